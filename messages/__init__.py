@@ -1,0 +1,1 @@
+"""The MAVLink dialect `pandion`: its XML, its generator and a fast frame codec."""
