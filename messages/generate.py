@@ -1,0 +1,75 @@
+"""Generate ``messages/dialect.py`` from ``pandion.xml`` with pymavlink's mavgen.
+
+Run by the build hook for every wheel and editable install, and by hand after an edit of the XML:
+``python -m messages.generate``. The definitions that the XML includes come from the installed
+pymavlink, so the same pymavlink always gives the same bytes.
+"""
+
+import contextlib
+import io
+import shutil
+import sys
+import tempfile
+from importlib.util import find_spec
+from pathlib import Path
+
+DEFINITION = Path(__file__).with_name("pandion.xml")
+GENERATED = Path(__file__).with_name("dialect.py")
+
+
+class GenerationError(RuntimeError):
+    """mavgen refused the XML; the message carries what it printed."""
+
+
+def generate(definition: Path = DEFINITION, destination: Path = GENERATED) -> None:
+    """Write the Python module of a dialect.
+
+    Args:
+        definition: XML that may include any definition shipped with pymavlink.
+        destination: Module to write; replaced in one step, so that a reader never sees half of it.
+
+    Raises:
+        GenerationError: The XML is invalid or clashes with what it includes.
+    """
+    with tempfile.TemporaryDirectory(dir=destination.parent) as folder:
+        # mavgen resolves includes beside the including file and takes the dialect's name from
+        # the output, so both live in one folder under the name of the definition.
+        for included in _pymavlink_definitions().glob("*.xml"):
+            shutil.copy(included, folder)
+        source = Path(folder, definition.name)
+        shutil.copy(definition, source)
+        module = source.with_suffix(".py")
+        _run_mavgen(source, module)
+        module.replace(destination)
+
+
+def _pymavlink_definitions() -> Path:
+    spec = find_spec("pymavlink")
+    if spec is None or spec.origin is None:
+        raise GenerationError("pymavlink is not installed; run `make setup`")
+    return Path(spec.origin).parent / "dialects" / "v20"
+
+
+def _run_mavgen(source: Path, module: Path) -> None:
+    from pymavlink.generator import mavgen, mavparse
+
+    options = mavgen.Opts(
+        str(module), wire_protocol=mavparse.PROTOCOL_2_0, language="Python3", validate=True
+    )
+    chatter = io.StringIO()
+    with contextlib.redirect_stdout(chatter), contextlib.redirect_stderr(chatter):
+        try:
+            accepted = mavgen.mavgen(options, [str(source)])
+        except SystemExit as refusal:  # mavgen's way to report an XML that breaks the schema
+            accepted = False
+            print(refusal.code, file=chatter)
+    if not accepted or not module.exists():
+        raise GenerationError(f"mavgen refused {source.name}:\n{chatter.getvalue().strip()}")
+
+
+if __name__ == "__main__":
+    try:
+        generate()
+    except GenerationError as error:
+        sys.exit(str(error))
+    print(f"generated {GENERATED.name} from {DEFINITION.name}")
