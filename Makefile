@@ -1,0 +1,90 @@
+# Every target does its own set-up; needed are python 3.11-3.13, pip, make and git; no root.
+# The environment is .venv, at the versions and hashes of requirements-dev.lock, wheels only.
+
+PYTHON ?= python3
+UV_VERSION := 0.13.8
+BIN := .venv/bin
+READY := .venv/ready
+
+# pip's configured index and the system's certificates serve uv as well, unless uv has its own.
+export UV_SYSTEM_CERTS ?= 1
+export UV_PYTHON_DOWNLOADS := never
+export UV_PYTHON_PREFERENCE := only-system
+ifndef UV_DEFAULT_INDEX
+pip_index := $(shell $(PYTHON) -m pip config get global.index-url 2>/dev/null)
+pip_index := $(or $(PIP_INDEX_URL),$(pip_index))
+ifneq ($(pip_index),)
+export UV_DEFAULT_INDEX := $(pip_index)
+endif
+endif
+
+.DEFAULT_GOAL := help
+.PHONY: help setup run test lock clean
+
+help: ## show this list
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-6s %s\n", $$1, $$2 }' Makefile
+
+setup: $(READY) messages/dialect.py ## create .venv with everything in it (nothing to do if nothing changed)
+	@echo "setup: .venv is ready"
+
+run: setup ## set up, then fly the three-wall scenario
+	$(BIN)/pandion fly walls
+
+# One line for a check that passes, all of its output for one that does not.
+define check
+@printf '%-14s' '$(1)'; if out=$$($(2) 2>&1); then echo "$$out" | grep . | tail -n 1; \
+	else printf 'failed: %s\n%s\n' '$(2)' "$$out"; exit 1; fi
+endef
+
+test: setup ## set up, then run every check: ruff, mypy, import-linter, pytest
+	$(call check,lint,$(BIN)/ruff check .)
+	$(call check,format,$(BIN)/ruff format --check .)
+	$(call check,types,$(BIN)/mypy)
+	$(call check,imports,$(BIN)/lint-imports)
+	$(BIN)/pytest
+
+# A uv that is there is used if it understands what is asked of it; else the pinned one is fetched
+# into .boot with pip alone, because a fresh Debian has neither ensurepip nor a pip that may install.
+.boot/uv:
+	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 14))' || \
+		{ echo "python 3.11, 3.12 or 3.13 is needed; choose one with: make PYTHON=python3.12"; exit 1; }
+	@mkdir -p .boot
+	@if uv venv --help 2>/dev/null | grep -q -e --system-certs; then \
+		echo "setup: using $$(uv --version)"; \
+		ln -sf "$$(command -v uv)" .boot/uv; \
+	else \
+		echo "setup: fetching uv $(UV_VERSION) into .boot"; \
+		$(PYTHON) -m venv --without-pip .boot/python && \
+		$(PYTHON) -m pip --python .boot/python/bin/python install --quiet --no-input \
+			--disable-pip-version-check --only-binary :all: uv==$(UV_VERSION) && \
+		ln -sf python/bin/uv .boot/uv; \
+	fi
+
+# Order-only: a newer uv is no reason to install again.
+$(READY): requirements-dev.lock pyproject.toml Makefile messages/build_hook.py | .boot/uv
+	@echo "setup: creating .venv"
+	@.boot/uv venv --quiet --allow-existing --no-project --python \
+		"$$($(PYTHON) -c 'import sys; print(sys.executable)')" .venv
+	@echo "setup: installing the locked packages (wheels only, hashes checked)"
+	@.boot/uv pip sync --quiet --python .venv --require-hashes --only-binary :all: \
+		requirements-dev.lock
+	@echo "setup: generating the MAVLink dialect and installing pandion"
+	@.boot/uv pip install --quiet --python .venv --no-build-isolation --no-deps --no-index --editable .
+	@touch $@
+
+# The install has generated it; this is for an edit of the XML.
+messages/dialect.py: messages/pandion.xml messages/generate.py | $(READY)
+	@$(BIN)/python -m messages.generate
+
+# Hashes only: no index, no download address, nothing of the machine that made the file.
+COMPILE = .boot/uv pip compile --quiet --upgrade --universal --python-version 3.11 --generate-hashes \
+	--only-binary :all: --no-emit-index-url --no-annotate --custom-compile-command 'make lock' pyproject.toml
+
+lock: .boot/uv ## renew requirements.lock (to fly) and requirements-dev.lock (to test as well)
+	$(COMPILE) --group build --output-file requirements.lock
+	$(COMPILE) --group dev --constraints requirements.lock --output-file requirements-dev.lock
+
+clean: ## remove the environment, generated files and caches
+	rm -rf .venv .boot build dist messages/dialect.py .mypy_cache .ruff_cache .pytest_cache \
+		.hypothesis .import_linter_cache
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
