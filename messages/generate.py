@@ -63,6 +63,9 @@ def _run_mavgen(source: Path, module: Path) -> None:
         except SystemExit as refusal:  # mavgen's way to report an XML that breaks the schema
             accepted = False
             print(refusal.code, file=chatter)
+        except (SyntaxError, FileNotFoundError) as refusal:  # not XML at all, or a missing include
+            accepted = False
+            print(refusal, file=chatter)
     if not accepted or not module.exists():
         raise GenerationError(f"mavgen refused {source.name}:\n{chatter.getvalue().strip()}")
 
