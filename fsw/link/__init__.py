@@ -1,0 +1,1 @@
+"""MAVLink on both sides of the flight software: the simulator or vehicle, and ground stations."""

@@ -1,0 +1,137 @@
+"""Standard MAVLink messages from the vehicle's snapshot; pure.
+
+Each encoder returns every field of its message in wire order (larger types first, see
+``messages.frames.wire_fields``), or None when there is nothing to say yet.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from fsw.geometry.rotation import euler_zyx, quaternion_from_matrix
+from fsw.link.px4_mode import custom_mode
+from fsw.link.telemetry import TelemetryContext
+from fsw.signals import FlightSnapshot, Mode, Vec3, Vec4
+
+WireValues = tuple[float | bytes, ...]
+
+_QUADROTOR: Final = 2  # MAV_TYPE
+_PX4: Final = 12  # MAV_AUTOPILOT
+_ARMED: Final = 128  # MAV_MODE_FLAG
+_GUIDED: Final = 8
+_STABILISED: Final = 16
+_CUSTOM_MODE: Final = 1
+_STANDBY, _ACTIVE, _CRITICAL = 3, 4, 5  # MAV_STATE
+_MAVLINK_VERSION: Final = 3
+_LOCAL_NED: Final = 1  # MAV_FRAME
+_ON_GROUND, _IN_AIR, _TAKEOFF, _LANDING = 1, 2, 3, 4  # MAV_LANDED_STATE
+_RATES_IGNORED: Final = 0x07  # ATTITUDE_TARGET_TYPEMASK
+_UNKNOWN_CURRENT: Final = -1
+_UNKNOWN_VOLTAGE: Final = 0xFFFF
+_U32: Final = 0xFFFFFFFF
+
+# MAV_SYS_STATUS_SENSOR bits of what this vehicle has.
+_GYRO, _ACCELEROMETER, _EXTERNAL_POSE = 0x1, 0x2, 0x80
+_RATE_CONTROL, _ATTITUDE, _YAW, _HEIGHT, _POSITION = 0x400, 0x800, 0x1000, 0x2000, 0x4000
+_MOTORS, _AHRS, _PREARM = 0x8000, 0x200000, 0x10000000
+_SENSING: Final = _GYRO | _ACCELEROMETER | _EXTERNAL_POSE | _AHRS
+_CONTROL: Final = _RATE_CONTROL | _ATTITUDE | _YAW | _HEIGHT | _POSITION
+_PRESENT: Final = _SENSING | _CONTROL | _MOTORS | _PREARM
+
+
+def heartbeat(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues:
+    """HEARTBEAT as PX4 would send it."""
+    base_mode = _CUSTOM_MODE | _STABILISED | _GUIDED | (_ARMED if snapshot.armed else 0)
+    status = _CRITICAL if snapshot.failures else (_ACTIVE if snapshot.armed else _STANDBY)
+    return (
+        custom_mode(snapshot.mode),
+        _QUADROTOR,
+        _PX4,
+        base_mode,
+        status,
+        _MAVLINK_VERSION,
+    )
+
+
+def sys_status(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues:
+    """SYS_STATUS: load of the loop, and health by subsystem.
+
+    Any active fault takes the pre-arm bit away; in the fault mode position control is gone too.
+    """
+    health = _PRESENT
+    if snapshot.failures:
+        health &= ~_PREARM
+    if snapshot.mode is Mode.FAULT:
+        health &= ~(_POSITION | _HEIGHT)
+    enabled = _PRESENT if snapshot.armed else _PRESENT & ~(_CONTROL | _MOTORS)
+    load = round(1000 * min(context.health.inner.load + context.health.mpc.load, 1.0))
+    return (
+        _PRESENT,
+        enabled,
+        health,
+        load,
+        _UNKNOWN_VOLTAGE,
+        _UNKNOWN_CURRENT,
+        0,
+        0,
+        *(0, 0, 0, 0),
+        -1,
+        *(0, 0, 0),
+    )
+
+
+def extended_sys_state(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues:
+    """EXTENDED_SYS_STATE: no VTOL, landed state by mode."""
+    landed = {Mode.TAKEOFF: _TAKEOFF, Mode.LAND: _LANDING}.get(snapshot.mode, _IN_AIR)
+    return (0, landed if snapshot.armed else _ON_GROUND)
+
+
+def attitude(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues:
+    """ATTITUDE."""
+    estimate = snapshot.estimate
+    return (_boot_ms(snapshot.t_us), *euler_zyx(estimate.R_WB), *estimate.w_WB_B)
+
+
+def attitude_quaternion(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues:
+    """ATTITUDE_QUATERNION; no offset for display."""
+    quaternion = quaternion_from_matrix(snapshot.estimate.R_WB)
+    rates = snapshot.estimate.w_WB_B
+    return (_boot_ms(snapshot.t_us), *quaternion, *rates, 0.0, 0.0, 0.0, 0.0)
+
+
+def local_position(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues:
+    """LOCAL_POSITION_NED of the body origin."""
+    return (_boot_ms(snapshot.t_us), *snapshot.estimate.p_WB, *snapshot.estimate.v_WB)
+
+
+def position_target(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues | None:
+    """POSITION_TARGET_LOCAL_NED: where the running plan wants the body origin now."""
+    plan = snapshot.plan_state
+    if plan is None:
+        return None
+    motion = (*plan.p, *plan.v, *plan.a)
+    return (_boot_ms(snapshot.t_us), *motion, plan.yaw, plan.yaw_rate, 0, _LOCAL_NED)
+
+
+def attitude_target(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues:
+    """ATTITUDE_TARGET: attitude reference and collective thrust, 0 to 1."""
+    thrust = sum(snapshot.actuators.rotor_thrust) / (4.0 * context.facts.rotor_thrust_max)
+    quaternion = _quaternion(snapshot.attitude_ref)
+    return (_boot_ms(snapshot.t_us), *quaternion, 0.0, 0.0, 0.0, thrust, _RATES_IGNORED)
+
+
+def _boot_ms(t_us: int) -> int:
+    return (t_us // 1000) & _U32
+
+
+def _quaternion(euler: Vec3) -> Vec4:
+    """Quaternion [w, x, y, z] of ZYX Euler angles [rad]."""
+    cr, cp, cy = (math.cos(0.5 * angle) for angle in euler)
+    sr, sp, sy = (math.sin(0.5 * angle) for angle in euler)
+    return (
+        cr * cp * cy + sr * sp * sy,
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+    )

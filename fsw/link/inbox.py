@@ -1,0 +1,114 @@
+"""What arrived since the last tick, from whichever link."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final, cast
+
+from fsw.link import decode, message_ids
+from fsw.link.decode import Numbers
+from fsw.signals import CommandRequest, EndEffectorTarget, SafeSet, Wall
+from messages.frames import Frame
+
+_MAX_COMMANDS: Final = 16  # a tick; a client sends one at a time and repeats it
+_MAX_TARGETS: Final = 64  # a tick
+
+
+class Inbox:
+    """Collects commands, targets and the safe set until a tick takes them.
+
+    Bounded: what does not fit is dropped and counted, as a lost datagram would be.
+    """
+
+    def __init__(self) -> None:
+        self.refused = 0  # messages with numbers of no use, or too many of them
+        self._commands: list[CommandRequest] = []
+        self._targets: list[EndEffectorTarget] = []
+        self._safe_set: SafeSet | None = None
+        self._walls: dict[int, Wall] = {}
+        self._wall_count = 0
+        self._handlers: dict[int, Callable[[Frame], None]] = {
+            message_ids.COMMAND_LONG: self._command_long,
+            message_ids.COMMAND_INT: self._command_int,
+            message_ids.END_EFFECTOR_TARGET: self._target,
+            message_ids.OBSTACLE_WALL: self._wall,
+            message_ids.WORKSPACE_SPHERE: self._sphere,
+        }
+
+    def accept(self, frame: Frame) -> None:
+        """Keep what the frame says if it is for this vehicle and of use; never raises."""
+        handler = self._handlers.get(frame.message_id)
+        if handler is not None:
+            handler(frame)
+
+    def take_commands(self) -> tuple[CommandRequest, ...]:
+        """Hand over the commands, in order of arrival."""
+        if not self._commands:
+            return ()
+        taken = tuple(self._commands)
+        self._commands.clear()
+        return taken
+
+    def take_targets(self) -> tuple[EndEffectorTarget, ...]:
+        """Hand over the trajectory points, in order of arrival."""
+        if not self._targets:
+            return ()
+        taken = tuple(self._targets)
+        self._targets.clear()
+        return taken
+
+    def take_safe_set(self) -> SafeSet | None:
+        """Hand over the safe set if a new one is complete."""
+        taken, self._safe_set = self._safe_set, None
+        return taken
+
+    def _command_long(self, frame: Frame) -> None:
+        self._add_command(decode.command_long(frame))
+
+    def _command_int(self, frame: Frame) -> None:
+        self._add_command(decode.command_int(frame))
+
+    def _add_command(self, request: CommandRequest | None) -> None:
+        if request is None:
+            return
+        if len(self._commands) >= _MAX_COMMANDS:
+            self.refused += 1
+            return
+        self._commands.append(request)
+
+    def _target(self, frame: Frame) -> None:
+        values = cast(Numbers, frame.payload_values)
+        if not decode.for_this_vehicle(values[13], values[14]):
+            return
+        target = decode.end_effector_target(values)
+        if target is None or len(self._targets) >= _MAX_TARGETS:
+            self.refused += 1
+            return
+        self._targets.append(target)
+
+    def _wall(self, frame: Frame) -> None:
+        values = cast(Numbers, frame.payload_values)
+        if not decode.for_this_vehicle(values[5], values[6]):
+            return
+        indexed = decode.obstacle_wall(values)
+        if indexed is None:
+            self.refused += 1
+            return
+        if indexed.count != self._wall_count:
+            # Another count announces another set; walls of two sets must not mix.
+            self._walls.clear()
+            self._wall_count = indexed.count
+        self._walls[indexed.index] = indexed.wall
+        if len(self._walls) == indexed.count:
+            self._safe_set = SafeSet(walls=tuple(self._walls[i] for i in range(indexed.count)))
+            self._walls.clear()
+
+    def _sphere(self, frame: Frame) -> None:
+        values = cast(Numbers, frame.payload_values)
+        if not decode.for_this_vehicle(values[4], values[5]):
+            return
+        sphere = decode.workspace_sphere(values)
+        if sphere is None:
+            self.refused += 1
+            return
+        self._safe_set = SafeSet(sphere=sphere)

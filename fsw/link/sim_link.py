@@ -1,0 +1,177 @@
+"""The link to the simulator: one datagram in, one datagram out, per step.
+
+The simulator sends everything that belongs to step t_k with HIL_SENSOR last, as the barrier; the
+answer ends with exactly one HIL_ACTUATOR_CONTROLS of the same time stamp. In lockstep the
+simulator repeats a step whose answer got lost: the same answer is sent again and no tick runs.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from enum import Enum
+from typing import Final, cast
+
+from fsw.link import decode, encode_replies, message_ids
+from fsw.link.decode import Numbers
+from fsw.link.inbox import Inbox
+from fsw.link.message_ids import AUTOPILOT, SYSTEM_ID
+from fsw.link.telemetry import VehicleFacts
+from fsw.link.udp_endpoint import Address, ConnectedEndpoint
+from fsw.signals import CommandAck, SensorFrame, TickOutputs
+from messages.frames import Frame, FrameWriter, split
+
+PATIENCE_S: Final = 0.2  # one wait for a datagram; also the interval of announcements
+
+_SHUTDOWN: Final = 246  # MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN
+_POWER_OFF: Final = 2.0  # its second parameter here: shut the autopilot down
+_ACCEPTED: Final = 0  # MAV_RESULT
+_MAX_BACKLOG: Final = 5  # steps worked off one by one; what is older is skipped
+
+
+class Pacing(Enum):
+    """Who waits for whom; the simulator says it in the custom_mode of its HEARTBEAT."""
+
+    REALTIME = 0
+    LOCKSTEP = 1
+
+
+class SimLink:
+    """Sensors in, actuators out, over one UDP connection."""
+
+    def __init__(self, simulator: Address, inbox: Inbox, facts: VehicleFacts) -> None:
+        self.pacing: Pacing | None = None  # known with the first step in lockstep
+        self.shutdown = False  # the simulator has ended the run
+        self.retransmissions = 0
+        self.skipped = 0  # steps that were too old to work off
+        self._endpoint = ConnectedEndpoint(simulator, PATIENCE_S)
+        self._inbox = inbox
+        self._writer = FrameWriter(SYSTEM_ID, AUTOPILOT)
+        self._thrust_scale = 1.0 / facts.rotor_thrust_max
+        self._torque_scale = 1.0 / facts.joint_torque_max
+        self._last_us = -1  # time of the newest step seen
+        self._answer: tuple[int, bytes] = (-1, b"")
+        self._acks: list[CommandAck] = []
+        self._text_id = 0
+        self._backlog: deque[SensorFrame] = deque()
+
+    def announce(self) -> None:
+        """Tell the simulator where the vehicle is, until it sends steps."""
+        values = (0, 2, 12, 0, 3, 3)  # quadrotor, PX4, standby
+        self._endpoint.send(self._writer.frame(message_ids.HEARTBEAT, *values))
+
+    def receive(self) -> SensorFrame | None:
+        """Wait for the next new step.
+
+        Returns:
+            Its sensors; commands, targets and the safe set it came with are in the inbox. None
+            when nothing new came within the patience, or when the run is over.
+        """
+        if self._backlog:
+            return self._backlog.popleft()
+        datagram = self._endpoint.receive()
+        if datagram is None:
+            return None
+        sensors = self._read(datagram)
+        if self.pacing is not Pacing.REALTIME:
+            return sensors
+        return self._oldest_worth_a_tick(sensors)
+
+    def queue_ack(self, ack: CommandAck) -> None:
+        """Send an acknowledgement with the next answer."""
+        self._acks.append(ack)
+
+    def answer(self, t_us: int, outputs: TickOutputs) -> None:
+        """Send the actuator command that belongs to the step of ``t_us``."""
+        values = encode_replies.hil_actuator_controls(
+            t_us,
+            outputs.actuators,
+            outputs.snapshot.armed,
+            self._thrust_scale,
+            self._torque_scale,
+        )
+        controls = self._writer.frame(message_ids.HIL_ACTUATOR_CONTROLS, *values)
+        if self._acks or outputs.texts:
+            controls = self._replies(outputs) + controls
+        self._answer = (t_us, controls)
+        self._endpoint.send(controls)
+
+    def close(self) -> None:
+        """Close the socket."""
+        self._endpoint.close()
+
+    def _oldest_worth_a_tick(self, sensors: SensorFrame | None) -> SensorFrame | None:
+        """Drain the socket: after a pause of the system several steps wait there.
+
+        A short backlog is worked off in order, because the loops count on their nominal period;
+        a long one is cut to its newest steps.
+        """
+        if sensors is not None:
+            self._backlog.append(sensors)
+        while (datagram := self._endpoint.receive_waiting()) is not None:
+            newer = self._read(datagram)
+            if newer is not None:
+                self._backlog.append(newer)
+        while len(self._backlog) > _MAX_BACKLOG:
+            self._backlog.popleft()
+            self.skipped += 1
+        return self._backlog.popleft() if self._backlog else None
+
+    def _read(self, datagram: bytes) -> SensorFrame | None:
+        """Decode one datagram; None unless it carries a whole new step."""
+        frames = list(split(datagram))
+        payloads = {frame.message_id: cast(Numbers, frame.payload_values) for frame in frames}
+        barrier = payloads.get(message_ids.HIL_SENSOR)
+        if barrier is None:
+            self._read_between_steps(frames)
+            return None
+        t_us = int(barrier[0])
+        if t_us <= self._last_us:
+            self._repeat(t_us)
+            return None
+        odometry = payloads.get(message_ids.ODOMETRY)
+        arm = payloads.get(message_ids.ARM_JOINT_STATE)
+        if odometry is None or arm is None:
+            return None
+        self._last_us = t_us
+        if len(frames) > 3:
+            for frame in frames:
+                self._note(frame)
+        return decode.sensor_frame(odometry, arm, barrier)
+
+    def _note(self, frame: Frame) -> None:
+        if frame.message_id == message_ids.HEARTBEAT:
+            custom_mode = frame.payload_values[0]
+            self.pacing = Pacing.LOCKSTEP if custom_mode == 1 else Pacing.REALTIME
+        else:
+            self._inbox.accept(frame)
+
+    def _repeat(self, t_us: int) -> None:
+        answered_us, answer = self._answer
+        if t_us == answered_us:
+            self.retransmissions += 1
+            self._endpoint.send(answer)
+
+    def _read_between_steps(self, frames: list[Frame]) -> None:
+        for frame in frames:
+            if frame.message_id == message_ids.COMMAND_LONG:
+                request = decode.command_long(frame)
+                if (
+                    request is not None
+                    and request.command == _SHUTDOWN
+                    and request.params[1] == _POWER_OFF
+                ):
+                    self.shutdown = True
+                    ack = CommandAck(_SHUTDOWN, _ACCEPTED, frame.system_id, frame.component_id)
+                    self._endpoint.send(self._ack_frame(ack))
+
+    def _replies(self, outputs: TickOutputs) -> bytes:
+        frames = [self._ack_frame(ack) for ack in self._acks]
+        self._acks.clear()
+        for text in outputs.texts:
+            self._text_id = self._text_id % 0xFFFF + 1
+            for values in encode_replies.status_texts(text, self._text_id):
+                frames.append(self._writer.frame(message_ids.STATUSTEXT, *values))
+        return b"".join(frames)
+
+    def _ack_frame(self, ack: CommandAck) -> bytes:
+        return self._writer.frame(message_ids.COMMAND_ACK, *encode_replies.command_ack(ack))

@@ -1,0 +1,130 @@
+"""The only sockets of the flight software.
+
+Timeouts are set in the kernel (SO_RCVTIMEO): Python's own timeout costs one more system call for
+each datagram.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import re
+import socket
+import struct
+from typing import Final
+
+Address = tuple[str, int]
+
+MAX_DATAGRAM: Final = 2048  # bytes; a larger datagram is cut and its last frame then refused
+
+_ADDRESS = re.compile(r"udp:(?P<host>[^:\s]+):(?P<port>\d{1,5})")
+_RECEIVE_BUFFER: Final = 1 << 20  # bytes: rides out a pause of the receiver
+
+
+class LinkError(Exception):
+    """A link that cannot be opened, in one sentence for the operator."""
+
+
+def parse_address(text: str, *, any_port: bool = False) -> Address:
+    """Read ``udp:HOST:PORT``.
+
+    Args:
+        text: The address as typed.
+        any_port: Allow port 0, which lets the system choose.
+
+    Returns:
+        The host as an IPv4 address and the port.
+
+    Raises:
+        LinkError: The text has another form, the port is out of range, or the host is unknown.
+    """
+    match = _ADDRESS.fullmatch(text)
+    if match is None:
+        raise LinkError(f"address {text!r} is not of the form udp:HOST:PORT")
+    port = int(match["port"])
+    if not (0 if any_port else 1) <= port <= 65535:
+        raise LinkError(f"address {text!r}: port {port} is outside 1..65535")
+    try:
+        return socket.gethostbyname(match["host"]), port
+    except OSError:
+        raise LinkError(f"address {text!r}: host {match['host']!r} is not known") from None
+
+
+class ConnectedEndpoint:
+    """A socket that talks to one peer; the kernel drops whatever comes from elsewhere."""
+
+    def __init__(self, peer: Address, patience_s: float) -> None:
+        """Open a socket towards ``peer``.
+
+        Args:
+            peer: Where to send and whom to hear.
+            patience_s: How long :meth:`receive` waits [s].
+
+        Raises:
+            LinkError: The system refuses the peer's address.
+        """
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        seconds = int(patience_s)
+        waiting = struct.pack("ll", seconds, round((patience_s - seconds) * 1e6))
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, waiting)
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _RECEIVE_BUFFER)
+        try:
+            self._socket.connect(peer)
+        except OSError as error:
+            self._socket.close()
+            raise LinkError(f"cannot send to udp:{peer[0]}:{peer[1]}: {error.strerror}") from None
+
+    def receive(self) -> bytes | None:
+        """Wait for a datagram; None when the patience is over or nobody listens at the peer."""
+        try:
+            return self._socket.recv(MAX_DATAGRAM)
+        except (BlockingIOError, ConnectionRefusedError):
+            return None
+
+    def receive_waiting(self) -> bytes | None:
+        """Return a datagram that is already there, or None."""
+        try:
+            return self._socket.recv(MAX_DATAGRAM, socket.MSG_DONTWAIT)
+        except (BlockingIOError, ConnectionRefusedError):
+            return None
+
+    def send(self, datagram: bytes) -> None:
+        """Send one datagram; UDP promises nothing, so neither does this."""
+        with contextlib.suppress(OSError):
+            self._socket.send(datagram)
+
+    def close(self) -> None:
+        """Give the port back."""
+        self._socket.close()
+
+
+class OpenEndpoint:
+    """A socket that talks to anyone and never waits."""
+
+    def __init__(self) -> None:
+        """Bind to a port the system chooses, so that any number of vehicles share a machine."""
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _RECEIVE_BUFFER)
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
+        self._socket.bind(("", 0))
+        self._socket.setblocking(False)
+
+    @property
+    def port(self) -> int:
+        """The local port."""
+        return int(self._socket.getsockname()[1])
+
+    def receive_waiting(self) -> tuple[bytes, Address] | None:
+        """Return a datagram that is already there and its sender, or None."""
+        try:
+            return self._socket.recvfrom(MAX_DATAGRAM)
+        except OSError:
+            return None
+
+    def send(self, datagram: bytes, peer: Address) -> None:
+        """Send one datagram; a peer that cannot be reached is no reason to stop flying."""
+        with contextlib.suppress(OSError):
+            self._socket.sendto(datagram, peer)
+
+    def close(self) -> None:
+        """Give the port back."""
+        self._socket.close()

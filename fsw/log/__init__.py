@@ -1,0 +1,1 @@
+"""What a flight leaves on disk."""
