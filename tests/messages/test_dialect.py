@@ -1,5 +1,6 @@
 """The dialect as peers know it: a change here is a change of the protocol."""
 
+import re
 import xml.etree.ElementTree as ET
 
 from messages import dialect
@@ -41,6 +42,12 @@ def test_every_private_message_keeps_its_id_length_and_crc_extra():
         if message_id >= common_ids
     }
     assert private == PINNED
+
+
+def test_the_catalogue_shows_the_same_numbers():
+    catalogue = DEFINITION.with_name("README.md").read_text()
+    rows = re.findall(r"^\| ([A-Z_]+) \| (\d+) \| (\d+) \| (\d+) \|", catalogue, re.MULTILINE)
+    assert {name: tuple(map(int, numbers)) for name, *numbers in rows} == PINNED
 
 
 def test_every_private_enum_keeps_its_values():

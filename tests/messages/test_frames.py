@@ -139,12 +139,11 @@ def test_a_sender_needs_ids_that_can_be_addressed(ids):
         FrameWriter(*ids)
 
 
-@pytest.mark.parametrize("message", dialect.mavlink_map.values(), ids=lambda m: m.msgname)
-def test_wire_fields_names_every_value_of_every_message(message):
-    names = wire_fields(message.id)
-    assert (
-        len(names) == len(set(names)) == len(message.unpacker.unpack(bytes(message.unpacker.size)))
-    )
+def test_wire_fields_names_every_value_of_every_message():
+    for message_id, message in dialect.mavlink_map.items():
+        names = wire_fields(message_id)
+        values = message.unpacker.unpack(bytes(message.unpacker.size))
+        assert len(names) == len(set(names)) == len(values), message.msgname
 
 
 def test_wire_fields_writes_arrays_out():
