@@ -6,17 +6,13 @@ UV_VERSION := 0.13.8
 BIN := .venv/bin
 READY := .venv/ready
 
-# pip's configured index and the system's certificates serve uv as well, unless uv has its own.
+# uv trusts the system's certificates and asks the index that pip is configured for, unless
+# UV_DEFAULT_INDEX names another one.
 export UV_SYSTEM_CERTS ?= 1
 export UV_PYTHON_DOWNLOADS := never
 export UV_PYTHON_PREFERENCE := only-system
-ifndef UV_DEFAULT_INDEX
-pip_index := $(shell $(PYTHON) -m pip config get global.index-url 2>/dev/null)
-pip_index := $(or $(PIP_INDEX_URL),$(pip_index))
-ifneq ($(pip_index),)
-export UV_DEFAULT_INDEX := $(pip_index)
-endif
-endif
+PIP_INDEX = $${PIP_INDEX_URL:-$$($(PYTHON) -m pip config get global.index-url 2>/dev/null || true)}
+UV = UV_DEFAULT_INDEX="$${UV_DEFAULT_INDEX:-$(PIP_INDEX)}" .boot/uv
 
 .DEFAULT_GOAL := help
 .PHONY: help setup run test lock clean
@@ -66,7 +62,7 @@ $(READY): requirements-dev.lock pyproject.toml Makefile messages/build_hook.py |
 	@.boot/uv venv --quiet --allow-existing --no-project --python \
 		"$$($(PYTHON) -c 'import sys; print(sys.executable)')" .venv
 	@echo "setup: installing the locked packages (wheels only, hashes checked)"
-	@.boot/uv pip sync --quiet --python .venv --require-hashes --only-binary :all: \
+	@$(UV) pip sync --quiet --python .venv --require-hashes --only-binary :all: \
 		requirements-dev.lock
 	@echo "setup: generating the MAVLink dialect and installing pandion"
 	@.boot/uv pip install --quiet --python .venv --no-build-isolation --no-deps --no-index --editable .
@@ -77,12 +73,14 @@ messages/dialect.py: messages/pandion.xml messages/generate.py | $(READY)
 	@$(BIN)/python -m messages.generate
 
 # Hashes only: no index, no download address, nothing of the machine that made the file.
-COMPILE = .boot/uv pip compile --quiet --upgrade --universal --python-version 3.11 --generate-hashes \
+COMPILE = $(UV) pip compile --quiet --upgrade --universal --python-version 3.11 --generate-hashes \
 	--only-binary :all: --no-emit-index-url --no-annotate --custom-compile-command 'make lock' pyproject.toml
 
 lock: .boot/uv ## renew requirements.lock (to fly) and requirements-dev.lock (to test as well)
-	$(COMPILE) --group build --output-file requirements.lock
-	$(COMPILE) --group dev --constraints requirements.lock --output-file requirements-dev.lock
+	@echo "lock: resolving the newest versions"
+	@$(COMPILE) --group build --output-file requirements.lock
+	@$(COMPILE) --group dev --constraints requirements.lock --output-file requirements-dev.lock
+	@git diff --stat -- requirements.lock requirements-dev.lock
 
 clean: ## remove the environment, generated files and caches
 	rm -rf .venv .boot build dist messages/dialect.py .mypy_cache .ruff_cache .pytest_cache \
