@@ -1,0 +1,1 @@
+"""The simulator: an aerial manipulator, its world and its sensors, seen only through messages."""

@@ -1,0 +1,74 @@
+"""Checks across the keys of a scenario: what no single range can say."""
+
+from __future__ import annotations
+
+import math
+
+from sitl.scenario import Lissajous, Scenario
+from sitl.scenario_file import ScenarioError
+from sitl.world import POINTS
+
+MARGINS_MAX = 16  # what one BARRIER_MARGIN message carries
+
+
+def check(scenario: Scenario) -> None:
+    """Refuse a scenario whose parts contradict each other.
+
+    Raises:
+        ScenarioError: With the key, the value and what is allowed.
+    """
+    _check_walls(scenario)
+    _check_names(scenario)
+    curve = scenario.trajectory
+    if isinstance(curve, Lissajous) and not (2.0 * curve.ramp_s <= curve.duration_s):
+        raise ScenarioError(
+            f"trajectory.ramp_s = {curve.ramp_s:g}: must be at most half of "
+            f"trajectory.duration_s = {curve.duration_s:g}"
+        )
+    hop, ground = scenario.pilot.plan == "hop", scenario.start.kind == "ground"
+    if hop != ground and scenario.pilot.plan != "none":
+        raise ScenarioError(
+            f'pilot.plan = "{scenario.pilot.plan}": start.kind = "{scenario.start.kind}" needs '
+            f'"{"hop" if ground else "trajectory"}" or "none"'
+        )
+
+
+def _check_walls(scenario: Scenario) -> None:
+    for i, wall in enumerate(scenario.walls):
+        length = math.sqrt(sum(c * c for c in wall.normal))
+        if not (abs(length - 1.0) <= 1e-6):
+            raise ScenarioError(
+                f"walls[{i}].normal = {list(wall.normal)}: must have length 1, has {length:.6g}"
+            )
+    count = len(scenario.walls) * len(POINTS) + (scenario.workspace is not None)
+    if count > MARGINS_MAX:
+        most = MARGINS_MAX // len(POINTS)
+        raise ScenarioError(f"walls = {len(scenario.walls)} tables: must be at most {most}")
+
+
+def _check_names(scenario: Scenario) -> None:
+    for key, names in (
+        ("walls", [wall.name for wall in scenario.walls]),
+        ("disturbances", [item.name for item in scenario.disturbances]),
+    ):
+        for i, name in enumerate(names):
+            if name in names[:i]:
+                raise ScenarioError(f'{key}[{i}].name = "{name}": must differ from the others')
+            if not name or len(name) > 24 or "/" in name:
+                raise ScenarioError(
+                    f'{key}[{i}].name = "{name}": must be 1 to 24 characters without "/"'
+                )
+
+
+def check_start(keys: tuple[str, ...], margins: tuple[float, ...]) -> None:
+    """Refuse a start outside the safe set.
+
+    Raises:
+        ScenarioError: With the constraint and its margin at t = 0.
+    """
+    for key, margin in zip(keys, margins, strict=True):
+        if not (margin > 0.0):
+            raise ScenarioError(
+                f"the scenario starts outside its safe set: margin {key} = "
+                f"{1000.0 * margin:.1f} mm at t = 0, must be above 0"
+            )

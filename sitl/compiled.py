@@ -1,0 +1,46 @@
+"""Typed door to numba: every kernel of the simulator is compiled through this wrapper."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import ParamSpec, TypeVar
+
+import numba
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+_PACKAGE = Path(__file__).parent
+
+
+def _sources_digest() -> str:
+    """Digest of every source file of the package that can hold a kernel."""
+    digest = hashlib.sha256()
+    for path in sorted(_PACKAGE.rglob("*.py")):
+        if "compiled" in (text := path.read_text(encoding="utf-8")):
+            digest.update(text.encode())
+    return digest.hexdigest()[:12]
+
+
+# numba stamps a cached kernel with its own file only: after an edit in a callee the caller
+# would still run the old machine code. A cache directory per state of the sources cannot.
+_CACHE_DIR = str(_PACKAGE / "__pycache__" / f"numba-{_sources_digest()}")
+
+
+def compiled(function: Callable[P, R]) -> Callable[P, R]:
+    """Compile ``function`` to machine code on first call, cached on disk.
+
+    ``error_model="numpy"``: a division by zero gives inf/nan, which the simulation detects as
+    divergence, instead of an exception test in every division.
+    """
+    before = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = _CACHE_DIR
+    try:
+        kernel: Callable[P, R] = numba.njit(
+            cache=True, fastmath=False, nogil=True, error_model="numpy"
+        )(function)
+    finally:
+        numba.config.CACHE_DIR = before
+    return kernel

@@ -1,0 +1,1 @@
+"""What pushes the vehicle about: scenario items that add up."""

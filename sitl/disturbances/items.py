@@ -1,0 +1,106 @@
+"""One class per kind of disturbance; each is asked once per step, in order."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+
+from sitl.scenario import V3, Disturbance, Impulses, Torque, Uniform, Wind
+from sitl.seeds import stream
+
+STILL: V3 = (0.0, 0.0, 0.0)
+
+
+class Push(Protocol):
+    """A disturbance in flight."""
+
+    torque: bool  # what ``sample`` returns: torque [N·m, B] if set, else acceleration [m/s², W]
+
+    def sample(self, step: int) -> V3:
+        """The value held over step ``step``; steps are asked for in increasing order."""
+        ...
+
+
+class Resampled:
+    """Uniform within ±amplitude on each axis, drawn anew every ``every`` steps."""
+
+    def __init__(
+        self, amplitude: float, every: int, torque: bool, random: np.random.Generator
+    ) -> None:
+        self.torque = torque
+        self._amplitude = amplitude
+        self._every = every
+        self._random = random
+        self._held = STILL
+
+    def sample(self, step: int) -> V3:
+        """See ``Push``."""
+        if step % self._every == 0:
+            x, y, z = self._random.uniform(-self._amplitude, self._amplitude, 3)
+            self._held = (float(x), float(y), float(z))
+        return self._held
+
+
+class Constant:
+    """The same push for ever."""
+
+    torque = False
+
+    def __init__(self, acceleration: V3) -> None:
+        self._acceleration = acceleration
+
+    def sample(self, step: int) -> V3:
+        """See ``Push``."""
+        return self._acceleration
+
+
+class RandomImpulses:
+    """Pushes after exponentially distributed pauses, directions uniform on the sphere."""
+
+    torque = False
+
+    def __init__(
+        self, magnitude: float, pause_steps: float, length: int, random: np.random.Generator
+    ) -> None:
+        self._magnitude = magnitude
+        self._pause_steps = pause_steps
+        self._length = length
+        self._random = random
+        self._held = STILL
+        self._from = self._pause()
+        self._until = 0
+
+    def _pause(self) -> int:
+        return max(1, round(self._random.exponential(self._pause_steps)))
+
+    def sample(self, step: int) -> V3:
+        """See ``Push``."""
+        if step == self._from:
+            direction = self._random.standard_normal(3)
+            x, y, z = self._magnitude * direction / np.linalg.norm(direction)
+            self._held = (float(x), float(y), float(z))
+            self._until = step + self._length
+            self._from = self._until + self._pause()
+        return self._held if step < self._until else STILL
+
+
+def push(item: Disturbance, seed: int, step_s: float) -> Push:
+    """The running form of one scenario item."""
+    if isinstance(item, Wind):
+        return Constant(item.acceleration_m_s2)
+    random = stream(seed, "disturbance", item.kind, item.name)
+    if isinstance(item, Uniform):
+        return Resampled(item.amplitude_m_s2, round(item.period_s / step_s), False, random)
+    if isinstance(item, Torque):
+        return Resampled(item.amplitude_n_m, round(item.period_s / step_s), True, random)
+    return _impulses(item, random, step_s)
+
+
+def _impulses(item: Impulses, random: np.random.Generator, step_s: float) -> RandomImpulses:
+    return RandomImpulses(
+        item.magnitude_m_s2,
+        item.mean_interval_s / step_s,
+        max(1, round(item.duration_s / step_s)),
+        random,
+    )

@@ -1,0 +1,1 @@
+"""The exact coupled model of a multirotor with an arm; shares no physics with the controller."""

@@ -1,0 +1,51 @@
+"""Feet on the ground plane z = 0."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from sitl.compiled import compiled
+from sitl.plant.vector import V3, Array, add, cross, row, times, transposed_times
+
+
+class Feet(NamedTuple):
+    """Numbers of the landing gear for the kernels (see ``parameters.Legs``)."""
+
+    points: Array  # (k, 3) m, in B
+    reach: float  # m, largest distance of a foot from the base origin
+    stiffness: float  # N/m
+    dissipation: float  # s/m
+    friction: float
+    slip_rate: float  # m/s
+
+
+@compiled
+def foot_force(feet: Feet, depth: float, v: V3) -> V3:
+    """Ground reaction on one foot [N, W].
+
+    Hunt–Crossley normal force: unlike a linear damper it grows from zero at touch-down, so
+    the integrator sees no jump. Never pulls.
+    """
+    normal = max(feet.stiffness * depth * (1.0 + feet.dissipation * v[2]), 0.0)
+    slip = np.sqrt(v[0] * v[0] + v[1] * v[1] + feet.slip_rate * feet.slip_rate)
+    grip = -feet.friction * normal / slip
+    return (grip * v[0], grip * v[1], -normal)
+
+
+@compiled
+def ground_wrench(feet: Feet, p: V3, v: V3, w: V3, rotation: Array) -> tuple[V3, V3]:
+    """Force and moment about the base origin of all feet [N and N·m, both in B]."""
+    force = moment = (0.0, 0.0, 0.0)
+    if p[2] + feet.reach < 0.0:
+        return force, moment
+    for i in range(feet.points.shape[0]):
+        foot = row(feet.points[i])
+        depth = p[2] + times(rotation, foot)[2]
+        if depth > 0.0:
+            v_foot = add(v, times(rotation, cross(w, foot)))
+            f = transposed_times(rotation, foot_force(feet, depth, v_foot))
+            force = add(force, f)
+            moment = add(moment, cross(foot, f))
+    return force, moment

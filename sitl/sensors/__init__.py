@@ -1,0 +1,1 @@
+"""What the vehicle can measure: truth, delayed and with noise."""

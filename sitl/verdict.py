@@ -1,0 +1,130 @@
+"""How a run ended and what it scored, from the plant's truth."""
+
+from __future__ import annotations
+
+import enum
+import math
+from dataclasses import dataclass
+
+from sitl.scenario import V3
+
+
+class EndKind(enum.Enum):
+    """Why a run ended."""
+
+    DURATION = "duration"  # the scenario's time is over
+    MISSION = "mission"  # the pilot finished its plan before that
+    COLLISION = "collision"
+    CRASH = "crash"
+    DIVERGED = "diverged"
+    REFUSED = "refused"  # the vehicle denied the pilot
+    STOPPED = "stopped"  # from outside: interrupt, lost peer
+
+
+@dataclass(frozen=True, slots=True)
+class EndReason:
+    """The end of a run in one sentence."""
+
+    kind: EndKind
+    sentence: str
+    t_us: int
+
+
+@dataclass(frozen=True, slots=True)
+class TruthResult:
+    """The score of a run."""
+
+    completed: bool
+    end_reason: str
+    duration_s: float
+    tracking_error_rms_m: float | None  # None before the first sample
+    tracking_error_max_m: float | None
+    margins_m: dict[str, float]  # intersample minimum per constraint
+    min_margin_m: float | None  # None without constraints
+    min_margin_key: str | None
+    min_margin_time_s: float | None
+
+
+class TrackingError:
+    """Root mean square and maximum of the end-effector's distance from its reference.
+
+    Source: TE of the paper, one sample per planning step.
+    """
+
+    def __init__(self) -> None:
+        self._squares = 0.0
+        self._count = 0
+        self.maximum: float | None = None
+
+    def add(self, p: V3, target: V3) -> None:
+        """Take one sample of the true and the desired position [m]."""
+        error = math.dist(p, target)
+        self._squares += error * error
+        self._count += 1
+        self.maximum = error if self.maximum is None else max(error, self.maximum)
+
+    @property
+    def rms(self) -> float | None:
+        """Root mean square [m], None before the first sample."""
+        return math.sqrt(self._squares / self._count) if self._count else None
+
+
+class MarginRecord:
+    """Smallest value of every margin and when it was reached."""
+
+    def __init__(self, keys: tuple[str, ...]) -> None:
+        self.keys = keys
+        self.minimum = [math.inf] * len(keys)
+        self.time_s = [0.0] * len(keys)
+
+    def add(self, values: tuple[float, ...], time_s: float) -> None:
+        """Take the margins [m] at one time, in the order of ``keys``."""
+        minimum = self.minimum
+        for i, value in enumerate(values):
+            # Written so that NaN is recorded, not passed over.
+            if not (value >= minimum[i]):
+                minimum[i] = value
+                self.time_s[i] = time_s
+
+    def worst(self) -> int | None:
+        """Index of the smallest margin, None while there is none."""
+        seen = [i for i, value in enumerate(self.minimum) if value != math.inf]
+        return min(seen, key=lambda i: self.minimum[i], default=None)
+
+
+def violation(record: MarginRecord) -> str | None:
+    """A sentence about the deepest violated margin, None if all held."""
+    worst = record.worst()
+    if worst is None or record.minimum[worst] >= 0.0:
+        return None
+    depth = -1000.0 * record.minimum[worst]
+    return (
+        f"the {record.keys[worst]} margin was violated by {depth:.1f} mm "
+        f"at {record.time_s[worst]:.2f} s"
+    )
+
+
+def score(
+    end: EndReason | None, time_s: float, error: TrackingError, record: MarginRecord, hop: bool
+) -> TruthResult:
+    """The result of a run that ended with ``end`` (None: still running) at ``time_s``."""
+    broken = violation(record)
+    worst = record.worst()
+    whole = EndKind.MISSION if hop else EndKind.DURATION
+    flown = end is not None and end.kind in (whole, EndKind.MISSION)
+    parts = [end.sentence if end is not None else "still flying"]
+    if hop and end is not None and end.kind is EndKind.DURATION:
+        parts.append("the vehicle had not landed and disarmed by then")
+    if broken is not None:
+        parts.append(broken)
+    return TruthResult(
+        completed=flown and broken is None,
+        end_reason="; ".join(parts),
+        duration_s=time_s,
+        tracking_error_rms_m=error.rms,
+        tracking_error_max_m=error.maximum,
+        margins_m={k: m for k, m in zip(record.keys, record.minimum, strict=True) if m != math.inf},
+        min_margin_m=None if worst is None else record.minimum[worst],
+        min_margin_key=None if worst is None else record.keys[worst],
+        min_margin_time_s=None if worst is None else record.time_s[worst],
+    )

@@ -1,0 +1,66 @@
+"""Walls, workspace and ground, judged on the plant's true state."""
+
+from __future__ import annotations
+
+import math
+
+from sitl.scenario import V3, Scenario, Wall, Workspace
+
+POINTS = ("base", "joint2", "end_effector")  # critical points, in the order of the paper
+
+
+def wall_distance(wall: Wall, p: V3) -> float:
+    """Distance of a point from the wall's surface [m], positive in free space."""
+    n = wall.normal
+    return n[0] * p[0] + n[1] * p[1] + n[2] * p[2] - wall.offset_m
+
+
+def workspace_margin(workspace: Workspace, p_base: V3, p_target: V3) -> float:
+    """R − |base − centre| [m]; the centre rides ``d_iw`` above the end-effector's reference."""
+    x, y = p_base[0] - p_target[0], p_base[1] - p_target[1]
+    z = p_base[2] - (p_target[2] - workspace.d_iw_m)
+    distance: float = (x * x + y * y + z * z) ** 0.5
+    return workspace.radius_m - distance
+
+
+class World:
+    """The surroundings of one scenario."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        self.walls = scenario.walls
+        self.workspace = scenario.workspace
+        wall_keys = [f"{wall.name}/{point}" for wall in self.walls for point in POINTS]
+        self.keys = (*wall_keys, *(("workspace/base",) if self.workspace else ()))
+
+    def margins(self, points: tuple[V3, V3, V3], target: V3 | None) -> tuple[float, ...]:
+        """Margins [m] in the order of ``keys``.
+
+        Args:
+            points: Base, joint 2 and end-effector [m, NED].
+            target: End-effector reference [m, NED]; None while the workspace does not apply,
+                its margin is then infinite.
+        """
+        values = [
+            wall_distance(wall, point) - wall.clearance_m for wall in self.walls for point in points
+        ]
+        if self.workspace is not None:
+            values.append(
+                math.inf if target is None else workspace_margin(self.workspace, points[0], target)
+            )
+        return tuple(values)
+
+    def collision(self, points: tuple[V3, V3, V3]) -> str | None:
+        """A sentence if a critical point touches a wall or the ground, else None."""
+        for wall in self.walls:
+            for name, point in zip(POINTS, points, strict=True):
+                if not (wall_distance(wall, point) > 0.0):
+                    return f"{spoken(name)} hit the {wall.name} wall"
+        for name, point in zip(POINTS, points, strict=True):
+            if not (point[2] < 0.0):
+                return f"{spoken(name)} hit the ground"
+        return None
+
+
+def spoken(point: str) -> str:
+    """A critical point's name as part of a sentence."""
+    return {"base": "the base", "joint2": "joint 2", "end_effector": "the end-effector"}[point]
