@@ -28,7 +28,7 @@ run: setup ## set up, then fly the three-wall scenario
 
 # One line for a check that passes, all of its output for one that does not.
 define check
-@printf '%-14s' '$(1)'; if out=$$($(2) 2>&1); then echo "$$out" | grep . | tail -n 1; \
+@printf '%-14s' '$(1)'; if out=$$($(2) 2>&1); then printf '%s\n' "$$out" | grep . | tail -n 1; \
 	else printf 'failed: %s\n%s\n' '$(2)' "$$out"; exit 1; fi
 endef
 
