@@ -13,6 +13,7 @@ from fsw.geometry.rotation import euler_zyx, quaternion_from_matrix
 from fsw.link.px4_mode import custom_mode
 from fsw.link.telemetry import TelemetryContext
 from fsw.signals import FlightSnapshot, Mode, Vec3, Vec4
+from fsw.vehicle.faults import Fault
 
 WireValues = tuple[float | bytes, ...]
 
@@ -38,6 +39,14 @@ _MOTORS, _AHRS, _PREARM = 0x8000, 0x200000, 0x10000000
 _SENSING: Final = _GYRO | _ACCELEROMETER | _EXTERNAL_POSE | _AHRS
 _CONTROL: Final = _RATE_CONTROL | _ATTITUDE | _YAW | _HEIGHT | _POSITION
 _PRESENT: Final = _SENSING | _CONTROL | _MOTORS | _PREARM
+# Which subsystem an operator should look at; any fault also forbids arming.
+_SUSPECT: Final[dict[str, int]] = {
+    Fault.PLAN_REFUSED.value: 0,
+    Fault.PLAN_STALE.value: _POSITION | _HEIGHT,
+    Fault.OUTPUT_NOT_FINITE.value: _MOTORS,
+    Fault.ESTIMATE_INVALID.value: _AHRS | _EXTERNAL_POSE,
+    Fault.TILT_LOST.value: _ATTITUDE | _RATE_CONTROL,
+}
 
 
 def heartbeat(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues:
@@ -55,15 +64,10 @@ def heartbeat(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues:
 
 
 def sys_status(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues:
-    """SYS_STATUS: load of the loop, and health by subsystem.
-
-    Any active fault takes the pre-arm bit away; in the fault mode position control is gone too.
-    """
+    """SYS_STATUS: load of the loop, and health by subsystem."""
     health = _PRESENT
-    if snapshot.failures:
-        health &= ~_PREARM
-    if snapshot.mode is Mode.FAULT:
-        health &= ~(_POSITION | _HEIGHT)
+    for failure in snapshot.failures:
+        health &= ~(_SUSPECT.get(failure, 0) | _PREARM)
     enabled = _PRESENT if snapshot.armed else _PRESENT & ~(_CONTROL | _MOTORS)
     load = round(1000 * min(context.health.inner.load + context.health.mpc.load, 1.0))
     return (

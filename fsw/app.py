@@ -1,0 +1,189 @@
+"""Builds the flight software and flies it: the only place that makes objects."""
+
+from __future__ import annotations
+
+import traceback
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+from fsw.arguments import FswOptions
+from fsw.link.gcs_link import GcsLink
+from fsw.link.inbox import Inbox
+from fsw.link.sim_link import Pacing, SimLink
+from fsw.link.telemetry import LoopHealth, TelemetryContext, VehicleFacts
+from fsw.link.udp_endpoint import LinkError, parse_address
+from fsw.log.run_directory import new_run_directory
+from fsw.log.tlog import TlogWriter
+from fsw.ports import Planner, PlanService
+from fsw.runtime import clock, report
+from fsw.runtime.effort import EffortRecord
+from fsw.runtime.events import Events, events
+from fsw.runtime.planner_worker import InlinePlanner, PlannerRecord, ThreadedPlanner
+from fsw.runtime.process import (
+    StopRequest,
+    claim_real_time,
+    release_real_time,
+    settle_memory,
+)
+from fsw.runtime.program import FlightProgram
+from fsw.runtime.sim_loop import Ending, FlightEnd, SimLoop, FlightRecord
+from fsw.runtime.timing import GroupTimer
+
+DONE, NOT_COMPLETED, COULD_NOT_START = 0, 1, 2  # exit codes
+
+State = TypeVar("State")
+ProgramLoader = Callable[[FswOptions], FlightProgram[Any]]
+
+
+class CouldNotStart(Exception):
+    """Why there is no flight, in one sentence."""
+
+
+def run(options: FswOptions, load: ProgramLoader | None = None) -> int:
+    """Fly once.
+
+    Args:
+        options: From the command line.
+        load: Makes what is flown; the flight software proper when None.
+
+    Returns:
+        The exit code.
+    """
+    told = events(options.events)
+    try:
+        return _Session(options, told, load or load_flight_software).run()
+    except (CouldNotStart, LinkError) as error:
+        told.report("error", f"fsw: {error}")
+        return COULD_NOT_START
+    except KeyboardInterrupt:
+        told.report("error", "fsw: interrupted before the flight began")
+        return NOT_COMPLETED
+    except BrokenPipeError:
+        return NOT_COMPLETED  # whoever read the events is gone
+    except Exception as error:
+        traceback.print_exc()
+        told.report("error", f"fsw: internal error, {type(error).__name__}: {error}")
+        return NOT_COMPLETED
+
+
+class _Session:
+    """One start of the program."""
+
+    def __init__(self, options: FswOptions, told: Events, load: ProgramLoader) -> None:
+        self._options = options
+        self._told = told
+        self._load = load
+        self._stop = StopRequest()
+
+    def run(self) -> int:
+        options = self._options
+        simulator, ground = parse_address(options.sim), parse_address(options.gcs)
+        directory = _output_directory(options.out)
+        self._told.report(
+            "preparing", "fsw: preparing (the first start compiles, which takes a minute)"
+        )
+        program = self._load(options)
+        facts = program.facts
+        record = FlightRecord(
+            inner=GroupTimer(facts.tick_period_us),
+            mpc=PlannerRecord(GroupTimer(facts.mpc_period_us)),
+            effort=EffortRecord(),
+            health=LoopHealth(),
+        )
+        inbox = Inbox()
+        log = TlogWriter(directory / "flight.tlog", clock.unix_us())
+        sim = SimLink(simulator, inbox, facts)
+        gcs = GcsLink(ground, inbox, TelemetryContext(facts, record.health), log.add)
+        loop = SimLoop(program, sim, gcs, inbox, record, clock.now_us, self._stop)
+        try:
+            end = self._fly(loop, sim, program.planner, record)
+        finally:
+            for part in (sim, gcs, log):
+                part.close()
+        setup = report.Setup(options.controller, options.inner, facts)
+        result = report.as_json(setup, end, record, sim.retransmissions)
+        report.write(directory / "fsw.json", result)
+        self._told.report("ended", f"fsw: {end.sentence}", ending=end.ending.value)
+        return DONE if end.ending is Ending.SHUTDOWN else NOT_COMPLETED
+
+    def _fly(
+        self,
+        loop: SimLoop[Any],
+        sim: SimLink,
+        planner: Planner,
+        record: FlightRecord,
+    ) -> FlightEnd:
+        options = self._options
+        self._stop.listen()
+        self._told.report("ready", f"fsw: ready, looking for the simulator at {options.sim}")
+        first = loop.connect(options.wait_s)
+        if first is None:
+            if self._stop.requested:
+                return FlightEnd(Ending.STOPPED, "stopped before the flight began")
+            raise CouldNotStart(
+                f"no simulator answered at {options.sim} within {options.wait_s:g} s"
+            )
+        realtime = sim.pacing is Pacing.REALTIME
+        service = _plan_service(realtime, planner, record)
+        if realtime and (warning := claim_real_time()):
+            self._told.report("warning", f"fsw: {warning}")
+        settle_memory()
+        try:
+            return loop.fly(first, service)
+        finally:
+            service.close()
+            if realtime:
+                release_real_time()
+
+
+def load_flight_software(options: FswOptions) -> FlightProgram[Any]:
+    """Build and warm up the flight software.
+
+    Raises:
+        CouldNotStart: A controller or inner loop of that name does not exist.
+    """
+    # Imported here because SciPy, Clarabel and numba take a second, which `--help` need not wait.
+    from fsw.mpc.planner import Planner as MpcPlanner
+    from fsw.parameters.flight_config import flight_config
+    from fsw.runtime.flight_loop import initial_state, tick
+
+    try:
+        config = flight_config(options.controller, options.inner)
+    except ValueError as error:
+        raise CouldNotStart(str(error)) from None
+    planner = MpcPlanner(config.planner, clock.stopwatch_us)
+    planner.warm_up()
+    facts = VehicleFacts(
+        rotor_thrust_max=config.airframe.rotor_thrust_max,
+        joint_torque_max=config.airframe.joint_torque_max,
+        tick_period_us=config.tick_period_us,
+        mpc_period_us=config.mpc_period_us,
+        mpc_delay_us=config.plan_delay_ticks * config.tick_period_us,
+        horizon=config.planner.horizon,
+        sqp_iterations=config.planner.sqp_iterations,
+    )
+    return FlightProgram(
+        facts=facts,
+        first_state=initial_state(config),
+        tick=lambda state, inputs: tick(config, state, inputs),
+        planner=planner,
+    )
+
+
+def _plan_service(realtime: bool, planner: Planner, record: FlightRecord) -> PlanService:
+    if realtime:
+        return ThreadedPlanner(planner, clock.now_us, record.mpc)
+    return InlinePlanner(planner, clock.now_us, record.mpc)
+
+
+def _output_directory(wanted: Path | None) -> Path:
+    try:
+        if wanted is None:
+            return new_run_directory(Path("runs"), "fsw")
+        wanted.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise CouldNotStart(f"cannot write to {error.filename}: {error.strerror}") from None
+    if (wanted / "flight.tlog").exists():
+        raise CouldNotStart(f"{wanted} already holds a flight; name another --out")
+    return wanted

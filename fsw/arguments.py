@@ -1,0 +1,71 @@
+"""Command line of the flight software."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import dataclass
+from pathlib import Path
+
+
+@dataclass(frozen=True, slots=True)
+class FswOptions:
+    """What the flight software is started with."""
+
+    sim: str  # udp:HOST:PORT of the simulator
+    gcs: str  # udp:HOST:PORT of the ground station
+    controller: str
+    inner: str
+    out: Path | None  # None: a new directory under runs/
+    wait_s: float  # for the simulator
+    events: str  # "text" for people, "json" for programs
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare every option of the flight software."""
+    parser.add_argument(
+        "--sim",
+        metavar="udp:HOST:PORT",
+        default="udp:127.0.0.1:4560",
+        help="where the simulator listens (default %(default)s)",
+    )
+    parser.add_argument(
+        "--gcs",
+        metavar="udp:HOST:PORT",
+        default="udp:127.0.0.1:14550",
+        help="where to send telemetry (default %(default)s)",
+    )
+    parser.add_argument(
+        "--controller", metavar="NAME", default="blf", help="predictive controller (blf)"
+    )
+    parser.add_argument(
+        "--inner", metavar="NAME", default="tracking", help="fast loop: tracking or pid"
+    )
+    parser.add_argument(
+        "--out", metavar="DIR", type=Path, help="where logs go (default a new one in runs/)"
+    )
+    parser.add_argument(
+        "--wait",
+        metavar="S",
+        type=float,
+        default=30.0,
+        help="how long to wait for the simulator (default %(default)g s)",
+    )
+    parser.add_argument(
+        "--events",
+        choices=("text", "json"),
+        default="text",
+        help="how to report on standard output (default %(default)s)",
+    )
+
+
+def options(arguments: argparse.Namespace) -> FswOptions:
+    """The options as one value."""
+    return FswOptions(
+        sim=arguments.sim,
+        gcs=arguments.gcs,
+        controller=arguments.controller,
+        inner=arguments.inner,
+        out=arguments.out,
+        wait_s=arguments.wait,
+        events=arguments.events,
+    )

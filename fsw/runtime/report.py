@@ -1,0 +1,77 @@
+"""The flight software's part of a run's result: `fsw.json`."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+from fsw.link.telemetry import VehicleFacts
+from fsw.runtime.planner_worker import PlannerRecord
+from fsw.runtime.sim_loop import FlightEnd, FlightRecord
+from fsw.runtime.timing import GroupTimer
+
+
+@dataclass(frozen=True, slots=True)
+class Setup:
+    """What was flown with."""
+
+    controller: str
+    inner: str
+    facts: VehicleFacts
+
+
+def as_json(
+    setup: Setup, end: FlightEnd, record: FlightRecord, retransmissions: int
+) -> dict[str, object]:
+    """The result as it is written; times in microseconds."""
+    record.inner.close_interval()
+    record.mpc.timer.close_interval()
+    return {
+        "controller": setup.controller,
+        "inner_loop": setup.inner,
+        "end": end.ending.value,
+        "end_reason": end.sentence,
+        **record.effort.as_json(),
+        "mpc": _mpc(setup.facts, record),
+        "inner": _inner(record.inner),
+        "retransmissions": retransmissions,
+    }
+
+
+def write(path: Path, result: dict[str, object]) -> None:
+    """Write the result as one JSON object."""
+    path.write_text(json.dumps(result, indent=2) + "\n", encoding="utf-8")
+
+
+def _mpc(facts: VehicleFacts, record: FlightRecord) -> dict[str, object]:
+    planner: PlannerRecord = record.mpc
+    execution = planner.timer.execution
+    return {
+        "horizon": facts.horizon,
+        "rate_hz": 1e6 / facts.mpc_period_us,
+        "sqp_iterations": facts.sqp_iterations,
+        "cycles": execution.count,
+        "p50_us": execution.percentile_us(0.50),
+        "p99_us": execution.percentile_us(0.99),
+        "max_us": execution.max_us,
+        "missed_deadlines": record.counters.missed_deadlines,
+        "fallbacks": record.counters.fallbacks,
+        "status": dict(planner.status),
+    }
+
+
+def _inner(timer: GroupTimer) -> dict[str, object]:
+    execution, lateness = timer.execution, timer.lateness
+    return {
+        "rate_hz": 1e6 / timer.period_us,
+        "ticks": timer.ticks,
+        "p50_us": execution.percentile_us(0.50),
+        "p99_us": execution.percentile_us(0.99),
+        "max_us": execution.max_us,
+        "late_share": timer.late_share,
+        "skipped": timer.skipped,
+        "lateness_p50_us": lateness.percentile_us(0.50),
+        "lateness_p99_us": lateness.percentile_us(0.99),
+        "lateness_max_us": lateness.max_us,
+    }

@@ -1,0 +1,99 @@
+"""How long ticks take and how late they start: bounded memory, cheap enough for every tick."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from fsw.link.telemetry import GroupTiming
+
+_BINS_PER_E: Final = 50.0  # 2 % resolution
+_BINS: Final = 900  # up to exp(18) us, about a minute
+
+
+class Histogram:
+    """Counts of durations in bins that grow by 2 %."""
+
+    def __init__(self) -> None:
+        self.count = 0
+        self.total_us = 0.0
+        self.max_us = 0.0
+        self._bins = [0] * _BINS
+
+    def add(self, duration_us: float) -> None:
+        """Count one duration; anything below 1 us is in the first bin."""
+        self.count += 1
+        self.total_us += duration_us
+        if duration_us > self.max_us:
+            self.max_us = duration_us
+        index = int(math.log(duration_us) * _BINS_PER_E) if duration_us > 1.0 else 0
+        self._bins[index if index < _BINS else -1] += 1
+
+    def percentile_us(self, share: float) -> float:
+        """The duration that a share of all counts does not exceed; 0 before the first."""
+        wanted = share * self.count
+        seen = 0
+        for index, count in enumerate(self._bins):
+            seen += count
+            if count and seen >= wanted:
+                # Upper edge of the bin, which the largest of all cannot exceed.
+                return min(math.exp((index + 1) / _BINS_PER_E), self.max_us)
+        return 0.0
+
+    def absorb(self, other: Histogram) -> None:
+        """Add the counts of another histogram."""
+        self.count += other.count
+        self.total_us += other.total_us
+        self.max_us = max(self.max_us, other.max_us)
+        self._bins = [mine + theirs for mine, theirs in zip(self._bins, other._bins, strict=True)]
+
+
+class GroupTimer:
+    """Timing of one rate group: of the last interval and of the whole flight."""
+
+    def __init__(self, period_us: int) -> None:
+        self.period_us = period_us
+        self.late = 0
+        self.skipped = 0
+        self.execution = Histogram()  # whole flight, up to the last interval
+        self.lateness = Histogram()
+        self._execution = Histogram()  # this interval
+        self._lateness = Histogram()
+
+    def add(self, execution_us: float, lateness_us: float = 0.0) -> None:
+        """Count one tick that started ``lateness_us`` after its release."""
+        self._execution.add(execution_us)
+        self._lateness.add(lateness_us)
+        if lateness_us + execution_us > self.period_us:
+            self.late += 1
+
+    @property
+    def ticks(self) -> int:
+        """Ticks counted since the start."""
+        return self.execution.count + self._execution.count
+
+    @property
+    def late_share(self) -> float:
+        """Share of ticks that ended after the next release."""
+        return self.late / self.ticks if self.ticks else 0.0
+
+    def close_interval(self) -> GroupTiming:
+        """Report the interval since the last call and start another."""
+        execution, lateness = self._execution, self._lateness
+        report = GroupTiming(
+            period_us=self.period_us,
+            ticks=self.ticks,
+            late_ticks=self.late,
+            skipped_ticks=self.skipped,
+            execution_p50_us=execution.percentile_us(0.50),
+            execution_p99_us=execution.percentile_us(0.99),
+            execution_max_us=execution.max_us,
+            lateness_p50_us=lateness.percentile_us(0.50),
+            lateness_p99_us=lateness.percentile_us(0.99),
+            lateness_max_us=lateness.max_us,
+            load=execution.total_us / (self.period_us * execution.count) if execution.count else 0,
+        )
+        self.execution.absorb(execution)
+        self.lateness.absorb(lateness)
+        self._execution, self._lateness = Histogram(), Histogram()
+        return report
