@@ -11,7 +11,7 @@ from sitl.admission import check, check_start
 from sitl.disturbances.items import push
 from sitl.plant.aerial_manipulator import Inputs, plant
 from sitl.plant.integrator import STEP_S, integrate, specific_force
-from sitl.plant.kinematics import points_into, touch_down_speed
+from sitl.plant.kinematics import places
 from sitl.plant.parameters import Vehicle
 from sitl.plant.state import StateView
 from sitl.scenario import V3, Scenario
@@ -76,6 +76,7 @@ class Simulation:
         self.ended: EndReason | None = None
         self._world = World(scenario)
         self._plant = plant(self.vehicle)
+        self._mass = self.vehicle.mass
         self._sensors = SensorSuite(scenario.sensors, seed, STEP_US)
         self._pushes = [push(item, seed, 1e-6 * STEP_US) for item in scenario.disturbances]
         self._trajectory_from_s: float | None = None
@@ -83,7 +84,6 @@ class Simulation:
         joints = len(self.vehicle.links)
         self._inputs = Inputs(np.zeros(4), np.zeros(joints), np.zeros(3), np.zeros(3))
         self._state = self._first_state()
-        self._trace = np.empty((SUBSTEPS, self._state.shape[0]))
         self._places = np.empty((SUBSTEPS, 2 + joints, 3))
         self._reading: SensorReadings | None = None
         self._error = TrackingError()
@@ -160,13 +160,12 @@ class Simulation:
         """
         self._command(controls)
         self._disturb()
-        integrate(self._plant, self._state, self._inputs, STEP_S, self._trace)
-        points_into(self._plant, self._trace, self._places)
+        landing = integrate(self._plant, self._state, self._inputs, STEP_S, self._places)
         before = self.time_s
         self.step += 1
-        for k, places in enumerate(self._places.tolist()):
-            self._judge(_critical(places), before + (k + 1) * STEP_S)
-        self._judge_ground()
+        for k, row in enumerate(self._places.tolist()):
+            self._judge(_critical(row), before + (k + 1) * STEP_S)
+        self._judge_landing(landing)
         self._judge_time()
 
     def truth(self) -> Truth:
@@ -223,16 +222,14 @@ class Simulation:
             self._inputs.torque[i] = live * drives.torque_max * min(max(fraction, -1.0), 1.0)
 
     def _disturb(self) -> None:
-        if not self._pushes:
-            return
-        self._inputs.force_W[:] = 0.0
-        self._inputs.torque_B[:] = 0.0
+        force, torque = [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]
         for item in self._pushes:
-            value = item.sample(self.step)
-            if item.torque:
-                self._inputs.torque_B[:] += value
-            else:
-                self._inputs.force_W[:] += [self.vehicle.mass * a for a in value]
+            total, unit = (torque, 1.0) if item.torque else (force, self._mass)
+            for i, value in enumerate(item.sample(self.step)):
+                total[i] += unit * value
+        for i in range(3):
+            self._inputs.force_W[i] = force[i]
+            self._inputs.torque_B[i] = torque[i]
 
     def _on_trajectory(self, time_s: float) -> bool:
         """While airborne from the start, the wait before the trajectory counts as well."""
@@ -247,9 +244,9 @@ class Simulation:
         return self.target_at(time_s).p if self._on_trajectory(time_s) else None
 
     def _points_now(self) -> tuple[V3, V3, V3]:
-        places = np.empty((1, *self._places.shape[1:]))
-        points_into(self._plant, self._state[np.newaxis, :], places)
-        return _critical(places[0].tolist())
+        out = np.empty((1, *self._places.shape[1:]))
+        places(self._plant, self._state, out)
+        return _critical(out[0].tolist())
 
     def _judge_start(self) -> None:
         points = self._points_now()
@@ -277,10 +274,7 @@ class Simulation:
         if self._on_trajectory(self.time_s):
             self._error.add(points[2], self.target_at(self.time_s).p)
 
-    def _judge_ground(self) -> None:
-        if self._state[2] + self._plant.feet.reach < 0.0:
-            return
-        speed = touch_down_speed(self._plant, self._state)
+    def _judge_landing(self, speed: float) -> None:
         if not (speed <= TOUCH_DOWN_MAX):
             self.end(
                 EndKind.CRASH,
@@ -309,9 +303,9 @@ def _vehicle(scenario: Scenario) -> Vehicle:
     )
 
 
-def _critical(places: list[list[float]]) -> tuple[V3, V3, V3]:
+def _critical(rows: list[list[float]]) -> tuple[V3, V3, V3]:
     """Base, joint 2 and end-effector out of base, joint 1, …, end-effector."""
-    return _three(places[0]), _three(places[2]), _three(places[-1])
+    return _three(rows[0]), _three(rows[2]), _three(rows[-1])
 
 
 def _three(values: list[float]) -> V3:

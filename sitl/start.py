@@ -8,7 +8,7 @@ import numpy as np
 
 from sitl.plant.parameters import Vehicle, level_reach
 from sitl.plant.state import StateView, at_rest
-from sitl.plant.trim import NoTrim, Trim, level_hover, standing_height
+from sitl.plant.trim import NoTrimError, Trim, level_hover, standing_height
 from sitl.plant.vector import Array
 from sitl.scenario import V3, Scenario
 from sitl.scenario_file import ScenarioError
@@ -26,7 +26,7 @@ def hovering(vehicle: Vehicle, scenario: Scenario, p_target: V3) -> tuple[Array,
     c, s = math.cos(yaw), math.sin(yaw)
     try:
         trim = level_hover(vehicle, angles)
-    except NoTrim as error:
+    except NoTrimError as error:
         raise ScenarioError(f"start.arm_deg = {list(scenario.start.arm_deg)}: {error}") from error
     state = at_rest(len(angles))
     view = StateView(state)

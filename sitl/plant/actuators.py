@@ -4,30 +4,31 @@ from __future__ import annotations
 
 import numpy as np
 
-from sitl.compiled import compiled
-from sitl.plant.vector import V3, Array
+from sitl.compiled import kernel
+from sitl.plant.vector import V3, V4
 
 
-@compiled
+@kernel
 def thrust_rate(thrust: float, command: float, thrust_max: float, lag: float) -> float:
     """First-order lag of one rotor [N/s]; the command saturates at 0 and ``thrust_max`` [N]."""
     return (min(max(command, 0.0), thrust_max) - thrust) / lag
 
 
-@compiled
-def rotor_torque(thrust: Array, arm: float, yaw_ratio: float) -> V3:
+@kernel
+def rotor_torque(thrust: V4, arm: float, yaw_ratio: float) -> V3:
     """Torque of the four thrusts on the base [N·m, B].
 
     .. math:: τ = [L(f_2 − f_4), L(f_3 − f_1), b(f_1 − f_2 + f_3 − f_4)]
     """
-    f1, f2, f3, f4 = thrust[0], thrust[1], thrust[2], thrust[3]
+    f1, f2, f3, f4 = thrust
     return (arm * (f2 - f4), arm * (f3 - f1), yaw_ratio * (f1 - f2 + f3 - f4))
 
 
-@compiled
+@kernel
 def joint_torque(
     command: float, rate: float, torque_max: float, viscous: float, coulomb: float, width: float
 ) -> float:
     """Torque that reaches a joint after limit, viscous and smoothed Coulomb friction [N·m]."""
     driven = min(max(command, -torque_max), torque_max)
-    return driven - viscous * rate - coulomb * np.tanh(rate / width)
+    friction: float = viscous * rate + coulomb * np.tanh(rate / width)
+    return driven - friction

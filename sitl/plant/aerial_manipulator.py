@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sitl.compiled import compiled
+from sitl.compiled import compiled, kernel
 from sitl.plant.actuators import joint_torque, rotor_torque, thrust_rate
 from sitl.plant.contact import Feet, ground_wrench
 from sitl.plant.newton_euler import (
@@ -20,16 +20,16 @@ from sitl.plant.newton_euler import (
     wrench_needed_into,
 )
 from sitl.plant.parameters import Vehicle, chain
-from sitl.plant.state import JOINTS_FROM, P_WB, Q_WB, THRUST, V_WB, W_WB_B
+from sitl.plant.state import ARM, P_WB, Q_WB, THRUST, V_WB, W_WB_B
 from sitl.plant.vector import (
     Array,
     add,
     put,
     rotation_into,
-    row,
     scale,
     times,
     transposed_times,
+    triple,
 )
 
 
@@ -59,6 +59,7 @@ class Workspace(NamedTuple):
     rotation: Array  # (3, 3) R_WB
     mass: Array  # (6+j, 6+j)
     load: Array  # (6+j,) generalised force, then acceleration
+    bias: Array  # (6+j,) force that gravity and velocities take up
     still: Array  # (j,) zeros
 
 
@@ -88,81 +89,74 @@ def empty_workspace(joints: int) -> Workspace:
     """Memory for a vehicle with ``joints`` joints."""
     n = 6 + joints
     return Workspace(
-        empty_posture(joints), np.empty((3, 3)), np.empty((n, n)), np.empty(n), np.zeros(joints)
+        empty_posture(joints),
+        np.empty((3, 3)),
+        np.empty((n, n)),
+        np.empty(n),
+        np.empty(n),
+        np.zeros(joints),
     )
 
 
-@compiled
+@kernel
 def load_into(plant: Plant, state: Array, inputs: Inputs, work: Workspace) -> None:
     """Generalised force of everything but inertia: rotors, drives, ground, disturbance."""
     load, rotation = work.load, work.rotation
-    joints = work.still.shape[0]
-    thrust = state[THRUST]
     feet_force, feet_moment = ground_wrench(
-        plant.feet, row(state[P_WB]), row(state[V_WB]), row(state[W_WB_B]), rotation
+        plant.feet, triple(state, P_WB), triple(state, V_WB), triple(state, W_WB_B), rotation
     )
+    thrust = (state[THRUST], state[THRUST + 1], state[THRUST + 2], state[THRUST + 3])
     lift = (0.0, 0.0, -(thrust[0] + thrust[1] + thrust[2] + thrust[3]))
-    push = transposed_times(rotation, row(inputs.force_W))
-    put(load[0:3], add(add(lift, push), feet_force))
+    push = transposed_times(rotation, triple(inputs.force_W, 0))
+    put(load, 0, add(add(lift, push), feet_force))
     turn = rotor_torque(thrust, plant.rotors[0], plant.rotors[1])
-    put(load[3:6], add(add(turn, row(inputs.torque_B)), feet_moment))
-    drive = plant.joints
+    put(load, 3, add(add(turn, triple(inputs.torque_B, 0)), feet_moment))
+    joints, drive = work.still.shape[0], plant.joints
     for i in range(joints):
-        rate = state[JOINTS_FROM + joints + i]
+        rate = state[ARM + joints + i]
         load[6 + i] = joint_torque(inputs.torque[i], rate, drive[0], drive[1], drive[2], drive[3])
 
 
-@compiled
+@kernel
 def acceleration_into(plant: Plant, state: Array, inputs: Inputs, work: Workspace) -> None:
     """Solve M x = load − bias into ``work.load``: base linear and angular, joint accelerations.
 
     The linear part is the acceleration of the base origin written in B (not the rate of the
     velocity's components in B).
     """
-    joints = work.still.shape[0]
-    q = state[Q_WB]
-    rotation_into(q[0], q[1], q[2], q[3], work.rotation)
-    posture_into(plant.chain, state[JOINTS_FROM : JOINTS_FROM + joints], work.posture)
-    # The bias (everything that is not mass times acceleration) first lands in the first row
-    # of the mass matrix, which is not yet in use.
-    bias = work.mass[0]
-    fall = gravity_in_body(work.rotation, plant.gravity)
-    wrench_needed_into(
-        plant.chain,
-        work.posture,
-        row(state[W_WB_B]),
-        (0.0, 0.0, 0.0),
-        scale(-1.0, fall),
-        state[JOINTS_FROM + joints :],
-        work.still,
-        bias,
-    )
+    joints, load, bias = work.still.shape[0], work.load, work.bias
+    rotation_into(state, Q_WB, work.rotation)
+    posture_into(plant.chain, state[ARM : ARM + joints], work.posture)
+    lift = scale(-1.0, gravity_in_body(work.rotation, plant.gravity))
+    w, still = triple(state, W_WB_B), (0.0, 0.0, 0.0)
+    rates = state[ARM + joints :]
+    wrench_needed_into(plant.chain, work.posture, w, still, lift, rates, work.still, bias)
     load_into(plant, state, inputs, work)
     for i in range(6 + joints):
-        work.load[i] -= bias[i]
+        load[i] -= bias[i]
     mass_matrix_into(plant.chain, work.posture, work.mass)
-    solve_in_place(work.mass, work.load)
+    solve_in_place(work.mass, load)
 
 
-@compiled
+@kernel
 def derivative_into(
     plant: Plant, state: Array, inputs: Inputs, work: Workspace, out: Array
 ) -> None:
     """Time derivative of the state vector (17 + 2j,)."""
-    joints = work.still.shape[0]
     acceleration_into(plant, state, inputs, work)
-    put(out[P_WB], row(state[V_WB]))
-    put(out[V_WB], times(work.rotation, row(work.load)))
-    q, w = state[Q_WB], state[W_WB_B]
-    rate = out[Q_WB]
-    rate[0] = -0.5 * (q[1] * w[0] + q[2] * w[1] + q[3] * w[2])
-    rate[1] = 0.5 * (q[0] * w[0] + q[2] * w[2] - q[3] * w[1])
-    rate[2] = 0.5 * (q[0] * w[1] + q[3] * w[0] - q[1] * w[2])
-    rate[3] = 0.5 * (q[0] * w[2] + q[1] * w[1] - q[2] * w[0])
-    put(out[W_WB_B], row(work.load[3:6]))
-    thrust, growth = state[THRUST], out[THRUST]
+    put(out, P_WB, triple(state, V_WB))
+    put(out, V_WB, times(work.rotation, triple(work.load, 0)))
+    put(out, W_WB_B, triple(work.load, 3))
+    w, x, y, z = state[Q_WB], state[Q_WB + 1], state[Q_WB + 2], state[Q_WB + 3]
+    a, b, c = triple(state, W_WB_B)
+    out[Q_WB] = -0.5 * (x * a + y * b + z * c)
+    out[Q_WB + 1] = 0.5 * (w * a + y * c - z * b)
+    out[Q_WB + 2] = 0.5 * (w * b + z * a - x * c)
+    out[Q_WB + 3] = 0.5 * (w * c + x * b - y * a)
+    limit, lag = plant.rotors[2], plant.rotors[3]
     for i in range(4):
-        growth[i] = thrust_rate(thrust[i], inputs.thrust[i], plant.rotors[2], plant.rotors[3])
+        out[THRUST + i] = thrust_rate(state[THRUST + i], inputs.thrust[i], limit, lag)
+    joints = work.still.shape[0]
     for i in range(joints):
-        out[JOINTS_FROM + i] = state[JOINTS_FROM + joints + i]
-        out[JOINTS_FROM + joints + i] = work.load[6 + i]
+        out[ARM + i] = state[ARM + joints + i]
+        out[ARM + joints + i] = work.load[6 + i]

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sitl.compiled import compiled
+from sitl.compiled import kernel
 from sitl.plant.vector import V3, Array, add, cross, row, times, transposed_times
 
 
@@ -21,7 +21,7 @@ class Feet(NamedTuple):
     slip_rate: float  # m/s
 
 
-@compiled
+@kernel
 def foot_force(feet: Feet, depth: float, v: V3) -> V3:
     """Ground reaction on one foot [N, W].
 
@@ -34,14 +34,14 @@ def foot_force(feet: Feet, depth: float, v: V3) -> V3:
     return (grip * v[0], grip * v[1], -normal)
 
 
-@compiled
+@kernel
 def ground_wrench(feet: Feet, p: V3, v: V3, w: V3, rotation: Array) -> tuple[V3, V3]:
     """Force and moment about the base origin of all feet [N and N·m, both in B]."""
     force = moment = (0.0, 0.0, 0.0)
     if p[2] + feet.reach < 0.0:
         return force, moment
     for i in range(feet.points.shape[0]):
-        foot = row(feet.points[i])
+        foot = row(feet.points, i)
         depth = p[2] + times(rotation, foot)[2]
         if depth > 0.0:
             v_foot = add(v, times(rotation, cross(w, foot)))

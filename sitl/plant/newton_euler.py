@@ -16,18 +16,20 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sitl.compiled import compiled
+from sitl.compiled import compiled, kernel
 from sitl.plant.vector import (
     V3,
     Array,
     add,
+    column,
     cross,
     dot,
     put,
+    put_row,
     row,
     scale,
     sub,
-    times,
+    times_one,
     transposed_times,
 )
 
@@ -68,50 +70,53 @@ def empty_posture(joints: int) -> Posture:
     )
 
 
-@compiled
-def _column(m: Array, i: int) -> V3:
-    return (m[0, i], m[1, i], m[2, i])
-
-
-@compiled
+@kernel
 def _place(chain: Chain, i: int, out: Posture) -> None:
     """Centre of mass and inertia of link ``i`` from its frame."""
-    axes = out.axes[i]
-    put(out.com[i], add(row(out.origin[i]), times(axes, row(chain.com[i]))))
-    local = chain.inertia[i]
-    # R I Rᵀ, row by row: (I Rᵀ) has the columns I · (row of R).
+    axes = out.axes
+    com = times_one(axes, i, row(chain.com, i))
+    put_row(out.com, i, add(row(out.origin, i), com))
+    # R I Rᵀ, column by column: the rows of R are the columns of Rᵀ.
     for r in range(3):
-        half = times(local, (axes[r, 0], axes[r, 1], axes[r, 2]))
-        whole = times(axes, half)
+        half = times_one(chain.inertia, i, (axes[i, r, 0], axes[i, r, 1], axes[i, r, 2]))
+        whole = times_one(axes, i, half)
         out.inertia[i, 0, r] = whole[0]
         out.inertia[i, 1, r] = whole[1]
         out.inertia[i, 2, r] = whole[2]
 
 
-@compiled
-def posture_into(chain: Chain, q: Array, out: Posture) -> None:
-    """Fill ``out`` for the joint angles ``q`` (j,) rad by the DH transforms."""
-    out.axes[0] = chain.mount_R
-    out.origin[0] = chain.mount_p
-    out.com[0] = chain.com[0]
-    out.inertia[0] = chain.inertia[0]
-    for i in range(q.shape[0]):
-        a, alpha, d, offset = chain.dh[i, 0], chain.dh[i, 1], chain.dh[i, 2], chain.dh[i, 3]
-        c, s = np.cos(q[i] + offset), np.sin(q[i] + offset)
-        ca, sa = np.cos(alpha), np.sin(alpha)
-        before, after = out.axes[i], out.axes[i + 1]
-        for r in range(3):
-            x = c * before[r, 0] + s * before[r, 1]
-            y = c * before[r, 1] - s * before[r, 0]
-            z = before[r, 2]
-            after[r, 0] = x
-            after[r, 1] = ca * y + sa * z
-            after[r, 2] = ca * z - sa * y
-            out.origin[i + 1, r] = out.origin[i, r] + d * z + a * x
-        _place(chain, i + 1, out)
+@kernel
+def _turn(chain: Chain, i: int, angle: float, out: Posture) -> None:
+    """DH frame ``i`` from frame i − 1 and the angle of joint ``i``."""
+    a, alpha, d = chain.dh[i - 1, 0], chain.dh[i - 1, 1], chain.dh[i - 1, 2]
+    theta = angle + chain.dh[i - 1, 3]
+    c, s, ca, sa = np.cos(theta), np.sin(theta), np.cos(alpha), np.sin(alpha)
+    axes = out.axes
+    for r in range(3):
+        z = axes[i - 1, r, 2]
+        x = c * axes[i - 1, r, 0] + s * axes[i - 1, r, 1]
+        y = c * axes[i - 1, r, 1] - s * axes[i - 1, r, 0]
+        axes[i, r, 0] = x
+        axes[i, r, 1] = ca * y + sa * z
+        axes[i, r, 2] = ca * z - sa * y
+        out.origin[i, r] = out.origin[i - 1, r] + d * z + a * x
 
 
-@compiled
+@kernel
+def posture_into(chain: Chain, angles: Array, out: Posture) -> None:
+    """Fill ``out`` for the joint angles (j,) [rad]."""
+    for r in range(3):
+        for c in range(3):
+            out.axes[0, r, c] = chain.mount_R[r, c]
+            out.inertia[0, r, c] = chain.inertia[0, r, c]
+        out.origin[0, r] = chain.mount_p[r]
+        out.com[0, r] = chain.com[0, r]
+    for i in range(1, chain.mass.shape[0]):
+        _turn(chain, i, angles[i - 1], out)
+        _place(chain, i, out)
+
+
+@kernel
 def wrench_needed_into(
     chain: Chain,
     at: Posture,
@@ -144,33 +149,33 @@ def wrench_needed_into(
     w_i, alpha_i, a_i = w, alpha, a
     for i in range(joints + 1):
         if i > 0:
-            turn = scale(qd[i - 1], _column(at.axes[i - 1], 2))
+            turn = scale(qd[i - 1], column(at.axes, i - 1, 2))
             alpha_i = add(alpha_i, cross(w_i, turn))
-            alpha_i = add(alpha_i, scale(qdd[i - 1], _column(at.axes[i - 1], 2)))
+            alpha_i = add(alpha_i, scale(qdd[i - 1], column(at.axes, i - 1, 2)))
             w_i = add(w_i, turn)
-        joint = row(at.origin[i - 1]) if i > 0 else (0.0, 0.0, 0.0)
-        to_com = sub(row(at.com[i]), joint)
+        joint = row(at.origin, i - 1) if i > 0 else (0.0, 0.0, 0.0)
+        to_com = sub(row(at.com, i), joint)
         a_com = add(a_i, add(cross(alpha_i, to_com), cross(w_i, cross(w_i, to_com))))
         f = scale(chain.mass[i], a_com)
-        spin = times(at.inertia[i], w_i)
-        own = add(times(at.inertia[i], alpha_i), cross(w_i, spin))
-        put(force[i], f)
-        put(moment[i], add(own, cross(to_com, f)))
-        to_end = sub(row(at.origin[i]), joint)
+        spin = times_one(at.inertia, i, w_i)
+        own = add(times_one(at.inertia, i, alpha_i), cross(w_i, spin))
+        put_row(force, i, f)
+        put_row(moment, i, add(own, cross(to_com, f)))
+        to_end = sub(row(at.origin, i), joint)
         a_i = add(a_i, add(cross(alpha_i, to_end), cross(w_i, cross(w_i, to_end))))
     # Backward, eq 5.
     for i in range(joints, 0, -1):
-        out[5 + i] = dot(_column(at.axes[i - 1], 2), row(moment[i]))
-        joint_below = row(at.origin[i - 2]) if i > 1 else (0.0, 0.0, 0.0)
-        arm = sub(row(at.origin[i - 1]), joint_below)
-        f = row(force[i])
-        put(moment[i - 1], add(row(moment[i - 1]), add(row(moment[i]), cross(arm, f))))
-        put(force[i - 1], add(row(force[i - 1]), f))
-    put(out[0:3], row(force[0]))
-    put(out[3:6], row(moment[0]))
+        out[5 + i] = dot(column(at.axes, i - 1, 2), row(moment, i))
+        joint_below = row(at.origin, i - 2) if i > 1 else (0.0, 0.0, 0.0)
+        arm = sub(row(at.origin, i - 1), joint_below)
+        f = row(force, i)
+        put_row(moment, i - 1, add(row(moment, i - 1), add(row(moment, i), cross(arm, f))))
+        put_row(force, i - 1, add(row(force, i - 1), f))
+    put(out, 0, row(force, 0))
+    put(out, 3, row(moment, 0))
 
 
-@compiled
+@kernel
 def mass_matrix_into(chain: Chain, at: Posture, out: Array) -> None:
     """Lower triangle of the exact coupled mass matrix (6+j, 6+j).
 
@@ -182,21 +187,21 @@ def mass_matrix_into(chain: Chain, at: Posture, out: Array) -> None:
     m, h = 0.0, (0.0, 0.0, 0.0)
     xx = yy = zz = xy = xz = yz = 0.0
     for i in range(joints, -1, -1):
-        m_i, c, inertia = chain.mass[i], row(at.com[i]), at.inertia[i]
+        m_i, c, inertia = chain.mass[i], row(at.com, i), at.inertia
         m += m_i
         h = add(h, scale(m_i, c))
-        xx += inertia[0, 0] + m_i * (c[1] * c[1] + c[2] * c[2])
-        yy += inertia[1, 1] + m_i * (c[0] * c[0] + c[2] * c[2])
-        zz += inertia[2, 2] + m_i * (c[0] * c[0] + c[1] * c[1])
-        xy += inertia[1, 0] - m_i * c[0] * c[1]
-        xz += inertia[2, 0] - m_i * c[0] * c[2]
-        yz += inertia[2, 1] - m_i * c[1] * c[2]
+        xx += inertia[i, 0, 0] + m_i * (c[1] * c[1] + c[2] * c[2])
+        yy += inertia[i, 1, 1] + m_i * (c[0] * c[0] + c[2] * c[2])
+        zz += inertia[i, 2, 2] + m_i * (c[0] * c[0] + c[1] * c[1])
+        xy += inertia[i, 1, 0] - m_i * c[0] * c[1]
+        xz += inertia[i, 2, 0] - m_i * c[0] * c[2]
+        yz += inertia[i, 2, 1] - m_i * c[1] * c[2]
         if i == 0:
             break
         # Unit rate of joint i moves the composite body: about z, and at the base origin
         # with o × z.
-        z = _column(at.axes[i - 1], 2)
-        v = cross(row(at.origin[i - 1]), z)
+        z = column(at.axes, i - 1, 2)
+        v = cross(row(at.origin, i - 1), z)
         p = add(scale(m, v), cross(z, h))
         spin = (
             xx * z[0] + xy * z[1] + xz * z[2],
@@ -204,11 +209,11 @@ def mass_matrix_into(chain: Chain, at: Posture, out: Array) -> None:
             xz * z[0] + yz * z[1] + zz * z[2],
         )
         momentum = add(cross(h, v), spin)
-        put(out[5 + i, 0:3], p)
-        put(out[5 + i, 3:6], momentum)
+        put_row(out, 5 + i, p)
+        out[5 + i, 3], out[5 + i, 4], out[5 + i, 5] = momentum
         for k in range(1, i + 1):
-            z_k = _column(at.axes[k - 1], 2)
-            v_k = cross(row(at.origin[k - 1]), z_k)
+            z_k = column(at.axes, k - 1, 2)
+            v_k = cross(row(at.origin, k - 1), z_k)
             out[5 + i, 5 + k] = dot(z_k, momentum) + dot(v_k, p)
     for r in range(6):
         for s in range(6):
@@ -222,33 +227,32 @@ def mass_matrix_into(chain: Chain, at: Posture, out: Array) -> None:
     out[4, 3], out[5, 3], out[5, 4] = xy, xz, yz
 
 
-@compiled
+@kernel
 def solve_in_place(m: Array, b: Array) -> None:
     """Solve M x = b by Cholesky; ``m`` (n, n) lower triangle and ``b`` (n,) are overwritten."""
     n = b.shape[0]
     for k in range(n):
-        pivot = m[k, k]
+        pivot, value = m[k, k], b[k]
         for s in range(k):
             pivot -= m[k, s] * m[k, s]
-        pivot = np.sqrt(pivot)
-        m[k, k] = pivot
+            value -= m[k, s] * b[s]
+        # The diagonal keeps the inverse of the factor's: divisions are the slow part.
+        inverse = 1.0 / np.sqrt(pivot)
+        m[k, k] = inverse
+        b[k] = value * inverse
         for r in range(k + 1, n):
             value = m[r, k]
             for s in range(k):
                 value -= m[r, s] * m[k, s]
-            m[r, k] = value / pivot
-        value = b[k]
-        for s in range(k):
-            value -= m[k, s] * b[s]
-        b[k] = value / pivot
+            m[r, k] = value * inverse
     for k in range(n - 1, -1, -1):
         value = b[k]
         for s in range(k + 1, n):
             value -= m[s, k] * b[s]
-        b[k] = value / m[k, k]
+        b[k] = value * m[k, k]
 
 
-@compiled
+@kernel
 def gravity_in_body(rotation: Array, g: float) -> V3:
     """Gravity [m/s²] written in B for R_WB (3, 3); W is NED, so it points along +z."""
     return transposed_times(rotation, (0.0, 0.0, g))

@@ -18,7 +18,7 @@ class Trim:
     torque: tuple[float, ...]  # (j,) N·m
 
 
-class NoTrim(ValueError):
+class NoTrimError(ValueError):
     """The pose cannot be held within the actuators' limits."""
 
 
@@ -26,7 +26,7 @@ def level_hover(vehicle: Vehicle, angles: tuple[float, ...]) -> Trim:
     """Equilibrium of a level hover with the arm at ``angles`` [rad].
 
     Raises:
-        NoTrim: A rotor or a joint would have to exceed its limit.
+        NoTrimError: A rotor or a joint would have to exceed its limit.
     """
     joints = len(angles)
     posture = empty_posture(joints)
@@ -50,13 +50,13 @@ def level_hover(vehicle: Vehicle, angles: tuple[float, ...]) -> Trim:
     torque = tuple(float(t) for t in needed[6:])
     for number, thrust in enumerate((f1, f2, f3, f4), start=1):
         if not (0.0 <= thrust <= rotors.thrust_max):
-            raise NoTrim(
+            raise NoTrimError(
                 f"rotor {number} would need {thrust:.2f} N to hover, "
                 f"it can give 0 to {rotors.thrust_max:.2f} N"
             )
     for number, value in enumerate(torque, start=1):
         if not (abs(value) <= vehicle.joints.torque_max):
-            raise NoTrim(
+            raise NoTrimError(
                 f"joint {number} would need {value:.3f} N·m to hold the arm, "
                 f"it can give ±{vehicle.joints.torque_max:.3f} N·m"
             )

@@ -7,51 +7,86 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from sitl.compiled import compiled
+from sitl.compiled import kernel
 
 Array: TypeAlias = npt.NDArray[np.float64]
 V3: TypeAlias = tuple[float, float, float]
+V4: TypeAlias = tuple[float, float, float, float]
 
 
-@compiled
-def row(a: Array) -> V3:
-    """The three numbers of a (3,) array."""
-    return (a[0], a[1], a[2])
+# Entries are picked by index, not through slices: a slice of an array inside a kernel costs a
+# reference count, and these run some hundred times per step.
 
 
-@compiled
-def put(out: Array, v: V3) -> None:
-    """Store ``v`` in a (3,) array."""
-    out[0] = v[0]
-    out[1] = v[1]
-    out[2] = v[2]
+@kernel
+def triple(a: Array, i: int) -> V3:
+    """Entries i, i+1, i+2 of a vector."""
+    return (a[i], a[i + 1], a[i + 2])
 
 
-@compiled
+@kernel
+def put(out: Array, i: int, v: V3) -> None:
+    """Store ``v`` in entries i, i+1, i+2 of a vector."""
+    out[i] = v[0]
+    out[i + 1] = v[1]
+    out[i + 2] = v[2]
+
+
+@kernel
+def row(a: Array, i: int) -> V3:
+    """Row ``i`` of an (n, 3) array."""
+    return (a[i, 0], a[i, 1], a[i, 2])
+
+
+@kernel
+def put_row(out: Array, i: int, v: V3) -> None:
+    """Store ``v`` in row ``i`` of an (n, 3) array."""
+    out[i, 0] = v[0]
+    out[i, 1] = v[1]
+    out[i, 2] = v[2]
+
+
+@kernel
+def column(stack: Array, i: int, c: int) -> V3:
+    """Column ``c`` of matrix ``i`` in an (n, 3, 3) array."""
+    return (stack[i, 0, c], stack[i, 1, c], stack[i, 2, c])
+
+
+@kernel
+def times_one(stack: Array, i: int, v: V3) -> V3:
+    """M v for matrix ``i`` in an (n, 3, 3) array."""
+    return (
+        stack[i, 0, 0] * v[0] + stack[i, 0, 1] * v[1] + stack[i, 0, 2] * v[2],
+        stack[i, 1, 0] * v[0] + stack[i, 1, 1] * v[1] + stack[i, 1, 2] * v[2],
+        stack[i, 2, 0] * v[0] + stack[i, 2, 1] * v[1] + stack[i, 2, 2] * v[2],
+    )
+
+
+@kernel
 def add(a: V3, b: V3) -> V3:
     """A + b."""
     return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
 
 
-@compiled
+@kernel
 def sub(a: V3, b: V3) -> V3:
     """A - b."""
     return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
 
 
-@compiled
+@kernel
 def scale(s: float, a: V3) -> V3:
     """S a."""
     return (s * a[0], s * a[1], s * a[2])
 
 
-@compiled
+@kernel
 def dot(a: V3, b: V3) -> float:
     """A · b."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@compiled
+@kernel
 def cross(a: V3, b: V3) -> V3:
     """A × b."""
     return (
@@ -61,7 +96,7 @@ def cross(a: V3, b: V3) -> V3:
     )
 
 
-@compiled
+@kernel
 def times(m: Array, v: V3) -> V3:
     """M v for a (3, 3) array."""
     return (
@@ -71,7 +106,7 @@ def times(m: Array, v: V3) -> V3:
     )
 
 
-@compiled
+@kernel
 def transposed_times(m: Array, v: V3) -> V3:
     """Mᵀ v for a (3, 3) array."""
     return (
@@ -81,13 +116,14 @@ def transposed_times(m: Array, v: V3) -> V3:
     )
 
 
-@compiled
-def rotation_into(w: float, x: float, y: float, z: float, out: Array) -> None:
-    """R_WB (3, 3) of the quaternion [w, x, y, z], which need not be of unit length.
+@kernel
+def rotation_into(a: Array, i: int, out: Array) -> None:
+    """R_WB (3, 3) of the quaternion [w, x, y, z] in entries i … i+3, of any length.
 
     Dividing by the squared length keeps the derivative smooth at Runge–Kutta stages, where
     the length is off one by O(dt²).
     """
+    w, x, y, z = a[i], a[i + 1], a[i + 2], a[i + 3]
     s = 2.0 / (w * w + x * x + y * y + z * z)
     out[0, 0] = 1.0 - s * (y * y + z * z)
     out[0, 1] = s * (x * y - w * z)

@@ -48,7 +48,7 @@ def random_state(joints: int, random: np.random.Generator) -> Array:
     """In the air, moving and turning every way."""
     state = at_rest(joints)
     view = StateView(state)
-    view.p_WB[:] = random.uniform(-2.0, 2.0, 3) + (0.0, 0.0, -10.0)
+    view.p_WB[:] = random.uniform(-12.0, -8.0, 3)
     view.v_WB[:] = random.uniform(-3.0, 3.0, 3)
     quaternion = random.standard_normal(4)
     view.q_WB[:] = quaternion / np.linalg.norm(quaternion)
@@ -69,8 +69,10 @@ def pinocchio_acceleration(
     v_B = rotation.T @ view.v_WB
     rotors, drive = vehicle.rotors, vehicle.joints
     lift = np.array([0.0, 0.0, -view.thrust.sum()])
+    f1, f2, f3, f4 = view.thrust
+    turn = rotor_torque((f1, f2, f3, f4), rotors.arm, rotors.yaw_ratio)
     force = lift + rotation.T @ inputs.force_W
-    moment = np.array(rotor_torque(view.thrust, rotors.arm, rotors.yaw_ratio)) + inputs.torque_B
+    moment = np.array(turn) + inputs.torque_B
     torque = [
         joint_torque(t, r, drive.torque_max, drive.viscous, drive.coulomb, drive.coulomb_rate)
         for t, r in zip(inputs.torque, view.qd_arm, strict=True)
