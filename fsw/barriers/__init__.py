@@ -1,0 +1,1 @@
+"""Barrier Lyapunov functions; each contributes rows to the planner's program."""

@@ -1,0 +1,64 @@
+"""How far inside its safe set the vehicle is now, for telemetry, in plain floats."""
+
+from __future__ import annotations
+
+import math
+
+from fsw.barriers.root import BarrierTuning
+from fsw.signals import ConstraintKind, ConstraintReport, EndEffectorTarget, SafeSet, Vec3
+
+PointMotion = tuple[Vec3, Vec3]  # position [m], velocity [m/s]
+
+
+def constraint_report(
+    safe_set: SafeSet,
+    tuning: BarrierTuning,
+    points: tuple[PointMotion, PointMotion, PointMotion],
+    target: EndEffectorTarget | None,
+) -> ConstraintReport:
+    """Margins and barrier values of the active safe set.
+
+    Args:
+        safe_set: Walls or sphere.
+        tuning: Constants of the barrier in force.
+        points: Base, joint 2 and end-effector.
+        target: End-effector reference in use; the sphere hangs on it.
+
+    Returns:
+        For walls one margin per wall and point in that order; for the sphere a single one.
+    """
+    if safe_set.kind is ConstraintKind.WALLS:
+        pairs = [
+            (
+                _dot(wall.normal, p) - wall.offset - wall.clearance,
+                _dot(wall.normal, v),
+            )
+            for wall in safe_set.walls
+            for p, v in points
+        ]
+    elif safe_set.sphere is not None and target is not None:
+        offset, (p, v) = safe_set.sphere.centre_from_target, points[0]
+        e = tuple(p[k] - target.p_WE[k] - offset[k] for k in range(3))
+        w = tuple(v[k] - target.v_WE[k] for k in range(3))
+        distance = math.sqrt(sum(x * x for x in e))
+        outward = sum(a * b for a, b in zip(e, w, strict=True)) / max(distance, 1e-6)
+        pairs = [(safe_set.sphere.radius - distance, -outward)]
+    else:
+        pairs = []
+    return ConstraintReport(
+        safe_set.kind,
+        tuple(margin for margin, _ in pairs),
+        tuple(_root(margin, tuning) + rate for margin, rate in pairs),
+    )
+
+
+def _root(distance: float, tuning: BarrierTuning) -> float:
+    """S of ``root.py`` without its compiler: called ten times a second on plain floats."""
+    knee = tuning.alpha / (tuning.slope * tuning.slope)
+    if distance < knee:
+        return tuning.slope * distance
+    return math.sqrt(2.0 * tuning.alpha * (distance - 0.5 * knee))
+
+
+def _dot(a: Vec3, b: Vec3) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

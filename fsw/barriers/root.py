@@ -1,0 +1,66 @@
+r"""The square root of eqs 11, 22 and 23, made safe to differentiate.
+
+:math:`\sqrt{2\alpha d}` is the speed from which a deceleration :math:`\alpha` just stops
+within :math:`d`. Its slope is infinite at the boundary and it does not exist outside, where
+a disturbed vehicle may well be. It is continued by its tangent of slope :math:`k_S`:
+
+.. math:: S(d) = k_S d \;(d < \alpha/k_S^2), \qquad
+          \sqrt{2\alpha\,(d - \alpha/(2k_S^2))} \;\text{otherwise}
+
+which has a continuous slope, never promises more braking than the root, and needs
+:math:`k_S T \le 1` to be safe between samples.
+
+Source: docs/equations.md E22, E23.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from fsw.compiled import compiled
+
+
+@dataclass(frozen=True, slots=True)
+class BarrierTuning:
+    """Constants of eqs 22, 23 and 25 and of the rows that enforce them.
+
+    Raises:
+        ValueError: where the sampled-data conditions ``k_S T <= 1`` and ``gamma T <= 1``
+            fail, or a constant is not positive.
+    """
+
+    alpha: float = 2.0  # m/s^2, deceleration the barrier counts on
+    slope: float = 4.0  # 1/s, k_S
+    gamma: float = 3.0  # 1/s
+    robustness: float = 0.4  # m/s, lambda of eq 25
+    skipped_nodes: int = 1  # first nodes, which the inputs can hardly move
+    period: float = 0.1  # s
+
+    def __post_init__(self) -> None:
+        for name in ("alpha", "slope", "gamma", "robustness", "period"):
+            value = getattr(self, name)
+            if not (0.0 < value < math.inf):
+                raise ValueError(f"barrier {name} is {value}; it must be positive and finite")
+        for name, rate in (("slope", self.slope), ("gamma", self.gamma)):
+            if not (rate * self.period <= 1.0):
+                raise ValueError(
+                    f"barrier {name} is {rate} 1/s; at a period of {self.period} s it must not "
+                    f"exceed {1.0 / self.period} 1/s"
+                )
+
+
+@compiled
+def root(distance: float, alpha: float, slope: float) -> float:
+    """Largest safe approach speed S(distance) [m/s]."""
+    if distance < alpha / (slope * slope):
+        return slope * distance
+    return math.sqrt(2.0 * alpha * (distance - alpha / (2.0 * slope * slope)))
+
+
+@compiled
+def root_slope(distance: float, alpha: float, slope: float) -> float:
+    """Derivative of S in the distance [1/s]."""
+    if distance < alpha / (slope * slope):
+        return slope
+    return alpha / math.sqrt(2.0 * alpha * (distance - alpha / (2.0 * slope * slope)))

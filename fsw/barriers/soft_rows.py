@@ -1,0 +1,69 @@
+"""What every barrier contributes to the planner's program."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fsw.model.linearisation import Linearisation
+from fsw.model.prediction import INPUTS, Array
+
+
+@dataclass(frozen=True)
+class SoftRows:
+    """Rows ``value + gradient (U - U_guess) + slack >= required``, slack >= 0.
+
+    Which inputs a row can feel (those before its node) and which slack softens it never
+    change; the numbers are refilled in place each iteration.
+    """
+
+    node: NDArray[np.intp]  # (rows,) node of each row, 1..n
+    slack: NDArray[np.intp]  # (rows,) index of its slack among this block's slacks
+    unknowns: int  # 6 n
+    value: Array = field(init=False)  # (rows,)
+    required: Array = field(init=False)  # (rows,)
+    gradient: Array = field(init=False)  # (rows, 6 n)
+
+    def __post_init__(self) -> None:
+        rows = len(self.node)
+        object.__setattr__(self, "value", np.zeros(rows))
+        object.__setattr__(self, "required", np.zeros(rows))
+        object.__setattr__(self, "gradient", np.zeros((rows, self.unknowns)))
+
+    @property
+    def slacks(self) -> int:
+        """How many slacks soften this block."""
+        return int(self.slack.max()) + 1 if len(self.slack) else 0
+
+    def feels(self) -> NDArray[np.bool_]:
+        """(rows, 6 n), true where the gradient may be non-zero."""
+        columns = np.arange(self.unknowns)
+        return np.asarray(columns[None, :] < INPUTS * self.node[:, None])
+
+
+@dataclass(frozen=True)
+class TargetPoints:
+    """End-effector reference at the nodes of one horizon, refilled in place."""
+
+    position: Array  # (n + 1, 3) m
+    velocity: Array  # (n + 1, 3) m/s
+
+
+class Barrier(Protocol):
+    """A safe set that keeps the horizon inside by soft rows."""
+
+    @property
+    def rows(self) -> SoftRows:
+        """The rows as of the last refill."""
+        ...
+
+    def refill(self, horizon: Linearisation, targets: TargetPoints) -> None:
+        """Bring the rows up to date with a linearisation."""
+        ...
+
+    def at_start(self) -> Array:
+        """h of each constraint at node 0 as of the last refill [m/s]."""
+        ...

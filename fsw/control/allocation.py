@@ -1,0 +1,36 @@
+"""From torque and thrust to four rotors, roll and pitch first."""
+
+from __future__ import annotations
+
+from fsw.model.airframe import Airframe
+from fsw.signals import Vec3, Vec4
+
+
+def allocate(airframe: Airframe, torque: Vec3, thrust: float, yaw_limit: float) -> Vec4:
+    """Rotor thrusts of the '+' mixer, each within its limits.
+
+    Roll and pitch keep the vehicle upright and decide where it accelerates, so they are
+    served first, thrust gives way to them, and yaw takes what is left.
+
+    Args:
+        airframe: Rotor arm, drag and thrust limits.
+        torque: Wanted body torque [N m].
+        thrust: Wanted total thrust [N].
+        yaw_limit: Most thrust a rotor may spend on yaw [N].
+
+    Returns:
+        Thrust of the rear, left, front and right rotor [N].
+    """
+    top = airframe.rotor_thrust_max
+    half = 0.5 * top
+    roll = _limit(torque[0] / (2.0 * airframe.rotor_arm), half)
+    pitch = _limit(torque[1] / (2.0 * airframe.rotor_arm), half)
+    spread = max(abs(roll), abs(pitch))
+    lift = min(max(0.25 * thrust, spread), top - spread)
+    room = min(yaw_limit, lift - spread, top - spread - lift)
+    yaw = _limit(0.25 * torque[2] / airframe.yaw_per_thrust, max(room, 0.0))
+    return (lift - pitch + yaw, lift + roll - yaw, lift + pitch + yaw, lift - roll - yaw)
+
+
+def _limit(value: float, bound: float) -> float:
+    return min(max(value, -bound), bound)

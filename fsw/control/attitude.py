@@ -1,0 +1,56 @@
+"""The paper's inner attitude loop and the references it follows."""
+
+from __future__ import annotations
+
+import math
+
+from fsw.control.pid import PidGains, pid_step
+from fsw.geometry.rotation import euler_zyx, wrap_angle
+from fsw.model.airframe import GRAVITY
+from fsw.signals import StateEstimate, Vec3
+
+
+def attitude_reference(a: Vec3, yaw: float) -> Vec3:
+    """Roll, pitch and yaw whose thrust direction gives an acceleration (exact, ZYX).
+
+    Args:
+        a: Wanted acceleration, world [m/s^2].
+        yaw: Wanted yaw [rad].
+    """
+    c, s = math.cos(yaw), math.sin(yaw)
+    forward, right = c * a[0] + s * a[1], -s * a[0] + c * a[1]
+    down = GRAVITY - a[2]
+    pitch = math.atan2(-forward, down)
+    roll = math.atan2(right, math.hypot(forward, down))
+    return roll, pitch, yaw
+
+
+def attitude_pid(
+    gains: PidGains,
+    integral: Vec3,
+    estimate: StateEstimate,
+    reference: Vec3,
+    dt: float,
+) -> tuple[Vec3, Vec3]:
+    """Angular acceleration that turns the vehicle to its attitude reference.
+
+    Small-angle PID of the paper: body rates damp, Euler errors drive.
+
+    Args:
+        gains: On angle [1/s^2], its integral [1/s^3] and rate [1/s].
+        integral: Integrals of the errors [rad s].
+        estimate: The vehicle now.
+        reference: Roll, pitch, yaw [rad].
+        dt: Tick length [s].
+
+    Returns:
+        Angular acceleration in the body [rad/s^2] and the integrals to pass back.
+    """
+    attitude = euler_zyx(estimate.R_WB)
+    out, kept = [], []
+    for axis in range(3):
+        error = wrap_angle(reference[axis] - attitude[axis])
+        acceleration, grown = pid_step(gains, integral[axis], error, -estimate.w_WB_B[axis], dt)
+        out.append(acceleration)
+        kept.append(grown)
+    return (out[0], out[1], out[2]), (kept[0], kept[1], kept[2])

@@ -1,0 +1,153 @@
+"""One fast cycle: from the plan and the estimate to rotors and joints."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from fsw.control.allocation import allocate
+from fsw.control.attitude import attitude_pid, attitude_reference
+from fsw.control.height import height_pid
+from fsw.control.inner_tuning import InnerTuning, tracking_gains
+from fsw.control.joints import joint_torques
+from fsw.control.pid import PidGains
+from fsw.control.tracking import TrackingLaw, follow_plan, observe_disturbance
+from fsw.geometry.rotation import wrap_angle
+from fsw.model.airframe import GRAVITY, Airframe
+from fsw.model.prediction import LagModel
+from fsw.model.rotors import MotionState, lag_rotors, motion_state, rotor_decay
+from fsw.signals import (
+    ActuatorCommand,
+    PlanInput,
+    PredictionState,
+    StateEstimate,
+    Vec2,
+    Vec3,
+    Vec4,
+)
+
+Inner = Literal["tracking", "pid"]
+
+NO_ACTION = ActuatorCommand((0.0, 0.0, 0.0, 0.0), (0.0, 0.0))
+
+
+@dataclass(frozen=True, slots=True)
+class CascadeMemory:
+    """What the fast loops carry from tick to tick."""
+
+    rotors: Vec4  # N, where the rotor model says they are
+    commanded: ActuatorCommand  # what was sent last tick, after the safety gate
+    v_hat: Vec3  # m/s, disturbance observer
+    attitude: Vec3 = (0.0, 0.0, 0.0)  # rad s, integrals
+    height: float = 0.0  # m s, integral
+    joints: Vec2 = (0.0, 0.0)  # rad s, integrals
+
+
+def at_rest(estimate: StateEstimate) -> CascadeMemory:
+    """Memory of a vehicle whose rotors stand still."""
+    return CascadeMemory(NO_ACTION.rotor_thrust, NO_ACTION, estimate.v_WB)
+
+
+def in_hover(airframe: Airframe, estimate: StateEstimate) -> CascadeMemory:
+    """Memory of a vehicle taken over in hover."""
+    each = 0.25 * airframe.mass * GRAVITY
+    thrust = (each, each, each, each)
+    return CascadeMemory(thrust, ActuatorCommand(thrust, (0.0, 0.0)), estimate.v_WB)
+
+
+class Cascade:
+    """The inner loops of one configuration; laws are pure, memory goes in and comes out."""
+
+    def __init__(
+        self, airframe: Airframe, lag: LagModel, tuning: InnerTuning, inner: Inner, dt: float
+    ) -> None:
+        """Choose the inner loop and design its gains, before flight.
+
+        Args:
+            airframe: The vehicle.
+            lag: Attitude model of the plan.
+            tuning: Gains of every loop.
+            inner: ``tracking`` follows the plan's state, ``pid`` only its acceleration.
+            dt: Tick length [s].
+        """
+        self._airframe = airframe
+        self._tuning = tuning
+        self._dt = dt
+        self._decay = rotor_decay(airframe, dt)
+        self._follows_plan = inner == "tracking"
+        gains = tracking_gains(tuning.tracking, airframe.rotor_lag, dt)
+        self._law = TrackingLaw(airframe, lag, tuning.tracking, gains)
+
+    def motion(self, memory: CascadeMemory, estimate: StateEstimate) -> MotionState:
+        """Acceleration to snap right now, from the rotor model."""
+        rotors = lag_rotors(memory.rotors, memory.commanded.rotor_thrust, self._decay)
+        return motion_state(self._airframe, estimate, rotors, memory.commanded.joint_torque[0])
+
+    def step(
+        self,
+        memory: CascadeMemory,
+        estimate: StateEstimate,
+        plan: PredictionState,
+        u: PlanInput,
+    ) -> tuple[ActuatorCommand, CascadeMemory]:
+        """One tick.
+
+        Args:
+            memory: From the last tick.
+            estimate: The vehicle now.
+            plan: Where the plan wants the vehicle now.
+            u: The plan's input now.
+
+        Returns:
+            Actuator command, not yet gated, and the memory to pass back, whose ``commanded``
+            the caller replaces by what was really sent.
+        """
+        airframe, tuning, dt = self._airframe, self._tuning, self._dt
+        rotors = lag_rotors(memory.rotors, memory.commanded.rotor_thrust, self._decay)
+        motion = motion_state(airframe, estimate, rotors, memory.commanded.joint_torque[0])
+        disturbance, v_hat = observe_disturbance(
+            memory.v_hat, estimate.v_WB, motion.a, tuning.tracking.observer_bandwidth, dt
+        )
+        attitude, height = memory.attitude, memory.height
+        if self._follows_plan:
+            (wdx, wdy), thrust = follow_plan(self._law, estimate, motion, disturbance, plan, u)
+            wdz = u.yaw_acc + _yaw_correction(tuning.yaw, estimate, plan)
+        else:
+            (wdx, wdy, wdz), attitude = attitude_pid(
+                tuning.attitude, attitude, estimate, attitude_reference(u.a, plan.yaw), dt
+            )
+            thrust, height = height_pid(airframe, tuning.height, height, estimate, plan, u, dt)
+        joints, kept = joint_torques(
+            airframe,
+            tuning.joint,
+            memory.joints,
+            estimate,
+            (plan.q_arm, plan.qd_arm, u.qdd_arm),
+            motion.thrust / airframe.mass,
+            wdy,
+            dt,
+        )
+        torque = _body_torque(airframe, estimate, (wdx, wdy, wdz), joints[0])
+        command = ActuatorCommand(
+            allocate(airframe, torque, thrust, tuning.yaw_thrust_limit), joints
+        )
+        return command, CascadeMemory(rotors, command, v_hat, attitude, height, kept)
+
+
+def _yaw_correction(gains: PidGains, estimate: StateEstimate, plan: PredictionState) -> float:
+    error = wrap_angle(plan.yaw - estimate.yaw)
+    raw = gains.kp * error + gains.kd * (plan.yaw_rate - estimate.w_WB_B[2])
+    return min(max(raw, -gains.limit), gains.limit)
+
+
+def _body_torque(
+    airframe: Airframe, estimate: StateEstimate, wd: Vec3, joint1_torque: float
+) -> Vec3:
+    """Rotor torque for an angular acceleration: inertia, gyroscopic part, arm's reaction."""
+    ix, iy, iz = airframe.inertia
+    wx, wy, wz = estimate.w_WB_B
+    return (
+        ix * wd[0] + (iz - iy) * wy * wz,
+        iy * wd[1] + (ix - iz) * wz * wx + joint1_torque,
+        iz * wd[2] + (iy - ix) * wx * wy,
+    )

@@ -1,0 +1,89 @@
+"""Gains of the 500 Hz loops and where they come from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.linalg import expm, solve_discrete_are
+
+from fsw.control.pid import PidGains
+from fsw.model.prediction import Array
+
+
+@dataclass(frozen=True, slots=True)
+class TrackingTuning:
+    """Design of the loop that follows the plan (docs/decisions/0005-tracking-inner-loop.md).
+
+    The gains are those of a discrete LQR on position alone; ``effort`` is its price of
+    snap. A cheaper price follows the plan more closely until the rotors saturate, which
+    makes the loop diverge: 1e-8 does, 1e-7 leaves a reserve at 0.8 m/s^2 of disturbance.
+    """
+
+    effort: float = 1e-7  # horizontal, on (m/s^4)^2
+    vertical_effort: float = 1e-6  # on (m/s^2)^2
+    disturbance_correlation: float = 0.05  # s, of the Ornstein-Uhlenbeck model
+    observer_bandwidth: float = 100.0  # 1/s
+    position_error_limit: float = 0.07  # m
+    acceleration_limit: float = 2.5  # m/s^2
+    jerk_limit: float = 20.0  # m/s^3
+
+
+@dataclass(frozen=True, slots=True)
+class TrackingGains:
+    """Feedback on (position, velocity, acceleration, jerk, snap) and on the disturbance."""
+
+    k: tuple[float, float, float, float, float]
+    k_disturbance: float
+    k_vertical: tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class InnerTuning:
+    """Everything the cascade can be tuned by."""
+
+    attitude: PidGains = field(default_factory=lambda: PidGains(50.0, 8.0, 15.0, 25.0))
+    height: PidGains = field(default_factory=lambda: PidGains(7.1429, 1.4286, 3.4286, 4.0))
+    joint: PidGains = field(default_factory=lambda: PidGains(400.0, 400.0, 40.0, 200.0))
+    yaw: PidGains = field(default_factory=lambda: PidGains(4.0, 0.0, 4.0, 0.5))
+    yaw_thrust_limit: float = 1.0  # N a rotor; more would be taken from roll and pitch
+    tracking: TrackingTuning = field(default_factory=TrackingTuning)
+
+
+def tracking_gains(tuning: TrackingTuning, rotor_lag: float, dt: float) -> TrackingGains:
+    """Design the tracking loop for one tick length.
+
+    Args:
+        tuning: Prices and the disturbance model.
+        rotor_lag: Time constant of the rotors [s].
+        dt: Tick length [s].
+    """
+    # p, v, a, j, s and the disturbance acceleration that adds to v's derivative.
+    a = np.diag([1.0, 1.0, 1.0, 1.0, 0.0], 1)
+    a[1, 5] = 1.0
+    a[4, 4] = -1.0 / rotor_lag
+    a[5, 5] = -1.0 / tuning.disturbance_correlation
+    b = np.array([[0.0], [0.0], [0.0], [0.0], [1.0 / rotor_lag], [0.0]])
+    k = _lqr(a, b, tuning.effort, dt)
+    a_vertical = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, -1.0 / rotor_lag]])
+    b_vertical = np.array([[0.0], [0.0], [1.0 / rotor_lag]])
+    k_vertical = _lqr(a_vertical, b_vertical, tuning.vertical_effort, dt)
+    return TrackingGains(
+        k=(k[0], k[1], k[2], k[3], k[4]),
+        k_disturbance=k[5],
+        k_vertical=(k_vertical[0], k_vertical[1], k_vertical[2]),
+    )
+
+
+def _lqr(a: Array, b: Array, effort: float, dt: float) -> list[float]:
+    """Discrete LQR gain of a single-input chain with unit price on its first state."""
+    n = len(a)
+    block = np.zeros((n + 1, n + 1))
+    block[:n, :n], block[:n, n:] = a * dt, b * dt
+    exponential = expm(block)
+    ad, bd = exponential[:n, :n], exponential[:n, n:]
+    q = np.zeros((n, n))
+    q[0, 0] = 1.0
+    p = solve_discrete_are(ad, bd, q, np.array([[effort]]))
+    gain = np.linalg.solve(effort + bd.T @ p @ bd, bd.T @ p @ ad)
+    return [float(value) for value in gain[0]]

@@ -1,0 +1,76 @@
+"""Rotations as nine floats, row-major, mapping body components to world components."""
+
+from __future__ import annotations
+
+import math
+
+from fsw.signals import Mat3, Vec3, Vec4
+
+
+def matrix_from_quaternion(q: Vec4) -> Mat3:
+    """Rotation matrix of a quaternion [w, x, y, z] that is close to unit length."""
+    w, x, y, z = q
+    s = 2.0 / (w * w + x * x + y * y + z * z)
+    xs, ys, zs = x * s, y * s, z * s
+    wx, wy, wz = w * xs, w * ys, w * zs
+    xx, xy, xz = x * xs, x * ys, x * zs
+    yy, yz, zz = y * ys, y * zs, z * zs
+    return (
+        1.0 - (yy + zz),
+        xy - wz,
+        xz + wy,
+        xy + wz,
+        1.0 - (xx + zz),
+        yz - wx,
+        xz - wy,
+        yz + wx,
+        1.0 - (xx + yy),
+    )
+
+
+def yaw_of(R: Mat3) -> float:
+    """ZYX yaw of a rotation [rad]."""
+    return math.atan2(R[3], R[0])
+
+
+def euler_zyx(R: Mat3) -> Vec3:
+    """Roll, pitch and yaw of a rotation [rad]."""
+    return math.atan2(R[7], R[8]), -math.asin(min(max(R[6], -1.0), 1.0)), yaw_of(R)
+
+
+def quaternion_from_matrix(R: Mat3) -> Vec4:
+    """Unit quaternion [w, x, y, z] with w >= 0 (Shepperd's method, largest component first)."""
+    m00, m01, m02, m10, m11, m12, m20, m21, m22 = R
+    trace = m00 + m11 + m22
+    if trace > max(m00, m11, m22):
+        w = 0.5 * math.sqrt(1.0 + trace)
+        k = 0.25 / w
+        return w, (m21 - m12) * k, (m02 - m20) * k, (m10 - m01) * k
+    if m00 >= m11 and m00 >= m22:
+        x = 0.5 * math.sqrt(1.0 + m00 - m11 - m22)
+        k = 0.25 / x
+        q = ((m21 - m12) * k, x, (m01 + m10) * k, (m02 + m20) * k)
+    elif m11 >= m22:
+        y = 0.5 * math.sqrt(1.0 - m00 + m11 - m22)
+        k = 0.25 / y
+        q = ((m02 - m20) * k, (m01 + m10) * k, y, (m12 + m21) * k)
+    else:
+        z = 0.5 * math.sqrt(1.0 - m00 - m11 + m22)
+        k = 0.25 / z
+        q = ((m10 - m01) * k, (m02 + m20) * k, (m12 + m21) * k, z)
+    return q if q[0] >= 0.0 else (-q[0], -q[1], -q[2], -q[3])
+
+
+def rotate(R: Mat3, v: Vec3) -> Vec3:
+    """World components of a body vector."""
+    x, y, z = v
+    return (
+        R[0] * x + R[1] * y + R[2] * z,
+        R[3] * x + R[4] * y + R[5] * z,
+        R[6] * x + R[7] * y + R[8] * z,
+    )
+
+
+def wrap_angle(angle: float) -> float:
+    """The same angle in [-pi, pi)."""
+    return (angle + math.pi) % (2.0 * math.pi) - math.pi

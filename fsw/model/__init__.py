@@ -1,0 +1,1 @@
+"""What the controllers believe about the vehicle."""

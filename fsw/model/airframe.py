@@ -1,0 +1,38 @@
+"""The vehicle as the controllers believe it to be (Table I of the paper and our choices)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from fsw.signals import Vec2, Vec3
+
+GRAVITY = 9.81  # m/s^2, along +z of the world
+
+
+@dataclass(frozen=True, slots=True)
+class Airframe:
+    """'+' quadrotor with a planar two-joint arm whose first joint is at the body origin.
+
+    Rotors are numbered rear, left, front, right, so that with thrusts f the torque is
+    ``[L (f2 - f4), L (f3 - f1), b (f1 - f2 + f3 - f4)]`` in the body (FRD).
+    """
+
+    mass: float = 3.5  # kg, the whole vehicle
+    inertia: Vec3 = (0.3, 0.3, 0.6)  # kg m^2, base only
+    rotor_arm: float = 0.3  # m, L
+    yaw_per_thrust: float = 0.016  # m, b
+    rotor_thrust_max: float = 2.0 * 3.5 * GRAVITY / 4.0  # N; thrust-to-weight 2, our choice
+    rotor_lag: float = 0.04  # s, our choice
+    link_length: Vec2 = (0.15, 0.15)  # m
+    link_mass: Vec2 = (0.2, 0.2)  # kg, from the laboratory's public model
+    link_com: Vec2 = (0.075, 0.075)  # m from the link's joint
+    link_inertia: Vec2 = (4.256e-5, 8.321e-5)  # kg m^2 about +y at the link's centre of mass
+    joint_torque_max: float = 2.0  # N m, our choice
+    joint1_limit: float = math.pi / 3.0  # rad, |th1|
+    joint12_limit: float = math.pi / 2.0  # rad, |th1 + th2|
+    tilt_limit: float = math.pi / 10.0  # rad
+    leg_length: float = 0.2  # m, body origin above ground when standing
+
+
+AIRFRAME = Airframe()

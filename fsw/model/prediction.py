@@ -1,0 +1,118 @@
+r"""The planner's prediction model: six double integrators with the attitude's lag in between.
+
+The paper's model (eq 16) takes the commanded acceleration as reached at once. The real
+vehicle must tilt first: a horizontal acceleration follows its command through the attitude
+loop and the rotors, a vertical one through the rotors alone. With the attitude loop
+:math:`\ddot\vartheta = k_p(\vartheta_d - \vartheta) - k_d\dot\vartheta` and rotor lag
+:math:`\tau`, and acceleration proportional to tilt, each horizontal axis is
+
+.. math:: \dot p = v,\; \dot v = a,\; \dot a = j,\; \dot j = s,\;
+          \dot s = (k_p (u - a) - k_d j - s)/\tau
+
+and the vertical axis :math:`\dot a = (u - a)/\tau`. Yaw and joints stay double integrators.
+The chain is linear, time-invariant and the same in x and y, so it is discretised exactly
+once (zero-order hold) and condensed once.
+
+Source: docs/equations.md E16, E17; docs/decisions/0002-prediction-knows-the-attitude-lag.md.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import expm
+
+from fsw.signals import PredictionState
+
+Array = NDArray[np.float64]
+
+# Layout of the prediction state as a vector.
+P, V, A, J, S = 0, 3, 6, 9, 11
+YAW, YAW_RATE, Q_ARM, QD_ARM = 13, 14, 15, 17
+STATES = 19
+INPUTS = 6
+
+
+@dataclass(frozen=True, slots=True)
+class LagModel:
+    """How fast a commanded acceleration becomes a real one."""
+
+    kp: float = 50.0  # 1/s^2, attitude loop, the paper's PID
+    kd: float = 15.0  # 1/s
+    rotor_lag: float = 0.04  # s
+
+
+@dataclass(frozen=True)
+class CondensedModel:
+    """Prediction over a horizon: ``x_i = phi[i] x_0 + gamma[i] U`` for i = 0..n."""
+
+    horizon: int
+    period: float  # s
+    phi: Array  # (n + 1, 19, 19)
+    gamma: Array  # (n + 1, 19, 6 n)
+
+
+def continuous_model(lag: LagModel) -> tuple[Array, Array]:
+    """Continuous-time A (19, 19) and B (19, 6) of the module docstring."""
+    a = np.zeros((STATES, STATES))
+    b = np.zeros((STATES, INPUTS))
+    for axis in range(3):
+        a[P + axis, V + axis] = 1.0
+        a[V + axis, A + axis] = 1.0
+    for axis in range(2):
+        a[A + axis, J + axis] = 1.0
+        a[J + axis, S + axis] = 1.0
+        a[S + axis, [A + axis, J + axis, S + axis]] = (
+            np.array([-lag.kp, -lag.kd, -1.0]) / lag.rotor_lag
+        )
+        b[S + axis, axis] = lag.kp / lag.rotor_lag
+    a[A + 2, A + 2] = -1.0 / lag.rotor_lag
+    b[A + 2, 2] = 1.0 / lag.rotor_lag
+    a[YAW, YAW_RATE] = 1.0
+    b[YAW_RATE, 3] = 1.0
+    for joint in range(2):
+        a[Q_ARM + joint, QD_ARM + joint] = 1.0
+        b[QD_ARM + joint, 4 + joint] = 1.0
+    return a, b
+
+
+def discretise(lag: LagModel, period: float) -> tuple[Array, Array]:
+    """Exact zero-order-hold A (19, 19) and B (19, 6) over one period [s]."""
+    a, b = continuous_model(lag)
+    block = np.zeros((STATES + INPUTS, STATES + INPUTS))
+    block[:STATES, :STATES] = a * period
+    block[:STATES, STATES:] = b * period
+    exponential = expm(block)
+    return exponential[:STATES, :STATES].copy(), exponential[:STATES, STATES:].copy()
+
+
+def condense(lag: LagModel, period: float, horizon: int) -> CondensedModel:
+    """Stack the discrete model over the horizon, inputs as the only unknowns."""
+    a, b = discretise(lag, period)
+    phi = np.zeros((horizon + 1, STATES, STATES))
+    gamma = np.zeros((horizon + 1, STATES, INPUTS * horizon))
+    phi[0] = np.eye(STATES)
+    for i in range(horizon):
+        phi[i + 1] = a @ phi[i]
+        gamma[i + 1] = a @ gamma[i]
+        gamma[i + 1, :, INPUTS * i : INPUTS * (i + 1)] = b
+    return CondensedModel(horizon, period, phi, gamma)
+
+
+def to_vector(state: PredictionState) -> Array:
+    """The prediction state in the layout of this module, (19,)."""
+    return np.array(
+        (
+            *state.p,
+            *state.v,
+            *state.a,
+            *state.j,
+            *state.s,
+            state.yaw,
+            state.yaw_rate,
+            *state.q_arm,
+            *state.qd_arm,
+        )
+    )

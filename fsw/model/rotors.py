@@ -1,0 +1,72 @@
+r"""Where the rotors are, and what that does to the vehicle's motion.
+
+Thrust, jerk and snap cannot be measured at 500 Hz without noise; they follow from the
+commands through the rotor lag. With f the total thrust over the mass and b1, b2, b3 the
+body axes,
+
+.. math:: a = g e_3 - f b_3, \quad j = -f(\omega_y b_1 - \omega_x b_2), \quad
+          s = -f(\dot\omega_y b_1 - \dot\omega_x b_2)
+
+(horizontal parts; products of rates and the vertical jerk are left out).
+
+Source: docs/equations.md T1.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from fsw.model.airframe import GRAVITY, Airframe
+from fsw.signals import StateEstimate, Vec2, Vec3, Vec4
+
+
+@dataclass(frozen=True, slots=True)
+class MotionState:
+    """Derivatives of the body's position that the rotors produce right now."""
+
+    thrust: float  # N, total
+    a: Vec3  # m/s^2, without disturbance
+    j: Vec2  # m/s^3, horizontal
+    s: Vec2  # m/s^4, horizontal
+
+
+def lag_rotors(thrust: Vec4, command: Vec4, decay: float) -> Vec4:
+    """Rotor thrusts one tick later [N]; ``decay`` is exp(-dt / lag)."""
+    return (
+        command[0] + (thrust[0] - command[0]) * decay,
+        command[1] + (thrust[1] - command[1]) * decay,
+        command[2] + (thrust[2] - command[2]) * decay,
+        command[3] + (thrust[3] - command[3]) * decay,
+    )
+
+
+def rotor_decay(airframe: Airframe, dt: float) -> float:
+    """Share of a rotor's error left after a tick."""
+    return math.exp(-dt / airframe.rotor_lag)
+
+
+def motion_state(
+    airframe: Airframe, estimate: StateEstimate, rotors: Vec4, joint1_torque: float
+) -> MotionState:
+    """Acceleration, jerk and snap of the body origin from the rotor model.
+
+    Args:
+        airframe: Mass, inertia and rotor arm.
+        estimate: Attitude and body rates.
+        rotors: Thrust of each rotor now [N].
+        joint1_torque: Torque on link 1 about +y of the body [N m]; the base feels minus it.
+    """
+    R = estimate.R_WB
+    wx, wy, _ = estimate.w_WB_B
+    f1, f2, f3, f4 = rotors
+    thrust = f1 + f2 + f3 + f4
+    f = thrust / airframe.mass
+    wdx = airframe.rotor_arm * (f2 - f4) / airframe.inertia[0]
+    wdy = (airframe.rotor_arm * (f3 - f1) - joint1_torque) / airframe.inertia[1]
+    return MotionState(
+        thrust,
+        (-f * R[2], -f * R[5], GRAVITY - f * R[8]),
+        (-f * (wy * R[0] - wx * R[1]), -f * (wy * R[3] - wx * R[4])),
+        (-f * (wdy * R[0] - wdx * R[1]), -f * (wdy * R[3] - wdx * R[4])),
+    )

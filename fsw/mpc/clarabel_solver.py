@@ -1,0 +1,86 @@
+"""Clarabel behind one call; the only importer of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import clarabel
+import numpy as np
+
+from fsw.model.prediction import Array
+from fsw.mpc.program import Program
+from fsw.signals import SolverStatus
+
+_STATUS = {
+    clarabel.SolverStatus.Solved: SolverStatus.SOLVED,
+    clarabel.SolverStatus.AlmostSolved: SolverStatus.ALMOST_SOLVED,
+    clarabel.SolverStatus.PrimalInfeasible: SolverStatus.INFEASIBLE,
+    clarabel.SolverStatus.DualInfeasible: SolverStatus.INFEASIBLE,
+    clarabel.SolverStatus.AlmostPrimalInfeasible: SolverStatus.INFEASIBLE,
+    clarabel.SolverStatus.AlmostDualInfeasible: SolverStatus.INFEASIBLE,
+    clarabel.SolverStatus.MaxIterations: SolverStatus.TIME_LIMIT,
+    clarabel.SolverStatus.MaxTime: SolverStatus.TIME_LIMIT,
+}
+
+# A solve is bounded in iterations, not in time: about 20 us each at n = 5, and the same
+# answer on a slow machine as on a fast one. Feasible programs need 8 to 15.
+MAX_ITERATIONS = 50
+
+
+@dataclass(frozen=True, slots=True)
+class Solution:
+    """Outcome of one solve; ``x`` is usable only where the status is (almost) solved."""
+
+    status: SolverStatus
+    x: Array  # (unknowns,)
+    iterations: int
+
+    @property
+    def usable(self) -> bool:
+        """Whether ``x`` may be flown: a truncated iterate is finite but wrong."""
+        return self.status in (SolverStatus.SOLVED, SolverStatus.ALMOST_SOLVED)
+
+
+class ClarabelSolver:
+    """Solves one program again and again with new numbers in the same pattern."""
+
+    def __init__(self, program: Program) -> None:
+        settings = clarabel.DefaultSettings()
+        settings.verbose = False
+        settings.max_iter = MAX_ITERATIONS
+        settings.max_threads = 1
+        settings.direct_solve_method = "qdldl"
+        # The program is small, dense and scaled by its author; these stages cost more than
+        # they give here (docs/decisions/0004-clarabel-settings.md) and presolve would
+        # forbid updates in place.
+        settings.equilibrate_enable = False
+        settings.iterative_refinement_enable = False
+        settings.presolve_enable = False
+        settings.chordal_decomposition_enable = False
+        settings.input_sparse_dropzeros = False
+        settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = 1e-6
+        cones = [
+            clarabel.NonnegativeConeT(program.nonnegative_rows),
+            *[clarabel.SecondOrderConeT(3)] * program.tilt_cones,
+        ]
+        self._program = program
+        self._solver = clarabel.DefaultSolver(
+            program.p, program.q, program.a, program.b, cones, settings
+        )
+
+    def solve(self) -> Solution:
+        """Solve the program as it is filled now."""
+        program = self._program
+        # Memoryviews: the binding copies them three times as fast as arrays.
+        self._solver.update(
+            P=program.p.data.data,
+            q=program.q.data,
+            A=program.a.data.data,
+            b=program.b.data,
+        )
+        answer = self._solver.solve()
+        status = _STATUS.get(answer.status, SolverStatus.NUMERICAL_ERROR)
+        x = np.array(answer.x)
+        if not np.isfinite(x).all():
+            status = SolverStatus.NUMERICAL_ERROR
+        return Solution(status, x, int(answer.iterations))

@@ -1,0 +1,129 @@
+r"""The paper's costs (eqs 18, 20, 21) and an input cost, as one Gauss-Newton quadratic.
+
+.. math:: \sum_i \|e_e\|^2_{W_1} + \|v_e - v_d\|^2_{W_2} + \|p_{G,x}\|^2_{W_3} + \|u_i\|^2_R
+
+over nodes 1..n-1, with the terminal weights at node n (node 0 is measured and constant).
+
+The paper penalises :math:`v_e` itself, which pulls a moving end-effector back; by default
+the target's velocity is subtracted (docs/equations.md E20 gives both figures).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fsw.barriers.soft_rows import TargetPoints
+from fsw.compiled import compiled
+from fsw.model.linearisation import END_EFFECTOR, Linearisation
+from fsw.model.prediction import INPUTS, Array
+
+
+@dataclass(frozen=True, slots=True)
+class CostWeights:
+    """Weights of Table II and ours for the inputs."""
+
+    tracking: float = 10.0  # w_1
+    tracking_terminal: float = 50.0  # w_s1
+    velocity: float = 2.0  # w_2
+    velocity_terminal: float = 10.0  # w_s2
+    arm_cog: float = 1.0  # w_3
+    arm_cog_terminal: float = 5.0  # w_s3
+    inputs: float = 0.02  # on a_d, yaw and joint accelerations alike
+    relative_velocity: bool = True  # v_e - v_d in eq 20 instead of the printed v_e
+
+
+def fill_cost(
+    weights: CostWeights,
+    horizon: Linearisation,
+    targets: TargetPoints,
+    guess: Array,
+    hessian: Array,
+    gradient: Array,
+) -> float:
+    """Quadratic model ``1/2 U' hessian U + gradient' U`` of the cost around a guess.
+
+    Args:
+        weights: Cost weights.
+        horizon: Linearisation around ``guess``.
+        targets: Reference at the nodes.
+        guess: Inputs of the linearisation, (6 n,).
+        hessian: (6 n, 6 n), overwritten.
+        gradient: (6 n,), overwritten.
+
+    Returns:
+        The cost at the guess.
+    """
+    return _fill(
+        np.array(
+            (
+                (weights.tracking, weights.velocity, weights.arm_cog),
+                (weights.tracking_terminal, weights.velocity_terminal, weights.arm_cog_terminal),
+            )
+        ),
+        weights.inputs,
+        1.0 if weights.relative_velocity else 0.0,
+        horizon.position[:, END_EFFECTOR],
+        horizon.velocity[:, END_EFFECTOR],
+        horizon.arm_cog,
+        horizon.d_position[:, END_EFFECTOR],
+        horizon.d_velocity[:, END_EFFECTOR],
+        horizon.d_arm_cog,
+        targets.position,
+        targets.velocity,
+        guess,
+        hessian,
+        gradient,
+    )
+
+
+@compiled
+def _fill(
+    weights: Array,
+    input_weight: float,
+    velocity_share: float,
+    position: Array,
+    velocity: Array,
+    cog: Array,
+    d_position: Array,
+    d_velocity: Array,
+    d_cog: Array,
+    target_position: Array,
+    target_velocity: Array,
+    guess: Array,
+    hessian: Array,
+    gradient: Array,
+) -> float:
+    n = position.shape[0] - 1
+    hessian[:] = 0.0
+    gradient[:] = 0.0
+    cost = 0.0
+    for k in range(INPUTS * n):
+        hessian[k, k] = 2.0 * input_weight
+        cost += input_weight * guess[k] * guess[k]
+    for i in range(1, n + 1):
+        w = weights[1 if i == n else 0]
+        for residual in range(7):
+            if residual < 3:
+                weight, row = w[0], d_position[i, residual]
+                value = position[i, residual] - target_position[i, residual]
+            elif residual < 6:
+                weight, row = w[1], d_velocity[i, residual - 3]
+                value = (
+                    velocity[i, residual - 3] - velocity_share * target_velocity[i, residual - 3]
+                )
+            else:
+                weight, row, value = w[2], d_cog[i], cog[i]
+            cost += weight * value * value
+            columns = INPUTS * i
+            at_zero = value
+            for k in range(columns):
+                at_zero -= row[k] * guess[k]
+            for k in range(columns):
+                scaled = 2.0 * weight * row[k]
+                if scaled != 0.0:
+                    gradient[k] += scaled * at_zero
+                    for m in range(k, columns):
+                        hessian[k, m] += scaled * row[m]
+    return cost

@@ -1,0 +1,152 @@
+"""One 10 Hz cycle: linearise, refill, solve, twice; then a plan or the reason for none."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from fsw.barriers.soft_rows import TargetPoints
+from fsw.model.prediction import INPUTS, Array, condense, to_vector
+from fsw.mpc.planner_config import PlannerConfig
+from fsw.mpc.problem import Problem
+from fsw.signals import (
+    EndEffectorTarget,
+    Plan,
+    PlanFailure,
+    PlanInput,
+    PlanRequest,
+    PlanTimings,
+    PredictionState,
+    SafeSet,
+    SolverStatus,
+    Wall,
+    WorkspaceSphere,
+)
+
+
+class Planner:
+    """The MPC of eq 17, solved by sequential quadratic programming.
+
+    Holds the last solution as the next guess and the program of the current safe set;
+    everything else comes with the request.
+    """
+
+    def __init__(self, config: PlannerConfig, stopwatch_us: Callable[[], float]) -> None:
+        """Build the prediction model.
+
+        Args:
+            config: Horizon, weights, limits and barriers.
+            stopwatch_us: Monotonic time for the reported stage times only [us].
+        """
+        self._config = config
+        self._stopwatch_us = stopwatch_us
+        self._period_us = round(config.period * 1e6)
+        self._model = condense(config.lag, config.period, config.horizon)
+        self._safe_set: SafeSet | None = None
+        self._problem: Problem | None = None
+        self._inputs: Array = np.zeros(INPUTS * config.horizon)
+        self._t_us = -1
+
+    def warm_up(self) -> None:
+        """Compile every kernel and load the solver, before anything flies."""
+        rest = PredictionState(
+            p=(0.0, 0.0, -1.0),
+            v=(0.0, 0.0, 0.0),
+            a=(0.0, 0.0, 0.0),
+            j=(0.0, 0.0),
+            s=(0.0, 0.0),
+            yaw=0.0,
+            yaw_rate=0.0,
+            q_arm=(0.0, 0.0),
+            qd_arm=(0.0, 0.0),
+        )
+        target = EndEffectorTarget(0, (0.0, 0.0, -0.7), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+        targets = (target,) * (self._config.horizon + 1)
+        wall = Wall((-1.0, 0.0, 0.0), -1.0, 0.1)
+        sphere = WorkspaceSphere((0.0, 0.0, -0.3), 0.1)
+        for safe_set in (SafeSet(), SafeSet(walls=(wall,)), SafeSet(sphere=sphere)):
+            self.plan(PlanRequest(0, 0, rest, targets, safe_set, False))
+        self._t_us = -1
+        self._inputs[:] = 0.0
+
+    def plan(self, request: PlanRequest) -> Plan | PlanFailure:
+        """Answer one request.
+
+        Returns:
+            A plan whose every program was solved, or a failure that says which was not.
+        """
+        begin = self._stopwatch_us()
+        refusal = self._refusal(request)
+        if refusal is not None:
+            return PlanFailure(
+                request.plan_id, SolverStatus.INPUT_REFUSED, refusal, PlanTimings(0.0, 0.0, 0.0)
+            )
+        problem = self._problem_for(request.safe_set)
+        start = to_vector(request.start)
+        targets = TargetPoints(
+            np.array([target.p_WE for target in request.targets]),
+            np.array([target.v_WE for target in request.targets]),
+        )
+        inputs = self._guess(request.t_apply_us)
+        linearise_us = solve_us = 0.0
+        iterations = 0
+        for _ in range(self._config.sqp_iterations):
+            mark = self._stopwatch_us()
+            problem.linearise(start, inputs, targets)
+            linearised = self._stopwatch_us()
+            solution = problem.solve()
+            linearise_us += linearised - mark
+            solve_us += self._stopwatch_us() - linearised
+            iterations += solution.iterations
+            if not solution.usable:
+                timings = PlanTimings(linearise_us, solve_us, self._stopwatch_us() - begin)
+                reason = f"solver stopped with {solution.status.name} after {iterations} iterations"
+                return PlanFailure(request.plan_id, solution.status, reason, timings)
+            inputs = solution.x[: len(inputs)]
+        self._inputs = inputs
+        self._t_us = request.t_apply_us
+        return Plan(
+            plan_id=request.plan_id,
+            t_us=request.t_apply_us,
+            period_us=self._period_us,
+            start=request.start,
+            inputs=_as_plan_inputs(inputs),
+            status=solution.status,
+            cost=problem.cost,
+            slack_max=problem.largest_barrier_slack(solution.x),
+            barrier=problem.barrier_at_start(),
+            sqp_iterations=self._config.sqp_iterations,
+            solver_iterations=iterations,
+            timings=PlanTimings(linearise_us, solve_us, self._stopwatch_us() - begin),
+        )
+
+    def _refusal(self, request: PlanRequest) -> str | None:
+        if len(request.targets) != self._config.horizon + 1:
+            return f"{len(request.targets)} targets given, {self._config.horizon + 1} needed"
+        if not np.isfinite(to_vector(request.start)).all():
+            return "the start state is not finite"
+        for target in request.targets:
+            if not all(map(math.isfinite, (*target.p_WE, *target.v_WE))):
+                return "a target is not finite"
+        return None
+
+    def _problem_for(self, safe_set: SafeSet) -> Problem:
+        if self._problem is None or safe_set != self._safe_set:
+            self._problem = Problem(self._config, self._model, safe_set)
+            self._safe_set = safe_set
+        return self._problem
+
+    def _guess(self, t_us: int) -> Array:
+        """The last solution moved on by one period, or rest after a break."""
+        if t_us - self._t_us != self._period_us:
+            return np.zeros_like(self._inputs)
+        return np.concatenate((self._inputs[INPUTS:], self._inputs[-INPUTS:]))
+
+
+def _as_plan_inputs(inputs: Array) -> tuple[PlanInput, ...]:
+    return tuple(
+        PlanInput((ax, ay, az), yaw_acc, (joint1, joint2))
+        for ax, ay, az, yaw_acc, joint1, joint2 in inputs.reshape(-1, INPUTS).tolist()
+    )

@@ -1,0 +1,76 @@
+"""The optimal control problem of one safe set: everything that is built once and refilled."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fsw.barriers.soft_rows import Barrier, TargetPoints
+from fsw.barriers.wall import WallBarrier
+from fsw.barriers.workspace import WorkspaceBarrier
+from fsw.model.linearisation import Linearisation
+from fsw.model.prediction import Array, CondensedModel
+from fsw.mpc.clarabel_solver import ClarabelSolver, Solution
+from fsw.mpc.costs import fill_cost
+from fsw.mpc.limits import JointLimits
+from fsw.mpc.planner_config import PlannerConfig
+from fsw.mpc.program import Program
+from fsw.signals import SafeSet
+
+
+def barrier_for(safe_set: SafeSet, config: PlannerConfig) -> Barrier | None:
+    """The barrier of a safe set, or none in open space."""
+    if safe_set.sphere is not None:
+        return WorkspaceBarrier(safe_set.sphere, config.workspace, config.horizon)
+    if safe_set.walls:
+        return WallBarrier(safe_set.walls, config.walls, config.horizon)
+    return None
+
+
+class Problem:
+    """Costs, barrier and limits of one safe set in one program."""
+
+    def __init__(self, config: PlannerConfig, model: CondensedModel, safe_set: SafeSet) -> None:
+        self._config = config
+        self._horizon = Linearisation(model)
+        self._limits = JointLimits(config.airframe, model)
+        self._barrier = barrier_for(safe_set, config)
+        blocks = [(self._limits.rows, config.joint_slack)]
+        if self._barrier is not None:
+            blocks.append((self._barrier.rows, config.barrier_slack))
+        self._program = Program(config.horizon, config.limits, tuple(blocks))
+        self._gradient = np.zeros(self._program.inputs)
+        self._first_barrier_slack = self._program.inputs + self._limits.rows.slacks
+        self.cost = 0.0
+        self.linearise(np.zeros(model.phi.shape[1]), self._gradient, _no_targets(config.horizon))
+        self._solver = ClarabelSolver(self._program)
+
+    def linearise(self, start: Array, guess: Array, targets: TargetPoints) -> None:
+        """Refill the program around a guess of the inputs (6 n,) from a start (19,)."""
+        config = self._config
+        self._horizon.refill(config.airframe, start, guess)
+        self.cost = fill_cost(
+            config.weights, self._horizon, targets, guess, self._program.hessian, self._gradient
+        )
+        self._limits.refill(self._horizon)
+        if self._barrier is not None:
+            self._barrier.refill(self._horizon, targets)
+        self._program.refill(guess, self._gradient)
+
+    def solve(self) -> Solution:
+        """Solve the program as last linearised."""
+        return self._solver.solve()
+
+    def barrier_at_start(self) -> tuple[float, ...]:
+        """h of each constraint at node 0 [m/s]."""
+        if self._barrier is None:
+            return ()
+        return tuple(float(h) for h in self._barrier.at_start())
+
+    def largest_barrier_slack(self, x: Array) -> float:
+        """How far a solution softens the barrier [m/s]."""
+        slacks = x[self._first_barrier_slack :]
+        return float(slacks.max()) if len(slacks) else 0.0
+
+
+def _no_targets(horizon: int) -> TargetPoints:
+    return TargetPoints(np.zeros((horizon + 1, 3)), np.zeros((horizon + 1, 3)))

@@ -1,0 +1,92 @@
+"""The end-effector reference between the points that were received."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+
+from fsw.signals import EndEffectorTarget, Vec3
+
+_REST: Vec3 = (0.0, 0.0, 0.0)
+KEPT_POINTS = 256  # 25 s of a 10 Hz stream; a flood must not grow the memory
+
+
+def still_at(p_WE: Vec3, t_us: int = 0, yaw: float = 0.0) -> EndEffectorTarget:
+    """A target that does not move."""
+    return EndEffectorTarget(t_us, p_WE, _REST, _REST, yaw)
+
+
+def merge(
+    stream: tuple[EndEffectorTarget, ...],
+    received: tuple[EndEffectorTarget, ...],
+    now_us: int,
+) -> tuple[EndEffectorTarget, ...]:
+    """Add points to the stream, sorted by time, a later point for the same instant wins.
+
+    Points before the last one already due are forgotten.
+    """
+    if not received:
+        return stream
+    by_time = {point.t_us: point for point in (*stream, *received)}
+    points = [by_time[t] for t in sorted(by_time)]
+    due = bisect_right([point.t_us for point in points], now_us)
+    return tuple(points[max(due - 1, 0) :][:KEPT_POINTS])
+
+
+def sample(stream: tuple[EndEffectorTarget, ...], t_us: int) -> EndEffectorTarget:
+    """The reference at an instant: cubic between points, at rest beyond the ends.
+
+    Args:
+        stream: At least one point, sorted by time.
+        t_us: The instant.
+    """
+    after = bisect_right(stream, t_us, key=lambda point: point.t_us)
+    if after == 0:
+        return still_at(stream[0].p_WE, t_us, stream[0].yaw)
+    before = stream[after - 1]
+    if after == len(stream):
+        if before.t_us == t_us:
+            return before
+        return still_at(before.p_WE, t_us, before.yaw)
+    return _hermite(before, stream[after], t_us)
+
+
+def _hermite(first: EndEffectorTarget, last: EndEffectorTarget, t_us: int) -> EndEffectorTarget:
+    """Cubic through both points' positions and velocities."""
+    span = (last.t_us - first.t_us) * 1e-6
+    x = (t_us - first.t_us) * 1e-6 / span
+    p, v, a = [], [], []
+    for axis in range(3):
+        p0, p1 = first.p_WE[axis], last.p_WE[axis]
+        m0, m1 = span * first.v_WE[axis], span * last.v_WE[axis]
+        c2 = 3.0 * (p1 - p0) - 2.0 * m0 - m1
+        c3 = -2.0 * (p1 - p0) + m0 + m1
+        p.append(p0 + x * (m0 + x * (c2 + x * c3)))
+        v.append((m0 + x * (2.0 * c2 + x * 3.0 * c3)) / span)
+        a.append((2.0 * c2 + 6.0 * x * c3) / (span * span))
+    yaw = first.yaw + x * (last.yaw - first.yaw)
+    return EndEffectorTarget(t_us, (p[0], p[1], p[2]), (v[0], v[1], v[2]), (a[0], a[1], a[2]), yaw)
+
+
+def vertical_ramp(
+    start: Vec3, climb: float, speed: float, since_us: int, t_us: int
+) -> EndEffectorTarget:
+    """Straight up (climb > 0) or down from a point at constant speed, then still.
+
+    Args:
+        start: Where the ramp begins [m].
+        climb: Height to gain [m].
+        speed: Of the ramp, positive [m/s].
+        since_us: When it began.
+        t_us: The instant asked for.
+    """
+    elapsed = max(t_us - since_us, 0) * 1e-6
+    direction = 1.0 if climb >= 0.0 else -1.0
+    gained = speed * elapsed
+    if gained >= abs(climb):
+        return still_at((start[0], start[1], start[2] - climb), t_us)
+    return EndEffectorTarget(
+        t_us,
+        (start[0], start[1], start[2] - direction * gained),
+        (0.0, 0.0, -direction * speed),
+        _REST,
+    )

@@ -1,0 +1,1 @@
+"""Tunables and their presets."""

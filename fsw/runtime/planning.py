@@ -1,0 +1,168 @@
+"""Between tick and planner: when to ask, what to ask, what to fly while the answer ages."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from fsw.model.nominal import NominalModel
+from fsw.model.rotors import MotionState
+from fsw.parameters.flight_config import FlightConfig
+from fsw.runtime.flight_state import PlanMemory
+from fsw.signals import (
+    ConstraintKind,
+    EndEffectorTarget,
+    Plan,
+    PlanFailure,
+    PlanInput,
+    PlanRequest,
+    PredictionState,
+    SafeSet,
+    StateEstimate,
+)
+from fsw.vehicle.faults import PLAN_STALE_PERIODS
+
+_BRAKE_RATE = 1.5  # 1/s; slower than the attitude loop, so that stopping does not ring
+_BRAKE_LIMIT = 2.0  # m/s^2
+
+
+def nominal_at_rest(estimate: StateEstimate) -> PredictionState:
+    """A plan state that stands where the vehicle is."""
+    return PredictionState(
+        estimate.p_WB,
+        (0.0, 0.0, 0.0),
+        (0.0, 0.0, 0.0),
+        (0.0, 0.0),
+        (0.0, 0.0),
+        estimate.yaw,
+        0.0,
+        estimate.q_arm,
+        (0.0, 0.0),
+    )
+
+
+def measured_state(estimate: StateEstimate, motion: MotionState) -> PredictionState:
+    """The vehicle itself as a state of the prediction model."""
+    R = estimate.R_WB
+    _, wy, wz = estimate.w_WB_B
+    # ZYX yaw rate: the body rates' share about the vertical, over the cosine of pitch squared.
+    yaw_rate = (R[7] * wy + R[8] * wz) / max(R[7] * R[7] + R[8] * R[8], 1e-6)
+    return PredictionState(
+        estimate.p_WB,
+        estimate.v_WB,
+        motion.a,
+        motion.j,
+        motion.s,
+        estimate.yaw,
+        yaw_rate,
+        estimate.q_arm,
+        estimate.qd_arm,
+    )
+
+
+def plan_input(memory: PlanMemory, now_us: int) -> PlanInput:
+    """The running plan's input at its age; braking where there is none young enough."""
+    plan = memory.running
+    if plan is not None:
+        step = (now_us - plan.t_us) // plan.period_us
+        if 0 <= step < min(PLAN_STALE_PERIODS, len(plan.inputs)):
+            return plan.inputs[step]
+    return _brake(memory.nominal) if memory.nominal is not None else _REST
+
+
+_REST = PlanInput((0.0, 0.0, 0.0), 0.0, (0.0, 0.0))
+
+
+def _brake(x: PredictionState) -> PlanInput:
+    """Stop the plan state where it is, within what the vehicle can surely follow."""
+    ax, ay, az = (min(max(-_BRAKE_RATE * v, -_BRAKE_LIMIT), _BRAKE_LIMIT) for v in x.v)
+    qdd1, qdd2 = (min(max(-4.0 * qd, -5.0), 5.0) for qd in x.qd_arm)
+    return PlanInput((ax, ay, az), min(max(-x.yaw_rate, -0.1), 0.1), (qdd1, qdd2))
+
+
+def take_answer(
+    memory: PlanMemory,
+    answer: Plan | PlanFailure | None,
+    now_us: int,
+    model: NominalModel,
+    dt_us: int,
+) -> PlanMemory:
+    """Account for the planner: a plan starts, a refusal is counted, a missing one is noticed.
+
+    Args:
+        memory: Before this tick.
+        answer: What arrived, at most one.
+        now_us: This tick.
+        model: Moves a late plan's start on to now.
+        dt_us: Tick length.
+    """
+    if answer is not None and answer.plan_id == memory.awaited_id:
+        memory = replace(memory, awaited_id=-1)
+        counters = memory.counters
+        if isinstance(answer, Plan):
+            late = max(now_us - answer.t_us, 0) // dt_us
+            start = model.advance(answer.start, answer.inputs[0], late)
+            return replace(
+                memory,
+                running=answer,
+                since_us=answer.t_us,
+                nominal=start,
+                status=answer.status,
+                refused=False,
+                counters=replace(counters, plans=counters.plans + 1),
+            )
+        return replace(
+            memory,
+            status=answer.status,
+            refused=True,
+            counters=replace(counters, fallbacks=counters.fallbacks + 1),
+        )
+    if memory.awaited_id >= 0 and now_us >= memory.awaited_us and not memory.awaited_missed:
+        missed = memory.counters.missed_deadlines + 1
+        return replace(
+            memory,
+            awaited_missed=True,
+            counters=replace(memory.counters, missed_deadlines=missed),
+        )
+    return memory
+
+
+def ask(
+    config: FlightConfig,
+    model: NominalModel,
+    memory: PlanMemory,
+    estimate: StateEstimate,
+    motion: MotionState,
+    safe_set: SafeSet,
+    targets: tuple[EndEffectorTarget, ...],
+) -> tuple[PlanRequest, PlanMemory]:
+    """The question for this period.
+
+    The plan starts from the running plan's own state where the fast loop can hold the
+    vehicle to it, and from the measurement otherwise: beside walls, where the planner must
+    see the disturbance itself; with the PID inner loop, which follows no state; after an
+    upset. Either is moved on to the instant the answer takes effect.
+    """
+    now_us = estimate.t_us
+    nominal = memory.nominal
+    from_nominal = (
+        nominal is not None
+        and config.inner == "tracking"
+        and safe_set.kind is not ConstraintKind.WALLS
+        and math.dist(nominal.p, estimate.p_WB) < config.upset_distance
+    )
+    start = nominal if from_nominal and nominal is not None else measured_state(estimate, motion)
+    start = model.advance(start, plan_input(memory, now_us), config.plan_delay_ticks)
+    apply_us = now_us + config.plan_delay_ticks * config.tick_period_us
+    request = PlanRequest(memory.next_id, apply_us, start, targets, safe_set, from_nominal)
+    counters = memory.counters
+    if memory.awaited_id >= 0:  # the last question is given up, not waited for
+        counters = replace(counters, fallbacks=counters.fallbacks + 1)
+    return request, replace(
+        memory,
+        awaited_id=memory.next_id,
+        awaited_us=apply_us,
+        awaited_missed=False,
+        next_id=memory.next_id + 1,
+        counters=counters,
+    )

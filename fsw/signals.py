@@ -1,0 +1,303 @@
+"""Every value that crosses a boundary of the flight software.
+
+Frames: W is the local NED world, B the body (FRD), E the end-effector. ``R_WB`` maps body
+components to world components and is stored row by row. Units are SI and radians. The tick
+runs at 500 Hz, so its values are tuples of plain floats: at this size NumPy costs more than
+it saves (docs/decisions/0003-plain-floats-in-the-fast-loop.md).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum, IntEnum
+
+Vec2 = tuple[float, float]
+Vec3 = tuple[float, float, float]
+Vec4 = tuple[float, float, float, float]
+Mat3 = tuple[float, float, float, float, float, float, float, float, float]  # row-major
+
+
+class Mode(Enum):
+    """Where the vehicle is in its flight; transitions are in ``vehicle/modes.py``."""
+
+    DISARMED = "disarmed"
+    TAKEOFF = "takeoff"
+    HOLD = "hold"
+    TRAJECTORY = "trajectory"
+    LAND = "land"
+    FAULT = "fault"
+
+
+class SolverStatus(IntEnum):
+    """Outcome of one planning cycle; values equal PANDION_SOLVER_STATUS of the dialect."""
+
+    UNKNOWN = 0
+    SOLVED = 1
+    ALMOST_SOLVED = 2
+    INFEASIBLE = 3
+    TIME_LIMIT = 4
+    NUMERICAL_ERROR = 5
+    INPUT_REFUSED = 6
+
+
+class ConstraintKind(IntEnum):
+    """Which safe set is active; values equal PANDION_CONSTRAINT_KIND of the dialect."""
+
+    NONE = 0
+    WALLS = 1
+    WORKSPACE = 2
+
+
+# ---------------------------------------------------------------- inputs of a tick
+
+
+@dataclass(frozen=True, slots=True)
+class SensorFrame:
+    """What the sensors said at one instant."""
+
+    t_us: int  # sensor time, the only clock a tick knows
+    p_WB: Vec3  # m
+    v_WB: Vec3  # m/s, world components
+    q_WB: Vec4  # unit quaternion [w, x, y, z]
+    gyro_B: Vec3  # rad/s
+    accel_B: Vec3  # m/s^2, specific force
+    q_arm: Vec2  # rad: th1 from straight down, th2 relative to link 1
+    qd_arm: Vec2  # rad/s
+
+
+@dataclass(frozen=True, slots=True)
+class CommandRequest:
+    """A MAVLink command (COMMAND_LONG or COMMAND_INT) addressed to this vehicle."""
+
+    command: int  # MAV_CMD
+    params: tuple[float, float, float, float, float, float, float]  # NaN where not used
+    source_system: int
+    source_component: int
+    confirmation: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class EndEffectorTarget:
+    """One point of the end-effector reference and the instant at which to meet it."""
+
+    t_us: int
+    p_WE: Vec3  # m
+    v_WE: Vec3  # m/s
+    a_WE: Vec3  # m/s^2
+    yaw: float = 0.0  # rad
+
+
+@dataclass(frozen=True, slots=True)
+class Wall:
+    """A plane ``normal . p = offset``; free space is where ``normal . p > offset``."""
+
+    normal: Vec3  # unit, world
+    offset: float  # m
+    clearance: float  # m, s_min of eq 14
+
+
+@dataclass(frozen=True, slots=True)
+class WorkspaceSphere:
+    """Sphere that follows the end-effector target and must contain the body origin (eq 15)."""
+
+    centre_from_target: Vec3  # m, world; (0, 0, -d_iw) for a sphere straight above
+    radius: float  # m
+
+
+@dataclass(frozen=True, slots=True)
+class SafeSet:
+    """Where the vehicle may be: known walls (Case I), a workspace sphere (Case II), or neither."""
+
+    walls: tuple[Wall, ...] = ()
+    sphere: WorkspaceSphere | None = None
+
+    @property
+    def kind(self) -> ConstraintKind:
+        """The sphere rules where both are given: it is the tighter set."""
+        if self.sphere is not None:
+            return ConstraintKind.WORKSPACE
+        return ConstraintKind.WALLS if self.walls else ConstraintKind.NONE
+
+
+# ---------------------------------------------------------------- estimate
+
+
+@dataclass(frozen=True, slots=True)
+class StateEstimate:
+    """What the vehicle believes about itself."""
+
+    t_us: int
+    p_WB: Vec3  # m
+    v_WB: Vec3  # m/s
+    R_WB: Mat3
+    w_WB_B: Vec3  # rad/s
+    yaw: float  # rad, ZYX
+    q_arm: Vec2  # rad
+    qd_arm: Vec2  # rad/s
+
+
+# ---------------------------------------------------------------- planner
+
+
+@dataclass(frozen=True, slots=True)
+class PredictionState:
+    """State of the prediction model: the paper's twelve plus the attitude lag's seven."""
+
+    p: Vec3  # m, body origin
+    v: Vec3  # m/s
+    a: Vec3  # m/s^2
+    j: Vec2  # m/s^3, horizontal
+    s: Vec2  # m/s^4, horizontal
+    yaw: float  # rad
+    yaw_rate: float  # rad/s
+    q_arm: Vec2  # rad
+    qd_arm: Vec2  # rad/s
+
+
+@dataclass(frozen=True, slots=True)
+class PlanInput:
+    """The paper's u for one step of the horizon: [a_d, yaw acceleration, joint accelerations]."""
+
+    a: Vec3  # m/s^2, commanded
+    yaw_acc: float  # rad/s^2
+    qdd_arm: Vec2  # rad/s^2
+
+
+@dataclass(frozen=True, slots=True)
+class PlanRequest:
+    """One question to the planner."""
+
+    plan_id: int
+    t_apply_us: int  # when the answer takes effect; ``start`` is the state predicted for it
+    start: PredictionState
+    targets: tuple[EndEffectorTarget, ...]  # n + 1 points, one a node, first at t_apply_us
+    safe_set: SafeSet
+    from_nominal: bool  # start carried over from the running plan, not measured
+
+
+@dataclass(frozen=True, slots=True)
+class PlanTimings:
+    """Wall time of one planning cycle by stage [us]; never used by control."""
+
+    linearise_us: float
+    solve_us: float
+    total_us: float
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """A horizon of inputs, valid from ``t_us`` on."""
+
+    plan_id: int
+    t_us: int
+    period_us: int
+    start: PredictionState
+    inputs: tuple[PlanInput, ...]  # one a period
+    status: SolverStatus
+    cost: float
+    slack_max: float  # largest softening of a barrier row, 0 where all hold
+    barrier: tuple[float, ...]  # h of each constraint at ``start`` [m/s]
+    sqp_iterations: int
+    solver_iterations: int
+    timings: PlanTimings
+
+
+@dataclass(frozen=True, slots=True)
+class PlanFailure:
+    """The planner's refusal; the running plan goes on and the failure is counted."""
+
+    plan_id: int
+    status: SolverStatus
+    reason: str
+    timings: PlanTimings
+
+
+# ---------------------------------------------------------------- outputs of a tick
+
+
+@dataclass(frozen=True, slots=True)
+class ActuatorCommand:
+    """What leaves the flight software."""
+
+    rotor_thrust: Vec4  # N: rear, left, front, right
+    joint_torque: Vec2  # N m
+
+
+@dataclass(frozen=True, slots=True)
+class CommandAck:
+    """Answer to one CommandRequest."""
+
+    command: int  # MAV_CMD
+    result: int  # MAV_RESULT
+    target_system: int
+    target_component: int
+
+
+@dataclass(frozen=True, slots=True)
+class StatusText:
+    """A sentence for the operator."""
+
+    severity: int  # MAV_SEVERITY
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class PlannerCounters:
+    """What happened to plans since start."""
+
+    plans: int = 0
+    missed_deadlines: int = 0
+    fallbacks: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class ConstraintReport:
+    """Margins of the active safe set, from the vehicle's own estimate."""
+
+    kind: ConstraintKind = ConstraintKind.NONE
+    margins: tuple[float, ...] = ()  # m; walls in order, base/joint2/end-effector within a wall
+    barrier: tuple[float, ...] = ()  # h, m/s, same order
+
+
+@dataclass(frozen=True, slots=True)
+class FlightSnapshot:
+    """The vehicle as telemetry shows it after a tick."""
+
+    t_us: int
+    mode: Mode
+    armed: bool
+    estimate: StateEstimate
+    p_WE: Vec3  # m, end-effector
+    v_WE: Vec3  # m/s
+    reference: EndEffectorTarget | None  # end-effector setpoint in use
+    plan_state: PredictionState | None  # where the running plan wants the vehicle now
+    plan_input: PlanInput | None
+    attitude_ref: Vec3  # rad: roll, pitch, yaw
+    actuators: ActuatorCommand
+    plan: Plan | None  # last accepted
+    plan_status: SolverStatus  # of the last cycle, accepted or not
+    counters: PlannerCounters
+    constraints: ConstraintReport
+    failures: tuple[str, ...] = ()  # active faults, by name
+
+
+@dataclass(frozen=True, slots=True)
+class TickInputs:
+    """Everything one tick may look at."""
+
+    sensors: SensorFrame
+    plan: Plan | PlanFailure | None = None  # newly arrived, at most one
+    commands: tuple[CommandRequest, ...] = ()
+    targets: tuple[EndEffectorTarget, ...] = ()
+    safe_set: SafeSet | None = None  # newly announced
+
+
+@dataclass(frozen=True, slots=True)
+class TickOutputs:
+    """Everything one tick says."""
+
+    actuators: ActuatorCommand
+    snapshot: FlightSnapshot
+    plan_request: PlanRequest | None = None
+    acks: tuple[CommandAck, ...] = ()
+    texts: tuple[StatusText, ...] = field(default=())

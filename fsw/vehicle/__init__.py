@@ -1,0 +1,1 @@
+"""Modes, commands, faults and the safety gate."""

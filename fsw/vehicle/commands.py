@@ -1,0 +1,115 @@
+"""What a ground command does: a decision, without sockets."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from fsw.signals import CommandRequest, Mode
+from fsw.vehicle.modes import Event, next_mode
+
+# MAV_CMD and MAV_RESULT numbers of MAVLink common.xml.
+CMD_NAV_LAND = 21
+CMD_NAV_TAKEOFF = 22
+CMD_DO_SET_MODE = 176
+CMD_SHUTDOWN = 246
+CMD_ARM_DISARM = 400
+
+ACCEPTED, TEMPORARILY_REJECTED, DENIED, UNSUPPORTED = 0, 1, 2, 3
+
+# PX4's custom_mode, main and sub mode as carried by DO_SET_MODE.
+_PX4_MODES: dict[tuple[int, int], Event] = {
+    (4, 2): Event.TAKE_OFF,
+    (4, 3): Event.HOLD,
+    (4, 6): Event.LAND,
+    (6, 0): Event.FOLLOW,
+}
+_FORCE = 21196.0  # the value MAVLink asks for to arm or disarm against all checks
+
+
+@dataclass(frozen=True, slots=True)
+class Situation:
+    """What a decision may depend on."""
+
+    mode: Mode
+    landed: bool
+    estimate_valid: bool
+    targets_ahead: bool  # the stream holds a point at or after now
+
+
+@dataclass(frozen=True, slots=True)
+class Decision:
+    """Answer to a command: its MAV_RESULT, the event it causes and why not."""
+
+    result: int
+    event: Event | None = None
+    reason: str = ""
+
+
+def decide(request: CommandRequest, situation: Situation) -> Decision:
+    """Accept a command with its event, or refuse it with a reason an operator can act on."""
+    event = _requested_event(request)
+    if isinstance(event, Decision):
+        return event
+    refusal = _refusal(event, request, situation)
+    if refusal is not None:
+        return Decision(TEMPORARILY_REJECTED, reason=refusal)
+    if _already_there(event, situation.mode):
+        return Decision(ACCEPTED)
+    if next_mode(situation.mode, event) is None:
+        return Decision(
+            TEMPORARILY_REJECTED,
+            reason=f"{event.value} is not possible while {situation.mode.value}",
+        )
+    return Decision(ACCEPTED, event)
+
+
+def _requested_event(request: CommandRequest) -> Event | Decision:
+    if request.command == CMD_ARM_DISARM:
+        if request.params[0] == 1.0:
+            return Event.ARM
+        if request.params[0] == 0.0:
+            return Event.DISARM
+        return Decision(DENIED, reason="arm/disarm wants param1 = 1 or 0")
+    if request.command == CMD_NAV_TAKEOFF:
+        return Event.TAKE_OFF
+    if request.command == CMD_NAV_LAND:
+        return Event.LAND
+    if request.command == CMD_DO_SET_MODE:
+        main, sub = request.params[1], request.params[2]
+        if math.isfinite(main):
+            key = (int(main), int(sub) if math.isfinite(sub) else 0)
+            if key in _PX4_MODES:
+                return _PX4_MODES[key]
+        return Decision(DENIED, reason=f"mode {main:g}/{sub:g} is not one of this vehicle")
+    if request.command == CMD_SHUTDOWN:
+        return Decision(ACCEPTED)  # the process ends after answering; no mode changes
+    return Decision(UNSUPPORTED, reason=f"command {request.command} is not supported")
+
+
+def _refusal(event: Event, request: CommandRequest, situation: Situation) -> str | None:
+    forced = request.params[1] == _FORCE
+    if event is Event.ARM and not situation.estimate_valid:
+        return "not armed: the state estimate is invalid"
+    flying = not situation.landed and situation.mode not in (Mode.DISARMED, Mode.FAULT)
+    if event is Event.DISARM and flying and not forced:
+        return "not disarmed: the vehicle is in the air; land first or force"
+    if event is Event.TAKE_OFF and not situation.landed:
+        return "no takeoff: the vehicle is in the air already"
+    if event is Event.FOLLOW:
+        if situation.landed:
+            return "no trajectory: the vehicle is on the ground; take off first"
+        if not situation.targets_ahead:
+            return "no trajectory: no END_EFFECTOR_TARGET ahead of now was received"
+    return None
+
+
+def _already_there(event: Event, mode: Mode) -> bool:
+    return {
+        Event.ARM: mode not in (Mode.DISARMED, Mode.FAULT),
+        Event.DISARM: mode is Mode.DISARMED,
+        Event.TAKE_OFF: mode is Mode.TAKEOFF,
+        Event.HOLD: mode is Mode.HOLD,
+        Event.FOLLOW: mode is Mode.TRAJECTORY,
+        Event.LAND: mode is Mode.LAND,
+    }.get(event, False)

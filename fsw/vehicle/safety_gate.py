@@ -1,0 +1,45 @@
+"""The last law before the actuators: finite, within limits, and nothing while disarmed."""
+
+from __future__ import annotations
+
+import math
+
+from fsw.model.airframe import Airframe
+from fsw.signals import ActuatorCommand
+
+STOPPED = ActuatorCommand((0.0, 0.0, 0.0, 0.0), (0.0, 0.0))
+
+
+def gate(
+    airframe: Airframe, command: ActuatorCommand, last: ActuatorCommand, armed: bool
+) -> tuple[ActuatorCommand, bool]:
+    """What may be sent.
+
+    Args:
+        airframe: Actuator limits.
+        command: What the cascade wants.
+        last: What was sent last tick; repeated where the wish is not a number.
+        armed: Whether anything may move.
+
+    Returns:
+        The command to send, and whether the wish had to be replaced because it was not finite.
+    """
+    if not armed:
+        return STOPPED, False
+    if not math.isfinite(sum(command.rotor_thrust) + sum(command.joint_torque)):
+        return last, True
+    f1, f2, f3, f4 = command.rotor_thrust
+    t1, t2 = command.joint_torque
+    top, bound = airframe.rotor_thrust_max, airframe.joint_torque_max
+    return (
+        ActuatorCommand(
+            (
+                min(max(f1, 0.0), top),
+                min(max(f2, 0.0), top),
+                min(max(f3, 0.0), top),
+                min(max(f4, 0.0), top),
+            ),
+            (min(max(t1, -bound), bound), min(max(t2, -bound), bound)),
+        ),
+        False,
+    )
