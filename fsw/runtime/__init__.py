@@ -1,0 +1,1 @@
+"""Time, threads and the loop around the pure tick."""

@@ -1,0 +1,41 @@
+"""Progress on standard output: sentences for people, JSON lines for the program that asked."""
+
+from __future__ import annotations
+
+import json
+import sys
+from typing import Protocol
+
+
+class Events(Protocol):
+    """Where the life of the process is reported."""
+
+    def report(self, event: str, sentence: str, **details: object) -> None:
+        """Tell one thing that happened.
+
+        Args:
+            event: Its name, for programs.
+            sentence: The same for people; empty if they need not know.
+            **details: Values that go with it, JSON types only.
+        """
+        ...
+
+
+class TextEvents:
+    """Sentences; all on standard error when standard output carries the result."""
+
+    def __init__(self, to_stderr: bool) -> None:
+        self._out = sys.stderr if to_stderr else sys.stdout
+
+    def report(self, event: str, sentence: str, **details: object) -> None:
+        """See :class:`Events`."""
+        if sentence:
+            print(sentence, file=sys.stderr if event == "error" else self._out, flush=True)
+
+
+class JsonEvents:
+    """One JSON object a line."""
+
+    def report(self, event: str, sentence: str, **details: object) -> None:
+        """See :class:`Events`."""
+        print(json.dumps({"event": event, "message": sentence, **details}), flush=True)

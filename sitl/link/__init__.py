@@ -1,0 +1,1 @@
+"""The simulator's side of the MAVLink connection to the flight software."""

@@ -1,0 +1,80 @@
+"""The vehicle's datagrams as values; pure."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final, cast
+
+from messages.frames import Frame, split
+from sitl.link import message_ids
+from sitl.link.message_ids import PATH_PLANNER
+from sitl.link.pilot_messages import Ack
+from sitl.simulation import Controls
+
+_ARMED: Final = 128  # MAV_MODE_FLAG in the mode of HIL_ACTUATOR_CONTROLS
+_JOINTS_AT: Final = 6  # wire index of controls[4]
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What the vehicle answered to one step."""
+
+    t_us: int  # the step's time stamp
+    controls: Controls
+    acks: tuple[Ack, ...] = ()
+    texts: tuple[str, ...] = ()
+
+
+def is_vehicle(datagram: bytes) -> bool:
+    """Tell whether a datagram holds at least one valid frame."""
+    return any(True for _ in split(datagram))
+
+
+def answer(datagram: bytes, joints: int) -> Answer | None:
+    """Read an answer.
+
+    Args:
+        datagram: From the vehicle.
+        joints: Number of joints that controls[4…] drive.
+
+    Returns:
+        None if there is no HIL_ACTUATOR_CONTROLS in it.
+    """
+    frames = list(split(datagram))
+    if not frames or frames[-1].message_id != message_ids.HIL_ACTUATOR_CONTROLS:
+        return None
+    values = cast("tuple[float, ...]", frames[-1].payload_values)
+    controls = Controls(
+        thrust=cast("tuple[float, float, float, float]", values[2:6]),
+        torque=values[_JOINTS_AT : _JOINTS_AT + joints],
+        armed=bool(int(values[18]) & _ARMED),
+    )
+    if len(frames) == 1:
+        return Answer(int(values[0]), controls)
+    return Answer(int(values[0]), controls, acknowledgements(frames), _texts(frames))
+
+
+def acknowledgements(frames: list[Frame]) -> tuple[Ack, ...]:
+    """COMMAND_ACKs addressed to the pilot or to everyone."""
+    return tuple(
+        Ack(cast(int, frame.payload_values[0]), cast(int, frame.payload_values[1]))
+        for frame in frames
+        if frame.message_id == message_ids.COMMAND_ACK
+        and frame.payload_values[5] in (0, PATH_PLANNER)
+    )
+
+
+def _texts(frames: list[Frame]) -> tuple[str, ...]:
+    """STATUSTEXTs, the pieces of a long one joined."""
+    pieces: dict[int, bytes] = {}
+    whole: list[bytes] = []
+    for frame in frames:
+        if frame.message_id != message_ids.STATUSTEXT:
+            continue
+        _, raw, text_id, _ = cast("tuple[int, bytes, int, int]", frame.payload_values)
+        text = raw.rstrip(b"\0")
+        if text_id == 0:
+            whole.append(text)
+        else:
+            pieces[text_id] = pieces.get(text_id, b"") + text
+    return tuple(text.decode("utf-8", "replace") for text in (*whole, *pieces.values()))

@@ -1,0 +1,104 @@
+"""Sensor readings and the pilot's messages as MAVLink frames; wire order, see messages.frames."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from messages.frames import FrameWriter
+from sitl.link import message_ids
+from sitl.link.message_ids import PATH_PLANNER, SENSORS, SYSTEM_ID
+from sitl.link.pilot_messages import (
+    AnnounceWall,
+    AnnounceWorkspace,
+    PilotMessage,
+    SendCommand,
+    SendTarget,
+)
+from sitl.sensors.suite import SensorReadings
+
+WireValues = tuple[float | bytes, ...]
+
+_LOCAL_NED: Final = 1  # MAV_FRAME; of ODOMETRY's position and velocity
+_MOTION_CAPTURE: Final = 5  # MAV_ESTIMATOR_TYPE
+_ACCEL_AND_GYRO: Final = 0x3F  # HIL_SENSOR_UPDATED_FLAGS: there is no magnetometer or barometer
+_GENERIC: Final = 0  # MAV_TYPE
+_NO_AUTOPILOT: Final = 8  # MAV_AUTOPILOT
+_HIL: Final = 32  # MAV_MODE_FLAG
+_ACTIVE: Final = 4  # MAV_STATE
+_MAVLINK_VERSION: Final = 3
+# An unknown covariance is a NaN in its first entry.
+_NO_COVARIANCE: Final = (math.nan, *(0.0,) * 20)
+_ODOMETRY_TAIL: Final = (
+    *_NO_COVARIANCE,
+    *_NO_COVARIANCE,
+    *(_LOCAL_NED, _LOCAL_NED, 0, _MOTION_CAPTURE, 100),
+)
+_HIL_TAIL: Final = (*(0.0,) * 7, _ACCEL_AND_GYRO, 0)
+
+
+class StepEncoder:
+    """Builds the datagram of a step."""
+
+    def __init__(self, lockstep: bool) -> None:
+        self._sensors = FrameWriter(SYSTEM_ID, SENSORS)
+        self._pilot = FrameWriter(SYSTEM_ID, PATH_PLANNER)
+        self._pacing = 1 if lockstep else 0
+
+    def datagram(self, readings: SensorReadings, messages: tuple[PilotMessage, ...]) -> bytes:
+        """Pilot's messages, pose, arm, and HIL_SENSOR last, as the barrier."""
+        t_us = readings.t_us
+        frame = self._sensors.frame
+        a, b = readings.q_arm, readings.qd_arm
+        arm = (*_four(a), *_four(b), *_four(readings.tau_arm), *(0.0,) * 6, len(a))
+        step = (
+            frame(
+                message_ids.ODOMETRY,
+                t_us,
+                *readings.p_WB,
+                *readings.q_WB,
+                *readings.v_WB,
+                *readings.w_WB_B,
+                *_ODOMETRY_TAIL,
+            )
+            + frame(message_ids.ARM_JOINT_STATE, t_us, *arm)
+            + frame(message_ids.HIL_SENSOR, t_us, *readings.accel_B, *readings.gyro_B, *_HIL_TAIL)
+        )
+        return self._spoken(messages) + step if messages else step
+
+    def heartbeat(self) -> bytes:
+        """HEARTBEAT; its custom_mode says who waits for whom: 1 lockstep, 0 real time."""
+        values = (self._pacing, _GENERIC, _NO_AUTOPILOT, _HIL, _ACTIVE, _MAVLINK_VERSION)
+        return self._sensors.frame(message_ids.HEARTBEAT, *values)
+
+    def command(self, message: SendCommand) -> bytes:
+        """One COMMAND_LONG of the pilot."""
+        return self._spoken((message,))
+
+    def _spoken(self, messages: tuple[PilotMessage, ...]) -> bytes:
+        return b"".join(self._pilot.frame(*_wire(message)) for message in messages)
+
+
+def _wire(message: PilotMessage) -> tuple[int, *WireValues]:
+    """Message id and wire values."""
+    if isinstance(message, SendTarget):
+        motion = (*message.point.p, *message.point.v, *message.point.a)
+        tail = (message.yaw, 0.0, 0, SYSTEM_ID, 1, _LOCAL_NED)
+        return (message_ids.END_EFFECTOR_TARGET, message.t_us, *motion, *tail)
+    if isinstance(message, SendCommand):
+        return (message_ids.COMMAND_LONG, *message.params, message.command, SYSTEM_ID, 1, 0)
+    if isinstance(message, AnnounceWall):
+        wall = message.wall
+        plane = (*wall.normal, wall.offset_m, wall.clearance_m)
+        return (message_ids.OBSTACLE_WALL, *plane, SYSTEM_ID, 1, message.index, message.count)
+    return _workspace(message)
+
+
+def _workspace(message: AnnounceWorkspace) -> tuple[int, *WireValues]:
+    sphere = message.workspace
+    offset = (0.0, 0.0, -sphere.d_iw_m)
+    return (message_ids.WORKSPACE_SPHERE, *offset, sphere.radius_m, SYSTEM_ID, 1)
+
+
+def _four(values: tuple[float, ...]) -> tuple[float, ...]:
+    return (*values, 0.0, 0.0, 0.0, 0.0)[:4]

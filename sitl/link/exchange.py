@@ -1,0 +1,144 @@
+"""One step with the vehicle: sensors out, actuators in. In lockstep or in real time."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import Final, Protocol
+
+from sitl.link import decode
+from sitl.link.decode import Answer
+from sitl.link.udp_endpoint import UdpEndpoint
+from sitl.simulation import Controls
+
+RESEND_S: Final = 0.25
+STALL_S: Final = 2.0
+
+_OFF: Final = Controls((0.0, 0.0, 0.0, 0.0), (0.0, 0.0), armed=False)
+
+
+class SimulatorError(Exception):
+    """A run that cannot go on, in one sentence that names the step."""
+
+
+@dataclass(slots=True)
+class ExchangeCounts:
+    """What happened on the link."""
+
+    resent: int = 0  # lockstep: steps that were sent again
+    missed: int = 0  # real time: steps whose answer was not there at the end of the step
+
+
+class Exchange(Protocol):
+    """How a step is exchanged with the vehicle."""
+
+    counts: ExchangeCounts
+
+    def step(self, number: int, t_us: int, datagram: bytes) -> Answer:
+        """Send a step and return what to apply during it.
+
+        Raises:
+            SimulatorError: The vehicle has been silent for too long.
+        """
+        ...
+
+
+class Lockstep:
+    """Waits for the answer of every step, and repeats a step whose answer does not come."""
+
+    def __init__(self, endpoint: UdpEndpoint, joints: int, period_s: float | None) -> None:
+        """Start the grid.
+
+        Args:
+            endpoint: Connected to the vehicle; its patience is the interval of repetition.
+            joints: Number of joints.
+            period_s: Wall time between two steps [s], None for as fast as possible.
+        """
+        self.counts = ExchangeCounts()
+        self._endpoint = endpoint
+        self._joints = joints
+        self._period_s = period_s
+        self._start_s = time.perf_counter()
+
+    def step(self, number: int, t_us: int, datagram: bytes) -> Answer:
+        """See :class:`Exchange`."""
+        if self._period_s is not None:
+            _sleep_until(self._start_s + number * self._period_s)
+        self._endpoint.send(datagram)
+        begin_s = sent_s = time.perf_counter()
+        while True:
+            received = self._endpoint.receive()
+            if received is not None:
+                answer = decode.answer(received, self._joints)
+                if answer is not None and answer.t_us == t_us:
+                    return answer
+            now_s = time.perf_counter()
+            if now_s - begin_s > STALL_S:
+                raise SimulatorError(
+                    f"the flight software did not answer step {number} within {STALL_S:g} s"
+                )
+            # A peer that is gone ends the wait early; repeating at once would only spin.
+            if received is None and now_s - sent_s >= 0.9 * RESEND_S:
+                self.counts.resent += 1
+                sent_s = now_s
+                self._endpoint.send(datagram)
+
+
+class RealTime:
+    """Never waits for the vehicle: what has arrived when the step is over is what was applied.
+
+    With the answer in time this is what lockstep applies; without it the last controls are held
+    and the step is counted as missed.
+    """
+
+    def __init__(self, endpoint: UdpEndpoint, joints: int, period_s: float) -> None:
+        """Start the grid.
+
+        Args:
+            endpoint: Connected to the vehicle.
+            joints: Number of joints.
+            period_s: Wall time of a step [s].
+        """
+        self.counts = ExchangeCounts()
+        self._endpoint = endpoint
+        self._joints = joints
+        self._period_s = period_s
+        self._start_s = time.perf_counter()
+        self._held = _OFF
+        self._heard_s = self._start_s
+
+    def step(self, number: int, t_us: int, datagram: bytes) -> Answer:
+        """See :class:`Exchange`."""
+        self._endpoint.send(datagram)
+        # The grid is absolute: a late step shortens the next one and shifts nothing.
+        _sleep_until(self._start_s + (number + 1) * self._period_s)
+        answers = self._waiting()
+        if answers:
+            self._heard_s = time.perf_counter()
+            self._held = max(answers, key=lambda answer: answer.t_us).controls
+        elif time.perf_counter() - self._heard_s > STALL_S:
+            raise SimulatorError(
+                f"the flight software sent nothing for {STALL_S:g} s before step {number}"
+            )
+        if not any(answer.t_us == t_us for answer in answers):
+            self.counts.missed += 1
+        return Answer(
+            t_us,
+            self._held,
+            acks=tuple(ack for answer in answers for ack in answer.acks),
+            texts=tuple(text for answer in answers for text in answer.texts),
+        )
+
+    def _waiting(self) -> list[Answer]:
+        answers = []
+        while (received := self._endpoint.receive_waiting()) is not None:
+            answer = decode.answer(received, self._joints)
+            if answer is not None:
+                answers.append(answer)
+        return answers
+
+
+def _sleep_until(release_s: float) -> None:
+    remaining = release_s - time.perf_counter()
+    if remaining > 0.0:
+        time.sleep(remaining)

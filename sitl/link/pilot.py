@@ -1,0 +1,198 @@
+"""The scenario's pilot: what to say to the vehicle at each step; pure.
+
+It announces the safe set, keeps the trajectory two seconds ahead of the vehicle, and takes the
+vehicle through its plan by commands that it repeats until they are acknowledged.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from enum import Enum
+from typing import Final
+
+from sitl.link import message_ids
+from sitl.link.pilot_messages import (
+    AnnounceWall,
+    AnnounceWorkspace,
+    Heard,
+    PilotMessage,
+    SendCommand,
+    SendTarget,
+)
+from sitl.scenario import Scenario
+from sitl.simulation import START_US
+from sitl.trajectory import TrajectoryPoint
+
+TARGET_INTERVAL_US: Final = 100_000  # one point a planning period
+TARGET_LEAD_US: Final = 2_000_000  # 1.5 s are promised; the rest covers a lost datagram
+MESSAGES_PER_STEP: Final = 8  # keeps a datagram below 1400 bytes
+
+_REPEAT_US: Final = 500_000
+_PATIENCE_US: Final = 10_000_000  # of asking for the same thing
+_HOVER_SPEED_M_S: Final = 0.1
+_CLIMB_M: Final = 0.4  # at least, before a hop counts as flying
+_HOVER_US: Final = 3_000_000
+_NAN: Final = math.nan
+
+
+class Phase(Enum):
+    """Where the pilot is in its plan."""
+
+    IDLE = "idle"  # plan none: a ground station flies
+    ARM = "arm"
+    FOLLOW = "start the trajectory"
+    TAKE_OFF = "take off"
+    HOVER = "hover"
+    LAND = "land"
+    DISARM = "wait for the vehicle to disarm"
+    DONE = "done"
+
+
+@dataclass(frozen=True, slots=True)
+class FlightPlan:
+    """What the pilot knows from the start."""
+
+    announcements: tuple[PilotMessage, ...]  # the safe set
+    target_at: Callable[[int], TrajectoryPoint] | None  # by time stamp [us]; None: no targets
+    yaw: float  # rad
+    hop: bool
+    takeoff_height_m: float
+    first_phase: Phase
+
+
+@dataclass(frozen=True, slots=True)
+class PilotState:
+    """What the pilot remembers."""
+
+    phase: Phase
+    announced: int = 0  # announcements made
+    next_target_us: int = START_US
+    since_us: int = START_US  # start of the phase
+    next_ask_us: int = START_US
+    hovering_since_us: int | None = None
+    start_height_m: float = 0.0
+    last_text: str = ""
+    refusal: str | None = None  # ends the run
+
+    @property
+    def done(self) -> bool:
+        """True once the plan is flown."""
+        return self.phase is Phase.DONE
+
+
+# The command of each phase that asks for something, and the phase that follows its acceptance.
+_COMMANDS: Final[dict[Phase, tuple[int, Phase]]] = {
+    Phase.ARM: (message_ids.CMD_ARM_DISARM, Phase.FOLLOW),
+    Phase.FOLLOW: (message_ids.CMD_DO_SET_MODE, Phase.IDLE),
+    Phase.TAKE_OFF: (message_ids.CMD_TAKEOFF, Phase.HOVER),
+    Phase.LAND: (message_ids.CMD_LAND, Phase.DISARM),
+}
+
+
+def flight_plan(scenario: Scenario, target_at: Callable[[int], TrajectoryPoint]) -> FlightPlan:
+    """The plan of a scenario.
+
+    Args:
+        scenario: What to fly.
+        target_at: End-effector reference by time stamp [us].
+    """
+    walls = scenario.walls
+    announcements: tuple[PilotMessage, ...] = tuple(
+        AnnounceWall(wall, index, len(walls)) for index, wall in enumerate(walls)
+    )
+    if scenario.workspace is not None:
+        announcements += (AnnounceWorkspace(scenario.workspace),)
+    kind = scenario.pilot.plan
+    return FlightPlan(
+        announcements=announcements,
+        target_at=target_at if kind == "trajectory" else None,
+        yaw=math.radians(scenario.start.yaw_deg),
+        hop=kind == "hop",
+        takeoff_height_m=scenario.pilot.takeoff_height_m,
+        first_phase=Phase.IDLE if kind == "none" else Phase.ARM,
+    )
+
+
+def listen(plan: FlightPlan, state: PilotState, heard: Heard, t_us: int) -> PilotState:
+    """Take in the vehicle's answer to the step of ``t_us``."""
+    if heard.texts:
+        state = replace(state, last_text=heard.texts[-1])
+    for ack in heard.acks:
+        wanted = _COMMANDS.get(state.phase)
+        if wanted is not None and ack.command == wanted[0]:
+            state = _acknowledged(plan, state, ack.result, heard, t_us)
+    if state.phase is Phase.HOVER:
+        return _hover(state, heard, t_us)
+    if state.phase is Phase.DISARM and not heard.armed:
+        return replace(state, phase=Phase.DONE)
+    return state
+
+
+def speak(
+    plan: FlightPlan, state: PilotState, t_us: int
+) -> tuple[PilotState, tuple[PilotMessage, ...]]:
+    """What to say at the step of ``t_us``; at most MESSAGES_PER_STEP messages."""
+    target_due = plan.target_at is not None and state.next_target_us <= t_us + TARGET_LEAD_US
+    command_due = state.phase in _COMMANDS and t_us >= state.next_ask_us
+    if not target_due and not command_due and state.announced == len(plan.announcements):
+        return state, ()
+    messages: list[PilotMessage] = list(plan.announcements[state.announced :][:MESSAGES_PER_STEP])
+    state = replace(state, announced=state.announced + len(messages))
+    # The trajectory is asked for once its points are there.
+    waits_for_targets = state.phase is Phase.FOLLOW and target_due
+    if command_due and not waits_for_targets and len(messages) < MESSAGES_PER_STEP:
+        state = replace(state, next_ask_us=t_us + _REPEAT_US)
+        messages.append(_command(plan, state.phase))
+    if plan.target_at is None:
+        return state, tuple(messages)
+    next_us = state.next_target_us
+    while next_us <= t_us + TARGET_LEAD_US and len(messages) < MESSAGES_PER_STEP:
+        messages.append(SendTarget(next_us, plan.target_at(next_us), plan.yaw))
+        next_us += TARGET_INTERVAL_US
+    return replace(state, next_target_us=next_us), tuple(messages)
+
+
+def _acknowledged(
+    plan: FlightPlan, state: PilotState, result: int, heard: Heard, t_us: int
+) -> PilotState:
+    if result == message_ids.ACCEPTED:
+        following = _COMMANDS[state.phase][1]
+        if state.phase is Phase.ARM and plan.hop:
+            following = Phase.TAKE_OFF
+        return replace(
+            state,
+            phase=following,
+            since_us=t_us,
+            next_ask_us=t_us,
+            start_height_m=heard.height_m,
+        )
+    can_wait = result in (message_ids.TEMPORARILY_REJECTED, message_ids.IN_PROGRESS)
+    if can_wait and t_us - state.since_us < _PATIENCE_US:
+        return state
+    reason = f": {state.last_text}" if state.last_text else f" (MAV_RESULT {result})"
+    return replace(state, refusal=f"the vehicle refused to {state.phase.value}{reason}")
+
+
+def _hover(state: PilotState, heard: Heard, t_us: int) -> PilotState:
+    """Land after three seconds of standing still in the air."""
+    still = heard.speed_m_s < _HOVER_SPEED_M_S
+    if not still or not heard.height_m - state.start_height_m >= _CLIMB_M:
+        return replace(state, hovering_since_us=None)
+    if state.hovering_since_us is None:
+        return replace(state, hovering_since_us=t_us)
+    if t_us - state.hovering_since_us < _HOVER_US:
+        return state
+    return replace(state, phase=Phase.LAND, since_us=t_us, next_ask_us=t_us)
+
+
+def _command(plan: FlightPlan, phase: Phase) -> SendCommand:
+    command = _COMMANDS[phase][0]
+    if phase is Phase.ARM:
+        return SendCommand(command, (1.0, 0.0, _NAN, _NAN, _NAN, _NAN, _NAN))
+    if phase is Phase.FOLLOW:
+        # Custom mode (1), PX4's main mode 6: offboard, here the end-effector's trajectory.
+        return SendCommand(command, (1.0, 6.0, 0.0, _NAN, _NAN, _NAN, _NAN))
+    height = plan.takeoff_height_m if phase is Phase.TAKE_OFF else _NAN
+    return SendCommand(command, (_NAN, _NAN, _NAN, _NAN, _NAN, _NAN, height))

@@ -1,0 +1,66 @@
+"""What the scenario's pilot says to the vehicle, before it is encoded."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from sitl.scenario import Wall, Workspace
+from sitl.trajectory import TrajectoryPoint
+
+Params: TypeAlias = tuple[float, float, float, float, float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class AnnounceWall:
+    """One wall of the safe set."""
+
+    wall: Wall
+    index: int
+    count: int
+
+
+@dataclass(frozen=True, slots=True)
+class AnnounceWorkspace:
+    """The sphere above the end-effector's target."""
+
+    workspace: Workspace
+
+
+@dataclass(frozen=True, slots=True)
+class SendTarget:
+    """A point of the end-effector's trajectory."""
+
+    t_us: int  # when it is to be met
+    point: TrajectoryPoint
+    yaw: float  # rad
+
+
+@dataclass(frozen=True, slots=True)
+class SendCommand:
+    """A command that wants an acknowledgement."""
+
+    command: int  # MAV_CMD
+    params: Params  # NaN where not used
+
+
+PilotMessage: TypeAlias = AnnounceWall | AnnounceWorkspace | SendTarget | SendCommand
+
+
+@dataclass(frozen=True, slots=True)
+class Ack:
+    """The vehicle's answer to a command."""
+
+    command: int  # MAV_CMD
+    result: int  # MAV_RESULT
+
+
+@dataclass(frozen=True, slots=True)
+class Heard:
+    """What the vehicle's last answer showed."""
+
+    acks: tuple[Ack, ...] = ()
+    texts: tuple[str, ...] = ()
+    armed: bool = False
+    height_m: float = 0.0  # above the ground, as the sensors measured it
+    speed_m_s: float = 0.0

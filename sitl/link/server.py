@@ -1,0 +1,147 @@
+"""The simulator server: one run of a simulation with the vehicle at the other end of the link."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass
+from typing import Final, Protocol
+
+from messages.frames import split
+from sitl.link import decode, pilot
+from sitl.link.decode import Answer
+from sitl.link.encode import StepEncoder
+from sitl.link.exchange import Exchange, SimulatorError
+from sitl.link.message_ids import ACCEPTED, CMD_REBOOT_SHUTDOWN
+from sitl.link.pilot import FlightPlan, PilotState
+from sitl.link.pilot_messages import Heard, PilotMessage, SendCommand
+from sitl.link.udp_endpoint import UdpEndpoint
+from sitl.sensors.suite import SensorReadings
+from sitl.simulation import Simulation
+from sitl.verdict import EndKind
+
+_HEARTBEAT_STEPS: Final = 500  # 1 Hz
+_PROGRESS_S: Final = 0.1  # wall time between two reports
+_PROGRESS_STEPS: Final = 25  # how often the wall clock is looked at
+_SHUTDOWN_TRIES: Final = 4
+_SILENT: Final = math.nan
+_SHUTDOWN: Final = SendCommand(
+    CMD_REBOOT_SHUTDOWN, (0.0, 2.0, _SILENT, _SILENT, _SILENT, _SILENT, _SILENT)
+)
+
+
+class Stop(Protocol):
+    """Asked between two steps."""
+
+    requested: bool
+
+
+class Progress(Protocol):
+    """Told about ten times a second of wall time."""
+
+    def __call__(self, time_s: float, margin_m: float | None, real_time_factor: float) -> None:
+        """Take simulated time, the smallest margin so far and the speed."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class RunTiming:
+    """Speed of a run."""
+
+    steps: int
+    wall_s: float
+    real_time_factor: float
+
+
+def wait_for_vehicle(endpoint: UdpEndpoint, wait_s: float, stop: Stop) -> bool:
+    """Serve the first sender of a valid frame; False if nobody came in time."""
+    until_s = time.perf_counter() + wait_s
+    while time.perf_counter() < until_s and not stop.requested:
+        received = endpoint.receive_from_anyone()
+        if received is not None and decode.is_vehicle(received[0]):
+            endpoint.serve(received[1])
+            return True
+    return False
+
+
+def fly(
+    simulation: Simulation,
+    plan: FlightPlan,
+    exchange: Exchange,
+    encoder: StepEncoder,
+    stop: Stop,
+    progress: Progress,
+) -> RunTiming:
+    """Step until the simulation, the pilot, a signal or silence ends the run.
+
+    The reason is in ``simulation.ended``.
+    """
+    state = PilotState(plan.first_phase)
+    begin_s = reported_s = time.perf_counter()
+    while simulation.ended is None:
+        readings = simulation.sense()
+        state, messages = pilot.speak(plan, state, readings.t_us)
+        datagram = _datagram(encoder, simulation.step, readings, messages)
+        try:
+            answer = exchange.step(simulation.step, readings.t_us, datagram)
+            _advance(simulation, answer)
+        except SimulatorError as error:
+            simulation.end(EndKind.STOPPED, str(error))
+            break
+        state = pilot.listen(plan, state, _heard(answer, readings), readings.t_us)
+        if state.refusal is not None:
+            simulation.end(EndKind.REFUSED, state.refusal)
+        elif state.done:
+            simulation.end(EndKind.MISSION, f"landed and disarmed after {simulation.time_s:.1f} s")
+        elif stop.requested:
+            simulation.end(EndKind.STOPPED, f"interrupted at step {simulation.step}")
+        if simulation.step % _PROGRESS_STEPS == 0:
+            now_s = time.perf_counter()
+            if now_s - reported_s >= _PROGRESS_S:
+                reported_s = now_s
+                speed = simulation.time_s / (now_s - begin_s)
+                progress(simulation.time_s, simulation.min_margin_m, speed)
+    wall_s = time.perf_counter() - begin_s
+    return RunTiming(simulation.step, wall_s, simulation.time_s / max(wall_s, 1e-9))
+
+
+def shut_down(endpoint: UdpEndpoint, encoder: StepEncoder) -> bool:
+    """Tell the vehicle that the run is over; True once it has acknowledged."""
+    for _ in range(_SHUTDOWN_TRIES):
+        endpoint.send(encoder.command(_SHUTDOWN))
+        until_s = time.perf_counter() + 0.25
+        while time.perf_counter() < until_s:
+            received = endpoint.receive()
+            if received is None:
+                break
+            for ack in decode.acknowledgements(list(split(received))):
+                if ack.command == CMD_REBOOT_SHUTDOWN and ack.result == ACCEPTED:
+                    return True
+    return False
+
+
+def _datagram(
+    encoder: StepEncoder,
+    step: int,
+    readings: SensorReadings,
+    messages: tuple[PilotMessage, ...],
+) -> bytes:
+    datagram = encoder.datagram(readings, messages)
+    return encoder.heartbeat() + datagram if step % _HEARTBEAT_STEPS == 0 else datagram
+
+
+def _advance(simulation: Simulation, answer: Answer) -> None:
+    try:
+        simulation.advance(answer.controls)
+    except ValueError as error:
+        raise SimulatorError(f"the flight software sent unusable controls: {error}") from None
+
+
+def _heard(answer: Answer, readings: SensorReadings) -> Heard:
+    return Heard(
+        acks=answer.acks,
+        texts=answer.texts,
+        armed=answer.controls.armed,
+        height_m=-readings.p_WB[2],
+        speed_m_s=math.hypot(*readings.v_WB),
+    )
