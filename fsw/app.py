@@ -5,7 +5,7 @@ from __future__ import annotations
 import traceback
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 from fsw.arguments import FswOptions
 from fsw.link.gcs_link import GcsLink
@@ -29,6 +29,9 @@ from fsw.runtime.process import (
 from fsw.runtime.program import FlightProgram
 from fsw.runtime.sim_loop import Ending, FlightEnd, SimLoop, FlightRecord
 from fsw.runtime.timing import GroupTimer
+
+if TYPE_CHECKING:
+    from fsw.control.cascade import Inner
 
 DONE, NOT_COMPLETED, COULD_NOT_START = 0, 1, 2  # exit codes
 
@@ -146,10 +149,12 @@ def load_flight_software(options: FswOptions) -> FlightProgram[Any]:
     # Imported here because SciPy, Clarabel and numba take a second, which `--help` need not wait.
     from fsw.mpc.planner import Planner as MpcPlanner
     from fsw.parameters.flight_config import flight_config
-    from fsw.runtime.flight_loop import initial_state, tick
+    from fsw.runtime.flight_loop import FlightLoop
+    from fsw.runtime.flight_state import FlightState
 
     try:
-        config = flight_config(options.controller, options.inner)
+        # An unknown name is what the except clause is for.
+        config = flight_config(options.controller, cast("Inner", options.inner))
     except ValueError as error:
         raise CouldNotStart(str(error)) from None
     planner = MpcPlanner(config.planner, clock.stopwatch_us)
@@ -165,8 +170,8 @@ def load_flight_software(options: FswOptions) -> FlightProgram[Any]:
     )
     return FlightProgram(
         facts=facts,
-        first_state=initial_state(config),
-        tick=lambda state, inputs: tick(config, state, inputs),
+        first_state=FlightState(),
+        tick=FlightLoop(config).tick,
         planner=planner,
     )
 
