@@ -42,6 +42,10 @@ class CascadeMemory:
     height: float = 0.0  # m s, integral
     joints: Vec2 = (0.0, 0.0)  # rad s, integrals
 
+    def after_sending(self, sent: ActuatorCommand) -> CascadeMemory:
+        """The memory for the next tick, once the safety gate has decided."""
+        return CascadeMemory(self.rotors, sent, self.v_hat, self.attitude, self.height, self.joints)
+
 
 def at_rest(estimate: StateEstimate) -> CascadeMemory:
     """Memory of a vehicle whose rotors stand still."""
@@ -99,8 +103,7 @@ class Cascade:
             u: The plan's input now.
 
         Returns:
-            Actuator command, not yet gated, and the memory to pass back, whose ``commanded``
-            the caller replaces by what was really sent.
+            Actuator command, not yet gated, and the memory to pass back after sending.
         """
         airframe, tuning, dt = self._airframe, self._tuning, self._dt
         rotors = lag_rotors(memory.rotors, memory.commanded.rotor_thrust, self._decay)

@@ -32,7 +32,7 @@ class Airframe:
     joint1_limit: float = math.pi / 3.0  # rad, |th1|
     joint12_limit: float = math.pi / 2.0  # rad, |th1 + th2|
     tilt_limit: float = math.pi / 10.0  # rad
-    leg_length: float = 0.2  # m, body origin above ground when standing
+    leg_length: float = 0.32  # m, body origin above ground when standing
 
 
 AIRFRAME = Airframe()

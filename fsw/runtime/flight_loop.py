@@ -9,44 +9,41 @@ from __future__ import annotations
 from dataclasses import replace
 
 from fsw.barriers.margins import constraint_report
-from fsw.barriers.root import BarrierTuning
 from fsw.control.attitude import attitude_reference
-from fsw.control.cascade import Cascade, at_rest, in_hover
+from fsw.control.cascade import Cascade, CascadeMemory, at_rest
 from fsw.estimation.estimator import estimate_state
 from fsw.model.arm_kinematics import point_in_flight
 from fsw.model.nominal import NominalModel
 from fsw.mpc.reference import merge
 from fsw.parameters.flight_config import FlightConfig
-from fsw.runtime.flight_state import FlightState, PlanMemory
+from fsw.runtime.flight_state import FlightState, MissionMemory, PlanMemory
+from fsw.runtime.mode_keeper import ModeKeeper, answer
 from fsw.runtime.mode_reference import mode_reference
-from fsw.runtime.planning import ask, nominal_at_rest, plan_input, take_answer
+from fsw.runtime.planning import ask, late_start, measured_state, plan_input, take_answer
 from fsw.signals import (
     ActuatorCommand,
     CommandAck,
-    CommandRequest,
     ConstraintKind,
+    ConstraintReport,
     EndEffectorTarget,
     FlightSnapshot,
     Mode,
     PlanInput,
     PlanRequest,
+    PredictionState,
     StateEstimate,
     StatusText,
     TickInputs,
     TickOutputs,
-    Vec3,
 )
-from fsw.vehicle.commands import Situation, decide
-from fsw.vehicle.faults import RESPONSES, Evidence, Response, detect
-from fsw.vehicle.modes import Event, next_mode
+from fsw.vehicle.commands import Situation
 from fsw.vehicle.safety_gate import STOPPED, gate
 
-_WARNING, _NOTICE, _EMERGENCY = 4, 5, 0  # MAV_SEVERITY
-_IDLE_INPUT = PlanInput((0.0, 0.0, 0.0), 0.0, (0.0, 0.0))
+_NO_INPUT = PlanInput((0.0, 0.0, 0.0), 0.0, (0.0, 0.0))
 
 
 class FlightLoop:
-    """The tick of one configuration. Holds only what never changes in flight."""
+    """The tick of one configuration; holds only what never changes in flight."""
 
     def __init__(self, config: FlightConfig) -> None:
         self.config = config
@@ -54,6 +51,7 @@ class FlightLoop:
         lag = config.planner.lag
         self._model = NominalModel(lag, dt)
         self._cascade = Cascade(config.airframe, lag, config.tuning, config.inner, dt)
+        self._modes = ModeKeeper(config)
         self._ticks_per_plan = config.mpc_period_us // config.tick_period_us
 
     def tick(self, state: FlightState, inputs: TickInputs) -> tuple[FlightState, TickOutputs]:
@@ -70,280 +68,171 @@ class FlightLoop:
         valid = estimate_state(inputs.sensors)
         estimate = valid or state.estimate
         if estimate is None:
-            return replace(state, index=state.index + 1), self._blind(inputs)
-        state = replace(
-            state,
-            estimate=estimate,
-            invalid_ticks=0 if valid is not None else state.invalid_ticks + 1,
-            stream=merge(state.stream, inputs.targets, now_us),
-            safe_set=inputs.safe_set or state.safe_set,
-        )
+            return state, _blind(inputs)
+        if valid is None:
+            state = replace(state, invalid_ticks=state.invalid_ticks + 1)
+        elif state.invalid_ticks:
+            state = replace(state, invalid_ticks=0)
+        if inputs.targets or inputs.safe_set is not None:
+            state = replace(state, mission=_receive(state.mission, inputs, now_us))
+
         texts: list[StatusText] = []
         acks: list[CommandAck] = []
-        for command in inputs.commands:
-            state = self._obey(state, command, estimate, acks, texts)
-        state = self._mind_faults(state, estimate, texts)
-        state = self._mind_milestones(state, estimate, texts)
+        if inputs.commands:
+            state, acks = self._modes.obey(state, estimate, inputs.commands, texts)
+        state = self._modes.mind_faults(state, estimate, texts)
+        state = self._modes.mind_milestones(state, estimate, texts)
 
-        flying = _flies(state)
-        request: PlanRequest | None = None
-        u = _IDLE_INPUT
-        if flying:
-            state = self._move_plan(state, inputs)
-            motion = self._cascade.motion(state.cascade, estimate)
-            if state.index % self._ticks_per_plan == 0:
-                targets = self._targets(state, now_us)
-                request, plan = ask(
-                    self.config, self._model, state.plan, estimate, motion, state.safe_set, targets
-                )
+        planning_due = state.index % self._ticks_per_plan == 0
+        plan, nominal, request, u = state.plan, state.nominal, None, _NO_INPUT
+        if state.vehicle.flies and nominal is not None:
+            last_u = plan_input(plan.running, nominal, now_us - self.config.tick_period_us)
+            plan, new_plan = take_answer(plan, inputs.plan, now_us)
+            if new_plan is not None:
+                tick_us = self.config.tick_period_us
+                nominal = late_start(self._model, new_plan, now_us, tick_us)
+            elif now_us > plan.since_us:
+                nominal = self._model.step(nominal, last_u)
+            state = replace(state, nominal=nominal, plan=plan)
+            if planning_due:
+                request, plan = self._ask(state, estimate, nominal)
                 state = replace(state, plan=plan)
-            u = plan_input(state.plan, now_us)
-        if state.index % self._ticks_per_plan == 0:
-            state = self._report_constraints(state, estimate, now_us)
-        state, actuators = self._actuate(state, estimate, u, flying)
-        snapshot = self._snapshot(state, estimate, u, actuators, flying)
-        state = replace(state, index=state.index + 1)
-        return state, TickOutputs(actuators, snapshot, request, tuple(acks), tuple(texts))
+            u = plan_input(plan.running, nominal, now_us)
 
-    # ------------------------------------------------------------ commands and modes
-
-    def _obey(
-        self,
-        state: FlightState,
-        request: CommandRequest,
-        estimate: StateEstimate,
-        acks: list[CommandAck],
-        texts: list[StatusText],
-    ) -> FlightState:
-        ahead = bool(state.stream) and state.stream[-1].t_us >= estimate.t_us
-        decision = decide(
-            request, Situation(state.mode, state.landed, state.invalid_ticks == 0, ahead)
+        constraints = self._constraints(state, estimate) if planning_due else state.constraints
+        sent, memory, replaced = self._actuate(state, estimate, u)
+        snapshot = self._snapshot(state, estimate, u, sent, constraints)
+        state = FlightState(
+            state.index + 1,
+            estimate,
+            state.invalid_ticks,
+            nominal,
+            replaced,
+            memory,
+            state.vehicle,
+            state.mission,
+            plan,
+            constraints,
         )
-        acks.append(
-            CommandAck(
-                request.command,
-                decision.result,
-                request.source_system,
-                request.source_component,
-            )
-        )
-        if decision.reason:
-            texts.append(StatusText(_WARNING, decision.reason))
-        if decision.event is None:
-            return state
-        return self._change_mode(state, decision.event, estimate, texts)
+        return state, TickOutputs(sent, snapshot, request, tuple(acks), tuple(texts))
 
-    def _change_mode(
-        self, state: FlightState, event: Event, estimate: StateEstimate, texts: list[StatusText]
-    ) -> FlightState:
-        mode = next_mode(state.mode, event)
-        if mode is None:
-            return state
-        texts.append(StatusText(_NOTICE, f"{state.mode.value} to {mode.value}: {event.value}"))
-        state = self._take_over(state, event, estimate)
-        return replace(
-            state,
-            mode=mode,
-            anchor=self._anchor(state, event, estimate),
-            anchor_us=estimate.t_us,
-            still_since_us=estimate.t_us,
-        )
-
-    def _take_over(self, state: FlightState, event: Event, estimate: StateEstimate) -> FlightState:
-        """Start the fast loops where the vehicle is, when it begins to move or to fly."""
-        if event is Event.ARM:
-            standing = self._stands(estimate)
-            cascade = at_rest(estimate) if standing else in_hover(self.config.airframe, estimate)
-            state = replace(state, landed=standing, cascade=cascade)
-        if event in (Event.ARM, Event.TAKE_OFF):
-            landed = state.landed and event is not Event.TAKE_OFF
-            plan = PlanMemory(
-                nominal=nominal_at_rest(estimate),
-                since_us=estimate.t_us,
-                next_id=state.plan.next_id,
-                counters=state.plan.counters,
-            )
-            return replace(state, landed=landed, plan=plan)
-        return state
-
-    def _anchor(self, state: FlightState, event: Event, estimate: StateEstimate) -> Vec3:
-        """Where the new mode's own reference begins: the old one's, or the end-effector."""
-        continues = event in (Event.CLIMB_DONE, Event.TRAJECTORY_DONE)
-        if continues or (_flies(state) and state.mode is not Mode.HOLD and event is Event.LAND):
-            return mode_reference(state, self.config.limits, estimate.t_us).p_WE
-        return point_in_flight(estimate, self.config.airframe.link_length)[0]
-
-    def _mind_faults(
-        self, state: FlightState, estimate: StateEstimate, texts: list[StatusText]
-    ) -> FlightState:
-        plan = state.plan
-        flying = _flies(state)
-        if not flying and state.invalid_ticks == 0 and not state.failures:
-            return state
-        faults = detect(
-            Evidence(
-                flying,
-                state.invalid_ticks,
-                estimate.R_WB[8],
-                estimate.t_us - plan.since_us,
-                self.config.mpc_period_us,
-                plan.refused,
-                state.output_replaced,
-            )
-        )
-        names = tuple(fault.value for fault in faults)
-        if names == state.failures:
-            return state
-        for fault in faults:
-            if fault.value not in state.failures:
-                response = RESPONSES[fault]
-                severity = _EMERGENCY if response is Response.TERMINATE else _WARNING
-                texts.append(StatusText(severity, f"{fault.value}: {response.name.lower()}"))
-        state = replace(state, failures=names)
-        if any(RESPONSES[fault] is Response.TERMINATE for fault in faults):
-            return self._change_mode(state, Event.TERMINATE, estimate, texts)
-        return state
-
-    def _mind_milestones(
-        self, state: FlightState, estimate: StateEstimate, texts: list[StatusText]
-    ) -> FlightState:
-        """Mode changes the vehicle makes by itself."""
-        now_us, limits = estimate.t_us, self.config.limits
-        if state.mode is Mode.TAKEOFF:
-            seconds = limits.takeoff_climb / limits.climb_speed
-            if now_us - state.anchor_us >= seconds * 1e6:
-                return self._change_mode(state, Event.CLIMB_DONE, estimate, texts)
-        elif state.mode is Mode.TRAJECTORY:
-            if not state.stream or state.stream[-1].t_us < now_us:
-                return self._change_mode(state, Event.TRAJECTORY_DONE, estimate, texts)
-        elif state.mode is Mode.LAND:
-            if not self._stands(estimate):
-                return replace(state, still_since_us=now_us)
-            if now_us - state.still_since_us >= limits.landed_time_us:
-                state = replace(state, landed=True)
-                return self._change_mode(state, Event.TOUCHED_DOWN, estimate, texts)
-        return state
-
-    def _stands(self, estimate: StateEstimate) -> bool:
-        """Near standing height and hardly moving."""
-        limits, legs = self.config.limits, self.config.airframe.leg_length
-        vx, vy, vz = estimate.v_WB
-        return (
-            -estimate.p_WB[2] < legs + limits.landed_height
-            and vx * vx + vy * vy + vz * vz < limits.landed_speed**2
-        )
-
-    # ------------------------------------------------------------ plan and actuators
-
-    def _move_plan(self, state: FlightState, inputs: TickInputs) -> FlightState:
-        """Bring the plan's state to this tick: a new plan, or one more step of the old."""
-        now_us, plan = inputs.sensors.t_us, state.plan
-        taken = take_answer(plan, inputs.plan, now_us, self._model, self.config.tick_period_us)
-        if taken.running is plan.running and taken.nominal is not None and now_us > plan.since_us:
-            last_us = now_us - self.config.tick_period_us
-            moved = self._model.step(taken.nominal, plan_input(taken, last_us))
-            taken = replace(taken, nominal=moved)
-        return replace(state, plan=taken)
-
-    def _targets(self, state: FlightState, now_us: int) -> tuple[EndEffectorTarget, ...]:
-        config = self.config
+    def _ask(
+        self, state: FlightState, estimate: StateEstimate, nominal: PredictionState
+    ) -> tuple[PlanRequest, PlanMemory]:
+        config, now_us = self.config, estimate.t_us
         apply_us = now_us + config.plan_delay_ticks * config.tick_period_us
-        return tuple(
-            mode_reference(state, config.limits, apply_us + node * config.mpc_period_us)
+        targets = tuple(
+            self._reference(state, apply_us + node * config.mpc_period_us)
             for node in range(config.planner.horizon + 1)
+        )
+        measured = measured_state(estimate, self._cascade.motion(state.cascade, estimate))
+        return ask(
+            config,
+            self._model,
+            state.plan,
+            nominal,
+            measured,
+            state.mission.safe_set,
+            targets,
+            now_us,
         )
 
     def _actuate(
-        self, state: FlightState, estimate: StateEstimate, u: PlanInput, flying: bool
-    ) -> tuple[FlightState, ActuatorCommand]:
-        airframe, memory = self.config.airframe, state.cascade
-        armed = state.mode not in (Mode.DISARMED, Mode.FAULT)
-        wanted = STOPPED
-        if flying and state.plan.nominal is not None:
-            wanted, memory = self._cascade.step(memory, estimate, state.plan.nominal, u)
-        elif armed:
+        self, state: FlightState, estimate: StateEstimate, u: PlanInput
+    ) -> tuple[ActuatorCommand, CascadeMemory, bool]:
+        """Close the loops, idle or stay still, and let the safety gate have the last word."""
+        memory, wanted = state.cascade, STOPPED
+        if state.vehicle.flies and state.nominal is not None:
+            wanted, memory = self._cascade.step(memory, estimate, state.nominal, u)
+        elif state.vehicle.armed:
             idle = self.config.limits.idle_thrust
             wanted = ActuatorCommand((idle, idle, idle, idle), (0.0, 0.0))
             memory = at_rest(estimate)
-        sent, replaced = gate(airframe, wanted, state.cascade.commanded, armed)
-        memory = replace(memory, commanded=sent)
-        return replace(state, cascade=memory, output_replaced=replaced), sent
+        sent, replaced = gate(
+            self.config.airframe, wanted, state.cascade.commanded, state.vehicle.armed
+        )
+        return sent, memory.after_sending(sent), replaced
 
-    # ------------------------------------------------------------ what is said
-
-    def _report_constraints(
-        self, state: FlightState, estimate: StateEstimate, now_us: int
-    ) -> FlightState:
-        length = self.config.airframe.link_length
+    def _constraints(self, state: FlightState, estimate: StateEstimate) -> ConstraintReport:
+        length, planner = self.config.airframe.link_length, self.config.planner
         points = (
             (estimate.p_WB, estimate.v_WB),
             point_in_flight(estimate, (length[0], 0.0)),
             point_in_flight(estimate, length),
         )
-        target = mode_reference(state, self.config.limits, now_us)
-        report = constraint_report(state.safe_set, self._tuning(state), points, target)
-        return replace(state, constraints=report)
+        safe_set = state.mission.safe_set
+        in_sphere = safe_set.kind is ConstraintKind.WORKSPACE
+        tuning = planner.workspace if in_sphere else planner.walls
+        target = self._reference(state, estimate.t_us)
+        return constraint_report(safe_set, tuning, points, target)
 
-    def _tuning(self, state: FlightState) -> BarrierTuning:
-        planner = self.config.planner
-        is_sphere = state.safe_set.kind is ConstraintKind.WORKSPACE
-        return planner.workspace if is_sphere else planner.walls
+    def _reference(self, state: FlightState, t_us: int) -> EndEffectorTarget:
+        return mode_reference(state.vehicle, state.mission, self.config.limits, t_us)
 
     def _snapshot(
         self,
         state: FlightState,
         estimate: StateEstimate,
         u: PlanInput,
-        actuators: ActuatorCommand,
-        flying: bool,
+        sent: ActuatorCommand,
+        constraints: ConstraintReport,
     ) -> FlightSnapshot:
         p_WE, v_WE = point_in_flight(estimate, self.config.airframe.link_length)
-        plan = state.plan
-        nominal = plan.nominal if flying else None
-        yaw = nominal.yaw if nominal is not None else estimate.yaw
-        reference = mode_reference(state, self.config.limits, estimate.t_us) if flying else None
+        vehicle, plan = state.vehicle, state.plan
+        flies = vehicle.flies and state.nominal is not None
+        yaw = state.nominal.yaw if state.nominal is not None else estimate.yaw
         return FlightSnapshot(
             estimate.t_us,
-            state.mode,
-            state.mode not in (Mode.DISARMED, Mode.FAULT),
+            vehicle.mode,
+            vehicle.armed,
             estimate,
             p_WE,
             v_WE,
-            reference,
-            nominal,
-            u if flying else None,
+            self._reference(state, estimate.t_us) if flies else None,
+            state.nominal if flies else None,
+            u if flies else None,
             attitude_reference(u.a, yaw),
-            actuators,
+            sent,
             plan.running,
             plan.status,
             plan.counters,
-            state.constraints,
-            state.failures,
+            constraints,
+            vehicle.failures,
         )
 
-    def _blind(self, inputs: TickInputs) -> TickOutputs:
-        """Before the first valid sensor frame: nothing moves, everything is refused."""
-        sensors = inputs.sensors
-        level = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
-        zero = (0.0, 0.0, 0.0)
-        nowhere = StateEstimate(sensors.t_us, zero, zero, level, zero, 0.0, (0.0, 0.0), (0.0, 0.0))
-        snapshot = self._snapshot(FlightState(), nowhere, _IDLE_INPUT, STOPPED, flying=False)
-        situation = Situation(Mode.DISARMED, landed=True, estimate_valid=False, targets_ahead=False)
-        acks, texts = [], []
-        for command in inputs.commands:
-            decision = decide(command, situation)
-            acks.append(
-                CommandAck(
-                    command.command,
-                    decision.result,
-                    command.source_system,
-                    command.source_component,
-                )
-            )
-            if decision.reason:
-                texts.append(StatusText(_WARNING, decision.reason))
-        return TickOutputs(STOPPED, snapshot, None, tuple(acks), tuple(texts))
+
+def _receive(mission: MissionMemory, inputs: TickInputs, now_us: int) -> MissionMemory:
+    return MissionMemory(
+        merge(mission.stream, inputs.targets, now_us), inputs.safe_set or mission.safe_set
+    )
 
 
-def _flies(state: FlightState) -> bool:
-    return state.mode not in (Mode.DISARMED, Mode.FAULT) and not state.landed
+def _blind(inputs: TickInputs) -> TickOutputs:
+    """Before the first valid sensor frame: nothing moves, and commands are refused."""
+    zero = (0.0, 0.0, 0.0)
+    level = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+    nowhere = StateEstimate(
+        inputs.sensors.t_us, zero, zero, level, zero, 0.0, (0.0, 0.0), (0.0, 0.0)
+    )
+    empty = FlightState()
+    snapshot = FlightSnapshot(
+        t_us=inputs.sensors.t_us,
+        mode=Mode.DISARMED,
+        armed=False,
+        estimate=nowhere,
+        p_WE=zero,
+        v_WE=zero,
+        reference=None,
+        plan_state=None,
+        plan_input=None,
+        attitude_ref=zero,
+        actuators=STOPPED,
+        plan=None,
+        plan_status=empty.plan.status,
+        counters=empty.plan.counters,
+        constraints=empty.constraints,
+    )
+    situation = Situation(Mode.DISARMED, landed=True, estimate_valid=False, targets_ahead=False)
+    texts: list[StatusText] = []
+    acks = [answer(command, situation, texts)[0] for command in inputs.commands]
+    return TickOutputs(STOPPED, snapshot, None, tuple(acks), tuple(texts))

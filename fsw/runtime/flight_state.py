@@ -22,12 +22,41 @@ _NOWHERE: Vec3 = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
+class VehicleMemory:
+    """Mode and what it needs; changes with commands, faults and milestones."""
+
+    mode: Mode = Mode.DISARMED
+    landed: bool = True
+    still_since_us: int = 0  # landing detector
+    anchor: Vec3 = _NOWHERE  # where a mode's own reference begins, end-effector [m]
+    anchor_us: int = 0
+    failures: tuple[str, ...] = ()
+
+    @property
+    def armed(self) -> bool:
+        """Whether anything may move."""
+        return self.mode is not Mode.DISARMED and self.mode is not Mode.FAULT
+
+    @property
+    def flies(self) -> bool:
+        """Whether the loops are closed."""
+        return self.armed and not self.landed
+
+
+@dataclass(frozen=True, slots=True)
+class MissionMemory:
+    """What was sent to be flown and to be kept clear of."""
+
+    stream: tuple[EndEffectorTarget, ...] = ()
+    safe_set: SafeSet = field(default_factory=SafeSet)
+
+
+@dataclass(frozen=True, slots=True)
 class PlanMemory:
     """The running plan and the question that is out."""
 
     running: Plan | None = None
     since_us: int = 0  # when the running plan began, or the vehicle was taken over
-    nominal: PredictionState | None = None  # where the running plan wants the vehicle now
     awaited_id: int = -1  # -1: nothing is out
     awaited_us: int = 0
     awaited_missed: bool = False
@@ -39,22 +68,18 @@ class PlanMemory:
 
 @dataclass(frozen=True, slots=True)
 class FlightState:
-    """Everything a tick starts from."""
+    """Everything a tick starts from; the upper half changes every tick, the lower rarely."""
 
     index: int = 0
-    mode: Mode = Mode.DISARMED
-    landed: bool = True
-    still_since_us: int = 0  # landing detector
     estimate: StateEstimate | None = None  # last valid
     invalid_ticks: int = 0
-    anchor: Vec3 = _NOWHERE  # where a mode's own reference begins, end-effector [m]
-    anchor_us: int = 0
-    stream: tuple[EndEffectorTarget, ...] = ()
-    safe_set: SafeSet = field(default_factory=SafeSet)
-    plan: PlanMemory = field(default_factory=PlanMemory)
+    nominal: PredictionState | None = None  # where the running plan wants the vehicle now
+    output_replaced: bool = False
     cascade: CascadeMemory = field(
         default_factory=lambda: CascadeMemory(NO_ACTION.rotor_thrust, NO_ACTION, _NOWHERE)
     )
+
+    vehicle: VehicleMemory = field(default_factory=VehicleMemory)
+    mission: MissionMemory = field(default_factory=MissionMemory)
+    plan: PlanMemory = field(default_factory=PlanMemory)
     constraints: ConstraintReport = field(default_factory=ConstraintReport)
-    output_replaced: bool = False
-    failures: tuple[str, ...] = ()

@@ -60,17 +60,13 @@ def measured_state(estimate: StateEstimate, motion: MotionState) -> PredictionSt
     )
 
 
-def plan_input(memory: PlanMemory, now_us: int) -> PlanInput:
+def plan_input(plan: Plan | None, nominal: PredictionState, now_us: int) -> PlanInput:
     """The running plan's input at its age; braking where there is none young enough."""
-    plan = memory.running
     if plan is not None:
         step = (now_us - plan.t_us) // plan.period_us
         if 0 <= step < min(PLAN_STALE_PERIODS, len(plan.inputs)):
             return plan.inputs[step]
-    return _brake(memory.nominal) if memory.nominal is not None else _REST
-
-
-_REST = PlanInput((0.0, 0.0, 0.0), 0.0, (0.0, 0.0))
+    return _brake(nominal)
 
 
 def _brake(x: PredictionState) -> PlanInput:
@@ -81,60 +77,58 @@ def _brake(x: PredictionState) -> PlanInput:
 
 
 def take_answer(
-    memory: PlanMemory,
-    answer: Plan | PlanFailure | None,
-    now_us: int,
-    model: NominalModel,
-    dt_us: int,
-) -> PlanMemory:
+    memory: PlanMemory, answer: Plan | PlanFailure | None, now_us: int
+) -> tuple[PlanMemory, Plan | None]:
     """Account for the planner: a plan starts, a refusal is counted, a missing one is noticed.
 
     Args:
         memory: Before this tick.
         answer: What arrived, at most one.
         now_us: This tick.
-        model: Moves a late plan's start on to now.
-        dt_us: Tick length.
+
+    Returns:
+        The memory, and the plan where one starts now.
     """
+    if memory.awaited_id < 0:
+        return memory, None
+    counters = memory.counters
     if answer is not None and answer.plan_id == memory.awaited_id:
-        memory = replace(memory, awaited_id=-1)
-        counters = memory.counters
         if isinstance(answer, Plan):
-            late = max(now_us - answer.t_us, 0) // dt_us
-            start = model.advance(answer.start, answer.inputs[0], late)
-            return replace(
+            taken = replace(
                 memory,
+                awaited_id=-1,
                 running=answer,
                 since_us=answer.t_us,
-                nominal=start,
                 status=answer.status,
                 refused=False,
                 counters=replace(counters, plans=counters.plans + 1),
             )
-        return replace(
-            memory,
-            status=answer.status,
-            refused=True,
-            counters=replace(counters, fallbacks=counters.fallbacks + 1),
+            return taken, answer
+        counters = replace(counters, fallbacks=counters.fallbacks + 1)
+        refused = replace(
+            memory, awaited_id=-1, status=answer.status, refused=True, counters=counters
         )
-    if memory.awaited_id >= 0 and now_us >= memory.awaited_us and not memory.awaited_missed:
-        missed = memory.counters.missed_deadlines + 1
-        return replace(
-            memory,
-            awaited_missed=True,
-            counters=replace(memory.counters, missed_deadlines=missed),
-        )
-    return memory
+        return refused, None
+    if now_us >= memory.awaited_us and not memory.awaited_missed:
+        counters = replace(counters, missed_deadlines=counters.missed_deadlines + 1)
+        return replace(memory, awaited_missed=True, counters=counters), None
+    return memory, None
+
+
+def late_start(model: NominalModel, plan: Plan, now_us: int, dt_us: int) -> PredictionState:
+    """Where a plan wants the vehicle on the tick it arrives."""
+    return model.advance(plan.start, plan.inputs[0], max(now_us - plan.t_us, 0) // dt_us)
 
 
 def ask(
     config: FlightConfig,
     model: NominalModel,
     memory: PlanMemory,
-    estimate: StateEstimate,
-    motion: MotionState,
+    nominal: PredictionState,
+    measured: PredictionState,
     safe_set: SafeSet,
     targets: tuple[EndEffectorTarget, ...],
+    now_us: int,
 ) -> tuple[PlanRequest, PlanMemory]:
     """The question for this period.
 
@@ -143,16 +137,13 @@ def ask(
     see the disturbance itself; with the PID inner loop, which follows no state; after an
     upset. Either is moved on to the instant the answer takes effect.
     """
-    now_us = estimate.t_us
-    nominal = memory.nominal
     from_nominal = (
-        nominal is not None
-        and config.inner == "tracking"
+        config.inner == "tracking"
         and safe_set.kind is not ConstraintKind.WALLS
-        and math.dist(nominal.p, estimate.p_WB) < config.upset_distance
+        and math.dist(nominal.p, measured.p) < config.upset_distance
     )
-    start = nominal if from_nominal and nominal is not None else measured_state(estimate, motion)
-    start = model.advance(start, plan_input(memory, now_us), config.plan_delay_ticks)
+    u = plan_input(memory.running, nominal, now_us)
+    start = model.advance(nominal if from_nominal else measured, u, config.plan_delay_ticks)
     apply_us = now_us + config.plan_delay_ticks * config.tick_period_us
     request = PlanRequest(memory.next_id, apply_us, start, targets, safe_set, from_nominal)
     counters = memory.counters
