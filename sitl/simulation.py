@@ -241,7 +241,9 @@ class Simulation:
         return start is not None and time_s >= start
 
     def _workspace_target(self, time_s: float) -> V3 | None:
-        return self.target_at(time_s).p if self._on_trajectory(time_s) else None
+        if self._world.workspace is None or not self._on_trajectory(time_s):
+            return None
+        return self.target_at(time_s).p
 
     def _points_now(self) -> tuple[V3, V3, V3]:
         out = np.empty((1, *self._places.shape[1:]))
@@ -258,12 +260,12 @@ class Simulation:
     def _judge(self, points: tuple[V3, V3, V3], time_s: float) -> None:
         if self.ended is not None:
             return
-        if not all(math.isfinite(c) for point in points for c in point):
+        if not math.isfinite(sum(map(sum, points))):
             self.end(EndKind.DIVERGED, f"the simulation diverged at {time_s:.3f} s")
             return
-        target = self._workspace_target(time_s)
-        self._record.add(self._world.margins(points, target), time_s)
-        touched = self._world.collision(points)
+        margins = self._world.margins(points, self._workspace_target(time_s))
+        self._record.add(margins, time_s)
+        touched = self._world.collision(points, margins)
         if touched is not None:
             self.end(EndKind.COLLISION, f"{touched} at {time_s:.2f} s")
         # The last plant step of an exchange ends on the exchange's own time.

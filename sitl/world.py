@@ -4,15 +4,9 @@ from __future__ import annotations
 
 import math
 
-from sitl.scenario import V3, Scenario, Wall, Workspace
+from sitl.scenario import V3, Scenario, Workspace
 
 POINTS = ("base", "joint2", "end_effector")  # critical points, in the order of the paper
-
-
-def wall_distance(wall: Wall, p: V3) -> float:
-    """Distance of a point from the wall's surface [m], positive in free space."""
-    n = wall.normal
-    return n[0] * p[0] + n[1] * p[1] + n[2] * p[2] - wall.offset_m
 
 
 def workspace_margin(workspace: Workspace, p_base: V3, p_target: V3) -> float:
@@ -33,27 +27,33 @@ class World:
         self.keys = (*wall_keys, *(("workspace/base",) if self.workspace else ()))
 
     def margins(self, points: tuple[V3, V3, V3], target: V3 | None) -> tuple[float, ...]:
-        """Margins [m] in the order of ``keys``.
+        """Margins [m] in the order of ``keys``; negative means violated.
 
         Args:
             points: Base, joint 2 and end-effector [m, NED].
             target: End-effector reference [m, NED]; None while the workspace does not apply,
                 its margin is then infinite.
         """
-        values = [
-            wall_distance(wall, point) - wall.clearance_m for wall in self.walls for point in points
-        ]
+        values = []
+        for wall in self.walls:
+            (a, b, c), limit = wall.normal, wall.offset_m + wall.clearance_m
+            values += [a * x + b * y + c * z - limit for x, y, z in points]
         if self.workspace is not None:
             values.append(
                 math.inf if target is None else workspace_margin(self.workspace, points[0], target)
             )
         return tuple(values)
 
-    def collision(self, points: tuple[V3, V3, V3]) -> str | None:
-        """A sentence if a critical point touches a wall or the ground, else None."""
-        for wall in self.walls:
-            for name, point in zip(POINTS, points, strict=True):
-                if not (wall_distance(wall, point) > 0.0):
+    def collision(self, points: tuple[V3, V3, V3], margins: tuple[float, ...]) -> str | None:
+        """A sentence if a critical point touches a wall or the ground, else None.
+
+        Args:
+            points: Base, joint 2 and end-effector [m, NED].
+            margins: Their margins, from ``margins``.
+        """
+        for i, wall in enumerate(self.walls):
+            for k, name in enumerate(POINTS):
+                if not (margins[len(POINTS) * i + k] + wall.clearance_m > 0.0):
                     return f"{spoken(name)} hit the {wall.name} wall"
         for name, point in zip(POINTS, points, strict=True):
             if not (point[2] < 0.0):

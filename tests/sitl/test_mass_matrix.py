@@ -1,0 +1,45 @@
+"""The composite mass matrix is the recursion's own, column by column."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sitl.plant.newton_euler import (
+    empty_posture,
+    mass_matrix_into,
+    posture_into,
+    solve_in_place,
+    wrench_needed_into,
+)
+from sitl.plant.parameters import chain
+from sitl.plant.vector import V3
+from tests.sitl.test_against_pinocchio import random_vehicle
+
+
+@pytest.mark.parametrize("joints", [1, 2, 3])
+def test_each_column_is_the_wrench_that_one_unit_acceleration_needs(joints: int) -> None:
+    random = np.random.default_rng(joints)
+    bodies, at, size = chain(random_vehicle(joints, random)), empty_posture(joints), 6 + joints
+    posture_into(bodies, random.uniform(-3.0, 3.0, joints), at)
+    lower, column = np.empty((size, size)), np.empty(size)
+    mass_matrix_into(bodies, at, lower)
+    matrix = np.tril(lower) + np.tril(lower, -1).T
+
+    def three(values: np.ndarray) -> V3:
+        return (float(values[0]), float(values[1]), float(values[2]))
+
+    for k, unit in enumerate(np.eye(size)):
+        a, alpha, qdd = three(unit), three(unit[3:]), unit[6:].copy()
+        still = (0.0, 0.0, 0.0)
+        wrench_needed_into(bodies, at, still, alpha, a, np.zeros(joints), qdd, column)
+        assert np.abs(column - matrix[:, k]).max() <= 1e-14 * np.abs(matrix).max()
+
+
+def test_the_solver_solves() -> None:
+    random = np.random.default_rng(0)
+    root = random.standard_normal((8, 8))
+    matrix, right = root @ root.T + np.eye(8), random.standard_normal(8)
+    x = right.copy()
+    solve_in_place(matrix.copy(), x)
+    assert np.abs(matrix @ x - right).max() <= 1e-13 * np.abs(right).max() * np.abs(matrix).max()

@@ -1,0 +1,126 @@
+"""Scenario files: what is accepted, and the sentence that refuses the rest."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from sitl.scenario import Lissajous, Uniform
+from sitl.scenario_file import ScenarioError, load_scenario, parse_scenario, scenario_names
+from sitl.simulation import Simulation
+
+BASE = """
+duration_s = 10.0
+[start]
+kind = "airborne"
+[pilot]
+plan = "trajectory"
+[trajectory]
+kind = "lissajous"
+centre_m = [0.0, 0.0, -1.2]
+amplitude_m = [0.1, 0.1, 0.1]
+period_s = [10.0, 10.0, 10.0]
+phase_deg = [0.0, 0.0, 0.0]
+ramp_s = 2.0
+duration_s = 9.0
+"""
+WALL = """
+[[walls]]
+name = "front"
+normal = [-1.0, 0.0, 0.0]
+offset_m = -1.0
+clearance_m = 0.1
+"""
+
+
+@pytest.mark.parametrize("name", scenario_names())
+def test_every_packaged_scenario_can_start(name: str) -> None:
+    simulation = Simulation(load_scenario(name), 0)
+    assert simulation.ended is None
+    assert simulation.min_margin_m is None or simulation.min_margin_m > 0.0
+
+
+def test_the_papers_cases_are_there() -> None:
+    assert {"walls", "workspace", "walls-calm", "workspace-calm"} <= set(scenario_names())
+    walls, calm = load_scenario("walls"), load_scenario("walls-calm")
+    assert walls.duration_s == 120.0
+    assert walls.disturbances == (Uniform(0.8, 0.1),)
+    assert calm.disturbances == ()
+    assert calm.walls == walls.walls
+    assert isinstance(walls.trajectory, Lissajous)
+    sphere = load_scenario("workspace").workspace
+    assert sphere is not None
+    assert (sphere.radius_m, sphere.d_iw_m) == (0.075, 0.225)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("duration_s = 10.0", "duratoin_s = 10.0", ['"duratoin_s"', '"duration_s"', "10.0"]),
+        ("duration_s = 10.0", "duration_s = -1", ["duration_s = -1", "0.1 to 86400"]),
+        ("duration_s = 10.0", "duration_s = nan", ["duration_s = nan", "0.1 to 86400"]),
+        ("duration_s = 10.0", 'duration_s = "long"', ["'long'", "must be a number"]),
+        ("duration_s = 10.0", "duration_s = true", ["True", "must be a number"]),
+        ("duration_s = 10.0", "", ['missing key "duration_s"', "0.1 to 86400"]),
+        ("ramp_s = 2.0", "ramp = 2.0", ['"trajectory.ramp"', '"ramp_s"']),
+        ("ramp_s = 2.0", "ramp_s = 6.0", ["trajectory.ramp_s = 6", "at most half"]),
+        ('"airborne"', '"airbourne"', ["start.kind", '"airborne", "ground"', "did you mean"]),
+        ('"lissajous"', '"lisajous"', ["trajectory.kind", "'lisajous'", '"lissajous"']),
+        ("[0.1, 0.1, 0.1]", "[0.1, 0.1]", ["trajectory.amplitude_m", "array of 3 numbers"]),
+        ("[0.1, 0.1, 0.1]", "[0.1, -1, 0.1]", ["trajectory.amplitude_m[1] = -1", "0 to 1000"]),
+        ('"trajectory"', '"hop"', ["pilot.plan", "airborne"]),
+    ],
+)
+def test_a_wrong_line_is_refused_with_key_value_and_what_is_allowed(
+    old: str, new: str, said: list[str]
+) -> None:
+    with pytest.raises(ScenarioError) as refusal:
+        Simulation(parse_scenario(BASE.replace(old, new, 1), "test"), 0)
+    assert all(part in str(refusal.value) for part in said), str(refusal.value)
+
+
+@pytest.mark.parametrize(
+    ("extra", "said"),
+    [
+        (WALL.replace("-1.0, 0.0, 0.0", "-1.0, 0.5, 0.0"), ["walls[0].normal", "1.118"]),
+        (WALL.replace("clearance_m", "clearence_m"), ['"walls[0].clearence_m"', '"clearance_m"']),
+        (WALL + WALL, ["walls[1].name", "differ"]),
+        (WALL.replace("offset_m = -1.0", "offset_m = -0.05"), ["front/base", "-50.0 mm"]),
+        ("[workspace]\nradius_m = 0.0\nd_iw_m = 0.225", ["workspace.radius_m", "0.001 to 10"]),
+        ("[workspace]\nradius_m = 0.1\nd_iw_m = 0.4", ["workspace/base", "-75.0 mm"]),
+        ('[[disturbances]]\nkind = "unifrom"\n', ["disturbances[0].kind", '"uniform"']),
+        ('[[disturbances]]\nkind = "uniform"\n', ['"disturbances[0].amplitude_m_s2"']),
+        ("disturbances = 3\n", ["must be"]),
+        ("[sensors.imu]\nlatency_ms = 3", ["sensors.imu.latency_ms", "steps of 2"]),
+        ("[sensors]\nimmu = {}", ['"sensors.immu"', '"imu"']),
+        ("[vehicle_scale]\nmass = 30", ["vehicle_scale.mass = 30", "0.2 to 5"]),
+        ("[vehicle_scale]\nmass = 3", ["start.arm_deg", "rotor 1 would need"]),
+        ('name = "x"', ['unknown key "name"']),
+    ],
+)
+def test_a_wrong_addition_is_refused(extra: str, said: list[str]) -> None:
+    # Bare keys belong before the first table.
+    text = BASE + extra if extra.lstrip().startswith("[") else extra + BASE
+    with pytest.raises(ScenarioError) as refusal:
+        Simulation(parse_scenario(text, "test"), 0)
+    assert all(part in str(refusal.value) for part in said), str(refusal.value)
+
+
+def test_an_unknown_scenario_names_the_nearest_and_all() -> None:
+    with pytest.raises(ScenarioError, match='did you mean "walls"') as refusal:
+        load_scenario("wals")
+    assert all(name in str(refusal.value) for name in scenario_names())
+
+
+def test_a_path_is_read_and_a_missing_one_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text(BASE)
+    assert load_scenario(str(path)).name == "mine"
+    with pytest.raises(ScenarioError, match="No such file"):
+        load_scenario(str(tmp_path / "none.toml"))
+
+
+def test_what_is_not_toml_is_refused() -> None:
+    with pytest.raises(ScenarioError, match="not TOML"):
+        parse_scenario("duration_s = ", "broken")

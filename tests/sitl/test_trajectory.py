@@ -1,0 +1,61 @@
+"""References: exact derivatives, at rest at both ends, where the scenario says."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from sitl.scenario import Hold, Lissajous
+from sitl.scenario_file import load_scenario, scenario_names
+from sitl.trajectory import HoldReference, Warp, reference
+
+STEP = 1e-4
+
+
+@pytest.mark.parametrize("name", scenario_names())
+def test_derivatives_equal_finite_differences(name: str) -> None:
+    curve = reference(load_scenario(name).trajectory)
+    for t in np.linspace(0.0, 120.0, 400):
+        before, here, after = (curve.at(t - STEP), curve.at(t), curve.at(t + STEP))
+        v = (np.array(after.p) - np.array(before.p)) / (2 * STEP)
+        a = (np.array(after.v) - np.array(before.v)) / (2 * STEP)
+        assert np.abs(v - here.v).max() <= 1e-7
+        assert np.abs(a - here.a).max() <= 1e-6
+
+
+@pytest.mark.parametrize("name", scenario_names())
+def test_a_trajectory_starts_and_stops_at_rest(name: str) -> None:
+    trajectory = load_scenario(name).trajectory
+    assert isinstance(trajectory, Lissajous)
+    curve = reference(trajectory)
+    for t in (-1.0, 0.0, trajectory.duration_s, trajectory.duration_s + 5.0):
+        point = curve.at(t)
+        assert max(map(abs, (*point.v, *point.a))) <= 1e-12
+    assert curve.at(-1.0) == curve.at(0.0)
+
+
+def test_the_warp_runs_at_full_speed_between_its_ramps() -> None:
+    warp = Warp(ramp=4.0, duration=20.0)
+    assert warp.at(4.0)[0] == pytest.approx(2.0)
+    assert warp.at(10.0) == pytest.approx((8.0, 1.0, 0.0))
+    assert warp.at(20.0)[0] == pytest.approx(16.0)
+    rates = [warp.at(t)[1] for t in np.linspace(-1.0, 21.0, 300)]
+    assert min(rates) >= 0.0
+    assert max(rates) <= 1.0
+
+
+def test_the_walls_path_enters_each_safety_zone_by_30_mm_and_stays_slow() -> None:
+    curve = reference(load_scenario("walls").trajectory)
+    points = [curve.at(t) for t in np.arange(0.0, 120.0, 0.05)]
+    assert max(p.p[0] for p in points) == pytest.approx(0.93, abs=1e-3)
+    assert max(p.p[1] for p in points) == pytest.approx(0.93, abs=1e-3)
+    assert min(p.p[1] for p in points) == pytest.approx(-0.93, abs=1e-3)
+    assert max(math.hypot(*p.v) for p in points) <= 0.125
+
+
+def test_a_held_point_never_moves() -> None:
+    point = HoldReference(Hold((1.0, 2.0, -3.0))).at(17.0)
+    assert point.p == (1.0, 2.0, -3.0)
+    assert point.v == point.a == (0.0, 0.0, 0.0)
