@@ -11,6 +11,7 @@ the target's velocity is subtracted (docs/equations.md E20 gives both figures).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -34,52 +35,96 @@ class CostWeights:
     relative_velocity: bool = True  # v_e - v_d in eq 20 instead of the printed v_e
 
 
-def fill_cost(
-    weights: CostWeights,
-    horizon: Linearisation,
-    targets: TargetPoints,
-    guess: Array,
-    hessian: Array,
-    gradient: Array,
-) -> float:
-    """Quadratic model ``1/2 U' hessian U + gradient' U`` of the cost around a guess.
+class Cost(Protocol):
+    """Something the planner minimises, as a quadratic around a guess of the inputs."""
 
-    Args:
-        weights: Cost weights.
-        horizon: Linearisation around ``guess``.
-        targets: Reference at the nodes.
-        guess: Inputs of the linearisation, (6 n,).
-        hessian: (6 n, 6 n), overwritten.
-        gradient: (6 n,), overwritten.
+    def add(
+        self,
+        horizon: Linearisation,
+        targets: TargetPoints,
+        guess: Array,
+        hessian: Array,
+        gradient: Array,
+    ) -> float:
+        """Add ``1/2 U' hessian U + gradient' U`` of this cost.
 
-    Returns:
-        The cost at the guess.
-    """
-    return _fill(
-        np.array(
+        Args:
+            horizon: Linearisation around ``guess``.
+            targets: Reference at the nodes.
+            guess: Inputs of the linearisation, (6 n,).
+            hessian: (6 n, 6 n), upper triangle added to.
+            gradient: (6 n,), added to.
+
+        Returns:
+            The cost at the guess.
+        """
+        ...
+
+
+class TrackingCost:
+    """Eqs 18, 20 and 21 and the inputs: what all of the paper's controllers minimise."""
+
+    def __init__(self, weights: CostWeights) -> None:
+        self._weights = np.array(
             (
                 (weights.tracking, weights.velocity, weights.arm_cog),
                 (weights.tracking_terminal, weights.velocity_terminal, weights.arm_cog_terminal),
             )
-        ),
-        weights.inputs,
-        1.0 if weights.relative_velocity else 0.0,
-        horizon.position[:, END_EFFECTOR],
-        horizon.velocity[:, END_EFFECTOR],
-        horizon.arm_cog,
-        horizon.d_position[:, END_EFFECTOR],
-        horizon.d_velocity[:, END_EFFECTOR],
-        horizon.d_arm_cog,
-        targets.position,
-        targets.velocity,
-        guess,
-        hessian,
-        gradient,
-    )
+        )
+        self._inputs = weights.inputs
+        self._velocity_share = 1.0 if weights.relative_velocity else 0.0
+
+    def add(
+        self,
+        horizon: Linearisation,
+        targets: TargetPoints,
+        guess: Array,
+        hessian: Array,
+        gradient: Array,
+    ) -> float:
+        """See ``Cost``."""
+        return _add_tracking(
+            self._weights,
+            self._inputs,
+            self._velocity_share,
+            horizon.position[:, END_EFFECTOR],
+            horizon.velocity[:, END_EFFECTOR],
+            horizon.arm_cog,
+            horizon.d_position[:, END_EFFECTOR],
+            horizon.d_velocity[:, END_EFFECTOR],
+            horizon.d_arm_cog,
+            targets.position,
+            targets.velocity,
+            guess,
+            hessian,
+            gradient,
+        )
 
 
 @compiled
-def _fill(
+def add_square(
+    weight: float,
+    value: float,
+    row: Array,
+    columns: int,
+    guess: Array,
+    hessian: Array,
+    gradient: Array,
+) -> None:
+    """Add ``weight (value + row (U - guess))^2`` over the first columns."""
+    at_zero = value
+    for k in range(columns):
+        at_zero -= row[k] * guess[k]
+    for k in range(columns):
+        scaled = 2.0 * weight * row[k]
+        if scaled != 0.0:
+            gradient[k] += scaled * at_zero
+            for m in range(k, columns):
+                hessian[k, m] += scaled * row[m]
+
+
+@compiled
+def _add_tracking(
     weights: Array,
     input_weight: float,
     velocity_share: float,
@@ -96,11 +141,9 @@ def _fill(
     gradient: Array,
 ) -> float:
     n = position.shape[0] - 1
-    hessian[:] = 0.0
-    gradient[:] = 0.0
     cost = 0.0
     for k in range(INPUTS * n):
-        hessian[k, k] = 2.0 * input_weight
+        hessian[k, k] += 2.0 * input_weight
         cost += input_weight * guess[k] * guess[k]
     for i in range(1, n + 1):
         w = weights[1 if i == n else 0]
@@ -116,14 +159,5 @@ def _fill(
             else:
                 weight, row, value = w[2], d_cog[i], cog[i]
             cost += weight * value * value
-            columns = INPUTS * i
-            at_zero = value
-            for k in range(columns):
-                at_zero -= row[k] * guess[k]
-            for k in range(columns):
-                scaled = 2.0 * weight * row[k]
-                if scaled != 0.0:
-                    gradient[k] += scaled * at_zero
-                    for m in range(k, columns):
-                        hessian[k, m] += scaled * row[m]
+            add_square(weight, value, row, INPUTS * i, guess, hessian, gradient)
     return cost

@@ -9,12 +9,14 @@ from fsw.model.airframe import AIRFRAME, Airframe
 from fsw.model.prediction import LagModel
 from fsw.mpc.costs import CostWeights
 from fsw.mpc.program import InputLimits, SlackPrice
+from fsw.mpc.soft_costs import SoftWeights
 
 
 @dataclass(frozen=True, slots=True)
 class PlannerConfig:
     """Horizon, weights, limits and barriers of the MPC."""
 
+    controller: str = "blf"  # a name in variants.py
     horizon: int = 5  # n
     period: float = 0.1  # s, T
     sqp_iterations: int = 2
@@ -22,7 +24,15 @@ class PlannerConfig:
     lag: LagModel = field(default_factory=LagModel)
     weights: CostWeights = field(default_factory=CostWeights)
     limits: InputLimits = field(default_factory=InputLimits)
+    joint_slack: SlackPrice = field(default_factory=lambda: SlackPrice(50.0))
+    # blf
     walls: BarrierTuning = field(default_factory=lambda: BarrierTuning(robustness=0.4))
     workspace: BarrierTuning = field(default_factory=lambda: BarrierTuning(robustness=0.267))
     barrier_slack: SlackPrice = field(default_factory=lambda: SlackPrice(20.0))
-    joint_slack: SlackPrice = field(default_factory=lambda: SlackPrice(50.0))
+    # hc
+    tightening: float = 0.0  # m, kept in addition to the safe set
+    hard_slack: SlackPrice | None = None  # None: hard, as in the paper
+    hard_skipped_nodes: int = 0
+    # sc, and naive with centring
+    soft: SoftWeights = field(default_factory=SoftWeights)
+    centred: bool = False

@@ -4,26 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from fsw.barriers.soft_rows import Barrier, TargetPoints
-from fsw.barriers.wall import WallBarrier
-from fsw.barriers.workspace import WorkspaceBarrier
+from fsw.barriers.soft_rows import SoftRows, TargetPoints
 from fsw.model.linearisation import Linearisation
 from fsw.model.prediction import Array, CondensedModel
 from fsw.mpc.clarabel_solver import ClarabelSolver, Solution
-from fsw.mpc.costs import fill_cost
 from fsw.mpc.limits import JointLimits
 from fsw.mpc.planner_config import PlannerConfig
-from fsw.mpc.program import Program
+from fsw.mpc.program import Program, SlackPrice
+from fsw.mpc.variants import parts_of
 from fsw.signals import SafeSet
-
-
-def barrier_for(safe_set: SafeSet, config: PlannerConfig) -> Barrier | None:
-    """The barrier of a safe set, or none in open space."""
-    if safe_set.sphere is not None:
-        return WorkspaceBarrier(safe_set.sphere, config.workspace, config.horizon)
-    if safe_set.walls:
-        return WallBarrier(safe_set.walls, config.walls, config.horizon)
-    return None
 
 
 class Problem:
@@ -33,10 +22,11 @@ class Problem:
         self._config = config
         self._horizon = Linearisation(model)
         self._limits = JointLimits(config.airframe, model)
-        self._barrier = barrier_for(safe_set, config)
-        blocks = [(self._limits.rows, config.joint_slack)]
-        if self._barrier is not None:
-            blocks.append((self._barrier.rows, config.barrier_slack))
+        parts = parts_of(config, safe_set)
+        self._costs, self._barrier = parts.costs, parts.barrier
+        blocks: list[tuple[SoftRows, SlackPrice | None]] = [(self._limits.rows, config.joint_slack)]
+        if parts.barrier is not None:
+            blocks.append((parts.barrier.rows, parts.slack))
         self._program = Program(config.horizon, config.limits, tuple(blocks))
         self._gradient = np.zeros(self._program.inputs)
         self._first_barrier_slack = self._program.inputs + self._limits.rows.slacks
@@ -48,8 +38,11 @@ class Problem:
         """Refill the program around a guess of the inputs (6 n,) from a start (19,)."""
         config = self._config
         self._horizon.refill(config.airframe, start, guess)
-        self.cost = fill_cost(
-            config.weights, self._horizon, targets, guess, self._program.hessian, self._gradient
+        hessian, gradient = self._program.hessian, self._gradient
+        hessian[:] = 0.0
+        gradient[:] = 0.0
+        self.cost = sum(
+            cost.add(self._horizon, targets, guess, hessian, gradient) for cost in self._costs
         )
         self._limits.refill(self._horizon)
         if self._barrier is not None:

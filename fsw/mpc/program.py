@@ -41,7 +41,8 @@ class InputLimits:
 class SlackPrice:
     """Cost of softening a block: ``linear s + quadratic s^2``.
 
-    The linear part makes the penalty exact: rows that can hold, do hold.
+    The linear part makes the penalty exact: rows that can hold, do hold. A block without
+    a price is hard.
     """
 
     linear: float
@@ -55,11 +56,11 @@ class Program:
         self,
         horizon: int,
         limits: InputLimits,
-        blocks: tuple[tuple[SoftRows, SlackPrice], ...],
+        blocks: tuple[tuple[SoftRows, SlackPrice | None], ...],
     ) -> None:
         self._blocks = tuple(rows for rows, _ in blocks)
         self.inputs = INPUTS * horizon
-        slacks = [rows.slacks for rows in self._blocks]
+        slacks = [rows.slacks if price is not None else 0 for rows, price in blocks]
         self.unknowns = self.inputs + sum(slacks)
         soft = sum(len(rows.node) for rows in self._blocks)
         bounded = np.flatnonzero(np.tile(np.arange(INPUTS) >= 2, horizon))
@@ -69,9 +70,9 @@ class Program:
 
         pattern = _Pattern(self.unknowns)
         slack_column = self.inputs
-        for rows in self._blocks:
-            pattern.soft_block(rows, slack_column)
-            slack_column += rows.slacks
+        for rows, count in zip(self._blocks, slacks, strict=True):
+            pattern.block(rows, slack_column if count else None)
+            slack_column += count
         pattern.signed_rows(np.arange(self.inputs, self.unknowns), -1.0)  # -s <= 0
         pattern.signed_rows(bounded, 1.0)
         pattern.signed_rows(bounded, -1.0)
@@ -99,10 +100,11 @@ class Program:
         self._p_at = np.flatnonzero(in_inputs)
         self._p_from = self.p.indices[in_inputs] * self.inputs + columns[in_inputs]
         self.q = np.zeros(self.unknowns)
-        prices = [np.full(rows.slacks, price.linear) for rows, price in blocks]
-        curves = [np.full(rows.slacks, 2.0 * price.quadratic) for rows, price in blocks]
-        self.q[self.inputs :] = np.concatenate(prices)
-        self.p.data[~in_inputs] = np.concatenate(curves)
+        priced = [(rows.slacks, price) for rows, price in blocks if price is not None]
+        self.q[self.inputs :] = np.concatenate([np.full(n, price.linear) for n, price in priced])
+        self.p.data[~in_inputs] = np.concatenate(
+            [np.full(n, 2.0 * price.quadratic) for n, price in priced]
+        )
         self.hessian = np.zeros((self.inputs, self.inputs))
         self._gradient = np.zeros((soft, self.inputs))
 
@@ -137,8 +139,8 @@ class _Pattern:
         self._next_row = 0
         self._gradient_size = 0
 
-    def soft_block(self, block: SoftRows, slack_column: int) -> None:
-        """Rows -gradient U - slack <= ..., gradients to be filled later."""
+    def block(self, block: SoftRows, slack_column: int | None) -> None:
+        """Rows -gradient U - slack <= ..., gradients to be filled later; no slack: hard."""
         row, column = np.nonzero(block.feels())
         self._add(
             self._next_row + row,
@@ -147,7 +149,8 @@ class _Pattern:
             self._gradient_size + row * block.unknowns + column,
         )
         rows = np.arange(len(block.node))
-        self._add(self._next_row + rows, slack_column + block.slack, np.full(len(rows), -1.0))
+        if slack_column is not None:
+            self._add(self._next_row + rows, slack_column + block.slack, np.full(len(rows), -1.0))
         self._next_row += len(rows)
         self._gradient_size += len(rows) * block.unknowns
 

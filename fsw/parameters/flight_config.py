@@ -8,8 +8,9 @@ from fsw.control.cascade import Inner
 from fsw.control.inner_tuning import InnerTuning
 from fsw.model.airframe import AIRFRAME, Airframe
 from fsw.mpc.planner_config import PlannerConfig
+from fsw.mpc.variants import VARIANTS
 
-CONTROLLERS = ("blf",)
+CONTROLLERS = tuple(VARIANTS)
 INNERS: tuple[Inner, ...] = ("tracking", "pid")
 
 
@@ -54,4 +55,6 @@ def flight_config(controller: str = "blf", inner: Inner = "tracking") -> FlightC
         raise ValueError(f"unknown controller '{controller}'; known: {', '.join(CONTROLLERS)}")
     if inner not in INNERS:
         raise ValueError(f"unknown inner loop '{inner}'; known: {', '.join(INNERS)}")
-    return FlightConfig(controller=controller, inner=inner)
+    return FlightConfig(
+        controller=controller, inner=inner, planner=PlannerConfig(controller=controller)
+    )

@@ -1,0 +1,95 @@
+"""The paper's four controllers: the same program, with different parts in it.
+
+==========  =====================================  ==========================================
+name        Case I, walls                          Case II, workspace sphere
+==========  =====================================  ==========================================
+``naive``   tracking cost only                     tracking cost only
+``hc``      distances >= 0 (eq 14)                 distance to the surface >= 0 (eq 15)
+``sc``      cost of eq 29                          cost of eq 30
+``blf``     barrier of eq 22 with eq 25            barriers of eq 23 with eq 25
+==========  =====================================  ==========================================
+
+Naive can be given a centring cost and HC a tightening, so that the barrier's own share in a
+comparison shows (docs/paper-and-us.md).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from fsw.barriers.hard_set import HardWalls, HardWorkspace
+from fsw.barriers.soft_rows import Barrier
+from fsw.barriers.wall import WallBarrier
+from fsw.barriers.workspace import WorkspaceBarrier
+from fsw.mpc.costs import Cost, TrackingCost
+from fsw.mpc.planner_config import PlannerConfig
+from fsw.mpc.program import SlackPrice
+from fsw.mpc.soft_costs import SoftWallCost, SphereCost
+from fsw.signals import SafeSet
+
+
+@dataclass(frozen=True)
+class Parts:
+    """What shapes the optimum of one controller in one safe set."""
+
+    costs: tuple[Cost, ...]
+    barrier: Barrier | None = None
+    slack: SlackPrice | None = None  # None: the barrier's rows are hard
+
+
+def _naive(config: PlannerConfig, safe_set: SafeSet) -> Parts:
+    costs: tuple[Cost, ...] = (TrackingCost(config.weights),)
+    weight = config.soft.centring
+    if config.centred and safe_set.sphere is not None:
+        centring = SphereCost(safe_set.sphere, weight, 5.0 * weight, only_outside=False)
+        costs = (*costs, centring)
+    return Parts(costs)
+
+
+def _hard(config: PlannerConfig, safe_set: SafeSet) -> Parts:
+    costs, first = (TrackingCost(config.weights),), 1 + config.hard_skipped_nodes
+    barrier: Barrier
+    if safe_set.sphere is not None:
+        barrier = HardWorkspace(safe_set.sphere, config.horizon, config.tightening, first)
+    elif safe_set.walls:
+        barrier = HardWalls(safe_set.walls, config.horizon, config.tightening, first)
+    else:
+        return Parts(costs)
+    return Parts(costs, barrier, config.hard_slack)
+
+
+def _soft(config: PlannerConfig, safe_set: SafeSet) -> Parts:
+    tracking, weights = TrackingCost(config.weights), config.soft
+    if safe_set.sphere is not None:
+        outside = SphereCost(
+            safe_set.sphere, weights.workspace, weights.workspace_terminal, only_outside=True
+        )
+        return Parts((tracking, outside))
+    if safe_set.walls:
+        return Parts((tracking, SoftWallCost(safe_set.walls, weights)))
+    return Parts((tracking,))
+
+
+def _blf(config: PlannerConfig, safe_set: SafeSet) -> Parts:
+    costs = (TrackingCost(config.weights),)
+    if safe_set.sphere is not None:
+        sphere = WorkspaceBarrier(safe_set.sphere, config.workspace, config.horizon)
+        return Parts(costs, sphere, config.barrier_slack)
+    if safe_set.walls:
+        walls = WallBarrier(safe_set.walls, config.walls, config.horizon)
+        return Parts(costs, walls, config.barrier_slack)
+    return Parts(costs)
+
+
+VARIANTS: dict[str, Callable[[PlannerConfig, SafeSet], Parts]] = {
+    "naive": _naive,
+    "hc": _hard,
+    "sc": _soft,
+    "blf": _blf,
+}
+
+
+def parts_of(config: PlannerConfig, safe_set: SafeSet) -> Parts:
+    """The parts of the configured controller."""
+    return VARIANTS[config.controller](config, safe_set)
