@@ -1,0 +1,52 @@
+"""Horizons to hold a barrier against, and its h written out in numpy."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fsw.barriers.root import BarrierTuning
+from fsw.barriers.soft_rows import TargetPoints
+from fsw.model.airframe import AIRFRAME
+from fsw.model.linearisation import Linearisation
+from fsw.model.prediction import INPUTS, Array, LagModel, condense
+from tests.fsw.random_states import prediction_vector
+
+NODES = 5
+TUNING = BarrierTuning(alpha=2.0, slope=4.0, gamma=3.0, robustness=0.3, skipped_nodes=1)
+BETA = 1.0 - TUNING.gamma * TUNING.period
+_MODEL = condense(LagModel(), TUNING.period, NODES)
+
+
+@dataclass(frozen=True)
+class Case:
+    """A start, inputs and targets."""
+
+    start: Array  # (19,)
+    inputs: Array  # (6 n,)
+    targets: TargetPoints
+
+    def horizon(self, change: Array | float = 0.0) -> Linearisation:
+        """The horizon of these inputs, or of changed ones."""
+        horizon = Linearisation(_MODEL)
+        horizon.refill(AIRFRAME, self.start, self.inputs + change)
+        return horizon
+
+
+def random_case(random: np.random.Generator) -> Case:
+    targets = TargetPoints(
+        random.uniform(-1.0, 1.0, (NODES + 1, 3)), random.uniform(-0.5, 0.5, (NODES + 1, 3))
+    )
+    return Case(prediction_vector(random), random.uniform(-2.0, 2.0, INPUTS * NODES), targets)
+
+
+def safe_speed(d: float) -> float:
+    """S(d), eqs 22 and 23 as amended: tangent below the knee, shifted root above it."""
+    k, alpha = TUNING.slope, TUNING.alpha
+    return k * d if d < alpha / k**2 else float(np.sqrt(2 * alpha * d - (alpha / k) ** 2))
+
+
+def lowest_allowed(h_start: float, node: int) -> float:
+    """What the decay of eq 25 leaves of h at a node."""
+    return float(TUNING.robustness + BETA**node * (h_start - TUNING.robustness))

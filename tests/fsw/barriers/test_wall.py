@@ -1,0 +1,109 @@
+"""Each row of the wall barrier against h of eq 22 along the prediction."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fsw.barriers.root import BarrierTuning
+from fsw.barriers.wall import WallBarrier
+from fsw.model.linearisation import Linearisation
+from fsw.model.prediction import INPUTS, Array
+from fsw.signals import Wall
+from tests.fsw.barriers.horizons import (
+    NODES,
+    TUNING,
+    Case,
+    lowest_allowed,
+    random_case,
+    safe_speed,
+)
+from tests.fsw.random_states import vec3
+
+STEP = 1e-6
+
+
+def random_walls(random: np.random.Generator, through: Array, distance: float) -> tuple[Wall, ...]:
+    """Two walls at this distance (clearance taken off) from a point."""
+    walls = []
+    for clearance in (0.1, 0.0):
+        normal = random.standard_normal(3)
+        normal /= np.linalg.norm(normal)
+        offset = float(normal @ through) - distance - clearance
+        walls.append(Wall(vec3(normal), offset, clearance))
+    return tuple(walls)
+
+
+def h_by_hand(walls: tuple[Wall, ...], horizon: Linearisation, first_node: int) -> Array:
+    """h of every node, wall and point, in the rows' order."""
+    values = []
+    for node in range(first_node, NODES + 1):
+        for wall in walls:
+            n = np.array(wall.normal)
+            for point in range(3):
+                p, v = horizon.position[node, point], horizon.velocity[node, point]
+                values.append(safe_speed(n @ p - wall.offset - wall.clearance) + n @ v)
+    return np.array(values)
+
+
+def refilled(walls: tuple[Wall, ...], case: Case) -> WallBarrier:
+    barrier = WallBarrier(walls, TUNING, NODES)
+    barrier.refill(case.horizon(), case.targets)
+    return barrier
+
+
+@pytest.mark.parametrize("distance", [0.5, 0.0, -0.3], ids=["inside", "on the plane", "outside"])
+def test_rows_equal_h_and_its_finite_difference_along_the_prediction(distance: float) -> None:
+    random = np.random.default_rng(1)
+    for _ in range(3):
+        case = random_case(random)
+        walls = random_walls(random, case.start[0:3], distance)
+        rows = refilled(walls, case).rows
+        np.testing.assert_allclose(rows.value, h_by_hand(walls, case.horizon(), 2), atol=1e-12)
+        for column in range(INPUTS * NODES):
+            change = np.zeros(INPUTS * NODES)
+            change[column] = STEP
+            above = h_by_hand(walls, case.horizon(change), 2)
+            below = h_by_hand(walls, case.horizon(-change), 2)
+            np.testing.assert_allclose(
+                rows.gradient[:, column], (above - below) / (2 * STEP), atol=1e-5
+            )
+
+
+def test_rows_ask_for_what_the_decay_from_the_start_leaves() -> None:
+    random = np.random.default_rng(2)
+    case = random_case(random)
+    walls = random_walls(random, case.start[0:3], 0.4)
+    barrier = refilled(walls, case)
+    start = h_by_hand(walls, case.horizon(), 0)[: 3 * len(walls)]
+    np.testing.assert_allclose(barrier.at_start(), start, atol=1e-12)
+    expected = [lowest_allowed(h, node) for node in range(2, NODES + 1) for h in start]
+    np.testing.assert_allclose(barrier.rows.required, expected, atol=1e-12)
+
+
+def test_each_node_and_wall_has_a_slack_of_its_own() -> None:
+    walls = (Wall((1.0, 0.0, 0.0), 0.0, 0.1), Wall((0.0, 1.0, 0.0), 0.0, 0.1))
+    rows = WallBarrier(walls, TUNING, NODES).rows
+    shared = {(int(node), k // 3 % 2): int(rows.slack[k]) for k, node in enumerate(rows.node)}
+    assert len(set(shared.values())) == len(shared) == rows.slacks == 2 * (NODES - 1)
+
+
+def test_skipped_nodes_have_no_rows_and_later_ones_feel_no_later_inputs() -> None:
+    random = np.random.default_rng(3)
+    case = random_case(random)
+    barrier = WallBarrier(
+        random_walls(random, case.start[0:3], 0.4), BarrierTuning(skipped_nodes=2), NODES
+    )
+    barrier.refill(case.horizon(), case.targets)
+    assert barrier.rows.node.min() == 3
+    assert not barrier.rows.gradient[~barrier.rows.feels()].any()
+
+
+def test_accelerating_away_from_the_wall_raises_h() -> None:
+    case = random_case(np.random.default_rng(4))
+    case.start[:] = 0.0
+    ahead = (Wall((-1.0, 0.0, 0.0), -1.0, 0.1),)  # plane x = 1, free space behind it
+    rows = refilled(ahead, case).rows
+    base_last_node = len(rows.node) - 3
+    assert rows.gradient[base_last_node, 0] < 0.0  # forward is towards the wall
+    assert rows.gradient[base_last_node, 1] == 0.0
