@@ -114,7 +114,7 @@ def _fly(
 
     plan = flight_plan(simulation.scenario, target_at)
     _settle(options.realtime, told)
-    exchange = _exchange(options, endpoint, len(simulation.vehicle.links))
+    exchange = _exchange(options, endpoint, len(simulation.vehicle.links), stop)
     timing = fly(simulation, plan, exchange, encoder, stop, progress)
     shut_down(endpoint, encoder)
     result = simulation.result()
@@ -140,12 +140,14 @@ def _compile(scenario: Scenario, seed: int) -> None:
     rehearsal.sense()
 
 
-def _exchange(options: SitlOptions, endpoint: UdpEndpoint, joints: int) -> Exchange:
+def _exchange(
+    options: SitlOptions, endpoint: UdpEndpoint, joints: int, stop: _StopRequest
+) -> Exchange:
     period_s = 1e-6 * STEP_US
     if options.realtime:
         return RealTime(endpoint, joints, period_s)
     speed = options.speed
-    return Lockstep(endpoint, joints, None if speed is None else period_s / speed)
+    return Lockstep(endpoint, joints, None if speed is None else period_s / speed, stop)
 
 
 def _settle(realtime: bool, told: Events) -> None:

@@ -29,6 +29,12 @@ class ExchangeCounts:
     missed: int = 0  # real time: steps whose answer was not there at the end of the step
 
 
+class Stop(Protocol):
+    """Asked between two steps, and while waiting."""
+
+    requested: bool
+
+
 class Exchange(Protocol):
     """How a step is exchanged with the vehicle."""
 
@@ -46,15 +52,19 @@ class Exchange(Protocol):
 class Lockstep:
     """Waits for the answer of every step, and repeats a step whose answer does not come."""
 
-    def __init__(self, endpoint: UdpEndpoint, joints: int, period_s: float | None) -> None:
+    def __init__(
+        self, endpoint: UdpEndpoint, joints: int, period_s: float | None, stop: Stop
+    ) -> None:
         """Start the grid.
 
         Args:
             endpoint: Connected to the vehicle; its patience is the interval of repetition.
             joints: Number of joints.
             period_s: Wall time between two steps [s], None for as fast as possible.
+            stop: Ends a wait for a vehicle that was interrupted as well.
         """
         self.counts = ExchangeCounts()
+        self._stop = stop
         self._endpoint = endpoint
         self._joints = joints
         self._period_s = period_s
@@ -72,6 +82,8 @@ class Lockstep:
                 answer = decode.answer(received, self._joints)
                 if answer is not None and answer.t_us == t_us:
                     return answer
+            if self._stop.requested:
+                raise SimulatorError(f"interrupted at step {number}")
             now_s = time.perf_counter()
             if now_s - begin_s > STALL_S:
                 raise SimulatorError(

@@ -11,7 +11,7 @@ from messages.frames import split
 from sitl.link import decode, pilot
 from sitl.link.decode import Answer
 from sitl.link.encode import StepEncoder
-from sitl.link.exchange import Exchange, SimulatorError
+from sitl.link.exchange import Exchange, SimulatorError, Stop
 from sitl.link.message_ids import ACCEPTED, CMD_REBOOT_SHUTDOWN
 from sitl.link.pilot import FlightPlan, PilotState
 from sitl.link.pilot_messages import Heard, PilotMessage, SendCommand
@@ -28,12 +28,6 @@ _SILENT: Final = math.nan
 _SHUTDOWN: Final = SendCommand(
     CMD_REBOOT_SHUTDOWN, (0.0, 2.0, _SILENT, _SILENT, _SILENT, _SILENT, _SILENT)
 )
-
-
-class Stop(Protocol):
-    """Asked between two steps."""
-
-    requested: bool
 
 
 class Progress(Protocol):

@@ -1,0 +1,80 @@
+"""Entry point: ``pandion VERB …``. Imports are inside the verbs so that help answers at once."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from typing import Final
+
+from pandion.parser import COULD_NOT_START, Parser, unknown_name
+
+HELP: Final = """\
+usage: pandion VERB [options]
+
+Flight software for aerial manipulators, with a simulator, over MAVLink 2.
+
+verbs:
+  fly     start the simulator and the flight software, fly a scenario, print the verdict
+  sitl    run the simulator alone
+  fsw     run the flight software alone
+
+options:
+  --version   print the version
+  -h, --help  print this; `pandion VERB --help` prints the options of a verb
+
+examples:
+  pandion fly walls
+  pandion fly workspace-calm --realtime --duration 20
+  pandion sitl walls --listen udp:127.0.0.1:4560
+  pandion fsw --sim udp:127.0.0.1:4560 --gcs udp:127.0.0.1:14550
+"""
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run one verb; returns the exit code."""
+    words = sys.argv[1:] if argv is None else argv
+    if not words or words[0] in ("-h", "--help", "help"):
+        print(HELP, end="")
+        return 0
+    if words[0] == "--version":
+        from pandion.version import version
+
+        print(f"pandion {version()}")
+        return 0
+    verb = VERBS.get(words[0])
+    if verb is None:
+        what = "option" if words[0].startswith("-") else "verb"
+        known = ("--help", "--version") if what == "option" else VERBS
+        print(f"pandion: {unknown_name(what, words[0], known)}", file=sys.stderr)
+        return COULD_NOT_START
+    return verb(words[1:])
+
+
+def _fly(argv: list[str]) -> int:
+    from pandion import fly
+
+    return fly.main(argv)
+
+
+def _sitl(argv: list[str]) -> int:
+    from sitl import __main__ as entry
+    from sitl import arguments
+
+    parser = Parser("pandion sitl", "Run the simulator alone.")
+    arguments.add_arguments(parser)
+    return entry.run(arguments.options(parser.read(argv)))
+
+
+def _fsw(argv: list[str]) -> int:
+    from fsw import __main__ as entry
+    from fsw import arguments
+
+    parser = Parser("pandion fsw", "Run the flight software alone.")
+    arguments.add_arguments(parser)
+    return entry.run(arguments.options(parser.read(argv)))
+
+
+VERBS: Final[dict[str, Callable[[list[str]], int]]] = {"fly": _fly, "sitl": _sitl, "fsw": _fsw}
+
+if __name__ == "__main__":
+    sys.exit(main())
