@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 
-from sitl.scenario import Lissajous, Scenario
+from sitl.scenario import Lissajous, Scenario, Start
 from sitl.scenario_file import ScenarioError
 from sitl.world import POINTS
 
+FIRST_JOINT_DEG, BOTH_JOINTS_DEG = 60.0, 90.0  # the arm's limits, Table I of the paper
 MARGINS_MAX = 16  # what one BARRIER_MARGIN message carries
 
 
@@ -17,6 +18,7 @@ def check(scenario: Scenario) -> None:
     Raises:
         ScenarioError: With the key, the value and what is allowed.
     """
+    _check_start(scenario.start)
     _check_walls(scenario)
     _check_names(scenario)
     curve = scenario.trajectory
@@ -30,6 +32,26 @@ def check(scenario: Scenario) -> None:
         raise ScenarioError(
             f'pilot.plan = "{scenario.pilot.plan}": start.kind = "{scenario.start.kind}" needs '
             f'"{"hop" if ground else "trajectory"}" or "none"'
+        )
+
+
+def _check_start(start: Start) -> None:
+    given = Start(kind=start.kind, yaw_deg=start.yaw_deg)
+    if start.kind == "airborne" and start.position_m != given.position_m:
+        raise ScenarioError(
+            f"start.position_m = {list(start.position_m)}: only for a start on the ground, in the "
+            "air the trajectory's first point decides"
+        )
+    if start.kind == "ground" and start.arm_deg != given.arm_deg:
+        raise ScenarioError(
+            f"start.arm_deg = {list(start.arm_deg)}: only for a start in the air, on the ground "
+            "the arm is limp"
+        )
+    first, second = start.arm_deg
+    if not (abs(first) <= FIRST_JOINT_DEG and abs(first + second) <= BOTH_JOINTS_DEG):
+        raise ScenarioError(
+            f"start.arm_deg = {list(start.arm_deg)}: must be within ±{FIRST_JOINT_DEG:g} for the "
+            f"first joint and ±{BOTH_JOINTS_DEG:g} for the sum"
         )
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from sitl.admission import check, check_start
 from sitl.disturbances.items import push
 from sitl.plant.aerial_manipulator import Inputs, plant
-from sitl.plant.integrator import STEP_S, integrate, specific_force
+from sitl.plant.integrator import STEP_S, integrate
 from sitl.plant.kinematics import places
 from sitl.plant.parameters import Vehicle
 from sitl.plant.state import StateView
@@ -86,6 +86,10 @@ class Simulation:
         self._state = self._first_state()
         self._places = np.empty((SUBSTEPS, 2 + joints, 3))
         self._reading: SensorReadings | None = None
+        # No steps: only what the accelerometer feels at the start.
+        self._felt = integrate(
+            self._plant, self._state, self._inputs, STEP_S, self._places[:0]
+        ).felt
         self._error = TrackingError()
         self._record = MarginRecord(self._world.keys)
         self._judge_start()
@@ -160,12 +164,13 @@ class Simulation:
         """
         self._command(controls)
         self._disturb()
-        landing = integrate(self._plant, self._state, self._inputs, STEP_S, self._places)
+        arrival = integrate(self._plant, self._state, self._inputs, STEP_S, self._places)
         before = self.time_s
         self.step += 1
         for k, row in enumerate(self._places.tolist()):
             self._judge(_critical(row), before + (k + 1) * STEP_S)
-        self._judge_landing(landing)
+        self._felt = arrival.felt
+        self._judge_landing(arrival.landing_speed)
         self._judge_time()
 
     def truth(self) -> Truth:
@@ -202,7 +207,7 @@ class Simulation:
             q_WB=_four(view.q_WB.tolist()),
             w_WB_B=w,
             gyro_B=w,
-            accel_B=specific_force(self._plant, self._state, self._inputs),
+            accel_B=self._felt,
             q_arm=tuple(view.q_arm.tolist()),
             qd_arm=tuple(view.qd_arm.tolist()),
             tau_arm=tuple(self._inputs.torque.tolist()),

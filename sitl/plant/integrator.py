@@ -31,6 +31,20 @@ class Slopes(NamedTuple):
     middle: Array
 
 
+class Arrival(NamedTuple):
+    """What a run of steps ended with, besides the state."""
+
+    landing_speed: float  # m/s, fastest downward speed of a foot on the ground after any step
+    felt: V3  # m/s², specific force at the base origin in the last state, B
+
+
+@kernel
+def specific_force(plant: Plant, state: Array, inputs: Inputs, work: Workspace) -> V3:
+    """What an accelerometer at the base origin feels [m/s², B]: acceleration minus gravity."""
+    acceleration_into(plant, state, inputs, work)
+    return sub(triple(work.load, 0), gravity_in_body(work.rotation, plant.gravity))
+
+
 @kernel
 def rk4_step(
     plant: Plant, state: Array, inputs: Inputs, step: float, work: Workspace, slopes: Slopes
@@ -60,8 +74,11 @@ def rk4_step(
 
 
 @compiled
-def integrate(plant: Plant, state: Array, inputs: Inputs, step: float, places: Array) -> float:
+def integrate(plant: Plant, state: Array, inputs: Inputs, step: float, places: Array) -> Arrival:
     """Advance ``state`` in place by one step per row of ``places``.
+
+    One call does all that an exchange needs, because handing the plant's arrays to compiled
+    code costs as much as two steps.
 
     Args:
         plant: Numbers of the vehicle.
@@ -69,10 +86,7 @@ def integrate(plant: Plant, state: Array, inputs: Inputs, step: float, places: A
         inputs: Commands and disturbance, held over all steps.
         step: Length of one step [s].
         places: (steps, 2 + j, 3) m, overwritten: positions in W of the base origin and of
-            every DH frame's origin after each step.
-
-    Returns:
-        Fastest downward speed of a foot on the ground after any of the steps [m/s].
+            every DH frame's origin after each step. No rows: the state stays as it is.
     """
     n = state.shape[0]
     work = empty_workspace((n - ARM) // 2)
@@ -82,12 +96,4 @@ def integrate(plant: Plant, state: Array, inputs: Inputs, step: float, places: A
         rk4_step(plant, state, inputs, step, work, slopes)
         place_into(plant, state, work, k, places)
         fastest = max(fastest, touch_down_speed(plant, state, work))
-    return fastest
-
-
-@compiled
-def specific_force(plant: Plant, state: Array, inputs: Inputs) -> V3:
-    """What an accelerometer at the base origin feels [m/s², B]: acceleration minus gravity."""
-    work = empty_workspace((state.shape[0] - ARM) // 2)
-    acceleration_into(plant, state, inputs, work)
-    return sub(triple(work.load, 0), gravity_in_body(work.rotation, plant.gravity))
+    return Arrival(fastest, specific_force(plant, state, inputs, work))

@@ -70,6 +70,10 @@ def test_the_papers_cases_are_there() -> None:
         ("[0.1, 0.1, 0.1]", "[0.1, 0.1]", ["trajectory.amplitude_m", "array of 3 numbers"]),
         ("[0.1, 0.1, 0.1]", "[0.1, -1, 0.1]", ["trajectory.amplitude_m[1] = -1", "0 to 1000"]),
         ('"trajectory"', '"hop"', ["pilot.plan", "airborne"]),
+        ('"airborne"', '"airborne"\nposition_m = [1.0, 0.0]', ["start.position_m", "ground"]),
+        ('"airborne"', '"ground"\narm_deg = [10.0, 0.0]', ["start.arm_deg", "limp"]),
+        ('"airborne"', '"airborne"\narm_deg = [70.0, 0.0]', ["start.arm_deg", "±60"]),
+        ('"airborne"', '"airborne"\narm_deg = [50.0, 50.0]', ["start.arm_deg", "±90"]),
     ],
 )
 def test_a_wrong_line_is_refused_with_key_value_and_what_is_allowed(
