@@ -1,10 +1,9 @@
-"""The first state of a flight."""
+"""The vehicle and the first state of a flight."""
 
 from __future__ import annotations
 
 import math
-
-import numpy as np
+from dataclasses import replace
 
 from sitl.plant.parameters import Vehicle, level_reach
 from sitl.plant.state import StateView, at_rest
@@ -12,6 +11,38 @@ from sitl.plant.trim import NoTrimError, Trim, level_hover, standing_height
 from sitl.plant.vector import Array
 from sitl.scenario import V3, Scenario
 from sitl.scenario_file import ScenarioError
+
+
+def flown_vehicle(scenario: Scenario) -> Vehicle:
+    """The default vehicle, scaled as the scenario says."""
+    scale = scenario.vehicle_scale
+    vehicle = Vehicle().scaled(scale.mass, scale.inertia)
+    rotors, joints = vehicle.rotors, vehicle.joints
+    return replace(
+        vehicle,
+        rotors=replace(rotors, lag=scale.rotor_lag * rotors.lag),
+        joints=replace(
+            joints,
+            viscous=scale.joint_friction * joints.viscous,
+            coulomb=scale.joint_friction * joints.coulomb,
+        ),
+    )
+
+
+def first_state(vehicle: Vehicle, scenario: Scenario, p_target: V3) -> tuple[Array, Trim]:
+    """State vector and actuator values at t = 0.
+
+    Args:
+        vehicle: What flies.
+        scenario: Says whether it flies or stands.
+        p_target: First end-effector reference [m, NED].
+
+    Raises:
+        ScenarioError: No equilibrium within the actuators' limits.
+    """
+    if scenario.start.kind == "ground":
+        return standing(vehicle, scenario)
+    return hovering(vehicle, scenario, p_target)
 
 
 def hovering(vehicle: Vehicle, scenario: Scenario, p_target: V3) -> tuple[Array, Trim]:
@@ -47,4 +78,4 @@ def standing(vehicle: Vehicle, scenario: Scenario) -> tuple[Array, Trim]:
     view.p_WB[:] = (x, y, -standing_height(vehicle))
     view.q_WB[:] = (math.cos(0.5 * yaw), 0.0, 0.0, math.sin(0.5 * yaw))
     view.q_arm[:] = [-link.theta_offset for link in vehicle.links]
-    return state, Trim((0.0, 0.0, 0.0, 0.0), tuple(float(t) for t in np.zeros(joints)))
+    return state, Trim((0.0, 0.0, 0.0, 0.0), (0.0,) * joints)

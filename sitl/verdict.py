@@ -27,7 +27,7 @@ class EndReason:
 
     kind: EndKind
     sentence: str
-    t_us: int
+    time_s: float  # since the start of the simulation
 
 
 @dataclass(frozen=True, slots=True)

@@ -51,6 +51,9 @@ class World:
             points: Base, joint 2 and end-effector [m, NED].
             margins: Their margins, from ``margins``.
         """
+        (_, _, base), (_, _, joint2), (_, _, end) = points
+        if max(base, joint2, end) < 0.0 < min(margins, default=1.0):
+            return None
         for i, wall in enumerate(self.walls):
             for k, name in enumerate(POINTS):
                 if not (margins[len(POINTS) * i + k] + wall.clearance_m > 0.0):

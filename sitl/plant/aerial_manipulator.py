@@ -8,20 +8,14 @@ import numpy as np
 
 from sitl.compiled import compiled, kernel
 from sitl.plant.actuators import joint_torque, rotor_torque, thrust_rate
+from sitl.plant.bodies import Chain, Posture, empty_posture, posture_into
 from sitl.plant.contact import Feet, ground_wrench
-from sitl.plant.newton_euler import (
-    Chain,
-    Posture,
-    empty_posture,
-    gravity_in_body,
-    mass_matrix_into,
-    posture_into,
-    solve_in_place,
-    wrench_needed_into,
-)
+from sitl.plant.mass_matrix import mass_matrix_into, solve_in_place
+from sitl.plant.newton_euler import wrench_needed_into
 from sitl.plant.parameters import Vehicle, chain
 from sitl.plant.state import ARM, P_WB, Q_WB, THRUST, V_WB, W_WB_B
 from sitl.plant.vector import (
+    V3,
     Array,
     add,
     put,
@@ -96,6 +90,12 @@ def empty_workspace(joints: int) -> Workspace:
         np.empty(n),
         np.zeros(joints),
     )
+
+
+@kernel
+def gravity_in_body(rotation: Array, g: float) -> V3:
+    """Gravity [m/s²] written in B for R_WB (3, 3); W is NED, so it points along +z."""
+    return transposed_times(rotation, (0.0, 0.0, g))
 
 
 @kernel

@@ -14,9 +14,9 @@ from sitl.plant.aerial_manipulator import (
     acceleration_into,
     derivative_into,
     empty_workspace,
+    gravity_in_body,
 )
 from sitl.plant.kinematics import place_into, touch_down_speed
-from sitl.plant.newton_euler import gravity_in_body
 from sitl.plant.state import ARM, Q_WB
 from sitl.plant.vector import V3, Array, sub, triple
 

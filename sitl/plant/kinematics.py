@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from sitl.compiled import compiled, kernel
 from sitl.plant.aerial_manipulator import Plant, Workspace, empty_workspace
-from sitl.plant.newton_euler import posture_into
+from sitl.plant.bodies import posture_into
 from sitl.plant.state import ARM, P_WB, Q_WB, V_WB, W_WB_B
 from sitl.plant.vector import V3, Array, add, cross, rotation_into, row, times, triple
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sitl.plant.newton_euler import Chain
+from sitl.plant.bodies import Chain
 from sitl.plant.vector import V3
 
 GRAVITY = 9.81  # m/s², along +z of NED

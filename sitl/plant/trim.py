@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sitl.plant.newton_euler import empty_posture, posture_into, wrench_needed_into
+from sitl.plant.bodies import empty_posture, posture_into
+from sitl.plant.newton_euler import wrench_needed_into
 from sitl.plant.parameters import Vehicle, chain
 
 

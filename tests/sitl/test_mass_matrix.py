@@ -5,13 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sitl.plant.newton_euler import (
-    empty_posture,
-    mass_matrix_into,
-    posture_into,
-    solve_in_place,
-    wrench_needed_into,
-)
+from sitl.plant.bodies import empty_posture, posture_into
+from sitl.plant.mass_matrix import mass_matrix_into, solve_in_place
+from sitl.plant.newton_euler import wrench_needed_into
 from sitl.plant.parameters import chain
 from sitl.plant.vector import V3
 from tests.sitl.test_against_pinocchio import random_vehicle

@@ -238,8 +238,8 @@ def test_the_trajectory_starts_after_the_delay_and_the_pilot_can_move_it() -> No
     assert hop.trajectory_start_us is None
     assert hop.result().tracking_error_rms_m is None
     hop.start_trajectory(11_000_000)
-    assert hop.target_at(10.0) == hop.reference.at(0.0)
-    assert hop.target_at(15.0) == hop.reference.at(5.0)
+    assert hop.target_at(10.0) == hop.clock.reference.at(0.0)
+    assert hop.target_at(15.0) == hop.clock.reference.at(5.0)
 
 
 def test_the_first_reason_to_end_stands() -> None:

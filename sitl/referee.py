@@ -1,0 +1,86 @@
+"""Judges a run on the plant's truth: margins, collisions, landing, tracking error."""
+
+from __future__ import annotations
+
+import math
+
+from sitl.admission import check_start
+from sitl.mission_clock import MissionClock
+from sitl.scenario import V3, Scenario
+from sitl.verdict import EndKind, EndReason, MarginRecord, TrackingError, TruthResult, score
+from sitl.world import World
+
+TOUCH_DOWN_MAX = 2.0  # m/s; a drop from 0.2 m
+Points = tuple[V3, V3, V3]  # base, joint 2, end-effector [m, NED]
+
+
+class Referee:
+    """The score of one run and the first reason to end it.
+
+    Args:
+        scenario: What is flown.
+        clock: When the trajectory runs.
+        points: Critical points at the start.
+
+    Raises:
+        ScenarioError: The start is outside the safe set.
+    """
+
+    def __init__(self, scenario: Scenario, clock: MissionClock, points: Points) -> None:
+        self.world = World(scenario)
+        self.record = MarginRecord(self.world.keys)
+        self.ended: EndReason | None = None
+        self._clock = clock
+        self._error = TrackingError()
+        self._duration_s = scenario.duration_s
+        self._hop = scenario.pilot.plan == "hop"
+        margins = self.margins(points, 0.0)
+        check_start(self.world.keys, margins)
+        self.record.add(margins, 0.0)
+        self.sample_error(points, 0.0)
+
+    def end(self, kind: EndKind, sentence: str, time_s: float) -> None:
+        """End the run; the first reason stands."""
+        if self.ended is None:
+            self.ended = EndReason(kind, sentence, time_s)
+
+    def margins(self, points: Points, time_s: float) -> tuple[float, ...]:
+        """Margins [m] in the order of ``world.keys``."""
+        applies = self.world.workspace is not None and self._clock.counts(time_s)
+        return self.world.margins(points, self._clock.target_at(time_s).p if applies else None)
+
+    def judge(self, points: Points, time_s: float) -> None:
+        """Look at one plant step."""
+        if self.ended is not None:
+            return
+        if not math.isfinite(sum(map(sum, points))):
+            self.end(EndKind.DIVERGED, f"the simulation diverged at {time_s:.3f} s", time_s)
+            return
+        margins = self.margins(points, time_s)
+        self.record.add(margins, time_s)
+        touched = self.world.collision(points, margins)
+        if touched is not None:
+            self.end(EndKind.COLLISION, f"{touched} at {time_s:.2f} s", time_s)
+
+    def judge_landing(self, speed: float, time_s: float) -> None:
+        """Look at the fastest foot on the ground [m/s]."""
+        if not (speed <= TOUCH_DOWN_MAX):
+            sentence = (
+                f"the legs hit the ground at {speed:.1f} m/s at {time_s:.2f} s, "
+                f"{TOUCH_DOWN_MAX:.1f} m/s is the most they stand"
+            )
+            self.end(EndKind.CRASH, sentence, time_s)
+
+    def judge_time(self, time_s: float) -> None:
+        """Look at the clock."""
+        if time_s >= self._duration_s - 1e-6:
+            self.end(EndKind.DURATION, f"flew {time_s:.1f} s", time_s)
+
+    def sample_error(self, points: Points, time_s: float) -> None:
+        """Take one sample of the tracking error, if the trajectory is on."""
+        if self._clock.counts(time_s):
+            self._error.add(points[2], self._clock.target_at(time_s).p)
+
+    def result(self, time_s: float) -> TruthResult:
+        """The score up to ``time_s``."""
+        return score(self.ended, time_s, self._error, self.record, self._hop)
