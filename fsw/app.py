@@ -21,13 +21,15 @@ from fsw.runtime.effort import EffortRecord
 from fsw.runtime.events import Events, events
 from fsw.runtime.planner_worker import InlinePlanner, PlannerRecord, ThreadedPlanner
 from fsw.runtime.process import (
+    TICK_PRIORITY,
     StopRequest,
     claim_real_time,
     release_real_time,
     settle_memory,
+    share_interpreter_fairly,
 )
 from fsw.runtime.program import FlightProgram
-from fsw.runtime.sim_loop import Ending, FlightEnd, SimLoop, FlightRecord
+from fsw.runtime.sim_loop import Ending, FlightEnd, FlightRecord, SimLoop
 from fsw.runtime.timing import GroupTimer
 
 if TYPE_CHECKING:
@@ -36,6 +38,8 @@ if TYPE_CHECKING:
 DONE, NOT_COMPLETED, COULD_NOT_START = 0, 1, 2  # exit codes
 
 State = TypeVar("State")
+NO_PERMISSION = "no permission for real-time scheduling: ticks may be late on a busy machine"
+
 ProgramLoader = Callable[[FswOptions], FlightProgram[Any]]
 
 
@@ -129,8 +133,10 @@ class _Session:
             )
         realtime = sim.pacing is Pacing.REALTIME
         service = _plan_service(realtime, planner, record)
-        if realtime and (warning := claim_real_time()):
-            self._told.report("warning", f"fsw: {warning}")
+        if realtime:
+            share_interpreter_fairly()
+            if not claim_real_time(TICK_PRIORITY):
+                self._told.report("warning", f"fsw: {NO_PERMISSION}")
         settle_memory()
         try:
             return loop.fly(first, service)

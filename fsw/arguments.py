@@ -35,10 +35,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="where to send telemetry (default %(default)s)",
     )
     parser.add_argument(
-        "--controller", metavar="NAME", default="blf", help="predictive controller (blf)"
+        "--controller",
+        metavar="NAME",
+        default="blf",
+        help="predictive controller (default %(default)s)",
     )
     parser.add_argument(
-        "--inner", metavar="NAME", default="tracking", help="fast loop: tracking or pid"
+        "--inner",
+        metavar="NAME",
+        default="tracking",
+        help="fast loop, tracking or pid (default %(default)s)",
     )
     parser.add_argument(
         "--out", metavar="DIR", type=Path, help="where logs go (default a new one in runs/)"

@@ -64,10 +64,16 @@ def main(argv: list[str]) -> int:
 
 def _add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "--controller", metavar="NAME", default="blf", help="predictive controller (blf)"
+        "--controller",
+        metavar="NAME",
+        default="blf",
+        help="predictive controller (default %(default)s)",
     )
     parser.add_argument(
-        "--inner", metavar="NAME", default="tracking", help="fast loop: tracking or pid"
+        "--inner",
+        metavar="NAME",
+        default="tracking",
+        help="fast loop, tracking or pid (default %(default)s)",
     )
     parser.add_argument(
         "--gcs",

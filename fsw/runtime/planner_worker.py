@@ -12,6 +12,7 @@ from collections import Counter
 from dataclasses import dataclass, field
 
 from fsw.ports import Clock, Planner
+from fsw.runtime.process import PLANNER_PRIORITY, claim_real_time
 from fsw.runtime.timing import GroupTimer
 from fsw.signals import Plan, PlanFailure, PlanRequest, PlanTimings, SolverStatus
 
@@ -96,6 +97,7 @@ class ThreadedPlanner:
         self._thread.join(timeout=1.0)
 
     def _work(self) -> None:
+        claim_real_time(PLANNER_PRIORITY)
         # Single reads and writes of an attribute are atomic; one thread takes, one puts.
         while True:
             self._wanted.wait()

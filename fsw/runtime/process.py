@@ -10,7 +10,8 @@ import sys
 from types import FrameType
 from typing import Final
 
-_FIFO_PRIORITY: Final = 50
+TICK_PRIORITY: Final = 50
+PLANNER_PRIORITY: Final = 40  # the tick goes first, ordinary programs come after both
 _SWITCH_INTERVAL_S: Final = 100e-6
 _THREAD_VARIABLES: Final = (
     "OPENBLAS_NUM_THREADS",
@@ -56,23 +57,18 @@ def settle_memory() -> None:
     gc.disable()
 
 
-def claim_real_time() -> str | None:
-    """Ask for real-time scheduling of the calling thread.
-
-    Threads started before keep their ordinary priority, so start the planner first.
-
-    Returns:
-        None when granted, else a sentence on what will happen instead.
-    """
-    # The planner's Python stretches may hold the GIL this long while a tick is due.
-    sys.setswitchinterval(_SWITCH_INTERVAL_S)
+def claim_real_time(priority: int) -> bool:
+    """Ask for real-time scheduling of the calling thread; False if that is not permitted."""
     try:
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(_FIFO_PRIORITY))
-    except (PermissionError, OSError):
-        return (
-            "no permission for real-time scheduling: ticks may be late on a busy machine"
-        )
-    return None
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
+    except OSError:
+        return False
+    return True
+
+
+def share_interpreter_fairly() -> None:
+    """Let a due tick wait for the planner's Python no longer than this, instead of 5 ms."""
+    sys.setswitchinterval(_SWITCH_INTERVAL_S)
 
 
 def release_real_time() -> None:
