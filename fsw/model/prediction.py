@@ -10,6 +10,7 @@ loop and the rotors, a vertical one through the rotors alone. With the attitude 
           \dot s = (k_p (u - a) - k_d j - s)/\tau
 
 and the vertical axis :math:`\dot a = (u - a)/\tau`. Yaw and joints stay double integrators.
+The paper's own model is there as well, for a plant that is one: ``LagModel(at_once=True)``.
 The chain is linear, time-invariant and the same in x and y, so it is discretised exactly
 once (zero-order hold) and condensed once.
 
@@ -42,6 +43,9 @@ class LagModel:
     kp: float = 50.0  # 1/s^2, attitude loop, the paper's PID
     kd: float = 15.0  # 1/s
     rotor_lag: float = 0.04  # s
+    # Eq 16 as printed: u is the acceleration. The states a, j and s then keep their start values,
+    # and a start with zeros in them has no tilt in the arm's kinematics either.
+    at_once: bool = False
 
 
 @dataclass(frozen=True)
@@ -60,6 +64,21 @@ def continuous_model(lag: LagModel) -> tuple[Array, Array]:
     b = np.zeros((STATES, INPUTS))
     for axis in range(3):
         a[P + axis, V + axis] = 1.0
+        if lag.at_once:
+            b[V + axis, axis] = 1.0
+    if not lag.at_once:
+        _add_lag(lag, a, b)
+    a[YAW, YAW_RATE] = 1.0
+    b[YAW_RATE, 3] = 1.0
+    for joint in range(2):
+        a[Q_ARM + joint, QD_ARM + joint] = 1.0
+        b[QD_ARM + joint, 4 + joint] = 1.0
+    return a, b
+
+
+def _add_lag(lag: LagModel, a: Array, b: Array) -> None:
+    """From commanded acceleration to velocity, through attitude and rotors."""
+    for axis in range(3):
         a[V + axis, A + axis] = 1.0
     for axis in range(2):
         a[A + axis, J + axis] = 1.0
@@ -70,12 +89,6 @@ def continuous_model(lag: LagModel) -> tuple[Array, Array]:
         b[S + axis, axis] = lag.kp / lag.rotor_lag
     a[A + 2, A + 2] = -1.0 / lag.rotor_lag
     b[A + 2, 2] = 1.0 / lag.rotor_lag
-    a[YAW, YAW_RATE] = 1.0
-    b[YAW_RATE, 3] = 1.0
-    for joint in range(2):
-        a[Q_ARM + joint, QD_ARM + joint] = 1.0
-        b[QD_ARM + joint, 4 + joint] = 1.0
-    return a, b
 
 
 def discretise(lag: LagModel, period: float) -> tuple[Array, Array]:
