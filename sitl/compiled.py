@@ -27,7 +27,8 @@ def _sources_digest() -> str:
 
 # numba stamps a cached kernel with its own file only: after an edit in a callee the caller
 # would still run the old machine code. A cache directory per state of the sources cannot.
-_CACHE_DIR = str(_PACKAGE / "__pycache__" / f"numba-{_sources_digest()}")
+_ROOT = Path(numba.config.CACHE_DIR or _PACKAGE / "__pycache__")
+_CACHE_DIR = str(_ROOT / f"numba-{_sources_digest()}")
 
 
 def compiled(function: Callable[P, R]) -> Callable[P, R]:

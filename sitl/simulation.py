@@ -16,6 +16,7 @@ from sitl.plant.kinematics import places
 from sitl.plant.state import StateView
 from sitl.referee import Points, Referee
 from sitl.scenario import V3, Scenario
+from sitl.scenario_file import ScenarioError
 from sitl.sensors.suite import V4, SensorReadings, SensorSuite
 from sitl.start import first_state, flown_vehicle
 from sitl.trajectory import TrajectoryPoint
@@ -58,7 +59,7 @@ class Simulation:
 
     Args:
         scenario: What to fly.
-        seed: Root of every random number of the run.
+        seed: Root of every random number of the run, 0 or more.
 
     Raises:
         ScenarioError: The scenario contradicts itself or starts outside its safe set.
@@ -67,6 +68,8 @@ class Simulation:
     step_us = STEP_US
 
     def __init__(self, scenario: Scenario, seed: int) -> None:
+        if not (seed >= 0):
+            raise ScenarioError(f"seed = {seed}: must be 0 or more")
         check(scenario)
         self.scenario = scenario
         self.vehicle = flown_vehicle(scenario)

@@ -8,8 +8,8 @@ from dataclasses import replace
 import pytest
 
 from sitl.plant.trim import level_hover
-from sitl.scenario import Hold, Impulses, ImuErrors, Scenario, Sensors, Wind
-from sitl.scenario_file import load_scenario
+from sitl.scenario import Hold, ImuErrors, Impulses, Scenario, Sensors, Wind, Workspace
+from sitl.scenario_file import ScenarioError, load_scenario
 from sitl.sensors.suite import SensorReadings
 from sitl.simulation import Controls, Simulation, Truth
 from sitl.verdict import EndKind
@@ -248,3 +248,37 @@ def test_the_first_reason_to_end_stands() -> None:
     simulation.end(EndKind.STOPPED, "interrupted")
     assert simulation.result().end_reason == "the vehicle denied arming: battery low"
     assert not simulation.result().completed
+
+
+def test_wind_is_an_acceleration_of_the_whole_vehicle() -> None:
+    scenario = load_scenario("walls-calm")
+    # With the arm straight down a vertical push goes through every centre of mass.
+    scenario = replace(
+        scenario,
+        start=replace(scenario.start, arm_deg=(0.0, 0.0)),
+        disturbances=(Wind((0.0, 0.0, -0.5)),),
+    )
+    simulation = Simulation(scenario, 0)
+    _fly(simulation, _trimmed(simulation), 0.2)
+    assert simulation.truth().v_WB == pytest.approx((0.0, 0.0, -0.1), abs=1e-12)
+
+
+def test_a_workspace_counts_only_while_the_pilot_is_on_the_trajectory() -> None:
+    scenario = replace(load_scenario("hop"), workspace=Workspace(0.075, 0.225))
+    simulation = Simulation(scenario, 0)
+    _fly(simulation, OFF, 0.2)
+    assert simulation.result().margins_m == {}
+    simulation.start_trajectory(1_300_000)
+    _fly(simulation, OFF, 0.2)
+    # Still on the ground, 1.5 m below where it should be.
+    depth = simulation.result().margins_m["workspace/base"]
+    assert depth < -1.0
+    error = simulation.result().tracking_error_rms_m
+    simulation.stop_trajectory(simulation.t_us)
+    _fly(simulation, OFF, 0.3)
+    assert simulation.result().tracking_error_rms_m == error
+
+
+def test_a_negative_seed_is_refused() -> None:
+    with pytest.raises(ScenarioError, match="seed = -1"):
+        Simulation(load_scenario("walls-calm"), -1)
