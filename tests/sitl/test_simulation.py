@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from sitl.plant.trim import level_hover
-from sitl.scenario import Hold, ImuErrors, Impulses, Scenario, Sensors, Wind, Workspace
+from sitl.scenario import Hold, Impulses, ImuErrors, Scenario, Sensors, Wind, Workspace
 from sitl.scenario_file import ScenarioError, load_scenario
 from sitl.sensors.suite import SensorReadings
 from sitl.simulation import Controls, Simulation, Truth
