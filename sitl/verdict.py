@@ -48,7 +48,7 @@ class TruthResult:
 class TrackingError:
     """Root mean square and maximum of the end-effector's distance from its reference.
 
-    Source: TE of the paper, one sample per planning step.
+    Source: TE of the paper, one sample per planning step; docs/equations.md E13.
     """
 
     def __init__(self) -> None:

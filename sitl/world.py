@@ -1,4 +1,7 @@
-"""Walls, workspace and ground, judged on the plant's true state."""
+"""Walls, workspace and ground, judged on the plant's true state.
+
+Source: docs/equations.md E14, E15.
+"""
 
 from __future__ import annotations
 

@@ -2,6 +2,8 @@
 
 The rows have the same shape as a barrier's, with the distance in place of h, so that the
 same program carries both; whether they are softened is the program's price, not theirs.
+
+Source: docs/equations.md E14, E15.
 """
 
 from __future__ import annotations

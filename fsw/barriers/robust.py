@@ -8,7 +8,7 @@ faster than exponentially. Sampled and accumulated from the start of the horizon
 The rows are anchored at :math:`h_0`. Chained row by row they would let the first, which the
 lagging vehicle cannot move, excuse the others.
 
-Source: docs/equations.md E25.
+Source: docs/equations.md E10, E25.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""The prediction model at the tick's rate, in plain floats: where the plan is now."""
+"""The prediction model at the tick's rate, in plain floats: where the plan is now.
+
+Source: docs/equations.md E16.
+"""
 
 from __future__ import annotations
 

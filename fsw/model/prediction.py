@@ -14,7 +14,7 @@ The paper's own model is there as well, for a plant that is one: ``LagModel(at_o
 The chain is linear, time-invariant and the same in x and y, so it is discretised exactly
 once (zero-order hold) and condensed once.
 
-Source: docs/equations.md E16, E17; docs/decisions/0002-prediction-knows-the-attitude-lag.md.
+Source: docs/equations.md E15b, E16, E17; docs/decisions/0002-prediction-knows-the-attitude-lag.md.
 """
 
 from __future__ import annotations

@@ -6,6 +6,8 @@ over nodes 1..n-1, with the terminal weights at node n (node 0 is measured and c
 
 The paper penalises :math:`v_e` itself, which pulls a moving end-effector back; by default
 the target's velocity is subtracted (docs/equations.md E20 gives both figures).
+
+Source: docs/equations.md E18, E20, E21.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""One 10 Hz cycle: linearise, refill, solve, twice; then a plan or the reason for none."""
+"""One 10 Hz cycle: linearise, refill, solve, twice; then a plan or the reason for none.
+
+Source: docs/equations.md E17.
+"""
 
 from __future__ import annotations
 

@@ -11,6 +11,8 @@ slacks                slack >= 0                                  non-negative
 input bounds          -u_max <= u <= u_max                        non-negative
 tilt, one a node      |a_xy| <= tan(tilt) (g - a_z)               second-order
 ====================  ==========================================  =============
+
+Source: docs/equations.md E17.
 """
 
 from __future__ import annotations

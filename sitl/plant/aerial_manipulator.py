@@ -1,4 +1,7 @@
-"""The whole vehicle as one ordinary differential equation."""
+"""The whole vehicle as one ordinary differential equation.
+
+Source: docs/equations.md E1, E2, E3, E6.
+"""
 
 from __future__ import annotations
 

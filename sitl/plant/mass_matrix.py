@@ -1,6 +1,6 @@
 """The exact coupled mass matrix of base and arm, and its solver.
 
-It stands where the paper's eq 6 has a constant block-diagonal matrix (docs/equations.md).
+It stands where the paper's eq 6 has a constant block-diagonal matrix (docs/equations.md E6).
 """
 
 from __future__ import annotations

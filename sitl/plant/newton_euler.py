@@ -5,7 +5,8 @@ frame per link: the recursion is the same, the rotations between links drop out,
 composite inertias of all links can be added (``mass_matrix``).
 
 Deviations from the printed equations: eq 2's ω̇ × Iω̇ is ω × Iω, eq 5's cross products are
-ordered so that moments balance, and the base is a body like the others (docs/equations.md).
+ordered so that moments balance, and the base is a body like the others
+(docs/equations.md E4, E5).
 """
 
 from __future__ import annotations
@@ -53,7 +54,7 @@ def wrench_needed_into(
         qdd: Joint accelerations (j,) [rad/s²].
         out: (6 + j,) force [N, B], moment about the base origin [N·m, B], joint torques [N·m].
 
-    Source: eqs 4 and 5 with errata; docs/equations.md.
+    Source: eqs 4 and 5 with errata; docs/equations.md E4, E5.
     """
     joints = qd.shape[0]
     force, moment = at.force, at.moment
