@@ -142,6 +142,9 @@ def speak(
     state = replace(state, announced=state.announced + len(messages))
     # The trajectory is asked for once its points are there.
     waits_for_targets = state.phase is Phase.FOLLOW and target_due
+    if command_due and t_us - state.since_us >= _PATIENCE_US:
+        wish = f"the vehicle did not acknowledge the command to {state.phase.value}"
+        return replace(state, refusal=wish), tuple(messages)
     if command_due and not waits_for_targets and len(messages) < MESSAGES_PER_STEP:
         state = replace(state, next_ask_us=t_us + _REPEAT_US)
         messages.append(_command(plan, state.phase))

@@ -1,0 +1,146 @@
+"""Every telemetry stream, read back with pymavlink's generated classes."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from fsw.link import encode_replies, encode_standard
+from fsw.link import message_ids as ids
+from fsw.link.streams import STREAMS, Stream
+from fsw.signals import Mode, StatusText
+from messages import dialect
+from messages.frames import FrameWriter
+from tests.link.snapshots import ACTUATORS, CONTEXT, SNAPSHOT
+
+
+def read_back(stream: Stream, snapshot: Any = SNAPSHOT) -> Any:
+    values = stream.encode(snapshot, CONTEXT)
+    assert values is not None
+    return decoded(FrameWriter(1, stream.component).frame(stream.message_id, *values))
+
+
+def decoded(frame: bytes) -> Any:
+    (message,) = dialect.MAVLink(None).parse_buffer(bytearray(frame))
+    return message
+
+
+def stream_of(message_id: int) -> Stream:
+    return next(stream for stream in STREAMS if stream.message_id == message_id)
+
+
+# What pymavlink must read for the snapshot, one or a few telling fields a message.
+TELLING: dict[int, dict[str, Any]] = {
+    ids.HEARTBEAT: {"type": 2, "autopilot": 12, "custom_mode": 6 << 16, "system_status": 4},
+    ids.SYS_STATUS: {"load": 40, "voltage_battery": 65535, "battery_remaining": -1},
+    ids.EXTENDED_SYS_STATE: {"landed_state": 2},
+    ids.ATTITUDE: {"time_boot_ms": 3004, "yaw": math.pi / 2, "rollspeed": 0.4},
+    ids.ATTITUDE_QUATERNION: {"q1": math.sqrt(0.5), "q4": math.sqrt(0.5), "yawspeed": 0.6},
+    ids.LOCAL_POSITION_NED: {"x": 1.0, "y": 2.0, "z": -3.0, "vz": 0.3},
+    ids.POSITION_TARGET_LOCAL_NED: {"x": 1.1, "vy": 0.21, "afz": 0.32, "yaw": 0.33},
+    ids.ATTITUDE_TARGET: {"thrust": 40.0 / 64.0, "type_mask": 7},
+    ids.ARM_JOINT_STATE: {"joint_count": 2, "time_usec": 3_004_000},
+    ids.ARM_JOINT_SETPOINT: {"joint_count": 2},
+    ids.END_EFFECTOR_TARGET: {"yaw": 0.3, "coordinate_frame": 1},
+    ids.BARRIER_MARGIN: {
+        "margin_min": 0.2, "margin_min_index": 1, "count": 3, "constraint_kind": 1,
+        "active_mask": 0b010, "slack_max": 0.25,
+    },
+    ids.MPC_STATUS: {
+        "plan_id": 7, "total_us": 703, "linearise_us": 101, "solve_us": 502, "budget_us": 10_000,
+        "missed_deadlines": 1, "fallbacks": 2, "cost": 12.5, "horizon": 5, "rate_hz": 10,
+        "sqp_iterations": 2, "solver_iterations": 19, "solver_status": 4,
+    },
+    ids.LOOP_TIMING: {"ticks": 5000, "late_ticks": 3, "skipped_ticks": 1, "lateness_p99_us": 90.0},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("message_id", TELLING)
+def test_pymavlink_reads_what_was_meant(message_id: int) -> None:
+    message = read_back(stream_of(message_id))
+    for field, expected in TELLING[message_id].items():
+        assert getattr(message, field) == pytest.approx(expected, rel=1e-6), field
+
+
+def test_every_stream_is_checked_above() -> None:
+    assert {stream.message_id for stream in STREAMS} == set(TELLING)
+
+
+def test_arrays_of_the_arm_hold_two_joints_and_zeros() -> None:
+    state = read_back(stream_of(ids.ARM_JOINT_STATE))
+    assert state.position == pytest.approx([0.7, 0.8, 0.0, 0.0])
+    assert state.torque == pytest.approx([1.0, -0.5, 0.0, 0.0])
+    assert state.ee_position == pytest.approx([1.5, 2.5, -2.5])
+    setpoint = read_back(stream_of(ids.ARM_JOINT_SETPOINT))
+    assert setpoint.acceleration == pytest.approx([0.8, 0.9, 0.0, 0.0])
+
+
+@pytest.mark.parametrize(
+    ("mode", "main", "sub"),
+    [
+        (Mode.TAKEOFF, 4, 2),
+        (Mode.HOLD, 4, 3),
+        (Mode.LAND, 4, 6),
+        (Mode.TRAJECTORY, 6, 0),
+    ],
+)
+def test_modes_have_the_names_that_px4_gave_them(mode: Mode, main: int, sub: int) -> None:
+    message = read_back(stream_of(ids.HEARTBEAT), replace(SNAPSHOT, mode=mode))
+    assert message.custom_mode == main << 16 | sub << 24
+
+
+def test_armed_and_custom_mode_are_flags_of_the_heartbeat() -> None:
+    assert read_back(stream_of(ids.HEARTBEAT)).base_mode & 0x81 == 0x81
+    disarmed = replace(SNAPSHOT, mode=Mode.DISARMED, armed=False)
+    assert read_back(stream_of(ids.HEARTBEAT), disarmed).base_mode & 0x81 == 0x01
+
+
+def test_a_fault_takes_the_prearm_bit_and_the_suspect_away() -> None:
+    healthy = read_back(stream_of(ids.SYS_STATUS))
+    assert healthy.onboard_control_sensors_health == healthy.onboard_control_sensors_present
+    broken = replace(SNAPSHOT, failures=("state estimate invalid",))
+    status = read_back(stream_of(ids.SYS_STATUS), broken)
+    lost = status.onboard_control_sensors_present & ~status.onboard_control_sensors_health
+    assert lost == 0x10000000 | 0x200000 | 0x80
+    assert read_back(stream_of(ids.HEARTBEAT), broken).system_status == 5
+
+
+def test_there_is_nothing_to_say_before_the_first_plan() -> None:
+    idle = replace(SNAPSHOT, plan=None, plan_state=None, plan_input=None, reference=None)
+    for message_id in (
+        ids.POSITION_TARGET_LOCAL_NED,
+        ids.ARM_JOINT_SETPOINT,
+        ids.END_EFFECTOR_TARGET,
+        ids.MPC_STATUS,
+    ):
+        assert stream_of(message_id).encode(idle, CONTEXT) is None
+
+
+def test_actuators_are_fractions_of_their_limits() -> None:
+    values = encode_replies.hil_actuator_controls(3_004_000, ACTUATORS, True, 1 / 16.0, 1 / 2.0)
+    message = decoded(FrameWriter(1, 1).frame(ids.HIL_ACTUATOR_CONTROLS, *values))
+    assert message.time_usec == 3_004_000
+    assert message.controls[:6] == pytest.approx([0.5, 0.25, 0.75, 1.0, 0.5, -0.25])
+    assert message.mode & 128
+    assert message.flags == 1
+
+
+def test_a_long_text_is_cut_into_numbered_pieces() -> None:
+    sentence = "arming refused: " + "ä" * 60
+    pieces = [
+        decoded(FrameWriter(1, 1).frame(ids.STATUSTEXT, *values))
+        for values in encode_replies.status_texts(StatusText(4, sentence), 9)
+    ]
+    assert [piece.chunk_seq for piece in pieces] == list(range(len(pieces)))
+    assert {piece.id for piece in pieces} == {9}
+    whole = b"".join(
+        values[1] for values in encode_replies.status_texts(StatusText(4, sentence), 9)
+    )
+    assert whole.decode() == sentence
+
+
+def test_attitude_of_a_level_vehicle_is_level() -> None:
+    assert encode_standard.attitude(SNAPSHOT, CONTEXT)[1:3] == pytest.approx((0.0, 0.0))

@@ -1,0 +1,176 @@
+"""What the scenario's pilot says, and when it gives up."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass, field
+
+import pytest
+
+from sitl.link.pilot import (
+    MESSAGES_PER_STEP,
+    TARGET_INTERVAL_US,
+    FlightPlan,
+    Phase,
+    PilotState,
+    flight_plan,
+    listen,
+    speak,
+)
+from sitl.link.pilot_messages import (
+    Ack,
+    AnnounceWall,
+    AnnounceWorkspace,
+    Heard,
+    PilotMessage,
+    SendCommand,
+    SendTarget,
+)
+from sitl.scenario import Hold, Pilot, Scenario, Start, Wall, Workspace
+from sitl.simulation import START_US, STEP_US
+from sitl.trajectory import TrajectoryPoint
+
+ARM, MODE, TAKE_OFF, LAND = 400, 176, 22, 21
+WALLS = tuple(Wall(name, (-1.0, 0.0, 0.0), -1.0, 0.1) for name in ("a", "b", "c"))
+
+
+def still(t_us: int) -> TrajectoryPoint:
+    return TrajectoryPoint((1e-6 * t_us, 0.0, -1.0), (0.0,) * 3, (0.0,) * 3)
+
+
+def plan(kind: str = "trajectory", **changes: object) -> FlightPlan:
+    fields = {
+        "name": "test",
+        "duration_s": 10.0,
+        "start": Start("airborne"),
+        "pilot": Pilot(kind),  # type: ignore[arg-type]
+        "trajectory": Hold((0.0, 0.0, -1.0)),
+        **changes,
+    }
+    return flight_plan(Scenario(**fields), still)  # type: ignore[arg-type]
+
+
+@dataclass
+class Flight:
+    """A pilot and a vehicle that answers by a table: command to MAV_RESULT."""
+
+    plan: FlightPlan
+    results: dict[int, int]
+    state: PilotState = field(init=False)
+    said: list[tuple[int, PilotMessage]] = field(default_factory=list)
+    t_us: int = START_US
+    heard: Heard = Heard()
+
+    def __post_init__(self) -> None:
+        self.state = PilotState(self.plan.first_phase)
+
+    def fly(self, seconds: float) -> None:
+        for _ in range(round(seconds * 1e6 / STEP_US)):
+            self.state, messages = speak(self.plan, self.state, self.t_us)
+            assert len(messages) <= MESSAGES_PER_STEP
+            self.said += [(self.t_us, message) for message in messages]
+            acks = tuple(
+                Ack(message.command, self.results[message.command])
+                for message in messages
+                if isinstance(message, SendCommand) and message.command in self.results
+            )
+            heard = Heard(
+                acks, self.heard.texts, self.heard.armed, self.heard.height_m, self.heard.speed_m_s
+            )
+            self.state = listen(self.plan, self.state, heard, self.t_us)
+            self.t_us += STEP_US
+
+    def commands(self) -> list[tuple[int, int]]:
+        return [(t, m.command) for t, m in self.said if isinstance(m, SendCommand)]
+
+    def targets(self) -> list[tuple[int, SendTarget]]:
+        return [(t, m) for t, m in self.said if isinstance(m, SendTarget)]
+
+
+def test_the_safe_set_is_announced_first() -> None:
+    flight = Flight(plan(walls=WALLS, workspace=Workspace(0.1, 0.2)), {ARM: 0, MODE: 0})
+    flight.fly(0.01)
+    first = [message for _, message in flight.said[:4]]
+    assert [m.index for m in first if isinstance(m, AnnounceWall)] == [0, 1, 2]
+    assert isinstance(first[3], AnnounceWorkspace)
+    assert flight.said[3][0] == START_US
+
+
+def test_targets_arrive_a_second_and_a_half_ahead_without_gaps() -> None:
+    flight = Flight(plan(walls=WALLS), {ARM: 0, MODE: 0})
+    flight.fly(3.0)
+    times = [message.t_us for _, message in flight.targets()]
+    assert times[0] == START_US
+    assert {after - before for before, after in itertools.pairwise(times)} == {TARGET_INTERVAL_US}
+    settled = [(t, m) for t, m in flight.targets() if t > START_US + 10 * STEP_US]
+    assert min(message.t_us - t for t, message in settled) >= 1_500_000
+    assert flight.targets()[5][1].point == still(times[5])
+
+
+def test_it_arms_and_then_asks_for_the_trajectory_once_its_points_are_there() -> None:
+    flight = Flight(plan(walls=WALLS), {ARM: 0, MODE: 0})
+    flight.fly(1.0)
+    assert [command for _, command in flight.commands()] == [ARM, MODE]
+    (_, asked) = (t for t, _ in flight.commands())
+    ahead = max(message.t_us for t, message in flight.targets() if t <= asked)
+    assert ahead >= asked + 1_500_000
+    assert flight.state.refusal is None
+
+
+def test_a_command_without_an_answer_is_repeated_twice_a_second() -> None:
+    flight = Flight(plan(), {})
+    flight.fly(2.0)
+    times = [t for t, _ in flight.commands()]
+    assert times == [START_US + n * 500_000 for n in range(4)]
+
+
+@pytest.mark.parametrize("result", [2, 3, 4])
+def test_a_denial_ends_the_run_with_the_vehicles_reason(result: int) -> None:
+    flight = Flight(plan(), {ARM: result}, heard=Heard(texts=("no estimate",)))
+    flight.fly(0.01)
+    assert flight.state.refusal == "the vehicle refused to arm: no estimate"
+
+
+def test_a_vehicle_that_is_not_ready_yet_is_asked_again() -> None:
+    flight = Flight(plan(), {ARM: 1})
+    flight.fly(2.0)
+    assert flight.state.refusal is None
+    flight.results = {ARM: 0, MODE: 0}
+    flight.fly(1.0)
+    assert flight.state.phase is Phase.IDLE
+
+
+def test_asking_does_not_go_on_for_ever() -> None:
+    flight = Flight(plan(), {ARM: 1})
+    flight.fly(11.0)
+    assert flight.state.refusal is not None
+
+
+def test_silence_to_a_command_does_not_go_on_for_ever() -> None:
+    flight = Flight(plan(), {})
+    flight.fly(11.0)
+    assert flight.state.refusal is not None
+
+
+def test_a_hop_takes_off_hovers_lands_and_is_done_when_disarmed() -> None:
+    flight = Flight(plan("hop"), {ARM: 0, TAKE_OFF: 0, LAND: 0}, heard=Heard(armed=True))
+    flight.fly(1.0)
+    assert [command for _, command in flight.commands()] == [ARM, TAKE_OFF]
+    flight.heard = Heard(armed=True, height_m=1.2, speed_m_s=0.5)
+    flight.fly(4.0)
+    assert flight.state.phase is Phase.HOVER
+    flight.heard = Heard(armed=True, height_m=1.5, speed_m_s=0.01)
+    flight.fly(4.0)
+    assert flight.commands()[-1][1] == LAND
+    assert not flight.state.done
+    flight.heard = Heard(armed=False)
+    flight.fly(0.01)
+    assert flight.state.done
+    assert flight.targets() == []
+
+
+def test_plan_none_leaves_the_flying_to_others() -> None:
+    flight = Flight(plan("none", walls=WALLS), {})
+    flight.fly(2.0)
+    assert all(isinstance(message, AnnounceWall) for _, message in flight.said)
+    assert len(flight.said) == 3
