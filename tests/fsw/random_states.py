@@ -7,7 +7,7 @@ import math
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from fsw.model.prediction import A, J, P, Q_ARM, QD_ARM, S, STATES, V, YAW, YAW_RATE, Array
+from fsw.model.prediction import Q_ARM, QD_ARM, STATES, YAW, YAW_RATE, A, Array, J, P, S, V
 from fsw.signals import Mat3, PredictionState, StateEstimate, Vec2, Vec3
 
 

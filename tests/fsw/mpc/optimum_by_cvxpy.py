@@ -1,0 +1,201 @@
+"""The planner's program written a second time, from the paper, for a solver of its own.
+
+Costs are eqs 18, 20 and 21 with the horizon's points linearised; constraints are Table I, the
+tilt cone and eq 25. Nothing of ``fsw.mpc`` or ``fsw.barriers`` is used.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import cvxpy as cp
+import numpy as np
+
+from fsw.barriers.root import BarrierTuning
+from fsw.model.linearisation import BASE, END_EFFECTOR, Linearisation
+from fsw.model.prediction import INPUTS, Array
+from fsw.mpc.planner_config import PlannerConfig
+from fsw.signals import SafeSet, Wall, WorkspaceSphere
+
+
+@dataclass(frozen=True)
+class Optimum:
+    """Where the second program has its minimum."""
+
+    inputs: Array  # (6 n,)
+    joint_slack: Array
+    barrier_slack: Array
+    value: float
+
+
+@dataclass(frozen=True)
+class Question:
+    """One linearised instance."""
+
+    horizon: Linearisation
+    guess: Array  # (6 n,)
+    target_p: Array  # (n + 1, 3)
+    target_v: Array  # (n + 1, 3)
+    safe_set: SafeSet
+
+
+class _Linear:
+    """The horizon's quantities as affine expressions of the unknown inputs."""
+
+    def __init__(self, question: Question, U: cp.Variable) -> None:
+        self._horizon, self._change = question.horizon, U - question.guess
+
+    def position(self, node: int, point: int) -> Any:
+        horizon = self._horizon
+        return horizon.position[node, point] + horizon.d_position[node, point] @ self._change
+
+    def velocity(self, node: int, point: int) -> Any:
+        horizon = self._horizon
+        return horizon.velocity[node, point] + horizon.d_velocity[node, point] @ self._change
+
+    def arm_cog(self, node: int) -> Any:
+        return self._horizon.arm_cog[node] + self._horizon.d_arm_cog[node] @ self._change
+
+    def angles(self, node: int) -> Any:
+        gamma = self._horizon.model.gamma[node, 15:17]
+        return self._horizon.states[node, 15:17] + gamma @ self._change
+
+
+def optimum(question: Question, config: PlannerConfig) -> Optimum:
+    """Solve the second program."""
+    n = config.horizon
+    U = cp.Variable(INPUTS * n)
+    linear = _Linear(question, U)
+    joint_slack = cp.Variable(n, nonneg=True)
+    rows, barrier_slack = _barrier(question, linear, config)
+    constraints = _input_limits(U, config) + rows
+    for node in range(1, n + 1):
+        th1, th2 = linear.angles(node)[0], linear.angles(node)[1]
+        constraints += [
+            cp.abs(th1) <= config.airframe.joint1_limit + joint_slack[node - 1],
+            cp.abs(th1 + th2) <= config.airframe.joint12_limit + joint_slack[node - 1],
+        ]
+    problem = cp.Problem(
+        cp.Minimize(
+            _cost(question, linear, U, config)
+            + config.joint_slack.linear * cp.sum(joint_slack)
+            + config.joint_slack.quadratic * cp.sum_squares(joint_slack)
+            + config.barrier_slack.linear * cp.sum(barrier_slack)
+            + config.barrier_slack.quadratic * cp.sum_squares(barrier_slack)
+        ),
+        constraints,
+    )
+    problem.solve(solver=cp.CLARABEL)
+    assert problem.status == cp.OPTIMAL
+    return Optimum(
+        np.asarray(U.value),
+        np.asarray(joint_slack.value),
+        np.asarray(barrier_slack.value),
+        float(problem.value),
+    )
+
+
+def _cost(question: Question, linear: _Linear, U: cp.Variable, config: PlannerConfig) -> Any:
+    """Table II: 10, 2 and 1 on the way, 50, 10 and 5 at the end."""
+    weights, n = config.weights, config.horizon
+    total: Any = weights.inputs * cp.sum_squares(U)
+    for node in range(1, n + 1):
+        last = node == n
+        error = linear.position(node, END_EFFECTOR) - question.target_p[node]
+        speed = linear.velocity(node, END_EFFECTOR)
+        if weights.relative_velocity:
+            speed = speed - question.target_v[node]
+        total += (50.0 if last else 10.0) * cp.sum_squares(error)
+        total += (10.0 if last else 2.0) * cp.sum_squares(speed)
+        total += (5.0 if last else 1.0) * cp.square(linear.arm_cog(node))
+    return total
+
+
+def _input_limits(U: cp.Variable, config: PlannerConfig) -> list[Any]:
+    limits, constraints = config.limits, []
+    for node in range(config.horizon):
+        ax, ay, az, yaw, joint1, joint2 = (U[INPUTS * node + k] for k in range(INPUTS))
+        constraints += [
+            cp.norm(cp.hstack([ax, ay])) <= math.tan(limits.tilt) * (9.81 - az),
+            cp.abs(az) <= limits.vertical,
+            cp.abs(yaw) <= limits.yaw_acc,
+            cp.abs(joint1) <= limits.joint_acc,
+            cp.abs(joint2) <= limits.joint_acc,
+        ]
+    return constraints
+
+
+def _safe_speed(d: float, tuning: BarrierTuning) -> tuple[float, float]:
+    """S(d) and its slope."""
+    k, alpha = tuning.slope, tuning.alpha
+    if d < alpha / k**2:
+        return k * d, k
+    value = math.sqrt(2.0 * alpha * d - (alpha / k) ** 2)
+    return value, alpha / value
+
+
+def _barrier(
+    question: Question, linear: _Linear, config: PlannerConfig
+) -> tuple[list[Any], cp.Variable]:
+    if question.safe_set.sphere is not None:
+        return _sphere_rows(question, linear, config, question.safe_set.sphere)
+    slack = cp.Variable((config.horizon + 1, max(len(question.safe_set.walls), 1)), nonneg=True)
+    rows: list[Any] = []
+    for k, wall in enumerate(question.safe_set.walls):
+        rows += _wall_rows(question, linear, config.walls, wall, slack[:, k])
+    return rows, slack
+
+
+def _required(h_start: float, node: int, tuning: BarrierTuning) -> float:
+    decay = (1.0 - tuning.gamma * tuning.period) ** node
+    return decay * h_start + (1.0 - decay) * tuning.robustness
+
+
+def _wall_rows(
+    question: Question, linear: _Linear, tuning: BarrierTuning, wall: Wall, slack: Any
+) -> list[Any]:
+    horizon, n = question.horizon, np.array(wall.normal)
+    limit, rows = wall.offset + wall.clearance, []
+    for point in range(3):
+        start_gap = float(n @ horizon.position[0, point]) - limit
+        h_start = _safe_speed(start_gap, tuning)[0] + float(n @ horizon.velocity[0, point])
+        for node in range(1 + tuning.skipped_nodes, len(horizon.position)):
+            gap = float(n @ horizon.position[node, point]) - limit
+            value, slope = _safe_speed(gap, tuning)
+            room = n @ linear.position(node, point) - limit - gap
+            h = value + slope * room + n @ linear.velocity(node, point)
+            rows.append(h + slack[node] >= _required(h_start, node, tuning))
+    return rows
+
+
+def _sphere_rows(
+    question: Question, linear: _Linear, config: PlannerConfig, sphere: WorkspaceSphere
+) -> tuple[list[Any], cp.Variable]:
+    horizon, tuning = question.horizon, config.workspace
+    slack = cp.Variable(config.horizon + 1, nonneg=True)
+    centre = question.target_p + np.array(sphere.centre_from_target)
+    e_start = horizon.position[0, BASE] - centre[0]
+    w_start = horizon.velocity[0, BASE] - question.target_v[0]
+    rows: list[Any] = []
+    for node in range(1 + tuning.skipped_nodes, config.horizon + 1):
+        e = horizon.position[node, BASE] - centre[node]
+        for n in _directions(e):
+            gap = sphere.radius - float(n @ e)
+            value, slope = _safe_speed(gap, tuning)
+            room = sphere.radius - n @ (linear.position(node, BASE) - centre[node]) - gap
+            h = value + slope * room - n @ (linear.velocity(node, BASE) - question.target_v[node])
+            start = _safe_speed(sphere.radius - float(n @ e_start), tuning)[0] - float(n @ w_start)
+            rows.append(h + slack[node] >= _required(start, node, tuning))
+    return rows, slack
+
+
+def _directions(e: Array) -> list[Array]:
+    """Plus and minus an orthonormal frame: outward, then from the least parallel world axis."""
+    first = e / np.linalg.norm(e)
+    seed = np.eye(3)[np.argmin(np.abs(first))]
+    second = seed - (seed @ first) * first
+    second /= np.linalg.norm(second)
+    third = np.cross(first, second)
+    return [sign * axis for axis in (first, second, third) for sign in (1.0, -1.0)]

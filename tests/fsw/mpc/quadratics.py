@@ -1,0 +1,20 @@
+"""A cost's quadratic model on its own."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fsw.barriers.soft_rows import TargetPoints
+from fsw.model.linearisation import Linearisation
+from fsw.model.prediction import Array
+from fsw.mpc.costs import Cost
+
+
+def quadratic(
+    cost: Cost, horizon: Linearisation, guess: Array, targets: TargetPoints
+) -> tuple[float, Array, Array]:
+    """Value, slope and full Hessian at the guess."""
+    hessian, gradient = np.zeros((len(guess), len(guess))), np.zeros(len(guess))
+    value = cost.add(horizon, targets, guess, hessian, gradient)
+    full = np.triu(hessian) + np.triu(hessian, 1).T
+    return value, full @ guess + gradient, full

@@ -1,0 +1,93 @@
+"""Every cost's quadratic model against finite differences of the cost itself."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from fsw.barriers.soft_rows import TargetPoints
+from fsw.model.airframe import AIRFRAME
+from fsw.model.linearisation import Linearisation
+from fsw.model.prediction import INPUTS, Array, LagModel, condense
+from fsw.mpc.costs import Cost, CostWeights, TrackingCost
+from fsw.mpc.soft_costs import SoftWallCost, SoftWeights, SphereCost, one_sided_reciprocal
+from fsw.signals import Wall, WorkspaceSphere
+from tests.fsw.mpc.quadratics import quadratic
+from tests.fsw.random_states import prediction_vector
+
+N = 5
+MODEL = condense(LagModel(), 0.1, N)
+WALLS = (Wall((-1.0, 0.0, 0.0), -1.0, 0.1), Wall((0.0, 0.6, 0.8), -1.5, 0.1))
+SPHERE = WorkspaceSphere((0.0, 0.0, -0.225), 0.075)
+
+COSTS = {
+    "tracking": TrackingCost(CostWeights()),
+    "printed": TrackingCost(CostWeights(relative_velocity=False)),
+    "soft walls": SoftWallCost(WALLS, SoftWeights()),
+    "outside the sphere": SphereCost(SPHERE, 5.0, 20.0, only_outside=True),
+    "centring": SphereCost(SPHERE, 100.0, 500.0, only_outside=False),
+}
+
+
+def horizon_of(start: Array, inputs: Array) -> Linearisation:
+    horizon = Linearisation(MODEL)
+    horizon.refill(AIRFRAME, start, inputs)
+    return horizon
+
+
+@pytest.mark.parametrize("cost", COSTS.values(), ids=COSTS.keys())
+def test_slope_is_the_finite_difference_and_the_model_is_convex(cost: Cost) -> None:
+    random = np.random.default_rng(1)
+    for _ in range(3):
+        start, guess = prediction_vector(random), random.uniform(-1.0, 1.0, INPUTS * N)
+        start[0:3] = 0.2 * start[0:3]
+        targets = TargetPoints(
+            start[0:3] + random.uniform(-0.3, 0.3, (N + 1, 3)),
+            random.uniform(-0.3, 0.3, (N + 1, 3)),
+        )
+        _, slope, hessian = quadratic(cost, horizon_of(start, guess), guess, targets)
+        for column in range(INPUTS * N):
+            step = np.zeros(INPUTS * N)
+            step[column] = 1e-6
+            above, below = (
+                quadratic(cost, horizon_of(start, u), u, targets)[0]
+                for u in (guess + step, guess - step)
+            )
+            assert slope[column] == pytest.approx((above - below) / 2e-6, rel=1e-4, abs=1e-4)
+        assert np.linalg.eigvalsh(hessian).min() > -1e-9 * np.abs(hessian).max()
+
+
+def test_terminal_node_weighs_five_times_as_table_two_says() -> None:
+    """A pure position error, the same at every node: n - 1 at 10 and one at 50."""
+    start, guess = np.zeros(19), np.zeros(INPUTS * N)
+    horizon = horizon_of(start, guess)
+    error = np.array([0.1, -0.2, 0.05])
+    tip = horizon.position[:, 2]
+    targets = TargetPoints(tip - error, np.zeros((N + 1, 3)))
+    value, _, _ = quadratic(TrackingCost(CostWeights()), horizon, guess, targets)
+    assert value == pytest.approx(float(error @ error) * (10.0 * (N - 1) + 50.0))
+
+
+@given(st.floats(-1.0, 3.0), st.floats(1e-3, 1.0), st.floats(1.0, 20.0))
+def test_soft_wall_always_pushes_away_and_more_when_closer(
+    gap: float, more: float, weight: float
+) -> None:
+    near, far = one_sided_reciprocal(gap, weight), one_sided_reciprocal(gap + more, weight)
+    assert near[0] > far[0] > 0.0
+    assert near[1] < far[1] < 0.0
+    assert near[2] > 0.0
+
+
+def test_sphere_cost_of_eq_30_is_silent_inside() -> None:
+    start, guess = np.zeros(19), np.zeros(INPUTS * N)
+    horizon = horizon_of(start, guess)
+    centre = TargetPoints(
+        horizon.position[:, 0] - np.array(SPHERE.centre_from_target) + 0.01,
+        np.zeros((N + 1, 3)),
+    )
+    inside, slope, _ = quadratic(COSTS["outside the sphere"], horizon, guess, centre)
+    assert inside == 0.0
+    assert not slope.any()
+    assert quadratic(COSTS["centring"], horizon, guess, centre)[0] > 0.0
