@@ -1,0 +1,91 @@
+"""The mixer against the rotors' geometry, written out here from the drawing of the vehicle."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from fsw.control.allocation import allocate
+from fsw.model.airframe import AIRFRAME
+from fsw.model.prediction import Array
+from fsw.signals import Vec4
+
+HOVER = 3.5 * 9.81
+TOP = 2.0 * 3.5 * 9.81 / 4.0
+YAW_LIMIT = 1.0
+
+# Where each rotor sits (x forward, y right) and the sign of its drag about +z (down).
+REAR, LEFT, FRONT, RIGHT = (-0.3, 0.0), (0.0, -0.3), (0.3, 0.0), (0.0, 0.3)
+PLACES = np.array([REAR, LEFT, FRONT, RIGHT])
+DRAG = 0.016 * np.array([1.0, -1.0, 1.0, -1.0])
+
+
+def wrench(rotors: Vec4) -> Array:
+    """Roll, pitch and yaw torque and total thrust of thrusts that act along -z."""
+    f = np.array(rotors)
+    force = np.zeros((4, 3))
+    force[:, 2] = -f
+    arm = np.column_stack((PLACES, np.zeros(4)))
+    torque = np.cross(arm, force).sum(axis=0)
+    return np.array([torque[0], torque[1], DRAG @ f, f.sum()])
+
+
+@given(st.floats(-1.5, 1.5), st.floats(-1.5, 1.5), st.floats(-0.06, 0.06), st.floats(15.0, 50.0))
+def test_an_achievable_wish_is_met_exactly(
+    roll: float, pitch: float, yaw: float, thrust: float
+) -> None:
+    rotors = allocate(AIRFRAME, (roll, pitch, yaw), thrust, YAW_LIMIT)
+    np.testing.assert_allclose(wrench(rotors), [roll, pitch, yaw, thrust], atol=1e-9)
+
+
+wide = st.floats(-1e4, 1e4)
+
+
+@given(wide, wide, wide, wide)
+def test_no_rotor_leaves_its_limits_whatever_is_asked(
+    roll: float, pitch: float, yaw: float, thrust: float
+) -> None:
+    for f in allocate(AIRFRAME, (roll, pitch, yaw), thrust, YAW_LIMIT):
+        assert -1e-9 <= f <= TOP + 1e-9
+
+
+@given(st.floats(-5.0, 5.0), st.floats(-5.0, 5.0), st.floats(-3.0, 3.0), st.floats(-100.0, 300.0))
+def test_roll_and_pitch_are_kept_when_thrust_and_yaw_must_give_way(
+    roll: float, pitch: float, yaw: float, thrust: float
+) -> None:
+    got = wrench(allocate(AIRFRAME, (roll, pitch, yaw), thrust, YAW_LIMIT))
+    np.testing.assert_allclose(got[:2], [roll, pitch], atol=1e-9)
+
+
+@given(st.floats(-3.0, 3.0), st.floats(10.0, 60.0))
+def test_yaw_spends_no_more_than_it_may(yaw: float, thrust: float) -> None:
+    assume(abs(yaw) > 0.07)
+    got = wrench(allocate(AIRFRAME, (0.0, 0.0, yaw), thrust, YAW_LIMIT))
+    assert abs(got[2]) <= 4.0 * 0.016 * YAW_LIMIT + 1e-9
+    assert got[2] * yaw > 0.0
+    assert got[3] == pytest.approx(thrust)
+
+
+@pytest.mark.parametrize(
+    ("torque", "stronger", "weaker"),
+    [
+        ((0.0, 1.0, 0.0), 2, 0),  # nose up: front over rear
+        ((0.0, -1.0, 0.0), 0, 2),
+        ((1.0, 0.0, 0.0), 1, 3),  # right side down: left over right
+        ((-1.0, 0.0, 0.0), 3, 1),
+        ((0.0, 0.0, 0.05), 0, 1),  # clockwise from above: rear and front over left and right
+        ((0.0, 0.0, -0.05), 1, 0),
+    ],
+)
+def test_sign_of_every_rotor(
+    torque: tuple[float, float, float], stronger: int, weaker: int
+) -> None:
+    rotors = allocate(AIRFRAME, torque, HOVER, YAW_LIMIT)
+    assert rotors[stronger] > HOVER / 4.0 > rotors[weaker]
+
+
+def test_hover_is_shared_equally() -> None:
+    hover = allocate(AIRFRAME, (0.0, 0.0, 0.0), HOVER, YAW_LIMIT)
+    assert hover == pytest.approx((HOVER / 4.0,) * 4)

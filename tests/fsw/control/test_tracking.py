@@ -1,0 +1,157 @@
+"""The loop that follows the plan: feed-forward, signs, limits, observer."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from fsw.control.inner_tuning import TrackingTuning, tracking_gains
+from fsw.control.tracking import TrackingLaw, follow_plan, observe_disturbance, snap_command
+from fsw.model.airframe import AIRFRAME, GRAVITY
+from fsw.model.prediction import LagModel
+from fsw.model.rotors import MotionState
+from fsw.signals import PlanInput, PredictionState, StateEstimate, Vec3
+from tests.fsw.random_states import estimate_of, vec3
+
+LAG = LagModel()
+TUNING = TrackingTuning()
+LAW = TrackingLaw(AIRFRAME, LAG, TUNING, tracking_gains(TUNING, AIRFRAME.rotor_lag, 0.002))
+WEIGHT = AIRFRAME.mass * GRAVITY
+CALM: Vec3 = (0.0, 0.0, 0.0)
+REST_INPUT = PlanInput(CALM, 0.0, (0.0, 0.0))
+PLAN = PredictionState(
+    (0.0, 0.0, -1.0), CALM, CALM, (0.0, 0.0), (0.0, 0.0), 0.0, 0.0, (0.0, 0.0), (0.0, 0.0)
+)
+
+
+def on_plan(rotation: Rotation, plan: PredictionState) -> tuple[StateEstimate, MotionState]:
+    """A vehicle that is exactly where the plan wants it."""
+    estimate = estimate_of(rotation, p_WB=plan.p, v_WB=plan.v)
+    return estimate, MotionState(WEIGHT, plan.a, plan.j, plan.s)
+
+
+def snap_of(estimate: StateEstimate, wd: tuple[float, float]) -> np.ndarray:
+    """Horizontal snap that angular accelerations about body x and y make at hover thrust."""
+    turn = np.reshape(estimate.R_WB, (3, 3))
+    b3_second = np.cross(turn @ np.array([wd[0], wd[1], 0.0]), turn[:, 2])
+    return np.asarray(-GRAVITY * b3_second[:2])
+
+
+@pytest.mark.parametrize("yaw", [0.0, 1.0, math.pi, -2.0])
+@pytest.mark.parametrize("tilt", [0.0, 0.3])
+def test_without_error_the_plans_own_snap_is_flown(yaw: float, tilt: float) -> None:
+    rotation = Rotation.from_euler("ZYX", [yaw, tilt, -tilt])
+    plan = replace(PLAN, a=(0.5, -0.8, 0.2), j=(1.0, -2.0), s=(10.0, 20.0))
+    u = PlanInput((1.0, -1.0, 0.3), 0.0, (0.0, 0.0))
+    estimate, motion = on_plan(rotation, plan)
+    wd, thrust = follow_plan(LAW, estimate, motion, CALM, plan, u)
+    expected = [LAG.kp * (u.a[k] - plan.a[k]) - LAG.kd * plan.j[k] for k in (0, 1)]
+    np.testing.assert_allclose(snap_of(estimate, wd), expected, atol=1e-9)
+    upright = estimate.R_WB[8]
+    assert thrust * upright == pytest.approx(AIRFRAME.mass * (GRAVITY - u.a[2]))
+
+
+@pytest.mark.parametrize("yaw", [0.0, math.pi / 2.0, math.pi, -math.pi / 2.0])
+@pytest.mark.parametrize("axis", [0, 1])
+@pytest.mark.parametrize("quantity", ["p", "v", "a", "j", "s"])
+def test_the_vehicle_is_snapped_towards_the_plan(yaw: float, axis: int, quantity: str) -> None:
+    """Each error by itself, at every heading: the snap points the error's way."""
+    size = {"p": 0.01, "v": 0.05, "a": 0.1, "j": 0.5, "s": 20.0}[quantity]
+    error = [0.0] * len(getattr(PLAN, quantity))
+    error[axis] = size
+    start = getattr(PLAN, quantity)
+    ahead = replace(PLAN, **{quantity: tuple(a + b for a, b in zip(start, error, strict=True))})
+    estimate, motion = on_plan(Rotation.from_euler("Z", yaw), PLAN)
+    # The plan's own feed-forward depends on a and j; u follows so that it stays the same.
+    u = PlanInput(
+        (ahead.a[0] + LAG.kd / LAG.kp * ahead.j[0], ahead.a[1] + LAG.kd / LAG.kp * ahead.j[1], 0.0),
+        0.0,
+        (0.0, 0.0),
+    )
+    wd, _ = follow_plan(LAW, estimate, motion, CALM, ahead, u)
+    snap = snap_of(estimate, wd)
+    assert snap[axis] > 1.0
+    assert abs(snap[1 - axis]) < 1e-9
+
+
+def test_a_disturbance_is_leaned_against() -> None:
+    estimate, motion = on_plan(Rotation.identity(), PLAN)
+    wd, _ = follow_plan(LAW, estimate, motion, (0.5, 0.0, 0.0), PLAN, REST_INPUT)
+    assert snap_of(estimate, wd)[0] < -1.0
+    assert wd[1] > 0.0  # nose up: thrust leans back
+
+
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_height_errors_change_thrust_the_right_way(sign: float) -> None:
+    """Plan below the vehicle (z down): less thrust; above: more."""
+    estimate, motion = on_plan(Rotation.identity(), PLAN)
+    for plan in (
+        replace(PLAN, p=(0.0, 0.0, -1.0 + sign * 0.02)),
+        replace(PLAN, v=(0.0, 0.0, sign * 0.1)),
+        replace(PLAN, a=(0.0, 0.0, sign * 0.5)),
+    ):
+        _, thrust = follow_plan(LAW, estimate, motion, CALM, plan, REST_INPUT)
+        assert sign * (thrust - WEIGHT) < -0.5
+
+
+errors = st.floats(-1e3, 1e3)
+
+
+@given(errors, errors, st.floats(-10.0, 10.0))
+def test_far_from_the_plan_acceleration_and_jerk_wishes_are_limited(
+    e_p: float, e_v: float, d: float
+) -> None:
+    """At the vehicle's own a = j = 0 the wish is K4 times a jerk of at most its limit."""
+    wanted = snap_command(LAW, e_p, e_v, 0.0, d, 0.0, 0.0, 0.0, 0.0, 0.0)
+    k4 = LAW.gains.k[3]
+    assert abs(wanted) <= k4 * TUNING.jerk_limit + 1e-9
+    stoppable = math.sqrt(120.0 * (TUNING.acceleration_limit + 0.15))
+    assert abs(wanted) <= k4 * stoppable + 1e-9
+
+
+@given(errors)
+def test_a_vehicle_at_the_acceleration_limit_is_not_asked_for_more(e_p: float) -> None:
+    side = math.copysign(1.0, e_p)
+    at_limit = side * TUNING.acceleration_limit
+    assert side * snap_command(LAW, e_p, 0.0, 0.0, 0.0, at_limit, 0.0, 0.0, 0.0, 0.0) <= 1e-9
+
+
+def test_beyond_the_position_limit_more_error_asks_for_nothing_more() -> None:
+    def at(error: float) -> float:
+        return snap_command(LAW, error, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+    assert at(TUNING.position_error_limit) == at(10.0)
+
+
+@given(st.tuples(*[st.floats(-3.0, 3.0)] * 3))
+def test_observer_finds_a_constant_disturbance(d: Vec3) -> None:
+    dt, v, v_hat, a = 0.002, np.zeros(3), (0.0, 0.0, 0.0), np.array([0.3, -0.2, 0.1])
+    found: Vec3 = (0.0, 0.0, 0.0)
+    for _ in range(100):
+        found, v_hat = observe_disturbance(v_hat, vec3(v), vec3(a), 100.0, dt)
+        v = v + dt * (a + np.array(d))
+    np.testing.assert_allclose(found, d, atol=0.01)
+
+
+def test_tracking_gains_stabilise_the_chain_they_are_designed_for() -> None:
+    """The sampled loop of both chains, closed, has every pole inside the unit circle."""
+    dt, lag = 0.002, AIRFRAME.rotor_lag
+    steps = 10_000
+    p, v, a, j, s = 0.05, 0.0, 0.0, 0.0, 0.0
+    for _ in range(steps):
+        w = -float(np.dot(LAW.gains.k, (p, v, a, j, s)))
+        p, v, a, j = p + dt * v, v + dt * a, a + dt * j, j + dt * s
+        s += dt * (w - s) / lag
+    assert abs(p) < 1e-6
+    z, v, a = 0.05, 0.0, 0.0
+    for _ in range(steps):
+        u = -float(np.dot(LAW.gains.k_vertical, (z, v, a)))
+        z, v = z + dt * v, v + dt * a
+        a += dt * (u - a) / lag
+    assert abs(z) < 1e-6

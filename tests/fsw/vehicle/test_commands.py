@@ -1,0 +1,157 @@
+"""Every command is accepted with its event or refused with a reason."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from fsw.signals import CommandRequest, Mode
+from fsw.vehicle.commands import (
+    ACCEPTED,
+    DENIED,
+    TEMPORARILY_REJECTED,
+    UNSUPPORTED,
+    Decision,
+    Situation,
+    decide,
+)
+from fsw.vehicle.modes import Event, next_mode
+
+NAN = math.nan
+ARM, TAKEOFF, LAND, SET_MODE, SHUTDOWN = 400, 22, 21, 176, 246
+
+STANDING = Situation(Mode.DISARMED, landed=True, estimate_valid=True, targets_ahead=False)
+IDLING = replace(STANDING, mode=Mode.HOLD)
+HOLDING = Situation(Mode.HOLD, landed=False, estimate_valid=True, targets_ahead=True)
+
+
+def ask(situation: Situation, command: int, *given_params: float) -> Decision:
+    """Decide on a command whose unused parameters are NaN, as MAVLink demands."""
+    p = (*given_params, *[NAN] * (7 - len(given_params)))
+    params = (p[0], p[1], p[2], p[3], p[4], p[5], p[6])
+    return decide(CommandRequest(command, params, 255, 190), situation)
+
+
+@pytest.mark.parametrize(
+    ("situation", "command", "params", "event"),
+    [
+        (STANDING, ARM, (1.0,), Event.ARM),
+        (IDLING, ARM, (0.0,), Event.DISARM),
+        (IDLING, TAKEOFF, (), Event.TAKE_OFF),
+        (IDLING, SET_MODE, (1.0, 4.0, 2.0), Event.TAKE_OFF),
+        (HOLDING, LAND, (), Event.LAND),
+        (HOLDING, SET_MODE, (1.0, 4.0, 6.0), Event.LAND),
+        (HOLDING, SET_MODE, (1.0, 6.0, 0.0), Event.FOLLOW),
+        (HOLDING, SET_MODE, (1.0, 6.0), Event.FOLLOW),
+        (replace(HOLDING, mode=Mode.TRAJECTORY), SET_MODE, (1.0, 4.0, 3.0), Event.HOLD),
+        (HOLDING, ARM, (0.0, 21196.0), Event.DISARM),
+    ],
+)
+def test_a_command_in_order_causes_its_event_whatever_unused_parameters_hold(
+    situation: Situation, command: int, params: tuple[float, ...], event: Event
+) -> None:
+    assert ask(situation, command, *params) == Decision(ACCEPTED, event)
+
+
+@pytest.mark.parametrize(
+    ("situation", "command", "params", "word"),
+    [
+        (replace(STANDING, estimate_valid=False), ARM, (1.0,), "estimate"),
+        (replace(STANDING, mode=Mode.FAULT), ARM, (1.0,), "fault"),
+        (HOLDING, ARM, (0.0,), "air"),
+        (HOLDING, TAKEOFF, (), "air"),
+        (STANDING, TAKEOFF, (), "disarmed"),
+        (STANDING, LAND, (), "disarmed"),
+        (IDLING, SET_MODE, (1.0, 6.0, 0.0), "ground"),
+        (replace(HOLDING, targets_ahead=False), SET_MODE, (1.0, 6.0, 0.0), "END_EFFECTOR_TARGET"),
+        (replace(HOLDING, mode=Mode.LAND), SET_MODE, (1.0, 6.0, 0.0), "land"),
+    ],
+)
+def test_a_command_out_of_place_is_refused_with_a_reason(
+    situation: Situation, command: int, params: tuple[float, ...], word: str
+) -> None:
+    decision = ask(situation, command, *params)
+    assert (decision.result, decision.event) == (TEMPORARILY_REJECTED, None)
+    assert word in decision.reason
+
+
+@pytest.mark.parametrize(
+    ("command", "params"),
+    [
+        (ARM, (NAN,)),
+        (ARM, (math.inf,)),
+        (ARM, (0.5,)),
+        (ARM, (2.0,)),
+        (SET_MODE, (1.0, NAN, 3.0)),
+        (SET_MODE, (1.0, math.inf, 3.0)),
+        (SET_MODE, (1.0, 4.0, NAN)),
+        (SET_MODE, (1.0, 4.0, 99.0)),
+        (SET_MODE, (1.0, 1.0, 0.0)),
+        (SET_MODE, (1.0, 1e30, 1e30)),
+    ],
+)
+def test_a_parameter_that_means_nothing_is_denied(command: int, params: tuple[float, ...]) -> None:
+    decision = ask(HOLDING, command, *params)
+    assert (decision.result, decision.event) == (DENIED, None)
+    assert decision.reason
+
+
+@pytest.mark.parametrize("command", [0, 16, 2500, 65535])
+def test_an_unknown_command_is_unsupported(command: int) -> None:
+    decision = ask(HOLDING, command)
+    assert (decision.result, decision.event) == (UNSUPPORTED, None)
+    assert str(command) in decision.reason
+
+
+@pytest.mark.parametrize(
+    ("situation", "command", "params"),
+    [
+        (HOLDING, ARM, (1.0,)),
+        (STANDING, ARM, (0.0,)),
+        (HOLDING, SET_MODE, (1.0, 4.0, 3.0)),
+        (replace(HOLDING, mode=Mode.TRAJECTORY), SET_MODE, (1.0, 6.0, 0.0)),
+        (replace(HOLDING, mode=Mode.LAND), LAND, ()),
+    ],
+)
+def test_asking_again_for_what_is_so_is_accepted_and_changes_nothing(
+    situation: Situation, command: int, params: tuple[float, ...]
+) -> None:
+    assert ask(situation, command, *params) == Decision(ACCEPTED)
+
+
+def test_shutdown_is_accepted_without_an_event() -> None:
+    assert ask(STANDING, SHUTDOWN, 2.0) == Decision(ACCEPTED)
+
+
+situations = st.builds(
+    Situation,
+    mode=st.sampled_from(Mode),
+    landed=st.booleans(),
+    estimate_valid=st.booleans(),
+    targets_ahead=st.booleans(),
+)
+params = st.tuples(*[st.floats(allow_nan=True, allow_infinity=True)] * 7)
+
+
+@given(st.sampled_from([ARM, TAKEOFF, LAND, SET_MODE, SHUTDOWN, 1, 999]), params, situations)
+def test_whatever_arrives_is_answered_and_an_event_is_always_a_transition(
+    command: int,
+    values: tuple[float, float, float, float, float, float, float],
+    situation: Situation,
+) -> None:
+    decision = decide(CommandRequest(command, values, 1, 1), situation)
+    if decision.event is not None:
+        assert decision.result == ACCEPTED
+        assert next_mode(situation.mode, decision.event) is not None
+    if decision.result != ACCEPTED:
+        assert decision.reason
+
+
+@given(situations)
+def test_a_vehicle_in_the_air_is_not_disarmed_unless_forced(situation: Situation) -> None:
+    decision = ask(replace(situation, landed=False), ARM, 0.0)
+    assert decision.event is None

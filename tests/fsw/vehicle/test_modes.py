@@ -1,0 +1,55 @@
+"""The transition table as a whole."""
+
+from __future__ import annotations
+
+import itertools
+
+import pytest
+
+from fsw.signals import Mode
+from fsw.vehicle.modes import TRANSITIONS, Event, next_mode
+
+FLYING = [Mode.TAKEOFF, Mode.HOLD, Mode.TRAJECTORY, Mode.LAND]
+
+
+@pytest.mark.parametrize(("mode", "event"), list(itertools.product(Mode, Event)))
+def test_every_pair_is_a_transition_or_refused(mode: Mode, event: Event) -> None:
+    after = next_mode(mode, event)
+    assert after is None or isinstance(after, Mode)
+    assert (after is not None) == ((mode, event) in TRANSITIONS)
+
+
+@pytest.mark.parametrize("mode", FLYING)
+def test_landing_terminating_disarming_and_holding_are_always_possible_in_flight(
+    mode: Mode,
+) -> None:
+    assert next_mode(mode, Event.LAND) is Mode.LAND
+    assert next_mode(mode, Event.HOLD) is Mode.HOLD
+    assert next_mode(mode, Event.DISARM) is Mode.DISARMED
+    assert next_mode(mode, Event.TERMINATE) is Mode.FAULT
+
+
+@pytest.mark.parametrize("event", Event)
+def test_nothing_leaves_a_terminated_vehicle(event: Event) -> None:
+    assert next_mode(Mode.FAULT, event) is None
+
+
+def test_a_disarmed_vehicle_can_only_be_armed_or_terminated() -> None:
+    possible = {event for event in Event if next_mode(Mode.DISARMED, event) is not None}
+    assert possible == {Event.ARM, Event.TERMINATE}
+
+
+def test_a_trajectory_begins_only_from_hold() -> None:
+    before = {mode for mode in Mode if next_mode(mode, Event.FOLLOW) is not None}
+    assert before == {Mode.HOLD}
+
+
+def test_every_mode_can_be_reached_from_disarmed() -> None:
+    reached = {Mode.DISARMED}
+    for _ in Mode:
+        reached |= {after for (before, _), after in TRANSITIONS.items() if before in reached}
+    assert reached == set(Mode)
+
+
+def test_every_event_means_something_somewhere() -> None:
+    assert {event for _, event in TRANSITIONS} == set(Event)
