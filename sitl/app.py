@@ -24,7 +24,7 @@ from sitl.scenario import Scenario
 from sitl.scenario_file import ScenarioError, load_scenario
 from sitl.simulation import START_US, STEP_US, Controls, Simulation
 from sitl.trajectory import TrajectoryPoint
-from sitl.verdict import TruthResult
+from sitl.verdict import EndKind, TruthResult
 
 COMPLETED, NOT_COMPLETED, COULD_NOT_START = 0, 1, 2  # exit codes
 
@@ -116,7 +116,9 @@ def _fly(
     _settle(options.realtime, told)
     exchange = _exchange(options, endpoint, len(simulation.vehicle.links), stop)
     timing = fly(simulation, plan, exchange, encoder, stop, progress)
-    shut_down(endpoint, encoder)
+    stopped = simulation.ended is not None and simulation.ended.kind is EndKind.STOPPED
+    # A vehicle that has just been silent for two seconds is not worth another one.
+    shut_down(endpoint, encoder, tries=1 if stopped else 4)
     result = simulation.result()
     written = _as_json(options, simulation.scenario, result, timing, exchange)
     _write(options, written)

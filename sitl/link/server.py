@@ -23,7 +23,6 @@ from sitl.verdict import EndKind
 _HEARTBEAT_STEPS: Final = 500  # 1 Hz
 _PROGRESS_S: Final = 0.1  # wall time between two reports
 _PROGRESS_STEPS: Final = 25  # how often the wall clock is looked at
-_SHUTDOWN_TRIES: Final = 4
 _SILENT: Final = math.nan
 _SHUTDOWN: Final = SendCommand(
     CMD_REBOOT_SHUTDOWN, (0.0, 2.0, _SILENT, _SILENT, _SILENT, _SILENT, _SILENT)
@@ -99,9 +98,9 @@ def fly(
     return RunTiming(simulation.step, wall_s, simulation.time_s / max(wall_s, 1e-9))
 
 
-def shut_down(endpoint: UdpEndpoint, encoder: StepEncoder) -> bool:
+def shut_down(endpoint: UdpEndpoint, encoder: StepEncoder, tries: int) -> bool:
     """Tell the vehicle that the run is over; True once it has acknowledged."""
-    for _ in range(_SHUTDOWN_TRIES):
+    for _ in range(tries):
         endpoint.send(encoder.command(_SHUTDOWN))
         until_s = time.perf_counter() + 0.25
         while time.perf_counter() < until_s:

@@ -59,7 +59,7 @@ class Flight:
     state: PilotState = field(init=False)
     said: list[tuple[int, PilotMessage]] = field(default_factory=list)
     t_us: int = START_US
-    heard: Heard = Heard()
+    heard: Heard = field(default_factory=Heard)
 
     def __post_init__(self) -> None:
         self.state = PilotState(self.plan.first_phase)

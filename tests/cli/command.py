@@ -1,0 +1,83 @@
+"""``pandion`` as a process."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+PANDION = [sys.executable, "-m", "pandion"]
+
+
+def pandion(*arguments: str, cwd: Path, timeout: float = 90.0) -> subprocess.CompletedProcess[str]:
+    """Run a command to its end; the repository is importable wherever it runs."""
+    return subprocess.run(
+        [*PANDION, *arguments],
+        cwd=cwd,
+        env=environment(),
+        capture_output=True,
+        text=True,
+        timeout=timeout,
+        check=False,
+    )
+
+
+def environment() -> dict[str, str]:
+    """The environment with this source tree first, whether or not it is installed."""
+    root = str(Path(__file__).parents[2])
+    return {**os.environ, "PYTHONPATH": os.pathsep.join([root, os.environ.get("PYTHONPATH", "")])}
+
+
+def start(*arguments: str, cwd: Path) -> subprocess.Popen[str]:
+    """Start a command in a process group of its own."""
+    return subprocess.Popen(
+        [*PANDION, *arguments],
+        cwd=cwd,
+        env=environment(),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        start_new_session=True,
+    )
+
+
+def read_until(process: subprocess.Popen[str], word: str) -> str:
+    """Read its output up to a line that contains a word."""
+    assert process.stdout is not None
+    seen = ""
+    for line in process.stdout:
+        seen += line
+        if word in line:
+            return seen
+    raise AssertionError(f"{word!r} is not in {seen!r}")
+
+
+def group_is_empty(leader: int, patience_s: float = 2.0) -> bool:
+    """True once no process of the leader's group is left."""
+    until = time.monotonic() + patience_s
+    while time.monotonic() < until:
+        try:
+            os.killpg(leader, 0)
+        except ProcessLookupError:
+            return True
+        time.sleep(0.02)
+    return False
+
+
+def clean_up(process: subprocess.Popen[str]) -> None:
+    """End a group whatever state it is in."""
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+    assert process.stdout is not None
+    process.stdout.close()
+
+
+def one_sentence(text: str) -> bool:
+    """True for exactly one line that is not a traceback."""
+    lines = text.strip().splitlines()
+    return len(lines) == 1 and "Traceback" not in text

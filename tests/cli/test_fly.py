@@ -1,0 +1,215 @@
+"""`pandion fly` from the outside: the result, the telemetry, the log, and every way to end it."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import threading
+import time
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pytest
+from pymavlink import mavutil
+
+from fsw.link.streams import STREAMS
+from messages.frames import Frame, split
+from tests.cli.command import clean_up, group_is_empty, pandion, read_until, start
+from tests.link.halves import free_port
+
+KEYS = [
+    "scenario", "controller", "seed", "duration_s", "completed", "end_reason",
+    "tracking_error_rms_m", "control_effort", "control_smoothness", "margins_m", "min_margin_m",
+    "mpc", "inner", "real_time_factor", "logs",
+]  # fmt: skip
+MPC_KEYS = [
+    "horizon", "rate_hz", "sqp_iterations", "p50_us", "p99_us", "max_us", "missed_deadlines",
+    "fallbacks", "status",
+]  # fmt: skip
+
+
+class Listener:
+    """A ground station that only listens."""
+
+    def __init__(self) -> None:
+        self.frames: list[Frame] = []
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 22)
+        self._socket.bind(("127.0.0.1", 0))
+        self._socket.settimeout(0.1)
+        self.address = f"udp:127.0.0.1:{self._socket.getsockname()[1]}"
+        self._closing = threading.Event()
+        self._thread = threading.Thread(target=self._listen, daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        self._closing.set()
+        self._thread.join()
+        self._socket.close()
+
+    def _listen(self) -> None:
+        while not self._closing.is_set():
+            try:
+                self.frames += split(self._socket.recv(4096))
+            except TimeoutError:
+                continue
+
+
+@dataclass
+class Flight:
+    """A flight that has ended."""
+
+    done: subprocess.CompletedProcess[str]
+    result: dict[str, Any]
+    frames: list[Frame]
+    directory: Path
+    files: list[str] = field(default_factory=list)
+
+
+def flown(cwd: Path, *arguments: str) -> Flight:
+    listener = Listener()
+    done = pandion("fly", *arguments, "--gcs", listener.address, "--json", "-", cwd=cwd)
+    listener.close()
+    assert done.returncode == 0, done.stderr
+    (directory,) = (cwd / "runs").iterdir()
+    files = sorted(path.name for path in directory.iterdir())
+    return Flight(done, json.loads(done.stdout), listener.frames, directory, files)
+
+
+@pytest.fixture(scope="module")
+def lockstep(tmp_path_factory: pytest.TempPathFactory) -> Flight:
+    arguments = ("walls", "--seed", "2", "--duration", "6")
+    return flown(tmp_path_factory.mktemp("lockstep"), *arguments)
+
+
+@pytest.fixture(scope="module")
+def realtime(tmp_path_factory: pytest.TempPathFactory) -> Flight:
+    arguments = ("workspace-calm", "--duration", "3", "--realtime")
+    return flown(tmp_path_factory.mktemp("realtime"), *arguments)
+
+
+def test_the_result_has_exactly_the_promised_keys(lockstep: Flight) -> None:
+    result = lockstep.result
+    assert list(result) == KEYS
+    assert list(result["mpc"]) == MPC_KEYS
+    assert list(result["inner"]) == ["rate_hz", "p50_us", "p99_us", "late_share"]
+    assert (result["scenario"], result["seed"], result["controller"]) == ("walls", 2, "blf")
+    assert result["completed"] is True
+    assert result["duration_s"] == pytest.approx(6.0)
+    assert result["min_margin_m"] == min(result["margins_m"].values())
+    assert result["mpc"]["horizon"] == 5
+    assert sum(result["mpc"]["status"].values()) == pytest.approx(60, abs=2)
+    assert result["control_effort"]["sum"] > 0.0
+
+
+def test_the_verdict_is_told_and_the_files_are_there(lockstep: Flight) -> None:
+    told = lockstep.done.stderr
+    assert "PASS" in told
+    assert "QGroundControl connects on UDP" in told
+    assert "minimum margin" in told
+    assert lockstep.directory.name == "walls-seed2-1"
+    assert {"flight.tlog", "fsw.json", "sitl.json", "result.json"} <= set(lockstep.files)
+    assert json.loads((lockstep.directory / "result.json").read_text()) == lockstep.result
+
+
+@pytest.mark.parametrize("mode", ["lockstep", "realtime"])
+def test_a_listener_hears_every_stream_at_its_rate(
+    mode: str, request: pytest.FixtureRequest
+) -> None:
+    flight: Flight = request.getfixturevalue(mode)
+    seconds = flight.result["duration_s"]
+    counts = Counter((frame.component_id, frame.message_id) for frame in flight.frames)
+    wanted: Counter[tuple[int, int]] = Counter()
+    for stream in STREAMS:
+        wanted[(stream.component, stream.message_id)] += stream.rate_hz
+    for key, rate in wanted.items():
+        # Slow streams may miss or gain one at the ends, and a mode change adds a heartbeat.
+        slack = 3 if rate <= 2 else 1
+        assert counts[key] == pytest.approx(rate * seconds, rel=0.10, abs=slack), key
+
+
+def test_the_tlog_reads_with_mavutil(lockstep: Flight) -> None:
+    reader = mavutil.mavlink_connection(str(lockstep.directory / "flight.tlog"))
+    counts: Counter[int] = Counter()
+    while (message := reader.recv_match()) is not None:
+        counts[message.get_msgId()] += 1
+    assert counts[30] == pytest.approx(300, rel=0.02)  # ATTITUDE, 50 Hz
+    assert counts[0] >= 6
+
+
+def test_real_time_is_real_time(realtime: Flight) -> None:
+    assert realtime.result["real_time_factor"] == pytest.approx(1.0, rel=0.02)
+    assert realtime.result["completed"] is True
+
+
+@pytest.fixture
+def flying(tmp_path: Path) -> Iterator[subprocess.Popen[str]]:
+    process = start(
+        "fly", "walls-calm", "--speed", "1", "--gcs", f"udp:127.0.0.1:{free_port()}",
+        "--duration", "5", "--out", str(tmp_path / "out"), cwd=tmp_path,
+    )  # fmt: skip
+    read_until(process, "flying")
+    yield process
+    clean_up(process)
+
+
+@pytest.mark.parametrize("ending", ["one SIGINT", "SIGINT to all", "SIGTERM"])
+def test_a_signal_ends_everything_within_two_seconds_with_a_verdict(
+    ending: str, flying: subprocess.Popen[str], tmp_path: Path
+) -> None:
+    begin = time.monotonic()
+    if ending == "SIGINT to all":  # what a terminal does on Ctrl-C
+        os.killpg(flying.pid, signal.SIGINT)
+    else:
+        flying.send_signal(signal.SIGTERM if ending == "SIGTERM" else signal.SIGINT)
+    told, _ = flying.communicate(timeout=10)
+    assert time.monotonic() - begin < 2.0
+    assert flying.returncode == 1
+    assert "FAIL" in told
+    assert "interrupted at step" in told
+    assert "Traceback" not in told
+    assert group_is_empty(flying.pid)
+    result = json.loads((tmp_path / "out" / "result.json").read_text())
+    assert result["completed"] is False
+    assert result["duration_s"] > 0.0
+    assert result["mpc"]["p50_us"] > 0.0
+
+
+def test_children_die_with_a_killed_parent(flying: subprocess.Popen[str]) -> None:
+    flying.kill()
+    flying.wait()
+    assert group_is_empty(flying.pid)
+
+
+def test_a_crash_of_the_flight_software_is_one_sentence(
+    flying: subprocess.Popen[str],
+) -> None:
+    (fsw,) = [pid for pid in group_members(flying.pid) if b"fsw" in command_line(pid)]
+    os.kill(fsw, signal.SIGKILL)
+    told, _ = flying.communicate(timeout=20)
+    assert flying.returncode == 1
+    assert "fsw ended with code -9" in told
+    assert "Traceback" not in told
+    assert group_is_empty(flying.pid)
+
+
+def group_members(leader: int) -> list[int]:
+    members = []
+    for entry in Path("/proc").iterdir():
+        if entry.name.isdecimal():
+            try:
+                if os.getpgid(int(entry.name)) == leader:
+                    members.append(int(entry.name))
+            except ProcessLookupError:
+                continue
+    return members
+
+
+def command_line(pid: int) -> list[bytes]:
+    return Path(f"/proc/{pid}/cmdline").read_bytes().split(b"\0")

@@ -1,0 +1,139 @@
+"""What cannot start says why in one sentence, with exit code 2, and leaves nothing behind."""
+
+from __future__ import annotations
+
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.cli.command import environment, one_sentence, pandion
+
+
+@pytest.fixture
+def taken_port() -> Iterator[int]:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
+        taken.bind(("127.0.0.1", 0))
+        yield int(taken.getsockname()[1])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["flyy"], ["unknown verb flyy", "fly"]),
+        (["--versio"], ["unknown option", "--version"]),
+        (["fly", "wals"], ["unknown scenario", "walls"]),
+        (["fly", "walls", "--sed", "3"], ["unknown option --sed", "--seed"]),
+        (["fly", "walls", "--seed", "-1"], ["--seed", "-1"]),
+        (["fly", "walls", "--seed", "1.5"], ["--seed", "1.5"]),
+        (["fly", "walls", "--duration", "nan"], ["--duration", "nan"]),
+        (["fly", "walls", "--duration", "0"], ["--duration", "0"]),
+        (["fly", "walls", "--speed", "nan"], ["--speed", "nan"]),
+        (["fly", "walls", "--realtime", "--speed", "3"], ["--realtime", "--speed"]),
+        (["fly", "walls", "--realtime", "--lockstep"], ["--lockstep", "--realtime"]),
+        (["fly", "walls", "--gcs", "localhost"], ["localhost", "udp:HOST:PORT"]),
+        (["fly", "walls", "--gcs", "udp:127.0.0.1:70000"], ["70000"]),
+        (["fly", "walls", "--gcs", "udp:127.0.0.1:14550", "more"], ["more"]),
+        (["sitl", "wals"], ["unknown scenario", "walls"]),
+        (["sitl", "--listen", "tcp:1"], ["tcp:1", "udp:HOST:PORT"]),
+        (["sitl", "--listen", "udp:192.0.2.1:4560"], ["192.0.2.1"]),
+        (["fsw", "--sim", "nowhere"], ["nowhere", "udp:HOST:PORT"]),
+        (["fsw", "--sim", "udp:no.such.host.invalid:4560"], ["no.such.host.invalid"]),
+    ],
+)
+def test_a_wrong_word_is_named_with_what_was_meant(
+    arguments: list[str], words: list[str], tmp_path: Path
+) -> None:
+    done = pandion(*arguments, cwd=tmp_path)
+    assert done.returncode == 2
+    assert one_sentence(done.stderr), done.stderr
+    assert done.stdout == ""
+    for word in words:
+        assert word in done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_unknown_controllers_are_refused_with_the_known_ones(tmp_path: Path) -> None:
+    done = pandion("fly", "walls", "--controller", "bfl", "--json", "-", cwd=tmp_path)
+    assert done.returncode == 2
+    assert done.stdout == ""
+    assert "unknown controller 'bfl'" in done.stderr
+    assert "blf" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_a_port_in_use_is_named(taken_port: int, tmp_path: Path) -> None:
+    done = pandion("sitl", "--listen", f"udp:127.0.0.1:{taken_port}", cwd=tmp_path)
+    assert done.returncode == 2
+    assert one_sentence(done.stderr)
+    assert f"udp:127.0.0.1:{taken_port}" in done.stderr
+    assert "in use" in done.stderr
+
+
+def test_a_peer_that_never_answers_ends_the_wait(taken_port: int, tmp_path: Path) -> None:
+    sitl = subprocess.Popen(
+        [sys.executable, "-m", "pandion", "sitl", "--listen", "udp:127.0.0.1:0", "--wait", "0.5"],
+        cwd=tmp_path, env=environment(), stderr=subprocess.PIPE, stdout=subprocess.DEVNULL,
+        text=True,
+    )  # fmt: skip
+    fsw = pandion("fsw", "--sim", f"udp:127.0.0.1:{taken_port}", "--wait", "0.5", cwd=tmp_path)
+    assert fsw.returncode == 2
+    assert f"no simulator answered at udp:127.0.0.1:{taken_port} within 0.5 s" in fsw.stderr
+    _, said = sitl.communicate(timeout=60)
+    assert sitl.returncode == 2
+    assert "no flight software" in said
+    assert one_sentence(said)
+
+
+def test_a_scenario_that_starts_outside_its_safe_set_cannot_start(tmp_path: Path) -> None:
+    scenario = tmp_path / "inside-a-wall.toml"
+    scenario.write_text(
+        """
+        duration_s = 5.0
+        [start]
+        kind = "airborne"
+        [pilot]
+        plan = "trajectory"
+        [trajectory]
+        kind = "hold"
+        position_m = [0.0, 0.0, -1.0]
+        [[walls]]
+        name = "front"
+        normal = [-1.0, 0.0, 0.0]
+        offset_m = 0.0
+        clearance_m = 0.1
+        """
+    )
+    done = pandion("fly", str(scenario), cwd=tmp_path)
+    assert done.returncode == 2
+    assert one_sentence(done.stderr)
+    assert "front" in done.stderr
+    assert "safe set" in done.stderr
+
+
+def test_a_directory_with_a_flight_is_not_written_over(tmp_path: Path) -> None:
+    (tmp_path / "result.json").write_text("{}")
+    done = pandion("fly", "walls", "--out", str(tmp_path), cwd=tmp_path)
+    assert done.returncode == 2
+    assert "already holds a flight" in done.stderr
+    assert (tmp_path / "result.json").read_text() == "{}"
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [["--help"], ["fly", "--help"], ["sitl", "--help"], ["fsw", "--help"], ["--version"]],
+)
+def test_help_and_version_answer_at_once(arguments: list[str], tmp_path: Path) -> None:
+    times = []
+    for _ in range(3):
+        begin = time.monotonic()
+        done = pandion(*arguments, cwd=tmp_path)
+        times.append(time.monotonic() - begin)
+        assert done.returncode == 0
+        assert done.stdout
+    # The best of three: a busy machine must not fail a test about imports.
+    assert min(times) < 0.5
