@@ -1,0 +1,200 @@
+"""Plant, flight loop and planner in one process, joined as the lockstep shell joins them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from fsw.mpc.planner import Planner
+from fsw.parameters.flight_config import FlightConfig, flight_config
+from fsw.ports import Planner as AnyPlanner
+from fsw.runtime.flight_loop import FlightLoop
+from fsw.runtime.flight_state import FlightState
+from fsw.signals import (
+    ActuatorCommand,
+    CommandRequest,
+    EndEffectorTarget,
+    FlightSnapshot,
+    Mode,
+    Plan,
+    PlanFailure,
+    SafeSet,
+    SensorFrame,
+    TickInputs,
+    TickOutputs,
+    Wall,
+    WorkspaceSphere,
+)
+from sitl.scenario import Hold, Pilot, Scenario, Start
+from sitl.sensors.suite import SensorReadings
+from sitl.simulation import START_US, STEP_US, Controls, Simulation
+
+ARM, TAKEOFF, LAND, SET_MODE = 400, 22, 21, 176
+TARGET_PERIOD_US = 100_000
+TARGETS_AHEAD = 20
+
+
+def hover(arm_deg: tuple[float, float] | None = None, yaw_deg: float = 0.0) -> Scenario:
+    """In the air, calm, nothing asked for."""
+    start = Start("airborne", yaw_deg=yaw_deg)
+    if arm_deg is not None:
+        start = Start("airborne", arm_deg=arm_deg, yaw_deg=yaw_deg)
+    return Scenario("hover", 600.0, start, Pilot("none"), Hold((0.0, 0.0, -1.2)))
+
+
+def on_the_ground() -> Scenario:
+    """Standing, disarmed, nothing asked for."""
+    return Scenario("ground", 600.0, Start("ground"), Pilot("none"), Hold((0.0, 0.0, -1.2)))
+
+
+def real_planner(config: FlightConfig) -> Planner:
+    return Planner(config.planner, stopwatch_us=lambda: 0.0)
+
+
+def on_time(_plan_id: int) -> int:
+    return 0
+
+
+def as_measured(frame: SensorFrame) -> SensorFrame:
+    return frame
+
+
+@dataclass
+class Flight:
+    """One flight, step by step; everything that was said is kept.
+
+    ``spoil`` stands between sensors and flight software, ``late_ticks`` says by how many ticks
+    each plan comes after its time.
+    """
+
+    scenario: Scenario
+    seed: int = 11
+    config: FlightConfig = field(default_factory=flight_config)
+    planner: AnyPlanner | None = None
+    spoil: Callable[[SensorFrame], SensorFrame] = as_measured
+    late_ticks: Callable[[int], int] = on_time
+    state: FlightState = field(default_factory=FlightState)
+    texts: list[str] = field(default_factory=list)
+    results: list[tuple[int, int]] = field(default_factory=list)  # command, MAV_RESULT
+    modes: list[Mode] = field(default_factory=list)  # each change
+    sent: list[ActuatorCommand] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.sim = Simulation(self.scenario, self.seed)
+        self.loop = FlightLoop(self.config)
+        self.planner = self.planner or real_planner(self.config)
+        self.inputs: TickInputs | None = None  # of the last tick
+        self._outputs: TickOutputs | None = None
+        self._answer: tuple[int, Plan | PlanFailure] | None = None
+
+    @property
+    def outputs(self) -> TickOutputs:
+        """Of the last tick."""
+        assert self._outputs is not None, "no tick yet"
+        return self._outputs
+
+    @property
+    def snapshot(self) -> FlightSnapshot:
+        """The vehicle as telemetry shows it."""
+        return self.outputs.snapshot
+
+    @property
+    def mode(self) -> Mode:
+        return Mode.DISARMED if self._outputs is None else self.snapshot.mode
+
+    def follow(self) -> None:
+        """Arm and start the scenario's trajectory, both in their first possible tick."""
+        self.step(command(ARM, 1.0))
+        self.step(command(SET_MODE, 1.0, 6.0, 0.0))
+        assert self.mode is Mode.TRAJECTORY, self.texts
+
+    def run(self, seconds: float) -> None:
+        """Fly on for a while; a plant that ended its run is an error."""
+        for _ in range(round(seconds * 1e6) // STEP_US):
+            self.step()
+            assert self.sim.ended is None, self.sim.ended
+
+    def step(self, *commands: CommandRequest) -> TickOutputs:
+        """Sense, tick, plan, advance."""
+        assert self.planner is not None
+        sensors = self.spoil(frame(self.sim.sense()))
+        self.inputs = TickInputs(
+            sensors,
+            self._due(sensors.t_us),
+            commands,
+            self._targets(),
+            safe_set(self.scenario) if self.sim.step == 0 else None,
+        )
+        before = self.mode
+        self.state, outputs = self.loop.tick(self.state, self.inputs)
+        self._outputs = outputs
+        request = outputs.plan_request
+        if request is not None:
+            due_us = request.t_apply_us + STEP_US * self.late_ticks(request.plan_id)
+            self._answer = (due_us, self.planner.plan(request))
+        self.texts += [text.text for text in outputs.texts]
+        self.results += [(ack.command, ack.result) for ack in outputs.acks]
+        if self.mode is not before:
+            self.modes.append(self.mode)
+        self.sent.append(outputs.actuators)
+        self.sim.advance(self._controls(outputs))
+        return outputs
+
+    def _due(self, t_us: int) -> Plan | PlanFailure | None:
+        if self._answer is None or t_us < self._answer[0]:
+            return None
+        answer, self._answer = self._answer[1], None
+        return answer
+
+    def _targets(self) -> tuple[EndEffectorTarget, ...]:
+        """A stream that stays two seconds ahead, as the scenario's pilot sends it."""
+        start_us = self.sim.trajectory_start_us
+        if self.scenario.pilot.plan != "trajectory" or start_us is None:
+            return ()
+        points, rest = divmod(self.sim.step * STEP_US, TARGET_PERIOD_US)
+        if self.sim.step == 0:
+            return tuple(
+                self._target(start_us + k * TARGET_PERIOD_US) for k in range(TARGETS_AHEAD)
+            )
+        if rest:
+            return ()
+        return (self._target(start_us + (TARGETS_AHEAD + points - 1) * TARGET_PERIOD_US),)
+
+    def _target(self, t_us: int) -> EndEffectorTarget:
+        point = self.sim.target_at(1e-6 * (t_us - START_US))
+        return EndEffectorTarget(t_us, point.p, point.v, point.a)
+
+    def _controls(self, outputs: TickOutputs) -> Controls:
+        airframe, sent = self.config.airframe, outputs.actuators
+        f1, f2, f3, f4 = (f / airframe.rotor_thrust_max for f in sent.rotor_thrust)
+        torque = tuple(t / airframe.joint_torque_max for t in sent.joint_torque)
+        return Controls((f1, f2, f3, f4), torque, outputs.snapshot.armed)
+
+
+def command(number: int, *params: float) -> CommandRequest:
+    """A command whose unused parameters are NaN."""
+    p = (*params, *[float("nan")] * (7 - len(params)))
+    return CommandRequest(number, (p[0], p[1], p[2], p[3], p[4], p[5], p[6]), 255, 190)
+
+
+def frame(readings: SensorReadings) -> SensorFrame:
+    q1, q2 = readings.q_arm
+    qd1, qd2 = readings.qd_arm
+    return SensorFrame(
+        readings.t_us,
+        readings.p_WB,
+        readings.v_WB,
+        readings.q_WB,
+        readings.gyro_B,
+        readings.accel_B,
+        (q1, q2),
+        (qd1, qd2),
+    )
+
+
+def safe_set(scenario: Scenario) -> SafeSet:
+    walls = tuple(Wall(wall.normal, wall.offset_m, wall.clearance_m) for wall in scenario.walls)
+    if scenario.workspace is None:
+        return SafeSet(walls)
+    centre = (0.0, 0.0, -scenario.workspace.d_iw_m)
+    return SafeSet(walls, WorkspaceSphere(centre, scenario.workspace.radius_m))

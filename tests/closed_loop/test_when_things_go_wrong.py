@@ -1,0 +1,152 @@
+"""Late plans, no plans, no estimate, a hard push: what the vehicle does about them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import pytest
+
+from fsw.mpc.planner import Planner
+from fsw.parameters.flight_config import flight_config
+from fsw.signals import Mode, PlanFailure, PlanRequest, PlanTimings, SensorFrame, SolverStatus
+from fsw.vehicle.faults import Fault
+from sitl.scenario_file import load_scenario
+from sitl.simulation import START_US, STEP_US
+from tests.closed_loop.harness import ARM, Flight, command, hover, real_planner
+
+
+class FailsFrom:
+    """A planner that answers up to some plan and then only fails."""
+
+    def __init__(self, planner: Planner, first_failure: int) -> None:
+        self._planner = planner
+        self._first_failure = first_failure
+
+    def plan(self, request: PlanRequest) -> object:
+        if request.plan_id < self._first_failure:
+            return self._planner.plan(request)
+        nothing = PlanTimings(0.0, 0.0, 0.0)
+        return PlanFailure(request.plan_id, SolverStatus.INFEASIBLE, "as told", nothing)
+
+
+def test_a_late_plan_is_counted_and_flown() -> None:
+    flight = Flight(load_scenario("workspace"), late_ticks=lambda plan: 3 if plan == 5 else 0)
+    flight.follow()
+    missed_at = set()
+    flown = set()
+    for _ in range(500):
+        outputs = flight.step()
+        plan = outputs.snapshot.plan
+        if plan is not None:
+            flown.add(plan.plan_id)
+        missed_at.add((outputs.snapshot.counters.missed_deadlines, len(flown)))
+    counters = flight.snapshot.counters
+    assert (counters.missed_deadlines, counters.fallbacks) == (1, 0)
+    assert (1, 5) in missed_at, "counted while plan 4 was still flown"
+    assert 5 in flown
+    assert flight.sim.min_margin_m is not None
+    assert flight.sim.min_margin_m > 0.0
+
+
+def test_a_plan_that_never_comes_is_counted_given_up_and_survived() -> None:
+    flight = Flight(load_scenario("workspace"), late_ticks=lambda plan: 10**6 if plan == 5 else 0)
+    flight.follow()
+    flight.run(1.0)
+    counters = flight.snapshot.counters
+    assert (counters.missed_deadlines, counters.fallbacks) == (1, 1)
+    assert flight.mode is Mode.TRAJECTORY
+    assert flight.snapshot.failures == ()
+
+
+@pytest.mark.parametrize("first_failure", [0, 30], ids=["from the start", "in motion"])
+def test_without_plans_the_vehicle_brakes_and_stays_put(first_failure: int) -> None:
+    config = flight_config()
+    planner = FailsFrom(real_planner(config), first_failure)
+    flight = Flight(load_scenario("workspace-calm"), config=config, planner=planner)
+    flight.follow()
+    flight.run(0.1 * first_failure + 0.5)
+    assert Fault.PLAN_STALE.value in flight.snapshot.failures
+    assert f"{Fault.PLAN_STALE.value}: brake" in flight.texts
+    braked = flight.sim.truth().p_WB
+    for _ in range(6):
+        flight.run(0.5)
+        assert math.dist(flight.sim.truth().p_WB, braked) < 0.1
+    assert math.hypot(*flight.sim.truth().v_WB) < 0.02
+    assert flight.mode is Mode.TRAJECTORY
+
+
+def lost_between(first: int, last: int) -> object:
+    """Position is no number in steps first..last."""
+
+    def spoil(frame: SensorFrame) -> SensorFrame:
+        step = (frame.t_us - START_US) // STEP_US
+        return replace(frame, p_WB=(math.nan,) * 3) if first <= step <= last else frame
+
+    return spoil
+
+
+def test_an_estimate_lost_for_ten_milliseconds_ends_the_flight_for_good() -> None:
+    flight = Flight(load_scenario("workspace"), spoil=lost_between(300, 330))
+    flight.follow()
+    for step in range(2, 400):
+        outputs = flight.step()
+        if step < 304:
+            assert flight.mode is Mode.TRAJECTORY
+            assert sum(outputs.actuators.rotor_thrust) > 10.0
+        else:
+            assert flight.mode is Mode.FAULT
+            assert outputs.actuators.rotor_thrust == (0.0, 0.0, 0.0, 0.0)
+            assert outputs.actuators.joint_torque == (0.0, 0.0)
+            assert not outputs.snapshot.armed
+    assert any(Fault.ESTIMATE_INVALID.value in text for text in flight.texts)
+    flight.step(command(ARM, 1.0))
+    assert flight.mode is Mode.FAULT
+
+
+def test_a_few_lost_frames_are_flown_through() -> None:
+    flight = Flight(load_scenario("workspace"), spoil=lost_between(300, 303))
+    flight.follow()
+    flight.run(1.0)
+    assert flight.mode is Mode.TRAJECTORY
+    assert flight.snapshot.failures == ()
+
+
+@dataclass
+class OnePush:
+    """A constant push for a while, in m/s^2 (world) or N m (body)."""
+
+    value: tuple[float, float, float]
+    torque: bool
+    first: int
+    last: int
+
+    def sample(self, step: int) -> tuple[float, float, float]:
+        return self.value if self.first <= step <= self.last else (0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("value", "torque", "felt"),
+    [
+        ((12.0, 0.0, 0.0), False, 0.1),
+        ((0.0, -12.0, 0.0), False, 0.1),
+        ((6.0, 6.0, -9.0), False, 0.1),
+        ((3.0, 0.0, 0.0), True, 0.01),
+        ((0.0, -3.0, 0.0), True, 0.002),
+    ],
+)
+def test_a_hard_push_is_recovered_from(
+    value: tuple[float, float, float], torque: bool, felt: float
+) -> None:
+    flight = Flight(hover())
+    flight.sim._pushes.append(OnePush(value, torque, 100, 175))
+    flight.step(command(ARM, 1.0))
+    held = flight.sim.truth().p_WE
+    farthest = 0.0
+    for _ in range(3500):
+        flight.step()
+        farthest = max(farthest, math.dist(flight.sim.truth().p_WE, held))
+    assert flight.mode is Mode.HOLD
+    assert flight.sim.ended is None
+    assert farthest > felt, "or it was no test"
+    assert math.dist(flight.sim.truth().p_WE, held) < 0.02
