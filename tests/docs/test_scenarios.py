@@ -1,0 +1,101 @@
+"""docs/scenarios.md names every key of a scenario with its range and default, and no other."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+import typing
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from sitl import scenario
+from sitl.admission import check
+from sitl.scenario_file import parse_scenario
+from sitl.simulation import Simulation
+
+PAGE = Path(__file__).parents[2] / "docs" / "scenarios.md"
+TABLES = (
+    scenario.Scenario,
+    scenario.Start,
+    scenario.Pilot,
+    scenario.Lissajous,
+    scenario.Hold,
+    scenario.Wall,
+    scenario.Workspace,
+    scenario.Uniform,
+    scenario.Wind,
+    scenario.Impulses,
+    scenario.Torque,
+    scenario.ImuErrors,
+    scenario.PoseErrors,
+    scenario.EncoderErrors,
+    scenario.VehicleScale,
+)
+
+
+def allowed(kind: Any, field: dataclasses.Field[Any]) -> str:
+    """What the table says about the value."""
+    hint = typing.get_type_hints(kind)[field.name]
+    count = len(typing.get_args(hint)) if typing.get_origin(hint) is tuple else 0
+    numbers = f"{count} numbers, " if count else ""
+    for key in ("range", "choices"):
+        if key in field.metadata:
+            return numbers + str(field.metadata[key]).replace('"', "`").removeprefix("one of ")
+    return "text"
+
+
+def default(field: dataclasses.Field[Any]) -> str:
+    """What the table says about leaving it out."""
+    # In a file a table says its kind, even where the dataclass has only one.
+    if field.default is dataclasses.MISSING or field.name == "kind":
+        return "required"
+    value = field.default
+    if isinstance(value, tuple):
+        return "[" + ", ".join(f"{entry:.4g}" for entry in value) + "]"
+    if isinstance(value, float):
+        return f"{value:g}"
+    return f"`{value}`" if value else "empty"
+
+
+def expected(kind: Any) -> set[tuple[str, str, str]]:
+    """Rows of one table; keys that hold other tables have tables of their own."""
+    rows = set()
+    for field in dataclasses.fields(kind):
+        plain = "range" in field.metadata or "choices" in field.metadata or field.type == "str"
+        named_by_file = kind is scenario.Scenario and field.name == "name"
+        if plain and not named_by_file:
+            rows.add((f"`{field.name}`", allowed(kind, field), default(field)))
+    return rows
+
+
+def documented(kind: Any) -> set[tuple[str, str, str]]:
+    """First three cells of the rows behind the marker of a dataclass."""
+    text = PAGE.read_text(encoding="utf-8")
+    table = text.split(f"<!-- {kind.__name__} -->\n")[1].split("\n\n")[0]
+    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in table.splitlines()]
+    return {(row[0], row[1], row[2]) for row in rows[2:]}
+
+
+@pytest.mark.parametrize("kind", TABLES, ids=lambda kind: kind.__name__)
+def test_the_page_names_every_key_with_range_and_default(kind: Any) -> None:
+    assert documented(kind) == expected(kind)
+
+
+def test_every_dataclass_of_a_scenario_has_a_table() -> None:
+    made = {
+        name
+        for name, value in vars(scenario).items()
+        if dataclasses.is_dataclass(value) and value is not scenario.Sensors
+    }
+    assert made == {kind.__name__ for kind in TABLES}
+
+
+def test_the_examples_on_the_page_can_be_flown() -> None:
+    examples = re.findall(r"```toml\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+    assert examples
+    for text in examples:
+        flown = parse_scenario(text, "example")
+        check(flown)
+        assert Simulation(flown, 0).ended is None
