@@ -1,0 +1,211 @@
+"""The paper's own prediction model as the plant: six double integrators (eq 16).
+
+The commanded acceleration is reached at once and the disturbance adds to it; the body stays
+level. The same trajectories, safe sets, disturbances and referee as in the full plant, so
+that only the plant differs. Motion between disturbance changes is a parabola and is judged
+every exchange of 2 ms.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass
+
+from fsw.model.airframe import AIRFRAME
+from fsw.mpc.planner import Planner
+from fsw.parameters.flight_config import FlightConfig
+from fsw.runtime.planning import plan_input
+from fsw.signals import Plan, PlanInput, PlanRequest, PredictionState, Vec2, Vec3
+from sitl.admission import check
+from sitl.disturbances.items import push
+from sitl.mission_clock import MissionClock
+from sitl.referee import Points, Referee
+from sitl.scenario import V3, Scenario
+from sitl.simulation import SAMPLE_STEPS, START_US, STEP_US
+from sitl.verdict import EndReason, TruthResult
+from studies.flight_result import FlightRecorder, FlightResult, TracePoint
+from studies.mission import safe_set, target
+
+_STEP_S = 1e-6 * STEP_US
+_TRACE_STEPS = 20
+_LEVEL = (0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class PointMass:
+    """The paper's twelve states."""
+
+    p: Vec3  # m, NED
+    v: Vec3  # m/s
+    yaw: float  # rad
+    yaw_rate: float  # rad/s
+    q_arm: Vec2  # rad
+    qd_arm: Vec2  # rad/s
+
+    def after(self, u: PlanInput, push_W: V3, dt: float) -> PointMass:
+        """The state a time later, under a constant input and disturbance, exactly.
+
+        Args:
+            u: Accelerations commanded.
+            push_W: Disturbance acceleration [m/s^2].
+            dt: The time [s].
+        """
+        a = (u.a[0] + push_W[0], u.a[1] + push_W[1], u.a[2] + push_W[2])
+        p, v, half = self.p, self.v, 0.5 * dt * dt
+        (q1, q2), (qd1, qd2), (qdd1, qdd2) = self.q_arm, self.qd_arm, u.qdd_arm
+        return PointMass(
+            (
+                p[0] + dt * v[0] + half * a[0],
+                p[1] + dt * v[1] + half * a[1],
+                p[2] + dt * v[2] + half * a[2],
+            ),
+            (v[0] + dt * a[0], v[1] + dt * a[1], v[2] + dt * a[2]),
+            self.yaw + dt * self.yaw_rate + half * u.yaw_acc,
+            self.yaw_rate + dt * u.yaw_acc,
+            (q1 + dt * qd1 + half * qdd1, q2 + dt * qd2 + half * qdd2),
+            (qd1 + dt * qdd1, qd2 + dt * qdd2),
+        )
+
+    def points(self) -> Points:
+        """Base, joint 2 and end-effector of the level body [m, NED]."""
+        l1, l2 = AIRFRAME.link_length
+        th1, th12 = self.q_arm[0], self.q_arm[0] + self.q_arm[1]
+        x1, z1 = l1 * math.sin(th1), l1 * math.cos(th1)
+        x2, z2 = x1 + l2 * math.sin(th12), z1 + l2 * math.cos(th12)
+        return self.p, self._hung(x1, z1), self._hung(x2, z2)
+
+    def as_prediction(self) -> PredictionState:
+        """The same for the planner: no tilt, no tilt rate."""
+        return PredictionState(
+            self.p,
+            self.v,
+            (0.0, 0.0, 0.0),
+            _LEVEL,
+            _LEVEL,
+            self.yaw,
+            self.yaw_rate,
+            self.q_arm,
+            self.qd_arm,
+        )
+
+    def _hung(self, forward: float, down: float) -> Vec3:
+        x, y, z = self.p
+        return (x + math.cos(self.yaw) * forward, y + math.sin(self.yaw) * forward, z + down)
+
+
+class DoubleIntegrator:
+    """The plant in its scenario; mirrors ``sitl.simulation.Simulation``.
+
+    Raises:
+        ScenarioError: The scenario contradicts itself or starts outside its safe set.
+    """
+
+    def __init__(self, scenario: Scenario, seed: int) -> None:
+        check(scenario)
+        self.clock = MissionClock(scenario)
+        self.step = 0
+        self.state = _first_state(scenario, self.clock.target_at(0.0).p)
+        self._pushes = [push(item, seed, _STEP_S) for item in scenario.disturbances]
+        self.referee = Referee(scenario, self.clock, self.state.points())
+
+    @property
+    def time_s(self) -> float:
+        """Seconds since the start."""
+        return _STEP_S * self.step
+
+    @property
+    def t_us(self) -> int:
+        """Time stamp of the current state [us]."""
+        return START_US + STEP_US * self.step
+
+    @property
+    def ended(self) -> EndReason | None:
+        """Why the run is over, None while it is not."""
+        return self.referee.ended
+
+    def advance(self, u: PlanInput) -> None:
+        """One exchange of 2 ms under an input, judged at its end."""
+        push_W = self._push()
+        self.state = self.state.after(u, push_W, _STEP_S)
+        self.step += 1
+        points = self.state.points()
+        self.referee.judge(points, self.time_s)
+        if self.step % SAMPLE_STEPS == 0:
+            self.referee.sample_error(points, self.time_s)
+        self.referee.judge_time(self.time_s)
+
+    def result(self) -> TruthResult:
+        """The score so far."""
+        return self.referee.result(self.time_s)
+
+    def _push(self) -> V3:
+        x = y = z = 0.0
+        for item in self._pushes:
+            dx, dy, dz = item.sample(self.step)
+            if not item.torque:  # a point has no attitude to disturb
+                x, y, z = x + dx, y + dy, z + dz
+        return x, y, z
+
+
+def fly(
+    scenario: Scenario, seed: int, config: FlightConfig, *, traced: bool = False
+) -> FlightResult:
+    """Fly the planner alone on the double integrators: measured start, no delay, no fast loop.
+
+    Args:
+        scenario: With a trajectory that starts in the air.
+        seed: Of every random number of the plant.
+        config: Its planner is flown; give it ``LagModel(at_once=True)``.
+        traced: Keep the truth for figures.
+    """
+    plant = DoubleIntegrator(scenario, seed)
+    planner = Planner(config.planner, _stopwatch_us)
+    recorder = FlightRecorder()
+    held, running = safe_set(scenario), None
+    steps = config.mpc_period_us // STEP_US
+    while plant.ended is None:
+        start = plant.state.as_prediction()
+        t_us = plant.t_us
+        targets = tuple(
+            target(plant.clock, t_us + node * config.mpc_period_us)
+            for node in range(config.planner.horizon + 1)
+        )
+        answer = planner.plan(PlanRequest(recorder.plans, t_us, start, targets, held, False))
+        recorder.planned(answer)
+        running = answer if isinstance(answer, Plan) else running
+        # As in flight: without an answer the running plan goes on, then the vehicle brakes.
+        u = plan_input(running, start, t_us)
+        recorder.effort.add(u)
+        for _ in range(steps):
+            if traced and plant.step % _TRACE_STEPS == 0:
+                recorder.trace.append(_trace_point(plant))
+            if plant.ended is None:
+                plant.advance(u)
+    return recorder.result(plant.result())
+
+
+def _first_state(scenario: Scenario, p_target: V3) -> PointMass:
+    th1, th2 = (math.radians(angle) for angle in scenario.start.arm_deg)
+    here = PointMass(
+        (0.0, 0.0, 0.0),
+        (0.0, 0.0, 0.0),
+        math.radians(scenario.start.yaw_deg),
+        0.0,
+        (th1, th2),
+        (0.0, 0.0),
+    )
+    x, y, z = here.points()[2]
+    p = (p_target[0] - x, p_target[1] - y, p_target[2] - z)
+    return PointMass(p, here.v, here.yaw, here.yaw_rate, here.q_arm, here.qd_arm)
+
+
+def _trace_point(plant: DoubleIntegrator) -> TracePoint:
+    points = plant.state.points()
+    margins = plant.referee.margins(points, plant.time_s)
+    aim = plant.clock.target_at(plant.time_s).p
+    return TracePoint(plant.time_s, points[0], points[2], aim, min(margins))
+
+
+def _stopwatch_us() -> float:
+    return time.perf_counter() * 1e6

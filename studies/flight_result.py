@@ -1,0 +1,74 @@
+"""What one flight of a study leaves behind."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from fsw.runtime.effort import EffortRecord
+from fsw.signals import Plan, PlanFailure
+from sitl.scenario import V3
+from sitl.verdict import TruthResult
+
+
+@dataclass(frozen=True, slots=True)
+class InputTotals:
+    """A quantity of the applied inputs over a flight, summed and per planning step."""
+
+    sum: float
+    mean: float
+
+
+@dataclass(frozen=True, slots=True)
+class TracePoint:
+    """The truth at one instant, for figures."""
+
+    t_s: float
+    p_WB: V3  # m, NED
+    p_WE: V3  # m, NED, end-effector
+    p_target: V3  # m, NED, its reference
+    margin_m: float  # the smallest
+
+
+@dataclass(frozen=True, slots=True)
+class FlightResult:
+    """Score of one flight from the plant's truth, and what the planner did."""
+
+    truth: TruthResult
+    effort: InputTotals  # c_e
+    smoothness: InputTotals  # c_s
+    step_us: tuple[float, ...]  # wall time of each planning step
+    plans: int
+    failures: int  # planning steps without a plan
+    trace: tuple[TracePoint, ...]  # empty unless asked for
+
+
+@dataclass(slots=True)
+class FlightRecorder:
+    """Collects what a flight's result consists of beside the truth."""
+
+    effort: EffortRecord = field(default_factory=EffortRecord)
+    step_us: list[float] = field(default_factory=list)
+    plans: int = 0
+    failures: int = 0
+    trace: list[TracePoint] = field(default_factory=list)
+
+    def planned(self, answer: Plan | PlanFailure) -> None:
+        """Account for one planning step."""
+        self.step_us.append(answer.timings.total_us)
+        if isinstance(answer, Plan):
+            self.plans += 1
+        else:
+            self.failures += 1
+
+    def result(self, truth: TruthResult) -> FlightResult:
+        """The whole flight."""
+        totals = self.effort.as_json()
+        return FlightResult(
+            truth,
+            InputTotals(**totals["control_effort"]),
+            InputTotals(**totals["control_smoothness"]),
+            tuple(self.step_us),
+            self.plans,
+            self.failures,
+            tuple(self.trace),
+        )

@@ -1,0 +1,133 @@
+"""One flight of a campaign: what to fly, and the flat row it leaves."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import asdict, dataclass, replace
+from functools import cache
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+import fsw
+import sitl
+import studies
+from fsw.parameters.flight_config import FlightConfig
+from sitl.scenario import EncoderErrors, ImuErrors, PoseErrors, Scenario
+from studies import closed_loop, double_integrator
+from studies.flight_result import FlightResult
+
+PlantName = Literal["double-integrator", "full"]
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """Everything a flight depends on; equal jobs fly equal flights."""
+
+    plant: PlantName
+    scenario: Scenario
+    config: FlightConfig
+    seed: int
+
+    @property
+    def random(self) -> bool:
+        """Whether the seed changes anything: calm air and exact sensors draw no number."""
+        sensors = self.scenario.sensors
+        punctual = (
+            replace(sensors.imu, latency_ms=0.0),
+            replace(sensors.pose, latency_ms=0.0),
+            replace(sensors.encoders, latency_ms=0.0),
+        )
+        noisy = punctual != (ImuErrors(), PoseErrors(), EncoderErrors())
+        return noisy or any(item.kind != "wind" for item in self.scenario.disturbances)
+
+    def key(self) -> str:
+        """Name of the flight: same flight, same name, in any process, while the code is the same.
+
+        Seeds that change nothing are left out, so that calm air is flown once.
+        """
+        distinct = self if self.random else replace(self, seed=0)
+        return hashlib.sha256((repr(distinct) + sources()).encode()).hexdigest()[:32]
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """The flat result of one flight; also of one that failed with an error."""
+
+    seed: int
+    completed: bool
+    reason: str
+    duration_s: float = 0.0
+    te_m: float | None = None
+    te_max_m: float | None = None
+    margin_m: float | None = None
+    margin_key: str | None = None
+    cs_sum: float = 0.0
+    cs_mean: float = 0.0
+    ce_sum: float = 0.0
+    ce_mean: float = 0.0
+    tc_p50_us: float = 0.0
+    tc_p99_us: float = 0.0
+    tc_max_us: float = 0.0
+    plans: int = 0
+    failures: int = 0  # planning steps without a plan
+    error: bool = False  # the flight itself broke, not the vehicle
+
+    def as_json(self) -> dict[str, Any]:
+        """Every field by name."""
+        return asdict(self)
+
+
+def fly(job: Job, *, traced: bool = False) -> FlightResult:
+    """Fly one job here and now."""
+    plants = {"full": closed_loop.fly, "double-integrator": double_integrator.fly}
+    return plants[job.plant](job.scenario, job.seed, job.config, traced=traced)
+
+
+def outcome(job: Job) -> Outcome:
+    """Fly one job; whatever it raises becomes a row that says so."""
+    try:
+        return score(job.seed, fly(job))
+    except Exception as error:
+        return broken(job, f"{type(error).__name__}: {error}")
+
+
+def broken(job: Job, reason: str) -> Outcome:
+    """The row of a flight that could not be flown."""
+    return Outcome(job.seed, completed=False, reason=reason, error=True)
+
+
+def score(seed: int, result: FlightResult) -> Outcome:
+    """The row of a flight."""
+    truth, steps = result.truth, np.array(result.step_us or (0.0,))
+    return Outcome(
+        seed=seed,
+        completed=truth.completed,
+        reason=truth.end_reason,
+        duration_s=truth.duration_s,
+        te_m=truth.tracking_error_rms_m,
+        te_max_m=truth.tracking_error_max_m,
+        margin_m=truth.min_margin_m,
+        margin_key=truth.min_margin_key,
+        cs_sum=result.smoothness.sum,
+        cs_mean=result.smoothness.mean,
+        ce_sum=result.effort.sum,
+        ce_mean=result.effort.mean,
+        tc_p50_us=float(np.median(steps)),
+        tc_p99_us=float(np.quantile(steps, 0.99)),
+        tc_max_us=float(steps.max()),
+        plans=result.plans,
+        failures=result.failures,
+    )
+
+
+@cache
+def sources() -> str:
+    """Digest of the code that decides how a flight goes."""
+    digest = hashlib.sha256()
+    for package in (fsw, sitl, studies):
+        folder = Path(str(package.__file__)).parent
+        for path in sorted(folder.rglob("*.py")):
+            digest.update(path.read_bytes())
+    return digest.hexdigest()

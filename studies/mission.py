@@ -1,0 +1,26 @@
+"""A scenario as the flight software hears of it, without messages in between."""
+
+from __future__ import annotations
+
+import fsw.signals as fsw_signals
+from fsw.signals import EndEffectorTarget, SafeSet, WorkspaceSphere
+from sitl.mission_clock import MissionClock
+from sitl.scenario import Scenario
+from sitl.simulation import START_US
+
+
+def safe_set(scenario: Scenario) -> SafeSet:
+    """The safe set of a scenario in the flight software's terms."""
+    walls = tuple(
+        fsw_signals.Wall(wall.normal, wall.offset_m, wall.clearance_m) for wall in scenario.walls
+    )
+    workspace = scenario.workspace
+    if workspace is None:
+        return SafeSet(walls)
+    return SafeSet(walls, WorkspaceSphere((0.0, 0.0, -workspace.d_iw_m), workspace.radius_m))
+
+
+def target(clock: MissionClock, t_us: int) -> EndEffectorTarget:
+    """The end-effector reference at a time stamp."""
+    point = clock.target_at(1e-6 * (t_us - START_US))
+    return EndEffectorTarget(t_us, point.p, point.v, point.a)

@@ -1,0 +1,77 @@
+"""One self-contained HTML page: nothing is fetched when it is opened."""
+
+from __future__ import annotations
+
+import html
+
+from studies.settings import Figure, Report, Settings, Table
+
+_STYLE = """
+body { font: 15px/1.45 system-ui, sans-serif; max-width: 75rem; margin: 2rem auto; padding: 0 1rem;
+       color: #1b1f24; background: #fff; }
+h1 { font-size: 1.5rem; } h2 { font-size: 1.1rem; margin-top: 2rem; }
+table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
+caption { text-align: left; font-weight: 600; padding: .4rem 0; }
+th, td { border-bottom: 1px solid #d5d9de; padding: .25rem .6rem; text-align: right; }
+th:nth-child(-n+2), td:nth-child(-n+2) { text-align: left; }
+svg { max-width: 100%; height: auto; }
+figure { margin: 1.5rem 0; } figcaption { color: #57606a; }
+.warning { border-left: 4px solid #b3261e; padding-left: .8rem; }
+"""
+
+
+def page(report: Report, settings: Settings, provenance: tuple[str, ...]) -> str:
+    """The page of one study.
+
+    Args:
+        report: What was found.
+        settings: What was asked for.
+        provenance: Sentences that say how to get the same again.
+    """
+    parts = [f"<h1>{_text(report.title)}</h1>", _items(provenance), _seeds(settings)]
+    parts += [_table(table) for table in report.tables]
+    parts += [_figure(figure) for figure in report.figures]
+    if report.errors:
+        parts.append('<h2 class="warning">Flights that broke</h2>' + _items(report.errors))
+    if report.deviations:
+        parts.append("<h2>Deviations from the paper</h2>" + _items(report.deviations))
+    body = "\n".join(parts)
+    return (
+        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        f"<title>{_text(report.title)}</title>\n<style>{_STYLE}</style>\n</head>\n"
+        f"<body>\n{body}\n</body>\n</html>\n"
+    )
+
+
+def _seeds(settings: Settings) -> str:
+    first, last = settings.seeds[0], settings.seeds[-1]
+    asked = f"Reported seeds: {first} to {last}. Seeds 0 to 29 were used for tuning."
+    if not settings.tuned_on:
+        return f"<p>{asked} The two are disjoint.</p>"
+    return (
+        f'<p class="warning">{asked} {len(settings.tuned_on)} of the seeds here are among them: '
+        "these flights show how well the tuning fits, not how well it carries over.</p>"
+    )
+
+
+def _table(table: Table) -> str:
+    head = "".join(f"<th>{_text(name)}</th>" for name in table.headers)
+    rows = "\n".join(
+        "<tr>" + "".join(f"<td>{_text(cell)}</td>" for cell in row) + "</tr>" for row in table.rows
+    )
+    caption = f"<caption>{_text(table.caption)}</caption>"
+    return f"<table>{caption}<thead><tr>{head}</tr></thead>\n<tbody>{rows}</tbody></table>"
+
+
+def _figure(figure: Figure) -> str:
+    drawing = figure.svg[figure.svg.index("<svg") :]  # no XML declaration inside HTML
+    caption = f"{figure.caption} (numbers: {figure.name}.json)"
+    return f"<figure>{drawing}<figcaption>{_text(caption)}</figcaption></figure>"
+
+
+def _items(sentences: tuple[str, ...]) -> str:
+    return "<ul>" + "".join(f"<li>{_text(line)}</li>" for line in sentences) + "</ul>"
+
+
+def _text(plain: str) -> str:
+    return html.escape(plain)

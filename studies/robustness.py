@@ -1,0 +1,126 @@
+"""How far blf's claim carries: another vehicle, late or noisy sensors, other disturbances."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+from sitl.scenario import (
+    EncoderErrors,
+    Impulses,
+    ImuErrors,
+    PoseErrors,
+    Scenario,
+    Sensors,
+    VehicleScale,
+    Wind,
+)
+from studies import deviations
+from studies.campaign import Campaign
+from studies.cases import CASES, configuration, scenario
+from studies.job import Job
+from studies.settings import Report, Settings, Table
+from studies.summary import Cell, fly_cells, interval, metres, millimetres, seen
+
+Change = Callable[[Scenario], Scenario]
+
+
+def _vehicle(scale: VehicleScale) -> Change:
+    return lambda flown: replace(flown, vehicle_scale=scale)
+
+
+def _late(latency_ms: float) -> Change:
+    """Every sensor late, which the flight software is not told."""
+    sensors = Sensors(
+        ImuErrors(latency_ms=latency_ms),
+        PoseErrors(latency_ms=latency_ms),
+        EncoderErrors(latency_ms=latency_ms),
+    )
+    return lambda flown: replace(flown, sensors=sensors)
+
+
+def _noisy(flown: Scenario) -> Scenario:
+    angle, rate = math.radians(0.2), math.radians(0.2)
+    sensors = Sensors(
+        ImuErrors(gyro_rad_s=rate),
+        PoseErrors(0.001, 0.01, angle, rate),
+        EncoderErrors(angle, rate),
+    )
+    return replace(flown, sensors=sensors)
+
+
+def _windy(flown: Scenario) -> Scenario:
+    wind = Wind((0.5 * math.sqrt(0.5), 0.5 * math.sqrt(0.5), 0.0))
+    return replace(flown, disturbances=(*flown.disturbances, wind))
+
+
+def _pushed(flown: Scenario) -> Scenario:
+    """Twice the paper's amplitude for 0.1 s in any direction, every 5 s on average."""
+    pushes = Impulses(mean_interval_s=5.0, magnitude_m_s2=1.6, duration_s=0.1)
+    return replace(flown, disturbances=(*flown.disturbances, pushes))
+
+
+# On top of the paper's random disturbance.
+CHANGES: dict[str, Change] = {
+    "as believed": lambda flown: flown,
+    "mass × 0.8": _vehicle(VehicleScale(mass=0.8)),
+    "mass × 1.2": _vehicle(VehicleScale(mass=1.2)),
+    "inertia × 0.8": _vehicle(VehicleScale(inertia=0.8)),
+    "inertia × 1.2": _vehicle(VehicleScale(inertia=1.2)),
+    "sensors 6 ms late": _late(6.0),
+    "sensors 10 ms late": _late(10.0),
+    "sensor noise": _noisy,
+    "wind 0.5 m/s²": _windy,
+    "impulses": _pushed,
+}
+
+_HEADERS = ("case", "change", "passed", "95 %", "worst margin mm", "TE m")
+
+
+def run(settings: Settings, campaign: Campaign) -> Report:
+    """Fly every change in both cases; always the full plant, the other has nothing to change."""
+    config = configuration("full", "blf", settings.inner)
+    named = [(case, name) for case in CASES for name in CHANGES]
+    cells = [
+        Cell(
+            tuple(
+                Job(
+                    "full",
+                    CHANGES[name](scenario(case, disturbed=True, duration_s=settings.duration_s)),
+                    config,
+                    seed,
+                )
+                for seed in settings.seeds
+            )
+        )
+        for case, name in named
+    ]
+    summaries, errors = fly_cells(campaign, cells)
+    found = list(zip(named, summaries, strict=True))
+    return Report(
+        title="Robustness of MPC-BLF, full plant, with the paper's disturbance",
+        rows=[
+            {"plant": "full", "case": case, "change": name, "controller": "blf"} | summary.as_json()
+            for (case, name), summary in found
+        ],
+        tables=(
+            Table(
+                "MPC-BLF",
+                _HEADERS,
+                tuple(
+                    (
+                        case,
+                        name,
+                        seen(row),
+                        interval(row),
+                        millimetres(row.worst_margin_m),
+                        metres(row.te_m),
+                    )
+                    for (case, name), row in found
+                ),
+            ),
+        ),
+        deviations=deviations.ROBUSTNESS,
+        errors=errors,
+    )
