@@ -14,7 +14,7 @@ import numpy as np
 
 from fsw.barriers.robust import required_h
 from fsw.barriers.root import BarrierTuning, root, root_slope
-from fsw.barriers.soft_rows import SoftRows, TargetPoints
+from fsw.barriers.soft_rows import SoftRows, TargetPoints, kinds_moving_base
 from fsw.model.linearisation import BASE, Linearisation
 from fsw.model.prediction import INPUTS, Array
 
@@ -35,7 +35,8 @@ class PointObstacleBarrier:
         self._obstacle = np.array(position)
         self._clearance = clearance
         nodes = np.arange(1 + tuning.skipped_nodes, horizon + 1)
-        self.rows = SoftRows(nodes, nodes - nodes[0], INPUTS * horizon)
+        moved_by = kinds_moving_base(np.ones((len(nodes), 3)))
+        self.rows = SoftRows(nodes, nodes - nodes[0], moved_by, INPUTS * horizon)
         self._h_start = np.zeros(1)
 
     def refill(self, horizon: Linearisation, targets: TargetPoints) -> None:

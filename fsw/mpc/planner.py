@@ -95,11 +95,11 @@ class Planner:
         inputs = self._guess(request.t_apply_us)
         linearise_us = solve_us = 0.0
         iterations = 0
-        for _ in range(self._config.sqp_iterations):
+        for left in reversed(range(self._config.sqp_iterations)):
             mark = self._stopwatch_us()
             problem.linearise(start, inputs, targets)
             linearised = self._stopwatch_us()
-            solution = problem.solve()
+            solution = problem.solve(last=left == 0)
             linearise_us += linearised - mark
             solve_us += self._stopwatch_us() - linearised
             iterations += solution.iterations

@@ -7,7 +7,7 @@ import numpy as np
 from fsw.barriers.soft_rows import SoftRows, TargetPoints
 from fsw.model.linearisation import Linearisation
 from fsw.model.prediction import Array, CondensedModel
-from fsw.mpc.clarabel_solver import ClarabelSolver, Solution
+from fsw.mpc.clarabel_solver import FINE, ROUGH, ClarabelSolver, Solution
 from fsw.mpc.limits import JointLimits
 from fsw.mpc.planner_config import PlannerConfig
 from fsw.mpc.program import Program, SlackPrice
@@ -32,7 +32,8 @@ class Problem:
         self._first_barrier_slack = self._program.inputs + self._limits.rows.slacks
         self.cost = 0.0
         self.linearise(np.zeros(model.phi.shape[1]), self._gradient, _no_targets(config.horizon))
-        self._solver = ClarabelSolver(self._program)
+        self._rough = ClarabelSolver(self._program, ROUGH)
+        self._fine = ClarabelSolver(self._program, FINE)
 
     def linearise(self, start: Array, guess: Array, targets: TargetPoints) -> None:
         """Refill the program around a guess of the inputs (6 n,) from a start (19,)."""
@@ -49,9 +50,9 @@ class Problem:
             self._barrier.refill(self._horizon, targets)
         self._program.refill(guess, self._gradient)
 
-    def solve(self) -> Solution:
-        """Solve the program as last linearised."""
-        return self._solver.solve()
+    def solve(self, *, last: bool) -> Solution:
+        """Solve the program as last linearised, finely where no iteration will follow."""
+        return (self._fine if last else self._rough).solve()
 
     def barrier_at_start(self) -> tuple[float, ...]:
         """h of each constraint at node 0 [m/s]."""
