@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from fsw.control.allocation import allocate
+from fsw.control.arm_compensation import compensated_joints
 from fsw.control.attitude import attitude_pid, attitude_reference
 from fsw.control.height import height_pid
 from fsw.control.inner_tuning import InnerTuning, tracking_gains
@@ -120,12 +121,15 @@ class Cascade:
                 tuning.attitude, attitude, estimate, attitude_reference(u.a, plan.yaw), dt
             )
             thrust, height = height_pid(airframe, tuning.height, height, estimate, plan, u, dt)
+        q_ref, qd_ref = plan.q_arm, plan.qd_arm
+        if self._follows_plan and tuning.compensate:
+            q_ref, qd_ref = compensated_joints(airframe, tuning.compensation, estimate, plan)
         joints, kept = joint_torques(
             airframe,
             tuning.joint,
             memory.joints,
             estimate,
-            (plan.q_arm, plan.qd_arm, u.qdd_arm),
+            (q_ref, qd_ref, u.qdd_arm),
             motion.thrust / airframe.mass,
             wdy,
             dt,

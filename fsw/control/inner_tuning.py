@@ -7,7 +7,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.linalg import expm, solve_discrete_are
 
+from fsw.control.arm_compensation import CompensationLimits
 from fsw.control.pid import PidGains
+from fsw.model.airframe import GRAVITY
 from fsw.model.prediction import Array
 
 
@@ -15,12 +17,16 @@ from fsw.model.prediction import Array
 class TrackingTuning:
     """Design of the loop that follows the plan (docs/decisions/0005-tracking-inner-loop.md).
 
-    The gains are those of a discrete LQR on position alone; ``effort`` is its price of
-    snap. A cheaper price follows the plan more closely until the rotors saturate, which
-    makes the loop diverge: 1e-8 does, 1e-7 leaves a reserve at 0.8 m/s^2 of disturbance.
+    The gains are those of a discrete LQR on the position of one point; ``effort`` is its
+    price of snap. A cheaper price follows the plan more closely until the rotors saturate,
+    which makes the loop diverge: 1e-8 does, 1e-7 leaves a reserve at 0.8 m/s^2 of
+    disturbance.
     """
 
     effort: float = 1e-7  # horizontal, on (m/s^4)^2
+    # The point sits half-way down to a hanging end-effector: holding the base alone, every
+    # correction swings the end-effector; holding the end-effector alone, the base wanders.
+    point_below_base: float = 0.1125  # m
     vertical_effort: float = 1e-6  # on (m/s^2)^2
     disturbance_correlation: float = 0.05  # s, of the Ornstein-Uhlenbeck model
     observer_bandwidth: float = 100.0  # 1/s
@@ -46,6 +52,8 @@ class InnerTuning:
     height: PidGains = field(default_factory=lambda: PidGains(7.1429, 1.4286, 3.4286, 4.0))
     joint: PidGains = field(default_factory=lambda: PidGains(400.0, 400.0, 40.0, 200.0))
     yaw: PidGains = field(default_factory=lambda: PidGains(4.0, 0.0, 4.0, 0.5))
+    compensate: bool = True  # the arm holds the end-effector while the base is pushed
+    compensation: CompensationLimits = field(default_factory=CompensationLimits)
     yaw_thrust_limit: float = 1.0  # N a rotor; more would be taken from roll and pitch
     tracking: TrackingTuning = field(default_factory=TrackingTuning)
 
@@ -64,10 +72,12 @@ def tracking_gains(tuning: TrackingTuning, rotor_lag: float, dt: float) -> Track
     a[4, 4] = -1.0 / rotor_lag
     a[5, 5] = -1.0 / tuning.disturbance_correlation
     b = np.array([[0.0], [0.0], [0.0], [0.0], [1.0 / rotor_lag], [0.0]])
-    k = _lqr(a, b, tuning.effort, dt)
+    # Tilting for an acceleration moves the point below the base by -height / g times it.
+    point = np.array([1.0, 0.0, -tuning.point_below_base / GRAVITY, 0.0, 0.0, 0.0])
+    k = _lqr(a, b, np.outer(point, point), tuning.effort, dt)
     a_vertical = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, -1.0 / rotor_lag]])
     b_vertical = np.array([[0.0], [0.0], [1.0 / rotor_lag]])
-    k_vertical = _lqr(a_vertical, b_vertical, tuning.vertical_effort, dt)
+    k_vertical = _lqr(a_vertical, b_vertical, np.diag([1.0, 0.0, 0.0]), tuning.vertical_effort, dt)
     return TrackingGains(
         k=(k[0], k[1], k[2], k[3], k[4]),
         k_disturbance=k[5],
@@ -75,15 +85,13 @@ def tracking_gains(tuning: TrackingTuning, rotor_lag: float, dt: float) -> Track
     )
 
 
-def _lqr(a: Array, b: Array, effort: float, dt: float) -> list[float]:
-    """Discrete LQR gain of a single-input chain with unit price on its first state."""
+def _lqr(a: Array, b: Array, q: Array, effort: float, dt: float) -> list[float]:
+    """Discrete LQR gain of a single-input chain."""
     n = len(a)
     block = np.zeros((n + 1, n + 1))
     block[:n, :n], block[:n, n:] = a * dt, b * dt
     exponential = expm(block)
     ad, bd = exponential[:n, :n], exponential[:n, n:]
-    q = np.zeros((n, n))
-    q[0, 0] = 1.0
     p = solve_discrete_are(ad, bd, q, np.array([[effort]]))
     gain = np.linalg.solve(effort + bd.T @ p @ bd, bd.T @ p @ ad)
     return [float(value) for value in gain[0]]

@@ -1,0 +1,112 @@
+r"""The arm holds the end-effector where the plan wants it while the base is pushed about.
+
+The base cannot be held better than its tilting allows: under the disturbance it wanders by
+centimetres, and every correction swings whatever hangs below. The arm is ten times as
+quick. Each tick it is asked for the joint angles that put the end-effector, seen from where
+the base really is, on its planned path, as far as the arm's plane and its limits allow;
+across the plane it can do nothing.
+
+Source: docs/equations.md T3.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from fsw.model.airframe import Airframe
+from fsw.model.arm_kinematics import END_EFFECTOR, arm_points
+from fsw.model.prediction import to_vector
+from fsw.signals import PredictionState, StateEstimate, Vec2, Vec3
+
+
+@dataclass(frozen=True, slots=True)
+class CompensationLimits:
+    """How far the arm may leave its planned pose to compensate."""
+
+    reach: float = 0.985  # of the straight arm; beyond it the elbow loses its side
+    fold: float = 0.25  # of the straight arm; closer to the base it folds through itself
+    joint_margin: float = 0.03  # rad, kept to the joint limits
+
+
+def planned_end_effector(airframe: Airframe, plan: PredictionState) -> tuple[Vec3, Vec3]:
+    """World position and velocity of the end-effector in the plan's state."""
+    points = np.empty((2, 2, 3))
+    arm_points(to_vector(plan), *airframe.link_length, points)
+    (px, py, pz), (vx, vy, vz) = points[END_EFFECTOR].tolist()
+    return (px, py, pz), (vx, vy, vz)
+
+
+def compensated_joints(
+    airframe: Airframe,
+    limits: CompensationLimits,
+    estimate: StateEstimate,
+    plan: PredictionState,
+) -> tuple[Vec2, Vec2]:
+    """Joint angles and rates that keep the end-effector on its planned path.
+
+    Args:
+        airframe: Links and joint limits.
+        limits: Where compensation stops.
+        estimate: The vehicle now.
+        plan: Where the plan wants it now; its elbow decides on which side ours stays.
+
+    Returns:
+        Angles [rad] and rates [rad/s]; the plan's own where the arm is (nearly) straight.
+    """
+    l1, l2 = airframe.link_length
+    p_WE, v_WE = planned_end_effector(airframe, plan)
+    x, z, vx, vz = _seen_from_base(estimate, p_WE, v_WE)
+    length = math.hypot(x, z)
+    bent = abs(math.sin(plan.q_arm[1]))
+    if bent < _LEAST_BEND or length < 1e-3:
+        return plan.q_arm, plan.qd_arm
+    straight = l1 + l2
+    scale = min(max(length, limits.fold * straight), limits.reach * straight) / length
+    x, z = x * scale, z * scale
+    cos2 = (x * x + z * z - l1 * l1 - l2 * l2) / (2.0 * l1 * l2)
+    th2 = math.copysign(math.acos(min(max(cos2, -1.0), 1.0)), plan.q_arm[1])
+    th1 = math.atan2(x, z) - math.atan2(l2 * math.sin(th2), l1 + l2 * math.cos(th2))
+    th1, th12 = _within_limits(airframe, limits, th1, th1 + th2)
+    return (th1, th12 - th1), _rates(airframe, th1, th12, vx, vz)
+
+
+_LEAST_BEND = 0.2  # sine of the elbow; a straighter arm has no side to stay on
+
+
+def _seen_from_base(
+    estimate: StateEstimate, p_WE: Vec3, v_WE: Vec3
+) -> tuple[float, float, float, float]:
+    """Where the point is in the arm's plane of the real body, and how it moves there."""
+    R, p, v = estimate.R_WB, estimate.p_WB, estimate.v_WB
+    dx, dy, dz = p_WE[0] - p[0], p_WE[1] - p[1], p_WE[2] - p[2]
+    ux, uy, uz = v_WE[0] - v[0], v_WE[1] - v[1], v_WE[2] - v[2]
+    x = R[0] * dx + R[3] * dy + R[6] * dz
+    y = R[1] * dx + R[4] * dy + R[7] * dz
+    z = R[2] * dx + R[5] * dy + R[8] * dz
+    wx, wy, wz = estimate.w_WB_B
+    vx = R[0] * ux + R[3] * uy + R[6] * uz - (wy * z - wz * y)
+    vz = R[2] * ux + R[5] * uy + R[8] * uz - (wx * y - wy * x)
+    return x, z, vx, vz
+
+
+def _within_limits(airframe: Airframe, limits: CompensationLimits, th1: float, th12: float) -> Vec2:
+    bound1 = airframe.joint1_limit - limits.joint_margin
+    bound12 = airframe.joint12_limit - limits.joint_margin
+    return min(max(th1, -bound1), bound1), min(max(th12, -bound12), bound12)
+
+
+def _rates(airframe: Airframe, th1: float, th12: float, vx: float, vz: float) -> Vec2:
+    """Joint rates for a velocity of the end-effector in the body's x-z plane."""
+    l1, l2 = airframe.link_length
+    x1, z1 = l1 * math.sin(th1), l1 * math.cos(th1)
+    x2, z2 = l2 * math.sin(th12), l2 * math.cos(th12)
+    # [vx, vz] = [[z1, z2], [-x1, -x2]] [w1, w12]
+    determinant = z2 * x1 - z1 * x2
+    if abs(determinant) < 0.1 * l1 * l2:
+        return 0.0, 0.0
+    w1 = (-x2 * vx - z2 * vz) / determinant
+    w12 = (x1 * vx + z1 * vz) / determinant
+    return w1, w12 - w1
