@@ -26,8 +26,8 @@ class PlannerConfig:
     limits: InputLimits = field(default_factory=InputLimits)
     joint_slack: SlackPrice = field(default_factory=lambda: SlackPrice(50.0))
     # blf
-    walls: BarrierTuning = field(default_factory=lambda: BarrierTuning(robustness=0.4))
-    workspace: BarrierTuning = field(default_factory=lambda: BarrierTuning(robustness=0.267))
+    walls: BarrierTuning = field(default_factory=BarrierTuning)
+    workspace: BarrierTuning = field(default_factory=BarrierTuning)
     barrier_slack: SlackPrice = field(default_factory=lambda: SlackPrice(20.0))
     # hc
     tightening: float = 0.0  # m, kept in addition to the safe set

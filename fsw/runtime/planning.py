@@ -10,7 +10,6 @@ from fsw.model.rotors import MotionState
 from fsw.parameters.flight_config import FlightConfig
 from fsw.runtime.flight_state import PlanMemory
 from fsw.signals import (
-    ConstraintKind,
     EndEffectorTarget,
     Plan,
     PlanFailure,
@@ -132,14 +131,13 @@ def ask(
 ) -> tuple[PlanRequest, PlanMemory]:
     """The question for this period.
 
-    The plan starts from the running plan's own state where the fast loop can hold the
-    vehicle to it, and from the measurement otherwise: beside walls, where the planner must
-    see the disturbance itself; with the PID inner loop, which follows no state; after an
-    upset. Either is moved on to the instant the answer takes effect.
+    The plan starts from the running plan's own state as long as the fast loop holds the
+    vehicle to it, and from the measurement otherwise: with the PID inner loop, which
+    follows no state, and after an upset. Either is moved on to the instant the answer
+    takes effect.
     """
     from_nominal = (
         config.inner == "tracking"
-        and safe_set.kind is not ConstraintKind.WALLS
         and math.dist(nominal.p, measured.p) < config.upset_distance
     )
     u = plan_input(memory.running, nominal, now_us)
