@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import pytest
 
 from fsw.mpc.planner import Planner
 from fsw.parameters.flight_config import flight_config
-from fsw.signals import Mode, PlanFailure, PlanRequest, PlanTimings, SensorFrame, SolverStatus
+from fsw.signals import Mode, Plan, PlanFailure, PlanRequest, PlanTimings, SensorFrame, SolverStatus
 from fsw.vehicle.faults import Fault
 from sitl.scenario_file import load_scenario
 from sitl.simulation import START_US, STEP_US
@@ -23,7 +24,7 @@ class FailsFrom:
         self._planner = planner
         self._first_failure = first_failure
 
-    def plan(self, request: PlanRequest) -> object:
+    def plan(self, request: PlanRequest) -> Plan | PlanFailure:
         if request.plan_id < self._first_failure:
             return self._planner.plan(request)
         nothing = PlanTimings(0.0, 0.0, 0.0)
@@ -76,12 +77,12 @@ def test_without_plans_the_vehicle_brakes_and_stays_put(first_failure: int) -> N
     assert flight.mode is Mode.TRAJECTORY
 
 
-def lost_between(first: int, last: int) -> object:
+def lost_between(first: int, last: int) -> Callable[[SensorFrame], SensorFrame]:
     """Position is no number in steps first..last."""
 
     def spoil(frame: SensorFrame) -> SensorFrame:
         step = (frame.t_us - START_US) // STEP_US
-        return replace(frame, p_WB=(math.nan,) * 3) if first <= step <= last else frame
+        return replace(frame, p_WB=(math.nan, 0.0, 0.0)) if first <= step <= last else frame
 
     return spoil
 

@@ -58,7 +58,7 @@ def frozen_normals(case: Case) -> Array:
 
 
 def h_along(n: Array, e: Array, w: Array) -> float:
-    return float(safe_speed(RADIUS - n @ e) - n @ w)
+    return safe_speed(RADIUS - float(n @ e)) - float(n @ w)
 
 
 def h_by_hand(case: Case, change: Array | float, normals: Array) -> Array:
@@ -121,6 +121,13 @@ def test_reported_h_is_the_smaller_of_the_papers_pair_at_the_start() -> None:
         n = e / np.linalg.norm(e)
         expected = min(h_along(n, e, w), h_along(-n, e, w))
         assert barrier.at_start()[0] == pytest.approx(expected)
+
+
+def test_no_row_has_a_gradient_where_its_pattern_says_it_feels_nothing() -> None:
+    barrier = WorkspaceBarrier(SPHERE, TUNING, NODES)
+    case = case_at(np.random.default_rng(3), 0.05)
+    barrier.refill(case.horizon(), case.targets)
+    assert not barrier.rows.gradient[~barrier.rows.feels()].any()
 
 
 def test_one_slack_a_node() -> None:

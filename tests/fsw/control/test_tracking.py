@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -66,7 +67,8 @@ def test_the_vehicle_is_snapped_towards_the_plan(yaw: float, axis: int, quantity
     error = [0.0] * len(getattr(PLAN, quantity))
     error[axis] = size
     start = getattr(PLAN, quantity)
-    ahead = replace(PLAN, **{quantity: tuple(a + b for a, b in zip(start, error, strict=True))})
+    changed: dict[str, Any] = {quantity: tuple(a + b for a, b in zip(start, error, strict=True))}
+    ahead = replace(PLAN, **changed)
     estimate, motion = on_plan(Rotation.from_euler("Z", yaw), PLAN)
     # The plan's own feed-forward depends on a and j; u follows so that it stays the same.
     u = PlanInput(

@@ -22,7 +22,7 @@ MODEL = condense(LagModel(), 0.1, N)
 WALLS = (Wall((-1.0, 0.0, 0.0), -1.0, 0.1), Wall((0.0, 0.6, 0.8), -1.5, 0.1))
 SPHERE = WorkspaceSphere((0.0, 0.0, -0.225), 0.075)
 
-COSTS = {
+COSTS: dict[str, Cost] = {
     "tracking": TrackingCost(CostWeights()),
     "printed": TrackingCost(CostWeights(relative_velocity=False)),
     "soft walls": SoftWallCost(WALLS, SoftWeights()),
