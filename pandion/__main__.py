@@ -14,9 +14,10 @@ usage: pandion VERB [options]
 Flight software for aerial manipulators, with a simulator, over MAVLink 2.
 
 verbs:
-  fly     start the simulator and the flight software, fly a scenario, print the verdict
-  sitl    run the simulator alone
-  fsw     run the flight software alone
+  fly         start the simulator and the flight software, fly a scenario, print the verdict
+  sitl        run the simulator alone
+  fsw         run the flight software alone
+  reproduce   fly a table or a figure of the paper again
 
 options:
   --version   print the version
@@ -27,6 +28,7 @@ examples:
   pandion fly workspace-calm --realtime --duration 20
   pandion sitl walls --listen udp:127.0.0.1:4560
   pandion fsw --sim udp:127.0.0.1:4560 --gcs udp:127.0.0.1:14550
+  pandion reproduce table4 --plant double-integrator --seeds 100:120
 """
 
 
@@ -74,7 +76,18 @@ def _fsw(argv: list[str]) -> int:
     return entry.run(arguments.options(parser.read(argv)))
 
 
-VERBS: Final[dict[str, Callable[[list[str]], int]]] = {"fly": _fly, "sitl": _sitl, "fsw": _fsw}
+def _reproduce(argv: list[str]) -> int:
+    from pandion import reproduce
+
+    return reproduce.main(argv)
+
+
+VERBS: Final[dict[str, Callable[[list[str]], int]]] = {
+    "fly": _fly,
+    "sitl": _sitl,
+    "fsw": _fsw,
+    "reproduce": _reproduce,
+}
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -1,0 +1,66 @@
+"""Drawings as SVG text. The only importer of matplotlib, which is loaded when first needed."""
+
+from __future__ import annotations
+
+import io
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure as Canvas
+
+TARGET, BASE, END_EFFECTOR, BOUND = "#2da44e", "#0969da", "#e36209", "#8c959f"
+WALL = "#cf222e"
+
+_METADATA = re.compile(r"\s*<metadata>.*?</metadata>", re.DOTALL)
+
+
+class NoMatplotlibError(RuntimeError):
+    """The figures were asked for where matplotlib is not installed."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sheet:
+    """A canvas and its axes, row by row."""
+
+    canvas: Canvas
+    axes: list[list[Axes]]
+
+    def svg(self) -> str:
+        """The drawing; equal drawings give equal text."""
+        import matplotlib as mpl
+
+        text = io.StringIO()
+        # Without a salt and with a date, two equal runs would differ.
+        with mpl.rc_context({"svg.hashsalt": "pandion", "svg.fonttype": "none"}):
+            self.canvas.savefig(text, format="svg", metadata={"Date": None, "Creator": None})
+        return _METADATA.sub("", text.getvalue())
+
+
+def sheet(rows: int, columns: int, width: float, height: float, **options: Any) -> Sheet:
+    """An empty sheet of axes.
+
+    Args:
+        rows: Of axes.
+        columns: Of axes.
+        width: Of the sheet [inch].
+        height: Of the sheet [inch].
+        options: For ``Figure.subplots``, such as ``sharex``.
+
+    Raises:
+        NoMatplotlibError: With the sentence that says how to get it.
+    """
+    try:
+        from matplotlib.figure import Figure
+    except ImportError as error:
+        raise NoMatplotlibError(
+            "figures need matplotlib: install pandion[report], or ask for a table"
+        ) from error
+    canvas = Figure(figsize=(width, height), layout="constrained")
+    axes = canvas.subplots(rows, columns, squeeze=False, **options)
+    for ax in axes.flat:
+        ax.grid(visible=True, linewidth=0.4, alpha=0.5)
+        ax.tick_params(labelsize=8)
+    return Sheet(canvas, [list(row) for row in axes])
