@@ -69,6 +69,11 @@ class Child:
         if self._process.poll() is None:
             self._process.send_signal(signal.SIGINT)
 
+    def kill(self) -> None:
+        """End it now."""
+        if self._process.poll() is None:
+            self._process.kill()
+
     def end(self, patience_s: float) -> None:
         """Wait for it, and kill it if it does not end in time."""
         try:

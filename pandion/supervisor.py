@@ -17,7 +17,7 @@ from pandion.parser import COULD_NOT_START
 
 _LISTEN_S: Final = 30.0  # until sitl has bound its port
 _FOLLOW_S: Final = 3.0  # one half ends this soon after the other; the link's stall time is 2 s
-_INTERRUPT_S: Final = 1.5  # after a signal
+_GRACE_S: Final = 0.6  # between one way to end a half and the next, stronger one
 
 
 class HalfFailed(Exception):
@@ -54,7 +54,8 @@ class Supervisor:
         self._flown = Flown()
         self._children: list[Child] = []
         self._selector = selectors.DefaultSelector()
-        self._deadline_s: float | None = None  # when the half that is left is made to end
+        self._deadline_s: float | None = None  # when a half that is left is made to end
+        self._interrupted_all = False
 
     def fly(self, sitl: list[str], fsw: Callable[[int], list[str]]) -> Flown:
         """Run one flight.
@@ -123,6 +124,7 @@ class Supervisor:
             flown.errors[child.name] = event["message"]
         elif kind == "listening":
             flown.port, flown.duration_s = event["port"], event["duration_s"]
+            self._display.say(event["message"])
         elif kind == "flying":
             flown.started = True
         elif kind == "ended" and child.name == "sitl":
@@ -143,15 +145,21 @@ class Supervisor:
             self._deadline_s = time.monotonic() + wait_s
 
     def _hurry(self) -> None:
-        if self._deadline_s is not None and time.monotonic() > self._deadline_s:
-            self._deadline_s = time.monotonic() + _INTERRUPT_S
-            for child in self._children:
+        """Past the deadline: interrupt what still runs, then kill it."""
+        if self._deadline_s is None or time.monotonic() < self._deadline_s:
+            return
+        self._deadline_s = time.monotonic() + _GRACE_S
+        for child in self._children:
+            if self._interrupted_all:
+                child.kill()
+            else:
                 child.interrupt()
+        self._interrupted_all = True
 
     def _interrupt(self, number: int, frame: FrameType | None) -> None:
         """End the simulator, which ends the flight software and still gives a result."""
         self._flown.interrupted = True
-        self._deadline_s = time.monotonic() + _INTERRUPT_S / 2
+        self._deadline_s = time.monotonic() + _GRACE_S
         for child in self._children[:1]:
             child.interrupt()
 

@@ -122,7 +122,11 @@ def _fly(
     result = simulation.result()
     written = _as_json(options, simulation.scenario, result, timing, exchange)
     _write(options, written)
-    told.report("ended", f"sitl: {result.end_reason}", result=written)
+    speed = f"{timing.real_time_factor:.1f} times real time"
+    margin = ""
+    if result.min_margin_m is not None:
+        margin = f", smallest margin {1000.0 * result.min_margin_m:.1f} mm"
+    told.report("ended", f"sitl: {result.end_reason}{margin}, {speed}", result=written)
     return COMPLETED if result.completed else NOT_COMPLETED
 
 

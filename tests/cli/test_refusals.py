@@ -108,7 +108,7 @@ def test_a_scenario_that_starts_outside_its_safe_set_cannot_start(tmp_path: Path
         clearance_m = 0.1
         """
     )
-    done = pandion("fly", str(scenario), cwd=tmp_path)
+    done = pandion("sitl", str(scenario), "--listen", "udp:127.0.0.1:0", cwd=tmp_path)
     assert done.returncode == 2
     assert one_sentence(done.stderr)
     assert "front" in done.stderr

@@ -32,6 +32,7 @@ class Half:
     """``python -m sitl`` or ``python -m fsw`` and its events."""
 
     def __init__(self, module: str, *arguments: str) -> None:
+        self.name = module
         self.events: list[dict[str, Any]] = []
         self.process = subprocess.Popen(
             [sys.executable, "-m", module, *arguments, "--events", "json"],
