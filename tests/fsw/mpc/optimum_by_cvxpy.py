@@ -87,7 +87,10 @@ def optimum(question: Question, config: PlannerConfig) -> Optimum:
         ),
         constraints,
     )
-    problem.solve(solver=cp.CLARABEL)
+    tolerance = 1e-7
+    problem.solve(
+        solver=cp.CLARABEL, tol_gap_abs=tolerance, tol_gap_rel=tolerance, tol_feas=tolerance
+    )
     assert problem.status == cp.OPTIMAL
     return Optimum(
         np.asarray(U.value),
