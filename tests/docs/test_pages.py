@@ -1,0 +1,201 @@
+"""What a reader can try on the pages works: links, files, commands, Python, drawings."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import re
+import runpy
+import shlex
+import struct
+import subprocess
+import sys
+import xml.etree.ElementTree as ET
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from fsw.link.streams import STREAMS
+from fsw.log.tlog import TlogWriter
+from fsw.mpc.planner_config import PlannerConfig
+from messages import dialect
+from messages.frames import FrameWriter
+from messages.reference import reference
+from pandion.__main__ import VERBS, main
+from pandion.reproduce import WHAT
+from sitl.link.encode import StepEncoder
+from sitl.scenario_file import load_scenario, scenario_names
+from sitl.simulation import Simulation
+
+ROOT = Path(__file__).parents[2]
+DOCS = ROOT / "docs"
+PAGES = [ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted(DOCS.rglob("*.md"))]
+LOCAL_POSITION_NED = 32
+
+
+def named(path: Path) -> str:
+    return path.relative_to(ROOT).as_posix()
+
+
+def blocks(page: Path, language: str) -> list[str]:
+    """Fenced blocks of one language."""
+    pattern = rf"^```{language}\n(.*?)^```$"
+    return re.findall(pattern, page.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
+
+
+def without_blocks(page: Path) -> str:
+    return re.sub(r"^```.*?^```$", "", page.read_text(encoding="utf-8"), flags=re.M | re.S)
+
+
+def anchors(page: Path) -> set[str]:
+    """Fragments that GitHub gives to the headings of a page."""
+    headings = re.findall(r"^#+ (.+)$", without_blocks(page), re.MULTILINE)
+    plain = [re.sub(r"[^\w\- ]", "", heading.lower()) for heading in headings]
+    return {heading.replace(" ", "-") for heading in plain}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=named)
+def test_links_resolve(page: Path) -> None:
+    broken = []
+    for target in re.findall(r"\]\(([^)\s]+)\)", without_blocks(page)):
+        if re.match(r"https?:", target):
+            continue
+        file, _, fragment = target.partition("#")
+        other = (page.parent / file).resolve() if file else page
+        if not other.exists() or (fragment and fragment not in anchors(other)):
+            broken.append(target)
+    assert broken == []
+
+
+@pytest.mark.parametrize("page", PAGES, ids=named)
+def test_files_named_in_the_text_exist(page: Path) -> None:
+    names = re.findall(
+        r"`((?:fsw|sitl|messages|pandion|tests|docs)/[\w./-]*)`", without_blocks(page)
+    )
+    generated = {"messages/dialect.py"}
+    assert [name for name in names if name not in generated and not (ROOT / name).exists()] == []
+
+
+def test_decisions_that_the_code_cites_exist() -> None:
+    cited = {
+        name
+        for half in ("fsw", "sitl", "pandion", "messages")
+        for path in (ROOT / half).rglob("*.py")
+        for name in re.findall(r"docs/[\w/-]+\.md", path.read_text(encoding="utf-8"))
+    }
+    assert [name for name in sorted(cited) if not (ROOT / name).exists()] == []
+
+
+def commands() -> list[str]:
+    """Every `pandion` and `make` command line in console blocks."""
+    lines = [
+        line.lstrip("$# ").removeprefix(".venv/bin/")
+        for page in PAGES
+        for block in blocks(page, "console")
+        for line in block.splitlines()
+        if line.startswith(("$ ", "# "))
+    ]
+    return sorted({line for line in lines if line.split()[0] in ("pandion", "make")})
+
+
+@pytest.mark.parametrize("line", commands())
+def test_commands_shown_exist(line: str) -> None:
+    program, *words = shlex.split(line)
+    if program == "make":
+        makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+        assert [word for word in words if f"\n{word}:" not in makefile] == []
+        return
+    if words[0] == "--help":
+        return
+    assert words[0] in VERBS
+    said = io.StringIO()
+    with contextlib.redirect_stdout(said), contextlib.suppress(SystemExit):
+        main([words[0], "--help"])
+    options = {word.partition("=")[0] for word in words if word.startswith("--")}
+    assert [option for option in options if option not in said.getvalue()] == []
+    if words[0] in ("fly", "sitl") and len(words) > 1 and not words[1].startswith("-"):
+        assert words[1] in scenario_names() or words[1].endswith(".toml")
+    if words[0] == "reproduce":
+        assert words[1] in WHAT
+
+
+def examples() -> Iterator[tuple[Path, str]]:
+    for page in [*PAGES, ROOT / "messages" / "README.md"]:
+        for block in blocks(page, "python"):
+            yield page, block
+
+
+@pytest.mark.parametrize(
+    ("page", "code"), examples(), ids=lambda value: named(value) if isinstance(value, Path) else ""
+)
+def test_python_examples_run(
+    page: Path, code: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    write_capture(tmp_path / "link.pcap")
+    write_log(tmp_path / "flight.tlog")
+    (tmp_path / "example.py").write_text(code, encoding="utf-8")
+    runpy.run_path(str(tmp_path / "example.py"))
+
+
+def write_capture(path: Path) -> None:
+    """Three steps of a flight as a capture of the loopback interface would show them."""
+    simulation, encoder = Simulation(load_scenario("walls-calm"), 0), StepEncoder(lockstep=True)
+    packets = [encoder.heartbeat() + encoder.datagram(simulation.sense(), ()) for _ in range(3)]
+    capture = struct.pack("<IHHiIII", 0xA1B2C3D4, 2, 4, 0, 0, 262144, 1)
+    for payload in packets:
+        udp = struct.pack(">HHHH", 4560, 40000, 8 + len(payload), 0) + payload
+        packet = bytes(12) + b"\x08\x00" + b"\x45" + bytes(19) + udp
+        capture += struct.pack("<IIII", 0, 0, len(packet), len(packet)) + packet
+    path.write_bytes(capture)
+
+
+def write_log(path: Path) -> None:
+    """A .tlog with one position."""
+    log = TlogWriter(path, 0)
+    log.add(0, FrameWriter(1, 1).frame(LOCAL_POSITION_NED, 0, 1.0, 2.0, -3.0, 0.0, 0.0, 0.0))
+    log.close()
+
+
+def test_the_reference_of_messages_is_not_stale() -> None:
+    page = DOCS / "messages.md"
+    assert page.read_text(encoding="utf-8") == reference(), "run python -m messages.reference"
+
+
+def test_the_streams_on_the_page_are_those_that_are_sent() -> None:
+    text = (DOCS / "ground-station.md").read_text(encoding="utf-8")
+    table = text.split("<!-- streams -->\n")[1].split("<!-- end -->")[0]
+    shown = [
+        tuple(cell.strip() for cell in line.strip("|").split("|"))
+        for line in table.strip().splitlines()[2:]
+    ]
+    assert shown == [
+        (
+            dialect.mavlink_map[stream.message_id].msgname,
+            str(stream.rate_hz),
+            str(stream.component),
+        )
+        for stream in STREAMS
+    ]
+
+
+def test_the_barrier_constants_on_the_page_are_those_that_are_flown() -> None:
+    text = (DOCS / "equations.md").read_text(encoding="utf-8")
+    config = PlannerConfig()
+    for name, tuning in (("walls", config.walls), ("sphere", config.workspace)):
+        cells = (tuning.alpha, tuning.slope, tuning.gamma, tuning.robustness)
+        assert f"| {name} | " + " | ".join(f"{value:g}" for value in cells) + " |" in text
+
+
+@pytest.mark.parametrize("name", ["frames", "architecture"])
+def test_drawings_are_what_their_script_draws(name: str, tmp_path: Path) -> None:
+    drawn = tmp_path / f"{name}.svg"
+    script = DOCS / "figures" / f"{name}.py"
+    subprocess.run([sys.executable, str(script), str(drawn)], check=True, cwd=ROOT)
+    assert drawn.read_bytes() == (DOCS / "images" / f"{name}.svg").read_bytes()
+
+
+@pytest.mark.parametrize("image", sorted((DOCS / "images").glob("*.svg")), ids=named)
+def test_drawings_are_well_formed(image: Path) -> None:
+    assert ET.parse(image).getroot().tag.endswith("svg")
