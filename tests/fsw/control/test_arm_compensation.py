@@ -1,0 +1,131 @@
+"""The arm puts the end-effector where the plan wants it, seen from where the base really is."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from fsw.control.arm_compensation import (
+    CompensationLimits,
+    compensated_joints,
+    planned_end_effector,
+)
+from fsw.model.airframe import AIRFRAME
+from fsw.model.prediction import Array
+from fsw.signals import PredictionState, StateEstimate, Vec2
+from tests.fsw.model.geometry_by_rotation import attitude, tips
+from tests.fsw.random_states import estimate_of, vec3
+
+LENGTHS = np.array(AIRFRAME.link_length)
+LIMITS = CompensationLimits()
+
+
+def plan_of(random: np.random.Generator) -> PredictionState:
+    """A bent arm on either side, tilted and turned anyhow, well within its limits."""
+    elbow = float(random.choice([-1.0, 1.0])) * random.uniform(0.9, 1.5)
+    ax, ay = (float(a) for a in random.uniform(-1.5, 1.5, 2))
+    return PredictionState(
+        p=vec3(random.uniform(-1.0, 1.0, 3)),
+        v=vec3(random.uniform(-0.3, 0.3, 3)),
+        a=(ax, ay, 0.3),
+        j=(0.2, -0.3),
+        s=(0.0, 0.0),
+        yaw=float(random.uniform(-math.pi, math.pi)),
+        yaw_rate=0.1,
+        q_arm=(float(-0.5 * elbow + random.uniform(-0.1, 0.1)), float(elbow)),
+        qd_arm=(0.1, -0.2),
+    )
+
+
+def attitude_of(plan: PredictionState) -> Rotation:
+    return attitude(np.array(plan.a), plan.yaw)
+
+
+def pushed_within_the_arms_plane(
+    plan: PredictionState, along: float, up: float, lean: float
+) -> StateEstimate:
+    """The base displaced and leaning where the arm can still make up for all of it."""
+    R_WB = attitude_of(plan)
+    away = R_WB.apply([along, 0.0, up])
+    return estimate_of(
+        R_WB * Rotation.from_euler("Y", lean),
+        (0.0, 0.2, 0.0),
+        vec3(np.array(plan.p) + away),
+        vec3(np.array(plan.v) + 0.05),
+        q_arm=plan.q_arm,
+    )
+
+
+def reached(estimate: StateEstimate, q_arm: Vec2) -> Array:
+    R_WB = Rotation.from_matrix(np.reshape(estimate.R_WB, (3, 3)))
+    return np.asarray(tips(np.array(estimate.p_WB), R_WB, np.array(q_arm), LENGTHS)[1])
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_a_pushed_base_does_not_move_the_end_effector(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    plan = plan_of(random)
+    along, up, lean = (float(x) for x in random.uniform(-0.02, 0.02, 3))
+    estimate = pushed_within_the_arms_plane(plan, along, up, lean)
+    q_arm, _ = compensated_joints(AIRFRAME, LIMITS, estimate, plan)
+    planned, _ = planned_end_effector(AIRFRAME, plan)
+    np.testing.assert_allclose(reached(estimate, q_arm), planned, atol=1e-9)
+    assert q_arm[1] * plan.q_arm[1] > 0.0, "the elbow keeps its side"
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_on_the_plan_nothing_is_compensated(seed: int) -> None:
+    plan = plan_of(np.random.default_rng(seed))
+    estimate = pushed_within_the_arms_plane(plan, 0.0, 0.0, 0.0)
+    q_arm, _ = compensated_joints(AIRFRAME, LIMITS, estimate, plan)
+    assert q_arm == pytest.approx(plan.q_arm)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_rates_are_those_of_the_angles_along_the_motion(seed: int) -> None:
+    """Plan and base moved on by a moment; the plan's end-effector at its own velocity."""
+    random = np.random.default_rng(seed)
+    plan = replace(plan_of(random), j=(0.0, 0.0), yaw_rate=0.0)
+    estimate = pushed_within_the_arms_plane(plan, 0.01, -0.01, 0.02)
+    _, rates = compensated_joints(AIRFRAME, LIMITS, estimate, plan)
+    moment = 1e-5
+    angles = [later(plan, estimate, t) for t in (-moment, moment)]
+    expected = (np.array(angles[1]) - np.array(angles[0])) / (2.0 * moment)
+    np.testing.assert_allclose(rates, expected, atol=1e-5)
+
+
+def later(plan: PredictionState, estimate: StateEstimate, t: float) -> Vec2:
+    R_WB = Rotation.from_matrix(np.reshape(estimate.R_WB, (3, 3)))
+    moved = estimate_of(
+        R_WB * Rotation.from_rotvec(t * np.array(estimate.w_WB_B)),
+        estimate.w_WB_B,
+        vec3(np.array(estimate.p_WB) + t * np.array(estimate.v_WB)),
+        estimate.v_WB,
+        estimate.q_arm,
+    )
+    q1, q2 = (float(q) for q in np.array(plan.q_arm) + t * np.array(plan.qd_arm))
+    ahead = replace(plan, p=vec3(np.array(plan.p) + t * np.array(plan.v)), q_arm=(q1, q2))
+    return compensated_joints(AIRFRAME, LIMITS, moved, ahead)[0]
+
+
+def test_far_off_the_arm_stays_within_its_limits() -> None:
+    random = np.random.default_rng(1)
+    for _ in range(100):
+        plan = plan_of(random)
+        along, up = (float(x) for x in random.uniform(-1.0, 1.0, 2))
+        q_arm, rates = compensated_joints(
+            AIRFRAME, LIMITS, pushed_within_the_arms_plane(plan, along, up, 0.0), plan
+        )
+        assert abs(q_arm[0]) <= AIRFRAME.joint1_limit
+        assert abs(q_arm[0] + q_arm[1]) <= AIRFRAME.joint12_limit
+        assert all(map(math.isfinite, rates))
+
+
+def test_a_straight_arm_keeps_to_its_plan() -> None:
+    plan = replace(plan_of(np.random.default_rng(2)), q_arm=(0.1, 0.0))
+    estimate = pushed_within_the_arms_plane(plan, 0.02, 0.0, 0.0)
+    assert compensated_joints(AIRFRAME, LIMITS, estimate, plan) == (plan.q_arm, plan.qd_arm)

@@ -1,0 +1,166 @@
+"""The paper's optimiser and ours on the same nonlinear problem."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.optimize import approx_fprime
+
+from fsw.barriers.soft_rows import TargetPoints
+from fsw.model.prediction import INPUTS, STATES, Array, condense
+from fsw.mpc.planner_config import PlannerConfig
+from fsw.mpc.problem import Problem
+from fsw.mpc.slsqp_solver import Gradients, SlsqpSolver, _Point
+from fsw.mpc.variants import VARIANTS
+from fsw.signals import SafeSet, SolverStatus, Wall, WorkspaceSphere
+
+CONFIG = PlannerConfig()
+N = CONFIG.horizon
+MODEL = condense(CONFIG.lag, CONFIG.period, N)
+WALLS = SafeSet((Wall((-1.0, 0.0, 0.0), -1.0, 0.1), Wall((0.0, 1.0, 0.0), -1.0, 0.1)))
+SPHERE = SafeSet(sphere=WorkspaceSphere((0.0, 0.0, -0.225), 0.075))
+CASES = {"walls": WALLS, "sphere": SPHERE}
+
+
+def instance(random: np.random.Generator, safe_set: SafeSet) -> tuple[Array, TargetPoints]:
+    """Inside the safe set, with a target that moves on steadily, as in flight.
+
+    In the sphere the vehicle moves with it: the directions of eq 23 turn with the iterate,
+    which the programs hold still and numeric gradients feel, in proportion to the speed
+    past the centre.
+    """
+    start = np.zeros(STATES)
+    start[0:3] = random.uniform(-0.6, 0.6, 3)
+    start[13] = random.uniform(-3.0, 3.0)
+    start[15:17] = random.uniform(-0.5, 0.5, 2)
+    speed = random.uniform(-0.15, 0.15, 3)
+    if safe_set.sphere is None:
+        start[0] = random.uniform(0.6, 0.8)  # the wall is at 0.9
+        start[3:6] = random.uniform(-0.3, 0.3, 3)
+    else:
+        start[3:6] = speed
+    along = CONFIG.period * np.arange(N + 1)[:, None] * speed
+    at_start = start[0:3] + [0.0, 0.0, 0.225] + random.uniform(-0.02, 0.02, 3)
+    return start, TargetPoints(at_start + along, np.tile(speed, (N + 1, 1)))
+
+
+def price(problem: Problem, start: Array, targets: TargetPoints, inputs: Array) -> float:
+    """Cost of inputs with the smallest slacks that admit them: what both optimisers minimise."""
+    problem.linearise(start, inputs, targets)
+    program, whole = problem.program, problem.program.whole
+    short = -(whole.b - whole.a[:, : program.inputs] @ inputs)[: program.soft_rows]
+    holds = -whole.a[: program.soft_rows, program.inputs :].toarray()
+    slack = (holds * np.maximum(short, 0.0)[:, None]).max(axis=0, initial=0.0)
+    weight = whole.p.diagonal()[program.inputs :]
+    return float(problem.cost + whole.q[program.inputs :] @ slack + 0.5 * slack @ (weight * slack))
+
+
+def converged(problem: Problem, start: Array, targets: TargetPoints) -> Array:
+    """Quadratic programs until the inputs stay."""
+    inputs = np.zeros(INPUTS * N)
+    for _ in range(40):
+        problem.linearise(start, inputs, targets)
+        solution = problem.solve(last=True)
+        assert solution.usable
+        change = float(np.abs(solution.x[: len(inputs)] - inputs).max())
+        inputs = solution.x[: len(inputs)]
+        if change < 1e-6:
+            break
+    return inputs
+
+
+@pytest.mark.parametrize("gradients", ["numeric", "analytic"])
+@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("controller", VARIANTS)
+def test_both_optimisers_find_the_same_cost(
+    controller: str, case: str, gradients: Gradients
+) -> None:
+    config = replace(CONFIG, controller=controller, hard_skipped_nodes=1)
+    problem = Problem(config, MODEL, CASES[case])
+    solver = SlsqpSolver(gradients)
+    for seed in (1, 2, 3):
+        start, targets = instance(np.random.default_rng(seed), CASES[case])
+        answer = solver.minimise(problem, start, targets)
+        assert answer.usable
+        ours = price(problem, start, targets, converged(problem, start, targets))
+        theirs = price(problem, start, targets, answer.x[: INPUTS * N])
+        assert theirs == pytest.approx(ours, rel=2e-3, abs=1e-4)
+
+
+@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("controller", VARIANTS)
+def test_analytic_slopes_are_those_of_the_cost_and_the_margins(controller: str, case: str) -> None:
+    random = np.random.default_rng(5)
+    problem = Problem(replace(CONFIG, controller=controller), MODEL, CASES[case])
+    start, targets = instance(random, CASES[case])
+    point = _Point(problem, start, targets)
+    x = np.concatenate(
+        (
+            random.uniform(-0.3, 0.3, problem.program.inputs),
+            random.uniform(0.0, 0.1, problem.program.unknowns - problem.program.inputs),
+        )
+    )
+    slope, slopes = point.slope(x).copy(), point.margin_slopes(x)
+    np.testing.assert_allclose(approx_fprime(x, point.cost, 1e-7), slope, rtol=1e-3, atol=1e-3)
+    by_difference = approx_fprime(x, point.margins, 1e-7)
+    if case == "sphere" and controller == "blf":
+        # The directions of eq 23 turn with the guess; the rows hold them still.
+        inside = by_difference - slopes
+        assert float(np.abs(inside).max()) < 0.2 * float(np.abs(slopes).max())
+    else:
+        np.testing.assert_allclose(by_difference, slopes, atol=1e-4)
+
+
+def test_starts_at_rest_with_the_slacks_that_admit_it() -> None:
+    start, targets = instance(np.random.default_rng(6), WALLS)
+    start[3] = 1.0  # fast towards the wall: rest breaks the barrier
+    point = _Point(Problem(CONFIG, MODEL, WALLS), start, targets)
+    x = point.rest()
+    assert (x[: INPUTS * N] == 0.0).all()
+    assert x.max() > 0.0
+    assert point.margins(x).min() >= -1e-12
+
+
+def test_margins_and_bounds_together_admit_what_the_program_admits() -> None:
+    random = np.random.default_rng(7)
+    start, targets = instance(random, WALLS)
+    problem = Problem(CONFIG, MODEL, WALLS)
+    point = _Point(problem, start, targets)
+    whole = problem.program.whole
+    verdicts = set()
+    for _ in range(200):
+        x = point.rest()
+        x[: INPUTS * N] += random.uniform(-1.0, 1.0, INPUTS * N) * random.choice([0.1, 2.0, 5.0])
+        x[3 : INPUTS * N : INPUTS] *= 0.05
+        x[INPUTS * N :] += 3.0
+        admitted = point.margins(x).min() >= 0.0 and all(
+            (low is None or low <= value) and (high is None or value <= high)
+            for value, (low, high) in zip(x, point.bounds(), strict=True)
+        )
+        point.cost(x)
+        left = whole.b - whole.a @ x
+        t, ax, ay = left[whole.nonnegative_rows :].reshape(-1, 3).T
+        expected = left[: whole.nonnegative_rows].min() >= 0.0 and (t >= np.hypot(ax, ay)).all()
+        assert admitted == expected
+        verdicts.add(admitted)
+    assert verdicts == {True, False}
+
+
+def test_no_plan_without_convergence() -> None:
+    start, targets = instance(np.random.default_rng(8), WALLS)
+    answer = SlsqpSolver("analytic", max_iterations=2).minimise(
+        Problem(CONFIG, MODEL, WALLS), start, targets
+    )
+    assert answer.status is SolverStatus.TIME_LIMIT
+    assert not answer.usable
+
+
+def test_what_cannot_be_kept_is_infeasible() -> None:
+    """Far behind a hard wall: nothing brings the vehicle back within half a second."""
+    start, targets = instance(np.random.default_rng(9), WALLS)
+    start[0] = 3.0
+    problem = Problem(replace(CONFIG, controller="hc"), MODEL, WALLS)
+    answer = SlsqpSolver("analytic").minimise(problem, start, targets)
+    assert not answer.usable
