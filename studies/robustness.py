@@ -18,7 +18,7 @@ from sitl.scenario import (
 )
 from studies import deviations
 from studies.campaign import Campaign
-from studies.cases import CASES, configuration, scenario
+from studies.cases import CASES, Case, configuration, grazing, scenario
 from studies.job import Job
 from studies.settings import Report, Settings, Table
 from studies.summary import Cell, fly_cells, interval, metres, millimetres, seen
@@ -75,19 +75,27 @@ CHANGES: dict[str, Change] = {
     "impulses": _pushed,
 }
 
+GRAZING = "grazing path"  # of Case I only
+
 _HEADERS = ("case", "change", "passed", "95 %", "worst margin mm", "TE m")
+
+
+def _changed(case: Case, name: str, duration_s: float | None) -> Scenario:
+    change = grazing if name == GRAZING else CHANGES[name]
+    return change(scenario(case, disturbed=True, duration_s=duration_s))
 
 
 def run(settings: Settings, campaign: Campaign) -> Report:
     """Fly every change in both cases; always the full plant, the other has nothing to change."""
     config = configuration("full", "blf", settings.inner)
     named = [(case, name) for case in CASES for name in CHANGES]
+    named.append(("I", GRAZING))
     cells = [
         Cell(
             tuple(
                 Job(
                     "full",
-                    CHANGES[name](scenario(case, disturbed=True, duration_s=settings.duration_s)),
+                    _changed(case, name, settings.duration_s),
                     config,
                     seed,
                 )

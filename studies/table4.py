@@ -69,7 +69,8 @@ def run(settings: Settings, campaign: Campaign) -> Report:
             _table(pairs, comparison, disturbed)
             for comparison in ("paper", "like-for-like")
             for disturbed in (False, True)
-        ),
+        )
+        + (_floors(settings),),
         deviations=deviations.TABLE_4 + deviations.PLANT[settings.plant],
         errors=errors,
     )
@@ -103,6 +104,18 @@ def _table(pairs: list[tuple[_Entry, Summary]], comparison: str, disturbed: bool
         f"{comparison.capitalize()} comparison, {air}",
         _HEADERS,
         tuple(_cells(entry, summary) for entry, summary in chosen),
+    )
+
+
+def _floors(settings: Settings) -> Table:
+    floors = [
+        (case, reference_floor_m(scenario(case, disturbed=False, duration_s=settings.duration_s)))
+        for case in CASES
+    ]
+    return Table(
+        "Least TE of any safe controller: RMS distance of the reference from the safe set",
+        ("case", "TE m"),
+        tuple((case, metres(floor)) for case, floor in floors),
     )
 
 
