@@ -42,6 +42,7 @@ class Display:
             TextColumn("{task.fields[state]}"),
             console=Console(file=self._stream),
             transient=True,
+            refresh_per_second=4,
         )
         self._task = self._bar.add_task("waiting", total=duration_s, state="")
         return self._bar

@@ -97,6 +97,8 @@ def _options(arguments: argparse.Namespace) -> FlyOptions:
     """
     scenario = load_scenario(arguments.scenario)
     parse_address(arguments.gcs)
+    if arguments.json not in (None, "-") and not Path(arguments.json).parent.is_dir():
+        raise NotADirectoryError(f"cannot write {arguments.json}: its directory does not exist")
     if arguments.realtime and arguments.speed not in (None, 1.0):
         raise ScenarioError("--realtime flies at speed 1; --speed needs --lockstep")
     return FlyOptions(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 
 from sitl import arguments
@@ -17,7 +18,8 @@ def main(argv: list[str] | None = None) -> int:
 
 def run(options: arguments.SitlOptions) -> int:
     """Simulate with parsed options; returns the exit code."""
-    # NumPy and numba take a second to import, which `--help` need not wait for.
+    # One thread for BLAS, before NumPy reads it: the other core is the flight software's.
+    os.environ["OPENBLAS_NUM_THREADS"] = "1"
     from sitl import app
 
     return app.run(options)

@@ -8,10 +8,9 @@ from typing import Final, Protocol
 
 from sitl.link import decode
 from sitl.link.decode import Answer
-from sitl.link.udp_endpoint import UdpEndpoint
+from sitl.link.udp_endpoint import RESEND_S, UdpEndpoint
 from sitl.simulation import Controls
 
-RESEND_S: Final = 0.25
 STALL_S: Final = 2.0
 
 _OFF: Final = Controls((0.0, 0.0, 0.0, 0.0), (0.0, 0.0), armed=False)

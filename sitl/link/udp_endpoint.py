@@ -15,6 +15,7 @@ from typing import Final
 
 Address = tuple[str, int]
 
+RESEND_S: Final = 0.25  # patience of one receive, after which a step is sent again
 MAX_DATAGRAM: Final = 2048  # bytes; a larger datagram is cut and its last frame then refused
 
 _ADDRESS = re.compile(r"udp:(?P<host>[^:\s]+):(?P<port>\d{1,5})")

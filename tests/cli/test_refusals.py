@@ -38,6 +38,8 @@ def taken_port() -> Iterator[int]:
         (["fly", "walls", "--gcs", "localhost"], ["localhost", "udp:HOST:PORT"]),
         (["fly", "walls", "--gcs", "udp:127.0.0.1:70000"], ["70000"]),
         (["fly", "walls", "--gcs", "udp:127.0.0.1:14550", "more"], ["more"]),
+        (["fly", "walls", "--json", "no/such/result.json"], ["no/such/result.json"]),
+        (["sitl", "--json", "no/such/result.json"], ["no/such/result.json"]),
         (["sitl", "wals"], ["unknown scenario", "walls"]),
         (["sitl", "--listen", "tcp:1"], ["tcp:1", "udp:HOST:PORT"]),
         (["sitl", "--listen", "udp:192.0.2.1:4560"], ["192.0.2.1"]),

@@ -1,0 +1,132 @@
+"""One flight of a simulation with the vehicle at the other end: built, flown, written down."""
+
+from __future__ import annotations
+
+import dataclasses
+import gc
+import json
+import os
+from pathlib import Path
+from typing import Final
+
+from sitl.arguments import SitlOptions
+from sitl.events import Events
+from sitl.link.encode import StepEncoder
+from sitl.link.exchange import Exchange, Lockstep, RealTime, Stop
+from sitl.link.pilot import flight_plan
+from sitl.link.server import RunTiming, fly, shut_down, wait_for_vehicle
+from sitl.link.udp_endpoint import UdpEndpoint
+from sitl.scenario import Scenario
+from sitl.simulation import START_US, STEP_US, Controls, Simulation
+from sitl.trajectory import TrajectoryPoint
+from sitl.verdict import EndKind, TruthResult
+
+COMPLETED, NOT_COMPLETED = 0, 1  # exit codes
+
+_FIFO_PRIORITY: Final = 50
+
+
+class Flight:
+    """Everything of one run, ready to meet the vehicle."""
+
+    def __init__(
+        self, options: SitlOptions, scenario: Scenario, endpoint: UdpEndpoint, told: Events
+    ) -> None:
+        """Build the plant and compile it.
+
+        Raises:
+            ScenarioError: The scenario contradicts itself or starts outside its safe set.
+        """
+        self._options = options
+        self._endpoint = endpoint
+        self._told = told
+        self._simulation = Simulation(scenario, options.seed)
+        _rehearse(Simulation(scenario, options.seed))
+
+    def wait_for_vehicle(self, stop: Stop) -> bool:
+        """Wait as long as the options allow; False if nobody came."""
+        return wait_for_vehicle(self._endpoint, self._options.wait_s, stop)
+
+    def fly(self, stop: Stop) -> int:
+        """Fly to the end and report; returns the exit code."""
+        options, simulation, endpoint = self._options, self._simulation, self._endpoint
+        self._told.report("flying", "sitl: flying")
+        encoder = StepEncoder(lockstep=not options.realtime)
+        plan = flight_plan(simulation.scenario, self._target_at)
+        self._settle()
+        exchange = self._exchange(stop)
+        timing = fly(simulation, plan, exchange, encoder, stop, self._progress)
+        stopped = simulation.ended is not None and simulation.ended.kind is EndKind.STOPPED
+        # A vehicle that has just been silent for two seconds is not worth another one.
+        shut_down(endpoint, encoder, tries=1 if stopped else 4)
+        result = simulation.result()
+        written = self._as_json(result, timing, exchange)
+        self._write(written)
+        self._told.report("ended", f"sitl: {_summary(result, timing)}", result=written)
+        return COMPLETED if result.completed else NOT_COMPLETED
+
+    def _target_at(self, t_us: int) -> TrajectoryPoint:
+        return self._simulation.target_at(1e-6 * (t_us - START_US))
+
+    def _progress(self, time_s: float, margin_m: float | None, real_time_factor: float) -> None:
+        values = {"t_s": time_s, "min_margin_m": margin_m, "real_time_factor": real_time_factor}
+        self._told.report("progress", "", **values)
+
+    def _exchange(self, stop: Stop) -> Exchange:
+        joints = len(self._simulation.vehicle.links)
+        period_s = 1e-6 * STEP_US
+        if self._options.realtime:
+            return RealTime(self._endpoint, joints, period_s)
+        speed = self._options.speed
+        paced_s = None if speed is None else period_s / speed
+        return Lockstep(self._endpoint, joints, paced_s, stop)
+
+    def _settle(self) -> None:
+        """Stop the garbage collector: sweeping numba's objects takes tens of milliseconds."""
+        gc.collect()
+        gc.freeze()
+        gc.disable()
+        if not self._options.realtime:
+            return
+        try:
+            os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(_FIFO_PRIORITY))
+        except OSError:
+            reason = "sitl: no permission for real-time scheduling: steps may be late"
+            self._told.report("warning", reason)
+
+    def _as_json(
+        self, result: TruthResult, timing: RunTiming, exchange: Exchange
+    ) -> dict[str, object]:
+        return {
+            "scenario": self._simulation.scenario.name,
+            "seed": self._options.seed,
+            **dataclasses.asdict(result),
+            "real_time_factor": timing.real_time_factor,
+            "steps": timing.steps,
+            "resent_steps": exchange.counts.resent,
+            "missed_steps": exchange.counts.missed,
+        }
+
+    def _write(self, result: dict[str, object]) -> None:
+        text = json.dumps(result, indent=2) + "\n"
+        if self._options.json == "-":
+            print(text, end="", flush=True)
+        elif self._options.json is not None:
+            Path(self._options.json).write_text(text, encoding="utf-8")
+        if self._options.out is not None:
+            (self._options.out / "sitl.json").write_text(text, encoding="utf-8")
+
+
+def _rehearse(simulation: Simulation) -> None:
+    """Take one step of a simulation that is thrown away, so that every kernel is compiled."""
+    simulation.sense()
+    joints = len(simulation.vehicle.links)
+    simulation.advance(Controls((0.5, 0.5, 0.5, 0.5), (0.0,) * joints, armed=True))
+    simulation.sense()
+
+
+def _summary(result: TruthResult, timing: RunTiming) -> str:
+    margin = ""
+    if result.min_margin_m is not None:
+        margin = f", smallest margin {1000.0 * result.min_margin_m:.1f} mm"
+    return f"{result.end_reason}{margin}, {timing.real_time_factor:.1f} times real time"
