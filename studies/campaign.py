@@ -88,16 +88,18 @@ class Campaign:
         if self.journal is not None and not row.error:
             self.journal.parent.mkdir(parents=True, exist_ok=True)
             with self.journal.open("a", encoding="utf-8") as lines:
-                lines.write(json.dumps({"key": key, **row.as_json()}) + "\n")
+                # A line of its own even after one that an interrupt cut short.
+                lines.write("\n" + json.dumps({"key": key, **row.as_json()}) + "\n")
 
 
 def _read(journal: Path) -> dict[str, Outcome]:
-    """Rows of a journal; a last line cut short by an interrupt is dropped."""
+    """Rows of a journal; empty lines and one cut short by an interrupt are dropped."""
     known = {}
     for line in journal.read_text(encoding="utf-8").splitlines():
         try:
             row = json.loads(line)
         except json.JSONDecodeError:
             continue
-        known[row.pop("key")] = Outcome(**row)
+        key = row.pop("key")
+        known[key] = Outcome(**row)
     return known

@@ -70,8 +70,7 @@ class InverseWorkspace:
 
     def inscribed_radius(self, x: float, up: float) -> float:
         """Radius of the largest disc about a centre [m]; negative depth outside the set."""
-        distance = float(self._nearest.query((x, up))[0])
-        return distance if bool(self.contains(np.array(x), np.array(up))) else -distance
+        return float(self._radii(np.array([x]), np.array([up]))[0])
 
     def largest(self, *, on_axis: bool = False) -> Inscribed:
         """The largest inscribed disc, anywhere or with its centre straight above the point.
@@ -79,19 +78,22 @@ class InverseWorkspace:
         A grid over the whole set is refined around its best point until 0.01 mm.
         """
         reach = sum(self._airframe.link_length)
-        width = 0.0 if on_axis else reach
-        best, step = Inscribed(0.0, 0.0, -math.inf), reach / 60.0
-        x, up, span = 0.0, 0.0, reach
+        step, span = reach / 60.0, reach
+        best = Inscribed(0.0, 0.0, self.inscribed_radius(0.0, 0.0))
         while step > 1e-5:
-            for xi in np.arange(x - width, x + width + 0.5 * step, step):
-                for upi in np.arange(up - span, up + span + 0.5 * step, step):
-                    radius = self.inscribed_radius(float(xi), float(upi))
-                    if radius > best.radius_m:
-                        best = Inscribed(float(xi), float(upi), radius)
-            x, up, span = best.x_m, best.up_m, 2.0 * step
-            width = 0.0 if on_axis else span
-            step *= 0.25
+            offsets = np.arange(-span, span + 0.5 * step, step)
+            across = np.zeros(1) if on_axis else offsets
+            x, up = np.meshgrid(best.x_m + across, best.up_m + offsets)
+            radii = self._radii(x.ravel(), up.ravel())
+            k = int(np.argmax(radii))
+            if radii[k] > best.radius_m:
+                best = Inscribed(float(x.flat[k]), float(up.flat[k]), float(radii[k]))
+            span, step = 2.0 * step, 0.25 * step
         return best
+
+    def _radii(self, x: Array, up: Array) -> Array:
+        distance = self._nearest.query(np.stack([x, up], axis=1))[0]
+        return np.asarray(np.where(self.contains(x, up), distance, -distance))
 
     def _permitted(self, th1: Array, th12: Array) -> NDArray[np.bool_]:
         limits = self._airframe

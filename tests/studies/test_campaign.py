@@ -1,0 +1,59 @@
+"""Campaigns: each flight once, resumable, and dead processes are rows."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from studies import campaign as campaign_module
+from studies.campaign import Campaign
+from studies.cases import configuration, scenario
+from studies.job import Job, Outcome
+
+FLOWN = scenario("II", disturbed=True, duration_s=0.5)
+CONFIG = configuration("double-integrator")
+JOBS = [Job("double-integrator", FLOWN, CONFIG, seed) for seed in (1, 2, 1)]
+
+
+def test_equal_jobs_are_flown_once_and_answered_each(monkeypatch: pytest.MonkeyPatch) -> None:
+    flown = []
+
+    def count(job: Job) -> Outcome:
+        flown.append(job.seed)
+        return Outcome(job.seed, completed=True, reason="")
+
+    monkeypatch.setattr(campaign_module, "outcome", count)
+    told: list[tuple[int, int]] = []
+    rows = Campaign(0, report=lambda done, total: told.append((done, total))).fly(JOBS)
+    assert flown == [1, 2]
+    assert [row.seed for row in rows] == [1, 2, 1]
+    assert told == [(0, 2), (1, 2), (2, 2)]
+
+
+def test_a_journal_resumes_and_survives_a_line_cut_short(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    journal = tmp_path / "journal.jsonl"
+    first = Campaign(0, journal).fly(JOBS[:1])
+    with journal.open("a") as lines:
+        lines.write('{"key": "cut sh')
+    flown = []
+
+    def count(job: Job) -> Outcome:
+        flown.append(job.seed)
+        return Outcome(job.seed, completed=False, reason="")
+
+    monkeypatch.setattr(campaign_module, "outcome", count)
+    rows = Campaign(0, journal).fly(JOBS)
+    assert flown == [2]
+    assert rows[0] == first[0]
+    assert Campaign(0, journal).fly(JOBS) == rows
+    assert flown == [2]
+
+
+def test_a_pool_flies_what_one_process_flies() -> None:
+    here, there = Campaign(0).fly(JOBS[:2]), Campaign(1).fly(JOBS[:2])
+    for one, other in zip(here, there, strict=True):
+        assert (one.te_m, one.margin_m, one.ce_sum) == (other.te_m, other.margin_m, other.ce_sum)
+        assert not one.error
