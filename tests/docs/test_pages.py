@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import json
 import re
 import runpy
 import shlex
@@ -24,6 +25,7 @@ from messages.frames import FrameWriter
 from messages.reference import reference
 from pandion.__main__ import VERBS, main
 from pandion.reproduce import WHAT
+from pandion.result import Parts, as_json
 from sitl.link.encode import StepEncoder
 from sitl.scenario_file import load_scenario, scenario_names
 from sitl.simulation import Simulation
@@ -127,7 +129,9 @@ def examples() -> Iterator[tuple[Path, str]]:
 
 
 @pytest.mark.parametrize(
-    ("page", "code"), examples(), ids=lambda value: named(value) if isinstance(value, Path) else ""
+    ("page", "code"),
+    list(examples()),
+    ids=lambda value: named(value) if isinstance(value, Path) else "",
 )
 def test_python_examples_run(
     page: Path, code: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -135,6 +139,9 @@ def test_python_examples_run(
     monkeypatch.chdir(tmp_path)
     write_capture(tmp_path / "link.pcap")
     write_log(tmp_path / "flight.tlog")
+    (tmp_path / "result.json").write_text(
+        json.dumps({"margins_m": {"front/base": 0.1}, "completed": True}), encoding="utf-8"
+    )
     (tmp_path / "example.py").write_text(code, encoding="utf-8")
     runpy.run_path(str(tmp_path / "example.py"))
 
@@ -156,6 +163,15 @@ def write_log(path: Path) -> None:
     log = TlogWriter(path, 0)
     log.add(0, FrameWriter(1, 1).frame(LOCAL_POSITION_NED, 0, 1.0, 2.0, -3.0, 0.0, 0.0, 0.0))
     log.close()
+
+
+def test_the_keys_of_the_result_on_the_page_are_those_that_are_written() -> None:
+    result = as_json(Parts("walls", 0, "blf", None, None, None, {}))
+    rows = re.findall(r"^\| (`.*?) \| (.*) \|$", (DOCS / "result.md").read_text("utf-8"), re.M)
+    meaning = {key: text for keys, text in rows for key in re.findall(r"`(\w+)`", keys)}
+    assert list(meaning) == list(result)
+    for part in ("mpc", "inner", "control_effort", "control_smoothness"):
+        assert set(re.findall(r"`(\w+)`", meaning[part])) == set(result[part])
 
 
 def test_the_reference_of_messages_is_not_stale() -> None:
