@@ -185,10 +185,15 @@ def test_a_signal_ends_everything_within_two_seconds_with_a_verdict(
     assert frozen or result["mpc"]["p50_us"] > 0.0
 
 
-def test_children_die_with_a_killed_parent(flying: subprocess.Popen[str]) -> None:
-    flying.kill()
-    flying.wait()
-    assert group_is_empty(flying.pid)
+def test_children_die_with_a_killed_parent(tmp_path: Path) -> None:
+    process = start("fly", "--gcs", f"udp:127.0.0.1:{free_port()}", cwd=tmp_path)
+    try:
+        read_until(process, "preparing")  # which the flight software says: both are there
+        process.kill()
+        process.wait()
+        assert group_is_empty(process.pid)
+    finally:
+        clean_up(process)
 
 
 def test_a_crash_of_the_flight_software_is_one_sentence(

@@ -1,0 +1,76 @@
+"""Starting and ending the flight software, with a program that only stands there."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import threading
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from fsw import app
+from fsw.arguments import FswOptions
+from fsw.runtime.program import FlightProgram
+from fsw.signals import Plan, PlanFailure, PlanRequest, TickInputs, TickOutputs
+from tests.link.snapshots import FACTS, outputs_at
+
+
+class NoPlanner:
+    """Never asked."""
+
+    def plan(self, request: PlanRequest) -> Plan | PlanFailure:
+        raise AssertionError("nobody asks")
+
+
+def standing(state: int, inputs: TickInputs) -> tuple[int, TickOutputs]:
+    return state + 1, outputs_at(inputs.sensors.t_us)
+
+
+def load(options: FswOptions) -> FlightProgram[int]:
+    return FlightProgram(FACTS, 0, standing, NoPlanner())
+
+
+@pytest.fixture
+def options(tmp_path: Path) -> Iterator[FswOptions]:
+    handlers = [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)]
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as silent:
+        silent.bind(("127.0.0.1", 0))
+        address = f"udp:127.0.0.1:{silent.getsockname()[1]}"
+        yield FswOptions(address, address, "blf", "tracking", tmp_path, 0.4, "text")
+    for number, handler in zip((signal.SIGINT, signal.SIGTERM), handlers, strict=True):
+        signal.signal(number, handler)
+
+
+def test_a_simulator_that_never_answers_ends_the_wait(
+    options: FswOptions, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert app.run(options, load) == app.COULD_NOT_START
+    said = capsys.readouterr().err
+    assert said == f"fsw: no simulator answered at {options.sim} within 0.4 s\n"
+
+
+def test_nobody_at_the_simulators_port_is_the_same(
+    options: FswOptions, capsys: pytest.CaptureFixture[str]
+) -> None:
+    nobody = replace(options, sim="udp:127.0.0.1:9")
+    assert app.run(nobody, load) == app.COULD_NOT_START
+    assert "no simulator answered at udp:127.0.0.1:9" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_the_wait(options: FswOptions, number: signal.Signals) -> None:
+    threading.Timer(0.2, os.kill, (os.getpid(), number)).start()
+    assert app.run(replace(options, wait_s=30.0), load) == app.NOT_COMPLETED
+    assert (Path(str(options.out)) / "fsw.json").exists()
+
+
+def test_a_directory_with_a_flight_is_refused(
+    options: FswOptions, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (Path(str(options.out)) / "flight.tlog").write_bytes(b"")
+    assert app.run(options, load) == app.COULD_NOT_START
+    assert "already holds a flight" in capsys.readouterr().err
