@@ -9,6 +9,7 @@ mode commands of the scenario's pilot come on the first two ticks.
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from fsw.mpc.planner import Planner
@@ -20,6 +21,7 @@ from fsw.signals import (
     EndEffectorTarget,
     Plan,
     PlanFailure,
+    PlanRequest,
     SensorFrame,
     TickInputs,
     TickOutputs,
@@ -50,7 +52,12 @@ class RefusedError(RuntimeError):
 
 
 def fly(
-    scenario: Scenario, seed: int, config: FlightConfig, *, traced: bool = False
+    scenario: Scenario,
+    seed: int,
+    config: FlightConfig,
+    *,
+    traced: bool = False,
+    asked: Callable[[PlanRequest], None] | None = None,
 ) -> FlightResult:
     """Fly a scenario that starts in the air to its end.
 
@@ -59,18 +66,26 @@ def fly(
         seed: Of every random number of the plant.
         config: Of the flight software.
         traced: Keep the truth every TRACE_STEPS steps.
+        asked: Hears every request to the planner.
 
     Raises:
         RefusedError: The vehicle refused to arm or to follow.
     """
-    flight = _Flight(scenario, seed, config, traced)
+    flight = _Flight(scenario, seed, config, traced, asked)
     while flight.simulation.ended is None:
         flight.step()
     return flight.recorder.result(flight.simulation.result())
 
 
 class _Flight:
-    def __init__(self, scenario: Scenario, seed: int, config: FlightConfig, traced: bool) -> None:
+    def __init__(
+        self,
+        scenario: Scenario,
+        seed: int,
+        config: FlightConfig,
+        traced: bool,
+        asked: Callable[[PlanRequest], None] | None,
+    ) -> None:
         self.simulation = Simulation(scenario, seed)
         self.recorder = FlightRecorder()
         self._safe_set = safe_set(scenario)
@@ -81,6 +96,7 @@ class _Flight:
         self._answer: _Answer | None = None
         self._steps_per_plan = config.mpc_period_us // config.tick_period_us
         self._traced = traced
+        self._asked = asked
 
     def step(self) -> None:
         """One exchange between plant and flight software."""
@@ -101,6 +117,8 @@ class _Flight:
         if self._traced and step % TRACE_STEPS == 0:
             self.recorder.trace.append(self._trace_point())
         if outputs.plan_request is not None:
+            if self._asked is not None:
+                self._asked(outputs.plan_request)
             answer = self._planner.plan(outputs.plan_request)
             self.recorder.planned(answer)
             self._answer = _Answer(outputs.plan_request.t_apply_us, answer)
