@@ -131,7 +131,8 @@ class _Session:
             raise CouldNotStart(
                 f"no simulator answered at {options.sim} within {options.wait_s:g} s"
             )
-        realtime = sim.pacing is Pacing.REALTIME
+        # Lockstep announces itself with the first step; a first step without it was not the first.
+        realtime = sim.pacing is not Pacing.LOCKSTEP
         service = _plan_service(realtime, planner, record)
         if realtime:
             share_interpreter_fairly()

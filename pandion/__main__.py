@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable
 from typing import Final
@@ -34,7 +35,17 @@ examples:
 
 def main(argv: list[str] | None = None) -> int:
     """Run one verb; returns the exit code."""
-    words = sys.argv[1:] if argv is None else argv
+    try:
+        return _run(sys.argv[1:] if argv is None else argv)
+    except BrokenPipeError:
+        # Whoever read the output has left. Nothing more can be said, at exit neither.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except KeyboardInterrupt:
+        print("pandion: interrupted", file=sys.stderr)
+    return INTERRUPTED
+
+
+def _run(words: list[str]) -> int:
     if not words or words[0] in ("-h", "--help", "help"):
         print(HELP, end="")
         return 0
@@ -82,6 +93,7 @@ def _reproduce(argv: list[str]) -> int:
     return reproduce.main(argv)
 
 
+INTERRUPTED: Final = 1  # exit code
 VERBS: Final[dict[str, Callable[[list[str]], int]]] = {
     "fly": _fly,
     "sitl": _sitl,

@@ -95,7 +95,7 @@ class SimLoop(Generic[State]):
 
     def fly(self, first: SensorFrame, planner: PlanService) -> FlightEnd:
         """Tick on every step until the simulator, a signal or silence ends it."""
-        realtime = self._sim.pacing is Pacing.REALTIME
+        realtime = self._sim.pacing is not Pacing.LOCKSTEP
         sensors: SensorFrame | None = first
         heard = self._clock()
         t_us = first.t_us

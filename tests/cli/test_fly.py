@@ -196,6 +196,15 @@ def test_children_die_with_a_killed_parent(tmp_path: Path) -> None:
         clean_up(process)
 
 
+def test_a_reader_that_leaves_ends_the_flight_quietly(tmp_path: Path) -> None:
+    process = start("fly", "--gcs", f"udp:127.0.0.1:{free_port()}", cwd=tmp_path)
+    assert process.stdout is not None
+    process.stdout.readline()
+    process.stdout.close()  # what `| head -1` does; standard error is in the same pipe
+    assert process.wait(timeout=20) == 1
+    assert group_is_empty(process.pid)
+
+
 def test_a_crash_of_the_flight_software_is_one_sentence(
     flying: subprocess.Popen[str],
 ) -> None:
