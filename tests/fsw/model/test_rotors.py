@@ -109,9 +109,11 @@ def test_level_hover_has_no_acceleration() -> None:
 
 
 def test_rotors_close_63_percent_of_a_step_in_one_time_constant() -> None:
-    dt = 0.002
-    decay, thrust = rotor_decay(AIRFRAME, dt), (0.0, 10.0, 5.0, 5.0)
+    dt = 0.008  # an odd number of steps: a sign that flips each time must show
+    decay, thrust = rotor_decay(AIRFRAME, dt), (0.0, 10.0, 2.0, 5.0)
     for _ in range(round(AIRFRAME.rotor_lag / dt)):
-        thrust = lag_rotors(thrust, (10.0, 0.0, 5.0, 6.0), decay)
+        thrust = lag_rotors(thrust, (10.0, 0.0, 4.0, 6.0), decay)
     share = 1.0 - math.exp(-1.0)
-    assert thrust == pytest.approx((10.0 * share, 10.0 * (1 - share), 5.0, 5.0 + share))
+    assert thrust == pytest.approx(
+        (10.0 * share, 10.0 * (1 - share), 2.0 + 2.0 * share, 5.0 + share)
+    )
