@@ -120,9 +120,11 @@ def entrants(case: Case, plant: PlantName, inner: Inner) -> tuple[Entrant, ...]:
     """Everyone who flies a case, in both comparisons.
 
     ``paper`` has each controller as the paper describes it, ``blf`` also with the paper's
-    lambda = 5. ``like-for-like`` gives the rivals what ``blf`` has: the same slack and the
-    same first node left out for HC, with and without a tightening, and a centring cost for
-    Naive where there is a centre. Prediction, costs and fast loop are the same for all.
+    lambda = 5 and, in the full plant, as printed: without lag in the prediction, over PIDs,
+    because the tracking loop needs a plan that the vehicle can follow. ``like-for-like`` gives
+    the rivals what ``blf`` has: the same slack and the same first node left out for HC, with and
+    without a tightening, and a centring cost for Naive where there is a centre. Otherwise
+    prediction, costs and fast loop are the same for all.
     """
     naive, hc, sc, blf = (
         configuration(plant, name, inner) for name in ("naive", "hc", "sc", "blf")
@@ -148,6 +150,9 @@ def entrants(case: Case, plant: PlantName, inner: Inner) -> tuple[Entrant, ...]:
     ]
     paper = [("naive", naive), ("hc", hard), ("sc", sc), ("blf", blf)]
     paper.append(("blf-lambda-5", with_lambda(blf, 5.0)))
+    if plant == "full":
+        printed = replace(blf.planner, lag=LagModel(at_once=True))
+        paper.append(("blf-no-lag", replace(blf, inner="pid", planner=printed)))
     return tuple(
         [Entrant("paper", name, config) for name, config in paper]
         + [Entrant("like-for-like", name, config) for name, config in fair]

@@ -14,10 +14,10 @@ PLANT: dict[str, tuple[str, ...]] = {
         "Plant: the exact coupled vehicle and arm with rotor lag instead of the printed eq 6, "
         "whose constant mass matrix neglects the moving centre of mass and counts the links "
         "twice.",
-        "Fast loop: 500 Hz tracking of the MPC's plan (`--inner pid` flies the paper's PIDs); "
-        "with the PIDs the attitude lag alone leads the vehicle out of the sphere.",
-        "Prediction: the MPC knows the attitude lag; the paper's prediction without it loses this "
-        "plant.",
+        "Fast loop: 500 Hz tracking of the MPC's plan for every controller; `--inner pid` flies "
+        "the paper's PIDs instead.",
+        "Prediction: the MPC knows the attitude's lag. blf-no-lag is what the paper prints, "
+        "prediction without lag over PIDs, with our λ.",
     ),
 }
 

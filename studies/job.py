@@ -12,10 +12,9 @@ import numpy as np
 
 import fsw
 import sitl
-import studies
 from fsw.parameters.flight_config import FlightConfig
 from sitl.scenario import EncoderErrors, ImuErrors, PoseErrors, Scenario
-from studies import closed_loop, double_integrator
+from studies import closed_loop, double_integrator, mission
 from studies.flight_result import FlightResult
 
 PlantName = Literal["double-integrator", "full"]
@@ -125,9 +124,10 @@ def score(seed: int, result: FlightResult) -> Outcome:
 @cache
 def sources() -> str:
     """Digest of the code that decides how a flight goes."""
+    halves = [Path(str(package.__file__)).parent for package in (fsw, sitl)]
+    files = [path for folder in halves for path in sorted(folder.rglob("*.py"))]
+    files += [Path(str(shell.__file__)) for shell in (closed_loop, double_integrator, mission)]
     digest = hashlib.sha256()
-    for package in (fsw, sitl, studies):
-        folder = Path(str(package.__file__)).parent
-        for path in sorted(folder.rglob("*.py")):
-            digest.update(path.read_bytes())
+    for path in files:
+        digest.update(path.read_bytes())
     return digest.hexdigest()
