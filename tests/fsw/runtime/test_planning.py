@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
@@ -83,6 +83,7 @@ def test_braking_opposes_every_motion(axis: int, sign: float) -> None:
     assert sign * u.yaw_acc < 0.0
 
 
+@settings(max_examples=20)
 @given(st.tuples(*[st.floats(-3.0, 3.0)] * 3))
 def test_braking_comes_to_rest_without_swinging_back_far(v: Vec3) -> None:
     x, speeds = moving(v), []
