@@ -1,16 +1,18 @@
 """Many flights: a pool of processes, a journal to resume from, progress while it runs.
 
 Each process computes with one thread, so that as many run as there are cores. A flight that
-raises is a row; a process that dies takes the pool with it, so the flights that were out are
-flown again in a new pool, and one that kills its pool twice is a row as well.
+raises is a row. A process that dies takes its pool with it: the flights that were out are then
+flown one by one, each in a process of its own, and the one that kills it again is a row as well.
 """
 
 from __future__ import annotations
 
 import json
 import multiprocessing
-from collections.abc import Callable, Iterator
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+import signal
+from collections import deque
+from collections.abc import Callable, Generator, Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -20,7 +22,7 @@ from studies.one_thread import pin_threads
 
 Report = Callable[[int, int], None]  # flights done, flights in all
 
-_POOLS = 3  # attempts at flights whose process died
+_Named = tuple[str, Job]  # a flight and its key
 
 
 def silent(done: int, total: int) -> None:
@@ -58,30 +60,32 @@ class Campaign:
             for key, job in jobs.items():
                 yield key, outcome(job)
             return
-        left = dict(jobs)
-        for _ in range(_POOLS):
-            for key, row in self._pooled(left):
-                del left[key]
-                yield key, row
-            if not left:
-                return
-        for key, job in left.items():
-            yield key, broken(job, "the process that flew it died")
+        waiting = deque(jobs.items())
+        while waiting:
+            suspects = yield from self._pooled(waiting)
+            for key, job in suspects:
+                yield key, _alone(job)
 
-    def _pooled(self, jobs: dict[str, Job]) -> Iterator[tuple[str, Outcome]]:
-        """What one pool can fly; ends early if a process dies."""
-        pin_threads()  # inherited by the processes, before they load their libraries
-        spawn = multiprocessing.get_context("spawn")
-        pool = ProcessPoolExecutor(self.workers, mp_context=spawn)
-        out: dict[Future[Outcome], str] = {}
+    def _pooled(
+        self, waiting: deque[_Named]
+    ) -> Generator[tuple[str, Outcome], None, tuple[_Named, ...]]:
+        """Fly what waits; returns early, with the flights that were out, if a process dies."""
+        pool = _pool(self.workers)
+        out: dict[Future[Outcome], _Named] = {}
         try:
-            out = {pool.submit(outcome, job): key for key, job in jobs.items()}
-            for future in as_completed(out):
-                yield out[future], future.result()
+            while waiting or out:
+                while waiting and len(out) < self.workers:
+                    out[pool.submit(outcome, waiting[0][1])] = waiting[0]
+                    waiting.popleft()
+                for future in wait(out, return_when=FIRST_COMPLETED).done:
+                    row = future.result()
+                    key, _ = out.pop(future)
+                    yield key, row
         except BrokenProcessPool:
-            return
+            return tuple(out.values())
         finally:
             pool.shutdown(wait=True, cancel_futures=True)
+        return ()
 
     def _keep(self, key: str, row: Outcome) -> None:
         self._known[key] = row
@@ -90,6 +94,26 @@ class Campaign:
             with self.journal.open("a", encoding="utf-8") as lines:
                 # A line of its own even after one that an interrupt cut short.
                 lines.write("\n" + json.dumps({"key": key, **row.as_json()}) + "\n")
+
+
+def _pool(workers: int) -> ProcessPoolExecutor:
+    pin_threads()  # inherited by the processes, before they load their libraries
+    spawn = multiprocessing.get_context("spawn")
+    return ProcessPoolExecutor(workers, mp_context=spawn, initializer=_leave_interrupts)
+
+
+def _leave_interrupts() -> None:
+    """An interrupt is for the campaign to handle; a process finishes its flight."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _alone(job: Job) -> Outcome:
+    """Fly one job in a process that nothing else depends on."""
+    with _pool(1) as pool:
+        try:
+            return pool.submit(outcome, job).result()
+        except BrokenProcessPool:
+            return broken(job, "the process that flew it died")
 
 
 def _read(journal: Path) -> dict[str, Outcome]:

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import os
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any, cast
 
 import pytest
 
+from fsw.parameters.flight_config import FlightConfig
 from studies import campaign as campaign_module
 from studies.campaign import Campaign
 from studies.cases import configuration, scenario
@@ -52,8 +56,18 @@ def test_a_journal_resumes_and_survives_a_line_cut_short(
     assert flown == [2]
 
 
-def test_a_pool_flies_what_one_process_flies() -> None:
-    here, there = Campaign(0).fly(JOBS[:2]), Campaign(1).fly(JOBS[:2])
-    for one, other in zip(here, there, strict=True):
-        assert (one.te_m, one.margin_m, one.ce_sum) == (other.te_m, other.margin_m, other.ce_sum)
-        assert not one.error
+@dataclass(frozen=True)
+class Deadly:
+    """Ends the process that unpacks it."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return os._exit, (1,)
+
+
+def test_a_flight_that_kills_its_process_is_a_row_and_the_others_are_flown() -> None:
+    deadly = replace(JOBS[0], config=cast(FlightConfig, Deadly()))
+    dead, alive = Campaign(1).fly([deadly, JOBS[1]])
+    assert dead.error
+    assert "died" in dead.reason
+    (here,) = Campaign(0).fly(JOBS[1:2])
+    assert (alive.te_m, alive.margin_m, alive.ce_sum) == (here.te_m, here.margin_m, here.ce_sum)
