@@ -279,6 +279,7 @@ class FlightSnapshot:
     counters: PlannerCounters
     constraints: ConstraintReport
     failures: tuple[str, ...] = ()  # active faults, by name
+    landed: bool = False  # stands on the ground, armed or not
 
 
 @dataclass(frozen=True, slots=True)

@@ -86,9 +86,10 @@ def sys_status(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValue
 
 
 def extended_sys_state(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues:
-    """EXTENDED_SYS_STATE: no VTOL, landed state by mode."""
-    landed = {Mode.TAKEOFF: _TAKEOFF, Mode.LAND: _LANDING}.get(snapshot.mode, _IN_AIR)
-    return (0, landed if snapshot.armed else _ON_GROUND)
+    """EXTENDED_SYS_STATE: no VTOL, on the ground or what the mode is doing."""
+    if snapshot.landed or not snapshot.armed:
+        return (0, _ON_GROUND)
+    return (0, {Mode.TAKEOFF: _TAKEOFF, Mode.LAND: _LANDING}.get(snapshot.mode, _IN_AIR))
 
 
 def attitude(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues:

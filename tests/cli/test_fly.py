@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import math
 import os
 import signal
 import socket
@@ -20,7 +21,7 @@ import pytest
 from pymavlink import mavutil
 
 from fsw.link.streams import STREAMS
-from messages.frames import Frame, split
+from messages.frames import Frame, FrameWriter, split
 from tests.cli.command import clean_up, group_is_empty, pandion, read_until, start
 from tests.link.halves import free_port
 
@@ -35,8 +36,11 @@ MPC_KEYS = [
 ]  # fmt: skip
 
 
+QUESTION = (0.0, *(math.nan,) * 6, 31010, 1, 1, 0)  # MAV_CMD_USER_1, which nobody supports
+
+
 class Listener:
-    """A ground station that only listens."""
+    """A ground station that asks one question, and listens."""
 
     def __init__(self) -> None:
         self.frames: list[Frame] = []
@@ -57,9 +61,12 @@ class Listener:
     def _listen(self) -> None:
         while not self._closing.is_set():
             try:
-                self.frames += split(self._socket.recv(4096))
+                datagram, vehicle = self._socket.recvfrom(4096)
             except TimeoutError:
                 continue
+            if not self.frames:
+                self._socket.sendto(FrameWriter(255, 190).frame(76, *QUESTION), vehicle)
+            self.frames += split(datagram)
 
 
 @dataclass
@@ -142,6 +149,16 @@ def test_the_tlog_reads_with_mavutil(lockstep: Flight) -> None:
         counts[message.get_msgId()] += 1
     assert counts[30] == pytest.approx(300, rel=0.02)  # ATTITUDE, 50 Hz
     assert counts[0] >= 6
+    assert counts[76] == 1  # what came from the ground station is in it as well
+
+
+@pytest.mark.parametrize("mode", ["lockstep", "realtime"])
+def test_a_command_that_nobody_supports_is_answered(
+    mode: str, request: pytest.FixtureRequest
+) -> None:
+    flight: Flight = request.getfixturevalue(mode)
+    (ack,) = [frame.payload_values for frame in flight.frames if frame.message_id == 77]
+    assert ack == (31010, 3, 0, 0, 255, 190)
 
 
 def test_real_time_is_real_time(realtime: Flight) -> None:

@@ -108,6 +108,21 @@ def test_a_fault_takes_the_prearm_bit_and_the_suspect_away() -> None:
     assert read_back(stream_of(ids.HEARTBEAT), broken).system_status == 5
 
 
+@pytest.mark.parametrize(
+    ("changes", "landed_state"),
+    [
+        ({"armed": True, "landed": True, "mode": Mode.HOLD}, 1),
+        ({"armed": False, "landed": False, "mode": Mode.DISARMED}, 1),
+        ({"armed": True, "landed": False, "mode": Mode.HOLD}, 2),
+        ({"armed": True, "landed": False, "mode": Mode.TAKEOFF}, 3),
+        ({"armed": True, "landed": False, "mode": Mode.LAND}, 4),
+    ],
+)
+def test_landed_state_is_what_clients_wait_for(changes: dict[str, Any], landed_state: int) -> None:
+    message = read_back(stream_of(ids.EXTENDED_SYS_STATE), replace(SNAPSHOT, **changes))
+    assert message.landed_state == landed_state
+
+
 def test_there_is_nothing_to_say_before_the_first_plan() -> None:
     idle = replace(SNAPSHOT, plan=None, plan_state=None, plan_input=None, reference=None)
     for message_id in (
