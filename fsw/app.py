@@ -5,13 +5,13 @@ from __future__ import annotations
 import traceback
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar, cast
+from typing import Any
 
 from fsw.arguments import FswOptions
 from fsw.link.gcs_link import GcsLink
 from fsw.link.inbox import Inbox
 from fsw.link.sim_link import Pacing, SimLink
-from fsw.link.telemetry import LoopHealth, TelemetryContext, VehicleFacts
+from fsw.link.telemetry import LoopHealth, TelemetryContext
 from fsw.link.udp_endpoint import LinkError, parse_address
 from fsw.log.run_directory import new_run_directory
 from fsw.log.tlog import TlogWriter
@@ -32,12 +32,8 @@ from fsw.runtime.program import FlightProgram
 from fsw.runtime.sim_loop import Ending, FlightEnd, FlightRecord, SimLoop
 from fsw.runtime.timing import GroupTimer
 
-if TYPE_CHECKING:
-    from fsw.control.cascade import Inner
-
 DONE, NOT_COMPLETED, COULD_NOT_START = 0, 1, 2  # exit codes
 
-State = TypeVar("State")
 NO_PERMISSION = "no permission for real-time scheduling: ticks may be late on a busy machine"
 
 ProgramLoader = Callable[[FswOptions], FlightProgram[Any]]
@@ -153,34 +149,13 @@ def load_flight_software(options: FswOptions) -> FlightProgram[Any]:
     Raises:
         CouldNotStart: A controller or inner loop of that name does not exist.
     """
-    # Imported here because SciPy, Clarabel and numba take a second, which `--help` need not wait.
-    from fsw.mpc.planner import Planner as MpcPlanner
-    from fsw.parameters.flight_config import flight_config
-    from fsw.runtime.flight_loop import FlightLoop
-    from fsw.runtime.flight_state import FlightState
+    # Imported here because SciPy, Clarabel and numba take a second, which a refusal need not wait.
+    from fsw.runtime.assembly import flight_software
 
     try:
-        # An unknown name is what the except clause is for.
-        config = flight_config(options.controller, cast("Inner", options.inner))
+        return flight_software(options.controller, options.inner)
     except ValueError as error:
         raise CouldNotStart(str(error)) from None
-    planner = MpcPlanner(config.planner, clock.stopwatch_us)
-    planner.warm_up()
-    facts = VehicleFacts(
-        rotor_thrust_max=config.airframe.rotor_thrust_max,
-        joint_torque_max=config.airframe.joint_torque_max,
-        tick_period_us=config.tick_period_us,
-        mpc_period_us=config.mpc_period_us,
-        mpc_delay_us=config.plan_delay_ticks * config.tick_period_us,
-        horizon=config.planner.horizon,
-        sqp_iterations=config.planner.sqp_iterations,
-    )
-    return FlightProgram(
-        facts=facts,
-        first_state=FlightState(),
-        tick=FlightLoop(config).tick,
-        planner=planner,
-    )
 
 
 def _plan_service(realtime: bool, planner: Planner, record: FlightRecord) -> PlanService:

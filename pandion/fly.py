@@ -2,51 +2,31 @@
 
 from __future__ import annotations
 
-import argparse
 import json
 import sys
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from fsw.link.udp_endpoint import LinkError, parse_address
-from fsw.log.run_directory import new_run_directory
 from pandion.display import Display
+from pandion.fly_options import FlyOptions, add_arguments
+from pandion.fly_options import options as fly_options
 from pandion.parser import COULD_NOT_START, Parser
 from pandion.result import Parts, as_json
 from pandion.supervisor import Flown, HalfFailed, Supervisor
 from pandion.verdict import rows
 from pandion.version import version
-from sitl.arguments import add_run_arguments
-from sitl.scenario_file import ScenarioError, load_scenario
+from sitl.scenario_file import ScenarioError
 
 COMPLETED, NOT_COMPLETED = 0, 1  # exit codes
-
-
-@dataclass(frozen=True, slots=True)
-class FlyOptions:
-    """One flight."""
-
-    scenario: str
-    scenario_name: str
-    seed: int
-    duration_s: float
-    realtime: bool
-    speed: float | None  # None: as fast as possible
-    controller: str
-    inner: str
-    gcs: str
-    out: Path
-    json: str | None
 
 
 def main(argv: list[str]) -> int:
     """Fly once; returns the exit code."""
     parser = Parser("pandion fly", "Fly a scenario and judge the flight.")
-    add_run_arguments(parser)
-    _add_arguments(parser)
+    add_arguments(parser)
     try:
-        options = _options(parser.read(argv))
+        options = fly_options(parser.read(argv))
     except (ScenarioError, LinkError, OSError) as error:
         print(f"pandion fly: {error}", file=sys.stderr)
         return COULD_NOT_START
@@ -60,69 +40,6 @@ def main(argv: list[str]) -> int:
         print(f"pandion fly: {error}", file=sys.stderr)
         return error.exit_code
     return _judge(options, display, flown)
-
-
-def _add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--controller",
-        metavar="NAME",
-        default="blf",
-        help="predictive controller (default %(default)s)",
-    )
-    parser.add_argument(
-        "--inner",
-        metavar="NAME",
-        default="tracking",
-        help="fast loop, tracking or pid (default %(default)s)",
-    )
-    parser.add_argument(
-        "--gcs",
-        metavar="udp:HOST:PORT",
-        default="udp:127.0.0.1:14550",
-        help="where telemetry goes (default %(default)s)",
-    )
-    parser.add_argument(
-        "--out", metavar="DIR", type=Path, help="where logs go (default a new one in runs/)"
-    )
-    parser.add_argument("--json", metavar="FILE", help="write the result; - for standard output")
-
-
-def _options(arguments: argparse.Namespace) -> FlyOptions:
-    """Check everything that can be checked before a process is started.
-
-    Raises:
-        ScenarioError: There is no such scenario.
-        LinkError: The ground station's address is not one.
-        OSError: The directory for the logs cannot be made.
-    """
-    scenario = load_scenario(arguments.scenario)
-    parse_address(arguments.gcs)
-    if arguments.json not in (None, "-") and not Path(arguments.json).parent.is_dir():
-        raise NotADirectoryError(f"cannot write {arguments.json}: its directory does not exist")
-    if arguments.realtime and arguments.speed not in (None, 1.0):
-        raise ScenarioError("--realtime flies at speed 1; --speed needs --lockstep")
-    return FlyOptions(
-        scenario=arguments.scenario,
-        scenario_name=scenario.name,
-        seed=arguments.seed,
-        duration_s=scenario.duration_s if arguments.duration is None else arguments.duration,
-        realtime=arguments.realtime,
-        speed=arguments.speed,
-        controller=arguments.controller,
-        inner=arguments.inner,
-        gcs=arguments.gcs,
-        out=_directory(arguments.out, f"{scenario.name}-seed{arguments.seed}"),
-        json=arguments.json,
-    )
-
-
-def _directory(wanted: Path | None, stem: str) -> Path:
-    if wanted is None:
-        return new_run_directory(Path("runs"), stem)
-    wanted.mkdir(parents=True, exist_ok=True)
-    if (wanted / "result.json").exists() or (wanted / "flight.tlog").exists():
-        raise FileExistsError(f"{wanted} already holds a flight; name another --out")
-    return wanted
 
 
 def _banner(options: FlyOptions, display: Display) -> None:

@@ -1,0 +1,39 @@
+"""Puts the flight software together from a configuration."""
+
+from __future__ import annotations
+
+from typing import Any, cast
+
+from fsw.control.cascade import Inner
+from fsw.link.telemetry import VehicleFacts
+from fsw.mpc.planner import Planner
+from fsw.parameters.flight_config import FlightConfig, flight_config
+from fsw.runtime import clock
+from fsw.runtime.flight_loop import FlightLoop
+from fsw.runtime.flight_state import FlightState
+from fsw.runtime.program import FlightProgram
+
+
+def flight_software(controller: str, inner: str) -> FlightProgram[Any]:
+    """Build everything that flies and compile it, which takes a minute the first time.
+
+    Raises:
+        ValueError: For an unknown name, listing the known ones.
+    """
+    # What is not an Inner is refused by the call itself.
+    config = flight_config(controller, cast(Inner, inner))
+    planner = Planner(config.planner, clock.stopwatch_us)
+    planner.warm_up()
+    return FlightProgram(_facts(config), FlightState(), FlightLoop(config).tick, planner)
+
+
+def _facts(config: FlightConfig) -> VehicleFacts:
+    return VehicleFacts(
+        rotor_thrust_max=config.airframe.rotor_thrust_max,
+        joint_torque_max=config.airframe.joint_torque_max,
+        tick_period_us=config.tick_period_us,
+        mpc_period_us=config.mpc_period_us,
+        mpc_delay_us=config.plan_delay_ticks * config.tick_period_us,
+        horizon=config.planner.horizon,
+        sqp_iterations=config.planner.sqp_iterations,
+    )
