@@ -25,6 +25,8 @@ class SoftRows:
     slack: NDArray[np.intp]  # (rows,) index of its slack among this block's slacks
     moved_by: NDArray[np.bool_]  # (rows, 6) kinds of input that can move the row's point
     unknowns: int  # 6 n
+    # (rows,) rows that become active together, such as those of one wall; all in one if None
+    group: NDArray[np.intp] | None = None
     value: Array = field(init=False)  # (rows,)
     required: Array = field(init=False)  # (rows,)
     gradient: Array = field(init=False)  # (rows, 6 n)
@@ -72,6 +74,7 @@ class TargetPoints:
 
     position: Array  # (n + 1, 3) m
     velocity: Array  # (n + 1, 3) m/s
+    yaw: Array  # (n + 1,) rad
 
 
 class Barrier(Protocol):

@@ -32,7 +32,11 @@ class WallBarrier:
         slack = (node - nodes[0]) * len(walls) + wall
         moved_by = np.tile(kinds_moving_points(self._normals), (len(nodes), 1, 1, 1))
         self.rows = SoftRows(
-            node.ravel(), slack.ravel(), moved_by.reshape(-1, INPUTS), INPUTS * horizon
+            node.ravel(),
+            slack.ravel(),
+            moved_by.reshape(-1, INPUTS),
+            INPUTS * horizon,
+            group=wall.ravel(),
         )
         self._h_start = np.zeros(len(walls) * POINTS)
 

@@ -54,7 +54,9 @@ class InnerTuning:
     yaw: PidGains = field(default_factory=lambda: PidGains(4.0, 0.0, 4.0, 0.5))
     compensate: bool = True  # the arm holds the end-effector while the base is pushed
     compensation: CompensationLimits = field(default_factory=CompensationLimits)
-    yaw_thrust_limit: float = 1.0  # N a rotor; more would be taken from roll and pitch
+    # N a rotor, of what roll and pitch leave: three times the plan's yaw acceleration, so that
+    # the loop has something left to correct with
+    yaw_thrust_limit: float = 3.0
     tracking: TrackingTuning = field(default_factory=TrackingTuning)
 
 

@@ -8,7 +8,7 @@ import clarabel
 import numpy as np
 
 from fsw.model.prediction import Array
-from fsw.mpc.program import Program
+from fsw.mpc.program import QuadraticProgram
 from fsw.signals import SolverStatus
 
 _STATUS = {
@@ -48,7 +48,7 @@ class Solution:
 class ClarabelSolver:
     """Solves one program again and again with new numbers in the same pattern."""
 
-    def __init__(self, program: Program, tolerance: float = FINE) -> None:
+    def __init__(self, program: QuadraticProgram, tolerance: float = FINE) -> None:
         settings = clarabel.DefaultSettings()
         settings.verbose = False
         settings.max_iter = MAX_ITERATIONS

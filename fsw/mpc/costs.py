@@ -1,6 +1,7 @@
 r"""The paper's costs (eqs 18, 20, 21) and an input cost, as one Gauss-Newton quadratic.
 
-.. math:: \sum_i \|e_e\|^2_{W_1} + \|v_e - v_d\|^2_{W_2} + \|p_{G,x}\|^2_{W_3} + \|u_i\|^2_R
+.. math:: \sum_i \|e_e\|^2_{W_1} + \|v_e - v_d\|^2_{W_2} + \|p_{G,x}\|^2_{W_3}
+          + w_\psi(\psi - \psi_d)^2 + \|u_i\|^2_R
 
 over nodes 1..n-1, with the terminal weights at node n (node 0 is measured and constant).
 
@@ -12,6 +13,7 @@ Source: docs/equations.md E18, E20, E21.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -20,7 +22,7 @@ import numpy as np
 from fsw.barriers.soft_rows import TargetPoints
 from fsw.compiled import compiled
 from fsw.model.linearisation import END_EFFECTOR, Linearisation
-from fsw.model.prediction import INPUTS, Array
+from fsw.model.prediction import INPUTS, YAW, Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +35,9 @@ class CostWeights:
     velocity_terminal: float = 10.0  # w_s2
     arm_cog: float = 1.0  # w_3
     arm_cog_terminal: float = 5.0  # w_s3
+    # Ours: with base and arm both free to reach a point, nothing in the paper's cost says where
+    # to look, and beside walls the vehicle wandered through half a turn.
+    yaw: float = 0.05
     inputs: float = 0.02  # on a_d, yaw and joint accelerations alike
     relative_velocity: bool = True  # v_e - v_d in eq 20 instead of the printed v_e
 
@@ -74,6 +79,7 @@ class TrackingCost:
             )
         )
         self._inputs = weights.inputs
+        self._yaw = weights.yaw
         self._velocity_share = 1.0 if weights.relative_velocity else 0.0
 
     def add(
@@ -88,7 +94,11 @@ class TrackingCost:
         return _add_tracking(
             self._weights,
             self._inputs,
+            self._yaw,
             self._velocity_share,
+            horizon.states[:, YAW],
+            horizon.model.gamma[:, YAW],
+            targets.yaw,
             horizon.position[:, END_EFFECTOR],
             horizon.velocity[:, END_EFFECTOR],
             horizon.arm_cog,
@@ -129,7 +139,11 @@ def add_square(
 def _add_tracking(
     weights: Array,
     input_weight: float,
+    yaw_weight: float,
     velocity_share: float,
+    yaw: Array,
+    d_yaw: Array,
+    target_yaw: Array,
     position: Array,
     velocity: Array,
     cog: Array,
@@ -149,6 +163,10 @@ def _add_tracking(
         cost += input_weight * guess[k] * guess[k]
     for i in range(1, n + 1):
         w = weights[1 if i == n else 0]
+        # The short way round: a target half a turn away must not unwind whole turns.
+        turn = (yaw[i] - target_yaw[i] + math.pi) % (2.0 * math.pi) - math.pi
+        cost += yaw_weight * turn * turn
+        add_square(yaw_weight, turn, d_yaw[i], INPUTS * i, guess, hessian, gradient)
         for residual in range(7):
             if residual < 3:
                 weight, row = w[0], d_position[i, residual]

@@ -7,13 +7,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from fsw.barriers.soft_rows import TargetPoints
 from fsw.model.prediction import INPUTS, Array, condense, to_vector
+from fsw.mpc.clarabel_solver import Solution
 from fsw.mpc.planner_config import PlannerConfig
 from fsw.mpc.problem import Problem
+from fsw.mpc.slsqp_solver import SlsqpSolver
 from fsw.signals import (
     EndEffectorTarget,
     Plan,
@@ -27,6 +30,17 @@ from fsw.signals import (
     Wall,
     WorkspaceSphere,
 )
+
+
+@dataclass(frozen=True, slots=True)
+class _Search:
+    """How one request was answered; the plan is usable where the last solution is."""
+
+    solution: Solution
+    sqp_iterations: int
+    solver_iterations: int
+    linearise_us: float
+    solve_us: float
 
 
 class Planner:
@@ -91,23 +105,19 @@ class Planner:
         targets = TargetPoints(
             np.array([target.p_WE for target in request.targets]),
             np.array([target.v_WE for target in request.targets]),
+            np.array([target.yaw for target in request.targets]),
         )
-        inputs = self._guess(request.t_apply_us)
-        linearise_us = solve_us = 0.0
-        iterations = 0
-        for left in reversed(range(self._config.sqp_iterations)):
-            mark = self._stopwatch_us()
-            problem.linearise(start, inputs, targets)
-            linearised = self._stopwatch_us()
-            solution = problem.solve(last=left == 0)
-            linearise_us += linearised - mark
-            solve_us += self._stopwatch_us() - linearised
-            iterations += solution.iterations
-            if not solution.usable:
-                timings = PlanTimings(linearise_us, solve_us, self._stopwatch_us() - begin)
-                reason = f"solver stopped with {solution.status.name} after {iterations} iterations"
-                return PlanFailure(request.plan_id, solution.status, reason, timings)
-            inputs = solution.x[: len(inputs)]
+        if self._config.solver == "slsqp":
+            search = self._by_slsqp(problem, start, targets)
+        else:
+            search = self._by_programs(problem, start, targets, request.t_apply_us)
+        solution = search.solution
+        timings = PlanTimings(search.linearise_us, search.solve_us, self._stopwatch_us() - begin)
+        if not solution.usable:
+            after = f"after {search.solver_iterations} iterations"
+            reason = f"solver stopped with {solution.status.name} {after}"
+            return PlanFailure(request.plan_id, solution.status, reason, timings)
+        inputs = solution.x[: len(self._inputs)]
         self._inputs = inputs
         self._t_us = request.t_apply_us
         return Plan(
@@ -120,10 +130,38 @@ class Planner:
             cost=problem.cost,
             slack_max=problem.largest_barrier_slack(solution.x),
             barrier=problem.barrier_at_start(),
-            sqp_iterations=self._config.sqp_iterations,
-            solver_iterations=iterations,
-            timings=PlanTimings(linearise_us, solve_us, self._stopwatch_us() - begin),
+            sqp_iterations=search.sqp_iterations,
+            solver_iterations=search.solver_iterations,
+            timings=replace(timings, total_us=self._stopwatch_us() - begin),
         )
+
+    def _by_programs(
+        self, problem: Problem, start: Array, targets: TargetPoints, t_us: int
+    ) -> _Search:
+        """A fixed number of quadratic programs from the last solution on."""
+        inputs = self._guess(t_us)
+        linearise_us = solve_us = 0.0
+        iterations = 0
+        wanted = self._config.sqp_iterations
+        for done in range(1, wanted + 1):
+            mark = self._stopwatch_us()
+            problem.linearise(start, inputs, targets)
+            linearised = self._stopwatch_us()
+            solution = problem.solve(last=done == wanted)
+            linearise_us += linearised - mark
+            solve_us += self._stopwatch_us() - linearised
+            iterations += solution.iterations
+            if not solution.usable:
+                break
+            inputs = solution.x[: len(inputs)]
+        return _Search(solution, done, iterations, linearise_us, solve_us)
+
+    def _by_slsqp(self, problem: Problem, start: Array, targets: TargetPoints) -> _Search:
+        """The paper's optimiser, from rest whatever was planned before."""
+        mark = self._stopwatch_us()
+        solution = SlsqpSolver().minimise(problem, start, targets)
+        solve_us = self._stopwatch_us() - mark
+        return _Search(solution, solution.iterations, solution.iterations, 0.0, solve_us)
 
     def _refusal(self, request: PlanRequest) -> str | None:
         if len(request.targets) != self._config.horizon + 1:

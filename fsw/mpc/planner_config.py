@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Literal
 
 from fsw.barriers.root import BarrierTuning
 from fsw.model.airframe import AIRFRAME, Airframe
@@ -10,6 +11,8 @@ from fsw.model.prediction import LagModel
 from fsw.mpc.costs import CostWeights
 from fsw.mpc.program import InputLimits, SlackPrice
 from fsw.mpc.soft_costs import SoftWeights
+
+Solver = Literal["clarabel", "slsqp"]  # ours, or the paper's with numeric gradients
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,14 +22,16 @@ class PlannerConfig:
     controller: str = "blf"  # a name in variants.py
     horizon: int = 5  # n
     period: float = 0.1  # s, T
-    sqp_iterations: int = 2
+    solver: Solver = "clarabel"
+    sqp_iterations: int = 2  # of clarabel; slsqp goes on until it converges
     airframe: Airframe = AIRFRAME
     lag: LagModel = field(default_factory=LagModel)
     weights: CostWeights = field(default_factory=CostWeights)
     limits: InputLimits = field(default_factory=InputLimits)
     joint_slack: SlackPrice = field(default_factory=lambda: SlackPrice(50.0))
     # blf
-    walls: BarrierTuning = field(default_factory=BarrierTuning)
+    # Beside walls the end-effector counts too, which swings more than the base wanders.
+    walls: BarrierTuning = field(default_factory=lambda: BarrierTuning(robustness=0.3))
     workspace: BarrierTuning = field(default_factory=BarrierTuning)
     barrier_slack: SlackPrice = field(default_factory=lambda: SlackPrice(20.0))
     # hc

@@ -7,10 +7,11 @@ import numpy as np
 from fsw.barriers.soft_rows import SoftRows, TargetPoints
 from fsw.model.linearisation import Linearisation
 from fsw.model.prediction import Array, CondensedModel
-from fsw.mpc.clarabel_solver import FINE, ROUGH, ClarabelSolver, Solution
+from fsw.mpc.clarabel_solver import FINE, ROUGH, Solution
 from fsw.mpc.limits import JointLimits
 from fsw.mpc.planner_config import PlannerConfig
 from fsw.mpc.program import Program, SlackPrice
+from fsw.mpc.reduced_solver import ReducedSolver
 from fsw.mpc.variants import parts_of
 from fsw.signals import SafeSet
 
@@ -32,8 +33,13 @@ class Problem:
         self._first_barrier_slack = self._program.inputs + self._limits.rows.slacks
         self.cost = 0.0
         self.linearise(np.zeros(model.phi.shape[1]), self._gradient, _no_targets(config.horizon))
-        self._rough = ClarabelSolver(self._program, ROUGH)
-        self._fine = ClarabelSolver(self._program, FINE)
+        self._rough = ReducedSolver(self._program, ROUGH)
+        self._fine = ReducedSolver(self._program, FINE)
+
+    @property
+    def program(self) -> Program:
+        """The program as last linearised."""
+        return self._program
 
     def linearise(self, start: Array, guess: Array, targets: TargetPoints) -> None:
         """Refill the program around a guess of the inputs (6 n,) from a start (19,)."""
@@ -49,10 +55,11 @@ class Problem:
         if self._barrier is not None:
             self._barrier.refill(self._horizon, targets)
         self._program.refill(guess, self._gradient)
+        self._guess = guess
 
     def solve(self, *, last: bool) -> Solution:
         """Solve the program as last linearised, finely where no iteration will follow."""
-        return (self._fine if last else self._rough).solve()
+        return (self._fine if last else self._rough).solve(self._guess)
 
     def barrier_at_start(self) -> tuple[float, ...]:
         """h of each constraint at node 0 [m/s]."""
@@ -67,4 +74,5 @@ class Problem:
 
 
 def _no_targets(horizon: int) -> TargetPoints:
-    return TargetPoints(np.zeros((horizon + 1, 3)), np.zeros((horizon + 1, 3)))
+    nodes = horizon + 1
+    return TargetPoints(np.zeros((nodes, 3)), np.zeros((nodes, 3)), np.zeros(nodes))

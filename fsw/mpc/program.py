@@ -29,6 +29,27 @@ from fsw.model.airframe import GRAVITY
 from fsw.model.prediction import INPUTS, Array
 
 
+@dataclass(frozen=True)
+class QuadraticProgram:
+    """One program in Clarabel's form; the arrays' data may change, the pattern may not."""
+
+    p: sparse.csc_matrix  # upper triangle
+    q: Array
+    a: sparse.csc_matrix
+    b: Array
+    nonnegative_rows: int
+    tilt_cones: int  # of three rows each, after the non-negative ones
+
+
+@dataclass(frozen=True, slots=True)
+class RowGroup:
+    """Rows that can be left out together while none of them binds."""
+
+    rows: NDArray[np.intp]  # of A
+    columns: NDArray[np.intp]  # slacks that only these rows use
+    are_cones: bool = False
+
+
 @dataclass(frozen=True, slots=True)
 class InputLimits:
     """Bounds on the paper's u; the horizontal acceleration is bounded by the tilt."""
@@ -61,14 +82,16 @@ class Program:
         blocks: tuple[tuple[SoftRows, SlackPrice | None], ...],
     ) -> None:
         self._blocks = tuple(rows for rows, _ in blocks)
+        self._slack_counts = [rows.slacks if price is not None else 0 for rows, price in blocks]
         self.inputs = INPUTS * horizon
-        slacks = [rows.slacks if price is not None else 0 for rows, price in blocks]
+        slacks = self._slack_counts
         self.unknowns = self.inputs + sum(slacks)
         soft = sum(len(rows.node) for rows in self._blocks)
+        self.soft_rows = soft
         bounded = np.flatnonzero(np.tile(np.arange(INPUTS) >= 2, horizon))
         bound = np.tile([limits.vertical, limits.yaw_acc, *[limits.joint_acc] * 2], horizon)
-        self.nonnegative_rows = soft + sum(slacks) + 2 * len(bounded)
-        self.tilt_cones = horizon
+        nonnegative_rows = soft + sum(slacks) + 2 * len(bounded)
+        self.groups = (*self._soft_groups(soft), *_input_groups(soft + sum(slacks), horizon))
 
         pattern = _Pattern(self.unknowns)
         slack_column = self.inputs
@@ -82,8 +105,8 @@ class Program:
         for node in range(horizon):
             for axis, coefficient in ((2, slope), (0, -1.0), (1, -1.0)):
                 pattern.signed_rows(np.array([INPUTS * node + axis]), coefficient)
-        self.a, self._soft_at, self._soft_from = pattern.finish()
-        self.b = np.concatenate(
+        a, self._soft_at, self._soft_from = pattern.finish()
+        b = np.concatenate(
             (
                 np.zeros(soft + sum(slacks)),
                 bound,
@@ -96,17 +119,18 @@ class Program:
         p_pattern = np.zeros((self.unknowns, self.unknowns), dtype=bool)
         p_pattern[: self.inputs, : self.inputs] = upper
         p_pattern[range(self.inputs, self.unknowns), range(self.inputs, self.unknowns)] = True
-        self.p = sparse.csc_matrix(p_pattern.astype(float))
-        columns = np.repeat(np.arange(self.unknowns), np.diff(self.p.indptr))
+        p = sparse.csc_matrix(p_pattern.astype(float))
+        columns = np.repeat(np.arange(self.unknowns), np.diff(p.indptr))
         in_inputs = columns < self.inputs
         self._p_at = np.flatnonzero(in_inputs)
-        self._p_from = self.p.indices[in_inputs] * self.inputs + columns[in_inputs]
-        self.q = np.zeros(self.unknowns)
+        self._p_from = p.indices[in_inputs] * self.inputs + columns[in_inputs]
+        q = np.zeros(self.unknowns)
         priced = [(rows.slacks, price) for rows, price in blocks if price is not None]
-        self.q[self.inputs :] = np.concatenate([np.full(n, price.linear) for n, price in priced])
-        self.p.data[~in_inputs] = np.concatenate(
+        q[self.inputs :] = np.concatenate([np.full(n, price.linear) for n, price in priced])
+        p.data[~in_inputs] = np.concatenate(
             [np.full(n, 2.0 * price.quadratic) for n, price in priced]
         )
+        self.whole = QuadraticProgram(p, q, a, b, nonnegative_rows, horizon)
         self.hessian = np.zeros((self.inputs, self.inputs))
         self._gradient = np.zeros((soft, self.inputs))
 
@@ -117,16 +141,42 @@ class Program:
             guess: Inputs around which the blocks are linearised, (6 n,).
             gradient: Linear cost term in the inputs, (6 n,).
         """
-        self.p.data[self._p_at] = self.hessian.take(self._p_from)
-        self.q[: self.inputs] = gradient
+        whole = self.whole
+        whole.p.data[self._p_at] = self.hessian.take(self._p_from)
+        whole.q[: self.inputs] = gradient
         row = 0
         for block in self._blocks:
             end = row + len(block.node)
             self._gradient[row:end] = block.gradient
             # A carries -gradient and -1 for the slack, so b is value at U = 0 minus required.
-            self.b[row:end] = block.value - block.gradient @ guess - block.required
+            whole.b[row:end] = block.value - block.gradient @ guess - block.required
             row = end
-        self.a.data[self._soft_at] = -self._gradient.take(self._soft_from)
+        whole.a.data[self._soft_at] = -self._gradient.take(self._soft_from)
+
+    def _soft_groups(self, soft_rows: int) -> list[RowGroup]:
+        """A group for each group of each block, with the slacks it alone uses."""
+        groups = []
+        row, slack = 0, 0
+        for block, count in zip(self._blocks, self._slack_counts, strict=True):
+            numbers = np.zeros(len(block.node), dtype=int) if block.group is None else block.group
+            for number in np.unique(numbers):
+                members = np.flatnonzero(numbers == number)
+                own = slack + np.unique(block.slack[members]) if count else np.zeros(0, dtype=int)
+                rows = np.concatenate((row + members, soft_rows + own))
+                groups.append(RowGroup(rows, self.inputs + own))
+            row, slack = row + len(block.node), slack + count
+        return groups
+
+
+def _input_groups(first_bound: int, horizon: int) -> tuple[RowGroup, RowGroup]:
+    """Bounds that hardly ever bind, and the tilt cones; yaw's bounds bind often and stay."""
+    bounds = np.arange(8 * horizon)  # upper then lower, (vertical, yaw, joint 1, joint 2) a node
+    cones = first_bound + len(bounds) + np.arange(3 * horizon)
+    none = np.zeros(0, dtype=int)
+    return (
+        RowGroup(first_bound + bounds[bounds % 4 != 1], none),
+        RowGroup(cones, none, are_cones=True),
+    )
 
 
 class _Pattern:

@@ -42,7 +42,9 @@ class FlightConfig:
     # 10 ms between question and answer: 10 times the planner's median, and a fixed number of
     # ticks, so that a slow machine flies exactly like a fast one.
     plan_delay_ticks: int = 5
-    upset_distance: float = 0.15  # m; farther from the plan than this, plan from the measurement
+    # Farther from the plan than this, plan from the measurement.
+    upset_distance: float = 0.15  # m
+    upset_yaw: float = 0.35  # rad
 
 
 def flight_config(controller: str = "blf", inner: Inner = "tracking") -> FlightConfig:

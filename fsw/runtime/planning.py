@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+from fsw.geometry.rotation import wrap_angle
 from fsw.model.nominal import NominalModel
 from fsw.model.rotors import MotionState
 from fsw.parameters.flight_config import FlightConfig
@@ -139,6 +140,7 @@ def ask(
     from_nominal = (
         config.inner == "tracking"
         and math.dist(nominal.p, measured.p) < config.upset_distance
+        and abs(wrap_angle(nominal.yaw - measured.yaw)) < config.upset_yaw
     )
     u = plan_input(memory.running, nominal, now_us)
     start = model.advance(nominal if from_nominal else measured, u, config.plan_delay_ticks)

@@ -1,0 +1,176 @@
+"""The paper's optimiser: SciPy's SLSQP on the whole nonlinear problem, from u = 0.
+
+The problem is the one that the sequence of quadratic programs approaches: costs, barriers and
+limits are evaluated at the iterate itself through the same linearisation, whose program around
+U says everything at U (cost, slope, margins and their slopes). Slacks are unknowns as well, so
+that both optimisers minimise the same sum.
+
+Source: docs/paper-and-us.md (the paper solves eq 17 by SLSQP with numeric gradients).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal, Protocol
+
+import numpy as np
+from scipy.optimize import OptimizeResult, minimize
+
+from fsw.barriers.soft_rows import TargetPoints
+from fsw.model.prediction import Array
+from fsw.mpc.clarabel_solver import Solution
+from fsw.mpc.program import Program, QuadraticProgram
+from fsw.signals import SolverStatus
+
+Gradients = Literal["numeric", "analytic"]
+
+MAX_ITERATIONS = 100  # SciPy's default
+TOLERANCE = 1e-6  # of the cost, SciPy's default
+
+_CONVERGED, _INCOMPATIBLE, _ITERATIONS = 0, 4, 9  # SLSQP's exit modes
+_STATUS = {
+    _CONVERGED: SolverStatus.SOLVED,
+    _INCOMPATIBLE: SolverStatus.INFEASIBLE,
+    _ITERATIONS: SolverStatus.TIME_LIMIT,
+}
+
+
+class Linearisable(Protocol):
+    """The part of ``fsw.mpc.problem.Problem`` that is needed here."""
+
+    cost: float
+
+    @property
+    def program(self) -> Program:
+        """The program around the last guess."""
+        ...
+
+    def linearise(self, start: Array, guess: Array, targets: TargetPoints) -> None:
+        """Refill the program around a guess."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class SlsqpSolver:
+    """SLSQP with SciPy's finite differences, as in the paper, or with our gradients."""
+
+    gradients: Gradients = "numeric"
+    tolerance: float = TOLERANCE
+    max_iterations: int = MAX_ITERATIONS
+
+    def minimise(self, problem: Linearisable, start: Array, targets: TargetPoints) -> Solution:
+        """Solve the nonlinear problem.
+
+        Args:
+            problem: Of the safe set; holds the program around the optimum afterwards.
+            start: Prediction state at node 0, (19,).
+            targets: Reference at the nodes.
+
+        Returns:
+            Inputs and slacks; usable only where SLSQP says that it converged.
+        """
+        point = _Point(problem, start, targets)
+        analytic = self.gradients == "analytic"
+        constraints: dict[str, Any] = {"type": "ineq", "fun": point.margins}
+        if analytic:
+            constraints["jac"] = point.margin_slopes
+        # Far iterates of a failing line search may overflow; the outcome is checked below.
+        with np.errstate(over="ignore", invalid="ignore"):
+            answer = minimize(
+                point.cost,
+                point.rest(),
+                jac=point.slope if analytic else None,
+                method="SLSQP",
+                bounds=point.bounds(),
+                constraints=[constraints],
+                options={"ftol": self.tolerance, "maxiter": self.max_iterations},
+            )
+        return _solution(answer, point)
+
+
+def _solution(answer: OptimizeResult, point: _Point) -> Solution:
+    x = np.array(answer.x)
+    status = _STATUS.get(int(answer.status), SolverStatus.NUMERICAL_ERROR)
+    if not (np.isfinite(x).all() and np.isfinite(answer.fun)):
+        status = SolverStatus.NUMERICAL_ERROR
+    else:
+        point.cost(x)  # leaves the problem around the answer, not around a last probe
+    return Solution(status, x, int(answer.nit))
+
+
+class _Point:
+    """The problem at the inputs asked for last, linearised anew only where they changed.
+
+    SciPy asks for cost, margins and slopes of one point in separate calls, and for a
+    difference in a slack the inputs stay the same.
+    """
+
+    def __init__(self, problem: Linearisable, start: Array, targets: TargetPoints) -> None:
+        self._problem, self._start, self._targets = problem, start, targets
+        self._inputs = np.zeros(problem.program.inputs)
+        self._soft_rows = problem.program.soft_rows
+        whole, slacks = problem.program.whole, slice(problem.program.inputs, None)
+        self._price, self._weight = whole.q[slacks].copy(), whole.p.diagonal()[slacks]
+        problem.linearise(start, self._inputs, targets)
+
+    def rest(self) -> Array:
+        """u = 0, and the slacks that make it admissible."""
+        program, whole = self._problem.program, self._problem.program.whole
+        x = np.zeros(program.unknowns)
+        # Every soft row holds at most one slack, with coefficient -1.
+        missing = np.maximum(-whole.b[: program.soft_rows], 0.0)
+        slacks = -whole.a[: program.soft_rows, program.inputs :].toarray()
+        x[program.inputs :] = (slacks * missing[:, None]).max(axis=0, initial=0.0)
+        return x
+
+    def bounds(self) -> list[tuple[float | None, float | None]]:
+        """Of every unknown; the tilt bounds the horizontal acceleration through the margins."""
+        program, whole = self._problem.program, self._problem.program.whole
+        slacks = program.unknowns - program.inputs
+        first, last = program.soft_rows + slacks, whole.nonnegative_rows
+        upper = slice(first, (first + last) // 2)  # one +1 a row; the lower bounds mirror them
+        bounds: list[tuple[float | None, float | None]] = [(None, None)] * program.inputs
+        for column, bound in zip(whole.a[upper].tocsr().indices, whole.b[upper], strict=True):
+            bounds[column] = (-bound, bound)
+        return bounds + [(0.0, None)] * slacks
+
+    def cost(self, x: Array) -> float:
+        """Costs at the inputs and the price of the slacks."""
+        self._at(x)
+        slack = x[len(self._inputs) :]
+        price = self._price @ slack + 0.5 * slack @ (self._weight * slack)
+        return float(self._problem.cost + price)
+
+    def slope(self, x: Array) -> Array:
+        """Of ``cost``: the quadratic model around a point has the true slope there."""
+        whole = self._at(x)
+        upper = whole.p
+        return np.asarray(upper @ x + upper.T @ x - upper.diagonal() * x + whole.q)
+
+    def margins(self, x: Array) -> Array:
+        """Non-negative where admissible: soft rows, then one a tilt cone.
+
+        The cone's margin is the difference of squares: the norm has no slope at u = 0,
+        where the paper starts.
+        """
+        whole = self._at(x)
+        left = whole.b - whole.a @ x
+        t, ax, ay = left[whole.nonnegative_rows :].reshape(-1, 3).T
+        return np.concatenate((left[: self._soft_rows], t * t - ax * ax - ay * ay))
+
+    def margin_slopes(self, x: Array) -> Array:
+        """Of ``margins``, (margins, unknowns)."""
+        whole = self._at(x)
+        slopes = -whole.a.toarray()
+        cones = (whole.b + slopes @ x)[whole.nonnegative_rows :].reshape(-1, 3)
+        signed = 2.0 * cones * np.array([1.0, -1.0, -1.0])
+        tilt = slopes[whole.nonnegative_rows :].reshape(-1, 3, len(x))
+        return np.concatenate((slopes[: self._soft_rows], np.einsum("ca,cak->ck", signed, tilt)))
+
+    def _at(self, x: Array) -> QuadraticProgram:
+        problem = self._problem
+        inputs = x[: len(self._inputs)]
+        if not np.array_equal(inputs, self._inputs):
+            self._inputs = inputs.copy()  # SLSQP writes into its x
+            problem.linearise(self._start, self._inputs, self._targets)
+        return problem.program.whole
