@@ -36,7 +36,9 @@ class Case:
 
 def random_case(random: np.random.Generator) -> Case:
     targets = TargetPoints(
-        random.uniform(-1.0, 1.0, (NODES + 1, 3)), random.uniform(-0.5, 0.5, (NODES + 1, 3))
+        random.uniform(-1.0, 1.0, (NODES + 1, 3)),
+        random.uniform(-0.5, 0.5, (NODES + 1, 3)),
+        random.uniform(-3.0, 3.0, NODES + 1),
     )
     return Case(prediction_vector(random), random.uniform(-2.0, 2.0, INPUTS * NODES), targets)
 

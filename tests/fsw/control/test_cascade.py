@@ -10,7 +10,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from fsw.control.attitude import attitude_pid, attitude_reference
-from fsw.control.cascade import Cascade, in_hover
+from fsw.control.cascade import Cascade, Inner, in_hover
 from fsw.control.inner_tuning import InnerTuning
 from fsw.model.airframe import AIRFRAME
 from fsw.model.prediction import Array, LagModel
@@ -35,10 +35,12 @@ def torque_of(command: ActuatorCommand) -> Array:
 
 
 def one_step(
-    estimate: StateEstimate, plan: PredictionState, u: PlanInput = NO_INPUT, inner: str = "tracking"
+    estimate: StateEstimate,
+    plan: PredictionState,
+    u: PlanInput = NO_INPUT,
+    inner: Inner = "tracking",
 ) -> ActuatorCommand:
-    kind = "tracking" if inner == "tracking" else "pid"
-    cascade = Cascade(AIRFRAME, LagModel(), TUNING, kind, DT)
+    cascade = Cascade(AIRFRAME, LagModel(), TUNING, inner, DT)
     return cascade.step(in_hover(AIRFRAME, estimate), estimate, plan, u)[0]
 
 
@@ -85,14 +87,14 @@ def test_body_torque_is_eulers_equation() -> None:
 
 
 @pytest.mark.parametrize("inner", ["tracking", "pid"])
-def test_at_rest_on_its_plan_the_weight_is_carried_level(inner: str) -> None:
+def test_at_rest_on_its_plan_the_weight_is_carried_level(inner: Inner) -> None:
     command = one_step(turned(1.0), plan_at(1.0), inner=inner)
     assert command.rotor_thrust == pytest.approx((3.5 * 9.81 / 4.0,) * 4)
     assert command.joint_torque == pytest.approx((0.0, 0.0))
 
 
 @pytest.mark.parametrize("inner", ["tracking", "pid"])
-def test_a_commanded_acceleration_tilts_the_thrust_its_way(inner: str) -> None:
+def test_a_commanded_acceleration_tilts_the_thrust_its_way(inner: Inner) -> None:
     for axis, torque_axis, sign in ((0, 1, -1.0), (1, 0, 1.0)):
         a = [0.0, 0.0, 0.0]
         a[axis] = 1.0

@@ -38,6 +38,7 @@ class Question:
     guess: Array  # (6 n,)
     target_p: Array  # (n + 1, 3)
     target_v: Array  # (n + 1, 3)
+    target_yaw: Array  # (n + 1,) within half a turn of the horizon's
     safe_set: SafeSet
 
 
@@ -57,6 +58,9 @@ class _Linear:
 
     def arm_cog(self, node: int) -> Any:
         return self._horizon.arm_cog[node] + self._horizon.d_arm_cog[node] @ self._change
+
+    def yaw(self, node: int) -> Any:
+        return self._horizon.states[node, 13] + self._horizon.model.gamma[node, 13] @ self._change
 
     def angles(self, node: int) -> Any:
         gamma = self._horizon.model.gamma[node, 15:17]
@@ -112,6 +116,7 @@ def _cost(question: Question, linear: _Linear, U: cp.Variable, config: PlannerCo
             speed = speed - question.target_v[node]
         total += (50.0 if last else 10.0) * cp.sum_squares(error)
         total += (10.0 if last else 2.0) * cp.sum_squares(speed)
+        total += weights.yaw * cp.square(linear.yaw(node) - question.target_yaw[node])
         total += (5.0 if last else 1.0) * cp.square(linear.arm_cog(node))
     return total
 

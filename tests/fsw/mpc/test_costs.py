@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from fsw.barriers.soft_rows import TargetPoints
 from fsw.model.airframe import AIRFRAME
 from fsw.model.linearisation import Linearisation
-from fsw.model.prediction import INPUTS, Array, LagModel, condense
+from fsw.model.prediction import INPUTS, YAW, Array, LagModel, condense
 from fsw.mpc.costs import Cost, CostWeights, TrackingCost
 from fsw.mpc.soft_costs import SoftWallCost, SoftWeights, SphereCost, one_sided_reciprocal
 from fsw.signals import Wall, WorkspaceSphere
@@ -46,6 +46,7 @@ def test_slope_is_the_finite_difference_and_the_model_is_convex(cost: Cost) -> N
         targets = TargetPoints(
             start[0:3] + random.uniform(-0.3, 0.3, (N + 1, 3)),
             random.uniform(-0.3, 0.3, (N + 1, 3)),
+            start[YAW] + random.uniform(-2.5, 2.5, N + 1),
         )
         _, slope, hessian = quadratic(cost, horizon_of(start, guess), guess, targets)
         for column in range(INPUTS * N):
@@ -65,9 +66,25 @@ def test_terminal_node_weighs_five_times_as_table_two_says() -> None:
     horizon = horizon_of(start, guess)
     error = np.array([0.1, -0.2, 0.05])
     tip = horizon.position[:, 2]
-    targets = TargetPoints(tip - error, np.zeros((N + 1, 3)))
+    targets = TargetPoints(tip - error, np.zeros((N + 1, 3)), np.zeros(N + 1))
     value, _, _ = quadratic(TrackingCost(CostWeights()), horizon, guess, targets)
     assert value == pytest.approx(float(error @ error) * (10.0 * (N - 1) + 50.0))
+
+
+@pytest.mark.parametrize(
+    ("yaw", "target", "short_way"), [(3.0, -3.0, 1.0), (-3.0, 3.0, -1.0), (0.1, 0.4, 1.0)]
+)
+def test_the_heading_is_pulled_the_short_way_across_south(
+    yaw: float, target: float, short_way: float
+) -> None:
+    start, guess = np.zeros(19), np.zeros(INPUTS * N)
+    start[YAW] = yaw
+    horizon = horizon_of(start, guess)
+    there = TargetPoints(horizon.position[:, 2], np.zeros((N + 1, 3)), np.full(N + 1, target))
+    value, slope, _ = quadratic(TrackingCost(CostWeights()), horizon, guess, there)
+    turn = (target - yaw + np.pi) % (2.0 * np.pi) - np.pi
+    assert value == pytest.approx(N * CostWeights().yaw * turn**2)
+    assert short_way * slope[3] < 0.0
 
 
 @given(st.floats(-1.0, 3.0), st.floats(1e-3, 1.0), st.floats(1.0, 20.0))
@@ -86,6 +103,7 @@ def test_sphere_cost_of_eq_30_is_silent_inside() -> None:
     centre = TargetPoints(
         horizon.position[:, 0] - np.array(SPHERE.centre_from_target) + 0.01,
         np.zeros((N + 1, 3)),
+        np.zeros(N + 1),
     )
     inside, slope, _ = quadratic(COSTS["outside the sphere"], horizon, guess, centre)
     assert inside == 0.0
