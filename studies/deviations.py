@@ -16,6 +16,8 @@ PLANT: dict[str, tuple[str, ...]] = {
         "twice.",
         "Fast loop: 500 Hz tracking of the MPC's plan for every controller; `--inner pid` flies "
         "the paper's PIDs instead.",
+        "c_s and c_e are those of the MPC's inputs, as in the paper. Where the MPC plans from its "
+        "own plan, the fast loop meets the disturbance and its effort is not in them.",
         "Prediction: the MPC knows the attitude's lag. blf-no-lag is what the paper prints, "
         "prediction without lag over PIDs, with our λ.",
     ),
@@ -58,8 +60,8 @@ TABLE_4: tuple[str, ...] = (
 
 TABLE_3: tuple[str, ...] = (
     *_COMMON,
-    "T_C is the median wall time of one planning step with Clarabel on this machine while others "
-    "fly beside it; the paper used SLSQP with numeric gradients on an i7-8550U.",
+    "T_C is the median processor time of one planning step with Clarabel on this machine; the "
+    "paper used SLSQP with numeric gradients on an i7-8550U.",
     "λ = 1 and 5 are infeasible as hard conditions in a sphere of 75 mm and act through the "
     "penalty, as centring; ours is beside them.",
     "n = 1 on the full plant: the inputs can hardly move the vehicle within one period of lag.",

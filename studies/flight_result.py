@@ -36,7 +36,7 @@ class FlightResult:
     truth: TruthResult
     effort: InputTotals  # c_e
     smoothness: InputTotals  # c_s
-    step_us: tuple[float, ...]  # wall time of each planning step
+    step_us: tuple[float, ...]  # processor time of each planning step
     plans: int
     failures: int  # planning steps without a plan
     trace: tuple[TracePoint, ...]  # empty unless asked for
