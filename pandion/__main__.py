@@ -19,6 +19,7 @@ verbs:
   sitl        run the simulator alone
   fsw         run the flight software alone
   reproduce   fly a table or a figure of the paper again
+  bench       time the planner's optimiser against others
 
 options:
   --version   print the version
@@ -69,6 +70,12 @@ def _fly(argv: list[str]) -> int:
     return fly.main(argv)
 
 
+def _bench(argv: list[str]) -> int:
+    from pandion import bench
+
+    return bench.main(argv)
+
+
 def _sitl(argv: list[str]) -> int:
     from sitl import __main__ as entry
     from sitl import arguments
@@ -99,6 +106,7 @@ VERBS: Final[dict[str, Callable[[list[str]], int]]] = {
     "sitl": _sitl,
     "fsw": _fsw,
     "reproduce": _reproduce,
+    "bench": _bench,
 }
 
 if __name__ == "__main__":

@@ -1,0 +1,167 @@
+"""``pandion bench mpc``: time the planner's optimiser against others on recorded instances."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, TextIO
+
+from pandion.parser import COULD_NOT_START, Parser
+from pandion.version import version
+
+if TYPE_CHECKING:
+    from rich.progress import Progress, TaskID
+
+    from studies.bench_mpc import Samples
+
+DONE, INTERRUPTED = 0, 1  # exit codes
+
+
+@dataclass(frozen=True, slots=True)
+class BenchOptions:
+    """One measurement."""
+
+    json: str | None
+    instances: int | None
+    quick: bool
+    horizons: tuple[int, ...] | None
+
+
+def main(argv: list[str]) -> int:
+    """Measure and report; returns the exit code."""
+    options = _options(argv)
+    if options.json not in (None, "-") and not Path(str(options.json)).parent.is_dir():
+        print(f"pandion bench: no directory for {options.json}", file=sys.stderr)
+        return COULD_NOT_START
+    from studies.one_thread import pin_threads
+
+    pin_threads()  # before NumPy loads
+    try:
+        return _run(options)
+    except OSError as error:
+        print(f"pandion bench: {error}", file=sys.stderr)
+        return COULD_NOT_START
+    except KeyboardInterrupt:
+        print("pandion bench: interrupted", file=sys.stderr)
+        return INTERRUPTED
+
+
+def _options(argv: list[str]) -> BenchOptions:
+    parser = Parser("pandion bench", "Time the planner's optimiser against others.")
+    parser.add_argument("what", metavar="WHAT", choices=("mpc",), help="mpc")
+    parser.add_argument(
+        "--json",
+        metavar="FILE",
+        help="write the rows as a list, and machine, stages and counts beside it as "
+        "FILE.machine.json; - for standard output, rows only",
+    )
+    parser.add_argument(
+        "--instances",
+        metavar="N",
+        type=_count,
+        help="of each case and horizon (default 100; slow methods get as many as 25 s allow)",
+    )
+    parser.add_argument("--quick", action="store_true", help="about a minute, rougher")
+    parser.add_argument("--horizons", metavar="N,N", type=_horizons, help="(default 1,5,10,20)")
+    read = parser.read(argv)
+    return BenchOptions(read.json, read.instances, read.quick, read.horizons)
+
+
+def _count(text: str) -> int:
+    if not text.isdecimal() or not 1 <= int(text) <= 10_000:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number of instances")
+    return int(text)
+
+
+def _horizons(text: str) -> tuple[int, ...]:
+    parts = text.split(",")
+    if not all(part.isdecimal() and 1 <= int(part) <= 50 for part in parts):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a list of horizons such as 5,10")
+    return tuple(int(part) for part in parts)
+
+
+def _run(options: BenchOptions) -> int:
+    from dataclasses import replace
+
+    from studies.bench_mpc import HORIZONS, QUICK, Effort, run
+    from studies.bench_report import lines, machine
+
+    console = sys.stderr if options.json == "-" else sys.stdout
+    effort = QUICK if options.quick else Effort()
+    if options.instances is not None:
+        effort = replace(effort, instances=options.instances)
+    load = os.getloadavg()[0]
+    print(
+        f"Pandion {version()}: one process, one thread, {os.cpu_count()} cores, load {load:.1f}",
+        file=console,
+        flush=True,
+    )
+    with BenchProgress(console) as progress:
+        measured = run(options.horizons or HORIZONS, effort, progress.report)
+    facts = machine(load)
+    print("\n".join(lines(measured)), file=console)
+    print(
+        f"load average {facts['load_average_before']} before, {facts['load_average_after']} after",
+        file=console,
+    )
+    _write(options.json, measured, facts)
+    return DONE
+
+
+def _write(target: str | None, measured: list[Samples], facts: dict[str, object]) -> None:
+    from studies.bench_report import details
+
+    rows = json.dumps([samples.row() for samples in measured], indent=1, allow_nan=False) + "\n"
+    if target == "-":
+        sys.stdout.write(rows)
+    elif target is not None:
+        Path(target).write_text(rows, encoding="utf-8")
+        beside = json.dumps({"machine": facts, "details": details(measured)}, indent=1)
+        Path(f"{target}.machine.json").write_text(beside + "\n", encoding="utf-8")
+
+
+class BenchProgress(AbstractContextManager["BenchProgress"]):
+    """A bar on a terminal, a line for every quarter elsewhere."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+        self._bar: Progress | None = None
+        self._task: TaskID | None = None
+        self._told = ("", -1)
+
+    def __enter__(self) -> BenchProgress:
+        if self._stream.isatty():
+            from rich.console import Console
+            from rich.progress import BarColumn, MofNCompleteColumn, Progress
+
+            self._bar = Progress(
+                "{task.description}",
+                BarColumn(),
+                MofNCompleteColumn(),
+                console=Console(file=self._stream),
+                transient=True,
+                auto_refresh=False,  # a thread that draws would be measured too
+            )
+            self._bar.start()
+            self._task = self._bar.add_task("", total=None)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._bar is not None:
+            self._bar.stop()
+
+    def report(self, what: str, done: int, total: int) -> None:
+        """Show how far it is."""
+        if self._bar is not None and self._task is not None:
+            self._bar.update(self._task, description=what, completed=done, total=total)
+            self._bar.refresh()
+            return
+        told = (what, 4 * done // max(total, 1))
+        if told != self._told:
+            self._told = told
+            print(f"{what} {done} of {total}", file=self._stream, flush=True)

@@ -1,0 +1,55 @@
+"""What the planner is asked in flight: requests recorded in the closed loop of both cases."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fsw.parameters.flight_config import FlightConfig
+from fsw.signals import PlanRequest
+from studies.cases import CASES, Case, configuration, scenario, with_horizon
+from studies.closed_loop import fly
+
+SEED = 100  # never used for tuning
+_LED_BY = 2  # requests before the timed one: they bring a planner's guess to where it is in flight
+
+
+@dataclass(frozen=True, slots=True)
+class Instance:
+    """One question and the two that came before it, a period apart each."""
+
+    case: Case
+    before: tuple[PlanRequest, ...]
+    request: PlanRequest
+
+
+def planner_of(horizon: int) -> FlightConfig:
+    """The configuration that is recorded and timed: ``blf`` as it flies, another horizon."""
+    return with_horizon(configuration("full"), horizon)
+
+
+def record(horizon: int, count: int, duration_s: float) -> list[Instance]:
+    """Instances spread evenly over a flight of each case, cases alternating.
+
+    Args:
+        horizon: n.
+        count: Of instances for each case; fewer if the flight is too short.
+        duration_s: Of the flights.
+    """
+    return [
+        instance
+        for pair in zip(
+            *(_of_case(case, horizon, count, duration_s) for case in CASES), strict=True
+        )
+        for instance in pair
+    ]
+
+
+def _of_case(case: Case, horizon: int, count: int, duration_s: float) -> list[Instance]:
+    requests: list[PlanRequest] = []
+    flown = scenario(case, disturbed=True, duration_s=duration_s)
+    fly(flown, SEED, planner_of(horizon), asked=requests.append)
+    last = len(requests) - 1
+    chosen = np.unique(np.linspace(min(_LED_BY + 10, last), last, count).astype(int))
+    return [Instance(case, tuple(requests[at - _LED_BY : at]), requests[at]) for at in chosen]

@@ -1,0 +1,66 @@
+"""What a plan is worth: its cost on the nonlinear problem, whoever found it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fsw.barriers.soft_rows import TargetPoints
+from fsw.model.prediction import INPUTS, Array, condense, to_vector
+from fsw.mpc.planner_config import PlannerConfig
+from fsw.mpc.problem import Problem
+from fsw.signals import PlanRequest, SafeSet
+
+_MOST_ITERATIONS = 60
+_STAYS = 1e-7  # m/s^2 and rad/s^2
+
+
+class Judge:
+    """Prices inputs, and knows the converged solution of a request."""
+
+    def __init__(self, config: PlannerConfig, safe_set: SafeSet) -> None:
+        self._problem = Problem(
+            config, condense(config.lag, config.period, config.horizon), safe_set
+        )
+        self._unknowns = INPUTS * config.horizon
+
+    def price(self, request: PlanRequest, inputs: Array) -> float:
+        """Cost of inputs (6 n,) with the smallest slacks that admit them."""
+        problem = self._problem
+        problem.linearise(to_vector(request.start), inputs, target_points(request))
+        program, whole = problem.program, problem.program.whole
+        soft, slacks = slice(program.soft_rows), slice(program.inputs, None)
+        missing = np.maximum(-(whole.b - whole.a[:, : program.inputs] @ inputs)[soft], 0.0)
+        held_by = -whole.a[soft, slacks].toarray()
+        slack = (held_by * missing[:, None]).max(axis=0, initial=0.0)
+        weight = whole.p.diagonal()[slacks]
+        return float(problem.cost + whole.q[slacks] @ slack + 0.5 * slack @ (weight * slack))
+
+    def converged(self, request: PlanRequest, guess: Array) -> tuple[Array, float]:
+        """Inputs and price after programs until they stay.
+
+        Where they keep on changing (the directions of eq 23 turn with the iterate) the best
+        that was met counts.
+        """
+        start, targets = to_vector(request.start), target_points(request)
+        inputs, best = guess, (guess, self.price(request, guess))
+        for _ in range(_MOST_ITERATIONS):
+            self._problem.linearise(start, inputs, targets)
+            solution = self._problem.solve(last=True)
+            if not solution.usable:
+                break
+            step = solution.x[: self._unknowns] - inputs
+            inputs = solution.x[: self._unknowns]
+            price = self.price(request, inputs)
+            best = min(best, (inputs, price), key=lambda known: known[1])
+            if np.abs(step).max() < _STAYS:
+                return inputs, price
+        return best
+
+
+def target_points(request: PlanRequest) -> TargetPoints:
+    """The reference at the nodes as arrays."""
+    return TargetPoints(
+        np.array([target.p_WE for target in request.targets]),
+        np.array([target.v_WE for target in request.targets]),
+        np.array([target.yaw for target in request.targets]),
+    )
