@@ -35,12 +35,19 @@ def load(options: FswOptions) -> FlightProgram[int]:
 
 
 @pytest.fixture
-def options(tmp_path: Path) -> Iterator[FswOptions]:
+def silent() -> Iterator[socket.socket]:
+    """A simulator that hears and never answers."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as deaf:
+        deaf.bind(("127.0.0.1", 0))
+        deaf.settimeout(30.0)
+        yield deaf
+
+
+@pytest.fixture
+def options(silent: socket.socket, tmp_path: Path) -> Iterator[FswOptions]:
     handlers = [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)]
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as silent:
-        silent.bind(("127.0.0.1", 0))
-        address = f"udp:127.0.0.1:{silent.getsockname()[1]}"
-        yield FswOptions(address, address, "blf", "tracking", tmp_path, 0.4, "text")
+    address = f"udp:127.0.0.1:{silent.getsockname()[1]}"
+    yield FswOptions(address, address, "blf", "tracking", tmp_path, 0.4, "text")
     for number, handler in zip((signal.SIGINT, signal.SIGTERM), handlers, strict=True):
         signal.signal(number, handler)
 
@@ -62,8 +69,14 @@ def test_nobody_at_the_simulators_port_is_the_same(
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_ends_the_wait(options: FswOptions, number: signal.Signals) -> None:
-    threading.Timer(0.2, os.kill, (os.getpid(), number)).start()
+def test_a_signal_ends_the_wait(
+    options: FswOptions, silent: socket.socket, number: signal.Signals
+) -> None:
+    def signal_once_it_announces_itself() -> None:
+        silent.recv(2048)
+        os.kill(os.getpid(), number)
+
+    threading.Thread(target=signal_once_it_announces_itself, daemon=True).start()
     assert app.run(replace(options, wait_s=30.0), load) == app.NOT_COMPLETED
     assert (Path(str(options.out)) / "fsw.json").exists()
 
