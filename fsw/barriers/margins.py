@@ -42,7 +42,9 @@ def constraint_report(
         w = tuple(v[k] - target.v_WE[k] for k in range(3))
         distance = math.sqrt(sum(x * x for x in e))
         outward = sum(a * b for a, b in zip(e, w, strict=True)) / max(distance, 1e-6)
-        pairs = [(safe_set.sphere.radius - distance, -outward)]
+        inner, outer = safe_set.sphere.radius - distance, safe_set.sphere.radius + distance
+        h = min(_root(inner, tuning) - outward, _root(outer, tuning) + outward)
+        return ConstraintReport(safe_set.kind, (inner,), (h,))
     else:
         pairs = []
     return ConstraintReport(

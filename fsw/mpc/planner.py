@@ -169,7 +169,7 @@ class Planner:
         if not np.isfinite(to_vector(request.start)).all():
             return "the start state is not finite"
         for target in request.targets:
-            if not all(map(math.isfinite, (*target.p_WE, *target.v_WE))):
+            if not all(map(math.isfinite, (*target.p_WE, *target.v_WE, target.yaw))):
                 return "a target is not finite"
         return None
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from bisect import bisect_right
 
+from fsw.geometry.rotation import wrap_angle
 from fsw.signals import EndEffectorTarget, Vec3
 
 _REST: Vec3 = (0.0, 0.0, 0.0)
@@ -22,14 +24,19 @@ def merge(
 ) -> tuple[EndEffectorTarget, ...]:
     """Add points to the stream, sorted by time, a later point for the same instant wins.
 
-    Points before the last one already due are forgotten.
+    Points before the last one already due are forgotten; points that are not numbers never
+    enter.
     """
     if not received:
         return stream
-    by_time = {point.t_us: point for point in (*stream, *received)}
+    by_time = {point.t_us: point for point in (*stream, *received) if _is_finite(point)}
     points = [by_time[t] for t in sorted(by_time)]
     due = bisect_right([point.t_us for point in points], now_us)
     return tuple(points[max(due - 1, 0) :][:KEPT_POINTS])
+
+
+def _is_finite(point: EndEffectorTarget) -> bool:
+    return math.isfinite(sum(point.p_WE) + sum(point.v_WE) + sum(point.a_WE) + point.yaw)
 
 
 def sample(stream: tuple[EndEffectorTarget, ...], t_us: int) -> EndEffectorTarget:
@@ -63,30 +70,31 @@ def _hermite(first: EndEffectorTarget, last: EndEffectorTarget, t_us: int) -> En
         p.append(p0 + x * (m0 + x * (c2 + x * c3)))
         v.append((m0 + x * (2.0 * c2 + x * 3.0 * c3)) / span)
         a.append((2.0 * c2 + 6.0 * x * c3) / (span * span))
-    yaw = first.yaw + x * (last.yaw - first.yaw)
+    yaw = wrap_angle(first.yaw + x * wrap_angle(last.yaw - first.yaw))
     return EndEffectorTarget(t_us, (p[0], p[1], p[2]), (v[0], v[1], v[2]), (a[0], a[1], a[2]), yaw)
 
 
 def vertical_ramp(
-    start: Vec3, climb: float, speed: float, since_us: int, t_us: int
+    start: EndEffectorTarget, climb: float, speed: float, t_us: int
 ) -> EndEffectorTarget:
     """Straight up (climb > 0) or down from a point at constant speed, then still.
 
     Args:
-        start: Where the ramp begins [m].
+        start: Where and when the ramp begins.
         climb: Height to gain [m].
         speed: Of the ramp, positive [m/s].
-        since_us: When it began.
         t_us: The instant asked for.
     """
-    elapsed = max(t_us - since_us, 0) * 1e-6
+    elapsed = max(t_us - start.t_us, 0) * 1e-6
+    x, y, z = start.p_WE
     direction = 1.0 if climb >= 0.0 else -1.0
     gained = speed * elapsed
     if gained >= abs(climb):
-        return still_at((start[0], start[1], start[2] - climb), t_us)
+        return still_at((x, y, z - climb), t_us, start.yaw)
     return EndEffectorTarget(
         t_us,
-        (start[0], start[1], start[2] - direction * gained),
+        (x, y, z - direction * gained),
         (0.0, 0.0, -direction * speed),
         _REST,
+        start.yaw,
     )

@@ -15,9 +15,10 @@ from fsw.estimation.estimator import estimate_state
 from fsw.model.arm_kinematics import point_in_flight
 from fsw.model.nominal import NominalModel
 from fsw.mpc.reference import merge
+from fsw.parameters.consistency import analyse, loop_tube, refusals, warnings
 from fsw.parameters.flight_config import FlightConfig
 from fsw.runtime.flight_state import FlightState, MissionMemory, PlanMemory
-from fsw.runtime.mode_keeper import ModeKeeper, answer
+from fsw.runtime.mode_keeper import SEVERITY_WARNING, ModeKeeper, answer
 from fsw.runtime.mode_reference import mode_reference
 from fsw.runtime.planning import ask, late_start, measured_state, plan_input, take_answer
 from fsw.signals import (
@@ -52,6 +53,7 @@ class FlightLoop:
         self._model = NominalModel(lag, dt)
         self._cascade = Cascade(config.airframe, lag, config.tuning, config.inner, dt)
         self._modes = ModeKeeper(config)
+        self._loop_tube = loop_tube(config)
         self._ticks_per_plan = config.mpc_period_us // config.tick_period_us
 
     def tick(self, state: FlightState, inputs: TickInputs) -> tuple[FlightState, TickOutputs]:
@@ -67,16 +69,17 @@ class FlightLoop:
         now_us = inputs.sensors.t_us
         valid = estimate_state(inputs.sensors)
         estimate = valid or state.estimate
+        texts: list[StatusText] = []
+        if inputs.targets or inputs.safe_set is not None:
+            mission = self._receive(state.mission, inputs, now_us, texts)
+            state = replace(state, mission=mission)
         if estimate is None:
-            return state, _blind(inputs)
+            return state, _blind(inputs, texts)
         if valid is None:
             state = replace(state, invalid_ticks=state.invalid_ticks + 1)
         elif state.invalid_ticks:
             state = replace(state, invalid_ticks=0)
-        if inputs.targets or inputs.safe_set is not None:
-            state = replace(state, mission=_receive(state.mission, inputs, now_us))
 
-        texts: list[StatusText] = []
         acks: list[CommandAck] = []
         if inputs.commands:
             state, acks = self._modes.obey(state, estimate, inputs.commands, texts)
@@ -95,7 +98,7 @@ class FlightLoop:
                 nominal = self._model.step(nominal, last_u)
             state = replace(state, nominal=nominal, plan=plan)
             if planning_due:
-                request, plan = self._ask(state, estimate, nominal)
+                request, plan = self._ask(state, estimate, nominal, now_us)
                 state = replace(state, plan=plan)
             u = plan_input(plan.running, nominal, now_us)
 
@@ -116,10 +119,26 @@ class FlightLoop:
         )
         return state, TickOutputs(sent, snapshot, request, tuple(acks), tuple(texts))
 
+    def _receive(
+        self,
+        mission: MissionMemory,
+        inputs: TickInputs,
+        now_us: int,
+        texts: list[StatusText],
+    ) -> MissionMemory:
+        """Take in targets and a safe set; a new safe set is analysed before it is believed."""
+        stream = merge(mission.stream, inputs.targets, now_us)
+        if inputs.safe_set is None or inputs.safe_set == mission.safe_set:
+            return replace(mission, stream=stream)
+        findings = analyse(self.config, inputs.safe_set, self._loop_tube)
+        against = refusals(findings)
+        texts += [StatusText(SEVERITY_WARNING, text) for text in (*against, *warnings(findings))]
+        return MissionMemory(stream, inputs.safe_set, () if self.config.soft else against)
+
     def _ask(
-        self, state: FlightState, estimate: StateEstimate, nominal: PredictionState
+        self, state: FlightState, estimate: StateEstimate, nominal: PredictionState, now_us: int
     ) -> tuple[PlanRequest, PlanMemory]:
-        config, now_us = self.config, estimate.t_us
+        config = self.config
         apply_us = now_us + config.plan_delay_ticks * config.tick_period_us
         targets = tuple(
             self._reference(state, apply_us + node * config.mpc_period_us)
@@ -198,16 +217,11 @@ class FlightLoop:
             plan.counters,
             constraints,
             vehicle.failures,
+            vehicle.landed,
         )
 
 
-def _receive(mission: MissionMemory, inputs: TickInputs, now_us: int) -> MissionMemory:
-    return MissionMemory(
-        merge(mission.stream, inputs.targets, now_us), inputs.safe_set or mission.safe_set
-    )
-
-
-def _blind(inputs: TickInputs) -> TickOutputs:
+def _blind(inputs: TickInputs, texts: list[StatusText]) -> TickOutputs:
     """Before the first valid sensor frame: nothing moves, and commands are refused."""
     zero = (0.0, 0.0, 0.0)
     level = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
@@ -233,6 +247,5 @@ def _blind(inputs: TickInputs) -> TickOutputs:
         constraints=empty.constraints,
     )
     situation = Situation(Mode.DISARMED, landed=True, estimate_valid=False, targets_ahead=False)
-    texts: list[StatusText] = []
     acks = [answer(command, situation, texts)[0] for command in inputs.commands]
     return TickOutputs(STOPPED, snapshot, None, tuple(acks), tuple(texts))

@@ -29,6 +29,7 @@ class VehicleMemory:
     landed: bool = True
     still_since_us: int = 0  # landing detector
     anchor: Vec3 = _NOWHERE  # where a mode's own reference begins, end-effector [m]
+    anchor_yaw: float = 0.0  # rad
     anchor_us: int = 0
     failures: tuple[str, ...] = ()
 
@@ -49,6 +50,7 @@ class MissionMemory:
 
     stream: tuple[EndEffectorTarget, ...] = ()
     safe_set: SafeSet = field(default_factory=SafeSet)
+    refusals: tuple[str, ...] = ()  # why this configuration cannot keep the safe set
 
 
 @dataclass(frozen=True, slots=True)

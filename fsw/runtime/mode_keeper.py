@@ -25,7 +25,7 @@ from fsw.vehicle.commands import Decision, Situation, decide
 from fsw.vehicle.faults import RESPONSES, Evidence, Response, detect
 from fsw.vehicle.modes import Event, next_mode
 
-_EMERGENCY, _WARNING, _NOTICE = 0, 4, 5  # MAV_SEVERITY
+SEVERITY_EMERGENCY, SEVERITY_WARNING, SEVERITY_NOTICE = 0, 4, 5  # MAV_SEVERITY
 
 
 def answer(
@@ -34,7 +34,7 @@ def answer(
     """Decide a command; a reason becomes a text for the operator."""
     decision = decide(request, situation)
     if decision.reason:
-        texts.append(StatusText(_WARNING, decision.reason))
+        texts.append(StatusText(SEVERITY_WARNING, decision.reason))
     ack = CommandAck(
         request.command, decision.result, request.source_system, request.source_component
     )
@@ -60,7 +60,12 @@ class ModeKeeper:
             stream = state.mission.stream
             ahead = bool(stream) and stream[-1].t_us >= estimate.t_us
             situation = Situation(
-                state.vehicle.mode, state.vehicle.landed, state.invalid_ticks == 0, ahead
+                mode=state.vehicle.mode,
+                landed=state.vehicle.landed,
+                estimate_valid=state.invalid_ticks == 0,
+                targets_ahead=ahead,
+                standing_unclear=self._standing_unclear(estimate),
+                inconsistent="; ".join(state.mission.refusals),
             )
             ack, decision = answer(request, situation, texts)
             acks.append(ack)
@@ -75,6 +80,7 @@ class ModeKeeper:
         vehicle, plan = state.vehicle, state.plan
         faults = detect(
             Evidence(
+                vehicle.armed,
                 vehicle.flies,
                 state.invalid_ticks,
                 estimate.R_WB[8],
@@ -92,7 +98,9 @@ class ModeKeeper:
         for fault in faults:
             if fault.value not in vehicle.failures:
                 response = RESPONSES[fault]
-                severity = _EMERGENCY if response is Response.TERMINATE else _WARNING
+                severity = (
+                    SEVERITY_EMERGENCY if response is Response.TERMINATE else SEVERITY_WARNING
+                )
                 texts.append(StatusText(severity, f"{fault.value}: {response.name.lower()}"))
         state = replace(state, vehicle=replace(vehicle, failures=names))
         if any(RESPONSES[fault] is Response.TERMINATE for fault in faults):
@@ -123,18 +131,22 @@ class ModeKeeper:
     def _change(
         self, state: FlightState, event: Event, estimate: StateEstimate, texts: list[StatusText]
     ) -> FlightState:
-        mode = next_mode(state.vehicle.mode, event)
+        before = state.vehicle.mode
+        mode = next_mode(before, event)
         if mode is None:
             return state
         texts.append(
-            StatusText(_NOTICE, f"{state.vehicle.mode.value} to {mode.value}: {event.value}")
+            StatusText(
+                SEVERITY_NOTICE, f"{state.vehicle.mode.value} to {mode.value}: {event.value}"
+            )
         )
-        anchor = self._anchor(state, event, estimate)
+        anchor, anchor_yaw = self._anchor(state, event, estimate)
         state = self._take_over(state, event, estimate)
         vehicle = replace(
             state.vehicle,
             mode=mode,
             anchor=anchor,
+            anchor_yaw=anchor_yaw,
             anchor_us=estimate.t_us,
             still_since_us=estimate.t_us,
         )
@@ -160,7 +172,9 @@ class ModeKeeper:
             cascade=cascade,
         )
 
-    def _anchor(self, state: FlightState, event: Event, estimate: StateEstimate) -> Vec3:
+    def _anchor(
+        self, state: FlightState, event: Event, estimate: StateEstimate
+    ) -> tuple[Vec3, float]:
         """Where the new mode's own reference begins: the old one's where it leads on."""
         goes_on = state.vehicle.flies and event in (
             Event.CLIMB_DONE,
@@ -169,14 +183,22 @@ class ModeKeeper:
         )
         if goes_on:
             limits = self._config.limits
-            return mode_reference(state.vehicle, state.mission, limits, estimate.t_us).p_WE
-        return point_in_flight(estimate, self._config.airframe.link_length)[0]
+            last = mode_reference(state.vehicle, state.mission, limits, estimate.t_us)
+            return last.p_WE, last.yaw
+        return point_in_flight(estimate, self._config.airframe.link_length)[0], estimate.yaw
+
+    def _standing_unclear(self, estimate: StateEstimate) -> bool:
+        limits, above = self._config.limits, self._height_above_standing(estimate)
+        return limits.landed_height <= above < limits.airborne_height
+
+    def _height_above_standing(self, estimate: StateEstimate) -> float:
+        return -estimate.p_WB[2] - self._config.airframe.leg_length
 
     def _stands(self, estimate: StateEstimate) -> bool:
         """Near standing height and hardly moving."""
-        limits, legs = self._config.limits, self._config.airframe.leg_length
+        limits = self._config.limits
         vx, vy, vz = estimate.v_WB
         return (
-            -estimate.p_WB[2] < legs + limits.landed_height
+            self._height_above_standing(estimate) < limits.landed_height
             and vx * vx + vy * vy + vz * vz < limits.landed_speed**2
         )

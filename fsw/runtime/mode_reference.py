@@ -17,9 +17,12 @@ def mode_reference(
     if vehicle.mode is Mode.TRAJECTORY and mission.stream:
         return sample(mission.stream, t_us)
     if vehicle.mode is Mode.TAKEOFF:
-        return vertical_ramp(
-            vehicle.anchor, limits.takeoff_climb, limits.climb_speed, vehicle.anchor_us, t_us
-        )
+        return _ramp(vehicle, limits.takeoff_climb, limits.climb_speed, t_us)
     if vehicle.mode is Mode.LAND:
-        return vertical_ramp(vehicle.anchor, _FAR_DOWN, limits.land_speed, vehicle.anchor_us, t_us)
-    return still_at(vehicle.anchor, t_us)
+        return _ramp(vehicle, _FAR_DOWN, limits.land_speed, t_us)
+    return still_at(vehicle.anchor, t_us, vehicle.anchor_yaw)
+
+
+def _ramp(vehicle: VehicleMemory, climb: float, speed: float, t_us: int) -> EndEffectorTarget:
+    start = still_at(vehicle.anchor, vehicle.anchor_us, vehicle.anchor_yaw)
+    return vertical_ramp(start, climb, speed, t_us)

@@ -18,11 +18,11 @@ CMD_ARM_DISARM = 400
 ACCEPTED, TEMPORARILY_REJECTED, DENIED, UNSUPPORTED = 0, 1, 2, 3
 
 # PX4's custom_mode, main and sub mode as carried by DO_SET_MODE.
-_PX4_MODES: dict[tuple[int, int], Event] = {
-    (4, 2): Event.TAKE_OFF,
-    (4, 3): Event.HOLD,
-    (4, 6): Event.LAND,
-    (6, 0): Event.FOLLOW,
+_PX4_MODES: dict[tuple[float, float], Event] = {
+    (4.0, 2.0): Event.TAKE_OFF,
+    (4.0, 3.0): Event.HOLD,
+    (4.0, 6.0): Event.LAND,
+    (6.0, 0.0): Event.FOLLOW,
 }
 _FORCE = 21196.0  # the value MAVLink asks for to arm or disarm against all checks
 
@@ -35,6 +35,8 @@ class Situation:
     landed: bool
     estimate_valid: bool
     targets_ahead: bool  # the stream holds a point at or after now
+    standing_unclear: bool = False  # too high to stand, too low to be surely in the air
+    inconsistent: str = ""  # why the configuration cannot keep the safe set
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,10 +79,9 @@ def _requested_event(request: CommandRequest) -> Event | Decision:
         return Event.LAND
     if request.command == CMD_DO_SET_MODE:
         main, sub = request.params[1], request.params[2]
-        if math.isfinite(main):
-            key = (int(main), int(sub) if math.isfinite(sub) else 0)
-            if key in _PX4_MODES:
-                return _PX4_MODES[key]
+        mode = _PX4_MODES.get((main, 0.0 if math.isnan(sub) else sub))
+        if mode is not None:
+            return mode
         return Decision(DENIED, reason=f"mode {main:g}/{sub:g} is not one of this vehicle")
     if request.command == CMD_SHUTDOWN:
         return Decision(ACCEPTED)  # the process ends after answering; no mode changes
@@ -91,6 +92,10 @@ def _refusal(event: Event, request: CommandRequest, situation: Situation) -> str
     forced = request.params[1] == _FORCE
     if event is Event.ARM and not situation.estimate_valid:
         return "not armed: the state estimate is invalid"
+    if event is Event.ARM and situation.inconsistent:
+        return f"not armed: {situation.inconsistent}"
+    if event is Event.ARM and situation.standing_unclear:
+        return "not armed: neither standing nor clearly in the air; check the origin's height"
     flying = not situation.landed and situation.mode not in (Mode.DISARMED, Mode.FAULT)
     if event is Event.DISARM and flying and not forced:
         return "not disarmed: the vehicle is in the air; land first or force"

@@ -41,6 +41,7 @@ LEAST_UP = 0.34  # cosine of 70 degrees of tilt
 class Evidence:
     """What the detector looks at, once a tick."""
 
+    armed: bool
     flying: bool
     invalid_ticks: int  # since the last valid estimate
     up: float  # cosine of tilt, R33
@@ -53,7 +54,7 @@ class Evidence:
 def detect(evidence: Evidence) -> tuple[Fault, ...]:
     """Active faults, strongest response first."""
     active = []
-    if evidence.invalid_ticks >= INVALID_TICKS:
+    if evidence.armed and evidence.invalid_ticks >= INVALID_TICKS:
         active.append(Fault.ESTIMATE_INVALID)
     if evidence.flying and not (evidence.up > LEAST_UP):
         active.append(Fault.TILT_LOST)

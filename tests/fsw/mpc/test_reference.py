@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fsw.mpc.reference import KEPT_POINTS, merge, sample, vertical_ramp
+from fsw.mpc.reference import KEPT_POINTS, merge, sample, still_at, vertical_ramp
 from fsw.signals import EndEffectorTarget, Vec3
 
 STILL: Vec3 = (0.0, 0.0, 0.0)
@@ -100,11 +100,19 @@ def test_a_flood_keeps_what_is_flown_next() -> None:
 
 @pytest.mark.parametrize("climb", [1.0, -1.0], ids=["up", "down"])
 def test_ramp_moves_vertically_at_its_speed_and_then_rests(climb: float) -> None:
-    start: Vec3 = (1.0, 2.0, -0.5)
-    halfway = vertical_ramp(start, climb, 0.4, since_us=1_000_000, t_us=2_000_000)
+    start = still_at((1.0, 2.0, -0.5), 1_000_000, yaw=0.7)
+    halfway = vertical_ramp(start, climb, 0.4, t_us=2_000_000)
     assert halfway.p_WE == pytest.approx((1.0, 2.0, -0.5 - math.copysign(0.4, climb)))
     assert halfway.v_WE == pytest.approx((0.0, 0.0, -math.copysign(0.4, climb)))
-    arrived = vertical_ramp(start, climb, 0.4, since_us=1_000_000, t_us=9_000_000)
+    arrived = vertical_ramp(start, climb, 0.4, t_us=9_000_000)
     assert arrived.p_WE == pytest.approx((1.0, 2.0, -0.5 - climb))
     assert arrived.v_WE == STILL
-    assert vertical_ramp(start, climb, 0.4, 1_000_000, 0).p_WE == pytest.approx(start)
+    before = vertical_ramp(start, climb, 0.4, t_us=0)
+    assert before.p_WE == pytest.approx(start.p_WE)
+    assert halfway.yaw == arrived.yaw == before.yaw == 0.7
+
+
+def test_the_reference_turns_the_short_way() -> None:
+    p = (0.0, 0.0, 0.0)
+    stream = (EndEffectorTarget(0, p, p, p, 3.1), EndEffectorTarget(100_000, p, p, p, -3.1))
+    assert abs(sample(stream, 50_000).yaw) > 3.0

@@ -13,6 +13,7 @@ from fsw.vehicle.faults import RESPONSES, Evidence, Fault, Response, detect
 
 PERIOD_US = 100_000
 FINE = Evidence(
+    armed=True,
     flying=True,
     invalid_ticks=0,
     up=1.0,
@@ -60,6 +61,7 @@ def test_each_evidence_is_its_fault(evidence: Evidence, fault: Fault) -> None:
         replace(FINE, plan_age_us=3 * PERIOD_US),
         replace(FINE, flying=False, up=-1.0),  # carried about upside down
         replace(FINE, flying=False, plan_age_us=10**9),
+        replace(FINE, armed=False, flying=False, invalid_ticks=1000),  # sensors not yet on
     ],
 )
 def test_what_can_be_lived_with_is_no_fault(evidence: Evidence) -> None:
@@ -69,6 +71,7 @@ def test_what_can_be_lived_with_is_no_fault(evidence: Evidence) -> None:
 @given(
     st.builds(
         Evidence,
+        armed=st.booleans(),
         flying=st.booleans(),
         invalid_ticks=st.integers(0, 1000),
         up=st.floats(allow_nan=True),

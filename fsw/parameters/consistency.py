@@ -1,0 +1,191 @@
+r"""Whether a configuration can keep its safe set at all, before anything flies.
+
+The paper's :math:`\lambda \in \{1, 5\}` cannot be met in its own workspace sphere: at the
+centre, at rest, :math:`h = S(r)`, which would have to be at least :math:`\lambda`. Such
+contradictions show in a few inequalities. Each finding states one of them, whether it
+holds, and the nearest value that would do.
+
+Source: docs/equations.md T5.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from fsw.barriers.root import BarrierTuning
+from fsw.control.inner_tuning import tracking_gains
+from fsw.control.tube import Tube, peak_snap_share, tube
+from fsw.model.airframe import GRAVITY
+from fsw.parameters.flight_config import FlightConfig, Surroundings
+from fsw.signals import ConstraintKind, SafeSet
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One inequality of the analysis."""
+
+    name: str
+    holds: bool
+    statement: str  # with numbers, and what would do where it does not hold
+    refuses: bool = True  # a finding that only warns says False
+
+
+def analyse(config: FlightConfig, safe_set: SafeSet, loop: Tube) -> tuple[Finding, ...]:
+    """Every finding about a controller with barriers in a safe set; none for the others.
+
+    Args:
+        config: What would fly.
+        safe_set: What it would have to keep.
+        loop: ``loop_tube(config)``, which takes a moment and does not depend on the safe set.
+    """
+    surroundings = config.surroundings
+    if config.controller != "blf" or safe_set.kind is ConstraintKind.NONE:
+        return ()
+    in_sphere = safe_set.sphere is not None
+    tuning = config.planner.workspace if in_sphere else config.planner.walls
+    findings = [_actuation(config, tuning, safe_set, surroundings)]
+    if safe_set.sphere is not None:
+        findings.append(_room_in_sphere(tuning, safe_set.sphere.radius))
+    if config.inner == "tracking":
+        findings.append(_base_tube(tuning, loop, surroundings))
+        if not in_sphere:
+            findings.append(_end_effector_tube(tuning, loop, surroundings))
+        findings.append(_snap(config, loop, surroundings))
+    else:
+        findings.append(_sampled(tuning, surroundings))
+    return tuple(findings)
+
+
+def refusals(findings: tuple[Finding, ...]) -> tuple[str, ...]:
+    """The statements that speak against flying."""
+    return tuple(f.statement for f in findings if f.refuses and not f.holds)
+
+
+def warnings(findings: tuple[Finding, ...]) -> tuple[str, ...]:
+    """The statements an operator should know and may fly with."""
+    return tuple(f.statement for f in findings if not f.refuses and not f.holds)
+
+
+def loop_tube(config: FlightConfig) -> Tube:
+    """Tube of the configured tracking loop, per m/s^2 of disturbance."""
+    surroundings = config.surroundings
+    dt = config.tick_period_us * 1e-6
+    tracking = config.tuning.tracking
+    gains = tracking_gains(tracking, config.airframe.rotor_lag, dt)
+    return tube(
+        config.airframe, tracking, gains, surroundings.hanging, surroundings.disturbance_hold, dt
+    )
+
+
+def stand_off(tuning: BarrierTuning) -> float:
+    """Distance to the boundary at which a plan at rest meets h = lambda [m]."""
+    knee = tuning.alpha / tuning.slope**2
+    if tuning.robustness <= tuning.slope * knee:
+        return tuning.robustness / tuning.slope
+    return tuning.robustness**2 / (2.0 * tuning.alpha) + 0.5 * knee
+
+
+def sampled_robustness(tuning: BarrierTuning, disturbance: float) -> float:
+    """Least lambda that rejects a constant disturbance along the normal in sampled data."""
+    return disturbance * (1.0 + 0.5 * tuning.slope * tuning.period) / tuning.gamma
+
+
+def _actuation(
+    config: FlightConfig, tuning: BarrierTuning, safe_set: SafeSet, surroundings: Surroundings
+) -> Finding:
+    available = GRAVITY * math.tan(config.airframe.tilt_limit)
+    wanted = tuning.alpha + tuning.gamma * tuning.robustness + surroundings.target_acceleration
+    parts = "alpha + gamma lambda + |a_t|"
+    if safe_set.sphere is not None:
+        wanted += surroundings.tangential_speed**2 / safe_set.sphere.radius
+        parts += " + w^2/r"
+    best = tuning.alpha - (wanted - available)
+    remedy = (
+        f"alpha <= {best:.2f} m/s^2 would do"
+        if best > 0.0
+        else f"lambda <= {(available - wanted) / tuning.gamma + tuning.robustness:.2f} m/s would do"
+    )
+    return _finding(
+        "actuation",
+        wanted <= available,
+        f"braking needs {parts} = {wanted:.2f} m/s^2 and the tilt gives {available:.2f}",
+        remedy,
+    )
+
+
+def _room_in_sphere(tuning: BarrierTuning, radius: float) -> Finding:
+    knee = tuning.alpha / tuning.slope**2
+    at_centre = (
+        tuning.slope * radius
+        if radius < knee
+        else math.sqrt(2.0 * tuning.alpha * (radius - 0.5 * knee))
+    )
+    return _finding(
+        "sphere",
+        at_centre >= tuning.robustness,
+        f"h2a and h2b at the centre are S(r) = {at_centre:.3f} m/s and lambda is "
+        f"{tuning.robustness:.3f}",
+        f"lambda <= {at_centre:.3f} m/s or r >= {stand_off(tuning):.3f} m would do",
+    )
+
+
+def _base_tube(tuning: BarrierTuning, loop: Tube, surroundings: Surroundings) -> Finding:
+    reach, room = loop.base * surroundings.disturbance, stand_off(tuning)
+    return _finding(
+        "tube",
+        room >= reach,
+        f"no disturbance within {surroundings.disturbance:g} m/s^2 pushes the base further than "
+        f"{reach * 1e3:.0f} mm off its plan, which keeps {room * 1e3:.0f} mm from the boundary: "
+        f"margin {(room - reach) * 1e3:+.0f} mm",
+        f"lambda >= {reach * tuning.slope:.3f} m/s would do",
+    )
+
+
+def _end_effector_tube(tuning: BarrierTuning, loop: Tube, surroundings: Surroundings) -> Finding:
+    """Across the arm's plane the arm cannot compensate; along it, it does."""
+    reach = loop.end_effector * surroundings.disturbance
+    expected = loop.end_effector_expected * surroundings.disturbance
+    room = stand_off(tuning)
+    return _finding(
+        "end-effector tube",
+        room >= reach,
+        f"across the arm's plane a hanging end-effector can be pushed {reach * 1e3:.0f} mm by the "
+        f"worst disturbance ({expected * 1e3:.0f} mm expected at random) and the plan keeps "
+        f"{room * 1e3:.0f} mm",
+        f"lambda >= {reach * tuning.slope:.3f} m/s would be proof",
+        refuses=False,
+    )
+
+
+def _snap(config: FlightConfig, loop: Tube, surroundings: Surroundings) -> Finding:
+    share = peak_snap_share(config.airframe, loop, surroundings.disturbance)
+    return _finding(
+        "snap",
+        share <= 0.85,
+        f"rejecting {surroundings.disturbance:g} m/s^2 uses {share:.0%} of the snap the rotors' "
+        "torque gives",
+        f"a disturbance up to {0.85 / share * surroundings.disturbance:.2f} m/s^2 leaves 15 %",
+        refuses=False,
+    )
+
+
+def _sampled(tuning: BarrierTuning, surroundings: Surroundings) -> Finding:
+    least = sampled_robustness(tuning, surroundings.disturbance)
+    margin = (tuning.robustness - least) / tuning.slope
+    return _finding(
+        "sampled",
+        tuning.robustness >= least,
+        f"rejecting {surroundings.disturbance:g} m/s^2 by planning alone needs lambda >= "
+        f"d (1 + k_S T/2) / gamma = {least:.3f} m/s and lambda is {tuning.robustness:.3f}: margin "
+        f"{margin * 1e3:+.0f} mm",
+        f"lambda = {least:.3f} m/s would do",
+        refuses=False,
+    )
+
+
+def _finding(
+    name: str, holds: bool, statement: str, remedy: str, *, refuses: bool = True
+) -> Finding:
+    sentence = statement if holds else f"{statement}; {remedy}"
+    return Finding(name, holds, sentence, refuses)

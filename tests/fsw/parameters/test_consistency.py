@@ -1,0 +1,97 @@
+"""A configuration that cannot keep its safe set says so, with a value that would do."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from fsw.barriers.root import BarrierTuning, root
+from fsw.parameters.consistency import (
+    Finding,
+    analyse,
+    loop_tube,
+    refusals,
+    sampled_robustness,
+    stand_off,
+)
+from fsw.parameters.flight_config import FlightConfig, flight_config
+from fsw.signals import SafeSet, Wall, WorkspaceSphere
+
+WALLS = SafeSet(walls=(Wall((-1.0, 0.0, 0.0), -1.0, 0.1),))
+SPHERE = SafeSet(sphere=WorkspaceSphere((0.0, 0.0, -0.225), 0.075))
+
+
+def _findings(config: FlightConfig, safe_set: SafeSet) -> dict[str, Finding]:
+    found = analyse(config, safe_set, loop_tube(config))
+    return {finding.name: finding for finding in found}
+
+
+@pytest.mark.parametrize("safe_set", [WALLS, SPHERE])
+def test_the_default_configuration_is_consistent(safe_set: SafeSet) -> None:
+    config = flight_config()
+    assert refusals(analyse(config, safe_set, loop_tube(config))) == ()
+
+
+@pytest.mark.parametrize("preset", ["paper-1", "paper-5"])
+@pytest.mark.parametrize("safe_set", [WALLS, SPHERE])
+def test_the_papers_lambda_is_refused_with_a_value_that_would_do(
+    preset: str, safe_set: SafeSet
+) -> None:
+    config = flight_config(robustness=preset)
+    against = refusals(analyse(config, safe_set, loop_tube(config)))
+    assert against
+    assert all("would do" in sentence for sentence in against)
+
+
+def test_the_sphere_finding_turns_exactly_where_the_centre_can_hold() -> None:
+    config = flight_config()
+    tuning = config.planner.workspace
+    at_centre = root(0.075, tuning.alpha, tuning.slope)
+    for robustness, holds in ((0.999 * at_centre, True), (1.001 * at_centre, False)):
+        workspace = replace(tuning, robustness=robustness)
+        changed = replace(config, planner=replace(config.planner, workspace=workspace))
+        assert _findings(changed, SPHERE)["sphere"].holds is holds
+
+
+@pytest.mark.parametrize("robustness", [0.1, 0.3, 0.5, 0.9, 2.0])
+def test_at_the_stand_off_a_vehicle_at_rest_meets_lambda(robustness: float) -> None:
+    tuning = BarrierTuning(robustness=robustness)
+    assert root(stand_off(tuning), tuning.alpha, tuning.slope) == pytest.approx(robustness)
+
+
+def test_the_tube_finding_turns_where_the_stand_off_equals_the_reach() -> None:
+    config = flight_config()
+    tuning = config.planner.walls
+    reach = 0.8 * loop_tube(config).base
+    for factor, holds in ((1.01, True), (0.99, False)):
+        walls = replace(tuning, robustness=factor * reach * tuning.slope)
+        changed = replace(config, planner=replace(config.planner, walls=walls))
+        assert _findings(changed, WALLS)["tube"].holds is holds
+
+
+@pytest.mark.parametrize("share", [0.9, 1.0, 1.1])
+def test_sampled_robustness_is_the_least_lambda_that_a_held_push_cannot_beat(share: float) -> None:
+    """Beside a wall, on the double integrator, with the row of eq 25 met with equality.
+
+    The controller brakes exactly as much as ``h+ = h - gamma T (h - lambda)`` asks; a push of
+    0.8 m/s^2 that it does not know comes on top. The distance settles at the predicted margin.
+    """
+    push, period = 0.8, 0.1
+    tuning = BarrierTuning(slope=4.0)
+    robustness = share * sampled_robustness(tuning, push)
+    k, gamma = tuning.slope, tuning.gamma
+    d, v = 0.05, 0.0
+    for _ in range(400):
+        h = k * d + v
+        wanted = h - gamma * period * (h - robustness)
+        # h at the next sample is k (d + v T + a T^2/2) + v + a T, the push left out.
+        a = (wanted - k * (d + v * period) - v) / (k * period**2 / 2.0 + period)
+        d, v = d + v * period + (a - push) * period**2 / 2.0, v + (a - push) * period
+    predicted = (robustness - sampled_robustness(tuning, push)) / k
+    assert d == pytest.approx(predicted, abs=1e-6)
+
+
+def test_controllers_without_a_barrier_have_nothing_to_refuse() -> None:
+    config = flight_config("naive")
+    assert analyse(config, SPHERE, loop_tube(config)) == ()
