@@ -62,8 +62,11 @@ def grazing(flown: Scenario) -> Scenario:
 def configuration(
     plant: PlantName, controller: str = "blf", inner: Inner = "tracking"
 ) -> FlightConfig:
-    """A controller as it flies in a plant."""
-    config = flight_config(controller, inner)
+    """A controller as it flies in a plant.
+
+    Inconsistent ones fly as well: what becomes of them is what a study wants to see.
+    """
+    config = flight_config(controller, inner, soft=True)
     return config if plant == "full" else replace(config, planner=_at_once(config.planner))
 
 
