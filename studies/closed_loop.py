@@ -8,7 +8,6 @@ mode commands of the scenario's pilot come on the first two ticks.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -29,10 +28,14 @@ from fsw.signals import (
 from sitl.scenario import Scenario
 from sitl.sensors.suite import SensorReadings
 from sitl.simulation import STEP_US, Controls, Simulation
-from studies.flight_result import FlightRecorder, FlightResult, TracePoint
+from studies.flight_result import (
+    TRACE_STEPS,
+    FlightRecorder,
+    FlightResult,
+    TracePoint,
+    processor_time_us,
+)
 from studies.mission import safe_set, target
-
-TRACE_STEPS = 20  # 40 ms between points of a trace
 
 _TARGET_US = 100_000  # between points of the reference, as the pilot sends them
 _TARGETS_AHEAD = 20
@@ -92,7 +95,7 @@ class _Flight:
         self._config = config
         self._loop = FlightLoop(config)
         self._state = FlightState()
-        self._planner = Planner(config.planner, _stopwatch_us)
+        self._planner = Planner(config.planner, processor_time_us)
         self._answer: _Answer | None = None
         self._steps_per_plan = config.mpc_period_us // config.tick_period_us
         self._traced = traced
@@ -178,8 +181,3 @@ def _insist(outputs: TickOutputs) -> None:
         if ack.result != 0:
             texts = "; ".join(text.text for text in outputs.texts)
             raise RefusedError(f"command {ack.command} was answered with {ack.result}: {texts}")
-
-
-def _stopwatch_us() -> float:
-    """Processor time: a campaign shares its cores, and planning time must not tell of that."""
-    return time.thread_time() * 1e6

@@ -9,7 +9,6 @@ every exchange of 2 ms.
 from __future__ import annotations
 
 import math
-import time
 from dataclasses import dataclass
 
 from fsw.model.airframe import AIRFRAME
@@ -24,11 +23,16 @@ from sitl.referee import Points, Referee
 from sitl.scenario import V3, Scenario
 from sitl.simulation import SAMPLE_STEPS, START_US, STEP_US
 from sitl.verdict import EndReason, TruthResult
-from studies.flight_result import FlightRecorder, FlightResult, TracePoint
+from studies.flight_result import (
+    TRACE_STEPS,
+    FlightRecorder,
+    FlightResult,
+    TracePoint,
+    processor_time_us,
+)
 from studies.mission import safe_set, target
 
 _STEP_S = 1e-6 * STEP_US
-_TRACE_STEPS = 20
 _LEVEL = (0.0, 0.0)
 
 
@@ -160,7 +164,7 @@ def fly(
         traced: Keep the truth for figures.
     """
     plant = DoubleIntegrator(scenario, seed)
-    planner = Planner(config.planner, _stopwatch_us)
+    planner = Planner(config.planner, processor_time_us)
     recorder = FlightRecorder()
     held, running = safe_set(scenario), None
     steps = config.mpc_period_us // STEP_US
@@ -171,14 +175,14 @@ def fly(
             target(plant.clock, t_us + node * config.mpc_period_us)
             for node in range(config.planner.horizon + 1)
         )
-        answer = planner.plan(PlanRequest(recorder.plans, t_us, start, targets, held, False))
+        answer = planner.plan(PlanRequest(len(recorder.step_us), t_us, start, targets, held, False))
         recorder.planned(answer)
         running = answer if isinstance(answer, Plan) else running
         # As in flight: without an answer the running plan goes on, then the vehicle brakes.
         u = plan_input(running, start, t_us)
         recorder.effort.add(u)
         for _ in range(steps):
-            if traced and plant.step % _TRACE_STEPS == 0:
+            if traced and plant.step % TRACE_STEPS == 0:
                 recorder.trace.append(_trace_point(plant))
             if plant.ended is None:
                 plant.advance(u)
@@ -205,8 +209,3 @@ def _trace_point(plant: DoubleIntegrator) -> TracePoint:
     margins = plant.referee.margins(points, plant.time_s)
     aim = plant.clock.target_at(plant.time_s).p
     return TracePoint(plant.time_s, points[0], points[2], aim, min(margins))
-
-
-def _stopwatch_us() -> float:
-    """Processor time: a campaign shares its cores, and planning time must not tell of that."""
-    return time.thread_time() * 1e6
