@@ -104,7 +104,7 @@ class _Session:
         finally:
             for part in (sim, gcs, log):
                 part.close()
-        setup = report.Setup(options.controller, options.inner, facts)
+        setup = report.Setup(options.control.controller, options.control.inner, facts)
         result = report.as_json(setup, end, record, sim.retransmissions)
         report.write(directory / "fsw.json", result)
         self._told.report("ended", f"fsw: {end.sentence}", ending=end.ending.value)
@@ -153,7 +153,7 @@ def load_flight_software(options: FswOptions) -> FlightProgram[Any]:
     from fsw.runtime.assembly import flight_software
 
     try:
-        return flight_software(options.controller, options.inner)
+        return flight_software(options.control)
     except ValueError as error:
         raise CouldNotStart(str(error)) from None
 

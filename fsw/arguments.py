@@ -6,6 +6,53 @@ import argparse
 from dataclasses import dataclass
 from pathlib import Path
 
+from fsw.parameters.control_choice import ControlChoice
+
+
+def add_control_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare what flies."""
+    parser.add_argument(
+        "--controller",
+        metavar="NAME",
+        default="blf",
+        help="predictive controller: blf, hc, sc or naive (default %(default)s)",
+    )
+    parser.add_argument(
+        "--inner",
+        metavar="NAME",
+        default="tracking",
+        help="fast loop, tracking or pid (default %(default)s)",
+    )
+    parser.add_argument(
+        "--robustness",
+        metavar="NAME",
+        default="consistent",
+        help="lambda of the barrier: consistent, or the paper's, paper-1 or paper-5, which "
+        "need --soft (default %(default)s)",
+    )
+    parser.add_argument(
+        "--solver",
+        metavar="NAME",
+        default="clarabel",
+        help="optimiser, clarabel or the paper's slsqp (default %(default)s)",
+    )
+    parser.add_argument(
+        "--soft",
+        action="store_true",
+        help="fly a configuration that cannot keep its safe set, with a warning",
+    )
+
+
+def control_choice(arguments: argparse.Namespace) -> ControlChoice:
+    """What flies, as one value."""
+    return ControlChoice(
+        controller=arguments.controller,
+        inner=arguments.inner,
+        robustness=arguments.robustness,
+        solver=arguments.solver,
+        soft=arguments.soft,
+    )
+
 
 @dataclass(frozen=True, slots=True)
 class FswOptions:
@@ -13,8 +60,7 @@ class FswOptions:
 
     sim: str  # udp:HOST:PORT of the simulator
     gcs: str  # udp:HOST:PORT of the ground station
-    controller: str
-    inner: str
+    control: ControlChoice
     out: Path | None  # None: a new directory under runs/
     wait_s: float  # for the simulator
     events: str  # "text" for people, "json" for programs
@@ -34,18 +80,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="udp:127.0.0.1:14550",
         help="where to send telemetry (default %(default)s)",
     )
-    parser.add_argument(
-        "--controller",
-        metavar="NAME",
-        default="blf",
-        help="predictive controller (default %(default)s)",
-    )
-    parser.add_argument(
-        "--inner",
-        metavar="NAME",
-        default="tracking",
-        help="fast loop, tracking or pid (default %(default)s)",
-    )
+    add_control_arguments(parser)
     parser.add_argument(
         "--out", metavar="DIR", type=Path, help="where logs go (default a new one in runs/)"
     )
@@ -69,8 +104,7 @@ def options(arguments: argparse.Namespace) -> FswOptions:
     return FswOptions(
         sim=arguments.sim,
         gcs=arguments.gcs,
-        controller=arguments.controller,
-        inner=arguments.inner,
+        control=control_choice(arguments),
         out=arguments.out,
         wait_s=arguments.wait,
         events=arguments.events,

@@ -46,7 +46,7 @@ def _banner(options: FlyOptions, display: Display) -> None:
     pacing = "real time" if options.realtime else "lockstep"
     display.say(
         f"Pandion {version()}: {options.scenario_name}, seed {options.seed}, "
-        f"{options.duration_s:g} s, {options.controller} controller, {pacing}"
+        f"{options.duration_s:g} s, {options.control.controller} controller, {pacing}"
     )
     port = parse_address(options.gcs)[1]
     display.say(f"telemetry to {options.gcs}: QGroundControl connects on UDP {port}")
@@ -72,8 +72,7 @@ def _fsw_arguments(options: FlyOptions, port: int) -> list[str]:
     return [
         f"--sim=udp:127.0.0.1:{port}",
         f"--gcs={options.gcs}",
-        f"--controller={options.controller}",
-        f"--inner={options.inner}",
+        *options.control.as_arguments(),
         f"--out={options.out}",
         "--wait=600",
     ]
@@ -92,7 +91,7 @@ def _judge(options: FlyOptions, display: Display, flown: Flown) -> int:
     parts = Parts(
         scenario=options.scenario_name,
         seed=options.seed,
-        controller=options.controller,
+        controller=options.control.controller,
         sitl=flown.sitl,
         fsw=_read(out / "fsw.json"),
         failure=flown.failure,
@@ -110,6 +109,8 @@ def _judge(options: FlyOptions, display: Display, flown: Flown) -> int:
         print(text, end="", flush=True)
     elif options.json is not None:
         Path(options.json).write_text(text, encoding="utf-8")
+    if flown.sitl is not None and flown.sitl.get("end_kind") == "refused":
+        return COULD_NOT_START
     return COMPLETED if result["completed"] else NOT_COMPLETED
 
 

@@ -6,8 +6,10 @@ import argparse
 from dataclasses import dataclass
 from pathlib import Path
 
+from fsw.arguments import add_control_arguments, control_choice
 from fsw.link.udp_endpoint import parse_address
 from fsw.log.run_directory import new_run_directory
+from fsw.parameters.control_choice import ControlChoice
 from sitl.arguments import add_run_arguments
 from sitl.scenario_file import ScenarioError, load_scenario
 
@@ -22,8 +24,7 @@ class FlyOptions:
     duration_s: float
     realtime: bool
     speed: float | None  # None: as fast as possible
-    controller: str
-    inner: str
+    control: ControlChoice
     gcs: str
     out: Path
     json: str | None
@@ -32,18 +33,7 @@ class FlyOptions:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare every option."""
     add_run_arguments(parser)
-    parser.add_argument(
-        "--controller",
-        metavar="NAME",
-        default="blf",
-        help="predictive controller (default %(default)s)",
-    )
-    parser.add_argument(
-        "--inner",
-        metavar="NAME",
-        default="tracking",
-        help="fast loop, tracking or pid (default %(default)s)",
-    )
+    add_control_arguments(parser)
     parser.add_argument(
         "--gcs",
         metavar="udp:HOST:PORT",
@@ -77,8 +67,7 @@ def options(arguments: argparse.Namespace) -> FlyOptions:
         duration_s=scenario.duration_s if arguments.duration is None else arguments.duration,
         realtime=arguments.realtime,
         speed=arguments.speed,
-        controller=arguments.controller,
-        inner=arguments.inner,
+        control=control_choice(arguments),
         gcs=arguments.gcs,
         out=_directory(arguments.out, f"{scenario.name}-seed{arguments.seed}"),
         json=arguments.json,

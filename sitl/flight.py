@@ -21,7 +21,7 @@ from sitl.simulation import START_US, STEP_US, Controls, Simulation
 from sitl.trajectory import TrajectoryPoint
 from sitl.verdict import EndKind, TruthResult
 
-COMPLETED, NOT_COMPLETED = 0, 1  # exit codes
+COMPLETED, NOT_COMPLETED, COULD_NOT_START = 0, 1, 2  # exit codes
 
 _FIFO_PRIORITY: Final = 50
 
@@ -63,6 +63,8 @@ class Flight:
         written = self._as_json(result, timing, exchange)
         self._write(written)
         self._told.report("ended", f"sitl: {_summary(result, timing)}", result=written)
+        if simulation.ended is not None and simulation.ended.kind is EndKind.REFUSED:
+            return COULD_NOT_START
         return COMPLETED if result.completed else NOT_COMPLETED
 
     def _target_at(self, t_us: int) -> TrajectoryPoint:
@@ -101,6 +103,9 @@ class Flight:
             "scenario": self._simulation.scenario.name,
             "seed": self._options.seed,
             **dataclasses.asdict(result),
+            "end_kind": None
+            if self._simulation.ended is None
+            else self._simulation.ended.kind.value,
             "real_time_factor": timing.real_time_factor,
             "steps": timing.steps,
             "resent_steps": exchange.counts.resent,

@@ -12,7 +12,7 @@ from fsw.control.height import height_pid
 from fsw.control.inner_tuning import InnerTuning, tracking_gains
 from fsw.control.joints import joint_torques
 from fsw.control.pid import PidGains
-from fsw.control.tracking import TrackingLaw, follow_plan, observe_disturbance
+from fsw.control.tracking import Observed, TrackingLaw, follow_plan, observe
 from fsw.geometry.rotation import wrap_angle
 from fsw.model.airframe import GRAVITY, Airframe
 from fsw.model.prediction import LagModel
@@ -29,6 +29,7 @@ from fsw.signals import (
 
 Inner = Literal["tracking", "pid"]
 
+_NONE: Vec3 = (0.0, 0.0, 0.0)
 NO_ACTION = ActuatorCommand((0.0, 0.0, 0.0, 0.0), (0.0, 0.0))
 
 
@@ -38,26 +39,30 @@ class CascadeMemory:
 
     rotors: Vec4  # N, where the rotor model says they are
     commanded: ActuatorCommand  # what was sent last tick, after the safety gate
-    v_hat: Vec3  # m/s, disturbance observer
+    observed: Observed
     attitude: Vec3 = (0.0, 0.0, 0.0)  # rad s, integrals
     height: float = 0.0  # m s, integral
     joints: Vec2 = (0.0, 0.0)  # rad s, integrals
 
     def after_sending(self, sent: ActuatorCommand) -> CascadeMemory:
         """The memory for the next tick, once the safety gate has decided."""
-        return CascadeMemory(self.rotors, sent, self.v_hat, self.attitude, self.height, self.joints)
+        return CascadeMemory(
+            self.rotors, sent, self.observed, self.attitude, self.height, self.joints
+        )
 
 
 def at_rest(estimate: StateEstimate) -> CascadeMemory:
     """Memory of a vehicle whose rotors stand still."""
-    return CascadeMemory(NO_ACTION.rotor_thrust, NO_ACTION, estimate.v_WB)
+    return CascadeMemory(NO_ACTION.rotor_thrust, NO_ACTION, Observed(estimate.v_WB, _NONE))
 
 
 def in_hover(airframe: Airframe, estimate: StateEstimate) -> CascadeMemory:
     """Memory of a vehicle taken over in hover."""
     each = 0.25 * airframe.mass * GRAVITY
     thrust = (each, each, each, each)
-    return CascadeMemory(thrust, ActuatorCommand(thrust, (0.0, 0.0)), estimate.v_WB)
+    return CascadeMemory(
+        thrust, ActuatorCommand(thrust, (0.0, 0.0)), Observed(estimate.v_WB, _NONE)
+    )
 
 
 class Cascade:
@@ -109,12 +114,12 @@ class Cascade:
         airframe, tuning, dt = self._airframe, self._tuning, self._dt
         rotors = lag_rotors(memory.rotors, memory.commanded.rotor_thrust, self._decay)
         motion = motion_state(airframe, estimate, rotors, memory.commanded.joint_torque[0])
-        disturbance, v_hat = observe_disturbance(
-            memory.v_hat, estimate.v_WB, motion.a, tuning.tracking.observer_bandwidth, dt
+        observed = observe(
+            memory.observed, estimate.v_WB, motion.a, tuning.tracking.observer_bandwidth, dt
         )
         attitude, height = memory.attitude, memory.height
         if self._follows_plan:
-            (wdx, wdy), thrust = follow_plan(self._law, estimate, motion, disturbance, plan, u)
+            (wdx, wdy), thrust = follow_plan(self._law, estimate, motion, observed, plan, u)
             wdz = u.yaw_acc + _yaw_correction(tuning.yaw, estimate, plan)
         else:
             (wdx, wdy, wdz), attitude = attitude_pid(
@@ -138,7 +143,7 @@ class Cascade:
         command = ActuatorCommand(
             allocate(airframe, torque, thrust, tuning.yaw_thrust_limit), joints
         )
-        return command, CascadeMemory(rotors, command, v_hat, attitude, height, kept)
+        return command, CascadeMemory(rotors, command, observed, attitude, height, kept)
 
 
 def _yaw_correction(gains: PidGains, estimate: StateEstimate, plan: PredictionState) -> float:

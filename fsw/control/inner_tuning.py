@@ -19,17 +19,17 @@ class TrackingTuning:
 
     The gains are those of a discrete LQR on the position of one point; ``effort`` is its
     price of snap. A cheaper price follows the plan more closely until the rotors saturate,
-    which makes the loop diverge: 1e-8 does, 1.5e-7 leaves 15 % of the rotors' torque at
+    which makes the loop diverge: 1e-8 does, 1.7e-7 leaves 15 % of the rotors' torque at
     0.8 m/s^2 of disturbance (``tube.py``).
     """
 
-    effort: float = 1.5e-7  # horizontal, on (m/s^4)^2
+    effort: float = 1.7e-7  # horizontal, on (m/s^4)^2
     # The point sits half-way down to a hanging end-effector: holding the base alone, every
     # correction swings the end-effector; holding the end-effector alone, the base wanders.
     point_below_base: float = 0.1125  # m
     vertical_effort: float = 1e-6  # on (m/s^2)^2
     disturbance_correlation: float = 0.05  # s, of the Ornstein-Uhlenbeck model
-    observer_bandwidth: float = 100.0  # 1/s
+    observer_bandwidth: float = 130.0  # rad/s
     position_error_limit: float = 0.07  # m
     acceleration_limit: float = 2.5  # m/s^2
     jerk_limit: float = 20.0  # m/s^3

@@ -38,32 +38,40 @@ class TrackingLaw:
     gains: TrackingGains
 
 
-def observe_disturbance(
-    v_hat: Vec3, v: Vec3, a: Vec3, bandwidth: float, dt: float
-) -> tuple[Vec3, Vec3]:
-    """Disturbance acceleration from the velocity the rotors do not explain.
+@dataclass(frozen=True, slots=True)
+class Observed:
+    """What the observer believes between two velocity readings."""
+
+    v: Vec3  # m/s
+    d: Vec3  # m/s^2, disturbance acceleration
+
+
+def observe(memory: Observed, v: Vec3, a: Vec3, bandwidth: float, dt: float) -> Observed:
+    """Velocity and disturbance from a velocity reading and the rotors' acceleration.
+
+    A second-order observer with both poles at ``bandwidth``: as
+    quick as differencing the velocity, but the disturbance is a state and does not carry
+    the reading's noise straight into the rotors.
 
     Args:
-        v_hat: Velocity predicted by the observer last tick [m/s].
+        memory: From the last tick.
         v: Measured velocity [m/s].
         a: Acceleration the rotors produce [m/s^2].
-        bandwidth: Observer gain [1/s].
+        bandwidth: Of the observer [rad/s].
         dt: Tick length [s].
-
-    Returns:
-        The disturbance estimate [m/s^2] and the velocity to pass back next tick.
     """
-    dx, dy, dz = (
-        bandwidth * (v[0] - v_hat[0]),
-        bandwidth * (v[1] - v_hat[1]),
-        bandwidth * (v[2] - v_hat[2]),
+    gain_v, gain_d = 2.0 * bandwidth * dt, bandwidth * bandwidth * dt
+    velocity, disturbance = [], []
+    for axis in range(3):
+        d = memory.d[axis]
+        predicted = memory.v[axis] + dt * (a[axis] + d)
+        surprise = v[axis] - predicted
+        velocity.append(predicted + gain_v * surprise)
+        disturbance.append(d + gain_d * surprise)
+    return Observed(
+        (velocity[0], velocity[1], velocity[2]),
+        (disturbance[0], disturbance[1], disturbance[2]),
     )
-    predicted = (
-        v_hat[0] + dt * (a[0] + dx),
-        v_hat[1] + dt * (a[1] + dy),
-        v_hat[2] + dt * (a[2] + dz),
-    )
-    return (dx, dy, dz), predicted
 
 
 def snap_command(
@@ -95,7 +103,7 @@ def follow_plan(
     law: TrackingLaw,
     estimate: StateEstimate,
     motion: MotionState,
-    disturbance: Vec3,
+    observed: Observed,
     plan: PredictionState,
     u: PlanInput,
 ) -> tuple[Vec2, float]:
@@ -105,18 +113,18 @@ def follow_plan(
         law: Airframe, lag and gains.
         estimate: The vehicle now.
         motion: Its acceleration, jerk and snap.
-        disturbance: Estimated disturbance acceleration [m/s^2].
+        observed: Its velocity without the reading's noise, and the disturbance.
         plan: Where the plan wants the vehicle now.
         u: The plan's input now.
     """
-    p, v = estimate.p_WB, estimate.v_WB
+    p, v = estimate.p_WB, observed.v
     wx, wy = (
         snap_command(
             law,
             plan.p[axis] - p[axis],
             plan.v[axis] - v[axis],
             plan.s[axis] - motion.s[axis],
-            disturbance[axis],
+            observed.d[axis],
             motion.a[axis],
             motion.j[axis],
             plan.a[axis],

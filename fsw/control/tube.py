@@ -83,21 +83,25 @@ def _impulse_responses(
 ) -> tuple[Array, Array, Array]:
     """Position, acceleration and commanded snap after a unit push of one tick, per tick."""
     k, kd, bandwidth = gains.k, gains.k_disturbance, tuning.observer_bandwidth
-    # p, v, a, j, s and the observer's velocity; the plan stands still at the origin.
-    a = np.diag([1.0, 1.0, 1.0, 1.0, 0.0], 1)
-    snap = np.array([-k[0], -k[1] - kd * bandwidth, -k[2], -k[3], -k[4], kd * bandwidth])
+    # p, v, a, j, s and the observer's velocity and disturbance; the plan stands still at 0.
+    n = 7
+    a = np.zeros((n, n))
+    a[:4, 1:5] = np.eye(4)
+    snap = np.array([-k[0], 0.0, -k[2], -k[3], -k[4], -k[1], -kd])
     a[4] = snap / airframe.rotor_lag
     a[4, 4] -= 1.0 / airframe.rotor_lag
-    a[5] = [0.0, bandwidth, 1.0, 0.0, 0.0, -bandwidth]
-    block = np.zeros((7, 7))
-    block[:6, :6] = a * dt
-    block[1, 6] = dt
+    gain_v, gain_d = 2.0 * bandwidth, bandwidth**2
+    a[5] = [0.0, gain_v, 1.0, 0.0, 0.0, -gain_v, 1.0]
+    a[6] = [0.0, gain_d, 0.0, 0.0, 0.0, -gain_d, 0.0]
+    block = np.zeros((n + 1, n + 1))
+    block[:n, :n] = a * dt
+    block[1, n] = dt
     exponential = expm(block)
-    x = exponential[:6, 6]
+    x = exponential[:n, n]
     states = []
     for _ in range(round(_SETTLED_S / dt)):
         states.append(x)
-        x = exponential[:6, :6] @ x
+        x = exponential[:n, :n] @ x
     history = np.array(states)
     return history[:, 0], history[:, 2], history @ snap
 

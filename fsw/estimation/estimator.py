@@ -1,8 +1,9 @@
 """From one sensor frame to the state estimate.
 
 Position, velocity and attitude come from motion capture, rates from the gyro, joints from
-their encoders. Nothing is filtered: with the sensors a laboratory has, the 500 Hz loops
-tolerate the noise better than a delay (docs/decisions/0006-estimate-without-filter.md).
+their encoders. Nothing is filtered here: the loop that would suffer most from a velocity's
+noise has an observer of its own (``control/tracking.py``), which knows the rotors
+(docs/decisions/0006-estimate-without-filter.md).
 """
 
 from __future__ import annotations

@@ -19,7 +19,7 @@ _MODES: Final[dict[Mode, tuple[int, int]]] = {
     Mode.HOLD: (_MAIN_AUTO, _AUTO_LOITER),
     Mode.TRAJECTORY: (_MAIN_OFFBOARD, 0),
     Mode.LAND: (_MAIN_AUTO, _AUTO_LAND),
-    # The fault response brings the vehicle down; system_status says that it is an emergency.
+    # Terminated, rotors off: PX4 has no mode for it; system_status says it is an emergency.
     Mode.FAULT: (_MAIN_AUTO, _AUTO_LAND),
 }
 

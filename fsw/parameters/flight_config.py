@@ -7,10 +7,11 @@ from dataclasses import dataclass, field, replace
 from fsw.control.cascade import Inner
 from fsw.control.inner_tuning import InnerTuning
 from fsw.model.airframe import AIRFRAME, Airframe
-from fsw.mpc.planner_config import PlannerConfig
+from fsw.mpc.planner_config import PlannerConfig, Solver
 from fsw.mpc.variants import VARIANTS
 
 CONTROLLERS = tuple(VARIANTS)
+SOLVERS: tuple[Solver, ...] = ("clarabel", "slsqp")
 INNERS: tuple[Inner, ...] = ("tracking", "pid")
 
 
@@ -18,7 +19,8 @@ INNERS: tuple[Inner, ...] = ("tracking", "pid")
 class FlightLimits:
     """How the vehicle climbs, descends and decides that it stands."""
 
-    takeoff_climb: float = 1.0  # m
+    takeoff_climb: float = 1.0  # m, where the command names no height
+    takeoff_climb_most: float = 10.0  # m
     climb_speed: float = 0.4  # m/s
     land_speed: float = 0.25  # m/s
     landed_height: float = 0.1  # m above standing; the origin's height is known no better
@@ -71,9 +73,10 @@ def flight_config(
     inner: Inner = "tracking",
     robustness: str = "consistent",
     *,
+    solver: Solver = "clarabel",
     soft: bool = False,
 ) -> FlightConfig:
-    """The configuration of a controller, an inner loop and a lambda, by name.
+    """The configuration of a controller, an inner loop, a lambda and a solver, by name.
 
     Raises:
         ValueError: for an unknown name, listing the known ones.
@@ -85,7 +88,9 @@ def flight_config(
     if robustness not in ROBUSTNESS_PRESETS:
         known = ", ".join(ROBUSTNESS_PRESETS)
         raise ValueError(f"unknown robustness '{robustness}'; known: {known}")
-    planner = PlannerConfig(controller=controller)
+    if solver not in SOLVERS:
+        raise ValueError(f"unknown solver '{solver}'; known: {', '.join(SOLVERS)}")
+    planner = PlannerConfig(controller=controller, solver=solver)
     wanted = ROBUSTNESS_PRESETS[robustness]
     if wanted is not None:
         planner = replace(

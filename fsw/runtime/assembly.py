@@ -7,6 +7,8 @@ from typing import Any, cast
 from fsw.control.cascade import Inner
 from fsw.link.telemetry import VehicleFacts
 from fsw.mpc.planner import Planner
+from fsw.mpc.planner_config import Solver
+from fsw.parameters.control_choice import ControlChoice
 from fsw.parameters.flight_config import FlightConfig, flight_config
 from fsw.runtime import clock
 from fsw.runtime.flight_loop import FlightLoop
@@ -14,14 +16,20 @@ from fsw.runtime.flight_state import FlightState
 from fsw.runtime.program import FlightProgram
 
 
-def flight_software(controller: str, inner: str) -> FlightProgram[Any]:
+def flight_software(choice: ControlChoice) -> FlightProgram[Any]:
     """Build everything that flies and compile it, which takes a minute the first time.
 
     Raises:
         ValueError: For an unknown name, listing the known ones.
     """
-    # What is not an Inner is refused by the call itself.
-    config = flight_config(controller, cast(Inner, inner))
+    # What is no name of an inner loop or solver is refused by the call itself.
+    config = flight_config(
+        choice.controller,
+        cast(Inner, choice.inner),
+        choice.robustness,
+        solver=cast(Solver, choice.solver),
+        soft=choice.soft,
+    )
     planner = Planner(config.planner, clock.stopwatch_us)
     planner.warm_up()
     return FlightProgram(_facts(config), FlightState(), FlightLoop(config).tick, planner)

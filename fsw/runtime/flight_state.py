@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from fsw.control.cascade import NO_ACTION, CascadeMemory
+from fsw.control.tracking import Observed
 from fsw.signals import (
     ConstraintReport,
     EndEffectorTarget,
@@ -30,6 +31,7 @@ class VehicleMemory:
     still_since_us: int = 0  # landing detector
     anchor: Vec3 = _NOWHERE  # where a mode's own reference begins, end-effector [m]
     anchor_yaw: float = 0.0  # rad
+    climb: float = 0.0  # m, of a takeoff
     anchor_us: int = 0
     failures: tuple[str, ...] = ()
 
@@ -78,7 +80,9 @@ class FlightState:
     nominal: PredictionState | None = None  # where the running plan wants the vehicle now
     output_replaced: bool = False
     cascade: CascadeMemory = field(
-        default_factory=lambda: CascadeMemory(NO_ACTION.rotor_thrust, NO_ACTION, _NOWHERE)
+        default_factory=lambda: CascadeMemory(
+            NO_ACTION.rotor_thrust, NO_ACTION, Observed(_NOWHERE, _NOWHERE)
+        )
     )
 
     vehicle: VehicleMemory = field(default_factory=VehicleMemory)

@@ -5,6 +5,7 @@ Every function takes a state and returns one; almost every tick it is the same o
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 from fsw.control.cascade import at_rest, in_hover
@@ -69,6 +70,9 @@ class ModeKeeper:
             )
             ack, decision = answer(request, situation, texts)
             acks.append(ack)
+            if decision.event is Event.TAKE_OFF:
+                climb = self._climb(request.params[6], estimate)
+                state = replace(state, vehicle=replace(state.vehicle, climb=climb))
             if decision.event is not None:
                 state = self._change(state, decision.event, estimate, texts)
         return state, acks
@@ -113,7 +117,7 @@ class ModeKeeper:
         """Mode changes the vehicle makes by itself."""
         now_us, limits, vehicle = estimate.t_us, self._config.limits, state.vehicle
         if vehicle.mode is Mode.TAKEOFF:
-            climb_us = 1e6 * limits.takeoff_climb / limits.climb_speed
+            climb_us = 1e6 * vehicle.climb / limits.climb_speed
             if now_us - vehicle.anchor_us >= climb_us:
                 return self._change(state, Event.CLIMB_DONE, estimate, texts)
         elif vehicle.mode is Mode.TRAJECTORY:
@@ -186,6 +190,13 @@ class ModeKeeper:
             last = mode_reference(state.vehicle, state.mission, limits, estimate.t_us)
             return last.p_WE, last.yaw
         return point_in_flight(estimate, self._config.airframe.link_length)[0], estimate.yaw
+
+    def _climb(self, height: float, estimate: StateEstimate) -> float:
+        """From here to the height a takeoff asks for [m]; the usual climb where it names none."""
+        usual = self._config.limits.takeoff_climb
+        if not math.isfinite(height):
+            return usual
+        return min(max(height + estimate.p_WB[2], 0.0), self._config.limits.takeoff_climb_most)
 
     def _standing_unclear(self, estimate: StateEstimate) -> bool:
         limits, above = self._config.limits, self._height_above_standing(estimate)

@@ -17,7 +17,7 @@ def mode_reference(
     if vehicle.mode is Mode.TRAJECTORY and mission.stream:
         return sample(mission.stream, t_us)
     if vehicle.mode is Mode.TAKEOFF:
-        return _ramp(vehicle, limits.takeoff_climb, limits.climb_speed, t_us)
+        return _ramp(vehicle, vehicle.climb, limits.climb_speed, t_us)
     if vehicle.mode is Mode.LAND:
         return _ramp(vehicle, _FAR_DOWN, limits.land_speed, t_us)
     return still_at(vehicle.anchor, t_us, vehicle.anchor_yaw)

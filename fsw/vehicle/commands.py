@@ -53,6 +53,9 @@ def decide(request: CommandRequest, situation: Situation) -> Decision:
     event = _requested_event(request)
     if isinstance(event, Decision):
         return event
+    if event is Event.ARM and situation.inconsistent:
+        # Waiting does not help: nothing but another configuration does.
+        return Decision(DENIED, reason=f"not armed: {situation.inconsistent}")
     refusal = _refusal(event, request, situation)
     if refusal is not None:
         return Decision(TEMPORARILY_REJECTED, reason=refusal)
@@ -92,8 +95,6 @@ def _refusal(event: Event, request: CommandRequest, situation: Situation) -> str
     forced = request.params[1] == _FORCE
     if event is Event.ARM and not situation.estimate_valid:
         return "not armed: the state estimate is invalid"
-    if event is Event.ARM and situation.inconsistent:
-        return f"not armed: {situation.inconsistent}"
     if event is Event.ARM and situation.standing_unclear:
         return "not armed: neither standing nor clearly in the air; check the origin's height"
     flying = not situation.landed and situation.mode not in (Mode.DISARMED, Mode.FAULT)

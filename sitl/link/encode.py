@@ -20,7 +20,7 @@ from sitl.sensors.suite import SensorReadings
 WireValues = tuple[float | bytes, ...]
 
 _LOCAL_NED: Final = 1  # MAV_FRAME; of ODOMETRY's position and velocity
-_MOTION_CAPTURE: Final = 5  # MAV_ESTIMATOR_TYPE
+_MOTION_CAPTURE: Final = 6  # MAV_ESTIMATOR_TYPE
 _ACCEL_AND_GYRO: Final = 0x3F  # HIL_SENSOR_UPDATED_FLAGS: there is no magnetometer or barometer
 _GENERIC: Final = 0  # MAV_TYPE
 _NO_AUTOPILOT: Final = 8  # MAV_AUTOPILOT

@@ -30,6 +30,7 @@ TARGET_LEAD_US: Final = 2_000_000  # 1.5 s are promised; the rest covers a lost 
 MESSAGES_PER_STEP: Final = 8  # keeps a datagram below 1400 bytes
 
 _REPEAT_US: Final = 500_000
+_ROUND_US: Final = 1_000_000  # the safe set is announced again: a datagram may be lost
 _PATIENCE_US: Final = 10_000_000  # of asking for the same thing
 _HOVER_SPEED_M_S: Final = 0.1
 _CLIMB_M: Final = 0.4  # at least, before a hop counts as flying
@@ -67,7 +68,8 @@ class PilotState:
     """What the pilot remembers."""
 
     phase: Phase
-    announced: int = 0  # announcements made
+    announced: int = 0  # announcements made in this round
+    next_round_us: int = START_US  # of announcements
     next_target_us: int = START_US
     since_us: int = START_US  # start of the phase
     next_ask_us: int = START_US
@@ -136,6 +138,8 @@ def speak(
     """What to say at the step of ``t_us``; at most MESSAGES_PER_STEP messages."""
     target_due = plan.target_at is not None and state.next_target_us <= t_us + TARGET_LEAD_US
     command_due = state.phase in _COMMANDS and t_us >= state.next_ask_us
+    if plan.announcements and t_us >= state.next_round_us:
+        state = replace(state, announced=0, next_round_us=t_us + _ROUND_US)
     if not target_due and not command_due and state.announced == len(plan.announcements):
         return state, ()
     messages: list[PilotMessage] = list(plan.announcements[state.announced :][:MESSAGES_PER_STEP])

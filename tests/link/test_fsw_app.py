@@ -14,9 +14,12 @@ import pytest
 
 from fsw import app
 from fsw.arguments import FswOptions
+from fsw.parameters.control_choice import ControlChoice
 from fsw.runtime.program import FlightProgram
 from fsw.signals import Plan, PlanFailure, PlanRequest, TickInputs, TickOutputs
 from tests.link.snapshots import FACTS, outputs_at
+
+CHOICE = ControlChoice("blf", "tracking", "consistent", "clarabel", soft=False)
 
 
 class NoPlanner:
@@ -47,7 +50,7 @@ def silent() -> Iterator[socket.socket]:
 def options(silent: socket.socket, tmp_path: Path) -> Iterator[FswOptions]:
     handlers = [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)]
     address = f"udp:127.0.0.1:{silent.getsockname()[1]}"
-    yield FswOptions(address, address, "blf", "tracking", tmp_path, 0.4, "text")
+    yield FswOptions(address, address, CHOICE, tmp_path, 0.4, "text")
     for number, handler in zip((signal.SIGINT, signal.SIGTERM), handlers, strict=True):
         signal.signal(number, handler)
 

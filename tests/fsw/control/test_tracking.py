@@ -13,7 +13,13 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from fsw.control.inner_tuning import TrackingTuning, tracking_gains
-from fsw.control.tracking import TrackingLaw, follow_plan, observe_disturbance, snap_command
+from fsw.control.tracking import (
+    Observed,
+    TrackingLaw,
+    follow_plan,
+    observe,
+    snap_command,
+)
 from fsw.model.airframe import AIRFRAME, GRAVITY
 from fsw.model.prediction import LagModel
 from fsw.model.rotors import MotionState
@@ -25,6 +31,14 @@ TUNING = TrackingTuning()
 LAW = TrackingLaw(AIRFRAME, LAG, TUNING, tracking_gains(TUNING, AIRFRAME.rotor_lag, 0.002))
 WEIGHT = AIRFRAME.mass * GRAVITY
 CALM: Vec3 = (0.0, 0.0, 0.0)
+NOTHING = Observed(CALM, CALM)
+
+
+def calm(estimate: StateEstimate) -> Observed:
+    """No disturbance, and the velocity as it is."""
+    return Observed(estimate.v_WB, CALM)
+
+
 REST_INPUT = PlanInput(CALM, 0.0, (0.0, 0.0))
 PLAN = PredictionState(
     (0.0, 0.0, -1.0), CALM, CALM, (0.0, 0.0), (0.0, 0.0), 0.0, 0.0, (0.0, 0.0), (0.0, 0.0)
@@ -51,7 +65,7 @@ def test_without_error_the_plans_own_snap_is_flown(yaw: float, tilt: float) -> N
     plan = replace(PLAN, a=(0.5, -0.8, 0.2), j=(1.0, -2.0), s=(10.0, 20.0))
     u = PlanInput((1.0, -1.0, 0.3), 0.0, (0.0, 0.0))
     estimate, motion = on_plan(rotation, plan)
-    wd, thrust = follow_plan(LAW, estimate, motion, CALM, plan, u)
+    wd, thrust = follow_plan(LAW, estimate, motion, calm(estimate), plan, u)
     expected = [LAG.kp * (u.a[k] - plan.a[k]) - LAG.kd * plan.j[k] for k in (0, 1)]
     np.testing.assert_allclose(snap_of(estimate, wd), expected, atol=1e-9)
     upright = estimate.R_WB[8]
@@ -76,7 +90,7 @@ def test_the_vehicle_is_snapped_towards_the_plan(yaw: float, axis: int, quantity
         0.0,
         (0.0, 0.0),
     )
-    wd, _ = follow_plan(LAW, estimate, motion, CALM, ahead, u)
+    wd, _ = follow_plan(LAW, estimate, motion, calm(estimate), ahead, u)
     snap = snap_of(estimate, wd)
     assert snap[axis] > 1.0
     assert abs(snap[1 - axis]) < 1e-9
@@ -84,7 +98,9 @@ def test_the_vehicle_is_snapped_towards_the_plan(yaw: float, axis: int, quantity
 
 def test_a_disturbance_is_leaned_against() -> None:
     estimate, motion = on_plan(Rotation.identity(), PLAN)
-    wd, _ = follow_plan(LAW, estimate, motion, (0.5, 0.0, 0.0), PLAN, REST_INPUT)
+    wd, _ = follow_plan(
+        LAW, estimate, motion, Observed(estimate.v_WB, (0.5, 0.0, 0.0)), PLAN, REST_INPUT
+    )
     assert snap_of(estimate, wd)[0] < -1.0
     assert wd[1] > 0.0  # nose up: thrust leans back
 
@@ -98,7 +114,7 @@ def test_height_errors_change_thrust_the_right_way(sign: float) -> None:
         replace(PLAN, v=(0.0, 0.0, sign * 0.1)),
         replace(PLAN, a=(0.0, 0.0, sign * 0.5)),
     ):
-        _, thrust = follow_plan(LAW, estimate, motion, CALM, plan, REST_INPUT)
+        _, thrust = follow_plan(LAW, estimate, motion, calm(estimate), plan, REST_INPUT)
         assert sign * (thrust - WEIGHT) < -0.5
 
 
@@ -133,12 +149,23 @@ def test_beyond_the_position_limit_more_error_asks_for_nothing_more() -> None:
 
 @given(st.tuples(*[st.floats(-3.0, 3.0)] * 3))
 def test_observer_finds_a_constant_disturbance(d: Vec3) -> None:
-    dt, v, v_hat, a = 0.002, np.zeros(3), (0.0, 0.0, 0.0), np.array([0.3, -0.2, 0.1])
-    found: Vec3 = (0.0, 0.0, 0.0)
+    dt, v, a = 0.002, np.zeros(3), np.array([0.3, -0.2, 0.1])
+    believed = NOTHING
     for _ in range(100):
-        found, v_hat = observe_disturbance(v_hat, vec3(v), vec3(a), 100.0, dt)
         v = v + dt * (a + np.array(d))
-    np.testing.assert_allclose(found, d, atol=0.01)
+        believed = observe(believed, vec3(v), vec3(a), 100.0, dt)
+    np.testing.assert_allclose(believed.d, d, atol=0.01)
+    np.testing.assert_allclose(believed.v, v, atol=1e-3)
+
+
+def test_observer_passes_little_of_a_velocity_reading_s_noise_on() -> None:
+    """Differencing the reading, at the same bandwidth, would carry bandwidth x noise: 1 m/s^2."""
+    rng = np.random.default_rng(3)
+    believed, found = NOTHING, []
+    for _ in range(5000):
+        believed = observe(believed, vec3(rng.normal(0.0, 0.01, 3)), (0.0, 0.0, 0.0), 100.0, 0.002)
+        found.append(believed.d)
+    assert np.std(np.array(found)) < 0.4
 
 
 def test_tracking_gains_stabilise_the_chain_they_are_designed_for() -> None:

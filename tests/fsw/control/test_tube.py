@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fsw.control.inner_tuning import TrackingGains, TrackingTuning, tracking_gains
-from fsw.control.tracking import TrackingLaw, observe_disturbance, snap_command
+from fsw.control.tracking import Observed, TrackingLaw, observe, snap_command
 from fsw.control.tube import Tube, peak_snap_share, tube
 from fsw.model.airframe import AIRFRAME
 from fsw.model.prediction import LagModel
@@ -31,14 +31,12 @@ def _position_under(disturbance: np.ndarray) -> np.ndarray:
     law = TrackingLaw(AIRFRAME, LagModel(), TUNING, _gains())
     decay = np.exp(-DT / AIRFRAME.rotor_lag)
     p = v = a = j = s = 0.0
-    v_hat = (0.0, 0.0, 0.0)
+    believed = Observed((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
     positions = []
     for d in disturbance:
-        (d_hat, _, _), v_hat = observe_disturbance(
-            v_hat, (v, 0.0, 0.0), (a, 0.0, 0.0), TUNING.observer_bandwidth, DT
-        )
+        believed = observe(believed, (v, 0.0, 0.0), (a, 0.0, 0.0), TUNING.observer_bandwidth, DT)
         # Far from the jerk limit that the square root sets, snap_command is linear.
-        w = snap_command(law, -p, -v, -s, d_hat, a, j, 0.0, 0.0, 0.0)
+        w = snap_command(law, -p, -believed.v[0], -s, believed.d[0], a, j, 0.0, 0.0, 0.0)
         s = w + (s - w) * decay
         p, v, a, j = p + DT * v, v + DT * (a + d), a + DT * j, j + DT * s
         positions.append(p)
