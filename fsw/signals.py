@@ -261,18 +261,15 @@ class ConstraintReport:
 
 @dataclass(frozen=True, slots=True)
 class FlightSnapshot:
-    """The vehicle as telemetry shows it after a tick."""
+    """The vehicle as telemetry shows it after a tick; what follows from it, encoders compute."""
 
     t_us: int
     mode: Mode
     armed: bool
     estimate: StateEstimate
-    p_WE: Vec3  # m, end-effector
-    v_WE: Vec3  # m/s
-    reference: EndEffectorTarget | None  # end-effector setpoint in use
+    reference: EndEffectorTarget | None  # end-effector setpoint in use when last planned
     plan_state: PredictionState | None  # where the running plan wants the vehicle now
     plan_input: PlanInput | None
-    attitude_ref: Vec3  # rad: roll, pitch, yaw
     actuators: ActuatorCommand
     plan: Plan | None  # last accepted
     plan_status: SolverStatus  # of the last cycle, accepted or not

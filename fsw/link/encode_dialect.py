@@ -10,6 +10,7 @@ import math
 from typing import Final
 
 from fsw.link.telemetry import GroupTiming, TelemetryContext
+from fsw.model.arm_kinematics import point_in_flight
 from fsw.signals import FlightSnapshot, Vec2, Vec4
 
 WireValues = tuple[float | bytes, ...]
@@ -19,16 +20,17 @@ _MAX_CONSTRAINTS: Final = 16
 _U32: Final = 0xFFFFFFFF
 
 
-def arm_joint_state(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues:
+def arm_joint_state(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues:
     """ARM_JOINT_STATE; the torque is the one commanded, the arm has no torque sensor."""
     estimate = snapshot.estimate
+    p_WE, v_WE = point_in_flight(estimate, context.facts.link_length)
     return (
         snapshot.t_us,
         *_four(estimate.q_arm),
         *_four(estimate.qd_arm),
         *_four(snapshot.actuators.joint_torque),
-        *snapshot.p_WE,
-        *snapshot.v_WE,
+        *p_WE,
+        *v_WE,
         2,
     )
 
@@ -57,7 +59,7 @@ def end_effector_target(snapshot: FlightSnapshot, _: TelemetryContext) -> WireVa
 
 
 def barrier_margin(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues | None:
-    """BARRIER_MARGIN of the active safe set; a barrier is active where the plan has h near 0."""
+    """BARRIER_MARGIN of the active safe set; a barrier counts as active at or below zero."""
     report = snapshot.constraints
     margins = report.margins[:_MAX_CONSTRAINTS]
     if not margins:

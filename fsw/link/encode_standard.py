@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from fsw.control.attitude import attitude_reference
 from fsw.geometry.rotation import euler_zyx, quaternion_from_matrix
 from fsw.link.px4_mode import custom_mode
 from fsw.link.telemetry import TelemetryContext
@@ -122,7 +123,9 @@ def position_target(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues
 def attitude_target(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues:
     """ATTITUDE_TARGET: attitude reference and collective thrust, 0 to 1."""
     thrust = sum(snapshot.actuators.rotor_thrust) / (4.0 * context.facts.rotor_thrust_max)
-    quaternion = _quaternion(snapshot.attitude_ref)
+    plan, u = snapshot.plan_state, snapshot.plan_input
+    yaw = snapshot.estimate.yaw if plan is None else plan.yaw
+    quaternion = _quaternion(attitude_reference((0.0, 0.0, 0.0) if u is None else u.a, yaw))
     return (_boot_ms(snapshot.t_us), *quaternion, 0.0, 0.0, 0.0, thrust, _RATES_IGNORED)
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from fsw.signals import Vec2
+
 
 @dataclass(frozen=True, slots=True)
 class GroupTiming:
@@ -28,6 +30,7 @@ class VehicleFacts:
 
     rotor_thrust_max: float  # N, one rotor
     joint_torque_max: float  # N m
+    link_length: Vec2  # m
     tick_period_us: int
     mpc_period_us: int
     mpc_delay_us: int  # from a request to the first use of its plan

@@ -39,6 +39,7 @@ def _facts(config: FlightConfig) -> VehicleFacts:
     return VehicleFacts(
         rotor_thrust_max=config.airframe.rotor_thrust_max,
         joint_torque_max=config.airframe.joint_torque_max,
+        link_length=config.airframe.link_length,
         tick_period_us=config.tick_period_us,
         mpc_period_us=config.mpc_period_us,
         mpc_delay_us=config.plan_delay_ticks * config.tick_period_us,

@@ -9,7 +9,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 from fsw.barriers.margins import constraint_report
-from fsw.control.attitude import attitude_reference
 from fsw.control.cascade import Cascade, CascadeMemory, at_rest
 from fsw.estimation.estimator import estimate_state
 from fsw.model.arm_kinematics import point_in_flight
@@ -75,11 +74,7 @@ class FlightLoop:
             state = replace(state, mission=mission)
         if estimate is None:
             return state, _blind(inputs, texts)
-        if valid is None:
-            state = replace(state, invalid_ticks=state.invalid_ticks + 1)
-        elif state.invalid_ticks:
-            state = replace(state, invalid_ticks=0)
-
+        state = _count_invalid(state, valid)
         acks: list[CommandAck] = []
         if inputs.commands:
             state, acks = self._modes.obey(state, estimate, inputs.commands, texts)
@@ -87,37 +82,49 @@ class FlightLoop:
         state = self._modes.mind_milestones(state, estimate, texts)
 
         planning_due = state.index % self._ticks_per_plan == 0
-        plan, nominal, request, u = state.plan, state.nominal, None, _NO_INPUT
-        if state.vehicle.flies and nominal is not None:
-            last_u = plan_input(plan.running, nominal, now_us - self.config.tick_period_us)
-            plan, new_plan = take_answer(plan, inputs.plan, now_us)
-            if new_plan is not None:
-                tick_us = self.config.tick_period_us
-                nominal = late_start(self._model, new_plan, now_us, tick_us)
-            elif now_us > plan.since_us:
-                nominal = self._model.step(nominal, last_u)
-            state = replace(state, nominal=nominal, plan=plan)
-            if planning_due:
-                request, plan = self._ask(state, estimate, nominal, now_us)
-                state = replace(state, plan=plan)
-            u = plan_input(plan.running, nominal, now_us)
-
-        constraints = self._constraints(state, estimate) if planning_due else state.constraints
+        state, request, u = self._follow_plan(state, inputs, estimate, planning_due)
+        constraints, reference = state.constraints, state.reference
+        if planning_due:
+            target = self._reference(state, now_us)
+            constraints = self._constraints(state, estimate, target)
+            reference = target if state.vehicle.flies else None
         sent, memory, replaced = self._actuate(state, estimate, u)
-        snapshot = self._snapshot(state, estimate, u, sent, constraints)
+        snapshot = _snapshot(state, estimate, u, sent, constraints, reference)
         state = FlightState(
             state.index + 1,
             estimate,
             state.invalid_ticks,
-            nominal,
+            state.nominal,
             replaced,
             memory,
             state.vehicle,
             state.mission,
-            plan,
+            state.plan,
             constraints,
+            reference,
         )
         return state, TickOutputs(sent, snapshot, request, tuple(acks), tuple(texts))
+
+    def _follow_plan(
+        self, state: FlightState, inputs: TickInputs, estimate: StateEstimate, planning_due: bool
+    ) -> tuple[FlightState, PlanRequest | None, PlanInput]:
+        """Bring the plan's state to this tick, by a new plan or one more step; ask for the next."""
+        nominal = state.nominal
+        if not state.vehicle.flies or nominal is None:
+            return state, None, _NO_INPUT
+        now_us, tick_us = inputs.sensors.t_us, self.config.tick_period_us
+        last_u = plan_input(state.plan.running, nominal, now_us - tick_us)
+        plan, new_plan = take_answer(state.plan, inputs.plan, now_us)
+        if new_plan is not None:
+            nominal = late_start(self._model, new_plan, now_us, tick_us)
+        elif now_us > plan.since_us:
+            nominal = self._model.step(nominal, last_u)
+        state = replace(state, nominal=nominal, plan=plan)
+        request = None
+        if planning_due:
+            request, plan = self._ask(state, estimate, nominal, now_us)
+            state = replace(state, plan=plan)
+        return state, request, plan_input(plan.running, nominal, now_us)
 
     def _receive(
         self,
@@ -172,7 +179,9 @@ class FlightLoop:
         )
         return sent, memory.after_sending(sent), replaced
 
-    def _constraints(self, state: FlightState, estimate: StateEstimate) -> ConstraintReport:
+    def _constraints(
+        self, state: FlightState, estimate: StateEstimate, target: EndEffectorTarget
+    ) -> ConstraintReport:
         length, planner = self.config.airframe.link_length, self.config.planner
         points = (
             (estimate.p_WB, estimate.v_WB),
@@ -182,43 +191,44 @@ class FlightLoop:
         safe_set = state.mission.safe_set
         in_sphere = safe_set.kind is ConstraintKind.WORKSPACE
         tuning = planner.workspace if in_sphere else planner.walls
-        target = self._reference(state, estimate.t_us)
         return constraint_report(safe_set, tuning, points, target)
 
     def _reference(self, state: FlightState, t_us: int) -> EndEffectorTarget:
         return mode_reference(state.vehicle, state.mission, self.config.limits, t_us)
 
-    def _snapshot(
-        self,
-        state: FlightState,
-        estimate: StateEstimate,
-        u: PlanInput,
-        sent: ActuatorCommand,
-        constraints: ConstraintReport,
-    ) -> FlightSnapshot:
-        p_WE, v_WE = point_in_flight(estimate, self.config.airframe.link_length)
-        vehicle, plan = state.vehicle, state.plan
-        flies = vehicle.flies and state.nominal is not None
-        yaw = state.nominal.yaw if state.nominal is not None else estimate.yaw
-        return FlightSnapshot(
-            estimate.t_us,
-            vehicle.mode,
-            vehicle.armed,
-            estimate,
-            p_WE,
-            v_WE,
-            self._reference(state, estimate.t_us) if flies else None,
-            state.nominal if flies else None,
-            u if flies else None,
-            attitude_reference(u.a, yaw),
-            sent,
-            plan.running,
-            plan.status,
-            plan.counters,
-            constraints,
-            vehicle.failures,
-            vehicle.landed,
-        )
+
+def _count_invalid(state: FlightState, valid: StateEstimate | None) -> FlightState:
+    if valid is None:
+        return replace(state, invalid_ticks=state.invalid_ticks + 1)
+    return replace(state, invalid_ticks=0) if state.invalid_ticks else state
+
+
+def _snapshot(
+    state: FlightState,
+    estimate: StateEstimate,
+    u: PlanInput,
+    sent: ActuatorCommand,
+    constraints: ConstraintReport,
+    reference: EndEffectorTarget | None,
+) -> FlightSnapshot:
+    vehicle, plan = state.vehicle, state.plan
+    flies = vehicle.flies and state.nominal is not None
+    return FlightSnapshot(
+        estimate.t_us,
+        vehicle.mode,
+        vehicle.armed,
+        estimate,
+        reference,
+        state.nominal if flies else None,
+        u if flies else None,
+        sent,
+        plan.running,
+        plan.status,
+        plan.counters,
+        constraints,
+        vehicle.failures,
+        vehicle.landed,
+    )
 
 
 def _blind(inputs: TickInputs, texts: list[StatusText]) -> TickOutputs:
@@ -234,12 +244,9 @@ def _blind(inputs: TickInputs, texts: list[StatusText]) -> TickOutputs:
         mode=Mode.DISARMED,
         armed=False,
         estimate=nowhere,
-        p_WE=zero,
-        v_WE=zero,
         reference=None,
         plan_state=None,
         plan_input=None,
-        attitude_ref=zero,
         actuators=STOPPED,
         plan=None,
         plan_status=empty.plan.status,

@@ -89,3 +89,4 @@ class FlightState:
     mission: MissionMemory = field(default_factory=MissionMemory)
     plan: PlanMemory = field(default_factory=PlanMemory)
     constraints: ConstraintReport = field(default_factory=ConstraintReport)
+    reference: EndEffectorTarget | None = None  # in use when last planned

@@ -25,6 +25,7 @@ from fsw.signals import (
 FACTS = VehicleFacts(
     rotor_thrust_max=16.0,
     joint_torque_max=2.0,
+    link_length=(0.15, 0.15),
     tick_period_us=2_000,
     mpc_period_us=100_000,
     mpc_delay_us=10_000,
@@ -67,15 +68,12 @@ SNAPSHOT = FlightSnapshot(
         3_004_000, (1.0, 2.0, -3.0), (0.1, 0.2, 0.3), _EAST, (0.4, 0.5, 0.6), 1.5707963,
         (0.7, 0.8), (0.9, 1.1),
     ),
-    p_WE=(1.5, 2.5, -2.5),
-    v_WE=(0.15, 0.25, 0.35),
     reference=EndEffectorTarget(3_004_000, (1.6, 2.6, -2.6), (0.1,) * 3, (0.2,) * 3, 0.3),
     plan_state=PredictionState(
         (1.1, 2.1, -3.1), (0.11, 0.21, 0.31), (0.12, 0.22, 0.32), (0.0,) * 2, (0.0,) * 2, 0.33,
         0.03, (0.71, 0.81), (0.91, 1.01),
     ),
     plan_input=PlanInput((0.5, 0.6, 0.7), 0.05, (0.8, 0.9)),
-    attitude_ref=(0.0, 0.0, 1.5707963),
     actuators=ACTUATORS,
     plan=PLAN,
     plan_status=SolverStatus.TIME_LIMIT,

@@ -73,7 +73,10 @@ def test_arrays_of_the_arm_hold_two_joints_and_zeros() -> None:
     state = read_back(stream_of(ids.ARM_JOINT_STATE))
     assert state.position == pytest.approx([0.7, 0.8, 0.0, 0.0])
     assert state.torque == pytest.approx([1.0, -0.5, 0.0, 0.0])
-    assert state.ee_position == pytest.approx([1.5, 2.5, -2.5])
+    # Body x points east: the arm's reach along x is seen in y, its depth in z.
+    reach = 0.15 * (math.sin(0.7) + math.sin(1.5))
+    depth = 0.15 * (math.cos(0.7) + math.cos(1.5))
+    assert state.ee_position == pytest.approx([1.0, 2.0 + reach, -3.0 + depth])
     setpoint = read_back(stream_of(ids.ARM_JOINT_SETPOINT))
     assert setpoint.acceleration == pytest.approx([0.8, 0.9, 0.0, 0.0])
 

@@ -173,4 +173,10 @@ def test_plan_none_leaves_the_flying_to_others() -> None:
     flight = Flight(plan("none", walls=WALLS), {})
     flight.fly(2.0)
     assert all(isinstance(message, AnnounceWall) for _, message in flight.said)
-    assert len(flight.said) == 3
+
+
+def test_walls_are_announced_again_every_second_for_a_datagram_may_be_lost() -> None:
+    flight = Flight(plan("none", walls=WALLS), {})
+    flight.fly(2.0)
+    times = [t_us for t_us, _ in flight.said]
+    assert times == [1_000_000] * len(WALLS) + [2_000_000] * len(WALLS)
