@@ -54,9 +54,6 @@ def main(argv: list[str]) -> int:
     except (NoMatplotlibError, OSError) as error:
         print(f"pandion reproduce: {error}", file=sys.stderr)
         return COULD_NOT_START
-    except KeyboardInterrupt:
-        print("pandion reproduce: interrupted; the same --out resumes", file=sys.stderr)
-        return BROKEN
 
 
 def _options(argv: list[str]) -> ReproduceOptions:
@@ -165,9 +162,13 @@ def _run(options: ReproduceOptions) -> int:
     print(f"Pandion {version()}: {options.what}, written to {folder}", file=console, flush=True)
     if settings.tuned_on:
         print("these seeds were used for tuning; report others", file=console, flush=True)
-    with FlightProgress(console) as progress:
-        campaign = Campaign(options.workers, folder / "journal.jsonl", progress.report)
-        report = STUDIES[options.what](settings, campaign)
+    try:
+        with FlightProgress(console) as progress:
+            campaign = Campaign(options.workers, folder / "journal.jsonl", progress.report)
+            report = STUDIES[options.what](settings, campaign)
+    except KeyboardInterrupt:
+        print(f"pandion reproduce: interrupted; --out {folder} resumes", file=sys.stderr)
+        return BROKEN
     page = write(report, settings, _provenance(options), options.what, folder)
     _show(report, console)
     print(f"page {page}", file=console)

@@ -83,6 +83,9 @@ class Campaign:
                     yield key, row
         except BrokenProcessPool:
             return tuple(out.values())
+        except BaseException:
+            _end_processes()  # or leaving would wait for flights that nobody wants any more
+            raise
         finally:
             pool.shutdown(wait=True, cancel_futures=True)
         return ()
@@ -102,8 +105,13 @@ def _pool(workers: int) -> ProcessPoolExecutor:
     return ProcessPoolExecutor(workers, mp_context=spawn, initializer=_leave_interrupts)
 
 
+def _end_processes() -> None:
+    for process in multiprocessing.active_children():
+        process.kill()
+
+
 def _leave_interrupts() -> None:
-    """An interrupt is for the campaign to handle; a process finishes its flight."""
+    """An interrupt is for the campaign to handle, which ends its processes."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 

@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
+import signal
+import subprocess
+import sys
+import time
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, cast
@@ -71,3 +76,26 @@ def test_a_flight_that_kills_its_process_is_a_row_and_the_others_are_flown() -> 
     assert "died" in dead.reason
     (here,) = Campaign(0).fly(JOBS[1:2])
     assert (alive.te_m, alive.margin_m, alive.ce_sum) == (here.te_m, here.margin_m, here.ce_sum)
+
+
+def test_an_interrupt_ends_the_campaign_and_its_processes_at_once(tmp_path: Path) -> None:
+    words = ["table4", "--plant=double-integrator", "--workers=1", f"--out={tmp_path}"]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "pandion", "reproduce", *words],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        start_new_session=True,
+    )
+    try:
+        assert process.stdout is not None
+        while "flown 0" not in process.stdout.readline():
+            assert process.poll() is None
+        time.sleep(1.0)
+        os.killpg(process.pid, signal.SIGINT)
+        said, _ = process.communicate(timeout=20.0)
+    finally:
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+    assert process.returncode == 1
+    assert f"--out {tmp_path} resumes" in said
