@@ -99,6 +99,7 @@ class Cascade:
         estimate: StateEstimate,
         plan: PredictionState,
         u: PlanInput,
+        ticks: int = 1,
     ) -> tuple[ActuatorCommand, CascadeMemory]:
         """One tick.
 
@@ -107,16 +108,20 @@ class Cascade:
             estimate: The vehicle now.
             plan: Where the plan wants the vehicle now.
             u: The plan's input now.
+            ticks: Ticks since the last call; more than one where some were missed.
 
         Returns:
             Actuator command, not yet gated, and the memory to pass back after sending.
         """
         airframe, tuning, dt = self._airframe, self._tuning, self._dt
-        rotors = lag_rotors(memory.rotors, memory.commanded.rotor_thrust, self._decay)
+        rotors, observed = memory.rotors, memory.observed
+        for _ in range(ticks):
+            rotors = lag_rotors(rotors, memory.commanded.rotor_thrust, self._decay)
         motion = motion_state(airframe, estimate, rotors, memory.commanded.joint_torque[0])
-        observed = observe(
-            memory.observed, estimate.v_WB, motion.a, tuning.tracking.observer_bandwidth, dt
-        )
+        for _ in range(ticks):
+            observed = observe(
+                observed, estimate.v_WB, motion.a, tuning.tracking.observer_bandwidth, dt
+            )
         attitude, height = memory.attitude, memory.height
         if self._follows_plan:
             (wdx, wdy), thrust = follow_plan(self._law, estimate, motion, observed, plan, u)

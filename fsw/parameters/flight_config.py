@@ -55,9 +55,12 @@ class FlightConfig:
     soft: bool = False  # fly an inconsistent configuration all the same, with a warning
     tick_period_us: int = 2_000
     mpc_period_us: int = 100_000
-    # 10 ms between question and answer: 10 times the planner's median, and a fixed number of
-    # ticks, so that a slow machine flies exactly like a fast one.
-    plan_delay_ticks: int = 5
+    # 20 ms between question and answer: 20 times the planner's median, and a fixed number of
+    # ticks, so that a slow machine flies exactly like a fast one. A plan that starts from the
+    # nominal state loses nothing by waiting.
+    plan_delay_ticks: int = 10
+    # Ticks that were missed are made up for, up to this many at once.
+    catch_up_ticks: int = 25
     # Farther from the plan than this, plan from the measurement.
     upset_distance: float = 0.15  # m
     upset_yaw: float = 0.35  # rad

@@ -81,17 +81,20 @@ class FlightLoop:
         state = self._modes.mind_faults(state, estimate, texts)
         state = self._modes.mind_milestones(state, estimate, texts)
 
-        planning_due = state.index % self._ticks_per_plan == 0
-        state, request, u = self._follow_plan(state, inputs, estimate, planning_due)
+        ticks = self._elapsed_ticks(state, now_us)
+        index, per_plan = state.index + ticks, self._ticks_per_plan
+        planning_due = index // per_plan != state.index // per_plan
+        state, request, u = self._follow_plan(state, inputs, estimate, ticks, planning_due)
         constraints, reference = state.constraints, state.reference
         if planning_due:
             target = self._reference(state, now_us)
             constraints = self._constraints(state, estimate, target)
             reference = target if state.vehicle.flies else None
-        sent, memory, replaced = self._actuate(state, estimate, u)
+        sent, memory, replaced = self._actuate(state, estimate, u, ticks)
         snapshot = _snapshot(state, estimate, u, sent, constraints, reference)
         state = FlightState(
-            state.index + 1,
+            index,
+            now_us,
             estimate,
             state.invalid_ticks,
             state.nominal,
@@ -105,20 +108,32 @@ class FlightLoop:
         )
         return state, TickOutputs(sent, snapshot, request, tuple(acks), tuple(texts))
 
+    def _elapsed_ticks(self, state: FlightState, now_us: int) -> int:
+        """Ticks since the last one: more than one where sensor frames were missed."""
+        elapsed = (now_us - state.t_us) // self.config.tick_period_us
+        return min(max(elapsed, 1), self.config.catch_up_ticks) if state.index >= 0 else 1
+
     def _follow_plan(
-        self, state: FlightState, inputs: TickInputs, estimate: StateEstimate, planning_due: bool
+        self,
+        state: FlightState,
+        inputs: TickInputs,
+        estimate: StateEstimate,
+        ticks: int,
+        planning_due: bool,
     ) -> tuple[FlightState, PlanRequest | None, PlanInput]:
         """Bring the plan's state to this tick, by a new plan or one more step; ask for the next."""
         nominal = state.nominal
         if not state.vehicle.flies or nominal is None:
             return state, None, _NO_INPUT
         now_us, tick_us = inputs.sensors.t_us, self.config.tick_period_us
-        last_u = plan_input(state.plan.running, nominal, now_us - tick_us)
+        running = state.plan.running
         plan, new_plan = take_answer(state.plan, inputs.plan, now_us)
         if new_plan is not None:
             nominal = late_start(self._model, new_plan, now_us, tick_us)
         elif now_us > plan.since_us:
-            nominal = self._model.step(nominal, last_u)
+            for ago in range(ticks, 0, -1):
+                u = plan_input(running, nominal, now_us - ago * tick_us)
+                nominal = self._model.step(nominal, u)
         state = replace(state, nominal=nominal, plan=plan)
         request = None
         if planning_due:
@@ -164,12 +179,12 @@ class FlightLoop:
         )
 
     def _actuate(
-        self, state: FlightState, estimate: StateEstimate, u: PlanInput
+        self, state: FlightState, estimate: StateEstimate, u: PlanInput, ticks: int
     ) -> tuple[ActuatorCommand, CascadeMemory, bool]:
         """Close the loops, idle or stay still, and let the safety gate have the last word."""
         memory, wanted = state.cascade, STOPPED
         if state.vehicle.flies and state.nominal is not None:
-            wanted, memory = self._cascade.step(memory, estimate, state.nominal, u)
+            wanted, memory = self._cascade.step(memory, estimate, state.nominal, u, ticks)
         elif state.vehicle.armed:
             idle = self.config.limits.idle_thrust
             wanted = ActuatorCommand((idle, idle, idle, idle), (0.0, 0.0))

@@ -74,7 +74,8 @@ class PlanMemory:
 class FlightState:
     """Everything a tick starts from; the upper half changes every tick, the lower rarely."""
 
-    index: int = 0
+    index: int = -1  # of the last tick on the absolute grid, missed ones counted
+    t_us: int = 0  # of the last tick
     estimate: StateEstimate | None = None  # last valid
     invalid_ticks: int = 0
     nominal: PredictionState | None = None  # where the running plan wants the vehicle now

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 from fsw.geometry.rotation import wrap_angle
@@ -19,6 +20,7 @@ from fsw.signals import (
     PredictionState,
     SafeSet,
     StateEstimate,
+    Vec3,
 )
 from fsw.vehicle.faults import PLAN_STALE_PERIODS
 
@@ -58,6 +60,27 @@ def measured_state(estimate: StateEstimate, motion: MotionState) -> PredictionSt
         estimate.q_arm,
         estimate.qd_arm,
     )
+
+
+def coast(x: PredictionState, seconds: float) -> PredictionState:
+    """A measured state a moment later, its jerk held.
+
+    Off its plan the vehicle does what the fast loop makes of the error, not what the plan's
+    input says; its own motion is the better guess.
+    """
+    t, j = seconds, (*x.j, 0.0)
+    return replace(
+        x,
+        p=_each(lambda k: x.p[k] + t * (x.v[k] + t * (x.a[k] / 2.0 + t * j[k] / 6.0))),
+        v=_each(lambda k: x.v[k] + t * (x.a[k] + t * j[k] / 2.0)),
+        a=_each(lambda k: x.a[k] + t * j[k]),
+        yaw=x.yaw + t * x.yaw_rate,
+        q_arm=(x.q_arm[0] + t * x.qd_arm[0], x.q_arm[1] + t * x.qd_arm[1]),
+    )
+
+
+def _each(value: Callable[[int], float]) -> Vec3:
+    return value(0), value(1), value(2)
 
 
 def plan_input(plan: Plan | None, nominal: PredictionState, now_us: int) -> PlanInput:
@@ -142,9 +165,12 @@ def ask(
         and math.dist(nominal.p, measured.p) < config.upset_distance
         and abs(wrap_angle(nominal.yaw - measured.yaw)) < config.upset_yaw
     )
-    u = plan_input(memory.running, nominal, now_us)
-    start = model.advance(nominal if from_nominal else measured, u, config.plan_delay_ticks)
-    apply_us = now_us + config.plan_delay_ticks * config.tick_period_us
+    delay = config.plan_delay_ticks
+    if from_nominal:
+        start = model.advance(nominal, plan_input(memory.running, nominal, now_us), delay)
+    else:
+        start = coast(measured, delay * config.tick_period_us * 1e-6)
+    apply_us = now_us + delay * config.tick_period_us
     request = PlanRequest(memory.next_id, apply_us, start, targets, safe_set, from_nominal)
     counters = memory.counters
     if memory.awaited_id >= 0:  # the last question is given up, not waited for

@@ -1,0 +1,94 @@
+"""Sensor frames that never arrive: the plan keeps its time, and planning its period."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from fsw.model.nominal import NominalModel
+from fsw.mpc.planner import Planner
+from fsw.parameters.flight_config import flight_config
+from fsw.runtime.flight_loop import FlightLoop
+from fsw.runtime.flight_state import FlightState
+from fsw.signals import (
+    CommandRequest,
+    EndEffectorTarget,
+    Plan,
+    PlanRequest,
+    SensorFrame,
+    TickInputs,
+)
+
+CONFIG = flight_config()
+START_US = 1_000_000
+ARM = CommandRequest(400, (1.0, *(0.0,) * 6), 1, 195)
+FOLLOW = CommandRequest(176, (1.0, 6.0, *(0.0,) * 5), 1, 195)
+ARM_FOLDED = (-0.7227, 1.4454)
+
+
+def frame(t_us: int) -> SensorFrame:
+    """A vehicle that is held still, so that only the plan moves."""
+    return SensorFrame(
+        t_us, (0.0, 0.0, -2.0), (0.0,) * 3, (1.0, 0.0, 0.0, 0.0), (0.0,) * 3, (0.0, 0.0, -9.81),
+        ARM_FOLDED, (0.0, 0.0),
+    )  # fmt: skip
+
+
+def target(t_us: int) -> EndEffectorTarget:
+    """Half a metre ahead of where the end-effector is."""
+    return EndEffectorTarget(t_us, (0.1, 0.0, -1.775), (0.0,) * 3, (0.0,) * 3)
+
+
+def fly(lost: set[int], ticks: int) -> tuple[FlightState, list[PlanRequest]]:
+    """Ticks of a loop that never hears the lost ones; plans arrive when they are due."""
+    loop, state = FlightLoop(CONFIG), FlightState()
+    planner = Planner(CONFIG.planner, lambda: 0.0)
+    waiting: Plan | None = None
+    asked = []
+    for k in range(ticks):
+        if k in lost:
+            continue
+        t_us = START_US + k * CONFIG.tick_period_us
+        plan = waiting if waiting is not None and waiting.t_us <= t_us else None
+        waiting = None if plan is not None else waiting
+        first = k == 0
+        inputs = TickInputs(
+            frame(t_us),
+            plan,
+            (ARM, FOLLOW) if first else (),
+            tuple(target(START_US + i * 100_000) for i in range(30)) if first else (),
+        )
+        state, outputs = loop.tick(state, inputs)
+        if outputs.plan_request is not None:
+            asked.append(outputs.plan_request)
+            answer = planner.plan(outputs.plan_request)
+            assert isinstance(answer, Plan)
+            waiting = answer
+    return state, asked
+
+
+@pytest.mark.parametrize("lost", [{30}, {30, 31, 32}, {49, 50, 51}, {100}, set(range(20, 40))])
+def test_the_plan_s_state_is_where_it_would_be_without_the_loss(lost: set[int]) -> None:
+    whole, _ = fly(set(), 140)
+    holed, _ = fly(lost, 140)
+    assert whole.nominal is not None
+    assert holed.nominal is not None
+    assert math.dist(whole.nominal.p, holed.nominal.p) < 2e-3
+    assert whole.nominal.p != (0.0, 0.0, -2.0)
+
+
+def test_a_lost_planning_tick_is_planned_on_the_next_and_the_grid_stays() -> None:
+    _, asked = fly({50}, 160)
+    applied = [(request.t_apply_us - START_US) // CONFIG.tick_period_us for request in asked]
+    delay = CONFIG.plan_delay_ticks
+    assert applied == [delay, 51 + delay, 100 + delay, 150 + delay]
+
+
+def test_without_loss_every_step_is_one_step_of_the_model() -> None:
+    state, asked = fly(set(), CONFIG.plan_delay_ticks + 4)
+    model = NominalModel(CONFIG.planner.lag, CONFIG.tick_period_us * 1e-6)
+    plan = state.plan.running
+    assert plan is not None
+    assert len(asked) == 1
+    assert state.nominal == model.advance(plan.start, plan.inputs[0], 3)
