@@ -46,7 +46,9 @@ TABLE_4: tuple[str, ...] = (
     "printed there.",
     "λ: the paper's 5 cannot hold as a hard condition (the centre of the sphere at rest would need "
     "α ≥ 167 m/s²); it is flown softly as blf-lambda-5, beside ours.",
-    "MPC-SC: eq 29 is one-sided; as printed it pushes deeper once s_min is passed.",
+    "MPC-SC: eq 29 is one-sided; as printed it pushes deeper once s_min is passed. With the "
+    "weights of Table II in the denominator, as printed, it keeps so far from the walls that it "
+    "never collides and hardly tracks; the paper's TE and its collision are not reproduced.",
     "MPC-HC keeps 1 mm more than the safe set: without it, its calm flights fail by micrometres of "
     "solver tolerance and of curvature between nodes.",
     "MPC-HC without a solution: the last plan goes on and then brakes; the paper ends the flight "
