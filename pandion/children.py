@@ -21,13 +21,16 @@ _PR_SET_PDEATHSIG: Final = 1
 class Child:
     """A half of the system. Its events come from its standard output, line by line."""
 
-    def __init__(self, module: str, arguments: list[str], log: Path) -> None:
+    def __init__(
+        self, module: str, arguments: list[str], log: Path, processor: int | None = None
+    ) -> None:
         """Start ``python -m module``.
 
         Args:
             module: ``sitl`` or ``fsw``.
             arguments: Its command line.
             log: Where its standard error goes.
+            processor: The only one it may run on; any if None.
         """
         self.name = module
         self._rest = b""
@@ -38,7 +41,7 @@ class Child:
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.PIPE,
                 stderr=errors,
-                preexec_fn=_die_with(os.getpid()),
+                preexec_fn=_die_with(os.getpid(), processor),
             )
         assert self._process.stdout is not None
         self._pipe = self._process.stdout.fileno()
@@ -94,7 +97,7 @@ def _event(line: bytes) -> Event | None:
     return event if isinstance(event, dict) and "event" in event else None
 
 
-def _die_with(parent: int) -> Callable[[], None] | None:
+def _die_with(parent: int, processor: int | None) -> Callable[[], None] | None:
     """What a new child does before it becomes Python: tie its life to ours (Linux only)."""
     if sys.platform != "linux":
         return None
@@ -105,5 +108,7 @@ def _die_with(parent: int) -> Callable[[], None] | None:
         prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
         if os.getppid() != parent:
             os._exit(1)
+        if processor is not None:
+            os.sched_setaffinity(0, {processor})
 
     return tie

@@ -12,6 +12,7 @@ from pandion.display import Display
 from pandion.fly_options import FlyOptions, add_arguments
 from pandion.fly_options import options as fly_options
 from pandion.parser import COULD_NOT_START, Parser
+from pandion.processor import quietest
 from pandion.result import Parts, as_json
 from pandion.supervisor import Flown, HalfFailed, Supervisor
 from pandion.verdict import rows
@@ -33,7 +34,8 @@ def main(argv: list[str]) -> int:
     display = Display(sys.stderr if options.json == "-" else sys.stdout)
     _banner(options, display)
     try:
-        flown = Supervisor(display, options.out).fly(
+        processor = None if options.realtime else quietest()
+        flown = Supervisor(display, options.out, processor).fly(
             _sitl_arguments(options), lambda port: _fsw_arguments(options, port)
         )
     except HalfFailed as error:

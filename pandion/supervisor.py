@@ -48,8 +48,9 @@ class Flown:
 class Supervisor:
     """Starts sitl, then fsw, and sees both to their end."""
 
-    def __init__(self, display: Display, out: Path) -> None:
+    def __init__(self, display: Display, out: Path, processor: int | None = None) -> None:
         self._display = display
+        self._processor = processor
         self._out = out
         self._flown = Flown()
         self._children: list[Child] = []
@@ -94,7 +95,7 @@ class Supervisor:
         raise HalfFailed(self._flown.failure or "the simulator did not start")
 
     def _start(self, name: str, arguments: list[str]) -> None:
-        child = Child(name, arguments, self._out / f"{name}.log")
+        child = Child(name, arguments, self._out / f"{name}.log", self._processor)
         self._children.append(child)
         self._selector.register(child, selectors.EVENT_READ)
 

@@ -78,7 +78,7 @@ class Flight:
         joints = len(self._simulation.vehicle.links)
         period_s = 1e-6 * STEP_US
         if self._options.realtime:
-            return RealTime(self._endpoint, joints, period_s)
+            return RealTime(self._endpoint, joints, period_s, stop)
         speed = self._options.speed
         paced_s = None if speed is None else period_s / speed
         return Lockstep(self._endpoint, joints, paced_s, stop)

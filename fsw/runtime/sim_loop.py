@@ -154,8 +154,11 @@ class SimLoop(Generic[State]):
             record.health.mpc = record.mpc.timer.close_interval()
 
     def _lateness_us(self, now_us: int, t_us: int, realtime: bool) -> int:
-        """How long after its release a step is taken up; the promptest step so far defines 0."""
-        if not realtime:
+        """How long after its release a step is taken up; the promptest step so far defines 0.
+
+        The first step does not count: the simulator's clock starts when it has been answered.
+        """
+        if not realtime or self._ticks == 0:
             return 0
         offset = now_us - t_us
         if self._offset_us is None or offset < self._offset_us:

@@ -12,6 +12,7 @@ from sitl.link.udp_endpoint import RESEND_S, UdpEndpoint
 from sitl.simulation import Controls
 
 STALL_S: Final = 2.0
+_FIRST_PLAN_S: Final = 0.05  # between the first answer and the start of the clock
 
 _OFF: Final = Controls((0.0, 0.0, 0.0, 0.0), (0.0, 0.0), armed=False)
 
@@ -54,7 +55,7 @@ class Lockstep:
     def __init__(
         self, endpoint: UdpEndpoint, joints: int, period_s: float | None, stop: Stop
     ) -> None:
-        """Start the grid.
+        """Ready to start.
 
         Args:
             endpoint: Connected to the vehicle; its patience is the interval of repetition.
@@ -99,17 +100,20 @@ class RealTime:
     """Never waits for the vehicle: what has arrived when the step is over is what was applied.
 
     With the answer in time this is what lockstep applies; without it the last controls are held
-    and the step is counted as missed.
+    and the step is counted as missed. Only the first step is waited for: the clock starts when
+    the vehicle has answered it and had a moment to make its first plan.
     """
 
-    def __init__(self, endpoint: UdpEndpoint, joints: int, period_s: float) -> None:
-        """Start the grid.
+    def __init__(self, endpoint: UdpEndpoint, joints: int, period_s: float, stop: Stop) -> None:
+        """Ready to start.
 
         Args:
             endpoint: Connected to the vehicle.
             joints: Number of joints.
             period_s: Wall time of a step [s].
+            stop: Ends the wait for the first answer.
         """
+        self._first = Lockstep(endpoint, joints, None, stop)
         self.counts = ExchangeCounts()
         self._endpoint = endpoint
         self._joints = joints
@@ -120,6 +124,8 @@ class RealTime:
 
     def step(self, number: int, t_us: int, datagram: bytes) -> Answer:
         """See :class:`Exchange`."""
+        if number == 0:
+            return self._first_step(t_us, datagram)
         self._endpoint.send(datagram)
         # The grid is absolute: a late step shortens the next one and shifts nothing.
         _sleep_until(self._start_s + (number + 1) * self._period_s)
@@ -139,6 +145,15 @@ class RealTime:
             acks=tuple(ack for answer in answers for ack in answer.acks),
             texts=tuple(text for answer in answers for text in answer.texts),
         )
+
+    def _first_step(self, t_us: int, datagram: bytes) -> Answer:
+        """Wait for the first answer as lockstep does, then start the grid."""
+        answer = self._first.step(0, t_us, datagram)
+        self._held = answer.controls
+        self._heard_s = time.perf_counter()
+        self._start_s = self._heard_s + _FIRST_PLAN_S
+        _sleep_until(self._start_s + self._period_s)
+        return answer
 
     def _waiting(self) -> list[Answer]:
         answers = []

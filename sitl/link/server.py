@@ -77,6 +77,8 @@ def fly(
         datagram = _datagram(encoder, simulation.step, readings, messages)
         try:
             answer = exchange.step(simulation.step, readings.t_us, datagram)
+            if simulation.step == 0:  # the vehicle may take its time for the first answer
+                begin_s = time.perf_counter()
             _advance(simulation, answer)
         except SimulatorError as error:
             simulation.end(EndKind.STOPPED, str(error))
