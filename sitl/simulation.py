@@ -204,21 +204,22 @@ class Simulation:
             raise ValueError(f"{controls} at step {self.step}: expected 4 rotors, {joints} joints")
         if not all(map(math.isfinite, (*controls.thrust, *controls.torque))):
             raise ValueError(f"{controls} at step {self.step}: every control must be finite")
-        live = 1.0 if controls.armed else 0.0
-        for i, fraction in enumerate(controls.thrust):
-            self._inputs.thrust[i] = live * rotors.thrust_max * min(max(fraction, 0.0), 1.0)
-        for i, fraction in enumerate(controls.torque):
-            self._inputs.torque[i] = live * drives.torque_max * min(max(fraction, -1.0), 1.0)
+        thrust = rotors.thrust_max if controls.armed else 0.0
+        torque = drives.torque_max if controls.armed else 0.0
+        self._inputs.thrust[:] = [thrust * min(max(f, 0.0), 1.0) for f in controls.thrust]
+        self._inputs.torque[:] = [torque * min(max(f, -1.0), 1.0) for f in controls.torque]
 
     def _disturb(self) -> None:
-        force, torque = [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]
+        force = torque = (0.0, 0.0, 0.0)
         for item in self._pushes:
-            total, unit = (torque, 1.0) if item.torque else (force, self._mass)
-            for i, value in enumerate(item.sample(self.step)):
-                total[i] += unit * value
-        for i in range(3):
-            self._inputs.force_W[i] = force[i]
-            self._inputs.torque_B[i] = torque[i]
+            x, y, z = item.sample(self.step)
+            if item.torque:
+                torque = (torque[0] + x, torque[1] + y, torque[2] + z)
+            else:
+                m = self._mass
+                force = (force[0] + m * x, force[1] + m * y, force[2] + m * z)
+        self._inputs.force_W[:] = force
+        self._inputs.torque_B[:] = torque
 
     def _judge(self, before_s: float, landing_speed: float) -> None:
         """Judge every plant step of the exchange that began at ``before_s``."""

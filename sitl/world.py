@@ -27,6 +27,7 @@ class World:
         self.walls = scenario.walls
         self.workspace = scenario.workspace
         wall_keys = [f"{wall.name}/{point}" for wall in self.walls for point in POINTS]
+        self._planes = [(*wall.normal, wall.offset_m + wall.clearance_m) for wall in self.walls]
         self.keys = (*wall_keys, *(("workspace/base",) if self.workspace else ()))
 
     def margins(self, points: tuple[V3, V3, V3], target: V3 | None) -> tuple[float, ...]:
@@ -37,10 +38,9 @@ class World:
             target: End-effector reference [m, NED]; None while the workspace does not apply,
                 its margin is then infinite.
         """
-        values = []
-        for wall in self.walls:
-            (a, b, c), limit = wall.normal, wall.offset_m + wall.clearance_m
-            values += [a * x + b * y + c * z - limit for x, y, z in points]
+        values = [
+            a * x + b * y + c * z - limit for a, b, c, limit in self._planes for x, y, z in points
+        ]
         if self.workspace is not None:
             values.append(
                 math.inf if target is None else workspace_margin(self.workspace, points[0], target)
