@@ -19,11 +19,11 @@ class TrackingTuning:
 
     The gains are those of a discrete LQR on the position of one point; ``effort`` is its
     price of snap. A cheaper price follows the plan more closely until the rotors saturate,
-    which makes the loop diverge: 1e-8 does, 1.7e-7 leaves 15 % of the rotors' torque at
+    which makes the loop diverge: 1e-8 does, 1.2e-7 leaves 15 % of the rotors' torque at
     0.8 m/s^2 of disturbance (``tube.py``).
     """
 
-    effort: float = 1.7e-7  # horizontal, on (m/s^4)^2
+    effort: float = 1.2e-7  # horizontal, on (m/s^4)^2
     # The point sits half-way down to a hanging end-effector: holding the base alone, every
     # correction swings the end-effector; holding the end-effector alone, the base wanders.
     point_below_base: float = 0.1125  # m

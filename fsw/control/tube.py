@@ -107,13 +107,15 @@ def _impulse_responses(
 
 
 def _random_steps(response: Array, per_hold: int) -> float:
-    """Standard deviation under steps drawn uniformly from +-1 every ``per_hold`` ticks."""
+    """Standard deviation under steps drawn uniformly from +-1 every ``per_hold`` ticks.
+
+    The draws are independent, so their shares add up in squares; the mean over the instants
+    within a hold.
+    """
     whole = len(response) // per_hold * per_hold
-    # Worst of all instants within a hold: the draws are independent, so their shares add up
-    # in squares.
     variances = []
     for phase in range(0, per_hold, max(per_hold // 10, 1)):
         shifted = np.concatenate((np.zeros(phase), response[: whole - phase]))
         held = shifted.reshape(-1, per_hold).sum(axis=1)
         variances.append(float(held @ held))
-    return float(np.sqrt(max(variances) / 3.0))
+    return float(np.sqrt(np.mean(variances) / 3.0))

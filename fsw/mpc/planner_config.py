@@ -31,7 +31,7 @@ class PlannerConfig:
     joint_slack: SlackPrice = field(default_factory=lambda: SlackPrice(50.0))
     # blf
     # Beside walls the end-effector counts too, which swings more than the base wanders.
-    walls: BarrierTuning = field(default_factory=lambda: BarrierTuning(robustness=0.3))
+    walls: BarrierTuning = field(default_factory=lambda: BarrierTuning(robustness=0.32))
     workspace: BarrierTuning = field(default_factory=BarrierTuning)
     barrier_slack: SlackPrice = field(default_factory=lambda: SlackPrice(20.0))
     # hc
