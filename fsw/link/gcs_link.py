@@ -43,7 +43,7 @@ class GcsLink:
     ) -> None:
         self.losses = Losses()
         self.encode_failures = 0
-        self._endpoint = OpenEndpoint()
+        self._endpoint = OpenEndpoint(target)
         self._peers = Peers(target)
         self._inbox = inbox
         self._context = context

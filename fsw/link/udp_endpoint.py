@@ -100,12 +100,18 @@ class ConnectedEndpoint:
 class OpenEndpoint:
     """A socket that talks to anyone and never waits."""
 
-    def __init__(self) -> None:
-        """Bind to a port the system chooses, so that any number of vehicles share a machine."""
+    def __init__(self, target: Address) -> None:
+        """Bind to a port the system chooses, so that any number of vehicles share a machine.
+
+        Args:
+            target: Who is spoken to first. Where that is this machine, only this machine is
+                heard: a vehicle must not take commands from a network nobody asked for.
+        """
+        local = target[0] if target[0].startswith("127.") else ""
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _RECEIVE_BUFFER)
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
-        self._socket.bind(("", 0))
+        self._socket.bind((local, 0))
         self._socket.setblocking(False)
 
     @property
