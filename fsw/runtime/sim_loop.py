@@ -17,6 +17,7 @@ from fsw.link.sim_link import Pacing, SimLink
 from fsw.link.telemetry import LoopHealth
 from fsw.ports import Clock, PlanService
 from fsw.runtime.effort import EffortRecord
+from fsw.runtime.guarded_tick import GuardedTick
 from fsw.runtime.planner_worker import PlannerRecord
 from fsw.runtime.process import StopRequest
 from fsw.runtime.program import FlightProgram, State
@@ -68,7 +69,7 @@ class SimLoop(Generic[State]):
         stop: StopRequest,
     ) -> None:
         self._program = program
-        self._state = program.first_state
+        self._tick = GuardedTick(program.tick, program.first_state)
         self._sim = sim
         self._gcs = gcs
         self._inbox = inbox
@@ -124,7 +125,7 @@ class SimLoop(Generic[State]):
             inbox.take_targets(),
             inbox.take_safe_set(),
         )
-        self._state, outputs = self._program.tick(self._state, inputs)
+        outputs = self._tick(inputs)
         if outputs.acks:
             self._acknowledge(t_us, outputs)
         self._sim.answer(t_us, outputs)

@@ -1,0 +1,61 @@
+"""A tick that raises: flown through once, not for ever."""
+
+from __future__ import annotations
+
+import pytest
+
+from fsw.runtime.guarded_tick import PATIENCE_TICKS, GuardedTick
+from fsw.signals import CommandAck, SensorFrame, TickInputs, TickOutputs
+from tests.link.snapshots import ACTUATORS, outputs_at
+
+INPUTS = TickInputs(
+    SensorFrame(
+        1_000_000, (0.0,) * 3, (0.0,) * 3, (1.0, 0.0, 0.0, 0.0), (0.0,) * 3, (0.0,) * 3,
+        (0.0, 0.0), (0.0, 0.0),
+    )
+)  # fmt: skip
+
+
+class Raising:
+    """Counts its ticks in the state and fails on some of them."""
+
+    def __init__(self, failing: set[int]) -> None:
+        self.calls = 0
+        self._failing = failing
+
+    def __call__(self, state: int, inputs: TickInputs) -> tuple[int, TickOutputs]:
+        self.calls += 1
+        if self.calls in self._failing:
+            raise ZeroDivisionError("division by zero")
+        return state + 1, outputs_at(state, acks=(CommandAck(400, 0, 1, 195),))
+
+
+def test_a_tick_that_fails_repeats_the_last_command_and_says_so() -> None:
+    tick = GuardedTick(Raising({2}), 0)
+    tick(INPUTS)
+    failed = tick(INPUTS)
+    assert failed.actuators == ACTUATORS
+    assert failed.acks == ()
+    assert "ZeroDivisionError" in failed.texts[0].text
+    # The state is the one before the failure: it goes on from there.
+    assert tick(INPUTS).snapshot.t_us == 1
+
+
+def test_an_error_that_stays_is_raised() -> None:
+    tick = GuardedTick(Raising(set(range(2, 100))), 0)
+    tick(INPUTS)
+    for _ in range(PATIENCE_TICKS):
+        tick(INPUTS)
+    with pytest.raises(ZeroDivisionError):
+        tick(INPUTS)
+
+
+def test_errors_apart_from_each_other_do_not_add_up() -> None:
+    tick = GuardedTick(Raising(set(range(2, 60, 2))), 0)
+    for _ in range(59):
+        tick(INPUTS)
+
+
+def test_a_first_tick_that_fails_has_nothing_to_repeat() -> None:
+    with pytest.raises(ZeroDivisionError):
+        GuardedTick(Raising({1}), 0)(INPUTS)
