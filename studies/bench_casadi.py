@@ -18,8 +18,8 @@ from fsw.model.linearisation import POINTS, Linearisation
 from fsw.model.prediction import INPUTS, STATES, Array, condense, to_vector
 from fsw.mpc.planner_config import PlannerConfig
 from fsw.signals import PlanRequest, SafeSet
+from studies.bench_answer import Answer, timed
 from studies.bench_instances import Instance
-from studies.bench_methods import Answer, timed
 
 SOLVERS = ("ipopt", "fatrop")
 _TOLERANCE = 1e-6  # as Clarabel's
@@ -130,9 +130,7 @@ class CasadiMethod:
             for axis in frame:
                 for n in (axis, -axis):
                     h_start.append(root(sphere.radius - n @ e, tuning.alpha, tuning.slope) - n @ w)
-        return np.array(
-            [required_h(h, i, tuning.gamma, tuning.period, tuning.robustness) for h in h_start]
-        )
+        return np.array([required_h(h, i, tuning.numbers) for h in h_start])
 
 
 def _options(

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Protocol, TypeVar
+from typing import Protocol
 
 import numpy as np
 
@@ -15,30 +14,12 @@ from fsw.mpc.planner_config import PlannerConfig
 from fsw.mpc.problem import Problem
 from fsw.mpc.slsqp_solver import Gradients, SlsqpSolver
 from fsw.signals import Plan, SafeSet
+from studies.bench_answer import Answer, stopwatch_us, timed
+from studies.bench_casadi import SOLVERS, CasadiMethod, installed
 from studies.bench_instances import Instance
 from studies.bench_price import target_points
 
 _ITERATIONS = (1, 2, 3)
-Result = TypeVar("Result")
-
-
-@dataclass(frozen=True, slots=True)
-class Spent:
-    """What a call took."""
-
-    wall_us: float
-    cpu_us: float  # of this process; a busy machine stretches only the other
-
-
-@dataclass(frozen=True, slots=True)
-class Answer:
-    """What one timed call gave."""
-
-    spent: Spent
-    inputs: Array | None  # (6 n,), None where the method failed
-    sqp_iterations: int | None
-    linearise_us: float = 0.0
-    solve_us: float = 0.0
 
 
 class Method(Protocol):
@@ -105,7 +86,6 @@ class SlsqpMethod:
 
 def entries() -> tuple[Entry, ...]:
     """Everything that is compared, in the order of the table."""
-    from studies.bench_casadi import SOLVERS, CasadiMethod, installed
 
     def clarabel(iterations: int) -> Build:
         return lambda config, safe_set: ClarabelMethod(config, safe_set, iterations)
@@ -141,16 +121,3 @@ def guess_for(planner: Planner, instance: Instance) -> Array:
 def flat(plan: Plan) -> Array:
     """Inputs of a plan, (6 n,)."""
     return np.array([(*u.a, u.yaw_acc, *u.qdd_arm) for u in plan.inputs]).ravel()
-
-
-def timed(call: Callable[[], Result]) -> tuple[Result, Spent]:
-    """What a call gives, and the time that it took."""
-    cpu, wall = time.process_time(), time.perf_counter()
-    result = call()
-    wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
-    return result, Spent(1e6 * wall, 1e6 * cpu)
-
-
-def stopwatch_us() -> float:
-    """Monotonic time [us]."""
-    return time.perf_counter() * 1e6

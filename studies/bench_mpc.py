@@ -15,8 +15,9 @@ import numpy as np
 
 from fsw.model.prediction import Array
 from fsw.mpc.planner import Planner
+from studies.bench_answer import Answer, stopwatch_us
 from studies.bench_instances import Instance, planner_of, record
-from studies.bench_methods import Answer, Entry, Method, entries, guess_for, stopwatch_us
+from studies.bench_methods import Entry, Method, entries, guess_for
 from studies.bench_price import Judge
 from studies.cases import Case
 

@@ -53,9 +53,7 @@ class PointObstacleBarrier:
             rows.gradient[row] = n @ (
                 steepness * horizon.d_position[i, BASE] + horizon.d_velocity[i, BASE]
             )
-            rows.required[row] = required_h(
-                self._h(n, p_start, v_start), i, tuning.gamma, tuning.period, tuning.robustness
-            )
+            rows.required[row] = required_h(self._h(n, p_start, v_start), i, tuning.numbers)
 
     def at_start(self) -> Array:
         """h0 at node 0 [m/s], (1,)."""

@@ -13,11 +13,12 @@ Source: docs/equations.md E10, E25.
 
 from __future__ import annotations
 
+from fsw.barriers.root import BarrierNumbers
 from fsw.compiled import compiled
 
 
 @compiled
-def required_h(h_start: float, node: int, gamma: float, period: float, robustness: float) -> float:
+def required_h(h_start: float, node: int, tuning: BarrierNumbers) -> float:
     """Least h allowed at a node of the horizon [m/s]."""
-    decay = (1.0 - gamma * period) ** node
-    return decay * h_start + (1.0 - decay) * robustness
+    decay = (1.0 - tuning.gamma * tuning.period) ** node
+    return decay * h_start + (1.0 - decay) * tuning.robustness

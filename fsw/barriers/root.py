@@ -17,8 +17,20 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from fsw.compiled import compiled
+
+
+class BarrierNumbers(NamedTuple):
+    """What compiled rows need of a tuning; compiled code takes no dataclass."""
+
+    alpha: float  # m/s^2
+    slope: float  # 1/s
+    gamma: float  # 1/s
+    robustness: float  # m/s
+    period: float  # s
+    first_node: int  # the first one with rows
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +62,18 @@ class BarrierTuning:
                     f"barrier {name} is {rate} 1/s; at a period of {self.period} s it must not "
                     f"exceed {1.0 / self.period} 1/s"
                 )
+
+    @property
+    def numbers(self) -> BarrierNumbers:
+        """The same, for compiled rows."""
+        return BarrierNumbers(
+            self.alpha,
+            self.slope,
+            self.gamma,
+            self.robustness,
+            self.period,
+            1 + self.skipped_nodes,
+        )
 
 
 @compiled

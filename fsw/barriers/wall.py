@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from fsw.barriers.robust import required_h
-from fsw.barriers.root import BarrierTuning, root, root_slope
+from fsw.barriers.root import BarrierNumbers, BarrierTuning, root, root_slope
 from fsw.barriers.soft_rows import SoftRows, TargetPoints, kinds_moving_points
 from fsw.compiled import compiled
 from fsw.model.linearisation import POINTS, Linearisation
@@ -24,7 +24,7 @@ class WallBarrier:
     """Rows for walls x critical points x nodes, one slack a node and wall."""
 
     def __init__(self, walls: tuple[Wall, ...], tuning: BarrierTuning, horizon: int) -> None:
-        self._tuning = tuning
+        self._tuning = tuning.numbers
         self._normals = np.array([wall.normal for wall in walls]).reshape(-1, 3)
         self._offsets = np.array([wall.offset + wall.clearance for wall in walls])
         nodes = np.arange(1 + tuning.skipped_nodes, horizon + 1)
@@ -42,7 +42,7 @@ class WallBarrier:
 
     def refill(self, horizon: Linearisation, targets: TargetPoints) -> None:
         """Linearise h of every wall, point and node."""
-        tuning, rows = self._tuning, self.rows
+        rows = self.rows
         _fill(
             self._normals,
             self._offsets,
@@ -50,12 +50,7 @@ class WallBarrier:
             horizon.velocity,
             horizon.d_position,
             horizon.d_velocity,
-            tuning.alpha,
-            tuning.slope,
-            tuning.gamma,
-            tuning.period,
-            tuning.robustness,
-            1 + tuning.skipped_nodes,
+            self._tuning,
             self._h_start,
             rows.value,
             rows.required,
@@ -75,12 +70,7 @@ def _fill(
     velocity: Array,
     d_position: Array,
     d_velocity: Array,
-    alpha: float,
-    slope: float,
-    gamma: float,
-    period: float,
-    robustness: float,
-    first_node: int,
+    tuning: BarrierNumbers,
     h_start: Array,
     value: Array,
     required: Array,
@@ -89,7 +79,7 @@ def _fill(
     walls, nodes = normals.shape[0], position.shape[0]
     row = 0
     for i in range(nodes):
-        if 0 < i < first_node:
+        if 0 < i < tuning.first_node:
             continue
         for wall in range(walls):
             nx, ny, nz = normals[wall]
@@ -97,11 +87,11 @@ def _fill(
                 p, v = position[i, point], velocity[i, point]
                 distance = nx * p[0] + ny * p[1] + nz * p[2] - offsets[wall]
                 approach = nx * v[0] + ny * v[1] + nz * v[2]
-                h = root(distance, alpha, slope) + approach
+                h = root(distance, tuning.alpha, tuning.slope) + approach
                 if i == 0:
                     h_start[wall * POINTS + point] = h
                     continue
-                steepness = root_slope(distance, alpha, slope)
+                steepness = root_slope(distance, tuning.alpha, tuning.slope)
                 dp, dv = d_position[i, point], d_velocity[i, point]
                 for column in range(INPUTS * i):
                     gradient[row, column] = (
@@ -110,7 +100,6 @@ def _fill(
                         + nz * (steepness * dp[2, column] + dv[2, column])
                     )
                 value[row] = h
-                required[row] = required_h(
-                    h_start[wall * POINTS + point], i, gamma, period, robustness
-                )
+                anchor = h_start[wall * POINTS + point]
+                required[row] = required_h(anchor, i, tuning)
                 row += 1

@@ -20,7 +20,7 @@ import math
 import numpy as np
 
 from fsw.barriers.robust import required_h
-from fsw.barriers.root import BarrierTuning, root, root_slope
+from fsw.barriers.root import BarrierNumbers, BarrierTuning, root, root_slope
 from fsw.barriers.soft_rows import SoftRows, TargetPoints, kinds_moving_base
 from fsw.compiled import compiled
 from fsw.model.linearisation import BASE, Linearisation
@@ -35,7 +35,7 @@ class WorkspaceBarrier:
     """Rows for six directions x nodes, one slack a node."""
 
     def __init__(self, sphere: WorkspaceSphere, tuning: BarrierTuning, horizon: int) -> None:
-        self._tuning = tuning
+        self._tuning = tuning.numbers
         self._radius = sphere.radius
         self._offset = np.array(sphere.centre_from_target)
         nodes = np.arange(1 + tuning.skipped_nodes, horizon + 1)
@@ -46,7 +46,7 @@ class WorkspaceBarrier:
 
     def refill(self, horizon: Linearisation, targets: TargetPoints) -> None:
         """Linearise h along six directions, frozen at the guess, at every node."""
-        tuning, rows = self._tuning, self.rows
+        rows = self.rows
         _fill(
             self._radius,
             targets.position + self._offset,
@@ -55,12 +55,7 @@ class WorkspaceBarrier:
             horizon.velocity[:, BASE],
             horizon.d_position[:, BASE],
             horizon.d_velocity[:, BASE],
-            tuning.alpha,
-            tuning.slope,
-            tuning.gamma,
-            tuning.period,
-            tuning.robustness,
-            1 + tuning.skipped_nodes,
+            self._tuning,
             self._h_start,
             rows.value,
             rows.required,
@@ -101,10 +96,10 @@ def outward_frame(e: Array, frame: Array) -> None:
 
 
 @compiled
-def _h_along(n: Array, e: Array, w: Array, radius: float, alpha: float, slope: float) -> float:
+def _h_along(n: Array, e: Array, w: Array, radius: float, tuning: BarrierNumbers) -> float:
     gap = radius - (n[0] * e[0] + n[1] * e[1] + n[2] * e[2])
     outward_speed: float = n[0] * w[0] + n[1] * w[1] + n[2] * w[2]
-    return root(gap, alpha, slope) - outward_speed
+    return root(gap, tuning.alpha, tuning.slope) - outward_speed
 
 
 @compiled
@@ -116,12 +111,7 @@ def _fill(
     velocity: Array,
     d_position: Array,
     d_velocity: Array,
-    alpha: float,
-    slope: float,
-    gamma: float,
-    period: float,
-    robustness: float,
-    first_node: int,
+    tuning: BarrierNumbers,
     h_start: Array,
     value: Array,
     required: Array,
@@ -131,17 +121,17 @@ def _fill(
     e_start, w_start = position[0] - centre[0], velocity[0] - centre_velocity[0]
     outward_frame(e_start, frame)
     h_start[0] = min(
-        _h_along(frame[0], e_start, w_start, radius, alpha, slope),
-        _h_along(-frame[0], e_start, w_start, radius, alpha, slope),
+        _h_along(frame[0], e_start, w_start, radius, tuning),
+        _h_along(-frame[0], e_start, w_start, radius, tuning),
     )
     row = 0
-    for i in range(first_node, position.shape[0]):
+    for i in range(tuning.first_node, position.shape[0]):
         e, w = position[i] - centre[i], velocity[i] - centre_velocity[i]
         outward_frame(e, frame)
         for direction in range(DIRECTIONS):
             n = frame[direction // 2] if direction % 2 == 0 else -frame[direction // 2]
             gap = radius - (n[0] * e[0] + n[1] * e[1] + n[2] * e[2])
-            steepness = root_slope(gap, alpha, slope)
+            steepness = root_slope(gap, tuning.alpha, tuning.slope)
             for column in range(INPUTS * i):
                 moved = 0.0
                 for axis in range(3):
@@ -149,7 +139,7 @@ def _fill(
                         steepness * d_position[i, axis, column] + d_velocity[i, axis, column]
                     )
                 gradient[row, column] = moved
-            value[row] = _h_along(n, e, w, radius, alpha, slope)
-            anchor = _h_along(n, e_start, w_start, radius, alpha, slope)
-            required[row] = required_h(anchor, i, gamma, period, robustness)
+            value[row] = _h_along(n, e, w, radius, tuning)
+            anchor = _h_along(n, e_start, w_start, radius, tuning)
+            required[row] = required_h(anchor, i, tuning)
             row += 1

@@ -11,9 +11,10 @@ import pytest
 from fsw.mpc.planner import Planner
 from pandion import bench
 from studies import bench_casadi
+from studies.bench_answer import stopwatch_us
 from studies.bench_casadi import SOLVERS, CasadiMethod
 from studies.bench_instances import Instance, planner_of, record
-from studies.bench_methods import Entry, guess_for, stopwatch_us
+from studies.bench_methods import Entry, guess_for
 from studies.bench_mpc import Effort, Samples, run
 from studies.bench_price import Judge
 from studies.bench_report import lines

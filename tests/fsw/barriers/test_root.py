@@ -76,7 +76,8 @@ def test_required_h_is_the_one_step_condition_iterated(
     period, h = 0.1, h_start
     for _ in range(node):  # h' + gamma (h - lambda) = 0 over one sample
         h -= gamma * period * (h - robustness)
-    assert required_h(h_start, node, gamma, period, robustness) == pytest.approx(h, abs=1e-12)
+    tuning = BarrierTuning(gamma=gamma, period=period, robustness=robustness, slope=1.0)
+    assert required_h(h_start, node, tuning.numbers) == pytest.approx(h, abs=1e-12)
 
 
 @pytest.mark.parametrize("name", ["alpha", "slope", "gamma", "robustness", "period"])
