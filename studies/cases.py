@@ -15,7 +15,7 @@ from fsw.mpc.planner_config import PlannerConfig
 from fsw.mpc.program import SlackPrice
 from fsw.parameters.flight_config import FlightConfig, flight_config
 from sitl.mission_clock import MissionClock
-from sitl.scenario import Lissajous, Scenario
+from sitl.scenario import Scenario
 from sitl.scenario_file import load_scenario
 from studies.job import PlantName
 
@@ -53,10 +53,7 @@ def scenario(case: Case, *, disturbed: bool, duration_s: float | None = None) ->
 
 def grazing(flown: Scenario) -> Scenario:
     """Case I on a path that touches the safety zones instead of entering them by 30 mm."""
-    path = flown.trajectory
-    assert isinstance(path, Lissajous)
-    x, y, z = path.amplitude_m
-    return replace(flown, trajectory=replace(path, amplitude_m=(x - 0.03, y - 0.03, z)))
+    return replace(flown, trajectory=load_scenario("walls-grazing").trajectory)
 
 
 def configuration(

@@ -9,6 +9,7 @@ import pytest
 from sitl.scenario import Lissajous, Uniform
 from sitl.scenario_file import ScenarioError, load_scenario, parse_scenario, scenario_names
 from sitl.simulation import Simulation
+from sitl.trajectory import reference
 
 BASE = """
 duration_s = 10.0
@@ -128,3 +129,17 @@ def test_a_path_is_read_and_a_missing_one_is_refused(tmp_path: Path) -> None:
 def test_what_is_not_toml_is_refused() -> None:
     with pytest.raises(ScenarioError, match="not TOML"):
         parse_scenario("duration_s = ", "broken")
+
+
+def test_the_grazing_path_touches_every_safety_zone_and_enters_none() -> None:
+    walls, grazing = load_scenario("walls"), load_scenario("walls-grazing")
+    assert (grazing.walls, grazing.disturbances) == (walls.walls, walls.disturbances)
+    path = reference(grazing.trajectory)
+    for wall in grazing.walls:
+        gaps = [
+            sum(n * x for n, x in zip(wall.normal, path.at(0.02 * k).p, strict=True))
+            - wall.offset_m
+            - wall.clearance_m
+            for k in range(6000)
+        ]
+        assert -1e-9 < min(gaps) < 2e-3
