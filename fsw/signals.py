@@ -134,6 +134,7 @@ class StateEstimate:
     yaw: float  # rad, ZYX
     q_arm: Vec2  # rad
     qd_arm: Vec2  # rad/s
+    specific_force: float = 9.81  # m/s^2, accelerometer along -z of the body
 
 
 # ---------------------------------------------------------------- planner

@@ -16,7 +16,7 @@ from fsw.control.tracking import Observed, TrackingLaw, follow_plan, observe
 from fsw.geometry.rotation import wrap_angle
 from fsw.model.airframe import GRAVITY, Airframe
 from fsw.model.prediction import LagModel
-from fsw.model.rotors import MotionState, lag_rotors, motion_state, rotor_decay
+from fsw.model.rotors import MotionState, lag_rotors, motion_state, rotor_decay, weigh
 from fsw.signals import (
     ActuatorCommand,
     PlanInput,
@@ -40,6 +40,7 @@ class CascadeMemory:
     rotors: Vec4  # N, where the rotor model says they are
     commanded: ActuatorCommand  # what was sent last tick, after the safety gate
     observed: Observed
+    mass: float  # kg, weighed in flight
     attitude: Vec3 = (0.0, 0.0, 0.0)  # rad s, integrals
     height: float = 0.0  # m s, integral
     joints: Vec2 = (0.0, 0.0)  # rad s, integrals
@@ -47,13 +48,15 @@ class CascadeMemory:
     def after_sending(self, sent: ActuatorCommand) -> CascadeMemory:
         """The memory for the next tick, once the safety gate has decided."""
         return CascadeMemory(
-            self.rotors, sent, self.observed, self.attitude, self.height, self.joints
+            self.rotors, sent, self.observed, self.mass, self.attitude, self.height, self.joints
         )
 
 
-def at_rest(estimate: StateEstimate) -> CascadeMemory:
+def at_rest(airframe: Airframe, estimate: StateEstimate) -> CascadeMemory:
     """Memory of a vehicle whose rotors stand still."""
-    return CascadeMemory(NO_ACTION.rotor_thrust, NO_ACTION, Observed(estimate.v_WB, _NONE))
+    return CascadeMemory(
+        NO_ACTION.rotor_thrust, NO_ACTION, Observed(estimate.v_WB, _NONE), airframe.mass
+    )
 
 
 def in_hover(airframe: Airframe, estimate: StateEstimate) -> CascadeMemory:
@@ -61,7 +64,7 @@ def in_hover(airframe: Airframe, estimate: StateEstimate) -> CascadeMemory:
     each = 0.25 * airframe.mass * GRAVITY
     thrust = (each, each, each, each)
     return CascadeMemory(
-        thrust, ActuatorCommand(thrust, (0.0, 0.0)), Observed(estimate.v_WB, _NONE)
+        thrust, ActuatorCommand(thrust, (0.0, 0.0)), Observed(estimate.v_WB, _NONE), airframe.mass
     )
 
 
@@ -91,7 +94,9 @@ class Cascade:
     def motion(self, memory: CascadeMemory, estimate: StateEstimate) -> MotionState:
         """Acceleration to snap right now, from the rotor model."""
         rotors = lag_rotors(memory.rotors, memory.commanded.rotor_thrust, self._decay)
-        return motion_state(self._airframe, estimate, rotors, memory.commanded.joint_torque[0])
+        return motion_state(
+            self._airframe, memory.mass, estimate, rotors, memory.commanded.joint_torque[0]
+        )
 
     def step(
         self,
@@ -117,14 +122,15 @@ class Cascade:
         rotors, observed = memory.rotors, memory.observed
         for _ in range(ticks):
             rotors = lag_rotors(rotors, memory.commanded.rotor_thrust, self._decay)
-        motion = motion_state(airframe, estimate, rotors, memory.commanded.joint_torque[0])
+        mass = weigh(airframe, memory.mass, rotors, estimate.specific_force, dt * ticks)
+        motion = motion_state(airframe, mass, estimate, rotors, memory.commanded.joint_torque[0])
         for _ in range(ticks):
             observed = observe(
                 observed, estimate.v_WB, motion.a, tuning.tracking.observer_bandwidth, dt
             )
         attitude, height = memory.attitude, memory.height
         if self._follows_plan:
-            (wdx, wdy), thrust = follow_plan(self._law, estimate, motion, observed, plan, u)
+            (wdx, wdy), thrust = follow_plan(self._law, mass, estimate, motion, observed, plan, u)
             wdz = u.yaw_acc + _yaw_correction(tuning.yaw, estimate, plan)
         else:
             (wdx, wdy, wdz), attitude = attitude_pid(
@@ -140,7 +146,7 @@ class Cascade:
             memory.joints,
             estimate,
             (q_ref, qd_ref, u.qdd_arm),
-            motion.thrust / airframe.mass,
+            motion.thrust / mass,
             wdy,
             dt,
         )
@@ -148,7 +154,7 @@ class Cascade:
         command = ActuatorCommand(
             allocate(airframe, torque, thrust, tuning.yaw_thrust_limit), joints
         )
-        return command, CascadeMemory(rotors, command, observed, attitude, height, kept)
+        return command, CascadeMemory(rotors, command, observed, mass, attitude, height, kept)
 
 
 def _yaw_correction(gains: PidGains, estimate: StateEstimate, plan: PredictionState) -> float:

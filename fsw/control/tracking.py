@@ -101,6 +101,7 @@ def snap_command(
 
 def follow_plan(
     law: TrackingLaw,
+    mass: float,
     estimate: StateEstimate,
     motion: MotionState,
     observed: Observed,
@@ -111,6 +112,7 @@ def follow_plan(
 
     Args:
         law: Airframe, lag and gains.
+        mass: Of the whole vehicle, as weighed in flight [kg].
         estimate: The vehicle now.
         motion: Its acceleration, jerk and snap.
         observed: Its velocity without the reading's noise, and the disturbance.
@@ -134,7 +136,7 @@ def follow_plan(
         for axis in (0, 1)
     )
     R = estimate.R_WB
-    f = max(motion.thrust / law.airframe.mass, _LEAST_SPECIFIC_THRUST)
+    f = max(motion.thrust / mass, _LEAST_SPECIFIC_THRUST)
     # -f [b1_xy, -b2_xy] [wdy; wdx] = w_xy; the determinant is -R33, far from zero in flight.
     determinant = R[0] * -R[4] + R[1] * R[3]
     wdy = (wx * -R[4] + R[1] * wy) / (-f * determinant)
@@ -144,7 +146,7 @@ def follow_plan(
     a_z = (
         u.a[2] + k1 * (plan.p[2] - p[2]) + k2 * (plan.v[2] - v[2]) + k3 * (plan.a[2] - motion.a[2])
     )
-    thrust = law.airframe.mass * (GRAVITY - a_z) / max(R[8], 0.5)
+    thrust = mass * (GRAVITY - a_z) / max(R[8], 0.5)
     return (wdx, wdy), thrust
 
 

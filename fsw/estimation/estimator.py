@@ -23,6 +23,7 @@ def estimate_state(sensors: SensorFrame) -> StateEstimate | None:
         sum(sensors.p_WB)
         + sum(sensors.v_WB)
         + sum(sensors.gyro_B)
+        + sensors.accel_B[2]
         + sum(sensors.q_arm)
         + sum(sensors.qd_arm)
     )
@@ -38,4 +39,5 @@ def estimate_state(sensors: SensorFrame) -> StateEstimate | None:
         yaw_of(R),
         sensors.q_arm,
         sensors.qd_arm,
+        -sensors.accel_B[2],
     )

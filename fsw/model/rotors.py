@@ -20,6 +20,9 @@ from dataclasses import dataclass
 from fsw.model.airframe import GRAVITY, Airframe
 from fsw.signals import StateEstimate, Vec2, Vec3, Vec4
 
+_WEIGHING_TIME = 1.0  # s
+_WEIGHING_THRUST = 5.0  # m/s^2
+
 
 @dataclass(frozen=True, slots=True)
 class MotionState:
@@ -46,13 +49,36 @@ def rotor_decay(airframe: Airframe, dt: float) -> float:
     return math.exp(-dt / airframe.rotor_lag)
 
 
+def weigh(
+    airframe: Airframe, mass: float, rotors: Vec4, specific_force: float, seconds: float
+) -> float:
+    """The vehicle's mass [kg], from what the accelerometer makes of the rotors' thrust.
+
+    The tracking loop is quick, and its gain is thrust over mass: 20 % less mass than believed
+    makes it diverge. A second of averaging keeps gusts and arm motion out.
+
+    Args:
+        airframe: Believed mass; the estimate stays within 30 % of it.
+        mass: Estimate of the last tick [kg].
+        rotors: Thrust of each rotor now [N].
+        specific_force: Accelerometer along -z of the body [m/s^2].
+        seconds: Since the last tick.
+    """
+    thrust = sum(rotors)
+    if not (thrust > _WEIGHING_THRUST * airframe.mass and specific_force > _WEIGHING_THRUST):
+        return mass  # hardly flying: a quotient of small numbers
+    moved = mass + seconds / _WEIGHING_TIME * (thrust / specific_force - mass)
+    return min(max(moved, 0.7 * airframe.mass), 1.3 * airframe.mass)
+
+
 def motion_state(
-    airframe: Airframe, estimate: StateEstimate, rotors: Vec4, joint1_torque: float
+    airframe: Airframe, mass: float, estimate: StateEstimate, rotors: Vec4, joint1_torque: float
 ) -> MotionState:
     """Acceleration, jerk and snap of the body origin from the rotor model.
 
     Args:
-        airframe: Mass, inertia and rotor arm.
+        airframe: Inertia and rotor arm.
+        mass: Of the whole vehicle, as weighed in flight [kg].
         estimate: Attitude and body rates.
         rotors: Thrust of each rotor now [N].
         joint1_torque: Torque on link 1 about +y of the body [N m]; the base feels minus it.
@@ -61,7 +87,7 @@ def motion_state(
     wx, wy, _ = estimate.w_WB_B
     f1, f2, f3, f4 = rotors
     thrust = f1 + f2 + f3 + f4
-    f = thrust / airframe.mass
+    f = thrust / mass
     wdx = airframe.rotor_arm * (f2 - f4) / airframe.inertia[0]
     wdy = (airframe.rotor_arm * (f3 - f1) - joint1_torque) / airframe.inertia[1]
     return MotionState(

@@ -188,7 +188,7 @@ class FlightLoop:
         elif state.vehicle.armed:
             idle = self.config.limits.idle_thrust
             wanted = ActuatorCommand((idle, idle, idle, idle), (0.0, 0.0))
-            memory = at_rest(estimate)
+            memory = at_rest(self.config.airframe, estimate)
         sent, replaced = gate(
             self.config.airframe, wanted, state.cascade.commanded, state.vehicle.armed
         )

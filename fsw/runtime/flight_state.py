@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 from fsw.control.cascade import NO_ACTION, CascadeMemory
 from fsw.control.tracking import Observed
+from fsw.model.airframe import AIRFRAME
 from fsw.signals import (
     ConstraintReport,
     EndEffectorTarget,
@@ -82,7 +83,7 @@ class FlightState:
     output_replaced: bool = False
     cascade: CascadeMemory = field(
         default_factory=lambda: CascadeMemory(
-            NO_ACTION.rotor_thrust, NO_ACTION, Observed(_NOWHERE, _NOWHERE)
+            NO_ACTION.rotor_thrust, NO_ACTION, Observed(_NOWHERE, _NOWHERE), AIRFRAME.mass
         )
     )
 

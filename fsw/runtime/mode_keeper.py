@@ -164,7 +164,7 @@ class ModeKeeper:
         cascade = state.cascade
         if event is Event.ARM:
             airframe = self._config.airframe
-            cascade = at_rest(estimate) if landed else in_hover(airframe, estimate)
+            cascade = at_rest(airframe, estimate) if landed else in_hover(airframe, estimate)
         plan = PlanMemory(
             since_us=estimate.t_us, next_id=state.plan.next_id, counters=state.plan.counters
         )

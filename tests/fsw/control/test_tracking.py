@@ -65,7 +65,7 @@ def test_without_error_the_plans_own_snap_is_flown(yaw: float, tilt: float) -> N
     plan = replace(PLAN, a=(0.5, -0.8, 0.2), j=(1.0, -2.0), s=(10.0, 20.0))
     u = PlanInput((1.0, -1.0, 0.3), 0.0, (0.0, 0.0))
     estimate, motion = on_plan(rotation, plan)
-    wd, thrust = follow_plan(LAW, estimate, motion, calm(estimate), plan, u)
+    wd, thrust = follow_plan(LAW, AIRFRAME.mass, estimate, motion, calm(estimate), plan, u)
     expected = [LAG.kp * (u.a[k] - plan.a[k]) - LAG.kd * plan.j[k] for k in (0, 1)]
     np.testing.assert_allclose(snap_of(estimate, wd), expected, atol=1e-9)
     upright = estimate.R_WB[8]
@@ -90,7 +90,7 @@ def test_the_vehicle_is_snapped_towards_the_plan(yaw: float, axis: int, quantity
         0.0,
         (0.0, 0.0),
     )
-    wd, _ = follow_plan(LAW, estimate, motion, calm(estimate), ahead, u)
+    wd, _ = follow_plan(LAW, AIRFRAME.mass, estimate, motion, calm(estimate), ahead, u)
     snap = snap_of(estimate, wd)
     assert snap[axis] > 1.0
     assert abs(snap[1 - axis]) < 1e-9
@@ -99,7 +99,13 @@ def test_the_vehicle_is_snapped_towards_the_plan(yaw: float, axis: int, quantity
 def test_a_disturbance_is_leaned_against() -> None:
     estimate, motion = on_plan(Rotation.identity(), PLAN)
     wd, _ = follow_plan(
-        LAW, estimate, motion, Observed(estimate.v_WB, (0.5, 0.0, 0.0)), PLAN, REST_INPUT
+        LAW,
+        AIRFRAME.mass,
+        estimate,
+        motion,
+        Observed(estimate.v_WB, (0.5, 0.0, 0.0)),
+        PLAN,
+        REST_INPUT,
     )
     assert snap_of(estimate, wd)[0] < -1.0
     assert wd[1] > 0.0  # nose up: thrust leans back
@@ -114,7 +120,9 @@ def test_height_errors_change_thrust_the_right_way(sign: float) -> None:
         replace(PLAN, v=(0.0, 0.0, sign * 0.1)),
         replace(PLAN, a=(0.0, 0.0, sign * 0.5)),
     ):
-        _, thrust = follow_plan(LAW, estimate, motion, calm(estimate), plan, REST_INPUT)
+        _, thrust = follow_plan(
+            LAW, AIRFRAME.mass, estimate, motion, calm(estimate), plan, REST_INPUT
+        )
         assert sign * (thrust - WEIGHT) < -0.5
 
 

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from fsw.model.airframe import AIRFRAME, GRAVITY
 from fsw.model.prediction import Array
-from fsw.model.rotors import lag_rotors, motion_state, rotor_decay
+from fsw.model.rotors import lag_rotors, motion_state, rotor_decay, weigh
 from fsw.signals import Vec3, Vec4
 from tests.fsw.random_states import estimate_of, vec3
 
@@ -61,7 +61,7 @@ def test_acceleration_and_jerk_are_those_of_the_simulated_motion() -> None:
         angles = random.uniform([-math.pi, -0.8, -0.8], [math.pi, 0.8, 0.8])
         rotation = Rotation.from_euler("ZYX", angles)
         w, rotors = random.uniform(-2.0, 2.0, 3), random_rotors(random)
-        motion = motion_state(AIRFRAME, estimate_of(rotation, vec3(w)), rotors, 0.1)
+        motion = motion_state(AIRFRAME, AIRFRAME.mass, estimate_of(rotation, vec3(w)), rotors, 0.1)
         now = acceleration_at(0.0, rotation, w, rotors, 0.1)
         after = acceleration_at(MOMENT, rotation, w, rotors, 0.1)
         before = acceleration_at(-MOMENT, rotation, w, rotors, 0.1)
@@ -76,7 +76,7 @@ def test_snap_is_that_of_a_motion_that_starts_from_rest() -> None:
         angles = random.uniform([-math.pi, -0.8, -0.8], [math.pi, 0.8, 0.8])
         rotation = Rotation.from_euler("ZYX", angles)
         rotors, joint1 = random_rotors(random), float(random.uniform(-1.0, 1.0))
-        motion = motion_state(AIRFRAME, estimate_of(rotation), rotors, joint1)
+        motion = motion_state(AIRFRAME, AIRFRAME.mass, estimate_of(rotation), rotors, joint1)
         still = np.zeros(3)
         before, now, after = (
             acceleration_at(t, rotation, still, rotors, joint1) for t in (-MOMENT, 0.0, MOMENT)
@@ -91,13 +91,15 @@ def test_snap_is_that_of_a_motion_that_starts_from_rest() -> None:
     ids=["front lifts more: brakes", "rear lifts more: speeds up"],
 )
 def test_thrust_difference_along_the_body_decides_forward_snap(rotors: Vec4, sign: float) -> None:
-    motion = motion_state(AIRFRAME, estimate_of(Rotation.identity()), rotors, 0.0)
+    motion = motion_state(AIRFRAME, AIRFRAME.mass, estimate_of(Rotation.identity()), rotors, 0.0)
     assert sign * motion.s[0] > 1.0
     assert motion.s[1] == pytest.approx(0.0)
 
 
 def test_more_thrust_on_the_left_accelerates_to_the_right() -> None:
-    motion = motion_state(AIRFRAME, estimate_of(Rotation.identity()), (8.5, 8.5, 8.5, 8.0), 0.0)
+    motion = motion_state(
+        AIRFRAME, AIRFRAME.mass, estimate_of(Rotation.identity()), (8.5, 8.5, 8.5, 8.0), 0.0
+    )
     assert motion.s[1] > 1.0
 
 
@@ -105,7 +107,7 @@ def test_level_hover_has_no_acceleration() -> None:
     each = AIRFRAME.mass * GRAVITY / 4.0
     level = estimate_of(Rotation.from_euler("Z", 2.0))
     still: Vec3 = (0.0, 0.0, 0.0)
-    assert motion_state(AIRFRAME, level, (each,) * 4, 0.0).a == pytest.approx(still)
+    assert motion_state(AIRFRAME, AIRFRAME.mass, level, (each,) * 4, 0.0).a == pytest.approx(still)
 
 
 def test_rotors_close_63_percent_of_a_step_in_one_time_constant() -> None:
@@ -117,3 +119,23 @@ def test_rotors_close_63_percent_of_a_step_in_one_time_constant() -> None:
     assert thrust == pytest.approx(
         (10.0 * share, 10.0 * (1 - share), 2.0 + 2.0 * share, 5.0 + share)
     )
+
+
+@pytest.mark.parametrize("true_mass", [2.8, 3.5, 4.2])
+def test_the_vehicle_is_weighed_within_seconds(true_mass: float) -> None:
+    mass, rotors = AIRFRAME.mass, (9.0, 8.0, 8.5, 8.0)
+    for _ in range(2500):
+        mass = weigh(AIRFRAME, mass, rotors, sum(rotors) / true_mass, 0.002)
+    assert mass == pytest.approx(true_mass, rel=0.01)
+
+
+@pytest.mark.parametrize("specific_force", [0.0, -9.81, math.nan, 1e-3])
+def test_what_is_no_flight_is_not_weighed(specific_force: float) -> None:
+    assert weigh(AIRFRAME, 3.3, (8.0,) * 4, specific_force, 0.002) == 3.3
+
+
+def test_the_scales_stay_near_what_is_believed() -> None:
+    mass = AIRFRAME.mass
+    for _ in range(5000):
+        mass = weigh(AIRFRAME, mass, (10.0,) * 4, 100.0, 0.002)
+    assert mass == pytest.approx(0.7 * AIRFRAME.mass)

@@ -141,7 +141,7 @@ def test_measured_yaw_rate_is_that_of_the_zyx_angles() -> None:
     random, moment = np.random.default_rng(1), 1e-6
     for _ in range(20):
         estimate = random_estimate(random, tilt=0.8)
-        motion = motion_state(AIRFRAME, estimate, (8.0, 8.0, 8.0, 8.0), 0.0)
+        motion = motion_state(AIRFRAME, AIRFRAME.mass, estimate, (8.0, 8.0, 8.0, 8.0), 0.0)
         R_WB = Rotation.from_matrix(np.reshape(estimate.R_WB, (3, 3)))
         turn = Rotation.from_rotvec(moment * np.array(estimate.w_WB_B))
         change = (R_WB * turn).as_euler("ZYX")[0] - (R_WB * turn.inv()).as_euler("ZYX")[0]
@@ -154,7 +154,7 @@ def test_measured_state_is_the_vehicle() -> None:
     estimate = estimate_of(
         Rotation.from_euler("Z", 1.0), STILL, (1.0, 2.0, 3.0), (0.1, 0.2, 0.3), (0.4, 0.5)
     )
-    motion = motion_state(AIRFRAME, estimate, (9.0, 8.0, 8.0, 8.0), 0.0)
+    motion = motion_state(AIRFRAME, AIRFRAME.mass, estimate, (9.0, 8.0, 8.0, 8.0), 0.0)
     state = measured_state(estimate, motion)
     assert (state.p, state.v, state.q_arm) == (estimate.p_WB, estimate.v_WB, estimate.q_arm)
     assert (state.a, state.j, state.s) == (motion.a, motion.j, motion.s)
