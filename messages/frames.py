@@ -110,7 +110,12 @@ class FrameWriter:
 
 
 def split(datagram: bytes, losses: Losses | None = None) -> Iterator[Frame]:
-    """Yield the valid frames of one datagram, in order.
+    """Yield the valid frames of one datagram, in order; see ``cut``."""
+    return (frame for frame, _ in cut(datagram, losses))
+
+
+def cut(datagram: bytes, losses: Losses | None = None) -> Iterator[tuple[Frame, bytes]]:
+    """Yield the valid frames of one datagram, in order, each with its own bytes.
 
     Nothing is kept between datagrams, so a truncated one cannot swallow the next. Whatever is not
     a whole frame of a known message with the right checksum is skipped without an exception: the
@@ -129,7 +134,7 @@ def split(datagram: bytes, losses: Losses | None = None) -> Iterator[Frame]:
             refused += 1
             at = datagram.find(_MAGIC, at + 1)
         else:
-            yield frame
+            yield frame, datagram[at : at + size]
             delivered_bytes += size
             at = datagram.find(_MAGIC, at + size)
     if losses is not None:

@@ -56,6 +56,8 @@ def options(arguments: argparse.Namespace) -> FlyOptions:
     """
     scenario = load_scenario(arguments.scenario)
     parse_address(arguments.gcs)
+    if arguments.json not in (None, "-") and Path(arguments.json).is_dir():
+        raise IsADirectoryError(f"cannot write {arguments.json}: it is a directory")
     if arguments.json not in (None, "-") and not Path(arguments.json).parent.is_dir():
         raise NotADirectoryError(f"cannot write {arguments.json}: its directory does not exist")
     if arguments.realtime and arguments.speed not in (None, 1.0):

@@ -124,7 +124,7 @@ def obstacle_wall(values: Numbers) -> IndexedWall | None:
     if not _all_finite(numbers) or not index < count:
         return None
     # f32 rounding leaves a unit normal within 1e-6; anything further off is another vector.
-    if not abs(math.hypot(*values[0:3]) - 1.0) < 1e-3:
+    if not abs(math.hypot(*values[0:3]) - 1.0) < 1e-3 or not values[4] >= 0.0:
         return None
     wall = Wall(normal=cast(Vec3, values[0:3]), offset=values[3], clearance=values[4])
     return IndexedWall(wall, index, count)

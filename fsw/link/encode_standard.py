@@ -24,7 +24,7 @@ _ARMED: Final = 128  # MAV_MODE_FLAG
 _GUIDED: Final = 8
 _STABILISED: Final = 16
 _CUSTOM_MODE: Final = 1
-_STANDBY, _ACTIVE, _CRITICAL = 3, 4, 5  # MAV_STATE
+_STANDBY, _ACTIVE, _CRITICAL, _TERMINATED = 3, 4, 5, 8  # MAV_STATE
 _MAVLINK_VERSION: Final = 3
 _LOCAL_NED: Final = 1  # MAV_FRAME
 _ON_GROUND, _IN_AIR, _TAKEOFF, _LANDING = 1, 2, 3, 4  # MAV_LANDED_STATE
@@ -53,7 +53,12 @@ _SUSPECT: Final[dict[str, int]] = {
 def heartbeat(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues:
     """HEARTBEAT as PX4 would send it."""
     base_mode = _CUSTOM_MODE | _STABILISED | _GUIDED | (_ARMED if snapshot.armed else 0)
-    status = _CRITICAL if snapshot.failures else (_ACTIVE if snapshot.armed else _STANDBY)
+    if snapshot.mode is Mode.FAULT:
+        status = _TERMINATED
+    elif snapshot.failures:
+        status = _CRITICAL
+    else:
+        status = _ACTIVE if snapshot.armed else _STANDBY
     return (
         custom_mode(snapshot.mode),
         _QUADROTOR,

@@ -18,7 +18,7 @@ from fsw.link.streams import HEARTBEAT, STREAMS, Stream, schedule
 from fsw.link.telemetry import TelemetryContext
 from fsw.link.udp_endpoint import Address, OpenEndpoint
 from fsw.signals import CommandAck, FlightSnapshot, Mode, StatusText, TickOutputs
-from messages.frames import Frame, FrameWriter, Losses, split
+from messages.frames import FrameWriter, Losses, cut
 
 RecordFrame = Callable[[int, bytes], None]
 """Takes the sensor time [us] and one frame, for the log."""
@@ -26,9 +26,6 @@ RecordFrame = Callable[[int, bytes], None]
 _POLL_TICKS: Final = 5  # 100 Hz: a system call a tick would be spent on silence
 _POLL_BYTES: Final = 4096  # a poll; a flood waits in the kernel, and is dropped there
 _MAX_DATAGRAM_OUT: Final = 1400  # bytes
-_ORIGIN_OFFSET: Final = 4  # bytes of a frame before sequence, system and component
-_FRAME_OVERHEAD: Final = 12  # header and checksum
-_SIGNATURE_SIZE: Final = 13
 
 
 class GcsLink:
@@ -105,10 +102,7 @@ class GcsLink:
         self._endpoint.close()
 
     def _read(self, t_us: int, datagram: bytes, sender: Address) -> None:
-        start = 0
-        for frame in split(datagram, self.losses):
-            raw = _raw(datagram, start, frame)
-            start += len(raw)
+        for frame, raw in cut(datagram, self.losses):
             if frame.system_id == SYSTEM_ID and frame.component_id in self._writers:
                 continue  # our own telemetry, sent back by a router
             self._record(t_us, raw)
@@ -146,18 +140,3 @@ def _packed(frames: list[bytes]) -> list[bytes]:
             datagrams.append(b"")
         datagrams[-1] += frame
     return datagrams
-
-
-def _raw(datagram: bytes, start: int, frame: Frame) -> bytes:
-    """Return the bytes of a frame that :func:`split` delivered from a datagram.
-
-    Args:
-        datagram: Where it came from; may hold garbage between frames.
-        start: End of the frame before it.
-        frame: What was delivered.
-    """
-    origin = bytes((frame.sequence, frame.system_id, frame.component_id))
-    header = origin + frame.message_id.to_bytes(3, "little")
-    at = datagram.index(header, start + _ORIGIN_OFFSET) - _ORIGIN_OFFSET
-    signed = datagram[at + 2] & 1
-    return datagram[at : at + _FRAME_OVERHEAD + datagram[at + 1] + _SIGNATURE_SIZE * signed]

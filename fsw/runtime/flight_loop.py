@@ -192,6 +192,9 @@ class FlightLoop:
         sent, replaced = gate(
             self.config.airframe, wanted, state.cascade.commanded, state.vehicle.armed
         )
+        if replaced:
+            # What made the wish no number is in the loops' new memory too: forget it.
+            memory = state.cascade
         return sent, memory.after_sending(sent), replaced
 
     def _constraints(

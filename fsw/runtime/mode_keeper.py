@@ -57,6 +57,7 @@ class ModeKeeper:
     ) -> tuple[FlightState, list[CommandAck]]:
         """Carry out commands in the order they came."""
         acks = []
+        limits = self._config.limits
         for request in requests:
             stream = state.mission.stream
             ahead = bool(stream) and stream[-1].t_us >= estimate.t_us
@@ -67,6 +68,8 @@ class ModeKeeper:
                 targets_ahead=ahead,
                 standing_unclear=self._standing_unclear(estimate),
                 inconsistent="; ".join(state.mission.refusals),
+                height=-estimate.p_WB[2],
+                climb_range=(limits.airborne_height, limits.takeoff_climb_most),
             )
             ack, decision = answer(request, situation, texts)
             acks.append(ack)
@@ -82,6 +85,8 @@ class ModeKeeper:
     ) -> FlightState:
         """Name what is wrong, say it once, and terminate where the table says so."""
         vehicle, plan = state.vehicle, state.plan
+        if vehicle.mode is Mode.FAULT:
+            return state  # what ended the flight stays on show
         faults = detect(
             Evidence(
                 vehicle.armed,
@@ -193,10 +198,9 @@ class ModeKeeper:
 
     def _climb(self, height: float, estimate: StateEstimate) -> float:
         """From here to the height a takeoff asks for [m]; the usual climb where it names none."""
-        usual = self._config.limits.takeoff_climb
         if not math.isfinite(height):
-            return usual
-        return min(max(height + estimate.p_WB[2], 0.0), self._config.limits.takeoff_climb_most)
+            return self._config.limits.takeoff_climb
+        return height + estimate.p_WB[2]
 
     def _standing_unclear(self, estimate: StateEstimate) -> bool:
         limits, above = self._config.limits, self._height_above_standing(estimate)

@@ -8,7 +8,7 @@ lockstep is the same on every machine.
 from __future__ import annotations
 
 import threading
-from collections import Counter
+from collections import Counter, deque
 from dataclasses import dataclass, field
 
 from fsw.ports import Clock, Planner
@@ -71,23 +71,27 @@ class ThreadedPlanner:
         self._clock = clock
         self._record = record
         self._wanted = threading.Event()
-        self._request: PlanRequest | None = None
-        self._answer: _Answer | None = None
+        # Appending and popping a deque is atomic; the newest replaces what nobody took.
+        self._requests: deque[PlanRequest] = deque(maxlen=1)
+        self._answers: deque[_Answer] = deque(maxlen=1)
         self._closing = False
         self._thread = threading.Thread(target=self._work, name="planner", daemon=True)
         self._thread.start()
 
     def submit(self, request: PlanRequest) -> None:
         """Leave a request for the thread; never waits."""
-        self._request = request
+        self._requests.append(request)
         self._wanted.set()
 
     def take(self, t_us: int) -> Plan | PlanFailure | None:
         """Hand out the newest answer that is there and due."""
-        answer = self._answer
-        if answer is None or t_us < answer.t_apply_us:
+        try:
+            if t_us < self._answers[0].t_apply_us:
+                return None
+            # Only this thread takes: what replaced the answer just looked at is newer.
+            answer = self._answers.pop()
+        except IndexError:
             return None
-        self._answer = None
         return _counted(answer, self._record)
 
     def close(self) -> None:
@@ -98,15 +102,16 @@ class ThreadedPlanner:
 
     def _work(self) -> None:
         claim_real_time(PLANNER_PRIORITY)
-        # Single reads and writes of an attribute are atomic; one thread takes, one puts.
         while True:
             self._wanted.wait()
             self._wanted.clear()
             if self._closing:
                 return
-            request, self._request = self._request, None
-            if request is not None:
-                self._answer = _plan(self._planner, self._clock, request)
+            try:
+                request = self._requests.pop()
+            except IndexError:
+                continue
+            self._answers.append(_plan(self._planner, self._clock, request))
 
 
 def _plan(planner: Planner, clock: Clock, request: PlanRequest) -> _Answer:

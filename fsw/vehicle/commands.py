@@ -12,7 +12,6 @@ from fsw.vehicle.modes import Event, next_mode
 CMD_NAV_LAND = 21
 CMD_NAV_TAKEOFF = 22
 CMD_DO_SET_MODE = 176
-CMD_SHUTDOWN = 246
 CMD_ARM_DISARM = 400
 
 ACCEPTED, TEMPORARILY_REJECTED, DENIED, UNSUPPORTED = 0, 1, 2, 3
@@ -37,6 +36,8 @@ class Situation:
     targets_ahead: bool  # the stream holds a point at or after now
     standing_unclear: bool = False  # too high to stand, too low to be surely in the air
     inconsistent: str = ""  # why the configuration cannot keep the safe set
+    height: float = 0.0  # m, above the origin
+    climb_range: tuple[float, float] = (0.3, 10.0)  # m, of a takeoff
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,9 +54,10 @@ def decide(request: CommandRequest, situation: Situation) -> Decision:
     event = _requested_event(request)
     if isinstance(event, Decision):
         return event
-    if event is Event.ARM and situation.inconsistent:
+    if event in (Event.ARM, Event.FOLLOW) and situation.inconsistent:
         # Waiting does not help: nothing but another configuration does.
-        return Decision(DENIED, reason=f"not armed: {situation.inconsistent}")
+        what = "not armed" if event is Event.ARM else "no trajectory"
+        return Decision(DENIED, reason=f"{what}: {situation.inconsistent}")
     refusal = _refusal(event, request, situation)
     if refusal is not None:
         return Decision(TEMPORARILY_REJECTED, reason=refusal)
@@ -86,8 +88,6 @@ def _requested_event(request: CommandRequest) -> Event | Decision:
         if mode is not None:
             return mode
         return Decision(DENIED, reason=f"mode {main:g}/{sub:g} is not one of this vehicle")
-    if request.command == CMD_SHUTDOWN:
-        return Decision(ACCEPTED)  # the process ends after answering; no mode changes
     return Decision(UNSUPPORTED, reason=f"command {request.command} is not supported")
 
 
@@ -100,8 +100,8 @@ def _refusal(event: Event, request: CommandRequest, situation: Situation) -> str
     flying = not situation.landed and situation.mode not in (Mode.DISARMED, Mode.FAULT)
     if event is Event.DISARM and flying and not forced:
         return "not disarmed: the vehicle is in the air; land first or force"
-    if event is Event.TAKE_OFF and not situation.landed:
-        return "no takeoff: the vehicle is in the air already"
+    if event is Event.TAKE_OFF:
+        return _takeoff_refusal(request.params[6], situation)
     if event is Event.FOLLOW:
         if situation.landed:
             return "no trajectory: the vehicle is on the ground; take off first"
@@ -110,10 +110,22 @@ def _refusal(event: Event, request: CommandRequest, situation: Situation) -> str
     return None
 
 
+def _takeoff_refusal(height: float, situation: Situation) -> str | None:
+    if situation.mode is Mode.DISARMED:
+        return "no takeoff: the vehicle is not armed"
+    if not situation.landed:
+        return "no takeoff: the vehicle is in the air already"
+    least, most = situation.climb_range
+    if math.isfinite(height) and not (least <= height - situation.height <= most):
+        low, high = situation.height + least, situation.height + most
+        return f"no takeoff: height {height:g} m is outside {low:.1f} to {high:.1f} m"
+    return None
+
+
 def _already_there(event: Event, mode: Mode) -> bool:
     return {
         Event.ARM: mode not in (Mode.DISARMED, Mode.FAULT),
-        Event.DISARM: mode is Mode.DISARMED,
+        Event.DISARM: mode in (Mode.DISARMED, Mode.FAULT),
         Event.TAKE_OFF: mode is Mode.TAKEOFF,
         Event.HOLD: mode is Mode.HOLD,
         Event.FOLLOW: mode is Mode.TRAJECTORY,

@@ -12,6 +12,7 @@ from sitl.link.udp_endpoint import RESEND_S, UdpEndpoint
 from sitl.simulation import Controls
 
 STALL_S: Final = 2.0
+_SILENT_S: Final = 0.1  # real time: older controls are not held, the rotors stop
 _FIRST_PLAN_S: Final = 0.05  # between the first answer and the start of the clock
 
 _OFF: Final = Controls((0.0, 0.0, 0.0, 0.0), (0.0, 0.0), armed=False)
@@ -133,7 +134,9 @@ class RealTime:
         if answers:
             self._heard_s = time.perf_counter()
             self._held = max(answers, key=lambda answer: answer.t_us).controls
-        elif time.perf_counter() - self._heard_s > STALL_S:
+        elif time.perf_counter() - self._heard_s > _SILENT_S:
+            self._held = _OFF
+        if time.perf_counter() - self._heard_s > STALL_S:
             raise SimulatorError(
                 f"the flight software sent nothing for {STALL_S:g} s before step {number}"
             )

@@ -34,6 +34,7 @@ _ROUND_US: Final = 1_000_000  # the safe set is announced again: a datagram may 
 _PATIENCE_US: Final = 10_000_000  # of asking for the same thing
 _HOVER_SPEED_M_S: Final = 0.1
 _CLIMB_M: Final = 0.4  # at least, before a hop counts as flying
+_LANDED_M: Final = 0.05  # above where it took off
 _HOVER_US: Final = 3_000_000
 _NAN: Final = math.nan
 
@@ -127,7 +128,7 @@ def listen(plan: FlightPlan, state: PilotState, heard: Heard, t_us: int) -> Pilo
             state = _acknowledged(plan, state, ack.result, heard, t_us)
     if state.phase is Phase.HOVER:
         return _hover(state, heard, t_us)
-    if state.phase is Phase.DISARM and not heard.armed:
+    if state.phase is Phase.DISARM and not heard.armed and _stands(state, heard):
         return replace(state, phase=Phase.DONE)
     return state
 
@@ -180,6 +181,12 @@ def _acknowledged(
         return state
     reason = f": {state.last_text}" if state.last_text else f" (MAV_RESULT {result})"
     return replace(state, refusal=f"the vehicle refused to {state.phase.value}{reason}")
+
+
+def _stands(state: PilotState, heard: Heard) -> bool:
+    """Back where it took off from; a vehicle that disarms in the air is judged as it lands."""
+    low = heard.height_m - state.start_height_m < _LANDED_M
+    return low and heard.speed_m_s < _HOVER_SPEED_M_S
 
 
 def _hover(state: PilotState, heard: Heard, t_us: int) -> PilotState:

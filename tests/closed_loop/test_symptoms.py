@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fsw.signals import ConstraintKind, SensorFrame
+from fsw.signals import ConstraintKind, Mode, SensorFrame
 from sitl.scenario_file import load_scenario
 from tests.closed_loop.harness import ARM, LAND, Flight, command, hover, on_the_ground
 
@@ -69,3 +69,29 @@ def test_left_alone_the_vehicle_keeps_its_heading(yaw_deg: float) -> None:
     flight.run(4.0)
     turned = np.degrees(flight.snapshot.estimate.yaw) - yaw_deg
     assert abs((turned + 180.0) % 360.0 - 180.0) < 2.0
+
+
+def test_one_tick_of_nonsense_does_not_leave_the_vehicle_in_open_loop() -> None:
+    flight = Flight(hover())
+    flight.step(command(ARM, 1.0))
+    flight.run(0.5)
+    nominal = flight.state.nominal
+    assert nominal is not None
+    flight.state = replace(flight.state, nominal=replace(nominal, q_arm=(math.nan, 0.0)))
+    flight.step()
+    assert flight.state.output_replaced
+    flight.run(0.5)
+    assert not flight.state.output_replaced
+    assert flight.snapshot.failures == ()
+
+
+def test_what_ended_the_flight_stays_on_show() -> None:
+    def blinded(frame: SensorFrame) -> SensorFrame:
+        late = frame.t_us >= 1_400_000
+        return replace(frame, p_WB=(math.nan, 0.0, 0.0)) if late else frame
+
+    flight = Flight(hover(), spoil=blinded)
+    flight.step(command(ARM, 1.0))
+    flight.run(0.6)
+    assert flight.mode is Mode.FAULT
+    assert flight.snapshot.failures

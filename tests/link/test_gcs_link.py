@@ -180,3 +180,10 @@ def test_both_directions_are_recorded_frame_by_frame(ground: Ground) -> None:
     first, second = (writer.frame(ids.HEARTBEAT, *HEARTBEAT) for _ in range(2))
     ground.polled(b"junk" + first + b"\xfd\xfd" + second)
     assert [frame for _, frame in ground.recorded] == [first, second]
+
+
+def test_garbage_that_looks_like_the_next_header_does_not_end_the_flight(ground: Ground) -> None:
+    writer = FrameWriter(255, 190)
+    first, second = (writer.frame(ids.HEARTBEAT, *HEARTBEAT) for _ in range(2))
+    ground.polled(b"\x00\xff\x00\x00" + first[4:10] + first + second)
+    assert [frame for _, frame in ground.recorded] == [first, second]

@@ -180,3 +180,15 @@ def test_walls_are_announced_again_every_second_for_a_datagram_may_be_lost() -> 
     flight.fly(2.0)
     times = [t_us for t_us, _ in flight.said]
     assert times == [1_000_000] * len(WALLS) + [2_000_000] * len(WALLS)
+
+
+def test_a_hop_that_disarms_in_the_air_is_not_done() -> None:
+    flight = Flight(plan("hop"), {ARM: 0, TAKE_OFF: 0, LAND: 0})
+    flight.heard = Heard(armed=True, height_m=0.3, speed_m_s=0.0)
+    flight.fly(1.0)
+    flight.heard = Heard(armed=True, height_m=1.5, speed_m_s=0.01)
+    flight.fly(4.0)
+    assert flight.commands()[-1][1] == LAND
+    flight.heard = Heard(armed=False, height_m=1.2, speed_m_s=2.0)
+    flight.fly(0.1)
+    assert not flight.state.done

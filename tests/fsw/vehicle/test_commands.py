@@ -64,7 +64,7 @@ def test_a_command_in_order_causes_its_event_whatever_unused_parameters_hold(
         (replace(STANDING, mode=Mode.FAULT), ARM, (1.0,), "fault"),
         (HOLDING, ARM, (0.0,), "air"),
         (HOLDING, TAKEOFF, (), "air"),
-        (STANDING, TAKEOFF, (), "disarmed"),
+        (STANDING, TAKEOFF, (), "not armed"),
         (STANDING, LAND, (), "disarmed"),
         (IDLING, SET_MODE, (1.0, 6.0, 0.0), "ground"),
         (replace(HOLDING, targets_ahead=False), SET_MODE, (1.0, 6.0, 0.0), "END_EFFECTOR_TARGET"),
@@ -123,8 +123,32 @@ def test_asking_again_for_what_is_so_is_accepted_and_changes_nothing(
     assert ask(situation, command, *params) == Decision(ACCEPTED)
 
 
-def test_shutdown_is_accepted_without_an_event() -> None:
-    assert ask(STANDING, SHUTDOWN, 2.0) == Decision(ACCEPTED)
+def test_shutdown_belongs_to_the_simulator_s_link_alone() -> None:
+    assert ask(STANDING, SHUTDOWN, 2.0).result == UNSUPPORTED
+
+
+@pytest.mark.parametrize(
+    ("height", "accepted"),
+    [(1.5, True), (math.nan, True), *[(height, False) for height in (0.3, 0.0, -1.5, 50.0)]],
+)
+def test_a_takeoff_goes_to_a_height_above_where_the_vehicle_stands(
+    height: float, accepted: bool
+) -> None:
+    standing = replace(STANDING, mode=Mode.HOLD, height=0.32)
+    decision = ask(standing, TAKEOFF, *[math.nan] * 6, height)
+    assert (decision.event is Event.TAKE_OFF) is accepted
+    assert accepted or "height" in decision.reason
+
+
+def test_an_inconsistent_safe_set_forbids_arming_and_following() -> None:
+    for situation, command in ((STANDING, (ARM, 1.0)), (HOLDING, (SET_MODE, 1.0, 6.0, 0.0))):
+        decision = ask(replace(situation, inconsistent="the sphere is too small"), *command)
+        assert decision.result == DENIED
+        assert "too small" in decision.reason
+
+
+def test_a_terminated_vehicle_is_disarmed_already() -> None:
+    assert ask(replace(HOLDING, mode=Mode.FAULT), ARM, 0.0) == Decision(ACCEPTED)
 
 
 situations = st.builds(
