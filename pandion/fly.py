@@ -28,7 +28,7 @@ def main(argv: list[str]) -> int:
     add_arguments(parser)
     try:
         options = fly_options(parser.read(argv))
-    except (ScenarioError, LinkError, OSError) as error:
+    except (ValueError, ScenarioError, LinkError, OSError) as error:
         print(f"pandion fly: {error}", file=sys.stderr)
         return COULD_NOT_START
     display = Display(sys.stderr if options.json == "-" else sys.stdout)

@@ -9,7 +9,7 @@ from pathlib import Path
 from fsw.arguments import add_control_arguments, control_choice
 from fsw.link.udp_endpoint import parse_address
 from fsw.log.run_directory import new_run_directory
-from fsw.parameters.control_choice import ControlChoice
+from fsw.parameters.control_choice import ControlChoice, check
 from sitl.arguments import add_run_arguments
 from sitl.scenario_file import ScenarioError, load_scenario
 
@@ -50,10 +50,13 @@ def options(arguments: argparse.Namespace) -> FlyOptions:
     """Check everything that can be checked before a process is started.
 
     Raises:
+        ValueError: There is no such controller, inner loop, lambda or solver.
         ScenarioError: There is no such scenario.
         LinkError: The ground station's address is not one.
         OSError: The directory for the logs cannot be made.
     """
+    control = control_choice(arguments)
+    check(control)
     scenario = load_scenario(arguments.scenario)
     parse_address(arguments.gcs)
     if arguments.json not in (None, "-") and Path(arguments.json).is_dir():
@@ -69,7 +72,7 @@ def options(arguments: argparse.Namespace) -> FlyOptions:
         duration_s=scenario.duration_s if arguments.duration is None else arguments.duration,
         realtime=arguments.realtime,
         speed=arguments.speed,
-        control=control_choice(arguments),
+        control=control,
         gcs=arguments.gcs,
         out=_directory(arguments.out, f"{scenario.name}-seed{arguments.seed}"),
         json=arguments.json,

@@ -24,3 +24,24 @@ class ControlChoice:
             f"--solver={self.solver}",
         )
         return [*named, *(["--soft"] if self.soft else [])]
+
+
+# What can be chosen, by the name of the choice; a test holds it against what can be built.
+KNOWN: dict[str, tuple[str, ...]] = {
+    "controller": ("blf", "hc", "sc", "naive"),
+    "inner": ("tracking", "pid"),
+    "robustness": ("consistent", "paper-1", "paper-5"),
+    "solver": ("clarabel", "slsqp"),
+}
+
+
+def check(choice: ControlChoice) -> None:
+    """Refuse an unknown name before anything is started.
+
+    Raises:
+        ValueError: naming it and the known ones.
+    """
+    for what, known in KNOWN.items():
+        name = getattr(choice, what)
+        if name not in known:
+            raise ValueError(f"unknown {what} '{name}'; known: {', '.join(known)}")

@@ -1,0 +1,15 @@
+"""The names that a command line offers are the ones that can be built."""
+
+from __future__ import annotations
+
+from fsw.parameters.control_choice import KNOWN
+from fsw.parameters.flight_config import CONTROLLERS, INNERS, ROBUSTNESS_PRESETS, SOLVERS
+
+
+def test_every_name_offered_can_be_built_and_none_is_left_out() -> None:
+    assert {what: set(names) for what, names in KNOWN.items()} == {
+        "controller": set(CONTROLLERS),
+        "inner": set(INNERS),
+        "robustness": set(ROBUSTNESS_PRESETS),
+        "solver": set(SOLVERS),
+    }
