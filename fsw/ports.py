@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Protocol
 
-from fsw.signals import Plan, PlanFailure, PlanRequest, SensorFrame, TickOutputs
+from fsw.signals import Plan, PlanFailure, PlanRequest
 
 Clock = Callable[[], int]
 """Monotonic wall time [us]. Measures the loop; no law ever sees it."""
@@ -32,20 +32,4 @@ class PlanService(Protocol):
 
     def close(self) -> None:
         """Stop planning; what is under way is abandoned."""
-        ...
-
-
-class SensorSource(Protocol):
-    """Where sensor frames come from; one frame releases one tick."""
-
-    def receive(self) -> SensorFrame | None:
-        """Wait for the next frame; None when nothing came within the source's patience."""
-        ...
-
-
-class ActuatorSink(Protocol):
-    """Where a tick's outputs go."""
-
-    def answer(self, t_us: int, outputs: TickOutputs) -> None:
-        """Send the actuator command that belongs to the sensor frame of ``t_us``."""
         ...

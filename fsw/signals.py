@@ -224,6 +224,9 @@ class ActuatorCommand:
     joint_torque: Vec2  # N m
 
 
+STOPPED = ActuatorCommand((0.0, 0.0, 0.0, 0.0), (0.0, 0.0))  # nothing moves
+
+
 @dataclass(frozen=True, slots=True)
 class CommandAck:
     """Answer to one CommandRequest."""

@@ -18,6 +18,7 @@ from fsw.model.airframe import GRAVITY, Airframe
 from fsw.model.prediction import LagModel
 from fsw.model.rotors import MotionState, lag_rotors, motion_state, rotor_decay, weigh
 from fsw.signals import (
+    STOPPED,
     ActuatorCommand,
     PlanInput,
     PredictionState,
@@ -30,7 +31,6 @@ from fsw.signals import (
 Inner = Literal["tracking", "pid"]
 
 _NONE: Vec3 = (0.0, 0.0, 0.0)
-NO_ACTION = ActuatorCommand((0.0, 0.0, 0.0, 0.0), (0.0, 0.0))
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +55,7 @@ class CascadeMemory:
 def at_rest(airframe: Airframe, estimate: StateEstimate) -> CascadeMemory:
     """Memory of a vehicle whose rotors stand still."""
     return CascadeMemory(
-        NO_ACTION.rotor_thrust, NO_ACTION, Observed(estimate.v_WB, _NONE), airframe.mass
+        STOPPED.rotor_thrust, STOPPED, Observed(estimate.v_WB, _NONE), airframe.mass
     )
 
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from fsw.compiled import compiled
 from fsw.geometry.rotation import rotate
-from fsw.model.airframe import GRAVITY, Airframe
+from fsw.model.airframe import GRAVITY
 from fsw.model.prediction import Q_ARM, QD_ARM, YAW, YAW_RATE, A, J, P, V
 from fsw.signals import StateEstimate, Vec2, Vec3
 
@@ -50,14 +50,6 @@ def point_in_flight(estimate: StateEstimate, lengths: Vec2) -> tuple[Vec3, Vec3]
         (p[0] + offset[0], p[1] + offset[1], p[2] + offset[2]),
         (v[0] + velocity[0], v[1] + velocity[1], v[2] + velocity[2]),
     )
-
-
-def arm_centre_of_gravity(airframe: Airframe, q_arm: Vec2) -> float:
-    """The arm's own centre of gravity along body x [m] (eq 21)."""
-    m1, m2 = airframe.link_mass
-    s1, s12 = math.sin(q_arm[0]), math.sin(q_arm[0] + q_arm[1])
-    moment = (m1 * airframe.link_com[0] + m2 * airframe.link_length[0]) * s1
-    return (moment + m2 * airframe.link_com[1] * s12) / (m1 + m2)
 
 
 @compiled

@@ -12,7 +12,7 @@ from fsw.barriers.margins import constraint_report
 from fsw.control.cascade import Cascade, CascadeMemory, at_rest
 from fsw.estimation.estimator import estimate_state
 from fsw.model.arm_kinematics import point_in_flight
-from fsw.model.nominal import NominalModel
+from fsw.model.nominal import REST_INPUT, NominalModel
 from fsw.mpc.reference import merge
 from fsw.parameters.consistency import analyse, loop_tube, refusals, warnings
 from fsw.parameters.flight_config import FlightConfig
@@ -21,6 +21,7 @@ from fsw.runtime.mode_keeper import SEVERITY_WARNING, ModeKeeper, answer
 from fsw.runtime.mode_reference import mode_reference
 from fsw.runtime.planning import ask, late_start, measured_state, plan_input, take_answer
 from fsw.signals import (
+    STOPPED,
     ActuatorCommand,
     CommandAck,
     ConstraintKind,
@@ -37,9 +38,7 @@ from fsw.signals import (
     TickOutputs,
 )
 from fsw.vehicle.commands import Situation
-from fsw.vehicle.safety_gate import STOPPED, gate
-
-_NO_INPUT = PlanInput((0.0, 0.0, 0.0), 0.0, (0.0, 0.0))
+from fsw.vehicle.safety_gate import gate
 
 
 class FlightLoop:
@@ -124,7 +123,7 @@ class FlightLoop:
         """Bring the plan's state to this tick, by a new plan or one more step; ask for the next."""
         nominal = state.nominal
         if not state.vehicle.flies or nominal is None:
-            return state, None, _NO_INPUT
+            return state, None, REST_INPUT
         now_us, tick_us = inputs.sensors.t_us, self.config.tick_period_us
         running = state.plan.running
         plan, new_plan = take_answer(state.plan, inputs.plan, now_us)

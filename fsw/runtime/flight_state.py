@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from fsw.control.cascade import NO_ACTION, CascadeMemory
+from fsw.control.cascade import CascadeMemory
 from fsw.control.tracking import Observed
 from fsw.model.airframe import AIRFRAME
 from fsw.signals import (
+    STOPPED,
     ConstraintReport,
     EndEffectorTarget,
     Mode,
@@ -83,7 +84,7 @@ class FlightState:
     output_replaced: bool = False
     cascade: CascadeMemory = field(
         default_factory=lambda: CascadeMemory(
-            NO_ACTION.rotor_thrust, NO_ACTION, Observed(_NOWHERE, _NOWHERE), AIRFRAME.mass
+            STOPPED.rotor_thrust, STOPPED, Observed(_NOWHERE, _NOWHERE), AIRFRAME.mass
         )
     )
 

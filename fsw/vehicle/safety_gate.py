@@ -5,9 +5,7 @@ from __future__ import annotations
 import math
 
 from fsw.model.airframe import Airframe
-from fsw.signals import ActuatorCommand
-
-STOPPED = ActuatorCommand((0.0, 0.0, 0.0, 0.0), (0.0, 0.0))
+from fsw.signals import STOPPED, ActuatorCommand
 
 
 def gate(

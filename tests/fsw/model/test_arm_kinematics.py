@@ -8,8 +8,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from fsw.model.airframe import AIRFRAME
-from fsw.model.arm_kinematics import arm_centre_of_gravity, arm_points, point_in_flight
-from fsw.model.prediction import STATES, Array
+from fsw.model.arm_kinematics import arm_points, point_in_flight
+from fsw.model.linearisation import Linearisation
+from fsw.model.prediction import INPUTS, Q_ARM, STATES, Array, LagModel, condense
 from fsw.signals import StateEstimate, Vec2
 from tests.fsw.model.geometry_by_rotation import moved_on, tips, tips_of_prediction
 from tests.fsw.random_states import estimate_of, prediction_vector, random_estimate
@@ -96,6 +97,7 @@ def test_first_joint_turns_the_hanging_arm_forward() -> None:
 
 def test_centre_of_gravity_is_the_mass_weighted_mean_of_the_links() -> None:
     random = np.random.default_rng(5)
+    horizon = Linearisation(condense(LagModel(), 0.1, 1))
     m1, m2 = AIRFRAME.link_mass
     for _ in range(20):
         q1, q2 = (float(q) for q in random.uniform(-1.5, 1.5, 2))
@@ -103,4 +105,7 @@ def test_centre_of_gravity_is_the_mass_weighted_mean_of_the_links() -> None:
         com1 = point_in_flight(level, (AIRFRAME.link_com[0], 0.0))[0][0]
         com2 = point_in_flight(level, (AIRFRAME.link_length[0], AIRFRAME.link_com[1]))[0][0]
         mean = (m1 * com1 + m2 * com2) / (m1 + m2)
-        assert math.isclose(arm_centre_of_gravity(AIRFRAME, (q1, q2)), mean, abs_tol=1e-12)
+        start = np.zeros(STATES)
+        start[Q_ARM : Q_ARM + 2] = q1, q2
+        horizon.refill(AIRFRAME, start, np.zeros(INPUTS))
+        assert math.isclose(float(horizon.arm_cog[0]), mean, abs_tol=1e-12)

@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fsw.model.airframe import AIRFRAME
-from fsw.signals import ActuatorCommand
-from fsw.vehicle.safety_gate import STOPPED, gate
+from fsw.signals import STOPPED, ActuatorCommand
+from fsw.vehicle.safety_gate import gate
 
 anything = st.floats(allow_nan=True, allow_infinity=True)
 wishes = st.builds(
