@@ -10,6 +10,7 @@ from typing import Any
 from fsw.arguments import FswOptions
 from fsw.link.gcs_link import GcsLink
 from fsw.link.inbox import Inbox
+from fsw.link.service import LinkService
 from fsw.link.sim_link import Pacing, SimLink
 from fsw.link.telemetry import LoopHealth, TelemetryContext
 from fsw.link.udp_endpoint import LinkError, parse_address
@@ -97,7 +98,8 @@ class _Session:
         inbox = Inbox()
         log = TlogWriter(directory / "flight.tlog", clock.unix_us())
         sim = SimLink(simulator, inbox, facts)
-        gcs = GcsLink(ground, inbox, TelemetryContext(facts, record.health), log.add)
+        context = TelemetryContext(facts, record.health)
+        gcs = GcsLink(ground, inbox, context, log.add, self._services())
         loop = SimLoop(program, sim, gcs, inbox, record, clock.now_us, self._stop)
         try:
             end = self._fly(loop, sim, program.planner, record)
@@ -109,6 +111,10 @@ class _Session:
         report.write(directory / "fsw.json", result)
         self._told.report("ended", f"fsw: {end.sentence}", ending=end.ending.value)
         return DONE if end.ending is Ending.SHUTDOWN else NOT_COMPLETED
+
+    def _services(self) -> tuple[LinkService, ...]:
+        """What one link serves; called once a link."""
+        return ()
 
     def _fly(
         self,

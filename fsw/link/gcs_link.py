@@ -7,13 +7,15 @@ said.
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Final
 
 from fsw.link import encode_replies, message_ids
+from fsw.link.dispatch import Dispatch
 from fsw.link.inbox import Inbox
 from fsw.link.message_ids import AUTOPILOT, PANDION, SYSTEM_ID
 from fsw.link.peers import Peers
+from fsw.link.service import LinkService, Outgoing, WireValues
 from fsw.link.streams import HEARTBEAT, STREAMS, Stream, schedule
 from fsw.link.telemetry import TelemetryContext
 from fsw.link.udp_endpoint import Address, OpenEndpoint
@@ -37,6 +39,7 @@ class GcsLink:
         inbox: Inbox,
         context: TelemetryContext,
         record: RecordFrame,
+        services: Sequence[LinkService] = (),
     ) -> None:
         self.losses = Losses()
         self.encode_failures = 0
@@ -50,6 +53,8 @@ class GcsLink:
         self._tick = 0
         self._shown: tuple[Mode, bool] | None = None
         self._text_id = 0
+        self._dispatch = Dispatch(services)
+        self._answers: list[bytes] = []
 
     @property
     def port(self) -> int:
@@ -62,9 +67,15 @@ class GcsLink:
         return self._peers.all
 
     def poll(self, t_us: int) -> None:
-        """Read what ground stations sent, within the byte budget; call it once a tick."""
-        if self._tick % _POLL_TICKS:
-            return
+        """Read and answer what ground stations sent, within a budget; call it once a tick."""
+        self._dispatch.poll(t_us, self._answer)
+        if self._tick % _POLL_TICKS == 0:
+            self._read_waiting(t_us)
+        if self._answers:
+            frames, self._answers = self._answers, []
+            self._send(t_us, frames)
+
+    def _read_waiting(self, t_us: int) -> None:
         budget = _POLL_BYTES
         while budget > 0:
             received = self._endpoint.receive_waiting()
@@ -108,12 +119,25 @@ class GcsLink:
             self._record(t_us, raw)
             self._inbox.accept(frame)
             self._peers.heard(sender)
+            self._dispatch.receive(frame, t_us, self._answer)
+
+    def _answer(self, outgoing: Outgoing) -> None:
+        self._append(outgoing.component, outgoing.message_id, outgoing.values, self._answers)
 
     def _encode(self, stream: Stream, snapshot: FlightSnapshot, frames: list[bytes]) -> None:
         try:
             values = stream.encode(snapshot, self._context)
-            if values is not None:
-                frames.append(self._writers[stream.component].frame(stream.message_id, *values))
+        except (OverflowError, ValueError):
+            self.encode_failures += 1
+            return
+        if values is not None:
+            self._append(stream.component, stream.message_id, values, frames)
+
+    def _append(
+        self, component: int, message_id: int, values: WireValues, frames: list[bytes]
+    ) -> None:
+        try:
+            frames.append(self._writers[component].frame(message_id, *values))
         except (struct.error, OverflowError, ValueError):
             # A number that does not fit its field must not end the flight it describes.
             self.encode_failures += 1

@@ -4,6 +4,7 @@ from typing import Final
 
 HEARTBEAT: Final = 0
 SYS_STATUS: Final = 1
+PING: Final = 4
 ATTITUDE: Final = 30
 ATTITUDE_QUATERNION: Final = 31
 LOCAL_POSITION_NED: Final = 32

@@ -13,6 +13,7 @@ import pytest
 from fsw.link import message_ids as ids
 from fsw.link.gcs_link import GcsLink
 from fsw.link.inbox import Inbox
+from fsw.link.service import Outgoing
 from fsw.signals import CommandAck, Mode, StatusText
 from messages.frames import Frame, FrameWriter, split
 from tests.link.snapshots import CONTEXT, outputs_at
@@ -187,3 +188,57 @@ def test_garbage_that_looks_like_the_next_header_does_not_end_the_flight(ground:
     first, second = (writer.frame(ids.HEARTBEAT, *HEARTBEAT) for _ in range(2))
     ground.polled(b"\x00\xff\x00\x00" + first[4:10] + first + second)
     assert [frame for _, frame in ground.recorded] == [first, second]
+
+
+class Echo:
+    """A service that answers each PING with itself, and counts down once asked."""
+
+    message_ids = frozenset({ids.PING})
+
+    def __init__(self) -> None:
+        self.left = 0
+        self.broken = False
+
+    def receive(self, frame: Frame, t_us: int) -> list[Outgoing]:
+        if self.broken:
+            raise RuntimeError("a mistake in a service")
+        self.left = 2
+        return [Outgoing(ids.PING, frame.payload_values)]
+
+    def poll(self, t_us: int) -> list[Outgoing]:
+        if not self.left:
+            return []
+        self.left -= 1
+        return [Outgoing(ids.PING, (t_us, self.left, 0, 0))]
+
+
+@pytest.fixture
+def echo() -> Iterator[tuple[Ground, Echo]]:
+    station, inbox, service = station_socket(), Inbox(), Echo()
+    link = GcsLink(station.getsockname(), inbox, CONTEXT, lambda t, f: None, (service,))
+    yield Ground(station, link, inbox), service
+    link.close()
+    station.close()
+
+
+def test_a_service_answers_within_the_same_poll_and_goes_on_in_later_ones(
+    echo: tuple[Ground, Echo],
+) -> None:
+    ground, _ = echo
+    ground.polled(FrameWriter(255, 190).frame(ids.PING, 77, 5, 0, 0))
+    assert [frame.payload_values for frame in ground.heard()] == [(77, 5, 0, 0)]
+    ground.poll()
+    ground.poll()
+    ground.poll()
+    assert [frame.payload_values[1] for frame in ground.heard()] == [1, 0]
+
+
+def test_a_service_that_fails_ends_neither_the_link_nor_the_flight(
+    echo: tuple[Ground, Echo],
+) -> None:
+    ground, service = echo
+    service.broken = True
+    ground.polled(FrameWriter(255, 190).frame(ids.PING, 77, 5, 0, 0))
+    service.broken = False
+    ground.polled(FrameWriter(255, 190).frame(ids.PING, 78, 6, 0, 0))
+    assert [frame.payload_values[1] for frame in ground.heard()] == [6]
