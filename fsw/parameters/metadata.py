@@ -1,0 +1,70 @@
+"""Component metadata: the documents from which a ground station learns names, units and ranges.
+
+A ground station asks for COMPONENT_METADATA, fetches the general document and from there the one
+about parameters, both by MAVLink FTP. Format version 1 is what QGroundControl reads.
+
+Source: https://mavlink.io/en/services/component_information.html
+"""
+
+from __future__ import annotations
+
+import json
+import zlib
+from typing import Any, Final
+
+from fsw.parameters.registry import PARAMETERS, Parameter
+
+_VERSION: Final = 1
+_PARAMETER_TYPE: Final = 1  # COMP_METADATA_TYPE_PARAMETER
+
+
+def parameter_document() -> bytes:
+    """The document about all parameters, as JSON."""
+    return _encoded({"version": _VERSION, "parameters": [_described(p) for p in PARAMETERS]})
+
+
+def general_document(parameter_uri: str, firmware_version: str) -> bytes:
+    """The document that says where the others are, as JSON.
+
+    Args:
+        parameter_uri: Where ``parameter_document`` can be fetched, ``mftp://...``.
+        firmware_version: Three numbers with dots.
+    """
+    parameters = {
+        "type": _PARAMETER_TYPE,
+        "uri": parameter_uri,
+        "fileCrc": metadata_crc(parameter_document()),
+    }
+    return _encoded(
+        {
+            "version": _VERSION,
+            "vendorName": "Pandion",
+            "modelName": "aerial manipulator",
+            "firmwareVersion": firmware_version,
+            "metadataTypes": [parameters],
+        }
+    )
+
+
+def metadata_crc(document: bytes) -> int:
+    """CRC-32 as component metadata and MAVLink FTP have it: nothing inverted, unlike zlib's."""
+    return zlib.crc32(document, 0xFFFFFFFF) ^ 0xFFFFFFFF
+
+
+def _described(parameter: Parameter) -> dict[str, Any]:
+    return {
+        "name": parameter.name,
+        "type": "Float",
+        "shortDesc": parameter.meaning,
+        "group": parameter.group,
+        "category": "Standard",
+        "units": parameter.unit,
+        "default": parameter.default,
+        "min": parameter.least,
+        "max": parameter.most,
+        "decimalPlaces": 6,
+    }
+
+
+def _encoded(document: dict[str, Any]) -> bytes:
+    return json.dumps(document, separators=(",", ":"), allow_nan=False).encode()
