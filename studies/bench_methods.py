@@ -10,7 +10,7 @@ import numpy as np
 
 from fsw.model.prediction import INPUTS, Array, condense, to_vector
 from fsw.mpc.planner import Planner
-from fsw.mpc.planner_config import PlannerConfig
+from fsw.mpc.planner_config import PlannerConfig, Solver
 from fsw.mpc.problem import Problem
 from fsw.mpc.slsqp_solver import Gradients, SlsqpSolver
 from fsw.signals import Plan, SafeSet
@@ -48,7 +48,7 @@ class Entry:
     build: Build | None
 
 
-class ClarabelMethod:
+class PlannerMethod:
     """The planner as it flies, all of it: request in, plan out."""
 
     def __init__(self, config: PlannerConfig, safe_set: SafeSet, iterations: int) -> None:
@@ -87,8 +87,10 @@ class SlsqpMethod:
 def entries() -> tuple[Entry, ...]:
     """Everything that is compared, in the order of the table."""
 
-    def clarabel(iterations: int) -> Build:
-        return lambda config, safe_set: ClarabelMethod(config, safe_set, iterations)
+    def planner(solver: Solver, iterations: int) -> Build:
+        return lambda config, safe_set: PlannerMethod(
+            replace(config, solver=solver), safe_set, iterations
+        )
 
     def slsqp(gradients: Gradients) -> Build:
         return lambda config, safe_set: SlsqpMethod(config, safe_set, gradients)
@@ -97,7 +99,8 @@ def entries() -> tuple[Entry, ...]:
         return lambda config, safe_set: CasadiMethod(config, safe_set, solver)
 
     return (
-        *(Entry("clarabel", count, clarabel(count)) for count in _ITERATIONS),
+        *(Entry("clarabel", count, planner("clarabel", count)) for count in _ITERATIONS),
+        *(Entry("daqp", count, planner("daqp", count)) for count in _ITERATIONS),
         Entry("slsqp-numeric", None, slsqp("numeric")),
         Entry("slsqp-analytic", None, slsqp("analytic")),
         *(

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import clarabel
 import numpy as np
 
-from fsw.model.prediction import Array
 from fsw.mpc.program import QuadraticProgram
+from fsw.mpc.solution import Solution
 from fsw.signals import SolverStatus
 
 _STATUS = {
@@ -29,20 +27,6 @@ ROUGH, FINE = 1e-3, 1e-6
 # A solve is bounded in iterations, not in time: about 20 us each at n = 5, and the same
 # answer on a slow machine as on a fast one. Feasible programs need 8 to 15.
 MAX_ITERATIONS = 50
-
-
-@dataclass(frozen=True, slots=True)
-class Solution:
-    """Outcome of one solve; ``x`` is usable only where the status is (almost) solved."""
-
-    status: SolverStatus
-    x: Array  # (unknowns,)
-    iterations: int
-
-    @property
-    def usable(self) -> bool:
-        """Whether ``x`` may be flown: a truncated iterate is finite but wrong."""
-        return self.status in (SolverStatus.SOLVED, SolverStatus.ALMOST_SOLVED)
 
 
 class ClarabelSolver:

@@ -161,23 +161,48 @@ def _add_tracking(
     for k in range(INPUTS * n):
         hessian[k, k] += 2.0 * input_weight
         cost += input_weight * guess[k] * guess[k]
+    rows, values, weight = np.zeros((8, INPUTS * n)), np.zeros(8), np.zeros(8)
     for i in range(1, n + 1):
         w = weights[1 if i == n else 0]
+        rows[0:3], rows[3:6], rows[6], rows[7] = d_position[i], d_velocity[i], d_cog[i], d_yaw[i]
+        weight[0:3], weight[3:6], weight[6], weight[7] = w[0], w[1], w[2], yaw_weight
+        values[0:3] = position[i] - target_position[i]
+        values[3:6] = velocity[i] - velocity_share * target_velocity[i]
+        values[6] = cog[i]
         # The short way round: a target half a turn away must not unwind whole turns.
-        turn = (yaw[i] - target_yaw[i] + math.pi) % (2.0 * math.pi) - math.pi
-        cost += yaw_weight * turn * turn
-        add_square(yaw_weight, turn, d_yaw[i], INPUTS * i, guess, hessian, gradient)
-        for residual in range(7):
-            if residual < 3:
-                weight, row = w[0], d_position[i, residual]
-                value = position[i, residual] - target_position[i, residual]
-            elif residual < 6:
-                weight, row = w[1], d_velocity[i, residual - 3]
-                value = (
-                    velocity[i, residual - 3] - velocity_share * target_velocity[i, residual - 3]
-                )
-            else:
-                weight, row, value = w[2], d_cog[i], cog[i]
-            cost += weight * value * value
-            add_square(weight, value, row, INPUTS * i, guess, hessian, gradient)
+        values[7] = (yaw[i] - target_yaw[i] + math.pi) % (2.0 * math.pi) - math.pi
+        _add_eight_squares(weight, values, rows, INPUTS * i, guess, hessian, gradient)
+        for residual in range(8):
+            cost += weight[residual] * values[residual] * values[residual]
     return cost
+
+
+@compiled
+def _add_eight_squares(
+    weight: Array,
+    value: Array,
+    rows: Array,
+    columns: int,
+    guess: Array,
+    hessian: Array,
+    gradient: Array,
+) -> None:
+    """``add_square`` for all residuals of a node at once: the Hessian is walked through once."""
+    s0, s1, s2, s3, s4, s5, s6, s7 = rows
+    at_zero = value.copy()
+    for residual in range(8):
+        for k in range(columns):
+            at_zero[residual] -= rows[residual, k] * guess[k]
+    for k in range(columns):
+        c0, c1 = 2.0 * weight[0] * s0[k], 2.0 * weight[1] * s1[k]
+        c2, c3 = 2.0 * weight[2] * s2[k], 2.0 * weight[3] * s3[k]
+        c4, c5 = 2.0 * weight[4] * s4[k], 2.0 * weight[5] * s5[k]
+        c6, c7 = 2.0 * weight[6] * s6[k], 2.0 * weight[7] * s7[k]
+        gradient[k] += (c0 * at_zero[0] + c1 * at_zero[1] + c2 * at_zero[2] + c3 * at_zero[3]) + (
+            c4 * at_zero[4] + c5 * at_zero[5] + c6 * at_zero[6] + c7 * at_zero[7]
+        )
+        h = hessian[k]
+        for m in range(k, columns):
+            h[m] += (c0 * s0[m] + c1 * s1[m] + c2 * s2[m] + c3 * s3[m]) + (
+                c4 * s4[m] + c5 * s5[m] + c6 * s6[m] + c7 * s7[m]
+            )

@@ -13,10 +13,10 @@ import numpy as np
 
 from fsw.barriers.soft_rows import TargetPoints
 from fsw.model.prediction import INPUTS, Array, condense, to_vector
-from fsw.mpc.clarabel_solver import Solution
 from fsw.mpc.planner_config import PlannerConfig
 from fsw.mpc.problem import Problem
 from fsw.mpc.slsqp_solver import SlsqpSolver
+from fsw.mpc.solution import Solution
 from fsw.signals import (
     EndEffectorTarget,
     Plan,

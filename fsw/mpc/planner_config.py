@@ -12,7 +12,8 @@ from fsw.mpc.costs import CostWeights
 from fsw.mpc.program import InputLimits, SlackPrice
 from fsw.mpc.soft_costs import SoftWeights
 
-Solver = Literal["clarabel", "slsqp"]  # ours, or the paper's with numeric gradients
+# Interior point, active set, or the paper's SLSQP with numeric gradients.
+Solver = Literal["clarabel", "daqp", "slsqp"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,7 +24,7 @@ class PlannerConfig:
     horizon: int = 5  # n
     period: float = 0.1  # s, T
     solver: Solver = "clarabel"
-    sqp_iterations: int = 2  # of clarabel; slsqp goes on until it converges
+    sqp_iterations: int = 2  # slsqp goes on until it converges
     airframe: Airframe = AIRFRAME
     lag: LagModel = field(default_factory=LagModel)
     weights: CostWeights = field(default_factory=CostWeights)
@@ -31,7 +32,7 @@ class PlannerConfig:
     joint_slack: SlackPrice = field(default_factory=lambda: SlackPrice(50.0))
     # blf
     # Beside walls the end-effector counts too, which swings more than the base wanders.
-    walls: BarrierTuning = field(default_factory=lambda: BarrierTuning(robustness=0.32))
+    walls: BarrierTuning = field(default_factory=lambda: BarrierTuning(robustness=0.345))
     workspace: BarrierTuning = field(default_factory=BarrierTuning)
     barrier_slack: SlackPrice = field(default_factory=lambda: SlackPrice(20.0))
     # hc

@@ -7,11 +7,12 @@ import numpy as np
 from fsw.barriers.soft_rows import SoftRows, TargetPoints
 from fsw.model.linearisation import Linearisation
 from fsw.model.prediction import Array, CondensedModel
-from fsw.mpc.clarabel_solver import FINE, ROUGH, Solution
+from fsw.mpc.clarabel_solver import FINE, ROUGH
 from fsw.mpc.limits import JointLimits
 from fsw.mpc.planner_config import PlannerConfig
 from fsw.mpc.program import Program, SlackPrice
 from fsw.mpc.reduced_solver import ReducedSolver
+from fsw.mpc.solution import Solution
 from fsw.mpc.variants import parts_of
 from fsw.signals import SafeSet
 
@@ -33,8 +34,9 @@ class Problem:
         self._first_barrier_slack = self._program.inputs + self._limits.rows.slacks
         self.cost = 0.0
         self.linearise(np.zeros(model.phi.shape[1]), self._gradient, _no_targets(config.horizon))
-        self._rough = ReducedSolver(self._program, ROUGH)
-        self._fine = ReducedSolver(self._program, FINE)
+        active_set = config.solver == "daqp"
+        self._fine = ReducedSolver(self._program, FINE, active_set=active_set)
+        self._rough = self._fine if active_set else ReducedSolver(self._program, ROUGH)
 
     @property
     def program(self) -> Program:

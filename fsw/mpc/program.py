@@ -37,6 +37,7 @@ class QuadraticProgram:
     q: Array
     a: sparse.csc_matrix
     b: Array
+    general_rows: int  # the first; the other non-negative ones have one entry that never changes
     nonnegative_rows: int
     tilt_cones: int  # of three rows each, after the non-negative ones
 
@@ -130,7 +131,7 @@ class Program:
         p.data[~in_inputs] = np.concatenate(
             [np.full(n, 2.0 * price.quadratic) for n, price in priced]
         )
-        self.whole = QuadraticProgram(p, q, a, b, nonnegative_rows, horizon)
+        self.whole = QuadraticProgram(p, q, a, b, soft, nonnegative_rows, horizon)
         self.hessian = np.zeros((self.inputs, self.inputs))
         self._gradient = np.zeros((soft, self.inputs))
 

@@ -15,8 +15,10 @@ from scipy import sparse
 
 from fsw.compiled import compiled
 from fsw.model.prediction import Array
-from fsw.mpc.clarabel_solver import ClarabelSolver, Solution
+from fsw.mpc.active_set_solver import ActiveSetSolver
+from fsw.mpc.clarabel_solver import ClarabelSolver
 from fsw.mpc.program import Program, QuadraticProgram
+from fsw.mpc.solution import Solution
 
 _ROOM = 0.3  # least room of every row at the guess (m/s, rad, m/s^2) to be left out
 _TOLERANCE = 1e-6  # a left-out row may be missed by no more than the solver's own error
@@ -25,9 +27,17 @@ _TOLERANCE = 1e-6  # a left-out row may be missed by no more than the solver's o
 class ReducedSolver:
     """Keeps one solver for every set of groups that has occurred."""
 
-    def __init__(self, program: Program, tolerance: float) -> None:
+    def __init__(self, program: Program, tolerance: float, *, active_set: bool = False) -> None:
+        """Build the smallest and the largest reduction; the others when they occur.
+
+        Args:
+            program: Filled, so that its pattern is known.
+            tolerance: Of the interior-point method.
+            active_set: Solve by the active-set method wherever there are no cones.
+        """
         self._program = program
         self._tolerance = tolerance
+        self._active_set = active_set
         self._reductions: dict[int, _Reduction] = {}
         everything = (1 << len(program.groups)) - 1
         for kept in (0, everything):
@@ -63,14 +73,16 @@ class ReducedSolver:
     def _reduction(self, kept: int) -> _Reduction:
         found = self._reductions.get(kept)
         if found is None:
-            found = self._reductions[kept] = _Reduction(self._program, kept, self._tolerance)
+            found = self._reductions[kept] = _Reduction(
+                self._program, kept, self._tolerance, self._active_set
+            )
         return found
 
 
 class _Reduction:
     """One set of groups: a smaller program, gathered from the whole by fixed indices."""
 
-    def __init__(self, program: Program, kept: int, tolerance: float) -> None:
+    def __init__(self, program: Program, kept: int, tolerance: float, active_set: bool) -> None:
         whole = program.whole
         left_out = [group for bit, group in enumerate(program.groups) if not kept >> bit & 1]
         rows = _without(len(whole.b), [group.rows for group in left_out])
@@ -81,9 +93,19 @@ class _Reduction:
         p, self._p_from = _part(whole.p, self._columns, self._columns)
         cones = 0 if any(group.are_cones for group in left_out) else whole.tilt_cones
         self._part = QuadraticProgram(
-            p, whole.q[self._columns], a, whole.b[rows], len(rows) - 3 * cones, cones
+            p,
+            whole.q[self._columns],
+            a,
+            whole.b[rows],
+            int(np.searchsorted(rows, whole.general_rows)),
+            len(rows) - 3 * cones,
+            cones,
         )
-        self._solver = ClarabelSolver(self._part, tolerance)
+        self._solver: ClarabelSolver | ActiveSetSolver
+        if active_set and not cones:
+            self._solver = ActiveSetSolver(self._part)
+        else:
+            self._solver = ClarabelSolver(self._part, tolerance)
 
     def solve(self) -> Solution:
         """Gather the numbers, solve, and put the unknowns back where they belong."""

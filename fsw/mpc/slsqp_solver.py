@@ -18,8 +18,8 @@ from scipy.optimize import OptimizeResult, minimize
 
 from fsw.barriers.soft_rows import TargetPoints
 from fsw.model.prediction import Array
-from fsw.mpc.clarabel_solver import Solution
 from fsw.mpc.program import Program, QuadraticProgram
+from fsw.mpc.solution import Solution
 from fsw.signals import SolverStatus
 
 Gradients = Literal["numeric", "analytic"]

@@ -11,7 +11,7 @@ from fsw.mpc.planner_config import PlannerConfig, Solver
 from fsw.mpc.variants import VARIANTS
 
 CONTROLLERS = tuple(VARIANTS)
-SOLVERS: tuple[Solver, ...] = ("clarabel", "slsqp")
+SOLVERS: tuple[Solver, ...] = ("clarabel", "daqp", "slsqp")
 INNERS: tuple[Inner, ...] = ("tracking", "pid")
 
 

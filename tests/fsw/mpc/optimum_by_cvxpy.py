@@ -1,7 +1,8 @@
 """The planner's program written a second time, from the paper, for a solver of its own.
 
 Costs are eqs 18, 20 and 21 with the horizon's points linearised; constraints are Table I, the
-tilt cone and eq 25. Nothing of ``fsw.mpc`` or ``fsw.barriers`` is used.
+tilt cone and, by controller, eq 25, eqs 14 and 15, or the costs of eqs 29 and 30. Nothing of
+``fsw.mpc`` or ``fsw.barriers`` is used but the numbers of the configuration.
 """
 
 from __future__ import annotations
@@ -67,13 +68,25 @@ class _Linear:
         return self._horizon.states[node, 15:17] + gamma @ self._change
 
 
+class InfeasibleError(Exception):
+    """The second program has no solution."""
+
+
 def optimum(question: Question, config: PlannerConfig) -> Optimum:
-    """Solve the second program."""
+    """Solve the second program.
+
+    Raises:
+        InfeasibleError: Its hard rows contradict each other.
+    """
     n = config.horizon
     U = cp.Variable(INPUTS * n)
     linear = _Linear(question, U)
     joint_slack = cp.Variable(n, nonneg=True)
-    rows, barrier_slack = _barrier(question, linear, config)
+    rows, barrier_slack = (
+        _hard_rows(question, linear, config)
+        if config.controller == "hc"
+        else _barrier(question, linear, config)
+    )
     constraints = _input_limits(U, config) + rows
     for node in range(1, n + 1):
         th1, th2 = linear.angles(node)[0], linear.angles(node)[1]
@@ -84,6 +97,7 @@ def optimum(question: Question, config: PlannerConfig) -> Optimum:
     problem = cp.Problem(
         cp.Minimize(
             _cost(question, linear, U, config)
+            + _safety_cost(question, linear, config)
             + config.joint_slack.linear * cp.sum(joint_slack)
             + config.joint_slack.quadratic * cp.sum_squares(joint_slack)
             + config.barrier_slack.linear * cp.sum(barrier_slack)
@@ -95,6 +109,8 @@ def optimum(question: Question, config: PlannerConfig) -> Optimum:
     problem.solve(
         solver=cp.CLARABEL, tol_gap_abs=tolerance, tol_gap_rel=tolerance, tol_feas=tolerance
     )
+    if problem.status in (cp.INFEASIBLE, cp.INFEASIBLE_INACCURATE):
+        raise InfeasibleError
     assert problem.status == cp.OPTIMAL
     return Optimum(
         np.asarray(U.value),
@@ -119,6 +135,60 @@ def _cost(question: Question, linear: _Linear, U: cp.Variable, config: PlannerCo
         total += weights.yaw * cp.square(linear.yaw(node) - question.target_yaw[node])
         total += (5.0 if last else 1.0) * cp.square(linear.arm_cog(node))
     return total
+
+
+def _safety_cost(question: Question, linear: _Linear, config: PlannerConfig) -> Any:
+    """Eqs 29 and 30 with Table II's 5 and 20, and our centring of 100 and 500."""
+    sphere, n = question.safe_set.sphere, config.horizon
+    total: Any = 0.0
+    for node in range(1, n + 1):
+        last = node == n
+        if sphere is not None:
+            if config.controller == "sc":
+                centre = question.target_p[node] + np.array(sphere.centre_from_target)
+                outside = np.linalg.norm(question.horizon.position[node, BASE] - centre)
+                if outside >= sphere.radius:
+                    e = linear.position(node, BASE) - centre
+                    total += (20.0 if last else 5.0) * cp.sum_squares(e)
+            elif config.centred:
+                centre = question.target_p[node] + np.array(sphere.centre_from_target)
+                e = linear.position(node, BASE) - centre
+                total += (500.0 if last else 100.0) * cp.sum_squares(e)
+        elif config.controller == "sc":
+            for wall in question.safe_set.walls:
+                for point in range(3):
+                    total += _wall_cost(question, linear, wall, node, point) / (
+                        20.0 if last else 5.0
+                    )
+    return total
+
+
+def _wall_cost(question: Question, linear: _Linear, wall: Wall, node: int, point: int) -> Any:
+    """1/d^2 to second order about the guess; from 20 mm on, about 20 mm."""
+    normal = np.array(wall.normal)
+    limit = wall.offset + wall.clearance
+    gap = float(normal @ question.horizon.position[node, point]) - limit
+    about = max(gap, 0.02)
+    x = normal @ linear.position(node, point) - limit - about
+    return 1.0 / about**2 - 2.0 / about**3 * x + 3.0 / about**4 * cp.square(x)
+
+
+def _hard_rows(
+    question: Question, linear: _Linear, config: PlannerConfig
+) -> tuple[list[Any], cp.Variable]:
+    """Eqs 14 and 15 at every node; the slack is for none of them."""
+    horizon, sphere, rows = question.horizon, question.safe_set.sphere, []
+    for node in range(1, config.horizon + 1):
+        for wall in question.safe_set.walls:
+            for point in range(3):
+                gap = np.array(wall.normal) @ linear.position(node, point) - wall.offset
+                rows.append(gap >= wall.clearance)
+        if sphere is not None:
+            centre = question.target_p[node] + np.array(sphere.centre_from_target)
+            e = horizon.position[node, BASE] - centre
+            outward = e / np.linalg.norm(e)
+            rows.append(outward @ (linear.position(node, BASE) - centre) <= sphere.radius)
+    return rows, cp.Variable(1, nonneg=True)
 
 
 def _input_limits(U: cp.Variable, config: PlannerConfig) -> list[Any]:
@@ -147,6 +217,8 @@ def _safe_speed(d: float, tuning: BarrierTuning) -> tuple[float, float]:
 def _barrier(
     question: Question, linear: _Linear, config: PlannerConfig
 ) -> tuple[list[Any], cp.Variable]:
+    if config.controller != "blf":
+        return [], cp.Variable(1, nonneg=True)
     if question.safe_set.sphere is not None:
         return _sphere_rows(question, linear, config, question.safe_set.sphere)
     slack = cp.Variable((config.horizon + 1, max(len(question.safe_set.walls), 1)), nonneg=True)
