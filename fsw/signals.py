@@ -23,8 +23,11 @@ class Mode(Enum):
     DISARMED = "disarmed"
     TAKEOFF = "takeoff"
     HOLD = "hold"
-    TRAJECTORY = "trajectory"
+    MISSION = "mission"
+    RETURN = "return"
     LAND = "land"
+    OFFBOARD = "offboard"
+    TRAJECTORY = "trajectory"
     FAULT = "fault"
 
 
@@ -38,6 +41,16 @@ class SolverStatus(IntEnum):
     TIME_LIMIT = 4
     NUMERICAL_ERROR = 5
     INPUT_REFUSED = 6
+
+
+class SetpointKind(IntEnum):
+    """What is flown offboard; values equal PANDION_SETPOINT_KIND of the dialect."""
+
+    NONE = 0
+    BODY = 1
+    END_EFFECTOR = 2
+    ATTITUDE = 3
+    JOINTS = 4
 
 
 class ConstraintKind(IntEnum):
@@ -74,6 +87,7 @@ class CommandRequest:
     source_system: int
     source_component: int
     confirmation: int = 0
+    frame: int | None = None  # MAV_FRAME of a COMMAND_INT, None for a COMMAND_LONG
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,6 +99,52 @@ class EndEffectorTarget:
     v_WE: Vec3  # m/s
     a_WE: Vec3  # m/s^2
     yaw: float = 0.0  # rad
+
+
+@dataclass(frozen=True, slots=True)
+class MotionSetpoint:
+    """Where the body or the end-effector should be or move from now on; None leaves it open."""
+
+    of_end_effector: bool
+    p: Vec3 | None = None  # m
+    v: Vec3 | None = None  # m/s
+    a: Vec3 | None = None  # m/s^2
+    yaw: float | None = None  # rad
+    yaw_rate: float | None = None  # rad/s
+    along_heading: bool = False  # v and a in the body's level frame: forward, right, down
+
+
+@dataclass(frozen=True, slots=True)
+class AttitudeSetpoint:
+    """An attitude or body rates, and a thrust."""
+
+    thrust: float  # 0 to 1, of what four rotors give
+    q_WB: Vec4 | None = None  # unit quaternion [w, x, y, z]; None: rates alone
+    w_WB_B: Vec3 | None = None  # rad/s
+
+
+@dataclass(frozen=True, slots=True)
+class JointSetpoint:
+    """Where the arm's joints should be."""
+
+    q_arm: Vec2  # rad
+
+
+@dataclass(frozen=True, slots=True)
+class Origin:
+    """Where on Earth the local frame begins."""
+
+    latitude: float  # deg
+    longitude: float  # deg
+    altitude: float  # m above mean sea level
+
+
+@dataclass(frozen=True, slots=True)
+class Home:
+    """Where a return leads to."""
+
+    p: Vec3  # m, the body's place while it stands there
+    yaw: float  # rad
 
 
 @dataclass(frozen=True, slots=True)
@@ -264,6 +324,29 @@ class ConstraintReport:
 
 
 @dataclass(frozen=True, slots=True)
+class BatteryState:
+    """What a model of the battery says, for there is no sensor."""
+
+    voltage: float = 16.8  # V
+    current: float = 0.0  # A
+    consumed: float = 0.0  # A h
+    remaining: float = 1.0  # share of the capacity
+
+
+@dataclass(frozen=True, slots=True)
+class OffboardReport:
+    """The set-point in use while offboard, and how many were of no use since start."""
+
+    kind: SetpointKind = SetpointKind.NONE  # NONE unless flying offboard
+    motion: MotionSetpoint | None = None
+    attitude: AttitudeSetpoint | None = None
+    joints: JointSetpoint | None = None
+    accepted: int = 0
+    refused: int = 0
+    age_us: int = 0  # of the newest accepted one
+
+
+@dataclass(frozen=True, slots=True)
 class FlightSnapshot:
     """The vehicle as telemetry shows it after a tick; what follows from it, encoders compute."""
 
@@ -281,6 +364,10 @@ class FlightSnapshot:
     constraints: ConstraintReport
     failures: tuple[str, ...] = ()  # active faults, by name
     landed: bool = False  # stands on the ground, armed or not
+    home: Home | None = None
+    battery: BatteryState = BatteryState()
+    arming_refusal: str = ""  # why it cannot be armed; empty: it could be, or is
+    offboard: OffboardReport = OffboardReport()
 
 
 @dataclass(frozen=True, slots=True)
@@ -292,6 +379,12 @@ class TickInputs:
     commands: tuple[CommandRequest, ...] = ()
     targets: tuple[EndEffectorTarget, ...] = ()
     safe_set: SafeSet | None = None  # newly announced
+    # The newest set-points for now; at most one of motion and attitude.
+    motion: MotionSetpoint | None = None
+    attitude: AttitudeSetpoint | None = None
+    joints: JointSetpoint | None = None
+    refused_setpoints: int = 0  # that were of no use, since the last tick
+    ground_station_heard: bool = False  # a heartbeat, since the last tick
 
 
 @dataclass(frozen=True, slots=True)

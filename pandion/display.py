@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from contextlib import AbstractContextManager, nullcontext
 from typing import TYPE_CHECKING, Any, TextIO
 
@@ -44,7 +45,9 @@ class Display:
             transient=True,
             refresh_per_second=4,
         )
-        self._task = self._bar.add_task("waiting", total=duration_s, state="")
+        self._task = self._bar.add_task(
+            "waiting", total=None if math.isinf(duration_s) else duration_s, state=""
+        )
         return self._bar
 
     def progress(self, time_s: float, margin_m: float | None, real_time_factor: float) -> None:

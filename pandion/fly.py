@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import sys
 from pathlib import Path
 from typing import Any
@@ -46,9 +47,11 @@ def main(argv: list[str]) -> int:
 
 def _banner(options: FlyOptions, display: Display) -> None:
     pacing = "real time" if options.realtime else "lockstep"
+    endless = math.isinf(options.duration_s)
+    length = "until interrupted" if endless else f"{options.duration_s:g} s"
     display.say(
         f"Pandion {version()}: {options.scenario_name}, seed {options.seed}, "
-        f"{options.duration_s:g} s, {options.control.controller} controller, {pacing}"
+        f"{length}, {options.control.controller} controller, {pacing}"
     )
     port = parse_address(options.gcs)[1]
     display.say(f"telemetry to {options.gcs}: QGroundControl connects on UDP {port}")
@@ -60,7 +63,7 @@ def _sitl_arguments(options: FlyOptions) -> list[str]:
         options.scenario,
         "--listen=udp:127.0.0.1:0",
         f"--seed={options.seed}",
-        f"--duration={options.duration_s!r}",
+        *([] if math.isinf(options.duration_s) else [f"--duration={options.duration_s!r}"]),
         "--realtime" if options.realtime else "--lockstep",
         f"--speed={'max' if options.speed is None else repr(options.speed)}",
         # The flight software compiles when it is started for the first time; the supervisor

@@ -33,7 +33,7 @@ class Referee:
         self._clock = clock
         self._error = TrackingError()
         self._duration_s = scenario.duration_s
-        self._hop = scenario.pilot.plan == "hop"
+        self._whole = _whole(scenario)
         margins = self.margins(points, 0.0)
         check_start(self.world.keys, margins)
         self.record.add(margins, 0.0)
@@ -87,4 +87,11 @@ class Referee:
 
     def result(self, time_s: float) -> TruthResult:
         """The score up to ``time_s``."""
-        return score(self.ended, time_s, self._error, self.record, self._hop)
+        return score(self.ended, time_s, self._error, self.record, self._whole)
+
+
+def _whole(scenario: Scenario) -> EndKind:
+    """The end that a completed run of a scenario has."""
+    if scenario.pilot.plan == "hop":
+        return EndKind.MISSION
+    return EndKind.DURATION if math.isfinite(scenario.duration_s) else EndKind.INTERRUPTED

@@ -177,7 +177,7 @@ class Scenario:
     """One flight."""
 
     name: str
-    duration_s: float = field(metadata=inside(0.1, 86400.0))
+    duration_s: float = field(metadata=inside(0.1, 86400.0, or_endless=True))
     start: Start
     pilot: Pilot
     trajectory: Trajectory

@@ -150,7 +150,8 @@ def _number(value: Any, path: str, metadata: Any) -> float:
     allowed = metadata.get("range")
     if isinstance(allowed, Range) and allowed.refuses(float(value)):
         raise ScenarioError(f"{path} = {value!r}: must be {allowed}")
-    if not math.isfinite(value):
+    endless = isinstance(allowed, Range) and allowed.or_endless
+    if not math.isfinite(value) and not endless:
         raise ScenarioError(f"{path} = {value!r}: must be finite")
     return float(value)
 

@@ -18,7 +18,8 @@ class EndKind(enum.Enum):
     CRASH = "crash"
     DIVERGED = "diverged"
     REFUSED = "refused"  # the vehicle denied the pilot
-    STOPPED = "stopped"  # from outside: interrupt, lost peer
+    INTERRUPTED = "interrupted"  # a signal; the regular end of an endless flight
+    STOPPED = "stopped"  # from outside: lost peer
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,15 +106,26 @@ def violation(record: MarginRecord) -> str | None:
 
 
 def score(
-    end: EndReason | None, time_s: float, error: TrackingError, record: MarginRecord, hop: bool
+    end: EndReason | None,
+    time_s: float,
+    error: TrackingError,
+    record: MarginRecord,
+    whole: EndKind,
 ) -> TruthResult:
-    """The result of a run that ended with ``end`` (None: still running) at ``time_s``."""
+    """The result of a run.
+
+    Args:
+        end: How it ended, None while it goes on.
+        time_s: Now, since the start of the simulation [s].
+        error: Of the end-effector.
+        record: Of the margins.
+        whole: The end that such a run should have.
+    """
     broken = violation(record)
     worst = record.worst()
-    whole = EndKind.MISSION if hop else EndKind.DURATION
     flown = end is not None and end.kind in (whole, EndKind.MISSION)
     parts = [end.sentence if end is not None else "still flying"]
-    if hop and end is not None and end.kind is EndKind.DURATION:
+    if whole is EndKind.MISSION and end is not None and end.kind is EndKind.DURATION:
         parts.append("the vehicle had not landed and disarmed by then")
     if broken is not None:
         parts.append(broken)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Final
 
 from fsw.signals import Mode
@@ -10,21 +11,48 @@ _MAIN_AUTO: Final = 4
 _MAIN_OFFBOARD: Final = 6
 _AUTO_TAKEOFF: Final = 2
 _AUTO_LOITER: Final = 3
+_AUTO_MISSION: Final = 4
+_AUTO_RTL: Final = 5
 _AUTO_LAND: Final = 6
+_AUTO_EXTERNAL1: Final = 11  # PX4's place for modes that are not its own
 
 _MODES: Final[dict[Mode, tuple[int, int]]] = {
     # A disarmed vehicle has no flight mode of its own; PX4 shows the one it would start in.
     Mode.DISARMED: (_MAIN_AUTO, _AUTO_LOITER),
     Mode.TAKEOFF: (_MAIN_AUTO, _AUTO_TAKEOFF),
     Mode.HOLD: (_MAIN_AUTO, _AUTO_LOITER),
-    Mode.TRAJECTORY: (_MAIN_OFFBOARD, 0),
+    Mode.MISSION: (_MAIN_AUTO, _AUTO_MISSION),
+    Mode.RETURN: (_MAIN_AUTO, _AUTO_RTL),
     Mode.LAND: (_MAIN_AUTO, _AUTO_LAND),
+    Mode.OFFBOARD: (_MAIN_OFFBOARD, 0),
+    Mode.TRAJECTORY: (_MAIN_AUTO, _AUTO_EXTERNAL1),
     # Terminated, rotors off: PX4 has no mode for it; system_status says it is an emergency.
     Mode.FAULT: (_MAIN_AUTO, _AUTO_LAND),
 }
+
+
+@dataclass(frozen=True, slots=True)
+class AvailableMode:
+    """One row of AVAILABLE_MODES."""
+
+    name: str
+    custom_mode: int
+    standard_mode: int  # MAV_STANDARD_MODE, 0 where it is none of those
 
 
 def custom_mode(mode: Mode) -> int:
     """PX4's custom_mode: main mode in bits 16 to 23, sub mode in bits 24 to 31."""
     main, sub = _MODES[mode]
     return main << 16 | sub << 24
+
+
+# What a ground station may offer, in the order of AVAILABLE_MODES.
+AVAILABLE_MODES: Final = (
+    AvailableMode("Hold", custom_mode(Mode.HOLD), 0),
+    AvailableMode("Takeoff", custom_mode(Mode.TAKEOFF), 8),
+    AvailableMode("Mission", custom_mode(Mode.MISSION), 6),
+    AvailableMode("Return", custom_mode(Mode.RETURN), 5),
+    AvailableMode("Land", custom_mode(Mode.LAND), 7),
+    AvailableMode("Offboard", custom_mode(Mode.OFFBOARD), 0),
+    AvailableMode("Trajectory", custom_mode(Mode.TRAJECTORY), 0),
+)

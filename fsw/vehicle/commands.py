@@ -20,8 +20,11 @@ ACCEPTED, TEMPORARILY_REJECTED, DENIED, UNSUPPORTED = 0, 1, 2, 3
 _PX4_MODES: dict[tuple[float, float], Event] = {
     (4.0, 2.0): Event.TAKE_OFF,
     (4.0, 3.0): Event.HOLD,
+    (4.0, 4.0): Event.START_MISSION,
+    (4.0, 5.0): Event.GO_HOME,
     (4.0, 6.0): Event.LAND,
-    (6.0, 0.0): Event.FOLLOW,
+    (4.0, 11.0): Event.FOLLOW,  # the first mode that is not PX4's own
+    (6.0, 0.0): Event.GO_OFFBOARD,
 }
 _FORCE = 21196.0  # the value MAVLink asks for to arm or disarm against all checks
 
@@ -36,6 +39,8 @@ class Situation:
     targets_ahead: bool  # the stream holds a point at or after now
     standing_unclear: bool = False  # too high to stand, too low to be surely in the air
     inconsistent: str = ""  # why the configuration cannot keep the safe set
+    mission_ready: bool = False  # a mission was uploaded and can be flown from here
+    setpoint_fresh: bool = False  # an offboard set-point came within the last 0.5 s
     height: float = 0.0  # m, above the origin
     climb_range: tuple[float, float] = (0.3, 10.0)  # m, of a takeoff
 
@@ -103,10 +108,21 @@ def _refusal(event: Event, request: CommandRequest, situation: Situation) -> str
     if event is Event.TAKE_OFF:
         return _takeoff_refusal(request.params[6], situation)
     if event is Event.FOLLOW:
-        if situation.landed:
-            return "no trajectory: the vehicle is on the ground; take off first"
-        if not situation.targets_ahead:
-            return "no trajectory: no END_EFFECTOR_TARGET ahead of now was received"
+        return _trajectory_refusal(situation)
+    if event is Event.GO_HOME and situation.landed:
+        return "no return: the vehicle is on the ground"
+    if event is Event.START_MISSION and not situation.mission_ready:
+        return "no mission: none was uploaded"
+    if event is Event.GO_OFFBOARD and not situation.setpoint_fresh:
+        return "not offboard: no set-point was received in the last 0.5 s"
+    return None
+
+
+def _trajectory_refusal(situation: Situation) -> str | None:
+    if situation.landed:
+        return "no trajectory: the vehicle is on the ground; take off first"
+    if not situation.targets_ahead:
+        return "no trajectory: no END_EFFECTOR_TARGET ahead of now was received"
     return None
 
 
@@ -129,5 +145,8 @@ def _already_there(event: Event, mode: Mode) -> bool:
         Event.TAKE_OFF: mode is Mode.TAKEOFF,
         Event.HOLD: mode is Mode.HOLD,
         Event.FOLLOW: mode is Mode.TRAJECTORY,
+        Event.START_MISSION: mode is Mode.MISSION,
+        Event.GO_HOME: mode is Mode.RETURN,
+        Event.GO_OFFBOARD: mode is Mode.OFFBOARD,
         Event.LAND: mode is Mode.LAND,
     }.get(event, False)

@@ -5,7 +5,10 @@ mode           meaning
 =============  ==========================================================
 disarmed       rotors off, arm limp
 takeoff        end-effector reference climbs from where the vehicle stood
-hold           end-effector stays where it was; on the ground, rotors idle
+hold           stays where it was or goes to a place; on the ground, rotors idle
+mission        the uploaded mission is flown
+return         climbs, goes home, then lands
+offboard       a ground station's set-points for now are followed
 trajectory     the streamed end-effector reference is followed
 land           reference descends until the ground is felt, then disarms
 fault          terminated: outputs are zero until restarted
@@ -27,26 +30,50 @@ class Event(Enum):
     TAKE_OFF = "take off"
     HOLD = "hold"
     FOLLOW = "follow trajectory"
+    START_MISSION = "start mission"
+    GO_HOME = "return"
+    GO_OFFBOARD = "offboard"
     LAND = "land"
     CLIMB_DONE = "climb done"
     TRAJECTORY_DONE = "trajectory done"
+    MISSION_DONE = "mission done"
+    HOME_REACHED = "home reached"
+    SETPOINTS_LOST = "no set-point for 0.5 s"
+    LINK_LOST = "ground station lost"
     TOUCHED_DOWN = "touched down"
     TERMINATE = "terminate"
 
 
-_FLYING = (Mode.TAKEOFF, Mode.HOLD, Mode.TRAJECTORY, Mode.LAND)
+# Whoever wants to steer a vehicle that lands asks it to hold first.
+_STEERABLE = (
+    Mode.TAKEOFF,
+    Mode.HOLD,
+    Mode.MISSION,
+    Mode.RETURN,
+    Mode.OFFBOARD,
+    Mode.TRAJECTORY,
+)
+ARMED = (*_STEERABLE, Mode.LAND)
 
 TRANSITIONS: dict[tuple[Mode, Event], Mode] = {
     (Mode.DISARMED, Event.ARM): Mode.HOLD,
-    (Mode.HOLD, Event.TAKE_OFF): Mode.TAKEOFF,
-    (Mode.HOLD, Event.FOLLOW): Mode.TRAJECTORY,
+    **{(mode, Event.TAKE_OFF): Mode.TAKEOFF for mode in (Mode.HOLD, Mode.MISSION, Mode.OFFBOARD)},
+    **{(mode, Event.FOLLOW): Mode.TRAJECTORY for mode in _STEERABLE},
+    **{(mode, Event.START_MISSION): Mode.MISSION for mode in _STEERABLE},
+    **{(mode, Event.GO_OFFBOARD): Mode.OFFBOARD for mode in _STEERABLE},
+    **{(mode, Event.GO_HOME): Mode.RETURN for mode in ARMED},
+    **{(mode, Event.HOLD): Mode.HOLD for mode in ARMED},
+    **{(mode, Event.LAND): Mode.LAND for mode in ARMED},
+    **{(mode, Event.DISARM): Mode.DISARMED for mode in ARMED},
     (Mode.TAKEOFF, Event.CLIMB_DONE): Mode.HOLD,
     (Mode.TRAJECTORY, Event.TRAJECTORY_DONE): Mode.HOLD,
+    (Mode.MISSION, Event.MISSION_DONE): Mode.HOLD,
+    (Mode.RETURN, Event.HOME_REACHED): Mode.LAND,
+    (Mode.OFFBOARD, Event.SETPOINTS_LOST): Mode.HOLD,
+    # Whoever flies by itself goes on: a mission, a trajectory, a return, a landing.
+    **{(mode, Event.LINK_LOST): Mode.RETURN for mode in (Mode.TAKEOFF, Mode.HOLD, Mode.OFFBOARD)},
     (Mode.LAND, Event.TOUCHED_DOWN): Mode.DISARMED,
-    **{(mode, Event.HOLD): Mode.HOLD for mode in _FLYING},
-    **{(mode, Event.LAND): Mode.LAND for mode in _FLYING},
-    **{(mode, Event.DISARM): Mode.DISARMED for mode in _FLYING},
-    **{(mode, Event.TERMINATE): Mode.FAULT for mode in (Mode.DISARMED, *_FLYING)},
+    **{(mode, Event.TERMINATE): Mode.FAULT for mode in (Mode.DISARMED, *ARMED)},
 }
 
 

@@ -206,7 +206,8 @@ def _command(plan: FlightPlan, phase: Phase) -> SendCommand:
     if phase is Phase.ARM:
         return SendCommand(command, (1.0, 0.0, _NAN, _NAN, _NAN, _NAN, _NAN))
     if phase is Phase.FOLLOW:
-        # Custom mode (1), PX4's main mode 6: offboard, here the end-effector's trajectory.
-        return SendCommand(command, (1.0, 6.0, 0.0, _NAN, _NAN, _NAN, _NAN))
+        # Custom mode (1), PX4's main mode 4, automatic, and its first sub mode for modes of
+        # others: here the end-effector's trajectory.
+        return SendCommand(command, (1.0, 4.0, 11.0, _NAN, _NAN, _NAN, _NAN))
     height = plan.takeoff_height_m if phase is Phase.TAKE_OFF else _NAN
     return SendCommand(command, (_NAN, _NAN, _NAN, _NAN, _NAN, _NAN, height))

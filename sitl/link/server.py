@@ -81,7 +81,8 @@ def fly(
                 begin_s = time.perf_counter()
             _advance(simulation, answer)
         except SimulatorError as error:
-            simulation.end(EndKind.STOPPED, str(error))
+            kind = EndKind.INTERRUPTED if stop.requested else EndKind.STOPPED
+            simulation.end(kind, str(error))
             break
         state = pilot.listen(plan, state, _heard(answer, readings), readings.t_us)
         if state.refusal is not None:
@@ -89,7 +90,7 @@ def fly(
         elif state.done:
             simulation.end(EndKind.MISSION, f"landed and disarmed after {simulation.time_s:.1f} s")
         elif stop.requested:
-            simulation.end(EndKind.STOPPED, f"interrupted at step {simulation.step}")
+            simulation.end(EndKind.INTERRUPTED, f"interrupted at step {simulation.step}")
         if simulation.step % _PROGRESS_STEPS == 0:
             now_s = time.perf_counter()
             if now_s - reported_s >= _PROGRESS_S:

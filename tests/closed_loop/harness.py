@@ -105,7 +105,7 @@ class Flight:
     def follow(self) -> None:
         """Arm and start the scenario's trajectory, both in their first possible tick."""
         self.step(command(ARM, 1.0))
-        self.step(command(SET_MODE, 1.0, 6.0, 0.0))
+        self.step(command(SET_MODE, 1.0, 4.0, 11.0))
         assert self.mode is Mode.TRAJECTORY, self.texts
 
     def run(self, seconds: float) -> None:

@@ -37,7 +37,7 @@ def test_one_hop_goes_through_its_modes_and_ends_standing() -> None:
 def test_on_the_ground_it_refuses_to_follow_and_says_why() -> None:
     flight = Flight(on_the_ground())
     flight.step(command(ARM, 1.0))
-    flight.step(command(176, 1.0, 6.0, 0.0))
+    flight.step(command(176, 1.0, 4.0, 11.0))
     assert flight.mode is Mode.HOLD
     assert flight.results[-1] == (176, 1)
     assert any("ground" in text for text in flight.texts)

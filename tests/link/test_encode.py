@@ -34,7 +34,7 @@ def stream_of(message_id: int) -> Stream:
 
 # What pymavlink must read for the snapshot, one or a few telling fields a message.
 TELLING: dict[int, dict[str, Any]] = {
-    ids.HEARTBEAT: {"type": 2, "autopilot": 12, "custom_mode": 6 << 16, "system_status": 4},
+    ids.HEARTBEAT: {"type": 2, "autopilot": 12, "custom_mode": 0x0B040000, "system_status": 4},
     ids.SYS_STATUS: {"load": 40, "voltage_battery": 65535, "battery_remaining": -1},
     ids.EXTENDED_SYS_STATE: {"landed_state": 2},
     ids.ATTITUDE: {"time_boot_ms": 3004, "yaw": math.pi / 2, "rollspeed": 0.4},
@@ -87,7 +87,10 @@ def test_arrays_of_the_arm_hold_two_joints_and_zeros() -> None:
         (Mode.TAKEOFF, 4, 2),
         (Mode.HOLD, 4, 3),
         (Mode.LAND, 4, 6),
-        (Mode.TRAJECTORY, 6, 0),
+        (Mode.TRAJECTORY, 4, 11),
+        (Mode.MISSION, 4, 4),
+        (Mode.RETURN, 4, 5),
+        (Mode.OFFBOARD, 6, 0),
     ],
 )
 def test_modes_have_the_names_that_px4_gave_them(mode: Mode, main: int, sub: int) -> None:

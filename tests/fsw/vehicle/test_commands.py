@@ -45,8 +45,7 @@ def ask(situation: Situation, command: int, *given_params: float) -> Decision:
         (IDLING, SET_MODE, (1.0, 4.0, 2.0), Event.TAKE_OFF),
         (HOLDING, LAND, (), Event.LAND),
         (HOLDING, SET_MODE, (1.0, 4.0, 6.0), Event.LAND),
-        (HOLDING, SET_MODE, (1.0, 6.0, 0.0), Event.FOLLOW),
-        (HOLDING, SET_MODE, (1.0, 6.0), Event.FOLLOW),
+        (HOLDING, SET_MODE, (1.0, 4.0, 11.0), Event.FOLLOW),
         (replace(HOLDING, mode=Mode.TRAJECTORY), SET_MODE, (1.0, 4.0, 3.0), Event.HOLD),
         (HOLDING, ARM, (0.0, 21196.0), Event.DISARM),
     ],
@@ -66,9 +65,9 @@ def test_a_command_in_order_causes_its_event_whatever_unused_parameters_hold(
         (HOLDING, TAKEOFF, (), "air"),
         (STANDING, TAKEOFF, (), "not armed"),
         (STANDING, LAND, (), "disarmed"),
-        (IDLING, SET_MODE, (1.0, 6.0, 0.0), "ground"),
-        (replace(HOLDING, targets_ahead=False), SET_MODE, (1.0, 6.0, 0.0), "END_EFFECTOR_TARGET"),
-        (replace(HOLDING, mode=Mode.LAND), SET_MODE, (1.0, 6.0, 0.0), "land"),
+        (IDLING, SET_MODE, (1.0, 4.0, 11.0), "ground"),
+        (replace(HOLDING, targets_ahead=False), SET_MODE, (1.0, 4.0, 11.0), "END_EFFECTOR_TARGET"),
+        (replace(HOLDING, mode=Mode.LAND), SET_MODE, (1.0, 4.0, 11.0), "land"),
     ],
 )
 def test_a_command_out_of_place_is_refused_with_a_reason(
@@ -113,7 +112,7 @@ def test_an_unknown_command_is_unsupported(command: int) -> None:
         (HOLDING, ARM, (1.0,)),
         (STANDING, ARM, (0.0,)),
         (HOLDING, SET_MODE, (1.0, 4.0, 3.0)),
-        (replace(HOLDING, mode=Mode.TRAJECTORY), SET_MODE, (1.0, 6.0, 0.0)),
+        (replace(HOLDING, mode=Mode.TRAJECTORY), SET_MODE, (1.0, 4.0, 11.0)),
         (replace(HOLDING, mode=Mode.LAND), LAND, ()),
     ],
 )
@@ -141,7 +140,7 @@ def test_a_takeoff_goes_to_a_height_above_where_the_vehicle_stands(
 
 
 def test_an_inconsistent_safe_set_forbids_arming_and_following() -> None:
-    for situation, command in ((STANDING, (ARM, 1.0)), (HOLDING, (SET_MODE, 1.0, 6.0, 0.0))):
+    for situation, command in ((STANDING, (ARM, 1.0)), (HOLDING, (SET_MODE, 1.0, 4.0, 11.0))):
         decision = ask(replace(situation, inconsistent="the sphere is too small"), *command)
         assert decision.result == DENIED
         assert "too small" in decision.reason
