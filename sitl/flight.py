@@ -56,9 +56,10 @@ class Flight:
         self._settle()
         exchange = self._exchange(stop)
         timing = fly(simulation, plan, exchange, encoder, stop, self._progress)
-        stopped = simulation.ended is not None and simulation.ended.kind is EndKind.STOPPED
         # A vehicle that has just been silent for two seconds is not worth another one.
-        shut_down(endpoint, encoder, tries=1 if stopped else 4)
+        tries = {EndKind.STOPPED: 1, EndKind.INTERRUPTED: 2}
+        end = simulation.ended
+        shut_down(endpoint, encoder, tries=4 if end is None else tries.get(end.kind, 4))
         result = simulation.result()
         written = self._as_json(result, timing, exchange)
         self._write(written)
