@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from fsw.barriers.margins import constraint_report
+from fsw.control.braking import Brake
 from fsw.control.cascade import Cascade, CascadeMemory, at_rest
 from fsw.estimation.estimator import estimate_state
 from fsw.model.arm_kinematics import point_in_flight
@@ -49,6 +50,7 @@ class FlightLoop:
         dt = config.tick_period_us * 1e-6
         lag = config.planner.lag
         self._model = NominalModel(lag, dt)
+        self._brake = Brake(lag)
         self._cascade = Cascade(config.airframe, lag, config.tuning, config.inner, dt)
         self._modes = ModeKeeper(config)
         self._loop_tube = loop_tube(config)
@@ -131,14 +133,14 @@ class FlightLoop:
             nominal = late_start(self._model, new_plan, now_us, tick_us)
         elif now_us > plan.since_us:
             for ago in range(ticks, 0, -1):
-                u = plan_input(running, nominal, now_us - ago * tick_us)
+                u = plan_input(running, nominal, now_us - ago * tick_us, self._brake)
                 nominal = self._model.step(nominal, u)
         state = replace(state, nominal=nominal, plan=plan)
         request = None
         if planning_due:
             request, plan = self._ask(state, estimate, nominal, now_us)
             state = replace(state, plan=plan)
-        return state, request, plan_input(plan.running, nominal, now_us)
+        return state, request, plan_input(plan.running, nominal, now_us, self._brake)
 
     def _receive(
         self,
@@ -169,6 +171,7 @@ class FlightLoop:
         return ask(
             config,
             self._model,
+            self._brake,
             state.plan,
             nominal,
             measured,

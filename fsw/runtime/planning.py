@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 
+from fsw.control.braking import Brake
 from fsw.geometry.rotation import wrap_angle
 from fsw.model.nominal import NominalModel
 from fsw.model.rotors import MotionState
@@ -23,9 +24,6 @@ from fsw.signals import (
     Vec3,
 )
 from fsw.vehicle.faults import PLAN_STALE_PERIODS
-
-_BRAKE_RATE = 1.5  # 1/s; slower than the attitude loop, so that stopping does not ring
-_BRAKE_LIMIT = 2.0  # m/s^2
 
 
 def nominal_at_rest(estimate: StateEstimate) -> PredictionState:
@@ -83,20 +81,13 @@ def _each(value: Callable[[int], float]) -> Vec3:
     return value(0), value(1), value(2)
 
 
-def plan_input(plan: Plan | None, nominal: PredictionState, now_us: int) -> PlanInput:
+def plan_input(plan: Plan | None, nominal: PredictionState, now_us: int, brake: Brake) -> PlanInput:
     """The running plan's input at its age; braking where there is none young enough."""
     if plan is not None:
         step = (now_us - plan.t_us) // plan.period_us
         if 0 <= step < min(PLAN_STALE_PERIODS, len(plan.inputs)):
             return plan.inputs[step]
-    return _brake(nominal)
-
-
-def _brake(x: PredictionState) -> PlanInput:
-    """Stop the plan state where it is, within what the vehicle can surely follow."""
-    ax, ay, az = (min(max(-_BRAKE_RATE * v, -_BRAKE_LIMIT), _BRAKE_LIMIT) for v in x.v)
-    qdd1, qdd2 = (min(max(-4.0 * qd, -5.0), 5.0) for qd in x.qd_arm)
-    return PlanInput((ax, ay, az), min(max(-x.yaw_rate, -0.1), 0.1), (qdd1, qdd2))
+    return brake(nominal)
 
 
 def take_answer(
@@ -146,6 +137,7 @@ def late_start(model: NominalModel, plan: Plan, now_us: int, dt_us: int) -> Pred
 def ask(
     config: FlightConfig,
     model: NominalModel,
+    brake: Brake,
     memory: PlanMemory,
     nominal: PredictionState,
     measured: PredictionState,
@@ -167,7 +159,7 @@ def ask(
     )
     delay = config.plan_delay_ticks
     if from_nominal:
-        start = model.advance(nominal, plan_input(memory.running, nominal, now_us), delay)
+        start = model.advance(nominal, plan_input(memory.running, nominal, now_us, brake), delay)
     else:
         start = coast(measured, delay * config.tick_period_us * 1e-6)
     apply_us = now_us + delay * config.tick_period_us

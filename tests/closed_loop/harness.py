@@ -116,7 +116,6 @@ class Flight:
 
     def step(self, *commands: CommandRequest) -> TickOutputs:
         """Sense, tick, plan, advance."""
-        assert self.planner is not None
         sensors = self.spoil(frame(self.sim.sense()))
         self.inputs = TickInputs(
             sensors,
@@ -128,10 +127,7 @@ class Flight:
         before = self.mode
         self.state, outputs = self.loop.tick(self.state, self.inputs)
         self._outputs = outputs
-        request = outputs.plan_request
-        if request is not None:
-            due_us = request.t_apply_us + STEP_US * self.late_ticks(request.plan_id)
-            self._answer = (due_us, self.planner.plan(request))
+        self._submit(outputs)
         self.texts += [text.text for text in outputs.texts]
         self.results += [(ack.command, ack.result) for ack in outputs.acks]
         if self.mode is not before:
@@ -139,6 +135,12 @@ class Flight:
         self.sent.append(outputs.actuators)
         self.sim.advance(self._controls(outputs))
         return outputs
+
+    def _submit(self, outputs: TickOutputs) -> None:
+        request = outputs.plan_request
+        if request is not None and self.planner is not None:
+            due_us = request.t_apply_us + STEP_US * self.late_ticks(request.plan_id)
+            self._answer = (due_us, self.planner.plan(request))
 
     def _due(self, t_us: int) -> Plan | PlanFailure | None:
         if self._answer is None or t_us < self._answer[0]:

@@ -1,0 +1,82 @@
+r"""What is flown where no plan is young enough: the plan's state is brought to rest.
+
+Each horizontal axis is a velocity with the attitude's lag behind it, and braking is its linear
+quadratic regulator, :math:`u = -K (v, a, j, s)`: it takes back a tilt that points the wrong way
+while it brakes, which feedback of the velocity alone does not. The wish is cut to the tilt that
+the planner may use as well, along its own direction; the lag bounds the jerk.
+
+It knows no walls. It keeps them because the barrier counts on a deceleration that this law exceeds
+in every direction: from a state with :math:`h \ge \lambda` the plan stops before the wall
+(``tests/fsw/control/test_braking.py`` says from which states). A sphere that moves on with its
+target leaves a vehicle at rest behind.
+
+Source: docs/timing.md, docs/decisions/0015-own-grid-own-process.md.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import solve_continuous_are
+
+from fsw.model.airframe import GRAVITY
+from fsw.model.prediction import A, J, LagModel, S, V, continuous_model
+from fsw.signals import PlanInput, PredictionState, Vec2
+
+
+@dataclass(frozen=True, slots=True)
+class BrakeTuning:
+    """How hard to brake."""
+
+    effort: float = 0.02  # price of (m/s^2)^2 against (m/s)^2
+    tilt: float = math.pi / 10.0  # rad, the planner's own limit
+    vertical_rate: float = 4.0  # 1/s
+    vertical: float = 2.0  # m/s^2
+    joint_rate: float = 6.0  # 1/s
+    joint: float = 5.0  # rad/s^2
+    yaw: float = 0.1  # rad/s^2; the rotors' drag gives hardly more
+
+
+class Brake:
+    """The braking law of one prediction model."""
+
+    def __init__(self, lag: LagModel, tuning: BrakeTuning | None = None) -> None:
+        self._tuning = tuning or BrakeTuning()
+        self._gains = _gains(lag, self._tuning.effort)
+
+    def __call__(self, x: PredictionState) -> PlanInput:
+        """The input that brings a state of the plan towards rest."""
+        tuning = self._tuning
+        vertical = _limited(-tuning.vertical_rate * x.v[2], tuning.vertical)
+        kv, ka, kj, ks = self._gains
+        wish_x = -(kv * x.v[0] + ka * x.a[0] + kj * x.j[0] + ks * x.s[0])
+        wish_y = -(kv * x.v[1] + ka * x.a[1] + kj * x.j[1] + ks * x.s[1])
+        # The thrust points along a - g: the same tilt is less acceleration while descending.
+        most = math.tan(tuning.tilt) * (GRAVITY - max(vertical, 0.0))
+        scale = min(1.0, most / max(math.hypot(wish_x, wish_y), 1e-9))
+        first, second = x.qd_arm
+        joints: Vec2 = (
+            _limited(-tuning.joint_rate * first, tuning.joint),
+            _limited(-tuning.joint_rate * second, tuning.joint),
+        )
+        return PlanInput(
+            (scale * wish_x, scale * wish_y, vertical), _limited(-x.yaw_rate, tuning.yaw), joints
+        )
+
+
+def _gains(lag: LagModel, effort: float) -> tuple[float, float, float, float]:
+    """On velocity, acceleration, jerk and snap of one horizontal axis."""
+    if lag.at_once:
+        return 1.0 / math.sqrt(effort), 0.0, 0.0, 0.0
+    a, b = continuous_model(lag)
+    axis = [V, A, J, S]
+    a_axis, b_axis = a[np.ix_(axis, axis)], b[axis, :1]
+    price = solve_continuous_are(a_axis, b_axis, np.diag([1.0, 0.0, 0.0, 0.0]), [[effort]])
+    kv, ka, kj, ks = (b_axis.T @ price / effort)[0].tolist()
+    return kv, ka, kj, ks
+
+
+def _limited(value: float, bound: float) -> float:
+    return min(max(value, -bound), bound)

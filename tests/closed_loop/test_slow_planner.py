@@ -1,0 +1,111 @@
+"""A planner that takes 40, 99, 101 or 250 ms: each has its defined response, and costs no barrier.
+
+The planner is a process of its own: it works on one request at a time, and what was asked meanwhile
+waits, the newest in front. An answer within its period is flown at its age and counted as a missed
+deadline; a later one answers a question that was given up.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import pytest
+
+from fsw.mpc.planner import Planner
+from fsw.parameters.flight_config import flight_config
+from fsw.signals import Plan, PlanFailure, PlanRequest, TickOutputs
+from fsw.vehicle.faults import Fault
+from sitl.scenario_file import load_scenario
+from tests.closed_loop.harness import Flight, real_planner
+
+SLOW_FROM_S, SLOW_TO_S, END_S = 2.0, 4.0, 6.0
+
+
+@dataclass
+class OneAtATime:
+    """Answers when its time of work is over, counted in simulated time."""
+
+    planner: Planner
+    takes_us: int = 0
+    waiting: PlanRequest | None = None
+    at_work: PlanRequest | None = None
+    ready_us: int = 0
+
+    def submit(self, request: PlanRequest, now_us: int) -> None:
+        self.waiting = request
+        self._begin(now_us)
+
+    def take(self, now_us: int) -> Plan | PlanFailure | None:
+        request = self.at_work
+        if request is None or now_us < max(self.ready_us, request.t_apply_us):
+            return None
+        self.at_work = None
+        self._begin(now_us)
+        return self.planner.plan(request)
+
+    def _begin(self, now_us: int) -> None:
+        if self.at_work is None and self.waiting is not None:
+            self.at_work, self.waiting = self.waiting, None
+            self.ready_us = now_us + self.takes_us
+
+
+@dataclass
+class SlowFlight(Flight):
+    """A flight whose planner is slow for a while."""
+
+    takes_ms: int = 1
+    service: OneAtATime = field(init=False)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.service = OneAtATime(real_planner(self.config))
+
+    def _due(self, t_us: int) -> Plan | PlanFailure | None:
+        slow = SLOW_FROM_S <= self.sim.time_s < SLOW_TO_S
+        self.service.takes_us = 1000 * self.takes_ms if slow else 1000
+        return self.service.take(t_us)
+
+    def _submit(self, outputs: TickOutputs) -> None:
+        if outputs.plan_request is not None:
+            self.service.submit(outputs.plan_request, outputs.snapshot.t_us)
+
+
+@pytest.mark.parametrize(
+    ("takes_ms", "missed", "given_up", "brakes"),
+    [(19, 0, 0, False), (40, 20, 0, False), (99, 20, 0, False), (101, 20, 20, True),
+     (250, 20, 20, True)],
+)  # fmt: skip
+def test_a_slow_planner_has_its_response(
+    takes_ms: int, missed: int, given_up: int, brakes: bool
+) -> None:
+    flight = SlowFlight(load_scenario("walls"), seed=11, takes_ms=takes_ms)
+    flight.follow()
+    flight.run(SLOW_TO_S - flight.sim.time_s)
+    counters = flight.snapshot.counters
+    assert counters.missed_deadlines == pytest.approx(missed, abs=1)
+    assert counters.fallbacks == pytest.approx(given_up, abs=1)
+    assert (Fault.PLAN_STALE.value in flight.snapshot.failures) == brakes
+    if brakes:
+        assert math.dist(flight.sim.truth().v_WB, (0.0, 0.0, 0.0)) < 0.15, "disturbed, but held"
+    flight.run(END_S - flight.sim.time_s)
+    assert flight.snapshot.failures == ()
+    assert flight.snapshot.counters.missed_deadlines == pytest.approx(missed, abs=3)
+    assert flight.sim.min_margin_m is not None
+    assert flight.sim.min_margin_m > 0.0
+
+
+@pytest.mark.parametrize("gone_s", [3.1, 9.4, 14.0])
+def test_in_walls_a_planner_that_is_gone_costs_no_barrier(gone_s: float) -> None:
+    last = round(10 * gone_s)
+    flight = Flight(
+        load_scenario("walls"),
+        seed=4,
+        config=flight_config(),
+        late_ticks=lambda plan: 0 if plan < last else 10**9,
+    )
+    flight.follow()
+    flight.run(gone_s + 3.0)
+    assert Fault.PLAN_STALE.value in flight.snapshot.failures
+    assert flight.sim.min_margin_m is not None
+    assert flight.sim.min_margin_m > 0.0
