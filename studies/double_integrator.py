@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from fsw.control.braking import Brake
 from fsw.model.airframe import AIRFRAME
 from fsw.mpc.planner import Planner
 from fsw.parameters.flight_config import FlightConfig
@@ -165,6 +166,7 @@ def fly(
     """
     plant = DoubleIntegrator(scenario, seed)
     planner = Planner(config.planner, processor_time_us)
+    brake = Brake(config.planner.lag)
     recorder = FlightRecorder()
     held, running = safe_set(scenario), None
     steps = config.mpc_period_us // STEP_US
@@ -179,7 +181,7 @@ def fly(
         recorder.planned(answer)
         running = answer if isinstance(answer, Plan) else running
         # As in flight: without an answer the running plan goes on, then the vehicle brakes.
-        u = plan_input(running, start, t_us)
+        u = plan_input(running, start, t_us, brake)
         recorder.effort.add(u)
         for _ in range(steps):
             if traced and plant.step % TRACE_STEPS == 0:
