@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 from fsw.arguments import FswOptions
+from fsw.link.flight_logs import FlightLog, flight_logs
+from fsw.link.ftp_service import FtpService
 from fsw.link.gcs_link import GcsLink
 from fsw.link.inbox import Inbox
+from fsw.link.log_service import LogService
 from fsw.link.service import LinkService
 from fsw.link.sim_link import Pacing, SimLink
 from fsw.link.telemetry import LoopHealth, TelemetryContext
 from fsw.link.udp_endpoint import LinkError, parse_address
+from fsw.link.vehicle_files import vehicle_files
 from fsw.log.run_directory import new_run_directory
 from fsw.log.tlog import TlogWriter
 from fsw.ports import Planner, PlanService
@@ -99,7 +103,7 @@ class _Session:
         log = TlogWriter(directory / "flight.tlog", clock.unix_us())
         sim = SimLink(simulator, inbox, facts)
         context = TelemetryContext(facts, record.health)
-        gcs = GcsLink(ground, inbox, context, log.add, self._services())
+        gcs = GcsLink(ground, inbox, context, log.add, self._services(flight_logs(directory)))
         loop = SimLoop(program, sim, gcs, inbox, record, clock.now_us, self._stop)
         try:
             end = self._fly(loop, sim, program.planner, record)
@@ -112,9 +116,9 @@ class _Session:
         self._told.report("ended", f"fsw: {end.sentence}", ending=end.ending.value)
         return DONE if end.ending is Ending.SHUTDOWN else NOT_COMPLETED
 
-    def _services(self) -> tuple[LinkService, ...]:
+    def _services(self, logs: Sequence[FlightLog]) -> tuple[LinkService, ...]:
         """What one link serves; called once a link."""
-        return ()
+        return LogService(logs), FtpService(vehicle_files(logs))
 
     def _fly(
         self,

@@ -28,6 +28,11 @@ RecordFrame = Callable[[int, bytes], None]
 _POLL_TICKS: Final = 5  # 100 Hz: a system call a tick would be spent on silence
 _POLL_BYTES: Final = 4096  # a poll; a flood waits in the kernel, and is dropped there
 _MAX_DATAGRAM_OUT: Final = 1400  # bytes
+_MESSAGE_ID: Final = slice(7, 10)  # in a frame
+# Not recorded: a log that is downloaded while it is written would grow by what is sent of it.
+_FILE_DATA: Final = frozenset(
+    id_.to_bytes(3, "little") for id_ in (message_ids.LOG_DATA, message_ids.FILE_TRANSFER_PROTOCOL)
+)
 
 
 class GcsLink:
@@ -68,9 +73,11 @@ class GcsLink:
 
     def poll(self, t_us: int) -> None:
         """Read and answer what ground stations sent, within a budget; call it once a tick."""
-        self._dispatch.poll(t_us, self._answer)
         if self._tick % _POLL_TICKS == 0:
             self._read_waiting(t_us)
+            self._send_answers(t_us)
+
+    def _send_answers(self, t_us: int) -> None:
         if self._answers:
             frames, self._answers = self._answers, []
             self._send(t_us, frames)
@@ -101,6 +108,8 @@ class GcsLink:
             self._encode_text(text, frames)
         if frames:
             self._send(snapshot.t_us, frames)
+        self._dispatch.poll(snapshot.t_us, self._answer)
+        self._send_answers(snapshot.t_us)
 
     def acknowledge(self, t_us: int, ack: CommandAck) -> None:
         """Answer a command that came over this link."""
@@ -150,7 +159,8 @@ class GcsLink:
 
     def _send(self, t_us: int, frames: list[bytes]) -> None:
         for frame in frames:
-            self._record(t_us, frame)
+            if frame[_MESSAGE_ID] not in _FILE_DATA:
+                self._record(t_us, frame)
         for datagram in _packed(frames):
             for peer in self._peers.all:
                 self._endpoint.send(datagram, peer)

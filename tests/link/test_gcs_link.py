@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import contextlib
 import random
 import socket
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 import pytest
 
 from fsw.link import message_ids as ids
+from fsw.link.flight_logs import flight_logs
 from fsw.link.gcs_link import GcsLink
 from fsw.link.inbox import Inbox
+from fsw.link.log_service import LogService
 from fsw.link.service import Outgoing
 from fsw.signals import CommandAck, Mode, StatusText
 from messages.frames import Frame, FrameWriter, split
@@ -221,16 +225,43 @@ def echo() -> Iterator[tuple[Ground, Echo]]:
     station.close()
 
 
-def test_a_service_answers_within_the_same_poll_and_goes_on_in_later_ones(
+def test_a_service_answers_within_the_same_poll_and_goes_on_after_later_ticks(
     echo: tuple[Ground, Echo],
 ) -> None:
     ground, _ = echo
     ground.polled(FrameWriter(255, 190).frame(ids.PING, 77, 5, 0, 0))
     assert [frame.payload_values for frame in ground.heard()] == [(77, 5, 0, 0)]
-    ground.poll()
-    ground.poll()
-    ground.poll()
-    assert [frame.payload_values[1] for frame in ground.heard()] == [1, 0]
+    for tick in range(3):
+        ground.link.publish(outputs_at(1_000_000 + 2_000 * tick))
+    pings = [frame for frame in ground.heard() if frame.message_id == ids.PING]
+    assert [frame.payload_values[1] for frame in pings] == [1, 0]
+
+
+def test_a_log_that_is_downloaded_does_not_grow_by_it(tmp_path: Path) -> None:
+    run = tmp_path / "run-1"
+    run.mkdir()
+    (run / "flight.tlog").write_bytes(bytes(2000))
+    recorded: list[bytes] = []
+    station, service = station_socket(), LogService(flight_logs(run))
+    record = lambda t_us, frame: recorded.append(frame)  # noqa: E731
+    link = GcsLink(station.getsockname(), Inbox(), CONTEXT, record, (service,))
+    request = FrameWriter(255, 190).frame(ids.LOG_REQUEST_DATA, 0, 2000, 0, 1, 1)
+    station.sendto(request, ("127.0.0.1", link.port))
+    for tick in range(20):
+        link.poll(1_000_000 + 2_000 * tick)
+        link.publish(outputs_at(1_000_000 + 2_000 * tick))
+    sent = Counter(frame.message_id for frame in split(b"".join(_datagrams(station))))
+    kept = Counter(frame.message_id for frame in split(b"".join(recorded)))
+    assert sent[ids.LOG_DATA] == 23
+    assert kept == sent - Counter({ids.LOG_DATA: 23}) + Counter({ids.LOG_REQUEST_DATA: 1})
+    link.close()
+    station.close()
+
+
+def _datagrams(station: socket.socket) -> Iterator[bytes]:
+    with contextlib.suppress(BlockingIOError):
+        while True:
+            yield station.recv(2048)
 
 
 def test_a_service_that_fails_ends_neither_the_link_nor_the_flight(

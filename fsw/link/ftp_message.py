@@ -1,0 +1,115 @@
+"""What the payload of a FILE_TRANSFER_PROTOCOL message says; pure.
+
+Source: https://mavlink.io/en/services/ftp.html
+"""
+
+from __future__ import annotations
+
+import enum
+import struct
+from dataclasses import dataclass
+from typing import Final
+
+MAX_DATA: Final = 239  # bytes in one message
+_PAYLOAD: Final = 251
+_HEADER: Final = struct.Struct("<HBBBBBxI")
+
+
+class Opcode(enum.IntEnum):
+    """What is asked for, or answered."""
+
+    TERMINATE_SESSION = 1
+    RESET_SESSIONS = 2
+    LIST_DIRECTORY = 3
+    OPEN_FILE_RO = 4
+    READ_FILE = 5
+    CREATE_FILE = 6
+    WRITE_FILE = 7
+    REMOVE_FILE = 8
+    CREATE_DIRECTORY = 9
+    REMOVE_DIRECTORY = 10
+    OPEN_FILE_WO = 11
+    TRUNCATE_FILE = 12
+    RENAME = 13
+    CALC_FILE_CRC32 = 14
+    BURST_READ_FILE = 15
+    ACK = 128
+    NAK = 129
+
+
+class Refusal(enum.IntEnum):
+    """Why not: the byte of data in a NAK."""
+
+    FAIL = 1
+    INVALID_DATA_SIZE = 3
+    INVALID_SESSION = 4
+    NO_SESSIONS_AVAILABLE = 5
+    END_OF_FILE = 6
+    UNKNOWN_COMMAND = 7
+    FILE_PROTECTED = 9
+    FILE_NOT_FOUND = 10
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """A message to the vehicle."""
+
+    sequence: int
+    session: int
+    opcode: int
+    size: int  # bytes of data, or bytes that a read asks for
+    offset: int  # bytes into the file, or entries into the directory
+    data: bytes
+
+    @property
+    def damaged(self) -> bool:
+        """Whether it announces more data than there is room for."""
+        return self.size > MAX_DATA
+
+    @property
+    def path(self) -> bytes:
+        """The path that the data name; clients may or may not end it with NUL."""
+        return self.data.partition(b"\0")[0]
+
+
+@dataclass(frozen=True, slots=True)
+class Reply:
+    """A message from the vehicle, but for its sequence number."""
+
+    opcode: Opcode
+    session: int = 0
+    offset: int = 0
+    data: bytes = b""
+    burst_complete: bool = False
+
+
+def read(payload: bytes) -> Request:
+    """Take a payload of 251 bytes apart."""
+    sequence, session, opcode, size, _, _, offset = _HEADER.unpack_from(payload)
+    data = payload[_HEADER.size : _HEADER.size + size]
+    return Request(sequence, session, opcode, size, offset, data)
+
+
+def write(reply: Reply, requested: int, sequence: int) -> bytes:
+    """Make a payload of 251 bytes.
+
+    Args:
+        reply: What to say.
+        requested: Opcode of the request that is answered.
+        sequence: That of the request and one more; it starts again at 0 after 65535.
+    """
+    header = _HEADER.pack(
+        sequence & 0xFFFF,
+        reply.session,
+        reply.opcode,
+        len(reply.data),
+        requested,
+        reply.burst_complete,
+        reply.offset,
+    )
+    return (header + reply.data).ljust(_PAYLOAD, b"\0")
+
+
+def refused(why: Refusal, session: int = 0) -> Reply:
+    """A NAK."""
+    return Reply(Opcode.NAK, session, data=bytes([why]))
