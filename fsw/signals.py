@@ -179,6 +179,65 @@ class SafeSet:
         return ConstraintKind.WALLS if self.walls else ConstraintKind.NONE
 
 
+# ---------------------------------------------------------------- mission
+
+
+class MissionAction(Enum):
+    """What one step of a mission does."""
+
+    TAKE_OFF = "take off"
+    GO = "go"  # to a position, then stay for hold_s
+    DELAY = "delay"  # stay for hold_s
+    SPEED = "speed"  # of the legs that follow
+    LAND = "land"
+    RETURN = "return"
+
+
+@dataclass(frozen=True, slots=True)
+class MissionStep:
+    """One step, as read from the mission item of the same number."""
+
+    action: MissionAction
+    position: Vec3 | None = None  # m, of the end-effector (takeoff: of the base); None: right here
+    above_home: bool = False  # position's z counts from home's
+    yaw: float | None = None  # rad; None: as it is
+    hold_s: float = 0.0
+    acceptance: float = 0.1  # m, end-effector to position
+    speed: float | None = None  # m/s; None: the usual
+    stop_after: bool = False  # hold until told to go on
+
+
+@dataclass(frozen=True, slots=True)
+class MissionUpdate:
+    """What a ground station changed since the last tick; None where it did not."""
+
+    steps: tuple[MissionStep, ...] | None = None
+    fence: SafeSet | None = None
+    rally: tuple[Vec2, ...] | None = None  # m, north and east
+    current: int | None = None  # the step to fly next
+
+
+class MissionState(IntEnum):
+    """How far a mission is; values equal MISSION_STATE of MAVLink."""
+
+    NO_MISSION = 1
+    NOT_STARTED = 2
+    ACTIVE = 3
+    PAUSED = 4
+    COMPLETE = 5
+
+
+@dataclass(frozen=True, slots=True)
+class MissionProgress:
+    """What ground stations are told of the mission."""
+
+    state: MissionState = MissionState.NO_MISSION
+    current: int = 0
+    total: int = 0
+    reached: int = -1  # the last step that was
+    reached_count: int = 0  # grows with each, so that none is missed
+
+
 # ---------------------------------------------------------------- estimate
 
 
@@ -368,6 +427,7 @@ class FlightSnapshot:
     battery: BatteryState = BatteryState()
     arming_refusal: str = ""  # why it cannot be armed; empty: it could be, or is
     offboard: OffboardReport = OffboardReport()
+    mission: MissionProgress = MissionProgress()
 
 
 @dataclass(frozen=True, slots=True)
@@ -385,6 +445,7 @@ class TickInputs:
     joints: JointSetpoint | None = None
     refused_setpoints: int = 0  # that were of no use, since the last tick
     ground_station_heard: bool = False  # a heartbeat, since the last tick
+    mission: MissionUpdate | None = None  # newly uploaded
 
 
 @dataclass(frozen=True, slots=True)

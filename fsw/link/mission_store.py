@@ -1,0 +1,144 @@
+"""What was uploaded: mission, fence and rally points, shared by every link.
+
+Kept as it came, so that a download returns it bit for bit, and handed to the tick as what it
+means. It lives as long as the process (docs/decisions/0013-missions.md).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from enum import IntEnum
+from typing import Final
+
+from fsw.signals import (
+    FlightSnapshot,
+    MissionProgress,
+    MissionStep,
+    MissionUpdate,
+    Mode,
+    SafeSet,
+    Vec2,
+)
+from fsw.vehicle.fence import read_fence, read_fence_item
+from fsw.vehicle.mission_items import DENIED, Locate, MissionItem, Refused, read_rally, read_step
+
+Judge = Callable[[SafeSet], tuple[str, ...]]
+"""Why the vehicle could not keep a safe set; nothing where it can."""
+
+Meaning = MissionStep | Vec2 | None
+"""What one item means; a fence item means something only in its shape."""
+
+
+class Kind(IntEnum):
+    """Values of MAV_MISSION_TYPE."""
+
+    MISSION = 0
+    FENCE = 1
+    RALLY = 2
+
+
+ALL_KINDS: Final = 255  # MAV_MISSION_TYPE_ALL
+ROOM: Final = {Kind.MISSION: 500, Kind.FENCE: 64, Kind.RALLY: 16}
+
+
+@dataclass(frozen=True, slots=True)
+class Site:
+    """Where missions are flown."""
+
+    locate: Locate
+    judge: Judge
+    clearance: float  # m, from the walls of a fence
+
+
+class MissionStore:
+    """The three lists, and what changed since the last tick."""
+
+    def __init__(self, site: Site) -> None:
+        self.progress = MissionProgress()
+        self.in_mission = False
+        self._site = site
+        self._items: dict[Kind, tuple[MissionItem, ...]] = dict.fromkeys(Kind, ())
+        self._update: MissionUpdate | None = None
+        self._snapshot: FlightSnapshot | None = None
+
+    def observe(self, snapshot: FlightSnapshot) -> None:
+        """See the vehicle after a tick."""
+        self._snapshot = snapshot
+        self.progress = snapshot.mission
+        self.in_mission = snapshot.mode is Mode.MISSION
+
+    def items(self, kind: Kind) -> tuple[MissionItem, ...]:
+        """What a download returns."""
+        return self._items[kind]
+
+    def read(self, kind: Kind, item: MissionItem) -> Meaning | Refused:
+        """What an item means, or what is wrong with it by itself."""
+        if kind is Kind.MISSION:
+            return read_step(item, self._site.locate)
+        if kind is Kind.RALLY:
+            return read_rally(item, self._site.locate)
+        return read_fence_item(item, self._site.locate)
+
+    def keep(
+        self, kind: Kind, items: tuple[MissionItem, ...], meanings: tuple[Meaning, ...]
+    ) -> Refused | None:
+        """Put a whole upload in the place of the old one, or say why not."""
+        if kind is Kind.MISSION:
+            steps = tuple(step for step in meanings if isinstance(step, MissionStep))
+            self._change(MissionUpdate(steps=steps, current=0 if steps else None))
+        elif kind is Kind.RALLY:
+            places = tuple(place for place in meanings if isinstance(place, tuple))
+            self._change(MissionUpdate(rally=places))
+        else:
+            fence = self._fence(items)
+            if isinstance(fence, Refused):
+                return fence
+            self._change(MissionUpdate(fence=fence))
+        self._items[kind] = items
+        return None
+
+    def set_current(self, number: int) -> bool:
+        """Make a step the current one; False where there is no such step."""
+        if not 0 <= number < len(self._items[Kind.MISSION]):
+            return False
+        self._change(MissionUpdate(current=number))
+        return True
+
+    def take_update(self) -> MissionUpdate | None:
+        """Hand over what changed."""
+        taken, self._update = self._update, None
+        return taken
+
+    def _fence(self, items: tuple[MissionItem, ...]) -> SafeSet | Refused:
+        fence = read_fence(items, self._site.locate, self._site.clearance)
+        if isinstance(fence, Refused):
+            return fence
+        against = self._site.judge(fence)
+        if against:
+            return Refused(DENIED, f"the fence cannot be kept: {'; '.join(against)}")
+        if self._snapshot is not None:
+            x, y, z = self._snapshot.estimate.p_WB
+            for number, wall in enumerate(fence.walls):
+                n = wall.normal
+                inside = n[0] * x + n[1] * y + n[2] * z - wall.offset - wall.clearance
+                if not inside > 0.0:
+                    return Refused(
+                        DENIED,
+                        f"the vehicle is not inside the fence: {-inside:.2f} m beyond the "
+                        f"clearance of wall {number}",
+                    )
+        return fence
+
+    def _change(self, update: MissionUpdate) -> None:
+        waiting = self._update
+        if waiting is not None:
+            update = replace(
+                waiting,
+                **{
+                    name: value
+                    for name in ("steps", "fence", "rally", "current")
+                    if (value := getattr(update, name)) is not None
+                },
+            )
+        self._update = update

@@ -1,0 +1,257 @@
+"""A mission in flight: which step, which leg, and what happens when; pure.
+
+Each step that names a place is one leg from rest to rest (``leg.py``), a stay there, and the next
+step. A step is reached where the end-effector really is within its acceptance; a place that the
+vehicle cannot get to, beyond a wall say, is given up after a while, with a text and without being
+called reached.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from enum import Enum
+
+from fsw.signals import (
+    EndEffectorTarget,
+    MissionAction,
+    MissionProgress,
+    MissionState,
+    MissionStep,
+    Vec3,
+)
+from fsw.vehicle.leg import Leg, Pace, braking_leg, leg_to
+from fsw.vehicle.modes import Event
+
+PATIENCE_US = 5_000_000  # at the end of a leg, for the end-effector to arrive
+
+
+class Stage(Enum):
+    """What the vehicle does about its current step."""
+
+    IDLE = "idle"  # the mission is not being flown
+    BEGIN = "begin"
+    BRAKE = "brake"  # before it begins with another step
+    MOVE = "move"
+    ARRIVE = "arrive"
+    STAY = "stay"
+    GONE = "gone"  # handed over to landing or return
+
+
+@dataclass(frozen=True, slots=True)
+class MissionFlight:
+    """What the vehicle remembers of its mission."""
+
+    steps: tuple[MissionStep, ...] = ()
+    stage: Stage = Stage.IDLE
+    leg: Leg | None = None
+    since_us: int = 0  # when the stage began
+    speed: float | None = None  # m/s, as the mission says
+    progress: MissionProgress = field(default_factory=MissionProgress)
+
+
+@dataclass(frozen=True, slots=True)
+class Whereabouts:
+    """The vehicle as a mission needs to know it."""
+
+    now_us: int
+    p_WE: Vec3  # m, estimate
+    height: float  # m, base above the origin
+    home_z: float  # m, NED, of home
+
+
+@dataclass(frozen=True, slots=True)
+class Happening:
+    """What a tick of a mission brings about."""
+
+    event: Event | None = None
+    text: str = ""
+    unmet: bool = False  # the text is a warning
+
+
+NOTHING = Happening()
+
+
+def loaded(steps: tuple[MissionStep, ...], count: int = 0) -> MissionFlight:
+    """A mission that was received, not begun.
+
+    Args:
+        steps: All of it.
+        count: Steps reached so far in earlier missions, so that the count only grows.
+    """
+    state = MissionState.NOT_STARTED if steps else MissionState.NO_MISSION
+    progress = MissionProgress(state, total=len(steps), reached_count=count)
+    return MissionFlight(steps, progress=progress)
+
+
+def refusal(flight: MissionFlight, landed: bool) -> str | None:
+    """Why this mission cannot be begun or gone on with now."""
+    if not flight.steps:
+        return "no mission: none was uploaded"
+    first = flight.progress
+    at = 0 if first.state is MissionState.COMPLETE else first.current
+    moves = [step for step in flight.steps[at:] if step.action is not MissionAction.SPEED]
+    if landed and (not moves or moves[0].action is not MissionAction.TAKE_OFF):
+        return f"no mission: on the ground, and step {at} is no takeoff; take off first"
+    return None
+
+
+def begun(flight: MissionFlight, reference: EndEffectorTarget) -> MissionFlight:
+    """Begin, or go on with the current step, from a reference at rest."""
+    progress = flight.progress
+    if progress.state is MissionState.COMPLETE:
+        progress = replace(progress, current=0, reached=-1)
+    return replace(
+        flight,
+        stage=Stage.BEGIN,
+        leg=_still(reference),
+        since_us=reference.t_us,
+        speed=_speed_before(flight.steps, progress.current),
+        progress=replace(progress, state=MissionState.ACTIVE),
+    )
+
+
+def left(flight: MissionFlight) -> MissionFlight:
+    """Another mode took over: the current step will be begun again."""
+    if flight.progress.state is not MissionState.ACTIVE:
+        return replace(flight, stage=Stage.IDLE, leg=None)
+    paused = replace(flight.progress, state=MissionState.PAUSED)
+    return replace(flight, stage=Stage.IDLE, leg=None, progress=paused)
+
+
+def jumped(flight: MissionFlight, step: int, now_us: int, pace: Pace) -> MissionFlight:
+    """Make another step the current one; in flight, brake first."""
+    state = flight.progress.state
+    if state is MissionState.COMPLETE:
+        state = MissionState.NOT_STARTED
+    progress = replace(flight.progress, current=step, state=state)
+    if flight.leg is None:
+        return replace(flight, progress=progress)
+    return replace(
+        flight,
+        stage=Stage.BRAKE,
+        leg=braking_leg(flight.leg.at(now_us), pace),
+        since_us=now_us,
+        speed=_speed_before(flight.steps, step),
+        progress=progress,
+    )
+
+
+def advance(
+    flight: MissionFlight, where: Whereabouts, pace: Pace
+) -> tuple[MissionFlight, Happening]:
+    """One tick: at most one thing happens, in almost every tick none.
+
+    Args:
+        flight: With a leg, that is after ``begun``.
+        where: The vehicle now.
+        pace: Limits of a leg where the mission names no speed.
+    """
+    leg, now_us = flight.leg, where.now_us
+    if leg is None:
+        return flight, NOTHING
+    if flight.stage is Stage.BEGIN:
+        return _begin(flight, leg.at(now_us), where, pace)
+    if now_us < leg.end_us:
+        return flight, NOTHING
+    if flight.stage is Stage.BRAKE:
+        return replace(flight, stage=Stage.BEGIN), NOTHING
+    if flight.stage is Stage.MOVE:
+        return replace(flight, stage=Stage.ARRIVE, since_us=now_us), NOTHING
+    step = flight.steps[flight.progress.current]
+    if flight.stage is Stage.ARRIVE:
+        return _arrive(flight, step, leg, where)
+    if flight.stage is Stage.STAY and now_us - flight.since_us >= 1e6 * step.hold_s:
+        return _hand_over(flight, step)
+    return flight, NOTHING
+
+
+def touched_down(flight: MissionFlight) -> MissionFlight:
+    """The landing that a mission ended with is done."""
+    if flight.stage is not Stage.GONE:
+        return flight
+    return replace(_reached(flight), stage=Stage.IDLE, leg=None)
+
+
+def _begin(
+    flight: MissionFlight, at: EndEffectorTarget, where: Whereabouts, pace: Pace
+) -> tuple[MissionFlight, Happening]:
+    number = flight.progress.current
+    step = flight.steps[number]
+    if step.action is MissionAction.SPEED:
+        return _next(_reached(replace(flight, speed=step.speed)))
+    if flight.speed is not None:
+        pace = replace(pace, speed=flight.speed)
+    leg = leg_to(at, _destination(step, at, where), step.yaw, pace)
+    text = f"mission step {number}: {step.action.value}"
+    moving = replace(flight, stage=Stage.MOVE, leg=leg, since_us=where.now_us)
+    return moving, Happening(text=text)
+
+
+def _destination(step: MissionStep, at: EndEffectorTarget, where: Whereabouts) -> Vec3:
+    if step.position is None:
+        return at.p_WE
+    x, y, z = step.position
+    z += where.home_z if step.above_home else 0.0
+    if step.action is MissionAction.LAND:
+        return x, y, at.p_WE[2]  # the descent is the landing's
+    if step.action is MissionAction.TAKE_OFF:
+        # The height is the base's, and a vehicle that is higher already does not come down.
+        return at.p_WE[0], at.p_WE[1], at.p_WE[2] - max(-z - where.height, 0.0)
+    return x, y, z
+
+
+def _arrive(
+    flight: MissionFlight, step: MissionStep, leg: Leg, where: Whereabouts
+) -> tuple[MissionFlight, Happening]:
+    if step.position is None:
+        return replace(flight, stage=Stage.STAY, since_us=where.now_us), NOTHING
+    off = math.dist(where.p_WE, leg.end)
+    if off <= step.acceptance:
+        return replace(flight, stage=Stage.STAY, since_us=where.now_us), NOTHING
+    if where.now_us - flight.since_us < PATIENCE_US:
+        return flight, NOTHING
+    following, happening = _next(flight)
+    text = f"mission step {flight.progress.current} not reached: {off:.2f} m away"
+    return following, Happening(happening.event, text, unmet=True)
+
+
+def _hand_over(flight: MissionFlight, step: MissionStep) -> tuple[MissionFlight, Happening]:
+    """The step is flown: on to the next, or to the mode that it asks for."""
+    if step.action is MissionAction.LAND:
+        return replace(flight, stage=Stage.GONE), Happening(Event.LAND)
+    if step.action is MissionAction.RETURN:
+        return replace(_reached(flight), stage=Stage.GONE), Happening(Event.GO_HOME)
+    return _next(_reached(flight))
+
+
+def _reached(flight: MissionFlight) -> MissionFlight:
+    now = flight.progress
+    last = now.current == now.total - 1
+    state = MissionState.COMPLETE if last else now.state
+    progress = replace(now, state=state, reached=now.current, reached_count=now.reached_count + 1)
+    return replace(flight, progress=progress)
+
+
+def _next(flight: MissionFlight) -> tuple[MissionFlight, Happening]:
+    now = flight.progress
+    following = now.current + 1
+    if following == now.total:
+        done = replace(flight, progress=replace(now, state=MissionState.COMPLETE))
+        return done, Happening(Event.MISSION_DONE, "mission complete")
+    stops = flight.steps[now.current].stop_after
+    begins = replace(flight, stage=Stage.BEGIN, progress=replace(now, current=following))
+    if stops:
+        return begins, Happening(Event.HOLD, f"mission holds before step {following}")
+    return begins, NOTHING
+
+
+def _speed_before(steps: tuple[MissionStep, ...], number: int) -> float | None:
+    """The speed in force where the mission is begun at a step."""
+    speeds = [step.speed for step in steps[:number] if step.action is MissionAction.SPEED]
+    return speeds[-1] if speeds else None
+
+
+def _still(at: EndEffectorTarget) -> Leg:
+    """A leg that is flown already."""
+    return Leg(at.t_us, at.p_WE, (0.0, 0.0, 0.0), at.yaw, 0.0, 0.0, 0.0, 0.0)
