@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import dataclasses
 import hashlib
 from collections.abc import Callable
 from pathlib import Path
-from typing import ParamSpec, TypeVar, cast
+from typing import Any, ParamSpec, TypeVar, cast
 
 import numba
+import numpy as np
+from numba.extending import register_jitable
+from numpy.typing import NDArray
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -41,3 +45,39 @@ def compiled(kernel: Callable[P, R]) -> Callable[P, R]:
         return cast(Callable[P, R], compile_it(kernel))
     finally:
         numba.config.CACHE_DIR = before
+
+
+def compilable(function: Callable[P, R]) -> Callable[P, R]:
+    """Let kernels compile a pure law into themselves; called from Python it stays Python.
+
+    So every law can be read, tested and stepped through as it stands, and flies as machine
+    code (docs/decisions/0017-one-compiled-call-a-tick.md).
+    """
+    return cast(Callable[P, R], register_jitable(fastmath=False, error_model="numpy")(function))
+
+
+def packed(numbers: Any) -> NDArray[Any]:
+    """A frozen dataclass of numbers as an array of one record, for kernels.
+
+    A kernel reads ``packed(tuning)[0].kp`` as a law reads ``tuning.kp``; handing it over costs
+    as much as one float, however many numbers are in it. Tuples become arrays: laws pick their
+    entries by index.
+    """
+    array = np.zeros(1, dtype=_layout(numbers))
+    array[0] = _values(numbers)
+    return array
+
+
+def _layout(value: Any) -> np.dtype[Any]:
+    if dataclasses.is_dataclass(value):
+        fields = [field.name for field in dataclasses.fields(value)]
+        return np.dtype([(name, _layout(getattr(value, name))) for name in fields], align=True)
+    entries = np.asarray(value)
+    return np.dtype((entries.dtype, entries.shape))
+
+
+def _values(value: Any) -> Any:
+    if dataclasses.is_dataclass(value):
+        fields = dataclasses.fields(value)
+        return tuple(_values(getattr(value, field.name)) for field in fields)
+    return value

@@ -3,13 +3,16 @@
 Frames: W is the local NED world, B the body (FRD), E the end-effector. ``R_WB`` maps body
 components to world components and is stored row by row. Units are SI and radians. The tick
 runs at 500 Hz, so its values are tuples of plain floats: at this size NumPy costs more than
-it saves (docs/decisions/0003-plain-floats-in-the-fast-loop.md).
+it saves (docs/decisions/0003-plain-floats-in-the-fast-loop.md). What goes in and out of the
+compiled loops is a NamedTuple, which numba reads by name and which is made in a fifth of the
+time of a frozen dataclass (docs/decisions/0017-one-compiled-call-a-tick.md).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import Enum, IntEnum
+from typing import NamedTuple
 
 Vec2 = tuple[float, float]
 Vec3 = tuple[float, float, float]
@@ -241,8 +244,7 @@ class MissionProgress:
 # ---------------------------------------------------------------- estimate
 
 
-@dataclass(frozen=True, slots=True)
-class StateEstimate:
+class StateEstimate(NamedTuple):
     """What the vehicle believes about itself."""
 
     t_us: int
@@ -259,8 +261,7 @@ class StateEstimate:
 # ---------------------------------------------------------------- planner
 
 
-@dataclass(frozen=True, slots=True)
-class PredictionState:
+class PredictionState(NamedTuple):
     """State of the prediction model: the paper's twelve plus the attitude lag's seven."""
 
     p: Vec3  # m, body origin
@@ -274,8 +275,7 @@ class PredictionState:
     qd_arm: Vec2  # rad/s
 
 
-@dataclass(frozen=True, slots=True)
-class PlanInput:
+class PlanInput(NamedTuple):
     """The paper's u for one step of the horizon: [a_d, yaw acceleration, joint accelerations]."""
 
     a: Vec3  # m/s^2, commanded
@@ -335,8 +335,7 @@ class PlanFailure:
 # ---------------------------------------------------------------- outputs of a tick
 
 
-@dataclass(frozen=True, slots=True)
-class ActuatorCommand:
+class ActuatorCommand(NamedTuple):
     """What leaves the flight software."""
 
     rotor_thrust: Vec4  # N: rear, left, front, right

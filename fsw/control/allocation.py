@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from fsw.compiled import compilable
 from fsw.model.airframe import Airframe
 from fsw.signals import Vec3, Vec4
 
 
+@compilable
 def allocate(airframe: Airframe, torque: Vec3, thrust: float, yaw_limit: float) -> Vec4:
     """Rotor thrusts of the '+' mixer, each within its limits.
 
@@ -32,5 +34,6 @@ def allocate(airframe: Airframe, torque: Vec3, thrust: float, yaw_limit: float) 
     return (lift - pitch + yaw, lift + roll - yaw, lift + pitch + yaw, lift - roll - yaw)
 
 
+@compilable
 def _limit(value: float, bound: float) -> float:
     return min(max(value, -bound), bound)

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fsw.compiled import compilable
 from fsw.model.airframe import Airframe
 from fsw.model.arm_kinematics import END_EFFECTOR, arm_points
 from fsw.model.prediction import to_vector
@@ -31,14 +32,16 @@ class CompensationLimits:
     joint_margin: float = 0.03  # rad, kept to the joint limits
 
 
+@compilable
 def planned_end_effector(airframe: Airframe, plan: PredictionState) -> tuple[Vec3, Vec3]:
     """World position and velocity of the end-effector in the plan's state."""
     points = np.empty((2, 2, 3))
-    arm_points(to_vector(plan), *airframe.link_length, points)
-    (px, py, pz), (vx, vy, vz) = points[END_EFFECTOR].tolist()
-    return (px, py, pz), (vx, vy, vz)
+    arm_points(to_vector(plan), airframe.link_length[0], airframe.link_length[1], points)
+    p, v = points[END_EFFECTOR, 0], points[END_EFFECTOR, 1]
+    return (float(p[0]), float(p[1]), float(p[2])), (float(v[0]), float(v[1]), float(v[2]))
 
 
+@compilable
 def compensated_joints(
     airframe: Airframe,
     limits: CompensationLimits,
@@ -56,7 +59,7 @@ def compensated_joints(
     Returns:
         Angles [rad] and rates [rad/s]; the plan's own where the arm is (nearly) straight.
     """
-    l1, l2 = airframe.link_length
+    l1, l2 = airframe.link_length[0], airframe.link_length[1]
     p_WE, v_WE = planned_end_effector(airframe, plan)
     x, z, vx, vz = _seen_from_base(estimate, p_WE, v_WE)
     length = math.hypot(x, z)
@@ -76,6 +79,7 @@ def compensated_joints(
 _LEAST_BEND = 0.2  # sine of the elbow; a straighter arm has no side to stay on
 
 
+@compilable
 def _seen_from_base(
     estimate: StateEstimate, p_WE: Vec3, v_WE: Vec3
 ) -> tuple[float, float, float, float]:
@@ -92,15 +96,17 @@ def _seen_from_base(
     return x, z, vx, vz
 
 
+@compilable
 def _within_limits(airframe: Airframe, limits: CompensationLimits, th1: float, th12: float) -> Vec2:
     bound1 = airframe.joint1_limit - limits.joint_margin
     bound12 = airframe.joint12_limit - limits.joint_margin
     return min(max(th1, -bound1), bound1), min(max(th12, -bound12), bound12)
 
 
+@compilable
 def _rates(airframe: Airframe, th1: float, th12: float, vx: float, vz: float) -> Vec2:
     """Joint rates for a velocity of the end-effector in the body's x-z plane."""
-    l1, l2 = airframe.link_length
+    l1, l2 = airframe.link_length[0], airframe.link_length[1]
     x1, z1 = l1 * math.sin(th1), l1 * math.cos(th1)
     x2, z2 = l2 * math.sin(th12), l2 * math.cos(th12)
     # [vx, vz] = [[z1, z2], [-x1, -x2]] [w1, w12]

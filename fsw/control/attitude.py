@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 
+from fsw.compiled import compilable
 from fsw.control.pid import PidGains, pid_step
 from fsw.geometry.rotation import euler_zyx, wrap_angle
 from fsw.model.airframe import GRAVITY
 from fsw.signals import StateEstimate, Vec3
 
 
+@compilable
 def attitude_reference(a: Vec3, yaw: float) -> Vec3:
     """Roll, pitch and yaw whose thrust direction gives an acceleration (exact, ZYX).
 
@@ -25,6 +27,7 @@ def attitude_reference(a: Vec3, yaw: float) -> Vec3:
     return roll, pitch, yaw
 
 
+@compilable
 def attitude_pid(
     gains: PidGains,
     integral: Vec3,
@@ -46,11 +49,9 @@ def attitude_pid(
     Returns:
         Angular acceleration in the body [rad/s^2] and the integrals to pass back.
     """
-    attitude = euler_zyx(estimate.R_WB)
-    out, kept = [], []
-    for axis in range(3):
-        error = wrap_angle(reference[axis] - attitude[axis])
-        acceleration, grown = pid_step(gains, integral[axis], error, -estimate.w_WB_B[axis], dt)
-        out.append(acceleration)
-        kept.append(grown)
-    return (out[0], out[1], out[2]), (kept[0], kept[1], kept[2])
+    roll, pitch, yaw = euler_zyx(estimate.R_WB)
+    wx, wy, wz = estimate.w_WB_B
+    x, kept_x = pid_step(gains, integral[0], wrap_angle(reference[0] - roll), -wx, dt)
+    y, kept_y = pid_step(gains, integral[1], wrap_angle(reference[1] - pitch), -wy, dt)
+    z, kept_z = pid_step(gains, integral[2], wrap_angle(reference[2] - yaw), -wz, dt)
+    return (x, y, z), (kept_x, kept_y, kept_z)

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal, NamedTuple
 
+from numpy.typing import NDArray
+
+from fsw.compiled import compilable, compiled, packed
 from fsw.control.allocation import allocate
 from fsw.control.arm_compensation import compensated_joints
 from fsw.control.attitude import attitude_pid, attitude_reference
@@ -33,8 +36,7 @@ Inner = Literal["tracking", "pid"]
 _NONE: Vec3 = (0.0, 0.0, 0.0)
 
 
-@dataclass(frozen=True, slots=True)
-class CascadeMemory:
+class CascadeMemory(NamedTuple):
     """What the fast loops carry from tick to tick."""
 
     rotors: Vec4  # N, where the rotor model says they are
@@ -47,9 +49,7 @@ class CascadeMemory:
 
     def after_sending(self, sent: ActuatorCommand) -> CascadeMemory:
         """The memory for the next tick, once the safety gate has decided."""
-        return CascadeMemory(
-            self.rotors, sent, self.observed, self.mass, self.attitude, self.height, self.joints
-        )
+        return self._replace(commanded=sent)
 
 
 def at_rest(airframe: Airframe, estimate: StateEstimate) -> CascadeMemory:
@@ -68,6 +68,18 @@ def in_hover(airframe: Airframe, estimate: StateEstimate) -> CascadeMemory:
     )
 
 
+@dataclass(frozen=True, slots=True)
+class CascadeLaw:
+    """Everything the loops need that does not change in flight."""
+
+    airframe: Airframe
+    tuning: InnerTuning
+    tracking: TrackingLaw
+    follows_plan: bool  # or only the plan's acceleration
+    rotor_decay: float  # share of a rotor's error left after a tick
+    dt: float  # s, tick length
+
+
 class Cascade:
     """The inner loops of one configuration; laws are pure, memory goes in and comes out."""
 
@@ -83,19 +95,22 @@ class Cascade:
             inner: ``tracking`` follows the plan's state, ``pid`` only its acceleration.
             dt: Tick length [s].
         """
-        self._airframe = airframe
-        self._tuning = tuning
-        self._dt = dt
-        self._decay = rotor_decay(airframe, dt)
-        self._follows_plan = inner == "tracking"
         gains = tracking_gains(tuning.tracking, airframe.rotor_lag, dt)
-        self._law = TrackingLaw(airframe, lag, tuning.tracking, gains)
+        self.law = CascadeLaw(
+            airframe,
+            tuning,
+            TrackingLaw(airframe, lag, tuning.tracking, gains),
+            inner == "tracking",
+            rotor_decay(airframe, dt),
+            dt,
+        )
+        self._packed = packed(self.law)
 
     def motion(self, memory: CascadeMemory, estimate: StateEstimate) -> MotionState:
         """Acceleration to snap right now, from the rotor model."""
-        rotors = lag_rotors(memory.rotors, memory.commanded.rotor_thrust, self._decay)
+        rotors = lag_rotors(memory.rotors, memory.commanded.rotor_thrust, self.law.rotor_decay)
         return motion_state(
-            self._airframe, memory.mass, estimate, rotors, memory.commanded.joint_torque[0]
+            self.law.airframe, memory.mass, estimate, rotors, memory.commanded.joint_torque[0]
         )
 
     def step(
@@ -106,68 +121,126 @@ class Cascade:
         u: PlanInput,
         ticks: int = 1,
     ) -> tuple[ActuatorCommand, CascadeMemory]:
-        """One tick.
-
-        Args:
-            memory: From the last tick.
-            estimate: The vehicle now.
-            plan: Where the plan wants the vehicle now.
-            u: The plan's input now.
-            ticks: Ticks since the last call; more than one where some were missed.
-
-        Returns:
-            Actuator command, not yet gated, and the memory to pass back after sending.
-        """
-        airframe, tuning, dt = self._airframe, self._tuning, self._dt
-        rotors, observed = memory.rotors, memory.observed
-        for _ in range(ticks):
-            rotors = lag_rotors(rotors, memory.commanded.rotor_thrust, self._decay)
-        mass = weigh(airframe, memory.mass, rotors, estimate.specific_force, dt * ticks)
-        motion = motion_state(airframe, mass, estimate, rotors, memory.commanded.joint_torque[0])
-        for _ in range(ticks):
-            observed = observe(
-                observed, estimate.v_WB, motion.a, tuning.tracking.observer_bandwidth, dt
-            )
-        attitude, height = memory.attitude, memory.height
-        if self._follows_plan:
-            (wdx, wdy), thrust = follow_plan(self._law, mass, estimate, motion, observed, plan, u)
-            wdz = u.yaw_acc + _yaw_correction(tuning.yaw, estimate, plan)
-        else:
-            (wdx, wdy, wdz), attitude = attitude_pid(
-                tuning.attitude, attitude, estimate, attitude_reference(u.a, plan.yaw), dt
-            )
-            thrust, height = height_pid(airframe, tuning.height, height, estimate, plan, u, dt)
-        q_ref, qd_ref = plan.q_arm, plan.qd_arm
-        if self._follows_plan and tuning.compensate:
-            q_ref, qd_ref = compensated_joints(airframe, tuning.compensation, estimate, plan)
-        joints, kept = joint_torques(
-            airframe,
-            tuning.joint,
-            memory.joints,
-            estimate,
-            (q_ref, qd_ref, u.qdd_arm),
-            motion.thrust / mass,
-            wdy,
-            dt,
+        """See ``close_loops``, of which this is the machine code."""
+        rotors, commanded, observed, mass, attitude, height, joints = memory
+        # Plain tuples cross into machine code and back at half the price of named ones.
+        sent, rotors, believed, mass, integrals = _close_loops(
+            self._packed,
+            (rotors, tuple(commanded), tuple(observed), mass, attitude, height, joints),
+            tuple(estimate),
+            tuple(plan),
+            tuple(u),
+            ticks,
         )
-        torque = _body_torque(airframe, estimate, (wdx, wdy, wdz), joints[0])
-        command = ActuatorCommand(
-            allocate(airframe, torque, thrust, tuning.yaw_thrust_limit), joints
+        command = ActuatorCommand(*sent)
+        return command, CascadeMemory(rotors, command, Observed(*believed), mass, *integrals)
+
+
+@compilable
+def close_loops(
+    law: CascadeLaw,
+    memory: CascadeMemory,
+    estimate: StateEstimate,
+    plan: PredictionState,
+    u: PlanInput,
+    ticks: int,
+) -> tuple[ActuatorCommand, CascadeMemory]:
+    """One tick.
+
+    Args:
+        law: Airframe and gains.
+        memory: From the last tick.
+        estimate: The vehicle now.
+        plan: Where the plan wants the vehicle now.
+        u: The plan's input now.
+        ticks: Ticks since the last call; more than one where some were missed.
+
+    Returns:
+        Actuator command, not yet gated, and the memory to pass back after sending.
+    """
+    airframe, tuning, dt = law.airframe, law.tuning, law.dt
+    rotors, observed = memory.rotors, memory.observed
+    for _ in range(ticks):
+        rotors = lag_rotors(rotors, memory.commanded.rotor_thrust, law.rotor_decay)
+    mass = weigh(airframe, memory.mass, rotors, estimate.specific_force, dt * ticks)
+    motion = motion_state(airframe, mass, estimate, rotors, memory.commanded.joint_torque[0])
+    for _ in range(ticks):
+        observed = observe(
+            observed, estimate.v_WB, motion.a, tuning.tracking.observer_bandwidth, dt
         )
-        return command, CascadeMemory(rotors, command, observed, mass, attitude, height, kept)
+    attitude, height = memory.attitude, memory.height
+    if law.follows_plan:
+        (wdx, wdy), thrust = follow_plan(law.tracking, mass, estimate, motion, observed, plan, u)
+        wdz = u.yaw_acc + _yaw_correction(tuning.yaw, estimate, plan)
+    else:
+        (wdx, wdy, wdz), attitude = attitude_pid(
+            tuning.attitude, attitude, estimate, attitude_reference(u.a, plan.yaw), dt
+        )
+        thrust, height = height_pid(airframe, tuning.height, height, estimate, plan, u, dt)
+    q_ref, qd_ref = plan.q_arm, plan.qd_arm
+    if law.follows_plan and tuning.compensate:
+        q_ref, qd_ref = compensated_joints(airframe, tuning.compensation, estimate, plan)
+    joints, kept = joint_torques(
+        airframe,
+        tuning.joint,
+        memory.joints,
+        estimate,
+        (q_ref, qd_ref, u.qdd_arm),
+        motion.thrust / mass,
+        wdy,
+        dt,
+    )
+    torque = _body_torque(airframe, estimate, (wdx, wdy, wdz), joints[0])
+    rotor_thrust = allocate(airframe, torque, thrust, tuning.yaw_thrust_limit)
+    command = ActuatorCommand(rotor_thrust, joints)
+    return command, CascadeMemory(rotors, command, observed, mass, attitude, height, kept)
 
 
+@compiled
+def _close_loops(
+    law: NDArray[Any], memory: Any, estimate: Any, plan: Any, u: Any, ticks: int
+) -> tuple[tuple[Vec4, Vec2], Vec4, tuple[Vec3, Vec3], float, tuple[Vec3, float, Vec2]]:
+    """``close_loops`` between plain tuples."""
+    rotors, commanded, observed, mass, attitude, height, joints = memory
+    command, kept = close_loops(
+        law[0],
+        CascadeMemory(
+            rotors,
+            ActuatorCommand(*commanded),
+            Observed(*observed),
+            mass,
+            attitude,
+            height,
+            joints,
+        ),
+        StateEstimate(*estimate),
+        PredictionState(*plan),
+        PlanInput(*u),
+        ticks,
+    )
+    return (
+        (command.rotor_thrust, command.joint_torque),
+        kept.rotors,
+        (kept.observed.v, kept.observed.d),
+        kept.mass,
+        (kept.attitude, kept.height, kept.joints),
+    )
+
+
+@compilable
 def _yaw_correction(gains: PidGains, estimate: StateEstimate, plan: PredictionState) -> float:
     error = wrap_angle(plan.yaw - estimate.yaw)
     raw = gains.kp * error + gains.kd * (plan.yaw_rate - estimate.w_WB_B[2])
     return min(max(raw, -gains.limit), gains.limit)
 
 
+@compilable
 def _body_torque(
     airframe: Airframe, estimate: StateEstimate, wd: Vec3, joint1_torque: float
 ) -> Vec3:
     """Rotor torque for an angular acceleration: inertia, gyroscopic part, arm's reaction."""
-    ix, iy, iz = airframe.inertia
+    inertia = airframe.inertia
+    ix, iy, iz = inertia[0], inertia[1], inertia[2]
     wx, wy, wz = estimate.w_WB_B
     return (
         ix * wd[0] + (iz - iy) * wy * wz,

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from fsw.compiled import compilable
 from fsw.control.pid import PidGains, pid_step
 from fsw.model.airframe import GRAVITY, Airframe
 from fsw.signals import PlanInput, PredictionState, StateEstimate
 
 
+@compilable
 def height_pid(
     airframe: Airframe,
     gains: PidGains,

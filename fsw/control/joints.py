@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 
+from fsw.compiled import compilable
 from fsw.control.pid import PidGains, pid_step
 from fsw.model.airframe import Airframe
 from fsw.signals import StateEstimate, Vec2
 
 
+@compilable
 def joint_torques(
     airframe: Airframe,
     gains: PidGains,
@@ -55,6 +57,7 @@ def joint_torques(
     return torques, (kept1, kept2)
 
 
+@compilable
 def arm_inverse_dynamics(
     airframe: Airframe, estimate: StateEstimate, qdd: Vec2, field: float
 ) -> Vec2:
@@ -69,9 +72,9 @@ def arm_inverse_dynamics(
     Returns:
         Torques [N m].
     """
-    m1, m2 = airframe.link_mass
-    l1, (c1, c2) = airframe.link_length[0], airframe.link_com
-    i1, i2 = airframe.link_inertia
+    m1, m2 = airframe.link_mass[0], airframe.link_mass[1]
+    l1, c1, c2 = airframe.link_length[0], airframe.link_com[0], airframe.link_com[1]
+    i1, i2 = airframe.link_inertia[0], airframe.link_inertia[1]
     th1, th2 = estimate.q_arm
     sin1, sin12 = math.sin(th1), math.sin(th1 + th2)
     cos2, sin2 = math.cos(th2), math.sin(th2)

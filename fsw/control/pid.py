@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from fsw.compiled import compilable
+
 
 @dataclass(frozen=True, slots=True)
 class PidGains:
@@ -15,6 +17,7 @@ class PidGains:
     limit: float
 
 
+@compilable
 def pid_step(
     gains: PidGains, integral: float, error: float, error_rate: float, dt: float
 ) -> tuple[float, float]:

@@ -18,7 +18,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
+from fsw.compiled import compilable
 from fsw.control.inner_tuning import TrackingGains, TrackingTuning
 from fsw.model.airframe import GRAVITY, Airframe
 from fsw.model.prediction import LagModel
@@ -38,14 +40,14 @@ class TrackingLaw:
     gains: TrackingGains
 
 
-@dataclass(frozen=True, slots=True)
-class Observed:
+class Observed(NamedTuple):
     """What the observer believes between two velocity readings."""
 
     v: Vec3  # m/s
     d: Vec3  # m/s^2, disturbance acceleration
 
 
+@compilable
 def observe(memory: Observed, v: Vec3, a: Vec3, bandwidth: float, dt: float) -> Observed:
     """Velocity and disturbance from a velocity reading and the rotors' acceleration.
 
@@ -60,20 +62,26 @@ def observe(memory: Observed, v: Vec3, a: Vec3, bandwidth: float, dt: float) -> 
         bandwidth: Of the observer [rad/s].
         dt: Tick length [s].
     """
-    gain_v, gain_d = 2.0 * bandwidth * dt, bandwidth * bandwidth * dt
-    velocity, disturbance = [], []
-    for axis in range(3):
-        d = memory.d[axis]
-        predicted = memory.v[axis] + dt * (a[axis] + d)
-        surprise = v[axis] - predicted
-        velocity.append(predicted + gain_v * surprise)
-        disturbance.append(d + gain_d * surprise)
-    return Observed(
-        (velocity[0], velocity[1], velocity[2]),
-        (disturbance[0], disturbance[1], disturbance[2]),
+    vx, dx = _observe_axis(memory.v[0], memory.d[0], v[0], a[0], bandwidth, dt)
+    vy, dy = _observe_axis(memory.v[1], memory.d[1], v[1], a[1], bandwidth, dt)
+    vz, dz = _observe_axis(memory.v[2], memory.d[2], v[2], a[2], bandwidth, dt)
+    return Observed((vx, vy, vz), (dx, dy, dz))
+
+
+@compilable
+def _observe_axis(
+    believed_v: float, d: float, v: float, a: float, bandwidth: float, dt: float
+) -> Vec2:
+    """Velocity and disturbance of one axis, one tick on."""
+    predicted = believed_v + dt * (a + d)
+    surprise = v - predicted
+    return (
+        predicted + 2.0 * bandwidth * dt * surprise,
+        d + bandwidth * bandwidth * dt * surprise,
     )
 
 
+@compilable
 def snap_command(
     law: TrackingLaw,
     e_p: float,
@@ -88,7 +96,8 @@ def snap_command(
 ) -> float:
     """Commanded snap of one horizontal axis [m/s^4]."""
     tuning, lag = law.tuning, law.lag
-    k1, k2, k3, k4, k5 = law.gains.k
+    k = law.gains.k
+    k1, k2, k3, k4, k5 = k[0], k[1], k[2], k[3], k[4]
     e_p = _limit(e_p, tuning.position_error_limit)
     wanted_a = a_plan + (k1 * e_p + k2 * e_v - law.gains.k_disturbance * d) / k3
     wanted_a = _limit(wanted_a, tuning.acceleration_limit)
@@ -99,6 +108,7 @@ def snap_command(
     return lag.kp * (u - a_plan) - lag.kd * j_plan + k5 * e_s + k4 * (wanted_j - j)
 
 
+@compilable
 def follow_plan(
     law: TrackingLaw,
     mass: float,
@@ -120,21 +130,8 @@ def follow_plan(
         u: The plan's input now.
     """
     p, v = estimate.p_WB, observed.v
-    wx, wy = (
-        snap_command(
-            law,
-            plan.p[axis] - p[axis],
-            plan.v[axis] - v[axis],
-            plan.s[axis] - motion.s[axis],
-            observed.d[axis],
-            motion.a[axis],
-            motion.j[axis],
-            plan.a[axis],
-            plan.j[axis],
-            u.a[axis],
-        )
-        for axis in (0, 1)
-    )
+    wx = _horizontal_snap(law, 0, estimate, motion, observed, plan, u)
+    wy = _horizontal_snap(law, 1, estimate, motion, observed, plan, u)
     R = estimate.R_WB
     f = max(motion.thrust / mass, _LEAST_SPECIFIC_THRUST)
     # -f [b1_xy, -b2_xy] [wdy; wdx] = w_xy; the determinant is -R33, far from zero in flight.
@@ -142,7 +139,8 @@ def follow_plan(
     wdy = (wx * -R[4] + R[1] * wy) / (-f * determinant)
     wdx = (R[0] * wy - R[3] * wx) / (-f * determinant)
 
-    k1, k2, k3 = law.gains.k_vertical
+    k_z = law.gains.k_vertical
+    k1, k2, k3 = k_z[0], k_z[1], k_z[2]
     a_z = (
         u.a[2] + k1 * (plan.p[2] - p[2]) + k2 * (plan.v[2] - v[2]) + k3 * (plan.a[2] - motion.a[2])
     )
@@ -150,5 +148,30 @@ def follow_plan(
     return (wdx, wdy), thrust
 
 
+@compilable
+def _horizontal_snap(
+    law: TrackingLaw,
+    axis: int,
+    estimate: StateEstimate,
+    motion: MotionState,
+    observed: Observed,
+    plan: PredictionState,
+    u: PlanInput,
+) -> float:
+    return snap_command(
+        law,
+        plan.p[axis] - estimate.p_WB[axis],
+        plan.v[axis] - observed.v[axis],
+        plan.s[axis] - motion.s[axis],
+        observed.d[axis],
+        motion.a[axis],
+        motion.j[axis],
+        plan.a[axis],
+        plan.j[axis],
+        u.a[axis],
+    )
+
+
+@compilable
 def _limit(value: float, bound: float) -> float:
     return min(max(value, -bound), bound)

@@ -10,34 +10,37 @@ from __future__ import annotations
 
 import math
 
+from fsw.compiled import compilable, compiled
 from fsw.geometry.rotation import matrix_from_quaternion, yaw_of
-from fsw.signals import SensorFrame, StateEstimate
+from fsw.signals import Mat3, SensorFrame, StateEstimate, Vec2, Vec3, Vec4
 
 
 def estimate_state(sensors: SensorFrame) -> StateEstimate | None:
     """The vehicle's state, or None where a reading is not a number or no attitude."""
-    q = sensors.q_WB
-    norm2 = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]
+    p, v, w, q, qd = sensors.p_WB, sensors.v_WB, sensors.gyro_B, sensors.q_arm, sensors.qd_arm
+    usable, R, yaw = _attitude(p, v, sensors.q_WB, w, sensors.accel_B, q, qd)
+    if not usable:
+        return None
+    return StateEstimate(sensors.t_us, p, v, R, w, yaw, q, qd, -sensors.accel_B[2])
+
+
+@compilable
+def attitude(
+    p_WB: Vec3, v_WB: Vec3, q_WB: Vec4, gyro_B: Vec3, accel_B: Vec3, q_arm: Vec2, qd_arm: Vec2
+) -> tuple[bool, Mat3, float]:
+    """Whether all readings are of use, and then the rotation R_WB and its yaw [rad]."""
+    norm2 = q_WB[0] * q_WB[0] + q_WB[1] * q_WB[1] + q_WB[2] * q_WB[2] + q_WB[3] * q_WB[3]
     # The sum is finite exactly when every reading is (infinities of both signs give NaN).
     total = (
-        sum(sensors.p_WB)
-        + sum(sensors.v_WB)
-        + sum(sensors.gyro_B)
-        + sensors.accel_B[2]
-        + sum(sensors.q_arm)
-        + sum(sensors.qd_arm)
+        (p_WB[0] + p_WB[1] + p_WB[2])
+        + (v_WB[0] + v_WB[1] + v_WB[2])
+        + (gyro_B[0] + gyro_B[1] + gyro_B[2])
+        + accel_B[2]
+        + (q_arm[0] + q_arm[1])
+        + (qd_arm[0] + qd_arm[1])
     )
-    if not (math.isfinite(total) and 0.5 < norm2 < 2.0):
-        return None
-    R = matrix_from_quaternion(q)
-    return StateEstimate(
-        sensors.t_us,
-        sensors.p_WB,
-        sensors.v_WB,
-        R,
-        sensors.gyro_B,
-        yaw_of(R),
-        sensors.q_arm,
-        sensors.qd_arm,
-        -sensors.accel_B[2],
-    )
+    R = matrix_from_quaternion(q_WB)
+    return math.isfinite(total) and 0.5 < norm2 < 2.0, R, yaw_of(R)
+
+
+_attitude = compiled(attitude)

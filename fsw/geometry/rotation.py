@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 
+from fsw.compiled import compilable
 from fsw.signals import Mat3, Vec3, Vec4
 
 
+@compilable
 def matrix_from_quaternion(q: Vec4) -> Mat3:
     """Rotation matrix of a quaternion [w, x, y, z] that is close to unit length."""
     w, x, y, z = q
@@ -28,11 +30,13 @@ def matrix_from_quaternion(q: Vec4) -> Mat3:
     )
 
 
+@compilable
 def yaw_of(R: Mat3) -> float:
     """ZYX yaw of a rotation [rad]."""
     return math.atan2(R[3], R[0])
 
 
+@compilable
 def euler_zyx(R: Mat3) -> Vec3:
     """Roll, pitch and yaw of a rotation [rad]."""
     return math.atan2(R[7], R[8]), -math.asin(min(max(R[6], -1.0), 1.0)), yaw_of(R)
@@ -61,6 +65,7 @@ def quaternion_from_matrix(R: Mat3) -> Vec4:
     return q if q[0] >= 0.0 else (-q[0], -q[1], -q[2], -q[3])
 
 
+@compilable
 def rotate(R: Mat3, v: Vec3) -> Vec3:
     """World components of a body vector."""
     x, y, z = v
@@ -71,6 +76,7 @@ def rotate(R: Mat3, v: Vec3) -> Vec3:
     )
 
 
+@compilable
 def wrap_angle(angle: float) -> float:
     """The same angle in [-pi, pi)."""
     return (angle + math.pi) % (2.0 * math.pi) - math.pi

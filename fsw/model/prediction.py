@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
+from fsw.compiled import compilable
 from fsw.signals import PredictionState
 
 Array = NDArray[np.float64]
@@ -114,6 +115,7 @@ def condense(lag: LagModel, period: float, horizon: int) -> CondensedModel:
     return CondensedModel(horizon, period, phi, gamma)
 
 
+@compilable
 def to_vector(state: PredictionState) -> Array:
     """The prediction state in the layout of this module, (19,)."""
     return np.array(

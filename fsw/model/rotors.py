@@ -15,8 +15,9 @@ Source: docs/equations.md T1.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
+from fsw.compiled import compilable
 from fsw.model.airframe import GRAVITY, Airframe
 from fsw.signals import StateEstimate, Vec2, Vec3, Vec4
 
@@ -24,8 +25,7 @@ _WEIGHING_TIME = 1.0  # s
 _WEIGHING_THRUST = 5.0  # m/s^2
 
 
-@dataclass(frozen=True, slots=True)
-class MotionState:
+class MotionState(NamedTuple):
     """Derivatives of the body's position that the rotors produce right now."""
 
     thrust: float  # N, total
@@ -34,6 +34,7 @@ class MotionState:
     s: Vec2  # m/s^4, horizontal
 
 
+@compilable
 def lag_rotors(thrust: Vec4, command: Vec4, decay: float) -> Vec4:
     """Rotor thrusts one tick later [N]; ``decay`` is exp(-dt / lag)."""
     return (
@@ -49,6 +50,7 @@ def rotor_decay(airframe: Airframe, dt: float) -> float:
     return math.exp(-dt / airframe.rotor_lag)
 
 
+@compilable
 def weigh(
     airframe: Airframe, mass: float, rotors: Vec4, specific_force: float, seconds: float
 ) -> float:
@@ -64,13 +66,14 @@ def weigh(
         specific_force: Accelerometer along -z of the body [m/s^2].
         seconds: Since the last tick.
     """
-    thrust = sum(rotors)
+    thrust = rotors[0] + rotors[1] + rotors[2] + rotors[3]
     if not (thrust > _WEIGHING_THRUST * airframe.mass and specific_force > _WEIGHING_THRUST):
         return mass  # hardly flying: a quotient of small numbers
     moved = mass + seconds / _WEIGHING_TIME * (thrust / specific_force - mass)
     return min(max(moved, 0.7 * airframe.mass), 1.3 * airframe.mass)
 
 
+@compilable
 def motion_state(
     airframe: Airframe, mass: float, estimate: StateEstimate, rotors: Vec4, joint1_torque: float
 ) -> MotionState:

@@ -32,7 +32,9 @@ def flight_software(choice: ControlChoice) -> FlightProgram[Any]:
     )
     planner = Planner(config.planner, clock.stopwatch_us)
     planner.warm_up()
-    return FlightProgram(_facts(config), FlightState(), FlightLoop(config).tick, planner)
+    loop = FlightLoop(config)
+    loop.warm_up()
+    return FlightProgram(_facts(config), FlightState(), loop.tick, planner)
 
 
 def _facts(config: FlightConfig) -> VehicleFacts:

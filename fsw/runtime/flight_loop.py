@@ -10,7 +10,7 @@ from dataclasses import replace
 
 from fsw.barriers.margins import constraint_report
 from fsw.control.braking import Brake
-from fsw.control.cascade import Cascade, CascadeMemory, at_rest
+from fsw.control.cascade import Cascade, CascadeMemory, at_rest, in_hover
 from fsw.estimation.estimator import estimate_state
 from fsw.model.arm_kinematics import point_in_flight
 from fsw.model.nominal import REST_INPUT, NominalModel
@@ -20,7 +20,14 @@ from fsw.parameters.flight_config import FlightConfig
 from fsw.runtime.flight_state import FlightState, MissionMemory, PlanMemory
 from fsw.runtime.mode_keeper import SEVERITY_WARNING, ModeKeeper, answer
 from fsw.runtime.mode_reference import mode_reference
-from fsw.runtime.planning import ask, late_start, measured_state, plan_input, take_answer
+from fsw.runtime.planning import (
+    ask,
+    late_start,
+    measured_state,
+    nominal_at_rest,
+    plan_input,
+    take_answer,
+)
 from fsw.signals import (
     STOPPED,
     ActuatorCommand,
@@ -33,6 +40,7 @@ from fsw.signals import (
     PlanInput,
     PlanRequest,
     PredictionState,
+    SensorFrame,
     StateEstimate,
     StatusText,
     TickInputs,
@@ -40,6 +48,17 @@ from fsw.signals import (
 )
 from fsw.vehicle.commands import Situation
 from fsw.vehicle.safety_gate import gate
+
+_STILL = SensorFrame(
+    1_000_000,
+    (0.0, 0.0, -1.0),
+    (0.0, 0.0, 0.0),
+    (1.0, 0.0, 0.0, 0.0),
+    (0.0, 0.0, 0.0),
+    (0.0, 0.0, -9.81),
+    (0.0, 0.0),
+    (0.0, 0.0),
+)
 
 
 class FlightLoop:
@@ -55,6 +74,13 @@ class FlightLoop:
         self._modes = ModeKeeper(config)
         self._loop_tube = loop_tube(config)
         self._ticks_per_plan = config.mpc_period_us // config.tick_period_us
+
+    def warm_up(self) -> None:
+        """Compile every kernel of the tick, before anything flies."""
+        estimate = estimate_state(_STILL)
+        assert estimate is not None
+        nominal = self._model.step(nominal_at_rest(estimate), REST_INPUT)
+        self._cascade.step(in_hover(self.config.airframe, estimate), estimate, nominal, REST_INPUT)
 
     def tick(self, state: FlightState, inputs: TickInputs) -> tuple[FlightState, TickOutputs]:
         """Everything the vehicle does at one instant.

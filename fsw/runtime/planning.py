@@ -67,8 +67,7 @@ def coast(x: PredictionState, seconds: float) -> PredictionState:
     input says; its own motion is the better guess.
     """
     t, j = seconds, (*x.j, 0.0)
-    return replace(
-        x,
+    return x._replace(
         p=_each(lambda k: x.p[k] + t * (x.v[k] + t * (x.a[k] / 2.0 + t * j[k] / 6.0))),
         v=_each(lambda k: x.v[k] + t * (x.a[k] + t * j[k] / 2.0)),
         a=_each(lambda k: x.a[k] + t * j[k]),

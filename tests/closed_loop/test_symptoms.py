@@ -77,7 +77,7 @@ def test_one_tick_of_nonsense_does_not_leave_the_vehicle_in_open_loop() -> None:
     flight.run(0.5)
     nominal = flight.state.nominal
     assert nominal is not None
-    flight.state = replace(flight.state, nominal=replace(nominal, q_arm=(math.nan, 0.0)))
+    flight.state = replace(flight.state, nominal=nominal._replace(q_arm=(math.nan, 0.0)))
     flight.step()
     assert flight.state.output_replaced
     flight.run(0.5)

@@ -84,6 +84,6 @@ SNAPSHOT = FlightSnapshot(
 
 def outputs_at(t_us: int, **changes: object) -> TickOutputs:
     """What a tick would say at a time; keyword arguments replace fields of the outputs."""
-    estimate = replace(SNAPSHOT.estimate, t_us=t_us)
+    estimate = SNAPSHOT.estimate._replace(t_us=t_us)
     snapshot = replace(SNAPSHOT, t_us=t_us, estimate=estimate)
     return replace(TickOutputs(ACTUATORS, snapshot), **changes)  # type: ignore[arg-type]

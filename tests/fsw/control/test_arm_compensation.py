@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -89,7 +88,7 @@ def test_on_the_plan_nothing_is_compensated(seed: int) -> None:
 def test_rates_are_those_of_the_angles_along_the_motion(seed: int) -> None:
     """Plan and base moved on by a moment; the plan's end-effector at its own velocity."""
     random = np.random.default_rng(seed)
-    plan = replace(plan_of(random), j=(0.0, 0.0), yaw_rate=0.0)
+    plan = plan_of(random)._replace(j=(0.0, 0.0), yaw_rate=0.0)
     estimate = pushed_within_the_arms_plane(plan, 0.01, -0.01, 0.02)
     _, rates = compensated_joints(AIRFRAME, LIMITS, estimate, plan)
     moment = 1e-5
@@ -108,7 +107,7 @@ def later(plan: PredictionState, estimate: StateEstimate, t: float) -> Vec2:
         estimate.q_arm,
     )
     q1, q2 = (float(q) for q in np.array(plan.q_arm) + t * np.array(plan.qd_arm))
-    ahead = replace(plan, p=vec3(np.array(plan.p) + t * np.array(plan.v)), q_arm=(q1, q2))
+    ahead = plan._replace(p=vec3(np.array(plan.p) + t * np.array(plan.v)), q_arm=(q1, q2))
     return compensated_joints(AIRFRAME, LIMITS, moved, ahead)[0]
 
 
@@ -126,6 +125,6 @@ def test_far_off_the_arm_stays_within_its_limits() -> None:
 
 
 def test_a_straight_arm_keeps_to_its_plan() -> None:
-    plan = replace(plan_of(np.random.default_rng(2)), q_arm=(0.1, 0.0))
+    plan = plan_of(np.random.default_rng(2))._replace(q_arm=(0.1, 0.0))
     estimate = pushed_within_the_arms_plane(plan, 0.02, 0.0, 0.0)
     assert compensated_joints(AIRFRAME, LIMITS, estimate, plan) == (plan.q_arm, plan.qd_arm)

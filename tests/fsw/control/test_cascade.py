@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -108,7 +107,7 @@ def test_the_rotor_model_lags_behind_what_was_sent() -> None:
     cascade = Cascade(AIRFRAME, LagModel(), TUNING, "tracking", DT)
     memory = in_hover(AIRFRAME, estimate)
     sent = ActuatorCommand((10.0, 10.0, 10.0, 10.0), (0.0, 0.0))
-    _, after = cascade.step(replace(memory, commanded=sent), estimate, plan_at(), NO_INPUT)
+    _, after = cascade.step(memory._replace(commanded=sent), estimate, plan_at(), NO_INPUT)
     share = 1.0 - math.exp(-DT / AIRFRAME.rotor_lag)
     hover = 3.5 * 9.81 / 4.0
     assert after.rotors == pytest.approx((hover + share * (10.0 - hover),) * 4)

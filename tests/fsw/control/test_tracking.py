@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -62,7 +61,7 @@ def snap_of(estimate: StateEstimate, wd: tuple[float, float]) -> np.ndarray:
 @pytest.mark.parametrize("tilt", [0.0, 0.3])
 def test_without_error_the_plans_own_snap_is_flown(yaw: float, tilt: float) -> None:
     rotation = Rotation.from_euler("ZYX", [yaw, tilt, -tilt])
-    plan = replace(PLAN, a=(0.5, -0.8, 0.2), j=(1.0, -2.0), s=(10.0, 20.0))
+    plan = PLAN._replace(a=(0.5, -0.8, 0.2), j=(1.0, -2.0), s=(10.0, 20.0))
     u = PlanInput((1.0, -1.0, 0.3), 0.0, (0.0, 0.0))
     estimate, motion = on_plan(rotation, plan)
     wd, thrust = follow_plan(LAW, AIRFRAME.mass, estimate, motion, calm(estimate), plan, u)
@@ -82,7 +81,7 @@ def test_the_vehicle_is_snapped_towards_the_plan(yaw: float, axis: int, quantity
     error[axis] = size
     start = getattr(PLAN, quantity)
     changed: dict[str, Any] = {quantity: tuple(a + b for a, b in zip(start, error, strict=True))}
-    ahead = replace(PLAN, **changed)
+    ahead = PLAN._replace(**changed)
     estimate, motion = on_plan(Rotation.from_euler("Z", yaw), PLAN)
     # The plan's own feed-forward depends on a and j; u follows so that it stays the same.
     u = PlanInput(
@@ -116,9 +115,9 @@ def test_height_errors_change_thrust_the_right_way(sign: float) -> None:
     """Plan below the vehicle (z down): less thrust; above: more."""
     estimate, motion = on_plan(Rotation.identity(), PLAN)
     for plan in (
-        replace(PLAN, p=(0.0, 0.0, -1.0 + sign * 0.02)),
-        replace(PLAN, v=(0.0, 0.0, sign * 0.1)),
-        replace(PLAN, a=(0.0, 0.0, sign * 0.5)),
+        PLAN._replace(p=(0.0, 0.0, -1.0 + sign * 0.02)),
+        PLAN._replace(v=(0.0, 0.0, sign * 0.1)),
+        PLAN._replace(a=(0.0, 0.0, sign * 0.5)),
     ):
         _, thrust = follow_plan(
             LAW, AIRFRAME.mass, estimate, motion, calm(estimate), plan, REST_INPUT

@@ -128,7 +128,7 @@ def test_a_start_that_is_no_number_is_refused(name: str, value: float) -> None:
     start = hovering()
     whole = getattr(start, name)
     broken: Any = (value, *whole[1:]) if isinstance(whole, tuple) else value
-    answer = planner().plan(request(replace(start, **{name: broken}), below(start.p)))
+    answer = planner().plan(request(start._replace(**{name: broken}), below(start.p)))
     assert isinstance(answer, PlanFailure)
     assert answer.status is SolverStatus.INPUT_REFUSED
     assert answer.plan_id == 7
@@ -174,7 +174,7 @@ def test_a_safe_set_that_is_no_number_never_becomes_a_plan(safe_set: SafeSet) ->
 def test_a_refusal_does_not_spoil_the_next_plan() -> None:
     start, used = hovering(), planner()
     used.plan(request(start, below((0.5, 0.0, -1.2))))
-    nowhere = replace(start, p=(math.nan, 0.0, 0.0))
+    nowhere = start._replace(p=(math.nan, 0.0, 0.0))
     used.plan(request(nowhere, below(start.p), t_us=1_100_000))
     again = planned(used.plan(request(start, below((0.5, 0.0, -1.2)), t_us=1_200_000)))
     fresh = planned(planner().plan(request(start, below((0.5, 0.0, -1.2)), t_us=1_200_000)))

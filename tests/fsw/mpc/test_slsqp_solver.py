@@ -187,14 +187,14 @@ def test_plans_come_back_through_the_planner(controller: str, case: str) -> None
 
 def test_what_is_not_finite_is_refused() -> None:
     slsqp = planner(replace(CONFIG, solver="slsqp"))
-    lost = replace(hovering(), v=(math.nan, 0.0, 0.0))
+    lost = hovering()._replace(v=(math.nan, 0.0, 0.0))
     answer = slsqp.plan(request(lost, below(STILL)))
     assert isinstance(answer, PlanFailure)
     assert answer.status is SolverStatus.INPUT_REFUSED
 
 
 def test_a_failure_is_no_plan() -> None:
-    behind = replace(hovering(), p=(3.0, 0.0, -1.2))
+    behind = hovering()._replace(p=(3.0, 0.0, -1.2))
     slsqp = planner(replace(CONFIG, controller="hc", solver="slsqp"))
     answer = slsqp.plan(request(behind, below((3.0, 0.0, -1.2)), WALLS))
     assert isinstance(answer, PlanFailure)

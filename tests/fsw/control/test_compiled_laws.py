@@ -1,0 +1,113 @@
+"""What flies is machine code; what is read and tested is Python: the two agree."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from fsw.control.cascade import Cascade, CascadeMemory, Inner, close_loops
+from fsw.control.inner_tuning import InnerTuning
+from fsw.control.tracking import Observed
+from fsw.estimation.estimator import attitude, estimate_state
+from fsw.model.airframe import AIRFRAME
+from fsw.model.nominal import NominalModel, advance
+from fsw.model.prediction import LagModel
+from fsw.signals import ActuatorCommand, PlanInput, SensorFrame, Vec4
+from tests.fsw.random_states import as_state, prediction_vector, random_estimate, vec3
+
+STATES = 300
+TUNINGS = [InnerTuning(), replace(InnerTuning(), compensate=False)]
+
+
+def numbers(value: Any) -> Iterator[float]:
+    """Every number of nested tuples, in order."""
+    if isinstance(value, tuple):
+        for part in value:
+            yield from numbers(part)
+    else:
+        yield value
+
+
+def four(random: np.random.Generator, high: float) -> Vec4:
+    a, b, c, d = (float(value) for value in random.uniform(0.0, high, 4))
+    return (a, b, c, d)
+
+
+def memory(random: np.random.Generator) -> CascadeMemory:
+    torque = (float(random.uniform(-2.0, 2.0)), float(random.uniform(-2.0, 2.0)))
+    return CascadeMemory(
+        four(random, AIRFRAME.rotor_thrust_max),
+        ActuatorCommand(four(random, AIRFRAME.rotor_thrust_max), torque),
+        Observed(vec3(random.uniform(-1.0, 1.0, 3)), vec3(random.uniform(-1.0, 1.0, 3))),
+        float(random.uniform(2.5, 4.5)),
+        vec3(random.uniform(-0.2, 0.2, 3)),
+        float(random.uniform(-0.2, 0.2)),
+        (float(random.uniform(-0.1, 0.1)), float(random.uniform(-0.1, 0.1))),
+    )
+
+
+def plan_input(random: np.random.Generator) -> PlanInput:
+    qdd1, qdd2 = (float(value) for value in random.uniform(-5.0, 5.0, 2))
+    return PlanInput(
+        vec3(random.uniform(-2.0, 2.0, 3)), float(random.uniform(-1.0, 1.0)), (qdd1, qdd2)
+    )
+
+
+@pytest.mark.parametrize("ticks", [1, 3])
+@pytest.mark.parametrize("tuning", TUNINGS)
+@pytest.mark.parametrize("inner", ["tracking", "pid"])
+def test_the_loops_do_as_machine_code_what_they_say_in_python(
+    inner: Inner, tuning: InnerTuning, ticks: int
+) -> None:
+    random = np.random.default_rng(7)
+    cascade = Cascade(AIRFRAME, LagModel(), tuning, inner, 0.002)
+    for _ in range(STATES):
+        case = (
+            memory(random),
+            random_estimate(random),
+            as_state(prediction_vector(random)),
+            plan_input(random),
+            ticks,
+        )
+        plain = list(numbers(close_loops(cascade.law, *case)))
+        np.testing.assert_allclose(list(numbers(cascade.step(*case))), plain, rtol=0, atol=1e-9)
+
+
+def test_a_number_that_is_none_comes_out_as_none_and_is_left_to_the_gate() -> None:
+    random = np.random.default_rng(8)
+    cascade = Cascade(AIRFRAME, LagModel(), InnerTuning(), "tracking", 0.002)
+    plan = as_state(prediction_vector(random))._replace(q_arm=(math.nan, 0.0))
+    wanted, _ = cascade.step(memory(random), random_estimate(random), plan, plan_input(random))
+    assert not math.isfinite(sum(wanted.joint_torque))
+
+
+@pytest.mark.parametrize("lag", [LagModel(), LagModel(at_once=True)])
+def test_the_plans_state_moves_on_as_in_python(lag: LagModel) -> None:
+    random = np.random.default_rng(9)
+    nominal = NominalModel(lag, 0.002)
+    for ticks in range(20):
+        x, u = as_state(prediction_vector(random)), plan_input(random)
+        plain = list(numbers(advance(nominal.model, x, u, ticks)))
+        np.testing.assert_allclose(
+            list(numbers(nominal.advance(x, u, ticks))), plain, rtol=0, atol=1e-9
+        )
+
+
+def test_the_estimate_is_the_one_of_python() -> None:
+    random = np.random.default_rng(10)
+    for _ in range(STATES):
+        q = random.normal(size=4)
+        w, x, y, z = (float(value) for value in q / np.linalg.norm(q))
+        p, v, gyro, accel = (vec3(random.uniform(-2.0, 2.0, 3)) for _ in range(4))
+        sensors = SensorFrame(1, p, v, (w, x, y, z), gyro, accel, (0.1, 0.2), (0.3, 0.4))
+        usable, rotation, yaw = attitude(p, v, (w, x, y, z), gyro, accel, (0.1, 0.2), (0.3, 0.4))
+        estimate = estimate_state(sensors)
+        assert usable
+        assert estimate is not None
+        np.testing.assert_allclose(estimate.R_WB, rotation, rtol=0, atol=1e-9)
+        assert estimate.yaw == pytest.approx(yaw, abs=1e-9)
