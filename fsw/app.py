@@ -20,26 +20,25 @@ from fsw.link.udp_endpoint import LinkError, parse_address
 from fsw.link.vehicle_files import vehicle_files
 from fsw.log.run_directory import new_run_directory
 from fsw.log.tlog import TlogWriter
-from fsw.ports import Planner, PlanService
+from fsw.ports import Planner
 from fsw.runtime import clock, report
 from fsw.runtime.effort import EffortRecord
 from fsw.runtime.events import Events, events
-from fsw.runtime.planner_worker import InlinePlanner, PlannerRecord, ThreadedPlanner
-from fsw.runtime.process import (
+from fsw.runtime.planner_worker import InlinePlanner, PlannerRecord, ProcessPlanner
+from fsw.runtime.process import StopRequest, settle_memory
+from fsw.runtime.program import FlightProgram
+from fsw.runtime.realtime import (
     TICK_PRIORITY,
-    StopRequest,
     claim_real_time,
     release_real_time,
-    settle_memory,
     share_interpreter_fairly,
 )
-from fsw.runtime.program import FlightProgram
 from fsw.runtime.sim_loop import Ending, FlightEnd, FlightRecord, SimLoop
 from fsw.runtime.timing import GroupTimer
 
 DONE, NOT_COMPLETED, COULD_NOT_START = 0, 1, 2  # exit codes
 
-NO_PERMISSION = "no permission for real-time scheduling: ticks may be late on a busy machine"
+NO_PERMISSION = "no permission for {}: ticks may be late on a busy machine"
 
 ProgramLoader = Callable[[FswOptions], FlightProgram[Any]]
 
@@ -99,6 +98,9 @@ class _Session:
             effort=EffortRecord(),
             health=LoopHealth(),
         )
+        # Early: a process forked now shares what was compiled, and no thread, port or log.
+        settle_memory()
+        planner = ProcessPlanner(program.planner, clock.now_us, record.mpc)
         inbox = Inbox()
         log = TlogWriter(directory / "flight.tlog", clock.unix_us())
         sim = SimLink(simulator, inbox, facts)
@@ -106,9 +108,9 @@ class _Session:
         gcs = GcsLink(ground, inbox, context, log.add, self._services(flight_logs(directory)))
         loop = SimLoop(program, sim, gcs, inbox, record, clock.now_us, self._stop)
         try:
-            end = self._fly(loop, sim, program.planner, record)
+            end = self._fly(loop, sim, program.planner, planner, record)
         finally:
-            for part in (sim, gcs, log):
+            for part in (planner, sim, gcs, log):
                 part.close()
         setup = report.Setup(options.control.controller, options.control.inner, facts)
         result = report.as_json(setup, end, record, sim.retransmissions)
@@ -124,7 +126,8 @@ class _Session:
         self,
         loop: SimLoop[Any],
         sim: SimLink,
-        planner: Planner,
+        inline: Planner,
+        planner: ProcessPlanner,
         record: FlightRecord,
     ) -> FlightEnd:
         options = self._options
@@ -138,19 +141,18 @@ class _Session:
                 f"no simulator answered at {options.sim} within {options.wait_s:g} s"
             )
         # Lockstep announces itself with the first step; a first step without it was not the first.
-        realtime = sim.pacing is not Pacing.LOCKSTEP
-        service = _plan_service(realtime, planner, record)
-        if realtime:
-            share_interpreter_fairly()
-            if not claim_real_time(TICK_PRIORITY):
-                self._told.report("warning", f"fsw: {NO_PERMISSION}")
+        if sim.pacing is Pacing.LOCKSTEP:
+            settle_memory()
+            return loop.fly(first, InlinePlanner(inline, clock.now_us, record.mpc))
+        share_interpreter_fairly()
+        refused = claim_real_time(TICK_PRIORITY)
+        if refused:
+            self._told.report("warning", f"fsw: {NO_PERMISSION.format(' and '.join(refused))}")
         settle_memory()
         try:
-            return loop.fly(first, service)
+            return loop.fly(first, planner)
         finally:
-            service.close()
-            if realtime:
-                release_real_time()
+            release_real_time()
 
 
 def load_flight_software(options: FswOptions) -> FlightProgram[Any]:
@@ -166,12 +168,6 @@ def load_flight_software(options: FswOptions) -> FlightProgram[Any]:
         return flight_software(options.control)
     except ValueError as error:
         raise CouldNotStart(str(error)) from None
-
-
-def _plan_service(realtime: bool, planner: Planner, record: FlightRecord) -> PlanService:
-    if realtime:
-        return ThreadedPlanner(planner, clock.now_us, record.mpc)
-    return InlinePlanner(planner, clock.now_us, record.mpc)
 
 
 def _output_directory(wanted: Path | None) -> Path:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
+import ctypes
 import gc
 import os
 import signal
@@ -10,9 +10,7 @@ import sys
 from types import FrameType
 from typing import Final
 
-TICK_PRIORITY: Final = 50
-PLANNER_PRIORITY: Final = 40  # the tick goes first, ordinary programs come after both
-_SWITCH_INTERVAL_S: Final = 100e-6
+_PR_SET_PDEATHSIG: Final = 1
 _THREAD_VARIABLES: Final = (
     "OPENBLAS_NUM_THREADS",
     "OMP_NUM_THREADS",
@@ -57,21 +55,9 @@ def settle_memory() -> None:
     gc.disable()
 
 
-def claim_real_time(priority: int) -> bool:
-    """Ask for real-time scheduling of the calling thread; False if that is not permitted."""
-    try:
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
-    except OSError:
-        return False
-    return True
-
-
-def share_interpreter_fairly() -> None:
-    """Let a due tick wait for the planner's Python no longer than this, instead of 5 ms."""
-    sys.setswitchinterval(_SWITCH_INTERVAL_S)
-
-
-def release_real_time() -> None:
-    """Give ordinary scheduling back, for the work after the flight."""
-    with contextlib.suppress(OSError):
-        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+def die_with_parent(parent: int) -> None:
+    """Tie the life of a process that was just forked to its parent's (Linux only)."""
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
+    if os.getppid() != parent:
+        os._exit(1)

@@ -1,14 +1,17 @@
-"""Latency is counted in ticks inline, and never blocks in a thread."""
+"""Latency is counted in ticks inline; the planner's process never blocks and never stays behind."""
 
 from __future__ import annotations
 
-import threading
+import os
+import signal
 import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import pytest
 
-from fsw.runtime import clock
-from fsw.runtime.planner_worker import InlinePlanner, PlannerRecord, ThreadedPlanner
+from fsw.runtime import clock, planner_worker
+from fsw.runtime.planner_worker import InlinePlanner, PlannerRecord, ProcessPlanner
 from fsw.runtime.timing import GroupTimer
 from fsw.signals import (
     Plan,
@@ -23,6 +26,7 @@ from fsw.signals import (
 REST = PredictionState(
     (0.0,) * 3, (0.0,) * 3, (0.0,) * 3, (0.0,) * 2, (0.0,) * 2, 0.0, 0.0, (0.0,) * 2, (0.0,) * 2
 )  # fmt: skip
+CRASH, HANG, ALWAYS_US = 666, 667, 9_000_000
 
 
 def request(plan_id: int, t_apply_us: int = 1_010_000) -> PlanRequest:
@@ -30,16 +34,16 @@ def request(plan_id: int, t_apply_us: int = 1_010_000) -> PlanRequest:
 
 
 class Refusing:
-    """A planner that answers everything with a failure, after a gate has opened."""
+    """Answers everything with a failure; two numbers it does not survive."""
 
-    def __init__(self) -> None:
-        self.gate = threading.Event()
-        self.gate.set()
-        self.asked: list[int] = []
+    def __init__(self, gate: Path | None = None) -> None:
+        self._gate = gate
 
     def plan(self, request: PlanRequest) -> Plan | PlanFailure:
-        self.asked.append(request.plan_id)
-        assert self.gate.wait(5.0)
+        if request.plan_id == CRASH:
+            os.kill(os.getpid(), signal.SIGSEGV)
+        while request.plan_id == HANG or (self._gate is not None and not self._gate.exists()):
+            time.sleep(0.001)
         return PlanFailure(
             request.plan_id, SolverStatus.INFEASIBLE, "no", PlanTimings(0.0, 0.0, 0.0)
         )
@@ -57,11 +61,32 @@ def record() -> PlannerRecord:
     return PlannerRecord(GroupTimer(100_000))
 
 
-def wait_for(condition: object) -> None:
-    until = time.monotonic() + 5.0
-    while not condition():  # type: ignore[operator]
+@pytest.fixture
+def service(record: PlannerRecord) -> Iterator[ProcessPlanner]:
+    planner = ProcessPlanner(Refusing(), clock.now_us, record)
+    yield planner
+    planner.close()
+
+
+def wait_for(condition: Callable[[], object]) -> None:
+    until = time.monotonic() + 10.0
+    while not condition():
         assert time.monotonic() < until
         time.sleep(0.001)
+
+
+def answer(service: ProcessPlanner, t_us: int = ALWAYS_US) -> Plan | PlanFailure:
+    answers: list[Plan | PlanFailure] = []
+    wait_for(lambda: answers.append(a) or True if (a := service.take(t_us)) else False)
+    return answers[0]
+
+
+def is_gone(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return True
+    return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] == "Z"
 
 
 def test_inline_the_answer_waits_for_its_tick(record: PlannerRecord) -> None:
@@ -85,30 +110,121 @@ def test_a_planner_that_raises_is_a_failed_cycle(record: PlannerRecord) -> None:
     assert "ZeroDivisionError" in answer.reason
 
 
-def test_in_a_thread_submit_and_take_never_wait(record: PlannerRecord) -> None:
-    planner = Refusing()
-    planner.gate.clear()
-    service = ThreadedPlanner(planner, clock.now_us, record)
+def test_the_process_s_answer_waits_for_its_tick_too(
+    service: ProcessPlanner, record: PlannerRecord
+) -> None:
+    service.submit(request(1))
+    until = time.monotonic() + 0.3
+    while time.monotonic() < until:
+        assert service.take(1_008_000) is None
+    given = answer(service, 1_010_000)
+    assert given == PlanFailure(1, SolverStatus.INFEASIBLE, "no", PlanTimings(0.0, 0.0, 0.0))
+    assert service.take(ALWAYS_US) is None
+    assert record.timer.ticks == 1
+
+
+def test_submit_and_take_never_wait_and_the_newest_request_is_next(
+    record: PlannerRecord, tmp_path: Path
+) -> None:
+    gate = tmp_path / "open"
+    service = ProcessPlanner(Refusing(gate), clock.now_us, record)
+    service.submit(request(1))
+    time.sleep(0.2)  # now it is at work on it
     begin = time.monotonic()
-    service.submit(request(1))
-    assert service.take(9_000_000) is None
-    assert time.monotonic() - begin < 1.0
-    planner.gate.set()
-    answers: list[Plan | PlanFailure] = []
-    wait_for(lambda: answers.append(a) or True if (a := service.take(9_000_000)) else False)
-    assert answers[0].plan_id == 1
+    for plan_id in range(2, 2000):  # far more than the link holds
+        service.submit(request(plan_id))
+        assert service.take(ALWAYS_US) is None
+    assert time.monotonic() - begin < 2.0
+    gate.touch()
+    given = [answer(service).plan_id]
+    until = time.monotonic() + 0.2
+    while time.monotonic() < until:
+        later = service.take(ALWAYS_US)
+        given += [] if later is None else [later.plan_id]
+    assert len(given) <= 2, "everything in between was skipped"
+    assert given[-1] > 100
     service.close()
 
 
-def test_the_newest_request_replaces_one_that_was_not_started(record: PlannerRecord) -> None:
-    planner = Refusing()
-    planner.gate.clear()
-    service = ThreadedPlanner(planner, clock.now_us, record)
+def test_a_worker_that_dies_is_replaced_and_the_event_told(
+    service: ProcessPlanner, record: PlannerRecord
+) -> None:
     service.submit(request(1))
-    wait_for(lambda: planner.asked == [1])
+    answer(service)
+    first = service.worker
+    assert first is not None
+    os.kill(first, signal.SIGKILL)
+    wait_for(lambda: is_gone(first))
     service.submit(request(2))
+    assert answer(service).plan_id == 2
+    assert service.worker not in (None, first)
+    assert record.restarts == 1
+    assert record.events == ["planner process died (-9), restarted"]
+
+
+def test_a_request_that_kills_its_worker_is_lost_and_the_next_is_answered(
+    service: ProcessPlanner, record: PlannerRecord
+) -> None:
+    service.submit(request(CRASH))
+    wait_for(lambda: service.take(ALWAYS_US) or record.restarts)
     service.submit(request(3))
-    planner.gate.set()
-    wait_for(lambda: planner.asked[-1] == 3)
-    assert planner.asked == [1, 3]
+    assert answer(service).plan_id == 3
+    assert record.events == ["planner process died (-11), restarted"]
+
+
+def test_a_nursery_that_dies_takes_its_worker_along_and_both_are_replaced(
+    service: ProcessPlanner, record: PlannerRecord
+) -> None:
+    service.submit(request(1))
+    answer(service)
+    first, nursery = service.worker, service._nursery
+    assert first is not None
+    assert nursery is not None
+    os.kill(nursery, signal.SIGKILL)
+    wait_for(lambda: is_gone(first))
+    service.submit(request(2))
+    service.take(ALWAYS_US)
+    service.submit(request(3))
+    assert answer(service).plan_id in (2, 3)
+    assert record.restarts == 1
+
+
+def test_a_worker_that_is_stuck_is_replaced(
+    service: ProcessPlanner, record: PlannerRecord, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(planner_worker, "PATIENCE_US", 200_000)
+    service.submit(request(HANG))
+    wait_for(lambda: service.take(ALWAYS_US) or record.restarts)
+    service.submit(request(4))
+    assert answer(service).plan_id == 4
+
+
+def test_nothing_is_left_of_it(record: PlannerRecord) -> None:
+    service = ProcessPlanner(Refusing(), clock.now_us, record)
+    service.submit(request(1))
+    answer(service)
+    worker, nursery = service.worker, service._nursery
+    assert worker is not None
+    assert nursery is not None
     service.close()
+    service.close()
+    assert is_gone(nursery)
+    wait_for(lambda: is_gone(worker))
+
+
+def test_a_parent_that_is_killed_leaves_no_orphans() -> None:
+    reading, writing = os.pipe()
+    parent = os.fork()
+    if parent == 0:
+        service = ProcessPlanner(Refusing(), clock.now_us, PlannerRecord(GroupTimer(100_000)))
+        service.submit(request(1))
+        answer(service)
+        os.write(writing, f"{service.worker} {service._nursery}".encode())
+        time.sleep(60.0)
+        os._exit(0)
+    os.close(writing)
+    worker, nursery = map(int, os.read(reading, 100).split())
+    os.close(reading)
+    os.kill(parent, signal.SIGKILL)
+    os.waitpid(parent, 0)
+    wait_for(lambda: is_gone(worker) and is_gone(nursery))
