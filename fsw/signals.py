@@ -14,6 +14,8 @@ from dataclasses import dataclass, field
 from enum import Enum, IntEnum
 from typing import NamedTuple
 
+from fsw.tuning import Tuning
+
 Vec2 = tuple[float, float]
 Vec3 = tuple[float, float, float]
 Vec4 = tuple[float, float, float, float]
@@ -293,6 +295,7 @@ class PlanRequest:
     targets: tuple[EndEffectorTarget, ...]  # n + 1 points, one a node, first at t_apply_us
     safe_set: SafeSet
     from_nominal: bool  # start carried over from the running plan, not measured
+    tuning: Tuning = ()  # of the planner's configuration
 
 
 @dataclass(frozen=True, slots=True)
@@ -445,6 +448,7 @@ class TickInputs:
     refused_setpoints: int = 0  # that were of no use, since the last tick
     ground_station_heard: bool = False  # a heartbeat, since the last tick
     mission: MissionUpdate | None = None  # newly uploaded
+    tuning: Tuning | None = None  # newly wished for, whole
 
 
 @dataclass(frozen=True, slots=True)
@@ -456,3 +460,4 @@ class TickOutputs:
     plan_request: PlanRequest | None = None
     acks: tuple[CommandAck, ...] = ()
     texts: tuple[StatusText, ...] = field(default=())
+    tuning_taken: bool | None = None  # whether the one wished for is in use; None: none was

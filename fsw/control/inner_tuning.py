@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
 from scipy.linalg import expm, solve_discrete_are
@@ -60,6 +61,7 @@ class InnerTuning:
     tracking: TrackingTuning = field(default_factory=TrackingTuning)
 
 
+@lru_cache(maxsize=8)
 def tracking_gains(tuning: TrackingTuning, rotor_lag: float, dt: float) -> TrackingGains:
     """Design the tracking loop for one tick length.
 

@@ -19,6 +19,7 @@ Source: docs/equations.md T4.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from scipy.linalg import expm
@@ -42,6 +43,7 @@ class Tube:
     snap_expected: float  # m/s^4
 
 
+@lru_cache(maxsize=8)  # 4 ms; most changes of a tuning do not touch it
 def tube(
     airframe: Airframe,
     tuning: TrackingTuning,

@@ -30,6 +30,7 @@ from fsw.signals import (
     Wall,
     WorkspaceSphere,
 )
+from fsw.tuning import Tuning, tuned
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,8 +47,8 @@ class _Search:
 class Planner:
     """The MPC of eq 17, solved by sequential quadratic programming.
 
-    Holds the last solution as the next guess and the program of the current safe set;
-    everything else comes with the request.
+    Holds the last solution as the next guess and the program of the current safe set and
+    tuning; everything else comes with the request.
     """
 
     def __init__(self, config: PlannerConfig, stopwatch_us: Callable[[], float]) -> None:
@@ -57,7 +58,8 @@ class Planner:
             config: Horizon, weights, limits and barriers.
             stopwatch_us: Monotonic time for the reported stage times only [us].
         """
-        self._config = config
+        self._untuned = self._config = config
+        self._tuning: Tuning = ()
         self._stopwatch_us = stopwatch_us
         self._period_us = round(config.period * 1e6)
         self._model = condense(config.lag, config.period, config.horizon)
@@ -100,6 +102,8 @@ class Planner:
             return PlanFailure(
                 request.plan_id, SolverStatus.INPUT_REFUSED, refusal, PlanTimings(0.0, 0.0, 0.0)
             )
+        if request.tuning != self._tuning:
+            self._retune(request.tuning)
         problem = self._problem_for(request.safe_set)
         start = to_vector(request.start)
         targets = TargetPoints(
@@ -172,6 +176,12 @@ class Planner:
             if not all(map(math.isfinite, (*target.p_WE, *target.v_WE, target.yaw))):
                 return "a target is not finite"
         return None
+
+    def _retune(self, tuning: Tuning) -> None:
+        """Plan with other weights, limits and barriers from now on."""
+        self._config = tuned(self._untuned, tuning)
+        self._tuning = tuning
+        self._problem = None
 
     def _problem_for(self, safe_set: SafeSet) -> Problem:
         if self._problem is None or safe_set != self._safe_set:

@@ -94,7 +94,8 @@ def sampled_robustness(tuning: BarrierTuning, disturbance: float) -> float:
 def _actuation(
     config: FlightConfig, tuning: BarrierTuning, safe_set: SafeSet, surroundings: Surroundings
 ) -> Finding:
-    available = GRAVITY * math.tan(config.airframe.tilt_limit)
+    tilt = min(config.airframe.tilt_limit, config.planner.limits.tilt)
+    available = GRAVITY * math.tan(tilt)
     wanted = tuning.alpha + tuning.gamma * tuning.robustness + surroundings.target_acceleration
     parts = "alpha + gamma lambda + |a_t|"
     if safe_set.sphere is not None:

@@ -158,7 +158,7 @@ _ROWS: Final[dict[str, list[_Row]]] = {
         *_slack("BAR", "planner.barrier_slack", "a barrier"),
         ("SUR_DISTURB", "surroundings.disturbance", "m/s^2", 0.0, 3.0,
          "disturbance on an axis that the analysis reckons with"),
-        ("SUR_HOLD", "surroundings.disturbance_hold", "s", 0.01, 10.0,
+        ("SUR_HOLD", "surroundings.disturbance_hold", "s", 0.01, 2.0,
          "how long a random disturbance keeps its value"),
         ("SUR_ACC_TGT", "surroundings.target_acceleration", "m/s^2", 0.0, 3.0,
          "acceleration of the reference that the analysis reckons with"),

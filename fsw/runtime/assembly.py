@@ -11,9 +11,9 @@ from fsw.mpc.planner_config import Solver
 from fsw.parameters.control_choice import ControlChoice
 from fsw.parameters.flight_config import FlightConfig, flight_config
 from fsw.runtime import clock
-from fsw.runtime.flight_loop import FlightLoop
 from fsw.runtime.flight_state import FlightState
 from fsw.runtime.program import FlightProgram
+from fsw.runtime.tuned_flight import TunedFlight
 
 
 def flight_software(choice: ControlChoice) -> FlightProgram[Any]:
@@ -32,9 +32,9 @@ def flight_software(choice: ControlChoice) -> FlightProgram[Any]:
     )
     planner = Planner(config.planner, clock.stopwatch_us)
     planner.warm_up()
-    loop = FlightLoop(config)
-    loop.warm_up()
-    return FlightProgram(_facts(config), FlightState(), loop.tick, planner)
+    flight = TunedFlight(config)
+    flight.warm_up()
+    return FlightProgram(_facts(config), FlightState(), flight.tick, planner)
 
 
 def _facts(config: FlightConfig) -> VehicleFacts:

@@ -15,7 +15,7 @@ from fsw.estimation.estimator import estimate_state
 from fsw.model.arm_kinematics import point_in_flight
 from fsw.model.nominal import REST_INPUT, NominalModel
 from fsw.mpc.reference import merge
-from fsw.parameters.consistency import analyse, loop_tube, refusals, warnings
+from fsw.parameters.consistency import Finding, analyse, loop_tube, refusals, warnings
 from fsw.parameters.flight_config import FlightConfig
 from fsw.runtime.flight_state import FlightState, MissionMemory, PlanMemory
 from fsw.runtime.mode_keeper import SEVERITY_WARNING, ModeKeeper, answer
@@ -40,6 +40,7 @@ from fsw.signals import (
     PlanInput,
     PlanRequest,
     PredictionState,
+    SafeSet,
     SensorFrame,
     StateEstimate,
     StatusText,
@@ -132,8 +133,13 @@ class FlightLoop:
             state.plan,
             constraints,
             reference,
+            state.tuning,
         )
         return state, TickOutputs(sent, snapshot, request, tuple(acks), tuple(texts))
+
+    def judge(self, safe_set: SafeSet) -> tuple[Finding, ...]:
+        """What speaks for and against keeping a safe set with this configuration."""
+        return analyse(self.config, safe_set, self._loop_tube)
 
     def _elapsed_ticks(self, state: FlightState, now_us: int) -> int:
         """Ticks since the last one: more than one where sensor frames were missed."""
@@ -179,7 +185,7 @@ class FlightLoop:
         stream = merge(mission.stream, inputs.targets, now_us)
         if inputs.safe_set is None or inputs.safe_set == mission.safe_set:
             return replace(mission, stream=stream)
-        findings = analyse(self.config, inputs.safe_set, self._loop_tube)
+        findings = self.judge(inputs.safe_set)
         against = refusals(findings)
         texts += [StatusText(SEVERITY_WARNING, text) for text in (*against, *warnings(findings))]
         return MissionMemory(stream, inputs.safe_set, () if self.config.soft else against)

@@ -20,6 +20,7 @@ from fsw.signals import (
     StateEstimate,
     Vec3,
 )
+from fsw.tuning import Tuning
 
 _NOWHERE: Vec3 = (0.0, 0.0, 0.0)
 
@@ -93,3 +94,4 @@ class FlightState:
     plan: PlanMemory = field(default_factory=PlanMemory)
     constraints: ConstraintReport = field(default_factory=ConstraintReport)
     reference: EndEffectorTarget | None = None  # in use when last planned
+    tuning: Tuning = ()  # in use: what differs from the configuration of the start

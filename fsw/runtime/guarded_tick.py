@@ -48,7 +48,11 @@ class GuardedTick(Generic[State]):
             traceback.print_exc()
             text = f"tick failed, {type(error).__name__}: last command repeated"
             return replace(
-                self._last, plan_request=None, acks=(), texts=(StatusText(_CRITICAL, text),)
+                self._last,
+                plan_request=None,
+                acks=(),
+                texts=(StatusText(_CRITICAL, text),),
+                tuning_taken=None,
             )
         self._failed = 0
         self._last = outputs

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from fsw.mpc.planner import Planner
 from fsw.parameters.flight_config import FlightConfig, flight_config
 from fsw.ports import Planner as AnyPlanner
-from fsw.runtime.flight_loop import FlightLoop
 from fsw.runtime.flight_state import FlightState
+from fsw.runtime.tuned_flight import TunedFlight
 from fsw.signals import (
     ActuatorCommand,
     CommandRequest,
@@ -25,6 +25,7 @@ from fsw.signals import (
     Wall,
     WorkspaceSphere,
 )
+from fsw.tuning import Tuning
 from sitl.scenario import Hold, Pilot, Scenario, Start
 from sitl.sensors.suite import SensorReadings
 from sitl.simulation import START_US, STEP_US, Controls, Simulation
@@ -81,7 +82,7 @@ class Flight:
 
     def __post_init__(self) -> None:
         self.sim = Simulation(self.scenario, self.seed)
-        self.loop = FlightLoop(self.config)
+        self.loop = TunedFlight(self.config)
         self.planner = self.planner or real_planner(self.config)
         self.inputs: TickInputs | None = None  # of the last tick
         self._outputs: TickOutputs | None = None
@@ -114,7 +115,7 @@ class Flight:
             self.step()
             assert self.sim.ended is None, self.sim.ended
 
-    def step(self, *commands: CommandRequest) -> TickOutputs:
+    def step(self, *commands: CommandRequest, tuning: Tuning | None = None) -> TickOutputs:
         """Sense, tick, plan, advance."""
         sensors = self.spoil(frame(self.sim.sense()))
         self.inputs = TickInputs(
@@ -123,6 +124,7 @@ class Flight:
             commands,
             self._targets(),
             safe_set(self.scenario) if self.sim.step == 0 else None,
+            tuning=tuning,
         )
         before = self.mode
         self.state, outputs = self.loop.tick(self.state, self.inputs)
