@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from sitl.admission import check_start
 from sitl.mission_clock import MissionClock
+from sitl.plant.vector import Array
 from sitl.scenario import V3, Scenario
 from sitl.verdict import EndKind, EndReason, MarginRecord, TrackingError, TruthResult, score
-from sitl.world import World
+from sitl.world import World, record_if_clear
 
 TOUCH_DOWN_MAX = 2.0  # m/s; a drop from 0.2 m
 Points = tuple[V3, V3, V3]  # base, joint 2, end-effector [m, NED]
+
+_NOWHERE = np.empty((0, 3))
 
 
 class Referee:
@@ -66,6 +71,32 @@ class Referee:
         if touched is not None:
             self.end(EndKind.COLLISION, f"{touched} at {time_s:.2f} s", time_s)
 
+    def judge_all(self, places: Array, before_s: float, step_s: float) -> None:
+        """Look at every plant step of an exchange.
+
+        Args:
+            places: As ``sitl.plant.integrator.integrate`` leaves them, a row a plant step.
+            before_s: Time at the begin of the exchange [s].
+            step_s: Length of a plant step [s].
+        """
+        if self.ended is None and self._all_clear(places, before_s, step_s):
+            return
+        for k, rows in enumerate(places.tolist(), start=1):
+            self.judge(critical(rows), before_s + k * step_s)
+
+    def _all_clear(self, places: Array, before_s: float, step_s: float) -> bool:
+        """Record the margins of steps without any incident; False, and nothing done, otherwise."""
+        instants = [before_s + k * step_s for k in range(1, 1 + len(places))]
+        targets = _NOWHERE
+        if self.world.workspace is not None:
+            if not all(map(self._clock.counts, instants)):
+                return False
+            targets = np.array([self._clock.target_at(time_s).p for time_s in instants])
+        lowest, when_s = self.record.arrays
+        return record_if_clear(
+            self.world.planes, self.world.sphere, targets, places, before_s, step_s, lowest, when_s
+        )
+
     def judge_landing(self, speed: float, time_s: float) -> None:
         """Look at the fastest foot on the ground [m/s]."""
         if not (speed <= TOUCH_DOWN_MAX):
@@ -95,3 +126,12 @@ def _whole(scenario: Scenario) -> EndKind:
     if scenario.pilot.plan == "hop":
         return EndKind.MISSION
     return EndKind.DURATION if math.isfinite(scenario.duration_s) else EndKind.INTERRUPTED
+
+
+def critical(rows: list[list[float]]) -> Points:
+    """Base, joint 2 and end-effector out of base, joint 1, …, end-effector."""
+    return _three(rows[0]), _three(rows[2]), _three(rows[-1])
+
+
+def _three(values: list[float]) -> V3:
+    return (values[0], values[1], values[2])

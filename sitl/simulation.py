@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from sitl.admission import check
 from sitl.disturbances.items import push
 from sitl.mission_clock import MissionClock
-from sitl.plant.aerial_manipulator import Inputs, plant
-from sitl.plant.integrator import STEP_S, integrate
+from sitl.plant.aerial_manipulator import plant
+from sitl.plant.integrator import STEP_S, Arrival
 from sitl.plant.kinematics import places
-from sitl.plant.state import StateView
-from sitl.referee import Points, Referee
+from sitl.plant.parcel import parcel, travel
+from sitl.plant.state import ARM, P_WB, Q_WB, THRUST, V_WB, W_WB_B
+from sitl.plant.vector import Array
+from sitl.referee import Points, Referee, critical
 from sitl.scenario import V3, Scenario
 from sitl.scenario_file import ScenarioError
 from sitl.sensors.suite import V4, SensorReadings, SensorSuite
@@ -28,8 +31,7 @@ SUBSTEPS = 2  # plant steps per exchange
 SAMPLE_STEPS = 50  # tracking error at 10 Hz, as the paper's TE
 
 
-@dataclass(frozen=True, slots=True)
-class Controls:
+class Controls(NamedTuple):
     """What the flight software commands for one step."""
 
     thrust: tuple[float, float, float, float]  # fraction of full thrust 0…1, rotors 1..4
@@ -76,17 +78,16 @@ class Simulation:
         self.clock = MissionClock(scenario)
         self.step = 0
         self._plant = plant(self.vehicle)
+        self._parcel = parcel(self._plant)
         self._mass = self.vehicle.mass
         self._sensors = SensorSuite(scenario.sensors, seed, STEP_US)
         self._pushes = [push(item, seed, 1e-6 * STEP_US) for item in scenario.disturbances]
         self._state, trim = first_state(self.vehicle, scenario, self.clock.target_at(0.0).p)
-        self._inputs = Inputs(
-            np.array(trim.thrust), np.array(trim.torque), np.zeros(3), np.zeros(3)
-        )
+        self._thrust, self._torque = trim.thrust, trim.torque
         self._places = np.empty((SUBSTEPS, 2 + len(self.vehicle.links), 3))
         # No steps: only what the accelerometer feels at the start.
         nothing = self._places[:0]
-        self._felt = integrate(self._plant, self._state, self._inputs, STEP_S, nothing).felt
+        self._felt = self._travel((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), nothing).felt
         self._reading: SensorReadings | None = None
         self._referee = Referee(scenario, self.clock, self._points_now())
 
@@ -152,8 +153,7 @@ class Simulation:
             ValueError: A control is not finite or their number is wrong.
         """
         self._command(controls)
-        self._disturb()
-        arrival = integrate(self._plant, self._state, self._inputs, STEP_S, self._places)
+        arrival = self._travel(*self._disturbance(), self._places)
         self._felt = arrival.felt
         before = self.time_s
         self.step += 1
@@ -161,17 +161,17 @@ class Simulation:
 
     def truth(self) -> Truth:
         """The true state now."""
-        view = StateView(self._state)
+        exact = self._exact_reading()
         points = self._points_now()
         return Truth(
             t_us=self.t_us,
-            p_WB=_three(view.p_WB.tolist()),
-            v_WB=_three(view.v_WB.tolist()),
-            q_WB=_four(view.q_WB.tolist()),
-            w_WB_B=_three(view.w_WB_B.tolist()),
-            thrust=_four(view.thrust.tolist()),
-            q_arm=tuple(view.q_arm.tolist()),
-            qd_arm=tuple(view.qd_arm.tolist()),
+            p_WB=exact.p_WB,
+            v_WB=exact.v_WB,
+            q_WB=exact.q_WB,
+            w_WB_B=exact.w_WB_B,
+            thrust=_four(self._state[THRUST:ARM].tolist()),
+            q_arm=exact.q_arm,
+            qd_arm=exact.qd_arm,
             p_WE=points[2],
             target=self.target_at(self.time_s),
             margins_m=self._referee.margins(points, self.time_s),
@@ -182,19 +182,34 @@ class Simulation:
         return self._referee.result(self.time_s)
 
     def _exact_reading(self) -> SensorReadings:
-        view = StateView(self._state)
-        w = _three(view.w_WB_B.tolist())
+        # Taken apart as a list: a view into the vector costs as much as all of this.
+        x: list[float] = self._state.tolist()
+        w = (x[W_WB_B], x[W_WB_B + 1], x[W_WB_B + 2])
+        rates = ARM + len(self._torque)
         return SensorReadings(
-            t_us=self.t_us,
-            p_WB=_three(view.p_WB.tolist()),
-            v_WB=_three(view.v_WB.tolist()),
-            q_WB=_four(view.q_WB.tolist()),
+            self.t_us,
+            p_WB=(x[P_WB], x[P_WB + 1], x[P_WB + 2]),
+            v_WB=(x[V_WB], x[V_WB + 1], x[V_WB + 2]),
+            q_WB=(x[Q_WB], x[Q_WB + 1], x[Q_WB + 2], x[Q_WB + 3]),
             w_WB_B=w,
             gyro_B=w,
             accel_B=self._felt,
-            q_arm=tuple(view.q_arm.tolist()),
-            qd_arm=tuple(view.qd_arm.tolist()),
-            tau_arm=tuple(self._inputs.torque.tolist()),
+            q_arm=tuple(x[ARM:rates]),
+            qd_arm=tuple(x[rates:]),
+            tau_arm=self._torque,
+        )
+
+    def _travel(self, force_W: V3, torque_B: V3, passed: Array) -> Arrival:
+        """Integrate one plant step for every row of ``passed``."""
+        return travel(
+            self._parcel,
+            self._state,
+            self._thrust,
+            self._torque,
+            force_W,
+            torque_B,
+            STEP_S,
+            passed,
         )
 
     def _command(self, controls: Controls) -> None:
@@ -202,14 +217,21 @@ class Simulation:
         joints = len(self.vehicle.links)
         if len(controls.thrust) != 4 or len(controls.torque) != joints:
             raise ValueError(f"{controls} at step {self.step}: expected 4 rotors, {joints} joints")
-        if not all(map(math.isfinite, (*controls.thrust, *controls.torque))):
+        if not math.isfinite(sum(controls.thrust) + sum(controls.torque)):
             raise ValueError(f"{controls} at step {self.step}: every control must be finite")
         thrust = rotors.thrust_max if controls.armed else 0.0
         torque = drives.torque_max if controls.armed else 0.0
-        self._inputs.thrust[:] = [thrust * min(max(f, 0.0), 1.0) for f in controls.thrust]
-        self._inputs.torque[:] = [torque * min(max(f, -1.0), 1.0) for f in controls.torque]
+        f1, f2, f3, f4 = controls.thrust
+        self._thrust = (
+            thrust * min(max(f1, 0.0), 1.0),
+            thrust * min(max(f2, 0.0), 1.0),
+            thrust * min(max(f3, 0.0), 1.0),
+            thrust * min(max(f4, 0.0), 1.0),
+        )
+        self._torque = tuple([torque * min(max(f, -1.0), 1.0) for f in controls.torque])
 
-    def _disturb(self) -> None:
+    def _disturbance(self) -> tuple[V3, V3]:
+        """Force on the base [N, W] and torque [N·m, B] during this step."""
         force = torque = (0.0, 0.0, 0.0)
         for item in self._pushes:
             x, y, z = item.sample(self.step)
@@ -218,33 +240,20 @@ class Simulation:
             else:
                 m = self._mass
                 force = (force[0] + m * x, force[1] + m * y, force[2] + m * z)
-        self._inputs.force_W[:] = force
-        self._inputs.torque_B[:] = torque
+        return force, torque
 
     def _judge(self, before_s: float, landing_speed: float) -> None:
         """Judge every plant step of the exchange that began at ``before_s``."""
-        points = None
-        for k, rows in enumerate(self._places.tolist(), start=1):
-            points = _critical(rows)
-            self._referee.judge(points, before_s + k * STEP_S)
-        if self.step % SAMPLE_STEPS == 0 and points is not None:
-            self._referee.sample_error(points, self.time_s)
+        self._referee.judge_all(self._places, before_s, STEP_S)
+        if self.step % SAMPLE_STEPS == 0:
+            self._referee.sample_error(critical(self._places[-1].tolist()), self.time_s)
         self._referee.judge_landing(landing_speed, self.time_s)
         self._referee.judge_time(self.time_s)
 
     def _points_now(self) -> Points:
         out = np.empty((1, *self._places.shape[1:]))
         places(self._plant, self._state, out)
-        return _critical(out[0].tolist())
-
-
-def _critical(rows: list[list[float]]) -> Points:
-    """Base, joint 2 and end-effector out of base, joint 1, …, end-effector."""
-    return _three(rows[0]), _three(rows[2]), _three(rows[-1])
-
-
-def _three(values: list[float]) -> V3:
-    return (values[0], values[1], values[2])
+        return critical(out[0].tolist())
 
 
 def _four(values: list[float]) -> V4:

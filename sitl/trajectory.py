@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from sitl.scenario import Hold, Lissajous, Trajectory
 
 V3 = tuple[float, float, float]
 
 
-@dataclass(frozen=True, slots=True)
-class TrajectoryPoint:
+class TrajectoryPoint(NamedTuple):
     """The reference at one time."""
 
     p: V3  # m, NED

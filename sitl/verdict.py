@@ -6,6 +6,9 @@ import enum
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
+from sitl.plant.vector import Array
 from sitl.scenario import V3
 
 
@@ -75,22 +78,37 @@ class MarginRecord:
 
     def __init__(self, keys: tuple[str, ...]) -> None:
         self.keys = keys
-        self.minimum = [math.inf] * len(keys)
-        self.time_s = [0.0] * len(keys)
+        self._lowest = np.full(len(keys), math.inf)
+        self._when_s = np.zeros(len(keys))
+
+    @property
+    def minimum(self) -> list[float]:
+        """Smallest value of each so far [m]; infinite before the first."""
+        return self._lowest.tolist()
+
+    @property
+    def time_s(self) -> list[float]:
+        """When each was reached [s]."""
+        return self._when_s.tolist()
+
+    @property
+    def arrays(self) -> tuple[Array, Array]:
+        """The memory behind both, for kernels."""
+        return self._lowest, self._when_s
 
     def add(self, values: tuple[float, ...], time_s: float) -> None:
         """Take the margins [m] at one time, in the order of ``keys``."""
-        minimum = self.minimum
         for i, value in enumerate(values):
             # Written so that NaN is recorded, not passed over.
-            if not (value >= minimum[i]):
-                minimum[i] = value
-                self.time_s[i] = time_s
+            if not (value >= self._lowest[i]):
+                self._lowest[i] = value
+                self._when_s[i] = time_s
 
     def worst(self) -> int | None:
         """Index of the smallest margin, None while there is none."""
-        seen = [i for i, value in enumerate(self.minimum) if value != math.inf]
-        return min(seen, key=lambda i: self.minimum[i], default=None)
+        minimum = self.minimum
+        seen = [i for i, value in enumerate(minimum) if value != math.inf]
+        return min(seen, key=lambda i: minimum[i], default=None)
 
 
 def violation(record: MarginRecord) -> str | None:

@@ -7,6 +7,10 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
+from sitl.compiled import compiled
+from sitl.plant.vector import Array
 from sitl.scenario import V3, Scenario, Workspace
 
 POINTS = ("base", "joint2", "end_effector")  # critical points, in the order of the paper
@@ -28,6 +32,9 @@ class World:
         self.workspace = scenario.workspace
         wall_keys = [f"{wall.name}/{point}" for wall in self.walls for point in POINTS]
         self._planes = [(*wall.normal, wall.offset_m + wall.clearance_m) for wall in self.walls]
+        self.planes = np.array(self._planes).reshape(-1, 4)  # normal, least distance [m]
+        workspace = self.workspace
+        self.sphere = (0.0, 0.0) if workspace is None else (workspace.radius_m, workspace.d_iw_m)
         self.keys = (*wall_keys, *(("workspace/base",) if self.workspace else ()))
 
     def margins(self, points: tuple[V3, V3, V3], target: V3 | None) -> tuple[float, ...]:
@@ -65,6 +72,67 @@ class World:
             if not (point[2] < 0.0):
                 return f"{spoken(name)} hit the ground"
         return None
+
+
+@compiled
+def record_if_clear(
+    planes: Array,
+    sphere: tuple[float, float],
+    targets: Array,
+    places: Array,
+    before_s: float,
+    step_s: float,
+    lowest: Array,
+    when_s: Array,
+) -> bool:
+    """``World.margins`` of plant steps without any incident, into the record of the smallest.
+
+    Args:
+        planes: (walls, 4), of a World.
+        sphere: Its radius and height above the target [m].
+        targets: (steps, 3) m, where the workspace applies, else no rows.
+        places: (steps, 2 + j, 3) m: base, joint 1, joint 2, …, end-effector.
+        before_s: Time one step before the first [s].
+        step_s: Between two steps [s].
+        lowest: (margins,) m, smallest so far.
+        when_s: (margins,) s, when that was.
+
+    Returns:
+        True; or False, with nothing recorded, if any point is not clearly above ground and
+        within every margin.
+    """
+    margins = np.empty((places.shape[0], lowest.shape[0]))
+    for k in range(places.shape[0]):
+        _wall_margins_into(planes, places, k, margins)
+        if targets.shape[0]:
+            margins[k, 3 * planes.shape[0]] = _sphere_margin(sphere, targets, places, k)
+        above = places[k, 0, 2] < 0.0 and places[k, 2, 2] < 0.0 and places[k, -1, 2] < 0.0
+        if not (above and (margins[k] > 0.0).all()):
+            return False
+    for k in range(places.shape[0]):
+        for i in range(lowest.shape[0]):
+            if margins[k, i] < lowest[i]:
+                lowest[i] = margins[k, i]
+                when_s[i] = before_s + (k + 1) * step_s
+    return True
+
+
+@compiled
+def _wall_margins_into(planes: Array, places: Array, k: int, margins: Array) -> None:
+    for i in range(planes.shape[0]):
+        a, b, c, limit = planes[i, 0], planes[i, 1], planes[i, 2], planes[i, 3]
+        for point, row in enumerate((0, 2, places.shape[1] - 1)):
+            x, y, z = places[k, row, 0], places[k, row, 1], places[k, row, 2]
+            margins[k, 3 * i + point] = a * x + b * y + c * z - limit
+
+
+@compiled
+def _sphere_margin(sphere: tuple[float, float], targets: Array, places: Array, k: int) -> float:
+    radius, above = sphere
+    x, y = places[k, 0, 0] - targets[k, 0], places[k, 0, 1] - targets[k, 1]
+    z = places[k, 0, 2] - (targets[k, 2] - above)
+    distance: float = np.sqrt(x * x + y * y + z * z)
+    return radius - distance
 
 
 def spoken(point: str) -> str:

@@ -41,7 +41,7 @@ _TARGET_US = 100_000  # between points of the reference, as the pilot sends them
 _TARGETS_AHEAD = 20
 _PILOT = (1, 195)
 _ARM = CommandRequest(400, (1.0, *(0.0,) * 6), *_PILOT)
-_FOLLOW = CommandRequest(176, (1.0, 6.0, *(0.0,) * 5), *_PILOT)
+_FOLLOW = CommandRequest(176, (1.0, 4.0, 11.0, *(0.0,) * 4), *_PILOT)
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import dataclass
-from typing import Generic, TypeVar
+from typing import Generic, NamedTuple, TypeVar
 
 from sitl.scenario import V3, Sensors
 from sitl.seeds import stream
@@ -14,8 +13,7 @@ V4 = tuple[float, float, float, float]
 T = TypeVar("T")
 
 
-@dataclass(frozen=True, slots=True)
-class SensorReadings:
+class SensorReadings(NamedTuple):
     """One sample of every sensor."""
 
     t_us: int  # µs, time of the sample's delivery

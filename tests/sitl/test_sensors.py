@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 
 import numpy as np
@@ -60,7 +59,7 @@ def _noise(sensors: Sensors, seed: int, samples: int) -> dict[str, np.ndarray]:
     """Measured minus true for each field of many readings of the same truth."""
     suite, exact = SensorSuite(sensors, seed, 2000), _exact(0)
     readings = [suite.measure(exact) for _ in range(samples)]
-    names = [f.name for f in dataclasses.fields(SensorReadings) if f.name != "t_us"]
+    names = [name for name in SensorReadings._fields if name != "t_us"]
     return {
         name: np.array([getattr(r, name) for r in readings]) - getattr(exact, name)
         for name in names

@@ -1,0 +1,77 @@
+"""Steps without an incident are judged by one compiled call: it says what the referee says."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from sitl.mission_clock import MissionClock
+from sitl.plant.aerial_manipulator import plant
+from sitl.plant.parameters import Vehicle
+from sitl.plant.parcel import parcel, unpacked
+from sitl.plant.vector import Array
+from sitl.referee import Referee, critical
+from sitl.scenario_file import load_scenario
+from sitl.verdict import EndKind
+
+STEP_S = 0.001
+
+
+def referee(name: str) -> Referee:
+    scenario = load_scenario(name)
+    clock = MissionClock(scenario)
+    target = clock.target_at(0.0).p
+    above = (target[0], target[1], target[2] - 0.225)
+    return Referee(scenario, clock, (above, above, target))
+
+
+def places(random: np.random.Generator, name: str) -> Array:
+    """Two plant steps of base, joint 1, joint 2 and end-effector about the first target."""
+    x, y, z = MissionClock(load_scenario(name)).target_at(0.0).p
+    spread = 0.02 * random.uniform(-1.0, 1.0, (2, 4, 3))
+    return spread + np.array([x, y, z]) - np.array([0.0, 0.0, 0.225])
+
+
+@pytest.mark.parametrize("name", ["walls", "workspace", "walls-calm"])
+def test_the_quick_look_records_what_the_slow_one_does(name: str) -> None:
+    random = np.random.default_rng(3)
+    quick, slow = referee(name), referee(name)
+    for step in range(200):
+        passed, before_s = places(random, name), 0.002 * step
+        quick.judge_all(passed, before_s, STEP_S)
+        for k in (1, 2):
+            slow.judge(critical(passed[k - 1].tolist()), before_s + k * STEP_S)
+    assert quick.record.minimum == pytest.approx(slow.record.minimum, abs=1e-14)
+    assert quick.record.time_s == slow.record.time_s
+    assert max(quick.record.time_s) > 0.0
+
+
+@pytest.mark.parametrize("point", [0, 2, 3])
+@pytest.mark.parametrize("step", [0, 1])
+def test_an_incident_in_any_step_at_any_point_is_seen(step: int, point: int) -> None:
+    for where, kind in (((0.0, 0.0, 0.1), EndKind.COLLISION), ((math.nan,) * 3, EndKind.DIVERGED)):
+        judge, passed = referee("walls"), places(np.random.default_rng(4), "walls")
+        passed[step, point] = where
+        judge.judge_all(passed, 0.0, STEP_S)
+        assert judge.ended is not None
+        assert judge.ended.kind is kind
+        assert judge.ended.time_s == pytest.approx(STEP_S * (step + 1))
+
+
+def test_joint_1_is_no_critical_point() -> None:
+    judge, passed = referee("walls"), places(np.random.default_rng(4), "walls")
+    passed[:, 1] = (99.0, 99.0, 99.0)
+    judge.judge_all(passed, 0.0, STEP_S)
+    assert judge.ended is None
+
+
+def test_a_parcel_holds_the_whole_plant() -> None:
+    packed = plant(Vehicle())
+    again = unpacked(parcel(packed), 2)
+    for one, other in zip((*packed.chain, *packed.feet), (*again.chain, *again.feet), strict=True):
+        np.testing.assert_array_equal(one, other)
+    np.testing.assert_array_equal(packed.rotors, again.rotors)
+    np.testing.assert_array_equal(packed.joints, again.joints)
+    assert packed.gravity == again.gravity
