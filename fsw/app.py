@@ -93,7 +93,6 @@ class _Session:
         program = self._load(options)
         facts = program.facts
         record = FlightRecord(
-            inner=GroupTimer(facts.tick_period_us),
             mpc=PlannerRecord(GroupTimer(facts.mpc_period_us)),
             effort=EffortRecord(),
             health=LoopHealth(),

@@ -436,7 +436,7 @@ class FlightSnapshot:
 class TickInputs:
     """Everything one tick may look at."""
 
-    sensors: SensorFrame
+    sensors: SensorFrame  # its stamp is the instant of the tick
     plan: Plan | PlanFailure | None = None  # newly arrived, at most one
     commands: tuple[CommandRequest, ...] = ()
     targets: tuple[EndEffectorTarget, ...] = ()
@@ -449,6 +449,7 @@ class TickInputs:
     ground_station_heard: bool = False  # a heartbeat, since the last tick
     mission: MissionUpdate | None = None  # newly uploaded
     tuning: Tuning | None = None  # newly wished for, whole
+    stale_us: int = 0  # how much older the sensors' readings are, where no newer ones had come
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,6 @@ simulator repeats a step whose answer got lost: the same answer is sent again an
 
 from __future__ import annotations
 
-from collections import deque
 from enum import Enum
 from typing import Final, cast
 
@@ -25,7 +24,6 @@ PATIENCE_S: Final = 0.2  # one wait for a datagram; also the interval of announc
 _SHUTDOWN: Final = 246  # MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN
 _POWER_OFF: Final = 2.0  # its second parameter here: shut the autopilot down
 _ACCEPTED: Final = 0  # MAV_RESULT
-_MAX_BACKLOG: Final = 5  # steps worked off one by one; what is older is skipped
 
 
 class Pacing(Enum):
@@ -42,7 +40,6 @@ class SimLink:
         self.pacing: Pacing | None = None  # known with the first step in lockstep
         self.shutdown = False  # the simulator has ended the run
         self.retransmissions = 0
-        self.skipped = 0  # steps that were too old to work off
         self._endpoint = ConnectedEndpoint(simulator, PATIENCE_S)
         self._inbox = inbox
         self._writer = FrameWriter(SYSTEM_ID, AUTOPILOT)
@@ -52,7 +49,6 @@ class SimLink:
         self._answer: tuple[int, bytes] = (-1, b"")
         self._acks: list[CommandAck] = []
         self._text_id = 0
-        self._backlog: deque[SensorFrame] = deque()
 
     def announce(self) -> None:
         """Tell the simulator where the vehicle is, until it sends steps."""
@@ -66,15 +62,19 @@ class SimLink:
             Its sensors; commands, targets and the safe set it came with are in the inbox. None
             when nothing new came within the patience, or when the run is over.
         """
-        if self._backlog:
-            return self._backlog.popleft()
         datagram = self._endpoint.receive()
-        if datagram is None:
-            return None
-        sensors = self._read(datagram)
-        if self.pacing is not Pacing.REALTIME:
-            return sensors
-        return self._oldest_worth_a_tick(sensors)
+        return None if datagram is None else self._read(datagram)
+
+    def newest(self) -> SensorFrame | None:
+        """The newest of the steps that are there; what came with all of them is in the inbox."""
+        newest = None
+        while (datagram := self._endpoint.receive_waiting()) is not None:
+            newest = self._read(datagram) or newest
+        return newest
+
+    def wait(self, seconds: float) -> bool:
+        """Wait until a datagram is there; False when the time is over."""
+        return self._endpoint.wait(seconds)
 
     def queue_ack(self, ack: CommandAck) -> None:
         """Send an acknowledgement with the next answer."""
@@ -98,23 +98,6 @@ class SimLink:
     def close(self) -> None:
         """Close the socket."""
         self._endpoint.close()
-
-    def _oldest_worth_a_tick(self, sensors: SensorFrame | None) -> SensorFrame | None:
-        """Drain the socket: after a pause of the system several steps wait there.
-
-        A short backlog is worked off in order, because the loops count on their nominal period;
-        a long one is cut to its newest steps.
-        """
-        if sensors is not None:
-            self._backlog.append(sensors)
-        while (datagram := self._endpoint.receive_waiting()) is not None:
-            newer = self._read(datagram)
-            if newer is not None:
-                self._backlog.append(newer)
-        while len(self._backlog) > _MAX_BACKLOG:
-            self._backlog.popleft()
-            self.skipped += 1
-        return self._backlog.popleft() if self._backlog else None
 
     def _read(self, datagram: bytes) -> SensorFrame | None:
         """Decode one datagram; None unless it carries a whole new step."""

@@ -40,10 +40,12 @@ class VehicleFacts:
 
 @dataclass(slots=True)
 class LoopHealth:
-    """The latest timing of both rate groups; the loop replaces them once a second."""
+    """The latest timing of the rate groups; the loop replaces them once a second."""
 
     inner: GroupTiming = field(default_factory=lambda: GroupTiming(period_us=2_000))
     mpc: GroupTiming = field(default_factory=lambda: GroupTiming(period_us=100_000))
+    telemetry: GroupTiming = field(default_factory=lambda: GroupTiming(period_us=2_000))
+    housekeeping: GroupTiming = field(default_factory=lambda: GroupTiming(period_us=1_000_000))
 
 
 @dataclass(frozen=True, slots=True)

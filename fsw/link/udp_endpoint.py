@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import re
+import select
 import socket
 import struct
 from typing import Final
@@ -86,6 +87,10 @@ class ConnectedEndpoint:
             return self._socket.recv(MAX_DATAGRAM, socket.MSG_DONTWAIT)
         except (BlockingIOError, ConnectionRefusedError):
             return None
+
+    def wait(self, seconds: float) -> bool:
+        """Wait until a datagram is there; False when the time is over."""
+        return bool(select.select((self._socket,), (), (), seconds)[0])
 
     def send(self, datagram: bytes) -> None:
         """Send one datagram; UDP promises nothing, so neither does this."""

@@ -11,6 +11,7 @@ from dataclasses import replace
 from fsw.barriers.margins import constraint_report
 from fsw.control.braking import Brake
 from fsw.control.cascade import Cascade, CascadeMemory, at_rest, in_hover
+from fsw.estimation.dead_reckoning import moved_on
 from fsw.estimation.estimator import estimate_state
 from fsw.model.arm_kinematics import point_in_flight
 from fsw.model.nominal import REST_INPUT, NominalModel
@@ -95,6 +96,8 @@ class FlightLoop:
         """
         now_us = inputs.sensors.t_us
         valid = estimate_state(inputs.sensors)
+        if valid is not None and inputs.stale_us:
+            valid = moved_on(valid, 1e-6 * inputs.stale_us)
         estimate = valid or state.estimate
         texts: list[StatusText] = []
         if inputs.targets or inputs.safe_set is not None:

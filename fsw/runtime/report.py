@@ -8,8 +8,9 @@ from pathlib import Path
 
 from fsw.link.telemetry import VehicleFacts
 from fsw.runtime.planner_worker import PlannerRecord
+from fsw.runtime.rates import HOUSEKEEPING, INNER, TELEMETRY
 from fsw.runtime.sim_loop import FlightEnd, FlightRecord
-from fsw.runtime.timing import GroupTimer
+from fsw.runtime.timing import GroupTimer, Histogram
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +26,8 @@ def as_json(
     setup: Setup, end: FlightEnd, record: FlightRecord, retransmissions: int
 ) -> dict[str, object]:
     """The result as it is written; times in microseconds."""
-    record.inner.close_interval()
+    for timer in record.groups.values():
+        timer.close_interval()
     record.mpc.timer.close_interval()
     return {
         "controller": setup.controller,
@@ -34,7 +36,10 @@ def as_json(
         "end_reason": end.sentence,
         **record.effort.as_json(),
         "mpc": _mpc(setup.facts, record),
-        "inner": _inner(record.inner),
+        "inner": {**_group(record.groups[INNER.name]), "stale": record.stale},
+        "telemetry": _group(record.groups[TELEMETRY.name]),
+        "housekeeping": _group(record.groups[HOUSEKEEPING.name]),
+        "stages": {name: _percentiles(times) for name, times in record.stages.items()},
         "retransmissions": retransmissions,
     }
 
@@ -46,32 +51,39 @@ def write(path: Path, result: dict[str, object]) -> None:
 
 def _mpc(facts: VehicleFacts, record: FlightRecord) -> dict[str, object]:
     planner: PlannerRecord = record.mpc
-    execution = planner.timer.execution
+    timer = planner.timer
     return {
         "horizon": facts.horizon,
         "rate_hz": 1e6 / facts.mpc_period_us,
         "sqp_iterations": facts.sqp_iterations,
-        "cycles": execution.count,
-        "p50_us": execution.percentile_us(0.50),
-        "p99_us": execution.percentile_us(0.99),
-        "max_us": execution.max_us,
+        "cycles": timer.execution.count,
+        **_percentiles(timer.execution),
+        "lateness_p99_us": timer.lateness.percentile_us(0.99),
         "missed_deadlines": record.counters.missed_deadlines,
         "fallbacks": record.counters.fallbacks,
+        "restarts": planner.restarts,
         "status": dict(planner.status),
     }
 
 
-def _inner(timer: GroupTimer) -> dict[str, object]:
-    execution, lateness = timer.execution, timer.lateness
+def _group(timer: GroupTimer) -> dict[str, object]:
+    lateness = timer.lateness
     return {
         "rate_hz": 1e6 / timer.period_us,
         "ticks": timer.ticks,
-        "p50_us": execution.percentile_us(0.50),
-        "p99_us": execution.percentile_us(0.99),
-        "max_us": execution.max_us,
+        **_percentiles(timer.execution),
+        "late": timer.late,
         "late_share": timer.late_share,
         "skipped": timer.skipped,
         "lateness_p50_us": lateness.percentile_us(0.50),
         "lateness_p99_us": lateness.percentile_us(0.99),
         "lateness_max_us": lateness.max_us,
+    }
+
+
+def _percentiles(times: Histogram) -> dict[str, float]:
+    return {
+        "p50_us": times.percentile_us(0.50),
+        "p99_us": times.percentile_us(0.99),
+        "max_us": times.max_us,
     }

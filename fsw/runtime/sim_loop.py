@@ -1,13 +1,15 @@
-"""The loop around the pure tick: a step of the simulator releases one tick.
+"""The loop around the pure tick: on each release every rate group that is due, in order.
 
-The same loop flies in lockstep and in real time; the planner behind it differs (inline or in a
-thread), and in real time the lateness of each tick is measured against the simulator's grid.
+The same loop flies in lockstep and in real time. What releases a tick differs (``releases.py``),
+and the planner behind it (inline, or in a process of its own).
 """
 
 from __future__ import annotations
 
 import enum
-from dataclasses import dataclass, field
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 from typing import Final, Generic
 
 from fsw.link.gcs_link import GcsLink
@@ -21,11 +23,16 @@ from fsw.runtime.guarded_tick import GuardedTick
 from fsw.runtime.planner_worker import PlannerRecord
 from fsw.runtime.process import StopRequest
 from fsw.runtime.program import FlightProgram, State
-from fsw.runtime.timing import GroupTimer
-from fsw.signals import PlannerCounters, SensorFrame, TickInputs, TickOutputs
+from fsw.runtime.rate_group import RateGroupRunner
+from fsw.runtime.rates import HOUSEKEEPING, INNER, MPC, RATE_GROUPS, TELEMETRY, Member
+from fsw.runtime.releases import GridReleases, Release, Releases, StepReleases
+from fsw.runtime.slips import Slips, SlipWarning
+from fsw.runtime.timing import GroupTimer, Histogram
+from fsw.signals import PlannerCounters, SensorFrame, StatusText, TickInputs, TickOutputs
 
 STALL_S: Final = 2.0  # no step for this long ends the flight
 _START_US: Final = 1_000_000  # time stamp of the simulator's step 0
+_WARNING: Final = 4  # MAV_SEVERITY
 
 
 class Ending(enum.Enum):
@@ -48,15 +55,27 @@ class FlightEnd:
 class FlightRecord:
     """What the loop measured."""
 
-    inner: GroupTimer
     mpc: PlannerRecord
     effort: EffortRecord
     health: LoopHealth
+    groups: dict[str, GroupTimer] = field(default_factory=dict)  # of the loop's own groups
+    stages: dict[str, Histogram] = field(default_factory=dict)  # of their members
+    stale: int = 0  # ticks without a sensor frame of their own
     counters: PlannerCounters = field(default_factory=PlannerCounters)
 
 
+@dataclass(slots=True)
+class Cycle:
+    """One release on its way through the groups."""
+
+    release: Release
+    planner: PlanService
+    inputs: TickInputs = field(init=False)  # from HEAR on
+    outputs: TickOutputs = field(init=False)  # from TICK on
+
+
 class SimLoop(Generic[State]):
-    """Receive, tick, answer; only then plan, count and tell the ground."""
+    """Walks the table of rate groups on every release."""
 
     def __init__(
         self,
@@ -67,8 +86,10 @@ class SimLoop(Generic[State]):
         record: FlightRecord,
         clock: Clock,
         stop: StopRequest,
+        sleep: Callable[[float], None] = time.sleep,
     ) -> None:
         self._program = program
+        self._tick_us = program.facts.tick_period_us
         self._tick = GuardedTick(program.tick, program.first_state)
         self._sim = sim
         self._gcs = gcs
@@ -76,10 +97,25 @@ class SimLoop(Generic[State]):
         self._record = record
         self._clock = clock
         self._stop = stop
-        self._ticks = 0
-        self._interval = round(1e6 / program.facts.tick_period_us)
-        self._plan_interval = program.facts.mpc_period_us // program.facts.tick_period_us
-        self._offset_us: int | None = None  # smallest wall minus sensor time seen
+        self._sleep = sleep
+        self._warning = SlipWarning()
+        self._notices: list[StatusText] = []
+        self._releases: Releases
+        methods: dict[Member, Callable[[Cycle], None]] = {
+            Member.HEAR: self._hear,
+            Member.TICK: self._think,
+            Member.ACTUATE: self._actuate,
+            Member.ASK: self._ask,
+            Member.PUBLISH: self._publish,
+            Member.SUM_UP: self._sum_up,
+            Member.WARN: self._warn,
+        }
+        self._groups = tuple(
+            RateGroupRunner(group, methods, clock, self._tick_us) for group in RATE_GROUPS
+        )
+        for runner in self._groups:
+            record.groups[runner.group.name] = runner.timer
+            record.stages.update({one.value: times for one, times in runner.stages.items()})
 
     def connect(self, wait_s: float) -> SensorFrame | None:
         """Announce the vehicle until the first step arrives; None on time-out or a signal."""
@@ -95,79 +131,107 @@ class SimLoop(Generic[State]):
         return None
 
     def fly(self, first: SensorFrame, planner: PlanService) -> FlightEnd:
-        """Tick on every step until the simulator, a signal or silence ends it."""
-        realtime = self._sim.pacing is not Pacing.LOCKSTEP
-        sensors: SensorFrame | None = first
+        """Tick on every release until the simulator, a signal or silence ends it."""
+        self._releases = self._make_releases(first)
         heard = self._clock()
-        t_us = first.t_us
+        release: Release | None = Release(first, 0, heard, heard)
+        index, t_us = -1, first.t_us
         while not self._stop.requested:
-            if sensors is not None:
-                heard = self._clock()
-                t_us = sensors.t_us
-                self._step(sensors, planner, heard, self._lateness_us(heard, t_us, realtime))
+            if release is not None:
+                t_us = release.sensors.t_us
+                if release.stale_us == 0:
+                    heard = release.begun_us
+                index = self._run_groups(release, planner, index)
             elif self._sim.shutdown:
                 return FlightEnd(Ending.SHUTDOWN, "the simulator ended the run")
             elif self._clock() - heard > STALL_S * 1e6:
                 return FlightEnd(Ending.LINK_LOST, _silence(self._step_number(t_us)))
-            sensors = self._sim.receive()
+            release = self._releases.next()
         return FlightEnd(Ending.STOPPED, f"stopped at step {self._step_number(t_us)}")
 
-    def _step(
-        self, sensors: SensorFrame, planner: PlanService, begin_us: int, lateness_us: int
-    ) -> None:
-        t_us = sensors.t_us
+    def _make_releases(self, first: SensorFrame) -> Releases:
+        if self._sim.pacing is Pacing.LOCKSTEP:
+            return StepReleases(self._sim, self._clock)
+        return GridReleases(self._sim, self._clock, self._sleep, first, self._tick_us)
+
+    def _run_groups(self, release: Release, planner: PlanService, before: int) -> int:
+        """Run what is due; returns the release's place on the vehicle's time grid."""
+        index = self._step_number(release.sensors.t_us)
+        cycle = Cycle(release, planner)
+        for runner in self._groups:
+            if runner.group is MPC:
+                due = cycle.outputs.plan_request is not None  # the tick keeps the planner's grid
+            else:
+                due = runner.ticks == 1 or index // runner.ticks != before // runner.ticks
+            if due:
+                begin_us = release.begun_us if runner.group is INNER else self._clock()
+                runner.run(cycle, release.due_us, begin_us)
+        return index
+
+    def _hear(self, cycle: Cycle) -> None:
+        t_us = cycle.release.sensors.t_us
         self._gcs.poll(t_us)
         inbox = self._inbox
-        inputs = TickInputs(
-            sensors,
-            planner.take(t_us),
+        cycle.inputs = TickInputs(
+            cycle.release.sensors,
+            cycle.planner.take(t_us),
             inbox.take_commands(),
             inbox.take_targets(),
             inbox.take_safe_set(),
+            stale_us=cycle.release.stale_us,
         )
-        outputs = self._tick(inputs)
-        if outputs.acks:
-            self._acknowledge(t_us, outputs)
-        self._sim.answer(t_us, outputs)
-        self._record.inner.add(self._clock() - begin_us, lateness_us)
-        # The simulator is at work on the next step by now: everything else happens meanwhile.
-        if outputs.plan_request is not None:
-            planner.submit(outputs.plan_request)
-        self._count(outputs)
-        self._gcs.publish(outputs)
 
-    def _acknowledge(self, t_us: int, outputs: TickOutputs) -> None:
+    def _think(self, cycle: Cycle) -> None:
+        cycle.outputs = self._tick(cycle.inputs)
+
+    def _actuate(self, cycle: Cycle) -> None:
+        t_us, outputs = cycle.release.sensors.t_us, cycle.outputs
         for ack in outputs.acks:
             if (ack.target_system, ack.target_component) == (SYSTEM_ID, PATH_PLANNER):
                 self._sim.queue_ack(ack)
             else:
                 self._gcs.acknowledge(t_us, ack)
+        self._sim.answer(t_us, outputs)
 
-    def _count(self, outputs: TickOutputs) -> None:
-        record = self._record
+    def _ask(self, cycle: Cycle) -> None:
+        request, applied = cycle.outputs.plan_request, cycle.outputs.snapshot.plan_input
+        if request is not None:
+            cycle.planner.submit(request)
+        if applied is not None:
+            self._record.effort.add(applied)
+
+    def _publish(self, cycle: Cycle) -> None:
+        record, outputs = self._record, cycle.outputs
         record.counters = outputs.snapshot.counters
-        if self._ticks % self._plan_interval == 0 and outputs.snapshot.plan_input is not None:
-            record.effort.add(outputs.snapshot.plan_input)
-        self._ticks += 1
-        if self._ticks % self._interval == 0:
-            record.inner.skipped = self._sim.skipped
-            record.health.inner = record.inner.close_interval()
-            record.health.mpc = record.mpc.timer.close_interval()
+        events = record.mpc.events
+        if events:
+            self._notices += [StatusText(_WARNING, event) for event in events]
+            events.clear()
+        if self._notices:
+            outputs = replace(outputs, texts=(*outputs.texts, *self._notices))
+            self._notices.clear()
+        self._gcs.publish(outputs)
 
-    def _lateness_us(self, now_us: int, t_us: int, realtime: bool) -> int:
-        """How long after its release a step is taken up; the promptest step so far defines 0.
+    def _sum_up(self, cycle: Cycle) -> None:
+        record, health = self._record, self._record.health
+        record.stale = self._releases.stale
+        record.groups[INNER.name].skipped = self._releases.skipped
+        health.inner = record.groups[INNER.name].close_interval()
+        health.mpc = record.mpc.timer.close_interval()
+        health.telemetry = record.groups[TELEMETRY.name].close_interval()
+        health.housekeeping = record.groups[HOUSEKEEPING.name].close_interval()
 
-        The first step does not count: the simulator's clock starts when it has been answered.
-        """
-        if not realtime or self._ticks == 0:
-            return 0
-        offset = now_us - t_us
-        if self._offset_us is None or offset < self._offset_us:
-            self._offset_us = offset
-        return offset - self._offset_us
+    def _warn(self, cycle: Cycle) -> None:
+        if self._sim.pacing is Pacing.LOCKSTEP:
+            return  # the clock on the wall is nobody's deadline
+        inner, counters = self._record.groups[INNER.name], self._record.counters
+        slips = Slips(inner.late, inner.skipped, self._record.stale, counters.missed_deadlines)
+        sentence = self._warning.sentence(slips, cycle.release.sensors.t_us)
+        if sentence is not None:
+            self._notices.append(StatusText(_WARNING, sentence))
 
     def _step_number(self, t_us: int) -> int:
-        return (t_us - _START_US) // self._program.facts.tick_period_us
+        return (t_us - _START_US) // self._tick_us
 
 
 def _silence(step: int) -> str:

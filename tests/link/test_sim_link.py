@@ -149,18 +149,23 @@ def test_the_heartbeat_of_the_simulator_says_who_waits(wire: Wire) -> None:
     assert wire.link.pacing is Pacing.REALTIME
 
 
-def test_in_real_time_a_short_backlog_is_worked_off_and_a_long_one_cut(wire: Wire) -> None:
+def test_of_steps_that_piled_up_the_newest_counts_and_every_message_is_kept(
+    wire: Wire,
+) -> None:
     encoder = StepEncoder(lockstep=False)
-    times = [1_002_000 + 2_000 * step for step in range(9)]
-    wire.send(encoder.heartbeat() + encoder.datagram(readings(times[0]), ()))
+    wire.send(encoder.heartbeat() + encoder.datagram(readings(1_002_000), ()))
     assert wire.link.receive() is not None
-    for t_us in times[1:]:
+    assert not wire.link.wait(0.0)
+    arm = SendCommand(400, (1.0, NAN, NAN, NAN, NAN, NAN, NAN))
+    wire.send(encoder.datagram(readings(1_004_000), (arm,)))
+    for t_us in (1_006_000, 1_008_000):
         wire.send(encoder.datagram(readings(t_us), ()))
-    got = []
-    while (sensors := wire.link.receive()) is not None:
-        got.append(sensors.t_us)
-    assert got == times[-5:]
-    assert wire.link.skipped == 3
+    assert wire.link.wait(1.0)
+    newest = wire.link.newest()
+    assert newest is not None
+    assert newest.t_us == 1_008_000
+    assert [request.command for request in wire.inbox.take_commands()] == [400]
+    assert wire.link.newest() is None
 
 
 def test_shutdown_is_acknowledged_and_ends_the_flight(wire: Wire) -> None:

@@ -1,0 +1,50 @@
+"""A state that is moved on by its own rates, for the few ticks in which no sensor frame came."""
+
+from __future__ import annotations
+
+import math
+
+from fsw.geometry.rotation import rotate, yaw_of
+from fsw.model.airframe import GRAVITY
+from fsw.signals import Mat3, StateEstimate, Vec3
+
+
+def moved_on(x: StateEstimate, seconds: float) -> StateEstimate:
+    """The estimate a moment later: the specific force and all rates are held.
+
+    Args:
+        x: As measured.
+        seconds: How old that is; milliseconds, not more.
+    """
+    t, R = seconds, x.R_WB
+    a = (-x.specific_force * R[2], -x.specific_force * R[5], GRAVITY - x.specific_force * R[8])
+    (q1, q2), (qd1, qd2) = x.q_arm, x.qd_arm
+    turned = _turned(R, (t * x.w_WB_B[0], t * x.w_WB_B[1], t * x.w_WB_B[2]))
+    return x._replace(
+        p_WB=_added(x.p_WB, t, _added(x.v_WB, 0.5 * t, a)),
+        v_WB=_added(x.v_WB, t, a),
+        R_WB=turned,
+        yaw=yaw_of(turned),
+        q_arm=(q1 + t * qd1, q2 + t * qd2),
+    )
+
+
+def _added(x: Vec3, t: float, rate: Vec3) -> Vec3:
+    return x[0] + t * rate[0], x[1] + t * rate[1], x[2] + t * rate[2]
+
+
+def _turned(R: Mat3, angle: Vec3) -> Mat3:
+    """R times the rotation by a small vector in body components (Rodrigues)."""
+    x, y, z = angle
+    size = math.sqrt(x * x + y * y + z * z)
+    if size < 1e-12:
+        return R
+    s, c = math.sin(size) / size, (1.0 - math.cos(size)) / (size * size)
+    first = rotate(R, (1.0 - c * (y * y + z * z), s * z + c * x * y, -s * y + c * x * z))
+    second = rotate(R, (-s * z + c * x * y, 1.0 - c * (x * x + z * z), s * x + c * y * z))
+    third = rotate(R, (s * y + c * x * z, -s * x + c * y * z, 1.0 - c * (x * x + y * y)))
+    return (
+        first[0], second[0], third[0],
+        first[1], second[1], third[1],
+        first[2], second[2], third[2],
+    )  # fmt: skip

@@ -1,0 +1,186 @@
+"""What releases a tick: in lockstep the simulator's step, in real time the vehicle's own grid.
+
+In real time the vehicle wakes on an absolute grid of its own, which it has laid a little behind the
+arrival of the sensor frames, and takes the newest frame there is. A frame that is late or lost does
+not stop the inner loop: the tick gets the last readings and is told how old they are. After
+``MOST_STALE`` such ticks time stands still: nothing is commanded any more, and whoever drives the
+rotors stops them after 0.1 s.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Final, Protocol
+
+from fsw.ports import Clock
+from fsw.runtime.grid import Grid
+from fsw.signals import SensorFrame
+
+MOST_STALE: Final = 5  # ticks: 10 ms, as long as an estimate may be missing
+LEAD_US: Final = 600  # frames arrive so much before their tick, and may be so much late
+_SETTLING: Final = 25  # frames until the grid is laid
+_LISTEN_TICKS: Final = 25  # between two looks at when a frame arrives
+_MOST_SHIFT_US: Final = 25.0  # a look; 500 us/s is more than clocks differ
+_GAIN: Final = 0.25
+_REPEATED: Final = 3  # frames that were anticipated, in a row, until a release is left out
+
+
+class SensorLink(Protocol):
+    """Where sensor frames come from."""
+
+    def receive(self) -> SensorFrame | None:
+        """Wait for the next frame, with some patience."""
+        ...
+
+    def newest(self) -> SensorFrame | None:
+        """The newest of the frames that are there."""
+        ...
+
+    def wait(self, seconds: float) -> bool:
+        """Wait until something is there; False when the time is over."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Release:
+    """A tick may run."""
+
+    sensors: SensorFrame  # stamped with the instant of the tick
+    stale_us: int  # how much older its readings are
+    due_us: int  # wall time at which it should have begun
+    begun_us: int  # wall time
+
+
+class Releases(Protocol):
+    """One release after the other."""
+
+    stale: int  # ticks without a frame of their own
+
+    @property
+    def skipped(self) -> int:
+        """Releases that were never taken."""
+        ...
+
+    def next(self) -> Release | None:
+        """Wait for the next release; None when there was nothing to tick on."""
+        ...
+
+
+class StepReleases:
+    """Lockstep: every step of the simulator releases a tick, whenever it comes."""
+
+    def __init__(self, sim: SensorLink, clock: Clock) -> None:
+        self.stale = 0
+        self._sim = sim
+        self._clock = clock
+
+    @property
+    def skipped(self) -> int:
+        """See :class:`Releases`: every step is taken."""
+        return 0
+
+    def next(self) -> Release | None:
+        """See :class:`Releases`."""
+        sensors = self._sim.receive()
+        if sensors is None:
+            return None
+        now_us = self._clock()
+        return Release(sensors, 0, now_us, now_us)
+
+
+class GridReleases:
+    """Real time: an absolute grid, phased behind the arrival of the sensor frames."""
+
+    def __init__(
+        self,
+        sim: SensorLink,
+        clock: Clock,
+        sleep: Callable[[float], None],
+        first: SensorFrame,
+        period_us: int,
+    ) -> None:
+        """Follow the first frame, which has been ticked on.
+
+        Args:
+            sim: Where the frames come from.
+            clock: Monotonic wall time.
+            sleep: Sleeps for seconds, on the same clock.
+            first: The frame whose time the vehicle's time begins with.
+            period_us: Of the inner loop.
+        """
+        self.stale = 0
+        self._sim = sim
+        self._clock = clock
+        self._sleep = sleep
+        self._period_us = period_us
+        self._grid: Grid | None = None
+        self._offsets: list[int] = []  # arrival minus stamp, while the grid is not laid
+        self._readings = first
+        self._t_us = first.t_us  # of the last tick
+        self._grid_us = first.t_us  # the same, had every release been taken
+        self._repeated = 0
+        self._left_out = 0
+
+    @property
+    def skipped(self) -> int:
+        """Releases that were never taken."""
+        return self._left_out + (0 if self._grid is None else self._grid.skipped)
+
+    def next(self) -> Release | None:
+        """See :class:`Releases`."""
+        if self._grid is None:
+            return self._settle()
+        steps = self._grid.advance(self._clock())
+        self._wait(self._grid, self._grid.due_us)
+        return self._release(self._grid, steps)
+
+    def _settle(self) -> Release | None:
+        """Tick on arrival, and lay the grid by the promptest of the first frames."""
+        sensors, now_us = self._sim.receive(), self._clock()
+        if sensors is None:
+            return None
+        self._readings, self._t_us, self._grid_us = sensors, sensors.t_us, sensors.t_us
+        self._offsets.append(now_us - sensors.t_us)
+        if len(self._offsets) >= _SETTLING:
+            start_us = min(self._offsets) + sensors.t_us + LEAD_US
+            self._grid = Grid(start_us + self._period_us, self._period_us)
+        return Release(sensors, 0, min(self._offsets) + sensors.t_us, now_us)
+
+    def _wait(self, grid: Grid, due_us: int) -> None:
+        """Sleep until the release; now and then listen for the frame, and follow its clock."""
+        if grid.index % _LISTEN_TICKS == 0 and not self._sim.wait(0.0):
+            arrived = self._sim.wait(1e-6 * max(due_us - self._clock(), 0))
+            early_us = due_us - self._clock() if arrived else 0
+            shift_us = _GAIN * (LEAD_US - early_us)
+            grid.steer(min(max(shift_us, -_MOST_SHIFT_US), _MOST_SHIFT_US))
+        remaining_us = due_us - self._clock()
+        if remaining_us > 0:
+            self._sleep(1e-6 * remaining_us)
+
+    def _release(self, grid: Grid, steps: int) -> Release | None:
+        due_us, begun_us = grid.due_us, self._clock()
+        newest = self._sim.newest()
+        self._grid_us += steps * self._period_us
+        if newest is not None:
+            self._readings = newest
+            if newest.t_us > self._t_us:
+                # A tick so late that the next frame has come too is the next tick as well.
+                grid.leave_out((newest.t_us - self._grid_us) // self._period_us)
+                self._t_us = self._grid_us = newest.t_us
+                self._repeated = 0
+                return Release(newest, 0, due_us, begun_us)
+            # Time has run ahead of the frames by a tick: wait for them, or they stay behind.
+            self._repeated += 1
+            if self._repeated >= _REPEATED:
+                self._repeated = 0
+                self._left_out += 1
+                return None
+        t_us = self._t_us + steps * self._period_us
+        stale_us = t_us - self._readings.t_us
+        if stale_us > MOST_STALE * self._period_us:
+            self._left_out += 1
+            return None
+        self._t_us = t_us
+        self.stale += 1
+        return Release(replace(self._readings, t_us=t_us), stale_us, due_us, begun_us)

@@ -1,0 +1,184 @@
+"""Late and lost sensor frames, ticks that overrun, clocks that jump: each has its response."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import pairwise
+
+import pytest
+
+from fsw.runtime.grid import Grid
+from fsw.runtime.releases import LEAD_US, MOST_STALE, GridReleases, Release
+from tests.timing.virtual_time import FIRST_US, PERIOD_US, VirtualSensors, VirtualTime, frame
+
+LAID = 25  # the grid is laid by then
+
+
+class Loop:
+    """Takes releases and works on each for a while."""
+
+    def __init__(self, sensors: VirtualSensors, work_us: int = 150) -> None:
+        self.time = sensors.time
+        self.work_us: Callable[[int], int] = lambda tick: work_us
+        self.releases = GridReleases(
+            sensors, self.time.clock, self.time.sleep, frame(FIRST_US), PERIOD_US
+        )
+        self.ticks: list[Release] = []
+        self.nothing = 0
+
+    def run(self, times: int) -> list[Release]:
+        """The ticks of so many releases."""
+        begin = len(self.ticks)
+        for _ in range(times):
+            release = self.releases.next()
+            if release is None:
+                self.nothing += 1
+            else:
+                self.ticks.append(release)
+                self.time.work(self.work_us(len(self.ticks)))
+        return self.ticks[begin:]
+
+
+def stamps(ticks: list[Release]) -> list[int]:
+    return [(tick.sensors.t_us - FIRST_US) // PERIOD_US for tick in ticks]
+
+
+@pytest.fixture
+def time() -> VirtualTime:
+    return VirtualTime()
+
+
+def test_every_frame_has_its_tick_on_the_grid(time: VirtualTime) -> None:
+    loop = Loop(VirtualSensors(time))
+    loop.run(LAID)
+    ticks = loop.run(300)
+    assert stamps(ticks) == list(range(LAID + 1, LAID + 301))
+    assert {tick.begun_us - tick.due_us for tick in ticks} == {0}
+    assert all(b.due_us - a.due_us == PERIOD_US for a, b in pairwise(ticks))
+    assert (loop.releases.skipped, loop.releases.stale, loop.nothing) == (0, 0, 0)
+
+
+@pytest.mark.parametrize("late_us", [LEAD_US + 100, 1_900])
+def test_a_late_frame_does_not_stop_the_tick_which_is_told_its_age(
+    time: VirtualTime, late_us: int
+) -> None:
+    loop = Loop(VirtualSensors(time, lambda step: late_us if step == 100 else 0))
+    ticks = loop.run(200)
+    assert stamps(ticks) == list(range(1, 201))
+    assert [stamps([tick])[0] for tick in ticks if tick.stale_us] == [100]
+    assert ticks[99].stale_us == PERIOD_US
+    assert (loop.releases.skipped, loop.releases.stale) == (0, 1)
+
+
+def test_a_frame_that_is_less_late_than_the_lead_changes_nothing(time: VirtualTime) -> None:
+    loop = Loop(VirtualSensors(time, lambda step: LEAD_US - 50 if step == 100 else 0))
+    assert stamps(loop.run(200)) == list(range(1, 201))
+    assert loop.releases.stale == 0
+
+
+@pytest.mark.parametrize("lost", [1, 2, MOST_STALE])
+def test_lost_frames_are_flown_through_on_the_last_readings(time: VirtualTime, lost: int) -> None:
+    loop = Loop(VirtualSensors(time, lambda step: None if 100 <= step < 100 + lost else 0))
+    ticks = loop.run(200)
+    assert stamps(ticks) == list(range(1, 201))
+    aged = [tick.stale_us // PERIOD_US for tick in ticks if tick.stale_us]
+    assert aged == list(range(1, lost + 1))
+    assert loop.releases.skipped == 0
+
+
+def test_after_ten_milliseconds_without_sensors_nothing_is_commanded(time: VirtualTime) -> None:
+    silent = range(100, 150)
+    loop = Loop(VirtualSensors(time, lambda step: None if step in silent else 0))
+    ticks = loop.run(300)
+    assert loop.releases.stale == MOST_STALE
+    assert loop.nothing == len(silent) - MOST_STALE
+    assert loop.releases.skipped == loop.nothing
+    assert stamps(ticks)[98:106] == [99, 100, 101, 102, 103, 104, 150, 151]
+
+
+def test_a_simulator_that_paused_and_catches_up_is_taken_at_its_newest_frame(
+    time: VirtualTime,
+) -> None:
+    """Forty frames arrive at once, 80 ms late; from then on they are on time."""
+    loop = Loop(
+        VirtualSensors(time, lambda step: max(0, (140 - step) * PERIOD_US) if step >= 100 else 0)
+    )
+    ticks = loop.run(300)
+    assert stamps(ticks)[:104] == list(range(1, 105))
+    assert stamps(ticks)[104:] == list(range(140, 140 + len(ticks) - 104))
+    assert loop.releases.stale == MOST_STALE
+
+
+@pytest.mark.parametrize(("work_us", "skipped"), [(1_990, 0), (2_500, 0), (3_990, 1), (6_100, 2)])
+def test_a_tick_that_overruns_makes_the_next_late_and_shifts_nothing(
+    time: VirtualTime, work_us: int, skipped: int
+) -> None:
+    loop = Loop(VirtualSensors(time))
+    loop.run(LAID)
+    loop.work_us = lambda tick: work_us if tick == 100 else 150
+    ticks = loop.run(200)
+    before, after = ticks[:70], ticks[-70:]
+    assert (after[0].due_us - before[0].due_us) % PERIOD_US == 0
+    assert {tick.begun_us - tick.due_us for tick in before + after} == {0}
+    assert loop.releases.skipped == skipped
+    assert loop.releases.stale == 0
+    late = [tick.begun_us - tick.due_us for tick in ticks if tick.begun_us > tick.due_us]
+    assert len(late) == (work_us > PERIOD_US)
+
+
+def test_a_clock_that_jumps_ahead_skips_and_keeps_the_grid(time: VirtualTime) -> None:
+    """The machine was suspended: wall time has passed, and no sensor frame came meanwhile."""
+    sensors = VirtualSensors(time)
+    loop = Loop(sensors)
+    first = loop.run(100)[-1]
+    time.now_us += 3_000_000
+    ticks = loop.run(100)
+    assert loop.releases.skipped == pytest.approx(1500, abs=1)
+    assert (ticks[-1].due_us - first.due_us) % PERIOD_US == 0
+    assert ticks[-1].stale_us == 0
+
+
+def test_a_clock_that_jumps_back_repeats_no_release() -> None:
+    grid = Grid(0.0, PERIOD_US)
+    grid.advance(10_100)
+    assert (grid.index, grid.due_us) == (5, 10_000)
+    assert grid.advance(1_000) == 1
+    assert grid.due_us == 12_000
+
+
+@pytest.mark.parametrize("parts_per_million", [-200.0, 200.0])
+def test_sensors_on_another_clock_are_followed(time: VirtualTime, parts_per_million: float) -> None:
+    period = PERIOD_US * (1.0 + 1e-6 * parts_per_million)
+    sensors = VirtualSensors(time, period_us=period)
+    loop = Loop(sensors)
+    ticks = loop.run(8_000)  # 16 s, in which the clocks part by 3.2 ms
+    assert loop.releases.stale + loop.releases.skipped == 0
+    assert stamps(ticks) == list(range(1, 8_001))
+
+
+def test_frames_that_always_come_behind_their_tick_are_waited_for_once(time: VirtualTime) -> None:
+    """The link became slower by 1 ms for good: time must not stay ahead of the frames."""
+    loop = Loop(VirtualSensors(time, lambda step: 1_000 if step >= 100 else 0))
+    ticks = loop.run(1_000)
+    assert loop.nothing == 1
+    assert loop.releases.stale < 10
+    assert all(tick.stale_us == 0 for tick in ticks[150:])
+
+
+def test_a_simulator_slower_than_time_is_followed_at_its_own_pace(time: VirtualTime) -> None:
+    loop = Loop(VirtualSensors(time, period_us=1.25 * PERIOD_US))
+    loop.run(100)
+    ticks = loop.run(1_000)
+    assert max(tick.stale_us for tick in ticks) <= 2 * PERIOD_US
+    assert stamps(ticks) == sorted(stamps(ticks))
+    wall_us = time.now_us - loop.ticks[0].begun_us
+    assert stamps(ticks)[-1] == pytest.approx(wall_us / (1.25 * PERIOD_US), abs=5)
+
+
+def test_silence_ends_in_nothing_to_tick_on_so_that_the_loop_can_look_at_its_clock(
+    time: VirtualTime,
+) -> None:
+    loop = Loop(VirtualSensors(time, lambda step: None if step > 50 else 0))
+    loop.run(1_200)
+    assert loop.nothing > 1_000
+    assert len(loop.ticks) == 50 + MOST_STALE
