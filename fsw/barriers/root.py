@@ -47,7 +47,7 @@ class BarrierTuning:
     gamma: float = 3.0  # 1/s
     # lambda of eq 25 [m/s]. At rest the plan keeps lambda / slope = 67 mm from the boundary,
     # more than the 58 mm the fast loop can be pushed off the plan by 0.8 m/s^2.
-    robustness: float = 0.267
+    robustness: float = 0.28
     skipped_nodes: int = 1  # first nodes, which the inputs can hardly move
     period: float = 0.1  # s
 

@@ -165,9 +165,7 @@ def close_loops(
     mass = weigh(airframe, memory.mass, rotors, estimate.specific_force, dt * ticks)
     motion = motion_state(airframe, mass, estimate, rotors, memory.commanded.joint_torque[0])
     for _ in range(ticks):
-        observed = observe(
-            observed, estimate.v_WB, motion.a, tuning.tracking.observer_bandwidth, dt
-        )
+        observed = observe(observed, estimate.v_WB, motion.a, tuning.tracking, dt)
     attitude, height = memory.attitude, memory.height
     if law.follows_plan:
         (wdx, wdy), thrust = follow_plan(law.tracking, mass, estimate, motion, observed, plan, u)
@@ -199,7 +197,7 @@ def close_loops(
 @compiled
 def _close_loops(
     law: NDArray[Any], memory: Any, estimate: Any, plan: Any, u: Any, ticks: int
-) -> tuple[tuple[Vec4, Vec2], Vec4, tuple[Vec3, Vec3], float, tuple[Vec3, float, Vec2]]:
+) -> tuple[tuple[Vec4, Vec2], Vec4, tuple[Vec3, Vec3, Vec2], float, tuple[Vec3, float, Vec2]]:
     """``close_loops`` between plain tuples."""
     rotors, commanded, observed, mass, attitude, height, joints = memory
     command, kept = close_loops(
@@ -221,7 +219,7 @@ def _close_loops(
     return (
         (command.rotor_thrust, command.joint_torque),
         kept.rotors,
-        (kept.observed.v, kept.observed.d),
+        (kept.observed.v, kept.observed.d, kept.observed.lasting),
         kept.mass,
         (kept.attitude, kept.height, kept.joints),
     )

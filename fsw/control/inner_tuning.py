@@ -31,6 +31,11 @@ class TrackingTuning:
     vertical_effort: float = 1e-6  # on (m/s^2)^2
     disturbance_correlation: float = 0.05  # s, of the Ornstein-Uhlenbeck model
     observer_bandwidth: float = 130.0  # rad/s
+    # Wind: what stays of the observed disturbance is cancelled whole. Slowly, because the mean of
+    # a random one is nobody's wind, and within a limit, because whoever pushes one way for long
+    # and then the other finds it added to his push (``tube.py``).
+    wind_time: float = 3.0  # s
+    wind_limit: float = 0.15  # m/s^2 an axis
     position_error_limit: float = 0.07  # m
     acceleration_limit: float = 2.5  # m/s^2
     jerk_limit: float = 20.0  # m/s^3

@@ -5,10 +5,12 @@ feed-forward, the commanded snap is
 
 .. math:: w = k_p(u - a_p) - k_d j_p + K_5 e_s + K_4 (J - j), \quad
           J = j_p + \frac{K_3}{K_4}(A - a), \quad
-          A = a_p + \frac{K_1 e_p + K_2 e_v - K_d \hat d}{K_3}
+          A = a_p + \frac{K_1 e_p + K_2 e_v - K_d (\hat d - \bar d)}{K_3} - \bar d
 
 which is the LQR law in cascade form, so that acceleration (tilt) and jerk (tilt rate) can
-be limited on the way. The body's angular acceleration then solves
+be limited on the way. The gain on the disturbance is for one that is forgotten within
+milliseconds; of what lasts, wind, :math:`\bar d` keeps the mean and all of it is cancelled.
+The body's angular acceleration then solves
 :math:`-f(\dot\omega_y b_1 - \dot\omega_x b_2) = w`. Height is the same with one stage.
 
 Source: docs/equations.md T2; docs/decisions/0005-tracking-inner-loop.md.
@@ -45,10 +47,11 @@ class Observed(NamedTuple):
 
     v: Vec3  # m/s
     d: Vec3  # m/s^2, disturbance acceleration
+    lasting: Vec2 = (0.0, 0.0)  # m/s^2, horizontal part of d that stays: wind
 
 
 @compilable
-def observe(memory: Observed, v: Vec3, a: Vec3, bandwidth: float, dt: float) -> Observed:
+def observe(memory: Observed, v: Vec3, a: Vec3, tuning: TrackingTuning, dt: float) -> Observed:
     """Velocity and disturbance from a velocity reading and the rotors' acceleration.
 
     A second-order observer with both poles at ``bandwidth``: as
@@ -59,13 +62,17 @@ def observe(memory: Observed, v: Vec3, a: Vec3, bandwidth: float, dt: float) -> 
         memory: From the last tick.
         v: Measured velocity [m/s].
         a: Acceleration the rotors produce [m/s^2].
-        bandwidth: Of the observer [rad/s].
+        tuning: Bandwidth of the observer, and how slowly it takes a disturbance for wind.
         dt: Tick length [s].
     """
+    bandwidth = tuning.observer_bandwidth
     vx, dx = _observe_axis(memory.v[0], memory.d[0], v[0], a[0], bandwidth, dt)
     vy, dy = _observe_axis(memory.v[1], memory.d[1], v[1], a[1], bandwidth, dt)
     vz, dz = _observe_axis(memory.v[2], memory.d[2], v[2], a[2], bandwidth, dt)
-    return Observed((vx, vy, vz), (dx, dy, dz))
+    share, most = min(dt / tuning.wind_time, 1.0), tuning.wind_limit
+    wind_x = _limit(memory.lasting[0] + share * (dx - memory.lasting[0]), most)
+    wind_y = _limit(memory.lasting[1] + share * (dy - memory.lasting[1]), most)
+    return Observed((vx, vy, vz), (dx, dy, dz), (wind_x, wind_y))
 
 
 @compilable
@@ -88,6 +95,7 @@ def snap_command(
     e_v: float,
     e_s: float,
     d: float,
+    lasting: float,
     a: float,
     j: float,
     a_plan: float,
@@ -99,7 +107,8 @@ def snap_command(
     k = law.gains.k
     k1, k2, k3, k4, k5 = k[0], k[1], k[2], k[3], k[4]
     e_p = _limit(e_p, tuning.position_error_limit)
-    wanted_a = a_plan + (k1 * e_p + k2 * e_v - law.gains.k_disturbance * d) / k3
+    passing = law.gains.k_disturbance * (d - lasting)
+    wanted_a = a_plan + (k1 * e_p + k2 * e_v - passing) / k3 - lasting
     wanted_a = _limit(wanted_a, tuning.acceleration_limit)
     wanted_j = j_plan + k3 / k4 * (wanted_a - a)
     # A jerk that can still be stopped before the acceleration overshoots.
@@ -164,6 +173,7 @@ def _horizontal_snap(
         plan.v[axis] - observed.v[axis],
         plan.s[axis] - motion.s[axis],
         observed.d[axis],
+        observed.lasting[axis],
         motion.a[axis],
         motion.j[axis],
         plan.a[axis],

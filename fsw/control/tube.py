@@ -10,6 +10,9 @@ The bound is attained by the disturbance that always pushes the worst way, so it
 for the linear loop. Drawn at random, as the paper draws it, the disturbance comes nowhere
 near; ``expected_peak`` is 3.7 standard deviations, about one in five thousand.
 
+The memory of wind is not linear, because it is limited. It acts on the loop as a second
+disturbance within that limit, and the worst that both can do together bounds what they do.
+
 The loop stays linear while the snap it commands stays within what the rotors' torque can
 give; ``peak_snap_share`` says how much of that is used.
 
@@ -38,6 +41,8 @@ class Tube:
 
     base: float  # m, worst case, body origin
     end_effector: float  # m, worst case, a hanging end-effector across the arm's plane
+    base_wind: float  # m, what the memory of wind can add to it, at its limit
+    end_effector_wind: float  # m
     base_expected: float  # m, 3.7 sigma under random steps
     end_effector_expected: float  # m
     snap_expected: float  # m/s^4
@@ -56,18 +61,23 @@ def tube(
 
     Args:
         airframe: Rotor lag.
-        tuning: Observer bandwidth.
+        tuning: Observer bandwidth and the limit of the memory of wind.
         gains: Of the loop.
         hanging: Height of the end-effector below the base [m].
         hold_s: How long a random disturbance keeps its value [s].
         dt: Tick length [s].
     """
-    base, acceleration, snap = _impulse_responses(airframe, tuning, gains, dt)
-    end_effector = base - hanging / GRAVITY * acceleration
+    below = hanging / GRAVITY
+    base, acceleration, snap = _impulse_responses(airframe, tuning, gains, dt, wind=False)
+    end_effector = base - below * acceleration
+    base_wind, acceleration, _ = _impulse_responses(airframe, tuning, gains, dt, wind=True)
+    end_effector_wind = base_wind - below * acceleration
     per_hold = round(hold_s / dt)
     return Tube(
         float(np.abs(base).sum()),
         float(np.abs(end_effector).sum()),
+        tuning.wind_limit * float(np.abs(base_wind).sum()),
+        tuning.wind_limit * float(np.abs(end_effector_wind).sum()),
         *(_RARE * _random_steps(response, per_hold) for response in (base, end_effector, snap)),
     )
 
@@ -81,9 +91,12 @@ def peak_snap_share(airframe: Airframe, tube_per_unit: Tube, disturbance: float)
 
 
 def _impulse_responses(
-    airframe: Airframe, tuning: TrackingTuning, gains: TrackingGains, dt: float
+    airframe: Airframe, tuning: TrackingTuning, gains: TrackingGains, dt: float, *, wind: bool
 ) -> tuple[Array, Array, Array]:
-    """Position, acceleration and commanded snap after a unit push of one tick, per tick."""
+    """Position, acceleration and commanded snap after a unit push of one tick, per tick.
+
+    The push is a disturbance, or a memory of wind that is of no disturbance.
+    """
     k, kd, bandwidth = gains.k, gains.k_disturbance, tuning.observer_bandwidth
     # p, v, a, j, s and the observer's velocity and disturbance; the plan stands still at 0.
     n = 7
@@ -97,7 +110,10 @@ def _impulse_responses(
     a[6] = [0.0, gain_d, 0.0, 0.0, 0.0, -gain_d, 0.0]
     block = np.zeros((n + 1, n + 1))
     block[:n, :n] = a * dt
-    block[1, n] = dt
+    if wind:
+        block[4, n] = dt * (kd - k[2]) / airframe.rotor_lag
+    else:
+        block[1, n] = dt
     exponential = expm(block)
     x = exponential[:n, n]
     states = []

@@ -132,7 +132,7 @@ def _room_in_sphere(tuning: BarrierTuning, radius: float) -> Finding:
 
 
 def _base_tube(tuning: BarrierTuning, loop: Tube, surroundings: Surroundings) -> Finding:
-    reach, room = loop.base * surroundings.disturbance, stand_off(tuning)
+    reach, room = loop.base * surroundings.disturbance + loop.base_wind, stand_off(tuning)
     return _finding(
         "tube",
         room >= reach,
@@ -145,7 +145,7 @@ def _base_tube(tuning: BarrierTuning, loop: Tube, surroundings: Surroundings) ->
 
 def _end_effector_tube(tuning: BarrierTuning, loop: Tube, surroundings: Surroundings) -> Finding:
     """Across the arm's plane the arm cannot compensate; along it, it does."""
-    reach = loop.end_effector * surroundings.disturbance
+    reach = loop.end_effector * surroundings.disturbance + loop.end_effector_wind
     expected = loop.end_effector_expected * surroundings.disturbance
     room = stand_off(tuning)
     return _finding(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -28,6 +29,7 @@ from tests.fsw.random_states import estimate_of, vec3
 LAG = LagModel()
 TUNING = TrackingTuning()
 LAW = TrackingLaw(AIRFRAME, LAG, TUNING, tracking_gains(TUNING, AIRFRAME.rotor_lag, 0.002))
+BRISK = replace(TUNING, observer_bandwidth=100.0)
 WEIGHT = AIRFRAME.mass * GRAVITY
 CALM: Vec3 = (0.0, 0.0, 0.0)
 NOTHING = Observed(CALM, CALM)
@@ -111,6 +113,37 @@ def test_a_disturbance_is_leaned_against() -> None:
 
 
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_wind_is_cancelled_whole_once_it_is_believed(sign: float) -> None:
+    """On the plan, in wind, the acceleration that is asked for is the opposite of the wind's."""
+    wind = sign * TUNING.wind_limit
+    k3, k4 = LAW.gains.k[2], LAW.gains.k[3]
+    asked = snap_command(LAW, 0.0, 0.0, 0.0, wind, wind, 0.0, 0.0, 0.0, 0.0, 0.0)
+    assert asked == pytest.approx(-k3 * wind)
+    leaning = snap_command(LAW, 0.0, 0.0, 0.0, wind, wind, -wind, 0.0, 0.0, 0.0, 0.0)
+    assert leaning == pytest.approx(0.0, abs=1e-9)
+    assert k4 > 0.0
+
+
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_a_lasting_push_is_taken_for_wind_up_to_its_limit_and_forgotten(sign: float) -> None:
+    """Half of what has not been believed yet within ln 2 time constants, never past the limit."""
+    dt, d = 0.002, sign * 0.8 * TUNING.wind_limit
+    believed = Observed(CALM, (d, 0.0, 0.0))
+    for _ in range(round(math.log(2.0) * TUNING.wind_time / dt)):
+        believed = observe(believed._replace(v=CALM), (dt * d, 0.0, 0.0), CALM, TUNING, dt)
+    assert believed.lasting == pytest.approx((0.5 * d, 0.0), abs=0.01 * abs(d))
+    pushed = believed._replace(d=(5.0 * sign, 0.0, 0.0))
+    for _ in range(1000):
+        pushed = observe(pushed._replace(v=CALM), (dt * 5.0 * sign, 0.0, 0.0), CALM, TUNING, dt)
+        assert abs(pushed.lasting[0]) <= TUNING.wind_limit
+    assert pushed.lasting[0] == pytest.approx(sign * TUNING.wind_limit)
+    calm_again = believed._replace(d=CALM)
+    for _ in range(round(10.0 * TUNING.wind_time / dt)):
+        calm_again = observe(calm_again._replace(v=CALM), CALM, CALM, TUNING, dt)
+    assert calm_again.lasting == pytest.approx((0.0, 0.0), abs=1e-3 * TUNING.wind_limit)
+
+
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
 def test_height_errors_change_thrust_the_right_way(sign: float) -> None:
     """Plan below the vehicle (z down): less thrust; above: more."""
     estimate, motion = on_plan(Rotation.identity(), PLAN)
@@ -133,7 +166,7 @@ def test_far_from_the_plan_acceleration_and_jerk_wishes_are_limited(
     e_p: float, e_v: float, d: float
 ) -> None:
     """At the vehicle's own a = j = 0 the wish is K4 times a jerk of at most its limit."""
-    wanted = snap_command(LAW, e_p, e_v, 0.0, d, 0.0, 0.0, 0.0, 0.0, 0.0)
+    wanted = snap_command(LAW, e_p, e_v, 0.0, d, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     k4 = LAW.gains.k[3]
     assert abs(wanted) <= k4 * TUNING.jerk_limit + 1e-9
     stoppable = math.sqrt(120.0 * (TUNING.acceleration_limit + 0.15))
@@ -144,12 +177,12 @@ def test_far_from_the_plan_acceleration_and_jerk_wishes_are_limited(
 def test_a_vehicle_at_the_acceleration_limit_is_not_asked_for_more(e_p: float) -> None:
     side = math.copysign(1.0, e_p)
     at_limit = side * TUNING.acceleration_limit
-    assert side * snap_command(LAW, e_p, 0.0, 0.0, 0.0, at_limit, 0.0, 0.0, 0.0, 0.0) <= 1e-9
+    assert side * snap_command(LAW, e_p, 0.0, 0.0, 0.0, 0.0, at_limit, 0.0, 0.0, 0.0, 0.0) <= 1e-9
 
 
 def test_beyond_the_position_limit_more_error_asks_for_nothing_more() -> None:
     def at(error: float) -> float:
-        return snap_command(LAW, error, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        return snap_command(LAW, error, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
     assert at(TUNING.position_error_limit) == at(10.0)
 
@@ -160,7 +193,7 @@ def test_observer_finds_a_constant_disturbance(d: Vec3) -> None:
     believed = NOTHING
     for _ in range(100):
         v = v + dt * (a + np.array(d))
-        believed = observe(believed, vec3(v), vec3(a), 100.0, dt)
+        believed = observe(believed, vec3(v), vec3(a), BRISK, dt)
     np.testing.assert_allclose(believed.d, d, atol=0.01)
     np.testing.assert_allclose(believed.v, v, atol=1e-3)
 
@@ -170,7 +203,7 @@ def test_observer_passes_little_of_a_velocity_reading_s_noise_on() -> None:
     rng = np.random.default_rng(3)
     believed, found = NOTHING, []
     for _ in range(5000):
-        believed = observe(believed, vec3(rng.normal(0.0, 0.01, 3)), (0.0, 0.0, 0.0), 100.0, 0.002)
+        believed = observe(believed, vec3(rng.normal(0.0, 0.01, 3)), (0.0, 0.0, 0.0), BRISK, 0.002)
         found.append(believed.d)
     assert np.std(np.array(found)) < 0.4
 

@@ -26,17 +26,18 @@ def _tube() -> Tube:
     return tube(AIRFRAME, TUNING, _gains(), hanging=0.225, hold_s=0.1, dt=DT)
 
 
-def _position_under(disturbance: np.ndarray) -> np.ndarray:
+def _position_under(disturbance: np.ndarray, tuning: TrackingTuning = TUNING) -> np.ndarray:
     """One axis of the loop as it is flown, its law called tick by tick."""
-    law = TrackingLaw(AIRFRAME, LagModel(), TUNING, _gains())
+    law = TrackingLaw(AIRFRAME, LagModel(), tuning, _gains())
     decay = np.exp(-DT / AIRFRAME.rotor_lag)
     p = v = a = j = s = 0.0
     believed = Observed((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
     positions = []
     for d in disturbance:
-        believed = observe(believed, (v, 0.0, 0.0), (a, 0.0, 0.0), TUNING.observer_bandwidth, DT)
+        believed = observe(believed, (v, 0.0, 0.0), (a, 0.0, 0.0), tuning, DT)
         # Far from the jerk limit that the square root sets, snap_command is linear.
-        w = snap_command(law, -p, -believed.v[0], -s, believed.d[0], a, j, 0.0, 0.0, 0.0)
+        d_hat, lasting = believed.d[0], believed.lasting[0]
+        w = snap_command(law, -p, -believed.v[0], -s, d_hat, lasting, a, j, 0.0, 0.0, 0.0)
         s = w + (s - w) * decay
         p, v, a, j = p + DT * v, v + DT * (a + d), a + DT * j, j + DT * s
         positions.append(p)
@@ -46,24 +47,29 @@ def _position_under(disturbance: np.ndarray) -> np.ndarray:
 def test_no_random_disturbance_leaves_the_tube() -> None:
     rng = np.random.default_rng(5)
     steps = np.repeat(rng.uniform(-0.8, 0.8, 150), 50)
-    assert np.abs(_position_under(steps)).max() < 0.8 * _tube().base
+    assert np.abs(_position_under(steps)).max() < 0.8 * _tube().base + _tube().base_wind
 
 
 def test_a_lasting_push_stays_inside_and_uses_much_of_it() -> None:
-    settled = abs(_position_under(np.full(4000, 0.5))[-1])
+    forgetful = replace(TUNING, wind_limit=0.0)
+    settled = abs(_position_under(np.full(4000, 0.5), forgetful)[-1])
     assert 0.6 * 0.5 * _tube().base < settled < 0.5 * _tube().base
 
 
-def test_the_end_effector_below_swings_further_than_the_base() -> None:
-    reach = _tube()
-    assert reach.end_effector > reach.base
-    assert reach.end_effector_expected > reach.base_expected
+def test_wind_within_the_limit_ends_without_an_offset() -> None:
+    """And more than that with what the limit leaves."""
+    limit = TUNING.wind_limit
+    assert abs(_position_under(np.full(15_000, 0.9 * limit))[-1]) < 0.5e-3
+    forgetful = _position_under(np.full(15_000, 0.5 - limit), replace(TUNING, wind_limit=0.0))
+    believed = _position_under(np.full(15_000, 0.5))
+    assert believed[-1] == pytest.approx(forgetful[-1], abs=1e-5)
 
 
-def test_what_is_expected_at_random_is_within_the_worst_case() -> None:
-    reach = _tube()
-    assert reach.base_expected < reach.base
-    assert reach.end_effector_expected < reach.end_effector
+def test_a_push_that_turns_once_it_is_taken_for_wind_needs_the_wider_tube() -> None:
+    """The memory of one push is added to the opposite one."""
+    push = np.concatenate((np.full(10_000, -0.8), np.full(1000, 0.8)))
+    reach = np.abs(_position_under(push)).max()
+    assert 0.8 * _tube().base < reach < 0.8 * _tube().base + _tube().base_wind
 
 
 @pytest.mark.parametrize("cheaper", [0.5, 0.2])

@@ -63,7 +63,8 @@ def test_at_the_stand_off_a_vehicle_at_rest_meets_lambda(robustness: float) -> N
 def test_the_tube_finding_turns_where_the_stand_off_equals_the_reach() -> None:
     config = flight_config()
     tuning = config.planner.walls
-    reach = 0.8 * loop_tube(config).base
+    loop = loop_tube(config)
+    reach = 0.8 * loop.base + loop.base_wind
     for factor, holds in ((1.01, True), (0.99, False)):
         walls = replace(tuning, robustness=factor * reach * tuning.slope)
         changed = replace(config, planner=replace(config.planner, walls=walls))
