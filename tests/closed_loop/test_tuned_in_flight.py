@@ -125,7 +125,7 @@ def test_in_the_air_what_breaks_an_inequality_is_refused_with_it() -> None:
     assert flight.state.tuning == ()
     (text,) = [text.text for text in outputs.texts]
     assert "refused while armed" in text
-    assert "pushes the base further than 58 mm" in text
+    assert "pushes the base further than 69 mm" in text
     assert "lambda >= 0.2" in text
     flight.run(0.2)
     assert flight.mode is Mode.TRAJECTORY
