@@ -10,10 +10,11 @@ time of a frozen dataclass (docs/decisions/0017-one-compiled-call-a-tick.md).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from enum import Enum, IntEnum
 from typing import NamedTuple
 
+from fsw.frozen import dataclass
 from fsw.tuning import Tuning
 
 Vec2 = tuple[float, float]

@@ -49,7 +49,7 @@ class CascadeMemory(NamedTuple):
 
     def after_sending(self, sent: ActuatorCommand) -> CascadeMemory:
         """The memory for the next tick, once the safety gate has decided."""
-        return self._replace(commanded=sent)
+        return self if sent is self.commanded else self._replace(commanded=sent)
 
 
 def at_rest(airframe: Airframe, estimate: StateEstimate) -> CascadeMemory:

@@ -38,6 +38,8 @@ from fsw.signals import (
     EndEffectorTarget,
     FlightSnapshot,
     Mode,
+    Plan,
+    PlanFailure,
     PlanInput,
     PlanRequest,
     PredictionState,
@@ -115,29 +117,31 @@ class FlightLoop:
         ticks = self._elapsed_ticks(state, now_us)
         index, per_plan = state.index + ticks, self._ticks_per_plan
         planning_due = index // per_plan != state.index // per_plan
-        state, request, u = self._follow_plan(state, inputs, estimate, ticks, planning_due)
-        constraints, reference = state.constraints, state.reference
+        nominal, plan, u = self._follow_plan(state, inputs.plan, now_us, ticks)
+        request, constraints, reference = None, state.constraints, state.reference
         if planning_due:
+            if state.vehicle.flies and nominal is not None:
+                request, plan = self._ask(state, estimate, nominal, plan, now_us)
             target = self._reference(state, now_us)
             constraints = self._constraints(state, estimate, target)
             reference = target if state.vehicle.flies else None
-        sent, memory, replaced = self._actuate(state, estimate, u, ticks)
-        snapshot = _snapshot(state, estimate, u, sent, constraints, reference)
+        sent, memory, replaced = self._actuate(state, estimate, nominal, u, ticks)
         state = FlightState(
             index,
             now_us,
             estimate,
             state.invalid_ticks,
-            state.nominal,
+            nominal,
             replaced,
             memory,
             state.vehicle,
             state.mission,
-            state.plan,
+            plan,
             constraints,
             reference,
             state.tuning,
         )
+        snapshot = _snapshot(state, estimate, u, sent)
         return state, TickOutputs(sent, snapshot, request, tuple(acks), tuple(texts))
 
     def judge(self, safe_set: SafeSet) -> tuple[Finding, ...]:
@@ -150,32 +154,21 @@ class FlightLoop:
         return min(max(elapsed, 1), self.config.catch_up_ticks) if state.index >= 0 else 1
 
     def _follow_plan(
-        self,
-        state: FlightState,
-        inputs: TickInputs,
-        estimate: StateEstimate,
-        ticks: int,
-        planning_due: bool,
-    ) -> tuple[FlightState, PlanRequest | None, PlanInput]:
-        """Bring the plan's state to this tick, by a new plan or one more step; ask for the next."""
+        self, state: FlightState, answer: Plan | PlanFailure | None, now_us: int, ticks: int
+    ) -> tuple[PredictionState | None, PlanMemory, PlanInput]:
+        """Bring the plan's state to this tick, by a new plan or one more step."""
         nominal = state.nominal
         if not state.vehicle.flies or nominal is None:
-            return state, None, REST_INPUT
-        now_us, tick_us = inputs.sensors.t_us, self.config.tick_period_us
-        running = state.plan.running
-        plan, new_plan = take_answer(state.plan, inputs.plan, now_us)
+            return nominal, state.plan, REST_INPUT
+        tick_us, running = self.config.tick_period_us, state.plan.running
+        plan, new_plan = take_answer(state.plan, answer, now_us)
         if new_plan is not None:
             nominal = late_start(self._model, new_plan, now_us, tick_us)
         elif now_us > plan.since_us:
             for ago in range(ticks, 0, -1):
                 u = plan_input(running, nominal, now_us - ago * tick_us, self._brake)
                 nominal = self._model.step(nominal, u)
-        state = replace(state, nominal=nominal, plan=plan)
-        request = None
-        if planning_due:
-            request, plan = self._ask(state, estimate, nominal, now_us)
-            state = replace(state, plan=plan)
-        return state, request, plan_input(plan.running, nominal, now_us, self._brake)
+        return nominal, plan, plan_input(plan.running, nominal, now_us, self._brake)
 
     def _receive(
         self,
@@ -194,7 +187,12 @@ class FlightLoop:
         return MissionMemory(stream, inputs.safe_set, () if self.config.soft else against)
 
     def _ask(
-        self, state: FlightState, estimate: StateEstimate, nominal: PredictionState, now_us: int
+        self,
+        state: FlightState,
+        estimate: StateEstimate,
+        nominal: PredictionState,
+        plan: PlanMemory,
+        now_us: int,
     ) -> tuple[PlanRequest, PlanMemory]:
         config = self.config
         apply_us = now_us + config.plan_delay_ticks * config.tick_period_us
@@ -207,7 +205,7 @@ class FlightLoop:
             config,
             self._model,
             self._brake,
-            state.plan,
+            plan,
             nominal,
             measured,
             state.mission.safe_set,
@@ -216,12 +214,17 @@ class FlightLoop:
         )
 
     def _actuate(
-        self, state: FlightState, estimate: StateEstimate, u: PlanInput, ticks: int
+        self,
+        state: FlightState,
+        estimate: StateEstimate,
+        nominal: PredictionState | None,
+        u: PlanInput,
+        ticks: int,
     ) -> tuple[ActuatorCommand, CascadeMemory, bool]:
         """Close the loops, idle or stay still, and let the safety gate have the last word."""
         memory, wanted = state.cascade, STOPPED
-        if state.vehicle.flies and state.nominal is not None:
-            wanted, memory = self._cascade.step(memory, estimate, state.nominal, u, ticks)
+        if state.vehicle.flies and nominal is not None:
+            wanted, memory = self._cascade.step(memory, estimate, nominal, u, ticks)
         elif state.vehicle.armed:
             idle = self.config.limits.idle_thrust
             wanted = ActuatorCommand((idle, idle, idle, idle), (0.0, 0.0))
@@ -263,8 +266,6 @@ def _snapshot(
     estimate: StateEstimate,
     u: PlanInput,
     sent: ActuatorCommand,
-    constraints: ConstraintReport,
-    reference: EndEffectorTarget | None,
 ) -> FlightSnapshot:
     vehicle, plan = state.vehicle, state.plan
     flies = vehicle.flies and state.nominal is not None
@@ -273,14 +274,14 @@ def _snapshot(
         vehicle.mode,
         vehicle.armed,
         estimate,
-        reference,
+        state.reference,
         state.nominal if flies else None,
         u if flies else None,
         sent,
         plan.running,
         plan.status,
         plan.counters,
-        constraints,
+        state.constraints,
         vehicle.failures,
         vehicle.landed,
     )

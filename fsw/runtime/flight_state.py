@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from fsw.control.cascade import CascadeMemory
 from fsw.control.tracking import Observed
+from fsw.frozen import dataclass
 from fsw.model.airframe import AIRFRAME
 from fsw.signals import (
     STOPPED,

@@ -26,9 +26,12 @@ def gate(
         return STOPPED, False
     if not math.isfinite(sum(command.rotor_thrust) + sum(command.joint_torque)):
         return last, True
-    f1, f2, f3, f4 = command.rotor_thrust
-    t1, t2 = command.joint_torque
+    rotors, joints = command
     top, bound = airframe.rotor_thrust_max, airframe.joint_torque_max
+    if min(rotors) >= 0.0 and max(rotors) <= top and max(map(abs, joints)) <= bound:
+        return command, False
+    f1, f2, f3, f4 = rotors
+    t1, t2 = joints
     return (
         ActuatorCommand(
             (
