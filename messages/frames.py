@@ -27,10 +27,10 @@ _SIGNED: Final = 0x01
 # hold the flight loop up: 1400 of them would cost a quarter of a tick.
 _FALSE_START_LIMIT: Final = 64
 
-_checksum: Callable[[bytes], int] = fastcrc.crc16.mcrf4xx
+checksum: Callable[[bytes], int] = fastcrc.crc16.mcrf4xx
 
 
-class _Layout(NamedTuple):
+class Layout(NamedTuple):
     """How one message lies in a frame; a plain tuple because it is taken apart for each frame."""
 
     payload: Struct
@@ -38,8 +38,8 @@ class _Layout(NamedTuple):
     id_bytes: bytes  # (3,), the message id as it stands in the header
 
 
-_LAYOUTS: Final[dict[int, _Layout]] = {
-    message_id: _Layout(
+_LAYOUTS: Final[dict[int, Layout]] = {
+    message_id: Layout(
         message.unpacker, bytes([message.crc_extra]), message_id.to_bytes(3, "little")
     )
     for message_id, message in dialect.mavlink_map.items()
@@ -103,10 +103,23 @@ class FrameWriter:
         layout = _LAYOUTS[message_id]
         # The first byte of a payload is sent even if it is zero.
         payload = layout.payload.pack(*wire_values).rstrip(b"\0") or b"\0"
+        body = b"%c%b%b%b" % (len(payload), self.next_origin(), layout.id_bytes, payload)
+        return b"\xfd%b%b" % (body, checksum(body + layout.crc_extra).to_bytes(2, "little"))
+
+    def next_origin(self) -> bytes:
+        """Advance the sequence: the header between length and message id of the next frame."""
         origin = self._origins[self._sequence]
-        body = b"%c%b%b%b" % (len(payload), origin, layout.id_bytes, payload)
         self._sequence = (self._sequence + 1) & 0xFF
-        return b"\xfd%b%b" % (body, _checksum(body + layout.crc_extra).to_bytes(2, "little"))
+        return origin
+
+
+def layout_of(message_id: int) -> Layout:
+    """How a message lies in a frame.
+
+    Raises:
+        KeyError: The dialect has no such message.
+    """
+    return _LAYOUTS[message_id]
 
 
 def split(datagram: bytes, losses: Losses | None = None) -> Iterator[Frame]:
@@ -161,8 +174,8 @@ def _frame_at(datagram: bytes, start: int) -> tuple[int, Frame | None]:
         end += _SIGNATURE_SIZE
     if layout is None or len(datagram) < end:
         return 0, None
-    checksum = datagram[payload_end] | datagram[payload_end + 1] << 8
-    if _checksum(datagram[start + 1 : payload_end] + layout.crc_extra) != checksum:
+    received = datagram[payload_end] | datagram[payload_end + 1] << 8
+    if checksum(datagram[start + 1 : payload_end] + layout.crc_extra) != received:
         return 0, None
     # Longer than known: a peer with newer extensions. Shorter: trailing zeros were left out.
     size = layout.payload.size

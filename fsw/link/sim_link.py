@@ -17,6 +17,7 @@ from fsw.link.message_ids import AUTOPILOT, SYSTEM_ID
 from fsw.link.telemetry import VehicleFacts
 from fsw.link.udp_endpoint import Address, ConnectedEndpoint
 from fsw.signals import CommandAck, SensorFrame, TickOutputs
+from messages.convoy import ConvoyReader
 from messages.frames import Frame, FrameWriter, split
 
 PATIENCE_S: Final = 0.2  # one wait for a datagram; also the interval of announcements
@@ -24,6 +25,10 @@ PATIENCE_S: Final = 0.2  # one wait for a datagram; also the interval of announc
 _SHUTDOWN: Final = 246  # MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN
 _POWER_OFF: Final = 2.0  # its second parameter here: shut the autopilot down
 _ACCEPTED: Final = 0  # MAV_RESULT
+# An ordinary step; with the number of first values that are of use.
+_STEP: Final = ConvoyReader(
+    (message_ids.ODOMETRY, 14), (message_ids.ARM_JOINT_STATE, 7), (message_ids.HIL_SENSOR, 7)
+)
 
 
 class Pacing(Enum):
@@ -101,24 +106,34 @@ class SimLink:
 
     def _read(self, datagram: bytes) -> SensorFrame | None:
         """Decode one datagram; None unless it carries a whole new step."""
+        step = _STEP.read(datagram)
+        if step is not None:
+            return self._new(*step)
         frames = list(split(datagram))
         payloads = {frame.message_id: cast(Numbers, frame.payload_values) for frame in frames}
         barrier = payloads.get(message_ids.HIL_SENSOR)
         if barrier is None:
             self._read_between_steps(frames)
             return None
+        odometry = payloads.get(message_ids.ODOMETRY)
+        arm = payloads.get(message_ids.ARM_JOINT_STATE)
+        sensors = self._new(odometry, arm, barrier)
+        if sensors is not None:
+            for frame in frames:
+                self._note(frame)
+        return sensors
+
+    def _new(
+        self, odometry: Numbers | None, arm: Numbers | None, barrier: Numbers
+    ) -> SensorFrame | None:
+        """The sensors of a step that is whole and not known yet; a known one is answered again."""
         t_us = int(barrier[0])
         if t_us <= self._last_us:
             self._repeat(t_us)
             return None
-        odometry = payloads.get(message_ids.ODOMETRY)
-        arm = payloads.get(message_ids.ARM_JOINT_STATE)
         if odometry is None or arm is None:
             return None
         self._last_us = t_us
-        if len(frames) > 3:
-            for frame in frames:
-                self._note(frame)
         return decode.sensor_frame(odometry, arm, barrier)
 
     def _note(self, frame: Frame) -> None:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Final, cast
+from typing import Final, NamedTuple, cast
 
+from messages.convoy import ConvoyReader
 from messages.frames import Frame, split
 from sitl.link import message_ids
 from sitl.link.message_ids import PATH_PLANNER
@@ -13,10 +13,10 @@ from sitl.simulation import Controls
 
 _ARMED: Final = 128  # MAV_MODE_FLAG in the mode of HIL_ACTUATOR_CONTROLS
 _JOINTS_AT: Final = 6  # wire index of controls[4]
+_CONTROLS_ALONE: Final = ConvoyReader((message_ids.HIL_ACTUATOR_CONTROLS, 19))
 
 
-@dataclass(frozen=True, slots=True)
-class Answer:
+class Answer(NamedTuple):
     """What the vehicle answered to one step."""
 
     t_us: int  # the step's time stamp
@@ -40,18 +40,24 @@ def answer(datagram: bytes, joints: int) -> Answer | None:
     Returns:
         None if there is no HIL_ACTUATOR_CONTROLS in it.
     """
+    alone = _CONTROLS_ALONE.read(datagram)
+    if alone is not None:
+        return Answer(int(alone[0][0]), _controls(alone[0], joints))
     frames = list(split(datagram))
     if not frames or frames[-1].message_id != message_ids.HIL_ACTUATOR_CONTROLS:
         return None
     values = cast("tuple[float, ...]", frames[-1].payload_values)
-    controls = Controls(
-        thrust=cast("tuple[float, float, float, float]", values[2:6]),
-        torque=values[_JOINTS_AT : _JOINTS_AT + joints],
-        armed=bool(int(values[18]) & _ARMED),
-    )
-    if len(frames) == 1:
-        return Answer(int(values[0]), controls)
+    controls = _controls(values, joints)
     return Answer(int(values[0]), controls, acknowledgements(frames), _texts(frames))
+
+
+def _controls(values: tuple[float, ...], joints: int) -> Controls:
+    """From the wire values of HIL_ACTUATOR_CONTROLS."""
+    return Controls(
+        cast("tuple[float, float, float, float]", values[2:6]),
+        values[_JOINTS_AT : _JOINTS_AT + joints],
+        bool(int(values[18]) & _ARMED),
+    )
 
 
 def acknowledgements(frames: list[Frame]) -> tuple[Ack, ...]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from messages.convoy import ConvoyFrame
 from messages.frames import FrameWriter
 from sitl.link import message_ids
 from sitl.link.message_ids import PATH_PLANNER, SENSORS, SYSTEM_ID
@@ -35,6 +36,7 @@ _ODOMETRY_TAIL: Final = (
     *(_LOCAL_NED, _LOCAL_NED, 0, _MOTION_CAPTURE, 100),
 )
 _HIL_TAIL: Final = (*(0.0,) * 7, _ACCEL_AND_GYRO, 0)
+_ARM_TAIL: Final = (0.0,) * 6  # the end-effector's place and velocity: not measured
 
 
 class StepEncoder:
@@ -44,25 +46,22 @@ class StepEncoder:
         self._sensors = FrameWriter(SYSTEM_ID, SENSORS)
         self._pilot = FrameWriter(SYSTEM_ID, PATH_PLANNER)
         self._pacing = 1 if lockstep else 0
+        self._odometry = ConvoyFrame(self._sensors, message_ids.ODOMETRY, *_ODOMETRY_TAIL)
+        self._hil_sensor = ConvoyFrame(self._sensors, message_ids.HIL_SENSOR, *_HIL_TAIL)
+        self._arms = {
+            joints: ConvoyFrame(self._sensors, message_ids.ARM_JOINT_STATE, *_ARM_TAIL, joints)
+            for joints in range(1, 5)
+        }
 
     def datagram(self, readings: SensorReadings, messages: tuple[PilotMessage, ...]) -> bytes:
         """Pilot's messages, pose, arm, and HIL_SENSOR last, as the barrier."""
-        t_us = readings.t_us
-        frame = self._sensors.frame
-        a, b = readings.q_arm, readings.qd_arm
-        arm = (*_four(a), *_four(b), *_four(readings.tau_arm), *(0.0,) * 6, len(a))
+        t_us, p, v, q, w, gyro, accel, angles, rates, torques = readings
+        arm = self._arms[len(angles)]
+        rest = (0.0,) * (4 - len(angles))
         step = (
-            frame(
-                message_ids.ODOMETRY,
-                t_us,
-                *readings.p_WB,
-                *readings.q_WB,
-                *readings.v_WB,
-                *readings.w_WB_B,
-                *_ODOMETRY_TAIL,
-            )
-            + frame(message_ids.ARM_JOINT_STATE, t_us, *arm)
-            + frame(message_ids.HIL_SENSOR, t_us, *readings.accel_B, *readings.gyro_B, *_HIL_TAIL)
+            self._odometry(t_us, *p, *q, *v, *w)
+            + arm(t_us, *angles, *rest, *rates, *rest, *torques, *rest)
+            + self._hil_sensor(t_us, *accel, *gyro)
         )
         return self._spoken(messages) + step if messages else step
 
@@ -98,7 +97,3 @@ def _workspace(message: AnnounceWorkspace) -> tuple[int, *WireValues]:
     sphere = message.workspace
     offset = (0.0, 0.0, -sphere.d_iw_m)
     return (message_ids.WORKSPACE_SPHERE, *offset, sphere.radius_m, SYSTEM_ID, 1)
-
-
-def _four(values: tuple[float, ...]) -> tuple[float, ...]:
-    return (*values, 0.0, 0.0, 0.0, 0.0)[:4]
