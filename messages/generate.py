@@ -21,12 +21,15 @@ class GenerationError(RuntimeError):
     """mavgen refused the XML; the message carries what it printed."""
 
 
-def generate(definition: Path = DEFINITION, destination: Path = GENERATED) -> None:
-    """Write the Python module of a dialect.
+def generate(
+    definition: Path = DEFINITION, destination: Path = GENERATED, language: str = "Python3"
+) -> None:
+    """Write what mavgen makes of a dialect.
 
     Args:
         definition: XML that may include any definition shipped with pymavlink.
-        destination: Module to write; replaced in one step, so that a reader never sees half of it.
+        destination: File to write; replaced in one step, so that a reader never sees half of it.
+        language: A language of mavgen's that is one file: Python3, WLua.
 
     Raises:
         GenerationError: The XML is invalid or clashes with what it includes.
@@ -34,27 +37,32 @@ def generate(definition: Path = DEFINITION, destination: Path = GENERATED) -> No
     with tempfile.TemporaryDirectory(dir=destination.parent) as folder:
         # mavgen resolves includes beside the including file and takes the dialect's name from
         # the output, so both live in one folder under the name of the definition.
-        for included in _pymavlink_definitions().glob("*.xml"):
+        for included in pymavlink_definitions().glob("*.xml"):
             shutil.copy(included, folder)
         source = Path(folder, definition.name)
         shutil.copy(definition, source)
-        module = source.with_suffix(".py")
-        _run_mavgen(source, module)
+        module = source.with_suffix(destination.suffix)
+        _run_mavgen(source, module, language)
         module.replace(destination)
 
 
-def _pymavlink_definitions() -> Path:
+def pymavlink_definitions() -> Path:
+    """The folder of the definitions that come with pymavlink.
+
+    Raises:
+        GenerationError: There is no pymavlink.
+    """
     spec = find_spec("pymavlink")
     if spec is None or spec.origin is None:
         raise GenerationError("pymavlink is not installed; run `make setup`")
     return Path(spec.origin).parent / "dialects" / "v20"
 
 
-def _run_mavgen(source: Path, module: Path) -> None:
+def _run_mavgen(source: Path, module: Path, language: str) -> None:
     from pymavlink.generator import mavgen, mavparse
 
     options = mavgen.Opts(
-        str(module), wire_protocol=mavparse.PROTOCOL_2_0, language="Python3", validate=True
+        str(module), wire_protocol=mavparse.PROTOCOL_2_0, language=language, validate=True
     )
     chatter = io.StringIO()
     with contextlib.redirect_stdout(chatter), contextlib.redirect_stderr(chatter):

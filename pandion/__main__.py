@@ -20,6 +20,7 @@ verbs:
   fsw         run the flight software alone
   reproduce   fly a table or a figure of the paper again
   bench       time the planner's optimiser against others
+  dialect     teach MAVProxy, Wireshark and others the private messages
 
 options:
   --version   print the version
@@ -76,6 +77,12 @@ def _bench(argv: list[str]) -> int:
     return bench.main(argv)
 
 
+def _dialect(argv: list[str]) -> int:
+    from pandion import dialect
+
+    return dialect.main(argv)
+
+
 def _sitl(argv: list[str]) -> int:
     from sitl import __main__ as entry
     from sitl import arguments
@@ -107,6 +114,7 @@ VERBS: Final[dict[str, Callable[[list[str]], int]]] = {
     "fsw": _fsw,
     "reproduce": _reproduce,
     "bench": _bench,
+    "dialect": _dialect,
 }
 
 if __name__ == "__main__":

@@ -37,15 +37,13 @@ def burst(request: Request, session: Session) -> Job:
 
 def _piece(request: Request, session: Session, offset: int, *, burst_complete: bool) -> Job:
     if offset >= session.file.size:
-        yield refused(Refusal.END_OF_FILE, request.session)
+        yield refused(Refusal.END_OF_FILE)
         return
     try:
         for data in _delivered(session.file, offset, request.size or MAX_DATA):
-            yield (
-                Reply(Opcode.ACK, request.session, offset, data, burst_complete) if data else None
-            )
+            yield (Reply(Opcode.ACK, None, offset, data, burst_complete) if data else None)
     except OSError:
-        yield refused(Refusal.FAIL, request.session)
+        yield refused(Refusal.FAIL)
 
 
 def checksum(served: ServedFile) -> Job:

@@ -77,7 +77,7 @@ class Reply:
     """A message from the vehicle, but for its sequence number."""
 
     opcode: Opcode
-    session: int = 0
+    session: int | None = None  # that of the request if None
     offset: int = 0
     data: bytes = b""
     burst_complete: bool = False
@@ -90,26 +90,26 @@ def read(payload: bytes) -> Request:
     return Request(sequence, session, opcode, size, offset, data)
 
 
-def write(reply: Reply, requested: int, sequence: int) -> bytes:
+def write(reply: Reply, request: Request, sequence: int) -> bytes:
     """Make a payload of 251 bytes.
 
     Args:
         reply: What to say.
-        requested: Opcode of the request that is answered.
+        request: What is answered.
         sequence: That of the request and one more; it starts again at 0 after 65535.
     """
     header = _HEADER.pack(
         sequence & 0xFFFF,
-        reply.session,
+        request.session if reply.session is None else reply.session,
         reply.opcode,
         len(reply.data),
-        requested,
+        request.opcode,
         reply.burst_complete,
         reply.offset,
     )
     return (header + reply.data).ljust(_PAYLOAD, b"\0")
 
 
-def refused(why: Refusal, session: int = 0) -> Reply:
+def refused(why: Refusal) -> Reply:
     """A NAK."""
-    return Reply(Opcode.NAK, session, data=bytes([why]))
+    return Reply(Opcode.NAK, data=bytes([why]))

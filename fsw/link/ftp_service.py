@@ -113,14 +113,14 @@ class FtpService:
         if handler is not None:
             return handler(request, client, t_us)
         if request.opcode in _WRITES:
-            return refused(Refusal.FILE_PROTECTED, request.session)
-        return refused(Refusal.UNKNOWN_COMMAND, request.session)
+            return refused(Refusal.FILE_PROTECTED)
+        return refused(Refusal.UNKNOWN_COMMAND)
 
     def _terminate(self, request: Request, client: Client, t_us: int) -> Reply:
         if self._sessions.of(client, request.session) is None:
-            return refused(Refusal.INVALID_SESSION, request.session)
+            return refused(Refusal.INVALID_SESSION)
         self._close(client, request.session)
-        return Reply(Opcode.ACK, request.session)
+        return Reply(Opcode.ACK)
 
     def _reset(self, request: Request, client: Client, t_us: int) -> Reply:
         # Those of the client: another ground station goes on with its download.
@@ -141,20 +141,20 @@ class FtpService:
         node = find(self._root, request.path)
         if node is None or isinstance(node, Mapping):
             return refused(Refusal.FILE_NOT_FOUND)
-        number = self._sessions.room(t_us)
+        number = self._sessions.room(client, request.session, t_us)
         if number is None:
             return refused(Refusal.NO_SESSIONS_AVAILABLE)
         try:
             file = node.open()
         except OSError:
             return refused(Refusal.FILE_NOT_FOUND)
-        self._sessions.add(number, Session(client, file, t_us))
-        return Reply(Opcode.ACK, number, data=file.size.to_bytes(4, "little"))
+        self._sessions.add(client, number, Session(file, t_us))
+        return Reply(Opcode.ACK, session=number, data=file.size.to_bytes(4, "little"))
 
     def _read(self, request: Request, client: Client, t_us: int) -> Reply | None:
         session = self._sessions.of(client, request.session)
         if session is None:
-            return refused(Refusal.INVALID_SESSION, request.session)
+            return refused(Refusal.INVALID_SESSION)
         session.used_us = t_us
         burst = request.opcode == Opcode.BURST_READ_FILE
         self._start(request, client, (ftp_jobs.burst if burst else ftp_jobs.read)(request, session))
@@ -186,7 +186,7 @@ class FtpService:
 
     def _close(self, client: Client, number: int) -> None:
         self._stop((client, number))
-        self._sessions.close(number)
+        self._sessions.close(client, number)
 
     def _remember(self, client: Client, answered: _Answered) -> None:
         self._answered.pop(client, None)
@@ -196,5 +196,5 @@ class FtpService:
 
 
 def _outgoing(reply: Reply, request: Request, sequence: int, client: Client) -> Outgoing:
-    payload = write(reply, request.opcode, sequence)
+    payload = write(reply, request, sequence)
     return Outgoing(message_ids.FILE_TRANSFER_PROTOCOL, (0, *client, *payload))

@@ -104,6 +104,8 @@ class Client:
         assert answer.requested == opcode
         assert answer.sequence == (self.sequence + 1) & 0xFFFF
         assert answer.to == (255, self.component)
+        if opcode != Opcode.OPEN_FILE_RO:
+            assert answer.session == header.get("session", 0)
         return answer
 
     def open(self, path: str) -> tuple[int, int]:
@@ -285,6 +287,16 @@ def test_sessions_are_few_and_come_back_when_their_client_has_gone(client: Clien
     client.ask(Opcode.READ_FILE, session=0, size=1)
     client.t_us += 2 * SECOND_US
     assert client.open("/top")[0] == 1
+
+
+def test_a_client_may_choose_the_number_of_its_session(client: Client) -> None:
+    (chosen,) = client.send(Opcode.OPEN_FILE_RO, b"/top", session=231)
+    (again,) = client.send(Opcode.OPEN_FILE_RO, b"/files/b", session=231)
+    assert (chosen.session, again.session) == (231, 0)
+    assert client.ask(Opcode.READ_FILE, session=231, size=1).data == b"t"
+    assert client.ask(Opcode.READ_FILE, session=0, size=1).data == b"b"
+    assert client.send(Opcode.LIST_DIRECTORY, b"/", session=77)[0].session == 77
+    assert client.send(Opcode.REMOVE_FILE, b"/top", session=78)[0].session == 78
 
 
 def test_a_reset_closes_the_sessions_of_the_one_who_asks(client: Client) -> None:
