@@ -145,6 +145,11 @@ class Origin:
     altitude: float  # m above mean sea level
 
 
+# PX4's usual place, but at sea level: there "above the sea" and "above the origin" are the same
+# number, which clients confuse.
+SEA_LEVEL = Origin(47.397742, 8.545594, 0.0)
+
+
 @dataclass(frozen=True, slots=True)
 class Home:
     """Where a return leads to."""
@@ -297,6 +302,8 @@ class PlanRequest:
     safe_set: SafeSet
     from_nominal: bool  # start carried over from the running plan, not measured
     tuning: Tuning = ()  # of the planner's configuration
+    # (2,) rad, joints to hold at the nodes; empty: where the arm is is the planner's choice
+    postures: tuple[Vec2, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -54,12 +54,16 @@ def constraint_report(
     )
 
 
-def _root(distance: float, tuning: BarrierTuning) -> float:
+def plain_root(distance: float, alpha: float, slope: float) -> float:
     """S of ``root.py`` without its compiler: called ten times a second on plain floats."""
-    knee = tuning.alpha / (tuning.slope * tuning.slope)
+    knee = alpha / (slope * slope)
     if distance < knee:
-        return tuning.slope * distance
-    return math.sqrt(2.0 * tuning.alpha * (distance - 0.5 * knee))
+        return slope * distance
+    return math.sqrt(2.0 * alpha * (distance - 0.5 * knee))
+
+
+def _root(distance: float, tuning: BarrierTuning) -> float:
+    return plain_root(distance, tuning.alpha, tuning.slope)
 
 
 def _dot(a: Vec3, b: Vec3) -> float:

@@ -75,6 +75,7 @@ class TargetPoints:
     position: Array  # (n + 1, 3) m
     velocity: Array  # (n + 1, 3) m/s
     yaw: Array  # (n + 1,) rad
+    q_arm: Array | None = None  # (n + 1, 2) rad; None: the planner is free to choose
 
 
 class Barrier(Protocol):

@@ -22,7 +22,7 @@ import numpy as np
 from fsw.barriers.soft_rows import TargetPoints
 from fsw.compiled import compiled
 from fsw.model.linearisation import END_EFFECTOR, Linearisation
-from fsw.model.prediction import INPUTS, YAW, Array
+from fsw.model.prediction import INPUTS, Q_ARM, YAW, Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +38,7 @@ class CostWeights:
     # Ours: with base and arm both free to reach a point, nothing in the paper's cost says where
     # to look, and beside walls the vehicle wandered through half a turn.
     yaw: float = 0.05
+    posture: float = 2.0  # on joint angles that a ground station asks for
     inputs: float = 0.02  # on a_d, yaw and joint accelerations alike
     relative_velocity: bool = True  # v_e - v_d in eq 20 instead of the printed v_e
 
@@ -111,6 +112,54 @@ class TrackingCost:
             hessian,
             gradient,
         )
+
+
+class PostureCost:
+    """Ours: joints that are asked for. Body and end-effector can then both be given."""
+
+    def __init__(self, weights: CostWeights) -> None:
+        self._weight = weights.posture
+
+    def add(
+        self,
+        horizon: Linearisation,
+        targets: TargetPoints,
+        guess: Array,
+        hessian: Array,
+        gradient: Array,
+    ) -> float:
+        """See ``Cost``; nothing where no joints are asked for."""
+        if targets.q_arm is None:
+            return 0.0
+        return _add_posture(
+            self._weight,
+            horizon.states[:, Q_ARM : Q_ARM + 2],
+            horizon.model.gamma[:, Q_ARM : Q_ARM + 2],
+            targets.q_arm,
+            guess,
+            hessian,
+            gradient,
+        )
+
+
+@compiled
+def _add_posture(
+    weight: float,
+    q_arm: Array,
+    d_q_arm: Array,
+    wanted: Array,
+    guess: Array,
+    hessian: Array,
+    gradient: Array,
+) -> float:
+    cost = 0.0
+    for i in range(1, q_arm.shape[0]):
+        for joint in range(2):
+            value = q_arm[i, joint] - wanted[i, joint]
+            cost += weight * value * value
+            row = d_q_arm[i, joint]
+            add_square(weight, value, row, INPUTS * i, guess, hessian, gradient)
+    return cost
 
 
 @compiled

@@ -110,6 +110,7 @@ class Planner:
             np.array([target.p_WE for target in request.targets]),
             np.array([target.v_WE for target in request.targets]),
             np.array([target.yaw for target in request.targets]),
+            np.array(request.postures) if request.postures else None,
         )
         if self._config.solver == "slsqp":
             search = self._by_slsqp(problem, start, targets)
@@ -175,6 +176,10 @@ class Planner:
         for target in request.targets:
             if not all(map(math.isfinite, (*target.p_WE, *target.v_WE, target.yaw))):
                 return "a target is not finite"
+        if len(request.postures) not in (0, len(request.targets)):
+            return f"{len(request.postures)} joint targets given for {len(request.targets)} nodes"
+        if not all(math.isfinite(angle) for joints in request.postures for angle in joints):
+            return "a joint target is not finite"
         return None
 
     def _retune(self, tuning: Tuning) -> None:

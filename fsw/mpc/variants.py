@@ -16,13 +16,13 @@ comparison shows (docs/paper-and-us.md).
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from fsw.barriers.hard_set import HardWalls, HardWorkspace
 from fsw.barriers.soft_rows import Barrier
 from fsw.barriers.wall import WallBarrier
 from fsw.barriers.workspace import WorkspaceBarrier
-from fsw.mpc.costs import Cost, TrackingCost
+from fsw.mpc.costs import Cost, PostureCost, TrackingCost
 from fsw.mpc.planner_config import PlannerConfig
 from fsw.mpc.program import SlackPrice
 from fsw.mpc.soft_costs import SoftWallCost, SphereCost
@@ -91,5 +91,6 @@ VARIANTS: dict[str, Callable[[PlannerConfig, SafeSet], Parts]] = {
 
 
 def parts_of(config: PlannerConfig, safe_set: SafeSet) -> Parts:
-    """The parts of the configured controller."""
-    return VARIANTS[config.controller](config, safe_set)
+    """The parts of the configured controller; joints that are asked for are none of its own."""
+    parts = VARIANTS[config.controller](config, safe_set)
+    return replace(parts, costs=(*parts.costs, PostureCost(config.weights)))

@@ -9,6 +9,9 @@ from fsw.control.inner_tuning import InnerTuning
 from fsw.model.airframe import AIRFRAME, Airframe
 from fsw.mpc.planner_config import PlannerConfig, Solver
 from fsw.mpc.variants import VARIANTS
+from fsw.signals import SEA_LEVEL, Origin
+from fsw.vehicle.battery import BatteryModel
+from fsw.vehicle.steering import SteeringLimits
 
 CONTROLLERS = tuple(VARIANTS)
 SOLVERS: tuple[Solver, ...] = ("clarabel", "daqp", "slsqp")
@@ -28,6 +31,9 @@ class FlightLimits:
     landed_speed: float = 0.05  # m/s
     landed_time_us: int = 500_000  # at rest this long
     idle_thrust: float = 0.8  # N a rotor while armed on the ground
+    return_height: float = 2.0  # m above home, on the way back
+    setpoint_timeout_us: int = 500_000  # without a set-point offboard ends
+    station_timeout_us: int = 10_000_000  # without a ground station the vehicle comes home
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +58,9 @@ class FlightConfig:
     tuning: InnerTuning = field(default_factory=InnerTuning)
     limits: FlightLimits = field(default_factory=FlightLimits)
     surroundings: Surroundings = field(default_factory=Surroundings)
+    steering: SteeringLimits = field(default_factory=SteeringLimits)
+    battery: BatteryModel = field(default_factory=BatteryModel)
+    origin: Origin = SEA_LEVEL
     soft: bool = False  # fly an inconsistent configuration all the same, with a warning
     tick_period_us: int = 2_000
     mpc_period_us: int = 100_000

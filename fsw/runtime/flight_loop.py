@@ -29,15 +29,18 @@ from fsw.runtime.planning import (
     plan_input,
     take_answer,
 )
+from fsw.runtime.steering_keeper import SteeringKeeper
 from fsw.signals import (
     STOPPED,
     ActuatorCommand,
+    BatteryState,
     CommandAck,
     ConstraintKind,
     ConstraintReport,
     EndEffectorTarget,
     FlightSnapshot,
     Mode,
+    OffboardReport,
     Plan,
     PlanFailure,
     PlanInput,
@@ -50,8 +53,9 @@ from fsw.signals import (
     TickInputs,
     TickOutputs,
 )
-from fsw.vehicle.commands import Situation
+from fsw.vehicle.battery import drained
 from fsw.vehicle.safety_gate import gate
+from fsw.vehicle.situation import Situation
 
 _STILL = SensorFrame(
     1_000_000,
@@ -76,6 +80,7 @@ class FlightLoop:
         self._brake = Brake(lag)
         self._cascade = Cascade(config.airframe, lag, config.tuning, config.inner, dt)
         self._modes = ModeKeeper(config)
+        self._steering = SteeringKeeper(config)
         self._loop_tube = loop_tube(config)
         self._ticks_per_plan = config.mpc_period_us // config.tick_period_us
 
@@ -103,8 +108,9 @@ class FlightLoop:
         estimate = valid or state.estimate
         texts: list[StatusText] = []
         if inputs.targets or inputs.safe_set is not None:
-            mission = self._receive(state.mission, inputs, now_us, texts)
+            mission = self._receive(state, inputs, now_us, texts)
             state = replace(state, mission=mission)
+        state = self._hear(state, inputs)
         if estimate is None:
             return state, _blind(inputs, texts)
         state = _count_invalid(state, valid)
@@ -119,12 +125,15 @@ class FlightLoop:
         planning_due = index // per_plan != state.index // per_plan
         nominal, plan, u = self._follow_plan(state, inputs.plan, now_us, ticks)
         request, constraints, reference = None, state.constraints, state.reference
+        arming_refusal, battery = state.arming_refusal, state.battery
         if planning_due:
             if state.vehicle.flies and nominal is not None:
-                request, plan = self._ask(state, estimate, nominal, plan, now_us)
+                state, request, plan = self._ask(state, estimate, nominal, plan, now_us)
             target = self._reference(state, now_us)
             constraints = self._constraints(state, estimate, target)
             reference = target if state.vehicle.flies else None
+            arming_refusal = self._modes.arming_refusal(state, estimate)
+            battery = self._battery(state)
         sent, memory, replaced = self._actuate(state, estimate, nominal, u, ticks)
         state = FlightState(
             index,
@@ -140,8 +149,12 @@ class FlightLoop:
             constraints,
             reference,
             state.tuning,
+            state.steer,
+            state.offboard,
+            battery,
+            arming_refusal,
         )
-        snapshot = _snapshot(state, estimate, u, sent)
+        snapshot = _snapshot(state, estimate, u, self._steering.report(state, now_us))
         return state, TickOutputs(sent, snapshot, request, tuple(acks), tuple(texts))
 
     def judge(self, safe_set: SafeSet) -> tuple[Finding, ...]:
@@ -172,19 +185,39 @@ class FlightLoop:
 
     def _receive(
         self,
-        mission: MissionMemory,
+        state: FlightState,
         inputs: TickInputs,
         now_us: int,
         texts: list[StatusText],
     ) -> MissionMemory:
         """Take in targets and a safe set; a new safe set is analysed before it is believed."""
+        mission = state.mission
         stream = merge(mission.stream, inputs.targets, now_us)
-        if inputs.safe_set is None or inputs.safe_set == mission.safe_set:
+        if inputs.safe_set in (None, mission.safe_set, mission.refused_set):
             return replace(mission, stream=stream)
+        assert inputs.safe_set is not None
         findings = self.judge(inputs.safe_set)
         against = refusals(findings)
         texts += [StatusText(SEVERITY_WARNING, text) for text in (*against, *warnings(findings))]
-        return MissionMemory(stream, inputs.safe_set, () if self.config.soft else against)
+        if against and not self.config.soft and state.vehicle.flies:
+            texts.append(StatusText(SEVERITY_WARNING, "safe set refused: the old one is kept"))
+            return replace(mission, stream=stream, refused_set=inputs.safe_set)
+        return MissionMemory(stream, inputs.safe_set, None, () if self.config.soft else against)
+
+    def _hear(self, state: FlightState, inputs: TickInputs) -> FlightState:
+        """Note set-points for now and signs of life of a ground station."""
+        if inputs.ground_station_heard:
+            vehicle = replace(state.vehicle, station_us=inputs.sensors.t_us)
+            state = replace(state, vehicle=vehicle)
+        heard = (inputs.motion, inputs.attitude, inputs.joints) != (None, None, None)
+        if heard or inputs.refused_setpoints:
+            state = replace(state, offboard=self._steering.receive(state.offboard, inputs))
+        return state
+
+    def _battery(self, state: FlightState) -> BatteryState:
+        thrust = state.cascade.commanded.rotor_thrust
+        period = 1e-6 * self.config.mpc_period_us
+        return drained(self.config.battery, state.battery, thrust, period)
 
     def _ask(
         self,
@@ -193,15 +226,20 @@ class FlightLoop:
         nominal: PredictionState,
         plan: PlanMemory,
         now_us: int,
-    ) -> tuple[PlanRequest, PlanMemory]:
+    ) -> tuple[FlightState, PlanRequest, PlanMemory]:
         config = self.config
         apply_us = now_us + config.plan_delay_ticks * config.tick_period_us
-        targets = tuple(
-            self._reference(state, apply_us + node * config.mpc_period_us)
-            for node in range(config.planner.horizon + 1)
-        )
+        steered = self._steering.plan_ahead(state, estimate, apply_us)
+        if steered is not None:
+            state, targets, postures = steered
+        else:
+            postures = ()
+            targets = tuple(
+                self._reference(state, apply_us + node * config.mpc_period_us)
+                for node in range(config.planner.horizon + 1)
+            )
         measured = measured_state(estimate, self._cascade.motion(state.cascade, estimate))
-        return ask(
+        request, plan = ask(
             config,
             self._model,
             self._brake,
@@ -210,8 +248,10 @@ class FlightLoop:
             measured,
             state.mission.safe_set,
             targets,
+            postures,
             now_us,
         )
+        return state, request, plan
 
     def _actuate(
         self,
@@ -252,6 +292,9 @@ class FlightLoop:
         return constraint_report(safe_set, tuning, points, target)
 
     def _reference(self, state: FlightState, t_us: int) -> EndEffectorTarget:
+        steered = self._steering.target(state, t_us)
+        if steered is not None:
+            return steered
         return mode_reference(state.vehicle, state.mission, self.config.limits, t_us)
 
 
@@ -265,7 +308,7 @@ def _snapshot(
     state: FlightState,
     estimate: StateEstimate,
     u: PlanInput,
-    sent: ActuatorCommand,
+    offboard: OffboardReport,
 ) -> FlightSnapshot:
     vehicle, plan = state.vehicle, state.plan
     flies = vehicle.flies and state.nominal is not None
@@ -277,13 +320,17 @@ def _snapshot(
         state.reference,
         state.nominal if flies else None,
         u if flies else None,
-        sent,
+        state.cascade.commanded,
         plan.running,
         plan.status,
         plan.counters,
         state.constraints,
         vehicle.failures,
         vehicle.landed,
+        vehicle.home,
+        state.battery,
+        state.arming_refusal,
+        offboard,
     )
 
 

@@ -10,9 +10,14 @@ from fsw.frozen import dataclass
 from fsw.model.airframe import AIRFRAME
 from fsw.signals import (
     STOPPED,
+    AttitudeSetpoint,
+    BatteryState,
     ConstraintReport,
     EndEffectorTarget,
+    Home,
+    JointSetpoint,
     Mode,
+    MotionSetpoint,
     Plan,
     PlannerCounters,
     PredictionState,
@@ -22,6 +27,9 @@ from fsw.signals import (
     Vec3,
 )
 from fsw.tuning import Tuning
+from fsw.vehicle.offboard import Tilt
+from fsw.vehicle.repeats import Answered
+from fsw.vehicle.steering import Aim, Lead
 
 _NOWHERE: Vec3 = (0.0, 0.0, 0.0)
 
@@ -38,6 +46,9 @@ class VehicleMemory:
     climb: float = 0.0  # m, of a takeoff
     anchor_us: int = 0
     failures: tuple[str, ...] = ()
+    home: Home | None = None
+    station_us: int = -1  # when a ground station was last heard; -1: not since it was given up
+    answered: tuple[Answered, ...] = ()  # each sender's last command
 
     @property
     def armed(self) -> bool:
@@ -51,11 +62,35 @@ class VehicleMemory:
 
 
 @dataclass(frozen=True, slots=True)
+class SteerMemory:
+    """The reference that is steered; there is a lead only in hold, return and offboard."""
+
+    lead: Lead | None = None
+    aim: Aim | None = None
+    waypoints: tuple[Vec3, ...] = ()  # after the aim's place
+
+
+@dataclass(frozen=True, slots=True)
+class OffboardMemory:
+    """Set-points for now, flown or not: the newest ones, and how many there were."""
+
+    motion: MotionSetpoint | None = None
+    attitude: AttitudeSetpoint | None = None
+    joints: JointSetpoint | None = None
+    motion_us: int = -1  # when motion or attitude came
+    joints_us: int = -1
+    accepted: int = 0
+    refused: int = 0
+    tilt: Tilt = field(default_factory=Tilt)
+
+
+@dataclass(frozen=True, slots=True)
 class MissionMemory:
     """What was sent to be flown and to be kept clear of."""
 
     stream: tuple[EndEffectorTarget, ...] = ()
     safe_set: SafeSet = field(default_factory=SafeSet)
+    refused_set: SafeSet | None = None  # announced in flight, and of no use
     refusals: tuple[str, ...] = ()  # why this configuration cannot keep the safe set
 
 
@@ -96,3 +131,7 @@ class FlightState:
     constraints: ConstraintReport = field(default_factory=ConstraintReport)
     reference: EndEffectorTarget | None = None  # in use when last planned
     tuning: Tuning = ()  # in use: what differs from the configuration of the start
+    steer: SteerMemory = field(default_factory=SteerMemory)
+    offboard: OffboardMemory = field(default_factory=OffboardMemory)
+    battery: BatteryState = field(default_factory=BatteryState)
+    arming_refusal: str = ""

@@ -5,7 +5,6 @@ Every function takes a state and returns one; almost every tick it is the same o
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 from fsw.control.cascade import at_rest, in_hover
@@ -14,19 +13,25 @@ from fsw.parameters.flight_config import FlightConfig
 from fsw.runtime.flight_state import FlightState, PlanMemory
 from fsw.runtime.mode_reference import mode_reference
 from fsw.runtime.planning import nominal_at_rest
+from fsw.runtime.steering_keeper import SteeringKeeper
 from fsw.signals import (
     CommandAck,
     CommandRequest,
+    Home,
     Mode,
     StateEstimate,
     StatusText,
     Vec3,
 )
-from fsw.vehicle.commands import Decision, Situation, decide
+from fsw.vehicle.commands import decide
 from fsw.vehicle.faults import RESPONSES, Evidence, Response, detect
+from fsw.vehicle.mode_commands import arming_refusal
 from fsw.vehicle.modes import Event, next_mode
+from fsw.vehicle.repeats import answered_before, remember
+from fsw.vehicle.situation import Decision, Situation
 
-SEVERITY_EMERGENCY, SEVERITY_WARNING, SEVERITY_NOTICE = 0, 4, 5  # MAV_SEVERITY
+# MAV_SEVERITY
+SEVERITY_EMERGENCY, SEVERITY_CRITICAL, SEVERITY_WARNING, SEVERITY_NOTICE = 0, 2, 4, 5
 
 
 def answer(
@@ -35,11 +40,13 @@ def answer(
     """Decide a command; a reason becomes a text for the operator."""
     decision = decide(request, situation)
     if decision.reason:
-        texts.append(StatusText(SEVERITY_WARNING, decision.reason))
-    ack = CommandAck(
-        request.command, decision.result, request.source_system, request.source_component
-    )
-    return ack, decision
+        severity = SEVERITY_CRITICAL if decision.alarming else SEVERITY_WARNING
+        texts.append(StatusText(severity, decision.reason))
+    return _ack(request, decision.result), decision
+
+
+def _ack(request: CommandRequest, result: int) -> CommandAck:
+    return CommandAck(request.command, result, request.source_system, request.source_component)
 
 
 class ModeKeeper:
@@ -47,6 +54,7 @@ class ModeKeeper:
 
     def __init__(self, config: FlightConfig) -> None:
         self._config = config
+        self._steering = SteeringKeeper(config)
 
     def obey(
         self,
@@ -55,30 +63,50 @@ class ModeKeeper:
         requests: tuple[CommandRequest, ...],
         texts: list[StatusText],
     ) -> tuple[FlightState, list[CommandAck]]:
-        """Carry out commands in the order they came."""
+        """Carry out commands in the order they came; a repeated one is answered again only."""
         acks = []
-        limits = self._config.limits
         for request in requests:
-            stream = state.mission.stream
-            ahead = bool(stream) and stream[-1].t_us >= estimate.t_us
-            situation = Situation(
-                mode=state.vehicle.mode,
-                landed=state.vehicle.landed,
-                estimate_valid=state.invalid_ticks == 0,
-                targets_ahead=ahead,
-                standing_unclear=self._standing_unclear(estimate),
-                inconsistent="; ".join(state.mission.refusals),
-                height=-estimate.p_WB[2],
-                climb_range=(limits.airborne_height, limits.takeoff_climb_most),
-            )
-            ack, decision = answer(request, situation, texts)
+            memory = state.vehicle.answered
+            before = answered_before(memory, request, estimate.t_us)
+            if before is not None:
+                acks.append(_ack(request, before.result))
+                continue
+            ack, decision = answer(request, self.situation(state, estimate), texts)
             acks.append(ack)
-            if decision.event is Event.TAKE_OFF:
-                climb = self._climb(request.params[6], estimate)
-                state = replace(state, vehicle=replace(state.vehicle, climb=climb))
-            if decision.event is not None:
-                state = self._change(state, decision.event, estimate, texts)
+            state = self._carry_out(state, decision, estimate, texts)
+            memory = remember(memory, request, ack.result, estimate.t_us)
+            state = replace(state, vehicle=replace(state.vehicle, answered=memory))
         return state, acks
+
+    def situation(self, state: FlightState, estimate: StateEstimate) -> Situation:
+        """What a decision may depend on now."""
+        limits, vehicle, stream = self._config.limits, state.vehicle, state.mission.stream
+        asked = state.steer.aim.joints if state.steer.aim is not None else None
+        return Situation(
+            mode=vehicle.mode,
+            landed=vehicle.landed,
+            estimate_valid=state.invalid_ticks == 0,
+            targets_ahead=bool(stream) and stream[-1].t_us >= estimate.t_us,
+            standing_unclear=self._standing_unclear(estimate),
+            inconsistent="; ".join(state.mission.refusals),
+            setpoint_fresh=self._steering.is_fresh(state, estimate.t_us),
+            position=estimate.p_WB,
+            yaw=estimate.yaw,
+            joints=asked or estimate.q_arm,
+            origin=self._config.origin,
+            home=vehicle.home,
+            safe_set=state.mission.safe_set,
+            climb_range=(limits.airborne_height, limits.takeoff_climb_most),
+            airframe=self._config.airframe,
+        )
+
+    def arming_refusal(self, state: FlightState, estimate: StateEstimate) -> str:
+        """Why the vehicle cannot be armed now, for telemetry; empty if it could be, or is."""
+        if state.vehicle.armed:
+            return ""
+        if state.vehicle.mode is Mode.FAULT:
+            return "terminated: restart the flight software"
+        return arming_refusal(self.situation(state, estimate)) or ""
 
     def mind_faults(
         self, state: FlightState, estimate: StateEstimate, texts: list[StatusText]
@@ -97,6 +125,7 @@ class ModeKeeper:
                 self._config.mpc_period_us,
                 plan.refused,
                 state.output_replaced,
+                state.battery.remaining,
             )
         )
         if not faults and not vehicle.failures:
@@ -121,20 +150,87 @@ class ModeKeeper:
     ) -> FlightState:
         """Mode changes the vehicle makes by itself."""
         now_us, limits, vehicle = estimate.t_us, self._config.limits, state.vehicle
+        if vehicle.home is None:
+            home = Home(estimate.p_WB, estimate.yaw)
+            return replace(state, vehicle=replace(vehicle, home=home))
         if vehicle.mode is Mode.TAKEOFF:
             climb_us = 1e6 * vehicle.climb / limits.climb_speed
             if now_us - vehicle.anchor_us >= climb_us:
-                return self._change(state, Event.CLIMB_DONE, estimate, texts)
+                state = self._change(state, Event.CLIMB_DONE, estimate, texts)
         elif vehicle.mode is Mode.TRAJECTORY:
             stream = state.mission.stream
             if not stream or stream[-1].t_us < now_us:
-                return self._change(state, Event.TRAJECTORY_DONE, estimate, texts)
+                state = self._change(state, Event.TRAJECTORY_DONE, estimate, texts)
+        elif vehicle.mode is Mode.RETURN and self._steering.is_home(state):
+            state = self._change(state, Event.HOME_REACHED, estimate, texts)
+        elif vehicle.mode is Mode.OFFBOARD:
+            state = self._mind_offboard(state, estimate, texts)
         elif vehicle.mode is Mode.LAND:
-            if not self._stands(estimate):
-                return replace(state, vehicle=replace(vehicle, still_since_us=now_us))
-            if now_us - vehicle.still_since_us >= limits.landed_time_us:
-                state = replace(state, vehicle=replace(vehicle, landed=True))
-                return self._change(state, Event.TOUCHED_DOWN, estimate, texts)
+            state = self._mind_touch_down(state, estimate, texts)
+        return self._mind_station(state, estimate, texts)
+
+    def _mind_offboard(
+        self, state: FlightState, estimate: StateEstimate, texts: list[StatusText]
+    ) -> FlightState:
+        if not self._steering.is_fresh(state, estimate.t_us):
+            texts.append(StatusText(SEVERITY_WARNING, "offboard set-points stopped: holding"))
+            return self._change(state, Event.SETPOINTS_LOST, estimate, texts)
+        if state.vehicle.landed:
+            if self._steering.wants_to_rise(state, estimate):
+                return self._lift_off(state, estimate)
+            return state
+        if not (self._stands(estimate) and self._steering.wants_to_sink(state, estimate)):
+            return self._moving(state, estimate)
+        if estimate.t_us - state.vehicle.still_since_us < self._config.limits.landed_time_us:
+            return state
+        return replace(state, vehicle=replace(state.vehicle, landed=True))
+
+    def _mind_touch_down(
+        self, state: FlightState, estimate: StateEstimate, texts: list[StatusText]
+    ) -> FlightState:
+        if not self._stands(estimate):
+            return self._moving(state, estimate)
+        vehicle = state.vehicle
+        if estimate.t_us - vehicle.still_since_us < self._config.limits.landed_time_us:
+            return state
+        state = replace(state, vehicle=replace(vehicle, landed=True))
+        return self._change(state, Event.TOUCHED_DOWN, estimate, texts)
+
+    def _mind_station(
+        self, state: FlightState, estimate: StateEstimate, texts: list[StatusText]
+    ) -> FlightState:
+        """Come home where the ground station that was there is silent for too long."""
+        vehicle = state.vehicle
+        silent_us = estimate.t_us - vehicle.station_us
+        if vehicle.station_us < 0 or silent_us < self._config.limits.station_timeout_us:
+            return state
+        state = replace(state, vehicle=replace(vehicle, station_us=-1))
+        if not vehicle.flies or next_mode(vehicle.mode, Event.LINK_LOST) is None:
+            return state
+        text = f"no ground station for {silent_us * 1e-6:.0f} s: returning"
+        texts.append(StatusText(SEVERITY_WARNING, text))
+        return self._change(state, Event.LINK_LOST, estimate, texts)
+
+    def _carry_out(
+        self,
+        state: FlightState,
+        decision: Decision,
+        estimate: StateEstimate,
+        texts: list[StatusText],
+    ) -> FlightState:
+        if decision.home is not None:
+            state = replace(state, vehicle=replace(state.vehicle, home=decision.home))
+        if decision.event is Event.TAKE_OFF:
+            climb = self._config.limits.takeoff_climb if decision.climb is None else decision.climb
+            state = replace(state, vehicle=replace(state.vehicle, climb=climb))
+        if decision.event is not None:
+            state = self._change(state, decision.event, estimate, texts)
+        if decision.stop:
+            state = self._steering.stop(state, estimate)
+        if decision.goto is not None:
+            state = self._steering.go_to(state, decision.goto, estimate)
+        if decision.joints is not None:
+            state = self._steering.set_joints(state, decision.joints, estimate)
         return state
 
     def _change(
@@ -144,13 +240,11 @@ class ModeKeeper:
         mode = next_mode(before, event)
         if mode is None:
             return state
-        texts.append(
-            StatusText(
-                SEVERITY_NOTICE, f"{state.vehicle.mode.value} to {mode.value}: {event.value}"
-            )
-        )
+        texts.append(StatusText(SEVERITY_NOTICE, f"{before.value} to {mode.value}: {event.value}"))
         anchor, anchor_yaw = self._anchor(state, event, estimate)
-        state = self._take_over(state, event, estimate)
+        if event in (Event.ARM, Event.TAKE_OFF):
+            state = self._take_over(state, event, estimate)
+        steer = self._steering.steer_into(state, mode, event, estimate)
         vehicle = replace(
             state.vehicle,
             mode=mode,
@@ -159,27 +253,32 @@ class ModeKeeper:
             anchor_us=estimate.t_us,
             still_since_us=estimate.t_us,
         )
-        return replace(state, vehicle=vehicle)
+        return replace(state, vehicle=vehicle, steer=steer)
 
     def _take_over(self, state: FlightState, event: Event, estimate: StateEstimate) -> FlightState:
         """Start the fast loops where the vehicle is, when it begins to move or to fly."""
-        if event not in (Event.ARM, Event.TAKE_OFF):
-            return state
         landed = event is Event.ARM and self._stands(estimate)
-        cascade = state.cascade
+        cascade, vehicle = state.cascade, state.vehicle
         if event is Event.ARM:
             airframe = self._config.airframe
             cascade = at_rest(airframe, estimate) if landed else in_hover(airframe, estimate)
+            vehicle = replace(vehicle, home=Home(estimate.p_WB, estimate.yaw))
         plan = PlanMemory(
             since_us=estimate.t_us, next_id=state.plan.next_id, counters=state.plan.counters
         )
         return replace(
             state,
-            vehicle=replace(state.vehicle, landed=landed),
+            vehicle=replace(vehicle, landed=landed),
             nominal=nominal_at_rest(estimate),
             plan=plan,
             cascade=cascade,
         )
+
+    def _lift_off(self, state: FlightState, estimate: StateEstimate) -> FlightState:
+        """Begin to fly in a mode that began on the ground."""
+        state = self._take_over(state, Event.TAKE_OFF, estimate)
+        steer = self._steering.steer_into(state, state.vehicle.mode, Event.TAKE_OFF, estimate)
+        return replace(state, steer=steer)
 
     def _anchor(
         self, state: FlightState, event: Event, estimate: StateEstimate
@@ -189,18 +288,17 @@ class ModeKeeper:
             Event.CLIMB_DONE,
             Event.TRAJECTORY_DONE,
             Event.LAND,
+            Event.HOME_REACHED,
         )
         if goes_on:
-            limits = self._config.limits
-            last = mode_reference(state.vehicle, state.mission, limits, estimate.t_us)
+            last = self._steering.target(state, estimate.t_us) or mode_reference(
+                state.vehicle, state.mission, self._config.limits, estimate.t_us
+            )
             return last.p_WE, last.yaw
         return point_in_flight(estimate, self._config.airframe.link_length)[0], estimate.yaw
 
-    def _climb(self, height: float, estimate: StateEstimate) -> float:
-        """From here to the height a takeoff asks for [m]; the usual climb where it names none."""
-        if not math.isfinite(height):
-            return self._config.limits.takeoff_climb
-        return height + estimate.p_WB[2]
+    def _moving(self, state: FlightState, estimate: StateEstimate) -> FlightState:
+        return replace(state, vehicle=replace(state.vehicle, still_since_us=estimate.t_us))
 
     def _standing_unclear(self, estimate: StateEstimate) -> bool:
         limits, above = self._config.limits, self._height_above_standing(estimate)

@@ -21,6 +21,7 @@ from fsw.signals import (
     PredictionState,
     SafeSet,
     StateEstimate,
+    Vec2,
     Vec3,
 )
 from fsw.vehicle.faults import PLAN_STALE_PERIODS
@@ -142,6 +143,7 @@ def ask(
     measured: PredictionState,
     safe_set: SafeSet,
     targets: tuple[EndEffectorTarget, ...],
+    postures: tuple[Vec2, ...],
     now_us: int,
 ) -> tuple[PlanRequest, PlanMemory]:
     """The question for this period.
@@ -162,7 +164,9 @@ def ask(
     else:
         start = coast(measured, delay * config.tick_period_us * 1e-6)
     apply_us = now_us + delay * config.tick_period_us
-    request = PlanRequest(memory.next_id, apply_us, start, targets, safe_set, from_nominal)
+    request = PlanRequest(
+        memory.next_id, apply_us, start, targets, safe_set, from_nominal, postures=postures
+    )
     counters = memory.counters
     if memory.awaited_id >= 0:  # the last question is given up, not waited for
         counters = replace(counters, fallbacks=counters.fallbacks + 1)

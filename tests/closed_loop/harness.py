@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 from fsw.mpc.planner import Planner
 from fsw.parameters.flight_config import FlightConfig, flight_config
@@ -33,6 +34,7 @@ from sitl.simulation import START_US, STEP_US, Controls, Simulation
 ARM, TAKEOFF, LAND, SET_MODE = 400, 22, 21, 176
 TARGET_PERIOD_US = 100_000
 TARGETS_AHEAD = 20
+STREAM_STEPS = 25
 
 
 def hover(arm_deg: tuple[float, float] | None = None, yaw_deg: float = 0.0) -> Scenario:
@@ -78,6 +80,8 @@ class Flight:
     texts: list[str] = field(default_factory=list)
     results: list[tuple[int, int]] = field(default_factory=list)  # command, MAV_RESULT
     modes: list[Mode] = field(default_factory=list)  # each change
+    # What a ground station sends 20 times a second: fields of TickInputs.
+    streamed: dict[str, Any] = field(default_factory=dict)
     sent: list[ActuatorCommand] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -126,6 +130,8 @@ class Flight:
             safe_set(self.scenario) if self.sim.step == 0 else None,
             tuning=tuning,
         )
+        if self.streamed and self.sim.step % STREAM_STEPS == 0:
+            self.inputs = replace(self.inputs, **self.streamed)
         before = self.mode
         self.state, outputs = self.loop.tick(self.state, self.inputs)
         self._outputs = outputs

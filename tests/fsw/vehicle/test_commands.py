@@ -10,16 +10,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fsw.signals import CommandRequest, Mode
-from fsw.vehicle.commands import (
+from fsw.vehicle.commands import decide
+from fsw.vehicle.modes import Event, next_mode
+from fsw.vehicle.situation import (
     ACCEPTED,
     DENIED,
     TEMPORARILY_REJECTED,
     UNSUPPORTED,
     Decision,
     Situation,
-    decide,
 )
-from fsw.vehicle.modes import Event, next_mode
 
 NAN = math.nan
 ARM, TAKEOFF, LAND, SET_MODE, SHUTDOWN = 400, 22, 21, 176, 246
@@ -47,13 +47,27 @@ def ask(situation: Situation, command: int, *given_params: float) -> Decision:
         (HOLDING, SET_MODE, (1.0, 4.0, 6.0), Event.LAND),
         (HOLDING, SET_MODE, (1.0, 4.0, 11.0), Event.FOLLOW),
         (replace(HOLDING, mode=Mode.TRAJECTORY), SET_MODE, (1.0, 4.0, 3.0), Event.HOLD),
-        (HOLDING, ARM, (0.0, 21196.0), Event.DISARM),
     ],
 )
 def test_a_command_in_order_causes_its_event_whatever_unused_parameters_hold(
     situation: Situation, command: int, params: tuple[float, ...], event: Event
 ) -> None:
     assert ask(situation, command, *params) == Decision(ACCEPTED, event)
+
+
+def test_a_disarm_in_the_air_needs_force_and_is_told_loudly() -> None:
+    decision = ask(HOLDING, ARM, 0.0, 21196.0)
+    assert (decision.result, decision.event, decision.alarming) == (ACCEPTED, Event.DISARM, True)
+    assert "255/190" in decision.reason
+
+
+def test_arming_by_force_says_what_it_ignores_and_never_ignores_the_estimate() -> None:
+    broken = replace(STANDING, inconsistent="the sphere is too small", standing_unclear=True)
+    decision = ask(broken, ARM, 1.0, 21196.0)
+    assert (decision.result, decision.event, decision.alarming) == (ACCEPTED, Event.ARM, True)
+    assert "by force" in decision.reason
+    assert ask(replace(broken, estimate_valid=False), ARM, 1.0, 21196.0).event is None
+    assert ask(STANDING, ARM, 1.0, 21196.0) == Decision(ACCEPTED, Event.ARM)
 
 
 @pytest.mark.parametrize(
@@ -119,7 +133,8 @@ def test_an_unknown_command_is_unsupported(command: int) -> None:
 def test_asking_again_for_what_is_so_is_accepted_and_changes_nothing(
     situation: Situation, command: int, params: tuple[float, ...]
 ) -> None:
-    assert ask(situation, command, *params) == Decision(ACCEPTED)
+    decision = ask(situation, command, *params)
+    assert (decision.result, decision.event, decision.reason) == (ACCEPTED, None, "")
 
 
 def test_shutdown_belongs_to_the_simulator_s_link_alone() -> None:
@@ -133,7 +148,7 @@ def test_shutdown_belongs_to_the_simulator_s_link_alone() -> None:
 def test_a_takeoff_goes_to_a_height_above_where_the_vehicle_stands(
     height: float, accepted: bool
 ) -> None:
-    standing = replace(STANDING, mode=Mode.HOLD, height=0.32)
+    standing = replace(STANDING, mode=Mode.HOLD, position=(0.0, 0.0, -0.32))
     decision = ask(standing, TAKEOFF, *[math.nan] * 6, height)
     assert (decision.event is Event.TAKE_OFF) is accepted
     assert accepted or "height" in decision.reason

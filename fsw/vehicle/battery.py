@@ -1,0 +1,52 @@
+r"""What the battery must be like by now: a model, for there is no sensor.
+
+A rotor that hovers needs the induced power of actuator-disc theory over its figure of merit,
+
+.. math:: P = \frac{1}{\eta} \sqrt{\frac{f^3}{2 \rho A}}
+
+and the voltage is a straight line over the charge, less the drop at the inner resistance.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from fsw.signals import BatteryState, Vec4
+
+_AIR_DENSITY = 1.225  # kg/m^3
+_AS_PER_AH = 3600.0
+
+
+@dataclass(frozen=True, slots=True)
+class BatteryModel:
+    """Four lithium-polymer cells of 10 A h: about a quarter of an hour of hover."""
+
+    capacity: float = 10.0  # A h
+    full: float = 16.8  # V
+    empty: float = 13.6  # V
+    resistance: float = 0.02  # ohm
+    disc_area: float = 0.0507  # m^2, a rotor of 10 inches
+    efficiency: float = 0.55  # figure of merit, motor and controller
+    idle_power: float = 8.0  # W, electronics and arm
+
+
+def drained(model: BatteryModel, state: BatteryState, thrust: Vec4, dt: float) -> BatteryState:
+    """The battery a moment later.
+
+    Args:
+        model: Of the battery.
+        state: Now.
+        thrust: Of each rotor [N].
+        dt: The moment [s].
+    """
+    power = model.idle_power
+    for f in thrust:
+        power += (
+            f * math.sqrt(max(f, 0.0) / (2.0 * _AIR_DENSITY * model.disc_area)) / (model.efficiency)
+        )
+    current = power / max(state.voltage, 1.0)
+    consumed = state.consumed + current * dt / _AS_PER_AH
+    remaining = max(1.0 - consumed / model.capacity, 0.0)
+    at_rest = model.empty + (model.full - model.empty) * remaining
+    return BatteryState(at_rest - model.resistance * current, current, consumed, remaining)

@@ -1,0 +1,58 @@
+"""What a command is decided on, and what a decision is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from fsw.model.airframe import AIRFRAME, Airframe
+from fsw.signals import SEA_LEVEL, Home, Mode, Origin, SafeSet, Vec2, Vec3
+from fsw.vehicle.modes import Event
+
+# MAV_RESULT of MAVLink common.xml.
+ACCEPTED, TEMPORARILY_REJECTED, DENIED, UNSUPPORTED = 0, 1, 2, 3
+
+
+@dataclass(frozen=True, slots=True)
+class Situation:
+    """What a decision may depend on."""
+
+    mode: Mode
+    landed: bool
+    estimate_valid: bool
+    targets_ahead: bool  # the stream holds a point at or after now
+    standing_unclear: bool = False  # too high to stand, too low to be surely in the air
+    inconsistent: str = ""  # why the configuration cannot keep the safe set
+    mission_ready: bool = False  # a mission was uploaded and can be flown from here
+    setpoint_fresh: bool = False  # an offboard set-point came within the last 0.5 s
+    position: Vec3 = (0.0, 0.0, 0.0)  # m, of the body
+    yaw: float = 0.0  # rad
+    joints: Vec2 = (0.0, 0.0)  # rad, asked for last or as they are
+    origin: Origin = SEA_LEVEL
+    home: Home | None = None
+    safe_set: SafeSet = field(default_factory=SafeSet)
+    climb_range: Vec2 = (0.3, 10.0)  # m, of a takeoff
+    airframe: Airframe = AIRFRAME
+
+
+@dataclass(frozen=True, slots=True)
+class Goto:
+    """A place to hold at."""
+
+    p: Vec3  # m, of the body
+    yaw: float | None  # rad; None: as it is
+    speed: float | None  # m/s; None: as usual
+
+
+@dataclass(frozen=True, slots=True)
+class Decision:
+    """Answer to a command: its MAV_RESULT, the event it causes and what goes with it."""
+
+    result: int
+    event: Event | None = None
+    reason: str = ""  # of a refusal, or what the operator must read though it is accepted
+    alarming: bool = False
+    stop: bool = False  # holding already, but perhaps on the way to a place
+    climb: float | None = None  # m, of a takeoff; None: the usual one
+    goto: Goto | None = None
+    joints: Vec2 | None = None  # rad
+    home: Home | None = None
