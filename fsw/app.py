@@ -5,7 +5,7 @@ from __future__ import annotations
 import traceback
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from fsw.arguments import FswOptions
 from fsw.link.flight_logs import FlightLog, flight_logs
@@ -35,6 +35,9 @@ from fsw.runtime.realtime import (
 )
 from fsw.runtime.sim_loop import Ending, FlightEnd, FlightRecord, SimLoop
 from fsw.runtime.timing import GroupTimer
+
+if TYPE_CHECKING:
+    from fsw.parameters.kept_file import Keeping
 
 DONE, NOT_COMPLETED, COULD_NOT_START = 0, 1, 2  # exit codes
 
@@ -97,19 +100,22 @@ class _Session:
             effort=EffortRecord(),
             health=LoopHealth(),
         )
+        keeping = self._keep_parameters(program, directory)
         # Early: a process forked now shares what was compiled, and no thread, port or log.
         settle_memory()
         planner = ProcessPlanner(program.planner, clock.now_us, record.mpc)
+        keeping.start()
         inbox = Inbox()
         log = TlogWriter(directory / "flight.tlog", clock.unix_us())
         sim = SimLink(simulator, inbox, facts)
         context = TelemetryContext(facts, record.health)
-        gcs = GcsLink(ground, inbox, context, log.add, self._services(flight_logs(directory)))
+        services = self._services(program, flight_logs(directory))
+        gcs = GcsLink(ground, inbox, context, log.add, services)
         loop = SimLoop(program, sim, gcs, inbox, record, clock.now_us, self._stop)
         try:
             end = self._fly(loop, sim, program.planner, planner, record)
         finally:
-            for part in (planner, sim, gcs, log):
+            for part in (planner, sim, gcs, log, keeping):
                 part.close()
         setup = report.Setup(options.control.controller, options.control.inner, facts)
         result = report.as_json(setup, end, record, sim.retransmissions)
@@ -117,9 +123,39 @@ class _Session:
         self._told.report("ended", f"fsw: {end.sentence}", ending=end.ending.value)
         return DONE if end.ending is Ending.SHUTDOWN else NOT_COMPLETED
 
-    def _services(self, logs: Sequence[FlightLog]) -> tuple[LinkService, ...]:
+    def _services(
+        self, program: FlightProgram[Any], logs: Sequence[FlightLog]
+    ) -> tuple[LinkService, ...]:
         """What one link serves; called once a link."""
-        return LogService(logs), FtpService(vehicle_files(logs))
+        # Its table of parameters knows all that flies, as the program does.
+        from fsw.link.parameter_service import ParameterService
+
+        parameters = ParameterService(program.parameters)
+        return parameters, LogService(logs), FtpService(vehicle_files(logs))
+
+    def _keep_parameters(self, program: FlightProgram[Any], directory: Path) -> Keeping:
+        """Take over the parameters of the vehicle's file, and say what of it is of no use.
+
+        Raises:
+            CouldNotStart: The file cannot be read or written, or contradicts itself.
+        """
+        from fsw.parameters.kept_file import Keeping, KeptFile
+
+        path, store = self._options.params, program.parameters
+        file = KeptFile(path, directory / "parameters.params", store.defaults)
+        try:
+            keeping = Keeping(store, file)
+        except OSError as error:
+            where = path or directory
+            raise CouldNotStart(f"cannot keep parameters in {where}: {error.strerror}") from None
+        except ValueError as error:
+            raise CouldNotStart(f"parameters in {path} contradict each other: {error}") from None
+        for complaint in keeping.complaints:
+            self._told.report("warning", f"fsw: {path}, {complaint}")
+        if path is not None:
+            text = f"fsw: {keeping.restored} parameters of {path} are not the default"
+            self._told.report("parameters", text)
+        return keeping
 
     def _fly(
         self,

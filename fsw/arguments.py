@@ -54,6 +54,17 @@ def control_choice(arguments: argparse.Namespace) -> ControlChoice:
     )
 
 
+def add_params_argument(parser: argparse.ArgumentParser) -> None:
+    """Declare where parameters are kept."""
+    parser.add_argument(
+        "--params",
+        metavar="FILE",
+        type=Path,
+        help="start with the parameters in FILE and keep changes there (default: the defaults, "
+        "and changes end with the flight)",
+    )
+
+
 @dataclass(frozen=True, slots=True)
 class FswOptions:
     """What the flight software is started with."""
@@ -63,6 +74,7 @@ class FswOptions:
     control: ControlChoice
     out: Path | None  # None: a new directory under runs/
     wait_s: float  # for the simulator
+    params: Path | None  # file that keeps the parameters; None: they end with the flight
     events: str  # "text" for people, "json" for programs
 
 
@@ -81,6 +93,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="where to send telemetry (default %(default)s)",
     )
     add_control_arguments(parser)
+    add_params_argument(parser)
     parser.add_argument(
         "--out", metavar="DIR", type=Path, help="where logs go (default a new one in runs/)"
     )
@@ -107,5 +120,6 @@ def options(arguments: argparse.Namespace) -> FswOptions:
         control=control_choice(arguments),
         out=arguments.out,
         wait_s=arguments.wait,
+        params=arguments.params,
         events=arguments.events,
     )

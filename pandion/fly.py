@@ -78,6 +78,7 @@ def _fsw_arguments(options: FlyOptions, port: int) -> list[str]:
         f"--sim=udp:127.0.0.1:{port}",
         f"--gcs={options.gcs}",
         *options.control.as_arguments(),
+        *([] if options.params is None else [f"--params={options.params}"]),
         f"--out={options.out}",
         "--wait=600",
     ]

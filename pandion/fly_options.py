@@ -6,7 +6,7 @@ import argparse
 from dataclasses import dataclass
 from pathlib import Path
 
-from fsw.arguments import add_control_arguments, control_choice
+from fsw.arguments import add_control_arguments, add_params_argument, control_choice
 from fsw.link.udp_endpoint import parse_address
 from fsw.log.run_directory import new_run_directory
 from fsw.parameters.control_choice import ControlChoice, check
@@ -25,6 +25,7 @@ class FlyOptions:
     realtime: bool
     speed: float | None  # None: as fast as possible
     control: ControlChoice
+    params: Path | None
     gcs: str
     out: Path
     json: str | None
@@ -34,6 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare every option."""
     add_run_arguments(parser)
     add_control_arguments(parser)
+    add_params_argument(parser)
     parser.add_argument(
         "--gcs",
         metavar="udp:HOST:PORT",
@@ -73,6 +75,7 @@ def options(arguments: argparse.Namespace) -> FlyOptions:
         realtime=arguments.realtime,
         speed=arguments.speed,
         control=control,
+        params=arguments.params,
         gcs=arguments.gcs,
         out=_directory(arguments.out, f"{scenario.name}-seed{arguments.seed}"),
         json=arguments.json,

@@ -130,7 +130,7 @@ class Supervisor:
             flown.started = True
         elif kind == "ended" and child.name == "sitl":
             flown.sitl = event["result"]
-        if kind in ("preparing", "warning"):
+        if kind in ("preparing", "warning", "parameters"):
             self._display.say(event["message"])
 
     def _ended(self, child: Child) -> None:

@@ -10,6 +10,7 @@ from fsw.mpc.planner import Planner
 from fsw.mpc.planner_config import Solver
 from fsw.parameters.control_choice import ControlChoice
 from fsw.parameters.flight_config import FlightConfig, flight_config
+from fsw.parameters.store import ParameterStore
 from fsw.runtime import clock
 from fsw.runtime.flight_state import FlightState
 from fsw.runtime.program import FlightProgram
@@ -34,7 +35,8 @@ def flight_software(choice: ControlChoice) -> FlightProgram[Any]:
     planner.warm_up()
     flight = TunedFlight(config)
     flight.warm_up()
-    return FlightProgram(_facts(config), FlightState(), flight.tick, planner)
+    parameters = ParameterStore(config, flight.prepare)
+    return FlightProgram(_facts(config), FlightState(), flight.tick, planner, parameters)
 
 
 def _facts(config: FlightConfig) -> VehicleFacts:

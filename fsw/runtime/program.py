@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Generic, TypeVar
+from typing import TYPE_CHECKING, Generic, TypeVar
 
 from fsw.link.telemetry import VehicleFacts
 from fsw.ports import Planner
 from fsw.signals import TickInputs, TickOutputs
+
+if TYPE_CHECKING:
+    # Its table of parameters imports all that flies, which a refusal need not wait for.
+    from fsw.parameters.store import ParameterStore
 
 State = TypeVar("State")
 
@@ -21,3 +25,4 @@ class FlightProgram(Generic[State]):
     first_state: State
     tick: Callable[[State, TickInputs], tuple[State, TickOutputs]]
     planner: Planner
+    parameters: ParameterStore

@@ -90,6 +90,7 @@ class SimLoop(Generic[State]):
     ) -> None:
         self._program = program
         self._tick_us = program.facts.tick_period_us
+        self._parameters = program.parameters
         self._tick = GuardedTick(program.tick, program.first_state)
         self._sim = sim
         self._gcs = gcs
@@ -179,10 +180,13 @@ class SimLoop(Generic[State]):
             inbox.take_targets(),
             inbox.take_safe_set(),
             stale_us=cycle.release.stale_us,
+            tuning=self._parameters.take_tuning(),
         )
 
     def _think(self, cycle: Cycle) -> None:
         cycle.outputs = self._tick(cycle.inputs)
+        if cycle.inputs.tuning is not None:
+            self._parameters.settle(cycle.outputs.tuning_taken)
 
     def _actuate(self, cycle: Cycle) -> None:
         t_us, outputs = cycle.release.sensors.t_us, cycle.outputs

@@ -15,6 +15,8 @@ import pytest
 from fsw import app
 from fsw.arguments import FswOptions
 from fsw.parameters.control_choice import ControlChoice
+from fsw.parameters.flight_config import FlightConfig
+from fsw.parameters.store import ParameterStore
 from fsw.runtime.program import FlightProgram
 from fsw.signals import Plan, PlanFailure, PlanRequest, TickInputs, TickOutputs
 from tests.link.snapshots import FACTS, outputs_at
@@ -34,7 +36,8 @@ def standing(state: int, inputs: TickInputs) -> tuple[int, TickOutputs]:
 
 
 def load(options: FswOptions) -> FlightProgram[int]:
-    return FlightProgram(FACTS, 0, standing, NoPlanner())
+    parameters = ParameterStore(FlightConfig(), lambda tuning: None)
+    return FlightProgram(FACTS, 0, standing, NoPlanner(), parameters)
 
 
 @pytest.fixture
@@ -50,7 +53,7 @@ def silent() -> Iterator[socket.socket]:
 def options(silent: socket.socket, tmp_path: Path) -> Iterator[FswOptions]:
     handlers = [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)]
     address = f"udp:127.0.0.1:{silent.getsockname()[1]}"
-    yield FswOptions(address, address, CHOICE, tmp_path, 0.4, "text")
+    yield FswOptions(address, address, CHOICE, tmp_path, 0.4, None, "text")
     for number, handler in zip((signal.SIGINT, signal.SIGTERM), handlers, strict=True):
         signal.signal(number, handler)
 

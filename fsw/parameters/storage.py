@@ -1,0 +1,133 @@
+"""Parameters in files: QGroundControl's ``.params`` and MAVProxy's ``.parm``.
+
+Both are text, one parameter a line, and both are read wherever a file is read. What cannot be
+used is passed over with a sentence; what was in a file before it is overwritten for the first
+time is kept beside it, if any of it had to be passed over.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from fsw.parameters.real32 import as_text, nearest_decimal
+from fsw.parameters.registry import BY_NAME
+
+VEHICLE: Final = 1  # MAVLink system of the vehicle
+COMPONENT: Final = 1  # and its autopilot's component
+REAL32: Final = 9  # MAV_PARAM_TYPE
+
+_HEAD: Final = """\
+# Onboard parameters for Vehicle 1
+#
+# Stack: Pandion
+# Vehicle: Multi-Rotor
+#
+# Vehicle-Id Component-Id Name Value Type
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Loaded:
+    """What a file says."""
+
+    values: dict[str, float]  # by name, each within its range
+    complaints: tuple[str, ...]  # a sentence for each line that is of no use
+
+
+def parse(text: str) -> Loaded:
+    """Read either format; a later line for the same parameter wins."""
+    values: dict[str, float] = {}
+    complaints = []
+    for number, line in enumerate(text.splitlines(), start=1):
+        words = line.partition("#")[0].replace(",", " ").split()
+        if not words:
+            continue
+        try:
+            name, value = _entry(words)
+        except ValueError as error:
+            complaints.append(f"line {number} is passed over: {error}")
+        else:
+            values[name] = value
+    return Loaded(values, tuple(complaints))
+
+
+def load(path: Path) -> Loaded:
+    """Read a file.
+
+    Raises:
+        OSError: It cannot be read.
+    """
+    # What is no UTF-8 shows as lines of no use, not as an error.
+    return parse(path.read_text(encoding="utf-8", errors="replace"))
+
+
+def as_params(values: Mapping[str, float]) -> str:
+    """The text of a ``.params`` file."""
+    lines = [
+        f"{VEHICLE}\t{COMPONENT}\t{name}\t{as_text(values[name])}\t{REAL32}\n"
+        for name in sorted(values)
+    ]
+    return _HEAD + "".join(lines)
+
+
+def as_parm(values: Mapping[str, float]) -> str:
+    """The text of a ``.parm`` file."""
+    return "".join(f"{name:<16s} {as_text(values[name])}\n" for name in sorted(values))
+
+
+def save(path: Path, values: Mapping[str, float]) -> None:
+    """Write a file, whole or not at all: whoever reads it meanwhile finds the old one.
+
+    Args:
+        path: ``.parm`` makes it MAVProxy's format, anything else QGroundControl's.
+        values: By name.
+
+    Raises:
+        OSError: It cannot be written; the old one is untouched.
+    """
+    text = as_parm(values) if path.suffix == ".parm" else as_params(values)
+    handle, temporary = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
+    try:
+        with os.fdopen(handle, "w", encoding="utf-8") as file:
+            file.write(text)
+            file.flush()
+            os.fsync(file.fileno())
+        Path(temporary).chmod(0o644)
+        Path(temporary).replace(path)
+    except BaseException:
+        with contextlib.suppress(OSError):
+            Path(temporary).unlink()
+        raise
+    directory = os.open(path.parent, os.O_RDONLY)
+    try:
+        os.fsync(directory)
+    finally:
+        os.close(directory)
+
+
+def _entry(words: list[str]) -> tuple[str, float]:
+    if len(words) == 5:
+        vehicle, component, name, number, _ = words
+        if (vehicle, component) != (str(VEHICLE), str(COMPONENT)):
+            raise ValueError(f"it is for component {vehicle}/{component}")
+    elif len(words) == 2:
+        name, number = words
+    else:
+        raise ValueError("it is no parameter")
+    parameter = BY_NAME.get(name)
+    if parameter is None:
+        raise ValueError(f"{name[:40]} is unknown")
+    try:
+        value = nearest_decimal(float(number))
+    except ValueError:
+        raise ValueError(f"{number[:40]} is no number") from None
+    refusal = parameter.refusal(value)
+    if refusal is not None:
+        raise ValueError(refusal)
+    return name, value

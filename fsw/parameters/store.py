@@ -1,0 +1,198 @@
+"""The values of all parameters, and changes on their way into use.
+
+A change passes four stages: its range is checked at once; its flight loop is designed in a thread,
+because that takes longer than a tick; a tick takes it over or refuses it; and it is written to the
+file, again in the thread, before anybody is told that it holds. One change at a time is under way,
+the others wait, and every link hears of each.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Mapping
+from concurrent.futures import Executor, Future
+from dataclasses import dataclass, field
+from typing import Final
+
+from fsw.parameters.flight_config import FlightConfig
+from fsw.parameters.real32 import nearest_decimal
+from fsw.parameters.registry import BY_NAME, PARAMETERS, Parameter
+from fsw.tuning import Tuning
+
+Prepare = Callable[[Tuning], None]
+"""Makes ready what a tuning needs; raises ValueError where its numbers contradict each other."""
+
+Save = Callable[[Mapping[str, float]], None]
+"""Writes all values down; raises OSError."""
+
+WAITING: Final = 64  # changes; a client sends one at a time and repeats it
+
+
+@dataclass(eq=False, slots=True)
+class Listener:
+    """What one link has not yet told its peers."""
+
+    changed: dict[str, None] = field(default_factory=dict)  # names, in order
+    texts: deque[str] = field(default_factory=lambda: deque(maxlen=WAITING))
+
+
+@dataclass(frozen=True, slots=True)
+class _Change:
+    """One value somebody wants."""
+
+    parameter: Parameter
+    value: float
+    asker: Listener
+
+
+class ParameterStore:
+    """Shared by all links; only what the executor is handed runs outside the loop's thread."""
+
+    def __init__(self, config: FlightConfig, prepare: Prepare) -> None:
+        """Start with the values of a configuration.
+
+        Args:
+            config: What flies before anybody changes it.
+            prepare: Called in the executor's thread.
+        """
+        self.defaults: Final[Mapping[str, float]] = {p.name: p.read(config) for p in PARAMETERS}
+        self._values = dict(self.defaults)
+        self._prepare = prepare
+        self._executor: Executor | None = None
+        self._save: Save | None = None
+        self._listeners: list[Listener] = []
+        self._waiting: deque[_Change] = deque()
+        self._change: _Change | None = None  # the one under way
+        self._job: Future[None] | None = None  # what is being done about it
+        self._offered: Tuning | None = None  # to the tick
+        self._saving = False
+
+    @property
+    def values(self) -> Mapping[str, float]:
+        """Every parameter in use, by name."""
+        return self._values
+
+    def restore(self, values: Mapping[str, float]) -> int:
+        """Take values over before the first tick.
+
+        Args:
+            values: By name, within their ranges.
+
+        Returns:
+            How many are other than the configuration has them.
+
+        Raises:
+            ValueError: They contradict each other.
+        """
+        wanted = self._values | {name: nearest_decimal(value) for name, value in values.items()}
+        tuning = self._tuning(wanted)
+        if tuning:
+            self._prepare(tuning)
+            self._offered = tuning
+        self._values = wanted
+        return len(tuning)
+
+    def open(self, executor: Executor, save: Save) -> None:
+        """Allow changes.
+
+        Args:
+            executor: Of one thread; the store does not end it.
+            save: Called in it after each change.
+        """
+        self._executor, self._save = executor, save
+
+    def listen(self) -> Listener:
+        """One more link that is to be told of changes."""
+        self._listeners.append(Listener())
+        return self._listeners[-1]
+
+    def change(self, name: str, value: float, asker: Listener) -> str | None:
+        """Ask for a value; the asker hears of it whatever comes of it.
+
+        Returns:
+            Why it cannot be, where that is clear at once.
+        """
+        parameter = BY_NAME[name]
+        refusal = parameter.refusal(value)
+        if refusal is None and len(self._waiting) >= WAITING:
+            refusal = f"too many changes at once, {name} is left as it is"
+        if refusal is not None:
+            asker.changed[name] = None
+            return refusal
+        self._waiting.append(_Change(parameter, nearest_decimal(value), asker))
+        return None
+
+    def take_tuning(self) -> Tuning | None:
+        """What the next tick is to take over, if anything; call it every tick, it costs nothing."""
+        if self._job is not None:
+            if not self._job.done():
+                return None
+            self._finish()
+        elif self._change is None and self._waiting and self._executor is not None:
+            self._begin(self._executor)
+        return self._offered
+
+    def settle(self, taken: bool | None) -> None:
+        """Learn what the tick did with the tuning it was given.
+
+        Args:
+            taken: Whether it is in use; None where the tick failed before it came to that.
+        """
+        self._offered = None
+        change = self._change
+        if change is None:
+            return  # the values of the start
+        if taken and self._executor is not None and self._save is not None:
+            self._values[change.parameter.name] = change.value
+            self._saving = True
+            self._job = self._executor.submit(self._save, dict(self._values))
+        else:
+            self._drop(change)
+
+    def _begin(self, executor: Executor) -> None:
+        change = self._waiting.popleft()
+        name = change.parameter.name
+        if self._values[name] == change.value:
+            self._tell(name)
+            return
+        self._change, self._saving = change, False
+        self._job = executor.submit(self._prepare, self._tuning(self._wanted(change)))
+
+    def _finish(self) -> None:
+        """Go on after the thread has done its part."""
+        job, change = self._job, self._change
+        assert job is not None
+        assert change is not None
+        self._job = None
+        error = job.exception()
+        if not self._saving:
+            if error is None:
+                self._offered = self._tuning(self._wanted(change))
+            else:
+                change.asker.texts.append(f"{change.parameter.name} is left as it is: {error}")
+                self._drop(change)
+            return
+        if error is not None:
+            change.asker.texts.append(f"{change.parameter.name} holds until the end only: {error}")
+        self._change = None
+        self._tell(change.parameter.name)
+
+    def _drop(self, change: _Change) -> None:
+        """The asker is shown what holds; nobody else has lost anything."""
+        change.asker.changed[change.parameter.name] = None
+        self._change = None
+
+    def _tell(self, name: str) -> None:
+        for listener in self._listeners:
+            listener.changed[name] = None
+
+    def _wanted(self, change: _Change) -> dict[str, float]:
+        return self._values | {change.parameter.name: change.value}
+
+    def _tuning(self, values: Mapping[str, float]) -> Tuning:
+        """What differs from the configuration of the start."""
+        return tuple(
+            (p.path, values[p.name] * p.scale)
+            for p in PARAMETERS
+            if values[p.name] != self.defaults[p.name]
+        )

@@ -1,0 +1,187 @@
+"""Parameter files: both formats, whole or not at all, nothing lost."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pymavlink.mavparm import MAVParmDict
+
+from fsw.parameters import storage
+from fsw.parameters.flight_config import FlightConfig
+from fsw.parameters.kept_file import Keeping, KeptFile
+from fsw.parameters.real32 import nearest_decimal
+from fsw.parameters.registry import BY_NAME, PARAMETERS
+from fsw.parameters.storage import as_params, as_parm, load, parse, save
+from fsw.parameters.store import ParameterStore
+from fsw.tuning import Tuning
+from tests.fsw.parameters.test_store import ticks
+
+DEFAULTS = {parameter.name: parameter.default for parameter in PARAMETERS}
+
+
+def by_mavproxy(path: Path) -> dict[str, float]:
+    """What pymavlink's reader, which MAVProxy uses, makes of a file."""
+    read = MAVParmDict()
+    with contextlib.redirect_stdout(io.StringIO()) as said:
+        assert read.load(str(path), use_excludes=False)
+    assert "Invalid" not in said.getvalue()
+    return dict(read)
+
+
+@st.composite
+def value_sets(draw: st.DrawFn) -> dict[str, float]:
+    chosen = draw(st.lists(st.sampled_from(PARAMETERS), unique=True, min_size=1))
+    return {
+        p.name: nearest_decimal(draw(st.floats(p.least, p.most, width=64)))
+        for p in chosen
+        if p.refusal(nearest_decimal(p.least)) is None
+    }
+
+
+@given(value_sets())
+@settings(max_examples=50, deadline=None)
+def test_both_formats_bring_every_value_back(values: dict[str, float]) -> None:
+    inside = {n: v for n, v in values.items() if BY_NAME[n].refusal(v) is None}
+    for text in (as_params(inside), as_parm(inside)):
+        loaded = parse(text)
+        assert loaded.values == inside
+        assert loaded.complaints == ()
+
+
+def test_mavproxy_reads_what_we_write(tmp_path: Path) -> None:
+    path = tmp_path / "vehicle.parm"
+    save(path, DEFAULTS)
+    assert by_mavproxy(path) == pytest.approx(DEFAULTS)
+
+
+def test_we_read_what_mavproxy_writes_and_nothing_has_changed(tmp_path: Path) -> None:
+    """MAVProxy keeps six decimals."""
+    written = MAVParmDict()
+    written.update(DEFAULTS)
+    path = tmp_path / "mav.parm"
+    written.save(str(path))
+    assert load(path).values == DEFAULTS
+
+
+def test_we_read_what_qgroundcontrol_writes() -> None:
+    """Its lines: tabs, full precision of the REAL32, integers without a point."""
+    text = (
+        "# Onboard parameters for Vehicle 1\n#\n# Vehicle-Id Component-Id Name Value Type\n"
+        "1\t1\tPID_YAW_P\t5\t9\n1\t1\tWALL_LAMBDA\t0.330000013113021851\t9\n"
+    )
+    assert parse(text).values == {"PID_YAW_P": 5.0, "WALL_LAMBDA": 0.33}
+
+
+def test_a_params_file_has_qgroundcontrol_s_columns() -> None:
+    (line,) = [row for row in as_params({"PID_YAW_P": 5.5}).splitlines() if row[0] != "#"]
+    assert line.split("\t") == ["1", "1", "PID_YAW_P", "5.5", "9"]
+
+
+@pytest.mark.parametrize(
+    ("line", "why"),
+    [
+        ("1\t1\tNOT_OURS\t1\t9", "NOT_OURS is unknown"),
+        ("PID_YAW_P five", "five is no number"),
+        ("PID_YAW_P nan", "PID_YAW_P is to be 0..50, nan is refused"),
+        ("PID_YAW_P inf", "inf is refused"),
+        ("PID_YAW_P 1e9", "1e+09 is refused"),
+        ("1\t154\tPID_YAW_P\t1\t9", "it is for component 1/154"),
+        ("garbage", "it is no parameter"),
+        ("\x00\ufffd\x1b[2J a b", "it is no parameter"),
+        ("PID_YAW_P 0x10", "0x10 is no number"),
+    ],
+)
+def test_a_line_of_no_use_is_passed_over_with_a_sentence(line: str, why: str) -> None:
+    loaded = parse(f"# a comment\nPID_YAW_D 3 # kept\n{line}\n\nPID_YAW_I,1\n")
+    assert loaded.values == {"PID_YAW_D": 3.0, "PID_YAW_I": 1.0}
+    (complaint,) = loaded.complaints
+    assert complaint.startswith("line 3 is passed over: ")
+    assert why in complaint
+
+
+@given(st.text())
+def test_no_text_raises(text: str) -> None:
+    loaded = parse(text)
+    assert all("\n" not in complaint for complaint in loaded.complaints)
+
+
+def test_a_file_that_is_no_text_is_read_as_lines_of_no_use(tmp_path: Path) -> None:
+    path = tmp_path / "noise.params"
+    path.write_bytes(bytes(range(256)))
+    assert load(path).values == {}
+
+
+def test_a_write_that_fails_leaves_the_old_file_whole(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "vehicle.params"
+    save(path, {"PID_YAW_P": 5.0})
+
+    def power_cut(handle: int) -> None:
+        raise OSError("power cut")
+
+    monkeypatch.setattr(storage.os, "fsync", power_cut)
+    with pytest.raises(OSError, match="power cut"):
+        save(path, {"PID_YAW_P": 6.0})
+    assert load(path).values == {"PID_YAW_P": 5.0}
+    assert [file.name for file in tmp_path.iterdir()] == ["vehicle.params"]
+
+
+def keeping(path: Path | None, tmp_path: Path) -> tuple[ParameterStore, Keeping]:
+    store = ParameterStore(FlightConfig(), lambda tuning: None)
+    kept = Keeping(store, KeptFile(path, tmp_path / "record.params", store.defaults))
+    kept.start()
+    return store, kept
+
+
+def settled(store: ParameterStore, name: str, value: float) -> list[Tuning]:
+    """Change a value and wait until it is written."""
+    asker = store.listen()
+    assert store.change(name, value, asker) is None
+    given: list[Tuning] = []
+    while not asker.changed:
+        given += ticks(store, 1)
+    return given
+
+
+def test_a_change_outlives_a_restart(tmp_path: Path) -> None:
+    path = tmp_path / "vehicle.params"
+    store, kept = keeping(path, tmp_path)
+    settled(store, "PID_YAW_P", 5.0)
+    kept.close()
+    assert load(path).values == {"PID_YAW_P": 5.0}, "only what differs is the vehicle's own"
+    assert load(tmp_path / "record.params").values == {**DEFAULTS, "PID_YAW_P": 5.0}
+    again, kept = keeping(path, tmp_path)
+    assert kept.restored == 1
+    assert again.values["PID_YAW_P"] == 5.0
+    kept.close()
+
+
+def test_without_a_file_a_change_is_on_record_and_gone(tmp_path: Path) -> None:
+    store, kept = keeping(None, tmp_path)
+    settled(store, "PID_YAW_P", 5.0)
+    kept.close()
+    assert load(tmp_path / "record.params").values["PID_YAW_P"] == 5.0
+    again, kept = keeping(None, tmp_path)
+    assert again.values == DEFAULTS
+    kept.close()
+
+
+def test_what_could_not_be_used_is_not_lost_when_the_file_is_written(tmp_path: Path) -> None:
+    path = tmp_path / "vehicle.params"
+    path.write_text("PID_YAW_P 5\nOF_ANOTHER_AGE 7\n")
+    _, kept = keeping(path, tmp_path)
+    assert kept.complaints == ("line 2 is passed over: OF_ANOTHER_AGE is unknown",)
+    kept.close()
+    assert load(path).values == {"PID_YAW_P": 5.0}
+    assert "OF_ANOTHER_AGE 7" in (tmp_path / "vehicle.params.old").read_text()
+
+
+def test_a_file_that_cannot_be_written_is_noticed_before_the_flight(tmp_path: Path) -> None:
+    with pytest.raises(OSError, match="nowhere"):
+        keeping(tmp_path / "nowhere" / "vehicle.params", tmp_path)
