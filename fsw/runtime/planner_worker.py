@@ -21,7 +21,9 @@ from fsw.runtime.process_link import PeerGone
 from fsw.runtime.timing import GroupTimer
 from fsw.signals import Plan, PlanFailure, PlanRequest
 
-PATIENCE_US: Final = 1_000_000  # a worker silent for so long is stuck: it is killed and replaced
+PATIENCE_US: Final = (
+    500_000  # the bound of a solve in time: a silent worker is killed, and replaced
+)
 _FAREWELL_S: Final = 0.5
 
 
