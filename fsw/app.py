@@ -8,10 +8,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fsw.arguments import FswOptions
+from fsw.link import link_report
+from fsw.link.build_links import build_links
 from fsw.link.flight_logs import FlightLog, flight_logs
 from fsw.link.ftp_service import FtpService
-from fsw.link.gcs_link import GcsLink
 from fsw.link.inbox import Inbox
+from fsw.link.link_choice import AUTOPILOTS, addresses
 from fsw.link.log_service import LogService
 from fsw.link.service import LinkService
 from fsw.link.sim_link import Pacing, SimLink
@@ -88,7 +90,8 @@ class _Session:
 
     def run(self) -> int:
         options = self._options
-        simulator, ground = parse_address(options.sim), parse_address(options.gcs)
+        simulator = parse_address(options.sim)
+        addresses(options.links)  # what is no address is refused before a minute of compiling
         directory = _output_directory(options.out)
         self._told.report(
             "preparing", "fsw: preparing (the first start compiles, which takes a minute)"
@@ -106,19 +109,25 @@ class _Session:
         planner = ProcessPlanner(program.planner, clock.now_us, record.mpc)
         keeping.start()
         inbox = Inbox()
-        log = TlogWriter(directory / "flight.tlog", clock.unix_us())
+        start_us = clock.unix_us()
+        log = TlogWriter(directory / "flight.tlog", start_us)
         sim = SimLink(simulator, inbox, facts)
-        context = TelemetryContext(facts, record.health)
-        services = self._services(program, flight_logs(directory))
-        gcs = GcsLink(ground, inbox, context, log.add, services)
-        loop = SimLoop(program, sim, gcs, inbox, record, clock.now_us, self._stop)
+        autopilot = AUTOPILOTS[options.links.autopilot]
+        context = TelemetryContext(facts, record.health, autopilot, start_unix_us=start_us)
+        logs = flight_logs(directory)
+        clocks = (clock.now_us, clock.unix_us)
+        ground = build_links(
+            options.links, inbox, context, clocks, log.add, lambda: self._services(program, logs)
+        )
+        loop = SimLoop(program, sim, ground, inbox, record, clock.now_us, self._stop)
         try:
             end = self._fly(loop, sim, program.planner, planner, record)
         finally:
-            for part in (planner, sim, gcs, log, keeping):
+            for part in (planner, sim, ground, log, keeping):
                 part.close()
         setup = report.Setup(options.control.controller, options.control.inner, facts)
         result = report.as_json(setup, end, record, sim.retransmissions)
+        result |= link_report.as_json(ground, inbox)
         report.write(directory / "fsw.json", result)
         self._told.report("ended", f"fsw: {end.sentence}", ending=end.ending.value)
         return DONE if end.ending is Ending.SHUTDOWN else NOT_COMPLETED

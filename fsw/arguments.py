@@ -6,6 +6,7 @@ import argparse
 from dataclasses import dataclass
 from pathlib import Path
 
+from fsw.link.link_choice import AUTOPILOTS, LinkChoice
 from fsw.parameters.control_choice import ControlChoice
 
 
@@ -65,12 +66,57 @@ def add_params_argument(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_link_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the links to the ground."""
+    default = LinkChoice()
+    parser.add_argument(
+        "--gcs",
+        metavar="udp:HOST:PORT",
+        default=default.gcs,
+        help="ground station: where telemetry goes (default %(default)s)",
+    )
+    parser.add_argument(
+        "--api",
+        metavar="udp:HOST:PORT",
+        default=default.api,
+        help="program, such as one with MAVSDK, or none (default %(default)s)",
+    )
+    parser.add_argument(
+        "--allow-remote",
+        action="store_true",
+        help="hear other machines even while telemetry goes to this one",
+    )
+    parser.add_argument(
+        "--autopilot",
+        choices=tuple(AUTOPILOTS),
+        default=default.autopilot,
+        help="what the vehicle says it is (default %(default)s)",
+    )
+    parser.add_argument(
+        "--keys",
+        metavar="DIR",
+        type=Path,
+        help="where signing keys are kept (default ~/.local/state/pandion)",
+    )
+
+
+def link_choice(arguments: argparse.Namespace) -> LinkChoice:
+    """The links to the ground, as one value."""
+    return LinkChoice(
+        gcs=arguments.gcs,
+        api=arguments.api,
+        allow_remote=arguments.allow_remote,
+        autopilot=arguments.autopilot,
+        keys=arguments.keys,
+    )
+
+
 @dataclass(frozen=True, slots=True)
 class FswOptions:
     """What the flight software is started with."""
 
     sim: str  # udp:HOST:PORT of the simulator
-    gcs: str  # udp:HOST:PORT of the ground station
+    links: LinkChoice
     control: ControlChoice
     out: Path | None  # None: a new directory under runs/
     wait_s: float  # for the simulator
@@ -86,12 +132,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="udp:127.0.0.1:4560",
         help="where the simulator listens (default %(default)s)",
     )
-    parser.add_argument(
-        "--gcs",
-        metavar="udp:HOST:PORT",
-        default="udp:127.0.0.1:14550",
-        help="where to send telemetry (default %(default)s)",
-    )
+    add_link_arguments(parser)
     add_control_arguments(parser)
     add_params_argument(parser)
     parser.add_argument(
@@ -116,7 +157,7 @@ def options(arguments: argparse.Namespace) -> FswOptions:
     """The options as one value."""
     return FswOptions(
         sim=arguments.sim,
-        gcs=arguments.gcs,
+        links=link_choice(arguments),
         control=control_choice(arguments),
         out=arguments.out,
         wait_s=arguments.wait,

@@ -122,6 +122,21 @@ def layout_of(message_id: int) -> Layout:
     return _LAYOUTS[message_id]
 
 
+def announcing_signature(frame: bytes) -> bytes:
+    """Mark an unsigned frame of :class:`FrameWriter` as signed; the signature is to follow it.
+
+    The flag is part of what the checksum covers, so that is renewed.
+    """
+    layout = _LAYOUTS[int.from_bytes(frame[7:10], "little")]
+    body = b"%b%c%b" % (frame[1:2], _SIGNED, frame[3:-_CHECKSUM_SIZE])
+    return b"\xfd%b%b" % (body, checksum(body + layout.crc_extra).to_bytes(2, "little"))
+
+
+def is_signed(frame: bytes) -> bool:
+    """Whether the bytes of a whole frame end in a signature."""
+    return frame[2] == _SIGNED
+
+
 def split(datagram: bytes, losses: Losses | None = None) -> Iterator[Frame]:
     """Yield the valid frames of one datagram, in order; see ``cut``."""
     return (frame for frame, _ in cut(datagram, losses))

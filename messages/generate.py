@@ -2,7 +2,9 @@
 
 Run by the build hook for every wheel and editable install, and by hand after an edit of the XML:
 ``python -m messages.generate``. The definitions that the XML includes come from the installed
-pymavlink, so the same pymavlink always gives the same bytes.
+pymavlink, so the same pymavlink always gives the same bytes. The standard modes (AVAILABLE_MODES,
+CURRENT_MODE), which MAVLink has in common.xml by now, still wait in pymavlink's development.xml:
+the module carries that as well, and tests pin the three messages.
 """
 
 import contextlib
@@ -15,6 +17,7 @@ from pathlib import Path
 
 DEFINITION = Path(__file__).with_name("pandion.xml")
 GENERATED = Path(__file__).with_name("dialect.py")
+_BESIDE = "development.xml"
 
 
 class GenerationError(RuntimeError):
@@ -42,7 +45,7 @@ def generate(
         source = Path(folder, definition.name)
         shutil.copy(definition, source)
         module = source.with_suffix(destination.suffix)
-        _run_mavgen(source, module, language)
+        _run_mavgen([source, Path(folder, _BESIDE)], module, language)
         module.replace(destination)
 
 
@@ -58,7 +61,7 @@ def pymavlink_definitions() -> Path:
     return Path(spec.origin).parent / "dialects" / "v20"
 
 
-def _run_mavgen(source: Path, module: Path, language: str) -> None:
+def _run_mavgen(sources: list[Path], module: Path, language: str) -> None:
     from pymavlink.generator import mavgen, mavparse
 
     options = mavgen.Opts(
@@ -67,7 +70,7 @@ def _run_mavgen(source: Path, module: Path, language: str) -> None:
     chatter = io.StringIO()
     with contextlib.redirect_stdout(chatter), contextlib.redirect_stderr(chatter):
         try:
-            accepted = mavgen.mavgen(options, [str(source)])
+            accepted = mavgen.mavgen(options, [str(source) for source in sources])
         except SystemExit as refusal:  # mavgen's way to report an XML that breaks the schema
             accepted = False
             print(refusal.code, file=chatter)
@@ -75,7 +78,7 @@ def _run_mavgen(source: Path, module: Path, language: str) -> None:
             accepted = False
             print(refusal, file=chatter)
     if not accepted or not module.exists():
-        raise GenerationError(f"mavgen refused {source.name}:\n{chatter.getvalue().strip()}")
+        raise GenerationError(f"mavgen refused {sources[0].name}:\n{chatter.getvalue().strip()}")
 
 
 if __name__ == "__main__":

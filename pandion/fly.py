@@ -53,8 +53,8 @@ def _banner(options: FlyOptions, display: Display) -> None:
         f"Pandion {version()}: {options.scenario_name}, seed {options.seed}, "
         f"{length}, {options.control.controller} controller, {pacing}"
     )
-    port = parse_address(options.gcs)[1]
-    display.say(f"telemetry to {options.gcs}: QGroundControl connects on UDP {port}")
+    port = parse_address(options.links.gcs)[1]
+    display.say(f"telemetry to {options.links.gcs}: QGroundControl connects on UDP {port}")
     display.say(f"logs in {options.out}")
 
 
@@ -76,7 +76,7 @@ def _sitl_arguments(options: FlyOptions) -> list[str]:
 def _fsw_arguments(options: FlyOptions, port: int) -> list[str]:
     return [
         f"--sim=udp:127.0.0.1:{port}",
-        f"--gcs={options.gcs}",
+        *options.links.as_arguments(),
         *options.control.as_arguments(),
         *([] if options.params is None else [f"--params={options.params}"]),
         f"--out={options.out}",

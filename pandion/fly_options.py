@@ -6,8 +6,14 @@ import argparse
 from dataclasses import dataclass
 from pathlib import Path
 
-from fsw.arguments import add_control_arguments, add_params_argument, control_choice
-from fsw.link.udp_endpoint import parse_address
+from fsw.arguments import (
+    add_control_arguments,
+    add_link_arguments,
+    add_params_argument,
+    control_choice,
+    link_choice,
+)
+from fsw.link.link_choice import LinkChoice, addresses
 from fsw.log.run_directory import new_run_directory
 from fsw.parameters.control_choice import ControlChoice, check
 from sitl.arguments import add_run_arguments
@@ -26,7 +32,7 @@ class FlyOptions:
     speed: float | None  # None: as fast as possible
     control: ControlChoice
     params: Path | None
-    gcs: str
+    links: LinkChoice
     out: Path
     json: str | None
 
@@ -36,12 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_run_arguments(parser)
     add_control_arguments(parser)
     add_params_argument(parser)
-    parser.add_argument(
-        "--gcs",
-        metavar="udp:HOST:PORT",
-        default="udp:127.0.0.1:14550",
-        help="where telemetry goes (default %(default)s)",
-    )
+    add_link_arguments(parser)
     parser.add_argument(
         "--out", metavar="DIR", type=Path, help="where logs go (default a new one in runs/)"
     )
@@ -54,13 +55,14 @@ def options(arguments: argparse.Namespace) -> FlyOptions:
     Raises:
         ValueError: There is no such controller, inner loop, lambda or solver.
         ScenarioError: There is no such scenario.
-        LinkError: The ground station's address is not one.
+        LinkError: An address of a link is none.
         OSError: The directory for the logs cannot be made.
     """
     control = control_choice(arguments)
     check(control)
     scenario = load_scenario(arguments.scenario)
-    parse_address(arguments.gcs)
+    links = link_choice(arguments)
+    addresses(links)
     if arguments.json not in (None, "-") and Path(arguments.json).is_dir():
         raise IsADirectoryError(f"cannot write {arguments.json}: it is a directory")
     if arguments.json not in (None, "-") and not Path(arguments.json).parent.is_dir():
@@ -76,7 +78,7 @@ def options(arguments: argparse.Namespace) -> FlyOptions:
         speed=arguments.speed,
         control=control,
         params=arguments.params,
-        gcs=arguments.gcs,
+        links=links,
         out=_directory(arguments.out, f"{scenario.name}-seed{arguments.seed}"),
         json=arguments.json,
     )

@@ -13,6 +13,7 @@ from typing import Final
 from fsw.signals import Origin, Vec3
 
 EARTH_RADIUS: Final = 6_371_000.0  # m
+DEFAULT_ORIGIN: Final = Origin(47.397742, 8.545594, 0.0)  # where PX4's simulation flies
 
 
 def to_local(origin: Origin, latitude: float, longitude: float, altitude: float) -> Vec3:

@@ -9,11 +9,10 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from fsw.link.service import WireValues
 from fsw.link.telemetry import GroupTiming, TelemetryContext
 from fsw.model.arm_kinematics import point_in_flight
 from fsw.signals import FlightSnapshot, Vec2, Vec4
-
-WireValues = tuple[float | bytes, ...]
 
 _LOCAL_NED: Final = 1  # MAV_FRAME
 _MAX_CONSTRAINTS: Final = 16

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import Final
 
+from fsw.link.service import WireValues
 from fsw.signals import ActuatorCommand, CommandAck, StatusText
-
-WireValues = tuple[float | bytes, ...]
 
 _ARMED: Final = 128  # MAV_MODE_FLAG
 _CUSTOM_MODE: Final = 1

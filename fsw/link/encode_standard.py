@@ -12,14 +12,11 @@ from typing import Final
 from fsw.control.attitude import attitude_reference
 from fsw.geometry.rotation import euler_zyx, quaternion_from_matrix
 from fsw.link.px4_mode import custom_mode
+from fsw.link.service import WireValues
 from fsw.link.telemetry import TelemetryContext
 from fsw.signals import FlightSnapshot, Mode, Vec3, Vec4
-from fsw.vehicle.faults import Fault
-
-WireValues = tuple[float | bytes, ...]
 
 _QUADROTOR: Final = 2  # MAV_TYPE
-_PX4: Final = 12  # MAV_AUTOPILOT
 _ARMED: Final = 128  # MAV_MODE_FLAG
 _GUIDED: Final = 8
 _STABILISED: Final = 16
@@ -29,29 +26,11 @@ _MAVLINK_VERSION: Final = 3
 _LOCAL_NED: Final = 1  # MAV_FRAME
 _ON_GROUND, _IN_AIR, _TAKEOFF, _LANDING = 1, 2, 3, 4  # MAV_LANDED_STATE
 _RATES_IGNORED: Final = 0x07  # ATTITUDE_TARGET_TYPEMASK
-_UNKNOWN_CURRENT: Final = -1
-_UNKNOWN_VOLTAGE: Final = 0xFFFF
 _U32: Final = 0xFFFFFFFF
 
-# MAV_SYS_STATUS_SENSOR bits of what this vehicle has.
-_GYRO, _ACCELEROMETER, _EXTERNAL_POSE = 0x1, 0x2, 0x80
-_RATE_CONTROL, _ATTITUDE, _YAW, _HEIGHT, _POSITION = 0x400, 0x800, 0x1000, 0x2000, 0x4000
-_MOTORS, _AHRS, _PREARM = 0x8000, 0x200000, 0x10000000
-_SENSING: Final = _GYRO | _ACCELEROMETER | _EXTERNAL_POSE | _AHRS
-_CONTROL: Final = _RATE_CONTROL | _ATTITUDE | _YAW | _HEIGHT | _POSITION
-_PRESENT: Final = _SENSING | _CONTROL | _MOTORS | _PREARM
-# Which subsystem an operator should look at; any fault also forbids arming.
-_SUSPECT: Final[dict[str, int]] = {
-    Fault.PLAN_REFUSED.value: 0,
-    Fault.PLAN_STALE.value: _POSITION | _HEIGHT,
-    Fault.OUTPUT_NOT_FINITE.value: _MOTORS,
-    Fault.ESTIMATE_INVALID.value: _AHRS | _EXTERNAL_POSE,
-    Fault.TILT_LOST.value: _ATTITUDE | _RATE_CONTROL,
-}
 
-
-def heartbeat(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues:
-    """HEARTBEAT as PX4 would send it."""
+def heartbeat(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues:
+    """HEARTBEAT as PX4 would send it, under whatever autopilot's name."""
     base_mode = _CUSTOM_MODE | _STABILISED | _GUIDED | (_ARMED if snapshot.armed else 0)
     if snapshot.mode is Mode.FAULT:
         status = _TERMINATED
@@ -62,32 +41,10 @@ def heartbeat(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues:
     return (
         custom_mode(snapshot.mode),
         _QUADROTOR,
-        _PX4,
+        context.autopilot,
         base_mode,
         status,
         _MAVLINK_VERSION,
-    )
-
-
-def sys_status(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues:
-    """SYS_STATUS: load of the loop, and health by subsystem."""
-    health = _PRESENT
-    for failure in snapshot.failures:
-        health &= ~(_SUSPECT.get(failure, 0) | _PREARM)
-    enabled = _PRESENT if snapshot.armed else _PRESENT & ~(_CONTROL | _MOTORS)
-    load = round(1000 * min(context.health.inner.load + context.health.mpc.load, 1.0))
-    return (
-        _PRESENT,
-        enabled,
-        health,
-        load,
-        _UNKNOWN_VOLTAGE,
-        _UNKNOWN_CURRENT,
-        0,
-        0,
-        *(0, 0, 0, 0),
-        -1,
-        *(0, 0, 0),
     )
 
 
@@ -96,6 +53,11 @@ def extended_sys_state(snapshot: FlightSnapshot, _: TelemetryContext) -> WireVal
     if snapshot.landed or not snapshot.armed:
         return (0, _ON_GROUND)
     return (0, {Mode.TAKEOFF: _TAKEOFF, Mode.LAND: _LANDING}.get(snapshot.mode, _IN_AIR))
+
+
+def system_time(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues:
+    """SYSTEM_TIME: the wall time of the start plus sensor time, as in the log."""
+    return (context.start_unix_us + snapshot.t_us, _boot_ms(snapshot.t_us))
 
 
 def attitude(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues:

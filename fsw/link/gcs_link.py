@@ -1,4 +1,4 @@
-"""The link to ground stations: telemetry out, commands in.
+"""One link to the ground: telemetry out, commands in, services both ways.
 
 Nothing that arrives here can raise, and nothing is kept between datagrams but what a valid frame
 said.
@@ -6,28 +6,34 @@ said.
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Final
 
 from fsw.link import encode_replies, message_ids
 from fsw.link.dispatch import Dispatch
 from fsw.link.inbox import Inbox
-from fsw.link.message_ids import AUTOPILOT, PANDION, SYSTEM_ID
+from fsw.link.link_commands import LinkCommands
+from fsw.link.message_ids import AUTOPILOT
+from fsw.link.outbox import Outbox, packed
 from fsw.link.peers import Peers
-from fsw.link.service import LinkService, Outgoing, WireValues
-from fsw.link.streams import HEARTBEAT, STREAMS, Stream, schedule
+from fsw.link.service import LinkService
+from fsw.link.signing import Signing, Verdict
+from fsw.link.signing_setup import set_up_signing
+from fsw.link.stream_rates import StreamRates
+from fsw.link.streams import AT_ONCE, HEARTBEAT, STREAMS, Stream
 from fsw.link.telemetry import TelemetryContext
 from fsw.link.udp_endpoint import Address, OpenEndpoint
-from fsw.signals import CommandAck, FlightSnapshot, Mode, StatusText, TickOutputs
-from messages.frames import FrameWriter, Losses, cut
+from fsw.ports import Clock
+from fsw.signals import CommandAck, FlightSnapshot, TickOutputs
+from messages.frames import Frame, Losses, cut
 
 RecordFrame = Callable[[int, bytes], None]
 """Takes the sensor time [us] and one frame, for the log."""
 
-_POLL_TICKS: Final = 5  # 100 Hz: a system call a tick would be spent on silence
-_POLL_BYTES: Final = 4096  # a poll; a flood waits in the kernel, and is dropped there
-_MAX_DATAGRAM_OUT: Final = 1400  # bytes
+_LEAST_COST: Final = 64  # bytes: an empty datagram costs as much as a small one
+_MAX_SPEAKERS: Final = 32
+_HOUSEKEEPING_US: Final = 1_000_000
 _MESSAGE_ID: Final = slice(7, 10)  # in a frame
 # Not recorded: a log that is downloaded while it is written would grow by what is sent of it.
 _FILE_DATA: Final = frozenset(
@@ -35,31 +41,60 @@ _FILE_DATA: Final = frozenset(
 )
 
 
+@dataclass(frozen=True, slots=True)
+class LinkSetup:
+    """What tells one link from another."""
+
+    name: str  # in fsw.json
+    target: Address  # who is spoken to first
+    local_port: int  # if it is free
+    rates_hz: tuple[float, ...]  # of each stream
+    unheard: bool  # whether everything is sent before anybody has been heard
+    remote: bool = False  # whether other machines are heard though the target is this one
+
+
 class GcsLink:
-    """Serves the configured ground station and those who speak to the vehicle."""
+    """Serves the configured peer and those who speak to the vehicle."""
 
     def __init__(
         self,
-        target: Address,
+        setup: LinkSetup,
         inbox: Inbox,
         context: TelemetryContext,
-        record: RecordFrame,
+        signing: Signing,
+        clock: Clock,
+        record: RecordFrame | None = None,
         services: Sequence[LinkService] = (),
     ) -> None:
+        """Open the link.
+
+        Args:
+            setup: Addresses and rates.
+            inbox: Takes what is for the vehicle.
+            context: What encoders need.
+            signing: Of this link.
+            clock: Wall time, in which peers live.
+            record: Is told every frame of both directions.
+            services: Of this link alone.
+        """
+        self.name = setup.name
         self.losses = Losses()
-        self.encode_failures = 0
-        self._endpoint = OpenEndpoint(target)
-        self._peers = Peers(target)
+        self.dispatch = Dispatch(services)
+        self.signing = signing
+        self.outbox = Outbox(signing)
+        self.accepted = 0  # frames
+        self.rates = StreamRates(STREAMS, setup.rates_hz, context.facts.tick_period_us)
+        self._unheard = setup.unheard
+        self._endpoint = OpenEndpoint(setup.target, setup.local_port, remote=setup.remote)
+        self._peers = Peers(setup.target)
         self._inbox = inbox
         self._context = context
+        self._clock = clock
         self._record = record
-        self._writers = {id_: FrameWriter(SYSTEM_ID, id_) for id_ in (AUTOPILOT, PANDION)}
-        self._slots = schedule(STREAMS, round(1e6 / context.facts.tick_period_us))
-        self._tick = 0
-        self._shown: tuple[Mode, bool] | None = None
-        self._text_id = 0
-        self._dispatch = Dispatch(services)
-        self._answers: list[bytes] = []
+        self._commands = LinkCommands(self.rates, context)
+        self._snapshot: FlightSnapshot | None = None
+        self._speakers: set[tuple[int, int]] = set()
+        self._housekeeping_us = 0
 
     @property
     def port(self) -> int:
@@ -71,106 +106,127 @@ class GcsLink:
         """Everyone who receives telemetry."""
         return self._peers.all
 
-    def poll(self, t_us: int) -> None:
-        """Read and answer what ground stations sent, within a budget; call it once a tick."""
-        if self._tick % _POLL_TICKS == 0:
-            self._read_waiting(t_us)
-            self._send_answers(t_us)
+    @property
+    def talks(self) -> bool:
+        """Whether more than a heartbeat is sent."""
+        return self._unheard or self._peers.any_heard
 
-    def _send_answers(self, t_us: int) -> None:
-        if self._answers:
-            frames, self._answers = self._answers, []
-            self._send(t_us, frames)
+    def fileno(self) -> int:
+        """The socket, to wait for."""
+        return self._endpoint.fileno()
 
-    def _read_waiting(self, t_us: int) -> None:
-        budget = _POLL_BYTES
+    def hears(self, system: int, component: int) -> bool:
+        """Whether a component has spoken on this link."""
+        return (system, component) in self._speakers
+
+    def read(self, t_us: int, budget: int) -> int:
+        """Read datagrams that are there, and answer them.
+
+        Args:
+            t_us: Sensor time [us].
+            budget: Bytes after which to stop; what is left waits in the kernel, and is lost there
+                if it becomes too much.
+
+        Returns:
+            What is left of the budget; all of it if nothing was there.
+        """
         while budget > 0:
             received = self._endpoint.receive_waiting()
             if received is None:
-                return
+                break
             datagram, sender = received
-            # An empty datagram costs as much as a small one.
-            budget -= max(len(datagram), 64)
-            self._read(t_us, datagram, sender)
+            budget -= max(len(datagram), _LEAST_COST)
+            for frame, raw in cut(datagram, self.losses):
+                if not self.outbox.is_own(frame.system_id, frame.component_id):
+                    self._take(t_us, frame, raw, sender)
+        self._send(t_us)
+        return budget
 
-    def publish(self, outputs: TickOutputs) -> None:
-        """Send what is due on this tick; call it once a tick, after the actuators."""
-        snapshot = outputs.snapshot
-        due = self._slots[self._tick % len(self._slots)]
-        self._tick += 1
-        frames: list[bytes] = []
-        if (snapshot.mode, snapshot.armed) != self._shown:
-            self._shown = (snapshot.mode, snapshot.armed)
-            self._encode(HEARTBEAT, snapshot, frames)
-        for stream in due:
-            self._encode(stream, snapshot, frames)
-        for text in outputs.texts:
-            self._encode_text(text, frames)
-        if frames:
-            self._send(snapshot.t_us, frames)
-        self._dispatch.poll(snapshot.t_us, self._answer)
-        self._send_answers(snapshot.t_us)
+    def serve(self, t_us: int) -> None:
+        """Let services go on with what they are sending; call it once a tick if it talks."""
+        self.dispatch.poll(t_us, self.outbox.add_outgoing)
+        self._send(t_us)
+
+    def publish(self, outputs: TickOutputs, changed: bool) -> None:
+        """Send what is due.
+
+        Args:
+            outputs: Of this tick.
+            changed: Whether mode, arming, landing or health are other than they were.
+        """
+        snapshot = self._snapshot = outputs.snapshot
+        talks = self.talks
+        if changed:
+            for stream in AT_ONCE if talks else (HEARTBEAT,):
+                self._encode(stream, snapshot)
+        for stream in self.rates.due(snapshot.t_us):
+            if talks or stream is HEARTBEAT:
+                self._encode(stream, snapshot)
+        if talks:
+            for text in outputs.texts:
+                self.outbox.add_text(text)
+        self._send(snapshot.t_us)
+        if snapshot.t_us >= self._housekeeping_us:
+            self._housekeeping_us = snapshot.t_us + _HOUSEKEEPING_US
+            self._peers.expire(self._clock())
 
     def acknowledge(self, t_us: int, ack: CommandAck) -> None:
         """Answer a command that came over this link."""
-        values = encode_replies.command_ack(ack)
-        frame = self._writers[AUTOPILOT].frame(message_ids.COMMAND_ACK, *values)
-        self._send(t_us, [frame])
+        self.outbox.add(AUTOPILOT, message_ids.COMMAND_ACK, encode_replies.command_ack(ack))
+        self._send(t_us)
 
     def close(self) -> None:
         """Close the socket."""
         self._endpoint.close()
+        self.signing.close()
 
-    def _read(self, t_us: int, datagram: bytes, sender: Address) -> None:
-        for frame, raw in cut(datagram, self.losses):
-            if frame.system_id == SYSTEM_ID and frame.component_id in self._writers:
-                continue  # our own telemetry, sent back by a router
+    def _take(self, t_us: int, frame: Frame, raw: bytes, sender: Address) -> None:
+        """Let a frame whose checksum is right do what it may."""
+        verdict = self.signing.judge(frame, raw)
+        if verdict is Verdict.REFUSED:
+            return
+        self.accepted += 1
+        if self._record is not None:
             self._record(t_us, raw)
+        if verdict is Verdict.TRUSTED:
+            self._peers.heard(sender, self._clock())
+            if len(self._speakers) < _MAX_SPEAKERS:
+                self._speakers.add((frame.system_id, frame.component_id))
+        if frame.message_id == message_ids.SETUP_SIGNING:
+            armed = self._snapshot is not None and self._snapshot.armed
+            text = set_up_signing(self.signing, frame, sender, armed)
+            if text is not None:
+                self.outbox.add_text(text)
+            return
+        answer = self._commands.answer(frame, t_us, self._snapshot)
+        if answer is None:
             self._inbox.accept(frame)
-            self._peers.heard(sender)
-            self._dispatch.receive(frame, t_us, self._answer)
+        else:
+            messages, refusal = answer
+            for message in messages:
+                self.outbox.add_outgoing(message)
+            if refusal is not None:
+                self.outbox.add_text(refusal)
+        self.dispatch.receive(frame, t_us, self.outbox.add_outgoing)
 
-    def _answer(self, outgoing: Outgoing) -> None:
-        self._append(outgoing.component, outgoing.message_id, outgoing.values, self._answers)
-
-    def _encode(self, stream: Stream, snapshot: FlightSnapshot, frames: list[bytes]) -> None:
+    def _encode(self, stream: Stream, snapshot: FlightSnapshot) -> None:
         try:
             values = stream.encode(snapshot, self._context)
         except (OverflowError, ValueError):
-            self.encode_failures += 1
+            # A number that does not fit its field must not end the flight it describes.
+            self.outbox.encode_failures += 1
             return
         if values is not None:
-            self._append(stream.component, stream.message_id, values, frames)
+            self.outbox.add(stream.component, stream.message_id, values)
 
-    def _append(
-        self, component: int, message_id: int, values: WireValues, frames: list[bytes]
-    ) -> None:
-        try:
-            frames.append(self._writers[component].frame(message_id, *values))
-        except (struct.error, OverflowError, ValueError):
-            # A number that does not fit its field must not end the flight it describes.
-            self.encode_failures += 1
-
-    def _encode_text(self, text: StatusText, frames: list[bytes]) -> None:
-        self._text_id = self._text_id % 0xFFFF + 1
-        writer = self._writers[AUTOPILOT]
-        for values in encode_replies.status_texts(text, self._text_id):
-            frames.append(writer.frame(message_ids.STATUSTEXT, *values))
-
-    def _send(self, t_us: int, frames: list[bytes]) -> None:
-        for frame in frames:
-            if frame[_MESSAGE_ID] not in _FILE_DATA:
-                self._record(t_us, frame)
-        for datagram in _packed(frames):
+    def _send(self, t_us: int) -> None:
+        frames = self.outbox.take()
+        if not frames:
+            return
+        if self._record is not None:
+            for frame in frames:
+                if frame[_MESSAGE_ID] not in _FILE_DATA:
+                    self._record(t_us, frame)
+        for datagram in packed(frames):
             for peer in self._peers.all:
                 self._endpoint.send(datagram, peer)
-
-
-def _packed(frames: list[bytes]) -> list[bytes]:
-    """Join frames into as few datagrams as fit an Ethernet packet."""
-    datagrams = [b""]
-    for frame in frames:
-        if len(datagrams[-1]) + len(frame) > _MAX_DATAGRAM_OUT:
-            datagrams.append(b"")
-        datagrams[-1] += frame
-    return datagrams

@@ -6,29 +6,46 @@ from typing import Final
 
 from fsw.link.udp_endpoint import Address
 
+EXPIRY_US: Final = 30_000_000  # of silence: ten times what clients call a lost link
 _MAX_LEARNT: Final = 4
 
 
 class Peers:
-    """The configured ground station and the few others that were heard last.
+    """The configured peer and the few others that were heard last.
 
-    Bounded, so that a flood of forged sources cannot turn the vehicle into an amplifier.
+    Bounded, so that a flood of forged sources cannot turn the vehicle into an amplifier; who falls
+    silent is forgotten. Times are wall time [us], because peers live in it.
     """
 
     def __init__(self, configured: Address) -> None:
-        self._configured = configured
-        self._learnt: dict[Address, None] = {}  # in order of the last time each was heard
         self.all: tuple[Address, ...] = (configured,)
+        self._configured = configured
+        self._heard_us: dict[Address, int] = {}  # in the order in which each was heard last
 
-    def heard(self, peer: Address) -> None:
+    @property
+    def any_heard(self) -> bool:
+        """Whether anybody speaks to us."""
+        return bool(self._heard_us)
+
+    def heard(self, peer: Address, now_us: int) -> None:
         """Note a peer that has just sent a valid frame."""
-        if peer == self._configured:
-            return
-        known = peer in self._learnt
-        self._learnt.pop(peer, None)
-        self._learnt[peer] = None
+        known = self._heard_us.pop(peer, None) is not None
+        self._heard_us[peer] = now_us
         if known:
             return
-        if len(self._learnt) > _MAX_LEARNT:
-            del self._learnt[next(iter(self._learnt))]
-        self.all = (self._configured, *self._learnt)
+        learnt = [other for other in self._heard_us if other != self._configured]
+        if len(learnt) > _MAX_LEARNT:
+            del self._heard_us[learnt[0]]
+        self._list()
+
+    def expire(self, now_us: int) -> None:
+        """Forget who has been silent for too long; call it now and then."""
+        silent = [peer for peer, at in self._heard_us.items() if now_us - at > EXPIRY_US]
+        for peer in silent:
+            del self._heard_us[peer]
+        if silent:
+            self._list()
+
+    def _list(self) -> None:
+        learnt = (peer for peer in self._heard_us if peer != self._configured)
+        self.all = (self._configured, *learnt)

@@ -1,87 +1,113 @@
-"""What is sent to ground stations, and how often: one table.
+"""What is sent to the ground, and how often by default: one table for both links.
 
-Rates are counted in ticks, that is in sensor time, so they are the same in real time and in
-lockstep at any speed. Each rate is exact over a second, and the streams are spread over the ticks
-so that they do not all fall on one.
+Rates are counted in sensor time, so they are the same in real time and in lockstep at any speed.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from fsw.link import encode_dialect, encode_standard, message_ids
+from fsw.link import (
+    encode_dialect,
+    encode_health,
+    encode_identity,
+    encode_place,
+    encode_standard,
+    message_ids,
+)
 from fsw.link.message_ids import AUTOPILOT, PANDION
+from fsw.link.service import Outgoing, WireValues
 from fsw.link.telemetry import TelemetryContext
 from fsw.signals import FlightSnapshot
 
-Encoder = Callable[[FlightSnapshot, TelemetryContext], tuple[float | bytes, ...] | None]
+Encoder = Callable[[FlightSnapshot, TelemetryContext], WireValues | None]
+Answerer = Callable[[float, FlightSnapshot, TelemetryContext], Sequence[Outgoing]]
 
 
 @dataclass(frozen=True, slots=True)
 class Stream:
-    """One message at one rate from one component."""
+    """One message from one component; a rate of 0 sends it on request only."""
 
     message_id: int
-    rate_hz: int
+    ground_hz: float  # to ground stations
+    api_hz: float  # to programs
     component: int
     encode: Encoder
 
 
-HEARTBEAT: Final = Stream(message_ids.HEARTBEAT, 1, AUTOPILOT, encode_standard.heartbeat)
-
-# HEARTBEAT also leaves at once when mode or arming change; COMMAND_ACK and STATUSTEXT as they come.
-STREAMS: Final = (
-    HEARTBEAT,
-    Stream(message_ids.SYS_STATUS, 2, AUTOPILOT, encode_standard.sys_status),
-    Stream(message_ids.EXTENDED_SYS_STATE, 1, AUTOPILOT, encode_standard.extended_sys_state),
-    Stream(message_ids.ATTITUDE, 50, AUTOPILOT, encode_standard.attitude),
-    Stream(message_ids.ATTITUDE_QUATERNION, 10, AUTOPILOT, encode_standard.attitude_quaternion),
-    Stream(message_ids.LOCAL_POSITION_NED, 30, AUTOPILOT, encode_standard.local_position),
-    Stream(message_ids.POSITION_TARGET_LOCAL_NED, 10, AUTOPILOT, encode_standard.position_target),
-    Stream(message_ids.ATTITUDE_TARGET, 10, AUTOPILOT, encode_standard.attitude_target),
-    Stream(message_ids.ARM_JOINT_STATE, 30, PANDION, encode_dialect.arm_joint_state),
-    Stream(message_ids.ARM_JOINT_SETPOINT, 10, PANDION, encode_dialect.arm_joint_setpoint),
-    Stream(message_ids.END_EFFECTOR_TARGET, 10, PANDION, encode_dialect.end_effector_target),
-    Stream(message_ids.BARRIER_MARGIN, 10, PANDION, encode_dialect.barrier_margin),
-    Stream(message_ids.MPC_STATUS, 10, PANDION, encode_dialect.mpc_status),
-    Stream(message_ids.LOOP_TIMING, 1, PANDION, encode_dialect.inner_timing),
-    Stream(message_ids.LOOP_TIMING, 1, PANDION, encode_dialect.mpc_timing),
+HEARTBEAT: Final = Stream(message_ids.HEARTBEAT, 1, 1, AUTOPILOT, encode_standard.heartbeat)
+_CURRENT_MODE = Stream(message_ids.CURRENT_MODE, 0.5, 0.5, AUTOPILOT, encode_identity.current_mode)
+_EXTENDED_STATE = Stream(
+    message_ids.EXTENDED_SYS_STATE, 1, 5, AUTOPILOT, encode_standard.extended_sys_state
 )
 
+STREAMS: Final = (
+    HEARTBEAT,
+    Stream(message_ids.SYS_STATUS, 2, 2, AUTOPILOT, encode_health.sys_status),
+    _EXTENDED_STATE,
+    Stream(message_ids.ATTITUDE, 50, 50, AUTOPILOT, encode_standard.attitude),
+    Stream(message_ids.ATTITUDE_QUATERNION, 10, 50, AUTOPILOT, encode_standard.attitude_quaternion),
+    Stream(message_ids.LOCAL_POSITION_NED, 30, 50, AUTOPILOT, encode_standard.local_position),
+    Stream(message_ids.GLOBAL_POSITION_INT, 5, 10, AUTOPILOT, encode_place.global_position),
+    Stream(
+        message_ids.POSITION_TARGET_LOCAL_NED, 10, 10, AUTOPILOT, encode_standard.position_target
+    ),
+    Stream(message_ids.ATTITUDE_TARGET, 10, 10, AUTOPILOT, encode_standard.attitude_target),
+    Stream(message_ids.VFR_HUD, 4, 4, AUTOPILOT, encode_place.vfr_hud),
+    Stream(message_ids.ALTITUDE, 1, 2, AUTOPILOT, encode_place.altitude),
+    Stream(message_ids.HOME_POSITION, 0.5, 1, AUTOPILOT, encode_place.home_position),
+    Stream(message_ids.BATTERY_STATUS, 1, 1, AUTOPILOT, encode_health.battery_status),
+    Stream(message_ids.ESTIMATOR_STATUS, 1, 1, AUTOPILOT, encode_health.estimator_status),
+    Stream(message_ids.SYSTEM_TIME, 1, 1, AUTOPILOT, encode_standard.system_time),
+    _CURRENT_MODE,
+    Stream(message_ids.ODOMETRY, 0, 0, AUTOPILOT, encode_place.odometry),
+    Stream(message_ids.GPS_GLOBAL_ORIGIN, 0, 0, AUTOPILOT, encode_place.global_origin),
+    Stream(message_ids.AUTOPILOT_VERSION, 0, 0, AUTOPILOT, encode_identity.autopilot_version),
+    Stream(message_ids.ARM_JOINT_STATE, 30, 50, PANDION, encode_dialect.arm_joint_state),
+    Stream(message_ids.ARM_JOINT_SETPOINT, 10, 10, PANDION, encode_dialect.arm_joint_setpoint),
+    Stream(message_ids.END_EFFECTOR_TARGET, 10, 10, PANDION, encode_dialect.end_effector_target),
+    Stream(message_ids.BARRIER_MARGIN, 10, 10, PANDION, encode_dialect.barrier_margin),
+    Stream(message_ids.MPC_STATUS, 10, 10, PANDION, encode_dialect.mpc_status),
+    Stream(message_ids.LOOP_TIMING, 1, 1, PANDION, encode_dialect.inner_timing),
+    Stream(message_ids.LOOP_TIMING, 1, 1, PANDION, encode_dialect.mpc_timing),
+)
 
-def schedule(streams: tuple[Stream, ...], ticks_per_second: int) -> tuple[tuple[Stream, ...], ...]:
-    """Lay the streams out over one second.
+# These leave at once when mode, arming, landing or health change.
+AT_ONCE: Final = (HEARTBEAT, _CURRENT_MODE, _EXTENDED_STATE)
+
+# Sent on request only, because they have several parts; the request's param2 chooses.
+ON_REQUEST: Final[dict[int, Answerer]] = {
+    message_ids.AVAILABLE_MODES: encode_identity.available_modes,
+}
+
+GROUND_RATES: Final = tuple(stream.ground_hz for stream in STREAMS)
+API_RATES: Final = tuple(stream.api_hz for stream in STREAMS)
+
+
+def messages_now(
+    message_id: int, which: float, snapshot: FlightSnapshot, context: TelemetryContext
+) -> Sequence[Outgoing] | None:
+    """Any message of this vehicle, as it would be sent now.
 
     Args:
-        streams: Rates of at most one message a tick.
-        ticks_per_second: Ticks in a second.
+        message_id: Which.
+        which: Part of it, where it has several.
+        snapshot: Of the last tick.
+        context: What encoders need.
 
     Returns:
-        For each tick of a second the streams that are due; message k of a stream of rate r is due
-        ``floor((k + 1/2) * ticks_per_second / r)`` ticks after the stream's phase, and each phase
-        is the one at which the busiest tick it meets is least busy.
-
-    Raises:
-        ValueError: A rate is not between 1 and the tick rate.
+        The message, or several; nothing where there is nothing to say yet; None if the vehicle has
+        no such message.
     """
-    slots: list[list[Stream]] = [[] for _ in range(ticks_per_second)]
-    # The fast streams have the least freedom, so they choose first.
-    for stream in sorted(streams, key=lambda stream: -stream.rate_hz):
-        if not 1 <= stream.rate_hz <= ticks_per_second:
-            raise ValueError(f"stream rate {stream.rate_hz} Hz is outside 1..{ticks_per_second}")
-        for tick in min(_placements(stream.rate_hz, slots), key=lambda p: _crowding(p, slots)):
-            slots[tick].append(stream)
-    return tuple(tuple(slot) for slot in slots)
-
-
-def _placements(rate_hz: int, slots: list[list[Stream]]) -> list[list[int]]:
-    ticks = len(slots)
-    offsets = [(2 * k + 1) * ticks // (2 * rate_hz) for k in range(rate_hz)]
-    return [[(offset + phase) % ticks for offset in offsets] for phase in range(ticks // rate_hz)]
-
-
-def _crowding(ticks: list[int], slots: list[list[Stream]]) -> tuple[int, int]:
-    loads = [len(slots[tick]) for tick in ticks]
-    return max(loads), sum(loads)
+    answerer = ON_REQUEST.get(message_id)
+    if answerer is not None:
+        return answerer(which, snapshot, context)
+    streams = [stream for stream in STREAMS if stream.message_id == message_id]
+    if not streams:
+        return None
+    found = ((stream, stream.encode(snapshot, context)) for stream in streams)
+    return [
+        Outgoing(s.message_id, values, s.component) for s, values in found if values is not None
+    ]

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from fsw.signals import Vec2
+from fsw.geometry.geodesy import DEFAULT_ORIGIN
+from fsw.signals import Origin, Vec2
+
+GENERIC, PX4 = 0, 12  # MAV_AUTOPILOT
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,3 +57,6 @@ class TelemetryContext:
 
     facts: VehicleFacts
     health: LoopHealth
+    autopilot: int = PX4
+    origin: Origin = DEFAULT_ORIGIN
+    start_unix_us: int = 0  # wall time at sensor time 0 [us since 1970]

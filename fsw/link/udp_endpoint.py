@@ -19,6 +19,8 @@ MAX_DATAGRAM: Final = 2048  # bytes; a larger datagram is cut and its last frame
 
 _ADDRESS = re.compile(r"udp:(?P<host>[^:\s]+):(?P<port>\d{1,5})")
 _RECEIVE_BUFFER: Final = 1 << 20  # bytes: rides out a pause of the receiver
+# Of what the ground sends: what a flood leaves waiting in front of a command delays that command.
+_QUEUE: Final = 1 << 17
 
 
 class LinkError(Exception):
@@ -48,6 +50,11 @@ def parse_address(text: str, *, any_port: bool = False) -> Address:
         return socket.gethostbyname(match["host"]), port
     except OSError:
         raise LinkError(f"address {text!r}: host {match['host']!r} is not known") from None
+
+
+def is_loopback(address: Address) -> bool:
+    """Whether an address is one of this machine alone."""
+    return address[0].startswith("127.")
 
 
 class ConnectedEndpoint:
@@ -105,24 +112,34 @@ class ConnectedEndpoint:
 class OpenEndpoint:
     """A socket that talks to anyone and never waits."""
 
-    def __init__(self, target: Address) -> None:
-        """Bind to a port the system chooses, so that any number of vehicles share a machine.
+    def __init__(self, target: Address, local_port: int = 0, *, remote: bool = False) -> None:
+        """Open the socket.
 
         Args:
             target: Who is spoken to first. Where that is this machine, only this machine is
                 heard: a vehicle must not take commands from a network nobody asked for.
+            local_port: Wanted, so that a peer can be told beforehand; where it is taken the system
+                chooses one, so that any number of vehicles share a machine.
+            remote: Hear other machines anyway.
         """
-        local = target[0] if target[0].startswith("127.") else ""
+        local = "" if remote or not is_loopback(target) else target[0]
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _RECEIVE_BUFFER)
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _QUEUE)
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
-        self._socket.bind((local, 0))
+        try:
+            self._socket.bind((local, local_port))
+        except OSError:
+            self._socket.bind((local, 0))
         self._socket.setblocking(False)
 
     @property
     def port(self) -> int:
         """The local port."""
         return int(self._socket.getsockname()[1])
+
+    def fileno(self) -> int:
+        """The handle, to wait for."""
+        return self._socket.fileno()
 
     def receive_waiting(self) -> tuple[bytes, Address] | None:
         """Return a datagram that is already there and its sender, or None."""

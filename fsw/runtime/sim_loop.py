@@ -7,12 +7,11 @@ and the planner behind it (inline, or in a process of its own).
 from __future__ import annotations
 
 import enum
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Final, Generic
 
-from fsw.link.gcs_link import GcsLink
+from fsw.link.ground_links import GroundLinks
 from fsw.link.inbox import Inbox
 from fsw.link.message_ids import PATH_PLANNER, SYSTEM_ID
 from fsw.link.sim_link import Pacing, SimLink
@@ -81,24 +80,24 @@ class SimLoop(Generic[State]):
         self,
         program: FlightProgram[State],
         sim: SimLink,
-        gcs: GcsLink,
+        ground: GroundLinks,
         inbox: Inbox,
         record: FlightRecord,
         clock: Clock,
         stop: StopRequest,
-        sleep: Callable[[float], None] = time.sleep,
+        sleep: Callable[[float], None] | None = None,
     ) -> None:
         self._program = program
         self._tick_us = program.facts.tick_period_us
         self._parameters = program.parameters
         self._tick = GuardedTick(program.tick, program.first_state)
         self._sim = sim
-        self._gcs = gcs
+        self._ground = ground
         self._inbox = inbox
         self._record = record
         self._clock = clock
         self._stop = stop
-        self._sleep = sleep
+        self._sleep = sleep or ground.attend  # what time is left belongs to the ground
         self._warning = SlipWarning()
         self._notices: list[StatusText] = []
         self._releases: Releases
@@ -171,7 +170,7 @@ class SimLoop(Generic[State]):
 
     def _hear(self, cycle: Cycle) -> None:
         t_us = cycle.release.sensors.t_us
-        self._gcs.poll(t_us)
+        self._ground.poll(t_us)
         inbox = self._inbox
         cycle.inputs = TickInputs(
             cycle.release.sensors,
@@ -194,7 +193,7 @@ class SimLoop(Generic[State]):
             if (ack.target_system, ack.target_component) == (SYSTEM_ID, PATH_PLANNER):
                 self._sim.queue_ack(ack)
             else:
-                self._gcs.acknowledge(t_us, ack)
+                self._ground.acknowledge(t_us, ack)
         self._sim.answer(t_us, outputs)
 
     def _ask(self, cycle: Cycle) -> None:
@@ -214,7 +213,7 @@ class SimLoop(Generic[State]):
         if self._notices:
             outputs = replace(outputs, texts=(*outputs.texts, *self._notices))
             self._notices.clear()
-        self._gcs.publish(outputs)
+        self._ground.publish(outputs)
 
     def _sum_up(self, cycle: Cycle) -> None:
         record, health = self._record, self._record.health

@@ -82,7 +82,9 @@ class Flight:
 
 def flown(cwd: Path, *arguments: str) -> Flight:
     listener = Listener()
-    done = pandion("fly", *arguments, "--gcs", listener.address, "--json", "-", cwd=cwd)
+    done = pandion(
+        "fly", *arguments, "--api", "none", "--gcs", listener.address, "--json", "-", cwd=cwd
+    )
     listener.close()
     assert done.returncode == 0, done.stderr
     (directory,) = (cwd / "runs").iterdir()
@@ -169,7 +171,8 @@ def test_real_time_is_real_time(realtime: Flight) -> None:
 @pytest.fixture
 def flying(tmp_path: Path) -> Iterator[subprocess.Popen[str]]:
     process = start(
-        "fly", "walls-calm", "--speed", "1", "--gcs", f"udp:127.0.0.1:{free_port()}",
+        "fly", "walls-calm", "--speed", "1", "--api", "none",
+        "--gcs", f"udp:127.0.0.1:{free_port()}",
         "--duration", "5", "--out", str(tmp_path / "out"), cwd=tmp_path,
     )  # fmt: skip
     read_until(process, "flying")
@@ -203,7 +206,7 @@ def test_a_signal_ends_everything_within_two_seconds_with_a_verdict(
 
 
 def test_children_die_with_a_killed_parent(tmp_path: Path) -> None:
-    process = start("fly", "--gcs", f"udp:127.0.0.1:{free_port()}", cwd=tmp_path)
+    process = start("fly", "--api", "none", "--gcs", f"udp:127.0.0.1:{free_port()}", cwd=tmp_path)
     try:
         read_until(process, "preparing")  # which the flight software says: both are there
         process.kill()
@@ -214,7 +217,7 @@ def test_children_die_with_a_killed_parent(tmp_path: Path) -> None:
 
 
 def test_a_reader_that_leaves_ends_the_flight_quietly(tmp_path: Path) -> None:
-    process = start("fly", "--gcs", f"udp:127.0.0.1:{free_port()}", cwd=tmp_path)
+    process = start("fly", "--api", "none", "--gcs", f"udp:127.0.0.1:{free_port()}", cwd=tmp_path)
     assert process.stdout is not None
     process.stdout.readline()
     process.stdout.close()  # what `| head -1` does; standard error is in the same pipe

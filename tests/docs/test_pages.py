@@ -189,7 +189,8 @@ def test_the_streams_on_the_page_are_those_that_are_sent() -> None:
     assert shown == [
         (
             dialect.mavlink_map[stream.message_id].msgname,
-            str(stream.rate_hz),
+            f"{stream.ground_hz:g}",
+            f"{stream.api_hz:g}",
             str(stream.component),
         )
         for stream in STREAMS

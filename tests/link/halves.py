@@ -34,6 +34,9 @@ class Half:
     def __init__(self, module: str, *arguments: str) -> None:
         self.name = module
         self.events: list[dict[str, Any]] = []
+        if module == "fsw" and "--api" not in arguments:
+            # The programs' port belongs to whoever tests with a program.
+            arguments = (*arguments, "--api", "none")
         self.process = subprocess.Popen(
             [sys.executable, "-m", module, *arguments, "--events", "json"],
             stdout=subprocess.PIPE,

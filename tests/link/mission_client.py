@@ -68,7 +68,7 @@ class Client:
         """Let time pass; returns the first message that is wanted, None if it did not come."""
         for _ in range(round(seconds * 1e6) // TICK_US):
             self.t_us += TICK_US
-            self._link.poll(self.t_us)
+            self._link.read(self.t_us, 4096)
             self._after_tick(self.t_us)
             arrived = self._receive()
             self.heard += arrived

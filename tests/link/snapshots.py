@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 from fsw.link.telemetry import GroupTiming, LoopHealth, TelemetryContext, VehicleFacts
 from fsw.signals import (
     ActuatorCommand,
+    BatteryState,
     ConstraintKind,
     ConstraintReport,
     EndEffectorTarget,
     FlightSnapshot,
+    Home,
     Mode,
     Plan,
     PlanInput,
@@ -38,6 +41,7 @@ CONTEXT = TelemetryContext(
         inner=GroupTiming(2_000, 5000, 3, 1, 60.0, 120.0, 500.0, 20.0, 90.0, 700.0, 0.03),
         mpc=GroupTiming(100_000, 100, 0, 0, 900.0, 1500.0, 2100.0, 0.0, 0.0, 0.0, 0.01),
     ),
+    start_unix_us=1_750_000_000_000_000,
 )
 
 # Yaw of 90 degrees: body x points east.
@@ -79,6 +83,8 @@ SNAPSHOT = FlightSnapshot(
     plan_status=SolverStatus.TIME_LIMIT,
     counters=PlannerCounters(plans=10, missed_deadlines=1, fallbacks=2),
     constraints=ConstraintReport(ConstraintKind.WALLS, (0.3, 0.2, 0.4), (0.5, -0.1, 0.6)),
+    home=Home((-0.5, 0.25, -0.3), math.pi),
+    battery=BatteryState(voltage=15.2, current=18.3, consumed=1.9, remaining=0.62),
 )  # fmt: skip
 
 

@@ -35,13 +35,37 @@ def stream_of(message_id: int) -> Stream:
 # What pymavlink must read for the snapshot, one or a few telling fields a message.
 TELLING: dict[int, dict[str, Any]] = {
     ids.HEARTBEAT: {"type": 2, "autopilot": 12, "custom_mode": 0x0B040000, "system_status": 4},
-    ids.SYS_STATUS: {"load": 40, "voltage_battery": 65535, "battery_remaining": -1},
+    ids.SYS_STATUS: {
+        "load": 40, "voltage_battery": 15_200, "current_battery": 1_830, "battery_remaining": 62,
+    },
     ids.EXTENDED_SYS_STATE: {"landed_state": 2},
     ids.ATTITUDE: {"time_boot_ms": 3004, "yaw": math.pi / 2, "rollspeed": 0.4},
     ids.ATTITUDE_QUATERNION: {"q1": math.sqrt(0.5), "q4": math.sqrt(0.5), "yawspeed": 0.6},
     ids.LOCAL_POSITION_NED: {"x": 1.0, "y": 2.0, "z": -3.0, "vz": 0.3},
     ids.POSITION_TARGET_LOCAL_NED: {"x": 1.1, "vy": 0.21, "afz": 0.32, "yaw": 0.33},
     ids.ATTITUDE_TARGET: {"thrust": 40.0 / 64.0, "type_mask": 7},
+    ids.GLOBAL_POSITION_INT: {
+        "lat": 473977510, "lon": 85456206, "alt": 3_000, "relative_alt": 2_700, "vx": 10, "vy": 20,
+        "vz": 30, "hdg": 9_000,
+    },
+    ids.VFR_HUD: {
+        "groundspeed": math.hypot(0.1, 0.2), "alt": 3.0, "climb": -0.3, "heading": 90,
+        "throttle": 62,
+    },
+    ids.ALTITUDE: {"altitude_amsl": 3.0, "altitude_local": 3.0, "altitude_relative": 2.7},
+    ids.HOME_POSITION: {
+        "latitude": 473977375, "x": -0.5, "z": -0.3, "altitude": 300, "q": [0.0, 0.0, 0.0, 1.0],
+    },
+    ids.BATTERY_STATUS: {
+        "voltages": [15_200, *[65_535] * 9], "current_battery": 1_830, "current_consumed": 1_900,
+        "battery_remaining": 62, "charge_state": 1,
+    },
+    ids.ESTIMATOR_STATUS: {"time_usec": 3_004_000, "flags": 63},
+    ids.SYSTEM_TIME: {"time_boot_ms": 3004, "time_unix_usec": 1_750_000_003_004_000},
+    ids.CURRENT_MODE: {"custom_mode": 0x0B040000, "standard_mode": 0},
+    ids.ODOMETRY: {"x": 1.0, "vx": 0.2, "vy": -0.1, "vz": 0.3, "rollspeed": 0.4, "frame_id": 1},
+    ids.GPS_GLOBAL_ORIGIN: {"latitude": 473977420, "longitude": 85455940, "altitude": 0},
+    ids.AUTOPILOT_VERSION: {"uid": int.from_bytes(b"PANDION", "big")},
     ids.ARM_JOINT_STATE: {"joint_count": 2, "time_usec": 3_004_000},
     ids.ARM_JOINT_SETPOINT: {"joint_count": 2},
     ids.END_EFFECTOR_TARGET: {"yaw": 0.3, "coordinate_frame": 1},
@@ -110,7 +134,8 @@ def test_a_fault_takes_the_prearm_bit_and_the_suspect_away() -> None:
     broken = replace(SNAPSHOT, failures=("state estimate invalid",))
     status = read_back(stream_of(ids.SYS_STATUS), broken)
     lost = status.onboard_control_sensors_present & ~status.onboard_control_sensors_health
-    assert lost == 0x10000000 | 0x200000 | 0x80
+    # Nothing is known without an estimate: neither place nor heading nor what feeds them.
+    assert lost == 0x10000000 | 0x200000 | 0x80 | 0x27
     assert read_back(stream_of(ids.HEARTBEAT), broken).system_status == 5
 
 

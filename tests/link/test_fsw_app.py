@@ -14,6 +14,7 @@ import pytest
 
 from fsw import app
 from fsw.arguments import FswOptions
+from fsw.link.link_choice import NO_LINK, LinkChoice
 from fsw.parameters.control_choice import ControlChoice
 from fsw.parameters.flight_config import FlightConfig
 from fsw.parameters.store import ParameterStore
@@ -53,7 +54,8 @@ def silent() -> Iterator[socket.socket]:
 def options(silent: socket.socket, tmp_path: Path) -> Iterator[FswOptions]:
     handlers = [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)]
     address = f"udp:127.0.0.1:{silent.getsockname()[1]}"
-    yield FswOptions(address, address, CHOICE, tmp_path, 0.4, None, "text")
+    links = LinkChoice(gcs=address, api=NO_LINK)
+    yield FswOptions(address, links, CHOICE, tmp_path, 0.4, None, "text")
     for number, handler in zip((signal.SIGINT, signal.SIGTERM), handlers, strict=True):
         signal.signal(number, handler)
 

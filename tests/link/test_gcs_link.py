@@ -2,122 +2,95 @@
 
 from __future__ import annotations
 
-import contextlib
+import math
 import random
-import socket
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from fsw.link import message_ids as ids
 from fsw.link.flight_logs import flight_logs
-from fsw.link.gcs_link import GcsLink
-from fsw.link.inbox import Inbox
 from fsw.link.log_service import LogService
+from fsw.link.peers import EXPIRY_US
 from fsw.link.service import Outgoing
-from fsw.signals import CommandAck, Mode, StatusText
+from fsw.link.streams import AT_ONCE, STREAMS
+from fsw.signals import BatteryState, CommandAck, Mode, StatusText
 from messages.frames import Frame, FrameWriter, split
-from tests.link.snapshots import CONTEXT, outputs_at
+from tests.link.ground import Ground, ground_station, station_socket
+from tests.link.snapshots import SNAPSHOT, outputs_at
 
 HEARTBEAT = (0, 6, 8, 0, 4, 3)
 
 
-@dataclass
-class Ground:
-    """A ground station's socket and the link under test."""
-
-    station: socket.socket
-    link: GcsLink
-    inbox: Inbox
-    recorded: list[tuple[int, bytes]] = field(default_factory=list)
-
-    def heard(self) -> list[Frame]:
-        frames = []
-        while True:
-            try:
-                frames += split(self.station.recv(2048))
-            except BlockingIOError:
-                return frames
-
-    def polled(self, datagram: bytes, sender: socket.socket | None = None) -> None:
-        (sender or self.station).sendto(datagram, ("127.0.0.1", self.link.port))
-        self.poll()
-
-    def poll(self) -> None:
-        self.link.poll(1_000_000)
-
-
-def station_socket() -> socket.socket:
-    station = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-    station.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 20)
-    station.bind(("127.0.0.1", 0))
-    station.setblocking(False)
-    return station
-
-
 @pytest.fixture
 def ground() -> Iterator[Ground]:
-    station, inbox = station_socket(), Inbox()
-    recorded: list[tuple[int, bytes]] = []
-    link = GcsLink(station.getsockname(), inbox, CONTEXT, lambda t, f: recorded.append((t, f)))
-    yield Ground(station, link, inbox, recorded)
-    link.close()
-    station.close()
+    with ground_station() as ground:
+        yield ground
 
 
 def test_streams_leave_at_their_rates_in_sensor_time(ground: Ground) -> None:
-    frames: list[Frame] = []
-    for tick in range(1500):
-        ground.link.publish(outputs_at(1_000_000 + 2_000 * tick))
-        if tick % 100 == 99:
-            frames += ground.heard()
+    frames = ground.fly(2000)
     counts = Counter((frame.component_id, frame.message_id) for frame in frames)
-    assert counts[(1, ids.ATTITUDE)] == 150
-    assert counts[(1, ids.LOCAL_POSITION_NED)] == 90
-    assert counts[(191, ids.ARM_JOINT_STATE)] == 90
-    assert counts[(1, ids.HEARTBEAT)] == 3 + 1  # one more at once, for the first mode
-    assert counts[(191, ids.LOOP_TIMING)] == 6
+    for stream in STREAMS:
+        rows = sum(s.message_id == stream.message_id for s in STREAMS)
+        extra = 1 if stream in AT_ONCE else 0  # the first mode is news
+        found = counts[(stream.component, stream.message_id)] - extra
+        assert abs(found - rows * 4 * stream.ground_hz) <= 1, stream
     assert len(ground.recorded) == len(frames)
 
 
 def test_each_component_counts_its_own_sequence(ground: Ground) -> None:
-    for tick in range(200):
-        ground.link.publish(outputs_at(1_000_000 + 2_000 * tick))
-    frames = ground.heard()
+    frames = ground.fly(200)
     for component in (1, 191):
         sequences = [frame.sequence for frame in frames if frame.component_id == component]
         assert sequences == [n % 256 for n in range(len(sequences))]
 
 
 def test_a_mode_change_is_told_at_once(ground: Ground) -> None:
-    ground.link.publish(outputs_at(1_000_000))
-    ground.heard()
-    outputs = outputs_at(1_002_000)
-    changed = replace(outputs, snapshot=replace(outputs.snapshot, mode=Mode.HOLD))
-    ground.link.publish(changed)
-    heartbeats = [frame for frame in ground.heard() if frame.message_id == ids.HEARTBEAT]
-    assert [frame.payload_values[0] for frame in heartbeats] == [4 << 16 | 3 << 24]
+    ground.fly(7)
+    changed = ground.fly(1, mode=Mode.HOLD)
+    told = {frame.message_id: frame.payload_values[0] for frame in changed}
+    assert told[ids.HEARTBEAT] == told[ids.CURRENT_MODE] == 4 << 16 | 3 << 24
+    assert ids.EXTENDED_SYS_STATE in told
+    assert ids.HEARTBEAT not in {f.message_id for f in ground.fly(1, mode=Mode.HOLD)}
+
+
+@pytest.mark.parametrize("change", [{"armed": False}, {"landed": True}, {"failures": ("x",)}])
+def test_arming_landing_and_health_are_told_at_once(ground: Ground, change: dict[str, Any]) -> None:
+    ground.fly(7)
+    assert ids.HEARTBEAT in {frame.message_id for frame in ground.fly(1, **change)}
 
 
 def test_texts_and_acknowledgements_are_sent_as_they_happen(ground: Ground) -> None:
-    ground.link.publish(outputs_at(1_000_000, texts=(StatusText(4, "why not"),)))
-    ground.link.acknowledge(1_000_000, CommandAck(400, 1, 255, 190))
+    ground.links.publish(outputs_at(1_000_000, texts=(StatusText(4, "why not"),)))
+    ground.links.acknowledge(1_000_000, CommandAck(400, 1, 255, 190))
     frames = {frame.message_id: frame.payload_values for frame in ground.heard()}
     assert frames[ids.STATUSTEXT][1] == b"why not".ljust(50, b"\0")
     assert frames[ids.COMMAND_ACK] == (400, 1, 0, 0, 255, 190)
 
 
 def test_a_number_that_does_not_fit_its_field_does_not_end_the_flight(ground: Ground) -> None:
-    outputs = outputs_at(1_000_000)
-    plan = outputs.snapshot.plan
+    plan = SNAPSHOT.plan
     assert plan is not None
-    huge = replace(outputs.snapshot, plan=replace(plan, cost=1e300))
-    for _ in range(60):
-        ground.link.publish(replace(outputs, snapshot=huge))
-    assert ground.link.encode_failures > 0
+    told = {frame.message_id for frame in ground.fly(60, plan=replace(plan, cost=1e300))}
+    assert ids.ATTITUDE in told
+    assert ids.MPC_STATUS not in told
+    assert ground.link.outbox.encode_failures > 0
+
+
+@pytest.mark.parametrize("number", [math.nan, math.inf, -math.inf, 1e30])
+def test_no_estimate_however_wild_ends_the_flight(ground: Ground, number: float) -> None:
+    wild = SNAPSHOT.estimate._replace(
+        p_WB=(number,) * 3, v_WB=(number,) * 3, R_WB=(number,) * 9,
+        w_WB_B=(number,) * 3, yaw=number,
+    )  # fmt: skip
+    battery = BatteryState(number, number, number, number)
+    told = {frame.message_id for frame in ground.fly(1000, estimate=wild, battery=battery)}
+    assert ids.HEARTBEAT in told
 
 
 def test_garbage_does_not_raise_and_nothing_is_learnt_from_it(ground: Ground) -> None:
@@ -147,9 +120,8 @@ def test_a_truncated_datagram_does_not_swallow_the_next(ground: Ground) -> None:
 def test_a_valid_frame_makes_its_sender_a_peer(ground: Ground) -> None:
     other = station_socket()
     ground.polled(FrameWriter(255, 190).frame(ids.HEARTBEAT, *HEARTBEAT), other)
-    ground.link.publish(outputs_at(1_000_000))
+    assert ground.fly(5)
     assert other.recv(2048)
-    assert len(ground.heard()) >= 1
     other.close()
 
 
@@ -163,6 +135,21 @@ def test_peers_are_bounded_and_the_configured_one_stays(ground: Ground) -> None:
     assert others[-1].getsockname() in ground.link.peers
     for other in others:
         other.close()
+
+
+def test_a_peer_that_falls_silent_is_forgotten(ground: Ground) -> None:
+    other = station_socket()
+    writer = FrameWriter(255, 190)
+    ground.polled(writer.frame(ids.HEARTBEAT, *HEARTBEAT), other)
+    ground.wall.pass_s(0.6 * EXPIRY_US / 1e6)
+    ground.polled(writer.frame(ids.HEARTBEAT, *HEARTBEAT), other)
+    ground.wall.pass_s(0.6 * EXPIRY_US / 1e6)
+    ground.fly(500)
+    assert other.getsockname() in ground.link.peers
+    ground.wall.pass_s(0.6 * EXPIRY_US / 1e6)
+    ground.fly(500)
+    assert ground.link.peers == (ground.station.getsockname(),)
+    other.close()
 
 
 def test_our_own_frames_sent_back_are_ignored(ground: Ground) -> None:
@@ -218,11 +205,9 @@ class Echo:
 
 @pytest.fixture
 def echo() -> Iterator[tuple[Ground, Echo]]:
-    station, inbox, service = station_socket(), Inbox(), Echo()
-    link = GcsLink(station.getsockname(), inbox, CONTEXT, lambda t, f: None, (service,))
-    yield Ground(station, link, inbox), service
-    link.close()
-    station.close()
+    service = Echo()
+    with ground_station(services=(service,)) as ground:
+        yield ground, service
 
 
 def test_a_service_answers_within_the_same_poll_and_goes_on_after_later_ticks(
@@ -231,9 +216,7 @@ def test_a_service_answers_within_the_same_poll_and_goes_on_after_later_ticks(
     ground, _ = echo
     ground.polled(FrameWriter(255, 190).frame(ids.PING, 77, 5, 0, 0))
     assert [frame.payload_values for frame in ground.heard()] == [(77, 5, 0, 0)]
-    for tick in range(3):
-        ground.link.publish(outputs_at(1_000_000 + 2_000 * tick))
-    pings = [frame for frame in ground.heard() if frame.message_id == ids.PING]
+    pings = [frame for frame in ground.fly(3) if frame.message_id == ids.PING]
     assert [frame.payload_values[1] for frame in pings] == [1, 0]
 
 
@@ -241,27 +224,13 @@ def test_a_log_that_is_downloaded_does_not_grow_by_it(tmp_path: Path) -> None:
     run = tmp_path / "run-1"
     run.mkdir()
     (run / "flight.tlog").write_bytes(bytes(2000))
-    recorded: list[bytes] = []
-    station, service = station_socket(), LogService(flight_logs(run))
-    record = lambda t_us, frame: recorded.append(frame)  # noqa: E731
-    link = GcsLink(station.getsockname(), Inbox(), CONTEXT, record, (service,))
     request = FrameWriter(255, 190).frame(ids.LOG_REQUEST_DATA, 0, 2000, 0, 1, 1)
-    station.sendto(request, ("127.0.0.1", link.port))
-    for tick in range(20):
-        link.poll(1_000_000 + 2_000 * tick)
-        link.publish(outputs_at(1_000_000 + 2_000 * tick))
-    sent = Counter(frame.message_id for frame in split(b"".join(_datagrams(station))))
-    kept = Counter(frame.message_id for frame in split(b"".join(recorded)))
+    with ground_station(services=(LogService(flight_logs(run)),)) as ground:
+        ground.polled(request)
+        sent = Counter(frame.message_id for frame in ground.fly(20))
+        kept = Counter(id_ for _, raw in ground.recorded for id_ in [next(split(raw)).message_id])
     assert sent[ids.LOG_DATA] == 23
     assert kept == sent - Counter({ids.LOG_DATA: 23}) + Counter({ids.LOG_REQUEST_DATA: 1})
-    link.close()
-    station.close()
-
-
-def _datagrams(station: socket.socket) -> Iterator[bytes]:
-    with contextlib.suppress(BlockingIOError):
-        while True:
-            yield station.recv(2048)
 
 
 def test_a_service_that_fails_ends_neither_the_link_nor_the_flight(

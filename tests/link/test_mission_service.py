@@ -10,8 +10,6 @@ from typing import Any
 
 import pytest
 
-from fsw.link.gcs_link import GcsLink
-from fsw.link.inbox import Inbox
 from fsw.link.mission_service import MissionService
 from fsw.link.mission_store import Kind, MissionStore, Site
 from fsw.signals import (
@@ -23,8 +21,9 @@ from fsw.signals import (
     Vec3,
     WorkspaceSphere,
 )
+from tests.link.ground import Ground, ground_station
 from tests.link.mission_client import Client, Item, Weather
-from tests.link.snapshots import CONTEXT, SNAPSHOT, outputs_at
+from tests.link.snapshots import SNAPSHOT, outputs_at
 
 NAN = math.nan
 ACCEPTED, ERROR, UNSUPPORTED_FRAME, UNSUPPORTED, NO_SPACE = 0, 1, 2, 3, 4
@@ -59,28 +58,25 @@ def judge(safe_set: SafeSet) -> tuple[str, ...]:
 class Vehicle:
     """A link that serves missions, and what it would tell the tick."""
 
-    link: GcsLink
+    ground: Ground
     store: MissionStore
-    station: socket.socket
+
+    @property
+    def station(self) -> socket.socket:
+        return self.ground.station
 
     def client(self, system: int = 255, weather: Weather | None = None) -> Client:
         def publish(t_us: int) -> None:
-            self.link.publish(outputs_at(t_us))
+            self.ground.links.publish(outputs_at(t_us))
 
-        return Client(self.link, self.station, system, weather, publish)
+        return Client(self.ground.link, self.station, system, weather, publish)
 
 
 @pytest.fixture
 def vehicle() -> Iterator[Vehicle]:
-    station = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-    station.bind(("127.0.0.1", 0))
-    station.setblocking(False)
     store = MissionStore(Site(locate, judge, 0.1))
-    service = MissionService(store)
-    link = GcsLink(station.getsockname(), Inbox(), CONTEXT, lambda t, f: None, (service,))
-    yield Vehicle(link, store, station)
-    link.close()
-    station.close()
+    with ground_station(services=(MissionService(store),)) as ground:
+        yield Vehicle(ground, store)
 
 
 def same(items: list[Any], uploaded: list[Item]) -> None:

@@ -19,6 +19,13 @@ PINNED = {
     "WORKSPACE_SPHERE": (60208, 18, 197),
 }
 
+# From pymavlink's development.xml, as MAVLink's common.xml and QGroundControl have them.
+STANDARD_MODES = {
+    "AVAILABLE_MODES": (435, 46, 134),
+    "CURRENT_MODE": (436, 9, 193),
+    "AVAILABLE_MODES_MONITOR": (437, 1, 30),
+}
+
 PINNED_ENUMS = {
     "PANDION_CONSTRAINT_KIND": ("NONE", "WALLS", "WORKSPACE"),
     "PANDION_SOLVER_STATUS": (
@@ -42,6 +49,14 @@ def test_every_private_message_keeps_its_id_length_and_crc_extra():
         if message_id >= common_ids
     }
     assert private == PINNED
+
+
+def test_the_standard_modes_are_those_that_ground_stations_know():
+    known = {
+        name: (id_, dialect.mavlink_map[id_].unpacker.size, dialect.mavlink_map[id_].crc_extra)
+        for name, (id_, _, _) in STANDARD_MODES.items()
+    }
+    assert known == STANDARD_MODES
 
 
 def test_the_catalogue_shows_the_same_numbers():

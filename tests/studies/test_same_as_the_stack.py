@@ -22,7 +22,11 @@ def test_in_process_and_over_the_wire_are_one_flight(tmp_path: Path) -> None:
         ground.bind(("127.0.0.1", 0))
         result = tmp_path / "result.json"
         words = ["workspace", f"--seed={SEED}", f"--duration={DURATION_S}", f"--json={result}"]
-        words += [f"--gcs=udp:127.0.0.1:{ground.getsockname()[1]}", f"--out={tmp_path / 'out'}"]
+        words += [
+            "--api=none",
+            f"--gcs=udp:127.0.0.1:{ground.getsockname()[1]}",
+            f"--out={tmp_path / 'out'}",
+        ]
         command = [sys.executable, "-m", "pandion", "fly", *words]
         subprocess.run(command, check=True, capture_output=True, timeout=300)
     wire = json.loads(result.read_text())

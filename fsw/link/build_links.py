@@ -1,0 +1,69 @@
+"""Opens the links to the ground that were chosen."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Final
+
+from fsw.link.gcs_link import GcsLink, LinkSetup, RecordFrame
+from fsw.link.ground_links import GroundLinks
+from fsw.link.inbox import Inbox
+from fsw.link.key_file import KeyFile
+from fsw.link.link_choice import LinkChoice, addresses, default_keys
+from fsw.link.service import LinkService
+from fsw.link.signing import Signing
+from fsw.link.streams import API_RATES, GROUND_RATES
+from fsw.link.telemetry import TelemetryContext
+from fsw.link.time_service import TimeService
+from fsw.ports import Clock
+
+_GCS_PORT: Final = 18570  # of our own, as PX4 has it, if they are free
+_API_PORT: Final = 14580
+
+
+def build_links(
+    choice: LinkChoice,
+    inbox: Inbox,
+    context: TelemetryContext,
+    clocks: tuple[Clock, Clock],
+    record: RecordFrame,
+    services: Callable[[], Sequence[LinkService]],
+) -> GroundLinks:
+    """Open the links.
+
+    Args:
+        choice: Which.
+        inbox: Takes what is for the vehicle, from all of them.
+        context: What encoders need.
+        clocks: Monotonic time and Unix time [us].
+        record: Is told every frame of the ground station's link; the programs' link would repeat
+            the same telemetry under the same sequence numbers.
+        services: Makes what one link serves.
+
+    Raises:
+        LinkError: An address is none, or a key cannot be trusted.
+    """
+    chosen = addresses(choice)
+    now_us, unix_us = clocks
+    keys = choice.keys or default_keys()
+    setups = [
+        LinkSetup("gcs", chosen.gcs, _GCS_PORT, GROUND_RATES, True, choice.allow_remote),
+    ]
+    if chosen.api is not None:
+        setups.append(
+            # Until a program speaks, a heartbeat a second is all it needs to find the vehicle.
+            LinkSetup("api", chosen.api, _API_PORT, API_RATES, False, choice.allow_remote)
+        )
+    links = [
+        GcsLink(
+            setup,
+            inbox,
+            context,
+            Signing(number, unix_us, KeyFile(keys / f"signing-{setup.name}.json")),
+            now_us,
+            record if number == 0 else None,
+            (TimeService(), *services()),
+        )
+        for number, setup in enumerate(setups)
+    ]
+    return GroundLinks(links, context.facts.tick_period_us, now_us)

@@ -1,0 +1,91 @@
+"""All links to the ground, as the loop sees them."""
+
+from __future__ import annotations
+
+import select
+import time
+from collections.abc import Sequence
+from typing import Final
+
+from fsw.link.gcs_link import GcsLink
+from fsw.link.stream_rates import SLOT_US
+from fsw.ports import Clock
+from fsw.signals import CommandAck, TickOutputs
+
+_READ_BYTES: Final = 4096  # of each link a slot in lockstep, of all links a tick in real time
+_ONE: Final = 1  # byte of budget: one datagram
+_GUARD_US: Final = 200  # before a tick: the dearest datagram takes less
+
+
+class GroundLinks:
+    """The ground station's link and the programs' link, each with its own peers and rates."""
+
+    def __init__(self, links: Sequence[GcsLink], tick_period_us: int, clock: Clock) -> None:
+        self.links = tuple(links)
+        self._clock = clock
+        self._tick_us = tick_period_us
+        self._slot_ticks = SLOT_US // tick_period_us
+        self._tick = 0
+        self._shown: object = None
+        self._t_us = 0  # of the last tick
+        self._attends = False
+
+    def poll(self, t_us: int) -> None:
+        """Read what arrived, in lockstep; call it once a tick, before the tick."""
+        if self._attends or self._tick % self._slot_ticks:
+            return
+        for link in self.links:
+            link.read(t_us, _READ_BYTES)
+
+    def attend(self, seconds: float) -> None:
+        """Sleep, and answer the ground meanwhile: in real time it is heard between two ticks.
+
+        One datagram is read at a time and none shortly before the end, so a flood delays no tick.
+
+        Args:
+            seconds: How long to sleep [s].
+        """
+        self._attends = True
+        begin = self._clock()
+        until, budget = begin + round(1e6 * seconds), _READ_BYTES
+        while budget > 0 and (left := until - self._clock() - _GUARD_US) > 0:
+            ready, _, _ = select.select(self.links, (), (), 1e-6 * left)
+            if not ready:
+                break
+            # The vehicle's time goes on between two ticks.
+            t_us = self._t_us + min(self._clock() - begin, self._tick_us - 1)
+            for link in ready:
+                budget -= _ONE - link.read(t_us, _ONE)
+        time.sleep(1e-6 * max(until - self._clock(), 0))
+
+    def publish(self, outputs: TickOutputs) -> None:
+        """Send what is due on this tick; call it once a tick, after the actuators."""
+        snapshot = outputs.snapshot
+        shown = (snapshot.mode, snapshot.armed, snapshot.landed, snapshot.failures)
+        changed = shown != self._shown
+        self._shown = shown
+        tick, t_us = self._tick, snapshot.t_us
+        self._t_us = t_us
+        self._tick += 1
+        slot = tick % self._slot_ticks == 0
+        for link in self.links:
+            if changed or slot or outputs.texts or link.rates.slot_us < SLOT_US:
+                link.publish(outputs, changed)
+            if link.talks:
+                link.serve(t_us)
+            if slot and self._attends:
+                # Ticks without a pause between them must not make the vehicle deaf.
+                link.read(t_us, _ONE)
+
+    def acknowledge(self, t_us: int, ack: CommandAck) -> None:
+        """Answer a command on the link it came from; on all where that cannot be told."""
+        hearing = [
+            link for link in self.links if link.hears(ack.target_system, ack.target_component)
+        ]
+        for link in hearing or self.links:
+            link.acknowledge(t_us, ack)
+
+    def close(self) -> None:
+        """Close all sockets."""
+        for link in self.links:
+            link.close()

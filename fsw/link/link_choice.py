@@ -1,0 +1,61 @@
+"""Which links to the ground a flight has, as chosen on the command line."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from fsw.link.telemetry import GENERIC, PX4
+from fsw.link.udp_endpoint import Address, LinkError, parse_address
+
+NO_LINK: Final = "none"
+AUTOPILOTS: Final = {"px4": PX4, "generic": GENERIC}
+
+
+@dataclass(frozen=True, slots=True)
+class LinkChoice:
+    """Where telemetry goes and who is heard; the defaults are those of the command line."""
+
+    gcs: str = "udp:127.0.0.1:14550"  # udp:HOST:PORT of the ground station
+    api: str = "udp:127.0.0.1:14540"  # the same of a program, or "none"
+    allow_remote: bool = False  # hear other machines though both are on this one
+    autopilot: str = "px4"  # or "generic": what the vehicle says it is
+    keys: Path | None = None  # directory of the signing keys; None: default_keys()
+
+    def as_arguments(self) -> list[str]:
+        """The same as words of a command line."""
+        words = [f"--gcs={self.gcs}", f"--api={self.api}", f"--autopilot={self.autopilot}"]
+        if self.allow_remote:
+            words.append("--allow-remote")
+        if self.keys is not None:
+            words.append(f"--keys={self.keys}")
+        return words
+
+
+@dataclass(frozen=True, slots=True)
+class LinkAddresses:
+    """A choice, checked."""
+
+    gcs: Address
+    api: Address | None
+
+
+def addresses(choice: LinkChoice) -> LinkAddresses:
+    """Read the addresses of a choice.
+
+    Raises:
+        LinkError: One of them is none.
+    """
+    api = None if choice.api == NO_LINK else parse_address(choice.api)
+    gcs = parse_address(choice.gcs)
+    if api == gcs:
+        raise LinkError(f"--gcs and --api are both {choice.gcs}; give them different ports")
+    return LinkAddresses(gcs, api)
+
+
+def default_keys() -> Path:
+    """Where signing keys are kept unless told otherwise."""
+    state = os.environ.get("XDG_STATE_HOME")
+    return (Path(state) if state else Path.home() / ".local" / "state") / "pandion"

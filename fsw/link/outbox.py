@@ -1,0 +1,67 @@
+"""Frames on their way to the peers of one link."""
+
+from __future__ import annotations
+
+import struct
+from typing import Final
+
+from fsw.link import encode_replies, message_ids
+from fsw.link.message_ids import AUTOPILOT, PANDION, SYSTEM_ID
+from fsw.link.service import Outgoing, WireValues
+from fsw.link.signing import Signing
+from fsw.signals import StatusText
+from messages.frames import FrameWriter
+
+_MAX_DATAGRAM: Final = 1400  # bytes, fits an Ethernet packet
+
+
+class Outbox:
+    """Encodes, counts sequences, signs where the link is signed, and packs."""
+
+    def __init__(self, signing: Signing) -> None:
+        self.encode_failures = 0
+        self._signing = signing
+        self._writers = {id_: FrameWriter(SYSTEM_ID, id_) for id_ in (AUTOPILOT, PANDION)}
+        self._frames: list[bytes] = []
+        self._text_id = 0
+
+    def add(self, component: int, message_id: int, values: WireValues) -> None:
+        """Take one message; one with a number that does not fit its field is dropped and counted.
+
+        Such a number must not end the flight it describes.
+        """
+        try:
+            frame = self._writers[component].frame(message_id, *values)
+        except (struct.error, OverflowError, ValueError, KeyError, TypeError):
+            self.encode_failures += 1
+            return
+        self._frames.append(self._signing.signed(frame) if self._signing.active else frame)
+
+    def add_outgoing(self, outgoing: Outgoing) -> None:
+        """Take what a service says."""
+        self.add(outgoing.component, outgoing.message_id, outgoing.values)
+
+    def add_text(self, text: StatusText) -> None:
+        """Take a sentence, in as many STATUSTEXT as it needs."""
+        self._text_id = self._text_id % 0xFFFF + 1
+        for values in encode_replies.status_texts(text, self._text_id):
+            self.add(AUTOPILOT, message_ids.STATUSTEXT, values)
+
+    def is_own(self, system: int, component: int) -> bool:
+        """Whether a frame from there is one of ours, sent back by a router."""
+        return system == SYSTEM_ID and component in self._writers
+
+    def take(self) -> list[bytes]:
+        """Hand over the frames, in order."""
+        frames, self._frames = self._frames, []
+        return frames
+
+
+def packed(frames: list[bytes]) -> list[bytes]:
+    """Join frames into as few datagrams as fit an Ethernet packet."""
+    datagrams = [b""]
+    for frame in frames:
+        if len(datagrams[-1]) + len(frame) > _MAX_DATAGRAM:
+            datagrams.append(b"")
+        datagrams[-1] += frame
+    return datagrams
