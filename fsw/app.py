@@ -20,8 +20,10 @@ from fsw.link.sim_link import Pacing, SimLink
 from fsw.link.telemetry import LoopHealth, TelemetryContext
 from fsw.link.udp_endpoint import LinkError, parse_address
 from fsw.link.vehicle_files import vehicle_files
+from fsw.log.flight_log import LogSubject
+from fsw.log.revision import revision
 from fsw.log.run_directory import new_run_directory
-from fsw.log.tlog import TlogWriter
+from fsw.log.run_files import RunFiles
 from fsw.ports import Planner
 from fsw.runtime import clock, report
 from fsw.runtime.effort import EffortRecord
@@ -110,27 +112,36 @@ class _Session:
         keeping.start()
         inbox = Inbox()
         start_us = clock.unix_us()
-        log = TlogWriter(directory / "flight.tlog", start_us)
+        files = RunFiles(directory, start_us, _subject(options, program), self._warn)
         sim = SimLink(simulator, inbox, facts)
         autopilot = AUTOPILOTS[options.links.autopilot]
         context = TelemetryContext(facts, record.health, autopilot, start_unix_us=start_us)
         logs = flight_logs(directory)
         clocks = (clock.now_us, clock.unix_us)
         ground = build_links(
-            options.links, inbox, context, clocks, log.add, lambda: self._services(program, logs)
+            options.links,
+            inbox,
+            context,
+            clocks,
+            files.tlog.add,
+            lambda: self._services(program, logs),
         )
-        loop = SimLoop(program, sim, ground, inbox, record, clock.now_us, self._stop)
+        loop = SimLoop(program, sim, ground, inbox, record, clock.now_us, self._stop, files)
         try:
             end = self._fly(loop, sim, program.planner, planner, record)
         finally:
-            for part in (planner, sim, ground, log, keeping):
+            for part in (planner, sim, ground, files, keeping):
                 part.close()
         setup = report.Setup(options.control.controller, options.control.inner, facts)
         result = report.as_json(setup, end, record, sim.retransmissions)
         result |= link_report.as_json(ground, inbox)
+        result["files"] = files.as_json()
         report.write(directory / "fsw.json", result)
         self._told.report("ended", f"fsw: {end.sentence}", ending=end.ending.value)
         return DONE if end.ending is Ending.SHUTDOWN else NOT_COMPLETED
+
+    def _warn(self, sentence: str) -> None:
+        self._told.report("warning", f"fsw: {sentence}")
 
     def _services(
         self, program: FlightProgram[Any], logs: Sequence[FlightLog]
@@ -191,7 +202,7 @@ class _Session:
         share_interpreter_fairly()
         refused = claim_real_time(TICK_PRIORITY)
         if refused:
-            self._told.report("warning", f"fsw: {NO_PERMISSION.format(' and '.join(refused))}")
+            self._warn(NO_PERMISSION.format(" and ".join(refused)))
         settle_memory()
         try:
             return loop.fly(first, planner)
@@ -212,6 +223,29 @@ def load_flight_software(options: FswOptions) -> FlightProgram[Any]:
         return flight_software(options.control)
     except ValueError as error:
         raise CouldNotStart(str(error)) from None
+
+
+def _subject(options: FswOptions, program: FlightProgram[Any]) -> LogSubject:
+    """What the flight log says about the flight."""
+    facts: dict[str, str | int] = {
+        "ver_sw": revision(),
+        "scenario": options.scenario,
+        "controller": options.control.controller,
+        "inner": options.control.inner,
+        "robustness": options.control.robustness,
+        "solver": options.control.solver,
+        "soft": int(options.control.soft),
+    }
+    if options.seed is not None:
+        facts["seed"] = options.seed
+    vehicle = program.facts
+    return LogSubject(
+        facts,
+        program.numbers,
+        program.parameters.values,
+        vehicle.rotor_thrust_max,
+        vehicle.link_length,
+    )
 
 
 def _output_directory(wanted: Path | None) -> Path:

@@ -122,6 +122,8 @@ class FswOptions:
     wait_s: float  # for the simulator
     params: Path | None  # file that keeps the parameters; None: they end with the flight
     events: str  # "text" for people, "json" for programs
+    scenario: str = ""  # for the log only: what the simulator flies
+    seed: int | None = None  # for the log only
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -151,6 +153,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="text",
         help="how to report on standard output (default %(default)s)",
     )
+    parser.add_argument(
+        "--scenario", metavar="NAME", default="", help="what is flown, noted in the flight log"
+    )
+    parser.add_argument(
+        "--seed", metavar="N", type=int, help="the simulator's seed, noted in the flight log"
+    )
 
 
 def options(arguments: argparse.Namespace) -> FswOptions:
@@ -163,4 +171,6 @@ def options(arguments: argparse.Namespace) -> FswOptions:
         wait_s=arguments.wait,
         params=arguments.params,
         events=arguments.events,
+        scenario=arguments.scenario,
+        seed=arguments.seed,
     )

@@ -21,6 +21,8 @@ verbs:
   reproduce   fly a table or a figure of the paper again
   bench       time the planner's optimiser against others
   dialect     teach MAVProxy, Wireshark and others the private messages
+  replay      feed a flight log through the flight software again and compare
+  export      write a flight log as CSV or MCAP
 
 options:
   --version   print the version
@@ -31,6 +33,7 @@ examples:
   pandion fly workspace-calm --realtime --duration 20
   pandion sitl walls --listen udp:127.0.0.1:4560
   pandion fsw --sim udp:127.0.0.1:4560 --gcs udp:127.0.0.1:14550
+  pandion replay runs/walls-seed0-1 --verify
   pandion reproduce table4 --plant double-integrator --seeds 100:120
 """
 
@@ -107,6 +110,18 @@ def _reproduce(argv: list[str]) -> int:
     return reproduce.main(argv)
 
 
+def _replay(argv: list[str]) -> int:
+    from pandion import replay
+
+    return replay.main(argv)
+
+
+def _export(argv: list[str]) -> int:
+    from pandion import export
+
+    return export.main(argv)
+
+
 INTERRUPTED: Final = 1  # exit code
 VERBS: Final[dict[str, Callable[[list[str]], int]]] = {
     "fly": _fly,
@@ -115,6 +130,8 @@ VERBS: Final[dict[str, Callable[[list[str]], int]]] = {
     "reproduce": _reproduce,
     "bench": _bench,
     "dialect": _dialect,
+    "replay": _replay,
+    "export": _export,
 }
 
 if __name__ == "__main__":

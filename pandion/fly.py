@@ -81,12 +81,15 @@ def _fsw_arguments(options: FlyOptions, port: int) -> list[str]:
         *([] if options.params is None else [f"--params={options.params}"]),
         f"--out={options.out}",
         "--wait=600",
+        f"--scenario={options.scenario_name}",
+        f"--seed={options.seed}",
     ]
 
 
 def _judge(options: FlyOptions, display: Display, flown: Flown) -> int:
     out = options.out
     names = {
+        "ulog": "flight.ulg",
         "tlog": "flight.tlog",
         "result": "result.json",
         "sitl": "sitl.json",

@@ -7,10 +7,10 @@ time, so that a flight in lockstep plays back at the speed at which it happened.
 
 from __future__ import annotations
 
-import queue
-import threading
 from pathlib import Path
 from typing import Final
+
+from fsw.log.block_file import BlockFile
 
 _FLUSH_INTERVAL_US: Final = 500_000
 _FLUSH_BYTES: Final = 1 << 16
@@ -32,13 +32,11 @@ class TlogWriter:
         Raises:
             OSError: The file exists or cannot be created.
         """
-        self._file = path.open("xb", buffering=0)
+        self.file = BlockFile(path)
+        self.file.start_thread()
         self._start_us = start_unix_us
         self._records = bytearray()
         self._flushed_us = 0
-        self._full: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
-        self._writer = threading.Thread(target=self._write, name="tlog", daemon=True)
-        self._writer.start()
 
     def add(self, t_us: int, frame: bytes) -> None:
         """Append one frame.
@@ -50,18 +48,14 @@ class TlogWriter:
         self._records += (self._start_us + t_us).to_bytes(8, "big") + frame
         if t_us - self._flushed_us >= _FLUSH_INTERVAL_US or len(self._records) > _FLUSH_BYTES:
             self._flushed_us = t_us
-            self._full.put(bytes(self._records))
-            self._records.clear()
+            self._flush()
 
     def close(self) -> None:
         """Write what is left and close the file; safe to call twice."""
-        if self._file.closed:
-            return
-        self._full.put(bytes(self._records))
-        self._full.put(None)
-        self._writer.join()
-        self._file.close()
+        self._flush()
+        self.file.close()
 
-    def _write(self) -> None:
-        while (records := self._full.get()) is not None:
-            self._file.write(records)
+    def _flush(self) -> None:
+        if self._records:
+            self.file.put(self._records)
+            self._records = bytearray()

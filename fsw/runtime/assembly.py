@@ -9,6 +9,7 @@ from fsw.link.telemetry import VehicleFacts
 from fsw.mpc.planner import Planner
 from fsw.mpc.planner_config import Solver
 from fsw.parameters.control_choice import ControlChoice
+from fsw.parameters.flat import flat
 from fsw.parameters.flight_config import FlightConfig, flight_config
 from fsw.parameters.store import ParameterStore
 from fsw.runtime import clock
@@ -17,8 +18,8 @@ from fsw.runtime.program import FlightProgram
 from fsw.runtime.tuned_flight import TunedFlight
 
 
-def flight_software(choice: ControlChoice) -> FlightProgram[Any]:
-    """Build everything that flies and compile it, which takes a minute the first time.
+def flight_software(choice: ControlChoice, *, to_plan: bool = True) -> FlightProgram[Any]:
+    """Build everything that flies and, if it is to plan, compile it: a minute the first time.
 
     Raises:
         ValueError: For an unknown name, listing the known ones.
@@ -32,11 +33,14 @@ def flight_software(choice: ControlChoice) -> FlightProgram[Any]:
         soft=choice.soft,
     )
     planner = Planner(config.planner, clock.stopwatch_us)
-    planner.warm_up()
     flight = TunedFlight(config)
-    flight.warm_up()
+    if to_plan:
+        planner.warm_up()
+        flight.warm_up()
     parameters = ParameterStore(config, flight.prepare)
-    return FlightProgram(_facts(config), FlightState(), flight.tick, planner, parameters)
+    return FlightProgram(
+        _facts(config), FlightState(), flight.tick, planner, parameters, flat(config)
+    )
 
 
 def _facts(config: FlightConfig) -> VehicleFacts:

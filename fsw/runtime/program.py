@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Generic, TypeVar
 
 from fsw.link.telemetry import VehicleFacts
@@ -26,3 +26,4 @@ class FlightProgram(Generic[State]):
     tick: Callable[[State, TickInputs], tuple[State, TickOutputs]]
     planner: Planner
     parameters: ParameterStore
+    numbers: Mapping[str, float] = field(default_factory=dict)  # of the configuration, by name

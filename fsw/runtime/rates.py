@@ -20,8 +20,10 @@ class Member(enum.Enum):
     ACTUATE = "actuate"  # answer the simulator; until here the vehicle waits
     ASK = "ask"  # hand a request to the planner
     PUBLISH = "publish"  # telemetry to the ground
+    RECORD = "record"  # the flight log
     SUM_UP = "sum up"  # timing of the second that is over
     WARN = "warn"  # what went wrong since the last warning
+    WATCH_FILES = "watch files"  # whether the disk still takes them
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +39,9 @@ class RateGroup:
 INNER: Final = RateGroup("inner", 0, 2_000, (Member.HEAR, Member.TICK, Member.ACTUATE))
 MPC: Final = RateGroup("mpc", 1, 100_000, (Member.ASK,))
 # Every stream of messages has a rate of its own, in whole ticks: fsw/link/streams.py.
-TELEMETRY: Final = RateGroup("telemetry", 2, 2_000, (Member.PUBLISH,))
-HOUSEKEEPING: Final = RateGroup("housekeeping", 3, 1_000_000, (Member.SUM_UP, Member.WARN))
+TELEMETRY: Final = RateGroup("telemetry", 2, 2_000, (Member.PUBLISH, Member.RECORD))
+HOUSEKEEPING: Final = RateGroup(
+    "housekeeping", 3, 1_000_000, (Member.SUM_UP, Member.WARN, Member.WATCH_FILES)
+)
 
 RATE_GROUPS: Final = (INNER, MPC, TELEMETRY, HOUSEKEEPING)

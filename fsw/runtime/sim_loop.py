@@ -15,7 +15,8 @@ from fsw.link.ground_links import GroundLinks
 from fsw.link.inbox import Inbox
 from fsw.link.message_ids import PATH_PLANNER, SYSTEM_ID
 from fsw.link.sim_link import Pacing, SimLink
-from fsw.link.telemetry import LoopHealth
+from fsw.link.telemetry import GroupTiming, LoopHealth
+from fsw.log.run_files import RunFiles
 from fsw.ports import Clock, PlanService
 from fsw.runtime.effort import EffortRecord
 from fsw.runtime.guarded_tick import GuardedTick
@@ -85,6 +86,7 @@ class SimLoop(Generic[State]):
         record: FlightRecord,
         clock: Clock,
         stop: StopRequest,
+        files: RunFiles,
         sleep: Callable[[float], None] | None = None,
     ) -> None:
         self._program = program
@@ -97,6 +99,7 @@ class SimLoop(Generic[State]):
         self._record = record
         self._clock = clock
         self._stop = stop
+        self._files = files
         self._sleep = sleep or ground.attend  # what time is left belongs to the ground
         self._warning = SlipWarning()
         self._notices: list[StatusText] = []
@@ -107,8 +110,10 @@ class SimLoop(Generic[State]):
             Member.ACTUATE: self._actuate,
             Member.ASK: self._ask,
             Member.PUBLISH: self._publish,
+            Member.RECORD: self._log,
             Member.SUM_UP: self._sum_up,
             Member.WARN: self._warn,
+            Member.WATCH_FILES: lambda _: files.check(),
         }
         self._groups = tuple(
             RateGroupRunner(group, methods, clock, self._tick_us) for group in RATE_GROUPS
@@ -136,6 +141,7 @@ class SimLoop(Generic[State]):
         heard = self._clock()
         release: Release | None = Release(first, 0, heard, heard)
         index, t_us = -1, first.t_us
+        self._files.ulog.begin(t_us, lockstep=self._sim.pacing is Pacing.LOCKSTEP)
         while not self._stop.requested:
             if release is not None:
                 t_us = release.sensors.t_us
@@ -215,6 +221,9 @@ class SimLoop(Generic[State]):
             self._notices.clear()
         self._ground.publish(outputs)
 
+    def _log(self, cycle: Cycle) -> None:
+        self._files.ulog.add(cycle.inputs, cycle.outputs)
+
     def _sum_up(self, cycle: Cycle) -> None:
         record, health = self._record, self._record.health
         record.stale = self._releases.stale
@@ -223,6 +232,10 @@ class SimLoop(Generic[State]):
         health.mpc = record.mpc.timer.close_interval()
         health.telemetry = record.groups[TELEMETRY.name].close_interval()
         health.housekeeping = record.groups[HOUSEKEEPING.name].close_interval()
+        timings = (health.inner, health.mpc, health.telemetry, health.housekeeping)
+        for group, timing in zip((INNER, MPC, TELEMETRY, HOUSEKEEPING), timings, strict=True):
+            values = _timing_values(timing)
+            self._files.ulog.add_timing(cycle.release.sensors.t_us, group.number, *values)
 
     def _warn(self, cycle: Cycle) -> None:
         if self._sim.pacing is Pacing.LOCKSTEP:
@@ -235,6 +248,20 @@ class SimLoop(Generic[State]):
 
     def _step_number(self, t_us: int) -> int:
         return (t_us - _START_US) // self._tick_us
+
+
+def _timing_values(timing: GroupTiming) -> tuple[tuple[int, int, int, int], tuple[float, ...]]:
+    """Counts and times in the order of the log's loop_timing."""
+    counts = (timing.ticks, timing.late_ticks, timing.skipped_ticks, timing.period_us)
+    times = (
+        timing.execution_p50_us,
+        timing.execution_p99_us,
+        timing.execution_max_us,
+        timing.lateness_p50_us,
+        timing.lateness_p99_us,
+        timing.lateness_max_us,
+    )
+    return counts, times
 
 
 def _silence(step: int) -> str:

@@ -14,10 +14,13 @@ import sys
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
 from pathlib import Path
+from random import Random
 
 import pytest
 
 from fsw.link.streams import STREAMS
+from fsw.log.flight_log import FlightLog, LogSubject
+from fsw.log.reference import inserted
 from fsw.log.tlog import TlogWriter
 from fsw.mpc.planner_config import PlannerConfig
 from messages import dialect
@@ -29,6 +32,8 @@ from pandion.result import Parts, as_json
 from sitl.link.encode import StepEncoder
 from sitl.scenario_file import load_scenario, scenario_names
 from sitl.simulation import Simulation
+from tests.fsw.log.specimens import inputs
+from tests.link.snapshots import outputs_at
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
@@ -139,6 +144,7 @@ def test_python_examples_run(
     monkeypatch.chdir(tmp_path)
     write_capture(tmp_path / "link.pcap")
     write_log(tmp_path / "flight.tlog")
+    write_flight_log(tmp_path / "flight.ulg")
     (tmp_path / "result.json").write_text(
         json.dumps({"margins_m": {"front/base": 0.1}, "completed": True}), encoding="utf-8"
     )
@@ -165,6 +171,15 @@ def write_log(path: Path) -> None:
     log.close()
 
 
+def write_flight_log(path: Path) -> None:
+    """A flight log of one tick."""
+    facts: dict[str, str | int] = {"ver_sw": "0", "scenario": "walls", "seed": 0}
+    log = FlightLog(path, LogSubject(facts, {}, {}, 16.0, (0.15, 0.15)))
+    log.begin(1_000_000, lockstep=True)
+    log.add(inputs(1_000_000, Random(0)), outputs_at(1_000_000))
+    log.close()
+
+
 def test_the_keys_of_the_result_on_the_page_are_those_that_are_written() -> None:
     result = as_json(Parts("walls", 0, "blf", None, None, None, {}))
     rows = re.findall(r"^\| (`.*?) \| (.*) \|$", (DOCS / "result.md").read_text("utf-8"), re.M)
@@ -177,6 +192,11 @@ def test_the_keys_of_the_result_on_the_page_are_those_that_are_written() -> None
 def test_the_reference_of_messages_is_not_stale() -> None:
     page = DOCS / "messages.md"
     assert page.read_text(encoding="utf-8") == reference(), "run python -m messages.reference"
+
+
+def test_the_topics_of_the_flight_log_are_not_stale() -> None:
+    page = (DOCS / "flight-log.md").read_text(encoding="utf-8")
+    assert page == inserted(page), "run python -m fsw.log.reference"
 
 
 def test_the_streams_on_the_page_are_those_that_are_sent() -> None:

@@ -1,0 +1,302 @@
+"""What a tick was given and what it said, as records of the flight log.
+
+The flight and ``pandion replay`` call the same encoder, so comparing their bytes compares every
+field of every topic. Records that come with every tick are packed in one call: at 500 Hz a call
+each would cost more than the numbers in them.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from operator import attrgetter
+from struct import Struct
+from typing import Any, Final
+
+from fsw.geometry.rotation import quaternion_from_matrix
+from fsw.log import topics
+from fsw.log.input_text import InputText
+from fsw.model.arm_kinematics import point_in_flight
+from fsw.signals import (
+    CommandRequest,
+    FlightSnapshot,
+    Mode,
+    PlanRequest,
+    PlanTimings,
+    TickInputs,
+    TickOutputs,
+    Vec2,
+)
+from messages.ulog import Topic, data_head, logged_text
+
+TYPED: Final = "sensors"  # the input that has a topic of its own
+STATUS_TICKS: Final = 500
+
+_UNMEASURED: Final = PlanTimings(math.nan, math.nan, math.nan)
+_NOWHERE: Final = (math.nan, math.nan, math.nan)
+_LARGEST: Final = struct.unpack("<f", b"\xff\xff\x7f\x7f")[0]
+_U16, _U32 = 0xFFFF, 0xFFFFFFFF
+
+_LOITER: Final = 4
+# PX4's NAVIGATION_STATE of what a mode does; the modes' own names are in the log as well.
+NAV_STATES: Final[dict[str, int]] = {
+    "disarmed": _LOITER,  # what it would start in, as in custom_mode
+    "takeoff": 17,
+    "hold": _LOITER,
+    "trajectory": 14,  # offboard
+    "offboard": 14,
+    "mission": 3,
+    "return": 5,
+    "land": 18,
+    "fault": 13,  # termination
+}
+
+
+class _Packed:
+    """Records of some topics, packed in one call."""
+
+    def __init__(self, *members: Topic) -> None:
+        self.heads = tuple(data_head(topics.TOPICS.index(topic), topic) for topic in members)
+        self.struct = Struct("<" + "".join("5s" + topic.codes for topic in members))
+
+    def pack(self, values: tuple[Any, ...]) -> bytes:
+        """Pack heads and values; a number too large for a float becomes infinite."""
+        try:
+            return self.struct.pack(*values)
+        except OverflowError:
+            return self.struct.pack(*map(_within_float, values))
+
+
+_TICK: Final = _Packed(
+    topics.SENSOR_FRAME,
+    topics.VEHICLE_ATTITUDE,
+    topics.VEHICLE_ANGULAR_VELOCITY,
+    topics.VEHICLE_LOCAL_POSITION,
+    topics.ACTUATOR_COMMAND,
+    topics.ACTUATOR_MOTORS,
+    topics.ARM_JOINT_STATE,
+)
+_SENSORS, _ATTITUDE, _RATES, _POSITION, _COMMAND, _MOTORS, _ARM = _TICK.heads
+_IN_FLIGHT: Final = _Packed(
+    topics.VEHICLE_LOCAL_POSITION_SETPOINT, topics.ARM_JOINT_SETPOINT, topics.PLAN_INPUT
+)
+_POSITION_SETPOINT, _ARM_SETPOINT, _PLAN_INPUT = _IN_FLIGHT.heads
+_PLANNING: Final = _Packed(topics.BARRIER_MARGIN, topics.END_EFFECTOR)
+_BARRIER, _END_EFFECTOR = _PLANNING.heads
+_MPC: Final = _Packed(topics.MPC_STATUS)
+_REQUEST: Final = _Packed(topics.MPC_REQUEST)
+_STATUS: Final = _Packed(topics.VEHICLE_STATUS, topics.VEHICLE_LAND_DETECTED)
+_ASKED: Final = _Packed(topics.VEHICLE_COMMAND)
+_ANSWERED: Final = _Packed(topics.VEHICLE_COMMAND_ACK)
+_INPUT: Final = _Packed(topics.TICK_INPUT)
+_TIMING: Final = _Packed(topics.LOOP_TIMING)
+
+
+class LogEncoder:
+    """Turns ticks into bytes; remembers what it has written, to write changes only."""
+
+    def __init__(self, *, measured: bool, thrust_max: float, link_length: Vec2) -> None:
+        """Start a log.
+
+        Args:
+            measured: Write times of the wall clock; without them a flight repeats to the byte.
+            thrust_max: Full thrust of a rotor [N].
+            link_length: Lengths of the arm's links [m].
+        """
+        self.inputs = InputText(TickInputs, {} if measured else {PlanTimings: _UNMEASURED})
+        self._measured = measured
+        self._per_newton = 1.0 / thrust_max
+        self._link_length = link_length
+        self._changing = tuple(name for name in self.inputs.fields if name != TYPED)
+        self._changing_of = attrgetter(*self._changing)
+        self._last_values: tuple[Any, ...] | None = None
+        self._last: FlightSnapshot | None = None
+        self._ticks_to_status = 0
+
+    def add(self, inputs: TickInputs, outputs: TickOutputs, out: bytearray) -> None:
+        """Append the records of one tick; the sensors' are the first."""
+        snapshot = outputs.snapshot
+        out += self._every_tick(inputs, snapshot)
+        if snapshot.plan_state is not None:
+            out += self._in_flight(snapshot)
+        self._add_inputs(inputs, out)
+        last = self._last
+        if last is None or snapshot.constraints is not last.constraints:
+            out += self._planning(snapshot)
+        if last is None or _plan_changed(snapshot, last):
+            out += self._mpc(snapshot)
+        if outputs.plan_request is not None:
+            out += _request(snapshot.t_us, outputs.plan_request)
+        self._ticks_to_status -= 1
+        if self._ticks_to_status < 0 or last is None or _status_changed(snapshot, last):
+            self._ticks_to_status = STATUS_TICKS - 1
+            out += _status(snapshot)
+        for ack in outputs.acks:
+            addressee = (ack.target_system & 0xFF, ack.target_component & _U16)
+            values = (ack.command & _U32, ack.result & 0xFF, *addressee)
+            out += _ANSWERED.pack((*_ANSWERED.heads, snapshot.t_us, *values))
+        for text in outputs.texts:
+            out += logged_text(text.severity & 7, snapshot.t_us, text.text)
+        self._last = snapshot
+
+    def _every_tick(self, inputs: TickInputs, snapshot: FlightSnapshot) -> bytes:
+        sensors, estimate, sent = inputs.sensors, snapshot.estimate, snapshot.actuators
+        t_us, k = sensors.t_us, self._per_newton
+        f1, f2, f3, f4 = sent.rotor_thrust
+        return _TICK.pack(
+            (
+                _SENSORS, t_us, *sensors.p_WB, *sensors.v_WB, *sensors.q_WB,
+                *sensors.gyro_B, *sensors.accel_B, *sensors.q_arm, *sensors.qd_arm,
+                _ATTITUDE, t_us, *quaternion_from_matrix(estimate.R_WB),
+                _RATES, t_us, *estimate.w_WB_B,
+                _POSITION, t_us, *estimate.p_WB, *estimate.v_WB, estimate.yaw,
+                _COMMAND, t_us, f1, f2, f3, f4, *sent.joint_torque, snapshot.armed,
+                _MOTORS, t_us, k * f1, k * f2, k * f3, k * f4,
+                _ARM, t_us, *estimate.q_arm, *estimate.qd_arm, *sent.joint_torque,
+            )
+        )  # fmt: skip
+
+    def _in_flight(self, snapshot: FlightSnapshot) -> bytes:
+        t_us, x, u = snapshot.t_us, snapshot.plan_state, snapshot.plan_input
+        assert x is not None
+        a, yaw_acc, qdd = (
+            ((0.0,) * 3, 0.0, (0.0, 0.0)) if u is None else (u.a, u.yaw_acc, u.qdd_arm)
+        )
+        return _IN_FLIGHT.pack(
+            (
+                *(_POSITION_SETPOINT, t_us, *x.p, *x.v, *x.a, x.yaw, x.yaw_rate),
+                *(_ARM_SETPOINT, t_us, *x.q_arm, *x.qd_arm, *qdd),
+                *(_PLAN_INPUT, t_us, *a, yaw_acc),
+            )
+        )
+
+    def _add_inputs(self, inputs: TickInputs, out: bytearray) -> None:
+        """Every input that is not what it was on the tick before."""
+        last, values = self._last_values, self._changing_of(inputs)
+        # Identity first, and in one comparison: on most ticks nothing is new.
+        if values == last:
+            return
+        t_us, self._last_values = inputs.sensors.t_us, values
+        for k, (name, value) in enumerate(zip(self._changing, values, strict=True)):
+            if last is not None and (value is last[k] or value == last[k]):
+                continue
+            _add_text(t_us, name, self.inputs.text(name, value), out)
+            if name == "commands":
+                for command in inputs.commands:
+                    out += _command(t_us, command)
+
+    def _planning(self, snapshot: FlightSnapshot) -> bytes:
+        t_us, report, target = snapshot.t_us, snapshot.constraints, snapshot.reference
+        margins, barrier = report.margins[: topics.MARGINS], report.barrier[: topics.MARGINS]
+        least = min(margins, default=math.nan)
+        argmin = margins.index(least) if least in margins else 0xFF
+        p, v = point_in_flight(snapshot.estimate, self._link_length)
+        wanted = (
+            (*_NOWHERE, *_NOWHERE, math.nan)
+            if target is None
+            else (*target.p_WE, *target.v_WE, target.yaw)
+        )
+        return _PLANNING.pack(
+            (
+                *(_BARRIER, t_us, *_filled(margins), *_filled(barrier), least),
+                *(int(report.kind), len(margins), argmin),
+                *(_END_EFFECTOR, t_us, *p, *v, *wanted),
+            )
+        )
+
+    def _mpc(self, snapshot: FlightSnapshot) -> bytes:
+        plan, counters = snapshot.plan, snapshot.counters
+        counts = (counters.plans, counters.missed_deadlines, counters.fallbacks)
+        about: tuple[float, ...] = (math.nan,) * 5 + (0, 0)
+        t_plan = plan_id = 0
+        if plan is not None:
+            t_plan, plan_id = plan.t_us, plan.plan_id & _U32
+            times = plan.timings if self._measured else _UNMEASURED
+            about = (
+                *(plan.cost, plan.slack_max, times.linearise_us, times.solve_us, times.total_us),
+                *(min(plan.sqp_iterations, _U16), min(plan.solver_iterations, _U16)),
+            )
+        return _MPC.pack(
+            (
+                *(*_MPC.heads, snapshot.t_us, t_plan, plan_id, *counts, *about),
+                int(snapshot.plan_status),
+            )
+        )
+
+
+def loop_timing(t_us: int, group: int, counts: tuple[int, ...], times: tuple[float, ...]) -> bytes:
+    """A record of loop_timing.
+
+    Args:
+        t_us: Sensor time [us].
+        group: 0 for the tick, 1 for the planner.
+        counts: Ticks, late and skipped ones, and the period [us].
+        times: Execution and lateness, each median, 99th percentile and most [us].
+    """
+    return _TIMING.pack((*_TIMING.heads, t_us, *counts, *times, group))
+
+
+def _plan_changed(now: FlightSnapshot, last: FlightSnapshot) -> bool:
+    return (
+        now.plan is not last.plan
+        or now.counters is not last.counters
+        or now.plan_status is not last.plan_status
+    )
+
+
+def _status_changed(now: FlightSnapshot, last: FlightSnapshot) -> bool:
+    return (
+        now.mode is not last.mode
+        or now.armed is not last.armed
+        or now.landed is not last.landed
+        or (now.failures is not last.failures and now.failures != last.failures)
+    )
+
+
+def _status(snapshot: FlightSnapshot) -> bytes:
+    mode: Mode = snapshot.mode
+    head, landing = _STATUS.heads
+    return _STATUS.pack(
+        (
+            *(head, snapshot.t_us, 2 if snapshot.armed else 1, NAV_STATES.get(mode.value, _LOITER)),
+            *(bool(snapshot.failures), mode.value.encode(), ",".join(snapshot.failures).encode()),
+            *(landing, snapshot.t_us, snapshot.landed),
+        )
+    )
+
+
+def _request(t_us: int, request: PlanRequest) -> bytes:
+    x = request.start
+    first = request.targets[0].p_WE if request.targets else _NOWHERE
+    return _REQUEST.pack(
+        (
+            *(*_REQUEST.heads, t_us, request.plan_id & _U32, request.t_apply_us),
+            *(*x.p, *x.v, *x.a, *x.j, *x.s, x.yaw, x.yaw_rate, *x.q_arm, *x.qd_arm),
+            *(*first, request.from_nominal),
+        )
+    )
+
+
+def _command(t_us: int, request: CommandRequest) -> bytes:
+    heads, params, number = _ASKED.heads, request.params, request.command & _U32
+    source = (request.source_system & 0xFF, request.source_component & _U16)
+    return _ASKED.pack((*heads, t_us, *params, number, *source, request.confirmation & 0xFF))
+
+
+def _add_text(t_us: int, name: str, text: bytes, out: bytearray) -> None:
+    size = topics.TEXT_SIZE
+    parts = max(-(-len(text) // size), 1)
+    for part in range(parts):
+        piece = text[part * size : (part + 1) * size]
+        out += _INPUT.pack((*_INPUT.heads, t_us, name.encode("ascii"), part, parts, piece))
+
+
+def _filled(values: tuple[float, ...]) -> tuple[float, ...]:
+    return values + (math.nan,) * (topics.MARGINS - len(values))
+
+
+def _within_float(value: Any) -> Any:
+    """The value, or infinity where a 32-bit float has no room for it."""
+    if isinstance(value, float) and _LARGEST < abs(value) < math.inf:
+        return math.copysign(math.inf, value)
+    return value

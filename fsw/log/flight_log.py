@@ -1,0 +1,146 @@
+"""The flight log, ``flight.ulg``: every tick with all that went into it and all that came out.
+
+What it costs the tick is the packing of some 600 bytes. In lockstep the loop writes them itself,
+so that the file repeats to the byte; in real time a thread does, and what the disk cannot take in
+time is lost and marked as lost.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import struct
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from fsw.log.block_file import BlockFile
+from fsw.log.encoder import LogEncoder, loop_timing
+from fsw.log.topics import TOPICS
+from fsw.signals import TickInputs, TickOutputs, Vec2
+from messages import ulog
+from messages.ground_truth import TRUTH_TOPICS
+
+Number = int | float | bool
+
+_FLUSH_INTERVAL_US: Final = 250_000
+_FLUSH_BYTES: Final = 1 << 16
+_UNMEASURED: Final = (math.nan,) * 6
+
+
+@dataclass(frozen=True, slots=True)
+class LogSubject:
+    """What a log says about the flight before it begins."""
+
+    facts: Mapping[str, str | int]  # revision, scenario, seed, controller, …
+    numbers: Mapping[str, Number]  # of the whole configuration, by dotted name
+    parameters: Mapping[str, float]  # those that a ground station may change, by their names there
+    thrust_max: float  # N, one rotor
+    link_length: Vec2  # m
+
+
+class FlightLog:
+    """One flight's ULog file."""
+
+    def __init__(self, path: Path, subject: LogSubject) -> None:
+        """Create the file; nothing is in it before :meth:`begin`.
+
+        Raises:
+            OSError: The file exists or cannot be created.
+        """
+        self.file = BlockFile(path)
+        self.lost_us = 0  # length of what the disk did not take in time
+        self.unwritten_ticks = 0  # ticks with a number that fits no field
+        self._subject = subject
+        self._records = bytearray()
+        self._encoder: LogEncoder | None = None
+        self._measured = False
+        self._block_us = 0  # time of the first record that is not yet with the disk
+        self._unmarked_us = 0  # lost, and not yet marked as lost
+
+    def begin(self, t_us: int, lockstep: bool) -> None:
+        """Write what stands before the data.
+
+        Args:
+            t_us: Sensor time of the first tick [us].
+            lockstep: Write in this thread and nothing that the wall clock measured.
+        """
+        subject, self._measured = self._subject, not lockstep
+        self._encoder = LogEncoder(
+            measured=self._measured,
+            thrust_max=subject.thrust_max,
+            link_length=subject.link_length,
+        )
+        pacing = "lockstep" if lockstep else "realtime"
+        self._records += definitions(t_us, subject, pacing, self._encoder.inputs.schema)
+        self._block_us = t_us
+        if not lockstep:
+            self.file.start_thread()
+
+    def add(self, inputs: TickInputs, outputs: TickOutputs) -> None:
+        """Append one tick; call it when its actuators have been sent."""
+        assert self._encoder is not None
+        records, begin = self._records, len(self._records)
+        try:
+            self._encoder.add(inputs, outputs, records)
+        except (struct.error, ValueError, TypeError):
+            # A number that fits no field must not end the flight it describes.
+            del records[begin:]
+            self.unwritten_ticks += 1
+        t_us = inputs.sensors.t_us
+        if len(records) > _FLUSH_BYTES or t_us - self._block_us >= _FLUSH_INTERVAL_US:
+            self._flush(t_us)
+
+    def add_timing(
+        self, t_us: int, group: int, counts: tuple[int, int, int, int], times: tuple[float, ...]
+    ) -> None:
+        """Append the timing of a rate group; see :func:`fsw.log.encoder.loop_timing`."""
+        if not self._measured:  # being late or skipped is measured too
+            ticks, _, _, period_us = counts
+            counts, times = (ticks, 0, 0, period_us), _UNMEASURED
+        self._records += loop_timing(t_us, group, counts, times)
+
+    def close(self) -> None:
+        """Write what is left and close the file; safe to call twice."""
+        if self._records:
+            self._flush(self._block_us)
+        self.file.close()
+
+    def _flush(self, t_us: int) -> None:
+        block, begin_us = self._records, self._block_us
+        self._records, self._block_us = bytearray(), t_us
+        if self._unmarked_us:
+            block = bytearray(ulog.dropout(round(1e-3 * self._unmarked_us))) + block
+        if self.file.put(block):
+            self._unmarked_us = 0
+            self._records += ulog.sync()
+        else:
+            self.lost_us += t_us - begin_us
+            self._unmarked_us += t_us - begin_us
+
+
+def definitions(t_us: int, subject: LogSubject, pacing: str, schema: str) -> bytes:
+    """Everything before the first record.
+
+    Args:
+        t_us: Sensor time at which the log begins [us].
+        subject: What was flown.
+        pacing: ``lockstep`` or ``realtime``.
+        schema: Shape of the recorded inputs, without which they cannot be read back.
+    """
+    exact = json.dumps(dict(subject.numbers), separators=(",", ":"))
+    named = {**subject.numbers, **subject.parameters}
+    facts: dict[str, str | int] = {
+        "sys_name": "Pandion",
+        **subject.facts,
+        "pacing": pacing,
+        "numbers": exact,  # as doubles; the format's own parameters are 32-bit
+        "inputs": schema,
+    }
+    parts = [ulog.opening(t_us)]
+    parts += [ulog.information(key, value) for key, value in facts.items()]
+    parts += [ulog.format_of(topic) for topic in (*TOPICS, *TRUTH_TOPICS)]
+    parts += [ulog.parameter(name, value) for name, value in named.items()]
+    parts += [ulog.subscription(number, topic) for number, topic in enumerate(TOPICS)]
+    return b"".join(parts)

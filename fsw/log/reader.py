@@ -1,0 +1,131 @@
+"""A flight log tick by tick: what went in, and the records of what came out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from fsw.log import topics
+from fsw.log.encoder import TYPED
+from fsw.log.input_text import InputText
+from fsw.signals import SensorFrame, TickInputs
+from messages import ulog
+from messages.ulog_reader import Record, UlogError, UlogFile, open_log, unpacker
+
+__all__ = ["Gap", "LoggedTick", "UlogError", "UlogFile", "open_flight", "ticks"]
+
+_SENSORS: Final = topics.TOPICS.index(topics.SENSOR_FRAME)
+_INPUT: Final = topics.TOPICS.index(topics.TICK_INPUT)
+_TIMING: Final = topics.TOPICS.index(topics.LOOP_TIMING)
+
+
+@dataclass(frozen=True, slots=True)
+class LoggedTick:
+    """One tick."""
+
+    index: int  # counted from 0 in this log
+    inputs: TickInputs
+    records: list[Record]  # everything the encoder wrote for it
+
+
+@dataclass(frozen=True, slots=True)
+class Gap:
+    """Here the disk was too slow, and ticks are missing."""
+
+    index: int  # of the tick that comes after it
+    duration_ms: int
+
+
+def open_flight(path: Path) -> UlogFile:
+    """Open a flight log whose inputs this build can read.
+
+    Args:
+        path: The file, or the directory of a flight.
+
+    Raises:
+        UlogError: It is no flight log, or its inputs have another shape.
+    """
+    log = open_log(path / "flight.ulg" if path.is_dir() else path)
+    if "inputs" not in log.information:
+        raise UlogError(f"{log.path} is not a flight log of Pandion: it records no inputs")
+    if log.information["inputs"] != InputText(TickInputs).schema or any(
+        log.formats.get(topic.name) is None or log.formats[topic.name].codes != topic.codes
+        for topic in topics.TOPICS
+    ):
+        written = log.information.get("ver_sw", "an unknown revision")
+        raise UlogError(f"{log.path} has other fields than this build reads; it is of {written}")
+    return log
+
+
+def ticks(log: UlogFile) -> Iterator[LoggedTick | Gap]:
+    """Every whole tick of a log, and where some are missing.
+
+    Raises:
+        UlogError: An input cannot be read back.
+    """
+    inputs, index, records, lost_ms = _Inputs(), 0, list[Record](), 0
+    for record in log.records():
+        if record.kind == ulog.DROPOUT:
+            lost_ms += int.from_bytes(record.body, "little")
+        elif _of_a_tick(record):
+            if record.number == _SENSORS and records:
+                yield inputs.tick(index, records)
+                index, records = index + 1, []
+                if lost_ms:
+                    yield Gap(index, lost_ms)
+                    lost_ms = 0
+            records.append(record)
+    if records and log.whole:
+        yield inputs.tick(index, records)
+
+
+def _of_a_tick(record: Record) -> bool:
+    """Whether the encoder writes it: timing is the loop's, truth the simulator's."""
+    if record.kind == ulog.DATA:
+        return record.number < len(topics.TOPICS) and record.number != _TIMING
+    return record.kind == ulog.TEXT
+
+
+class _Inputs:
+    """Puts the inputs of each tick together; what did not change is what it was."""
+
+    def __init__(self) -> None:
+        self._text = InputText(TickInputs)
+        self._values: dict[str, Any] = {}
+        self._pieces = b""
+        self._sensors = unpacker(topics.SENSOR_FRAME)
+        self._input = unpacker(topics.TICK_INPUT)
+
+    def tick(self, index: int, records: list[Record]) -> LoggedTick:
+        for record in records:
+            if record.number == _SENSORS:
+                self._values[TYPED] = _sensor_frame(self._sensors.unpack(record.body))
+            elif record.number == _INPUT:
+                self._take(record.body)
+        return LoggedTick(index, TickInputs(**self._values), records)
+
+    def _take(self, body: bytes) -> None:
+        _, field, part, parts, text = self._input.unpack(body)
+        self._pieces = (self._pieces if part else b"") + text
+        if part + 1 < parts:
+            return
+        name = field.rstrip(b"\0").decode("ascii")
+        try:
+            self._values[name] = self._text.value(name, self._pieces.rstrip(b"\0"))
+        except ValueError as error:
+            raise UlogError(f"the log is damaged: {error}") from None
+
+
+def _sensor_frame(values: tuple[Any, ...]) -> SensorFrame:
+    return SensorFrame(
+        t_us=values[0],
+        p_WB=values[1:4],
+        v_WB=values[4:7],
+        q_WB=values[7:11],
+        gyro_B=values[11:14],
+        accel_B=values[14:17],
+        q_arm=values[17:19],
+        qd_arm=values[19:21],
+    )

@@ -1,0 +1,75 @@
+"""The logs of one flight together: opened, watched and closed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from fsw.log.block_file import BlockFile
+from fsw.log.flight_log import FlightLog, LogSubject
+from fsw.log.tlog import TlogWriter
+
+
+class RunFiles:
+    """``flight.ulg`` and ``flight.tlog``. A disk that refuses is told about once a file."""
+
+    def __init__(
+        self,
+        directory: Path,
+        start_unix_us: int,
+        subject: LogSubject,
+        warn: Callable[[str], None],
+    ) -> None:
+        """Create both files.
+
+        Args:
+            directory: Where; exists.
+            start_unix_us: Wall time of sensor time 0, for the .tlog [us since 1970].
+            subject: What is flown.
+            warn: Takes a sentence for the operator.
+
+        Raises:
+            OSError: A file exists or cannot be created.
+        """
+        self.ulog = FlightLog(directory / "flight.ulg", subject)
+        self.tlog = TlogWriter(directory / "flight.tlog", start_unix_us)
+        self._warn = warn
+        self._told: set[str] = set()
+
+    def check(self) -> None:
+        """Tell what went wrong since the last time; costs nothing worth mentioning."""
+        for file in self._files():
+            if file.failure is not None:
+                self._tell(f"{file.path.name} ends early: {file.failure}")
+            elif file.dropped:
+                self._tell(f"{file.path.name} has gaps: the disk does not keep up")
+
+    def close(self) -> None:
+        """Write what is left; safe to call twice."""
+        self.ulog.close()
+        self.tlog.close()
+        self.check()
+
+    def as_json(self) -> dict[str, object]:
+        """What became of the files, for ``fsw.json``."""
+        described: dict[str, object] = {
+            file.path.name: {
+                "bytes": file.size,
+                "dropped_blocks": file.dropped,
+                "failure": file.failure,
+            }
+            for file in self._files()
+        }
+        return {
+            **described,
+            "lost_ms": round(1e-3 * self.ulog.lost_us),
+            "unwritten_ticks": self.ulog.unwritten_ticks,
+        }
+
+    def _files(self) -> tuple[BlockFile, BlockFile]:
+        return self.ulog.file, self.tlog.file
+
+    def _tell(self, sentence: str) -> None:
+        if sentence not in self._told:
+            self._told.add(sentence)
+            self._warn(sentence)

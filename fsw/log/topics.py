@@ -1,0 +1,266 @@
+"""The topics of a flight log: one table, which the writer, the reader and docs/flight-log.md use.
+
+Where PX4 has a topic of the same meaning, name, fields and units are PX4's, so that its tools
+show a flight of Pandion; a topic may have fewer fields than there. What is fed back by
+``pandion replay``, and the actuators, are doubles; the rest is for reading and is floats.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from messages.ulog import Field, Topic
+
+TEXT_SIZE: Final = 200  # characters of an input's text in one record
+MARGINS: Final = 16
+
+EVERY_TICK: Final = "every tick"
+PLANNING: Final = "every planning cycle"
+CHANGE: Final = "on change"
+
+
+def _floats(*names: str, note: str = "") -> tuple[Field, ...]:
+    return tuple(Field(name, "float", note=note) for name in names)
+
+
+def _vector(name: str, size: int, note: str) -> Field:
+    return Field(name, "float", size, note)
+
+
+def _exact(name: str, size: int, note: str) -> Field:
+    return Field(name, "double", size, note)
+
+
+SENSOR_FRAME: Final = Topic(
+    "sensor_frame",
+    "What the sensors said; input of the tick",
+    EVERY_TICK,
+    (
+        _exact("p_WB", 3, "m, NED"),
+        _exact("v_WB", 3, "m/s, NED"),
+        _exact("q_WB", 4, "[w, x, y, z]"),
+        _exact("gyro_B", 3, "rad/s, body"),
+        _exact("accel_B", 3, "m/s^2, body"),
+        _exact("q_arm", 2, "rad"),
+        _exact("qd_arm", 2, "rad/s"),
+    ),
+)
+VEHICLE_ATTITUDE: Final = Topic(
+    "vehicle_attitude", "Estimate", EVERY_TICK, (_vector("q", 4, "[w, x, y, z], body to NED"),)
+)
+VEHICLE_ANGULAR_VELOCITY: Final = Topic(
+    "vehicle_angular_velocity", "Estimate", EVERY_TICK, (_vector("xyz", 3, "rad/s, body"),)
+)
+VEHICLE_LOCAL_POSITION: Final = Topic(
+    "vehicle_local_position",
+    "Estimate of the body origin",
+    EVERY_TICK,
+    (
+        *_floats("x", "y", "z", note="m, NED"),
+        *_floats("vx", "vy", "vz", note="m/s, NED"),
+        *_floats("heading", note="rad"),
+    ),
+)
+ACTUATOR_COMMAND: Final = Topic(
+    "actuator_command",
+    "What was sent, exactly",
+    EVERY_TICK,
+    (
+        _exact("rotor_thrust", 4, "N: rear, left, front, right"),
+        _exact("joint_torque", 2, "N m"),
+        Field("armed", "bool"),
+    ),
+)
+ACTUATOR_MOTORS: Final = Topic(
+    "actuator_motors",
+    "The same of the rotors, in PX4's form",
+    EVERY_TICK,
+    (_vector("control", 4, "0 to 1, share of full thrust"),),
+)
+ARM_JOINT_STATE: Final = Topic(
+    "arm_joint_state",
+    "Estimate, and the torque commanded",
+    EVERY_TICK,
+    (
+        _vector("q", 2, "rad"),
+        _vector("qd", 2, "rad/s"),
+        _vector("tau", 2, "N m"),
+    ),
+)
+VEHICLE_LOCAL_POSITION_SETPOINT: Final = Topic(
+    "vehicle_local_position_setpoint",
+    "Where the running plan wants the body origin now",
+    "every tick in flight",
+    (
+        *_floats("x", "y", "z", note="m, NED"),
+        *_floats("vx", "vy", "vz", note="m/s, NED"),
+        _vector("acceleration", 3, "m/s^2, NED, of the plan's state"),
+        *_floats("yaw", note="rad"),
+        *_floats("yawspeed", note="rad/s"),
+    ),
+)
+ARM_JOINT_SETPOINT: Final = Topic(
+    "arm_joint_setpoint",
+    "Where the running plan wants the joints now",
+    "every tick in flight",
+    (_vector("q", 2, "rad"), _vector("qd", 2, "rad/s"), _vector("qdd", 2, "rad/s^2")),
+)
+PLAN_INPUT: Final = Topic(
+    "plan_input",
+    "The paper's u in force; with the joints' in `arm_joint_setpoint`",
+    "every tick in flight",
+    (_vector("a", 3, "m/s^2, NED"), *_floats("yaw_acc", note="rad/s^2")),
+)
+BARRIER_MARGIN: Final = Topic(
+    "barrier_margin",
+    "Margins of the active safe set, by the vehicle's own estimate",
+    PLANNING,
+    (
+        _vector("margin", MARGINS, "m; walls in order, base, joint 2, end-effector within a wall"),
+        _vector("barrier", MARGINS, "h, m/s, same order; active at or below 0"),
+        *_floats("minimum", note="m"),
+        Field("kind", "uint8_t", note="0 none, 1 walls, 2 workspace"),
+        Field("count", "uint8_t", note="how many are meant"),
+        Field("argmin", "uint8_t"),
+    ),
+)
+END_EFFECTOR: Final = Topic(
+    "end_effector",
+    "Estimate and the reference in use",
+    PLANNING,
+    (
+        _vector("p", 3, "m, NED"),
+        _vector("v", 3, "m/s, NED"),
+        _vector("p_ref", 3, "m, NED; NaN without a reference"),
+        _vector("v_ref", 3, "m/s, NED"),
+        *_floats("yaw_ref", note="rad"),
+    ),
+)
+MPC_REQUEST: Final = Topic(
+    "mpc_request",
+    "A question to the planner: the state that its answer starts from",
+    PLANNING,
+    (
+        Field("plan_id", "uint32_t"),
+        Field("t_apply", "uint64_t", note="us; when the answer takes effect"),
+        _exact("p", 3, "m, NED"),
+        _exact("v", 3, "m/s, NED"),
+        _exact("a", 3, "m/s^2, NED"),
+        _exact("j", 2, "m/s^3, horizontal"),
+        _exact("s", 2, "m/s^4, horizontal"),
+        _exact("yaw", 0, "rad"),
+        _exact("yaw_rate", 0, "rad/s"),
+        _exact("q_arm", 2, "rad"),
+        _exact("qd_arm", 2, "rad/s"),
+        _exact("p_WE", 3, "m, NED; first point of the reference"),
+        Field("from_nominal", "bool", note="start taken from the running plan, not measured"),
+    ),
+)
+MPC_STATUS: Final = Topic(
+    "mpc_status",
+    "The last plan taken over, the outcome of the last cycle, and counts since the start",
+    "on every answer, and on none",
+    (
+        Field("t_plan", "uint64_t", note="us; from when the plan counts, 0: there is none"),
+        Field("plan_id", "uint32_t"),
+        Field("plans", "uint32_t"),
+        Field("missed_deadlines", "uint32_t"),
+        Field("fallbacks", "uint32_t"),
+        *_floats("cost"),
+        *_floats("slack_max", note="m/s; softening of a barrier"),
+        *_floats("linearise_us", "solve_us", "total_us", note="wall time; NaN in lockstep"),
+        Field("sqp_iterations", "uint16_t"),
+        Field("solver_iterations", "uint16_t"),
+        Field("status", "uint8_t", note="PANDION_SOLVER_STATUS of the last cycle"),
+    ),
+)
+VEHICLE_STATUS: Final = Topic(
+    "vehicle_status",
+    "Mode, arming and active faults",
+    "on change and every second",
+    (
+        Field("arming_state", "uint8_t", note="1 disarmed, 2 armed"),
+        Field("nav_state", "uint8_t", note="PX4's number of the nearest mode"),
+        Field("failsafe", "bool", note="a fault is active"),
+        Field("mode", "char", 16, "Pandion's name of the mode"),
+        Field("failures", "char", 96, "names of the active faults"),
+    ),
+)
+VEHICLE_LAND_DETECTED: Final = Topic(
+    "vehicle_land_detected", "Standing or not", "on change and every second",
+    (Field("landed", "bool"),),
+)  # fmt: skip
+VEHICLE_COMMAND: Final = Topic(
+    "vehicle_command",
+    "A command that was heard",
+    "each",
+    (
+        *_floats("param1", "param2", "param3", "param4", note="NaN: not used"),
+        Field("param5", "double"),
+        Field("param6", "double"),
+        *_floats("param7"),
+        Field("command", "uint32_t", note="MAV_CMD"),
+        Field("source_system", "uint8_t"),
+        Field("source_component", "uint16_t"),
+        Field("confirmation", "uint8_t"),
+    ),
+)
+VEHICLE_COMMAND_ACK: Final = Topic(
+    "vehicle_command_ack",
+    "Its answer",
+    "each",
+    (
+        Field("command", "uint32_t", note="MAV_CMD"),
+        Field("result", "uint8_t", note="MAV_RESULT"),
+        Field("target_system", "uint8_t"),
+        Field("target_component", "uint16_t"),
+    ),
+)
+TICK_INPUT: Final = Topic(
+    "tick_input",
+    "Every other input of a tick, by the name of its field; `pandion replay` feeds it back",
+    CHANGE,
+    (
+        Field("field", "char", 24, "of TickInputs"),
+        Field("part", "uint16_t", note="a long text is cut into records of this topic"),
+        Field("parts", "uint16_t"),
+        Field("text", "char", TEXT_SIZE, "JSON, filled up with zeros"),
+    ),
+)
+LOOP_TIMING: Final = Topic(
+    "loop_timing",
+    "Timing of a rate group; the times are of the last second and, in lockstep, NaN",
+    "every second",
+    (
+        Field("ticks", "uint32_t"),
+        Field("late_ticks", "uint32_t"),
+        Field("skipped_ticks", "uint32_t"),
+        Field("period_us", "uint32_t"),
+        *_floats("execution_p50_us", "execution_p99_us", "execution_max_us"),
+        *_floats("lateness_p50_us", "lateness_p99_us", "lateness_max_us"),
+        Field("group", "uint8_t", note="PANDION_RATE_GROUP"),
+    ),
+)
+TOPICS: Final = (
+    SENSOR_FRAME,
+    TICK_INPUT,
+    VEHICLE_COMMAND,
+    VEHICLE_COMMAND_ACK,
+    VEHICLE_ATTITUDE,
+    VEHICLE_ANGULAR_VELOCITY,
+    VEHICLE_LOCAL_POSITION,
+    VEHICLE_LOCAL_POSITION_SETPOINT,
+    VEHICLE_STATUS,
+    VEHICLE_LAND_DETECTED,
+    ACTUATOR_COMMAND,
+    ACTUATOR_MOTORS,
+    ARM_JOINT_STATE,
+    ARM_JOINT_SETPOINT,
+    PLAN_INPUT,
+    END_EFFECTOR,
+    BARRIER_MARGIN,
+    MPC_REQUEST,
+    MPC_STATUS,
+    LOOP_TIMING,
+)
+"""Everything the flight software writes; a topic's place is its number in the file."""

@@ -1,0 +1,40 @@
+"""Topics of the simulator's truth.
+
+The simulator writes them into a file of its own, because the flight software must not see what
+they say. The flight log declares them, so that both can be joined after the flight.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from messages.ulog import Field, Topic
+
+
+def _exact(name: str, size: int, note: str) -> Field:
+    return Field(name, "double", size, note)
+
+
+SIM_GROUND_TRUTH: Final = Topic(
+    "sim_ground_truth",
+    "The simulator's true state",
+    "every tick",
+    (
+        _exact("p_WB", 3, "m, NED"),
+        _exact("v_WB", 3, "m/s, NED"),
+        _exact("q_WB", 4, "[w, x, y, z], body to NED"),
+        _exact("w_WB_B", 3, "rad/s, body"),
+        _exact("thrust", 4, "N: rear, left, front, right"),
+        _exact("q_arm", 2, "rad"),
+        _exact("qd_arm", 2, "rad/s"),
+        _exact("force", 3, "N, NED; disturbance up to this instant"),
+    ),
+)
+SIM_TRACKING: Final = Topic(
+    "sim_tracking",
+    "True end-effector, and the reference it should follow",
+    "10 Hz",
+    (_exact("p_WE", 3, "m, NED"), _exact("target", 3, "m, NED")),
+)
+TRUTH_TOPICS: Final = (SIM_GROUND_TRUTH, SIM_TRACKING)
+FIRST_NUMBER: Final = 1000  # of their subscriptions, out of the way of the flight software's

@@ -1,0 +1,155 @@
+"""Reads ULog files, as far as this project writes them; what it does not know is passed over."""
+
+from __future__ import annotations
+
+import mmap
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from struct import Struct, unpack_from
+from typing import Final, NamedTuple
+
+from messages import ulog
+from messages.ulog import Field, Topic
+
+_HEADER: Final = Struct("<Hc")
+_KEY = re.compile(r"(?P<type>\w+)(?:\[(?P<count>\d+)\])? (?P<name>\S+)")
+
+Value = int | float | bool | bytes
+
+
+class UlogError(Exception):
+    """A file that is no log, in one sentence."""
+
+
+class Record(NamedTuple):
+    """One message of the data section."""
+
+    kind: bytes
+    number: int  # of the subscription; -1 where it is no data
+    body: bytes  # behind the number
+
+
+@dataclass(slots=True)
+class UlogFile:
+    """An open log; what stands before the data is read at once, the data while iterating."""
+
+    path: Path
+    t_us: int
+    information: dict[str, str | int] = field(default_factory=dict)
+    parameters: dict[str, float] = field(default_factory=dict)
+    formats: dict[str, Topic] = field(default_factory=dict)
+    topics: dict[int, Topic] = field(default_factory=dict)  # by number; grows while iterating
+    size: int = 0
+    at: int = 0  # bytes read so far
+    whole: bool = True  # False once the end turned out to be cut
+
+    def records(self) -> Iterator[Record]:
+        """Every message behind the definitions, in file order."""
+        for kind, body in self._messages():
+            if kind == ulog.SUBSCRIPTION:
+                number = unpack_from("<H", body, 1)[0]
+                self.topics[number] = self.formats[body[3:].decode("ascii")]
+            else:
+                yield _record(kind, body)
+
+    def read_definitions(self) -> None:
+        """Read up to the first message that is none."""
+        for kind, body in self._messages():
+            if kind == ulog.FORMAT:
+                topic = _topic(body.decode("ascii"))
+                self.formats[topic.name] = topic
+            elif kind in (ulog.INFO, ulog.PARAMETER):
+                self._note(kind, body)
+            elif kind != ulog.FLAGS:
+                self.at -= _HEADER.size + len(body)
+                return
+
+    def _note(self, kind: bytes, body: bytes) -> None:
+        size = body[0]
+        declared = _field(body[1 : 1 + size].decode("ascii"))
+        rest = body[1 + size :]
+        if declared.type == "char":
+            self.information[declared.name] = rest.decode()
+            return
+        value = unpack_from("<" + declared.code, rest)[0]
+        if kind == ulog.PARAMETER:
+            self.parameters[declared.name] = value
+        else:
+            self.information[declared.name] = value
+
+    def _messages(self) -> Iterator[tuple[bytes, bytes]]:
+        with self.path.open("rb") as file, mmap.mmap(file.fileno(), 0, prot=mmap.PROT_READ) as data:
+            self.size = len(data)
+            while self.at + _HEADER.size <= self.size:
+                length, kind = _HEADER.unpack_from(data, self.at)
+                begin = self.at + _HEADER.size
+                if begin + length > self.size:
+                    break
+                self.at = begin + length
+                yield kind, data[begin : self.at]
+            self.whole = self.at == self.size
+
+
+def open_log(path: Path) -> UlogFile:
+    """Open a log and read what stands before its data.
+
+    Raises:
+        UlogError: The file cannot be read or is no ULog.
+    """
+    try:
+        with path.open("rb") as file:
+            head = file.read(16)
+    except OSError as error:
+        raise UlogError(f"cannot read {path}: {error.strerror}") from None
+    if len(head) < 16 or head[:7] != ulog.MAGIC[:7]:
+        raise UlogError(f"{path} is not a ULog file")
+    log = UlogFile(path, unpack_from("<Q", head, 8)[0], at=16)
+    try:
+        log.read_definitions()
+    except (ValueError, IndexError, KeyError) as error:
+        raise UlogError(f"{path} is damaged before its data begin: {error}") from None
+    return log
+
+
+def split(records: bytes) -> Iterator[Record]:
+    """The records in a piece of a data section."""
+    at = 0
+    while at < len(records):
+        length, kind = _HEADER.unpack_from(records, at)
+        at += _HEADER.size + length
+        yield _record(kind, records[at - length : at])
+
+
+def unpacker(topic: Topic) -> Struct:
+    """How one record of a topic is taken apart; see :func:`columns` for the names."""
+    return Struct("<" + topic.codes)
+
+
+def columns(topic: Topic) -> tuple[str, ...]:
+    """A name for each value of a record: ``name``, or ``name[0]``, ``name[1]``, … of an array."""
+    names: list[str] = []
+    for part in topic.all_fields:
+        single = part.values == 1
+        names += [part.name] if single else [f"{part.name}[{k}]" for k in range(part.count)]
+    return tuple(names)
+
+
+def _record(kind: bytes, body: bytes) -> Record:
+    if kind == ulog.DATA:
+        return Record(kind, body[0] | body[1] << 8, body[2:])
+    return Record(kind, -1, body)
+
+
+def _topic(text: str) -> Topic:
+    name, _, fields = text.partition(":")
+    _, *declared = (_field(part) for part in fields.split(";") if part)
+    return Topic(name, "", "", tuple(declared))
+
+
+def _field(text: str) -> Field:
+    match = _KEY.fullmatch(text)
+    if match is None:
+        raise ValueError(f"{text!r} declares no field")
+    return Field(match["name"], match["type"], int(match["count"] or 0))

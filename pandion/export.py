@@ -1,0 +1,116 @@
+"""``pandion export``: a flight log as CSV, one file a topic, or as one MCAP file."""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, Protocol
+
+from pandion.parser import COULD_NOT_START, Parser
+from pandion.reading import ReadingProgress
+
+if TYPE_CHECKING:
+    from messages.ulog import Topic
+    from messages.ulog_reader import UlogFile
+
+DONE: Final = 0  # exit code
+
+_TOLD_RECORDS: Final = 5_000
+_TEXTS: Final = "texts"  # the channel of what the vehicle said
+
+
+class Sink(Protocol):
+    """Where an export goes."""
+
+    def add(self, topic: str, t_us: int, names: tuple[str, ...], values: tuple[Any, ...]) -> None:
+        """Take one record; the names of a topic never change."""
+        ...
+
+
+def main(argv: list[str]) -> int:
+    """Export once; returns the exit code."""
+    parser = Parser("pandion export", "Write a flight log in another format.")
+    parser.add_argument("log", metavar="LOG", type=Path, help="flight.ulg, or its directory")
+    target = parser.add_mutually_exclusive_group(required=True)
+    target.add_argument("--csv", metavar="DIR", type=Path, help="one file a topic, into DIR")
+    target.add_argument("--mcap", metavar="FILE", type=Path, help="one file, messages as JSON")
+    read = parser.read(argv)
+    from messages.ulog_reader import UlogError, open_log
+
+    path: Path = read.log / "flight.ulg" if read.log.is_dir() else read.log
+    try:
+        log = open_log(path)
+        with contextlib.ExitStack() as stack:
+            sink = _sink(read.csv, read.mcap, log, stack)
+            progress = stack.enter_context(ReadingProgress("exporting", sys.stdout))
+            count = _export(log, sink, progress)
+    except (UlogError, OSError) as error:
+        print(f"pandion export: {error}", file=sys.stderr)
+        return COULD_NOT_START
+    except ModuleNotFoundError as error:
+        print(
+            f"pandion export: --mcap needs the package {error.name}; install pandion[mcap]",
+            file=sys.stderr,
+        )
+        return COULD_NOT_START
+    print(f"{count} records of {path} in {read.csv or read.mcap}")
+    return DONE
+
+
+def _sink(csv: Path | None, mcap: Path | None, log: UlogFile, stack: contextlib.ExitStack) -> Sink:
+    if csv is not None:
+        from pandion.csv_export import CsvSink
+
+        return stack.enter_context(CsvSink(csv))
+    assert mcap is not None
+    from pandion.mcap_export import McapSink
+
+    facts = {name: str(value) for name, value in log.information.items()}
+    return stack.enter_context(McapSink(mcap, facts))
+
+
+def _export(log: UlogFile, sink: Sink, progress: ReadingProgress) -> int:
+    count = 0
+    for topic, t_us, names, values in _rows(log):
+        sink.add(topic, t_us, names, values)
+        count += 1
+        if count % _TOLD_RECORDS == 0:
+            progress.report(log.at, log.size)
+    return count
+
+
+def _rows(log: UlogFile) -> Iterator[tuple[str, int, tuple[str, ...], tuple[Any, ...]]]:
+    """Topic, time, names and values of each record; a long text is put together again."""
+    from messages import ulog
+    from messages.ulog_reader import columns, unpacker
+
+    known: dict[int, tuple[Topic, Any, tuple[str, ...]]] = {}
+    pieces = ""
+    for record in log.records():
+        if record.kind == ulog.TEXT:
+            t_us = int.from_bytes(record.body[1:9], "little")
+            values: tuple[Any, ...] = (record.body[0] - ord("0"), _text(record.body[9:]))
+            yield _TEXTS, t_us, ("timestamp", "severity", "text"), (t_us, *values)
+        if record.kind != ulog.DATA:
+            continue
+        if record.number not in known:
+            topic = log.topics[record.number]
+            known[record.number] = topic, unpacker(topic), columns(topic)
+        topic, record_struct, names = known[record.number]
+        values = tuple(
+            _text(value) if isinstance(value, bytes) else value
+            for value in record_struct.unpack(record.body)
+        )
+        if names[-4:] == ("field", "part", "parts", "text"):
+            t_us, field, part, parts, text = values
+            pieces = (pieces if part else "") + text
+            if part + 1 == parts:
+                yield topic.name, t_us, ("timestamp", "field", "text"), (t_us, field, pieces)
+        else:
+            yield topic.name, values[0], names, values
+
+
+def _text(value: bytes) -> str:
+    return value.rstrip(b"\0").decode("utf-8", "replace")

@@ -1,0 +1,73 @@
+"""One MCAP file: a channel a topic, messages as JSON with a schema, as Foxglove reads them."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import math
+import re
+from pathlib import Path
+from typing import Any
+
+from mcap.writer import Writer
+
+_TYPES = {bool: "boolean", int: "integer", float: "number", str: "string"}
+_ELEMENT = re.compile(r"(\w+)\[\d+\]")
+
+
+class McapSink(contextlib.ExitStack):
+    """Writes one file; arrays of a topic are arrays again."""
+
+    def __init__(self, path: Path, facts: dict[str, str]) -> None:
+        """Create the file.
+
+        Args:
+            path: Where to write.
+            facts: What the log says about the flight; becomes its metadata.
+
+        Raises:
+            OSError: It cannot be created.
+        """
+        super().__init__()
+        self._writer = Writer(self.enter_context(path.open("wb")))
+        self._writer.start(profile="", library="pandion")
+        self._writer.add_metadata("flight", facts)
+        self.callback(self._writer.finish)
+        self._channels: dict[str, int] = {}
+
+    def add(self, topic: str, t_us: int, names: tuple[str, ...], values: tuple[Any, ...]) -> None:
+        """Append a message, and its channel before the first."""
+        if topic not in self._channels:
+            schema = json.dumps(_schema(topic, names, values)).encode()
+            number = self._writer.register_schema(topic, "jsonschema", schema)
+            self._channels[topic] = self._writer.register_channel(topic, "json", number)
+        data = json.dumps(_object(names, values), separators=(",", ":")).encode()
+        self._writer.add_message(self._channels[topic], 1000 * t_us, data, 1000 * t_us)
+
+
+def _object(names: tuple[str, ...], values: tuple[Any, ...]) -> dict[str, Any]:
+    """The record with its arrays; what is no number becomes null, because JSON has no NaN."""
+    result: dict[str, Any] = {}
+    for name, value in zip(names, values, strict=True):
+        if isinstance(value, float) and not math.isfinite(value):
+            value = None
+        element = _ELEMENT.fullmatch(name)
+        if element is None:
+            result[name] = value
+        else:
+            result.setdefault(element[1], []).append(value)
+    return result
+
+
+def _schema(topic: str, names: tuple[str, ...], values: tuple[Any, ...]) -> dict[str, Any]:
+    properties: dict[str, Any] = {}
+    for name, value in zip(names, values, strict=True):
+        kind: dict[str, Any] = {"type": _TYPES[type(value)]}
+        if kind["type"] == "number":
+            kind = {"type": ["number", "null"]}
+        element = _ELEMENT.fullmatch(name)
+        if element is None:
+            properties[name] = kind
+        else:
+            properties[element[1]] = {"type": "array", "items": kind}
+    return {"title": topic, "type": "object", "properties": properties}

@@ -1,0 +1,135 @@
+"""``pandion replay``: what a flight log holds, and whether the code still does the same."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pandion.parser import COULD_NOT_START, Parser
+from pandion.reading import ReadingProgress
+
+if TYPE_CHECKING:
+    from fsw.runtime.program import FlightProgram
+    from fsw.runtime.replay import Replayed
+    from messages.ulog_reader import UlogFile
+
+SAME, DIFFERS = 0, 1  # exit codes
+
+_NOTES_SHOWN = 5
+
+
+@dataclass(frozen=True, slots=True)
+class ReplayOptions:
+    """One replay."""
+
+    log: Path
+    verify: bool
+    json: str | None
+
+
+def main(argv: list[str]) -> int:
+    """Read a log, and compare if asked; returns the exit code."""
+    parser = Parser("pandion replay", "Show what a flight log holds, or fly its inputs again.")
+    parser.add_argument("log", metavar="LOG", type=Path, help="flight.ulg, or its directory")
+    parser.add_argument(
+        "--verify",
+        action="store_true",
+        help="feed the inputs through the same tick; exit code 1 at the first difference",
+    )
+    parser.add_argument("--json", metavar="FILE", help="write the result; - for standard output")
+    read = parser.read(argv)
+    options = ReplayOptions(read.log, read.verify, read.json)
+    if options.json not in (None, "-") and not Path(str(options.json)).parent.is_dir():
+        print(f"pandion replay: no directory for {options.json}", file=sys.stderr)
+        return COULD_NOT_START
+    from fsw.log.reader import open_flight
+    from messages.ulog_reader import UlogError
+
+    try:
+        log = open_flight(options.log)
+        return _verify(options, log) if options.verify else _summarise(options, log)
+    except (UlogError, ValueError, OSError) as error:
+        print(f"pandion replay: {error}", file=sys.stderr)
+        return COULD_NOT_START
+
+
+def _verify(options: ReplayOptions, log: UlogFile) -> int:
+    from fsw.runtime.replay import other_numbers, replay
+
+    console = sys.stderr if options.json == "-" else sys.stdout
+    program = _program(log)
+    notes = other_numbers(log, program)
+    for note in notes[:_NOTES_SHOWN]:
+        print(f"note: {note}", file=console)
+    if len(notes) > _NOTES_SHOWN:
+        print(f"note: {len(notes) - _NOTES_SHOWN} more numbers differ", file=console)
+    with ReadingProgress("replaying", console) as progress:
+        found = replay(log, program, progress.report)
+    same = found.difference is None and not found.lost_ms
+    print(_sentence(found, log), file=console)
+    _write(options.json, {"log": str(log.path), "same": same, **dataclasses.asdict(found),
+                          "whole": log.whole, "other_numbers": list(notes)})  # fmt: skip
+    return SAME if same else DIFFERS
+
+
+def _program(log: UlogFile) -> FlightProgram[Any]:
+    """The flight software of this build, configured by the names in the log."""
+    from fsw.parameters.control_choice import ControlChoice
+    from fsw.runtime.assembly import flight_software
+
+    facts = log.information
+    return flight_software(
+        ControlChoice(
+            controller=str(facts["controller"]),
+            inner=str(facts["inner"]),
+            robustness=str(facts["robustness"]),
+            solver=str(facts["solver"]),
+            soft=bool(facts["soft"]),
+        ),
+        to_plan=False,
+    )
+
+
+def _sentence(found: Replayed, log: UlogFile) -> str:
+    difference = found.difference
+    if difference is not None:
+        return (
+            f"first difference at tick {difference.tick} ({1e-6 * difference.t_us:.3f} s): "
+            f"{difference.field} was {difference.logged!r} and is {difference.replayed!r}"
+        )
+    if found.lost_ms:
+        return (
+            f"no difference in {found.ticks} ticks; behind them {found.lost_ms} ms are missing "
+            "in the log, and what follows cannot be fed"
+        )
+    cut = "" if log.whole else "; the log ends in the middle of a record"
+    return f"no difference in {found.ticks} ticks{cut}"
+
+
+def _summarise(options: ReplayOptions, log: UlogFile) -> int:
+    from pandion.log_summary import summary
+
+    console = sys.stderr if options.json == "-" else sys.stdout
+    with ReadingProgress("reading", console) as progress:
+        result = summary(log, progress.report)
+    for name, value in result.items():
+        if name not in ("topics", "texts"):
+            print(f"{name:12} {value}", file=console)
+    for name, count in result["topics"].items():
+        print(f"  {name:34} {count:8d}", file=console)
+    for text in result["texts"]:
+        print(f"  {text}", file=console)
+    _write(options.json, result)
+    return SAME
+
+
+def _write(target: str | None, result: dict[str, Any]) -> None:
+    text = json.dumps(result, indent=2) + "\n"
+    if target == "-":
+        sys.stdout.write(text)
+    elif target is not None:
+        Path(target).write_text(text, encoding="utf-8")

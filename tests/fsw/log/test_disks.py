@@ -1,0 +1,145 @@
+"""A log on a disk that is full, slow or cut off by a kill."""
+
+from __future__ import annotations
+
+import os
+import random
+import resource
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from pyulog import ULog
+
+from fsw.log.block_file import BlockFile
+from fsw.log.flight_log import FlightLog
+from fsw.log.reader import Gap, LoggedTick, open_flight, ticks
+from fsw.log.run_files import RunFiles
+from fsw.signals import SensorFrame, TickInputs
+from tests.fsw.log.specimens import inputs
+from tests.fsw.log.test_recorded_inputs import SUBJECT
+from tests.link.snapshots import outputs_at
+
+_THREE = (0.5, 0.5, 0.5)
+STILL = SensorFrame(0, _THREE, _THREE, (1.0, 0.0, 0.0, 0.0), _THREE, _THREE, (0.5,) * 2, (0.5,) * 2)
+
+
+def write_ticks(log: FlightLog, count: int) -> None:
+    dice = random.Random(1)
+    for k in range(count):
+        t_us = 1_000_000 + 2000 * k
+        log.add(inputs(t_us, dice), outputs_at(t_us))
+
+
+@pytest.fixture
+def small_disk() -> Iterator[None]:
+    """No file may grow beyond 200 kB; the system answers as a full disk does, with an error."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, before[1]))
+    yield
+    resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    signal.signal(signal.SIGXFSZ, handler)
+
+
+@pytest.mark.parametrize("lockstep", [True, False], ids=["lockstep", "realtime"])
+def test_a_full_disk_ends_the_files_and_is_told_once_a_file(
+    lockstep: bool, tmp_path: Path, small_disk: None
+) -> None:
+    told: list[str] = []
+    files = RunFiles(tmp_path, 0, SUBJECT, told.append)
+    files.ulog.begin(1_000_000, lockstep)
+    for _ in range(3):
+        write_ticks(files.ulog, 300)
+        for k in range(300):
+            files.tlog.add(2_000 * k, bytes(1000))
+        files.check()
+    files.close()
+    files.close()
+    assert sorted(told) == [
+        "flight.tlog ends early: File too large",
+        "flight.ulg ends early: File too large",
+    ]
+    said = files.as_json()
+    assert said["flight.ulg"] == {
+        "bytes": (tmp_path / "flight.ulg").stat().st_size,
+        "dropped_blocks": 0,
+        "failure": "File too large",
+    }
+    # What fitted is whole: the part of a block that went in was taken out again.
+    log = open_flight(tmp_path / "flight.ulg")
+    assert sum(isinstance(tick, LoggedTick) for tick in ticks(log)) > 10
+    assert log.whole
+
+
+def test_a_slow_disk_delays_no_tick_and_leaves_a_marked_gap(tmp_path: Path) -> None:
+    disk_is_back = threading.Event()
+
+    def stuck(file: int, block: memoryview) -> int:
+        disk_is_back.wait(30.0)
+        return os.write(file, block)
+
+    log = FlightLog(tmp_path / "flight.ulg", SUBJECT)
+    log.file = BlockFile(tmp_path / "slow.ulg", stuck)
+    log.begin(1_000_000, lockstep=False)
+    longest_s = 0.0
+    for k in range(12_000):  # 24 s of sensor time: more than may wait
+        t_us = 1_000_000 + 2000 * k
+        begin_s = time.thread_time()
+        log.add(TickInputs(replace(STILL, t_us=t_us)), outputs_at(t_us))
+        longest_s = max(longest_s, time.thread_time() - begin_s)
+        if k == 11_000:
+            disk_is_back.set()
+            time.sleep(0.3)
+    log.close()
+    assert longest_s < 0.01
+    assert log.lost_us > 1_000_000
+    assert log.file.dropped > 4
+    found = list(ticks(open_flight(tmp_path / "slow.ulg")))
+    (gap,) = [tick for tick in found if isinstance(tick, Gap)]
+    assert gap.duration_ms == round(1e-3 * log.lost_us)
+    whole = ULog(str(tmp_path / "slow.ulg"))
+    assert [dropout.duration for dropout in whole.dropouts] == [gap.duration_ms]
+    times = next(data for data in whole.data_list if data.name == "sensor_frame").data["timestamp"]
+    assert len(times) == 12_000 - log.lost_us // 2000
+
+
+KILLED = """
+import sys, time
+from pathlib import Path
+from fsw.log.flight_log import FlightLog
+from tests.fsw.log.test_disks import SUBJECT, write_ticks
+log = FlightLog(Path(sys.argv[1]), SUBJECT)
+log.begin(1_000_000, lockstep=sys.argv[2] == "lockstep")
+write_ticks(log, 1000)
+time.sleep(0.3)
+print("written", flush=True)
+time.sleep(60)
+"""
+
+
+@pytest.mark.parametrize("pacing", ["lockstep", "realtime"])
+def test_a_killed_process_leaves_a_readable_log(pacing: str, tmp_path: Path) -> None:
+    path = tmp_path / "flight.ulg"
+    process = subprocess.Popen(
+        [sys.executable, "-c", KILLED, str(path), pacing],
+        stdout=subprocess.PIPE,
+        text=True,
+        cwd=Path(__file__).parents[3],
+    )
+    assert process.stdout is not None
+    assert process.stdout.readline() == "written\n"
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    process.stdout.close()
+    log = ULog(str(path))
+    assert not log.file_corruption
+    count = len(next(data for data in log.data_list if data.name == "sensor_frame").data["q_WB[0]"])
+    assert count >= 1000 - 130  # at most the last quarter of a second of a flight is lost
+    assert sum(isinstance(tick, LoggedTick) for tick in ticks(open_flight(path))) == count

@@ -1,0 +1,196 @@
+"""A logged flight, fed through the tick again: equal to the bit, or the first difference named."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import field, replace
+from pathlib import Path
+
+import pytest
+
+from fsw.log import topics
+from fsw.log.flight_log import FlightLog, LogSubject, definitions
+from fsw.log.reader import open_flight
+from fsw.log.topics import TOPICS
+from fsw.parameters.control_choice import ControlChoice
+from fsw.parameters.flat import flat
+from fsw.parameters.flight_config import FlightConfig
+from fsw.runtime.assembly import flight_software
+from fsw.runtime.flight_loop import FlightLoop
+from fsw.runtime.flight_state import FlightState
+from fsw.runtime.replay import Replayed, other_numbers, replay
+from fsw.signals import CommandRequest, TickInputs, TickOutputs
+from messages import ulog
+from messages.ulog import Topic
+from messages.ulog_reader import UlogError
+from sitl.scenario_file import load_scenario
+from tests.closed_loop.harness import LAND, Flight, command
+
+CHOICE = ControlChoice("blf", "tracking", "consistent", "clarabel", soft=False)
+SECONDS = 0.8
+
+
+@dataclasses.dataclass
+class Recorded(Flight):
+    """A flight that keeps what went into each tick and what came out."""
+
+    ticks: list[tuple[TickInputs, TickOutputs]] = field(default_factory=list)
+
+    def step(self, *commands: CommandRequest) -> TickOutputs:
+        outputs = super().step(*commands)
+        assert self.inputs is not None
+        self.ticks.append((self.inputs, outputs))
+        return outputs
+
+
+@pytest.fixture(scope="module")
+def flown() -> list[tuple[TickInputs, TickOutputs]]:
+    """Walls, a trajectory, plans, a command nobody supports, and the way down."""
+    flight = Recorded(load_scenario("walls"), seed=5)
+    flight.follow()
+    flight.run(SECONDS / 2)
+    flight.step(command(31010), command(LAND))
+    flight.run(SECONDS / 2)
+    return flight.ticks
+
+
+def written(path: Path, ticks: list[tuple[TickInputs, TickOutputs]], lockstep: bool = True) -> Path:
+    facts = dict(vars_of(CHOICE))
+    log = FlightLog(path, LogSubject(facts, flat(FlightConfig()), {}, 17.1675, (0.15, 0.15)))
+    log.begin(ticks[0][0].sensors.t_us, lockstep)
+    for inputs, outputs in ticks:
+        log.add(inputs, outputs)
+        log.add_timing(inputs.sensors.t_us, 0, (1, 2, 3, 4), (5.0,) * 6)
+    log.close()
+    return path
+
+
+def vars_of(choice: ControlChoice) -> dict[str, str | int]:
+    return {**dataclasses.asdict(choice), "soft": int(choice.soft)}
+
+
+def replayed(path: Path, config: FlightConfig | None = None) -> Replayed:
+    """What a replay finds; with another configuration than the flight's, if one is given."""
+    program = flight_software(CHOICE, to_plan=False)
+    if config is not None:
+        program = replace(program, tick=FlightLoop(config).tick, numbers=flat(config))
+    return replay(open_flight(path), program, lambda done, total: None)
+
+
+@pytest.mark.parametrize("lockstep", [True, False], ids=["lockstep", "realtime"])
+def test_the_same_code_does_the_same(
+    lockstep: bool, flown: list[tuple[TickInputs, TickOutputs]], tmp_path: Path
+) -> None:
+    path = written(tmp_path / "flight.ulg", flown, lockstep)
+    assert replayed(path) == Replayed(len(flown), None, 0)
+
+
+def with_another_gain() -> FlightConfig:
+    config = FlightConfig()
+    tuning = replace(config.tuning, joint=replace(config.tuning.joint, kp=400.001))
+    return replace(config, tuning=tuning)
+
+
+def test_one_gain_changed_is_found_at_the_tick_at_which_it_first_matters(
+    flown: list[tuple[TickInputs, TickOutputs]], tmp_path: Path
+) -> None:
+    path = written(tmp_path / "flight.ulg", flown)
+    config = with_another_gain()
+    loop, state, right = FlightLoop(config), FlightState(), -1
+    for k, (inputs, outputs) in enumerate(flown):
+        state, now = loop.tick(state, inputs)
+        if now.actuators != outputs.actuators:
+            right = k
+            break
+    found = replayed(path, config)
+    assert found.difference is not None
+    assert found.ticks == found.difference.tick == right > 0
+    assert found.difference.t_us == flown[right][0].sensors.t_us
+    assert found.difference.field.startswith("actuator_command.")
+    logged, now_is = found.difference.logged, found.difference.replayed
+    both = (*outputs.actuators.rotor_thrust, *outputs.actuators.joint_torque)
+    assert logged in both
+    assert now_is in (*now.actuators.rotor_thrust, *now.actuators.joint_torque)
+    program = replace(flight_software(CHOICE, to_plan=False), numbers=flat(config))
+    assert other_numbers(open_flight(path), program) == (
+        "tuning.joint.kp is 400.001 here and was 400.0",
+    )
+
+
+def spoil(path: Path, topic: Topic, tick: int, value: int, byte: int = 0) -> None:
+    """Flip the lowest bit of a byte of a double in a record of a tick."""
+    data, at = bytearray(path.read_bytes()), 0
+    head = ulog.data_head(TOPICS.index(topic), topic)
+    for _ in range(tick + 1):
+        at = data.index(head, at) + len(head)
+    data[at + 8 + 8 * value + byte] ^= 1
+    path.write_bytes(data)
+
+
+@pytest.mark.parametrize("tick", [0, 77, 200])
+def test_a_bit_of_a_sensor_is_found_in_the_tick_that_used_it(
+    tick: int, flown: list[tuple[TickInputs, TickOutputs]], tmp_path: Path
+) -> None:
+    path = written(tmp_path / "flight.ulg", flown)
+    spoil(path, topics.SENSOR_FRAME, tick, value=2, byte=5)  # the height, by some 50 um
+    found = replayed(path)
+    assert found.difference is not None
+    assert found.ticks == found.difference.tick == tick
+
+
+def test_a_bit_of_an_actuator_is_found_and_named_with_both_values(
+    flown: list[tuple[TickInputs, TickOutputs]], tmp_path: Path
+) -> None:
+    path = written(tmp_path / "flight.ulg", flown)
+    spoil(path, topics.ACTUATOR_COMMAND, 50, 2)
+    found = replayed(path)
+    assert found.difference is not None
+    assert found.ticks == found.difference.tick == 50
+    assert found.difference.field == "actuator_command.rotor_thrust[2]"
+    assert found.difference.replayed == flown[50][1].actuators.rotor_thrust[2]
+    assert found.difference.logged == pytest.approx(found.difference.replayed, rel=1e-15)
+    assert found.difference.logged != found.difference.replayed
+
+
+def test_a_text_said_otherwise_is_found(
+    flown: list[tuple[TickInputs, TickOutputs]], tmp_path: Path
+) -> None:
+    path = written(tmp_path / "flight.ulg", flown)
+    path.write_bytes(path.read_bytes().replace(b"follow trajectory", b"follow trajectorx"))
+    found = replayed(path).difference
+    assert found is not None
+    assert (found.tick, found.field) == (1, "text")
+    assert str(found.logged).replace("trajectorx", "trajectory") == found.replayed
+
+
+def test_a_log_without_a_record_the_tick_makes_names_the_record(
+    flown: list[tuple[TickInputs, TickOutputs]], tmp_path: Path
+) -> None:
+    silent = [(inputs, replace(outputs, acks=())) for inputs, outputs in flown]
+    found = replayed(written(tmp_path / "flight.ulg", silent)).difference
+    assert found is not None
+    assert (found.tick, found.field, found.replayed) == (0, "record", "vehicle_command_ack")
+
+
+def test_behind_a_gap_nothing_is_compared(
+    flown: list[tuple[TickInputs, TickOutputs]], tmp_path: Path
+) -> None:
+    path = written(tmp_path / "flight.ulg", flown)
+    data, head = path.read_bytes(), ulog.data_head(0, topics.SENSOR_FRAME)
+    begin = -1
+    for _ in range(101):
+        begin = data.index(head, begin + 1)
+    end = data.index(head, begin + 1)
+    path.write_bytes(data[:begin] + ulog.dropout(2) + data[end:])
+    assert replayed(path) == Replayed(100, None, 2)
+
+
+def test_a_log_of_other_fields_is_refused_with_its_revision(tmp_path: Path) -> None:
+    subject = LogSubject({"ver_sw": "0123abc"}, {}, {}, 1.0, (1.0, 1.0))
+    path = tmp_path / "flight.ulg"
+    path.write_bytes(definitions(0, subject, "lockstep", '{"sensors":"other"}'))
+    with pytest.raises(UlogError, match="has other fields than this build reads; it is of 0123abc"):
+        open_flight(path)
+    path.write_bytes(ulog.opening(0))
+    with pytest.raises(UlogError, match="records no inputs"):
+        open_flight(tmp_path)
