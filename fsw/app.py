@@ -35,6 +35,7 @@ from fsw.runtime.realtime import (
     TICK_PRIORITY,
     claim_real_time,
     release_real_time,
+    scheduler,
     share_interpreter_fairly,
 )
 from fsw.runtime.sim_loop import Ending, FlightEnd, FlightRecord, SimLoop
@@ -198,9 +199,11 @@ class _Session:
         # Lockstep announces itself with the first step; a first step without it was not the first.
         if sim.pacing is Pacing.LOCKSTEP:
             settle_memory()
+            record.scheduler = scheduler()
             return loop.fly(first, InlinePlanner(inline, clock.now_us, record.mpc))
         share_interpreter_fairly()
         refused = claim_real_time(TICK_PRIORITY)
+        record.scheduler = scheduler()
         if refused:
             self._warn(NO_PERMISSION.format(" and ".join(refused)))
         settle_memory()

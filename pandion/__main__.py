@@ -19,7 +19,7 @@ verbs:
   sitl        run the simulator alone
   fsw         run the flight software alone
   reproduce   fly a table or a figure of the paper again
-  bench       time the planner's optimiser against others
+  bench       time the planner's optimiser, or the loop in real time
   dialect     teach MAVProxy, Wireshark and others the private messages
   replay      feed a flight log through the flight software again and compare
   export      write a flight log as CSV or MCAP

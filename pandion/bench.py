@@ -1,4 +1,7 @@
-"""``pandion bench mpc``: time the planner's optimiser against others on recorded instances."""
+"""``pandion bench mpc``: time the planner's optimiser against others on recorded instances.
+
+``pandion bench loop`` is in ``bench_loop.py``.
+"""
 
 from __future__ import annotations
 
@@ -34,6 +37,10 @@ class BenchOptions:
 
 def main(argv: list[str]) -> int:
     """Measure and report; returns the exit code."""
+    if argv[:1] == ["loop"]:
+        from pandion import bench_loop
+
+        return bench_loop.main(argv[1:])
     options = _options(argv)
     if options.json not in (None, "-") and not Path(str(options.json)).parent.is_dir():
         print(f"pandion bench: no directory for {options.json}", file=sys.stderr)
@@ -53,7 +60,7 @@ def main(argv: list[str]) -> int:
 
 def _options(argv: list[str]) -> BenchOptions:
     parser = Parser("pandion bench", "Time the planner's optimiser against others.")
-    parser.add_argument("what", metavar="WHAT", choices=("mpc",), help="mpc")
+    parser.add_argument("what", metavar="WHAT", choices=("mpc", "loop"), help="mpc or loop")
     parser.add_argument(
         "--json",
         metavar="FILE",

@@ -39,6 +39,7 @@ def as_json(
         "inner": {**_group(record.groups[INNER.name]), "stale": record.stale},
         "telemetry": _group(record.groups[TELEMETRY.name]),
         "housekeeping": _group(record.groups[HOUSEKEEPING.name]),
+        "scheduler": record.scheduler,
         "stages": {name: _percentiles(times) for name, times in record.stages.items()},
         "retransmissions": retransmissions,
     }

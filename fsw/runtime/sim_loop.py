@@ -61,6 +61,7 @@ class FlightRecord:
     groups: dict[str, GroupTimer] = field(default_factory=dict)  # of the loop's own groups
     stages: dict[str, Histogram] = field(default_factory=dict)  # of their members
     stale: int = 0  # ticks without a sensor frame of their own
+    scheduler: str = ""  # class and priority of the tick process
     counters: PlannerCounters = field(default_factory=PlannerCounters)
 
 

@@ -1,0 +1,212 @@
+"""``pandion bench loop``: fly in real time, alone and beside a busy program; judge the timing."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import platform
+import subprocess
+import sys
+import tempfile
+from contextlib import ExitStack
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, TextIO
+
+from pandion.budgets import Budgets, Row, judge, load_budgets, verdict
+from pandion.display import Display
+from pandion.machine_watch import Watch
+from pandion.parser import COULD_NOT_START, Parser
+from pandion.supervisor import HalfFailed, Supervisor
+from pandion.version import version
+from sitl.arguments import duration
+
+PASSED, NOT_PASSED = 0, 1  # exit codes
+_LINK = ("hear", "actuate", "publish", "log")  # stages: everything of a tick but the tick itself
+
+
+@dataclass(frozen=True, slots=True)
+class LoopOptions:
+    """One measurement."""
+
+    json: str | None
+    duration_s: float
+    hogs: tuple[int, ...]  # busy programs beside each of the flights
+    scenario: str
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """One flight."""
+
+    hogs: int
+    rows: list[Row]
+    verdict: str
+    facts: dict[str, Any]
+
+
+def main(argv: list[str]) -> int:
+    """Measure and judge; returns the exit code."""
+    options = _options(argv)
+    if options.json not in (None, "-") and not Path(str(options.json)).parent.is_dir():
+        print(f"pandion bench loop: no directory for {options.json}", file=sys.stderr)
+        return COULD_NOT_START
+    console = sys.stderr if options.json == "-" else sys.stdout
+    budgets = load_budgets()
+    machine = _machine()
+    print("Pandion {version}: {cores} cores, load {load}, {kernel}".format(**machine), file=console)
+    try:
+        flown = [_fly(options, hogs, budgets, console) for hogs in options.hogs]
+    except HalfFailed as error:
+        print(f"pandion bench loop: {error}", file=sys.stderr)
+        return error.exit_code
+    machine["load_after"] = round(os.getloadavg()[0], 2)
+    for measured in flown:
+        print("\n".join(_lines(measured)), file=console)
+    _write(options.json, {"machine": machine, "flights": [_as_json(one) for one in flown]})
+    return PASSED if all(one.verdict == "pass" for one in flown) else NOT_PASSED
+
+
+def _options(argv: list[str]) -> LoopOptions:
+    parser = Parser("pandion bench loop", "Fly in real time and judge the timing.")
+    parser.add_argument("--json", metavar="FILE", help="write the figures; - for standard output")
+    parser.add_argument(
+        "--duration", metavar="S", type=duration, default=60.0, help="of a flight (default 60)"
+    )
+    parser.add_argument(
+        "--hogs",
+        metavar="N,N",
+        type=_hogs,
+        default=(0, 1),
+        help="busy programs beside each of the flights (default 0,1: one flight without, one with)",
+    )
+    parser.add_argument(
+        "--scenario", metavar="NAME", default="walls", help="what to fly (default %(default)s)"
+    )
+    read = parser.read(argv)
+    return LoopOptions(read.json, read.duration, read.hogs, read.scenario)
+
+
+def _hogs(text: str) -> tuple[int, ...]:
+    parts = text.split(",")
+    if not all(part.isdecimal() and int(part) <= 64 for part in parts):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a list of numbers such as 0,1")
+    return tuple(int(part) for part in parts)
+
+
+def _fly(options: LoopOptions, hogs: int, budgets: Budgets, console: TextIO) -> Measured:
+    """One flight; its logs are thrown away.
+
+    Raises:
+        HalfFailed: There was no flight.
+    """
+    with ExitStack() as stack:
+        out = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="pandion-bench-")))
+        watch = stack.enter_context(Watch())
+        for _ in range(hogs):
+            stack.enter_context(Hog())
+        sitl = [
+            options.scenario,
+            "--realtime",
+            f"--duration={options.duration_s!r}",
+            *("--listen=udp:127.0.0.1:0", "--wait=600", f"--out={out}"),
+        ]
+        flown = Supervisor(Display(console), out).fly(
+            sitl,
+            # Telemetry goes where nobody listens: it is encoded and sent all the same.
+            lambda port: [
+                f"--sim=udp:127.0.0.1:{port}",
+                *("--gcs=udp:127.0.0.1:9", "--wait=600", f"--out={out}"),
+            ],
+        )
+        try:
+            vehicle = json.loads((out / "fsw.json").read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            raise HalfFailed(flown.failure or "the flight left no figures") from None
+    noise = watch.noise
+    assert noise is not None
+    facts = {
+        "scheduler": vehicle["scheduler"],
+        "noise": asdict(noise),
+        "flown": {} if flown.sitl is None else flown.sitl,
+        "vehicle": vehicle,
+    }
+    rows = judge(_figures(vehicle, watch), budgets)
+    return Measured(hogs, rows, verdict(rows, noise), facts)
+
+
+def _figures(vehicle: dict[str, Any], watch: Watch) -> dict[str, dict[str, float | None]]:
+    """What was measured, under the names of the budgets."""
+    inner, mpc, stages = vehicle["inner"], vehicle["mpc"], vehicle["stages"]
+    link = [stages[name] for name in _LINK if name in stages]
+    return {
+        "wake_up": {"p50_us": inner["lateness_p50_us"], "p99_us": inner["lateness_p99_us"]},
+        "ticks": {"late_share": inner["late_share"]},
+        "tick": stages["tick"],
+        "link": {"p50_us": sum(stage["p50_us"] for stage in link)},
+        "mpc": mpc,
+        "plans": {"missed_deadlines": mpc["missed_deadlines"]},
+        "memory": {"resident_mb": watch.resident_mb, "growth_mb": watch.growth_mb},
+    }
+
+
+class Hog(subprocess.Popen[bytes]):
+    """A program that does nothing but keep a processor busy, and ends with its block."""
+
+    def __init__(self) -> None:
+        super().__init__([sys.executable, "-c", "while True: pass"])
+
+    def __exit__(self, *ended: object) -> None:
+        self.kill()
+        super().__exit__(None, None, None)
+
+
+def _lines(measured: Measured) -> list[str]:
+    facts, noise = measured.facts, measured.facts["noise"]
+    beside = {0: "alone", 1: "beside one busy program"}
+    head = (
+        f"{beside.get(measured.hogs, f'beside {measured.hogs} busy programs')}, "
+        f"{facts['scheduler']}; others used {noise['others']:.2f} processors, "
+        f"the host took {100.0 * noise['stolen']:.1f} %"
+    )
+    table = [
+        f"  {row.name:<26}{_number(row.value):>12}{_number(row.budget):>12}"
+        f"  {'' if row.kept else 'over'}"
+        for row in measured.rows
+    ]
+    return [head, f"  {'':<26}{'measured':>12}{'budget':>12}", *table, f"  {measured.verdict}"]
+
+
+def _number(value: float | None) -> str:
+    return "-" if value is None else f"{value:.5g}"
+
+
+def _as_json(measured: Measured) -> dict[str, Any]:
+    return {
+        "hogs": measured.hogs,
+        "verdict": measured.verdict,
+        "figures": {
+            row.name: {"value": row.value, "budget": row.budget, "kept": row.kept}
+            for row in measured.rows
+        },
+        **measured.facts,
+    }
+
+
+def _machine() -> dict[str, Any]:
+    return {
+        "version": version(),
+        "cores": os.cpu_count(),
+        "load": round(os.getloadavg()[0], 2),
+        "kernel": platform.release(),
+        "python": platform.python_version(),
+    }
+
+
+def _write(target: str | None, result: dict[str, Any]) -> None:
+    text = json.dumps(result, indent=2) + "\n"
+    if target == "-":
+        sys.stdout.write(text)
+    elif target is not None:
+        Path(target).write_text(text, encoding="utf-8")

@@ -1,0 +1,82 @@
+"""The judgement of a measurement: over budget is told from a machine too noisy to say."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from pandion.bench_loop import main
+from pandion.budgets import Noise, judge, load_budgets, verdict
+
+BUDGETS = load_budgets()
+QUIET = Noise(others=0.05, stolen=0.0)
+AT_BUDGET = {group: dict(values) for group, values in BUDGETS.items()}
+
+
+def test_every_budget_of_the_file_is_judged() -> None:
+    assert len(judge({}, BUDGETS)) == sum(len(values) for values in BUDGETS.values())
+
+
+def test_at_its_budget_everything_is_kept() -> None:
+    rows = judge(AT_BUDGET, BUDGETS)
+    assert all(row.kept for row in rows)
+    assert verdict(rows, QUIET) == "pass"
+
+
+@pytest.mark.parametrize("group", sorted(BUDGETS))
+def test_one_figure_above_its_budget_is_no_pass(group: str) -> None:
+    key = next(iter(BUDGETS[group]))
+    measured = {**AT_BUDGET, group: {**AT_BUDGET[group], key: BUDGETS[group][key] + 1.0}}
+    assert verdict(judge(measured, BUDGETS), QUIET) == "over budget"
+
+
+@pytest.mark.parametrize("value", [None, float("nan")])
+def test_what_was_not_measured_is_not_kept(value: float | None) -> None:
+    measured = {**AT_BUDGET, "wake_up": {"p50_us": 1.0, "p99_us": value}}
+    assert verdict(judge(measured, BUDGETS), QUIET) == "over budget"
+
+
+@pytest.mark.parametrize("noise", [Noise(0.5, 0.0), Noise(0.0, 0.1), Noise(float("nan"), 0.0)])
+def test_on_a_noisy_machine_there_is_no_pass_and_no_fail(noise: Noise) -> None:
+    assert verdict(judge(AT_BUDGET, BUDGETS), noise) == "too noisy"
+
+
+def test_a_short_flight_beside_a_busy_program_is_measured_and_leaves_nothing(
+    tmp_path: Path,
+) -> None:
+    before = _descendants()
+    target = tmp_path / "loop.json"
+    code = main(["--duration", "2", "--hogs", "1", "--json", str(target)])
+    (flight,) = json.loads(target.read_text())["flights"]
+    assert code == (0 if flight["verdict"] == "pass" else 1)
+    assert flight["hogs"] == 1
+    assert flight["vehicle"]["inner"]["ticks"] > 900
+    measured = {name: figure["value"] for name, figure in flight["figures"].items()}
+    assert measured["wake-up lateness p99 us"] > 0.0
+    assert measured["tick p50 us"] > 0.0
+    assert 50.0 < measured["resident MB"] < 400.0
+    assert measured["growth MB"] is None, "two seconds say nothing about growth"
+    assert _descendants() == before
+
+
+def test_bad_options_are_one_sentence() -> None:
+    for words in (["--hogs", "x"], ["--json", "/nowhere/at/all.json"], ["--duration", "0"]):
+        run = subprocess.run(
+            [sys.executable, "-m", "pandion", "bench", "loop", *words],
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert run.returncode == 2
+        assert run.stderr.startswith("pandion bench loop: ")
+        assert run.stderr.count("\n") == 1
+
+
+def _descendants() -> list[str]:
+    children = Path(f"/proc/{os.getpid()}/task/{os.getpid()}/children").read_text()
+    return children.split()
