@@ -27,6 +27,7 @@ from messages.frames import Frame
 Numbers = tuple[float, ...]  # a payload without text, in wire order
 
 _LOCAL_NED: Final = 1  # MAV_FRAME_LOCAL_NED
+_INT32_MAX: Final = 0x7FFFFFFF
 _LOCAL_FRAMES: Final = frozenset({1, 7, 8, 9, 12})  # COMMAND_INT scales x, y by 1e4 here
 _VELOCITY_IGNORED: Final = 0x038  # POSITION_TARGET_TYPEMASK
 _ACCELERATION_IGNORED: Final = 0x1C0
@@ -93,10 +94,16 @@ def command_int(frame: Frame) -> CommandRequest | None:
     scale = 1e-4 if mav_frame in _LOCAL_FRAMES else 1e-7
     return CommandRequest(
         command=int(command),
-        params=(p1, p2, p3, p4, x * scale, y * scale, z),
+        params=(p1, p2, p3, p4, _scaled(x, scale), _scaled(y, scale), z),
         source_system=frame.system_id,
         source_component=frame.component_id,
+        frame=int(mav_frame),
     )
+
+
+def _scaled(number: float, scale: float) -> float:
+    """An integer parameter; INT32_MAX is its NaN."""
+    return math.nan if number == _INT32_MAX else number * scale
 
 
 def end_effector_target(values: Numbers) -> EndEffectorTarget | None:

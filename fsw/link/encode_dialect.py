@@ -9,10 +9,11 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from fsw.link.encode_setpoints import as_asked
 from fsw.link.service import WireValues
 from fsw.link.telemetry import GroupTiming, TelemetryContext
 from fsw.model.arm_kinematics import point_in_flight
-from fsw.signals import FlightSnapshot, Vec2, Vec4
+from fsw.signals import FlightSnapshot, SetpointKind, Vec2, Vec4
 
 _LOCAL_NED: Final = 1  # MAV_FRAME
 _MAX_CONSTRAINTS: Final = 16
@@ -35,7 +36,11 @@ def arm_joint_state(snapshot: FlightSnapshot, context: TelemetryContext) -> Wire
 
 
 def arm_joint_setpoint(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues | None:
-    """ARM_JOINT_SETPOINT in use: the running plan's joints."""
+    """ARM_JOINT_SETPOINT in use: the one that is flown offboard, or the running plan's joints."""
+    offboard = snapshot.offboard
+    if offboard.kind is not SetpointKind.NONE and offboard.joints is not None:
+        still = (*_four((0.0, 0.0)), *_four((0.0, 0.0)))
+        return (snapshot.t_us, *_four(offboard.joints.q_arm), *still, 0, 0, 2)
     plan, inputs = snapshot.plan_state, snapshot.plan_input
     if plan is None or inputs is None:
         return None
@@ -50,11 +55,22 @@ def arm_joint_setpoint(snapshot: FlightSnapshot, _: TelemetryContext) -> WireVal
 
 def end_effector_target(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues | None:
     """END_EFFECTOR_TARGET in use; shows whether a set-point was accepted."""
+    asked = snapshot.offboard.motion
+    if snapshot.offboard.kind is SetpointKind.END_EFFECTOR and asked is not None:
+        numbers, mask = as_asked(asked)
+        return (0, *numbers, mask, 0, 0, _LOCAL_NED)
     target = snapshot.reference
     if target is None:
         return None
     motion = (*target.p_WE, *target.v_WE, *target.a_WE)
     return (target.t_us, *motion, target.yaw, 0.0, 0, 0, 0, _LOCAL_NED)
+
+
+def setpoint_status(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues:
+    """SETPOINT_STATUS: how many set-points were of use, and which kind is flown."""
+    report = snapshot.offboard
+    counts = (report.accepted & _U32, report.refused & _U32, min(report.age_us, _U32))
+    return (snapshot.t_us, *counts, int(report.kind))
 
 
 def barrier_margin(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues | None:

@@ -11,10 +11,11 @@ from typing import Final
 
 from fsw.control.attitude import attitude_reference
 from fsw.geometry.rotation import euler_zyx, quaternion_from_matrix
+from fsw.link.encode_setpoints import as_asked
 from fsw.link.px4_mode import custom_mode
 from fsw.link.service import WireValues
 from fsw.link.telemetry import TelemetryContext
-from fsw.signals import FlightSnapshot, Mode, Vec3, Vec4
+from fsw.signals import FlightSnapshot, Mode, SetpointKind, Vec3, Vec4
 
 _QUADROTOR: Final = 2  # MAV_TYPE
 _ARMED: Final = 128  # MAV_MODE_FLAG
@@ -25,7 +26,10 @@ _STANDBY, _ACTIVE, _CRITICAL, _TERMINATED = 3, 4, 5, 8  # MAV_STATE
 _MAVLINK_VERSION: Final = 3
 _LOCAL_NED: Final = 1  # MAV_FRAME
 _ON_GROUND, _IN_AIR, _TAKEOFF, _LANDING = 1, 2, 3, 4  # MAV_LANDED_STATE
+_BODY_NED: Final = 8
 _RATES_IGNORED: Final = 0x07  # ATTITUDE_TARGET_TYPEMASK
+_ATTITUDE_IGNORED: Final = 0x80
+_ZERO: Final[Vec3] = (0.0, 0.0, 0.0)
 _U32: Final = 0xFFFFFFFF
 
 
@@ -79,8 +83,12 @@ def local_position(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues:
 
 
 def position_target(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues | None:
-    """POSITION_TARGET_LOCAL_NED: where the running plan wants the body origin now."""
-    plan = snapshot.plan_state
+    """POSITION_TARGET_LOCAL_NED: the set-point flown, or where the plan wants the body now."""
+    plan, offboard = snapshot.plan_state, snapshot.offboard
+    if offboard.kind is SetpointKind.BODY and offboard.motion is not None:
+        numbers, mask = as_asked(offboard.motion)
+        frame = _BODY_NED if offboard.motion.along_heading else _LOCAL_NED
+        return (_boot_ms(snapshot.t_us), *numbers, mask, frame)
     if plan is None:
         return None
     motion = (*plan.p, *plan.v, *plan.a)
@@ -88,7 +96,12 @@ def position_target(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues
 
 
 def attitude_target(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues:
-    """ATTITUDE_TARGET: attitude reference and collective thrust, 0 to 1."""
+    """ATTITUDE_TARGET: the set-point flown, or attitude reference and thrust, 0 to 1."""
+    asked = snapshot.offboard.attitude
+    if snapshot.offboard.kind is SetpointKind.ATTITUDE and asked is not None:
+        mask = _RATES_IGNORED if asked.w_WB_B is None else _ATTITUDE_IGNORED
+        rates, attitude = asked.w_WB_B or _ZERO, asked.q_WB or (1.0, 0.0, 0.0, 0.0)
+        return (_boot_ms(snapshot.t_us), *attitude, *rates, asked.thrust, mask)
     thrust = sum(snapshot.actuators.rotor_thrust) / (4.0 * context.facts.rotor_thrust_max)
     plan, u = snapshot.plan_state, snapshot.plan_input
     yaw = snapshot.estimate.yaw if plan is None else plan.yaw

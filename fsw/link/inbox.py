@@ -3,15 +3,40 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, replace
 from typing import Final, cast
 
-from fsw.link import decode, message_ids
+from fsw.link import decode, decode_setpoints, message_ids
 from fsw.link.decode import Numbers
-from fsw.signals import CommandRequest, EndEffectorTarget, SafeSet, Wall
+from fsw.signals import (
+    AttitudeSetpoint,
+    CommandRequest,
+    EndEffectorTarget,
+    JointSetpoint,
+    MotionSetpoint,
+    SafeSet,
+    Wall,
+)
 from messages.frames import Frame
 
 _MAX_COMMANDS: Final = 16  # a tick; a client sends one at a time and repeats it
 _MAX_TARGETS: Final = 64  # a tick
+_GROUND_STATION: Final = 6  # MAV_TYPE
+
+Setpoint = MotionSetpoint | AttitudeSetpoint | JointSetpoint
+
+
+@dataclass(frozen=True, slots=True)
+class Setpoints:
+    """The newest set-points for now; at most one of motion and attitude."""
+
+    motion: MotionSetpoint | None = None
+    attitude: AttitudeSetpoint | None = None
+    joints: JointSetpoint | None = None
+    refused: int = 0  # that were of no use
+
+
+NO_SETPOINTS: Final = Setpoints()
 
 
 class Inbox:
@@ -24,6 +49,8 @@ class Inbox:
         self.refused = 0  # messages with numbers of no use, or too many of them
         self._commands: list[CommandRequest] = []
         self._targets: list[EndEffectorTarget] = []
+        self._setpoints = NO_SETPOINTS
+        self._station_heard = False
         self._safe_set: SafeSet | None = None
         self._walls: dict[int, Wall] = {}
         self._wall_count = 0
@@ -31,6 +58,10 @@ class Inbox:
             message_ids.COMMAND_LONG: self._command_long,
             message_ids.COMMAND_INT: self._command_int,
             message_ids.END_EFFECTOR_TARGET: self._target,
+            message_ids.SET_POSITION_TARGET_LOCAL_NED: self._body,
+            message_ids.SET_ATTITUDE_TARGET: self._attitude,
+            message_ids.ARM_JOINT_SETPOINT: self._joints,
+            message_ids.HEARTBEAT: self._heartbeat,
             message_ids.OBSTACLE_WALL: self._wall,
             message_ids.WORKSPACE_SPHERE: self._sphere,
         }
@@ -62,6 +93,16 @@ class Inbox:
         taken, self._safe_set = self._safe_set, None
         return taken
 
+    def take_setpoints(self) -> Setpoints:
+        """Hand over the newest set-points for now."""
+        taken, self._setpoints = self._setpoints, NO_SETPOINTS
+        return taken
+
+    def take_station_heard(self) -> bool:
+        """Whether a ground station's heartbeat came."""
+        taken, self._station_heard = self._station_heard, False
+        return taken
+
     def _command_long(self, frame: Frame) -> None:
         self._add_command(decode.command_long(frame))
 
@@ -78,6 +119,9 @@ class Inbox:
 
     def _target(self, frame: Frame) -> None:
         values = cast(Numbers, frame.payload_values)
+        if values[0] == 0:  # not for a later time: for now
+            self._add(values, values[13:15], decode_setpoints.end_effector_setpoint)
+            return
         if not decode.for_this_vehicle(values[13], values[14]):
             return
         target = decode.end_effector_target(values)
@@ -85,6 +129,38 @@ class Inbox:
             self.refused += 1
             return
         self._targets.append(target)
+
+    def _body(self, frame: Frame) -> None:
+        values = cast(Numbers, frame.payload_values)
+        self._add(values, values[13:15], decode_setpoints.body_setpoint)
+
+    def _attitude(self, frame: Frame) -> None:
+        values = cast(Numbers, frame.payload_values)
+        self._add(values, values[9:11], decode_setpoints.attitude_setpoint)
+
+    def _joints(self, frame: Frame) -> None:
+        values = cast(Numbers, frame.payload_values)
+        self._add(values, values[13:15], decode_setpoints.joint_setpoint)
+
+    def _add(
+        self, values: Numbers, target: Numbers, read: Callable[[Numbers], Setpoint | None]
+    ) -> None:
+        """Keep the newest of each kind; one for somebody else is refused like a wrong one."""
+        setpoint = read(values) if decode.for_this_vehicle(*target) else None
+        kept = self._setpoints
+        if setpoint is None:
+            self.refused += 1
+            self._setpoints = replace(kept, refused=kept.refused + 1)
+        elif isinstance(setpoint, JointSetpoint):
+            self._setpoints = replace(kept, joints=setpoint)
+        elif isinstance(setpoint, AttitudeSetpoint):
+            self._setpoints = replace(kept, attitude=setpoint, motion=None)
+        else:
+            self._setpoints = replace(kept, motion=setpoint, attitude=None)
+
+    def _heartbeat(self, frame: Frame) -> None:
+        if frame.payload_values[1] == _GROUND_STATION:
+            self._station_heard = True
 
     def _wall(self, frame: Frame) -> None:
         values = cast(Numbers, frame.payload_values)

@@ -68,6 +68,7 @@ STREAMS: Final = (
     Stream(message_ids.ARM_JOINT_STATE, 30, 50, PANDION, encode_dialect.arm_joint_state),
     Stream(message_ids.ARM_JOINT_SETPOINT, 10, 10, PANDION, encode_dialect.arm_joint_setpoint),
     Stream(message_ids.END_EFFECTOR_TARGET, 10, 10, PANDION, encode_dialect.end_effector_target),
+    Stream(message_ids.SETPOINT_STATUS, 5, 5, PANDION, encode_dialect.setpoint_status),
     Stream(message_ids.BARRIER_MARGIN, 10, 10, PANDION, encode_dialect.barrier_margin),
     Stream(message_ids.MPC_STATUS, 10, 10, PANDION, encode_dialect.mpc_status),
     Stream(message_ids.LOOP_TIMING, 1, 1, PANDION, encode_dialect.inner_timing),

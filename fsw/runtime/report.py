@@ -41,6 +41,10 @@ def as_json(
         "housekeeping": _group(record.groups[HOUSEKEEPING.name]),
         "scheduler": record.scheduler,
         "stages": {name: _percentiles(times) for name, times in record.stages.items()},
+        "setpoints": {
+            "accepted": record.offboard.accepted,
+            "refused": record.offboard.refused,
+        },
         "retransmissions": retransmissions,
     }
 

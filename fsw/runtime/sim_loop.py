@@ -28,7 +28,14 @@ from fsw.runtime.rates import HOUSEKEEPING, INNER, MPC, RATE_GROUPS, TELEMETRY, 
 from fsw.runtime.releases import GridReleases, Release, Releases, StepReleases
 from fsw.runtime.slips import Slips, SlipWarning
 from fsw.runtime.timing import GroupTimer, Histogram
-from fsw.signals import PlannerCounters, SensorFrame, StatusText, TickInputs, TickOutputs
+from fsw.signals import (
+    OffboardReport,
+    PlannerCounters,
+    SensorFrame,
+    StatusText,
+    TickInputs,
+    TickOutputs,
+)
 
 STALL_S: Final = 2.0  # no step for this long ends the flight
 _START_US: Final = 1_000_000  # time stamp of the simulator's step 0
@@ -63,6 +70,7 @@ class FlightRecord:
     stale: int = 0  # ticks without a sensor frame of their own
     scheduler: str = ""  # class and priority of the tick process
     counters: PlannerCounters = field(default_factory=PlannerCounters)
+    offboard: OffboardReport = field(default_factory=OffboardReport)
 
 
 @dataclass(slots=True)
@@ -179,12 +187,18 @@ class SimLoop(Generic[State]):
         t_us = cycle.release.sensors.t_us
         self._ground.poll(t_us)
         inbox = self._inbox
+        setpoints = inbox.take_setpoints()
         cycle.inputs = TickInputs(
             cycle.release.sensors,
             cycle.planner.take(t_us),
             inbox.take_commands(),
             inbox.take_targets(),
             inbox.take_safe_set(),
+            setpoints.motion,
+            setpoints.attitude,
+            setpoints.joints,
+            setpoints.refused,
+            inbox.take_station_heard(),
             stale_us=cycle.release.stale_us,
             tuning=self._parameters.take_tuning(),
         )
@@ -213,6 +227,7 @@ class SimLoop(Generic[State]):
     def _publish(self, cycle: Cycle) -> None:
         record, outputs = self._record, cycle.outputs
         record.counters = outputs.snapshot.counters
+        record.offboard = outputs.snapshot.offboard
         events = record.mpc.events
         if events:
             self._notices += [StatusText(_WARNING, event) for event in events]

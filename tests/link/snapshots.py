@@ -15,6 +15,7 @@ from fsw.signals import (
     FlightSnapshot,
     Home,
     Mode,
+    OffboardReport,
     Plan,
     PlanInput,
     PlannerCounters,
@@ -85,6 +86,7 @@ SNAPSHOT = FlightSnapshot(
     constraints=ConstraintReport(ConstraintKind.WALLS, (0.3, 0.2, 0.4), (0.5, -0.1, 0.6)),
     home=Home((-0.5, 0.25, -0.3), math.pi),
     battery=BatteryState(voltage=15.2, current=18.3, consumed=1.9, remaining=0.62),
+    offboard=OffboardReport(accepted=5, refused=2, age_us=40_000),
 )  # fmt: skip
 
 

@@ -11,7 +11,16 @@ import pytest
 from fsw.link import encode_replies, encode_standard
 from fsw.link import message_ids as ids
 from fsw.link.streams import STREAMS, Stream
-from fsw.signals import Mode, StatusText
+from fsw.signals import (
+    AttitudeSetpoint,
+    FlightSnapshot,
+    JointSetpoint,
+    Mode,
+    MotionSetpoint,
+    OffboardReport,
+    SetpointKind,
+    StatusText,
+)
 from messages import dialect
 from messages.frames import FrameWriter
 from tests.link.snapshots import ACTUATORS, CONTEXT, SNAPSHOT
@@ -69,6 +78,7 @@ TELLING: dict[int, dict[str, Any]] = {
     ids.ARM_JOINT_STATE: {"joint_count": 2, "time_usec": 3_004_000},
     ids.ARM_JOINT_SETPOINT: {"joint_count": 2},
     ids.END_EFFECTOR_TARGET: {"yaw": 0.3, "coordinate_frame": 1},
+    ids.SETPOINT_STATUS: {"accepted": 5, "refused": 2, "age_us": 40_000, "kind": 0},
     ids.BARRIER_MARGIN: {
         "margin_min": 0.2, "margin_min_index": 1, "count": 3, "constraint_kind": 1,
         "active_mask": 0b010, "slack_max": 0.25,
@@ -190,3 +200,28 @@ def test_a_long_text_is_cut_into_numbered_pieces() -> None:
 
 def test_attitude_of_a_level_vehicle_is_level() -> None:
     assert encode_standard.attitude(SNAPSHOT, CONTEXT)[1:3] == pytest.approx((0.0, 0.0))
+
+
+BODY = MotionSetpoint(False, v=(0.5, 0.25, -0.125), yaw=0.75)
+ATTITUDE = AttitudeSetpoint(0.625, None, (0.25, 0.5, -0.5))
+
+
+def offboard(kind: SetpointKind, **setpoints: Any) -> FlightSnapshot:
+    return replace(SNAPSHOT, mode=Mode.OFFBOARD, offboard=OffboardReport(kind, **setpoints))
+
+
+def test_offboard_the_set_point_that_is_flown_is_sent_back_with_its_mask() -> None:
+    flown = offboard(SetpointKind.BODY, motion=BODY)
+    message = read_back(stream_of(ids.POSITION_TARGET_LOCAL_NED), flown)
+    assert (message.vx, message.vy, message.vz, message.yaw) == (0.5, 0.25, -0.125, 0.75)
+    assert (message.type_mask, message.coordinate_frame) == (0x9C7, 1)
+    flown = offboard(SetpointKind.ATTITUDE, attitude=ATTITUDE)
+    message = read_back(stream_of(ids.ATTITUDE_TARGET), flown)
+    assert (message.body_pitch_rate, message.thrust, message.type_mask) == (0.5, 0.625, 0x80)
+    point = MotionSetpoint(True, p=(1.0, 2.0, -3.0))
+    flown = offboard(SetpointKind.END_EFFECTOR, motion=point, joints=JointSetpoint((0.5, -0.25)))
+    message = read_back(stream_of(ids.END_EFFECTOR_TARGET), flown)
+    assert (message.time_usec, list(message.position)) == (0, [1.0, 2.0, -3.0])
+    assert message.type_mask == 0xDF8
+    message = read_back(stream_of(ids.ARM_JOINT_SETPOINT), flown)
+    assert list(message.position) == [0.5, -0.25, 0.0, 0.0]

@@ -17,6 +17,7 @@ PINNED = {
     "LOOP_TIMING": (60206, 49, 31),
     "OBSTACLE_WALL": (60207, 24, 28),
     "WORKSPACE_SPHERE": (60208, 18, 197),
+    "SETPOINT_STATUS": (60209, 21, 131),
 }
 
 # From pymavlink's development.xml, as MAVLink's common.xml and QGroundControl have them.
@@ -28,6 +29,7 @@ STANDARD_MODES = {
 
 PINNED_ENUMS = {
     "PANDION_CONSTRAINT_KIND": ("NONE", "WALLS", "WORKSPACE"),
+    "PANDION_SETPOINT_KIND": ("NONE", "BODY", "END_EFFECTOR", "ATTITUDE", "JOINTS"),
     "PANDION_SOLVER_STATUS": (
         "UNKNOWN",
         "SOLVED",
@@ -98,7 +100,7 @@ def test_every_field_with_a_dimension_states_its_unit():
         *("joint_count", "count", "index", "margin_min_index", "horizon", "plan_id", "normal"),
         *("missed_deadlines", "fallbacks", "cost", "slack_max", "sqp_iterations"),
         *("solver_iterations", "ticks", "late_ticks", "skipped_ticks"),
-        *("target_system", "target_component"),
+        *("target_system", "target_component", "accepted", "refused"),
     }
     for message in ET.parse(DEFINITION).iter("message"):
         for field in message.iter("field"):

@@ -1,0 +1,199 @@
+"""Set-points for now: what lets them in, what ends them, and that they cannot fly into a wall.
+
+The walls are those of Case I, the margin is the plant's own, between samples.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from fsw.signals import AttitudeSetpoint, JointSetpoint, Mode, MotionSetpoint, SetpointKind, Vec3
+from sitl.scenario import Hold, Pilot, Scenario
+from sitl.scenario_file import load_scenario
+from tests.closed_loop.harness import ARM, SET_MODE, Flight, command, hover, on_the_ground
+
+NAN = math.nan
+HOVERING: Vec3 = (0.0, 0.0, -1.2)
+AFAR: Vec3 = (-2.0, 0.0, -1.2)  # run-up enough for 2 m/s
+
+
+def walls(start: Vec3, disturbed: bool) -> Scenario:
+    case = load_scenario("walls")
+    case = replace(case, pilot=Pilot("none"), trajectory=Hold(start), duration_s=600.0)
+    return case if disturbed else replace(case, disturbances=())
+
+
+def offboard(scenario: Scenario, **streamed: Any) -> Flight:
+    """Armed in the air, the stream there, the mode asked for."""
+    flight = Flight(scenario)
+    flight.step(command(ARM, 1.0))
+    flight.streamed = streamed
+    flight.run(0.1)
+    flight.step(command(SET_MODE, 1.0, 6.0, 0.0))
+    assert flight.mode is Mode.OFFBOARD, flight.texts
+    return flight
+
+
+def nose_down(angle: float, thrust: float = 0.52) -> AttitudeSetpoint:
+    return AttitudeSetpoint(thrust, (math.cos(0.5 * angle), 0.0, math.sin(-0.5 * angle), 0.0))
+
+
+def body(**parts: Any) -> dict[str, Any]:
+    return {"motion": MotionSetpoint(False, **parts)}
+
+
+def end_effector(**parts: Any) -> dict[str, Any]:
+    return {"motion": MotionSetpoint(True, **parts)}
+
+
+ATTACKS = {
+    "a place behind the wall": body(p=(8.0, 0.0, -1.5)),
+    "the end-effector behind the wall": end_effector(p=(8.0, 0.0, -1.2)),
+    "5 m/s at the wall": body(v=(5.0, 0.0, 0.0)),
+    "5 m/s into the corner": body(v=(5.0, 5.0, 0.0), yaw_rate=0.5),
+    "the end-effector into the corner": end_effector(v=(5.0, -5.0, 0.0)),
+    "10 m/s^2 at the wall": body(a=(10.0, 0.0, 0.0), yaw=0.0),
+    "a place that runs into the wall": body(p=(0.8, 0.0, -1.4), v=(5.0, 0.0, 0.0)),
+    "nose down": {"attitude": nose_down(0.5)},
+    "rates": {"attitude": AttitudeSetpoint(0.52, None, (0.2, -1.0, 0.0))},
+    "the arm stretched at the wall": {
+        **body(v=(3.0, 0.0, 0.0)),
+        "joints": JointSetpoint((1.0, 0.5)),
+    },
+}
+
+
+@pytest.mark.parametrize("attack", ATTACKS)
+def test_no_set_point_flies_the_arm_into_a_wall(attack: str) -> None:
+    flight = offboard(walls(AFAR, disturbed=True), **ATTACKS[attack])
+    fastest = 0.0
+    for _ in range(2500):
+        flight.step()
+        assert flight.sim.ended is None, flight.sim.ended
+        fastest = max(fastest, math.hypot(*flight.sim.truth().v_WB))
+    assert fastest > 1.2, "or it was no test"
+    assert flight.mode is Mode.OFFBOARD
+    margin = flight.sim.min_margin_m
+    assert margin is not None
+    assert 0.02 < margin < 0.2
+
+
+def test_a_position_is_flown_to_and_held_with_its_heading() -> None:
+    flight = offboard(hover(), **body(p=(1.0, -0.5, -2.0), yaw=0.3))
+    flight.run(6.0)
+    assert math.dist(flight.sim.truth().p_WB, (1.0, -0.5, -2.0)) < 0.03
+    assert flight.snapshot.estimate.yaw == pytest.approx(0.3, abs=0.1)
+    assert flight.snapshot.offboard.kind is SetpointKind.BODY
+
+
+def test_a_velocity_is_flown_in_both_frames() -> None:
+    flight = offboard(hover(), **body(v=(0.0, 0.5, -0.2)))
+    flight.run(3.0)
+    assert flight.sim.truth().v_WB == pytest.approx((0.0, 0.5, -0.2), abs=0.05)
+    flight = offboard(hover(yaw_deg=90.0), **body(v=(0.5, 0.0, 0.0), along_heading=True))
+    flight.run(3.0)
+    assert flight.sim.truth().v_WB == pytest.approx((0.0, 0.5, 0.0), abs=0.05)
+
+
+def test_an_attitude_accelerates_the_way_it_points() -> None:
+    flight = offboard(hover(), attitude=nose_down(0.1, 0.5))
+    flight.run(1.0)
+    vx, vy, vz = flight.sim.truth().v_WB
+    assert 0.4 < vx < 1.2
+    assert abs(vy) < 0.05
+    assert abs(vz) < 0.15
+
+
+def test_the_end_effector_and_the_joints_go_where_they_are_told() -> None:
+    joints = JointSetpoint((0.4, -0.8))
+    flight = offboard(hover(), joints=joints, **end_effector(p=(0.6, 0.2, -1.5)))
+    flight.run(6.0)
+    truth = flight.sim.truth()
+    assert math.dist(truth.p_WE, (0.6, 0.2, -1.5)) < 0.03
+    assert truth.q_arm == pytest.approx(joints.q_arm, abs=0.05)
+    assert flight.snapshot.offboard.kind is SetpointKind.END_EFFECTOR
+
+
+def test_joints_alone_move_the_arm_and_leave_the_body() -> None:
+    flight = offboard(hover(), joints=JointSetpoint((0.2, 0.3)))
+    before = flight.sim.truth().p_WB
+    flight.run(5.0)
+    assert flight.sim.truth().q_arm == pytest.approx((0.2, 0.3), abs=0.05)
+    assert math.dist(flight.sim.truth().p_WB, before) < 0.05
+
+
+def test_without_a_set_point_in_the_last_half_second_it_does_not_begin() -> None:
+    flight = Flight(hover())
+    flight.step(command(ARM, 1.0))
+    flight.step(command(SET_MODE, 1.0, 6.0, 0.0))
+    assert flight.results[-1] == (SET_MODE, 1)
+    assert "no set-point" in flight.texts[-1]
+    flight.streamed = body(v=(0.0, 0.0, 0.0))
+    flight.run(0.1)
+    flight.streamed = {}
+    flight.run(0.55)
+    flight.step(command(SET_MODE, 1.0, 6.0, 0.0))
+    assert flight.mode is Mode.HOLD
+
+
+def test_silence_for_half_a_second_ends_it_in_hold_with_a_text() -> None:
+    flight = offboard(hover(), **body(v=(1.0, 0.0, 0.0)))
+    flight.run(2.0)
+    flight.streamed = {}
+    flight.run(0.6)
+    assert flight.mode is Mode.HOLD
+    assert any("set-points stopped" in text for text in flight.texts)
+    flight.run(4.0)
+    assert math.hypot(*flight.sim.truth().v_WB) < 0.04
+
+
+def test_a_velocity_whose_stream_ends_is_not_kept_alive_by_joints() -> None:
+    flight = offboard(hover(), joints=JointSetpoint((-0.7, 1.4)), **body(v=(1.0, 0.0, 0.0)))
+    flight.run(1.5)
+    del flight.streamed["motion"]
+    flight.run(3.0)
+    assert flight.mode is Mode.OFFBOARD
+    assert math.hypot(*flight.sim.truth().v_WB) < 0.05
+
+
+def test_out_of_range_is_counted_and_changes_nothing() -> None:
+    flight = offboard(hover(), **body(v=(0.0, 0.0, 0.0)))
+    flight.run(0.2)
+    accepted = flight.snapshot.offboard.accepted
+    for wrong in (
+        body(p=(5000.0, 0.0, -1.0)),
+        body(v=(200.0, 0.0, 0.0)),
+        {"attitude": AttitudeSetpoint(1.5, (1.0, 0.0, 0.0, 0.0))},
+        {"attitude": AttitudeSetpoint(0.5, (1.0, 1.0, 0.0, 0.0))},
+        {"joints": JointSetpoint((1.5, 0.0))},
+    ):
+        flight.streamed = wrong
+        flight.run(0.1)
+    report = flight.snapshot.offboard
+    assert (report.accepted, report.refused) == (accepted, 10)
+    assert flight.mode is Mode.HOLD, "half a second of nonsense is half a second of silence"
+    assert math.hypot(*flight.sim.truth().v_WB) < 0.02
+
+
+def test_from_the_ground_and_back_by_set_points_alone() -> None:
+    flight = Flight(on_the_ground())
+    flight.step(command(ARM, 1.0))
+    flight.streamed = body(p=(0.0, 0.0, -0.32))
+    flight.run(0.1)
+    flight.step(command(SET_MODE, 1.0, 6.0, 0.0))
+    flight.run(0.5)
+    assert flight.snapshot.landed
+    flight.streamed = body(p=(1.0, 0.0, -1.5))
+    flight.run(5.0)
+    assert not flight.snapshot.landed
+    assert math.dist(flight.sim.truth().p_WB, (1.0, 0.0, -1.5)) < 0.05
+    flight.streamed = body(v=(0.0, 0.0, 1.0))
+    flight.run(5.0)
+    assert flight.mode is Mode.OFFBOARD
+    assert flight.snapshot.landed
+    flight.step(command(ARM, 0.0))
+    assert flight.mode is Mode.DISARMED

@@ -1,0 +1,177 @@
+"""Goto, return, joints and home, flown; and what goes wrong around them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from fsw.geometry.geodesy import to_global
+from fsw.parameters.flight_config import flight_config
+from fsw.signals import CommandRequest, Mode, SafeSet, WorkspaceSphere
+from sitl.scenario_file import load_scenario
+from tests.closed_loop.harness import (
+    ARM,
+    LAND,
+    SET_MODE,
+    TAKEOFF,
+    Flight,
+    command,
+    hover,
+    on_the_ground,
+    safe_set,
+)  # fmt: skip
+
+NAN = math.nan
+RETURN, SET_ACTUATOR, GOTO = 20, 187, 192
+
+
+def as_int(number: int, frame: int, *params: float) -> CommandRequest:
+    return replace(command(number, *params), frame=frame)
+
+
+def up() -> Flight:
+    flight = Flight(on_the_ground())
+    flight.run(0.1)
+    flight.step(command(ARM, 1.0))
+    flight.step(command(TAKEOFF))
+    flight.run(4.0)
+    assert flight.mode is Mode.HOLD
+    return flight
+
+
+def test_goto_a_place_on_earth_then_home_and_down() -> None:
+    flight = up()
+    latitude, longitude, altitude = to_global(flight.config.origin, (2.0, 1.0, -1.8))
+    flight.step(as_int(GOTO, 5, -1.0, 1.0, 0.0, NAN, latitude, longitude, altitude))
+    flight.run(7.0)
+    assert flight.mode is Mode.HOLD
+    assert math.dist(flight.sim.truth().p_WB, (2.0, 1.0, -1.8)) < 0.05
+    flight.step(command(RETURN))
+    assert flight.mode is Mode.RETURN
+    flight.run(3.0)
+    home = flight.snapshot.home
+    assert home is not None
+    risen = home.p[2] - flight.sim.truth().p_WB[2]
+    assert risen == pytest.approx(flight.config.limits.return_height, abs=0.1)
+    flight.run(16.0)
+    assert flight.modes[-3:] == [Mode.RETURN, Mode.LAND, Mode.DISARMED]
+    assert math.dist(flight.sim.truth().p_WB, home.p) < 0.3
+    assert flight.snapshot.failures == ()
+
+
+def test_hold_breaks_off_the_way_to_a_place() -> None:
+    flight = up()
+    flight.step(as_int(GOTO, 1, -1.0, 1.0, 0.0, NAN, 20.0, 0.0, -2.0))
+    flight.run(3.0)
+    flight.step(command(SET_MODE, 1.0, 4.0, 3.0))
+    flight.run(3.0)
+    assert math.hypot(*flight.sim.truth().v_WB) < 0.02
+    assert 1.0 < flight.sim.truth().p_WB[0] < 5.0
+
+
+def test_the_joints_move_and_the_body_stays() -> None:
+    flight = up()
+    before = flight.sim.truth().p_WB
+    flight.step(command(SET_ACTUATOR, 0.5, -0.5))
+    flight.run(4.0)
+    assert flight.sim.truth().q_arm == pytest.approx((math.pi / 6, -math.pi / 4), abs=0.05)
+    assert math.dist(flight.sim.truth().p_WB, before) < 0.05
+
+
+def test_a_goto_towards_a_wall_stops_before_it() -> None:
+    walls = load_scenario("walls").walls
+    flight = Flight(replace(hover(), walls=walls))
+    flight.step(command(ARM, 1.0))
+    flight.step(as_int(GOTO, 1, 2.0, 1.0, 0.0, NAN, 0.89, 0.0, -1.4))
+    flight.run(5.0)
+    assert flight.sim.min_margin_m is not None
+    assert 0.0 < flight.sim.min_margin_m < 0.1
+
+
+def test_a_takeoff_that_is_sent_again_climbs_once() -> None:
+    flight = up()
+    height = flight.sim.truth().p_WB[2]
+    flight.step(command(LAND))
+    flight.run(0.2)
+    flight.step(replace(command(TAKEOFF), confirmation=1))
+    assert flight.results[-1] != (TAKEOFF, 0), "the last command of this sender was another"
+    second = Flight(on_the_ground())
+    second.step(command(ARM, 1.0))
+    for _ in range(5):
+        second.step(command(TAKEOFF))
+        second.run(0.05)
+    second.run(4.0)
+    assert [result for number, result in second.results if number == TAKEOFF] == [0] * 5
+    assert second.sim.truth().p_WB[2] == pytest.approx(height, abs=0.05)
+
+
+def test_a_takeoff_to_a_height_in_its_frame() -> None:
+    flight = Flight(on_the_ground())
+    flight.step(command(ARM, 1.0))
+    flight.step(as_int(TAKEOFF, 6, NAN, NAN, NAN, NAN, NAN, NAN, 1.2))  # above home
+    flight.run(4.5)
+    home = flight.snapshot.home
+    assert home is not None
+    assert home.p[2] - flight.sim.truth().p_WB[2] == pytest.approx(1.2, abs=0.05)
+
+
+def test_a_ground_station_that_falls_silent_brings_the_vehicle_home() -> None:
+    config = flight_config()
+    config = replace(config, limits=replace(config.limits, station_timeout_us=3_000_000))
+    flight = Flight(hover(), config=config)
+    flight.step(command(ARM, 1.0))
+    flight.run(4.0)
+    assert flight.mode is Mode.HOLD, "nobody was there, so nobody is missed"
+    flight.streamed = {"ground_station_heard": True}
+    flight.run(4.0)
+    assert flight.mode is Mode.HOLD
+    flight.streamed = {}
+    flight.run(3.1)
+    assert flight.mode is Mode.RETURN
+    assert any("no ground station" in text for text in flight.texts)
+
+
+def test_a_trajectory_goes_on_without_the_ground_station() -> None:
+    config = flight_config()
+    config = replace(config, limits=replace(config.limits, station_timeout_us=3_000_000))
+    flight = Flight(load_scenario("workspace-calm"), config=config)
+    flight.streamed = {"ground_station_heard": True}
+    flight.follow()
+    flight.run(0.2)
+    flight.streamed = {}
+    flight.run(4.0)
+    assert flight.mode is Mode.TRAJECTORY
+
+
+def test_a_safe_set_that_contradicts_itself_is_refused_in_flight_and_the_old_one_kept() -> None:
+    scenario = load_scenario("walls-calm")
+    flight = Flight(scenario)
+    flight.follow()
+    flight.run(0.5)
+    tiny = SafeSet(sphere=WorkspaceSphere((0.0, 0.0, -0.225), 0.01))
+    flight.streamed = {"safe_set": tiny}
+    flight.run(0.5)
+    assert flight.state.mission.safe_set == safe_set(scenario)
+    assert sum("old one is kept" in text for text in flight.texts) == 1
+    assert flight.mode is Mode.TRAJECTORY
+    assert flight.snapshot.constraints.margins
+
+
+def test_the_battery_empties_as_the_vehicle_flies() -> None:
+    flight = up()
+    battery = flight.snapshot.battery
+    assert 0.98 < battery.remaining < 1.0
+    assert 20.0 < battery.current < 60.0
+    assert 15.0 < battery.voltage < 16.8
+
+
+def test_what_keeps_it_from_arming_is_on_show() -> None:
+    flight = Flight(on_the_ground())
+    flight.run(0.3)
+    assert flight.snapshot.arming_refusal == ""
+    tiny = SafeSet(sphere=WorkspaceSphere((0.0, 0.0, -0.225), 0.01))
+    flight.streamed = {"safe_set": tiny}
+    flight.run(0.3)
+    assert "not armed" in flight.snapshot.arming_refusal
