@@ -27,7 +27,6 @@ SIM_GROUND_TRUTH: Final = Topic(
         _exact("thrust", 4, "N: rear, left, front, right"),
         _exact("q_arm", 2, "rad"),
         _exact("qd_arm", 2, "rad/s"),
-        _exact("force", 3, "N, NED; disturbance up to this instant"),
     ),
 )
 SIM_TRACKING: Final = Topic(

@@ -12,6 +12,7 @@ from fsw.link.udp_endpoint import LinkError, parse_address
 from pandion.display import Display
 from pandion.fly_options import FlyOptions, add_arguments
 from pandion.fly_options import options as fly_options
+from pandion.join_truth import join_truth
 from pandion.parser import COULD_NOT_START, Parser
 from pandion.processor import quietest
 from pandion.result import Parts, as_json
@@ -90,6 +91,7 @@ def _judge(options: FlyOptions, display: Display, flown: Flown) -> int:
     out = options.out
     names = {
         "ulog": "flight.ulg",
+        "truth": "truth.ulg",
         "tlog": "flight.tlog",
         "result": "result.json",
         "sitl": "sitl.json",
@@ -97,12 +99,14 @@ def _judge(options: FlyOptions, display: Display, flown: Flown) -> int:
         "sitl_log": "sitl.log",
         "fsw_log": "fsw.log",
     }
+    fsw = _read(out / "fsw.json")
+    join_truth(out, fsw)
     parts = Parts(
         scenario=options.scenario_name,
         seed=options.seed,
         controller=options.control.controller,
         sitl=flown.sitl,
-        fsw=_read(out / "fsw.json"),
+        fsw=fsw,
         failure=flown.failure,
         logs={
             key: out / name

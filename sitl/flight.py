@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import gc
 import json
 import os
+from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
@@ -19,6 +21,7 @@ from sitl.link.udp_endpoint import UdpEndpoint
 from sitl.scenario import Scenario
 from sitl.simulation import START_US, STEP_US, Controls, Simulation
 from sitl.trajectory import TrajectoryPoint
+from sitl.truth_log import TruthLog
 from sitl.verdict import EndKind, TruthResult
 
 COMPLETED, NOT_COMPLETED, COULD_NOT_START = 0, 1, 2  # exit codes
@@ -55,9 +58,11 @@ class Flight:
         plan = flight_plan(simulation.scenario, self._target_at)
         self._settle()
         exchange = self._exchange(stop)
-        timing = fly(simulation, plan, exchange, encoder, stop, self._progress)
-        # A vehicle that has just been silent for two seconds is not worth another one.
-        tries = {EndKind.STOPPED: 1, EndKind.INTERRUPTED: 2}
+        with contextlib.ExitStack() as files:
+            truth = self._truth(files)
+            timing = fly(simulation, plan, exchange, encoder, stop, self._progress, truth)
+        # A vehicle that has just been silent for so long is not worth waiting for.
+        tries = {EndKind.STOPPED: 0, EndKind.INTERRUPTED: 2}
         end = simulation.ended
         shut_down(endpoint, encoder, tries=4 if end is None else tries.get(end.kind, 4))
         result = simulation.result()
@@ -67,6 +72,20 @@ class Flight:
         if simulation.ended is not None and simulation.ended.kind is EndKind.REFUSED:
             return COULD_NOT_START
         return COMPLETED if result.completed else NOT_COMPLETED
+
+    def _truth(self, files: contextlib.ExitStack) -> Callable[[Simulation], None]:
+        """What takes the true state of every step: a log, where results are wanted."""
+        options = self._options
+        if options.out is None:
+            return lambda _: None
+        name, path = self._simulation.scenario.name, options.out / "truth.ulg"
+        log = files.enter_context(
+            contextlib.closing(TruthLog(path, name, options.seed, self._warn))
+        )
+        return log.add
+
+    def _warn(self, sentence: str) -> None:
+        self._told.report("warning", f"sitl: {sentence}")
 
     def _target_at(self, t_us: int) -> TrajectoryPoint:
         return self._simulation.target_at(1e-6 * (t_us - START_US))
@@ -94,8 +113,7 @@ class Flight:
         try:
             os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(_FIFO_PRIORITY))
         except OSError:
-            reason = "sitl: no permission for real-time scheduling: steps may be late"
-            self._told.report("warning", reason)
+            self._warn("no permission for real-time scheduling: steps may be late")
 
     def _as_json(
         self, result: TruthResult, timing: RunTiming, exchange: Exchange

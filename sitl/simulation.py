@@ -177,6 +177,10 @@ class Simulation:
             margins_m=self._referee.margins(points, self.time_s),
         )
 
+    def state_bytes(self) -> bytes:
+        """The true state now, for the log: position, velocity, attitude, rates, thrusts, arm."""
+        return self._state.tobytes()
+
     def result(self) -> TruthResult:
         """The score so far, or of the whole run once ``ended`` is set."""
         return self._referee.result(self.time_s)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final, Protocol
 
@@ -64,6 +65,7 @@ def fly(
     encoder: StepEncoder,
     stop: Stop,
     progress: Progress,
+    truth: Callable[[Simulation], None],
 ) -> RunTiming:
     """Step until the simulation, the pilot, a signal or silence ends the run.
 
@@ -79,6 +81,7 @@ def fly(
             answer = exchange.step(simulation.step, readings.t_us, datagram)
             if simulation.step == 0:  # the vehicle may take its time for the first answer
                 begin_s = time.perf_counter()
+            truth(simulation)
             _advance(simulation, answer)
         except SimulatorError as error:
             kind = EndKind.INTERRUPTED if stop.requested else EndKind.STOPPED

@@ -1,0 +1,83 @@
+"""The true state of every step, in a file that the flight software never sees.
+
+``truth.ulg`` is a ULog of its own; whoever started both halves may join it to the flight log.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Final
+
+from messages import ulog
+from messages.ground_truth import FIRST_NUMBER, SIM_GROUND_TRUTH, SIM_TRACKING, TRUTH_TOPICS
+from messages.ulog_reader import unpacker
+from sitl.simulation import SAMPLE_STEPS, START_US, Simulation
+
+_FLUSH_BYTES: Final = 1 << 16
+_STATE_HEAD: Final = ulog.data_head(FIRST_NUMBER, SIM_GROUND_TRUTH)
+_TRACKING_HEAD: Final = ulog.data_head(FIRST_NUMBER + 1, SIM_TRACKING)
+_TRACKING: Final = unpacker(SIM_TRACKING)
+
+
+class TruthLog:
+    """Whole records, appended a few hundred steps at a time."""
+
+    def __init__(self, path: Path, scenario: str, seed: int, warn: Callable[[str], None]) -> None:
+        """Create the file.
+
+        Args:
+            path: Where to write; what is there is replaced, as the simulator's other results are.
+            scenario: What is flown.
+            seed: The root of its randomness.
+            warn: Told once if the disk refuses; the simulation goes on.
+
+        Raises:
+            OSError: The file cannot be created.
+        """
+        self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_CLOEXEC, 0o666)
+        self._warn = warn
+        self._failed = False
+        self._size = 0
+        self._records = bytearray(_definitions(scenario, seed))
+
+    def add(self, simulation: Simulation) -> None:
+        """Append the state of the current step."""
+        t_us = simulation.t_us
+        # The state vector lies in memory as the record's fields follow each other.
+        self._records += _STATE_HEAD + t_us.to_bytes(8, "little") + simulation.state_bytes()
+        if simulation.step % SAMPLE_STEPS == 0:
+            truth = simulation.truth()
+            self._records += _TRACKING_HEAD + _TRACKING.pack(t_us, *truth.p_WE, *truth.target.p)
+        if len(self._records) > _FLUSH_BYTES:
+            self._flush()
+
+    def close(self) -> None:
+        """Write what is left and close the file."""
+        self._flush()
+        os.close(self._file)
+
+    def _flush(self) -> None:
+        records, self._records = self._records, bytearray()
+        if self._failed:
+            return
+        rest = memoryview(records)
+        try:
+            while rest:
+                rest = rest[os.write(self._file, rest) :]
+        except OSError as error:
+            self._failed = True
+            os.ftruncate(self._file, self._size)
+            self._warn(f"truth.ulg ends early: {error.strerror}")
+            return
+        self._size += len(records)
+
+
+def _definitions(scenario: str, seed: int) -> bytes:
+    parts = [ulog.opening(START_US), ulog.information("sys_name", "Pandion simulator")]
+    parts += [ulog.information("scenario", scenario), ulog.information("seed", seed)]
+    parts += [ulog.format_of(topic) for topic in TRUTH_TOPICS]
+    numbered = enumerate(TRUTH_TOPICS, start=FIRST_NUMBER)
+    parts += [ulog.subscription(number, topic) for number, topic in numbered]
+    return b"".join(parts)
