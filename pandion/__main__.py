@@ -19,6 +19,7 @@ verbs:
   sitl        run the simulator alone
   fsw         run the flight software alone
   reproduce   fly a table or a figure of the paper again
+  param       list, set, import and export the parameters of a vehicle or a file
   bench       time the planner's optimiser, or the loop in real time
   dialect     teach MAVProxy, Wireshark and others the private messages
   replay      feed a flight log through the flight software again and compare
@@ -86,6 +87,12 @@ def _dialect(argv: list[str]) -> int:
     return dialect.main(argv)
 
 
+def _param(argv: list[str]) -> int:
+    from pandion import param
+
+    return param.main(argv)
+
+
 def _sitl(argv: list[str]) -> int:
     from sitl import __main__ as entry
     from sitl import arguments
@@ -129,6 +136,7 @@ VERBS: Final[dict[str, Callable[[list[str]], int]]] = {
     "fsw": _fsw,
     "reproduce": _reproduce,
     "bench": _bench,
+    "param": _param,
     "dialect": _dialect,
     "replay": _replay,
     "export": _export,

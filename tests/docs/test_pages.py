@@ -23,6 +23,7 @@ from fsw.log.flight_log import FlightLog, LogSubject
 from fsw.log.reference import inserted
 from fsw.log.tlog import TlogWriter
 from fsw.mpc.planner_config import PlannerConfig
+from fsw.parameters.reference import reference as parameter_reference
 from messages import dialect
 from messages.frames import FrameWriter
 from messages.reference import reference
@@ -197,6 +198,12 @@ def test_the_reference_of_messages_is_not_stale() -> None:
 def test_the_topics_of_the_flight_log_are_not_stale() -> None:
     page = (DOCS / "flight-log.md").read_text(encoding="utf-8")
     assert page == inserted(page), "run python -m fsw.log.reference"
+
+
+def test_the_reference_of_parameters_is_not_stale() -> None:
+    page = DOCS / "parameters.md"
+    expected = parameter_reference()
+    assert page.read_text(encoding="utf-8") == expected, "run python -m fsw.parameters.reference"
 
 
 def test_the_streams_on_the_page_are_those_that_are_sent() -> None:

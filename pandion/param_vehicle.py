@@ -1,0 +1,175 @@
+"""The parameters of a running vehicle, over its link."""
+
+from __future__ import annotations
+
+import contextlib
+import socket
+import time
+from collections.abc import Iterator
+from types import TracebackType
+from typing import Final, cast
+
+from fsw.link.udp_endpoint import MAX_DATAGRAM, Address
+from fsw.parameters.real32 import nearest_decimal
+from messages.frames import Frame, FrameWriter, split
+
+_SYSTEM, _COMPONENT = 254, 190  # nobody's ground station
+_VEHICLE: Final = (1, 1)
+_HEARTBEAT, _STATUSTEXT = 0, 253
+_READ, _LIST, _VALUE, _SET, _ERROR = 20, 21, 22, 23, 345
+_GCS, _NO_AUTOPILOT, _ACTIVE, _VERSION = 6, 8, 4, 3
+_REAL32: Final = 9
+_TRIES: Final = 3
+_QUIET_S: Final = 0.3  # a list that pauses this long has lost something
+
+
+class NoAnswer(Exception):
+    """The vehicle is silent, in one sentence."""
+
+
+class Refused(Exception):
+    """The vehicle's reason."""
+
+
+class ParameterClient:
+    """Asks one vehicle; a context manager."""
+
+    def __init__(self, vehicle: Address, patience_s: float = 1.0) -> None:
+        """Open a socket.
+
+        Args:
+            vehicle: Where it listens.
+            patience_s: For each answer; it is asked three times.
+        """
+        self._vehicle = vehicle
+        self._patience_s = patience_s
+        self._writer = FrameWriter(_SYSTEM, _COMPONENT)
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.connect(vehicle)
+
+    def __enter__(self) -> ParameterClient:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._socket.close()
+
+    def read_all(self) -> dict[str, float]:
+        """Every parameter, by name.
+
+        Raises:
+            NoAnswer: Nothing came, or not all of it.
+        """
+        values: dict[int, tuple[str, float]] = {}
+        count = 1
+        for _ in range(_TRIES):
+            if not values:
+                self._send(_LIST, *_VEHICLE)
+            else:
+                for index in set(range(count)) - set(values):
+                    self._send(_READ, index, *_VEHICLE, b"")
+            patience_s = self._patience_s
+            while len(values) < count and (frame := self._hear((_VALUE,), patience_s)):
+                value, count, index, name, _ = cast(
+                    "tuple[float, int, int, bytes, int]", frame.payload_values
+                )
+                values[index] = (_text(name), nearest_decimal(value))
+                patience_s = _QUIET_S
+            if len(values) == count:
+                return dict(values.values())
+        missing = "nothing" if not values else f"{len(values)} of {count} parameters"
+        raise NoAnswer(f"{missing} came from the vehicle at {self._where}")
+
+    def read(self, name: str) -> float:
+        """One parameter.
+
+        Raises:
+            Refused: There is none of this name.
+            NoAnswer: The vehicle is silent.
+        """
+        return self._ask(_READ, (-1, *_VEHICLE, name.encode()), name)[0]
+
+    def write(self, name: str, value: float) -> None:
+        """Change one parameter.
+
+        Raises:
+            Refused: The vehicle's reason.
+            NoAnswer: The vehicle is silent.
+        """
+        held, texts = self._ask(_SET, (value, *_VEHICLE, name.encode(), _REAL32), name)
+        if held != nearest_decimal(value):
+            raise Refused("; ".join(texts) or f"the vehicle leaves {name} at {held:g}")
+
+    def _ask(
+        self, message_id: int, values: tuple[float | bytes, ...], name: str
+    ) -> tuple[float, list[str]]:
+        """Ask until the value of a name comes; it and what the vehicle said meanwhile."""
+        texts = _Texts()
+        for _ in range(_TRIES):
+            self._send(message_id, *values)
+            until = time.monotonic() + self._patience_s
+            while (left_s := until - time.monotonic()) > 0.0:
+                frame = self._hear((_VALUE, _ERROR, _STATUSTEXT), left_s)
+                if frame is None:
+                    break
+                if frame.message_id == _STATUSTEXT:
+                    texts.add(frame)
+                elif frame.message_id == _VALUE:
+                    value, _, _, named, _ = cast(
+                        "tuple[float, int, int, bytes, int]", frame.payload_values
+                    )
+                    if _text(named) == name:
+                        return nearest_decimal(value), texts.whole
+                elif _text(cast(bytes, frame.payload_values[3])) == name and not texts.whole:
+                    raise Refused(f"the vehicle has no parameter {name}")
+        raise NoAnswer(f"no answer from the vehicle at {self._where}")
+
+    @property
+    def _where(self) -> str:
+        return f"udp:{self._vehicle[0]}:{self._vehicle[1]}"
+
+    def _send(self, message_id: int, *values: float | bytes) -> None:
+        beat = self._writer.frame(_HEARTBEAT, 0, _GCS, _NO_AUTOPILOT, 0, _ACTIVE, _VERSION)
+        # Nobody there: the vehicle may come.
+        with contextlib.suppress(ConnectionRefusedError):
+            self._socket.send(beat + self._writer.frame(message_id, *values))
+
+    def _hear(self, wanted: tuple[int, ...], patience_s: float) -> Frame | None:
+        """The next frame of the vehicle with one of these ids; None after the patience."""
+        until = time.monotonic() + patience_s
+        while True:
+            for frame in self._waiting:
+                if frame.message_id in wanted and (frame.system_id, frame.component_id) == _VEHICLE:
+                    return frame
+            left_s = until - time.monotonic()
+            if left_s <= 0.0:
+                return None
+            self._socket.settimeout(left_s)
+            with contextlib.suppress(TimeoutError, ConnectionRefusedError):
+                self._waiting = split(self._socket.recv(MAX_DATAGRAM))
+
+    _waiting: Iterator[Frame] = iter(())
+
+
+class _Texts:
+    """Status texts, put together from their pieces."""
+
+    def __init__(self) -> None:
+        self.whole: list[str] = []
+        self._id = 0
+
+    def add(self, frame: Frame) -> None:
+        _, text, id_, piece = cast("tuple[int, bytes, int, int]", frame.payload_values)
+        if id_ and id_ == self._id and piece:
+            self.whole[-1] += _text(text)
+        else:
+            self.whole.append(_text(text))
+        self._id = id_
+
+
+def _text(padded: bytes) -> str:
+    return padded.partition(b"\0")[0].decode(errors="replace")

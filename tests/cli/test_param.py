@@ -1,0 +1,90 @@
+"""``pandion param`` on files, in this process."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from fsw.parameters.registry import PARAMETERS
+from fsw.parameters.storage import load
+from pandion import param
+
+DEFAULTS = {parameter.name: parameter.default for parameter in PARAMETERS}
+
+
+def test_a_file_is_listed_with_defaults_for_what_it_does_not_say(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "v.params"
+    file.write_text("PID_YAW_P 5\n")
+    assert param.main(["list", "--json", "--file", str(file)]) == 0
+    listed = {entry["name"]: entry for entry in json.loads(capsys.readouterr().out)}
+    assert {name: entry["value"] for name, entry in listed.items()} == {
+        **DEFAULTS,
+        "PID_YAW_P": 5.0,
+    }
+    assert listed["PID_YAW_P"]["default"] == 4.0
+    assert param.main(["list", "--changed", "--file", str(file)]) == 0
+    (line,) = capsys.readouterr().out.splitlines()
+    assert line.split()[:3] == ["PID_YAW_P", "*", "5"]
+
+
+def test_set_and_get_in_a_new_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    where = ["--file", str(tmp_path / "v.params")]
+    assert param.main(["set", "PID_YAW_P", "5", *where]) == 0
+    assert param.main(["set", "LND_SPEED", "0.3", *where]) == 0
+    assert load(tmp_path / "v.params").values == {"PID_YAW_P": 5.0, "LND_SPEED": 0.3}
+    capsys.readouterr()
+    assert param.main(["get", "PID_YAW_P", "PID_YAW_D", *where, "--json"]) == 0
+    assert [entry["value"] for entry in json.loads(capsys.readouterr().out)] == [5.0, 4.0]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "said"),
+    [
+        (["set", "PID_YAW_P", "99"], 1, "PID_YAW_P is to be 0..50, 99 is refused"),
+        (["set", "PID_YAW_P", "nan"], 1, "nan is refused"),
+        (["set", "PID_YAW_Q", "1"], 1, "unknown parameter PID_YAW_Q; did you mean PID_YAW_P?"),
+        (["get", "WAL_ALPHA"], 1, "did you mean WALL_ALPHA?"),
+        (["set", "PID_YAW_P", "much"], 2, "invalid float value: 'much'"),
+        (["import", "nowhere.params"], 2, "nowhere.params"),
+        (["export", "nowhere/x.params"], 2, "nowhere"),
+        (["lost"], 2, "unknown action lost; did you mean list?"),
+        (["list", "--vehicle=here"], 2, "not of the form udp:HOST:PORT"),
+    ],
+)
+def test_what_cannot_be_done_is_one_sentence(
+    arguments: list[str],
+    code: int,
+    said: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    where = [] if "--vehicle=here" in arguments else ["--file", "v.params"]
+    try:
+        ended = param.main([*arguments, *where])
+    except SystemExit as exit_:
+        ended = exit_.code  # type: ignore[assignment]
+    assert ended == code
+    error = capsys.readouterr().err
+    assert said in error
+    assert error.count("\n") == 1
+    assert not (tmp_path / "v.params").exists()
+
+
+@pytest.mark.parametrize("suffix", ["params", "parm"])
+def test_an_export_imported_again_changes_nothing(
+    suffix: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    source, copy, target = (str(tmp_path / n) for n in ("a.params", f"b.{suffix}", "c.params"))
+    param.main(["set", "WALL_LAMBDA", "0.4", "--file", source])
+    assert param.main(["export", copy, "--file", source]) == 0
+    assert param.main(["import", copy, "--file", target]) == 0
+    assert load(Path(target)).values == {"WALL_LAMBDA": 0.4}
+    assert "74 parameters read, 1 changed" in capsys.readouterr().out.replace(
+        f"{len(PARAMETERS)} parameters read", "74 parameters read"
+    )
