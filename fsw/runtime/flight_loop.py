@@ -56,6 +56,7 @@ from fsw.signals import (
 from fsw.vehicle.battery import drained
 from fsw.vehicle.safety_gate import gate
 from fsw.vehicle.situation import Situation
+from fsw.vehicle.tame import tamed
 
 _STILL = SensorFrame(
     1_000_000,
@@ -234,9 +235,15 @@ class FlightLoop:
             state, targets, postures = steered
         else:
             postures = ()
-            targets = tuple(
-                self._reference(state, apply_us + node * config.mpc_period_us)
-                for node in range(config.planner.horizon + 1)
+            targets = tamed(
+                tuple(
+                    self._reference(state, apply_us + node * config.mpc_period_us)
+                    for node in range(config.planner.horizon + 1)
+                ),
+                point_in_flight(estimate, config.airframe.link_length)[0],
+                state.mission.safe_set,
+                config.planner.walls.alpha,
+                config.planner.walls.slope,
             )
         measured = measured_state(estimate, self._cascade.motion(state.cascade, estimate))
         request, plan = ask(

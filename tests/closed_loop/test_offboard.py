@@ -6,12 +6,20 @@ The walls are those of Case I, the margin is the plant's own, between samples.
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import pytest
 
-from fsw.signals import AttitudeSetpoint, JointSetpoint, Mode, MotionSetpoint, SetpointKind, Vec3
+from fsw.signals import (
+    AttitudeSetpoint,
+    EndEffectorTarget,
+    JointSetpoint,
+    Mode,
+    MotionSetpoint,
+    SetpointKind,
+    Vec3,
+)
 from sitl.scenario import Hold, Pilot, Scenario
 from sitl.scenario_file import load_scenario
 from tests.closed_loop.harness import ARM, SET_MODE, Flight, command, hover, on_the_ground
@@ -48,6 +56,24 @@ def body(**parts: Any) -> dict[str, Any]:
 
 def end_effector(**parts: Any) -> dict[str, Any]:
     return {"motion": MotionSetpoint(True, **parts)}
+
+
+@dataclass
+class ThroughTheWall(Flight):
+    """Streams a straight path that goes on behind the wall."""
+
+    speed: float = 1.0
+
+    def _targets(self) -> tuple[EndEffectorTarget, ...]:
+        if self.sim.step % 50:
+            return ()
+        ahead = (self.sim.t_us + 100_000 * k for k in range(20))
+        return tuple(self._point(t_us) for t_us in ahead)
+
+    def _point(self, t_us: int) -> EndEffectorTarget:
+        x, y, z = AFAR
+        gone = self.speed * max(1e-6 * t_us - 1.5, 0.0)
+        return EndEffectorTarget(t_us, (x + gone, y, z), (self.speed, 0.0, 0.0), (0.0, 0.0, 0.0))
 
 
 ATTACKS = {
@@ -197,3 +223,16 @@ def test_from_the_ground_and_back_by_set_points_alone() -> None:
     assert flight.snapshot.landed
     flight.step(command(ARM, 0.0))
     assert flight.mode is Mode.DISARMED
+
+
+@pytest.mark.parametrize("speed", [1.0, 3.0])
+def test_a_streamed_trajectory_through_the_wall_is_not_flown_there(speed: float) -> None:
+    flight = ThroughTheWall(walls(AFAR, disturbed=True), speed=speed)
+    flight.step(command(ARM, 1.0))
+    flight.step(command(SET_MODE, 1.0, 4.0, 11.0))
+    assert flight.mode is Mode.TRAJECTORY
+    flight.run(6.0)
+    margin = flight.sim.min_margin_m
+    assert margin is not None
+    assert 0.02 < margin < 0.2
+    assert flight.mode is Mode.TRAJECTORY
