@@ -16,7 +16,8 @@ from pandion.display import Display
 from pandion.parser import COULD_NOT_START
 
 _LISTEN_S: Final = 30.0  # until sitl has bound its port
-_FOLLOW_S: Final = 3.0  # one half ends this soon after the other; the link's stall time is 2 s
+_FOLLOW_S: Final = 3.0  # one half ends this soon after the other
+_STALLED_S: Final = 0.1  # the same for a half that is silent: it has had its time
 _GRACE_S: Final = 0.6  # between one way to end a half and the next, stronger one
 
 
@@ -57,6 +58,7 @@ class Supervisor:
         self._selector = selectors.DefaultSelector()
         self._deadline_s: float | None = None  # when a half that is left is made to end
         self._interrupted_all = False
+        self._grace_s = _GRACE_S
 
     def fly(self, sitl: list[str], fsw: Callable[[int], list[str]]) -> Flown:
         """Run one flight.
@@ -128,16 +130,30 @@ class Supervisor:
             self._display.say(event["message"])
         elif kind == "flying":
             flown.started = True
-        elif kind == "ended" and child.name == "sitl":
-            flown.sitl = event["result"]
+        elif kind == "ended":
+            self._note_end(child, event)
         if kind in ("preparing", "warning", "parameters"):
             self._display.say(event["message"])
+
+    def _note_end(self, child: Child, event: Event) -> None:
+        """Keep the result; a half that ends because the other is silent does not wait for it."""
+        if child.name == "sitl":
+            self._flown.sitl = event["result"]
+            silent = event["vehicle_silent"]
+        else:
+            silent = event["ending"] == "link lost"
+            if silent:
+                self._flown.errors["fsw"] = event["message"]
+        if silent:
+            self._grace_s = _STALLED_S
+            self._deadline_s = time.monotonic() + _STALLED_S
 
     def _ended(self, child: Child) -> None:
         """A half is gone: note a crash, and give the other one a moment to follow."""
         child.end(patience_s=1.0)
         code = child.exit_code
-        if code not in (0, 1, 2) and child.name not in self._flown.errors:
+        killed = self._interrupted_all and code is not None and code < 0
+        if code not in (0, 1, 2) and not killed and child.name not in self._flown.errors:
             log = self._out / f"{child.name}.log"
             self._flown.errors[child.name] = f"{child.name} ended with code {code}; see {log}"
         if self._deadline_s is None:
@@ -149,7 +165,7 @@ class Supervisor:
         """Past the deadline: interrupt what still runs, then kill it."""
         if self._deadline_s is None or time.monotonic() < self._deadline_s:
             return
-        self._deadline_s = time.monotonic() + _GRACE_S
+        self._deadline_s = time.monotonic() + self._grace_s
         for child in self._children:
             if self._interrupted_all:
                 child.kill()

@@ -64,11 +64,12 @@ class Flight:
         # A vehicle that has just been silent for so long is not worth waiting for.
         tries = {EndKind.STOPPED: 0, EndKind.INTERRUPTED: 2}
         end = simulation.ended
-        shut_down(endpoint, encoder, tries=4 if end is None else tries.get(end.kind, 4))
+        heard = shut_down(endpoint, encoder, tries=4 if end is None else tries.get(end.kind, 4))
         result = simulation.result()
         written = self._as_json(result, timing, exchange)
         self._write(written)
-        self._told.report("ended", f"sitl: {_summary(result, timing)}", result=written)
+        sentence = f"sitl: {_summary(result, timing)}"
+        self._told.report("ended", sentence, result=written, vehicle_silent=not heard)
         if simulation.ended is not None and simulation.ended.kind is EndKind.REFUSED:
             return COULD_NOT_START
         return COMPLETED if result.completed else NOT_COMPLETED
