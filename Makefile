@@ -69,7 +69,7 @@ $(READY): requirements-dev.lock pyproject.toml Makefile messages/build_hook.py |
 	@touch $@
 
 # The install has generated it; this is for an edit of the XML.
-messages/dialect.py: messages/pandion.xml messages/generate.py | $(READY)
+messages/dialect.py: messages/pandion.xml messages/upstream.xml messages/generate.py | $(READY)
 	@$(BIN)/python -m messages.generate
 
 # Hashes only: no index, no download address, nothing of the machine that made the file.

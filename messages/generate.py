@@ -4,7 +4,7 @@ Run by the build hook for every wheel and editable install, and by hand after an
 ``python -m messages.generate``. The definitions that the XML includes come from the installed
 pymavlink, so the same pymavlink always gives the same bytes. The standard modes (AVAILABLE_MODES,
 CURRENT_MODE), which MAVLink has in common.xml by now, still wait in pymavlink's development.xml:
-the module carries that as well, and tests pin the three messages.
+the module carries that as well, what `upstream.xml` adds, and tests pin these messages.
 """
 
 import contextlib
@@ -17,7 +17,8 @@ from pathlib import Path
 
 DEFINITION = Path(__file__).with_name("pandion.xml")
 GENERATED = Path(__file__).with_name("dialect.py")
-_BESIDE = "development.xml"
+_DEVELOPMENT = "development.xml"
+_UPSTREAM = Path(__file__).with_name("upstream.xml")
 
 
 class GenerationError(RuntimeError):
@@ -45,7 +46,9 @@ def generate(
         source = Path(folder, definition.name)
         shutil.copy(definition, source)
         module = source.with_suffix(destination.suffix)
-        _run_mavgen([source, Path(folder, _BESIDE)], module, language)
+        shutil.copy(_UPSTREAM, folder)
+        beside = [Path(folder, name) for name in (_DEVELOPMENT, _UPSTREAM.name)]
+        _run_mavgen([source, *beside], module, language)
         module.replace(destination)
 
 

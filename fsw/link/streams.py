@@ -17,6 +17,7 @@ from fsw.link import (
     encode_standard,
     message_ids,
 )
+from fsw.link.component_metadata import component_metadata
 from fsw.link.message_ids import AUTOPILOT, PANDION
 from fsw.link.service import Outgoing, WireValues
 from fsw.link.telemetry import TelemetryContext
@@ -81,6 +82,7 @@ AT_ONCE: Final = (HEARTBEAT, _CURRENT_MODE, _EXTENDED_STATE)
 # Sent on request only, because they have several parts; the request's param2 chooses.
 ON_REQUEST: Final[dict[int, Answerer]] = {
     message_ids.AVAILABLE_MODES: encode_identity.available_modes,
+    message_ids.COMPONENT_METADATA: component_metadata,
 }
 
 GROUND_RATES: Final = tuple(stream.ground_hz for stream in STREAMS)

@@ -22,6 +22,7 @@ PINNED = {
 
 # From pymavlink's development.xml, as MAVLink's common.xml and QGroundControl have them.
 STANDARD_MODES = {
+    "COMPONENT_METADATA": (397, 108, 182),
     "AVAILABLE_MODES": (435, 46, 134),
     "CURRENT_MODE": (436, 9, 193),
     "AVAILABLE_MODES_MONITOR": (437, 1, 30),

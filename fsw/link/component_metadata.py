@@ -1,0 +1,66 @@
+"""Component metadata: documents over FTP that tell a ground station units, ranges and meanings.
+
+Source: https://mavlink.io/en/services/component_information.html
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+from typing import Final
+
+from fsw.link import message_ids
+from fsw.link.ftp_tree import Node
+from fsw.link.served_file import MemoryFile
+from fsw.link.service import Outgoing
+from fsw.link.telemetry import TelemetryContext
+from fsw.signals import FlightSnapshot
+
+_GENERAL: Final = "general.json"
+_PARAMETERS: Final = "parameters.json"
+
+
+def metadata_files() -> dict[str, Node]:
+    """The documents, by their names in the root of the tree."""
+    return {_GENERAL: MemoryFile(_general), _PARAMETERS: MemoryFile(_parameters)}
+
+
+def component_metadata(
+    _: float, snapshot: FlightSnapshot, __: TelemetryContext
+) -> Sequence[Outgoing]:
+    """COMPONENT_METADATA: where the general document is."""
+    uri = _uri(_GENERAL).encode()
+    values = (snapshot.t_us // 1000, _general_crc(), uri)
+    return [Outgoing(message_ids.COMPONENT_METADATA, values)]
+
+
+def _uri(name: str) -> str:
+    return f"mftp:///{name}"
+
+
+# The table of parameters knows all that flies and is slow to import; a ground station asks when
+# it has been imported long since.
+@cache
+def _parameters() -> bytes:
+    from fsw.parameters.metadata import parameter_document
+
+    return parameter_document()
+
+
+@cache
+def _general() -> bytes:
+    from fsw.parameters.metadata import general_document
+
+    try:
+        firmware = version("pandion")
+    except PackageNotFoundError:
+        firmware = "0.0.0"
+    return general_document(_uri(_PARAMETERS), firmware)
+
+
+@cache
+def _general_crc() -> int:
+    from fsw.parameters.metadata import metadata_crc
+
+    return metadata_crc(_general())
