@@ -15,10 +15,10 @@ PIP_INDEX = $${PIP_INDEX_URL:-$$($(PYTHON) -m pip config get global.index-url 2>
 UV = UV_DEFAULT_INDEX="$${UV_DEFAULT_INDEX:-$(PIP_INDEX)}" .boot/uv
 
 .DEFAULT_GOAL := help
-.PHONY: help setup run test lock clean
+.PHONY: help setup run test interop lock clean
 
 help: ## show this list
-	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-6s %s\n", $$1, $$2 }' Makefile
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-7s %s\n", $$1, $$2 }' Makefile
 
 setup: $(READY) messages/dialect.py ## create .venv with everything in it (nothing to do if nothing changed)
 	@echo "setup: .venv is ready"
@@ -38,6 +38,21 @@ test: setup ## set up, then run every check: ruff, mypy, import-linter, pytest
 	$(call check,types,$(BIN)/mypy)
 	$(call check,imports,$(BIN)/lint-imports)
 	$(BIN)/pytest
+
+# Of other people's clients; each has a lock of its own, and none is needed to fly or to test.
+EXTERNAL := tests/interop/external
+.interop/mavproxy/ready: $(EXTERNAL)/mavproxy.lock | $(READY)
+	@.boot/uv venv --quiet --allow-existing --no-project --python .venv/bin/python .interop/mavproxy
+	@$(UV) pip sync --quiet --python .interop/mavproxy --require-hashes --only-binary :all: $<
+	@touch $@
+
+.interop/node/ready: $(wildcard $(EXTERNAL)/node/*) | $(READY)
+	@mkdir -p .interop/node && cp $(EXTERNAL)/node/* .interop/node
+	@cd .interop/node && npm ci --silent --no-audit --no-fund --ignore-scripts
+	@touch $@
+
+interop: setup .interop/mavproxy/ready .interop/node/ready ## fly by MAVProxy and node-mavlink (needs npm)
+	PANDION_INTEROP=.interop $(BIN)/pytest $(EXTERNAL)
 
 # A uv that is there is used if it understands what is asked of it; else the pinned one is fetched
 # into .boot with pip alone, because a fresh Debian has neither ensurepip nor a pip that may install.
@@ -74,15 +89,17 @@ messages/dialect.py: messages/pandion.xml messages/upstream.xml messages/generat
 
 # Hashes only: no index, no download address, nothing of the machine that made the file.
 COMPILE = $(UV) pip compile --quiet --upgrade --universal --python-version 3.11 --generate-hashes \
-	--only-binary :all: --no-emit-index-url --no-annotate --custom-compile-command 'make lock' pyproject.toml
+	--only-binary :all: --no-emit-index-url --no-annotate --custom-compile-command 'make lock'
 
 lock: .boot/uv ## renew requirements.lock (to fly) and requirements-dev.lock (to test as well)
 	@echo "lock: resolving the newest versions"
-	@$(COMPILE) --group build --output-file requirements.lock
-	@$(COMPILE) --group dev --constraints requirements.lock --output-file requirements-dev.lock
-	@git diff --stat -- requirements.lock requirements-dev.lock
+	@$(COMPILE) pyproject.toml --group build --output-file requirements.lock
+	@$(COMPILE) pyproject.toml --group dev --constraints requirements.lock \
+		--output-file requirements-dev.lock
+	@$(COMPILE) --group mavproxy --no-deps --output-file $(EXTERNAL)/mavproxy.lock
+	@git diff --stat -- requirements.lock requirements-dev.lock $(EXTERNAL)/mavproxy.lock
 
 clean: ## remove the environment, generated files and caches
-	rm -rf .venv .boot build dist messages/dialect.py .mypy_cache .ruff_cache .pytest_cache \
+	rm -rf .venv .boot .interop build dist messages/dialect.py .mypy_cache .ruff_cache .pytest_cache \
 		.hypothesis .import_linter_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

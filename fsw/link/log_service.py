@@ -21,7 +21,7 @@ from fsw.signals import StatusText
 from messages.frames import Frame
 
 CHUNK: Final = 90  # bytes of a log in one LOG_DATA
-_FRAMES: Final = 12  # a tick: one datagram
+_FRAMES: Final = 6  # a tick: 3000 messages a second, as many as a client in Python can read
 _ENTRIES: Final = 8  # a tick: each asks the file system once
 _MAX_REQUESTS: Final = 32  # a client asks again for what got lost in up to 20 pieces
 _TO_THE_END: Final = 0xFFFFFFFF

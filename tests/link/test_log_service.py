@@ -17,7 +17,7 @@ from fsw.link.service import Outgoing
 from messages.frames import FrameWriter, split
 
 ALL = 0xFFFFFFFF
-FRAMES_A_TICK = 12
+FRAMES_A_TICK = 6
 
 
 def flight(runs: Path, name: str, content: bytes, suffix: str = "tlog") -> Path:

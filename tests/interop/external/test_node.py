@@ -1,0 +1,32 @@
+"""node-mavlink as client; run by ``make interop``."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+
+import pytest
+
+from fsw.parameters.registry import PARAMETERS
+from tests.interop.external.environments import environment_of
+from tests.interop.vehicle import Vehicle
+
+PACING = ("--realtime",)
+ARM, UNKNOWN = "400", "31010"
+ACCEPTED, UNSUPPORTED = 0, 3
+
+
+def test_node_mavlink_reads_and_commands_the_vehicle(vehicle: Vehicle) -> None:
+    client = environment_of("node") / "client.mjs"
+    said = subprocess.run(
+        ["node", str(client), str(vehicle.gcs_port)], capture_output=True, text=True, check=True
+    )
+    seen = json.loads(said.stdout)
+    assert {"HEARTBEAT", "ATTITUDE", "LOCAL_POSITION_NED", "SYS_STATUS"} <= set(seen["messages"])
+    assert seen["messages"]["ATTITUDE"] > 100
+    assert seen["acks"] == {ARM: ACCEPTED, UNKNOWN: UNSUPPORTED}
+    assert seen["armed"]
+    assert seen["parameters"] == {
+        parameter.name: pytest.approx(parameter.default, rel=1e-6, abs=1e-9)
+        for parameter in PARAMETERS
+    }
