@@ -1,0 +1,31 @@
+"""The programs on the pages about clients run, with a vehicle at the other end."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.docs.test_pages import DOCS, blocks
+from tests.interop.vehicle import Vehicle
+
+PACING = ("--lockstep", "--speed", "4")
+PAGES = sorted((DOCS / "ground-stations").glob("*.md"))
+PROGRAMS = [
+    pytest.param(code, id=f"{page.stem}-{number}")
+    for page in PAGES
+    for number, code in enumerate(blocks(page, "python"))
+]
+
+
+@pytest.mark.parametrize("code", PROGRAMS)
+def test_the_program_on_the_page_runs(vehicle: Vehicle, tmp_path: Path, code: str) -> None:
+    assert "127.0.0.1:14540" in code
+    program = tmp_path / "program.py"
+    program.write_text(code.replace("14540", str(vehicle.api_port)), encoding="utf-8")
+    said = subprocess.run(
+        [sys.executable, str(program)], capture_output=True, text=True, timeout=120.0
+    )
+    assert said.returncode == 0, said.stdout[-1000:] + said.stderr[-1000:]
