@@ -1,8 +1,9 @@
-"""Which processor two halves in lockstep should share.
+"""Which processors two halves in lockstep should run on.
 
-In lockstep only one half runs at a time. On one processor the kernel switches from one to the
-other directly; on two, every datagram has to wake an idle processor, which costs more than the
-step itself (7.4 against 10.1 times real time on an otherwise idle virtual machine).
+In lockstep the halves take turns. On two processors each keeps its caches, and the one that waits
+looks for the datagram instead of sleeping (``link/eager.py``): 24 times real time. On one, the
+kernel switches from one to the other: 16 times. But looking is of use only while the other half
+runs: on a machine that has more to do, both on the quietest processor is what disturbs least.
 """
 
 from __future__ import annotations
@@ -11,36 +12,46 @@ import os
 import sys
 import time
 from pathlib import Path
-from typing import Final
+from typing import Final, NamedTuple
 
 _GLANCE_S: Final = 0.05
+_IDLE: Final = 0.7  # share of a processor's time that must be nobody's
 
 
-def quietest() -> int | None:
-    """The processor this process may use that was idle most just now; None where unknown."""
+class Places(NamedTuple):
+    """A processor for each half; None: wherever the system likes."""
+
+    sitl: int | None = None
+    fsw: int | None = None
+
+
+def lockstep_places() -> Places:
+    """Two idle processors, else the quietest one for both, else wherever the system likes."""
     if sys.platform != "linux":
-        return None
+        return Places()
     allowed = os.sched_getaffinity(0)
     try:
-        before = _idle_ticks()
+        before, begin_s = _idle_s(), time.monotonic()
         time.sleep(_GLANCE_S)
-        after = _idle_ticks()
+        after, passed_s = _idle_s(), time.monotonic() - begin_s
     except (OSError, ValueError, IndexError):
-        return None
-    known = [cpu for cpu in allowed if cpu in before and cpu in after]
+        return Places()
+    idle = {cpu: after[cpu] - before[cpu] for cpu in allowed if cpu in before and cpu in after}
     # The process's number breaks ties, so that flights started together spread out.
-    return max(
-        known,
-        key=lambda cpu: (after[cpu] - before[cpu], (cpu + os.getpid()) % len(allowed)),
-        default=None,
-    )
+    quietest = sorted(idle, key=lambda cpu: (-idle[cpu], (cpu + os.getpid()) % len(allowed)))
+    if not quietest:
+        return Places()
+    if len(quietest) > 1 and idle[quietest[1]] > _IDLE * passed_s:
+        return Places(quietest[1], quietest[0])
+    return Places(quietest[0], quietest[0])
 
 
-def _idle_ticks() -> dict[int, int]:
-    """Idle time of each processor so far, in the kernel's ticks."""
+def _idle_s() -> dict[int, float]:
+    """Idle time of each processor so far [s]."""
+    ticks_per_s = os.sysconf("SC_CLK_TCK")
     idle = {}
     for line in Path("/proc/stat").read_text(encoding="ascii").splitlines():
         name, *counts = line.split()
         if name.startswith("cpu") and name != "cpu":
-            idle[int(name[3:])] = int(counts[3])
+            idle[int(name[3:])] = int(counts[3]) / ticks_per_s
     return idle

@@ -14,6 +14,7 @@ from typing import Any, Final
 from pandion.children import Child, Event
 from pandion.display import Display
 from pandion.parser import COULD_NOT_START
+from pandion.processor import Places
 
 _LISTEN_S: Final = 30.0  # until sitl has bound its port
 _FOLLOW_S: Final = 3.0  # one half ends this soon after the other
@@ -49,9 +50,9 @@ class Flown:
 class Supervisor:
     """Starts sitl, then fsw, and sees both to their end."""
 
-    def __init__(self, display: Display, out: Path, processor: int | None = None) -> None:
+    def __init__(self, display: Display, out: Path, places: Places) -> None:
         self._display = display
-        self._processor = processor
+        self._places = places
         self._out = out
         self._flown = Flown()
         self._children: list[Child] = []
@@ -75,10 +76,10 @@ class Supervisor:
             for number in (signal.SIGINT, signal.SIGTERM)
         }
         try:
-            self._start("sitl", sitl)
+            self._start("sitl", sitl, self._places.sitl)
             self._watch(lambda: self._flown.port is not None, _LISTEN_S)
             if self._flown.port is not None and not self._flown.interrupted:
-                self._start("fsw", fsw(self._flown.port))
+                self._start("fsw", fsw(self._flown.port), self._places.fsw)
                 with self._display.flight(self._flown.duration_s):
                     self._watch(lambda: False, None)
                 self._display.end()
@@ -96,8 +97,8 @@ class Supervisor:
             raise HalfFailed("interrupted before the flight began", exit_code=1)
         raise HalfFailed(self._flown.failure or "the simulator did not start")
 
-    def _start(self, name: str, arguments: list[str]) -> None:
-        child = Child(name, arguments, self._out / f"{name}.log", self._processor)
+    def _start(self, name: str, arguments: list[str], processor: int | None) -> None:
+        child = Child(name, arguments, self._out / f"{name}.log", processor)
         self._children.append(child)
         self._selector.register(child, selectors.EVENT_READ)
 

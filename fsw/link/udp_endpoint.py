@@ -13,6 +13,8 @@ import socket
 import struct
 from typing import Final
 
+from fsw.link.eager import EagerReceiver
+
 Address = tuple[str, int]
 
 MAX_DATAGRAM: Final = 2048  # bytes; a larger datagram is cut and its last frame then refused
@@ -80,11 +82,12 @@ class ConnectedEndpoint:
         except OSError as error:
             self._socket.close()
             raise LinkError(f"cannot send to udp:{peer[0]}:{peer[1]}: {error.strerror}") from None
+        self._receive = EagerReceiver(self._socket, MAX_DATAGRAM)
 
     def receive(self) -> bytes | None:
         """Wait for a datagram; None when the patience is over or nobody listens at the peer."""
         try:
-            return self._socket.recv(MAX_DATAGRAM)
+            return self._receive()
         except (BlockingIOError, ConnectionRefusedError):
             return None
 

@@ -13,6 +13,8 @@ import socket
 import struct
 from typing import Final
 
+from sitl.link.eager import EagerReceiver
+
 Address = tuple[str, int]
 
 RESEND_S: Final = 0.25  # patience of one receive, after which a step is sent again
@@ -70,6 +72,7 @@ class UdpEndpoint:
             raise LinkError(
                 f"cannot listen on udp:{local[0]}:{local[1]}: {reason[0].lower()}{reason[1:]}"
             ) from None
+        self._receive = EagerReceiver(self._socket, MAX_DATAGRAM)
 
     @property
     def address(self) -> Address:
@@ -91,7 +94,7 @@ class UdpEndpoint:
     def receive(self) -> bytes | None:
         """Wait for a datagram of the peer; None when the patience is over or it is gone."""
         try:
-            return self._socket.recv(MAX_DATAGRAM)
+            return self._receive()
         except (BlockingIOError, ConnectionRefusedError):
             return None
 
