@@ -86,9 +86,9 @@ class Referee:
 
     def _all_clear(self, places: Array, before_s: float, step_s: float) -> bool:
         """Record the margins of steps without any incident; False, and nothing done, otherwise."""
-        instants = [before_s + k * step_s for k in range(1, 1 + len(places))]
         targets = _NOWHERE
         if self.world.workspace is not None:
+            instants = [before_s + k * step_s for k in range(1, 1 + len(places))]
             if not all(map(self._clock.counts, instants)):
                 return False
             targets = np.array([self._clock.target_at(time_s).p for time_s in instants])

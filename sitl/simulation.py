@@ -217,22 +217,20 @@ class Simulation:
         )
 
     def _command(self, controls: Controls) -> None:
-        rotors, drives = self.vehicle.rotors, self.vehicle.joints
+        wanted, torques, armed = controls
         joints = len(self.vehicle.links)
-        if len(controls.thrust) != 4 or len(controls.torque) != joints:
+        if len(wanted) != 4 or len(torques) != joints:
             raise ValueError(f"{controls} at step {self.step}: expected 4 rotors, {joints} joints")
-        if not math.isfinite(sum(controls.thrust) + sum(controls.torque)):
+        if not math.isfinite(sum(wanted) + sum(torques)):
             raise ValueError(f"{controls} at step {self.step}: every control must be finite")
-        thrust = rotors.thrust_max if controls.armed else 0.0
-        torque = drives.torque_max if controls.armed else 0.0
-        f1, f2, f3, f4 = controls.thrust
-        self._thrust = (
-            thrust * min(max(f1, 0.0), 1.0),
-            thrust * min(max(f2, 0.0), 1.0),
-            thrust * min(max(f3, 0.0), 1.0),
-            thrust * min(max(f4, 0.0), 1.0),
-        )
-        self._torque = tuple([torque * min(max(f, -1.0), 1.0) for f in controls.torque])
+        thrust = self.vehicle.rotors.thrust_max if armed else 0.0
+        torque = self.vehicle.joints.torque_max if armed else 0.0
+        if min(wanted) < 0.0 or max(wanted) > 1.0 or max(map(abs, torques)) > 1.0:
+            wanted = _four([min(max(f, 0.0), 1.0) for f in wanted])
+            torques = tuple(min(max(f, -1.0), 1.0) for f in torques)
+        f1, f2, f3, f4 = wanted
+        self._thrust = (thrust * f1, thrust * f2, thrust * f3, thrust * f4)
+        self._torque = tuple([torque * f for f in torques])
 
     def _disturbance(self) -> tuple[V3, V3]:
         """Force on the base [N, W] and torque [N·m, B] during this step."""

@@ -10,9 +10,10 @@ rotors stops them after 0.1 s.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Final, Protocol
 
+from fsw.frozen import dataclass
 from fsw.ports import Clock
 from fsw.runtime.grid import Grid
 from fsw.signals import SensorFrame

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 from sitl.scenario import Wall, Workspace
 from sitl.trajectory import TrajectoryPoint
@@ -55,8 +55,7 @@ class Ack:
     result: int  # MAV_RESULT
 
 
-@dataclass(frozen=True, slots=True)
-class Heard:
+class Heard(NamedTuple):
     """What the vehicle's last answer showed."""
 
     acks: tuple[Ack, ...] = ()

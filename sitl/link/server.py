@@ -138,9 +138,9 @@ def _advance(simulation: Simulation, answer: Answer) -> None:
 
 def _heard(answer: Answer, readings: SensorReadings) -> Heard:
     return Heard(
-        acks=answer.acks,
-        texts=answer.texts,
-        armed=answer.controls.armed,
+        answer.acks,
+        answer.texts,
+        answer.controls.armed,
         height_m=-readings.p_WB[2],
         speed_m_s=math.hypot(*readings.v_WB),
     )
