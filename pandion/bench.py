@@ -41,6 +41,10 @@ def main(argv: list[str]) -> int:
         from pandion import bench_loop
 
         return bench_loop.main(argv[1:])
+    if argv[:1] == ["lockstep"]:
+        from pandion import bench_lockstep
+
+        return bench_lockstep.main(argv[1:])
     options = _options(argv)
     if options.json not in (None, "-") and not Path(str(options.json)).parent.is_dir():
         print(f"pandion bench: no directory for {options.json}", file=sys.stderr)
@@ -60,7 +64,9 @@ def main(argv: list[str]) -> int:
 
 def _options(argv: list[str]) -> BenchOptions:
     parser = Parser("pandion bench", "Time the planner's optimiser against others.")
-    parser.add_argument("what", metavar="WHAT", choices=("mpc", "loop"), help="mpc or loop")
+    parser.add_argument(
+        "what", metavar="WHAT", choices=("mpc", "loop", "lockstep"), help="mpc, loop or lockstep"
+    )
     parser.add_argument(
         "--json",
         metavar="FILE",

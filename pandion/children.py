@@ -22,22 +22,29 @@ class Child:
     """A half of the system. Its events come from its standard output, line by line."""
 
     def __init__(
-        self, module: str, arguments: list[str], log: Path, processor: int | None = None
+        self,
+        name: str,
+        arguments: list[str],
+        log: Path,
+        processor: int | None = None,
+        runner: str | None = None,
     ) -> None:
-        """Start ``python -m module``.
+        """Start ``python -m name``.
 
         Args:
-            module: ``sitl`` or ``fsw``.
+            name: ``sitl`` or ``fsw``.
             arguments: Its command line.
             log: Where its standard error goes.
             processor: The only one it may run on; any if None.
+            runner: A module that runs the half of this name in its own way.
         """
-        self.name = module
+        module = [name] if runner is None else [runner, name]
+        self.name = name
         self._rest = b""
         with log.open("wb") as errors:
             self._process = subprocess.Popen(
                 # -P: a directory of the same name where the user stands must not be imported.
-                [sys.executable, "-P", "-m", module, *arguments, "--events", "json"],
+                [sys.executable, "-P", "-m", *module, *arguments, "--events", "json"],
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.PIPE,
                 stderr=errors,

@@ -14,7 +14,7 @@ from pandion.fly_options import FlyOptions, add_arguments
 from pandion.fly_options import options as fly_options
 from pandion.join_truth import join_truth
 from pandion.parser import COULD_NOT_START, Parser
-from pandion.processor import Places, lockstep_places
+from pandion.processor import ANYWHERE, lockstep_places
 from pandion.result import Parts, as_json
 from pandion.supervisor import Flown, HalfFailed, Supervisor
 from pandion.verdict import rows
@@ -36,7 +36,7 @@ def main(argv: list[str]) -> int:
     display = Display(sys.stderr if options.json == "-" else sys.stdout)
     _banner(options, display)
     try:
-        places = Places() if options.realtime else lockstep_places()
+        places = ANYWHERE if options.realtime else lockstep_places()
         flown = Supervisor(display, options.out, places).fly(
             _sitl_arguments(options), lambda port: _fsw_arguments(options, port)
         )

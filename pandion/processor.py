@@ -25,22 +25,25 @@ class Places(NamedTuple):
     fsw: int | None = None
 
 
+ANYWHERE: Final = Places()
+
+
 def lockstep_places() -> Places:
     """Two idle processors, else the quietest one for both, else wherever the system likes."""
     if sys.platform != "linux":
-        return Places()
+        return ANYWHERE
     allowed = os.sched_getaffinity(0)
     try:
         before, begin_s = _idle_s(), time.monotonic()
         time.sleep(_GLANCE_S)
         after, passed_s = _idle_s(), time.monotonic() - begin_s
     except (OSError, ValueError, IndexError):
-        return Places()
+        return ANYWHERE
     idle = {cpu: after[cpu] - before[cpu] for cpu in allowed if cpu in before and cpu in after}
     # The process's number breaks ties, so that flights started together spread out.
     quietest = sorted(idle, key=lambda cpu: (-idle[cpu], (cpu + os.getpid()) % len(allowed)))
     if not quietest:
-        return Places()
+        return ANYWHERE
     if len(quietest) > 1 and idle[quietest[1]] > _IDLE * passed_s:
         return Places(quietest[1], quietest[0])
     return Places(quietest[0], quietest[0])

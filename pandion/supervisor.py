@@ -14,7 +14,7 @@ from typing import Any, Final
 from pandion.children import Child, Event
 from pandion.display import Display
 from pandion.parser import COULD_NOT_START
-from pandion.processor import Places
+from pandion.processor import ANYWHERE, Places
 
 _LISTEN_S: Final = 30.0  # until sitl has bound its port
 _FOLLOW_S: Final = 3.0  # one half ends this soon after the other
@@ -50,9 +50,12 @@ class Flown:
 class Supervisor:
     """Starts sitl, then fsw, and sees both to their end."""
 
-    def __init__(self, display: Display, out: Path, places: Places) -> None:
+    def __init__(
+        self, display: Display, out: Path, places: Places = ANYWHERE, runner: str | None = None
+    ) -> None:
         self._display = display
         self._places = places
+        self._runner = runner
         self._out = out
         self._flown = Flown()
         self._children: list[Child] = []
@@ -98,7 +101,7 @@ class Supervisor:
         raise HalfFailed(self._flown.failure or "the simulator did not start")
 
     def _start(self, name: str, arguments: list[str], processor: int | None) -> None:
-        child = Child(name, arguments, self._out / f"{name}.log", processor)
+        child = Child(name, arguments, self._out / f"{name}.log", processor, self._runner)
         self._children.append(child)
         self._selector.register(child, selectors.EVENT_READ)
 

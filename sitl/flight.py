@@ -128,6 +128,8 @@ class Flight:
             else self._simulation.ended.kind.value,
             "real_time_factor": timing.real_time_factor,
             "steps": timing.steps,
+            "wall_s": timing.wall_s,
+            "waited_s": exchange.counts.waited_s,
             "resent_steps": exchange.counts.resent,
             "missed_steps": exchange.counts.missed,
         }

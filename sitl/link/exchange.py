@@ -28,6 +28,7 @@ class ExchangeCounts:
 
     resent: int = 0  # lockstep: steps that were sent again
     missed: int = 0  # real time: steps whose answer was not there at the end of the step
+    waited_s: float = 0.0  # lockstep: for answers, sending included, the first step's left out
 
 
 class Stop(Protocol):
@@ -75,11 +76,13 @@ class Lockstep:
         """See :class:`Exchange`."""
         if self._period_s is not None:
             _sleep_until(self._start_s + number * self._period_s)
-        self._endpoint.send(datagram)
         begin_s = sent_s = time.perf_counter()
+        self._endpoint.send(datagram)
         while True:
             received = self._endpoint.receive()
             if received is not None:
+                if number:
+                    self.counts.waited_s += time.perf_counter() - begin_s
                 answer = decode.answer(received, self._joints)
                 if answer is not None and answer.t_us == t_us:
                     return answer
