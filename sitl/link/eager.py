@@ -12,10 +12,10 @@ import socket
 import time
 from typing import Final
 
-_LOOK_S: Final = 150e-6  # no longer than this before sleeping
-_PRICE: Final = 10  # answers in time that make up for a vain look: planning keeps us waiting too
+_LOOK_S: Final = 1.5e-3  # no longer than this before sleeping: a planning step takes 1 ms
+_PRICE: Final = 10  # answers in time that make up for a vain look
 _MOST: Final = 100
-_REST: Final = 2000  # receives without a look, where looking did not pay
+_REST: Final = 5000  # receives without a look, where looking did not pay
 
 
 class EagerReceiver:
