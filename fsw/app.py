@@ -174,7 +174,7 @@ class _Session:
         for complaint in keeping.complaints:
             self._told.report("warning", f"fsw: {path}, {complaint}")
         if path is not None:
-            text = f"fsw: {keeping.restored} parameters of {path} are not the default"
+            text = f"fsw: parameters from {path}, {keeping.restored} of them not the default"
             self._told.report("parameters", text)
         return keeping
 

@@ -12,3 +12,6 @@ settings.load_profile("reproducible")
 
 # No test reads or writes what the user keeps, such as signing keys.
 os.environ["XDG_STATE_HOME"] = tempfile.mkdtemp(prefix="pandion-state-")
+
+# pymavlink asks once, when it is imported first: without this it speaks MAVLink 1.
+os.environ["MAVLINK20"] = "1"

@@ -26,6 +26,8 @@ Save = Callable[[Mapping[str, float]], None]
 """Writes all values down; raises OSError."""
 
 WAITING: Final = 64  # changes; a client sends one at a time and repeats it
+# Between two changes: whoever sends nothing but changes gets a third of a core, not all of it.
+REST_TICKS: Final = 10
 
 
 @dataclass(eq=False, slots=True)
@@ -66,6 +68,7 @@ class ParameterStore:
         self._job: Future[None] | None = None  # what is being done about it
         self._offered: Tuning | None = None  # to the tick
         self._saving = False
+        self._rest = 0  # ticks until the next change may begin
 
     @property
     def values(self) -> Mapping[str, float]:
@@ -128,6 +131,8 @@ class ParameterStore:
             if not self._job.done():
                 return None
             self._finish()
+        elif self._rest:
+            self._rest -= 1
         elif self._change is None and self._waiting and self._executor is not None:
             self._begin(self._executor)
         return self._offered
@@ -155,7 +160,7 @@ class ParameterStore:
         if self._values[name] == change.value:
             self._tell(name)
             return
-        self._change, self._saving = change, False
+        self._change, self._saving, self._rest = change, False, REST_TICKS
         self._job = executor.submit(self._prepare, self._tuning(self._wanted(change)))
 
     def _finish(self) -> None:

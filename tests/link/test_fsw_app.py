@@ -17,6 +17,8 @@ from fsw.arguments import FswOptions
 from fsw.link.link_choice import NO_LINK, LinkChoice
 from fsw.parameters.control_choice import ControlChoice
 from fsw.parameters.flight_config import FlightConfig
+from fsw.parameters.registry import PARAMETERS
+from fsw.parameters.storage import load as parameter_file
 from fsw.parameters.store import ParameterStore
 from fsw.runtime.program import FlightProgram
 from fsw.signals import Plan, PlanFailure, PlanRequest, TickInputs, TickOutputs
@@ -95,3 +97,27 @@ def test_a_directory_with_a_flight_is_refused(
     (Path(str(options.out)) / "flight.tlog").write_bytes(b"")
     assert app.run(options, load) == app.COULD_NOT_START
     assert "already holds a flight" in capsys.readouterr().err
+
+
+def test_kept_parameters_are_taken_over_and_what_is_of_no_use_is_said(
+    options: FswOptions, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "vehicle.params"
+    file.write_text("PID_YAW_P 5\nOF_ANOTHER_AGE 1\n")
+    assert app.run(replace(options, params=file), load) == app.COULD_NOT_START
+    said = "".join(capsys.readouterr())
+    assert f"fsw: {file}, line 2 is passed over: OF_ANOTHER_AGE is unknown\n" in said
+    assert f"fsw: parameters from {file}, 1 of them not the default\n" in said
+    record = parameter_file(Path(str(options.out)) / "parameters.params").values
+    assert record["PID_YAW_P"] == 5.0
+    assert len(record) == len(PARAMETERS)
+
+
+def test_a_place_where_parameters_cannot_be_kept_is_one_sentence(
+    options: FswOptions, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    nowhere = tmp_path / "nowhere" / "vehicle.params"
+    assert app.run(replace(options, params=nowhere), load) == app.COULD_NOT_START
+    assert capsys.readouterr().err == (
+        f"fsw: cannot keep parameters in {nowhere}: No such file or directory\n"
+    )

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import io
 import json
-import os
 import socket
 import time
 from collections.abc import Iterator
@@ -13,9 +12,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-
-os.environ["MAVLINK20"] = "1"  # pymavlink reads it when it is imported
-
 from mavsdk.component_type import ComponentType
 from mavsdk.mavsdk import Configuration, Mavsdk
 from mavsdk.plugins.param.param import Param, ParamError, ParamResult

@@ -9,7 +9,7 @@ import pytest
 
 from fsw.parameters.flight_config import FlightConfig, flight_config
 from fsw.parameters.registry import PARAMETERS
-from fsw.parameters.store import WAITING, ParameterStore
+from fsw.parameters.store import REST_TICKS, WAITING, ParameterStore
 from fsw.tuning import Tuning, tuned
 from tests.fsw.parameters.threads import AtOnce
 
@@ -44,7 +44,9 @@ def store(kept: Kept) -> ParameterStore:
     return store
 
 
-def ticks(store: ParameterStore, count: int = 4, *, taken: bool | None = True) -> list[Tuning]:
+def ticks(
+    store: ParameterStore, count: int = 2 * REST_TICKS, *, taken: bool | None = True
+) -> list[Tuning]:
     """What some ticks are given, each answered."""
     given = []
     for _ in range(count):
@@ -96,7 +98,7 @@ def test_each_tuning_is_whole(store: ParameterStore) -> None:
     asker = store.listen()
     store.change("TRK_EFFORT", 0.2, asker)
     store.change("LND_T_STILL", 0.7, asker)
-    first, second = ticks(store, 8)
+    first, second = ticks(store, 3 * REST_TICKS)
     assert first == (("tuning.tracking.effort", pytest.approx(0.2e-6)),)
     assert dict(second) == {
         "limits.landed_time_us": pytest.approx(700_000.0),
@@ -167,6 +169,15 @@ def test_the_same_value_again_is_told_and_nothing_else(store: ParameterStore, ke
     assert ticks(store) == []
     assert list(asker.changed) == ["PID_YAW_P"]
     assert kept.prepared == []
+
+
+def test_changes_leave_each_other_time(store: ParameterStore) -> None:
+    asker = store.listen()
+    for value in (5.0, 6.0, 7.0):
+        store.change("PID_YAW_P", value, asker)
+    given = [len(ticks(store, 1)) for _ in range(5 * REST_TICKS)]
+    first, second, third = [tick for tick, count in enumerate(given) if count]
+    assert second - first == third - second > REST_TICKS
 
 
 def test_a_flood_of_changes_is_bounded(store: ParameterStore) -> None:
