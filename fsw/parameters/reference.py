@@ -21,7 +21,7 @@ echoed.
 
 ```console
 $ pandion param list 'WALL_*'
-$ pandion param set WALL_LAMBDA 0.4
+$ pandion param set WALL_LAMBDA 0.36
 $ pandion param export vehicle.params
 $ pandion fly walls --params vehicle.params
 ```
