@@ -113,7 +113,7 @@ class _Session:
         keeping.start()
         inbox = Inbox()
         start_us = clock.unix_us()
-        files = RunFiles(directory, start_us, _subject(options, program), self._warn)
+        files = self._files(directory, start_us, program)
         sim = SimLink(simulator, inbox, facts)
         autopilot = AUTOPILOTS[options.links.autopilot]
         context = TelemetryContext(facts, record.health, autopilot, start_unix_us=start_us)
@@ -140,6 +140,17 @@ class _Session:
         report.write(directory / "fsw.json", result)
         self._told.report("ended", f"fsw: {end.sentence}", ending=end.ending.value)
         return DONE if end.ending is Ending.SHUTDOWN else NOT_COMPLETED
+
+    def _files(self, directory: Path, start_us: int, program: FlightProgram[Any]) -> RunFiles:
+        """Create the logs.
+
+        Raises:
+            CouldNotStart: They cannot be created.
+        """
+        try:
+            return RunFiles(directory, start_us, _subject(self._options, program), self._warn)
+        except OSError as error:
+            raise CouldNotStart(f"cannot write {error.filename}: {error.strerror}") from None
 
     def _warn(self, sentence: str) -> None:
         self._told.report("warning", f"fsw: {sentence}")
@@ -258,6 +269,6 @@ def _output_directory(wanted: Path | None) -> Path:
         wanted.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise CouldNotStart(f"cannot write to {error.filename}: {error.strerror}") from None
-    if (wanted / "flight.tlog").exists():
+    if any((wanted / name).exists() for name in ("flight.tlog", "flight.ulg")):
         raise CouldNotStart(f"{wanted} already holds a flight; name another --out")
     return wanted

@@ -88,6 +88,6 @@ def _directory(wanted: Path | None, stem: str) -> Path:
     if wanted is None:
         return new_run_directory(Path("runs"), stem)
     wanted.mkdir(parents=True, exist_ok=True)
-    if (wanted / "result.json").exists() or (wanted / "flight.tlog").exists():
+    if any((wanted / name).exists() for name in ("result.json", "flight.tlog", "flight.ulg")):
         raise FileExistsError(f"{wanted} already holds a flight; name another --out")
     return wanted

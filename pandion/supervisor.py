@@ -18,7 +18,7 @@ from pandion.processor import ANYWHERE, Places
 
 _LISTEN_S: Final = 30.0  # until sitl has bound its port
 _FOLLOW_S: Final = 3.0  # one half ends this soon after the other
-_STALLED_S: Final = 0.1  # the same for a half that is silent: it has had its time
+_STALLED_S: Final = 0.08  # the same for a half that is silent: it has had its time
 _GRACE_S: Final = 0.6  # between one way to end a half and the next, stronger one
 
 

@@ -37,7 +37,7 @@ from fsw.signals import (
     TickOutputs,
 )
 
-STALL_S: Final = 1.4  # no step for this long ends the flight, so that 2 s see the end of both
+STALL_S: Final = 1.6  # no step for this long ends the flight, so that 2 s see the end of both
 _START_US: Final = 1_000_000  # time stamp of the simulator's step 0
 _WARNING: Final = 4  # MAV_SEVERITY
 

@@ -11,7 +11,7 @@ from sitl.link.decode import Answer
 from sitl.link.udp_endpoint import RESEND_S, UdpEndpoint
 from sitl.simulation import Controls
 
-STALL_S: Final = 1.4  # so that 2 s after a stall both halves have ended
+STALL_S: Final = 1.6  # so that 2 s after a stall both halves have ended
 _SILENT_S: Final = 0.1  # real time: older controls are not held, the rotors stop
 _FIRST_PLAN_S: Final = 0.05  # between the first answer and the start of the clock
 

@@ -91,10 +91,11 @@ def test_a_signal_ends_the_wait(
     assert (Path(str(options.out)) / "fsw.json").exists()
 
 
+@pytest.mark.parametrize("name", ["flight.tlog", "flight.ulg"])
 def test_a_directory_with_a_flight_is_refused(
-    options: FswOptions, capsys: pytest.CaptureFixture[str]
+    name: str, options: FswOptions, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    (Path(str(options.out)) / "flight.tlog").write_bytes(b"")
+    (Path(str(options.out)) / name).write_bytes(b"")
     assert app.run(options, load) == app.COULD_NOT_START
     assert "already holds a flight" in capsys.readouterr().err
 
