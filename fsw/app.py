@@ -15,6 +15,7 @@ from fsw.link.ftp_service import FtpService
 from fsw.link.inbox import Inbox
 from fsw.link.link_choice import AUTOPILOTS, addresses
 from fsw.link.log_service import LogService
+from fsw.link.mission_service import MissionService
 from fsw.link.service import LinkService
 from fsw.link.sim_link import Pacing, SimLink
 from fsw.link.telemetry import LoopHealth, TelemetryContext
@@ -163,7 +164,8 @@ class _Session:
         from fsw.link.parameter_service import ParameterService
 
         parameters = ParameterService(program.parameters)
-        return parameters, LogService(logs), FtpService(vehicle_files(logs))
+        missions = MissionService(program.missions)
+        return parameters, missions, LogService(logs), FtpService(vehicle_files(logs))
 
     def _keep_parameters(self, program: FlightProgram[Any], directory: Path) -> Keeping:
         """Take over the parameters of the vehicle's file, and say what of it is of no use.

@@ -437,6 +437,7 @@ class FlightSnapshot:
     battery: BatteryState = BatteryState()
     arming_refusal: str = ""  # why it cannot be armed; empty: it could be, or is
     offboard: OffboardReport = OffboardReport()
+    standby: Mode = Mode.HOLD  # what arming would lead to
     mission: MissionProgress = MissionProgress()
 
 

@@ -15,10 +15,10 @@ from fsw.vehicle.faults import Fault
 # position are known, which is what clients ask them for.
 _GYRO, _ACCELEROMETER, _HEADING, _PLACE, _EXTERNAL_POSE = 0x1, 0x2, 0x4, 0x20, 0x80
 _RATE_CONTROL, _ATTITUDE, _YAW, _HEIGHT, _POSITION = 0x400, 0x800, 0x1000, 0x2000, 0x4000
-_MOTORS, _AHRS, _BATTERY, _PREARM = 0x8000, 0x200000, 0x2000000, 0x10000000
+_MOTORS, _FENCE, _AHRS, _BATTERY, _PREARM = 0x8000, 0x100000, 0x200000, 0x2000000, 0x10000000
 _SENSING: Final = _GYRO | _ACCELEROMETER | _HEADING | _PLACE | _EXTERNAL_POSE | _AHRS
 _CONTROL: Final = _RATE_CONTROL | _ATTITUDE | _YAW | _HEIGHT | _POSITION
-_PRESENT: Final = _SENSING | _CONTROL | _MOTORS | _BATTERY | _PREARM
+_PRESENT: Final = _SENSING | _CONTROL | _MOTORS | _FENCE | _BATTERY | _PREARM
 # Which subsystem an operator should look at; any fault also forbids arming.
 _SUSPECT: Final[dict[str, int]] = {
     Fault.PLAN_REFUSED.value: 0,
@@ -47,7 +47,12 @@ def sys_status(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValue
         health &= ~_PREARM
     if battery.remaining < _CRITICAL:
         health &= ~_BATTERY
+    margins = snapshot.constraints.margins
+    if margins and not min(margins) >= 0.0:
+        health &= ~_FENCE
     enabled = _PRESENT if snapshot.armed else _PRESENT & ~(_CONTROL | _MOTORS)
+    if not margins:
+        enabled &= ~_FENCE
     load = round(1000 * min(context.health.inner.load + context.health.mpc.load, 1.0))
     return (
         _PRESENT,

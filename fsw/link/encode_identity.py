@@ -7,7 +7,7 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import Final
 
 from fsw.link import message_ids
-from fsw.link.px4_mode import AVAILABLE_MODES, custom_mode
+from fsw.link.px4_mode import AVAILABLE_MODES, custom_mode, shown_mode
 from fsw.link.service import Outgoing, WireValues
 from fsw.link.telemetry import TelemetryContext
 from fsw.signals import FlightSnapshot
@@ -47,7 +47,7 @@ def autopilot_version(_: FlightSnapshot, __: TelemetryContext) -> WireValues:
 
 def current_mode(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues:
     """CURRENT_MODE; what was intended is not told apart from what is."""
-    number = custom_mode(snapshot.mode)
+    number = custom_mode(shown_mode(snapshot))
     standard = next((m.standard_mode for m in AVAILABLE_MODES if m.custom_mode == number), 0)
     return (number, 0, standard)
 

@@ -12,7 +12,7 @@ from typing import Final
 from fsw.control.attitude import attitude_reference
 from fsw.geometry.rotation import euler_zyx, quaternion_from_matrix
 from fsw.link.encode_setpoints import as_asked
-from fsw.link.px4_mode import custom_mode
+from fsw.link.px4_mode import custom_mode, shown_mode
 from fsw.link.service import WireValues
 from fsw.link.telemetry import TelemetryContext
 from fsw.signals import FlightSnapshot, Mode, SetpointKind, Vec3, Vec4
@@ -43,7 +43,7 @@ def heartbeat(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues
     else:
         status = _ACTIVE if snapshot.armed else _STANDBY
     return (
-        custom_mode(snapshot.mode),
+        custom_mode(shown_mode(snapshot)),
         _QUADROTOR,
         context.autopilot,
         base_mode,

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from fsw.link.gcs_link import GcsLink
+from fsw.link.px4_mode import shown_mode
 from fsw.link.stream_rates import SLOT_US
 from fsw.ports import Clock
 from fsw.signals import CommandAck, TickOutputs
@@ -61,7 +62,7 @@ class GroundLinks:
     def publish(self, outputs: TickOutputs) -> None:
         """Send what is due on this tick; call it once a tick, after the actuators."""
         snapshot = outputs.snapshot
-        shown = (snapshot.mode, snapshot.armed, snapshot.landed, snapshot.failures)
+        shown = (shown_mode(snapshot), snapshot.armed, snapshot.landed, snapshot.failures)
         changed = shown != self._shown
         self._shown = shown
         tick, t_us = self._tick, snapshot.t_us

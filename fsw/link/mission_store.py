@@ -1,7 +1,7 @@
 """What was uploaded: mission, fence and rally points, shared by every link.
 
 Kept as it came, so that a download returns it bit for bit, and handed to the tick as what it
-means. It lives as long as the process (docs/decisions/0013-missions.md).
+means. It lives as long as the process (docs/decisions/0013-missions-stop-and-fences-are-walls.md).
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ class Site:
 
     locate: Locate
     judge: Judge
-    clearance: float  # m, from the walls of a fence
+    clearance: Callable[[], float]  # m, from the walls of a fence uploaded now
 
 
 class MissionStore:
@@ -111,7 +111,7 @@ class MissionStore:
         return taken
 
     def _fence(self, items: tuple[MissionItem, ...]) -> SafeSet | Refused:
-        fence = read_fence(items, self._site.locate, self._site.clearance)
+        fence = read_fence(items, self._site.locate, self._site.clearance())
         if isinstance(fence, Refused):
             return fence
         against = self._site.judge(fence)

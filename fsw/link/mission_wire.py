@@ -8,7 +8,8 @@ from typing import Final, cast
 from fsw.link import message_ids as ids
 from fsw.link.decode import Numbers
 from fsw.link.service import Outgoing, WireValues
-from fsw.signals import MissionProgress, MissionState, Vec4
+from fsw.link.telemetry import TelemetryContext
+from fsw.signals import FlightSnapshot, MissionProgress, MissionState, Mode, Vec4
 from fsw.vehicle.mission_items import (
     INVALID_PARAM1,
     LOCAL_FRAMES,
@@ -76,6 +77,11 @@ def encode_request(seq: int, kind: int, peer: Peer) -> Outgoing:
 def encode_ack(result: int, kind: int, peer: Peer) -> Outgoing:
     """MISSION_ACK."""
     return Outgoing(ids.MISSION_ACK, (*peer, result, kind))
+
+
+def mission_current(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues:
+    """MISSION_CURRENT of a snapshot."""
+    return current_values(snapshot.mission, snapshot.mode is Mode.MISSION)
 
 
 def current_values(progress: MissionProgress, in_mission: bool) -> WireValues:

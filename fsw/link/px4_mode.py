@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
-from fsw.signals import Mode
+from fsw.signals import FlightSnapshot, Mode
 
 _MAIN_AUTO: Final = 4
 _MAIN_OFFBOARD: Final = 6
@@ -38,6 +38,11 @@ class AvailableMode:
     name: str
     custom_mode: int
     standard_mode: int  # MAV_STANDARD_MODE, 0 where it is none of those
+
+
+def shown_mode(snapshot: FlightSnapshot) -> Mode:
+    """The mode for ground stations: while disarmed the one that arming would lead to."""
+    return snapshot.standby if snapshot.mode is Mode.DISARMED else snapshot.mode
 
 
 def custom_mode(mode: Mode) -> int:

@@ -16,6 +16,7 @@ from fsw.link import (
     encode_place,
     encode_standard,
     message_ids,
+    mission_wire,
 )
 from fsw.link.component_metadata import component_metadata
 from fsw.link.message_ids import AUTOPILOT, PANDION
@@ -58,6 +59,7 @@ STREAMS: Final = (
     Stream(message_ids.ATTITUDE_TARGET, 10, 10, AUTOPILOT, encode_standard.attitude_target),
     Stream(message_ids.VFR_HUD, 4, 4, AUTOPILOT, encode_place.vfr_hud),
     Stream(message_ids.ALTITUDE, 1, 2, AUTOPILOT, encode_place.altitude),
+    Stream(message_ids.MISSION_CURRENT, 1, 1, AUTOPILOT, mission_wire.mission_current),
     Stream(message_ids.HOME_POSITION, 0.5, 1, AUTOPILOT, encode_place.home_position),
     Stream(message_ids.BATTERY_STATUS, 1, 1, AUTOPILOT, encode_health.battery_status),
     Stream(message_ids.ESTIMATOR_STATUS, 1, 1, AUTOPILOT, encode_health.estimator_status),

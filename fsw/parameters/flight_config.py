@@ -33,6 +33,10 @@ class FlightLimits:
     idle_thrust: float = 0.8  # N a rotor while armed on the ground
     return_height: float = 2.0  # m above home, on the way back
     setpoint_timeout_us: int = 500_000  # without a set-point offboard ends
+    mission_speed: float = 0.3  # m/s, where the mission names none
+    mission_turn_rate: float = 0.3  # rad/s
+    mission_turn_acceleration: float = 0.05  # rad/s^2; the plan's limit is 0.1
+    fence_clearance: float = 0.1  # m, kept from the walls of an uploaded fence
     station_timeout_us: int = 10_000_000  # without a ground station the vehicle comes home
 
 

@@ -223,6 +223,16 @@ _ROWS: Final[dict[str, list[_Row]]] = {
         ("COM_DL_LOSS_T", "limits.station_timeout_us", "s", 3.0, 300.0,
          "the vehicle returns after this long without the ground station", _IN_MICROSECONDS),
     ],
+    "Missions": [
+        ("MSN_SPEED", "limits.mission_speed", "m/s", 0.01, 1.0,
+         "speed of a mission that names none"),
+        ("MSN_TURN_RATE", "limits.mission_turn_rate", "rad/s", 0.01, 1.0,
+         "turn rate of a mission at most"),
+        ("MSN_TURN_ACC", "limits.mission_turn_acceleration", "rad/s^2", 0.005, 0.1,
+         "turn acceleration of a mission at most"),
+        ("FNC_CLEARANCE", "limits.fence_clearance", "m", 0.0, 2.0,
+         "kept from the walls of a fence uploaded from now on"),
+    ],
 }  # fmt: skip
 
 # Numbers of FlightConfig that are no parameters, by the beginning of their path, and why.

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any, cast
 
 from fsw.control.cascade import Inner
+from fsw.geometry.geodesy import to_local
+from fsw.link.mission_store import MissionStore, Site
 from fsw.link.telemetry import VehicleFacts
 from fsw.mpc.planner import Planner
 from fsw.mpc.planner_config import Solver
@@ -38,8 +41,15 @@ def flight_software(choice: ControlChoice, *, to_plan: bool = True) -> FlightPro
         planner.warm_up()
         flight.warm_up()
     parameters = ParameterStore(config, flight.prepare)
+    missions = MissionStore(
+        Site(
+            locate=partial(to_local, config.origin),
+            judge=lambda safe_set: flight.against(safe_set),
+            clearance=lambda: flight.config.limits.fence_clearance,
+        )
+    )
     return FlightProgram(
-        _facts(config), FlightState(), flight.tick, planner, parameters, flat(config)
+        _facts(config), FlightState(), flight.tick, planner, parameters, missions, flat(config)
     )
 
 

@@ -19,6 +19,7 @@ from fsw.mpc.reference import merge
 from fsw.parameters.consistency import Finding, analyse, loop_tube, refusals, warnings
 from fsw.parameters.flight_config import FlightConfig
 from fsw.runtime.flight_state import FlightState, MissionMemory, PlanMemory
+from fsw.runtime.mission_keeper import received, with_mission
 from fsw.runtime.mode_keeper import SEVERITY_WARNING, ModeKeeper, answer
 from fsw.runtime.mode_reference import mode_reference
 from fsw.runtime.planning import (
@@ -54,6 +55,7 @@ from fsw.signals import (
     TickOutputs,
 )
 from fsw.vehicle.battery import drained
+from fsw.vehicle.confine import contradictions
 from fsw.vehicle.safety_gate import gate
 from fsw.vehicle.situation import Situation
 from fsw.vehicle.tame import tamed
@@ -108,9 +110,11 @@ class FlightLoop:
             valid = moved_on(valid, 1e-6 * inputs.stale_us)
         estimate = valid or state.estimate
         texts: list[StatusText] = []
-        if inputs.targets or inputs.safe_set is not None:
+        if inputs.targets or inputs.safe_set is not None or inputs.mission is not None:
             mission = self._receive(state, inputs, now_us, texts)
             state = replace(state, mission=mission)
+            if inputs.mission is not None:
+                state = with_mission(state, inputs.mission, self.config, now_us)
         state = self._hear(state, inputs)
         if estimate is None:
             return state, _blind(inputs, texts)
@@ -192,18 +196,20 @@ class FlightLoop:
         texts: list[StatusText],
     ) -> MissionMemory:
         """Take in targets and a safe set; a new safe set is analysed before it is believed."""
-        mission = state.mission
-        stream = merge(mission.stream, inputs.targets, now_us)
-        if inputs.safe_set in (None, mission.safe_set, mission.refused_set):
-            return replace(mission, stream=stream)
-        assert inputs.safe_set is not None
-        findings = self.judge(inputs.safe_set)
-        against = refusals(findings)
+        stream = merge(state.mission.stream, inputs.targets, now_us)
+        mission = replace(state.mission, stream=stream)
+        wanted = received(mission, inputs.mission, inputs.safe_set)
+        if wanted.safe_set == mission.safe_set:
+            return wanted
+        if wanted.safe_set == mission.refused_set:
+            return replace(mission, rally=wanted.rally)
+        findings = self.judge(wanted.safe_set)
+        against = (*contradictions(wanted.safe_set), *refusals(findings))
         texts += [StatusText(SEVERITY_WARNING, text) for text in (*against, *warnings(findings))]
         if against and not self.config.soft and state.vehicle.flies:
             texts.append(StatusText(SEVERITY_WARNING, "safe set refused: the old one is kept"))
-            return replace(mission, stream=stream, refused_set=inputs.safe_set)
-        return MissionMemory(stream, inputs.safe_set, None, () if self.config.soft else against)
+            return replace(mission, rally=wanted.rally, refused_set=wanted.safe_set)
+        return replace(wanted, refused_set=None, refusals=() if self.config.soft else against)
 
     def _hear(self, state: FlightState, inputs: TickInputs) -> FlightState:
         """Note set-points for now and signs of life of a ground station."""
@@ -338,6 +344,8 @@ def _snapshot(
         state.battery,
         state.arming_refusal,
         offboard,
+        vehicle.standby,
+        state.mission.flight.progress,
     )
 
 

@@ -24,9 +24,11 @@ from fsw.signals import (
     SafeSet,
     SolverStatus,
     StateEstimate,
+    Vec2,
     Vec3,
 )
 from fsw.tuning import Tuning
+from fsw.vehicle.mission import MissionFlight
 from fsw.vehicle.offboard import Tilt
 from fsw.vehicle.repeats import Answered
 from fsw.vehicle.steering import Aim, Lead
@@ -49,6 +51,7 @@ class VehicleMemory:
     home: Home | None = None
     station_us: int = -1  # when a ground station was last heard; -1: not since it was given up
     answered: tuple[Answered, ...] = ()  # each sender's last command
+    standby: Mode = Mode.HOLD  # what arming leads to
 
     @property
     def armed(self) -> bool:
@@ -89,9 +92,13 @@ class MissionMemory:
     """What was sent to be flown and to be kept clear of."""
 
     stream: tuple[EndEffectorTarget, ...] = ()
-    safe_set: SafeSet = field(default_factory=SafeSet)
+    safe_set: SafeSet = field(default_factory=SafeSet)  # in force: announced and fence together
     refused_set: SafeSet | None = None  # announced in flight, and of no use
     refusals: tuple[str, ...] = ()  # why this configuration cannot keep the safe set
+    announced: SafeSet = field(default_factory=SafeSet)
+    fence: SafeSet = field(default_factory=SafeSet)
+    rally: tuple[Vec2, ...] = ()  # m, where a return may lead beside home
+    flight: MissionFlight = field(default_factory=MissionFlight)
 
 
 @dataclass(frozen=True, slots=True)

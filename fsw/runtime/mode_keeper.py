@@ -5,19 +5,24 @@ Every function takes a state and returns one; almost every tick it is the same o
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 from fsw.control.cascade import at_rest, in_hover
 from fsw.model.arm_kinematics import point_in_flight
+from fsw.mpc.reference import still_at
 from fsw.parameters.flight_config import FlightConfig
 from fsw.runtime.flight_state import FlightState, PlanMemory
+from fsw.runtime.mission_keeper import begin, fly, leave, with_mission
 from fsw.runtime.mode_reference import mode_reference
 from fsw.runtime.planning import nominal_at_rest
 from fsw.runtime.steering_keeper import SteeringKeeper
 from fsw.signals import (
     CommandAck,
     CommandRequest,
+    EndEffectorTarget,
     Home,
+    MissionUpdate,
     Mode,
     StateEstimate,
     StatusText,
@@ -25,6 +30,7 @@ from fsw.signals import (
 )
 from fsw.vehicle.commands import decide
 from fsw.vehicle.faults import RESPONSES, Evidence, Response, detect
+from fsw.vehicle.mission import refusal
 from fsw.vehicle.mode_commands import arming_refusal
 from fsw.vehicle.modes import Event, next_mode
 from fsw.vehicle.repeats import answered_before, remember
@@ -89,6 +95,8 @@ class ModeKeeper:
             targets_ahead=bool(stream) and stream[-1].t_us >= estimate.t_us,
             standing_unclear=self._standing_unclear(estimate),
             inconsistent="; ".join(state.mission.refusals),
+            mission=state.mission.flight.progress,
+            mission_refusal=refusal(state.mission.flight, vehicle.landed),
             setpoint_fresh=self._steering.is_fresh(state, estimate.t_us),
             position=estimate.p_WB,
             yaw=estimate.yaw,
@@ -165,6 +173,8 @@ class ModeKeeper:
             state = self._change(state, Event.HOME_REACHED, estimate, texts)
         elif vehicle.mode is Mode.OFFBOARD:
             state = self._mind_offboard(state, estimate, texts)
+        elif vehicle.mode is Mode.MISSION:
+            state = self._fly_mission(state, estimate, texts)
         elif vehicle.mode is Mode.LAND:
             state = self._mind_touch_down(state, estimate, texts)
         return self._mind_station(state, estimate, texts)
@@ -223,8 +233,16 @@ class ModeKeeper:
         if decision.event is Event.TAKE_OFF:
             climb = self._config.limits.takeoff_climb if decision.climb is None else decision.climb
             state = replace(state, vehicle=replace(state.vehicle, climb=climb))
+        if decision.standby is not None:
+            state = replace(state, vehicle=replace(state.vehicle, standby=decision.standby))
+        if decision.mission_step is not None:
+            state = with_mission(
+                state, MissionUpdate(current=decision.mission_step), self._config, estimate.t_us
+            )
         if decision.event is not None:
             state = self._change(state, decision.event, estimate, texts)
+        if decision.event is Event.ARM:
+            state = self._begin_standby(state, estimate, texts)
         if decision.stop:
             state = self._steering.stop(state, estimate)
         if decision.goto is not None:
@@ -232,6 +250,34 @@ class ModeKeeper:
         if decision.joints is not None:
             state = self._steering.set_joints(state, decision.joints, estimate)
         return state
+
+    def _begin_standby(
+        self, state: FlightState, estimate: StateEstimate, texts: list[StatusText]
+    ) -> FlightState:
+        """Go on to the mode that was chosen before arming, if it is still possible."""
+        wanted = state.vehicle.standby
+        state = replace(state, vehicle=replace(state.vehicle, standby=Mode.HOLD))
+        if wanted is not Mode.MISSION:
+            return state
+        against = refusal(state.mission.flight, state.vehicle.landed)
+        if against is None:
+            return self._change(state, Event.START_MISSION, estimate, texts)
+        texts.append(StatusText(SEVERITY_WARNING, against))
+        return state
+
+    def _fly_mission(
+        self, state: FlightState, estimate: StateEstimate, texts: list[StatusText]
+    ) -> FlightState:
+        if state.mission.flight.leg is None:
+            # Another mission came, or none: not what the operator started.
+            return self._change(state, Event.HOLD, estimate, texts)
+        state, happening = fly(state, estimate, self._config)
+        if happening.text:
+            severity = SEVERITY_WARNING if happening.unmet else SEVERITY_NOTICE
+            texts.append(StatusText(severity, happening.text))
+        if happening.event is None:
+            return state
+        return self._change(state, happening.event, estimate, texts)
 
     def _change(
         self, state: FlightState, event: Event, estimate: StateEstimate, texts: list[StatusText]
@@ -242,7 +288,11 @@ class ModeKeeper:
             return state
         texts.append(StatusText(SEVERITY_NOTICE, f"{before.value} to {mode.value}: {event.value}"))
         anchor, anchor_yaw = self._anchor(state, event, estimate)
-        if event in (Event.ARM, Event.TAKE_OFF):
+        state = leave(state, event)
+        if mode is Mode.MISSION:
+            state = begin(state, self._mission_start(state, estimate), self._config)
+        rises = event is Event.START_MISSION and state.vehicle.landed
+        if event in (Event.ARM, Event.TAKE_OFF) or rises:
             state = self._take_over(state, event, estimate)
         steer = self._steering.steer_into(state, mode, event, estimate)
         vehicle = replace(
@@ -287,15 +337,29 @@ class ModeKeeper:
         goes_on = state.vehicle.flies and event in (
             Event.CLIMB_DONE,
             Event.TRAJECTORY_DONE,
+            Event.MISSION_DONE,
             Event.LAND,
             Event.HOME_REACHED,
         )
         if goes_on:
-            last = self._steering.target(state, estimate.t_us) or mode_reference(
-                state.vehicle, state.mission, self._config.limits, estimate.t_us
-            )
+            last = self._reference(state, estimate.t_us)
             return last.p_WE, last.yaw
         return point_in_flight(estimate, self._config.airframe.link_length)[0], estimate.yaw
+
+    def _reference(self, state: FlightState, t_us: int) -> EndEffectorTarget:
+        return self._steering.target(state, t_us) or mode_reference(
+            state.vehicle, state.mission, self._config.limits, t_us
+        )
+
+    def _mission_start(self, state: FlightState, estimate: StateEstimate) -> EndEffectorTarget:
+        """The reference so far, unless it is far off or fast; then where the vehicle is."""
+        here = point_in_flight(estimate, self._config.airframe.link_length)[0]
+        if state.vehicle.flies:
+            last = self._reference(state, estimate.t_us)
+            near = math.dist(last.p_WE, here) < self._config.steering.leash
+            if near and math.hypot(*last.v_WE) <= self._config.limits.mission_speed:
+                return last
+        return still_at(here, estimate.t_us, estimate.yaw)
 
     def _moving(self, state: FlightState, estimate: StateEstimate) -> FlightState:
         return replace(state, vehicle=replace(state.vehicle, still_since_us=estimate.t_us))

@@ -6,6 +6,7 @@ from fsw.mpc.reference import sample, still_at, vertical_ramp
 from fsw.parameters.flight_config import FlightLimits
 from fsw.runtime.flight_state import MissionMemory, VehicleMemory
 from fsw.signals import EndEffectorTarget, Mode
+from fsw.vehicle.confine import confined
 
 _FAR_DOWN = -100.0  # m; landing descends until the ground is felt, wherever it is
 
@@ -16,6 +17,8 @@ def mode_reference(
     """Where the end-effector should be at an instant, by the vehicle's mode."""
     if vehicle.mode is Mode.TRAJECTORY and mission.stream:
         return sample(mission.stream, t_us)
+    if vehicle.mode is Mode.MISSION and mission.flight.leg is not None:
+        return confined(mission.flight.leg.at(t_us), mission.safe_set)
     if vehicle.mode is Mode.TAKEOFF:
         return _ramp(vehicle, vehicle.climb, limits.climb_speed, t_us)
     if vehicle.mode is Mode.LAND:

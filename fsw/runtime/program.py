@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Generic, TypeVar
 
+from fsw.link.mission_store import MissionStore
 from fsw.link.telemetry import VehicleFacts
 from fsw.ports import Planner
 from fsw.signals import TickInputs, TickOutputs
@@ -26,4 +27,5 @@ class FlightProgram(Generic[State]):
     tick: Callable[[State, TickInputs], tuple[State, TickOutputs]]
     planner: Planner
     parameters: ParameterStore
+    missions: MissionStore
     numbers: Mapping[str, float] = field(default_factory=dict)  # of the configuration, by name

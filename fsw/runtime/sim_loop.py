@@ -101,6 +101,7 @@ class SimLoop(Generic[State]):
         self._program = program
         self._tick_us = program.facts.tick_period_us
         self._parameters = program.parameters
+        self._missions = program.missions
         self._tick = GuardedTick(program.tick, program.first_state)
         self._sim = sim
         self._ground = ground
@@ -201,10 +202,12 @@ class SimLoop(Generic[State]):
             inbox.take_station_heard(),
             stale_us=cycle.release.stale_us,
             tuning=self._parameters.take_tuning(),
+            mission=self._missions.take_update(),
         )
 
     def _think(self, cycle: Cycle) -> None:
         cycle.outputs = self._tick(cycle.inputs)
+        self._missions.observe(cycle.outputs.snapshot)
         if cycle.inputs.tuning is not None:
             self._parameters.settle(cycle.outputs.tuning_taken)
 

@@ -20,6 +20,7 @@ from fsw.signals import (
     Vec2,
     Vec3,
 )
+from fsw.vehicle.mission import nearest
 from fsw.vehicle.modes import Event
 from fsw.vehicle.offboard import (
     Tilt,
@@ -77,7 +78,8 @@ class SteeringKeeper:
         if event in (Event.ARM, Event.CLIMB_DONE, Event.TRAJECTORY_DONE, Event.MISSION_DONE):
             return SteerMemory()
         if mode is Mode.RETURN and state.vehicle.home is not None:
-            return self._way_home(state.vehicle.home, estimate)
+            home = nearest(state.vehicle.home, state.mission.rally, estimate.p_WB)
+            return self._way_home(home, estimate)
         if mode is Mode.HOLD and state.vehicle.flies:
             return self._stop(state, estimate)
         return SteerMemory()

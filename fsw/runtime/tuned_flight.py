@@ -13,7 +13,7 @@ from fsw.parameters.flight_config import FlightConfig
 from fsw.runtime.flight_loop import FlightLoop
 from fsw.runtime.flight_state import FlightState
 from fsw.runtime.mode_keeper import SEVERITY_WARNING
-from fsw.signals import StatusText, TickInputs, TickOutputs
+from fsw.signals import SafeSet, StatusText, TickInputs, TickOutputs
 from fsw.tuning import Tuning, part, tuned
 
 
@@ -36,6 +36,15 @@ class TunedFlight:
             ValueError: The numbers contradict each other.
         """
         self._prepared = (tuning, FlightLoop(tuned(self._config, tuning)))
+
+    @property
+    def config(self) -> FlightConfig:
+        """What flies now."""
+        return self._in_use[1].config
+
+    def against(self, safe_set: SafeSet) -> tuple[str, ...]:
+        """Why what flies now could not keep a safe set; nothing if it is to fly all the same."""
+        return () if self._config.soft else refusals(self._in_use[1].judge(safe_set))
 
     def tick(self, state: FlightState, inputs: TickInputs) -> tuple[FlightState, TickOutputs]:
         """Take over a tuning that was wished for, if it may be, then do the tick; see FlightLoop.

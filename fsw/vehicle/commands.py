@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from fsw.signals import CommandRequest
+from fsw.vehicle.mission_commands import pause_or_continue, set_current, start_mission
 from fsw.vehicle.mode_commands import (
     arm_or_disarm,
     enter,
@@ -26,6 +27,8 @@ CMD_DO_SET_HOME = 179
 CMD_DO_SET_ACTUATOR = 187
 CMD_DO_REPOSITION = 192
 CMD_DO_SET_STANDARD_MODE = 262
+CMD_DO_PAUSE_CONTINUE = 193
+CMD_DO_SET_MISSION_CURRENT = 224
 CMD_MISSION_START = 300
 CMD_ARM_DISARM = 400
 
@@ -52,6 +55,8 @@ _JUDGES: dict[int, Callable[[CommandRequest, Situation], Decision]] = {
     CMD_DO_SET_ACTUATOR: set_actuator,
     CMD_DO_REPOSITION: reposition,
     CMD_DO_SET_STANDARD_MODE: set_standard_mode,
-    CMD_MISSION_START: _event(Event.START_MISSION),
+    CMD_DO_PAUSE_CONTINUE: pause_or_continue,
+    CMD_DO_SET_MISSION_CURRENT: set_current,
+    CMD_MISSION_START: start_mission,
     CMD_ARM_DISARM: arm_or_disarm,
 }

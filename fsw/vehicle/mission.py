@@ -14,12 +14,16 @@ from enum import Enum
 
 from fsw.signals import (
     EndEffectorTarget,
+    Home,
     MissionAction,
     MissionProgress,
     MissionState,
     MissionStep,
+    SafeSet,
+    Vec2,
     Vec3,
 )
+from fsw.vehicle.confine import inside
 from fsw.vehicle.leg import Leg, Pace, braking_leg, leg_to
 from fsw.vehicle.modes import Event
 
@@ -45,6 +49,7 @@ class MissionFlight:
     steps: tuple[MissionStep, ...] = ()
     stage: Stage = Stage.IDLE
     leg: Leg | None = None
+    place: Vec3 | None = None  # m, where the step is to be reached; the leg may stop before a wall
     since_us: int = 0  # when the stage began
     speed: float | None = None  # m/s, as the mission says
     progress: MissionProgress = field(default_factory=MissionProgress)
@@ -58,6 +63,7 @@ class Whereabouts:
     p_WE: Vec3  # m, estimate
     height: float  # m, base above the origin
     home_z: float  # m, NED, of home
+    safe_set: SafeSet = field(default_factory=SafeSet)
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,15 +102,23 @@ def refusal(flight: MissionFlight, landed: bool) -> str | None:
     return None
 
 
-def begun(flight: MissionFlight, reference: EndEffectorTarget) -> MissionFlight:
-    """Begin, or go on with the current step, from a reference at rest."""
+def nearest(home: Home, rally: tuple[Vec2, ...], p: Vec3) -> Home:
+    """Home, or a rally point where one is nearer; both are at home's height."""
+    x, y, z = home.p
+    places = ((x, y), *rally)
+    x, y = min(places, key=lambda place: math.dist(place, p[:2]))
+    return Home((x, y, z), home.yaw)
+
+
+def begun(flight: MissionFlight, reference: EndEffectorTarget, pace: Pace) -> MissionFlight:
+    """Begin, or go on with the current step, from a reference; brake first if it moves."""
     progress = flight.progress
     if progress.state is MissionState.COMPLETE:
         progress = replace(progress, current=0, reached=-1)
     return replace(
         flight,
-        stage=Stage.BEGIN,
-        leg=_still(reference),
+        stage=Stage.BRAKE,
+        leg=braking_leg(reference, pace),
         since_us=reference.t_us,
         speed=_speed_before(flight.steps, progress.current),
         progress=replace(progress, state=MissionState.ACTIVE),
@@ -160,7 +174,7 @@ def advance(
         return replace(flight, stage=Stage.ARRIVE, since_us=now_us), NOTHING
     step = flight.steps[flight.progress.current]
     if flight.stage is Stage.ARRIVE:
-        return _arrive(flight, step, leg, where)
+        return _arrive(flight, step, where)
     if flight.stage is Stage.STAY and now_us - flight.since_us >= 1e6 * step.hold_s:
         return _hand_over(flight, step)
     return flight, NOTHING
@@ -173,6 +187,11 @@ def touched_down(flight: MissionFlight) -> MissionFlight:
     return replace(_reached(flight), stage=Stage.IDLE, leg=None)
 
 
+def handed_over(flight: MissionFlight, event: Event) -> bool:
+    """Whether this change of mode is the mission's own wish."""
+    return flight.stage is Stage.GONE and event in (Event.LAND, Event.GO_HOME)
+
+
 def _begin(
     flight: MissionFlight, at: EndEffectorTarget, where: Whereabouts, pace: Pace
 ) -> tuple[MissionFlight, Happening]:
@@ -182,9 +201,10 @@ def _begin(
         return _next(_reached(replace(flight, speed=step.speed)))
     if flight.speed is not None:
         pace = replace(pace, speed=flight.speed)
-    leg = leg_to(at, _destination(step, at, where), step.yaw, pace)
+    place = _destination(step, at, where)
+    leg = leg_to(at, inside(place, where.safe_set), step.yaw, pace)
     text = f"mission step {number}: {step.action.value}"
-    moving = replace(flight, stage=Stage.MOVE, leg=leg, since_us=where.now_us)
+    moving = replace(flight, stage=Stage.MOVE, leg=leg, place=place, since_us=where.now_us)
     return moving, Happening(text=text)
 
 
@@ -202,11 +222,10 @@ def _destination(step: MissionStep, at: EndEffectorTarget, where: Whereabouts) -
 
 
 def _arrive(
-    flight: MissionFlight, step: MissionStep, leg: Leg, where: Whereabouts
+    flight: MissionFlight, step: MissionStep, where: Whereabouts
 ) -> tuple[MissionFlight, Happening]:
-    if step.position is None:
-        return replace(flight, stage=Stage.STAY, since_us=where.now_us), NOTHING
-    off = math.dist(where.p_WE, leg.end)
+    place = flight.place
+    off = 0.0 if step.position is None or place is None else math.dist(where.p_WE, place)
     if off <= step.acceptance:
         return replace(flight, stage=Stage.STAY, since_us=where.now_us), NOTHING
     if where.now_us - flight.since_us < PATIENCE_US:
@@ -250,8 +269,3 @@ def _speed_before(steps: tuple[MissionStep, ...], number: int) -> float | None:
     """The speed in force where the mission is begun at a step."""
     speeds = [step.speed for step in steps[:number] if step.action is MissionAction.SPEED]
     return speeds[-1] if speeds else None
-
-
-def _still(at: EndEffectorTarget) -> Leg:
-    """A leg that is flown already."""
-    return Leg(at.t_us, at.p_WE, (0.0, 0.0, 0.0), at.yaw, 0.0, 0.0, 0.0, 0.0)

@@ -26,6 +26,8 @@ _STANDARD_MODES: dict[float, Event] = {  # MAV_STANDARD_MODE
     7.0: Event.LAND,
     8.0: Event.TAKE_OFF,
 }
+# Modes that can be chosen before arming, as ground stations do with a mission.
+_STANDBY: dict[Event, Mode] = {Event.HOLD: Mode.HOLD, Event.START_MISSION: Mode.MISSION}
 _FORCE = 21196.0  # the value MAVLink asks for to arm or disarm against all checks
 
 
@@ -95,6 +97,8 @@ def enter(event: Event, situation: Situation) -> Decision:
     refusal = _refusal(event, situation)
     if refusal is not None:
         return Decision(TEMPORARILY_REJECTED, reason=refusal)
+    if situation.mode is Mode.DISARMED and event in _STANDBY:
+        return Decision(ACCEPTED, standby=_STANDBY[event])
     return change(event, situation)
 
 
@@ -119,8 +123,8 @@ def _refusal(event: Event, situation: Situation) -> str | None:
         return "no return: the vehicle is not armed"
     if event is Event.GO_HOME and situation.landed:
         return "no return: the vehicle is on the ground"
-    if event is Event.START_MISSION and not situation.mission_ready:
-        return "no mission: none was uploaded"
+    if event is Event.START_MISSION:
+        return situation.mission_refusal
     if event is Event.GO_OFFBOARD and not situation.setpoint_fresh:
         return "not offboard: no set-point was received in the last 0.5 s"
     return None

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from fsw.model.airframe import AIRFRAME, Airframe
-from fsw.signals import SEA_LEVEL, Home, Mode, Origin, SafeSet, Vec2, Vec3
+from fsw.signals import SEA_LEVEL, Home, MissionProgress, Mode, Origin, SafeSet, Vec2, Vec3
 from fsw.vehicle.modes import Event
 
 # MAV_RESULT of MAVLink common.xml.
@@ -22,7 +22,8 @@ class Situation:
     targets_ahead: bool  # the stream holds a point at or after now
     standing_unclear: bool = False  # too high to stand, too low to be surely in the air
     inconsistent: str = ""  # why the configuration cannot keep the safe set
-    mission_ready: bool = False  # a mission was uploaded and can be flown from here
+    mission: MissionProgress = field(default_factory=MissionProgress)
+    mission_refusal: str | None = "no mission: none was uploaded"  # None: it can be flown
     setpoint_fresh: bool = False  # an offboard set-point came within the last 0.5 s
     position: Vec3 = (0.0, 0.0, 0.0)  # m, of the body
     yaw: float = 0.0  # rad
@@ -56,3 +57,5 @@ class Decision:
     goto: Goto | None = None
     joints: Vec2 | None = None  # rad
     home: Home | None = None
+    standby: Mode | None = None  # what arming is to lead to
+    mission_step: int | None = None  # to fly next

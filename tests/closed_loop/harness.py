@@ -16,6 +16,7 @@ from fsw.signals import (
     CommandRequest,
     EndEffectorTarget,
     FlightSnapshot,
+    MissionUpdate,
     Mode,
     Plan,
     PlanFailure,
@@ -76,6 +77,8 @@ class Flight:
     planner: AnyPlanner | None = None
     spoil: Callable[[SensorFrame], SensorFrame] = as_measured
     late_ticks: Callable[[int], int] = on_time
+    announces: bool = True  # the safe set
+    upload: MissionUpdate | None = None  # told to the next tick
     state: FlightState = field(default_factory=FlightState)
     texts: list[str] = field(default_factory=list)
     results: list[tuple[int, int]] = field(default_factory=list)  # command, MAV_RESULT
@@ -127,9 +130,11 @@ class Flight:
             self._due(sensors.t_us),
             commands,
             self._targets(),
-            safe_set(self.scenario) if self.sim.step == 0 else None,
+            safe_set(self.scenario) if self.announces and self.sim.step == 0 else None,
             tuning=tuning,
+            mission=self.upload,
         )
+        self.upload = None
         if self.streamed and self.sim.step % STREAM_STEPS == 0:
             self.inputs = replace(self.inputs, **self.streamed)
         before = self.mode

@@ -14,6 +14,8 @@ from fsw.signals import (
     EndEffectorTarget,
     FlightSnapshot,
     Home,
+    MissionProgress,
+    MissionState,
     Mode,
     OffboardReport,
     Plan,
@@ -87,6 +89,7 @@ SNAPSHOT = FlightSnapshot(
     home=Home((-0.5, 0.25, -0.3), math.pi),
     battery=BatteryState(voltage=15.2, current=18.3, consumed=1.9, remaining=0.62),
     offboard=OffboardReport(accepted=5, refused=2, age_us=40_000),
+    mission=MissionProgress(MissionState.PAUSED, 2, 5, 1, 2),
 )  # fmt: skip
 
 

@@ -71,6 +71,7 @@ TELLING: dict[int, dict[str, Any]] = {
     },
     ids.ESTIMATOR_STATUS: {"time_usec": 3_004_000, "flags": 63},
     ids.SYSTEM_TIME: {"time_boot_ms": 3004, "time_unix_usec": 1_750_000_003_004_000},
+    ids.MISSION_CURRENT: {"seq": 2, "total": 5, "mission_state": 4, "mission_mode": 2},
     ids.CURRENT_MODE: {"custom_mode": 0x0B040000, "standard_mode": 0},
     ids.ODOMETRY: {"x": 1.0, "vx": 0.2, "vy": -0.1, "vz": 0.3, "rollspeed": 0.4, "frame_id": 1},
     ids.GPS_GLOBAL_ORIGIN: {"latitude": 473977420, "longitude": 85455940, "altitude": 0},
@@ -147,6 +148,15 @@ def test_a_fault_takes_the_prearm_bit_and_the_suspect_away() -> None:
     # Nothing is known without an estimate: neither place nor heading nor what feeds them.
     assert lost == 0x10000000 | 0x200000 | 0x80 | 0x27
     assert read_back(stream_of(ids.HEARTBEAT), broken).system_status == 5
+
+
+def test_the_fence_is_enabled_where_there_is_one_and_healthy_until_it_is_left() -> None:
+    fence = 0x100000
+    for margins, enabled, healthy in (((), 0, fence), ((0.1,), fence, fence), ((-0.1,), fence, 0)):
+        report = replace(SNAPSHOT.constraints, margins=margins)
+        status = read_back(stream_of(ids.SYS_STATUS), replace(SNAPSHOT, constraints=report))
+        assert status.onboard_control_sensors_enabled & fence == enabled
+        assert status.onboard_control_sensors_health & fence == healthy
 
 
 @pytest.mark.parametrize(

@@ -15,6 +15,7 @@ import pytest
 from fsw import app
 from fsw.arguments import FswOptions
 from fsw.link.link_choice import NO_LINK, LinkChoice
+from fsw.link.mission_store import MissionStore, Site
 from fsw.parameters.control_choice import ControlChoice
 from fsw.parameters.flight_config import FlightConfig
 from fsw.parameters.registry import PARAMETERS
@@ -40,7 +41,8 @@ def standing(state: int, inputs: TickInputs) -> tuple[int, TickOutputs]:
 
 def load(options: FswOptions) -> FlightProgram[int]:
     parameters = ParameterStore(FlightConfig(), lambda tuning: None)
-    return FlightProgram(FACTS, 0, standing, NoPlanner(), parameters)
+    site = Site(lambda *place: (0.0, 0.0, 0.0), lambda safe_set: (), lambda: 0.1)
+    return FlightProgram(FACTS, 0, standing, NoPlanner(), parameters, MissionStore(site))
 
 
 @pytest.fixture

@@ -1,0 +1,228 @@
+"""Uploaded missions and fences, flown on the full plant."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import replace
+
+from fsw.signals import (
+    EndEffectorTarget,
+    MissionAction,
+    MissionState,
+    MissionStep,
+    MissionUpdate,
+    Mode,
+    SafeSet,
+    Vec3,
+)
+from fsw.vehicle.fence import CIRCLE_INCLUSION, POLYGON_INCLUSION, read_fence
+from fsw.vehicle.mission_items import MissionItem
+from sitl.scenario import Pilot
+from sitl.scenario_file import load_scenario
+from tests.closed_loop.harness import (
+    ARM,
+    SET_MODE,
+    Flight,
+    command,
+    hover,
+    on_the_ground,
+)
+
+A = MissionAction
+ACCEPTED, TEMPORARILY_REJECTED, DENIED = 0, 1, 2
+MISSION_START, PAUSE_CONTINUE, SET_CURRENT = 300, 193, 224
+# The three walls of Case I and a fourth far behind: MAVLink's polygons are closed.
+NICHE = ((1.0, 1.0), (1.0, -1.0), (-9.0, -1.0), (-9.0, 1.0))
+
+
+def go(x: float, y: float, z: float, hold: float = 0.0) -> MissionStep:
+    return MissionStep(A.GO, (x, y, z), hold_s=hold)
+
+
+def fence(*items: MissionItem) -> MissionUpdate:
+    read = read_fence(items, lambda latitude, longitude, altitude: (0.0, 0.0, 0.0), 0.1)
+    assert isinstance(read, SafeSet)
+    return MissionUpdate(fence=read)
+
+
+def niche() -> MissionUpdate:
+    count = (float(len(NICHE)), 0.0, 0.0, 0.0)
+    return fence(
+        *(
+            MissionItem(POLYGON_INCLUSION, 1, count, round(1e4 * x), round(1e4 * y), 0.0)
+            for x, y in NICHE
+        )
+    )
+
+
+def among_walls(seed: int) -> Flight:
+    """Case I, disturbed; the vehicle hears of the walls from nobody but the fence."""
+    scenario = replace(load_scenario("walls"), pilot=Pilot("none"))
+    flight = Flight(scenario, seed=seed, announces=False)
+    flight.upload = niche()
+    flight.step(command(ARM, 1.0))
+    return flight
+
+
+def told(flight: Flight, steps: tuple[MissionStep, ...]) -> None:
+    flight.upload = MissionUpdate(steps=steps, current=0)
+    flight.step()
+
+
+def where(flight: Flight) -> Vec3:
+    return flight.sim.truth().p_WE
+
+
+def test_a_mission_from_the_ground_to_the_ground() -> None:
+    """As QGroundControl begins it: mission mode first, then arming."""
+    flight = Flight(on_the_ground())
+    steps = (
+        MissionStep(A.TAKE_OFF, (0.0, 0.0, -0.8), above_home=True),
+        MissionStep(A.SPEED, speed=0.2),
+        MissionStep(A.GO, (0.3, 0.2, -0.8), yaw=0.3),
+        MissionStep(A.LAND),
+    )
+    told(flight, steps)
+    flight.step(command(SET_MODE, 1.0, 4.0, 4.0))
+    assert flight.snapshot.standby is Mode.MISSION
+    flight.step(command(ARM, 1.0))
+    assert flight.mode is Mode.MISSION
+    reached: dict[int, Vec3] = {}
+    for _ in range(600):
+        flight.run(0.1)
+        reached.setdefault(flight.snapshot.mission.reached, where(flight))
+        if flight.mode is Mode.DISARMED:
+            break
+    assert flight.modes == [Mode.MISSION, Mode.LAND, Mode.DISARMED]
+    assert list(reached) == [-1, 1, 2, 3] or list(reached) == [-1, 0, 1, 2, 3]
+    assert math.dist(reached[2], (0.3, 0.2, -0.8)) < 0.1
+    assert flight.snapshot.mission.state is MissionState.COMPLETE
+    assert flight.snapshot.mission.reached_count == 4
+    assert flight.snapshot.standby is Mode.HOLD
+
+
+def test_waypoints_beyond_the_walls_of_an_uploaded_fence_are_flown_up_to_it() -> None:
+    flight = among_walls(seed=3)
+    told(flight, (go(1.8, 0.3, -1.2, hold=1.0), go(1.4, 1.7, -1.2, hold=1.0), go(0.0, 0.0, -1.2)))
+    flight.step(command(MISSION_START, 0.0, 0.0))
+    flight.run(33.0)
+    margins = flight.sim.result().margins_m
+    assert len(margins) == 9
+    assert min(margins.values()) > 0.0, margins
+    assert margins["front/end_effector"] < 0.15, "the mission never came near the wall"
+    texts = "; ".join(flight.texts)
+    assert "mission step 0 not reached" in texts
+    assert "mission step 1 not reached" in texts
+
+
+def test_a_fence_takes_the_place_of_the_walls_that_nobody_announced() -> None:
+    flight = among_walls(seed=5)
+    assert len(flight.state.mission.safe_set.walls) == 4
+    flight.upload = MissionUpdate(fence=SafeSet())
+    flight.step()
+    assert flight.state.mission.safe_set == SafeSet()
+
+
+def test_the_sphere_of_case_2_can_be_a_fence() -> None:
+    scenario = replace(load_scenario("workspace"), pilot=Pilot("none"))
+    flight = Flight(scenario, seed=7, announces=False)
+    flight.upload = fence(MissionItem(CIRCLE_INCLUSION, 7, (0.075, 0, 0, 0), 0, 0, -0.225))
+    flight.step(command(ARM, 1.0))
+    flight.run(0.5)
+    told(flight, (go(0.5, 0.3, -1.3), go(0.0, 0.0, -1.2)))
+    flight.step(command(MISSION_START, 0.0, 0.0))
+    farthest = 0.0
+    for _ in range(100):
+        flight.run(0.1)
+        leg = flight.state.mission.flight.leg
+        assert leg is not None
+        target = leg.at(flight.sim.t_us)
+        centre = (target.p_WE[0], target.p_WE[1], target.p_WE[2] - 0.225)
+        farthest = max(farthest, math.dist(flight.sim.truth().p_WB, centre))
+    assert farthest < 0.075
+    assert flight.snapshot.mission.reached == 0
+
+
+def test_pause_and_continue_come_back_to_the_current_step() -> None:
+    flight = Flight(hover())
+    flight.step(command(ARM, 1.0))
+    told(flight, (go(0.0, 0.0, -1.0), go(1.0, 0.0, -1.0)))
+    flight.step(command(MISSION_START, 1.0, 0.0))
+    flight.run(5.0)
+    flight.step(command(PAUSE_CONTINUE, 0.0))
+    assert flight.mode is Mode.HOLD
+    assert flight.snapshot.mission.state is MissionState.PAUSED
+    flight.run(2.0)
+    flight.step(command(PAUSE_CONTINUE, 1.0))
+    assert flight.mode is Mode.MISSION
+    assert flight.snapshot.mission.current == 1
+    flight.run(14.0)
+    assert flight.snapshot.mission.state is MissionState.COMPLETE
+    assert flight.mode is Mode.HOLD
+    assert math.dist(where(flight), (1.0, 0.0, -1.0)) < 0.05
+    assert "mission complete" in flight.texts
+
+
+def test_the_reference_does_not_jump_from_hold_into_a_mission_and_back() -> None:
+    flight = Flight(hover())
+    flight.step(command(ARM, 1.0))
+    flight.run(0.5)
+    told(flight, (go(0.3, 0.0, -1.1),))
+    flight.step(command(MISSION_START, 0.0, 0.0))
+    seen: list[EndEffectorTarget] = []
+    for _ in range(110):
+        flight.run(0.1)
+        if flight.snapshot.reference is not None:
+            seen.append(flight.snapshot.reference)
+    assert flight.mode is Mode.HOLD
+    steps = [math.dist(a.p_WE, b.p_WE) for a, b in itertools.pairwise(seen)]
+    assert max(steps) < 0.3 * 0.1 + 1e-6
+    assert math.dist(seen[0].p_WE, seen[-1].p_WE) > 0.2
+
+
+def test_another_mission_or_none_ends_the_one_that_is_flown() -> None:
+    flight = Flight(hover())
+    flight.step(command(ARM, 1.0))
+    for steps in ((go(0.5, 0.0, -1.0),), ()):
+        told(flight, (go(1.0, 0.0, -1.0),))
+        flight.step(command(SET_MODE, 1.0, 4.0, 4.0))
+        assert flight.mode is Mode.MISSION
+        flight.run(2.0)  # the same command sooner would be a repetition
+        told(flight, steps)
+        assert flight.mode is Mode.HOLD
+
+
+def test_what_cannot_be_begun_is_refused_with_the_reason() -> None:
+    flight = Flight(on_the_ground())
+    flight.step(command(ARM, 1.0))
+    flight.step(command(MISSION_START, 0.0, 0.0))
+    told(flight, (go(1.0, 0.0, -1.0),))
+    flight.step(command(SET_MODE, 1.0, 4.0, 4.0))
+    flight.step(command(MISSION_START, 7.0, 0.0))
+    flight.step(command(SET_CURRENT, 1.0, 0.0))
+    assert [result for _, result in flight.results[1:]] == [
+        TEMPORARILY_REJECTED,
+        TEMPORARILY_REJECTED,
+        TEMPORARILY_REJECTED,
+        DENIED,
+    ]
+    assert flight.texts[1:] == [
+        "no mission: none was uploaded",
+        *["no mission: on the ground, and step 0 is no takeoff; take off first"] * 2,
+        "there is no mission step 1; 1 were uploaded",
+    ]
+
+
+def test_a_step_chosen_in_flight_is_flown_after_braking() -> None:
+    flight = Flight(hover())
+    flight.step(command(ARM, 1.0))
+    told(flight, (go(2.0, 0.0, -1.0), go(0.0, 0.5, -1.0)))
+    flight.step(command(MISSION_START, 0.0, 0.0))
+    flight.run(5.0)
+    flight.step(command(SET_CURRENT, 1.0, 0.0))
+    assert flight.results[-1] == (SET_CURRENT, ACCEPTED)
+    flight.run(30.0)
+    assert flight.snapshot.mission.reached == 1
+    assert flight.snapshot.mission.reached_count == 1
+    assert math.dist(where(flight), (0.0, 0.5, -1.0)) < 0.05
