@@ -226,3 +226,20 @@ def test_a_step_chosen_in_flight_is_flown_after_braking() -> None:
     assert flight.snapshot.mission.reached == 1
     assert flight.snapshot.mission.reached_count == 1
     assert math.dist(where(flight), (0.0, 0.5, -1.0)) < 0.05
+
+
+def test_a_return_leads_to_the_nearest_rally_point() -> None:
+    flight = Flight(hover())
+    flight.step(command(ARM, 1.0))
+    flight.upload = MissionUpdate(rally=((0.0, 9.0), (0.8, 0.0)))
+    flight.step()
+    told(flight, (go(0.6, 0.0, -1.2), MissionStep(A.RETURN)))
+    flight.step(command(MISSION_START, 0.0, 0.0))
+    for _ in range(300):
+        flight.run(0.1)
+        if flight.mode is Mode.LAND:
+            break
+    assert flight.modes[-2:] == [Mode.RETURN, Mode.LAND]
+    x, y, _ = flight.sim.truth().p_WB
+    assert math.dist((x, y), (0.8, 0.0)) < 0.1
+    assert flight.snapshot.mission.state is MissionState.COMPLETE
