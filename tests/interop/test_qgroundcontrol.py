@@ -116,6 +116,17 @@ def test_a_parameter_that_is_not_there(station: Station) -> None:
     assert answer.get_type() == "PARAM_ERROR"
 
 
+@pytest.mark.parametrize(("kind", "what"), [(0, "mission"), (1, "fence"), (2, "rally points")])
+def test_its_mission_fence_and_rally_points(station: Station, kind: int, what: str) -> None:
+    """A vehicle that has just started has none, and says so."""
+    count = station.ask(
+        what,
+        lambda: station.mav.mission_request_list_send(1, 1, kind),
+        lambda m: m.get_type() == "MISSION_COUNT" and m.mission_type == kind,
+    )
+    assert (count.count, count.target_system, count.target_component) == (0, 255, 190)
+
+
 @pytest.mark.parametrize(
     "message_id", [259, 280, 410, 395], ids=["camera", "gimbal", "events", "information"]
 )
