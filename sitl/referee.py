@@ -35,6 +35,7 @@ class Referee:
         self.world = World(scenario)
         self.record = MarginRecord(self.world.keys)
         self.ended: EndReason | None = None
+        self.left: str | None = None  # why the trajectory is no longer flown
         self._clock = clock
         self._error = TrackingError()
         self._duration_s = scenario.duration_s
@@ -118,7 +119,7 @@ class Referee:
 
     def result(self, time_s: float) -> TruthResult:
         """The score up to ``time_s``."""
-        return score(self.ended, time_s, self._error, self.record, self._whole)
+        return score(self.ended, time_s, self._error, self.record, self._whole, self.left)
 
 
 def _whole(scenario: Scenario) -> EndKind:

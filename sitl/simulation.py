@@ -128,9 +128,15 @@ class Simulation:
         """The pilot starts the trajectory at the stamp ``t_us``."""
         self.clock.start(1e-6 * (t_us - START_US))
 
-    def stop_trajectory(self, t_us: int) -> None:
-        """The pilot leaves the trajectory at the stamp ``t_us``: no more error, no workspace."""
-        self.clock.stop(1e-6 * (t_us - START_US))
+    def leave_trajectory(self, t_us: int, why: str) -> None:
+        """The vehicle left the trajectory at the stamp ``t_us``: no more error, no workspace.
+
+        The run goes on, but not to completion; the first time counts.
+        """
+        time_s = 1e-6 * (t_us - START_US)
+        if self._referee.left is None:
+            self.clock.stop(time_s)
+            self._referee.left = f"{why} at {time_s:.1f} s"
 
     def target_at(self, time_s: float) -> TrajectoryPoint:
         """End-effector reference ``time_s`` after the start of the simulation."""

@@ -129,6 +129,7 @@ def score(
     error: TrackingError,
     record: MarginRecord,
     whole: EndKind,
+    left: str | None = None,
 ) -> TruthResult:
     """The result of a run.
 
@@ -138,6 +139,7 @@ def score(
         error: Of the end-effector.
         record: Of the margins.
         whole: The end that such a run should have.
+        left: Why the trajectory was not flown to its end.
     """
     broken = violation(record)
     worst = record.worst()
@@ -145,10 +147,12 @@ def score(
     parts = [end.sentence if end is not None else "still flying"]
     if whole is EndKind.MISSION and end is not None and end.kind is EndKind.DURATION:
         parts.append("the vehicle had not landed and disarmed by then")
+    if left is not None:
+        parts.append(left)
     if broken is not None:
         parts.append(broken)
     return TruthResult(
-        completed=flown and broken is None,
+        completed=flown and broken is None and left is None,
         end_reason="; ".join(parts),
         duration_s=time_s,
         tracking_error_rms_m=error.rms,

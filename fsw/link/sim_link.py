@@ -14,9 +14,10 @@ from fsw.link import decode, encode_replies, message_ids
 from fsw.link.decode import Numbers
 from fsw.link.inbox import Inbox
 from fsw.link.message_ids import AUTOPILOT, SYSTEM_ID
+from fsw.link.px4_mode import custom_mode
 from fsw.link.telemetry import VehicleFacts
 from fsw.link.udp_endpoint import Address, ConnectedEndpoint
-from fsw.signals import CommandAck, SensorFrame, TickOutputs
+from fsw.signals import CommandAck, FlightSnapshot, Mode, SensorFrame, TickOutputs
 from messages.convoy import ConvoyReader
 from messages.frames import Frame, FrameWriter, split
 
@@ -25,6 +26,12 @@ PATIENCE_S: Final = 0.2  # one wait for a datagram; also the interval of announc
 _SHUTDOWN: Final = 246  # MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN
 _POWER_OFF: Final = 2.0  # its second parameter here: shut the autopilot down
 _ACCEPTED: Final = 0  # MAV_RESULT
+_TELL_US: Final = 1_000_000  # the mode is told when it changes, and this often
+_QUADROTOR: Final = 2  # MAV_TYPE
+_PX4: Final = 12  # MAV_AUTOPILOT
+_CUSTOM_MODE: Final = 1  # MAV_MODE_FLAG
+_ARMED: Final = 128
+_STANDBY, _ACTIVE = 3, 4  # MAV_STATE
 # An ordinary step; with the number of first values that are of use.
 _STEP: Final = ConvoyReader(
     (message_ids.ODOMETRY, 14), (message_ids.ARM_JOINT_STATE, 7), (message_ids.HIL_SENSOR, 7)
@@ -54,10 +61,12 @@ class SimLink:
         self._answer: tuple[int, bytes] = (-1, b"")
         self._acks: list[CommandAck] = []
         self._text_id = 0
+        self._told_us = -_TELL_US
+        self._told_mode: Mode | None = None
 
     def announce(self) -> None:
         """Tell the simulator where the vehicle is, until it sends steps."""
-        values = (0, 2, 12, 0, 3, 3)  # quadrotor, PX4, standby
+        values = (0, _QUADROTOR, _PX4, 0, _STANDBY, 3)
         self._endpoint.send(self._writer.frame(message_ids.HEARTBEAT, *values))
 
     def receive(self) -> SensorFrame | None:
@@ -95,8 +104,9 @@ class SimLink:
             self._torque_scale,
         )
         controls = self._writer.frame(message_ids.HIL_ACTUATOR_CONTROLS, *values)
-        if self._acks or outputs.texts:
-            controls = self._replies(outputs) + controls
+        told = t_us - self._told_us >= _TELL_US
+        if self._acks or outputs.texts or told or outputs.snapshot.mode is not self._told_mode:
+            controls = self._mode(t_us, outputs.snapshot) + self._replies(outputs) + controls
         self._answer = (t_us, controls)
         self._endpoint.send(controls)
 
@@ -170,6 +180,14 @@ class SimLink:
             for values in encode_replies.status_texts(text, self._text_id):
                 frames.append(self._writer.frame(message_ids.STATUSTEXT, *values))
         return b"".join(frames)
+
+    def _mode(self, t_us: int, snapshot: FlightSnapshot) -> bytes:
+        """HEARTBEAT: the simulator sees whether its trajectory is being flown."""
+        self._told_us, self._told_mode = t_us, snapshot.mode
+        base_mode = _CUSTOM_MODE | (_ARMED if snapshot.armed else 0)
+        status = _ACTIVE if snapshot.armed else _STANDBY
+        values = (custom_mode(snapshot.mode), _QUADROTOR, _PX4, base_mode, status, 3)
+        return self._writer.frame(message_ids.HEARTBEAT, *values)
 
     def _ack_frame(self, ack: CommandAck) -> bytes:
         return self._writer.frame(message_ids.COMMAND_ACK, *encode_replies.command_ack(ack))

@@ -23,6 +23,7 @@ class Answer(NamedTuple):
     controls: Controls
     acks: tuple[Ack, ...] = ()
     texts: tuple[str, ...] = ()
+    custom_mode: int | None = None  # of the vehicle's HEARTBEAT, where there is one
 
 
 def is_vehicle(datagram: bytes) -> bool:
@@ -48,7 +49,9 @@ def answer(datagram: bytes, joints: int) -> Answer | None:
         return None
     values = cast("tuple[float, ...]", frames[-1].payload_values)
     controls = _controls(values, joints)
-    return Answer(int(values[0]), controls, acknowledgements(frames), _texts(frames))
+    return Answer(
+        int(values[0]), controls, acknowledgements(frames), _texts(frames), _custom_mode(frames)
+    )
 
 
 def _controls(values: tuple[float, ...], joints: int) -> Controls:
@@ -68,6 +71,11 @@ def acknowledgements(frames: list[Frame]) -> tuple[Ack, ...]:
         if frame.message_id == message_ids.COMMAND_ACK
         and frame.payload_values[5] in (0, PATH_PLANNER)
     )
+
+
+def _custom_mode(frames: list[Frame]) -> int | None:
+    told = [frame for frame in frames if frame.message_id == message_ids.HEARTBEAT]
+    return cast(int, told[-1].payload_values[0]) if told else None
 
 
 def _texts(frames: list[Frame]) -> tuple[str, ...]:

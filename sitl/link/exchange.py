@@ -150,6 +150,9 @@ class RealTime:
             self._held,
             acks=tuple(ack for answer in answers for ack in answer.acks),
             texts=tuple(text for answer in answers for text in answer.texts),
+            custom_mode=next(
+                (a.custom_mode for a in reversed(answers) if a.custom_mode is not None), None
+            ),
         )
 
     def _first_step(self, t_us: int, datagram: bytes) -> Answer:

@@ -38,6 +38,17 @@ _LANDED_M: Final = 0.05  # above where it took off
 _HOVER_US: Final = 3_000_000
 _NAN: Final = math.nan
 
+# PX4's custom_mode: main mode in bits 16 to 23, sub mode from bit 24 on.
+_MAIN_AUTO, _AUTO_EXTERNAL1 = 4, 11
+_TRAJECTORY: Final = _MAIN_AUTO << 16 | _AUTO_EXTERNAL1 << 24
+_NAMES: Final[dict[tuple[int, int], str]] = {
+    (4, 3): "hold",
+    (4, 4): "mission",
+    (4, 5): "return",
+    (4, 6): "land",
+    (6, 0): "offboard",
+}
+
 
 class Phase(Enum):
     """Where the pilot is in its plan."""
@@ -45,6 +56,7 @@ class Phase(Enum):
     IDLE = "idle"  # plan none: a ground station flies
     ARM = "arm"
     FOLLOW = "start the trajectory"
+    FOLLOWING = "watch the trajectory being flown"
     TAKE_OFF = "take off"
     HOVER = "hover"
     LAND = "land"
@@ -78,6 +90,7 @@ class PilotState:
     start_height_m: float = 0.0
     last_text: str = ""
     refusal: str | None = None  # ends the run
+    left: str | None = None  # somebody else took the vehicle off the trajectory
 
     @property
     def done(self) -> bool:
@@ -88,7 +101,7 @@ class PilotState:
 # The command of each phase that asks for something, and the phase that follows its acceptance.
 _COMMANDS: Final[dict[Phase, tuple[int, Phase]]] = {
     Phase.ARM: (message_ids.CMD_ARM_DISARM, Phase.FOLLOW),
-    Phase.FOLLOW: (message_ids.CMD_DO_SET_MODE, Phase.IDLE),
+    Phase.FOLLOW: (message_ids.CMD_DO_SET_MODE, Phase.FOLLOWING),
     Phase.TAKE_OFF: (message_ids.CMD_TAKEOFF, Phase.HOVER),
     Phase.LAND: (message_ids.CMD_LAND, Phase.DISARM),
 }
@@ -126,6 +139,8 @@ def listen(plan: FlightPlan, state: PilotState, heard: Heard, t_us: int) -> Pilo
         wanted = _COMMANDS.get(state.phase)
         if wanted is not None and ack.command == wanted[0]:
             state = _acknowledged(plan, state, ack.result, heard, t_us)
+    if state.phase is Phase.FOLLOWING and heard.custom_mode not in (None, _TRAJECTORY):
+        return replace(state, phase=Phase.IDLE, left=_left(heard.custom_mode))
     if state.phase is Phase.HOVER:
         return _hover(state, heard, t_us)
     if state.phase is Phase.DISARM and not heard.armed and _stands(state, heard):
@@ -183,6 +198,13 @@ def _acknowledged(
     return replace(state, refusal=f"the vehicle refused to {state.phase.value}{reason}")
 
 
+def _left(custom_mode: int | None) -> str:
+    """What became of the trajectory, in words."""
+    number = custom_mode or 0
+    main, sub = number >> 16 & 0xFF, number >> 24 & 0xFF
+    return f"the vehicle left the trajectory for {_NAMES.get((main, sub), f'mode {main}/{sub}')}"
+
+
 def _stands(state: PilotState, heard: Heard) -> bool:
     """Back where it took off from; a vehicle that disarms in the air is judged as it lands."""
     low = heard.height_m - state.start_height_m < _LANDED_M
@@ -208,6 +230,6 @@ def _command(plan: FlightPlan, phase: Phase) -> SendCommand:
     if phase is Phase.FOLLOW:
         # Custom mode (1), PX4's main mode 4, automatic, and its first sub mode for modes of
         # others: here the end-effector's trajectory.
-        return SendCommand(command, (1.0, 4.0, 11.0, _NAN, _NAN, _NAN, _NAN))
+        return SendCommand(command, (1.0, _MAIN_AUTO, _AUTO_EXTERNAL1, _NAN, _NAN, _NAN, _NAN))
     height = plan.takeoff_height_m if phase is Phase.TAKE_OFF else _NAN
     return SendCommand(command, (_NAN, _NAN, _NAN, _NAN, _NAN, _NAN, height))

@@ -63,3 +63,4 @@ class Heard(NamedTuple):
     armed: bool = False
     height_m: float = 0.0  # above the ground, as the sensors measured it
     speed_m_s: float = 0.0
+    custom_mode: int | None = None  # None: it said nothing

@@ -88,6 +88,8 @@ def fly(
             simulation.end(kind, str(error))
             break
         state = pilot.listen(plan, state, _heard(answer, readings), readings.t_us)
+        if state.left is not None:
+            simulation.leave_trajectory(readings.t_us, state.left)
         if state.refusal is not None:
             simulation.end(EndKind.REFUSED, state.refusal)
         elif state.done:
@@ -143,4 +145,5 @@ def _heard(answer: Answer, readings: SensorReadings) -> Heard:
         answer.controls.armed,
         height_m=-readings.p_WB[2],
         speed_m_s=math.hypot(*readings.v_WB),
+        custom_mode=answer.custom_mode,
     )

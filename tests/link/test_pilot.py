@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import pytest
 
@@ -74,9 +74,7 @@ class Flight:
                 for message in messages
                 if isinstance(message, SendCommand) and message.command in self.results
             )
-            heard = Heard(
-                acks, self.heard.texts, self.heard.armed, self.heard.height_m, self.heard.speed_m_s
-            )
+            heard = replace(self.heard, acks=acks)
             self.state = listen(self.plan, self.state, heard, self.t_us)
             self.t_us += STEP_US
 
@@ -137,7 +135,7 @@ def test_a_vehicle_that_is_not_ready_yet_is_asked_again() -> None:
     assert flight.state.refusal is None
     flight.results = {ARM: 0, MODE: 0}
     flight.fly(1.0)
-    assert flight.state.phase is Phase.IDLE
+    assert flight.state.phase is Phase.FOLLOWING
 
 
 def test_asking_does_not_go_on_for_ever() -> None:
@@ -192,3 +190,20 @@ def test_a_hop_that_disarms_in_the_air_is_not_done() -> None:
     flight.heard = Heard(armed=False, height_m=1.2, speed_m_s=2.0)
     flight.fly(0.1)
     assert not flight.state.done
+
+
+TRAJECTORY, HOLD = 4 << 16 | 11 << 24, 4 << 16 | 3 << 24
+
+
+def test_a_vehicle_that_somebody_else_takes_off_the_trajectory_is_noticed() -> None:
+    flight = Flight(plan(), {ARM: 0, MODE: 0})
+    flight.fly(1.0)
+    flight.heard = Heard(custom_mode=TRAJECTORY)
+    flight.fly(0.1)
+    flight.heard = Heard()
+    flight.fly(0.1)
+    assert flight.state.left is None
+    flight.heard = Heard(custom_mode=HOLD)
+    flight.fly(0.1)
+    assert flight.state.left == "the vehicle left the trajectory for hold"
+    assert flight.state.refusal is None

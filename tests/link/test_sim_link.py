@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import socket
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import pytest
 
 from fsw.link import message_ids as ids
 from fsw.link.inbox import Inbox
 from fsw.link.sim_link import Pacing, SimLink
-from fsw.signals import CommandAck
+from fsw.signals import CommandAck, Mode
 from messages.frames import FrameWriter, split
 from sitl.link.encode import StepEncoder
 from sitl.link.pilot_messages import SendCommand
@@ -136,10 +136,24 @@ def test_acknowledgements_come_before_the_actuators_and_are_repeated_with_them(w
     wire.link.answer(1_002_000, outputs_at(1_002_000))
     answer = wire.hear()
     order = [frame.message_id for frame in split(answer)]
-    assert order == [ids.COMMAND_ACK, ids.HIL_ACTUATOR_CONTROLS]
+    assert order == [ids.HEARTBEAT, ids.COMMAND_ACK, ids.HIL_ACTUATOR_CONTROLS]
     wire.send(step)
     wire.link.receive()
     assert wire.hear() == answer
+
+
+def test_the_simulator_is_told_the_mode_when_it_changes_and_once_a_second(wire: Wire) -> None:
+    told = []
+    for step in range(1, 1001):
+        t_us = 1_000_000 + 2_000 * step
+        outputs = outputs_at(t_us)
+        if step >= 700:
+            outputs = replace(outputs, snapshot=replace(outputs.snapshot, mode=Mode.HOLD))
+        wire.link.answer(t_us, outputs)
+        for frame in split(wire.hear()):
+            if frame.message_id == ids.HEARTBEAT:
+                told.append((step, frame.payload_values[0]))
+    assert told == [(1, 0x0B040000), (501, 0x0B040000), (700, 0x03040000)]
 
 
 def test_the_heartbeat_of_the_simulator_says_who_waits(wire: Wire) -> None:

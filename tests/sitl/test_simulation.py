@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from sitl.plant.trim import level_hover
-from sitl.scenario import Hold, Impulses, ImuErrors, Scenario, Sensors, Wind, Workspace
+from sitl.scenario import Hold, Impulses, ImuErrors, Pilot, Scenario, Sensors, Wind, Workspace
 from sitl.scenario_file import ScenarioError, load_scenario
 from sitl.sensors.suite import SensorReadings
 from sitl.simulation import Controls, Simulation, Truth
@@ -274,9 +274,25 @@ def test_a_workspace_counts_only_while_the_pilot_is_on_the_trajectory() -> None:
     depth = simulation.result().margins_m["workspace/base"]
     assert depth < -1.0
     error = simulation.result().tracking_error_rms_m
-    simulation.stop_trajectory(simulation.t_us)
+    simulation.leave_trajectory(simulation.t_us, "the vehicle left it")
     _fly(simulation, OFF, 0.3)
     assert simulation.result().tracking_error_rms_m == error
+    simulation.leave_trajectory(simulation.t_us, "and again")
+    assert "the vehicle left it at 0.4 s" in simulation.result().end_reason
+    assert "again" not in simulation.result().end_reason
+
+
+def test_a_whole_flight_off_its_trajectory_is_not_completed() -> None:
+    scenario = replace(load_scenario("hop"), duration_s=0.2, pilot=Pilot("none"))
+    completed = []
+    for leaves in (False, True):
+        simulation = Simulation(scenario, 0)
+        if leaves:
+            simulation.leave_trajectory(simulation.t_us, "the vehicle left it")
+        _fly(simulation, OFF, 0.2)
+        assert simulation.ended is not None
+        completed.append(simulation.result().completed)
+    assert completed == [True, False]
 
 
 def test_a_negative_seed_is_refused() -> None:
