@@ -117,7 +117,9 @@ class _Session:
         files = self._files(directory, start_us, program)
         sim = SimLink(simulator, inbox, facts)
         autopilot = AUTOPILOTS[options.links.autopilot]
-        context = TelemetryContext(facts, record.health, autopilot, start_unix_us=start_us)
+        context = TelemetryContext(
+            facts, record.health, autopilot, options.links.origin, start_unix_us=start_us
+        )
         logs = flight_logs(directory)
         clocks = (clock.now_us, clock.unix_us)
         ground = build_links(
@@ -236,7 +238,7 @@ def load_flight_software(options: FswOptions) -> FlightProgram[Any]:
     from fsw.runtime.assembly import flight_software
 
     try:
-        return flight_software(options.control)
+        return flight_software(options.control, origin=options.links.origin)
     except ValueError as error:
         raise CouldNotStart(str(error)) from None
 

@@ -6,8 +6,9 @@ import argparse
 from dataclasses import dataclass
 from pathlib import Path
 
-from fsw.link.link_choice import AUTOPILOTS, LinkChoice
+from fsw.link.link_choice import AUTOPILOTS, LinkChoice, parse_origin
 from fsw.parameters.control_choice import ControlChoice
+from fsw.signals import Origin
 
 
 def add_control_arguments(parser: argparse.ArgumentParser) -> None:
@@ -93,11 +94,26 @@ def add_link_arguments(parser: argparse.ArgumentParser) -> None:
         help="what the vehicle says it is (default %(default)s)",
     )
     parser.add_argument(
+        "--origin",
+        metavar="LAT,LON,ALT",
+        type=_origin,
+        default=default.origin,
+        help="where on Earth the local frame begins, degrees and metres above the sea "
+        "(default 47.397742,8.545594,0); a negative latitude needs --origin=LAT,LON,ALT",
+    )
+    parser.add_argument(
         "--keys",
         metavar="DIR",
         type=Path,
         help="where signing keys are kept (default ~/.local/state/pandion)",
     )
+
+
+def _origin(text: str) -> Origin:
+    try:
+        return parse_origin(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
 
 
 def link_choice(arguments: argparse.Namespace) -> LinkChoice:
@@ -107,6 +123,7 @@ def link_choice(arguments: argparse.Namespace) -> LinkChoice:
         api=arguments.api,
         allow_remote=arguments.allow_remote,
         autopilot=arguments.autopilot,
+        origin=arguments.origin,
         keys=arguments.keys,
     )
 

@@ -145,11 +145,6 @@ class Origin:
     altitude: float  # m above mean sea level
 
 
-# PX4's usual place, but at sea level: there "above the sea" and "above the origin" are the same
-# number, which clients confuse.
-SEA_LEVEL = Origin(47.397742, 8.545594, 0.0)
-
-
 @dataclass(frozen=True, slots=True)
 class Home:
     """Where a return leads to."""

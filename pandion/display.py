@@ -57,6 +57,11 @@ class Display:
         if self._bar is not None and self._task is not None:
             self._bar.update(self._task, completed=time_s, description="flying", state=state)
             return
+        if math.isinf(self._duration_s):
+            if self._told == 0:
+                self._told = 1
+                self.say("flying until interrupted, by Ctrl-C or SIGINT")
+            return
         tenth = int(_PLAIN_STEPS * time_s / self._duration_s)
         if tenth > self._told:
             self._told = tenth

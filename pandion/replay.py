@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from fsw.signals import Origin
 from pandion.parser import COULD_NOT_START, Parser
 from pandion.reading import ReadingProgress
 
@@ -90,8 +91,14 @@ def _program(log: UlogFile) -> FlightProgram[Any]:
             solver=str(facts["solver"]),
             soft=bool(facts["soft"]),
         ),
+        origin=_origin(json.loads(str(facts["numbers"]))),
         to_plan=False,
     )
+
+
+def _origin(numbers: dict[str, float]) -> Origin:
+    """Where the local frame of the flight began; not chosen by a name."""
+    return Origin(*(numbers[f"origin.{part}"] for part in ("latitude", "longitude", "altitude")))
 
 
 def _sentence(found: Replayed, log: UlogFile) -> str:

@@ -13,7 +13,9 @@ from typing import Final
 from fsw.signals import Origin, Vec3
 
 EARTH_RADIUS: Final = 6_371_000.0  # m
-DEFAULT_ORIGIN: Final = Origin(47.397742, 8.545594, 0.0)  # where PX4's simulation flies
+# Where PX4's simulation flies, but at sea level: there "above the sea" and "above the origin" are
+# the same number, which clients confuse.
+DEFAULT_ORIGIN: Final = Origin(47.397742, 8.545594, 0.0)
 
 
 def to_local(origin: Origin, latitude: float, longitude: float, altitude: float) -> Vec3:

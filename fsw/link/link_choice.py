@@ -7,8 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from fsw.geometry.geodesy import DEFAULT_ORIGIN
 from fsw.link.telemetry import GENERIC, PX4
 from fsw.link.udp_endpoint import Address, LinkError, parse_address
+from fsw.signals import Origin
 
 NO_LINK: Final = "none"
 AUTOPILOTS: Final = {"px4": PX4, "generic": GENERIC}
@@ -22,16 +24,39 @@ class LinkChoice:
     api: str = "udp:127.0.0.1:14540"  # the same of a program, or "none"
     allow_remote: bool = False  # hear other machines though both are on this one
     autopilot: str = "px4"  # or "generic": what the vehicle says it is
+    origin: Origin = DEFAULT_ORIGIN  # where on Earth the local frame begins
     keys: Path | None = None  # directory of the signing keys; None: default_keys()
 
     def as_arguments(self) -> list[str]:
         """The same as words of a command line."""
         words = [f"--gcs={self.gcs}", f"--api={self.api}", f"--autopilot={self.autopilot}"]
+        place = self.origin
+        if place != DEFAULT_ORIGIN:
+            words.append(f"--origin={place.latitude!r},{place.longitude!r},{place.altitude!r}")
         if self.allow_remote:
             words.append("--allow-remote")
         if self.keys is not None:
             words.append(f"--keys={self.keys}")
         return words
+
+
+def parse_origin(text: str) -> Origin:
+    """Read LATITUDE,LONGITUDE,ALTITUDE in degrees and metres.
+
+    Raises:
+        ValueError: It is no place.
+    """
+    try:
+        latitude, longitude, altitude = (float(word) for word in text.split(","))
+    except ValueError:
+        raise ValueError(f"origin '{text}' is not LATITUDE,LONGITUDE,ALTITUDE") from None
+    # At the poles there is no north.
+    if not (abs(latitude) <= 89.0 and abs(longitude) <= 180.0 and -500.0 <= altitude <= 9000.0):
+        raise ValueError(
+            f"origin '{text}' is out of range: latitude -89 to 89, longitude -180 to 180 degrees, "
+            "altitude -500 to 9000 m"
+        )
+    return Origin(latitude, longitude, altitude)
 
 
 @dataclass(frozen=True, slots=True)

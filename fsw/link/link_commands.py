@@ -17,7 +17,8 @@ from fsw.link.telemetry import TelemetryContext
 from fsw.signals import CommandAck, CommandRequest, FlightSnapshot, StatusText
 from messages.frames import Frame
 
-_GET_MESSAGE_INTERVAL: Final = 510  # MAV_CMD
+_GET_HOME_POSITION: Final = 410  # MAV_CMD
+_GET_MESSAGE_INTERVAL: Final = 510
 _SET_MESSAGE_INTERVAL: Final = 511
 _REQUEST_MESSAGE: Final = 512
 _REQUEST_AUTOPILOT_CAPABILITIES: Final = 520
@@ -40,6 +41,7 @@ class LinkCommands:
         self._handlers: dict[
             int, Callable[[CommandRequest, int, FlightSnapshot | None], _Outcome]
         ] = {
+            _GET_HOME_POSITION: self._get_home,
             _GET_MESSAGE_INTERVAL: self._get_interval,
             _SET_MESSAGE_INTERVAL: self._set_interval,
             _REQUEST_MESSAGE: self._request_message,
@@ -95,6 +97,11 @@ class LinkCommands:
         if message_id is None:
             return _DENIED, "request message: param1 is no message id", ()
         return self._now(message_id, request.params[1], snapshot)
+
+    def _get_home(
+        self, request: CommandRequest, t_us: int, snapshot: FlightSnapshot | None
+    ) -> _Outcome:
+        return self._now(message_ids.HOME_POSITION, math.nan, snapshot)
 
     def _request_capabilities(
         self, request: CommandRequest, t_us: int, snapshot: FlightSnapshot | None

@@ -6,10 +6,11 @@ from dataclasses import dataclass, field, replace
 
 from fsw.control.cascade import Inner
 from fsw.control.inner_tuning import InnerTuning
+from fsw.geometry.geodesy import DEFAULT_ORIGIN
 from fsw.model.airframe import AIRFRAME, Airframe
 from fsw.mpc.planner_config import PlannerConfig, Solver
 from fsw.mpc.variants import VARIANTS
-from fsw.signals import SEA_LEVEL, Origin
+from fsw.signals import Origin
 from fsw.vehicle.battery import BatteryModel
 from fsw.vehicle.steering import SteeringLimits
 
@@ -64,7 +65,7 @@ class FlightConfig:
     surroundings: Surroundings = field(default_factory=Surroundings)
     steering: SteeringLimits = field(default_factory=SteeringLimits)
     battery: BatteryModel = field(default_factory=BatteryModel)
-    origin: Origin = SEA_LEVEL
+    origin: Origin = DEFAULT_ORIGIN
     soft: bool = False  # fly an inconsistent configuration all the same, with a warning
     tick_period_us: int = 2_000
     mpc_period_us: int = 100_000

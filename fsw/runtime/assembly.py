@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from typing import Any, cast
 
 from fsw.control.cascade import Inner
-from fsw.geometry.geodesy import to_local
+from fsw.geometry.geodesy import DEFAULT_ORIGIN, to_local
 from fsw.link.mission_store import MissionStore, Site
 from fsw.link.telemetry import VehicleFacts
 from fsw.mpc.planner import Planner
@@ -19,9 +20,12 @@ from fsw.runtime import clock
 from fsw.runtime.flight_state import FlightState
 from fsw.runtime.program import FlightProgram
 from fsw.runtime.tuned_flight import TunedFlight
+from fsw.signals import Origin
 
 
-def flight_software(choice: ControlChoice, *, to_plan: bool = True) -> FlightProgram[Any]:
+def flight_software(
+    choice: ControlChoice, *, origin: Origin = DEFAULT_ORIGIN, to_plan: bool = True
+) -> FlightProgram[Any]:
     """Build everything that flies and, if it is to plan, compile it: a minute the first time.
 
     Raises:
@@ -35,6 +39,7 @@ def flight_software(choice: ControlChoice, *, to_plan: bool = True) -> FlightPro
         solver=cast(Solver, choice.solver),
         soft=choice.soft,
     )
+    config = replace(config, origin=origin)
     planner = Planner(config.planner, clock.stopwatch_us)
     flight = TunedFlight(config)
     if to_plan:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from fsw.geometry.geodesy import DEFAULT_ORIGIN
 from fsw.model.airframe import AIRFRAME, Airframe
-from fsw.signals import SEA_LEVEL, Home, MissionProgress, Mode, Origin, SafeSet, Vec2, Vec3
+from fsw.signals import Home, MissionProgress, Mode, Origin, SafeSet, Vec2, Vec3
 from fsw.vehicle.modes import Event
 
 # MAV_RESULT of MAVLink common.xml.
@@ -28,7 +29,7 @@ class Situation:
     position: Vec3 = (0.0, 0.0, 0.0)  # m, of the body
     yaw: float = 0.0  # rad
     joints: Vec2 = (0.0, 0.0)  # rad, asked for last or as they are
-    origin: Origin = SEA_LEVEL
+    origin: Origin = DEFAULT_ORIGIN
     home: Home | None = None
     safe_set: SafeSet = field(default_factory=SafeSet)
     climb_range: Vec2 = (0.3, 10.0)  # m, of a takeoff

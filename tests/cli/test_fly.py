@@ -205,6 +205,24 @@ def test_a_signal_ends_everything_within_two_seconds_with_a_verdict(
     assert frozen or result["mpc"]["p50_us"] > 0.0
 
 
+def test_a_vehicle_waits_on_the_ground_until_it_is_interrupted(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    process = start(
+        "fly", "ground", "--realtime", "--gcs", f"udp:127.0.0.1:{free_port()}", "--api", "none",
+        "--out", str(out), cwd=tmp_path,
+    )  # fmt: skip
+    try:
+        read_until(process, "flying until interrupted")
+        process.send_signal(signal.SIGINT)
+        told, _ = process.communicate(timeout=10)
+        assert process.returncode == 0
+        assert "PASS interrupted at step" in told
+        result = json.loads((out / "result.json").read_text())
+        assert (result["completed"], result["min_margin_m"]) == (True, None)
+    finally:
+        clean_up(process)
+
+
 def test_children_die_with_a_killed_parent(tmp_path: Path) -> None:
     process = start("fly", "--api", "none", "--gcs", f"udp:127.0.0.1:{free_port()}", cwd=tmp_path)
     try:

@@ -1,0 +1,36 @@
+"""Where on Earth the local frame begins, from the command line to the vehicle."""
+
+from __future__ import annotations
+
+import argparse
+
+import pytest
+
+from fsw.arguments import add_link_arguments, link_choice
+from fsw.geometry.geodesy import DEFAULT_ORIGIN
+from fsw.link.link_choice import LinkChoice, parse_origin
+from fsw.signals import Origin
+
+
+def chosen(*words: str) -> LinkChoice:
+    parser = argparse.ArgumentParser(exit_on_error=False)
+    add_link_arguments(parser)
+    return link_choice(parser.parse_args(words))
+
+
+def test_an_origin_is_latitude_longitude_altitude() -> None:
+    assert chosen("--origin=-33.5,151.25,12").origin == Origin(-33.5, 151.25, 12.0)
+    assert chosen().origin == DEFAULT_ORIGIN
+
+
+def test_the_words_for_the_other_half_mean_the_same_origin() -> None:
+    choice = chosen("--origin=-33.123456789012,151.25,12")
+    assert chosen(*choice.as_arguments()).origin == choice.origin
+
+
+@pytest.mark.parametrize("text", ["", "48,11", "48,11,x", "90,11,0", "nan,11,0", "48,181,0"])
+def test_what_is_no_place_is_refused_in_one_sentence(text: str) -> None:
+    with pytest.raises(ValueError, match="origin"):
+        parse_origin(text)
+    with pytest.raises(argparse.ArgumentError, match="origin"):
+        chosen(f"--origin={text}")
