@@ -53,6 +53,7 @@ from fsw.signals import (
     StatusText,
     TickInputs,
     TickOutputs,
+    Vec2,
 )
 from fsw.vehicle.battery import drained
 from fsw.vehicle.confine import contradictions
@@ -70,6 +71,8 @@ _STILL = SensorFrame(
     (0.0, 0.0),
     (0.0, 0.0),
 )
+# N m s/rad, about critical for the hanging arm: it is let down beside walls as well.
+_ARM_DAMPING: Vec2 = (0.15, 0.04)
 
 
 class FlightLoop:
@@ -280,7 +283,7 @@ class FlightLoop:
             wanted, memory = self._cascade.step(memory, estimate, nominal, u, ticks)
         elif state.vehicle.armed:
             idle = self.config.limits.idle_thrust
-            wanted = ActuatorCommand((idle, idle, idle, idle), (0.0, 0.0))
+            wanted = ActuatorCommand((idle, idle, idle, idle), _let_down(estimate))
             memory = at_rest(self.config.airframe, estimate)
         sent, replaced = gate(
             self.config.airframe, wanted, state.cascade.commanded, state.vehicle.armed
@@ -309,6 +312,12 @@ class FlightLoop:
         if steered is not None:
             return steered
         return mode_reference(state.vehicle, state.mission, self.config.limits, t_us)
+
+
+def _let_down(estimate: StateEstimate) -> Vec2:
+    """Joint torques that let a folded arm hang without swinging through."""
+    (rate1, rate2), (damping1, damping2) = estimate.qd_arm, _ARM_DAMPING
+    return -damping1 * rate1, -damping2 * rate2
 
 
 def _count_invalid(state: FlightState, valid: StateEstimate | None) -> FlightState:

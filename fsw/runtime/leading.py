@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
+from fsw.geometry.rotation import wrap_angle
 from fsw.model.arm_kinematics import point_in_flight
 from fsw.parameters.flight_config import FlightConfig
 from fsw.signals import EndEffectorTarget, SafeSet, StateEstimate, Vec2, Vec3
 from fsw.vehicle.steering import Aim, Lead, keep_out, keep_up, move, tie
+
+# s; the planner weighs the heading, not its rate, and would swing about it for half a minute.
+_YAW_DAMPING = 3.0
 
 
 def lead_from(config: FlightConfig, estimate: StateEstimate, *, of_end_effector: bool) -> Lead:
@@ -44,7 +49,9 @@ def horizon_of(
         if node > 0:
             lead = move(lead, aim, config.steering, config.planner.period)
             lead = _out(config, lead, estimate, safe_set)
-        targets.append(target_of(config, lead, t_us + node * config.mpc_period_us))
+        target = target_of(config, lead, t_us + node * config.mpc_period_us)
+        damping = _YAW_DAMPING * (lead.yaw_rate - estimate.w_WB_B[2])
+        targets.append(replace(target, yaw=wrap_angle(target.yaw + damping)))
         if lead.q_arm is not None:
             postures.append(lead.q_arm)
     return tuple(targets), tuple(postures)

@@ -175,3 +175,15 @@ def test_what_keeps_it_from_arming_is_on_show() -> None:
     flight.streamed = {"safe_set": tiny}
     flight.run(0.3)
     assert "not armed" in flight.snapshot.arming_refusal
+
+
+def test_a_heading_is_reached_without_swinging_about_it() -> None:
+    flight = Flight(hover())
+    flight.step(command(ARM, 1.0))
+    flight.step(as_int(GOTO, 1, -1.0, 1.0, 0.0, 1.5, 0.0, 0.0, -1.42))
+    turned = []
+    for _ in range(40):
+        flight.run(0.5)
+        turned.append(flight.snapshot.estimate.yaw)
+    assert max(turned) < 1.56
+    assert turned[26:] == pytest.approx([1.5] * 14, abs=0.04)
