@@ -71,6 +71,7 @@ _STILL = SensorFrame(
     (0.0, 0.0),
     (0.0, 0.0),
 )
+_FROM_OUTSIDE = (Mode.TRAJECTORY, Mode.MISSION)  # modes whose targets somebody else made
 # N m s/rad, about critical for the hanging arm: it is let down beside walls as well.
 _ARM_DAMPING: Vec2 = (0.15, 0.04)
 
@@ -244,16 +245,14 @@ class FlightLoop:
             state, targets, postures = steered
         else:
             postures = ()
-            targets = tamed(
-                tuple(
-                    self._reference(state, apply_us + node * config.mpc_period_us)
-                    for node in range(config.planner.horizon + 1)
-                ),
-                point_in_flight(estimate, config.airframe.link_length)[0],
-                state.mission.safe_set,
-                config.planner.walls.alpha,
-                config.planner.walls.slope,
+            targets = tuple(
+                self._reference(state, apply_us + node * config.mpc_period_us)
+                for node in range(config.planner.horizon + 1)
             )
+            if state.vehicle.mode in _FROM_OUTSIDE:
+                p_WE, v_WE = point_in_flight(estimate, config.airframe.link_length)
+                walls, safe_set = config.planner.walls, state.mission.safe_set
+                targets = tamed(targets, p_WE, v_WE, safe_set, walls.alpha, walls.slope)
         measured = measured_state(estimate, self._cascade.motion(state.cascade, estimate))
         request, plan = ask(
             config,

@@ -1,19 +1,20 @@
 """A streamed trajectory, as far as it may pull: the planner's barriers have a price.
 
-What is asked for within a leash of the vehicle, and not far behind a wall, passes as it is: the
+What is asked for near the vehicle's own motion, and not far behind a wall, passes as it is: the
 paper's own path enters the safety zone. Farther out the pull on the planner could outbid the
-price of softening a barrier row (docs/decisions/0010-steering-through-the-planner.md).
+prices of barrier rows and joint limits (docs/decisions/0010-steering-through-the-planner.md).
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 from fsw.barriers.margins import plain_root
 from fsw.signals import EndEffectorTarget, SafeSet, Vec3
 
-_LEASH = 0.5  # m from the vehicle's end-effector to the first target
+_LEASH = 0.4  # m from where the end-effector's motion leads to the target, now
+_SPREAD = 0.4  # m/s, by which that grows over the horizon
+_JUMP = 1.0  # m/s between the end-effector and its target; more makes the planned arm wind up
 _DEPTH = 0.1  # m behind the clearance; the paper's path goes 0.03 m deep
 _ALWAYS = 0.5  # m/s towards a wall, half of what the price of a row stands
 
@@ -21,6 +22,7 @@ _ALWAYS = 0.5  # m/s towards a wall, half of what the price of a row stands
 def tamed(
     targets: tuple[EndEffectorTarget, ...],
     p_WE: Vec3,
+    v_WE: Vec3,
     safe_set: SafeSet,
     braking: float,
     slope: float,
@@ -30,46 +32,40 @@ def tamed(
     Args:
         targets: At the nodes.
         p_WE: Where the end-effector is [m].
+        v_WE: How it moves [m/s].
         safe_set: Its walls are looked at.
         braking: Deceleration the barrier counts on [m/s^2].
         slope: Of S at the boundary [1/s].
     """
-    away = _minus(targets[0].p_WE, p_WE)
+    begin_us, kept = targets[0].t_us, []
+    for target in targets:
+        ahead = 1e-6 * (target.t_us - begin_us)
+        p = _within(target.p_WE, _plus(p_WE, v_WE, ahead), _LEASH + _SPREAD * ahead)
+        v = _within(target.v_WE, v_WE, _JUMP)
+        for wall in safe_set.walls:
+            n, boundary = wall.normal, wall.offset + wall.clearance
+            depth = boundary - _dot(n, p)
+            if depth > _DEPTH:
+                p = _plus(p, n, depth - _DEPTH)
+            room = max(_dot(n, p_WE) - boundary, 0.0)
+            most = max(plain_root(room, braking, slope), _ALWAYS)
+            approach = -_dot(n, v)
+            if approach > most:
+                v = _plus(v, n, approach - most)
+        kept.append(EndEffectorTarget(target.t_us, p, v, target.a_WE, target.yaw))
+    tame = tuple(kept)
+    return targets if tame == targets else tame
+
+
+def _within(a: Vec3, centre: Vec3, radius: float) -> Vec3:
+    """The point, or the nearest one of a ball."""
+    away = (a[0] - centre[0], a[1] - centre[1], a[2] - centre[2])
     length = math.sqrt(_dot(away, away))
-    excess = max(length - _LEASH, 0.0) / length if length > 0.0 else 0.0
-    shift = (-excess * away[0], -excess * away[1], -excess * away[2])
-    kept = tuple(_tamed(target, shift, p_WE, safe_set, braking, slope) for target in targets)
-    return targets if kept == targets else kept
-
-
-def _tamed(
-    target: EndEffectorTarget,
-    shift: Vec3,
-    p_WE: Vec3,
-    safe_set: SafeSet,
-    braking: float,
-    slope: float,
-) -> EndEffectorTarget:
-    p, v = _plus(target.p_WE, shift, 1.0), target.v_WE
-    for wall in safe_set.walls:
-        n, boundary = wall.normal, wall.offset + wall.clearance
-        depth = boundary - _dot(n, p)
-        if depth > _DEPTH:
-            p = _plus(p, n, depth - _DEPTH)
-        room = max(_dot(n, p_WE) - boundary, 0.0)
-        most = max(plain_root(room, braking, slope), _ALWAYS)
-        approach = -_dot(n, v)
-        if approach > most:
-            v = _plus(v, n, approach - most)
-    return replace(target, p_WE=p, v_WE=v)
+    return a if length <= radius else _plus(centre, away, radius / length)
 
 
 def _plus(a: Vec3, b: Vec3, share: float) -> Vec3:
     return a[0] + share * b[0], a[1] + share * b[1], a[2] + share * b[2]
-
-
-def _minus(a: Vec3, b: Vec3) -> Vec3:
-    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
 def _dot(a: Vec3, b: Vec3) -> float:
