@@ -249,10 +249,10 @@ class FlightLoop:
                 self._reference(state, apply_us + node * config.mpc_period_us)
                 for node in range(config.planner.horizon + 1)
             )
-            if state.vehicle.mode in _FROM_OUTSIDE:
-                p_WE, v_WE = point_in_flight(estimate, config.airframe.link_length)
-                walls, safe_set = config.planner.walls, state.mission.safe_set
-                targets = tamed(targets, p_WE, v_WE, safe_set, walls.alpha, walls.slope)
+        if steered is not None or state.vehicle.mode in _FROM_OUTSIDE:
+            p_WE, v_WE = point_in_flight(estimate, config.airframe.link_length)
+            walls, safe_set = config.planner.walls, state.mission.safe_set
+            targets = tamed(targets, p_WE, v_WE, safe_set, walls.alpha, walls.slope)
         measured = measured_state(estimate, self._cascade.motion(state.cascade, estimate))
         request, plan = ask(
             config,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import pytest
 
@@ -74,7 +74,7 @@ class Flight:
                 for message in messages
                 if isinstance(message, SendCommand) and message.command in self.results
             )
-            heard = replace(self.heard, acks=acks)
+            heard = self.heard._replace(acks=acks)
             self.state = listen(self.plan, self.state, heard, self.t_us)
             self.t_us += STEP_US
 
