@@ -34,6 +34,7 @@ from fsw.vehicle.situation import Goto
 from fsw.vehicle.steering import Aim, arrived
 
 _STILL = 0.1  # m/s; faster, a hold brakes first
+_OFF_PLAN = 0.05  # m; beyond what a disturbance alone does nearly always
 _RISING = 0.1  # m, m/s or m/s^2 upwards: somebody on the ground wants to fly
 _SINKING = 0.1  # m that the reference is below the vehicle: it presses on the ground
 _NOTHING_HEARD = OffboardReport()
@@ -143,11 +144,16 @@ class SteeringKeeper:
         if lead is None or aim is None:
             return None
         safe_set = state.mission.safe_set
+        if self._is_off_plan(state, estimate):
+            still = MotionSetpoint(lead.of_end_effector, v=(0.0, 0.0, 0.0))
+            asked, aim = aim, replace(aim, motion=still)
+        else:
+            asked = aim
         lead = go_ahead(self._config, lead, aim, estimate, safe_set)
         if waypoints and aim.motion.p is not None and arrived(lead, aim.motion.p):
-            aim = replace(aim, motion=replace(aim.motion, p=waypoints[0]))
+            asked = aim = replace(aim, motion=replace(aim.motion, p=waypoints[0]))
             waypoints = waypoints[1:]
-        state = replace(state, steer=SteerMemory(lead, aim, waypoints))
+        state = replace(state, steer=SteerMemory(lead, asked, waypoints))
         targets, postures = horizon_of(self._config, lead, aim, estimate, safe_set, t_us)
         return state, targets, postures
 
@@ -219,6 +225,15 @@ class SteeringKeeper:
         lead = lead_from(self._config, estimate, of_end_effector=False)
         aim = Aim(MotionSetpoint(False, (x, y, height)))
         return SteerMemory(lead, aim, ((home.p[0], home.p[1], height),))
+
+    def _is_off_plan(self, state: FlightState, estimate: StateEstimate) -> bool:
+        """Whether the fast loop is not where the plan is: then nothing new is asked of it."""
+        if state.nominal is None:
+            return False
+        (x, y, z), (px, py, pz) = estimate.p_WB, state.nominal.p
+        # On the ground the plan may well be lower.
+        low = -z - self._config.airframe.leg_length < self._config.limits.airborne_height
+        return math.hypot(px - x, py - y, 0.0 if low else pz - z) > _OFF_PLAN
 
     def _stop(self, state: FlightState, estimate: StateEstimate) -> SteerMemory:
         """Come to rest; a vehicle that hardly moves just stays."""

@@ -32,11 +32,13 @@ class SteeringLimits:
     """How fast a steered reference moves."""
 
     cruise_speed: float = 1.0  # m/s, on the way to a place
-    speed: float = 2.0  # m/s, at most
-    acceleration: float = 2.0  # m/s^2
+    # Faster and harder, set-points that change every half second drove the fast loop into the
+    # rotors' limits, and the vehicle off its plan.
+    speed: float = 1.5  # m/s, at most
+    acceleration: float = 1.0  # m/s^2
     yaw_rate: float = 0.3  # rad/s
     yaw_acceleration: float = 0.06  # rad/s^2; the plan's limit is 0.1
-    joint_speed: float = 0.8  # rad/s
+    joint_speed: float = 0.6  # rad/s
     leash: float = 0.3  # m, from the vehicle to the reference
 
 

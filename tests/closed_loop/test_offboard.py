@@ -6,6 +6,7 @@ The walls are those of Case I, the margin is the plant's own, between samples.
 from __future__ import annotations
 
 import math
+import random
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -101,7 +102,7 @@ def test_no_set_point_flies_the_arm_into_a_wall(attack: str) -> None:
         flight.step()
         assert flight.sim.ended is None, flight.sim.ended
         fastest = max(fastest, math.hypot(*flight.sim.truth().v_WB))
-    assert fastest > 1.2, "or it was no test"
+    assert fastest > 1.0, "or it was no test"
     assert flight.mode is Mode.OFFBOARD
     margin = flight.sim.min_margin_m
     assert margin is not None
@@ -236,3 +237,42 @@ def test_a_streamed_trajectory_through_the_wall_is_not_flown_there(speed: float)
     assert margin is not None
     assert 0.02 < margin < 0.2
     assert flight.mode is Mode.TRAJECTORY
+
+
+def any_setpoint(chance: random.Random) -> dict[str, Any]:
+    """One of everything, wild."""
+
+    def vector(most: float) -> Vec3:
+        return (
+            chance.uniform(-most / 3.0, most),
+            chance.uniform(-most, most),
+            chance.uniform(-most / 4.0, most / 8.0),
+        )
+
+    place = (chance.uniform(-1.0, 8.0), chance.uniform(-4.0, 4.0), chance.uniform(-3.0, -0.5))
+    rates = (chance.uniform(-1.0, 1.0), chance.uniform(-1.0, 1.0), chance.uniform(-1.0, 1.0))
+    kinds = (
+        body(p=place, yaw=chance.uniform(-3.0, 3.0)),
+        body(v=vector(6.0), yaw_rate=chance.uniform(-2.0, 2.0)),
+        body(a=vector(12.0)),
+        end_effector(p=place),
+        end_effector(v=vector(6.0), yaw=chance.uniform(-3.0, 3.0)),
+        {"attitude": nose_down(chance.uniform(-0.2, 0.6), chance.uniform(0.4, 0.6))},
+        {"attitude": AttitudeSetpoint(chance.uniform(0.4, 0.6), None, rates)},
+    )
+    joint1 = chance.uniform(-1.0, 1.0)
+    joints = {"joints": JointSetpoint((joint1, chance.uniform(-1.4, 1.4) - joint1))}
+    return {**chance.choice(kinds), **(joints if chance.random() < 0.4 else {})}
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_wild_set_points_in_quick_succession_keep_the_walls(seed: int) -> None:
+    chance = random.Random(seed)
+    flight = offboard(walls(AFAR if seed % 2 else HOVERING, disturbed=True), **body(v=(1.0, 0, 0)))
+    for _ in range(12):
+        flight.streamed = any_setpoint(chance)
+        flight.run(0.05 * chance.randrange(4, 18))
+    assert flight.mode is Mode.OFFBOARD
+    margin = flight.sim.min_margin_m
+    assert margin is not None
+    assert margin > 0.0
