@@ -221,8 +221,8 @@ def _show(values: Mapping[str, float], *, as_json: bool) -> None:
     for name, value in values.items():
         entry = _described(name, value)
         star = " " if value == entry.get("default", value) else "*"
-        print(f"{name:<16} {star}{_number(value):>10} {entry.get('unit', ''):<9} "
-              f"{entry.get('meaning', '')}".rstrip())  # fmt: skip
+        unit, meaning = entry.get("unit", ""), entry.get("meaning", "")
+        print(f"{name:<16} {star}{_number(value):>10} {unit:<9} {meaning}".rstrip())
 
 
 def _described(name: str, value: float) -> dict[str, Any]:
