@@ -84,15 +84,6 @@ class ParameterClient:
         missing = "nothing" if not values else f"{len(values)} of {count} parameters"
         raise NoAnswer(f"{missing} came from the vehicle at {self._where}")
 
-    def read(self, name: str) -> float:
-        """One parameter.
-
-        Raises:
-            Refused: There is none of this name.
-            NoAnswer: The vehicle is silent.
-        """
-        return self._ask(_READ, (-1, *_VEHICLE, name.encode()), name)[0]
-
     def write(self, name: str, value: float) -> None:
         """Change one parameter.
 
@@ -100,17 +91,15 @@ class ParameterClient:
             Refused: The vehicle's reason.
             NoAnswer: The vehicle is silent.
         """
-        held, texts = self._ask(_SET, (value, *_VEHICLE, name.encode(), _REAL32), name)
+        held, texts = self._ask(name, value)
         if held != nearest_decimal(value):
             raise Refused("; ".join(texts) or f"the vehicle leaves {name} at {held:g}")
 
-    def _ask(
-        self, message_id: int, values: tuple[float | bytes, ...], name: str
-    ) -> tuple[float, list[str]]:
-        """Ask until the value of a name comes; it and what the vehicle said meanwhile."""
+    def _ask(self, name: str, value: float) -> tuple[float, list[str]]:
+        """Set a value until one comes back; that and what the vehicle said meanwhile."""
         texts = _Texts()
         for _ in range(_TRIES):
-            self._send(message_id, *values)
+            self._send(_SET, value, *_VEHICLE, name.encode(), _REAL32)
             until = time.monotonic() + self._patience_s
             while (left_s := until - time.monotonic()) > 0.0:
                 frame = self._hear((_VALUE, _ERROR, _STATUSTEXT), left_s)
@@ -119,11 +108,11 @@ class ParameterClient:
                 if frame.message_id == _STATUSTEXT:
                     texts.add(frame)
                 elif frame.message_id == _VALUE:
-                    value, _, _, named, _ = cast(
+                    held, _, _, named, _ = cast(
                         "tuple[float, int, int, bytes, int]", frame.payload_values
                     )
                     if _text(named) == name:
-                        return nearest_decimal(value), texts.whole
+                        return nearest_decimal(held), texts.whole
                 elif _text(cast(bytes, frame.payload_values[3])) == name and not texts.whole:
                     raise Refused(f"the vehicle has no parameter {name}")
         raise NoAnswer(f"no answer from the vehicle at {self._where}")
