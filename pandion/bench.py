@@ -37,6 +37,10 @@ class BenchOptions:
 
 def main(argv: list[str]) -> int:
     """Measure and report; returns the exit code."""
+    if argv[:1] == ["flood"]:
+        from pandion import bench_flood
+
+        return bench_flood.main(argv[1:])
     if argv[:1] == ["loop"]:
         from pandion import bench_loop
 
@@ -65,7 +69,10 @@ def main(argv: list[str]) -> int:
 def _options(argv: list[str]) -> BenchOptions:
     parser = Parser("pandion bench", "Time the planner's optimiser against others.")
     parser.add_argument(
-        "what", metavar="WHAT", choices=("mpc", "loop", "lockstep"), help="mpc, loop or lockstep"
+        "what",
+        metavar="WHAT",
+        choices=("mpc", "loop", "lockstep", "flood"),
+        help="mpc, loop, lockstep or flood",
     )
     parser.add_argument(
         "--json",

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from fsw.link.link_choice import NO_LINK
 from fsw.link.udp_endpoint import LinkError, parse_address
 from pandion.display import Display
 from pandion.fly_options import FlyOptions, add_arguments
@@ -56,6 +57,8 @@ def _banner(options: FlyOptions, display: Display) -> None:
     )
     port = parse_address(options.links.gcs)[1]
     display.say(f"telemetry to {options.links.gcs}: QGroundControl connects on UDP {port}")
+    if options.links.api != NO_LINK:
+        display.say(f"programs (MAVSDK) find the vehicle at {options.links.api}")
     display.say(f"logs in {options.out}")
 
 

@@ -84,6 +84,7 @@ class GcsLink:
         self.outbox = Outbox(signing)
         self.accepted = 0  # frames
         self.rates = StreamRates(STREAMS, setup.rates_hz, context.facts.tick_period_us)
+        self.talks = setup.unheard  # whether more than a heartbeat is sent
         self._unheard = setup.unheard
         self._endpoint = OpenEndpoint(setup.target, setup.local_port, remote=setup.remote)
         self._peers = Peers(setup.target)
@@ -105,11 +106,6 @@ class GcsLink:
     def peers(self) -> tuple[Address, ...]:
         """Everyone who receives telemetry."""
         return self._peers.all
-
-    @property
-    def talks(self) -> bool:
-        """Whether more than a heartbeat is sent."""
-        return self._unheard or self._peers.any_heard
 
     def fileno(self) -> int:
         """The socket, to wait for."""
@@ -139,36 +135,43 @@ class GcsLink:
             for frame, raw in cut(datagram, self.losses):
                 if not self.outbox.is_own(frame.system_id, frame.component_id):
                     self._take(t_us, frame, raw, sender)
-        self._send(t_us)
+        if self.outbox.waiting:
+            self._send(t_us)
         return budget
+
+    def announce(self, snapshot: FlightSnapshot, changed: bool) -> None:
+        """Say that the vehicle is there, to whoever has not spoken; see :meth:`publish`."""
+        self._snapshot = snapshot
+        if changed or snapshot.t_us >= self._housekeeping_us:
+            self._housekeeping_us = snapshot.t_us + _HOUSEKEEPING_US
+            self._encode(HEARTBEAT, snapshot)
+            self._send(snapshot.t_us)
 
     def serve(self, t_us: int) -> None:
         """Let services go on with what they are sending; call it once a tick if it talks."""
         self.dispatch.poll(t_us, self.outbox.add_outgoing)
-        self._send(t_us)
+        if self.outbox.waiting:
+            self._send(t_us)
 
     def publish(self, outputs: TickOutputs, changed: bool) -> None:
-        """Send what is due.
+        """Send what is due, to whoever listens.
 
         Args:
             outputs: Of this tick.
             changed: Whether mode, arming, landing or health are other than they were.
         """
         snapshot = self._snapshot = outputs.snapshot
-        talks = self.talks
         if changed:
-            for stream in AT_ONCE if talks else (HEARTBEAT,):
+            for stream in AT_ONCE:
                 self._encode(stream, snapshot)
         for stream in self.rates.due(snapshot.t_us):
-            if talks or stream is HEARTBEAT:
-                self._encode(stream, snapshot)
-        if talks:
-            for text in outputs.texts:
-                self.outbox.add_text(text)
-        self._send(snapshot.t_us)
+            self._encode(stream, snapshot)
+        for text in outputs.texts:
+            self.outbox.add_text(text)
         if snapshot.t_us >= self._housekeeping_us:
             self._housekeeping_us = snapshot.t_us + _HOUSEKEEPING_US
             self._peers.expire(self._clock())
+            self.talks = self._unheard or self._peers.any_heard
 
     def acknowledge(self, t_us: int, ack: CommandAck) -> None:
         """Answer a command that came over this link."""
@@ -190,6 +193,7 @@ class GcsLink:
             self._record(t_us, raw)
         if verdict is Verdict.TRUSTED:
             self._peers.heard(sender, self._clock())
+            self.talks = True
             if len(self._speakers) < _MAX_SPEAKERS:
                 self._speakers.add((frame.system_id, frame.component_id))
         if frame.message_id == message_ids.SETUP_SIGNING:
@@ -221,8 +225,6 @@ class GcsLink:
 
     def _send(self, t_us: int) -> None:
         frames = self.outbox.take()
-        if not frames:
-            return
         if self._record is not None:
             for frame in frames:
                 if frame[_MESSAGE_ID] not in _FILE_DATA:

@@ -14,6 +14,7 @@ from fsw.ports import Clock
 from fsw.signals import CommandAck, TickOutputs
 
 _READ_BYTES: Final = 4096  # of each link a slot in lockstep, of all links a tick in real time
+_UNHEARD_SLOTS: Final = 5  # from one look at a link that nobody speaks on to the next
 _ONE: Final = 1  # byte of budget: one datagram
 _GUARD_US: Final = 200  # before a tick: the dearest datagram takes less
 
@@ -36,7 +37,9 @@ class GroundLinks:
         if self._attends or self._tick % self._slot_ticks:
             return
         for link in self.links:
-            link.read(t_us, _READ_BYTES)
+            # A system call for each look; whoever has not spoken yet can wait a little longer.
+            if link.talks or self._tick % (_UNHEARD_SLOTS * self._slot_ticks) == 0:
+                link.read(t_us, _READ_BYTES)
 
     def attend(self, seconds: float) -> None:
         """Sleep, and answer the ground meanwhile: in real time it is heard between two ticks.
@@ -69,11 +72,14 @@ class GroundLinks:
         self._t_us = t_us
         self._tick += 1
         slot = tick % self._slot_ticks == 0
+        news = slot or changed or bool(outputs.texts)
         for link in self.links:
-            if changed or slot or outputs.texts or link.rates.slot_us < SLOT_US:
-                link.publish(outputs, changed)
             if link.talks:
+                if news or link.rates.slot_us < SLOT_US:
+                    link.publish(outputs, changed)
                 link.serve(t_us)
+            elif news:
+                link.announce(snapshot, changed)
             if slot and self._attends:
                 # Ticks without a pause between them must not make the vehicle deaf.
                 link.read(t_us, _ONE)

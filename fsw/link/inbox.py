@@ -66,6 +66,11 @@ class Inbox:
             message_ids.WORKSPACE_SPHERE: self._sphere,
         }
 
+    @property
+    def message_ids(self) -> frozenset[int]:
+        """What it keeps something of."""
+        return frozenset(self._handlers)
+
     def accept(self, frame: Frame) -> None:
         """Keep what the frame says if it is for this vehicle and of use; never raises."""
         handler = self._handlers.get(frame.message_id)

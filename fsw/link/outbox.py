@@ -25,6 +25,11 @@ class Outbox:
         self._frames: list[bytes] = []
         self._text_id = 0
 
+    @property
+    def waiting(self) -> bool:
+        """Whether there is anything to send."""
+        return bool(self._frames)
+
     def add(self, component: int, message_id: int, values: WireValues) -> None:
         """Take one message; one with a number that does not fit its field is dropped and counted.
 

@@ -45,11 +45,6 @@ class StreamRates:
             self._rows.append(_Timetable(stream, interval, interval, phase))
         self._lay_out()
 
-    @property
-    def slot_us(self) -> int:
-        """How often :meth:`due` wants to be asked."""
-        return self._slot_us
-
     def due(self, t_us: int) -> Iterator[Stream]:
         """Streams to be sent now; a pause is not caught up on."""
         if not self._begun:
@@ -104,4 +99,4 @@ class StreamRates:
     def _lay_out(self) -> None:
         self._sent = [row for row in self._rows if row.interval_us != OFF]
         fast = any(row.interval_us < SLOT_US for row in self._sent)
-        self._slot_us = self._tick_us if fast else SLOT_US
+        self.slot_us = self._tick_us if fast else SLOT_US  # how often to ask for what is due

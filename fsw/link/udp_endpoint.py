@@ -22,7 +22,7 @@ MAX_DATAGRAM: Final = 2048  # bytes; a larger datagram is cut and its last frame
 _ADDRESS = re.compile(r"udp:(?P<host>[^:\s]+):(?P<port>\d{1,5})")
 _RECEIVE_BUFFER: Final = 1 << 20  # bytes: rides out a pause of the receiver
 # Of what the ground sends: what a flood leaves waiting in front of a command delays that command.
-_QUEUE: Final = 1 << 17
+_QUEUE: Final = 1 << 18
 
 
 class LinkError(Exception):

@@ -18,6 +18,9 @@ from random import Random
 
 import pytest
 
+from fsw.link import message_ids as ids
+from fsw.link.mission_service import MissionService
+from fsw.link.mission_store import MissionStore, Site
 from fsw.link.streams import STREAMS
 from fsw.log.flight_log import FlightLog, LogSubject
 from fsw.log.reference import inserted
@@ -28,6 +31,7 @@ from messages import dialect
 from messages.frames import FrameWriter
 from messages.reference import reference
 from pandion.__main__ import VERBS, main
+from pandion.message_page import OF_MISSIONS, traffic
 from pandion.reproduce import WHAT
 from pandion.result import Parts, as_json
 from sitl.link.encode import StepEncoder
@@ -193,8 +197,8 @@ def test_the_keys_of_the_result_on_the_page_are_those_that_are_written() -> None
 
 
 def test_the_reference_of_messages_is_not_stale() -> None:
-    page = DOCS / "messages.md"
-    assert page.read_text(encoding="utf-8") == reference(), "run python -m messages.reference"
+    page = (DOCS / "messages.md").read_text(encoding="utf-8")
+    assert page == reference(traffic()), "run python -m pandion.message_page"
 
 
 def test_the_topics_of_the_flight_log_are_not_stale() -> None:
@@ -206,6 +210,16 @@ def test_the_reference_of_parameters_is_not_stale() -> None:
     page = DOCS / "parameters.md"
     expected = parameter_reference()
     assert page.read_text(encoding="utf-8") == expected, "run python -m fsw.parameters.reference"
+
+
+def test_the_reference_of_messages_names_all_that_is_sent_and_heard() -> None:
+    rows = {row.message_id: row for row in traffic()}
+    assert {stream.message_id for stream in STREAMS} <= {i for i, r in rows.items() if r.component}
+    site = Site(lambda *_: (0.0, 0.0, 0.0), lambda _: (), lambda: 0.1)
+    assert MissionService(MissionStore(site)).message_ids == frozenset(OF_MISSIONS)
+    assert {ids.COMMAND_LONG, ids.TIMESYNC, ids.PARAM_SET, *OF_MISSIONS} <= {
+        i for i, row in rows.items() if row.heard
+    }
 
 
 def test_the_streams_on_the_page_are_those_that_are_sent() -> None:

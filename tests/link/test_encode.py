@@ -11,6 +11,7 @@ import pytest
 from fsw.link import encode_replies, encode_standard
 from fsw.link import message_ids as ids
 from fsw.link.streams import STREAMS, Stream
+from fsw.link.telemetry import GENERIC
 from fsw.signals import (
     AttitudeSetpoint,
     FlightSnapshot,
@@ -235,3 +236,30 @@ def test_offboard_the_set_point_that_is_flown_is_sent_back_with_its_mask() -> No
     assert message.type_mask == 0xDF8
     message = read_back(stream_of(ids.ARM_JOINT_SETPOINT), flown)
     assert list(message.position) == [0.5, -0.25, 0.0, 0.0]
+
+
+def test_a_generic_autopilot_does_not_say_px4() -> None:
+    generic = replace(CONTEXT, autopilot=GENERIC)
+    stream = stream_of(ids.HEARTBEAT)
+    values = stream.encode(SNAPSHOT, generic)
+    assert values is not None
+    message = decoded(FrameWriter(1, 1).frame(ids.HEARTBEAT, *values))
+    assert message.autopilot == dialect.MAV_AUTOPILOT_GENERIC
+    assert message.custom_mode == 0x0B040000  # the modes stay what they are
+
+
+def test_what_forbids_arming_takes_the_prearm_bit_alone() -> None:
+    refused = replace(SNAPSHOT, arming_refusal="not armed: standing is unclear")
+    status = read_back(stream_of(ids.SYS_STATUS), refused)
+    lost = status.onboard_control_sensors_present & ~status.onboard_control_sensors_health
+    assert lost == dialect.MAV_SYS_STATUS_PREARM_CHECK
+
+
+@pytest.mark.parametrize(("remaining", "state"), [(0.5, 1), (0.19, 2), (0.09, 3)])
+def test_a_battery_that_runs_low_says_so(remaining: float, state: int) -> None:
+    low = replace(SNAPSHOT, battery=replace(SNAPSHOT.battery, remaining=remaining))
+    assert read_back(stream_of(ids.BATTERY_STATUS), low).charge_state == state
+
+
+def test_without_a_home_there_is_no_home_position() -> None:
+    assert stream_of(ids.HOME_POSITION).encode(replace(SNAPSHOT, home=None), CONTEXT) is None
