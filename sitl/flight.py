@@ -55,7 +55,7 @@ class Flight:
         options, simulation, endpoint = self._options, self._simulation, self._endpoint
         self._told.report("flying", "sitl: flying")
         encoder = StepEncoder(lockstep=not options.realtime)
-        plan = flight_plan(simulation.scenario, self._target_at)
+        plan = flight_plan(simulation.scenario, self._target_at, self._yaw_at)
         self._settle()
         exchange = self._exchange(stop)
         with contextlib.ExitStack() as files:
@@ -90,6 +90,9 @@ class Flight:
 
     def _target_at(self, t_us: int) -> TrajectoryPoint:
         return self._simulation.target_at(1e-6 * (t_us - START_US))
+
+    def _yaw_at(self, t_us: int) -> float:
+        return self._simulation.clock.yaw_at(1e-6 * (t_us - START_US))
 
     def _progress(self, time_s: float, margin_m: float | None, real_time_factor: float) -> None:
         values = {"t_s": time_s, "min_margin_m": margin_m, "real_time_factor": real_time_factor}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from sitl.heading import Heading
 from sitl.scenario import Scenario
 from sitl.trajectory import TrajectoryPoint, reference
 
@@ -18,6 +19,7 @@ class MissionClock:
     def __init__(self, scenario: Scenario) -> None:
         airborne = scenario.start.kind == "airborne"
         self.reference = reference(scenario.trajectory)
+        self._heading = Heading(scenario, self.reference)
         self.starts_s: float | None = scenario.pilot.start_delay_s if airborne else None
         self.stops_s = math.inf
         self._counts_from_s = 0.0 if airborne else math.inf
@@ -38,3 +40,7 @@ class MissionClock:
     def target_at(self, time_s: float) -> TrajectoryPoint:
         """End-effector reference at ``time_s``; its first point while the start is open."""
         return self.reference.at(0.0 if self.starts_s is None else time_s - self.starts_s)
+
+    def yaw_at(self, time_s: float) -> float:
+        """Yaw of the reference at ``time_s`` [rad]."""
+        return self._heading.at(0.0 if self.starts_s is None else time_s - self.starts_s)

@@ -48,6 +48,8 @@ class Lissajous:
     phase_deg: V3 = field(metadata=inside(-360.0, 360.0))
     ramp_s: float = field(metadata=inside(0.1, 600.0))
     duration_s: float = field(metadata=inside(1.0, 86400.0))
+    # "walls" turns the arm's plane to the nearest wall; "start" keeps the yaw of the start.
+    heading: Literal["start", "walls"] = field(default="start", metadata=choices("start", "walls"))
     kind: Literal["lissajous"] = field(default="lissajous", metadata=choices("lissajous"))
 
 

@@ -18,7 +18,7 @@ import numpy as np
 from fsw.barriers.root import BarrierTuning
 from fsw.model.airframe import GRAVITY
 from fsw.model.arm_kinematics import arm_points
-from fsw.model.prediction import INPUTS, Q_ARM, STATES, YAW, P, V, discretise
+from fsw.model.prediction import INPUTS, Q_ARM, STATES, YAW, YAW_RATE, P, V, discretise
 from fsw.mpc.planner_config import PlannerConfig
 from fsw.signals import SafeSet
 
@@ -166,7 +166,7 @@ def _add_cost(
     program.cost += (w.tracking_terminal if last else w.tracking) * ca.sumsqr(tip[0] - node[:3])
     program.cost += (w.velocity_terminal if last else w.velocity) * ca.sumsqr(tip[1] - target_v)
     program.cost += (w.arm_cog_terminal if last else w.arm_cog) * cog**2
-    program.cost += w.yaw * (x[YAW] - node[6]) ** 2
+    program.cost += w.yaw * (x[YAW] + w.yaw_lead * x[YAW_RATE] - node[6]) ** 2
 
 
 def _barrier(

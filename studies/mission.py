@@ -22,5 +22,6 @@ def safe_set(scenario: Scenario) -> SafeSet:
 
 def target(clock: MissionClock, t_us: int) -> EndEffectorTarget:
     """The end-effector reference at a time stamp."""
-    point = clock.target_at(1e-6 * (t_us - START_US))
-    return EndEffectorTarget(t_us, point.p, point.v, point.a)
+    time_s = 1e-6 * (t_us - START_US)
+    point = clock.target_at(time_s)
+    return EndEffectorTarget(t_us, point.p, point.v, point.a, clock.yaw_at(time_s))

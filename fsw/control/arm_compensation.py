@@ -54,29 +54,30 @@ def compensated_joints(
         airframe: Links and joint limits.
         limits: Where compensation stops.
         estimate: The vehicle now.
-        plan: Where the plan wants it now; its elbow decides on which side ours stays.
+        plan: Where the plan wants it now; its elbow, where bent, decides on which side ours is.
 
     Returns:
-        Angles [rad] and rates [rad/s]; the plan's own where the arm is (nearly) straight.
+        Angles [rad] and rates [rad/s].
     """
     l1, l2 = airframe.link_length[0], airframe.link_length[1]
     p_WE, v_WE = planned_end_effector(airframe, plan)
     x, z, vx, vz = _seen_from_base(estimate, p_WE, v_WE)
     length = math.hypot(x, z)
-    bent = abs(math.sin(plan.q_arm[1]))
-    if bent < _LEAST_BEND or length < 1e-3:
+    if length < 1e-3:
         return plan.q_arm, plan.qd_arm
+    # A plan that is nearly straight has no side; the arm then stays on the one it is on.
+    side = plan.q_arm[1] if abs(plan.q_arm[1]) >= _LEAST_BEND else estimate.q_arm[1]
     straight = l1 + l2
     scale = min(max(length, limits.fold * straight), limits.reach * straight) / length
     x, z = x * scale, z * scale
     cos2 = (x * x + z * z - l1 * l1 - l2 * l2) / (2.0 * l1 * l2)
-    th2 = math.copysign(math.acos(min(max(cos2, -1.0), 1.0)), plan.q_arm[1])
+    th2 = math.copysign(math.acos(min(max(cos2, -1.0), 1.0)), side)
     th1 = math.atan2(x, z) - math.atan2(l2 * math.sin(th2), l1 + l2 * math.cos(th2))
     th1, th12 = _within_limits(airframe, limits, th1, th1 + th2)
     return (th1, th12 - th1), _rates(airframe, th1, th12, vx, vz)
 
 
-_LEAST_BEND = 0.2  # sine of the elbow; a straighter arm has no side to stay on
+_LEAST_BEND = 0.2  # rad; a straighter plan has no side
 
 
 @compilable

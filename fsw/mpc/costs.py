@@ -22,7 +22,7 @@ import numpy as np
 from fsw.barriers.soft_rows import TargetPoints
 from fsw.compiled import compiled
 from fsw.model.linearisation import END_EFFECTOR, Linearisation
-from fsw.model.prediction import INPUTS, Q_ARM, YAW, Array
+from fsw.model.prediction import INPUTS, Q_ARM, YAW, YAW_RATE, Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +38,9 @@ class CostWeights:
     # Ours: with base and arm both free to reach a point, nothing in the paper's cost says where
     # to look, and beside walls the vehicle wandered through half a turn.
     yaw: float = 0.05
+    # Added to the yaw is what its rate makes of it in this time: the horizon is too short for the
+    # planner to see that what turns must be stopped as well, and the vehicle swung for ever.
+    yaw_lead: float = 2.0  # s
     posture: float = 2.0  # on joint angles that a ground station asks for
     inputs: float = 0.02  # on a_d, yaw and joint accelerations alike
     relative_velocity: bool = True  # v_e - v_d in eq 20 instead of the printed v_e
@@ -80,7 +83,7 @@ class TrackingCost:
             )
         )
         self._inputs = weights.inputs
-        self._yaw = weights.yaw
+        self._yaw = (weights.yaw, weights.yaw_lead)
         self._velocity_share = 1.0 if weights.relative_velocity else 0.0
 
     def add(
@@ -95,10 +98,10 @@ class TrackingCost:
         return _add_tracking(
             self._weights,
             self._inputs,
-            self._yaw,
+            *self._yaw,
             self._velocity_share,
-            horizon.states[:, YAW],
-            horizon.model.gamma[:, YAW],
+            horizon.states[:, YAW : YAW_RATE + 1],
+            horizon.model.gamma[:, YAW : YAW_RATE + 1],
             targets.yaw,
             horizon.position[:, END_EFFECTOR],
             horizon.velocity[:, END_EFFECTOR],
@@ -189,6 +192,7 @@ def _add_tracking(
     weights: Array,
     input_weight: float,
     yaw_weight: float,
+    yaw_lead: float,
     velocity_share: float,
     yaw: Array,
     d_yaw: Array,
@@ -213,13 +217,15 @@ def _add_tracking(
     rows, values, weight = np.zeros((8, INPUTS * n)), np.zeros(8), np.zeros(8)
     for i in range(1, n + 1):
         w = weights[1 if i == n else 0]
-        rows[0:3], rows[3:6], rows[6], rows[7] = d_position[i], d_velocity[i], d_cog[i], d_yaw[i]
+        rows[0:3], rows[3:6], rows[6] = d_position[i], d_velocity[i], d_cog[i]
+        rows[7] = d_yaw[i, 0] + yaw_lead * d_yaw[i, 1]
         weight[0:3], weight[3:6], weight[6], weight[7] = w[0], w[1], w[2], yaw_weight
         values[0:3] = position[i] - target_position[i]
         values[3:6] = velocity[i] - velocity_share * target_velocity[i]
         values[6] = cog[i]
         # The short way round: a target half a turn away must not unwind whole turns.
-        values[7] = (yaw[i] - target_yaw[i] + math.pi) % (2.0 * math.pi) - math.pi
+        turn = (yaw[i, 0] - target_yaw[i] + math.pi) % (2.0 * math.pi) - math.pi
+        values[7] = turn + yaw_lead * yaw[i, 1]
         _add_eight_squares(weight, values, rows, INPUTS * i, guess, hessian, gradient)
         for residual in range(8):
             cost += weight[residual] * values[residual] * values[residual]

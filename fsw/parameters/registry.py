@@ -143,6 +143,8 @@ _ROWS: Final[dict[str, list[_Row]]] = {
         ("PLN_W_POSTURE", f"{_WEIGHTS}.posture", "", 0.0, 100.0,
          "weight of the joints' error, where joints are asked for"),
         ("PLN_W_YAW", f"{_WEIGHTS}.yaw", "", 0.0, 100.0, "weight of the yaw error"),
+        ("PLN_YAW_LEAD", f"{_WEIGHTS}.yaw_lead", "s", 0.0, 10.0,
+         "how far ahead the yaw error looks at the rate of now, which damps the yaw"),
         ("PLN_W_INPUT", f"{_WEIGHTS}.inputs", "", 0.0001, 100.0,
          "weight of all inputs; without it the optimum is not unique"),
         ("PLN_TILT_MAX", "planner.limits.tilt", "deg", 2.0, 30.0,

@@ -70,7 +70,7 @@ class FlightPlan:
 
     announcements: tuple[PilotMessage, ...]  # the safe set
     target_at: Callable[[int], TrajectoryPoint] | None  # by time stamp [us]; None: no targets
-    yaw: float  # rad
+    yaw_at: Callable[[int], float]  # of the targets [rad], by time stamp [us]
     hop: bool
     takeoff_height_m: float
     first_phase: Phase
@@ -107,12 +107,17 @@ _COMMANDS: Final[dict[Phase, tuple[int, Phase]]] = {
 }
 
 
-def flight_plan(scenario: Scenario, target_at: Callable[[int], TrajectoryPoint]) -> FlightPlan:
+def flight_plan(
+    scenario: Scenario,
+    target_at: Callable[[int], TrajectoryPoint],
+    yaw_at: Callable[[int], float],
+) -> FlightPlan:
     """The plan of a scenario.
 
     Args:
         scenario: What to fly.
         target_at: End-effector reference by time stamp [us].
+        yaw_at: Its yaw [rad] by time stamp [us].
     """
     walls = scenario.walls
     announcements: tuple[PilotMessage, ...] = tuple(
@@ -124,7 +129,7 @@ def flight_plan(scenario: Scenario, target_at: Callable[[int], TrajectoryPoint])
     return FlightPlan(
         announcements=announcements,
         target_at=target_at if kind == "trajectory" else None,
-        yaw=math.radians(scenario.start.yaw_deg),
+        yaw_at=yaw_at,
         hop=kind == "hop",
         takeoff_height_m=scenario.pilot.takeoff_height_m,
         first_phase=Phase.IDLE if kind == "none" else Phase.ARM,
@@ -172,7 +177,7 @@ def speak(
         return state, tuple(messages)
     next_us = state.next_target_us
     while next_us <= t_us + TARGET_LEAD_US and len(messages) < MESSAGES_PER_STEP:
-        messages.append(SendTarget(next_us, plan.target_at(next_us), plan.yaw))
+        messages.append(SendTarget(next_us, plan.target_at(next_us), plan.yaw_at(next_us)))
         next_us += TARGET_INTERVAL_US
     return replace(state, next_target_us=next_us), tuple(messages)
 

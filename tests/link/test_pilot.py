@@ -47,7 +47,7 @@ def plan(kind: str = "trajectory", **changes: object) -> FlightPlan:
         "trajectory": Hold((0.0, 0.0, -1.0)),
         **changes,
     }
-    return flight_plan(Scenario(**fields), still)  # type: ignore[arg-type]
+    return flight_plan(Scenario(**fields), still, lambda t_us: 0.25)  # type: ignore[arg-type]
 
 
 @dataclass

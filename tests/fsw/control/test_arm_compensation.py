@@ -124,7 +124,20 @@ def test_far_off_the_arm_stays_within_its_limits() -> None:
         assert all(map(math.isfinite, rates))
 
 
-def test_a_straight_arm_keeps_to_its_plan() -> None:
-    plan = plan_of(np.random.default_rng(2))._replace(q_arm=(0.1, 0.0))
-    estimate = pushed_within_the_arms_plane(plan, 0.02, 0.0, 0.0)
-    assert compensated_joints(AIRFRAME, LIMITS, estimate, plan) == (plan.q_arm, plan.qd_arm)
+@pytest.mark.parametrize("bend", [-0.1, 0.0, 0.1])
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+@pytest.mark.parametrize("along", [-0.02, 0.02])
+def test_a_nearly_straight_arm_stays_on_its_side_and_holds_what_it_can_reach(
+    bend: float, side: float, along: float
+) -> None:
+    """Pushed towards the end-effector it folds, pushed away it points at it, at full reach."""
+    plan = plan_of(np.random.default_rng(2))._replace(q_arm=(-0.6, bend))
+    pushed = pushed_within_the_arms_plane(plan, along, 0.0, 0.0)
+    estimate = pushed._replace(q_arm=(-0.6, 0.3 * side))
+    q_arm, _ = compensated_joints(AIRFRAME, LIMITS, estimate, plan)
+    planned, _ = planned_end_effector(AIRFRAME, plan)
+    assert q_arm[1] * side > 0.0
+    left = float(np.linalg.norm(reached(estimate, q_arm) - planned))
+    idle = float(np.linalg.norm(reached(estimate, plan.q_arm) - planned))
+    assert idle == pytest.approx(abs(along))
+    assert left < 1e-9 if along < 0.0 else left < 0.9 * idle

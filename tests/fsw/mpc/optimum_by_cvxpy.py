@@ -63,6 +63,9 @@ class _Linear:
     def yaw(self, node: int) -> Any:
         return self._horizon.states[node, 13] + self._horizon.model.gamma[node, 13] @ self._change
 
+    def yaw_rate(self, node: int) -> Any:
+        return self._horizon.states[node, 14] + self._horizon.model.gamma[node, 14] @ self._change
+
     def angles(self, node: int) -> Any:
         gamma = self._horizon.model.gamma[node, 15:17]
         return self._horizon.states[node, 15:17] + gamma @ self._change
@@ -132,7 +135,9 @@ def _cost(question: Question, linear: _Linear, U: cp.Variable, config: PlannerCo
             speed = speed - question.target_v[node]
         total += (50.0 if last else 10.0) * cp.sum_squares(error)
         total += (10.0 if last else 2.0) * cp.sum_squares(speed)
-        total += weights.yaw * cp.square(linear.yaw(node) - question.target_yaw[node])
+        total += weights.yaw * cp.square(
+            linear.yaw(node) + weights.yaw_lead * linear.yaw_rate(node) - question.target_yaw[node]
+        )
         total += (5.0 if last else 1.0) * cp.square(linear.arm_cog(node))
     return total
 

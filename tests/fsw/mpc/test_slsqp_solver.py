@@ -181,7 +181,9 @@ def test_plans_come_back_through_the_planner(controller: str, case: str) -> None
     theirs = planned(planner(replace(config, solver="slsqp")).plan(asked))
     assert theirs.status is SolverStatus.SOLVED
     assert theirs.sqp_iterations > 2
-    np.testing.assert_allclose(theirs.inputs[0].a, ours.inputs[0].a, atol=0.03)
+    # SLSQP also turns the sphere's directions, which a program holds: less than 1e-3 of the cost.
+    assert theirs.cost == pytest.approx(ours.cost, rel=1e-3)
+    np.testing.assert_allclose(theirs.inputs[0].a, ours.inputs[0].a, atol=0.05)
     np.testing.assert_allclose(theirs.inputs[0].qdd_arm, ours.inputs[0].qdd_arm, atol=0.3)
 
 

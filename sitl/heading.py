@@ -1,0 +1,49 @@
+"""Which way the vehicle looks along its path.
+
+The arm moves in one vertical plane of the body. In that plane it holds the end-effector while the
+base is pushed about; across it can do nothing. Whoever works beside walls therefore turns that
+plane to the wall.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from sitl.scenario import Scenario, Wall
+from sitl.trajectory import V3, Reference
+
+_NEAR_M: Final = 0.05  # this much farther away, a wall counts 1/e of the nearer one
+_AROUND_S: Final = tuple(0.5 * k for k in range(-4, 5))  # the vehicle turns slowly: seen ahead
+
+
+class Heading:
+    """Yaw over the time of a reference."""
+
+    def __init__(self, scenario: Scenario, reference: Reference) -> None:
+        upright = tuple(wall for wall in scenario.walls if math.hypot(*wall.normal[:2]) > 0.5)
+        turns = scenario.trajectory.kind == "lissajous" and scenario.trajectory.heading == "walls"
+        self._walls = upright if turns else ()
+        self._fixed = math.radians(scenario.start.yaw_deg)
+        self._reference = reference
+
+    def at(self, t: float) -> float:
+        """Yaw [rad], ``t`` seconds after the start of the trajectory."""
+        if not self._walls:
+            return self._fixed
+        yaws = [facing(self._walls, self._reference.at(t + around).p) for around in _AROUND_S]
+        return sum(yaws) / len(yaws)
+
+
+def facing(walls: tuple[Wall, ...], p: V3) -> float:
+    """Yaw in [0, pi) that turns the arm's plane to the nearest wall, between two near ones.
+
+    A plane faces a wall with either side, so half a turn more is the same.
+    """
+    gaps = [
+        sum(n * x for n, x in zip(wall.normal, p, strict=True)) - wall.offset_m for wall in walls
+    ]
+    nearest = min(gaps)
+    weights = [math.exp((nearest - gap) / _NEAR_M) for gap in gaps]
+    yaws = [math.atan2(wall.normal[1], wall.normal[0]) % math.pi for wall in walls]
+    return sum(w * yaw for w, yaw in zip(weights, yaws, strict=True)) / sum(weights)
