@@ -8,6 +8,7 @@ from dataclasses import replace
 
 from fsw.control.braking import Brake
 from fsw.geometry.rotation import wrap_angle
+from fsw.model.airframe import Airframe
 from fsw.model.nominal import NominalModel
 from fsw.model.rotors import MotionState
 from fsw.parameters.flight_config import FlightConfig
@@ -25,6 +26,8 @@ from fsw.signals import (
     Vec3,
 )
 from fsw.vehicle.faults import PLAN_STALE_PERIODS
+
+_JOINT_RATE = 3.0  # rad/s, which the plan stops within its horizon
 
 
 def nominal_at_rest(estimate: StateEstimate) -> PredictionState:
@@ -59,6 +62,23 @@ def measured_state(estimate: StateEstimate, motion: MotionState) -> PredictionSt
         estimate.q_arm,
         estimate.qd_arm,
     )
+
+
+def with_arm_in_bounds(x: PredictionState, airframe: Airframe) -> PredictionState:
+    """The state with the arm in the nearest pose, and at the nearest rate, that can be planned from.
+
+    A hard push slings the arm about. A plan that began with it so would need seconds to catch it,
+    and the arm would follow the plan round and round.
+    """
+    th1 = _clip(x.q_arm[0], airframe.joint1_limit)
+    th12 = _clip(x.q_arm[0] + x.q_arm[1], airframe.joint12_limit)
+    first, second = x.qd_arm
+    rates = (_clip(first, _JOINT_RATE), _clip(second, _JOINT_RATE))
+    return x._replace(q_arm=(th1, th12 - th1), qd_arm=rates)
+
+
+def _clip(value: float, bound: float) -> float:
+    return min(max(value, -bound), bound)
 
 
 def coast(x: PredictionState, seconds: float) -> PredictionState:
@@ -162,7 +182,8 @@ def ask(
     if from_nominal:
         start = model.advance(nominal, plan_input(memory.running, nominal, now_us, brake), delay)
     else:
-        start = coast(measured, delay * config.tick_period_us * 1e-6)
+        settled = with_arm_in_bounds(measured, config.airframe)
+        start = coast(settled, delay * config.tick_period_us * 1e-6)
     apply_us = now_us + delay * config.tick_period_us
     request = PlanRequest(
         memory.next_id, apply_us, start, targets, safe_set, from_nominal, postures=postures

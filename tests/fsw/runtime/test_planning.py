@@ -14,9 +14,15 @@ from fsw.control.braking import Brake
 from fsw.model.airframe import AIRFRAME
 from fsw.model.nominal import NominalModel
 from fsw.model.prediction import LagModel
-from fsw.model.rotors import motion_state
+from fsw.model.rotors import MotionState, motion_state
 from fsw.runtime.flight_state import PlanMemory
-from fsw.runtime.planning import late_start, measured_state, plan_input, take_answer
+from fsw.runtime.planning import (
+    late_start,
+    measured_state,
+    plan_input,
+    take_answer,
+    with_arm_in_bounds,
+)
 from fsw.signals import (
     Plan,
     PlanFailure,
@@ -140,3 +146,17 @@ def test_measured_state_is_the_vehicle() -> None:
     assert (state.p, state.v, state.q_arm) == (estimate.p_WB, estimate.v_WB, estimate.q_arm)
     assert (state.a, state.j, state.s) == (motion.a, motion.j, motion.s)
     assert state.yaw == pytest.approx(1.0)
+
+
+def test_a_slung_arm_is_planned_from_the_nearest_pose_it_may_have() -> None:
+    estimate = random_estimate(np.random.default_rng(3))
+    still = (0.0, 0.0, 0.0)
+    measured = measured_state(estimate, MotionState(30.0, still, (0.0, 0.0), (0.0, 0.0)))
+    slung = with_arm_in_bounds(measured._replace(q_arm=(2.0, 3.0), qd_arm=(-20.0, 15.0)), AIRFRAME)
+    assert slung.q_arm[0] == AIRFRAME.joint1_limit
+    assert sum(slung.q_arm) == pytest.approx(AIRFRAME.joint12_limit)
+    assert slung.qd_arm == (-3.0, 3.0)
+    within = measured._replace(q_arm=(0.3, -0.5), qd_arm=(1.0, -2.0))
+    same = with_arm_in_bounds(within, AIRFRAME)
+    assert same.q_arm == pytest.approx(within.q_arm)
+    assert same._replace(q_arm=within.q_arm) == within
