@@ -30,6 +30,10 @@ class CompensationLimits:
     reach: float = 0.985  # of the straight arm; beyond it the elbow loses its side
     fold: float = 0.25  # of the straight arm; closer to the base it folds through itself
     joint_margin: float = 0.03  # rad, kept to the joint limits
+    # Off its plan by more than any disturbance makes it, the vehicle needs its rotors' torque for
+    # itself: an arm that chases a far point slings it about.
+    whole: float = 0.07  # m, compensates wholly up to here
+    none: float = 0.12  # m, and not at all from here
 
 
 @compilable
@@ -62,6 +66,12 @@ def compensated_joints(
     l1, l2 = airframe.link_length[0], airframe.link_length[1]
     p_WE, v_WE = planned_end_effector(airframe, plan)
     x, z, vx, vz = _seen_from_base(estimate, p_WE, v_WE)
+    share = _share(_distance(plan.p, estimate.p_WB), limits.whole, limits.none)
+    if share < 1.0:
+        th1, th12 = plan.q_arm[0], plan.q_arm[0] + plan.q_arm[1]
+        x = share * x + (1.0 - share) * (l1 * math.sin(th1) + l2 * math.sin(th12))
+        z = share * z + (1.0 - share) * (l1 * math.cos(th1) + l2 * math.cos(th12))
+        vx, vz = share * vx, share * vz
     length = math.hypot(x, z)
     if length < 1e-3:
         return plan.q_arm, plan.qd_arm
@@ -75,6 +85,18 @@ def compensated_joints(
     th1 = math.atan2(x, z) - math.atan2(l2 * math.sin(th2), l1 + l2 * math.cos(th2))
     th1, th12 = _within_limits(airframe, limits, th1, th1 + th2)
     return (th1, th12 - th1), _rates(airframe, th1, th12, vx, vz)
+
+
+@compilable
+def _distance(a: Vec3, b: Vec3) -> float:
+    dx, dy, dz = a[0] - b[0], a[1] - b[1], a[2] - b[2]
+    return math.sqrt(dx * dx + dy * dy + dz * dz)
+
+
+@compilable
+def _share(distance: float, whole: float, none: float) -> float:
+    """From 1 up to ``whole`` to 0 from ``none`` on."""
+    return min(max((none - distance) / (none - whole), 0.0), 1.0)
 
 
 _LEAST_BEND = 0.2  # rad; a straighter plan has no side

@@ -112,7 +112,7 @@ def snap_command(
     wanted_a = _limit(wanted_a, tuning.acceleration_limit)
     wanted_j = j_plan + k3 / k4 * (wanted_a - a)
     # A jerk that can still be stopped before the acceleration overshoots.
-    stoppable = math.sqrt(120.0 * (abs(wanted_a - a) + 0.15))
+    stoppable = math.sqrt(60.0 * (abs(wanted_a - a) + 0.15))
     wanted_j = _limit(wanted_j, min(tuning.jerk_limit, stoppable))
     return lag.kp * (u - a_plan) - lag.kd * j_plan + k5 * e_s + k4 * (wanted_j - j)
 

@@ -126,6 +126,10 @@ _ROWS: Final[dict[str, list[_Row]]] = {
          "the arm compensates down to this share of its straight length"),
         ("CMP_MARGIN", "tuning.compensation.joint_margin", "rad", 0.0, 0.5,
          "what compensation keeps to the joint limits"),
+        ("CMP_WHOLE", "tuning.compensation.whole", "m", 0.0, 0.5,
+         "the arm compensates wholly while the base is this close to its plan"),
+        ("CMP_NONE", "tuning.compensation.none", "m", 0.01, 1.0,
+         "the arm does not compensate while the base is farther off than this"),
     ],
     "Planner": [
         ("PLN_W_TRACK", f"{_WEIGHTS}.tracking", "", 0.0, 1000.0,

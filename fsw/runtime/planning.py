@@ -65,7 +65,7 @@ def measured_state(estimate: StateEstimate, motion: MotionState) -> PredictionSt
 
 
 def with_arm_in_bounds(x: PredictionState, airframe: Airframe) -> PredictionState:
-    """The state with the arm in the nearest pose, and at the nearest rate, that can be planned from.
+    """The state with the arm in the nearest pose and at the nearest rate to plan from.
 
     A hard push slings the arm about. A plan that began with it so would need seconds to catch it,
     and the arm would follow the plan round and round.

@@ -141,3 +141,17 @@ def test_a_nearly_straight_arm_stays_on_its_side_and_holds_what_it_can_reach(
     idle = float(np.linalg.norm(reached(estimate, plan.q_arm) - planned))
     assert idle == pytest.approx(abs(along))
     assert left < 1e-9 if along < 0.0 else left < 0.9 * idle
+
+
+def test_far_off_the_plan_the_arm_goes_back_to_its_planned_pose_without_a_jump() -> None:
+    plan = plan_of(np.random.default_rng(4))
+    angles = []
+    for metres in np.arange(0.0, 0.2, 0.001):
+        pushed = pushed_within_the_arms_plane(plan, 0.0, 0.0, 0.0)
+        p = vec3(np.array(plan.p) + attitude_of(plan).apply([0.0, metres, 0.0]))
+        q_arm, rates = compensated_joints(AIRFRAME, LIMITS, pushed._replace(p_WB=p), plan)
+        angles.append(q_arm)
+        if metres > LIMITS.none:
+            assert q_arm == pytest.approx(plan.q_arm)
+            assert rates == pytest.approx((0.0, 0.0), abs=1e-12)
+    assert np.abs(np.diff(np.array(angles), axis=0)).max() < 0.02

@@ -169,7 +169,7 @@ def test_far_from_the_plan_acceleration_and_jerk_wishes_are_limited(
     wanted = snap_command(LAW, e_p, e_v, 0.0, d, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     k4 = LAW.gains.k[3]
     assert abs(wanted) <= k4 * TUNING.jerk_limit + 1e-9
-    stoppable = math.sqrt(120.0 * (TUNING.acceleration_limit + 0.15))
+    stoppable = math.sqrt(60.0 * (TUNING.acceleration_limit + 0.15))
     assert abs(wanted) <= k4 * stoppable + 1e-9
 
 
