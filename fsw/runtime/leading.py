@@ -11,9 +11,6 @@ from fsw.parameters.flight_config import FlightConfig
 from fsw.signals import EndEffectorTarget, SafeSet, StateEstimate, Vec2, Vec3
 from fsw.vehicle.steering import Aim, Lead, keep_out, keep_up, move, tie
 
-# s; the planner weighs the heading, not its rate, and would swing about it for half a minute.
-_YAW_DAMPING = 3.0
-
 
 def lead_from(config: FlightConfig, estimate: StateEstimate, *, of_end_effector: bool) -> Lead:
     """A reference that begins where the vehicle is and moves as it does."""
@@ -50,8 +47,9 @@ def horizon_of(
             lead = move(lead, aim, config.steering, config.planner.period)
             lead = _out(config, lead, estimate, safe_set)
         target = target_of(config, lead, t_us + node * config.mpc_period_us)
-        damping = _YAW_DAMPING * (lead.yaw_rate - estimate.w_WB_B[2])
-        targets.append(replace(target, yaw=wrap_angle(target.yaw + damping)))
+        # The planner looks ahead at the vehicle's yaw rate, so it has to see where ours leads.
+        ahead = config.planner.weights.yaw_lead * lead.yaw_rate
+        targets.append(replace(target, yaw=wrap_angle(target.yaw + ahead)))
         if lead.q_arm is not None:
             postures.append(lead.q_arm)
     return tuple(targets), tuple(postures)
