@@ -22,10 +22,9 @@ from fsw.parameters.metadata import parameter_document
 from fsw.parameters.registry import PARAMETERS
 from messages.generate import DEFINITION
 from tests.interop.mavsdk_client import connected, eventually, finished, seconds
-from tests.interop.vehicle import Vehicle
+from tests.interop.vehicle import FAST, Vehicle
 
-# As fast as the wall clock, but a busy machine makes it slow instead of late.
-PACING = ("--lockstep", "--speed", "1")
+PACING = FAST
 PARAMETER_METADATA = 1
 
 

@@ -12,10 +12,9 @@ from mavsdk.plugins.offboard import Offboard, OffboardError, PositionNedYaw, Vel
 from mavsdk.plugins.telemetry import Telemetry
 
 from tests.interop.mavsdk_client import connected, eventually
-from tests.interop.vehicle import Vehicle
+from tests.interop.vehicle import FAST, Vehicle
 
-# Four times real time: the client's clock is the wall's, the vehicle's is the simulator's.
-PACING = ("--lockstep", "--speed", "4")
+PACING = FAST
 METRES_PER_DEGREE = 111_319.5  # of latitude
 
 

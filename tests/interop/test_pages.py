@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from tests.docs.test_pages import DOCS, blocks
-from tests.interop.vehicle import Vehicle
+from tests.interop.vehicle import FAST, Vehicle
 
-PACING = ("--lockstep", "--speed", "4")
+PACING = FAST
 PAGES = sorted((DOCS / "ground-stations").glob("*.md"))
 PROGRAMS = [
     pytest.param(code, id=f"{page.stem}-{number}")

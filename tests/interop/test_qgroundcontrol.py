@@ -22,9 +22,9 @@ from fsw.parameters.metadata import parameter_document
 from fsw.parameters.registry import PARAMETERS
 from messages import dialect
 from tests.interop.station import PATIENCE_S, Station
-from tests.interop.vehicle import Vehicle
+from tests.interop.vehicle import REAL_TIME, Vehicle
 
-PACING = ("--realtime",)
+PACING = REAL_TIME
 DENIED, UNSUPPORTED = 2, 3
 HEADER = struct.Struct("<HBBBBBxI")  # of FTP
 OPEN, BURST, TERMINATE, LIST, CREATE = 4, 15, 1, 3, 6

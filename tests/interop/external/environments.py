@@ -7,10 +7,12 @@ from pathlib import Path
 
 import pytest
 
+_PLACE = os.environ.get("PANDION_INTEROP")
+
+only_where_installed = pytest.mark.skipif(_PLACE is None, reason="run by make interop")
+
 
 def environment_of(client: str) -> Path:
-    """The folder of a client; skips the test where there is none."""
-    place = os.environ.get("PANDION_INTEROP")
-    if place is None:
-        pytest.skip("run by make interop")
-    return Path(place, client).absolute()
+    """The folder of a client."""
+    assert _PLACE is not None
+    return Path(_PLACE, client).absolute()

@@ -14,11 +14,12 @@ import pytest
 
 from fsw.parameters.registry import PARAMETERS
 from messages.export import write_definitions
-from tests.interop.external.environments import environment_of
+from tests.interop.external.environments import environment_of, only_where_installed
 from tests.interop.mavsdk_client import eventually
-from tests.interop.vehicle import Vehicle
+from tests.interop.vehicle import REAL_TIME, Vehicle
 
-PACING = ("--realtime",)
+PACING = REAL_TIME
+pytestmark = only_where_installed
 
 
 class Prompt:

@@ -8,10 +8,11 @@ import subprocess
 import pytest
 
 from fsw.parameters.registry import PARAMETERS
-from tests.interop.external.environments import environment_of
-from tests.interop.vehicle import Vehicle
+from tests.interop.external.environments import environment_of, only_where_installed
+from tests.interop.vehicle import REAL_TIME, Vehicle
 
-PACING = ("--realtime",)
+PACING = REAL_TIME
+pytestmark = only_where_installed
 ARM, UNKNOWN = "400", "31010"
 ACCEPTED, UNSUPPORTED = 0, 3
 
