@@ -23,6 +23,7 @@ _PARAMETERS: Final = "parameters.json"
 
 def metadata_files() -> dict[str, Node]:
     """The documents, by their names in the root of the tree."""
+    _general_crc()  # made now, so that no tick has to
     return {_GENERAL: MemoryFile(_general), _PARAMETERS: MemoryFile(_parameters)}
 
 
@@ -39,8 +40,8 @@ def _uri(name: str) -> str:
     return f"mftp:///{name}"
 
 
-# The table of parameters knows all that flies and is slow to import; a ground station asks when
-# it has been imported long since.
+# The table of parameters knows all that flies and is slow to import: it must not be imported
+# before the command line has been found right.
 @cache
 def _parameters() -> bytes:
     from fsw.parameters.metadata import parameter_document
