@@ -16,9 +16,9 @@ from mavsdk.plugins.mission_raw import MissionRaw, MissionRawError
 from mavsdk.plugins.telemetry import Telemetry
 
 from tests.interop.mavsdk_client import connected, eventually
-from tests.interop.vehicle import Vehicle
+from tests.interop.vehicle import FAST, Vehicle
 
-PACING = ("--speed", "8")
+PACING = FAST
 METRE = 360.0 / (2.0 * math.pi * 6_371_000.0)  # degrees of latitude
 
 

@@ -91,10 +91,10 @@ def test_it_reads_the_private_messages_and_takes_none_for_loss(prompt: Prompt) -
 
 def test_it_sets_a_parameter(prompt: Prompt) -> None:
     known = PARAMETERS[0]
-    wanted = 0.5 * (known.default + known.most)
-    prompt.says("", command=f"param set {known.name} {wanted}")
-    time.sleep(3.0)  # it repeats each second what was not answered, and says nothing
-    prompt.says(rf"{known.name} +{wanted:.0f}", command=f"param show {known.name}")
+    for wanted in (0.5 * (known.default + known.most), known.default):
+        prompt.says("", command=f"param set {known.name} {wanted}")
+        time.sleep(3.0)  # it repeats each second what was not answered, and says nothing
+        prompt.says(rf"{known.name} +{wanted:.0f}", command=f"param show {known.name}")
 
 
 def test_it_lists_and_fetches_files(prompt: Prompt, earlier: bytes) -> None:
@@ -109,6 +109,17 @@ def test_it_downloads_a_log(prompt: Prompt, earlier: bytes) -> None:
     prompt.says("Log 0  numLogs 2", command="log list")
     prompt.says("Finished downloading", command="log download 0 log.tlog")
     assert eventually(lambda: (prompt.home / "log.tlog").read_bytes() == earlier)
+
+
+def test_it_loads_a_mission(prompt: Prompt) -> None:
+    home = prompt.says(r"latitude : (-?\d+), longitude : (-?\d+)", command="status HOME_POSITION")
+    north, east = int(home[1]) * 1e-7, int(home[2]) * 1e-7
+    lines = ["QGC WPL 110", f"0 1 0 16 0 0 0 0 {north} {east} 0 1"]
+    for number, height in ((1, 1.5), (2, 2.0)):
+        lines.append(f"{number} 0 3 16 0 0 0 0 {north + 5e-6} {east} {height} 1")
+    (prompt.home / "points.txt").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    prompt.says(r"(?s)Loaded 3 waypoints.*Sent all 3 waypoints", command="wp load points.txt")
+    prompt.says("Saved 3 waypoints", command="wp save back.txt")
 
 
 def test_it_flies(prompt: Prompt) -> None:
