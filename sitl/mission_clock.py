@@ -6,7 +6,7 @@ import math
 
 from sitl.heading import Heading
 from sitl.scenario import Scenario
-from sitl.trajectory import TrajectoryPoint, reference
+from sitl.trajectory import TrajectoryPoint, curve_row, reference
 
 
 class MissionClock:
@@ -20,6 +20,7 @@ class MissionClock:
         airborne = scenario.start.kind == "airborne"
         self.reference = reference(scenario.trajectory)
         self._heading = Heading(scenario, self.reference)
+        self.curve = curve_row(scenario.trajectory)  # the same for compiled code
         self.starts_s: float | None = scenario.pilot.start_delay_s if airborne else None
         self.stops_s = math.inf
         self._counts_from_s = 0.0 if airborne else math.inf
