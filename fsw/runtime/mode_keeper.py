@@ -198,7 +198,10 @@ class ModeKeeper:
     def _mind_touch_down(
         self, state: FlightState, estimate: StateEstimate, texts: list[StatusText]
     ) -> FlightState:
-        if not self._stands(estimate):
+        """Descending and not sinking is standing, sliding or not: no loop may fight the ground."""
+        limits = self._config.limits
+        held_up = abs(estimate.v_WB[2]) < limits.landed_speed
+        if not (held_up and self._height_above_standing(estimate) < limits.landed_height):
             return self._moving(state, estimate)
         vehicle = state.vehicle
         if estimate.t_us - vehicle.still_since_us < self._config.limits.landed_time_us:
@@ -366,7 +369,7 @@ class ModeKeeper:
 
     def _standing_unclear(self, estimate: StateEstimate) -> bool:
         limits, above = self._config.limits, self._height_above_standing(estimate)
-        return limits.landed_height <= above < limits.airborne_height
+        return above < limits.airborne_height and not self._stands(estimate)
 
     def _height_above_standing(self, estimate: StateEstimate) -> float:
         return -estimate.p_WB[2] - self._config.airframe.leg_length

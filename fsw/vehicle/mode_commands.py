@@ -68,7 +68,7 @@ def arming_refusal(situation: Situation, *, forced: bool = False) -> str | None:
     if forced:
         return None
     if situation.standing_unclear:
-        return "not armed: neither standing nor clearly in the air; check the origin's height"
+        return "not armed: neither at rest on the ground nor clearly in the air; check the height"
     return f"not armed: {situation.inconsistent}" if situation.inconsistent else None
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from fsw.geometry.geodesy import to_global
 from fsw.parameters.flight_config import flight_config
-from fsw.signals import CommandRequest, Mode, SafeSet, WorkspaceSphere
+from fsw.signals import CommandRequest, Mode, SafeSet, SensorFrame, WorkspaceSphere
 from sitl.scenario_file import load_scenario
 from tests.closed_loop.harness import (
     ARM,
@@ -187,3 +187,20 @@ def test_a_heading_is_reached_without_swinging_about_it() -> None:
         turned.append(flight.snapshot.estimate.yaw)
     assert max(turned) < 1.56
     assert turned[26:] == pytest.approx([1.5] * 14, abs=0.04)
+
+
+def test_a_vehicle_that_slides_when_it_comes_down_is_not_flown_against_the_ground() -> None:
+    """It drifted on its legs, pushed by a loop that could not move it, until it tipped over."""
+
+    def sliding(frame: SensorFrame) -> SensorFrame:
+        vx, vy, vz = frame.v_WB
+        return replace(frame, v_WB=(vx + 0.2, vy, vz)) if frame.p_WB[2] > -0.36 else frame
+
+    flight = up()
+    flight.spoil = sliding
+    flight.step(command(LAND))
+    flight.run(12.0)
+    assert flight.mode is Mode.DISARMED
+    assert not flight.snapshot.failures
+    flight.step(command(ARM, 1.0))
+    assert not flight.snapshot.armed, "while it still slides"
