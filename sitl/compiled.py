@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import ParamSpec, TypeVar
 
 import numba
+from numba.extending import register_jitable
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -47,6 +48,12 @@ def kernel(function: Callable[P, R]) -> Callable[P, R]:
     takes 3.6 times as long. Allocating in a kernel is a compile-time error.
     """
     return _njit(function, counts_references=False)
+
+
+def compilable(function: Callable[P, R]) -> Callable[P, R]:
+    """Let compiled code take a pure function into itself; called from Python it stays Python."""
+    same: Callable[P, R] = register_jitable(error_model="numpy")(function)
+    return same
 
 
 def _njit(function: Callable[P, R], counts_references: bool) -> Callable[P, R]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from sitl.scenario import Scenario
-from sitl.trajectory import TrajectoryPoint, reference
+from sitl.trajectory import TrajectoryPoint, curve_row, reference
 
 
 class MissionClock:
@@ -18,6 +18,7 @@ class MissionClock:
     def __init__(self, scenario: Scenario) -> None:
         airborne = scenario.start.kind == "airborne"
         self.reference = reference(scenario.trajectory)
+        self.curve = curve_row(scenario.trajectory)  # the same for compiled code
         self.starts_s: float | None = scenario.pilot.start_delay_s if airborne else None
         self.stops_s = math.inf
         self._counts_from_s = 0.0 if airborne else math.inf

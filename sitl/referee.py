@@ -16,7 +16,7 @@ from sitl.world import World, record_if_clear
 TOUCH_DOWN_MAX = 2.0  # m/s; a drop from 0.2 m
 Points = tuple[V3, V3, V3]  # base, joint 2, end-effector [m, NED]
 
-_NOWHERE = np.empty((0, 3))
+_NO_CURVE = np.empty(0)
 
 
 class Referee:
@@ -87,15 +87,21 @@ class Referee:
 
     def _all_clear(self, places: Array, before_s: float, step_s: float) -> bool:
         """Record the margins of steps without any incident; False, and nothing done, otherwise."""
-        targets = _NOWHERE
+        curve, starts_s = _NO_CURVE, 0.0
         if self.world.workspace is not None:
-            instants = [before_s + k * step_s for k in range(1, 1 + len(places))]
-            if not all(map(self._clock.counts, instants)):
+            clock, last_s = self._clock, before_s + len(places) * step_s
+            if clock.starts_s is None or not (clock.counts(before_s) and clock.counts(last_s)):
                 return False
-            targets = np.array([self._clock.target_at(time_s).p for time_s in instants])
+            curve, starts_s = clock.curve, clock.starts_s
         lowest, when_s = self.record.arrays
         return record_if_clear(
-            self.world.planes, self.world.sphere, targets, places, before_s, step_s, lowest, when_s
+            self.world.planes,
+            self.world.sphere,
+            (curve, starts_s),
+            places,
+            (before_s, step_s),
+            lowest,
+            when_s,
         )
 
     def judge_landing(self, speed: float, time_s: float) -> None:

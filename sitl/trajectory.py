@@ -6,6 +6,10 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
+import numpy as np
+
+from sitl.compiled import compilable
+from sitl.plant.vector import Array
 from sitl.scenario import Hold, Lissajous, Trajectory
 
 V3 = tuple[float, float, float]
@@ -52,15 +56,29 @@ class Warp:
 
     def at(self, t: float) -> tuple[float, float, float]:
         """S [s], ds/dt and d²s/dt² [1/s] at ``t``."""
-        if t > 0.5 * self.duration:
-            s, rate, bend = self.at(self.duration - t)
-            return self.duration - self.ramp - s, rate, -bend
-        x = min(max(t / self.ramp, 0.0), 1.0)
-        rate = x**3 * (10.0 - 15.0 * x + 6.0 * x * x)
-        bend = 30.0 * x * x * (1.0 - x) ** 2 / self.ramp
-        # The integral of the smooth step: half a ramp is lost by starting slowly.
-        s = self.ramp * x**4 * (2.5 - 3.0 * x + x * x) + max(t - self.ramp, 0.0)
-        return s, rate, bend
+        return warped(t, self.ramp, self.duration)
+
+
+@compilable
+def warped(t: float, ramp: float, duration: float) -> tuple[float, float, float]:
+    """``Warp.at`` of a ramp and a duration [s]."""
+    # The second half is the first one backwards.
+    backwards = t > 0.5 * duration
+    passed = duration - t if backwards else t
+    x = min(max(passed / ramp, 0.0), 1.0)
+    rate = x**3 * (10.0 - 15.0 * x + 6.0 * x * x)
+    bend = 30.0 * x * x * (1.0 - x) ** 2 / ramp
+    # The integral of the smooth step: half a ramp is lost by starting slowly.
+    s = ramp * x**4 * (2.5 - 3.0 * x + x * x) + max(passed - ramp, 0.0)
+    if backwards:
+        return duration - ramp - s, rate, -bend
+    return s, rate, bend
+
+
+@compilable
+def swung(centre: float, size: float, period: float, phase: float, s: float) -> float:
+    """One coordinate of a Lissajous curve [m] at its own time ``s`` [s]; phase in degrees."""
+    return centre + size * math.sin(2.0 * math.pi / period * s + math.radians(phase))
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +101,7 @@ class LissajousReference:
         sine, cosine = math.sin(angle), math.cos(angle)
         slope = size * frequency * cosine
         return (
-            self.curve.centre_m[i] + size * sine,
+            swung(self.curve.centre_m[i], size, self.curve.period_s[i], self.curve.phase_deg[i], s),
             slope * rate,
             slope * bend - size * frequency**2 * sine * rate * rate,
         )
@@ -94,3 +112,24 @@ def reference(trajectory: Trajectory) -> Reference:
     if isinstance(trajectory, Hold):
         return HoldReference(trajectory)
     return LissajousReference(trajectory, Warp(trajectory.ramp_s, trajectory.duration_s))
+
+
+def curve_row(trajectory: Trajectory) -> Array:
+    """Numbers of a curve for ``place_on_curve``: centre, amplitude, period, phase, warp."""
+    if isinstance(trajectory, Hold):
+        still = (0.0,) * 3
+        return np.array([*trajectory.position_m, *still, *(1.0,) * 3, *still, 1.0, 2.0])
+    curve = trajectory
+    shape = (*curve.centre_m, *curve.amplitude_m, *curve.period_s, *curve.phase_deg)
+    return np.array([*shape, curve.ramp_s, curve.duration_s])
+
+
+@compilable
+def place_on_curve(row: Array, t: float) -> V3:
+    """``Reference.at(t).p`` of the curve whose ``curve_row`` it is [m, NED]."""
+    s = warped(t, row[12], row[13])[0]
+    return (
+        swung(row[0], row[3], row[6], row[9], s),
+        swung(row[1], row[4], row[7], row[10], s),
+        swung(row[2], row[5], row[8], row[11], s),
+    )

@@ -12,6 +12,7 @@ import numpy as np
 from sitl.compiled import compiled
 from sitl.plant.vector import Array
 from sitl.scenario import V3, Scenario, Workspace
+from sitl.trajectory import place_on_curve
 
 POINTS = ("base", "joint2", "end_effector")  # critical points, in the order of the paper
 
@@ -78,10 +79,9 @@ class World:
 def record_if_clear(
     planes: Array,
     sphere: tuple[float, float],
-    targets: Array,
+    aim: tuple[Array, float],
     places: Array,
-    before_s: float,
-    step_s: float,
+    instants: tuple[float, float],
     lowest: Array,
     when_s: Array,
 ) -> bool:
@@ -90,10 +90,10 @@ def record_if_clear(
     Args:
         planes: (walls, 4), of a World.
         sphere: Its radius and height above the target [m].
-        targets: (steps, 3) m, where the workspace applies, else no rows.
+        aim: The end-effector's curve (``trajectory.curve_row``) and when it begins [s]; a row
+            without numbers where the workspace does not apply.
         places: (steps, 2 + j, 3) m: base, joint 1, joint 2, …, end-effector.
-        before_s: Time one step before the first [s].
-        step_s: Between two steps [s].
+        instants: Time one step before the first, and between two steps [s].
         lowest: (margins,) m, smallest so far.
         when_s: (margins,) s, when that was.
 
@@ -102,10 +102,13 @@ def record_if_clear(
         within every margin.
     """
     margins = np.empty((places.shape[0], lowest.shape[0]))
+    before_s, step_s = instants
+    curve, starts_s = aim
     for k in range(places.shape[0]):
         _wall_margins_into(planes, places, k, margins)
-        if targets.shape[0]:
-            margins[k, 3 * planes.shape[0]] = _sphere_margin(sphere, targets, places, k)
+        if curve.shape[0]:
+            target = place_on_curve(curve, before_s + (k + 1) * step_s - starts_s)
+            margins[k, 3 * planes.shape[0]] = _sphere_margin(sphere, target, places, k)
         above = places[k, 0, 2] < 0.0 and places[k, 2, 2] < 0.0 and places[k, -1, 2] < 0.0
         if not (above and (margins[k] > 0.0).all()):
             return False
@@ -127,10 +130,10 @@ def _wall_margins_into(planes: Array, places: Array, k: int, margins: Array) -> 
 
 
 @compiled
-def _sphere_margin(sphere: tuple[float, float], targets: Array, places: Array, k: int) -> float:
+def _sphere_margin(sphere: tuple[float, float], target: V3, places: Array, k: int) -> float:
     radius, above = sphere
-    x, y = places[k, 0, 0] - targets[k, 0], places[k, 0, 1] - targets[k, 1]
-    z = places[k, 0, 2] - (targets[k, 2] - above)
+    x, y = places[k, 0, 0] - target[0], places[k, 0, 1] - target[1]
+    z = places[k, 0, 2] - (target[2] - above)
     distance: float = np.sqrt(x * x + y * y + z * z)
     return radius - distance
 
