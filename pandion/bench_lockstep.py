@@ -36,6 +36,7 @@ class LockstepOptions:
     scenario: str
     duration_s: float
     rounds: int
+    processors: int | None
 
 
 def main(argv: list[str]) -> int:
@@ -69,8 +70,14 @@ def _options(argv: list[str]) -> LockstepOptions:
     parser.add_argument(
         "--rounds", metavar="N", type=_count, default=3, help="flights of each (default 3)"
     )
+    parser.add_argument(
+        "--processors",
+        type=int,
+        choices=(1, 2),
+        help="how many the two halves share (default as pandion fly decides, by what is idle)",
+    )
     read = parser.read(argv)
-    return LockstepOptions(read.json, read.scenario, read.duration, read.rounds)
+    return LockstepOptions(read.json, read.scenario, read.duration, read.rounds, read.processors)
 
 
 def _seconds(text: str) -> float:
@@ -141,7 +148,7 @@ def _fly(options: LockstepOptions, runner: str | None) -> dict[str, Any]:
         HalfFailed: It did not begin, or did not end as it should.
     """
     with tempfile.TemporaryDirectory(prefix="pandion-bench-") as name:
-        out, places = Path(name), lockstep_places()
+        out, places = Path(name), _places(options.processors)
         sitl = [
             options.scenario,
             "--listen=udp:127.0.0.1:0",
@@ -154,8 +161,19 @@ def _fly(options: LockstepOptions, runner: str | None) -> dict[str, Any]:
         )
         if flown.failure is not None or flown.sitl is None or flown.interrupted:
             raise HalfFailed(flown.failure or "the flight was interrupted", exit_code=1)
-        fsw: Event = json.loads((out / "fsw.json").read_text(encoding="utf-8"))
+        written = out / "fsw.json"
+        if not written.exists():
+            raise HalfFailed("the flight software was ended before it wrote its result", 1)
+        fsw: Event = json.loads(written.read_text(encoding="utf-8"))
         return {"sitl": flown.sitl, "fsw": fsw, "places": _described(places)}
+
+
+def _places(processors: int | None) -> Places:
+    places = lockstep_places()
+    if processors is None or places.sitl is None:
+        return places
+    allowed = sorted(os.sched_getaffinity(0))
+    return Places(allowed[0], allowed[min(processors, len(allowed)) - 1])
 
 
 def _described(places: Places) -> str:

@@ -30,7 +30,7 @@ class EagerReceiver:
         """
         self._receive = source.recv
         self._size = size
-        self._credit = 2 * _PRICE
+        self._credit = _MOST  # a first plan is slow, and more than one thing at a start
         self._rest = 0
 
     def __call__(self) -> bytes:

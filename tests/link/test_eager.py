@@ -61,13 +61,13 @@ def test_looking_in_vain_is_given_up_for_a_while_and_tried_again(module: ModuleT
     slow = Slow()
     receive = module.EagerReceiver(slow, 100)
     looked = []
-    for _ in range(5500):
+    for _ in range(5520):
         before = slow.looks
         assert receive() == b"late"
         looked.append(slow.looks > before)
-    assert looked[:2] == [True, True]
-    assert not any(looked[2:5002])
-    assert any(looked[5002:])
+    assert all(looked[:10])  # a start may be slow
+    assert not any(looked[10:5010])
+    assert looked[5010:5013] == [True, True, False]
 
 
 @BOTH
