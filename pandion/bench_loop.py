@@ -23,7 +23,7 @@ from pandion.version import version
 from sitl.arguments import duration
 
 PASSED, NOT_PASSED = 0, 1  # exit codes
-_LINK = ("hear", "actuate", "publish", "log")  # stages: everything of a tick but the tick itself
+_LINK = ("hear", "actuate", "publish", "record")  # stages: everything of a tick but the tick itself
 
 
 @dataclass(frozen=True, slots=True)

@@ -130,6 +130,16 @@ def mpc_timing(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValue
     return _loop_timing(snapshot.t_us, context.health.mpc, group=1)
 
 
+def telemetry_timing(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues:
+    """LOOP_TIMING of telemetry and log."""
+    return _loop_timing(snapshot.t_us, context.health.telemetry, group=2)
+
+
+def housekeeping_timing(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues:
+    """LOOP_TIMING of what is done once a second."""
+    return _loop_timing(snapshot.t_us, context.health.housekeeping, group=3)
+
+
 def _loop_timing(t_us: int, timing: GroupTiming, group: int) -> WireValues:
     return (
         t_us,

@@ -76,6 +76,8 @@ STREAMS: Final = (
     Stream(message_ids.MPC_STATUS, 10, 10, PANDION, encode_dialect.mpc_status),
     Stream(message_ids.LOOP_TIMING, 1, 1, PANDION, encode_dialect.inner_timing),
     Stream(message_ids.LOOP_TIMING, 1, 1, PANDION, encode_dialect.mpc_timing),
+    Stream(message_ids.LOOP_TIMING, 1, 1, PANDION, encode_dialect.telemetry_timing),
+    Stream(message_ids.LOOP_TIMING, 1, 1, PANDION, encode_dialect.housekeeping_timing),
 )
 
 # These leave at once when mode, arming, landing or health change.

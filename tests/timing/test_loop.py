@@ -1,0 +1,264 @@
+"""The loop in virtual time: groups in their order, and what a tick, a socket or a disk costs it."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, cast
+
+import pytest
+
+from fsw.link.inbox import Inbox
+from fsw.link.sim_link import Pacing
+from fsw.link.telemetry import LoopHealth
+from fsw.log.block_file import BlockFile
+from fsw.parameters.flight_config import flight_config
+from fsw.runtime.effort import EffortRecord
+from fsw.runtime.flight_loop import FlightLoop
+from fsw.runtime.flight_state import FlightState
+from fsw.runtime.planner_worker import PlannerRecord
+from fsw.runtime.process import StopRequest
+from fsw.runtime.program import FlightProgram
+from fsw.runtime.rates import HOUSEKEEPING, INNER, MPC, RATE_GROUPS, TELEMETRY, Member
+from fsw.runtime.sim_loop import Ending, FlightRecord, SimLoop
+from fsw.runtime.timing import GroupTimer
+from fsw.signals import (
+    CommandRequest,
+    PlannerCounters,
+    PlanRequest,
+    SensorFrame,
+    TickInputs,
+    TickOutputs,
+)
+from messages import dialect
+from tests.link.snapshots import FACTS, outputs_at
+from tests.timing.virtual_time import FIRST_US, PERIOD_US, VirtualSensors, VirtualTime, frame
+
+Tick = Callable[[Any, TickInputs], tuple[Any, TickOutputs]]
+ARM = CommandRequest(400, (1.0, *(0.0,) * 6), 255, 190)
+KILL = CommandRequest(400, (0.0, 21196.0, *(0.0,) * 5), 255, 190)
+
+
+@dataclass
+class Sim(VirtualSensors):
+    """The simulator's end: frames in, answers out."""
+
+    pacing: Pacing = Pacing.REALTIME
+    shutdown: bool = False
+    done: list[str] = field(default_factory=list)  # shared by all parts
+    answers: list[tuple[int, TickOutputs]] = field(default_factory=list)  # at, what
+
+    def newest(self) -> SensorFrame | None:
+        self.done.append("sensors")
+        return super().newest()
+
+    def answer(self, t_us: int, outputs: TickOutputs) -> None:
+        self.done.append("actuators")
+        self.answers.append((self.time.now_us, outputs))
+
+    def queue_ack(self, ack: object) -> None:
+        pass
+
+
+@dataclass
+class Planner:
+    """Takes requests."""
+
+    done: list[str]
+
+    def take(self, t_us: int) -> None:
+        self.done.append("plan")
+
+    def submit(self, request: PlanRequest) -> None:
+        self.done.append("request")
+
+    def close(self) -> None:
+        pass
+
+
+@dataclass
+class Ground:
+    """Takes telemetry, for as long as it likes."""
+
+    done: list[str]
+    takes: Callable[[], None]
+    texts: list[str] = field(default_factory=list)
+
+    def poll(self, t_us: int) -> None:
+        self.done.append("ground")
+
+    def publish(self, outputs: TickOutputs) -> None:
+        self.done.append("telemetry")
+        self.texts += [text.text for text in outputs.texts]
+        self.takes()
+
+    def acknowledge(self, t_us: int, ack: object) -> None:
+        pass
+
+
+class NoParameters:
+    """Nothing is tuned."""
+
+    def take_tuning(self) -> None:
+        return None
+
+
+class NoFiles:
+    """Nothing is logged."""
+
+    def __init__(self) -> None:
+        self.ulog = self
+
+    def begin(self, *about: object, **more: object) -> None:
+        pass
+
+    add = add_timing = check = begin
+
+
+class Bench:
+    """A loop with everything around it replaced."""
+
+    def __init__(self, tick: Tick, first: object = 0) -> None:
+        self.time = VirtualTime()
+        self.stop = StopRequest()
+        self.inbox = Inbox()
+        self.telemetry: Callable[[], object] = lambda: None
+        self.asleep: Callable[[], None] = lambda: None
+        self.sim = Sim(self.time)
+        self.ground = Ground(self.sim.done, self._publish)
+        self.record = FlightRecord(PlannerRecord(GroupTimer(100_000)), EffortRecord(), LoopHealth())
+        program = cast(Any, FlightProgram)(FACTS, first, tick, None, NoParameters())
+        self.loop = SimLoop(
+            program, cast(Any, self.sim), cast(Any, self.ground), self.inbox, self.record,
+            self.time.clock, self.stop, cast(Any, NoFiles()), self._sleep,
+        )  # fmt: skip
+        self.until_us = 0
+
+    def run(self, seconds: float) -> None:
+        self.until_us = self.time.now_us + round(1e6 * seconds)
+        end = self.loop.fly(frame(FIRST_US), Planner(self.sim.done))
+        assert end.ending is Ending.STOPPED
+
+    def timer(self, name: str) -> GroupTimer:
+        return self.record.groups[name]
+
+    def _publish(self) -> None:
+        self.telemetry()
+        self.stop.requested = self.time.now_us >= self.until_us
+
+    def _sleep(self, seconds: float) -> None:
+        self.asleep()
+        self.time.sleep(seconds)
+
+
+def standing(state: int, inputs: TickInputs) -> tuple[int, TickOutputs]:
+    """Says the same on every tick, and asks for a plan on every fiftieth."""
+    outputs = outputs_at(inputs.sensors.t_us)
+    snapshot = replace(outputs.snapshot, counters=PlannerCounters())
+    request = cast(PlanRequest, "a request") if state % 50 == 0 else None
+    return state + 1, replace(outputs, snapshot=snapshot, plan_request=request, texts=())
+
+
+def test_the_table_is_the_configuration_s_and_the_dialect_s() -> None:
+    config = flight_config()
+    assert (INNER.period_us, MPC.period_us) == (config.tick_period_us, config.mpc_period_us)
+    for group in RATE_GROUPS:
+        name = f"PANDION_RATE_GROUP_{group.name.upper()}"
+        assert getattr(dialect, name) == group.number
+    named = [member for group in RATE_GROUPS for member in group.members]
+    assert sorted(member.name for member in named) == sorted(member.name for member in Member)
+
+
+def test_groups_run_at_their_rates_and_their_members_in_order() -> None:
+    bench = Bench(standing)
+    bench.run(2.0)
+    done = bench.sim.done
+    tick = ["sensors", "ground", "plan", "actuators", "telemetry"]
+    asking = ["sensors", "ground", "plan", "actuators", "request", "telemetry"]
+    laid = done.index("sensors")
+    second = done.index("sensors", laid + 1)
+    assert done[laid:second] == tick
+    ask = done.index("request", laid)
+    assert done[ask - 4 : ask + 2] == asking
+    ticks = bench.timer(INNER.name).ticks
+    assert ticks == pytest.approx(1000, abs=2)
+    assert done.count("request") == pytest.approx(ticks / 50, abs=1)
+    assert bench.timer(HOUSEKEEPING.name).ticks == pytest.approx(2, abs=1)
+    assert (bench.timer(INNER.name).late, bench.timer(INNER.name).skipped) == (0, 0)
+
+
+def test_a_tick_that_overruns_is_counted_and_told_once() -> None:
+    def overrunning(state: int, inputs: TickInputs) -> tuple[int, TickOutputs]:
+        bench.time.work(2_500 if state in (800, 850, 900) else 100)
+        return standing(state, inputs)
+
+    bench = Bench(overrunning)
+    bench.run(9.0)
+    assert bench.timer(INNER.name).late == 3
+    assert [text for text in bench.ground.texts if "late" in text] == ["ticks: 3 late"]
+
+
+def test_a_telemetry_socket_that_blocks_costs_releases_but_no_answer_is_late() -> None:
+    bench = Bench(standing)
+    bench.telemetry = lambda: bench.time.work(5_000)
+    bench.run(2.0)
+    inner, telemetry = bench.timer(INNER.name), bench.timer(TELEMETRY.name)
+    assert telemetry.late == telemetry.ticks
+    assert inner.skipped > 250
+    assert inner.execution.max_us < PERIOD_US
+    assert len(bench.sim.answers) == inner.ticks
+    warnings = [text for text in bench.ground.texts if "skipped" in text]
+    assert len(warnings) == 1
+
+
+def test_a_planner_that_died_is_told_at_once() -> None:
+    bench = Bench(standing)
+    bench.asleep = lambda: (
+        bench.record.mpc.events.append("planner process died (-9), restarted")
+        if len(bench.sim.answers) == 100
+        else None
+    )
+    bench.run(0.5)
+    assert bench.ground.texts == ["planner process died (-9), restarted"]
+
+
+@pytest.mark.parametrize("moment_us", [100, 900, 1_700])
+def test_a_command_acts_on_the_actuators_within_one_tick_of_its_arrival(moment_us: int) -> None:
+    bench = Bench(FlightLoop(flight_config()).tick, FlightState())
+    bench.inbox._commands.append(ARM)
+    arrived: list[int] = []
+
+    def hear_between_two_ticks() -> None:
+        if len(bench.sim.answers) == 200 and not arrived:
+            bench.time.work(moment_us)
+            bench.inbox._commands.append(KILL)
+            arrived.append(bench.time.now_us)
+
+    bench.asleep = hear_between_two_ticks
+    bench.run(0.6)
+    thrust = [(at, sum(outputs.actuators.rotor_thrust)) for at, outputs in bench.sim.answers]
+    running = [at for at, total in thrust if total > 1.0]
+    stopped = [at for at, total in thrust if total == 0.0]
+    assert len(running) >= 199
+    assert max(running) < arrived[0] < min(stopped) <= arrived[0] + PERIOD_US
+
+
+def test_a_disk_that_does_not_answer_delays_no_tick_and_loses_only_log(tmp_path: Path) -> None:
+    answers = threading.Event()
+
+    def stuck(file: int, data: memoryview) -> int:
+        answers.wait(10.0)
+        return len(data)
+
+    log = BlockFile(tmp_path / "log", stuck)
+    log.start_thread()
+    bench = Bench(standing)
+    bench.telemetry = lambda: log.put(bytes(65_536))
+    bench.run(1.0)
+    assert bench.timer(INNER.name).late == 0
+    assert bench.timer(INNER.name).ticks == pytest.approx(500, abs=2)
+    assert log.dropped > 300
+    answers.set()
+    log.close()
