@@ -30,11 +30,6 @@ class Grid:
         self.skipped += steps - 1
         return steps
 
-    def leave_out(self, releases: int) -> None:
-        """Skip releases to come; none where the number is not positive."""
-        self.index += max(releases, 0)
-        self.skipped += max(releases, 0)
-
     @property
     def due_us(self) -> int:
         """When the release of now is or was due."""

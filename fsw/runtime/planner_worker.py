@@ -36,6 +36,11 @@ class PlannerRecord:
     restarts: int = 0
     events: list[str] = field(default_factory=list)  # not yet told to the operator
 
+    def restarted(self, why: str) -> None:
+        """Count a new process and leave a sentence for the operator."""
+        self.restarts += 1
+        self.events.append(f"{why}, restart {self.restarts}")
+
     def count(self, given: Answer, asked_us: int) -> Plan | PlanFailure:
         """Count an answer that is handed out."""
         self.timer.add(given.duration_us, max(given.begun_us - asked_us, 0))
@@ -81,11 +86,12 @@ class ProcessPlanner:
         self._nursery, self._link = start(planner, clock)
         self._answer: Answer | None = None
         self._asked_us = 0  # when the last request was sent
+        self._asked_id = -1
         self._silent_since_us: int | None = None  # while something is to be heard
 
     def submit(self, request: PlanRequest) -> None:
         """Hand a request over; never waits."""
-        self._asked_us = self._clock()
+        self._asked_us, self._asked_id = self._clock(), request.plan_id
         if self._silent_since_us is None:
             self._silent_since_us = self._asked_us
         try:
@@ -130,12 +136,12 @@ class ProcessPlanner:
     def _hear(self, said: Answer | Born | Died) -> None:
         if isinstance(said, Answer):
             self._answer = said
-            self._silent_since_us = None
+            answered = said.result.plan_id == self._asked_id
+            self._silent_since_us = None if answered else self._clock()
         elif isinstance(said, Born):
             self.worker = said.process
         else:
-            self._record.restarts += 1
-            self._record.events.append(f"planner process died ({said.exit_code}), restarted")
+            self._record.restarted(f"planner process died ({said.exit_code})")
 
     def _end_stuck_worker(self) -> None:
         """Kill a worker that does not answer; its nursery starts another one and says so."""
@@ -156,5 +162,4 @@ class ProcessPlanner:
         os.waitpid(self._nursery, 0)
         self._nursery, self._link = start(self._planner, self._clock)
         self._silent_since_us = None
-        self._record.restarts += 1
-        self._record.events.append("planner processes died, restarted")
+        self._record.restarted("planner processes died")

@@ -24,7 +24,7 @@ _SETTLING: Final = 25  # frames until the grid is laid
 _LISTEN_TICKS: Final = 25  # between two looks at when a frame arrives
 _MOST_SHIFT_US: Final = 25.0  # a look; 500 us/s is more than clocks differ
 _GAIN: Final = 0.25
-_REPEATED: Final = 3  # frames that were anticipated, in a row, until a release is left out
+_REPEATED: Final = 3  # frames in a row behind or ahead of their release, until it is another's
 
 
 class SensorLink(Protocol):
@@ -119,8 +119,9 @@ class GridReleases:
         self._offsets: list[int] = []  # arrival minus stamp, while the grid is not laid
         self._readings = first
         self._t_us = first.t_us  # of the last tick
-        self._grid_us = first.t_us  # the same, had every release been taken
-        self._repeated = 0
+        self._grid_us = first.t_us  # of the frame that belongs to the last release
+        self._repeated = 0  # frames in a row that had been anticipated
+        self._ahead = 0  # frames in a row that were ahead of their release
         self._left_out = 0
 
     @property
@@ -166,22 +167,23 @@ class GridReleases:
         if newest is not None:
             self._readings = newest
             if newest.t_us > self._t_us:
-                # A tick so late that the next frame has come too is the next tick as well.
-                grid.leave_out((newest.t_us - self._grid_us) // self._period_us)
-                self._t_us = self._grid_us = newest.t_us
-                self._repeated = 0
+                self._match(newest.t_us)
+                self._t_us, self._repeated = newest.t_us, 0
                 return Release(newest, 0, due_us, begun_us)
-            # Time has run ahead of the frames by a tick: wait for them, or they stay behind.
+            # Time has run ahead of the frames: wait for them once, or they stay behind.
             self._repeated += 1
             if self._repeated >= _REPEATED:
-                self._repeated = 0
-                self._left_out += 1
-                return None
-        t_us = self._t_us + steps * self._period_us
-        stale_us = t_us - self._readings.t_us
-        if stale_us > MOST_STALE * self._period_us:
+                self._repeated, self._grid_us = 0, newest.t_us
+        stale_us = self._grid_us - self._readings.t_us
+        if self._grid_us <= self._t_us or stale_us > MOST_STALE * self._period_us:
             self._left_out += 1
             return None
-        self._t_us = t_us
+        self._t_us = self._grid_us
         self.stale += 1
-        return Release(replace(self._readings, t_us=t_us), stale_us, due_us, begun_us)
+        return Release(replace(self._readings, t_us=self._t_us), stale_us, due_us, begun_us)
+
+    def _match(self, t_us: int) -> None:
+        """Note which frame came to which release: at once behind, for good only if it repeats."""
+        self._ahead = self._ahead + 1 if t_us > self._grid_us else 0
+        if t_us < self._grid_us or self._ahead >= _REPEATED:
+            self._grid_us, self._ahead = t_us, 0

@@ -61,7 +61,7 @@ def test_killing_the_planner_costs_no_barrier(tmp_path: Path, victim: str) -> No
     assert result["completed"], result["end_reason"]
     assert min(result["margins_m"].values()) >= 0.0
     assert vehicle["mpc"]["restarts"] == 1
-    assert vehicle["mpc"]["cycles"] >= 50, "planned on with the new one"
+    assert vehicle["mpc"]["cycles"] > 40, "planned on with the new one"
     assert any("planner process" in text for text in said), said
     for process in (nursery, worker):
         with pytest.raises(ProcessLookupError):

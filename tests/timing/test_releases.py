@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 from collections.abc import Callable
 from itertools import pairwise
 
@@ -126,6 +127,18 @@ def test_a_tick_that_overruns_makes_the_next_late_and_shifts_nothing(
     assert len(late) == (work_us > PERIOD_US)
 
 
+@pytest.mark.parametrize("early_us", [500, 1_500])
+def test_a_frame_that_comes_early_costs_its_predecessor_and_nothing_more(
+    time: VirtualTime, early_us: int
+) -> None:
+    """The simulator was behind and hurries: two frames in one period, once."""
+    loop = Loop(VirtualSensors(time, lambda step: -early_us if step == 100 else 0))
+    ticks = loop.run(300)
+    taken = [step for step in range(1, 301) if step != 99 or early_us == 500]
+    assert stamps(ticks)[: len(taken)] == taken
+    assert loop.releases.skipped + loop.releases.stale <= 2
+
+
 def test_a_clock_that_jumps_ahead_skips_and_keeps_the_grid(time: VirtualTime) -> None:
     """The machine was suspended: wall time has passed, and no sensor frame came meanwhile."""
     sensors = VirtualSensors(time)
@@ -182,3 +195,28 @@ def test_silence_ends_in_nothing_to_tick_on_so_that_the_loop_can_look_at_its_clo
     loop.run(1_200)
     assert loop.nothing > 1_000
     assert len(loop.ticks) == 50 + MOST_STALE
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_whatever_a_noisy_machine_did_afterwards_every_frame_has_its_tick(
+    time: VirtualTime, seed: int
+) -> None:
+    """Both halves are stopped at random for up to 30 ms over 4 s, then left alone."""
+    dice = random.Random(seed)
+    noisy = 2_000
+    pauses = {step: dice.randint(500, 30_000) for step in dice.sample(range(30, noisy), 60)}
+    delays, behind = [], 0
+    for step in range(noisy):
+        behind = max(behind - PERIOD_US + 50, pauses.get(step, 0), dice.randint(0, 80))
+        delays.append(behind)
+    loop = Loop(VirtualSensors(time, lambda step: delays[step] if step < noisy else 20))
+    loop.work_us = lambda tick: dice.randint(500, 30_000) if dice.random() < 0.02 else 150
+    while time.now_us < 50_000_000 + noisy * PERIOD_US + 60_000:
+        loop.run(1)
+    loop.work_us = lambda tick: 150
+    loop.run(50)
+    missing = loop.releases.stale + loop.releases.skipped
+    ticks = loop.run(500)
+    assert loop.releases.stale + loop.releases.skipped == missing
+    assert stamps(ticks) == list(range(stamps(ticks)[0], stamps(ticks)[0] + 500))
+    assert len(loop.ticks) > 0.7 * stamps(ticks)[-1]
