@@ -142,13 +142,18 @@ def _figures(vehicle: dict[str, Any], watch: Watch) -> dict[str, dict[str, float
     link = [stages[name] for name in _LINK if name in stages]
     return {
         "wake_up": {"p50_us": inner["lateness_p50_us"], "p99_us": inner["lateness_p99_us"]},
-        "ticks": {"late_share": inner["late_share"]},
+        "ticks": {"late_share": _missed(inner) / max(inner["ticks"] + inner["skipped"], 1)},
         "tick": stages["tick"],
         "link": {"p50_us": sum(stage["p50_us"] for stage in link)},
         "mpc": mpc,
         "plans": {"missed_deadlines": mpc["missed_deadlines"]},
         "memory": {"resident_mb": watch.resident_mb, "growth_mb": watch.growth_mb},
     }
+
+
+def _missed(inner: dict[str, Any]) -> int:
+    """Releases that were not over by the next one: late ticks, and those that never ran."""
+    return int(inner["late"] + inner["skipped"])
 
 
 class Hog(subprocess.Popen[bytes]):
