@@ -34,7 +34,7 @@ def main(path: Path) -> None:
         ),
     )  # fmt: skip
     thread(
-        d, (406.0, 382.0), 268.0, ORANGE, "log threads, one a file",
+        d, (406.0, 382.0), 268.0, ORANGE, "log threads, FIFO 49",
         ("write blocks in order", "wait: the disk; what has no", "room meanwhile is dropped"),
     )  # fmt: skip
     process(d, (820.0, 50.0), (240.0, 190.0), "process worker")

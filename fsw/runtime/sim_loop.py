@@ -25,6 +25,7 @@ from fsw.runtime.process import StopRequest
 from fsw.runtime.program import FlightProgram, State
 from fsw.runtime.rate_group import RateGroupRunner
 from fsw.runtime.rates import HOUSEKEEPING, INNER, MPC, RATE_GROUPS, TELEMETRY, Member
+from fsw.runtime.realtime import rank_threads
 from fsw.runtime.releases import GridReleases, Release, Releases, StepReleases
 from fsw.runtime.slips import Slips, SlipWarning
 from fsw.runtime.timing import GroupTimer, Histogram
@@ -152,6 +153,7 @@ class SimLoop(Generic[State]):
         release: Release | None = Release(first, 0, heard, heard)
         index, t_us = -1, first.t_us
         self._files.ulog.begin(t_us, lockstep=self._sim.pacing is Pacing.LOCKSTEP)
+        rank_threads()  # now that the logs have theirs
         while not self._stop.requested:
             if release is not None:
                 t_us = release.sensors.t_us

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import threading
 from pathlib import Path
 
 import pytest
@@ -51,6 +52,32 @@ def test_what_is_granted_is_in_force() -> None:
     granted = "real-time scheduling" not in refused
     assert scheduler == ("SCHED_FIFO 50" if granted else "SCHED_OTHER")
     assert slack in ("0", "1")
+
+
+def test_no_thread_is_left_behind_that_could_hold_the_interpreter() -> None:
+    reading, writing = os.pipe()
+    child = os.fork()
+    if child == 0:
+        waiting = threading.Event()
+        helper = threading.Thread(target=waiting.wait, daemon=True)
+        helper.start()
+        refused = realtime.claim_real_time(realtime.TICK_PRIORITY)
+        realtime.rank_threads()
+        assert helper.native_id is not None
+        policy = os.sched_getscheduler(helper.native_id)
+        lower = os.sched_getparam(helper.native_id).sched_priority < realtime.TICK_PRIORITY
+        realtime.release_real_time()
+        after = os.sched_getscheduler(helper.native_id)
+        os.write(writing, f"{','.join(refused)}|{policy}|{lower}|{after}".encode())
+        os._exit(0)
+    os.waitpid(child, 0)
+    refused, policy, lower, after = os.read(reading, 200).decode().split("|")
+    os.close(reading)
+    os.close(writing)
+    granted = "real-time scheduling" not in refused
+    assert int(policy) == (os.SCHED_FIFO if granted else os.SCHED_OTHER)
+    assert lower == "True"
+    assert int(after) == os.SCHED_OTHER
 
 
 def test_every_group_s_timing_says_which_group_it_is() -> None:
