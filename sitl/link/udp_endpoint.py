@@ -13,7 +13,7 @@ import socket
 import struct
 from typing import Final
 
-from sitl.link.eager import EagerReceiver
+from messages.eager import EagerReceiver
 
 Address = tuple[str, int]
 

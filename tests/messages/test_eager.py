@@ -5,14 +5,11 @@ from __future__ import annotations
 import socket
 import struct
 import time
-from types import ModuleType
 
 import pytest
 
-import fsw.link.eager
-import sitl.link.eager
+from messages.eager import EagerReceiver
 
-BOTH = pytest.mark.parametrize("module", [fsw.link.eager, sitl.link.eager])
 PATIENCE_S = 0.02
 
 
@@ -24,19 +21,17 @@ def connected() -> tuple[socket.socket, socket.socket]:
     return one, other
 
 
-@BOTH
-def test_datagrams_come_in_order_whether_looked_for_or_slept_on(module: ModuleType) -> None:
+def test_datagrams_come_in_order_whether_looked_for_or_slept_on() -> None:
     one, other = connected()
-    receive = module.EagerReceiver(one, 100)
+    receive = EagerReceiver(one, 100)
     for number in range(50):
         other.send(bytes([number]))
     assert [receive() for _ in range(50)] == [bytes([number]) for number in range(50)]
 
 
-@BOTH
-def test_silence_ends_with_the_sockets_patience(module: ModuleType) -> None:
+def test_silence_ends_with_the_sockets_patience() -> None:
     one, _other = connected()
-    receive = module.EagerReceiver(one, 100)
+    receive = EagerReceiver(one, 100)
     begin = time.perf_counter()
     with pytest.raises(BlockingIOError):
         receive()
@@ -56,10 +51,9 @@ class Slow:
         return b"late"
 
 
-@BOTH
-def test_looking_in_vain_is_given_up_for_a_while_and_tried_again(module: ModuleType) -> None:
+def test_looking_in_vain_is_given_up_for_a_while_and_tried_again() -> None:
     slow = Slow()
-    receive = module.EagerReceiver(slow, 100)
+    receive = EagerReceiver(slow, 100)  # type: ignore[arg-type]
     looked = []
     for _ in range(5520):
         before = slow.looks
@@ -70,10 +64,9 @@ def test_looking_in_vain_is_given_up_for_a_while_and_tried_again(module: ModuleT
     assert looked[5010:5013] == [True, True, False]
 
 
-@BOTH
-def test_one_late_answer_in_fifty_does_not_end_the_looking(module: ModuleType) -> None:
+def test_one_late_answer_in_fifty_does_not_end_the_looking() -> None:
     one, other = connected()
-    receive = module.EagerReceiver(one, 100)
+    receive = EagerReceiver(one, 100)
     for _ in range(20):
         for _ in range(49):
             other.send(b"x")
