@@ -10,17 +10,17 @@ from typing import TYPE_CHECKING, Any
 from fsw.arguments import FswOptions
 from fsw.link import link_report
 from fsw.link.build_links import build_links
-from fsw.link.flight_logs import FlightLog, flight_logs
-from fsw.link.ftp_service import FtpService
+from fsw.link.files.flight_logs import FlightLog, flight_logs
+from fsw.link.files.ftp_service import FtpService
+from fsw.link.files.log_service import LogService
+from fsw.link.files.vehicle_files import vehicle_files
 from fsw.link.inbox import Inbox
 from fsw.link.link_choice import AUTOPILOTS, addresses
-from fsw.link.log_service import LogService
-from fsw.link.mission_service import MissionService
-from fsw.link.service import LinkService
+from fsw.link.services.mission_service import MissionService
+from fsw.link.services.service import LinkService
 from fsw.link.sim_link import Pacing, SimLink
-from fsw.link.telemetry import LoopHealth, TelemetryContext
 from fsw.link.udp_endpoint import LinkError, parse_address
-from fsw.link.vehicle_files import vehicle_files
+from fsw.link.wire.telemetry_context import LoopHealth, TelemetryContext
 from fsw.log.flight_log import LogSubject
 from fsw.log.revision import revision
 from fsw.log.run_directory import new_run_directory
@@ -163,7 +163,7 @@ class _Session:
     ) -> tuple[LinkService, ...]:
         """What one link serves; called once a link."""
         # Its table of parameters knows all that flies, as the program does.
-        from fsw.link.parameter_service import ParameterService
+        from fsw.link.services.parameter_service import ParameterService
 
         parameters = ParameterService(program.parameters)
         missions = MissionService(program.missions)

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from fsw.link.streams import STREAMS
+from fsw.link.telemetry.streams import STREAMS
 from pandion.display import Display
 from pandion.flood_monitor import Heard, Monitor
 from pandion.flood_traffic import SYSTEM

@@ -10,13 +10,13 @@ import sys
 from pathlib import Path
 from typing import Final
 
-from fsw.link import message_ids as ids
-from fsw.link.ftp_service import FtpService
+from fsw.link.files.ftp_service import FtpService
+from fsw.link.files.log_service import LogService
 from fsw.link.inbox import Inbox
-from fsw.link.log_service import LogService
-from fsw.link.parameter_service import ParameterService
-from fsw.link.streams import AT_ONCE, ON_REQUEST, STREAMS
-from fsw.link.time_service import TimeService
+from fsw.link.services.parameter_service import ParameterService
+from fsw.link.services.time_service import TimeService
+from fsw.link.telemetry.streams import AT_ONCE, ON_REQUEST, STREAMS
+from fsw.link.wire import message_ids as ids
 from messages.reference import Traffic, reference
 
 # What the vehicle says in answer, or as it happens, beside the streams.

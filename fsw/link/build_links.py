@@ -8,13 +8,13 @@ from typing import Final
 from fsw.link.gcs_link import GcsLink, LinkSetup, RecordFrame
 from fsw.link.ground_links import GroundLinks
 from fsw.link.inbox import Inbox
-from fsw.link.key_file import KeyFile
 from fsw.link.link_choice import LinkChoice, addresses, default_keys
-from fsw.link.service import LinkService
-from fsw.link.signing import Signing
-from fsw.link.streams import API_RATES, GROUND_RATES
-from fsw.link.telemetry import TelemetryContext
-from fsw.link.time_service import TimeService
+from fsw.link.services.service import LinkService
+from fsw.link.services.time_service import TimeService
+from fsw.link.signing.key_file import KeyFile
+from fsw.link.signing.signing import Signing
+from fsw.link.telemetry.streams import API_RATES, GROUND_RATES
+from fsw.link.wire.telemetry_context import TelemetryContext
 from fsw.ports import Clock
 
 _GCS_PORT: Final = 18570  # of our own, as PX4 has it, if they are free

@@ -10,20 +10,20 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from fsw.link import encode_replies, message_ids
-from fsw.link.dispatch import Dispatch
 from fsw.link.inbox import Inbox
-from fsw.link.link_commands import LinkCommands
-from fsw.link.message_ids import AUTOPILOT
 from fsw.link.outbox import Outbox, packed
 from fsw.link.peers import Peers
-from fsw.link.service import LinkService
-from fsw.link.signing import Signing, Verdict
-from fsw.link.signing_setup import set_up_signing
-from fsw.link.stream_rates import StreamRates
-from fsw.link.streams import AT_ONCE, HEARTBEAT, STREAMS, Stream
-from fsw.link.telemetry import TelemetryContext
+from fsw.link.services.dispatch import Dispatch
+from fsw.link.services.service import LinkService
+from fsw.link.signing.signing import Signing, Verdict
+from fsw.link.signing.signing_setup import set_up_signing
+from fsw.link.telemetry.link_commands import LinkCommands
+from fsw.link.telemetry.stream_rates import StreamRates
+from fsw.link.telemetry.streams import AT_ONCE, HEARTBEAT, STREAMS, Stream
 from fsw.link.udp_endpoint import Address, OpenEndpoint
+from fsw.link.wire import encode_replies, message_ids
+from fsw.link.wire.message_ids import AUTOPILOT
+from fsw.link.wire.telemetry_context import TelemetryContext
 from fsw.ports import Clock
 from fsw.signals import CommandAck, FlightSnapshot, TickOutputs
 from messages.frames import Frame, Losses, cut

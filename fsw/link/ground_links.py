@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from typing import Final
 
 from fsw.link.gcs_link import GcsLink
-from fsw.link.px4_mode import shown_mode
-from fsw.link.stream_rates import SLOT_US
+from fsw.link.telemetry.stream_rates import SLOT_US
+from fsw.link.wire.px4_mode import shown_mode
 from fsw.ports import Clock
 from fsw.signals import CommandAck, TickOutputs
 

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Final, cast
 
-from fsw.link import decode, decode_setpoints, message_ids
-from fsw.link.decode import Numbers
+from fsw.link.wire import decode, decode_setpoints, message_ids
+from fsw.link.wire.decode import Numbers
 from fsw.signals import (
     AttitudeSetpoint,
     CommandRequest,

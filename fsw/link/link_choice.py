@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Final
 
 from fsw.geometry.geodesy import DEFAULT_ORIGIN
-from fsw.link.telemetry import GENERIC, PX4
 from fsw.link.udp_endpoint import Address, LinkError, parse_address
+from fsw.link.wire.telemetry_context import GENERIC, PX4
 from fsw.signals import Origin
 
 NO_LINK: Final = "none"

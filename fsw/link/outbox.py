@@ -5,10 +5,10 @@ from __future__ import annotations
 import struct
 from typing import Final
 
-from fsw.link import encode_replies, message_ids
-from fsw.link.message_ids import AUTOPILOT, PANDION, SYSTEM_ID
-from fsw.link.service import Outgoing, WireValues
-from fsw.link.signing import Signing
+from fsw.link.signing.signing import Signing
+from fsw.link.wire import encode_replies, message_ids
+from fsw.link.wire.message_ids import AUTOPILOT, PANDION, SYSTEM_ID
+from fsw.link.wire.outgoing import Outgoing, WireValues
 from fsw.signals import StatusText
 from messages.frames import FrameWriter
 

@@ -10,13 +10,13 @@ from __future__ import annotations
 from enum import Enum
 from typing import Final, cast
 
-from fsw.link import decode, encode_replies, message_ids
-from fsw.link.decode import Numbers
 from fsw.link.inbox import Inbox
-from fsw.link.message_ids import AUTOPILOT, SYSTEM_ID
-from fsw.link.px4_mode import custom_mode
-from fsw.link.telemetry import VehicleFacts
 from fsw.link.udp_endpoint import Address, ConnectedEndpoint
+from fsw.link.wire import decode, encode_replies, message_ids
+from fsw.link.wire.decode import Numbers
+from fsw.link.wire.message_ids import AUTOPILOT, SYSTEM_ID
+from fsw.link.wire.px4_mode import custom_mode
+from fsw.link.wire.telemetry_context import VehicleFacts
 from fsw.signals import CommandAck, FlightSnapshot, Mode, SensorFrame, TickOutputs
 from messages.convoy import ConvoyReader
 from messages.frames import Frame, FrameWriter, split

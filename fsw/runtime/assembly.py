@@ -8,8 +8,8 @@ from typing import Any, cast
 
 from fsw.control.cascade import Inner
 from fsw.geometry.geodesy import DEFAULT_ORIGIN, to_local
-from fsw.link.mission_store import MissionStore, Site
-from fsw.link.telemetry import VehicleFacts
+from fsw.link.services.mission_store import MissionStore, Site
+from fsw.link.wire.telemetry_context import VehicleFacts
 from fsw.mpc.planner import Planner
 from fsw.mpc.planner_config import Solver
 from fsw.parameters.control_choice import ControlChoice

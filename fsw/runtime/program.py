@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Generic, TypeVar
 
-from fsw.link.mission_store import MissionStore
-from fsw.link.telemetry import VehicleFacts
+from fsw.link.services.mission_store import MissionStore
+from fsw.link.wire.telemetry_context import VehicleFacts
 from fsw.ports import Planner
 from fsw.signals import TickInputs, TickOutputs
 

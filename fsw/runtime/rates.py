@@ -38,7 +38,7 @@ class RateGroup:
 
 INNER: Final = RateGroup("inner", 0, 2_000, (Member.HEAR, Member.TICK, Member.ACTUATE))
 MPC: Final = RateGroup("mpc", 1, 100_000, (Member.ASK,))
-# Every stream of messages has a rate of its own, in whole ticks: fsw/link/streams.py.
+# Every stream of messages has a rate of its own, in whole ticks: fsw/link/telemetry/streams.py.
 TELEMETRY: Final = RateGroup("telemetry", 2, 2_000, (Member.PUBLISH, Member.RECORD))
 HOUSEKEEPING: Final = RateGroup(
     "housekeeping", 3, 1_000_000, (Member.SUM_UP, Member.WARN, Member.WATCH_FILES)

@@ -13,9 +13,9 @@ from typing import Final, Generic
 
 from fsw.link.ground_links import GroundLinks
 from fsw.link.inbox import Inbox
-from fsw.link.message_ids import PATH_PLANNER, SYSTEM_ID
 from fsw.link.sim_link import Pacing, SimLink
-from fsw.link.telemetry import GroupTiming, LoopHealth
+from fsw.link.wire.message_ids import PATH_PLANNER, SYSTEM_ID
+from fsw.link.wire.telemetry_context import GroupTiming, LoopHealth
 from fsw.log.run_files import RunFiles
 from fsw.ports import Clock, PlanService
 from fsw.runtime.effort import EffortRecord

@@ -18,7 +18,7 @@ from mcap.reader import make_reader
 from pyulog import ULog
 
 from tests.cli.command import clean_up, one_sentence, pandion, start
-from tests.link.halves import free_port
+from tests.processes.halves import free_port
 
 FLIGHT = ("fly", "walls", "--lockstep", "--seed", "5", "--duration", "2")
 

@@ -20,10 +20,10 @@ from typing import Any
 import pytest
 from pymavlink import mavutil
 
-from fsw.link.streams import STREAMS
+from fsw.link.telemetry.streams import STREAMS
 from messages.frames import Frame, FrameWriter, split
 from tests.cli.command import clean_up, group_is_empty, pandion, read_until, start
-from tests.link.halves import free_port
+from tests.processes.halves import free_port
 
 KEYS = [
     "scenario", "controller", "seed", "duration_s", "completed", "end_reason",

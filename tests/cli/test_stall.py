@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from tests.cli.command import clean_up, group_is_empty, read_until, start
-from tests.link.halves import free_port
+from tests.processes.halves import free_port
 
 
 def half_of(parent: int, module: str) -> int:

@@ -18,10 +18,10 @@ from random import Random
 
 import pytest
 
-from fsw.link import message_ids as ids
-from fsw.link.mission_service import MissionService
-from fsw.link.mission_store import MissionStore, Site
-from fsw.link.streams import STREAMS
+from fsw.link.services.mission_service import MissionService
+from fsw.link.services.mission_store import MissionStore, Site
+from fsw.link.telemetry.streams import STREAMS
+from fsw.link.wire import message_ids as ids
 from fsw.log.flight_log import FlightLog, LogSubject
 from fsw.log.reference import inserted
 from fsw.log.tlog import TlogWriter
@@ -37,8 +37,8 @@ from pandion.result import Parts, as_json
 from sitl.link.encode import StepEncoder
 from sitl.scenario_file import load_scenario, scenario_names
 from sitl.simulation import Simulation
+from tests.fsw.link.snapshots import outputs_at
 from tests.fsw.log.specimens import inputs
-from tests.link.snapshots import outputs_at
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"

@@ -12,11 +12,11 @@ from pathlib import Path
 
 import pytest
 
-from fsw.link.streams import STREAMS
+from fsw.link.telemetry.streams import STREAMS
 from messages import dialect
 from messages.frames import FrameWriter
 from tests.cli.command import environment, one_sentence, pandion
-from tests.link.snapshots import CONTEXT, outputs_at
+from tests.fsw.link.snapshots import CONTEXT, outputs_at
 
 PRIVATE = {id_: message.msgname for id_, message in dialect.mavlink_map.items() if id_ > 60199}
 PORT = 14550

@@ -12,7 +12,7 @@ import pytest
 
 from fsw.link.inbox import Inbox
 from fsw.link.sim_link import Pacing
-from fsw.link.telemetry import LoopHealth
+from fsw.link.wire.telemetry_context import LoopHealth
 from fsw.log.block_file import BlockFile
 from fsw.parameters.flight_config import flight_config
 from fsw.runtime.effort import EffortRecord
@@ -33,7 +33,7 @@ from fsw.signals import (
     TickOutputs,
 )
 from messages import dialect
-from tests.link.snapshots import FACTS, outputs_at
+from tests.fsw.link.snapshots import FACTS, outputs_at
 from tests.timing.virtual_time import FIRST_US, PERIOD_US, VirtualSensors, VirtualTime, frame
 
 Tick = Callable[[Any, TickInputs], tuple[Any, TickOutputs]]

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from fsw.link import encode_dialect
+from fsw.link.wire import encode_dialect
 from fsw.runtime import realtime
 from fsw.runtime.process import settle_memory
 from fsw.runtime.rates import RATE_GROUPS
-from tests.link.snapshots import CONTEXT, outputs_at
+from tests.fsw.link.snapshots import CONTEXT, outputs_at
 
 
 def test_what_is_refused_is_named_and_nothing_raises(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -22,9 +22,9 @@ from fsw.log.flight_log import FlightLog
 from fsw.log.reader import Gap, LoggedTick, open_flight, ticks
 from fsw.log.run_files import RunFiles
 from fsw.signals import SensorFrame, TickInputs
+from tests.fsw.link.snapshots import outputs_at
 from tests.fsw.log.specimens import inputs
 from tests.fsw.log.test_recorded_inputs import SUBJECT
-from tests.link.snapshots import outputs_at
 
 _THREE = (0.5, 0.5, 0.5)
 STILL = SensorFrame(0, _THREE, _THREE, (1.0, 0.0, 0.0, 0.0), _THREE, _THREE, (0.5,) * 2, (0.5,) * 2)

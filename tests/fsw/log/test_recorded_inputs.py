@@ -18,8 +18,8 @@ from fsw.log.flight_log import FlightLog, LogSubject
 from fsw.log.input_text import InputText
 from fsw.log.reader import LoggedTick, open_flight, ticks
 from fsw.signals import Mode, PlanTimings, SensorFrame, TickInputs
+from tests.fsw.link.snapshots import outputs_at
 from tests.fsw.log.specimens import inputs
-from tests.link.snapshots import outputs_at
 
 SUBJECT = LogSubject(
     {"ver_sw": "a test"}, {"airframe.mass": 3.5}, {"PD_ROLL_P": 50.0}, 16.0, (0.15, 0.15)

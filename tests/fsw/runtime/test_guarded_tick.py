@@ -6,7 +6,7 @@ import pytest
 
 from fsw.runtime.guarded_tick import PATIENCE_TICKS, GuardedTick
 from fsw.signals import CommandAck, SensorFrame, TickInputs, TickOutputs
-from tests.link.snapshots import ACTUATORS, outputs_at
+from tests.fsw.link.snapshots import ACTUATORS, outputs_at
 
 INPUTS = TickInputs(
     SensorFrame(

@@ -1,0 +1,67 @@
+"""Component metadata: documents over FTP that tell a ground station units, ranges and meanings.
+
+Source: https://mavlink.io/en/services/component_information.html
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+from typing import Final
+
+from fsw.link.files.ftp_tree import Node
+from fsw.link.files.served_file import MemoryFile
+from fsw.link.wire import message_ids
+from fsw.link.wire.outgoing import Outgoing
+from fsw.link.wire.telemetry_context import TelemetryContext
+from fsw.signals import FlightSnapshot
+
+_GENERAL: Final = "general.json"
+_PARAMETERS: Final = "parameters.json"
+
+
+def metadata_files() -> dict[str, Node]:
+    """The documents, by their names in the root of the tree."""
+    _general_crc()  # made now, so that no tick has to
+    return {_GENERAL: MemoryFile(_general), _PARAMETERS: MemoryFile(_parameters)}
+
+
+def component_metadata(
+    _: float, snapshot: FlightSnapshot, __: TelemetryContext
+) -> Sequence[Outgoing]:
+    """COMPONENT_METADATA: where the general document is."""
+    uri = _uri(_GENERAL).encode()
+    values = (snapshot.t_us // 1000, _general_crc(), uri)
+    return [Outgoing(message_ids.COMPONENT_METADATA, values)]
+
+
+def _uri(name: str) -> str:
+    return f"mftp:///{name}"
+
+
+# The table of parameters knows all that flies and is slow to import: it must not be imported
+# before the command line has been found right.
+@cache
+def _parameters() -> bytes:
+    from fsw.parameters.metadata import parameter_document
+
+    return parameter_document()
+
+
+@cache
+def _general() -> bytes:
+    from fsw.parameters.metadata import general_document
+
+    try:
+        firmware = version("pandion")
+    except PackageNotFoundError:
+        firmware = "0.0.0"
+    return general_document(_uri(_PARAMETERS), firmware)
+
+
+@cache
+def _general_crc() -> int:
+    from fsw.parameters.metadata import metadata_crc
+
+    return metadata_crc(_general())

@@ -1,0 +1,79 @@
+"""Answers of MAVLink FTP that take more than a moment."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Generator, Iterator
+from typing import Final, TypeAlias
+
+from fsw.link.files.ftp_message import MAX_DATA, Opcode, Refusal, Reply, Request, refused
+from fsw.link.files.ftp_sessions import Session
+from fsw.link.files.served_file import OpenFile, ServedFile
+
+Job: TypeAlias = Generator[Reply | None, None, None]
+"""Yields what to send, and None where it has to go on at the next tick."""
+
+_BURST: Final = 256  # messages; then the client asks on: one that has gone is not served for long
+_CRC_PIECE: Final = 1 << 16  # bytes a tick, about 30 µs
+_ALL_ONES: Final = 0xFFFFFFFF
+
+
+def read(request: Request, session: Session) -> Job:
+    """One piece of a file."""
+    yield from _piece(request, session, request.offset, burst_complete=False)
+
+
+def burst(request: Request, session: Session) -> Job:
+    """Piece after piece, to the end of the file or of the burst."""
+    size = request.size or MAX_DATA
+    end = session.file.size
+    for number in range(_BURST):
+        offset = request.offset + number * size
+        last = number == _BURST - 1 or offset + size >= end
+        yield from _piece(request, session, offset, burst_complete=last)
+        if last:
+            return
+
+
+def _piece(request: Request, session: Session, offset: int, *, burst_complete: bool) -> Job:
+    if offset >= session.file.size:
+        yield refused(Refusal.END_OF_FILE)
+        return
+    try:
+        for data in _delivered(session.file, offset, request.size or MAX_DATA):
+            yield (Reply(Opcode.ACK, None, offset, data, burst_complete) if data else None)
+    except OSError:
+        yield refused(Refusal.FAIL)
+
+
+def checksum(served: ServedFile) -> Job:
+    """The CRC-32 of a whole file, without the inversions at both ends that zlib's has."""
+    try:
+        file = served.open()
+    except OSError:
+        yield refused(Refusal.FILE_NOT_FOUND)
+        return
+    try:
+        crc = _ALL_ONES
+        for offset in range(0, file.size, _CRC_PIECE):
+            for data in _delivered(file, offset, _CRC_PIECE):
+                crc = crc if data is None else zlib.crc32(data, crc)
+                yield None
+        yield Reply(Opcode.ACK, data=(crc ^ _ALL_ONES).to_bytes(4, "little"))
+    except OSError:
+        yield refused(Refusal.FAIL)
+    finally:
+        file.close()
+
+
+def _delivered(file: OpenFile, offset: int, count: int) -> Iterator[bytes | None]:
+    """Nones while the disk has not delivered, then the data.
+
+    Raises:
+        OSError: The file cannot be read, or has become shorter.
+    """
+    while (data := file.read(offset, count)) is None:
+        yield None
+    if not data:
+        raise OSError("the file has become shorter")
+    yield data

@@ -1,0 +1,201 @@
+"""MAVLink FTP, to read only: every request is answered, with a refusal if need be.
+
+Reads, bursts and checksums are jobs: they go on a little each tick and wait for no disk.
+
+Source: https://mavlink.io/en/services/ftp.html
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final, cast
+
+from fsw.link.files import ftp_jobs
+from fsw.link.files.ftp_jobs import Job
+from fsw.link.files.ftp_message import Opcode, Refusal, Reply, Request, read, refused, write
+from fsw.link.files.ftp_sessions import Client, Session, Sessions
+from fsw.link.files.ftp_tree import Directory, find, listing
+from fsw.link.wire import message_ids
+from fsw.link.wire.decode import for_this_vehicle
+from fsw.link.wire.outgoing import Outgoing
+from messages.frames import Frame
+
+_FRAMES: Final = 10  # a tick: two datagrams
+_MAX_JOBS: Final = 12
+_MAX_REMEMBERED: Final = 8  # clients
+_REMEMBERED_US: Final = 3_000_000  # a client has given up repeating by then
+_WRITES: Final = range(Opcode.CREATE_FILE, Opcode.RENAME + 1)
+_NO_SESSION: Final = -1
+
+
+@dataclass(frozen=True, slots=True)
+class _Answered:
+    """A request that must not be carried out twice, because it opens or closes a session."""
+
+    payload: bytes
+    answer: Outgoing
+    t_us: int
+
+
+@dataclass(slots=True)
+class _Running:
+    client: Client
+    request: Request
+    job: Job
+    sequence: int  # of the last message
+
+
+class FtpService:
+    """Serves one tree of files on one link."""
+
+    message_ids = frozenset({message_ids.FILE_TRANSFER_PROTOCOL})
+
+    def __init__(self, root: Directory) -> None:
+        self._root = root
+        self._sessions = Sessions()
+        self._answered: dict[Client, _Answered] = {}
+        self._jobs: dict[tuple[Client, int], _Running] = {}
+        self._at_once: dict[int, Callable[[Request, Client, int], Reply]] = {
+            Opcode.TERMINATE_SESSION: self._terminate,
+            Opcode.RESET_SESSIONS: self._reset,
+            Opcode.LIST_DIRECTORY: self._list_directory,
+            Opcode.OPEN_FILE_RO: self._open,
+        }
+        self._in_time: dict[int, Callable[[Request, Client, int], Reply | None]] = {
+            Opcode.READ_FILE: self._read,
+            Opcode.BURST_READ_FILE: self._read,
+            Opcode.CALC_FILE_CRC32: self._checksum,
+        }
+
+    def receive(self, frame: Frame, t_us: int) -> Sequence[Outgoing]:
+        """Answer a request, or start the job that will."""
+        _, system, component, *payload = cast("tuple[int, ...]", frame.payload_values)
+        if not for_this_vehicle(system, component):
+            return ()
+        client, packed = (frame.system_id, frame.component_id), bytes(payload)
+        before = self._answered.get(client)
+        if before and before.payload == packed and t_us - before.t_us < _REMEMBERED_US:
+            return [before.answer]
+        request = read(packed)
+        reply = self._answer(request, client, t_us)
+        if reply is None:
+            return ()
+        answer = _outgoing(reply, request, request.sequence + 1, client)
+        if request.opcode in (Opcode.OPEN_FILE_RO, Opcode.TERMINATE_SESSION):
+            self._remember(client, _Answered(packed, answer, t_us))
+        return [answer]
+
+    def poll(self, t_us: int) -> Sequence[Outgoing]:
+        """Go on with the jobs, each in its turn."""
+        if not self._jobs:
+            return ()
+        answers: list[Outgoing] = []
+        ready = list(self._jobs)
+        while ready and len(answers) < _FRAMES:
+            key = ready.pop(0)
+            running = self._jobs.pop(key)
+            try:
+                reply = next(running.job)
+            except StopIteration:
+                continue
+            self._jobs[key] = running
+            if reply is not None:
+                running.sequence += 1
+                answers.append(_outgoing(reply, running.request, running.sequence, running.client))
+                ready.append(key)
+        return answers
+
+    def _answer(self, request: Request, client: Client, t_us: int) -> Reply | None:
+        """The answer; None if a job gives it."""
+        if request.damaged:
+            return refused(Refusal.INVALID_DATA_SIZE)
+        handler = self._at_once.get(request.opcode) or self._in_time.get(request.opcode)
+        if handler is not None:
+            return handler(request, client, t_us)
+        if request.opcode in _WRITES:
+            return refused(Refusal.FILE_PROTECTED)
+        return refused(Refusal.UNKNOWN_COMMAND)
+
+    def _terminate(self, request: Request, client: Client, t_us: int) -> Reply:
+        if self._sessions.of(client, request.session) is None:
+            return refused(Refusal.INVALID_SESSION)
+        self._close(client, request.session)
+        return Reply(Opcode.ACK)
+
+    def _reset(self, request: Request, client: Client, t_us: int) -> Reply:
+        # Those of the client: another ground station goes on with its download.
+        for number in self._sessions.numbers_of(client):
+            self._close(client, number)
+        return Reply(Opcode.ACK)
+
+    def _list_directory(self, request: Request, client: Client, t_us: int) -> Reply:
+        directory = find(self._root, request.path)
+        if not isinstance(directory, Mapping):
+            return refused(Refusal.FILE_NOT_FOUND)
+        entries = listing(directory, request.offset)
+        if not entries:
+            return refused(Refusal.END_OF_FILE)
+        return Reply(Opcode.ACK, offset=request.offset, data=entries)
+
+    def _open(self, request: Request, client: Client, t_us: int) -> Reply:
+        node = find(self._root, request.path)
+        if node is None or isinstance(node, Mapping):
+            return refused(Refusal.FILE_NOT_FOUND)
+        number = self._sessions.room(client, request.session, t_us)
+        if number is None:
+            return refused(Refusal.NO_SESSIONS_AVAILABLE)
+        try:
+            file = node.open()
+        except OSError:
+            return refused(Refusal.FILE_NOT_FOUND)
+        self._sessions.add(client, number, Session(file, t_us))
+        return Reply(Opcode.ACK, session=number, data=file.size.to_bytes(4, "little"))
+
+    def _read(self, request: Request, client: Client, t_us: int) -> Reply | None:
+        session = self._sessions.of(client, request.session)
+        if session is None:
+            return refused(Refusal.INVALID_SESSION)
+        session.used_us = t_us
+        burst = request.opcode == Opcode.BURST_READ_FILE
+        self._start(request, client, (ftp_jobs.burst if burst else ftp_jobs.read)(request, session))
+        return None
+
+    def _checksum(self, request: Request, client: Client, t_us: int) -> Reply | None:
+        running = self._jobs.get((client, _NO_SESSION))
+        if running is not None and running.request == request:
+            return None  # asked again because it takes long
+        node = find(self._root, request.path)
+        if node is None or isinstance(node, Mapping):
+            return refused(Refusal.FILE_NOT_FOUND)
+        if len(self._jobs) >= _MAX_JOBS:
+            return refused(Refusal.FAIL)
+        self._start(request, client, ftp_jobs.checksum(node))
+        return None
+
+    def _start(self, request: Request, client: Client, job: Job) -> None:
+        """Begin a job; it takes the place of the one that the client had there."""
+        reads = request.opcode != Opcode.CALC_FILE_CRC32
+        key = client, request.session if reads else _NO_SESSION
+        self._stop(key)
+        self._jobs[key] = _Running(client, request, job, request.sequence)
+
+    def _stop(self, key: tuple[Client, int]) -> None:
+        running = self._jobs.pop(key, None)
+        if running is not None:
+            running.job.close()
+
+    def _close(self, client: Client, number: int) -> None:
+        self._stop((client, number))
+        self._sessions.close(client, number)
+
+    def _remember(self, client: Client, answered: _Answered) -> None:
+        self._answered.pop(client, None)
+        self._answered[client] = answered
+        if len(self._answered) > _MAX_REMEMBERED:
+            del self._answered[next(iter(self._answered))]
+
+
+def _outgoing(reply: Reply, request: Request, sequence: int, client: Client) -> Outgoing:
+    payload = write(reply, request, sequence)
+    return Outgoing(message_ids.FILE_TRANSFER_PROTOCOL, (0, *client, *payload))

@@ -1,0 +1,157 @@
+"""Log download: LOG_REQUEST_LIST, LOG_REQUEST_DATA and what follows from them.
+
+The size of a log is the one that was last listed, so that a client gets exactly the file it was
+told about even while the flight goes on and the file grows.
+
+Source: https://mavlink.io/en/messages/common.html#LOG_REQUEST_LIST
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+from typing import Final, NamedTuple, cast
+
+from fsw.link.files.flight_logs import FlightLog
+from fsw.link.files.served_file import OpenFile
+from fsw.link.wire import encode_replies, message_ids
+from fsw.link.wire.decode import Numbers, for_this_vehicle
+from fsw.link.wire.outgoing import Outgoing
+from fsw.signals import StatusText
+from messages.frames import Frame
+
+CHUNK: Final = 90  # bytes of a log in one LOG_DATA
+_FRAMES: Final = 6  # a tick: 3000 messages a second, as many as a client in Python can read
+_ENTRIES: Final = 8  # a tick: each asks the file system once
+_MAX_REQUESTS: Final = 32  # a client asks again for what got lost in up to 20 pieces
+_TO_THE_END: Final = 0xFFFFFFFF
+_WARNING: Final = 4  # MAV_SEVERITY
+_KEPT = StatusText(_WARNING, "Logs are kept: they are not erased over the link")
+
+
+class _Request(NamedTuple):
+    log_id: int
+    offset: int  # the next byte to send
+    end: int  # behind the last byte to send
+    closed: bool  # whether the client waits for a short message as the sign of the end
+
+
+class LogService:
+    """Serves the logs of one link. Messages carry no addressee, so there is one transfer."""
+
+    message_ids = frozenset(
+        {
+            message_ids.LOG_REQUEST_LIST,
+            message_ids.LOG_REQUEST_DATA,
+            message_ids.LOG_ERASE,
+            message_ids.LOG_REQUEST_END,
+        }
+    )
+
+    def __init__(self, logs: Sequence[FlightLog]) -> None:
+        self._logs = logs
+        self._listed: dict[int, int] = {}  # bytes that each log was listed with
+        self._to_list: deque[int] = deque()
+        self._requests: deque[_Request] = deque()
+        self._open: tuple[int, OpenFile] | None = None
+
+    def receive(self, frame: Frame, t_us: int) -> Sequence[Outgoing]:
+        """Note what is asked for; refuse to erase."""
+        values = cast(Numbers, frame.payload_values)
+        if not for_this_vehicle(*values[-2:]):
+            return ()
+        if frame.message_id == message_ids.LOG_REQUEST_LIST:
+            return self._list(*map(int, values[:2]))
+        if frame.message_id == message_ids.LOG_REQUEST_DATA:
+            self._request(*map(int, values[:3]))
+        elif frame.message_id == message_ids.LOG_REQUEST_END:
+            self._stop()
+        elif frame.message_id == message_ids.LOG_ERASE:
+            texts = encode_replies.status_texts(_KEPT, 0)
+            return [Outgoing(message_ids.STATUSTEXT, values) for values in texts]
+        return ()
+
+    def poll(self, t_us: int) -> Sequence[Outgoing]:
+        """Send the next entries and the next piece of a log."""
+        if not self._to_list and not self._requests:
+            return ()
+        answers = [self._entry(self._to_list.popleft()) for _ in self._next_entries()]
+        while self._requests and len(answers) < _FRAMES:
+            data = self._data()
+            if data is None:
+                break
+            answers.append(data)
+        return answers
+
+    def _list(self, first: int, last: int) -> Sequence[Outgoing]:
+        if not self._logs:
+            return [Outgoing(message_ids.LOG_ENTRY, (0, 0, 0, 0, 0))]
+        self._to_list = deque(range(first, min(last, len(self._logs) - 1) + 1))
+        return ()
+
+    def _next_entries(self) -> range:
+        return range(min(_ENTRIES, len(self._to_list)))
+
+    def _entry(self, log_id: int) -> Outgoing:
+        if self._open is not None and self._open[0] == log_id:
+            self._close()  # it was opened at its earlier size
+        size = self._list_size(log_id)
+        try:
+            time_s = int(self._logs[log_id].log.status().st_mtime)
+        except OSError:
+            time_s = 0
+        count = len(self._logs)
+        return Outgoing(message_ids.LOG_ENTRY, (time_s, size, log_id, count, count - 1))
+
+    def _list_size(self, log_id: int) -> int:
+        size = min(self._logs[log_id].log.size(), _TO_THE_END)
+        self._listed[log_id] = size
+        return size
+
+    def _request(self, offset: int, count: int, log_id: int) -> None:
+        if not log_id < len(self._logs):
+            return
+        size = self._listed.get(log_id)
+        if size is None:
+            size = self._list_size(log_id)
+        another = bool(self._requests) and self._requests[0].log_id != log_id
+        if another or count == _TO_THE_END:
+            self._requests.clear()
+        if len(self._requests) < _MAX_REQUESTS:
+            end = min(offset + count, size)
+            closed = count == _TO_THE_END or offset >= size
+            self._requests.append(_Request(log_id, offset, end, closed))
+
+    def _data(self) -> Outgoing | None:
+        """The next LOG_DATA; None while the disk has not delivered."""
+        log_id, offset, end, closed = self._requests[0]
+        try:
+            data = self._file(log_id).read(offset, min(CHUNK, end - offset))
+        except OSError:
+            data = b""  # gone or damaged: nothing more will come of it
+        if data is None:
+            return None
+        offset += len(data)
+        # Without an end of its own a request is over for the client at the first message that is
+        # not full, so one more is due where the last byte filled its message.
+        if not data or (offset >= end and not (closed and len(data) == CHUNK)):
+            self._requests.popleft()
+        else:
+            self._requests[0] = _Request(log_id, offset, end, closed)
+        start, padded = offset - len(data), data.ljust(CHUNK, b"\0")
+        return Outgoing(message_ids.LOG_DATA, (start, log_id, len(data), *padded))
+
+    def _file(self, log_id: int) -> OpenFile:
+        if self._open is None or self._open[0] != log_id:
+            self._close()
+            self._open = log_id, self._logs[log_id].log.open()
+        return self._open[1]
+
+    def _stop(self) -> None:
+        self._requests.clear()
+        self._close()
+
+    def _close(self) -> None:
+        if self._open is not None:
+            self._open[1].close()
+            self._open = None

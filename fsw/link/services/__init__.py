@@ -1,0 +1,1 @@
+"""MAVLink services on one link: parameters, missions, time, and who hands them their frames."""

@@ -1,0 +1,49 @@
+"""Hands frames to the services that want them, and survives a service that fails."""
+
+from __future__ import annotations
+
+import traceback
+from collections.abc import Callable, Sequence
+
+from fsw.link.services.service import LinkService
+from fsw.link.wire.outgoing import Outgoing
+from messages.frames import Frame
+
+Answers = Callable[[Outgoing], None]
+"""Takes each message a service wants to send."""
+
+
+class Dispatch:
+    """The services of one link."""
+
+    def __init__(self, services: Sequence[LinkService]) -> None:
+        self.failures = 0  # answers that ended in an exception
+        self._polled = tuple(services)
+        self._wanting: dict[int, tuple[LinkService, ...]] = {}
+        for service in services:
+            for id_ in service.message_ids:
+                self._wanting[id_] = (*self._wanting.get(id_, ()), service)
+
+    def receive(self, frame: Frame, t_us: int, send: Answers) -> None:
+        """Let every service that wants the frame answer it."""
+        for service in self._wanting.get(frame.message_id, ()):
+            try:
+                for outgoing in service.receive(frame, t_us):
+                    send(outgoing)
+            except Exception:
+                self._note()
+
+    def poll(self, t_us: int, send: Answers) -> None:
+        """Let every service go on with what it is sending."""
+        for service in self._polled:
+            try:
+                for outgoing in service.poll(t_us):
+                    send(outgoing)
+            except Exception:
+                self._note()
+
+    def _note(self) -> None:
+        """A mistake in a service must not end the flight it serves; it is told once."""
+        if self.failures == 0:
+            traceback.print_exc()
+        self.failures += 1

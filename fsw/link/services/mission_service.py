@@ -1,0 +1,311 @@
+"""Missions, fences and rally points over MAVLink's mission protocol.
+
+One transfer at a time a link; a second ground station is denied until it has ended. An upload is
+collected aside and takes the old one's place whole, or not at all. The vehicle asks again for an
+item that does not come; duplicates and items out of turn are passed over without an answer,
+because each answer would bring forth another duplicate.
+
+Source: https://mavlink.io/en/services/mission.html
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Final, cast
+
+from fsw.link.services.mission_store import ALL_KINDS, ROOM, Kind, Meaning, MissionStore
+from fsw.link.services.mission_wire import (
+    Peer,
+    current_values,
+    encode_ack,
+    encode_count,
+    encode_item,
+    encode_request,
+    item_float,
+    item_int,
+)
+from fsw.link.wire import encode_replies
+from fsw.link.wire import message_ids as ids
+from fsw.link.wire.decode import Numbers, for_this_vehicle
+from fsw.link.wire.outgoing import Outgoing
+from fsw.signals import StatusText
+from fsw.vehicle.mission_items import DENIED, UNSUPPORTED, MissionItem, Refused
+from messages.frames import Frame
+
+# MAV_MISSION_RESULT
+ACCEPTED: Final = 0
+ERROR: Final = 1
+NO_SPACE: Final = 4
+INVALID_SEQUENCE: Final = 13
+CANCELLED: Final = 15
+
+ASK_AGAIN_US: Final = 250_000
+TRIES: Final = 20  # of asking for one item, which makes 5 s
+SILENCE_US: Final = 5_000_000  # ends a download that is not asked on
+_WARNING, _NOTICE = 4, 5  # MAV_SEVERITY
+
+
+@dataclass(slots=True)
+class _Upload:
+    """Items on their way in."""
+
+    peer: Peer
+    kind: Kind
+    count: int
+    items: list[MissionItem] = field(default_factory=list)
+    meanings: list[Meaning] = field(default_factory=list)
+    asked_us: int = 0
+    tries: int = 0
+
+
+@dataclass(slots=True)
+class _Download:
+    """Items on their way out, as they were when it began."""
+
+    peer: Peer
+    kind: Kind
+    items: tuple[MissionItem, ...]
+    heard_us: int
+
+
+class MissionService:
+    """The mission protocol on one link."""
+
+    def __init__(self, store: MissionStore) -> None:
+        self._store = store
+        self._upload: _Upload | None = None
+        self._download: _Download | None = None
+        self._done: tuple[Peer, Kind, int] | None = None  # last upload: sender, kind, last item
+        self._shown = store.progress
+        self._show_again = False
+        self._text_id = 0
+        self._handlers: dict[int, Callable[[Numbers, Peer, int], Sequence[Outgoing]]] = {
+            ids.MISSION_COUNT: self._count,
+            ids.MISSION_ITEM: self._item,
+            ids.MISSION_ITEM_INT: self._item_int,
+            ids.MISSION_REQUEST_LIST: self._request_list,
+            ids.MISSION_REQUEST: self._request,
+            ids.MISSION_REQUEST_INT: self._request_int,
+            ids.MISSION_ACK: self._ack,
+            ids.MISSION_CLEAR_ALL: self._clear_all,
+            ids.MISSION_SET_CURRENT: self._set_current,
+            ids.MISSION_WRITE_PARTIAL_LIST: self._partial,
+            ids.MISSION_REQUEST_PARTIAL_LIST: self._partial,
+        }
+        self.message_ids = frozenset(self._handlers)
+
+    def receive(self, frame: Frame, t_us: int) -> Sequence[Outgoing]:
+        """See :class:`~fsw.link.services.service.LinkService`."""
+        values = cast(Numbers, frame.payload_values)
+        at = _TARGET_AT[frame.message_id]
+        if not for_this_vehicle(values[at], values[at + 1]):
+            return ()
+        peer = (frame.system_id, frame.component_id)
+        return self._handlers[frame.message_id](values, peer, t_us)
+
+    def poll(self, t_us: int) -> Sequence[Outgoing]:
+        """Ask again for what did not come, and tell how far the mission is."""
+        told: list[Outgoing] = []
+        if self._store.progress is not self._shown or self._show_again:
+            told += self._show_progress()
+        upload = self._upload
+        if upload is not None and t_us - upload.asked_us >= ASK_AGAIN_US:
+            if upload.tries < TRIES:
+                told.append(self._ask(upload, t_us))
+            else:
+                self._upload = None
+                silence = f"upload broken off: item {len(upload.items)} did not come; kept the old"
+                told.append(encode_ack(CANCELLED, upload.kind, upload.peer))
+                told += self._say(silence)
+        return told
+
+    def _show_progress(self) -> list[Outgoing]:
+        before, now = self._shown, self._store.progress
+        self._shown, self._show_again = now, False
+        told = [Outgoing(ids.MISSION_CURRENT, current_values(now, self._store.in_mission))]
+        if now.reached_count > before.reached_count:
+            told.append(Outgoing(ids.MISSION_ITEM_REACHED, (now.reached,)))
+        return told
+
+    # ------------------------------------------------------------ upload
+
+    def _count(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[Outgoing]:
+        number, count = int(values[3]), int(values[0])
+        refused = self._unavailable(number, peer, t_us)
+        if refused is not None:
+            return refused
+        kind = Kind(number)
+        self._upload = self._download = self._done = None
+        if count > ROOM[kind]:
+            reason = f"{count} items of {kind.name.lower()}; there is room for {ROOM[kind]}"
+            return self._refuse(Refused(NO_SPACE, reason), kind, peer)
+        self._upload = _Upload(peer, kind, count)
+        if count == 0:
+            return self._finish(self._upload)
+        return (self._ask(self._upload, t_us),)
+
+    def _item(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[Outgoing]:
+        return self._take(item_float(values), values, peer, t_us)
+
+    def _item_int(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[Outgoing]:
+        return self._take(item_int(values), values, peer, t_us)
+
+    def _take(
+        self, item: MissionItem | Refused, values: Numbers, peer: Peer, t_us: int
+    ) -> Sequence[Outgoing]:
+        """Add the item that was asked for; the last one completes the upload."""
+        seq, number = int(values[7]), int(values[14])
+        upload = self._upload
+        if upload is None or upload.peer != peer or upload.kind != number:
+            return self._stray(seq, number, peer)
+        if seq >= upload.count:
+            reason = f"item {seq} in an upload of {upload.count}"
+            return self._refuse(Refused(INVALID_SEQUENCE, reason), upload.kind, peer)
+        if seq != len(upload.items):
+            return ()
+        meaning = item if isinstance(item, Refused) else self._store.read(upload.kind, item)
+        if isinstance(item, Refused) or isinstance(meaning, Refused):
+            wrong = item if isinstance(item, Refused) else meaning
+            assert isinstance(wrong, Refused)
+            named = Refused(wrong.result, f"item {seq}: {wrong.reason}")
+            return self._refuse(named, upload.kind, peer)
+        upload.items.append(item)
+        upload.meanings.append(meaning)
+        if len(upload.items) == upload.count:
+            return self._finish(upload)
+        upload.tries = 0
+        return (self._ask(upload, t_us),)
+
+    def _stray(self, seq: int, number: int, peer: Peer) -> Sequence[Outgoing]:
+        """An item of no upload; after one that ended, its acknowledgement may have been lost."""
+        if self._done is not None and self._done[:2] == (peer, number):
+            return (encode_ack(ACCEPTED, number, peer),) if seq == self._done[2] else ()
+        if self._upload is not None and self._upload.peer == peer:
+            return ()
+        return (encode_ack(DENIED if self._upload else ERROR, number, peer),)
+
+    def _ask(self, upload: _Upload, t_us: int) -> Outgoing:
+        upload.asked_us = t_us
+        upload.tries += 1
+        return encode_request(len(upload.items), upload.kind, upload.peer)
+
+    def _finish(self, upload: _Upload) -> Sequence[Outgoing]:
+        kind, peer = upload.kind, upload.peer
+        refused = self._store.keep(kind, tuple(upload.items), tuple(upload.meanings))
+        if refused is not None:
+            return self._refuse(refused, kind, peer)
+        self._upload = None
+        self._done = (peer, kind, upload.count - 1)
+        text = f"{kind.name.lower()} of {upload.count} items received"
+        return (encode_ack(ACCEPTED, kind, peer), *self._say(text, _NOTICE))
+
+    # ------------------------------------------------------------ download
+
+    def _request_list(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[Outgoing]:
+        number = int(values[2])
+        refused = self._unavailable(number, peer, t_us)
+        if refused is not None:
+            return refused
+        kind = Kind(number)
+        self._upload = None
+        items = self._store.items(kind)
+        self._download = _Download(peer, kind, items, t_us) if items else None
+        return (encode_count(len(items), kind, peer),)
+
+    def _request(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[Outgoing]:
+        return self._send_item(values, peer, t_us, as_int=False)
+
+    def _request_int(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[Outgoing]:
+        return self._send_item(values, peer, t_us, as_int=True)
+
+    def _send_item(
+        self, values: Numbers, peer: Peer, t_us: int, as_int: bool
+    ) -> Sequence[Outgoing]:
+        """Any item in any order and as often as asked: requests and items may be lost."""
+        seq, number = int(values[0]), int(values[3])
+        download = self._download
+        if download is None or download.peer != peer or download.kind != number:
+            refused = self._unavailable(number, peer, t_us)
+            if refused is not None:
+                return refused
+            download = _Download(peer, Kind(number), self._store.items(Kind(number)), t_us)
+        if seq >= len(download.items):
+            return (encode_ack(INVALID_SEQUENCE, number, peer),)
+        download.heard_us = t_us
+        return (encode_item(download.items[seq], seq, number, peer, as_int),)
+
+    # ------------------------------------------------------------ the rest
+
+    def _ack(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[Outgoing]:
+        """The other side has all it wanted, or wants no more; the old items stay."""
+        if self._download is not None and self._download.peer == peer:
+            self._download = None
+        if self._upload is not None and self._upload.peer == peer and values[2] != ACCEPTED:
+            self._upload = None
+        return ()
+
+    def _clear_all(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[Outgoing]:
+        number = int(values[2])
+        kinds = tuple(Kind) if number == ALL_KINDS else (number,)
+        refused = self._unavailable(kinds[0], peer, t_us)
+        if refused is not None:
+            return refused
+        self._upload = self._download = None
+        for kind in kinds:
+            self._store.keep(Kind(kind), (), ())
+        return (encode_ack(ACCEPTED, number, peer),)
+
+    def _set_current(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[Outgoing]:
+        seq = int(values[0])
+        if self._store.set_current(seq):
+            self._show_again = True
+            return ()
+        refused = Refused(INVALID_SEQUENCE, f"there is no mission item {seq}")
+        return (
+            encode_ack(refused.result, Kind.MISSION, peer),
+            *self._say(refused.reason),
+        )
+
+    def _partial(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[Outgoing]:
+        """A part of a list cannot be checked by itself; ground stations then send all of it."""
+        return (encode_ack(UNSUPPORTED, int(values[4]), peer),)
+
+    def _unavailable(self, number: int, peer: Peer, t_us: int) -> Sequence[Outgoing] | None:
+        """Why no transfer of this type can begin now."""
+        if number not in ROOM:
+            return (encode_ack(UNSUPPORTED, number, peer),)
+        upload, download = self._upload, self._download
+        if download is not None and t_us - download.heard_us > SILENCE_US:
+            download = self._download = None
+        busy = upload or download
+        if busy is not None and busy.peer != peer:
+            return (encode_ack(DENIED, number, peer),)
+        return None
+
+    def _refuse(self, refused: Refused, kind: Kind, peer: Peer) -> Sequence[Outgoing]:
+        self._upload = None
+        text = f"{kind.name.lower()} refused: {refused.reason}"
+        return (encode_ack(refused.result, kind, peer), *self._say(text))
+
+    def _say(self, text: str, severity: int = _WARNING) -> list[Outgoing]:
+        self._text_id = (self._text_id + 1) & 0x7FFF
+        # The upper half of all numbers, so that no text of the vehicle itself has the same.
+        pieces = encode_replies.status_texts(StatusText(severity, text), 0x8000 | self._text_id)
+        return [Outgoing(ids.STATUSTEXT, values) for values in pieces]
+
+
+# Where the wire values of a message name the system it is for; its component follows.
+_TARGET_AT: Final = {
+    ids.MISSION_COUNT: 1,
+    ids.MISSION_ITEM: 9,
+    ids.MISSION_ITEM_INT: 9,
+    ids.MISSION_REQUEST_LIST: 0,
+    ids.MISSION_REQUEST: 1,
+    ids.MISSION_REQUEST_INT: 1,
+    ids.MISSION_ACK: 0,
+    ids.MISSION_CLEAR_ALL: 0,
+    ids.MISSION_SET_CURRENT: 1,
+    ids.MISSION_WRITE_PARTIAL_LIST: 2,
+    ids.MISSION_REQUEST_PARTIAL_LIST: 2,
+}

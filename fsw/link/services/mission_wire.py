@@ -1,0 +1,97 @@
+"""Mission messages to and from the vehicle's own items; pure."""
+
+from __future__ import annotations
+
+import math
+from typing import Final, cast
+
+from fsw.link.wire import message_ids as ids
+from fsw.link.wire.decode import Numbers
+from fsw.link.wire.outgoing import Outgoing, WireValues
+from fsw.link.wire.telemetry_context import TelemetryContext
+from fsw.signals import FlightSnapshot, MissionProgress, MissionState, Mode, Vec4
+from fsw.vehicle.mission_items import (
+    INVALID_PARAM1,
+    LOCAL_FRAMES,
+    NO_PLACE,
+    MissionItem,
+    Refused,
+)
+
+Peer = tuple[int, int]
+"""System and component of whoever speaks."""
+
+_FRAME_MISSION: Final = 2  # MAV_FRAME of a command without a place
+
+
+def item_int(values: Numbers) -> MissionItem:
+    """Read a MISSION_ITEM_INT."""
+    return MissionItem(
+        command=int(values[8]),
+        frame=int(values[11]),
+        params=cast(Vec4, values[0:4]),
+        x=int(values[4]),
+        y=int(values[5]),
+        z=values[6],
+        autocontinue=int(values[13]),
+    )
+
+
+def item_float(values: Numbers) -> MissionItem | Refused:
+    """Read a MISSION_ITEM, whose x and y are degrees or metres."""
+    frame = int(values[11])
+    whole = []
+    for number, value in enumerate(values[4:6]):
+        scaled = value * _scale(frame)
+        if math.isnan(scaled):
+            scaled = float(NO_PLACE)
+        if not abs(scaled) <= NO_PLACE:
+            return Refused(INVALID_PARAM1 + 4 + number, f"{value:g} is no place")
+        whole.append(round(scaled))
+    return item_int((*values[0:4], *whole, *values[6:]))
+
+
+def encode_item(item: MissionItem, seq: int, kind: int, peer: Peer, as_int: bool) -> Outgoing:
+    """MISSION_ITEM_INT, or MISSION_ITEM for those who asked in floats."""
+    x: float = item.x
+    y: float = item.y
+    if not as_int:
+        scale = _scale(item.frame)
+        x = math.nan if item.x == NO_PLACE else item.x / scale
+        y = math.nan if item.y == NO_PLACE else item.y / scale
+    tail = (seq, item.command, *peer, item.frame, 0, item.autocontinue, kind)
+    message_id = ids.MISSION_ITEM_INT if as_int else ids.MISSION_ITEM
+    return Outgoing(message_id, (*item.params, x, y, item.z, *tail))
+
+
+def encode_count(count: int, kind: int, peer: Peer) -> Outgoing:
+    """MISSION_COUNT."""
+    return Outgoing(ids.MISSION_COUNT, (count, *peer, kind))
+
+
+def encode_request(seq: int, kind: int, peer: Peer) -> Outgoing:
+    """MISSION_REQUEST_INT."""
+    return Outgoing(ids.MISSION_REQUEST_INT, (seq, *peer, kind))
+
+
+def encode_ack(result: int, kind: int, peer: Peer) -> Outgoing:
+    """MISSION_ACK."""
+    return Outgoing(ids.MISSION_ACK, (*peer, result, kind))
+
+
+def mission_current(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues:
+    """MISSION_CURRENT of a snapshot."""
+    return current_values(snapshot.mission, snapshot.mode is Mode.MISSION)
+
+
+def current_values(progress: MissionProgress, in_mission: bool) -> WireValues:
+    """MISSION_CURRENT."""
+    if progress.state is MissionState.NO_MISSION:
+        return (0, 0, int(progress.state), 0)
+    return (progress.current, progress.total, int(progress.state), 1 if in_mission else 2)
+
+
+def _scale(frame: int) -> float:
+    if frame == _FRAME_MISSION:
+        return 1.0
+    return 1e4 if frame in LOCAL_FRAMES else 1e7

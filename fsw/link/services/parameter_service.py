@@ -1,0 +1,137 @@
+"""The parameter protocol: list, read and set, every value a REAL32.
+
+A list is paced, so that no tick sends more than a datagram of it. A set is answered with the value
+that holds when it has been decided: the new one, or the old one after a text that says why. A
+change is told on every link.
+
+Source: https://mavlink.io/en/services/parameter.html
+"""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from collections.abc import Sequence
+from typing import Final, cast
+
+from fsw.link.wire import message_ids as ids
+from fsw.link.wire.decode import for_this_vehicle
+from fsw.link.wire.encode_replies import status_texts
+from fsw.link.wire.outgoing import Outgoing
+from fsw.parameters.registry import BY_NAME, PARAMETERS
+from fsw.parameters.storage import REAL32
+from fsw.parameters.store import ParameterStore
+from fsw.signals import StatusText
+from messages.frames import Frame
+
+BURST: Final = 10  # values at once: one datagram
+_BURST_EVERY_US: Final = 20_000  # 500 values a second
+_UINT32: Final = 5  # MAV_PARAM_TYPE
+_NO_INDEX: Final = 0xFFFF
+_BY_NAME: Final = -1  # in place of an index
+_DOES_NOT_EXIST, _OUT_OF_RANGE = 1, 2  # MAV_PARAM_ERROR
+_WARNING: Final = 4  # MAV_SEVERITY
+_HASH: Final = "_HASH_CHECK"  # what QGroundControl asks for, to see whether it knows all values
+_Peer = tuple[int, int]  # system and component
+_COUNT: Final = len(PARAMETERS)
+_INDEX: Final = {parameter.name: index for index, parameter in enumerate(PARAMETERS)}
+
+
+class ParameterService:
+    """Parameters on one link."""
+
+    message_ids = frozenset({ids.PARAM_REQUEST_READ, ids.PARAM_REQUEST_LIST, ids.PARAM_SET})
+
+    def __init__(self, store: ParameterStore) -> None:
+        """Listen to a store that all links share."""
+        self._store = store
+        self._news = store.listen()
+        self._next = _COUNT  # index of the next one to list
+        self._burst_us = 0
+        self._text_id = 0
+
+    def receive(self, frame: Frame, t_us: int) -> Sequence[Outgoing]:
+        """Answer a question at once, begin to list, or pass a wish on."""
+        values = frame.payload_values
+        if frame.message_id == ids.PARAM_REQUEST_LIST:
+            system, component = cast("tuple[int, int]", values)
+            if for_this_vehicle(system, component):
+                self._next, self._burst_us = 0, t_us
+            return ()
+        if frame.message_id == ids.PARAM_REQUEST_READ:
+            index, system, component, text = cast("tuple[int, int, int, bytes]", values)
+            if not for_this_vehicle(system, component):
+                return ()
+            return self._read(index, _name(text), (frame.system_id, frame.component_id))
+        value, system, component, text, type_ = cast("tuple[float, int, int, bytes, int]", values)
+        if not for_this_vehicle(system, component):
+            return ()
+        return self._set(_name(text), value, type_, (frame.system_id, frame.component_id))
+
+    def poll(self, t_us: int) -> Sequence[Outgoing]:
+        """Tell what has changed, and go on with a list."""
+        news = self._news
+        if self._next == _COUNT and not news.changed and not news.texts:
+            return ()
+        answers: list[Outgoing] = []
+        if news.texts:
+            answers += self._text(news.texts.popleft())
+        while news.changed and len(answers) < BURST:
+            name = next(iter(news.changed))
+            del news.changed[name]
+            answers.append(self._value(_INDEX[name]))
+        if self._next < _COUNT and t_us >= self._burst_us:
+            self._burst_us = t_us + _BURST_EVERY_US
+            end = min(self._next + BURST, _COUNT)
+            answers += [self._value(index) for index in range(self._next, end)]
+            self._next = end
+        return answers
+
+    def _read(self, index: int, name: str, asker: _Peer) -> Sequence[Outgoing]:
+        if index < 0 and name == _HASH:
+            return (self._hash(),)
+        wanted = _INDEX.get(name, _COUNT) if index < 0 else index
+        if wanted < _COUNT:
+            return (self._value(wanted),)
+        return (_error(index, name, _DOES_NOT_EXIST, asker),)
+
+    def _set(self, name: str, value: float, type_: int, asker: _Peer) -> Sequence[Outgoing]:
+        if name == _HASH:
+            return ()  # QGroundControl's word that it needs no list
+        if name not in BY_NAME:
+            return (_error(_BY_NAME, name, _DOES_NOT_EXIST, asker),)
+        if type_ == REAL32:
+            refusal = self._store.change(name, value, self._news)
+        else:
+            refusal = f"{name} is a REAL32, type {type_} is refused"
+            self._news.changed[name] = None
+        if refusal is None:
+            return ()
+        return (*self._text(refusal), _error(_INDEX[name], name, _OUT_OF_RANGE, asker))
+
+    def _value(self, index: int) -> Outgoing:
+        name = PARAMETERS[index].name
+        value = self._store.values[name]
+        return Outgoing(ids.PARAM_VALUE, (value, _COUNT, index, name.encode(), REAL32))
+
+    def _hash(self) -> Outgoing:
+        """CRC-32 over names and values in order, nothing inverted; its bits in place of a float."""
+        state = 0xFFFFFFFF
+        for parameter in PARAMETERS:
+            named = parameter.name.encode() + struct.pack("<f", self._store.values[parameter.name])
+            state = zlib.crc32(named, state)
+        (bits,) = struct.unpack("<f", struct.pack("<I", state ^ 0xFFFFFFFF))
+        return Outgoing(ids.PARAM_VALUE, (bits, _COUNT, _NO_INDEX, _HASH.encode(), _UINT32))
+
+    def _text(self, sentence: str) -> list[Outgoing]:
+        self._text_id = (self._text_id + 1) & 0x3FFF
+        pieces = status_texts(StatusText(_WARNING, sentence), 0x4000 | self._text_id)
+        return [Outgoing(ids.STATUSTEXT, piece) for piece in pieces]
+
+
+def _error(index: int, name: str, error: int, asker: _Peer) -> Outgoing:
+    return Outgoing(ids.PARAM_ERROR, (index, *asker, name.encode(errors="replace"), error))
+
+
+def _name(text: bytes) -> str:
+    return text.partition(b"\0")[0].decode("ascii", errors="replace")

@@ -1,0 +1,36 @@
+"""What a link serves beside telemetry and commands: parameters, missions, files, time.
+
+A service is asked by frames and answers with messages; sockets, sequence numbers, signatures and
+peers are the link's. There is one instance a link; what it serves may be shared.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol
+
+from fsw.link.wire.outgoing import Outgoing
+from messages.frames import Frame
+
+
+class LinkService(Protocol):
+    """One protocol on one link. Checks itself whether a frame is addressed to this vehicle."""
+
+    message_ids: frozenset[int]  # what it wants to hear
+
+    def receive(self, frame: Frame, t_us: int) -> Sequence[Outgoing]:
+        """Answer a valid frame at once; never raises.
+
+        Args:
+            frame: Its values are of the right type and number, not of any sense.
+            t_us: Sensor time [us].
+        """
+        ...
+
+    def poll(self, t_us: int) -> Sequence[Outgoing]:
+        """Go on with an answer that is paced; called every tick, so idle must cost nothing.
+
+        Args:
+            t_us: Sensor time [us].
+        """
+        ...

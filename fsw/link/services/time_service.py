@@ -1,0 +1,31 @@
+"""TIMESYNC and PING: what time it is on the vehicle, and how far away that is."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import cast
+
+from fsw.link.wire.decode import Numbers
+from fsw.link.wire.message_ids import PING, TIMESYNC
+from fsw.link.wire.outgoing import Outgoing
+from messages.frames import Frame
+
+
+class TimeService:
+    """Answers at once, in the vehicle's own time: the one its messages are stamped with."""
+
+    message_ids = frozenset({PING, TIMESYNC})
+
+    def receive(self, frame: Frame, t_us: int) -> Sequence[Outgoing]:
+        """Answer a request; answers of others to their own requests are not for us."""
+        if frame.message_id == TIMESYNC:
+            answered_ns, sent_ns = frame.payload_values
+            return () if answered_ns else (Outgoing(TIMESYNC, (1000 * t_us, sent_ns)),)
+        time_us, sequence, system, component = cast(Numbers, frame.payload_values)
+        if system or component:
+            return ()  # a ping with a target is an answer
+        return (Outgoing(PING, (time_us, sequence, frame.system_id, frame.component_id)),)
+
+    def poll(self, t_us: int) -> Sequence[Outgoing]:
+        """Nothing is paced."""
+        return ()

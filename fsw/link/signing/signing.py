@@ -1,0 +1,157 @@
+"""MAVLink 2 signing of one link.
+
+A frame is believed if its hash is right, then if its time is: newer than the last of its sender,
+not further ahead than a minute. In this order, because a time taken from a forged frame would lock
+its true sender out. Source: https://mavlink.io/en/guide/message_signing.html
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hmac
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+from hashlib import sha256
+from typing import Final
+
+from fsw.link.signing.key_file import KeyFile, SigningKey
+from fsw.link.wire.message_ids import HEARTBEAT, RADIO_STATUS
+from messages.frames import Frame, announcing_signature, is_signed
+
+KEY_SIZE: Final = 32  # bytes
+_HASH_SIZE: Final = 6  # bytes, the first of SHA-256
+_SIGNATURE_SIZE: Final = 13  # bytes: link, time (6), hash (6)
+_EPOCH_UNIX_S: Final = 1_420_070_400  # 2015-01-01 UTC, where signing time begins
+_UNIT_US: Final = 10  # of signing time
+_TOLERANCE: Final = 6_000_000  # one minute, in units
+_MAX_SENDERS: Final = 64  # that are remembered; only who holds the key can add one
+# A radio that puts its own status on the link has no key, and presence asks for nothing.
+_EXEMPT: Final = frozenset({HEARTBEAT, RADIO_STATUS})
+
+
+class Verdict(Enum):
+    """What a frame may do."""
+
+    TRUSTED = "trusted"
+    EXEMPT = "exempt"  # unsigned on a signed link, but harmless: nothing is learnt from its sender
+    REFUSED = "refused"
+
+
+@dataclass(slots=True)
+class SigningCounters:
+    """Frames that a signed link refused."""
+
+    unsigned: int = 0
+    wrong_hash: int = 0
+    wrong_time: int = 0  # replayed, or too far ahead
+
+
+class Signing:
+    """The key of one link and the times of its senders; without a key everything passes."""
+
+    def __init__(self, link_id: int, unix_us: Callable[[], int], file: KeyFile | None) -> None:
+        """Take up the key that an earlier flight left.
+
+        Args:
+            link_id: 0..255, tells our links apart in our own signatures.
+            unix_us: Wall time [us since 1970].
+            file: Where the key is kept; None forgets it with the process.
+
+        Raises:
+            LinkError: The file is there and cannot be trusted or read.
+        """
+        self.counters = SigningCounters()
+        self._link_id = link_id
+        self._unix_us = unix_us
+        self._file = file
+        stored = None if file is None else file.read()
+        self._key = b"" if stored is None else stored.key
+        # Frames of a flight before this one must not be played to this one.
+        self._oldest = 0 if stored is None else stored.newest
+        self._sent = self._oldest
+        self._senders: dict[tuple[int, int, int], int] = {}
+
+    @property
+    def active(self) -> bool:
+        """Whether this link is signed."""
+        return bool(self._key)
+
+    def signed(self, frame: bytes) -> bytes:
+        """Sign a frame of ours."""
+        self._sent = max(self._sent + 1, self._now())
+        marked = announcing_signature(frame)
+        stamp = bytes([self._link_id]) + self._sent.to_bytes(6, "little")
+        return marked + stamp + self._hash(marked + stamp)
+
+    def judge(self, frame: Frame, raw: bytes) -> Verdict:
+        """Decide about a frame whose checksum is right.
+
+        Args:
+            frame: What it says.
+            raw: All of its bytes, signature included.
+        """
+        if not self._key:
+            return Verdict.TRUSTED
+        if not is_signed(raw):
+            if frame.message_id in _EXEMPT:
+                return Verdict.EXEMPT
+            self.counters.unsigned += 1
+            return Verdict.REFUSED
+        if not hmac.compare_digest(self._hash(raw[:-_HASH_SIZE]), raw[-_HASH_SIZE:]):
+            self.counters.wrong_hash += 1
+            return Verdict.REFUSED
+        link_id = raw[-_SIGNATURE_SIZE]
+        time = int.from_bytes(raw[1 - _SIGNATURE_SIZE : -_HASH_SIZE], "little")
+        if not self._in_time((frame.system_id, frame.component_id, link_id), time):
+            self.counters.wrong_time += 1
+            return Verdict.REFUSED
+        return Verdict.TRUSTED
+
+    def set_up(self, key: bytes, initial_time: int) -> None:
+        """Sign from now on with ``key``, or stop signing if it is all zeros.
+
+        Args:
+            key: 32 bytes.
+            initial_time: Signing time of who asks; ours does not begin before it, unless it is
+                further ahead than a minute.
+
+        Raises:
+            OSError: The key cannot be stored; nothing has changed.
+        """
+        new = key if any(key) else b""
+        if self._file is not None:
+            if new:
+                self._file.write(SigningKey(new, self._oldest))
+            else:
+                self._file.remove()
+        self._key = new
+        self._senders.clear()
+        if initial_time <= self._now() + _TOLERANCE:
+            self._sent = max(self._sent, initial_time)
+
+    def close(self) -> None:
+        """Keep the newest time that was accepted."""
+        newest = max(self._senders.values(), default=0)
+        if self._file is not None and self._key and newest > self._oldest:
+            # Without it the next flight only trusts what is not older than a minute.
+            with contextlib.suppress(OSError):
+                self._file.write(SigningKey(self._key, newest))
+
+    def _in_time(self, sender: tuple[int, int, int], time: int) -> bool:
+        now = self._now()
+        last = self._senders.get(sender)
+        if last is None:
+            if len(self._senders) >= _MAX_SENDERS:
+                return False
+            last = max(self._oldest, now - _TOLERANCE)
+        if not last < time <= now + _TOLERANCE:
+            return False
+        self._senders[sender] = time
+        return True
+
+    def _hash(self, covered: bytes) -> bytes:
+        return sha256(self._key + covered).digest()[:_HASH_SIZE]
+
+    def _now(self) -> int:
+        return (self._unix_us() - 1_000_000 * _EPOCH_UNIX_S) // _UNIT_US

@@ -1,0 +1,1 @@
+"""What is sent to the ground, how often, and what changes that."""

@@ -1,0 +1,126 @@
+"""Commands to the link itself: how often messages are sent, and "send me this one now".
+
+They are answered here and do not reach the tick, because each link keeps its own rates.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Final
+
+from fsw.link.telemetry.stream_rates import StreamRates
+from fsw.link.telemetry.streams import messages_now
+from fsw.link.wire import decode, encode_replies, message_ids
+from fsw.link.wire.outgoing import Outgoing
+from fsw.link.wire.telemetry_context import TelemetryContext
+from fsw.signals import CommandAck, CommandRequest, FlightSnapshot, StatusText
+from messages.frames import Frame
+
+_GET_HOME_POSITION: Final = 410  # MAV_CMD
+_GET_MESSAGE_INTERVAL: Final = 510
+_SET_MESSAGE_INTERVAL: Final = 511
+_REQUEST_MESSAGE: Final = 512
+_REQUEST_AUTOPILOT_CAPABILITIES: Final = 520
+_ACCEPTED, _TEMPORARILY_REJECTED, _DENIED = 0, 1, 2  # MAV_RESULT
+_INFO: Final = 6  # MAV_SEVERITY: a client's question that has no answer endangers nobody
+_DECODERS: Final = {
+    message_ids.COMMAND_LONG: decode.command_long,
+    message_ids.COMMAND_INT: decode.command_int,
+}
+
+_Outcome = tuple[int, str, Sequence[Outgoing]]  # MAV_RESULT, reason, what follows the ACK
+
+
+class LinkCommands:
+    """Serves one link."""
+
+    def __init__(self, rates: StreamRates, context: TelemetryContext) -> None:
+        self._rates = rates
+        self._context = context
+        self._handlers: dict[
+            int, Callable[[CommandRequest, int, FlightSnapshot | None], _Outcome]
+        ] = {
+            _GET_HOME_POSITION: self._get_home,
+            _GET_MESSAGE_INTERVAL: self._get_interval,
+            _SET_MESSAGE_INTERVAL: self._set_interval,
+            _REQUEST_MESSAGE: self._request_message,
+            _REQUEST_AUTOPILOT_CAPABILITIES: self._request_capabilities,
+        }
+
+    def answer(
+        self, frame: Frame, t_us: int, snapshot: FlightSnapshot | None
+    ) -> tuple[Sequence[Outgoing], StatusText | None] | None:
+        """Carry out a command to the link.
+
+        Args:
+            frame: Any valid frame.
+            t_us: Sensor time [us].
+            snapshot: What there is to tell about.
+
+        Returns:
+            What to send and why it was refused, if it was; None if the frame is something else.
+        """
+        decoder = _DECODERS.get(frame.message_id)
+        request = None if decoder is None else decoder(frame)
+        handler = None if request is None else self._handlers.get(request.command)
+        if handler is None or request is None:
+            return None
+        result, reason, messages = handler(request, t_us, snapshot)
+        ack = CommandAck(request.command, result, request.source_system, request.source_component)
+        told = Outgoing(message_ids.COMMAND_ACK, encode_replies.command_ack(ack))
+        return (told, *messages), StatusText(_INFO, reason) if reason else None
+
+    def _get_interval(
+        self, request: CommandRequest, t_us: int, snapshot: FlightSnapshot | None
+    ) -> _Outcome:
+        message_id = _whole(request.params[0])
+        if message_id is None:
+            return _DENIED, "message interval: param1 is no message id", ()
+        interval = self._rates.interval_us(message_id)
+        values = (interval, message_id & 0xFFFF)
+        return _ACCEPTED, "", (Outgoing(message_ids.MESSAGE_INTERVAL, values),)
+
+    def _set_interval(
+        self, request: CommandRequest, t_us: int, snapshot: FlightSnapshot | None
+    ) -> _Outcome:
+        message_id, interval = _whole(request.params[0]), _whole(request.params[1])
+        if message_id is None or interval is None:
+            return _DENIED, "message interval: param1 is a message id, param2 a time in us", ()
+        refusal = self._rates.set_interval(message_id, interval, t_us)
+        return (_DENIED if refusal else _ACCEPTED), refusal, ()
+
+    def _request_message(
+        self, request: CommandRequest, t_us: int, snapshot: FlightSnapshot | None
+    ) -> _Outcome:
+        message_id = _whole(request.params[0])
+        if message_id is None:
+            return _DENIED, "request message: param1 is no message id", ()
+        return self._now(message_id, request.params[1], snapshot)
+
+    def _get_home(
+        self, request: CommandRequest, t_us: int, snapshot: FlightSnapshot | None
+    ) -> _Outcome:
+        return self._now(message_ids.HOME_POSITION, math.nan, snapshot)
+
+    def _request_capabilities(
+        self, request: CommandRequest, t_us: int, snapshot: FlightSnapshot | None
+    ) -> _Outcome:
+        if request.params[0] != 1.0:
+            return _DENIED, "request capabilities: param1 = 1 asks for them", ()
+        return self._now(message_ids.AUTOPILOT_VERSION, math.nan, snapshot)
+
+    def _now(self, message_id: int, which: float, snapshot: FlightSnapshot | None) -> _Outcome:
+        if snapshot is None:
+            return _TEMPORARILY_REJECTED, "the vehicle has not begun to fly", ()
+        messages = messages_now(message_id, which, snapshot, self._context)
+        if messages is None:
+            return _DENIED, f"message {message_id} is not one that this vehicle sends", ()
+        if not messages:
+            return _TEMPORARILY_REJECTED, f"message {message_id}: nothing to tell yet", ()
+        return _ACCEPTED, "", messages
+
+
+def _whole(number: float) -> int | None:
+    """A parameter as an integer of 32 bits; None for NaN, infinity and what is out of range."""
+    return round(number) if abs(number) < 2**31 else None

@@ -1,0 +1,102 @@
+"""When each message of one link is due, and what SET_MESSAGE_INTERVAL changes about it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from fsw.link.telemetry.streams import Stream
+
+SLOT_US: Final = 10_000  # what is due within one slot leaves together, in one datagram
+OFF: Final = -1  # MESSAGE_INTERVAL: not sent
+UNKNOWN: Final = 0  # MESSAGE_INTERVAL: not available
+_MOST_PER_SECOND: Final = 1500  # of all messages on a link: 3 % of a core
+
+
+@dataclass(slots=True)
+class _Timetable:
+    """One stream: every ``interval_us`` from ``due_us`` on, not at all if OFF."""
+
+    stream: Stream
+    default_us: int
+    interval_us: int
+    due_us: int
+
+
+class StreamRates:
+    """The timetable of one link, in sensor time: the same in real time and in lockstep."""
+
+    def __init__(self, streams: Sequence[Stream], rates_hz: Sequence[float], tick_us: int) -> None:
+        """Lay out the defaults.
+
+        Args:
+            streams: What there is to send.
+            rates_hz: Of each stream; 0 for one that is sent on request only.
+            tick_us: No message is sent more often than once a tick [us].
+        """
+        self._tick_us = tick_us
+        self._begun = False
+        self._rows = []
+        for place, (stream, rate_hz) in enumerate(zip(streams, rates_hz, strict=True)):
+            interval = round(1e6 / rate_hz) if rate_hz > 0.0 else OFF
+            # Spread over the slots, so that slow messages do not all leave at once.
+            phase = place * SLOT_US % interval if interval != OFF else 0
+            self._rows.append(_Timetable(stream, interval, interval, phase))
+        self._lay_out()
+
+    def due(self, t_us: int) -> Iterator[Stream]:
+        """Streams to be sent now; a pause is not caught up on."""
+        if not self._begun:
+            self._begun = True
+            for row in self._rows:
+                row.due_us += t_us
+        for row in self._sent:
+            if row.due_us <= t_us:
+                row.due_us += row.interval_us
+                if row.due_us <= t_us:
+                    row.due_us = t_us + row.interval_us
+                yield row.stream
+
+    def interval_us(self, message_id: int) -> int:
+        """The interval in force, OFF, or UNKNOWN for a message that does not exist."""
+        for row in self._rows:
+            if row.stream.message_id == message_id:
+                return row.interval_us
+        return UNKNOWN
+
+    def set_interval(self, message_id: int, interval_us: int, t_us: int) -> str:
+        """Change how often a message is sent.
+
+        Args:
+            message_id: Which.
+            interval_us: Time between two [us]; 0 for the default, -1 for never.
+            t_us: Sensor time; the next one is due an interval from now.
+
+        Returns:
+            Why not, empty if it is done.
+        """
+        rows = [row for row in self._rows if row.stream.message_id == message_id]
+        if not rows:
+            return f"message {message_id} is not one that this vehicle sends"
+        if interval_us < OFF or 0 < interval_us < self._tick_us:
+            return f"interval {interval_us} us is shorter than a tick, {self._tick_us} us"
+        before = [row.interval_us for row in rows]
+        for row in rows:
+            row.interval_us = interval_us or row.default_us
+            row.due_us = t_us + max(row.interval_us, 0)
+        if self._per_second() > _MOST_PER_SECOND:
+            for row, interval in zip(rows, before, strict=True):
+                row.interval_us = interval
+            return f"more than {_MOST_PER_SECOND} messages a second on one link"
+        self._begun = True
+        self._lay_out()
+        return ""
+
+    def _per_second(self) -> float:
+        return sum(1e6 / row.interval_us for row in self._rows if row.interval_us != OFF)
+
+    def _lay_out(self) -> None:
+        self._sent = [row for row in self._rows if row.interval_us != OFF]
+        fast = any(row.interval_us < SLOT_US for row in self._sent)
+        self.slot_us = self._tick_us if fast else SLOT_US  # how often to ask for what is due

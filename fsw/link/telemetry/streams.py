@@ -1,0 +1,120 @@
+"""What is sent to the ground, and how often by default: one table for both links.
+
+Rates are counted in sensor time, so they are the same in real time and in lockstep at any speed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from fsw.link.files.component_metadata import component_metadata
+from fsw.link.services import mission_wire
+from fsw.link.wire import (
+    encode_dialect,
+    encode_health,
+    encode_identity,
+    encode_place,
+    encode_standard,
+    message_ids,
+)
+from fsw.link.wire.message_ids import AUTOPILOT, PANDION
+from fsw.link.wire.outgoing import Outgoing, WireValues
+from fsw.link.wire.telemetry_context import TelemetryContext
+from fsw.signals import FlightSnapshot
+
+Encoder = Callable[[FlightSnapshot, TelemetryContext], WireValues | None]
+Answerer = Callable[[float, FlightSnapshot, TelemetryContext], Sequence[Outgoing]]
+
+
+@dataclass(frozen=True, slots=True)
+class Stream:
+    """One message from one component; a rate of 0 sends it on request only."""
+
+    message_id: int
+    ground_hz: float  # to ground stations
+    api_hz: float  # to programs
+    component: int
+    encode: Encoder
+
+
+HEARTBEAT: Final = Stream(message_ids.HEARTBEAT, 1, 1, AUTOPILOT, encode_standard.heartbeat)
+_CURRENT_MODE = Stream(message_ids.CURRENT_MODE, 0.5, 0.5, AUTOPILOT, encode_identity.current_mode)
+_EXTENDED_STATE = Stream(
+    message_ids.EXTENDED_SYS_STATE, 1, 5, AUTOPILOT, encode_standard.extended_sys_state
+)
+
+STREAMS: Final = (
+    HEARTBEAT,
+    Stream(message_ids.SYS_STATUS, 2, 2, AUTOPILOT, encode_health.sys_status),
+    _EXTENDED_STATE,
+    Stream(message_ids.ATTITUDE, 50, 50, AUTOPILOT, encode_standard.attitude),
+    Stream(message_ids.ATTITUDE_QUATERNION, 10, 50, AUTOPILOT, encode_standard.attitude_quaternion),
+    Stream(message_ids.LOCAL_POSITION_NED, 30, 50, AUTOPILOT, encode_standard.local_position),
+    Stream(message_ids.GLOBAL_POSITION_INT, 5, 10, AUTOPILOT, encode_place.global_position),
+    Stream(
+        message_ids.POSITION_TARGET_LOCAL_NED, 10, 10, AUTOPILOT, encode_standard.position_target
+    ),
+    Stream(message_ids.ATTITUDE_TARGET, 10, 10, AUTOPILOT, encode_standard.attitude_target),
+    Stream(message_ids.VFR_HUD, 4, 4, AUTOPILOT, encode_place.vfr_hud),
+    Stream(message_ids.ALTITUDE, 1, 2, AUTOPILOT, encode_place.altitude),
+    Stream(message_ids.MISSION_CURRENT, 1, 1, AUTOPILOT, mission_wire.mission_current),
+    Stream(message_ids.HOME_POSITION, 0.5, 1, AUTOPILOT, encode_place.home_position),
+    Stream(message_ids.BATTERY_STATUS, 1, 1, AUTOPILOT, encode_health.battery_status),
+    Stream(message_ids.ESTIMATOR_STATUS, 1, 1, AUTOPILOT, encode_health.estimator_status),
+    Stream(message_ids.SYSTEM_TIME, 1, 1, AUTOPILOT, encode_standard.system_time),
+    _CURRENT_MODE,
+    Stream(message_ids.ODOMETRY, 0, 0, AUTOPILOT, encode_place.odometry),
+    Stream(message_ids.GPS_GLOBAL_ORIGIN, 0, 0, AUTOPILOT, encode_place.global_origin),
+    Stream(message_ids.AUTOPILOT_VERSION, 0, 0, AUTOPILOT, encode_identity.autopilot_version),
+    Stream(message_ids.ARM_JOINT_STATE, 30, 50, PANDION, encode_dialect.arm_joint_state),
+    Stream(message_ids.ARM_JOINT_SETPOINT, 10, 10, PANDION, encode_dialect.arm_joint_setpoint),
+    Stream(message_ids.END_EFFECTOR_TARGET, 10, 10, PANDION, encode_dialect.end_effector_target),
+    Stream(message_ids.SETPOINT_STATUS, 5, 5, PANDION, encode_dialect.setpoint_status),
+    Stream(message_ids.BARRIER_MARGIN, 10, 10, PANDION, encode_dialect.barrier_margin),
+    Stream(message_ids.MPC_STATUS, 10, 10, PANDION, encode_dialect.mpc_status),
+    Stream(message_ids.LOOP_TIMING, 1, 1, PANDION, encode_dialect.inner_timing),
+    Stream(message_ids.LOOP_TIMING, 1, 1, PANDION, encode_dialect.mpc_timing),
+    Stream(message_ids.LOOP_TIMING, 1, 1, PANDION, encode_dialect.telemetry_timing),
+    Stream(message_ids.LOOP_TIMING, 1, 1, PANDION, encode_dialect.housekeeping_timing),
+)
+
+# These leave at once when mode, arming, landing or health change.
+AT_ONCE: Final = (HEARTBEAT, _CURRENT_MODE, _EXTENDED_STATE)
+
+# Sent on request only, because they have several parts; the request's param2 chooses.
+ON_REQUEST: Final[dict[int, Answerer]] = {
+    message_ids.AVAILABLE_MODES: encode_identity.available_modes,
+    message_ids.COMPONENT_METADATA: component_metadata,
+}
+
+GROUND_RATES: Final = tuple(stream.ground_hz for stream in STREAMS)
+API_RATES: Final = tuple(stream.api_hz for stream in STREAMS)
+
+
+def messages_now(
+    message_id: int, which: float, snapshot: FlightSnapshot, context: TelemetryContext
+) -> Sequence[Outgoing] | None:
+    """Any message of this vehicle, as it would be sent now.
+
+    Args:
+        message_id: Which.
+        which: Part of it, where it has several.
+        snapshot: Of the last tick.
+        context: What encoders need.
+
+    Returns:
+        The message, or several; nothing where there is nothing to say yet; None if the vehicle has
+        no such message.
+    """
+    answerer = ON_REQUEST.get(message_id)
+    if answerer is not None:
+        return answerer(which, snapshot, context)
+    streams = [stream for stream in STREAMS if stream.message_id == message_id]
+    if not streams:
+        return None
+    found = ((stream, stream.encode(snapshot, context)) for stream in streams)
+    return [
+        Outgoing(s.message_id, values, s.component) for s, values in found if values is not None
+    ]

@@ -1,0 +1,1 @@
+"""What goes over the wire: message ids, encoders and decoders; pure."""

@@ -1,0 +1,148 @@
+"""From wire values to the boundary types; pure.
+
+A MAVLink payload that carries NaN or infinity where the vehicle would use it as a number is
+refused here by returning None, and the caller counts it. NaN in a COMMAND_LONG is normal:
+clients put it into every parameter that they do not use.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final, cast
+
+from fsw.link.wire.message_ids import SYSTEM_ID
+from fsw.signals import (
+    CommandRequest,
+    EndEffectorTarget,
+    SensorFrame,
+    Vec2,
+    Vec3,
+    Vec4,
+    Wall,
+    WorkspaceSphere,
+)
+from messages.frames import Frame
+
+Numbers = tuple[float, ...]  # a payload without text, in wire order
+
+_LOCAL_NED: Final = 1  # MAV_FRAME_LOCAL_NED
+_INT32_MAX: Final = 0x7FFFFFFF
+_LOCAL_FRAMES: Final = frozenset({1, 7, 8, 9, 12})  # COMMAND_INT scales x, y by 1e4 here
+_VELOCITY_IGNORED: Final = 0x038  # POSITION_TARGET_TYPEMASK
+_ACCELERATION_IGNORED: Final = 0x1C0
+_YAW_IGNORED: Final = 0x400
+_POSITION_IGNORED: Final = 0x007
+_ZERO: Final[Vec3] = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class IndexedWall:
+    """One wall of a set of ``count``."""
+
+    wall: Wall
+    index: int
+    count: int
+
+
+def for_this_vehicle(target_system: float, target_component: float) -> bool:
+    """Tell whether a message is addressed to the autopilot or to everyone."""
+    return target_system in (0, SYSTEM_ID) and target_component in (0, 1, 191)
+
+
+def sensor_frame(odometry: Numbers, arm: Numbers, hil_sensor: Numbers) -> SensorFrame:
+    """Put together what the sensors said at one step.
+
+    Args:
+        odometry: ODOMETRY, pose and velocity in local NED, body rates.
+        arm: ARM_JOINT_STATE, joint encoders.
+        hil_sensor: HIL_SENSOR, whose time stamp is the frame's.
+    """
+    return SensorFrame(
+        t_us=cast(int, hil_sensor[0]),
+        p_WB=cast(Vec3, odometry[1:4]),
+        v_WB=cast(Vec3, odometry[8:11]),
+        q_WB=cast(Vec4, odometry[4:8]),
+        gyro_B=cast(Vec3, hil_sensor[4:7]),
+        accel_B=cast(Vec3, hil_sensor[1:4]),
+        q_arm=cast(Vec2, arm[1:3]),
+        qd_arm=cast(Vec2, arm[5:7]),
+    )
+
+
+def command_long(frame: Frame) -> CommandRequest | None:
+    """Read a COMMAND_LONG; None if it is for another system."""
+    *params, command, system, component, confirmation = cast(Numbers, frame.payload_values)
+    if not for_this_vehicle(system, component):
+        return None
+    return CommandRequest(
+        command=int(command),
+        params=cast("tuple[float, float, float, float, float, float, float]", tuple(params)),
+        source_system=frame.system_id,
+        source_component=frame.component_id,
+        confirmation=int(confirmation),
+    )
+
+
+def command_int(frame: Frame) -> CommandRequest | None:
+    """Read a COMMAND_INT; parameters 5 and 6 come back in metres or degrees."""
+    p1, p2, p3, p4, x, y, z, command, system, component, mav_frame, _, _ = cast(
+        Numbers, frame.payload_values
+    )
+    if not for_this_vehicle(system, component):
+        return None
+    scale = 1e-4 if mav_frame in _LOCAL_FRAMES else 1e-7
+    return CommandRequest(
+        command=int(command),
+        params=(p1, p2, p3, p4, _scaled(x, scale), _scaled(y, scale), z),
+        source_system=frame.system_id,
+        source_component=frame.component_id,
+        frame=int(mav_frame),
+    )
+
+
+def _scaled(number: float, scale: float) -> float:
+    """An integer parameter; INT32_MAX is its NaN."""
+    return math.nan if number == _INT32_MAX else number * scale
+
+
+def end_effector_target(values: Numbers) -> EndEffectorTarget | None:
+    """Read an END_EFFECTOR_TARGET; None if it is of no use as a set-point.
+
+    A masked velocity, acceleration or yaw reads as zero; a target without a position, in another
+    frame than local NED or with a number that is not finite is refused.
+    """
+    mask, frame = int(values[12]), values[15]
+    if frame != _LOCAL_NED or mask & _POSITION_IGNORED:
+        return None
+    position = cast(Vec3, values[1:4])
+    velocity = _ZERO if mask & _VELOCITY_IGNORED else cast(Vec3, values[4:7])
+    acceleration = _ZERO if mask & _ACCELERATION_IGNORED else cast(Vec3, values[7:10])
+    yaw = 0.0 if mask & _YAW_IGNORED else values[10]
+    if not _all_finite((*position, *velocity, *acceleration, yaw)):
+        return None
+    return EndEffectorTarget(int(values[0]), position, velocity, acceleration, yaw)
+
+
+def obstacle_wall(values: Numbers) -> IndexedWall | None:
+    """Read an OBSTACLE_WALL; None if it describes no plane or no place in its set."""
+    numbers = values[0:5]
+    index, count = int(values[7]), int(values[8])
+    if not _all_finite(numbers) or not index < count:
+        return None
+    # f32 rounding leaves a unit normal within 1e-6; anything further off is another vector.
+    if not abs(math.hypot(*values[0:3]) - 1.0) < 1e-3 or not values[4] >= 0.0:
+        return None
+    wall = Wall(normal=cast(Vec3, values[0:3]), offset=values[3], clearance=values[4])
+    return IndexedWall(wall, index, count)
+
+
+def workspace_sphere(values: Numbers) -> WorkspaceSphere | None:
+    """Read a WORKSPACE_SPHERE; None if it contains nothing."""
+    if not _all_finite(values[0:4]) or not values[3] > 0.0:
+        return None
+    return WorkspaceSphere(centre_from_target=cast(Vec3, values[0:3]), radius=values[3])
+
+
+def _all_finite(numbers: Numbers) -> bool:
+    return all(map(math.isfinite, numbers))

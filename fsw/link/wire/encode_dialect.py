@@ -1,0 +1,169 @@
+"""Messages of the pandion dialect from the vehicle's snapshot; pure.
+
+Each encoder returns every field of its message in wire order (larger types first, see
+``messages.frames.wire_fields``), or None when there is nothing to say yet.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from fsw.link.wire.encode_setpoints import as_asked
+from fsw.link.wire.outgoing import WireValues
+from fsw.link.wire.telemetry_context import GroupTiming, TelemetryContext
+from fsw.model.arm_kinematics import point_in_flight
+from fsw.signals import FlightSnapshot, SetpointKind, Vec2, Vec4
+
+_LOCAL_NED: Final = 1  # MAV_FRAME
+_MAX_CONSTRAINTS: Final = 16
+_U32: Final = 0xFFFFFFFF
+
+
+def arm_joint_state(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues:
+    """ARM_JOINT_STATE; the torque is the one commanded, the arm has no torque sensor."""
+    estimate = snapshot.estimate
+    p_WE, v_WE = point_in_flight(estimate, context.facts.link_length)
+    return (
+        snapshot.t_us,
+        *_four(estimate.q_arm),
+        *_four(estimate.qd_arm),
+        *_four(snapshot.actuators.joint_torque),
+        *p_WE,
+        *v_WE,
+        2,
+    )
+
+
+def arm_joint_setpoint(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues | None:
+    """ARM_JOINT_SETPOINT in use: the one that is flown offboard, or the running plan's joints."""
+    offboard = snapshot.offboard
+    if offboard.kind is not SetpointKind.NONE and offboard.joints is not None:
+        still = (*_four((0.0, 0.0)), *_four((0.0, 0.0)))
+        return (snapshot.t_us, *_four(offboard.joints.q_arm), *still, 0, 0, 2)
+    plan, inputs = snapshot.plan_state, snapshot.plan_input
+    if plan is None or inputs is None:
+        return None
+    return (
+        snapshot.t_us,
+        *_four(plan.q_arm),
+        *_four(plan.qd_arm),
+        *_four(inputs.qdd_arm),
+        *(0, 0, 2),
+    )
+
+
+def end_effector_target(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues | None:
+    """END_EFFECTOR_TARGET in use; shows whether a set-point was accepted."""
+    asked = snapshot.offboard.motion
+    if snapshot.offboard.kind is SetpointKind.END_EFFECTOR and asked is not None:
+        numbers, mask = as_asked(asked)
+        return (0, *numbers, mask, 0, 0, _LOCAL_NED)
+    target = snapshot.reference
+    if target is None:
+        return None
+    motion = (*target.p_WE, *target.v_WE, *target.a_WE)
+    return (target.t_us, *motion, target.yaw, 0.0, 0, 0, 0, _LOCAL_NED)
+
+
+def setpoint_status(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues:
+    """SETPOINT_STATUS: how many set-points were of use, and which kind is flown."""
+    report = snapshot.offboard
+    counts = (report.accepted & _U32, report.refused & _U32, min(report.age_us, _U32))
+    return (snapshot.t_us, *counts, int(report.kind))
+
+
+def barrier_margin(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues | None:
+    """BARRIER_MARGIN of the active safe set; a barrier counts as active at or below zero."""
+    report = snapshot.constraints
+    margins = report.margins[:_MAX_CONSTRAINTS]
+    if not margins:
+        return None
+    barrier = report.barrier[:_MAX_CONSTRAINTS]
+    smallest = min(margins)
+    active = sum(1 << i for i, value in enumerate(barrier) if not value > 0.0)
+    return (
+        snapshot.t_us,
+        *_padded(margins, _MAX_CONSTRAINTS),
+        *_padded(barrier, _MAX_CONSTRAINTS),
+        snapshot.plan.slack_max if snapshot.plan is not None else 0.0,
+        smallest,
+        active,
+        int(report.kind),
+        len(margins),
+        margins.index(smallest),
+    )
+
+
+def mpc_status(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues | None:
+    """MPC_STATUS of the last plan that was accepted, with the status of the last cycle."""
+    plan, facts = snapshot.plan, context.facts
+    if plan is None:
+        return None
+    return (
+        plan.t_us,
+        plan.plan_id & _U32,
+        _microseconds(plan.timings.total_us),
+        _microseconds(plan.timings.linearise_us),
+        _microseconds(plan.timings.solve_us),
+        facts.mpc_delay_us,
+        snapshot.counters.missed_deadlines,
+        snapshot.counters.fallbacks,
+        plan.cost,
+        plan.slack_max,
+        facts.mpc_delay_us,
+        facts.horizon,
+        round(1e6 / facts.mpc_period_us),
+        plan.sqp_iterations & 0xFF,
+        plan.solver_iterations & 0xFF,
+        int(snapshot.plan_status),
+    )
+
+
+def inner_timing(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues:
+    """LOOP_TIMING of the fast tick."""
+    return _loop_timing(snapshot.t_us, context.health.inner, group=0)
+
+
+def mpc_timing(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues:
+    """LOOP_TIMING of the planning cycle."""
+    return _loop_timing(snapshot.t_us, context.health.mpc, group=1)
+
+
+def telemetry_timing(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues:
+    """LOOP_TIMING of telemetry and log."""
+    return _loop_timing(snapshot.t_us, context.health.telemetry, group=2)
+
+
+def housekeeping_timing(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues:
+    """LOOP_TIMING of what is done once a second."""
+    return _loop_timing(snapshot.t_us, context.health.housekeeping, group=3)
+
+
+def _loop_timing(t_us: int, timing: GroupTiming, group: int) -> WireValues:
+    return (
+        t_us,
+        timing.ticks,
+        timing.late_ticks,
+        timing.skipped_ticks,
+        timing.period_us,
+        timing.execution_p50_us,
+        timing.execution_p99_us,
+        timing.execution_max_us,
+        timing.lateness_p50_us,
+        timing.lateness_p99_us,
+        timing.lateness_max_us,
+        group,
+    )
+
+
+def _microseconds(value: float) -> int:
+    return min(max(round(value), 0), _U32) if math.isfinite(value) else _U32
+
+
+def _four(pair: Vec2) -> Vec4:
+    return (pair[0], pair[1], 0.0, 0.0)
+
+
+def _padded(values: tuple[float, ...], size: int) -> tuple[float, ...]:
+    return values + (0.0,) * (size - len(values))

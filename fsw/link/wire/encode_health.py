@@ -1,0 +1,112 @@
+"""Health, battery and estimator as standard MAVLink messages; pure, in wire order."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from fsw.link.wire.outgoing import WireValues
+from fsw.link.wire.telemetry_context import TelemetryContext
+from fsw.signals import BatteryState, FlightSnapshot
+from fsw.vehicle.faults import Fault
+
+# MAV_SYS_STATUS_SENSOR bits of what this vehicle has. It has no magnetometer and no satellite
+# receiver: heading and position come from motion capture. Their bits say whether heading and
+# position are known, which is what clients ask them for.
+_GYRO, _ACCELEROMETER, _HEADING, _PLACE, _EXTERNAL_POSE = 0x1, 0x2, 0x4, 0x20, 0x80
+_RATE_CONTROL, _ATTITUDE, _YAW, _HEIGHT, _POSITION = 0x400, 0x800, 0x1000, 0x2000, 0x4000
+_MOTORS, _FENCE, _AHRS, _BATTERY, _PREARM = 0x8000, 0x100000, 0x200000, 0x2000000, 0x10000000
+_SENSING: Final = _GYRO | _ACCELEROMETER | _HEADING | _PLACE | _EXTERNAL_POSE | _AHRS
+_CONTROL: Final = _RATE_CONTROL | _ATTITUDE | _YAW | _HEIGHT | _POSITION
+_PRESENT: Final = _SENSING | _CONTROL | _MOTORS | _FENCE | _BATTERY | _PREARM
+# Which subsystem an operator should look at; any fault also forbids arming.
+_SUSPECT: Final[dict[str, int]] = {
+    Fault.PLAN_REFUSED.value: 0,
+    Fault.PLAN_STALE.value: _POSITION | _HEIGHT,
+    Fault.OUTPUT_NOT_FINITE.value: _MOTORS,
+    Fault.ESTIMATE_INVALID.value: _SENSING,
+    Fault.TILT_LOST.value: _ATTITUDE | _RATE_CONTROL,
+}
+_LOW, _CRITICAL = 0.2, 0.1  # shares of the charge
+_CHARGE_OK, _CHARGE_LOW, _CHARGE_CRITICAL = 1, 2, 3  # MAV_BATTERY_CHARGE_STATE
+_LIPO, _FOR_EVERYTHING = 1, 1  # MAV_BATTERY_TYPE, MAV_BATTERY_FUNCTION
+_UNKNOWN_CELL: Final = 0xFFFF
+_UNKNOWN_TEMPERATURE: Final = 0x7FFF
+_UNKNOWN_ENERGY: Final = -1
+# ESTIMATOR_STATUS_FLAGS: attitude, both velocities, position relative and absolute, height.
+_ESTIMATED: Final = 1 | 2 | 4 | 8 | 16 | 32
+
+
+def sys_status(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues:
+    """SYS_STATUS: load of the loop, health by subsystem, battery."""
+    battery = snapshot.battery
+    health = _PRESENT
+    for failure in snapshot.failures:
+        health &= ~(_SUSPECT.get(failure, 0) | _PREARM)
+    if snapshot.arming_refusal:
+        health &= ~_PREARM
+    if battery.remaining < _CRITICAL:
+        health &= ~_BATTERY
+    margins = snapshot.constraints.margins
+    if margins and not min(margins) >= 0.0:
+        health &= ~_FENCE
+    enabled = _PRESENT if snapshot.armed else _PRESENT & ~(_CONTROL | _MOTORS)
+    if not margins:
+        enabled &= ~_FENCE
+    load = round(1000 * min(context.health.inner.load + context.health.mpc.load, 1.0))
+    return (
+        _PRESENT,
+        enabled,
+        health,
+        load,
+        _millivolts(battery),
+        _centiamperes(battery),
+        0,
+        0,
+        *(0, 0, 0, 0),
+        _percent(battery),
+        *(0, 0, 0),
+    )
+
+
+def battery_status(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues:
+    """BATTERY_STATUS: one pack whose cells are not told apart."""
+    battery = snapshot.battery
+    state = _CHARGE_OK
+    if battery.remaining < _LOW:
+        state = _CHARGE_LOW if battery.remaining >= _CRITICAL else _CHARGE_CRITICAL
+    return (
+        round(1000.0 * battery.consumed),
+        _UNKNOWN_ENERGY,
+        _UNKNOWN_TEMPERATURE,
+        _millivolts(battery),
+        *(_UNKNOWN_CELL,) * 9,
+        _centiamperes(battery),
+        0,
+        _FOR_EVERYTHING,
+        _LIPO,
+        _percent(battery),
+        0,
+        state,
+        *(0, 0, 0, 0),
+        0,
+        0,
+    )
+
+
+def estimator_status(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues:
+    """ESTIMATOR_STATUS: what is known. There is no filter, hence no innovation to report."""
+    invalid = Fault.ESTIMATE_INVALID.value in snapshot.failures
+    return (snapshot.t_us, *(math.nan,) * 8, 0 if invalid else _ESTIMATED)
+
+
+def _millivolts(battery: BatteryState) -> int:
+    return round(1000.0 * battery.voltage)
+
+
+def _centiamperes(battery: BatteryState) -> int:
+    return round(100.0 * battery.current)
+
+
+def _percent(battery: BatteryState) -> int:
+    return round(100.0 * battery.remaining)

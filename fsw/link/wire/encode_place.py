@@ -1,0 +1,110 @@
+"""Where the vehicle is on Earth, as standard MAVLink messages; pure, in wire order.
+
+The local frame is measured; the place of its origin on Earth is configured.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from fsw.geometry.geodesy import to_global
+from fsw.geometry.rotation import quaternion_from_matrix
+from fsw.link.wire.outgoing import WireValues
+from fsw.link.wire.telemetry_context import TelemetryContext
+from fsw.signals import FlightSnapshot, Vec3
+
+_LOCAL_NED: Final = 1  # MAV_FRAME
+_BODY_FRD: Final = 12  # MAV_FRAME
+_MOCAP: Final = 4  # MAV_ESTIMATOR_TYPE
+_U32: Final = 0xFFFFFFFF
+_COVARIANCE_UNKNOWN: Final = (math.nan, *(0.0,) * 20)
+_I16: Final = 32767
+
+
+def global_position(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues:
+    """GLOBAL_POSITION_INT of the body origin."""
+    estimate = snapshot.estimate
+    latitude, longitude, altitude = _scaled(to_global(context.origin, estimate.p_WB))
+    vx, vy, vz = (_int16(100.0 * v) for v in estimate.v_WB)
+    heading = round(100.0 * _degrees(estimate.yaw)) % 36000
+    above = round(1000.0 * _above_home(snapshot))
+    return (_boot_ms(snapshot), latitude, longitude, altitude, above, vx, vy, vz, heading)
+
+
+def home_position(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues | None:
+    """HOME_POSITION, once there is one; level ground and no direction of approach."""
+    home = snapshot.home
+    if home is None:
+        return None
+    half = 0.5 * home.yaw
+    heading = (math.cos(half), 0.0, 0.0, math.sin(half))
+    place = _scaled(to_global(context.origin, home.p))
+    return (*place, *home.p, *heading, 0.0, 0.0, 0.0, snapshot.t_us)
+
+
+def global_origin(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues:
+    """GPS_GLOBAL_ORIGIN: where the local frame begins."""
+    return (*_scaled(to_global(context.origin, (0.0, 0.0, 0.0))), snapshot.t_us)
+
+
+def altitude(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues:
+    """ALTITUDE; nothing is known about the terrain."""
+    local = -snapshot.estimate.p_WB[2]
+    mean_sea = context.origin.altitude + local
+    above_home = _above_home(snapshot)
+    return (snapshot.t_us, mean_sea, mean_sea, local, above_home, math.nan, math.nan)
+
+
+def vfr_hud(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues:
+    """VFR_HUD; without an airspeed sensor the ground speed stands for it."""
+    estimate = snapshot.estimate
+    vx, vy, vz = estimate.v_WB
+    speed = math.hypot(vx, vy)
+    thrust = sum(snapshot.actuators.rotor_thrust) / (4.0 * context.facts.rotor_thrust_max)
+    heading = round(_degrees(estimate.yaw)) % 360
+    mean_sea = context.origin.altitude - estimate.p_WB[2]
+    return (speed, speed, mean_sea, -vz, heading, round(100.0 * thrust))
+
+
+def odometry(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues:
+    """ODOMETRY: pose in local NED, velocity in the body; accuracy is not known."""
+    estimate = snapshot.estimate
+    r, v = estimate.R_WB, estimate.v_WB
+    v_B = tuple(r[i] * v[0] + r[i + 3] * v[1] + r[i + 6] * v[2] for i in range(3))
+    return (
+        snapshot.t_us,
+        *estimate.p_WB,
+        *quaternion_from_matrix(r),
+        *v_B,
+        *estimate.w_WB_B,
+        *_COVARIANCE_UNKNOWN,
+        *_COVARIANCE_UNKNOWN,
+        _LOCAL_NED,
+        _BODY_FRD,
+        0,
+        _MOCAP,
+        0,
+    )
+
+
+def _scaled(place: Vec3) -> tuple[int, int, int]:
+    """Degrees times 1e7 and millimetres."""
+    return round(1e7 * place[0]), round(1e7 * place[1]), round(1000.0 * place[2])
+
+
+def _above_home(snapshot: FlightSnapshot) -> float:
+    ground = 0.0 if snapshot.home is None else snapshot.home.p[2]
+    return ground - snapshot.estimate.p_WB[2]
+
+
+def _degrees(yaw: float) -> float:
+    return math.degrees(yaw) % 360.0
+
+
+def _int16(value: float) -> int:
+    return min(max(round(value), -_I16), _I16)
+
+
+def _boot_ms(snapshot: FlightSnapshot) -> int:
+    return (snapshot.t_us // 1000) & _U32

@@ -1,0 +1,63 @@
+"""What the vehicle says in answer, to the simulator or a ground station; pure, in wire order."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from fsw.link.wire.outgoing import WireValues
+from fsw.signals import ActuatorCommand, CommandAck, StatusText
+
+_ARMED: Final = 128  # MAV_MODE_FLAG
+_CUSTOM_MODE: Final = 1
+_LOCKSTEP: Final = 1  # HIL_ACTUATOR_CONTROLS_FLAGS
+_TEXT_SIZE: Final = 50  # bytes in one STATUSTEXT
+
+
+def command_ack(ack: CommandAck) -> WireValues:
+    """COMMAND_ACK: no progress, no detail."""
+    return (ack.command, ack.result, 0, 0, ack.target_system, ack.target_component)
+
+
+def status_texts(text: StatusText, text_id: int) -> list[WireValues]:
+    """STATUSTEXT messages for one sentence, cut into pieces of 50 bytes.
+
+    Args:
+        text: The sentence.
+        text_id: 1..65535, the same for all pieces so that the receiver joins them.
+    """
+    whole = text.text.encode("utf-8")
+    if len(whole) <= _TEXT_SIZE:
+        return [(text.severity, whole, 0, 0)]
+    starts = range(0, min(len(whole), 255 * _TEXT_SIZE), _TEXT_SIZE)
+    return [
+        (text.severity, whole[start : start + _TEXT_SIZE], text_id, number)
+        for number, start in enumerate(starts)
+    ]
+
+
+def hil_actuator_controls(
+    t_us: int, actuators: ActuatorCommand, armed: bool, thrust_scale: float, torque_scale: float
+) -> WireValues:
+    """HIL_ACTUATOR_CONTROLS: the answer to the step of ``t_us``.
+
+    Args:
+        t_us: Time stamp of the HIL_SENSOR that is answered.
+        actuators: Rotor thrusts [N] and joint torques [N m].
+        armed: Goes into bit 7 of the mode.
+        thrust_scale: 1 / maximum thrust of a rotor [1/N].
+        torque_scale: 1 / maximum joint torque [1/(N m)].
+    """
+    f1, f2, f3, f4 = actuators.rotor_thrust
+    tau1, tau2 = actuators.joint_torque
+    return (
+        t_us,
+        _LOCKSTEP,
+        f1 * thrust_scale,
+        f2 * thrust_scale,
+        f3 * thrust_scale,
+        f4 * thrust_scale,
+        tau1 * torque_scale,
+        tau2 * torque_scale,
+        *(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+        _CUSTOM_MODE | (_ARMED if armed else 0),
+    )

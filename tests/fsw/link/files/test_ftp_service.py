@@ -1,0 +1,373 @@
+"""MAVLink FTP: every request is answered, and nothing but the offered files is reached."""
+
+from __future__ import annotations
+
+import os
+import random
+import struct
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import pytest
+
+from fsw.link.files.flight_logs import flight_logs
+from fsw.link.files.ftp_message import MAX_DATA, Opcode, Refusal
+from fsw.link.files.ftp_service import FtpService
+from fsw.link.files.ftp_tree import Directory
+from fsw.link.files.served_file import DiskFile, MemoryFile
+from fsw.link.files.vehicle_files import vehicle_files
+from fsw.link.wire import message_ids as ids
+from fsw.link.wire.outgoing import Outgoing
+from messages.frames import FrameWriter, split
+
+HEADER = struct.Struct("<HBBBBBxI")
+FRAMES_A_TICK = 10
+SECOND_US = 1_000_000
+
+
+@dataclass(frozen=True)
+class Said:
+    """A message of the server."""
+
+    sequence: int
+    session: int
+    opcode: int
+    requested: int
+    complete: bool
+    offset: int
+    data: bytes
+    to: tuple[int, ...]
+
+    @property
+    def refusal(self) -> int | None:
+        return self.data[0] if self.opcode == Opcode.NAK else None
+
+
+def said(outgoing: Outgoing) -> Said:
+    assert outgoing.message_id == ids.FILE_TRANSFER_PROTOCOL
+    network, system, component, *payload = (int(value) for value in outgoing.values)
+    assert network == 0
+    sequence, session, opcode, size, requested, complete, offset = HEADER.unpack_from(
+        bytes(payload)
+    )
+    data = bytes(payload[HEADER.size : HEADER.size + size])
+    return Said(
+        sequence, session, opcode, requested, bool(complete), offset, data, (system, component)
+    )
+
+
+@dataclass
+class Client:
+    """A ground station."""
+
+    service: FtpService
+    component: int = 190
+    sequence: int = 0
+    t_us: int = SECOND_US
+    writer: FrameWriter = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.writer = FrameWriter(255, self.component)
+
+    def send(
+        self,
+        opcode: int,
+        data: bytes = b"",
+        session: int = 0,
+        offset: int = 0,
+        size: int | None = None,
+        repeat: bool = False,
+        target: tuple[int, int] = (1, 1),
+    ) -> list[Said]:
+        """Ask, and poll until there is silence."""
+        if not repeat:
+            self.sequence = (self.sequence + 1) & 0xFFFF
+        size = len(data) if size is None else size
+        header = HEADER.pack(self.sequence, session, opcode, size, 0, 0, offset)
+        payload = (header + data).ljust(251, b"\0")
+        frame = self.writer.frame(ids.FILE_TRANSFER_PROTOCOL, 0, *target, *payload)
+        (received,) = split(frame)
+        return [said(answer) for answer in self.service.receive(received, self.t_us)]
+
+    def polled(self) -> list[Said]:
+        answers = [said(answer) for answer in self.service.poll(self.t_us)]
+        assert len(answers) <= FRAMES_A_TICK
+        return answers
+
+    def ask(self, opcode: int, data: bytes = b"", **header: int) -> Said:
+        """The one answer to a request, at once or within a few ticks."""
+        answers = self.send(opcode, data, **header)  # type: ignore[arg-type]
+        for _ in range(200):
+            answers += self.polled()
+        (answer,) = answers
+        assert answer.requested == opcode
+        assert answer.sequence == (self.sequence + 1) & 0xFFFF
+        assert answer.to == (255, self.component)
+        if opcode != Opcode.OPEN_FILE_RO:
+            assert answer.session == header.get("session", 0)
+        return answer
+
+    def open(self, path: str) -> tuple[int, int]:
+        """(session, size)."""
+        answer = self.ask(Opcode.OPEN_FILE_RO, path.encode())
+        assert answer.opcode == Opcode.ACK
+        return answer.session, int.from_bytes(answer.data, "little")
+
+    def names(self, path: str) -> list[str]:
+        found: list[str] = []
+        while True:
+            answer = self.ask(Opcode.LIST_DIRECTORY, path.encode(), offset=len(found))
+            if answer.refusal == Refusal.END_OF_FILE:
+                return found
+            assert answer.opcode == Opcode.ACK
+            found += [entry.decode() for entry in answer.data.split(b"\0") if entry]
+
+    def burst(self, session: int, offset: int, size: int = MAX_DATA) -> list[Said]:
+        answers = self.send(Opcode.BURST_READ_FILE, session=session, offset=offset, size=size)
+        while more := self.polled():
+            answers += more
+        return answers
+
+
+def serve(**files: bytes) -> Directory:
+    return {name: MemoryFile(lambda content=content: content) for name, content in files.items()}
+
+
+CONTENT = random.Random(3).randbytes(100_000)
+
+
+@pytest.fixture
+def client() -> Client:
+    return Client(FtpService({"files": serve(a=CONTENT, b=b"b"), "top": MemoryFile(lambda: b"t")}))
+
+
+@pytest.mark.parametrize("root", ["/", "", ".", "//", "/./"])
+def test_the_root_is_listed(client: Client, root: str) -> None:
+    assert client.names(root) == ["Dfiles", "Ftop\t1"]
+
+
+def test_a_long_directory_is_listed_piece_by_piece() -> None:
+    files = {f"file{n:03}": MemoryFile(lambda: b"x") for n in range(300)}
+    assert Client(FtpService({"d": files})).names("/d") == [f"F{name}\t1" for name in files]
+
+
+@pytest.mark.parametrize("size", [1, 100, MAX_DATA])
+def test_reading_gives_the_file(client: Client, size: int) -> None:
+    session, total = client.open("/files/a")
+    assert total == len(CONTENT)
+    for offset in (0, 1, 5000, total - 1):
+        answer = client.ask(Opcode.READ_FILE, session=session, offset=offset, size=size)
+        assert answer.data == CONTENT[offset : offset + size]
+        assert answer.offset == offset
+    answer = client.ask(Opcode.READ_FILE, session=session, offset=total, size=size)
+    assert answer.refusal == Refusal.END_OF_FILE
+
+
+@pytest.mark.parametrize("size", [80, MAX_DATA])
+def test_bursts_give_the_file(client: Client, size: int) -> None:
+    session, total = client.open("files/a")
+    read = b""
+    while len(read) < total:
+        client.sequence = 65_000  # it must go round
+        pieces = client.burst(session, len(read), size)
+        for number, piece in enumerate(pieces, start=1):
+            assert piece.sequence == (client.sequence + number) & 0xFFFF
+            assert piece.offset == len(read)
+            assert piece.complete == (number == len(pieces))
+            read += piece.data
+    assert read == CONTENT
+    (end,) = client.burst(session, total, size)
+    assert end.refusal == Refusal.END_OF_FILE
+
+
+def test_the_checksum_is_the_one_of_the_specification(client: Client) -> None:
+    crc = 0
+    for byte in CONTENT:  # reflected 0x04C11DB7, no inversion at either end
+        crc ^= byte
+        for _ in range(8):
+            crc = crc >> 1 ^ (0xEDB88320 if crc & 1 else 0)
+    answer = client.ask(Opcode.CALC_FILE_CRC32, b"/files/a")
+    assert answer.data == crc.to_bytes(4, "little")
+
+
+def test_a_checksum_takes_a_little_of_many_ticks(client: Client) -> None:
+    big = Client(FtpService(serve(big=bytes(1 << 20))))
+    assert big.send(Opcode.CALC_FILE_CRC32, b"big") == []
+    ticks = 0
+    while not big.polled():
+        ticks += 1
+        assert big.send(Opcode.CALC_FILE_CRC32, b"big", repeat=True) == []
+    assert ticks == 16
+
+
+OUTSIDE = [
+    "..",
+    "/..",
+    "../secret",
+    "/files/../../secret",
+    "files/../top",
+    "/etc/passwd",
+    "//etc/passwd",
+    "~",
+    "files/a/..",
+    "files\\..",
+    "@PARAM/param.pck.gz",
+    "@SYS/threads.txt",
+]
+
+
+@pytest.mark.parametrize("path", OUTSIDE)
+@pytest.mark.parametrize(
+    "opcode", [Opcode.OPEN_FILE_RO, Opcode.LIST_DIRECTORY, Opcode.CALC_FILE_CRC32]
+)
+def test_there_is_no_way_out_of_the_tree(client: Client, opcode: Opcode, path: str) -> None:
+    assert client.ask(opcode, path.encode()).refusal == Refusal.FILE_NOT_FOUND
+
+
+@pytest.mark.parametrize("path", [b"\xff\xfe", b"/files/\xc3\x28", b"files/a/x", b"files"])
+def test_what_is_no_file_is_not_found(client: Client, path: bytes) -> None:
+    assert client.ask(Opcode.OPEN_FILE_RO, path).refusal == Refusal.FILE_NOT_FOUND
+
+
+def test_a_link_in_the_place_of_a_log_is_not_followed(tmp_path: Path) -> None:
+    secret, log = tmp_path / "secret", tmp_path / "run" / "flight.tlog"
+    secret.write_bytes(b"secret")
+    log.parent.mkdir()
+    log.write_bytes(b"log")
+    client = Client(FtpService(vehicle_files(flight_logs(log.parent))))
+    assert client.names("/logs/run") == ["Fflight.tlog\t3"]
+    log.unlink()
+    log.symlink_to(secret)
+    path = b"/logs/run/flight.tlog"
+    assert client.ask(Opcode.OPEN_FILE_RO, path).refusal == Refusal.FILE_NOT_FOUND
+    assert client.ask(Opcode.CALC_FILE_CRC32, path).refusal == Refusal.FILE_NOT_FOUND
+    log.unlink()
+    os.mkfifo(log)
+    assert client.ask(Opcode.OPEN_FILE_RO, path).refusal == Refusal.FILE_NOT_FOUND
+    assert client.send(Opcode.TERMINATE_SESSION)[0].refusal == Refusal.INVALID_SESSION
+
+
+@pytest.mark.parametrize("opcode", range(Opcode.CREATE_FILE, Opcode.RENAME + 1))
+def test_writing_is_refused_at_once(client: Client, opcode: int) -> None:
+    (answer,) = client.send(opcode, b"/files/b")
+    assert answer.refusal == Refusal.FILE_PROTECTED
+
+
+@pytest.mark.parametrize("opcode", [0, 16, 100, 128, 129, 255])
+def test_an_unknown_request_is_refused_at_once(client: Client, opcode: int) -> None:
+    (answer,) = client.send(opcode)
+    assert answer.refusal == Refusal.UNKNOWN_COMMAND
+    assert answer.requested == opcode
+
+
+def test_more_data_than_fit_are_refused(client: Client) -> None:
+    (answer,) = client.send(Opcode.OPEN_FILE_RO, b"/top", size=240)
+    assert answer.refusal == Refusal.INVALID_DATA_SIZE
+
+
+def test_a_repeated_open_opens_once_and_a_repeated_close_succeeds(client: Client) -> None:
+    first = client.send(Opcode.OPEN_FILE_RO, b"/top")
+    assert client.send(Opcode.OPEN_FILE_RO, b"/top", repeat=True) == first
+    second = client.ask(Opcode.OPEN_FILE_RO, b"/top")
+    assert (first[0].session, second.session) == (0, 1)
+    closed = client.send(Opcode.TERMINATE_SESSION, session=0)
+    assert client.send(Opcode.TERMINATE_SESSION, session=0, repeat=True) == closed
+    assert closed[0].opcode == Opcode.ACK
+    again = client.ask(Opcode.TERMINATE_SESSION, session=0)
+    assert again.refusal == Refusal.INVALID_SESSION
+
+
+def test_sessions_are_few_and_come_back_when_their_client_has_gone(client: Client) -> None:
+    for number in range(8):
+        assert client.open("/top")[0] == number
+    refused = client.ask(Opcode.OPEN_FILE_RO, b"/top")
+    assert refused.refusal == Refusal.NO_SESSIONS_AVAILABLE
+    client.t_us += 29 * SECOND_US
+    client.ask(Opcode.READ_FILE, session=0, size=1)
+    client.t_us += 2 * SECOND_US
+    assert client.open("/top")[0] == 1
+
+
+def test_a_client_may_choose_the_number_of_its_session(client: Client) -> None:
+    (chosen,) = client.send(Opcode.OPEN_FILE_RO, b"/top", session=231)
+    (again,) = client.send(Opcode.OPEN_FILE_RO, b"/files/b", session=231)
+    assert (chosen.session, again.session) == (231, 0)
+    assert client.ask(Opcode.READ_FILE, session=231, size=1).data == b"t"
+    assert client.ask(Opcode.READ_FILE, session=0, size=1).data == b"b"
+    assert client.send(Opcode.LIST_DIRECTORY, b"/", session=77)[0].session == 77
+    assert client.send(Opcode.REMOVE_FILE, b"/top", session=78)[0].session == 78
+
+
+def test_a_reset_closes_the_sessions_of_the_one_who_asks(client: Client) -> None:
+    other = Client(client.service, component=230)
+    mine, theirs = client.open("/top")[0], other.open("/top")[0]
+    assert client.ask(Opcode.RESET_SESSIONS).opcode == Opcode.ACK
+    lost = client.ask(Opcode.READ_FILE, session=mine, size=1)
+    assert lost.refusal == Refusal.INVALID_SESSION
+    assert other.ask(Opcode.READ_FILE, session=theirs, size=1).data == b"t"
+
+
+def test_nobody_reads_or_closes_the_session_of_another(client: Client) -> None:
+    session, _ = client.open("/top")
+    other = Client(client.service, component=230)
+    for opcode in (Opcode.READ_FILE, Opcode.BURST_READ_FILE, Opcode.TERMINATE_SESSION):
+        refused = other.ask(opcode, session=session, size=1)
+        assert refused.refusal == Refusal.INVALID_SESSION
+    assert client.ask(Opcode.READ_FILE, session=session, size=1).data == b"t"
+
+
+def test_two_clients_share_the_ticks(client: Client) -> None:
+    other = Client(client.service, component=230)
+    sessions = [(each, each.open("/files/a")[0]) for each in (client, other)]
+    for each, session in sessions:
+        each.send(Opcode.BURST_READ_FILE, session=session, size=MAX_DATA)
+    receivers = [answer.to[1] for answer in client.polled()]
+    assert receivers.count(190) == receivers.count(230) == FRAMES_A_TICK // 2
+
+
+def test_a_closed_session_sends_no_more(client: Client) -> None:
+    session, _ = client.open("/files/a")
+    client.send(Opcode.BURST_READ_FILE, session=session, size=MAX_DATA)
+    assert client.polled()
+    client.send(Opcode.TERMINATE_SESSION, session=session)
+    assert client.polled() == []
+
+
+def test_a_file_has_the_size_of_its_opening_while_it_grows(tmp_path: Path) -> None:
+    path = tmp_path / "growing"
+    path.write_bytes(CONTENT)
+    client = Client(FtpService({"growing": DiskFile(path)}))
+    session, size = client.open("growing")
+    with path.open("ab") as file:
+        file.write(b"more" * 1000)
+    read = b""
+    while len(read) < size:
+        read += b"".join(piece.data for piece in client.burst(session, len(read)))
+    assert read == CONTENT
+    assert client.burst(session, size)[0].refusal == Refusal.END_OF_FILE
+
+
+def test_a_file_that_became_shorter_is_a_failure_and_not_silence(tmp_path: Path) -> None:
+    path = tmp_path / "file"
+    path.write_bytes(CONTENT)
+    client = Client(FtpService({"file": DiskFile(path)}))
+    session, _ = client.open("file")
+    path.write_bytes(b"")
+    answer = client.ask(Opcode.READ_FILE, session=session, offset=100, size=10)
+    assert answer.refusal == Refusal.FAIL
+
+
+@pytest.mark.parametrize("target", [(2, 1), (1, 100)])
+def test_what_is_for_another_vehicle_is_left_to_it(client: Client, target: tuple[int, int]) -> None:
+    assert client.send(Opcode.LIST_DIRECTORY, b"/", target=target) == []
+
+
+def test_names_that_do_not_fit_a_message_are_left_out(tmp_path: Path) -> None:
+    for name in ("n" * 230, "tab\there", "plain"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "flight.tlog").write_bytes(b"log")
+    tree = vehicle_files(flight_logs(tmp_path / "plain"))
+    logs = tree["logs"]
+    assert isinstance(logs, Mapping)
+    assert list(logs) == ["plain"]

@@ -1,0 +1,212 @@
+"""Log download: what arrives is the file, whatever happens on the way."""
+
+from __future__ import annotations
+
+import os
+import random
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import pytest
+
+from fsw.link.files.flight_logs import flight_logs
+from fsw.link.files.log_service import CHUNK, LogService
+from fsw.link.wire import message_ids as ids
+from fsw.link.wire.outgoing import Outgoing
+from messages.frames import FrameWriter, split
+
+ALL = 0xFFFFFFFF
+FRAMES_A_TICK = 6
+
+
+def flight(runs: Path, name: str, content: bytes, suffix: str = "tlog") -> Path:
+    directory = runs / name
+    directory.mkdir(exist_ok=True)
+    (directory / f"flight.{suffix}").write_bytes(content)
+    return directory
+
+
+@dataclass
+class Client:
+    """Puts a download together, as ground stations do."""
+
+    service: LogService
+    log: bytearray = field(default_factory=bytearray)
+    counts: list[int] = field(default_factory=list)
+    writer: FrameWriter = field(default_factory=lambda: FrameWriter(255, 190))
+
+    def ask(self, message_id: int, *values: int) -> list[Outgoing]:
+        (frame,) = split(self.writer.frame(message_id, *values))
+        return list(self.service.receive(frame, 0))
+
+    def polled(self) -> list[Outgoing]:
+        answers = list(self.service.poll(0))
+        assert len(answers) <= FRAMES_A_TICK
+        return answers
+
+    def entries(self) -> list[tuple[int, ...]]:
+        """(id, size, number of logs, last id) of each entry."""
+        answers = self.ask(ids.LOG_REQUEST_LIST, 0, 0xFFFF, 1, 1)
+        while more := self.polled():
+            answers += more
+        assert {answer.message_id for answer in answers} == {ids.LOG_ENTRY}
+        return [tuple(map(int, (v[2], v[1], v[3], v[4]))) for v in (a.values for a in answers)]
+
+    def download(
+        self,
+        log_id: int,
+        offset: int = 0,
+        count: int = ALL,
+        lose: Callable[[], bool] = lambda: False,
+    ) -> None:
+        self.ask(ids.LOG_REQUEST_DATA, offset, count, log_id, 1, 1)
+        while answers := self.polled():
+            for start, id_, size, *data in (map(int, answer.values) for answer in answers):
+                assert id_ == log_id
+                assert len(data) == CHUNK
+                self.counts.append(size)
+                if not lose():
+                    self.log.extend(bytes(max(0, start + size - len(self.log))))
+                    self.log[start : start + size] = bytes(data[:size])
+
+
+@pytest.mark.parametrize("size", [1, 89, 90, 91, 1000, 90 * 40, 40_000])
+@pytest.mark.parametrize("count", [ALL, 0x7FFFFFFF])
+def test_a_download_is_the_file_byte_for_byte(tmp_path: Path, size: int, count: int) -> None:
+    content = random.Random(size).randbytes(size)
+    client = Client(LogService(flight_logs(flight(tmp_path, "run-1", content))))
+    client.download(0, count=count)
+    assert bytes(client.log) == content
+
+
+@pytest.mark.parametrize("size", [90, 91, 900])
+def test_a_download_without_an_end_closes_with_a_message_that_is_not_full(
+    tmp_path: Path, size: int
+) -> None:
+    client = Client(LogService(flight_logs(flight(tmp_path, "run-1", bytes(size)))))
+    client.download(0)
+    assert [count < CHUNK for count in client.counts] == [False] * (size // 90) + [True]
+
+
+def test_a_piece_ends_where_it_was_asked_to_end(tmp_path: Path) -> None:
+    content = bytes(range(250)) * 8
+    client = Client(LogService(flight_logs(flight(tmp_path, "run-1", content))))
+    client.download(0, offset=180, count=270)
+    assert client.counts == [90, 90, 90]
+    assert bytes(client.log[180:]) == content[180:450]
+
+
+def test_behind_the_end_there_is_nothing(tmp_path: Path) -> None:
+    client = Client(LogService(flight_logs(flight(tmp_path, "run-1", bytes(180)))))
+    client.download(0, offset=180)
+    client.download(0, offset=5000, count=90)
+    assert client.counts == [0, 0]
+
+
+def test_lost_pieces_are_asked_for_again_many_at_a_time(tmp_path: Path) -> None:
+    content = random.Random(1).randbytes(90 * 100)
+    client = Client(LogService(flight_logs(flight(tmp_path, "run-1", content))))
+    numbers = iter(range(1000))
+    client.download(0, lose=lambda: next(numbers) % 5 == 0)
+    assert bytes(client.log) != content
+    for lost in range(0, 100, 5):
+        client.ask(ids.LOG_REQUEST_DATA, 90 * lost, 90, 0, 1, 1)
+    client.download(0, offset=len(content), count=90)
+    assert bytes(client.log) == content
+
+
+def test_the_size_is_the_listed_one_while_the_file_grows(tmp_path: Path) -> None:
+    content = random.Random(2).randbytes(5000)
+    directory = flight(tmp_path, "run-1", content)
+    client = Client(LogService(flight_logs(directory)))
+    assert client.entries() == [(0, 5000, 1, 0)]
+    with (directory / "flight.tlog").open("ab") as log:
+        log.write(b"more of the flight" * 100)
+    client.download(0)
+    assert bytes(client.log) == content
+    assert client.entries() == [(0, 6800, 1, 0)]
+    client.download(0)
+    assert bytes(client.log) == (directory / "flight.tlog").read_bytes()
+
+
+def test_flights_are_listed_oldest_first_and_this_one_last(tmp_path: Path) -> None:
+    for age, name in ((30, "walls-1"), (10, "hop-1"), (20, "ground-9")):
+        log = flight(tmp_path, name, bytes(age)) / "flight.tlog"
+        os.utime(log, (1e9 - age, 1e9 - age))
+    present = flight(tmp_path, "ground-1", bytes(5))
+    client = Client(LogService(flight_logs(present)))
+    assert client.entries() == [(0, 30, 4, 3), (1, 20, 4, 3), (2, 10, 4, 3), (3, 5, 4, 3)]
+
+
+def test_the_ulog_stands_for_its_flight(tmp_path: Path) -> None:
+    directory = flight(tmp_path, "run-1", b"telemetry")
+    flight(tmp_path, "run-1", b"everything", "ulg")
+    client = Client(LogService(flight_logs(directory)))
+    client.download(0)
+    assert bytes(client.log) == b"everything"
+
+
+def test_a_link_to_elsewhere_is_no_log(tmp_path: Path) -> None:
+    secret = tmp_path / "secret"
+    secret.write_bytes(b"secret")
+    runs = tmp_path / "runs"
+    runs.mkdir()
+    present = flight(runs, "run-1", b"")
+    (runs / "run-2").mkdir()
+    (runs / "run-2" / "flight.tlog").symlink_to(secret)
+    flight(tmp_path, "elsewhere", b"secret")
+    (runs / "run-3").symlink_to(tmp_path / "elsewhere")
+    os.mkfifo(runs / "run-2" / "flight.ulg")
+    logs = flight_logs(present)
+    assert [log.flight for log in logs] == ["run-1"]
+    # Put there later, it cannot be opened either.
+    (present / "flight.tlog").unlink()
+    (present / "flight.tlog").symlink_to(secret)
+    client = Client(LogService(logs))
+    client.download(0)
+    assert client.counts == [0]
+
+
+def test_a_vehicle_without_logs_says_so(tmp_path: Path) -> None:
+    empty = tmp_path / "run-1"
+    empty.mkdir()
+    client = Client(LogService(flight_logs(empty)))
+    assert client.entries() == [(0, 0, 0, 0)]
+    client.download(0)
+    assert client.counts == []
+
+
+def test_nothing_is_erased_and_the_operator_is_told(tmp_path: Path) -> None:
+    directory = flight(tmp_path, "run-1", b"kept")
+    client = Client(LogService(flight_logs(directory)))
+    (answer,) = client.ask(ids.LOG_ERASE, 1, 1)
+    assert answer.message_id == ids.STATUSTEXT
+    assert b"not erased" in bytes(answer.values[1])
+    assert (directory / "flight.tlog").read_bytes() == b"kept"
+
+
+def test_a_client_that_stops_gets_no_more(tmp_path: Path) -> None:
+    client = Client(LogService(flight_logs(flight(tmp_path, "run-1", bytes(90_000)))))
+    client.ask(ids.LOG_REQUEST_DATA, 0, ALL, 0, 1, 1)
+    assert len(client.polled()) == FRAMES_A_TICK
+    client.ask(ids.LOG_REQUEST_END, 1, 1)
+    assert client.polled() == []
+
+
+def test_a_request_for_another_log_ends_the_download_of_the_first(tmp_path: Path) -> None:
+    flight(tmp_path, "run-1", bytes(90_000))
+    client = Client(LogService(flight_logs(flight(tmp_path, "run-2", b"the other"))))
+    client.ask(ids.LOG_REQUEST_DATA, 0, 0x7FFFFFFF, 0, 1, 1)
+    client.polled()
+    client.download(1)
+    assert bytes(client.log) == b"the other"
+
+
+@pytest.mark.parametrize("target", [(2, 1), (1, 100)])
+def test_what_is_for_another_vehicle_is_left_to_it(tmp_path: Path, target: tuple[int, int]) -> None:
+    client = Client(LogService(flight_logs(flight(tmp_path, "run-1", b"log"))))
+    client.ask(ids.LOG_REQUEST_LIST, 0, 0xFFFF, *target)
+    client.ask(ids.LOG_REQUEST_DATA, 0, ALL, 0, *target)
+    assert client.ask(ids.LOG_ERASE, *target) == []
+    assert client.polled() == []

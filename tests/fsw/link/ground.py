@@ -1,0 +1,117 @@
+"""A ground station's socket, and the links under test behind it."""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from fsw.link.gcs_link import GcsLink, LinkSetup
+from fsw.link.ground_links import GroundLinks
+from fsw.link.inbox import Inbox
+from fsw.link.services.service import LinkService
+from fsw.link.signing.key_file import KeyFile
+from fsw.link.signing.signing import Signing
+from fsw.link.telemetry.streams import API_RATES, GROUND_RATES
+from messages.frames import Frame, split
+from tests.fsw.link.snapshots import CONTEXT, outputs_at
+
+
+def station_socket() -> socket.socket:
+    """A UDP socket of this machine that does not wait."""
+    station = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    station.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 20)
+    station.bind(("127.0.0.1", 0))
+    station.setblocking(False)
+    return station
+
+
+@dataclass
+class Wall:
+    """Clocks that a test moves."""
+
+    now_us: int = 0
+    unix_us: int = 1_750_000_000_000_000
+
+    def pass_s(self, seconds: float) -> None:
+        self.now_us += round(1e6 * seconds)
+        self.unix_us += round(1e6 * seconds)
+
+
+@dataclass
+class Ground:
+    """One end of a link, with the link itself."""
+
+    station: socket.socket
+    link: GcsLink
+    links: GroundLinks
+    inbox: Inbox
+    wall: Wall
+    recorded: list[tuple[int, bytes]] = field(default_factory=list)
+    t_us: int = 1_000_000
+    ticks: int = 0
+
+    def heard(self) -> list[Frame]:
+        """Every frame that has arrived since the last call."""
+        return [frame for datagram in self.datagrams() for frame in split(datagram)]
+
+    def datagrams(self) -> list[bytes]:
+        """The same as it arrived."""
+        got = []
+        while True:
+            try:
+                got.append(self.station.recv(2048))
+            except BlockingIOError:
+                return got
+
+    def polled(self, datagram: bytes, sender: socket.socket | None = None) -> None:
+        """Send something to the vehicle and let it read."""
+        (sender or self.station).sendto(datagram, ("127.0.0.1", self.link.port))
+        self.poll()
+
+    def poll(self) -> None:
+        """Let the vehicle read what has arrived."""
+        self.link.read(self.t_us, 4096)
+
+    def fly(self, ticks: int, **changes: Any) -> list[Frame]:
+        """Let some ticks pass; keyword arguments replace fields of the snapshot."""
+        frames = []
+        for _ in range(ticks):
+            self.t_us += 2_000
+            outputs = outputs_at(self.t_us)
+            snapshot = replace(outputs.snapshot, **changes)
+            self.links.publish(replace(outputs, snapshot=snapshot))
+            self.ticks += 1
+            if self.ticks % 100 == 0:
+                frames += self.heard()
+        return frames + self.heard()
+
+
+@contextmanager
+def ground_station(
+    *,
+    services: Sequence[LinkService] = (),
+    api: bool = False,
+    key_file: KeyFile | None = None,
+) -> Iterator[Ground]:
+    """A link to a ground station, or to a program, that nobody else knows."""
+    station, inbox, wall = station_socket(), Inbox(), Wall()
+    recorded: list[tuple[int, bytes]] = []
+    rates = API_RATES if api else GROUND_RATES
+    link = GcsLink(
+        LinkSetup("test", station.getsockname(), 0, rates, unheard=not api),
+        inbox,
+        CONTEXT,
+        Signing(0, lambda: wall.unix_us, key_file),
+        lambda: wall.now_us,
+        lambda t, frame: recorded.append((t, frame)),
+        services,
+    )
+    links = GroundLinks([link], 2_000, lambda: wall.now_us)
+    try:
+        yield Ground(station, link, links, inbox, wall, recorded)
+    finally:
+        links.close()
+        station.close()

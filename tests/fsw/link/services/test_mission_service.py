@@ -1,0 +1,398 @@
+"""Missions, fences and rally points with a pymavlink client over real sockets."""
+
+from __future__ import annotations
+
+import math
+import socket
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import pytest
+
+from fsw.link.services.mission_service import MissionService
+from fsw.link.services.mission_store import Kind, MissionStore, Site
+from fsw.signals import (
+    MissionAction,
+    MissionProgress,
+    MissionState,
+    Mode,
+    SafeSet,
+    Vec3,
+    WorkspaceSphere,
+)
+from tests.fsw.link.ground import Ground, ground_station
+from tests.fsw.link.services.mission_client import Client, Item, Weather
+from tests.fsw.link.snapshots import SNAPSHOT, outputs_at
+
+NAN = math.nan
+ACCEPTED, ERROR, UNSUPPORTED_FRAME, UNSUPPORTED, NO_SPACE = 0, 1, 2, 3, 4
+INVALID_SEQUENCE, DENIED, CANCELLED = 13, 14, 15
+MISSION, FENCE, RALLY = Kind.MISSION, Kind.FENCE, Kind.RALLY
+
+WAYPOINTS: list[Item] = [
+    {"command": 22, "frame": 6, "z": 1.5, "x": 470_000_100, "y": 80_000_200},
+    {"command": 178, "frame": 2, "params": (1.0, 0.25, -1.0, 0.0)},
+    {"command": 16, "x": 5_000, "y": -12_345, "z": -1.3, "params": (2.0, 0.2, 0.0, 90.0)},
+    {"command": 16, "x": 0, "y": 7, "z": -1.2345678, "autocontinue": 0},
+    {"command": 93, "frame": 2, "params": (3.0, -1.0, -1.0, -1.0)},
+    {"command": 20, "frame": 2},
+]
+TRIANGLE: list[Item] = [
+    {"command": 5001, "params": (3.0, 0.0, 0.0, 0.0), "x": 10_000 * n, "y": 10_000 * e, "z": 0.0}
+    for n, e in ((9, 0), (-9, 9), (-9, -9))
+]
+
+
+def locate(latitude: float, longitude: float, altitude: float) -> Vec3:
+    return (latitude - 47.0) * 111_000.0, (longitude - 8.0) * 76_000.0, -altitude
+
+
+def judge(safe_set: SafeSet) -> tuple[str, ...]:
+    if safe_set.sphere is not None and safe_set.sphere.radius < 0.05:
+        return ("S(r) = 0.04 is less than lambda",)
+    return ()
+
+
+@dataclass
+class Vehicle:
+    """A link that serves missions, and what it would tell the tick."""
+
+    ground: Ground
+    store: MissionStore
+
+    @property
+    def station(self) -> socket.socket:
+        return self.ground.station
+
+    def client(self, system: int = 255, weather: Weather | None = None) -> Client:
+        def publish(t_us: int) -> None:
+            self.ground.links.publish(outputs_at(t_us))
+
+        return Client(self.ground.link, self.station, system, weather, publish)
+
+
+@pytest.fixture
+def vehicle() -> Iterator[Vehicle]:
+    store = MissionStore(Site(locate, judge, lambda: 0.1))
+    with ground_station(services=(MissionService(store),)) as ground:
+        yield Vehicle(ground, store)
+
+
+def same(items: list[Any], uploaded: list[Item]) -> None:
+    assert [item.seq for item in items] == list(range(len(uploaded)))
+    for item, given in zip(items, uploaded, strict=True):
+        assert (item.command, item.frame) == (given["command"], given.get("frame", 1))
+        assert (item.x, item.y) == (given.get("x", 0), given.get("y", 0))
+        assert item.z == pytest.approx(given.get("z", -1.0), rel=1e-7)
+        assert item.autocontinue == given.get("autocontinue", 1)
+        wanted = given.get("params", (0.0, 0.0, 0.0, NAN))
+        got = (item.param1, item.param2, item.param3, item.param4)
+        assert got == pytest.approx(wanted, rel=1e-7, nan_ok=True)
+
+
+@pytest.mark.parametrize(
+    ("kind", "items"),
+    [(0, WAYPOINTS), (1, TRIANGLE), (2, [{"command": 5100, "x": 10_000, "y": 20_000}])],
+)
+def test_what_was_uploaded_comes_back_bit_for_bit(
+    vehicle: Vehicle, kind: int, items: list[Item]
+) -> None:
+    client = vehicle.client()
+    assert client.upload(items, kind) == ACCEPTED
+    same(client.download(kind), items)
+    for other in {0, 1, 2} - {kind}:
+        assert client.download(other) == []
+
+
+def test_the_tick_is_told_what_a_mission_means(vehicle: Vehicle) -> None:
+    assert vehicle.client().upload(WAYPOINTS) == ACCEPTED
+    update = vehicle.store.take_update()
+    assert update is not None
+    assert update.steps is not None
+    assert [step.action for step in update.steps] == [
+        MissionAction.TAKE_OFF,
+        MissionAction.SPEED,
+        MissionAction.GO,
+        MissionAction.GO,
+        MissionAction.DELAY,
+        MissionAction.RETURN,
+    ]
+    assert update.steps[2].position == pytest.approx((0.5, -1.2345, -1.3))
+    assert vehicle.store.take_update() is None
+
+
+def test_items_in_floats_are_taken_and_given(vehicle: Vehicle) -> None:
+    """MAVProxy sends what it is asked for, and older ground stations know nothing else."""
+    client = vehicle.client()
+    assert client.upload(WAYPOINTS[:1] + WAYPOINTS[2:4], floats=True) == ACCEPTED
+    stored = vehicle.store.items(MISSION)
+    assert (stored[1].x, stored[1].y) == (5_000, -12_345)
+    assert stored[0].x == pytest.approx(470_000_100, abs=40)  # as exact as a float is
+    items = client.download(floats=True)
+    assert (items[1].x, items[1].y) == pytest.approx((0.5, -1.2345))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_network_that_loses_doubles_and_reorders_changes_nothing(
+    vehicle: Vehicle, seed: int
+) -> None:
+    weather = Weather(lost=0.2, doubled=0.2, late=0.15)
+    weather.random.seed(seed)
+    client = vehicle.client(weather=weather)
+    items = [{**WAYPOINTS[2], "x": 100 * k} for k in range(25)]
+    assert client.upload(items) == ACCEPTED
+    same(client.download(), items)
+
+
+def test_a_lost_item_is_asked_for_again(vehicle: Vehicle) -> None:
+    client = vehicle.client()
+    client.ask(client.mav.mission_count_encode(1, 1, 3, 0), "MISSION_REQUEST_INT")
+    client.heard.clear()
+    client.pump(0.6)
+    again = [m for m in client.heard if m.get_type() == "MISSION_REQUEST_INT"]
+    assert [m.seq for m in again] == [0, 0]
+
+
+def test_a_doubled_item_does_not_double_every_request_that_follows(vehicle: Vehicle) -> None:
+    client = vehicle.client()
+    client.ask(client.mav.mission_count_encode(1, 1, 3, 0), "MISSION_REQUEST_INT")
+    client.heard.clear()
+    for _ in range(3):
+        client.send(client.item(WAYPOINTS[2], 0))
+    client.pump(0.1)
+    requests = [m.seq for m in client.heard if m.get_type() == "MISSION_REQUEST_INT"]
+    assert requests == [1]
+
+
+def test_an_upload_that_breaks_off_leaves_the_old_mission_whole(vehicle: Vehicle) -> None:
+    client = vehicle.client()
+    assert client.upload(WAYPOINTS) == ACCEPTED
+    vehicle.store.take_update()
+    client.ask(client.mav.mission_count_encode(1, 1, 4, 0), "MISSION_REQUEST_INT")
+    client.ask(client.item(WAYPOINTS[3], 0), "MISSION_REQUEST_INT")
+    ack = client.pump(8.0, lambda m: m.get_type() == "MISSION_ACK")
+    assert ack is not None
+    assert ack.type == CANCELLED
+    assert "broken off" in client.texts()
+    assert vehicle.store.take_update() is None
+    same(client.download(), WAYPOINTS)
+
+
+def test_an_upload_that_is_called_off_leaves_the_old_mission_whole(vehicle: Vehicle) -> None:
+    client = vehicle.client()
+    assert client.upload(WAYPOINTS) == ACCEPTED
+    client.ask(client.mav.mission_count_encode(1, 1, 4, 0), "MISSION_REQUEST_INT")
+    client.send(client.mav.mission_ack_encode(1, 1, CANCELLED, 0))
+    client.pump(0.1)
+    client.heard.clear()
+    client.pump(1.0)
+    assert not [m for m in client.heard if m.get_type() == "MISSION_REQUEST_INT"]
+    same(client.download(), WAYPOINTS)
+
+
+def test_a_lost_acknowledgement_is_given_again(vehicle: Vehicle) -> None:
+    client = vehicle.client()
+    assert client.upload(WAYPOINTS) == ACCEPTED
+    last = len(WAYPOINTS) - 1
+    again = client.ask(client.item(WAYPOINTS[last], last), "MISSION_ACK")
+    assert again.type == ACCEPTED
+
+
+@pytest.mark.parametrize(
+    ("bad", "result", "word"),
+    [
+        ({"command": 82}, UNSUPPORTED, "command 82"),
+        ({"command": 16, "frame": 8}, UNSUPPORTED_FRAME, "frame 8"),
+        ({"command": 16, "params": (NAN, 0.0, 0.0, 0.0)}, 6, "stay"),
+        ({"command": 16, "x": 2_000_000_000}, 10, "too far"),
+        ({"command": 16, "z": NAN}, 12, "height"),
+    ],
+)
+def test_a_bad_item_ends_the_upload_with_its_result_and_the_reason(
+    vehicle: Vehicle, bad: Item, result: int, word: str
+) -> None:
+    client = vehicle.client()
+    assert client.upload(WAYPOINTS) == ACCEPTED
+    assert client.upload([WAYPOINTS[2], bad, WAYPOINTS[3]]) == result
+    assert "item 1: " in client.texts()
+    assert word in client.texts()
+    same(client.download(), WAYPOINTS)
+
+
+def test_a_float_item_that_is_no_place_is_refused(vehicle: Vehicle) -> None:
+    client = vehicle.client()
+    client.ask(client.mav.mission_count_encode(1, 1, 1, 0), "MISSION_REQUEST_INT")
+    bad = client.mav.mission_item_encode(1, 1, 0, 1, 16, 0, 1, 0, 0, 0, 0, math.inf, 0, -1, 0)
+    assert client.ask(bad, "MISSION_ACK").type == 10
+
+
+def test_an_item_beyond_the_count_is_a_wrong_sequence(vehicle: Vehicle) -> None:
+    client = vehicle.client()
+    client.ask(client.mav.mission_count_encode(1, 1, 2, 0), "MISSION_REQUEST_INT")
+    assert client.ask(client.item(WAYPOINTS[2], 2), "MISSION_ACK").type == INVALID_SEQUENCE
+
+
+def test_an_item_of_no_upload_is_an_error(vehicle: Vehicle) -> None:
+    client = vehicle.client()
+    assert client.ask(client.item(WAYPOINTS[2], 0), "MISSION_ACK").type == ERROR
+
+
+def test_too_many_items_are_refused_at_once(vehicle: Vehicle) -> None:
+    client = vehicle.client()
+    for kind in (0, 1, 2):
+        ack = client.ask(client.mav.mission_count_encode(1, 1, 60_000, kind), "MISSION_ACK")
+        assert (ack.type, ack.mission_type) == (NO_SPACE, kind)
+
+
+def test_types_that_nobody_knows_are_refused(vehicle: Vehicle) -> None:
+    client, mav = vehicle.client(), vehicle.client().mav
+    for message in (
+        mav.mission_count_encode(1, 1, 1, 7),
+        mav.mission_request_list_encode(1, 1, 7),
+        mav.mission_request_int_encode(1, 1, 0, 7),
+        mav.mission_clear_all_encode(1, 1, 7),
+    ):
+        ack = client.ask(message, "MISSION_ACK")
+        assert (ack.type, ack.mission_type) == (UNSUPPORTED, 7)
+
+
+def test_partial_lists_are_refused_cleanly(vehicle: Vehicle) -> None:
+    client, mav = vehicle.client(), vehicle.client().mav
+    assert client.upload(WAYPOINTS) == ACCEPTED
+    for message in (
+        mav.mission_write_partial_list_encode(1, 1, 1, 2, 0),
+        mav.mission_request_partial_list_encode(1, 1, 1, 2, 0),
+    ):
+        assert client.ask(message, "MISSION_ACK").type == UNSUPPORTED
+    same(client.download(), WAYPOINTS)
+
+
+def test_a_request_beyond_the_end_is_a_wrong_sequence(vehicle: Vehicle) -> None:
+    client, mav = vehicle.client(), vehicle.client().mav
+    assert client.upload(WAYPOINTS) == ACCEPTED
+    ack = client.ask(mav.mission_request_int_encode(1, 1, 6, 0), "MISSION_ACK")
+    assert ack.type == INVALID_SEQUENCE
+
+
+@pytest.mark.parametrize("kind", [0, 1, 2, 255])
+def test_clearing_clears_what_it_names(vehicle: Vehicle, kind: int) -> None:
+    client, mav = vehicle.client(), vehicle.client().mav
+    assert client.upload(WAYPOINTS) == ACCEPTED
+    assert client.upload(TRIANGLE, FENCE) == ACCEPTED
+    assert client.upload([{"command": 5100}], RALLY) == ACCEPTED
+    vehicle.store.take_update()
+    assert client.ask(mav.mission_clear_all_encode(1, 1, kind), "MISSION_ACK").type == ACCEPTED
+    left = [len(vehicle.store.items(k)) for k in Kind]
+    full = [len(WAYPOINTS), 3, 1]
+    assert left == ([0, 0, 0] if kind == 255 else [0 if k == kind else full[k] for k in range(3)])
+    update = vehicle.store.take_update()
+    assert update is not None
+    assert (update.steps == ()) is (kind in (0, 255))
+    assert (update.fence == SafeSet()) is (kind in (1, 255))
+    assert (update.rally == ()) is (kind in (2, 255))
+
+
+def test_an_upload_of_nothing_clears_too(vehicle: Vehicle) -> None:
+    client = vehicle.client()
+    assert client.upload(WAYPOINTS) == ACCEPTED
+    assert client.upload([]) == ACCEPTED
+    assert client.download() == []
+
+
+def test_a_second_ground_station_is_denied_until_the_transfer_has_ended(vehicle: Vehicle) -> None:
+    first, second = vehicle.client(255), vehicle.client(254)
+    first.ask(first.mav.mission_count_encode(1, 1, 2, 0), "MISSION_REQUEST_INT")
+    for message in (
+        second.mav.mission_count_encode(1, 1, 1, 1),
+        second.mav.mission_request_list_encode(1, 1, 0),
+        second.mav.mission_clear_all_encode(1, 1, 255),
+        second.item(WAYPOINTS[2], 0),
+    ):
+        second.t_us = first.t_us
+        ack = second.ask(message, "MISSION_ACK", patience_s=0.1)
+        assert (ack.type, ack.target_system) == (DENIED, 254)
+    first.ask(first.item(WAYPOINTS[2], 0), "MISSION_REQUEST_INT")
+    assert first.ask(first.item(WAYPOINTS[3], 1), "MISSION_ACK").type == ACCEPTED
+    assert second.upload(TRIANGLE, FENCE) == ACCEPTED
+
+
+def test_a_download_that_nobody_goes_on_with_does_not_block_for_ever(vehicle: Vehicle) -> None:
+    first, second = vehicle.client(255), vehicle.client(254)
+    assert first.upload(WAYPOINTS) == ACCEPTED
+    first.ask(first.mav.mission_request_list_encode(1, 1, 0), "MISSION_COUNT")
+    second.t_us = first.t_us
+    assert second.ask(second.mav.mission_clear_all_encode(1, 1, 0), "MISSION_ACK").type == DENIED
+    second.pump(5.1)
+    assert second.upload([]) == ACCEPTED
+
+
+def test_what_is_for_another_system_is_not_answered(vehicle: Vehicle) -> None:
+    client, mav = vehicle.client(), vehicle.client().mav
+    client.send(mav.mission_request_list_encode(2, 1, 0))
+    client.send(mav.mission_count_encode(1, 42, 2, 0))
+    client.pump(1.0)
+    streamed = "MISSION_CURRENT"
+    told = [m.get_type() for m in client.heard if m.get_type().startswith("MISSION")]
+    assert set(told) <= {streamed}
+
+
+def test_a_fence_that_cannot_be_kept_is_refused_with_the_inequality(vehicle: Vehicle) -> None:
+    client = vehicle.client()
+    sphere: Item = {"command": 5003, "frame": 7, "params": (0.075, 0.0, 0.0, 0.0), "z": -0.225}
+    assert client.upload([sphere], FENCE) == ACCEPTED
+    update = vehicle.store.take_update()
+    assert update is not None
+    assert update.fence is not None
+    centre = pytest.approx((0.0, 0.0, -0.225))
+    assert isinstance(update.fence.sphere, WorkspaceSphere)
+    assert update.fence.sphere.centre_from_target == centre
+    small = {**sphere, "params": (0.04, 0.0, 0.0, 0.0)}
+    assert client.upload([small], FENCE) == DENIED
+    assert "S(r) = 0.04" in client.texts()
+    same(client.download(FENCE), [sphere])
+
+
+def test_a_fence_around_another_place_is_refused(vehicle: Vehicle) -> None:
+    client = vehicle.client()
+    vehicle.store.observe(SNAPSHOT)  # at 1 m north, 2 m east
+    elsewhere = [{**item, "x": item["x"] + 300_000} for item in TRIANGLE]
+    assert client.upload(elsewhere, FENCE) == DENIED
+    assert "not inside" in client.texts()
+    assert client.upload(TRIANGLE, FENCE) == ACCEPTED
+
+
+def test_the_current_item_can_be_set_and_is_told_at_once(vehicle: Vehicle) -> None:
+    client, mav = vehicle.client(), vehicle.client().mav
+    assert client.upload(WAYPOINTS) == ACCEPTED
+    vehicle.store.take_update()
+    client.heard.clear()
+    client.send(mav.mission_set_current_encode(1, 1, 3))
+    client.pump(0.1)
+    assert [m.get_type() for m in client.heard if m.get_type().startswith("MISSION_CURRENT")]
+    update = vehicle.store.take_update()
+    assert update is not None
+    assert update.current == 3
+    ack = client.ask(mav.mission_set_current_encode(1, 1, 6), "MISSION_ACK")
+    assert ack.type == INVALID_SEQUENCE
+    assert "no mission item 6" in client.texts()
+
+
+def test_progress_is_told_as_it_happens(vehicle: Vehicle) -> None:
+    client = vehicle.client()
+    progress = MissionProgress(MissionState.ACTIVE, 0, 6)
+    for current, reached in ((0, -1), (1, 0), (2, 1)):
+        progress = replace(progress, current=current, reached=reached, reached_count=reached + 1)
+        seen = replace(SNAPSHOT, mode=Mode.MISSION, mission=progress)
+        vehicle.store.observe(seen)
+        client.pump(0.02)
+        vehicle.store.observe(seen)
+        client.pump(0.02)
+    reached = [m.seq for m in client.heard if m.get_type() == "MISSION_ITEM_REACHED"]
+    assert reached == [0, 1]
+    current = [m for m in client.heard if m.get_type() == "MISSION_CURRENT" and m.total == 6]
+    assert [(m.seq, m.total, m.mission_state, m.mission_mode) for m in current] == [
+        (0, 6, 3, 1),
+        (1, 6, 3, 1),
+        (2, 6, 3, 1),
+    ]

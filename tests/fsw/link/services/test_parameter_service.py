@@ -1,0 +1,208 @@
+"""The parameter protocol, frame by frame."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterable
+
+import pytest
+
+from fsw.link.services.parameter_service import BURST, ParameterService
+from fsw.link.wire import message_ids as ids
+from fsw.link.wire.outgoing import Outgoing
+from fsw.parameters.flight_config import FlightConfig
+from fsw.parameters.registry import PARAMETERS
+from fsw.parameters.store import ParameterStore
+from messages import dialect
+from messages.frames import Frame, FrameWriter, split, wire_fields
+from tests.fsw.parameters.test_store import ticks
+from tests.fsw.parameters.threads import AtOnce
+
+COUNT = len(PARAMETERS)
+TICK_US = 2_000
+
+
+@pytest.fixture
+def store() -> ParameterStore:
+    store = ParameterStore(FlightConfig(), lambda tuning: None)
+    store.open(AtOnce(), lambda values: None)
+    return store
+
+
+@pytest.fixture
+def service(store: ParameterStore) -> ParameterService:
+    return ParameterService(store)
+
+
+def frame(message_id: int, *values: float | bytes) -> Frame:
+    return Frame(255, 190, 0, message_id, values)
+
+
+def listing(system: int = 1, component: int = 1) -> Frame:
+    return frame(ids.PARAM_REQUEST_LIST, system, component)
+
+
+def reading(name: bytes = b"", index: int = -1, system: int = 1, component: int = 1) -> Frame:
+    return frame(ids.PARAM_REQUEST_READ, index, system, component, name)
+
+
+def setting(name: bytes, value: float, type_: int = 9, system: int = 1) -> Frame:
+    return frame(ids.PARAM_SET, value, system, 1, name, type_)
+
+
+def said(answers: Iterable[Outgoing]) -> list[dict[str, object]]:
+    """Answers by field, and every one must fit its message."""
+    writer, fields = FrameWriter(1, 1), []
+    for outgoing in answers:
+        assert list(split(writer.frame(outgoing.message_id, *outgoing.values)))
+        named = dict(zip(wire_fields(outgoing.message_id), outgoing.values, strict=True))
+        fields.append({"message": outgoing.message_id, **named})
+    return fields
+
+
+def later(service: ParameterService, count: int, start_us: int = 0) -> list[dict[str, object]]:
+    return [field for k in range(count) for field in said(service.poll(start_us + k * TICK_US))]
+
+
+def test_a_list_is_whole_paced_and_in_order(service: ParameterService) -> None:
+    assert service.receive(listing(), 0) == ()
+    bursts = [said(service.poll(k * TICK_US)) for k in range(500)]
+    assert max(map(len, bursts)) <= BURST, "no tick sends more than a datagram"
+    values = [value for burst in bursts for value in burst]
+    assert [value["param_index"] for value in values] == list(range(COUNT))
+    assert {value["param_count"] for value in values} == {COUNT}
+    assert {value["param_type"] for value in values} == {dialect.MAV_PARAM_TYPE_REAL32}
+    assert [value["param_id"] for value in values] == [p.name.encode() for p in PARAMETERS]
+    assert bursts[150:] == [[]] * 350, "all within 0.3 s"
+
+
+def test_a_second_request_starts_the_list_again(service: ParameterService) -> None:
+    service.receive(listing(), 0)
+    assert len(said(service.poll(0))) == BURST
+    service.receive(listing(), TICK_US)
+    assert said(service.poll(TICK_US))[0]["param_index"] == 0
+
+
+def test_one_parameter_by_name_or_index(service: ParameterService) -> None:
+    (by_name,) = said(service.receive(reading(b"PID_YAW_P"), 0))
+    assert by_name["param_value"] == 4.0
+    index = by_name["param_index"]
+    assert isinstance(index, int)
+    assert said(service.receive(reading(index=index), 0)) == [by_name]
+    assert PARAMETERS[index].name == "PID_YAW_P"
+
+
+@pytest.mark.parametrize("index", [-1, COUNT, 32767])
+def test_the_unknown_is_answered_with_an_error_for_the_one_who_asked(
+    service: ParameterService, index: int
+) -> None:
+    (error,) = said(service.receive(reading(b"NO_SUCH_THING_16", index), 0))
+    assert error["message"] == ids.PARAM_ERROR
+    assert error["error"] == dialect.MAV_PARAM_ERROR_DOES_NOT_EXIST
+    assert error["param_id"] == b"NO_SUCH_THING_16"
+    assert (error["target_system"], error["target_component"]) == (255, 190)
+
+
+def test_a_name_of_noise_is_unknown(service: ParameterService) -> None:
+    for name in (bytes(range(240, 256)), b"\0" * 16, b"\xff" * 16):
+        (error,) = said(service.receive(reading(name), 0))
+        assert error["message"] == ids.PARAM_ERROR
+
+
+def test_a_set_is_echoed_once_it_holds_and_on_every_link(
+    store: ParameterStore, service: ParameterService
+) -> None:
+    other = ParameterService(store)
+    assert service.receive(setting(b"PID_YAW_P", 5.0), 0) == ()
+    assert later(service, 3) == []
+    ticks(store)
+    for link in (service, other):
+        (value,) = later(link, 3)
+        assert (value["param_id"], value["param_value"]) == (b"PID_YAW_P", 5.0)
+        assert value["message"] == ids.PARAM_VALUE
+
+
+@pytest.mark.parametrize("value", [float("nan"), float("inf"), -1.0, 1e9])
+def test_a_refused_set_shows_the_value_that_holds_and_says_why(
+    store: ParameterStore, service: ParameterService, value: float
+) -> None:
+    text, *more, error = said(service.receive(setting(b"PID_YAW_P", value), 0))
+    assert text["message"] == ids.STATUSTEXT
+    assert b"PID_YAW_P is to be 0..50" in bytes(text["text"])  # type: ignore[call-overload]
+    assert error["error"] == dialect.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE
+    assert more == []
+    (echo,) = later(service, 3)
+    assert (echo["param_id"], echo["param_value"]) == (b"PID_YAW_P", 4.0)
+    assert ticks(store) == []
+
+
+def test_what_the_tick_refuses_is_shown_unchanged(
+    store: ParameterStore, service: ParameterService
+) -> None:
+    service.receive(setting(b"PID_YAW_P", 5.0), 0)
+    ticks(store, taken=False)
+    (echo,) = later(service, 3)
+    assert echo["param_value"] == 4.0
+
+
+def test_an_integer_is_refused_because_nobody_agrees_on_its_bits(
+    store: ParameterStore, service: ParameterService
+) -> None:
+    answers = said(service.receive(setting(b"PID_YAW_P", 5.0, type_=6), 0))
+    assert [answer["message"] for answer in answers] == [ids.STATUSTEXT, ids.PARAM_ERROR]
+    assert ticks(store) == []
+    assert later(service, 3)[0]["param_value"] == 4.0
+
+
+def test_setting_the_unknown_is_an_error(service: ParameterService) -> None:
+    (error,) = said(service.receive(setting(b"NOPE", 1.0), 0))
+    assert error["error"] == dialect.MAV_PARAM_ERROR_DOES_NOT_EXIST
+
+
+def test_other_systems_parameters_are_none_of_ours(
+    store: ParameterStore, service: ParameterService
+) -> None:
+    assert service.receive(listing(system=7), 0) == ()
+    assert later(service, 50) == []
+    assert service.receive(reading(b"PID_YAW_P", system=7), 0) == ()
+    assert service.receive(setting(b"PID_YAW_P", 5.0, system=7), 0) == ()
+    assert ticks(store) == []
+    assert service.receive(listing(component=154), 0) == ()
+    assert later(service, 5) == []
+
+
+def test_everybody_is_this_vehicle_too(service: ParameterService) -> None:
+    service.receive(listing(0, 0), 0)
+    assert len(later(service, 2)) == BURST
+
+
+def test_the_hash_tells_a_ground_station_that_it_knows_every_value(
+    store: ParameterStore, service: ParameterService
+) -> None:
+    def bits() -> int:
+        (value,) = said(service.receive(reading(b"_HASH_CHECK"), 0))
+        assert value["param_type"] == dialect.MAV_PARAM_TYPE_UINT32
+        assert value["param_index"] == 65535
+        return int.from_bytes(struct.pack("<f", value["param_value"]), "little")
+
+    def bitwise() -> int:
+        state = 0
+        for parameter in PARAMETERS:
+            number = struct.pack("<f", store.values[parameter.name])
+            for byte in parameter.name.encode() + number:
+                state ^= byte
+                for _ in range(8):
+                    state = state >> 1 ^ (0xEDB88320 if state & 1 else 0)
+        return state
+
+    before = bits()
+    assert before == bitwise()
+    service.receive(setting(b"PID_YAW_P", 5.0), 0)
+    ticks(store)
+    assert bits() == bitwise() != before
+    # Its thanks for that is no wish.
+    assert service.receive(setting(b"_HASH_CHECK", 1.0, type_=5), 0) == ()
+
+
+def test_idle_it_says_nothing(service: ParameterService) -> None:
+    assert service.poll(0) == ()

@@ -1,0 +1,290 @@
+"""Signing, with pymavlink's own as the independent oracle, in both directions."""
+
+from __future__ import annotations
+
+import stat
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from fsw.link.signing.key_file import KeyFile
+from fsw.link.udp_endpoint import LinkError
+from fsw.link.wire import message_ids as ids
+from messages import dialect
+from messages.frames import FrameWriter, is_signed
+from tests.fsw.link.ground import Ground, ground_station, station_socket
+
+KEY = bytes(range(1, 33))
+OTHER_KEY = bytes(range(2, 34))
+EPOCH_UNIX_US = 1_420_070_400_000_000
+MINUTE = 6_000_000  # in units of signing time
+ARM = (1.0, *(0.0,) * 6, 400, 1, 1, 0)
+
+
+class Client:
+    """pymavlink, signing."""
+
+    def __init__(self, ground: Ground, key: bytes = KEY, system: int = 255) -> None:
+        self._ground = ground
+        self.mav = dialect.MAVLink(None, srcSystem=system, srcComponent=190)
+        self.mav.signing.secret_key = key
+        self.mav.signing.sign_outgoing = True
+        self.mav.signing.link_id = 3
+        self.mav.signing.timestamp = self.now()
+
+    def now(self) -> int:
+        return (self._ground.wall.unix_us - EPOCH_UNIX_US) // 10
+
+    def at(self, time: int) -> Client:
+        self.mav.signing.timestamp = time
+        return self
+
+    def arm(self) -> bytes:
+        message = dialect.MAVLink_command_long_message(1, 1, 400, 0, 1, 0, 0, 0, 0, 0, 0)
+        return bytes(message.pack(self.mav))
+
+    def set_up(self, key: bytes) -> bytes:
+        message = dialect.MAVLink_setup_signing_message(1, 1, list(key), self.now())
+        return bytes(message.pack(self.mav))
+
+
+def unsigned(message_id: int, *values: float) -> bytes:
+    return FrameWriter(255, 190).frame(message_id, *values)
+
+
+def set_up(key: bytes = KEY, time: int = 0) -> bytes:
+    return unsigned(ids.SETUP_SIGNING, time, 1, 1, *key)
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    return tmp_path / "keys" / "signing-test.json"
+
+
+@pytest.fixture
+def ground(file: Path) -> Iterator[Ground]:
+    with ground_station(key_file=KeyFile(file)) as ground:
+        ground.fly(5, armed=False)
+        ground.polled(set_up())
+        assert ground.link.signing.active
+        ground.heard()
+        yield ground
+
+
+def commands(ground: Ground) -> int:
+    return len(ground.inbox.take_commands())
+
+
+def test_pymavlink_believes_what_we_sign_and_only_with_the_key(ground: Ground) -> None:
+    def read(key: bytes, datagrams: list[bytes]) -> tuple[int, int]:
+        reader = dialect.MAVLink(None)
+        reader.robust_parsing = True
+        reader.signing.secret_key = key
+        messages: list[Any] = []
+        for datagram in datagrams:
+            messages += reader.parse_buffer(bytearray(datagram)) or []
+        good = sum(message.get_type() != "BAD_DATA" for message in messages)
+        return good, reader.signing.badsig_count
+
+    ground.heard()
+    for _ in range(100):
+        ground.wall.pass_s(0.002)
+        ground.fly(1)
+    ground.fly(100)  # the wall clock stands still: times still grow
+    kept = [raw for _, raw in ground.recorded if is_signed(raw)]
+    good, bad = read(KEY, kept)
+    assert good == len(kept) > 30
+    assert bad == 0
+    assert read(OTHER_KEY, kept)[1] == len(kept)
+
+
+def test_we_believe_what_pymavlink_signs(ground: Ground) -> None:
+    client = Client(ground)
+    for _ in range(3):
+        ground.polled(client.arm())
+    assert commands(ground) == 3
+
+
+def test_unsigned_commands_do_nothing(ground: Ground) -> None:
+    stranger = station_socket()
+    ground.polled(unsigned(ids.COMMAND_LONG, *ARM), stranger)
+    ground.polled(unsigned(ids.COMMAND_LONG, 30.0, 1e5, *(0.0,) * 5, 511, 1, 1, 0), stranger)
+    ground.polled(unsigned(ids.TIMESYNC, 0, 1), stranger)
+    assert commands(ground) == 0
+    assert ground.heard() == []
+    assert ground.link.rates.interval_us(ids.ATTITUDE) == 20_000
+    assert ground.link.signing.counters.unsigned == 3
+    stranger.close()
+
+
+def test_presence_needs_no_signature_but_teaches_no_peer(ground: Ground) -> None:
+    stranger = station_socket()
+    ground.polled(unsigned(ids.HEARTBEAT, 0, 6, 8, 0, 4, 3), stranger)
+    ground.polled(unsigned(ids.RADIO_STATUS, 0, 0, 1, 1, 1, 1, 1), stranger)
+    assert ground.link.signing.counters.unsigned == 0
+    assert stranger.getsockname() not in ground.link.peers
+    stranger.close()
+
+
+def test_a_tampered_frame_does_nothing_and_locks_nobody_out(ground: Ground) -> None:
+    """Stock pymavlink believes a forged time before it has checked the hash."""
+    client = Client(ground)
+    frame = bytearray(client.arm())
+    far = client.now() + 20 * 365 * 86_400 * 100_000
+    frame[-12:-6] = far.to_bytes(6, "little")
+    ground.polled(bytes(frame))
+    for place in range(len(frame) - 13, len(frame)):
+        broken = bytearray(client.arm())
+        broken[place] ^= 1
+        ground.polled(bytes(broken))
+    assert commands(ground) == 0
+    assert ground.link.signing.counters.wrong_hash == 14
+    ground.polled(client.arm())
+    assert commands(ground) == 1
+
+
+def test_a_wrong_key_is_refused(ground: Ground) -> None:
+    ground.polled(Client(ground, OTHER_KEY).arm())
+    assert commands(ground) == 0
+    assert ground.link.signing.counters.wrong_hash == 1
+
+
+def test_a_replayed_frame_is_refused(ground: Ground) -> None:
+    client = Client(ground)
+    first, second = client.arm(), client.arm()
+    ground.polled(first)
+    ground.polled(second)
+    ground.polled(first)
+    ground.polled(second)
+    assert commands(ground) == 2
+    assert ground.link.signing.counters.wrong_time == 2
+
+
+def test_each_sender_has_a_time_of_its_own(ground: Ground) -> None:
+    ahead, behind = Client(ground, system=255), Client(ground, system=254)
+    ground.polled(ahead.at(ahead.now() + MINUTE // 2).arm())
+    ground.polled(behind.arm())
+    assert commands(ground) == 2
+
+
+@pytest.mark.parametrize(
+    ("offset", "believed"),
+    [(MINUTE - 10, True), (MINUTE + 10, False), (-MINUTE + 10, True), (-MINUTE - 10, False)],
+)
+def test_a_new_sender_may_be_off_by_a_minute(ground: Ground, offset: int, believed: bool) -> None:
+    client = Client(ground)
+    ground.polled(client.at(client.now() + offset).arm())
+    assert commands(ground) == believed
+
+
+def test_the_key_is_for_its_owners_eyes_and_outlives_the_process(
+    ground: Ground, file: Path
+) -> None:
+    assert stat.S_IMODE(file.stat().st_mode) == 0o600
+    assert [path.name for path in file.parent.iterdir()] == [file.name]
+    old = Client(ground).arm()
+    ground.polled(old)
+    ground.link.close()
+    with ground_station(key_file=KeyFile(file)) as restarted:
+        restarted.fly(5)
+        assert all(is_signed(raw) for _, raw in restarted.recorded)
+        restarted.polled(unsigned(ids.COMMAND_LONG, *ARM))
+        restarted.polled(old)  # recorded before, played again
+        assert commands(restarted) == 0
+        restarted.polled(Client(restarted).at(Client(restarted).now() + 5).arm())
+        assert commands(restarted) == 1
+
+
+@pytest.mark.parametrize("content", ["", "{}", '{"key": "00", "newest": 1}', "[]", "\xff"])
+def test_a_damaged_key_is_an_error_and_no_open_link(file: Path, content: str) -> None:
+    file.parent.mkdir()
+    file.write_text(content, encoding="latin-1")
+    file.chmod(0o600)
+    with pytest.raises(LinkError, match="no signing key"), ground_station(key_file=KeyFile(file)):
+        pass
+
+
+def test_a_key_that_others_may_read_is_refused(ground: Ground, file: Path) -> None:
+    file.chmod(0o644)
+    with pytest.raises(LinkError, match="read by others"), ground_station(key_file=KeyFile(file)):
+        pass
+
+
+def test_a_key_of_zeros_signed_with_the_old_one_ends_signing(ground: Ground, file: Path) -> None:
+    ground.polled(set_up(bytes(32)))
+    assert ground.link.signing.active  # unsigned: refused
+    ground.polled(Client(ground).set_up(bytes(32)))
+    assert not ground.link.signing.active
+    assert not file.exists()
+    ground.polled(unsigned(ids.COMMAND_LONG, *ARM))
+    assert commands(ground) == 1
+
+
+def test_the_key_can_be_changed_by_who_has_it(ground: Ground) -> None:
+    client = Client(ground)
+    ground.polled(set_up(OTHER_KEY))
+    ground.polled(client.arm())
+    assert commands(ground) == 1
+    ground.polled(client.set_up(OTHER_KEY))
+    ground.polled(client.arm())
+    assert commands(ground) == 0
+    ground.polled(Client(ground, OTHER_KEY).arm())
+    assert commands(ground) == 1
+
+
+def test_an_armed_vehicle_takes_no_key(file: Path) -> None:
+    with ground_station(key_file=KeyFile(file)) as ground:
+        ground.fly(5)
+        ground.polled(set_up())
+        assert not ground.link.signing.active
+        assert not file.exists()
+
+
+def test_a_key_for_another_vehicle_is_not_taken(file: Path) -> None:
+    with ground_station(key_file=KeyFile(file)) as ground:
+        ground.polled(unsigned(ids.SETUP_SIGNING, 0, 2, 1, *KEY))
+        assert not ground.link.signing.active
+
+
+def test_a_key_from_another_machine_is_not_taken(file: Path) -> None:
+    from fsw.link.signing.signing_setup import set_up_signing
+    from messages.frames import split
+
+    with ground_station(key_file=KeyFile(file)) as ground:
+        (frame,) = split(set_up())
+        text = set_up_signing(ground.link.signing, frame, ("192.0.2.7", 14550), armed=False)
+        assert text is not None
+        assert "this machine" in text.text
+        assert not ground.link.signing.active
+
+
+def test_a_key_that_cannot_be_kept_changes_nothing(file: Path) -> None:
+    with ground_station(key_file=KeyFile(file)) as ground:
+        file.parent.write_text("a file where the directory should be")
+        ground.polled(set_up())
+        assert not ground.link.signing.active
+
+
+def test_senders_that_are_remembered_are_bounded(ground: Ground) -> None:
+    for system in range(1, 100):
+        ground.polled(Client(ground, system=system).arm())
+    assert commands(ground) <= 64
+
+
+def test_an_unsigned_link_takes_signed_frames_as_they_are() -> None:
+    with ground_station() as ground:
+        ground.polled(Client(ground).arm())
+        assert commands(ground) == 1
+
+
+def test_what_is_written_is_replaced_whole(file: Path) -> None:
+    from fsw.link.signing.key_file import SigningKey
+
+    keys = KeyFile(file)
+    keys.write(SigningKey(KEY, 5))
+    inode = file.stat().st_ino
+    keys.write(SigningKey(OTHER_KEY, 6))
+    assert file.stat().st_ino != inode
+    assert keys.read() == SigningKey(OTHER_KEY, 6)

@@ -1,0 +1,100 @@
+"""Snapshots and outputs of a tick with a distinct number in every field."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from fsw.link.wire.telemetry_context import GroupTiming, LoopHealth, TelemetryContext, VehicleFacts
+from fsw.signals import (
+    ActuatorCommand,
+    BatteryState,
+    ConstraintKind,
+    ConstraintReport,
+    EndEffectorTarget,
+    FlightSnapshot,
+    Home,
+    MissionProgress,
+    MissionState,
+    Mode,
+    OffboardReport,
+    Plan,
+    PlanInput,
+    PlannerCounters,
+    PlanTimings,
+    PredictionState,
+    SolverStatus,
+    StateEstimate,
+    TickOutputs,
+)
+
+FACTS = VehicleFacts(
+    rotor_thrust_max=16.0,
+    joint_torque_max=2.0,
+    link_length=(0.15, 0.15),
+    tick_period_us=2_000,
+    mpc_period_us=100_000,
+    mpc_delay_us=10_000,
+    horizon=5,
+    sqp_iterations=2,
+)
+CONTEXT = TelemetryContext(
+    FACTS,
+    LoopHealth(
+        inner=GroupTiming(2_000, 5000, 3, 1, 60.0, 120.0, 500.0, 20.0, 90.0, 700.0, 0.03),
+        mpc=GroupTiming(100_000, 100, 0, 0, 900.0, 1500.0, 2100.0, 0.0, 0.0, 0.0, 0.01),
+    ),
+    start_unix_us=1_750_000_000_000_000,
+)
+
+# Yaw of 90 degrees: body x points east.
+_EAST = (0.0, -1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+ACTUATORS = ActuatorCommand((8.0, 4.0, 12.0, 16.0), (1.0, -0.5))
+PLAN = Plan(
+    plan_id=7,
+    t_us=3_000_000,
+    period_us=100_000,
+    start=PredictionState(
+        (0.0, 0.0, -1.0), (0.0,) * 3, (0.0,) * 3, (0.0,) * 2, (0.0,) * 2, 0.0, 0.0, (0.0,) * 2,
+        (0.0,) * 2,
+    ),
+    inputs=(),
+    status=SolverStatus.SOLVED,
+    cost=12.5,
+    slack_max=0.25,
+    barrier=(),
+    sqp_iterations=2,
+    solver_iterations=19,
+    timings=PlanTimings(linearise_us=101.0, solve_us=502.0, total_us=703.0),
+)  # fmt: skip
+SNAPSHOT = FlightSnapshot(
+    t_us=3_004_000,
+    mode=Mode.TRAJECTORY,
+    armed=True,
+    estimate=StateEstimate(
+        3_004_000, (1.0, 2.0, -3.0), (0.1, 0.2, 0.3), _EAST, (0.4, 0.5, 0.6), 1.5707963,
+        (0.7, 0.8), (0.9, 1.1),
+    ),
+    reference=EndEffectorTarget(3_004_000, (1.6, 2.6, -2.6), (0.1,) * 3, (0.2,) * 3, 0.3),
+    plan_state=PredictionState(
+        (1.1, 2.1, -3.1), (0.11, 0.21, 0.31), (0.12, 0.22, 0.32), (0.0,) * 2, (0.0,) * 2, 0.33,
+        0.03, (0.71, 0.81), (0.91, 1.01),
+    ),
+    plan_input=PlanInput((0.5, 0.6, 0.7), 0.05, (0.8, 0.9)),
+    actuators=ACTUATORS,
+    plan=PLAN,
+    plan_status=SolverStatus.TIME_LIMIT,
+    counters=PlannerCounters(plans=10, missed_deadlines=1, fallbacks=2),
+    constraints=ConstraintReport(ConstraintKind.WALLS, (0.3, 0.2, 0.4), (0.5, -0.1, 0.6)),
+    home=Home((-0.5, 0.25, -0.3), math.pi),
+    battery=BatteryState(voltage=15.2, current=18.3, consumed=1.9, remaining=0.62),
+    offboard=OffboardReport(accepted=5, refused=2, age_us=40_000),
+    mission=MissionProgress(MissionState.PAUSED, 2, 5, 1, 2),
+)  # fmt: skip
+
+
+def outputs_at(t_us: int, **changes: object) -> TickOutputs:
+    """What a tick would say at a time; keyword arguments replace fields of the outputs."""
+    estimate = SNAPSHOT.estimate._replace(t_us=t_us)
+    snapshot = replace(SNAPSHOT, t_us=t_us, estimate=estimate)
+    return replace(TickOutputs(ACTUATORS, snapshot), **changes)  # type: ignore[arg-type]

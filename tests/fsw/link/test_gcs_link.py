@@ -1,0 +1,244 @@
+"""The ground link over real sockets: rates, peers, and what garbage does not do."""
+
+from __future__ import annotations
+
+import math
+import random
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from fsw.link.files.flight_logs import flight_logs
+from fsw.link.files.log_service import LogService
+from fsw.link.peers import EXPIRY_US
+from fsw.link.telemetry.streams import AT_ONCE, STREAMS
+from fsw.link.wire import message_ids as ids
+from fsw.link.wire.outgoing import Outgoing
+from fsw.signals import BatteryState, CommandAck, Mode, StatusText
+from messages.frames import Frame, FrameWriter, split
+from tests.fsw.link.ground import Ground, ground_station, station_socket
+from tests.fsw.link.snapshots import SNAPSHOT, outputs_at
+
+HEARTBEAT = (0, 6, 8, 0, 4, 3)
+
+
+@pytest.fixture
+def ground() -> Iterator[Ground]:
+    with ground_station() as ground:
+        yield ground
+
+
+def test_streams_leave_at_their_rates_in_sensor_time(ground: Ground) -> None:
+    frames = ground.fly(2000)
+    counts = Counter((frame.component_id, frame.message_id) for frame in frames)
+    for stream in STREAMS:
+        rows = sum(s.message_id == stream.message_id for s in STREAMS)
+        extra = 1 if stream in AT_ONCE else 0  # the first mode is news
+        found = counts[(stream.component, stream.message_id)] - extra
+        assert abs(found - rows * 4 * stream.ground_hz) <= 1, stream
+    assert len(ground.recorded) == len(frames)
+
+
+def test_each_component_counts_its_own_sequence(ground: Ground) -> None:
+    frames = ground.fly(200)
+    for component in (1, 191):
+        sequences = [frame.sequence for frame in frames if frame.component_id == component]
+        assert sequences == [n % 256 for n in range(len(sequences))]
+
+
+def test_a_mode_change_is_told_at_once(ground: Ground) -> None:
+    ground.fly(7)
+    changed = ground.fly(1, mode=Mode.HOLD)
+    told = {frame.message_id: frame.payload_values[0] for frame in changed}
+    assert told[ids.HEARTBEAT] == told[ids.CURRENT_MODE] == 4 << 16 | 3 << 24
+    assert ids.EXTENDED_SYS_STATE in told
+    assert ids.HEARTBEAT not in {f.message_id for f in ground.fly(1, mode=Mode.HOLD)}
+
+
+@pytest.mark.parametrize("change", [{"armed": False}, {"landed": True}, {"failures": ("x",)}])
+def test_arming_landing_and_health_are_told_at_once(ground: Ground, change: dict[str, Any]) -> None:
+    ground.fly(7)
+    assert ids.HEARTBEAT in {frame.message_id for frame in ground.fly(1, **change)}
+
+
+def test_texts_and_acknowledgements_are_sent_as_they_happen(ground: Ground) -> None:
+    ground.links.publish(outputs_at(1_000_000, texts=(StatusText(4, "why not"),)))
+    ground.links.acknowledge(1_000_000, CommandAck(400, 1, 255, 190))
+    frames = {frame.message_id: frame.payload_values for frame in ground.heard()}
+    assert frames[ids.STATUSTEXT][1] == b"why not".ljust(50, b"\0")
+    assert frames[ids.COMMAND_ACK] == (400, 1, 0, 0, 255, 190)
+
+
+def test_a_number_that_does_not_fit_its_field_does_not_end_the_flight(ground: Ground) -> None:
+    plan = SNAPSHOT.plan
+    assert plan is not None
+    told = {frame.message_id for frame in ground.fly(60, plan=replace(plan, cost=1e300))}
+    assert ids.ATTITUDE in told
+    assert ids.MPC_STATUS not in told
+    assert ground.link.outbox.encode_failures > 0
+
+
+@pytest.mark.parametrize("number", [math.nan, math.inf, -math.inf, 1e30])
+def test_no_estimate_however_wild_ends_the_flight(ground: Ground, number: float) -> None:
+    wild = SNAPSHOT.estimate._replace(
+        p_WB=(number,) * 3, v_WB=(number,) * 3, R_WB=(number,) * 9,
+        w_WB_B=(number,) * 3, yaw=number,
+    )  # fmt: skip
+    battery = BatteryState(number, number, number, number)
+    told = {frame.message_id for frame in ground.fly(1000, estimate=wild, battery=battery)}
+    assert ids.HEARTBEAT in told
+
+
+def test_garbage_does_not_raise_and_nothing_is_learnt_from_it(ground: Ground) -> None:
+    chance = random.Random(4)
+    stranger = station_socket()
+    for size in (0, 1, 9, 12, 60, 280, 1400, 2048, 4000):
+        ground.polled(bytes(chance.randrange(256) for _ in range(size)), stranger)
+        ground.polled(b"\xfd" * size, stranger)
+    command = FrameWriter(255, 190).frame(ids.COMMAND_LONG, *(0.0,) * 7, 400, 1, 1, 0)
+    for cut in range(len(command)):
+        ground.polled(command[:cut], stranger)
+    ground.polled(command[:-1] + bytes([command[-1] ^ 1]), stranger)
+    assert ground.inbox.take_commands() == ()
+    assert ground.link.peers == (ground.station.getsockname(),)
+    assert ground.recorded == []
+    assert ground.link.losses.bytes > 0
+    stranger.close()
+
+
+def test_a_truncated_datagram_does_not_swallow_the_next(ground: Ground) -> None:
+    command = FrameWriter(255, 190).frame(ids.COMMAND_LONG, *(0.0,) * 7, 400, 1, 1, 0)
+    ground.polled(command[:20])
+    ground.polled(command)
+    assert len(ground.inbox.take_commands()) == 1
+
+
+def test_a_valid_frame_makes_its_sender_a_peer(ground: Ground) -> None:
+    other = station_socket()
+    ground.polled(FrameWriter(255, 190).frame(ids.HEARTBEAT, *HEARTBEAT), other)
+    assert ground.fly(5)
+    assert other.recv(2048)
+    other.close()
+
+
+def test_peers_are_bounded_and_the_configured_one_stays(ground: Ground) -> None:
+    others = [station_socket() for _ in range(12)]
+    writer = FrameWriter(255, 190)
+    for other in others:
+        ground.polled(writer.frame(ids.HEARTBEAT, *HEARTBEAT), other)
+    assert len(ground.link.peers) == 5
+    assert ground.station.getsockname() in ground.link.peers
+    assert others[-1].getsockname() in ground.link.peers
+    for other in others:
+        other.close()
+
+
+def test_a_peer_that_falls_silent_is_forgotten(ground: Ground) -> None:
+    other = station_socket()
+    writer = FrameWriter(255, 190)
+    ground.polled(writer.frame(ids.HEARTBEAT, *HEARTBEAT), other)
+    ground.wall.pass_s(0.6 * EXPIRY_US / 1e6)
+    ground.polled(writer.frame(ids.HEARTBEAT, *HEARTBEAT), other)
+    ground.wall.pass_s(0.6 * EXPIRY_US / 1e6)
+    ground.fly(500)
+    assert other.getsockname() in ground.link.peers
+    ground.wall.pass_s(0.6 * EXPIRY_US / 1e6)
+    ground.fly(500)
+    assert ground.link.peers == (ground.station.getsockname(),)
+    other.close()
+
+
+def test_our_own_frames_sent_back_are_ignored(ground: Ground) -> None:
+    echo = station_socket()
+    ground.polled(FrameWriter(1, 191).frame(ids.HEARTBEAT, *HEARTBEAT), echo)
+    assert echo.getsockname() not in ground.link.peers
+    echo.close()
+
+
+def test_a_flood_is_read_within_a_budget(ground: Ground) -> None:
+    heartbeat = FrameWriter(255, 190).frame(ids.HEARTBEAT, *HEARTBEAT)
+    for _ in range(500):
+        ground.station.sendto(heartbeat * 60, ("127.0.0.1", ground.link.port))
+    ground.poll()
+    assert 0 < len(ground.recorded) < 400
+
+
+def test_both_directions_are_recorded_frame_by_frame(ground: Ground) -> None:
+    writer = FrameWriter(255, 190)
+    first, second = (writer.frame(ids.HEARTBEAT, *HEARTBEAT) for _ in range(2))
+    ground.polled(b"junk" + first + b"\xfd\xfd" + second)
+    assert [frame for _, frame in ground.recorded] == [first, second]
+
+
+def test_garbage_that_looks_like_the_next_header_does_not_end_the_flight(ground: Ground) -> None:
+    writer = FrameWriter(255, 190)
+    first, second = (writer.frame(ids.HEARTBEAT, *HEARTBEAT) for _ in range(2))
+    ground.polled(b"\x00\xff\x00\x00" + first[4:10] + first + second)
+    assert [frame for _, frame in ground.recorded] == [first, second]
+
+
+class Echo:
+    """A service that answers each PING with itself, and counts down once asked."""
+
+    message_ids = frozenset({ids.PING})
+
+    def __init__(self) -> None:
+        self.left = 0
+        self.broken = False
+
+    def receive(self, frame: Frame, t_us: int) -> list[Outgoing]:
+        if self.broken:
+            raise RuntimeError("a mistake in a service")
+        self.left = 2
+        return [Outgoing(ids.PING, frame.payload_values)]
+
+    def poll(self, t_us: int) -> list[Outgoing]:
+        if not self.left:
+            return []
+        self.left -= 1
+        return [Outgoing(ids.PING, (t_us, self.left, 0, 0))]
+
+
+@pytest.fixture
+def echo() -> Iterator[tuple[Ground, Echo]]:
+    service = Echo()
+    with ground_station(services=(service,)) as ground:
+        yield ground, service
+
+
+def test_a_service_answers_within_the_same_poll_and_goes_on_after_later_ticks(
+    echo: tuple[Ground, Echo],
+) -> None:
+    ground, _ = echo
+    ground.polled(FrameWriter(255, 190).frame(ids.PING, 77, 5, 0, 0))
+    assert [frame.payload_values for frame in ground.heard()] == [(77, 5, 0, 0)]
+    pings = [frame for frame in ground.fly(3) if frame.message_id == ids.PING]
+    assert [frame.payload_values[1] for frame in pings] == [1, 0]
+
+
+def test_a_log_that_is_downloaded_does_not_grow_by_it(tmp_path: Path) -> None:
+    run = tmp_path / "run-1"
+    run.mkdir()
+    (run / "flight.tlog").write_bytes(bytes(2000))
+    request = FrameWriter(255, 190).frame(ids.LOG_REQUEST_DATA, 0, 2000, 0, 1, 1)
+    with ground_station(services=(LogService(flight_logs(run)),)) as ground:
+        ground.polled(request)
+        sent = Counter(frame.message_id for frame in ground.fly(20))
+        kept = Counter(id_ for _, raw in ground.recorded for id_ in [next(split(raw)).message_id])
+    assert sent[ids.LOG_DATA] == 23
+    assert kept == sent - Counter({ids.LOG_DATA: 23}) + Counter({ids.LOG_REQUEST_DATA: 1})
+
+
+def test_a_service_that_fails_ends_neither_the_link_nor_the_flight(
+    echo: tuple[Ground, Echo],
+) -> None:
+    ground, service = echo
+    service.broken = True
+    ground.polled(FrameWriter(255, 190).frame(ids.PING, 77, 5, 0, 0))
+    service.broken = False
+    ground.polled(FrameWriter(255, 190).frame(ids.PING, 78, 6, 0, 0))
+    assert [frame.payload_values[1] for frame in ground.heard()] == [6]

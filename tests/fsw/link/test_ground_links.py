@@ -1,0 +1,161 @@
+"""Two links at once: what they share, what they do not, and time."""
+
+from __future__ import annotations
+
+import socket
+import threading
+import time
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import ExitStack
+
+import pytest
+
+from fsw.link.ground_links import GroundLinks
+from fsw.link.link_choice import LinkChoice, addresses
+from fsw.link.services.time_service import TimeService
+from fsw.link.udp_endpoint import LinkError, OpenEndpoint
+from fsw.link.wire import message_ids as ids
+from fsw.signals import CommandAck
+from messages.frames import FrameWriter, split
+from tests.fsw.link.ground import Ground, ground_station
+from tests.fsw.link.snapshots import outputs_at
+
+HEARTBEAT = (0, 6, 8, 0, 4, 3)
+
+
+def wall_us() -> int:
+    return time.monotonic_ns() // 1000
+
+
+@pytest.fixture
+def both() -> Iterator[tuple[Ground, Ground, GroundLinks]]:
+    with ExitStack() as stack:
+        gcs = stack.enter_context(ground_station())
+        api = stack.enter_context(ground_station(services=(TimeService(),), api=True))
+        links = GroundLinks([gcs.link, api.link], 2_000, wall_us)
+        gcs.links = api.links = links
+        yield gcs, api, links
+
+
+def speak(ground: Ground, system: int = 245) -> None:
+    ground.polled(FrameWriter(system, 190).frame(ids.HEARTBEAT, *HEARTBEAT))
+
+
+def test_a_program_that_has_not_spoken_hears_heartbeats_only(
+    both: tuple[Ground, Ground, GroundLinks],
+) -> None:
+    gcs, api, _ = both
+    gcs.fly(1500)
+    assert {frame.message_id for frame in api.heard()} == {ids.HEARTBEAT}
+    speak(api)
+    gcs.fly(500)
+    counts = Counter(frame.message_id for frame in api.heard())
+    assert abs(counts[ids.ATTITUDE_QUATERNION] - 50) <= 1
+
+
+def test_a_rate_is_one_links_own(both: tuple[Ground, Ground, GroundLinks]) -> None:
+    gcs, api, _ = both
+    speak(api)
+    command = (float(ids.ATTITUDE), 500_000.0, *(0.0,) * 5, 511, 1, 1, 0)
+    api.polled(FrameWriter(245, 190).frame(ids.COMMAND_LONG, *command))
+    frames = gcs.fly(1000)
+    assert abs(sum(f.message_id == ids.ATTITUDE for f in frames) - 100) <= 1
+    assert abs(sum(f.message_id == ids.ATTITUDE for f in api.heard()) - 4) <= 1
+
+
+def test_an_answer_goes_to_the_link_the_command_came_from(
+    both: tuple[Ground, Ground, GroundLinks],
+) -> None:
+    gcs, api, links = both
+    speak(api, system=245)
+    speak(gcs, system=255)
+    for ground in (gcs, api):
+        ground.heard()
+    links.acknowledge(1_000_000, CommandAck(400, 0, 245, 190))
+    assert [f.message_id for f in api.heard()] == [ids.COMMAND_ACK]
+    assert gcs.heard() == []
+    links.acknowledge(1_000_000, CommandAck(400, 0, 99, 1))  # of nobody known: to all
+    assert [len(ground.heard()) for ground in (gcs, api)] == [1, 1]
+
+
+def test_between_ticks_the_time_is_told_within_a_millisecond(
+    both: tuple[Ground, Ground, GroundLinks],
+) -> None:
+    """TIMESYNC and PING while the vehicle sleeps until its next tick."""
+    _, api, links = both
+    client = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    client.settimeout(1.0)
+    delays, told = [], []
+
+    def ask() -> None:
+        writer = FrameWriter(245, 190)
+        for number in range(1, 41):
+            sent = time.monotonic_ns()
+            values = (0, number) if number % 2 else (number, number, 0, 0)
+            frame = writer.frame(ids.TIMESYNC if number % 2 else ids.PING, *values)
+            client.sendto(frame, ("127.0.0.1", api.link.port))
+            while not told or told[-1].payload_values[1] != number:
+                told.extend(
+                    f for f in split(client.recv(2048)) if f.message_id in (ids.TIMESYNC, ids.PING)
+                )
+            delays.append((time.monotonic_ns() - sent) / 1e6)
+            time.sleep(0.0007)
+
+    asking = threading.Thread(target=ask)
+    asking.start()
+    t_us = 5_000_000
+    while asking.is_alive():
+        t_us += 2_000
+        links.publish(outputs_at(t_us))
+        links.attend(0.0019)
+    asking.join()
+    client.close()
+    assert sorted(delays)[len(delays) // 2] < 1.0  # ms
+    synced = [f for f in told if f.message_id == ids.TIMESYNC]
+    assert len(synced) == 20
+    assert all(5_000_000 <= f.payload_values[0] / 1000 <= t_us + 2_000 for f in synced)
+
+
+def test_sleeping_takes_as_long_as_it_should_under_a_flood(
+    both: tuple[Ground, Ground, GroundLinks],
+) -> None:
+    gcs, _, links = both
+    links.publish(outputs_at(1_000_000))
+    over = []
+    for _ in range(20):
+        for _ in range(30):
+            gcs.station.sendto(b"\xfd" * 1400, ("127.0.0.1", gcs.link.port))
+        begin = wall_us()
+        links.attend(0.002)
+        over.append(wall_us() - begin - 2_000)
+    assert min(over) >= -5
+    assert sorted(over)[10] < 500
+
+
+def test_somebody_elses_answer_to_a_ping_is_not_answered(
+    both: tuple[Ground, Ground, GroundLinks],
+) -> None:
+    _, api, _ = both
+    api.heard()
+    api.polled(FrameWriter(245, 190).frame(ids.PING, 1, 1, 1, 1))
+    api.polled(FrameWriter(245, 190).frame(ids.TIMESYNC, 5, 6))
+    assert api.heard() == []
+
+
+def test_the_wanted_port_is_taken_if_it_is_free_and_another_if_not() -> None:
+    first = OpenEndpoint(("127.0.0.1", 14550))
+    second = OpenEndpoint(("127.0.0.1", 14550), first.port)
+    wanted = second.port
+    second.close()
+    third = OpenEndpoint(("127.0.0.1", 14550), wanted)
+    assert wanted != first.port
+    assert third.port == wanted
+    first.close()
+    third.close()
+
+
+def test_two_links_to_one_address_are_refused() -> None:
+    with pytest.raises(LinkError, match="different ports"):
+        addresses(LinkChoice(gcs="udp:127.0.0.1:14550", api="udp:localhost:14550"))
+    assert addresses(LinkChoice(api="none")).api is None

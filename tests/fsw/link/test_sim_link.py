@@ -1,0 +1,204 @@
+"""The simulator link over real sockets: one tick a step, whatever the network does."""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import pytest
+
+from fsw.link.inbox import Inbox
+from fsw.link.sim_link import Pacing, SimLink
+from fsw.link.wire import message_ids as ids
+from fsw.signals import CommandAck, Mode
+from messages.frames import FrameWriter, split
+from sitl.link.encode import StepEncoder
+from sitl.link.pilot_messages import SendCommand
+from sitl.sensors.suite import SensorReadings
+from tests.fsw.link.snapshots import FACTS, outputs_at
+
+NAN = float("nan")
+SHUTDOWN = SendCommand(246, (0.0, 2.0, NAN, NAN, NAN, NAN, NAN))
+
+
+def readings(t_us: int) -> SensorReadings:
+    return SensorReadings(
+        t_us=t_us,
+        p_WB=(1.0, 2.0, -3.0),
+        v_WB=(0.1, 0.2, 0.3),
+        q_WB=(0.5, 0.5, -0.5, 0.5),
+        w_WB_B=(0.4, 0.5, 0.6),
+        gyro_B=(0.41, 0.51, 0.61),
+        accel_B=(0.0, 0.1, -9.81),
+        q_arm=(-0.7, 1.4),
+        qd_arm=(0.01, 0.02),
+        tau_arm=(0.03, 0.04),
+    )
+
+
+@dataclass
+class Wire:
+    """A simulator's socket and the link under test."""
+
+    simulator: socket.socket
+    link: SimLink
+    inbox: Inbox
+
+    def send(self, datagram: bytes) -> None:
+        self.simulator.send(datagram)
+
+    def hear(self) -> bytes:
+        return self.simulator.recv(2048)
+
+
+@pytest.fixture
+def wire() -> Iterator[Wire]:
+    simulator = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    simulator.bind(("127.0.0.1", 0))
+    simulator.settimeout(0.5)
+    inbox = Inbox()
+    link = SimLink(simulator.getsockname(), inbox, FACTS)
+    link.announce()
+    hello, vehicle = simulator.recvfrom(2048)
+    assert [frame.message_id for frame in split(hello)] == [ids.HEARTBEAT]
+    simulator.connect(vehicle)
+    yield Wire(simulator, link, inbox)
+    link.close()
+    simulator.close()
+
+
+def test_every_sensor_arrives_where_it_belongs(wire: Wire) -> None:
+    sent = readings(1_002_000)
+    wire.send(StepEncoder(lockstep=True).datagram(sent, ()))
+    got = wire.link.receive()
+    assert got is not None
+    assert got.t_us == 1_002_000
+    for name, other in (
+        ("p_WB", "p_WB"),
+        ("v_WB", "v_WB"),
+        ("q_WB", "q_WB"),
+        ("gyro_B", "gyro_B"),
+        ("accel_B", "accel_B"),
+        ("q_arm", "q_arm"),
+        ("qd_arm", "qd_arm"),
+    ):
+        assert getattr(got, name) == pytest.approx(getattr(sent, other)), name
+
+
+def test_a_repeated_step_gets_the_same_answer_and_no_tick(wire: Wire) -> None:
+    step = StepEncoder(lockstep=True).datagram(readings(1_002_000), ())
+    wire.send(step)
+    assert wire.link.receive() is not None
+    wire.link.answer(1_002_000, outputs_at(1_002_000))
+    answer = wire.hear()
+    wire.send(step)
+    assert wire.link.receive() is None
+    assert wire.hear() == answer
+    assert wire.link.retransmissions == 1
+
+
+def test_an_older_step_is_ignored(wire: Wire) -> None:
+    encoder = StepEncoder(lockstep=True)
+    for t_us in (1_002_000, 1_004_000):
+        wire.send(encoder.datagram(readings(t_us), ()))
+        assert wire.link.receive() is not None
+        wire.link.answer(t_us, outputs_at(t_us))
+        wire.hear()
+    wire.send(encoder.datagram(readings(1_002_000), ()))
+    assert wire.link.receive() is None
+    with pytest.raises(TimeoutError):
+        wire.hear()
+
+
+def test_a_step_without_its_barrier_releases_no_tick(wire: Wire) -> None:
+    step = StepEncoder(lockstep=True).datagram(readings(1_002_000), ())
+    wire.send(step[:-10])
+    assert wire.link.receive() is None
+    wire.send(step)
+    assert wire.link.receive() is not None
+
+
+def test_commands_of_a_repeated_step_are_taken_once(wire: Wire) -> None:
+    arm = SendCommand(400, (1.0, NAN, NAN, NAN, NAN, NAN, NAN))
+    step = StepEncoder(lockstep=True).datagram(readings(1_002_000), (arm,))
+    for _ in range(2):
+        wire.send(step)
+        wire.link.receive()
+    assert len(wire.inbox.take_commands()) == 1
+
+
+def test_acknowledgements_come_before_the_actuators_and_are_repeated_with_them(wire: Wire) -> None:
+    step = StepEncoder(lockstep=True).datagram(readings(1_002_000), ())
+    wire.send(step)
+    wire.link.receive()
+    wire.link.queue_ack(CommandAck(400, 0, 1, 195))
+    wire.link.answer(1_002_000, outputs_at(1_002_000))
+    answer = wire.hear()
+    order = [frame.message_id for frame in split(answer)]
+    assert order == [ids.HEARTBEAT, ids.COMMAND_ACK, ids.HIL_ACTUATOR_CONTROLS]
+    wire.send(step)
+    wire.link.receive()
+    assert wire.hear() == answer
+
+
+def test_the_simulator_is_told_the_mode_when_it_changes_and_once_a_second(wire: Wire) -> None:
+    told = []
+    for step in range(1, 1001):
+        t_us = 1_000_000 + 2_000 * step
+        outputs = outputs_at(t_us)
+        if step >= 700:
+            outputs = replace(outputs, snapshot=replace(outputs.snapshot, mode=Mode.HOLD))
+        wire.link.answer(t_us, outputs)
+        for frame in split(wire.hear()):
+            if frame.message_id == ids.HEARTBEAT:
+                told.append((step, frame.payload_values[0]))
+    assert told == [(1, 0x0B040000), (501, 0x0B040000), (700, 0x03040000)]
+
+
+def test_the_heartbeat_of_the_simulator_says_who_waits(wire: Wire) -> None:
+    encoder = StepEncoder(lockstep=False)
+    wire.send(encoder.heartbeat() + encoder.datagram(readings(1_002_000), ()))
+    assert wire.link.receive() is not None
+    assert wire.link.pacing is Pacing.REALTIME
+
+
+def test_of_steps_that_piled_up_the_newest_counts_and_every_message_is_kept(
+    wire: Wire,
+) -> None:
+    encoder = StepEncoder(lockstep=False)
+    wire.send(encoder.heartbeat() + encoder.datagram(readings(1_002_000), ()))
+    assert wire.link.receive() is not None
+    assert not wire.link.wait(0.0)
+    arm = SendCommand(400, (1.0, NAN, NAN, NAN, NAN, NAN, NAN))
+    wire.send(encoder.datagram(readings(1_004_000), (arm,)))
+    for t_us in (1_006_000, 1_008_000):
+        wire.send(encoder.datagram(readings(t_us), ()))
+    assert wire.link.wait(1.0)
+    newest = wire.link.newest()
+    assert newest is not None
+    assert newest.t_us == 1_008_000
+    assert [request.command for request in wire.inbox.take_commands()] == [400]
+    assert wire.link.newest() is None
+
+
+def test_shutdown_is_acknowledged_and_ends_the_flight(wire: Wire) -> None:
+    wire.send(StepEncoder(lockstep=True).command(SHUTDOWN))
+    assert wire.link.receive() is None
+    assert wire.link.shutdown
+    (ack,) = split(wire.hear())
+    assert ack.message_id == ids.COMMAND_ACK
+    assert ack.payload_values == (246, 0, 0, 0, 1, 195)
+
+
+def test_a_reboot_is_not_a_shutdown(wire: Wire) -> None:
+    reboot = SendCommand(246, (1.0, 1.0, NAN, NAN, NAN, NAN, NAN))
+    wire.send(StepEncoder(lockstep=True).command(reboot))
+    assert wire.link.receive() is None
+    assert not wire.link.shutdown
+
+
+def test_garbage_releases_no_tick(wire: Wire) -> None:
+    for datagram in (b"", b"\xfd" * 300, FrameWriter(1, 200).frame(ids.HEARTBEAT, *(0,) * 6)):
+        wire.send(datagram)
+        assert wire.link.receive() is None

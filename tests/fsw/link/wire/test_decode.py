@@ -1,0 +1,135 @@
+"""What the vehicle accepts from the wire, and what it refuses and counts."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from fsw.link.inbox import Inbox
+from fsw.link.wire import message_ids as ids
+from messages.frames import Frame, FrameWriter, split, wire_fields
+
+NAN = math.nan
+
+
+def frame(message_id: int, **fields: float) -> Frame:
+    """A message with the named wire values, the others zero, as it comes off the wire."""
+    names = wire_fields(message_id)
+    assert not set(fields) - set(names)
+    wire = FrameWriter(255, 190).frame(message_id, *(fields.get(name, 0) for name in names))
+    (decoded,) = split(wire)
+    return decoded
+
+
+def target(**fields: float) -> Frame:
+    return frame(
+        ids.END_EFFECTOR_TARGET, **{"time_usec": 5_000_000, "coordinate_frame": 1, **fields}
+    )
+
+
+def wall(index: int, count: int, **fields: float) -> Frame:
+    plane = {"normal[0]": -1.0, "offset": -1.0, "clearance": 0.1}
+    return frame(ids.OBSTACLE_WALL, index=index, count=count, **{**plane, **fields})
+
+
+def test_nan_in_an_unused_parameter_of_a_command_is_normal() -> None:
+    inbox = Inbox()
+    inbox.accept(frame(ids.COMMAND_LONG, command=400, param1=1.0, param5=NAN, param7=NAN))
+    (command,) = inbox.take_commands()
+    assert command.command == 400
+    assert command.params[0] == 1.0
+    assert math.isnan(command.params[6])
+    assert (command.source_system, command.source_component) == (255, 190)
+    assert inbox.take_commands() == ()
+    assert inbox.refused == 0
+
+
+def test_a_command_for_another_system_is_not_ours() -> None:
+    inbox = Inbox()
+    inbox.accept(frame(ids.COMMAND_LONG, command=400, target_system=2))
+    inbox.accept(frame(ids.COMMAND_LONG, command=400, target_system=1, target_component=154))
+    assert inbox.take_commands() == ()
+
+
+@pytest.mark.parametrize(("mav_frame", "x"), [(1, 2.5), (6, 0.0025)])
+def test_command_int_scales_x_by_its_frame(mav_frame: int, x: float) -> None:
+    inbox = Inbox()
+    inbox.accept(frame(ids.COMMAND_INT, command=192, x=25_000, z=-3.0, frame=mav_frame))
+    (command,) = inbox.take_commands()
+    assert command.params[4] == pytest.approx(x)
+    assert command.params[6] == -3.0
+
+
+@pytest.mark.parametrize("bad", [NAN, math.inf, -math.inf])
+@pytest.mark.parametrize("field", ["position[0]", "velocity[2]", "acceleration[1]", "yaw"])
+def test_a_target_that_is_not_finite_is_refused_and_counted(field: str, bad: float) -> None:
+    inbox = Inbox()
+    inbox.accept(target(**{field: bad}))
+    assert inbox.take_targets() == ()
+    assert inbox.refused == 1
+
+
+def test_a_masked_field_of_a_target_may_be_nan() -> None:
+    inbox = Inbox()
+    mask = 0x038 | 0x1C0 | 0x400
+    inbox.accept(target(**{"position[2]": -1.0, "velocity[0]": NAN, "yaw": NAN, "type_mask": mask}))
+    (point,) = inbox.take_targets()
+    assert point.v_WE == (0.0, 0.0, 0.0)
+    assert point.yaw == 0.0
+
+
+@pytest.mark.parametrize("fields", [{"coordinate_frame": 6}, {"type_mask": 1}])
+def test_a_target_in_another_frame_or_without_position_is_refused(fields: dict[str, int]) -> None:
+    inbox = Inbox()
+    inbox.accept(target(**fields))
+    assert inbox.take_targets() == ()
+    assert inbox.refused == 1
+
+
+def test_walls_arrive_as_one_set_in_any_order() -> None:
+    inbox = Inbox()
+    inbox.accept(wall(1, 2, offset=-2.0))
+    assert inbox.take_safe_set() is None
+    inbox.accept(wall(0, 2, offset=-1.0))
+    safe_set = inbox.take_safe_set()
+    assert safe_set is not None
+    assert [wall.offset for wall in safe_set.walls] == [-1.0, -2.0]
+    assert inbox.take_safe_set() is None
+
+
+def test_walls_of_two_sets_do_not_mix() -> None:
+    inbox = Inbox()
+    inbox.accept(wall(0, 2))
+    inbox.accept(wall(0, 3))
+    inbox.accept(wall(1, 2))
+    assert inbox.take_safe_set() is None
+
+
+@pytest.mark.parametrize(
+    "bad",
+    [{"normal[0]": NAN}, {"normal[0]": -0.9}, {"offset": math.inf}, {"clearance": NAN}],
+)
+def test_a_wall_that_is_no_plane_is_refused(bad: dict[str, float]) -> None:
+    inbox = Inbox()
+    inbox.accept(wall(0, 1, **bad))
+    assert inbox.take_safe_set() is None
+    assert inbox.refused == 1
+
+
+@pytest.mark.parametrize("radius", [0.0, -1.0, NAN])
+def test_a_sphere_that_contains_nothing_is_refused(radius: float) -> None:
+    inbox = Inbox()
+    inbox.accept(frame(ids.WORKSPACE_SPHERE, radius=radius))
+    assert inbox.take_safe_set() is None
+    assert inbox.refused == 1
+
+
+def test_the_inbox_is_bounded() -> None:
+    inbox = Inbox()
+    for _ in range(1000):
+        inbox.accept(target())
+        inbox.accept(frame(ids.COMMAND_LONG, command=400))
+    assert len(inbox.take_targets()) <= 64
+    assert len(inbox.take_commands()) <= 16
+    assert inbox.refused > 1900

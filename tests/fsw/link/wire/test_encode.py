@@ -1,0 +1,265 @@
+"""Every telemetry stream, read back with pymavlink's generated classes."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from fsw.link.telemetry.streams import STREAMS, Stream
+from fsw.link.wire import encode_replies, encode_standard
+from fsw.link.wire import message_ids as ids
+from fsw.link.wire.telemetry_context import GENERIC
+from fsw.signals import (
+    AttitudeSetpoint,
+    FlightSnapshot,
+    JointSetpoint,
+    Mode,
+    MotionSetpoint,
+    OffboardReport,
+    SetpointKind,
+    StatusText,
+)
+from messages import dialect
+from messages.frames import FrameWriter
+from tests.fsw.link.snapshots import ACTUATORS, CONTEXT, SNAPSHOT
+
+
+def read_back(stream: Stream, snapshot: Any = SNAPSHOT) -> Any:
+    values = stream.encode(snapshot, CONTEXT)
+    assert values is not None
+    return decoded(FrameWriter(1, stream.component).frame(stream.message_id, *values))
+
+
+def decoded(frame: bytes) -> Any:
+    (message,) = dialect.MAVLink(None).parse_buffer(bytearray(frame))
+    return message
+
+
+def stream_of(message_id: int) -> Stream:
+    return next(stream for stream in STREAMS if stream.message_id == message_id)
+
+
+# What pymavlink must read for the snapshot, one or a few telling fields a message.
+TELLING: dict[int, dict[str, Any]] = {
+    ids.HEARTBEAT: {"type": 2, "autopilot": 12, "custom_mode": 0x0B040000, "system_status": 4},
+    ids.SYS_STATUS: {
+        "load": 40, "voltage_battery": 15_200, "current_battery": 1_830, "battery_remaining": 62,
+    },
+    ids.EXTENDED_SYS_STATE: {"landed_state": 2},
+    ids.ATTITUDE: {"time_boot_ms": 3004, "yaw": math.pi / 2, "rollspeed": 0.4},
+    ids.ATTITUDE_QUATERNION: {"q1": math.sqrt(0.5), "q4": math.sqrt(0.5), "yawspeed": 0.6},
+    ids.LOCAL_POSITION_NED: {"x": 1.0, "y": 2.0, "z": -3.0, "vz": 0.3},
+    ids.POSITION_TARGET_LOCAL_NED: {"x": 1.1, "vy": 0.21, "afz": 0.32, "yaw": 0.33},
+    ids.ATTITUDE_TARGET: {"thrust": 40.0 / 64.0, "type_mask": 7},
+    ids.GLOBAL_POSITION_INT: {
+        "lat": 473977510, "lon": 85456206, "alt": 3_000, "relative_alt": 2_700, "vx": 10, "vy": 20,
+        "vz": 30, "hdg": 9_000,
+    },
+    ids.VFR_HUD: {
+        "groundspeed": math.hypot(0.1, 0.2), "alt": 3.0, "climb": -0.3, "heading": 90,
+        "throttle": 62,
+    },
+    ids.ALTITUDE: {"altitude_amsl": 3.0, "altitude_local": 3.0, "altitude_relative": 2.7},
+    ids.HOME_POSITION: {
+        "latitude": 473977375, "x": -0.5, "z": -0.3, "altitude": 300, "q": [0.0, 0.0, 0.0, 1.0],
+    },
+    ids.BATTERY_STATUS: {
+        "voltages": [15_200, *[65_535] * 9], "current_battery": 1_830, "current_consumed": 1_900,
+        "battery_remaining": 62, "charge_state": 1,
+    },
+    ids.ESTIMATOR_STATUS: {"time_usec": 3_004_000, "flags": 63},
+    ids.SYSTEM_TIME: {"time_boot_ms": 3004, "time_unix_usec": 1_750_000_003_004_000},
+    ids.MISSION_CURRENT: {"seq": 2, "total": 5, "mission_state": 4, "mission_mode": 2},
+    ids.CURRENT_MODE: {"custom_mode": 0x0B040000, "standard_mode": 0},
+    ids.ODOMETRY: {"x": 1.0, "vx": 0.2, "vy": -0.1, "vz": 0.3, "rollspeed": 0.4, "frame_id": 1},
+    ids.GPS_GLOBAL_ORIGIN: {"latitude": 473977420, "longitude": 85455940, "altitude": 0},
+    ids.AUTOPILOT_VERSION: {"uid": int.from_bytes(b"PANDION", "big")},
+    ids.ARM_JOINT_STATE: {"joint_count": 2, "time_usec": 3_004_000},
+    ids.ARM_JOINT_SETPOINT: {"joint_count": 2},
+    ids.END_EFFECTOR_TARGET: {"yaw": 0.3, "coordinate_frame": 1},
+    ids.SETPOINT_STATUS: {"accepted": 5, "refused": 2, "age_us": 40_000, "kind": 0},
+    ids.BARRIER_MARGIN: {
+        "margin_min": 0.2, "margin_min_index": 1, "count": 3, "constraint_kind": 1,
+        "active_mask": 0b010, "slack_max": 0.25,
+    },
+    ids.MPC_STATUS: {
+        "plan_id": 7, "total_us": 703, "linearise_us": 101, "solve_us": 502, "budget_us": 10_000,
+        "missed_deadlines": 1, "fallbacks": 2, "cost": 12.5, "horizon": 5, "rate_hz": 10,
+        "sqp_iterations": 2, "solver_iterations": 19, "solver_status": 4,
+    },
+    ids.LOOP_TIMING: {"ticks": 5000, "late_ticks": 3, "skipped_ticks": 1, "lateness_p99_us": 90.0},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("message_id", TELLING)
+def test_pymavlink_reads_what_was_meant(message_id: int) -> None:
+    message = read_back(stream_of(message_id))
+    for field, expected in TELLING[message_id].items():
+        assert getattr(message, field) == pytest.approx(expected, rel=1e-6), field
+
+
+def test_every_stream_is_checked_above() -> None:
+    assert {stream.message_id for stream in STREAMS} == set(TELLING)
+
+
+def test_arrays_of_the_arm_hold_two_joints_and_zeros() -> None:
+    state = read_back(stream_of(ids.ARM_JOINT_STATE))
+    assert state.position == pytest.approx([0.7, 0.8, 0.0, 0.0])
+    assert state.torque == pytest.approx([1.0, -0.5, 0.0, 0.0])
+    # Body x points east: the arm's reach along x is seen in y, its depth in z.
+    reach = 0.15 * (math.sin(0.7) + math.sin(1.5))
+    depth = 0.15 * (math.cos(0.7) + math.cos(1.5))
+    assert state.ee_position == pytest.approx([1.0, 2.0 + reach, -3.0 + depth])
+    setpoint = read_back(stream_of(ids.ARM_JOINT_SETPOINT))
+    assert setpoint.acceleration == pytest.approx([0.8, 0.9, 0.0, 0.0])
+
+
+@pytest.mark.parametrize(
+    ("mode", "main", "sub"),
+    [
+        (Mode.TAKEOFF, 4, 2),
+        (Mode.HOLD, 4, 3),
+        (Mode.LAND, 4, 6),
+        (Mode.TRAJECTORY, 4, 11),
+        (Mode.MISSION, 4, 4),
+        (Mode.RETURN, 4, 5),
+        (Mode.OFFBOARD, 6, 0),
+    ],
+)
+def test_modes_have_the_names_that_px4_gave_them(mode: Mode, main: int, sub: int) -> None:
+    message = read_back(stream_of(ids.HEARTBEAT), replace(SNAPSHOT, mode=mode))
+    assert message.custom_mode == main << 16 | sub << 24
+
+
+def test_armed_and_custom_mode_are_flags_of_the_heartbeat() -> None:
+    assert read_back(stream_of(ids.HEARTBEAT)).base_mode & 0x81 == 0x81
+    disarmed = replace(SNAPSHOT, mode=Mode.DISARMED, armed=False)
+    assert read_back(stream_of(ids.HEARTBEAT), disarmed).base_mode & 0x81 == 0x01
+
+
+def test_a_fault_takes_the_prearm_bit_and_the_suspect_away() -> None:
+    healthy = read_back(stream_of(ids.SYS_STATUS))
+    assert healthy.onboard_control_sensors_health == healthy.onboard_control_sensors_present
+    broken = replace(SNAPSHOT, failures=("state estimate invalid",))
+    status = read_back(stream_of(ids.SYS_STATUS), broken)
+    lost = status.onboard_control_sensors_present & ~status.onboard_control_sensors_health
+    # Nothing is known without an estimate: neither place nor heading nor what feeds them.
+    assert lost == 0x10000000 | 0x200000 | 0x80 | 0x27
+    assert read_back(stream_of(ids.HEARTBEAT), broken).system_status == 5
+
+
+def test_the_fence_is_enabled_where_there_is_one_and_healthy_until_it_is_left() -> None:
+    fence = 0x100000
+    for margins, enabled, healthy in (((), 0, fence), ((0.1,), fence, fence), ((-0.1,), fence, 0)):
+        report = replace(SNAPSHOT.constraints, margins=margins)
+        status = read_back(stream_of(ids.SYS_STATUS), replace(SNAPSHOT, constraints=report))
+        assert status.onboard_control_sensors_enabled & fence == enabled
+        assert status.onboard_control_sensors_health & fence == healthy
+
+
+@pytest.mark.parametrize(
+    ("changes", "landed_state"),
+    [
+        ({"armed": True, "landed": True, "mode": Mode.HOLD}, 1),
+        ({"armed": False, "landed": False, "mode": Mode.DISARMED}, 1),
+        ({"armed": True, "landed": False, "mode": Mode.HOLD}, 2),
+        ({"armed": True, "landed": False, "mode": Mode.TAKEOFF}, 3),
+        ({"armed": True, "landed": False, "mode": Mode.LAND}, 4),
+    ],
+)
+def test_landed_state_is_what_clients_wait_for(changes: dict[str, Any], landed_state: int) -> None:
+    message = read_back(stream_of(ids.EXTENDED_SYS_STATE), replace(SNAPSHOT, **changes))
+    assert message.landed_state == landed_state
+
+
+def test_there_is_nothing_to_say_before_the_first_plan() -> None:
+    idle = replace(SNAPSHOT, plan=None, plan_state=None, plan_input=None, reference=None)
+    for message_id in (
+        ids.POSITION_TARGET_LOCAL_NED,
+        ids.ARM_JOINT_SETPOINT,
+        ids.END_EFFECTOR_TARGET,
+        ids.MPC_STATUS,
+    ):
+        assert stream_of(message_id).encode(idle, CONTEXT) is None
+
+
+def test_actuators_are_fractions_of_their_limits() -> None:
+    values = encode_replies.hil_actuator_controls(3_004_000, ACTUATORS, True, 1 / 16.0, 1 / 2.0)
+    message = decoded(FrameWriter(1, 1).frame(ids.HIL_ACTUATOR_CONTROLS, *values))
+    assert message.time_usec == 3_004_000
+    assert message.controls[:6] == pytest.approx([0.5, 0.25, 0.75, 1.0, 0.5, -0.25])
+    assert message.mode & 128
+    assert message.flags == 1
+
+
+def test_a_long_text_is_cut_into_numbered_pieces() -> None:
+    sentence = "arming refused: " + "ä" * 60
+    pieces = [
+        decoded(FrameWriter(1, 1).frame(ids.STATUSTEXT, *values))
+        for values in encode_replies.status_texts(StatusText(4, sentence), 9)
+    ]
+    assert [piece.chunk_seq for piece in pieces] == list(range(len(pieces)))
+    assert {piece.id for piece in pieces} == {9}
+    whole = b"".join(
+        values[1] for values in encode_replies.status_texts(StatusText(4, sentence), 9)
+    )
+    assert whole.decode() == sentence
+
+
+def test_attitude_of_a_level_vehicle_is_level() -> None:
+    assert encode_standard.attitude(SNAPSHOT, CONTEXT)[1:3] == pytest.approx((0.0, 0.0))
+
+
+BODY = MotionSetpoint(False, v=(0.5, 0.25, -0.125), yaw=0.75)
+ATTITUDE = AttitudeSetpoint(0.625, None, (0.25, 0.5, -0.5))
+
+
+def offboard(kind: SetpointKind, **setpoints: Any) -> FlightSnapshot:
+    return replace(SNAPSHOT, mode=Mode.OFFBOARD, offboard=OffboardReport(kind, **setpoints))
+
+
+def test_offboard_the_set_point_that_is_flown_is_sent_back_with_its_mask() -> None:
+    flown = offboard(SetpointKind.BODY, motion=BODY)
+    message = read_back(stream_of(ids.POSITION_TARGET_LOCAL_NED), flown)
+    assert (message.vx, message.vy, message.vz, message.yaw) == (0.5, 0.25, -0.125, 0.75)
+    assert (message.type_mask, message.coordinate_frame) == (0x9C7, 1)
+    flown = offboard(SetpointKind.ATTITUDE, attitude=ATTITUDE)
+    message = read_back(stream_of(ids.ATTITUDE_TARGET), flown)
+    assert (message.body_pitch_rate, message.thrust, message.type_mask) == (0.5, 0.625, 0x80)
+    point = MotionSetpoint(True, p=(1.0, 2.0, -3.0))
+    flown = offboard(SetpointKind.END_EFFECTOR, motion=point, joints=JointSetpoint((0.5, -0.25)))
+    message = read_back(stream_of(ids.END_EFFECTOR_TARGET), flown)
+    assert (message.time_usec, list(message.position)) == (0, [1.0, 2.0, -3.0])
+    assert message.type_mask == 0xDF8
+    message = read_back(stream_of(ids.ARM_JOINT_SETPOINT), flown)
+    assert list(message.position) == [0.5, -0.25, 0.0, 0.0]
+
+
+def test_a_generic_autopilot_does_not_say_px4() -> None:
+    generic = replace(CONTEXT, autopilot=GENERIC)
+    stream = stream_of(ids.HEARTBEAT)
+    values = stream.encode(SNAPSHOT, generic)
+    assert values is not None
+    message = decoded(FrameWriter(1, 1).frame(ids.HEARTBEAT, *values))
+    assert message.autopilot == dialect.MAV_AUTOPILOT_GENERIC
+    assert message.custom_mode == 0x0B040000  # the modes stay what they are
+
+
+def test_what_forbids_arming_takes_the_prearm_bit_alone() -> None:
+    refused = replace(SNAPSHOT, arming_refusal="not armed: standing is unclear")
+    status = read_back(stream_of(ids.SYS_STATUS), refused)
+    lost = status.onboard_control_sensors_present & ~status.onboard_control_sensors_health
+    assert lost == dialect.MAV_SYS_STATUS_PREARM_CHECK
+
+
+@pytest.mark.parametrize(("remaining", "state"), [(0.5, 1), (0.19, 2), (0.09, 3)])
+def test_a_battery_that_runs_low_says_so(remaining: float, state: int) -> None:
+    low = replace(SNAPSHOT, battery=replace(SNAPSHOT.battery, remaining=remaining))
+    assert read_back(stream_of(ids.BATTERY_STATUS), low).charge_state == state
+
+
+def test_without_a_home_there_is_no_home_position() -> None:
+    assert stream_of(ids.HOME_POSITION).encode(replace(SNAPSHOT, home=None), CONTEXT) is None

@@ -1,0 +1,126 @@
+"""Starting and ending the flight software, with a program that only stands there."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import threading
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from fsw import app
+from fsw.arguments import FswOptions
+from fsw.link.link_choice import NO_LINK, LinkChoice
+from fsw.link.services.mission_store import MissionStore, Site
+from fsw.parameters.control_choice import ControlChoice
+from fsw.parameters.flight_config import FlightConfig
+from fsw.parameters.registry import PARAMETERS
+from fsw.parameters.storage import load as parameter_file
+from fsw.parameters.store import ParameterStore
+from fsw.runtime.program import FlightProgram
+from fsw.signals import Plan, PlanFailure, PlanRequest, TickInputs, TickOutputs
+from tests.fsw.link.snapshots import FACTS, outputs_at
+
+CHOICE = ControlChoice("blf", "tracking", "consistent", "clarabel", soft=False)
+
+
+class NoPlanner:
+    """Never asked."""
+
+    def plan(self, request: PlanRequest) -> Plan | PlanFailure:
+        raise AssertionError("nobody asks")
+
+
+def standing(state: int, inputs: TickInputs) -> tuple[int, TickOutputs]:
+    return state + 1, outputs_at(inputs.sensors.t_us)
+
+
+def load(options: FswOptions) -> FlightProgram[int]:
+    parameters = ParameterStore(FlightConfig(), lambda tuning: None)
+    site = Site(lambda *place: (0.0, 0.0, 0.0), lambda safe_set: (), lambda: 0.1)
+    return FlightProgram(FACTS, 0, standing, NoPlanner(), parameters, MissionStore(site))
+
+
+@pytest.fixture
+def silent() -> Iterator[socket.socket]:
+    """A simulator that hears and never answers."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as deaf:
+        deaf.bind(("127.0.0.1", 0))
+        deaf.settimeout(30.0)
+        yield deaf
+
+
+@pytest.fixture
+def options(silent: socket.socket, tmp_path: Path) -> Iterator[FswOptions]:
+    handlers = [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)]
+    address = f"udp:127.0.0.1:{silent.getsockname()[1]}"
+    links = LinkChoice(gcs=address, api=NO_LINK)
+    yield FswOptions(address, links, CHOICE, tmp_path, 0.4, None, "text")
+    for number, handler in zip((signal.SIGINT, signal.SIGTERM), handlers, strict=True):
+        signal.signal(number, handler)
+
+
+def test_a_simulator_that_never_answers_ends_the_wait(
+    options: FswOptions, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert app.run(options, load) == app.COULD_NOT_START
+    said = capsys.readouterr().err
+    assert said == f"fsw: no simulator answered at {options.sim} within 0.4 s\n"
+
+
+def test_nobody_at_the_simulators_port_is_the_same(
+    options: FswOptions, capsys: pytest.CaptureFixture[str]
+) -> None:
+    nobody = replace(options, sim="udp:127.0.0.1:9")
+    assert app.run(nobody, load) == app.COULD_NOT_START
+    assert "no simulator answered at udp:127.0.0.1:9" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_the_wait(
+    options: FswOptions, silent: socket.socket, number: signal.Signals
+) -> None:
+    def signal_once_it_announces_itself() -> None:
+        silent.recv(2048)
+        os.kill(os.getpid(), number)
+
+    threading.Thread(target=signal_once_it_announces_itself, daemon=True).start()
+    assert app.run(replace(options, wait_s=30.0), load) == app.NOT_COMPLETED
+    assert (Path(str(options.out)) / "fsw.json").exists()
+
+
+@pytest.mark.parametrize("name", ["flight.tlog", "flight.ulg"])
+def test_a_directory_with_a_flight_is_refused(
+    name: str, options: FswOptions, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (Path(str(options.out)) / name).write_bytes(b"")
+    assert app.run(options, load) == app.COULD_NOT_START
+    assert "already holds a flight" in capsys.readouterr().err
+
+
+def test_kept_parameters_are_taken_over_and_what_is_of_no_use_is_said(
+    options: FswOptions, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "vehicle.params"
+    file.write_text("PID_YAW_P 5\nOF_ANOTHER_AGE 1\n")
+    assert app.run(replace(options, params=file), load) == app.COULD_NOT_START
+    said = "".join(capsys.readouterr())
+    assert f"fsw: {file}, line 2 is passed over: OF_ANOTHER_AGE is unknown\n" in said
+    assert f"fsw: parameters from {file}, 1 of them not the default\n" in said
+    record = parameter_file(Path(str(options.out)) / "parameters.params").values
+    assert record["PID_YAW_P"] == 5.0
+    assert len(record) == len(PARAMETERS)
+
+
+def test_a_place_where_parameters_cannot_be_kept_is_one_sentence(
+    options: FswOptions, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    nowhere = tmp_path / "nowhere" / "vehicle.params"
+    assert app.run(replace(options, params=nowhere), load) == app.COULD_NOT_START
+    assert capsys.readouterr().err == (
+        f"fsw: cannot keep parameters in {nowhere}: No such file or directory\n"
+    )

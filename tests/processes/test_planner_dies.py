@@ -1,0 +1,68 @@
+"""The planner's process is killed in real time: the flight goes on, and no barrier falls."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import socket
+import time
+from pathlib import Path
+
+import pytest
+
+from messages import dialect
+from tests.processes.halves import Half
+
+STATUSTEXT = 253
+
+
+def children(process: int) -> list[int]:
+    """Direct children of a process."""
+    text = Path(f"/proc/{process}/task/{process}/children").read_text()
+    return [int(number) for number in text.split()]
+
+
+def texts(ground: socket.socket) -> list[str]:
+    """What the vehicle has said so far."""
+    parser, said = dialect.MAVLink(None), []
+    parser.robust_parsing = True
+    ground.setblocking(False)
+    while True:
+        try:
+            datagram = ground.recv(4096)
+        except BlockingIOError:
+            return said
+        for message in parser.parse_buffer(datagram) or []:
+            if message.get_type() == "STATUSTEXT":
+                said.append(message.text)
+
+
+@pytest.mark.parametrize("victim", ["worker", "nursery"])
+def test_killing_the_planner_costs_no_barrier(tmp_path: Path, victim: str) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as ground:
+        ground.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 22)
+        ground.bind(("127.0.0.1", 0))
+        flight = ("walls", "--realtime", "--seed", "2", "--duration", "6")
+        with Half("sitl", *flight, "--listen", "udp:127.0.0.1:0") as sitl:
+            port = sitl.wait_for("listening")["port"]
+            addresses = ("--sim", f"udp:127.0.0.1:{port}")
+            telemetry = ("--gcs", f"udp:127.0.0.1:{ground.getsockname()[1]}")
+            with Half("fsw", *addresses, *telemetry, "--out", str(tmp_path), "--wait", "90") as fsw:
+                sitl.wait_for("flying", patience_s=120.0)
+                time.sleep(2.5)
+                (nursery,) = children(fsw.process.pid)
+                (worker,) = children(nursery)
+                os.kill(worker if victim == "worker" else nursery, signal.SIGKILL)
+                ended = sitl.wait_for("ended", patience_s=30.0)
+                assert fsw.finish() == 0
+        said = texts(ground)
+    result, vehicle = ended["result"], json.loads((tmp_path / "fsw.json").read_text())
+    assert result["completed"], result["end_reason"]
+    assert min(result["margins_m"].values()) >= 0.0
+    assert vehicle["mpc"]["restarts"] == 1
+    assert vehicle["mpc"]["cycles"] > 40, "planned on with the new one"
+    assert any("planner process" in text for text in said), said
+    for process in (nursery, worker):
+        with pytest.raises(ProcessLookupError):
+            os.kill(process, 0)
