@@ -65,6 +65,7 @@ class ConstraintKind(IntEnum):
     NONE = 0
     WALLS = 1
     WORKSPACE = 2
+    OBSTACLES = 3  # points; beside them there may be walls
 
 
 # ---------------------------------------------------------------- inputs of a tick
@@ -163,6 +164,14 @@ class Wall:
 
 
 @dataclass(frozen=True, slots=True)
+class PointObstacle:
+    """A known point, the tip of a branch say, and the distance to keep from it (eq 11)."""
+
+    position: Vec3  # m, world
+    clearance: float  # m, d_s
+
+
+@dataclass(frozen=True, slots=True)
 class WorkspaceSphere:
     """Sphere that follows the end-effector target and must contain the body origin (eq 15)."""
 
@@ -172,16 +181,22 @@ class WorkspaceSphere:
 
 @dataclass(frozen=True, slots=True)
 class SafeSet:
-    """Where the vehicle may be: known walls (Case I), a workspace sphere (Case II), or neither."""
+    """Where the vehicle may be.
+
+    Off known walls (Case I) and points, or in a workspace sphere (Case II), or anywhere.
+    """
 
     walls: tuple[Wall, ...] = ()
     sphere: WorkspaceSphere | None = None
+    obstacles: tuple[PointObstacle, ...] = ()
 
     @property
     def kind(self) -> ConstraintKind:
         """The sphere rules where both are given: it is the tighter set."""
         if self.sphere is not None:
             return ConstraintKind.WORKSPACE
+        if self.obstacles:
+            return ConstraintKind.OBSTACLES
         return ConstraintKind.WALLS if self.walls else ConstraintKind.NONE
 
 
@@ -383,7 +398,8 @@ class ConstraintReport:
     """Margins of the active safe set, from the vehicle's own estimate."""
 
     kind: ConstraintKind = ConstraintKind.NONE
-    margins: tuple[float, ...] = ()  # m; walls in order, base/joint2/end-effector within a wall
+    # m; walls in order, then points, base/joint2/end-effector within each
+    margins: tuple[float, ...] = ()
     barrier: tuple[float, ...] = ()  # h, m/s, same order
 
 

@@ -62,19 +62,24 @@ def _check_walls(scenario: Scenario) -> None:
             raise ScenarioError(
                 f"walls[{i}].normal = {list(wall.normal)}: must have length 1, has {length:.6g}"
             )
-    count = len(scenario.walls) * len(POINTS) + (scenario.workspace is not None)
-    if count > MARGINS_MAX:
+    kept = len(scenario.walls) + len(scenario.obstacles)
+    if kept * len(POINTS) + (scenario.workspace is not None) > MARGINS_MAX:
         most = MARGINS_MAX // len(POINTS)
-        raise ScenarioError(f"walls = {len(scenario.walls)} tables: must be at most {most}")
+        both = f"walls and obstacles = {kept}" if scenario.obstacles else f"walls = {kept}"
+        raise ScenarioError(f"{both} tables: must be at most {most}")
+    if scenario.obstacles and scenario.workspace is not None:
+        raise ScenarioError("obstacles: cannot be kept together with a workspace")
 
 
 def _check_names(scenario: Scenario) -> None:
-    for key, names in (
-        ("walls", [wall.name for wall in scenario.walls]),
-        ("disturbances", [item.name for item in scenario.disturbances]),
+    walls = [wall.name for wall in scenario.walls]
+    for key, taken, names in (
+        ("walls", [], walls),
+        ("obstacles", walls, [one.name for one in scenario.obstacles]),
+        ("disturbances", [], [item.name for item in scenario.disturbances]),
     ):
         for i, name in enumerate(names):
-            if name in names[:i]:
+            if name in (*taken, *names[:i]):
                 raise ScenarioError(f'{key}[{i}].name = "{name}": must differ from the others')
             if not name or len(name) > 24 or "/" in name:
                 raise ScenarioError(

@@ -96,6 +96,7 @@ class Referee:
         lowest, when_s = self.record.arrays
         return record_if_clear(
             self.world.planes,
+            self.world.balls,
             self.world.sphere,
             (curve, starts_s),
             places,

@@ -75,6 +75,15 @@ class Wall:
 
 
 @dataclass(frozen=True, slots=True)
+class Obstacle:
+    """A point without a size of its own, such as the tip of a branch."""
+
+    name: str
+    position_m: V3 = field(metadata=inside(-WORLD_M, WORLD_M))
+    clearance_m: float = field(metadata=inside(0.001, 10.0))  # d_s
+
+
+@dataclass(frozen=True, slots=True)
 class Workspace:
     """Sphere the base must stay in, riding above the end-effector's reference."""
 
@@ -185,6 +194,7 @@ class Scenario:
     trajectory: Trajectory
     description: str = ""
     walls: tuple[Wall, ...] = ()
+    obstacles: tuple[Obstacle, ...] = ()
     workspace: Workspace | None = None
     disturbances: tuple[Disturbance, ...] = ()
     sensors: Sensors = Sensors()

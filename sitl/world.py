@@ -1,6 +1,6 @@
-"""Walls, workspace and ground, judged on the plant's true state.
+"""Walls, points, workspace and ground, judged on the plant's true state.
 
-Source: docs/equations.md E14, E15.
+Source: docs/equations.md E11, E14, E15.
 """
 
 from __future__ import annotations
@@ -31,12 +31,15 @@ class World:
     def __init__(self, scenario: Scenario) -> None:
         self.walls = scenario.walls
         self.workspace = scenario.workspace
-        wall_keys = [f"{wall.name}/{point}" for wall in self.walls for point in POINTS]
+        names = [one.name for one in self.walls] + [one.name for one in scenario.obstacles]
+        keys = [f"{name}/{point}" for name in names for point in POINTS]
         self._planes = [(*wall.normal, wall.offset_m + wall.clearance_m) for wall in self.walls]
         self.planes = np.array(self._planes).reshape(-1, 4)  # normal, least distance [m]
+        self._balls = [(*one.position_m, one.clearance_m) for one in scenario.obstacles]
+        self.balls = np.array(self._balls).reshape(-1, 4)  # centre, least distance [m]
         workspace = self.workspace
         self.sphere = (0.0, 0.0) if workspace is None else (workspace.radius_m, workspace.d_iw_m)
-        self.keys = (*wall_keys, *(("workspace/base",) if self.workspace else ()))
+        self.keys = (*keys, *(("workspace/base",) if self.workspace else ()))
 
     def margins(self, points: tuple[V3, V3, V3], target: V3 | None) -> tuple[float, ...]:
         """Margins [m] in the order of ``keys``; negative means violated.
@@ -49,6 +52,11 @@ class World:
         values = [
             a * x + b * y + c * z - limit for a, b, c, limit in self._planes for x, y, z in points
         ]
+        values += [
+            math.dist((x, y, z), points_at) - radius
+            for *points_at, radius in self._balls
+            for x, y, z in points
+        ]
         if self.workspace is not None:
             values.append(
                 math.inf if target is None else workspace_margin(self.workspace, points[0], target)
@@ -57,6 +65,8 @@ class World:
 
     def collision(self, points: tuple[V3, V3, V3], margins: tuple[float, ...]) -> str | None:
         """A sentence if a critical point touches a wall or the ground, else None.
+
+        A point has no size that could be touched: coming too close to it is a violation only.
 
         Args:
             points: Base, joint 2 and end-effector [m, NED].
@@ -78,6 +88,7 @@ class World:
 @compiled
 def record_if_clear(
     planes: Array,
+    balls: Array,
     sphere: tuple[float, float],
     aim: tuple[Array, float],
     places: Array,
@@ -89,6 +100,7 @@ def record_if_clear(
 
     Args:
         planes: (walls, 4), of a World.
+        balls: (obstacles, 4), of a World.
         sphere: Its radius and height above the target [m].
         aim: The end-effector's curve (``trajectory.curve_row``) and when it begins [s]; a row
             without numbers where the workspace does not apply.
@@ -106,9 +118,10 @@ def record_if_clear(
     curve, starts_s = aim
     for k in range(places.shape[0]):
         _wall_margins_into(planes, places, k, margins)
+        _obstacle_margins_into(balls, places, k, margins[:, 3 * planes.shape[0] :])
         if curve.shape[0]:
             target = place_on_curve(curve, before_s + (k + 1) * step_s - starts_s)
-            margins[k, 3 * planes.shape[0]] = _sphere_margin(sphere, target, places, k)
+            margins[k, margins.shape[1] - 1] = _sphere_margin(sphere, target, places, k)
         above = places[k, 0, 2] < 0.0 and places[k, 2, 2] < 0.0 and places[k, -1, 2] < 0.0
         if not (above and (margins[k] > 0.0).all()):
             return False
@@ -127,6 +140,15 @@ def _wall_margins_into(planes: Array, places: Array, k: int, margins: Array) -> 
         for point, row in enumerate((0, 2, places.shape[1] - 1)):
             x, y, z = places[k, row, 0], places[k, row, 1], places[k, row, 2]
             margins[k, 3 * i + point] = a * x + b * y + c * z - limit
+
+
+@compiled
+def _obstacle_margins_into(balls: Array, places: Array, k: int, margins: Array) -> None:
+    for i in range(balls.shape[0]):
+        for point, row in enumerate((0, 2, places.shape[1] - 1)):
+            x, y = places[k, row, 0] - balls[i, 0], places[k, row, 1] - balls[i, 1]
+            z = places[k, row, 2] - balls[i, 2]
+            margins[k, 3 * i + point] = math.sqrt(x * x + y * y + z * z) - balls[i, 3]
 
 
 @compiled

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import fsw.signals as fsw_signals
-from fsw.signals import EndEffectorTarget, SafeSet, WorkspaceSphere
+from fsw.signals import EndEffectorTarget, PointObstacle, SafeSet, WorkspaceSphere
 from sitl.mission_clock import MissionClock
 from sitl.scenario import Scenario
 from sitl.simulation import START_US
@@ -14,9 +14,10 @@ def safe_set(scenario: Scenario) -> SafeSet:
     walls = tuple(
         fsw_signals.Wall(wall.normal, wall.offset_m, wall.clearance_m) for wall in scenario.walls
     )
+    obstacles = tuple(PointObstacle(one.position_m, one.clearance_m) for one in scenario.obstacles)
     workspace = scenario.workspace
     if workspace is None:
-        return SafeSet(walls)
+        return SafeSet(walls, obstacles=obstacles)
     return SafeSet(walls, WorkspaceSphere((0.0, 0.0, -workspace.d_iw_m), workspace.radius_m))
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 
 from fsw.barriers.root import BarrierTuning
-from fsw.signals import ConstraintKind, ConstraintReport, EndEffectorTarget, SafeSet, Vec3
+from fsw.barriers.tangent import tangent
+from fsw.signals import ConstraintKind, ConstraintReport, EndEffectorTarget, SafeSet, Vec3, Wall
 
 PointMotion = tuple[Vec3, Vec3]  # position [m], velocity [m/s]
 
@@ -19,21 +20,20 @@ def constraint_report(
     """Margins and barrier values of the active safe set.
 
     Args:
-        safe_set: Walls or sphere.
+        safe_set: Walls, points or sphere.
         tuning: Constants of the barrier in force.
         points: Base, joint 2 and end-effector.
         target: End-effector reference in use; the sphere hangs on it.
 
     Returns:
-        For walls one margin per wall and point in that order; for the sphere a single one.
+        For walls and then obstacles one margin each and critical point in that order; for the
+        sphere a single one.
     """
-    if safe_set.kind is ConstraintKind.WALLS:
-        pairs = [
-            (
-                _dot(wall.normal, p) - wall.offset - wall.clearance,
-                _dot(wall.normal, v),
-            )
-            for wall in safe_set.walls
+    if safe_set.kind in (ConstraintKind.WALLS, ConstraintKind.OBSTACLES):
+        pairs = [_margin_and_rate(wall, p, v) for wall in safe_set.walls for p, v in points]
+        pairs += [
+            _margin_and_rate(tangent(obstacle, p), p, v)
+            for obstacle in safe_set.obstacles
             for p, v in points
         ]
     elif safe_set.sphere is not None and target is not None:
@@ -52,6 +52,10 @@ def constraint_report(
         tuple(margin for margin, _ in pairs),
         tuple(_root(margin, tuning) + rate for margin, rate in pairs),
     )
+
+
+def _margin_and_rate(wall: Wall, p: Vec3, v: Vec3) -> tuple[float, float]:
+    return _dot(wall.normal, p) - wall.offset - wall.clearance, _dot(wall.normal, v)
 
 
 def plain_root(distance: float, alpha: float, slope: float) -> float:

@@ -1,69 +1,136 @@
-r"""The point-obstacle barrier of the paper's preliminaries (eqs 11 and 12).
+r"""Known points to keep away from, against every critical point (eqs 11 and 12).
 
 .. math:: h_0 = S(\|p\| - d_s) + \hat p\cdot v
 
-with p from the obstacle to the base. The direction is frozen at the guess, so that each row
-is the tangent plane of the obstacle's ball; inside 2 mm of the obstacle any direction does.
+with p from the obstacle to a critical point: base, joint 2, end-effector. The direction is
+frozen at the guess, node by node, so that each row is that of a wall: the tangent plane of the
+obstacle's ball, which lies outside the ball wherever the optimum goes. Inside 2 mm of the
+obstacle any direction does.
 
 Source: docs/equations.md E11, E12.
 """
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from fsw.barriers.robust import required_h
-from fsw.barriers.root import BarrierTuning, root, root_slope
-from fsw.barriers.soft_rows import SoftRows, TargetPoints, kinds_moving_base
-from fsw.model.linearisation import BASE, Linearisation
+from fsw.barriers.root import BarrierNumbers, BarrierTuning, root, root_slope
+from fsw.barriers.soft_rows import SoftRows, TargetPoints, kinds_moving_points
+from fsw.barriers.tangent import CENTRE_BALL
+from fsw.barriers.wall import gradient_along
+from fsw.compiled import compiled
+from fsw.model.linearisation import POINTS, Linearisation
 from fsw.model.prediction import INPUTS, Array
-
-_CENTRE_BALL = 0.002  # m
+from fsw.signals import PointObstacle
 
 
 class PointObstacleBarrier:
-    """Rows for one obstacle x nodes, one slack a node."""
+    """Rows for obstacles x critical points x nodes, one slack a node and obstacle."""
 
     def __init__(
-        self,
-        position: tuple[float, float, float],
-        clearance: float,
-        tuning: BarrierTuning,
-        horizon: int,
+        self, obstacles: tuple[PointObstacle, ...], tuning: BarrierTuning, horizon: int
     ) -> None:
-        self._tuning = tuning
-        self._obstacle = np.array(position)
-        self._clearance = clearance
+        self._tuning = tuning.numbers
+        self._centres = np.array([obstacle.position for obstacle in obstacles]).reshape(-1, 3)
+        self._clearances = np.array([obstacle.clearance for obstacle in obstacles])
+        count = len(obstacles)
         nodes = np.arange(1 + tuning.skipped_nodes, horizon + 1)
-        moved_by = kinds_moving_base(np.ones((len(nodes), 3)))
-        self.rows = SoftRows(nodes, nodes - nodes[0], moved_by, INPUTS * horizon)
-        self._h_start = np.zeros(1)
+        node, number, _ = np.meshgrid(nodes, np.arange(count), np.arange(POINTS), indexing="ij")
+        slack = (node - nodes[0]) * count + number
+        # The direction turns with the guess: no axis can be left out for good.
+        moved_by = np.tile(kinds_moving_points(np.ones((count, 3))), (len(nodes), 1, 1, 1))
+        self.rows = SoftRows(
+            node.ravel(),
+            slack.ravel(),
+            moved_by.reshape(-1, INPUTS),
+            INPUTS * horizon,
+            group=number.ravel(),
+        )
+        self._h_start = np.zeros(count * POINTS)
 
     def refill(self, horizon: Linearisation, targets: TargetPoints) -> None:
-        """Linearise h0 at every node along the guess's ray from the obstacle."""
-        tuning, rows = self._tuning, self.rows
-        p_start = horizon.position[0, BASE] - self._obstacle
-        v_start = horizon.velocity[0, BASE]
-        self._h_start[0] = self._h(_ray(p_start), p_start, v_start)
-        for row, i in enumerate(rows.node):
-            p = horizon.position[i, BASE] - self._obstacle
-            n = _ray(p)
-            steepness = root_slope(float(n @ p) - self._clearance, tuning.alpha, tuning.slope)
-            rows.value[row] = self._h(n, p, horizon.velocity[i, BASE])
-            rows.gradient[row] = n @ (
-                steepness * horizon.d_position[i, BASE] + horizon.d_velocity[i, BASE]
-            )
-            rows.required[row] = required_h(self._h(n, p_start, v_start), i, tuning.numbers)
+        """Linearise h0 of every obstacle, point and node along the guess's ray."""
+        rows = self.rows
+        _fill(
+            self._centres,
+            self._clearances,
+            horizon.position,
+            horizon.velocity,
+            horizon.d_position,
+            horizon.d_velocity,
+            self._tuning,
+            self._h_start,
+            rows.value,
+            rows.required,
+            rows.gradient,
+        )
 
     def at_start(self) -> Array:
-        """h0 at node 0 [m/s], (1,)."""
+        """h0 at node 0 by obstacle and point [m/s]."""
         return self._h_start
 
-    def _h(self, n: Array, p: Array, v: Array) -> float:
-        tuning = self._tuning
-        return root(float(n @ p) - self._clearance, tuning.alpha, tuning.slope) + float(n @ v)
+
+@compiled
+def _fill(
+    centres: Array,
+    clearances: Array,
+    position: Array,
+    velocity: Array,
+    d_position: Array,
+    d_velocity: Array,
+    tuning: BarrierNumbers,
+    h_start: Array,
+    value: Array,
+    required: Array,
+    gradient: Array,
+) -> None:
+    n = np.zeros(3)
+    row = 0
+    for i in range(position.shape[0]):
+        if 0 < i < tuning.first_node:
+            continue
+        for number in range(centres.shape[0]):
+            centre, clearance = centres[number], clearances[number]
+            for point in range(POINTS):
+                _ray(centre, position[i, point], n)
+                h, distance = _h_along(
+                    n, centre, clearance, position[i, point], velocity[i, point], tuning
+                )
+                if i == 0:
+                    h_start[number * POINTS + point] = h
+                    continue
+                steepness = root_slope(distance, tuning.alpha, tuning.slope)
+                dp, dv = d_position[i, point], d_velocity[i, point]
+                gradient_along(n, steepness, dp, dv, INPUTS * i, gradient[row])
+                anchor, _ = _h_along(
+                    n, centre, clearance, position[0, point], velocity[0, point], tuning
+                )
+                value[row] = h
+                required[row] = required_h(anchor, i, tuning)
+                row += 1
 
 
-def _ray(p: Array) -> Array:
-    length = float(np.sqrt(p @ p))
-    return p / length if length > _CENTRE_BALL else np.array([1.0, 0.0, 0.0])
+@compiled
+def _ray(centre: Array, p: Array, n: Array) -> None:
+    """Unit vector from the obstacle to a point, into ``n``."""
+    x, y, z = p[0] - centre[0], p[1] - centre[1], p[2] - centre[2]
+    length = math.sqrt(x * x + y * y + z * z)
+    n[0], n[1], n[2] = 1.0, 0.0, 0.0
+    if length > CENTRE_BALL:
+        n[0], n[1], n[2] = x / length, y / length, z / length
+
+
+@compiled
+def _h_along(
+    n: Array, centre: Array, clearance: float, p: Array, v: Array, tuning: BarrierNumbers
+) -> tuple[float, float]:
+    """h of the tangent plane at n [m/s], and the distance to it [m]."""
+    distance = -clearance
+    approach = 0.0
+    for axis in range(3):
+        distance += n[axis] * (p[axis] - centre[axis])
+        approach += n[axis] * v[axis]
+    return root(distance, tuning.alpha, tuning.slope) + approach, distance

@@ -93,13 +93,31 @@ def _fill(
                     continue
                 steepness = root_slope(distance, tuning.alpha, tuning.slope)
                 dp, dv = d_position[i, point], d_velocity[i, point]
-                for column in range(INPUTS * i):
-                    gradient[row, column] = (
-                        nx * (steepness * dp[0, column] + dv[0, column])
-                        + ny * (steepness * dp[1, column] + dv[1, column])
-                        + nz * (steepness * dp[2, column] + dv[2, column])
-                    )
+                gradient_along(normals[wall], steepness, dp, dv, INPUTS * i, gradient[row])
                 value[row] = h
                 anchor = h_start[wall * POINTS + point]
                 required[row] = required_h(anchor, i, tuning)
                 row += 1
+
+
+@compiled
+def gradient_along(
+    n: Array, steepness: float, dp: Array, dv: Array, columns: int, row: Array
+) -> None:
+    """Slope of ``S(n . p - c) + n . v`` in the inputs, into a row's first columns.
+
+    Args:
+        n: (3,), unit.
+        steepness: Of S [1/s].
+        dp: (3, inputs), of the point's position.
+        dv: (3, inputs), of its velocity.
+        columns: How many inputs come before the row's node.
+        row: (inputs,), overwritten.
+    """
+    nx, ny, nz = n
+    for column in range(columns):
+        row[column] = (
+            nx * (steepness * dp[0, column] + dv[0, column])
+            + ny * (steepness * dp[1, column] + dv[1, column])
+            + nz * (steepness * dp[2, column] + dv[2, column])
+        )

@@ -14,6 +14,7 @@ from fsw.signals import (
     EndEffectorTarget,
     JointSetpoint,
     MotionSetpoint,
+    PointObstacle,
     SafeSet,
     Wall,
 )
@@ -52,8 +53,8 @@ class Inbox:
         self._setpoints = NO_SETPOINTS
         self._station_heard = False
         self._safe_set: SafeSet | None = None
-        self._walls: dict[int, Wall] = {}
-        self._wall_count = 0
+        self._obstacles: dict[int, Wall | PointObstacle] = {}
+        self._obstacle_count = 0
         self._handlers: dict[int, Callable[[Frame], None]] = {
             message_ids.COMMAND_LONG: self._command_long,
             message_ids.COMMAND_INT: self._command_int,
@@ -63,6 +64,7 @@ class Inbox:
             message_ids.ARM_JOINT_SETPOINT: self._joints,
             message_ids.HEARTBEAT: self._heartbeat,
             message_ids.OBSTACLE_WALL: self._wall,
+            message_ids.OBSTACLE_POINT: self._point,
             message_ids.WORKSPACE_SPHERE: self._sphere,
         }
 
@@ -169,20 +171,30 @@ class Inbox:
 
     def _wall(self, frame: Frame) -> None:
         values = cast(Numbers, frame.payload_values)
-        if not decode.for_this_vehicle(values[5], values[6]):
-            return
-        indexed = decode.obstacle_wall(values)
+        if decode.for_this_vehicle(values[5], values[6]):
+            self._add_obstacle(decode.obstacle_wall(values))
+
+    def _point(self, frame: Frame) -> None:
+        values = cast(Numbers, frame.payload_values)
+        if decode.for_this_vehicle(values[4], values[5]):
+            self._add_obstacle(decode.obstacle_point(values))
+
+    def _add_obstacle(self, indexed: decode.IndexedObstacle | None) -> None:
         if indexed is None:
             self.refused += 1
             return
-        if indexed.count != self._wall_count:
-            # Another count announces another set; walls of two sets must not mix.
-            self._walls.clear()
-            self._wall_count = indexed.count
-        self._walls[indexed.index] = indexed.wall
-        if len(self._walls) == indexed.count:
-            self._safe_set = SafeSet(walls=tuple(self._walls[i] for i in range(indexed.count)))
-            self._walls.clear()
+        if indexed.count != self._obstacle_count:
+            # Another count announces another set; those of two sets must not mix.
+            self._obstacles.clear()
+            self._obstacle_count = indexed.count
+        self._obstacles[indexed.index] = indexed.obstacle
+        if len(self._obstacles) == indexed.count:
+            whole = [self._obstacles[i] for i in range(indexed.count)]
+            self._safe_set = SafeSet(
+                walls=tuple(one for one in whole if isinstance(one, Wall)),
+                obstacles=tuple(one for one in whole if isinstance(one, PointObstacle)),
+            )
+            self._obstacles.clear()
 
     def _sphere(self, frame: Frame) -> None:
         values = cast(Numbers, frame.payload_values)

@@ -24,6 +24,7 @@ from fsw.signals import (
     PlanInput,
     PlanRequest,
     PlanTimings,
+    PointObstacle,
     PredictionState,
     SafeSet,
     SolverStatus,
@@ -85,7 +86,12 @@ class Planner:
         targets = (target,) * (self._config.horizon + 1)
         wall = Wall((-1.0, 0.0, 0.0), -1.0, 0.1)
         sphere = WorkspaceSphere((0.0, 0.0, -0.3), 0.1)
-        for safe_set in (SafeSet(), SafeSet(walls=(wall,)), SafeSet(sphere=sphere)):
+        point = PointObstacle((3.0, 0.0, -1.0), 0.1)
+        for safe_set in (
+            SafeSet(),
+            SafeSet(walls=(wall,), obstacles=(point,)),
+            SafeSet(sphere=sphere),
+        ):
             self.plan(PlanRequest(0, 0, rest, targets, safe_set, False))
         self._t_us = -1
         self._inputs[:] = 0.0

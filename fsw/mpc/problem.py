@@ -25,10 +25,9 @@ class Problem:
         self._horizon = Linearisation(model)
         self._limits = JointLimits(config.airframe, model)
         parts = parts_of(config, safe_set)
-        self._costs, self._barrier = parts.costs, parts.barrier
+        self._costs, self._barriers = parts.costs, parts.barriers
         blocks: list[tuple[SoftRows, SlackPrice | None]] = [(self._limits.rows, config.joint_slack)]
-        if parts.barrier is not None:
-            blocks.append((parts.barrier.rows, parts.slack))
+        blocks += [(barrier.rows, parts.slack) for barrier in parts.barriers]
         self._program = Program(config.horizon, config.limits, tuple(blocks))
         self._gradient = np.zeros(self._program.inputs)
         self._first_barrier_slack = self._program.inputs + self._limits.rows.slacks
@@ -54,8 +53,8 @@ class Problem:
             cost.add(self._horizon, targets, guess, hessian, gradient) for cost in self._costs
         )
         self._limits.refill(self._horizon)
-        if self._barrier is not None:
-            self._barrier.refill(self._horizon, targets)
+        for barrier in self._barriers:
+            barrier.refill(self._horizon, targets)
         self._program.refill(guess, self._gradient)
         self._guess = guess
 
@@ -65,9 +64,7 @@ class Problem:
 
     def barrier_at_start(self) -> tuple[float, ...]:
         """h of each constraint at node 0 [m/s]."""
-        if self._barrier is None:
-            return ()
-        return tuple(float(h) for h in self._barrier.at_start())
+        return tuple(float(h) for barrier in self._barriers for h in barrier.at_start())
 
     def largest_barrier_slack(self, x: Array) -> float:
         """How far a solution softens the barrier [m/s]."""

@@ -9,6 +9,9 @@ name        Case I, walls                          Case II, workspace sphere
 ``blf``     barrier of eq 22 with eq 25            barriers of eq 23 with eq 25
 ==========  =====================================  ==========================================
 
+Points (eqs 11 and 12) are kept by ``blf`` beside walls or alone; the others have no part for
+them (``fsw/parameters/consistency.py`` says so before they fly).
+
 Naive can be given a centring cost and HC a tightening, so that the barrier's own share in a
 comparison shows (docs/paper-and-us.md).
 """
@@ -19,6 +22,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from fsw.barriers.hard_set import HardWalls, HardWorkspace
+from fsw.barriers.point_obstacle import PointObstacleBarrier
 from fsw.barriers.soft_rows import Barrier
 from fsw.barriers.wall import WallBarrier
 from fsw.barriers.workspace import WorkspaceBarrier
@@ -34,8 +38,8 @@ class Parts:
     """What shapes the optimum of one controller in one safe set."""
 
     costs: tuple[Cost, ...]
-    barrier: Barrier | None = None
-    slack: SlackPrice | None = None  # None: the barrier's rows are hard
+    barriers: tuple[Barrier, ...] = ()
+    slack: SlackPrice | None = None  # None: the barriers' rows are hard
 
 
 def _naive(config: PlannerConfig, safe_set: SafeSet) -> Parts:
@@ -56,7 +60,7 @@ def _hard(config: PlannerConfig, safe_set: SafeSet) -> Parts:
         barrier = HardWalls(safe_set.walls, config.horizon, config.tightening, first)
     else:
         return Parts(costs)
-    return Parts(costs, barrier, config.hard_slack)
+    return Parts(costs, (barrier,), config.hard_slack)
 
 
 def _soft(config: PlannerConfig, safe_set: SafeSet) -> Parts:
@@ -75,11 +79,15 @@ def _blf(config: PlannerConfig, safe_set: SafeSet) -> Parts:
     costs = (TrackingCost(config.weights),)
     if safe_set.sphere is not None:
         sphere = WorkspaceBarrier(safe_set.sphere, config.workspace, config.horizon)
-        return Parts(costs, sphere, config.barrier_slack)
+        return Parts(costs, (sphere,), config.barrier_slack)
+    barriers: list[Barrier] = []
     if safe_set.walls:
-        walls = WallBarrier(safe_set.walls, config.walls, config.horizon)
-        return Parts(costs, walls, config.barrier_slack)
-    return Parts(costs)
+        barriers.append(WallBarrier(safe_set.walls, config.walls, config.horizon))
+    if safe_set.obstacles:
+        # A point is the wall that its ball's tangent plane is, so it has the walls' tuning.
+        obstacles, tuning = safe_set.obstacles, config.walls
+        barriers.append(PointObstacleBarrier(obstacles, tuning, config.horizon))
+    return Parts(costs, tuple(barriers), config.barrier_slack)
 
 
 VARIANTS: dict[str, Callable[[PlannerConfig, SafeSet], Parts]] = {

@@ -32,7 +32,11 @@ class Finding:
 
 
 def analyse(config: FlightConfig, safe_set: SafeSet, loop: Tube) -> tuple[Finding, ...]:
-    """Every finding about a controller with barriers in a safe set; none for the others.
+    """Every finding about a controller with barriers in a safe set.
+
+    About the others there is one thing to say: which of them has nothing that keeps off a point.
+    A point needs what a wall needs: its ball lies behind the tangent plane, and going round it
+    takes acceleration away from it, which is in nobody's way.
 
     Args:
         config: What would fly.
@@ -40,6 +44,8 @@ def analyse(config: FlightConfig, safe_set: SafeSet, loop: Tube) -> tuple[Findin
         loop: ``loop_tube(config)``, which takes a moment and does not depend on the safe set.
     """
     surroundings = config.surroundings
+    if config.controller in ("hc", "sc") and safe_set.obstacles:
+        return (_no_points(config.controller),)
     if config.controller != "blf" or safe_set.kind is ConstraintKind.NONE:
         return ()
     in_sphere = safe_set.sphere is not None
@@ -47,6 +53,8 @@ def analyse(config: FlightConfig, safe_set: SafeSet, loop: Tube) -> tuple[Findin
     findings = [_actuation(config, tuning, safe_set, surroundings)]
     if safe_set.sphere is not None:
         findings.append(_room_in_sphere(tuning, safe_set.sphere.radius))
+    if safe_set.obstacles:
+        findings.append(_links(config, min(o.clearance for o in safe_set.obstacles)))
     if config.inner == "tracking":
         findings.append(_base_tube(tuning, loop, surroundings))
         if not in_sphere:
@@ -128,6 +136,26 @@ def _room_in_sphere(tuning: BarrierTuning, radius: float) -> Finding:
         f"h2a and h2b at the centre are S(r) = {at_centre:.3f} m/s and lambda is "
         f"{tuning.robustness:.3f}",
         f"lambda <= {at_centre:.3f} m/s or r >= {stand_off(tuning):.3f} m would do",
+    )
+
+
+def _no_points(controller: str) -> Finding:
+    return _finding(
+        "points", False, f"{controller} has nothing that keeps off points", "blf would do"
+    )
+
+
+def _links(config: FlightConfig, clearance: float) -> Finding:
+    """Both ends of a link keep off a point; the nearest place of the link is between them."""
+    longest = max(config.airframe.link_length)
+    left = math.sqrt(max(clearance**2 - 0.25 * longest**2, 0.0))
+    return _finding(
+        "links",
+        left > 0.0,
+        f"with both ends of a link {clearance * 1e3:.0f} mm from a point, the middle of the "
+        f"longest, {longest * 1e3:.0f} mm, keeps {left * 1e3:.0f} mm",
+        f"a clearance above {0.5 * longest * 1e3:.0f} mm would do",
+        refuses=False,
     )
 
 

@@ -75,7 +75,7 @@ def _out(config: FlightConfig, lead: Lead, estimate: StateEstimate, safe_set: Sa
     body_down = lead.p[2] - (z if lead.of_end_effector else 0.0)
     touch_speed = 0.0 if lead.of_end_effector else config.limits.land_speed
     lead = keep_up(lead, -body_down - config.airframe.leg_length, touch_speed)
-    if not safe_set.walls:
+    if not (safe_set.walls or safe_set.obstacles):
         return lead
     below = (-x, -y, -z) if lead.of_end_effector else (x, y, z)
     tuning = config.planner.walls

@@ -66,6 +66,9 @@ def _blocked(place: Vec3, situation: Situation) -> str | None:
         distance = sum(n * x for n, x in zip(wall.normal, place, strict=True)) - wall.offset
         if not distance > wall.clearance:
             return f"the place is behind wall {number} or too close to it"
+    for number, obstacle in enumerate(situation.safe_set.obstacles, start=1):
+        if not math.dist(obstacle.position, place) > obstacle.clearance:
+            return f"the place is too close to obstacle {number}"
     return None
 
 

@@ -17,8 +17,9 @@ import math
 from dataclasses import dataclass, replace
 
 from fsw.barriers.margins import plain_root
+from fsw.barriers.tangent import tangent
 from fsw.geometry.rotation import wrap_angle
-from fsw.signals import MotionSetpoint, SafeSet, Vec2, Vec3
+from fsw.signals import MotionSetpoint, SafeSet, Vec2, Vec3, Wall
 
 _SETTLE_RATE = 2.0  # 1/s, of the last bit of the way
 _GROUND_BRAKING = 1.0  # m/s^2
@@ -94,27 +95,39 @@ def tie(lead: Lead, vehicle: Vec3, leash: float) -> Lead:
 
 
 def keep_out(lead: Lead, below: Vec3, safe_set: SafeSet, braking: float, slope: float) -> Lead:
-    """The point out of every wall, and no faster towards one than would let it stop.
+    """The point off every wall and obstacle, and no faster towards one than would let it stop.
 
     Args:
         lead: The point.
         below: From the point to the other end of the arm, which must stay out as well [m].
-        safe_set: The walls; a sphere rides on the reference and needs nothing.
+        safe_set: Walls and obstacles; a sphere rides on the reference and needs nothing.
         braking: Deceleration the barrier counts on [m/s^2].
         slope: Of S at the boundary [1/s].
     """
     p, v = lead.p, lead.v
     for wall in safe_set.walls:
-        n = wall.normal
-        reach = min(0.0, _dot(n, below))
-        distance = _dot(n, p) + reach - wall.offset - wall.clearance
-        if distance < 0.0:
-            p = _plus(p, n, -distance)
-        approach = -_dot(n, v)
-        most = plain_root(max(distance, 0.0), braking, slope)
-        if approach > most:
-            v = _plus(v, n, approach - most)
+        reach = min(0.0, _dot(wall.normal, below))
+        p, v = _off(wall, reach, p, v, braking, slope)
+    for obstacle in safe_set.obstacles:
+        for end in ((0.0, 0.0, 0.0), below):
+            wall = tangent(obstacle, _plus(p, end, 1.0))
+            p, v = _off(wall, _dot(wall.normal, end), p, v, braking, slope)
     return lead if p is lead.p and v is lead.v else replace(lead, p=p, v=v)
+
+
+def _off(
+    wall: Wall, reach: float, p: Vec3, v: Vec3, braking: float, slope: float
+) -> tuple[Vec3, Vec3]:
+    """A point that something reaches out from along the normal [m], off one wall."""
+    n = wall.normal
+    distance = _dot(n, p) + reach - wall.offset - wall.clearance
+    if distance < 0.0:
+        p = _plus(p, n, -distance)
+    approach = -_dot(n, v)
+    most = plain_root(max(distance, 0.0), braking, slope)
+    if approach > most:
+        v = _plus(v, n, approach - most)
+    return p, v
 
 
 def keep_up(lead: Lead, body_height: float, touch_speed: float) -> Lead:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 
 from fsw.barriers.margins import plain_root
+from fsw.barriers.tangent import planes
 from fsw.signals import EndEffectorTarget, SafeSet, Vec3
 
 _LEASH = 0.4  # m from where the end-effector's motion leads to the target, now
@@ -33,20 +34,22 @@ def tamed(
         targets: At the nodes.
         p_WE: Where the end-effector is [m].
         v_WE: How it moves [m/s].
-        safe_set: Its walls are looked at.
+        safe_set: Its walls and obstacles are looked at.
         braking: Deceleration the barrier counts on [m/s^2].
         slope: Of S at the boundary [1/s].
     """
     begin_us, kept = targets[0].t_us, []
+    ahead_of_it = planes(safe_set, p_WE)
     for target in targets:
         ahead = 1e-6 * (target.t_us - begin_us)
         p = _within(target.p_WE, _plus(p_WE, v_WE, ahead), _LEASH + _SPREAD * ahead)
         v = _within(target.v_WE, v_WE, _JUMP)
-        for wall in safe_set.walls:
-            n, boundary = wall.normal, wall.offset + wall.clearance
-            depth = boundary - _dot(n, p)
+        for wall in planes(safe_set, p):
+            depth = wall.offset + wall.clearance - _dot(wall.normal, p)
             if depth > _DEPTH:
-                p = _plus(p, n, depth - _DEPTH)
+                p = _plus(p, wall.normal, depth - _DEPTH)
+        for wall in ahead_of_it:
+            n, boundary = wall.normal, wall.offset + wall.clearance
             room = max(_dot(n, p_WE) - boundary, 0.0)
             most = max(plain_root(room, braking, slope), _ALWAYS)
             approach = -_dot(n, v)

@@ -10,6 +10,7 @@ from messages.frames import FrameWriter
 from sitl.link import message_ids
 from sitl.link.message_ids import PATH_PLANNER, SENSORS, SYSTEM_ID
 from sitl.link.pilot_messages import (
+    AnnounceObstacle,
     AnnounceWall,
     AnnounceWorkspace,
     PilotMessage,
@@ -90,6 +91,9 @@ def _wire(message: PilotMessage) -> tuple[int, *WireValues]:
         wall = message.wall
         plane = (*wall.normal, wall.offset_m, wall.clearance_m)
         return (message_ids.OBSTACLE_WALL, *plane, SYSTEM_ID, 1, message.index, message.count)
+    if isinstance(message, AnnounceObstacle):
+        ball = (*message.obstacle.position_m, message.obstacle.clearance_m)
+        return (message_ids.OBSTACLE_POINT, *ball, SYSTEM_ID, 1, message.index, message.count)
     return _workspace(message)
 
 

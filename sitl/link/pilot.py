@@ -14,6 +14,7 @@ from typing import Final
 
 from sitl.link import message_ids
 from sitl.link.pilot_messages import (
+    AnnounceObstacle,
     AnnounceWall,
     AnnounceWorkspace,
     Heard,
@@ -119,9 +120,11 @@ def flight_plan(
         target_at: End-effector reference by time stamp [us].
         yaw_at: Its yaw [rad] by time stamp [us].
     """
-    walls = scenario.walls
-    announcements: tuple[PilotMessage, ...] = tuple(
-        AnnounceWall(wall, index, len(walls)) for index, wall in enumerate(walls)
+    walls, obstacles = scenario.walls, scenario.obstacles
+    count = len(walls) + len(obstacles)
+    announcements: tuple[PilotMessage, ...] = (
+        *(AnnounceWall(wall, k, count) for k, wall in enumerate(walls)),
+        *(AnnounceObstacle(one, k, count) for k, one in enumerate(obstacles, len(walls))),
     )
     if scenario.workspace is not None:
         announcements += (AnnounceWorkspace(scenario.workspace),)

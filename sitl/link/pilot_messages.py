@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple, TypeAlias
 
-from sitl.scenario import Wall, Workspace
+from sitl.scenario import Obstacle, Wall, Workspace
 from sitl.trajectory import TrajectoryPoint
 
 Params: TypeAlias = tuple[float, float, float, float, float, float, float]
@@ -16,6 +16,15 @@ class AnnounceWall:
     """One wall of the safe set."""
 
     wall: Wall
+    index: int
+    count: int
+
+
+@dataclass(frozen=True, slots=True)
+class AnnounceObstacle:
+    """One point of the safe set; walls and points are counted together."""
+
+    obstacle: Obstacle
     index: int
     count: int
 
@@ -44,7 +53,9 @@ class SendCommand:
     params: Params  # NaN where not used
 
 
-PilotMessage: TypeAlias = AnnounceWall | AnnounceWorkspace | SendTarget | SendCommand
+PilotMessage: TypeAlias = (
+    AnnounceWall | AnnounceObstacle | AnnounceWorkspace | SendTarget | SendCommand
+)
 
 
 @dataclass(frozen=True, slots=True)

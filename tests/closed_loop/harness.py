@@ -20,6 +20,7 @@ from fsw.signals import (
     Mode,
     Plan,
     PlanFailure,
+    PointObstacle,
     SafeSet,
     SensorFrame,
     TickInputs,
@@ -209,7 +210,8 @@ def frame(readings: SensorReadings) -> SensorFrame:
 
 def safe_set(scenario: Scenario) -> SafeSet:
     walls = tuple(Wall(wall.normal, wall.offset_m, wall.clearance_m) for wall in scenario.walls)
+    obstacles = tuple(PointObstacle(one.position_m, one.clearance_m) for one in scenario.obstacles)
     if scenario.workspace is None:
-        return SafeSet(walls)
+        return SafeSet(walls, obstacles=obstacles)
     centre = (0.0, 0.0, -scenario.workspace.d_iw_m)
     return SafeSet(walls, WorkspaceSphere(centre, scenario.workspace.radius_m))

@@ -15,6 +15,7 @@ from fsw.link.wire.message_ids import SYSTEM_ID
 from fsw.signals import (
     CommandRequest,
     EndEffectorTarget,
+    PointObstacle,
     SensorFrame,
     Vec2,
     Vec3,
@@ -37,10 +38,10 @@ _ZERO: Final[Vec3] = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
-class IndexedWall:
-    """One wall of a set of ``count``."""
+class IndexedObstacle:
+    """One wall or point of a set of ``count``."""
 
-    wall: Wall
+    obstacle: Wall | PointObstacle
     index: int
     count: int
 
@@ -124,7 +125,7 @@ def end_effector_target(values: Numbers) -> EndEffectorTarget | None:
     return EndEffectorTarget(int(values[0]), position, velocity, acceleration, yaw)
 
 
-def obstacle_wall(values: Numbers) -> IndexedWall | None:
+def obstacle_wall(values: Numbers) -> IndexedObstacle | None:
     """Read an OBSTACLE_WALL; None if it describes no plane or no place in its set."""
     numbers = values[0:5]
     index, count = int(values[7]), int(values[8])
@@ -134,7 +135,15 @@ def obstacle_wall(values: Numbers) -> IndexedWall | None:
     if not abs(math.hypot(*values[0:3]) - 1.0) < 1e-3 or not values[4] >= 0.0:
         return None
     wall = Wall(normal=cast(Vec3, values[0:3]), offset=values[3], clearance=values[4])
-    return IndexedWall(wall, index, count)
+    return IndexedObstacle(wall, index, count)
+
+
+def obstacle_point(values: Numbers) -> IndexedObstacle | None:
+    """Read an OBSTACLE_POINT; None if it keeps nothing away or has no place in its set."""
+    index, count = int(values[6]), int(values[7])
+    if not _all_finite(values[0:4]) or not index < count or not values[3] > 0.0:
+        return None
+    return IndexedObstacle(PointObstacle(cast(Vec3, values[0:3]), values[3]), index, count)
 
 
 def workspace_sphere(values: Numbers) -> WorkspaceSphere | None:

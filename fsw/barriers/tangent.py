@@ -1,0 +1,36 @@
+"""A point obstacle as a wall: the tangent plane of its clearance ball, from where one looks.
+
+The half-space in front of that plane lies outside the ball. So whoever keeps off the plane, or
+stops in front of it, keeps off the obstacle, and what is right beside a wall is right here.
+
+Source: docs/equations.md E11.
+"""
+
+from __future__ import annotations
+
+import math
+
+from fsw.signals import PointObstacle, SafeSet, Vec3, Wall
+
+CENTRE_BALL = 0.002  # m; closer to the obstacle its direction is noise and any does
+
+
+def tangent(obstacle: PointObstacle, p: Vec3) -> Wall:
+    """The wall that an obstacle is to a point: normal along the ray from the obstacle.
+
+    Args:
+        obstacle: Whose distance to the point is the wall's.
+        p: The point [m].
+    """
+    o = obstacle.position
+    x, y, z = p[0] - o[0], p[1] - o[1], p[2] - o[2]
+    length = math.sqrt(x * x + y * y + z * z)
+    n = (x / length, y / length, z / length) if length > CENTRE_BALL else (1.0, 0.0, 0.0)
+    return Wall(n, n[0] * o[0] + n[1] * o[1] + n[2] * o[2], obstacle.clearance)
+
+
+def planes(safe_set: SafeSet, p: Vec3) -> tuple[Wall, ...]:
+    """Everything that a point [m] is to keep off, as walls; a sphere is not among it."""
+    if not safe_set.obstacles:
+        return safe_set.walls
+    return (*safe_set.walls, *(tangent(obstacle, p) for obstacle in safe_set.obstacles))
