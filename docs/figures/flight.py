@@ -1,11 +1,11 @@
-"""Draw docs/images/flight.svg from a flight that ``pandion fly`` has flown.
+"""Draw docs/images/flight.svg or branches.svg from a flight that ``pandion fly`` has flown.
 
 ::
 
     pandion fly walls --out runs/figure
     python docs/figures/flight.py runs/figure [FILE]
 
-Seen from above: the end-effector, its reference, the base and the walls; below it the smallest
+Seen from above: the end-effector, its reference, the base, walls and points; beside it the smallest
 margin over time, as the flight software itself saw it.
 """
 
@@ -86,13 +86,17 @@ def main(directory: Path, target: Path) -> None:
         13,
     )
     from_above(d, flight, result["scenario"])
-    over_time(d, flight, result["duration_s"])
+    kept = "point" if load_scenario(result["scenario"]).obstacles else "wall"
+    over_time(d, flight, result["duration_s"], kept)
     d.save(target)
 
 
 def from_above(d: Drawing, flight: Flight, scenario: str) -> None:
     """North is up, east to the right."""
-    walls = load_scenario(scenario).walls
+    flown = load_scenario(scenario)
+    walls, obstacles = flown.walls, flown.obstacles
+    for one in obstacles:
+        d.circle(seen(one.position_m[:2]), SCALE * one.clearance_m, ZONE, ZONE)
     for wall in walls:
         zone(d, wall.normal, wall.offset_m, wall.clearance_m)
     for wall in walls:
@@ -100,12 +104,17 @@ def from_above(d: Drawing, flight: Flight, scenario: str) -> None:
     d.polyline(map(seen, flight.base), BLUE, 0.8)
     d.polyline(map(seen, flight.reference), GREEN, 2.2)
     d.polyline(map(seen, flight.end_effector), ORANGE, 1.0)
+    for one in obstacles:
+        x, y = seen(one.position_m[:2])
+        d.circle((x, y), 3.5, RED, RED)
+        d.text((x + 7.0, y - 7.0), f"{one.name}, {-one.position_m[2]:.2f} m high", RED, 12)
     legend = (("base", BLUE), ("reference", GREEN), ("end-effector", ORANGE))
     for k, (words, colour) in enumerate(legend):
         x = 60.0 + 130.0 * k
         d.line((x, 440.0), (x + 24.0, 440.0), colour, 2.5)
         d.text((x + 30.0, 445.0), words, INK, 13)
-    d.text((60.0, 466.0), "red: closer than the clearance of 0.1 m to a wall", RED, 13)
+    what = "a point, at its height" if obstacles else "a wall"
+    d.text((60.0, 466.0), f"red: closer than the clearance of 0.1 m to {what}", RED, 13)
 
 
 def across(normal: tuple[float, float, float], distance: float) -> tuple[XY, XY]:
@@ -122,7 +131,7 @@ def zone(d: Drawing, normal: tuple[float, float, float], offset: float, clearanc
     d.box((min(x1, x2), min(y1, y2)), (abs(x1 - x2), abs(y1 - y2)), ZONE, ZONE, 0.0)
 
 
-def over_time(d: Drawing, flight: Flight, duration_s: float) -> None:
+def over_time(d: Drawing, flight: Flight, duration_s: float, kept: str) -> None:
     """The smallest margin."""
     (x0, y0), (width, height) = CHART, CHART_SIZE
     d.text((x0, y0 - 14.0), "smallest margin [mm]", INK, 13)
@@ -142,9 +151,8 @@ def over_time(d: Drawing, flight: Flight, duration_s: float) -> None:
         d.text((place((t, 0.0))[0], y0 + height + 20.0), f"{t:.0f} s", FAINT, 12, "middle")
     d.polyline(map(place, flight.margin), BLUE, 1.2)
     d.text((x0, y0 + height + 44.0), "distance beyond the 0.1 m clearance, the nearest", FAINT, 13)
-    d.text(
-        (x0, y0 + height + 62.0), "of base, joint 2, end-effector to the nearest wall", FAINT, 13
-    )
+    nearest = f"of base, joint 2, end-effector to the nearest {kept}"
+    d.text((x0, y0 + height + 62.0), nearest, FAINT, 13)
 
 
 def seen(point: XY) -> XY:

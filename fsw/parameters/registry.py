@@ -165,7 +165,7 @@ _ROWS: Final[dict[str, list[_Row]]] = {
         ("PLN_UPS_YAW", "upset_yaw", "rad", 0.05, 3.0, "the same for yaw"),
     ],
     "Barriers": [
-        *_barrier("WALL", "planner.walls", "walls"),
+        *_barrier("WALL", "planner.walls", "walls and points"),
         *_barrier("SPH", "planner.workspace", "workspace sphere"),
         *_slack("BAR", "planner.barrier_slack", "a barrier"),
         ("SUR_DISTURB", "surroundings.disturbance", "m/s^2", 0.0, 3.0,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 
+import pytest
 from numba.core.dispatcher import Dispatcher
 
 from fsw.mpc.planner import Planner
@@ -27,10 +28,11 @@ def _kernels() -> Iterator[tuple[str, Dispatcher]]:
                     yield f"{name}.{key}", value
 
 
-def test_a_flight_compiles_nothing_more() -> None:
+@pytest.mark.parametrize("name", ["walls", "branches"])
+def test_a_flight_compiles_nothing_more(name: str) -> None:
     program = flight_software(ControlChoice("blf", "tracking", "consistent", "clarabel", False))
     assert isinstance(program.planner, Planner)
-    flight = Flight(load_scenario("walls"), planner=program.planner)
+    flight = Flight(load_scenario(name), planner=program.planner)
     ready = variants()
     flight.follow()
     flight.run(0.5)

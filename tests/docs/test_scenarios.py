@@ -23,6 +23,7 @@ TABLES = (
     scenario.Lissajous,
     scenario.Hold,
     scenario.Wall,
+    scenario.Obstacle,
     scenario.Workspace,
     scenario.Uniform,
     scenario.Wind,

@@ -18,6 +18,7 @@ PINNED = {
     "OBSTACLE_WALL": (60207, 24, 28),
     "WORKSPACE_SPHERE": (60208, 18, 197),
     "SETPOINT_STATUS": (60209, 21, 131),
+    "OBSTACLE_POINT": (60210, 20, 254),
 }
 
 # From pymavlink's development.xml, as MAVLink's common.xml and QGroundControl have them.
@@ -29,7 +30,7 @@ STANDARD_MODES = {
 }
 
 PINNED_ENUMS = {
-    "PANDION_CONSTRAINT_KIND": ("NONE", "WALLS", "WORKSPACE"),
+    "PANDION_CONSTRAINT_KIND": ("NONE", "WALLS", "WORKSPACE", "OBSTACLES"),
     "PANDION_SETPOINT_KIND": ("NONE", "BODY", "END_EFFECTOR", "ATTITUDE", "JOINTS"),
     "PANDION_SOLVER_STATUS": (
         "UNKNOWN",

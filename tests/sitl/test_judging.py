@@ -34,7 +34,7 @@ def places(random: np.random.Generator, name: str) -> Array:
     return spread + np.array([x, y, z]) - np.array([0.0, 0.0, 0.225])
 
 
-@pytest.mark.parametrize("name", ["walls", "workspace", "walls-calm"])
+@pytest.mark.parametrize("name", ["walls", "workspace", "branches"])
 def test_the_quick_look_records_what_the_slow_one_does(name: str) -> None:
     random = np.random.default_rng(3)
     quick, slow = referee(name), referee(name)

@@ -19,6 +19,7 @@ from sitl.link.pilot import (
 )
 from sitl.link.pilot_messages import (
     Ack,
+    AnnounceObstacle,
     AnnounceWall,
     AnnounceWorkspace,
     Heard,
@@ -26,7 +27,7 @@ from sitl.link.pilot_messages import (
     SendCommand,
     SendTarget,
 )
-from sitl.scenario import Hold, Pilot, Scenario, Start, Wall, Workspace
+from sitl.scenario import Hold, Obstacle, Pilot, Scenario, Start, Wall, Workspace
 from sitl.simulation import START_US, STEP_US
 from sitl.trajectory import TrajectoryPoint
 
@@ -92,6 +93,17 @@ def test_the_safe_set_is_announced_first() -> None:
     assert [m.index for m in first if isinstance(m, AnnounceWall)] == [0, 1, 2]
     assert isinstance(first[3], AnnounceWorkspace)
     assert flight.said[3][0] == START_US
+
+
+def test_walls_and_points_are_announced_as_one_set() -> None:
+    branch = Obstacle("branch", (0.0, 1.0, -1.0), 0.1)
+    flight = Flight(plan(walls=WALLS, obstacles=(branch,)), {ARM: 0, MODE: 0})
+    flight.fly(0.01)
+    first = [message for _, message in flight.said[:4]]
+    assert [(m.index, m.count) for m in first if isinstance(m, AnnounceWall)] == [
+        (0, 4), (1, 4), (2, 4),
+    ]  # fmt: skip
+    assert first[3] == AnnounceObstacle(branch, 3, 4)
 
 
 def test_targets_arrive_a_second_and_a_half_ahead_without_gaps() -> None:

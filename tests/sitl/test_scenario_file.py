@@ -33,6 +33,18 @@ normal = [-1.0, 0.0, 0.0]
 offset_m = -1.0
 clearance_m = 0.1
 """
+POINT = """
+[[obstacles]]
+name = "branch"
+position_m = [0.0, 1.0, -1.0]
+clearance_m = 0.1
+"""
+SPHERE = "[workspace]\nradius_m = 0.1\nd_iw_m = 0.225\n"
+
+
+def several(table: str, count: int) -> str:
+    """So many tables of different names."""
+    return "".join(table.replace('name = "', f'name = "{k}') for k in range(count))
 
 
 @pytest.mark.parametrize("name", scenario_names())
@@ -92,6 +104,11 @@ def test_a_wrong_line_is_refused_with_key_value_and_what_is_allowed(
         (WALL.replace("clearance_m", "clearence_m"), ['"walls[0].clearence_m"', '"clearance_m"']),
         (WALL + WALL, ["walls[1].name", "differ"]),
         (WALL.replace("offset_m = -1.0", "offset_m = -0.05"), ["front/base", "-50.0 mm"]),
+        (WALL + POINT.replace("branch", "front"), ["obstacles[0].name", "differ"]),
+        (POINT.replace("0.1", "0.0"), ["obstacles[0].clearance_m", "0.001 to 10"]),
+        (POINT.replace("1.0, -1.0", "0.05, -1.2"), ["branch/end_effector", "-50.0 mm"]),
+        (POINT + SPHERE, ["obstacles", "workspace"]),
+        (several(WALL, 3) + several(POINT, 3), ["walls and obstacles = 6", "at most 5"]),
         ("[workspace]\nradius_m = 0.0\nd_iw_m = 0.225", ["workspace.radius_m", "0.001 to 10"]),
         ("[workspace]\nradius_m = 0.1\nd_iw_m = 0.4", ["workspace/base", "-75.0 mm"]),
         ('[[disturbances]]\nkind = "unifrom"\n', ["disturbances[0].kind", '"uniform"']),

@@ -6,22 +6,13 @@ import numpy as np
 import pytest
 
 from fsw.barriers.hard_set import HardWalls, HardWorkspace
-from fsw.barriers.point_obstacle import PointObstacleBarrier
 from fsw.model.linearisation import BASE, Linearisation
 from fsw.model.prediction import INPUTS, Array
 from fsw.signals import Wall, WorkspaceSphere
-from tests.fsw.barriers.horizons import (
-    NODES,
-    TUNING,
-    Case,
-    lowest_allowed,
-    random_case,
-    safe_speed,
-)
+from tests.fsw.barriers.horizons import NODES, Case, random_case
 
 WALLS = (Wall((-1.0, 0.0, 0.0), -1.0, 0.1), Wall((0.0, 0.6, 0.8), -1.5, 0.05))
 OFFSET = np.array([0.0, 0.0, -0.225])
-OBSTACLE = np.array([3.0, -3.0, 1.0])  # away from every random base
 STEP = 1e-6
 
 
@@ -81,29 +72,3 @@ def test_sphere_rows_are_the_distance_to_the_surface(rho: float) -> None:
             np.testing.assert_allclose(
                 hard.rows.gradient[:, column], difference(case, column, gaps), atol=1e-5
             )
-
-
-def test_obstacle_rows_are_h_of_eq_11_along_the_frozen_ray() -> None:
-    case = random_case(np.random.default_rng(3))
-    barrier = PointObstacleBarrier((3.0, -3.0, 1.0), 0.4, TUNING, NODES)
-    barrier.refill(case.horizon(), case.targets)
-    frozen = case.horizon().position[:, BASE] - OBSTACLE
-    rays = frozen / np.linalg.norm(frozen, axis=1)[:, None]
-
-    def h(horizon: Linearisation) -> Array:
-        p, v = horizon.position[:, BASE] - OBSTACLE, horizon.velocity[:, BASE]
-        return np.array(
-            [safe_speed(rays[k] @ p[k] - 0.4) + rays[k] @ v[k] for k in range(2, NODES + 1)]
-        )
-
-    np.testing.assert_allclose(barrier.rows.value, h(case.horizon()), atol=1e-12)
-    start_p, start_v = frozen[0], case.horizon().velocity[0, BASE]
-    required = [
-        lowest_allowed(safe_speed(rays[k] @ start_p - 0.4) + rays[k] @ start_v, k)
-        for k in range(2, NODES + 1)
-    ]
-    np.testing.assert_allclose(barrier.rows.required, required, atol=1e-12)
-    for column in range(INPUTS * NODES):
-        np.testing.assert_allclose(
-            barrier.rows.gradient[:, column], difference(case, column, h), atol=1e-5
-        )

@@ -2,14 +2,24 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
 from fsw.barriers.margins import PointMotion, constraint_report
+from fsw.barriers.point_obstacle import PointObstacleBarrier
 from fsw.barriers.wall import WallBarrier
 from fsw.barriers.workspace import WorkspaceBarrier
 from fsw.model.linearisation import Linearisation
-from fsw.signals import ConstraintKind, EndEffectorTarget, SafeSet, Wall, WorkspaceSphere
+from fsw.signals import (
+    ConstraintKind,
+    EndEffectorTarget,
+    PointObstacle,
+    SafeSet,
+    Wall,
+    WorkspaceSphere,
+)
 from tests.fsw.barriers.horizons import NODES, TUNING, Case, random_case
 from tests.fsw.random_states import vec3
 
@@ -38,6 +48,28 @@ def test_wall_report_equals_the_rows_at_the_start() -> None:
         report = constraint_report(SafeSet(walls), TUNING, points_at_start(case.horizon()), None)
         assert report.kind is ConstraintKind.WALLS
         np.testing.assert_allclose(report.barrier, barrier.at_start(), atol=1e-12)
+
+
+def test_the_report_of_walls_and_points_equals_the_rows_at_the_start() -> None:
+    random = np.random.default_rng(3)
+    walls = (Wall((-1.0, 0.0, 0.0), -1.0, 0.1),)
+    obstacles = (PointObstacle((0.4, -0.3, -1.0), 0.2), PointObstacle((2.0, 1.0, 0.0), 0.1))
+    for _ in range(10):
+        case = random_case(random)
+        points = points_at_start(case.horizon())
+        rows: list[float] = []
+        for barrier in (
+            WallBarrier(walls, TUNING, NODES),
+            PointObstacleBarrier(obstacles, TUNING, NODES),
+        ):
+            barrier.refill(case.horizon(), case.targets)
+            rows += barrier.at_start().tolist()
+        report = constraint_report(SafeSet(walls, obstacles=obstacles), TUNING, points, None)
+        assert report.kind is ConstraintKind.OBSTACLES
+        np.testing.assert_allclose(report.barrier, rows, atol=1e-12)
+        distances = [math.dist(p, one.position) - one.clearance for one in obstacles
+                     for p, _ in points]  # fmt: skip
+        assert report.margins[3:] == pytest.approx(distances)
 
 
 def test_wall_margin_is_the_distance_that_is_left_in_order_of_the_points() -> None:

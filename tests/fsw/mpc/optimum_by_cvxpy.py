@@ -18,7 +18,7 @@ from fsw.barriers.root import BarrierTuning
 from fsw.model.linearisation import BASE, END_EFFECTOR, Linearisation
 from fsw.model.prediction import INPUTS, Array
 from fsw.mpc.planner_config import PlannerConfig
-from fsw.signals import SafeSet, Wall, WorkspaceSphere
+from fsw.signals import PointObstacle, SafeSet, Wall, WorkspaceSphere
 
 
 @dataclass(frozen=True)
@@ -226,10 +226,14 @@ def _barrier(
         return [], cp.Variable(1, nonneg=True)
     if question.safe_set.sphere is not None:
         return _sphere_rows(question, linear, config, question.safe_set.sphere)
-    slack = cp.Variable((config.horizon + 1, max(len(question.safe_set.walls), 1)), nonneg=True)
+    walls, obstacles = question.safe_set.walls, question.safe_set.obstacles
+    count = len(walls) + len(obstacles)
+    slack = cp.Variable((config.horizon + 1, max(count, 1)), nonneg=True)
     rows: list[Any] = []
-    for k, wall in enumerate(question.safe_set.walls):
+    for k, wall in enumerate(walls):
         rows += _wall_rows(question, linear, config.walls, wall, slack[:, k])
+    for k, obstacle in enumerate(obstacles, len(walls)):
+        rows += _point_rows(question, linear, config.walls, obstacle, slack[:, k])
     return rows, slack
 
 
@@ -252,6 +256,24 @@ def _wall_rows(
             room = n @ linear.position(node, point) - limit - gap
             h = value + slope * room + n @ linear.velocity(node, point)
             rows.append(h + slack[node] >= _required(h_start, node, tuning))
+    return rows
+
+
+def _point_rows(
+    question: Question, linear: _Linear, tuning: BarrierTuning, obstacle: PointObstacle, slack: Any
+) -> list[Any]:
+    """Eq 11 under eq 25, with the direction that a point has at a node of the guess."""
+    horizon, centre, rows = question.horizon, np.array(obstacle.position), []
+    for point in range(3):
+        for node in range(1 + tuning.skipped_nodes, len(horizon.position)):
+            away = horizon.position[node, point] - centre
+            n = away / np.linalg.norm(away)
+            start = n @ (horizon.position[0, point] - centre) - obstacle.clearance
+            h_start = _safe_speed(float(start), tuning)[0] + n @ horizon.velocity[0, point]
+            value, slope = _safe_speed(float(n @ away) - obstacle.clearance, tuning)
+            room = n @ (linear.position(node, point) - horizon.position[node, point])
+            h = value + slope * room + n @ linear.velocity(node, point)
+            rows.append(h + slack[node] >= _required(float(h_start), node, tuning))
     return rows
 
 

@@ -19,6 +19,7 @@ from fsw.signals import (
     Plan,
     PlanFailure,
     PlanRequest,
+    PointObstacle,
     SafeSet,
     SolverStatus,
     Wall,
@@ -33,6 +34,10 @@ CONFIG = PlannerConfig()
 N = CONFIG.horizon
 MODEL = condense(CONFIG.lag, CONFIG.period, N)
 WALLS = SafeSet((Wall((-1.0, 0.0, 0.0), -1.0, 0.1), Wall((0.0, 1.0, 0.0), -1.0, 0.1)))
+POINTS = SafeSet(
+    (Wall((-1.0, 0.0, 0.0), -1.0, 0.1),),
+    obstacles=(PointObstacle((0.2, 0.1, 0.3), 0.15), PointObstacle((-0.5, 0.4, -0.2), 0.1)),
+)
 SPHERE = SafeSet(sphere=WorkspaceSphere((0.0, 0.0, -0.225), 0.075))
 
 
@@ -64,7 +69,9 @@ def targets_of(asked: Question) -> TargetPoints:
     return TargetPoints(asked.target_p, asked.target_v, asked.target_yaw)
 
 
-@pytest.mark.parametrize("safe_set", [SafeSet(), WALLS, SPHERE], ids=["open", "walls", "sphere"])
+@pytest.mark.parametrize(
+    "safe_set", [SafeSet(), WALLS, POINTS, SPHERE], ids=["open", "walls", "points", "sphere"]
+)
 @pytest.mark.parametrize("seed", [1, 2, 3])
 @pytest.mark.parametrize(("iterations", "tolerance"), [(1, 0.01), (2, 0.1)])
 def test_the_plan_is_the_optimum_of_the_problem_written_a_second_time(

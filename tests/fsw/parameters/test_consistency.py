@@ -16,9 +16,10 @@ from fsw.parameters.consistency import (
     stand_off,
 )
 from fsw.parameters.flight_config import FlightConfig, flight_config
-from fsw.signals import SafeSet, Wall, WorkspaceSphere
+from fsw.signals import PointObstacle, SafeSet, Wall, WorkspaceSphere
 
 WALLS = SafeSet(walls=(Wall((-1.0, 0.0, 0.0), -1.0, 0.1),))
+POINT = SafeSet(obstacles=(PointObstacle((1.0, 0.0, -1.0), 0.1),))
 SPHERE = SafeSet(sphere=WorkspaceSphere((0.0, 0.0, -0.225), 0.075))
 
 
@@ -27,14 +28,14 @@ def _findings(config: FlightConfig, safe_set: SafeSet) -> dict[str, Finding]:
     return {finding.name: finding for finding in found}
 
 
-@pytest.mark.parametrize("safe_set", [WALLS, SPHERE])
+@pytest.mark.parametrize("safe_set", [WALLS, POINT, SPHERE])
 def test_the_default_configuration_is_consistent(safe_set: SafeSet) -> None:
     config = flight_config()
     assert refusals(analyse(config, safe_set, loop_tube(config))) == ()
 
 
 @pytest.mark.parametrize("preset", ["paper-1", "paper-5"])
-@pytest.mark.parametrize("safe_set", [WALLS, SPHERE])
+@pytest.mark.parametrize("safe_set", [WALLS, POINT, SPHERE])
 def test_the_papers_lambda_is_refused_with_a_value_that_would_do(
     preset: str, safe_set: SafeSet
 ) -> None:
@@ -96,3 +97,30 @@ def test_sampled_robustness_is_the_least_lambda_that_a_held_push_cannot_beat(sha
 def test_controllers_without_a_barrier_have_nothing_to_refuse() -> None:
     config = flight_config("naive")
     assert analyse(config, SPHERE, loop_tube(config)) == ()
+
+
+def test_beside_a_point_the_same_is_said_as_beside_a_wall_and_something_about_the_links() -> None:
+    beside_wall = _findings(flight_config(), WALLS)
+    beside_point = _findings(flight_config(), POINT)
+    links = beside_point.pop("links")
+    assert beside_point == beside_wall
+    assert links.holds
+    assert "keeps 66 mm" in links.statement  # sqrt(100^2 - 75^2)
+
+
+@pytest.mark.parametrize(("clearance", "holds"), [(0.074, False), (0.076, True)])
+def test_a_point_that_a_link_could_pass_through_is_worth_a_warning(
+    clearance: float, holds: bool
+) -> None:
+    safe_set = SafeSet(obstacles=(PointObstacle((1.0, 0.0, -1.0), clearance),))
+    finding = _findings(flight_config(), safe_set)["links"]
+    assert finding.holds is holds
+    assert not finding.refuses
+
+
+@pytest.mark.parametrize("controller", ["hc", "sc"])
+def test_a_controller_that_knows_no_points_refuses_them(controller: str) -> None:
+    config = flight_config(controller)
+    (refusal,) = refusals(analyse(config, POINT, loop_tube(config)))
+    assert controller in refusal
+    assert analyse(config, WALLS, loop_tube(config)) == ()

@@ -15,11 +15,13 @@ from fsw.signals import (
     MissionAction,
     MissionState,
     MissionStep,
+    PointObstacle,
     SafeSet,
     Vec3,
     Wall,
+    WorkspaceSphere,
 )
-from fsw.vehicle.confine import confined, inside
+from fsw.vehicle.confine import confined, contradictions, inside, joined
 from fsw.vehicle.leg import Pace
 from fsw.vehicle.mission import (
     MissionFlight,
@@ -194,6 +196,24 @@ def test_a_reference_in_a_corner_keeps_every_wall() -> None:
     x, y, _ = inside((5.0, 9.0, -1.0), SafeSet(walls))
     assert x <= 0.9 + 1e-3
     assert half * (x - y) >= -0.9 - 1e-3
+
+
+def test_a_place_of_a_mission_in_the_ball_of_a_point_moves_to_its_surface() -> None:
+    branch = PointObstacle((1.0, 0.0, -1.0), 0.25)
+    around = SafeSet((Wall((-1.0, 0.0, 0.0), -1.2, 0.1),), obstacles=(branch,))
+    p = inside((1.05, 0.05, -1.0), around)
+    assert math.dist(p, branch.position) >= 0.25 - 1e-3
+    assert p[0] <= 1.1 + 1e-3
+    assert inside((0.0, 0.0, -1.0), around) == (0.0, 0.0, -1.0)
+
+
+def test_points_and_a_sphere_contradict_each_other() -> None:
+    branch = SafeSet(obstacles=(PointObstacle((1.0, 0.0, -1.0), 0.25),))
+    sphere = SafeSet(sphere=WorkspaceSphere((0.0, 0.0, -0.2), 0.1))
+    assert joined(branch, SafeSet()) == branch
+    assert contradictions(branch) == ()
+    (sentence,) = contradictions(joined(branch, sphere))
+    assert "points" in sentence
 
 
 def test_landing_and_return_are_handed_over_and_a_landing_is_reached_on_the_ground() -> None:

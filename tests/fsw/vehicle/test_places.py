@@ -7,7 +7,7 @@ import math
 import pytest
 
 from fsw.geometry.geodesy import to_global
-from fsw.signals import CommandRequest, Home, Mode, Origin, SafeSet, Wall
+from fsw.signals import CommandRequest, Home, Mode, Origin, PointObstacle, SafeSet, Wall
 from fsw.vehicle.commands import decide
 from fsw.vehicle.modes import Event
 from fsw.vehicle.places import Refused, height_of, place_of
@@ -104,6 +104,17 @@ def test_a_goto_into_a_wall_or_the_ground_is_refused() -> None:
         decision = decide(asked(x, 0.0, z, 1), walled)
         assert decision.result == DENIED
         assert word in decision.reason
+
+
+def test_a_goto_too_close_to_a_point_is_refused() -> None:
+    from dataclasses import replace
+
+    branch = PointObstacle((9.0, 0.0, -3.0), 0.5)
+    near = replace(HOVERING, safe_set=SafeSet(obstacles=(branch,)))
+    assert decide(asked(9.0, 0.6, -3.0, 1), near).result == ACCEPTED
+    decision = decide(asked(9.0, 0.4, -3.0, 1), near)
+    assert decision.result == DENIED
+    assert "obstacle 1" in decision.reason
 
 
 def test_home_is_set_here_or_at_a_place() -> None:

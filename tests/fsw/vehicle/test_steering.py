@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fsw.barriers.margins import plain_root
-from fsw.signals import MotionSetpoint, SafeSet, Vec3, Wall
+from fsw.signals import MotionSetpoint, PointObstacle, SafeSet, Vec3, Wall
 from fsw.vehicle.steering import Aim, Lead, SteeringLimits, arrived, keep_out, keep_up, move, tie
 
 LIMITS = SteeringLimits()
@@ -103,6 +103,27 @@ def test_no_end_of_the_arm_is_wanted_in_a_wall_and_the_approach_can_stop(
     assert room >= -1e-9
     assert kept.v[0] <= plain_root(max(room, 0.0), 2.0, 4.0) + 1e-9
     assert kept.v[0] <= max(speed, 0.0) + 1e-9 or speed < 0.0
+
+
+@given(number, number, st.floats(-3.0, 3.0))
+def test_what_hangs_below_is_not_wanted_near_a_point_and_the_approach_can_stop(
+    x: float, y: float, speed: float
+) -> None:
+    branch, below = PointObstacle((0.5, 0.0, -2.0), 0.2), (0.0, 0.0, 0.3)
+    lead = replace(STILL, p=(x, y, -2.2), v=(speed, -speed, 0.0))
+    kept = keep_out(lead, below, SafeSet(obstacles=(branch,)), 2.0, 4.0)
+    end = (kept.p[0], kept.p[1], kept.p[2] + 0.3)
+    away = [a - b for a, b in zip(end, branch.position, strict=True)]
+    distance = math.hypot(*away)
+    assert distance >= 0.2 - 1e-9
+    approach = -sum(a * v for a, v in zip(away, kept.v, strict=True)) / distance
+    assert approach <= plain_root(max(distance - 0.2, 0.0), 2.0, 4.0) + 1e-9
+
+
+def test_the_body_is_not_wanted_near_a_point_that_its_arm_is_far_from() -> None:
+    branch, below = PointObstacle((0.1, 0.0, -2.0), 0.2), (0.0, 0.0, 5.0)
+    kept = keep_out(STILL, below, SafeSet(obstacles=(branch,)), 2.0, 4.0)
+    assert kept.p == pytest.approx((-0.1, 0.0, -2.0))
 
 
 def test_away_from_walls_nothing_changes() -> None:

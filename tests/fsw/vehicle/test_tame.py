@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fsw.signals import EndEffectorTarget, SafeSet, Vec3, Wall
+from fsw.signals import EndEffectorTarget, PointObstacle, SafeSet, Vec3, Wall
 from fsw.vehicle.tame import tamed
 
 WALL = SafeSet((Wall((-1.0, 0.0, 0.0), -1.0, 0.1),))
@@ -62,3 +62,25 @@ def test_nothing_pulls_deep_or_fast_into_a_wall(x: float, v: float, first: float
         room = 0.9 - x
         assert target.v_WE[0] <= max((4.0 * room) ** 0.5, 4.0 * room, 0.5) + 1e-9
         assert abs(target.v_WE[0]) <= 1.0 + 1e-9
+
+
+BRANCH = SafeSet(obstacles=(PointObstacle((1.0, 0.0, -1.2), 0.3),))
+
+
+def test_a_path_that_passes_a_point_within_its_clearance_stays_as_it_is() -> None:
+    targets = horizon((1.0, 0.25, -1.2), (0.3, 0.0, 0.0))
+    assert tamed(targets, (0.9, 0.3, -1.2), STILL, BRANCH, 2.0, 4.0) is targets
+
+
+@given(st.floats(-math.pi, math.pi), st.floats(0.01, 0.3), st.floats(0.5, 3.0))
+def test_nothing_pulls_deep_into_the_ball_of_a_point_or_fast_towards_it(
+    angle: float, distance: float, speed: float
+) -> None:
+    away = (math.cos(angle), math.sin(angle), 0.0)
+    target = (1.0 + distance * away[0], distance * away[1], -1.2)
+    p_WE = (1.0 + 0.35 * away[0], 0.35 * away[1], -1.2)
+    inward = (-speed * away[0], -speed * away[1], 0.0)
+    targets = (EndEffectorTarget(0, target, inward, STILL),)
+    (tame,) = tamed(targets, p_WE, STILL, BRANCH, 2.0, 4.0)
+    assert math.dist(tame.p_WE, (1.0, 0.0, -1.2)) == pytest.approx(max(distance, 0.2))
+    assert math.hypot(*tame.v_WE) <= 0.5 + 1e-9

@@ -33,6 +33,11 @@ def wall(index: int, count: int, **fields: float) -> Frame:
     return frame(ids.OBSTACLE_WALL, index=index, count=count, **{**plane, **fields})
 
 
+def point(index: int, count: int, **fields: float) -> Frame:
+    ball = {"position[0]": 2.0, "clearance": 0.125}
+    return frame(ids.OBSTACLE_POINT, index=index, count=count, **{**ball, **fields})
+
+
 def test_nan_in_an_unused_parameter_of_a_command_is_normal() -> None:
     inbox = Inbox()
     inbox.accept(frame(ids.COMMAND_LONG, command=400, param1=1.0, param5=NAN, param7=NAN))
@@ -104,6 +109,34 @@ def test_walls_of_two_sets_do_not_mix() -> None:
     inbox.accept(wall(0, 3))
     inbox.accept(wall(1, 2))
     assert inbox.take_safe_set() is None
+
+
+def test_walls_and_points_are_one_set() -> None:
+    inbox = Inbox()
+    inbox.accept(point(2, 3))
+    inbox.accept(wall(0, 3))
+    assert inbox.take_safe_set() is None
+    inbox.accept(point(1, 3, **{"position[0]": 7.0}))
+    safe_set = inbox.take_safe_set()
+    assert safe_set is not None
+    assert len(safe_set.walls) == 1
+    assert [obstacle.position[0] for obstacle in safe_set.obstacles] == [7.0, 2.0]
+    inbox.accept(wall(0, 1))
+    safe_set = inbox.take_safe_set()
+    assert safe_set is not None
+    assert safe_set.obstacles == ()
+
+
+@pytest.mark.parametrize(
+    "bad",
+    [{"position[1]": NAN}, {"clearance": 0.0}, {"clearance": -0.1}, {"clearance": math.inf},
+     {"index": 1}],
+)  # fmt: skip
+def test_a_point_that_keeps_nothing_away_is_refused(bad: dict[str, float]) -> None:
+    inbox = Inbox()
+    inbox.accept(point(**{"index": 0, "count": 1, **bad}))  # type: ignore[arg-type]
+    assert inbox.take_safe_set() is None
+    assert inbox.refused == 1
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,145 @@
+"""Rows of the point obstacle against h0 written out, with slopes by finite differences."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fsw.barriers.point_obstacle import PointObstacleBarrier
+from fsw.barriers.tangent import planes, tangent
+from fsw.barriers.wall import WallBarrier
+from fsw.model.linearisation import Linearisation
+from fsw.model.prediction import INPUTS, Array
+from fsw.signals import PointObstacle, SafeSet, Wall
+from tests.fsw.barriers.horizons import (
+    NODES,
+    TUNING,
+    Case,
+    lowest_allowed,
+    random_case,
+    safe_speed,
+)
+from tests.fsw.random_states import vec3
+
+STEP = 1e-6
+CLEARANCES = (0.1, 0.4)
+
+
+def obstacles_near(random: np.random.Generator, case: Case, distance: float) -> Array:
+    """Two places at about this distance from the base, (2, 3)."""
+    away = random.standard_normal((2, 3))
+    away *= distance / np.linalg.norm(away, axis=1)[:, None]
+    return np.asarray(case.start[0:3] + away)
+
+
+def refilled(places: Array, case: Case) -> PointObstacleBarrier:
+    obstacles = tuple(
+        PointObstacle(vec3(place), clearance)
+        for place, clearance in zip(places, CLEARANCES, strict=True)
+    )
+    barrier = PointObstacleBarrier(obstacles, TUNING, NODES)
+    barrier.refill(case.horizon(), case.targets)
+    return barrier
+
+
+def rays_at(horizon: Linearisation, place: Array) -> Array:
+    away = horizon.position - place
+    return np.asarray(away / np.linalg.norm(away, axis=2)[:, :, None])
+
+
+def h_by_hand(places: Array, frozen: Linearisation, horizon: Linearisation) -> Array:
+    """By node from 2, obstacle and point, with the directions of the frozen horizon."""
+    h = []
+    for node in range(2, NODES + 1):
+        for place, clearance in zip(places, CLEARANCES, strict=True):
+            for point in range(3):
+                n = rays_at(frozen, place)[node, point]
+                gap = n @ (horizon.position[node, point] - place) - clearance
+                h.append(safe_speed(gap) + n @ horizon.velocity[node, point])
+    return np.array(h)
+
+
+@pytest.mark.parametrize("distance", [0.3, 1.0, 3.0])
+def test_rows_are_h0_of_every_critical_point_and_their_slopes_its_differences(
+    distance: float,
+) -> None:
+    random = np.random.default_rng(3)
+    for _ in range(3):
+        case = random_case(random)
+        places = obstacles_near(random, case, distance)
+        rows, frozen = refilled(places, case).rows, case.horizon()
+        np.testing.assert_allclose(rows.value, h_by_hand(places, frozen, frozen), atol=1e-12)
+        for column in range(INPUTS * NODES):
+            change = np.zeros(INPUTS * NODES)
+            change[column] = STEP
+            above = h_by_hand(places, frozen, case.horizon(change))
+            below = h_by_hand(places, frozen, case.horizon(-change))
+            np.testing.assert_allclose(
+                rows.gradient[:, column], (above - below) / (2.0 * STEP), atol=1e-4
+            )
+        assert not rows.gradient[~rows.feels()].any()
+
+
+def test_the_rows_ask_for_the_decay_of_h_from_where_the_vehicle_is() -> None:
+    random = np.random.default_rng(4)
+    case = random_case(random)
+    places = obstacles_near(random, case, 1.0)
+    barrier, horizon = refilled(places, case), case.horizon()
+    required, start = [], []
+    for place, clearance in zip(places, CLEARANCES, strict=True):
+        for point in range(3):
+            p, v = horizon.position[0, point] - place, horizon.velocity[0, point]
+            distance = float(np.linalg.norm(p))
+            start.append(safe_speed(distance - clearance) + p @ v / distance)
+    for node in range(2, NODES + 1):
+        for place, clearance in zip(places, CLEARANCES, strict=True):
+            for point in range(3):
+                n = rays_at(horizon, place)[node, point]
+                p, v = horizon.position[0, point] - place, horizon.velocity[0, point]
+                required.append(lowest_allowed(safe_speed(n @ p - clearance) + n @ v, node))
+    np.testing.assert_allclose(barrier.at_start(), start, atol=1e-12)
+    np.testing.assert_allclose(barrier.rows.required, required, atol=1e-12)
+
+
+def test_far_away_an_obstacle_is_the_wall_that_its_tangent_plane_is() -> None:
+    """Seen from a thousand kilometres the direction is the same for every point and node."""
+    case = random_case(np.random.default_rng(5))
+    obstacle = PointObstacle((1e6, 2e6, -3e6), 0.2)
+    point = PointObstacleBarrier((obstacle,), TUNING, NODES)
+    wall = WallBarrier((tangent(obstacle, vec3(case.start[0:3])),), TUNING, NODES)
+    for barrier in (point, wall):
+        barrier.refill(case.horizon(), case.targets)
+    np.testing.assert_allclose(point.rows.gradient, wall.rows.gradient, atol=1e-4)
+    np.testing.assert_array_equal(point.rows.slack, wall.rows.slack)
+
+
+def test_each_obstacle_has_its_slack_at_each_node_and_may_be_left_out_alone() -> None:
+    rows = refilled(np.ones((2, 3)), random_case(np.random.default_rng(6))).rows
+    assert rows.slacks == 2 * (NODES - 1)
+    np.testing.assert_array_equal(rows.group, np.tile([0, 0, 0, 1, 1, 1], NODES - 1))
+    for slack in range(rows.slacks):
+        assert len(set(rows.node[rows.slack == slack])) == 1
+
+
+def test_in_the_obstacle_itself_the_rows_are_numbers() -> None:
+    case = random_case(np.random.default_rng(7))
+    rows = refilled(np.tile(case.start[0:3], (2, 1)), case).rows
+    assert np.isfinite(rows.value).all()
+    assert np.isfinite(rows.gradient).all()
+    wall = tangent(PointObstacle((1.0, 2.0, 3.0), 0.1), (1.0, 2.0, 3.0))
+    assert wall.normal == (1.0, 0.0, 0.0)
+
+
+def test_the_tangent_plane_has_the_ball_behind_it() -> None:
+    random = np.random.default_rng(8)
+    for _ in range(50):
+        centre, p = random.uniform(-1.0, 1.0, (2, 3))
+        wall = tangent(PointObstacle(vec3(centre), 0.3), vec3(p))
+        n = np.array(wall.normal)
+        assert n @ p - wall.offset == pytest.approx(np.linalg.norm(p - centre))
+        assert n @ (centre + 0.3 * n) <= wall.offset + wall.clearance + 1e-12
+
+
+def test_without_obstacles_the_planes_are_the_walls_themselves() -> None:
+    walls = (Wall((-1.0, 0.0, 0.0), -1.0, 0.1),)
+    assert planes(SafeSet(walls), (0.0, 0.0, 0.0)) is walls
