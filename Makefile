@@ -14,6 +14,9 @@ export UV_PYTHON_PREFERENCE := only-system
 PIP_INDEX = $${PIP_INDEX_URL:-$$($(PYTHON) -m pip config get global.index-url 2>/dev/null || true)}
 UV = UV_DEFAULT_INDEX="$${UV_DEFAULT_INDEX:-$(PIP_INDEX)}" .boot/uv
 
+# Where it is set, each of a flight's processes would compile its imports anew: two seconds a start.
+unexport PYTHONDONTWRITEBYTECODE
+
 .DEFAULT_GOAL := help
 .PHONY: help setup run test interop lock clean
 
