@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable
+from importlib import import_module
 from typing import Final
 
 from pandion.parser import COULD_NOT_START, Parser, unknown_name
@@ -69,28 +70,8 @@ def _run(words: list[str]) -> int:
     return verb(words[1:])
 
 
-def _fly(argv: list[str]) -> int:
-    from pandion import fly
-
-    return fly.main(argv)
-
-
-def _bench(argv: list[str]) -> int:
-    from pandion import bench
-
-    return bench.main(argv)
-
-
-def _dialect(argv: list[str]) -> int:
-    from pandion import dialect
-
-    return dialect.main(argv)
-
-
-def _param(argv: list[str]) -> int:
-    from pandion import param
-
-    return param.main(argv)
+def _verb(module: str) -> Callable[[list[str]], int]:
+    return lambda argv: int(import_module(f"pandion.{module}").main(argv))
 
 
 def _sitl(argv: list[str]) -> int:
@@ -111,35 +92,17 @@ def _fsw(argv: list[str]) -> int:
     return entry.run(arguments.options(parser.read(argv)))
 
 
-def _reproduce(argv: list[str]) -> int:
-    from pandion import reproduce
-
-    return reproduce.main(argv)
-
-
-def _replay(argv: list[str]) -> int:
-    from pandion import replay
-
-    return replay.main(argv)
-
-
-def _export(argv: list[str]) -> int:
-    from pandion import export
-
-    return export.main(argv)
-
-
 INTERRUPTED: Final = 1  # exit code
 VERBS: Final[dict[str, Callable[[list[str]], int]]] = {
-    "fly": _fly,
+    "fly": _verb("fly"),
     "sitl": _sitl,
     "fsw": _fsw,
-    "reproduce": _reproduce,
-    "bench": _bench,
-    "param": _param,
-    "dialect": _dialect,
-    "replay": _replay,
-    "export": _export,
+    "reproduce": _verb("reproduce"),
+    "bench": _verb("bench"),
+    "param": _verb("param"),
+    "dialect": _verb("dialect"),
+    "replay": _verb("replay"),
+    "export": _verb("export"),
 }
 
 if __name__ == "__main__":

@@ -9,17 +9,16 @@ import argparse
 import json
 import os
 import sys
-from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, TextIO
+from typing import TYPE_CHECKING
 
+from pandion.output import write_text
 from pandion.parser import COULD_NOT_START, Parser
+from pandion.progress import Progress
 from pandion.version import version
 
 if TYPE_CHECKING:
-    from rich.progress import Progress, TaskID
-
     from studies.bench_mpc import Samples
 
 DONE, INTERRUPTED = 0, 1  # exit codes
@@ -121,7 +120,7 @@ def _run(options: BenchOptions) -> int:
         file=console,
         flush=True,
     )
-    with BenchProgress(console) as progress:
+    with Progress(console, lines=4, threaded=False) as progress:
         measured = run(options.horizons or HORIZONS, effort, progress.report)
     facts = machine(load)
     print("\n".join(lines(measured)), file=console)
@@ -137,51 +136,7 @@ def _write(target: str | None, measured: list[Samples], facts: dict[str, object]
     from studies.bench_report import details
 
     rows = json.dumps([samples.row() for samples in measured], indent=1, allow_nan=False) + "\n"
-    if target == "-":
-        sys.stdout.write(rows)
-    elif target is not None:
-        Path(target).write_text(rows, encoding="utf-8")
+    write_text(target, rows)
+    if target not in (None, "-"):
         beside = json.dumps({"machine": facts, "details": details(measured)}, indent=1)
         Path(f"{target}.machine.json").write_text(beside + "\n", encoding="utf-8")
-
-
-class BenchProgress(AbstractContextManager["BenchProgress"]):
-    """A bar on a terminal, a line for every quarter elsewhere."""
-
-    def __init__(self, stream: TextIO) -> None:
-        self._stream = stream
-        self._bar: Progress | None = None
-        self._task: TaskID | None = None
-        self._told = ("", -1)
-
-    def __enter__(self) -> BenchProgress:
-        if self._stream.isatty():
-            from rich.console import Console
-            from rich.progress import BarColumn, MofNCompleteColumn, Progress
-
-            self._bar = Progress(
-                "{task.description}",
-                BarColumn(),
-                MofNCompleteColumn(),
-                console=Console(file=self._stream),
-                transient=True,
-                auto_refresh=False,  # a thread that draws would be measured too
-            )
-            self._bar.start()
-            self._task = self._bar.add_task("", total=None)
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        if self._bar is not None:
-            self._bar.stop()
-
-    def report(self, what: str, done: int, total: int) -> None:
-        """Show how far it is."""
-        if self._bar is not None and self._task is not None:
-            self._bar.update(self._task, description=what, completed=done, total=total)
-            self._bar.refresh()
-            return
-        told = (what, 4 * done // max(total, 1))
-        if told != self._told:
-            self._told = told
-            print(f"{what} {done} of {total}", file=self._stream, flush=True)

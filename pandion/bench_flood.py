@@ -20,6 +20,7 @@ from fsw.link.telemetry.streams import STREAMS
 from pandion.display import Display
 from pandion.flood_monitor import Heard, Monitor
 from pandion.flood_traffic import SYSTEM
+from pandion.output import write_text
 from pandion.parser import COULD_NOT_START, Parser
 from pandion.supervisor import HalfFailed, Supervisor
 from pandion.version import version
@@ -242,11 +243,7 @@ def _write(target: str | None, rows: list[Row], calm: Flight, flooded: Flight) -
         "without": _facts(calm),
         "with": _facts(flooded),
     }
-    text = json.dumps(figures, indent=1) + "\n"
-    if target == "-":
-        sys.stdout.write(text)
-    else:
-        Path(target).write_text(text, encoding="utf-8")
+    write_text(target, json.dumps(figures, indent=1) + "\n")
 
 
 def _facts(flight: Flight) -> dict[str, Any]:

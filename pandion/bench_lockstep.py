@@ -18,6 +18,7 @@ from typing import Any, Final, TextIO
 
 from pandion.children import Event
 from pandion.display import Display
+from pandion.output import write_text
 from pandion.parser import COULD_NOT_START, Parser
 from pandion.processor import Places, lockstep_places
 from pandion.supervisor import HalfFailed, Supervisor
@@ -51,11 +52,7 @@ def main(argv: list[str]) -> int:
     except (HalfFailed, OSError) as error:
         print(f"pandion bench: {error}", file=sys.stderr)
         return COULD_NOT_START
-    text = json.dumps(found, indent=1, allow_nan=False) + "\n"
-    if options.json == "-":
-        sys.stdout.write(text)
-    elif options.json is not None:
-        Path(options.json).write_text(text, encoding="utf-8")
+    write_text(options.json, json.dumps(found, indent=1, allow_nan=False) + "\n")
     print("\n".join(_lines(found)), file=console)
     return DONE if found["real_time_factor_best"] >= WANTED else SLOW
 

@@ -17,6 +17,7 @@ from typing import Any, TextIO
 from pandion.budgets import Budgets, Row, judge, load_budgets, verdict
 from pandion.display import Display
 from pandion.machine_watch import Watch
+from pandion.output import write_text
 from pandion.parser import COULD_NOT_START, Parser
 from pandion.supervisor import HalfFailed, Supervisor
 from pandion.version import version
@@ -64,7 +65,8 @@ def main(argv: list[str]) -> int:
     machine["load_after"] = round(os.getloadavg()[0], 2)
     for measured in flown:
         print("\n".join(_lines(measured)), file=console)
-    _write(options.json, {"machine": machine, "flights": [_as_json(one) for one in flown]})
+    figures = {"machine": machine, "flights": [_as_json(one) for one in flown]}
+    write_text(options.json, json.dumps(figures, indent=2) + "\n")
     return PASSED if all(one.verdict == "pass" for one in flown) else NOT_PASSED
 
 
@@ -207,11 +209,3 @@ def _machine() -> dict[str, Any]:
         "kernel": platform.release(),
         "python": platform.python_version(),
     }
-
-
-def _write(target: str | None, result: dict[str, Any]) -> None:
-    text = json.dumps(result, indent=2) + "\n"
-    if target == "-":
-        sys.stdout.write(text)
-    elif target is not None:
-        Path(target).write_text(text, encoding="utf-8")

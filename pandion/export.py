@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Protocol
 
 from pandion.parser import COULD_NOT_START, Parser
-from pandion.reading import ReadingProgress
+from pandion.progress import Progress
 
 if TYPE_CHECKING:
     from messages.ulog import Topic
@@ -44,7 +44,7 @@ def main(argv: list[str]) -> int:
         log = open_log(path)
         with contextlib.ExitStack() as stack:
             sink = _sink(read.csv, read.mcap, log, stack)
-            progress = stack.enter_context(ReadingProgress("exporting", sys.stdout))
+            progress = stack.enter_context(Progress(sys.stdout, counted=False))
             count = _export(log, sink, progress)
     except (UlogError, OSError) as error:
         print(f"pandion export: {error}", file=sys.stderr)
@@ -71,13 +71,13 @@ def _sink(csv: Path | None, mcap: Path | None, log: UlogFile, stack: contextlib.
     return stack.enter_context(McapSink(mcap, facts))
 
 
-def _export(log: UlogFile, sink: Sink, progress: ReadingProgress) -> int:
+def _export(log: UlogFile, sink: Sink, progress: Progress) -> int:
     count = 0
     for topic, t_us, names, values in _rows(log):
         sink.add(topic, t_us, names, values)
         count += 1
         if count % _TOLD_RECORDS == 0:
-            progress.report(log.at, log.size)
+            progress.report("exporting", log.at, log.size)
     return count
 
 

@@ -14,6 +14,7 @@ from pandion.display import Display
 from pandion.fly_options import FlyOptions, add_arguments
 from pandion.fly_options import options as fly_options
 from pandion.join_truth import join_truth
+from pandion.output import write_text
 from pandion.parser import COULD_NOT_START, Parser
 from pandion.processor import ANYWHERE, lockstep_places
 from pandion.result import Parts, as_json
@@ -121,10 +122,7 @@ def _judge(options: FlyOptions, display: Display, flown: Flown) -> int:
     text = json.dumps(result, indent=2) + "\n"
     (out / "result.json").write_text(text, encoding="utf-8")
     display.verdict(result, rows(result, (flown.sitl or {}).get("tracking_error_max_m")))
-    if options.json == "-":
-        print(text, end="", flush=True)
-    elif options.json is not None:
-        Path(options.json).write_text(text, encoding="utf-8")
+    write_text(options.json, text)
     if flown.sitl is not None and flown.sitl.get("end_kind") == "refused":
         return COULD_NOT_START
     return COMPLETED if result["completed"] else NOT_COMPLETED

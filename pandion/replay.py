@@ -6,12 +6,14 @@ import dataclasses
 import json
 import sys
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fsw.signals import Origin
+from pandion.output import write_text
 from pandion.parser import COULD_NOT_START, Parser
-from pandion.reading import ReadingProgress
+from pandion.progress import Progress
 
 if TYPE_CHECKING:
     from fsw.runtime.program import FlightProgram
@@ -68,12 +70,13 @@ def _verify(options: ReplayOptions, log: UlogFile) -> int:
         print(f"note: {note}", file=console)
     if len(notes) > _NOTES_SHOWN:
         print(f"note: {len(notes) - _NOTES_SHOWN} more numbers differ", file=console)
-    with ReadingProgress("replaying", console) as progress:
-        found = replay(log, program, progress.report)
+    with Progress(console, counted=False) as progress:
+        found = replay(log, program, partial(progress.report, "replaying"))
     same = found.difference is None and not found.lost_ms
     print(_sentence(found, log), file=console)
-    _write(options.json, {"log": str(log.path), "same": same, **dataclasses.asdict(found),
-                          "whole": log.whole, "other_numbers": list(notes)})  # fmt: skip
+    figures = {"log": str(log.path), "same": same, **dataclasses.asdict(found)}
+    figures |= {"whole": log.whole, "other_numbers": list(notes)}
+    write_text(options.json, json.dumps(figures, indent=2) + "\n")
     return SAME if same else DIFFERS
 
 
@@ -121,8 +124,8 @@ def _summarise(options: ReplayOptions, log: UlogFile) -> int:
     from pandion.log_summary import summary
 
     console = sys.stderr if options.json == "-" else sys.stdout
-    with ReadingProgress("reading", console) as progress:
-        result = summary(log, progress.report)
+    with Progress(console, counted=False) as progress:
+        result = summary(log, partial(progress.report, "reading"))
     for name, value in result.items():
         if name not in ("topics", "texts"):
             print(f"{name:12} {value}", file=console)
@@ -130,13 +133,5 @@ def _summarise(options: ReplayOptions, log: UlogFile) -> int:
         print(f"  {name:34} {count:8d}", file=console)
     for text in result["texts"]:
         print(f"  {text}", file=console)
-    _write(options.json, result)
+    write_text(options.json, json.dumps(result, indent=2) + "\n")
     return SAME
-
-
-def _write(target: str | None, result: dict[str, Any]) -> None:
-    text = json.dumps(result, indent=2) + "\n"
-    if target == "-":
-        sys.stdout.write(text)
-    elif target is not None:
-        Path(target).write_text(text, encoding="utf-8")

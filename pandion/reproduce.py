@@ -5,18 +5,18 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from contextlib import AbstractContextManager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
 from fsw.log.run_directory import new_run_directory
+from pandion.output import write_text
 from pandion.parser import COULD_NOT_START, Parser, unknown_name
+from pandion.progress import Progress
 from pandion.version import version
 
 if TYPE_CHECKING:
-    from rich.progress import Progress, TaskID
-
     from studies.settings import Report, Settings
 
 # As in studies.catalogue, which takes a second to import; a test compares the two.
@@ -163,8 +163,10 @@ def _run(options: ReproduceOptions) -> int:
     if settings.tuned_on:
         print("these seeds were used for tuning; report others", file=console, flush=True)
     try:
-        with FlightProgress(console) as progress:
-            campaign = Campaign(options.workers, folder / "journal.jsonl", progress.report)
+        with Progress(console, lines=10) as progress:
+            campaign = Campaign(
+                options.workers, folder / "journal.jsonl", partial(progress.report, "flown")
+            )
             report = STUDIES[options.what](settings, campaign)
     except KeyboardInterrupt:
         print(f"pandion reproduce: interrupted; --out {folder} resumes", file=sys.stderr)
@@ -172,10 +174,7 @@ def _run(options: ReproduceOptions) -> int:
     page = write(report, settings, _provenance(options), options.what, folder)
     _show(report, console)
     print(f"page {page}", file=console)
-    if options.json == "-":
-        sys.stdout.write(json_text(report))
-    elif options.json is not None:
-        Path(options.json).write_text(json_text(report), encoding="utf-8")
+    write_text(options.json, json_text(report))
     for error in report.errors:
         print(f"pandion reproduce: {error}", file=sys.stderr)
     return BROKEN if report.errors else DONE
@@ -216,44 +215,3 @@ def _show(report: Report, stream: TextIO) -> None:
         for row in table.rows:
             drawn.add_row(*row)
         console.print(drawn)
-
-
-class FlightProgress(AbstractContextManager["FlightProgress"]):
-    """A bar on a terminal, a line for every tenth elsewhere."""
-
-    def __init__(self, stream: TextIO) -> None:
-        self._stream = stream
-        self._bar: Progress | None = None
-        self._task: TaskID | None = None
-        self._told = -1
-
-    def __enter__(self) -> FlightProgress:
-        if self._stream.isatty():
-            from rich.console import Console
-            from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemainingColumn
-
-            self._bar = Progress(
-                "flying",
-                BarColumn(),
-                MofNCompleteColumn(),
-                TimeRemainingColumn(),
-                console=Console(file=self._stream),
-                transient=True,
-            )
-            self._bar.start()
-            self._task = self._bar.add_task("", total=None)
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        if self._bar is not None:
-            self._bar.stop()
-
-    def report(self, done: int, total: int) -> None:
-        """Show how many flights are done."""
-        if self._bar is not None and self._task is not None:
-            self._bar.update(self._task, completed=done, total=total)
-            return
-        tenth = 10 * done // max(total, 1)
-        if tenth != self._told:
-            self._told = tenth
-            print(f"flown {done} of {total}", file=self._stream, flush=True)

@@ -90,7 +90,7 @@ class Referee:
         curve, starts_s = _NO_CURVE, 0.0
         if self.world.workspace is not None:
             clock, last_s = self._clock, before_s + len(places) * step_s
-            if clock.starts_s is None or not (clock.counts(before_s) and clock.counts(last_s)):
+            if clock.starts_s is None or not clock.counts(last_s):
                 return False
             curve, starts_s = clock.curve, clock.starts_s
         lowest, when_s = self.record.arrays

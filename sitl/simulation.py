@@ -120,13 +120,9 @@ class Simulation:
 
     @property
     def trajectory_start_us(self) -> int | None:
-        """Stamp at which the trajectory starts, None while that is open."""
+        """Stamp at which the trajectory starts, None if the flight has none."""
         start = self.clock.starts_s
         return None if start is None else START_US + round(1e6 * start)
-
-    def start_trajectory(self, t_us: int) -> None:
-        """The pilot starts the trajectory at the stamp ``t_us``."""
-        self.clock.start(1e-6 * (t_us - START_US))
 
     def leave_trajectory(self, t_us: int, why: str) -> None:
         """The vehicle left the trajectory at the stamp ``t_us``: no more error, no workspace.

@@ -12,7 +12,6 @@ from fsw.signals import CommandRequest, Home, Origin, Vec3
 _GLOBAL = (0, 5)
 _RELATIVE = (3, 6)
 _LOCAL_NED = 1
-FRAMES = (*_GLOBAL, *_RELATIVE, _LOCAL_NED)
 
 # m from the origin; farther is a slip: of the frame, the unit or the sign.
 FARTHEST = 1000.0

@@ -229,17 +229,15 @@ def test_asking_twice_in_a_step_gives_the_same_reading() -> None:
     assert simulation.sense() is simulation.sense()
 
 
-def test_the_trajectory_starts_after_the_delay_and_the_pilot_can_move_it() -> None:
+def test_the_trajectory_starts_after_the_delay_and_a_hop_has_none() -> None:
     simulation = Simulation(load_scenario("walls"), 0)
     assert simulation.trajectory_start_us == 2_000_000
     assert simulation.target_at(0.5) == simulation.target_at(1.0)
     assert simulation.target_at(5.0) != simulation.target_at(1.0)
     hop = Simulation(load_scenario("hop"), 0)
     assert hop.trajectory_start_us is None
+    assert hop.target_at(15.0) == hop.target_at(0.0)
     assert hop.result().tracking_error_rms_m is None
-    hop.start_trajectory(11_000_000)
-    assert hop.target_at(10.0) == hop.clock.reference.at(0.0)
-    assert hop.target_at(15.0) == hop.clock.reference.at(5.0)
 
 
 def test_the_first_reason_to_end_stands() -> None:
@@ -263,20 +261,24 @@ def test_wind_is_an_acceleration_of_the_whole_vehicle() -> None:
     assert simulation.truth().v_WB == pytest.approx((0.0, 0.0, -0.1), abs=1e-12)
 
 
-def test_a_workspace_counts_only_while_the_pilot_is_on_the_trajectory() -> None:
+def test_a_workspace_counts_only_where_there_is_a_trajectory() -> None:
     scenario = replace(load_scenario("hop"), workspace=Workspace(0.075, 0.225))
     simulation = Simulation(scenario, 0)
     _fly(simulation, OFF, 0.2)
     assert simulation.result().margins_m == {}
-    simulation.start_trajectory(1_300_000)
-    _fly(simulation, OFF, 0.2)
-    # Still on the ground, 1.5 m below where it should be.
-    depth = simulation.result().margins_m["workspace/base"]
-    assert depth < -1.0
-    error = simulation.result().tracking_error_rms_m
+
+
+def test_nothing_of_the_trajectory_counts_once_the_vehicle_has_left_it() -> None:
+    simulation = Simulation(load_scenario("workspace-calm"), 0)
+    trimmed = _trimmed(simulation)
+    _fly(simulation, trimmed, 0.4)
+    before = simulation.result()
+    assert before.tracking_error_rms_m is not None
     simulation.leave_trajectory(simulation.t_us, "the vehicle left it")
-    _fly(simulation, OFF, 0.3)
-    assert simulation.result().tracking_error_rms_m == error
+    _fly(simulation, OFF, 0.1)  # falls
+    after = simulation.result()
+    assert after.tracking_error_rms_m == before.tracking_error_rms_m
+    assert after.margins_m == before.margins_m
     simulation.leave_trajectory(simulation.t_us, "and again")
     assert "the vehicle left it at 0.4 s" in simulation.result().end_reason
     assert "again" not in simulation.result().end_reason

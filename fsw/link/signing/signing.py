@@ -19,7 +19,6 @@ from fsw.link.signing.key_file import KeyFile, SigningKey
 from fsw.link.wire.message_ids import HEARTBEAT, RADIO_STATUS
 from messages.frames import Frame, announcing_signature, is_signed
 
-KEY_SIZE: Final = 32  # bytes
 _HASH_SIZE: Final = 6  # bytes, the first of SHA-256
 _SIGNATURE_SIZE: Final = 13  # bytes: link, time (6), hash (6)
 _EPOCH_UNIX_S: Final = 1_420_070_400  # 2015-01-01 UTC, where signing time begins

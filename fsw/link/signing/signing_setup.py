@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Final, cast
+from typing import cast
 
 from fsw.link.signing.signing import Signing
 from fsw.link.udp_endpoint import Address, is_loopback
@@ -11,7 +11,6 @@ from fsw.signals import StatusText
 from messages.frames import Frame
 
 _WARNING, _NOTICE = 4, 5  # MAV_SEVERITY
-_KEY_FROM: Final = 3  # place of the first key byte in SETUP_SIGNING
 
 
 def set_up_signing(

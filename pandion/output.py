@@ -1,0 +1,15 @@
+"""Where ``--json`` goes."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+
+def write_text(target: str | None, text: str) -> None:
+    """Write to the file of that name, to standard output for ``-``, nowhere for None."""
+    if target == "-":
+        sys.stdout.write(text)
+        sys.stdout.flush()
+    elif target is not None:
+        Path(target).write_text(text, encoding="utf-8")
