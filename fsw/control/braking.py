@@ -5,10 +5,11 @@ quadratic regulator, :math:`u = -K (v, a, j, s)`: it takes back a tilt that poin
 while it brakes, which feedback of the velocity alone does not. The wish is cut to the tilt that
 the planner may use as well, along its own direction; the lag bounds the jerk.
 
-It knows no walls. It keeps them because the barrier counts on a deceleration that this law exceeds
-in every direction: from a state with :math:`h \ge \lambda` the plan stops before the wall
-(``tests/fsw/control/test_braking.py`` says from which states). A sphere that moves on with its
-target leaves a vehicle at rest behind.
+It knows no walls or points. It keeps them because the barrier counts on a deceleration that this
+law exceeds in every direction: from a state with :math:`h \ge \lambda` the plan stops before the
+wall (``tests/fsw/control/test_braking.py`` says from which states), or before the tangent plane
+that a point's ball lies behind. A sphere that moves on with its target leaves a vehicle at rest
+behind.
 
 Source: docs/timing.md, docs/decisions/0015-own-grid-own-process.md.
 """

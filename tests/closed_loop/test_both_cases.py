@@ -9,7 +9,7 @@ import pytest
 
 from fsw.control.cascade import Inner
 from fsw.parameters.flight_config import CONTROLLERS, flight_config
-from sitl.scenario import Start
+from sitl.scenario import Obstacle, Start
 from sitl.scenario_file import load_scenario
 from tests.closed_loop.harness import Flight
 
@@ -27,6 +27,18 @@ def test_every_margin_stays_positive_between_samples_too(name: str, seconds: flo
     counters = flight.snapshot.counters
     assert (counters.missed_deadlines, counters.fallbacks) == (0, 0)
     assert counters.plans >= 10.0 * seconds - 1
+
+
+def test_a_point_among_walls_is_kept_with_them() -> None:
+    tip = Obstacle("tip", (0.82, 0.52, -1.03), 0.1)  # 50 mm from the path
+    flight = Flight(replace(load_scenario("walls"), obstacles=(tip,)), seed=11)
+    flight.follow()
+    flight.run(12.0)
+    margins = flight.sim.result().margins_m
+    assert len(margins) == 12
+    assert min(margins.values()) > 0.0, margins
+    assert margins["tip/end_effector"] < 0.15, "or it was no test"
+    assert margins["front/end_effector"] < 0.2, "or it was no test"
 
 
 def test_without_the_barrier_the_path_leads_too_close_to_a_branch() -> None:

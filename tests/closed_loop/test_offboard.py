@@ -21,7 +21,7 @@ from fsw.signals import (
     SetpointKind,
     Vec3,
 )
-from sitl.scenario import Hold, Pilot, Scenario
+from sitl.scenario import Hold, Obstacle, Pilot, Scenario
 from sitl.scenario_file import load_scenario
 from tests.closed_loop.harness import ARM, SET_MODE, Flight, command, hover, on_the_ground
 
@@ -107,6 +107,35 @@ def test_no_set_point_flies_the_arm_into_a_wall(attack: str) -> None:
     margin = flight.sim.min_margin_m
     assert margin is not None
     assert 0.02 < margin < 0.2
+
+
+def among_branches() -> Scenario:
+    """A point where the body is going to pass, and one for the end-effector."""
+    tips = (("high", (0.5, 0.0, -1.4)), ("low", (1.2, 0.1, -1.2)))
+    obstacles = tuple(Obstacle(name, place, 0.1) for name, place in tips)
+    return replace(walls(AFAR, disturbed=True), walls=(), obstacles=obstacles)
+
+
+@pytest.mark.parametrize(
+    "attack", ["the end-effector behind the wall", "5 m/s at the wall", "nose down"]
+)
+def test_no_set_point_flies_the_vehicle_into_a_branch(attack: str) -> None:
+    flight = offboard(among_branches(), **ATTACKS[attack])
+    flight.run(5.0)
+    assert flight.mode is Mode.OFFBOARD
+    margin = flight.sim.min_margin_m
+    assert margin is not None
+    assert 0.02 < margin < 0.6
+
+
+def test_a_set_point_in_a_branch_is_held_at_its_clearance() -> None:
+    flight = offboard(among_branches(), **end_effector(p=(0.5, 0.0, -1.4)))
+    flight.run(7.0)
+    followed = flight.snapshot.reference
+    assert followed is not None
+    assert 0.1 - 1e-6 < math.dist(followed.p_WE, (0.5, 0.0, -1.4)) < 0.25
+    assert flight.sim.min_margin_m is not None
+    assert 0.02 < flight.sim.min_margin_m < 0.2
 
 
 def test_a_position_is_flown_to_and_held_with_its_heading() -> None:

@@ -95,11 +95,14 @@ def test_a_slow_planner_has_its_response(
     assert flight.sim.min_margin_m > 0.0
 
 
-@pytest.mark.parametrize("gone_s", [3.1, 9.4, 14.0])
-def test_in_walls_a_planner_that_is_gone_costs_no_barrier(gone_s: float) -> None:
+@pytest.mark.parametrize(
+    ("name", "gone_s"),
+    [("walls", 3.1), ("walls", 9.4), ("walls", 14.0), ("branches", 7.9), ("branches", 11.3)],
+)
+def test_a_planner_that_is_gone_costs_no_barrier(name: str, gone_s: float) -> None:
     last = round(10 * gone_s)
     flight = Flight(
-        load_scenario("walls"),
+        load_scenario(name),
         seed=4,
         config=flight_config(),
         late_ticks=lambda plan: 0 if plan < last else 10**9,

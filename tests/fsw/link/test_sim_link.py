@@ -14,7 +14,10 @@ from fsw.link.wire import message_ids as ids
 from fsw.signals import CommandAck, Mode
 from messages.frames import FrameWriter, split
 from sitl.link.encode import StepEncoder
+from sitl.link.pilot import flight_plan
 from sitl.link.pilot_messages import SendCommand
+from sitl.mission_clock import MissionClock
+from sitl.scenario_file import load_scenario
 from sitl.sensors.suite import SensorReadings
 from tests.fsw.link.snapshots import FACTS, outputs_at
 
@@ -84,6 +87,22 @@ def test_every_sensor_arrives_where_it_belongs(wire: Wire) -> None:
         ("qd_arm", "qd_arm"),
     ):
         assert getattr(got, name) == pytest.approx(getattr(sent, other)), name
+
+
+def test_walls_and_points_arrive_as_the_pilot_announces_them(wire: Wire) -> None:
+    branches, walls = load_scenario("branches"), load_scenario("walls").walls
+    scenario = replace(branches, walls=walls[:1])
+    clock = MissionClock(scenario)
+    plan = flight_plan(scenario, lambda t_us: clock.target_at(0.0), lambda t_us: 0.0)
+    encoder = StepEncoder(lockstep=True)
+    wire.send(encoder.datagram(readings(1_002_000), plan.announcements))
+    assert wire.link.receive() is not None
+    safe_set = wire.inbox.take_safe_set()
+    assert safe_set is not None
+    assert [wall.offset for wall in safe_set.walls] == [-1.0]
+    for heard, told in zip(safe_set.obstacles, scenario.obstacles, strict=True):
+        assert heard.position == pytest.approx(told.position_m)
+        assert heard.clearance == pytest.approx(told.clearance_m)
 
 
 def test_a_repeated_step_gets_the_same_answer_and_no_tick(wire: Wire) -> None:

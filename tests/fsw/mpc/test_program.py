@@ -10,7 +10,7 @@ import pytest
 
 from fsw.barriers.soft_rows import TargetPoints
 from fsw.model.airframe import AIRFRAME
-from fsw.model.linearisation import Linearisation
+from fsw.model.linearisation import END_EFFECTOR, Linearisation
 from fsw.model.prediction import INPUTS, Array, condense
 from fsw.mpc.costs import CostWeights, TrackingCost
 from fsw.mpc.planner_config import PlannerConfig, Solver
@@ -88,6 +88,23 @@ def test_the_plan_is_the_optimum_of_the_problem_written_a_second_time(
     np.testing.assert_allclose(inputs_of(answer) / loose, expected.inputs / loose, atol=tolerance)
     worst = float(expected.barrier_slack.max()) if safe_set != SafeSet() else 0.0
     assert answer.slack_max == pytest.approx(worst, abs=tolerance)
+
+
+@pytest.mark.parametrize("seed", [31, 32, 33, 34])
+def test_a_point_beside_a_wall_that_is_in_the_way_is_in_the_problem(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    start, asked = question(random, SafeSet())
+    way = asked.target_p[-1] - asked.horizon.position[0, END_EFFECTOR]
+    tip = asked.horizon.position[0, END_EFFECTOR] + 0.15 * way / np.linalg.norm(way)
+    branch = PointObstacle(vec3(tip), 0.1)
+    asked = replace(asked, safe_set=SafeSet(POINTS.walls, obstacles=(branch,)))
+    expected = optimum(asked, CONFIG)
+    free = optimum(replace(asked, safe_set=SafeSet(POINTS.walls)), CONFIG)
+    assert np.abs(expected.inputs - free.inputs).max() > 0.3, "or it was no test"
+    answer = planned(answered(start, asked, CONFIG))
+    loose = np.tile([1.0, 1.0, 1.0, 3.0, 1.0, 1.0], N)
+    np.testing.assert_allclose(inputs_of(answer) / loose, expected.inputs / loose, atol=0.01)
+    assert answer.slack_max == pytest.approx(float(expected.barrier_slack.max()), abs=0.01)
 
 
 def answered(
