@@ -36,7 +36,7 @@ def add_control_arguments(parser: argparse.ArgumentParser) -> None:
         "--solver",
         metavar="NAME",
         default="clarabel",
-        help="optimiser: clarabel, the active-set daqp or the paper's slsqp (default %(default)s)",
+        help="optimiser: clarabel or the paper's slsqp (default %(default)s)",
     )
     parser.add_argument(
         "--soft",

@@ -100,7 +100,6 @@ def entries() -> tuple[Entry, ...]:
 
     return (
         *(Entry("clarabel", count, planner("clarabel", count)) for count in _ITERATIONS),
-        *(Entry("daqp", count, planner("daqp", count)) for count in _ITERATIONS),
         Entry("slsqp-numeric", None, slsqp("numeric")),
         Entry("slsqp-analytic", None, slsqp("analytic")),
         *(

@@ -132,9 +132,9 @@ def _node(
     points = _points(config, x)
     _add_cost(program, config, i == config.horizon, x, points[2], node)
     joint, barrier = config.joint_slack, config.barrier_slack
-    program.cost += joint.linear * slack[0] + joint.quadratic * slack[0] ** 2
+    program.cost += joint * slack[0]
     for k in range(1, slack.numel()):
-        program.cost += barrier.linear * slack[k] + barrier.quadratic * slack[k] ** 2
+        program.cost += barrier * slack[k]
     th1, th12 = x[Q_ARM], x[Q_ARM] + x[Q_ARM + 1]
     for angle, limit in (
         (th1, config.airframe.joint1_limit),

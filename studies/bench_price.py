@@ -27,13 +27,8 @@ class Judge:
         """Cost of inputs (6 n,) with the smallest slacks that admit them."""
         problem = self._problem
         problem.linearise(to_vector(request.start), inputs, target_points(request))
-        program, whole = problem.program, problem.program.whole
-        soft, slacks = slice(program.soft_rows), slice(program.inputs, None)
-        missing = np.maximum(-(whole.b - whole.a[:, : program.inputs] @ inputs)[soft], 0.0)
-        held_by = -whole.a[soft, slacks].toarray()
-        slack = (held_by * missing[:, None]).max(axis=0, initial=0.0)
-        weight = whole.p.diagonal()[slacks]
-        return float(problem.cost + whole.q[slacks] @ slack + 0.5 * slack @ (weight * slack))
+        program = problem.program
+        return float(problem.cost + program.price @ program.least_slacks(inputs))
 
     def converged(self, request: PlanRequest, guess: Array) -> tuple[Array, float]:
         """Inputs and price after programs until they stay.
@@ -45,7 +40,7 @@ class Judge:
         inputs, best = guess, (guess, self.price(request, guess))
         for _ in range(_MOST_ITERATIONS):
             self._problem.linearise(start, inputs, targets)
-            solution = self._problem.solve(last=True)
+            solution = self._problem.solve()
             if not solution.usable:
                 break
             step = solution.x[: self._unknowns] - inputs

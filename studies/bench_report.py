@@ -12,7 +12,7 @@ import numpy as np
 
 from studies.bench_mpc import Samples
 
-OURS = (("clarabel", 2), ("daqp", 2))  # as it flies by default, and with --solver daqp
+OURS = ("clarabel", 2)  # as it flies
 # Least factors at n = 5 and n = 10 by which the others should be slower.
 TARGETS = {
     "slsqp-numeric": {5: 150.0, 10: 250.0},
@@ -22,7 +22,7 @@ TARGETS = {
 }
 STEP_TARGET_US = {5: (600.0, 1000.0)}  # median, p99 with 2 iterations on an unloaded core
 PERIOD_US, FITS = 100_000.0, 50  # n = 20 should fit the period so often
-_PACKAGES = ("numpy", "scipy", "clarabel", "daqp", "numba", "casadi")
+_PACKAGES = ("numpy", "scipy", "clarabel", "numba", "casadi")
 
 
 def lines(all_samples: list[Samples]) -> list[str]:
@@ -65,10 +65,7 @@ def _stages(all_samples: list[Samples]) -> list[str]:
 def _verdicts(all_samples: list[Samples]) -> list[str]:
     """Ratios of medians against ours, and whether each is what it should be."""
     known = {(s.entry.name, s.entry.sqp_iterations, s.horizon): s for s in all_samples}
-    return [line for name, iterations in OURS for line in _verdict(known, name, iterations)]
-
-
-def _verdict(known: dict[Any, Samples], own_name: str, iterations: int) -> list[str]:
+    own_name, iterations = OURS
     found = [
         f"slower than {own_name} with {iterations} SQP iterations, by median wall time and "
         "processor time:"

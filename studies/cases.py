@@ -12,7 +12,6 @@ from typing import Literal
 from fsw.control.cascade import Inner
 from fsw.model.prediction import LagModel
 from fsw.mpc.planner_config import PlannerConfig
-from fsw.mpc.program import SlackPrice
 from fsw.parameters.flight_config import FlightConfig, flight_config
 from sitl.mission_clock import MissionClock
 from sitl.scenario import Scenario
@@ -84,7 +83,7 @@ def _at_once(planner: PlannerConfig) -> PlannerConfig:
         lag=LagModel(at_once=True),
         walls=walls,
         workspace=workspace,
-        barrier_slack=SlackPrice(200.0),
+        barrier_slack=200.0,
     )
 
 

@@ -10,12 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fsw.barriers.soft_rows import (
-    SoftRows,
-    TargetPoints,
-    kinds_moving_base,
-    kinds_moving_points,
-)
+from fsw.barriers.soft_rows import SoftRows, TargetPoints
 from fsw.model.linearisation import BASE, POINTS, Linearisation
 from fsw.model.prediction import INPUTS, Array
 from fsw.signals import Wall, WorkspaceSphere
@@ -35,10 +30,7 @@ class HardWalls:
         nodes = np.arange(first_node, horizon + 1)
         node, wall, _ = np.meshgrid(nodes, np.arange(len(walls)), np.arange(POINTS), indexing="ij")
         slack = (node - first_node) * len(walls) + wall
-        moved_by = np.tile(kinds_moving_points(self._normals), (len(nodes), 1, 1, 1))
-        self.rows = SoftRows(
-            node.ravel(), slack.ravel(), moved_by.reshape(-1, INPUTS), INPUTS * horizon
-        )
+        self.rows = SoftRows(node.ravel(), slack.ravel(), INPUTS * horizon)
         self.rows.required[:] = tightening
         self._start = np.zeros(len(walls) * POINTS)
 
@@ -67,8 +59,7 @@ class HardWorkspace:
         self._offset = np.array(sphere.centre_from_target)
         self._first = first_node
         nodes = np.arange(first_node, horizon + 1)
-        moved_by = kinds_moving_base(np.ones((len(nodes), 3)))
-        self.rows = SoftRows(nodes, nodes - first_node, moved_by, INPUTS * horizon)
+        self.rows = SoftRows(nodes, nodes - first_node, INPUTS * horizon)
         self.rows.required[:] = tightening
         self._start = np.zeros(1)
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from fsw.barriers.robust import required_h
 from fsw.barriers.root import BarrierNumbers, BarrierTuning, root, root_slope
-from fsw.barriers.soft_rows import SoftRows, TargetPoints, kinds_moving_points
+from fsw.barriers.soft_rows import SoftRows, TargetPoints
 from fsw.barriers.tangent import CENTRE_BALL
 from fsw.barriers.wall import gradient_along
 from fsw.compiled import compiled
@@ -40,15 +40,7 @@ class PointObstacleBarrier:
         nodes = np.arange(1 + tuning.skipped_nodes, horizon + 1)
         node, number, _ = np.meshgrid(nodes, np.arange(count), np.arange(POINTS), indexing="ij")
         slack = (node - nodes[0]) * count + number
-        # The direction turns with the guess: no axis can be left out for good.
-        moved_by = np.tile(kinds_moving_points(np.ones((count, 3))), (len(nodes), 1, 1, 1))
-        self.rows = SoftRows(
-            node.ravel(),
-            slack.ravel(),
-            moved_by.reshape(-1, INPUTS),
-            INPUTS * horizon,
-            group=number.ravel(),
-        )
+        self.rows = SoftRows(node.ravel(), slack.ravel(), INPUTS * horizon)
         self._h_start = np.zeros(count * POINTS)
 
     def refill(self, horizon: Linearisation, targets: TargetPoints) -> None:

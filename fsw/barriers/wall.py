@@ -13,7 +13,7 @@ import numpy as np
 
 from fsw.barriers.robust import required_h
 from fsw.barriers.root import BarrierNumbers, BarrierTuning, root, root_slope
-from fsw.barriers.soft_rows import SoftRows, TargetPoints, kinds_moving_points
+from fsw.barriers.soft_rows import SoftRows, TargetPoints
 from fsw.compiled import compiled
 from fsw.model.linearisation import POINTS, Linearisation
 from fsw.model.prediction import INPUTS, Array
@@ -30,14 +30,7 @@ class WallBarrier:
         nodes = np.arange(1 + tuning.skipped_nodes, horizon + 1)
         node, wall, _ = np.meshgrid(nodes, np.arange(len(walls)), np.arange(POINTS), indexing="ij")
         slack = (node - nodes[0]) * len(walls) + wall
-        moved_by = np.tile(kinds_moving_points(self._normals), (len(nodes), 1, 1, 1))
-        self.rows = SoftRows(
-            node.ravel(),
-            slack.ravel(),
-            moved_by.reshape(-1, INPUTS),
-            INPUTS * horizon,
-            group=wall.ravel(),
-        )
+        self.rows = SoftRows(node.ravel(), slack.ravel(), INPUTS * horizon)
         self._h_start = np.zeros(len(walls) * POINTS)
 
     def refill(self, horizon: Linearisation, targets: TargetPoints) -> None:

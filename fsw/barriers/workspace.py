@@ -21,7 +21,7 @@ import numpy as np
 
 from fsw.barriers.robust import required_h
 from fsw.barriers.root import BarrierNumbers, BarrierTuning, root, root_slope
-from fsw.barriers.soft_rows import SoftRows, TargetPoints, kinds_moving_base
+from fsw.barriers.soft_rows import SoftRows, TargetPoints
 from fsw.compiled import compiled
 from fsw.model.linearisation import BASE, Linearisation
 from fsw.model.prediction import INPUTS, Array
@@ -40,8 +40,7 @@ class WorkspaceBarrier:
         self._offset = np.array(sphere.centre_from_target)
         nodes = np.arange(1 + tuning.skipped_nodes, horizon + 1)
         node = np.repeat(nodes, DIRECTIONS)
-        moved_by = kinds_moving_base(np.ones((len(node), 3)))
-        self.rows = SoftRows(node, node - nodes[0], moved_by, INPUTS * horizon)
+        self.rows = SoftRows(node, node - nodes[0], INPUTS * horizon)
         self._h_start = np.zeros(1)
 
     def refill(self, horizon: Linearisation, targets: TargetPoints) -> None:

@@ -20,11 +20,9 @@ _STATUS = {
     clarabel.SolverStatus.MaxTime: SolverStatus.TIME_LIMIT,
 }
 
-# A guess that another iteration will correct need not be exact: stopping at 1e-3 changes the
-# final u by less than 2e-3 m/s^2 in flight, by up to 0.06 m/s^2 from an upset.
-ROUGH, FINE = 1e-3, 1e-6
+_TOLERANCE = 1e-6
 
-# A solve is bounded in iterations, not in time: about 20 us each at n = 5, and the same
+# A solve is bounded in iterations, not in time: a few microseconds each at n = 5, and the same
 # answer on a slow machine as on a fast one. Feasible programs need 8 to 15.
 MAX_ITERATIONS = 50
 
@@ -32,7 +30,7 @@ MAX_ITERATIONS = 50
 class ClarabelSolver:
     """Solves one program again and again with new numbers in the same pattern."""
 
-    def __init__(self, program: QuadraticProgram, tolerance: float = FINE) -> None:
+    def __init__(self, program: QuadraticProgram) -> None:
         settings = clarabel.DefaultSettings()
         settings.verbose = False
         settings.max_iter = MAX_ITERATIONS
@@ -46,10 +44,10 @@ class ClarabelSolver:
         settings.presolve_enable = False
         settings.chordal_decomposition_enable = False
         settings.input_sparse_dropzeros = False
-        settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = tolerance
+        settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = _TOLERANCE
         cones = [
             clarabel.NonnegativeConeT(program.nonnegative_rows),
-            *[clarabel.SecondOrderConeT(3)] * program.tilt_cones,
+            *[clarabel.SecondOrderConeT(3)] * program.cones,
         ]
         self._program = program
         self._solver = clarabel.DefaultSolver(

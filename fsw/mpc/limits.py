@@ -17,11 +17,7 @@ class JointLimits:
 
     def __init__(self, airframe: Airframe, model: CondensedModel) -> None:
         nodes = np.repeat(np.arange(1, model.horizon + 1), len(_LIMITED))
-        moved_by = np.zeros((len(_LIMITED), INPUTS), dtype=bool)
-        moved_by[:, 4:] = _LIMITED != 0.0
-        self.rows = SoftRows(
-            nodes, nodes - 1, np.tile(moved_by, (model.horizon, 1)), INPUTS * model.horizon
-        )
+        self.rows = SoftRows(nodes, nodes - 1, INPUTS * model.horizon)
         limits = np.array([airframe.joint1_limit] * 2 + [airframe.joint12_limit] * 2)
         self.rows.required[:] = np.tile(-limits, model.horizon)
         angles = model.gamma[1:, Q_ARM : Q_ARM + 2]  # (n, 2, 6 n)

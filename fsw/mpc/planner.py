@@ -152,16 +152,16 @@ class Planner:
         """A fixed number of quadratic programs from the last solution on."""
         inputs = self._guess(t_us)
         linearise_us = solve_us = 0.0
-        iterations = 0
-        wanted = self._config.sqp_iterations
-        for done in range(1, wanted + 1):
+        iterations = done = 0
+        while done < self._config.sqp_iterations:
             mark = self._stopwatch_us()
             problem.linearise(start, inputs, targets)
             linearised = self._stopwatch_us()
-            solution = problem.solve(last=done == wanted)
+            solution = problem.solve()
             linearise_us += linearised - mark
             solve_us += self._stopwatch_us() - linearised
             iterations += solution.iterations
+            done += 1
             if not solution.usable:
                 break
             inputs = solution.x[: len(inputs)]

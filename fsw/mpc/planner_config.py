@@ -9,11 +9,10 @@ from fsw.barriers.root import BarrierTuning
 from fsw.model.airframe import AIRFRAME, Airframe
 from fsw.model.prediction import LagModel
 from fsw.mpc.costs import CostWeights
-from fsw.mpc.program import InputLimits, SlackPrice
+from fsw.mpc.program import InputLimits
 from fsw.mpc.soft_costs import SoftWeights
 
-# Interior point, active set, or the paper's SLSQP with numeric gradients.
-Solver = Literal["clarabel", "daqp", "slsqp"]
+Solver = Literal["clarabel", "slsqp"]  # slsqp: the paper's, with numeric gradients
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,15 +28,15 @@ class PlannerConfig:
     lag: LagModel = field(default_factory=LagModel)
     weights: CostWeights = field(default_factory=CostWeights)
     limits: InputLimits = field(default_factory=InputLimits)
-    joint_slack: SlackPrice = field(default_factory=lambda: SlackPrice(50.0))
+    joint_slack: float = 50.0  # price of a rad outside the limits
     # blf
     # Beside walls the end-effector counts too, which swings more than the base wanders.
     walls: BarrierTuning = field(default_factory=lambda: BarrierTuning(robustness=0.345))
     workspace: BarrierTuning = field(default_factory=BarrierTuning)
-    barrier_slack: SlackPrice = field(default_factory=lambda: SlackPrice(20.0))
+    barrier_slack: float = 20.0  # price of a m/s less than the barrier requires
     # hc
     tightening: float = 0.0  # m, kept in addition to the safe set
-    hard_slack: SlackPrice | None = None  # None: hard, as in the paper
+    hard_slack: float | None = None  # price of a m outside; None: hard, as in the paper
     hard_skipped_nodes: int = 0
     # sc, and naive with centring
     soft: SoftWeights = field(default_factory=SoftWeights)

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from fsw.barriers.soft_rows import SoftRows, TargetPoints
 from fsw.model.linearisation import Linearisation
 from fsw.model.prediction import Array, CondensedModel
-from fsw.mpc.clarabel_solver import FINE, ROUGH
+from fsw.mpc.dual_solver import DualSolver
 from fsw.mpc.limits import JointLimits
 from fsw.mpc.planner_config import PlannerConfig
-from fsw.mpc.program import Program, SlackPrice
-from fsw.mpc.reduced_solver import ReducedSolver
+from fsw.mpc.program import Program
 from fsw.mpc.solution import Solution
 from fsw.mpc.variants import parts_of
 from fsw.signals import SafeSet
@@ -26,16 +23,12 @@ class Problem:
         self._limits = JointLimits(config.airframe, model)
         parts = parts_of(config, safe_set)
         self._costs, self._barriers = parts.costs, parts.barriers
-        blocks: list[tuple[SoftRows, SlackPrice | None]] = [(self._limits.rows, config.joint_slack)]
+        blocks: list[tuple[SoftRows, float | None]] = [(self._limits.rows, config.joint_slack)]
         blocks += [(barrier.rows, parts.slack) for barrier in parts.barriers]
         self._program = Program(config.horizon, config.limits, tuple(blocks))
-        self._gradient = np.zeros(self._program.inputs)
         self._first_barrier_slack = self._program.inputs + self._limits.rows.slacks
         self.cost = 0.0
-        self.linearise(np.zeros(model.phi.shape[1]), self._gradient, _no_targets(config.horizon))
-        active_set = config.solver == "daqp"
-        self._fine = ReducedSolver(self._program, FINE, active_set=active_set)
-        self._rough = self._fine if active_set else ReducedSolver(self._program, ROUGH)
+        self._solver = DualSolver(self._program)
 
     @property
     def program(self) -> Program:
@@ -44,23 +37,23 @@ class Problem:
 
     def linearise(self, start: Array, guess: Array, targets: TargetPoints) -> None:
         """Refill the program around a guess of the inputs (6 n,) from a start (19,)."""
-        config = self._config
-        self._horizon.refill(config.airframe, start, guess)
-        hessian, gradient = self._program.hessian, self._gradient
-        hessian[:] = 0.0
-        gradient[:] = 0.0
+        program = self._program
+        self._horizon.refill(self._config.airframe, start, guess)
+        program.hessian[:] = 0.0
+        program.linear[:] = 0.0
         self.cost = sum(
-            cost.add(self._horizon, targets, guess, hessian, gradient) for cost in self._costs
+            cost.add(self._horizon, targets, guess, program.hessian, program.linear)
+            for cost in self._costs
         )
         self._limits.refill(self._horizon)
         for barrier in self._barriers:
             barrier.refill(self._horizon, targets)
-        self._program.refill(guess, self._gradient)
+        program.refill(guess)
         self._guess = guess
 
-    def solve(self, *, last: bool) -> Solution:
-        """Solve the program as last linearised, finely where no iteration will follow."""
-        return (self._fine if last else self._rough).solve(self._guess)
+    def solve(self) -> Solution:
+        """Solve the program as last linearised."""
+        return self._solver.solve(self._guess)
 
     def barrier_at_start(self) -> tuple[float, ...]:
         """h of each constraint at node 0 [m/s]."""
@@ -70,8 +63,3 @@ class Problem:
         """How far a solution softens the barrier [m/s]."""
         slacks = x[self._first_barrier_slack :]
         return float(slacks.max()) if len(slacks) else 0.0
-
-
-def _no_targets(horizon: int) -> TargetPoints:
-    nodes = horizon + 1
-    return TargetPoints(np.zeros((nodes, 3)), np.zeros((nodes, 3)), np.zeros(nodes))

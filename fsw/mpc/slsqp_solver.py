@@ -18,7 +18,7 @@ from scipy.optimize import OptimizeResult, minimize
 
 from fsw.barriers.soft_rows import TargetPoints
 from fsw.model.prediction import Array
-from fsw.mpc.program import Program, QuadraticProgram
+from fsw.mpc.program import CONE, Program
 from fsw.mpc.solution import Solution
 from fsw.signals import SolverStatus
 
@@ -107,45 +107,40 @@ class _Point:
 
     def __init__(self, problem: Linearisable, start: Array, targets: TargetPoints) -> None:
         self._problem, self._start, self._targets = problem, start, targets
-        self._inputs = np.zeros(problem.program.inputs)
-        self._soft_rows = problem.program.soft_rows
-        whole, slacks = problem.program.whole, slice(problem.program.inputs, None)
-        self._price, self._weight = whole.q[slacks].copy(), whole.p.diagonal()[slacks]
+        program = problem.program
+        self._inputs = np.zeros(program.inputs)
+        rows = program.rows
+        self._holds = np.zeros((program.soft_rows, len(program.price)))  # slacks of soft rows
+        softened = np.flatnonzero(rows.slack >= 0)
+        self._holds[softened, rows.slack[softened]] = 1.0
         problem.linearise(start, self._inputs, targets)
 
     def rest(self) -> Array:
         """u = 0, and the slacks that make it admissible."""
-        program, whole = self._problem.program, self._problem.program.whole
-        x = np.zeros(program.unknowns)
-        # Every soft row holds at most one slack, with coefficient -1.
-        missing = np.maximum(-whole.b[: program.soft_rows], 0.0)
-        slacks = -whole.a[: program.soft_rows, program.inputs :].toarray()
-        x[program.inputs :] = (slacks * missing[:, None]).max(axis=0, initial=0.0)
-        return x
+        rest = np.zeros(len(self._inputs))
+        return np.concatenate((rest, self._at(rest).least_slacks(rest)))
 
     def bounds(self) -> list[tuple[float | None, float | None]]:
         """Of every unknown; the tilt bounds the horizontal acceleration through the margins."""
-        program, whole = self._problem.program, self._problem.program.whole
-        slacks = program.unknowns - program.inputs
-        first, last = program.soft_rows + slacks, whole.nonnegative_rows
-        upper = slice(first, (first + last) // 2)  # one +1 a row; the lower bounds mirror them
+        program = self._problem.program
+        rows, first = program.rows, program.soft_rows
+        upper = slice(first, (first + rows.first_cone) // 2)  # the lower bounds mirror them
         bounds: list[tuple[float | None, float | None]] = [(None, None)] * program.inputs
-        for column, bound in zip(whole.a[upper].tocsr().indices, whole.b[upper], strict=True):
-            bounds[column] = (-bound, bound)
-        return bounds + [(0.0, None)] * slacks
+        for row, bound in zip(rows.g[upper], rows.b[upper], strict=True):
+            bounds[int(row.argmax())] = (-bound, bound)
+        return bounds + [(0.0, None)] * len(program.price)
 
     def cost(self, x: Array) -> float:
         """Costs at the inputs and the price of the slacks."""
-        self._at(x)
-        slack = x[len(self._inputs) :]
-        price = self._price @ slack + 0.5 * slack @ (self._weight * slack)
-        return float(self._problem.cost + price)
+        program = self._at(x)
+        return float(self._problem.cost + program.price @ x[program.inputs :])
 
     def slope(self, x: Array) -> Array:
         """Of ``cost``: the quadratic model around a point has the true slope there."""
-        whole = self._at(x)
-        upper = whole.p
-        return np.asarray(upper @ x + upper.T @ x - upper.diagonal() * x + whole.q)
+        program = self._at(x)
+        upper, inputs = program.hessian, x[: program.inputs]
+        slope = upper @ inputs + upper.T @ inputs - upper.diagonal() * inputs + program.linear
+        return np.concatenate((slope, program.price))
 
     def margins(self, x: Array) -> Array:
         """Non-negative where admissible: soft rows, then one a tilt cone.
@@ -153,24 +148,28 @@ class _Point:
         The cone's margin is the difference of squares: the norm has no slope at u = 0,
         where the paper starts.
         """
-        whole = self._at(x)
-        left = whole.b - whole.a @ x
-        t, ax, ay = left[whole.nonnegative_rows :].reshape(-1, 3).T
-        return np.concatenate((left[: self._soft_rows], t * t - ax * ax - ay * ay))
+        program = self._at(x)
+        rows, soft = program.rows, program.soft_rows
+        left = rows.b - rows.g @ x[: program.inputs]
+        left[:soft] += self._holds @ x[program.inputs :]
+        t, ax, ay = left[rows.first_cone :].reshape(-1, CONE).T
+        return np.concatenate((left[:soft], t * t - ax * ax - ay * ay))
 
     def margin_slopes(self, x: Array) -> Array:
         """Of ``margins``, (margins, unknowns)."""
-        whole = self._at(x)
-        slopes = -whole.a.toarray()
-        cones = (whole.b + slopes @ x)[whole.nonnegative_rows :].reshape(-1, 3)
-        signed = 2.0 * cones * np.array([1.0, -1.0, -1.0])
-        tilt = slopes[whole.nonnegative_rows :].reshape(-1, 3, len(x))
-        return np.concatenate((slopes[: self._soft_rows], np.einsum("ca,cak->ck", signed, tilt)))
+        program = self._at(x)
+        rows, soft = program.rows, program.soft_rows
+        g, b = rows.g[rows.first_cone :], rows.b[rows.first_cone :]
+        cones = (b - g @ x[: program.inputs]).reshape(-1, CONE)
+        signed = 2.0 * cones * np.array([-1.0, 1.0, 1.0])
+        tilt = np.einsum("ca,cak->ck", signed, g.reshape(-1, CONE, program.inputs))
+        unfelt = np.zeros((len(tilt), len(program.price)))
+        return np.block([[-rows.g[:soft], self._holds], [tilt, unfelt]])
 
-    def _at(self, x: Array) -> QuadraticProgram:
+    def _at(self, x: Array) -> Program:
         problem = self._problem
         inputs = x[: len(self._inputs)]
         if not np.array_equal(inputs, self._inputs):
             self._inputs = inputs.copy()  # SLSQP writes into its x
             problem.linearise(self._start, self._inputs, self._targets)
-        return problem.program.whole
+        return problem.program

@@ -28,7 +28,6 @@ from fsw.barriers.wall import WallBarrier
 from fsw.barriers.workspace import WorkspaceBarrier
 from fsw.mpc.costs import Cost, PostureCost, TrackingCost
 from fsw.mpc.planner_config import PlannerConfig
-from fsw.mpc.program import SlackPrice
 from fsw.mpc.soft_costs import SoftWallCost, SphereCost
 from fsw.signals import SafeSet
 
@@ -39,7 +38,7 @@ class Parts:
 
     costs: tuple[Cost, ...]
     barriers: tuple[Barrier, ...] = ()
-    slack: SlackPrice | None = None  # None: the barriers' rows are hard
+    slack: float | None = None  # price of softening their rows; None: they are hard
 
 
 def _naive(config: PlannerConfig, safe_set: SafeSet) -> Parts:

@@ -31,7 +31,7 @@ KNOWN: dict[str, tuple[str, ...]] = {
     "controller": ("blf", "hc", "sc", "naive"),
     "inner": ("tracking", "pid"),
     "robustness": ("consistent", "paper-1", "paper-5"),
-    "solver": ("clarabel", "daqp", "slsqp"),
+    "solver": ("clarabel", "slsqp"),
 }
 
 

@@ -15,7 +15,7 @@ from fsw.vehicle.battery import BatteryModel
 from fsw.vehicle.steering import SteeringLimits
 
 CONTROLLERS = tuple(VARIANTS)
-SOLVERS: tuple[Solver, ...] = ("clarabel", "daqp", "slsqp")
+SOLVERS: tuple[Solver, ...] = ("clarabel", "slsqp")
 INNERS: tuple[Inner, ...] = ("tracking", "pid")
 
 

@@ -76,13 +76,6 @@ def _barrier(name: str, path: str, what: str) -> list[_Row]:
     ]
 
 
-def _slack(name: str, path: str, what: str) -> list[_Row]:
-    return [
-        (f"{name}_SLK_L", f"{path}.linear", "", 0.0, 1e5, f"price of softening {what}"),
-        (f"{name}_SLK_Q", f"{path}.quadratic", "", 0.001, 1e5, "price of its square"),
-    ]
-
-
 _TRACKING = "tuning.tracking"
 _WEIGHTS = "planner.weights"
 _SOFT = "planner.soft"
@@ -159,7 +152,7 @@ _ROWS: Final[dict[str, list[_Row]]] = {
          "yaw acceleration the plan may ask for"),
         ("PLN_JNT_MAX", "planner.limits.joint_acc", "rad/s^2", 0.5, 50.0,
          "joint acceleration the plan may ask for"),
-        *_slack("PLN_JNT", "planner.joint_slack", "a joint limit"),
+        ("PLN_JNT_SLACK", "planner.joint_slack", "", 0.0, 1e5, "price of softening a joint limit"),
         ("PLN_UPS_DIST", "upset_distance", "m", 0.02, 1.0,
          "farther than this off the plan, plan from the measurement"),
         ("PLN_UPS_YAW", "upset_yaw", "rad", 0.05, 3.0, "the same for yaw"),
@@ -167,7 +160,7 @@ _ROWS: Final[dict[str, list[_Row]]] = {
     "Barriers": [
         *_barrier("WALL", "planner.walls", "walls and points"),
         *_barrier("SPH", "planner.workspace", "workspace sphere"),
-        *_slack("BAR", "planner.barrier_slack", "a barrier"),
+        ("BAR_SLACK", "planner.barrier_slack", "", 0.0, 1e5, "price of softening a barrier"),
         ("SUR_DISTURB", "surroundings.disturbance", "m/s^2", 0.0, 3.0,
          "disturbance on an axis that the analysis reckons with"),
         ("SUR_HOLD", "surroundings.disturbance_hold", "s", 0.01, 2.0,

@@ -123,13 +123,6 @@ def test_reported_h_is_the_smaller_of_the_papers_pair_at_the_start() -> None:
         assert barrier.at_start()[0] == pytest.approx(expected)
 
 
-def test_no_row_has_a_gradient_where_its_pattern_says_it_feels_nothing() -> None:
-    barrier = WorkspaceBarrier(SPHERE, TUNING, NODES)
-    case = case_at(np.random.default_rng(3), 0.05)
-    barrier.refill(case.horizon(), case.targets)
-    assert not barrier.rows.gradient[~barrier.rows.feels()].any()
-
-
 def test_one_slack_a_node() -> None:
     rows = WorkspaceBarrier(SPHERE, TUNING, NODES).rows
     np.testing.assert_array_equal(rows.slack, rows.node - 2)

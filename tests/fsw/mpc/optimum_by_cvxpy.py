@@ -101,10 +101,8 @@ def optimum(question: Question, config: PlannerConfig) -> Optimum:
         cp.Minimize(
             _cost(question, linear, U, config)
             + _safety_cost(question, linear, config)
-            + config.joint_slack.linear * cp.sum(joint_slack)
-            + config.joint_slack.quadratic * cp.sum_squares(joint_slack)
-            + config.barrier_slack.linear * cp.sum(barrier_slack)
-            + config.barrier_slack.quadratic * cp.sum_squares(barrier_slack)
+            + config.joint_slack * cp.sum(joint_slack)
+            + config.barrier_slack * cp.sum(barrier_slack)
         ),
         constraints,
     )

@@ -52,12 +52,8 @@ def instance(random: np.random.Generator, safe_set: SafeSet) -> tuple[Array, Tar
 def price(problem: Problem, start: Array, targets: TargetPoints, inputs: Array) -> float:
     """Cost of inputs with the smallest slacks that admit them: what both optimisers minimise."""
     problem.linearise(start, inputs, targets)
-    program, whole = problem.program, problem.program.whole
-    short = -(whole.b - whole.a[:, : program.inputs] @ inputs)[: program.soft_rows]
-    holds = -whole.a[: program.soft_rows, program.inputs :].toarray()
-    slack = (holds * np.maximum(short, 0.0)[:, None]).max(axis=0, initial=0.0)
-    weight = whole.p.diagonal()[program.inputs :]
-    return float(problem.cost + whole.q[program.inputs :] @ slack + 0.5 * slack @ (weight * slack))
+    program = problem.program
+    return float(problem.cost + program.price @ program.least_slacks(inputs))
 
 
 def converged(problem: Problem, start: Array, targets: TargetPoints) -> Array:
@@ -65,7 +61,7 @@ def converged(problem: Problem, start: Array, targets: TargetPoints) -> Array:
     inputs = np.zeros(INPUTS * N)
     for _ in range(40):
         problem.linearise(start, inputs, targets)
-        solution = problem.solve(last=True)
+        solution = problem.solve()
         assert solution.usable
         change = float(np.abs(solution.x[: len(inputs)] - inputs).max())
         inputs = solution.x[: len(inputs)]
@@ -133,7 +129,6 @@ def test_margins_and_bounds_together_admit_what_the_program_admits() -> None:
     start, targets = instance(random, WALLS)
     problem = Problem(CONFIG, MODEL, WALLS)
     point = _Point(problem, start, targets)
-    whole = problem.program.whole
     verdicts = set()
     for _ in range(200):
         x = point.rest()
@@ -145,6 +140,7 @@ def test_margins_and_bounds_together_admit_what_the_program_admits() -> None:
             for value, (low, high) in zip(x, point.bounds(), strict=True)
         )
         point.cost(x)
+        whole = problem.program.whole()
         left = whole.b - whole.a @ x
         t, ax, ay = left[whole.nonnegative_rows :].reshape(-1, 3).T
         expected = left[: whole.nonnegative_rows].min() >= 0.0 and (t >= np.hypot(ax, ay)).all()
