@@ -19,8 +19,9 @@ from fsw.model.prediction import INPUTS, Q_ARM, STATES, Array, CondensedModel
 BASE, JOINT2, END_EFFECTOR = 0, 1, 2
 POINTS = 3
 
-# Prediction states on which the arm's points depend beyond the base's own position and velocity.
-_SWING_STATES = np.array([6, 7, 8, 9, 10, 13, 14, 15, 16, 17, 18])
+# Prediction states that swing the arm's points about the base, and the rate of each where it is a
+# state too: a point's velocity feels the rate as its position feels the state.
+_SWING_STATES = np.array([[6, 9], [7, 10], [8, -1], [13, 14], [15, 17], [16, 18]])
 # Prediction states each input can move, -1 where it moves fewer.
 _REACHED = np.array(
     [
@@ -125,11 +126,13 @@ def _differentiate(state: Array, l1: float, l2: float, jacobian: Array) -> None:
     for axis in range(3):
         jacobian[:, 0, axis, axis] = 1.0
         jacobian[:, 1, axis, 3 + axis] = 1.0
-    for k in _SWING_STATES:
+    for k, rate in _SWING_STATES:
         x[k] = complex(state[k], _STEP)
         arm_points(x, l1, l2, stepped)
         x[k] = state[k]
         jacobian[:, :, :, k] = stepped.imag / _STEP
+        if rate >= 0:
+            jacobian[:, 1, :, rate] = jacobian[:, 0, :, k]
 
 
 @compiled

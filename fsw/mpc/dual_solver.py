@@ -39,6 +39,9 @@ _BINDS, _NEAR = 1e-3, 0.05
 _TOLERANCE = 1e-6  # a left-out row may be missed by no more than the solver's own error
 _SOLVES = 4  # after so many every row is wanted
 _SIZES = 32  # programs kept ready; others are built when they occur
+# Unknowns and costs of the order of one save the interior-point method a third of its iterations:
+# multipliers are counted in a slack's price, and the cost so that its tolerance is fine enough.
+_MULTIPLIER, _COST = 20.0, 0.25
 
 Wanted = NDArray[np.bool_]
 
@@ -125,11 +128,14 @@ class _Multipliers:
             shares: One where a row (first index) holds a slack (second).
             price: Of the slacks.
         """
-        gram.take(self._upper, out=self._program.p.data)
-        self._program.q[:] = room
+        program = self._program
+        gram.take(self._upper, out=program.p.data)
+        program.p.data *= _MULTIPLIER**2 / _COST
+        np.multiply(room, _MULTIPLIER / _COST, out=program.q)
         self._shares[:] = shares
-        self._price[:] = price
-        return self._solver.solve()
+        np.divide(price, _MULTIPLIER, out=self._price)
+        solution = self._solver.solve()
+        return Solution(solution.status, _MULTIPLIER * solution.x, solution.iterations)
 
 
 @compiled
