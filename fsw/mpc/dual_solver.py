@@ -13,7 +13,8 @@ with a linear price is a bound on multipliers. Then :math:`U = U_0 - H^{-1} G^T 
 optimum of the whole if it satisfies the rows that were left out; this is checked after every
 solve, and rows that are violated are wanted as well and the program is solved again.
 
-Source: Boyd and Vandenberghe, Convex Optimization, 5.2 and 5.7; docs/decisions/0009.
+Source: docs/equations.md E17 and docs/decisions/0009; Boyd and Vandenberghe, Convex Optimization,
+5.2 and 5.7.
 """
 
 from __future__ import annotations

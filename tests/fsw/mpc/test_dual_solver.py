@@ -1,0 +1,143 @@
+"""The solver by multipliers against Clarabel on the whole program, unknown by unknown."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import sparse
+
+from fsw.barriers.soft_rows import TargetPoints
+from fsw.model.prediction import INPUTS, Array, condense
+from fsw.mpc.clarabel_solver import ClarabelSolver
+from fsw.mpc.dual_solver import DualSolver
+from fsw.mpc.planner_config import PlannerConfig
+from fsw.mpc.problem import Problem
+from fsw.mpc.program import Program
+from fsw.signals import SafeSet, SolverStatus, Wall, WorkspaceSphere
+from tests.fsw.random_states import prediction_vector
+
+CONFIG = PlannerConfig()
+WALLS = SafeSet((Wall((-1.0, 0.0, 0.0), -1.0, 0.1), Wall((0.0, 1.0, 0.0), -1.0, 0.1)))
+SPHERE = SafeSet(sphere=WorkspaceSphere((0.0, 0.0, -0.225), 0.075))
+# Yaw hardly matters to the cost, which leaves it loose within the solver's tolerance.
+LOOSE = np.array([1.0, 1.0, 1.0, 10.0, 1.0, 1.0])
+
+
+def filled(
+    random: np.random.Generator,
+    safe_set: SafeSet,
+    *,
+    config: PlannerConfig = CONFIG,
+    off: float = 0.05,
+) -> Problem:
+    """A program around rest, of a vehicle somewhere, moving, its target so far off [m]."""
+    n = config.horizon
+    problem = Problem(config, condense(config.lag, config.period, n), safe_set)
+    start = prediction_vector(random)
+    start[0:3] = random.uniform(-0.9, 0.9, 3)
+    start[3:19] *= 0.4
+    about = start[0:3] + np.array([0.0, 0.0, 0.225]) + random.uniform(-off, off, 3)
+    targets = TargetPoints(
+        about + random.uniform(-0.02, 0.02, (n + 1, 3)),
+        random.uniform(-0.3, 0.3, (n + 1, 3)),
+        start[13] + random.uniform(-1.0, 1.0, n + 1),
+    )
+    problem.linearise(start, np.zeros(INPUTS * n), targets)
+    return problem
+
+
+def difference(x: Array, expected: Array, inputs: int) -> float:
+    scaled = (x - expected)[:inputs] / np.tile(LOOSE, inputs // INPUTS)
+    return float(np.abs(scaled).max())
+
+
+def cost(program: Program, x: Array) -> float:
+    whole = program.whole()
+    return float(
+        whole.q @ x + 0.5 * x @ (whole.p + whole.p.T - sparse.diags(whole.p.diagonal())) @ x
+    )
+
+
+@pytest.mark.parametrize("horizon", [1, 5, 20])
+@pytest.mark.parametrize("off", [0.05, 5.0], ids=["near", "far"])
+@pytest.mark.parametrize("safe_set", [SafeSet(), WALLS, SPHERE], ids=["open", "walls", "sphere"])
+def test_the_optimum_is_that_of_the_whole_program(
+    safe_set: SafeSet, off: float, horizon: int
+) -> None:
+    """Far off, tilt cones and input bounds bind as well, and the barrier gives way."""
+    random = np.random.default_rng(7)
+    config = replace(
+        CONFIG,
+        horizon=horizon,
+        walls=replace(CONFIG.walls, skipped_nodes=0),
+        workspace=replace(CONFIG.workspace, skipped_nodes=0),
+    )
+    cones_bound = 0
+    for _ in range(6):
+        problem = filled(random, safe_set, config=config, off=off)
+        program = problem.program
+        expected = ClarabelSolver(program.whole()).solve()
+        found = problem.solve()
+        assert found.usable
+        assert expected.usable
+        least = cost(program, expected.x)
+        assert cost(program, found.x) == pytest.approx(least, rel=1e-5, abs=1e-4)
+        assert difference(found.x, expected.x, program.inputs) < 0.03
+        np.testing.assert_allclose(
+            found.x[program.inputs :], expected.x[program.inputs :], atol=1e-3
+        )
+        softened = np.append(found.x[program.inputs :], 0.0)
+        left = program.rows.b - program.rows.g @ found.x[: program.inputs]
+        left += softened[program.rows.slack]
+        assert left[: program.rows.first_cone].min() > -1e-4
+        cones = left[program.rows.first_cone :].reshape(-1, 3)
+        room = cones[:, 0] - np.hypot(cones[:, 1], cones[:, 2])
+        assert room.min() > -1e-4
+        cones_bound += bool(room.min() < 1e-3)
+    assert cones_bound >= 3 or off < 1.0
+
+
+@pytest.mark.parametrize("safe_set", [WALLS, SPHERE], ids=["walls", "sphere"])
+def test_the_guess_says_where_to_look_and_not_what_is_found(safe_set: SafeSet) -> None:
+    random = np.random.default_rng(8)
+    for _ in range(10):
+        problem = filled(random, safe_set)
+        program, solver = problem.program, DualSolver(problem.program)
+        first = solver.solve(np.zeros(program.inputs)).x
+        for size in (0.1, 3.0, 30.0):
+            again = solver.solve(random.uniform(-size, size, program.inputs)).x
+            assert difference(again, first, program.inputs) < 0.01
+
+
+def test_what_was_solved_before_leaves_no_trace() -> None:
+    random = np.random.default_rng(9)
+    one, other = filled(random, WALLS), filled(random, WALLS)
+    fresh = one.solve().x
+    kept = DualSolver(one.program)
+    numbers = (one.program.hessian, one.program.linear, one.program.rows.g, one.program.rows.b)
+    saved = [array.copy() for array in numbers]
+    theirs = other.program
+    for array, another in zip(
+        numbers, (theirs.hessian, theirs.linear, theirs.rows.g, theirs.rows.b), strict=True
+    ):
+        array[:] = another
+    kept.solve(np.zeros(theirs.inputs))
+    for array, original in zip(numbers, saved, strict=True):
+        array[:] = original
+    np.testing.assert_array_equal(kept.solve(np.zeros(theirs.inputs)).x, fresh)
+
+
+def test_hard_rows_that_contradict_each_other_are_infeasible() -> None:
+    """Two walls, 0.2 m apart, that both want 0.5 m."""
+    narrow = SafeSet((Wall((1.0, 0.0, 0.0), -0.1, 0.5), Wall((-1.0, 0.0, 0.0), -0.1, 0.5)))
+    problem = filled(np.random.default_rng(10), narrow, config=replace(CONFIG, controller="hc"))
+    assert problem.solve().status is SolverStatus.INFEASIBLE
+
+
+def test_a_hessian_that_is_not_positive_is_never_flown() -> None:
+    problem = filled(np.random.default_rng(11), WALLS)
+    problem.program.hessian[0, 0] = -1.0
+    solution = problem.solve()
+    assert not solution.usable
