@@ -84,7 +84,7 @@ class Planner:
         )
         target = EndEffectorTarget(0, (0.0, 0.0, -0.7), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
         targets = (target,) * (self._config.horizon + 1)
-        wall = Wall((-1.0, 0.0, 0.0), -1.0, 0.1)
+        wall = Wall((-1.0, 0.0, 0.0), 0.0, 0.1)  # too close: rows bind
         sphere = WorkspaceSphere((0.0, 0.0, -0.3), 0.1)
         point = PointObstacle((3.0, 0.0, -1.0), 0.1)
         for safe_set in (

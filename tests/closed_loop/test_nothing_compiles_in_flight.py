@@ -14,6 +14,8 @@ from fsw.runtime.assembly import flight_software
 from sitl.scenario_file import load_scenario
 from tests.closed_loop.harness import Flight
 
+_WHERE_ROWS_BIND = ("_want_near", "_shares", "_want_violated")
+
 
 def variants() -> dict[str, int]:
     """How many types each kernel of the flight software is compiled for."""
@@ -34,6 +36,7 @@ def test_a_flight_compiles_nothing_more(name: str) -> None:
     assert isinstance(program.planner, Planner)
     flight = Flight(load_scenario(name), planner=program.planner)
     ready = variants()
+    assert all(ready[f"fsw.mpc.dual_solver.{kernel}"] for kernel in _WHERE_ROWS_BIND)
     flight.follow()
     flight.run(0.5)
     assert flight.snapshot.plan is not None
