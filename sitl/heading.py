@@ -31,7 +31,7 @@ class Heading:
         """Yaw [rad], ``t`` seconds after the start of the trajectory."""
         if not self._walls:
             return self._fixed
-        yaws = [facing(self._walls, self._reference.at(t + around).p) for around in _AROUND_S]
+        yaws = [facing(self._walls, self._reference.place(t + around)) for around in _AROUND_S]
         return sum(yaws) / len(yaws)
 
 
@@ -40,9 +40,8 @@ def facing(walls: tuple[Wall, ...], p: V3) -> float:
 
     A plane faces a wall with either side, so half a turn more is the same.
     """
-    gaps = [
-        sum(n * x for n, x in zip(wall.normal, p, strict=True)) - wall.offset_m for wall in walls
-    ]
+    x, y, z = p
+    gaps = [a * x + b * y + c * z - wall.offset_m for wall in walls for a, b, c in (wall.normal,)]
     nearest = min(gaps)
     weights = [math.exp((nearest - gap) / _NEAR_M) for gap in gaps]
     yaws = [math.atan2(wall.normal[1], wall.normal[0]) % math.pi for wall in walls]

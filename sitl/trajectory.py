@@ -30,6 +30,10 @@ class Reference(Protocol):
         """The reference ``t`` seconds after the start; at rest before 0."""
         ...
 
+    def place(self, t: float) -> V3:
+        """Position of ``at(t)`` alone [m, NED]."""
+        ...
+
 
 @dataclass(frozen=True, slots=True)
 class HoldReference:
@@ -41,6 +45,10 @@ class HoldReference:
         """See ``Reference``."""
         still = (0.0, 0.0, 0.0)
         return TrajectoryPoint(self.hold.position_m, still, still)
+
+    def place(self, t: float) -> V3:
+        """See ``Reference``."""
+        return self.hold.position_m
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,6 +101,13 @@ class LissajousReference:
         s, rate, bend = self.warp.at(t)
         x, y, z = (self._axis(i, s, rate, bend) for i in range(3))
         return TrajectoryPoint((x[0], y[0], z[0]), (x[1], y[1], z[1]), (x[2], y[2], z[2]))
+
+    def place(self, t: float) -> V3:
+        """See ``Reference``."""
+        s, curve = self.warp.at(t)[0], self.curve
+        (cx, cy, cz), (ax, ay, az) = curve.centre_m, curve.amplitude_m
+        (tx, ty, tz), (px, py, pz) = curve.period_s, curve.phase_deg
+        return swung(cx, ax, tx, px, s), swung(cy, ay, ty, py, s), swung(cz, az, tz, pz, s)
 
     def _axis(self, i: int, s: float, rate: float, bend: float) -> V3:
         size = self.curve.amplitude_m[i]

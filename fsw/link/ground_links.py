@@ -15,6 +15,9 @@ from fsw.signals import CommandAck, TickOutputs
 
 _READ_BYTES: Final = 4096  # of each link a slot in lockstep, of all links a tick in real time
 _UNHEARD_SLOTS: Final = 5  # from one look at a link that nobody speaks on to the next
+# Tick of a slot on which its messages are encoded; they are sent on the next one. So neither the
+# sending nor what a planning period begins with falls on the same tick.
+_ENCODES: Final = 2
 _ONE: Final = 1  # byte of budget: one datagram
 _GUARD_US: Final = 200  # before a tick: the dearest datagram takes less
 
@@ -33,7 +36,7 @@ class GroundLinks:
         self._attends = False
 
     def poll(self, t_us: int) -> None:
-        """Read what arrived, in lockstep; call it once a tick, before the tick."""
+        """Read what arrived, in lockstep; call it once a tick, after :meth:`publish`."""
         if self._attends or self._tick % self._slot_ticks:
             return
         for link in self.links:
@@ -71,13 +74,15 @@ class GroundLinks:
         tick, t_us = self._tick, snapshot.t_us
         self._t_us = t_us
         self._tick += 1
-        slot = tick % self._slot_ticks == 0
+        slot = tick % self._slot_ticks == _ENCODES
         news = slot or changed or bool(outputs.texts)
         for link in self.links:
             if link.talks:
-                if news or link.rates.slot_us < SLOT_US:
+                fast = link.rates.slot_us < SLOT_US
+                if news or fast:
                     link.publish(outputs, changed)
-                link.serve(t_us)
+                if fast or changed or not slot:
+                    link.serve(t_us)
             elif news:
                 link.announce(snapshot, changed)
             if slot and self._attends:

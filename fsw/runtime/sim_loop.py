@@ -188,7 +188,6 @@ class SimLoop(Generic[State]):
 
     def _hear(self, cycle: Cycle) -> None:
         t_us = cycle.release.sensors.t_us
-        self._ground.poll(t_us)
         inbox = self._inbox
         setpoints = inbox.take_setpoints()
         cycle.inputs = TickInputs(
@@ -241,6 +240,8 @@ class SimLoop(Generic[State]):
             outputs = replace(outputs, texts=(*outputs.texts, *self._notices))
             self._notices.clear()
         self._ground.publish(outputs)
+        # In lockstep: what is heard now is in the next tick, and nobody waits while it is read.
+        self._ground.poll(cycle.release.sensors.t_us)
 
     def _log(self, cycle: Cycle) -> None:
         self._files.ulog.add(cycle.inputs, cycle.outputs)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final, Protocol
 
@@ -42,8 +43,16 @@ class Exchange(Protocol):
 
     counts: ExchangeCounts
 
-    def step(self, number: int, t_us: int, datagram: bytes) -> Answer:
+    def step(
+        self, number: int, t_us: int, datagram: bytes, meanwhile: Callable[[], None]
+    ) -> Answer:
         """Send a step and return what to apply during it.
+
+        Args:
+            number: Of the step, from 0.
+            t_us: Its time stamp.
+            datagram: What to send.
+            meanwhile: Work that can be done while the vehicle thinks; called once.
 
         Raises:
             SimulatorError: The vehicle has been silent for too long.
@@ -72,12 +81,15 @@ class Lockstep:
         self._period_s = period_s
         self._start_s = time.perf_counter()
 
-    def step(self, number: int, t_us: int, datagram: bytes) -> Answer:
+    def step(
+        self, number: int, t_us: int, datagram: bytes, meanwhile: Callable[[], None]
+    ) -> Answer:
         """See :class:`Exchange`."""
         if self._period_s is not None:
             _sleep_until(self._start_s + number * self._period_s)
         begin_s = sent_s = time.perf_counter()
         self._endpoint.send(datagram)
+        meanwhile()
         while True:
             received = self._endpoint.receive()
             if received is not None:
@@ -126,11 +138,14 @@ class RealTime:
         self._held = _OFF
         self._heard_s = self._start_s
 
-    def step(self, number: int, t_us: int, datagram: bytes) -> Answer:
+    def step(
+        self, number: int, t_us: int, datagram: bytes, meanwhile: Callable[[], None]
+    ) -> Answer:
         """See :class:`Exchange`."""
         if number == 0:
-            return self._first_step(t_us, datagram)
+            return self._first_step(t_us, datagram, meanwhile)
         self._endpoint.send(datagram)
+        meanwhile()
         # The grid is absolute: a late step shortens the next one and shifts nothing.
         _sleep_until(self._start_s + (number + 1) * self._period_s)
         answers = self._waiting()
@@ -155,9 +170,9 @@ class RealTime:
             ),
         )
 
-    def _first_step(self, t_us: int, datagram: bytes) -> Answer:
+    def _first_step(self, t_us: int, datagram: bytes, meanwhile: Callable[[], None]) -> Answer:
         """Wait for the first answer as lockstep does, then start the grid."""
-        answer = self._first.step(0, t_us, datagram)
+        answer = self._first.step(0, t_us, datagram, meanwhile)
         self._held = answer.controls
         self._heard_s = time.perf_counter()
         self._start_s = self._heard_s + _FIRST_PLAN_S

@@ -78,10 +78,11 @@ def fly(
         state, messages = pilot.speak(plan, state, readings.t_us)
         datagram = _datagram(encoder, simulation.step, readings, messages)
         try:
-            answer = exchange.step(simulation.step, readings.t_us, datagram)
+            answer = exchange.step(
+                simulation.step, readings.t_us, datagram, lambda: truth(simulation)
+            )
             if simulation.step == 0:  # the vehicle may take its time for the first answer
                 begin_s = time.perf_counter()
-            truth(simulation)
             _advance(simulation, answer)
         except SimulatorError as error:
             kind = EndKind.INTERRUPTED if stop.requested else EndKind.STOPPED
