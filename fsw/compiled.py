@@ -47,6 +47,19 @@ def compiled(kernel: Callable[P, R]) -> Callable[P, R]:
         numba.config.CACHE_DIR = before
 
 
+def machine_code(kernel: Callable[P, R], *example: Any) -> Callable[P, R]:
+    """The machine code of a kernel for arguments of the types of an example, called directly.
+
+    numba looks at the type of every number in every call, which for the nested tuples of a tick
+    costs as much as the arithmetic. Here numbers become what they are in the example and tuples
+    may be named or not; an array must be of the example's type, for nobody looks any more.
+    """
+    dispatcher = cast(Any, kernel)
+    dispatcher(*example)
+    types = tuple(dispatcher.typeof_pyval(argument) for argument in example)
+    return cast(Callable[P, R], dispatcher.overloads[types].entry_point)
+
+
 def compilable(function: Callable[P, R]) -> Callable[P, R]:
     """Let kernels compile a pure law into themselves; called from Python it stays Python.
 

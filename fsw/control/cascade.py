@@ -7,7 +7,7 @@ from typing import Any, Literal, NamedTuple
 
 from numpy.typing import NDArray
 
-from fsw.compiled import compilable, compiled, packed
+from fsw.compiled import compilable, compiled, machine_code, packed
 from fsw.control.allocation import allocate
 from fsw.control.arm_compensation import compensated_joints
 from fsw.control.attitude import attitude_pid, attitude_reference
@@ -18,11 +18,13 @@ from fsw.control.pid import PidGains
 from fsw.control.tracking import Observed, TrackingLaw, follow_plan, observe
 from fsw.geometry.rotation import wrap_angle
 from fsw.model.airframe import GRAVITY, Airframe
+from fsw.model.nominal import REST_INPUT, REST_STATE
 from fsw.model.prediction import LagModel
 from fsw.model.rotors import MotionState, lag_rotors, motion_state, rotor_decay, weigh
 from fsw.signals import (
     STOPPED,
     ActuatorCommand,
+    Mat3,
     PlanInput,
     PredictionState,
     StateEstimate,
@@ -34,6 +36,8 @@ from fsw.signals import (
 Inner = Literal["tracking", "pid"]
 
 _NONE: Vec3 = (0.0, 0.0, 0.0)
+_LEVEL: Mat3 = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+_SOMEWHERE = StateEstimate(0, _NONE, _NONE, _LEVEL, _NONE, 0.0, (0.0, 0.0), (0.0, 0.0))
 
 
 class CascadeMemory(NamedTuple):
@@ -105,6 +109,9 @@ class Cascade:
             dt,
         )
         self._packed = packed(self.law)
+        memory = CascadeMemory(STOPPED.rotor_thrust, STOPPED, Observed(_NONE, _NONE), 1.0)
+        example = (self._packed, memory, _SOMEWHERE, REST_STATE, REST_INPUT, 1)
+        self._close_loops = machine_code(_close_loops, *example)
 
     def motion(self, memory: CascadeMemory, estimate: StateEstimate) -> MotionState:
         """Acceleration to snap right now, from the rotor model."""
@@ -122,15 +129,8 @@ class Cascade:
         ticks: int = 1,
     ) -> tuple[ActuatorCommand, CascadeMemory]:
         """See ``close_loops``, of which this is the machine code."""
-        rotors, commanded, observed, mass, attitude, height, joints = memory
-        # Plain tuples cross into machine code and back at half the price of named ones.
-        sent, rotors, believed, mass, integrals = _close_loops(
-            self._packed,
-            (rotors, tuple(commanded), tuple(observed), mass, attitude, height, joints),
-            tuple(estimate),
-            tuple(plan),
-            tuple(u),
-            ticks,
+        sent, rotors, believed, mass, integrals = self._close_loops(
+            self._packed, memory, estimate, plan, u, ticks
         )
         command = ActuatorCommand(*sent)
         return command, CascadeMemory(rotors, command, Observed(*believed), mass, *integrals)
@@ -196,26 +196,15 @@ def close_loops(
 
 @compiled
 def _close_loops(
-    law: NDArray[Any], memory: Any, estimate: Any, plan: Any, u: Any, ticks: int
+    law: NDArray[Any],
+    memory: CascadeMemory,
+    estimate: StateEstimate,
+    plan: PredictionState,
+    u: PlanInput,
+    ticks: int,
 ) -> tuple[tuple[Vec4, Vec2], Vec4, tuple[Vec3, Vec3, Vec2], float, tuple[Vec3, float, Vec2]]:
-    """``close_loops`` between plain tuples."""
-    rotors, commanded, observed, mass, attitude, height, joints = memory
-    command, kept = close_loops(
-        law[0],
-        CascadeMemory(
-            rotors,
-            ActuatorCommand(*commanded),
-            Observed(*observed),
-            mass,
-            attitude,
-            height,
-            joints,
-        ),
-        StateEstimate(*estimate),
-        PredictionState(*plan),
-        PlanInput(*u),
-        ticks,
-    )
+    """``close_loops`` that returns plain tuples, which leave machine code at half the price."""
+    command, kept = close_loops(law[0], memory, estimate, plan, u, ticks)
     return (
         (command.rotor_thrust, command.joint_torque),
         kept.rotors,

@@ -9,8 +9,10 @@ noise has an observer of its own (``control/tracking.py``), which knows the roto
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from functools import cache
 
-from fsw.compiled import compilable, compiled
+from fsw.compiled import compilable, compiled, machine_code
 from fsw.geometry.rotation import matrix_from_quaternion, yaw_of
 from fsw.signals import Mat3, SensorFrame, StateEstimate, Vec2, Vec3, Vec4
 
@@ -18,7 +20,7 @@ from fsw.signals import Mat3, SensorFrame, StateEstimate, Vec2, Vec3, Vec4
 def estimate_state(sensors: SensorFrame) -> StateEstimate | None:
     """The vehicle's state, or None where a reading is not a number or no attitude."""
     p, v, w, q, qd = sensors.p_WB, sensors.v_WB, sensors.gyro_B, sensors.q_arm, sensors.qd_arm
-    usable, R, yaw = _attitude(p, v, sensors.q_WB, w, sensors.accel_B, q, qd)
+    usable, R, yaw = _machine_code()(p, v, sensors.q_WB, w, sensors.accel_B, q, qd)
     if not usable:
         return None
     return StateEstimate(sensors.t_us, p, v, R, w, yaw, q, qd, -sensors.accel_B[2])
@@ -44,3 +46,10 @@ def attitude(
 
 
 _attitude = compiled(attitude)
+
+
+@cache
+def _machine_code() -> Callable[..., tuple[bool, Mat3, float]]:
+    """``attitude``, compiled when it is first wanted."""
+    none, arm = (0.0, 0.0, 0.0), (0.0, 0.0)
+    return machine_code(_attitude, none, none, (1.0, 0.0, 0.0, 0.0), none, none, arm, arm)

@@ -10,11 +10,22 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from fsw.compiled import compilable, compiled, packed
+from fsw.compiled import compilable, compiled, machine_code, packed
 from fsw.model.prediction import A, LagModel, P, S, discretise
 from fsw.signals import PlanInput, PredictionState, Vec3
 
 REST_INPUT = PlanInput((0.0, 0.0, 0.0), 0.0, (0.0, 0.0))
+REST_STATE = PredictionState(
+    (0.0, 0.0, 0.0),
+    (0.0, 0.0, 0.0),
+    (0.0, 0.0, 0.0),
+    (0.0, 0.0),
+    (0.0, 0.0),
+    0.0,
+    0.0,
+    (0.0, 0.0),
+    (0.0, 0.0),
+)
 
 _Row = tuple[float, ...]
 
@@ -41,6 +52,7 @@ class NominalModel:
             tuple((*a[row, vertical].tolist(), float(b[row, 2])) for row in vertical),
         )
         self._packed = packed(self.model)
+        self._advance = machine_code(_advance, self._packed, REST_STATE, REST_INPUT, 1)
 
     def step(self, x: PredictionState, u: PlanInput) -> PredictionState:
         """The state one tick later."""
@@ -48,7 +60,7 @@ class NominalModel:
 
     def advance(self, x: PredictionState, u: PlanInput, ticks: int) -> PredictionState:
         """The state some ticks later under one input."""
-        return PredictionState(*_advance(self._packed, tuple(x), tuple(u), ticks))
+        return PredictionState(*self._advance(self._packed, x, u, ticks))
 
 
 @compilable
@@ -60,9 +72,9 @@ def advance(model: TickModel, x: PredictionState, u: PlanInput, ticks: int) -> P
 
 
 @compiled
-def _advance(model: NDArray[Any], x: Any, u: Any, ticks: int) -> tuple[Any, ...]:
-    """``advance`` between plain tuples, which cross into machine code at half the price."""
-    x = advance(model[0], PredictionState(*x), PlanInput(*u), ticks)
+def _advance(model: NDArray[Any], x: PredictionState, u: PlanInput, ticks: int) -> tuple[Any, ...]:
+    """``advance`` that returns a plain tuple, which leaves machine code at half the price."""
+    x = advance(model[0], x, u, ticks)
     return (x.p, x.v, x.a, x.j, x.s, x.yaw, x.yaw_rate, x.q_arm, x.qd_arm)
 
 
