@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable
 from pathlib import Path
-from typing import ParamSpec, TypeVar
+from typing import Any, ParamSpec, TypeVar, cast
 
 import numba
 from numba.extending import register_jitable
@@ -48,6 +48,18 @@ def kernel(function: Callable[P, R]) -> Callable[P, R]:
     takes 3.6 times as long. Allocating in a kernel is a compile-time error.
     """
     return _njit(function, counts_references=False)
+
+
+def machine_code(function: Callable[P, R], *example: Any) -> Callable[P, R]:
+    """The machine code of a compiled function for arguments of the types of an example.
+
+    Called directly it is spared numba's look at the types of all arguments; whoever calls it
+    answers for them. The function is called once.
+    """
+    dispatcher = cast(Any, function)
+    dispatcher(*example)
+    types = tuple(dispatcher.typeof_pyval(argument) for argument in example)
+    return cast(Callable[P, R], dispatcher.overloads[types].entry_point)
 
 
 def compilable(function: Callable[P, R]) -> Callable[P, R]:

@@ -9,14 +9,14 @@ from typing import NamedTuple
 import numpy as np
 
 from sitl.admission import check
+from sitl.compiled import machine_code
 from sitl.disturbances.items import push
 from sitl.mission_clock import MissionClock
 from sitl.plant.aerial_manipulator import plant
-from sitl.plant.integrator import STEP_S, Arrival
+from sitl.plant.integrator import STEP_S
 from sitl.plant.kinematics import places
 from sitl.plant.parcel import parcel, travel
 from sitl.plant.state import ARM, P_WB, Q_WB, THRUST, V_WB, W_WB_B
-from sitl.plant.vector import Array
 from sitl.referee import Points, Referee, critical
 from sitl.scenario import V3, Scenario
 from sitl.scenario_file import ScenarioError
@@ -85,9 +85,11 @@ class Simulation:
         self._state, trim = first_state(self.vehicle, scenario, self.clock.target_at(0.0).p)
         self._thrust, self._torque = trim.thrust, trim.torque
         self._places = np.empty((SUBSTEPS, 2 + len(self.vehicle.links), 3))
+        still = (0.0, 0.0, 0.0)
         # No steps: only what the accelerometer feels at the start.
-        nothing = self._places[:0]
-        self._felt = self._travel((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), nothing).felt
+        example = (self._thrust, self._torque, still, still, STEP_S, self._places[:0])
+        self._travel = machine_code(travel, self._parcel, self._state, *example)
+        self._felt = self._travel(self._parcel, self._state, *example).felt
         self._reading: SensorReadings | None = None
         self._referee = Referee(scenario, self.clock, self._points_now())
 
@@ -155,7 +157,15 @@ class Simulation:
             ValueError: A control is not finite or their number is wrong.
         """
         self._command(controls)
-        arrival = self._travel(*self._disturbance(), self._places)
+        arrival = self._travel(
+            self._parcel,
+            self._state,
+            self._thrust,
+            self._torque,
+            *self._disturbance(),
+            STEP_S,
+            self._places,
+        )
         self._felt = arrival.felt
         before = self.time_s
         self.step += 1
@@ -203,19 +213,6 @@ class Simulation:
             q_arm=tuple(x[ARM:rates]),
             qd_arm=tuple(x[rates:]),
             tau_arm=self._torque,
-        )
-
-    def _travel(self, force_W: V3, torque_B: V3, passed: Array) -> Arrival:
-        """Integrate one plant step for every row of ``passed``."""
-        return travel(
-            self._parcel,
-            self._state,
-            self._thrust,
-            self._torque,
-            force_W,
-            torque_B,
-            STEP_S,
-            passed,
         )
 
     def _command(self, controls: Controls) -> None:
