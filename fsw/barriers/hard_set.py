@@ -1,4 +1,4 @@
-"""MPC-HC: the safe set itself as rows (eqs 14 and 15), without regard to velocity.
+"""MPC-HC: the safe set itself as rows (eqs 14 and 15, and points), without regard to velocity.
 
 The rows have the same shape as a barrier's, with the distance in place of h, so that the
 same program carries both; whether they are softened is the program's price, not theirs.
@@ -13,7 +13,7 @@ import numpy as np
 from fsw.barriers.soft_rows import SoftRows, TargetPoints
 from fsw.model.linearisation import BASE, POINTS, Linearisation
 from fsw.model.prediction import INPUTS, Array
-from fsw.signals import Wall, WorkspaceSphere
+from fsw.signals import PointObstacle, Wall, WorkspaceSphere
 
 _CENTRE_BALL = 1e-6  # m; at the centre any outward direction does
 
@@ -42,6 +42,43 @@ class HardWalls:
         self._start[:] = distance[0].ravel()
         rows.value[:] = distance[first:].ravel()
         gradient = np.einsum("wa,ipak->iwpk", self._normals, horizon.d_position[first:])
+        rows.gradient[:] = gradient.reshape(rows.gradient.shape)
+
+    def at_start(self) -> Array:
+        """Distances at node 0 [m]."""
+        return self._start
+
+
+class HardObstacles:
+    """Distance of every critical point to every obstacle, at every node."""
+
+    def __init__(
+        self,
+        obstacles: tuple[PointObstacle, ...],
+        horizon: int,
+        tightening: float,
+        first_node: int,
+    ) -> None:
+        self._centres = np.array([obstacle.position for obstacle in obstacles])
+        self._clearances = np.array([obstacle.clearance for obstacle in obstacles])
+        self._first = first_node
+        count, nodes = len(obstacles), np.arange(first_node, horizon + 1)
+        node, number, _ = np.meshgrid(nodes, np.arange(count), np.arange(POINTS), indexing="ij")
+        slack = (node - first_node) * count + number
+        self.rows = SoftRows(node.ravel(), slack.ravel(), INPUTS * horizon)
+        self.rows.required[:] = tightening
+        self._start = np.zeros(count * POINTS)
+
+    def refill(self, horizon: Linearisation, targets: TargetPoints) -> None:
+        """Linearise the distances along the rays of the guess."""
+        away = horizon.position[:, None] - self._centres[:, None]
+        length = np.sqrt(np.einsum("ikpa,ikpa->ikp", away, away))
+        rays = away / np.maximum(length, _CENTRE_BALL)[..., None]
+        distance = length - self._clearances[:, None]
+        first, rows = self._first, self.rows
+        self._start[:] = distance[0].ravel()
+        rows.value[:] = distance[first:].ravel()
+        gradient = np.einsum("ikpa,ipac->ikpc", rays[first:], horizon.d_position[first:])
         rows.gradient[:] = gradient.reshape(rows.gradient.shape)
 
     def at_start(self) -> Array:

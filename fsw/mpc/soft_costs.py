@@ -16,11 +16,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from fsw.barriers.soft_rows import TargetPoints
+from fsw.barriers.tangent import CENTRE_BALL
 from fsw.compiled import compiled
 from fsw.model.linearisation import BASE, POINTS, Linearisation
 from fsw.model.prediction import INPUTS, Array
 from fsw.mpc.costs import add_square
-from fsw.signals import Wall, WorkspaceSphere
+from fsw.signals import PointObstacle, Wall, WorkspaceSphere
 
 _LEAST_GAP = 0.02  # m; from here on eq 29 goes on as a parabola
 
@@ -56,6 +57,35 @@ class SoftWallCost:
         return _add_walls(
             self._normals,
             self._offsets,
+            *self._weights,
+            horizon.position,
+            horizon.d_position,
+            guess,
+            hessian,
+            gradient,
+        )
+
+
+class SoftObstacleCost:
+    """Eq 29 of the distance to every obstacle, along the ray of the guess."""
+
+    def __init__(self, obstacles: tuple[PointObstacle, ...], weights: SoftWeights) -> None:
+        self._centres = np.array([obstacle.position for obstacle in obstacles])
+        self._clearances = np.array([obstacle.clearance for obstacle in obstacles])
+        self._weights = (weights.wall, weights.wall_terminal)
+
+    def add(
+        self,
+        horizon: Linearisation,
+        targets: TargetPoints,
+        guess: Array,
+        hessian: Array,
+        gradient: Array,
+    ) -> float:
+        """See ``fsw.mpc.costs.Cost``."""
+        return _add_obstacles(
+            self._centres,
+            self._clearances,
             *self._weights,
             horizon.position,
             horizon.d_position,
@@ -131,15 +161,57 @@ def _add_walls(
             for point in range(POINTS):
                 p, dp = position[i, point], d_position[i, point]
                 gap = nx * p[0] + ny * p[1] + nz * p[2] - offsets[wall]
-                value, slope, curvature = one_sided_reciprocal(gap, terminal if i == n else weight)
-                cost += value
                 for k in range(INPUTS * i):
                     row[k] = nx * dp[0, k] + ny * dp[1, k] + nz * dp[2, k]
-                # value + slope x + curvature x^2 / 2 as a square about its minimum.
-                add_square(
-                    0.5 * curvature, slope / curvature, row, INPUTS * i, guess, hessian, gradient
-                )
+                w = terminal if i == n else weight
+                cost += _add_gap(gap, w, row, INPUTS * i, guess, hessian, gradient)
     return cost
+
+
+@compiled
+def _add_obstacles(
+    centres: Array,
+    clearances: Array,
+    weight: float,
+    terminal: float,
+    position: Array,
+    d_position: Array,
+    guess: Array,
+    hessian: Array,
+    gradient: Array,
+) -> float:
+    n = position.shape[0] - 1
+    row = np.zeros(guess.shape[0])
+    cost = 0.0
+    for i in range(1, n + 1):
+        for number in range(centres.shape[0]):
+            for point in range(POINTS):
+                away, dp = position[i, point] - centres[number], d_position[i, point]
+                x, y, z = away
+                length = math.sqrt(x * x + y * y + z * z)
+                scale = 1.0 / max(length, CENTRE_BALL)
+                for k in range(INPUTS * i):
+                    row[k] = scale * (x * dp[0, k] + y * dp[1, k] + z * dp[2, k])
+                w, gap = terminal if i == n else weight, length - clearances[number]
+                cost += _add_gap(gap, w, row, INPUTS * i, guess, hessian, gradient)
+    return cost
+
+
+@compiled
+def _add_gap(
+    gap: float,
+    weight: float,
+    row: Array,
+    columns: int,
+    guess: Array,
+    hessian: Array,
+    gradient: Array,
+) -> float:
+    """Eq 29 of one gap that moves with the inputs by ``row``."""
+    value, slope, curvature = one_sided_reciprocal(gap, weight)
+    # value + slope x + curvature x^2 / 2 as a square about its minimum.
+    add_square(0.5 * curvature, slope / curvature, row, columns, guess, hessian, gradient)
+    return value
 
 
 @compiled

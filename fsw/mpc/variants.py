@@ -1,7 +1,7 @@
 """The paper's four controllers: the same program, with different parts in it.
 
 ==========  =====================================  ==========================================
-name        Case I, walls                          Case II, workspace sphere
+name        Case I, walls; and points              Case II, workspace sphere
 ==========  =====================================  ==========================================
 ``naive``   tracking cost only                     tracking cost only
 ``hc``      distances >= 0 (eq 14)                 distance to the surface >= 0 (eq 15)
@@ -9,8 +9,7 @@ name        Case I, walls                          Case II, workspace sphere
 ``blf``     barrier of eq 22 with eq 25            barriers of eq 23 with eq 25
 ==========  =====================================  ==========================================
 
-Points (eqs 11 and 12) are kept by ``blf`` beside walls or alone; the others have no part for
-them (``fsw/parameters/consistency.py`` says so before they fly).
+Points, alone or beside walls, are to ``hc`` and ``sc`` what walls are; ``blf`` has eqs 11 and 12.
 
 Naive can be given a centring cost and HC a tightening, so that the barrier's own share in a
 comparison shows (docs/paper-and-us.md).
@@ -21,14 +20,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from fsw.barriers.hard_set import HardWalls, HardWorkspace
+from fsw.barriers.hard_set import HardObstacles, HardWalls, HardWorkspace
 from fsw.barriers.point_obstacle import PointObstacleBarrier
 from fsw.barriers.soft_rows import Barrier
 from fsw.barriers.wall import WallBarrier
 from fsw.barriers.workspace import WorkspaceBarrier
 from fsw.mpc.costs import Cost, PostureCost, TrackingCost
 from fsw.mpc.planner_config import PlannerConfig
-from fsw.mpc.soft_costs import SoftWallCost, SphereCost
+from fsw.mpc.soft_costs import SoftObstacleCost, SoftWallCost, SphereCost
 from fsw.signals import SafeSet
 
 
@@ -52,14 +51,15 @@ def _naive(config: PlannerConfig, safe_set: SafeSet) -> Parts:
 
 def _hard(config: PlannerConfig, safe_set: SafeSet) -> Parts:
     costs, first = (TrackingCost(config.weights),), 1 + config.hard_skipped_nodes
-    barrier: Barrier
+    where = (config.horizon, config.tightening, first)
     if safe_set.sphere is not None:
-        barrier = HardWorkspace(safe_set.sphere, config.horizon, config.tightening, first)
-    elif safe_set.walls:
-        barrier = HardWalls(safe_set.walls, config.horizon, config.tightening, first)
-    else:
-        return Parts(costs)
-    return Parts(costs, (barrier,), config.hard_slack)
+        return Parts(costs, (HardWorkspace(safe_set.sphere, *where),), config.hard_slack)
+    barriers: list[Barrier] = []
+    if safe_set.walls:
+        barriers.append(HardWalls(safe_set.walls, *where))
+    if safe_set.obstacles:
+        barriers.append(HardObstacles(safe_set.obstacles, *where))
+    return Parts(costs, tuple(barriers), config.hard_slack)
 
 
 def _soft(config: PlannerConfig, safe_set: SafeSet) -> Parts:
@@ -69,9 +69,12 @@ def _soft(config: PlannerConfig, safe_set: SafeSet) -> Parts:
             safe_set.sphere, weights.workspace, weights.workspace_terminal, only_outside=True
         )
         return Parts((tracking, outside))
+    costs: list[Cost] = [tracking]
     if safe_set.walls:
-        return Parts((tracking, SoftWallCost(safe_set.walls, weights)))
-    return Parts((tracking,))
+        costs.append(SoftWallCost(safe_set.walls, weights))
+    if safe_set.obstacles:
+        costs.append(SoftObstacleCost(safe_set.obstacles, weights))
+    return Parts(tuple(costs))
 
 
 def _blf(config: PlannerConfig, safe_set: SafeSet) -> Parts:

@@ -34,9 +34,8 @@ class Finding:
 def analyse(config: FlightConfig, safe_set: SafeSet, loop: Tube) -> tuple[Finding, ...]:
     """Every finding about a controller with barriers in a safe set.
 
-    About the others there is one thing to say: which of them has nothing that keeps off a point.
-    A point needs what a wall needs: its ball lies behind the tangent plane, and going round it
-    takes acceleration away from it, which is in nobody's way.
+    There is none for the others. A point needs what a wall needs: its ball lies behind the
+    tangent plane, and going round it only takes the vehicle off that plane.
 
     Args:
         config: What would fly.
@@ -44,8 +43,6 @@ def analyse(config: FlightConfig, safe_set: SafeSet, loop: Tube) -> tuple[Findin
         loop: ``loop_tube(config)``, which takes a moment and does not depend on the safe set.
     """
     surroundings = config.surroundings
-    if config.controller in ("hc", "sc") and safe_set.obstacles:
-        return (_no_points(config.controller),)
     if config.controller != "blf" or safe_set.kind is ConstraintKind.NONE:
         return ()
     in_sphere = safe_set.sphere is not None
@@ -136,12 +133,6 @@ def _room_in_sphere(tuning: BarrierTuning, radius: float) -> Finding:
         f"h2a and h2b at the centre are S(r) = {at_centre:.3f} m/s and lambda is "
         f"{tuning.robustness:.3f}",
         f"lambda <= {at_centre:.3f} m/s or r >= {stand_off(tuning):.3f} m would do",
-    )
-
-
-def _no_points(controller: str) -> Finding:
-    return _finding(
-        "points", False, f"{controller} has nothing that keeps off points", "blf would do"
     )
 
 

@@ -158,11 +158,8 @@ def _safety_cost(question: Question, linear: _Linear, config: PlannerConfig) -> 
                 e = linear.position(node, BASE) - centre
                 total += (500.0 if last else 100.0) * cp.sum_squares(e)
         elif config.controller == "sc":
-            for wall in question.safe_set.walls:
-                for point in range(3):
-                    total += _wall_cost(question, linear, wall, node, point) / (
-                        20.0 if last else 5.0
-                    )
+            for point, wall in _planes(question, node):
+                total += _wall_cost(question, linear, wall, node, point) / (20.0 if last else 5.0)
     return total
 
 
@@ -176,16 +173,27 @@ def _wall_cost(question: Question, linear: _Linear, wall: Wall, node: int, point
     return 1.0 / about**2 - 2.0 / about**3 * x + 3.0 / about**4 * cp.square(x)
 
 
+def _planes(question: Question, node: int) -> list[tuple[int, Wall]]:
+    """Every critical point with each wall, and with what each obstacle is to it at the guess."""
+    planes = [(point, wall) for point in range(3) for wall in question.safe_set.walls]
+    for obstacle in question.safe_set.obstacles:
+        for point in range(3):
+            away = question.horizon.position[node, point] - np.array(obstacle.position)
+            x, y, z = (away / np.linalg.norm(away)).tolist()
+            offset = float(np.dot((x, y, z), obstacle.position))
+            planes.append((point, Wall((x, y, z), offset, obstacle.clearance)))
+    return planes
+
+
 def _hard_rows(
     question: Question, linear: _Linear, config: PlannerConfig
 ) -> tuple[list[Any], cp.Variable]:
     """Eqs 14 and 15 at every node; the slack is for none of them."""
     horizon, sphere, rows = question.horizon, question.safe_set.sphere, []
     for node in range(1, config.horizon + 1):
-        for wall in question.safe_set.walls:
-            for point in range(3):
-                gap = np.array(wall.normal) @ linear.position(node, point) - wall.offset
-                rows.append(gap >= wall.clearance)
+        for point, wall in _planes(question, node):
+            gap = np.array(wall.normal) @ linear.position(node, point) - wall.offset
+            rows.append(gap >= wall.clearance)
         if sphere is not None:
             centre = question.target_p[node] + np.array(sphere.centre_from_target)
             e = horizon.position[node, BASE] - centre

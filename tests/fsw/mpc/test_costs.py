@@ -12,20 +12,28 @@ from fsw.model.airframe import AIRFRAME
 from fsw.model.linearisation import Linearisation
 from fsw.model.prediction import INPUTS, YAW, Array, LagModel, condense
 from fsw.mpc.costs import Cost, CostWeights, TrackingCost
-from fsw.mpc.soft_costs import SoftWallCost, SoftWeights, SphereCost, one_sided_reciprocal
-from fsw.signals import Wall, WorkspaceSphere
+from fsw.mpc.soft_costs import (
+    SoftObstacleCost,
+    SoftWallCost,
+    SoftWeights,
+    SphereCost,
+    one_sided_reciprocal,
+)
+from fsw.signals import PointObstacle, Wall, WorkspaceSphere
 from tests.fsw.mpc.quadratics import quadratic
 from tests.fsw.random_states import prediction_vector
 
 N = 5
 MODEL = condense(LagModel(), 0.1, N)
 WALLS = (Wall((-1.0, 0.0, 0.0), -1.0, 0.1), Wall((0.0, 0.6, 0.8), -1.5, 0.1))
+POINTS = (PointObstacle((0.3, -0.2, 0.1), 0.1), PointObstacle((-0.5, 0.4, 0.6), 0.2))
 SPHERE = WorkspaceSphere((0.0, 0.0, -0.225), 0.075)
 
 COSTS: dict[str, Cost] = {
     "tracking": TrackingCost(CostWeights()),
     "printed": TrackingCost(CostWeights(relative_velocity=False)),
     "soft walls": SoftWallCost(WALLS, SoftWeights()),
+    "soft points": SoftObstacleCost(POINTS, SoftWeights()),
     "outside the sphere": SphereCost(SPHERE, 5.0, 20.0, only_outside=True),
     "centring": SphereCost(SPHERE, 100.0, 500.0, only_outside=False),
 }

@@ -11,7 +11,7 @@ import pytest
 from fsw.barriers.soft_rows import TargetPoints
 from fsw.model.airframe import AIRFRAME
 from fsw.model.linearisation import END_EFFECTOR, Linearisation
-from fsw.model.prediction import INPUTS, Array, condense
+from fsw.model.prediction import INPUTS, Array, condense, to_vector
 from fsw.mpc.costs import CostWeights, TrackingCost
 from fsw.mpc.planner_config import PlannerConfig
 from fsw.signals import (
@@ -22,6 +22,7 @@ from fsw.signals import (
     PointObstacle,
     SafeSet,
     SolverStatus,
+    Vec3,
     Wall,
     WorkspaceSphere,
 )
@@ -107,6 +108,30 @@ def test_a_point_beside_a_wall_that_is_in_the_way_is_in_the_problem(seed: int) -
     assert answer.slack_max == pytest.approx(float(expected.barrier_slack.max()), abs=0.01)
 
 
+@pytest.mark.parametrize("controller", ["hc", "sc", "blf"])
+@pytest.mark.parametrize("direction", [(1.0, 0.0, 0.0), (0.6, 0.8, 0.0), (0.0, 0.6, 0.8)])
+def test_at_rest_before_a_point_every_controller_is_held_by_it_as_written_a_second_time(
+    controller: str, direction: Vec3
+) -> None:
+    config, way = replace(CONFIG, controller=controller), np.array(direction)
+    start, asked = question(np.random.default_rng(1), SafeSet())
+    start[:] = to_vector(hovering())
+    asked = around(asked, start, np.zeros(INPUTS * N))
+    here = asked.horizon.position[0, END_EFFECTOR]
+    asked = replace(
+        asked,
+        target_p=np.tile(here + 0.1 * way, (N + 1, 1)),
+        target_v=np.zeros((N + 1, 3)),
+        target_yaw=np.zeros(N + 1),
+    )
+    branch = PointObstacle(vec3(here + 0.12 * way), 0.1)
+    held = replace(asked, safe_set=SafeSet(obstacles=(branch,)))
+    expected, free = optimum(held, config), optimum(asked, config)
+    assert np.abs(expected.inputs - free.inputs).max() > 0.1, "or it was no test"
+    difference = inputs_of(planned(answered(start, held, config))) - expected.inputs
+    np.testing.assert_allclose(difference / np.tile([1, 1, 1, 3, 1, 1], N), 0.0, atol=0.01)
+
+
 def answered(
     start: Array, asked: Question, config: PlannerConfig, iterations: int = 1
 ) -> Plan | PlanFailure:
@@ -121,7 +146,7 @@ def inputs_of(plan: Plan) -> Array:
     return np.array([(*u.a, u.yaw_acc, *u.qdd_arm) for u in plan.inputs]).ravel()
 
 
-@pytest.mark.parametrize("safe_set", [WALLS, SPHERE], ids=["walls", "sphere"])
+@pytest.mark.parametrize("safe_set", [WALLS, POINTS, SPHERE], ids=["walls", "points", "sphere"])
 @pytest.mark.parametrize("controller", ["naive", "naive-centred", "hc", "sc", "blf"])
 def test_every_controller_is_its_problem_written_a_second_time(
     safe_set: SafeSet, controller: str

@@ -116,11 +116,3 @@ def test_a_point_that_a_link_could_pass_through_is_worth_a_warning(
     finding = _findings(flight_config(), safe_set)["links"]
     assert finding.holds is holds
     assert not finding.refuses
-
-
-@pytest.mark.parametrize("controller", ["hc", "sc"])
-def test_a_controller_that_knows_no_points_refuses_them(controller: str) -> None:
-    config = flight_config(controller)
-    (refusal,) = refusals(analyse(config, POINT, loop_tube(config)))
-    assert controller in refusal
-    assert analyse(config, WALLS, loop_tube(config)) == ()
