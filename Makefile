@@ -18,7 +18,7 @@ UV = UV_DEFAULT_INDEX="$${UV_DEFAULT_INDEX:-$(PIP_INDEX)}" .boot/uv
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: help setup run test interop lock clean
+.PHONY: help setup run test tests-of-processes tests-of-the-rest interop lock clean
 
 help: ## show this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-7s %s\n", $$1, $$2 }' Makefile
@@ -31,8 +31,8 @@ run: setup ## set up, then fly the three-wall scenario
 
 # One line for a check that passes, all of its output for one that does not.
 define check
-@printf '%-14s' '$(1)'; if out=$$($(2) 2>&1); then printf '%s\n' "$$out" | grep . | tail -n 1; \
-	else printf 'failed: %s\n%s\n' '$(2)' "$$out"; exit 1; fi
+@out=$$($(2) 2>&1) && printf '%-14s%s\n' '$(1)' "$$(printf '%s\n' "$$out" | grep . | tail -n 1)" || \
+	{ printf '%-14sfailed: %s\n%s\n' '$(1)' '$(2)' "$$out"; exit 1; }
 endef
 
 test: setup ## set up, then run every check: ruff, mypy, import-linter, pytest
@@ -40,7 +40,15 @@ test: setup ## set up, then run every check: ruff, mypy, import-linter, pytest
 	$(call check,format,$(BIN)/ruff format --check .)
 	$(call check,types,$(BIN)/mypy)
 	$(call check,imports,$(BIN)/lint-imports)
-	$(BIN)/pytest
+	@echo "pytest: two minutes on two cores"
+	@$(MAKE) --no-print-directory --jobs=2 tests-of-processes tests-of-the-rest
+
+# Two at a time, one a core: most of what the first starts waits for clocks.
+OF_PROCESSES := tests/cli tests/interop tests/processes tests/timing
+tests-of-processes:
+	$(call check,processes,$(BIN)/pytest $(OF_PROCESSES))
+tests-of-the-rest:
+	$(call check,the rest,$(BIN)/pytest $(addprefix --ignore=,$(OF_PROCESSES)))
 
 # Of other people's clients; each has a lock of its own, and none is needed to fly or to test.
 EXTERNAL := tests/interop/external
