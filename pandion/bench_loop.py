@@ -10,10 +10,11 @@ import subprocess
 import sys
 import tempfile
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, TextIO
 
+from pandion.bare_loop import BareLoops
 from pandion.budgets import Budgets, Row, judge, load_budgets, verdict
 from pandion.display import Display
 from pandion.machine_watch import Watch
@@ -106,6 +107,7 @@ def _fly(options: LoopOptions, hogs: int, budgets: Budgets, console: TextIO) -> 
     with ExitStack() as stack:
         out = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="pandion-bench-")))
         watch = stack.enter_context(Watch())
+        bare = stack.enter_context(BareLoops(options.duration_s))
         for _ in range(hogs):
             stack.enter_context(Hog())
         sitl = [
@@ -126,8 +128,8 @@ def _fly(options: LoopOptions, hogs: int, budgets: Budgets, console: TextIO) -> 
             vehicle = json.loads((out / "fsw.json").read_text(encoding="utf-8"))
         except (OSError, ValueError):
             raise HalfFailed(flown.failure or "the flight left no figures") from None
-    noise = watch.noise
-    assert noise is not None
+    assert watch.noise is not None
+    noise = replace(watch.noise, stopped=bare.late_share)
     facts = {
         "scheduler": vehicle["scheduler"],
         "noise": asdict(noise),
@@ -177,6 +179,8 @@ def _lines(measured: Measured) -> list[str]:
         f"{facts['scheduler']}; others used {noise['others']:.2f} processors, "
         f"the host took {100.0 * noise['stolen']:.1f} %"
     )
+    if noise["stopped"] is not None:
+        head += f"; a loop that only sleeps was late for {noise['stopped']:.2g} of its releases"
     table = [
         f"  {row.name:<26}{_number(row.value):>12}{_number(row.budget):>12}"
         f"  {'' if row.kept else 'over'}"

@@ -10,6 +10,7 @@ from typing import Any, Final
 
 MOST_OTHER_LOAD: Final = 0.25  # processors that other programs may use while we measure
 MOST_STOLEN: Final = 0.02  # share of the machine that its host may take away
+MOST_STOPPED: Final = 0.0005  # share of releases; half of those that a flight may be late for
 
 Budgets = Mapping[str, Mapping[str, float]]
 
@@ -49,11 +50,14 @@ class Noise:
 
     others: float  # processors used by programs that are not ours
     stolen: float  # share of all processors taken away by the host
+    # Share of releases for which a program that only sleeps was late; None: not measured.
+    stopped: float | None = None
 
     @property
     def too_much(self) -> bool:
         """Whether the figures say something about the machine rather than about us."""
-        return not (self.others <= MOST_OTHER_LOAD and self.stolen <= MOST_STOLEN)
+        quiet = self.others <= MOST_OTHER_LOAD and self.stolen <= MOST_STOLEN
+        return not (quiet and (self.stopped is None or self.stopped <= MOST_STOPPED))
 
 
 def load_budgets(path: Path | None = None) -> Budgets:

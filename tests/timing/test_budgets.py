@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
 
+from pandion.bare_loop import BareLoops
 from pandion.bench_loop import main
 from pandion.budgets import Noise, judge, load_budgets, verdict
 
@@ -41,9 +44,30 @@ def test_what_was_not_measured_is_not_kept(value: float | None) -> None:
     assert verdict(judge(measured, BUDGETS), QUIET) == "over budget"
 
 
-@pytest.mark.parametrize("noise", [Noise(0.5, 0.0), Noise(0.0, 0.1), Noise(float("nan"), 0.0)])
+@pytest.mark.parametrize(
+    "noise",
+    [Noise(0.5, 0.0), Noise(0.0, 0.1), Noise(float("nan"), 0.0), Noise(0.0, 0.0, stopped=0.001)],
+)
 def test_on_a_noisy_machine_there_is_no_pass_and_no_fail(noise: Noise) -> None:
     assert verdict(judge(AT_BUDGET, BUDGETS), noise) == "too noisy"
+
+
+def test_a_loop_that_only_sleeps_sees_the_machine_stand_still_and_leaves_nothing() -> None:
+    before = _descendants()
+    with BareLoops(60.0) as bare:
+        time.sleep(1.0)
+    assert bare.late_share is None or 0.0 <= bare.late_share < 1.0
+    assert _descendants() == before
+    with BareLoops(60.0) as bare:
+        time.sleep(1.0)
+        loops = [int(process) for process in _descendants() if process not in before]
+        for loop in loops:
+            os.kill(loop, signal.SIGSTOP)
+        time.sleep(0.5)
+        for loop in loops:
+            os.kill(loop, signal.SIGCONT)
+    if bare.late_share is not None:
+        assert bare.late_share > 0.1
 
 
 def test_a_short_flight_beside_a_busy_program_is_measured_and_leaves_nothing(
