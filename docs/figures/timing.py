@@ -40,7 +40,7 @@ def main(path: Path) -> None:
     process(d, (820.0, 50.0), (240.0, 190.0), "process worker")
     thread(
         d, (836.0, 76.0), 208.0, GREEN, "main thread, FIFO 40",
-        ("newest request, plan, answer", "waits: the next request;", "a solve is bounded"),
+        ("newest request, answer", "waits: the next request;", "a solve is bounded"),
     )  # fmt: skip
     process(d, (820.0, 330.0), (240.0, 190.0), "process nursery")
     thread(
@@ -54,7 +54,7 @@ def main(path: Path) -> None:
 def process(d: Drawing, corner: XY, size: XY, name: str) -> None:
     """A process."""
     d.box(corner, size, fill=PALE)
-    d.text((corner[0] + size[0] / 2.0, corner[1] - 12.0), name, anchor="middle", bold=True)
+    d.text((corner[0], corner[1] - 12.0), name, bold=True)
 
 
 def thread(
