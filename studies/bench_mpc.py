@@ -45,7 +45,7 @@ class Samples:
     horizon: int
     entry: Entry
     answers: list[Answer] = field(default_factory=list)
-    suboptimality: list[float] = field(default_factory=list)
+    suboptimality: list[float] = field(default_factory=list)  # against the best known cost
     spent_us: float = 0.0
 
     @property
@@ -145,6 +145,7 @@ class _Rivals:
         lane = self._lane(instance)
         guess, optimum, best = self._truth(lane, instance)
         order = np.roll(np.arange(len(self.samples)), turn)
+        prices: list[tuple[Samples, float]] = []
         for at in order:
             samples, method = self.samples[at], lane.methods[at]
             if method is None or samples.spent_us > self._effort.budget_us:
@@ -153,8 +154,11 @@ class _Rivals:
             samples.spent_us += answer.spent.wall_us
             samples.answers.append(answer)
             if answer.inputs is not None:
-                price = lane.judge.price(instance.request, answer.inputs)
-                samples.suboptimality.append(price / best - 1.0)
+                prices.append((samples, lane.judge.price(instance.request, answer.inputs)))
+        # Where directions turn (eq 23), programs may settle above what another optimiser finds.
+        best = min([best, *(price for _, price in prices)])
+        for samples, price in prices:
+            samples.suboptimality.append(price / best - 1.0)
 
     def _truth(self, lane: _Lane, instance: Instance) -> tuple[Array, Array, float]:
         guess = guess_for(lane.planner, instance)
