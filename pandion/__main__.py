@@ -98,7 +98,7 @@ VERBS: Final[dict[str, Callable[[list[str]], int]]] = {
     "sitl": _sitl,
     "fsw": _fsw,
     "reproduce": _verb("reproduce"),
-    "bench": _verb("bench"),
+    "bench": _verb("bench.mpc"),
     "param": _verb("param"),
     "dialect": _verb("dialect"),
     "replay": _verb("replay"),

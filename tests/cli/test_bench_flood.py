@@ -8,9 +8,9 @@ import sys
 import pytest
 
 from messages.frames import FrameWriter, Losses, split
-from pandion.bench_flood import Row, correctness, fly
+from pandion.bench.flood import Row, correctness, fly
+from pandion.bench.flood_traffic import KINDS, out_of_range
 from pandion.display import Display
-from pandion.flood_traffic import KINDS, out_of_range
 
 
 @pytest.mark.parametrize("kind", KINDS)

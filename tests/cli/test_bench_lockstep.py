@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 
 from messages import dialect
-from pandion import bench_lockstep
-from pandion.pymavlink_half import step
+from pandion.bench import lockstep
+from pandion.bench.pymavlink_half import step
 from sitl.link.encode import StepEncoder
 from sitl.sensors.suite import SensorReadings
 
@@ -47,7 +47,7 @@ def test_what_makes_no_sense_is_refused_in_a_sentence(
     words: list[str], named: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     try:
-        code = bench_lockstep.main(words)
+        code = lockstep.main(words)
     except SystemExit as error:
         code = int(str(error.code))
     assert code == 2
@@ -73,8 +73,8 @@ def test_factor_ratio_and_stages_come_from_both_halves(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     factors = iter([24.0, 12.0, 30.0, 10.0, 27.0, 9.0])  # ours and the peer's take turns
-    monkeypatch.setattr(bench_lockstep, "_fly", lambda *_: _flown(next(factors)))
-    assert bench_lockstep.main([]) == 0
+    monkeypatch.setattr(lockstep, "_fly", lambda *_: _flown(next(factors)))
+    assert lockstep.main([]) == 0
     said = capsys.readouterr().out
     assert "median 27.0, best 30.0" in said
     assert "3.00 times as fast as with pymavlink's packing" in said
@@ -83,5 +83,5 @@ def test_factor_ratio_and_stages_come_from_both_halves(
 
 
 def test_too_slow_is_an_exit_code(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(bench_lockstep, "_fly", lambda *_: _flown(24.9))
-    assert bench_lockstep.main(["--rounds", "1"]) == 1
+    monkeypatch.setattr(lockstep, "_fly", lambda *_: _flown(24.9))
+    assert lockstep.main(["--rounds", "1"]) == 1

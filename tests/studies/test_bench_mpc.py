@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from fsw.mpc.planner import Planner
-from pandion import bench
+from pandion.bench import mpc
 from studies import bench_casadi
 from studies.bench_answer import stopwatch_us
 from studies.bench_casadi import SOLVERS, CasadiMethod
@@ -128,7 +128,7 @@ def test_what_makes_no_sense_is_refused_at_once(
     argv: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
     try:
-        code = bench.main(argv)
+        code = mpc.main(argv)
     except SystemExit as stop:
         code = int(stop.code or 0)
     assert code == 2
@@ -141,7 +141,7 @@ def test_the_verb_writes_a_list_and_what_it_was_measured_on(
     monkeypatch.setattr("studies.bench_mpc.QUICK", LITTLE)
     target = tmp_path / "bench.json"
     argv = ["mpc", "--quick", "--horizons", "1", "--instances", "1", "--json", str(target)]
-    assert bench.main(argv) == 0
+    assert mpc.main(argv) == 0
     rows = json.loads(target.read_text())
     assert isinstance(rows, list)
     assert {row["n"] for row in rows} == {1}

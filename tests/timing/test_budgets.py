@@ -13,8 +13,8 @@ from pathlib import Path
 import pytest
 
 from pandion.bare_loop import BareLoops
-from pandion.bench_loop import main
-from pandion.budgets import Noise, judge, load_budgets, verdict
+from pandion.bench.budgets import Noise, judge, load_budgets, verdict
+from pandion.bench.loop import main
 
 BUDGETS = load_budgets()
 QUIET = Noise(others=0.05, stolen=0.0)

@@ -1,7 +1,7 @@
 """A half of the system whose lockstep frames are packed and read by pymavlink itself.
 
 The peer of ``pandion bench lockstep``: the same loop, the same bytes, the usual library. Run as
-``python -m pandion.pymavlink_half sitl|fsw …``.
+``python -m pandion.bench.pymavlink_half sitl|fsw …``.
 """
 
 from __future__ import annotations

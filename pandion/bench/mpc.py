@@ -1,6 +1,6 @@
 """``pandion bench mpc``: time the planner's optimiser against others on recorded instances.
 
-``pandion bench loop`` is in ``bench_loop.py``.
+It also knows the other benches, each a module of its own beside this one.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import json
 import os
 import sys
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -36,18 +37,8 @@ class BenchOptions:
 
 def main(argv: list[str]) -> int:
     """Measure and report; returns the exit code."""
-    if argv[:1] == ["flood"]:
-        from pandion import bench_flood
-
-        return bench_flood.main(argv[1:])
-    if argv[:1] == ["loop"]:
-        from pandion import bench_loop
-
-        return bench_loop.main(argv[1:])
-    if argv[:1] == ["lockstep"]:
-        from pandion import bench_lockstep
-
-        return bench_lockstep.main(argv[1:])
+    if argv[:1] in (["flood"], ["loop"], ["lockstep"]):
+        return int(import_module(f"pandion.bench.{argv[0]}").main(argv[1:]))
     options = _options(argv)
     if options.json not in (None, "-") and not Path(str(options.json)).parent.is_dir():
         print(f"pandion bench: no directory for {options.json}", file=sys.stderr)

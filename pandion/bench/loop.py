@@ -15,9 +15,9 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from pandion.bare_loop import BareLoops
-from pandion.budgets import Budgets, Row, judge, load_budgets, verdict
+from pandion.bench.budgets import Budgets, Row, judge, load_budgets, verdict
+from pandion.bench.machine_watch import Watch
 from pandion.display import Display
-from pandion.machine_watch import Watch
 from pandion.output import write_text
 from pandion.parser import COULD_NOT_START, Parser
 from pandion.supervisor import HalfFailed, Supervisor

@@ -12,7 +12,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Final
 
-from pandion.budgets import Noise
+from pandion.bench.budgets import Noise
 
 _GLANCE_S: Final = 1.0
 _SETTLED_S: Final = 5.0  # from here on memory may not grow

@@ -17,9 +17,9 @@ from pathlib import Path
 from typing import Any, Final
 
 from fsw.link.telemetry.streams import STREAMS
+from pandion.bench.flood_monitor import Heard, Monitor
+from pandion.bench.flood_traffic import SYSTEM
 from pandion.display import Display
-from pandion.flood_monitor import Heard, Monitor
-from pandion.flood_traffic import SYSTEM
 from pandion.output import write_text
 from pandion.parser import COULD_NOT_START, Parser
 from pandion.supervisor import HalfFailed, Supervisor
@@ -139,7 +139,7 @@ def fly(duration_s: float, *, flooded: bool, display: Display) -> Flight:
 @contextmanager
 def _sender() -> Iterator[subprocess.Popen[str]]:
     """The flood's process, started before the flight: only its sending is to be measured."""
-    words = [sys.executable, "-P", "-m", "pandion.flood_traffic"]
+    words = [sys.executable, "-P", "-m", "pandion.bench.flood_traffic"]
     pipe = subprocess.PIPE
     with subprocess.Popen(words, stdin=pipe, stdout=pipe, text=True) as sender:
         try:

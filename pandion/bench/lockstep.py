@@ -26,7 +26,7 @@ from pandion.version import version
 
 DONE, SLOW = 0, 1  # exit codes
 WANTED: Final = 25.0  # times real time, at 500 Hz
-PEER: Final = "pandion.pymavlink_half"
+PEER: Final = "pandion.bench.pymavlink_half"
 
 
 @dataclass(frozen=True, slots=True)
