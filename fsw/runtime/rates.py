@@ -15,11 +15,11 @@ from typing import Final
 class Member(enum.Enum):
     """What a group does; the loop has one method for each."""
 
-    HEAR = "hear"  # what came from the simulator, the ground and the planner
+    HEAR = "hear"  # what came from the simulator and the planner, and what the ground had sent
     TICK = "tick"  # estimate, modes, control, safety gate: the pure function
     ACTUATE = "actuate"  # answer the simulator; until here the vehicle waits
     ASK = "ask"  # hand a request to the planner
-    PUBLISH = "publish"  # telemetry to the ground
+    PUBLISH = "publish"  # telemetry to the ground, and read what it sends
     RECORD = "record"  # the flight log
     SUM_UP = "sum up"  # timing of the second that is over
     WARN = "warn"  # what went wrong since the last warning
