@@ -11,7 +11,7 @@ import math
 
 from fsw.barriers.margins import plain_root
 from fsw.barriers.tangent import planes
-from fsw.signals import EndEffectorTarget, SafeSet, Vec3
+from fsw.signals import EndEffectorTarget, SafeSet, Vec3, Wall
 
 _LEASH = 0.4  # m from where the end-effector's motion leads to the target, now
 _SPREAD = 0.4  # m/s, by which that grows over the horizon
@@ -39,7 +39,9 @@ def tamed(
         slope: Of S at the boundary [1/s].
     """
     begin_us, kept = targets[0].t_us, []
-    ahead_of_it = planes(safe_set, p_WE)
+    approached = [
+        (wall.normal, _fastest(wall, p_WE, braking, slope)) for wall in planes(safe_set, p_WE)
+    ]
     for target in targets:
         ahead = 1e-6 * (target.t_us - begin_us)
         p = _within(target.p_WE, _plus(p_WE, v_WE, ahead), _LEASH + _SPREAD * ahead)
@@ -48,16 +50,19 @@ def tamed(
             depth = wall.offset + wall.clearance - _dot(wall.normal, p)
             if depth > _DEPTH:
                 p = _plus(p, wall.normal, depth - _DEPTH)
-        for wall in ahead_of_it:
-            n, boundary = wall.normal, wall.offset + wall.clearance
-            room = max(_dot(n, p_WE) - boundary, 0.0)
-            most = max(plain_root(room, braking, slope), _ALWAYS)
+        for n, most in approached:
             approach = -_dot(n, v)
             if approach > most:
                 v = _plus(v, n, approach - most)
         kept.append(EndEffectorTarget(target.t_us, p, v, target.a_WE, target.yaw))
     tame = tuple(kept)
     return targets if tame == targets else tame
+
+
+def _fastest(wall: Wall, p_WE: Vec3, braking: float, slope: float) -> float:
+    """How fast to approach a wall [m/s]."""
+    room = max(_dot(wall.normal, p_WE) - (wall.offset + wall.clearance), 0.0)
+    return max(plain_root(room, braking, slope), _ALWAYS)
 
 
 def _within(a: Vec3, centre: Vec3, radius: float) -> Vec3:
