@@ -17,9 +17,7 @@ from fsw.signals import (
     EndEffectorTarget,
     PointObstacle,
     SensorFrame,
-    Vec2,
     Vec3,
-    Vec4,
     Wall,
     WorkspaceSphere,
 )
@@ -59,15 +57,18 @@ def sensor_frame(odometry: Numbers, arm: Numbers, hil_sensor: Numbers) -> Sensor
         arm: ARM_JOINT_STATE, joint encoders.
         hil_sensor: HIL_SENSOR, whose time stamp is the frame's.
     """
+    _, px, py, pz, qw, qx, qy, qz, vx, vy, vz = odometry[:11]
+    t_us, ax, ay, az, wx, wy, wz = hil_sensor[:7]
+    _, q1, q2, _, _, qd1, qd2 = arm[:7]
     return SensorFrame(
-        t_us=cast(int, hil_sensor[0]),
-        p_WB=cast(Vec3, odometry[1:4]),
-        v_WB=cast(Vec3, odometry[8:11]),
-        q_WB=cast(Vec4, odometry[4:8]),
-        gyro_B=cast(Vec3, hil_sensor[4:7]),
-        accel_B=cast(Vec3, hil_sensor[1:4]),
-        q_arm=cast(Vec2, arm[1:3]),
-        qd_arm=cast(Vec2, arm[5:7]),
+        cast(int, t_us),
+        p_WB=(px, py, pz),
+        v_WB=(vx, vy, vz),
+        q_WB=(qw, qx, qy, qz),
+        gyro_B=(wx, wy, wz),
+        accel_B=(ax, ay, az),
+        q_arm=(q1, q2),
+        qd_arm=(qd1, qd2),
     )
 
 
