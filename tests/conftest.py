@@ -1,6 +1,7 @@
 """Settings for every test."""
 
 import os
+import signal
 import tempfile
 
 from hypothesis import settings
@@ -15,3 +16,6 @@ os.environ["XDG_STATE_HOME"] = tempfile.mkdtemp(prefix="pandion-state-")
 
 # pymavlink asks once, when it is imported first: without this it speaks MAVLink 1.
 os.environ["MAVLINK20"] = "1"
+
+# A shell has what it starts in the background ignore interrupts, and so would all that we start.
+signal.signal(signal.SIGINT, signal.default_int_handler)
