@@ -60,12 +60,19 @@ def group_is_empty(leader: int, patience_s: float = 2.0) -> bool:
     """True once no process of the leader's group is left."""
     until = time.monotonic() + patience_s
     while time.monotonic() < until:
-        try:
-            os.killpg(leader, 0)
-        except ProcessLookupError:
+        if not any(_lives_in(leader, entry) for entry in Path("/proc").iterdir()):
             return True
         time.sleep(0.02)
     return False
+
+
+def _lives_in(group: int, entry: Path) -> bool:
+    """A process that has ended counts no more, though init may take seconds to fetch its code."""
+    try:
+        state, _, number = (entry / "stat").read_text().rpartition(")")[2].split()[:3]
+    except OSError:
+        return False
+    return int(number) == group and state != "Z"
 
 
 def clean_up(process: subprocess.Popen[str]) -> None:
