@@ -40,7 +40,7 @@ test: setup ## set up, then run every check: ruff, mypy, import-linter, pytest
 	$(call check,format,$(BIN)/ruff format --check .)
 	$(call check,types,$(BIN)/mypy)
 	$(call check,imports,$(BIN)/lint-imports)
-	@echo "pytest: two minutes on two cores"
+	@echo "pytest: two runs at once, each told when it is over"
 	@$(MAKE) --no-print-directory --jobs=2 tests-of-processes tests-of-the-rest
 
 # Two at a time, one a core: much of what the first starts waits for clocks.
