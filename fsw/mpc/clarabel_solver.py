@@ -28,7 +28,7 @@ MAX_ITERATIONS = 50
 
 
 class ClarabelSolver:
-    """Solves one program again and again with new numbers in the same pattern."""
+    """Solves one program again and again with new P, q and b; A stays as it is."""
 
     def __init__(self, program: QuadraticProgram) -> None:
         settings = clarabel.DefaultSettings()
@@ -58,12 +58,7 @@ class ClarabelSolver:
         """Solve the program as it is filled now."""
         program = self._program
         # Memoryviews: the binding copies them three times as fast as arrays.
-        self._solver.update(
-            P=program.p.data.data,
-            q=program.q.data,
-            A=program.a.data.data,
-            b=program.b.data,
-        )
+        self._solver.update(P=program.p.data.data, q=program.q.data, b=program.b.data)
         answer = self._solver.solve()
         status = _STATUS.get(answer.status, SolverStatus.NUMERICAL_ERROR)
         x = np.array(answer.x)

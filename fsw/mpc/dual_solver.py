@@ -19,6 +19,7 @@ Source: docs/equations.md E17 and docs/decisions/0009; Boyd and Vandenberghe, Co
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
 
 import numpy as np
@@ -39,10 +40,11 @@ from fsw.signals import SolverStatus
 _BINDS, _NEAR = 1e-3, 0.05
 _TOLERANCE = 1e-6  # a left-out row may be missed by no more than the solver's own error
 _SOLVES = 4  # after so many every row is wanted
-_SIZES = 32  # programs kept ready; others are built when they occur
+_PATTERNS = 64  # programs kept ready; others are built when they occur
 # Unknowns and costs of the order of one save the interior-point method a third of its iterations:
 # multipliers are counted in a slack's price, and the cost so that its tolerance is fine enough.
 _MULTIPLIER, _COST = 20.0, 0.25
+_SPREAD = _MULTIPLIER / math.sqrt(_COST)
 
 Wanted = NDArray[np.bool_]
 
@@ -52,7 +54,7 @@ class DualSolver:
 
     def __init__(self, program: Program) -> None:
         self._program = program
-        self._multipliers = lru_cache(maxsize=_SIZES)(_Multipliers)
+        self._multipliers = lru_cache(maxsize=_PATTERNS)(_Multipliers)
 
     def solve(self, guess: Array) -> Solution:
         """Solve the program as filled now.
@@ -80,13 +82,15 @@ class DualSolver:
         for solves in range(len(rows.b)):
             chosen = np.flatnonzero(wanted)
             if len(chosen):
-                spread = dtrsm(1.0, factor, rows.g[chosen].T, lower=1, overwrite_b=1)  # L^-1 G'
+                # L^-1 G', scaled so that its square is the quadratic term.
+                spread = dtrsm(_SPREAD, factor, rows.g[chosen].T, lower=1, overwrite_b=1)
                 solution = self._by_multipliers(chosen, spread, room_free[chosen])
                 status = solution.status
                 iterations += solution.iterations
                 if not solution.usable:
                     break
-                inputs = free - dtrsv(factor, spread @ solution.x, lower=1, trans=1)
+                moved = spread @ (_MULTIPLIER / _SPREAD * solution.x)
+                inputs = free - dtrsv(factor, moved, lower=1, trans=1)
                 room = rows.b - rows.g @ inputs
             if not _want_violated(room, rows.slack, rows.first_cone, wanted, slacks):
                 return Solution(status, np.concatenate((inputs, slacks)), iterations)
@@ -95,48 +99,58 @@ class DualSolver:
         return ClarabelSolver(program.whole()).solve()
 
     def _by_multipliers(self, chosen: NDArray[np.intp], spread: Array, room: Array) -> Solution:
+        """Multipliers of the chosen rows, counted in ``_MULTIPLIER``."""
         program = self._program
-        simple = int(np.searchsorted(chosen, program.rows.first_cone))
-        softening, shares = _shares(program.rows.slack[chosen[:simple]], len(program.price))
-        sized = self._multipliers(simple, (len(chosen) - simple) // CONE, len(softening))
-        return sized.solve(spread.T @ spread, room, shares, program.price[softening])
+        simple = int(chosen.searchsorted(program.rows.first_cone))
+        softening, held = _numbered(program.rows.slack[chosen[:simple]], len(program.price))
+        same = self._multipliers(tuple(held.tolist()), (len(chosen) - simple) // CONE)
+        return same.solve(spread.T @ spread, room, program.price[softening])
 
 
 class _Multipliers:
-    """The program of so many rows, cones and slacks in Clarabel's form."""
+    """The dual program of rows that share slacks in one way, in Clarabel's form."""
 
-    def __init__(self, simple: int, cones: int, slacks: int) -> None:
-        size = simple + CONE * cones
-        upper = sparse.csc_matrix(np.triu(np.ones((size, size))))
-        positive = -np.eye(size)
-        shared = np.hstack((np.ones((slacks, simple)), np.zeros((slacks, CONE * cones))))
-        a = sparse.csc_matrix(np.vstack((positive[:simple], shared, positive[simple:])))
-        self._program = QuadraticProgram(
-            upper, np.zeros(size), a, np.zeros(size + slacks), simple + slacks, cones
+    def __init__(self, held: tuple[int, ...], cones: int) -> None:
+        """Lay it out.
+
+        Args:
+            held: The slack of each simple row, numbered as they come; -1: none.
+            cones: How many follow.
+        """
+        simple, slacks, size = len(held), max(held, default=-1) + 1, len(held) + CONE * cones
+        column, row = np.tril_indices(size)  # of the upper triangle, column by column
+        self._upper = row * size + column
+        ends = np.arange(size + 1)
+        p = sparse.csc_matrix((np.ones(len(row)), row, ends * (ends + 1) // 2), shape=(size, size))
+        # A column has -1 for its own sign and, in a row that shares a slack, 1 in the sum for it.
+        entries = [((k, -1.0), (simple + its, 1.0))[: 1 + (its >= 0)] for k, its in enumerate(held)]
+        entries += [((slacks + k, -1.0),) for k in range(simple, size)]
+        a = sparse.csc_matrix(
+            (
+                np.array([value for column in entries for _, value in column]),
+                np.array([row for column in entries for row, _ in column], dtype=np.intp),
+                np.cumsum([0, *map(len, entries)]),
+            ),
+            shape=(size + slacks, size),
         )
-        self._upper = upper.indices * size + np.repeat(np.arange(size), np.diff(upper.indptr))
-        # A column of a simple row: -1 for its sign, then one entry a slack.
-        self._shares = a.data[: simple * (1 + slacks)].reshape(simple, 1 + slacks)[:, 1:]
+        self._program = QuadraticProgram(
+            p, np.zeros(size), a, np.zeros(size + slacks), simple + slacks, cones
+        )
         self._price = self._program.b[simple : simple + slacks]
         self._solver = ClarabelSolver(self._program)
 
-    def solve(self, gram: Array, room: Array, shares: Array, price: Array) -> Solution:
+    def solve(self, gram: Array, room: Array, price: Array) -> Solution:
         """Multipliers, simple rows before cones.
 
         Args:
-            gram: G H^-1 G', (multipliers, multipliers).
+            gram: G H^-1 G', (multipliers, multipliers), as scaled by ``_SPREAD``.
             room: Of the rows at the optimum without any, (multipliers,).
-            shares: One where a row (first index) holds a slack (second).
             price: Of the slacks.
         """
-        program = self._program
-        gram.take(self._upper, out=program.p.data)
-        program.p.data *= _MULTIPLIER**2 / _COST
-        np.multiply(room, _MULTIPLIER / _COST, out=program.q)
-        self._shares[:] = shares
+        gram.take(self._upper, out=self._program.p.data)
+        np.multiply(room, _MULTIPLIER / _COST, out=self._program.q)
         np.divide(price, _MULTIPLIER, out=self._price)
-        solution = self._solver.solve()
-        return Solution(solution.status, _MULTIPLIER * solution.x, solution.iterations)
+        return self._solver.solve()
 
 
 @compiled
@@ -181,17 +195,16 @@ def _want_violated(
 
 
 @compiled
-def _shares(slack: NDArray[np.intp], slacks: int) -> tuple[NDArray[np.intp], Array]:
-    """Which slacks soften these rows, and one where a row (first index) holds one of them."""
+def _numbered(slack: NDArray[np.intp], slacks: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """The slacks of these rows in the order they come, and which of them each row has, or -1."""
     number = np.full(slacks, -1)
+    softening, held = np.empty(len(slack), dtype=np.intp), np.full(len(slack), -1)
     count = 0
-    for held in slack:
-        if held >= 0 and number[held] < 0:
-            number[held] = count
-            count += 1
-    softening, shares = np.empty(count, dtype=np.intp), np.zeros((len(slack), count))
-    for row, held in enumerate(slack):
-        if held >= 0:
-            softening[number[held]] = held
-            shares[row, number[held]] = 1.0
-    return softening, shares
+    for row, its in enumerate(slack):
+        if its >= 0:
+            if number[its] < 0:
+                number[its] = count
+                softening[count] = its
+                count += 1
+            held[row] = number[its]
+    return softening[:count], held

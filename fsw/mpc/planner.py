@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -43,6 +43,10 @@ class _Search:
     solver_iterations: int
     linearise_us: float
     solve_us: float
+
+    def timings(self, total_us: float) -> PlanTimings:
+        """Where the time went."""
+        return PlanTimings(self.linearise_us, self.solve_us, total_us)
 
 
 class Planner:
@@ -103,7 +107,8 @@ class Planner:
             A plan whose every program was solved, or a failure that says which was not.
         """
         begin = self._stopwatch_us()
-        refusal = self._refusal(request)
+        start = to_vector(request.start)
+        refusal = self._refusal(request, start)
         if refusal is not None:
             return PlanFailure(
                 request.plan_id, SolverStatus.INPUT_REFUSED, refusal, PlanTimings(0.0, 0.0, 0.0)
@@ -111,7 +116,6 @@ class Planner:
         if request.tuning != self._tuning:
             self._retune(request.tuning)
         problem = self._problem_for(request.safe_set)
-        start = to_vector(request.start)
         targets = TargetPoints(
             np.array([target.p_WE for target in request.targets]),
             np.array([target.v_WE for target in request.targets]),
@@ -123,10 +127,10 @@ class Planner:
         else:
             search = self._by_programs(problem, start, targets, request.t_apply_us)
         solution = search.solution
-        timings = PlanTimings(search.linearise_us, search.solve_us, self._stopwatch_us() - begin)
         if not solution.usable:
             after = f"after {search.solver_iterations} iterations"
             reason = f"solver stopped with {solution.status.name} {after}"
+            timings = search.timings(self._stopwatch_us() - begin)
             return PlanFailure(request.plan_id, solution.status, reason, timings)
         inputs = solution.x[: len(self._inputs)]
         self._inputs = inputs
@@ -143,7 +147,7 @@ class Planner:
             barrier=problem.barrier_at_start(),
             sqp_iterations=search.sqp_iterations,
             solver_iterations=search.solver_iterations,
-            timings=replace(timings, total_us=self._stopwatch_us() - begin),
+            timings=search.timings(self._stopwatch_us() - begin),
         )
 
     def _by_programs(
@@ -174,10 +178,10 @@ class Planner:
         solve_us = self._stopwatch_us() - mark
         return _Search(solution, solution.iterations, solution.iterations, 0.0, solve_us)
 
-    def _refusal(self, request: PlanRequest) -> str | None:
+    def _refusal(self, request: PlanRequest, start: Array) -> str | None:
         if len(request.targets) != self._config.horizon + 1:
             return f"{len(request.targets)} targets given, {self._config.horizon + 1} needed"
-        if not np.isfinite(to_vector(request.start)).all():
+        if not np.isfinite(start).all():
             return "the start state is not finite"
         for target in request.targets:
             if not all(map(math.isfinite, (*target.p_WE, *target.v_WE, target.yaw))):

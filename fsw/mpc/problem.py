@@ -57,7 +57,7 @@ class Problem:
 
     def barrier_at_start(self) -> tuple[float, ...]:
         """h of each constraint at node 0 [m/s]."""
-        return tuple(float(h) for barrier in self._barriers for h in barrier.at_start())
+        return tuple(h for barrier in self._barriers for h in barrier.at_start().tolist())
 
     def largest_barrier_slack(self, x: Array) -> float:
         """How far a solution softens the barrier [m/s]."""

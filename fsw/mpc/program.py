@@ -54,7 +54,7 @@ class Rows:
 class QuadraticProgram:
     """Clarabel's form: minimise ``1/2 x' P x + q' x`` where ``b - A x`` lies in the cones.
 
-    The arrays' data may change, the pattern may not.
+    The data of P, q and b may change; patterns and A may not.
     """
 
     p: sparse.csc_matrix  # upper triangle

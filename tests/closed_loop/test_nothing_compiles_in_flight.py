@@ -14,7 +14,7 @@ from fsw.runtime.assembly import flight_software
 from sitl.scenario_file import load_scenario
 from tests.closed_loop.harness import Flight
 
-_WHERE_ROWS_BIND = ("_want_near", "_shares", "_want_violated")
+_WHERE_ROWS_BIND = ("_want_near", "_numbered", "_want_violated")
 
 
 def variants() -> dict[str, int]:
