@@ -30,7 +30,7 @@ from fsw.runtime import clock, report
 from fsw.runtime.effort import EffortRecord
 from fsw.runtime.events import Events, events
 from fsw.runtime.planner_worker import InlinePlanner, PlannerRecord, ProcessPlanner
-from fsw.runtime.process import StopRequest, settle_memory
+from fsw.runtime.process import StopRequest, in_a_child, settle_memory
 from fsw.runtime.program import FlightProgram
 from fsw.runtime.realtime import (
     TICK_PRIORITY,
@@ -235,10 +235,16 @@ def load_flight_software(options: FswOptions) -> FlightProgram[Any]:
         CouldNotStart: A controller or inner loop of that name does not exist.
     """
     # Imported here because SciPy, Clarabel and numba take a second, which a refusal need not wait.
+    from fsw.compiled import compiled_before
     from fsw.runtime.assembly import flight_software
 
-    try:
+    def load() -> FlightProgram[Any]:
         return flight_software(options.control, origin=options.links.origin)
+
+    if not compiled_before():
+        in_a_child(load)  # the compiler leaves 150 MB behind where it has run
+    try:
+        return load()
     except ValueError as error:
         raise CouldNotStart(str(error)) from None
 

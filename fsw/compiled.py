@@ -34,6 +34,11 @@ def _cache_directory() -> str:
 _CACHE = _cache_directory()
 
 
+def compiled_before() -> bool:
+    """Whether kernels of this state of the sources are kept on disk."""
+    return Path(_CACHE).is_dir()
+
+
 def compiled(kernel: Callable[P, R]) -> Callable[P, R]:
     """Compile a kernel with numba, cached on disk, without the GIL.
 

@@ -7,6 +7,7 @@ import gc
 import os
 import signal
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from types import FrameType
 from typing import Final
@@ -81,6 +82,24 @@ def _give_memory_back() -> None:
         if "llvmlite" in path and rights == "r-xp":  # code: it alone is as it is in the file
             first, last = (int(address, 16) for address in addresses.split("-"))
             libc.madvise(ctypes.c_void_p(first), ctypes.c_size_t(last - first), _MADV_DONTNEED)
+
+
+def in_a_child(work: Callable[[], object]) -> None:
+    """Do something for what it leaves on disk, in a child that takes its memory away with it.
+
+    Call it while there is one thread. What fails there fails silently: whoever needs the result
+    finds it missing and does the work itself.
+    """
+    parent = os.getpid()
+    child = os.fork()
+    if child:
+        os.waitpid(child, 0)
+        return
+    try:
+        die_with_parent(parent)
+        work()
+    finally:
+        os._exit(0)  # neither traceback nor buffered output of the parent's
 
 
 def die_with_parent(parent: int) -> None:
