@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import resource
 import socket
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -123,10 +123,15 @@ def test_a_directory_with_a_flight_is_not_written_over(tmp_path: Path) -> None:
 def test_help_and_version_answer_at_once(arguments: list[str], tmp_path: Path) -> None:
     times = []
     for _ in range(3):
-        begin = time.monotonic()
+        begin = _spent_by_children_s()
         done = pandion(*arguments, cwd=tmp_path)
-        times.append(time.monotonic() - begin)
+        times.append(_spent_by_children_s() - begin)
         assert done.returncode == 0
         assert done.stdout
-    # The best of three: a busy machine must not fail a test about imports.
+    # Processor time, and the best of three: a busy machine must not fail a test about imports.
     assert min(times) < 0.5
+
+
+def _spent_by_children_s() -> float:
+    spent = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return spent.ru_utime + spent.ru_stime
