@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar, cast
@@ -34,9 +35,11 @@ def _cache_directory() -> str:
 _CACHE = _cache_directory()
 
 
-def compiled_before() -> bool:
-    """Whether kernels of this state of the sources are kept on disk."""
-    return Path(_CACHE).is_dir()
+def compiling_is_due() -> bool:
+    """Whether kernels of this state of the sources are not on disk yet, and would be kept there."""
+    cache = Path(_CACHE)
+    nearest = next(parent for parent in cache.parents if parent.is_dir())
+    return not cache.is_dir() and os.access(nearest, os.W_OK)
 
 
 def compiled(kernel: Callable[P, R]) -> Callable[P, R]:
