@@ -1,7 +1,7 @@
 r"""Solves the planner's program for the multipliers of the few rows that can bind, exactly.
 
 An interior-point method pays for every unknown and every row in each iteration. A horizon has
-30 to 120 inputs and a hundred rows or more, of which 0 to 40 matter. So the inputs are
+30 to 120 inputs and a hundred rows or more, of which a few matter. So the inputs are
 eliminated by one Cholesky factor of the Hessian, :math:`H = L L^T`, and the rows by asking for
 the wanted ones only. With :math:`U_0 = -H^{-1} c`, the optimum without any row, what is left is
 
