@@ -40,8 +40,8 @@ class RateGroupRunner(Generic[Cycle]):
         self._clock = clock
         self._runs = 0
 
-    def run(self, cycle: Cycle, due_us: int, begin_us: int) -> None:
-        """Run once.
+    def run(self, cycle: Cycle, due_us: int, begin_us: int) -> bool:
+        """Run once; says whether that ended after the group's next release.
 
         Args:
             cycle: What the members work on.
@@ -54,7 +54,7 @@ class RateGroupRunner(Generic[Cycle]):
                 call(cycle)
         else:
             self._run_timed(cycle, begin_us)
-        self.timer.add(self._clock() - begin_us, begin_us - due_us)
+        return self.timer.add(self._clock() - begin_us, begin_us - due_us)
 
     def _run_timed(self, cycle: Cycle, mark: int) -> None:
         for call, stage in zip(self._calls, self.stages.values(), strict=True):

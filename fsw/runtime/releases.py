@@ -16,6 +16,7 @@ from typing import Final, Protocol
 from fsw.frozen import dataclass
 from fsw.ports import Clock
 from fsw.runtime.grid import Grid
+from fsw.runtime.missed import MissedReleases
 from fsw.signals import SensorFrame
 
 MOST_STALE: Final = 5  # ticks: 10 ms, as long as an estimate may be missing
@@ -100,6 +101,7 @@ class GridReleases:
         sleep: Callable[[float], None],
         first: SensorFrame,
         period_us: int,
+        missed: MissedReleases,
     ) -> None:
         """Follow the first frame, which has been ticked on.
 
@@ -109,12 +111,14 @@ class GridReleases:
             sleep: Sleeps for seconds, on the same clock.
             first: The frame whose time the vehicle's time begins with.
             period_us: Of the inner loop.
+            missed: Where to note the releases that are skipped.
         """
         self.stale = 0
         self._sim = sim
         self._clock = clock
         self._sleep = sleep
         self._period_us = period_us
+        self._missed = missed
         self._grid: Grid | None = None
         self._offsets: list[int] = []  # arrival minus stamp, while the grid is not laid
         self._readings = first
@@ -134,6 +138,9 @@ class GridReleases:
         if self._grid is None:
             return self._settle()
         steps = self._grid.advance(self._clock())
+        if steps > 1:
+            due_us = self._grid.due_us
+            self._missed.add(due_us - (steps - 1) * self._period_us, due_us - self._period_us)
         self._wait(self._grid, self._grid.due_us)
         return self._release(self._grid, steps)
 
@@ -177,6 +184,7 @@ class GridReleases:
         stale_us = self._grid_us - self._readings.t_us
         if self._grid_us <= self._t_us or stale_us > MOST_STALE * self._period_us:
             self._left_out += 1
+            self._missed.add(due_us)
             return None
         self._t_us = self._grid_us
         self.stale += 1

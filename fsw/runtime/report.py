@@ -36,7 +36,12 @@ def as_json(
         "end_reason": end.sentence,
         **record.effort.as_json(),
         "mpc": _mpc(setup.facts, record),
-        "inner": {**_group(record.groups[INNER.name]), "stale": record.stale},
+        "inner": {
+            **_group(record.groups[INNER.name]),
+            "stale": record.stale,
+            "begun_us": record.begun_us,
+            "missed_us": record.missed.stretches,
+        },
         "telemetry": _group(record.groups[TELEMETRY.name]),
         "housekeeping": _group(record.groups[HOUSEKEEPING.name]),
         "scheduler": record.scheduler,

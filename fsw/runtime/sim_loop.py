@@ -20,6 +20,7 @@ from fsw.log.run_files import RunFiles
 from fsw.ports import Clock, PlanService
 from fsw.runtime.effort import EffortRecord
 from fsw.runtime.guarded_tick import GuardedTick
+from fsw.runtime.missed import MissedReleases
 from fsw.runtime.planner_worker import PlannerRecord
 from fsw.runtime.process import StopRequest
 from fsw.runtime.program import FlightProgram, State
@@ -68,6 +69,8 @@ class FlightRecord:
     health: LoopHealth
     groups: dict[str, GroupTimer] = field(default_factory=dict)  # of the loop's own groups
     stages: dict[str, Histogram] = field(default_factory=dict)  # of their members
+    missed: MissedReleases = field(default_factory=MissedReleases)  # of the inner loop
+    begun_us: int = 0  # first release, wall time
     stale: int = 0  # ticks without a sensor frame of their own
     scheduler: str = ""  # class and priority of the tick process
     counters: PlannerCounters = field(default_factory=PlannerCounters)
@@ -149,7 +152,7 @@ class SimLoop(Generic[State]):
     def fly(self, first: SensorFrame, planner: PlanService) -> FlightEnd:
         """Tick on every release until the simulator, a signal or silence ends it."""
         self._releases = self._make_releases(first)
-        heard = self._clock()
+        heard = self._record.begun_us = self._clock()
         release: Release | None = Release(first, 0, heard, heard)
         index, t_us = -1, first.t_us
         self._files.ulog.begin(t_us, lockstep=self._sim.pacing is Pacing.LOCKSTEP)
@@ -170,7 +173,9 @@ class SimLoop(Generic[State]):
     def _make_releases(self, first: SensorFrame) -> Releases:
         if self._sim.pacing is Pacing.LOCKSTEP:
             return StepReleases(self._sim, self._clock)
-        return GridReleases(self._sim, self._clock, self._sleep, first, self._tick_us)
+        return GridReleases(
+            self._sim, self._clock, self._sleep, first, self._tick_us, self._record.missed
+        )
 
     def _run_groups(self, release: Release, planner: PlanService, before: int) -> int:
         """Run what is due; returns the release's place on the vehicle's time grid."""
@@ -183,7 +188,9 @@ class SimLoop(Generic[State]):
                 due = runner.ticks == 1 or index // runner.ticks != before // runner.ticks
             if due:
                 begin_us = release.begun_us if runner.group is INNER else self._clock()
-                runner.run(cycle, release.due_us, begin_us)
+                late = runner.run(cycle, release.due_us, begin_us)
+                if late and runner.group is INNER:
+                    self._record.missed.add(release.due_us)
         return index
 
     def _hear(self, cycle: Cycle) -> None:

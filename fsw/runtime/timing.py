@@ -60,12 +60,13 @@ class GroupTimer:
         self._execution = Histogram()  # this interval
         self._lateness = Histogram()
 
-    def add(self, execution_us: float, lateness_us: float = 0.0) -> None:
-        """Count one tick that started ``lateness_us`` after its release."""
+    def add(self, execution_us: float, lateness_us: float = 0.0) -> bool:
+        """Count one tick that started ``lateness_us`` after its release; True if it was late."""
         self._execution.add(execution_us)
         self._lateness.add(lateness_us)
-        if lateness_us + execution_us > self.period_us:
-            self.late += 1
+        late = lateness_us + execution_us > self.period_us
+        self.late += late
+        return late
 
     @property
     def ticks(self) -> int:
@@ -74,8 +75,8 @@ class GroupTimer:
 
     @property
     def late_share(self) -> float:
-        """Share of ticks that ended after the next release."""
-        return self.late / self.ticks if self.ticks else 0.0
+        """Share of releases whose tick ended after the next one, or never ran."""
+        return (self.late + self.skipped) / max(self.ticks + self.skipped, 1)
 
     def close_interval(self) -> GroupTiming:
         """Report the interval since the last call and start another."""

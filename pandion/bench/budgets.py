@@ -19,6 +19,7 @@ _JUDGED: Final = (
     ("wake_up", "p50_us", "wake-up lateness p50 us"),
     ("wake_up", "p99_us", "wake-up lateness p99 us"),
     ("ticks", "late_share", "ticks late, share"),
+    ("ticks", "late_share_running", "... while the machine ran"),
     ("tick", "p50_us", "tick p50 us"),
     ("tick", "p99_us", "tick p99 us"),
     ("link", "p50_us", "link and log p50 us"),

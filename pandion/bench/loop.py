@@ -14,7 +14,7 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, TextIO
 
-from pandion.bare_loop import BareLoops
+from pandion.bench.bare_loop import BareLoops
 from pandion.bench.budgets import Budgets, Row, judge, load_budgets, verdict
 from pandion.bench.machine_watch import Watch
 from pandion.display import Display
@@ -106,8 +106,8 @@ def _fly(options: LoopOptions, hogs: int, budgets: Budgets, console: TextIO) -> 
     """
     with ExitStack() as stack:
         out = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="pandion-bench-")))
-        watch = stack.enter_context(Watch())
-        bare = stack.enter_context(BareLoops(options.duration_s))
+        watch = stack.enter_context(Watch((out / "flight.ulg").exists))
+        bare = stack.enter_context(BareLoops())
         for _ in range(hogs):
             stack.enter_context(Hog())
         sitl = [
@@ -129,35 +129,36 @@ def _fly(options: LoopOptions, hogs: int, budgets: Budgets, console: TextIO) -> 
         except (OSError, ValueError):
             raise HalfFailed(flown.failure or "the flight left no figures") from None
     assert watch.noise is not None
-    noise = replace(watch.noise, stopped=bare.late_share)
+    inner, stops = vehicle["inner"], bare.stops
+    flight = inner["begun_us"], inner["ticks"] + inner["skipped"]
+    stopped = None if stops is None else stops.share(*flight)
+    elsewhere = None if stops is None else stops.missed_elsewhere(inner["missed_us"], *flight)
+    noise = replace(watch.noise, stopped=stopped)
     facts = {
         "scheduler": vehicle["scheduler"],
         "noise": asdict(noise),
         "flown": {} if flown.sitl is None else flown.sitl,
         "vehicle": vehicle,
     }
-    rows = judge(_figures(vehicle, watch), budgets)
+    rows = judge(_figures(vehicle, watch, elsewhere), budgets)
     return Measured(hogs, rows, verdict(rows, noise), facts)
 
 
-def _figures(vehicle: dict[str, Any], watch: Watch) -> dict[str, dict[str, float | None]]:
+def _figures(
+    vehicle: dict[str, Any], watch: Watch, elsewhere: float | None
+) -> dict[str, dict[str, float | None]]:
     """What was measured, under the names of the budgets."""
     inner, mpc, stages = vehicle["inner"], vehicle["mpc"], vehicle["stages"]
     link = [stages[name] for name in _LINK if name in stages]
     return {
         "wake_up": {"p50_us": inner["lateness_p50_us"], "p99_us": inner["lateness_p99_us"]},
-        "ticks": {"late_share": _missed(inner) / max(inner["ticks"] + inner["skipped"], 1)},
+        "ticks": {"late_share": inner["late_share"], "late_share_running": elsewhere},
         "tick": stages["tick"],
         "link": {"p50_us": sum(stage["p50_us"] for stage in link)},
         "mpc": mpc,
         "plans": {"missed_deadlines": mpc["missed_deadlines"]},
         "memory": {"resident_mb": watch.resident_mb, "growth_mb": watch.growth_mb},
     }
-
-
-def _missed(inner: dict[str, Any]) -> int:
-    """Releases that were not over by the next one: late ticks, and those that never ran."""
-    return int(inner["late"] + inner["skipped"])
 
 
 class Hog(subprocess.Popen[bytes]):

@@ -7,6 +7,7 @@ import os
 import resource
 import threading
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import TracebackType
@@ -24,6 +25,7 @@ _TICK_S: Final = 1.0 / os.sysconf("SC_CLK_TCK")
 class Watch:
     """Watches the flight software among the descendants of this process, in a thread."""
 
+    flying: Callable[[], bool]  # compiling, which comes before, is not what is watched
     module: str = "fsw"
     resident: list[tuple[float, int]] = field(default_factory=list)  # seconds, bytes
     children_bytes: int = 0  # what its children have for themselves
@@ -67,12 +69,10 @@ class Watch:
     def _look(self) -> None:
         begin: float | None = None
         while not self._done.wait(_GLANCE_S):
-            process = self._find(os.getpid())
+            process = self._find(os.getpid()) if self.flying() else None
             if process is None:
                 continue
             with contextlib.suppress(OSError, ValueError, IndexError):
-                if not _descendants(process):
-                    continue  # still compiling: the planner's processes come last
                 begin = time.monotonic() if begin is None else begin
                 pages = int(Path(f"/proc/{process}/statm").read_text().split()[1])
                 seconds = time.monotonic() - begin

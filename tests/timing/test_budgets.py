@@ -12,7 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from pandion.bare_loop import BareLoops
+from fsw.runtime.clock import now_us
+from pandion.bench.bare_loop import BareLoops
 from pandion.bench.budgets import Noise, judge, load_budgets, verdict
 from pandion.bench.loop import main
 
@@ -54,20 +55,22 @@ def test_on_a_noisy_machine_there_is_no_pass_and_no_fail(noise: Noise) -> None:
 
 def test_a_loop_that_only_sleeps_sees_the_machine_stand_still_and_leaves_nothing() -> None:
     before = _descendants()
-    with BareLoops(60.0) as bare:
+    with BareLoops() as bare:
         time.sleep(1.0)
-    assert bare.late_share is None or 0.0 <= bare.late_share < 1.0
-    assert _descendants() == before
-    with BareLoops(60.0) as bare:
-        time.sleep(1.0)
+        begin_us = now_us()
         loops = [int(process) for process in _descendants() if process not in before]
         for loop in loops:
             os.kill(loop, signal.SIGSTOP)
         time.sleep(0.5)
         for loop in loops:
             os.kill(loop, signal.SIGCONT)
-    if bare.late_share is not None:
-        assert bare.late_share > 0.1
+    assert _descendants() == before
+    if bare.stops is not None:  # the machine grants real-time priority
+        assert bare.stops.share(begin_us, 250) > 0.9
+        missed = [(begin_us + 100_000, begin_us + 300_000)]
+        assert bare.stops.missed_elsewhere(missed, begin_us, 1_000) == 0.0
+        before_it = [(begin_us - 400_000, begin_us - 200_000)]
+        assert bare.stops.missed_elsewhere(before_it, begin_us - 500_000, 1_000) > 0.1
 
 
 def test_a_short_flight_beside_a_busy_program_is_measured_and_leaves_nothing(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, cast
 
@@ -192,6 +193,8 @@ def test_a_tick_that_overruns_is_counted_and_told_once() -> None:
     bench = Bench(overrunning)
     bench.run(9.0)
     assert bench.timer(INNER.name).late == 3
+    noted = [first for first, _ in bench.record.missed.stretches]
+    assert [b - a for a, b in pairwise(noted)] == [50 * PERIOD_US] * 2
     assert [text for text in bench.ground.texts if "late" in text] == ["ticks: 3 late"]
 
 

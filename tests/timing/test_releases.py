@@ -9,6 +9,7 @@ from itertools import pairwise
 import pytest
 
 from fsw.runtime.grid import Grid
+from fsw.runtime.missed import MissedReleases
 from fsw.runtime.releases import LEAD_US, MOST_STALE, GridReleases, Release
 from tests.timing.virtual_time import FIRST_US, PERIOD_US, VirtualSensors, VirtualTime, frame
 
@@ -21,8 +22,9 @@ class Loop:
     def __init__(self, sensors: VirtualSensors, work_us: int = 150) -> None:
         self.time = sensors.time
         self.work_us: Callable[[int], int] = lambda tick: work_us
+        self.missed = MissedReleases()
         self.releases = GridReleases(
-            sensors, self.time.clock, self.time.sleep, frame(FIRST_US), PERIOD_US
+            sensors, self.time.clock, self.time.sleep, frame(FIRST_US), PERIOD_US, self.missed
         )
         self.ticks: list[Release] = []
         self.nothing = 0
@@ -37,6 +39,9 @@ class Loop:
             else:
                 self.ticks.append(release)
                 self.time.work(self.work_us(len(self.ticks)))
+        noted = (round((last - first) / PERIOD_US) + 1 for first, last in self.missed.stretches)
+        # Every skipped release is noted once; a grid that follows a clock has other periods.
+        assert sum(noted) == pytest.approx(self.releases.skipped, rel=0.001)
         return self.ticks[begin:]
 
 

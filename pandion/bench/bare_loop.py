@@ -1,7 +1,7 @@
 """Loops that only sleep, beside a flight: where they are late as well, the machine stood still.
 
 They wake on a grid as the tick does, at a higher priority than anything of the flight, so nothing
-of ours makes them late. One a processor, as ``python -m pandion.bare_loop PROCESSOR RELEASES``.
+of ours makes them late. One a processor, as ``python -m pandion.bench.bare_loop PROCESSOR``.
 """
 
 from __future__ import annotations
@@ -19,30 +19,24 @@ from fsw.runtime.clock import now_us
 from fsw.runtime.grid import Grid
 from fsw.runtime.process import StopRequest
 from fsw.runtime.realtime import claim_real_time
+from pandion.bench.stops import Stops, Stretch
 
 _PRIORITY: Final = 60  # SCHED_FIFO; the tick has 50
 _PERIOD_US: Final = 2_000
-_LATE_US: Final = 1_500  # a tick that begins so late is not over by the next one
+_STOPPED_US: Final = 500  # an idle processor wakes a sleeper within a tenth of that
 _MOST: Final = 4  # processors: a stop of the machine is seen on any
 
 
 class BareLoops:
     """Sleeping loops for as long as a block lasts."""
 
-    def __init__(self, seconds: float) -> None:
-        """Ready to start.
-
-        Args:
-            seconds: What counts, at the end of the block: a flight begins with compiling.
-        """
-        self.late_share: float | None = None  # of their releases; None: priority was refused
-        self._releases = round(1e6 * seconds / _PERIOD_US)
+    def __init__(self) -> None:
+        self.stops: Stops | None = None  # at the end of the block; None: priority was refused
         self._loops: list[subprocess.Popen[str]] = []
 
     def __enter__(self) -> BareLoops:
         for processor in sorted(os.sched_getaffinity(0))[:_MOST]:
-            numbers = (str(processor), str(self._releases))
-            command = [sys.executable, "-m", "pandion.bare_loop", *numbers]
+            command = [sys.executable, "-m", "pandion.bench.bare_loop", str(processor)]
             self._loops.append(subprocess.Popen(command, stdout=subprocess.PIPE, text=True))
         return self
 
@@ -55,14 +49,13 @@ class BareLoops:
         for loop in self._loops:
             loop.terminate()
         said = [loop.communicate()[0] for loop in self._loops]
-        counts = [json.loads(text) for text in said if text]
-        if counts:
-            releases = sum(count["releases"] for count in counts)
-            self.late_share = sum(count["late"] for count in counts) / max(releases, 1)
+        if said and all(said):
+            late = [[(due, woken) for due, woken in json.loads(text)] for text in said]
+            self.stops = Stops(late, _PERIOD_US)
 
 
-def main(processor: int, releases: int) -> None:
-    """Sleep from release to release until told to end; print how many of the last were late."""
+def main(processor: int) -> None:
+    """Sleep from release to release until told to end; print from when to when it was late."""
     stop = StopRequest()
     stop.listen()
     os.sched_setaffinity(0, {processor})
@@ -70,18 +63,16 @@ def main(processor: int, releases: int) -> None:
     if os.sched_getscheduler(0) != os.SCHED_FIFO:
         return  # its lateness would say nothing about the machine
     gc.disable()
-    late: list[int] = []
+    late: list[Stretch] = []
     grid = Grid(now_us() + _PERIOD_US, _PERIOD_US)
     while not stop.requested:
-        steps = grid.advance(now_us())
-        late += range(grid.index - steps + 1, grid.index)  # skipped
+        grid.advance(now_us())
         time.sleep(1e-6 * max(grid.due_us - now_us(), 0))
-        if now_us() - grid.due_us > _LATE_US:
-            late.append(grid.index)
-    first = max(grid.index + 1 - releases, 0)
-    counted = {"releases": grid.index + 1 - first, "late": sum(index >= first for index in late)}
-    print(json.dumps(counted))
+        woken_us = now_us()
+        if woken_us - grid.due_us > _STOPPED_US:
+            late.append((grid.due_us, woken_us))
+    print(json.dumps(late))
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]), int(sys.argv[2]))
+    main(int(sys.argv[1]))
