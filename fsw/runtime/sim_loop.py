@@ -152,13 +152,13 @@ class SimLoop(Generic[State]):
     def fly(self, first: SensorFrame, planner: PlanService) -> FlightEnd:
         """Tick on every release until the simulator, a signal or silence ends it."""
         self._releases = self._make_releases(first)
-        heard = self._record.begun_us = self._clock()
-        release: Release | None = Release(first, 0, heard, heard)
         index, t_us = -1, first.t_us
         self._files.ulog.begin(t_us, lockstep=self._sim.pacing is Pacing.LOCKSTEP)
         rank_threads()  # now that the logs have theirs
+        heard = self._record.begun_us = self._clock()
+        release: Release | None = Release(first, 0, heard, heard)
         while not self._stop.requested:
-            if release is not None:
+            if release is not None and not (self._sim.shutdown and release.stale_us):
                 t_us = release.sensors.t_us
                 if release.stale_us == 0:
                     heard = release.begun_us

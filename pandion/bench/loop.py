@@ -137,6 +137,7 @@ def _fly(options: LoopOptions, hogs: int, budgets: Budgets, console: TextIO) -> 
     facts = {
         "scheduler": vehicle["scheduler"],
         "noise": asdict(noise),
+        "sleeping_loops_late_us": None if stops is None else stops.late,
         "flown": {} if flown.sitl is None else flown.sitl,
         "vehicle": vehicle,
     }

@@ -21,7 +21,7 @@ class Stops:
                 and when the loop ran.
             period_us: Of the loops and of the flight.
         """
-        self._late = late
+        self.late = late
         self._period_us = period_us
         # A processor that stops between two releases of its loop is seen by the next one.
         self._stretches = _united(
@@ -37,10 +37,10 @@ class Stops:
         """
         end_us = begin_us + releases * self._period_us
         missed = 0
-        for due_us, woken_us in (stretch for one in self._late for stretch in one):
+        for due_us, woken_us in (stretch for one in self.late for stretch in one):
             if begin_us <= due_us < end_us and woken_us - due_us > _MISSED_US:
                 missed += max((woken_us - due_us) // self._period_us, 1)
-        return missed / max(releases * len(self._late), 1)
+        return missed / max(releases * len(self.late), 1)
 
     def missed_elsewhere(
         self, missed: Iterable[Sequence[int]], begin_us: int, releases: int
