@@ -29,7 +29,8 @@ def merge(
     """
     if not received:
         return stream
-    by_time = {point.t_us: point for point in (*stream, *received) if _is_finite(point)}
+    by_time = {point.t_us: point for point in stream}
+    by_time.update((point.t_us, point) for point in received if _is_finite(point))
     points = [by_time[t] for t in sorted(by_time)]
     due = bisect_right([point.t_us for point in points], now_us)
     return tuple(points[max(due - 1, 0) :][:KEPT_POINTS])

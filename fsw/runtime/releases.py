@@ -31,6 +31,11 @@ _REPEATED: Final = 3  # frames in a row behind or ahead of their release, until 
 class SensorLink(Protocol):
     """Where sensor frames come from."""
 
+    @property
+    def shutdown(self) -> bool:
+        """Whether there will be no more."""
+        ...
+
     def receive(self) -> SensorFrame | None:
         """Wait for the next frame, with some patience."""
         ...
@@ -170,6 +175,8 @@ class GridReleases:
     def _release(self, grid: Grid, steps: int) -> Release | None:
         due_us, begun_us = grid.due_us, self._clock()
         newest = self._sim.newest()
+        if newest is None and self._sim.shutdown:
+            return None  # not missed: it is over
         self._grid_us += steps * self._period_us
         if newest is not None:
             self._readings = newest

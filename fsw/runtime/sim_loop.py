@@ -152,13 +152,19 @@ class SimLoop(Generic[State]):
     def fly(self, first: SensorFrame, planner: PlanService) -> FlightEnd:
         """Tick on every release until the simulator, a signal or silence ends it."""
         self._releases = self._make_releases(first)
+        try:
+            return self._tick_on(first, planner)
+        finally:
+            self._count_missed()
+
+    def _tick_on(self, first: SensorFrame, planner: PlanService) -> FlightEnd:
         index, t_us = -1, first.t_us
         self._files.ulog.begin(t_us, lockstep=self._sim.pacing is Pacing.LOCKSTEP)
         rank_threads()  # now that the logs have theirs
         heard = self._record.begun_us = self._clock()
         release: Release | None = Release(first, 0, heard, heard)
         while not self._stop.requested:
-            if release is not None and not (self._sim.shutdown and release.stale_us):
+            if release is not None:
                 t_us = release.sensors.t_us
                 if release.stale_us == 0:
                     heard = release.begun_us
@@ -255,8 +261,7 @@ class SimLoop(Generic[State]):
 
     def _sum_up(self, cycle: Cycle) -> None:
         record, health = self._record, self._record.health
-        record.stale = self._releases.stale
-        record.groups[INNER.name].skipped = self._releases.skipped
+        self._count_missed()
         health.inner = record.groups[INNER.name].close_interval()
         health.mpc = record.mpc.timer.close_interval()
         health.telemetry = record.groups[TELEMETRY.name].close_interval()
@@ -265,6 +270,10 @@ class SimLoop(Generic[State]):
         for group, timing in zip((INNER, MPC, TELEMETRY, HOUSEKEEPING), timings, strict=True):
             values = _timing_values(timing)
             self._files.ulog.add_timing(cycle.release.sensors.t_us, group.number, *values)
+
+    def _count_missed(self) -> None:
+        self._record.stale = self._releases.stale
+        self._record.groups[INNER.name].skipped = self._releases.skipped
 
     def _warn(self, cycle: Cycle) -> None:
         if self._sim.pacing is Pacing.LOCKSTEP:

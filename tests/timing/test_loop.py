@@ -47,7 +47,6 @@ class Sim(VirtualSensors):
     """The simulator's end: frames in, answers out."""
 
     pacing: Pacing = Pacing.REALTIME
-    shutdown: bool = False
     done: list[str] = field(default_factory=list)  # shared by all parts
     answers: list[tuple[int, TickOutputs]] = field(default_factory=list)  # at, what
 
@@ -61,6 +60,10 @@ class Sim(VirtualSensors):
 
     def queue_ack(self, ack: object) -> None:
         pass
+
+    def end_after_a_second(self) -> None:
+        if self.time.now_us - self.begun_us > 1_000_000:
+            self.shutdown, self.delay_us = True, lambda step: None
 
 
 @dataclass
@@ -209,6 +212,24 @@ def test_a_telemetry_socket_that_blocks_costs_releases_but_no_answer_is_late() -
     assert len(bench.sim.answers) == inner.ticks
     warnings = [text for text in bench.ground.texts if "skipped" in text]
     assert len(warnings) == 1
+
+
+def test_with_the_simulator_s_end_there_is_nothing_left_to_miss() -> None:
+    bench = Bench(standing)
+    bench.asleep = bench.sim.end_after_a_second
+    bench.until_us = bench.time.now_us + 10_000_000
+    end = bench.loop.fly(frame(FIRST_US), Planner(bench.sim.done))
+    assert end.ending is Ending.SHUTDOWN
+    assert bench.timer(INNER.name).ticks == pytest.approx(500, abs=5)
+    assert (bench.record.stale, bench.timer(INNER.name).skipped) == (0, 0)
+    assert bench.record.missed.stretches == []
+
+
+def test_what_was_missed_in_the_last_second_is_counted() -> None:
+    bench = Bench(standing)
+    bench.asleep = lambda: bench.time.work(7_000) if len(bench.sim.answers) == 700 else None
+    bench.run(1.8)
+    assert bench.timer(INNER.name).skipped == 3
 
 
 def test_a_planner_that_died_is_told_at_once() -> None:

@@ -52,6 +52,7 @@ class VirtualSensors:
     delay_us: Callable[[int], int | None] = on_time
     period_us: float = PERIOD_US  # of the wall clock: the sensors' own may be fast or slow
     begun_us: float = 0.0
+    shutdown: bool = False
     _taken: int = field(default=0, init=False)  # frames up to this one have been read
 
     def __post_init__(self) -> None:
