@@ -96,7 +96,8 @@ class Planner:
             SafeSet(walls=(wall,), obstacles=(point,)),
             SafeSet(sphere=sphere),
         ):
-            self.plan(PlanRequest(0, 0, rest, targets, safe_set, False))
+            for postures in ((), (rest.q_arm,) * len(targets)):
+                self.plan(PlanRequest(0, 0, rest, targets, safe_set, False, postures=postures))
         self._t_us = -1
         self._inputs[:] = 0.0
 
