@@ -18,7 +18,7 @@ MAGIC: Final = b"ULog\x01\x12\x35\x01"  # the last byte is the version
 SYNC_BYTES: Final = bytes([0x2F, 0x73, 0x13, 0x20, 0x25, 0x0C, 0xBB, 0x12])
 
 FLAGS, FORMAT, INFO, PARAMETER = b"B", b"F", b"I", b"P"
-SUBSCRIPTION, DATA, TEXT, SYNC, DROPOUT = b"A", b"D", b"L", b"S", b"O"
+SUBSCRIPTION, DATA, TEXT, TAGGED, SYNC, DROPOUT = b"A", b"D", b"L", b"C", b"S", b"O"
 
 _CODES: Final = {
     "uint8_t": "B", "int8_t": "b", "uint16_t": "H", "int16_t": "h", "uint32_t": "I",
@@ -117,6 +117,20 @@ def data_head(number: int, topic: Topic) -> bytes:
 def logged_text(severity: int, t_us: int, text: str) -> bytes:
     """A sentence, with the severity of syslog and MAVLink, 0 to 7."""
     return message(TEXT, pack("<BQ", ord("0") + severity, t_us) + text.encode())
+
+
+def tagged_text(severity: int, tag: int, t_us: int, text: str) -> bytes:
+    """A sentence of a source that is not the vehicle's own voice."""
+    return message(TAGGED, pack("<BHQ", ord("0") + severity, tag, t_us) + text.encode())
+
+
+def said(kind: bytes, body: bytes) -> tuple[int, int, str] | None:
+    """Severity, time and sentence of a text, tagged or not; None for what is no text."""
+    if kind not in (TEXT, TAGGED):
+        return None
+    at = 1 if kind == TEXT else 3
+    t_us = int.from_bytes(body[at : at + 8], "little")
+    return body[0] - ord("0"), t_us, body[at + 8 :].decode("utf-8", "replace")
 
 
 def sync() -> bytes:

@@ -89,17 +89,17 @@ def _rows(log: UlogFile) -> Iterator[tuple[str, int, tuple[str, ...], tuple[Any,
     known: dict[int, tuple[Topic, Any, tuple[str, ...]]] = {}
     pieces = ""
     for record in log.records():
-        if record.kind == ulog.TEXT:
-            t_us = int.from_bytes(record.body[1:9], "little")
-            values: tuple[Any, ...] = (record.body[0] - ord("0"), _text(record.body[9:]))
-            yield _TEXTS, t_us, ("timestamp", "severity", "text"), (t_us, *values)
+        said = ulog.said(record.kind, record.body)
+        if said is not None:
+            severity, t_us, text = said
+            yield _TEXTS, t_us, ("timestamp", "severity", "text"), (t_us, severity, text)
         if record.kind != ulog.DATA:
             continue
         if record.number not in known:
             topic = log.topics[record.number]
             known[record.number] = topic, unpacker(topic), columns(topic)
         topic, record_struct, names = known[record.number]
-        values = tuple(
+        values: tuple[Any, ...] = tuple(
             _text(value) if isinstance(value, bytes) else value
             for value in record_struct.unpack(record.body)
         )

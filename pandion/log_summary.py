@@ -23,9 +23,9 @@ def summary(log: UlogFile, progress: Callable[[int, int], None]) -> dict[str, An
             counts[log.topics[record.number].name] += 1
             last_us = max(last_us, int.from_bytes(record.body[:8], "little"))
             first_us = first_us or last_us
-        elif record.kind == ulog.TEXT:
-            t_us = int.from_bytes(record.body[1:9], "little")
-            texts.append(f"{1e-6 * t_us:9.3f} s  {record.body[9:].decode('utf-8', 'replace')}")
+        elif (said := ulog.said(record.kind, record.body)) is not None:
+            _, t_us, text = said
+            texts.append(f"{1e-6 * t_us:9.3f} s  {text}")
         elif record.kind == ulog.DROPOUT:
             lost_ms += int.from_bytes(record.body, "little")
         if k % _TOLD_RECORDS == 0:

@@ -51,4 +51,5 @@ def _name(record: Record) -> str:
 
 
 def _text(record: Record) -> str:
-    return record.body[9:].decode("utf-8", "replace")
+    said = ulog.said(record.kind, record.body)
+    return "" if said is None else said[2]

@@ -18,7 +18,7 @@ from typing import Final
 from fsw.log.block_file import BlockFile
 from fsw.log.encoder import LogEncoder, loop_timing
 from fsw.log.topics import TOPICS
-from fsw.signals import TickInputs, TickOutputs, Vec2
+from fsw.signals import StatusText, TickInputs, TickOutputs, Vec2
 from messages import ulog
 from messages.ground_truth import TRUTH_TOPICS
 
@@ -26,6 +26,7 @@ Number = int | float | bool
 
 _FLUSH_INTERVAL_US: Final = 250_000
 _FLUSH_BYTES: Final = 1 << 16
+_OF_THE_LOOP: Final = 1  # tag of its sentences
 _UNMEASURED: Final = (math.nan,) * 6
 
 
@@ -100,6 +101,10 @@ class FlightLog:
             ticks, _, _, period_us = counts
             counts, times = (ticks, 0, 0, period_us), _UNMEASURED
         self._records += loop_timing(t_us, group, counts, times)
+
+    def add_notice(self, t_us: int, notice: StatusText) -> None:
+        """Append what the loop said; a replay of the tick does not say it again."""
+        self._records += ulog.tagged_text(notice.severity & 7, _OF_THE_LOOP, t_us, notice.text)
 
     def close(self) -> None:
         """Write what is left and close the file; safe to call twice."""

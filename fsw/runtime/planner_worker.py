@@ -41,11 +41,10 @@ class PlannerRecord:
         self.restarts += 1
         self.events.append(f"{why}, restart {self.restarts}")
 
-    def count(self, given: Answer, asked_us: int) -> Plan | PlanFailure:
-        """Count an answer that is handed out."""
+    def count(self, given: Answer, asked_us: int) -> None:
+        """Count a cycle by its answer."""
         self.timer.add(given.duration_us, max(given.begun_us - asked_us, 0))
         self.status[given.result.status.name.lower()] += 1
-        return given.result
 
 
 class InlinePlanner:
@@ -67,7 +66,8 @@ class InlinePlanner:
         if given is None or t_us < given.t_apply_us:
             return None
         self._answer = None
-        return self._record.count(given, given.begun_us)
+        self._record.count(given, given.begun_us)
+        return given.result
 
     def close(self) -> None:
         """Nothing to stop."""
@@ -85,15 +85,16 @@ class ProcessPlanner:
         self._nursery: int | None
         self._nursery, self._link = start(planner, clock)
         self._answer: Answer | None = None
-        self._asked_us = 0  # when the last request was sent
-        self._asked_id = -1
+        self._asked_us: dict[int, int] = {}  # when which requests were sent that are open
         self._silent_since_us: int | None = None  # while something is to be heard
+        self._stuck = 0  # times in a row that patience was over
 
     def submit(self, request: PlanRequest) -> None:
         """Hand a request over; never waits."""
-        self._asked_us, self._asked_id = self._clock(), request.plan_id
+        now_us = self._clock()
+        self._asked_us[request.plan_id] = now_us
         if self._silent_since_us is None:
-            self._silent_since_us = self._asked_us
+            self._silent_since_us = now_us
         try:
             self._link.send(request)
         except PeerGone:
@@ -107,7 +108,7 @@ class ProcessPlanner:
         if given is None or t_us < given.t_apply_us:
             return None
         self._answer = None
-        return self._record.count(given, self._asked_us)
+        return given.result
 
     def close(self) -> None:
         """End both processes; safe to call twice."""
@@ -131,24 +132,38 @@ class ProcessPlanner:
             self._start_again()
             return
         if self._silent_since_us is not None and self._clock() - since_us > PATIENCE_US:
-            self._end_stuck_worker()
+            self._end_stuck()
 
     def _hear(self, said: Answer | Born | Died) -> None:
+        self._stuck = 0
         if isinstance(said, Answer):
             self._answer = said
-            answered = said.result.plan_id == self._asked_id
-            self._silent_since_us = None if answered else self._clock()
+            self._settle(said)
+            self._silent_since_us = self._clock() if self._asked_us else None
         elif isinstance(said, Born):
             self.worker = said.process
         else:
             self._record.restarted(f"planner process died ({said.exit_code})")
 
-    def _end_stuck_worker(self) -> None:
-        """Kill a worker that does not answer; its nursery starts another one and says so."""
+    def _settle(self, given: Answer) -> None:
+        """Count an answer, and what was asked before it as skipped: the newest goes first."""
+        plan_id = given.result.plan_id
+        self._record.count(given, self._asked_us.get(plan_id, given.begun_us))
+        older = sum(asked < plan_id for asked in self._asked_us)
+        self._record.timer.skipped += older
+        self._asked_us = {one: at for one, at in self._asked_us.items() if one > plan_id}
+
+    def _end_stuck(self) -> None:
+        """Kill a worker that does not answer; its nursery starts another one and says so.
+
+        A nursery that does not, is killed the next time, and the worker with it.
+        """
         self._silent_since_us = self._clock()
-        if self.worker is not None:
+        self._stuck += 1
+        stuck = self.worker if self._stuck == 1 else self._nursery
+        if stuck is not None:
             with contextlib.suppress(ProcessLookupError):
-                os.kill(self.worker, signal.SIGKILL)
+                os.kill(stuck, signal.SIGKILL)
 
     def _start_again(self) -> None:
         """The nursery is gone, and its worker with it: fork both anew, from the flying process.
@@ -161,5 +176,5 @@ class ProcessPlanner:
         self._link.close()
         os.waitpid(self._nursery, 0)
         self._nursery, self._link = start(self._planner, self._clock)
-        self._silent_since_us = None
+        self._silent_since_us, self._stuck = None, 0
         self._record.restarted("planner processes died")

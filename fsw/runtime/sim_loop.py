@@ -191,7 +191,10 @@ class SimLoop(Generic[State]):
             if runner.group is MPC:
                 due = cycle.outputs.plan_request is not None  # the tick keeps the planner's grid
             else:
-                due = runner.ticks == 1 or index // runner.ticks != before // runner.ticks
+                periods = index // runner.ticks - before // runner.ticks
+                due = runner.ticks == 1 or periods != 0
+                if periods > 1 and before >= 0 and runner.group is not INNER:
+                    runner.timer.skipped += periods - 1
             if due:
                 begin_us = release.begun_us if runner.group is INNER else self._clock()
                 late = runner.run(cycle, release.due_us, begin_us)
@@ -251,13 +254,15 @@ class SimLoop(Generic[State]):
             events.clear()
         if self._notices:
             outputs = replace(outputs, texts=(*outputs.texts, *self._notices))
-            self._notices.clear()
         self._ground.publish(outputs)
         # In lockstep: what is heard now is in the next tick, and nobody waits while it is read.
         self._ground.poll(cycle.release.sensors.t_us)
 
     def _log(self, cycle: Cycle) -> None:
         self._files.ulog.add(cycle.inputs, cycle.outputs)
+        for notice in self._notices:
+            self._files.ulog.add_notice(cycle.release.sensors.t_us, notice)
+        self._notices.clear()
 
     def _sum_up(self, cycle: Cycle) -> None:
         record, health = self._record, self._record.health

@@ -1,4 +1,4 @@
-"""Compiling takes seconds, and loading what was compiled milliseconds: both are over before a flight.
+"""Compiling takes seconds and loading kernels milliseconds: both are over before a flight.
 
 What is loaded is a matter of the process, so each flight has one of its own:
 ``python -m tests.closed_loop.test_nothing_compiles_in_flight NAME`` flies and prints the kernels

@@ -48,6 +48,7 @@ def written() -> bytes:
             ulog.subscription(3, EVERY_TYPE),
             records[0],
             ulog.logged_text(4, 1_000_500, "beware"),
+            ulog.tagged_text(3, 7, 1_000_600, "it died"),
             ulog.dropout(20),
             ulog.sync(),
             records[1],
@@ -75,6 +76,10 @@ def test_pyulog_reads_every_type_back() -> None:
     assert data.data["port"].tolist() == [4560, 1]
     (text,) = log.logged_messages
     assert (text.message, text.timestamp, text.log_level_str()) == ("beware", 1_000_500, "WARNING")
+    (tagged,) = log.logged_messages_tagged[7]
+    assert (tagged.message, tagged.timestamp, tagged.log_level_str()) == (
+        "it died", 1_000_600, "ERROR",
+    )  # fmt: skip
     assert [dropout.duration for dropout in log.dropouts] == [20]
 
 
@@ -84,7 +89,10 @@ def test_our_reader_reads_the_same(tmp_path: Path) -> None:
     log = open_log(path)
     assert log.information == {"sys_name": "Pandion ü", "seed": 5}
     assert log.parameters["airframe.mass"] == 3.5
-    data = [record for record in log.records() if record.kind == ulog.DATA]
+    records = list(log.records())
+    data = [record for record in records if record.kind == ulog.DATA]
+    said = [text for one in records if (text := ulog.said(one.kind, one.body)) is not None]
+    assert said == [(4, 1_000_500, "beware"), (3, 1_000_600, "it died")]
     topic = log.topics[3]
     assert columns(topic) == (
         "timestamp", "a_bool", "small", "large", "real", "three[0]", "three[1]", "three[2]",

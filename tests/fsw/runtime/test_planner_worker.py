@@ -209,6 +209,43 @@ def test_a_worker_that_is_stuck_is_replaced(
     assert answer(service).plan_id == 4
 
 
+def test_a_nursery_that_is_stuck_is_replaced_with_its_worker(
+    service: ProcessPlanner, record: PlannerRecord, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(planner_worker, "PATIENCE_US", 200_000)
+    service.submit(request(1))
+    answer(service)
+    worker, nursery = service.worker, service._nursery
+    assert worker is not None
+    assert nursery is not None
+    os.kill(nursery, signal.SIGSTOP)
+    os.kill(worker, signal.SIGKILL)
+    service.submit(request(2))
+    wait_for(lambda: service.take(ALWAYS_US) or record.restarts)
+    assert record.events == ["planner processes died, restart 1"]
+    service.submit(request(3))
+    assert answer(service).plan_id == 3
+
+
+def test_every_cycle_is_measured_and_what_was_never_answered_is_skipped(
+    record: PlannerRecord, tmp_path: Path
+) -> None:
+    gate = tmp_path / "open"
+    service = ProcessPlanner(Refusing(gate), clock.now_us, record)
+    service.submit(request(1))
+    time.sleep(0.15)  # now it is at work on it, for longer than its period
+    for plan_id in (2, 3, 4):
+        service.submit(request(plan_id))
+    gate.touch()
+    time.sleep(0.2)  # the answers to 1 and to 4 are there, and taken together
+    assert answer(service).plan_id == 4
+    timing = record.timer.close_interval()
+    assert (timing.ticks, timing.late_ticks, timing.skipped_ticks) == (2, 1, 2)
+    assert timing.execution_max_us > 100_000.0
+    assert record.status == {"infeasible": 2}
+    service.close()
+
+
 def test_nothing_is_left_of_it(record: PlannerRecord) -> None:
     service = ProcessPlanner(Refusing(), clock.now_us, record)
     service.submit(request(1))
