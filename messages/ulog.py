@@ -19,6 +19,10 @@ SYNC_BYTES: Final = bytes([0x2F, 0x73, 0x13, 0x20, 0x25, 0x0C, 0xBB, 0x12])
 
 FLAGS, FORMAT, INFO, PARAMETER = b"B", b"F", b"I", b"P"
 SUBSCRIPTION, DATA, TEXT, TAGGED, SYNC, DROPOUT = b"A", b"D", b"L", b"C", b"S", b"O"
+# What may stand among the data; of M, Q and R nothing is written here.
+AMONG_DATA: Final = frozenset(
+    (SUBSCRIPTION, DATA, TEXT, TAGGED, SYNC, DROPOUT, INFO, PARAMETER, b"M", b"Q", b"R")
+)
 
 _CODES: Final = {
     "uint8_t": "B", "int8_t": "b", "uint16_t": "H", "int16_t": "h", "uint32_t": "I",
@@ -44,7 +48,13 @@ class Field:
 
     @property
     def code(self) -> str:
-        """As :mod:`struct` packs it."""
+        """As :mod:`struct` packs it.
+
+        Raises:
+            ValueError: The type is none of the format's own.
+        """
+        if self.type not in _CODES:
+            raise ValueError(f"{self.name} has the unknown type {self.type!r}")
         return f"{self.count or ''}{_CODES[self.type]}"
 
     @property

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import mmap
 import re
+import struct
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,7 +15,10 @@ from messages import ulog
 from messages.ulog import Field, Topic
 
 _HEADER: Final = Struct("<Hc")
-_KEY = re.compile(r"(?P<type>\w+)(?:\[(?P<count>\d+)\])? (?P<name>\S+)")
+_KEY = re.compile(r"(?P<type>\w+)(?:\[(?P<count>\d{1,5})\])? (?P<name>\S+)")
+_NAME = re.compile(r"\w+", re.ASCII)  # of a topic; it also names a file of an export
+_TEXT_HEADS: Final = {ulog.TEXT: 9, ulog.TAGGED: 11}  # bytes: severity, tag and time
+_DAMAGE = (ValueError, IndexError, KeyError, struct.error)  # what a wrong byte leads to
 
 Value = int | float | bool | bytes
 
@@ -44,18 +48,60 @@ class UlogFile:
     size: int = 0
     at: int = 0  # bytes read so far
     whole: bool = True  # False once the end turned out to be cut
+    _lengths: dict[int, int] = field(default_factory=dict)  # of the records, by number
 
     def records(self) -> Iterator[Record]:
-        """Every message behind the definitions, in file order."""
-        for kind, body in self._messages():
-            if kind == ulog.SUBSCRIPTION:
-                number = unpack_from("<H", body, 1)[0]
-                self.topics[number] = self.formats[body[3:].decode("ascii")]
-            else:
-                yield _record(kind, body)
+        """Every message behind the definitions, in file order.
+
+        Raises:
+            UlogError: A message cannot be what was written. A file that was cut is read up to
+                there.
+        """
+        begin = self.at
+        try:
+            for kind, body in self._messages():
+                if kind == ulog.SUBSCRIPTION:
+                    self._subscribe(unpack_from("<H", body, 1)[0], body[3:].decode("ascii"))
+                else:
+                    record = _record(kind, body)
+                    self._check(record, len(record.body))
+                    yield record
+                begin = self.at
+            self._check_rest(begin)
+        except _DAMAGE as problem:
+            raise UlogError(f"{self.path} is damaged at byte {begin}: {problem}") from None
+
+    def _subscribe(self, number: int, name: str) -> None:
+        if number in self.topics or name not in self.formats:
+            raise ValueError(f"topic {name!r} was not declared, or its number is taken")
+        topic = self.formats[name]
+        self._lengths[number] = unpacker(topic).size
+        self.topics[number] = topic
+
+    def _check(self, record: Record, length: int) -> None:
+        if record.kind not in ulog.AMONG_DATA:
+            raise ValueError(f"{record.kind!r} is no kind of message among data")
+        if record.kind == ulog.DATA and length != self._lengths.get(record.number):
+            raise ValueError(f"a record of topic {record.number} has {length} bytes")
+        if length < _TEXT_HEADS.get(record.kind, 0):
+            raise ValueError(f"a text has {length} bytes")
+
+    def _check_rest(self, begin: int) -> None:
+        """Tell a last message that was cut from one whose length is wrong."""
+        with self.path.open("rb") as file:
+            file.seek(begin)
+            rest = file.read(_HEADER.size + 2)
+        if len(rest) == _HEADER.size + 2:
+            length, kind = _HEADER.unpack_from(rest)
+            record = _record(kind, rest[_HEADER.size :])
+            self._check(record, length - 2 if kind == ulog.DATA else length)
 
     def read_definitions(self) -> None:
-        """Read up to the first message that is none."""
+        """Read up to the first message that is none.
+
+        Raises:
+            UlogError: There is none.
+        """
         for kind, body in self._messages():
             if kind == ulog.FORMAT:
                 topic = _topic(body.decode("ascii"))
@@ -65,6 +111,7 @@ class UlogFile:
             elif kind != ulog.FLAGS:
                 self.at -= _HEADER.size + len(body)
                 return
+        raise UlogError(f"{self.path} ends before its data begin")
 
     def _note(self, kind: bytes, body: bytes) -> None:
         size = body[0]
@@ -108,8 +155,8 @@ def open_log(path: Path) -> UlogFile:
     log = UlogFile(path, unpack_from("<Q", head, 8)[0], at=16)
     try:
         log.read_definitions()
-    except (ValueError, IndexError, KeyError) as error:
-        raise UlogError(f"{path} is damaged before its data begin: {error}") from None
+    except _DAMAGE as problem:
+        raise UlogError(f"{path} is damaged before its data begin: {problem}") from None
     return log
 
 
@@ -144,6 +191,8 @@ def _record(kind: bytes, body: bytes) -> Record:
 
 def _topic(text: str) -> Topic:
     name, _, fields = text.partition(":")
+    if _NAME.fullmatch(name) is None:
+        raise ValueError(f"{name!r} names no topic")
     _, *declared = (_field(part) for part in fields.split(";") if part)
     return Topic(name, "", "", tuple(declared))
 

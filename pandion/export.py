@@ -46,7 +46,9 @@ def main(argv: list[str]) -> int:
             sink = _sink(read.csv, read.mcap, log, stack)
             progress = stack.enter_context(Progress(sys.stdout, counted=False))
             count = _export(log, sink, progress)
-    except (UlogError, OSError) as error:
+        if count == 0:
+            raise UlogError(f"{path} holds no record")
+    except (UlogError, ValueError, OSError) as error:
         print(f"pandion export: {error}", file=sys.stderr)
         return COULD_NOT_START
     except ModuleNotFoundError as error:

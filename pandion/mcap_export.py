@@ -12,6 +12,7 @@ from typing import Any
 from mcap.writer import Writer
 
 _TYPES = {bool: "boolean", int: "integer", float: "number", str: "string"}
+_LAST_US = ((1 << 64) - 1) // 1000  # it counts nanoseconds
 _ELEMENT = re.compile(r"(\w+)\[\d+\]")
 
 
@@ -36,11 +37,17 @@ class McapSink(contextlib.ExitStack):
         self._channels: dict[str, int] = {}
 
     def add(self, topic: str, t_us: int, names: tuple[str, ...], values: tuple[Any, ...]) -> None:
-        """Append a message, and its channel before the first."""
+        """Append a message, and its channel before the first.
+
+        Raises:
+            ValueError: MCAP cannot hold the time.
+        """
         if topic not in self._channels:
             schema = json.dumps(_schema(topic, names, values)).encode()
             number = self._writer.register_schema(topic, "jsonschema", schema)
             self._channels[topic] = self._writer.register_channel(topic, "json", number)
+        if t_us > _LAST_US:
+            raise ValueError(f"{topic} has the time {t_us} us, which MCAP cannot hold")
         data = json.dumps(_object(names, values), separators=(",", ":")).encode()
         self._writer.add_message(self._channels[topic], 1000 * t_us, data, 1000 * t_us)
 

@@ -84,24 +84,32 @@ def _program(log: UlogFile) -> FlightProgram[Any]:
     """The flight software of this build, configured by the names in the log."""
     from fsw.parameters.control_choice import ControlChoice
     from fsw.runtime.assembly import flight_software
+    from fsw.runtime.replay import fact
 
-    facts = log.information
     return flight_software(
         ControlChoice(
-            controller=str(facts["controller"]),
-            inner=str(facts["inner"]),
-            robustness=str(facts["robustness"]),
-            solver=str(facts["solver"]),
-            soft=bool(facts["soft"]),
+            controller=fact(log, "controller"),
+            inner=fact(log, "inner"),
+            robustness=fact(log, "robustness"),
+            solver=fact(log, "solver"),
+            soft=fact(log, "soft") != "0",
         ),
-        origin=_origin(json.loads(str(facts["numbers"]))),
+        origin=_origin(log),
         to_plan=False,
     )
 
 
-def _origin(numbers: dict[str, float]) -> Origin:
+def _origin(log: UlogFile) -> Origin:
     """Where the local frame of the flight began; not chosen by a name."""
-    return Origin(*(numbers[f"origin.{part}"] for part in ("latitude", "longitude", "altitude")))
+    from fsw.runtime.replay import logged_numbers
+    from messages.ulog_reader import UlogError
+
+    numbers = logged_numbers(log)
+    try:
+        parts = (numbers[f"origin.{part.name}"] for part in dataclasses.fields(Origin))
+        return Origin(*map(float, parts))
+    except (KeyError, TypeError, ValueError):
+        raise UlogError(f"{log.path} is damaged: it does not say where it began") from None
 
 
 def _sentence(found: Replayed, log: UlogFile) -> str:

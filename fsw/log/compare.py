@@ -17,8 +17,8 @@ class Difference:
     tick: int  # counted from 0 in the log
     t_us: int
     field: str  # topic.field
-    logged: object
-    replayed: object
+    logged: int | float | str
+    replayed: int | float | str
 
 
 def first_difference(logged: LoggedTick, encoded: bytes) -> Difference | None:
@@ -35,7 +35,7 @@ def first_difference(logged: LoggedTick, encoded: bytes) -> Difference | None:
         if one.kind == ulog.TEXT:
             return Difference(*where, "text", _text(one), _text(other))
         topic = TOPICS[one.number]
-        values = (unpacker(topic).unpack(record.body) for record in (one, other))
+        values = (map(_readable, unpacker(topic).unpack(record.body)) for record in (one, other))
         for name, was, now in zip(columns(topic), *values, strict=True):
             if repr(was) != repr(now):  # by their digits: NaN is NaN, and -0.0 is not 0.0
                 return Difference(*where, f"{topic.name}.{name}", was, now)
@@ -48,6 +48,13 @@ def first_difference(logged: LoggedTick, encoded: bytes) -> Difference | None:
 
 def _name(record: Record) -> str:
     return TOPICS[record.number].name if record.kind == ulog.DATA else f"text {_text(record)!r}"
+
+
+def _readable(value: int | float | bytes) -> int | float | str:
+    """Characters as text; the zeros that fill a field up say nothing."""
+    if isinstance(value, bytes):
+        return value.rstrip(b"\0").decode("utf-8", "backslashreplace")
+    return value
 
 
 def _text(record: Record) -> str:

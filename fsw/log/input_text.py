@@ -60,7 +60,7 @@ class InputText:
         """
         try:
             return self._read[name](json.loads(text))
-        except (TypeError, KeyError, AttributeError, IndexError) as error:
+        except (TypeError, LookupError, AttributeError, ArithmeticError, ValueError) as error:
             raise ValueError(f"input {name} cannot be read: {error}") from None
 
     def _writer(self, hint: Any) -> Convert:

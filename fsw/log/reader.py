@@ -50,22 +50,26 @@ def open_flight(path: Path) -> UlogFile:
     log = open_log(path / "flight.ulg" if path.is_dir() else path)
     if "inputs" not in log.information:
         raise UlogError(f"{log.path} is not a flight log of Pandion: it records no inputs")
-    if log.information["inputs"] != InputText(TickInputs).schema or any(
-        log.formats.get(topic.name) is None or log.formats[topic.name].codes != topic.codes
-        for topic in topics.TOPICS
-    ):
+    if log.information["inputs"] != InputText(TickInputs).schema or not _has_our_topics(log):
         written = log.information.get("ver_sw", "an unknown revision")
         raise UlogError(f"{log.path} has other fields than this build reads; it is of {written}")
     return log
+
+
+def _has_our_topics(log: UlogFile) -> bool:
+    try:
+        return all(log.formats[topic.name].codes == topic.codes for topic in topics.TOPICS)
+    except (KeyError, ValueError):  # a topic is missing, or has a type nobody knows
+        return False
 
 
 def ticks(log: UlogFile) -> Iterator[LoggedTick | Gap]:
     """Every whole tick of a log, and where some are missing.
 
     Raises:
-        UlogError: An input cannot be read back.
+        UlogError: An input cannot be read back, or the log holds no whole tick.
     """
-    inputs, index, records, lost_ms = _Inputs(), 0, list[Record](), 0
+    inputs, index, records, lost_ms = _Inputs(log), 0, list[Record](), 0
     for record in log.records():
         if record.kind == ulog.DROPOUT:
             lost_ms += int.from_bytes(record.body, "little")
@@ -79,6 +83,8 @@ def ticks(log: UlogFile) -> Iterator[LoggedTick | Gap]:
             records.append(record)
     if records and log.whole:
         yield inputs.tick(index, records)
+    elif index == 0:
+        raise UlogError(f"{log.path} holds no whole tick")
 
 
 def _of_a_tick(record: Record) -> bool:
@@ -91,7 +97,8 @@ def _of_a_tick(record: Record) -> bool:
 class _Inputs:
     """Puts the inputs of each tick together; what did not change is what it was."""
 
-    def __init__(self) -> None:
+    def __init__(self, log: UlogFile) -> None:
+        self._log = log
         self._text = InputText(TickInputs)
         self._values: dict[str, Any] = {}
         self._pieces = b""
@@ -99,23 +106,31 @@ class _Inputs:
         self._input = unpacker(topics.TICK_INPUT)
 
     def tick(self, index: int, records: list[Record]) -> LoggedTick:
-        for record in records:
-            if record.number == _SENSORS:
-                self._values[TYPED] = _sensor_frame(self._sensors.unpack(record.body))
-            elif record.number == _INPUT:
-                self._take(record.body)
-        return LoggedTick(index, TickInputs(**self._values), records)
+        if index == 0:
+            self._check_numbers()
+        try:
+            for record in records:
+                if record.number == _SENSORS:
+                    self._values[TYPED] = _sensor_frame(self._sensors.unpack(record.body))
+                elif record.number == _INPUT:
+                    self._take(record.body)
+            return LoggedTick(index, TickInputs(**self._values), records)
+        except (ValueError, TypeError) as error:
+            raise UlogError(f"{self._log.path} is damaged in tick {index}: {error}") from None
+
+    def _check_numbers(self) -> None:
+        for number, topic in enumerate(topics.TOPICS):
+            known = self._log.topics.get(number)
+            if known is None or known.name != topic.name:
+                raise UlogError(f"{self._log.path} is damaged: topic {number} is another")
 
     def _take(self, body: bytes) -> None:
         _, field, part, parts, text = self._input.unpack(body)
         self._pieces = (self._pieces if part else b"") + text
         if part + 1 < parts:
             return
-        name = field.rstrip(b"\0").decode("ascii")
-        try:
-            self._values[name] = self._text.value(name, self._pieces.rstrip(b"\0"))
-        except ValueError as error:
-            raise UlogError(f"the log is damaged: {error}") from None
+        name = field.rstrip(b"\0").decode("ascii", "backslashreplace")
+        self._values[name] = self._text.value(name, self._pieces.rstrip(b"\0"))
 
 
 def _sensor_frame(values: tuple[Any, ...]) -> SensorFrame:

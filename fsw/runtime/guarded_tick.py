@@ -26,8 +26,17 @@ class GuardedTick(Generic[State]):
         self,
         tick: Callable[[State, TickInputs], tuple[State, TickOutputs]],
         first_state: State,
+        tell: Callable[[], None] = traceback.print_exc,
     ) -> None:
+        """Start at the first tick.
+
+        Args:
+            tick: May fail.
+            first_state: What it starts from.
+            tell: Called where it has failed, for whoever will look for the reason.
+        """
         self._tick = tick
+        self._tell = tell
         self._state = first_state
         self._last: TickOutputs | None = None
         self._failed = 0
@@ -45,7 +54,7 @@ class GuardedTick(Generic[State]):
             self._failed += 1
             if self._last is None or self._failed > PATIENCE_TICKS:
                 raise
-            traceback.print_exc()
+            self._tell()
             text = f"tick failed, {type(error).__name__}: last command repeated"
             return replace(
                 self._last,

@@ -12,7 +12,7 @@ from typing import Any
 
 from fsw.log.compare import Difference, first_difference
 from fsw.log.encoder import LogEncoder
-from fsw.log.reader import Gap, UlogFile, ticks
+from fsw.log.reader import Gap, LoggedTick, UlogError, UlogFile, ticks
 from fsw.runtime.guarded_tick import GuardedTick
 from fsw.runtime.program import FlightProgram
 
@@ -37,19 +37,17 @@ def replay(log: UlogFile, program: FlightProgram[Any], progress: Progress) -> Re
     Raises:
         UlogError: The log is damaged.
     """
-    measured = log.information["pacing"] != "lockstep"
+    measured = fact(log, "pacing") != "lockstep"
     facts = program.facts
     encoder = LogEncoder(
         measured=measured, thrust_max=facts.rotor_thrust_max, link_length=facts.link_length
     )
-    tick = GuardedTick(program.tick, program.first_state)
+    tick = GuardedTick(program.tick, program.first_state, tell=lambda: None)
     compared = 0
     for logged in ticks(log):
         if isinstance(logged, Gap):
             return Replayed(compared, None, logged.duration_ms)
-        out = bytearray()
-        encoder.add(logged.inputs, tick(logged.inputs), out)
-        difference = first_difference(logged, bytes(out))
+        difference = _difference(logged, tick, encoder)
         if difference is not None:
             return Replayed(compared, difference, 0)
         compared += 1
@@ -59,9 +57,45 @@ def replay(log: UlogFile, program: FlightProgram[Any], progress: Progress) -> Re
     return Replayed(compared, None, 0)
 
 
+def fact(log: UlogFile, name: str) -> str:
+    """What a log says of its flight.
+
+    Raises:
+        UlogError: It does not say it.
+    """
+    if name not in log.information:
+        raise UlogError(f"{log.path} is damaged: it does not say its {name}")
+    return str(log.information[name])
+
+
+def logged_numbers(log: UlogFile) -> dict[str, float]:
+    """The configuration that was flown, by dotted name.
+
+    Raises:
+        UlogError: It cannot be read.
+    """
+    try:
+        return dict[str, float](json.loads(fact(log, "numbers")))
+    except (ValueError, TypeError) as error:
+        raise UlogError(f"{log.path} is damaged in its numbers: {error}") from None
+
+
+def _difference(
+    logged: LoggedTick, tick: GuardedTick[Any], encoder: LogEncoder
+) -> Difference | None:
+    out = bytearray()
+    try:
+        encoder.add(logged.inputs, tick(logged.inputs), out)
+    except Exception as error:  # of a tick that was flown, whatever its inputs look like
+        raised = f"{type(error).__name__}: {error}"
+        t_us = logged.inputs.sensors.t_us
+        return Difference(logged.index, t_us, "the tick", "flown", raised)
+    return first_difference(logged, bytes(out))
+
+
 def other_numbers(log: UlogFile, program: FlightProgram[Any]) -> tuple[str, ...]:
     """In which numbers of its configuration the program is not the one that was logged."""
-    logged: dict[str, float] = json.loads(str(log.information["numbers"]))
+    logged = logged_numbers(log)
     here = program.numbers
     return tuple(
         f"{name} is {here.get(name, 'unknown')} here and was {logged.get(name, 'unknown')}"

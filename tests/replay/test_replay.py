@@ -2,71 +2,35 @@
 
 from __future__ import annotations
 
-import dataclasses
-from dataclasses import field, replace
+import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from fsw.log import topics
-from fsw.log.flight_log import FlightLog, LogSubject, definitions
+from fsw.log.flight_log import LogSubject, definitions
 from fsw.log.reader import open_flight
 from fsw.log.topics import TOPICS
-from fsw.parameters.control_choice import ControlChoice
 from fsw.parameters.flat import flat
 from fsw.parameters.flight_config import FlightConfig
 from fsw.runtime.assembly import flight_software
 from fsw.runtime.flight_loop import FlightLoop
 from fsw.runtime.flight_state import FlightState
 from fsw.runtime.replay import Replayed, other_numbers, replay
-from fsw.signals import CommandRequest, TickInputs, TickOutputs
+from fsw.signals import TickInputs, TickOutputs
 from messages import ulog
 from messages.ulog import Topic
 from messages.ulog_reader import UlogError
-from sitl.scenario_file import load_scenario
-from tests.closed_loop.harness import LAND, Flight, command
+from pandion.replay import main
+from tests.replay.recorded import CHOICE, flight, written
 
-CHOICE = ControlChoice("blf", "tracking", "consistent", "clarabel", soft=False)
 SECONDS = 0.8
-
-
-@dataclasses.dataclass
-class Recorded(Flight):
-    """A flight that keeps what went into each tick and what came out."""
-
-    ticks: list[tuple[TickInputs, TickOutputs]] = field(default_factory=list)
-
-    def step(self, *commands: CommandRequest) -> TickOutputs:
-        outputs = super().step(*commands)
-        assert self.inputs is not None
-        self.ticks.append((self.inputs, outputs))
-        return outputs
 
 
 @pytest.fixture(scope="module")
 def flown() -> list[tuple[TickInputs, TickOutputs]]:
-    """Walls, a trajectory, plans, a command nobody supports, and the way down."""
-    flight = Recorded(load_scenario("walls"), seed=5)
-    flight.follow()
-    flight.run(SECONDS / 2)
-    flight.step(command(31010), command(LAND))
-    flight.run(SECONDS / 2)
-    return flight.ticks
-
-
-def written(path: Path, ticks: list[tuple[TickInputs, TickOutputs]], lockstep: bool = True) -> Path:
-    facts = dict(vars_of(CHOICE))
-    log = FlightLog(path, LogSubject(facts, flat(FlightConfig()), {}, 17.1675, (0.15, 0.15)))
-    log.begin(ticks[0][0].sensors.t_us, lockstep)
-    for inputs, outputs in ticks:
-        log.add(inputs, outputs)
-        log.add_timing(inputs.sensors.t_us, 0, (1, 2, 3, 4), (5.0,) * 6)
-    log.close()
-    return path
-
-
-def vars_of(choice: ControlChoice) -> dict[str, str | int]:
-    return {**dataclasses.asdict(choice), "soft": int(choice.soft)}
+    return flight(SECONDS)
 
 
 def replayed(path: Path, config: FlightConfig | None = None) -> Replayed:
@@ -163,6 +127,50 @@ def test_a_text_said_otherwise_is_found(
     assert str(found.logged).replace("trajectorx", "trajectory") == found.replayed
 
 
+@pytest.mark.parametrize(
+    ("field", "was", "becomes"),
+    [
+        ("vehicle_status.mode", b"trajectory\0\0\0\0\0\0", b"trajectorx\0\0\0\0\0\0"),
+        ("tick_input.text", b"0.0,", b"0e0,"),  # the same number otherwise
+    ],
+)
+def test_a_letter_is_found_and_told_as_text_in_json_too(
+    field: str,
+    was: bytes,
+    becomes: bytes,
+    flown: list[tuple[TickInputs, TickOutputs]],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    path = written(tmp_path / "flight.ulg", flown)
+    data = path.read_bytes()
+    at = data.index(was, data.index(ulog.data_head(0, topics.SENSOR_FRAME)))
+    path.write_bytes(data[:at] + becomes + data[at + len(was) :])
+    assert main([str(path), "--verify", "--json", str(tmp_path / "found.json")]) == 1
+    assert f": {field} was '" in capsys.readouterr().out
+    found = json.loads((tmp_path / "found.json").read_text())["difference"]
+    assert found["field"] == field
+    assert becomes.rstrip(b"\0").decode() in found["logged"]
+    assert was.rstrip(b"\0").decode() in found["replayed"]
+
+
+def test_a_tick_that_fails_now_is_a_difference(
+    flown: list[tuple[TickInputs, TickOutputs]],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    def failing(state: object, inputs: TickInputs) -> tuple[object, TickOutputs]:
+        raise ArithmeticError("no such thing")
+
+    path = written(tmp_path / "flight.ulg", flown)
+    program = replace(flight_software(CHOICE, to_plan=False), tick=failing)
+    found = replay(open_flight(path), program, lambda done, total: None).difference
+    assert found is not None
+    assert (found.tick, found.field) == (0, "the tick")
+    assert found.replayed == "ArithmeticError: no such thing"
+    assert capsys.readouterr().err == ""
+
+
 def test_a_log_without_a_record_the_tick_makes_names_the_record(
     flown: list[tuple[TickInputs, TickOutputs]], tmp_path: Path
 ) -> None:
@@ -191,6 +199,6 @@ def test_a_log_of_other_fields_is_refused_with_its_revision(tmp_path: Path) -> N
     path.write_bytes(definitions(0, subject, "lockstep", '{"sensors":"other"}'))
     with pytest.raises(UlogError, match="has other fields than this build reads; it is of 0123abc"):
         open_flight(path)
-    path.write_bytes(ulog.opening(0))
+    path.write_bytes(ulog.opening(0) + ulog.sync())
     with pytest.raises(UlogError, match="records no inputs"):
         open_flight(tmp_path)

@@ -1,0 +1,52 @@
+"""A short flight with its ticks kept, and the log that it makes."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import field
+from pathlib import Path
+
+from fsw.log.flight_log import FlightLog, LogSubject
+from fsw.parameters.control_choice import ControlChoice
+from fsw.parameters.flat import flat
+from fsw.parameters.flight_config import FlightConfig
+from fsw.signals import CommandRequest, TickInputs, TickOutputs
+from sitl.scenario_file import load_scenario
+from tests.closed_loop.harness import LAND, Flight, command
+
+CHOICE = ControlChoice("blf", "tracking", "consistent", "clarabel", soft=False)
+
+
+@dataclasses.dataclass
+class Recorded(Flight):
+    """A flight that keeps what went into each tick and what came out."""
+
+    ticks: list[tuple[TickInputs, TickOutputs]] = field(default_factory=list)
+
+    def step(self, *commands: CommandRequest) -> TickOutputs:
+        outputs = super().step(*commands)
+        assert self.inputs is not None
+        self.ticks.append((self.inputs, outputs))
+        return outputs
+
+
+def flight(seconds: float) -> list[tuple[TickInputs, TickOutputs]]:
+    """Walls, a trajectory, plans, a command nobody supports, and the way down."""
+    flight = Recorded(load_scenario("walls"), seed=5)
+    flight.follow()
+    flight.run(seconds / 2)
+    flight.step(command(31010), command(LAND))
+    flight.run(seconds / 2)
+    return flight.ticks
+
+
+def written(path: Path, ticks: list[tuple[TickInputs, TickOutputs]], lockstep: bool = True) -> Path:
+    """The log of these ticks."""
+    facts: dict[str, str | int] = {**dataclasses.asdict(CHOICE), "soft": int(CHOICE.soft)}
+    log = FlightLog(path, LogSubject(facts, flat(FlightConfig()), {}, 17.1675, (0.15, 0.15)))
+    log.begin(ticks[0][0].sensors.t_us, lockstep)
+    for inputs, outputs in ticks:
+        log.add(inputs, outputs)
+        log.add_timing(inputs.sensors.t_us, 0, (1, 2, 3, 4), (5.0,) * 6)
+    log.close()
+    return path
