@@ -23,6 +23,7 @@ from fsw.signals import (
 )
 from sitl.scenario import Hold, Obstacle, Pilot, Scenario
 from sitl.scenario_file import load_scenario
+from tests.closed_loop import harness
 from tests.closed_loop.harness import ARM, SET_MODE, Flight, command, hover, on_the_ground
 
 NAN = math.nan
@@ -152,6 +153,24 @@ def test_a_velocity_is_flown_in_both_frames() -> None:
     flight = offboard(hover(yaw_deg=90.0), **body(v=(0.5, 0.0, 0.0), along_heading=True))
     flight.run(3.0)
     assert flight.sim.truth().v_WB == pytest.approx((0.0, 0.5, 0.0), abs=0.05)
+
+
+@pytest.mark.parametrize("phase", [0, 1, 17, 49])
+@pytest.mark.parametrize("wanted", [body(v=(0.5, 0.0, 0.0)), {"attitude": nose_down(0.1, 0.5)}])
+def test_a_set_point_moves_the_rotors_with_the_next_plan_and_not_before(
+    wanted: dict[str, Any], phase: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The planner is asked every 50 ticks and answers for 10 ticks later: 10 to 59 ticks."""
+    monkeypatch.setattr(harness, "STREAM_STEPS", 1)
+    told, twin = (offboard(hover(), **body(v=(0.0, 0.0, 0.0))) for _ in range(2))
+    asked = told.state.index // 50 * 50 + 50 + phase
+    while told.state.index < asked - 1:
+        told.step()
+        twin.step()
+    told.streamed = wanted
+    until_asked = -asked % 50
+    ticks = next(n for n in range(60) if told.step().actuators != twin.step().actuators)
+    assert ticks == until_asked + told.config.plan_delay_ticks
 
 
 def test_an_attitude_accelerates_the_way_it_points() -> None:
