@@ -58,6 +58,7 @@ class FlightLog:
         self._encoder: LogEncoder | None = None
         self._measured = False
         self._block_us = 0  # time of the first record that is not yet with the disk
+        self._last_us = 0  # time of the last tick
         self._unmarked_us = 0  # lost, and not yet marked as lost
 
     def begin(self, t_us: int, lockstep: bool) -> None:
@@ -75,7 +76,7 @@ class FlightLog:
         )
         pacing = "lockstep" if lockstep else "realtime"
         self._records += definitions(t_us, subject, pacing, self._encoder.inputs.schema)
-        self._block_us = t_us
+        self._block_us = self._last_us = t_us
         if not lockstep:
             self.file.start_thread()
 
@@ -89,7 +90,7 @@ class FlightLog:
             # A number that fits no field must not end the flight it describes.
             del records[begin:]
             self.unwritten_ticks += 1
-        t_us = inputs.sensors.t_us
+        t_us = self._last_us = inputs.sensors.t_us
         if len(records) > _FLUSH_BYTES or t_us - self._block_us >= _FLUSH_INTERVAL_US:
             self._flush(t_us)
 
@@ -109,7 +110,7 @@ class FlightLog:
     def close(self) -> None:
         """Write what is left and close the file; safe to call twice."""
         if self._records:
-            self._flush(self._block_us)
+            self._flush(self._last_us)
         self.file.close()
 
     def _flush(self, t_us: int) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -15,6 +16,8 @@ from fsw.link.inbox import Inbox
 from fsw.link.sim_link import Pacing
 from fsw.link.wire.telemetry_context import LoopHealth
 from fsw.log.block_file import BlockFile
+from fsw.log.flight_log import FlightLog
+from fsw.log.reader import LoggedTick, open_flight, ticks
 from fsw.parameters.flight_config import flight_config
 from fsw.runtime.effort import EffortRecord
 from fsw.runtime.flight_loop import FlightLoop
@@ -36,6 +39,7 @@ from fsw.signals import (
 )
 from messages import dialect
 from tests.fsw.link.snapshots import FACTS, outputs_at
+from tests.fsw.log.test_recorded_inputs import SUBJECT
 from tests.timing.virtual_time import FIRST_US, PERIOD_US, VirtualSensors, VirtualTime, frame
 
 Tick = Callable[[Any, TickInputs], tuple[Any, TickOutputs]]
@@ -282,19 +286,44 @@ def test_a_command_acts_on_the_actuators_within_one_tick_of_its_arrival(moment_u
 
 
 def test_a_disk_that_does_not_answer_delays_no_tick_and_loses_only_log(tmp_path: Path) -> None:
-    answers = threading.Event()
+    disk_is_back, waited_in_vain = threading.Event(), threading.Event()
 
     def stuck(file: int, data: memoryview) -> int:
-        answers.wait(10.0)
-        return len(data)
+        if not waited_in_vain.is_set() and not disk_is_back.wait(5.0):
+            waited_in_vain.set()
+        return os.write(file, data)
 
-    log = BlockFile(tmp_path / "log", stuck)
-    log.start_thread()
-    bench = Bench(standing)
-    bench.telemetry = lambda: log.put(bytes(65_536))
-    bench.run(1.0)
-    assert bench.timer(INNER.name).late == 0
-    assert bench.timer(INNER.name).ticks == pytest.approx(500, abs=2)
-    assert log.dropped > 300
-    answers.set()
+    def still(state: int, inputs: TickInputs) -> tuple[int, TickOutputs]:
+        return state, outputs_at(inputs.sensors.t_us)
+
+    bench = Bench(still)
+    log = FlightLog(tmp_path / "flight.ulg", SUBJECT)
+    log.file = BlockFile(tmp_path / "stuck.ulg", stuck)
+    cast(Any, bench.files).ulog = log
+    bench.run(20.0)  # more than may wait
+    assert not waited_in_vain.is_set(), "the loop waited for the disk"
+    assert log.file.size == 0
+    assert len(bench.sim.answers) == bench.timer(INNER.name).ticks == pytest.approx(10_000, abs=5)
+    assert log.lost_us > 1_000_000
+    disk_is_back.set()
     log.close()
+    written = [tick for tick in ticks(open_flight(log.file.path)) if isinstance(tick, LoggedTick)]
+    assert len(written) == bench.timer(INNER.name).ticks - log.lost_us // PERIOD_US
+
+
+def test_a_clock_that_jumps_back_costs_waiting_and_repeats_no_tick() -> None:
+    stamps: list[int] = []
+
+    def noting(state: int, inputs: TickInputs) -> tuple[int, TickOutputs]:
+        stamps.append(inputs.sensors.t_us)
+        if len(stamps) == 400:
+            bench.time.now_us -= 50_000  # while it works
+        return standing(state, inputs)
+
+    bench = Bench(noting)
+    bench.asleep = lambda: bench.time.work(-50_000) if len(bench.sim.answers) == 700 else None
+    bench.run(2.0)
+    assert stamps == list(range(FIRST_US, FIRST_US + PERIOD_US * len(stamps), PERIOD_US))
+    assert len(bench.sim.answers) == len(stamps) == pytest.approx(1000, abs=30)
+    assert (bench.timer(INNER.name).late, bench.timer(INNER.name).skipped) == (0, 0)
+    assert bench.record.missed.stretches == []

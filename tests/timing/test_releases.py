@@ -156,7 +156,23 @@ def test_a_clock_that_jumps_ahead_skips_and_keeps_the_grid(time: VirtualTime) ->
     assert ticks[-1].stale_us == 0
 
 
-def test_a_clock_that_jumps_back_repeats_no_release() -> None:
+@pytest.mark.parametrize("back_us", [700, 50_000, 1_000_000])
+def test_a_clock_that_jumps_back_is_waited_for_and_repeats_no_release(
+    time: VirtualTime, back_us: int
+) -> None:
+    loop = Loop(VirtualSensors(time))
+    loop.run(100)
+    jumped_at_us = time.now_us
+    time.now_us -= back_us
+    ticks = loop.run(200)
+    assert ticks[0].begun_us > jumped_at_us
+    assert stamps(ticks) == list(range(101, 301))
+    assert {b.due_us - a.due_us for a, b in pairwise(ticks)} == {PERIOD_US}
+    assert all(tick.begun_us >= tick.due_us for tick in ticks)
+    assert (loop.releases.skipped, loop.releases.stale, loop.nothing) == (0, 0, 0)
+
+
+def test_a_grid_whose_clock_jumps_back_goes_on_to_the_next_release() -> None:
     grid = Grid(0.0, PERIOD_US)
     grid.advance(10_100)
     assert (grid.index, grid.due_us) == (5, 10_000)
