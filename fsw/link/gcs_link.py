@@ -103,6 +103,11 @@ class GcsLink:
         return self._endpoint.port
 
     @property
+    def dropped(self) -> int | None:
+        """Datagrams that were not read in time and that the kernel dropped; None: not known."""
+        return self._endpoint.dropped
+
+    @property
     def peers(self) -> tuple[Address, ...]:
         """Everyone who receives telemetry."""
         return self._peers.all

@@ -22,6 +22,7 @@ def _counts(link: GcsLink) -> dict[str, object]:
         "frames_accepted": link.accepted,
         "false_starts": link.losses.frames,
         "bytes_lost": link.losses.bytes,
+        "datagrams_dropped": link.dropped,
         "refused": asdict(link.signing.counters),
         "signed": link.signing.active,
         "peers": len(link.peers),

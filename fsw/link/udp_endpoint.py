@@ -11,6 +11,7 @@ import re
 import select
 import socket
 import struct
+import sys
 from typing import Final
 
 from messages.eager import EagerReceiver
@@ -21,6 +22,8 @@ MAX_DATAGRAM: Final = 2048  # bytes; a larger datagram is cut and its last frame
 
 _ADDRESS = re.compile(r"udp:(?P<host>[^:\s]+):(?P<port>\d{1,5})")
 _RECEIVE_BUFFER: Final = 1 << 20  # bytes: rides out a pause of the receiver
+_SO_MEMINFO: Final = 55  # Linux; the socket module has no name for it
+_MEMINFO: Final = struct.Struct("9I")  # the last is sk_drops
 # Of what the ground sends: what a flood leaves waiting in front of a command delays that command.
 _QUEUE: Final = 1 << 18
 
@@ -134,6 +137,21 @@ class OpenEndpoint:
         except OSError:
             self._socket.bind((local, 0))
         self._socket.setblocking(False)
+        self._dropped: int | None = None  # once the socket is closed
+
+    @property
+    def dropped(self) -> int | None:
+        """Datagrams that found no room in the kernel; None where it does not count them."""
+        return self._drops() if self._socket.fileno() >= 0 else self._dropped
+
+    def _drops(self) -> int | None:
+        if sys.platform != "linux":
+            return None
+        try:
+            counts = self._socket.getsockopt(socket.SOL_SOCKET, _SO_MEMINFO, _MEMINFO.size)
+            return int(_MEMINFO.unpack(counts)[-1])
+        except (OSError, struct.error):
+            return None
 
     @property
     def port(self) -> int:
@@ -157,5 +175,6 @@ class OpenEndpoint:
             self._socket.sendto(datagram, peer)
 
     def close(self) -> None:
-        """Give the port back."""
+        """Give the port back; safe to call twice."""
+        self._dropped = self.dropped
         self._socket.close()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import random
+import sys
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
@@ -12,6 +13,7 @@ from typing import Any
 
 import pytest
 
+from fsw.link import link_report
 from fsw.link.files.flight_logs import flight_logs
 from fsw.link.files.log_service import LogService
 from fsw.link.peers import EXPIRY_US
@@ -165,6 +167,32 @@ def test_a_flood_is_read_within_a_budget(ground: Ground) -> None:
         ground.station.sendto(heartbeat * 60, ("127.0.0.1", ground.link.port))
     ground.poll()
     assert 0 < len(ground.recorded) < 400
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere nobody counts")
+def test_what_a_flood_left_for_the_kernel_to_drop_is_counted_to_the_datagram(
+    ground: Ground,
+) -> None:
+    heartbeat = FrameWriter(255, 190).frame(ids.HEARTBEAT, *HEARTBEAT)
+    ground.polled(heartbeat)
+    assert counts(ground)["datagrams_dropped"] == 0
+    sent = 2_000
+    for _ in range(sent):
+        ground.station.sendto(heartbeat, ("127.0.0.1", ground.link.port))
+    dropped = ground.link.dropped
+    assert dropped is not None
+    for _ in range(sent):
+        ground.poll()
+    assert dropped == sent - (ground.link.accepted - 1) > 1_000
+    ground.links.close()
+    assert counts(ground)["datagrams_dropped"] == dropped  # told after the flight
+
+
+def counts(ground: Ground) -> dict[str, Any]:
+    """Of the link, as `fsw.json` has them."""
+    told: Any = link_report.as_json(ground.links, ground.inbox)
+    link: dict[str, Any] = told["links"]["test"]
+    return link
 
 
 def test_both_directions_are_recorded_frame_by_frame(ground: Ground) -> None:
