@@ -140,8 +140,12 @@ class _Session:
         result = report.as_json(setup, end, record, sim.retransmissions)
         result |= link_report.as_json(ground, inbox)
         result["files"] = files.as_json()
-        report.write(directory / "fsw.json", result)
-        self._told.report("ended", f"fsw: {end.sentence}", ending=end.ending.value)
+        unwritten = report.write(directory / "fsw.json", result)
+        told = f"fsw: {end.sentence}"
+        self._told.report("ended", told, ending=end.ending.value, result=result)
+        if unwritten is not None:
+            self._told.report("unwritten", f"fsw: cannot write {unwritten}", what=unwritten)
+            return NOT_COMPLETED
         return DONE if end.ending is Ending.SHUTDOWN else NOT_COMPLETED
 
     def _files(self, directory: Path, start_us: int, program: FlightProgram[Any]) -> RunFiles:

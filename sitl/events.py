@@ -30,7 +30,8 @@ class TextEvents:
     def report(self, event: str, sentence: str, **details: object) -> None:
         """See :class:`Events`."""
         if sentence:
-            print(sentence, file=sys.stderr if event == "error" else self._out, flush=True)
+            wrong = event in ("error", "unwritten")
+            print(sentence, file=sys.stderr if wrong else self._out, flush=True)
 
 
 class JsonEvents:

@@ -14,7 +14,7 @@ from typing import Final
 from sitl.arguments import SitlOptions
 from sitl.events import Events
 from sitl.link.encode import StepEncoder
-from sitl.link.exchange import Exchange, Lockstep, RealTime, Stop
+from sitl.link.exchange import Exchange, ExchangeCounts, Lockstep, RealTime, Stop
 from sitl.link.pilot import flight_plan
 from sitl.link.server import RunTiming, fly, shut_down, wait_for_vehicle
 from sitl.link.udp_endpoint import UdpEndpoint
@@ -61,18 +61,36 @@ class Flight:
         with contextlib.ExitStack() as files:
             truth = self._truth(files)
             timing = fly(simulation, plan, exchange, encoder, stop, self._progress, truth)
-        # A vehicle that has just been silent for so long is not worth waiting for.
-        tries = {EndKind.STOPPED: 0, EndKind.INTERRUPTED: 2}
-        end = simulation.ended
-        heard = shut_down(endpoint, encoder, tries=4 if end is None else tries.get(end.kind, 4))
+        silent_since = exchange.silent_since
+        if silent_since is not None:
+            simulation.note_silence(silent_since)
+        heard = shut_down(endpoint, encoder, self._tries(silent_since is not None))
+        self._tell_pauses(exchange.counts)
         result = simulation.result()
-        written = self._as_json(result, timing, exchange)
-        self._write(written)
+        described = self._as_json(result, timing, exchange.counts)
+        unwritten = self._write(described)
         sentence = f"sitl: {_summary(result, timing)}"
-        self._told.report("ended", sentence, result=written, vehicle_silent=not heard)
+        self._told.report("ended", sentence, result=described, vehicle_silent=not heard)
+        for what in unwritten:
+            self._told.report("unwritten", f"sitl: cannot write {what}", what=what)
         if simulation.ended is not None and simulation.ended.kind is EndKind.REFUSED:
             return COULD_NOT_START
-        return COMPLETED if result.completed else NOT_COMPLETED
+        return COMPLETED if result.completed and not unwritten else NOT_COMPLETED
+
+    def _tries(self, silent: bool) -> int:
+        """How often to tell the vehicle that it is over; one that is silent may not hear it."""
+        end = self._simulation.ended
+        if end is not None and end.kind is EndKind.STOPPED:
+            return 0
+        if silent:
+            return 1
+        return 2 if end is not None and end.kind is EndKind.INTERRUPTED else 4
+
+    def _tell_pauses(self, counts: ExchangeCounts) -> None:
+        if counts.pauses:
+            times = "once" if counts.pauses == 1 else f"{counts.pauses} times"
+            length = f"{counts.paused_s:.2f} s in all"
+            self._warn(f"stood still {times}, {length}, and simulated time with it")
 
     def _truth(self, files: contextlib.ExitStack) -> Callable[[Simulation], None]:
         """What takes the true state of every step: a log, where results are wanted."""
@@ -80,10 +98,12 @@ class Flight:
         if options.out is None:
             return lambda _: None
         name, path = self._simulation.scenario.name, options.out / "truth.ulg"
-        log = files.enter_context(
-            contextlib.closing(TruthLog(path, name, options.seed, self._warn))
-        )
-        return log.add
+        try:
+            log = TruthLog(path, name, options.seed, self._warn)
+        except OSError as error:
+            self._warn(f"no truth.ulg: {error.strerror}")
+            return lambda _: None
+        return files.enter_context(contextlib.closing(log)).add
 
     def _warn(self, sentence: str) -> None:
         self._told.report("warning", f"sitl: {sentence}")
@@ -120,7 +140,7 @@ class Flight:
             self._warn("no permission for real-time scheduling: steps may be late")
 
     def _as_json(
-        self, result: TruthResult, timing: RunTiming, exchange: Exchange
+        self, result: TruthResult, timing: RunTiming, counts: ExchangeCounts
     ) -> dict[str, object]:
         return {
             "scenario": self._simulation.scenario.name,
@@ -132,19 +152,27 @@ class Flight:
             "real_time_factor": timing.real_time_factor,
             "steps": timing.steps,
             "wall_s": timing.wall_s,
-            "waited_s": exchange.counts.waited_s,
-            "resent_steps": exchange.counts.resent,
-            "missed_steps": exchange.counts.missed,
+            "waited_s": counts.waited_s,
+            "resent_steps": counts.resent,
+            "missed_steps": counts.missed,
+            "pauses": counts.pauses,
+            "paused_s": counts.paused_s,
         }
 
-    def _write(self, result: dict[str, object]) -> None:
-        text = json.dumps(result, indent=2) + "\n"
-        if self._options.json == "-":
+    def _write(self, result: dict[str, object]) -> list[str]:
+        """Write the result where it is wanted; returns what could not be written, and why."""
+        options, text = self._options, json.dumps(result, indent=2) + "\n"
+        if options.json == "-":
             print(text, end="", flush=True)
-        elif self._options.json is not None:
-            Path(self._options.json).write_text(text, encoding="utf-8")
-        if self._options.out is not None:
-            (self._options.out / "sitl.json").write_text(text, encoding="utf-8")
+        files = [] if options.json in (None, "-") else [Path(str(options.json))]
+        files += [] if options.out is None else [options.out / "sitl.json"]
+        unwritten = []
+        for file in files:
+            try:
+                file.write_text(text, encoding="utf-8")
+            except OSError as error:
+                unwritten.append(f"{file}: {error.strerror}")
+        return unwritten
 
 
 def _rehearse(simulation: Simulation) -> None:

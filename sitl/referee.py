@@ -36,6 +36,7 @@ class Referee:
         self.record = MarginRecord(self.world.keys)
         self.ended: EndReason | None = None
         self.left: str | None = None  # why the trajectory is no longer flown
+        self.silent: str | None = None  # since when nobody flew
         self._clock = clock
         self._error = TrackingError()
         self._duration_s = scenario.duration_s
@@ -126,7 +127,8 @@ class Referee:
 
     def result(self, time_s: float) -> TruthResult:
         """The score up to ``time_s``."""
-        return score(self.ended, time_s, self._error, self.record, self._whole, self.left)
+        flaws = tuple(flaw for flaw in (self.left, self.silent) if flaw is not None)
+        return score(self.ended, time_s, self._error, self.record, self._whole, flaws)
 
 
 def _whole(scenario: Scenario) -> EndKind:

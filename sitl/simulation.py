@@ -136,6 +136,11 @@ class Simulation:
             self.clock.stop(time_s)
             self._referee.left = f"{why} at {time_s:.1f} s"
 
+    def note_silence(self, step: int) -> None:
+        """Nothing came from the vehicle since this step: whatever ended was not flown."""
+        if self.ended is None or self.ended.kind is not EndKind.STOPPED:  # which says it itself
+            self._referee.silent = f"the flight software was silent since step {step}"
+
     def target_at(self, time_s: float) -> TrajectoryPoint:
         """End-effector reference ``time_s`` after the start of the simulation."""
         return self.clock.target_at(time_s)

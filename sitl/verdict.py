@@ -129,7 +129,7 @@ def score(
     error: TrackingError,
     record: MarginRecord,
     whole: EndKind,
-    left: str | None = None,
+    flaws: tuple[str, ...] = (),
 ) -> TruthResult:
     """The result of a run.
 
@@ -139,7 +139,7 @@ def score(
         error: Of the end-effector.
         record: Of the margins.
         whole: The end that such a run should have.
-        left: Why the trajectory was not flown to its end.
+        flaws: What else was not as in a completed run, each in a sentence.
     """
     broken = violation(record)
     worst = record.worst()
@@ -147,12 +147,11 @@ def score(
     parts = [end.sentence if end is not None else "still flying"]
     if whole is EndKind.MISSION and end is not None and end.kind is EndKind.DURATION:
         parts.append("the vehicle had not landed and disarmed by then")
-    if left is not None:
-        parts.append(left)
+    parts += flaws
     if broken is not None:
         parts.append(broken)
     return TruthResult(
-        completed=flown and broken is None and left is None,
+        completed=flown and broken is None and not flaws,
         end_reason="; ".join(parts),
         duration_s=time_s,
         tracking_error_rms_m=error.rms,

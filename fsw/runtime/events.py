@@ -26,7 +26,8 @@ class TextEvents:
 
     def report(self, event: str, sentence: str, **details: object) -> None:
         """See :class:`Events`."""
-        print(sentence, file=sys.stderr if event == "error" else sys.stdout, flush=True)
+        wrong = event in ("error", "unwritten")
+        print(sentence, file=sys.stderr if wrong else sys.stdout, flush=True)
 
 
 class JsonEvents:

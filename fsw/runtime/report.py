@@ -54,9 +54,13 @@ def as_json(
     }
 
 
-def write(path: Path, result: dict[str, object]) -> None:
-    """Write the result as one JSON object."""
-    path.write_text(json.dumps(result, indent=2) + "\n", encoding="utf-8")
+def write(path: Path, result: dict[str, object]) -> str | None:
+    """Write the result as one JSON object; returns why that was not possible."""
+    try:
+        path.write_text(json.dumps(result, indent=2) + "\n", encoding="utf-8")
+    except OSError as error:
+        return f"{path}: {error.strerror}"
+    return None
 
 
 def _mpc(facts: VehicleFacts, record: FlightRecord) -> dict[str, object]:

@@ -28,6 +28,7 @@ from fsw.runtime.rate_group import RateGroupRunner
 from fsw.runtime.rates import HOUSEKEEPING, INNER, MPC, RATE_GROUPS, TELEMETRY, Member
 from fsw.runtime.realtime import rank_threads
 from fsw.runtime.releases import GridReleases, Release, Releases, StepReleases
+from fsw.runtime.silence import Silence
 from fsw.runtime.slips import Slips, SlipWarning
 from fsw.runtime.timing import GroupTimer, Histogram
 from fsw.signals import (
@@ -39,7 +40,7 @@ from fsw.signals import (
     TickOutputs,
 )
 
-STALL_S: Final = 1.6  # no step for this long ends the flight, so that 2 s see the end of both
+STALL_S: Final = 1.2  # no step for this long ends the flight, so that 2 s see the end of both
 _START_US: Final = 1_000_000  # time stamp of the simulator's step 0
 _WARNING: Final = 4  # MAV_SEVERITY
 
@@ -161,17 +162,18 @@ class SimLoop(Generic[State]):
         index, t_us = -1, first.t_us
         self._files.ulog.begin(t_us, lockstep=self._sim.pacing is Pacing.LOCKSTEP)
         rank_threads()  # now that the logs have theirs
-        heard = self._record.begun_us = self._clock()
-        release: Release | None = Release(first, 0, heard, heard)
+        silence = Silence(self._clock)
+        begun = self._record.begun_us = self._clock()
+        release: Release | None = Release(first, 0, begun, begun)
         while not self._stop.requested:
             if release is not None:
                 t_us = release.sensors.t_us
                 if release.stale_us == 0:
-                    heard = release.begun_us
+                    silence.end(release.begun_us)
                 index = self._run_groups(release, planner, index)
             elif self._sim.shutdown:
                 return FlightEnd(Ending.SHUTDOWN, "the simulator ended the run")
-            elif self._clock() - heard > STALL_S * 1e6:
+            elif silence.grow() >= STALL_S * 1e6:
                 return FlightEnd(Ending.LINK_LOST, _silence(self._step_number(t_us)))
             release = self._releases.next()
         return FlightEnd(Ending.STOPPED, f"stopped at step {self._step_number(t_us)}")

@@ -9,11 +9,12 @@ from typing import Final, Protocol
 
 from sitl.link import decode
 from sitl.link.decode import Answer
+from sitl.link.step_grid import StepGrid
 from sitl.link.udp_endpoint import RESEND_S, UdpEndpoint
 from sitl.simulation import Controls
 
-STALL_S: Final = 1.6  # so that 2 s after a stall both halves have ended
-_SILENT_S: Final = 0.1  # real time: older controls are not held, the rotors stop
+STALL_S: Final = 1.2  # so that 2 s after a stall both halves have ended; a pause of 1 s passes
+SILENT_S: Final = 0.1  # real time: older controls are not held, the rotors stop
 _FIRST_PLAN_S: Final = 0.05  # between the first answer and the start of the clock
 
 _OFF: Final = Controls((0.0, 0.0, 0.0, 0.0), (0.0, 0.0), armed=False)
@@ -29,6 +30,8 @@ class ExchangeCounts:
 
     resent: int = 0  # lockstep: steps that were sent again
     missed: int = 0  # real time: steps whose answer was not there at the end of the step
+    pauses: int = 0  # real time: how often the simulator stood still and moved its grid
+    paused_s: float = 0.0  # real time: by how much in all
     waited_s: float = 0.0  # lockstep: for answers, sending included, the first step's left out
 
 
@@ -42,6 +45,11 @@ class Exchange(Protocol):
     """How a step is exchanged with the vehicle."""
 
     counts: ExchangeCounts
+
+    @property
+    def silent_since(self) -> int | None:
+        """Step of the last answer, if the vehicle has been silent for 0.1 s; None if not."""
+        ...
 
     def step(
         self, number: int, t_us: int, datagram: bytes, meanwhile: Callable[[], None]
@@ -80,6 +88,13 @@ class Lockstep:
         self._joints = joints
         self._period_s = period_s
         self._start_s = time.perf_counter()
+        self._number = 0
+        self._listened_s = 0.0  # in vain, for the answer to this step
+
+    @property
+    def silent_since(self) -> int | None:
+        """See :class:`Exchange`."""
+        return self._number - 1 if self._number and self._listened_s >= SILENT_S else None
 
     def step(
         self, number: int, t_us: int, datagram: bytes, meanwhile: Callable[[], None]
@@ -90,6 +105,8 @@ class Lockstep:
         begin_s = sent_s = time.perf_counter()
         self._endpoint.send(datagram)
         meanwhile()
+        self._number, self._listened_s = number, 0.0
+        looked_s = time.perf_counter()
         while True:
             received = self._endpoint.receive()
             if received is not None:
@@ -98,10 +115,13 @@ class Lockstep:
                 answer = decode.answer(received, self._joints)
                 if answer is not None and answer.t_us == t_us:
                     return answer
+            now_s = time.perf_counter()
+            # More than its patience a receive takes only if this process itself stood still.
+            self._listened_s += min(now_s - looked_s, RESEND_S)
+            looked_s = now_s
             if self._stop.requested:
                 raise SimulatorError(f"interrupted at step {number}")
-            now_s = time.perf_counter()
-            if now_s - begin_s > STALL_S:
+            if self._listened_s >= STALL_S:
                 raise SimulatorError(
                     f"the flight software did not answer step {number} within {STALL_S:g} s"
                 )
@@ -120,7 +140,15 @@ class RealTime:
     the vehicle has answered it and had a moment to make its first plan.
     """
 
-    def __init__(self, endpoint: UdpEndpoint, joints: int, period_s: float, stop: Stop) -> None:
+    def __init__(
+        self,
+        endpoint: UdpEndpoint,
+        joints: int,
+        period_s: float,
+        stop: Stop,
+        clock: Callable[[], float] = time.perf_counter,
+        sleep: Callable[[float], None] = time.sleep,
+    ) -> None:
         """Ready to start.
 
         Args:
@@ -128,15 +156,25 @@ class RealTime:
             joints: Number of joints.
             period_s: Wall time of a step [s].
             stop: Ends the wait for the first answer.
+            clock: Monotonic wall time [s].
+            sleep: Sleeps for seconds, on the same clock.
         """
         self._first = Lockstep(endpoint, joints, None, stop)
         self.counts = ExchangeCounts()
         self._endpoint = endpoint
         self._joints = joints
         self._period_s = period_s
-        self._start_s = time.perf_counter()
+        self._clock = clock
+        self._grid = StepGrid(period_s, clock, sleep)
         self._held = _OFF
-        self._heard_s = self._start_s
+        self._heard_s = clock()
+        self._heard_step = 0
+        self._silent_s = 0.0  # at the end of the last step
+
+    @property
+    def silent_since(self) -> int | None:
+        """See :class:`Exchange`."""
+        return self._heard_step if self._silent_s > SILENT_S else None
 
     def step(
         self, number: int, t_us: int, datagram: bytes, meanwhile: Callable[[], None]
@@ -146,17 +184,17 @@ class RealTime:
             return self._first_step(t_us, datagram, meanwhile)
         self._endpoint.send(datagram)
         meanwhile()
-        # The grid is absolute: a late step shortens the next one and shifts nothing.
-        _sleep_until(self._start_s + (number + 1) * self._period_s)
+        self._wait(number)
         answers = self._waiting()
         if answers:
-            self._heard_s = time.perf_counter()
+            self._heard_s, self._heard_step = self._clock(), number
             self._held = max(answers, key=lambda answer: answer.t_us).controls
-        elif time.perf_counter() - self._heard_s > _SILENT_S:
+        self._silent_s = self._clock() - self._heard_s
+        if self._silent_s > SILENT_S:
             self._held = _OFF
-        if time.perf_counter() - self._heard_s > STALL_S:
+        if self._silent_s > STALL_S:
             raise SimulatorError(
-                f"the flight software sent nothing for {STALL_S:g} s before step {number}"
+                f"the flight software sent nothing for {STALL_S:g} s after step {self._heard_step}"
             )
         if not any(answer.t_us == t_us for answer in answers):
             self.counts.missed += 1
@@ -174,10 +212,18 @@ class RealTime:
         """Wait for the first answer as lockstep does, then start the grid."""
         answer = self._first.step(0, t_us, datagram, meanwhile)
         self._held = answer.controls
-        self._heard_s = time.perf_counter()
-        self._start_s = self._heard_s + _FIRST_PLAN_S
-        _sleep_until(self._start_s + self._period_s)
+        self._heard_s = self._clock()
+        self._grid.begin(self._heard_s + _FIRST_PLAN_S)
+        self._wait(0)
         return answer
+
+    def _wait(self, number: int) -> None:
+        """Sleep until the step is over; what this process stood still is nobody's silence."""
+        paused_s = self._grid.wait(number)
+        if paused_s > 0.0:
+            self.counts.pauses += 1
+            self.counts.paused_s += paused_s
+            self._heard_s += paused_s
 
     def _waiting(self) -> list[Answer]:
         answers = []

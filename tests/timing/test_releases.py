@@ -115,6 +115,20 @@ def test_a_simulator_that_paused_and_catches_up_is_taken_at_its_newest_frame(
     assert loop.releases.stale == MOST_STALE
 
 
+@pytest.mark.parametrize("pause_us", [80_000, 1_000_000, 3_000_000])
+def test_a_simulator_that_stood_still_is_met_where_it_goes_on(
+    time: VirtualTime, pause_us: int
+) -> None:
+    loop = Loop(VirtualSensors(time, lambda step: 0 if step < 100 else pause_us))
+    loop.run(100 + pause_us // PERIOD_US)
+    went_on = loop.run(30)
+    after = loop.run(200)
+    # The first five were anticipated, and had their tick before the pause.
+    assert stamps(went_on)[0] == 105
+    assert stamps(went_on + after) == list(range(105, 105 + len(went_on) + 200))
+    assert {tick.stale_us for tick in after} == {0}
+
+
 @pytest.mark.parametrize(("work_us", "skipped"), [(1_990, 0), (2_500, 0), (3_990, 1), (6_100, 2)])
 def test_a_tick_that_overruns_makes_the_next_late_and_shifts_nothing(
     time: VirtualTime, work_us: int, skipped: int
