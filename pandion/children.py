@@ -40,6 +40,8 @@ class Child:
         """
         module = [name] if runner is None else [runner, name]
         self.name = name
+        self.interrupted = False  # by us
+        self.killed = False  # by us
         self._rest = b""
         with log.open("wb") as errors:
             self._process = subprocess.Popen(
@@ -77,11 +79,13 @@ class Child:
     def interrupt(self) -> None:
         """Ask it to end."""
         if self._process.poll() is None:
+            self.interrupted = True
             self._process.send_signal(signal.SIGINT)
 
     def kill(self) -> None:
         """End it now."""
         if self._process.poll() is None:
+            self.killed = True
             self._process.kill()
 
     def end(self, patience_s: float) -> None:
@@ -89,7 +93,7 @@ class Child:
         try:
             self._process.wait(timeout=patience_s)
         except subprocess.TimeoutExpired:
-            self._process.kill()
+            self.kill()
             self._process.wait()
         assert self._process.stdout is not None
         self._process.stdout.close()

@@ -89,3 +89,4 @@ class Display:
         console.print(result["end_reason"], markup=False, soft_wrap=True)
         for name, path in result["logs"].items():
             console.print(f"{name:12} {path}", markup=False, soft_wrap=True)
+        self._stream.flush()  # what follows may go to another stream

@@ -5,8 +5,6 @@ from __future__ import annotations
 import json
 import math
 import sys
-from pathlib import Path
-from typing import Any
 
 from fsw.link.link_choice import NO_LINK
 from fsw.link.udp_endpoint import LinkError, parse_address
@@ -103,15 +101,15 @@ def _judge(options: FlyOptions, display: Display, flown: Flown) -> int:
         "sitl_log": "sitl.log",
         "fsw_log": "fsw.log",
     }
-    fsw = _read(out / "fsw.json")
-    join_truth(out, fsw)
+    join_truth(out, flown.fsw)
     parts = Parts(
         scenario=options.scenario_name,
         seed=options.seed,
         controller=options.control.controller,
         sitl=flown.sitl,
-        fsw=fsw,
-        failure=flown.failure,
+        fsw=flown.fsw,
+        failure=flown.cause,
+        aftermath="; ".join(flown.aftermath) or None,
         logs={
             key: out / name
             for key, name in names.items()
@@ -120,17 +118,22 @@ def _judge(options: FlyOptions, display: Display, flown: Flown) -> int:
     )
     result = as_json(parts)
     text = json.dumps(result, indent=2) + "\n"
-    (out / "result.json").write_text(text, encoding="utf-8")
+    lost = _write(str(out / "result.json"), text)
     display.verdict(result, rows(result, (flown.sitl or {}).get("tracking_error_max_m")))
-    write_text(options.json, text)
+    unwritten = [*flown.unwritten, *lost, *_write(options.json, text)]
+    if unwritten:
+        print(f"pandion fly: results could not be written: {'; '.join(unwritten)}", file=sys.stderr)
     if flown.sitl is not None and flown.sitl.get("end_kind") == "refused":
         return COULD_NOT_START
-    return COMPLETED if result["completed"] else NOT_COMPLETED
+    return COMPLETED if result["completed"] and not unwritten else NOT_COMPLETED
 
 
-def _read(path: Path) -> dict[str, Any] | None:
+def _write(target: str | None, text: str) -> list[str]:
+    """Write the result; returns what could not be written, and why."""
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return None
-    return content if isinstance(content, dict) else None
+        write_text(target, text)
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        return [f"{'standard output' if target == '-' else target}: {error.strerror}"]
+    return []

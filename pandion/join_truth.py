@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Any
 
@@ -23,8 +24,18 @@ def join_truth(directory: Path, fsw: dict[str, Any] | None) -> None:
         return
     try:
         records = truth.read_bytes()[open_log(truth).at :]
-        with flight.open("ab") as joined:
-            joined.write(records)
+        _append(flight, records)
         truth.unlink()
     except (OSError, UlogError):
         return  # both are still readable, each alone
+
+
+def _append(file: Path, records: bytes) -> None:
+    """Append all of it, or nothing if the disk refuses."""
+    size = file.stat().st_size
+    try:
+        with file.open("ab") as joined:
+            joined.write(records)
+    except OSError:
+        os.truncate(file, size)
+        raise

@@ -32,6 +32,7 @@ class Parts:
     fsw: dict[str, Any] | None  # fsw.json
     failure: str | None  # what a half reported as an error
     logs: dict[str, Path]
+    aftermath: str | None = None  # what went wrong when the halves were to end
 
 
 def as_json(parts: Parts) -> dict[str, Any]:
@@ -43,7 +44,9 @@ def as_json(parts: Parts) -> dict[str, Any]:
         "controller": parts.controller,
         "seed": parts.seed,
         "duration_s": truth.get("duration_s", 0.0),
-        "completed": bool(truth.get("completed")) and parts.failure is None,
+        "completed": bool(truth.get("completed"))
+        and parts.failure is None
+        and parts.aftermath is None,
         "end_reason": _end_reason(parts),
         "tracking_error_rms_m": truth.get("tracking_error_rms_m"),
         "control_effort": vehicle.get("control_effort", _NOTHING),
@@ -59,5 +62,5 @@ def as_json(parts: Parts) -> dict[str, Any]:
 
 def _end_reason(parts: Parts) -> str:
     seen = parts.sitl.get("end_reason") if parts.sitl is not None else None
-    reasons = [reason for reason in (parts.failure, seen) if reason]
+    reasons = [reason for reason in (parts.failure, seen, parts.aftermath) if reason]
     return "; ".join(reasons) or "the simulator ended without a result"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import selectors
 import signal
 import time
@@ -13,13 +14,13 @@ from typing import Any, Final
 
 from pandion.children import Child, Event
 from pandion.display import Display
+from pandion.leaving import GRACE_S, Leaving
 from pandion.parser import COULD_NOT_START
 from pandion.processor import ANYWHERE, Places
 
 _LISTEN_S: Final = 30.0  # until sitl has bound its port
 _FOLLOW_S: Final = 3.0  # one half ends this soon after the other
 _STALLED_S: Final = 0.08  # the same for a half that is silent: it has had its time
-_GRACE_S: Final = 0.6  # between one way to end a half and the next, stronger one
 
 
 class HalfFailed(Exception):
@@ -35,16 +36,24 @@ class Flown:
     """What the halves said."""
 
     sitl: dict[str, Any] | None = None  # the simulator's result
+    fsw: dict[str, Any] | None = None  # the flight software's
     errors: dict[str, str] = field(default_factory=dict)  # by half
+    aftermath: list[str] = field(default_factory=list)  # what went wrong behind the flight
+    unwritten: list[str] = field(default_factory=list)  # results that did not get to the disk
     port: int | None = None
     duration_s: float = 1.0
     started: bool = False
     interrupted: bool = False
 
     @property
-    def failure(self) -> str | None:
-        """Every error in one sentence, None if there was none."""
+    def cause(self) -> str | None:
+        """What the halves ended of by themselves, in one sentence; None if it was nothing bad."""
         return "; ".join(self.errors.values()) or None
+
+    @property
+    def failure(self) -> str | None:
+        """Everything that went wrong, None if nothing did."""
+        return "; ".join((*self.errors.values(), *self.aftermath)) or None
 
 
 class Supervisor:
@@ -58,11 +67,8 @@ class Supervisor:
         self._runner = runner
         self._out = out
         self._flown = Flown()
-        self._children: list[Child] = []
+        self._halves: list[Leaving] = []
         self._selector = selectors.DefaultSelector()
-        self._deadline_s: float | None = None  # when a half that is left is made to end
-        self._interrupted_all = False
-        self._grace_s = _GRACE_S
 
     def fly(self, sitl: list[str], fsw: Callable[[int], list[str]]) -> Flown:
         """Run one flight.
@@ -101,8 +107,8 @@ class Supervisor:
         raise HalfFailed(self._flown.failure or "the simulator did not start")
 
     def _start(self, name: str, arguments: list[str], processor: int | None) -> None:
-        child = Child(name, arguments, self._out / f"{name}.log", processor, self._runner)
-        self._children.append(child)
+        child = Child(name, arguments, self._log(name), processor, self._runner)
+        self._halves.append(Leaving(child))
         self._selector.register(child, selectors.EVENT_READ)
 
     def _watch(self, done: Callable[[], bool], patience_s: float | None) -> None:
@@ -111,7 +117,7 @@ class Supervisor:
         while self._selector.get_map() and not done():
             if until_s is not None and time.monotonic() > until_s:
                 return
-            for key, _ in self._selector.select(timeout=0.1):
+            for key, _ in self._selector.select(timeout=self._patience_s()):
                 child = key.fileobj
                 assert isinstance(child, Child)
                 events = child.events()
@@ -121,7 +127,22 @@ class Supervisor:
                 else:
                     for event in events:
                         self._take(child, event)
-            self._hurry()
+            now_s = time.monotonic()
+            for half in self._halves:
+                half.hurry(now_s)
+
+    def _patience_s(self) -> float:
+        """Until the next thing that has its time [s]."""
+        due_s = [half.due_s for half in self._halves if half.due_s is not None]
+        return min(max(min(due_s, default=math.inf) - time.monotonic(), 0.0), 0.1)
+
+    def _expect(self, halves: list[Leaving], within_s: float, grace_s: float = GRACE_S) -> None:
+        until_s = time.monotonic() + within_s
+        for half in halves:
+            half.expect(until_s, grace_s)
+
+    def _others(self, child: Child) -> list[Leaving]:
+        return [half for half in self._halves if half.child is not child]
 
     def _take(self, child: Child, event: Event) -> None:
         kind, flown = event["event"], self._flown
@@ -136,6 +157,8 @@ class Supervisor:
             flown.started = True
         elif kind == "ended":
             self._note_end(child, event)
+        elif kind == "unwritten":
+            flown.unwritten.append(event["what"])
         if kind in ("preparing", "warning", "parameters"):
             self._display.say(event["message"])
 
@@ -145,49 +168,45 @@ class Supervisor:
             self._flown.sitl = event["result"]
             silent = event["vehicle_silent"]
         else:
+            self._flown.fsw = event["result"]
             silent = event["ending"] == "link lost"
             if silent:
                 self._flown.errors["fsw"] = event["message"]
+        others = self._others(child)
+        self._expect([half for half in self._halves if half not in others], _FOLLOW_S)
         if silent:
-            self._grace_s = _STALLED_S
-            self._deadline_s = time.monotonic() + _STALLED_S
+            self._expect(others, _STALLED_S, _STALLED_S)
 
     def _ended(self, child: Child) -> None:
         """A half is gone: note a crash, and give the other one a moment to follow."""
         child.end(patience_s=1.0)
-        code = child.exit_code
-        killed = self._interrupted_all and code is not None and code < 0
-        if code not in (0, 1, 2) and not killed and child.name not in self._flown.errors:
-            log = self._out / f"{child.name}.log"
-            self._flown.errors[child.name] = f"{child.name} ended with code {code}; see {log}"
-        if self._deadline_s is None:
-            # Before the flight there is no link whose silence the other half would notice.
-            wait_s = _FOLLOW_S if self._flown.started else 0.0
-            self._deadline_s = time.monotonic() + wait_s
+        code, name, flown = child.exit_code, child.name, self._flown
+        obeyed = child.interrupted and code == -signal.SIGINT
+        if child.killed:
+            flown.aftermath.append(f"{name} did not end by itself and had to be killed")
+        elif code not in (0, 1, 2) and not obeyed and name not in flown.errors:
+            flown.errors[name] = f"{name} ended with code {code}; see {self._log(name)}"
+        elif flown.started and name not in flown.errors and self._result(name) is None:
+            flown.errors[name] = f"{name} ended without a result; see {self._log(name)}"
+        # Before the flight there is no link whose silence the other half would notice.
+        self._expect(self._others(child), _FOLLOW_S if flown.started else 0.0)
 
-    def _hurry(self) -> None:
-        """Past the deadline: interrupt what still runs, then kill it."""
-        if self._deadline_s is None or time.monotonic() < self._deadline_s:
-            return
-        self._deadline_s = time.monotonic() + self._grace_s
-        for child in self._children:
-            if self._interrupted_all:
-                child.kill()
-            else:
-                child.interrupt()
-        self._interrupted_all = True
+    def _result(self, name: str) -> dict[str, Any] | None:
+        return self._flown.sitl if name == "sitl" else self._flown.fsw
+
+    def _log(self, name: str) -> Path:
+        return self._out / f"{name}.log"
 
     def _interrupt(self, number: int, frame: FrameType | None) -> None:
         """End the simulator, which ends the flight software and still gives a result."""
         self._flown.interrupted = True
-        self._deadline_s = time.monotonic() + _GRACE_S
-        for child in self._children[:1]:
-            child.interrupt()
+        self._expect(self._halves, GRACE_S)
+        for half in self._halves[:1]:
+            half.child.interrupt()
 
     def _end_all(self) -> None:
-        for child in self._children:
-            if child.exit_code is None:
-                child.interrupt()
-        for child in self._children:
-            child.end(patience_s=1.0)
+        for half in self._halves:
+            half.child.interrupt()
+        for half in self._halves:
+            half.child.end(patience_s=1.0)
         self._selector.close()

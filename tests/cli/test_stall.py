@@ -1,4 +1,4 @@
-"""One half stands still: both are gone in two seconds, and the end names the step."""
+"""One half stands still or is gone: both are gone in two seconds, and the end names the step."""
 
 from __future__ import annotations
 
@@ -9,8 +9,13 @@ import subprocess
 import time
 from pathlib import Path
 
+import pytest
+
 from tests.cli.command import clean_up, group_is_empty, read_until, start
 from tests.processes.halves import free_port
+
+PROMISED_S = 2.0  # from the stall to the end of `pandion fly`, verdict included
+TRIES = 3  # a machine that is itself stopped for a while is asked again
 
 
 def half_of(parent: int, module: str) -> int:
@@ -26,29 +31,76 @@ def half_of(parent: int, module: str) -> int:
     raise AssertionError(f"no {module} under {parent}")
 
 
-def flying(out: Path) -> subprocess.Popen[str]:
+def flying(out: Path, *options: str, duration: str = "8") -> subprocess.Popen[str]:
+    """A flight of which the first line of progress is there."""
     gcs = f"--gcs=udp:127.0.0.1:{free_port()}"
-    flight = ("fly", "walls-calm", "--speed", "1", "--duration", "8", "--api", "none")
-    return start(*flight, gcs, "--out", str(out), cwd=out.parent)
+    flight = start(
+        "fly", "walls-calm", *options, "--duration", duration, "--api", "none", gcs,
+        "--out", str(out), cwd=out.parent,
+    )  # fmt: skip
+    read_until(flight, "flying")
+    return flight
 
 
-def test_a_stall_of_either_half_ends_both(tmp_path: Path) -> None:
-    """Two flights at once, because most of it is waiting."""
-    flights = {stalled: flying(tmp_path / stalled) for stalled in ("sitl", "fsw")}
-    try:
-        for flight in flights.values():
-            read_until(flight, "flying")
-        begin_s = time.monotonic()
-        for stalled, flight in flights.items():
-            os.kill(half_of(flight.pid, stalled), signal.SIGSTOP)
-        for flight in flights.values():
-            assert flight.wait(timeout=20.0) == 1
-            # Two seconds, and what starting to judge and to print may take on a busy machine.
-            assert time.monotonic() - begin_s < 2.0 + 1.5
-            assert group_is_empty(flight.pid)
-            assert flight.stdout is not None
-            said = flight.stdout.read()
-            assert re.search(r"FAIL .*step \d+", said), said
-    finally:
-        for flight in flights.values():
+def end_of(flight: subprocess.Popen[str], half: str, number: signal.Signals) -> tuple[float, str]:
+    """Send a signal to a half; returns the seconds until nothing runs, and what was said."""
+    begin_s = time.monotonic()
+    os.kill(half_of(flight.pid, half), number)
+    assert flight.wait(timeout=20.0) == 1
+    took_s = time.monotonic() - begin_s
+    assert group_is_empty(flight.pid)
+    assert flight.stdout is not None
+    return took_s, flight.stdout.read()
+
+
+NOT_ANSWERED = r"FAIL the flight software did not answer step \d{3,} .*; fsw did not end"
+NOT_SENT = r"FAIL fsw: the simulator sent nothing for .* after step \d{3,}; sitl did not end"
+
+
+@pytest.mark.parametrize(
+    ("pace", "half", "number", "sentence"),
+    [
+        (("--speed", "1"), "fsw", signal.SIGSTOP, NOT_ANSWERED),
+        (("--speed", "1"), "sitl", signal.SIGSTOP, NOT_SENT),
+        (("--speed", "1"), "fsw", signal.SIGKILL, r"FAIL fsw ended with code -9.*step \d{3,}"),
+        # In the air nobody waits for a stall to be sure: the vehicle falls before that.
+        (("--realtime",), "fsw", signal.SIGSTOP, r"FAIL .* silent since step \d{3,}"),
+        (("--realtime",), "fsw", signal.SIGKILL, r"FAIL fsw .* -9.* silent since step \d{3,}"),
+        (("--realtime",), "sitl", signal.SIGSTOP, NOT_SENT),
+    ],
+)
+def test_a_stall_of_a_half_ends_both_in_time_and_names_the_step(
+    pace: tuple[str, ...], half: str, number: signal.Signals, sentence: str, tmp_path: Path
+) -> None:
+    took_s = []
+    for attempt in range(TRIES):
+        flight = flying(tmp_path / f"{attempt}", *pace)
+        try:
+            seconds, said = end_of(flight, half, number)
+        finally:
             clean_up(flight)
+        assert re.search(sentence, said), said
+        assert "Traceback" not in said
+        took_s.append(seconds)
+        if seconds <= PROMISED_S:
+            return
+    raise AssertionError(f"{took_s} s, and {PROMISED_S} s are promised")
+
+
+def test_a_stall_shortly_before_the_end_is_no_pass(tmp_path: Path) -> None:
+    """The simulator ends as planned, and the flight software has to be killed."""
+    out = tmp_path / "out"
+    flight = flying(out, "--realtime", duration="2")
+    try:
+        assert flight.stdout is not None
+        for line in flight.stdout:
+            if float(line.split()[1]) >= 1.7:  # of progress; too late for a fall to end it
+                break
+        _, said = end_of(flight, "fsw", signal.SIGSTOP)
+        assert "PASS" not in said
+        assert re.search(r"FAIL flew 2\.0 s; .* silent since step \d{3}; fsw did not end", said), (
+            said
+        )
+        assert not (out / "fsw.json").exists()
+    finally:
+        clean_up(flight)

@@ -1,0 +1,69 @@
+"""Ways of two halves to end, and what the supervisor says about each."""
+
+from __future__ import annotations
+
+import io
+import time
+from pathlib import Path
+
+import pytest
+
+from pandion.display import Display
+from pandion.supervisor import Flown, Supervisor
+from tests.cli.command import environment
+from tests.cli.fake_halves import event
+
+LISTENING = event("listening", port=1, duration_s=1.0)
+FLYING = event("flying")
+FLEW = event("ended", result={"completed": True}, vehicle_silent=False)
+FLEW_ALONE = event("ended", result={"completed": True}, vehicle_silent=True)
+SHUT_DOWN = event("ended", result={"mpc": {}}, ending="shutdown")
+LINK_LOST = event("ended", result={"mpc": {}}, ending="link lost")
+
+
+@pytest.fixture(autouse=True)
+def _importable(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PYTHONPATH", environment()["PYTHONPATH"])
+
+
+def watched(out: Path, sitl: list[str], fsw: list[str]) -> Flown:
+    supervisor = Supervisor(Display(io.StringIO()), out, runner="tests.cli.fake_halves")
+    return supervisor.fly([LISTENING, FLYING, *sitl, "0"], lambda port: [*fsw, "0"])
+
+
+def test_two_results_and_no_failure(tmp_path: Path) -> None:
+    flown = watched(tmp_path, ["short", FLEW], [SHUT_DOWN])
+    assert (flown.failure, flown.aftermath, flown.unwritten) == (None, [], [])
+    assert (flown.sitl, flown.fsw) == ({"completed": True}, {"mpc": {}})
+
+
+def test_a_half_that_leaves_no_result_is_a_failure(tmp_path: Path) -> None:
+    flown = watched(tmp_path, ["short", FLEW], ["short"])
+    assert flown.failure == f"fsw ended without a result; see {tmp_path / 'fsw.log'}"
+
+
+def test_a_simulator_that_leaves_no_result_is_a_failure(tmp_path: Path) -> None:
+    flown = watched(tmp_path, ["short"], ["short", SHUT_DOWN])
+    assert flown.failure == f"sitl ended without a result; see {tmp_path / 'sitl.log'}"
+
+
+@pytest.mark.parametrize("said", [[], [SHUT_DOWN]])
+def test_a_half_that_has_to_be_killed_is_a_failure(said: list[str], tmp_path: Path) -> None:
+    begin_s = time.monotonic()
+    flown = watched(tmp_path, ["short", FLEW_ALONE], ["deaf", *said, "sleep"])
+    assert flown.aftermath == ["fsw did not end by itself and had to be killed"]
+    assert flown.sitl == {"completed": True}
+    assert time.monotonic() - begin_s < 3.0
+
+
+def test_an_interrupt_that_is_obeyed_is_not_a_kill(tmp_path: Path) -> None:
+    flown = watched(tmp_path, ["sleep"], ["short", LINK_LOST])
+    assert flown.aftermath == []
+    assert flown.failure is not None
+    assert flown.failure.startswith("ended said; sitl ended without a result")
+
+
+def test_what_could_not_be_written_is_kept_for_the_end(tmp_path: Path) -> None:
+    lost = event("unwritten", what="sitl.json: disk full")
+    flown = watched(tmp_path, ["short", FLEW, lost], [SHUT_DOWN])
+    assert (flown.failure, flown.unwritten) == (None, ["sitl.json: disk full"])
