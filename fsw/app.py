@@ -258,6 +258,7 @@ def _subject(options: FswOptions, program: FlightProgram[Any]) -> LogSubject:
     facts: dict[str, str | int] = {
         "ver_sw": revision(),
         "scenario": options.scenario,
+        "scenario_digest": options.scenario_digest,
         "controller": options.control.controller,
         "inner": options.control.inner,
         "robustness": options.control.robustness,

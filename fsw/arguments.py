@@ -140,6 +140,7 @@ class FswOptions:
     params: Path | None  # file that keeps the parameters; None: they end with the flight
     events: str  # "text" for people, "json" for programs
     scenario: str = ""  # for the log only: what the simulator flies
+    scenario_digest: str = ""  # for the log only: which of the scenarios of this name
     seed: int | None = None  # for the log only
 
 
@@ -174,6 +175,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--scenario", metavar="NAME", default="", help="what is flown, noted in the flight log"
     )
     parser.add_argument(
+        "--scenario-digest", metavar="HEX", default="", help="of its file, noted in the flight log"
+    )
+    parser.add_argument(
         "--seed", metavar="N", type=int, help="the simulator's seed, noted in the flight log"
     )
 
@@ -189,5 +193,6 @@ def options(arguments: argparse.Namespace) -> FswOptions:
         params=arguments.params,
         events=arguments.events,
         scenario=arguments.scenario,
+        scenario_digest=arguments.scenario_digest,
         seed=arguments.seed,
     )

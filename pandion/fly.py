@@ -85,6 +85,7 @@ def _fsw_arguments(options: FlyOptions, port: int) -> list[str]:
         f"--out={options.out}",
         "--wait=600",
         f"--scenario={options.scenario_name}",
+        f"--scenario-digest={options.scenario_digest}",
         f"--seed={options.seed}",
     ]
 

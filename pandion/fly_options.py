@@ -17,7 +17,7 @@ from fsw.link.link_choice import LinkChoice, addresses
 from fsw.log.run_directory import new_run_directory
 from fsw.parameters.control_choice import ControlChoice, check
 from sitl.arguments import add_run_arguments
-from sitl.scenario_file import ScenarioError, load_scenario
+from sitl.scenario_file import ScenarioError, load_scenario, scenario_digest
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,6 +26,7 @@ class FlyOptions:
 
     scenario: str
     scenario_name: str
+    scenario_digest: str
     seed: int
     duration_s: float
     realtime: bool
@@ -72,6 +73,7 @@ def options(arguments: argparse.Namespace) -> FlyOptions:
     return FlyOptions(
         scenario=arguments.scenario,
         scenario_name=scenario.name,
+        scenario_digest=scenario_digest(arguments.scenario),
         seed=arguments.seed,
         duration_s=scenario.duration_s if arguments.duration is None else arguments.duration,
         realtime=arguments.realtime,

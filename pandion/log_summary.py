@@ -9,7 +9,17 @@ from typing import Any
 from messages import ulog
 from messages.ulog_reader import UlogFile
 
-_FACTS = ("ver_sw", "scenario", "seed", "pacing", "controller", "inner", "robustness", "solver")
+_FACTS = (
+    "ver_sw",
+    "scenario",
+    "scenario_digest",
+    "seed",
+    "pacing",
+    "controller",
+    "inner",
+    "robustness",
+    "solver",
+)
 _TOLD_RECORDS = 10_000
 
 

@@ -136,7 +136,7 @@ def _summarise(options: ReplayOptions, log: UlogFile) -> int:
         result = summary(log, partial(progress.report, "reading"))
     for name, value in result.items():
         if name not in ("topics", "texts"):
-            print(f"{name:12} {value}", file=console)
+            print(f"{name:15} {value}", file=console)
     for name, count in result["topics"].items():
         print(f"  {name:34} {count:8d}", file=console)
     for text in result["texts"]:

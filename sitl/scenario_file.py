@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import difflib
+import hashlib
 import math
 import tomllib
 import types
@@ -14,6 +15,7 @@ from typing import Any
 from sitl.bounds import Choices, Range
 from sitl.scenario import Scenario
 
+_DIGITS = 12
 PACKAGED = Path(__file__).parent / "scenarios"
 
 
@@ -32,19 +34,39 @@ def load_scenario(name_or_path: str) -> Scenario:
     Raises:
         ScenarioError: Unknown name, unreadable file, unknown key or impossible value.
     """
+    path = _path(name_or_path)
+    try:
+        return parse_scenario(_content(path).decode("utf-8"), path.stem)
+    except UnicodeDecodeError as error:
+        raise ScenarioError(f"scenario {path} is not TOML: it is not UTF-8") from error
+
+
+def scenario_digest(name_or_path: str) -> str:
+    """What tells a scenario from another of its name: how the SHA-256 of its file begins.
+
+    Raises:
+        ScenarioError: Unknown name or unreadable file.
+    """
+    return hashlib.sha256(_content(_path(name_or_path))).hexdigest()[:_DIGITS]
+
+
+def _path(name_or_path: str) -> Path:
     path = Path(name_or_path)
     if name_or_path in scenario_names():
-        path = PACKAGED / f"{name_or_path}.toml"
-    elif path.suffix != ".toml":
+        return PACKAGED / f"{name_or_path}.toml"
+    if path.suffix != ".toml":
         raise ScenarioError(
             f'unknown scenario "{name_or_path}"{_nearest(name_or_path, scenario_names())}; '
             f"known: {', '.join(scenario_names())}, or the path of a .toml file"
         )
+    return path
+
+
+def _content(path: Path) -> bytes:
     try:
-        text = path.read_text(encoding="utf-8")
+        return path.read_bytes()
     except OSError as error:
         raise ScenarioError(f"cannot read scenario {path}: {error.strerror}") from error
-    return parse_scenario(text, path.stem)
 
 
 def parse_scenario(text: str, name: str) -> Scenario:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import csv
+import hashlib
 import json
 import os
 import signal
@@ -17,6 +18,7 @@ import pytest
 from mcap.reader import make_reader
 from pyulog import ULog
 
+from sitl.scenario_file import PACKAGED
 from tests.cli.command import clean_up, one_sentence, pandion, read_until, start
 from tests.processes.halves import free_port
 
@@ -64,6 +66,8 @@ def test_it_says_what_was_flown_and_holds_every_tick_and_the_truth(log: Path) ->
     assert not read.file_corruption
     facts = read.msg_info_dict
     assert (facts["scenario"], facts["seed"], facts["pacing"]) == ("walls", 5, "lockstep")
+    content = (PACKAGED / "walls.toml").read_bytes()
+    assert facts["scenario_digest"] == hashlib.sha256(content).hexdigest()[:12]
     assert facts["ver_sw"]
     assert read.initial_parameters["planner.horizon"] == 5
     assert len(read.initial_parameters) > 200

@@ -7,7 +7,14 @@ from pathlib import Path
 import pytest
 
 from sitl.scenario import Lissajous, Uniform
-from sitl.scenario_file import ScenarioError, load_scenario, parse_scenario, scenario_names
+from sitl.scenario_file import (
+    PACKAGED,
+    ScenarioError,
+    load_scenario,
+    parse_scenario,
+    scenario_digest,
+    scenario_names,
+)
 from sitl.simulation import Simulation
 from sitl.trajectory import reference
 
@@ -143,9 +150,24 @@ def test_a_path_is_read_and_a_missing_one_is_refused(tmp_path: Path) -> None:
         load_scenario(str(tmp_path / "none.toml"))
 
 
-def test_what_is_not_toml_is_refused() -> None:
+def test_what_is_not_toml_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ScenarioError, match="not TOML"):
         parse_scenario("duration_s = ", "broken")
+    (tmp_path / "latin.toml").write_bytes(b"# gr\xfc\xdfe\n")
+    with pytest.raises(ScenarioError, match="not UTF-8"):
+        load_scenario(str(tmp_path / "latin.toml"))
+
+
+def test_a_scenario_of_the_same_name_with_another_disturbance_has_another_digest(
+    tmp_path: Path,
+) -> None:
+    content = (PACKAGED / "walls.toml").read_bytes()
+    mine = tmp_path / "walls.toml"
+    mine.write_bytes(content)
+    assert scenario_digest(str(mine)) == scenario_digest("walls")
+    mine.write_bytes(content.replace(b"0.8", b"0.9"))
+    assert load_scenario(str(mine)) != load_scenario("walls")
+    assert scenario_digest(str(mine)) != scenario_digest("walls")
 
 
 def test_the_grazing_path_touches_every_safety_zone_and_enters_none() -> None:
