@@ -23,6 +23,9 @@ MOST_STALE: Final = 5  # ticks: 10 ms, as long as an estimate may be missing
 LEAD_US: Final = 600  # frames arrive so much before their tick, and may be so much late
 _SETTLING: Final = 25  # frames until the grid is laid
 _LISTEN_TICKS: Final = 25  # between two looks at when a frame arrives
+# Before the release: listening begins well before a frame is due, and where the grid is further off
+# than that, it moves by the most anyway. Who listens for a frame does not hear the ground.
+_LISTEN_US: Final = LEAD_US + 300
 _MOST_SHIFT_US: Final = 25.0  # a look; 500 us/s is more than clocks differ
 _GAIN: Final = 0.25
 _REPEATED: Final = 3  # frames in a row behind or ahead of their release, until it is another's
@@ -164,11 +167,15 @@ class GridReleases:
     def _wait(self, grid: Grid, due_us: int) -> None:
         """Sleep until the release; now and then listen for the frame, and follow its clock."""
         if grid.index % _LISTEN_TICKS == 0 and not self._sim.wait(0.0):
+            self._sleep_until(due_us - _LISTEN_US)
             arrived = self._sim.wait(1e-6 * max(due_us - self._clock(), 0))
             early_us = due_us - self._clock() if arrived else 0
             shift_us = _GAIN * (LEAD_US - early_us)
             grid.steer(min(max(shift_us, -_MOST_SHIFT_US), _MOST_SHIFT_US))
-        remaining_us = due_us - self._clock()
+        self._sleep_until(due_us)
+
+    def _sleep_until(self, until_us: int) -> None:
+        remaining_us = until_us - self._clock()
         if remaining_us > 0:
             self._sleep(1e-6 * remaining_us)
 

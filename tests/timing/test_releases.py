@@ -194,6 +194,27 @@ def test_a_grid_whose_clock_jumps_back_goes_on_to_the_next_release() -> None:
     assert grid.due_us == 12_000
 
 
+def test_who_listens_for_a_frame_is_deaf_to_the_ground_for_a_moment_only(
+    time: VirtualTime, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sensors = VirtualSensors(time)
+    loop = Loop(sensors)
+    loop.run(LAID)
+    deaf_us: list[int] = []
+
+    def wait(seconds: float) -> bool:
+        begin = time.now_us
+        there = VirtualSensors.wait(sensors, seconds)
+        deaf_us.append(time.now_us - begin)
+        return there
+
+    monkeypatch.setattr(sensors, "wait", wait)
+    loop.run(1000)
+    listened = [duration for duration in deaf_us if duration]
+    assert len(listened) == pytest.approx(40, abs=1)
+    assert max(listened) < PERIOD_US / 5
+
+
 @pytest.mark.parametrize("parts_per_million", [-200.0, 200.0])
 def test_sensors_on_another_clock_are_followed(time: VirtualTime, parts_per_million: float) -> None:
     period = PERIOD_US * (1.0 + 1e-6 * parts_per_million)
