@@ -22,12 +22,18 @@ _JUDGED: Final = (
     ("ticks", "late_share_running", "... while the machine ran"),
     ("tick", "p50_us", "tick p50 us"),
     ("tick", "p99_us", "tick p99 us"),
+    ("exchange", "p50_us", "frame in, command out p50 us"),
+    ("exchange", "p99_us", "frame in, command out p99 us"),
     ("link", "p50_us", "link and log p50 us"),
+    ("link", "p99_us", "link and log p99 us"),
+    ("telemetry", "p99_us", "telemetry and log p99 us"),
     ("mpc", "p50_us", "MPC cycle p50 us"),
     ("mpc", "p99_us", "MPC cycle p99 us"),
+    ("mpc", "taken_up_p99_us", "MPC request taken up p99 us"),
     ("plans", "missed_deadlines", "MPC deadlines missed"),
     ("memory", "resident_mb", "resident MB"),
     ("memory", "growth_mb", "growth MB"),
+    ("plant", "p50_us", "plant step p50 us"),
 )
 
 

@@ -6,6 +6,7 @@ import argparse
 import json
 import os
 import platform
+import statistics
 import subprocess
 import sys
 import tempfile
@@ -25,7 +26,8 @@ from pandion.version import version
 from sitl.arguments import duration
 
 PASSED, NOT_PASSED = 0, 1  # exit codes
-_LINK = ("hear", "actuate", "publish", "record")  # stages: everything of a tick but the tick itself
+_EXCHANGE = ("hear", "actuate")  # stages
+_LINK = (*_EXCHANGE, "publish", "record")  # everything of a tick but the tick itself
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,16 +151,24 @@ def _figures(
     vehicle: dict[str, Any], watch: Watch, elsewhere: float | None
 ) -> dict[str, dict[str, float | None]]:
     """What was measured, under the names of the budgets."""
+    from sitl.bench import plant_step_us  # with numba, which a refusal need not wait for
+
     inner, mpc, stages = vehicle["inner"], vehicle["mpc"], vehicle["stages"]
-    link = [stages[name] for name in _LINK if name in stages]
+
+    def added(names: tuple[str, ...]) -> dict[str, float | None]:
+        return {key: sum(stages[name][key] for name in names) for key in ("p50_us", "p99_us")}
+
     return {
         "wake_up": {"p50_us": inner["lateness_p50_us"], "p99_us": inner["lateness_p99_us"]},
         "ticks": {"late_share": inner["late_share"], "late_share_running": elsewhere},
         "tick": stages["tick"],
-        "link": {"p50_us": sum(stage["p50_us"] for stage in link)},
-        "mpc": mpc,
+        "exchange": added(_EXCHANGE),
+        "link": added(_LINK),
+        "telemetry": {"p99_us": vehicle["telemetry"]["p99_us"]},
+        "mpc": {**mpc, "taken_up_p99_us": mpc["lateness_p99_us"]},
         "plans": {"missed_deadlines": mpc["missed_deadlines"]},
         "memory": {"resident_mb": watch.resident_mb, "growth_mb": watch.growth_mb},
+        "plant": {"p50_us": statistics.median(plant_step_us())},
     }
 
 
@@ -184,11 +194,11 @@ def _lines(measured: Measured) -> list[str]:
     if noise["stopped"] is not None:
         head += f"; a loop that only sleeps was late for {noise['stopped']:.2g} of its releases"
     table = [
-        f"  {row.name:<26}{_number(row.value):>12}{_number(row.budget):>12}"
+        f"  {row.name:<30}{_number(row.value):>12}{_number(row.budget):>12}"
         f"  {'' if row.kept else 'over'}"
         for row in measured.rows
     ]
-    return [head, f"  {'':<26}{'measured':>12}{'budget':>12}", *table, f"  {measured.verdict}"]
+    return [head, f"  {'':<30}{'measured':>12}{'budget':>12}", *table, f"  {measured.verdict}"]
 
 
 def _number(value: float | None) -> str:

@@ -84,10 +84,11 @@ def test_a_short_flight_beside_a_busy_program_is_measured_and_leaves_nothing(
     assert flight["hogs"] == 1
     assert flight["vehicle"]["inner"]["ticks"] > 900
     measured = {name: figure["value"] for name, figure in flight["figures"].items()}
-    assert measured["wake-up lateness p99 us"] > 0.0
-    assert measured["tick p50 us"] > 0.0
     assert 50.0 < measured["resident MB"] < 400.0
-    assert measured["growth MB"] is None, "two seconds say nothing about growth"
+    assert measured.pop("growth MB") is None, "two seconds say nothing about growth"
+    times = [name for name in measured if name.endswith(" us")]
+    assert len(times) == 13
+    assert all(measured[name] > 0.0 for name in times), measured
     assert _descendants() == before
 
 
