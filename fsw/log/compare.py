@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from fsw.log.reader import LoggedTick
@@ -51,10 +52,13 @@ def _name(record: Record) -> str:
 
 
 def _readable(value: int | float | bytes) -> int | float | str:
-    """Characters as text; the zeros that fill a field up say nothing."""
+    """Characters and what is no number as text, as JSON wants them.
+
+    The zeros that fill characters up say nothing.
+    """
     if isinstance(value, bytes):
         return value.rstrip(b"\0").decode("utf-8", "backslashreplace")
-    return value
+    return value if math.isfinite(value) else repr(value)
 
 
 def _text(record: Record) -> str:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import math
+import struct
 from dataclasses import replace
 from pathlib import Path
 
@@ -84,7 +86,7 @@ def test_one_gain_changed_is_found_at_the_tick_at_which_it_first_matters(
 def spoil(path: Path, topic: Topic, tick: int, value: int, byte: int = 0) -> None:
     """Flip the lowest bit of a byte of a double in a record of a tick."""
     data, at = bytearray(path.read_bytes()), 0
-    head = ulog.data_head(TOPICS.index(topic), topic)
+    head = head_of(topic)
     for _ in range(tick + 1):
         at = data.index(head, at) + len(head)
     data[at + 8 + 8 * value + byte] ^= 1
@@ -144,7 +146,7 @@ def test_a_letter_is_found_and_told_as_text_in_json_too(
 ) -> None:
     path = written(tmp_path / "flight.ulg", flown)
     data = path.read_bytes()
-    at = data.index(was, data.index(ulog.data_head(0, topics.SENSOR_FRAME)))
+    at = data.index(was, data.index(head_of(topics.SENSOR_FRAME)))
     path.write_bytes(data[:at] + becomes + data[at + len(was) :])
     assert main([str(path), "--verify", "--json", str(tmp_path / "found.json")]) == 1
     assert f": {field} was '" in capsys.readouterr().out
@@ -152,6 +154,23 @@ def test_a_letter_is_found_and_told_as_text_in_json_too(
     assert found["field"] == field
     assert becomes.rstrip(b"\0").decode() in found["logged"]
     assert was.rstrip(b"\0").decode() in found["replayed"]
+
+
+def test_what_is_no_number_is_told_as_text_for_json_has_none(
+    flown: list[tuple[TickInputs, TickOutputs]], tmp_path: Path
+) -> None:
+    path = written(tmp_path / "flight.ulg", flown)
+    data, head = bytearray(path.read_bytes()), head_of(topics.ACTUATOR_COMMAND)
+    at = data.index(head) + len(head) + 8
+    data[at : at + 8] = struct.pack("<d", math.nan)
+    path.write_bytes(data)
+    found = replayed(path).difference
+    assert found is not None
+    assert (found.field, found.logged) == ("actuator_command.rotor_thrust[0]", "nan")
+
+
+def head_of(topic: Topic) -> bytes:
+    return ulog.data_head(TOPICS.index(topic), topic)
 
 
 def test_a_tick_that_fails_now_is_a_difference(
@@ -184,7 +203,7 @@ def test_behind_a_gap_nothing_is_compared(
     flown: list[tuple[TickInputs, TickOutputs]], tmp_path: Path
 ) -> None:
     path = written(tmp_path / "flight.ulg", flown)
-    data, head = path.read_bytes(), ulog.data_head(0, topics.SENSOR_FRAME)
+    data, head = path.read_bytes(), head_of(topics.SENSOR_FRAME)
     begin = -1
     for _ in range(101):
         begin = data.index(head, begin + 1)
