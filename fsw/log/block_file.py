@@ -8,7 +8,6 @@ flight; the reason is kept for whoever asks.
 
 from __future__ import annotations
 
-import contextlib
 import os
 import queue
 import threading
@@ -82,9 +81,6 @@ class BlockFile:
         os.close(self._file)
 
     def _work(self) -> None:
-        with contextlib.suppress(OSError):
-            # A thread inherits the priority of the tick, which must not wait for a disk.
-            os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
         while (block := self._waiting.get()) is not None:
             self._append(block)
 

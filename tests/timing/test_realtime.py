@@ -7,6 +7,7 @@ import json
 import mmap
 import os
 import threading
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ from typing import Any
 import pytest
 
 from fsw.link.wire import encode_dialect
+from fsw.log.block_file import BlockFile
 from fsw.runtime import realtime
 from fsw.runtime.process import settle_memory
 from fsw.runtime.rates import RATE_GROUPS
@@ -134,6 +136,24 @@ def test_no_thread_is_left_behind_that_could_hold_the_interpreter() -> None:
     assert found["policy"] == (os.SCHED_FIFO if granted else os.SCHED_OTHER)
     assert found["lower"]
     assert found["after"] == os.SCHED_OTHER
+
+
+def test_a_log_s_thread_leaves_its_rank_to_the_loop(tmp_path: Path) -> None:
+    def look() -> dict[str, Any]:
+        refused = realtime.claim_real_time(realtime.TICK_PRIORITY)
+        log = BlockFile(tmp_path / "log")
+        log.start_thread()
+        log.put(b"a block")
+        (thread,) = (one for one in threading.enumerate() if one is not threading.main_thread())
+        until = time.monotonic() + 5.0
+        while not log.size and time.monotonic() < until:
+            time.sleep(0.001)
+        assert thread.native_id is not None
+        return {"refused": refused, "policy": os.sched_getscheduler(thread.native_id)}
+
+    found = found_in_a_child(look)
+    granted = "real-time scheduling" not in found["refused"]
+    assert found["policy"] == (os.SCHED_FIFO if granted else os.SCHED_OTHER)
 
 
 def test_every_group_s_timing_says_which_group_it_is() -> None:
