@@ -10,7 +10,7 @@ from typing import Any, Final
 
 MOST_OTHER_LOAD: Final = 0.25  # processors that other programs may use while we measure
 MOST_STOLEN: Final = 0.02  # share of the machine that its host may take away
-MOST_STOPPED: Final = 0.0005  # share of releases; half of those that a flight may be late for
+MOST_STOPPED: Final = 0.0005  # share of the time; half the releases that a flight may be late for
 
 Budgets = Mapping[str, Mapping[str, float]]
 
@@ -57,7 +57,7 @@ class Noise:
 
     others: float  # processors used by programs that are not ours
     stolen: float  # share of all processors taken away by the host
-    # Share of releases for which a program that only sleeps was late; None: not measured.
+    # Share of the time for which a program that only sleeps was not woken; None: not measured.
     stopped: float | None = None
 
     @property

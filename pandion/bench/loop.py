@@ -192,7 +192,7 @@ def _lines(measured: Measured) -> list[str]:
         f"the host took {100.0 * noise['stolen']:.1f} %"
     )
     if noise["stopped"] is not None:
-        head += f"; a loop that only sleeps was late for {noise['stopped']:.2g} of its releases"
+        head += f"; a loop that only sleeps stood still for {100.0 * noise['stopped']:.2g} % of it"
     table = [
         f"  {row.name:<30}{_number(row.value):>12}{_number(row.budget):>12}"
         f"  {'' if row.kept else 'over'}"

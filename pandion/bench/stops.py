@@ -3,52 +3,47 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Final
+
+from fsw.runtime.releases import MOST_STALE
 
 Stretch = tuple[int, int]  # from, to: wall time in microseconds
-
-_MISSED_US: Final = 1_500  # a tick that begins so late is not over by the next release
 
 
 class Stops:
     """Stretches in which a sleeping loop on one of the processors was not woken."""
 
-    def __init__(
-        self, late: Sequence[Sequence[Stretch]], loop_period_us: int, period_us: int
-    ) -> None:
+    def __init__(self, late: Sequence[Sequence[Stretch]], period_us: int) -> None:
         """Take what the loops saw.
 
         Args:
             late: For each processor, the releases of its loop that were late: when they were due
                 and when the loop ran.
-            loop_period_us: Of the loops.
             period_us: Of the flight.
         """
         self.late = late
-        self._loop_period_us = loop_period_us
         self._period_us = period_us
-        # A stop began before it was seen, and what it held up ends behind it.
+        # A stop began before it was seen. Behind it the vehicle finds its frames again, for as
+        # long as it flies on old readings.
+        behind_us = MOST_STALE * period_us
         self._stretches = _united(
-            (due_us - period_us, woken_us + period_us) for one in late for due_us, woken_us in one
+            (due_us - period_us, woken_us + behind_us) for one in late for due_us, woken_us in one
         )
 
     def share(self, begin_us: int, releases: int) -> float:
-        """Share of its releases that a short tick would have missed, mean of the processors.
-
-        It misses those more than ``_MISSED_US`` before the end of a stop, which began half a
-        period of the loop before it was seen, in the mean.
+        """Share of the time for which a sleeping loop was not woken, mean of the processors.
 
         Args:
             begin_us: First release of the flight.
             releases: Of the flight.
         """
-        end_us = begin_us + releases * self._period_us
-        stopped_us = 0.0
-        for due_us, woken_us in (stretch for one in self.late for stretch in one):
-            if begin_us <= due_us < end_us:
-                length_us = woken_us - due_us + 0.5 * self._loop_period_us
-                stopped_us += max(length_us - _MISSED_US, 0.0)
-        return stopped_us / max(self._period_us * releases * len(self.late), 1)
+        length_us = releases * self._period_us
+        during = (
+            woken_us - due_us
+            for one in self.late
+            for due_us, woken_us in one
+            if begin_us <= due_us < begin_us + length_us
+        )
+        return sum(during) / max(length_us * len(self.late), 1)
 
     def missed_elsewhere(
         self, missed: Iterable[Sequence[int]], begin_us: int, releases: int
