@@ -44,7 +44,7 @@ test: setup ## set up, then run every check: ruff, mypy, import-linter, pytest
 	@$(MAKE) --no-print-directory --jobs=2 tests-of-processes tests-of-the-rest
 
 # Two at a time, one a core: much of what the first starts waits for clocks.
-OF_PROCESSES := tests/cli tests/interop tests/processes tests/studies tests/timing
+OF_PROCESSES := tests/cli tests/interop tests/processes tests/timing
 tests-of-processes:
 	$(call check,processes,$(BIN)/pytest $(OF_PROCESSES))
 tests-of-the-rest:

@@ -44,7 +44,10 @@ examples:
 def main(argv: list[str] | None = None) -> int:
     """Run one verb; returns the exit code."""
     try:
-        return _run(sys.argv[1:] if argv is None else argv)
+        try:
+            return _run(sys.argv[1:] if argv is None else argv)
+        finally:
+            sys.stdout.flush()  # here, where a reader that has left or a full disk has its answer
     except BrokenPipeError:
         _say_no_more()  # whoever read the output has left
     except OSError as error:

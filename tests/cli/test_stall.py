@@ -89,18 +89,22 @@ def test_a_stall_of_a_half_ends_both_in_time_and_names_the_step(
 
 def test_a_stall_shortly_before_the_end_is_no_pass(tmp_path: Path) -> None:
     """The simulator ends as planned, and the flight software has to be killed."""
-    out = tmp_path / "out"
-    flight = flying(out, "--realtime", duration="2")
-    try:
-        assert flight.stdout is not None
-        for line in flight.stdout:
-            if float(line.split()[1]) >= 1.7:  # of progress; too late for a fall to end it
-                break
-        _, said = end_of(flight, "fsw", signal.SIGSTOP)
-        assert "PASS" not in said
-        assert re.search(r"FAIL flew 2\.0 s; .* silent since step \d{3}; fsw did not end", said), (
-            said
-        )
+    silent_s, said = 0.0, ""
+    for attempt in range(TRIES):
+        out = tmp_path / f"{attempt}"
+        flight = flying(out, "--realtime", duration="2")
+        try:
+            assert flight.stdout is not None
+            for line in flight.stdout:
+                if float(line.split()[1]) >= 1.7:  # of progress; too late for a fall to end it
+                    break
+            _, said = end_of(flight, "fsw", signal.SIGSTOP)
+        finally:
+            clean_up(flight)
+        assert re.search(r"FAIL flew 2\.0 s; (.*; )?fsw did not end by itself", said), said
         assert not (out / "fsw.json").exists()
-    finally:
-        clean_up(flight)
+        since = re.search(r"silent since step (\d{3}); fsw", said)
+        if since is not None:  # a slow machine is slow to stop it, and a tenth of a second is short
+            silent_s = 2.0 - 0.002 * int(since[1])
+            break
+    assert 0.1 < silent_s < 0.4, said
