@@ -6,7 +6,6 @@ import contextlib
 import socket
 import time
 from collections.abc import Iterator
-from types import TracebackType
 from typing import Final, cast
 
 from fsw.link.udp_endpoint import MAX_DATAGRAM, Address
@@ -50,12 +49,7 @@ class ParameterClient:
     def __enter__(self) -> ParameterClient:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._socket.close()
 
     def read_all(self) -> dict[str, float]:

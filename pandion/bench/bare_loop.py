@@ -12,7 +12,6 @@ import os
 import subprocess
 import sys
 import time
-from types import TracebackType
 from typing import Final
 
 from fsw.runtime.clock import now_us
@@ -43,12 +42,7 @@ class BareLoops:
             self._loops.append(subprocess.Popen(command, stdout=subprocess.PIPE, text=True))
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         for loop in self._loops:
             loop.terminate()
         said = [loop.communicate()[0] for loop in self._loops]

@@ -29,6 +29,14 @@ def test_releases_within_a_stop_of_either_processor_are_excused_and_not_counted(
         assert stops.missed_elsewhere(missed, BEGIN_US, RELEASES) == 1 / (RELEASES - 21)
 
 
+def test_a_stop_excuses_one_period_before_it_was_seen_and_five_behind() -> None:
+    stops = Stops([[(BEGIN_US + 100_000, BEGIN_US + 130_000)]], PERIOD_US)
+    for due_us, excused in ((97_000, False), (99_000, True), (139_000, True), (141_000, False)):
+        missed = [(BEGIN_US + due_us, BEGIN_US + due_us)]
+        share = stops.missed_elsewhere(missed, BEGIN_US, RELEASES)
+        assert (share == 0.0) is excused, due_us
+
+
 def test_the_share_of_time_is_the_mean_of_the_processors() -> None:
     one = [(BEGIN_US + 10_000, BEGIN_US + 16_000), (BEGIN_US + 50_000, BEGIN_US + 50_600)]
     stops = Stops([one, []], PERIOD_US)

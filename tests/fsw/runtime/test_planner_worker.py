@@ -81,6 +81,16 @@ def answer(service: ProcessPlanner, t_us: int = ALWAYS_US) -> Plan | PlanFailure
     return answers[0]
 
 
+def processes_of(service: ProcessPlanner) -> tuple[int, int]:
+    """The worker and its nursery, once a request was answered."""
+    service.submit(request(1))
+    answer(service)
+    worker, nursery = service.worker, service._nursery
+    assert worker is not None
+    assert nursery is not None
+    return worker, nursery
+
+
 def is_gone(process: int) -> bool:
     try:
         state = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0]
@@ -185,11 +195,7 @@ def test_a_request_that_kills_its_worker_is_lost_and_the_next_is_answered(
 def test_a_nursery_that_dies_takes_its_worker_along_and_both_are_replaced(
     service: ProcessPlanner, record: PlannerRecord
 ) -> None:
-    service.submit(request(1))
-    answer(service)
-    first, nursery = service.worker, service._nursery
-    assert first is not None
-    assert nursery is not None
+    first, nursery = processes_of(service)
     os.kill(nursery, signal.SIGKILL)
     wait_for(lambda: is_gone(first))
     service.submit(request(2))
@@ -213,11 +219,7 @@ def test_a_nursery_that_is_stuck_is_replaced_with_its_worker(
     service: ProcessPlanner, record: PlannerRecord, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(planner_worker, "PATIENCE_US", 200_000)
-    service.submit(request(1))
-    answer(service)
-    worker, nursery = service.worker, service._nursery
-    assert worker is not None
-    assert nursery is not None
+    worker, nursery = processes_of(service)
     os.kill(nursery, signal.SIGSTOP)
     os.kill(worker, signal.SIGKILL)
     service.submit(request(2))
@@ -248,11 +250,7 @@ def test_every_cycle_is_measured_and_what_was_never_answered_is_skipped(
 
 def test_nothing_is_left_of_it(record: PlannerRecord) -> None:
     service = ProcessPlanner(Refusing(), clock.now_us, record)
-    service.submit(request(1))
-    answer(service)
-    worker, nursery = service.worker, service._nursery
-    assert worker is not None
-    assert nursery is not None
+    worker, nursery = processes_of(service)
     service.close()
     service.close()
     assert is_gone(nursery)
