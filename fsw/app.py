@@ -118,7 +118,12 @@ class _Session:
         sim = SimLink(simulator, inbox, facts)
         autopilot = AUTOPILOTS[options.links.autopilot]
         context = TelemetryContext(
-            facts, record.health, autopilot, options.links.origin, start_unix_us=start_us
+            facts,
+            record.health,
+            autopilot,
+            options.links.origin,
+            start_unix_us=start_us,
+            plan_ids=program.missions.ids,
         )
         logs = flight_logs(directory)
         clocks = (clock.now_us, clock.unix_us)

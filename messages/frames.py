@@ -1,4 +1,7 @@
-"""A small, fast codec for MAVLink 2 frames, byte-identical with pymavlink.
+"""A small, fast codec for MAVLink frames, byte-identical with pymavlink.
+
+Frames are written as MAVLink 2 and read as either version; :func:`as_version_1` rewrites one for a
+peer that speaks MAVLink 1, as QGroundControl does where a vehicle does not say that it knows more.
 
 pymavlink builds an object for every message and copies its payload several times, which makes it
 3 to 4 times as slow to send and 4 to 5 times as slow to receive. Here a message is a flat tuple of
@@ -11,15 +14,17 @@ Source: MAVLink 2 serialization, https://mavlink.io/en/guide/serialization.html
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from struct import Struct
-from typing import Final, NamedTuple
+from struct import Struct, calcsize
+from typing import Any, Final, NamedTuple
 
 import fastcrc
 
 from messages import dialect
 
 _MAGIC: Final = 0xFD
+_MAGIC_1: Final = 0xFE  # of MAVLink 1
 _HEADER_SIZE: Final = 10
+_HEADER_SIZE_1: Final = 6
 _CHECKSUM_SIZE: Final = 2
 _SIGNATURE_SIZE: Final = 13
 _SIGNED: Final = 0x01
@@ -36,13 +41,20 @@ class Layout(NamedTuple):
     payload: Struct
     crc_extra: bytes  # (1,), closes the checksummed bytes
     id_bytes: bytes  # (3,), the message id as it stands in the header
+    base_size: int  # bytes of the payload without extensions: its size in MAVLink 1
+
+
+def _layout(message_id: int, message: Any) -> Layout:
+    extensions = dialect.EXTENSION_FIELDS.get(message_id, 0)
+    base = len(message.ordered_fieldnames) - extensions
+    codes = zip(message.array_lengths[:base], message.native_format[1:].decode(), strict=False)
+    base_size = calcsize("<" + "".join(f"{length or 1}{code}" for length, code in codes))
+    id_bytes = message_id.to_bytes(3, "little")
+    return Layout(message.unpacker, bytes([message.crc_extra]), id_bytes, base_size)
 
 
 _LAYOUTS: Final[dict[int, Layout]] = {
-    message_id: Layout(
-        message.unpacker, bytes([message.crc_extra]), message_id.to_bytes(3, "little")
-    )
-    for message_id, message in dialect.mavlink_map.items()
+    message_id: _layout(message_id, message) for message_id, message in dialect.mavlink_map.items()
 }
 
 
@@ -132,9 +144,30 @@ def announcing_signature(frame: bytes) -> bytes:
     return b"\xfd%b%b" % (body, checksum(body + layout.crc_extra).to_bytes(2, "little"))
 
 
+def is_version_1(frame: bytes) -> bool:
+    """Whether a whole frame is of MAVLink 1."""
+    return frame[0] == _MAGIC_1
+
+
 def is_signed(frame: bytes) -> bool:
-    """Whether the bytes of a whole frame end in a signature."""
-    return frame[2] == _SIGNED
+    """Whether the bytes of a whole frame end in a signature; those of MAVLink 1 never do."""
+    return frame[0] == _MAGIC and frame[2] == _SIGNED
+
+
+def as_version_1(frame: bytes) -> bytes | None:
+    """Rewrite an unsigned frame of :class:`FrameWriter` for a peer that speaks MAVLink 1.
+
+    Returns:
+        The frame with the same sequence number, without extension fields and with the zeros that
+        MAVLink 2 leaves out; None where MAVLink 1 has no such message, its ids being one byte.
+    """
+    if frame[8] or frame[9]:
+        return None
+    layout = _LAYOUTS[frame[7]]
+    size = layout.base_size
+    payload = frame[_HEADER_SIZE:-_CHECKSUM_SIZE][:size].ljust(size, b"\0")
+    body = b"%c%b%b" % (size, frame[4:8], payload)
+    return b"\xfe%b%b" % (body, checksum(body + layout.crc_extra).to_bytes(2, "little"))
 
 
 def split(datagram: bytes, losses: Losses | None = None) -> Iterator[Frame]:
@@ -150,21 +183,33 @@ def cut(datagram: bytes, losses: Losses | None = None) -> Iterator[tuple[Frame, 
     search goes on at the byte after its start marker, since its length cannot be trusted. A
     signature is stepped over and not checked. After 64 false starts a datagram is given up.
 
+    A frame of MAVLink 1 is looked for only where a frame must begin: at the start of the datagram
+    and behind another frame. Its header has 8 bits of message id where that of MAVLink 2 has 24, so
+    in noise it would be found, by the luck of 16 bits of checksum, every few seconds of a flood.
+
     Args:
         datagram: What the socket delivered, any bytes.
         losses: Counts of what was dropped are added to it once the datagram has been read through.
     """
     delivered_bytes = refused = 0
-    at = datagram.find(_MAGIC)
-    while at >= 0 and refused < _FALSE_START_LIMIT:
-        size, frame = _frame_at(datagram, at)
-        if frame is None:
-            refused += 1
-            at = datagram.find(_MAGIC, at + 1)
+    at, size = 0, len(datagram)
+    while at < size and refused < _FALSE_START_LIMIT:
+        if datagram[at] == _MAGIC_1:
+            length, frame = _frame_1_at(datagram, at)
+        elif datagram[at] == _MAGIC:
+            length, frame = _frame_at(datagram, at)
         else:
-            yield frame, datagram[at : at + size]
-            delivered_bytes += size
-            at = datagram.find(_MAGIC, at + size)
+            length, frame = 0, None
+        if frame is None:
+            refused += datagram[at] in (_MAGIC, _MAGIC_1)
+            # A message of MAVLink 1 that is not known has a length all the same.
+            at = at + length if length else datagram.find(_MAGIC, at + 1)
+            if at < 0:
+                break
+        else:
+            yield frame, datagram[at : at + length]
+            delivered_bytes += length
+            at += length
     if losses is not None:
         losses.bytes += len(datagram) - delivered_bytes
         losses.frames += refused
@@ -195,6 +240,34 @@ def _frame_at(datagram: bytes, start: int) -> tuple[int, Frame | None]:
     # Longer than known: a peer with newer extensions. Shorter: trailing zeros were left out.
     size = layout.payload.size
     payload = datagram[payload_at:payload_end][:size].ljust(size, b"\0")
+    values = layout.payload.unpack(payload)
+    return end - start, Frame(system_id, component_id, sequence, message_id, values)
+
+
+def _frame_1_at(datagram: bytes, start: int) -> tuple[int, Frame | None]:
+    """Decode the frame of MAVLink 1 that starts at a marker: its size, and None if not valid.
+
+    The size is 0 where it cannot be trusted.
+    """
+    payload_at = start + _HEADER_SIZE_1
+    if len(datagram) < payload_at + _CHECKSUM_SIZE:
+        return 0, None
+    _, length, sequence, system_id, component_id, message_id = datagram[start:payload_at]
+    layout = _LAYOUTS.get(message_id)
+    payload_end = payload_at + length
+    end = payload_end + _CHECKSUM_SIZE
+    if len(datagram) < end:
+        return 0, None
+    if layout is None:
+        follows = end == len(datagram) or datagram[end] in (_MAGIC, _MAGIC_1)
+        return (end - start if follows else 0), None
+    # MAVLink 1 leaves nothing out; what is longer was sent with extensions by a lenient library.
+    if not layout.base_size <= length <= layout.payload.size:
+        return 0, None
+    received = datagram[payload_end] | datagram[payload_end + 1] << 8
+    if checksum(datagram[start + 1 : payload_end] + layout.crc_extra) != received:
+        return 0, None
+    payload = datagram[payload_at:payload_end].ljust(layout.payload.size, b"\0")
     values = layout.payload.unpack(payload)
     return end - start, Frame(system_id, component_id, sequence, message_id, values)
 

@@ -5,6 +5,9 @@ Run by the build hook for every wheel and editable install, and by hand after an
 pymavlink, so the same pymavlink always gives the same bytes. The standard modes (AVAILABLE_MODES,
 CURRENT_MODE), which MAVLink has in common.xml by now, still wait in pymavlink's development.xml:
 the module carries that as well, what `upstream.xml` adds, and tests pin these messages.
+
+At its end the module says how many fields of each message are extensions, which mavgen leaves out
+and MAVLink 1, which has none, asks for.
 """
 
 import contextlib
@@ -12,11 +15,13 @@ import io
 import shutil
 import sys
 import tempfile
+import xml.etree.ElementTree as ET
 from importlib.util import find_spec
 from pathlib import Path
 
 DEFINITION = Path(__file__).with_name("pandion.xml")
 GENERATED = Path(__file__).with_name("dialect.py")
+_COMMON = "common.xml"
 _DEVELOPMENT = "development.xml"
 _UPSTREAM = Path(__file__).with_name("upstream.xml")
 
@@ -46,9 +51,14 @@ def generate(
         source = Path(folder, definition.name)
         shutil.copy(definition, source)
         module = source.with_suffix(destination.suffix)
-        shutil.copy(_UPSTREAM, folder)
-        beside = [Path(folder, name) for name in (_DEVELOPMENT, _UPSTREAM.name)]
-        _run_mavgen([source, *beside], module, language)
+        upstream = Path(folder, _UPSTREAM.name)
+        shutil.copy(_UPSTREAM, upstream)
+        _extend(Path(folder, _COMMON), upstream)
+        sources = [source, Path(folder, _DEVELOPMENT), upstream]
+        _run_mavgen(sources, module, language)
+        if language == "Python3":
+            with module.open("a", encoding="utf-8") as file:
+                file.write(f"\nEXTENSION_FIELDS = {_extension_fields(sources)}\n")
         module.replace(destination)
 
 
@@ -62,6 +72,43 @@ def pymavlink_definitions() -> Path:
     if spec is None or spec.origin is None:
         raise GenerationError("pymavlink is not installed; run `make setup`")
     return Path(spec.origin).parent / "dialects" / "v20"
+
+
+def _extend(known: Path, upstream: Path) -> None:
+    """Move the extension fields that ``upstream`` adds to messages of ``known`` over there."""
+    known_tree, upstream_tree = ET.parse(known), ET.parse(upstream)
+    by_id = {message.get("id"): message for message in known_tree.iter("message")}
+    added = upstream_tree.find("messages")
+    assert added is not None
+    for message in list(added):
+        old = by_id.get(message.get("id"))
+        if old is None:
+            continue
+        if old.find("extensions") is None:
+            old.append(ET.Element("extensions"))
+        named = {field.get("name") for field in old.iter("field")}
+        old.extend(field for field in message.iter("field") if field.get("name") not in named)
+        added.remove(message)
+    known_tree.write(known, encoding="utf-8")
+    upstream_tree.write(upstream, encoding="utf-8")
+
+
+def _extension_fields(sources: list[Path]) -> dict[int, int]:
+    """Number of extension fields by message id, of every message that has some."""
+    counts: dict[int, int] = {}
+    waiting, seen = list(sources), set(sources)
+    while waiting:
+        tree = ET.parse(waiting.pop())
+        for message in tree.iter("message"):
+            tags = [child.tag for child in message]
+            if "extensions" in tags:
+                counts[int(message.get("id", ""))] = tags[tags.index("extensions") :].count("field")
+        for include in tree.iter("include"):
+            path = sources[0].with_name(include.text or "")
+            if path not in seen:
+                seen.add(path)
+                waiting.append(path)
+    return dict(sorted(counts.items()))
 
 
 def _run_mavgen(sources: list[Path], module: Path, language: str) -> None:

@@ -6,7 +6,7 @@ said.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -26,7 +26,7 @@ from fsw.link.wire.message_ids import AUTOPILOT
 from fsw.link.wire.telemetry_context import TelemetryContext
 from fsw.ports import Clock
 from fsw.signals import CommandAck, FlightSnapshot, TickOutputs
-from messages.frames import Frame, Losses, cut
+from messages.frames import Frame, Losses, as_version_1, cut, is_version_1
 
 RecordFrame = Callable[[int, bytes], None]
 """Takes the sensor time [us] and one frame, for the log."""
@@ -197,7 +197,7 @@ class GcsLink:
         if self._record is not None:
             self._record(t_us, raw)
         if verdict is Verdict.TRUSTED:
-            self._peers.heard(sender, self._clock())
+            self._peers.heard(sender, self._clock(), version_1=is_version_1(raw))
             self.talks = True
             if len(self._speakers) < _MAX_SPEAKERS:
                 self._speakers.add((frame.system_id, frame.component_id))
@@ -234,6 +234,15 @@ class GcsLink:
             for frame in frames:
                 if frame[_MESSAGE_ID] not in _FILE_DATA:
                     self._record(t_us, frame)
+        old = self._peers.version_1
+        self._send_to([peer for peer in self._peers.all if peer not in old], frames)
+        if old and not self.signing.active:
+            rewritten = (as_version_1(frame) for frame in frames)
+            self._send_to(old, [frame for frame in rewritten if frame is not None])
+
+    def _send_to(self, peers: Collection[Address], frames: list[bytes]) -> None:
+        if not peers or not frames:
+            return
         for datagram in packed(frames):
-            for peer in self._peers.all:
+            for peer in peers:
                 self._endpoint.send(datagram, peer)

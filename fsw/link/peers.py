@@ -19,6 +19,7 @@ class Peers:
 
     def __init__(self, configured: Address) -> None:
         self.all: tuple[Address, ...] = (configured,)
+        self.version_1: frozenset[Address] = frozenset()  # of these, those whose last frame was so
         self._configured = configured
         self._heard_us: dict[Address, int] = {}  # in the order in which each was heard last
 
@@ -27,8 +28,10 @@ class Peers:
         """Whether anybody speaks to us."""
         return bool(self._heard_us)
 
-    def heard(self, peer: Address, now_us: int) -> None:
-        """Note a peer that has just sent a valid frame."""
+    def heard(self, peer: Address, now_us: int, *, version_1: bool = False) -> None:
+        """Note a peer that has just sent a valid frame, of MAVLink 1 or 2."""
+        if version_1 != (peer in self.version_1):
+            self.version_1 ^= {peer}
         known = self._heard_us.pop(peer, None) is not None
         self._heard_us[peer] = now_us
         if known:
@@ -49,3 +52,4 @@ class Peers:
     def _list(self) -> None:
         learnt = (peer for peer in self._heard_us if peer != self._configured)
         self.all = (self._configured, *learnt)
+        self.version_1 &= set(self.all)

@@ -15,7 +15,7 @@ import time
 from collections.abc import Callable
 from typing import Final
 
-from messages.frames import FrameWriter, split
+from messages.frames import FrameWriter, as_version_1, split
 
 SYSTEM: Final = 66  # of the flood; its component too
 _POOL: Final = 2000  # different datagrams of each kind, made before the flood
@@ -28,6 +28,10 @@ _COMMAND_LONG, _COMMAND_INT, _PARAM_SET = 76, 75, 23
 _POSITION_TARGET, _ATTITUDE_TARGET, _END_EFFECTOR_TARGET, _WALL = 84, 82, 60202, 60207
 
 
+def _of_either_version(frame: bytes, chance: random.Random) -> bytes:
+    return (as_version_1(frame) if chance.random() < 0.5 else None) or frame
+
+
 def dangerous(writer: FrameWriter, chance: random.Random) -> bytes:
     """A frame that would hurt if it were believed after it has been damaged."""
     numbers = chance.choice(
@@ -37,12 +41,12 @@ def dangerous(writer: FrameWriter, chance: random.Random) -> bytes:
             (30.0, 1e6, *(0.0,) * 5, _SET_INTERVAL, 1, 1, 0),  # attitude once a second
         )
     )
-    return writer.frame(_COMMAND_LONG, *numbers)
+    return _of_either_version(writer.frame(_COMMAND_LONG, *numbers), chance)
 
 
 def noise(writer: FrameWriter, chance: random.Random) -> bytes:
-    """Random bytes, half of them behind a start marker."""
-    marker = b"\xfd" if chance.random() < 0.5 else b""
+    """Random bytes, two thirds of them behind a start marker of MAVLink 2 or 1."""
+    marker = chance.choice((b"\xfd", b"\xfe", b""))
     return marker + chance.randbytes(chance.randrange(1, 280))
 
 
@@ -90,7 +94,7 @@ def out_of_range(writer: FrameWriter, chance: random.Random) -> bytes:
             (_WALL, (0.0, 0.0, 0.0, wild, -1.0, 1, 1, 0, 1)),
         )
     )
-    return writer.frame(message_id, *values)
+    return _of_either_version(writer.frame(message_id, *values), chance)
 
 
 KINDS: Final[tuple[Callable[[FrameWriter, random.Random], bytes], ...]] = (

@@ -6,6 +6,8 @@ import fastcrc
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from pymavlink.dialects.v10.common import MAVLink
+from pymavlink.dialects.v10.common import MAVLink_heartbeat_message as Heartbeat
 
 from messages import dialect
 from messages.frames import Frame, FrameWriter, Losses, split
@@ -16,6 +18,8 @@ GOOD = FrameWriter(1, 200).frame(HIL_SENSOR, *SENSOR_VALUES)
 OTHER = FrameWriter(1, 195).frame(
     dialect.MAVLINK_MSG_ID_WORKSPACE_SPHERE, 0, 0, -0.225, 0.075, 1, 1
 )
+
+OLD = Heartbeat(6, 8, 0, 0, 4, 3).pack(MAVLink(None, srcSystem=255, srcComponent=190))
 
 
 def with_checksum(header_and_payload, message_id=HIL_SENSOR):
@@ -91,9 +95,42 @@ def test_a_message_of_another_dialect_is_skipped():
     assert delivered(bytes(unknown) + OTHER) == [60208]
 
 
-def test_a_frame_of_protocol_1_is_skipped():
+def test_a_damaged_frame_of_protocol_1_is_skipped():
     version_1 = struct.pack("<BBBBBB", 0xFE, 9, 0, 1, 1, 0) + bytes(11)
     assert delivered(version_1 + GOOD) == [HIL_SENSOR]
+
+
+def test_no_single_flipped_bit_of_protocol_1_is_delivered():
+    for bit in range(8 * len(OLD)):
+        damaged = bytearray(OLD)
+        damaged[bit // 8] ^= 1 << bit % 8
+        assert delivered(bytes(damaged)) == [], f"bit {bit}"
+
+
+@pytest.mark.parametrize("length", range(len(OLD)))
+def test_a_truncated_frame_of_protocol_1_is_not_delivered(length):
+    assert delivered(OLD[:length]) == []
+
+
+def test_protocol_1_is_looked_for_only_where_a_frame_must_begin():
+    """Its short header would be found in noise, checksum and all, every few seconds of a flood."""
+    assert delivered(OLD + OLD + GOOD + OLD) == [0, 0, HIL_SENSOR, 0]
+    assert delivered(b"x" + OLD) == []
+    assert delivered(b"x" + GOOD + OLD) == [HIL_SENSOR, 0]
+
+
+def test_a_message_of_another_dialect_in_protocol_1_is_stepped_over():
+    unknown = struct.pack("<BBBBBB", 0xFE, 3, 0, 1, 1, 199) + bytes(5)
+    assert 199 not in dialect.mavlink_map
+    assert delivered(unknown + OLD + GOOD) == [0, HIL_SENSOR]
+    assert delivered(unknown + b"x" + OLD) == []
+
+
+def test_protocol_1_leaves_nothing_out():
+    """What is shorter than the message without its extensions was never sent by anybody."""
+    short = bytearray(OLD[:-3])
+    short[1] -= 1
+    assert delivered(with_checksum(bytes(short), 0)) == []
 
 
 def test_an_unknown_incompatibility_flag_is_refused_even_with_a_right_checksum():

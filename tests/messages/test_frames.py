@@ -2,12 +2,14 @@
 
 import struct
 
+import fastcrc
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from pymavlink.dialects.v10 import common as version_1
 
 from messages import dialect
-from messages.frames import FrameWriter, split, wire_fields
+from messages.frames import FrameWriter, as_version_1, split, wire_fields
 
 SPOKEN = [
     *("HIL_SENSOR", "HIL_ACTUATOR_CONTROLS", "ODOMETRY", "COMMAND_LONG", "COMMAND_ACK"),
@@ -81,6 +83,57 @@ def test_pymavlink_reads_what_was_sent(data):
     frame = FrameWriter(1, 191).frame(message.id, *in_wire_order(message, values))
     (received,) = pymavlink_sender().parse_buffer(frame)
     assert {name: getattr(received, name) for name in message.fieldnames} == values
+
+
+OLD = {
+    name: message
+    for name, message in MESSAGES.items()
+    if message.id < 256 and message.id in version_1.mavlink_map
+} | {
+    "MISSION_COUNT": dialect.mavlink_map[44],  # with extensions
+    "MISSION_ITEM_INT": dialect.mavlink_map[73],
+    "PARAM_VALUE": dialect.mavlink_map[22],
+}
+
+
+@pytest.mark.parametrize("name", OLD)
+@given(data=st.data())
+def test_version_1_is_byte_identical_with_pymavlink_s(name, data):
+    """pymavlink's modules of MAVLink 1 know no extensions."""
+    message, old = OLD[name], version_1.mavlink_map[OLD[name].id]
+    values = data.draw(field_values(message))
+    frame = FrameWriter(1, 191).frame(message.id, *in_wire_order(message, values))
+    base = {key: value for key, value in values.items() if key in old.fieldnames}
+    sender = version_1.MAVLink(None, srcSystem=1, srcComponent=191)
+    theirs = old(**base).pack(sender)
+    assert as_version_1(frame) == theirs
+    (read,) = split(theirs)
+    assert read[:4] == (1, 191, 0, message.id)
+    without = dict.fromkeys(message.fieldnames, 0) | base
+    for extension in set(message.fieldnames) - set(base):
+        length = message.array_lengths[message.ordered_fieldnames.index(extension)]
+        without[extension] = [0] * length if length else 0
+    sent = message.unpacker.pack(*in_wire_order(message, without))
+    assert message.unpacker.pack(*read.payload_values) == sent
+
+
+def test_version_1_has_no_message_beyond_255():
+    assert as_version_1(FrameWriter(1, 191).frame(MESSAGES["MPC_STATUS"].id, *[0] * 16)) is None
+
+
+def test_every_base_size_is_the_one_whose_crc_extra_covers_it():
+    """MAVLink computes CRC_EXTRA from the fields that are no extensions: an independent count."""
+    for message_id, message in dialect.mavlink_map.items():
+        extensions = dialect.EXTENSION_FIELDS.get(message_id, 0)
+        base = message.ordered_fieldnames[: len(message.ordered_fieldnames) - extensions]
+        crc = fastcrc.crc16.mcrf4xx(f"{message.msgname} ".encode())
+        for name in base:
+            kind = message.fieldtypes[message.fieldnames.index(name)]
+            crc = fastcrc.crc16.mcrf4xx(f"{kind} {name} ".encode(), crc)
+            length = message.array_lengths[message.ordered_fieldnames.index(name)]
+            if length:
+                crc = fastcrc.crc16.mcrf4xx(bytes([length]), crc)
+        assert (crc & 0xFF) ^ (crc >> 8) == message.crc_extra, message.msgname
 
 
 def test_trailing_zeros_are_left_out_but_never_the_first_byte():

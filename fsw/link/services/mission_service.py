@@ -42,6 +42,8 @@ CANCELLED: Final = 15
 
 ASK_AGAIN_US: Final = 250_000
 TRIES: Final = 20  # of asking for one item, which makes 5 s
+REACHED_REPEATS: Final = 10  # of MISSION_ITEM_REACHED, as PX4 has them
+_REPEAT_US: Final = 1_000_000
 SILENCE_US: Final = 5_000_000  # ends a download that is not asked on
 _WARNING, _NOTICE = 4, 5  # MAV_SEVERITY
 
@@ -79,6 +81,8 @@ class MissionService:
         self._done: tuple[Peer, Kind, int] | None = None  # last upload: sender, kind, last item
         self._shown = store.progress
         self._show_again = False
+        self._repeats = 0  # of MISSION_ITEM_REACHED that are still to be sent
+        self._repeat_us = 0
         self._text_id = 0
         self._handlers: dict[int, Callable[[Numbers, Peer, int], Sequence[Outgoing]]] = {
             ids.MISSION_COUNT: self._count,
@@ -108,7 +112,9 @@ class MissionService:
         """Ask again for what did not come, and tell how far the mission is."""
         told: list[Outgoing] = []
         if self._store.progress is not self._shown or self._show_again:
-            told += self._show_progress()
+            told += self._show_progress(t_us)
+        elif self._repeats and t_us >= self._repeat_us:
+            told.append(self._reached(t_us))
         upload = self._upload
         if upload is not None and t_us - upload.asked_us >= ASK_AGAIN_US:
             if upload.tries < TRIES:
@@ -120,13 +126,23 @@ class MissionService:
                 told += self._say(silence)
         return told
 
-    def _show_progress(self) -> list[Outgoing]:
+    def _show_progress(self, t_us: int) -> list[Outgoing]:
         before, now = self._shown, self._store.progress
         self._shown, self._show_again = now, False
-        told = [Outgoing(ids.MISSION_CURRENT, current_values(now, self._store.in_mission))]
+        values = current_values(now, self._store.in_mission, self._store.ids)
+        told = [Outgoing(ids.MISSION_CURRENT, values)]
         if now.reached_count > before.reached_count:
-            told.append(Outgoing(ids.MISSION_ITEM_REACHED, (now.reached,)))
+            self._repeats = 1 + REACHED_REPEATS
+            told.append(self._reached(t_us))
+        elif now.reached < 0:
+            self._repeats = 0  # begun again, or another mission
         return told
+
+    def _reached(self, t_us: int) -> Outgoing:
+        """The item that was reached last, said again for a while: it has no acknowledgement."""
+        self._repeats -= 1
+        self._repeat_us = t_us + _REPEAT_US
+        return Outgoing(ids.MISSION_ITEM_REACHED, (self._shown.reached,))
 
     # ------------------------------------------------------------ upload
 
@@ -180,7 +196,8 @@ class MissionService:
     def _stray(self, seq: int, number: int, peer: Peer) -> Sequence[Outgoing]:
         """An item of no upload; after one that ended, its acknowledgement may have been lost."""
         if self._done is not None and self._done[:2] == (peer, number):
-            return (encode_ack(ACCEPTED, number, peer),) if seq == self._done[2] else ()
+            again = encode_ack(ACCEPTED, number, peer, self._store.identity(self._done[1]))
+            return (again,) if seq == self._done[2] else ()
         if self._upload is not None and self._upload.peer == peer:
             return ()
         return (encode_ack(DENIED if self._upload else ERROR, number, peer),)
@@ -198,7 +215,10 @@ class MissionService:
         self._upload = None
         self._done = (peer, kind, upload.count - 1)
         text = f"{kind.name.lower()} of {upload.count} items received"
-        return (encode_ack(ACCEPTED, kind, peer), *self._say(text, _NOTICE))
+        return (
+            encode_ack(ACCEPTED, kind, peer, self._store.identity(kind)),
+            *self._say(text, _NOTICE),
+        )
 
     # ------------------------------------------------------------ download
 
@@ -211,7 +231,7 @@ class MissionService:
         self._upload = None
         items = self._store.items(kind)
         self._download = _Download(peer, kind, items, t_us) if items else None
-        return (encode_count(len(items), kind, peer),)
+        return (encode_count(len(items), kind, peer, self._store.identity(kind)),)
 
     def _request(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[Outgoing]:
         return self._send_item(values, peer, t_us, as_int=False)

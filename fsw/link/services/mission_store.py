@@ -6,11 +6,14 @@ means. It lives as long as the process (docs/decisions/0013-missions-stop-and-fe
 
 from __future__ import annotations
 
+import struct
+import zlib
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import Final
 
+from fsw.link.wire.telemetry_context import PlanIds
 from fsw.signals import (
     FlightSnapshot,
     MissionProgress,
@@ -38,6 +41,21 @@ class Kind(IntEnum):
     RALLY = 2
 
 
+def _identity(items: tuple[MissionItem, ...]) -> int:
+    """A number that another list has not: a checksum of all that was uploaded, as PX4 has it.
+
+    0 means that nothing is there, so no list has it.
+    """
+    if not items:
+        return 0
+    packed = (
+        _ITEM.pack(one.command, one.frame, one.autocontinue, *one.params, one.x, one.y, one.z)
+        for one in items
+    )
+    return zlib.crc32(b"".join(packed)) or 1
+
+
+_ITEM: Final = struct.Struct("<HBB4fiif")
 ALL_KINDS: Final = 255  # MAV_MISSION_TYPE_ALL
 ROOM: Final = {Kind.MISSION: 500, Kind.FENCE: 64, Kind.RALLY: 16}
 
@@ -57,6 +75,7 @@ class MissionStore:
     def __init__(self, site: Site) -> None:
         self.progress = MissionProgress()
         self.in_mission = False
+        self.ids = PlanIds()
         self._site = site
         self._items: dict[Kind, tuple[MissionItem, ...]] = dict.fromkeys(Kind, ())
         self._update: MissionUpdate | None = None
@@ -96,7 +115,12 @@ class MissionStore:
                 return fence
             self._change(MissionUpdate(fence=fence))
         self._items[kind] = items
+        setattr(self.ids, kind.name.lower(), _identity(items))
         return None
+
+    def identity(self, kind: Kind) -> int:
+        """The opaque id of a list as it is now, 0 where it is empty."""
+        return int(getattr(self.ids, kind.name.lower()))
 
     def set_current(self, number: int) -> bool:
         """Make a step the current one; False where there is no such step."""

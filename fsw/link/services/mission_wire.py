@@ -8,7 +8,7 @@ from typing import Final, cast
 from fsw.link.wire import message_ids as ids
 from fsw.link.wire.decode import Numbers
 from fsw.link.wire.outgoing import Outgoing, WireValues
-from fsw.link.wire.telemetry_context import TelemetryContext
+from fsw.link.wire.telemetry_context import PlanIds, TelemetryContext
 from fsw.signals import FlightSnapshot, MissionProgress, MissionState, Mode, Vec4
 from fsw.vehicle.mission_items import (
     INVALID_PARAM1,
@@ -21,6 +21,8 @@ from fsw.vehicle.mission_items import (
 Peer = tuple[int, int]
 """System and component of whoever speaks."""
 
+_NO_MISSION: Final = 0xFFFF  # in place of a total; 0 would mean that totals are not told
+_ACTIVE, _SUSPENDED = 1, 2  # mission_mode
 _FRAME_MISSION: Final = 2  # MAV_FRAME of a command without a place
 
 
@@ -64,9 +66,9 @@ def encode_item(item: MissionItem, seq: int, kind: int, peer: Peer, as_int: bool
     return Outgoing(message_id, (*item.params, x, y, item.z, *tail))
 
 
-def encode_count(count: int, kind: int, peer: Peer) -> Outgoing:
+def encode_count(count: int, kind: int, peer: Peer, opaque_id: int) -> Outgoing:
     """MISSION_COUNT."""
-    return Outgoing(ids.MISSION_COUNT, (count, *peer, kind))
+    return Outgoing(ids.MISSION_COUNT, (count, *peer, kind, opaque_id))
 
 
 def encode_request(seq: int, kind: int, peer: Peer) -> Outgoing:
@@ -74,21 +76,23 @@ def encode_request(seq: int, kind: int, peer: Peer) -> Outgoing:
     return Outgoing(ids.MISSION_REQUEST_INT, (seq, *peer, kind))
 
 
-def encode_ack(result: int, kind: int, peer: Peer) -> Outgoing:
-    """MISSION_ACK."""
-    return Outgoing(ids.MISSION_ACK, (*peer, result, kind))
+def encode_ack(result: int, kind: int, peer: Peer, opaque_id: int = 0) -> Outgoing:
+    """MISSION_ACK; the id is that of the list which an upload has put on the vehicle."""
+    return Outgoing(ids.MISSION_ACK, (*peer, result, kind, opaque_id))
 
 
-def mission_current(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues:
+def mission_current(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues:
     """MISSION_CURRENT of a snapshot."""
-    return current_values(snapshot.mission, snapshot.mode is Mode.MISSION)
+    return current_values(snapshot.mission, snapshot.mode is Mode.MISSION, context.plan_ids)
 
 
-def current_values(progress: MissionProgress, in_mission: bool) -> WireValues:
+def current_values(progress: MissionProgress, in_mission: bool, plans: PlanIds) -> WireValues:
     """MISSION_CURRENT."""
+    which = (plans.mission, plans.fence, plans.rally)
     if progress.state is MissionState.NO_MISSION:
-        return (0, 0, int(progress.state), 0)
-    return (progress.current, progress.total, int(progress.state), 1 if in_mission else 2)
+        return (0, _NO_MISSION, int(progress.state), _SUSPENDED, *which)
+    mode = _ACTIVE if in_mission else _SUSPENDED
+    return (progress.current, progress.total, int(progress.state), mode, *which)
 
 
 def _scale(frame: int) -> float:

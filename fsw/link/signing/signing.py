@@ -17,7 +17,7 @@ from typing import Final
 
 from fsw.link.signing.key_file import KeyFile, SigningKey
 from fsw.link.wire.message_ids import HEARTBEAT, RADIO_STATUS
-from messages.frames import Frame, announcing_signature, is_signed
+from messages.frames import Frame, announcing_signature, is_signed, is_version_1
 
 _HASH_SIZE: Final = 6  # bytes, the first of SHA-256
 _SIGNATURE_SIZE: Final = 13  # bytes: link, time (6), hash (6)
@@ -25,7 +25,8 @@ _EPOCH_UNIX_S: Final = 1_420_070_400  # 2015-01-01 UTC, where signing time begin
 _UNIT_US: Final = 10  # of signing time
 _TOLERANCE: Final = 6_000_000  # one minute, in units
 _MAX_SENDERS: Final = 64  # that are remembered; only who holds the key can add one
-# A radio that puts its own status on the link has no key, and presence asks for nothing.
+# A radio that puts its own status on the link has no key, and presence asks for nothing. MAVLink 1
+# cannot be signed, so nothing of it passes.
 _EXEMPT: Final = frozenset({HEARTBEAT, RADIO_STATUS})
 
 
@@ -93,7 +94,7 @@ class Signing:
         if not self._key:
             return Verdict.TRUSTED
         if not is_signed(raw):
-            if frame.message_id in _EXEMPT:
+            if frame.message_id in _EXEMPT and not is_version_1(raw):
                 return Verdict.EXEMPT
             self.counters.unsigned += 1
             return Verdict.REFUSED

@@ -51,6 +51,15 @@ class LoopHealth:
     housekeeping: GroupTiming = field(default_factory=lambda: GroupTiming(period_us=1_000_000))
 
 
+@dataclass(slots=True)
+class PlanIds:
+    """What tells the uploaded lists from other ones, 0 for an empty one; the mission store's."""
+
+    mission: int = 0
+    fence: int = 0
+    rally: int = 0
+
+
 @dataclass(frozen=True, slots=True)
 class TelemetryContext:
     """Second argument of every encoder."""
@@ -60,3 +69,4 @@ class TelemetryContext:
     autopilot: int = PX4
     origin: Origin = DEFAULT_ORIGIN
     start_unix_us: int = 0  # wall time at sensor time 0 [us since 1970]
+    plan_ids: PlanIds = field(default_factory=PlanIds)

@@ -5,7 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from fsw.link.wire.telemetry_context import GroupTiming, LoopHealth, TelemetryContext, VehicleFacts
+from fsw.link.wire.telemetry_context import (
+    GroupTiming,
+    LoopHealth,
+    PlanIds,
+    TelemetryContext,
+    VehicleFacts,
+)
 from fsw.signals import (
     ActuatorCommand,
     BatteryState,
@@ -45,6 +51,7 @@ CONTEXT = TelemetryContext(
         mpc=GroupTiming(100_000, 100, 0, 0, 900.0, 1500.0, 2100.0, 0.0, 0.0, 0.0, 0.01),
     ),
     start_unix_us=1_750_000_000_000_000,
+    plan_ids=PlanIds(0xDEADBEEF, 7, 9),
 )
 
 # Yaw of 90 degrees: body x points east.

@@ -23,6 +23,7 @@ from fsw.parameters.flight_config import FlightConfig
 from fsw.parameters.store import ParameterStore
 from fsw.signals import SafeSet, Vec3
 from messages import dialect
+from messages.frames import as_version_1
 from pandion.message_page import heard
 from tests.fsw.link.ground import Ground, ground_station
 
@@ -56,7 +57,8 @@ def frame(message_id: int, chance: random.Random, sequence: int) -> bytes:
     )
     body = header + message_id.to_bytes(3, "little") + shown
     checksum = fastcrc.crc16.mcrf4xx(body + bytes([message.crc_extra]))
-    return b"\xfd" + body + checksum.to_bytes(2, "little")
+    whole = b"\xfd" + body + checksum.to_bytes(2, "little")
+    return (as_version_1(whole) if chance.random() < 0.3 else None) or whole
 
 
 def _codes(message: object) -> list[str]:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import random
+import socket
 import sys
 from collections import Counter
 from collections.abc import Iterator
@@ -12,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from pymavlink.dialects.v10 import common as old_protocol
 
 from fsw.link import link_report
 from fsw.link.files.flight_logs import flight_logs
@@ -21,7 +24,7 @@ from fsw.link.telemetry.streams import AT_ONCE, STREAMS
 from fsw.link.wire import message_ids as ids
 from fsw.link.wire.outgoing import Outgoing
 from fsw.signals import BatteryState, CommandAck, Mode, StatusText
-from messages.frames import Frame, FrameWriter, split
+from messages.frames import Frame, FrameWriter, as_version_1, split
 from tests.fsw.link.ground import Ground, ground_station, station_socket
 from tests.fsw.link.snapshots import SNAPSHOT, outputs_at
 
@@ -125,6 +128,60 @@ def test_a_valid_frame_makes_its_sender_a_peer(ground: Ground) -> None:
     assert ground.fly(5)
     assert other.recv(2048)
     other.close()
+
+
+def test_a_peer_is_answered_in_the_version_it_speaks(ground: Ground) -> None:
+    """QGroundControl falls back to MAVLink 1 and reads both; an old program reads only that."""
+    old, new = station_socket(), station_socket()
+    heartbeat = old_protocol.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)
+    ground.polled(bytes(heartbeat.pack(old_protocol.MAVLink(None, 255, 190))), old)
+    ground.polled(FrameWriter(254, 190).frame(ids.HEARTBEAT, *HEARTBEAT), new)
+    ground.fly(1000)
+    both = [b"".join(_received(one)) for one in (old, new)]
+    assert [{magic for magic, _ in _frames(data)} for data in both] == [{0xFE}, {0xFD}]
+    reader = old_protocol.MAVLink(None)
+    told = {message.get_type() for message in reader.parse_buffer(both[0])}
+    assert {"HEARTBEAT", "ATTITUDE", "MISSION_CURRENT", "BATTERY_STATUS"} <= told
+    assert "BAD_DATA" not in told
+    by_id = {id_ for _, id_ in _frames(both[1])}
+    assert {id_ for _, id_ in _frames(both[0])} == {id_ for id_ in by_id if id_ < 256}
+
+
+def test_a_peer_that_returns_to_version_2_is_answered_in_it(ground: Ground) -> None:
+    writer = FrameWriter(255, 190)
+    for frame, magic in (
+        (writer.frame(ids.HEARTBEAT, *HEARTBEAT), 0xFD),
+        (as_version_1(writer.frame(ids.HEARTBEAT, *HEARTBEAT)), 0xFE),
+        (writer.frame(ids.HEARTBEAT, *HEARTBEAT), 0xFD),
+    ):
+        assert frame is not None
+        ground.heard()
+        ground.polled(frame)
+        for _ in range(50):
+            ground.t_us += 2_000
+            ground.links.publish(outputs_at(ground.t_us))
+        assert {found for found, _ in _frames(b"".join(ground.datagrams()))} == {magic}
+
+
+def _received(station: socket.socket) -> list[bytes]:
+    found = []
+    with contextlib.suppress(BlockingIOError):
+        while True:
+            found.append(station.recv(2048))
+    return found
+
+
+def _frames(data: bytes) -> list[tuple[int, int]]:
+    """Start marker and message id of each frame."""
+    found, at = [], 0
+    while at < len(data):
+        if data[at] == 0xFE:
+            found.append((0xFE, data[at + 5]))
+            at += 8 + data[at + 1]
+        else:
+            found.append((data[at], int.from_bytes(data[at + 7 : at + 10], "little")))
+            at += 12 + data[at + 1]
+    return found
 
 
 def test_peers_are_bounded_and_the_configured_one_stays(ground: Ground) -> None:

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import os
 import random
 import socket
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-os.environ["MAVLINK20"] = "1"
-from pymavlink.dialects.v20 import common as mavlink
-
 from fsw.link.gcs_link import GcsLink
+from messages import dialect as mavlink
 
 TICK_US = 2_000
 Item = dict[str, Any]

@@ -396,3 +396,44 @@ def test_progress_is_told_as_it_happens(vehicle: Vehicle) -> None:
         (1, 6, 3, 1),
         (2, 6, 3, 1),
     ]
+
+
+def test_a_plan_has_an_id_that_the_upload_the_download_and_telemetry_agree_on(
+    vehicle: Vehicle,
+) -> None:
+    """A ground station that knows the id need not download the plan again."""
+    client, mav = vehicle.client(), vehicle.client().mav
+
+    def id_of(items: list[Item], kind: int) -> int:
+        assert client.upload(items, kind) == ACCEPTED
+        ack = [m for m in client.heard if m.get_type() == "MISSION_ACK"][-1]
+        count = client.ask(mav.mission_request_list_encode(1, 1, kind), "MISSION_COUNT")
+        client.send(mav.mission_ack_encode(1, 1, 0, kind))
+        assert count.opaque_id == ack.opaque_id
+        return int(ack.opaque_id)
+
+    mission, fence = id_of(WAYPOINTS, MISSION), id_of(TRIANGLE, FENCE)
+    assert 0 not in (mission, fence)
+    vehicle.store.set_current(1)
+    client.send(mav.mission_set_current_encode(1, 1, 1))
+    current = client.pump(0.1, lambda m: m.get_type() == "MISSION_CURRENT")
+    assert (current.mission_id, current.fence_id, current.rally_points_id) == (mission, fence, 0)
+    moved = [{**WAYPOINTS[0], "z": 1.6}, *WAYPOINTS[1:]]
+    assert id_of(moved, MISSION) != mission
+    assert id_of(WAYPOINTS, MISSION) == mission
+    assert id_of([], MISSION) == 0
+
+
+def test_an_item_that_was_reached_is_told_ten_times_more_a_second_apart(vehicle: Vehicle) -> None:
+    """There is no acknowledgement, and a datagram may be lost; PX4 does the same."""
+    client = vehicle.client()
+    progress = MissionProgress(MissionState.ACTIVE, 3, 6, 2, 3)
+    vehicle.store.observe(replace(SNAPSHOT, mode=Mode.MISSION, mission=progress))
+    client.pump(15.0)
+    assert [m.seq for m in client.heard if m.get_type() == "MISSION_ITEM_REACHED"] == [2] * 11
+    client.heard.clear()
+    vehicle.store.observe(
+        replace(SNAPSHOT, mission=replace(progress, current=4, reached=3, reached_count=4))
+    )
+    client.pump(2.5)
+    assert [m.seq for m in client.heard if m.get_type() == "MISSION_ITEM_REACHED"] == [3] * 3

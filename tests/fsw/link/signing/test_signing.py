@@ -13,8 +13,9 @@ from fsw.link.signing.key_file import KeyFile
 from fsw.link.udp_endpoint import LinkError
 from fsw.link.wire import message_ids as ids
 from messages import dialect
-from messages.frames import FrameWriter, is_signed
+from messages.frames import FrameWriter, as_version_1, is_signed
 from tests.fsw.link.ground import Ground, ground_station, station_socket
+from tests.fsw.link.snapshots import outputs_at
 
 KEY = bytes(range(1, 33))
 OTHER_KEY = bytes(range(2, 34))
@@ -288,3 +289,24 @@ def test_what_is_written_is_replaced_whole(file: Path) -> None:
     keys.write(SigningKey(OTHER_KEY, 6))
     assert file.stat().st_ino != inode
     assert keys.read() == SigningKey(OTHER_KEY, 6)
+
+
+@pytest.mark.parametrize(
+    ("message_id", "values"), [(ids.COMMAND_LONG, ARM), (ids.HEARTBEAT, (0, 6, 8, 0, 4, 3))]
+)
+def test_a_signed_link_takes_nothing_of_mavlink_1_and_sends_none(
+    ground: Ground, message_id: int, values: tuple[float, ...]
+) -> None:
+    """It cannot be signed; not even a heartbeat, which passes unsigned in MAVLink 2."""
+    old = as_version_1(unsigned(message_id, *values))
+    assert old is not None
+    before = ground.link.accepted
+    ground.polled(old)
+    assert ground.link.accepted == before
+    assert ground.link.signing.counters.unsigned == 1
+    assert ground.link.peers == (ground.station.getsockname(),)
+    ground.datagrams()
+    for _ in range(100):
+        ground.t_us += 2_000
+        ground.links.publish(outputs_at(ground.t_us))
+    assert all(datagram[0] == 0xFD for datagram in ground.datagrams())

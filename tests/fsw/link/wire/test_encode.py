@@ -72,7 +72,10 @@ TELLING: dict[int, dict[str, Any]] = {
     },
     ids.ESTIMATOR_STATUS: {"time_usec": 3_004_000, "flags": 63},
     ids.SYSTEM_TIME: {"time_boot_ms": 3004, "time_unix_usec": 1_750_000_003_004_000},
-    ids.MISSION_CURRENT: {"seq": 2, "total": 5, "mission_state": 4, "mission_mode": 2},
+    ids.MISSION_CURRENT: {
+        "seq": 2, "total": 5, "mission_state": 4, "mission_mode": 2,
+        "mission_id": 0xDEADBEEF, "fence_id": 7, "rally_points_id": 9,
+    },
     ids.CURRENT_MODE: {"custom_mode": 0x0B040000, "standard_mode": 0},
     ids.ODOMETRY: {"x": 1.0, "vx": 0.2, "vy": -0.1, "vz": 0.3, "rollspeed": 0.4, "frame_id": 1},
     ids.GPS_GLOBAL_ORIGIN: {"latitude": 473977420, "longitude": 85455940, "altitude": 0},
