@@ -33,6 +33,7 @@ class Mode(Enum):
     RETURN = "return"
     LAND = "land"
     OFFBOARD = "offboard"
+    ORBIT = "orbit"
     TRAJECTORY = "trajectory"
     FAULT = "fault"
 
@@ -154,6 +155,25 @@ class Home:
     yaw: float  # rad
 
 
+class Facing(IntEnum):
+    """Where the nose points on an orbit; values equal ORBIT_YAW_BEHAVIOUR of MAVLink."""
+
+    CENTRE = 0
+    INITIAL = 1  # as it was when the orbit began
+    TANGENT = 3  # along the flight
+
+
+@dataclass(frozen=True, slots=True)
+class Orbit:
+    """A level circle that the body flies."""
+
+    centre: Vec3  # m, NED; z is the height that is flown
+    radius: float  # m
+    speed: float  # m/s along the circle
+    clockwise: bool = True  # seen from above
+    facing: Facing = Facing.CENTRE
+
+
 @dataclass(frozen=True, slots=True)
 class Wall:
     """A plane ``normal . p = offset``; free space is where ``normal . p > offset``."""
@@ -169,6 +189,7 @@ class PointObstacle:
 
     position: Vec3  # m, world
     clearance: float  # m, d_s
+    upright: bool = False  # an upright cylinder of that radius: the height does not count
 
 
 @dataclass(frozen=True, slots=True)
@@ -212,6 +233,7 @@ class MissionAction(Enum):
     SPEED = "speed"  # of the legs that follow
     LAND = "land"
     RETURN = "return"
+    LOOK_AT = "look at"  # from now on: a place, or nothing
 
 
 @dataclass(frozen=True, slots=True)
@@ -403,6 +425,15 @@ class ConstraintReport:
     barrier: tuple[float, ...] = ()  # h, m/s, same order
 
 
+class Charge(IntEnum):
+    """How much is left, by the thresholds of the parameters."""
+
+    OK = 0
+    LOW = 1
+    CRITICAL = 2
+    EMERGENCY = 3
+
+
 @dataclass(frozen=True, slots=True)
 class BatteryState:
     """What a model of the battery says, for there is no sensor."""
@@ -411,6 +442,7 @@ class BatteryState:
     current: float = 0.0  # A
     consumed: float = 0.0  # A h
     remaining: float = 1.0  # share of the capacity
+    charge: Charge = Charge.OK
 
 
 @dataclass(frozen=True, slots=True)
@@ -450,6 +482,9 @@ class FlightSnapshot:
     offboard: OffboardReport = OffboardReport()
     standby: Mode = Mode.HOLD  # what arming would lead to
     mission: MissionProgress = MissionProgress()
+    failsafe_from: Mode | None = None  # what was flown when a failsafe took over; None: none did
+    orbit: Orbit | None = None  # that is being flown
+    accel_B: Vec3 = (0.0, 0.0, -9.81)  # m/s^2, specific force as measured
 
 
 @dataclass(frozen=True, slots=True)

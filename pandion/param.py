@@ -226,9 +226,13 @@ def _show(values: Mapping[str, float], *, as_json: bool) -> None:
 
 
 def _described(name: str, value: float) -> dict[str, Any]:
+    from fsw.parameters.facts import FACT_BY_NAME, GROUP
     from fsw.parameters.registry import BY_NAME
 
-    parameter = BY_NAME.get(name)
+    parameter, fact = BY_NAME.get(name), FACT_BY_NAME.get(name)
+    if fact is not None:
+        told = {"unit": fact.unit, "group": GROUP, "meaning": f"{fact.meaning} (read only)"}
+        return {"name": name, "value": value, **told}
     if parameter is None:  # of a vehicle with another version
         return {"name": name, "value": value}
     return {

@@ -14,6 +14,7 @@ from messages.frames import Frame, FrameWriter, split
 
 _SYSTEM, _COMPONENT = 254, 190  # nobody's ground station
 _VEHICLE: Final = (1, 1)
+_NO_INDEX: Final = 0xFFFF
 _HEARTBEAT, _STATUSTEXT = 0, 253
 _READ, _LIST, _VALUE, _SET, _ERROR = 20, 21, 22, 23, 345
 _GCS, _NO_AUTOPILOT, _ACTIVE, _VERSION = 6, 8, 4, 3
@@ -71,6 +72,8 @@ class ParameterClient:
                 value, count, index, name, _ = cast(
                     "tuple[float, int, int, bytes, int]", frame.payload_values
                 )
+                if index == _NO_INDEX:
+                    continue  # a checksum of them all, which PX4 and Pandion send first
                 values[index] = (_text(name), nearest_decimal(value))
                 patience_s = _QUIET_S
             if len(values) == count:

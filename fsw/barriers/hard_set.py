@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from fsw.barriers.point_obstacle import vertical_shares
 from fsw.barriers.soft_rows import SoftRows, TargetPoints
 from fsw.model.linearisation import BASE, POINTS, Linearisation
 from fsw.model.prediction import INPUTS, Array
@@ -61,6 +62,7 @@ class HardObstacles:
     ) -> None:
         self._centres = np.array([obstacle.position for obstacle in obstacles])
         self._clearances = np.array([obstacle.clearance for obstacle in obstacles])
+        self._verticals = vertical_shares(obstacles)[:, None]
         self._first = first_node
         count, nodes = len(obstacles), np.arange(first_node, horizon + 1)
         node, number, _ = np.meshgrid(nodes, np.arange(count), np.arange(POINTS), indexing="ij")
@@ -72,6 +74,7 @@ class HardObstacles:
     def refill(self, horizon: Linearisation, targets: TargetPoints) -> None:
         """Linearise the distances along the rays of the guess."""
         away = horizon.position[:, None] - self._centres[:, None]
+        away[..., 2] *= self._verticals
         length = np.sqrt(np.einsum("ikpa,ikpa->ikp", away, away))
         rays = away / np.maximum(length, _CENTRE_BALL)[..., None]
         distance = length - self._clearances[:, None]

@@ -27,6 +27,11 @@ from fsw.model.prediction import INPUTS, Array
 from fsw.signals import PointObstacle
 
 
+def vertical_shares(obstacles: tuple[PointObstacle, ...]) -> Array:
+    """(obstacles,), 0 for an upright one, whose distance is level, and 1 for a point."""
+    return np.array([0.0 if obstacle.upright else 1.0 for obstacle in obstacles])
+
+
 class PointObstacleBarrier:
     """Rows for obstacles x critical points x nodes, one slack a node and obstacle."""
 
@@ -36,6 +41,7 @@ class PointObstacleBarrier:
         self._tuning = tuning.numbers
         self._centres = np.array([obstacle.position for obstacle in obstacles]).reshape(-1, 3)
         self._clearances = np.array([obstacle.clearance for obstacle in obstacles])
+        self._verticals = vertical_shares(obstacles)
         count = len(obstacles)
         nodes = np.arange(1 + tuning.skipped_nodes, horizon + 1)
         node, number, _ = np.meshgrid(nodes, np.arange(count), np.arange(POINTS), indexing="ij")
@@ -49,6 +55,7 @@ class PointObstacleBarrier:
         _fill(
             self._centres,
             self._clearances,
+            self._verticals,
             horizon.position,
             horizon.velocity,
             horizon.d_position,
@@ -69,6 +76,7 @@ class PointObstacleBarrier:
 def _fill(
     centres: Array,
     clearances: Array,
+    verticals: Array,
     position: Array,
     velocity: Array,
     d_position: Array,
@@ -87,7 +95,7 @@ def _fill(
         for number in range(centres.shape[0]):
             centre, clearance = centres[number], clearances[number]
             for point in range(POINTS):
-                _ray(centre, position[i, point], n)
+                _ray(centre, verticals[number], position[i, point], n)
                 h, distance = _h_along(
                     n, centre, clearance, position[i, point], velocity[i, point], tuning
                 )
@@ -106,9 +114,9 @@ def _fill(
 
 
 @compiled
-def _ray(centre: Array, p: Array, n: Array) -> None:
-    """Unit vector from the obstacle to a point, into ``n``."""
-    x, y, z = p[0] - centre[0], p[1] - centre[1], p[2] - centre[2]
+def _ray(centre: Array, vertical: float, p: Array, n: Array) -> None:
+    """Unit vector from the obstacle to a point, into ``n``; level where the obstacle is upright."""
+    x, y, z = p[0] - centre[0], p[1] - centre[1], vertical * (p[2] - centre[2])
     length = math.sqrt(x * x + y * y + z * z)
     n[0], n[1], n[2] = 1.0, 0.0, 0.0
     if length > CENTRE_BALL:

@@ -1,5 +1,6 @@
 """A point obstacle as a wall: the tangent plane of its clearance ball, from where one looks.
 
+An upright obstacle has a cylinder in place of the ball, whose tangent planes are upright.
 The half-space in front of that plane lies outside the ball. So whoever keeps off the plane, or
 stops in front of it, keeps off the obstacle, and what is right beside a wall is right here.
 
@@ -15,6 +16,11 @@ from fsw.signals import PointObstacle, SafeSet, Vec3, Wall
 CENTRE_BALL = 0.002  # m; closer to the obstacle its direction is noise and any does
 
 
+def distance_to(obstacle: PointObstacle, p: Vec3) -> float:
+    """From an obstacle to a point [m]: level where the obstacle is upright."""
+    return math.sqrt(sum(c * c for c in _away(obstacle, p)))
+
+
 def tangent(obstacle: PointObstacle, p: Vec3) -> Wall:
     """The wall that an obstacle is to a point: normal along the ray from the obstacle.
 
@@ -23,10 +29,15 @@ def tangent(obstacle: PointObstacle, p: Vec3) -> Wall:
         p: The point [m].
     """
     o = obstacle.position
-    x, y, z = p[0] - o[0], p[1] - o[1], p[2] - o[2]
+    x, y, z = _away(obstacle, p)
     length = math.sqrt(x * x + y * y + z * z)
     n = (x / length, y / length, z / length) if length > CENTRE_BALL else (1.0, 0.0, 0.0)
     return Wall(n, n[0] * o[0] + n[1] * o[1] + n[2] * o[2], obstacle.clearance)
+
+
+def _away(obstacle: PointObstacle, p: Vec3) -> Vec3:
+    o = obstacle.position
+    return p[0] - o[0], p[1] - o[1], 0.0 if obstacle.upright else p[2] - o[2]
 
 
 def planes(safe_set: SafeSet, p: Vec3) -> tuple[Wall, ...]:

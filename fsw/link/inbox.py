@@ -58,6 +58,7 @@ class Inbox:
         self._handlers: dict[int, Callable[[Frame], None]] = {
             message_ids.COMMAND_LONG: self._command_long,
             message_ids.COMMAND_INT: self._command_int,
+            message_ids.SET_MODE: self._set_mode,
             message_ids.END_EFFECTOR_TARGET: self._target,
             message_ids.SET_POSITION_TARGET_LOCAL_NED: self._body,
             message_ids.SET_ATTITUDE_TARGET: self._attitude,
@@ -115,6 +116,9 @@ class Inbox:
 
     def _command_int(self, frame: Frame) -> None:
         self._add_command(decode.command_int(frame))
+
+    def _set_mode(self, frame: Frame) -> None:
+        self._add_command(decode.set_mode(frame))
 
     def _add_command(self, request: CommandRequest | None) -> None:
         if request is None:

@@ -44,6 +44,7 @@ NAV_STATES: Final[dict[str, int]] = {
     "takeoff": 17,
     "hold": _LOITER,
     "trajectory": 14,  # offboard
+    "orbit": 21,
     "offboard": 14,
     "mission": 3,
     "return": 5,

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fsw.barriers.point_obstacle import vertical_shares
 from fsw.barriers.soft_rows import TargetPoints
 from fsw.barriers.tangent import CENTRE_BALL
 from fsw.compiled import compiled
@@ -72,6 +73,7 @@ class SoftObstacleCost:
     def __init__(self, obstacles: tuple[PointObstacle, ...], weights: SoftWeights) -> None:
         self._centres = np.array([obstacle.position for obstacle in obstacles])
         self._clearances = np.array([obstacle.clearance for obstacle in obstacles])
+        self._verticals = vertical_shares(obstacles)
         self._weights = (weights.wall, weights.wall_terminal)
 
     def add(
@@ -86,6 +88,7 @@ class SoftObstacleCost:
         return _add_obstacles(
             self._centres,
             self._clearances,
+            self._verticals,
             *self._weights,
             horizon.position,
             horizon.d_position,
@@ -172,6 +175,7 @@ def _add_walls(
 def _add_obstacles(
     centres: Array,
     clearances: Array,
+    verticals: Array,
     weight: float,
     terminal: float,
     position: Array,
@@ -187,7 +191,7 @@ def _add_obstacles(
         for number in range(centres.shape[0]):
             for point in range(POINTS):
                 away, dp = position[i, point] - centres[number], d_position[i, point]
-                x, y, z = away
+                x, y, z = away[0], away[1], verticals[number] * away[2]
                 length = math.sqrt(x * x + y * y + z * z)
                 scale = 1.0 / max(length, CENTRE_BALL)
                 for k in range(INPUTS * i):

@@ -24,7 +24,8 @@ class FlightLimits:
     """How the vehicle climbs, descends and decides that it stands."""
 
     takeoff_climb: float = 1.0  # m, where the command names no height
-    takeoff_climb_most: float = 10.0  # m
+    takeoff_climb_most: float = 50.0  # m
+    takeoff_wait_us: int = 10_000_000  # a takeoff commanded before arming is forgotten after this
     climb_speed: float = 0.4  # m/s
     land_speed: float = 0.25  # m/s
     landed_height: float = 0.1  # m above standing; the origin's height is known no better
@@ -33,12 +34,20 @@ class FlightLimits:
     landed_time_us: int = 500_000  # at rest this long
     idle_thrust: float = 0.8  # N a rotor while armed on the ground
     return_height: float = 2.0  # m above home, on the way back
+    return_descent: float = 2.0  # m above home, where a return waits before it lands
+    return_wait: float = 0.0  # s, there; negative: it stays
     setpoint_timeout_us: int = 500_000  # without a set-point offboard ends
+    setpoint_loss_action: int = 5  # what then: 3 return, 4 land, 5 hold
     mission_speed: float = 0.3  # m/s, where the mission names none
     mission_turn_rate: float = 0.3  # rad/s
     mission_turn_acceleration: float = 0.05  # rad/s^2; the plan's limit is 0.1
     fence_clearance: float = 0.1  # m, kept from the walls of an uploaded fence
-    station_timeout_us: int = 10_000_000  # without a ground station the vehicle comes home
+    station_timeout_us: int = 10_000_000  # without a ground station its loss is acted upon
+    station_loss_action: int = 2  # how: 0 not at all, 1 hold, 2 return, 3 land
+    battery_low: float = 0.2  # share of the capacity
+    battery_critical: float = 0.1
+    battery_emergency: float = 0.05
+    low_battery_action: int = 0  # 0 warn; 2 land when critical; 3 return then, land in emergency
 
 
 @dataclass(frozen=True, slots=True)

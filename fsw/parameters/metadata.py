@@ -12,7 +12,8 @@ import json
 import zlib
 from typing import Any, Final
 
-from fsw.parameters.registry import PARAMETERS, Parameter
+from fsw.parameters.facts import FACTS, GROUP, Fact
+from fsw.parameters.registry import PARAMETERS, Choices, Parameter
 
 _VERSION: Final = 1
 _PARAMETER_TYPE: Final = 1  # COMP_METADATA_TYPE_PARAMETER
@@ -20,7 +21,9 @@ _PARAMETER_TYPE: Final = 1  # COMP_METADATA_TYPE_PARAMETER
 
 def parameter_document() -> bytes:
     """The document about all parameters, as JSON."""
-    return _encoded({"version": _VERSION, "parameters": [_described(p) for p in PARAMETERS]})
+    every = [*map(_described, PARAMETERS), *map(_told, FACTS)]
+    every.sort(key=lambda entry: str(entry["name"]))
+    return _encoded({"version": _VERSION, "parameters": every})
 
 
 def general_document(parameter_uri: str, firmware_version: str) -> bytes:
@@ -62,8 +65,33 @@ def _described(parameter: Parameter) -> dict[str, Any]:
         "default": parameter.default,
         "min": parameter.least,
         "max": parameter.most,
-        "decimalPlaces": 6,
+        **_form(parameter.choices, 6),
     }
+
+
+def _told(fact: Fact) -> dict[str, Any]:
+    if fact.repeats:
+        limits: dict[str, Any] = {}
+    else:
+        limits = {"default": fact.value, "min": fact.value, "max": fact.value}
+    return {
+        "name": fact.name,
+        "type": "Float",
+        "shortDesc": f"{fact.meaning} (read only)",
+        "group": GROUP,
+        "category": "Standard",
+        "units": fact.unit,
+        **limits,
+        **_form(fact.choices, 0 if fact.value.is_integer() and not fact.repeats else 3),
+    }
+
+
+def _form(choices: Choices, decimals: int) -> dict[str, Any]:
+    """How a value is shown and chosen."""
+    if not choices:
+        return {"decimalPlaces": decimals}
+    values = [{"value": number, "description": what} for number, what in choices]
+    return {"decimalPlaces": 0, "values": values}
 
 
 def _encoded(document: dict[str, Any]) -> bytes:

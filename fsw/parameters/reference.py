@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+from fsw.parameters.facts import FACTS, Fact
 from fsw.parameters.real32 import as_text
 from fsw.parameters.registry import GROUPS, NO_PARAMETERS, PARAMETERS, Parameter
 
@@ -32,6 +33,11 @@ holds all values that flew. Both formats are read everywhere: QGroundControl's `
 MAVProxy's `.parm`.
 """
 
+_READ_ONLY = """\
+PX4's ground stations ask for these and complain where they are missing. The values say what is true
+here; a change is refused ([why](decisions/0018-as-px4-answers.md)).
+"""
+
 
 def reference() -> str:
     """The page, in Markdown."""
@@ -39,12 +45,22 @@ def reference() -> str:
     for group in GROUPS:
         parts.append(f"## {group}\n")
         parts.append(_table([p for p in PARAMETERS if p.group == group]))
+    parts.append("## Read only\n")
+    parts.append(_READ_ONLY)
+    facts = ["| name | value | unit | meaning |", "|---|---|---|---|"]
+    facts += [f"| {' | '.join(_fact_cells(fact))} |" for fact in FACTS]
+    parts.append("\n".join(facts) + "\n")
     parts.append("## Numbers that are no parameters\n")
     parts.append("Of `FlightConfig` in `fsw/parameters/flight_config.py`, by their path there.\n")
     rows = ["| number | why not |", "|---|---|"]
     rows += [f"| `{path}` | {why} |" for path, why in NO_PARAMETERS.items()]
     parts.append("\n".join(rows) + "\n")
     return "\n".join(parts)
+
+
+def _fact_cells(fact: Fact) -> tuple[str, ...]:
+    value = f"as `{fact.repeats}`" if fact.repeats else as_text(fact.value)
+    return f"`{fact.name}`", value, fact.unit, fact.meaning
 
 
 def _table(parameters: list[Parameter]) -> str:
@@ -62,9 +78,14 @@ def _cells(parameter: Parameter) -> tuple[str, ...]:
         as_text(parameter.default),
         parameter.unit,
         f"{as_text(parameter.least)} … {as_text(parameter.most)}",
-        parameter.meaning,
+        _meaning(parameter),
         f"`{parameter.path}`",
     )
+
+
+def _meaning(parameter: Parameter) -> str:
+    choices = ", ".join(f"{number} {what.lower()}" for number, what in parameter.choices)
+    return f"{parameter.meaning}: {choices}" if choices else parameter.meaning
 
 
 if __name__ == "__main__":

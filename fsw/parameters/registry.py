@@ -23,6 +23,10 @@ _MICRO: Final = 1e-6
 _IN_MICROSECONDS: Final = 1e6
 
 
+Choices = tuple[tuple[int, str], ...]
+"""The values that something can have, with what each means."""
+
+
 @dataclass(frozen=True, slots=True)
 class Parameter:
     """One number a ground station may change in flight."""
@@ -35,6 +39,7 @@ class Parameter:
     meaning: str
     group: str
     scale: float  # the configuration's number is this times the parameter
+    choices: Choices = ()  # where only some values mean something
 
     @property
     def default(self) -> float:
@@ -47,6 +52,9 @@ class Parameter:
 
     def refusal(self, value: float) -> str | None:
         """Why it cannot have a value; None if the range allows it."""
+        if self.choices and value not in [number for number, _ in self.choices]:
+            known = ", ".join(f"{number} {what}" for number, what in self.choices)
+            return f"{self.name} is to be one of {known}; {value:g} is refused"
         if self.least <= value <= self.most:  # NaN is not
             return None
         return f"{self.name} is to be {self.least:g}..{self.most:g}, {value:g} is refused"
@@ -188,8 +196,10 @@ _ROWS: Final[dict[str, list[_Row]]] = {
     "Takeoff and landing": [
         ("MIS_TAKEOFF_ALT", "limits.takeoff_climb", "m", 0.3, 10.0,
          "climb of a takeoff that names no height"),
-        ("TKO_CLIMB_MAX", "limits.takeoff_climb_most", "m", 1.0, 100.0,
+        ("TKO_CLIMB_MAX", "limits.takeoff_climb_most", "m", 1.0, 150.0,
          "climb of a takeoff at most"),
+        ("TKO_WAIT_T", "limits.takeoff_wait_us", "s", 1.0, 300.0,
+         "a takeoff commanded before arming is forgotten after this long", _IN_MICROSECONDS),
         ("TKO_SPEED", "limits.climb_speed", "m/s", 0.05, 1.5, "speed of a takeoff"),
         ("LND_SPEED", "limits.land_speed", "m/s", 0.05, 0.6, "speed of a landing"),
         ("LND_HEIGHT", "limits.landed_height", "m", 0.02, 0.25,
@@ -217,10 +227,27 @@ _ROWS: Final[dict[str, list[_Row]]] = {
          "how far a steered reference runs ahead of the vehicle"),
         ("RTL_RETURN_ALT", "limits.return_height", "m", 0.5, 50.0,
          "height above home on the way back"),
+        ("RTL_DESCEND_ALT", "limits.return_descent", "m", 0.5, 50.0,
+         "height above home at which a return waits before it lands"),
+        ("RTL_LAND_DELAY", "limits.return_wait", "s", -1.0, 300.0,
+         "how long it waits there; negative: it stays"),
+    ],
+    "Failsafes": [
         ("COM_OF_LOSS_T", "limits.setpoint_timeout_us", "s", 0.1, 5.0,
          "offboard ends after this long without a set-point", _IN_MICROSECONDS),
+        ("COM_OBL_RC_ACT", "limits.setpoint_loss_action", "", 3.0, 5.0,
+         "what then"),
         ("COM_DL_LOSS_T", "limits.station_timeout_us", "s", 3.0, 300.0,
-         "the vehicle returns after this long without the ground station", _IN_MICROSECONDS),
+         "the ground station is lost after this long without its heartbeat", _IN_MICROSECONDS),
+        ("NAV_DLL_ACT", "limits.station_loss_action", "", 0.0, 3.0,
+         "what then, in takeoff, hold, orbit and offboard; other modes go on"),
+        ("BAT_LOW_THR", "limits.battery_low", "norm", 0.12, 0.5, "the battery is low below this"),
+        ("BAT_CRIT_THR", "limits.battery_critical", "norm", 0.06, 0.3,
+         "the battery is critical below this; the vehicle cannot be armed"),
+        ("BAT_EMERGEN_THR", "limits.battery_emergency", "norm", 0.03, 0.2,
+         "the battery is nearly empty below this"),
+        ("COM_LOW_BAT_ACT", "limits.low_battery_action", "", 0.0, 3.0,
+         "what is done about a battery that runs low in flight"),
     ],
     "Missions": [
         ("MSN_SPEED", "limits.mission_speed", "m/s", 0.01, 1.0,
@@ -233,6 +260,16 @@ _ROWS: Final[dict[str, list[_Row]]] = {
          "kept from the walls of a fence uploaded from now on"),
     ],
 }  # fmt: skip
+
+_CHOICES: Final[dict[str, Choices]] = {
+    "COM_OBL_RC_ACT": ((3, "Return"), (4, "Land"), (5, "Hold")),
+    "NAV_DLL_ACT": ((0, "Disabled"), (1, "Hold"), (2, "Return"), (3, "Land")),
+    "COM_LOW_BAT_ACT": (
+        (0, "Warning"),
+        (2, "Land when critical"),
+        (3, "Return when critical, land when nearly empty"),
+    ),
+}
 
 # Numbers of FlightConfig that are no parameters, by the beginning of their path, and why.
 NO_PARAMETERS: Final[dict[str, str]] = {
@@ -259,7 +296,8 @@ NO_PARAMETERS: Final[dict[str, str]] = {
 def _parameter(group: str, row: _Row) -> Parameter:
     name, path, unit, least, most, meaning = row[:6]
     scale = row[6] if len(row) == 7 else 1.0
-    return Parameter(name, path, unit, least, most, meaning, group, scale)
+    choices = _CHOICES.get(name, ())
+    return Parameter(name, path, unit, least, most, meaning, group, scale, choices)
 
 
 # In the order of their index on the wire, which is that of their names: clients sort so too.

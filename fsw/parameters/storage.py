@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from fsw.parameters.facts import FACT_BY_NAME
 from fsw.parameters.real32 import as_text, nearest_decimal
 from fsw.parameters.registry import BY_NAME
 
@@ -53,7 +54,8 @@ def parse(text: str) -> Loaded:
         except ValueError as error:
             complaints.append(f"line {number} is passed over: {error}")
         else:
-            values[name] = value
+            if name not in FACT_BY_NAME:
+                values[name] = value
     return Loaded(values, tuple(complaints))
 
 
@@ -120,13 +122,19 @@ def _entry(words: list[str]) -> tuple[str, float]:
         name, number = words
     else:
         raise ValueError("it is no parameter")
-    parameter = BY_NAME.get(name)
-    if parameter is None:
+    parameter, fact = BY_NAME.get(name), FACT_BY_NAME.get(name)
+    if parameter is None and fact is None:
         raise ValueError(f"{name[:40]} is unknown")
     try:
         value = nearest_decimal(float(number))
     except ValueError:
         raise ValueError(f"{number[:40]} is no number") from None
+    if fact is not None:
+        # A file that a ground station saved holds them as well, and they say nothing new.
+        if not fact.repeats and value != nearest_decimal(fact.value):
+            raise ValueError(f"{name} is read only and {as_text(fact.value)} here")
+        return name, value
+    assert parameter is not None
     refusal = parameter.refusal(value)
     if refusal is not None:
         raise ValueError(refusal)

@@ -54,6 +54,7 @@ from fsw.signals import (
     TickInputs,
     TickOutputs,
     Vec2,
+    Vec3,
 )
 from fsw.vehicle.battery import drained
 from fsw.vehicle.confine import contradictions
@@ -163,7 +164,8 @@ class FlightLoop:
             battery,
             arming_refusal,
         )
-        snapshot = _snapshot(state, estimate, u, self._steering.report(state, now_us))
+        report = self._steering.report(state, now_us)
+        snapshot = _snapshot(state, estimate, u, report, inputs.sensors.accel_B)
         return state, TickOutputs(sent, snapshot, request, tuple(acks), tuple(texts))
 
     def judge(self, safe_set: SafeSet) -> tuple[Finding, ...]:
@@ -228,7 +230,9 @@ class FlightLoop:
     def _battery(self, state: FlightState) -> BatteryState:
         thrust = state.cascade.commanded.rotor_thrust
         period = 1e-6 * self.config.mpc_period_us
-        return drained(self.config.battery, state.battery, thrust, period)
+        limits = self.config.limits
+        levels = (limits.battery_low, limits.battery_critical, limits.battery_emergency)
+        return drained(self.config.battery, levels, state.battery, thrust, period)
 
     def _ask(
         self,
@@ -330,8 +334,9 @@ def _snapshot(
     estimate: StateEstimate,
     u: PlanInput,
     offboard: OffboardReport,
+    accel_B: Vec3,
 ) -> FlightSnapshot:
-    vehicle, plan = state.vehicle, state.plan
+    vehicle, plan, steer = state.vehicle, state.plan, state.steer.aim
     flies = vehicle.flies and state.nominal is not None
     return FlightSnapshot(
         estimate.t_us,
@@ -354,6 +359,9 @@ def _snapshot(
         offboard,
         vehicle.standby,
         state.mission.flight.progress,
+        vehicle.failsafe_from,
+        steer.orbit if vehicle.mode is Mode.ORBIT and steer is not None else None,
+        accel_B,
     )
 
 

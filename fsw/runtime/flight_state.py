@@ -12,6 +12,7 @@ from fsw.signals import (
     STOPPED,
     AttitudeSetpoint,
     BatteryState,
+    Charge,
     ConstraintReport,
     EndEffectorTarget,
     Home,
@@ -52,6 +53,11 @@ class VehicleMemory:
     station_us: int = -1  # when a ground station was last heard; -1: not since it was given up
     answered: tuple[Answered, ...] = ()  # each sender's last command
     standby: Mode = Mode.HOLD  # what arming leads to
+    standby_us: int = 0  # when that was chosen
+    failsafe_from: Mode | None = None  # what was flown when a failsafe took over
+    charge: Charge = Charge.OK  # the worst that was told since arming
+    look_at: Vec3 | None = None  # m, where the nose is to point
+    speed: float | None = None  # m/s, on the way to places; None: as usual
 
     @property
     def armed(self) -> bool:

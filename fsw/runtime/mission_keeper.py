@@ -60,6 +60,13 @@ def with_mission(
     return replace(state, mission=replace(state.mission, flight=flight))
 
 
+def with_speed(state: FlightState, speed: float | None) -> FlightState:
+    """Fly to places at another speed [m/s], a mission from its next leg on; None: as usual."""
+    flight = replace(state.mission.flight, speed=speed)
+    vehicle = replace(state.vehicle, speed=speed)
+    return replace(state, vehicle=vehicle, mission=replace(state.mission, flight=flight))
+
+
 def begin(state: FlightState, reference: EndEffectorTarget, config: FlightConfig) -> FlightState:
     """Fly the mission from a reference on."""
     flight = mission.begun(state.mission.flight, reference, pace_of(config))
@@ -89,6 +96,7 @@ def fly(
         -estimate.p_WB[2],
         home.p[2] if home is not None else -config.airframe.leg_length,
         state.mission.safe_set,
+        state.vehicle.look_at,
     )
     moved, happening = mission.advance(flight, where, pace_of(config))
     if moved is flight:

@@ -6,6 +6,7 @@ Every function takes a state and returns one; almost every tick it is the same o
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 from fsw.control.cascade import at_rest, in_hover
@@ -13,11 +14,12 @@ from fsw.model.arm_kinematics import point_in_flight
 from fsw.mpc.reference import still_at
 from fsw.parameters.flight_config import FlightConfig
 from fsw.runtime.flight_state import FlightState, PlanMemory
-from fsw.runtime.mission_keeper import begin, fly, leave, with_mission
+from fsw.runtime.mission_keeper import begin, fly, leave, with_mission, with_speed
 from fsw.runtime.mode_reference import mode_reference
 from fsw.runtime.planning import nominal_at_rest
 from fsw.runtime.steering_keeper import SteeringKeeper
 from fsw.signals import (
+    Charge,
     CommandAck,
     CommandRequest,
     EndEffectorTarget,
@@ -31,13 +33,37 @@ from fsw.signals import (
 from fsw.vehicle.commands import decide
 from fsw.vehicle.faults import RESPONSES, Evidence, Response, detect
 from fsw.vehicle.mission import refusal
-from fsw.vehicle.mode_commands import arming_refusal
+from fsw.vehicle.mode_commands import STANDBY_EVENTS, arming_refusal, entry_refusal
 from fsw.vehicle.modes import Event, next_mode
 from fsw.vehicle.repeats import answered_before, remember
-from fsw.vehicle.situation import Decision, Situation
+from fsw.vehicle.situation import ACCEPTED, Decision, Situation
 
-# MAV_SEVERITY
-SEVERITY_EMERGENCY, SEVERITY_CRITICAL, SEVERITY_WARNING, SEVERITY_NOTICE = 0, 2, 4, 5
+# MAV_SEVERITY; PX4's: refusals and failsafes are critical, what goes as it should is information
+SEVERITY_EMERGENCY, SEVERITY_CRITICAL, SEVERITY_WARNING, SEVERITY_INFO = 0, 2, 4, 6
+
+# What a failsafe parameter's value does, in PX4's numbers of that parameter.
+_STATION_LOST: dict[int, Event] = {1: Event.HOLD, 2: Event.GO_HOME, 3: Event.LAND}  # NAV_DLL_ACT
+_SETPOINTS_LOST: dict[int, Event] = {  # COM_OBL_RC_ACT
+    3: Event.GO_HOME,
+    4: Event.LAND,
+    5: Event.HOLD,
+}
+_LOW_BATTERY: dict[tuple[int, Charge], Event] = {  # COM_LOW_BAT_ACT
+    (2, Charge.CRITICAL): Event.LAND,
+    (2, Charge.EMERGENCY): Event.LAND,
+    (3, Charge.CRITICAL): Event.GO_HOME,
+    (3, Charge.EMERGENCY): Event.LAND,
+}
+_CHARGE_TEXTS: dict[Charge, tuple[int, str]] = {
+    Charge.LOW: (SEVERITY_WARNING, "battery low"),
+    Charge.CRITICAL: (SEVERITY_CRITICAL, "battery critical"),
+    Charge.EMERGENCY: (SEVERITY_EMERGENCY, "battery nearly empty"),
+}
+_DOING: dict[Mode, str] = {Mode.HOLD: "holding", Mode.RETURN: "returning", Mode.LAND: "landing"}
+# Modes in which somebody on the ground flies the vehicle; the others fly by themselves and go on.
+_GUIDED = (Mode.TAKEOFF, Mode.HOLD, Mode.ORBIT, Mode.OFFBOARD)
+# These go on with what a failsafe began.
+_GOES_ON = (Event.HOME_REACHED, Event.CLIMB_DONE, Event.TRAJECTORY_DONE, Event.MISSION_DONE)
 
 
 def answer(
@@ -46,7 +72,8 @@ def answer(
     """Decide a command; a reason becomes a text for the operator."""
     decision = decide(request, situation)
     if decision.reason:
-        severity = SEVERITY_CRITICAL if decision.alarming else SEVERITY_WARNING
+        harmless = decision.result == ACCEPTED and not decision.alarming
+        severity = SEVERITY_INFO if harmless else SEVERITY_CRITICAL
         texts.append(StatusText(severity, decision.reason))
     return _ack(request, decision.result), decision
 
@@ -61,6 +88,17 @@ class ModeKeeper:
     def __init__(self, config: FlightConfig) -> None:
         self._config = config
         self._steering = SteeringKeeper(config)
+        self._minders: dict[
+            Mode, Callable[[FlightState, StateEstimate, list[StatusText]], FlightState]
+        ] = {
+            Mode.DISARMED: self._mind_standby,
+            Mode.TAKEOFF: self._mind_takeoff,
+            Mode.TRAJECTORY: self._mind_trajectory,
+            Mode.RETURN: self._mind_return,
+            Mode.OFFBOARD: self._mind_offboard,
+            Mode.MISSION: self._fly_mission,
+            Mode.LAND: self._mind_touch_down,
+        }
 
     def obey(
         self,
@@ -87,6 +125,7 @@ class ModeKeeper:
     def situation(self, state: FlightState, estimate: StateEstimate) -> Situation:
         """What a decision may depend on now."""
         limits, vehicle, stream = self._config.limits, state.vehicle, state.mission.stream
+        steering = self._config.steering
         asked = state.steer.aim.joints if state.steer.aim is not None else None
         return Situation(
             mode=vehicle.mode,
@@ -106,6 +145,10 @@ class ModeKeeper:
             safe_set=state.mission.safe_set,
             climb_range=(limits.airborne_height, limits.takeoff_climb_most),
             airframe=self._config.airframe,
+            charge=state.battery.charge,
+            speed_most=steering.speed,
+            turn_rate=steering.yaw_rate,
+            acceleration=steering.acceleration,
         )
 
     def arming_refusal(self, state: FlightState, estimate: StateEstimate) -> str:
@@ -133,7 +176,6 @@ class ModeKeeper:
                 self._config.mpc_period_us,
                 plan.refused,
                 state.output_replaced,
-                state.battery.remaining,
             )
         )
         if not faults and not vehicle.failures:
@@ -157,34 +199,68 @@ class ModeKeeper:
         self, state: FlightState, estimate: StateEstimate, texts: list[StatusText]
     ) -> FlightState:
         """Mode changes the vehicle makes by itself."""
-        now_us, limits, vehicle = estimate.t_us, self._config.limits, state.vehicle
+        vehicle = state.vehicle
         if vehicle.home is None:
             home = Home(estimate.p_WB, estimate.yaw)
             return replace(state, vehicle=replace(vehicle, home=home))
-        if vehicle.mode is Mode.TAKEOFF:
-            climb_us = 1e6 * vehicle.climb / limits.climb_speed
-            if now_us - vehicle.anchor_us >= climb_us:
-                state = self._change(state, Event.CLIMB_DONE, estimate, texts)
-        elif vehicle.mode is Mode.TRAJECTORY:
-            stream = state.mission.stream
-            if not stream or stream[-1].t_us < now_us:
-                state = self._change(state, Event.TRAJECTORY_DONE, estimate, texts)
-        elif vehicle.mode is Mode.RETURN and self._steering.is_home(state):
-            state = self._change(state, Event.HOME_REACHED, estimate, texts)
-        elif vehicle.mode is Mode.OFFBOARD:
-            state = self._mind_offboard(state, estimate, texts)
-        elif vehicle.mode is Mode.MISSION:
-            state = self._fly_mission(state, estimate, texts)
-        elif vehicle.mode is Mode.LAND:
-            state = self._mind_touch_down(state, estimate, texts)
-        return self._mind_station(state, estimate, texts)
+        minder = self._minders.get(vehicle.mode)
+        if minder is not None:
+            state = minder(state, estimate, texts)
+        state = self._mind_station(state, estimate, texts)
+        return self._mind_battery(state, estimate, texts)
+
+    def _mind_takeoff(
+        self, state: FlightState, estimate: StateEstimate, texts: list[StatusText]
+    ) -> FlightState:
+        climb_us = 1e6 * state.vehicle.climb / self._config.limits.climb_speed
+        if estimate.t_us - state.vehicle.anchor_us < climb_us:
+            return state
+        return self._change(state, Event.CLIMB_DONE, estimate, texts)
+
+    def _mind_trajectory(
+        self, state: FlightState, estimate: StateEstimate, texts: list[StatusText]
+    ) -> FlightState:
+        stream = state.mission.stream
+        if stream and stream[-1].t_us >= estimate.t_us:
+            return state
+        return self._change(state, Event.TRAJECTORY_DONE, estimate, texts)
+
+    def _mind_standby(
+        self, state: FlightState, estimate: StateEstimate, texts: list[StatusText]
+    ) -> FlightState:
+        """Forget what was chosen before arming, where it waits too long or is gone."""
+        vehicle, now_us = state.vehicle, estimate.t_us
+        waited_us = now_us - vehicle.standby_us
+        wait_us = self._config.limits.takeoff_wait_us
+        if vehicle.standby is Mode.TAKEOFF and waited_us >= wait_us:
+            text = f"takeoff forgotten: not armed within {wait_us * 1e-6:g} s"
+        elif vehicle.standby is Mode.OFFBOARD and not self._steering.is_fresh(state, now_us):
+            text = "offboard forgotten: set-points stopped before arming"
+        else:
+            return state
+        texts.append(StatusText(SEVERITY_WARNING, text))
+        return replace(state, vehicle=replace(vehicle, standby=Mode.HOLD))
+
+    def _mind_return(
+        self, state: FlightState, estimate: StateEstimate, texts: list[StatusText]
+    ) -> FlightState:
+        """Home, wait there, then land; or stay there."""
+        if not self._steering.is_home(state):
+            return self._moving(state, estimate)
+        wait = self._config.limits.return_wait
+        if wait < 0.0:
+            return self._change(state, Event.HOLD, estimate, texts, kept=True)
+        if estimate.t_us - state.vehicle.still_since_us < 1e6 * wait:
+            return state
+        return self._change(state, Event.HOME_REACHED, estimate, texts)
 
     def _mind_offboard(
         self, state: FlightState, estimate: StateEstimate, texts: list[StatusText]
     ) -> FlightState:
         if not self._steering.is_fresh(state, estimate.t_us):
-            texts.append(StatusText(SEVERITY_WARNING, "offboard set-points stopped: holding"))
-            return self._change(state, Event.SETPOINTS_LOST, estimate, texts)
+            action = self._config.limits.setpoint_loss_action
+            event = _SETPOINTS_LOST.get(action, Event.HOLD)
+            return self._fail_safe(state, event, "offboard set-points stopped", estimate, texts)
         if state.vehicle.landed:
             if self._steering.wants_to_rise(state, estimate):
                 return self._lift_off(state, estimate)
@@ -212,17 +288,52 @@ class ModeKeeper:
     def _mind_station(
         self, state: FlightState, estimate: StateEstimate, texts: list[StatusText]
     ) -> FlightState:
-        """Come home where the ground station that was there is silent for too long."""
+        """Act where the ground station that was there is silent for too long."""
         vehicle = state.vehicle
         silent_us = estimate.t_us - vehicle.station_us
         if vehicle.station_us < 0 or silent_us < self._config.limits.station_timeout_us:
             return state
         state = replace(state, vehicle=replace(vehicle, station_us=-1))
-        if not vehicle.flies or next_mode(vehicle.mode, Event.LINK_LOST) is None:
+        event = _STATION_LOST.get(self._config.limits.station_loss_action)
+        if event is None or not vehicle.flies or vehicle.mode not in _GUIDED:
             return state
-        text = f"no ground station for {silent_us * 1e-6:.0f} s: returning"
-        texts.append(StatusText(SEVERITY_WARNING, text))
-        return self._change(state, Event.LINK_LOST, estimate, texts)
+        text = f"no ground station for {silent_us * 1e-6:.0f} s"
+        return self._fail_safe(state, event, text, estimate, texts)
+
+    def _mind_battery(
+        self, state: FlightState, estimate: StateEstimate, texts: list[StatusText]
+    ) -> FlightState:
+        """Say each level once, and act in flight as the parameter says."""
+        charge, vehicle = state.battery.charge, state.vehicle
+        if charge <= vehicle.charge:
+            return state
+        state = replace(state, vehicle=replace(vehicle, charge=charge))
+        severity, what = _CHARGE_TEXTS[charge]
+        text = f"{what}: {100.0 * state.battery.remaining:.0f} % left"
+        event = _LOW_BATTERY.get((self._config.limits.low_battery_action, charge))
+        done = vehicle.mode is Mode.LAND or (vehicle.mode, event) == (Mode.RETURN, Event.GO_HOME)
+        if event is None or done or not vehicle.flies:
+            texts.append(StatusText(severity, text))
+            return state
+        return self._fail_safe(state, event, text, estimate, texts)
+
+    def _fail_safe(
+        self,
+        state: FlightState,
+        event: Event,
+        why: str,
+        estimate: StateEstimate,
+        texts: list[StatusText],
+    ) -> FlightState:
+        """Take the vehicle over, and say why; a pilot's next mode takes it back."""
+        mode = next_mode(state.vehicle.mode, event)
+        if mode is None:
+            return state
+        text = f"failsafe: {why}, {_DOING[mode]}"
+        texts.append(StatusText(SEVERITY_CRITICAL, text))
+        before = state.vehicle.failsafe_from or state.vehicle.mode
+        state = self._change(state, event, estimate, texts, kept=True)
+        return replace(state, vehicle=replace(state.vehicle, failsafe_from=before))
 
     def _carry_out(
         self,
@@ -231,17 +342,7 @@ class ModeKeeper:
         estimate: StateEstimate,
         texts: list[StatusText],
     ) -> FlightState:
-        if decision.home is not None:
-            state = replace(state, vehicle=replace(state.vehicle, home=decision.home))
-        if decision.event is Event.TAKE_OFF:
-            climb = self._config.limits.takeoff_climb if decision.climb is None else decision.climb
-            state = replace(state, vehicle=replace(state.vehicle, climb=climb))
-        if decision.standby is not None:
-            state = replace(state, vehicle=replace(state.vehicle, standby=decision.standby))
-        if decision.mission_step is not None:
-            state = with_mission(
-                state, MissionUpdate(current=decision.mission_step), self._config, estimate.t_us
-            )
+        state = self._remember(state, decision, estimate)
         if decision.event is not None:
             state = self._change(state, decision.event, estimate, texts)
         if decision.event is Event.ARM:
@@ -250,22 +351,49 @@ class ModeKeeper:
             state = self._steering.stop(state, estimate)
         if decision.goto is not None:
             state = self._steering.go_to(state, decision.goto, estimate)
+        if decision.orbit is not None:
+            state = self._steering.circle(state, decision.orbit, estimate)
         if decision.joints is not None:
             state = self._steering.set_joints(state, decision.joints, estimate)
         return state
+
+    def _remember(
+        self, state: FlightState, decision: Decision, estimate: StateEstimate
+    ) -> FlightState:
+        """What a decision says about the flight that follows."""
+        vehicle, limits = state.vehicle, self._config.limits
+        if decision.home is not None:
+            vehicle = replace(vehicle, home=decision.home)
+        if decision.event is Event.TAKE_OFF or decision.standby is Mode.TAKEOFF:
+            climb = limits.takeoff_climb if decision.climb is None else decision.climb
+            vehicle = replace(vehicle, climb=climb)
+        if decision.standby is not None:
+            vehicle = replace(vehicle, standby=decision.standby, standby_us=estimate.t_us)
+        if decision.look_at is not None:
+            vehicle = replace(vehicle, look_at=decision.look_at.place)
+        if vehicle is not state.vehicle:
+            state = replace(state, vehicle=vehicle)
+        if decision.speed is not None:
+            state = with_speed(state, decision.speed.speed)
+        if decision.look_at is not None:
+            state = self._steering.look_at(state, estimate)
+        if decision.mission_step is None:
+            return state
+        step = MissionUpdate(current=decision.mission_step)
+        return with_mission(state, step, self._config, estimate.t_us)
 
     def _begin_standby(
         self, state: FlightState, estimate: StateEstimate, texts: list[StatusText]
     ) -> FlightState:
         """Go on to the mode that was chosen before arming, if it is still possible."""
-        wanted = state.vehicle.standby
+        event = STANDBY_EVENTS.get(state.vehicle.standby)
         state = replace(state, vehicle=replace(state.vehicle, standby=Mode.HOLD))
-        if wanted is not Mode.MISSION:
+        if event is None:
             return state
-        against = refusal(state.mission.flight, state.vehicle.landed)
+        against = entry_refusal(event, self.situation(state, estimate))
         if against is None:
-            return self._change(state, Event.START_MISSION, estimate, texts)
-        texts.append(StatusText(SEVERITY_WARNING, against))
+            return self._change(state, event, estimate, texts)
+        texts.append(StatusText(SEVERITY_CRITICAL, against))
         return state
 
     def _fly_mission(
@@ -276,20 +404,30 @@ class ModeKeeper:
             return self._change(state, Event.HOLD, estimate, texts)
         state, happening = fly(state, estimate, self._config)
         if happening.text:
-            severity = SEVERITY_WARNING if happening.unmet else SEVERITY_NOTICE
+            severity = SEVERITY_WARNING if happening.unmet else SEVERITY_INFO
             texts.append(StatusText(severity, happening.text))
+        if happening.look_at is not None:
+            vehicle = replace(state.vehicle, look_at=happening.look_at.place)
+            state = replace(state, vehicle=vehicle)
         if happening.event is None:
             return state
         return self._change(state, happening.event, estimate, texts)
 
     def _change(
-        self, state: FlightState, event: Event, estimate: StateEstimate, texts: list[StatusText]
+        self,
+        state: FlightState,
+        event: Event,
+        estimate: StateEstimate,
+        texts: list[StatusText],
+        *,
+        kept: bool = False,
     ) -> FlightState:
+        """Go to the mode after an event; ``kept`` says that a failsafe's mark stays."""
         before = state.vehicle.mode
         mode = next_mode(before, event)
         if mode is None:
             return state
-        texts.append(StatusText(SEVERITY_NOTICE, f"{before.value} to {mode.value}: {event.value}"))
+        texts.append(StatusText(SEVERITY_INFO, f"{before.value} to {mode.value}: {event.value}"))
         anchor, anchor_yaw = self._anchor(state, event, estimate)
         state = leave(state, event)
         if mode is Mode.MISSION:
@@ -298,6 +436,7 @@ class ModeKeeper:
         if event in (Event.ARM, Event.TAKE_OFF) or rises:
             state = self._take_over(state, event, estimate)
         steer = self._steering.steer_into(state, mode, event, estimate)
+        kept = kept or event in _GOES_ON
         vehicle = replace(
             state.vehicle,
             mode=mode,
@@ -305,7 +444,10 @@ class ModeKeeper:
             anchor_yaw=anchor_yaw,
             anchor_us=estimate.t_us,
             still_since_us=estimate.t_us,
+            failsafe_from=state.vehicle.failsafe_from if kept else None,
         )
+        if event is Event.ARM:
+            vehicle = replace(vehicle, look_at=None, speed=None, charge=Charge.OK)
         return replace(state, vehicle=vehicle, steer=steer)
 
     def _take_over(self, state: FlightState, event: Event, estimate: StateEstimate) -> FlightState:

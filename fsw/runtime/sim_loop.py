@@ -11,6 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Final, Generic
 
+from fsw.estimation.vibration import VibrationMeter
 from fsw.link.ground_links import GroundLinks
 from fsw.link.inbox import Inbox
 from fsw.link.sim_link import Pacing, SimLink
@@ -118,6 +119,7 @@ class SimLoop(Generic[State]):
         self._sleep = sleep or ground.attend  # what time is left belongs to the ground
         self._warning = SlipWarning()
         self._notices: list[StatusText] = []
+        self._vibration = VibrationMeter()
         self._releases: Releases
         methods: dict[Member, Callable[[Cycle], None]] = {
             Member.HEAR: self._hear,
@@ -205,11 +207,13 @@ class SimLoop(Generic[State]):
         return index
 
     def _hear(self, cycle: Cycle) -> None:
-        t_us = cycle.release.sensors.t_us
+        sensors = cycle.release.sensors
+        t_us = sensors.t_us
+        self._vibration.add(sensors.gyro_B, sensors.accel_B)
         inbox = self._inbox
         setpoints = inbox.take_setpoints()
         cycle.inputs = TickInputs(
-            cycle.release.sensors,
+            sensors,
             cycle.planner.take(t_us),
             inbox.take_commands(),
             inbox.take_targets(),
@@ -269,6 +273,7 @@ class SimLoop(Generic[State]):
     def _sum_up(self, cycle: Cycle) -> None:
         record, health = self._record, self._record.health
         self._count_missed()
+        health.vibration = self._vibration.metrics
         health.inner = record.groups[INNER.name].close_interval()
         health.mpc = record.mpc.timer.close_interval()
         health.telemetry = record.groups[TELEMETRY.name].close_interval()

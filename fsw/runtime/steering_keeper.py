@@ -14,6 +14,7 @@ from fsw.signals import (
     Mode,
     MotionSetpoint,
     OffboardReport,
+    Orbit,
     SetpointKind,
     StateEstimate,
     TickInputs,
@@ -78,6 +79,8 @@ class SteeringKeeper:
         """The steered reference with which a mode begins; none in the modes that have their own."""
         if event in (Event.ARM, Event.CLIMB_DONE, Event.TRAJECTORY_DONE, Event.MISSION_DONE):
             return SteerMemory()
+        if mode is Mode.ORBIT:
+            return SteerMemory(state.steer.lead, state.steer.aim)
         if mode is Mode.RETURN and state.vehicle.home is not None:
             home = nearest(state.vehicle.home, state.mission.rally, estimate.p_WB)
             return self._way_home(home, estimate)
@@ -108,6 +111,24 @@ class SteeringKeeper:
             motion = MotionSetpoint(False, lead.p)
             return replace(state, steer=SteerMemory(lead, Aim(motion, q_arm)))
         return replace(state, steer=replace(steer, aim=replace(steer.aim, joints=q_arm)))
+
+    def circle(self, state: FlightState, orbit: Orbit, estimate: StateEstimate) -> FlightState:
+        """Fly a circle from now on."""
+        lead = state.steer.lead
+        if lead is None or lead.of_end_effector:
+            lead = lead_from(self._config, estimate, of_end_effector=False)
+        joints = state.steer.aim.joints if state.steer.aim is not None else None
+        motion = MotionSetpoint(False, orbit.centre, yaw=lead.yaw)
+        return replace(state, steer=SteerMemory(lead, Aim(motion, joints, orbit=orbit)))
+
+    def look_at(self, state: FlightState, estimate: StateEstimate) -> FlightState:
+        """A hold that just stays has to be steered to turn."""
+        if state.vehicle.mode is not Mode.HOLD or state.steer.lead is not None:
+            return state
+        if not state.vehicle.flies:
+            return state
+        lead = lead_from(self._config, estimate, of_end_effector=False)
+        return replace(state, steer=SteerMemory(lead, Aim(MotionSetpoint(False, lead.p))))
 
     def is_home(self, state: FlightState) -> bool:
         """Whether the way home is flown."""
@@ -143,12 +164,12 @@ class SteeringKeeper:
         lead, aim, waypoints = state.steer.lead, state.steer.aim, state.steer.waypoints
         if lead is None or aim is None:
             return None
-        safe_set = state.mission.safe_set
+        safe_set, asked = state.mission.safe_set, aim
         if self._is_off_plan(state, estimate):
             still = MotionSetpoint(lead.of_end_effector, v=(0.0, 0.0, 0.0))
-            asked, aim = aim, replace(aim, motion=still)
-        else:
-            asked = aim
+            aim = replace(aim, motion=still, orbit=None)
+        elif state.vehicle.mode is not Mode.OFFBOARD:
+            aim = self._as_guided(aim, state)
         lead = go_ahead(self._config, lead, aim, estimate, safe_set)
         if waypoints and aim.motion.p is not None and arrived(lead, aim.motion.p):
             asked = aim = replace(aim, motion=replace(aim.motion, p=waypoints[0]))
@@ -156,6 +177,13 @@ class SteeringKeeper:
         state = replace(state, steer=SteerMemory(lead, asked, waypoints))
         targets, postures = horizon_of(self._config, lead, aim, estimate, safe_set, t_us)
         return state, targets, postures
+
+    def _as_guided(self, aim: Aim, state: FlightState) -> Aim:
+        """The aim with the speed and the heading that commands asked for."""
+        vehicle = state.vehicle
+        if vehicle.look_at is None and (vehicle.speed is None or aim.speed is not None):
+            return aim
+        return replace(aim, speed=aim.speed or vehicle.speed, look_at=vehicle.look_at)
 
     def target(self, state: FlightState, t_us: int) -> EndEffectorTarget | None:
         """The steered end-effector target now; None where the mode is not steered."""
@@ -219,12 +247,15 @@ class SteeringKeeper:
         return _moved_on(memory.motion, estimate.t_us - memory.motion_us), ahead
 
     def _way_home(self, home: Home, estimate: StateEstimate) -> SteerMemory:
-        """Up to the height of return, across, and there it ends."""
-        x, y, z = estimate.p_WB
-        height = min(z, home.p[2] - self._config.limits.return_height)
+        """Up to the height of return, across, down to where it waits, and there it ends."""
+        (x, y, z), limits = estimate.p_WB, self._config.limits
+        height = min(z, home.p[2] - limits.return_height)
+        waits = max(height, home.p[2] - limits.return_descent)
         lead = lead_from(self._config, estimate, of_end_effector=False)
         aim = Aim(MotionSetpoint(False, (x, y, height)))
-        return SteerMemory(lead, aim, ((home.p[0], home.p[1], height),))
+        across: Vec3 = (home.p[0], home.p[1], height)
+        down: Vec3 = (home.p[0], home.p[1], waits)
+        return SteerMemory(lead, aim, (across, down) if waits > height else (across,))
 
     def _is_off_plan(self, state: FlightState, estimate: StateEstimate) -> bool:
         """Whether the fast loop is not where the plan is: then nothing new is asked of it."""

@@ -12,10 +12,23 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from fsw.signals import BatteryState, Vec4
+from fsw.signals import BatteryState, Charge, Vec4
 
 _AIR_DENSITY = 1.225  # kg/m^3
 _AS_PER_AH = 3600.0
+
+
+Levels = tuple[float, float, float]
+"""Shares of the capacity below which the charge is low, critical, and an emergency."""
+
+
+def charge_of(remaining: float, levels: Levels) -> Charge:
+    """The level of a share of the capacity; what is no number is an emergency."""
+    if remaining >= levels[0]:
+        return Charge.OK
+    if remaining >= levels[1]:
+        return Charge.LOW
+    return Charge.CRITICAL if remaining >= levels[2] else Charge.EMERGENCY
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,11 +44,14 @@ class BatteryModel:
     idle_power: float = 8.0  # W, electronics and arm
 
 
-def drained(model: BatteryModel, state: BatteryState, thrust: Vec4, dt: float) -> BatteryState:
+def drained(
+    model: BatteryModel, levels: Levels, state: BatteryState, thrust: Vec4, dt: float
+) -> BatteryState:
     """The battery a moment later.
 
     Args:
         model: Of the battery.
+        levels: Of its charge.
         state: Now.
         thrust: Of each rotor [N].
         dt: The moment [s].
@@ -49,4 +65,5 @@ def drained(model: BatteryModel, state: BatteryState, thrust: Vec4, dt: float) -
     consumed = state.consumed + current * dt / _AS_PER_AH
     remaining = max(1.0 - consumed / model.capacity, 0.0)
     at_rest = model.empty + (model.full - model.empty) * remaining
-    return BatteryState(at_rest - model.resistance * current, current, consumed, remaining)
+    voltage = at_rest - model.resistance * current
+    return BatteryState(voltage, current, consumed, remaining, charge_of(remaining, levels))

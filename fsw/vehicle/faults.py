@@ -23,7 +23,6 @@ class Fault(Enum):
     OUTPUT_NOT_FINITE = "actuator command not finite"
     ESTIMATE_INVALID = "state estimate invalid"
     TILT_LOST = "tilt beyond recovery"
-    BATTERY_LOW = "battery low"
 
 
 RESPONSES: dict[Fault, Response] = {
@@ -32,12 +31,10 @@ RESPONSES: dict[Fault, Response] = {
     Fault.OUTPUT_NOT_FINITE: Response.WARN,
     Fault.ESTIMATE_INVALID: Response.TERMINATE,
     Fault.TILT_LOST: Response.TERMINATE,
-    Fault.BATTERY_LOW: Response.WARN,
 }
 
 PLAN_STALE_PERIODS = 3
 INVALID_TICKS = 5  # 10 ms without an estimate; a single lost frame is flown through
-LEAST_CHARGE = 0.2  # of the battery
 LEAST_UP = 0.34  # cosine of 70 degrees of tilt
 
 
@@ -53,7 +50,6 @@ class Evidence:
     plan_period_us: int
     plan_refused: bool
     output_replaced: bool
-    charge: float = 1.0  # of the battery, as share
 
 
 def detect(evidence: Evidence) -> tuple[Fault, ...]:
@@ -67,8 +63,6 @@ def detect(evidence: Evidence) -> tuple[Fault, ...]:
         active.append(Fault.PLAN_STALE)
     if evidence.output_replaced:
         active.append(Fault.OUTPUT_NOT_FINITE)
-    if not evidence.charge >= LEAST_CHARGE:
-        active.append(Fault.BATTERY_LOW)
     if evidence.plan_refused:
         active.append(Fault.PLAN_REFUSED)
     return tuple(active)

@@ -25,9 +25,13 @@ from fsw.signals import (
 )
 from fsw.vehicle.confine import inside
 from fsw.vehicle.leg import Leg, Pace, braking_leg, leg_to
+from fsw.vehicle.mission_items import FASTEST
 from fsw.vehicle.modes import Event
+from fsw.vehicle.situation import LookAt
 
 PATIENCE_US = 5_000_000  # at the end of a leg, for the end-effector to arrive
+_TOO_NEAR_TO_LOOK = 0.3  # m
+_NO_MOVES = (MissionAction.SPEED, MissionAction.LOOK_AT)
 
 
 class Stage(Enum):
@@ -64,6 +68,7 @@ class Whereabouts:
     height: float  # m, base above the origin
     home_z: float  # m, NED, of home
     safe_set: SafeSet = field(default_factory=SafeSet)
+    look_at: Vec3 | None = None  # m, where the nose is to point
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,6 +78,7 @@ class Happening:
     event: Event | None = None
     text: str = ""
     unmet: bool = False  # the text is a warning
+    look_at: LookAt | None = None
 
 
 NOTHING = Happening()
@@ -96,7 +102,7 @@ def refusal(flight: MissionFlight, landed: bool) -> str | None:
         return "no mission: none was uploaded"
     first = flight.progress
     at = 0 if first.state is MissionState.COMPLETE else first.current
-    moves = [step for step in flight.steps[at:] if step.action is not MissionAction.SPEED]
+    moves = [step for step in flight.steps[at:] if step.action not in _NO_MOVES]
     if landed and (not moves or moves[0].action is not MissionAction.TAKE_OFF):
         return f"no mission: on the ground, and step {at} is no takeoff; take off first"
     return None
@@ -199,13 +205,24 @@ def _begin(
     step = flight.steps[number]
     if step.action is MissionAction.SPEED:
         return _next(_reached(replace(flight, speed=step.speed)))
+    if step.action is MissionAction.LOOK_AT:
+        following, happening = _next(_reached(flight))
+        return following, replace(happening, look_at=LookAt(step.position))
     if flight.speed is not None:
-        pace = replace(pace, speed=flight.speed)
+        pace = replace(pace, speed=min(flight.speed, FASTEST))
     place = _destination(step, at, where)
-    leg = leg_to(at, inside(place, where.safe_set), step.yaw, pace)
+    end = inside(place, where.safe_set)
+    leg = leg_to(at, end, _heading(step, end, where.look_at), pace)
     text = f"mission step {number}: {step.action.value}"
     moving = replace(flight, stage=Stage.MOVE, leg=leg, place=place, since_us=where.now_us)
     return moving, Happening(text=text)
+
+
+def _heading(step: MissionStep, end: Vec3, look_at: Vec3 | None) -> float | None:
+    """The heading at the end of a leg [rad]: towards a place that is looked at, if there is one."""
+    if look_at is None or math.dist(look_at[:2], end[:2]) < _TOO_NEAR_TO_LOOK:
+        return step.yaw
+    return math.atan2(look_at[1] - end[1], look_at[0] - end[0])
 
 
 def _destination(step: MissionStep, at: EndEffectorTarget, where: Whereabouts) -> Vec3:

@@ -6,18 +6,24 @@ import math
 from dataclasses import replace
 
 from fsw.signals import CommandRequest, Mode
-from fsw.vehicle.mode_commands import enter
+from fsw.vehicle.mode_commands import arm, enter
 from fsw.vehicle.modes import Event
 from fsw.vehicle.situation import ACCEPTED, DENIED, TEMPORARILY_REJECTED, Decision, Situation
 
 
 def start_mission(request: CommandRequest, situation: Situation) -> Decision:
-    """MISSION_START; parameter 1 is the step to begin with, parameter 2 the last one."""
+    """MISSION_START; parameter 1 is the step to begin with, parameter 2 the last one.
+
+    A vehicle that is not armed is armed by it, as PX4 does.
+    """
     first, last = request.params[0], request.params[1]
     total = situation.mission.total
     if math.isfinite(last) and 0.0 < last < total - 1:
         return Decision(DENIED, reason="no mission: it can be flown to its last step only")
     decision = enter(Event.START_MISSION, situation)
+    if decision.result == ACCEPTED and situation.mode is Mode.DISARMED:
+        armed = arm(situation)
+        decision = replace(armed, standby=Mode.MISSION) if armed.event is not None else armed
     if decision.result != ACCEPTED or not (math.isfinite(first) and first > 0.0):
         return decision
     if not first < total:

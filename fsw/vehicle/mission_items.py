@@ -22,6 +22,9 @@ NAV_LAND: Final = 21
 NAV_TAKEOFF: Final = 22
 NAV_DELAY: Final = 93
 DO_CHANGE_SPEED: Final = 178
+DO_SET_ROI_LOCATION: Final = 195
+DO_SET_ROI_NONE: Final = 197
+DO_SET_ROI: Final = 201
 NAV_RALLY_POINT: Final = 5100
 
 # MAV_FRAME
@@ -191,6 +194,26 @@ def _change_speed(item: MissionItem, _: Locate) -> MissionStep | Refused:
     return MissionStep(MissionAction.SPEED, speed=speed)
 
 
+def _look_at(item: MissionItem, locate: Locate) -> MissionStep | Refused:
+    """The nose points there on the legs that follow; its height does not matter."""
+    place = horizontal_place(item, locate)
+    if isinstance(place, Refused):
+        return place
+    return MissionStep(MissionAction.LOOK_AT, (*place, 0.0))
+
+
+def _look_away(item: MissionItem, _: Locate) -> MissionStep | Refused:
+    return MissionStep(MissionAction.LOOK_AT)
+
+
+def _look(item: MissionItem, locate: Locate) -> MissionStep | Refused:
+    if item.params[0] == 0.0:
+        return _look_away(item, locate)
+    if item.params[0] == 3.0:
+        return _look_at(item, locate)
+    return _bad(1, f"kind {item.params[0]:g} of a region of interest is not 0 or 3")
+
+
 FASTEST: Final = 1.0  # m/s
 _READERS: Final[dict[int, Callable[[MissionItem, Locate], MissionStep | Refused]]] = {
     NAV_WAYPOINT: _waypoint,
@@ -201,6 +224,9 @@ _READERS: Final[dict[int, Callable[[MissionItem, Locate], MissionStep | Refused]
     NAV_TAKEOFF: _take_off,
     NAV_DELAY: _delay,
     DO_CHANGE_SPEED: _change_speed,
+    DO_SET_ROI_LOCATION: _look_at,
+    DO_SET_ROI_NONE: _look_away,
+    DO_SET_ROI: _look,
 }
 
 

@@ -8,6 +8,7 @@ takeoff        end-effector reference climbs from where the vehicle stood
 hold           stays where it was or goes to a place; on the ground, rotors idle
 mission        the uploaded mission is flown
 return         climbs, goes home, then lands
+orbit          circles a point, level
 offboard       a ground station's set-points for now are followed
 trajectory     the streamed end-effector reference is followed
 land           reference descends until the ground is felt, then disarms
@@ -33,13 +34,12 @@ class Event(Enum):
     START_MISSION = "start mission"
     GO_HOME = "return"
     GO_OFFBOARD = "offboard"
+    CIRCLE = "orbit"
     LAND = "land"
     CLIMB_DONE = "climb done"
     TRAJECTORY_DONE = "trajectory done"
     MISSION_DONE = "mission done"
     HOME_REACHED = "home reached"
-    SETPOINTS_LOST = "no set-point for 0.5 s"
-    LINK_LOST = "ground station lost"
     TOUCHED_DOWN = "touched down"
     TERMINATE = "terminate"
 
@@ -51,6 +51,7 @@ _STEERABLE = (
     Mode.MISSION,
     Mode.RETURN,
     Mode.OFFBOARD,
+    Mode.ORBIT,
     Mode.TRAJECTORY,
 )
 ARMED = (*_STEERABLE, Mode.LAND)
@@ -61,6 +62,7 @@ TRANSITIONS: dict[tuple[Mode, Event], Mode] = {
     **{(mode, Event.FOLLOW): Mode.TRAJECTORY for mode in _STEERABLE},
     **{(mode, Event.START_MISSION): Mode.MISSION for mode in _STEERABLE},
     **{(mode, Event.GO_OFFBOARD): Mode.OFFBOARD for mode in _STEERABLE},
+    **{(mode, Event.CIRCLE): Mode.ORBIT for mode in _STEERABLE},
     **{(mode, Event.GO_HOME): Mode.RETURN for mode in ARMED},
     **{(mode, Event.HOLD): Mode.HOLD for mode in ARMED},
     **{(mode, Event.LAND): Mode.LAND for mode in ARMED},
@@ -69,9 +71,6 @@ TRANSITIONS: dict[tuple[Mode, Event], Mode] = {
     (Mode.TRAJECTORY, Event.TRAJECTORY_DONE): Mode.HOLD,
     (Mode.MISSION, Event.MISSION_DONE): Mode.HOLD,
     (Mode.RETURN, Event.HOME_REACHED): Mode.LAND,
-    (Mode.OFFBOARD, Event.SETPOINTS_LOST): Mode.HOLD,
-    # Whoever flies by itself goes on: a mission, a trajectory, a return, a landing.
-    **{(mode, Event.LINK_LOST): Mode.RETURN for mode in (Mode.TAKEOFF, Mode.HOLD, Mode.OFFBOARD)},
     (Mode.LAND, Event.TOUCHED_DOWN): Mode.DISARMED,
     **{(mode, Event.TERMINATE): Mode.FAULT for mode in (Mode.DISARMED, *ARMED)},
 }

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+from fsw.barriers.tangent import distance_to
 from fsw.model.airframe import AIRFRAME, Airframe
 from fsw.signals import CommandRequest, Home, Mode, Vec2, Vec3
 from fsw.vehicle.mode_commands import change
@@ -26,7 +27,7 @@ _ACTUATOR_RANGE: Vec2 = (AIRFRAME.joint1_limit, AIRFRAME.joint12_limit)
 
 def reposition(request: CommandRequest, situation: Situation) -> Decision:
     """DO_REPOSITION: hold at another place, height or heading."""
-    refusal = _hovering_refusal(situation)
+    refusal = hovering_refusal(situation)
     if refusal is not None:
         return Decision(TEMPORARILY_REJECTED, reason=f"no goto: {refusal}")
     speed, flags, _, yaw = request.params[:4]
@@ -51,7 +52,8 @@ def reposition(request: CommandRequest, situation: Situation) -> Decision:
     return replace(decision, goto=goto) if decision.result == ACCEPTED else decision
 
 
-def _hovering_refusal(situation: Situation) -> str | None:
+def hovering_refusal(situation: Situation) -> str | None:
+    """Why a vehicle cannot be sent anywhere now."""
     if situation.mode in (Mode.DISARMED, Mode.FAULT):
         return "the vehicle is not armed"
     return "the vehicle is on the ground; take off first" if situation.landed else None
@@ -59,17 +61,25 @@ def _hovering_refusal(situation: Situation) -> str | None:
 
 def _blocked(place: Vec3, situation: Situation) -> str | None:
     """Why the body cannot be at a place."""
-    least = situation.airframe.leg_length + situation.climb_range[0]
-    if not -place[2] >= least:
-        return f"{-place[2]:.1f} m above the origin is too low, {least:.1f} m is the least"
+    low = too_low(place, situation)
+    if low is not None:
+        return low
     for number, wall in enumerate(situation.safe_set.walls, start=1):
         distance = sum(n * x for n, x in zip(wall.normal, place, strict=True)) - wall.offset
         if not distance > wall.clearance:
             return f"the place is behind wall {number} or too close to it"
     for number, obstacle in enumerate(situation.safe_set.obstacles, start=1):
-        if not math.dist(obstacle.position, place) > obstacle.clearance:
+        if not distance_to(obstacle, place) > obstacle.clearance:
             return f"the place is too close to obstacle {number}"
     return None
+
+
+def too_low(place: Vec3, situation: Situation) -> str | None:
+    """Why the body cannot be at a height."""
+    least = situation.airframe.leg_length + situation.climb_range[0]
+    if -place[2] >= least:
+        return None
+    return f"{-place[2]:.1f} m above the origin is too low, {least:.1f} m is the least"
 
 
 def set_actuator(request: CommandRequest, situation: Situation) -> Decision:
@@ -79,7 +89,7 @@ def set_actuator(request: CommandRequest, situation: Situation) -> Decision:
         return Decision(DENIED, reason="no such actuators: the joints are 1 and 2 of index 0")
     if any(math.isfinite(value) for value in others):
         return Decision(DENIED, reason="no such actuator: only the joints, 1 and 2, can be set")
-    refusal = _hovering_refusal(situation)
+    refusal = hovering_refusal(situation)
     if refusal is None and situation.mode is not Mode.HOLD:
         refusal = f"the arm is not free while {situation.mode.value}; hold first"
     if refusal is not None:

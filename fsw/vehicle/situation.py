@@ -6,11 +6,22 @@ from dataclasses import dataclass, field
 
 from fsw.geometry.geodesy import DEFAULT_ORIGIN
 from fsw.model.airframe import AIRFRAME, Airframe
-from fsw.signals import Home, MissionProgress, Mode, Origin, SafeSet, Vec2, Vec3
+from fsw.signals import (
+    Charge,
+    Home,
+    MissionProgress,
+    Mode,
+    Orbit,
+    Origin,
+    SafeSet,
+    Vec2,
+    Vec3,
+)
 from fsw.vehicle.modes import Event
 
 # MAV_RESULT of MAVLink common.xml.
 ACCEPTED, TEMPORARILY_REJECTED, DENIED, UNSUPPORTED = 0, 1, 2, 3
+CLIMB_TOLERANCE = 0.05  # m: a ground station rounds, and reckons from the altitude it was sent last
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,8 +43,12 @@ class Situation:
     origin: Origin = DEFAULT_ORIGIN
     home: Home | None = None
     safe_set: SafeSet = field(default_factory=SafeSet)
-    climb_range: Vec2 = (0.3, 10.0)  # m, of a takeoff
+    climb_range: Vec2 = (0.3, 50.0)  # m, of a takeoff
     airframe: Airframe = AIRFRAME
+    charge: Charge = Charge.OK
+    speed_most: float = 1.5  # m/s, that can be asked for
+    turn_rate: float = 0.3  # rad/s, at most
+    acceleration: float = 1.0  # m/s^2, of a steered reference
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +57,20 @@ class Goto:
 
     p: Vec3  # m, of the body
     yaw: float | None  # rad; None: as it is
+    speed: float | None  # m/s; None: as usual
+
+
+@dataclass(frozen=True, slots=True)
+class LookAt:
+    """Where the nose is to point from now on."""
+
+    place: Vec3 | None  # m; None: wherever it is flown
+
+
+@dataclass(frozen=True, slots=True)
+class Speed:
+    """How fast to fly to places from now on."""
+
     speed: float | None  # m/s; None: as usual
 
 
@@ -60,3 +89,6 @@ class Decision:
     home: Home | None = None
     standby: Mode | None = None  # what arming is to lead to
     mission_step: int | None = None  # to fly next
+    orbit: Orbit | None = None
+    look_at: LookAt | None = None
+    speed: Speed | None = None

@@ -19,7 +19,8 @@ from dataclasses import dataclass, replace
 from fsw.barriers.margins import plain_root
 from fsw.barriers.tangent import tangent
 from fsw.geometry.rotation import wrap_angle
-from fsw.signals import MotionSetpoint, SafeSet, Vec2, Vec3, Wall
+from fsw.signals import Facing, MotionSetpoint, Orbit, SafeSet, Vec2, Vec3, Wall
+from fsw.vehicle.orbit import looking_at, on_orbit
 
 _SETTLE_RATE = 2.0  # 1/s, of the last bit of the way
 _GROUND_BRAKING = 1.0  # m/s^2
@@ -62,6 +63,8 @@ class Aim:
     motion: MotionSetpoint
     joints: Vec2 | None = None  # rad
     speed: float | None = None  # m/s, towards a place; None: as usual
+    orbit: Orbit | None = None  # in place of the motion
+    look_at: Vec3 | None = None  # m, where the nose points in place of the motion's heading
 
 
 def move(lead: Lead, aim: Aim, limits: SteeringLimits, dt: float) -> Lead:
@@ -73,8 +76,9 @@ def move(lead: Lead, aim: Aim, limits: SteeringLimits, dt: float) -> Lead:
         limits: How fast it may move.
         dt: The moment [s].
     """
-    p, v = _move_point(lead, aim, limits, dt)
-    yaw, yaw_rate = _turn(lead, aim.motion, limits, dt)
+    motion = _motion_now(lead, aim)
+    p, v = _move_point(lead, motion, aim.speed, limits, dt)
+    yaw, yaw_rate = _turn(lead, motion, limits, dt)
     q_arm = lead.q_arm
     if q_arm is not None and aim.joints is not None:
         step = limits.joint_speed * dt
@@ -155,8 +159,22 @@ def arrived(lead: Lead, place: Vec3) -> bool:
     return _length(_minus(place, lead.p)) < 0.02 and _length(lead.v) < 0.05
 
 
-def _move_point(lead: Lead, aim: Aim, limits: SteeringLimits, dt: float) -> tuple[Vec3, Vec3]:
-    motion, braking = aim.motion, _BRAKING_SHARE * limits.acceleration
+def _motion_now(lead: Lead, aim: Aim) -> MotionSetpoint:
+    """What the point is after where it is now."""
+    motion, look_at = aim.motion, aim.look_at
+    if aim.orbit is not None:
+        motion = on_orbit(aim.orbit, lead.p)
+        if aim.orbit.facing is Facing.INITIAL:
+            motion = replace(motion, yaw=aim.motion.yaw)
+        elif aim.orbit.facing is Facing.CENTRE and look_at is None:
+            look_at = aim.orbit.centre
+    return motion if look_at is None else looking_at(motion, look_at, lead.p, lead.v)
+
+
+def _move_point(
+    lead: Lead, motion: MotionSetpoint, speed: float | None, limits: SteeringLimits, dt: float
+) -> tuple[Vec3, Vec3]:
+    braking = _BRAKING_SHARE * limits.acceleration
     wanted = (0.0, 0.0, 0.0) if motion.v is None else motion.v
     if motion.along_heading:
         wanted = _level(wanted, lead.yaw)
@@ -164,7 +182,7 @@ def _move_point(lead: Lead, aim: Aim, limits: SteeringLimits, dt: float) -> tupl
         error = _minus(motion.p, lead.p)
         distance = _length(error)
         if distance > 0.0:
-            cruise = min(aim.speed or limits.cruise_speed, limits.speed)
+            cruise = min(speed or limits.cruise_speed, limits.speed)
             closing = min(plain_root(distance, braking, _SETTLE_RATE), cruise)
             wanted = _plus(wanted, error, closing / distance)
     elif motion.v is None and motion.a is not None:

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import Final
 
+from fsw.barriers.tangent import planes
 from fsw.link.wire.telemetry_context import PlanIds
 from fsw.signals import (
     FlightSnapshot,
@@ -142,15 +143,16 @@ class MissionStore:
         if against:
             return Refused(DENIED, f"the fence cannot be kept: {'; '.join(against)}")
         if self._snapshot is not None:
-            x, y, z = self._snapshot.estimate.p_WB
-            for number, wall in enumerate(fence.walls):
+            x, y, z = p = self._snapshot.estimate.p_WB
+            for number, wall in enumerate(planes(fence, p)):
                 n = wall.normal
                 inside = n[0] * x + n[1] * y + n[2] * z - wall.offset - wall.clearance
                 if not inside > 0.0:
+                    where = "not inside the fence" if number < len(fence.walls) else "excluded"
                     return Refused(
                         DENIED,
-                        f"the vehicle is not inside the fence: {-inside:.2f} m beyond the "
-                        f"clearance of wall {number}",
+                        f"the vehicle is {where}: {-inside:.2f} m beyond the clearance of "
+                        f"wall or cylinder {number}",
                     )
         return fence
 

@@ -18,7 +18,8 @@ from fsw.link.wire import message_ids as ids
 from fsw.link.wire.decode import for_this_vehicle
 from fsw.link.wire.encode_replies import status_texts
 from fsw.link.wire.outgoing import Outgoing
-from fsw.parameters.registry import BY_NAME, PARAMETERS
+from fsw.parameters.facts import FACT_BY_NAME, REPEATED
+from fsw.parameters.registry import BY_NAME
 from fsw.parameters.storage import REAL32
 from fsw.parameters.store import ParameterStore
 from fsw.signals import StatusText
@@ -29,12 +30,14 @@ _BURST_EVERY_US: Final = 20_000  # 500 values a second
 _UINT32: Final = 5  # MAV_PARAM_TYPE
 _NO_INDEX: Final = 0xFFFF
 _BY_NAME: Final = -1  # in place of an index
-_DOES_NOT_EXIST, _OUT_OF_RANGE = 1, 2  # MAV_PARAM_ERROR
+_DOES_NOT_EXIST, _OUT_OF_RANGE, _READ_ONLY = 1, 2, 5  # MAV_PARAM_ERROR
 _WARNING: Final = 4  # MAV_SEVERITY
 _HASH: Final = "_HASH_CHECK"  # what QGroundControl asks for, to see whether it knows all values
 _Peer = tuple[int, int]  # system and component
-_COUNT: Final = len(PARAMETERS)
-_INDEX: Final = {parameter.name: index for index, parameter in enumerate(PARAMETERS)}
+# In the order of their index on the wire, which is that of their names: clients sort so too.
+_NAMES: Final = tuple(sorted([*BY_NAME, *FACT_BY_NAME]))
+_COUNT: Final = len(_NAMES)
+_INDEX: Final = {name: index for index, name in enumerate(_NAMES)}
 
 
 class ParameterService:
@@ -55,9 +58,11 @@ class ParameterService:
         values = frame.payload_values
         if frame.message_id == ids.PARAM_REQUEST_LIST:
             system, component = cast("tuple[int, int]", values)
-            if for_this_vehicle(system, component):
-                self._next, self._burst_us = 0, t_us
-            return ()
+            if not for_this_vehicle(system, component):
+                return ()
+            self._next, self._burst_us = 0, t_us
+            # First, as PX4 has it: who knows all values from last time says so and needs no list.
+            return (self._hash(),)
         if frame.message_id == ids.PARAM_REQUEST_READ:
             index, system, component, text = cast("tuple[int, int, int, bytes]", values)
             if not for_this_vehicle(system, component):
@@ -80,6 +85,8 @@ class ParameterService:
             name = next(iter(news.changed))
             del news.changed[name]
             answers.append(self._value(_INDEX[name]))
+            if name in REPEATED:
+                answers.append(self._value(_INDEX[REPEATED[name]]))
         if self._next < _COUNT and t_us >= self._burst_us:
             self._burst_us = t_us + _BURST_EVERY_US
             end = min(self._next + BURST, _COUNT)
@@ -97,7 +104,14 @@ class ParameterService:
 
     def _set(self, name: str, value: float, type_: int, asker: _Peer) -> Sequence[Outgoing]:
         if name == _HASH:
-            return ()  # QGroundControl's word that it needs no list
+            self._next = _COUNT  # QGroundControl's word that it needs no list
+            return ()
+        if name in FACT_BY_NAME:
+            told, index = self._value(_INDEX[name]), _INDEX[name]
+            if value == told.values[0]:
+                return (told,)
+            why = f"{name} is read only: {FACT_BY_NAME[name].meaning}"
+            return (*self._text(why), told, _error(index, name, _READ_ONLY, asker))
         if name not in BY_NAME:
             return (_error(_BY_NAME, name, _DOES_NOT_EXIST, asker),)
         if type_ == REAL32:
@@ -110,15 +124,20 @@ class ParameterService:
         return (*self._text(refusal), _error(_INDEX[name], name, _OUT_OF_RANGE, asker))
 
     def _value(self, index: int) -> Outgoing:
-        name = PARAMETERS[index].name
-        value = self._store.values[name]
-        return Outgoing(ids.PARAM_VALUE, (value, _COUNT, index, name.encode(), REAL32))
+        name = _NAMES[index]
+        return Outgoing(
+            ids.PARAM_VALUE, (self._read_value(name), _COUNT, index, name.encode(), REAL32)
+        )
+
+    def _read_value(self, name: str) -> float:
+        fact, values = FACT_BY_NAME.get(name), self._store.values
+        return values[name] if fact is None else fact.read(values)
 
     def _hash(self) -> Outgoing:
         """CRC-32 over names and values in order, nothing inverted; its bits in place of a float."""
         state = 0xFFFFFFFF
-        for parameter in PARAMETERS:
-            named = parameter.name.encode() + struct.pack("<f", self._store.values[parameter.name])
+        for name in _NAMES:
+            named = name.encode() + struct.pack("<f", self._read_value(name))
             state = zlib.crc32(named, state)
         (bits,) = struct.unpack("<f", struct.pack("<I", state ^ 0xFFFFFFFF))
         return Outgoing(ids.PARAM_VALUE, (bits, _COUNT, _NO_INDEX, _HASH.encode(), _UINT32))

@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Final
 
-from fsw.link.telemetry.stream_rates import StreamRates
+from fsw.link.telemetry.stream_rates import UNKNOWN, StreamRates
 from fsw.link.telemetry.streams import messages_now
 from fsw.link.wire import decode, encode_replies, message_ids
 from fsw.link.wire.outgoing import Outgoing
@@ -21,8 +21,9 @@ _GET_HOME_POSITION: Final = 410  # MAV_CMD
 _GET_MESSAGE_INTERVAL: Final = 510
 _SET_MESSAGE_INTERVAL: Final = 511
 _REQUEST_MESSAGE: Final = 512
+_REQUEST_PROTOCOL_VERSION: Final = 519
 _REQUEST_AUTOPILOT_CAPABILITIES: Final = 520
-_ACCEPTED, _TEMPORARILY_REJECTED, _DENIED = 0, 1, 2  # MAV_RESULT
+_ACCEPTED, _TEMPORARILY_REJECTED, _DENIED, _FAILED = 0, 1, 2, 4  # MAV_RESULT
 _INFO: Final = 6  # MAV_SEVERITY: a client's question that has no answer endangers nobody
 _DECODERS: Final = {
     message_ids.COMMAND_LONG: decode.command_long,
@@ -46,6 +47,7 @@ class LinkCommands:
             _SET_MESSAGE_INTERVAL: self._set_interval,
             _REQUEST_MESSAGE: self._request_message,
             _REQUEST_AUTOPILOT_CAPABILITIES: self._request_capabilities,
+            _REQUEST_PROTOCOL_VERSION: self._request_protocol_version,
         }
 
     def answer(
@@ -87,6 +89,8 @@ class LinkCommands:
         message_id, interval = _whole(request.params[0]), _whole(request.params[1])
         if message_id is None or interval is None:
             return _DENIED, "message interval: param1 is a message id, param2 a time in us", ()
+        if self._rates.interval_us(message_id) == UNKNOWN:
+            return _FAILED, "", ()
         refusal = self._rates.set_interval(message_id, interval, t_us)
         return (_DENIED if refusal else _ACCEPTED), refusal, ()
 
@@ -110,12 +114,20 @@ class LinkCommands:
             return _DENIED, "request capabilities: param1 = 1 asks for them", ()
         return self._now(message_ids.AUTOPILOT_VERSION, math.nan, snapshot)
 
+    def _request_protocol_version(
+        self, request: CommandRequest, t_us: int, snapshot: FlightSnapshot | None
+    ) -> _Outcome:
+        if request.params[0] != 1.0:
+            return _DENIED, "request protocol version: param1 = 1 asks for it", ()
+        return self._now(message_ids.PROTOCOL_VERSION, math.nan, snapshot)
+
     def _now(self, message_id: int, which: float, snapshot: FlightSnapshot | None) -> _Outcome:
         if snapshot is None:
             return _TEMPORARILY_REJECTED, "the vehicle has not begun to fly", ()
         messages = messages_now(message_id, which, snapshot, self._context)
         if messages is None:
-            return _DENIED, f"message {message_id} is not one that this vehicle sends", ()
+            # No text: ground stations probe for cameras, gimbals and much else at every start.
+            return _DENIED, "", ()
         if not messages:
             return _TEMPORARILY_REJECTED, f"message {message_id}: nothing to tell yet", ()
         return _ACCEPTED, "", messages

@@ -27,6 +27,7 @@ Numbers = tuple[float, ...]  # a payload without text, in wire order
 
 _LOCAL_NED: Final = 1  # MAV_FRAME_LOCAL_NED
 _INT32_MAX: Final = 0x7FFFFFFF
+_DO_SET_MODE: Final = 176  # MAV_CMD
 _LOCAL_FRAMES: Final = frozenset({1, 7, 8, 9, 12})  # COMMAND_INT scales x, y by 1e4 here
 _VELOCITY_IGNORED: Final = 0x038  # POSITION_TARGET_TYPEMASK
 _ACCELERATION_IGNORED: Final = 0x1C0
@@ -100,6 +101,23 @@ def command_int(frame: Frame) -> CommandRequest | None:
         source_system=frame.system_id,
         source_component=frame.component_id,
         frame=int(mav_frame),
+    )
+
+
+def set_mode(frame: Frame) -> CommandRequest | None:
+    """Read a SET_MODE, the older form of DO_SET_MODE; None if it is for another system.
+
+    It names PX4's main and sub mode in one number, and no component.
+    """
+    custom_mode, system, base_mode = cast("tuple[int, int, int]", frame.payload_values)
+    if not for_this_vehicle(system, 0):
+        return None
+    main, sub = custom_mode >> 16 & 0xFF, custom_mode >> 24
+    return CommandRequest(
+        command=_DO_SET_MODE,
+        params=(float(base_mode), float(main), float(sub), *(math.nan,) * 4),
+        source_system=frame.system_id,
+        source_component=frame.component_id,
     )
 
 

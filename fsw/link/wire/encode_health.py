@@ -7,7 +7,7 @@ from typing import Final
 
 from fsw.link.wire.outgoing import WireValues
 from fsw.link.wire.telemetry_context import TelemetryContext
-from fsw.signals import BatteryState, FlightSnapshot
+from fsw.signals import BatteryState, Charge, FlightSnapshot
 from fsw.vehicle.faults import Fault
 
 # MAV_SYS_STATUS_SENSOR bits of what this vehicle has. It has no magnetometer and no satellite
@@ -27,8 +27,8 @@ _SUSPECT: Final[dict[str, int]] = {
     Fault.ESTIMATE_INVALID.value: _SENSING,
     Fault.TILT_LOST.value: _ATTITUDE | _RATE_CONTROL,
 }
-_LOW, _CRITICAL = 0.2, 0.1  # shares of the charge
-_CHARGE_OK, _CHARGE_LOW, _CHARGE_CRITICAL = 1, 2, 3  # MAV_BATTERY_CHARGE_STATE
+# MAV_BATTERY_CHARGE_STATE: 0 is undefined, OK is 1.
+_CHARGE_STATES: Final = {charge: int(charge) + 1 for charge in Charge}
 _LIPO, _FOR_EVERYTHING = 1, 1  # MAV_BATTERY_TYPE, MAV_BATTERY_FUNCTION
 _UNKNOWN_CELL: Final = 0xFFFF
 _UNKNOWN_TEMPERATURE: Final = 0x7FFF
@@ -45,7 +45,7 @@ def sys_status(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValue
         health &= ~(_SUSPECT.get(failure, 0) | _PREARM)
     if snapshot.arming_refusal:
         health &= ~_PREARM
-    if battery.remaining < _CRITICAL:
+    if battery.charge >= Charge.CRITICAL:
         health &= ~_BATTERY
     margins = snapshot.constraints.margins
     if margins and not min(margins) >= 0.0:
@@ -72,9 +72,6 @@ def sys_status(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValue
 def battery_status(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues:
     """BATTERY_STATUS: one pack whose cells are not told apart."""
     battery = snapshot.battery
-    state = _CHARGE_OK
-    if battery.remaining < _LOW:
-        state = _CHARGE_LOW if battery.remaining >= _CRITICAL else _CHARGE_CRITICAL
     return (
         round(1000.0 * battery.consumed),
         _UNKNOWN_ENERGY,
@@ -87,7 +84,7 @@ def battery_status(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues:
         _LIPO,
         _percent(battery),
         0,
-        state,
+        _CHARGE_STATES[battery.charge],
         *(0, 0, 0, 0),
         0,
         0,
@@ -98,6 +95,12 @@ def estimator_status(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValue
     """ESTIMATOR_STATUS: what is known. There is no filter, hence no innovation to report."""
     invalid = Fault.ESTIMATE_INVALID.value in snapshot.failures
     return (snapshot.t_us, *(math.nan,) * 8, 0 if invalid else _ESTIMATED)
+
+
+def vibration(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues:
+    """VIBRATION as PX4 fills it: high-frequency gyro and accelerometer, nothing was clipped."""
+    gyro, accel = context.health.vibration
+    return (snapshot.t_us, 0.0, gyro, accel, 0, 0, 0)
 
 
 def _millivolts(battery: BatteryState) -> int:

@@ -12,9 +12,15 @@ from fsw.link.wire.px4_mode import AVAILABLE_MODES, custom_mode, shown_mode
 from fsw.link.wire.telemetry_context import TelemetryContext
 from fsw.signals import FlightSnapshot
 
-# MAV_PROTOCOL_CAPABILITY: float parameters, COMMAND_INT, FTP, SET_ATTITUDE_TARGET,
-# SET_POSITION_TARGET_LOCAL_NED, MAVLink 2, and missions with fence and rally points, as integers.
-_CAPABILITIES: Final = 2 | 4 | 8 | 32 | 64 | 128 | 8192 | 16384 | 32768
+# MAV_PROTOCOL_CAPABILITY: missions in floats and integers, float parameters, encoded bytewise
+# (which is one with a cast for a REAL32), COMMAND_INT, FTP, SET_ATTITUDE_TARGET,
+# SET_POSITION_TARGET_LOCAL_NED, flight termination, MAVLink 2, fence and rally points.
+_CAPABILITIES: Final = 1 | 2 | 4 | 8 | 16 | 32 | 64 | 128 | 2048 | 8192 | 16384 | 32768
+# The release of PX4 whose behaviour towards ground stations is followed: QGroundControl asks for
+# 1.4.1 at least. It is marked as a development version, which is no release of anybody's; Pandion's
+# own version is that of the middleware (docs/decisions/0018-as-px4-answers.md).
+_FOLLOWED: Final = 1 << 24 | 16 << 16
+_PROTOCOL_1, _PROTOCOL_2 = 100, 200
 _UID: Final = int.from_bytes(b"PANDION", "big")
 _NAME_SIZE: Final = 35  # bytes of mode_name
 _UNRELEASED: Final = 0  # FIRMWARE_VERSION_TYPE_DEV
@@ -34,10 +40,10 @@ _VERSION: Final = _version_number()
 
 
 def autopilot_version(_: FlightSnapshot, __: TelemetryContext) -> WireValues:
-    """AUTOPILOT_VERSION: our own version, not one of PX4's."""
+    """AUTOPILOT_VERSION: the PX4 that is followed, and our own version as middleware."""
     nothing = (0,) * 8
     return (
-        *(_CAPABILITIES, _UID, _VERSION, 0, 0, 0, 0, 0),
+        *(_CAPABILITIES, _UID, _FOLLOWED | _UNRELEASED, _VERSION, 0, 0, 0, 0),
         *nothing,
         *nothing,
         *nothing,
@@ -46,10 +52,16 @@ def autopilot_version(_: FlightSnapshot, __: TelemetryContext) -> WireValues:
 
 
 def current_mode(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues:
-    """CURRENT_MODE; what was intended is not told apart from what is."""
+    """CURRENT_MODE, and the one that was intended where a failsafe has taken over."""
     number = custom_mode(shown_mode(snapshot))
     standard = next((m.standard_mode for m in AVAILABLE_MODES if m.custom_mode == number), 0)
-    return (number, 0, standard)
+    before = snapshot.failsafe_from
+    return (number, number if before is None else custom_mode(before), standard)
+
+
+def protocol_version(_: FlightSnapshot, __: TelemetryContext) -> WireValues:
+    """PROTOCOL_VERSION: 2, and 1 with those who speak it; the hashes say nothing."""
+    return (_PROTOCOL_2, _PROTOCOL_1, _PROTOCOL_2, *(0,) * 16)
 
 
 def available_modes(which: float, _: FlightSnapshot, __: TelemetryContext) -> Sequence[Outgoing]:
@@ -59,7 +71,10 @@ def available_modes(which: float, _: FlightSnapshot, __: TelemetryContext) -> Se
     return [
         Outgoing(
             message_ids.AVAILABLE_MODES,
-            (mode.custom_mode, 0, count, number, mode.standard_mode, _name(mode.name)),
+            (
+                *(mode.custom_mode, mode.properties, count, number, mode.standard_mode),
+                _name(mode.name),
+            ),
         )
         for number, mode in enumerate(AVAILABLE_MODES, start=1)
         if every or number == which

@@ -10,6 +10,7 @@ import math
 from typing import Final
 
 from fsw.control.attitude import attitude_reference
+from fsw.geometry.geodesy import to_global
 from fsw.geometry.rotation import euler_zyx, quaternion_from_matrix
 from fsw.link.wire.encode_setpoints import as_asked
 from fsw.link.wire.outgoing import WireValues
@@ -19,14 +20,20 @@ from fsw.signals import FlightSnapshot, Mode, SetpointKind, Vec3, Vec4
 
 _QUADROTOR: Final = 2  # MAV_TYPE
 _ARMED: Final = 128  # MAV_MODE_FLAG
-_GUIDED: Final = 8
-_STABILISED: Final = 16
 _CUSTOM_MODE: Final = 1
-_STANDBY, _ACTIVE, _CRITICAL, _TERMINATED = 3, 4, 5, 8  # MAV_STATE
+_AUTO, _GUIDED, _STABILISED, _MANUAL_INPUT = 4, 8, 16, 64
+_BY_ITSELF: Final = _CUSTOM_MODE | _AUTO | _GUIDED | _STABILISED
+_GUIDED_FROM_OUTSIDE: Final = _CUSTOM_MODE | _STABILISED
+# As PX4 sets them: 29 in its automatic modes, 17 where something outside steers.
+_BASE_MODES: Final = {Mode.OFFBOARD: _GUIDED_FROM_OUTSIDE, Mode.TRAJECTORY: _GUIDED_FROM_OUTSIDE}
+_UNINIT, _STANDBY, _ACTIVE, _CRITICAL, _TERMINATED = 0, 3, 4, 5, 8  # MAV_STATE
 _MAVLINK_VERSION: Final = 3
 _LOCAL_NED: Final = 1  # MAV_FRAME
+_GLOBAL: Final = 0  # MAV_FRAME
+_ACCEL_AND_GYRO: Final = 0x3F  # HIGHRES_IMU_UPDATED_FLAGS
 _ON_GROUND, _IN_AIR, _TAKEOFF, _LANDING = 1, 2, 3, 4  # MAV_LANDED_STATE
 _BODY_NED: Final = 8
+_IGNORE_ALL: Final = 0xDFF  # POSITION_TARGET_TYPEMASK, all but the flag of forces
 _RATES_IGNORED: Final = 0x07  # ATTITUDE_TARGET_TYPEMASK
 _ATTITUDE_IGNORED: Final = 0x80
 _ZERO: Final[Vec3] = (0.0, 0.0, 0.0)
@@ -35,15 +42,18 @@ _U32: Final = 0xFFFFFFFF
 
 def heartbeat(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues:
     """HEARTBEAT as PX4 would send it, under whatever autopilot's name."""
-    base_mode = _CUSTOM_MODE | _STABILISED | _GUIDED | (_ARMED if snapshot.armed else 0)
+    shown = shown_mode(snapshot)
+    base_mode = _BASE_MODES.get(shown, _BY_ITSELF) | (_ARMED if snapshot.armed else 0)
     if snapshot.mode is Mode.FAULT:
         status = _TERMINATED
-    elif snapshot.failures:
+    elif snapshot.failures or snapshot.failsafe_from is not None:
         status = _CRITICAL
+    elif snapshot.armed:
+        status = _ACTIVE
     else:
-        status = _ACTIVE if snapshot.armed else _STANDBY
+        status = _UNINIT if snapshot.arming_refusal else _STANDBY
     return (
-        custom_mode(shown_mode(snapshot)),
+        custom_mode(shown),
         _QUADROTOR,
         context.autopilot,
         base_mode,
@@ -82,7 +92,7 @@ def local_position(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues:
     return (_boot_ms(snapshot.t_us), *snapshot.estimate.p_WB, *snapshot.estimate.v_WB)
 
 
-def position_target(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues | None:
+def position_target(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues:
     """POSITION_TARGET_LOCAL_NED: the set-point flown, or where the plan wants the body now."""
     plan, offboard = snapshot.plan_state, snapshot.offboard
     if offboard.kind is SetpointKind.BODY and offboard.motion is not None:
@@ -90,7 +100,8 @@ def position_target(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues
         frame = _BODY_NED if offboard.motion.along_heading else _LOCAL_NED
         return (_boot_ms(snapshot.t_us), *numbers, mask, frame)
     if plan is None:
-        return None
+        # Nothing is followed: the stream goes on, as PX4's does, and says to ignore all of it.
+        return (_boot_ms(snapshot.t_us), *(0.0,) * 11, _IGNORE_ALL, _LOCAL_NED)
     motion = (*plan.p, *plan.v, *plan.a)
     return (_boot_ms(snapshot.t_us), *motion, plan.yaw, plan.yaw_rate, 0, _LOCAL_NED)
 
@@ -107,6 +118,39 @@ def attitude_target(snapshot: FlightSnapshot, context: TelemetryContext) -> Wire
     yaw = snapshot.estimate.yaw if plan is None else plan.yaw
     quaternion = _quaternion(attitude_reference((0.0, 0.0, 0.0) if u is None else u.a, yaw))
     return (_boot_ms(snapshot.t_us), *quaternion, 0.0, 0.0, 0.0, thrust, _RATES_IGNORED)
+
+
+def servo_outputs(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues:
+    """SERVO_OUTPUT_RAW: rotors 1 to 4 and joints 5 and 6, as pulse lengths 1000 to 2000 us.
+
+    A rotor's is its share of full thrust, a joint's its torque about 1500.
+    """
+    facts, actuators = context.facts, snapshot.actuators
+    pulses = [0, 0, 0, 0, 0, 0]
+    if snapshot.armed:
+        pulses = [
+            *(1000 + round(1000.0 * f / facts.rotor_thrust_max) for f in actuators.rotor_thrust),
+            *(1500 + round(500.0 * t / facts.joint_torque_max) for t in actuators.joint_torque),
+        ]
+    return (snapshot.t_us & _U32, *pulses, 0, 0, 0, *(0,) * 8)
+
+
+def highres_imu(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues:
+    """HIGHRES_IMU: accelerometer and gyro; nothing else is there."""
+    accel, gyro = snapshot.accel_B, snapshot.estimate.w_WB_B
+    nothing = (0.0,) * 7
+    return (snapshot.t_us, *accel, *gyro, *nothing, _ACCEL_AND_GYRO, 0)
+
+
+def orbit_status(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues | None:
+    """ORBIT_EXECUTION_STATUS: the circle that is flown, while one is; radius < 0 to the left."""
+    orbit = snapshot.orbit
+    if orbit is None:
+        return None
+    latitude, longitude, altitude = to_global(context.origin, orbit.centre)
+    radius = orbit.radius if orbit.clockwise else -orbit.radius
+    place = (round(1e7 * latitude), round(1e7 * longitude), altitude)
+    return (snapshot.t_us, radius, *place, _GLOBAL)
 
 
 def _boot_ms(t_us: int) -> int:

@@ -49,6 +49,7 @@ class LoopHealth:
     mpc: GroupTiming = field(default_factory=lambda: GroupTiming(period_us=100_000))
     telemetry: GroupTiming = field(default_factory=lambda: GroupTiming(period_us=2_000))
     housekeeping: GroupTiming = field(default_factory=lambda: GroupTiming(period_us=1_000_000))
+    vibration: Vec2 = (0.0, 0.0)  # rad/s, m/s^2: gyro and accelerometer, high-pass filtered
 
 
 @dataclass(slots=True)

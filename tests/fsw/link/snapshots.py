@@ -24,6 +24,7 @@ from fsw.signals import (
     MissionState,
     Mode,
     OffboardReport,
+    Orbit,
     Plan,
     PlanInput,
     PlannerCounters,
@@ -49,6 +50,7 @@ CONTEXT = TelemetryContext(
     LoopHealth(
         inner=GroupTiming(2_000, 5000, 3, 1, 60.0, 120.0, 500.0, 20.0, 90.0, 700.0, 0.03),
         mpc=GroupTiming(100_000, 100, 0, 0, 900.0, 1500.0, 2100.0, 0.0, 0.0, 0.0, 0.01),
+        vibration=(0.02, 0.3),
     ),
     start_unix_us=1_750_000_000_000_000,
     plan_ids=PlanIds(0xDEADBEEF, 7, 9),
@@ -97,6 +99,8 @@ SNAPSHOT = FlightSnapshot(
     battery=BatteryState(voltage=15.2, current=18.3, consumed=1.9, remaining=0.62),
     offboard=OffboardReport(accepted=5, refused=2, age_us=40_000),
     mission=MissionProgress(MissionState.PAUSED, 2, 5, 1, 2),
+    orbit=Orbit((1.0, 2.0, -3.0), 2.5, 0.4, clockwise=False),
+    accel_B=(0.1, 0.2, -9.7),
 )  # fmt: skip
 
 

@@ -4,8 +4,9 @@ import json
 import re
 from typing import Any
 
+from fsw.parameters.facts import FACT_BY_NAME
 from fsw.parameters.metadata import general_document, metadata_crc, parameter_document
-from fsw.parameters.registry import BY_NAME, PARAMETERS
+from fsw.parameters.registry import BY_NAME
 
 # What the format allows of a parameter, and as what.
 ALLOWED: dict[str, type | tuple[type, ...]] = {
@@ -24,6 +25,7 @@ ALLOWED: dict[str, type | tuple[type, ...]] = {
     "category": str,
     "volatile": bool,
     "readOnly": bool,
+    "values": list,
 }
 
 
@@ -36,14 +38,24 @@ def test_each_parameter_is_described_as_the_format_wants_it() -> None:
             assert isinstance(value, ALLOWED[key]), key
         assert re.fullmatch(r"[.\-a-zA-Z0-9_{}]{1,16}", described["name"])
         assert described["type"] == "Float"
-        assert described["min"] <= described["default"] <= described["max"]
+        repeats = FACT_BY_NAME.get(described["name"])
+        if repeats is None or not repeats.repeats:
+            assert described["min"] <= described["default"] <= described["max"]
+        for choice in described.get("values", ()):
+            assert set(choice) == {"value", "description"}
+
+
+def test_every_choice_is_a_value_and_its_default_is_among_them() -> None:
+    for described in json.loads(parameter_document())["parameters"]:
+        values = [choice["value"] for choice in described.get("values", ())]
+        assert not values or described["default"] in values, described["name"]
 
 
 def test_the_description_says_what_the_table_says() -> None:
     described: dict[str, Any] = {
         entry["name"]: entry for entry in json.loads(parameter_document())["parameters"]
     }
-    assert list(described) == [parameter.name for parameter in PARAMETERS]
+    assert list(described) == sorted([*BY_NAME, *FACT_BY_NAME])
     tilt, entry = BY_NAME["PLN_TILT_MAX"], described["PLN_TILT_MAX"]
     assert (entry["units"], entry["default"]) == ("deg", 18.0)
     assert (entry["min"], entry["max"], entry["shortDesc"]) == (

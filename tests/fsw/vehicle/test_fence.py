@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from matplotlib.path import Path
 
-from fsw.signals import SafeSet, Vec3, WorkspaceSphere
+from fsw.barriers.tangent import distance_to
+from fsw.signals import PointObstacle, SafeSet, Vec3, WorkspaceSphere
 from fsw.vehicle.fence import (
     CIRCLE_EXCLUSION,
     CIRCLE_INCLUSION,
     POLYGON_EXCLUSION,
     POLYGON_INCLUSION,
     RETURN_POINT,
+    cylinders_over,
     read_fence,
 )
 from fsw.vehicle.mission_items import MissionItem, Refused
@@ -43,6 +47,11 @@ def polygon(corners: Corners, command: int = POLYGON_INCLUSION) -> tuple[Mission
 
 def circle(radius: float, frame: int = 1, z: float = 0.0) -> MissionItem:
     return MissionItem(CIRCLE_INCLUSION, frame, (radius, 0.0, 0.0, 0.0), 10_000, 0, z)
+
+
+def excluded(radius: float, north: float = 3.0) -> MissionItem:
+    params = (radius, 0.0, 0.0, 0.0)
+    return MissionItem(CIRCLE_EXCLUSION, 1, params, round(1e4 * north), 0, 0.0)
 
 
 def safe(items: tuple[MissionItem, ...]) -> SafeSet:
@@ -132,8 +141,11 @@ def test_two_polygons_are_kept_both() -> None:
         (polygon(CASE_1)[:3], 5, "vertices"),
         (polygon(CASE_1)[:3] + polygon([(0, 0), (1, 0), (0, 1)]), 5, "number"),
         (polygon(CASE_1[:2]), 6, "vertices"),
-        (polygon(CASE_1, POLYGON_EXCLUSION), 3, "exclusion"),
-        (polygon(CASE_1[:1], CIRCLE_EXCLUSION), 3, "exclusion"),
+        (polygon(CASE_1[:2], POLYGON_EXCLUSION), 6, "vertices"),
+        (polygon(CASE_1)[:3] + polygon(CASE_1, POLYGON_EXCLUSION)[:1], 5, "number"),
+        ((circle(0.1, 7), excluded(1.0)), 5, "at once"),
+        ((excluded(math.inf),), 6, "radius"),
+        ((excluded(1.0),) * 17, 5, "cylinders"),
         (polygon(CASE_1[:1], RETURN_POINT), 3, "return point"),
         (polygon(CASE_1[:1], 16), 3, "16"),
         ((circle(0.0),), 6, "radius"),
@@ -155,3 +167,44 @@ def test_what_is_no_safe_set_is_refused_with_the_reason(
 
 def test_no_fence_is_no_safe_set() -> None:
     assert safe(()) == SafeSet()
+
+
+def test_a_circle_of_exclusion_is_an_upright_cylinder() -> None:
+    (cylinder,) = safe((excluded(0.5),)).obstacles
+    assert cylinder == PointObstacle((3.0, 0.0, 0.0), 0.6, upright=True)
+    for height in (0.0, -1.4, -50.0):
+        assert distance_to(cylinder, (3.0, 1.0, height)) == pytest.approx(1.0)
+
+
+def test_inclusion_and_exclusion_are_kept_together() -> None:
+    fence = safe((*polygon(CASE_1), excluded(0.2)))
+    assert (len(fence.walls), len(fence.obstacles)) == (4, 1)
+
+
+@given(
+    st.lists(st.tuples(st.floats(-20.0, 20.0), st.floats(-20.0, 20.0)), min_size=3, max_size=12),
+    st.floats(0.0, 1.0),
+    st.floats(0.0, 1.0),
+)
+def test_the_cylinders_cover_every_point_of_a_polygon(
+    corners: Corners, share: float, other: float
+) -> None:
+    """Of any shape, crossing itself too: what is inside, and between two places of its outline."""
+    cylinders = cylinders_over(corners, 0.1)
+    path = Path(np.array([*corners, corners[0]]))
+    for a in corners:
+        for b, c in zip(corners, corners[1:] + corners[:1], strict=True):
+            edge = (b[0] + other * (c[0] - b[0]), b[1] + other * (c[1] - b[1]))
+            p = (a[0] + share * (edge[0] - a[0]), a[1] + share * (edge[1] - a[1]))
+            if p in (a, edge) or path.contains_point(p):
+                inside = min(distance_to(o, (*p, -1.0)) - o.clearance for o in cylinders)
+                assert inside <= -0.1 + 1e-6
+
+
+def test_a_long_polygon_is_covered_by_several_cylinders_and_not_by_a_wide_one() -> None:
+    """A wall of 10 m by 0.5 m must leave room beside it."""
+    wall = [(0.0, 0.0), (10.0, 0.0), (10.0, 0.5), (0.0, 0.5)]
+    cylinders = cylinders_over(wall, 0.1)
+    assert len(cylinders) == 6
+    assert max(o.clearance for o in cylinders) < 1.0
+    assert min(distance_to(o, (5.0, 2.0, -1.0)) - o.clearance for o in cylinders) > 0.5

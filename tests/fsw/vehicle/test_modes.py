@@ -31,15 +31,9 @@ def test_a_disarmed_vehicle_can_only_be_armed_or_terminated() -> None:
 
 
 def test_a_landing_must_be_broken_off_before_anything_else_can_begin() -> None:
-    for event in (Event.FOLLOW, Event.START_MISSION, Event.GO_OFFBOARD):
+    for event in (Event.FOLLOW, Event.START_MISSION, Event.GO_OFFBOARD, Event.CIRCLE):
         before = {mode for mode in FLYING if next_mode(mode, event) is not None}
         assert before == set(FLYING) - {Mode.LAND}
-
-
-def test_who_flies_by_itself_goes_on_without_a_ground_station() -> None:
-    for mode in (Mode.MISSION, Mode.TRAJECTORY, Mode.RETURN, Mode.LAND):
-        assert next_mode(mode, Event.LINK_LOST) is None
-    assert next_mode(Mode.HOLD, Event.LINK_LOST) is Mode.RETURN
 
 
 def test_every_mode_can_be_reached_from_disarmed() -> None:

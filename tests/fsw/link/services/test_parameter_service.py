@@ -10,15 +10,17 @@ import pytest
 from fsw.link.services.parameter_service import BURST, ParameterService
 from fsw.link.wire import message_ids as ids
 from fsw.link.wire.outgoing import Outgoing
+from fsw.parameters.facts import FACT_BY_NAME
 from fsw.parameters.flight_config import FlightConfig
-from fsw.parameters.registry import PARAMETERS
+from fsw.parameters.registry import BY_NAME
 from fsw.parameters.store import ParameterStore
 from messages import dialect
 from messages.frames import Frame, FrameWriter, split, wire_fields
 from tests.fsw.parameters.test_store import ticks
 from tests.fsw.parameters.threads import AtOnce
 
-COUNT = len(PARAMETERS)
+NAMES = sorted([*BY_NAME, *FACT_BY_NAME])
+COUNT = len(NAMES)
 TICK_US = 2_000
 
 
@@ -65,15 +67,58 @@ def later(service: ParameterService, count: int, start_us: int = 0) -> list[dict
 
 
 def test_a_list_is_whole_paced_and_in_order(service: ParameterService) -> None:
-    assert service.receive(listing(), 0) == ()
+    (hash_,) = said(service.receive(listing(), 0))
+    assert (hash_["param_id"], hash_["param_index"]) == (b"_HASH_CHECK", 65535)
     bursts = [said(service.poll(k * TICK_US)) for k in range(500)]
     assert max(map(len, bursts)) <= BURST, "no tick sends more than a datagram"
     values = [value for burst in bursts for value in burst]
     assert [value["param_index"] for value in values] == list(range(COUNT))
     assert {value["param_count"] for value in values} == {COUNT}
     assert {value["param_type"] for value in values} == {dialect.MAV_PARAM_TYPE_REAL32}
-    assert [value["param_id"] for value in values] == [p.name.encode() for p in PARAMETERS]
-    assert bursts[150:] == [[]] * 350, "all within 0.3 s"
+    assert [value["param_id"] for value in values] == [name.encode() for name in NAMES]
+    assert bursts[250:] == [[]] * 250, "all within 0.5 s"
+
+
+def test_who_sends_the_hash_back_needs_no_list(service: ParameterService) -> None:
+    (hash_,) = said(service.receive(listing(), 0))
+    assert len(later(service, 1)) == BURST
+    bits = hash_["param_value"]
+    assert isinstance(bits, float)
+    assert service.receive(setting(b"_HASH_CHECK", bits, type_=5), TICK_US) == ()
+    assert later(service, 100, TICK_US) == []
+
+
+def test_what_is_read_only_says_so_and_shows_its_value(
+    store: ParameterStore, service: ParameterService
+) -> None:
+    *text, told, error = said(service.receive(setting(b"COM_RC_IN_MODE", 4.0), 0))
+    assert (told["message"], told["param_value"]) == (ids.PARAM_VALUE, 1.0)
+    assert error["error"] == dialect.MAV_PARAM_ERROR_READ_ONLY
+    assert b"read only" in b"".join(bytes(t["text"]) for t in text)  # type: ignore[call-overload]
+    (same,) = said(service.receive(setting(b"COM_RC_IN_MODE", 1.0), 0))
+    assert same["param_value"] == 1.0
+    assert ticks(store) == []
+
+
+def test_px4_s_name_of_a_parameter_follows_it(
+    store: ParameterStore, service: ParameterService
+) -> None:
+    service.receive(setting(b"STR_V_MAX", 1.25), 0)
+    ticks(store)
+    told = {value["param_id"]: value["param_value"] for value in later(service, 3)}
+    assert told == {b"STR_V_MAX": 1.25, b"MPC_XY_VEL_MAX": 1.25}
+
+
+def test_a_choice_that_there_is_not_is_refused(
+    store: ParameterStore, service: ParameterService
+) -> None:
+    *text, error = said(service.receive(setting(b"COM_LOW_BAT_ACT", 1.0), 0))
+    assert error["error"] == dialect.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE
+    assert b"2 Land when critical" in b"".join(
+        bytes(t["text"])
+        for t in text  # type: ignore[call-overload]
+    )
+    assert ticks(store) == []
 
 
 def test_a_second_request_starts_the_list_again(service: ParameterService) -> None:
@@ -89,7 +134,7 @@ def test_one_parameter_by_name_or_index(service: ParameterService) -> None:
     index = by_name["param_index"]
     assert isinstance(index, int)
     assert said(service.receive(reading(index=index), 0)) == [by_name]
-    assert PARAMETERS[index].name == "PID_YAW_P"
+    assert NAMES[index] == "PID_YAW_P"
 
 
 @pytest.mark.parametrize("index", [-1, COUNT, 32767])
@@ -187,9 +232,10 @@ def test_the_hash_tells_a_ground_station_that_it_knows_every_value(
 
     def bitwise() -> int:
         state = 0
-        for parameter in PARAMETERS:
-            number = struct.pack("<f", store.values[parameter.name])
-            for byte in parameter.name.encode() + number:
+        for name in NAMES:
+            fact = FACT_BY_NAME.get(name)
+            value = store.values[name] if fact is None else fact.read(store.values)
+            for byte in name.encode() + struct.pack("<f", value):
                 state ^= byte
                 for _ in range(8):
                     state = state >> 1 ^ (0xEDB88320 if state & 1 else 0)

@@ -17,7 +17,7 @@ from tests.fsw.link.ground import Ground, ground_station
 
 NAN = math.nan
 GET, SET, REQUEST, CAPABILITIES = 510, 511, 512, 520
-ACCEPTED, LATER, DENIED = 0, 1, 2
+ACCEPTED, LATER, DENIED, FAILED = 0, 1, 2, 4
 
 
 @pytest.fixture
@@ -71,14 +71,12 @@ def test_a_repeated_command_gets_the_same_answer(ground: Ground) -> None:
 @pytest.mark.parametrize(
     ("command", "params", "word"),
     [
-        (SET, (4711.0, 1e6), "4711"),
         (SET, (float(ids.ATTITUDE), 100.0), "tick"),
         (SET, (NAN, 1e6), "param1"),
         (SET, (30.0, NAN), "param2"),
         (SET, (30.0, math.inf), "param2"),
         (SET, (30.0, 1e30), "param2"),
         (GET, (NAN,), "param1"),
-        (REQUEST, (4711.0,), "4711"),
         (REQUEST, (NAN,), "param1"),
         (CAPABILITIES, (0.0,), "param1"),
     ],
@@ -91,6 +89,28 @@ def test_a_refusal_says_why(
     assert {text.message_id for text in texts} == {ids.STATUSTEXT}
     said = b"".join(bytes(text.payload_values[1]) for text in texts)  # type: ignore[arg-type]
     assert word in said.decode()
+
+
+@pytest.mark.parametrize(
+    ("command", "params", "result"),
+    [
+        (REQUEST, (4711.0,), DENIED),
+        (REQUEST, (259.0,), DENIED),  # CAMERA_INFORMATION
+        (REQUEST, (280.0,), DENIED),  # GIMBAL_MANAGER_INFORMATION
+        (SET, (4711.0, 1e6), FAILED),
+    ],
+)
+def test_a_probe_for_what_is_not_there_is_acknowledged_without_a_text(
+    ground: Ground, command: int, params: tuple[float, ...], result: int
+) -> None:
+    """QGroundControl sends a dozen of them at each start; a text each lit its warning triangle."""
+    assert ask(ground, long(command, *params)) == ((command, result), [])
+
+
+def test_the_protocol_version_comes_by_the_old_command_too(ground: Ground) -> None:
+    ack, (told,) = ask(ground, long(519, 1.0))
+    assert ack == (519, ACCEPTED)
+    assert told.payload_values[:3] == (200, 100, 200)
 
 
 @pytest.mark.parametrize("form", [long, integer])

@@ -14,6 +14,7 @@ from fsw.link.wire import message_ids as ids
 from fsw.link.wire.telemetry_context import GENERIC
 from fsw.signals import (
     AttitudeSetpoint,
+    Charge,
     FlightSnapshot,
     JointSetpoint,
     Mode,
@@ -44,7 +45,10 @@ def stream_of(message_id: int) -> Stream:
 
 # What pymavlink must read for the snapshot, one or a few telling fields a message.
 TELLING: dict[int, dict[str, Any]] = {
-    ids.HEARTBEAT: {"type": 2, "autopilot": 12, "custom_mode": 0x0B040000, "system_status": 4},
+    ids.HEARTBEAT: {
+        "type": 2, "autopilot": 12, "custom_mode": 0x0B040000, "system_status": 4,
+        "base_mode": 145,
+    },
     ids.SYS_STATUS: {
         "load": 40, "voltage_battery": 15_200, "current_battery": 1_830, "battery_remaining": 62,
     },
@@ -76,10 +80,24 @@ TELLING: dict[int, dict[str, Any]] = {
         "seq": 2, "total": 5, "mission_state": 4, "mission_mode": 2,
         "mission_id": 0xDEADBEEF, "fence_id": 7, "rally_points_id": 9,
     },
-    ids.CURRENT_MODE: {"custom_mode": 0x0B040000, "standard_mode": 0},
+    ids.CURRENT_MODE: {
+        "custom_mode": 0x0B040000, "standard_mode": 0, "intended_custom_mode": 0x0B040000,
+    },
+    ids.SERVO_OUTPUT_RAW: {
+        "servo1_raw": 1500, "servo2_raw": 1250, "servo3_raw": 1750, "servo4_raw": 2000,
+        "servo5_raw": 1750, "servo6_raw": 1375, "servo7_raw": 0,
+    },
+    ids.VIBRATION: {"vibration_y": 0.02, "vibration_z": 0.3, "clipping_0": 0},
+    ids.ORBIT_EXECUTION_STATUS: {
+        "radius": -2.5, "x": 473977510, "y": 85456206, "z": 3.0, "frame": 0,
+    },
+    ids.HIGHRES_IMU: {"xacc": 0.1, "zacc": -9.7, "xgyro": 0.4, "fields_updated": 0x3F, "xmag": 0.0},
+    ids.PROTOCOL_VERSION: {"version": 200, "min_version": 100, "max_version": 200},
     ids.ODOMETRY: {"x": 1.0, "vx": 0.2, "vy": -0.1, "vz": 0.3, "rollspeed": 0.4, "frame_id": 1},
     ids.GPS_GLOBAL_ORIGIN: {"latitude": 473977420, "longitude": 85455940, "altitude": 0},
-    ids.AUTOPILOT_VERSION: {"uid": int.from_bytes(b"PANDION", "big")},
+    ids.AUTOPILOT_VERSION: {
+        "uid": int.from_bytes(b"PANDION", "big"), "flight_sw_version": 0x01100000,
+    },
     ids.ARM_JOINT_STATE: {"joint_count": 2, "time_usec": 3_004_000},
     ids.ARM_JOINT_SETPOINT: {"joint_count": 2},
     ids.END_EFFECTOR_TARGET: {"yaw": 0.3, "coordinate_frame": 1},
@@ -181,7 +199,6 @@ def test_landed_state_is_what_clients_wait_for(changes: dict[str, Any], landed_s
 def test_there_is_nothing_to_say_before_the_first_plan() -> None:
     idle = replace(SNAPSHOT, plan=None, plan_state=None, plan_input=None, reference=None)
     for message_id in (
-        ids.POSITION_TARGET_LOCAL_NED,
         ids.ARM_JOINT_SETPOINT,
         ids.END_EFFECTOR_TARGET,
         ids.MPC_STATUS,
@@ -258,11 +275,54 @@ def test_what_forbids_arming_takes_the_prearm_bit_alone() -> None:
     assert lost == dialect.MAV_SYS_STATUS_PREARM_CHECK
 
 
-@pytest.mark.parametrize(("remaining", "state"), [(0.5, 1), (0.19, 2), (0.09, 3)])
-def test_a_battery_that_runs_low_says_so(remaining: float, state: int) -> None:
-    low = replace(SNAPSHOT, battery=replace(SNAPSHOT.battery, remaining=remaining))
+@pytest.mark.parametrize(("charge", "state"), [(0, 1), (1, 2), (2, 3), (3, 4)])
+def test_a_battery_that_runs_low_says_so(charge: int, state: int) -> None:
+    low = replace(SNAPSHOT, battery=replace(SNAPSHOT.battery, charge=Charge(charge)))
     assert read_back(stream_of(ids.BATTERY_STATUS), low).charge_state == state
 
 
 def test_without_a_home_there_is_no_home_position() -> None:
     assert stream_of(ids.HOME_POSITION).encode(replace(SNAPSHOT, home=None), CONTEXT) is None
+
+
+@pytest.mark.parametrize(
+    ("changes", "base_mode", "status"),
+    [
+        ({"mode": Mode.DISARMED, "armed": False}, 29, 3),
+        ({"mode": Mode.DISARMED, "armed": False, "arming_refusal": "not armed: why"}, 29, 0),
+        ({"mode": Mode.DISARMED, "armed": False, "standby": Mode.OFFBOARD}, 17, 3),
+        ({"mode": Mode.HOLD}, 157, 4),
+        ({"mode": Mode.ORBIT}, 157, 4),
+        ({"mode": Mode.OFFBOARD}, 145, 4),
+        ({"mode": Mode.HOLD, "failsafe_from": Mode.OFFBOARD}, 157, 5),
+        ({"mode": Mode.HOLD, "failures": ("x",)}, 157, 5),
+        ({"mode": Mode.FAULT, "armed": False}, 29, 8),
+    ],
+)
+def test_base_mode_and_status_are_those_of_a_px4(
+    changes: dict[str, Any], base_mode: int, status: int
+) -> None:
+    """29/157 in automatic modes, 17/145 where something outside steers; 0 if it cannot be armed."""
+    beat = read_back(stream_of(ids.HEARTBEAT), replace(SNAPSHOT, **changes))
+    assert (beat.base_mode, beat.system_status) == (base_mode, status)
+
+
+def test_what_a_failsafe_took_over_from_is_the_intended_mode() -> None:
+    seen = replace(SNAPSHOT, mode=Mode.HOLD, failsafe_from=Mode.OFFBOARD)
+    mode = read_back(stream_of(ids.CURRENT_MODE), seen)
+    assert (mode.custom_mode, mode.intended_custom_mode) == (0x03040000, 0x00060000)
+
+
+def test_without_a_plan_the_position_target_says_to_ignore_all_of_it() -> None:
+    resting = replace(SNAPSHOT, plan_state=None)
+    assert read_back(stream_of(ids.POSITION_TARGET_LOCAL_NED), resting).type_mask == 0xDFF
+
+
+def test_without_an_orbit_there_is_no_orbit_status() -> None:
+    encode = stream_of(ids.ORBIT_EXECUTION_STATUS).encode
+    assert encode(replace(SNAPSHOT, orbit=None), CONTEXT) is None
+
+
+def test_disarmed_no_pulse_is_sent() -> None:
+    outputs = read_back(stream_of(ids.SERVO_OUTPUT_RAW), replace(SNAPSHOT, armed=False))
+    assert outputs.servo1_raw == outputs.servo5_raw == 0
