@@ -279,6 +279,7 @@ def _subject(options: FswOptions, program: FlightProgram[Any]) -> LogSubject:
         program.parameters.values,
         vehicle.rotor_thrust_max,
         vehicle.link_length,
+        round(program.parameters.values["LOG_PROFILE"]),
     )
 
 

@@ -113,8 +113,27 @@ class FrameWriter:
                 is not advanced.
         """
         layout = _LAYOUTS[message_id]
+        return self._frame(layout, layout.payload.pack(*wire_values))
+
+    def packed_frame(self, message_id: int, payload: bytes) -> bytes:
+        """Encode a message whose payload is packed already, and advance the sequence.
+
+        Args:
+            message_id: An id of the dialect or of common.xml.
+            payload: All of it, extensions included.
+
+        Raises:
+            KeyError: The dialect has no such message.
+            ValueError: The payload is not of the message's size.
+        """
+        layout = _LAYOUTS[message_id]
+        if len(payload) != layout.payload.size:
+            raise ValueError(f"message {message_id} has {layout.payload.size} bytes of payload")
+        return self._frame(layout, payload)
+
+    def _frame(self, layout: Layout, whole: bytes) -> bytes:
         # The first byte of a payload is sent even if it is zero.
-        payload = layout.payload.pack(*wire_values).rstrip(b"\0") or b"\0"
+        payload = whole.rstrip(b"\0") or b"\0"
         body = b"%c%b%b%b" % (len(payload), self.next_origin(), layout.id_bytes, payload)
         return b"\xfd%b%b" % (body, checksum(body + layout.crc_extra).to_bytes(2, "little"))
 

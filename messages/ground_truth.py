@@ -18,7 +18,7 @@ def _exact(name: str, size: int, note: str) -> Field:
 SIM_GROUND_TRUTH: Final = Topic(
     "sim_ground_truth",
     "The simulator's true state",
-    "every tick",
+    "50 Hz; every tick with `LOG_PROFILE` 1",
     (
         _exact("p_WB", 3, "m, NED"),
         _exact("v_WB", 3, "m/s, NED"),

@@ -231,7 +231,11 @@ def _described(name: str, value: float) -> dict[str, Any]:
 
     parameter, fact = BY_NAME.get(name), FACT_BY_NAME.get(name)
     if fact is not None:
-        told = {"unit": fact.unit, "group": GROUP, "meaning": f"{fact.meaning} (read only)"}
+        told = {
+            "unit": fact.unit,
+            "group": GROUP,
+            "meaning": f"{fact.label}: {fact.meaning} (read only)",
+        }
         return {"name": name, "value": value, **told}
     if parameter is None:  # of a vehicle with another version
         return {"name": name, "value": value}

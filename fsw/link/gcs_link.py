@@ -158,6 +158,13 @@ class GcsLink:
         if self.outbox.waiting:
             self._send(t_us)
 
+    def serve_bulk(self, t_us: int) -> bool:
+        """Send a datagram of what clients wait for; whether there was anything."""
+        if not self.dispatch.bulk(t_us, self.outbox.add_outgoing):
+            return False
+        self._send(t_us)
+        return True
+
     def publish(self, outputs: TickOutputs, changed: bool) -> None:
         """Send what is due, to whoever listens.
 

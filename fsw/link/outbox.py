@@ -8,7 +8,7 @@ from typing import Final
 from fsw.link.signing.signing import Signing
 from fsw.link.wire import encode_replies, message_ids
 from fsw.link.wire.message_ids import AUTOPILOT, PANDION, SYSTEM_ID
-from fsw.link.wire.outgoing import Outgoing, WireValues
+from fsw.link.wire.outgoing import Outgoing, PackedOutgoing, WireValues
 from fsw.signals import StatusText
 from messages.frames import FrameWriter
 
@@ -42,9 +42,14 @@ class Outbox:
             return
         self._frames.append(self._signing.signed(frame) if self._signing.active else frame)
 
-    def add_outgoing(self, outgoing: Outgoing) -> None:
+    def add_outgoing(self, outgoing: Outgoing | PackedOutgoing) -> None:
         """Take what a service says."""
-        self.add(outgoing.component, outgoing.message_id, outgoing.values)
+        if isinstance(outgoing, Outgoing):
+            self.add(outgoing.component, outgoing.message_id, outgoing.values)
+            return
+        writer = self._writers[outgoing.component]
+        frame = writer.packed_frame(outgoing.message_id, outgoing.payload)
+        self._frames.append(self._signing.signed(frame) if self._signing.active else frame)
 
     def add_text(self, text: StatusText) -> None:
         """Take a sentence, in as many STATUSTEXT as it needs."""

@@ -31,6 +31,11 @@ from messages.ulog import Topic, data_head, logged_text
 
 TYPED: Final = "sensors"  # the input that has a topic of its own
 STATUS_TICKS: Final = 500
+THIN, FULL = 0, 1  # values of LOG_PROFILE
+DETAIL_US: Final = {
+    THIN: 20_000,
+    FULL: 1,
+}  # from one record of what follows from others to the next
 
 _UNMEASURED: Final = PlanTimings(math.nan, math.nan, math.nan)
 _NOWHERE: Final = (math.nan, math.nan, math.nan)
@@ -68,16 +73,18 @@ class _Packed:
             return self.struct.pack(*map(_within_float, values))
 
 
-_TICK: Final = _Packed(
-    topics.SENSOR_FRAME,
+# What a replay needs and what it is compared by: every tick in every profile.
+_TICK: Final = _Packed(topics.SENSOR_FRAME, topics.ACTUATOR_COMMAND)
+_SENSORS, _COMMAND = _TICK.heads
+# What follows from that, for reading.
+_DETAIL: Final = _Packed(
     topics.VEHICLE_ATTITUDE,
     topics.VEHICLE_ANGULAR_VELOCITY,
     topics.VEHICLE_LOCAL_POSITION,
-    topics.ACTUATOR_COMMAND,
     topics.ACTUATOR_MOTORS,
     topics.ARM_JOINT_STATE,
 )
-_SENSORS, _ATTITUDE, _RATES, _POSITION, _COMMAND, _MOTORS, _ARM = _TICK.heads
+_ATTITUDE, _RATES, _POSITION, _MOTORS, _ARM = _DETAIL.heads
 _IN_FLIGHT: Final = _Packed(
     topics.VEHICLE_LOCAL_POSITION_SETPOINT, topics.ARM_JOINT_SETPOINT, topics.PLAN_INPUT
 )
@@ -96,14 +103,19 @@ _TIMING: Final = _Packed(topics.LOOP_TIMING)
 class LogEncoder:
     """Turns ticks into bytes; remembers what it has written, to write changes only."""
 
-    def __init__(self, *, measured: bool, thrust_max: float, link_length: Vec2) -> None:
+    def __init__(
+        self, *, measured: bool, thrust_max: float, link_length: Vec2, profile: int = FULL
+    ) -> None:
         """Start a log.
 
         Args:
             measured: Write times of the wall clock; without them a flight repeats to the byte.
             thrust_max: Full thrust of a rotor [N].
             link_length: Lengths of the arm's links [m].
+            profile: THIN or FULL.
         """
+        self._detail_us = DETAIL_US[profile]
+        self._detailed = -1  # number of the interval of which details were written last
         self.inputs = InputText(TickInputs, {} if measured else {PlanTimings: _UNMEASURED})
         self._measured = measured
         self._per_newton = 1.0 / thrust_max
@@ -118,8 +130,12 @@ class LogEncoder:
         """Append the records of one tick; the sensors' are the first."""
         snapshot = outputs.snapshot
         out += self._every_tick(inputs, snapshot)
-        if snapshot.plan_state is not None:
-            out += self._in_flight(snapshot)
+        interval = snapshot.t_us // self._detail_us
+        if interval != self._detailed:
+            self._detailed = interval
+            out += self._detail(snapshot)
+            if snapshot.plan_state is not None:
+                out += self._in_flight(snapshot)
         self._add_inputs(inputs, out)
         last = self._last
         if last is None or snapshot.constraints is not last.constraints:
@@ -141,17 +157,25 @@ class LogEncoder:
         self._last = snapshot
 
     def _every_tick(self, inputs: TickInputs, snapshot: FlightSnapshot) -> bytes:
-        sensors, estimate, sent = inputs.sensors, snapshot.estimate, snapshot.actuators
-        t_us, k = sensors.t_us, self._per_newton
-        f1, f2, f3, f4 = sent.rotor_thrust
+        sensors, sent = inputs.sensors, snapshot.actuators
+        t_us = sensors.t_us
         return _TICK.pack(
             (
                 _SENSORS, t_us, *sensors.p_WB, *sensors.v_WB, *sensors.q_WB,
                 *sensors.gyro_B, *sensors.accel_B, *sensors.q_arm, *sensors.qd_arm,
+                _COMMAND, t_us, *sent.rotor_thrust, *sent.joint_torque, snapshot.armed,
+            )
+        )  # fmt: skip
+
+    def _detail(self, snapshot: FlightSnapshot) -> bytes:
+        estimate, sent = snapshot.estimate, snapshot.actuators
+        t_us, k = snapshot.t_us, self._per_newton
+        f1, f2, f3, f4 = sent.rotor_thrust
+        return _DETAIL.pack(
+            (
                 _ATTITUDE, t_us, *quaternion_from_matrix(estimate.R_WB),
                 _RATES, t_us, *estimate.w_WB_B,
                 _POSITION, t_us, *estimate.p_WB, *estimate.v_WB, estimate.yaw,
-                _COMMAND, t_us, f1, f2, f3, f4, *sent.joint_torque, snapshot.armed,
                 _MOTORS, t_us, k * f1, k * f2, k * f3, k * f4,
                 _ARM, t_us, *estimate.q_arm, *estimate.qd_arm, *sent.joint_torque,
             )

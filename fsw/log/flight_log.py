@@ -1,8 +1,8 @@
 """The flight log, ``flight.ulg``: every tick with all that went into it and all that came out.
 
-What it costs the tick is the packing of some 600 bytes. In lockstep the loop writes them itself,
-so that the file repeats to the byte; in real time a thread does, and what the disk cannot take in
-time is lost and marked as lost.
+What it costs the tick is the packing of some 250 bytes, or of 600 with all details. In lockstep the
+loop writes them itself, so that the file repeats to the byte; in real time a thread does, and what
+the disk cannot take in time is lost and marked as lost.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Final
 
 from fsw.log.block_file import BlockFile
-from fsw.log.encoder import LogEncoder, loop_timing
+from fsw.log.encoder import FULL, LogEncoder, loop_timing
 from fsw.log.topics import TOPICS
 from fsw.signals import StatusText, TickInputs, TickOutputs, Vec2
 from messages import ulog
@@ -39,6 +39,7 @@ class LogSubject:
     parameters: Mapping[str, float]  # those that a ground station may change, by their names there
     thrust_max: float  # N, one rotor
     link_length: Vec2  # m
+    profile: int = FULL  # what is written how often, LOG_PROFILE
 
 
 class FlightLog:
@@ -73,6 +74,7 @@ class FlightLog:
             measured=self._measured,
             thrust_max=subject.thrust_max,
             link_length=subject.link_length,
+            profile=subject.profile,
         )
         pacing = "lockstep" if lockstep else "realtime"
         self._records += definitions(t_us, subject, pacing, self._encoder.inputs.schema)
@@ -141,6 +143,7 @@ def definitions(t_us: int, subject: LogSubject, pacing: str, schema: str) -> byt
         "sys_name": "Pandion",
         **subject.facts,
         "pacing": pacing,
+        "profile": subject.profile,
         "numbers": exact,  # as doubles; the format's own parameters are 32-bit
         "inputs": schema,
     }

@@ -15,6 +15,8 @@ TEXT_SIZE: Final = 200  # characters of an input's text in one record
 MARGINS: Final = 16
 
 EVERY_TICK: Final = "every tick"
+DETAIL: Final = "50 Hz; every tick with `LOG_PROFILE` 1"
+DETAIL_IN_FLIGHT: Final = "in flight, 50 Hz; every tick with `LOG_PROFILE` 1"
 PLANNING: Final = "every planning cycle"
 CHANGE: Final = "on change"
 
@@ -46,15 +48,15 @@ SENSOR_FRAME: Final = Topic(
     ),
 )
 VEHICLE_ATTITUDE: Final = Topic(
-    "vehicle_attitude", "Estimate", EVERY_TICK, (_vector("q", 4, "[w, x, y, z], body to NED"),)
+    "vehicle_attitude", "Estimate", DETAIL, (_vector("q", 4, "[w, x, y, z], body to NED"),)
 )
 VEHICLE_ANGULAR_VELOCITY: Final = Topic(
-    "vehicle_angular_velocity", "Estimate", EVERY_TICK, (_vector("xyz", 3, "rad/s, body"),)
+    "vehicle_angular_velocity", "Estimate", DETAIL, (_vector("xyz", 3, "rad/s, body"),)
 )
 VEHICLE_LOCAL_POSITION: Final = Topic(
     "vehicle_local_position",
     "Estimate of the body origin",
-    EVERY_TICK,
+    DETAIL,
     (
         *_floats("x", "y", "z", note="m, NED"),
         *_floats("vx", "vy", "vz", note="m/s, NED"),
@@ -74,13 +76,13 @@ ACTUATOR_COMMAND: Final = Topic(
 ACTUATOR_MOTORS: Final = Topic(
     "actuator_motors",
     "The same of the rotors, in PX4's form",
-    EVERY_TICK,
+    DETAIL,
     (_vector("control", 4, "0 to 1, share of full thrust"),),
 )
 ARM_JOINT_STATE: Final = Topic(
     "arm_joint_state",
     "Estimate, and the torque commanded",
-    EVERY_TICK,
+    DETAIL,
     (
         _vector("q", 2, "rad"),
         _vector("qd", 2, "rad/s"),
@@ -90,7 +92,7 @@ ARM_JOINT_STATE: Final = Topic(
 VEHICLE_LOCAL_POSITION_SETPOINT: Final = Topic(
     "vehicle_local_position_setpoint",
     "Where the running plan wants the body origin now",
-    "every tick in flight",
+    DETAIL_IN_FLIGHT,
     (
         *_floats("x", "y", "z", note="m, NED"),
         *_floats("vx", "vy", "vz", note="m/s, NED"),
@@ -102,13 +104,13 @@ VEHICLE_LOCAL_POSITION_SETPOINT: Final = Topic(
 ARM_JOINT_SETPOINT: Final = Topic(
     "arm_joint_setpoint",
     "Where the running plan wants the joints now",
-    "every tick in flight",
+    DETAIL_IN_FLIGHT,
     (_vector("q", 2, "rad"), _vector("qd", 2, "rad/s"), _vector("qdd", 2, "rad/s^2")),
 )
 PLAN_INPUT: Final = Topic(
     "plan_input",
     "The paper's u in force; with the joints' in `arm_joint_setpoint`",
-    "every tick in flight",
+    DETAIL_IN_FLIGHT,
     (_vector("a", 3, "m/s^2, NED"), *_floats("yaw_acc", note="rad/s^2")),
 )
 BARRIER_MARGIN: Final = Topic(

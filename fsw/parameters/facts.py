@@ -23,7 +23,8 @@ class Fact:
     """One read-only parameter."""
 
     name: str  # at most 16 characters
-    meaning: str
+    label: str  # what a ground station writes beside the value
+    meaning: str  # why it is so
     value: float = 0.0
     unit: str = ""
     choices: Choices = ()
@@ -39,82 +40,129 @@ _BATTERY: Final = BatteryModel()
 _CELLS: Final = 4
 
 
-def _all(names: str, meaning: str, value: float = 0.0, choices: Choices = ()) -> list[Fact]:
-    return [Fact(name, meaning, value, choices=choices) for name in names.split()]
+def _all(
+    labels: Mapping[str, str], meaning: str, value: float = 0.0, choices: Choices = ()
+) -> list[Fact]:
+    """Facts of one meaning, by name and label."""
+    return [Fact(name, label, meaning, value, "", choices) for name, label in labels.items()]
 
 
 def _repeat(name: str, ours: str) -> Fact:
-    return Fact(name, f"PX4's name of {ours}", unit=BY_NAME[ours].unit, repeats=ours)
+    label = BY_NAME[ours].meaning
+    return Fact(name, label, f"the value of {ours}", unit=BY_NAME[ours].unit, repeats=ours)
 
 
+_NO_RC: Final = "there is no radio control"
+_NO_SENSOR: Final = "there is no such sensor"
+_LOOPS: Final = "not in use: the loops of this vehicle are tuned by TRK_ and PID_"
 _FACTS: Final = [
     Fact(
-        "SYS_AUTOSTART", "airframe, by PX4's number: a quadrotor; it has none with an arm", 4001.0
+        "SYS_AUTOSTART",
+        "Airframe",
+        "a quadrotor, by PX4's number; PX4 has no number of one with an arm",
+        4001.0,
     ),
-    Fact("SYS_AUTOCONFIG", "nothing is to be configured"),
-    Fact("SYS_HAS_MAG", "there is no magnetometer: the heading is measured from outside"),
-    Fact("MAV_SYS_ID", "MAVLink system of the vehicle", 1.0),
+    Fact("SYS_AUTOCONFIG", "Reset to the airframe's defaults", "nothing is to be reset"),
+    Fact("SYS_HAS_MAG", "Magnetometers", "none: the heading is measured from outside"),
+    Fact("MAV_SYS_ID", "MAVLink system ID", "of the vehicle", 1.0),
     *_all(
-        "CAL_GYRO0_ID CAL_ACC0_ID CAL_MAG0_ID",
-        "not zero: this sensor needs no calibration",
+        {"CAL_GYRO0_ID": "Gyro", "CAL_ACC0_ID": "Accelerometer", "CAL_MAG0_ID": "Heading sensor"},
+        "not zero: it needs no calibration",
         1.0,
     ),
-    *_all("CAL_MAG1_ID CAL_MAG2_ID", "there is no such sensor"),
-    *_all("CAL_MAG0_ROT CAL_MAG1_ROT CAL_MAG2_ROT", "there is no such sensor", -1.0),
-    Fact("SENS_BOARD_ROT", "sensors lie along the body's axes"),
-    Fact("SENS_DPRES_OFF", "there is no airspeed sensor"),
-    Fact("COM_RC_IN_MODE", "there is no radio control", 1.0, choices=((1, "No radio"),)),
-    Fact("COM_RC_LOSS_T", "there is no radio control to lose", unit="s"),
-    Fact("NAV_RCL_ACT", "there is no radio control to lose", choices=((0, "None: no radio"),)),
+    *_all({"CAL_MAG1_ID": "Second magnetometer", "CAL_MAG2_ID": "Third magnetometer"}, _NO_SENSOR),
+    *_all({f"CAL_MAG{k}_ROT": f"Rotation of magnetometer {k}" for k in range(3)}, _NO_SENSOR, -1.0),
+    Fact("SENS_BOARD_ROT", "Rotation of the flight controller", "along the body's axes"),
+    Fact("SENS_DPRES_OFF", "Offset of the airspeed sensor", _NO_SENSOR),
+    Fact("COM_RC_IN_MODE", "Manual control input", _NO_RC, 1.0, choices=((1, "No radio"),)),
+    Fact("COM_RC_LOSS_T", "Radio loss timeout", _NO_RC, unit="s"),
+    Fact("NAV_RCL_ACT", "Radio loss failsafe", _NO_RC, choices=((0, "Disabled: no radio"),)),
     # Zero would be read as a set-up that is missing.
     *_all(
-        "RC_MAP_ROLL RC_MAP_PITCH RC_MAP_YAW RC_MAP_THROTTLE",
-        "there is no radio control",
+        {
+            "RC_MAP_ROLL": "Roll channel",
+            "RC_MAP_PITCH": "Pitch channel",
+            "RC_MAP_YAW": "Yaw channel",
+            "RC_MAP_THROTTLE": "Throttle channel",
+        },
+        _NO_RC,
         -1.0,
         ((-1, "No radio"),),
     ),
     *_all(
-        "RC_MAP_FLAPS RC_MAP_AUX1 RC_MAP_AUX2 RC_MAP_PARAM1 RC_MAP_PARAM2 RC_MAP_PARAM3 "
-        "RC_MAP_FLTMODE RC_MAP_ARM_SW RC_MAP_GEAR_SW RC_MAP_KILL_SW RC_MAP_LOITER_SW "
-        "RC_MAP_OFFB_SW RC_MAP_RETURN_SW",
-        "there is no radio control",
+        {
+            "RC_MAP_FLAPS": "Flaps channel",
+            "RC_MAP_AUX1": "Auxiliary channel 1",
+            "RC_MAP_AUX2": "Auxiliary channel 2",
+            "RC_MAP_PARAM1": "Tuning channel 1",
+            "RC_MAP_PARAM2": "Tuning channel 2",
+            "RC_MAP_PARAM3": "Tuning channel 3",
+            "RC_MAP_FLTMODE": "Mode channel",
+            "RC_MAP_ARM_SW": "Arm switch",
+            "RC_MAP_GEAR_SW": "Landing gear switch",
+            "RC_MAP_KILL_SW": "Kill switch",
+            "RC_MAP_LOITER_SW": "Hold switch",
+            "RC_MAP_OFFB_SW": "Offboard switch",
+            "RC_MAP_RETURN_SW": "Return switch",
+        },
+        _NO_RC,
         choices=_NO_RADIO,
     ),
     *_all(
-        "RC_ARMSWITCH_TH RC_GEAR_TH RC_KILLSWITCH_TH RC_LOITER_TH RC_OFFB_TH RC_RETURN_TH",
-        "there is no radio control",
+        {
+            "RC_ARMSWITCH_TH": "Arm switch threshold",
+            "RC_GEAR_TH": "Landing gear switch threshold",
+            "RC_KILLSWITCH_TH": "Kill switch threshold",
+            "RC_LOITER_TH": "Hold switch threshold",
+            "RC_OFFB_TH": "Offboard switch threshold",
+            "RC_RETURN_TH": "Return switch threshold",
+        },
+        _NO_RC,
     ),
     *_all(
-        "COM_FLTMODE1 COM_FLTMODE2 COM_FLTMODE3 COM_FLTMODE4 COM_FLTMODE5 COM_FLTMODE6",
+        {f"COM_FLTMODE{k}": f"Flight mode {k}" for k in range(1, 7)},
         "there is no radio control to choose a mode with",
         -1.0,
         ((-1, "Unassigned: no radio"),),
     ),
-    Fact("BAT1_SOURCE", "the battery is a model, without a sensor", choices=((0, "Model"),)),
-    Fact("BAT1_N_CELLS", "cells in series", float(_CELLS)),
-    Fact("BAT1_V_CHARGED", "full cell", _BATTERY.full / _CELLS, "V"),
-    Fact("BAT1_V_EMPTY", "empty cell", _BATTERY.empty / _CELLS, "V"),
-    Fact("BAT1_V_LOAD_DROP", "not used: the drop is that of the inner resistance", unit="V"),
-    Fact("BAT1_CAPACITY", "capacity", 1000.0 * _BATTERY.capacity, "mAh"),
+    Fact("BAT1_SOURCE", "Battery source", "without a sensor", choices=((0, "Battery model"),)),
+    Fact("BAT1_N_CELLS", "Cells in series", "of the model", float(_CELLS)),
+    Fact("BAT1_V_CHARGED", "Full cell voltage", "of the model", _BATTERY.full / _CELLS, "V"),
+    Fact("BAT1_V_EMPTY", "Empty cell voltage", "of the model", _BATTERY.empty / _CELLS, "V"),
+    Fact(
+        "BAT1_V_LOAD_DROP",
+        "Voltage drop of a cell under load",
+        "not in use: the model has an inner resistance",
+        unit="V",
+    ),
+    Fact("BAT1_CAPACITY", "Battery capacity", "of the model", 1000.0 * _BATTERY.capacity, "mAh"),
     Fact(
         "GF_ACTION",
-        "a fence is a barrier that the vehicle does not cross; there is no breach to act upon",
+        "Geofence breach action",
+        "a fence is a barrier that the vehicle does not cross",
         choices=((0, "None: the barriers keep the vehicle inside"),),
     ),
-    Fact("GF_MAX_HOR_DIST", "no fence but the uploaded one", unit="m"),
-    Fact("GF_MAX_VER_DIST", "no fence but the uploaded one", unit="m"),
-    Fact("CP_DIST", "obstacles are announced, not sensed", -1.0, "m"),
-    Fact("COM_OBS_AVOID", "there is no companion that avoids obstacles"),
-    Fact("SDLOG_MODE", "what is logged when", 2.0, choices=((2, "From start to end"),)),
+    Fact("GF_MAX_HOR_DIST", "Geofence radius", "no fence but the uploaded one", unit="m"),
+    Fact("GF_MAX_VER_DIST", "Geofence height", "no fence but the uploaded one", unit="m"),
+    Fact(
+        "CP_DIST", "Collision prevention distance", "obstacles are announced, not sensed", -1.0, "m"
+    ),
+    Fact("COM_OBS_AVOID", "Obstacle avoidance by a companion", "there is none"),
+    Fact("SDLOG_MODE", "Logging", "see LOG_PROFILE", 2.0, choices=((2, "From start to end"),)),
     _repeat("MPC_XY_VEL_MAX", "STR_V_MAX"),
     _repeat("MPC_LAND_SPEED", "LND_SPEED"),
     _repeat("COM_DISARM_LAND", "LND_T_STILL"),
     *_all(
-        "MC_ROLLRATE_K MC_ROLLRATE_I MC_ROLLRATE_D MC_PITCHRATE_K MC_PITCHRATE_I MC_PITCHRATE_D "
-        "MC_YAWRATE_K MC_YAWRATE_I MC_ROLL_P MC_PITCH_P MC_YAW_P MPC_XY_P MPC_Z_P "
-        "MPC_XY_VEL_P_ACC MPC_XY_VEL_I_ACC MPC_XY_VEL_D_ACC "
-        "MPC_Z_VEL_P_ACC MPC_Z_VEL_I_ACC MPC_Z_VEL_D_ACC",
-        "not in use: the loops here are tuned by TRK_ and PID_",
+        {
+            **{
+                f"MC_{a}RATE_{g}": f"{a.title()} rate {g}" for a in ("ROLL", "PITCH") for g in "KID"
+            },
+            **{f"MC_YAWRATE_{g}": f"Yaw rate {g}" for g in "KI"},
+            **{f"MC_{a}_P": f"{a.title()} P" for a in ("ROLL", "PITCH", "YAW")},
+            **{f"MPC_{a}_P": f"Position {a} P" for a in ("XY", "Z")},
+            **{f"MPC_{a}_VEL_{g}_ACC": f"Velocity {a} {g}" for a in ("XY", "Z") for g in "PID"},
+        },
+        _LOOPS,
     ),
 ]
 

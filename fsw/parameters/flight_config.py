@@ -84,6 +84,7 @@ class FlightConfig:
     plan_delay_ticks: int = 10
     # Ticks that were missed are made up for, up to this many at once.
     catch_up_ticks: int = 25
+    log_profile: int = 0  # of flight.ulg: 0 what a replay needs, and the rest at 50 Hz; 1 all
     # Farther from the plan than this, plan from the measurement.
     upset_distance: float = 0.15  # m
     upset_yaw: float = 0.35  # rad

@@ -65,7 +65,7 @@ def _described(parameter: Parameter) -> dict[str, Any]:
         "default": parameter.default,
         "min": parameter.least,
         "max": parameter.most,
-        **_form(parameter.choices, 6),
+        **_form(parameter.choices, _decimals(parameter.default, at_least=2)),
     }
 
 
@@ -77,13 +77,19 @@ def _told(fact: Fact) -> dict[str, Any]:
     return {
         "name": fact.name,
         "type": "Float",
-        "shortDesc": f"{fact.meaning} (read only)",
+        "shortDesc": fact.label,
+        "longDesc": f"Read only: {fact.meaning}",
         "group": GROUP,
         "category": "Standard",
         "units": fact.unit,
         **limits,
-        **_form(fact.choices, 0 if fact.value.is_integer() and not fact.repeats else 3),
+        **_form(fact.choices, _decimals(fact.value, at_least=0)),
     }
+
+
+def _decimals(value: float, at_least: int) -> int:
+    """As many as the value has, six at most."""
+    return max(at_least, len(f"{value:f}".rstrip("0").partition(".")[2]))
 
 
 def _form(choices: Choices, decimals: int) -> dict[str, Any]:

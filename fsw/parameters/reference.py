@@ -60,7 +60,7 @@ def reference() -> str:
 
 def _fact_cells(fact: Fact) -> tuple[str, ...]:
     value = f"as `{fact.repeats}`" if fact.repeats else as_text(fact.value)
-    return f"`{fact.name}`", value, fact.unit, fact.meaning
+    return f"`{fact.name}`", value, fact.unit, f"{fact.label}: {fact.meaning}"
 
 
 def _table(parameters: list[Parameter]) -> str:

@@ -249,6 +249,10 @@ _ROWS: Final[dict[str, list[_Row]]] = {
         ("COM_LOW_BAT_ACT", "limits.low_battery_action", "", 0.0, 3.0,
          "what is done about a battery that runs low in flight"),
     ],
+    "Log": [
+        ("LOG_PROFILE", "log_profile", "", 0.0, 1.0,
+         "what flight.ulg holds, from the next start on"),
+    ],
     "Missions": [
         ("MSN_SPEED", "limits.mission_speed", "m/s", 0.01, 1.0,
          "speed of a mission that names none"),
@@ -262,6 +266,10 @@ _ROWS: Final[dict[str, list[_Row]]] = {
 }  # fmt: skip
 
 _CHOICES: Final[dict[str, Choices]] = {
+    "LOG_PROFILE": (
+        (0, "Sensors and actuators every tick, the rest at 50 Hz"),
+        (1, "Everything every tick"),
+    ),
     "COM_OBL_RC_ACT": ((3, "Return"), (4, "Land"), (5, "Hold")),
     "NAV_DLL_ACT": ((0, "Disabled"), (1, "Hold"), (2, "Return"), (3, "Land")),
     "COM_LOW_BAT_ACT": (

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from fsw.log.compare import Difference, first_difference
-from fsw.log.encoder import LogEncoder
+from fsw.log.encoder import FULL, THIN, LogEncoder
 from fsw.log.reader import Gap, LoggedTick, UlogError, UlogFile, ticks
 from fsw.runtime.guarded_tick import GuardedTick
 from fsw.runtime.program import FlightProgram
@@ -37,10 +37,15 @@ def replay(log: UlogFile, program: FlightProgram[Any], progress: Progress) -> Re
     Raises:
         UlogError: The log is damaged.
     """
-    measured = fact(log, "pacing") != "lockstep"
+    measured, profile = fact(log, "pacing") != "lockstep", fact(log, "profile")
+    if profile not in (str(THIN), str(FULL)):
+        raise UlogError(f"{log.path} is damaged: its profile {profile!r} is neither 0 nor 1")
     facts = program.facts
     encoder = LogEncoder(
-        measured=measured, thrust_max=facts.rotor_thrust_max, link_length=facts.link_length
+        measured=measured,
+        thrust_max=facts.rotor_thrust_max,
+        link_length=facts.link_length,
+        profile=int(profile),
     )
     tick = GuardedTick(program.tick, program.first_state, tell=lambda: None)
     compared = 0

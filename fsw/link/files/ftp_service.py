@@ -18,10 +18,11 @@ from fsw.link.files.ftp_sessions import Client, Session, Sessions
 from fsw.link.files.ftp_tree import Directory, find, listing
 from fsw.link.wire import message_ids
 from fsw.link.wire.decode import for_this_vehicle
-from fsw.link.wire.outgoing import Outgoing
+from fsw.link.wire.outgoing import PackedOutgoing
 from messages.frames import Frame
 
 _FRAMES: Final = 10  # a tick: two datagrams
+_DATAGRAM_FRAMES: Final = 5
 _MAX_JOBS: Final = 12
 _MAX_REMEMBERED: Final = 8  # clients
 _REMEMBERED_US: Final = 3_000_000  # a client has given up repeating by then
@@ -34,7 +35,7 @@ class _Answered:
     """A request that must not be carried out twice, because it opens or closes a session."""
 
     payload: bytes
-    answer: Outgoing
+    answer: PackedOutgoing
     t_us: int
 
 
@@ -44,6 +45,11 @@ class _Running:
     request: Request
     job: Job
     sequence: int  # of the last message
+
+    @property
+    def bursts(self) -> bool:
+        """Whether it sends piece after piece."""
+        return self.request.opcode == Opcode.BURST_READ_FILE
 
 
 class FtpService:
@@ -68,7 +74,7 @@ class FtpService:
             Opcode.CALC_FILE_CRC32: self._checksum,
         }
 
-    def receive(self, frame: Frame, t_us: int) -> Sequence[Outgoing]:
+    def receive(self, frame: Frame, t_us: int) -> Sequence[PackedOutgoing]:
         """Answer a request, or start the job that will."""
         _, system, component, *payload = cast("tuple[int, ...]", frame.payload_values)
         if not for_this_vehicle(system, component):
@@ -86,13 +92,20 @@ class FtpService:
             self._remember(client, _Answered(packed, answer, t_us))
         return [answer]
 
-    def poll(self, t_us: int) -> Sequence[Outgoing]:
+    def poll(self, t_us: int) -> Sequence[PackedOutgoing]:
         """Go on with the jobs, each in its turn."""
+        return self._go_on(list(self._jobs), _FRAMES) if self._jobs else ()
+
+    def bulk(self, t_us: int) -> Sequence[PackedOutgoing]:
+        """Go on with the bursts: after each the client asks for the next one."""
         if not self._jobs:
             return ()
-        answers: list[Outgoing] = []
-        ready = list(self._jobs)
-        while ready and len(answers) < _FRAMES:
+        bursts = [key for key, running in self._jobs.items() if running.bursts]
+        return self._go_on(bursts, _DATAGRAM_FRAMES)
+
+    def _go_on(self, ready: list[tuple[Client, int]], frames: int) -> list[PackedOutgoing]:
+        answers: list[PackedOutgoing] = []
+        while ready and len(answers) < frames:
             key = ready.pop(0)
             running = self._jobs.pop(key)
             try:
@@ -196,6 +209,6 @@ class FtpService:
             del self._answered[next(iter(self._answered))]
 
 
-def _outgoing(reply: Reply, request: Request, sequence: int, client: Client) -> Outgoing:
-    payload = write(reply, request, sequence)
-    return Outgoing(message_ids.FILE_TRANSFER_PROTOCOL, (0, *client, *payload))
+def _outgoing(reply: Reply, request: Request, sequence: int, client: Client) -> PackedOutgoing:
+    payload = bytes((0, *client)) + write(reply, request, sequence)
+    return PackedOutgoing(message_ids.FILE_TRANSFER_PROTOCOL, payload)

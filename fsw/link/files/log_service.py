@@ -8,6 +8,7 @@ Source: https://mavlink.io/en/messages/common.html#LOG_REQUEST_LIST
 
 from __future__ import annotations
 
+import struct
 from collections import deque
 from collections.abc import Sequence
 from typing import Final, NamedTuple, cast
@@ -16,12 +17,17 @@ from fsw.link.files.flight_logs import FlightLog
 from fsw.link.files.served_file import OpenFile
 from fsw.link.wire import encode_replies, message_ids
 from fsw.link.wire.decode import Numbers, for_this_vehicle
-from fsw.link.wire.outgoing import Outgoing
+from fsw.link.wire.outgoing import Outgoing, PackedOutgoing
 from fsw.signals import StatusText
 from messages.frames import Frame
 
 CHUNK: Final = 90  # bytes of a log in one LOG_DATA
 _FRAMES: Final = 6  # a tick: 3000 messages a second, as many as a client in Python can read
+# A client that asks for a log in pieces up to this size asks for the next one when it has all of
+# the last: it sets the pace. QGroundControl and MAVSDK ask for 512 messages at once.
+_PACED_BY_CLIENT: Final = 1 << 16
+_DATAGRAM_FRAMES: Final = 12  # LOG_DATA in one datagram
+_LOG_DATA: Final = struct.Struct(f"<IHB{CHUNK}s")
 _ENTRIES: Final = 8  # a tick: each asks the file system once
 _MAX_REQUESTS: Final = 32  # a client asks again for what got lost in up to 20 pieces
 _TO_THE_END: Final = 0xFFFFFFFF
@@ -34,6 +40,7 @@ class _Request(NamedTuple):
     offset: int  # the next byte to send
     end: int  # behind the last byte to send
     closed: bool  # whether the client waits for a short message as the sign of the end
+    paced: bool  # whether the client sets the pace
 
 
 class LogService:
@@ -71,17 +78,22 @@ class LogService:
             return [Outgoing(message_ids.STATUSTEXT, values) for values in texts]
         return ()
 
-    def poll(self, t_us: int) -> Sequence[Outgoing]:
-        """Send the next entries and the next piece of a log."""
+    def poll(self, t_us: int) -> Sequence[Outgoing | PackedOutgoing]:
+        """Send the next entries, and the next piece of a log to who asked for all of it at once."""
         if not self._to_list and not self._requests:
             return ()
-        answers = [self._entry(self._to_list.popleft()) for _ in self._next_entries()]
-        while self._requests and len(answers) < _FRAMES:
-            data = self._data()
-            if data is None:
-                break
-            answers.append(data)
+        answers: list[Outgoing | PackedOutgoing] = [
+            self._entry(self._to_list.popleft()) for _ in self._next_entries()
+        ]
+        if self._requests and not self._requests[0].paced:
+            answers += self._data(_FRAMES - len(answers))
         return answers
+
+    def bulk(self, t_us: int) -> Sequence[Outgoing | PackedOutgoing]:
+        """Send the next datagram to who asks for a log piece by piece."""
+        if not self._requests or not self._requests[0].paced:
+            return ()
+        return self._data(_DATAGRAM_FRAMES)
 
     def _list(self, first: int, last: int) -> Sequence[Outgoing]:
         if not self._logs:
@@ -120,26 +132,32 @@ class LogService:
         if len(self._requests) < _MAX_REQUESTS:
             end = min(offset + count, size)
             closed = count == _TO_THE_END or offset >= size
-            self._requests.append(_Request(log_id, offset, end, closed))
+            paced = count <= _PACED_BY_CLIENT
+            self._requests.append(_Request(log_id, offset, end, closed, paced))
 
-    def _data(self) -> Outgoing | None:
-        """The next LOG_DATA; None while the disk has not delivered."""
-        log_id, offset, end, closed = self._requests[0]
+    def _data(self, frames: int) -> list[PackedOutgoing]:
+        """The next LOG_DATA of the first request; none while the disk has not delivered."""
+        log_id, offset, end, closed, paced = self._requests[0]
         try:
-            data = self._file(log_id).read(offset, min(CHUNK, end - offset))
+            data = self._file(log_id).read(offset, min(CHUNK * frames, max(end - offset, 0)))
         except OSError:
             data = b""  # gone or damaged: nothing more will come of it
-        if data is None:
-            return None
+        if data is None or frames <= 0:
+            return []
+        told = []
+        for at in range(0, len(data), CHUNK):
+            piece = data[at : at + CHUNK]
+            told.append(_log_data(log_id, offset + at, piece))
         offset += len(data)
+        if data and offset < end:
+            self._requests[0] = _Request(log_id, offset, end, closed, paced)
+            return told
+        self._requests.popleft()
         # Without an end of its own a request is over for the client at the first message that is
         # not full, so one more is due where the last byte filled its message.
-        if not data or (offset >= end and not (closed and len(data) == CHUNK)):
-            self._requests.popleft()
-        else:
-            self._requests[0] = _Request(log_id, offset, end, closed)
-        start, padded = offset - len(data), data.ljust(CHUNK, b"\0")
-        return Outgoing(message_ids.LOG_DATA, (start, log_id, len(data), *padded))
+        if not data or (closed and len(data) % CHUNK == 0):
+            told.append(_log_data(log_id, offset, b""))
+        return told
 
     def _file(self, log_id: int) -> OpenFile:
         if self._open is None or self._open[0] != log_id:
@@ -155,3 +173,8 @@ class LogService:
         if self._open is not None:
             self._open[1].close()
             self._open = None
+
+
+def _log_data(log_id: int, offset: int, data: bytes) -> PackedOutgoing:
+    payload = _LOG_DATA.pack(offset, log_id, len(data), data)
+    return PackedOutgoing(message_ids.LOG_DATA, payload)

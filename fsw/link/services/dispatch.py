@@ -5,11 +5,11 @@ from __future__ import annotations
 import traceback
 from collections.abc import Callable, Sequence
 
-from fsw.link.services.service import LinkService
-from fsw.link.wire.outgoing import Outgoing
+from fsw.link.services.service import BulkService, LinkService
+from fsw.link.wire.outgoing import Outgoing, PackedOutgoing
 from messages.frames import Frame
 
-Answers = Callable[[Outgoing], None]
+Answers = Callable[[Outgoing | PackedOutgoing], None]
 """Takes each message a service wants to send."""
 
 
@@ -19,6 +19,7 @@ class Dispatch:
     def __init__(self, services: Sequence[LinkService]) -> None:
         self.failures = 0  # answers that ended in an exception
         self._polled = tuple(services)
+        self._bulky = tuple(service for service in services if isinstance(service, BulkService))
         self._wanting: dict[int, tuple[LinkService, ...]] = {}
         for service in services:
             for id_ in service.message_ids:
@@ -41,6 +42,18 @@ class Dispatch:
                     send(outgoing)
             except Exception:
                 self._note()
+
+    def bulk(self, t_us: int, send: Answers) -> bool:
+        """Let services send a datagram each of what clients wait for; whether any did."""
+        sent = False
+        for service in self._bulky:
+            try:
+                for outgoing in service.bulk(t_us):
+                    send(outgoing)
+                    sent = True
+            except Exception:
+                self._note()
+        return sent
 
     def _note(self) -> None:
         """A mistake in a service must not end the flight it serves; it is told once."""

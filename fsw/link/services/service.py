@@ -7,9 +7,9 @@ peers are the link's. There is one instance a link; what it serves may be shared
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
-from fsw.link.wire.outgoing import Outgoing
+from fsw.link.wire.outgoing import Outgoing, PackedOutgoing
 from messages.frames import Frame
 
 
@@ -18,7 +18,7 @@ class LinkService(Protocol):
 
     message_ids: frozenset[int]  # what it wants to hear
 
-    def receive(self, frame: Frame, t_us: int) -> Sequence[Outgoing]:
+    def receive(self, frame: Frame, t_us: int) -> Sequence[Outgoing | PackedOutgoing]:
         """Answer a valid frame at once; never raises.
 
         Args:
@@ -27,8 +27,23 @@ class LinkService(Protocol):
         """
         ...
 
-    def poll(self, t_us: int) -> Sequence[Outgoing]:
+    def poll(self, t_us: int) -> Sequence[Outgoing | PackedOutgoing]:
         """Go on with an answer that is paced; called every tick, so idle must cost nothing.
+
+        Args:
+            t_us: Sensor time [us].
+        """
+        ...
+
+
+@runtime_checkable
+class BulkService(LinkService, Protocol):
+    """A service with much to send to clients that set the pace themselves, piece by piece."""
+
+    def bulk(self, t_us: int) -> Sequence[Outgoing | PackedOutgoing]:
+        """The next datagram of it; nothing where nothing is under way.
+
+        Called in what is left of a tick, several times, so that it delays none.
 
         Args:
             t_us: Sensor time [us].

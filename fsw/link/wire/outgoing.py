@@ -17,3 +17,12 @@ class Outgoing:
     message_id: int
     values: WireValues
     component: int = AUTOPILOT  # whose sequence it counts in
+
+
+@dataclass(frozen=True, slots=True)
+class PackedOutgoing:
+    """The same with its payload packed already: the bytes of a file, of which there are many."""
+
+    message_id: int
+    payload: bytes  # all of it
+    component: int = AUTOPILOT

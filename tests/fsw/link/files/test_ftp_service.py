@@ -18,8 +18,9 @@ from fsw.link.files.ftp_tree import Directory
 from fsw.link.files.served_file import DiskFile, MemoryFile
 from fsw.link.files.vehicle_files import vehicle_files
 from fsw.link.wire import message_ids as ids
-from fsw.link.wire.outgoing import Outgoing
+from fsw.link.wire.outgoing import PackedOutgoing
 from messages.frames import FrameWriter, split
+from tests.fsw.link.files.wire_values import values_of
 
 HEADER = struct.Struct("<HBBBBBxI")
 FRAMES_A_TICK = 10
@@ -44,9 +45,9 @@ class Said:
         return self.data[0] if self.opcode == Opcode.NAK else None
 
 
-def said(outgoing: Outgoing) -> Said:
+def said(outgoing: PackedOutgoing) -> Said:
     assert outgoing.message_id == ids.FILE_TRANSFER_PROTOCOL
-    network, system, component, *payload = (int(value) for value in outgoing.values)
+    network, system, component, *payload = (int(value) for value in values_of(outgoing))
     assert network == 0
     sequence, session, opcode, size, requested, complete, offset = HEADER.unpack_from(
         bytes(payload)

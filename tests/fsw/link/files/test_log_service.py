@@ -13,11 +13,13 @@ import pytest
 from fsw.link.files.flight_logs import flight_logs
 from fsw.link.files.log_service import CHUNK, LogService
 from fsw.link.wire import message_ids as ids
-from fsw.link.wire.outgoing import Outgoing
+from fsw.link.wire.outgoing import Outgoing, PackedOutgoing
 from messages.frames import FrameWriter, split
+from tests.fsw.link.files.wire_values import values_of
 
 ALL = 0xFFFFFFFF
 FRAMES_A_TICK = 6
+FRAMES_A_DATAGRAM = 13
 
 
 def flight(runs: Path, name: str, content: bytes, suffix: str = "tlog") -> Path:
@@ -36,13 +38,17 @@ class Client:
     counts: list[int] = field(default_factory=list)
     writer: FrameWriter = field(default_factory=lambda: FrameWriter(255, 190))
 
-    def ask(self, message_id: int, *values: int) -> list[Outgoing]:
+    def ask(self, message_id: int, *values: int) -> list[Outgoing | PackedOutgoing]:
         (frame,) = split(self.writer.frame(message_id, *values))
         return list(self.service.receive(frame, 0))
 
-    def polled(self) -> list[Outgoing]:
+    def polled(self) -> list[Outgoing | PackedOutgoing]:
+        """Of one tick, and what fits between it and the next."""
         answers = list(self.service.poll(0))
         assert len(answers) <= FRAMES_A_TICK
+        while bulk := self.service.bulk(0):
+            assert len(bulk) <= FRAMES_A_DATAGRAM
+            answers += bulk
         return answers
 
     def entries(self) -> list[tuple[int, ...]]:
@@ -51,7 +57,7 @@ class Client:
         while more := self.polled():
             answers += more
         assert {answer.message_id for answer in answers} == {ids.LOG_ENTRY}
-        return [tuple(map(int, (v[2], v[1], v[3], v[4]))) for v in (a.values for a in answers)]
+        return [tuple(map(int, (v[2], v[1], v[3], v[4]))) for v in map(values_of, answers)]
 
     def download(
         self,
@@ -62,7 +68,7 @@ class Client:
     ) -> None:
         self.ask(ids.LOG_REQUEST_DATA, offset, count, log_id, 1, 1)
         while answers := self.polled():
-            for start, id_, size, *data in (map(int, answer.values) for answer in answers):
+            for start, id_, size, *data in (map(int, values_of(answer)) for answer in answers):
                 assert id_ == log_id
                 assert len(data) == CHUNK
                 self.counts.append(size)
