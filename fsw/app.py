@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fsw.arguments import FswOptions
 from fsw.link import link_report
 from fsw.link.build_links import build_links
-from fsw.link.files.flight_logs import FlightLog, flight_logs
+from fsw.link.files.flight_logs import FlightLogs
 from fsw.link.files.ftp_service import FtpService
 from fsw.link.files.log_service import LogService
 from fsw.link.files.vehicle_files import vehicle_files
@@ -125,7 +125,7 @@ class _Session:
             start_unix_us=start_us,
             plan_ids=program.missions.ids,
         )
-        logs = flight_logs(directory)
+        logs = FlightLogs(directory)
         clocks = (clock.now_us, clock.unix_us)
         ground = build_links(
             options.links,
@@ -167,9 +167,7 @@ class _Session:
     def _warn(self, sentence: str) -> None:
         self._told.report("warning", f"fsw: {sentence}")
 
-    def _services(
-        self, program: FlightProgram[Any], logs: Sequence[FlightLog]
-    ) -> tuple[LinkService, ...]:
+    def _services(self, program: FlightProgram[Any], logs: FlightLogs) -> tuple[LinkService, ...]:
         """What one link serves; called once a link."""
         # Its table of parameters knows all that flies, as the program does.
         from fsw.link.services.parameter_service import ParameterService

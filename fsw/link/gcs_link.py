@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Final
 
 from fsw.link.inbox import Inbox
@@ -154,13 +155,13 @@ class GcsLink:
 
     def serve(self, t_us: int) -> None:
         """Let services go on with what they are sending; call it once a tick if it talks."""
-        self.dispatch.poll(t_us, self.outbox.add_outgoing)
+        self.dispatch.poll(t_us, partial(self.outbox.add_said, t_us=t_us))
         if self.outbox.waiting:
             self._send(t_us)
 
     def serve_bulk(self, t_us: int) -> bool:
         """Send a datagram of what clients wait for; whether there was anything."""
-        if not self.dispatch.bulk(t_us, self.outbox.add_outgoing):
+        if not self.dispatch.bulk(t_us, partial(self.outbox.add_said, t_us=t_us)):
             return False
         self._send(t_us)
         return True
@@ -179,9 +180,10 @@ class GcsLink:
         for stream in self.rates.due(snapshot.t_us):
             self._encode(stream, snapshot)
         for text in outputs.texts:
-            self.outbox.add_text(text)
+            self.outbox.add_text(text, snapshot.t_us)
         if snapshot.t_us >= self._housekeeping_us:
             self._housekeeping_us = snapshot.t_us + _HOUSEKEEPING_US
+            self.outbox.add_overdue_texts(snapshot.t_us)
             self._peers.expire(self._clock())
             self.talks = self._unheard or self._peers.any_heard
 
@@ -212,7 +214,7 @@ class GcsLink:
             armed = self._snapshot is not None and self._snapshot.armed
             text = set_up_signing(self.signing, frame, sender, armed)
             if text is not None:
-                self.outbox.add_text(text)
+                self.outbox.add_text(text, t_us)
             return
         answer = self._commands.answer(frame, t_us, self._snapshot)
         if answer is None:
@@ -220,10 +222,10 @@ class GcsLink:
         else:
             messages, refusal = answer
             for message in messages:
-                self.outbox.add_outgoing(message)
+                self.outbox.add_said(message, t_us)
             if refusal is not None:
-                self.outbox.add_text(refusal)
-        self.dispatch.receive(frame, t_us, self.outbox.add_outgoing)
+                self.outbox.add_text(refusal, t_us)
+        self.dispatch.receive(frame, t_us, partial(self.outbox.add_said, t_us=t_us))
 
     def _encode(self, stream: Stream, snapshot: FlightSnapshot) -> None:
         try:

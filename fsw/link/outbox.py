@@ -6,9 +6,10 @@ import struct
 from typing import Final
 
 from fsw.link.signing.signing import Signing
+from fsw.link.text_limiter import TextLimiter
 from fsw.link.wire import encode_replies, message_ids
 from fsw.link.wire.message_ids import AUTOPILOT, PANDION, SYSTEM_ID
-from fsw.link.wire.outgoing import Outgoing, PackedOutgoing, WireValues
+from fsw.link.wire.outgoing import Outgoing, Said, WireValues
 from fsw.signals import StatusText
 from messages.frames import FrameWriter
 
@@ -24,6 +25,7 @@ class Outbox:
         self._writers = {id_: FrameWriter(SYSTEM_ID, id_) for id_ in (AUTOPILOT, PANDION)}
         self._frames: list[bytes] = []
         self._text_id = 0
+        self._limiter = TextLimiter()
 
     @property
     def waiting(self) -> bool:
@@ -42,8 +44,11 @@ class Outbox:
             return
         self._frames.append(self._signing.signed(frame) if self._signing.active else frame)
 
-    def add_outgoing(self, outgoing: Outgoing | PackedOutgoing) -> None:
+    def add_said(self, outgoing: Said, t_us: int) -> None:
         """Take what a service says."""
+        if isinstance(outgoing, StatusText):
+            self.add_text(outgoing, t_us)
+            return
         if isinstance(outgoing, Outgoing):
             self.add(outgoing.component, outgoing.message_id, outgoing.values)
             return
@@ -51,8 +56,19 @@ class Outbox:
         frame = writer.packed_frame(outgoing.message_id, outgoing.payload)
         self._frames.append(self._signing.signed(frame) if self._signing.active else frame)
 
-    def add_text(self, text: StatusText) -> None:
-        """Take a sentence, in as many STATUSTEXT as it needs."""
+    def add_text(self, text: StatusText, t_us: int) -> None:
+        """Take a sentence, unless it has just been said."""
+        admitted = self._limiter.admit(text, t_us)
+        if admitted is not None:
+            self._add_text(admitted)
+
+    def add_overdue_texts(self, t_us: int) -> None:
+        """Say how often sentences were held back; call it now and then."""
+        for text in self._limiter.overdue(t_us):
+            self._add_text(text)
+
+    def _add_text(self, text: StatusText) -> None:
+        """In as many STATUSTEXT as it needs."""
         self._text_id = self._text_id % 0xFFFF + 1
         for values in encode_replies.status_texts(text, self._text_id):
             self.add(AUTOPILOT, message_ids.STATUSTEXT, values)

@@ -1,12 +1,14 @@
 """Which flights' logs are offered, and under which numbers.
 
 The list is made once, when the vehicle starts: a number must mean the same file for as long as a
-ground station may ask for it.
+ground station may ask for it. Only erasing the finished logs changes it.
 """
 
 from __future__ import annotations
 
 import os
+import threading
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -30,6 +32,52 @@ class FlightLog:
         return self.files[0]
 
 
+class Erasure:
+    """Finished logs on their way from the disk, in a thread: that takes longer than a tick."""
+
+    def __init__(self, logs: Sequence[FlightLog]) -> None:
+        self.erased = 0  # flights
+        self.failed = 0
+        self.reason = ""  # of the last that could not be
+        self._logs = logs
+        self._thread = threading.Thread(target=self._work, name="erase", daemon=True)
+        self._thread.start()
+
+    @property
+    def done(self) -> bool:
+        """Whether it has come to its end."""
+        return not self._thread.is_alive()
+
+    def _work(self) -> None:
+        for log in self._logs:
+            try:
+                for file in log.files:
+                    file.path.unlink()
+                self.erased += 1
+            except OSError as error:
+                self.failed += 1
+                self.reason = f"{log.flight}: {error.strerror}"
+
+
+class FlightLogs:
+    """The list that all links share."""
+
+    def __init__(self, directory: Path) -> None:
+        """Find this flight's log and those of the flights beside it.
+
+        Args:
+            directory: Where the present flight writes; its logs must exist already.
+        """
+        self._present = directory.absolute().name
+        self.all = flight_logs(directory)
+
+    def erase(self) -> Erasure:
+        """Begin to delete the logs of finished flights; from now on they are not listed."""
+        finished = [log for log in self.all if log.flight != self._present]
+        self.all = tuple(log for log in self.all if log.flight == self._present)
+        return Erasure(finished)
+
+
 def flight_logs(directory: Path) -> tuple[FlightLog, ...]:
     """List this flight and those in the directories beside it, oldest first, this one last.
 
@@ -46,11 +94,13 @@ def flight_logs(directory: Path) -> tuple[FlightLog, ...]:
                 if earlier is not None:
                     dated.append((earlier.log.status().st_mtime, entry.name, earlier))
     earlier_flights = [flight for _, _, flight in sorted(dated, key=lambda item: item[:2])]
-    present = _flight(directory)
+    present = _flight(directory, present=True)
     return tuple([*earlier_flights, *([present] if present else [])][-_MAX_FLIGHTS:])
 
 
-def _flight(directory: Path) -> FlightLog | None:
+def _flight(directory: Path, *, present: bool = False) -> FlightLog | None:
     paths = [directory / name for name in NAMES]
     files = tuple(DiskFile(path) for path in paths if path.is_file() and not path.is_symlink())
+    if all(file.size() == 0 for file in files) and not present:
+        return None  # a download of nothing never ends
     return FlightLog(directory.name, files) if files else None

@@ -13,11 +13,11 @@ from collections import deque
 from collections.abc import Sequence
 from typing import Final, NamedTuple, cast
 
-from fsw.link.files.flight_logs import FlightLog
+from fsw.link.files.flight_logs import Erasure, FlightLogs
 from fsw.link.files.served_file import OpenFile
-from fsw.link.wire import encode_replies, message_ids
+from fsw.link.wire import message_ids
 from fsw.link.wire.decode import Numbers, for_this_vehicle
-from fsw.link.wire.outgoing import Outgoing, PackedOutgoing
+from fsw.link.wire.outgoing import Outgoing, PackedOutgoing, Said
 from fsw.signals import StatusText
 from messages.frames import Frame
 
@@ -31,8 +31,7 @@ _LOG_DATA: Final = struct.Struct(f"<IHB{CHUNK}s")
 _ENTRIES: Final = 8  # a tick: each asks the file system once
 _MAX_REQUESTS: Final = 32  # a client asks again for what got lost in up to 20 pieces
 _TO_THE_END: Final = 0xFFFFFFFF
-_WARNING: Final = 4  # MAV_SEVERITY
-_KEPT = StatusText(_WARNING, "Logs are kept: they are not erased over the link")
+_WARNING, _INFO = 4, 6  # MAV_SEVERITY
 
 
 class _Request(NamedTuple):
@@ -55,18 +54,21 @@ class LogService:
         }
     )
 
-    def __init__(self, logs: Sequence[FlightLog]) -> None:
-        self._logs = logs
+    def __init__(self, logs: FlightLogs) -> None:
+        self._kept = logs
+        self._logs = logs.all
+        self._erasure: Erasure | None = None
         self._listed: dict[int, int] = {}  # bytes that each log was listed with
         self._to_list: deque[int] = deque()
         self._requests: deque[_Request] = deque()
         self._open: tuple[int, OpenFile] | None = None
 
     def receive(self, frame: Frame, t_us: int) -> Sequence[Outgoing]:
-        """Note what is asked for; refuse to erase."""
+        """Note what is asked for."""
         values = cast(Numbers, frame.payload_values)
         if not for_this_vehicle(*values[-2:]):
             return ()
+        self._look_again()
         if frame.message_id == message_ids.LOG_REQUEST_LIST:
             return self._list(*map(int, values[:2]))
         if frame.message_id == message_ids.LOG_REQUEST_DATA:
@@ -74,26 +76,35 @@ class LogService:
         elif frame.message_id == message_ids.LOG_REQUEST_END:
             self._stop()
         elif frame.message_id == message_ids.LOG_ERASE:
-            texts = encode_replies.status_texts(_KEPT, 0)
-            return [Outgoing(message_ids.STATUSTEXT, values) for values in texts]
+            self._erasure = self._kept.erase()
+            self._look_again()
         return ()
 
-    def poll(self, t_us: int) -> Sequence[Outgoing | PackedOutgoing]:
+    def poll(self, t_us: int) -> Sequence[Said]:
         """Send the next entries, and the next piece of a log to who asked for all of it at once."""
-        if not self._to_list and not self._requests:
+        if not self._to_list and not self._requests and self._erasure is None:
             return ()
-        answers: list[Outgoing | PackedOutgoing] = [
-            self._entry(self._to_list.popleft()) for _ in self._next_entries()
-        ]
+        answers: list[Said] = [self._entry(self._to_list.popleft()) for _ in self._next_entries()]
+        if self._erasure is not None and self._erasure.done:
+            answers.append(_told(self._erasure))
+            self._erasure = None
         if self._requests and not self._requests[0].paced:
             answers += self._data(_FRAMES - len(answers))
         return answers
 
-    def bulk(self, t_us: int) -> Sequence[Outgoing | PackedOutgoing]:
+    def bulk(self, t_us: int) -> Sequence[Said]:
         """Send the next datagram to who asks for a log piece by piece."""
         if not self._requests or not self._requests[0].paced:
             return ()
         return self._data(_DATAGRAM_FRAMES)
+
+    def _look_again(self) -> None:
+        """Logs that were erased, over any link, give their numbers to others."""
+        if self._kept.all is not self._logs:
+            self._logs = self._kept.all
+            self._stop()
+            self._to_list.clear()
+            self._listed.clear()
 
     def _list(self, first: int, last: int) -> Sequence[Outgoing]:
         if not self._logs:
@@ -173,6 +184,13 @@ class LogService:
         if self._open is not None:
             self._open[1].close()
             self._open = None
+
+
+def _told(erasure: Erasure) -> StatusText:
+    text = f"{erasure.erased} logs erased, this flight's is kept"
+    if not erasure.failed:
+        return StatusText(_INFO, text)
+    return StatusText(_WARNING, f"{text}; {erasure.failed} could not be: {erasure.reason}")
 
 
 def _log_data(log_id: int, offset: int, data: bytes) -> PackedOutgoing:

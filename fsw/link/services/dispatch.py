@@ -6,11 +6,11 @@ import traceback
 from collections.abc import Callable, Sequence
 
 from fsw.link.services.service import BulkService, LinkService
-from fsw.link.wire.outgoing import Outgoing, PackedOutgoing
+from fsw.link.wire.outgoing import Said
 from messages.frames import Frame
 
-Answers = Callable[[Outgoing | PackedOutgoing], None]
-"""Takes each message a service wants to send."""
+Answers = Callable[[Said], None]
+"""Takes each thing a service wants to say."""
 
 
 class Dispatch:

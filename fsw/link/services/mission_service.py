@@ -25,10 +25,9 @@ from fsw.link.services.mission_wire import (
     item_float,
     item_int,
 )
-from fsw.link.wire import encode_replies
 from fsw.link.wire import message_ids as ids
 from fsw.link.wire.decode import Numbers, for_this_vehicle
-from fsw.link.wire.outgoing import Outgoing
+from fsw.link.wire.outgoing import Outgoing, Said
 from fsw.signals import StatusText
 from fsw.vehicle.mission_items import DENIED, UNSUPPORTED, MissionItem, Refused
 from messages.frames import Frame
@@ -45,7 +44,7 @@ TRIES: Final = 20  # of asking for one item, which makes 5 s
 REACHED_REPEATS: Final = 10  # of MISSION_ITEM_REACHED, as PX4 has them
 _REPEAT_US: Final = 1_000_000
 SILENCE_US: Final = 5_000_000  # ends a download that is not asked on
-_WARNING, _NOTICE = 4, 5  # MAV_SEVERITY
+_WARNING, _INFO = 4, 6  # MAV_SEVERITY
 
 
 @dataclass(slots=True)
@@ -83,8 +82,7 @@ class MissionService:
         self._show_again = False
         self._repeats = 0  # of MISSION_ITEM_REACHED that are still to be sent
         self._repeat_us = 0
-        self._text_id = 0
-        self._handlers: dict[int, Callable[[Numbers, Peer, int], Sequence[Outgoing]]] = {
+        self._handlers: dict[int, Callable[[Numbers, Peer, int], Sequence[Said]]] = {
             ids.MISSION_COUNT: self._count,
             ids.MISSION_ITEM: self._item,
             ids.MISSION_ITEM_INT: self._item_int,
@@ -99,7 +97,7 @@ class MissionService:
         }
         self.message_ids = frozenset(self._handlers)
 
-    def receive(self, frame: Frame, t_us: int) -> Sequence[Outgoing]:
+    def receive(self, frame: Frame, t_us: int) -> Sequence[Said]:
         """See :class:`~fsw.link.services.service.LinkService`."""
         values = cast(Numbers, frame.payload_values)
         at = _TARGET_AT[frame.message_id]
@@ -108,9 +106,9 @@ class MissionService:
         peer = (frame.system_id, frame.component_id)
         return self._handlers[frame.message_id](values, peer, t_us)
 
-    def poll(self, t_us: int) -> Sequence[Outgoing]:
+    def poll(self, t_us: int) -> Sequence[Said]:
         """Ask again for what did not come, and tell how far the mission is."""
-        told: list[Outgoing] = []
+        told: list[Said] = []
         if self._store.progress is not self._shown or self._show_again:
             told += self._show_progress(t_us)
         elif self._repeats and t_us >= self._repeat_us:
@@ -123,7 +121,7 @@ class MissionService:
                 self._upload = None
                 silence = f"upload broken off: item {len(upload.items)} did not come; kept the old"
                 told.append(encode_ack(CANCELLED, upload.kind, upload.peer))
-                told += self._say(silence)
+                told.append(StatusText(_WARNING, silence))
         return told
 
     def _show_progress(self, t_us: int) -> list[Outgoing]:
@@ -146,7 +144,7 @@ class MissionService:
 
     # ------------------------------------------------------------ upload
 
-    def _count(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[Outgoing]:
+    def _count(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[Said]:
         number, count = int(values[3]), int(values[0])
         refused = self._unavailable(number, peer, t_us)
         if refused is not None:
@@ -161,15 +159,15 @@ class MissionService:
             return self._finish(self._upload)
         return (self._ask(self._upload, t_us),)
 
-    def _item(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[Outgoing]:
+    def _item(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[Said]:
         return self._take(item_float(values), values, peer, t_us)
 
-    def _item_int(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[Outgoing]:
+    def _item_int(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[Said]:
         return self._take(item_int(values), values, peer, t_us)
 
     def _take(
         self, item: MissionItem | Refused, values: Numbers, peer: Peer, t_us: int
-    ) -> Sequence[Outgoing]:
+    ) -> Sequence[Said]:
         """Add the item that was asked for; the last one completes the upload."""
         seq, number = int(values[7]), int(values[14])
         upload = self._upload
@@ -193,7 +191,7 @@ class MissionService:
         upload.tries = 0
         return (self._ask(upload, t_us),)
 
-    def _stray(self, seq: int, number: int, peer: Peer) -> Sequence[Outgoing]:
+    def _stray(self, seq: int, number: int, peer: Peer) -> Sequence[Said]:
         """An item of no upload; after one that ended, its acknowledgement may have been lost."""
         if self._done is not None and self._done[:2] == (peer, number):
             again = encode_ack(ACCEPTED, number, peer, self._store.identity(self._done[1]))
@@ -207,7 +205,7 @@ class MissionService:
         upload.tries += 1
         return encode_request(len(upload.items), upload.kind, upload.peer)
 
-    def _finish(self, upload: _Upload) -> Sequence[Outgoing]:
+    def _finish(self, upload: _Upload) -> Sequence[Said]:
         kind, peer = upload.kind, upload.peer
         refused = self._store.keep(kind, tuple(upload.items), tuple(upload.meanings))
         if refused is not None:
@@ -217,12 +215,12 @@ class MissionService:
         text = f"{kind.name.lower()} of {upload.count} items received"
         return (
             encode_ack(ACCEPTED, kind, peer, self._store.identity(kind)),
-            *self._say(text, _NOTICE),
+            StatusText(_INFO, text),
         )
 
     # ------------------------------------------------------------ download
 
-    def _request_list(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[Outgoing]:
+    def _request_list(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[Said]:
         number = int(values[2])
         refused = self._unavailable(number, peer, t_us)
         if refused is not None:
@@ -233,15 +231,13 @@ class MissionService:
         self._download = _Download(peer, kind, items, t_us) if items else None
         return (encode_count(len(items), kind, peer, self._store.identity(kind)),)
 
-    def _request(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[Outgoing]:
+    def _request(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[Said]:
         return self._send_item(values, peer, t_us, as_int=False)
 
-    def _request_int(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[Outgoing]:
+    def _request_int(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[Said]:
         return self._send_item(values, peer, t_us, as_int=True)
 
-    def _send_item(
-        self, values: Numbers, peer: Peer, t_us: int, as_int: bool
-    ) -> Sequence[Outgoing]:
+    def _send_item(self, values: Numbers, peer: Peer, t_us: int, as_int: bool) -> Sequence[Said]:
         """Any item in any order and as often as asked: requests and items may be lost."""
         seq, number = int(values[0]), int(values[3])
         download = self._download
@@ -257,7 +253,7 @@ class MissionService:
 
     # ------------------------------------------------------------ the rest
 
-    def _ack(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[Outgoing]:
+    def _ack(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[Said]:
         """The other side has all it wanted, or wants no more; the old items stay."""
         if self._download is not None and self._download.peer == peer:
             self._download = None
@@ -265,7 +261,7 @@ class MissionService:
             self._upload = None
         return ()
 
-    def _clear_all(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[Outgoing]:
+    def _clear_all(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[Said]:
         number = int(values[2])
         kinds = tuple(Kind) if number == ALL_KINDS else (number,)
         refused = self._unavailable(kinds[0], peer, t_us)
@@ -276,7 +272,7 @@ class MissionService:
             self._store.keep(Kind(kind), (), ())
         return (encode_ack(ACCEPTED, number, peer),)
 
-    def _set_current(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[Outgoing]:
+    def _set_current(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[Said]:
         seq = int(values[0])
         if self._store.set_current(seq):
             self._show_again = True
@@ -284,14 +280,14 @@ class MissionService:
         refused = Refused(INVALID_SEQUENCE, f"there is no mission item {seq}")
         return (
             encode_ack(refused.result, Kind.MISSION, peer),
-            *self._say(refused.reason),
+            StatusText(_WARNING, refused.reason),
         )
 
-    def _partial(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[Outgoing]:
+    def _partial(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[Said]:
         """A part of a list cannot be checked by itself; ground stations then send all of it."""
         return (encode_ack(UNSUPPORTED, int(values[4]), peer),)
 
-    def _unavailable(self, number: int, peer: Peer, t_us: int) -> Sequence[Outgoing] | None:
+    def _unavailable(self, number: int, peer: Peer, t_us: int) -> Sequence[Said] | None:
         """Why no transfer of this type can begin now."""
         if number not in ROOM:
             return (encode_ack(UNSUPPORTED, number, peer),)
@@ -303,16 +299,10 @@ class MissionService:
             return (encode_ack(DENIED, number, peer),)
         return None
 
-    def _refuse(self, refused: Refused, kind: Kind, peer: Peer) -> Sequence[Outgoing]:
+    def _refuse(self, refused: Refused, kind: Kind, peer: Peer) -> Sequence[Said]:
         self._upload = None
         text = f"{kind.name.lower()} refused: {refused.reason}"
-        return (encode_ack(refused.result, kind, peer), *self._say(text))
-
-    def _say(self, text: str, severity: int = _WARNING) -> list[Outgoing]:
-        self._text_id = (self._text_id + 1) & 0x7FFF
-        # The upper half of all numbers, so that no text of the vehicle itself has the same.
-        pieces = encode_replies.status_texts(StatusText(severity, text), 0x8000 | self._text_id)
-        return [Outgoing(ids.STATUSTEXT, values) for values in pieces]
+        return (encode_ack(refused.result, kind, peer), StatusText(_WARNING, text))
 
 
 # Where the wire values of a message name the system it is for; its component follows.

@@ -16,8 +16,7 @@ from typing import Final, cast
 
 from fsw.link.wire import message_ids as ids
 from fsw.link.wire.decode import for_this_vehicle
-from fsw.link.wire.encode_replies import status_texts
-from fsw.link.wire.outgoing import Outgoing
+from fsw.link.wire.outgoing import Outgoing, Said
 from fsw.parameters.facts import FACT_BY_NAME, REPEATED
 from fsw.parameters.registry import BY_NAME
 from fsw.parameters.storage import REAL32
@@ -51,9 +50,8 @@ class ParameterService:
         self._news = store.listen()
         self._next = _COUNT  # index of the next one to list
         self._burst_us = 0
-        self._text_id = 0
 
-    def receive(self, frame: Frame, t_us: int) -> Sequence[Outgoing]:
+    def receive(self, frame: Frame, t_us: int) -> Sequence[Said]:
         """Answer a question at once, begin to list, or pass a wish on."""
         values = frame.payload_values
         if frame.message_id == ids.PARAM_REQUEST_LIST:
@@ -73,14 +71,14 @@ class ParameterService:
             return ()
         return self._set(_name(text), value, type_, (frame.system_id, frame.component_id))
 
-    def poll(self, t_us: int) -> Sequence[Outgoing]:
+    def poll(self, t_us: int) -> Sequence[Said]:
         """Tell what has changed, and go on with a list."""
         news = self._news
         if self._next == _COUNT and not news.changed and not news.texts:
             return ()
-        answers: list[Outgoing] = []
+        answers: list[Said] = []
         if news.texts:
-            answers += self._text(news.texts.popleft())
+            answers.append(StatusText(_WARNING, news.texts.popleft()))
         while news.changed and len(answers) < BURST:
             name = next(iter(news.changed))
             del news.changed[name]
@@ -94,7 +92,7 @@ class ParameterService:
             self._next = end
         return answers
 
-    def _read(self, index: int, name: str, asker: _Peer) -> Sequence[Outgoing]:
+    def _read(self, index: int, name: str, asker: _Peer) -> Sequence[Said]:
         if index < 0 and name == _HASH:
             return (self._hash(),)
         wanted = _INDEX.get(name, _COUNT) if index < 0 else index
@@ -102,7 +100,7 @@ class ParameterService:
             return (self._value(wanted),)
         return (_error(index, name, _DOES_NOT_EXIST, asker),)
 
-    def _set(self, name: str, value: float, type_: int, asker: _Peer) -> Sequence[Outgoing]:
+    def _set(self, name: str, value: float, type_: int, asker: _Peer) -> Sequence[Said]:
         if name == _HASH:
             self._next = _COUNT  # QGroundControl's word that it needs no list
             return ()
@@ -111,7 +109,7 @@ class ParameterService:
             if value == told.values[0]:
                 return (told,)
             why = f"{name} is read only: {FACT_BY_NAME[name].meaning}"
-            return (*self._text(why), told, _error(index, name, _READ_ONLY, asker))
+            return (StatusText(_WARNING, why), told, _error(index, name, _READ_ONLY, asker))
         if name not in BY_NAME:
             return (_error(_BY_NAME, name, _DOES_NOT_EXIST, asker),)
         if type_ == REAL32:
@@ -121,7 +119,7 @@ class ParameterService:
             self._news.changed[name] = None
         if refusal is None:
             return ()
-        return (*self._text(refusal), _error(_INDEX[name], name, _OUT_OF_RANGE, asker))
+        return (StatusText(_WARNING, refusal), _error(_INDEX[name], name, _OUT_OF_RANGE, asker))
 
     def _value(self, index: int) -> Outgoing:
         name = _NAMES[index]
@@ -141,11 +139,6 @@ class ParameterService:
             state = zlib.crc32(named, state)
         (bits,) = struct.unpack("<f", struct.pack("<I", state ^ 0xFFFFFFFF))
         return Outgoing(ids.PARAM_VALUE, (bits, _COUNT, _NO_INDEX, _HASH.encode(), _UINT32))
-
-    def _text(self, sentence: str) -> list[Outgoing]:
-        self._text_id = (self._text_id + 1) & 0x3FFF
-        pieces = status_texts(StatusText(_WARNING, sentence), 0x4000 | self._text_id)
-        return [Outgoing(ids.STATUSTEXT, piece) for piece in pieces]
 
 
 def _error(index: int, name: str, error: int, asker: _Peer) -> Outgoing:

@@ -1,7 +1,7 @@
 """What a link serves beside telemetry and commands: parameters, missions, files, time.
 
-A service is asked by frames and answers with messages; sockets, sequence numbers, signatures and
-peers are the link's. There is one instance a link; what it serves may be shared.
+A service is asked by frames and answers with messages and sentences; sockets, sequence numbers,
+signatures and peers are the link's. There is one instance a link; what it serves may be shared.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Protocol, runtime_checkable
 
-from fsw.link.wire.outgoing import Outgoing, PackedOutgoing
+from fsw.link.wire.outgoing import Said
 from messages.frames import Frame
 
 
@@ -18,7 +18,7 @@ class LinkService(Protocol):
 
     message_ids: frozenset[int]  # what it wants to hear
 
-    def receive(self, frame: Frame, t_us: int) -> Sequence[Outgoing | PackedOutgoing]:
+    def receive(self, frame: Frame, t_us: int) -> Sequence[Said]:
         """Answer a valid frame at once; never raises.
 
         Args:
@@ -27,7 +27,7 @@ class LinkService(Protocol):
         """
         ...
 
-    def poll(self, t_us: int) -> Sequence[Outgoing | PackedOutgoing]:
+    def poll(self, t_us: int) -> Sequence[Said]:
         """Go on with an answer that is paced; called every tick, so idle must cost nothing.
 
         Args:
@@ -40,7 +40,7 @@ class LinkService(Protocol):
 class BulkService(LinkService, Protocol):
     """A service with much to send to clients that set the pace themselves, piece by piece."""
 
-    def bulk(self, t_us: int) -> Sequence[Outgoing | PackedOutgoing]:
+    def bulk(self, t_us: int) -> Sequence[Said]:
         """The next datagram of it; nothing where nothing is under way.
 
         Called in what is left of a tick, several times, so that it delays none.

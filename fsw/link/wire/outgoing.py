@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from fsw.link.wire.message_ids import AUTOPILOT
+from fsw.signals import StatusText
 
 WireValues = tuple[float | bytes, ...]
 """Every field of a message in wire order, see ``messages.frames.wire_fields``."""
@@ -26,3 +27,7 @@ class PackedOutgoing:
     message_id: int
     payload: bytes  # all of it
     component: int = AUTOPILOT
+
+
+Said = Outgoing | PackedOutgoing | StatusText
+"""What a service says: messages, and sentences for the operator."""

@@ -10,7 +10,7 @@ from pathlib import Path
 import fastcrc
 import pytest
 
-from fsw.link.files.flight_logs import flight_logs
+from fsw.link.files.flight_logs import FlightLogs
 from fsw.link.files.ftp_service import FtpService
 from fsw.link.files.log_service import LogService
 from fsw.link.files.vehicle_files import vehicle_files
@@ -83,7 +83,7 @@ def vehicle(tmp_path: Path) -> Iterator[Ground]:
     run = tmp_path / "run-1"
     run.mkdir()
     (run / "flight.tlog").write_bytes(bytes(2000))
-    logs = flight_logs(run)
+    logs = FlightLogs(run)
     services = (
         ParameterService(ParameterStore(FlightConfig(), lambda tuning: None)),
         MissionService(MissionStore(Site(nowhere, judge, lambda: 0.1))),

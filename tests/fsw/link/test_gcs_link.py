@@ -17,7 +17,7 @@ import pytest
 from pymavlink.dialects.v10 import common as old_protocol
 
 from fsw.link import link_report
-from fsw.link.files.flight_logs import flight_logs
+from fsw.link.files.flight_logs import FlightLogs
 from fsw.link.files.log_service import LogService
 from fsw.link.peers import EXPIRY_US
 from fsw.link.telemetry.streams import AT_ONCE, STREAMS
@@ -310,7 +310,7 @@ def test_a_log_that_is_downloaded_does_not_grow_by_it(tmp_path: Path) -> None:
     run.mkdir()
     (run / "flight.tlog").write_bytes(bytes(2000))
     request = FrameWriter(255, 190).frame(ids.LOG_REQUEST_DATA, 0, 2000, 0, 1, 1)
-    with ground_station(services=(LogService(flight_logs(run)),)) as ground:
+    with ground_station(services=(LogService(FlightLogs(run)),)) as ground:
         ground.polled(request)
         sent = Counter(frame.message_id for frame in ground.fly(20))
         kept = Counter(id_ for _, raw in ground.recorded for id_ in [next(split(raw)).message_id])

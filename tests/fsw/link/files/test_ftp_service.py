@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from fsw.link.files.flight_logs import flight_logs
+from fsw.link.files.flight_logs import FlightLogs
 from fsw.link.files.ftp_message import MAX_DATA, Opcode, Refusal
 from fsw.link.files.ftp_service import FtpService
 from fsw.link.files.ftp_tree import Directory
@@ -236,7 +236,7 @@ def test_a_link_in_the_place_of_a_log_is_not_followed(tmp_path: Path) -> None:
     secret.write_bytes(b"secret")
     log.parent.mkdir()
     log.write_bytes(b"log")
-    client = Client(FtpService(vehicle_files(flight_logs(log.parent))))
+    client = Client(FtpService(vehicle_files(FlightLogs(log.parent))))
     assert client.names("/logs/run") == ["Fflight.tlog\t3"]
     log.unlink()
     log.symlink_to(secret)
@@ -368,7 +368,7 @@ def test_names_that_do_not_fit_a_message_are_left_out(tmp_path: Path) -> None:
     for name in ("n" * 230, "tab\there", "plain"):
         (tmp_path / name).mkdir()
         (tmp_path / name / "flight.tlog").write_bytes(b"log")
-    tree = vehicle_files(flight_logs(tmp_path / "plain"))
+    tree = vehicle_files(FlightLogs(tmp_path / "plain"))
     logs = tree["logs"]
     assert isinstance(logs, Mapping)
     assert list(logs) == ["plain"]

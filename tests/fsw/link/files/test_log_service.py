@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import os
 import random
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
 
-from fsw.link.files.flight_logs import flight_logs
+from fsw.link.files.flight_logs import FlightLogs, flight_logs
 from fsw.link.files.log_service import CHUNK, LogService
+from fsw.link.files.vehicle_files import vehicle_files
 from fsw.link.wire import message_ids as ids
-from fsw.link.wire.outgoing import Outgoing, PackedOutgoing
+from fsw.link.wire.outgoing import Said
+from fsw.signals import StatusText
 from messages.frames import FrameWriter, split
-from tests.fsw.link.files.wire_values import values_of
+from tests.fsw.link.files.wire_values import message_of, values_of
 
 ALL = 0xFFFFFFFF
 FRAMES_A_TICK = 6
@@ -38,11 +41,11 @@ class Client:
     counts: list[int] = field(default_factory=list)
     writer: FrameWriter = field(default_factory=lambda: FrameWriter(255, 190))
 
-    def ask(self, message_id: int, *values: int) -> list[Outgoing | PackedOutgoing]:
+    def ask(self, message_id: int, *values: int) -> list[Said]:
         (frame,) = split(self.writer.frame(message_id, *values))
         return list(self.service.receive(frame, 0))
 
-    def polled(self) -> list[Outgoing | PackedOutgoing]:
+    def polled(self) -> list[Said]:
         """Of one tick, and what fits between it and the next."""
         answers = list(self.service.poll(0))
         assert len(answers) <= FRAMES_A_TICK
@@ -56,7 +59,7 @@ class Client:
         answers = self.ask(ids.LOG_REQUEST_LIST, 0, 0xFFFF, 1, 1)
         while more := self.polled():
             answers += more
-        assert {answer.message_id for answer in answers} == {ids.LOG_ENTRY}
+        assert {message_of(answer) for answer in answers} == {ids.LOG_ENTRY}
         return [tuple(map(int, (v[2], v[1], v[3], v[4]))) for v in map(values_of, answers)]
 
     def download(
@@ -81,7 +84,7 @@ class Client:
 @pytest.mark.parametrize("count", [ALL, 0x7FFFFFFF])
 def test_a_download_is_the_file_byte_for_byte(tmp_path: Path, size: int, count: int) -> None:
     content = random.Random(size).randbytes(size)
-    client = Client(LogService(flight_logs(flight(tmp_path, "run-1", content))))
+    client = Client(LogService(FlightLogs(flight(tmp_path, "run-1", content))))
     client.download(0, count=count)
     assert bytes(client.log) == content
 
@@ -90,21 +93,21 @@ def test_a_download_is_the_file_byte_for_byte(tmp_path: Path, size: int, count: 
 def test_a_download_without_an_end_closes_with_a_message_that_is_not_full(
     tmp_path: Path, size: int
 ) -> None:
-    client = Client(LogService(flight_logs(flight(tmp_path, "run-1", bytes(size)))))
+    client = Client(LogService(FlightLogs(flight(tmp_path, "run-1", bytes(size)))))
     client.download(0)
     assert [count < CHUNK for count in client.counts] == [False] * (size // 90) + [True]
 
 
 def test_a_piece_ends_where_it_was_asked_to_end(tmp_path: Path) -> None:
     content = bytes(range(250)) * 8
-    client = Client(LogService(flight_logs(flight(tmp_path, "run-1", content))))
+    client = Client(LogService(FlightLogs(flight(tmp_path, "run-1", content))))
     client.download(0, offset=180, count=270)
     assert client.counts == [90, 90, 90]
     assert bytes(client.log[180:]) == content[180:450]
 
 
 def test_behind_the_end_there_is_nothing(tmp_path: Path) -> None:
-    client = Client(LogService(flight_logs(flight(tmp_path, "run-1", bytes(180)))))
+    client = Client(LogService(FlightLogs(flight(tmp_path, "run-1", bytes(180)))))
     client.download(0, offset=180)
     client.download(0, offset=5000, count=90)
     assert client.counts == [0, 0]
@@ -112,7 +115,7 @@ def test_behind_the_end_there_is_nothing(tmp_path: Path) -> None:
 
 def test_lost_pieces_are_asked_for_again_many_at_a_time(tmp_path: Path) -> None:
     content = random.Random(1).randbytes(90 * 100)
-    client = Client(LogService(flight_logs(flight(tmp_path, "run-1", content))))
+    client = Client(LogService(FlightLogs(flight(tmp_path, "run-1", content))))
     numbers = iter(range(1000))
     client.download(0, lose=lambda: next(numbers) % 5 == 0)
     assert bytes(client.log) != content
@@ -125,7 +128,7 @@ def test_lost_pieces_are_asked_for_again_many_at_a_time(tmp_path: Path) -> None:
 def test_the_size_is_the_listed_one_while_the_file_grows(tmp_path: Path) -> None:
     content = random.Random(2).randbytes(5000)
     directory = flight(tmp_path, "run-1", content)
-    client = Client(LogService(flight_logs(directory)))
+    client = Client(LogService(FlightLogs(directory)))
     assert client.entries() == [(0, 5000, 1, 0)]
     with (directory / "flight.tlog").open("ab") as log:
         log.write(b"more of the flight" * 100)
@@ -141,14 +144,14 @@ def test_flights_are_listed_oldest_first_and_this_one_last(tmp_path: Path) -> No
         log = flight(tmp_path, name, bytes(age)) / "flight.tlog"
         os.utime(log, (1e9 - age, 1e9 - age))
     present = flight(tmp_path, "ground-1", bytes(5))
-    client = Client(LogService(flight_logs(present)))
+    client = Client(LogService(FlightLogs(present)))
     assert client.entries() == [(0, 30, 4, 3), (1, 20, 4, 3), (2, 10, 4, 3), (3, 5, 4, 3)]
 
 
 def test_the_ulog_stands_for_its_flight(tmp_path: Path) -> None:
     directory = flight(tmp_path, "run-1", b"telemetry")
     flight(tmp_path, "run-1", b"everything", "ulg")
-    client = Client(LogService(flight_logs(directory)))
+    client = Client(LogService(FlightLogs(directory)))
     client.download(0)
     assert bytes(client.log) == b"everything"
 
@@ -166,10 +169,10 @@ def test_a_link_to_elsewhere_is_no_log(tmp_path: Path) -> None:
     os.mkfifo(runs / "run-2" / "flight.ulg")
     logs = flight_logs(present)
     assert [log.flight for log in logs] == ["run-1"]
+    client = Client(LogService(FlightLogs(present)))
     # Put there later, it cannot be opened either.
     (present / "flight.tlog").unlink()
     (present / "flight.tlog").symlink_to(secret)
-    client = Client(LogService(logs))
     client.download(0)
     assert client.counts == [0]
 
@@ -177,23 +180,64 @@ def test_a_link_to_elsewhere_is_no_log(tmp_path: Path) -> None:
 def test_a_vehicle_without_logs_says_so(tmp_path: Path) -> None:
     empty = tmp_path / "run-1"
     empty.mkdir()
-    client = Client(LogService(flight_logs(empty)))
+    client = Client(LogService(FlightLogs(empty)))
     assert client.entries() == [(0, 0, 0, 0)]
     client.download(0)
     assert client.counts == []
 
 
-def test_nothing_is_erased_and_the_operator_is_told(tmp_path: Path) -> None:
-    directory = flight(tmp_path, "run-1", b"kept")
-    client = Client(LogService(flight_logs(directory)))
-    (answer,) = client.ask(ids.LOG_ERASE, 1, 1)
-    assert answer.message_id == ids.STATUSTEXT
-    assert b"not erased" in bytes(answer.values[1])
-    assert (directory / "flight.tlog").read_bytes() == b"kept"
+def test_finished_logs_are_erased_this_flight_s_is_kept_and_the_operator_is_told(
+    tmp_path: Path,
+) -> None:
+    """QGroundControl asks for the list at once, so it must be another one by then."""
+    for name in ("run-1", "run-2"):
+        flight(tmp_path, name, b"finished", suffix="ulg")
+        flight(tmp_path, name, b"finished")
+    present = flight(tmp_path, "run-3", b"kept")
+    (tmp_path / "run-1" / "result.json").write_text("{}")
+    logs = FlightLogs(present)
+    client, other = Client(LogService(logs)), Client(LogService(logs))
+    assert len(other.entries()) == 3
+    other.ask(ids.LOG_REQUEST_DATA, 0, ALL, 0, 1, 1)
+    assert client.ask(ids.LOG_ERASE, 1, 1) == []
+    assert client.entries() == [(0, 4, 1, 0)]
+    told: list[Said] = []
+    until = time.monotonic() + 5.0
+    while not told and time.monotonic() < until:
+        told += client.service.poll(0)
+    assert told == [StatusText(6, "2 logs erased, this flight's is kept")]
+    left = sorted(str(path.relative_to(tmp_path)) for path in tmp_path.glob("*/*"))
+    assert left == ["run-1/result.json", "run-3/flight.tlog"]
+    other.download(0)
+    assert bytes(other.log) == b"kept", "numbers of another list mean nothing any more"
+    assert list(vehicle_files(logs)["logs"]) == ["run-3"]  # type: ignore[call-overload]
+
+
+def test_a_log_that_cannot_be_erased_is_told(tmp_path: Path) -> None:
+    earlier = flight(tmp_path, "run-1", b"finished")
+    client = Client(LogService(FlightLogs(flight(tmp_path, "run-2", b"kept"))))
+    (earlier / "flight.tlog").unlink()  # somebody else was faster
+    client.ask(ids.LOG_ERASE, 1, 1)
+    told: list[Said] = []
+    until = time.monotonic() + 5.0
+    while not told and time.monotonic() < until:
+        told += client.service.poll(0)
+    (text,) = told
+    assert isinstance(text, StatusText)
+    assert text.severity == 4
+    assert "0 logs erased" in text.text
+    assert "run-1" in text.text
+
+
+def test_an_empty_log_of_an_earlier_flight_is_not_listed(tmp_path: Path) -> None:
+    """QGroundControl never comes to the end of a download of nothing."""
+    flight(tmp_path, "run-1", b"")
+    logs = FlightLogs(flight(tmp_path, "run-2", b""))
+    assert [log.flight for log in logs.all] == ["run-2"]
 
 
 def test_a_client_that_stops_gets_no_more(tmp_path: Path) -> None:
-    client = Client(LogService(flight_logs(flight(tmp_path, "run-1", bytes(90_000)))))
+    client = Client(LogService(FlightLogs(flight(tmp_path, "run-1", bytes(90_000)))))
     client.ask(ids.LOG_REQUEST_DATA, 0, ALL, 0, 1, 1)
     assert len(client.polled()) == FRAMES_A_TICK
     client.ask(ids.LOG_REQUEST_END, 1, 1)
@@ -202,7 +246,7 @@ def test_a_client_that_stops_gets_no_more(tmp_path: Path) -> None:
 
 def test_a_request_for_another_log_ends_the_download_of_the_first(tmp_path: Path) -> None:
     flight(tmp_path, "run-1", bytes(90_000))
-    client = Client(LogService(flight_logs(flight(tmp_path, "run-2", b"the other"))))
+    client = Client(LogService(FlightLogs(flight(tmp_path, "run-2", b"the other"))))
     client.ask(ids.LOG_REQUEST_DATA, 0, 0x7FFFFFFF, 0, 1, 1)
     client.polled()
     client.download(1)
@@ -211,7 +255,7 @@ def test_a_request_for_another_log_ends_the_download_of_the_first(tmp_path: Path
 
 @pytest.mark.parametrize("target", [(2, 1), (1, 100)])
 def test_what_is_for_another_vehicle_is_left_to_it(tmp_path: Path, target: tuple[int, int]) -> None:
-    client = Client(LogService(flight_logs(flight(tmp_path, "run-1", b"log"))))
+    client = Client(LogService(FlightLogs(flight(tmp_path, "run-1", b"log"))))
     client.ask(ids.LOG_REQUEST_LIST, 0, 0xFFFF, *target)
     client.ask(ids.LOG_REQUEST_DATA, 0, ALL, 0, *target)
     assert client.ask(ids.LOG_ERASE, *target) == []

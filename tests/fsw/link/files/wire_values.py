@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
-from fsw.link.wire.outgoing import Outgoing, PackedOutgoing, WireValues
+from fsw.link.wire.outgoing import Outgoing, PackedOutgoing, Said, WireValues
+from fsw.signals import StatusText
 from messages.frames import FrameWriter, split
 
 
-def values_of(said: Outgoing | PackedOutgoing) -> WireValues:
+def message_of(said: Said) -> int:
+    """The id of a message."""
+    assert not isinstance(said, StatusText)
+    return said.message_id
+
+
+def values_of(said: Said) -> WireValues:
     """Every field of a message, whether it was packed already or not."""
     if isinstance(said, Outgoing):
         return said.values
+    assert isinstance(said, PackedOutgoing)
     (frame,) = split(FrameWriter(1, 1).packed_frame(said.message_id, said.payload))
     return frame.payload_values

@@ -9,11 +9,12 @@ import pytest
 
 from fsw.link.services.parameter_service import BURST, ParameterService
 from fsw.link.wire import message_ids as ids
-from fsw.link.wire.outgoing import Outgoing
+from fsw.link.wire.outgoing import Outgoing, Said
 from fsw.parameters.facts import FACT_BY_NAME
 from fsw.parameters.flight_config import FlightConfig
 from fsw.parameters.registry import BY_NAME
 from fsw.parameters.store import ParameterStore
+from fsw.signals import StatusText
 from messages import dialect
 from messages.frames import Frame, FrameWriter, split, wire_fields
 from tests.fsw.parameters.test_store import ticks
@@ -52,10 +53,14 @@ def setting(name: bytes, value: float, type_: int = 9, system: int = 1) -> Frame
     return frame(ids.PARAM_SET, value, system, 1, name, type_)
 
 
-def said(answers: Iterable[Outgoing]) -> list[dict[str, object]]:
+def said(answers: Iterable[Said]) -> list[dict[str, object]]:
     """Answers by field, and every one must fit its message."""
     writer, fields = FrameWriter(1, 1), []
     for outgoing in answers:
+        if isinstance(outgoing, StatusText):
+            fields.append({"message": ids.STATUSTEXT, "text": outgoing.text.encode()})
+            continue
+        assert isinstance(outgoing, Outgoing)
         assert list(split(writer.frame(outgoing.message_id, *outgoing.values)))
         named = dict(zip(wire_fields(outgoing.message_id), outgoing.values, strict=True))
         fields.append({"message": outgoing.message_id, **named})

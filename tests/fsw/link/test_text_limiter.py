@@ -1,0 +1,46 @@
+"""Repeated sentences are counted, others are said, and a flood of them ends in one."""
+
+from __future__ import annotations
+
+from fsw.link.text_limiter import REPEAT_US, TextLimiter
+from fsw.signals import StatusText
+
+REFUSED = StatusText(2, "no takeoff: the vehicle is in the air already")
+S = 1_000_000
+
+
+def test_a_sentence_is_said_once_and_counted() -> None:
+    limiter = TextLimiter()
+    assert limiter.admit(REFUSED, 0) is REFUSED
+    assert [limiter.admit(REFUSED, k * S // 2) for k in range(1, 8)] == [None] * 7
+    (counted,) = limiter.overdue(REPEAT_US)
+    assert counted == StatusText(2, f"{REFUSED.text} (again, 7 times)")
+    assert list(limiter.overdue(3 * REPEAT_US)) == []
+
+
+def test_one_that_comes_again_later_says_how_often_it_was_held_back() -> None:
+    limiter = TextLimiter()
+    limiter.admit(REFUSED, 0)
+    limiter.admit(REFUSED, S)
+    again = limiter.admit(REFUSED, REPEAT_US)
+    assert again == StatusText(2, f"{REFUSED.text} (again, once)")
+    assert limiter.admit(REFUSED, 3 * REPEAT_US) == REFUSED
+
+
+def test_other_sentences_are_said_at_once() -> None:
+    limiter = TextLimiter()
+    texts = [StatusText(6, f"mission step {k}") for k in range(10)]
+    assert [limiter.admit(text, k) for k, text in enumerate(texts)] == texts
+
+
+def test_a_flood_of_different_sentences_is_bounded_and_told() -> None:
+    """Refusals with a number that changes, a hundred times a second."""
+    limiter = TextLimiter()
+    said = [
+        limiter.admit(StatusText(2, f"no goto: {k} m is too low"), k * S // 100)
+        for k in range(1000)
+    ]
+    assert sum(text is not None for text in said) <= 20 + 5 * 10 + 1
+    (left_out,) = [text for text in limiter.overdue(11 * S) if "left out" in text.text]
+    assert left_out.text.startswith(f"{sum(text is None for text in said)} more texts")
+    assert limiter.admit(REFUSED, 20 * S) is REFUSED, "and then there is room again"
