@@ -222,7 +222,7 @@ class GcsLink:
         else:
             messages, refusal = answer
             for message in messages:
-                self.outbox.add_said(message, t_us)
+                self.outbox.add_asked_for(message)
             if refusal is not None:
                 self.outbox.add_text(refusal, t_us)
         self.dispatch.receive(frame, t_us, partial(self.outbox.add_said, t_us=t_us))
@@ -238,7 +238,7 @@ class GcsLink:
             self.outbox.add(stream.component, stream.message_id, values)
 
     def _send(self, t_us: int) -> None:
-        frames = self.outbox.take()
+        frames, asked_for = self.outbox.take()
         if self._record is not None:
             for frame in frames:
                 if frame[_MESSAGE_ID] not in _FILE_DATA:
@@ -246,8 +246,8 @@ class GcsLink:
         old = self._peers.version_1
         self._send_to([peer for peer in self._peers.all if peer not in old], frames)
         if old and not self.signing.active:
-            rewritten = (as_version_1(frame) for frame in frames)
-            self._send_to(old, [frame for frame in rewritten if frame is not None])
+            both = ((frame, as_version_1(frame)) for frame in frames)
+            self._send_to(old, [v1 or v2 for v2, v1 in both if v1 or v2 in asked_for])
 
     def _send_to(self, peers: Collection[Address], frames: list[bytes]) -> None:
         if not peers or not frames:

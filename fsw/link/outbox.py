@@ -24,6 +24,7 @@ class Outbox:
         self._signing = signing
         self._writers = {id_: FrameWriter(SYSTEM_ID, id_) for id_ in (AUTOPILOT, PANDION)}
         self._frames: list[bytes] = []
+        self._asked_for: set[bytes] = set()
         self._text_id = 0
         self._limiter = TextLimiter()
 
@@ -56,6 +57,15 @@ class Outbox:
         frame = writer.packed_frame(outgoing.message_id, outgoing.payload)
         self._frames.append(self._signing.signed(frame) if self._signing.active else frame)
 
+    def add_asked_for(self, outgoing: Outgoing) -> None:
+        """Take what somebody asked for: in MAVLink 2 if MAVLink 1 has no such message.
+
+        That a peer speaks MAVLink 1 may just come of not having been told the version.
+        """
+        before = len(self._frames)
+        self.add(outgoing.component, outgoing.message_id, outgoing.values)
+        self._asked_for.update(self._frames[before:])
+
     def add_text(self, text: StatusText, t_us: int) -> None:
         """Take a sentence, unless it has just been said."""
         admitted = self._limiter.admit(text, t_us)
@@ -77,10 +87,11 @@ class Outbox:
         """Whether a frame from there is one of ours, sent back by a router."""
         return system == SYSTEM_ID and component in self._writers
 
-    def take(self) -> list[bytes]:
-        """Hand over the frames, in order."""
+    def take(self) -> tuple[list[bytes], set[bytes]]:
+        """Hand over the frames, in order, and those among them that were asked for."""
         frames, self._frames = self._frames, []
-        return frames
+        asked_for, self._asked_for = self._asked_for, set()
+        return frames, asked_for
 
 
 def packed(frames: list[bytes]) -> list[bytes]:

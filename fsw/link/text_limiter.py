@@ -16,7 +16,7 @@ REPEAT_US: Final = 5_000_000  # the same sentence is said once in this time
 _MOST: Final = 32  # sentences remembered
 _RATE_PER_S: Final = 5  # of different sentences, in the long run
 _BURST: Final = 20
-_WARNING: Final = 4  # MAV_SEVERITY
+_WARNING, _INFO = 4, 6  # MAV_SEVERITY
 
 
 @dataclass(slots=True)
@@ -59,10 +59,10 @@ class TextLimiter:
         return _counted(before) if before is not None and before.held_back else text
 
     def overdue(self, t_us: int) -> Iterator[StatusText]:
-        """What was held back and has not come again; call it now and then."""
+        """What was held back and has not come again, as information; call it now and then."""
         for said in self._said.values():
             if said.held_back and t_us - said.at_us >= REPEAT_US:
-                yield _counted(said)
+                yield replace(_counted(said), severity=max(said.text.severity, _INFO))
                 said.at_us, said.held_back = t_us, 0
         if self._dropped and self._room + 1e-6 * _RATE_PER_S * (t_us - self._room_us) >= 1.0:
             yield StatusText(_WARNING, f"{self._dropped} more texts were left out")

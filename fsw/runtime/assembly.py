@@ -54,11 +54,18 @@ def flight_software(
         )
     )
     return FlightProgram(
-        _facts(config), FlightState(), flight.tick, planner, parameters, missions, flat(config)
+        vehicle_facts(config),
+        FlightState(),
+        flight.tick,
+        planner,
+        parameters,
+        missions,
+        flat(config),
     )
 
 
-def _facts(config: FlightConfig) -> VehicleFacts:
+def vehicle_facts(config: FlightConfig) -> VehicleFacts:
+    """What telemetry shows of a configuration."""
     return VehicleFacts(
         rotor_thrust_max=config.airframe.rotor_thrust_max,
         joint_torque_max=config.airframe.joint_torque_max,

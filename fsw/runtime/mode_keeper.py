@@ -60,6 +60,7 @@ _CHARGE_TEXTS: dict[Charge, tuple[int, str]] = {
     Charge.EMERGENCY: (SEVERITY_EMERGENCY, "battery nearly empty"),
 }
 _DOING: dict[Mode, str] = {Mode.HOLD: "holding", Mode.RETURN: "returning", Mode.LAND: "landing"}
+_PRESSING = 0.05  # m that the plan is below the vehicle
 # Modes in which somebody on the ground flies the vehicle; the others fly by themselves and go on.
 _GUIDED = (Mode.TAKEOFF, Mode.HOLD, Mode.ORBIT, Mode.OFFBOARD)
 # These go on with what a failsafe began.
@@ -146,6 +147,7 @@ class ModeKeeper:
             climb_range=(limits.airborne_height, limits.takeoff_climb_most),
             airframe=self._config.airframe,
             charge=state.battery.charge,
+            speed=vehicle.speed or steering.cruise_speed,
             speed_most=steering.speed,
             turn_rate=steering.yaw_rate,
             acceleration=steering.acceleration,
@@ -274,16 +276,27 @@ class ModeKeeper:
     def _mind_touch_down(
         self, state: FlightState, estimate: StateEstimate, texts: list[StatusText]
     ) -> FlightState:
-        """Descending and not sinking is standing, sliding or not: no loop may fight the ground."""
-        limits = self._config.limits
+        """Descending and not sinking is standing, sliding or not: no loop may fight the ground.
+
+        Where the plan is lower than the vehicle can be, the ground has been felt already: to wait
+        until it lies still let loops and arm work against it until it tipped over.
+        """
+        limits, vehicle = self._config.limits, state.vehicle
+        low = self._height_above_standing(estimate) < limits.landed_height
         held_up = abs(estimate.v_WB[2]) < limits.landed_speed
-        if not (held_up and self._height_above_standing(estimate) < limits.landed_height):
-            return self._moving(state, estimate)
-        vehicle = state.vehicle
-        if estimate.t_us - vehicle.still_since_us < self._config.limits.landed_time_us:
-            return state
+        if not (low and self._presses(state, estimate)):
+            if not (low and held_up):
+                return self._moving(state, estimate)
+            if estimate.t_us - vehicle.still_since_us < limits.landed_time_us:
+                return state
         state = replace(state, vehicle=replace(vehicle, landed=True))
         return self._change(state, Event.TOUCHED_DOWN, estimate, texts)
+
+    def _presses(self, state: FlightState, estimate: StateEstimate) -> bool:
+        """Whether the plan has gone on down where the vehicle has not."""
+        if state.nominal is None:
+            return False
+        return state.nominal.p[2] - estimate.p_WB[2] > _PRESSING
 
     def _mind_station(
         self, state: FlightState, estimate: StateEstimate, texts: list[StatusText]

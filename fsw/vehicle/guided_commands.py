@@ -58,7 +58,7 @@ def orbit(request: CommandRequest, situation: Situation) -> Decision:
     if blocked is not None:
         return Decision(DENIED, reason=f"no orbit: {blocked}")
     most = min(fastest(radius, situation.turn_rate, situation.acceleration), situation.speed_most)
-    asked = most if math.isnan(speed) else abs(speed)
+    asked = min(situation.speed, most) if math.isnan(speed) else abs(speed)
     if asked < _SLOWEST:
         return Decision(DENIED, reason=f"no orbit: {speed:g} m/s is no speed")
     flown = min(asked, most)

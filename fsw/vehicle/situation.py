@@ -46,6 +46,7 @@ class Situation:
     climb_range: Vec2 = (0.3, 50.0)  # m, of a takeoff
     airframe: Airframe = AIRFRAME
     charge: Charge = Charge.OK
+    speed: float = 1.0  # m/s, on the way to places
     speed_most: float = 1.5  # m/s, that can be asked for
     turn_rate: float = 0.3  # rad/s, at most
     acceleration: float = 1.0  # m/s^2, of a steered reference

@@ -138,8 +138,12 @@ class Flight:
         self.upload = None
         if self.streamed and self.sim.step % STREAM_STEPS == 0:
             self.inputs = replace(self.inputs, **self.streamed)
+        return self.fly(self.inputs)
+
+    def fly(self, inputs: TickInputs) -> TickOutputs:
+        """Tick, plan, advance, with inputs from somewhere else."""
         before = self.mode
-        self.state, outputs = self.loop.tick(self.state, self.inputs)
+        self.state, outputs = self.loop.tick(self.state, inputs)
         self._outputs = outputs
         self._submit(outputs)
         self.texts += [text.text for text in outputs.texts]

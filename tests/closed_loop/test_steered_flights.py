@@ -204,3 +204,30 @@ def test_a_vehicle_that_slides_when_it_comes_down_is_not_flown_against_the_groun
     assert not flight.snapshot.failures
     flight.step(command(ARM, 1.0))
     assert not flight.snapshot.armed, "while it still slides"
+
+
+@pytest.mark.parametrize("arm_deg", [(0.0, 30.0), (40.0, 45.0), (-30.0, 60.0)])
+def test_the_fastest_landing_that_can_be_set_does_not_fight_the_ground(
+    arm_deg: tuple[float, float],
+) -> None:
+    """It bounced at 0.6 m/s, never lay still, and loops and arm worked until it tipped over."""
+    config = flight_config()
+    config = replace(config, limits=replace(config.limits, land_speed=0.6))
+    flight = Flight(hover(arm_deg), config=config)
+    flight.step(command(ARM, 1.0))
+    flight.run(1.0)
+    flight.step(command(LAND))
+    flight.run(1.4)
+    felt_s = None
+    for k in range(400):
+        flight.run(0.01)
+        if felt_s is None and -flight.sim.truth().p_WB[2] < 0.33:
+            felt_s = 0.01 * k
+        if flight.mode is Mode.DISARMED:
+            break
+    assert flight.mode is Mode.DISARMED
+    assert felt_s is not None
+    assert 0.01 * k - felt_s < 0.3
+    flight.run(1.0)
+    assert flight.snapshot.failures == ()
+    assert flight.snapshot.estimate.R_WB[8] > math.cos(math.radians(5.0))
