@@ -20,7 +20,7 @@ from fsw.parameters.consistency import Finding, analyse, loop_tube, refusals, wa
 from fsw.parameters.flight_config import FlightConfig
 from fsw.runtime.flight_state import FlightState, MissionMemory, PlanMemory
 from fsw.runtime.mission_keeper import received, with_mission
-from fsw.runtime.mode_keeper import SEVERITY_WARNING, ModeKeeper, answer
+from fsw.runtime.mode_keeper import SEVERITY_INFO, SEVERITY_WARNING, ModeKeeper, answer
 from fsw.runtime.mode_reference import mode_reference
 from fsw.runtime.planning import (
     ask,
@@ -211,7 +211,8 @@ class FlightLoop:
             return replace(mission, rally=wanted.rally)
         findings = self.judge(wanted.safe_set)
         against = (*contradictions(wanted.safe_set), *refusals(findings))
-        texts += [StatusText(SEVERITY_WARNING, text) for text in (*against, *warnings(findings))]
+        texts += [StatusText(SEVERITY_WARNING, text) for text in against]
+        texts += [StatusText(SEVERITY_INFO, text) for text in warnings(findings)]
         if against and not self.config.soft and state.vehicle.flies:
             texts.append(StatusText(SEVERITY_WARNING, "safe set refused: the old one is kept"))
             return replace(mission, rally=wanted.rally, refused_set=wanted.safe_set)

@@ -7,6 +7,8 @@ polygon, inclusion           one wall an edge, upright, kept by base, second joi
 circle, inclusion            eight walls, the regular octagon inside the circle
 polygon, exclusion           upright cylinders that cover it, as wide as it needs
 circle, exclusion            an upright cylinder
+return point                 kept for who downloads it; the barriers keep the vehicle inside, so
+                             there is no breach to return from
 circle in frame 7            the sphere that rides with the end-effector's target and holds the
 (MAV_FRAME_LOCAL_OFFSET_NED) base: x, y, z from target to centre, radius
 ===========================  ==================================================================
@@ -44,9 +46,6 @@ MOST_CYLINDERS: Final = 16
 _CYLINDERS_OF_ONE: Final = 6  # that a polygon is covered with at most
 _SHORTEST_EDGE: Final = 0.05  # m
 
-_REASONS: Final = {
-    RETURN_POINT: "a fence has no return point here: the barriers keep the vehicle inside",
-}
 _POLYGONS: Final = (POLYGON_INCLUSION, POLYGON_EXCLUSION)
 _CIRCLES: Final = (CIRCLE_INCLUSION, CIRCLE_EXCLUSION)
 _Shape = list[Wall] | list[PointObstacle] | WorkspaceSphere
@@ -71,7 +70,10 @@ def read_fence(
         size = _vertex_count(item)
         if size > len(items) - at:
             return Refused(INVALID, f"a polygon of {size} vertices has {len(items) - at}")
-        shape = _shape(items[at : at + size], locate, clearance)
+        at += size
+        if item.command == RETURN_POINT:
+            continue
+        shape = _shape(items[at - size : at], locate, clearance)
         if isinstance(shape, Refused):
             return shape
         if isinstance(shape, WorkspaceSphere):
@@ -81,7 +83,6 @@ def read_fence(
         else:
             walls += [one for one in shape if isinstance(one, Wall)]
             cylinders += [one for one in shape if isinstance(one, PointObstacle)]
-        at += size
     if (walls or cylinders) and sphere is not None:
         return Refused(INVALID, "a fence and a workspace sphere cannot be kept at once")
     for count, most, what in (
@@ -98,9 +99,8 @@ def read_fence_item(item: MissionItem, locate: Locate) -> Refused | None:
     if item.command == CIRCLE_INCLUSION and item.frame == LOCAL_OFFSET_NED:
         sphere = _sphere(item)
         return sphere if isinstance(sphere, Refused) else None
-    if item.command not in (*_POLYGONS, *_CIRCLES):
-        unknown = f"command {item.command} is no fence of this vehicle"
-        return Refused(UNSUPPORTED, _REASONS.get(item.command, unknown))
+    if item.command not in (*_POLYGONS, *_CIRCLES, RETURN_POINT):
+        return Refused(UNSUPPORTED, f"command {item.command} is no fence of this vehicle")
     place = horizontal_place(item, locate)
     if isinstance(place, Refused):
         return place

@@ -146,7 +146,7 @@ def change(event: Event, situation: Situation) -> Decision:
 
 def entry_refusal(event: Event, situation: Situation) -> str | None:
     """What a mode needs and is not there."""
-    if event is Event.TAKE_OFF and not situation.landed:
+    if event is Event.TAKE_OFF and not situation.landed and situation.mode is not Mode.TAKEOFF:
         return "no takeoff: the vehicle is in the air already"
     if event is Event.FOLLOW and situation.landed:
         return "no trajectory: the vehicle is on the ground; take off first"

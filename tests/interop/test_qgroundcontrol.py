@@ -1,7 +1,7 @@
-"""What QGroundControl asks for when it connects, in its order: everything is answered within 1 s.
+"""How fast QGroundControl's questions are answered, by the processes that fly: within 1 s.
 
-QGroundControl needs a screen and a graphics driver; pymavlink asks in its place. The tests of this
-file are one connection, in their order.
+What has to be answered to each, and accepted, is in ``tests/interop/conversations``. The tests of
+this file are one connection, in their order.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from fsw.parameters.registry import PARAMETERS
 from messages import dialect
 from tests.interop.station import PATIENCE_S, Station
 from tests.interop.vehicle import REAL_TIME, Vehicle
+from tests.parameters_on_the_wire import LISTED
 
 PACING = REAL_TIME
 DENIED, UNSUPPORTED = 2, 3
@@ -99,11 +100,12 @@ def test_its_parameters(station: Station) -> None:
     found: dict[str, float] = {}
     for message in station.messages(5.0):
         if message.get_type() == "PARAM_VALUE":
-            found[message.param_id] = message.param_value
+            if message.param_index != 65535:  # the checksum of all
+                found[message.param_id] = message.param_value
             if len(found) == message.param_count:
                 break
     station.took["parameters"] = time.monotonic() - begin
-    assert set(found) == {parameter.name for parameter in PARAMETERS}
+    assert found == pytest.approx(LISTED, rel=1e-6)
     assert station.took["parameters"] < PATIENCE_S
 
 
@@ -146,7 +148,7 @@ def test_its_logs(station: Station) -> None:
 
 @pytest.mark.parametrize("integers", [False, True], ids=["COMMAND_LONG", "COMMAND_INT"])
 def test_a_command_is_acknowledged_within_50_ms(station: Station, integers: bool) -> None:
-    unknown = [31010, 2500, 41, 42, 43, 200, 201, 202, 203, 204]
+    unknown = [31010, 2500, 41, 42, 43, 200, 205, 202, 203, 204]
     for command in unknown:
         assert station.command(command, 1.0, integers=integers) == UNSUPPORTED
     form = "INT" if integers else "LONG"
@@ -158,7 +160,7 @@ def test_a_command_is_acknowledged_within_50_ms(station: Station, integers: bool
 def test_everything_was_answered_in_time(station: Station) -> None:
     slowest = sorted(station.took.items(), key=lambda item: -item[1])
     print("\n".join(f"{1e3 * seconds:7.1f} ms  {what}" for what, seconds in slowest))
-    assert len(slowest) > 40
+    assert len(slowest) >= 40
     assert slowest[0][1] < PATIENCE_S
 
 

@@ -146,7 +146,6 @@ def test_two_polygons_are_kept_both() -> None:
         ((circle(0.1, 7), excluded(1.0)), 5, "at once"),
         ((excluded(math.inf),), 6, "radius"),
         ((excluded(1.0),) * 17, 5, "cylinders"),
-        (polygon(CASE_1[:1], RETURN_POINT), 3, "return point"),
         (polygon(CASE_1[:1], 16), 3, "16"),
         ((circle(0.0),), 6, "radius"),
         ((circle(math.nan),), 6, "radius"),
@@ -174,6 +173,13 @@ def test_a_circle_of_exclusion_is_an_upright_cylinder() -> None:
     assert cylinder == PointObstacle((3.0, 0.0, 0.0), 0.6, upright=True)
     for height in (0.0, -1.4, -50.0):
         assert distance_to(cylinder, (3.0, 1.0, height)) == pytest.approx(1.0)
+
+
+def test_a_return_point_changes_nothing_and_is_no_reason_to_refuse_the_rest() -> None:
+    """QGroundControl offers one with every fence."""
+    point = polygon(CASE_1[:1], RETURN_POINT)
+    assert safe((*polygon(CASE_1), *point)) == safe(polygon(CASE_1))
+    assert safe(point) == SafeSet()
 
 
 def test_inclusion_and_exclusion_are_kept_together() -> None:

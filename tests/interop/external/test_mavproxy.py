@@ -17,6 +17,7 @@ from messages.export import write_definitions
 from tests.interop.external.environments import environment_of, only_where_installed
 from tests.interop.mavsdk_client import eventually
 from tests.interop.vehicle import REAL_TIME, Vehicle
+from tests.parameters_on_the_wire import LISTED
 
 PACING = REAL_TIME
 pytestmark = only_where_installed
@@ -81,7 +82,7 @@ def prompt(vehicle: Vehicle, tmp_path_factory: pytest.TempPathFactory) -> Iterat
 
 
 def test_it_finds_the_vehicle_and_its_parameters(prompt: Prompt) -> None:
-    prompt.says(f"Received {len(PARAMETERS)} parameters", 60.0)
+    prompt.says(f"Received {len(LISTED)} parameters", 60.0)
 
 
 def test_it_reads_the_private_messages_and_takes_none_for_loss(prompt: Prompt) -> None:
