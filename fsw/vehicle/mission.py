@@ -204,7 +204,13 @@ def _begin(
     number = flight.progress.current
     step = flight.steps[number]
     if step.action is MissionAction.SPEED:
-        return _next(_reached(replace(flight, speed=step.speed)))
+        following, happening = _next(_reached(replace(flight, speed=step.speed)))
+        if step.speed is not None and step.speed > FASTEST:
+            text = (
+                f"mission step {number}: {step.speed:g} m/s is flown as {FASTEST:g}, the most here"
+            )
+            happening = replace(happening, text="; ".join(filter(None, (text, happening.text))))
+        return following, happening
     if step.action is MissionAction.LOOK_AT:
         following, happening = _next(_reached(flight))
         return following, replace(happening, look_at=LookAt(step.position))

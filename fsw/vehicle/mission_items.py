@@ -183,14 +183,18 @@ def _delay(item: MissionItem, _: Locate) -> MissionStep | Refused:
 
 
 def _change_speed(item: MissionItem, _: Locate) -> MissionStep | Refused:
-    """Air speed and ground speed are one here; -1 and -2 mean the usual speed."""
+    """Air speed and ground speed are one here; -1 and -2 mean the usual speed.
+
+    A ground station writes what it takes for usual, QGroundControl 5 m/s: the mission is kept as
+    it came and flown no faster than ``FASTEST``.
+    """
     kind, speed = item.params[0], item.params[1]
     if kind not in (0.0, 1.0):
         return _bad(1, f"speed type {kind:g} is neither air speed (0) nor ground speed (1)")
     if speed in (-1.0, -2.0):
         return MissionStep(MissionAction.SPEED)
-    if not 0.01 <= speed <= FASTEST:
-        return _bad(2, f"a speed of {speed:g} m/s is outside 0.01 to {FASTEST:g} m/s")
+    if not 0.01 <= speed <= _NO_SPEED:
+        return _bad(2, f"a speed of {speed:g} m/s is outside 0.01 to {_NO_SPEED:g} m/s")
     return MissionStep(MissionAction.SPEED, speed=speed)
 
 
@@ -214,7 +218,8 @@ def _look(item: MissionItem, locate: Locate) -> MissionStep | Refused:
     return _bad(1, f"kind {item.params[0]:g} of a region of interest is not 0 or 3")
 
 
-FASTEST: Final = 1.0  # m/s
+FASTEST: Final = 1.0  # m/s, of a leg
+_NO_SPEED: Final = 20.0  # m/s; faster is a slip of the unit
 _READERS: Final[dict[int, Callable[[MissionItem, Locate], MissionStep | Refused]]] = {
     NAV_WAYPOINT: _waypoint,
     NAV_LOITER_UNLIMITED: _loiter_unlimited,

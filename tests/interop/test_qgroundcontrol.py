@@ -1,6 +1,6 @@
 """How fast QGroundControl's questions are answered, by the processes that fly: within 1 s.
 
-What has to be answered to each, and accepted, is in ``tests/interop/conversations``. The tests of
+What has to be answered to each, and accepted, is in ``tests/conversations``. The tests of
 this file are one connection, in their order.
 """
 

@@ -40,6 +40,8 @@ class Refusing:
         self._gate = gate
 
     def plan(self, request: PlanRequest) -> Plan | PlanFailure:
+        if self._gate is not None:
+            self._gate.with_name("at-work").touch()
         if request.plan_id == CRASH:
             os.kill(os.getpid(), signal.SIGSEGV)
         while request.plan_id == HANG or (self._gate is not None and not self._gate.exists()):
@@ -235,7 +237,8 @@ def test_every_cycle_is_measured_and_what_was_never_answered_is_skipped(
     gate = tmp_path / "open"
     service = ProcessPlanner(Refusing(gate), clock.now_us, record)
     service.submit(request(1))
-    time.sleep(0.15)  # now it is at work on it, for longer than its period
+    wait_for((tmp_path / "at-work").exists)
+    time.sleep(0.15)  # at work on it for longer than its period
     for plan_id in (2, 3, 4):
         service.submit(request(plan_id))
     gate.touch()

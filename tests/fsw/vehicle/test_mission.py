@@ -155,6 +155,13 @@ def test_a_speed_holds_for_the_legs_that_follow_and_for_a_jump_behind_it() -> No
     assert 0.0999 < max(math.hypot(*point.v_WE) for point in flown.points) < 0.1001
 
 
+def test_a_speed_beyond_the_greatest_is_flown_as_the_greatest_and_said() -> None:
+    fast = MissionStep(A.SPEED, speed=5.0)
+    flown = start(fast, go(50.0, 0.0, -1.0)).fly()
+    assert 0.999 < max(math.hypot(*point.v_WE) for point in flown.points) < 1.001
+    assert "mission step 0: 5 m/s is flown as 1, the most here" in flown.texts
+
+
 def test_altitude_above_home_counts_from_home() -> None:
     flown = Flown(begun(loaded((go(0.0, 0.0, -2.0, above_home=True),)), START, PACE), home_z=-0.35)
     assert flown.fly().points[-1].p_WE == (0.0, 0.0, -2.35)

@@ -96,6 +96,7 @@ def test_nan_where_it_is_not_used_is_normal() -> None:
         (item(items.DO_CHANGE_SPEED, MISSION, (2.0, 0.2, 0.0, 0.0)), 6),
         (item(items.DO_CHANGE_SPEED, MISSION, (1.0, 0.0, 0.0, 0.0)), 7),
         (item(items.DO_CHANGE_SPEED, MISSION, (1.0, NAN, 0.0, 0.0)), 7),
+        (item(items.DO_CHANGE_SPEED, MISSION, (1.0, 21.0, 0.0, 0.0)), 7),
         (item(82), 3),
         (item(5001), 3),
     ],

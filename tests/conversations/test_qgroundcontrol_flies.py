@@ -17,8 +17,8 @@ from fsw.link.wire.px4_mode import AVAILABLE_MODES
 from fsw.parameters.flight_config import flight_config
 from fsw.signals import MissionState
 from messages import dialect as d
-from tests.interop.conversations.connected import Connected, connected
-from tests.interop.conversations.qgroundcontrol import (
+from tests.conversations.connected import Connected, connected
+from tests.conversations.qgroundcontrol import (
     QGC_4_4,
     QGC_5,
     REQUIRED,
@@ -31,7 +31,7 @@ from tests.interop.conversations.qgroundcontrol import (
     rally,
     take_off,
 )
-from tests.interop.conversations.table import Message, Must, play
+from tests.conversations.table import Message, Must, play
 
 EARLIER = bytes(range(256)) * 400  # more than one piece of 512 messages
 TYPES = {0: items, 1: fence, 2: rally}

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from tests.interop.conversations.connected import Connected, Message
+from tests.conversations.connected import Connected, Message
 
 Condition = Callable[[Any], bool]
 Say = Callable[[Connected], Message | tuple[Message, ...]]

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from messages import dialect as d
-from tests.interop.conversations.connected import Connected, Message
-from tests.interop.conversations.table import Must, Turn, ack, latest, mode
+from tests.conversations.connected import Connected, Message
+from tests.conversations.table import Must, Turn, ack, latest, mode
 
 NAN = math.nan
 TAKEOFF, HOLD, MISSION, RETURN, LAND, ORBIT = (
@@ -241,7 +241,7 @@ def items(vehicle: Connected) -> list[Message]:
     """A plan as the Plan view makes it: takeoff, way points, a region of interest, return."""
     rows = (
         (22, 3, (0.0, 0.0, 0.0, NAN), (0.0, 0.0), 2.0),
-        (178, 2, (1.0, 0.8, -1.0, 0.0), None, 0.0),
+        (178, 2, (1.0, 5.0, -1.0, 0.0), None, 0.0),  # the default where it is ticked
         (195, 3, (0.0, 0.0, 0.0, 0.0), (3.0, 3.0), 0.0),
         (16, 3, (0.0, 0.0, 0.0, NAN), (1.5, 0.0), 2.0),
         (197, 2, (0.0, 0.0, 0.0, 0.0), None, 0.0),
