@@ -206,9 +206,7 @@ def _begin(
     if step.action is MissionAction.SPEED:
         following, happening = _next(_reached(replace(flight, speed=step.speed)))
         if step.speed is not None and step.speed > FASTEST:
-            text = (
-                f"mission step {number}: {step.speed:g} m/s is flown as {FASTEST:g}, the most here"
-            )
+            text = f"mission step {number}: {step.speed:g} m/s is flown as {FASTEST:g} m/s"
             happening = replace(happening, text="; ".join(filter(None, (text, happening.text))))
         return following, happening
     if step.action is MissionAction.LOOK_AT:
