@@ -22,7 +22,7 @@ verbs:
   fsw         run the flight software alone
   reproduce   fly a table or a figure of the paper again
   param       list, set, import and export the parameters of a vehicle or a file
-  bench       time the planner's optimiser, the loop in real time, or the lockstep
+  bench       time the optimiser, the loop, the lockstep, a flood, a log download
   dialect     teach MAVProxy, Wireshark and others the private messages
   replay      feed a flight log through the flight software again and compare
   export      write a flight log as CSV or MCAP

@@ -37,7 +37,7 @@ class BenchOptions:
 
 def main(argv: list[str]) -> int:
     """Measure and report; returns the exit code."""
-    if argv[:1] in (["flood"], ["loop"], ["lockstep"]):
+    if argv[:1] in (["flood"], ["loop"], ["lockstep"], ["download"]):
         return int(import_module(f"pandion.bench.{argv[0]}").main(argv[1:]))
     options = _options(argv)
     if options.json not in (None, "-") and not Path(str(options.json)).parent.is_dir():
@@ -61,8 +61,8 @@ def _options(argv: list[str]) -> BenchOptions:
     parser.add_argument(
         "what",
         metavar="WHAT",
-        choices=("mpc", "loop", "lockstep", "flood"),
-        help="mpc, loop, lockstep or flood",
+        choices=("mpc", "loop", "lockstep", "flood", "download"),
+        help="mpc, loop, lockstep, flood or download",
     )
     parser.add_argument(
         "--json",
