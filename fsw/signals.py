@@ -398,11 +398,21 @@ class CommandAck:
     target_component: int
 
 
+class Severity(IntEnum):
+    """MAV_SEVERITY. As PX4 has it: refusals and failsafes are critical, what goes well is INFO."""
+
+    EMERGENCY = 0
+    CRITICAL = 2
+    WARNING = 4
+    NOTICE = 5
+    INFO = 6
+
+
 @dataclass(frozen=True, slots=True)
 class StatusText:
     """A sentence for the operator."""
 
-    severity: int  # MAV_SEVERITY
+    severity: Severity
     text: str
 
 

@@ -2,8 +2,16 @@
 
 from __future__ import annotations
 
+import argparse
 import sys
 from pathlib import Path
+
+
+def json_target(text: str) -> str:
+    """The value of ``--json``, for argparse: a file that can be made, or ``-``."""
+    if text != "-" and not Path(text).parent.is_dir():
+        raise argparse.ArgumentTypeError(f"no directory for {text}")
+    return text
 
 
 def write_text(target: str | None, text: str) -> None:

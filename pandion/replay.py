@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fsw.signals import Origin
-from pandion.output import write_text
+from pandion.output import json_target, write_text
 from pandion.parser import COULD_NOT_START, Parser
 from pandion.progress import Progress
 
@@ -43,12 +43,11 @@ def main(argv: list[str]) -> int:
         action="store_true",
         help="feed the inputs through the same tick; exit code 1 at the first difference",
     )
-    parser.add_argument("--json", metavar="FILE", help="write the result; - for standard output")
+    parser.add_argument(
+        "--json", metavar="FILE", type=json_target, help="write the result; - for standard output"
+    )
     read = parser.read(argv)
     options = ReplayOptions(read.log, read.verify, read.json)
-    if options.json not in (None, "-") and not Path(str(options.json)).parent.is_dir():
-        print(f"pandion replay: no directory for {options.json}", file=sys.stderr)
-        return COULD_NOT_START
     from fsw.log.reader import open_flight
     from messages.ulog_reader import UlogError
 

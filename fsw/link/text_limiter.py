@@ -10,13 +10,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Final
 
-from fsw.signals import StatusText
+from fsw.signals import Severity, StatusText
 
 REPEAT_US: Final = 5_000_000  # the same sentence is said once in this time
 _MOST: Final = 32  # sentences remembered
 _RATE_PER_S: Final = 5  # of different sentences, in the long run
 _BURST: Final = 20
-_WARNING, _INFO = 4, 6  # MAV_SEVERITY
 
 
 @dataclass(slots=True)
@@ -62,10 +61,10 @@ class TextLimiter:
         """What was held back and has not come again, as information; call it now and then."""
         for said in self._said.values():
             if said.held_back and t_us - said.at_us >= REPEAT_US:
-                yield replace(_counted(said), severity=max(said.text.severity, _INFO))
+                yield replace(_counted(said), severity=max(said.text.severity, Severity.INFO))
                 said.at_us, said.held_back = t_us, 0
         if self._dropped and self._room + 1e-6 * _RATE_PER_S * (t_us - self._room_us) >= 1.0:
-            yield StatusText(_WARNING, f"{self._dropped} more texts were left out")
+            yield StatusText(Severity.WARNING, f"{self._dropped} more texts were left out")
             self._dropped = 0
 
 

@@ -20,7 +20,7 @@ from fsw.parameters.consistency import Finding, analyse, loop_tube, refusals, wa
 from fsw.parameters.flight_config import FlightConfig
 from fsw.runtime.flight_state import FlightState, MissionMemory, PlanMemory
 from fsw.runtime.mission_keeper import received, with_mission
-from fsw.runtime.mode_keeper import SEVERITY_INFO, SEVERITY_WARNING, ModeKeeper, answer
+from fsw.runtime.mode_keeper import ModeKeeper, answer
 from fsw.runtime.mode_reference import mode_reference
 from fsw.runtime.planning import (
     ask,
@@ -49,6 +49,7 @@ from fsw.signals import (
     PredictionState,
     SafeSet,
     SensorFrame,
+    Severity,
     StateEstimate,
     StatusText,
     TickInputs,
@@ -211,10 +212,10 @@ class FlightLoop:
             return replace(mission, rally=wanted.rally)
         findings = self.judge(wanted.safe_set)
         against = (*contradictions(wanted.safe_set), *refusals(findings))
-        texts += [StatusText(SEVERITY_WARNING, text) for text in against]
-        texts += [StatusText(SEVERITY_INFO, text) for text in warnings(findings)]
+        texts += [StatusText(Severity.WARNING, text) for text in against]
+        texts += [StatusText(Severity.INFO, text) for text in warnings(findings)]
         if against and not self.config.soft and state.vehicle.flies:
-            texts.append(StatusText(SEVERITY_WARNING, "safe set refused: the old one is kept"))
+            texts.append(StatusText(Severity.WARNING, "safe set refused: the old one is kept"))
             return replace(mission, rally=wanted.rally, refused_set=wanted.safe_set)
         return replace(wanted, refused_set=None, refusals=() if self.config.soft else against)
 

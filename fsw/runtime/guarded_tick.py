@@ -8,10 +8,9 @@ from dataclasses import replace
 from typing import Final, Generic
 
 from fsw.runtime.program import State
-from fsw.signals import StatusText, TickInputs, TickOutputs
+from fsw.signals import Severity, StatusText, TickInputs, TickOutputs
 
 PATIENCE_TICKS: Final = 5  # 10 ms, as long as the estimate may be missing
-_CRITICAL: Final = 2  # MAV_SEVERITY
 
 
 class GuardedTick(Generic[State]):
@@ -60,7 +59,7 @@ class GuardedTick(Generic[State]):
                 self._last,
                 plan_request=None,
                 acks=(),
-                texts=(StatusText(_CRITICAL, text),),
+                texts=(StatusText(Severity.CRITICAL, text),),
                 tuning_taken=None,
             )
         self._failed = 0

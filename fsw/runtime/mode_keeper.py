@@ -26,11 +26,13 @@ from fsw.signals import (
     Home,
     MissionUpdate,
     Mode,
+    Severity,
     StateEstimate,
     StatusText,
     Vec3,
 )
 from fsw.vehicle.commands import decide
+from fsw.vehicle.failsafes import battery_low, battery_text, setpoints_lost, station_lost
 from fsw.vehicle.faults import RESPONSES, Evidence, Response, detect
 from fsw.vehicle.mission import refusal
 from fsw.vehicle.mode_commands import STANDBY_EVENTS, arming_refusal, entry_refusal
@@ -38,31 +40,8 @@ from fsw.vehicle.modes import Event, next_mode
 from fsw.vehicle.repeats import answered_before, remember
 from fsw.vehicle.situation import ACCEPTED, Decision, Situation
 
-# MAV_SEVERITY; PX4's: refusals and failsafes are critical, what goes as it should is information
-SEVERITY_EMERGENCY, SEVERITY_CRITICAL, SEVERITY_WARNING, SEVERITY_INFO = 0, 2, 4, 6
-
-# What a failsafe parameter's value does, in PX4's numbers of that parameter.
-_STATION_LOST: dict[int, Event] = {1: Event.HOLD, 2: Event.GO_HOME, 3: Event.LAND}  # NAV_DLL_ACT
-_SETPOINTS_LOST: dict[int, Event] = {  # COM_OBL_RC_ACT
-    3: Event.GO_HOME,
-    4: Event.LAND,
-    5: Event.HOLD,
-}
-_LOW_BATTERY: dict[tuple[int, Charge], Event] = {  # COM_LOW_BAT_ACT
-    (2, Charge.CRITICAL): Event.LAND,
-    (2, Charge.EMERGENCY): Event.LAND,
-    (3, Charge.CRITICAL): Event.GO_HOME,
-    (3, Charge.EMERGENCY): Event.LAND,
-}
-_CHARGE_TEXTS: dict[Charge, tuple[int, str]] = {
-    Charge.LOW: (SEVERITY_WARNING, "battery low"),
-    Charge.CRITICAL: (SEVERITY_CRITICAL, "battery critical"),
-    Charge.EMERGENCY: (SEVERITY_EMERGENCY, "battery nearly empty"),
-}
 _DOING: dict[Mode, str] = {Mode.HOLD: "holding", Mode.RETURN: "returning", Mode.LAND: "landing"}
 _PRESSING = 0.05  # m that the plan is below the vehicle
-# Modes in which somebody on the ground flies the vehicle; the others fly by themselves and go on.
-_GUIDED = (Mode.TAKEOFF, Mode.HOLD, Mode.ORBIT, Mode.OFFBOARD)
 # These go on with what a failsafe began.
 _GOES_ON = (Event.HOME_REACHED, Event.CLIMB_DONE, Event.TRAJECTORY_DONE, Event.MISSION_DONE)
 
@@ -74,7 +53,7 @@ def answer(
     decision = decide(request, situation)
     if decision.reason:
         harmless = decision.result == ACCEPTED and not decision.alarming
-        severity = SEVERITY_INFO if harmless else SEVERITY_CRITICAL
+        severity = Severity.INFO if harmless else Severity.CRITICAL
         texts.append(StatusText(severity, decision.reason))
     return _ack(request, decision.result), decision
 
@@ -189,7 +168,7 @@ class ModeKeeper:
             if fault.value not in vehicle.failures:
                 response = RESPONSES[fault]
                 severity = (
-                    SEVERITY_EMERGENCY if response is Response.TERMINATE else SEVERITY_WARNING
+                    Severity.EMERGENCY if response is Response.TERMINATE else Severity.WARNING
                 )
                 texts.append(StatusText(severity, f"{fault.value}: {response.name.lower()}"))
         state = replace(state, vehicle=replace(vehicle, failures=names))
@@ -240,7 +219,7 @@ class ModeKeeper:
             text = "offboard forgotten: set-points stopped before arming"
         else:
             return state
-        texts.append(StatusText(SEVERITY_WARNING, text))
+        texts.append(StatusText(Severity.WARNING, text))
         return replace(state, vehicle=replace(vehicle, standby=Mode.HOLD))
 
     def _mind_return(
@@ -260,8 +239,7 @@ class ModeKeeper:
         self, state: FlightState, estimate: StateEstimate, texts: list[StatusText]
     ) -> FlightState:
         if not self._steering.is_fresh(state, estimate.t_us):
-            action = self._config.limits.setpoint_loss_action
-            event = _SETPOINTS_LOST.get(action, Event.HOLD)
+            event = setpoints_lost(self._config.limits.setpoint_loss_action)
             return self._fail_safe(state, event, "offboard set-points stopped", estimate, texts)
         if state.vehicle.landed:
             if self._steering.wants_to_rise(state, estimate):
@@ -307,8 +285,8 @@ class ModeKeeper:
         if vehicle.station_us < 0 or silent_us < self._config.limits.station_timeout_us:
             return state
         state = replace(state, vehicle=replace(vehicle, station_us=-1))
-        event = _STATION_LOST.get(self._config.limits.station_loss_action)
-        if event is None or not vehicle.flies or vehicle.mode not in _GUIDED:
+        event = station_lost(self._config.limits.station_loss_action, vehicle.mode)
+        if event is None or not vehicle.flies:
             return state
         text = f"no ground station for {silent_us * 1e-6:.0f} s"
         return self._fail_safe(state, event, text, estimate, texts)
@@ -321,14 +299,12 @@ class ModeKeeper:
         if charge <= vehicle.charge:
             return state
         state = replace(state, vehicle=replace(vehicle, charge=charge))
-        severity, what = _CHARGE_TEXTS[charge]
-        text = f"{what}: {100.0 * state.battery.remaining:.0f} % left"
-        event = _LOW_BATTERY.get((self._config.limits.low_battery_action, charge))
-        done = vehicle.mode is Mode.LAND or (vehicle.mode, event) == (Mode.RETURN, Event.GO_HOME)
-        if event is None or done or not vehicle.flies:
-            texts.append(StatusText(severity, text))
+        said = battery_text(state.battery)
+        event = battery_low(self._config.limits.low_battery_action, charge, vehicle.mode)
+        if event is None or not vehicle.flies:
+            texts.append(said)
             return state
-        return self._fail_safe(state, event, text, estimate, texts)
+        return self._fail_safe(state, event, said.text, estimate, texts)
 
     def _fail_safe(
         self,
@@ -343,7 +319,7 @@ class ModeKeeper:
         if mode is None:
             return state
         text = f"failsafe: {why}, {_DOING[mode]}"
-        texts.append(StatusText(SEVERITY_CRITICAL, text))
+        texts.append(StatusText(Severity.CRITICAL, text))
         before = state.vehicle.failsafe_from or state.vehicle.mode
         state = self._change(state, event, estimate, texts, kept=True)
         return replace(state, vehicle=replace(state.vehicle, failsafe_from=before))
@@ -406,7 +382,7 @@ class ModeKeeper:
         against = entry_refusal(event, self.situation(state, estimate))
         if against is None:
             return self._change(state, event, estimate, texts)
-        texts.append(StatusText(SEVERITY_CRITICAL, against))
+        texts.append(StatusText(Severity.CRITICAL, against))
         return state
 
     def _fly_mission(
@@ -417,7 +393,7 @@ class ModeKeeper:
             return self._change(state, Event.HOLD, estimate, texts)
         state, happening = fly(state, estimate, self._config)
         if happening.text:
-            severity = SEVERITY_WARNING if happening.unmet else SEVERITY_INFO
+            severity = Severity.WARNING if happening.unmet else Severity.INFO
             texts.append(StatusText(severity, happening.text))
         if happening.look_at is not None:
             vehicle = replace(state.vehicle, look_at=happening.look_at.place)
@@ -440,7 +416,7 @@ class ModeKeeper:
         mode = next_mode(before, event)
         if mode is None:
             return state
-        texts.append(StatusText(SEVERITY_INFO, f"{before.value} to {mode.value}: {event.value}"))
+        texts.append(StatusText(Severity.INFO, f"{before.value} to {mode.value}: {event.value}"))
         anchor, anchor_yaw = self._anchor(state, event, estimate)
         state = leave(state, event)
         if mode is Mode.MISSION:

@@ -36,6 +36,7 @@ from fsw.signals import (
     OffboardReport,
     PlannerCounters,
     SensorFrame,
+    Severity,
     StatusText,
     TickInputs,
     TickOutputs,
@@ -43,7 +44,6 @@ from fsw.signals import (
 
 STALL_S: Final = 1.2  # no step for this long ends the flight, so that 2 s see the end of both
 _START_US: Final = 1_000_000  # time stamp of the simulator's step 0
-_WARNING: Final = 4  # MAV_SEVERITY
 
 
 class Ending(enum.Enum):
@@ -256,7 +256,7 @@ class SimLoop(Generic[State]):
         record.offboard = outputs.snapshot.offboard
         events = record.mpc.events
         if events:
-            self._notices += [StatusText(_WARNING, event) for event in events]
+            self._notices += [StatusText(Severity.WARNING, event) for event in events]
             events.clear()
         if self._notices:
             outputs = replace(outputs, texts=(*outputs.texts, *self._notices))
@@ -294,7 +294,7 @@ class SimLoop(Generic[State]):
         slips = Slips(inner.late, inner.skipped, self._record.stale, counters.missed_deadlines)
         sentence = self._warning.sentence(slips, cycle.release.sensors.t_us)
         if sentence is not None:
-            self._notices.append(StatusText(_WARNING, sentence))
+            self._notices.append(StatusText(Severity.WARNING, sentence))
 
     def _step_number(self, t_us: int) -> int:
         return (t_us - _START_US) // self._tick_us

@@ -12,8 +12,7 @@ from fsw.parameters.consistency import Finding, refusals
 from fsw.parameters.flight_config import FlightConfig
 from fsw.runtime.flight_loop import FlightLoop
 from fsw.runtime.flight_state import FlightState
-from fsw.runtime.mode_keeper import SEVERITY_WARNING
-from fsw.signals import SafeSet, StatusText, TickInputs, TickOutputs
+from fsw.signals import SafeSet, Severity, StatusText, TickInputs, TickOutputs
 from fsw.tuning import Tuning, part, tuned
 
 
@@ -73,9 +72,9 @@ class TunedFlight:
         newly = [f for f in findings if not f.holds and f.name not in broken]
         against = refusals(tuple(newly))
         if against and state.vehicle.armed and not self._config.soft:
-            texts = [StatusText(SEVERITY_WARNING, f"refused while armed: {why}") for why in against]
+            texts = [StatusText(Severity.WARNING, f"refused while armed: {why}") for why in against]
             return state, False, texts
-        texts = [StatusText(SEVERITY_WARNING, finding.statement) for finding in newly]
+        texts = [StatusText(Severity.WARNING, finding.statement) for finding in newly]
         mission = replace(mission, refusals=() if self._config.soft else refusals(findings))
         return replace(state, tuning=wanted, mission=mission), True, texts
 

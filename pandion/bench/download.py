@@ -19,8 +19,8 @@ from typing import Any, Final
 
 from pandion.bench.download_client import DownloadClient, NothingCame
 from pandion.display import Display
-from pandion.output import write_text
-from pandion.parser import COULD_NOT_START, Parser
+from pandion.output import json_target, write_text
+from pandion.parser import Parser
 from pandion.supervisor import HalfFailed, Supervisor
 from pandion.version import version
 
@@ -69,14 +69,13 @@ class Downloads:
 def main(argv: list[str]) -> int:
     """Measure and judge; returns the exit code."""
     parser = Parser("pandion bench download", "Fetch a flight log in real time, by LOG_* and FTP.")
-    parser.add_argument("--json", metavar="FILE", help="write the figures; - for standard output")
+    parser.add_argument(
+        "--json", metavar="FILE", type=json_target, help="write the figures; - for standard output"
+    )
     parser.add_argument(
         "--size", metavar="MB", type=_size, default=20.0, help="of the log (default 20)"
     )
     options = parser.read(argv)
-    if options.json not in (None, "-") and not Path(options.json).parent.is_dir():
-        print(f"pandion bench download: no directory for {options.json}", file=sys.stderr)
-        return COULD_NOT_START
     console = sys.stderr if options.json == "-" else sys.stdout
     print(
         f"Pandion {version()}: {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}", file=console

@@ -20,8 +20,8 @@ from fsw.link.telemetry.streams import STREAMS
 from pandion.bench.flood_monitor import Heard, Monitor
 from pandion.bench.flood_traffic import SYSTEM
 from pandion.display import Display
-from pandion.output import write_text
-from pandion.parser import COULD_NOT_START, Parser
+from pandion.output import json_target, write_text
+from pandion.parser import Parser
 from pandion.supervisor import HalfFailed, Supervisor
 from pandion.version import version
 from sitl.arguments import duration
@@ -69,14 +69,13 @@ class Row:
 def main(argv: list[str]) -> int:
     """Measure and judge; returns the exit code."""
     parser = Parser("pandion bench flood", "Fly in real time under a flood of useless datagrams.")
-    parser.add_argument("--json", metavar="FILE", help="write the figures; - for standard output")
+    parser.add_argument(
+        "--json", metavar="FILE", type=json_target, help="write the figures; - for standard output"
+    )
     parser.add_argument(
         "--duration", metavar="S", type=duration, default=60.0, help="of the flood (default 60)"
     )
     options = parser.read(argv)
-    if options.json not in (None, "-") and not Path(options.json).parent.is_dir():
-        print(f"pandion bench flood: no directory for {options.json}", file=sys.stderr)
-        return COULD_NOT_START
     console = sys.stderr if options.json == "-" else sys.stdout
     print(
         f"Pandion {version()}: {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}", file=console

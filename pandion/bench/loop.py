@@ -19,8 +19,8 @@ from pandion.bench.bare_loop import BareLoops
 from pandion.bench.budgets import Budgets, Row, judge, load_budgets, verdict
 from pandion.bench.machine_watch import Watch
 from pandion.display import Display
-from pandion.output import write_text
-from pandion.parser import COULD_NOT_START, Parser
+from pandion.output import json_target, write_text
+from pandion.parser import Parser
 from pandion.supervisor import HalfFailed, Supervisor
 from pandion.version import version
 from sitl.arguments import duration
@@ -53,9 +53,6 @@ class Measured:
 def main(argv: list[str]) -> int:
     """Measure and judge; returns the exit code."""
     options = _options(argv)
-    if options.json not in (None, "-") and not Path(str(options.json)).parent.is_dir():
-        print(f"pandion bench loop: no directory for {options.json}", file=sys.stderr)
-        return COULD_NOT_START
     console = sys.stderr if options.json == "-" else sys.stdout
     budgets = load_budgets()
     machine = _machine()
@@ -75,7 +72,9 @@ def main(argv: list[str]) -> int:
 
 def _options(argv: list[str]) -> LoopOptions:
     parser = Parser("pandion bench loop", "Fly in real time and judge the timing.")
-    parser.add_argument("--json", metavar="FILE", help="write the figures; - for standard output")
+    parser.add_argument(
+        "--json", metavar="FILE", type=json_target, help="write the figures; - for standard output"
+    )
     parser.add_argument(
         "--duration", metavar="S", type=duration, default=60.0, help="of a flight (default 60)"
     )

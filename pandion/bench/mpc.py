@@ -14,7 +14,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pandion.output import write_text
+from pandion.output import json_target, write_text
 from pandion.parser import COULD_NOT_START, Parser
 from pandion.progress import Progress
 from pandion.version import version
@@ -40,9 +40,6 @@ def main(argv: list[str]) -> int:
     if argv[:1] in (["flood"], ["loop"], ["lockstep"], ["download"]):
         return int(import_module(f"pandion.bench.{argv[0]}").main(argv[1:]))
     options = _options(argv)
-    if options.json not in (None, "-") and not Path(str(options.json)).parent.is_dir():
-        print(f"pandion bench: no directory for {options.json}", file=sys.stderr)
-        return COULD_NOT_START
     from studies.one_thread import pin_threads
 
     pin_threads()  # before NumPy loads
@@ -67,6 +64,7 @@ def _options(argv: list[str]) -> BenchOptions:
     parser.add_argument(
         "--json",
         metavar="FILE",
+        type=json_target,
         help="write the rows as a list, and machine, stages and counts beside it as "
         "FILE.machine.json; - for standard output, rows only",
     )

@@ -18,7 +18,7 @@ from fsw.link.files.served_file import OpenFile
 from fsw.link.wire import message_ids
 from fsw.link.wire.decode import Numbers, for_this_vehicle
 from fsw.link.wire.outgoing import Outgoing, PackedOutgoing, Said
-from fsw.signals import StatusText
+from fsw.signals import Severity, StatusText
 from messages.frames import Frame
 
 CHUNK: Final = 90  # bytes of a log in one LOG_DATA
@@ -31,7 +31,6 @@ _LOG_DATA: Final = struct.Struct(f"<IHB{CHUNK}s")
 _ENTRIES: Final = 8  # a tick: each asks the file system once
 _MAX_REQUESTS: Final = 32  # a client asks again for what got lost in up to 20 pieces
 _TO_THE_END: Final = 0xFFFFFFFF
-_WARNING, _INFO = 4, 6  # MAV_SEVERITY
 
 
 class _Request(NamedTuple):
@@ -189,8 +188,8 @@ class LogService:
 def _told(erasure: Erasure) -> StatusText:
     text = f"{erasure.erased} logs erased, this flight's is kept"
     if not erasure.failed:
-        return StatusText(_INFO, text)
-    return StatusText(_WARNING, f"{text}; {erasure.failed} could not be: {erasure.reason}")
+        return StatusText(Severity.INFO, text)
+    return StatusText(Severity.WARNING, f"{text}; {erasure.failed} could not be: {erasure.reason}")
 
 
 def _log_data(log_id: int, offset: int, data: bytes) -> PackedOutgoing:

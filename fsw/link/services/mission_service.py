@@ -28,7 +28,7 @@ from fsw.link.services.mission_wire import (
 from fsw.link.wire import message_ids as ids
 from fsw.link.wire.decode import Numbers, for_this_vehicle
 from fsw.link.wire.outgoing import Outgoing, Said
-from fsw.signals import StatusText
+from fsw.signals import Severity, StatusText
 from fsw.vehicle.mission_items import DENIED, UNSUPPORTED, MissionItem, Refused
 from messages.frames import Frame
 
@@ -44,7 +44,6 @@ TRIES: Final = 20  # of asking for one item, which makes 5 s
 REACHED_REPEATS: Final = 10  # of MISSION_ITEM_REACHED, as PX4 has them
 _REPEAT_US: Final = 1_000_000
 SILENCE_US: Final = 5_000_000  # ends a download that is not asked on
-_WARNING, _INFO = 4, 6  # MAV_SEVERITY
 
 
 @dataclass(slots=True)
@@ -121,7 +120,7 @@ class MissionService:
                 self._upload = None
                 silence = f"upload broken off: item {len(upload.items)} did not come; kept the old"
                 told.append(encode_ack(CANCELLED, upload.kind, upload.peer))
-                told.append(StatusText(_WARNING, silence))
+                told.append(StatusText(Severity.WARNING, silence))
         return told
 
     def _show_progress(self, t_us: int) -> list[Outgoing]:
@@ -215,7 +214,7 @@ class MissionService:
         text = f"{kind.name.lower()} of {upload.count} items received"
         return (
             encode_ack(ACCEPTED, kind, peer, self._store.identity(kind)),
-            StatusText(_INFO, text),
+            StatusText(Severity.INFO, text),
         )
 
     # ------------------------------------------------------------ download
@@ -280,7 +279,7 @@ class MissionService:
         refused = Refused(INVALID_SEQUENCE, f"there is no mission item {seq}")
         return (
             encode_ack(refused.result, Kind.MISSION, peer),
-            StatusText(_WARNING, refused.reason),
+            StatusText(Severity.WARNING, refused.reason),
         )
 
     def _partial(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[Said]:
@@ -302,7 +301,7 @@ class MissionService:
     def _refuse(self, refused: Refused, kind: Kind, peer: Peer) -> Sequence[Said]:
         self._upload = None
         text = f"{kind.name.lower()} refused: {refused.reason}"
-        return (encode_ack(refused.result, kind, peer), StatusText(_WARNING, text))
+        return (encode_ack(refused.result, kind, peer), StatusText(Severity.WARNING, text))
 
 
 # Where the wire values of a message name the system it is for; its component follows.

@@ -21,7 +21,7 @@ from fsw.parameters.facts import FACT_BY_NAME, REPEATED
 from fsw.parameters.registry import BY_NAME
 from fsw.parameters.storage import REAL32
 from fsw.parameters.store import ParameterStore
-from fsw.signals import StatusText
+from fsw.signals import Severity, StatusText
 from messages.frames import Frame
 
 BURST: Final = 10  # values at once: one datagram
@@ -30,7 +30,6 @@ _UINT32: Final = 5  # MAV_PARAM_TYPE
 _NO_INDEX: Final = 0xFFFF
 _BY_NAME: Final = -1  # in place of an index
 _DOES_NOT_EXIST, _OUT_OF_RANGE, _READ_ONLY = 1, 2, 5  # MAV_PARAM_ERROR
-_WARNING: Final = 4  # MAV_SEVERITY
 _HASH: Final = "_HASH_CHECK"  # what QGroundControl asks for, to see whether it knows all values
 _Peer = tuple[int, int]  # system and component
 # In the order of their index on the wire, which is that of their names: clients sort so too.
@@ -78,7 +77,7 @@ class ParameterService:
             return ()
         answers: list[Said] = []
         if news.texts:
-            answers.append(StatusText(_WARNING, news.texts.popleft()))
+            answers.append(StatusText(Severity.WARNING, news.texts.popleft()))
         while news.changed and len(answers) < BURST:
             name = next(iter(news.changed))
             del news.changed[name]
@@ -109,7 +108,7 @@ class ParameterService:
             if value == told.values[0]:
                 return (told,)
             why = f"{name} is read only: {FACT_BY_NAME[name].meaning}"
-            return (StatusText(_WARNING, why), told, _error(index, name, _READ_ONLY, asker))
+            return (StatusText(Severity.WARNING, why), told, _error(index, name, _READ_ONLY, asker))
         if name not in BY_NAME:
             return (_error(_BY_NAME, name, _DOES_NOT_EXIST, asker),)
         if type_ == REAL32:
@@ -119,7 +118,10 @@ class ParameterService:
             self._news.changed[name] = None
         if refusal is None:
             return ()
-        return (StatusText(_WARNING, refusal), _error(_INDEX[name], name, _OUT_OF_RANGE, asker))
+        return (
+            StatusText(Severity.WARNING, refusal),
+            _error(_INDEX[name], name, _OUT_OF_RANGE, asker),
+        )
 
     def _value(self, index: int) -> Outgoing:
         name = _NAMES[index]

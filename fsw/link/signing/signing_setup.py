@@ -7,10 +7,8 @@ from typing import cast
 from fsw.link.signing.signing import Signing
 from fsw.link.udp_endpoint import Address, is_loopback
 from fsw.link.wire.decode import Numbers, for_this_vehicle
-from fsw.signals import StatusText
+from fsw.signals import Severity, StatusText
 from messages.frames import Frame
-
-_WARNING, _NOTICE = 4, 5  # MAV_SEVERITY
 
 
 def set_up_signing(
@@ -34,11 +32,15 @@ def set_up_signing(
     if not for_this_vehicle(system, component):
         return None
     if not is_loopback(sender):
-        return StatusText(_WARNING, "signing unchanged: a key is taken from this machine only")
+        return StatusText(
+            Severity.WARNING, "signing unchanged: a key is taken from this machine only"
+        )
     if armed:
-        return StatusText(_WARNING, "signing unchanged: disarm first")
+        return StatusText(Severity.WARNING, "signing unchanged: disarm first")
     try:
         signing.set_up(bytes(int(byte) for byte in key), int(initial_time))
     except OSError as error:
-        return StatusText(_WARNING, f"signing unchanged: the key cannot be kept, {error.strerror}")
-    return StatusText(_NOTICE, "signing is on" if signing.active else "signing is off")
+        return StatusText(
+            Severity.WARNING, f"signing unchanged: the key cannot be kept, {error.strerror}"
+        )
+    return StatusText(Severity.NOTICE, "signing is on" if signing.active else "signing is off")

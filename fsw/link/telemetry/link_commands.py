@@ -14,7 +14,7 @@ from fsw.link.telemetry.streams import messages_now
 from fsw.link.wire import decode, encode_replies, message_ids
 from fsw.link.wire.outgoing import Outgoing
 from fsw.link.wire.telemetry_context import TelemetryContext
-from fsw.signals import CommandAck, CommandRequest, FlightSnapshot, StatusText
+from fsw.signals import CommandAck, CommandRequest, FlightSnapshot, Severity, StatusText
 from messages.frames import Frame
 
 _GET_HOME_POSITION: Final = 410  # MAV_CMD
@@ -24,7 +24,6 @@ _REQUEST_MESSAGE: Final = 512
 _REQUEST_PROTOCOL_VERSION: Final = 519
 _REQUEST_AUTOPILOT_CAPABILITIES: Final = 520
 _ACCEPTED, _TEMPORARILY_REJECTED, _DENIED, _FAILED = 0, 1, 2, 4  # MAV_RESULT
-_INFO: Final = 6  # MAV_SEVERITY: a client's question that has no answer endangers nobody
 _DECODERS: Final = {
     message_ids.COMMAND_LONG: decode.command_long,
     message_ids.COMMAND_INT: decode.command_int,
@@ -71,7 +70,7 @@ class LinkCommands:
         result, reason, messages = handler(request, t_us, snapshot)
         ack = CommandAck(request.command, result, request.source_system, request.source_component)
         told = Outgoing(message_ids.COMMAND_ACK, encode_replies.command_ack(ack))
-        return (told, *messages), StatusText(_INFO, reason) if reason else None
+        return (told, *messages), StatusText(Severity.INFO, reason) if reason else None
 
     def _get_interval(
         self, request: CommandRequest, t_us: int, snapshot: FlightSnapshot | None

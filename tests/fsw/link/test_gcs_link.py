@@ -23,7 +23,7 @@ from fsw.link.peers import EXPIRY_US
 from fsw.link.telemetry.streams import AT_ONCE, STREAMS
 from fsw.link.wire import message_ids as ids
 from fsw.link.wire.outgoing import Outgoing
-from fsw.signals import BatteryState, CommandAck, Mode, StatusText
+from fsw.signals import BatteryState, CommandAck, Mode, Severity, StatusText
 from messages.frames import Frame, FrameWriter, as_version_1, split
 from tests.fsw.link.ground import Ground, ground_station, station_socket
 from tests.fsw.link.snapshots import SNAPSHOT, outputs_at
@@ -71,7 +71,7 @@ def test_arming_landing_and_health_are_told_at_once(ground: Ground, change: dict
 
 
 def test_texts_and_acknowledgements_are_sent_as_they_happen(ground: Ground) -> None:
-    ground.links.publish(outputs_at(1_000_000, texts=(StatusText(4, "why not"),)))
+    ground.links.publish(outputs_at(1_000_000, texts=(StatusText(Severity.WARNING, "why not"),)))
     ground.links.acknowledge(1_000_000, CommandAck(400, 1, 255, 190))
     frames = {frame.message_id: frame.payload_values for frame in ground.heard()}
     assert frames[ids.STATUSTEXT][1] == b"why not".ljust(50, b"\0")

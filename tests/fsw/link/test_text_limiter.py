@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from fsw.link.text_limiter import REPEAT_US, TextLimiter
-from fsw.signals import StatusText
+from fsw.signals import Severity, StatusText
 
-REFUSED = StatusText(2, "no takeoff: the vehicle is in the air already")
+REFUSED = StatusText(Severity.CRITICAL, "no takeoff: the vehicle is in the air already")
 S = 1_000_000
 
 
@@ -14,7 +14,9 @@ def test_a_sentence_is_said_once_and_counted() -> None:
     assert limiter.admit(REFUSED, 0) is REFUSED
     assert [limiter.admit(REFUSED, k * S // 2) for k in range(1, 8)] == [None] * 7
     (counted,) = limiter.overdue(REPEAT_US)
-    assert counted == StatusText(6, f"{REFUSED.text} (again, 7 times)"), "it alarmed once"
+    assert counted == StatusText(Severity.INFO, f"{REFUSED.text} (again, 7 times)"), (
+        "it alarmed once"
+    )
     assert list(limiter.overdue(3 * REPEAT_US)) == []
 
 
@@ -23,13 +25,13 @@ def test_one_that_comes_again_later_says_how_often_it_was_held_back() -> None:
     limiter.admit(REFUSED, 0)
     limiter.admit(REFUSED, S)
     again = limiter.admit(REFUSED, REPEAT_US)
-    assert again == StatusText(2, f"{REFUSED.text} (again, once)")
+    assert again == StatusText(Severity.CRITICAL, f"{REFUSED.text} (again, once)")
     assert limiter.admit(REFUSED, 3 * REPEAT_US) == REFUSED
 
 
 def test_other_sentences_are_said_at_once() -> None:
     limiter = TextLimiter()
-    texts = [StatusText(6, f"mission step {k}") for k in range(10)]
+    texts = [StatusText(Severity.INFO, f"mission step {k}") for k in range(10)]
     assert [limiter.admit(text, k) for k, text in enumerate(texts)] == texts
 
 
@@ -37,7 +39,7 @@ def test_a_flood_of_different_sentences_is_bounded_and_told() -> None:
     """Refusals with a number that changes, a hundred times a second."""
     limiter = TextLimiter()
     said = [
-        limiter.admit(StatusText(2, f"no goto: {k} m is too low"), k * S // 100)
+        limiter.admit(StatusText(Severity.CRITICAL, f"no goto: {k} m is too low"), k * S // 100)
         for k in range(1000)
     ]
     assert sum(text is not None for text in said) <= 20 + 5 * 10 + 1

@@ -16,7 +16,7 @@ from fsw.link.files.log_service import CHUNK, LogService
 from fsw.link.files.vehicle_files import vehicle_files
 from fsw.link.wire import message_ids as ids
 from fsw.link.wire.outgoing import Said
-from fsw.signals import StatusText
+from fsw.signals import Severity, StatusText
 from messages.frames import FrameWriter, split
 from tests.fsw.link.files.wire_values import message_of, values_of
 
@@ -205,7 +205,7 @@ def test_finished_logs_are_erased_this_flight_s_is_kept_and_the_operator_is_told
     until = time.monotonic() + 5.0
     while not told and time.monotonic() < until:
         told += client.service.poll(0)
-    assert told == [StatusText(6, "2 logs erased, this flight's is kept")]
+    assert told == [StatusText(Severity.INFO, "2 logs erased, this flight's is kept")]
     left = sorted(str(path.relative_to(tmp_path)) for path in tmp_path.glob("*/*"))
     assert left == ["run-1/result.json", "run-3/flight.tlog"]
     other.download(0)

@@ -21,6 +21,7 @@ from fsw.signals import (
     MotionSetpoint,
     OffboardReport,
     SetpointKind,
+    Severity,
     StatusText,
 )
 from messages import dialect
@@ -219,12 +220,13 @@ def test_a_long_text_is_cut_into_numbered_pieces() -> None:
     sentence = "arming refused: " + "ä" * 60
     pieces = [
         decoded(FrameWriter(1, 1).frame(ids.STATUSTEXT, *values))
-        for values in encode_replies.status_texts(StatusText(4, sentence), 9)
+        for values in encode_replies.status_texts(StatusText(Severity.WARNING, sentence), 9)
     ]
     assert [piece.chunk_seq for piece in pieces] == list(range(len(pieces)))
     assert {piece.id for piece in pieces} == {9}
     whole = b"".join(
-        values[1] for values in encode_replies.status_texts(StatusText(4, sentence), 9)
+        values[1]
+        for values in encode_replies.status_texts(StatusText(Severity.WARNING, sentence), 9)
     )
     assert whole.decode() == sentence
 
