@@ -12,7 +12,7 @@ import re
 from struct import Struct
 from typing import Final, NamedTuple
 
-from messages.frames import FrameWriter, checksum, layout_of
+from messages.frames import FrameWriter, checksum, closed_frame, layout_of
 
 _HEADER_SIZE: Final = 10
 _CHECKSUM_SIZE: Final = 2
@@ -91,7 +91,7 @@ class ConvoyFrame:
         """The frame with these first values."""
         origin = self._writer.next_origin()
         body = self._body.pack(self._length, origin, self._id_bytes, *first_values, self._last)
-        return b"\xfd" + body + checksum(body + self._crc_extra).to_bytes(2, "little")
+        return closed_frame(body, self._crc_extra)
 
 
 def _part(message_id: int, count: int) -> _Part:

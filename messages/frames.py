@@ -1,4 +1,4 @@
-"""A small, fast codec for MAVLink frames, byte-identical with pymavlink.
+"""A small, fast codec for MAVLink frames, byte-identical with pymavlink but for one in 256.
 
 Frames are written as MAVLink 2 and read as either version; :func:`as_version_1` rewrites one for a
 peer that speaks MAVLink 1, as QGroundControl does where a vehicle does not say that it knows more.
@@ -135,7 +135,7 @@ class FrameWriter:
         # The first byte of a payload is sent even if it is zero.
         payload = whole.rstrip(b"\0") or b"\0"
         body = b"%c%b%b%b" % (len(payload), self.next_origin(), layout.id_bytes, payload)
-        return b"\xfd%b%b" % (body, checksum(body + layout.crc_extra).to_bytes(2, "little"))
+        return closed_frame(body, layout.crc_extra)
 
     def next_origin(self) -> bytes:
         """Advance the sequence: the header between length and message id of the next frame."""
@@ -160,7 +160,24 @@ def announcing_signature(frame: bytes) -> bytes:
     """
     layout = _LAYOUTS[int.from_bytes(frame[7:10], "little")]
     body = b"%b%c%b" % (frame[1:2], _SIGNED, frame[3:-_CHECKSUM_SIZE])
-    return b"\xfd%b%b" % (body, checksum(body + layout.crc_extra).to_bytes(2, "little"))
+    return closed_frame(body, layout.crc_extra)
+
+
+def closed_frame(body: bytes, crc_extra: bytes) -> bytes:
+    """A frame of MAVLink 2 around all that its checksum covers.
+
+    A reader that does not know the message takes its checksum for wrong. MAVLink's own parser in C,
+    that of QGroundControl and MAVSDK, then begins a new frame if the last byte is a start marker,
+    and loses up to 280 bytes that follow. So no frame ends in one: of the flags that may be ignored
+    one is set, and the checksum is another.
+    """
+    crc = checksum(body + crc_extra)
+    flag = 0
+    while crc >> 8 == _MAGIC:
+        flag += 1
+        body = b"%b%c%b" % (body[:2], flag, body[3:])
+        crc = checksum(body + crc_extra)
+    return b"\xfd%b%b" % (body, crc.to_bytes(2, "little"))
 
 
 def is_version_1(frame: bytes) -> bool:
