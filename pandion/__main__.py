@@ -14,7 +14,7 @@ from pandion.parser import COULD_NOT_START, Parser, unknown_name
 HELP: Final = """\
 usage: pandion VERB [options]
 
-Flight software for aerial manipulators, with a simulator, over MAVLink 2.
+Flight software for aerial manipulators, with a simulator, over MAVLink.
 
 verbs:
   fly         start the simulator and the flight software, fly a scenario, print the verdict
