@@ -140,7 +140,7 @@ _FACTS: Final = [
         "GF_ACTION",
         "Geofence breach action",
         "a fence is a barrier that the vehicle does not cross",
-        choices=((0, "None: the barriers keep the vehicle inside"),),
+        choices=((0, "None: barriers hold"),),
     ),
     Fact("GF_MAX_HOR_DIST", "Geofence radius", "no fence but the uploaded one", unit="m"),
     Fact("GF_MAX_VER_DIST", "Geofence height", "no fence but the uploaded one", unit="m"),

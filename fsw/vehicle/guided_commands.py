@@ -81,13 +81,13 @@ def _blocked(centre: Vec3, radius: float, safe_set: SafeSet) -> str | None:
             n[0], n[1]
         )
         if not nearest - wall.offset > wall.clearance:
-            return f"the circle reaches behind wall {number} or too close to it"
+            return f"the circle comes too close to the fence or a wall (wall {number})"
     for number, obstacle in enumerate(safe_set.obstacles, start=1):
         o = obstacle.position
         across = math.dist(centre[:2], o[:2]) - radius
         up = 0.0 if obstacle.upright else centre[2] - o[2]
         if not math.hypot(across, up) > obstacle.clearance:
-            return f"the circle comes too close to obstacle {number}"
+            return f"the circle comes too close to a fence or an obstacle (obstacle {number})"
     return None
 
 

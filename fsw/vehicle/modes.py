@@ -39,7 +39,7 @@ class Event(Enum):
     CLIMB_DONE = "climb done"
     TRAJECTORY_DONE = "trajectory done"
     MISSION_DONE = "mission done"
-    HOME_REACHED = "home reached"
+    HOME_REACHED = "return point reached"
     TOUCHED_DOWN = "touched down"
     TERMINATE = "terminate"
 

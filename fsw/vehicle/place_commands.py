@@ -67,10 +67,10 @@ def _blocked(place: Vec3, situation: Situation) -> str | None:
     for number, wall in enumerate(situation.safe_set.walls, start=1):
         distance = sum(n * x for n, x in zip(wall.normal, place, strict=True)) - wall.offset
         if not distance > wall.clearance:
-            return f"the place is behind wall {number} or too close to it"
+            return f"the place is too close to the fence or a wall, or beyond it (wall {number})"
     for number, obstacle in enumerate(situation.safe_set.obstacles, start=1):
         if not distance_to(obstacle, place) > obstacle.clearance:
-            return f"the place is too close to obstacle {number}"
+            return f"the place is too close to a fence or an obstacle, or in it (obstacle {number})"
     return None
 
 

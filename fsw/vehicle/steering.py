@@ -77,7 +77,7 @@ def move(lead: Lead, aim: Aim, limits: SteeringLimits, dt: float) -> Lead:
         dt: The moment [s].
     """
     motion = _motion_now(lead, aim)
-    p, v = _move_point(lead, motion, aim.speed, limits, dt)
+    p, v = _move_point(lead, motion, aim, limits, dt)
     yaw, yaw_rate = _turn(lead, motion, limits, dt)
     q_arm = lead.q_arm
     if q_arm is not None and aim.joints is not None:
@@ -172,9 +172,9 @@ def _motion_now(lead: Lead, aim: Aim) -> MotionSetpoint:
 
 
 def _move_point(
-    lead: Lead, motion: MotionSetpoint, speed: float | None, limits: SteeringLimits, dt: float
+    lead: Lead, motion: MotionSetpoint, aim: Aim, limits: SteeringLimits, dt: float
 ) -> tuple[Vec3, Vec3]:
-    braking = _BRAKING_SHARE * limits.acceleration
+    braking, most = _BRAKING_SHARE * limits.acceleration, limits.speed
     wanted = (0.0, 0.0, 0.0) if motion.v is None else motion.v
     if motion.along_heading:
         wanted = _level(wanted, lead.yaw)
@@ -182,13 +182,15 @@ def _move_point(
         error = _minus(motion.p, lead.p)
         distance = _length(error)
         if distance > 0.0:
-            cruise = min(speed or limits.cruise_speed, limits.speed)
+            cruise = min(aim.speed or limits.cruise_speed, limits.speed)
+            if aim.orbit is not None:  # on the way to a circle too
+                most = max(cruise, aim.orbit.speed)
             closing = min(plain_root(distance, braking, _SETTLE_RATE), cruise)
             wanted = _plus(wanted, error, closing / distance)
     elif motion.v is None and motion.a is not None:
         a = _level(motion.a, lead.yaw) if motion.along_heading else motion.a
         wanted = _plus(lead.v, a, dt)
-    wanted = _shortened(wanted, limits.speed)
+    wanted = _shortened(wanted, most)
     change = _shortened(_minus(wanted, lead.v), limits.acceleration * dt)
     v = _plus(lead.v, change, 1.0)
     mean = _plus(lead.v, change, 0.5)

@@ -164,7 +164,7 @@ def test_an_orbit_that_reaches_behind_a_wall_is_refused() -> None:
     flight.run(0.5)
     flight.step(as_int(ORBIT, 1, 3.0, NAN, 0.0, NAN, 0.0, 0.0, -1.4))
     assert flight.results[-1] == (ORBIT, DENIED)
-    assert any("reaches behind wall" in text for text in flight.texts)
+    assert any("too close to the fence or a wall" in text for text in flight.texts)
     assert flight.mode is Mode.HOLD
 
 

@@ -186,7 +186,8 @@ class LogService:
 
 
 def _told(erasure: Erasure) -> StatusText:
-    text = f"{erasure.erased} logs erased, this flight's is kept"
+    logs = "log" if erasure.erased == 1 else "logs"
+    text = f"{erasure.erased} {logs} erased, this flight's is kept"
     if not erasure.failed:
         return StatusText(Severity.INFO, text)
     return StatusText(Severity.WARNING, f"{text}; {erasure.failed} could not be: {erasure.reason}")

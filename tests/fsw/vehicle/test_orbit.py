@@ -7,7 +7,7 @@ import math
 from dataclasses import replace
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fsw.signals import Facing, MotionSetpoint, Orbit
@@ -59,6 +59,17 @@ def test_a_reference_comes_to_the_circle_and_goes_round(clockwise: bool) -> None
     turned = sum(math.remainder(b - a, 2.0 * math.pi) for a, b in itertools.pairwise(angles))
     expected = 90.0 * orbit.speed / orbit.radius
     assert turned == pytest.approx(expected if clockwise else -expected, rel=0.03)
+
+
+@given(st.floats(-20.0, 20.0), st.floats(0.2, 1.5), st.floats(0.2, 1.5))
+@settings(max_examples=25)
+def test_the_way_to_a_circle_is_no_faster_than_the_speed_that_was_set(
+    x: float, cruise: float, speed: float
+) -> None:
+    orbit = replace(ORBIT, speed=speed)
+    aim = Aim(MotionSetpoint(False, orbit.centre, yaw=0.0), speed=cruise, orbit=orbit)
+    track = flown(Lead(False, (x, -2.0, -8.0), (0.0, 0.0, 0.0), 0.0), aim, 20.0)
+    assert max(math.hypot(*lead.v) for lead in track) <= max(cruise, speed) + 1e-9
 
 
 @pytest.mark.parametrize(
