@@ -18,7 +18,7 @@ UV = UV_DEFAULT_INDEX="$${UV_DEFAULT_INDEX:-$(PIP_INDEX)}" .boot/uv
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: help setup run test tests-of-processes tests-of-the-rest interop lock clean
+.PHONY: help setup run test code-checks tests-of-processes tests-of-the-rest interop lock clean
 
 help: ## show this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-7s %s\n", $$1, $$2 }' Makefile
@@ -36,16 +36,18 @@ define check
 endef
 
 test: setup ## set up, then run every check: ruff, mypy, import-linter, pytest
+	@echo "checks in two rows at once, one a core; each is told when it is over"
+	@$(MAKE) --no-print-directory --jobs=2 tests-of-processes tests-of-the-rest
+
+# What reads the code only goes first in the row of the tests that often wait for clocks: meanwhile
+# the other row compiles the kernels that both need.
+OF_PROCESSES := tests/cli tests/interop tests/processes tests/timing
+code-checks:
 	$(call check,lint,$(BIN)/ruff check .)
 	$(call check,format,$(BIN)/ruff format --check .)
 	$(call check,types,$(BIN)/mypy)
 	$(call check,imports,$(BIN)/lint-imports)
-	@echo "pytest: two runs at once, each told when it is over"
-	@$(MAKE) --no-print-directory --jobs=2 tests-of-processes tests-of-the-rest
-
-# Two at a time, one a core: much of what the first starts waits for clocks.
-OF_PROCESSES := tests/cli tests/interop tests/processes tests/timing
-tests-of-processes:
+tests-of-processes: code-checks
 	$(call check,processes,$(BIN)/pytest $(OF_PROCESSES))
 tests-of-the-rest:
 	$(call check,the rest,$(BIN)/pytest $(addprefix --ignore=,$(OF_PROCESSES)))
