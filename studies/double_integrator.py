@@ -166,7 +166,7 @@ def fly(
     """
     plant = DoubleIntegrator(scenario, seed)
     planner = Planner(config.planner, processor_time_us)
-    brake = Brake(config.planner.lag)
+    brake = Brake(config.planner.lag, config.planner.limits.tilt)
     recorder = FlightRecorder()
     held, running = safe_set(scenario), None
     steps = config.mpc_period_us // STEP_US

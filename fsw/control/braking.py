@@ -32,7 +32,6 @@ class BrakeTuning:
     """How hard to brake."""
 
     effort: float = 0.02  # price of (m/s^2)^2 against (m/s)^2
-    tilt: float = math.pi / 10.0  # rad, the planner's own limit
     vertical_rate: float = 4.0  # 1/s
     vertical: float = 2.0  # m/s^2
     joint_rate: float = 6.0  # 1/s
@@ -43,8 +42,16 @@ class BrakeTuning:
 class Brake:
     """The braking law of one prediction model."""
 
-    def __init__(self, lag: LagModel, tuning: BrakeTuning | None = None) -> None:
+    def __init__(self, lag: LagModel, tilt: float, tuning: BrakeTuning | None = None) -> None:
+        """Solve for the gains.
+
+        Args:
+            lag: Of the attitude and the rotors.
+            tilt: The most that may be asked for [rad]: the planner's own limit, ``PLN_TILT_MAX``.
+            tuning: How hard to brake.
+        """
         self._tuning = tuning or BrakeTuning()
+        self._tilt_slope = math.tan(tilt)
         self._gains = _gains(lag, self._tuning.effort)
 
     def __call__(self, x: PredictionState) -> PlanInput:
@@ -55,7 +62,7 @@ class Brake:
         wish_x = -(kv * x.v[0] + ka * x.a[0] + kj * x.j[0] + ks * x.s[0])
         wish_y = -(kv * x.v[1] + ka * x.a[1] + kj * x.j[1] + ks * x.s[1])
         # The thrust points along a - g: the same tilt is less acceleration while descending.
-        most = math.tan(tuning.tilt) * (GRAVITY - max(vertical, 0.0))
+        most = self._tilt_slope * (GRAVITY - max(vertical, 0.0))
         scale = min(1.0, most / max(math.hypot(wish_x, wish_y), 1e-9))
         first, second = x.qd_arm
         joints: Vec2 = (

@@ -86,7 +86,7 @@ class FlightLoop:
         dt = config.tick_period_us * 1e-6
         lag = config.planner.lag
         self._model = NominalModel(lag, dt)
-        self._brake = Brake(lag)
+        self._brake = Brake(lag, config.planner.limits.tilt)
         self._cascade = Cascade(config.airframe, lag, config.tuning, config.inner, dt)
         self._modes = ModeKeeper(config)
         self._steering = SteeringKeeper(config)

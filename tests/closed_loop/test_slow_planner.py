@@ -8,16 +8,17 @@ deadline; a later one answers a question that was given up.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import pytest
 
+from fsw.model.airframe import GRAVITY
 from fsw.mpc.planner import Planner
 from fsw.parameters.flight_config import flight_config
-from fsw.signals import Plan, PlanFailure, PlanRequest, TickOutputs
+from fsw.signals import Mode, Plan, PlanFailure, PlanRequest, TickOutputs
 from fsw.vehicle.faults import Fault
 from sitl.scenario_file import load_scenario
-from tests.closed_loop.harness import Flight, real_planner
+from tests.closed_loop.harness import ARM, Flight, command, hover, real_planner
 
 SLOW_FROM_S, SLOW_TO_S, END_S = 2.0, 4.0, 6.0
 
@@ -112,3 +113,25 @@ def test_a_planner_that_is_gone_costs_no_barrier(name: str, gone_s: float) -> No
     assert Fault.PLAN_STALE.value in flight.snapshot.failures
     assert flight.sim.min_margin_m is not None
     assert flight.sim.min_margin_m > 0.0
+
+
+@pytest.mark.parametrize("tilt_deg", [4.0, 12.0])
+def test_without_plans_it_brakes_with_the_tilt_that_the_plan_may_use(tilt_deg: float) -> None:
+    """PLN_TILT_MAX reaches braking: at a metre a second it leans as far as that, no farther."""
+    config = flight_config()
+    limits = replace(config.planner.limits, tilt=math.radians(tilt_deg))
+    config = replace(config, planner=replace(config.planner, limits=limits))
+    flight = Flight(hover(), config=config, late_ticks=lambda plan: 0 if plan < 60 else 10**9)
+    flight.step(command(ARM, 1.0))
+    flight.run(0.5)
+    flight.step(replace(command(192, -1.0, 0.0, 0.0, 0.0, 9.0, 0.0, -2.0), frame=1))
+    assert flight.mode is Mode.HOLD
+    asked = 0.0
+    for _ in range(40):
+        flight.run(0.2)
+        if Fault.PLAN_STALE.value in flight.snapshot.failures:
+            assert flight.state.nominal is not None
+            asked = max(asked, -flight.state.nominal.a[0])
+    most = GRAVITY * math.tan(math.radians(tilt_deg))
+    assert 0.7 * most < asked < 1.02 * most
+    assert math.dist(flight.sim.truth().v_WB, (0.0, 0.0, 0.0)) < 0.05

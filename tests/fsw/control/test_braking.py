@@ -22,11 +22,12 @@ from fsw.model.airframe import AIRFRAME, GRAVITY
 from fsw.model.nominal import NominalModel
 from fsw.model.prediction import LagModel
 from fsw.mpc.planner_config import PlannerConfig
+from fsw.mpc.program import InputLimits
 from fsw.signals import PlanInput, PredictionState, Vec3
 
 DT = 0.002
 MODEL = NominalModel(LagModel(), DT)
-BRAKE = Brake(LagModel())
+BRAKE = Brake(LagModel(), InputLimits().tilt)
 WALLS = PlannerConfig().walls
 TAKEN_BACK_S = 0.3  # by when the tilt of now no longer accelerates
 STILL: Vec3 = (0.0, 0.0, 0.0)
@@ -112,9 +113,20 @@ def test_whoever_keeps_lambda_stops_before_the_wall(seed: int) -> None:
 @given(
     st.tuples(*[st.floats(-2.0, 2.0)] * 3),
     st.tuples(st.floats(-3.0, 3.0), st.floats(-3.0, 3.0), st.just(0.0)),
+    st.floats(math.radians(2.0), math.radians(30.0)),
+)
+def test_braking_is_within_the_plans_tilt(v: Vec3, a: Vec3, tilt: float) -> None:
+    u = Brake(LagModel(), tilt)(state(v, a))
+    assert math.hypot(u.a[0], u.a[1]) <= math.tan(tilt) * (GRAVITY - u.a[2]) + 1e-9
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    st.tuples(*[st.floats(-2.0, 2.0)] * 3),
+    st.tuples(st.floats(-3.0, 3.0), st.floats(-3.0, 3.0), st.just(0.0)),
 )
 def test_braking_is_within_tilt_and_jerk_and_does_not_swing_back(v: Vec3, a: Vec3) -> None:
-    x, tilt = state(v, a), math.tan(BrakeTuning().tilt)
+    x, tilt = state(v, a), math.tan(InputLimits().tilt)
     for _ in range(2000):
         u = BRAKE(x)
         assert math.hypot(u.a[0], u.a[1]) <= tilt * (GRAVITY - u.a[2]) + 1e-9
@@ -149,5 +161,5 @@ def test_at_rest_nothing_is_asked_for() -> None:
 
 
 def test_the_paper_s_model_is_braked_without_a_lag() -> None:
-    u = Brake(LagModel(at_once=True))(state((0.1, 0.0, 0.0), (5.0, 0.0, 0.0)))
+    u = Brake(LagModel(at_once=True), InputLimits().tilt)(state((0.1, 0.0, 0.0), (5.0, 0.0, 0.0)))
     assert -2.0 < u.a[0] < -0.5

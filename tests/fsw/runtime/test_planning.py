@@ -15,6 +15,7 @@ from fsw.model.airframe import AIRFRAME
 from fsw.model.nominal import NominalModel
 from fsw.model.prediction import LagModel
 from fsw.model.rotors import MotionState, motion_state
+from fsw.mpc.program import InputLimits
 from fsw.runtime.flight_state import PlanMemory
 from fsw.runtime.planning import (
     late_start,
@@ -37,7 +38,7 @@ from tests.fsw.random_states import estimate_of, random_estimate
 PERIOD_US, TICK_US, START_US = 100_000, 2_000, 1_000_000
 NO_TIME = PlanTimings(0.0, 0.0, 0.0)
 MODEL = NominalModel(LagModel(), 1e-6 * TICK_US)
-BRAKE = Brake(LagModel())
+BRAKE = Brake(LagModel(), InputLimits().tilt)
 STILL: Vec3 = (0.0, 0.0, 0.0)
 
 
