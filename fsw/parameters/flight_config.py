@@ -63,7 +63,11 @@ class Surroundings:
 
 @dataclass(frozen=True, slots=True)
 class FlightConfig:
-    """One configuration of the whole flight software."""
+    """One configuration of the whole flight software.
+
+    The planner's airframe and its rotors' lag are this airframe's, whatever it is given: what
+    describes the vehicle is written once.
+    """
 
     controller: str = "blf"
     inner: Inner = "tracking"
@@ -88,6 +92,12 @@ class FlightConfig:
     # Farther from the plan than this, plan from the measurement.
     upset_distance: float = 0.15  # m
     upset_yaw: float = 0.35  # rad
+
+    def __post_init__(self) -> None:
+        """Hand the airframe down to the planner."""
+        lag = replace(self.planner.lag, rotor_lag=self.airframe.rotor_lag)
+        planner = replace(self.planner, airframe=self.airframe, lag=lag)
+        object.__setattr__(self, "planner", planner)
 
 
 # lambda of eq 25 [m/s]. The paper's two contradict its own sphere and tilt limits and fly only
