@@ -151,12 +151,12 @@ def inputs_of(plan: Plan) -> Array:
 def test_every_controller_is_its_problem_written_a_second_time(
     safe_set: SafeSet, controller: str
 ) -> None:
-    """Eight random questions each; what has no answer by one program has none by the other."""
+    """Five random questions each; what has no answer by one program has none by the other."""
     name, _, centred = controller.partition("-")
     config = replace(CONFIG, controller=name, centred=bool(centred))
     loose = np.tile([1.0, 1.0, 1.0, 3.0, 1.0, 1.0], N)
     compared = 0
-    for seed in range(20, 28):
+    for seed in range(20, 25):
         # Eq 15 without slack has no answer unless the vehicle is nearly in formation.
         liveliness = 0.2 if name == "hc" and safe_set is SPHERE and seed % 2 else 1.0
         start, asked = question(np.random.default_rng(seed), safe_set, liveliness)
