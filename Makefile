@@ -18,10 +18,10 @@ UV = UV_DEFAULT_INDEX="$${UV_DEFAULT_INDEX:-$(PIP_INDEX)}" .boot/uv
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: help setup run test code-checks tests-of-processes tests-of-the-rest interop lock clean
+.PHONY: help setup run test test-long code-checks tests-of-processes tests-of-the-rest interop lock clean
 
 help: ## show this list
-	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-7s %s\n", $$1, $$2 }' Makefile
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-9s %s\n", $$1, $$2 }' Makefile
 
 setup: $(READY) messages/dialect.py ## create .venv with everything in it (nothing to do if nothing changed)
 	@echo "setup: .venv is ready"
@@ -48,9 +48,12 @@ code-checks:
 	$(call check,types,$(BIN)/mypy)
 	$(call check,imports,$(BIN)/lint-imports)
 tests-of-processes: code-checks
-	$(call check,processes,$(BIN)/pytest $(OF_PROCESSES))
+	$(call check,processes,$(BIN)/pytest -m "not long" $(OF_PROCESSES))
 tests-of-the-rest:
-	$(call check,the rest,$(BIN)/pytest $(addprefix --ignore=,$(OF_PROCESSES)))
+	$(call check,the rest,$(BIN)/pytest -m "not long" $(addprefix --ignore=,$(OF_PROCESSES)))
+
+test-long: setup ## the tests that make test leaves out for its four minutes
+	$(BIN)/pytest -m long
 
 # Of other people's clients; each has a lock of its own, and none is needed to fly or to test.
 EXTERNAL := tests/interop/external

@@ -22,6 +22,7 @@ def test_only_what_asks_for_nonsense_is_a_valid_frame(kind: object) -> None:
         assert len(frames) == (1 if kind is out_of_range else 0)
 
 
+@pytest.mark.long
 def test_nothing_invalid_is_believed_and_the_vehicle_stays_in_touch() -> None:
     flight = fly(1.5, flooded=True, display=Display(sys.stderr))
     assert flight.sent > 0.5 * 1.5 * 5000.0

@@ -18,7 +18,9 @@ from tests.cli.test_stall import flying, half_of
     ("pace", "halves", "pause_s"),
     [
         (("--realtime",), ("sitl",), 1.0),
-        (("--realtime",), ("fsw", "sitl"), 3.0),  # what a laptop does whose lid is closed
+        pytest.param(  # what a laptop does whose lid is closed
+            ("--realtime",), ("fsw", "sitl"), 3.0, marks=pytest.mark.long
+        ),
         (("--speed", "2"), ("fsw",), 1.0),
         (("--speed", "2"), ("sitl",), 1.0),
     ],
