@@ -1,5 +1,7 @@
 """A small, fast codec for MAVLink frames, byte-identical with pymavlink but for one in 256.
 
+:func:`closed_frame` says which one.
+
 Frames are written as MAVLink 2 and read as either version; :func:`as_version_1` rewrites one for a
 peer that speaks MAVLink 1, as QGroundControl does where a vehicle does not say that it knows more.
 
@@ -167,9 +169,9 @@ def closed_frame(body: bytes, crc_extra: bytes) -> bytes:
     """A frame of MAVLink 2 around all that its checksum covers.
 
     A reader that does not know the message takes its checksum for wrong. MAVLink's own parser in C,
-    that of QGroundControl and MAVSDK, then begins a new frame if the last byte is a start marker,
-    and loses up to 280 bytes that follow. So no frame ends in one: of the flags that may be ignored
-    one is set, and the checksum is another.
+    which QGroundControl uses, then begins a new frame if the last byte is a start marker, and loses
+    up to 280 bytes that follow. So no frame ends in one: of the flags that may be ignored one is
+    set, and the checksum is another.
     """
     crc = checksum(body + crc_extra)
     flag = 0

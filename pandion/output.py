@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
+from typing import TextIO
 
 
 def json_target(text: str) -> str:
@@ -12,6 +13,18 @@ def json_target(text: str) -> str:
     if text != "-" and not Path(text).parent.is_dir():
         raise argparse.ArgumentTypeError(f"no directory for {text}")
     return text
+
+
+def add_json_option(parser: argparse.ArgumentParser, what: str) -> None:
+    """Add ``--json FILE``, to which a verb writes ``what``."""
+    parser.add_argument(
+        "--json", metavar="FILE", type=json_target, help=f"write {what}; - for standard output"
+    )
+
+
+def console_beside(target: str | None) -> TextIO:
+    """Where sentences go: standard error if standard output is the JSON's."""
+    return sys.stderr if target == "-" else sys.stdout
 
 
 def write_text(target: str | None, text: str) -> None:

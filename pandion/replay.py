@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fsw.signals import Origin
-from pandion.output import json_target, write_text
+from pandion.output import add_json_option, console_beside, write_text
 from pandion.parser import COULD_NOT_START, Parser
 from pandion.progress import Progress
 
@@ -43,9 +43,7 @@ def main(argv: list[str]) -> int:
         action="store_true",
         help="feed the inputs through the same tick; exit code 1 at the first difference",
     )
-    parser.add_argument(
-        "--json", metavar="FILE", type=json_target, help="write the result; - for standard output"
-    )
+    add_json_option(parser, "the result")
     read = parser.read(argv)
     options = ReplayOptions(read.log, read.verify, read.json)
     from fsw.log.reader import open_flight
@@ -62,7 +60,7 @@ def main(argv: list[str]) -> int:
 def _verify(options: ReplayOptions, log: UlogFile) -> int:
     from fsw.runtime.replay import other_numbers, replay
 
-    console = sys.stderr if options.json == "-" else sys.stdout
+    console = console_beside(options.json)
     program = _program(log)
     notes = other_numbers(log, program)
     for note in notes[:_NOTES_SHOWN]:
@@ -130,7 +128,7 @@ def _sentence(found: Replayed, log: UlogFile) -> str:
 def _summarise(options: ReplayOptions, log: UlogFile) -> int:
     from pandion.log_summary import summary
 
-    console = sys.stderr if options.json == "-" else sys.stdout
+    console = console_beside(options.json)
     with Progress(console, counted=False) as progress:
         result = summary(log, partial(progress.report, "reading"))
     for name, value in result.items():

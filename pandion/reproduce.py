@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
 from fsw.log.run_directory import new_run_directory
-from pandion.output import write_text
+from pandion.output import console_beside, write_text
 from pandion.parser import COULD_NOT_START, Parser, unknown_name
 from pandion.progress import Progress
 from pandion.version import version
@@ -156,7 +156,7 @@ def _run(options: ReproduceOptions) -> int:
     from studies.catalogue import STUDIES
     from studies.output import json_text, write
 
-    console = sys.stderr if options.json == "-" else sys.stdout
+    console = console_beside(options.json)
     settings = _settings(options)
     folder = options.out or new_run_directory(Path("runs"), options.what)
     print(f"Pandion {version()}: {options.what}, written to {folder}", file=console, flush=True)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+
 
 def version() -> str:
     """Version of the installed distribution."""
@@ -12,3 +14,8 @@ def version() -> str:
         return version("pandion")
     except PackageNotFoundError:
         return "0 (source tree, not installed)"
+
+
+def version_and_machine() -> str:
+    """The first line of a measurement."""
+    return f"Pandion {version()}: {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}"

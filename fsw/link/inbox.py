@@ -13,11 +13,17 @@ from fsw.signals import (
     CommandRequest,
     EndEffectorTarget,
     JointSetpoint,
+    MissionUpdate,
     MotionSetpoint,
+    Plan,
+    PlanFailure,
     PointObstacle,
     SafeSet,
+    SensorFrame,
+    TickInputs,
     Wall,
 )
+from fsw.tuning import Tuning
 from messages.frames import Frame
 
 _MAX_COMMANDS: Final = 16  # a tick; a client sends one at a time and repeats it
@@ -105,6 +111,40 @@ class Inbox:
         """Hand over the newest set-points for now."""
         taken, self._setpoints = self._setpoints, NO_SETPOINTS
         return taken
+
+    def take_inputs(
+        self,
+        sensors: SensorFrame,
+        plan: Plan | PlanFailure | None,
+        tuning: Tuning | None,
+        mission: MissionUpdate | None,
+        stale_us: int = 0,
+    ) -> TickInputs:
+        """Everything that arrived since the last tick, with what did not come from the ground.
+
+        Args:
+            sensors: Of this tick.
+            plan: The planner's answer that is due, if one is.
+            tuning: Parameters to take over, if any.
+            mission: A change of the mission, if there is one.
+            stale_us: How much older the sensors' readings are [us].
+        """
+        setpoints = self.take_setpoints()
+        return TickInputs(
+            sensors,
+            plan,
+            self.take_commands(),
+            self.take_targets(),
+            self.take_safe_set(),
+            setpoints.motion,
+            setpoints.attitude,
+            setpoints.joints,
+            setpoints.refused,
+            self.take_station_heard(),
+            stale_us=stale_us,
+            tuning=tuning,
+            mission=mission,
+        )
 
     def take_station_heard(self) -> bool:
         """Whether a ground station's heartbeat came."""

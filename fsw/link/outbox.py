@@ -43,7 +43,7 @@ class Outbox:
         except (struct.error, OverflowError, ValueError, KeyError, TypeError):
             self.encode_failures += 1
             return
-        self._frames.append(self._signing.signed(frame) if self._signing.active else frame)
+        self._add_frame(frame)
 
     def add_said(self, outgoing: Said, t_us: int) -> None:
         """Take what a service says."""
@@ -54,8 +54,7 @@ class Outbox:
             self.add(outgoing.component, outgoing.message_id, outgoing.values)
             return
         writer = self._writers[outgoing.component]
-        frame = writer.packed_frame(outgoing.message_id, outgoing.payload)
-        self._frames.append(self._signing.signed(frame) if self._signing.active else frame)
+        self._add_frame(writer.packed_frame(outgoing.message_id, outgoing.payload))
 
     def add_asked_for(self, outgoing: Outgoing) -> None:
         """Take what somebody asked for: in MAVLink 2 if MAVLink 1 has no such message.
@@ -76,6 +75,9 @@ class Outbox:
         """Say how often sentences were held back; call it now and then."""
         for text in self._limiter.overdue(t_us):
             self._add_text(text)
+
+    def _add_frame(self, frame: bytes) -> None:
+        self._frames.append(self._signing.signed(frame) if self._signing.active else frame)
 
     def _add_text(self, text: StatusText) -> None:
         """In as many STATUSTEXT as it needs."""

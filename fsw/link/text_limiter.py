@@ -61,7 +61,7 @@ class TextLimiter:
         """What was held back and has not come again, as information; call it now and then."""
         for said in self._said.values():
             if said.held_back and t_us - said.at_us >= REPEAT_US:
-                yield replace(_counted(said), severity=max(said.text.severity, Severity.INFO))
+                yield replace(_counted(said), severity=Severity.INFO)
                 said.at_us, said.held_back = t_us, 0
         if self._dropped and self._room + 1e-6 * _RATE_PER_S * (t_us - self._room_us) >= 1.0:
             yield StatusText(Severity.WARNING, f"{self._dropped} more texts were left out")

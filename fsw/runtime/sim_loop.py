@@ -211,21 +211,12 @@ class SimLoop(Generic[State]):
         t_us = sensors.t_us
         self._vibration.add(sensors.gyro_B, sensors.accel_B)
         inbox = self._inbox
-        setpoints = inbox.take_setpoints()
-        cycle.inputs = TickInputs(
+        cycle.inputs = inbox.take_inputs(
             sensors,
             cycle.planner.take(t_us),
-            inbox.take_commands(),
-            inbox.take_targets(),
-            inbox.take_safe_set(),
-            setpoints.motion,
-            setpoints.attitude,
-            setpoints.joints,
-            setpoints.refused,
-            inbox.take_station_heard(),
-            stale_us=cycle.release.stale_us,
-            tuning=self._parameters.take_tuning(),
-            mission=self._missions.take_update(),
+            self._parameters.take_tuning(),
+            self._missions.take_update(),
+            cycle.release.stale_us,
         )
 
     def _think(self, cycle: Cycle) -> None:

@@ -19,10 +19,10 @@ from typing import Any, Final
 
 from pandion.bench.download_client import DownloadClient, NothingCame
 from pandion.display import Display
-from pandion.output import json_target, write_text
+from pandion.output import add_json_option, console_beside, write_text
 from pandion.parser import Parser
 from pandion.supervisor import HalfFailed, Supervisor
-from pandion.version import version
+from pandion.version import version_and_machine
 
 PASSED, NOT_PASSED = 0, 1  # exit codes
 LEAST_MB_PER_S: Final = 2.0
@@ -69,17 +69,13 @@ class Downloads:
 def main(argv: list[str]) -> int:
     """Measure and judge; returns the exit code."""
     parser = Parser("pandion bench download", "Fetch a flight log in real time, by LOG_* and FTP.")
-    parser.add_argument(
-        "--json", metavar="FILE", type=json_target, help="write the figures; - for standard output"
-    )
+    add_json_option(parser, "the figures")
     parser.add_argument(
         "--size", metavar="MB", type=_size, default=20.0, help="of the log (default 20)"
     )
     options = parser.read(argv)
-    console = sys.stderr if options.json == "-" else sys.stdout
-    print(
-        f"Pandion {version()}: {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}", file=console
-    )
+    console = console_beside(options.json)
+    print(version_and_machine(), file=console)
     try:
         fetched = fly(int(options.size * _MB), Display(console))
     except (HalfFailed, NothingCame) as error:
@@ -100,8 +96,7 @@ def main(argv: list[str]) -> int:
         f"wake-up p99 {fetched.inner['lateness_p99_us']:.0f} us",
         file=console,
     )
-    if options.json is not None:
-        write_text(options.json, json.dumps(_facts(fetched), indent=1) + "\n")
+    write_text(options.json, json.dumps(_facts(fetched), indent=1) + "\n")
     return PASSED if fetched.passed else NOT_PASSED
 
 

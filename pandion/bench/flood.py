@@ -20,10 +20,10 @@ from fsw.link.telemetry.streams import STREAMS
 from pandion.bench.flood_monitor import Heard, Monitor
 from pandion.bench.flood_traffic import SYSTEM
 from pandion.display import Display
-from pandion.output import json_target, write_text
+from pandion.output import add_json_option, console_beside, write_text
 from pandion.parser import Parser
 from pandion.supervisor import HalfFailed, Supervisor
-from pandion.version import version
+from pandion.version import version_and_machine
 from sitl.arguments import duration
 
 PASSED, NOT_PASSED = 0, 1  # exit codes
@@ -69,17 +69,13 @@ class Row:
 def main(argv: list[str]) -> int:
     """Measure and judge; returns the exit code."""
     parser = Parser("pandion bench flood", "Fly in real time under a flood of useless datagrams.")
-    parser.add_argument(
-        "--json", metavar="FILE", type=json_target, help="write the figures; - for standard output"
-    )
+    add_json_option(parser, "the figures")
     parser.add_argument(
         "--duration", metavar="S", type=duration, default=60.0, help="of the flood (default 60)"
     )
     options = parser.read(argv)
-    console = sys.stderr if options.json == "-" else sys.stdout
-    print(
-        f"Pandion {version()}: {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}", file=console
-    )
+    console = console_beside(options.json)
+    print(version_and_machine(), file=console)
     try:
         calm = fly(options.duration, flooded=False, display=Display(console))
         flooded = fly(options.duration, flooded=True, display=Display(console))

@@ -18,7 +18,7 @@ from typing import Any, Final, TextIO
 
 from pandion.children import Event
 from pandion.display import Display
-from pandion.output import json_target, write_text
+from pandion.output import add_json_option, console_beside, write_text
 from pandion.parser import COULD_NOT_START, Parser
 from pandion.processor import Places, lockstep_places
 from pandion.supervisor import HalfFailed, Supervisor
@@ -43,7 +43,7 @@ class LockstepOptions:
 def main(argv: list[str]) -> int:
     """Measure and report; returns the exit code: 1 if the best flight was too slow."""
     options = _options(argv)
-    console = sys.stderr if options.json == "-" else sys.stdout
+    console = console_beside(options.json)
     try:
         found = _measure(options, console)
     except (HalfFailed, OSError) as error:
@@ -56,9 +56,7 @@ def main(argv: list[str]) -> int:
 
 def _options(argv: list[str]) -> LockstepOptions:
     parser = Parser("pandion bench lockstep", "Time a whole flight in lockstep and its peer.")
-    parser.add_argument(
-        "--json", metavar="FILE", type=json_target, help="write the result; - for standard output"
-    )
+    add_json_option(parser, "the result")
     parser.add_argument("--scenario", metavar="NAME", default="walls", help="(default walls)")
     parser.add_argument(
         "--duration", metavar="S", type=_seconds, default=60.0, help="of a flight (default 60)"

@@ -19,7 +19,7 @@ from pandion.bench.bare_loop import BareLoops
 from pandion.bench.budgets import Budgets, Row, judge, load_budgets, verdict
 from pandion.bench.machine_watch import Watch
 from pandion.display import Display
-from pandion.output import json_target, write_text
+from pandion.output import add_json_option, console_beside, write_text
 from pandion.parser import Parser
 from pandion.supervisor import HalfFailed, Supervisor
 from pandion.version import version
@@ -53,7 +53,7 @@ class Measured:
 def main(argv: list[str]) -> int:
     """Measure and judge; returns the exit code."""
     options = _options(argv)
-    console = sys.stderr if options.json == "-" else sys.stdout
+    console = console_beside(options.json)
     budgets = load_budgets()
     machine = _machine()
     print("Pandion {version}: {cores} cores, load {load}, {kernel}".format(**machine), file=console)
@@ -72,9 +72,7 @@ def main(argv: list[str]) -> int:
 
 def _options(argv: list[str]) -> LoopOptions:
     parser = Parser("pandion bench loop", "Fly in real time and judge the timing.")
-    parser.add_argument(
-        "--json", metavar="FILE", type=json_target, help="write the figures; - for standard output"
-    )
+    add_json_option(parser, "the figures")
     parser.add_argument(
         "--duration", metavar="S", type=duration, default=60.0, help="of a flight (default 60)"
     )

@@ -14,7 +14,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pandion.output import json_target, write_text
+from pandion.output import console_beside, json_target, write_text
 from pandion.parser import COULD_NOT_START, Parser
 from pandion.progress import Progress
 from pandion.version import version
@@ -99,7 +99,7 @@ def _run(options: BenchOptions) -> int:
     from studies.bench_mpc import HORIZONS, QUICK, Effort, run
     from studies.bench_report import lines, machine
 
-    console = sys.stderr if options.json == "-" else sys.stdout
+    console = console_beside(options.json)
     effort = QUICK if options.quick else Effort()
     if options.instances is not None:
         effort = replace(effort, instances=options.instances)

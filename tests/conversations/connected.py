@@ -34,7 +34,6 @@ from fsw.link.wire.telemetry_context import LoopHealth, TelemetryContext
 from fsw.parameters.flight_config import FlightConfig
 from fsw.parameters.store import ParameterStore
 from fsw.runtime.assembly import vehicle_facts
-from fsw.signals import TickInputs
 from messages import dialect
 from messages.frames import as_version_1
 from tests.closed_loop.harness import Flight, frame, on_the_ground
@@ -107,21 +106,9 @@ class Connected:
     def _step(self) -> None:
         flight, inbox = self.flight, self.inbox
         sensors = frame(flight.sim.sense())
-        setpoints = inbox.take_setpoints()
         tuning = self.parameters.take_tuning()
-        inputs = TickInputs(
-            sensors,
-            flight._due(sensors.t_us),
-            inbox.take_commands(),
-            inbox.take_targets(),
-            inbox.take_safe_set(),
-            setpoints.motion,
-            setpoints.attitude,
-            setpoints.joints,
-            setpoints.refused,
-            inbox.take_station_heard(),
-            tuning=tuning,
-            mission=self.missions.take_update(),
+        inputs = inbox.take_inputs(
+            sensors, flight._due(sensors.t_us), tuning, self.missions.take_update()
         )
         outputs = flight.fly(inputs)
         self.missions.observe(outputs.snapshot)
