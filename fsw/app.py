@@ -112,7 +112,7 @@ class _Session:
         settle_memory()
         planner = ProcessPlanner(program.planner, clock.now_us, record.mpc)
         keeping.start()
-        inbox = Inbox()
+        inbox = Inbox(options.links.origin)
         start_us = clock.unix_us()
         files = self._files(directory, start_us, program)
         sim = SimLink(simulator, inbox, facts)

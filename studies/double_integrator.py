@@ -12,10 +12,10 @@ import math
 from dataclasses import dataclass
 
 from fsw.control.braking import Brake
+from fsw.flight.plan_exchange import plan_input
 from fsw.model.airframe import AIRFRAME
 from fsw.mpc.planner import Planner
 from fsw.parameters.flight_config import FlightConfig
-from fsw.runtime.planning import plan_input
 from fsw.signals import Plan, PlanInput, PlanRequest, PredictionState, Vec2, Vec3
 from sitl.admission import check
 from sitl.disturbances.items import push

@@ -208,7 +208,7 @@ class LogEncoder:
             _add_text(t_us, name, self.inputs.text(name, value), out)
             if name == "commands":
                 for command in inputs.commands:
-                    out += _command(t_us, command)
+                    out += _command(t_us, command.request)
 
     def _planning(self, snapshot: FlightSnapshot) -> bytes:
         t_us, report, target = snapshot.t_us, snapshot.constraints, snapshot.reference

@@ -8,11 +8,10 @@ from fsw.control.cascade import Inner
 from fsw.control.inner_tuning import InnerTuning
 from fsw.geometry.geodesy import DEFAULT_ORIGIN
 from fsw.model.airframe import AIRFRAME, Airframe
+from fsw.model.battery import BatteryModel
 from fsw.mpc.planner_config import PlannerConfig, Solver
 from fsw.mpc.variants import VARIANTS
 from fsw.signals import Origin
-from fsw.vehicle.battery import BatteryModel
-from fsw.vehicle.steering import SteeringLimits
 
 CONTROLLERS = tuple(VARIANTS)
 SOLVERS: tuple[Solver, ...] = ("clarabel", "slsqp")
@@ -51,6 +50,21 @@ class FlightLimits:
 
 
 @dataclass(frozen=True, slots=True)
+class SetpointLimits:
+    """How fast a generated setpoint moves."""
+
+    cruise_speed: float = 1.0  # m/s, on the way to a place
+    # Faster and harder, setpoints that change every half second drove the fast loop into the
+    # rotors' limits, and the vehicle off its plan.
+    speed: float = 1.5  # m/s, at most
+    acceleration: float = 1.0  # m/s^2
+    yaw_rate: float = 0.3  # rad/s
+    yaw_acceleration: float = 0.06  # rad/s^2; the plan's limit is 0.1
+    joint_speed: float = 0.6  # rad/s
+    max_lead_distance: float = 0.3  # m, from the vehicle to the setpoint
+
+
+@dataclass(frozen=True, slots=True)
 class Surroundings:
     """What the vehicle must expect; ``consistency.py`` asks whether it can cope."""
 
@@ -76,7 +90,7 @@ class FlightConfig:
     tuning: InnerTuning = field(default_factory=InnerTuning)
     limits: FlightLimits = field(default_factory=FlightLimits)
     surroundings: Surroundings = field(default_factory=Surroundings)
-    steering: SteeringLimits = field(default_factory=SteeringLimits)
+    steering: SetpointLimits = field(default_factory=SetpointLimits)
     battery: BatteryModel = field(default_factory=BatteryModel)
     origin: Origin = DEFAULT_ORIGIN
     soft: bool = False  # fly an inconsistent configuration all the same, with a warning

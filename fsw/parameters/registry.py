@@ -223,7 +223,7 @@ _ROWS: Final[dict[str, list[_Row]]] = {
          "yaw acceleration of a steered reference"),
         ("STR_JNT_RATE", "steering.joint_speed", "rad/s", 0.05, 3.0,
          "speed of joints that are moved by command"),
-        ("STR_LEASH", "steering.leash", "m", 0.1, 0.6,
+        ("STR_LEASH", "steering.max_lead_distance", "m", 0.1, 0.6,
          "how far a steered reference runs ahead of the vehicle"),
         ("RTL_RETURN_ALT", "limits.return_height", "m", 0.5, 50.0,
          "height above home on the way back"),

@@ -7,6 +7,8 @@ from functools import partial
 from typing import Any, cast
 
 from fsw.control.cascade import Inner
+from fsw.flight.state import FlightState
+from fsw.flight.tuned_autopilot import TunedAutopilot
 from fsw.geometry.geodesy import DEFAULT_ORIGIN, to_local
 from fsw.link.services.mission_store import MissionStore, Site
 from fsw.link.wire.telemetry_context import VehicleFacts
@@ -17,9 +19,7 @@ from fsw.parameters.flat import flat
 from fsw.parameters.flight_config import FlightConfig, flight_config
 from fsw.parameters.store import ParameterStore
 from fsw.runtime import clock
-from fsw.runtime.flight_state import FlightState
 from fsw.runtime.program import FlightProgram
-from fsw.runtime.tuned_flight import TunedFlight
 from fsw.signals import Origin
 
 
@@ -41,7 +41,7 @@ def flight_software(
     )
     config = replace(config, origin=origin)
     planner = Planner(config.planner, clock.stopwatch_us)
-    flight = TunedFlight(config)
+    flight = TunedAutopilot(config)
     if to_plan:
         planner.warm_up()
         flight.warm_up()
