@@ -128,7 +128,7 @@ def test_a_text_said_otherwise_is_found(
     found = replayed(path).difference
     assert found is not None
     assert (found.tick, found.field) == (1, "text")
-    assert str(found.logged).replace("trajectorx", "trajectory") == found.replayed
+    assert str(found.logged).replace("commanx", "command") == found.replayed
 
 
 @pytest.mark.parametrize(
