@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 
-from sitl.admission import check_start
 from sitl.mission_clock import MissionClock
 from sitl.plant.vector import Array
 from sitl.scenario import V3, Scenario
+from sitl.scenario_validation import check_start
 from sitl.verdict import EndKind, EndReason, MarginRecord, TrackingError, TruthResult, score
 from sitl.world import World, record_if_clear
 

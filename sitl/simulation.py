@@ -8,7 +8,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sitl.admission import check
 from sitl.compiled import machine_code
 from sitl.disturbances.items import push
 from sitl.mission_clock import MissionClock
@@ -20,6 +19,7 @@ from sitl.plant.state import ARM, P_WB, Q_WB, THRUST, V_WB, W_WB_B
 from sitl.referee import Points, Referee, critical
 from sitl.scenario import V3, Scenario
 from sitl.scenario_file import ScenarioError
+from sitl.scenario_validation import check
 from sitl.sensors.suite import V4, SensorReadings, SensorSuite
 from sitl.start import first_state, flown_vehicle
 from sitl.trajectory import TrajectoryPoint

@@ -17,11 +17,11 @@ from fsw.mpc.planner import Planner
 from fsw.parameters.flight_config import FlightConfig
 from fsw.runtime.planning import plan_input
 from fsw.signals import Plan, PlanInput, PlanRequest, PredictionState, Vec2, Vec3
-from sitl.admission import check
 from sitl.disturbances.items import push
 from sitl.mission_clock import MissionClock
 from sitl.referee import Points, Referee
 from sitl.scenario import V3, Scenario
+from sitl.scenario_validation import check
 from sitl.simulation import SAMPLE_STEPS, START_US, STEP_US
 from sitl.verdict import EndReason, TruthResult
 from studies.flight_result import (
