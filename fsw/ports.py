@@ -11,7 +11,7 @@ Clock = Callable[[], int]
 """Monotonic wall time [us]. Measures the loop; no law ever sees it."""
 
 
-class Planner(Protocol):
+class PlanningCycle(Protocol):
     """One planning cycle, with whatever memory it keeps from the last one."""
 
     def plan(self, request: PlanRequest) -> Plan | PlanFailure:

@@ -85,7 +85,7 @@ Trajectory: TypeAlias = Lissajous | Hold
 
 
 @dataclass(frozen=True, slots=True)
-class Wall:
+class ScenarioWall:
     """A plane; free space is where n·p > offset."""
 
     name: str
@@ -186,7 +186,7 @@ class EncoderErrors:
 
 @dataclass(frozen=True, slots=True)
 class Sensors:
-    """All sensors; exact unless said otherwise."""
+    """All sensors; exact by default."""
 
     imu: ImuErrors = ImuErrors()
     pose: PoseErrors = PoseErrors()
@@ -213,7 +213,7 @@ class Scenario:
     pilot: Pilot
     trajectory: Trajectory
     description: str = ""
-    walls: tuple[Wall, ...] = ()
+    walls: tuple[ScenarioWall, ...] = ()
     obstacles: tuple[Obstacle, ...] = ()
     workspace: Workspace | None = None
     disturbances: tuple[Disturbance, ...] = ()

@@ -41,7 +41,7 @@ def load_scenario(name_or_path: str) -> Scenario:
 
 
 def scenario_digest(name_or_path: str) -> str:
-    """What tells a scenario from another of its name: how the SHA-256 of its file begins.
+    """First digits of the SHA-256 of the file; they differ if two scenarios of one name differ.
 
     Raises:
         ScenarioError: Unknown name or unreadable file.

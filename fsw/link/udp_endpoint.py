@@ -14,7 +14,7 @@ import struct
 import sys
 from typing import Final
 
-from messages.eager import EagerReceiver
+from messages.busy_poll import BusyPollReceiver
 
 Address = tuple[str, int]
 
@@ -85,10 +85,10 @@ class ConnectedEndpoint:
         except OSError as error:
             self._socket.close()
             raise LinkError(f"cannot send to udp:{peer[0]}:{peer[1]}: {error.strerror}") from None
-        self._receive = EagerReceiver(self._socket, MAX_DATAGRAM)
+        self._receive = BusyPollReceiver(self._socket, MAX_DATAGRAM)
 
     def receive(self) -> bytes | None:
-        """Wait for a datagram; None when the patience is over or nobody listens at the peer."""
+        """Wait for a datagram; None when the patience is over or the peer's port is closed."""
         try:
             return self._receive()
         except (BlockingIOError, ConnectionRefusedError):
@@ -122,9 +122,9 @@ class OpenEndpoint:
         """Open the socket.
 
         Args:
-            target: Who is spoken to first. Where that is this machine, only this machine is
-                heard: a vehicle must not take commands from a network nobody asked for.
-            local_port: Wanted, so that a peer can be told beforehand; where it is taken the system
+            target: Peer that is spoken to first. Where that is this machine, only this machine is
+                heard: a vehicle must not take commands from a network by accident.
+            local_port: Preferred, so that a peer can know it beforehand; if it is taken, the system
                 chooses one, so that any number of vehicles share a machine.
             remote: Hear other machines anyway.
         """

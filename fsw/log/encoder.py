@@ -1,4 +1,4 @@
-"""What a tick was given and what it said, as records of the flight log.
+"""Inputs and outputs of a tick as records of the flight log.
 
 The flight and ``pandion replay`` call the same encoder, so comparing their bytes compares every
 field of every topic. Records that come with every tick are packed in one call: at 500 Hz a call

@@ -59,7 +59,7 @@ def open_flight(path: Path) -> UlogFile:
 def _has_our_topics(log: UlogFile) -> bool:
     try:
         return all(log.formats[topic.name].codes == topic.codes for topic in topics.TOPICS)
-    except (KeyError, ValueError):  # a topic is missing, or has a type nobody knows
+    except (KeyError, ValueError):  # a topic is missing, or has an unknown type
         return False
 
 

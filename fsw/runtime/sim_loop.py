@@ -147,7 +147,7 @@ class SimLoop(Generic[State]):
             if self._clock() - announced >= 200_000:
                 announced = self._clock()
                 self._sim.announce()
-            sensors = self._sim.receive()
+            sensors = self._sim.wait_for_step()
             if sensors is not None:
                 return sensors
         return None
@@ -232,7 +232,7 @@ class SimLoop(Generic[State]):
                 self._sim.queue_ack(ack)
             else:
                 self._ground.acknowledge(t_us, ack)
-        self._sim.answer(t_us, outputs)
+        self._sim.send_actuators(t_us, outputs)
 
     def _ask(self, cycle: Cycle) -> None:
         request, applied = cycle.outputs.plan_request, cycle.outputs.snapshot.plan_input

@@ -13,7 +13,7 @@ import socket
 import struct
 from typing import Final
 
-from messages.eager import EagerReceiver
+from messages.busy_poll import BusyPollReceiver
 
 Address = tuple[str, int]
 
@@ -72,7 +72,7 @@ class UdpEndpoint:
             raise LinkError(
                 f"cannot listen on udp:{local[0]}:{local[1]}: {reason[0].lower()}{reason[1:]}"
             ) from None
-        self._receive = EagerReceiver(self._socket, MAX_DATAGRAM)
+        self._receive = BusyPollReceiver(self._socket, MAX_DATAGRAM)
 
     @property
     def address(self) -> Address:

@@ -8,7 +8,7 @@ from typing import Any
 
 from fsw.mpc.planner import Planner
 from fsw.parameters.flight_config import FlightConfig, flight_config
-from fsw.ports import Planner as AnyPlanner
+from fsw.ports import PlanningCycle as AnyPlanner
 from fsw.runtime.flight_state import FlightState
 from fsw.runtime.tuned_flight import TunedFlight
 from fsw.signals import (

@@ -22,7 +22,7 @@ TABLES = (
     scenario.Pilot,
     scenario.Lissajous,
     scenario.Hold,
-    scenario.Wall,
+    scenario.ScenarioWall,
     scenario.Obstacle,
     scenario.Workspace,
     scenario.Uniform,

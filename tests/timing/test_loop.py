@@ -60,7 +60,7 @@ class Sim(VirtualSensors):
         self.done.append("sensors")
         return super().newest()
 
-    def answer(self, t_us: int, outputs: TickOutputs) -> None:
+    def send_actuators(self, t_us: int, outputs: TickOutputs) -> None:
         self.done.append("actuators")
         self.answers.append((self.time.now_us, outputs))
 

@@ -54,7 +54,7 @@ class LoopHealth:
 
 @dataclass(slots=True)
 class PlanIds:
-    """What tells the uploaded lists from other ones, 0 for an empty one; the mission store's."""
+    """Identities of the uploaded lists, 0 for an empty one; from the mission store."""
 
     mission: int = 0
     fence: int = 0
