@@ -20,12 +20,12 @@ from fsw.link.services.mission_service import MissionService
 from fsw.link.services.service import LinkService
 from fsw.link.sim_link import Pacing, SimLink
 from fsw.link.udp_endpoint import LinkError, parse_address
-from fsw.link.wire.telemetry_context import LoopHealth, TelemetryContext
+from fsw.link.wire.telemetry_context import TelemetryContext
 from fsw.log.flight_log import LogSubject
 from fsw.log.revision import revision
 from fsw.log.run_directory import new_run_directory
 from fsw.log.run_files import RunFiles
-from fsw.ports import PlanningCycle
+from fsw.ports import LoopHealth, PlanningCycle
 from fsw.runtime import clock, report
 from fsw.runtime.effort import EffortRecord
 from fsw.runtime.events import Events, events

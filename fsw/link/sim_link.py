@@ -16,7 +16,7 @@ from fsw.link.wire import decode, encode_replies, message_ids
 from fsw.link.wire.decode import Numbers
 from fsw.link.wire.message_ids import AUTOPILOT, SYSTEM_ID
 from fsw.link.wire.px4_mode import custom_mode
-from fsw.link.wire.telemetry_context import VehicleFacts
+from fsw.ports import VehicleFacts
 from fsw.signals import CommandAck, FlightSnapshot, Mode, SensorFrame, TickOutputs
 from messages.frames import Frame, FrameWriter, split
 from messages.lockstep_codec import LockstepReader

@@ -7,8 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Generic, TypeVar
 
 from fsw.link.services.mission_store import MissionStore
-from fsw.link.wire.telemetry_context import VehicleFacts
-from fsw.ports import PlanningCycle
+from fsw.ports import PlanningCycle, VehicleFacts
 from fsw.signals import TickInputs, TickOutputs
 
 if TYPE_CHECKING:

@@ -16,9 +16,8 @@ from fsw.link.ground_links import GroundLinks
 from fsw.link.inbox import Inbox
 from fsw.link.sim_link import Pacing, SimLink
 from fsw.link.wire.message_ids import PATH_PLANNER, SYSTEM_ID
-from fsw.link.wire.telemetry_context import GroupTiming, LoopHealth
 from fsw.log.run_files import RunFiles
-from fsw.ports import Clock, PlanService
+from fsw.ports import Clock, GroupTiming, LoopHealth, PlanService
 from fsw.runtime.effort import EffortRecord
 from fsw.runtime.guarded_tick import GuardedTick
 from fsw.runtime.missed import MissedReleases

@@ -15,11 +15,11 @@ import pytest
 
 from fsw.link.inbox import Inbox
 from fsw.link.sim_link import Pacing
-from fsw.link.wire.telemetry_context import LoopHealth
 from fsw.log.block_file import BlockFile
 from fsw.log.flight_log import FlightLog
 from fsw.log.reader import LoggedTick, open_flight, ticks
 from fsw.parameters.flight_config import flight_config
+from fsw.ports import LoopHealth
 from fsw.runtime.effort import EffortRecord
 from fsw.runtime.flight_loop import FlightLoop
 from fsw.runtime.flight_state import FlightState
