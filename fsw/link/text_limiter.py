@@ -75,8 +75,8 @@ class TextLimiter:
         """Charge the text to its budget.
 
         Emergencies have no limit: only the vehicle itself raises them. Critical texts share a
-        budget with those that differ in their numbers only, the rest shares one. So whatever a client
-        provokes, the first text of a failsafe is sent.
+        budget with those that differ in their numbers only, all others share one. So whatever a
+        client provokes, the first text of a failsafe is sent.
         """
         if text.severity <= Severity.EMERGENCY:
             return True
