@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 
@@ -12,10 +13,9 @@ from sitl.compiled import machine_code
 from sitl.disturbances.items import push
 from sitl.flight_evaluator import FlightEvaluator, Points, critical
 from sitl.mission_clock import MissionClock
-from sitl.plant.aerial_manipulator import plant
-from sitl.plant.integrator import STEP_S
+from sitl.plant.aerial_manipulator import Plant, plant
+from sitl.plant.integrator import STEP_S, step
 from sitl.plant.kinematics import places
-from sitl.plant.parcel import parcel, travel
 from sitl.plant.state import ARM, P_WB, Q_WB, THRUST, V_WB, W_WB_B
 from sitl.result import EndKind, EndReason, TruthResult
 from sitl.scenario import V3, Scenario
@@ -78,7 +78,7 @@ class Simulation:
         self.clock = MissionClock(scenario)
         self.step = 0
         self._plant = plant(self.vehicle)
-        self._parcel = parcel(self._plant)
+        self._plants = cast(Sequence[Plant], np.array([self._plant]))  # cheaper to hand over
         self._mass = self.vehicle.mass
         self._sensors = SensorSuite(scenario.sensors, seed, STEP_US)
         self._pushes = [push(item, seed, 1e-6 * STEP_US) for item in scenario.disturbances]
@@ -88,8 +88,8 @@ class Simulation:
         still = (0.0, 0.0, 0.0)
         # No steps: only what the accelerometer feels at the start.
         example = (self._thrust, self._torque, still, still, STEP_S, self._places[:0])
-        self._travel = machine_code(travel, self._parcel, self._state, *example)
-        self._felt = self._travel(self._parcel, self._state, *example).felt
+        self._step = machine_code(step, self._plants, self._state, *example)
+        self._felt = self._step(self._plants, self._state, *example).felt
         self._reading: SensorReadings | None = None
         self._evaluator = FlightEvaluator(scenario, self.clock, self._points_now())
 
@@ -162,8 +162,8 @@ class Simulation:
             ValueError: A control is not finite or their number is wrong.
         """
         self._command(controls)
-        arrival = self._travel(
-            self._parcel,
+        arrival = self._step(
+            self._plants,
             self._state,
             self._thrust,
             self._torque,

@@ -9,9 +9,6 @@ import pytest
 
 from sitl.flight_evaluator import FlightEvaluator, critical
 from sitl.mission_clock import MissionClock
-from sitl.plant.aerial_manipulator import plant
-from sitl.plant.parameters import Vehicle
-from sitl.plant.parcel import parcel, unpacked
 from sitl.plant.vector import Array
 from sitl.result import EndKind
 from sitl.scenario_file import load_scenario
@@ -65,13 +62,3 @@ def test_joint_1_is_no_critical_point() -> None:
     passed[:, 1] = (99.0, 99.0, 99.0)
     judge.judge_all(passed, 0.0, STEP_S)
     assert judge.ended is None
-
-
-def test_a_parcel_holds_the_whole_plant() -> None:
-    packed = plant(Vehicle())
-    again = unpacked(parcel(packed), 2)
-    for one, other in zip((*packed.chain, *packed.feet), (*again.chain, *again.feet), strict=True):
-        np.testing.assert_array_equal(one, other)
-    np.testing.assert_array_equal(packed.rotors, again.rotors)
-    np.testing.assert_array_equal(packed.joints, again.joints)
-    assert packed.gravity == again.gravity
