@@ -10,7 +10,7 @@ from types import FrameType
 
 from sitl.arguments import SitlOptions
 from sitl.events import Events, JsonEvents, TextEvents
-from sitl.link.udp_endpoint import RESEND_S, LinkError, UdpEndpoint, parse_address
+from sitl.link.udp_endpoint import RESEND_S, LinkError, PeerSocket, parse_address
 from sitl.scenario import Scenario
 from sitl.scenario_file import ScenarioError, load_scenario
 
@@ -60,7 +60,7 @@ def _run(options: SitlOptions, events: Events) -> int:
         raise CouldNotStart("--realtime flies at speed 1; --speed needs --lockstep")
     scenario = _scenario(options)
     _check_outputs(options)
-    endpoint = UdpEndpoint(parse_address(options.listen), RESEND_S)
+    endpoint = PeerSocket.bound(parse_address(options.listen, any_port=True), RESEND_S)
     try:
         host, port = endpoint.address
         sentence = f"sitl: {scenario.name}, seed {options.seed}, on udp:{host}:{port}"

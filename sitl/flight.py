@@ -17,7 +17,7 @@ from sitl.link.encode import StepEncoder
 from sitl.link.exchange import Exchange, ExchangeCounts, Lockstep, RealTime, Stop
 from sitl.link.pilot import flight_plan
 from sitl.link.server import RunTiming, fly, shut_down, wait_for_vehicle
-from sitl.link.udp_endpoint import UdpEndpoint
+from sitl.link.udp_endpoint import PeerSocket
 from sitl.result import EndKind, TruthResult
 from sitl.scenario import Scenario
 from sitl.simulation import START_US, STEP_US, Controls, Simulation
@@ -33,7 +33,7 @@ class Flight:
     """Everything of one run, ready to meet the vehicle."""
 
     def __init__(
-        self, options: SitlOptions, scenario: Scenario, endpoint: UdpEndpoint, events: Events
+        self, options: SitlOptions, scenario: Scenario, endpoint: PeerSocket, events: Events
     ) -> None:
         """Build the plant and compile it.
 

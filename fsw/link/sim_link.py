@@ -11,7 +11,7 @@ from enum import Enum
 from typing import Final, cast
 
 from fsw.link.inbox import Inbox
-from fsw.link.udp_endpoint import Address, ConnectedEndpoint
+from fsw.link.udp_endpoint import Address
 from fsw.link.wire import decode, encode_replies, message_ids
 from fsw.link.wire.decode import Numbers
 from fsw.link.wire.message_ids import AUTOPILOT, SYSTEM_ID
@@ -20,6 +20,7 @@ from fsw.ports import VehicleFacts
 from fsw.signals import CommandAck, FlightSnapshot, Mode, SensorFrame, TickOutputs
 from messages.frames import Frame, FrameWriter, split
 from messages.lockstep_codec import LockstepReader
+from messages.udp import PeerSocket
 
 PATIENCE_S: Final = 0.2  # one wait for a datagram; also the interval of announcements
 
@@ -52,7 +53,7 @@ class SimLink:
         self.pacing: Pacing | None = None  # known with the first step in lockstep
         self.shutdown = False  # the simulator has ended the run
         self.retransmissions = 0
-        self._endpoint = ConnectedEndpoint(simulator, PATIENCE_S)
+        self._endpoint = PeerSocket.connected(simulator, PATIENCE_S)
         self._inbox = inbox
         self._writer = FrameWriter(SYSTEM_ID, AUTOPILOT)
         self._thrust_scale = 1.0 / facts.rotor_thrust_max
@@ -86,9 +87,9 @@ class SimLink:
             newest = self._read(datagram) or newest
         return newest
 
-    def wait(self, seconds: float) -> bool:
+    def wait(self, wait_s: float) -> bool:
         """Wait until a datagram is there; False when the time is over."""
-        return self._endpoint.wait(seconds)
+        return self._endpoint.wait(wait_s)
 
     def queue_ack(self, ack: CommandAck) -> None:
         """Send an acknowledgement with the next answer."""

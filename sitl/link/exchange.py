@@ -10,7 +10,7 @@ from typing import Final, Protocol
 from sitl.link import decode
 from sitl.link.decode import VehicleReply
 from sitl.link.step_grid import StepGrid
-from sitl.link.udp_endpoint import RESEND_S, UdpEndpoint
+from sitl.link.udp_endpoint import RESEND_S, PeerSocket
 from sitl.simulation import Controls
 
 STALL_S: Final = 1.2  # so that 2 s after a stall both processes have ended; a pause of 1 s passes
@@ -72,7 +72,7 @@ class Lockstep:
     """Waits for the answer of every step, and repeats a step whose answer does not come."""
 
     def __init__(
-        self, endpoint: UdpEndpoint, joints: int, period_s: float | None, stop: Stop
+        self, endpoint: PeerSocket, joints: int, period_s: float | None, stop: Stop
     ) -> None:
         """Ready to start.
 
@@ -142,7 +142,7 @@ class RealTime:
 
     def __init__(
         self,
-        endpoint: UdpEndpoint,
+        endpoint: PeerSocket,
         joints: int,
         period_s: float,
         stop: Stop,

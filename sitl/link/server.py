@@ -16,7 +16,7 @@ from sitl.link.exchange import Exchange, SimulatorError, Stop
 from sitl.link.message_ids import ACCEPTED, CMD_REBOOT_SHUTDOWN
 from sitl.link.pilot import FlightPlan, PilotState
 from sitl.link.pilot_messages import Heard, PilotMessage, SendCommand
-from sitl.link.udp_endpoint import UdpEndpoint
+from sitl.link.udp_endpoint import PeerSocket
 from sitl.result import EndKind
 from sitl.sensors.suite import SensorReadings
 from sitl.simulation import Simulation
@@ -47,7 +47,7 @@ class RunTiming:
     real_time_factor: float
 
 
-def wait_for_vehicle(endpoint: UdpEndpoint, wait_s: float, stop: Stop) -> bool:
+def wait_for_vehicle(endpoint: PeerSocket, wait_s: float, stop: Stop) -> bool:
     """Serve the first sender of a valid frame; False if none came in time."""
     until_s = time.perf_counter() + wait_s
     while time.perf_counter() < until_s and not stop.requested:
@@ -107,7 +107,7 @@ def fly(
     return RunTiming(simulation.step, wall_s, simulation.time_s / max(wall_s, 1e-9))
 
 
-def shut_down(endpoint: UdpEndpoint, encoder: StepEncoder, tries: int) -> bool:
+def shut_down(endpoint: PeerSocket, encoder: StepEncoder, tries: int) -> bool:
     """Command the vehicle to shut down; True once it has acknowledged."""
     for _ in range(tries):
         endpoint.send(encoder.command(_SHUTDOWN))
