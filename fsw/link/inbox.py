@@ -39,7 +39,7 @@ Setpoint = MotionSetpoint | AttitudeSetpoint | JointSetpoint
 
 @dataclass(frozen=True, slots=True)
 class Setpoints:
-    """The newest set-points for now; at most one of motion and attitude."""
+    """The newest setpoints for now; at most one of motion and attitude."""
 
     motion: MotionSetpoint | None = None
     attitude: AttitudeSetpoint | None = None
@@ -114,7 +114,7 @@ class Inbox:
         return taken
 
     def take_setpoints(self) -> Setpoints:
-        """Hand over the newest set-points for now."""
+        """Hand over the newest setpoints for now."""
         taken, self._setpoints = self._setpoints, NO_SETPOINTS
         return taken
 
@@ -202,7 +202,7 @@ class Inbox:
     def _add(
         self, values: Numbers, target: Numbers, read: Callable[[Numbers], Setpoint | None]
     ) -> None:
-        """Keep the newest of each kind; one for somebody else is refused like a wrong one."""
+        """Keep the newest of each kind; one for another vehicle is refused like a wrong one."""
         setpoint = read(values) if decode.for_this_vehicle(*target) else None
         kept = self._setpoints
         if setpoint is None:

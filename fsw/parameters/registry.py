@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from fsw.parameters.flight_config import FlightConfig
-from fsw.parameters.real32 import nearest_decimal
+from fsw.parameters.float32 import nearest_decimal
 from fsw.tuning import number_at
 
 _DEGREE: Final = math.pi / 180.0

@@ -13,7 +13,7 @@ from fsw.geometry.geodesy import DEFAULT_ORIGIN, to_local
 from fsw.link.wire.decode_commands import command as read_command
 from fsw.mpc.planner import Planner
 from fsw.parameters.flight_config import FlightConfig, flight_config
-from fsw.ports import Planner as AnyPlanner
+from fsw.ports import PlanningCycle as AnyPlanner
 from fsw.signals import (
     ActuatorCommand,
     Command,

@@ -58,7 +58,7 @@ def test_it_starts_with_the_end_effector_on_its_reference_and_the_base_in_the_ce
         target = plant.clock.target_at(0.0).p
         np.testing.assert_allclose(end_effector, target, atol=1e-12)
         if case == "II":
-            assert plant.referee.record.minimum[0] == pytest.approx(0.075, abs=1e-9)
+            assert plant.evaluator.record.minimum[0] == pytest.approx(0.075, abs=1e-9)
             assert math.dist(base, (target[0], target[1], target[2] - 0.225)) < 1e-9
 
 

@@ -17,11 +17,11 @@ from fsw.flight.autopilot import Autopilot
 from fsw.flight.state import FlightState
 from fsw.link.inbox import Inbox
 from fsw.link.sim_link import Pacing
-from fsw.link.wire.telemetry_context import LoopHealth
 from fsw.log.block_file import BlockFile
 from fsw.log.flight_log import FlightLog
 from fsw.log.reader import LoggedTick, open_flight, ticks
 from fsw.parameters.flight_config import flight_config
+from fsw.ports import LoopHealth
 from fsw.runtime.effort import EffortRecord
 from fsw.runtime.planner_worker import PlannerRecord
 from fsw.runtime.process import StopRequest
@@ -60,7 +60,7 @@ class Sim(VirtualSensors):
         self.done.append("sensors")
         return super().newest()
 
-    def answer(self, t_us: int, outputs: TickOutputs) -> None:
+    def send_actuators(self, t_us: int, outputs: TickOutputs) -> None:
         self.done.append("actuators")
         self.answers.append((self.time.now_us, outputs))
 

@@ -70,7 +70,7 @@ def sys_status(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValue
 
 
 def battery_status(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues:
-    """BATTERY_STATUS: one pack whose cells are not told apart."""
+    """BATTERY_STATUS: one pack without voltages of its cells."""
     battery = snapshot.battery
     return (
         round(1000.0 * battery.consumed),

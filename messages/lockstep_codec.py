@@ -1,4 +1,4 @@
-"""Frames that always travel together, read and written by fixed layouts.
+"""Codec of the lockstep exchange: messages of one datagram, read and written by fixed layouts.
 
 One step of lockstep is three frames to the flight software and one back, 500 times a simulated
 second. Their first fields change with every step and the others never do, so only the first ones
@@ -20,14 +20,14 @@ _FIELD = re.compile(r"(\d*)([a-zA-Z])")
 
 
 class _Part(NamedTuple):
-    """What is known about one frame of a convoy."""
+    """Layout of one frame of the datagram."""
 
     id_bytes: bytes
     crc_extra: bytes
     first: Struct  # the fields that are read
 
 
-class ConvoyReader:
+class LockstepReader:
     """Reads datagrams that hold these messages and nothing else."""
 
     def __init__(self, *parts: tuple[int, int]) -> None:
@@ -59,7 +59,7 @@ class ConvoyReader:
         return values if at == size else None
 
 
-class ConvoyFrame:
+class LockstepFrame:
     """Writes one message whose last fields never change."""
 
     def __init__(self, writer: FrameWriter, message_id: int, *last_values: float | bytes) -> None:

@@ -6,7 +6,7 @@ import math
 
 from sitl.scenario import Lissajous, Scenario, Start
 from sitl.scenario_file import ScenarioError
-from sitl.world import POINTS
+from sitl.world import CRITICAL_POINTS
 
 FIRST_JOINT_DEG, BOTH_JOINTS_DEG = 60.0, 90.0  # the arm's limits, Table I of the paper
 MARGINS_MAX = 16  # what one BARRIER_MARGIN message carries
@@ -63,8 +63,8 @@ def _check_walls(scenario: Scenario) -> None:
                 f"walls[{i}].normal = {list(wall.normal)}: must have length 1, has {length:.6g}"
             )
     kept = len(scenario.walls) + len(scenario.obstacles)
-    if kept * len(POINTS) + (scenario.workspace is not None) > MARGINS_MAX:
-        most = MARGINS_MAX // len(POINTS)
+    if kept * len(CRITICAL_POINTS) + (scenario.workspace is not None) > MARGINS_MAX:
+        most = MARGINS_MAX // len(CRITICAL_POINTS)
         both = f"walls and obstacles = {kept}" if scenario.obstacles else f"walls = {kept}"
         raise ScenarioError(f"{both} tables: must be at most {most}")
     if scenario.obstacles and scenario.workspace is not None:

@@ -6,11 +6,11 @@ import math
 
 import numpy as np
 
-from sitl.admission import check_start
 from sitl.mission_clock import MissionClock
 from sitl.plant.vector import Array
+from sitl.result import EndKind, EndReason, MarginRecord, TrackingError, TruthResult, score
 from sitl.scenario import V3, Scenario
-from sitl.verdict import EndKind, EndReason, MarginRecord, TrackingError, TruthResult, score
+from sitl.scenario_validation import check_start
 from sitl.world import World, record_if_clear
 
 TOUCH_DOWN_MAX = 2.0  # m/s; a drop from 0.2 m
@@ -19,7 +19,7 @@ Points = tuple[V3, V3, V3]  # base, joint 2, end-effector [m, NED]
 _NO_CURVE = np.empty(0)
 
 
-class Referee:
+class FlightEvaluator:
     """The score of one run and the first reason to end it.
 
     Args:
@@ -36,7 +36,7 @@ class Referee:
         self.record = MarginRecord(self.world.keys)
         self.ended: EndReason | None = None
         self.left: str | None = None  # why the trajectory is no longer flown
-        self.silent: str | None = None  # since when nobody flew
+        self.silent: str | None = None  # since which step the flight software was silent
         self._clock = clock
         self._error = TrackingError()
         self._duration_s = scenario.duration_s

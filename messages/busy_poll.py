@@ -1,9 +1,8 @@
-"""Looking at a socket again and again before sleeping on it, for as long as that pays.
+"""Busy polling of a socket, for as long as it pays.
 
-In lockstep the other half answers within tens of microseconds, less than it takes the system to
-wake a processor. Where both halves have a processor of their own, the one that waits keeps its
-awake by looking. Where they share one, looking only keeps the other from answering: after a few
-vain looks it is left for a while.
+In lockstep the other process answers within tens of microseconds, less than the system takes to
+wake a processor. Where each process has a processor of its own, polling keeps it awake. Where they
+share one, polling only delays the answer: after a few timeouts it is switched off for a while.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ _MOST: Final = 100
 _REST: Final = 5000  # receives without a look, where looking did not pay
 
 
-class EagerReceiver:
+class BusyPollReceiver:
     """Receives from one socket, whose timeout is set in the kernel."""
 
     def __init__(self, source: socket.socket, size: int) -> None:

@@ -8,7 +8,7 @@ import time
 
 import pytest
 
-from messages.eager import EagerReceiver
+from messages.busy_poll import BusyPollReceiver
 
 PATIENCE_S = 0.02
 
@@ -23,7 +23,7 @@ def connected() -> tuple[socket.socket, socket.socket]:
 
 def test_datagrams_come_in_order_whether_looked_for_or_slept_on() -> None:
     one, other = connected()
-    receive = EagerReceiver(one, 100)
+    receive = BusyPollReceiver(one, 100)
     for number in range(50):
         other.send(bytes([number]))
     assert [receive() for _ in range(50)] == [bytes([number]) for number in range(50)]
@@ -31,7 +31,7 @@ def test_datagrams_come_in_order_whether_looked_for_or_slept_on() -> None:
 
 def test_silence_ends_with_the_sockets_patience() -> None:
     one, _other = connected()
-    receive = EagerReceiver(one, 100)
+    receive = BusyPollReceiver(one, 100)
     begin = time.perf_counter()
     with pytest.raises(BlockingIOError):
         receive()
@@ -53,7 +53,7 @@ class Slow:
 
 def test_looking_in_vain_is_given_up_for_a_while_and_tried_again() -> None:
     slow = Slow()
-    receive = EagerReceiver(slow, 100)  # type: ignore[arg-type]
+    receive = BusyPollReceiver(slow, 100)  # type: ignore[arg-type]
     looked = []
     for _ in range(5520):
         before = slow.looks
@@ -66,7 +66,7 @@ def test_looking_in_vain_is_given_up_for_a_while_and_tried_again() -> None:
 
 def test_one_late_answer_in_fifty_does_not_end_the_looking() -> None:
     one, other = connected()
-    receive = EagerReceiver(one, 100)
+    receive = BusyPollReceiver(one, 100)
     for _ in range(20):
         for _ in range(49):
             other.send(b"x")

@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from messages import dialect
-from messages.convoy import ConvoyFrame, ConvoyReader
 from messages.frames import FrameWriter, split
+from messages.lockstep_codec import LockstepFrame, LockstepReader
 from tests.messages.frame_bytes import as_pymavlink
 
 ODOMETRY, ARM, HIL_SENSOR, CONTROLS = (
@@ -20,7 +20,7 @@ ODOMETRY, ARM, HIL_SENSOR, CONTROLS = (
     dialect.MAVLINK_MSG_ID_HIL_SENSOR,
     dialect.MAVLINK_MSG_ID_HIL_ACTUATOR_CONTROLS,
 )
-STEP = ConvoyReader((ODOMETRY, 14), (ARM, 7), (HIL_SENSOR, 7))
+STEP = LockstepReader((ODOMETRY, 14), (ARM, 7), (HIL_SENSOR, 7))
 T_US = st.integers(1, 2**53)
 FLOAT = st.just(0.0) | st.floats(width=32, allow_nan=False)
 FIRST = st.tuples(*[FLOAT] * 13)
@@ -51,14 +51,14 @@ def test_a_frame_with_fixed_last_fields_is_pymavlinks(t_us, first, sequence):
     writer = FrameWriter(1, 200)
     for _ in range(sequence):
         writer.next_origin()
-    assert as_pymavlink(ConvoyFrame(writer, ODOMETRY, *ODOMETRY_TAIL)(t_us, *first), theirs)
+    assert as_pymavlink(LockstepFrame(writer, ODOMETRY, *ODOMETRY_TAIL)(t_us, *first), theirs)
 
 
 @given(T_US, st.tuples(*[FLOAT] * 6))
 def test_fixed_and_free_frames_of_a_component_count_one_sequence(t_us, first):
     tail = (*[0.0] * 7, 0x3F, 0)
     fixed_writer, writer = FrameWriter(1, 200), FrameWriter(1, 200)
-    fixed = ConvoyFrame(fixed_writer, HIL_SENSOR, *tail)
+    fixed = LockstepFrame(fixed_writer, HIL_SENSOR, *tail)
     for _ in range(3):
         assert fixed(t_us, *first) == writer.frame(HIL_SENSOR, t_us, *first, *tail)
         heartbeat = (0, 2, 12, 0, 3, 3)
@@ -67,7 +67,7 @@ def test_fixed_and_free_frames_of_a_component_count_one_sequence(t_us, first):
 
 def test_a_frame_whose_length_would_vary_is_refused():
     with pytest.raises(ValueError, match="all zero"):
-        ConvoyFrame(FrameWriter(1, 1), HIL_SENSOR, 0.0, 0, 0)
+        LockstepFrame(FrameWriter(1, 1), HIL_SENSOR, 0.0, 0, 0)
 
 
 def test_a_step_is_read_as_the_general_codec_reads_it():
@@ -83,7 +83,7 @@ def test_a_step_is_read_as_the_general_codec_reads_it():
 def test_the_answer_is_read_from_pymavlinks_bytes(t_us, controls, mode):
     sender = dialect.MAVLink(None, srcSystem=1, srcComponent=1)
     frame = sender.hil_actuator_controls_encode(t_us, controls, mode, 1).pack(sender)
-    (values,) = ConvoyReader((CONTROLS, 19)).read(frame) or [()]
+    (values,) = LockstepReader((CONTROLS, 19)).read(frame) or [()]
     assert values == (t_us, 1, *controls, mode)
 
 
@@ -118,11 +118,11 @@ def test_a_signed_frame_is_left_to_the_general_codec():
 
 def test_a_payload_shorter_than_what_is_wanted_is_left_to_the_general_codec():
     short = FrameWriter(1, 1).frame(CONTROLS, 5, 0, *[0.0] * 16, 0)
-    assert ConvoyReader((CONTROLS, 19)).read(short) is None
+    assert LockstepReader((CONTROLS, 19)).read(short) is None
     assert len(list(split(short))) == 1
 
 
 def test_a_value_that_does_not_fit_is_refused():
-    frame = ConvoyFrame(FrameWriter(1, 1), HIL_SENSOR, 0x3F, 0)
+    frame = LockstepFrame(FrameWriter(1, 1), HIL_SENSOR, 0x3F, 0)
     with pytest.raises(struct.error):
         frame(5, 1.0)
