@@ -17,7 +17,7 @@ import numpy as np
 
 from fsw.barriers.root import BarrierTuning
 from fsw.model.airframe import GRAVITY
-from fsw.model.arm_kinematics import arm_points
+from fsw.model.kinematics import arm_points
 from fsw.model.prediction import INPUTS, Q_ARM, STATES, YAW, YAW_RATE, P, V, discretise
 from fsw.mpc.planner_config import PlannerConfig
 from fsw.signals import SafeSet

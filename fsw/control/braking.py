@@ -22,6 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import solve_continuous_are
 
+from fsw.geometry.vectors import clamp_magnitude
 from fsw.model.airframe import GRAVITY
 from fsw.model.prediction import A, J, LagModel, S, V, continuous_model
 from fsw.signals import PlanInput, PredictionState, Vec2
@@ -57,7 +58,7 @@ class Brake:
     def __call__(self, x: PredictionState) -> PlanInput:
         """The input that brings a state of the plan towards rest."""
         tuning = self._tuning
-        vertical = _limited(-tuning.vertical_rate * x.v[2], tuning.vertical)
+        vertical = clamp_magnitude(-tuning.vertical_rate * x.v[2], tuning.vertical)
         kv, ka, kj, ks = self._gains
         wish_x = -(kv * x.v[0] + ka * x.a[0] + kj * x.j[0] + ks * x.s[0])
         wish_y = -(kv * x.v[1] + ka * x.a[1] + kj * x.j[1] + ks * x.s[1])
@@ -66,11 +67,13 @@ class Brake:
         scale = min(1.0, most / max(math.hypot(wish_x, wish_y), 1e-9))
         first, second = x.qd_arm
         joints: Vec2 = (
-            _limited(-tuning.joint_rate * first, tuning.joint),
-            _limited(-tuning.joint_rate * second, tuning.joint),
+            clamp_magnitude(-tuning.joint_rate * first, tuning.joint),
+            clamp_magnitude(-tuning.joint_rate * second, tuning.joint),
         )
         return PlanInput(
-            (scale * wish_x, scale * wish_y, vertical), _limited(-x.yaw_rate, tuning.yaw), joints
+            (scale * wish_x, scale * wish_y, vertical),
+            clamp_magnitude(-x.yaw_rate, tuning.yaw),
+            joints,
         )
 
 
@@ -84,7 +87,3 @@ def _gains(lag: LagModel, effort: float) -> tuple[float, float, float, float]:
     price = solve_continuous_are(a_axis, b_axis, np.diag([1.0, 0.0, 0.0, 0.0]), [[effort]])
     kv, ka, kj, ks = (b_axis.T @ price / effort)[0].tolist()
     return kv, ka, kj, ks
-
-
-def _limited(value: float, bound: float) -> float:
-    return min(max(value, -bound), bound)

@@ -17,6 +17,7 @@ from fsw.control.joints import joint_torques
 from fsw.control.pid import PidGains
 from fsw.control.tracking import Observed, TrackingLaw, follow_plan, observe
 from fsw.geometry.rotation import wrap_angle
+from fsw.geometry.vectors import clamp_magnitude
 from fsw.model.airframe import GRAVITY, Airframe
 from fsw.model.nominal import REST_INPUT, REST_STATE
 from fsw.model.prediction import LagModel
@@ -218,7 +219,7 @@ def _close_loops(
 def _yaw_correction(gains: PidGains, estimate: StateEstimate, plan: PredictionState) -> float:
     error = wrap_angle(plan.yaw - estimate.yaw)
     raw = gains.kp * error + gains.kd * (plan.yaw_rate - estimate.w_WB_B[2])
-    return min(max(raw, -gains.limit), gains.limit)
+    return clamp_magnitude(raw, gains.limit)
 
 
 @compilable

@@ -13,7 +13,7 @@ import numpy as np
 
 from fsw.compiled import compiled
 from fsw.model.airframe import Airframe
-from fsw.model.arm_kinematics import arm_points
+from fsw.model.kinematics import arm_points, links
 from fsw.model.prediction import INPUTS, Q_ARM, STATES, Array, CondensedModel
 
 BASE, JOINT2, END_EFFECTOR = 0, 1, 2
@@ -159,9 +159,9 @@ def _fill_arm_cog(
     states: Array, gamma: Array, arm1: float, arm2: float, cog: Array, d_cog: Array
 ) -> None:
     for i in range(states.shape[0]):
-        th1, th12 = states[i, Q_ARM], states[i, Q_ARM] + states[i, Q_ARM + 1]
-        cog[i] = arm1 * np.sin(th1) + arm2 * np.sin(th12)
-        c1, c12 = arm1 * np.cos(th1), arm2 * np.cos(th12)
+        th1 = states[i, Q_ARM]
+        (x1, c1), (x2, c12) = links((arm1, arm2), th1, th1 + states[i, Q_ARM + 1])
+        cog[i] = x1 + x2
         for column in range(INPUTS * i):
             d_cog[i, column] = (c1 + c12) * gamma[i, Q_ARM, column] + c12 * gamma[
                 i, Q_ARM + 1, column

@@ -13,7 +13,7 @@ from fsw.control.braking import Brake
 from fsw.control.cascade import Cascade, CascadeMemory, at_rest, in_hover
 from fsw.estimation.dead_reckoning import moved_on
 from fsw.estimation.estimator import estimate_state
-from fsw.model.arm_kinematics import point_in_flight
+from fsw.model.kinematics import point_in_flight
 from fsw.model.nominal import REST_INPUT, NominalModel
 from fsw.mpc.reference import merge
 from fsw.parameters.consistency import Finding, analyse, loop_tube, refusals, warnings

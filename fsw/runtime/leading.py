@@ -6,7 +6,7 @@ import math
 from dataclasses import replace
 
 from fsw.geometry.rotation import wrap_angle
-from fsw.model.arm_kinematics import point_in_flight
+from fsw.model.kinematics import point_in_flight
 from fsw.parameters.flight_config import FlightConfig
 from fsw.signals import EndEffectorTarget, SafeSet, StateEstimate, Vec2, Vec3
 from fsw.vehicle.steering import Aim, Lead, keep_out, keep_up, move, tie

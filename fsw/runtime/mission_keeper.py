@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from fsw.model.arm_kinematics import point_in_flight
+from fsw.model.kinematics import point_in_flight
 from fsw.parameters.flight_config import FlightConfig
 from fsw.runtime.flight_state import FlightState, MissionMemory
 from fsw.signals import (

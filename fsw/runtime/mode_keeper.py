@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from fsw.control.cascade import at_rest, in_hover
-from fsw.model.arm_kinematics import point_in_flight
+from fsw.model.kinematics import point_in_flight
 from fsw.mpc.reference import still_at
 from fsw.parameters.flight_config import FlightConfig
 from fsw.runtime.flight_state import FlightState, PlanMemory

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from fsw.model.airframe import AIRFRAME
-from fsw.model.arm_kinematics import arm_points
+from fsw.model.kinematics import arm_points
 from fsw.model.prediction import LagModel, discretise, to_vector
 from fsw.signals import PlanInput
 from sitl.scenario import Uniform, Wind

@@ -12,7 +12,7 @@ from typing import Final
 from fsw.link.wire.encode_setpoints import as_asked
 from fsw.link.wire.outgoing import WireValues
 from fsw.link.wire.telemetry_context import GroupTiming, TelemetryContext
-from fsw.model.arm_kinematics import point_in_flight
+from fsw.model.kinematics import point_in_flight
 from fsw.signals import FlightSnapshot, SetpointKind, Vec2, Vec4
 
 _LOCAL_NED: Final = 1  # MAV_FRAME

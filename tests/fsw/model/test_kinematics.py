@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from fsw.model.airframe import AIRFRAME
-from fsw.model.arm_kinematics import arm_points, point_in_flight
+from fsw.model.kinematics import arm_points, point_in_flight
 from fsw.model.linearisation import Linearisation
 from fsw.model.prediction import INPUTS, Q_ARM, STATES, Array, LagModel, condense
 from fsw.signals import StateEstimate, Vec2
