@@ -20,7 +20,6 @@ from fsw.geometry.rotation import wrap_angle
 from fsw.geometry.vectors import clamp_magnitude
 from fsw.model.airframe import GRAVITY, Airframe
 from fsw.model.nominal import REST_INPUT, REST_STATE
-from fsw.model.prediction import LagModel
 from fsw.model.rotors import MotionState, lag_rotors, motion_state, rotor_decay, weigh
 from fsw.signals import (
     STOPPED,
@@ -88,14 +87,11 @@ class CascadeLaw:
 class Cascade:
     """The inner loops of one configuration; laws are pure, memory goes in and comes out."""
 
-    def __init__(
-        self, airframe: Airframe, lag: LagModel, tuning: InnerTuning, inner: Inner, dt: float
-    ) -> None:
+    def __init__(self, airframe: Airframe, tuning: InnerTuning, inner: Inner, dt: float) -> None:
         """Choose the inner loop and design its gains, before flight.
 
         Args:
             airframe: The vehicle.
-            lag: Attitude model of the plan.
             tuning: Gains of every loop.
             inner: ``tracking`` follows the plan's state, ``pid`` only its acceleration.
             dt: Tick length [s].
@@ -104,7 +100,7 @@ class Cascade:
         self.law = CascadeLaw(
             airframe,
             tuning,
-            TrackingLaw(airframe, lag, tuning.tracking, gains),
+            TrackingLaw(airframe.attitude_lag, tuning.tracking, gains),
             inner == "tracking",
             rotor_decay(airframe, dt),
             dt,

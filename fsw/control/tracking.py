@@ -25,8 +25,7 @@ from typing import NamedTuple
 from fsw.compiled import compilable
 from fsw.control.inner_tuning import TrackingGains, TrackingTuning
 from fsw.geometry.vectors import clamp_magnitude
-from fsw.model.airframe import GRAVITY, Airframe
-from fsw.model.prediction import LagModel
+from fsw.model.airframe import GRAVITY, AttitudeLag
 from fsw.model.rotors import MotionState
 from fsw.signals import PlanInput, PredictionState, StateEstimate, Vec2, Vec3
 
@@ -37,8 +36,7 @@ _LEAST_SPECIFIC_THRUST = 2.0  # m/s^2; below it tilt hardly accelerates the vehi
 class TrackingLaw:
     """Everything the law needs that does not change in flight."""
 
-    airframe: Airframe
-    lag: LagModel
+    lag: AttitudeLag
     tuning: TrackingTuning
     gains: TrackingGains
 
@@ -131,7 +129,7 @@ def follow_plan(
     """Angular acceleration about body x and y [rad/s^2] and total thrust [N].
 
     Args:
-        law: Airframe, lag and gains.
+        law: Lag of the attitude, tuning and gains.
         mass: Of the whole vehicle, as weighed in flight [kg].
         estimate: The vehicle now.
         motion: Its acceleration, jerk and snap.

@@ -12,7 +12,6 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fsw.compiled import compiled
-from fsw.model.airframe import Airframe
 from fsw.model.kinematics import arm_points, links
 from fsw.model.prediction import INPUTS, Q_ARM, STATES, Array, CondensedModel
 
@@ -63,14 +62,14 @@ class Linearisation:
         for name, shape in shapes.items():
             object.__setattr__(self, name, np.zeros(shape))
 
-    def refill(self, airframe: Airframe, start: Array, inputs: Array) -> None:
+    def refill(self, start: Array, inputs: Array) -> None:
         """Linearise around ``inputs``.
 
         Args:
-            airframe: Link geometry and masses.
             start: Prediction state at node 0, (19,).
             inputs: Guess of all inputs, (6 n,).
         """
+        airframe = self.model.airframe
         np.matmul(self.model.phi, start, out=self.states)
         np.add(self.states, self.model.gamma @ inputs, out=self.states)
         _fill_points(

@@ -18,10 +18,9 @@ class Problem:
     """Costs, barrier and limits of one safe set in one program."""
 
     def __init__(self, config: PlannerConfig, model: CondensedModel, safe_set: SafeSet) -> None:
-        self._config = config
         self._horizon = Linearisation(model)
-        self._limits = JointLimits(config.airframe, model)
-        parts = parts_of(config, safe_set)
+        self._limits = JointLimits(model)
+        parts = parts_of(config, model, safe_set)
         self._costs, self._barriers = parts.costs, parts.barriers
         blocks: list[tuple[SoftRows, float | None]] = [(self._limits.rows, config.joint_slack)]
         blocks += [(barrier.rows, parts.slack) for barrier in parts.barriers]
@@ -38,7 +37,7 @@ class Problem:
     def linearise(self, start: Array, guess: Array, targets: TargetPoints) -> None:
         """Refill the program around a guess of the inputs (6 n,) from a start (19,)."""
         program = self._program
-        self._horizon.refill(self._config.airframe, start, guess)
+        self._horizon.refill(start, guess)
         program.hessian[:] = 0.0
         program.linear[:] = 0.0
         self.cost = sum(

@@ -84,10 +84,9 @@ class FlightLoop:
     def __init__(self, config: FlightConfig) -> None:
         self.config = config
         dt = config.tick_period_us * 1e-6
-        lag = config.planner.lag
-        self._model = NominalModel(lag, dt)
-        self._brake = Brake(lag, config.planner.limits.tilt)
-        self._cascade = Cascade(config.airframe, lag, config.tuning, config.inner, dt)
+        self._model = NominalModel(config.airframe, dt)
+        self._brake = Brake(config.airframe, config.planner.limits.tilt)
+        self._cascade = Cascade(config.airframe, config.tuning, config.inner, dt)
         self._modes = ModeKeeper(config)
         self._steering = SteeringKeeper(config)
         self._loop_tube = loop_tube(config)

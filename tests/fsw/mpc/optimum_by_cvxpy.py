@@ -15,10 +15,13 @@ import cvxpy as cp
 import numpy as np
 
 from fsw.barriers.root import BarrierTuning
+from fsw.model.airframe import AIRFRAME
 from fsw.model.linearisation import BASE, END_EFFECTOR, Linearisation
 from fsw.model.prediction import INPUTS, Array
 from fsw.mpc.planner_config import PlannerConfig
 from fsw.signals import PointObstacle, SafeSet, Wall, WorkspaceSphere
+
+_PERIOD = 0.1  # s
 
 
 @dataclass(frozen=True)
@@ -94,8 +97,8 @@ def optimum(question: Question, config: PlannerConfig) -> Optimum:
     for node in range(1, n + 1):
         th1, th2 = linear.angles(node)[0], linear.angles(node)[1]
         constraints += [
-            cp.abs(th1) <= config.airframe.joint1_limit + joint_slack[node - 1],
-            cp.abs(th1 + th2) <= config.airframe.joint12_limit + joint_slack[node - 1],
+            cp.abs(th1) <= AIRFRAME.joint1_limit + joint_slack[node - 1],
+            cp.abs(th1 + th2) <= AIRFRAME.joint12_limit + joint_slack[node - 1],
         ]
     problem = cp.Problem(
         cp.Minimize(
@@ -244,7 +247,7 @@ def _barrier(
 
 
 def _required(h_start: float, node: int, tuning: BarrierTuning) -> float:
-    decay = (1.0 - tuning.gamma * tuning.period) ** node
+    decay = (1.0 - tuning.gamma * _PERIOD) ** node
     return decay * h_start + (1.0 - decay) * tuning.robustness
 
 
