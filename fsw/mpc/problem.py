@@ -5,6 +5,7 @@ from __future__ import annotations
 from fsw.barriers.soft_rows import SoftRows, TargetPoints
 from fsw.model.linearisation import Linearisation
 from fsw.model.prediction import Array, CondensedModel
+from fsw.mpc.costs import Quadratic
 from fsw.mpc.dual_solver import DualSolver
 from fsw.mpc.limits import JointLimits
 from fsw.mpc.planner_config import PlannerConfig
@@ -40,9 +41,9 @@ class Problem:
         self._horizon.refill(start, guess)
         program.hessian[:] = 0.0
         program.linear[:] = 0.0
+        quadratic = Quadratic(guess, program.hessian, program.linear)
         self.cost = sum(
-            cost.add(self._horizon, targets, guess, program.hessian, program.linear)
-            for cost in self._costs
+            cost.add(self._horizon, targets, quadratic) for cost in self._costs
         )
         self._limits.refill(self._horizon)
         for barrier in self._barriers:

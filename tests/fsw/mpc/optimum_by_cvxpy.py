@@ -60,8 +60,8 @@ class _Linear:
         horizon = self._horizon
         return horizon.velocity[node, point] + horizon.d_velocity[node, point] @ self._change
 
-    def arm_cog(self, node: int) -> Any:
-        return self._horizon.arm_cog[node] + self._horizon.d_arm_cog[node] @ self._change
+    def arm_com(self, node: int) -> Any:
+        return self._horizon.arm_com[node] + self._horizon.d_arm_com[node] @ self._change
 
     def yaw(self, node: int) -> Any:
         return self._horizon.states[node, 13] + self._horizon.model.gamma[node, 13] @ self._change
@@ -139,7 +139,7 @@ def _cost(question: Question, linear: _Linear, U: cp.Variable, config: PlannerCo
         total += weights.yaw * cp.square(
             linear.yaw(node) + weights.yaw_lead * linear.yaw_rate(node) - question.target_yaw[node]
         )
-        total += (5.0 if last else 1.0) * cp.square(linear.arm_cog(node))
+        total += (5.0 if last else 1.0) * cp.square(linear.arm_com(node))
     return total
 
 
