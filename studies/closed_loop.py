@@ -101,7 +101,7 @@ class _Flight:
         self._config = config
         self._loop = Autopilot(config)
         self._state = FlightState()
-        self._planner = Planner(config.planner, processor_time_us)
+        self._planner = Planner(config.planner, config.airframe, processor_time_us)
         self._answer: _Answer | None = None
         self._steps_per_plan = config.mpc_period_us // config.tick_period_us
         self._traced = traced

@@ -161,12 +161,12 @@ def fly(
     Args:
         scenario: With a trajectory that starts in the air.
         seed: Of every random number of the plant.
-        config: Its planner is flown; give it ``LagModel(at_once=True)``.
+        config: Its planner is flown; give it ``AttitudeLag(at_once=True)``.
         traced: Keep the truth for figures.
     """
     plant = DoubleIntegrator(scenario, seed)
-    planner = Planner(config.planner, processor_time_us)
-    brake = Brake(config.planner.lag, config.planner.limits.tilt)
+    planner = Planner(config.planner, config.airframe, processor_time_us)
+    brake = Brake(config.airframe, config.planner.limits.tilt)
     recorder = FlightRecorder()
     held, running = safe_set(scenario), None
     steps = config.mpc_period_us // STEP_US

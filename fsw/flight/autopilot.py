@@ -70,9 +70,7 @@ class Autopilot:
         self._commander = Commander(config)
         self._horizon = ReferenceHorizon(config)
         self._plans = PlanExchange(config)
-        self._cascade = Cascade(
-            config.airframe, config.planner.lag, config.tuning, config.inner, tick
-        )
+        self._cascade = Cascade(config.airframe, config.tuning, config.inner, tick)
         self._ticks_per_plan = config.mpc_period_us // config.tick_period_us
 
     def warm_up(self) -> None:

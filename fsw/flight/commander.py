@@ -23,7 +23,7 @@ from fsw.flight.modes.offboard import is_fresh
 from fsw.flight.plan_exchange import nominal_at_rest
 from fsw.flight.setpoint_generator import PositionGoal, SetpointGenerator
 from fsw.flight.state import FlightState, PlanMemory, SetpointMemory
-from fsw.model.arm_kinematics import point_in_flight
+from fsw.model.kinematics import point_in_flight
 from fsw.mpc.reference import still_at
 from fsw.parameters.flight_config import FlightConfig
 from fsw.signals import (

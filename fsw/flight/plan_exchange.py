@@ -146,10 +146,9 @@ class PlanExchange:
     """Requests to the planner and its answers, for one configuration."""
 
     def __init__(self, config: FlightConfig) -> None:
-        lag = config.planner.lag
         self._config = config
-        self._model = NominalModel(lag, config.tick_period_us * 1e-6)
-        self._brake = Brake(lag, config.planner.limits.tilt)
+        self._model = NominalModel(config.airframe, config.tick_period_us * 1e-6)
+        self._brake = Brake(config.airframe, config.planner.limits.tilt)
 
     def follow(
         self,

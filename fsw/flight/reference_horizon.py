@@ -10,7 +10,7 @@ from fsw.flight.modes.base import FlightMode
 from fsw.flight.reference_governor import ReferenceGovernor
 from fsw.flight.setpoint_generator import PositionGoal, ReferenceState, arrived
 from fsw.flight.state import FlightState, SetpointMemory
-from fsw.model.arm_kinematics import point_in_flight
+from fsw.model.kinematics import point_in_flight
 from fsw.parameters.flight_config import FlightConfig
 from fsw.signals import EndEffectorTarget, MotionSetpoint, StateEstimate, Vec2
 

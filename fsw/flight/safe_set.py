@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from fsw.barriers.margins import constraint_report
 from fsw.flight.state import MissionMemory
-from fsw.model.arm_kinematics import point_in_flight
+from fsw.model.kinematics import point_in_flight
 from fsw.parameters.consistency import Finding, analyse, loop_tube, refusals, warnings
 from fsw.parameters.flight_config import FlightConfig
 from fsw.signals import (

@@ -20,7 +20,7 @@ from fsw.flight.orbit_path import looking_at, on_orbit
 from fsw.flight.reference_governor import SETTLE_RATE, ReferenceGovernor
 from fsw.geometry.rotation import wrap_angle
 from fsw.geometry.vectors import add_scaled, clamp_magnitude, limit_norm, norm, subtract
-from fsw.model.arm_kinematics import point_in_flight
+from fsw.model.kinematics import point_in_flight
 from fsw.parameters.flight_config import FlightConfig, SetpointLimits
 from fsw.signals import (
     EndEffectorTarget,

@@ -16,7 +16,7 @@ from typing import Any, Final
 from fsw.geometry.rotation import quaternion_from_matrix
 from fsw.log import topics
 from fsw.log.json_codec import JsonCodec
-from fsw.model.arm_kinematics import point_in_flight
+from fsw.model.kinematics import point_in_flight
 from fsw.signals import (
     CommandRequest,
     FlightSnapshot,

@@ -11,6 +11,7 @@ from fsw.model.airframe import AIRFRAME, Airframe
 from fsw.model.battery import BatteryModel
 from fsw.mpc.planner_config import PlannerConfig, Solver
 from fsw.mpc.variants import VARIANTS
+from fsw.periods import TICK_US
 from fsw.signals import Origin
 
 CONTROLLERS = tuple(VARIANTS)
@@ -77,11 +78,7 @@ class Surroundings:
 
 @dataclass(frozen=True, slots=True)
 class FlightConfig:
-    """One configuration of the whole flight software.
-
-    The planner's airframe and its rotors' lag are this airframe's, whatever it is given: what
-    describes the vehicle is written once.
-    """
+    """One configuration of the whole flight software."""
 
     controller: str = "blf"
     inner: Inner = "tracking"
@@ -94,8 +91,7 @@ class FlightConfig:
     battery: BatteryModel = field(default_factory=BatteryModel)
     origin: Origin = DEFAULT_ORIGIN
     soft: bool = False  # fly an inconsistent configuration all the same, with a warning
-    tick_period_us: int = 2_000
-    mpc_period_us: int = 100_000
+    tick_period_us: int = TICK_US
     # 20 ms between question and answer: 20 times the planner's median, and a fixed number of
     # ticks, so that a slow machine flies exactly like a fast one. A plan that starts from the
     # nominal state loses nothing by waiting.
@@ -107,11 +103,10 @@ class FlightConfig:
     upset_distance: float = 0.15  # m
     upset_yaw: float = 0.35  # rad
 
-    def __post_init__(self) -> None:
-        """Hand the airframe down to the planner."""
-        lag = replace(self.planner.lag, rotor_lag=self.airframe.rotor_lag)
-        planner = replace(self.planner, airframe=self.airframe, lag=lag)
-        object.__setattr__(self, "planner", planner)
+    @property
+    def mpc_period_us(self) -> int:
+        """Of the planner."""
+        return self.planner.period_us
 
 
 # lambda of eq 25 [m/s]. The paper's two contradict its own sphere and tilt limits and fly only

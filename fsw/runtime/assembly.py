@@ -40,7 +40,7 @@ def flight_software(
         soft=choice.soft,
     )
     config = replace(config, origin=origin)
-    planner = Planner(config.planner, clock.stopwatch_us)
+    planner = Planner(config.planner, config.airframe, clock.stopwatch_us)
     flight = TunedAutopilot(config)
     if to_plan:
         planner.warm_up()

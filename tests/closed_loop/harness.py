@@ -58,7 +58,7 @@ def on_the_ground() -> Scenario:
 
 
 def real_planner(config: FlightConfig) -> Planner:
-    return Planner(config.planner, stopwatch_us=lambda: 0.0)
+    return Planner(config.planner, config.airframe, stopwatch_us=lambda: 0.0)
 
 
 def on_time(_plan_id: int) -> int:

@@ -44,7 +44,7 @@ def target(t_us: int) -> EndEffectorTarget:
 def fly(lost: set[int], ticks: int) -> tuple[FlightState, list[PlanRequest]]:
     """Ticks of a loop that never hears the lost ones; plans arrive when they are due."""
     loop, state = Autopilot(CONFIG), FlightState()
-    planner = Planner(CONFIG.planner, lambda: 0.0)
+    planner = Planner(CONFIG.planner, CONFIG.airframe, lambda: 0.0)
     waiting: Plan | None = None
     asked = []
     for k in range(ticks):
@@ -98,7 +98,7 @@ def test_a_lost_planning_tick_is_planned_on_the_next_and_the_grid_stays() -> Non
 
 def test_without_loss_every_step_is_one_step_of_the_model() -> None:
     state, asked = fly(set(), CONFIG.plan_delay_ticks + 4)
-    model = NominalModel(CONFIG.planner.lag, CONFIG.tick_period_us * 1e-6)
+    model = NominalModel(CONFIG.airframe, CONFIG.tick_period_us * 1e-6)
     plan = state.plan.running
     assert plan is not None
     assert len(asked) == 1

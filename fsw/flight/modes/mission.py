@@ -18,7 +18,7 @@ from fsw.flight.modes.base import (
 from fsw.flight.reference_governor import project
 from fsw.flight.state import FlightState, SetpointMemory
 from fsw.flight.trajectory_segment import MotionLimits
-from fsw.model.arm_kinematics import point_in_flight
+from fsw.model.kinematics import point_in_flight
 from fsw.mpc.reference import still_at
 from fsw.parameters.flight_config import FlightConfig
 from fsw.signals import (

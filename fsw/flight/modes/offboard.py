@@ -100,9 +100,9 @@ class Offboard(FlightMode):
             return MotionSetpoint(False, v=(0.0, 0.0, 0.0)), ahead
         if memory.attitude is not None:
             last = ahead if state.setpoint.reference is None else memory.tilt
-            airframe = config.airframe
-            tilt = tilted(memory.attitude, last, airframe.tilt_limit, config.planner.period)
-            thrust = 4.0 * airframe.rotor_thrust_max * memory.attitude.thrust
+            tilt_limit = config.planner.limits.tilt
+            tilt = tilted(memory.attitude, last, tilt_limit, config.planner.period)
+            thrust = 4.0 * config.airframe.rotor_thrust_max * memory.attitude.thrust
             return as_motion(tilt, thrust / state.cascade.mass), tilt
         assert memory.motion is not None, "one of the two is young"
         return _moved_on(memory.motion, estimate.t_us - memory.motion_us), ahead

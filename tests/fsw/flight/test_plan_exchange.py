@@ -21,7 +21,6 @@ from fsw.flight.plan_exchange import (
 from fsw.flight.state import PlanMemory
 from fsw.model.airframe import AIRFRAME
 from fsw.model.nominal import NominalModel
-from fsw.model.prediction import LagModel
 from fsw.model.rotors import MotionState, motion_state
 from fsw.mpc.program import InputLimits
 from fsw.parameters.flight_config import flight_config
@@ -38,8 +37,8 @@ from tests.fsw.random_states import estimate_of, random_estimate
 
 PERIOD_US, TICK_US, START_US = 100_000, 2_000, 1_000_000
 NO_TIME = PlanTimings(0.0, 0.0, 0.0)
-MODEL = NominalModel(LagModel(), 1e-6 * TICK_US)
-BRAKE = Brake(LagModel(), InputLimits().tilt)
+MODEL = NominalModel(AIRFRAME, 1e-6 * TICK_US)
+BRAKE = Brake(AIRFRAME, InputLimits().tilt)
 STILL: Vec3 = (0.0, 0.0, 0.0)
 
 

@@ -1,19 +1,22 @@
-"""Where the arm's points are, in flight (plain floats) and along the horizon (compiled).
+"""Forward kinematics of the arm: every place where angles become positions.
 
-In flight the attitude is measured. Along the horizon it follows from the planned
-acceleration: thrust points along ``g - a`` and the body's x axis keeps the planned yaw, so
-the plan sees how tilting swings the end-effector.
+The arm moves in the x-z plane of the body: th1 counts from straight down (body z), th2 is relative
+to link 1. In flight the attitude is measured (``point_in_flight``). Along the horizon it follows
+from the planned acceleration: thrust points along ``g - a`` and the body's x axis keeps the planned
+yaw, so the plan includes how tilting swings the end-effector (``arm_points``).
 """
 
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fsw.compiled import compiled
+from fsw.compiled import compilable, compiled
 from fsw.geometry.rotation import rotate
+from fsw.geometry.vectors import add_scaled
 from fsw.model.airframe import GRAVITY
 from fsw.model.prediction import Q_ARM, QD_ARM, YAW, YAW_RATE, A, J, P, V
 from fsw.signals import StateEstimate, Vec2, Vec3
@@ -21,13 +24,51 @@ from fsw.signals import StateEstimate, Vec2, Vec3
 JOINT2, END_EFFECTOR = 0, 1  # rows of arm_points
 
 
-def _in_body(lengths: Vec2, q_arm: Vec2, qd_arm: Vec2) -> tuple[Vec3, Vec3]:
-    """Position and velocity of the tip of links of these lengths in the body frame."""
+@compilable
+def _link(length: Any, sine: Any, cosine: Any, rate: Any) -> Any:
+    """One link in the arm's plane: forward, down [m] and their rates [m/s].
+
+    The angle enters by its sine and cosine, so that the numbers may be real, complex (the
+    derivatives of the horizon) or symbolic (a study's reference).
+    """
+    x, z = length * sine, length * cosine
+    return x, z, z * rate, -x * rate
+
+
+@compilable
+def links(lengths: Vec2, th1: float, th12: float) -> tuple[Vec2, Vec2]:
+    """Both links as vectors (forward, down) in the body's x-z plane [m].
+
+    Args:
+        lengths: Of the links [m].
+        th1: Angle of link 1 from straight down [rad].
+        th12: Angle of link 2 from straight down [rad].
+    """
+    x1, z1, _, _ = _link(lengths[0], math.sin(th1), math.cos(th1), 0.0)
+    x2, z2, _, _ = _link(lengths[1], math.sin(th12), math.cos(th12), 0.0)
+    return (x1, z1), (x2, z2)
+
+
+def end_effector_when_level(lengths: Vec2, q_arm: Vec2, yaw: float) -> Vec3:
+    """From the body origin to the end-effector of a level vehicle [m, NED].
+
+    Args:
+        lengths: Of the links [m].
+        q_arm: Joint angles [rad].
+        yaw: Of the body [rad].
+    """
+    (x1, z1), (x2, z2) = links(lengths, q_arm[0], q_arm[0] + q_arm[1])
+    ahead = x1 + x2
+    return ahead * math.cos(yaw), ahead * math.sin(yaw), z1 + z2
+
+
+def _tip_in_body(lengths: Vec2, q_arm: Vec2, qd_arm: Vec2) -> tuple[Vec3, Vec3]:
+    """Position [m] and velocity [m/s] of the tip of links of these lengths in the body frame."""
     th1, th12 = q_arm[0], q_arm[0] + q_arm[1]
-    w1, w12 = qd_arm[0], qd_arm[0] + qd_arm[1]
-    x1, z1 = lengths[0] * math.sin(th1), lengths[0] * math.cos(th1)
-    x2, z2 = lengths[1] * math.sin(th12), lengths[1] * math.cos(th12)
-    return (x1 + x2, 0.0, z1 + z2), (z1 * w1 + z2 * w12, 0.0, -x1 * w1 - x2 * w12)
+    x1, z1, vx1, vz1 = _link(lengths[0], math.sin(th1), math.cos(th1), qd_arm[0])
+    w12 = qd_arm[0] + qd_arm[1]
+    x2, z2, vx2, vz2 = _link(lengths[1], math.sin(th12), math.cos(th12), w12)
+    return (x1 + x2, 0.0, z1 + z2), (vx1 + vx2, 0.0, vz1 + vz2)
 
 
 def point_in_flight(estimate: StateEstimate, lengths: Vec2) -> tuple[Vec3, Vec3]:
@@ -40,16 +81,11 @@ def point_in_flight(estimate: StateEstimate, lengths: Vec2) -> tuple[Vec3, Vec3]
     Returns:
         p_WE [m] and v_WE [m/s], each (3,).
     """
-    r, rd = _in_body(lengths, estimate.q_arm, estimate.qd_arm)
+    r, rd = _tip_in_body(lengths, estimate.q_arm, estimate.qd_arm)
     wx, wy, wz = estimate.w_WB_B
     turning = (rd[0] + wy * r[2] - wz * r[1], wz * r[0] - wx * r[2], rd[2] + wx * r[1] - wy * r[0])
-    offset = rotate(estimate.R_WB, r)
-    velocity = rotate(estimate.R_WB, turning)
-    p, v = estimate.p_WB, estimate.v_WB
-    return (
-        (p[0] + offset[0], p[1] + offset[1], p[2] + offset[2]),
-        (v[0] + velocity[0], v[1] + velocity[1], v[2] + velocity[2]),
-    )
+    offset, velocity = rotate(estimate.R_WB, r), rotate(estimate.R_WB, turning)
+    return add_scaled(estimate.p_WB, offset, 1.0), add_scaled(estimate.v_WB, velocity, 1.0)
 
 
 @compiled
@@ -88,12 +124,11 @@ def arm_points(x: NDArray[np.generic], l1: float, l2: float, out: NDArray[np.gen
 
     th1, th12 = x[Q_ARM], x[Q_ARM] + x[Q_ARM + 1]
     w1, w12 = x[QD_ARM], x[QD_ARM] + x[QD_ARM + 1]
-    rx, rz = l1 * np.sin(th1), l1 * np.cos(th1)
-    vx, vz = rz * w1, -rx * w1
+    rx, rz, vx, vz = _link(l1, np.sin(th1), np.cos(th1), w1)
     for point in range(2):
         if point == 1:
-            tx, tz = l2 * np.sin(th12), l2 * np.cos(th12)
-            rx, rz, vx, vz = rx + tx, rz + tz, vx + tz * w12, vz - tx * w12
+            tx, tz, ux, uz = _link(l2, np.sin(th12), np.cos(th12), w12)
+            rx, rz, vx, vz = rx + tx, rz + tz, vx + ux, vz + uz
         out[point, 0, 0] = x[P] + rx * b1x + rz * b3x
         out[point, 0, 1] = x[P + 1] + rx * b1y + rz * b3y
         out[point, 0, 2] = x[P + 2] + rx * b1z + rz * b3z

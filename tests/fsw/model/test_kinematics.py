@@ -8,9 +8,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from fsw.model.airframe import AIRFRAME
-from fsw.model.arm_kinematics import arm_points, point_in_flight
+from fsw.model.kinematics import arm_points, end_effector_when_level, point_in_flight
 from fsw.model.linearisation import Linearisation
-from fsw.model.prediction import INPUTS, Q_ARM, STATES, Array, LagModel, condense
+from fsw.model.prediction import INPUTS, Q_ARM, STATES, Array, condense
 from fsw.signals import StateEstimate, Vec2
 from tests.fsw.model.geometry_by_rotation import moved_on, tips, tips_of_prediction
 from tests.fsw.random_states import estimate_of, prediction_vector, random_estimate
@@ -97,7 +97,7 @@ def test_first_joint_turns_the_hanging_arm_forward() -> None:
 
 def test_centre_of_gravity_is_the_mass_weighted_mean_of_the_links() -> None:
     random = np.random.default_rng(5)
-    horizon = Linearisation(condense(LagModel(), 0.1, 1))
+    horizon = Linearisation(condense(AIRFRAME, 0.1, 1))
     m1, m2 = AIRFRAME.link_mass
     for _ in range(20):
         q1, q2 = (float(q) for q in random.uniform(-1.5, 1.5, 2))
@@ -107,5 +107,16 @@ def test_centre_of_gravity_is_the_mass_weighted_mean_of_the_links() -> None:
         mean = (m1 * com1 + m2 * com2) / (m1 + m2)
         start = np.zeros(STATES)
         start[Q_ARM : Q_ARM + 2] = q1, q2
-        horizon.refill(AIRFRAME, start, np.zeros(INPUTS))
-        assert math.isclose(float(horizon.arm_cog[0]), mean, abs_tol=1e-12)
+        horizon.refill(start, np.zeros(INPUTS))
+        assert math.isclose(float(horizon.arm_com[0]), mean, abs_tol=1e-12)
+
+
+def test_a_level_vehicle_has_its_end_effector_where_the_chained_rotations_put_it() -> None:
+    random = np.random.default_rng(12)
+    for _ in range(50):
+        yaw, th1, th2 = random.uniform((-3.0, -1.0, -1.5), (3.0, 1.0, 1.5)).tolist()
+        level = Rotation.from_euler("z", yaw)
+        expected = tips(np.zeros(3), level, np.array((th1, th2)), LENGTHS)[1]
+        np.testing.assert_allclose(
+            end_effector_when_level((0.15, 0.12), (th1, th2), yaw), expected, atol=1e-12
+        )
