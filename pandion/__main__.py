@@ -22,7 +22,6 @@ verbs:
   fsw         run the flight software alone
   reproduce   fly a table or a figure of the paper again
   param       list, set, import and export the parameters of a vehicle or a file
-  bench       time the optimiser, the loop, the lockstep, a flood, a log download
   dialect     teach MAVProxy, Wireshark and others the private messages
   replay      feed a flight log through the flight software again and compare
   export      write a flight log as CSV or MCAP
@@ -111,7 +110,7 @@ VERBS: Final[dict[str, Callable[[list[str]], int]]] = {
     "sitl": _sitl,
     "fsw": _fsw,
     "reproduce": _verb("reproduce"),
-    "bench": _verb("bench.mpc"),
+    "bench": _verb("moved_bench"),
     "param": _verb("param"),
     "dialect": _verb("dialect"),
     "replay": _verb("replay"),

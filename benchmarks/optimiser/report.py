@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from studies.bench_mpc import Samples
+from benchmarks.optimiser.measurement import Samples
 
 OURS = ("clarabel", 2)  # as it flies
 # Least factors at n = 5 and n = 10 by which the others should be slower.

@@ -8,16 +8,16 @@ from typing import Protocol
 
 import numpy as np
 
+from benchmarks.optimiser.answer import Answer, stopwatch_us, timed
+from benchmarks.optimiser.casadi_method import SOLVERS, CasadiMethod, installed
+from benchmarks.optimiser.instances import Instance
+from benchmarks.optimiser.price import target_points
 from fsw.model.prediction import INPUTS, Array, condense, to_vector
 from fsw.mpc.planner import Planner
 from fsw.mpc.planner_config import PlannerConfig, Solver
 from fsw.mpc.problem import Problem
 from fsw.mpc.slsqp_solver import Gradients, SlsqpSolver
 from fsw.signals import Plan, SafeSet
-from studies.bench_answer import Answer, stopwatch_us, timed
-from studies.bench_casadi import SOLVERS, CasadiMethod, installed
-from studies.bench_instances import Instance
-from studies.bench_price import target_points
 
 _ITERATIONS = (1, 2, 3)
 

@@ -1,4 +1,4 @@
-"""``pandion bench download``: fetch a flight log in real time, and judge how fast it came."""
+"""``python -m benchmarks download``: fetch a flight log in real time and judge the speed."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from pandion.bench.download_client import DownloadClient, NothingCame
+from benchmarks.download_client import DownloadClient, NothingCame
 from pandion.display import Display
 from pandion.output import add_json_option, console_beside, write_text
 from pandion.parser import Parser
@@ -68,7 +68,9 @@ class Downloads:
 
 def main(argv: list[str]) -> int:
     """Measure and judge; returns the exit code."""
-    parser = Parser("pandion bench download", "Fetch a flight log in real time, by LOG_* and FTP.")
+    parser = Parser(
+        "python -m benchmarks download", "Fetch a flight log in real time, by LOG_* and FTP."
+    )
     add_json_option(parser, "the figures")
     parser.add_argument(
         "--size", metavar="MB", type=_size, default=20.0, help="of the log (default 20)"
@@ -79,7 +81,7 @@ def main(argv: list[str]) -> int:
     try:
         fetched = fly(int(options.size * _MB), Display(console))
     except (HalfFailed, NothingCame) as error:
-        print(f"pandion bench download: {error}", file=sys.stderr)
+        print(f"python -m benchmarks download: {error}", file=sys.stderr)
         return error.exit_code if isinstance(error, HalfFailed) else NOT_PASSED
     for each in fetched.downloads:
         said = "identical" if each.identical else "NOT identical"

@@ -1,4 +1,4 @@
-"""``pandion bench lockstep``: how fast a whole flight is, and where its time goes.
+"""``python -m benchmarks lockstep``: how fast a whole flight is, and where its time goes.
 
 Everything is on: both halves as processes, telemetry, logs, the MPC. The peer is the same loop with
 pymavlink's own packing of the lockstep frames; the two take turns: a busy machine slows both.
@@ -26,7 +26,7 @@ from pandion.version import version
 
 DONE, SLOW = 0, 1  # exit codes
 WANTED: Final = 25.0  # times real time, at 500 Hz
-PEER: Final = "pandion.bench.pymavlink_half"
+PEER: Final = "benchmarks.pymavlink_process"
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +47,7 @@ def main(argv: list[str]) -> int:
     try:
         found = _measure(options, console)
     except (HalfFailed, OSError) as error:
-        print(f"pandion bench: {error}", file=sys.stderr)
+        print(f"python -m benchmarks lockstep: {error}", file=sys.stderr)
         return COULD_NOT_START
     write_text(options.json, json.dumps(found, indent=1, allow_nan=False) + "\n")
     print("\n".join(_lines(found)), file=console)
@@ -55,7 +55,9 @@ def main(argv: list[str]) -> int:
 
 
 def _options(argv: list[str]) -> LockstepOptions:
-    parser = Parser("pandion bench lockstep", "Time a whole flight in lockstep and its peer.")
+    parser = Parser(
+        "python -m benchmarks lockstep", "Time a whole flight in lockstep and its peer."
+    )
     add_json_option(parser, "the result")
     parser.add_argument("--scenario", metavar="NAME", default="walls", help="(default walls)")
     parser.add_argument(

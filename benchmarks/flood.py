@@ -1,4 +1,4 @@
-"""``pandion bench flood``: fly in real time under 5000 useless datagrams a second, and judge."""
+"""``python -m benchmarks flood``: fly in real time under 5000 useless datagrams a second."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+from benchmarks.flood_monitor import Heard, Monitor
+from benchmarks.flood_traffic import SYSTEM
 from fsw.link.telemetry.streams import STREAMS
-from pandion.bench.flood_monitor import Heard, Monitor
-from pandion.bench.flood_traffic import SYSTEM
 from pandion.display import Display
 from pandion.output import add_json_option, console_beside, write_text
 from pandion.parser import Parser
@@ -68,7 +68,9 @@ class Row:
 
 def main(argv: list[str]) -> int:
     """Measure and judge; returns the exit code."""
-    parser = Parser("pandion bench flood", "Fly in real time under a flood of useless datagrams.")
+    parser = Parser(
+        "python -m benchmarks flood", "Fly in real time under a flood of useless datagrams."
+    )
     add_json_option(parser, "the figures")
     parser.add_argument(
         "--duration", metavar="S", type=duration, default=60.0, help="of the flood (default 60)"
@@ -80,7 +82,7 @@ def main(argv: list[str]) -> int:
         calm = fly(options.duration, flooded=False, display=Display(console))
         flooded = fly(options.duration, flooded=True, display=Display(console))
     except HalfFailed as error:
-        print(f"pandion bench flood: {error}", file=sys.stderr)
+        print(f"python -m benchmarks flood: {error}", file=sys.stderr)
         return error.exit_code
     rows = [*correctness(flooded), *timing(flooded, calm)]
     for row in rows:
@@ -134,7 +136,7 @@ def fly(duration_s: float, *, flooded: bool, display: Display) -> Flight:
 @contextmanager
 def _sender() -> Iterator[subprocess.Popen[str]]:
     """The flood's process, started before the flight: only its sending is to be measured."""
-    words = [sys.executable, "-P", "-m", "pandion.bench.flood_traffic"]
+    words = [sys.executable, "-P", "-m", "benchmarks.flood_traffic"]
     pipe = subprocess.PIPE
     with subprocess.Popen(words, stdin=pipe, stdout=pipe, text=True) as sender:
         try:

@@ -1,4 +1,4 @@
-"""``pandion bench loop``: fly in real time, alone and beside a busy program; judge the timing."""
+"""``python -m benchmarks loop``: fly in real time, alone and beside a busy program."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, TextIO
 
-from pandion.bench.bare_loop import BareLoops
-from pandion.bench.budgets import Budgets, Row, judge, load_budgets, verdict
-from pandion.bench.machine_watch import Watch
+from benchmarks.bare_loop import BareLoops
+from benchmarks.budgets import Budgets, Row, judge, load_budgets, verdict
+from benchmarks.machine_watch import Watch
 from pandion.display import Display
 from pandion.output import add_json_option, console_beside, write_text
 from pandion.parser import Parser
@@ -60,7 +60,7 @@ def main(argv: list[str]) -> int:
     try:
         flown = [_fly(options, hogs, budgets, console) for hogs in options.hogs]
     except HalfFailed as error:
-        print(f"pandion bench loop: {error}", file=sys.stderr)
+        print(f"python -m benchmarks loop: {error}", file=sys.stderr)
         return error.exit_code
     machine["load_after"] = round(os.getloadavg()[0], 2)
     for measured in flown:
@@ -71,7 +71,7 @@ def main(argv: list[str]) -> int:
 
 
 def _options(argv: list[str]) -> LoopOptions:
-    parser = Parser("pandion bench loop", "Fly in real time and judge the timing.")
+    parser = Parser("python -m benchmarks loop", "Fly in real time and judge the timing.")
     add_json_option(parser, "the figures")
     parser.add_argument(
         "--duration", metavar="S", type=duration, default=60.0, help="of a flight (default 60)"
@@ -148,7 +148,7 @@ def _figures(
     vehicle: dict[str, Any], watch: Watch, elsewhere: float | None
 ) -> dict[str, dict[str, float | None]]:
     """What was measured, under the names of the budgets."""
-    from sitl.bench import plant_step_us  # with numba, which a refusal need not wait for
+    from benchmarks.plant import plant_step_us  # with numba, which a refusal need not wait for
 
     inner, mpc, stages = vehicle["inner"], vehicle["mpc"], vehicle["stages"]
 

@@ -1,7 +1,4 @@
-"""``pandion bench mpc``: time the planner's optimiser against others on recorded instances.
-
-It also knows the other benches, each a module of its own beside this one.
-"""
+"""``python -m benchmarks mpc``: the planner's optimiser against others, on recorded requests."""
 
 from __future__ import annotations
 
@@ -10,7 +7,6 @@ import json
 import os
 import sys
 from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -20,13 +16,14 @@ from pandion.progress import Progress
 from pandion.version import version
 
 if TYPE_CHECKING:
-    from studies.bench_mpc import Samples
+    from benchmarks.optimiser.measurement import Samples
 
-DONE, INTERRUPTED = 0, 1  # exit codes
+DONE = 0  # exit code
+_PROGRAM = "python -m benchmarks mpc"
 
 
 @dataclass(frozen=True, slots=True)
-class BenchOptions:
+class MpcOptions:
     """One measurement."""
 
     json: str | None
@@ -37,8 +34,6 @@ class BenchOptions:
 
 def main(argv: list[str]) -> int:
     """Measure and report; returns the exit code."""
-    if argv[:1] in (["flood"], ["loop"], ["lockstep"], ["download"]):
-        return int(import_module(f"pandion.bench.{argv[0]}").main(argv[1:]))
     options = _options(argv)
     from studies.one_thread import pin_threads
 
@@ -46,21 +41,12 @@ def main(argv: list[str]) -> int:
     try:
         return _run(options)
     except OSError as error:
-        print(f"pandion bench: {error}", file=sys.stderr)
+        print(f"{_PROGRAM}: {error}", file=sys.stderr)
         return COULD_NOT_START
-    except KeyboardInterrupt:
-        print("pandion bench: interrupted", file=sys.stderr)
-        return INTERRUPTED
 
 
-def _options(argv: list[str]) -> BenchOptions:
-    parser = Parser("pandion bench", "Time the planner's optimiser against others.")
-    parser.add_argument(
-        "what",
-        metavar="WHAT",
-        choices=("mpc", "loop", "lockstep", "flood", "download"),
-        help="mpc, loop, lockstep, flood or download",
-    )
+def _options(argv: list[str]) -> MpcOptions:
+    parser = Parser(_PROGRAM, "Time the planner's optimiser against others.")
     parser.add_argument(
         "--json",
         metavar="FILE",
@@ -77,7 +63,7 @@ def _options(argv: list[str]) -> BenchOptions:
     parser.add_argument("--quick", action="store_true", help="about a minute, rougher")
     parser.add_argument("--horizons", metavar="N,N", type=_horizons, help="(default 1,5,10,20)")
     read = parser.read(argv)
-    return BenchOptions(read.json, read.instances, read.quick, read.horizons)
+    return MpcOptions(read.json, read.instances, read.quick, read.horizons)
 
 
 def _count(text: str) -> int:
@@ -93,11 +79,11 @@ def _horizons(text: str) -> tuple[int, ...]:
     return tuple(int(part) for part in parts)
 
 
-def _run(options: BenchOptions) -> int:
+def _run(options: MpcOptions) -> int:
     from dataclasses import replace
 
-    from studies.bench_mpc import HORIZONS, QUICK, Effort, run
-    from studies.bench_report import lines, machine
+    from benchmarks.optimiser.measurement import HORIZONS, QUICK, Effort, run
+    from benchmarks.optimiser.report import lines, machine
 
     console = console_beside(options.json)
     effort = QUICK if options.quick else Effort()
@@ -122,7 +108,7 @@ def _run(options: BenchOptions) -> int:
 
 
 def _write(target: str | None, measured: list[Samples], facts: dict[str, object]) -> None:
-    from studies.bench_report import details
+    from benchmarks.optimiser.report import details
 
     rows = json.dumps([samples.row() for samples in measured], indent=1, allow_nan=False) + "\n"
     write_text(target, rows)
