@@ -6,7 +6,7 @@ import sys
 from importlib import import_module
 from typing import Final
 
-from pandion.parser import COULD_NOT_START, unknown_name
+from command_line.parser import COULD_NOT_START, unknown_name
 
 _INTERRUPTED: Final = 1  # exit code
 

@@ -18,13 +18,13 @@ from typing import Any, Final
 
 from benchmarks.flood_monitor import Heard, Monitor
 from benchmarks.flood_traffic import SYSTEM
+from command_line.options import json_file, option, read
+from command_line.values import seconds
 from fsw.link.telemetry.streams import STREAMS
 from pandion.display import Display
-from pandion.output import add_json_option, console_beside, write_text
-from pandion.parser import Parser
+from pandion.output import console_beside, write_text
 from pandion.supervisor import HalfFailed, Supervisor
 from pandion.version import version_and_machine
-from sitl.arguments import duration
 
 PASSED, NOT_PASSED = 0, 1  # exit codes
 RATE_HZ: Final = 5000.0
@@ -38,6 +38,14 @@ LATENESS_SLACK_US: Final = 50.0
 _ACCEPTED: Final = 0  # MAV_RESULT
 _HEARTBEAT: Final = 0
 _COUNTED_HZ: Final = 4.0  # slower streams are too few to count in a minute
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FloodOptions:
+    """One measurement."""
+
+    json: str | None = json_file("the figures")
+    duration_s: float = option("--duration S", "of the flood, in seconds", seconds, default=60.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,19 +76,13 @@ class Row:
 
 def main(argv: list[str]) -> int:
     """Measure and judge; returns the exit code."""
-    parser = Parser(
-        "python -m benchmarks flood", "Fly in real time under a flood of useless datagrams."
-    )
-    add_json_option(parser, "the figures")
-    parser.add_argument(
-        "--duration", metavar="S", type=duration, default=60.0, help="of the flood (default 60)"
-    )
-    options = parser.read(argv)
+    what = "Fly in real time under a flood of useless datagrams."
+    options = read(FloodOptions, "python -m benchmarks flood", what, argv)
     console = console_beside(options.json)
     print(version_and_machine(), file=console)
     try:
-        calm = fly(options.duration, flooded=False, display=Display(console))
-        flooded = fly(options.duration, flooded=True, display=Display(console))
+        calm = fly(options.duration_s, flooded=False, display=Display(console))
+        flooded = fly(options.duration_s, flooded=True, display=Display(console))
     except HalfFailed as error:
         print(f"python -m benchmarks flood: {error}", file=sys.stderr)
         return error.exit_code

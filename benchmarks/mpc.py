@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import sys
@@ -10,8 +9,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pandion.output import console_beside, json_target, write_text
-from pandion.parser import COULD_NOT_START, Parser
+from command_line.options import json_file, option, read, switch
+from command_line.parser import COULD_NOT_START
+from command_line.values import several, whole
+from pandion.output import console_beside, write_text
 from pandion.progress import Progress
 from pandion.version import version
 
@@ -22,19 +23,26 @@ DONE = 0  # exit code
 _PROGRAM = "python -m benchmarks mpc"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class MpcOptions:
     """One measurement."""
 
-    json: str | None
-    instances: int | None
-    quick: bool
-    horizons: tuple[int, ...] | None
+    # Beside a file, FILE.machine.json gets machine, stages and counts.
+    json: str | None = json_file("the rows")
+    instances: int | None = option(
+        "--instances N",
+        "of each case and horizon (default 100; slow methods get as many as 25 s allow)",
+        whole(1, 10_000),
+    )
+    quick: bool = switch("--quick", "about a minute, rougher")
+    horizons: tuple[int, ...] | None = option(
+        "--horizons N,N", "of the planner (default 1,5,10,20)", several(whole(1, 50), "5,10")
+    )
 
 
 def main(argv: list[str]) -> int:
     """Measure and report; returns the exit code."""
-    options = _options(argv)
+    options = read(MpcOptions, _PROGRAM, "Time the planner's optimiser against others.", argv)
     from studies.one_thread import pin_threads
 
     pin_threads()  # before NumPy loads
@@ -43,40 +51,6 @@ def main(argv: list[str]) -> int:
     except OSError as error:
         print(f"{_PROGRAM}: {error}", file=sys.stderr)
         return COULD_NOT_START
-
-
-def _options(argv: list[str]) -> MpcOptions:
-    parser = Parser(_PROGRAM, "Time the planner's optimiser against others.")
-    parser.add_argument(
-        "--json",
-        metavar="FILE",
-        type=json_target,
-        help="write the rows as a list, and machine, stages and counts beside it as "
-        "FILE.machine.json; - for standard output, rows only",
-    )
-    parser.add_argument(
-        "--instances",
-        metavar="N",
-        type=_count,
-        help="of each case and horizon (default 100; slow methods get as many as 25 s allow)",
-    )
-    parser.add_argument("--quick", action="store_true", help="about a minute, rougher")
-    parser.add_argument("--horizons", metavar="N,N", type=_horizons, help="(default 1,5,10,20)")
-    read = parser.read(argv)
-    return MpcOptions(read.json, read.instances, read.quick, read.horizons)
-
-
-def _count(text: str) -> int:
-    if not text.isdecimal() or not 1 <= int(text) <= 10_000:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a number of instances")
-    return int(text)
-
-
-def _horizons(text: str) -> tuple[int, ...]:
-    parts = text.split(",")
-    if not all(part.isdecimal() and 1 <= int(part) <= 50 for part in parts):
-        raise argparse.ArgumentTypeError(f"{text!r} is not a list of horizons such as 5,10")
-    return tuple(int(part) for part in parts)
 
 
 def _run(options: MpcOptions) -> int:

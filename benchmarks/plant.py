@@ -7,7 +7,7 @@ import time
 
 import numpy as np
 
-from pandion.parser import Parser
+from command_line.parser import Parser
 from sitl.plant.aerial_manipulator import Inputs, plant
 from sitl.plant.integrator import STEP_S, integrate
 from sitl.plant.parameters import Vehicle

@@ -7,7 +7,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Final
 
-from pandion.parser import COULD_NOT_START
+from command_line.parser import COULD_NOT_START
 
 CHECKOUT: Final = Path(__file__).parents[1]
 

@@ -88,7 +88,7 @@ def _at_once(planner: PlannerConfig) -> PlannerConfig:
 
 
 def with_lambda(config: FlightConfig, robustness: float) -> FlightConfig:
-    """The same with another lambda of eq 25 in both cases."""
+    """The same with another lambda of eq 25, ``robustness`` [m/s], in both cases."""
     planner = config.planner
     return replace(
         config,

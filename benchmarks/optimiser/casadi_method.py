@@ -69,7 +69,7 @@ class CasadiMethod:
         )
 
     def answer(self, instance: Instance, guess: Array, optimum: Array) -> Answer:
-        """See ``benchmarks.optimiser.methods.Method``; what leads up to the call is not timed."""
+        """See ``Method``; ``guess`` and ``optimum`` (6 n,) [m/s^2, rad/s^2]."""
         parameters = self._parameters(instance.request, optimum)
         initial = self._unknowns(instance.request, guess)
         found, spent = timed(lambda: self._solve(x0=initial, p=parameters, **self._bounds))

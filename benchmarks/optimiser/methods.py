@@ -30,8 +30,8 @@ class Method(Protocol):
 
         Args:
             instance: The question and those before it.
-            guess: Inputs of the running plan moved on by one period, (6 n,).
-            optimum: Inputs of the converged solution, (6 n,).
+            guess: Inputs (6 n,) [m/s^2, rad/s^2] of the running plan, moved on by one period.
+            optimum: Inputs (6 n,) [m/s^2, rad/s^2] of the converged solution.
         """
         ...
 
@@ -56,7 +56,7 @@ class PlannerMethod:
         self._planner.warm_up()
 
     def answer(self, instance: Instance, guess: Array, optimum: Array) -> Answer:
-        """See ``Method``; the guess is the planner's own."""
+        """See ``Method``; ``guess`` and ``optimum`` (6 n,) [m/s^2, rad/s^2] are not used."""
         for request in instance.before:
             self._planner.plan(request)
         plan, spent = timed(lambda: self._planner.plan(instance.request))
@@ -77,7 +77,7 @@ class SlsqpMethod:
         self._solver = SlsqpSolver(gradients)
 
     def answer(self, instance: Instance, guess: Array, optimum: Array) -> Answer:
-        """See ``Method``; neither guess nor optimum is used."""
+        """See ``Method``; ``guess`` and ``optimum`` (6 n,) [m/s^2, rad/s^2] are not used."""
         start, targets = to_vector(instance.request.start), target_points(instance.request)
         solution, spent = timed(lambda: self._solver.minimise(self._problem, start, targets))
         inputs = solution.x[: len(guess)].copy() if solution.usable else None

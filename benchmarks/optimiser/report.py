@@ -106,7 +106,7 @@ def _ratios(theirs: Samples, ours: Samples, least: float) -> str:
 
 
 def machine(load_before: float) -> dict[str, Any]:
-    """What the numbers depend on besides the code."""
+    """What the numbers depend on besides the code; ``load_before`` [1] is a load average."""
     return {
         "cores": os.cpu_count(),
         "processor": _processor(),
