@@ -41,7 +41,7 @@ test: setup ## set up, then run every check: ruff, mypy, import-linter, pytest
 
 # What reads the code only goes first in the row of the tests that often wait for clocks: meanwhile
 # the other row compiles the kernels that both need.
-OF_PROCESSES := tests/cli tests/interop tests/processes tests/timing
+OF_PROCESSES := tests/benchmarks tests/cli tests/interop tests/processes tests/timing
 code-checks:
 	$(call check,lint,$(BIN)/ruff check .)
 	$(call check,format,$(BIN)/ruff format --check .)

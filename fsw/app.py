@@ -262,11 +262,7 @@ def _subject(options: FswOptions, program: FlightProgram[Any]) -> LogSubject:
         "ver_sw": revision(),
         "scenario": options.scenario,
         "scenario_digest": options.scenario_digest,
-        "controller": options.control.controller,
-        "inner": options.control.inner,
-        "robustness": options.control.robustness,
-        "solver": options.control.solver,
-        "soft": int(options.control.soft),
+        **options.control.facts(),
     }
     if options.seed is not None:
         facts["seed"] = options.seed

@@ -84,7 +84,7 @@ def _at_once(config: FlightConfig) -> FlightConfig:
 
 
 def with_lambda(config: FlightConfig, robustness: float) -> FlightConfig:
-    """The same with another lambda of eq 25 in both cases."""
+    """The same with another lambda of eq 25, ``robustness`` [m/s], in both cases."""
     planner = config.planner
     return replace(
         config,

@@ -113,9 +113,9 @@ _ROWS: Final[dict[str, list[_Row]]] = {
     ],
     "Inner loops": [
         *_pid("PID_ATT", "tuning.attitude", "rad/s^2", (500.0, 500.0, 100.0, 200.0),
-              "attitude (--inner pid)"),
+              "attitude (--tracking pid)"),
         *_pid("PID_HGT", "tuning.height", "m/s^2", (100.0, 100.0, 50.0, 9.0),
-              "height (--inner pid)"),
+              "height (--tracking pid)"),
         *_pid("PID_YAW", "tuning.yaw", "rad/s^2", (50.0, 50.0, 50.0, 5.0), "yaw"),
         *_pid("PID_JNT", "tuning.joint", "rad/s^2", (2000.0, 2000.0, 200.0, 1000.0), "arm joints",
               (50.0, 0.0, 5.0, 20.0)),

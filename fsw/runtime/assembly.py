@@ -35,9 +35,9 @@ def flight_software(
     config = flight_config(
         choice.controller,
         cast(Inner, choice.inner),
-        choice.robustness,
+        choice.lambda_,
         solver=cast(Solver, choice.solver),
-        soft=choice.soft,
+        soft=choice.allow_inconsistent,
     )
     config = replace(config, origin=origin)
     planner = Planner(config.planner, config.airframe, clock.stopwatch_us)

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
-from pandion.bench.budgets import Noise
+from benchmarks.budgets import Noise
 
 _GLANCE_S: Final = 1.0
 _SETTLED_S: Final = 5.0  # from here on memory may not grow

@@ -1,8 +1,7 @@
-"""``pandion bench loop``: fly in real time, alone and beside a busy program; judge the timing."""
+"""``python -m benchmarks loop``: fly in real time, alone and beside a busy program."""
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import platform
@@ -15,29 +14,34 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, TextIO
 
-from pandion.bench.bare_loop import BareLoops
-from pandion.bench.budgets import Budgets, Row, judge, load_budgets, verdict
-from pandion.bench.machine_watch import Watch
+from benchmarks.bare_loop import BareLoops
+from benchmarks.budgets import Budgets, Row, judge, load_budgets, verdict
+from benchmarks.machine_watch import Watch
+from command_line.options import json_file, option, read
+from command_line.values import seconds, several, whole
 from pandion.display import Display
-from pandion.output import add_json_option, console_beside, write_text
-from pandion.parser import Parser
+from pandion.output import console_beside, write_text
 from pandion.supervisor import HalfFailed, Supervisor
 from pandion.version import version
-from sitl.arguments import duration
 
 PASSED, NOT_PASSED = 0, 1  # exit codes
 _EXCHANGE = ("hear", "actuate")  # stages
 _LINK = (*_EXCHANGE, "publish", "record")  # everything of a tick but the tick itself
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class LoopOptions:
     """One measurement."""
 
-    json: str | None
-    duration_s: float
-    hogs: tuple[int, ...]  # busy programs beside each of the flights
-    scenario: str
+    json: str | None = json_file("the figures")
+    duration_s: float = option("--duration S", "of a flight, in seconds", seconds, default=60.0)
+    hogs: tuple[int, ...] = option(
+        "--hogs N,N",
+        "busy programs beside each of the flights (default 0,1: one flight without, one with)",
+        several(whole(0, 64), "0,1"),
+        default=(0, 1),
+    )
+    scenario: str = option("--scenario NAME", "what to fly", default="walls")
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +56,8 @@ class Measured:
 
 def main(argv: list[str]) -> int:
     """Measure and judge; returns the exit code."""
-    options = _options(argv)
+    what = "Fly in real time and judge the timing."
+    options = read(LoopOptions, "python -m benchmarks loop", what, argv)
     console = console_beside(options.json)
     budgets = load_budgets()
     machine = _machine()
@@ -60,7 +65,7 @@ def main(argv: list[str]) -> int:
     try:
         flown = [_fly(options, hogs, budgets, console) for hogs in options.hogs]
     except HalfFailed as error:
-        print(f"pandion bench loop: {error}", file=sys.stderr)
+        print(f"python -m benchmarks loop: {error}", file=sys.stderr)
         return error.exit_code
     machine["load_after"] = round(os.getloadavg()[0], 2)
     for measured in flown:
@@ -68,33 +73,6 @@ def main(argv: list[str]) -> int:
     figures = {"machine": machine, "flights": [_as_json(one) for one in flown]}
     write_text(options.json, json.dumps(figures, indent=2) + "\n")
     return PASSED if all(one.verdict == "pass" for one in flown) else NOT_PASSED
-
-
-def _options(argv: list[str]) -> LoopOptions:
-    parser = Parser("pandion bench loop", "Fly in real time and judge the timing.")
-    add_json_option(parser, "the figures")
-    parser.add_argument(
-        "--duration", metavar="S", type=duration, default=60.0, help="of a flight (default 60)"
-    )
-    parser.add_argument(
-        "--hogs",
-        metavar="N,N",
-        type=_hogs,
-        default=(0, 1),
-        help="busy programs beside each of the flights (default 0,1: one flight without, one with)",
-    )
-    parser.add_argument(
-        "--scenario", metavar="NAME", default="walls", help="what to fly (default %(default)s)"
-    )
-    read = parser.read(argv)
-    return LoopOptions(read.json, read.duration, read.hogs, read.scenario)
-
-
-def _hogs(text: str) -> tuple[int, ...]:
-    parts = text.split(",")
-    if not all(part.isdecimal() and int(part) <= 64 for part in parts):
-        raise argparse.ArgumentTypeError(f"{text!r} is not a list of numbers such as 0,1")
-    return tuple(int(part) for part in parts)
 
 
 def _fly(options: LoopOptions, hogs: int, budgets: Budgets, console: TextIO) -> Measured:
@@ -148,7 +126,7 @@ def _figures(
     vehicle: dict[str, Any], watch: Watch, elsewhere: float | None
 ) -> dict[str, dict[str, float | None]]:
     """What was measured, under the names of the budgets."""
-    from sitl.bench import plant_step_us  # with numba, which a refusal need not wait for
+    from benchmarks.plant import plant_step_us  # with numba, which a refusal need not wait for
 
     inner, mpc, stages = vehicle["inner"], vehicle["mpc"], vehicle["stages"]
 

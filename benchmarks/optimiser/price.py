@@ -23,14 +23,14 @@ class Judge:
         self._unknowns = INPUTS * config.horizon
 
     def price(self, request: PlanRequest, inputs: Array) -> float:
-        """Cost of inputs (6 n,) with the smallest slacks that admit them."""
+        """Cost of ``inputs`` (6 n,) [m/s^2, rad/s^2] with the smallest slacks that admit them."""
         problem = self._problem
         problem.linearise(to_vector(request.start), inputs, target_points(request))
         program = problem.program
         return float(problem.cost + program.price @ program.least_slacks(inputs))
 
     def converged(self, request: PlanRequest, guess: Array) -> tuple[Array, float]:
-        """Inputs and price after programs until they stay.
+        """Inputs and price after programs from ``guess`` (6 n,) [m/s^2, rad/s^2] until they stay.
 
         Where they keep on changing (the directions of eq 23 turn with the iterate) the best
         that was met counts.

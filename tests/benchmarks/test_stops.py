@@ -6,7 +6,7 @@ import random
 
 import pytest
 
-from pandion.bench.stops import Stops
+from benchmarks.stops import Stops
 
 PERIOD_US = 2_000
 BEGIN_US = 1_000_000

@@ -1,4 +1,4 @@
-"""How long the plant takes here: ``python -m sitl.bench``."""
+"""``python -m benchmarks plant``: one step of the simulator's plant."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import time
 
 import numpy as np
 
+from command_line.parser import Parser
 from sitl.plant.aerial_manipulator import Inputs, plant
 from sitl.plant.integrator import STEP_S, integrate
 from sitl.plant.parameters import Vehicle
@@ -53,8 +54,9 @@ def exchange_us(scenario: str) -> list[float]:
     return out[1:]  # the first round compiled
 
 
-def main() -> None:
-    """Print the table."""
+def main(argv: list[str]) -> int:
+    """Print the table; returns the exit code."""
+    Parser("python -m benchmarks plant", "Time one step of the simulator's plant.").read(argv)
     rows = [("plant step of 1 ms (RK4)", plant_step_us(), 1e6 * STEP_S)]
     for scenario in ("walls", "workspace"):
         rows.append((f"sense + advance, {scenario}", exchange_us(scenario), float(STEP_US)))
@@ -62,7 +64,4 @@ def main() -> None:
     for name, values, simulated_us in rows:
         median = statistics.median(values)
         print(f"{name:30}{median:10.2f}{min(values):10.2f}{simulated_us / median:18.0f}")
-
-
-if __name__ == "__main__":
-    main()
+    return 0

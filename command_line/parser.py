@@ -17,7 +17,7 @@ class Parser(argparse.ArgumentParser):
     def __init__(self, prog: str, description: str) -> None:
         super().__init__(prog=prog, description=description, allow_abbrev=False)
 
-    def read(self, argv: list[str]) -> argparse.Namespace:
+    def read(self, argv: list[str] | None) -> argparse.Namespace:
         """Parse or exit with code 2."""
         arguments, unknown = self.parse_known_args(argv)
         if unknown:
@@ -27,11 +27,12 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Say what is wrong in one sentence and exit with code 2."""
-        print(f"{self.prog}: {message}", file=sys.stderr)
+        print(f"{self.prog}: {message.removeprefix('argument ')}", file=sys.stderr)
         raise SystemExit(COULD_NOT_START)
 
     def _option_names(self) -> list[str]:
-        return [name for action in self._actions for name in action.option_strings]
+        shown = (action for action in self._actions if action.help != argparse.SUPPRESS)
+        return [name for action in shown for name in action.option_strings]
 
 
 def unknown_name(what: str, name: str, known: Iterable[str]) -> str:

@@ -1,4 +1,4 @@
-"""The flood of `pandion bench flood`, short: what must hold on any machine."""
+"""The flood of `python -m benchmarks flood`, short: what must hold on any machine."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ import sys
 
 import pytest
 
+from benchmarks.flood import Row, correctness, fly
+from benchmarks.flood_traffic import KINDS, out_of_range
 from messages.frames import FrameWriter, Losses, split
-from pandion.bench.flood import Row, correctness, fly
-from pandion.bench.flood_traffic import KINDS, out_of_range
 from pandion.display import Display
 
 

@@ -11,6 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.optimiser.answer import Answer, timed
+from benchmarks.optimiser.instances import Instance
 from fsw.barriers.robust import required_h
 from fsw.barriers.root import root
 from fsw.barriers.workspace import outward_frame
@@ -19,8 +21,6 @@ from fsw.model.linearisation import POINTS, Linearisation
 from fsw.model.prediction import INPUTS, STATES, Array, condense, to_vector
 from fsw.mpc.planner_config import PlannerConfig
 from fsw.signals import PlanRequest, SafeSet
-from studies.bench_answer import Answer, timed
-from studies.bench_instances import Instance
 
 SOLVERS = ("ipopt", "fatrop")
 _TOLERANCE = 1e-6  # as Clarabel's
@@ -41,7 +41,7 @@ class CasadiMethod:
     def __init__(self, config: PlannerConfig, safe_set: SafeSet, solver: str) -> None:
         import casadi
 
-        from studies.bench_ocp import build
+        from benchmarks.optimiser.ocp import build
 
         self._config, self._safe_set = config, safe_set
         self._model = condense(AIRFRAME, config.period, config.horizon)
@@ -70,7 +70,7 @@ class CasadiMethod:
         )
 
     def answer(self, instance: Instance, guess: Array, optimum: Array) -> Answer:
-        """See ``studies.bench_methods.Method``; what leads up to the call is not timed."""
+        """See ``Method``; ``guess`` and ``optimum`` (6 n,) [m/s^2, rad/s^2]."""
         parameters = self._parameters(instance.request, optimum)
         initial = self._unknowns(instance.request, guess)
         found, spent = timed(lambda: self._solve(x0=initial, p=parameters, **self._bounds))

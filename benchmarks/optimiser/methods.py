@@ -8,6 +8,10 @@ from typing import Protocol
 
 import numpy as np
 
+from benchmarks.optimiser.answer import Answer, stopwatch_us, timed
+from benchmarks.optimiser.casadi_method import SOLVERS, CasadiMethod, installed
+from benchmarks.optimiser.instances import Instance
+from benchmarks.optimiser.price import target_points
 from fsw.model.airframe import AIRFRAME
 from fsw.model.prediction import INPUTS, Array, condense, to_vector
 from fsw.mpc.planner import Planner
@@ -15,10 +19,6 @@ from fsw.mpc.planner_config import PlannerConfig, Solver
 from fsw.mpc.problem import Problem
 from fsw.mpc.slsqp_solver import Gradients, SlsqpSolver
 from fsw.signals import Plan, SafeSet
-from studies.bench_answer import Answer, stopwatch_us, timed
-from studies.bench_casadi import SOLVERS, CasadiMethod, installed
-from studies.bench_instances import Instance
-from studies.bench_price import target_points
 
 _ITERATIONS = (1, 2, 3)
 
@@ -31,8 +31,8 @@ class Method(Protocol):
 
         Args:
             instance: The question and those before it.
-            guess: Inputs of the running plan moved on by one period, (6 n,).
-            optimum: Inputs of the converged solution, (6 n,).
+            guess: Inputs (6 n,) [m/s^2, rad/s^2] of the running plan, moved on by one period.
+            optimum: Inputs (6 n,) [m/s^2, rad/s^2] of the converged solution.
         """
         ...
 
@@ -57,7 +57,7 @@ class PlannerMethod:
         self._planner.warm_up()
 
     def answer(self, instance: Instance, guess: Array, optimum: Array) -> Answer:
-        """See ``Method``; the guess is the planner's own."""
+        """See ``Method``; ``guess`` and ``optimum`` (6 n,) [m/s^2, rad/s^2] are not used."""
         for request in instance.before:
             self._planner.plan(request)
         plan, spent = timed(lambda: self._planner.plan(instance.request))
@@ -78,7 +78,7 @@ class SlsqpMethod:
         self._solver = SlsqpSolver(gradients)
 
     def answer(self, instance: Instance, guess: Array, optimum: Array) -> Answer:
-        """See ``Method``; neither guess nor optimum is used."""
+        """See ``Method``; ``guess`` and ``optimum`` (6 n,) [m/s^2, rad/s^2] are not used."""
         start, targets = to_vector(instance.request.start), target_points(instance.request)
         solution, spent = timed(lambda: self._solver.minimise(self._problem, start, targets))
         inputs = solution.x[: len(guess)].copy() if solution.usable else None

@@ -12,10 +12,10 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks.bare_loop import BareLoops
+from benchmarks.budgets import Noise, judge, load_budgets, verdict
+from benchmarks.loop import main
 from fsw.runtime.clock import now_us
-from pandion.bench.bare_loop import BareLoops
-from pandion.bench.budgets import Noise, judge, load_budgets, verdict
-from pandion.bench.loop import main
 
 BUDGETS = load_budgets()
 QUIET = Noise(others=0.05, stolen=0.0)
@@ -95,13 +95,13 @@ def test_a_short_flight_beside_a_busy_program_is_measured_and_leaves_nothing(
 def test_bad_options_are_one_sentence() -> None:
     for words in (["--hogs", "x"], ["--json", "/nowhere/at/all.json"], ["--duration", "0"]):
         run = subprocess.run(
-            [sys.executable, "-m", "pandion", "bench", "loop", *words],
+            [sys.executable, "-m", "benchmarks", "loop", *words],
             capture_output=True,
             text=True,
             check=False,
         )
         assert run.returncode == 2
-        assert run.stderr.startswith("pandion bench loop: ")
+        assert run.stderr.startswith("python -m benchmarks loop: ")
         assert run.stderr.count("\n") == 1
 
 

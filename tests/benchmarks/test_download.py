@@ -1,10 +1,10 @@
-"""`pandion bench download`, short: every byte comes; how fast is the bench's to measure."""
+"""`python -m benchmarks download`, short: every byte comes; how fast is the bench's to measure."""
 
 from __future__ import annotations
 
 import sys
 
-from pandion.bench.download import LEAST_MB_PER_S, Download, fly
+from benchmarks.download import LEAST_MB_PER_S, Download, fly
 from pandion.display import Display
 
 

@@ -1,4 +1,4 @@
-"""``pandion bench flood``: fly in real time under 5000 useless datagrams a second, and judge."""
+"""``python -m benchmarks flood``: fly in real time under 5000 useless datagrams a second."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+from benchmarks.flood_monitor import Heard, Monitor
+from benchmarks.flood_traffic import SYSTEM
+from command_line.options import json_file, option, read
+from command_line.values import seconds
 from fsw.link.telemetry.streams import STREAMS
-from pandion.bench.flood_monitor import Heard, Monitor
-from pandion.bench.flood_traffic import SYSTEM
 from pandion.display import Display
-from pandion.output import add_json_option, console_beside, write_text
-from pandion.parser import Parser
+from pandion.output import console_beside, write_text
 from pandion.supervisor import HalfFailed, Supervisor
 from pandion.version import version_and_machine
-from sitl.arguments import duration
 
 PASSED, NOT_PASSED = 0, 1  # exit codes
 RATE_HZ: Final = 5000.0
@@ -38,6 +38,14 @@ LATENESS_SLACK_US: Final = 50.0
 _ACCEPTED: Final = 0  # MAV_RESULT
 _HEARTBEAT: Final = 0
 _COUNTED_HZ: Final = 4.0  # slower streams are too few to count in a minute
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FloodOptions:
+    """One measurement."""
+
+    json: str | None = json_file("the figures")
+    duration_s: float = option("--duration S", "of the flood, in seconds", seconds, default=60.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,19 +76,15 @@ class Row:
 
 def main(argv: list[str]) -> int:
     """Measure and judge; returns the exit code."""
-    parser = Parser("pandion bench flood", "Fly in real time under a flood of useless datagrams.")
-    add_json_option(parser, "the figures")
-    parser.add_argument(
-        "--duration", metavar="S", type=duration, default=60.0, help="of the flood (default 60)"
-    )
-    options = parser.read(argv)
+    what = "Fly in real time under a flood of useless datagrams."
+    options = read(FloodOptions, "python -m benchmarks flood", what, argv)
     console = console_beside(options.json)
     print(version_and_machine(), file=console)
     try:
-        calm = fly(options.duration, flooded=False, display=Display(console))
-        flooded = fly(options.duration, flooded=True, display=Display(console))
+        calm = fly(options.duration_s, flooded=False, display=Display(console))
+        flooded = fly(options.duration_s, flooded=True, display=Display(console))
     except HalfFailed as error:
-        print(f"pandion bench flood: {error}", file=sys.stderr)
+        print(f"python -m benchmarks flood: {error}", file=sys.stderr)
         return error.exit_code
     rows = [*correctness(flooded), *timing(flooded, calm)]
     for row in rows:
@@ -134,7 +138,7 @@ def fly(duration_s: float, *, flooded: bool, display: Display) -> Flight:
 @contextmanager
 def _sender() -> Iterator[subprocess.Popen[str]]:
     """The flood's process, started before the flight: only its sending is to be measured."""
-    words = [sys.executable, "-P", "-m", "pandion.bench.flood_traffic"]
+    words = [sys.executable, "-P", "-m", "benchmarks.flood_traffic"]
     pipe = subprocess.PIPE
     with subprocess.Popen(words, stdin=pipe, stdout=pipe, text=True) as sender:
         try:

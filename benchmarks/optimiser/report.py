@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from studies.bench_mpc import Samples
+from benchmarks.optimiser.measurement import Samples
 
 OURS = ("clarabel", 2)  # as it flies
 # Least factors at n = 5 and n = 10 by which the others should be slower.
@@ -106,7 +106,7 @@ def _ratios(theirs: Samples, ours: Samples, least: float) -> str:
 
 
 def machine(load_before: float) -> dict[str, Any]:
-    """What the numbers depend on besides the code."""
+    """What the numbers depend on besides the code; ``load_before`` [1] is a load average."""
     return {
         "cores": os.cpu_count(),
         "processor": _processor(),

@@ -1,10 +1,8 @@
-"""``pandion bench download``: fetch a flight log in real time, and judge how fast it came."""
+"""``python -m benchmarks download``: fetch a flight log in real time and judge the speed."""
 
 from __future__ import annotations
 
-import argparse
 import json
-import math
 import os
 import random
 import sys
@@ -17,10 +15,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from pandion.bench.download_client import DownloadClient, NothingCame
+from benchmarks.download_client import DownloadClient, NothingCame
+from command_line.options import json_file, option, read
+from command_line.values import number
 from pandion.display import Display
-from pandion.output import add_json_option, console_beside, write_text
-from pandion.parser import Parser
+from pandion.output import console_beside, write_text
 from pandion.supervisor import HalfFailed, Supervisor
 from pandion.version import version_and_machine
 
@@ -29,6 +28,14 @@ LEAST_MB_PER_S: Final = 2.0
 _CONNECT_S: Final = 60.0
 _EARLIER: Final = "earlier"  # directory of the log that is fetched
 _MB: Final = 1e6
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DownloadOptions:
+    """One measurement."""
+
+    json: str | None = json_file("the figures")
+    size_mb: float = option("--size MB", "of the log", number(0.1, 1000.0, "MB"), default=20.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,18 +75,14 @@ class Downloads:
 
 def main(argv: list[str]) -> int:
     """Measure and judge; returns the exit code."""
-    parser = Parser("pandion bench download", "Fetch a flight log in real time, by LOG_* and FTP.")
-    add_json_option(parser, "the figures")
-    parser.add_argument(
-        "--size", metavar="MB", type=_size, default=20.0, help="of the log (default 20)"
-    )
-    options = parser.read(argv)
+    what = "Fetch a flight log in real time, by LOG_* and FTP."
+    options = read(DownloadOptions, "python -m benchmarks download", what, argv)
     console = console_beside(options.json)
     print(version_and_machine(), file=console)
     try:
-        fetched = fly(int(options.size * _MB), Display(console))
+        fetched = fly(int(options.size_mb * _MB), Display(console))
     except (HalfFailed, NothingCame) as error:
-        print(f"pandion bench download: {error}", file=sys.stderr)
+        print(f"python -m benchmarks download: {error}", file=sys.stderr)
         return error.exit_code if isinstance(error, HalfFailed) else NOT_PASSED
     for each in fetched.downloads:
         said = "identical" if each.identical else "NOT identical"
@@ -162,16 +165,6 @@ def _timed(way: str, log: bytes, fetch: Callable[[], bytes]) -> Download:
     begun_s = time.monotonic()
     data = fetch()
     return Download(way, len(log), time.monotonic() - begun_s, data == log)
-
-
-def _size(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not 0.1 <= value <= 1000.0:
-        raise argparse.ArgumentTypeError(f"{text!r} is no size from 0.1 to 1000 MB")
-    return value
 
 
 def _facts(fetched: Downloads) -> dict[str, Any]:

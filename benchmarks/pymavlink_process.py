@@ -1,7 +1,7 @@
-"""A half of the system whose lockstep frames are packed and read by pymavlink itself.
+"""One process of the system whose lockstep frames are packed and read by pymavlink itself.
 
-The peer of ``pandion bench lockstep``: the same loop, the same bytes, the usual library. Run as
-``python -m pandion.bench.pymavlink_half sitl|fsw …``.
+The peer of ``python -m benchmarks lockstep``: the same loop, the same bytes, the usual library.
+Run as ``python -m benchmarks.pymavlink_process sitl|fsw …``.
 """
 
 from __future__ import annotations

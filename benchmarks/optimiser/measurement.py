@@ -1,4 +1,4 @@
-"""``pandion bench mpc``: the planner's optimiser against others, in one process, interleaved.
+"""``python -m benchmarks mpc``: the optimiser against others, in one process, interleaved.
 
 Every instance is given to every method before the next one comes, in an order that rotates, so
 that a busy moment of the machine falls on all alike. Slow methods get as many instances as
@@ -13,13 +13,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from benchmarks.optimiser.answer import Answer, stopwatch_us
+from benchmarks.optimiser.instances import Instance, planner_of, record
+from benchmarks.optimiser.methods import Entry, Method, entries, guess_for
+from benchmarks.optimiser.price import Judge
 from fsw.model.airframe import AIRFRAME
 from fsw.model.prediction import Array
 from fsw.mpc.planner import Planner
-from studies.bench_answer import Answer, stopwatch_us
-from studies.bench_instances import Instance, planner_of, record
-from studies.bench_methods import Entry, Method, entries, guess_for
-from studies.bench_price import Judge
 from studies.cases import Case
 
 HORIZONS = (1, 5, 10, 20)

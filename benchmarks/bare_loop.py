@@ -1,7 +1,7 @@
 """Loops that only sleep, beside a flight: where they are late as well, the machine stood still.
 
 They wake about as often as the tick, at a higher priority than anything of the flight, so nothing
-of ours makes them late. One a processor, as ``python -m pandion.bench.bare_loop PROCESSOR``.
+of ours makes them late. One a processor, as ``python -m benchmarks.bare_loop PROCESSOR``.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ import sys
 import time
 from typing import Final
 
+from benchmarks.stops import Stops, Stretch
 from fsw.runtime.clock import now_us
 from fsw.runtime.grid import Grid
 from fsw.runtime.process import StopRequest
 from fsw.runtime.rates import INNER
 from fsw.runtime.realtime import claim_real_time
-from pandion.bench.stops import Stops, Stretch
 
 _PRIORITY: Final = 60  # SCHED_FIFO; the tick has 50
 # Waking costs a virtual machine 30 us, and at twice the rate the tick's median grew by half. Not
@@ -38,7 +38,7 @@ class BareLoops:
 
     def __enter__(self) -> BareLoops:
         for processor in sorted(os.sched_getaffinity(0))[:_MOST]:
-            command = [sys.executable, "-m", "pandion.bench.bare_loop", str(processor)]
+            command = [sys.executable, "-m", "benchmarks.bare_loop", str(processor)]
             self._loops.append(subprocess.Popen(command, stdout=subprocess.PIPE, text=True))
         return self
 

@@ -1,4 +1,4 @@
-"""``pandion bench lockstep``: how fast a whole flight is, and where its time goes.
+"""``python -m benchmarks lockstep``: how fast a whole flight is, and where its time goes.
 
 Everything is on: both halves as processes, telemetry, logs, the MPC. The peer is the same loop with
 pymavlink's own packing of the lockstep frames; the two take turns: a busy machine slows both.
@@ -6,7 +6,6 @@ pymavlink's own packing of the lockstep frames; the two take turns: a busy machi
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import statistics
@@ -16,89 +15,63 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, TextIO
 
+from command_line.options import json_file, option, read
+from command_line.parser import COULD_NOT_START
+from command_line.values import number, whole
 from pandion.children import Event
 from pandion.display import Display
-from pandion.output import add_json_option, console_beside, write_text
-from pandion.parser import COULD_NOT_START, Parser
+from pandion.output import console_beside, write_text
 from pandion.processor import Places, lockstep_places
 from pandion.supervisor import HalfFailed, Supervisor
 from pandion.version import version
 
 DONE, SLOW = 0, 1  # exit codes
 WANTED: Final = 25.0  # times real time, at 500 Hz
-PEER: Final = "pandion.bench.pymavlink_half"
+PEER: Final = "benchmarks.pymavlink_process"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class LockstepOptions:
     """One measurement."""
 
-    json: str | None
-    scenario: str
-    duration_s: float
-    rounds: int
-    processors: int | None
+    json: str | None = json_file("the result")
+    scenario: str = option("--scenario NAME", "what to fly", default="walls")
+    duration_s: float = option(
+        "--duration S", "of a flight, in seconds", number(1.0, 600.0, "s"), default=60.0
+    )
+    rounds: int = option("--rounds N", "flights of each", whole(1, 100), default=3)
+    processors: int | None = option(
+        "--processors N",
+        "how many the two processes share, 1 or 2 (default as pandion fly decides, by what is "
+        "idle)",
+        whole(1, 2),
+    )
 
 
 def main(argv: list[str]) -> int:
     """Measure and report; returns the exit code: 1 if the best flight was too slow."""
-    options = _options(argv)
+    what = "Time a whole flight in lockstep and its peer."
+    options = read(LockstepOptions, "python -m benchmarks lockstep", what, argv)
     console = console_beside(options.json)
     try:
         found = _measure(options, console)
     except (HalfFailed, OSError) as error:
-        print(f"pandion bench: {error}", file=sys.stderr)
+        print(f"python -m benchmarks lockstep: {error}", file=sys.stderr)
         return COULD_NOT_START
     write_text(options.json, json.dumps(found, indent=1, allow_nan=False) + "\n")
     print("\n".join(_lines(found)), file=console)
     return DONE if found["real_time_factor_best"] >= WANTED else SLOW
 
 
-def _options(argv: list[str]) -> LockstepOptions:
-    parser = Parser("pandion bench lockstep", "Time a whole flight in lockstep and its peer.")
-    add_json_option(parser, "the result")
-    parser.add_argument("--scenario", metavar="NAME", default="walls", help="(default walls)")
-    parser.add_argument(
-        "--duration", metavar="S", type=_seconds, default=60.0, help="of a flight (default 60)"
-    )
-    parser.add_argument(
-        "--rounds", metavar="N", type=_count, default=3, help="flights of each (default 3)"
-    )
-    parser.add_argument(
-        "--processors",
-        type=int,
-        choices=(1, 2),
-        help="how many the two halves share (default as pandion fly decides, by what is idle)",
-    )
-    read = parser.read(argv)
-    return LockstepOptions(read.json, read.scenario, read.duration, read.rounds, read.processors)
-
-
-def _seconds(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = 0.0
-    if not 1.0 <= value <= 600.0:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a number of seconds from 1 to 600")
-    return value
-
-
-def _count(text: str) -> int:
-    if not text.isdecimal() or not 1 <= int(text) <= 100:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a number of flights from 1 to 100")
-    return int(text)
-
-
 def _measure(options: LockstepOptions, console: TextIO) -> dict[str, Any]:
     load = os.getloadavg()[0]
     flights: dict[str, list[dict[str, Any]]] = {"pandion": [], "pymavlink": []}
-    for number in range(1, options.rounds + 1):
+    for round_ in range(1, options.rounds + 1):
         for name, runner in (("pandion", None), ("pymavlink", PEER)):
             flown = _fly(options, runner)
             flights[name].append(flown)
             factor = flown["sitl"]["real_time_factor"]
-            print(f"round {number}, {name}: {factor:.1f} times real time", file=console, flush=True)
+            print(f"round {round_}, {name}: {factor:.1f} times real time", file=console, flush=True)
     ours, theirs = (_factors(flights[name]) for name in ("pandion", "pymavlink"))
     best = max(flights["pandion"], key=lambda flown: float(flown["sitl"]["real_time_factor"]))
     return {

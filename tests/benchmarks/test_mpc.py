@@ -8,16 +8,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks import __main__ as benchmarks
+from benchmarks.optimiser import casadi_method
+from benchmarks.optimiser.answer import stopwatch_us
+from benchmarks.optimiser.casadi_method import SOLVERS, CasadiMethod
+from benchmarks.optimiser.instances import Instance, planner_of, record
+from benchmarks.optimiser.measurement import Effort, Samples, run
+from benchmarks.optimiser.methods import Entry, guess_for
+from benchmarks.optimiser.price import Judge
+from benchmarks.optimiser.report import lines
 from fsw.mpc.planner import Planner
-from pandion.bench import mpc
-from studies import bench_casadi
-from studies.bench_answer import stopwatch_us
-from studies.bench_casadi import SOLVERS, CasadiMethod
-from studies.bench_instances import Instance, planner_of, record
-from studies.bench_methods import Entry, guess_for
-from studies.bench_mpc import Effort, Samples, run
-from studies.bench_price import Judge
-from studies.bench_report import lines
 
 KEYS = {"n", "method", "sqp_iterations", "median_us", "p99_us", "max_us", "suboptimality_p50"}
 LITTLE = Effort(instances=2, duration_s=3.0, budget_us=3e6)
@@ -87,8 +87,8 @@ def test_what_is_not_installed_has_an_empty_row_and_is_named() -> None:
 
 
 def test_without_casadi_nobody_fails(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(bench_casadi.importlib.util, "find_spec", lambda name: None)
-    assert not any(bench_casadi.installed(solver) for solver in SOLVERS)
+    monkeypatch.setattr(casadi_method.importlib.util, "find_spec", lambda name: None)
+    assert not any(casadi_method.installed(solver) for solver in SOLVERS)
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
@@ -120,7 +120,7 @@ def test_instances_are_consecutive_and_of_both_cases(recorded: list[Instance]) -
     [
         ["mpc", "--instances", "0"],
         ["mpc", "--horizons", "5,x"],
-        ["plant"],
+        ["planet"],
         ["mpc", "--json", "/no/such/directory/file.json"],
     ],
 )
@@ -128,20 +128,20 @@ def test_what_makes_no_sense_is_refused_at_once(
     argv: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
     try:
-        code = mpc.main(argv)
+        code = benchmarks.main(argv)
     except SystemExit as stop:
         code = int(stop.code or 0)
     assert code == 2
-    assert "pandion bench" in capsys.readouterr().err
+    assert "python -m benchmarks" in capsys.readouterr().err
 
 
 def test_the_verb_writes_a_list_and_what_it_was_measured_on(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("studies.bench_mpc.QUICK", LITTLE)
+    monkeypatch.setattr("benchmarks.optimiser.measurement.QUICK", LITTLE)
     target = tmp_path / "bench.json"
     argv = ["mpc", "--quick", "--horizons", "1", "--instances", "1", "--json", str(target)]
-    assert mpc.main(argv) == 0
+    assert benchmarks.main(argv) == 0
     rows = json.loads(target.read_text())
     assert isinstance(rows, list)
     assert {row["n"] for row in rows} == {1}

@@ -6,9 +6,9 @@ from typing import Any
 
 import pytest
 
+from benchmarks import lockstep
+from benchmarks.pymavlink_process import step
 from messages import dialect
-from pandion.bench import lockstep
-from pandion.bench.pymavlink_half import step
 from sitl.link.encode import StepEncoder
 from sitl.sensors.suite import SensorReadings
 
