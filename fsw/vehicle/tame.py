@@ -2,7 +2,7 @@
 
 What is asked for near the vehicle's own motion, and not far behind a wall, passes as it is: the
 paper's own path enters the safety zone. Farther out the pull on the planner could outbid the
-prices of barrier rows and joint limits (docs/decisions/0010-steering-through-the-planner.md).
+prices of barrier rows and joint limits (docs/decisions/0010-setpoints-through-the-planner.md).
 """
 
 from __future__ import annotations
