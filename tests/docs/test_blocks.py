@@ -28,7 +28,7 @@ from sitl.simulation import Simulation
 from tests.docs.fences import PAGES, ROOT, Fence, commands, fences, named
 
 BLOCKS = [fence for page in PAGES for fence in fences(page)]
-LANGUAGES = {"console", "json", "math", "python", "text", "toml", "{toctree}"}
+LANGUAGES = {"console", "json", "math", "python", "text", "toml", "{include}", "{toctree}"}
 # New option or program -> the one that this version still has. Empty it when they have arrived.
 RENAMED = {
     "--allow-inconsistent": "--soft",
