@@ -11,7 +11,7 @@ wall (``tests/fsw/control/test_braking.py`` says from which states), or before t
 that a point's ball lies behind. A sphere that moves on with its target leaves a vehicle at rest
 behind.
 
-Source: docs/timing.md, docs/decisions/0015-own-grid-own-process.md.
+Source: docs/concepts/tick-and-time.md, docs/decisions/0015-tick-grid-and-planner-process.md.
 """
 
 from __future__ import annotations

@@ -13,7 +13,7 @@ targets, mission, setpoints   wall and not fast towards one
 a place of a mission          ``project``: the nearest place inside
 ============================  =====================================================
 
-Source: docs/decisions/0010-steering-through-the-planner.md.
+Source: docs/decisions/0010-setpoints-through-the-planner.md.
 """
 
 from __future__ import annotations

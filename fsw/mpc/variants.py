@@ -12,7 +12,7 @@ name        Case I, walls; and points              Case II, workspace sphere
 Points, alone or beside walls, are to ``hc`` and ``sc`` what walls are; ``blf`` has eqs 11 and 12.
 
 Naive can be given a centring cost and HC a tightening, so that the barrier's own share in a
-comparison shows (docs/paper-and-us.md).
+comparison shows (docs/reference/paper-comparison.md).
 """
 
 from __future__ import annotations
