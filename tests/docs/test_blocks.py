@@ -18,7 +18,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from sitl.admission import check
+from sitl.scenario_validation import check
 
 from pandion.__main__ import VERBS, main
 from pandion.reproduce import WHAT
