@@ -15,7 +15,6 @@ import pytest
 
 from fsw.link.inbox import Inbox
 from fsw.link.sim_link import Pacing
-from fsw.log.block_file import BlockFile
 from fsw.log.flight_log import FlightLog
 from fsw.log.reader import LoggedTick, open_flight, ticks
 from fsw.parameters.flight_config import flight_config
@@ -39,6 +38,7 @@ from fsw.signals import (
     TickOutputs,
 )
 from messages import dialect
+from messages.block_file import BlockFile
 from tests.fsw.link.snapshots import FACTS, outputs_at
 from tests.fsw.log.test_recorded_inputs import SUBJECT
 from tests.timing.virtual_time import FIRST_US, PERIOD_US, VirtualSensors, VirtualTime, frame
