@@ -28,7 +28,7 @@ class Heading:
         self._reference = reference
 
     def at(self, t: float) -> float:
-        """Yaw [rad], ``t`` seconds after the start of the trajectory."""
+        """Yaw [rad, NED] at t [s] after the start of the trajectory."""
         if not self._walls:
             return self._fixed
         yaws = [facing(self._walls, self._reference.place(t + around)) for around in _AROUND_S]

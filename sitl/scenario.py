@@ -24,7 +24,7 @@ class Range(NamedTuple):
     or_inf: bool = False
 
     def contains(self, value: float) -> bool:
-        """False outside the range; NaN is outside."""
+        """Whether a value [unit of the key] is in the range; NaN is not."""
         if not math.isfinite(value):
             return self.or_inf and value > 0.0
         on_grid = self.step is None or math.isclose(

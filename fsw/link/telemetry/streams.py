@@ -105,7 +105,7 @@ def messages_now(
 
     Args:
         message_id: Which.
-        which: Part of it, where it has several.
+        which: Number of the part [1], where it has several.
         snapshot: Of the last tick.
         context: What encoders need.
 

@@ -46,7 +46,7 @@ class IndexedObstacle:
 
 
 def for_this_vehicle(target_system: float, target_component: float) -> bool:
-    """Whether a message is addressed to the autopilot or to everyone."""
+    """Whether ``target_system`` [1], ``target_component`` [1] is the autopilot or everyone."""
     return target_system in (0, SYSTEM_ID) and target_component in (0, 1, 191)
 
 
