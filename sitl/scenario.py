@@ -75,7 +75,7 @@ class Lissajous:
 
 @dataclass(frozen=True, slots=True)
 class Hold:
-    """One point."""
+    """One position."""
 
     position_m: Annotated[V3, Range(-WORLD_M, WORLD_M)]
     kind: Literal["hold"] = "hold"
@@ -96,7 +96,7 @@ class ScenarioWall:
 
 @dataclass(frozen=True, slots=True)
 class Obstacle:
-    """A point without a size of its own, such as the tip of a branch."""
+    """An obstacle without a size of its own, such as the tip of a branch."""
 
     name: str
     position_m: Annotated[V3, Range(-WORLD_M, WORLD_M)]

@@ -1,4 +1,4 @@
-"""Walls, points, workspace and ground, judged on the plant's true state.
+"""Walls, obstacles, workspace and ground, judged on the plant's true state.
 
 Source: docs/equations.md E11, E14, E15.
 """
@@ -66,7 +66,7 @@ class World:
     def collision(self, points: tuple[V3, V3, V3], margins: tuple[float, ...]) -> str | None:
         """A sentence if a critical point touches a wall or the ground, else None.
 
-        A point has no size that could be touched: coming too close to it is a violation only.
+        An obstacle is a point and cannot be touched: coming too close to it is a violation only.
 
         Args:
             points: Base, joint 2 and end-effector [m, NED].

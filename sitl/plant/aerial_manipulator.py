@@ -105,7 +105,7 @@ def gravity_in_body(rotation: Array, g: float) -> V3:
 
 @kernel
 def load_into(plant: Plant, state: Array, inputs: Inputs, work: Workspace) -> None:
-    """Force of rotors, drives, ground and disturbance at a state (17 + 2j,) [SI], into work.load."""
+    """Forces of rotors, drives, ground, disturbance at a state (17 + 2j,) [SI], into work.load."""
     load, rotation = work.load, work.rotation
     feet_force, feet_moment = ground_wrench(
         plant.feet, triple(state, P_WB), triple(state, V_WB), triple(state, W_WB_B), rotation

@@ -38,7 +38,7 @@ _ZERO: Final[Vec3] = (0.0, 0.0, 0.0)
 
 @dataclass(frozen=True, slots=True)
 class IndexedObstacle:
-    """One wall or point of a set of ``count``."""
+    """One wall or obstacle of a set of ``count``."""
 
     obstacle: Wall | PointObstacle
     index: int
