@@ -112,7 +112,7 @@ class _Session:
         settle_memory()
         planner = ProcessPlanner(program.planner, clock.now_us, record.mpc)
         keeping.start()
-        inbox = Inbox()
+        inbox = Inbox(options.links.origin)
         start_us = clock.unix_us()
         files = self._files(directory, start_us, program)
         sim = SimLink(simulator, inbox, facts)
@@ -262,11 +262,7 @@ def _subject(options: FswOptions, program: FlightProgram[Any]) -> LogSubject:
         "ver_sw": revision(),
         "scenario": options.scenario,
         "scenario_digest": options.scenario_digest,
-        "controller": options.control.controller,
-        "inner": options.control.inner,
-        "robustness": options.control.robustness,
-        "solver": options.control.solver,
-        "soft": int(options.control.soft),
+        **options.control.facts(),
     }
     if options.seed is not None:
         facts["seed"] = options.seed

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Protocol
 
+from fsw.periods import PLANNING_US, TICK_US
 from fsw.signals import Plan, PlanFailure, PlanRequest, Vec2
 
 Clock = Callable[[], int]
@@ -71,8 +72,8 @@ class VehicleFacts:
 class LoopHealth:
     """The latest timing of the rate groups; the loop replaces them once a second."""
 
-    inner: GroupTiming = field(default_factory=lambda: GroupTiming(period_us=2_000))
-    mpc: GroupTiming = field(default_factory=lambda: GroupTiming(period_us=100_000))
-    telemetry: GroupTiming = field(default_factory=lambda: GroupTiming(period_us=2_000))
+    inner: GroupTiming = field(default_factory=lambda: GroupTiming(period_us=TICK_US))
+    mpc: GroupTiming = field(default_factory=lambda: GroupTiming(period_us=PLANNING_US))
+    telemetry: GroupTiming = field(default_factory=lambda: GroupTiming(period_us=TICK_US))
     housekeeping: GroupTiming = field(default_factory=lambda: GroupTiming(period_us=1_000_000))
     vibration: Vec2 = (0.0, 0.0)  # rad/s, m/s^2: gyro and accelerometer, high-pass filtered

@@ -51,7 +51,7 @@ class Display:
         return self._bar
 
     def progress(self, time_s: float, margin_m: float | None, real_time_factor: float) -> None:
-        """Move the bar, or print a line for every tenth of the flight."""
+        """Move the bar, or print a line for every tenth; ``real_time_factor`` [1]."""
         margin = "" if margin_m is None else f"  margin {1000.0 * margin_m:.0f} mm"
         state = f"{time_s:6.1f} s  ×{real_time_factor:.1f}{margin}"
         if self._bar is not None and self._task is not None:

@@ -5,10 +5,12 @@ from __future__ import annotations
 import contextlib
 import sys
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Protocol
 
-from pandion.parser import COULD_NOT_START, Parser
+from command_line.options import OneOf, option, read
+from command_line.parser import COULD_NOT_START
 from pandion.progress import Progress
 
 if TYPE_CHECKING:
@@ -21,6 +23,18 @@ _TOLD_RECORDS: Final = 5_000
 _TEXTS: Final = "texts"  # the channel of what the vehicle said
 
 
+_TARGET: Final = OneOf(required=True)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ExportOptions:
+    """One export."""
+
+    log: Path = option("LOG", "flight.ulg, or its directory", Path, required=True)
+    csv: Path | None = option("--csv DIR", "one file a topic, into DIR", Path, one_of=_TARGET)
+    mcap: Path | None = option("--mcap FILE", "one file, messages as JSON", Path, one_of=_TARGET)
+
+
 class Sink(Protocol):
     """Where an export goes."""
 
@@ -31,19 +45,14 @@ class Sink(Protocol):
 
 def main(argv: list[str]) -> int:
     """Export once; returns the exit code."""
-    parser = Parser("pandion export", "Write a flight log in another format.")
-    parser.add_argument("log", metavar="LOG", type=Path, help="flight.ulg, or its directory")
-    target = parser.add_mutually_exclusive_group(required=True)
-    target.add_argument("--csv", metavar="DIR", type=Path, help="one file a topic, into DIR")
-    target.add_argument("--mcap", metavar="FILE", type=Path, help="one file, messages as JSON")
-    read = parser.read(argv)
+    options = read(ExportOptions, "pandion export", "Write a flight log in another format.", argv)
     from messages.ulog_reader import UlogError, open_log
 
-    path: Path = read.log / "flight.ulg" if read.log.is_dir() else read.log
+    path: Path = options.log / "flight.ulg" if options.log.is_dir() else options.log
     try:
         log = open_log(path)
         with contextlib.ExitStack() as stack:
-            sink = _sink(read.csv, read.mcap, log, stack)
+            sink = _sink(options.csv, options.mcap, log, stack)
             progress = stack.enter_context(Progress(sys.stdout, counted=False))
             count = _export(log, sink, progress)
         if count == 0:
@@ -57,7 +66,7 @@ def main(argv: list[str]) -> int:
             file=sys.stderr,
         )
         return COULD_NOT_START
-    print(f"{count} records of {path} in {read.csv or read.mcap}")
+    print(f"{count} records of {path} in {options.csv or options.mcap}")
     return DONE
 
 

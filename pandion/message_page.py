@@ -1,4 +1,4 @@
-"""Write ``docs/messages.md``: every message on the links to the ground, and the dialect.
+"""Write ``docs/reference/messages.md``: every message on the links to the ground, and the dialect.
 
 Run by hand after an edit of the dialect or of the table of streams: ``python -m
 pandion.message_page``. A test compares.
@@ -66,6 +66,6 @@ def traffic() -> list[Traffic]:
 
 
 if __name__ == "__main__":
-    page = Path(sys.argv[1]) if len(sys.argv) > 1 else Path("docs/messages.md")
+    page = Path(sys.argv[1]) if len(sys.argv) > 1 else Path("docs/reference/messages.md")
     page.write_text(reference(traffic()), encoding="utf-8")
     print(f"wrote {page}")

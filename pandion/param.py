@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-import argparse
 import fnmatch
 import json
 import sys
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Protocol
+from typing import Any, Final, Protocol
 
+from command_line.options import OneOf, option, read, switch
+from command_line.parser import COULD_NOT_START, unknown_name
 from fsw.link.udp_endpoint import LinkError, parse_address
-from pandion.parser import COULD_NOT_START, Parser, unknown_name
-
-if TYPE_CHECKING:
-    pass
 
 DONE, REFUSED = 0, 1  # exit codes
-
 HELP: Final = """\
 usage: pandion param ACTION [arguments] [--vehicle udp:HOST:PORT | --file FILE]
 
@@ -30,6 +27,55 @@ actions:
 
 `pandion param ACTION --help` prints the options of an action.
 """
+_WHERE: Final = OneOf()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Where:
+    """Whose parameters."""
+
+    vehicle: str = option(
+        "--vehicle udp:HOST:PORT",
+        "address on which the vehicle listens",
+        default="udp:127.0.0.1:14580",
+        one_of=_WHERE,
+    )
+    file: Path | None = option("--file FILE", "a parameter file, instead", Path, one_of=_WHERE)
+
+
+def _as_json() -> Any:
+    return switch("--json", "for programs, with all that is known")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _List(_Where):
+    pattern: str = option("PATTERN", "of names", default="*")
+    changed: bool = switch("--changed", "only what is not the default")
+    json: bool = _as_json()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Get(_Where):
+    names: list[str] = option("NAME ...", "of a parameter", required=True)
+    json: bool = _as_json()
+
+
+def _value(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise ValueError(f"{text!r} is not a number") from None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Set(_Where):
+    name: str = option("NAME", "of the parameter", required=True)
+    value: float = option("VALUE", "in the parameter's unit", _value, required=True)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _File(_Where):
+    path: Path = option("FILE", ".params or .parm", Path, required=True)
 
 
 class Values(Protocol):
@@ -40,7 +86,7 @@ class Values(Protocol):
         ...
 
     def write(self, name: str, value: float) -> None:
-        """Change one value."""
+        """Change one parameter to ``value`` [the parameter's unit]."""
         ...
 
 
@@ -58,7 +104,7 @@ class FileValues:
         return {parameter.name: parameter.default for parameter in PARAMETERS} | self._kept()
 
     def write(self, name: str, value: float) -> None:
-        """Change one value in the file.
+        """Change one parameter in the file to ``value`` [the parameter's unit].
 
         Raises:
             Refused: It is out of range or contradicts the others.
@@ -101,14 +147,16 @@ def main(argv: list[str]) -> int:
     if action is None:
         print(f"pandion param: {unknown_name('action', argv[0], ACTIONS)}", file=sys.stderr)
         return COULD_NOT_START
-    arguments = _parser(argv[0]).read(argv[1:])
+    kind, act = action
+    what = "Parameters of a running vehicle or in a file."
+    options = read(kind, f"pandion param {argv[0]}", what, argv[1:])
     from pandion.param_vehicle import NoAnswer, ParameterClient, Refused
 
     try:
-        if arguments.file is not None:
-            return action(arguments, FileValues(arguments.file))
-        with ParameterClient(parse_address(arguments.vehicle)) as vehicle:
-            return action(arguments, vehicle)
+        if options.file is not None:
+            return act(options, FileValues(options.file))
+        with ParameterClient(parse_address(options.vehicle)) as vehicle:
+            return act(options, vehicle)
     except (LinkError, NoAnswer, OSError) as error:
         print(f"pandion param: {error}", file=sys.stderr)
         return COULD_NOT_START
@@ -120,67 +168,40 @@ def main(argv: list[str]) -> int:
         return REFUSED
 
 
-def _parser(action: str) -> Parser:
-    parser = Parser(f"pandion param {action}", "Parameters of a running vehicle or in a file.")
-    if action == "list":
-        parser.add_argument("pattern", metavar="PATTERN", nargs="?", default="*", help="of names")
-        parser.add_argument("--changed", action="store_true", help="only what is not the default")
-    elif action == "get":
-        parser.add_argument("names", metavar="NAME", nargs="+", help="of a parameter")
-    elif action == "set":
-        parser.add_argument("name", metavar="NAME", help="of the parameter")
-        parser.add_argument("value", metavar="VALUE", type=float, help="in the parameter's unit")
-    else:
-        parser.add_argument("path", metavar="FILE", type=Path, help=".params or .parm")
-    if action in ("list", "get"):
-        parser.add_argument(
-            "--json", action="store_true", help="for programs, with all that is known"
-        )
-    where = parser.add_mutually_exclusive_group()
-    where.add_argument(
-        "--vehicle",
-        metavar="udp:HOST:PORT",
-        default="udp:127.0.0.1:14580",
-        help="where the vehicle listens (default %(default)s)",
-    )
-    where.add_argument("--file", metavar="FILE", type=Path, help="a parameter file, instead")
-    return parser
-
-
-def _list(arguments: argparse.Namespace, values: Values) -> int:
+def _list(options: _List, values: Values) -> int:
     from fsw.parameters.registry import BY_NAME
 
     shown = {
         name: value
         for name, value in sorted(values.read_all().items())
-        if fnmatch.fnmatchcase(name, arguments.pattern.upper())
-        and not (arguments.changed and name in BY_NAME and value == BY_NAME[name].default)
+        if fnmatch.fnmatchcase(name, options.pattern.upper())
+        and not (options.changed and name in BY_NAME and value == BY_NAME[name].default)
     }
-    _show(shown, as_json=arguments.json)
+    _show(shown, as_json=options.json)
     return DONE
 
 
-def _get(arguments: argparse.Namespace, values: Values) -> int:
+def _get(options: _Get, values: Values) -> int:
     from pandion.param_vehicle import Refused
 
     known = values.read_all()
-    for name in arguments.names:
+    for name in options.names:
         if name not in known:
             raise Refused(unknown_name("parameter", name, known))
-    _show({name: known[name] for name in arguments.names}, as_json=arguments.json)
+    _show({name: known[name] for name in options.names}, as_json=options.json)
     return DONE
 
 
-def _set(arguments: argparse.Namespace, values: Values) -> int:
-    values.write(arguments.name, arguments.value)
-    print(f"{arguments.name} is {_number(arguments.value)}")
+def _set(options: _Set, values: Values) -> int:
+    values.write(options.name, options.value)
+    print(f"{options.name} is {_number(options.value)}")
     return DONE
 
 
-def _import(arguments: argparse.Namespace, values: Values) -> int:
+def _import(options: _File, values: Values) -> int:
     from pandion.param_vehicle import Refused
 
-    wanted, held = _read_file(arguments.path), values.read_all()
+    wanted, held = _read_file(options.path), values.read_all()
     changed = refused = 0
     for name, value in wanted.items():
         if held.get(name) == value:
@@ -195,12 +216,12 @@ def _import(arguments: argparse.Namespace, values: Values) -> int:
     return REFUSED if refused else DONE
 
 
-def _export(arguments: argparse.Namespace, values: Values) -> int:
+def _export(options: _File, values: Values) -> int:
     from fsw.parameters.storage import save
 
     known = values.read_all()
-    save(arguments.path, known)
-    print(f"{len(known)} parameters written to {arguments.path}")
+    save(options.path, known)
+    print(f"{len(known)} parameters written to {options.path}")
     return DONE
 
 
@@ -257,10 +278,10 @@ def _number(value: float) -> str:
     return as_text(value)
 
 
-ACTIONS: Final[dict[str, Callable[[argparse.Namespace, Values], int]]] = {
-    "list": _list,
-    "get": _get,
-    "set": _set,
-    "import": _import,
-    "export": _export,
+ACTIONS: Final[dict[str, tuple[type[_Where], Callable[[Any, Values], int]]]] = {
+    "list": (_List, _list),
+    "get": (_Get, _get),
+    "set": (_Set, _set),
+    "import": (_File, _import),
+    "export": (_File, _export),
 }

@@ -82,7 +82,7 @@ class ParameterClient:
         raise NoAnswer(f"{missing} came from the vehicle at {self._where}")
 
     def write(self, name: str, value: float) -> None:
-        """Change one parameter.
+        """Change one parameter to ``value`` [the parameter's unit].
 
         Raises:
             Refused: The vehicle's reason.

@@ -10,9 +10,10 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from command_line.options import json_file, option, read, switch
+from command_line.parser import COULD_NOT_START
 from fsw.signals import Origin
-from pandion.output import add_json_option, console_beside, write_text
-from pandion.parser import COULD_NOT_START, Parser
+from pandion.output import console_beside, write_text
 from pandion.progress import Progress
 
 if TYPE_CHECKING:
@@ -25,27 +26,21 @@ SAME, DIFFERS = 0, 1  # exit codes
 _NOTES_SHOWN = 5
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ReplayOptions:
     """One replay."""
 
-    log: Path
-    verify: bool
-    json: str | None
+    log: Path = option("LOG", "flight.ulg, or its directory", Path, required=True)
+    verify: bool = switch(
+        "--verify", "feed the inputs through the same tick; exit code 1 at the first difference"
+    )
+    json: str | None = json_file("the result")
 
 
 def main(argv: list[str]) -> int:
     """Read a log, and compare if asked; returns the exit code."""
-    parser = Parser("pandion replay", "Show what a flight log holds, or fly its inputs again.")
-    parser.add_argument("log", metavar="LOG", type=Path, help="flight.ulg, or its directory")
-    parser.add_argument(
-        "--verify",
-        action="store_true",
-        help="feed the inputs through the same tick; exit code 1 at the first difference",
-    )
-    add_json_option(parser, "the result")
-    read = parser.read(argv)
-    options = ReplayOptions(read.log, read.verify, read.json)
+    what = "Show what a flight log holds, or fly its inputs again."
+    options = read(ReplayOptions, "pandion replay", what, argv)
     from fsw.log.reader import open_flight
     from messages.ulog_reader import UlogError
 
@@ -79,18 +74,12 @@ def _verify(options: ReplayOptions, log: UlogFile) -> int:
 
 def _program(log: UlogFile) -> FlightProgram[Any]:
     """The flight software of this build, configured by the names in the log."""
-    from fsw.parameters.control_choice import ControlChoice
+    from fsw.parameters.control_choice import choice_of
     from fsw.runtime.assembly import flight_software
     from fsw.runtime.replay import fact
 
     return flight_software(
-        ControlChoice(
-            controller=fact(log, "controller"),
-            inner=fact(log, "inner"),
-            robustness=fact(log, "robustness"),
-            solver=fact(log, "solver"),
-            soft=fact(log, "soft") != "0",
-        ),
+        choice_of(partial(fact, log)),
         origin=_origin(log),
         to_plan=False,
     )

@@ -12,10 +12,10 @@ from pathlib import Path
 from types import FrameType
 from typing import Any, Final
 
+from command_line.parser import COULD_NOT_START
 from pandion.children import Child, Event
 from pandion.display import Display
 from pandion.leaving import GRACE_S, Leaving
-from pandion.parser import COULD_NOT_START
 from pandion.processor import ANYWHERE, Places
 
 _LISTEN_S: Final = 30.0  # until sitl has bound its port

@@ -12,10 +12,10 @@ import math
 from dataclasses import dataclass
 
 from fsw.control.braking import Brake
+from fsw.flight.plan_exchange import plan_input
 from fsw.model.airframe import AIRFRAME
 from fsw.mpc.planner import Planner
 from fsw.parameters.flight_config import FlightConfig
-from fsw.runtime.planning import plan_input
 from fsw.signals import Plan, PlanInput, PlanRequest, PredictionState, Vec2, Vec3
 from sitl.disturbances.items import push
 from sitl.flight_evaluator import FlightEvaluator, Points
@@ -161,12 +161,12 @@ def fly(
     Args:
         scenario: With a trajectory that starts in the air.
         seed: Of every random number of the plant.
-        config: Its planner is flown; give it ``LagModel(at_once=True)``.
+        config: Its planner is flown; give it ``AttitudeLag(at_once=True)``.
         traced: Keep the truth for figures.
     """
     plant = DoubleIntegrator(scenario, seed)
-    planner = Planner(config.planner, processor_time_us)
-    brake = Brake(config.planner.lag, config.planner.limits.tilt)
+    planner = Planner(config.planner, config.airframe, processor_time_us)
+    brake = Brake(config.airframe, config.planner.limits.tilt)
     recorder = FlightRecorder()
     held, running = safe_set(scenario), None
     steps = config.mpc_period_us // STEP_US

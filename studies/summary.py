@@ -96,12 +96,12 @@ def seen(summary: Summary) -> str:
 
 
 def metres(value: float | None, digits: int = 4) -> str:
-    """A length for a table."""
+    """A length ``value`` [m] for a table."""
     return "–" if value is None else f"{value:.{digits}f}"
 
 
 def millimetres(value: float | None) -> str:
-    """A margin for a table, with its sign."""
+    """A margin ``value`` [m] for a table, in millimetres and with its sign."""
     return "–" if value is None else f"{1000.0 * value:+.1f}"
 
 

@@ -4,17 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Final, cast
 
-from fsw.link.wire import decode, decode_setpoints, message_ids
+from fsw.geometry.geodesy import DEFAULT_ORIGIN, to_local
+from fsw.link.wire import decode, decode_commands, decode_setpoints, message_ids
 from fsw.link.wire.decode import Numbers
 from fsw.signals import (
     AttitudeSetpoint,
+    Command,
     CommandRequest,
     EndEffectorTarget,
     JointSetpoint,
     MissionUpdate,
     MotionSetpoint,
+    Origin,
     Plan,
     PlanFailure,
     PointObstacle,
@@ -52,9 +56,11 @@ class Inbox:
     Bounded: what does not fit is dropped and counted, as a lost datagram would be.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, origin: Origin = DEFAULT_ORIGIN) -> None:
+        """Begin empty; commands name places on Earth, from ``origin`` of the local frame on."""
+        self._locate = partial(to_local, origin)
         self.refused = 0  # messages with numbers of no use, or too many of them
-        self._commands: list[CommandRequest] = []
+        self._commands: list[Command] = []
         self._targets: list[EndEffectorTarget] = []
         self._setpoints = NO_SETPOINTS
         self._station_heard = False
@@ -86,7 +92,7 @@ class Inbox:
         if handler is not None:
             handler(frame)
 
-    def take_commands(self) -> tuple[CommandRequest, ...]:
+    def take_commands(self) -> tuple[Command, ...]:
         """Hand over the commands, in order of arrival."""
         if not self._commands:
             return ()
@@ -166,7 +172,7 @@ class Inbox:
         if len(self._commands) >= _MAX_COMMANDS:
             self.refused += 1
             return
-        self._commands.append(request)
+        self._commands.append(decode_commands.command(request, self._locate))
 
     def _target(self, frame: Frame) -> None:
         values = cast(Numbers, frame.payload_values)

@@ -16,7 +16,7 @@ from typing import Any, Final
 from fsw.geometry.rotation import quaternion_from_matrix
 from fsw.log import topics
 from fsw.log.json_codec import JsonCodec
-from fsw.model.arm_kinematics import point_in_flight
+from fsw.model.kinematics import point_in_flight
 from fsw.signals import (
     CommandRequest,
     FlightSnapshot,
@@ -208,7 +208,7 @@ class LogEncoder:
             _add_text(t_us, name, self.inputs.encode(name, value), out)
             if name == "commands":
                 for command in inputs.commands:
-                    out += _command(t_us, command)
+                    out += _command(t_us, command.request)
 
     def _planning(self, snapshot: FlightSnapshot) -> bytes:
         t_us, report, target = snapshot.t_us, snapshot.constraints, snapshot.reference

@@ -1,4 +1,4 @@
-"""Writes the table of topics into docs/flight-log.md: ``python -m fsw.log.reference``."""
+"""Writes the table of topics into docs/reference/flight-log.md: ``python -m fsw.log.reference``."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from fsw.log.topics import TOPICS
 from messages.ground_truth import TRUTH_TOPICS
 from messages.ulog import Field, Topic
 
-PAGE: Final = Path("docs/flight-log.md")
+PAGE: Final = Path("docs/reference/flight-log.md")
 BEGIN: Final = "<!-- topics: python -m fsw.log.reference -->\n"
 END: Final = "<!-- end -->"
 

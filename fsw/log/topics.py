@@ -1,4 +1,4 @@
-"""The topics of a flight log: one table, which the writer, the reader and docs/flight-log.md use.
+"""The topics of a flight log: one table for the writer, the reader and the page of topics.
 
 Where PX4 has a topic of the same meaning, name, fields and units are PX4's, so that its tools
 show a flight of Pandion; a topic may have fewer fields than there. What is fed back by

@@ -5,7 +5,7 @@ limits are evaluated at the iterate itself through the same linearisation, whose
 U says everything at U (cost, slope, margins and their slopes). Slacks are unknowns as well, so
 that both optimisers minimise the same sum.
 
-Source: docs/paper-and-us.md (the paper solves eq 17 by SLSQP with numeric gradients).
+Source: docs/reference/paper-comparison.md (the paper solves eq 17 by SLSQP with numeric gradients).
 """
 
 from __future__ import annotations

@@ -28,9 +28,9 @@ from fsw.link.services.mission_wire import (
 )
 from fsw.link.wire import message_ids as ids
 from fsw.link.wire.decode import Numbers, for_this_vehicle
+from fsw.link.wire.mission_items import DENIED, UNSUPPORTED, MissionItem, Refused
 from fsw.link.wire.outgoing import Outgoing, ServiceOutput
 from fsw.signals import Severity, StatusText
-from fsw.vehicle.mission_items import DENIED, UNSUPPORTED, MissionItem, Refused
 from messages.frames import Frame
 
 _ReadItem = Callable[[Numbers], MissionItem | Refused]

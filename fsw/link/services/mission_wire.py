@@ -7,16 +7,16 @@ from typing import Final, cast
 
 from fsw.link.wire import message_ids as ids
 from fsw.link.wire.decode import Numbers
-from fsw.link.wire.outgoing import Outgoing, WireValues
-from fsw.link.wire.telemetry_context import PlanIds, TelemetryContext
-from fsw.signals import FlightSnapshot, MissionProgress, MissionState, Mode, Vec4
-from fsw.vehicle.mission_items import (
+from fsw.link.wire.mission_items import (
     INVALID_PARAM1,
     LOCAL_FRAMES,
     NO_PLACE,
     MissionItem,
     Refused,
 )
+from fsw.link.wire.outgoing import Outgoing, WireValues
+from fsw.link.wire.telemetry_context import PlanIds, TelemetryContext
+from fsw.signals import FlightSnapshot, MissionProgress, MissionState, Mode, Vec4
 
 Peer = tuple[int, int]
 """System and component of a client."""

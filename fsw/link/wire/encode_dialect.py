@@ -13,7 +13,7 @@ from typing import Final
 from fsw.link.wire.encode_setpoints import as_asked
 from fsw.link.wire.outgoing import WireValues
 from fsw.link.wire.telemetry_context import TelemetryContext
-from fsw.model.arm_kinematics import point_in_flight
+from fsw.model.kinematics import point_in_flight
 from fsw.ports import GroupTiming
 from fsw.signals import FlightSnapshot, SetpointKind, Vec2, Vec4
 

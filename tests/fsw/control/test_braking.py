@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 import random
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -18,16 +19,15 @@ from hypothesis import strategies as st
 
 from fsw.barriers.root import root
 from fsw.control.braking import Brake, BrakeTuning
-from fsw.model.airframe import AIRFRAME, GRAVITY
+from fsw.model.airframe import AIRFRAME, GRAVITY, AttitudeLag
 from fsw.model.nominal import NominalModel
-from fsw.model.prediction import LagModel
 from fsw.mpc.planner_config import PlannerConfig
 from fsw.mpc.program import InputLimits
 from fsw.signals import PlanInput, PredictionState, Vec3
 
 DT = 0.002
-MODEL = NominalModel(LagModel(), DT)
-BRAKE = Brake(LagModel(), InputLimits().tilt)
+MODEL = NominalModel(AIRFRAME, DT)
+BRAKE = Brake(AIRFRAME, InputLimits().tilt)
 WALLS = PlannerConfig().walls
 TAKEN_BACK_S = 0.3  # by when the tilt of now no longer accelerates
 STILL: Vec3 = (0.0, 0.0, 0.0)
@@ -116,7 +116,7 @@ def test_whoever_keeps_lambda_stops_before_the_wall(seed: int) -> None:
     st.floats(math.radians(2.0), math.radians(30.0)),
 )
 def test_braking_is_within_the_plans_tilt(v: Vec3, a: Vec3, tilt: float) -> None:
-    u = Brake(LagModel(), tilt)(state(v, a))
+    u = Brake(AIRFRAME, tilt)(state(v, a))
     assert math.hypot(u.a[0], u.a[1]) <= math.tan(tilt) * (GRAVITY - u.a[2]) + 1e-9
 
 
@@ -161,5 +161,7 @@ def test_at_rest_nothing_is_asked_for() -> None:
 
 
 def test_the_paper_s_model_is_braked_without_a_lag() -> None:
-    u = Brake(LagModel(at_once=True), InputLimits().tilt)(state((0.1, 0.0, 0.0), (5.0, 0.0, 0.0)))
+    u = Brake(replace(AIRFRAME, attitude_lag=AttitudeLag(at_once=True)), InputLimits().tilt)(
+        state((0.1, 0.0, 0.0), (5.0, 0.0, 0.0))
+    )
     assert -2.0 < u.a[0] < -0.5

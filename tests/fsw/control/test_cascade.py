@@ -12,7 +12,7 @@ from fsw.control.attitude import attitude_pid, attitude_reference
 from fsw.control.cascade import Cascade, Inner, in_hover
 from fsw.control.inner_tuning import InnerTuning
 from fsw.model.airframe import AIRFRAME
-from fsw.model.prediction import Array, LagModel
+from fsw.model.prediction import Array
 from fsw.signals import ActuatorCommand, PlanInput, PredictionState, StateEstimate, Vec2, Vec3
 from tests.fsw.random_states import estimate_of
 
@@ -39,7 +39,7 @@ def one_step(
     u: PlanInput = NO_INPUT,
     inner: Inner = "tracking",
 ) -> ActuatorCommand:
-    cascade = Cascade(AIRFRAME, LagModel(), TUNING, inner, DT)
+    cascade = Cascade(AIRFRAME, TUNING, inner, DT)
     return cascade.step(in_hover(AIRFRAME, estimate), estimate, plan, u)[0]
 
 
@@ -112,7 +112,7 @@ def test_a_commanded_acceleration_tilts_the_thrust_its_way(inner: Inner) -> None
 
 def test_the_rotor_model_lags_behind_what_was_sent() -> None:
     estimate = turned(0.0)
-    cascade = Cascade(AIRFRAME, LagModel(), TUNING, "tracking", DT)
+    cascade = Cascade(AIRFRAME, TUNING, "tracking", DT)
     memory = in_hover(AIRFRAME, estimate)
     sent = ActuatorCommand((10.0, 10.0, 10.0, 10.0), (0.0, 0.0))
     _, after = cascade.step(memory._replace(commanded=sent), estimate, plan_at(), NO_INPUT)

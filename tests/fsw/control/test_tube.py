@@ -11,7 +11,6 @@ from fsw.control.inner_tuning import TrackingGains, TrackingTuning, tracking_gai
 from fsw.control.tracking import Observed, TrackingLaw, observe, snap_command
 from fsw.control.tube import Tube, peak_snap_share, tube
 from fsw.model.airframe import AIRFRAME
-from fsw.model.prediction import LagModel
 
 DT = 0.002
 # Without limits, so that the loop under test is the linear one the bound is about.
@@ -28,7 +27,7 @@ def _tube() -> Tube:
 
 def _position_under(disturbance: np.ndarray, tuning: TrackingTuning = TUNING) -> np.ndarray:
     """One axis of the loop as it is flown, its law called tick by tick."""
-    law = TrackingLaw(AIRFRAME, LagModel(), tuning, _gains())
+    law = TrackingLaw(AIRFRAME.attitude_lag, tuning, _gains())
     decay = np.exp(-DT / AIRFRAME.rotor_lag)
     p = v = a = j = s = 0.0
     believed = Observed((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))

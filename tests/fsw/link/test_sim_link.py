@@ -197,7 +197,7 @@ def test_of_steps_that_piled_up_the_newest_counts_and_every_message_is_kept(
     newest = wire.link.newest()
     assert newest is not None
     assert newest.t_us == 1_008_000
-    assert [request.command for request in wire.inbox.take_commands()] == [400]
+    assert [one.request.command for one in wire.inbox.take_commands()] == [400]
     assert wire.link.newest() is None
 
 
