@@ -19,7 +19,7 @@ unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
 .PHONY: help setup run test test-long code-checks tests-of-processes tests-of-the-rest interop lock \
-	docs docs-test pictures clean
+	docs docs-test pictures pages clean
 
 help: ## show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-9s %s\n", $$1, $$2 }' Makefile
@@ -86,6 +86,9 @@ docs-test: setup ## run every command and example of the documentation, flights 
 
 pictures: setup ## fly and draw docs/images again
 	$(BIN)/python -m docs.figures
+
+pages: setup ## write the generated pages of docs/reference again
+	@$(BIN)/python -m docs.pages
 
 # A uv that is there is used if it understands what is asked of it; else the pinned one is fetched
 # into .boot with pip alone, because a fresh Debian has neither ensurepip nor a pip that may install.

@@ -65,7 +65,7 @@ def protocol_version(_: FlightSnapshot, __: TelemetryContext) -> WireValues:
 
 
 def available_modes(which: float, _: FlightSnapshot, __: TelemetryContext) -> Sequence[Outgoing]:
-    """AVAILABLE_MODES: all of them, or the one whose number, from 1, is asked for."""
+    """AVAILABLE_MODES: all of them, or the one whose number ``which`` [1], from 1, is asked for."""
     count = len(AVAILABLE_MODES)
     every = not which >= 1.0  # NaN and 0 ask for all
     return [

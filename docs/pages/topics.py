@@ -1,16 +1,14 @@
-"""Writes the table of topics into docs/reference/flight-log.md: ``python -m fsw.log.reference``."""
+"""The table of topics in docs/reference/flight-log.md."""
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Final
 
 from fsw.log.topics import TOPICS
 from messages.ground_truth import TRUTH_TOPICS
 from messages.ulog import Field, Topic
 
-PAGE: Final = Path("docs/reference/flight-log.md")
-BEGIN: Final = "<!-- topics: python -m fsw.log.reference -->\n"
+BEGIN: Final = "<!-- topics: make pages -->\n"
 END: Final = "<!-- end -->"
 
 
@@ -43,8 +41,3 @@ def _fields(topic: Topic) -> str:
 
 def _type(field: Field) -> str:
     return field.declared.split(" ")[0]
-
-
-if __name__ == "__main__":
-    PAGE.write_text(inserted(PAGE.read_text(encoding="utf-8")), encoding="utf-8")
-    print(f"wrote the topics into {PAGE}")
