@@ -14,7 +14,7 @@ END: Final = "<!-- end -->"
 
 def reference() -> str:
     """The topics as Markdown: a table of them, then the fields of each."""
-    rows = ["| topic | written | what it says |", "|---|---|---|"]
+    rows = ["| topic | written | content |", "|---|---|---|"]
     every = (*TOPICS, *TRUTH_TOPICS)
     rows += [f"| [`{t.name}`](#{t.name}) | {t.when} | {t.about} |" for t in every]
     return "\n".join(rows) + "\n\n" + "\n".join(_fields(topic) for topic in every) + "\n"

@@ -18,12 +18,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from sitl.scenario_validation import check
 
 from pandion.__main__ import VERBS, main
 from pandion.reproduce import WHAT
 from sitl.link.encode import StepEncoder
 from sitl.scenario_file import load_scenario, parse_scenario, scenario_names
+from sitl.scenario_validation import check
 from sitl.simulation import Simulation
 from tests.docs.fences import PAGES, ROOT, Fence, commands, fences, named
 
@@ -54,11 +54,14 @@ def pages(*, flights: bool) -> Iterator[Path]:
 
 @pytest.fixture(scope="module")
 def flight(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The directory of one second of ``walls``, flown as a reader flies it."""
+    """The directory of one second of ``walls``, flown as a reader flies it.
+
+    The first flight of a fresh clone compiles the kernels, which takes minutes on a busy machine.
+    """
     out = tmp_path_factory.mktemp("flight") / "flown"
     line = ["fly", "walls", "--duration", "1", "--gcs", "udp:127.0.0.1:9", "--api", "none"]
     subprocess.run(
-        [BIN / "pandion", *line, "--out", out], check=True, capture_output=True, timeout=120.0
+        [BIN / "pandion", *line, "--out", out], check=True, capture_output=True, timeout=400.0
     )
     return out
 
