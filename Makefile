@@ -18,7 +18,7 @@ UV = UV_DEFAULT_INDEX="$${UV_DEFAULT_INDEX:-$(PIP_INDEX)}" .boot/uv
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: help setup run test test-long code-checks tests-of-processes tests-of-the-rest interop lock clean
+.PHONY: help setup run test test-long code-checks tests-of-processes tests-of-the-rest mutate interop lock clean
 
 help: ## show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-9s %s\n", $$1, $$2 }' Makefile
@@ -54,6 +54,18 @@ tests-of-the-rest:
 
 test-long: setup ## the tests that make test leaves out for its four minutes
 	$(BIN)/pytest -m long
+
+# cosmic-ray in an environment of its own; the tests run in .venv, on a copy of the checkout. FILES are
+# files and folders, SAMPLE mutants of each file, drawn with SEED; none of them: every mutant.
+MUTATION := tests/mutation
+.mutation/ready: $(MUTATION)/tool.lock | $(READY)
+	@.boot/uv venv --quiet --allow-existing --no-project --python .venv/bin/python .mutation/tool
+	@$(UV) pip sync --quiet --python .mutation/tool --require-hashes --only-binary :all: $<
+	@touch $@
+
+mutate: setup .mutation/ready ## change fsw a little, see if a test notices: SAMPLE=40 SEED=1 FILES=fsw/mpc JSON=1
+	@PYTHONPATH=. .mutation/tool/bin/python -m tests.mutation.mutate $(FILES) --seed $(or $(SEED),1) \
+		$(if $(SAMPLE),--sample $(SAMPLE)) $(if $(JSON),--json)
 
 # Of other people's clients; each has a lock of its own, and none is needed to fly or to test.
 EXTERNAL := tests/interop/external
@@ -113,9 +125,10 @@ lock: .boot/uv ## renew requirements.lock (to fly) and requirements-dev.lock (to
 	@$(COMPILE) pyproject.toml --group dev --constraints requirements.lock \
 		--output-file requirements-dev.lock
 	@$(COMPILE) --group mavproxy --no-deps --output-file $(EXTERNAL)/mavproxy.lock
-	@git diff --stat -- requirements.lock requirements-dev.lock $(EXTERNAL)/mavproxy.lock
+	@$(COMPILE) --group mutation --no-deps --output-file $(MUTATION)/tool.lock
+	@git diff --stat -- requirements.lock requirements-dev.lock $(EXTERNAL)/mavproxy.lock $(MUTATION)
 
 clean: ## remove the environment, generated files and caches
-	rm -rf .venv .boot .interop build dist messages/dialect.py .mypy_cache .ruff_cache .pytest_cache \
+	rm -rf .venv .boot .interop .mutation build dist messages/dialect.py .mypy_cache .ruff_cache .pytest_cache \
 		.hypothesis .import_linter_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
