@@ -47,31 +47,43 @@ class Count:
         )
 
 
-class Equivalents:
-    """The list of mutants that no test can kill; one that does not exist ends the run."""
+@dataclass(frozen=True)
+class Equivalent:
+    """One entry of the list of mutants that no test can kill."""
 
-    def __init__(self, copy: Copy, entries: list[dict[str, Any]]) -> None:
-        self._listed: dict[str, list[dict[str, Any]]] = {}
-        for entry in entries:
-            self._listed.setdefault(entry["module"], []).append(entry)
-            if not entry.get("reason"):
-                sys.exit(f"mutation.toml gives no reason for: {entry}")
-            exists = (copy.path / entry["module"]).is_file()
-            if not exists or not any(
-                self._is(entry, mutant) for mutant in mutants(copy.path, entry["module"])
-            ):
-                sys.exit(f"mutation.toml lists a mutant that does not exist (any more): {entry}")
+    module: str
+    function: str
+    reason: str
+    line: list[str]  # each of them
+    mutated: list[str] | None = None  # one of them, or whatever is made of the line
+    operator: str = ""  # begins so
 
-    def __contains__(self, mutant: Mutant) -> bool:
-        return any(self._is(entry, mutant) for entry in self._listed.get(mutant.module, []))
-
-    @staticmethod
-    def _is(entry: dict[str, Any], mutant: Mutant) -> bool:
+    def is_about(self, mutant: Mutant) -> bool:
         return (
-            entry["function"] == mutant.function
-            and entry["line"] == mutant.line
-            and entry.get("mutated", mutant.mutated) == mutant.mutated
+            (self.module, self.function) == (mutant.module, mutant.function)
+            and mutant.line in self.line
+            and (self.mutated is None or mutant.mutated in self.mutated)
+            and mutant.operator.startswith(self.operator)
         )
+
+
+def _equivalents(copy: Copy, entries: list[dict[str, Any]]) -> list[Equivalent]:
+    """The list; a mutant in it that does not exist ends the run."""
+    listed = [Equivalent(**entry) for entry in entries]
+    for entry in listed:
+        exists = (copy.path / entry.module).is_file()
+        every = mutants(copy.path, entry.module) if exists else ()
+        meant = [mutant for mutant in every if entry.is_about(mutant)]
+        gone = [f"line: {line}" for line in entry.line if line not in {m.line for m in meant}]
+        gone += [
+            f"mutated: {text}"
+            for text in entry.mutated or []
+            if text not in {m.mutated for m in meant}
+        ]
+        if gone:
+            where = f"{entry.module} {entry.function}"
+            sys.exit(f"mutation.toml lists a mutant that does not exist: {where}\n  {gone[0]}")
+    return listed
 
 
 @dataclass
@@ -145,7 +157,7 @@ class Run:
         work.mkdir(exist_ok=True)
         self._copy = Copy(work)
         self._extra = config["extra_tests"]
-        self._equivalents = Equivalents(self._copy, config.get("equivalent", []))
+        self._equivalents = _equivalents(self._copy, config.get("equivalent", []))
         self.modules = self._copy.modules(options.files or config["folders"])
         self._tests = Tests(work, self._copy)
         self._results = Results(work, self._copy)
@@ -185,7 +197,7 @@ class Run:
             print(f"{counts[0].text()}  [{selection.seconds:.0f} s of tests]", flush=True)
 
     def _count(self, mutant: Mutant, killer: str, counts: tuple[Count, Count]) -> None:
-        is_listed = mutant in self._equivalents
+        is_listed = any(entry.is_about(mutant) for entry in self._equivalents)
         if is_listed and killer:
             sys.exit(f"listed as equivalent, but killed by {killer}:\n{mutant}")
         for count in counts:
