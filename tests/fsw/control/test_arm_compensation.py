@@ -116,8 +116,8 @@ def bent_plan(q_arm: Vec2) -> PredictionState:
     return plan_of(np.random.default_rng(3))._replace(q_arm=q_arm)
 
 
-# Near to a limit of the first joint, near to one of the second link, and the same mirrored. The base
-# leans by what the limits cannot make up for, at a place where compensation is whole.
+# Near to a limit of the first joint, near to one of the second link, and the same mirrored. The
+# base leans by what the limits cannot make up for, at a place where compensation is whole.
 NEAR_A_LIMIT = [
     ((1.0, -0.8), -0.3, 0), ((-1.0, 0.8), 0.3, 0), ((0.3, 1.2), -0.3, 1), ((-0.3, -1.2), 0.3, 1),
 ]  # fmt: skip
@@ -143,7 +143,7 @@ def test_an_arm_that_would_have_to_pass_a_limit_stops_just_before_it(
 
 @pytest.mark.parametrize("away", [0.06, -0.06])
 def test_the_arm_neither_stretches_nor_folds_wholly(away: float) -> None:
-    """The end-effector farther than the arm is long, or nearer than it folds: its direction is held."""
+    """With the end-effector out of reach, or too near, the arm still points at it."""
     reach = LIMITS.reach * LENGTHS.sum() if away > 0.0 else LIMITS.fold * LENGTHS.sum()
     # At equal links the distance of the end-effector is 2 l cos(th2 / 2).
     bend = 2.0 * math.acos((reach - 0.4 * away) / LENGTHS.sum())

@@ -100,7 +100,7 @@ def test_rotations_agree_with_scipy(q: tuple[float, float, float, float]) -> Non
 
 
 def test_each_axis_has_its_own_error_and_its_own_integral() -> None:
-    """At rest, where the output is within its limit, it is kp times error plus ki times integral."""
+    """At rest and within the limit the output is kp times error plus ki times integral."""
     integral: Vec3 = (0.1, -0.2, 0.3)
     roll, pitch, yaw = 0.11, -0.07, 0.4
     at = estimate_of(Rotation.from_euler("ZYX", [yaw, pitch, roll]))
