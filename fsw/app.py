@@ -20,12 +20,12 @@ from fsw.link.services.mission_service import MissionService
 from fsw.link.services.service import LinkService
 from fsw.link.sim_link import Pacing, SimLink
 from fsw.link.udp_endpoint import LinkError, parse_address
-from fsw.link.wire.telemetry_context import LoopHealth, TelemetryContext
+from fsw.link.wire.telemetry_context import TelemetryContext
 from fsw.log.flight_log import LogSubject
 from fsw.log.revision import revision
 from fsw.log.run_directory import new_run_directory
 from fsw.log.run_files import RunFiles
-from fsw.ports import Planner
+from fsw.ports import LoopHealth, PlanningCycle
 from fsw.runtime import clock, report
 from fsw.runtime.effort import EffortRecord
 from fsw.runtime.events import Events, events
@@ -43,7 +43,7 @@ from fsw.runtime.sim_loop import Ending, FlightEnd, FlightRecord, SimLoop
 from fsw.runtime.timing import GroupTimer
 
 if TYPE_CHECKING:
-    from fsw.parameters.kept_file import Keeping
+    from fsw.parameters.kept_file import ParameterFile
 
 DONE, NOT_COMPLETED, COULD_NOT_START = 0, 1, 2  # exit codes
 
@@ -112,7 +112,7 @@ class _Session:
         settle_memory()
         planner = ProcessPlanner(program.planner, clock.now_us, record.mpc)
         keeping.start()
-        inbox = Inbox()
+        inbox = Inbox(options.links.origin)
         start_us = clock.unix_us()
         files = self._files(directory, start_us, program)
         sim = SimLink(simulator, inbox, facts)
@@ -176,18 +176,18 @@ class _Session:
         missions = MissionService(program.missions)
         return parameters, missions, LogService(logs), FtpService(vehicle_files(logs))
 
-    def _keep_parameters(self, program: FlightProgram[Any], directory: Path) -> Keeping:
+    def _keep_parameters(self, program: FlightProgram[Any], directory: Path) -> ParameterFile:
         """Take over the parameters of the vehicle's file, and say what of it is of no use.
 
         Raises:
             CouldNotStart: The file cannot be read or written, or contradicts itself.
         """
-        from fsw.parameters.kept_file import Keeping, KeptFile
+        from fsw.parameters.kept_file import KeptFile, ParameterFile
 
         path, store = self._options.params, program.parameters
         file = KeptFile(path, directory / "parameters.params", store.defaults)
         try:
-            keeping = Keeping(store, file)
+            keeping = ParameterFile(store, file)
         except OSError as error:
             where = path or directory
             raise CouldNotStart(f"cannot keep parameters in {where}: {error.strerror}") from None
@@ -204,7 +204,7 @@ class _Session:
         self,
         loop: SimLoop[Any],
         sim: SimLink,
-        inline: Planner,
+        inline: PlanningCycle,
         planner: ProcessPlanner,
         record: FlightRecord,
     ) -> FlightEnd:

@@ -1,4 +1,4 @@
-"""The reference of messages, in Markdown: who sends what, and every field with its unit.
+"""The reference of messages, in Markdown: senders, rates, and every field with its unit.
 
 ``pandion/message_page.py`` knows the traffic and writes the page.
 """

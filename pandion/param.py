@@ -64,7 +64,7 @@ class FileValues:
             Refused: It is out of range or contradicts the others.
         """
         from fsw.parameters.flight_config import FlightConfig
-        from fsw.parameters.real32 import nearest_decimal
+        from fsw.parameters.float32 import nearest_decimal
         from fsw.parameters.registry import BY_NAME
         from fsw.parameters.storage import save
         from fsw.tuning import tuned
@@ -252,7 +252,7 @@ def _described(name: str, value: float) -> dict[str, Any]:
 
 
 def _number(value: float) -> str:
-    from fsw.parameters.real32 import as_text
+    from fsw.parameters.float32 import as_text
 
     return as_text(value)
 

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from typing import Final, cast
 
 from fsw.link.udp_endpoint import MAX_DATAGRAM, Address
-from fsw.parameters.real32 import nearest_decimal
+from fsw.parameters.float32 import nearest_decimal
 from messages.frames import Frame, FrameWriter, split
 
 _SYSTEM, _COMPONENT = 254, 190  # nobody's ground station

@@ -1,9 +1,10 @@
 """Which processors two halves in lockstep should run on.
 
 In lockstep the halves take turns. On two processors each keeps its caches, and the one that waits
-looks for the datagram instead of sleeping (``messages/eager.py``). On one, the kernel switches from
-one to the other, which is slower (docs/decisions/0017). But looking is of use only while the other
-half runs: on a machine that has more to do, both on the quietest processor is what disturbs least.
+looks for the datagram instead of sleeping (``messages/busy_poll.py``). On one, the kernel switches
+from one to the other, which is slower (docs/decisions/0017). But looking is of use only while the
+other half runs: on a machine that has more to do, both on the quietest processor is what disturbs
+least.
 """
 
 from __future__ import annotations

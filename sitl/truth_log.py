@@ -1,6 +1,6 @@
 """The true state of every step, in a file that the flight software never sees.
 
-``truth.ulg`` is a ULog of its own; whoever started both halves may join it to the flight log.
+``truth.ulg`` is a ULog of its own; ``pandion fly`` joins it to the flight log.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class TruthLog:
             path: Where to write; what is there is replaced, as the simulator's other results are.
             scenario: What is flown.
             seed: The root of its randomness.
-            warn: Told once if the disk refuses; the simulation goes on.
+            warn: Called once if the disk refuses; the simulation goes on.
 
         Raises:
             OSError: The file cannot be created.

@@ -14,7 +14,7 @@ from sitl.plant.vector import Array
 from sitl.scenario import V3, Scenario, Workspace
 from sitl.trajectory import place_on_curve
 
-POINTS = ("base", "joint2", "end_effector")  # critical points, in the order of the paper
+CRITICAL_POINTS = ("base", "joint2", "end_effector")  # critical points, in the order of the paper
 
 
 def workspace_margin(workspace: Workspace, p_base: V3, p_target: V3) -> float:
@@ -32,7 +32,7 @@ class World:
         self.walls = scenario.walls
         self.workspace = scenario.workspace
         names = [one.name for one in self.walls] + [one.name for one in scenario.obstacles]
-        keys = [f"{name}/{point}" for name in names for point in POINTS]
+        keys = [f"{name}/{point}" for name in names for point in CRITICAL_POINTS]
         self._planes = [(*wall.normal, wall.offset_m + wall.clearance_m) for wall in self.walls]
         self.planes = np.array(self._planes).reshape(-1, 4)  # normal, least distance [m]
         self._balls = [(*one.position_m, one.clearance_m) for one in scenario.obstacles]
@@ -76,10 +76,10 @@ class World:
         if max(base, joint2, end) < 0.0 < min(margins, default=1.0):
             return None
         for i, wall in enumerate(self.walls):
-            for k, name in enumerate(POINTS):
-                if not (margins[len(POINTS) * i + k] + wall.clearance_m > 0.0):
+            for k, name in enumerate(CRITICAL_POINTS):
+                if not (margins[len(CRITICAL_POINTS) * i + k] + wall.clearance_m > 0.0):
                     return f"{spoken(name)} hit the {wall.name} wall"
-        for name, point in zip(POINTS, points, strict=True):
+        for name, point in zip(CRITICAL_POINTS, points, strict=True):
             if not (point[2] < 0.0):
                 return f"{spoken(name)} hit the ground"
         return None

@@ -14,6 +14,7 @@ import numpy as np
 from fsw.barriers.robust import required_h
 from fsw.barriers.root import root
 from fsw.barriers.workspace import outward_frame
+from fsw.model.airframe import AIRFRAME
 from fsw.model.linearisation import POINTS, Linearisation
 from fsw.model.prediction import INPUTS, STATES, Array, condense, to_vector
 from fsw.mpc.planner_config import PlannerConfig
@@ -43,7 +44,7 @@ class CasadiMethod:
         from studies.bench_ocp import build
 
         self._config, self._safe_set = config, safe_set
-        self._model = condense(config.lag, config.period, config.horizon)
+        self._model = condense(AIRFRAME, config.period, config.horizon)
         self._horizon = Linearisation(self._model)
         program, parameters = build(config, safe_set)
         self._states, self._controls = program.states, program.controls
@@ -99,7 +100,7 @@ class CasadiMethod:
     def _parameters(self, request: PlanRequest, optimum: Array) -> Array:
         """Start, targets, directions at the optimum and the h that eq 25 requires."""
         start = to_vector(request.start)
-        self._horizon.refill(self._config.airframe, start, optimum)
+        self._horizon.refill(start, optimum)
         yaws = self._horizon.states[:, 13]
         parts: list[Any] = [start]
         for i in range(1, self._config.horizon + 1):
@@ -130,7 +131,7 @@ class CasadiMethod:
             for axis in frame:
                 for n in (axis, -axis):
                     h_start.append(root(sphere.radius - n @ e, tuning.alpha, tuning.slope) - n @ w)
-        return np.array([required_h(h, i, tuning.numbers) for h in h_start])
+        return np.array([required_h(h, i, tuning.numbers(self._config.period)) for h in h_start])
 
 
 def _options(

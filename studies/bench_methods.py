@@ -8,6 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
+from fsw.model.airframe import AIRFRAME
 from fsw.model.prediction import INPUTS, Array, condense, to_vector
 from fsw.mpc.planner import Planner
 from fsw.mpc.planner_config import PlannerConfig, Solver
@@ -52,7 +53,7 @@ class PlannerMethod:
     """The planner as it flies, all of it: request in, plan out."""
 
     def __init__(self, config: PlannerConfig, safe_set: SafeSet, iterations: int) -> None:
-        self._planner = Planner(replace(config, sqp_iterations=iterations), stopwatch_us)
+        self._planner = Planner(replace(config, sqp_iterations=iterations), AIRFRAME, stopwatch_us)
         self._planner.warm_up()
 
     def answer(self, instance: Instance, guess: Array, optimum: Array) -> Answer:
@@ -72,7 +73,7 @@ class SlsqpMethod:
     """The paper's optimiser, from u = 0 as in the paper."""
 
     def __init__(self, config: PlannerConfig, safe_set: SafeSet, gradients: Gradients) -> None:
-        model = condense(config.lag, config.period, config.horizon)
+        model = condense(AIRFRAME, config.period, config.horizon)
         self._problem = Problem(config, model, safe_set)
         self._solver = SlsqpSolver(gradients)
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from fsw.model.airframe import AIRFRAME
 from fsw.model.prediction import Array
 from fsw.mpc.planner import Planner
 from studies.bench_answer import Answer, stopwatch_us
@@ -172,7 +173,7 @@ class _Rivals:
                 None if samples.entry.build is None else samples.entry.build(config, safe_set)
                 for samples in self.samples
             ]
-            found = _Lane(Planner(config, stopwatch_us), Judge(config, safe_set), built)
+            found = _Lane(Planner(config, AIRFRAME, stopwatch_us), Judge(config, safe_set), built)
             self._lanes[instance.case] = found
         return found
 

@@ -16,8 +16,8 @@ import casadi as ca
 import numpy as np
 
 from fsw.barriers.root import BarrierTuning
-from fsw.model.airframe import GRAVITY
-from fsw.model.arm_kinematics import arm_points
+from fsw.model.airframe import AIRFRAME, GRAVITY
+from fsw.model.kinematics import arm_points
 from fsw.model.prediction import INPUTS, Q_ARM, STATES, YAW, YAW_RATE, P, V, discretise
 from fsw.mpc.planner_config import PlannerConfig
 from fsw.signals import SafeSet
@@ -75,7 +75,7 @@ def build(config: PlannerConfig, safe_set: SafeSet) -> tuple[Program, Any]:
     if hasattr(ca.GlobalOptions, "setNumpyMode"):
         ca.GlobalOptions.setNumpyMode(-1)  # symbols stay symbols in numpy's functions, silently
     n, program = config.horizon, Program()
-    a, b = (ca.DM(matrix) for matrix in discretise(config.lag, config.period))
+    a, b = (ca.DM(matrix) for matrix in discretise(AIRFRAME, config.period))
     rows = barrier_rows(safe_set)
     start = ca.SX.sym("start", STATES)
     nodes = [ca.SX.sym(f"node{i}", TARGET + DIRECTIONS + rows) for i in range(1, n + 1)]
@@ -137,8 +137,8 @@ def _node(
         program.cost += barrier * slack[k]
     th1, th12 = x[Q_ARM], x[Q_ARM] + x[Q_ARM + 1]
     for angle, limit in (
-        (th1, config.airframe.joint1_limit),
-        (th12, config.airframe.joint12_limit),
+        (th1, AIRFRAME.joint1_limit),
+        (th12, AIRFRAME.joint12_limit),
     ):
         program.at_least_zero([limit + slack[0] - angle, limit + slack[0] + angle])
     if slack.numel() > 1:
@@ -149,7 +149,7 @@ def _points(config: PlannerConfig, x: Any) -> list[tuple[Any, Any]]:
     """Position and velocity of base, joint 2 and end-effector."""
     out = np.zeros((2, 2, 3), dtype=object)
     plain = arm_points.py_func  # type: ignore[attr-defined]  # the equations, not compiled
-    plain(np.array(ca.vertsplit(x), dtype=object), *config.airframe.link_length, out)
+    plain(np.array(ca.vertsplit(x), dtype=object), *AIRFRAME.link_length, out)
     arm = [(ca.vertcat(*point[0]), ca.vertcat(*point[1])) for point in out]
     return [(x[P : P + 3], x[V : V + 3]), *arm]
 
@@ -157,7 +157,7 @@ def _points(config: PlannerConfig, x: Any) -> list[tuple[Any, Any]]:
 def _add_cost(
     program: Program, config: PlannerConfig, last: bool, x: Any, tip: tuple[Any, Any], node: Any
 ) -> None:
-    w, airframe = config.weights, config.airframe
+    w, airframe = config.weights, AIRFRAME
     target_v = node[3:6] if w.relative_velocity else 0.0
     m1, m2 = airframe.link_mass
     th1, th12 = x[Q_ARM], x[Q_ARM] + x[Q_ARM + 1]
@@ -165,7 +165,7 @@ def _add_cost(
     cog = (moment1 * ca.sin(th1) + m2 * airframe.link_com[1] * ca.sin(th12)) / (m1 + m2)
     program.cost += (w.tracking_terminal if last else w.tracking) * ca.sumsqr(tip[0] - node[:3])
     program.cost += (w.velocity_terminal if last else w.velocity) * ca.sumsqr(tip[1] - target_v)
-    program.cost += (w.arm_cog_terminal if last else w.arm_cog) * cog**2
+    program.cost += (w.arm_com_terminal if last else w.arm_com) * cog**2
     program.cost += w.yaw * (x[YAW] + w.yaw_lead * x[YAW_RATE] - node[6]) ** 2
 
 

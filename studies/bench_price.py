@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fsw.barriers.soft_rows import TargetPoints
+from fsw.model.airframe import AIRFRAME
 from fsw.model.prediction import INPUTS, Array, condense, to_vector
 from fsw.mpc.planner_config import PlannerConfig
 from fsw.mpc.problem import Problem
@@ -18,9 +19,7 @@ class Judge:
     """Prices inputs, and knows the converged solution of a request."""
 
     def __init__(self, config: PlannerConfig, safe_set: SafeSet) -> None:
-        self._problem = Problem(
-            config, condense(config.lag, config.period, config.horizon), safe_set
-        )
+        self._problem = Problem(config, condense(AIRFRAME, config.period, config.horizon), safe_set)
         self._unknowns = INPUTS * config.horizon
 
     def price(self, request: PlanRequest, inputs: Array) -> float:

@@ -10,8 +10,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from fsw.control.cascade import Inner
-from fsw.model.prediction import LagModel
-from fsw.mpc.planner_config import PlannerConfig
+from fsw.model.airframe import AIRFRAME, AttitudeLag
 from fsw.parameters.flight_config import FlightConfig, flight_config
 from sitl.mission_clock import MissionClock
 from sitl.scenario import Scenario
@@ -32,6 +31,7 @@ _TIGHTENING: dict[Case, float] = {"I": 0.08, "II": 0.05}  # m
 # Kept by every other HC: without it, calm flights fail by the micrometres of the solver's
 # tolerance and of the path's curvature between nodes, which is not what is compared.
 _ROUNDING_M = 0.001
+_WITHOUT_LAG = replace(AIRFRAME, attitude_lag=AttitudeLag(at_once=True))
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,28 +63,24 @@ def configuration(
     Inconsistent ones fly as well: what becomes of them is what a study wants to see.
     """
     config = flight_config(controller, inner, soft=True)
-    return config if plant == "full" else replace(config, planner=_at_once(config.planner))
+    return config if plant == "full" else _at_once(config)
 
 
-def _at_once(planner: PlannerConfig) -> PlannerConfig:
-    """The planner for a plant whose acceleration follows at once.
+def _at_once(config: FlightConfig) -> FlightConfig:
+    """The configuration for a plant whose acceleration follows at once.
 
     No lag in the prediction and hence no node that the inputs cannot move. The MPC alone meets
     the disturbance here, so eq 25 needs its whole share, lambda >= d (1 + k_S T / 2) / gamma:
     0.373 m/s for the paper's 0.8 m/s^2 at k_S = 8 /s. The sphere of 75 mm leaves room for it, as
     its centre at rest has h = S(r) = 0.487; at k_S = 4 it would not (0.32 against 0.30).
     """
+    planner = config.planner
     walls, workspace = (
         replace(tuning, skipped_nodes=0, slope=8.0, robustness=0.4)
         for tuning in (planner.walls, planner.workspace)
     )
-    return replace(
-        planner,
-        lag=LagModel(at_once=True),
-        walls=walls,
-        workspace=workspace,
-        barrier_slack=200.0,
-    )
+    planner = replace(planner, walls=walls, workspace=workspace, barrier_slack=200.0)
+    return replace(config, airframe=_WITHOUT_LAG, planner=planner)
 
 
 def with_lambda(config: FlightConfig, robustness: float) -> FlightConfig:
@@ -150,8 +146,7 @@ def entrants(case: Case, plant: PlantName, inner: Inner) -> tuple[Entrant, ...]:
     paper = [("naive", naive), ("hc", hard), ("sc", sc), ("blf", blf)]
     paper.append(("blf-lambda-5", with_lambda(blf, 5.0)))
     if plant == "full":
-        printed = replace(blf.planner, lag=LagModel(at_once=True))
-        paper.append(("blf-no-lag", replace(blf, inner="pid", planner=printed)))
+        paper.append(("blf-no-lag", replace(blf, inner="pid", airframe=_WITHOUT_LAG)))
     return tuple(
         [Entrant("paper", name, config) for name, config in paper]
         + [Entrant("like-for-like", name, config) for name, config in fair]

@@ -11,17 +11,21 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from fsw.flight.autopilot import Autopilot
+from fsw.flight.state import FlightState
 from fsw.mpc.planner import Planner
 from fsw.parameters.flight_config import FlightConfig
-from fsw.runtime.flight_loop import FlightLoop
-from fsw.runtime.flight_state import FlightState
 from fsw.signals import (
+    Arm,
+    Command,
     CommandRequest,
     EndEffectorTarget,
+    Mode,
     Plan,
     PlanFailure,
     PlanRequest,
     SensorFrame,
+    SwitchMode,
     TickInputs,
     TickOutputs,
 )
@@ -40,8 +44,10 @@ from studies.mission import safe_set, target
 _TARGET_US = 100_000  # between points of the reference, as the pilot sends them
 _TARGETS_AHEAD = 20
 _PILOT = (1, 195)
-_ARM = CommandRequest(400, (1.0, *(0.0,) * 6), *_PILOT)
-_FOLLOW = CommandRequest(176, (1.0, 4.0, 11.0, *(0.0,) * 4), *_PILOT)
+_ARM = Command(Arm(), CommandRequest(400, (1.0, *(0.0,) * 6), *_PILOT))
+_FOLLOW = Command(
+    SwitchMode(Mode.TRAJECTORY), CommandRequest(176, (1.0, 4.0, 11.0, *(0.0,) * 4), *_PILOT)
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,9 +99,9 @@ class _Flight:
         self.recorder = FlightRecorder()
         self._safe_set = safe_set(scenario)
         self._config = config
-        self._loop = FlightLoop(config)
+        self._loop = Autopilot(config)
         self._state = FlightState()
-        self._planner = Planner(config.planner, processor_time_us)
+        self._planner = Planner(config.planner, config.airframe, processor_time_us)
         self._answer: _Answer | None = None
         self._steps_per_plan = config.mpc_period_us // config.tick_period_us
         self._traced = traced

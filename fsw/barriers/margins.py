@@ -6,6 +6,7 @@ import math
 
 from fsw.barriers.root import BarrierTuning
 from fsw.barriers.tangent import tangent
+from fsw.geometry.vectors import dot
 from fsw.signals import ConstraintKind, ConstraintReport, EndEffectorTarget, SafeSet, Vec3, Wall
 
 PointMotion = tuple[Vec3, Vec3]  # position [m], velocity [m/s]
@@ -55,7 +56,7 @@ def constraint_report(
 
 
 def _margin_and_rate(wall: Wall, p: Vec3, v: Vec3) -> tuple[float, float]:
-    return _dot(wall.normal, p) - wall.offset - wall.clearance, _dot(wall.normal, v)
+    return dot(wall.normal, p) - wall.offset - wall.clearance, dot(wall.normal, v)
 
 
 def plain_root(distance: float, alpha: float, slope: float) -> float:
@@ -68,7 +69,3 @@ def plain_root(distance: float, alpha: float, slope: float) -> float:
 
 def _root(distance: float, tuning: BarrierTuning) -> float:
     return plain_root(distance, tuning.alpha, tuning.slope)
-
-
-def _dot(a: Vec3, b: Vec3) -> float:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

@@ -23,7 +23,7 @@ from fsw.barriers.tangent import CENTRE_BALL
 from fsw.barriers.wall import gradient_along
 from fsw.compiled import compiled
 from fsw.model.linearisation import POINTS, Linearisation
-from fsw.model.prediction import INPUTS, Array
+from fsw.model.prediction import INPUTS, Array, CondensedModel
 from fsw.signals import PointObstacle
 
 
@@ -36,17 +36,17 @@ class PointObstacleBarrier:
     """Rows for obstacles x critical points x nodes, one slack a node and obstacle."""
 
     def __init__(
-        self, obstacles: tuple[PointObstacle, ...], tuning: BarrierTuning, horizon: int
+        self, obstacles: tuple[PointObstacle, ...], tuning: BarrierTuning, model: CondensedModel
     ) -> None:
-        self._tuning = tuning.numbers
+        self._tuning = tuning.numbers(model.period)
         self._centres = np.array([obstacle.position for obstacle in obstacles]).reshape(-1, 3)
         self._clearances = np.array([obstacle.clearance for obstacle in obstacles])
         self._verticals = vertical_shares(obstacles)
         count = len(obstacles)
-        nodes = np.arange(1 + tuning.skipped_nodes, horizon + 1)
+        nodes = np.arange(1 + tuning.skipped_nodes, model.horizon + 1)
         node, number, _ = np.meshgrid(nodes, np.arange(count), np.arange(POINTS), indexing="ij")
         slack = (node - nodes[0]) * count + number
-        self.rows = SoftRows(node.ravel(), slack.ravel(), INPUTS * horizon)
+        self.rows = SoftRows(node.ravel(), slack.ravel(), INPUTS * model.horizon)
         self._h_start = np.zeros(count * POINTS)
 
     def refill(self, horizon: Linearisation, targets: TargetPoints) -> None:

@@ -38,8 +38,7 @@ class BarrierTuning:
     """Constants of eqs 22, 23 and 25 and of the rows that enforce them.
 
     Raises:
-        ValueError: where the sampled-data conditions ``k_S T <= 1`` and ``gamma T <= 1``
-            fail, or a constant is not positive.
+        ValueError: where a constant is not positive.
     """
 
     alpha: float = 2.0  # m/s^2, deceleration the barrier counts on
@@ -49,30 +48,38 @@ class BarrierTuning:
     # more than the 58 mm the fast loop can be pushed off the plan by 0.8 m/s^2.
     robustness: float = 0.28
     skipped_nodes: int = 1  # first nodes, which the inputs can hardly move
-    period: float = 0.1  # s
 
     def __post_init__(self) -> None:
-        for name in ("alpha", "slope", "gamma", "robustness", "period"):
+        for name in ("alpha", "slope", "gamma", "robustness"):
             value = getattr(self, name)
             if not (0.0 < value < math.inf):
                 raise ValueError(f"barrier {name} is {value}; it must be positive and finite")
+
+    def check_sampling(self, period: float) -> None:
+        """Check the sampled-data conditions ``k_S T <= 1`` and ``gamma T <= 1``.
+
+        Args:
+            period: Of the planner, T [s].
+
+        Raises:
+            ValueError: One of them fails.
+        """
         for name, rate in (("slope", self.slope), ("gamma", self.gamma)):
-            if not (rate * self.period <= 1.0):
+            if not (rate * period <= 1.0):
                 raise ValueError(
-                    f"barrier {name} is {rate} 1/s; at a period of {self.period} s it must not "
-                    f"exceed {1.0 / self.period} 1/s"
+                    f"barrier {name} is {rate} 1/s; at a period of {period} s it must not "
+                    f"exceed {1.0 / period} 1/s"
                 )
 
-    @property
-    def numbers(self) -> BarrierNumbers:
-        """The same, for compiled rows."""
+    def numbers(self, period: float) -> BarrierNumbers:
+        """The same for compiled rows, with the ``period`` [s] of the planner."""
         return BarrierNumbers(
-            self.alpha,
-            self.slope,
-            self.gamma,
-            self.robustness,
-            self.period,
-            1 + self.skipped_nodes,
+            alpha=self.alpha,
+            slope=self.slope,
+            gamma=self.gamma,
+            robustness=self.robustness,
+            period=period,
+            first_node=1 + self.skipped_nodes,
         )
 
 

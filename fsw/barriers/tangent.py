@@ -9,8 +9,7 @@ Source: docs/equations.md E11.
 
 from __future__ import annotations
 
-import math
-
+from fsw.geometry.vectors import dot, norm
 from fsw.signals import PointObstacle, SafeSet, Vec3, Wall
 
 CENTRE_BALL = 0.002  # m; closer to the obstacle its direction is noise and any does
@@ -18,7 +17,7 @@ CENTRE_BALL = 0.002  # m; closer to the obstacle its direction is noise and any 
 
 def distance_to(obstacle: PointObstacle, p: Vec3) -> float:
     """From an obstacle to a point [m]: level where the obstacle is upright."""
-    return math.sqrt(sum(c * c for c in _away(obstacle, p)))
+    return norm(_away(obstacle, p))
 
 
 def tangent(obstacle: PointObstacle, p: Vec3) -> Wall:
@@ -28,11 +27,10 @@ def tangent(obstacle: PointObstacle, p: Vec3) -> Wall:
         obstacle: Whose distance to the point is the wall's.
         p: The point [m].
     """
-    o = obstacle.position
-    x, y, z = _away(obstacle, p)
-    length = math.sqrt(x * x + y * y + z * z)
+    x, y, z = away = _away(obstacle, p)
+    length = norm(away)
     n = (x / length, y / length, z / length) if length > CENTRE_BALL else (1.0, 0.0, 0.0)
-    return Wall(n, n[0] * o[0] + n[1] * o[1] + n[2] * o[2], obstacle.clearance)
+    return Wall(n, dot(n, obstacle.position), obstacle.clearance)
 
 
 def _away(obstacle: PointObstacle, p: Vec3) -> Vec3:

@@ -16,21 +16,23 @@ from fsw.barriers.root import BarrierNumbers, BarrierTuning, root, root_slope
 from fsw.barriers.soft_rows import SoftRows, TargetPoints
 from fsw.compiled import compiled
 from fsw.model.linearisation import POINTS, Linearisation
-from fsw.model.prediction import INPUTS, Array
+from fsw.model.prediction import INPUTS, Array, CondensedModel
 from fsw.signals import Wall
 
 
 class WallBarrier:
     """Rows for walls x critical points x nodes, one slack a node and wall."""
 
-    def __init__(self, walls: tuple[Wall, ...], tuning: BarrierTuning, horizon: int) -> None:
-        self._tuning = tuning.numbers
+    def __init__(
+        self, walls: tuple[Wall, ...], tuning: BarrierTuning, model: CondensedModel
+    ) -> None:
+        self._tuning = tuning.numbers(model.period)
         self._normals = np.array([wall.normal for wall in walls]).reshape(-1, 3)
         self._offsets = np.array([wall.offset + wall.clearance for wall in walls])
-        nodes = np.arange(1 + tuning.skipped_nodes, horizon + 1)
+        nodes = np.arange(1 + tuning.skipped_nodes, model.horizon + 1)
         node, wall, _ = np.meshgrid(nodes, np.arange(len(walls)), np.arange(POINTS), indexing="ij")
         slack = (node - nodes[0]) * len(walls) + wall
-        self.rows = SoftRows(node.ravel(), slack.ravel(), INPUTS * horizon)
+        self.rows = SoftRows(node.ravel(), slack.ravel(), INPUTS * model.horizon)
         self._h_start = np.zeros(len(walls) * POINTS)
 
     def refill(self, horizon: Linearisation, targets: TargetPoints) -> None:

@@ -24,7 +24,7 @@ from fsw.barriers.root import BarrierNumbers, BarrierTuning, root, root_slope
 from fsw.barriers.soft_rows import SoftRows, TargetPoints
 from fsw.compiled import compiled
 from fsw.model.linearisation import BASE, Linearisation
-from fsw.model.prediction import INPUTS, Array
+from fsw.model.prediction import INPUTS, Array, CondensedModel
 from fsw.signals import WorkspaceSphere
 
 DIRECTIONS = 6
@@ -34,13 +34,15 @@ _CENTRE_BALL = 0.002  # m; closer than this the outward ray is noise and any fra
 class WorkspaceBarrier:
     """Rows for six directions x nodes, one slack a node."""
 
-    def __init__(self, sphere: WorkspaceSphere, tuning: BarrierTuning, horizon: int) -> None:
-        self._tuning = tuning.numbers
+    def __init__(
+        self, sphere: WorkspaceSphere, tuning: BarrierTuning, model: CondensedModel
+    ) -> None:
+        self._tuning = tuning.numbers(model.period)
         self._radius = sphere.radius
         self._offset = np.array(sphere.centre_from_target)
-        nodes = np.arange(1 + tuning.skipped_nodes, horizon + 1)
+        nodes = np.arange(1 + tuning.skipped_nodes, model.horizon + 1)
         node = np.repeat(nodes, DIRECTIONS)
-        self.rows = SoftRows(node, node - nodes[0], INPUTS * horizon)
+        self.rows = SoftRows(node, node - nodes[0], INPUTS * model.horizon)
         self._h_start = np.zeros(1)
 
     def refill(self, horizon: Linearisation, targets: TargetPoints) -> None:

@@ -17,9 +17,9 @@ from fsw.control.joints import joint_torques
 from fsw.control.pid import PidGains
 from fsw.control.tracking import Observed, TrackingLaw, follow_plan, observe
 from fsw.geometry.rotation import wrap_angle
+from fsw.geometry.vectors import clamp_magnitude
 from fsw.model.airframe import GRAVITY, Airframe
 from fsw.model.nominal import REST_INPUT, REST_STATE
-from fsw.model.prediction import LagModel
 from fsw.model.rotors import MotionState, lag_rotors, motion_state, rotor_decay, weigh
 from fsw.signals import (
     STOPPED,
@@ -87,14 +87,11 @@ class CascadeLaw:
 class Cascade:
     """The inner loops of one configuration; laws are pure, memory goes in and comes out."""
 
-    def __init__(
-        self, airframe: Airframe, lag: LagModel, tuning: InnerTuning, inner: Inner, dt: float
-    ) -> None:
+    def __init__(self, airframe: Airframe, tuning: InnerTuning, inner: Inner, dt: float) -> None:
         """Choose the inner loop and design its gains, before flight.
 
         Args:
             airframe: The vehicle.
-            lag: Attitude model of the plan.
             tuning: Gains of every loop.
             inner: ``tracking`` follows the plan's state, ``pid`` only its acceleration.
             dt: Tick length [s].
@@ -103,7 +100,7 @@ class Cascade:
         self.law = CascadeLaw(
             airframe,
             tuning,
-            TrackingLaw(airframe, lag, tuning.tracking, gains),
+            TrackingLaw(airframe.attitude_lag, tuning.tracking, gains),
             inner == "tracking",
             rotor_decay(airframe, dt),
             dt,
@@ -218,7 +215,7 @@ def _close_loops(
 def _yaw_correction(gains: PidGains, estimate: StateEstimate, plan: PredictionState) -> float:
     error = wrap_angle(plan.yaw - estimate.yaw)
     raw = gains.kp * error + gains.kd * (plan.yaw_rate - estimate.w_WB_B[2])
-    return min(max(raw, -gains.limit), gains.limit)
+    return clamp_magnitude(raw, gains.limit)
 
 
 @compilable

@@ -24,8 +24,8 @@ from typing import NamedTuple
 
 from fsw.compiled import compilable
 from fsw.control.inner_tuning import TrackingGains, TrackingTuning
-from fsw.model.airframe import GRAVITY, Airframe
-from fsw.model.prediction import LagModel
+from fsw.geometry.vectors import clamp_magnitude
+from fsw.model.airframe import GRAVITY, AttitudeLag
 from fsw.model.rotors import MotionState
 from fsw.signals import PlanInput, PredictionState, StateEstimate, Vec2, Vec3
 
@@ -36,8 +36,7 @@ _LEAST_SPECIFIC_THRUST = 2.0  # m/s^2; below it tilt hardly accelerates the vehi
 class TrackingLaw:
     """Everything the law needs that does not change in flight."""
 
-    airframe: Airframe
-    lag: LagModel
+    lag: AttitudeLag
     tuning: TrackingTuning
     gains: TrackingGains
 
@@ -70,8 +69,8 @@ def observe(memory: Observed, v: Vec3, a: Vec3, tuning: TrackingTuning, dt: floa
     vy, dy = _observe_axis(memory.v[1], memory.d[1], v[1], a[1], bandwidth, dt)
     vz, dz = _observe_axis(memory.v[2], memory.d[2], v[2], a[2], bandwidth, dt)
     share, most = min(dt / tuning.wind_time, 1.0), tuning.wind_limit
-    wind_x = _limit(memory.lasting[0] + share * (dx - memory.lasting[0]), most)
-    wind_y = _limit(memory.lasting[1] + share * (dy - memory.lasting[1]), most)
+    wind_x = clamp_magnitude(memory.lasting[0] + share * (dx - memory.lasting[0]), most)
+    wind_y = clamp_magnitude(memory.lasting[1] + share * (dy - memory.lasting[1]), most)
     return Observed((vx, vy, vz), (dx, dy, dz), (wind_x, wind_y))
 
 
@@ -106,14 +105,14 @@ def snap_command(
     tuning, lag = law.tuning, law.lag
     k = law.gains.k
     k1, k2, k3, k4, k5 = k[0], k[1], k[2], k[3], k[4]
-    e_p = _limit(e_p, tuning.position_error_limit)
+    e_p = clamp_magnitude(e_p, tuning.position_error_limit)
     passing = law.gains.k_disturbance * (d - lasting)
     wanted_a = a_plan + (k1 * e_p + k2 * e_v - passing) / k3 - lasting
-    wanted_a = _limit(wanted_a, tuning.acceleration_limit)
+    wanted_a = clamp_magnitude(wanted_a, tuning.acceleration_limit)
     wanted_j = j_plan + k3 / k4 * (wanted_a - a)
     # A jerk that can still be stopped before the acceleration overshoots.
     stoppable = math.sqrt(60.0 * (abs(wanted_a - a) + 0.15))
-    wanted_j = _limit(wanted_j, min(tuning.jerk_limit, stoppable))
+    wanted_j = clamp_magnitude(wanted_j, min(tuning.jerk_limit, stoppable))
     return lag.kp * (u - a_plan) - lag.kd * j_plan + k5 * e_s + k4 * (wanted_j - j)
 
 
@@ -130,7 +129,7 @@ def follow_plan(
     """Angular acceleration about body x and y [rad/s^2] and total thrust [N].
 
     Args:
-        law: Airframe, lag and gains.
+        law: Lag of the attitude, tuning and gains.
         mass: Of the whole vehicle, as weighed in flight [kg].
         estimate: The vehicle now.
         motion: Its acceleration, jerk and snap.
@@ -180,8 +179,3 @@ def _horizontal_snap(
         plan.j[axis],
         u.a[axis],
     )
-
-
-@compilable
-def _limit(value: float, bound: float) -> float:
-    return min(max(value, -bound), bound)

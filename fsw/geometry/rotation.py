@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from fsw.compiled import compilable
+from fsw.geometry.vectors import clamp_magnitude
 from fsw.signals import Mat3, Vec3, Vec4
 
 
@@ -39,7 +40,7 @@ def yaw_of(R: Mat3) -> float:
 @compilable
 def euler_zyx(R: Mat3) -> Vec3:
     """Roll, pitch and yaw of a rotation [rad]."""
-    return math.atan2(R[7], R[8]), -math.asin(min(max(R[6], -1.0), 1.0)), yaw_of(R)
+    return math.atan2(R[7], R[8]), -math.asin(clamp_magnitude(R[6], 1.0)), yaw_of(R)
 
 
 def quaternion_from_matrix(R: Mat3) -> Vec4:
@@ -73,6 +74,17 @@ def rotate(R: Mat3, v: Vec3) -> Vec3:
         R[0] * x + R[1] * y + R[2] * z,
         R[3] * x + R[4] * y + R[5] * z,
         R[6] * x + R[7] * y + R[8] * z,
+    )
+
+
+@compilable
+def rotate_back(R: Mat3, v: Vec3) -> Vec3:
+    """Body components of a world vector."""
+    x, y, z = v
+    return (
+        R[0] * x + R[3] * y + R[6] * z,
+        R[1] * x + R[4] * y + R[7] * z,
+        R[2] * x + R[5] * y + R[8] * z,
     )
 
 

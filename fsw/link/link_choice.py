@@ -18,12 +18,12 @@ AUTOPILOTS: Final = {"px4": PX4, "generic": GENERIC}
 
 @dataclass(frozen=True, slots=True)
 class LinkChoice:
-    """Where telemetry goes and who is heard; the defaults are those of the command line."""
+    """Addresses of the links; the defaults are those of the command line."""
 
     gcs: str = "udp:127.0.0.1:14550"  # udp:HOST:PORT of the ground station
     api: str = "udp:127.0.0.1:14540"  # the same of a program, or "none"
     allow_remote: bool = False  # hear other machines though both are on this one
-    autopilot: str = "px4"  # or "generic": what the vehicle says it is
+    autopilot: str = "px4"  # or "generic": MAV_AUTOPILOT reported in HEARTBEAT
     origin: Origin = DEFAULT_ORIGIN  # where on Earth the local frame begins
     keys: Path | None = None  # directory of the signing keys; None: default_keys()
 
@@ -81,6 +81,6 @@ def addresses(choice: LinkChoice) -> LinkAddresses:
 
 
 def default_keys() -> Path:
-    """Where signing keys are kept unless told otherwise."""
+    """Default directory of signing keys."""
     state = os.environ.get("XDG_STATE_HOME")
     return (Path(state) if state else Path.home() / ".local" / "state") / "pandion"

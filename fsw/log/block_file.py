@@ -3,7 +3,7 @@
 In real time a thread writes: a slow disk must not stop a tick. What waits is bounded, and a block
 that finds no room is dropped and counted. In lockstep the caller writes: then nothing can be
 dropped and the file is the same on every machine. A disk that refuses ends the file, not the
-flight; the reason is kept for whoever asks.
+flight; the reason is kept in ``failure``.
 """
 
 from __future__ import annotations

@@ -106,7 +106,7 @@ class FlightLog:
         self._records += loop_timing(t_us, group, counts, times)
 
     def add_notice(self, t_us: int, notice: StatusText) -> None:
-        """Append what the loop said; a replay of the tick does not say it again."""
+        """Append a text of the loop; a replay of the tick does not repeat it."""
         self._records += ulog.tagged_text(notice.severity & 7, _OF_THE_LOOP, t_us, notice.text)
 
     def close(self) -> None:

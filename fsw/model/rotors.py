@@ -18,6 +18,7 @@ import math
 from typing import NamedTuple
 
 from fsw.compiled import compilable
+from fsw.geometry.vectors import clamp
 from fsw.model.airframe import GRAVITY, Airframe
 from fsw.signals import StateEstimate, Vec2, Vec3, Vec4
 
@@ -70,7 +71,7 @@ def weigh(
     if not (thrust > _WEIGHING_THRUST * airframe.mass and specific_force > _WEIGHING_THRUST):
         return mass  # hardly flying: a quotient of small numbers
     moved = mass + seconds / _WEIGHING_TIME * (thrust / specific_force - mass)
-    return min(max(moved, 0.7 * airframe.mass), 1.3 * airframe.mass)
+    return clamp(moved, 0.7 * airframe.mass, 1.3 * airframe.mass)
 
 
 @compilable

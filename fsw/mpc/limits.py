@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from fsw.barriers.soft_rows import SoftRows
-from fsw.model.airframe import Airframe
 from fsw.model.linearisation import Linearisation
 from fsw.model.prediction import INPUTS, Q_ARM, CondensedModel
 
@@ -15,7 +14,8 @@ _LIMITED = np.array([[1.0, 0.0], [-1.0, 0.0], [1.0, 1.0], [-1.0, -1.0]])  # +-th
 class JointLimits:
     """``|th1|`` and ``|th1 + th2|`` within their limits at every node, one slack a node."""
 
-    def __init__(self, airframe: Airframe, model: CondensedModel) -> None:
+    def __init__(self, model: CondensedModel) -> None:
+        airframe = model.airframe
         nodes = np.repeat(np.arange(1, model.horizon + 1), len(_LIMITED))
         self.rows = SoftRows(nodes, nodes - 1, INPUTS * model.horizon)
         limits = np.array([airframe.joint1_limit] * 2 + [airframe.joint12_limit] * 2)

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fsw.barriers.soft_rows import TargetPoints
+from fsw.model.airframe import Airframe
 from fsw.model.prediction import INPUTS, Array, condense, to_vector
 from fsw.mpc.planner_config import PlannerConfig
 from fsw.mpc.problem import Problem
@@ -56,18 +57,21 @@ class Planner:
     tuning; everything else comes with the request.
     """
 
-    def __init__(self, config: PlannerConfig, stopwatch_us: Callable[[], float]) -> None:
+    def __init__(
+        self, config: PlannerConfig, airframe: Airframe, stopwatch_us: Callable[[], float]
+    ) -> None:
         """Build the prediction model.
 
         Args:
             config: Horizon, weights, limits and barriers.
+            airframe: What the prediction model describes.
             stopwatch_us: Monotonic time for the reported stage times only [us].
         """
         self._untuned = self._config = config
         self._tuning: Tuning = ()
         self._stopwatch_us = stopwatch_us
-        self._period_us = round(config.period * 1e6)
-        self._model = condense(config.lag, config.period, config.horizon)
+        self._period_us = config.period_us
+        self._model = condense(airframe, config.period, config.horizon)
         self._safe_set: SafeSet | None = None
         self._problem: Problem | None = None
         self._inputs: Array = np.zeros(INPUTS * config.horizon)

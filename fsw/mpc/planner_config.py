@@ -6,11 +6,10 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from fsw.barriers.root import BarrierTuning
-from fsw.model.airframe import AIRFRAME, Airframe
-from fsw.model.prediction import LagModel
 from fsw.mpc.costs import CostWeights
 from fsw.mpc.program import InputLimits
 from fsw.mpc.soft_costs import SoftWeights
+from fsw.periods import PLANNING_US
 
 Solver = Literal["clarabel", "slsqp"]  # slsqp: the paper's, with numeric gradients
 
@@ -21,11 +20,9 @@ class PlannerConfig:
 
     controller: str = "blf"  # a name in variants.py
     horizon: int = 5  # n
-    period: float = 0.1  # s, T
+    period_us: int = PLANNING_US  # T
     solver: Solver = "clarabel"
     sqp_iterations: int = 2  # slsqp goes on until it converges
-    airframe: Airframe = AIRFRAME
-    lag: LagModel = field(default_factory=LagModel)
     weights: CostWeights = field(default_factory=CostWeights)
     limits: InputLimits = field(default_factory=InputLimits)
     joint_slack: float = 50.0  # price of a rad outside the limits
@@ -41,3 +38,14 @@ class PlannerConfig:
     # sc, and naive with centring
     soft: SoftWeights = field(default_factory=SoftWeights)
     centred: bool = False
+
+    def __post_init__(self) -> None:
+        if not self.period_us > 0:
+            raise ValueError(f"the planner's period is {self.period_us} us; it must be positive")
+        self.walls.check_sampling(self.period)
+        self.workspace.check_sampling(self.period)
+
+    @property
+    def period(self) -> float:
+        """Of the planner, T [s]."""
+        return self.period_us / 1e6

@@ -5,6 +5,7 @@ from __future__ import annotations
 from fsw.barriers.soft_rows import SoftRows, TargetPoints
 from fsw.model.linearisation import Linearisation
 from fsw.model.prediction import Array, CondensedModel
+from fsw.mpc.costs import Quadratic
 from fsw.mpc.dual_solver import DualSolver
 from fsw.mpc.limits import JointLimits
 from fsw.mpc.planner_config import PlannerConfig
@@ -18,10 +19,9 @@ class Problem:
     """Costs, barrier and limits of one safe set in one program."""
 
     def __init__(self, config: PlannerConfig, model: CondensedModel, safe_set: SafeSet) -> None:
-        self._config = config
         self._horizon = Linearisation(model)
-        self._limits = JointLimits(config.airframe, model)
-        parts = parts_of(config, safe_set)
+        self._limits = JointLimits(model)
+        parts = parts_of(config, model, safe_set)
         self._costs, self._barriers = parts.costs, parts.barriers
         blocks: list[tuple[SoftRows, float | None]] = [(self._limits.rows, config.joint_slack)]
         blocks += [(barrier.rows, parts.slack) for barrier in parts.barriers]
@@ -38,13 +38,11 @@ class Problem:
     def linearise(self, start: Array, guess: Array, targets: TargetPoints) -> None:
         """Refill the program around a guess of the inputs (6 n,) from a start (19,)."""
         program = self._program
-        self._horizon.refill(self._config.airframe, start, guess)
+        self._horizon.refill(start, guess)
         program.hessian[:] = 0.0
         program.linear[:] = 0.0
-        self.cost = sum(
-            cost.add(self._horizon, targets, guess, program.hessian, program.linear)
-            for cost in self._costs
-        )
+        quadratic = Quadratic(guess, program.hessian, program.linear)
+        self.cost = sum(cost.add(self._horizon, targets, quadratic) for cost in self._costs)
         self._limits.refill(self._horizon)
         for barrier in self._barriers:
             barrier.refill(self._horizon, targets)

@@ -58,7 +58,7 @@ def analyse(config: FlightConfig, safe_set: SafeSet, loop: Tube) -> tuple[Findin
             findings.append(_end_effector_tube(tuning, loop, surroundings))
         findings.append(_snap(config, loop, surroundings))
     else:
-        findings.append(_sampled(tuning, surroundings))
+        findings.append(_sampled(tuning, surroundings, config.planner.period))
     return tuple(findings)
 
 
@@ -91,16 +91,21 @@ def stand_off(tuning: BarrierTuning) -> float:
     return tuning.robustness**2 / (2.0 * tuning.alpha) + 0.5 * knee
 
 
-def sampled_robustness(tuning: BarrierTuning, disturbance: float) -> float:
-    """Least lambda that rejects a constant disturbance along the normal in sampled data."""
-    return disturbance * (1.0 + 0.5 * tuning.slope * tuning.period) / tuning.gamma
+def sampled_robustness(tuning: BarrierTuning, disturbance: float, period: float) -> float:
+    """Least lambda that rejects a constant disturbance along the normal in sampled data.
+
+    Args:
+        tuning: Of the barrier.
+        disturbance: On an axis [m/s^2].
+        period: Of the planner [s].
+    """
+    return disturbance * (1.0 + 0.5 * tuning.slope * period) / tuning.gamma
 
 
 def _actuation(
     config: FlightConfig, tuning: BarrierTuning, safe_set: SafeSet, surroundings: Surroundings
 ) -> Finding:
-    tilt = min(config.airframe.tilt_limit, config.planner.limits.tilt)
-    available = GRAVITY * math.tan(tilt)
+    available = GRAVITY * math.tan(config.planner.limits.tilt)
     wanted = tuning.alpha + tuning.gamma * tuning.robustness + surroundings.target_acceleration
     parts = "alpha + gamma lambda + |a_t|"
     if safe_set.sphere is not None:
@@ -190,8 +195,8 @@ def _snap(config: FlightConfig, loop: Tube, surroundings: Surroundings) -> Findi
     )
 
 
-def _sampled(tuning: BarrierTuning, surroundings: Surroundings) -> Finding:
-    least = sampled_robustness(tuning, surroundings.disturbance)
+def _sampled(tuning: BarrierTuning, surroundings: Surroundings, period: float) -> Finding:
+    least = sampled_robustness(tuning, surroundings.disturbance, period)
     margin = (tuning.robustness - least) / tuning.slope
     return _finding(
         "sampled",

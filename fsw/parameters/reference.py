@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 from fsw.parameters.facts import FACTS, Fact
-from fsw.parameters.real32 import as_text
+from fsw.parameters.float32 import as_text
 from fsw.parameters.registry import GROUPS, NO_PARAMETERS, PARAMETERS, Parameter
 
 _HEAD = """\

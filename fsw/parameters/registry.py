@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from fsw.parameters.flight_config import FlightConfig
-from fsw.parameters.real32 import nearest_decimal
+from fsw.parameters.float32 import nearest_decimal
 from fsw.tuning import number_at
 
 _DEGREE: Final = math.pi / 180.0
@@ -141,9 +141,9 @@ _ROWS: Final[dict[str, list[_Row]]] = {
          "weight w_2 of the end-effector's velocity error"),
         ("PLN_W_VEL_N", f"{_WEIGHTS}.velocity_terminal", "", 0.0, 5000.0,
          "the same at the last node, w_s2"),
-        ("PLN_W_COG", f"{_WEIGHTS}.arm_cog", "", 0.0, 1000.0,
+        ("PLN_W_COG", f"{_WEIGHTS}.arm_com", "", 0.0, 1000.0,
          "weight w_3 of the arm's centre of gravity"),
-        ("PLN_W_COG_N", f"{_WEIGHTS}.arm_cog_terminal", "", 0.0, 5000.0,
+        ("PLN_W_COG_N", f"{_WEIGHTS}.arm_com_terminal", "", 0.0, 5000.0,
          "the same at the last node, w_s3"),
         ("PLN_W_POSTURE", f"{_WEIGHTS}.posture", "", 0.0, 100.0,
          "weight of the joints' error, where joints are asked for"),
@@ -223,7 +223,7 @@ _ROWS: Final[dict[str, list[_Row]]] = {
          "yaw acceleration of a steered reference"),
         ("STR_JNT_RATE", "steering.joint_speed", "rad/s", 0.05, 3.0,
          "speed of joints that are moved by command"),
-        ("STR_LEASH", "steering.leash", "m", 0.1, 0.6,
+        ("STR_LEASH", "steering.max_lead_distance", "m", 0.1, 0.6,
          "how far a steered reference runs ahead of the vehicle"),
         ("RTL_RETURN_ALT", "limits.return_height", "m", 0.5, 50.0,
          "height above home on the way back"),
@@ -284,18 +284,13 @@ NO_PARAMETERS: Final[dict[str, str]] = {
     "battery.": "describes the vehicle",
     "origin.": "given at start: single precision is metres off in a latitude",
     "airframe.": "describes the vehicle; scales its actuators and telemetry, which must not change",
-    "planner.airframe.": "the same airframe",
-    "planner.lag.": "the prediction model, identified, not tuned",
     "planner.horizon": "size of the program, which is laid out once",
-    "planner.period": "the planner's grid, counted in ticks everywhere",
+    "planner.period_us": "the planner's grid, counted in ticks everywhere",
     "planner.sqp_iterations": "bounds the time of a planning cycle, which is budgeted",
     "planner.walls.skipped_nodes": "size of the program",
-    "planner.walls.period": "the planner's period",
     "planner.workspace.skipped_nodes": "size of the program",
-    "planner.workspace.period": "the planner's period",
     "planner.hard_skipped_nodes": "size of the program",
     "tick_period_us": "the loop's grid, given by the simulator link",
-    "mpc_period_us": "the planner's grid",
     "plan_delay_ticks": "part of the grid: when answers take effect",
     "catch_up_ticks": "bounds the work of one tick",
 }

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Final
 
 from fsw.parameters.facts import FACT_BY_NAME
-from fsw.parameters.real32 import as_text, nearest_decimal
+from fsw.parameters.float32 import as_text, nearest_decimal
 from fsw.parameters.registry import BY_NAME
 
 VEHICLE: Final = 1  # MAVLink system of the vehicle

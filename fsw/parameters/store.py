@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from fsw.parameters.flight_config import FlightConfig
-from fsw.parameters.real32 import nearest_decimal
+from fsw.parameters.float32 import nearest_decimal
 from fsw.parameters.registry import BY_NAME, PARAMETERS, Parameter
 from fsw.tuning import Tuning
 

@@ -31,7 +31,7 @@ def _swap_sitl() -> None:
     from sitl.simulation import Controls
 
     sender, receiver = _codec(200), _codec(200)
-    general = decode.answer
+    general = decode.read_reply
 
     def datagram(self: Any, readings: Any, messages: Any) -> bytes:
         spoken: bytes = self._spoken(messages)
@@ -45,10 +45,10 @@ def _swap_sitl() -> None:
         wanted = Controls(
             tuple(controls[:4]), tuple(controls[4 : 4 + joints]), bool(message.mode & 128)
         )
-        return decode.Answer(message.time_usec, wanted)
+        return decode.VehicleReply(message.time_usec, wanted)
 
     StepEncoder.datagram = datagram  # type: ignore[method-assign]
-    decode.answer = answer  # type: ignore[assignment]
+    decode.read_reply = answer  # type: ignore[assignment]
 
 
 def step(sender: Any, readings: Any) -> bytes:

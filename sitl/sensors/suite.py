@@ -40,7 +40,7 @@ class DelayLine(Generic[T]):
         return self._line[0]
 
 
-class Noise:
+class GaussianNoise:
     """Gaussian noise from a stream of its own."""
 
     def __init__(self, seed: int, *path: str) -> None:
@@ -92,7 +92,7 @@ class SensorSuite:
         self._encoders: DelayLine[SensorReadings] = DelayLine(steps[2])
         self._exact = sensors == Sensors()
         self._noise = {
-            name: Noise(seed, name)
+            name: GaussianNoise(seed, name)
             for name in ("gyro", "accel", "p", "v", "q", "w", "angle", "rate", "torque")
         }
 

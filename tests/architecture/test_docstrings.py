@@ -51,7 +51,7 @@ def test_every_quantity_has_its_unit_frame_and_shape() -> None:
         ('def f(x: Array) -> None:\n    """Step x [SI]."""', "no shape"),
         ('def f(x: Array) -> None:\n    """Step x (8,) [SI]."""', ""),
         (
-            'def f(x: Array) -> None:\n    """Step.\n\n    Args:\n        x: State (8,) [SI].\n    """',
+            'def f(x: Array) -> None:\n    """Step.\n\n    Args:\n        x: Is (8,) [m].\n    """',
             "",
         ),
     ],

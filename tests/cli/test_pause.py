@@ -44,7 +44,7 @@ def test_a_flight_survives_a_pause(
         if pace == ("--realtime",):
             assert simulator["pauses"] >= 1
             assert pause_s - 0.1 <= simulator["paused_s"] <= pause_s + 0.5
-            assert "sitl: stood still" in said
+            assert "sitl: process was suspended" in said
         else:
             assert simulator["pauses"] == 0
     finally:

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
+from fsw.flight.state import FlightState
+from fsw.flight.tuned_autopilot import TunedAutopilot
+from fsw.geometry.geodesy import DEFAULT_ORIGIN, to_local
+from fsw.link.wire.decode_commands import command as read_command
 from fsw.mpc.planner import Planner
 from fsw.parameters.flight_config import FlightConfig, flight_config
-from fsw.ports import Planner as AnyPlanner
-from fsw.runtime.flight_state import FlightState
-from fsw.runtime.tuned_flight import TunedFlight
+from fsw.ports import PlanningCycle as AnyPlanner
 from fsw.signals import (
     ActuatorCommand,
+    Command,
     CommandRequest,
     EndEffectorTarget,
     FlightSnapshot,
@@ -37,6 +41,7 @@ ARM, TAKEOFF, LAND, SET_MODE = 400, 22, 21, 176
 TARGET_PERIOD_US = 100_000
 TARGETS_AHEAD = 20
 STREAM_STEPS = 25
+LOCATE = partial(to_local, DEFAULT_ORIGIN)
 
 
 def hover(arm_deg: tuple[float, float] | None = None, yaw_deg: float = 0.0) -> Scenario:
@@ -53,7 +58,7 @@ def on_the_ground() -> Scenario:
 
 
 def real_planner(config: FlightConfig) -> Planner:
-    return Planner(config.planner, stopwatch_us=lambda: 0.0)
+    return Planner(config.planner, config.airframe, stopwatch_us=lambda: 0.0)
 
 
 def on_time(_plan_id: int) -> int:
@@ -90,7 +95,7 @@ class Flight:
 
     def __post_init__(self) -> None:
         self.sim = Simulation(self.scenario, self.seed)
-        self.loop = TunedFlight(self.config)
+        self.loop = TunedAutopilot(self.config)
         self.planner = self.planner or real_planner(self.config)
         self.inputs: TickInputs | None = None  # of the last tick
         self._outputs: TickOutputs | None = None
@@ -123,7 +128,7 @@ class Flight:
             self.step()
             assert self.sim.ended is None, self.sim.ended
 
-    def step(self, *commands: CommandRequest, tuning: Tuning | None = None) -> TickOutputs:
+    def step(self, *commands: Command, tuning: Tuning | None = None) -> TickOutputs:
         """Sense, tick, plan, advance."""
         sensors = self.spoil(frame(self.sim.sense()))
         self.inputs = TickInputs(
@@ -191,10 +196,13 @@ class Flight:
         return Controls((f1, f2, f3, f4), torque, outputs.snapshot.armed)
 
 
-def command(number: int, *params: float) -> CommandRequest:
-    """A command whose unused parameters are NaN."""
+def command(
+    number: int, *params: float, frame: int | None = None, confirmation: int = 0
+) -> Command:
+    """A command as the link reads it; parameters that are not used are NaN."""
     p = (*params, *[float("nan")] * (7 - len(params)))
-    return CommandRequest(number, (p[0], p[1], p[2], p[3], p[4], p[5], p[6]), 255, 190)
+    values = (p[0], p[1], p[2], p[3], p[4], p[5], p[6])
+    return read_command(CommandRequest(number, values, 255, 190, confirmation, frame), LOCATE)
 
 
 def frame(readings: SensorReadings) -> SensorFrame:

@@ -12,11 +12,11 @@ from dataclasses import dataclass, field, replace
 
 import pytest
 
+from fsw.flight.failsafe import Condition
 from fsw.model.airframe import GRAVITY
 from fsw.mpc.planner import Planner
 from fsw.parameters.flight_config import flight_config
 from fsw.signals import Mode, Plan, PlanFailure, PlanRequest, TickOutputs
-from fsw.vehicle.faults import Fault
 from sitl.scenario_file import load_scenario
 from tests.closed_loop.harness import ARM, Flight, command, hover, real_planner
 
@@ -86,7 +86,7 @@ def test_a_slow_planner_has_its_response(
     counters = flight.snapshot.counters
     assert counters.missed_deadlines == pytest.approx(missed, abs=1)
     assert counters.fallbacks == pytest.approx(given_up, abs=1)
-    assert (Fault.PLAN_STALE.value in flight.snapshot.failures) == brakes
+    assert (Condition.PLAN_STALE.value in flight.snapshot.failures) == brakes
     if brakes:
         assert math.dist(flight.sim.truth().v_WB, (0.0, 0.0, 0.0)) < 0.15, "disturbed, but held"
     flight.run(END_S - flight.sim.time_s)
@@ -110,7 +110,7 @@ def test_a_planner_that_is_gone_costs_no_barrier(name: str, gone_s: float) -> No
     )
     flight.follow()
     flight.run(gone_s + 3.0)
-    assert Fault.PLAN_STALE.value in flight.snapshot.failures
+    assert Condition.PLAN_STALE.value in flight.snapshot.failures
     assert flight.sim.min_margin_m is not None
     assert flight.sim.min_margin_m > 0.0
 
@@ -124,12 +124,12 @@ def test_without_plans_it_brakes_with_the_tilt_that_the_plan_may_use(tilt_deg: f
     flight = Flight(hover(), config=config, late_ticks=lambda plan: 0 if plan < 60 else 10**9)
     flight.step(command(ARM, 1.0))
     flight.run(0.5)
-    flight.step(replace(command(192, -1.0, 0.0, 0.0, 0.0, 9.0, 0.0, -2.0), frame=1))
+    flight.step(command(192, -1.0, 0.0, 0.0, 0.0, 9.0, 0.0, -2.0, frame=1))
     assert flight.mode is Mode.HOLD
     asked = 0.0
     for _ in range(40):
         flight.run(0.2)
-        if Fault.PLAN_STALE.value in flight.snapshot.failures:
+        if Condition.PLAN_STALE.value in flight.snapshot.failures:
             assert flight.state.nominal is not None
             asked = max(asked, -flight.state.nominal.a[0])
     most = GRAVITY * math.tan(math.radians(tilt_deg))

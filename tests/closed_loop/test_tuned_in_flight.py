@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import pytest
 
+from fsw.flight.autopilot import Autopilot
+from fsw.flight.tuned_autopilot import TunedAutopilot
 from fsw.parameters.flight_config import FlightConfig, flight_config
 from fsw.parameters.registry import PARAMETERS
-from fsw.runtime.flight_loop import FlightLoop
-from fsw.runtime.tuned_flight import TunedFlight
 from fsw.signals import Mode, Plan
 from fsw.tuning import Tuning, part, tuned
 from sitl.scenario_file import load_scenario
@@ -52,7 +52,7 @@ def test_no_tick_mixes_old_and_new() -> None:
     """A tick after a change is that of a vehicle which has never had another tuning."""
     flight = beside_walls()
     flight.step(tuning=EVERYTHING)
-    fresh = FlightLoop(tuned(FlightConfig(), EVERYTHING))
+    fresh = Autopilot(tuned(FlightConfig(), EVERYTHING))
     for _ in range(60):  # more than a planning period
         before = flight.state
         outputs = flight.step()
@@ -70,7 +70,7 @@ def test_the_tick_of_the_change_itself_is_the_new_ones() -> None:
     before = flight.state
     outputs = flight.step(tuning=EVERYTHING)
     assert flight.inputs is not None
-    fresh = FlightLoop(tuned(FlightConfig(), EVERYTHING))
+    fresh = Autopilot(tuned(FlightConfig(), EVERYTHING))
     _, expected = fresh.tick(before, replace(flight.inputs, tuning=None))
     assert outputs.actuators == expected.actuators
     assert outputs.tuning_taken is True
@@ -161,7 +161,7 @@ def test_what_is_broken_already_may_be_mended_in_steps() -> None:
     flight = Flight(load_scenario("walls"), config=config)
     flight.follow()
     flight.step(tuning=TOO_LITTLE_KEPT)
-    strict = TunedFlight(flight_config())
+    strict = TunedAutopilot(flight_config())
     assert flight.inputs is not None
     _, outputs = strict.tick(
         flight.state, replace(flight.inputs, tuning=(("planner.walls.robustness", 0.15),))

@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 
 import pytest
 
+from fsw.flight.failsafe import Condition
 from fsw.mpc.planner import Planner
 from fsw.parameters.flight_config import flight_config
 from fsw.signals import Mode, Plan, PlanFailure, PlanRequest, PlanTimings, SensorFrame, SolverStatus
-from fsw.vehicle.faults import Fault
 from sitl.scenario_file import load_scenario
 from sitl.simulation import START_US, STEP_US
 from tests.closed_loop.harness import ARM, Flight, command, hover, real_planner
@@ -67,8 +67,8 @@ def test_without_plans_the_vehicle_brakes_and_stays_put(first_failure: int) -> N
     flight = Flight(load_scenario("workspace-calm"), config=config, planner=planner)
     flight.follow()
     flight.run(0.1 * first_failure + 0.5)
-    assert Fault.PLAN_STALE.value in flight.snapshot.failures
-    assert f"{Fault.PLAN_STALE.value}: brake" in flight.texts
+    assert Condition.PLAN_STALE.value in flight.snapshot.failures
+    assert f"{Condition.PLAN_STALE.value}: brake" in flight.texts
     braked = flight.sim.truth().p_WB
     for _ in range(6):
         flight.run(0.5)
@@ -100,7 +100,7 @@ def test_an_estimate_lost_for_ten_milliseconds_ends_the_flight_for_good() -> Non
             assert outputs.actuators.rotor_thrust == (0.0, 0.0, 0.0, 0.0)
             assert outputs.actuators.joint_torque == (0.0, 0.0)
             assert not outputs.snapshot.armed
-    assert any(Fault.ESTIMATE_INVALID.value in text for text in flight.texts)
+    assert any(Condition.ESTIMATE_INVALID.value in text for text in flight.texts)
     flight.step(command(ARM, 1.0))
     assert flight.mode is Mode.FAULT
 

@@ -30,9 +30,10 @@ from fsw.link.services.parameter_service import ParameterService
 from fsw.link.services.time_service import TimeService
 from fsw.link.signing.signing import Signing
 from fsw.link.telemetry.streams import GROUND_RATES
-from fsw.link.wire.telemetry_context import LoopHealth, TelemetryContext
+from fsw.link.wire.telemetry_context import TelemetryContext
 from fsw.parameters.flight_config import FlightConfig
 from fsw.parameters.store import ParameterStore
+from fsw.ports import LoopHealth
 from fsw.runtime.assembly import vehicle_facts
 from messages import dialect
 from messages.frames import as_version_1

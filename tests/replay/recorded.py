@@ -10,7 +10,7 @@ from fsw.log.flight_log import FlightLog, LogSubject
 from fsw.parameters.control_choice import ControlChoice
 from fsw.parameters.flat import flat
 from fsw.parameters.flight_config import FlightConfig
-from fsw.signals import CommandRequest, TickInputs, TickOutputs
+from fsw.signals import Command, TickInputs, TickOutputs
 from sitl.scenario_file import load_scenario
 from tests.closed_loop.harness import LAND, Flight, command
 
@@ -23,7 +23,7 @@ class Recorded(Flight):
 
     ticks: list[tuple[TickInputs, TickOutputs]] = field(default_factory=list)
 
-    def step(self, *commands: CommandRequest) -> TickOutputs:
+    def step(self, *commands: Command) -> TickOutputs:
         outputs = super().step(*commands)
         assert self.inputs is not None
         self.ticks.append((self.inputs, outputs))

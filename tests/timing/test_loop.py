@@ -13,16 +13,16 @@ from typing import Any, cast
 
 import pytest
 
+from fsw.flight.autopilot import Autopilot
+from fsw.flight.state import FlightState
 from fsw.link.inbox import Inbox
 from fsw.link.sim_link import Pacing
-from fsw.link.wire.telemetry_context import LoopHealth
 from fsw.log.block_file import BlockFile
 from fsw.log.flight_log import FlightLog
 from fsw.log.reader import LoggedTick, open_flight, ticks
 from fsw.parameters.flight_config import flight_config
+from fsw.ports import LoopHealth
 from fsw.runtime.effort import EffortRecord
-from fsw.runtime.flight_loop import FlightLoop
-from fsw.runtime.flight_state import FlightState
 from fsw.runtime.planner_worker import PlannerRecord
 from fsw.runtime.process import StopRequest
 from fsw.runtime.program import FlightProgram
@@ -30,7 +30,6 @@ from fsw.runtime.rates import HOUSEKEEPING, INNER, MPC, RATE_GROUPS, TELEMETRY, 
 from fsw.runtime.sim_loop import Ending, FlightRecord, SimLoop
 from fsw.runtime.timing import GroupTimer
 from fsw.signals import (
-    CommandRequest,
     PlannerCounters,
     PlanRequest,
     SensorFrame,
@@ -39,13 +38,14 @@ from fsw.signals import (
     TickOutputs,
 )
 from messages import dialect
+from tests.closed_loop.harness import command
 from tests.fsw.link.snapshots import FACTS, outputs_at
 from tests.fsw.log.test_recorded_inputs import SUBJECT
 from tests.timing.virtual_time import FIRST_US, PERIOD_US, VirtualSensors, VirtualTime, frame
 
 Tick = Callable[[Any, TickInputs], tuple[Any, TickOutputs]]
-ARM = CommandRequest(400, (1.0, *(0.0,) * 6), 255, 190)
-KILL = CommandRequest(400, (0.0, 21196.0, *(0.0,) * 5), 255, 190)
+ARM = command(400, 1.0)
+KILL = command(400, 0.0, 21196.0)
 
 
 @dataclass
@@ -60,7 +60,7 @@ class Sim(VirtualSensors):
         self.done.append("sensors")
         return super().newest()
 
-    def answer(self, t_us: int, outputs: TickOutputs) -> None:
+    def send_actuators(self, t_us: int, outputs: TickOutputs) -> None:
         self.done.append("actuators")
         self.answers.append((self.time.now_us, outputs))
 
@@ -268,7 +268,7 @@ def test_a_planner_that_died_is_told_at_once_and_logged() -> None:
 
 @pytest.mark.parametrize("moment_us", [100, 900, 1_700])
 def test_a_command_acts_on_the_actuators_within_one_tick_of_its_arrival(moment_us: int) -> None:
-    bench = Bench(FlightLoop(flight_config()).tick, FlightState())
+    bench = Bench(Autopilot(flight_config()).tick, FlightState())
     bench.inbox._commands.append(ARM)
     arrived: list[int] = []
 

@@ -1,4 +1,4 @@
-"""Component metadata: documents over FTP that tell a ground station units, ranges and meanings.
+"""Component metadata: documents over FTP with the units, ranges and meanings of parameters.
 
 Source: https://mavlink.io/en/services/component_information.html
 """

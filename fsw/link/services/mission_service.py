@@ -27,9 +27,9 @@ from fsw.link.services.mission_wire import (
 )
 from fsw.link.wire import message_ids as ids
 from fsw.link.wire.decode import Numbers, for_this_vehicle
-from fsw.link.wire.outgoing import Outgoing, Said
+from fsw.link.wire.mission_items import DENIED, UNSUPPORTED, MissionItem, Refused
+from fsw.link.wire.outgoing import Outgoing, ServiceOutput
 from fsw.signals import Severity, StatusText
-from fsw.vehicle.mission_items import DENIED, UNSUPPORTED, MissionItem, Refused
 from messages.frames import Frame
 
 # MAV_MISSION_RESULT
@@ -81,7 +81,7 @@ class MissionService:
         self._show_again = False
         self._repeats = 0  # of MISSION_ITEM_REACHED that are still to be sent
         self._repeat_us = 0
-        self._handlers: dict[int, Callable[[Numbers, Peer, int], Sequence[Said]]] = {
+        self._handlers: dict[int, Callable[[Numbers, Peer, int], Sequence[ServiceOutput]]] = {
             ids.MISSION_COUNT: self._count,
             ids.MISSION_ITEM: self._item,
             ids.MISSION_ITEM_INT: self._item_int,
@@ -96,7 +96,7 @@ class MissionService:
         }
         self.message_ids = frozenset(self._handlers)
 
-    def receive(self, frame: Frame, t_us: int) -> Sequence[Said]:
+    def handle(self, frame: Frame, t_us: int) -> Sequence[ServiceOutput]:
         """See :class:`~fsw.link.services.service.LinkService`."""
         values = cast(Numbers, frame.payload_values)
         at = _TARGET_AT[frame.message_id]
@@ -105,45 +105,45 @@ class MissionService:
         peer = (frame.system_id, frame.component_id)
         return self._handlers[frame.message_id](values, peer, t_us)
 
-    def poll(self, t_us: int) -> Sequence[Said]:
-        """Ask again for what did not come, and tell how far the mission is."""
-        told: list[Said] = []
+    def poll(self, t_us: int) -> Sequence[ServiceOutput]:
+        """Ask again for what did not come, and report the mission's progress."""
+        replies: list[ServiceOutput] = []
         if self._store.progress is not self._shown or self._show_again:
-            told += self._show_progress(t_us)
+            replies += self._show_progress(t_us)
         elif self._repeats and t_us >= self._repeat_us:
-            told.append(self._reached(t_us))
+            replies.append(self._reached(t_us))
         upload = self._upload
         if upload is not None and t_us - upload.asked_us >= ASK_AGAIN_US:
             if upload.tries < TRIES:
-                told.append(self._ask(upload, t_us))
+                replies.append(self._ask(upload, t_us))
             else:
                 self._upload = None
                 silence = f"upload broken off: item {len(upload.items)} did not come; kept the old"
-                told.append(encode_ack(CANCELLED, upload.kind, upload.peer))
-                told.append(StatusText(Severity.WARNING, silence))
-        return told
+                replies.append(encode_ack(CANCELLED, upload.kind, upload.peer))
+                replies.append(StatusText(Severity.WARNING, silence))
+        return replies
 
     def _show_progress(self, t_us: int) -> list[Outgoing]:
         before, now = self._shown, self._store.progress
         self._shown, self._show_again = now, False
         values = current_values(now, self._store.in_mission, self._store.ids)
-        told = [Outgoing(ids.MISSION_CURRENT, values)]
+        replies = [Outgoing(ids.MISSION_CURRENT, values)]
         if now.reached_count > before.reached_count:
             self._repeats = 1 + REACHED_REPEATS
-            told.append(self._reached(t_us))
+            replies.append(self._reached(t_us))
         elif now.reached < 0:
             self._repeats = 0  # begun again, or another mission
-        return told
+        return replies
 
     def _reached(self, t_us: int) -> Outgoing:
-        """The item that was reached last, said again for a while: it has no acknowledgement."""
+        """The item that was reached last, repeated for a while: it has no acknowledgement."""
         self._repeats -= 1
         self._repeat_us = t_us + _REPEAT_US
         return Outgoing(ids.MISSION_ITEM_REACHED, (self._shown.reached,))
 
     # ------------------------------------------------------------ upload
 
-    def _count(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[Said]:
+    def _count(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[ServiceOutput]:
         number, count = int(values[3]), int(values[0])
         refused = self._unavailable(number, peer, t_us)
         if refused is not None:
@@ -158,15 +158,15 @@ class MissionService:
             return self._finish(self._upload)
         return (self._ask(self._upload, t_us),)
 
-    def _item(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[Said]:
+    def _item(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[ServiceOutput]:
         return self._take(item_float(values), values, peer, t_us)
 
-    def _item_int(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[Said]:
+    def _item_int(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[ServiceOutput]:
         return self._take(item_int(values), values, peer, t_us)
 
     def _take(
         self, item: MissionItem | Refused, values: Numbers, peer: Peer, t_us: int
-    ) -> Sequence[Said]:
+    ) -> Sequence[ServiceOutput]:
         """Add the item that was asked for; the last one completes the upload."""
         seq, number = int(values[7]), int(values[14])
         upload = self._upload
@@ -190,7 +190,7 @@ class MissionService:
         upload.tries = 0
         return (self._ask(upload, t_us),)
 
-    def _stray(self, seq: int, number: int, peer: Peer) -> Sequence[Said]:
+    def _stray(self, seq: int, number: int, peer: Peer) -> Sequence[ServiceOutput]:
         """An item of no upload; after one that ended, its acknowledgement may have been lost."""
         if self._done is not None and self._done[:2] == (peer, number):
             again = encode_ack(ACCEPTED, number, peer, self._store.identity(self._done[1]))
@@ -204,7 +204,7 @@ class MissionService:
         upload.tries += 1
         return encode_request(len(upload.items), upload.kind, upload.peer)
 
-    def _finish(self, upload: _Upload) -> Sequence[Said]:
+    def _finish(self, upload: _Upload) -> Sequence[ServiceOutput]:
         kind, peer = upload.kind, upload.peer
         refused = self._store.keep(kind, tuple(upload.items), tuple(upload.meanings))
         if refused is not None:
@@ -219,7 +219,7 @@ class MissionService:
 
     # ------------------------------------------------------------ download
 
-    def _request_list(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[Said]:
+    def _request_list(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[ServiceOutput]:
         number = int(values[2])
         refused = self._unavailable(number, peer, t_us)
         if refused is not None:
@@ -230,13 +230,15 @@ class MissionService:
         self._download = _Download(peer, kind, items, t_us) if items else None
         return (encode_count(len(items), kind, peer, self._store.identity(kind)),)
 
-    def _request(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[Said]:
+    def _request(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[ServiceOutput]:
         return self._send_item(values, peer, t_us, as_int=False)
 
-    def _request_int(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[Said]:
+    def _request_int(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[ServiceOutput]:
         return self._send_item(values, peer, t_us, as_int=True)
 
-    def _send_item(self, values: Numbers, peer: Peer, t_us: int, as_int: bool) -> Sequence[Said]:
+    def _send_item(
+        self, values: Numbers, peer: Peer, t_us: int, as_int: bool
+    ) -> Sequence[ServiceOutput]:
         """Any item in any order and as often as asked: requests and items may be lost."""
         seq, number = int(values[0]), int(values[3])
         download = self._download
@@ -252,7 +254,7 @@ class MissionService:
 
     # ------------------------------------------------------------ the rest
 
-    def _ack(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[Said]:
+    def _ack(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[ServiceOutput]:
         """The other side has all it wanted, or wants no more; the old items stay."""
         if self._download is not None and self._download.peer == peer:
             self._download = None
@@ -260,7 +262,7 @@ class MissionService:
             self._upload = None
         return ()
 
-    def _clear_all(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[Said]:
+    def _clear_all(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[ServiceOutput]:
         number = int(values[2])
         kinds = tuple(Kind) if number == ALL_KINDS else (number,)
         refused = self._unavailable(kinds[0], peer, t_us)
@@ -271,7 +273,7 @@ class MissionService:
             self._store.keep(Kind(kind), (), ())
         return (encode_ack(ACCEPTED, number, peer),)
 
-    def _set_current(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[Said]:
+    def _set_current(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[ServiceOutput]:
         seq = int(values[0])
         if self._store.set_current(seq):
             self._show_again = True
@@ -282,11 +284,11 @@ class MissionService:
             StatusText(Severity.WARNING, refused.reason),
         )
 
-    def _partial(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[Said]:
+    def _partial(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[ServiceOutput]:
         """A part of a list cannot be checked by itself; ground stations then send all of it."""
         return (encode_ack(UNSUPPORTED, int(values[4]), peer),)
 
-    def _unavailable(self, number: int, peer: Peer, t_us: int) -> Sequence[Said] | None:
+    def _unavailable(self, number: int, peer: Peer, t_us: int) -> Sequence[ServiceOutput] | None:
         """Why no transfer of this type can begin now."""
         if number not in ROOM:
             return (encode_ack(UNSUPPORTED, number, peer),)
@@ -298,7 +300,7 @@ class MissionService:
             return (encode_ack(DENIED, number, peer),)
         return None
 
-    def _refuse(self, refused: Refused, kind: Kind, peer: Peer) -> Sequence[Said]:
+    def _refuse(self, refused: Refused, kind: Kind, peer: Peer) -> Sequence[ServiceOutput]:
         self._upload = None
         text = f"{kind.name.lower()} refused: {refused.reason}"
         return (encode_ack(refused.result, kind, peer), StatusText(Severity.WARNING, text))

@@ -49,7 +49,7 @@ class LinkCommands:
             _REQUEST_PROTOCOL_VERSION: self._request_protocol_version,
         }
 
-    def answer(
+    def handle(
         self, frame: Frame, t_us: int, snapshot: FlightSnapshot | None
     ) -> tuple[Sequence[Outgoing], StatusText | None] | None:
         """Carry out a command to the link.
@@ -57,7 +57,7 @@ class LinkCommands:
         Args:
             frame: Any valid frame.
             t_us: Sensor time [us].
-            snapshot: What there is to tell about.
+            snapshot: The newest snapshot; None before the first tick.
 
         Returns:
             What to send and why it was refused, if it was; None if the frame is something else.
@@ -69,8 +69,8 @@ class LinkCommands:
             return None
         result, reason, messages = handler(request, t_us, snapshot)
         ack = CommandAck(request.command, result, request.source_system, request.source_component)
-        told = Outgoing(message_ids.COMMAND_ACK, encode_replies.command_ack(ack))
-        return (told, *messages), StatusText(Severity.INFO, reason) if reason else None
+        reply = Outgoing(message_ids.COMMAND_ACK, encode_replies.command_ack(ack))
+        return (reply, *messages), StatusText(Severity.INFO, reason) if reason else None
 
     def _get_interval(
         self, request: CommandRequest, t_us: int, snapshot: FlightSnapshot | None
@@ -122,13 +122,13 @@ class LinkCommands:
 
     def _now(self, message_id: int, which: float, snapshot: FlightSnapshot | None) -> _Outcome:
         if snapshot is None:
-            return _TEMPORARILY_REJECTED, "the vehicle has not begun to fly", ()
+            return _TEMPORARILY_REJECTED, "the flight software has not run a tick yet", ()
         messages = messages_now(message_id, which, snapshot, self._context)
         if messages is None:
             # No text: ground stations probe for cameras, gimbals and much else at every start.
             return _DENIED, "", ()
         if not messages:
-            return _TEMPORARILY_REJECTED, f"message {message_id}: nothing to tell yet", ()
+            return _TEMPORARILY_REJECTED, f"message {message_id}: no data yet", ()
         return _ACCEPTED, "", messages
 
 

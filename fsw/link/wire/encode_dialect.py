@@ -11,8 +11,9 @@ from typing import Final
 
 from fsw.link.wire.encode_setpoints import as_asked
 from fsw.link.wire.outgoing import WireValues
-from fsw.link.wire.telemetry_context import GroupTiming, TelemetryContext
-from fsw.model.arm_kinematics import point_in_flight
+from fsw.link.wire.telemetry_context import TelemetryContext
+from fsw.model.kinematics import point_in_flight
+from fsw.ports import GroupTiming
 from fsw.signals import FlightSnapshot, SetpointKind, Vec2, Vec4
 
 _LOCAL_NED: Final = 1  # MAV_FRAME
@@ -54,7 +55,7 @@ def arm_joint_setpoint(snapshot: FlightSnapshot, _: TelemetryContext) -> WireVal
 
 
 def end_effector_target(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues | None:
-    """END_EFFECTOR_TARGET in use; shows whether a set-point was accepted."""
+    """END_EFFECTOR_TARGET in use; shows whether a setpoint was accepted."""
     asked = snapshot.offboard.motion
     if snapshot.offboard.kind is SetpointKind.END_EFFECTOR and asked is not None:
         numbers, mask = as_asked(asked)
@@ -67,7 +68,7 @@ def end_effector_target(snapshot: FlightSnapshot, _: TelemetryContext) -> WireVa
 
 
 def setpoint_status(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues:
-    """SETPOINT_STATUS: how many set-points were of use, and which kind is flown."""
+    """SETPOINT_STATUS: how many setpoints were of use, and which kind is flown."""
     report = snapshot.offboard
     counts = (report.accepted & _U32, report.refused & _U32, min(report.age_us, _U32))
     return (snapshot.t_us, *counts, int(report.kind))

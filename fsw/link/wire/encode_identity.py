@@ -60,7 +60,7 @@ def current_mode(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues:
 
 
 def protocol_version(_: FlightSnapshot, __: TelemetryContext) -> WireValues:
-    """PROTOCOL_VERSION: 2, and 1 with those who speak it; the hashes say nothing."""
+    """PROTOCOL_VERSION: 2, and 1 for peers that use it; the hashes are not set."""
     return (_PROTOCOL_2, _PROTOCOL_1, _PROTOCOL_2, *(0,) * 16)
 
 

@@ -10,14 +10,15 @@ from fsw.barriers.root import BarrierTuning
 from fsw.barriers.soft_rows import TargetPoints
 from fsw.model.airframe import AIRFRAME
 from fsw.model.linearisation import Linearisation
-from fsw.model.prediction import INPUTS, Array, LagModel, condense
+from fsw.model.prediction import INPUTS, Array, condense
 from tests.fsw.model.geometry_by_rotation import moved_on, tips_of_prediction
 from tests.fsw.random_states import prediction_vector
 
 NODES = 5
 TUNING = BarrierTuning(alpha=2.0, slope=4.0, gamma=3.0, robustness=0.3, skipped_nodes=1)
-BETA = 1.0 - TUNING.gamma * TUNING.period
-_MODEL = condense(LagModel(), TUNING.period, NODES)
+PERIOD = 0.1
+BETA = 1.0 - TUNING.gamma * PERIOD
+MODEL = condense(AIRFRAME, PERIOD, NODES)
 
 
 @dataclass(frozen=True)
@@ -30,8 +31,8 @@ class Case:
 
     def horizon(self, change: Array | float = 0.0) -> Linearisation:
         """The horizon of these inputs, or of changed ones."""
-        horizon = Linearisation(_MODEL)
-        horizon.refill(AIRFRAME, self.start, self.inputs + change)
+        horizon = Linearisation(MODEL)
+        horizon.refill(self.start, self.inputs + change)
         return horizon
 
 

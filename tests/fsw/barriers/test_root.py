@@ -76,11 +76,11 @@ def test_required_h_is_the_one_step_condition_iterated(
     period, h = 0.1, h_start
     for _ in range(node):  # h' + gamma (h - lambda) = 0 over one sample
         h -= gamma * period * (h - robustness)
-    tuning = BarrierTuning(gamma=gamma, period=period, robustness=robustness, slope=1.0)
-    assert required_h(h_start, node, tuning.numbers) == pytest.approx(h, abs=1e-12)
+    tuning = BarrierTuning(gamma=gamma, robustness=robustness, slope=1.0)
+    assert required_h(h_start, node, tuning.numbers(period)) == pytest.approx(h, abs=1e-12)
 
 
-@pytest.mark.parametrize("name", ["alpha", "slope", "gamma", "robustness", "period"])
+@pytest.mark.parametrize("name", ["alpha", "slope", "gamma", "robustness"])
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, 0.0, -1.0])
 def test_tuning_refuses_what_is_not_a_positive_number(name: str, value: float) -> None:
     build: Callable[..., Any] = BarrierTuning
@@ -91,6 +91,6 @@ def test_tuning_refuses_what_is_not_a_positive_number(name: str, value: float) -
 @pytest.mark.parametrize("name", ["slope", "gamma"])
 def test_tuning_refuses_a_rate_too_fast_for_its_period(name: str) -> None:
     build: Callable[..., Any] = BarrierTuning
-    build(**{name: 10.0}, period=0.1)
+    build(**{name: 10.0}).check_sampling(0.1)
     with pytest.raises(ValueError, match=name):
-        build(**{name: 10.1}, period=0.1)
+        build(**{name: 10.1}).check_sampling(0.1)

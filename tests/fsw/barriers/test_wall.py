@@ -11,6 +11,7 @@ from fsw.model.linearisation import Linearisation
 from fsw.model.prediction import INPUTS, Array
 from fsw.signals import Wall
 from tests.fsw.barriers.horizons import (
+    MODEL,
     NODES,
     TUNING,
     Case,
@@ -54,7 +55,7 @@ def braked(walls: tuple[Wall, ...], horizon: Linearisation, first_node: int) -> 
 
 
 def refilled(walls: tuple[Wall, ...], case: Case) -> WallBarrier:
-    barrier = WallBarrier(walls, TUNING, NODES)
+    barrier = WallBarrier(walls, TUNING, MODEL)
     barrier.refill(case.horizon(), case.targets)
     return barrier
 
@@ -89,14 +90,14 @@ def test_rows_ask_for_what_the_decay_from_the_start_leaves() -> None:
 
 def test_each_node_and_wall_has_a_slack_of_its_own() -> None:
     walls = (Wall((1.0, 0.0, 0.0), 0.0, 0.1), Wall((0.0, 1.0, 0.0), 0.0, 0.1))
-    rows = WallBarrier(walls, TUNING, NODES).rows
+    rows = WallBarrier(walls, TUNING, MODEL).rows
     shared = {(int(node), k // 3 % 2): int(rows.slack[k]) for k, node in enumerate(rows.node)}
     assert len(set(shared.values())) == len(shared) == rows.slacks == 2 * (NODES - 1)
 
 
 def test_skipped_nodes_have_no_rows() -> None:
     case = random_case(np.random.default_rng(3))
-    barrier = WallBarrier(LEVEL, BarrierTuning(skipped_nodes=2), NODES)
+    barrier = WallBarrier(LEVEL, BarrierTuning(skipped_nodes=2), MODEL)
     barrier.refill(case.horizon(), case.targets)
     assert barrier.rows.node.min() == 3
 

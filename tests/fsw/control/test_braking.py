@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 import random
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -19,16 +20,16 @@ from scipy.linalg import solve_continuous_lyapunov
 
 from fsw.barriers.root import root
 from fsw.control.braking import Brake, BrakeTuning
-from fsw.model.airframe import AIRFRAME, GRAVITY
+from fsw.model.airframe import AIRFRAME, GRAVITY, AttitudeLag
 from fsw.model.nominal import NominalModel
-from fsw.model.prediction import A, J, LagModel, S, V, continuous_model
+from fsw.model.prediction import A, J, S, V, continuous_model
 from fsw.mpc.planner_config import PlannerConfig
 from fsw.mpc.program import InputLimits
 from fsw.signals import PlanInput, PredictionState, Vec2, Vec3
 
 DT = 0.002
-MODEL = NominalModel(LagModel(), DT)
-BRAKE = Brake(LagModel(), InputLimits().tilt)
+MODEL = NominalModel(AIRFRAME, DT)
+BRAKE = Brake(AIRFRAME, InputLimits().tilt)
 WALLS = PlannerConfig().walls
 TAKEN_BACK_S = 0.3  # by when the tilt of now no longer accelerates
 STILL: Vec3 = (0.0, 0.0, 0.0)
@@ -117,7 +118,7 @@ def test_whoever_keeps_lambda_stops_before_the_wall(seed: int) -> None:
     st.floats(math.radians(2.0), math.radians(30.0)),
 )
 def test_braking_is_within_the_plans_tilt(v: Vec3, a: Vec3, tilt: float) -> None:
-    u = Brake(LagModel(), tilt)(state(v, a))
+    u = Brake(AIRFRAME, tilt)(state(v, a))
     assert math.hypot(u.a[0], u.a[1]) <= math.tan(tilt) * (GRAVITY - u.a[2]) + 1e-9
 
 
@@ -162,12 +163,14 @@ def test_at_rest_nothing_is_asked_for() -> None:
 
 
 def test_the_paper_s_model_is_braked_without_a_lag() -> None:
-    u = Brake(LagModel(at_once=True), InputLimits().tilt)(state((0.1, 0.0, 0.0), (5.0, 0.0, 0.0)))
+    u = Brake(replace(AIRFRAME, attitude_lag=AttitudeLag(at_once=True)), InputLimits().tilt)(
+        state((0.1, 0.0, 0.0), (5.0, 0.0, 0.0))
+    )
     assert -2.0 < u.a[0] < -0.5
 
 
 LEVEL_SPEEDS = st.tuples(*[st.floats(-0.05, 0.05)] * 2)
-LINEAR = Brake(LagModel(), 0.3, BrakeTuning(effort=1.0))  # gentle enough to stay within the tilt
+LINEAR = Brake(AIRFRAME, 0.3, BrakeTuning(effort=1.0))  # gentle enough to stay within the tilt
 
 
 def linear_state(v: Vec2, a: Vec2, j: Vec2, s: Vec2) -> PredictionState:
@@ -197,11 +200,11 @@ def test_braking_costs_least_of_all_feedbacks_of_the_planned_axis(part: str) -> 
     The cost is the integral of v^2 + price u^2 from a unit of each part, by the Lyapunov equation
     of the axis that the prediction model integrates: v' = a, a' = j, j' = s, s' = kp (u - a) - ...
     """
-    lag, effort = LagModel(), BrakeTuning().effort
-    a_model, b_model = continuous_model(lag)
+    effort = BrakeTuning().effort
+    a_model, b_model = continuous_model(AIRFRAME)
     axis = [V, A, J, S]
     a_axis, b_axis = a_model[np.ix_(axis, axis)], b_model[axis, :1]
-    brake, small = Brake(lag, 1.5), 1e-4
+    brake, small = Brake(AIRFRAME, 1.5), 1e-4
     units = [linear_state(*[(small * (k == i), 0.0) for i in range(4)]) for k in range(4)]
     gains = np.array([[-brake(x).a[0] / small for x in units]])
 
@@ -218,7 +221,7 @@ def test_braking_costs_least_of_all_feedbacks_of_the_planned_axis(part: str) -> 
 
 
 def test_without_a_lag_only_the_velocity_is_fed_back_with_one_over_the_root_of_the_price() -> None:
-    brake = Brake(LagModel(at_once=True), 0.3)
+    brake = Brake(replace(AIRFRAME, attitude_lag=AttitudeLag(at_once=True)), 0.3)
     moving = linear_state((0.05, -0.04), (3.0, 2.0), (5.0, -4.0), (9.0, 8.0))
     gain = 1.0 / math.sqrt(BrakeTuning().effort)
     assert brake(moving).a == pytest.approx((-0.05 * gain, 0.04 * gain, 0.0))
@@ -230,7 +233,7 @@ def test_slow_vertical_joint_and_yaw_motions_decay_at_their_own_rates(
 ) -> None:
     tuning = BrakeTuning(vertical_rate=3.0, joint_rate=7.0)
     x = state((0.0, 0.0, sink), yaw_rate=turning, qd_arm=(first, second))
-    u = Brake(LagModel(), 0.3, tuning)(x)
+    u = Brake(AIRFRAME, 0.3, tuning)(x)
     assert u.a[2] == pytest.approx(-3.0 * sink)
     assert u.qdd_arm == pytest.approx((-7.0 * first, -7.0 * second))
     assert u.yaw_acc == pytest.approx(-turning)

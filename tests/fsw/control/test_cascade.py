@@ -15,7 +15,7 @@ from fsw.control.inner_tuning import InnerTuning
 from fsw.control.pid import PidGains
 from fsw.control.tracking import Observed, observe
 from fsw.model.airframe import AIRFRAME
-from fsw.model.prediction import Array, LagModel
+from fsw.model.prediction import Array
 from fsw.model.rotors import motion_state
 from fsw.signals import ActuatorCommand, PlanInput, PredictionState, StateEstimate, Vec2, Vec3
 from tests.fsw.random_states import estimate_of
@@ -43,7 +43,7 @@ def one_step(
     u: PlanInput = NO_INPUT,
     inner: Inner = "tracking",
 ) -> ActuatorCommand:
-    cascade = Cascade(AIRFRAME, LagModel(), TUNING, inner, DT)
+    cascade = Cascade(AIRFRAME, TUNING, inner, DT)
     return cascade.step(in_hover(AIRFRAME, estimate), estimate, plan, u)[0]
 
 
@@ -116,7 +116,7 @@ def test_a_commanded_acceleration_tilts_the_thrust_its_way(inner: Inner) -> None
 
 def test_the_rotor_model_lags_behind_what_was_sent() -> None:
     estimate = turned(0.0)
-    cascade = Cascade(AIRFRAME, LagModel(), TUNING, "tracking", DT)
+    cascade = Cascade(AIRFRAME, TUNING, "tracking", DT)
     memory = in_hover(AIRFRAME, estimate)
     sent = ActuatorCommand((10.0, 10.0, 10.0, 10.0), (0.0, 0.0))
     _, after = cascade.step(memory._replace(commanded=sent), estimate, plan_at(), NO_INPUT)
@@ -149,7 +149,7 @@ def test_a_vehicle_taken_over_carries_its_weight_and_one_at_rest_nothing() -> No
 def test_missed_ticks_are_made_up_for_by_rotor_model_and_observer(ticks: int) -> None:
     """As if the vehicle had been seen in each of them, with the rotors where they are now."""
     estimate = turned(0.0)._replace(v_WB=(0.05, -0.04, 0.03))
-    cascade = Cascade(AIRFRAME, LagModel(), TUNING, "tracking", DT)
+    cascade = Cascade(AIRFRAME, TUNING, "tracking", DT)
     sent = ActuatorCommand((10.0, 10.0, 10.0, 10.0), (0.0, 0.0))
     memory = in_hover(AIRFRAME, turned(0.0))._replace(commanded=sent)
     _, after = cascade.step(memory, estimate, plan_at(), NO_INPUT, ticks)
@@ -168,7 +168,7 @@ def test_the_servos_hold_the_arm_in_the_field_that_the_thrust_makes() -> None:
     q_arm = (0.5, -0.9)
     (m1, m2), (c1, c2), l1 = AIRFRAME.link_mass, AIRFRAME.link_com, AIRFRAME.link_length[0]
     estimate = estimate_of(Rotation.identity(), q_arm=q_arm)
-    cascade = Cascade(AIRFRAME, LagModel(), TUNING, "pid", DT)
+    cascade = Cascade(AIRFRAME, TUNING, "pid", DT)
     # One that weighs more than it does needs a stronger field of thrust to stand in.
     for thrust, field in ((3.5 * 9.81, 9.81), (1.2 * 3.5 * 9.81, 1.2 * 9.81)):
         each = (0.25 * thrust,) * 4
@@ -185,7 +185,7 @@ def test_the_servos_hold_the_arm_in_the_field_that_the_thrust_makes() -> None:
 
 def test_the_motion_is_that_of_the_rotors_one_tick_on_and_of_the_first_joints_torque() -> None:
     estimate = estimate_of(Rotation.from_euler("ZYX", [0.4, 0.1, -0.2]), (0.1, -0.2, 0.3))
-    cascade = Cascade(AIRFRAME, LagModel(), TUNING, "tracking", DT)
+    cascade = Cascade(AIRFRAME, TUNING, "tracking", DT)
     memory = in_hover(AIRFRAME, estimate)._replace(mass=3.6)
     sent = ActuatorCommand((8.0, 9.0, 10.0, 11.0), (0.3, -0.7))
     got = cascade.motion(memory._replace(commanded=sent), estimate)
@@ -212,7 +212,7 @@ def test_spinning_about_two_axes_the_third_torque_is_eulers() -> None:
     w: Vec3 = (0.5, -0.4, 0.3)
     estimate = estimate_of(Rotation.identity(), w)
     free = replace(TUNING, attitude=PidGains(0.0, 0.0, 0.0, 1.0))
-    cascade = Cascade(unlike, LagModel(), free, "pid", DT)
+    cascade = Cascade(unlike, free, "pid", DT)
     command, _ = cascade.step(in_hover(unlike, estimate), estimate, plan_at(), NO_INPUT)
     inertia, spin = np.array(unlike.inertia), np.array(w)
     expected = np.cross(spin, inertia * spin) + [0.0, command.joint_torque[0], 0.0]

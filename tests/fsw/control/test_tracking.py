@@ -20,15 +20,14 @@ from fsw.control.tracking import (
     observe,
     snap_command,
 )
-from fsw.model.airframe import AIRFRAME, GRAVITY
-from fsw.model.prediction import LagModel
+from fsw.model.airframe import AIRFRAME, GRAVITY, AttitudeLag
 from fsw.model.rotors import MotionState
 from fsw.signals import PlanInput, PredictionState, StateEstimate, Vec3
 from tests.fsw.random_states import estimate_of, vec3
 
-LAG = LagModel()
+LAG = AttitudeLag()
 TUNING = TrackingTuning()
-LAW = TrackingLaw(AIRFRAME, LAG, TUNING, tracking_gains(TUNING, AIRFRAME.rotor_lag, 0.002))
+LAW = TrackingLaw(LAG, TUNING, tracking_gains(TUNING, AIRFRAME.rotor_lag, 0.002))
 BRISK = replace(TUNING, observer_bandwidth=100.0)
 WEIGHT = AIRFRAME.mass * GRAVITY
 CALM: Vec3 = (0.0, 0.0, 0.0)

@@ -13,7 +13,7 @@ from fsw.control.inner_tuning import TrackingGains, TrackingTuning, tracking_gai
 from fsw.control.tracking import Observed, TrackingLaw, observe, snap_command
 from fsw.control.tube import Tube, peak_snap_share, tube
 from fsw.model.airframe import AIRFRAME, GRAVITY
-from fsw.model.prediction import Array, LagModel
+from fsw.model.prediction import Array
 
 DT = 0.002
 # Without limits, so that the loop under test is the linear one the bound is about.
@@ -30,7 +30,7 @@ def _tube() -> Tube:
 
 def _position_under(disturbance: np.ndarray, tuning: TrackingTuning = TUNING) -> np.ndarray:
     """One axis of the loop as it is flown, its law called tick by tick."""
-    law = TrackingLaw(AIRFRAME, LagModel(), tuning, _gains())
+    law = TrackingLaw(AIRFRAME.attitude_lag, tuning, _gains())
     decay = np.exp(-DT / AIRFRAME.rotor_lag)
     p = v = a = j = s = 0.0
     believed = Observed((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
@@ -92,7 +92,7 @@ def _pushed_once(wind: bool) -> tuple[Array, Array, Array]:
     The push is a disturbance of 1 m/s^2, or a memory of wind of 1 m/s^2 without a wind.
     """
     gains = tracking_gains(QUICK, AIRFRAME.rotor_lag, DT)
-    law = TrackingLaw(AIRFRAME, LagModel(), QUICK, gains)
+    law = TrackingLaw(AIRFRAME.attitude_lag, QUICK, gains)
     # Finer than the ticks: the tube is that of the continuous loop.
     fine = DT / 8.0
     decay = np.exp(-fine / AIRFRAME.rotor_lag)

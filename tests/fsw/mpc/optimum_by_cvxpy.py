@@ -15,10 +15,13 @@ import cvxpy as cp
 import numpy as np
 
 from fsw.barriers.root import BarrierTuning
+from fsw.model.airframe import AIRFRAME
 from fsw.model.linearisation import BASE, END_EFFECTOR, Linearisation
 from fsw.model.prediction import INPUTS, Array
 from fsw.mpc.planner_config import PlannerConfig
 from fsw.signals import PointObstacle, SafeSet, Wall, WorkspaceSphere
+
+_PERIOD = 0.1  # s
 
 
 @dataclass(frozen=True)
@@ -57,8 +60,8 @@ class _Linear:
         horizon = self._horizon
         return horizon.velocity[node, point] + horizon.d_velocity[node, point] @ self._change
 
-    def arm_cog(self, node: int) -> Any:
-        return self._horizon.arm_cog[node] + self._horizon.d_arm_cog[node] @ self._change
+    def arm_com(self, node: int) -> Any:
+        return self._horizon.arm_com[node] + self._horizon.d_arm_com[node] @ self._change
 
     def yaw(self, node: int) -> Any:
         return self._horizon.states[node, 13] + self._horizon.model.gamma[node, 13] @ self._change
@@ -94,8 +97,8 @@ def optimum(question: Question, config: PlannerConfig) -> Optimum:
     for node in range(1, n + 1):
         th1, th2 = linear.angles(node)[0], linear.angles(node)[1]
         constraints += [
-            cp.abs(th1) <= config.airframe.joint1_limit + joint_slack[node - 1],
-            cp.abs(th1 + th2) <= config.airframe.joint12_limit + joint_slack[node - 1],
+            cp.abs(th1) <= AIRFRAME.joint1_limit + joint_slack[node - 1],
+            cp.abs(th1 + th2) <= AIRFRAME.joint12_limit + joint_slack[node - 1],
         ]
     problem = cp.Problem(
         cp.Minimize(
@@ -136,7 +139,7 @@ def _cost(question: Question, linear: _Linear, U: cp.Variable, config: PlannerCo
         total += weights.yaw * cp.square(
             linear.yaw(node) + weights.yaw_lead * linear.yaw_rate(node) - question.target_yaw[node]
         )
-        total += (5.0 if last else 1.0) * cp.square(linear.arm_cog(node))
+        total += (5.0 if last else 1.0) * cp.square(linear.arm_com(node))
     return total
 
 
@@ -244,7 +247,7 @@ def _barrier(
 
 
 def _required(h_start: float, node: int, tuning: BarrierTuning) -> float:
-    decay = (1.0 - tuning.gamma * tuning.period) ** node
+    decay = (1.0 - tuning.gamma * _PERIOD) ** node
     return decay * h_start + (1.0 - decay) * tuning.robustness
 
 

@@ -9,6 +9,7 @@ import pytest
 from scipy import sparse
 
 from fsw.barriers.soft_rows import TargetPoints
+from fsw.model.airframe import AIRFRAME
 from fsw.model.prediction import INPUTS, Array, condense
 from fsw.mpc.clarabel_solver import ClarabelSolver
 from fsw.mpc.dual_solver import DualSolver
@@ -34,7 +35,7 @@ def filled(
 ) -> Problem:
     """A program around rest, of a vehicle somewhere, moving, its target so far off [m]."""
     n = config.horizon
-    problem = Problem(config, condense(config.lag, config.period, n), safe_set)
+    problem = Problem(config, condense(AIRFRAME, config.period, n), safe_set)
     start = prediction_vector(random)
     start[0:3] = random.uniform(-0.9, 0.9, 3)
     start[3:19] *= 0.4

@@ -33,7 +33,7 @@ from tests.fsw.random_states import as_state, prediction_vector, vec3
 
 CONFIG = PlannerConfig()
 N = CONFIG.horizon
-MODEL = condense(CONFIG.lag, CONFIG.period, N)
+MODEL = condense(AIRFRAME, CONFIG.period, N)
 WALLS = SafeSet((Wall((-1.0, 0.0, 0.0), -1.0, 0.1), Wall((0.0, 1.0, 0.0), -1.0, 0.1)))
 POINTS = SafeSet(
     (Wall((-1.0, 0.0, 0.0), -1.0, 0.1),),
@@ -45,7 +45,7 @@ SPHERE = SafeSet(sphere=WorkspaceSphere((0.0, 0.0, -0.225), 0.075))
 def around(asked: Question, start: Array, guess: Array) -> Question:
     """The same question, linearised around a guess."""
     horizon = Linearisation(MODEL)
-    horizon.refill(AIRFRAME, start, guess)
+    horizon.refill(start, guess)
     return replace(asked, horizon=horizon, guess=guess)
 
 
@@ -62,7 +62,7 @@ def question(
     target_yaw = start[13] + random.uniform(-1.0, 1.0, N + 1)
     guess = np.zeros(INPUTS * N)
     horizon = Linearisation(MODEL)
-    horizon.refill(AIRFRAME, start, guess)
+    horizon.refill(start, guess)
     return start, Question(horizon, guess, target_p, target_v, target_yaw, safe_set)
 
 

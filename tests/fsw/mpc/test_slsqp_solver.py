@@ -10,6 +10,7 @@ import pytest
 from scipy.optimize import approx_fprime
 
 from fsw.barriers.soft_rows import TargetPoints
+from fsw.model.airframe import AIRFRAME
 from fsw.model.prediction import INPUTS, STATES, Array, condense
 from fsw.mpc.planner_config import PlannerConfig
 from fsw.mpc.problem import Problem
@@ -20,7 +21,7 @@ from tests.fsw.mpc.requests import STILL, below, hovering, planned, planner, req
 
 CONFIG = PlannerConfig()
 N = CONFIG.horizon
-MODEL = condense(CONFIG.lag, CONFIG.period, N)
+MODEL = condense(AIRFRAME, CONFIG.period, N)
 WALLS = SafeSet((Wall((-1.0, 0.0, 0.0), -1.0, 0.1), Wall((0.0, 1.0, 0.0), -1.0, 0.1)))
 SPHERE = SafeSet(sphere=WorkspaceSphere((0.0, 0.0, -0.225), 0.075))
 CASES = {"walls": WALLS, "sphere": SPHERE}

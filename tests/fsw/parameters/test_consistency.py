@@ -81,7 +81,7 @@ def test_sampled_robustness_is_the_least_lambda_that_a_held_push_cannot_beat(sha
     """
     push, period = 0.8, 0.1
     tuning = BarrierTuning(slope=4.0)
-    robustness = share * sampled_robustness(tuning, push)
+    robustness = share * sampled_robustness(tuning, push, period)
     k, gamma = tuning.slope, tuning.gamma
     d, v = 0.05, 0.0
     for _ in range(400):
@@ -90,7 +90,7 @@ def test_sampled_robustness_is_the_least_lambda_that_a_held_push_cannot_beat(sha
         # h at the next sample is k (d + v T + a T^2/2) + v + a T, the push left out.
         a = (wanted - k * (d + v * period) - v) / (k * period**2 / 2.0 + period)
         d, v = d + v * period + (a - push) * period**2 / 2.0, v + (a - push) * period
-    predicted = (robustness - sampled_robustness(tuning, push)) / k
+    predicted = (robustness - sampled_robustness(tuning, push, period)) / k
     assert d == pytest.approx(predicted, abs=1e-6)
 
 

@@ -15,7 +15,7 @@ from fsw.link.files.flight_logs import FlightLogs, flight_logs
 from fsw.link.files.log_service import CHUNK, LogService
 from fsw.link.files.vehicle_files import vehicle_files
 from fsw.link.wire import message_ids as ids
-from fsw.link.wire.outgoing import Said
+from fsw.link.wire.outgoing import ServiceOutput
 from fsw.signals import Severity, StatusText
 from messages.frames import FrameWriter, split
 from tests.fsw.link.files.wire_values import message_of, values_of
@@ -41,11 +41,11 @@ class Client:
     counts: list[int] = field(default_factory=list)
     writer: FrameWriter = field(default_factory=lambda: FrameWriter(255, 190))
 
-    def ask(self, message_id: int, *values: int) -> list[Said]:
+    def ask(self, message_id: int, *values: int) -> list[ServiceOutput]:
         (frame,) = split(self.writer.frame(message_id, *values))
-        return list(self.service.receive(frame, 0))
+        return list(self.service.handle(frame, 0))
 
-    def polled(self) -> list[Said]:
+    def polled(self) -> list[ServiceOutput]:
         """Of one tick, and what fits between it and the next."""
         answers = list(self.service.poll(0))
         assert len(answers) <= FRAMES_A_TICK
@@ -200,7 +200,7 @@ def test_finished_logs_are_erased_this_flight_s_is_kept_and_the_operator_is_told
     assert len(other.entries()) == 3
     other.ask(ids.LOG_REQUEST_DATA, 0, ALL, 0, 1, 1)
     assert client.ask(ids.LOG_ERASE, 1, 1) == []
-    told: list[Said] = []
+    told: list[ServiceOutput] = []
     until = time.monotonic() + 5.0
     while not told and time.monotonic() < until:
         told += client.service.poll(0)
@@ -218,7 +218,7 @@ def test_a_log_that_cannot_be_erased_is_told(tmp_path: Path) -> None:
     client = Client(LogService(FlightLogs(flight(tmp_path, "run-2", b"kept"))))
     (earlier / "flight.tlog").unlink()  # somebody else was faster
     client.ask(ids.LOG_ERASE, 1, 1)
-    told: list[Said] = []
+    told: list[ServiceOutput] = []
     until = time.monotonic() + 5.0
     while not told and time.monotonic() < until:
         told += client.service.poll(0)
