@@ -21,7 +21,7 @@ from tests.mutation.mutants import OPERATORS, Mutant
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
 EACH = 5.0  # s, the longest a single test may take in plain Python
-ALL = 20.0  # s, and all tests of a module; the quickest are taken
+ALL = 20.0  # s, and all tests of a module; unit tests first, and the quickest
 
 
 class Copy:
@@ -122,21 +122,26 @@ class Tests:
     def select(self, files: list[str]) -> Selection:
         """Of some test files, the tests that pass in time where nothing is changed."""
         left_out: list[str] = []
-        total, used = 0.0, []
+        fit: list[tuple[bool, float, str, str]] = []
         for file in files:
             base = self._without_mutant(file)
             left_out += base["failed"]
-            for name, seconds in sorted(base["seconds"].items(), key=lambda item: item[1]):
-                if name in base["failed"]:
-                    continue
-                if total + seconds > ALL:
-                    left_out.append(name)
-                    continue
+            is_unit = file.startswith("tests/fsw/")
+            fit += [
+                (not is_unit, seconds, name, file)
+                for name, seconds in base["seconds"].items()
+                if name not in base["failed"]
+            ]
+        total, used = 0.0, set()
+        for _, seconds, name, file in sorted(fit):
+            if total + seconds <= ALL:
                 total += seconds
-                if file not in used:
-                    used.append(file)
-        helpers = [name for file in used for name in self._copy.helpers(file)]
-        return Selection(used, left_out, total, self._copy.digest(*used, *helpers))
+                used.add(file)
+            else:
+                left_out.append(name)
+        kept = [file for file in files if file in used]
+        helpers = [name for file in kept for name in self._copy.helpers(file)]
+        return Selection(kept, left_out, total, self._copy.digest(*kept, *helpers))
 
     def killer(self, mutant: Mutant, selection: Selection) -> str:
         """The test that notices a mutant; an empty text if none does."""

@@ -9,6 +9,7 @@ Runs in the environment of the tests, in the copy; nothing of the copy is loaded
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import json
 import os
 import select
@@ -39,6 +40,9 @@ for library in (
 ):
     with contextlib.suppress(ImportError):
         __import__(library)
+
+
+_PR_SET_PDEATHSIG = 1  # prctl(2): whoever stops the run stops the test it is at
 
 
 class _Recorder:
@@ -81,6 +85,7 @@ def _too_slow(_number: int, _frame: Any) -> None:
 
 def _child(request: dict[str, Any], answer: int) -> None:
     os.setsid()
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     sys.path.insert(0, str(Path.cwd()))
     signal.signal(signal.SIGALRM, _too_slow)
     nowhere = os.open(os.devnull, os.O_RDWR)
