@@ -18,8 +18,8 @@ UV = UV_DEFAULT_INDEX="$${UV_DEFAULT_INDEX:-$(PIP_INDEX)}" .boot/uv
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: help setup run test test-long code-checks tests-of-processes tests-of-the-rest interop lock \
-	docs docs-test pictures pages clean
+.PHONY: help setup run test test-long code-checks tests-of-processes tests-of-the-rest mutate \
+	interop lock docs docs-test pictures pages clean
 
 help: ## show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-9s %s\n", $$1, $$2 }' Makefile
@@ -55,6 +55,18 @@ tests-of-the-rest:
 
 test-long: setup ## the tests that make test leaves out for its four minutes
 	$(BIN)/pytest -m long
+
+# cosmic-ray in an environment of its own; the tests run in .venv, on a copy of the checkout. FILES are
+# files and folders, SAMPLE mutants of each file, drawn with SEED; none of them: every mutant.
+MUTATION := tests/mutation
+.mutation/ready: $(MUTATION)/tool.lock | $(READY)
+	@.boot/uv venv --quiet --allow-existing --no-project --python .venv/bin/python .mutation/tool
+	@$(UV) pip sync --quiet --python .mutation/tool --require-hashes --only-binary :all: $<
+	@touch $@
+
+mutate: setup .mutation/ready ## change fsw a little, see if a test notices: SAMPLE=40 SEED=1 FILES=fsw/mpc JSON=1
+	@PYTHONPATH=. .mutation/tool/bin/python -m tests.mutation.mutate $(FILES) --seed $(or $(SEED),1) \
+		$(if $(SAMPLE),--sample $(SAMPLE)) $(if $(JSON),--json)
 
 # Of other people's clients; each has a lock of its own, and none is needed to fly or to test.
 EXTERNAL := tests/interop/external
@@ -134,10 +146,11 @@ lock: .boot/uv ## renew requirements.lock (to fly) and requirements-dev.lock (to
 		--output-file requirements-dev.lock
 	@$(COMPILE) --group mavproxy --no-deps --output-file $(EXTERNAL)/mavproxy.lock
 	@$(COMPILE) --group docs --constraints requirements-dev.lock --output-file requirements-docs.lock
+	@$(COMPILE) --group mutation --no-deps --output-file $(MUTATION)/tool.lock
 	@git diff --stat -- requirements.lock requirements-dev.lock requirements-docs.lock \
-		$(EXTERNAL)/mavproxy.lock
+		$(EXTERNAL)/mavproxy.lock $(MUTATION)
 
 clean: ## remove the environment, generated files and caches
-	rm -rf .venv .boot .docs .interop build dist messages/dialect.py .mypy_cache .ruff_cache .pytest_cache \
+	rm -rf .venv .boot .docs .interop .mutation build dist messages/dialect.py .mypy_cache .ruff_cache .pytest_cache \
 		.hypothesis .import_linter_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

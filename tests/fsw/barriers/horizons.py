@@ -11,6 +11,7 @@ from fsw.barriers.soft_rows import TargetPoints
 from fsw.model.airframe import AIRFRAME
 from fsw.model.linearisation import Linearisation
 from fsw.model.prediction import INPUTS, Array, condense
+from tests.fsw.model.geometry_by_rotation import moved_on, tips_of_prediction
 from tests.fsw.random_states import prediction_vector
 
 NODES = 5
@@ -53,3 +54,21 @@ def safe_speed(d: float) -> float:
 def lowest_allowed(h_start: float, node: int) -> float:
     """What the decay of eq 25 leaves of h at a node."""
     return float(TUNING.robustness + BETA**node * (h_start - TUNING.robustness))
+
+
+def measured(horizon: Linearisation) -> tuple[Array, Array]:
+    """Positions (n + 1, 3 points, 3) of every node and their rates, without the product's geometry.
+
+    Base, joint 2 and end-effector by chained rotations from each node's state; the rate is the
+    difference over a moment of the motion.
+    """
+    moment = 1e-4
+
+    def places(x: Array) -> Array:
+        return np.array([x[0:3], *tips_of_prediction(x, np.array(AIRFRAME.link_length))])
+
+    states = horizon.states
+    before, after = (
+        np.array([places(moved_on(x, t)) for x in states]) for t in (-moment, moment)
+    )  # fmt: skip
+    return np.array([places(x) for x in states]), (after - before) / (2.0 * moment)

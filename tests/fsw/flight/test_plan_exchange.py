@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from scipy.spatial.transform import Rotation
 from fsw.control.braking import Brake
 from fsw.flight.plan_exchange import (
     PlanExchange,
+    coast,
     measured_state,
     plan_input,
     take_answer,
@@ -33,7 +35,7 @@ from fsw.signals import (
     SolverStatus,
     Vec3,
 )
-from tests.fsw.random_states import estimate_of, random_estimate
+from tests.fsw.random_states import as_state, estimate_of, prediction_vector, random_estimate
 
 PERIOD_US, TICK_US, START_US = 100_000, 2_000, 1_000_000
 NO_TIME = PlanTimings(0.0, 0.0, 0.0)
@@ -162,3 +164,72 @@ def test_a_slung_arm_is_planned_from_the_nearest_pose_it_may_have() -> None:
     same = with_arm_in_bounds(within, AIRFRAME)
     assert same.q_arm == pytest.approx(within.q_arm)
     assert same._replace(q_arm=within.q_arm) == within
+
+
+@given(st.floats(0.0, 0.2), st.floats(0.0, 0.2), st.integers(0, 2**31))
+def test_coasting_for_a_while_and_then_some_more_is_coasting_for_both(
+    first: float, second: float, seed: int
+) -> None:
+    x = as_state(prediction_vector(np.random.default_rng(seed)))
+    at_once, in_parts = coast(x, first + second), coast(coast(x, first), second)
+    for got, expected in zip(in_parts, at_once, strict=True):
+        assert got == pytest.approx(expected, abs=1e-9)
+
+
+def test_coasting_moves_every_quantity_by_its_rate_and_holds_the_jerk() -> None:
+    x, moment = as_state(prediction_vector(np.random.default_rng(1))), 1e-6
+    after = coast(x, moment)
+
+    def rate(name: str) -> Any:
+        return (np.array(getattr(after, name)) - np.array(getattr(x, name))) / moment
+
+    np.testing.assert_allclose(rate("p"), x.v, atol=1e-4)
+    np.testing.assert_allclose(rate("v"), x.a, atol=1e-4)
+    np.testing.assert_allclose(rate("a"), (*x.j, 0.0), atol=1e-4)
+    np.testing.assert_allclose(rate("yaw"), x.yaw_rate, atol=1e-4)
+    np.testing.assert_allclose(rate("q_arm"), x.qd_arm, atol=1e-4)
+    kept = (x.j, x.s, x.yaw_rate, x.qd_arm)
+    assert (after.j, after.s, after.yaw_rate, after.qd_arm) == kept
+
+
+FLOWN = flight_config()
+EXCHANGE = PlanExchange(FLOWN)
+DELAY_S = 1e-6 * FLOWN.plan_delay_ticks * FLOWN.tick_period_us
+
+
+@pytest.mark.parametrize("distance", [0.149, 0.151])
+@pytest.mark.parametrize("turn", [0.0, 0.349, 0.351, 2.0 * math.pi - 0.349])
+def test_off_its_plan_the_vehicle_is_planned_from_where_it_will_be(
+    distance: float, turn: float
+) -> None:
+    """By its own motion, jerk and all; near to the plan, from the plan."""
+    nominal = moving((0.2, 0.0, 0.0))
+    measured = nominal._replace(
+        p=(0.0, distance, 0.0), v=(0.4, 0.0, 0.1), a=(1.0, 0.0, 0.0), j=(50.0, -30.0), yaw=turn
+    )
+    start, is_nominal = EXCHANGE.start(PlanMemory(), nominal, measured, START_US)
+    assert is_nominal is (distance < 0.15 and turn != 0.351)
+    if not is_nominal:
+        assert start.p == pytest.approx(coast(measured, DELAY_S).p)
+        assert start.v == pytest.approx(coast(measured, DELAY_S).v)
+        assert start.a[0] == pytest.approx(1.0 + DELAY_S * 50.0)
+    else:
+        ticks = FLOWN.plan_delay_ticks
+        model = NominalModel(FLOWN.airframe, 1e-6 * FLOWN.tick_period_us)
+        brake = Brake(FLOWN.airframe, FLOWN.planner.limits.tilt)
+        assert start == model.advance(nominal, brake(nominal), ticks)
+
+
+def test_a_pid_loop_is_planned_from_the_measurement_however_near() -> None:
+    exchange = PlanExchange(flight_config(inner="pid"))
+    measured = moving((0.1, 0.0, 0.0))
+    start, is_nominal = exchange.start(PlanMemory(), measured, measured, START_US)
+    assert not is_nominal
+    assert start.p == pytest.approx((0.1 * DELAY_S, 0.0, 0.0))
+
+
+def test_an_arm_that_was_slung_about_is_caught_before_it_is_planned_on() -> None:
+    slung = moving()._replace(p=(1.0, 0.0, 0.0), q_arm=(2.0, 1.0), qd_arm=(9.0, -9.0))
+    start, _ = EXCHANGE.start(PlanMemory(), moving(), slung, START_US)
+    assert start.qd_arm == (3.0, -3.0)
+    assert abs(start.q_arm[0] - DELAY_S * 3.0) <= AIRFRAME.joint1_limit + 1e-12
