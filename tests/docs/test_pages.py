@@ -18,6 +18,8 @@ from random import Random
 
 import pytest
 
+from docs.generators.message_page import OF_MISSIONS, traffic
+from docs.generators.message_reference import reference
 from fsw.link.services.mission_service import MissionService
 from fsw.link.services.mission_store import MissionStore, Site
 from fsw.link.telemetry.streams import STREAMS
@@ -29,11 +31,9 @@ from fsw.mpc.planner_config import PlannerConfig
 from fsw.parameters.reference import reference as parameter_reference
 from messages import dialect
 from messages.frames import FrameWriter
-from messages.reference import reference
 from pandion.__main__ import VERBS, main
-from pandion.message_page import OF_MISSIONS, traffic
 from pandion.reproduce import WHAT
-from pandion.result import Parts, as_json
+from pandion.result import FlightReports, as_json
 from sitl.link.encode import StepEncoder
 from sitl.scenario_file import load_scenario, scenario_names
 from sitl.simulation import Simulation
@@ -188,7 +188,7 @@ def write_flight_log(path: Path) -> None:
 
 
 def test_the_keys_of_the_result_on_the_page_are_those_that_are_written() -> None:
-    result = as_json(Parts("walls", 0, "blf", None, None, None, {}))
+    result = as_json(FlightReports("walls", 0, "blf", None, None, None, {}))
     rows = re.findall(r"^\| (`.*?) \| (.*) \|$", (DOCS / "result.md").read_text("utf-8"), re.M)
     meaning = {key: text for keys, text in rows for key in re.findall(r"`(\w+)`", keys)}
     assert list(meaning) == list(result)
@@ -198,7 +198,7 @@ def test_the_keys_of_the_result_on_the_page_are_those_that_are_written() -> None
 
 def test_the_reference_of_messages_is_not_stale() -> None:
     page = (DOCS / "messages.md").read_text(encoding="utf-8")
-    assert page == reference(traffic()), "run python -m pandion.message_page"
+    assert page == reference(traffic()), "run python -m docs.generators.message_page"
 
 
 def test_the_topics_of_the_flight_log_are_not_stale() -> None:

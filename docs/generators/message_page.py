@@ -1,7 +1,7 @@
 """Write ``docs/messages.md``: every message on the links to the ground, and the dialect.
 
-Run by hand after an edit of the dialect or of the table of streams: ``python -m
-pandion.message_page``. A test compares.
+Run by hand after an edit of the dialect or of the table of streams:
+``python -m docs.generators.message_page``. A test compares.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 from typing import Final
 
+from docs.generators.message_reference import Traffic, reference
 from fsw.link.files.ftp_service import FtpService
 from fsw.link.files.log_service import LogService
 from fsw.link.inbox import Inbox
@@ -17,7 +18,6 @@ from fsw.link.services.parameter_service import ParameterService
 from fsw.link.services.time_service import TimeService
 from fsw.link.telemetry.streams import AT_ONCE, ON_REQUEST, STREAMS
 from fsw.link.wire import message_ids as ids
-from messages.reference import Traffic, reference
 
 # What the vehicle says in answer, or as it happens, beside the streams.
 ANSWERS: Final = (
