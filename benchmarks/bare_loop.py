@@ -22,7 +22,7 @@ from fsw.runtime.rates import INNER
 from fsw.runtime.realtime import claim_real_time
 
 _PRIORITY: Final = 60  # SCHED_FIFO; the tick has 50
-# Waking costs a virtual machine 30 us, and at twice the rate the tick's median grew by half. Not
+# Waking costs a virtual machine 30 us, and at twice the rate the tick's median grew by process. Not
 # the tick's period either: a loop that is due with the tick would hold up every tick of a flight.
 _PERIOD_US: Final = 1_930
 _STOPPED_US: Final = 500  # an idle processor wakes a sleeper within a tenth of that

@@ -20,7 +20,7 @@ from command_line.options import json_file, option, read
 from command_line.values import number
 from pandion.display import Display
 from pandion.output import console_beside, write_text
-from pandion.supervisor import HalfFailed, Supervisor
+from pandion.supervisor import ProcessFailed, Supervisor
 from pandion.version import version_and_machine
 
 PASSED, NOT_PASSED = 0, 1  # exit codes
@@ -81,9 +81,9 @@ def main(argv: list[str]) -> int:
     print(version_and_machine(), file=console)
     try:
         fetched = fly(int(options.size_mb * _MB), Display(console))
-    except (HalfFailed, NothingCame) as error:
+    except (ProcessFailed, NothingCame) as error:
         print(f"python -m benchmarks download: {error}", file=sys.stderr)
-        return error.exit_code if isinstance(error, HalfFailed) else NOT_PASSED
+        return error.exit_code if isinstance(error, ProcessFailed) else NOT_PASSED
     for each in fetched.downloads:
         said = "identical" if each.identical else "NOT identical"
         times = each.mb_per_s / fetched.logged_mb_per_s
@@ -107,7 +107,7 @@ def fly(size: int, display: Display) -> Downloads:
     """Stand on the ground in real time while a log of ``size`` bytes is fetched both ways.
 
     Raises:
-        HalfFailed: There was no flight.
+        ProcessFailed: There was no flight.
         NothingCame: The vehicle did not send the log to its end.
     """
     with ExitStack() as stack:
@@ -124,7 +124,7 @@ def fly(size: int, display: Display) -> Downloads:
         failures: list[NothingCame] = []
         helper = threading.Thread(target=_fetch, args=(client, log, found, failures), daemon=True)
         helper.start()
-        flown = Supervisor(display, out).fly(
+        flown = Supervisor(display, out).run(
             ["ground", "--realtime", f"--duration={duration_s!r}", "--listen=udp:127.0.0.1:0"]
             + ["--wait=600", f"--out={out}"],
             lambda port: [
@@ -140,7 +140,7 @@ def fly(size: int, display: Display) -> Downloads:
             vehicle = json.loads((out / "fsw.json").read_text(encoding="utf-8"))
             logged = (out / "flight.ulg").stat().st_size
         except (OSError, ValueError):
-            raise HalfFailed(flown.failure or "the flight left no figures") from None
+            raise ProcessFailed(flown.failure or "the flight left no figures") from None
     return Downloads(tuple(found), logged / duration_s / _MB, client.asked_again, vehicle["inner"])
 
 

@@ -23,7 +23,7 @@ from command_line.values import seconds
 from fsw.link.telemetry.streams import STREAMS
 from pandion.display import Display
 from pandion.output import console_beside, write_text
-from pandion.supervisor import HalfFailed, Supervisor
+from pandion.supervisor import ProcessFailed, Supervisor
 from pandion.version import version_and_machine
 
 PASSED, NOT_PASSED = 0, 1  # exit codes
@@ -83,7 +83,7 @@ def main(argv: list[str]) -> int:
     try:
         calm = fly(options.duration_s, flooded=False, display=Display(console))
         flooded = fly(options.duration_s, flooded=True, display=Display(console))
-    except HalfFailed as error:
+    except ProcessFailed as error:
         print(f"python -m benchmarks flood: {error}", file=sys.stderr)
         return error.exit_code
     rows = [*correctness(flooded), *timing(flooded, calm)]
@@ -101,7 +101,7 @@ def fly(duration_s: float, *, flooded: bool, display: Display) -> Flight:
     """Fly the walls once, and flood the ground station's link for ``duration_s`` if asked to.
 
     Raises:
-        HalfFailed: There was no flight.
+        ProcessFailed: There was no flight.
     """
     with ExitStack() as stack:
         out = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="pandion-flood-")))
@@ -116,7 +116,7 @@ def fly(duration_s: float, *, flooded: bool, display: Display) -> Flight:
         helper.start()
         sitl = ["walls", "--realtime", f"--duration={duration_s + SETTLE_S + 1.0!r}"]
         sitl += ["--listen=udp:127.0.0.1:0", "--wait=600", f"--out={out}"]
-        flown = Supervisor(display, out).fly(
+        flown = Supervisor(display, out).run(
             sitl,
             lambda port: [
                 f"--sim=udp:127.0.0.1:{port}",
@@ -128,9 +128,9 @@ def fly(duration_s: float, *, flooded: bool, display: Display) -> Flight:
         try:
             vehicle = json.loads((out / "fsw.json").read_text(encoding="utf-8"))
         except (OSError, ValueError):
-            raise HalfFailed(flown.failure or "the flight left no figures") from None
+            raise ProcessFailed(flown.failure or "the flight left no figures") from None
         if flown.interrupted or flown.sitl is None:
-            raise HalfFailed(flown.failure or "interrupted", exit_code=NOT_PASSED)
+            raise ProcessFailed(flown.failure or "interrupted", exit_code=NOT_PASSED)
     sent, sent_valid = (int(count) for count in counts) if counts else (0, 0)
     return Flight(monitor.heard, vehicle, flown.sitl, sent, sent_valid)
 

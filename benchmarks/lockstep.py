@@ -1,6 +1,6 @@
 """``python -m benchmarks lockstep``: how fast a whole flight is, and where its time goes.
 
-Everything is on: both halves as processes, telemetry, logs, the MPC. The peer is the same loop with
+Everything is on: both processes, telemetry, logs, the MPC. The peer is the same loop with
 pymavlink's own packing of the lockstep frames; the two take turns: a busy machine slows both.
 """
 
@@ -18,11 +18,11 @@ from typing import Any, Final, TextIO
 from command_line.options import json_file, option, read
 from command_line.parser import COULD_NOT_START
 from command_line.values import number, whole
-from pandion.children import Event
+from pandion.child import Event
 from pandion.display import Display
 from pandion.output import console_beside, write_text
 from pandion.processor import Places, lockstep_places
-from pandion.supervisor import HalfFailed, Supervisor
+from pandion.supervisor import ProcessFailed, Supervisor
 from pandion.version import version
 
 DONE, SLOW = 0, 1  # exit codes
@@ -55,7 +55,7 @@ def main(argv: list[str]) -> int:
     console = console_beside(options.json)
     try:
         found = _measure(options, console)
-    except (HalfFailed, OSError) as error:
+    except (ProcessFailed, OSError) as error:
         print(f"python -m benchmarks lockstep: {error}", file=sys.stderr)
         return COULD_NOT_START
     write_text(options.json, json.dumps(found, indent=1, allow_nan=False) + "\n")
@@ -104,15 +104,15 @@ class _Silent(Display):
     def say(self, sentence: str) -> None:
         """See :class:`Display`."""
 
-    def progress(self, *_: Any) -> None:
+    def flying(self, *_: Any) -> None:
         """See :class:`Display`."""
 
 
 def _fly(options: LockstepOptions, runner: str | None) -> dict[str, Any]:
-    """One flight; what both halves wrote about it.
+    """One flight; what both processes wrote about it.
 
     Raises:
-        HalfFailed: It did not begin, or did not end as it should.
+        ProcessFailed: It did not begin, or did not end as it should.
     """
     with tempfile.TemporaryDirectory(prefix="pandion-bench-") as name:
         out, places = Path(name), _places(options.processors)
@@ -123,14 +123,14 @@ def _fly(options: LockstepOptions, runner: str | None) -> dict[str, Any]:
             "--wait=600",
             f"--out={out}",
         ]
-        flown = Supervisor(_Silent(sys.stderr), out, places, runner).fly(
+        flown = Supervisor(_Silent(sys.stderr), out, places, runner).run(
             sitl, lambda port: [f"--sim=udp:127.0.0.1:{port}", f"--out={out}", "--wait=600"]
         )
         if flown.failure is not None or flown.sitl is None or flown.interrupted:
-            raise HalfFailed(flown.failure or "the flight was interrupted", exit_code=1)
+            raise ProcessFailed(flown.failure or "the flight was interrupted", exit_code=1)
         written = out / "fsw.json"
         if not written.exists():
-            raise HalfFailed("the flight software was ended before it wrote its result", 1)
+            raise ProcessFailed("the flight software was ended before it wrote its result", 1)
         fsw: Event = json.loads(written.read_text(encoding="utf-8"))
         return {"sitl": flown.sitl, "fsw": fsw, "places": _described(places)}
 
@@ -147,7 +147,7 @@ def _described(places: Places) -> str:
     if places.sitl is None:
         return "wherever the system likes"
     together = places.sitl == places.fsw
-    return "both halves on one processor" if together else "a processor for each half"
+    return "both processes on one processor" if together else "a processor for each process"
 
 
 def _stages(flown: dict[str, Any]) -> dict[str, float]:

@@ -21,7 +21,7 @@ from command_line.options import json_file, option, read
 from command_line.values import seconds, several, whole
 from pandion.display import Display
 from pandion.output import console_beside, write_text
-from pandion.supervisor import HalfFailed, Supervisor
+from pandion.supervisor import ProcessFailed, Supervisor
 from pandion.version import version
 
 PASSED, NOT_PASSED = 0, 1  # exit codes
@@ -64,7 +64,7 @@ def main(argv: list[str]) -> int:
     print("Pandion {version}: {cores} cores, load {load}, {kernel}".format(**machine), file=console)
     try:
         flown = [_fly(options, hogs, budgets, console) for hogs in options.hogs]
-    except HalfFailed as error:
+    except ProcessFailed as error:
         print(f"python -m benchmarks loop: {error}", file=sys.stderr)
         return error.exit_code
     machine["load_after"] = round(os.getloadavg()[0], 2)
@@ -79,7 +79,7 @@ def _fly(options: LoopOptions, hogs: int, budgets: Budgets, console: TextIO) -> 
     """One flight; its logs are thrown away.
 
     Raises:
-        HalfFailed: There was no flight.
+        ProcessFailed: There was no flight.
     """
     with ExitStack() as stack:
         out = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="pandion-bench-")))
@@ -93,7 +93,7 @@ def _fly(options: LoopOptions, hogs: int, budgets: Budgets, console: TextIO) -> 
             f"--duration={options.duration_s!r}",
             *("--listen=udp:127.0.0.1:0", "--wait=600", f"--out={out}"),
         ]
-        flown = Supervisor(Display(console), out).fly(
+        flown = Supervisor(Display(console), out).run(
             sitl,
             # Telemetry goes where nobody listens: it is encoded and sent all the same.
             lambda port: [
@@ -104,7 +104,7 @@ def _fly(options: LoopOptions, hogs: int, budgets: Budgets, console: TextIO) -> 
         try:
             vehicle = json.loads((out / "fsw.json").read_text(encoding="utf-8"))
         except (OSError, ValueError):
-            raise HalfFailed(flown.failure or "the flight left no figures") from None
+            raise ProcessFailed(flown.failure or "the flight left no figures") from None
     assert watch.noise is not None
     inner, stops = vehicle["inner"], bare.stops
     flight = inner["begun_us"], inner["ticks"] + inner["skipped"]

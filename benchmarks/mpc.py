@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 from command_line.options import json_file, option, read, switch
 from command_line.parser import COULD_NOT_START
 from command_line.values import several, whole
+from pandion.display import Display
 from pandion.output import console_beside, write_text
-from pandion.progress import Progress
 from pandion.version import version
 
 if TYPE_CHECKING:
@@ -69,8 +69,9 @@ def _run(options: MpcOptions) -> int:
         file=console,
         flush=True,
     )
-    with Progress(console, lines=4, threaded=False) as progress:
-        measured = run(options.horizons or HORIZONS, effort, progress.report)
+    display = Display(console, lines=4, threaded=False)
+    with display.progress():
+        measured = run(options.horizons or HORIZONS, effort, display.report)
     facts = machine(load)
     print("\n".join(lines(measured)), file=console)
     print(

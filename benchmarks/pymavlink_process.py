@@ -18,11 +18,11 @@ _STEP: Final = ("ODOMETRY", "ARM_JOINT_STATE", "HIL_SENSOR")
 
 
 def main() -> None:
-    """Swap the codec of one half and run it."""
-    half = sys.argv[1]
-    {"sitl": _swap_sitl, "fsw": _swap_fsw}[half]()
-    sys.argv = [half, *sys.argv[2:]]
-    runpy.run_module(half, run_name="__main__", alter_sys=True)
+    """Swap the codec of one process and run it."""
+    name = sys.argv[1]
+    {"sitl": _swap_sitl, "fsw": _swap_fsw}[name]()
+    sys.argv = [name, *sys.argv[2:]]
+    runpy.run_module(name, run_name="__main__", alter_sys=True)
 
 
 def _swap_sitl() -> None:

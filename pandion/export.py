@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final, Protocol
 
 from command_line.options import OneOf, option, read
 from command_line.parser import COULD_NOT_START
-from pandion.progress import Progress
+from pandion.display import Display
 
 if TYPE_CHECKING:
     from messages.ulog import Topic
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 DONE: Final = 0  # exit code
 
-_TOLD_RECORDS: Final = 5_000
+_SHOWN_RECORDS: Final = 5_000
 _TEXTS: Final = "texts"  # the channel of what the vehicle said
 
 
@@ -53,8 +53,9 @@ def main(argv: list[str]) -> int:
         log = open_log(path)
         with contextlib.ExitStack() as stack:
             sink = _sink(options.csv, options.mcap, log, stack)
-            progress = stack.enter_context(Progress(sys.stdout, counted=False))
-            count = _export(log, sink, progress)
+            display = Display(sys.stdout, lines=0)
+            stack.enter_context(display.progress())
+            count = _export(log, sink, display)
         if count == 0:
             raise UlogError(f"{path} holds no record")
     except (UlogError, ValueError, OSError) as error:
@@ -82,13 +83,13 @@ def _sink(csv: Path | None, mcap: Path | None, log: UlogFile, stack: contextlib.
     return stack.enter_context(McapSink(mcap, facts))
 
 
-def _export(log: UlogFile, sink: Sink, progress: Progress) -> int:
+def _export(log: UlogFile, sink: Sink, display: Display) -> int:
     count = 0
     for topic, t_us, names, values in _rows(log):
         sink.add(topic, t_us, names, values)
         count += 1
-        if count % _TOLD_RECORDS == 0:
-            progress.report("exporting", log.at, log.size)
+        if count % _SHOWN_RECORDS == 0:
+            display.share("exporting", log.at, log.size)
     return count
 
 

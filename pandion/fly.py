@@ -1,4 +1,4 @@
-"""``pandion fly``: start both halves, watch them, and give the verdict."""
+"""``pandion fly``: start both processes, watch them, and print the result."""
 
 from __future__ import annotations
 
@@ -19,9 +19,8 @@ from pandion.display import Display
 from pandion.join_truth import join_truth
 from pandion.output import write_text
 from pandion.processor import ANYWHERE, lockstep_places
-from pandion.result import Parts, as_json
-from pandion.supervisor import Flown, HalfFailed, Supervisor
-from pandion.verdict import rows
+from pandion.result import FlightReports, as_json, table_rows
+from pandion.supervisor import Flown, ProcessFailed, Supervisor
 from pandion.version import version
 from sitl.arguments import RunOptions, SitlOptions
 from sitl.scenario_file import ScenarioError, load_scenario, scenario_digest
@@ -66,10 +65,10 @@ def main(argv: list[str]) -> int:
     _banner(flight, display)
     try:
         places = ANYWHERE if options.realtime else lockstep_places()
-        flown = Supervisor(display, flight.out, places).fly(
+        flown = Supervisor(display, flight.out, places).run(
             as_words(_sitl_options(flight)), lambda port: as_words(_fsw_options(flight, port))
         )
-    except HalfFailed as error:
+    except ProcessFailed as error:
         print(f"pandion fly: {error}", file=sys.stderr)
         return error.exit_code
     return _judge(flight, display, flown)
@@ -154,7 +153,7 @@ def _judge(flight: PlannedFlight, display: Display, flown: Flown) -> int:
         "fsw_log": "fsw.log",
     }
     join_truth(out, flown.fsw)
-    parts = Parts(
+    reports = FlightReports(
         scenario=flight.name,
         seed=options.seed,
         controller=options.control.controller,
@@ -168,10 +167,10 @@ def _judge(flight: PlannedFlight, display: Display, flown: Flown) -> int:
             if name == "result.json" or (out / name).exists()
         },
     )
-    result = as_json(parts)
+    result = as_json(reports)
     text = json.dumps(result, indent=2) + "\n"
     lost = _write(str(out / "result.json"), text)
-    display.verdict(result, rows(result, (flown.sitl or {}).get("tracking_error_max_m")))
+    display.result(result, table_rows(result, (flown.sitl or {}).get("tracking_error_max_m")))
     unwritten = [*flown.unwritten, *lost, *_write(options.json, text)]
     if unwritten:
         print(f"pandion fly: results could not be written: {'; '.join(unwritten)}", file=sys.stderr)

@@ -20,7 +20,7 @@ _FACTS = (
     "robustness",
     "solver",
 )
-_TOLD_RECORDS = 10_000
+_SHOWN_RECORDS = 10_000
 
 
 def summary(log: UlogFile, progress: Callable[[int, int], None]) -> dict[str, Any]:
@@ -38,7 +38,7 @@ def summary(log: UlogFile, progress: Callable[[int, int], None]) -> dict[str, An
             texts.append(f"{1e-6 * t_us:9.3f} s  {text}")
         elif record.kind == ulog.DROPOUT:
             lost_ms += int.from_bytes(record.body, "little")
-        if k % _TOLD_RECORDS == 0:
+        if k % _SHOWN_RECORDS == 0:
             progress(log.at, log.size)
     return {
         "log": str(log.path),

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 from command_line.options import json_file, option, read, switch
 from command_line.parser import COULD_NOT_START
 from fsw.signals import Origin
+from pandion.display import Display
 from pandion.output import console_beside, write_text
-from pandion.progress import Progress
 
 if TYPE_CHECKING:
     from fsw.runtime.program import FlightProgram
@@ -62,8 +62,9 @@ def _verify(options: ReplayOptions, log: UlogFile) -> int:
         print(f"note: {note}", file=console)
     if len(notes) > _NOTES_SHOWN:
         print(f"note: {len(notes) - _NOTES_SHOWN} more numbers differ", file=console)
-    with Progress(console, counted=False) as progress:
-        found = replay(log, program, partial(progress.report, "replaying"))
+    display = Display(console, lines=0)
+    with display.progress():
+        found = replay(log, program, partial(display.share, "replaying"))
     same = found.difference is None and not found.lost_ms
     print(_sentence(found, log), file=console)
     figures = {"log": str(log.path), "same": same, **dataclasses.asdict(found)}
@@ -118,8 +119,9 @@ def _summarise(options: ReplayOptions, log: UlogFile) -> int:
     from pandion.log_summary import summary
 
     console = console_beside(options.json)
-    with Progress(console, counted=False) as progress:
-        result = summary(log, partial(progress.report, "reading"))
+    display = Display(console, lines=0)
+    with display.progress():
+        result = summary(log, partial(display.share, "reading"))
     for name, value in result.items():
         if name not in ("topics", "texts"):
             print(f"{name:15} {value}", file=console)

@@ -15,8 +15,8 @@ from command_line.parser import COULD_NOT_START
 from command_line.values import number, one_of, whole
 from fsw.log.run_directory import new_run_directory
 from fsw.parameters.control_choice import KNOWN
+from pandion.display import Display
 from pandion.output import console_beside, write_text
-from pandion.progress import Progress
 from pandion.version import version
 
 if TYPE_CHECKING:
@@ -119,9 +119,10 @@ def _run(options: ReproduceOptions) -> int:
     if settings.tuned_on:
         print("these seeds were used for tuning; report others", file=console, flush=True)
     try:
-        with Progress(console, lines=10) as progress:
+        display = Display(console)
+        with display.progress():
             campaign = Campaign(
-                options.workers, folder / "journal.jsonl", partial(progress.report, "flown")
+                options.workers, folder / "journal.jsonl", partial(display.report, "flown")
             )
             report = STUDIES[options.what](settings, campaign)
     except KeyboardInterrupt:

@@ -124,8 +124,8 @@ def score(seed: int, result: FlightResult) -> Outcome:
 @cache
 def sources() -> str:
     """Digest of the code that decides how a flight goes."""
-    halves = [Path(str(package.__file__)).parent for package in (fsw, sitl)]
-    files = [path for folder in halves for path in sorted(folder.rglob("*.py"))]
+    folders = [Path(str(package.__file__)).parent for package in (fsw, sitl)]
+    files = [path for folder in folders for path in sorted(folder.rglob("*.py"))]
     files += [Path(str(shell.__file__)) for shell in (closed_loop, double_integrator, mission)]
     digest = hashlib.sha256()
     for path in files:

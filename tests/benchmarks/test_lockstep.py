@@ -1,4 +1,4 @@
-"""The lockstep bench: what it refuses, what it makes of two halves' reports, and its peer."""
+"""The lockstep bench: what it refuses, what it makes of two processes' reports, and its peer."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def _flown(factor: float) -> dict[str, Any]:
     return {
         "sitl": {"real_time_factor": factor, "steps": 1000, "wall_s": 0.08, "waited_s": 0.05},
         "fsw": {"stages": stages, "telemetry": took(10.0), "mpc": mpc},
-        "places": "a processor for each half",
+        "places": "a processor for each process",
     }
 
 

@@ -1,4 +1,4 @@
-"""One half stands still or is gone: both are gone in two seconds, and the end names the step."""
+"""One process stands still or is gone: both are gone in two seconds, and the end names the step."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def flying(out: Path, *options: str, duration: str = "8") -> subprocess.Popen[st
 
 
 def end_of(flight: subprocess.Popen[str], half: str, number: signal.Signals) -> tuple[float, str]:
-    """Send a signal to a half; returns the seconds until nothing runs, and what was said."""
+    """Send a signal to a process; returns the seconds until nothing runs, and what was said."""
     begin_s = time.monotonic()
     os.kill(half_of(flight.pid, half), number)
     assert flight.wait(timeout=20.0) == 1

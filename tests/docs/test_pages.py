@@ -16,7 +16,7 @@ from fsw.link.telemetry.streams import STREAMS
 from fsw.link.wire import message_ids as ids
 from fsw.mpc.planner_config import PlannerConfig
 from messages import dialect
-from pandion.result import Parts, as_json
+from pandion.result import FlightReports, as_json
 from tests.docs.fences import DOCS, PAGES, ROOT, named, without_fences
 
 REFERENCE = DOCS / "reference"
@@ -62,7 +62,7 @@ def test_decisions_that_the_code_cites_exist() -> None:
 
 
 def test_the_keys_of_the_result_on_the_page_are_those_that_are_written() -> None:
-    result = as_json(Parts("walls", 0, "blf", None, None, None, {}))
+    result = as_json(FlightReports("walls", 0, "blf", None, None, None, {}))
     rows = re.findall(r"^\| (`.*?) \| (.*) \|$", (REFERENCE / "result.md").read_text("utf-8"), re.M)
     meaning = {key: text for keys, text in rows for key in re.findall(r"`(\w+)`", keys)}
     assert list(meaning) == list(result)

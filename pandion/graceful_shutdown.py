@@ -1,18 +1,18 @@
-"""How a half is made to end: it has a moment, then it is interrupted, then it is killed."""
+"""How a process is made to end: it has a moment, then it is interrupted, then it is killed."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Final
 
-from pandion.children import Child
+from pandion.child import Child
 
-GRACE_S: Final = 0.6  # between one way to end a half and the next, stronger one
+GRACE_S: Final = 0.6  # between one way to end a process and the next, stronger one
 
 
 @dataclass(slots=True)
-class Leaving:
-    """One half on its way out; nothing happens before it is expected to end."""
+class GracefulShutdown:
+    """One process on its way out; nothing happens before it is expected to end."""
 
     child: Child
     due_s: float | None = None  # on the monotonic clock: when the next step is taken
@@ -24,7 +24,7 @@ class Leaving:
         if self.due_s is None or due_s < self.due_s:
             self.due_s, self._grace_s = due_s, grace_s
 
-    def hurry(self, now_s: float) -> None:
+    def escalate(self, now_s: float) -> None:
         """Past its time: interrupt it, and the next time kill it."""
         if self.due_s is None or now_s < self.due_s:
             return

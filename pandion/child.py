@@ -1,4 +1,4 @@
-"""The two halves as child processes: started, listened to, and never left behind."""
+"""A child process of a flight: started, listened to, and never left behind."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _PR_SET_PDEATHSIG: Final = 1
 
 
 class Child:
-    """A half of the system. Its events come from its standard output, line by line."""
+    """A process of the system. Its events come from its standard output, line by line."""
 
     def __init__(
         self,
@@ -36,7 +36,7 @@ class Child:
             arguments: Its command line.
             log: Where its standard error goes.
             processor: The only one it may run on; any if None.
-            runner: A module that runs the half of this name in its own way.
+            runner: A module that runs the process of this name in its own way.
         """
         module = [name] if runner is None else [runner, name]
         self.name = name

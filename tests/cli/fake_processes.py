@@ -1,4 +1,4 @@
-"""Halves that only say what a script has them say: ``python -m tests.cli.fake_halves NAME``."""
+"""Processes that follow a script: ``python -m tests.cli.fake_processes NAME``."""
 
 from __future__ import annotations
 
