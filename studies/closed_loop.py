@@ -122,7 +122,7 @@ class _Flight:
         _insist(outputs)
         applied = outputs.snapshot.plan_input
         if step % self._steps_per_plan == 0 and applied is not None:
-            self.recorder.effort.add(applied)
+            self.recorder.metrics.add(applied)
         if self._traced and step % TRACE_STEPS == 0:
             self.recorder.trace.append(self._trace_point())
         if outputs.plan_request is not None:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fsw.ports import VehicleFacts
-from fsw.runtime.planner_worker import PlannerRecord
-from fsw.runtime.rates import HOUSEKEEPING, INNER, TELEMETRY
+from fsw.runtime.planner_service import PlannerRecord
+from fsw.runtime.rate_groups import HOUSEKEEPING, INNER, TELEMETRY
 from fsw.runtime.sim_loop import FlightEnd, FlightRecord
 from fsw.runtime.timing import GroupTimer, Histogram
 
@@ -34,13 +34,13 @@ def as_json(
         "inner_loop": setup.inner,
         "end": end.ending.value,
         "end_reason": end.sentence,
-        **record.effort.as_json(),
+        **record.control.as_json(),
         "mpc": _mpc(setup.facts, record),
         "inner": {
             **_group(record.groups[INNER.name]),
             "stale": record.stale,
             "begun_us": record.begun_us,
-            "missed_us": record.missed.stretches,
+            "missed_us": record.deadlines.missed,
         },
         "telemetry": _group(record.groups[TELEMETRY.name]),
         "housekeeping": _group(record.groups[HOUSEKEEPING.name]),
