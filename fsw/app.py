@@ -140,9 +140,8 @@ class _Session:
         finally:
             for part in (planner, sim, ground, files, keeping):
                 part.close()
-        setup = report.Setup(options.control.controller, options.control.inner, facts)
-        result = report.as_json(setup, end, record, sim.retransmissions)
-        result |= link_report.as_json(ground, inbox)
+        result = report.as_json(options.control, facts, end, record)
+        result |= {"retransmissions": sim.retransmissions, **link_report.as_json(ground, inbox)}
         result["files"] = files.as_json()
         unwritten = report.write(directory / "fsw.json", result)
         told = f"fsw: {end.sentence}"

@@ -95,9 +95,9 @@ def main(argv: list[str]) -> int:
     """Run one study; returns the exit code."""
     what = "Fly a table or a figure of the paper again."
     options = read(ReproduceOptions, "pandion reproduce", what, argv)
-    from studies.one_thread import pin_threads
+    from fsw.runtime.process import pin_numerics_to_one_thread
 
-    pin_threads()  # before NumPy loads
+    pin_numerics_to_one_thread()  # before NumPy loads
     from studies.drawing import NoMatplotlibError
 
     try:

@@ -17,8 +17,8 @@ from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from fsw.runtime.process import pin_numerics_to_one_thread
 from studies.job import Job, Outcome, broken, outcome
-from studies.one_thread import pin_threads
 
 Report = Callable[[int, int], None]  # flights done, flights in all
 
@@ -100,7 +100,7 @@ class Campaign:
 
 
 def _pool(workers: int) -> ProcessPoolExecutor:
-    pin_threads()  # inherited by the processes, before they load their libraries
+    pin_numerics_to_one_thread()  # inherited by the processes, before they load their libraries
     spawn = multiprocessing.get_context("spawn")
     return ProcessPoolExecutor(workers, mp_context=spawn, initializer=_leave_interrupts)
 
