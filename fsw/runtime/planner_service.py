@@ -10,7 +10,6 @@ from __future__ import annotations
 import contextlib
 import os
 import signal
-import time
 from collections import Counter
 from dataclasses import dataclass, field
 from typing import Final
@@ -29,7 +28,6 @@ from fsw.signals import Plan, PlanFailure, PlanRequest
 
 # The limit of a solve in wall time: a planner process that is silent for longer is replaced.
 ANSWER_TIMEOUT_US: Final = 500_000
-_CLOSE_TIMEOUT_S: Final = 0.5
 
 
 @dataclass(slots=True)
@@ -121,11 +119,6 @@ class ProcessPlanner:
             return
         server, self.fork_server = self.fork_server, None
         self._link.close()
-        until = time.monotonic() + _CLOSE_TIMEOUT_S
-        while time.monotonic() < until:
-            if os.waitpid(server, os.WNOHANG)[0]:
-                return
-            time.sleep(0.001)
         os.kill(server, signal.SIGKILL)  # and the worker with it
         os.waitpid(server, 0)
 

@@ -202,10 +202,10 @@ def test_groups_run_at_their_rates_and_their_members_in_order() -> None:
     done = bench.sim.done
     tick = ["sensors", "plan", "actuators", "telemetry", "ground"]
     asking = ["sensors", "plan", "actuators", "request", "telemetry", "ground"]
-    laid = done.index("sensors")
-    second = done.index("sensors", laid + 1)
-    assert done[laid:second] == tick
-    ask = done.index("request", laid)
+    begun = done.index("sensors")
+    second = done.index("sensors", begun + 1)
+    assert done[begun:second] == tick
+    ask = done.index("request", begun)
     assert done[ask - 3 : ask + 3] == asking
     ticks = bench.timer(INNER.name).ticks
     assert ticks == pytest.approx(1000, abs=2)
@@ -214,7 +214,7 @@ def test_groups_run_at_their_rates_and_their_members_in_order() -> None:
     assert (bench.timer(INNER.name).late, bench.timer(INNER.name).skipped) == (0, 0)
 
 
-def test_a_tick_that_overruns_is_counted_and_told_once() -> None:
+def test_a_tick_that_overruns_is_counted_and_reported_once() -> None:
     def overrunning(state: int, inputs: TickInputs) -> tuple[int, TickOutputs]:
         bench.time.work(2_500 if state in range(800, 3800, 50) else 100)
         return standing(state, inputs)
@@ -224,8 +224,8 @@ def test_a_tick_that_overruns_is_counted_and_told_once() -> None:
     assert bench.timer(INNER.name).late == 60
     noted = [first for first, _ in bench.record.deadlines.missed]
     assert [b - a for a, b in pairwise(noted)] == [50 * PERIOD_US] * 59
-    (told,) = [text for text in bench.ground.texts if "late" in text]
-    assert re.fullmatch(r"ticks: 5\d late", told)
+    (warning,) = [text for text in bench.ground.texts if "late" in text]
+    assert re.fullmatch(r"ticks: 5\d late", warning)
 
 
 def test_a_telemetry_socket_that_blocks_costs_releases_but_no_answer_is_late() -> None:
@@ -262,7 +262,7 @@ def test_what_was_missed_in_the_last_second_is_counted() -> None:
     assert bench.timer(INNER.name).skipped == 3
 
 
-def test_a_planner_that_died_is_told_at_once_and_logged() -> None:
+def test_a_planner_that_died_is_reported_at_once_and_logged() -> None:
     bench = Bench(standing)
     bench.asleep = lambda: (
         bench.record.mpc.events.append("planner process died (-9), restarted")

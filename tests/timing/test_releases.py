@@ -65,7 +65,7 @@ def test_every_frame_has_its_tick_on_the_grid(time: VirtualTime) -> None:
 
 
 @pytest.mark.parametrize("late_us", [LEAD_US + 100, 1_900])
-def test_a_late_frame_does_not_stop_the_tick_which_is_told_its_age(
+def test_a_late_frame_does_not_stop_the_tick_which_gets_its_age(
     time: VirtualTime, late_us: int
 ) -> None:
     loop = Loop(VirtualSensors(time, lambda step: late_us if step == 100 else 0))
@@ -194,25 +194,25 @@ def test_a_schedule_whose_clock_jumps_back_goes_on_to_the_next_release() -> None
     assert schedule.due_us == 12_000
 
 
-def test_who_listens_for_a_frame_is_deaf_to_the_ground_for_a_moment_only(
+def test_measuring_an_arrival_leaves_the_ground_links_unread_for_a_moment_only(
     time: VirtualTime, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     sensors = VirtualSensors(time)
     loop = Loop(sensors)
     loop.run(SETTLED)
-    deaf_us: list[int] = []
+    unread_us: list[int] = []
 
     def wait(seconds: float) -> bool:
         begin = time.now_us
         there = VirtualSensors.wait(sensors, seconds)
-        deaf_us.append(time.now_us - begin)
+        unread_us.append(time.now_us - begin)
         return there
 
     monkeypatch.setattr(sensors, "wait", wait)
     loop.run(1000)
-    listened = [duration for duration in deaf_us if duration]
-    assert len(listened) == pytest.approx(40, abs=1)
-    assert max(listened) < PERIOD_US / 5
+    measurements = [duration for duration in unread_us if duration]
+    assert len(measurements) == pytest.approx(40, abs=1)
+    assert max(measurements) < PERIOD_US / 5
 
 
 @pytest.mark.parametrize("parts_per_million", [-200.0, 200.0])
