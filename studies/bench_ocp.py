@@ -15,7 +15,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from fsw.barriers.root import BarrierTuning
+from fsw.barriers.safe_approach import BarrierTuning
 from fsw.model.airframe import AIRFRAME, GRAVITY
 from fsw.model.kinematics import arm_points
 from fsw.model.prediction import INPUTS, Q_ARM, STATES, YAW, YAW_RATE, P, V, discretise
@@ -165,7 +165,7 @@ def _add_cost(
     cog = (moment1 * ca.sin(th1) + m2 * airframe.link_com[1] * ca.sin(th12)) / (m1 + m2)
     program.cost += (w.tracking_terminal if last else w.tracking) * ca.sumsqr(tip[0] - node[:3])
     program.cost += (w.velocity_terminal if last else w.velocity) * ca.sumsqr(tip[1] - target_v)
-    program.cost += (w.arm_cog_terminal if last else w.arm_cog) * cog**2
+    program.cost += (w.arm_com_terminal if last else w.arm_com) * cog**2
     program.cost += w.yaw * (x[YAW] + w.yaw_lead * x[YAW_RATE] - node[6]) ** 2
 
 

@@ -19,7 +19,7 @@ CYCLE = (
     ("start, moved on by the delay", "runtime/planning.py"),
     ("linearise the horizon", "model/linearisation.py"),
     ("costs, barriers, limits", "mpc/, barriers/"),
-    ("refill the program, solve (2x)", "mpc/program.py"),
+    ("refill the program, solve (2x)", "mpc/qp_data.py"),
     ("Plan or PlanFailure", "signals.py"),
 )
 

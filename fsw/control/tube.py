@@ -27,7 +27,7 @@ from functools import lru_cache
 import numpy as np
 from scipy.linalg import expm
 
-from fsw.control.inner_tuning import TrackingGains, TrackingTuning
+from fsw.control.gains import TrackingGains, TrackingTuning
 from fsw.model.airframe import GRAVITY, Airframe
 from fsw.model.prediction import Array
 

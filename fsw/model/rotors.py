@@ -52,7 +52,7 @@ def rotor_decay(airframe: Airframe, dt: float) -> float:
 
 
 @compilable
-def weigh(
+def estimate_mass(
     airframe: Airframe, mass: float, rotors: Vec4, specific_force: float, seconds: float
 ) -> float:
     """The vehicle's mass [kg], from what the accelerometer makes of the rotors' thrust.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 from fsw.control.cascade import Inner
-from fsw.control.inner_tuning import InnerTuning
+from fsw.control.gains import InnerTuning
 from fsw.geometry.geodesy import DEFAULT_ORIGIN
 from fsw.model.airframe import AIRFRAME, Airframe
 from fsw.model.periods import TICK_US
@@ -127,7 +127,7 @@ def flight_config(
     if wanted is not None:
         planner = replace(
             planner,
-            walls=replace(planner.walls, robustness=wanted),
-            workspace=replace(planner.workspace, robustness=wanted),
+            walls=replace(planner.walls, lambda_=wanted),
+            workspace=replace(planner.workspace, lambda_=wanted),
         )
     return FlightConfig(controller=controller, inner=inner, planner=planner, soft=soft)

@@ -80,7 +80,7 @@ def _barrier(name: str, path: str, what: str) -> list[_Row]:
         (f"{name}_ALPHA", f"{path}.alpha", "m/s^2", 0.1, 10.0, f"{what}: braking counted on"),
         (f"{name}_K_S", f"{path}.slope", "1/s", 0.5, 10.0, f"{what}: slope k_S at the boundary"),
         (f"{name}_GAMMA", f"{path}.gamma", "1/s", 0.1, 10.0, f"{what}: rate of approach"),
-        (f"{name}_LAMBDA", f"{path}.robustness", "m/s", 0.01, 5.0, f"{what}: kept for the unknown"),
+        (f"{name}_LAMBDA", f"{path}.lambda_", "m/s", 0.01, 5.0, f"{what}: kept for the unknown"),
     ]
 
 
@@ -89,12 +89,12 @@ _WEIGHTS = "planner.weights"
 _SOFT = "planner.soft"
 _ROWS: Final[dict[str, list[_Row]]] = {
     "Tracking loop": [
-        ("TRK_EFFORT", f"{_TRACKING}.effort", "1e-6 s^8", 0.05, 100.0,
+        ("TRK_EFFORT", f"{_TRACKING}.input_weight", "1e-6 s^8", 0.05, 100.0,
          "price of horizontal snap in the LQR; cheaper follows closer, until the rotors saturate",
          _MICRO),
         ("TRK_POINT", f"{_TRACKING}.point_below_base", "m", 0.0, 0.3,
          "how far below the base the point is that the loop holds"),
-        ("TRK_Z_EFFORT", f"{_TRACKING}.vertical_effort", "1e-6 s^4", 0.05, 1000.0,
+        ("TRK_Z_EFFORT", f"{_TRACKING}.vertical_input_weight", "1e-6 s^4", 0.05, 1000.0,
          "price of vertical acceleration in the LQR", _MICRO),
         ("TRK_DIST_TAU", f"{_TRACKING}.disturbance_correlation", "s", 0.01, 1.0,
          "how long a disturbance is believed to last"),
@@ -141,9 +141,9 @@ _ROWS: Final[dict[str, list[_Row]]] = {
          "weight w_2 of the end-effector's velocity error"),
         ("PLN_W_VEL_N", f"{_WEIGHTS}.velocity_terminal", "", 0.0, 5000.0,
          "the same at the last node, w_s2"),
-        ("PLN_W_COG", f"{_WEIGHTS}.arm_cog", "", 0.0, 1000.0,
+        ("PLN_W_COG", f"{_WEIGHTS}.arm_com", "", 0.0, 1000.0,
          "weight w_3 of the arm's centre of gravity"),
-        ("PLN_W_COG_N", f"{_WEIGHTS}.arm_cog_terminal", "", 0.0, 5000.0,
+        ("PLN_W_COG_N", f"{_WEIGHTS}.arm_com_terminal", "", 0.0, 5000.0,
          "the same at the last node, w_s3"),
         ("PLN_W_POSTURE", f"{_WEIGHTS}.posture", "", 0.0, 100.0,
          "weight of the joints' error, where joints are asked for"),

@@ -247,9 +247,9 @@ class FlightLoop:
         apply_us = now_us + config.plan_delay_ticks * config.tick_period_us
         steered = self._steering.plan_ahead(state, estimate, apply_us)
         if steered is not None:
-            state, targets, postures = steered
+            state, targets, joint_targets = steered
         else:
-            postures = ()
+            joint_targets = ()
             targets = tuple(
                 self._reference(state, apply_us + node * config.mpc_period_us)
                 for node in range(config.planner.horizon + 1)
@@ -268,7 +268,7 @@ class FlightLoop:
             measured,
             state.mission.safe_set,
             targets,
-            postures,
+            joint_targets,
             now_us,
         )
         return state, request, plan

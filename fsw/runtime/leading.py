@@ -41,7 +41,7 @@ def horizon_of(
     t_us: int,
 ) -> tuple[tuple[EndEffectorTarget, ...], tuple[Vec2, ...]]:
     """Targets and joints at the nodes, the first at ``t_us``; joints only where some are asked."""
-    targets, postures = [], []
+    targets, joint_targets = [], []
     for node in range(config.planner.horizon + 1):
         if node > 0:
             lead = move(lead, aim, config.steering, config.planner.period)
@@ -51,8 +51,8 @@ def horizon_of(
         ahead = config.planner.weights.yaw_lead * lead.yaw_rate
         targets.append(replace(target, yaw=wrap_angle(target.yaw + ahead)))
         if lead.q_arm is not None:
-            postures.append(lead.q_arm)
-    return tuple(targets), tuple(postures)
+            joint_targets.append(lead.q_arm)
+    return tuple(targets), tuple(joint_targets)
 
 
 def target_of(config: FlightConfig, lead: Lead, t_us: int) -> EndEffectorTarget:

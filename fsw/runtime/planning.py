@@ -163,7 +163,7 @@ def ask(
     measured: PredictionState,
     safe_set: SafeSet,
     targets: tuple[EndEffectorTarget, ...],
-    postures: tuple[Vec2, ...],
+    joint_targets: tuple[Vec2, ...],
     now_us: int,
 ) -> tuple[PlanRequest, PlanMemory]:
     """The question for this period.
@@ -186,7 +186,13 @@ def ask(
         start = coast(settled, delay * config.tick_period_us * 1e-6)
     apply_us = now_us + delay * config.tick_period_us
     request = PlanRequest(
-        memory.next_id, apply_us, start, targets, safe_set, from_nominal, postures=postures
+        memory.next_id,
+        apply_us,
+        start,
+        targets,
+        safe_set,
+        from_nominal,
+        joint_targets=joint_targets,
     )
     counters = memory.counters
     if memory.awaited_id >= 0:  # the last question is given up, not waited for

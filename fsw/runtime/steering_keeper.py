@@ -175,8 +175,8 @@ class SteeringKeeper:
             asked = aim = replace(aim, motion=replace(aim.motion, p=waypoints[0]))
             waypoints = waypoints[1:]
         state = replace(state, steer=SteerMemory(lead, asked, waypoints))
-        targets, postures = horizon_of(self._config, lead, aim, estimate, safe_set, t_us)
-        return state, targets, postures
+        targets, joint_targets = horizon_of(self._config, lead, aim, estimate, safe_set, t_us)
+        return state, targets, joint_targets
 
     def _as_guided(self, aim: Aim, state: FlightState) -> Aim:
         """The aim with the speed and the heading that commands asked for."""

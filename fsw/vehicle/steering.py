@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from fsw.barriers.margins import plain_root
+from fsw.barriers.safe_approach import safe_approach_speed
 from fsw.barriers.tangent import tangent
 from fsw.geometry.rotation import wrap_angle
 from fsw.signals import Facing, MotionSetpoint, Orbit, SafeSet, Vec2, Vec3, Wall
@@ -128,7 +128,7 @@ def _off(
     if distance < 0.0:
         p = _plus(p, n, -distance)
     approach = -_dot(n, v)
-    most = plain_root(max(distance, 0.0), braking, slope)
+    most = safe_approach_speed(max(distance, 0.0), braking, slope)
     if approach > most:
         v = _plus(v, n, approach - most)
     return p, v
@@ -146,7 +146,7 @@ def keep_up(lead: Lead, body_height: float, touch_speed: float) -> Lead:
     if touch_speed == 0.0 and body_height < _CLEAR_OF_GROUND:
         z -= _CLEAR_OF_GROUND - body_height
     room = max(body_height - (0.0 if touch_speed > 0.0 else _CLEAR_OF_GROUND), 0.0)
-    most = plain_root(room, _GROUND_BRAKING, _SETTLE_RATE)
+    most = safe_approach_speed(room, _GROUND_BRAKING, _SETTLE_RATE)
     vz = min(vz, max(most, touch_speed))
     level = math.hypot(vx, vy)
     if level > most + _CREEP:
@@ -185,7 +185,7 @@ def _move_point(
             cruise = min(aim.speed or limits.cruise_speed, limits.speed)
             if aim.orbit is not None:  # on the way to a circle too
                 most = max(cruise, aim.orbit.speed)
-            closing = min(plain_root(distance, braking, _SETTLE_RATE), cruise)
+            closing = min(safe_approach_speed(distance, braking, _SETTLE_RATE), cruise)
             wanted = _plus(wanted, error, closing / distance)
     elif motion.v is None and motion.a is not None:
         a = _level(motion.a, lead.yaw) if motion.along_heading else motion.a
@@ -206,7 +206,7 @@ def _turn(
     if motion.yaw is not None:
         error = wrap_angle(motion.yaw - lead.yaw)
         braking = _BRAKING_SHARE * limits.yaw_acceleration
-        closing = min(plain_root(abs(error), braking, 0.5), limits.yaw_rate)
+        closing = min(safe_approach_speed(abs(error), braking, 0.5), limits.yaw_rate)
         wanted = _clamp(wanted + math.copysign(closing, error), limits.yaw_rate)
     change = _clamp(wanted - lead.yaw_rate, limits.yaw_acceleration * dt)
     return wrap_angle(lead.yaw + dt * (lead.yaw_rate + 0.5 * change)), lead.yaw_rate + change

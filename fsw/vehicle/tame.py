@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from fsw.barriers.margins import plain_root
+from fsw.barriers.safe_approach import safe_approach_speed
 from fsw.barriers.tangent import planes
 from fsw.signals import EndEffectorTarget, SafeSet, Vec3, Wall
 
@@ -62,7 +62,7 @@ def tamed(
 def _fastest(wall: Wall, p_WE: Vec3, braking: float, slope: float) -> float:
     """How fast to approach a wall [m/s]."""
     room = max(_dot(wall.normal, p_WE) - (wall.offset + wall.clearance), 0.0)
-    return max(plain_root(room, braking, slope), _ALWAYS)
+    return max(safe_approach_speed(room, braking, slope), _ALWAYS)
 
 
 def _within(a: Vec3, centre: Vec3, radius: float) -> Vec3:

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from fsw.control.attitude import attitude_pid, attitude_reference
 from fsw.control.cascade import Cascade, Inner, in_hover
-from fsw.control.inner_tuning import InnerTuning
+from fsw.control.gains import InnerTuning
 from fsw.model.airframe import AIRFRAME
 from fsw.model.prediction import Array
 from fsw.signals import ActuatorCommand, PlanInput, PredictionState, StateEstimate, Vec2, Vec3

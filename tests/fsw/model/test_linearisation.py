@@ -53,7 +53,7 @@ def test_gradients_equal_finite_differences_over_random_states() -> None:
             for gradient, high, low in (
                 (horizon.d_position, above.position, below.position),
                 (horizon.d_velocity, above.velocity, below.velocity),
-                (horizon.d_arm_cog, above.arm_cog, below.arm_cog),
+                (horizon.d_arm_com, above.arm_com, below.arm_com),
             ):
                 np.testing.assert_allclose(
                     gradient[..., column], (high - low) / (2.0 * STEP), atol=3e-8, rtol=1e-6
@@ -67,7 +67,7 @@ def test_refilling_forgets_the_previous_guess() -> None:
     start, inputs = random_horizon(random)
     used.refill(start, inputs)
     fresh = around(start, inputs)
-    for name in ("states", "position", "velocity", "d_position", "d_velocity", "d_arm_cog"):
+    for name in ("states", "position", "velocity", "d_position", "d_velocity", "d_arm_com"):
         np.testing.assert_array_equal(getattr(used, name), getattr(fresh, name))
 
 

@@ -14,7 +14,7 @@ from fsw.control.braking import Brake
 from fsw.model.airframe import AIRFRAME
 from fsw.model.nominal import NominalModel
 from fsw.model.rotors import MotionState, motion_state
-from fsw.mpc.program import InputLimits
+from fsw.mpc.qp_data import InputLimits
 from fsw.runtime.flight_state import PlanMemory
 from fsw.runtime.planning import (
     late_start,
