@@ -69,8 +69,8 @@ def outward_frame(e: Array, frame: Array) -> None:
     """Orthonormal rows, the first along e or, at the centre, along x.
 
     Args:
-        e: (3,) m, base from the sphere's centre.
-        frame: (3, 3), overwritten.
+        e: (3,) [m, NED], base from the sphere's centre.
+        frame: (3, 3) [1], overwritten.
     """
     length = math.sqrt(e[0] * e[0] + e[1] * e[1] + e[2] * e[2])
     frame[0] = 0.0

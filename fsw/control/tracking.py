@@ -59,8 +59,8 @@ def observe(memory: Observed, v: Vec3, a: Vec3, tuning: TrackingTuning, dt: floa
 
     Args:
         memory: From the last tick.
-        v: Measured velocity [m/s].
-        a: Acceleration the rotors produce [m/s^2].
+        v: Measured velocity [m/s, NED].
+        a: Acceleration the rotors produce [m/s^2, NED].
         tuning: Bandwidth of the observer, and how slowly it takes a disturbance for wind.
         dt: Tick length [s].
     """

@@ -60,8 +60,8 @@ class DualSolver:
         """Solve the program as filled now.
 
         Args:
-            guess: Inputs (6 n,) that say where rows may bind; the optimum does not depend on
-                them.
+            guess: Inputs (6 n,) [SI] that say where rows may be active; the optimum does not
+                depend on them.
 
         Returns:
             Inputs and slacks. Where the multipliers have no optimum (rows that contradict each

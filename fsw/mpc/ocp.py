@@ -40,7 +40,7 @@ class Ocp:
         return self._program
 
     def linearise(self, start: Array, guess: Array, targets: TargetPoints) -> None:
-        """Refill the program around a guess of the inputs (6 n,) from a start (19,)."""
+        """Refill the program around ``guess`` (6 n,) [SI inputs] from ``start`` (19,) [SI]."""
         program = self._program
         self._horizon.refill(start, guess)
         program.hessian[:] = 0.0
@@ -63,6 +63,6 @@ class Ocp:
         return tuple(h for barrier in self._barriers for h in barrier.at_start().tolist())
 
     def largest_barrier_slack(self, x: Array) -> float:
-        """How far a solution softens the barrier [m/s]."""
+        """Largest slack of the barrier's rows in a solution ``x`` (unknowns,) [SI], [m/s]."""
         slacks = x[self._first_barrier_slack :]
         return float(slacks.max()) if len(slacks) else 0.0

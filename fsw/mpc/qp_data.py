@@ -112,7 +112,7 @@ class QpData:
         """Bring the rows up to date with the soft blocks.
 
         Args:
-            guess: Inputs around which the blocks are linearised, (6 n,).
+            guess: (6 n,) [SI], inputs around which the blocks are linearised.
         """
         row = 0
         for block in self._blocks:
@@ -122,7 +122,7 @@ class QpData:
             row = end
 
     def least_slacks(self, inputs: Array) -> Array:
-        """Smallest slacks (slacks,) with which the soft rows admit these inputs (6 n,)."""
+        """Smallest slacks (slacks,) with which the soft rows admit ``inputs`` (6 n,) [SI]."""
         rows, slacks = self.rows, np.zeros(len(self.penalty))
         held = np.flatnonzero(rows.slack >= 0)
         np.maximum.at(slacks, rows.slack[held], rows.g[held] @ inputs - rows.b[held])

@@ -46,7 +46,7 @@ class Linearisable(Protocol):
         ...
 
     def linearise(self, start: Array, guess: Array, targets: TargetPoints) -> None:
-        """Refill the program around a guess."""
+        """Refill the program around ``guess`` (6 n,) [SI] from ``start`` (19,) [SI]."""
         ...
 
 
@@ -63,7 +63,7 @@ class SlsqpSolver:
 
         Args:
             ocp: Of the safe set; holds the program around the optimum afterwards.
-            start: Prediction state at node 0, (19,).
+            start: (19,) [SI], prediction state at node 0.
             targets: Reference at the nodes.
 
         Returns:

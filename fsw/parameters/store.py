@@ -110,7 +110,7 @@ class ParameterStore:
         return self._listeners[-1]
 
     def change(self, name: str, value: float, asker: Listener) -> str | None:
-        """Ask for a value; the asker hears of it whatever comes of it.
+        """Request a ``value`` [unit of the parameter]; the asker is told the outcome.
 
         Returns:
             Why it cannot be, where that is clear at once.

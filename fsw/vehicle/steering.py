@@ -7,7 +7,7 @@ the far side of a wall. The planner tracks a point that moves as the vehicle can
 
 towards a place, with the barrier's own :math:`S` so that it can stop there. The point stays
 within a leash of the vehicle and out of the walls, and nears a wall no faster than S: an error
-that could outbid the price of softening a barrier row never reaches the planner. The barrier
+that could outweigh the barrier's slack penalty never reaches the planner. The barrier
 itself is the planner's and stays as it is (docs/decisions/0010-steering-through-the-planner.md).
 """
 
