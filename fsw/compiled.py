@@ -60,7 +60,7 @@ def machine_code(kernel: Callable[P, R], *example: Any) -> Callable[P, R]:
 
     numba looks at the type of every number in every call, which for the nested tuples of a tick
     costs as much as the arithmetic. Here numbers become what they are in the example and tuples
-    may be named or not; an array must be of the example's type, for nobody looks any more.
+    may be named or not; an array must be of the example's type: it is not checked.
     """
     dispatcher = cast(Any, kernel)
     types = tuple(dispatcher.typeof_pyval(argument) for argument in example)

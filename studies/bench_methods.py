@@ -12,7 +12,7 @@ from fsw.model.airframe import AIRFRAME
 from fsw.model.prediction import INPUTS, Array, condense, to_vector
 from fsw.mpc.ocp import Ocp
 from fsw.mpc.planner import Planner
-from fsw.mpc.planner_config import PlannerConfig, Solver
+from fsw.mpc.planner_config import PlannerConfig
 from fsw.mpc.slsqp_solver import Gradients, SlsqpSolver
 from fsw.signals import Plan, SafeSet
 from studies.bench_answer import Answer, stopwatch_us, timed
@@ -88,7 +88,7 @@ class SlsqpMethod:
 def entries() -> tuple[Entry, ...]:
     """Everything that is compared, in the order of the table."""
 
-    def planner(solver: Solver, iterations: int) -> Build:
+    def planner(solver: str, iterations: int) -> Build:
         return lambda config, safe_set: PlannerMethod(
             replace(config, solver=solver), safe_set, iterations
         )

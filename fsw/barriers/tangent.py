@@ -1,8 +1,8 @@
 """A point obstacle as a wall: the tangent plane of its clearance ball, from where one looks.
 
 An upright obstacle has a cylinder in place of the ball, whose tangent planes are upright.
-The half-space in front of that plane lies outside the ball. So whoever keeps off the plane, or
-stops in front of it, keeps off the obstacle, and what is right beside a wall is right here.
+The half-space in front of that plane lies outside the ball. A point that keeps off the plane, or
+stops in front of it, keeps off the obstacle, so the rules for walls apply.
 
 Source: docs/equations.md E11.
 """

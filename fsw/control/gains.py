@@ -32,8 +32,8 @@ class TrackingTuning:
     disturbance_correlation: float = 0.05  # s, of the Ornstein-Uhlenbeck model
     observer_bandwidth: float = 130.0  # rad/s
     # Wind: what stays of the observed disturbance is cancelled whole. Slowly, because the mean of
-    # a random one is nobody's wind, and within a limit, because whoever pushes one way for long
-    # and then the other finds it added to his push (``tube.py``).
+    # a random one is not wind, and within a limit, because the estimate adds to a push that
+    # acts one way for long and then the other (``tube.py``).
     wind_time: float = 3.0  # s
     wind_limit: float = 0.15  # m/s^2 an axis
     position_error_limit: float = 0.07  # m

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,8 +15,7 @@ from fsw.model.airframe import Airframe
 from fsw.model.prediction import INPUTS, Array, condense, to_vector
 from fsw.mpc.ocp import Ocp
 from fsw.mpc.planner_config import PlannerConfig
-from fsw.mpc.slsqp_solver import SlsqpSolver
-from fsw.mpc.solution import Solution
+from fsw.mpc.solvers import SOLVERS, Search
 from fsw.signals import (
     EndEffectorTarget,
     Plan,
@@ -33,21 +31,6 @@ from fsw.signals import (
     WorkspaceSphere,
 )
 from fsw.tuning import Tuning, tuned
-
-
-@dataclass(frozen=True, slots=True)
-class _Search:
-    """How one request was answered; the plan is usable where the last solution is."""
-
-    solution: Solution
-    sqp_iterations: int
-    solver_iterations: int
-    linearise_us: float
-    solve_us: float
-
-    def timings(self, total_us: float) -> PlanTimings:
-        """Where the time went."""
-        return PlanTimings(self.linearise_us, self.solve_us, total_us)
 
 
 class Planner:
@@ -129,15 +112,13 @@ class Planner:
             np.array([target.yaw for target in request.targets]),
             np.array(request.joint_targets) if request.joint_targets else None,
         )
-        if self._config.solver == "slsqp":
-            search = self._by_slsqp(ocp, start, targets)
-        else:
-            search = self._by_programs(ocp, start, targets, request.t_apply_us)
+        solver = SOLVERS[self._config.solver](self._config, self._stopwatch_us)
+        search = solver.solve(ocp, start, targets, self._guess(request.t_apply_us))
         solution = search.solution
         if not solution.usable:
             after = f"after {search.solver_iterations} iterations"
             reason = f"solver stopped with {solution.status.name} {after}"
-            timings = search.timings(self._stopwatch_us() - begin)
+            timings = _timings(search, self._stopwatch_us() - begin)
             return PlanFailure(request.plan_id, solution.status, reason, timings)
         inputs = solution.x[: len(self._inputs)]
         self._inputs = inputs
@@ -154,34 +135,8 @@ class Planner:
             barrier=ocp.barrier_at_start(),
             sqp_iterations=search.sqp_iterations,
             solver_iterations=search.solver_iterations,
-            timings=search.timings(self._stopwatch_us() - begin),
+            timings=_timings(search, self._stopwatch_us() - begin),
         )
-
-    def _by_programs(self, ocp: Ocp, start: Array, targets: TargetPoints, t_us: int) -> _Search:
-        """A fixed number of quadratic programs from the last solution on."""
-        inputs = self._guess(t_us)
-        linearise_us = solve_us = 0.0
-        iterations = done = 0
-        while done < self._config.sqp_iterations:
-            mark = self._stopwatch_us()
-            ocp.linearise(start, inputs, targets)
-            linearised = self._stopwatch_us()
-            solution = ocp.solve()
-            linearise_us += linearised - mark
-            solve_us += self._stopwatch_us() - linearised
-            iterations += solution.iterations
-            done += 1
-            if not solution.usable:
-                break
-            inputs = solution.x[: len(inputs)]
-        return _Search(solution, done, iterations, linearise_us, solve_us)
-
-    def _by_slsqp(self, ocp: Ocp, start: Array, targets: TargetPoints) -> _Search:
-        """The paper's optimiser, from rest whatever was planned before."""
-        mark = self._stopwatch_us()
-        solution = SlsqpSolver().minimise(ocp, start, targets)
-        solve_us = self._stopwatch_us() - mark
-        return _Search(solution, solution.iterations, solution.iterations, 0.0, solve_us)
 
     def _refusal(self, request: PlanRequest, start: Array) -> str | None:
         if len(request.targets) != self._config.horizon + 1:
@@ -216,6 +171,10 @@ class Planner:
         if t_us - self._t_us != self._period_us:
             return np.zeros_like(self._inputs)
         return np.concatenate((self._inputs[INPUTS:], self._inputs[-INPUTS:]))
+
+
+def _timings(search: Search, total_us: float) -> PlanTimings:
+    return PlanTimings(search.linearise_us, search.solve_us, total_us)
 
 
 def _as_plan_inputs(inputs: Array) -> tuple[PlanInput, ...]:

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Literal
 
 from fsw.barriers.safe_approach import BarrierTuning
 from fsw.model.periods import PLANNING_US
 from fsw.mpc.costs import CostWeights
 from fsw.mpc.qp_data import InputLimits
 from fsw.mpc.soft_costs import SoftWeights
-
-Solver = Literal["clarabel", "slsqp"]  # slsqp: the paper's, with numeric gradients
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,7 +18,7 @@ class PlannerConfig:
     controller: str = "blf"  # a name in variants.py
     horizon: int = 5  # n
     period_us: int = PLANNING_US  # T
-    solver: Solver = "clarabel"
+    solver: str = "clarabel"  # a name in solvers.py; slsqp is the paper's
     sqp_iterations: int = 2  # slsqp goes on until it converges
     weights: CostWeights = field(default_factory=CostWeights)
     limits: InputLimits = field(default_factory=InputLimits)

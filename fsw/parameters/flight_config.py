@@ -9,14 +9,14 @@ from fsw.control.gains import InnerTuning
 from fsw.geometry.geodesy import DEFAULT_ORIGIN
 from fsw.model.airframe import AIRFRAME, Airframe
 from fsw.model.periods import TICK_US
-from fsw.mpc.planner_config import PlannerConfig, Solver
+from fsw.mpc.planner_config import PlannerConfig
+from fsw.mpc.solvers import SOLVERS
 from fsw.mpc.variants import VARIANTS
 from fsw.signals import Origin
 from fsw.vehicle.battery import BatteryModel
 from fsw.vehicle.steering import SteeringLimits
 
 CONTROLLERS = tuple(VARIANTS)
-SOLVERS: tuple[Solver, ...] = ("clarabel", "slsqp")
 INNERS: tuple[Inner, ...] = ("tracking", "pid")
 
 
@@ -30,7 +30,7 @@ class FlightLimits:
     climb_speed: float = 0.4  # m/s
     land_speed: float = 0.25  # m/s
     landed_height: float = 0.1  # m above standing; the origin's height is known no better
-    airborne_height: float = 0.3  # m above standing; lower and not landed: nobody knows
+    airborne_height: float = 0.3  # m above standing; lower and not landed: unknown
     landed_speed: float = 0.05  # m/s
     landed_time_us: int = 500_000  # at rest this long
     idle_thrust: float = 0.8  # N a rotor while armed on the ground
@@ -105,7 +105,7 @@ def flight_config(
     inner: Inner = "tracking",
     robustness: str = "consistent",
     *,
-    solver: Solver = "clarabel",
+    solver: str = "clarabel",
     soft: bool = False,
 ) -> FlightConfig:
     """The configuration of a controller, an inner loop, a lambda and a solver, by name.
