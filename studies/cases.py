@@ -76,7 +76,7 @@ def _at_once(config: FlightConfig) -> FlightConfig:
     """
     planner = config.planner
     walls, workspace = (
-        replace(tuning, skipped_nodes=0, slope=8.0, robustness=0.4)
+        replace(tuning, skipped_nodes=0, slope=8.0, lambda_=0.4)
         for tuning in (planner.walls, planner.workspace)
     )
     planner = replace(planner, walls=walls, workspace=workspace, barrier_slack=200.0)
@@ -90,8 +90,8 @@ def with_lambda(config: FlightConfig, robustness: float) -> FlightConfig:
         config,
         planner=replace(
             planner,
-            walls=replace(planner.walls, robustness=robustness),
-            workspace=replace(planner.workspace, robustness=robustness),
+            walls=replace(planner.walls, lambda_=robustness),
+            workspace=replace(planner.workspace, lambda_=robustness),
         ),
     )
 

@@ -16,15 +16,15 @@ from fsw.flight.state import FlightState
 from fsw.model.airframe import Airframe
 from fsw.mpc.planner import Planner
 from fsw.parameters.flight_config import FlightConfig
-from fsw.ports import PlanService
-from fsw.runtime.planner_worker import InlinePlanner, PlannerRecord
-from fsw.runtime.timing import GroupTimer
+from fsw.ports import PlanningCycle, PlanService
 from fsw.signals import (
     Arm,
     Command,
     CommandRequest,
     EndEffectorTarget,
     Mode,
+    Plan,
+    PlanFailure,
     PlanRequest,
     SensorFrame,
     SwitchMode,
@@ -116,15 +116,26 @@ class RefusedError(RuntimeError):
     """The flight software denied a command of the study's pilot."""
 
 
-def inline_planner(config: FlightConfig, stopwatch_us: Callable[[], float]) -> InlinePlanner:
-    """The planner of a configuration, which plans when it is asked.
+class InlinePlanner:
+    """Plans at once; the answer waits for its tick."""
 
-    Args:
-        config: Of the flight software.
-        stopwatch_us: Times its stages.
-    """
-    planner = Planner(config.planner, config.airframe, stopwatch_us)
-    return InlinePlanner(planner, lambda: 0, PlannerRecord(GroupTimer(config.mpc_period_us)))
+    def __init__(self, planner: PlanningCycle) -> None:
+        self._planner = planner
+        self._answer: tuple[int, Plan | PlanFailure] | None = None
+
+    def submit(self, request: PlanRequest) -> None:
+        """See ``PlanService``."""
+        self._answer = (request.t_apply_us, self._planner.plan(request))
+
+    def take(self, t_us: int) -> Plan | PlanFailure | None:
+        """See ``PlanService``."""
+        if self._answer is None or t_us < self._answer[0]:
+            return None
+        (_, answer), self._answer = self._answer, None
+        return answer
+
+    def close(self) -> None:
+        """Nothing to stop."""
 
 
 def fly(
@@ -148,7 +159,7 @@ def fly(
         RefusedError: The vehicle refused to arm or to follow.
     """
     simulation, recorder = Simulation(scenario, seed), FlightRecorder()
-    planner = inline_planner(config, processor_time_us)
+    planner = InlinePlanner(Planner(config.planner, config.airframe, processor_time_us))
     loop = ClosedLoop(simulation, Autopilot(config).tick, FlightState(), planner, config.airframe)
     announced = safe_set(scenario)
     steps_per_plan = config.mpc_period_us // config.tick_period_us

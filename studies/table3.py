@@ -34,7 +34,7 @@ def run(settings: Settings, campaign: Campaign) -> Report:
     """Fly the table."""
     flown = scenario("II", disturbed=True, duration_s=settings.duration_s)
     ours = configuration(settings.plant, "blf", settings.inner)
-    lambdas = (*PAPER_LAMBDAS, ours.planner.workspace.robustness)
+    lambdas = (*PAPER_LAMBDAS, ours.planner.workspace.lambda_)
     columns = [(horizon, value) for horizon in HORIZONS for value in lambdas]
     cells = [
         Cell(

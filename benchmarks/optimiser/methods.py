@@ -14,9 +14,9 @@ from benchmarks.optimiser.instances import Instance
 from benchmarks.optimiser.price import target_points
 from fsw.model.airframe import AIRFRAME
 from fsw.model.prediction import INPUTS, Array, condense, to_vector
+from fsw.mpc.ocp import Ocp
 from fsw.mpc.planner import Planner
-from fsw.mpc.planner_config import PlannerConfig, Solver
-from fsw.mpc.problem import Problem
+from fsw.mpc.planner_config import PlannerConfig
 from fsw.mpc.slsqp_solver import Gradients, SlsqpSolver
 from fsw.signals import Plan, SafeSet
 
@@ -74,13 +74,13 @@ class SlsqpMethod:
 
     def __init__(self, config: PlannerConfig, safe_set: SafeSet, gradients: Gradients) -> None:
         model = condense(AIRFRAME, config.period, config.horizon)
-        self._problem = Problem(config, model, safe_set)
+        self._ocp = Ocp(config, model, safe_set)
         self._solver = SlsqpSolver(gradients)
 
     def answer(self, instance: Instance, guess: Array, optimum: Array) -> Answer:
         """See ``Method``; ``guess`` and ``optimum`` (6 n,) [m/s^2, rad/s^2] are not used."""
         start, targets = to_vector(instance.request.start), target_points(instance.request)
-        solution, spent = timed(lambda: self._solver.minimise(self._problem, start, targets))
+        solution, spent = timed(lambda: self._solver.minimise(self._ocp, start, targets))
         inputs = solution.x[: len(guess)].copy() if solution.usable else None
         return Answer(spent, inputs, solution.iterations)
 
@@ -88,7 +88,7 @@ class SlsqpMethod:
 def entries() -> tuple[Entry, ...]:
     """Everything that is compared, in the order of the table."""
 
-    def planner(solver: Solver, iterations: int) -> Build:
+    def planner(solver: str, iterations: int) -> Build:
         return lambda config, safe_set: PlannerMethod(
             replace(config, solver=solver), safe_set, iterations
         )
