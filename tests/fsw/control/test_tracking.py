@@ -242,7 +242,7 @@ def test_only_differences_of_place_and_velocity_count(there: Vec3, moving: Vec3)
 
 
 def test_both_poles_of_the_observer_are_at_its_bandwidth() -> None:
-    """Of its error: what it believes without a reading to tell, from one of each, a moment later."""
+    """The poles of its error, from what it believes a moment after one of each."""
     dt = 1e-6
     columns = []
     for v, d in ((1.0, 0.0), (0.0, 1.0)):
