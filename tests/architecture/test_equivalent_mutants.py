@@ -1,4 +1,4 @@
-"""The list of mutants that no test can kill is about lines that exist; `make mutate` checks more."""
+"""The list of mutants that no test can kill is about lines that exist; mutate.py checks more."""
 
 from __future__ import annotations
 

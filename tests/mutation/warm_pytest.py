@@ -2,9 +2,9 @@
 
 Reads one JSON request a line: ``tests`` (pytest's arguments), ``deselect`` (test ids), ``timeout``
 [s] for the whole run, ``each`` [s] for every test or null, ``stop`` (at the first failure). Answers
-one JSON object a line: ``failed`` (test ids), ``seconds`` (of each id), ``status``. A test's time is
-the processor's, which other work on the machine does not lengthen. Runs in the environment of the
-tests, in the copy; nothing of the copy is loaded before a fork.
+one JSON object a line: ``failed`` (test ids), ``seconds`` (of each id), ``status``. The time of a
+test is the processor's, which other work on the machine does not lengthen. Runs in the environment
+of the tests, in the copy; nothing of the copy is loaded before a fork.
 """
 
 from __future__ import annotations
