@@ -143,7 +143,8 @@ def _arguments() -> argparse.Namespace:
 def _drawn(every: tuple[Mutant, ...], module: str, size: int | None, seed: int) -> list[Mutant]:
     if size is None or size >= len(every):
         return list(every)
-    drawn = random.Random(f"{seed} {module}").sample(every, size)
+    # A larger sample begins with the smaller one: what is known of it stays of use.
+    drawn = random.Random(f"{seed} {module}").sample(every, len(every))[:size]
     return sorted(drawn, key=lambda mutant: (mutant.number, mutant.occurrence))
 
 

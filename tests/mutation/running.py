@@ -151,7 +151,7 @@ class Tests:
         try:
             answer = self._run(
                 tests=selection.files, deselect=selection.left_out,
-                timeout=10.0 + 4.0 * selection.seconds, each=None, stop=True,
+                timeout=30.0 + 10.0 * selection.seconds, each=None, stop=True,
             )  # fmt: skip
         finally:
             path.write_text(original)

@@ -38,14 +38,19 @@ from fsw.signals import (
 )
 from messages import dialect
 from messages.block_file import BlockFile
-from tests.closed_loop.harness import command
+from messages.frames import Frame, FrameWriter, split
 from tests.fsw.link.snapshots import FACTS, outputs_at
 from tests.fsw.log.test_recorded_inputs import SUBJECT
 from tests.timing.virtual_time import FIRST_US, PERIOD_US, VirtualSensors, VirtualTime, frame
 
 Tick = Callable[[Any, TickInputs], tuple[Any, TickOutputs]]
-ARM = command(400, 1.0)
-KILL = command(400, 0.0, 21196.0)
+
+
+def command_frame(number: int, *params: float) -> Frame:
+    """A COMMAND_LONG of a ground station."""
+    seven = (*params, *(0.0,) * (7 - len(params)))
+    (frame,) = split(FrameWriter(255, 190).frame(76, *seven, number, 1, 1, 0))
+    return frame
 
 
 @dataclass
@@ -269,13 +274,13 @@ def test_a_planner_that_died_is_told_at_once_and_logged() -> None:
 @pytest.mark.parametrize("moment_us", [100, 900, 1_700])
 def test_a_command_acts_on_the_actuators_within_one_tick_of_its_arrival(moment_us: int) -> None:
     bench = Bench(Autopilot(flight_config()).tick, FlightState())
-    bench.inbox._commands.append(ARM)
+    bench.inbox.accept(command_frame(400, 1.0))
     arrived: list[int] = []
 
     def hear_between_two_ticks() -> None:
         if len(bench.sim.answers) == 200 and not arrived:
             bench.time.work(moment_us)
-            bench.inbox._commands.append(KILL)
+            bench.inbox.accept(command_frame(400, 0.0, 21196.0))
             arrived.append(bench.time.now_us)
 
     bench.asleep = hear_between_two_ticks

@@ -227,3 +227,32 @@ def test_tracking_gains_stabilise_the_chain_they_are_designed_for() -> None:
         z, v = z + dt * v, v + dt * a
         a += dt * (u - a) / lag
     assert abs(z) < 1e-6
+
+
+@given(st.tuples(*[st.floats(-50.0, 50.0)] * 3), st.tuples(*[st.floats(-2.0, 2.0)] * 3))
+def test_only_differences_of_place_and_velocity_count(there: Vec3, moving: Vec3) -> None:
+    """The same vehicle and plan somewhere else, or seen from a moving train."""
+
+    def moved(p: Vec3, by: Vec3) -> Vec3:
+        return p[0] + by[0], p[1] + by[1], p[2] + by[2]
+
+    ahead = PLAN._replace(p=(0.02, -0.01, -1.01), v=(0.05, 0.04, -0.02))
+    estimate, motion = on_plan(Rotation.from_euler("ZYX", [0.7, 0.1, -0.2]), PLAN)
+    here = follow_plan(LAW, 3.5, estimate, motion, calm(estimate), ahead, REST_INPUT)
+    estimate = estimate._replace(p_WB=moved(estimate.p_WB, there), v_WB=moving)
+    ahead = ahead._replace(p=moved(ahead.p, there), v=moved(ahead.v, moving))
+    same = follow_plan(LAW, 3.5, estimate, motion, calm(estimate), ahead, REST_INPUT)
+    assert same[0] == pytest.approx(here[0], abs=1e-6)
+    assert same[1] == pytest.approx(here[1], abs=1e-6)
+
+
+def test_both_poles_of_the_observer_are_at_its_bandwidth() -> None:
+    """The poles of its error, from what it believes a moment after one of each."""
+    dt = 1e-6
+    columns = []
+    for v, d in ((1.0, 0.0), (0.0, 1.0)):
+        after = observe(Observed((v, 0.0, 0.0), (d, 0.0, 0.0)), CALM, CALM, BRISK, dt)
+        columns.append((after.v[0], after.d[0]))
+    slope = (np.array(columns).T - np.eye(2)) / dt
+    b = BRISK.observer_bandwidth
+    assert np.poly(slope) == pytest.approx([1.0, 2.0 * b, b * b], rel=1e-3)
