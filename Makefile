@@ -1,4 +1,4 @@
-# Every target does its own set-up; needed are python 3.11-3.13, pip, make and git; no root.
+# Every target does its own set-up. Requirements: Python 3.11-3.13, pip, make, git. Root is not needed.
 # The environment is .venv, at the versions and hashes of requirements-dev.lock, wheels only.
 
 PYTHON ?= python3
