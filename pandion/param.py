@@ -107,21 +107,21 @@ class FileValues:
         """Change one parameter in the file to ``value`` [the parameter's unit].
 
         Raises:
-            Refused: It is out of range or contradicts the others.
+            ParameterRefused: It is out of range or contradicts the others.
         """
         from fsw.parameters.flight_config import FlightConfig
         from fsw.parameters.real32 import nearest_decimal
         from fsw.parameters.registry import BY_NAME
         from fsw.parameters.storage import save
         from fsw.tuning import tuned
-        from pandion.param_vehicle import Refused
+        from pandion.param_vehicle import ParameterRefused
 
         parameter = BY_NAME.get(name)
         if parameter is None:
-            raise Refused(unknown_name("parameter", name, BY_NAME))
+            raise ParameterRefused(unknown_name("parameter", name, BY_NAME))
         refusal = parameter.refusal(value)
         if refusal is not None:
-            raise Refused(refusal)
+            raise ParameterRefused(refusal)
         kept = self._kept() | {name: nearest_decimal(value)}
         try:
             tuned(
@@ -129,7 +129,7 @@ class FileValues:
                 tuple((BY_NAME[n].path, v * BY_NAME[n].scale) for n, v in kept.items()),
             )
         except ValueError as error:
-            raise Refused(f"{name} is left as it is: {error}") from None
+            raise ParameterRefused(f"{name} is left as it is: {error}") from None
         save(self._path, kept)
 
     def _kept(self) -> dict[str, float]:
@@ -150,7 +150,7 @@ def main(argv: list[str]) -> int:
     kind, act = action
     what = "Parameters of a running vehicle or in a file."
     options = read(kind, f"pandion param {argv[0]}", what, argv[1:])
-    from pandion.param_vehicle import NoAnswer, ParameterClient, Refused
+    from pandion.param_vehicle import NoAnswer, ParameterClient, ParameterRefused
 
     try:
         if options.file is not None:
@@ -160,7 +160,7 @@ def main(argv: list[str]) -> int:
     except (LinkError, NoAnswer, OSError) as error:
         print(f"pandion param: {error}", file=sys.stderr)
         return COULD_NOT_START
-    except Refused as error:
+    except ParameterRefused as error:
         print(f"pandion param: {error}", file=sys.stderr)
         return REFUSED
     except KeyboardInterrupt:
@@ -182,12 +182,12 @@ def _list(options: _List, values: Values) -> int:
 
 
 def _get(options: _Get, values: Values) -> int:
-    from pandion.param_vehicle import Refused
+    from pandion.param_vehicle import ParameterRefused
 
     known = values.read_all()
     for name in options.names:
         if name not in known:
-            raise Refused(unknown_name("parameter", name, known))
+            raise ParameterRefused(unknown_name("parameter", name, known))
     _show({name: known[name] for name in options.names}, as_json=options.json)
     return DONE
 
@@ -199,7 +199,7 @@ def _set(options: _Set, values: Values) -> int:
 
 
 def _import(options: _File, values: Values) -> int:
-    from pandion.param_vehicle import Refused
+    from pandion.param_vehicle import ParameterRefused
 
     wanted, held = _read_file(options.path), values.read_all()
     changed = refused = 0
@@ -209,7 +209,7 @@ def _import(options: _File, values: Values) -> int:
         try:
             values.write(name, value)
             changed += 1
-        except Refused as error:
+        except ParameterRefused as error:
             print(f"pandion param: {error}", file=sys.stderr)
             refused += 1
     print(f"{len(wanted)} parameters read, {changed} changed, {refused} refused")
@@ -226,7 +226,7 @@ def _export(options: _File, values: Values) -> int:
 
 
 def _read_file(path: Path) -> dict[str, float]:
-    """The values of a file; what is of no use in it is said on standard error."""
+    """The values of a file; unusable lines are reported on standard error."""
     from fsw.parameters.storage import load
 
     loaded = load(path)
@@ -252,12 +252,12 @@ def _described(name: str, value: float) -> dict[str, Any]:
 
     parameter, fact = BY_NAME.get(name), FACT_BY_NAME.get(name)
     if fact is not None:
-        told = {
+        described = {
             "unit": fact.unit,
             "group": GROUP,
             "meaning": f"{fact.label}: {fact.meaning} (read only)",
         }
-        return {"name": name, "value": value, **told}
+        return {"name": name, "value": value, **described}
     if parameter is None:  # of a vehicle with another version
         return {"name": name, "value": value}
     return {

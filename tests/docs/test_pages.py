@@ -32,11 +32,11 @@ from fsw.parameters.reference import reference as parameter_reference
 from messages import dialect
 from messages.frames import FrameWriter
 from pandion.__main__ import VERBS, main
-from pandion.reproduce import WHAT
 from pandion.result import FlightReports, as_json
 from sitl.link.encode import StepEncoder
 from sitl.scenario_file import load_scenario, scenario_names
 from sitl.simulation import Simulation
+from studies.catalogue import STUDIES
 from tests.fsw.link.snapshots import outputs_at
 from tests.fsw.log.specimens import inputs
 
@@ -129,7 +129,7 @@ def test_commands_shown_exist(line: str) -> None:
     if words[0] in ("fly", "sitl") and len(words) > 1 and not words[1].startswith("-"):
         assert words[1] in scenario_names() or words[1].endswith(".toml")
     if words[0] == "reproduce":
-        assert words[1] in WHAT
+        assert words[1] in STUDIES
 
 
 def examples() -> Iterator[tuple[Path, str]]:
