@@ -15,18 +15,6 @@ from command_line.parser import COULD_NOT_START, unknown_name
 from fsw.link.udp_endpoint import LinkError, parse_address
 
 DONE, REFUSED = 0, 1  # exit codes
-HELP: Final = """\
-usage: pandion param ACTION [arguments] [--vehicle udp:HOST:PORT | --file FILE]
-
-actions:
-  list [PATTERN]        show parameters, * and ? stand for anything
-  get NAME ...          show these
-  set NAME VALUE        change one
-  import FILE           take over every value of a .params or .parm file
-  export FILE           write all of them; .parm is MAVProxy's format, else QGroundControl's
-
-`pandion param ACTION --help` prints the options of an action.
-"""
 _WHERE: Final = OneOf()
 
 
@@ -141,14 +129,13 @@ class FileValues:
 def main(argv: list[str]) -> int:
     """Do one thing with parameters; returns the exit code."""
     if not argv or argv[0] in ("-h", "--help"):
-        print(HELP, end="")
+        print(_help())
         return DONE
     action = ACTIONS.get(argv[0])
     if action is None:
         print(f"pandion param: {unknown_name('action', argv[0], ACTIONS)}", file=sys.stderr)
         return COULD_NOT_START
-    kind, act = action
-    what = "Parameters of a running vehicle or in a file."
+    kind, act, what = action
     options = read(kind, f"pandion param {argv[0]}", what, argv[1:])
     from pandion.param_vehicle import NoAnswer, ParameterClient, ParameterRefused
 
@@ -250,26 +237,20 @@ def _described(name: str, value: float) -> dict[str, Any]:
     from fsw.parameters.facts import FACT_BY_NAME, GROUP
     from fsw.parameters.registry import BY_NAME
 
-    parameter, fact = BY_NAME.get(name), FACT_BY_NAME.get(name)
-    if fact is not None:
-        described = {
-            "unit": fact.unit,
-            "group": GROUP,
-            "meaning": f"{fact.label}: {fact.meaning} (read only)",
+    entry: dict[str, Any] = {"name": name, "value": value}
+    if (fact := FACT_BY_NAME.get(name)) is not None:
+        meaning = f"{fact.label}: {fact.meaning} (read only)"
+        entry |= {"unit": fact.unit, "group": GROUP, "meaning": meaning}
+    elif (parameter := BY_NAME.get(name)) is not None:
+        entry |= {
+            "default": parameter.default,
+            "unit": parameter.unit,
+            "min": parameter.least,
+            "max": parameter.most,
+            "group": parameter.group,
+            "meaning": parameter.meaning,
         }
-        return {"name": name, "value": value, **described}
-    if parameter is None:  # of a vehicle with another version
-        return {"name": name, "value": value}
-    return {
-        "name": name,
-        "value": value,
-        "default": parameter.default,
-        "unit": parameter.unit,
-        "min": parameter.least,
-        "max": parameter.most,
-        "group": parameter.group,
-        "meaning": parameter.meaning,
-    }
+    return entry  # bare if it is of a vehicle with another version
 
 
 def _number(value: float) -> str:
@@ -278,10 +259,23 @@ def _number(value: float) -> str:
     return as_text(value)
 
 
-ACTIONS: Final[dict[str, tuple[type[_Where], Callable[[Any, Values], int]]]] = {
-    "list": (_List, _list),
-    "get": (_Get, _get),
-    "set": (_Set, _set),
-    "import": (_File, _import),
-    "export": (_File, _export),
+ACTIONS: Final[dict[str, tuple[type[_Where], Callable[[Any, Values], int], str]]] = {
+    "list": (_List, _list, "Show parameters; in PATTERN * and ? stand for anything."),
+    "get": (_Get, _get, "Show parameters by name."),
+    "set": (_Set, _set, "Change one parameter."),
+    "import": (_File, _import, "Take over every value of a .params or .parm file."),
+    "export": (
+        _File,
+        _export,
+        "Write all parameters; .parm is MAVProxy's format, anything else QGroundControl's.",
+    ),
 }
+
+
+def _help() -> str:
+    rows = (f"  {name:8}{what}" for name, (_, _, what) in ACTIONS.items())
+    return "\n".join(
+        ("usage: pandion param ACTION [options] [--vehicle udp:HOST:PORT | --file FILE]", "")
+        + ("Parameters of a running vehicle or in a file.", "", "actions:", *rows, "")
+        + ("`pandion param ACTION --help` prints the options of an action.",)
+    )

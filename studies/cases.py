@@ -6,9 +6,11 @@ Tuning used seeds below ``REPORTING_FROM``; what is reported should use others.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Literal
 
+from fsw.barriers.root import BarrierTuning
 from fsw.control.cascade import Inner
 from fsw.model.prediction import LagModel
 from fsw.mpc.planner_config import PlannerConfig
@@ -74,45 +76,30 @@ def _at_once(planner: PlannerConfig) -> PlannerConfig:
     0.373 m/s for the paper's 0.8 m/s^2 at k_S = 8 /s. The sphere of 75 mm leaves room for it, as
     its centre at rest has h = S(r) = 0.487; at k_S = 4 it would not (0.32 against 0.30).
     """
-    walls, workspace = (
-        replace(tuning, skipped_nodes=0, slope=8.0, robustness=0.4)
-        for tuning in (planner.walls, planner.workspace)
-    )
-    return replace(
-        planner,
-        lag=LagModel(at_once=True),
-        walls=walls,
-        workspace=workspace,
-        barrier_slack=200.0,
-    )
+    planner = _barriers(planner, lambda it: replace(it, skipped_nodes=0, slope=8.0, robustness=0.4))
+    return replace(planner, lag=LagModel(at_once=True), barrier_slack=200.0)
+
+
+def _barriers(
+    planner: PlannerConfig, change: Callable[[BarrierTuning], BarrierTuning]
+) -> PlannerConfig:
+    """The same with both barriers changed."""
+    return replace(planner, walls=change(planner.walls), workspace=change(planner.workspace))
 
 
 def with_lambda(config: FlightConfig, robustness: float) -> FlightConfig:
     """The same with another lambda of eq 25, ``robustness`` [m/s], in both cases."""
-    planner = config.planner
-    return replace(
-        config,
-        planner=replace(
-            planner,
-            walls=replace(planner.walls, robustness=robustness),
-            workspace=replace(planner.workspace, robustness=robustness),
-        ),
-    )
+    planner = _barriers(config.planner, lambda it: replace(it, robustness=robustness))
+    return replace(config, planner=planner)
 
 
 def with_horizon(config: FlightConfig, horizon: int) -> FlightConfig:
     """The same with another horizon; no more first nodes are skipped than leave one."""
-    planner = config.planner
-    walls, workspace = planner.walls, planner.workspace
-    return replace(
-        config,
-        planner=replace(
-            planner,
-            horizon=horizon,
-            walls=replace(walls, skipped_nodes=min(walls.skipped_nodes, horizon - 1)),
-            workspace=replace(workspace, skipped_nodes=min(workspace.skipped_nodes, horizon - 1)),
-        ),
+    planner = _barriers(
+        replace(config.planner, horizon=horizon),
+        lambda it: replace(it, skipped_nodes=min(it.skipped_nodes, horizon - 1)),
     )
+    return replace(config, planner=planner)
 
 
 def entrants(case: Case, plant: PlantName, inner: Inner) -> tuple[Entrant, ...]:
