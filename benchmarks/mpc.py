@@ -43,9 +43,9 @@ class MpcOptions:
 def main(argv: list[str]) -> int:
     """Measure and report; returns the exit code."""
     options = read(MpcOptions, _PROGRAM, "Time the planner's optimiser against others.", argv)
-    from studies.one_thread import pin_threads
+    from fsw.runtime.process import pin_numerics_to_one_thread
 
-    pin_threads()  # before NumPy loads
+    pin_numerics_to_one_thread()  # before NumPy loads
     try:
         return _run(options)
     except OSError as error:

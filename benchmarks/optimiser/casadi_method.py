@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.optimiser.answer import Answer, timed
 from benchmarks.optimiser.instances import Instance
+from benchmarks.optimiser.solved import Solved, timed
 from fsw.barriers.cbf_row import cbf_lower_bound
 from fsw.barriers.safe_approach import safe_approach_speed
 from fsw.barriers.workspace import outward_frame
@@ -69,14 +69,14 @@ class CasadiMethod:
             ),
         )
 
-    def answer(self, instance: Instance, guess: Array, optimum: Array) -> Answer:
+    def solve(self, instance: Instance, guess: Array, optimum: Array) -> Solved:
         """See ``Method``; ``guess`` and ``optimum`` (6 n,) [m/s^2, rad/s^2]."""
         parameters = self._parameters(instance.request, optimum)
         initial = self._unknowns(instance.request, guess)
         found, spent = timed(lambda: self._solve(x0=initial, p=parameters, **self._bounds))
         if not self._solve.stats()["success"]:
-            return Answer(spent, None, None)
-        return Answer(spent, self._inputs(np.array(found["x"]).ravel()), None)
+            return Solved(spent, None, None)
+        return Solved(spent, self._inputs(np.array(found["x"]).ravel()), None)
 
     def _unknowns(self, request: PlanRequest, inputs: Array) -> Array:
         """States that follow from the inputs, stage by stage, and no slack."""

@@ -8,10 +8,10 @@ from typing import Protocol
 
 import numpy as np
 
-from benchmarks.optimiser.answer import Answer, stopwatch_us, timed
 from benchmarks.optimiser.casadi_method import SOLVERS, CasadiMethod, installed
 from benchmarks.optimiser.instances import Instance
 from benchmarks.optimiser.price import target_points
+from benchmarks.optimiser.solved import Solved, stopwatch_us, timed
 from fsw.model.airframe import AIRFRAME
 from fsw.model.prediction import INPUTS, Array, condense, to_vector
 from fsw.mpc.ocp import Ocp
@@ -26,7 +26,7 @@ _ITERATIONS = (1, 2, 3)
 class Method(Protocol):
     """One optimiser for one horizon and safe set."""
 
-    def answer(self, instance: Instance, guess: Array, optimum: Array) -> Answer:
+    def solve(self, instance: Instance, guess: Array, optimum: Array) -> Solved:
         """Time one instance.
 
         Args:
@@ -56,15 +56,15 @@ class PlannerMethod:
         self._planner = Planner(replace(config, sqp_iterations=iterations), AIRFRAME, stopwatch_us)
         self._planner.warm_up()
 
-    def answer(self, instance: Instance, guess: Array, optimum: Array) -> Answer:
+    def solve(self, instance: Instance, guess: Array, optimum: Array) -> Solved:
         """See ``Method``; ``guess`` and ``optimum`` (6 n,) [m/s^2, rad/s^2] are not used."""
         for request in instance.before:
             self._planner.plan(request)
         plan, spent = timed(lambda: self._planner.plan(instance.request))
         if not isinstance(plan, Plan):
-            return Answer(spent, None, None)
+            return Solved(spent, None, None)
         timings = plan.timings
-        return Answer(
+        return Solved(
             spent, flat(plan), plan.sqp_iterations, timings.linearise_us, timings.solve_us
         )
 
@@ -77,12 +77,12 @@ class SlsqpMethod:
         self._ocp = Ocp(config, model, safe_set)
         self._solver = SlsqpSolver(gradients)
 
-    def answer(self, instance: Instance, guess: Array, optimum: Array) -> Answer:
+    def solve(self, instance: Instance, guess: Array, optimum: Array) -> Solved:
         """See ``Method``; ``guess`` and ``optimum`` (6 n,) [m/s^2, rad/s^2] are not used."""
         start, targets = to_vector(instance.request.start), target_points(instance.request)
         solution, spent = timed(lambda: self._solver.minimise(self._ocp, start, targets))
         inputs = solution.x[: len(guess)].copy() if solution.usable else None
-        return Answer(spent, inputs, solution.iterations)
+        return Solved(spent, inputs, solution.iterations)
 
 
 def entries() -> tuple[Entry, ...]:

@@ -1,4 +1,4 @@
-"""What a plan is worth: its cost on the nonlinear problem, whoever found it."""
+"""What a plan is worth: its cost on the nonlinear problem, whichever method found it."""
 
 from __future__ import annotations
 
