@@ -1,4 +1,4 @@
-# Every target does its own set-up; needed are python 3.11-3.13, pip, make and git; no root.
+# Every target does its own set-up. Requirements: Python 3.11-3.13, pip, make, git. Root is not needed.
 # The environment is .venv, at the versions and hashes of requirements-dev.lock, wheels only.
 
 PYTHON ?= python3
@@ -18,7 +18,8 @@ UV = UV_DEFAULT_INDEX="$${UV_DEFAULT_INDEX:-$(PIP_INDEX)}" .boot/uv
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: help setup run test test-long code-checks tests-of-processes tests-of-the-rest mutate interop lock clean
+.PHONY: help setup run test test-long code-checks tests-of-processes tests-of-the-rest mutate \
+	interop lock docs docs-test pictures pages clean
 
 help: ## show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-9s %s\n", $$1, $$2 }' Makefile
@@ -41,7 +42,7 @@ test: setup ## set up, then run every check: ruff, mypy, import-linter, pytest
 
 # What reads the code only goes first in the row of the tests that often wait for clocks: meanwhile
 # the other row compiles the kernels that both need.
-OF_PROCESSES := tests/cli tests/interop tests/processes tests/timing
+OF_PROCESSES := tests/benchmarks tests/cli tests/interop tests/processes tests/timing
 code-checks:
 	$(call check,lint,$(BIN)/ruff check .)
 	$(call check,format,$(BIN)/ruff format --check .)
@@ -82,6 +83,25 @@ EXTERNAL := tests/interop/external
 
 interop: setup .interop/mavproxy/ready .interop/node/ready ## fly by MAVProxy and node-mavlink (needs npm)
 	PANDION_INTEROP=.interop $(BIN)/pytest $(EXTERNAL)
+
+# Sphinx has an environment and a lock of its own; the API pages import the code from .venv.
+.docs/ready: requirements-docs.lock | $(READY)
+	@.boot/uv venv --quiet --allow-existing --no-project --python .venv/bin/python .docs
+	@$(UV) pip sync --quiet --python .docs --require-hashes --only-binary :all: $<
+	@touch $@
+
+docs: setup .docs/ready ## build the documentation site into build/docs (warnings are errors)
+	@.docs/bin/python -m sphinx -q -n -W --keep-going -b html docs build/docs
+	@echo "docs: open build/docs/index.html"
+
+docs-test: setup ## run every command and example of the documentation, flights included
+	$(BIN)/pytest tests/docs
+
+pictures: setup ## fly and draw docs/images again
+	$(BIN)/python -m docs.figures
+
+pages: setup ## write the generated pages of docs/reference again
+	@$(BIN)/python -m docs.pages
 
 # A uv that is there is used if it understands what is asked of it; else the pinned one is fetched
 # into .boot with pip alone, because a fresh Debian has neither ensurepip nor a pip that may install.
@@ -126,10 +146,12 @@ lock: .boot/uv ## renew requirements.lock (to fly) and requirements-dev.lock (to
 	@$(COMPILE) pyproject.toml --group dev --constraints requirements.lock \
 		--output-file requirements-dev.lock
 	@$(COMPILE) --group mavproxy --no-deps --output-file $(EXTERNAL)/mavproxy.lock
+	@$(COMPILE) --group docs --constraints requirements-dev.lock --output-file requirements-docs.lock
 	@$(COMPILE) --group mutation --no-deps --output-file $(MUTATION)/tool.lock
-	@git diff --stat -- requirements.lock requirements-dev.lock $(EXTERNAL)/mavproxy.lock $(MUTATION)
+	@git diff --stat -- requirements.lock requirements-dev.lock requirements-docs.lock \
+		$(EXTERNAL)/mavproxy.lock $(MUTATION)
 
 clean: ## remove the environment, generated files and caches
-	rm -rf .venv .boot .interop .mutation build dist messages/dialect.py .mypy_cache .ruff_cache .pytest_cache \
+	rm -rf .venv .boot .docs .interop .mutation build dist messages/dialect.py .mypy_cache .ruff_cache .pytest_cache \
 		.hypothesis .import_linter_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import signal
 import traceback
-from pathlib import Path
 from types import FrameType
 
 from sitl.arguments import SitlOptions
@@ -98,5 +97,3 @@ def _check_outputs(options: SitlOptions) -> None:
             options.out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise CouldNotStart(f"cannot write to {options.out}: {error.strerror}") from None
-    if options.json not in (None, "-") and not Path(str(options.json)).parent.is_dir():
-        raise CouldNotStart(f"cannot write {options.json}: its directory does not exist")

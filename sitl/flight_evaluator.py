@@ -77,7 +77,7 @@ class FlightEvaluator:
         """Look at every plant step of an exchange.
 
         Args:
-            places: As ``sitl.plant.integrator.integrate`` leaves them, a row a plant step.
+            places: (steps, 2 + j, 3) [m, NED], from ``sitl.plant.integrator.integrate``.
             before_s: Time at the begin of the exchange [s].
             step_s: Length of a plant step [s].
         """
@@ -107,7 +107,7 @@ class FlightEvaluator:
         )
 
     def judge_landing(self, speed: float, time_s: float) -> None:
-        """Look at the fastest foot on the ground [m/s]."""
+        """Look at the landing speed [m/s] of the fastest foot on the ground."""
         if not (speed <= TOUCH_DOWN_MAX):
             sentence = (
                 f"the legs hit the ground at {speed:.1f} m/s at {time_s:.2f} s, "

@@ -10,8 +10,8 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from sitl.scenario import Scenario, ScenarioWall
-from sitl.trajectory import V3, Reference
+from sitl.scenario import V3, Scenario, ScenarioWall
+from sitl.trajectory import Reference
 
 _NEAR_M: Final = 0.05  # this much farther away, a wall counts 1/e of the nearer one
 _AROUND_S: Final = tuple(0.5 * k for k in range(-4, 5))  # the vehicle turns slowly: seen ahead
@@ -28,7 +28,7 @@ class Heading:
         self._reference = reference
 
     def at(self, t: float) -> float:
-        """Yaw [rad], ``t`` seconds after the start of the trajectory."""
+        """Yaw [rad, NED] at t [s] after the start of the trajectory."""
         if not self._walls:
             return self._fixed
         yaws = [facing(self._walls, self._reference.place(t + around)) for around in _AROUND_S]

@@ -24,7 +24,7 @@ class Range(NamedTuple):
     or_inf: bool = False
 
     def contains(self, value: float) -> bool:
-        """False outside the range; NaN is outside."""
+        """Whether a value [unit of the key] is in the range; NaN is not."""
         if not math.isfinite(value):
             return self.or_inf and value > 0.0
         on_grid = self.step is None or math.isclose(
@@ -75,7 +75,7 @@ class Lissajous:
 
 @dataclass(frozen=True, slots=True)
 class Hold:
-    """One point."""
+    """One position."""
 
     position_m: Annotated[V3, Range(-WORLD_M, WORLD_M)]
     kind: Literal["hold"] = "hold"
@@ -96,7 +96,7 @@ class ScenarioWall:
 
 @dataclass(frozen=True, slots=True)
 class Obstacle:
-    """A point without a size of its own, such as the tip of a branch."""
+    """An obstacle without a size of its own, such as the tip of a branch."""
 
     name: str
     position_m: Annotated[V3, Range(-WORLD_M, WORLD_M)]

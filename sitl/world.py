@@ -1,4 +1,4 @@
-"""Walls, points, workspace and ground, judged on the plant's true state.
+"""Walls, obstacles, workspace and ground, judged on the plant's true state.
 
 Source: docs/equations.md E11, E14, E15.
 """
@@ -66,7 +66,7 @@ class World:
     def collision(self, points: tuple[V3, V3, V3], margins: tuple[float, ...]) -> str | None:
         """A sentence if a critical point touches a wall or the ground, else None.
 
-        A point has no size that could be touched: coming too close to it is a violation only.
+        An obstacle is a point and cannot be touched: coming too close to it is a violation only.
 
         Args:
             points: Base, joint 2 and end-effector [m, NED].
@@ -99,15 +99,15 @@ def record_if_clear(
     """``World.margins`` of plant steps without any incident, into the record of the smallest.
 
     Args:
-        planes: (walls, 4), of a World.
-        balls: (obstacles, 4), of a World.
+        planes: (walls, 4) [m] of a World: normal and least distance.
+        balls: (obstacles, 4) [m] of a World: centre and least distance.
         sphere: Its radius and height above the target [m].
         aim: The end-effector's curve (``trajectory.curve_row``) and when it begins [s]; a row
             without numbers where the workspace does not apply.
-        places: (steps, 2 + j, 3) m: base, joint 1, joint 2, …, end-effector.
+        places: (steps, 2 + j, 3) [m, NED]: base, joint 1, joint 2, …, end-effector.
         instants: Time one step before the first, and between two steps [s].
-        lowest: (margins,) m, smallest so far.
-        when_s: (margins,) s, when that was.
+        lowest: (margins,) [m], smallest so far.
+        when_s: (margins,) [s], when that was.
 
     Returns:
         True; or False, with nothing recorded, if any point is not clearly above ground and

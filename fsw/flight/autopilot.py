@@ -191,7 +191,7 @@ class Autopilot:
             targets=targets,
             safe_set=state.mission.safe_set,
             from_nominal=from_nominal,
-            postures=joints,
+            joint_targets=joints,
         )
         return state, request, requested(plan, apply_us)
 

@@ -15,11 +15,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from fsw.log.block_file import BlockFile
 from fsw.log.encoder import FULL, LogEncoder, loop_timing
 from fsw.log.topics import TOPICS
 from fsw.signals import StatusText, TickInputs, TickOutputs, Vec2
 from messages import ulog
+from messages.block_file import BlockFile
 from messages.ground_truth import TRUTH_TOPICS
 
 Number = int | float | bool

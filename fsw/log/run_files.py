@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from fsw.log.block_file import BlockFile
 from fsw.log.flight_log import FlightLog, LogSubject
 from fsw.log.tlog import TlogWriter
+from messages.block_file import BlockFile
 
 
 class RunFiles:

@@ -1,4 +1,4 @@
-"""The topics of a flight log: one table, which the writer, the reader and docs/flight-log.md use.
+"""The topics of a flight log: one table for the writer, the reader and the page of topics.
 
 Where PX4 has a topic of the same meaning, name, fields and units are PX4's, so that its tools
 show a flight of Pandion; a topic may have fewer fields than there. What is fed back by
@@ -35,7 +35,7 @@ def _exact(name: str, size: int, note: str) -> Field:
 
 SENSOR_FRAME: Final = Topic(
     "sensor_frame",
-    "What the sensors said; input of the tick",
+    "Sensor readings; input of the tick",
     EVERY_TICK,
     (
         _exact("p_WB", 3, "m, NED"),
@@ -65,7 +65,7 @@ VEHICLE_LOCAL_POSITION: Final = Topic(
 )
 ACTUATOR_COMMAND: Final = Topic(
     "actuator_command",
-    "What was sent, exactly",
+    "Actuator command, exactly as sent",
     EVERY_TICK,
     (
         _exact("rotor_thrust", 4, "N: rear, left, front, right"),
@@ -75,13 +75,13 @@ ACTUATOR_COMMAND: Final = Topic(
 )
 ACTUATOR_MOTORS: Final = Topic(
     "actuator_motors",
-    "The same of the rotors, in PX4's form",
+    "Rotor commands in PX4's form",
     DETAIL,
     (_vector("control", 4, "0 to 1, share of full thrust"),),
 )
 ARM_JOINT_STATE: Final = Topic(
     "arm_joint_state",
-    "Estimate, and the torque commanded",
+    "Estimate, and commanded torque",
     DETAIL,
     (
         _vector("q", 2, "rad"),
@@ -91,7 +91,7 @@ ARM_JOINT_STATE: Final = Topic(
 )
 VEHICLE_LOCAL_POSITION_SETPOINT: Final = Topic(
     "vehicle_local_position_setpoint",
-    "Where the running plan wants the body origin now",
+    "State of the running plan: body origin",
     DETAIL_IN_FLIGHT,
     (
         *_floats("x", "y", "z", note="m, NED"),
@@ -103,7 +103,7 @@ VEHICLE_LOCAL_POSITION_SETPOINT: Final = Topic(
 )
 ARM_JOINT_SETPOINT: Final = Topic(
     "arm_joint_setpoint",
-    "Where the running plan wants the joints now",
+    "State of the running plan: joints",
     DETAIL_IN_FLIGHT,
     (_vector("q", 2, "rad"), _vector("qd", 2, "rad/s"), _vector("qdd", 2, "rad/s^2")),
 )
@@ -118,11 +118,11 @@ BARRIER_MARGIN: Final = Topic(
     "Margins of the active safe set, by the vehicle's own estimate",
     PLANNING,
     (
-        _vector("margin", MARGINS, "m; walls, then points, base, joint 2, end-effector in each"),
+        _vector("margin", MARGINS, "m; walls, then obstacles; base, joint 2, end-effector of each"),
         _vector("barrier", MARGINS, "h, m/s, same order; active at or below 0"),
         *_floats("minimum", note="m"),
-        Field("kind", "uint8_t", note="0 none, 1 walls, 2 workspace, 3 points and walls"),
-        Field("count", "uint8_t", note="how many are meant"),
+        Field("kind", "uint8_t", note="0 none, 1 walls, 2 workspace, 3 obstacles and walls"),
+        Field("count", "uint8_t", note="number of valid entries"),
         Field("argmin", "uint8_t"),
     ),
 )
@@ -140,7 +140,7 @@ END_EFFECTOR: Final = Topic(
 )
 MPC_REQUEST: Final = Topic(
     "mpc_request",
-    "A question to the planner: the state that its answer starts from",
+    "Request to the planner: start state of the plan",
     PLANNING,
     (
         Field("plan_id", "uint32_t"),
@@ -160,10 +160,10 @@ MPC_REQUEST: Final = Topic(
 )
 MPC_STATUS: Final = Topic(
     "mpc_status",
-    "The last plan taken over, the outcome of the last cycle, and counts since the start",
+    "Last accepted plan, status of the last cycle, and counts since the start",
     "on every answer, and on none",
     (
-        Field("t_plan", "uint64_t", note="us; from when the plan counts, 0: there is none"),
+        Field("t_plan", "uint64_t", note="us; start time of the plan, 0: no plan"),
         Field("plan_id", "uint32_t"),
         Field("plans", "uint32_t"),
         Field("missed_deadlines", "uint32_t"),
@@ -189,12 +189,12 @@ VEHICLE_STATUS: Final = Topic(
     ),
 )
 VEHICLE_LAND_DETECTED: Final = Topic(
-    "vehicle_land_detected", "Standing or not", "on change and every second",
+    "vehicle_land_detected", "Landed or not", "on change and every second",
     (Field("landed", "bool"),),
 )  # fmt: skip
 VEHICLE_COMMAND: Final = Topic(
     "vehicle_command",
-    "A command that was heard",
+    "Received command",
     "each",
     (
         *_floats("param1", "param2", "param3", "param4", note="NaN: not used"),
@@ -209,7 +209,7 @@ VEHICLE_COMMAND: Final = Topic(
 )
 VEHICLE_COMMAND_ACK: Final = Topic(
     "vehicle_command_ack",
-    "Its answer",
+    "Acknowledgement of a command",
     "each",
     (
         Field("command", "uint32_t", note="MAV_CMD"),
@@ -220,7 +220,7 @@ VEHICLE_COMMAND_ACK: Final = Topic(
 )
 TICK_INPUT: Final = Topic(
     "tick_input",
-    "Every other input of a tick, by the name of its field; `pandion replay` feeds it back",
+    "Every other input of a tick, by the name of its field; input of `pandion replay`",
     CHANGE,
     (
         Field("field", "char", 24, "of TickInputs"),

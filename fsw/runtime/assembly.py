@@ -12,7 +12,6 @@ from fsw.flight.tuned_autopilot import TunedAutopilot
 from fsw.geometry.geodesy import DEFAULT_ORIGIN, to_local
 from fsw.link.services.mission_store import MissionStore, Site
 from fsw.mpc.planner import Planner
-from fsw.mpc.planner_config import Solver
 from fsw.parameters.control_choice import ControlChoice
 from fsw.parameters.flat import flat
 from fsw.parameters.flight_config import FlightConfig, flight_config
@@ -31,13 +30,13 @@ def flight_software(
     Raises:
         ValueError: For an unknown name, listing the known ones.
     """
-    # What is no name of an inner loop or solver is refused by the call itself.
+    # An unknown name is refused by the call itself.
     config = flight_config(
         choice.controller,
         cast(Inner, choice.inner),
-        choice.robustness,
-        solver=cast(Solver, choice.solver),
-        soft=choice.soft,
+        choice.lambda_,
+        solver=choice.solver,
+        soft=choice.allow_inconsistent,
     )
     config = replace(config, origin=origin)
     planner = Planner(config.planner, config.airframe, clock.stopwatch_us)

@@ -99,13 +99,13 @@ def empty_workspace(joints: int) -> Workspace:
 
 @kernel
 def gravity_in_body(rotation: Array, g: float) -> V3:
-    """Gravity [m/s²] written in B for R_WB (3, 3); W is NED, so it points along +z."""
+    """Gravity g [m/s²] in B for the rotation (3, 3) [1], R_WB; in NED it points along +z."""
     return transposed_times(rotation, (0.0, 0.0, g))
 
 
 @kernel
 def load_into(plant: Plant, state: Array, inputs: Inputs, work: Workspace) -> None:
-    """Generalised force of everything but inertia: rotors, drives, ground, disturbance."""
+    """Forces of rotors, drives, ground, disturbance at a state (17 + 2j,) [SI], into work.load."""
     load, rotation = work.load, work.rotation
     feet_force, feet_moment = ground_wrench(
         plant.feet, triple(state, P_WB), triple(state, V_WB), triple(state, W_WB_B), rotation
@@ -133,6 +133,8 @@ def load_into(plant: Plant, state: Array, inputs: Inputs, work: Workspace) -> No
 def acceleration_into(plant: Plant, state: Array, inputs: Inputs, work: Workspace) -> None:
     """Solve M x = load − bias into ``work.load``: base linear and angular, joint accelerations.
 
+    Taken at a state (17 + 2j,) [SI], see ``sitl.plant.state``.
+
     The linear part is the acceleration of the base origin written in B (not the rate of the
     velocity's components in B).
     """
@@ -154,7 +156,7 @@ def acceleration_into(plant: Plant, state: Array, inputs: Inputs, work: Workspac
 def derivative_into(
     plant: Plant, state: Array, inputs: Inputs, work: Workspace, out: Array
 ) -> None:
-    """Time derivative of the state vector (17 + 2j,)."""
+    """Time derivative into out (17 + 2j,) [SI/s] at a state (17 + 2j,) [SI]."""
     acceleration_into(plant, state, inputs, work)
     put(out, P_WB, triple(state, V_WB))
     put(out, V_WB, times(work.rotation, triple(work.load, 0)))

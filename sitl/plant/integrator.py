@@ -41,7 +41,7 @@ class Arrival(NamedTuple):
 
 @kernel
 def specific_force(plant: Plant, state: Array, inputs: Inputs, work: Workspace) -> V3:
-    """What an accelerometer at the base origin feels [m/s², B]: acceleration minus gravity."""
+    """Acceleration minus gravity at the base origin [m/s², B] in a state (17 + 2j,) [SI]."""
     acceleration_into(plant, state, inputs, work)
     return sub(triple(work.load, 0), gravity_in_body(work.rotation, plant.gravity))
 
@@ -50,7 +50,7 @@ def specific_force(plant: Plant, state: Array, inputs: Inputs, work: Workspace) 
 def rk4_step(
     plant: Plant, state: Array, inputs: Inputs, step: float, work: Workspace, slopes: Slopes
 ) -> None:
-    """Advance ``state`` in place by ``step`` [s]; the attitude leaves with unit length."""
+    """Advance a state (17 + 2j,) [SI] in place by ``step`` [s]; the attitude gets unit length."""
     n = state.shape[0]
     one, total, middle = slopes.one, slopes.total, slopes.middle
     derivative_into(plant, state, inputs, work, total)
@@ -83,10 +83,10 @@ def integrate(plant: Plant, state: Array, inputs: Inputs, step: float, places: A
 
     Args:
         plant: Numbers of the vehicle.
-        state: (17 + 2j,), see ``sitl.plant.state``.
+        state: (17 + 2j,) [SI], see ``sitl.plant.state``.
         inputs: Commands and disturbance, held over all steps.
         step: Length of one step [s].
-        places: (steps, 2 + j, 3) m, overwritten: positions in W of the base origin and of
+        places: (steps, 2 + j, 3) [m, NED], overwritten: positions of the base origin and of
             every DH frame's origin after each step. No rows: the state stays as it is.
     """
     n = state.shape[0]

@@ -47,7 +47,7 @@ class GaussianNoise:
         self._random = stream(seed, "sensor", *path)
 
     def on(self, values: tuple[float, ...], sigma: float) -> tuple[float, ...]:
-        """``values`` with independent noise of standard deviation ``sigma`` each."""
+        """``values`` with independent noise of standard deviation sigma [unit of the values]."""
         if sigma == 0.0:
             return values
         draws = self._random.standard_normal(len(values))

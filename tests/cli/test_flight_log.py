@@ -194,7 +194,7 @@ def test_export_to_mcap_reads_with_its_own_library(log: Path, tmp_path: Path) ->
         (("replay", "nowhere.ulg"), "cannot read nowhere.ulg: No such file"),
         (("replay", "text.ulg", "--verify"), "text.ulg is not a ULog file"),
         (("export", "text.ulg", "--csv", "x"), "text.ulg is not a ULog file"),
-        (("replay", "text.ulg", "--json", "no/where"), "no directory for no/where"),
+        (("replay", "text.ulg", "--json", "no/where"), "cannot write no/where"),
     ],
 )
 def test_what_cannot_be_read_is_refused_in_one_sentence(

@@ -1,4 +1,4 @@
-"""docs/scenarios.md names every key of a scenario with its range and default, and no other."""
+"""The page of scenario keys names every key with its range and default, and no other."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from sitl.scenario_file import parse_scenario
 from sitl.scenario_validation import check
 from sitl.simulation import Simulation
 
-PAGE = Path(__file__).parents[2] / "docs" / "scenarios.md"
+PAGE = Path(__file__).parents[2] / "docs" / "reference" / "scenarios.md"
 TABLES = (
     scenario.Scenario,
     scenario.Start,

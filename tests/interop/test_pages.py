@@ -8,15 +8,15 @@ from pathlib import Path
 
 import pytest
 
-from tests.docs.test_pages import DOCS, blocks
+from tests.docs.fences import PAGES, fences
 from tests.interop.vehicle import FAST, Vehicle
 
 PACING = FAST
-PAGES = sorted((DOCS / "ground-stations").glob("*.md"))
 PROGRAMS = [
-    pytest.param(code, id=f"{page.stem}-{number}")
+    pytest.param(fence.text, id=f"{page.stem}-{fence.line}")
     for page in PAGES
-    for number, code in enumerate(blocks(page, "python"))
+    for fence in fences(page)
+    if fence.mark == "run in" and fence.reason == "tests/interop/test_pages.py"
 ]
 
 

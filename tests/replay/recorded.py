@@ -14,7 +14,7 @@ from fsw.signals import Command, TickInputs, TickOutputs
 from sitl.scenario_file import load_scenario
 from tests.closed_loop.harness import LAND, Flight, command
 
-CHOICE = ControlChoice("blf", "tracking", "consistent", "clarabel", soft=False)
+CHOICE = ControlChoice()
 
 
 @dataclasses.dataclass
@@ -42,7 +42,7 @@ def flight(seconds: float) -> list[tuple[TickInputs, TickOutputs]]:
 
 def written(path: Path, ticks: list[tuple[TickInputs, TickOutputs]], lockstep: bool = True) -> Path:
     """The log of these ticks."""
-    facts: dict[str, str | int] = {**dataclasses.asdict(CHOICE), "soft": int(CHOICE.soft)}
+    facts: dict[str, str | int] = CHOICE.facts()
     log = FlightLog(path, LogSubject(facts, flat(FlightConfig()), {}, 17.1675, (0.15, 0.15)))
     log.begin(ticks[0][0].sensors.t_us, lockstep)
     for inputs, outputs in ticks:

@@ -17,7 +17,6 @@ from fsw.flight.autopilot import Autopilot
 from fsw.flight.state import FlightState
 from fsw.link.inbox import Inbox
 from fsw.link.sim_link import Pacing
-from fsw.log.block_file import BlockFile
 from fsw.log.flight_log import FlightLog
 from fsw.log.reader import LoggedTick, open_flight, ticks
 from fsw.parameters.flight_config import flight_config
@@ -38,6 +37,7 @@ from fsw.signals import (
     TickOutputs,
 )
 from messages import dialect
+from messages.block_file import BlockFile
 from messages.frames import Frame, FrameWriter, split
 from tests.fsw.link.snapshots import FACTS, outputs_at
 from tests.fsw.log.test_recorded_inputs import SUBJECT

@@ -14,10 +14,10 @@ from typing import Any
 import pytest
 
 from fsw.link.wire import encode_dialect
-from fsw.log.block_file import BlockFile
 from fsw.runtime import realtime
 from fsw.runtime.process import settle_memory
 from fsw.runtime.rates import RATE_GROUPS
+from messages.block_file import BlockFile
 from tests.fsw.link.snapshots import CONTEXT, outputs_at
 from tests.waiting import wait_for
 

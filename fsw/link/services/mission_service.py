@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Final, cast
 
 from fsw.link.services.mission_store import ALL_KINDS, ROOM, Kind, Meaning, MissionStore
@@ -31,6 +32,8 @@ from fsw.link.wire.mission_items import DENIED, UNSUPPORTED, MissionItem, Refuse
 from fsw.link.wire.outgoing import Outgoing, ServiceOutput
 from fsw.signals import Severity, StatusText
 from messages.frames import Frame
+
+_ReadItem = Callable[[Numbers], MissionItem | Refused]
 
 # MAV_MISSION_RESULT
 ACCEPTED: Final = 0
@@ -83,11 +86,11 @@ class MissionService:
         self._repeat_us = 0
         self._handlers: dict[int, Callable[[Numbers, Peer, int], Sequence[ServiceOutput]]] = {
             ids.MISSION_COUNT: self._count,
-            ids.MISSION_ITEM: self._item,
-            ids.MISSION_ITEM_INT: self._item_int,
+            ids.MISSION_ITEM: partial(self._take, item_float),
+            ids.MISSION_ITEM_INT: partial(self._take, item_int),
             ids.MISSION_REQUEST_LIST: self._request_list,
-            ids.MISSION_REQUEST: self._request,
-            ids.MISSION_REQUEST_INT: self._request_int,
+            ids.MISSION_REQUEST: partial(self._send_item, False),
+            ids.MISSION_REQUEST_INT: partial(self._send_item, True),
             ids.MISSION_ACK: self._ack,
             ids.MISSION_CLEAR_ALL: self._clear_all,
             ids.MISSION_SET_CURRENT: self._set_current,
@@ -158,16 +161,11 @@ class MissionService:
             return self._finish(self._upload)
         return (self._ask(self._upload, t_us),)
 
-    def _item(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[ServiceOutput]:
-        return self._take(item_float(values), values, peer, t_us)
-
-    def _item_int(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[ServiceOutput]:
-        return self._take(item_int(values), values, peer, t_us)
-
     def _take(
-        self, item: MissionItem | Refused, values: Numbers, peer: Peer, t_us: int
+        self, read: _ReadItem, values: Numbers, peer: Peer, t_us: int
     ) -> Sequence[ServiceOutput]:
         """Add the item that was asked for; the last one completes the upload."""
+        item = read(values)
         seq, number = int(values[7]), int(values[14])
         upload = self._upload
         if upload is None or upload.peer != peer or upload.kind != number:
@@ -230,14 +228,8 @@ class MissionService:
         self._download = _Download(peer, kind, items, t_us) if items else None
         return (encode_count(len(items), kind, peer, self._store.identity(kind)),)
 
-    def _request(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[ServiceOutput]:
-        return self._send_item(values, peer, t_us, as_int=False)
-
-    def _request_int(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[ServiceOutput]:
-        return self._send_item(values, peer, t_us, as_int=True)
-
     def _send_item(
-        self, values: Numbers, peer: Peer, t_us: int, as_int: bool
+        self, as_int: bool, values: Numbers, peer: Peer, t_us: int
     ) -> Sequence[ServiceOutput]:
         """Any item in any order and as often as asked: requests and items may be lost."""
         seq, number = int(values[0]), int(values[3])

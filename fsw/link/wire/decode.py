@@ -38,7 +38,7 @@ _ZERO: Final[Vec3] = (0.0, 0.0, 0.0)
 
 @dataclass(frozen=True, slots=True)
 class IndexedObstacle:
-    """One wall or point of a set of ``count``."""
+    """One wall or obstacle of a set of ``count``."""
 
     obstacle: Wall | PointObstacle
     index: int
@@ -46,7 +46,7 @@ class IndexedObstacle:
 
 
 def for_this_vehicle(target_system: float, target_component: float) -> bool:
-    """Whether a message is addressed to the autopilot or to everyone."""
+    """Whether ``target_system`` [1], ``target_component`` [1] is the autopilot or everyone."""
     return target_system in (0, SYSTEM_ID) and target_component in (0, 1, 191)
 
 

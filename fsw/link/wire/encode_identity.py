@@ -18,7 +18,7 @@ from fsw.signals import FlightSnapshot
 _CAPABILITIES: Final = 1 | 2 | 4 | 8 | 16 | 32 | 64 | 128 | 2048 | 8192 | 16384 | 32768
 # The release of PX4 whose behaviour towards ground stations is followed: QGroundControl asks for
 # 1.4.1 at least. It is marked as a development version, which is no release of anybody's; Pandion's
-# own version is that of the middleware (docs/decisions/0018-as-px4-answers.md).
+# own version is that of the middleware (docs/decisions/0018-px4-compatibility.md).
 _FOLLOWED: Final = 1 << 24 | 16 << 16
 _PROTOCOL_1, _PROTOCOL_2 = 100, 200
 _UID: Final = int.from_bytes(b"PANDION", "big")
@@ -65,7 +65,7 @@ def protocol_version(_: FlightSnapshot, __: TelemetryContext) -> WireValues:
 
 
 def available_modes(which: float, _: FlightSnapshot, __: TelemetryContext) -> Sequence[Outgoing]:
-    """AVAILABLE_MODES: all of them, or the one whose number, from 1, is asked for."""
+    """AVAILABLE_MODES: all of them, or the one whose number ``which`` [1], from 1, is asked for."""
     count = len(AVAILABLE_MODES)
     every = not which >= 1.0  # NaN and 0 ask for all
     return [

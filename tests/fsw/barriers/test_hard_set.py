@@ -43,7 +43,7 @@ def test_wall_rows_are_distances_and_ask_for_the_tightening() -> None:
     hard = HardWalls(WALLS, NODES, tightening=0.05, first_node=1)
     hard.refill(case.horizon(), case.targets)
     np.testing.assert_allclose(hard.rows.value, distances(case.horizon()), atol=1e-12)
-    assert (hard.rows.required == 0.05).all()
+    assert (hard.rows.lower_bound == 0.05).all()
     for column in range(INPUTS * NODES):
         np.testing.assert_allclose(
             hard.rows.gradient[:, column], difference(case, column, distances), atol=1e-6

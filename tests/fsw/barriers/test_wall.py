@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fsw.barriers.root import BarrierTuning
+from fsw.barriers.safe_approach import BarrierTuning
 from fsw.barriers.wall import WallBarrier
 from fsw.model.linearisation import Linearisation
 from fsw.model.prediction import INPUTS, Array

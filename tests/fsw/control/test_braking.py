@@ -18,13 +18,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import solve_continuous_lyapunov
 
-from fsw.barriers.root import root
+from fsw.barriers.safe_approach import safe_approach_speed
 from fsw.control.braking import Brake, BrakeTuning
 from fsw.model.airframe import AIRFRAME, GRAVITY, AttitudeLag
 from fsw.model.nominal import NominalModel
 from fsw.model.prediction import A, J, S, V, continuous_model
 from fsw.mpc.planner_config import PlannerConfig
-from fsw.mpc.program import InputLimits
+from fsw.mpc.qp_data import InputLimits
 from fsw.signals import PlanInput, PredictionState, Vec2, Vec3
 
 DT = 0.002
@@ -64,7 +64,7 @@ def nearest_wall(x: PredictionState, normal: Array) -> float:
     later = velocity + TAKEN_BACK_S * np.array(x.a)
     offset = math.inf
     for point, now, then in zip(points(x), velocity, later, strict=True):
-        needed = WALLS.robustness - min(normal @ now, normal @ then)
+        needed = WALLS.lambda_ - min(normal @ now, normal @ then)
         offset = min(offset, float(normal @ point) - distance_for(needed))
     return offset
 
@@ -75,7 +75,9 @@ def distance_for(speed: float) -> float:
     for _ in range(60):
         middle = 0.5 * (low + high)
         low, high = (
-            (low, middle) if root(middle, WALLS.alpha, WALLS.slope) > speed else (middle, high)
+            (low, middle)
+            if safe_approach_speed(middle, WALLS.alpha, WALLS.slope) > speed
+            else (middle, high)
         )
     return high
 

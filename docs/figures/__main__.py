@@ -1,0 +1,65 @@
+"""Draw ``docs/images`` again: ``make pictures``, or ``python -m docs.figures [FLIGHTS]``.
+
+Flies the pictured flights first, unless FLIGHTS is a directory that has them already.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import matplotlib as mpl
+
+from docs.figures.diagrams import draw_architecture, draw_timing
+from docs.figures.flight import draw_flight, recorded
+from docs.figures.frames import draw_frames
+
+IMAGES = Path(__file__).parents[1] / "images"
+PICTURED = {"walls": "flight.svg", "branches": "branches.svg"}
+# The flights of the table in README.md; of each, seed 0 and the whole duration.
+FLOWN = ("walls", "walls-calm", "workspace", "workspace-calm", "branches")
+STYLE = {
+    "font.family": ["DejaVu Sans", "sans-serif"],
+    "font.size": 9.0,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "svg.fonttype": "none",  # text stays text: it can be searched, and tests can read it
+    "svg.hashsalt": "pandion",  # the same drawing gives the same file
+}
+
+
+def fly(scenario: str, directory: Path) -> Path:
+    """Fly a scenario, unless it has been; return the flight's directory."""
+    out = directory / scenario
+    if not (out / "result.json").exists():
+        program = Path(sys.executable).parent / "pandion"
+        print(f"flying {scenario}", flush=True)
+        subprocess.run(
+            [program, "fly", scenario, "--out", out], check=True, stdout=subprocess.DEVNULL
+        )
+    return out
+
+
+def draw_all(flights: Path) -> None:
+    """Fly what is missing, draw everything, record the numbers."""
+    with mpl.rc_context(STYLE):
+        draw_architecture(IMAGES / "architecture.svg")
+        draw_timing(IMAGES / "timing.svg")
+        draw_frames(IMAGES / "frames.svg")
+        for scenario, name in PICTURED.items():
+            draw_flight(fly(scenario, flights), IMAGES / name)
+    numbers = {scenario: recorded(fly(scenario, flights)) for scenario in FLOWN}
+    text = json.dumps(numbers, indent=2)
+    (IMAGES / "flights.json").write_text(f"{text}\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    if len(sys.argv) > 1:
+        draw_all(Path(sys.argv[1]))
+    else:
+        with tempfile.TemporaryDirectory() as made:
+            draw_all(Path(made))
+    print(f"drew {IMAGES}")

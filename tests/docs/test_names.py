@@ -1,0 +1,74 @@
+"""Parameters, messages and status texts that the pages name are those of the vehicle."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from fsw.parameters.facts import FACTS
+from fsw.parameters.registry import PARAMETERS
+from messages import dialect
+from tests.docs.fences import DOCS, PAGES, ROOT, named, without_fences
+
+PARAMETER_NAMES = {p.name for p in PARAMETERS} | {fact.name for fact in FACTS}
+MESSAGE_NAMES = {message.msgname for message in dialect.mavlink_map.values()}
+CONSTANTS = {
+    name.removeprefix("MAV_CMD_") for entries in dialect.enums.values() for name in
+    (entry.name for entry in entries.values())
+} | set(dialect.enums)  # fmt: skip
+# The changelog names what is gone, the page of messages is generated, and decision 0018 lists
+# messages of PX4's that this vehicle does not have.
+SKIPPED = (
+    "CHANGELOG.md",
+    "docs/reference/messages.md",
+    "docs/decisions/0018-px4-compatibility.md",
+)
+READ = [page for page in PAGES if named(page) not in SKIPPED]
+
+
+def prefixes() -> set[str]:
+    return {name.split("_")[0] for name in PARAMETER_NAMES}
+
+
+@pytest.mark.parametrize("page", READ, ids=named)
+def test_a_parameter_on_a_page_exists(page: Path) -> None:
+    """Names in backticks that look like a parameter; a star stands for several."""
+    quoted = re.findall(r"`([A-Z][A-Z0-9]+_[A-Z0-9_*]+)`", without_fences(page))
+    unknown = [
+        name
+        for name in quoted
+        if name.split("_")[0] in prefixes()
+        and not any(re.fullmatch(name.replace("*", ".*"), known) for known in PARAMETER_NAMES)
+    ]
+    assert unknown == []
+
+
+@pytest.mark.parametrize("page", READ, ids=named)
+def test_a_message_or_command_on_a_page_exists(page: Path) -> None:
+    """Words in capitals with an underscore, outside code: messages, commands, enumerations."""
+    text = re.sub(r"`[^`]*`|\]\([^)]*\)|<!--.*?-->", "", without_fences(page), flags=re.S)
+    words = set(re.findall(r"\b[A-Z][A-Z0-9]+(?:_[A-Z0-9]+)+\b(?!\*)", text))
+    known = MESSAGE_NAMES | CONSTANTS | PARAMETER_NAMES | OTHER
+    assert sorted(word for word in words if word not in known) == []
+
+
+# Of Linux, of PX4's simulator, of the dialect's own definition.
+OTHER = {
+    "SCHED_FIFO", "SCHED_OTHER", "PREEMPT_RT", "SOCK_SEQPACKET", "RWF_NOWAIT", "CRC_EXTRA",
+    "INVALID_ARGUMENT",
+}  # fmt: skip
+
+
+def test_the_beginnings_of_status_texts_occur_in_the_code() -> None:
+    page = (DOCS / "reference" / "status-texts.md").read_text(encoding="utf-8")
+    forms = page.split("## Forms")[1]
+    quoted = [
+        text
+        for row in re.findall(r"^\| (`.*?) \|", forms, re.M)
+        for text in re.findall(r"`([^`]{4,})`", row)
+    ]
+    code = "\n".join(path.read_text("utf-8") for path in (ROOT / "fsw").rglob("*.py"))
+    assert quoted
+    assert [text for text in quoted if text.removesuffix(" N") not in code] == []

@@ -1,0 +1,80 @@
+"""The pictures and tables of flights show what flies; ``make pictures`` renews them."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+import xml.etree.ElementTree as ET
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from docs.figures.diagrams import draw_architecture, draw_timing
+from docs.figures.flight import draw_flight, recorded
+from docs.figures.frames import draw_frames
+from tests.docs.fences import DOCS, ROOT
+
+IMAGES = DOCS / "images"
+NUMBERS: dict[str, dict[str, Any]] = json.loads((IMAGES / "flights.json").read_text("utf-8"))
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _text_stays_text() -> None:
+    import matplotlib as mpl
+
+    mpl.rcParams["svg.fonttype"] = "none"
+
+
+def words(picture: Path) -> list[str]:
+    """Every text of a drawing, in its order."""
+    found = ET.parse(picture).getroot().iter("{http://www.w3.org/2000/svg}text")
+    return ["".join(text.itertext()) for text in found]
+
+
+@pytest.mark.parametrize(("scenario", "name"), [("walls", "flight"), ("branches", "branches")])
+def test_a_picture_prints_the_recorded_numbers_of_its_flight(scenario: str, name: str) -> None:
+    numbers = NUMBERS[scenario]
+    title = next(text for text in words(IMAGES / f"{name}.svg") if "--seed" in text)
+    assert f"{numbers['tracking_error_rms_mm']:.1f} mm RMS" in title
+    assert f"minimum margin {numbers['min_margin_mm']:.1f} mm" in title
+
+
+def test_the_table_of_the_readme_has_the_recorded_numbers() -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| `([\w-]+)` \| ([\d.]+) mm \| ([\d.]+) mm \| (\w+) \|$", text, re.M)
+    assert {row[0]: row[1:] for row in rows} == {
+        scenario: (
+            f"{numbers['tracking_error_rms_mm']:.1f}",
+            f"{numbers['min_margin_mm']:.1f}",
+            "yes" if numbers["completed"] else "no",
+        )
+        for scenario, numbers in NUMBERS.items()
+    }
+
+
+@pytest.mark.parametrize(
+    ("draw", "name"),
+    [
+        (draw_architecture, "architecture"),
+        (draw_timing, "timing"),
+        (draw_frames, "frames"),
+    ],
+)
+def test_a_diagram_says_what_its_script_draws(draw: Any, name: str, tmp_path: Path) -> None:
+    draw(tmp_path / "drawn.svg")
+    stale = f"docs/images/{name}.svg is older than its script: run make pictures"
+    assert words(tmp_path / "drawn.svg") == words(IMAGES / f"{name}.svg"), stale
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("scenario", ["walls", "branches"])
+def test_today_s_flight_has_the_recorded_numbers(scenario: str, tmp_path: Path) -> None:
+    program, out = Path(sys.executable).parent / "pandion", tmp_path / "flown"
+    line = ["fly", scenario, "--gcs", "udp:127.0.0.1:9", "--api", "none", "--out", out]
+    subprocess.run([program, *line], check=True, capture_output=True, timeout=300.0)
+    assert recorded(out) == NUMBERS[scenario], "run make pictures"
+    draw_flight(out, tmp_path / "drawn.svg")
+    assert any("minimum margin" in text for text in words(tmp_path / "drawn.svg"))
