@@ -268,12 +268,12 @@ def _subject(options: FswOptions, program: FlightProgram[Any]) -> LogSubject:
         facts["seed"] = options.seed
     vehicle = program.facts
     return LogSubject(
-        facts,
-        program.numbers,
-        program.parameters.values,
-        vehicle.rotor_thrust_max,
-        vehicle.link_length,
-        round(program.parameters.values["LOG_PROFILE"]),
+        facts=facts,
+        numbers=program.numbers,
+        parameters=program.parameters.values,
+        thrust_max=vehicle.rotor_thrust_max,
+        link_length=vehicle.link_length,
+        profile=round(program.parameters.values["LOG_PROFILE"]),
     )
 
 

@@ -142,12 +142,12 @@ class QpData:
         positive = sparse.hstack((sparse.csc_matrix((slacks, self.inputs)), -sparse.eye(slacks)))
         cut = rows.first_cone
         return QuadraticProgram(
-            sparse.block_diag((upper, nothing)).tocsc(),
-            np.concatenate((self.linear, self.penalty)),
-            sparse.vstack((inside[:cut], positive, inside[cut:])).tocsc(),
-            np.concatenate((rows.b[:cut], np.zeros(slacks), rows.b[cut:])),
-            cut + slacks,
-            (len(rows.b) - cut) // CONE,
+            p=sparse.block_diag((upper, nothing)).tocsc(),
+            q=np.concatenate((self.linear, self.penalty)),
+            a=sparse.vstack((inside[:cut], positive, inside[cut:])).tocsc(),
+            b=np.concatenate((rows.b[:cut], np.zeros(slacks), rows.b[cut:])),
+            nonnegative_rows=cut + slacks,
+            cones=(len(rows.b) - cut) // CONE,
         )
 
 

@@ -53,13 +53,13 @@ def flight_software(
         )
     )
     return FlightProgram(
-        vehicle_facts(config),
-        FlightState(),
-        flight.tick,
-        planner,
-        parameters,
-        missions,
-        flat(config),
+        facts=vehicle_facts(config),
+        first_state=FlightState(),
+        tick=flight.tick,
+        planner=planner,
+        parameters=parameters,
+        missions=missions,
+        numbers=flat(config),
     )
 
 

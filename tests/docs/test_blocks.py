@@ -28,7 +28,7 @@ from studies.catalogue import STUDIES
 from tests.docs.fences import PAGES, ROOT, Fence, commands, fences, named
 
 BLOCKS = [fence for page in PAGES for fence in fences(page)]
-LANGUAGES = {"console", "json", "math", "python", "text", "toml", "{include}", "{toctree}"}
+LANGUAGES = {"console", "diff", "json", "math", "python", "text", "toml", "{include}", "{toctree}"}
 # New option or program -> the one that this version still has. Empty it when they have arrived.
 RENAMED = {
     "--allow-inconsistent": "--soft",
