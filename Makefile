@@ -18,8 +18,8 @@ UV = UV_DEFAULT_INDEX="$${UV_DEFAULT_INDEX:-$(PIP_INDEX)}" .boot/uv
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: help setup run test test-long code-checks tests-of-processes tests-of-the-rest interop lock \
-	docs docs-test pictures clean
+.PHONY: help setup run test test-long code-checks tests-of-processes tests-of-the-rest mutate \
+	interop lock docs docs-test pictures pages clean
 
 help: ## show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-9s %s\n", $$1, $$2 }' Makefile
@@ -42,7 +42,7 @@ test: setup ## set up, then run every check: ruff, mypy, import-linter, pytest
 
 # What reads the code only goes first in the row of the tests that often wait for clocks: meanwhile
 # the other row compiles the kernels that both need.
-OF_PROCESSES := tests/cli tests/interop tests/processes tests/timing
+OF_PROCESSES := tests/benchmarks tests/cli tests/interop tests/processes tests/timing
 code-checks:
 	$(call check,lint,$(BIN)/ruff check .)
 	$(call check,format,$(BIN)/ruff format --check .)
@@ -55,6 +55,19 @@ tests-of-the-rest:
 
 test-long: setup ## the tests that make test leaves out for its four minutes
 	$(BIN)/pytest -m long
+
+# cosmic-ray in an environment of its own; the tests run in .venv, on a copy of the checkout. FILES are
+# files and folders, SAMPLE mutants of each file, drawn with SEED, BUDGET the seconds that the tests of
+# a file may take; none of them: every mutant, 20 s.
+MUTATION := tests/mutation
+.mutation/ready: $(MUTATION)/tool.lock | $(READY)
+	@.boot/uv venv --quiet --allow-existing --no-project --python .venv/bin/python .mutation/tool
+	@$(UV) pip sync --quiet --python .mutation/tool --require-hashes --only-binary :all: $<
+	@touch $@
+
+mutate: setup .mutation/ready ## change fsw a little, see if a test notices: SAMPLE=40 SEED=1 FILES=fsw/mpc JSON=1
+	@PYTHONPATH=. .mutation/tool/bin/python -m tests.mutation.mutate $(FILES) --seed $(or $(SEED),1) \
+		$(if $(SAMPLE),--sample $(SAMPLE)) $(if $(BUDGET),--budget $(BUDGET)) $(if $(JSON),--json)
 
 # Of other people's clients; each has a lock of its own, and none is needed to fly or to test.
 EXTERNAL := tests/interop/external
@@ -86,6 +99,9 @@ docs-test: setup ## run every command and example of the documentation, flights 
 
 pictures: setup ## fly and draw docs/images again
 	$(BIN)/python -m docs.figures
+
+pages: setup ## write the generated pages of docs/reference again
+	@$(BIN)/python -m docs.pages
 
 # A uv that is there is used if it understands what is asked of it; else the pinned one is fetched
 # into .boot with pip alone, because a fresh Debian has neither ensurepip nor a pip that may install.
@@ -131,10 +147,11 @@ lock: .boot/uv ## renew requirements.lock (to fly) and requirements-dev.lock (to
 		--output-file requirements-dev.lock
 	@$(COMPILE) --group mavproxy --no-deps --output-file $(EXTERNAL)/mavproxy.lock
 	@$(COMPILE) --group docs --constraints requirements-dev.lock --output-file requirements-docs.lock
+	@$(COMPILE) --group mutation --no-deps --output-file $(MUTATION)/tool.lock
 	@git diff --stat -- requirements.lock requirements-dev.lock requirements-docs.lock \
-		$(EXTERNAL)/mavproxy.lock
+		$(EXTERNAL)/mavproxy.lock $(MUTATION)
 
 clean: ## remove the environment, generated files and caches
-	rm -rf .venv .boot .docs .interop build dist messages/dialect.py .mypy_cache .ruff_cache .pytest_cache \
+	rm -rf .venv .boot .docs .interop .mutation build dist messages/dialect.py .mypy_cache .ruff_cache .pytest_cache \
 		.hypothesis .import_linter_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -20,12 +20,12 @@ from fsw.link.services.mission_service import MissionService
 from fsw.link.services.service import LinkService
 from fsw.link.sim_link import Pacing, SimLink
 from fsw.link.udp_endpoint import LinkError, parse_address
-from fsw.link.wire.telemetry_context import LoopHealth, TelemetryContext
+from fsw.link.wire.telemetry_context import TelemetryContext
 from fsw.log.flight_log import LogSubject
 from fsw.log.revision import revision
 from fsw.log.run_directory import new_run_directory
 from fsw.log.run_files import RunFiles
-from fsw.ports import Planner
+from fsw.ports import LoopHealth, PlanningCycle
 from fsw.runtime import clock, report
 from fsw.runtime.effort import EffortRecord
 from fsw.runtime.events import Events, events
@@ -43,7 +43,7 @@ from fsw.runtime.sim_loop import Ending, FlightEnd, FlightRecord, SimLoop
 from fsw.runtime.timing import GroupTimer
 
 if TYPE_CHECKING:
-    from fsw.parameters.kept_file import Keeping
+    from fsw.parameters.kept_file import ParameterFile
 
 DONE, NOT_COMPLETED, COULD_NOT_START = 0, 1, 2  # exit codes
 
@@ -66,29 +66,29 @@ def run(options: FswOptions, load: ProgramLoader | None = None) -> int:
     Returns:
         The exit code.
     """
-    told = events(options.events)
+    reporter = events(options.events)
     try:
-        return _Session(options, told, load or load_flight_software).run()
+        return _Session(options, reporter, load or load_flight_software).run()
     except (CouldNotStart, LinkError) as error:
-        told.report("error", f"fsw: {error}")
+        reporter.report("error", f"fsw: {error}")
         return COULD_NOT_START
     except KeyboardInterrupt:
-        told.report("error", "fsw: interrupted before the flight began")
+        reporter.report("error", "fsw: interrupted before the flight began")
         return NOT_COMPLETED
     except BrokenPipeError:
-        return NOT_COMPLETED  # whoever read the events is gone
+        return NOT_COMPLETED  # the reader of the events is gone
     except Exception as error:
         traceback.print_exc()
-        told.report("error", f"fsw: internal error, {type(error).__name__}: {error}")
+        reporter.report("error", f"fsw: internal error, {type(error).__name__}: {error}")
         return NOT_COMPLETED
 
 
 class _Session:
     """One start of the program."""
 
-    def __init__(self, options: FswOptions, told: Events, load: ProgramLoader) -> None:
+    def __init__(self, options: FswOptions, events: Events, load: ProgramLoader) -> None:
         self._options = options
-        self._told = told
+        self._events = events
         self._load = load
         self._stop = StopRequest()
 
@@ -97,7 +97,7 @@ class _Session:
         simulator = parse_address(options.sim)
         addresses(options.links)  # what is no address is refused before a minute of compiling
         directory = _output_directory(options.out)
-        self._told.report(
+        self._events.report(
             "preparing", "fsw: preparing (the first start compiles, which takes a minute)"
         )
         program = self._load(options)
@@ -112,7 +112,7 @@ class _Session:
         settle_memory()
         planner = ProcessPlanner(program.planner, clock.now_us, record.mpc)
         keeping.start()
-        inbox = Inbox()
+        inbox = Inbox(options.links.origin)
         start_us = clock.unix_us()
         files = self._files(directory, start_us, program)
         sim = SimLink(simulator, inbox, facts)
@@ -146,10 +146,10 @@ class _Session:
         result |= link_report.as_json(ground, inbox)
         result["files"] = files.as_json()
         unwritten = report.write(directory / "fsw.json", result)
-        told = f"fsw: {end.sentence}"
-        self._told.report("ended", told, ending=end.ending.value, result=result)
+        sentence = f"fsw: {end.sentence}"
+        self._events.report("ended", sentence, ending=end.ending.value, result=result)
         if unwritten is not None:
-            self._told.report("unwritten", f"fsw: cannot write {unwritten}", what=unwritten)
+            self._events.report("unwritten", f"fsw: cannot write {unwritten}", what=unwritten)
             return NOT_COMPLETED
         return DONE if end.ending is Ending.SHUTDOWN else NOT_COMPLETED
 
@@ -165,7 +165,7 @@ class _Session:
             raise CouldNotStart(f"cannot write {error.filename}: {error.strerror}") from None
 
     def _warn(self, sentence: str) -> None:
-        self._told.report("warning", f"fsw: {sentence}")
+        self._events.report("warning", f"fsw: {sentence}")
 
     def _services(self, program: FlightProgram[Any], logs: FlightLogs) -> tuple[LinkService, ...]:
         """What one link serves; called once a link."""
@@ -176,41 +176,41 @@ class _Session:
         missions = MissionService(program.missions)
         return parameters, missions, LogService(logs), FtpService(vehicle_files(logs))
 
-    def _keep_parameters(self, program: FlightProgram[Any], directory: Path) -> Keeping:
+    def _keep_parameters(self, program: FlightProgram[Any], directory: Path) -> ParameterFile:
         """Take over the parameters of the vehicle's file, and say what of it is of no use.
 
         Raises:
             CouldNotStart: The file cannot be read or written, or contradicts itself.
         """
-        from fsw.parameters.kept_file import Keeping, KeptFile
+        from fsw.parameters.kept_file import KeptFile, ParameterFile
 
         path, store = self._options.params, program.parameters
         file = KeptFile(path, directory / "parameters.params", store.defaults)
         try:
-            keeping = Keeping(store, file)
+            keeping = ParameterFile(store, file)
         except OSError as error:
             where = path or directory
             raise CouldNotStart(f"cannot keep parameters in {where}: {error.strerror}") from None
         except ValueError as error:
             raise CouldNotStart(f"parameters in {path} contradict each other: {error}") from None
         for complaint in keeping.complaints:
-            self._told.report("warning", f"fsw: {path}, {complaint}")
+            self._events.report("warning", f"fsw: {path}, {complaint}")
         if path is not None:
             text = f"fsw: parameters from {path}, {keeping.restored} of them not the default"
-            self._told.report("parameters", text)
+            self._events.report("parameters", text)
         return keeping
 
     def _fly(
         self,
         loop: SimLoop[Any],
         sim: SimLink,
-        inline: Planner,
+        inline: PlanningCycle,
         planner: ProcessPlanner,
         record: FlightRecord,
     ) -> FlightEnd:
         options = self._options
         self._stop.listen()
-        self._told.report("ready", f"fsw: ready, looking for the simulator at {options.sim}")
+        self._events.report("ready", f"fsw: ready, looking for the simulator at {options.sim}")
         first = loop.connect(options.wait_s)
         if first is None:
             if self._stop.requested:
@@ -262,11 +262,7 @@ def _subject(options: FswOptions, program: FlightProgram[Any]) -> LogSubject:
         "ver_sw": revision(),
         "scenario": options.scenario,
         "scenario_digest": options.scenario_digest,
-        "controller": options.control.controller,
-        "inner": options.control.inner,
-        "robustness": options.control.robustness,
-        "solver": options.control.solver,
-        "soft": int(options.control.soft),
+        **options.control.facts(),
     }
     if options.seed is not None:
         facts["seed"] = options.seed

@@ -20,11 +20,13 @@ from fsw.tuning import Tuning
 Vec2 = tuple[float, float]
 Vec3 = tuple[float, float, float]
 Vec4 = tuple[float, float, float, float]
+MAX_DISTANCE = 1000.0  # m from the origin; a place farther off is a slip: of frame, unit or sign
+MAX_MISSION_SPEED = 1.0  # m/s, of a mission's segment
 Mat3 = tuple[float, float, float, float, float, float, float, float, float]  # row-major
 
 
 class Mode(Enum):
-    """Where the vehicle is in its flight; transitions are in ``vehicle/modes.py``."""
+    """Where the vehicle is in its flight; each flight mode has a file in ``flight/modes``."""
 
     DISARMED = "disarmed"
     TAKEOFF = "takeoff"
@@ -84,18 +86,6 @@ class SensorFrame:
     accel_B: Vec3  # m/s^2, specific force
     q_arm: Vec2  # rad: th1 from straight down, th2 relative to link 1
     qd_arm: Vec2  # rad/s
-
-
-@dataclass(frozen=True, slots=True)
-class CommandRequest:
-    """A MAVLink command (COMMAND_LONG or COMMAND_INT) addressed to this vehicle."""
-
-    command: int  # MAV_CMD
-    params: tuple[float, float, float, float, float, float, float]  # NaN where not used
-    source_system: int
-    source_component: int
-    confirmation: int = 0
-    frame: int | None = None  # MAV_FRAME of a COMMAND_INT, None for a COMMAND_LONG
 
 
 @dataclass(frozen=True, slots=True)
@@ -221,6 +211,179 @@ class SafeSet:
         return ConstraintKind.WALLS if self.walls else ConstraintKind.NONE
 
 
+# ---------------------------------------------------------------- commands
+
+
+class CommandResult(IntEnum):
+    """Answer to a command; values equal MAV_RESULT."""
+
+    ACCEPTED = 0
+    TEMPORARILY_REJECTED = 1
+    DENIED = 2
+    UNSUPPORTED = 3
+    FAILED = 4
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """A place in the local frame, as far as a command names one; None: where the vehicle is."""
+
+    north_east: Vec2 | None = None  # m
+    height: float | None = None  # m above the origin, or above home
+    above_home: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Arm:
+    """Close the loops."""
+
+    force: bool = False  # against all checks but that of the estimate
+
+
+@dataclass(frozen=True, slots=True)
+class Disarm:
+    """Stop the rotors."""
+
+    force: bool = False  # in the air as well
+
+
+@dataclass(frozen=True, slots=True)
+class SwitchMode:
+    """Fly in another mode."""
+
+    mode: Mode
+
+
+@dataclass(frozen=True, slots=True)
+class TakeOff:
+    """Climb straight up."""
+
+    to: Place  # its height; None: the usual climb
+
+
+@dataclass(frozen=True, slots=True)
+class GoTo:
+    """Hold at another place."""
+
+    place: Place
+    yaw: float | None = None  # rad; None: as it is
+    speed: float | None = None  # m/s; None: as usual
+    may_switch_mode: bool = False  # or only while in Hold
+
+
+@dataclass(frozen=True, slots=True)
+class FlyOrbit:
+    """Fly a level circle."""
+
+    centre: Place
+    radius: float  # m
+    speed: float | None = None  # m/s; None: as usual
+    clockwise: bool = True
+    facing: Facing = Facing.CENTRE
+
+
+@dataclass(frozen=True, slots=True)
+class LookAt:
+    """Point the nose at a place from now on; None: along the flight again."""
+
+    place: Place | None
+
+
+@dataclass(frozen=True, slots=True)
+class ChangeSpeed:
+    """Fly to places at another speed from now on."""
+
+    speed: float | None  # m/s; None: as usual
+
+
+@dataclass(frozen=True, slots=True)
+class MoveJoints:
+    """Move the arm; None leaves a joint as it is."""
+
+    joint1: float | None  # -1 to 1, of the joint's limit
+    joint2: float | None  # -1 to 1, of the limit of both joints together
+
+
+@dataclass(frozen=True, slots=True)
+class SetHome:
+    """Where a return leads to; None: here."""
+
+    place: Place | None
+
+
+@dataclass(frozen=True, slots=True)
+class StartMission:
+    """Fly the uploaded mission from a step on, to its end."""
+
+    first: float = 0.0
+    last: float = 0.0  # 0: to the end
+
+
+@dataclass(frozen=True, slots=True)
+class SetMissionStep:
+    """Make another step the current one."""
+
+    number: float  # -1: the current step
+    reset: bool = False
+
+
+class Order(Enum):
+    """Commands without parameters."""
+
+    TERMINATE = "terminate"
+    PAUSE_MISSION = "pause mission"
+    CONTINUE_MISSION = "continue mission"
+    CHECK_ARMING = "check arming"
+    NOTHING = "nothing"  # accepted, and nothing to do
+
+
+@dataclass(frozen=True, slots=True)
+class Rejected:
+    """A command that means nothing to this vehicle, as the link found out."""
+
+    result: CommandResult
+    reason: str = ""
+
+
+CommandAction = (
+    Arm
+    | Disarm
+    | SwitchMode
+    | TakeOff
+    | GoTo
+    | FlyOrbit
+    | LookAt
+    | ChangeSpeed
+    | MoveJoints
+    | SetHome
+    | StartMission
+    | SetMissionStep
+    | Order
+    | Rejected
+)
+"""What a command asks for, without MAVLink's numbers."""
+
+
+@dataclass(frozen=True, slots=True)
+class CommandRequest:
+    """A MAVLink command (COMMAND_LONG or COMMAND_INT) addressed to this vehicle, as it came."""
+
+    command: int  # MAV_CMD
+    params: tuple[float, float, float, float, float, float, float]  # NaN where not used
+    source_system: int
+    source_component: int
+    confirmation: int = 0
+    frame: int | None = None  # MAV_FRAME of a COMMAND_INT, None for a COMMAND_LONG
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """What a command asks for, and the message it came in, which is logged and acknowledged."""
+
+    action: CommandAction
+    request: CommandRequest
+
+
 # ---------------------------------------------------------------- mission
 
 
@@ -335,7 +498,7 @@ class PlanRequest:
     from_nominal: bool  # start carried over from the running plan, not measured
     tuning: Tuning = ()  # of the planner's configuration
     # (2,) rad, joints to hold at the nodes; empty: where the arm is is the planner's choice
-    postures: tuple[Vec2, ...] = ()
+    joint_targets: tuple[Vec2, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -393,7 +556,7 @@ class CommandAck:
     """Answer to one CommandRequest."""
 
     command: int  # MAV_CMD
-    result: int  # MAV_RESULT
+    result: int  # CommandResult, MAV_RESULT
     target_system: int
     target_component: int
 
@@ -490,7 +653,7 @@ class FlightSnapshot:
     battery: BatteryState = BatteryState()
     arming_refusal: str = ""  # why it cannot be armed; empty: it could be, or is
     offboard: OffboardReport = OffboardReport()
-    standby: Mode = Mode.HOLD  # what arming would lead to
+    intended_mode: Mode = Mode.HOLD  # what arming would lead to
     mission: MissionProgress = MissionProgress()
     failsafe_from: Mode | None = None  # what was flown when a failsafe took over; None: none did
     orbit: Orbit | None = None  # that is being flown
@@ -503,7 +666,7 @@ class TickInputs:
 
     sensors: SensorFrame  # its stamp is the instant of the tick
     plan: Plan | PlanFailure | None = None  # newly arrived, at most one
-    commands: tuple[CommandRequest, ...] = ()
+    commands: tuple[Command, ...] = ()
     targets: tuple[EndEffectorTarget, ...] = ()
     safe_set: SafeSet | None = None  # newly announced
     # The newest set-points for now; at most one of motion and attitude.

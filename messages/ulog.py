@@ -108,7 +108,7 @@ def information(key: str, value: str | int) -> bytes:
 
 
 def parameter(key: str, value: float) -> bytes:
-    """One parameter; the format knows 32-bit integers and floats only."""
+    """One parameter with a value [unit of the key], as a 32-bit integer or float."""
     if isinstance(value, int) and -(1 << 31) <= value < 1 << 31:
         return message(PARAMETER, _key(f"int32_t {key}") + pack("<i", value))
     return message(PARAMETER, _key(f"float {key}") + pack("<f", value))

@@ -87,7 +87,7 @@ class UlogFile:
             raise ValueError(f"a text has {length} bytes")
 
     def _check_rest(self, begin: int) -> None:
-        """Tell a last message that was cut from one whose length is wrong."""
+        """Distinguish a last message that was cut from one whose length is wrong."""
         with self.path.open("rb") as file:
             file.seek(begin)
             rest = file.read(_HEADER.size + 2)

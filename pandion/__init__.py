@@ -1,1 +1,1 @@
-"""The command line of Pandion: the only package that knows both halves."""
+"""The command line of Pandion: the only package that knows both processes."""

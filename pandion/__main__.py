@@ -5,11 +5,32 @@ from __future__ import annotations
 import errno
 import os
 import sys
-from collections.abc import Callable
 from importlib import import_module
 from typing import Final
 
-from pandion.parser import COULD_NOT_START, Parser, unknown_name
+from command_line.parser import COULD_NOT_START, unknown_name
+
+# Module, and what the verb does; without that it is not in the list.
+VERBS: Final[dict[str, tuple[str, str]]] = {
+    "fly": (
+        "pandion.fly",
+        "start the simulator and the flight software, fly a scenario, print the result",
+    ),
+    "sitl": ("sitl.__main__", "run the simulator alone"),
+    "fsw": ("fsw.__main__", "run the flight software alone"),
+    "reproduce": ("pandion.reproduce", "fly a table or a figure of the paper again"),
+    "param": (
+        "pandion.param",
+        "list, set, import and export the parameters of a vehicle or a file",
+    ),
+    "dialect": ("pandion.dialect", "teach MAVProxy, Wireshark and others the private messages"),
+    "replay": (
+        "pandion.replay",
+        "feed a flight log through the flight software again and compare",
+    ),
+    "export": ("pandion.export", "write a flight log as CSV or MCAP"),
+    "bench": ("pandion.moved_bench", ""),
+}
 
 HELP: Final = """\
 usage: pandion VERB [options]
@@ -17,15 +38,7 @@ usage: pandion VERB [options]
 Flight software for aerial manipulators, with a simulator, over MAVLink.
 
 verbs:
-  fly         start the simulator and the flight software, fly a scenario, print the verdict
-  sitl        run the simulator alone
-  fsw         run the flight software alone
-  reproduce   fly a table or a figure of the paper again
-  param       list, set, import and export the parameters of a vehicle or a file
-  bench       time the optimiser, the loop, the lockstep, a flood, a log download
-  dialect     teach MAVProxy, Wireshark and others the private messages
-  replay      feed a flight log through the flight software again and compare
-  export      write a flight log as CSV or MCAP
+{verbs}
 
 options:
   --version   print the version
@@ -38,7 +51,9 @@ examples:
   pandion fsw --sim udp:127.0.0.1:4560 --gcs udp:127.0.0.1:14550
   pandion replay runs/walls-seed0-1 --verify
   pandion reproduce table4 --plant double-integrator --seeds 100:120
-"""
+""".format(verbs="\n".join(f"  {name:11} {what}" for name, (_, what) in VERBS.items() if what))
+
+_INTERRUPTED: Final = 1  # exit code
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -49,18 +64,18 @@ def main(argv: list[str] | None = None) -> int:
         finally:
             sys.stdout.flush()  # here, where a reader that has left or a full disk has its answer
     except BrokenPipeError:
-        _say_no_more()  # whoever read the output has left
+        _silence_stdout()  # the reader of the output has left
     except OSError as error:
         if error.errno not in (errno.ENOSPC, errno.EDQUOT):
             raise
-        _say_no_more()
+        _silence_stdout()
         print(f"pandion: cannot write {error.filename or 'output'}: disk full", file=sys.stderr)
     except KeyboardInterrupt:
         print("pandion: interrupted", file=sys.stderr)
-    return INTERRUPTED
+    return _INTERRUPTED
 
 
-def _say_no_more() -> None:
+def _silence_stdout() -> None:
     """Nothing can be written to standard output, at exit neither."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
@@ -74,49 +89,19 @@ def _run(words: list[str]) -> int:
 
         print(f"pandion {version()}")
         return 0
-    verb = VERBS.get(words[0])
-    if verb is None:
-        what = "option" if words[0].startswith("-") else "verb"
+    name, *options = words
+    if name not in VERBS:
+        what = "option" if name.startswith("-") else "verb"
         known = ("--help", "--version") if what == "option" else VERBS
-        print(f"pandion: {unknown_name(what, words[0], known)}", file=sys.stderr)
+        print(f"pandion: {unknown_name(what, name, known)}", file=sys.stderr)
         return COULD_NOT_START
-    return verb(words[1:])
+    module, _ = VERBS[name]
+    entry = import_module(module).main
+    # The two processes have programs of their own, which call themselves by another name.
+    return int(
+        entry(options) if module.startswith("pandion") else entry(options, f"pandion {name}")
+    )
 
-
-def _verb(module: str) -> Callable[[list[str]], int]:
-    return lambda argv: int(import_module(f"pandion.{module}").main(argv))
-
-
-def _sitl(argv: list[str]) -> int:
-    from sitl import __main__ as entry
-    from sitl import arguments
-
-    parser = Parser("pandion sitl", "Run the simulator alone.")
-    arguments.add_arguments(parser)
-    return entry.run(arguments.options(parser.read(argv)))
-
-
-def _fsw(argv: list[str]) -> int:
-    from fsw import __main__ as entry
-    from fsw import arguments
-
-    parser = Parser("pandion fsw", "Run the flight software alone.")
-    arguments.add_arguments(parser)
-    return entry.run(arguments.options(parser.read(argv)))
-
-
-INTERRUPTED: Final = 1  # exit code
-VERBS: Final[dict[str, Callable[[list[str]], int]]] = {
-    "fly": _verb("fly"),
-    "sitl": _sitl,
-    "fsw": _fsw,
-    "reproduce": _verb("reproduce"),
-    "bench": _verb("bench.mpc"),
-    "param": _verb("param"),
-    "dialect": _verb("dialect"),
-    "replay": _verb("replay"),
-    "export": _verb("export"),
-}
 
 if __name__ == "__main__":
     sys.exit(main())

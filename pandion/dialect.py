@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import os
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from command_line.options import option, read, switch
+from command_line.parser import COULD_NOT_START
+from command_line.values import one_of
 from messages import export
 from messages.generate import DEFINITION, GenerationError
-from pandion.parser import COULD_NOT_START, Parser
 
 _MAVPROXY: Final = """\
 definitions in {folder}
@@ -25,25 +28,30 @@ Wireshark and tshark load it when they start; messages are shown on UDP ports 14
 """
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DialectOptions:
+    """What to install or print."""
+
+    what: str = option(
+        "WHAT",
+        "install: for MAVProxy and pymavlink; wireshark: a plugin; xml: print the definition",
+        one_of("target", "install", "wireshark", "xml"),
+        required=True,
+    )
+    to: Path | None = option("--to DIR", "write there (default a directory of the user's)", Path)
+    path: bool = switch("--path", "with xml: print where the file is")
+
+
 def main(argv: list[str]) -> int:
     """Install or print; returns the exit code."""
-    parser = Parser("pandion dialect", "Teach other programs the private messages.")
-    parser.add_argument(
-        "what",
-        choices=("install", "wireshark", "xml"),
-        help="install: for MAVProxy and pymavlink; wireshark: a plugin; xml: print the definition",
-    )
-    parser.add_argument(
-        "--to", metavar="DIR", type=Path, help="write there (default a directory of the user's)"
-    )
-    parser.add_argument("--path", action="store_true", help="with xml: print where the file is")
-    arguments = parser.read(argv)
-    if arguments.what == "xml":
-        print(DEFINITION if arguments.path else DEFINITION.read_text(encoding="utf-8").rstrip())
+    what = "Teach other programs the private messages."
+    options = read(DialectOptions, "pandion dialect", what, argv)
+    if options.what == "xml":
+        print(DEFINITION if options.path else DEFINITION.read_text(encoding="utf-8").rstrip())
         return 0
-    install = {"install": _install, "wireshark": _wireshark}[arguments.what]
+    install = {"install": _install, "wireshark": _wireshark}[options.what]
     try:
-        print(install(arguments.to), end="")
+        print(install(options.to), end="")
     except (GenerationError, OSError) as error:
         print(f"pandion dialect: {_reason(error)}", file=sys.stderr)
         return COULD_NOT_START

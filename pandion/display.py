@@ -1,26 +1,32 @@
-"""What a flight looks like in the terminal: a bar where there is one, plain lines elsewhere."""
+"""Sentences, progress and the result of a flight: a bar on a terminal, plain lines elsewhere."""
 
 from __future__ import annotations
 
 import math
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, TextIO
 
 if TYPE_CHECKING:
-    from rich.progress import Progress, TaskID
-
-_PLAIN_STEPS = 10  # lines for a whole flight
+    from rich.progress import Progress
 
 
 class Display:
-    """Sentences, progress and the verdict, all to one stream."""
+    """Everything that a user sees of something long, on one stream."""
 
-    def __init__(self, stream: TextIO) -> None:
+    def __init__(self, stream: TextIO, *, lines: int = 10, threaded: bool = True) -> None:
+        """Draw nothing yet.
+
+        Args:
+            stream: Where to.
+            lines: How many report on one thing where there is no terminal.
+            threaded: Draw between steps too, from a thread, which would be measured with them.
+        """
         self._stream = stream
+        self._lines = lines
+        self._threaded = threaded
         self._bar: Progress | None = None
-        self._task: TaskID | None = None
-        self._duration_s = 1.0
-        self._told = 0
+        self._shown = ("", 0)
 
     def say(self, sentence: str) -> None:
         """Print one line, above the bar if there is one."""
@@ -29,49 +35,69 @@ class Display:
         else:
             print(sentence, file=self._stream, flush=True)
 
-    def flight(self, duration_s: float) -> AbstractContextManager[Any]:
-        """Show progress of a flight of this length while the context lasts."""
-        self._duration_s = duration_s
+    @contextmanager
+    def progress(self) -> Iterator[None]:
+        """Show a bar while the context lasts, if the stream is a terminal."""
         if not self._stream.isatty():
-            return nullcontext()
+            yield
+            return
+        from rich import progress
         from rich.console import Console
-        from rich.progress import BarColumn, Progress, TextColumn
 
-        self._bar = Progress(
-            TextColumn("{task.description}"),
-            BarColumn(),
-            TextColumn("{task.fields[state]}"),
+        bar = progress.Progress(
+            "{task.description}",
+            progress.BarColumn(),
+            "{task.fields[state]}",
+            progress.TimeRemainingColumn(),
             console=Console(file=self._stream),
             transient=True,
+            auto_refresh=self._threaded,
             refresh_per_second=4,
         )
-        self._task = self._bar.add_task(
-            "waiting", total=None if math.isinf(duration_s) else duration_s, state=""
-        )
-        return self._bar
+        with bar:
+            bar.add_task("waiting", total=None, state="")
+            self._bar = bar
+            try:
+                yield
+            finally:
+                self._bar = None
 
-    def progress(self, time_s: float, margin_m: float | None, real_time_factor: float) -> None:
-        """Move the bar, or print a line for every tenth of the flight."""
+    def report(self, what: str, done: float, total: float, state: str = "") -> None:
+        """Show how much of one thing is done, ``done`` of ``total`` [any unit]."""
+        counted, state = not state, state or f"{done} of {total}"
+        if self._bar is not None:
+            self._bar.update(
+                self._bar.task_ids[0],
+                description=what,
+                completed=done,
+                total=None if math.isinf(total) else total,
+                state=state,
+                refresh=not self._threaded,
+            )
+            return
+        shown = (what, int(self._lines * done / max(total, 1e-9)))
+        if shown != self._shown and (counted or shown[1] > 0):
+            self.say(f"{what} {state}")
+        self._shown = shown
+
+    def share(self, what: str, done: int, total: int) -> None:
+        """Show the share of one thing that is done, ``done`` of ``total``."""
+        self.report(what, done, total, f"{100 * done // max(total, 1)} %")
+
+    def flying(
+        self, time_s: float, duration_s: float, margin_m: float | None, real_time_factor: float
+    ) -> None:
+        """Show how far a flight is; ``real_time_factor`` [1]."""
+        if math.isinf(duration_s) and self._bar is None:
+            if not self._shown[0]:
+                self.say("flying until interrupted, by Ctrl-C or SIGINT")
+            self._shown = ("flying", 0)
+            return
         margin = "" if margin_m is None else f"  margin {1000.0 * margin_m:.0f} mm"
         state = f"{time_s:6.1f} s  ×{real_time_factor:.1f}{margin}"
-        if self._bar is not None and self._task is not None:
-            self._bar.update(self._task, completed=time_s, description="flying", state=state)
-            return
-        if math.isinf(self._duration_s):
-            if self._told == 0:
-                self._told = 1
-                self.say("flying until interrupted, by Ctrl-C or SIGINT")
-            return
-        tenth = int(_PLAIN_STEPS * time_s / self._duration_s)
-        if tenth > self._told:
-            self._told = tenth
-            self.say(f"flying {state}")
+        self.report("flying", time_s, duration_s, state)
 
-    def end(self) -> None:
-        """Leave the bar."""
-        self._bar = None
-
-    def verdict(self, result: dict[str, Any], rows: list[tuple[str, str]]) -> None:
+    def result(self, result: dict[str, Any], rows: list[tuple[str, str]]) -> None:
         """Print the table and PASS or FAIL."""
         from rich.console import Console
         from rich.table import Table

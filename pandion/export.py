@@ -5,11 +5,13 @@ from __future__ import annotations
 import contextlib
 import sys
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Protocol
 
-from pandion.parser import COULD_NOT_START, Parser
-from pandion.progress import Progress
+from command_line.options import OneOf, option, read
+from command_line.parser import COULD_NOT_START
+from pandion.display import Display
 
 if TYPE_CHECKING:
     from messages.ulog import Topic
@@ -17,8 +19,20 @@ if TYPE_CHECKING:
 
 DONE: Final = 0  # exit code
 
-_TOLD_RECORDS: Final = 5_000
-_TEXTS: Final = "texts"  # the channel of what the vehicle said
+_SHOWN_RECORDS: Final = 5_000
+_TEXTS: Final = "texts"  # the channel of status texts
+
+
+_TARGET: Final = OneOf(required=True)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ExportOptions:
+    """One export."""
+
+    log: Path = option("LOG", "flight.ulg, or its directory", Path, required=True)
+    csv: Path | None = option("--csv DIR", "one file a topic, into DIR", Path, one_of=_TARGET)
+    mcap: Path | None = option("--mcap FILE", "one file, messages as JSON", Path, one_of=_TARGET)
 
 
 class Sink(Protocol):
@@ -31,21 +45,17 @@ class Sink(Protocol):
 
 def main(argv: list[str]) -> int:
     """Export once; returns the exit code."""
-    parser = Parser("pandion export", "Write a flight log in another format.")
-    parser.add_argument("log", metavar="LOG", type=Path, help="flight.ulg, or its directory")
-    target = parser.add_mutually_exclusive_group(required=True)
-    target.add_argument("--csv", metavar="DIR", type=Path, help="one file a topic, into DIR")
-    target.add_argument("--mcap", metavar="FILE", type=Path, help="one file, messages as JSON")
-    read = parser.read(argv)
+    options = read(ExportOptions, "pandion export", "Write a flight log in another format.", argv)
     from messages.ulog_reader import UlogError, open_log
 
-    path: Path = read.log / "flight.ulg" if read.log.is_dir() else read.log
+    path: Path = options.log / "flight.ulg" if options.log.is_dir() else options.log
     try:
         log = open_log(path)
         with contextlib.ExitStack() as stack:
-            sink = _sink(read.csv, read.mcap, log, stack)
-            progress = stack.enter_context(Progress(sys.stdout, counted=False))
-            count = _export(log, sink, progress)
+            sink = _sink(options.csv, options.mcap, log, stack)
+            display = Display(sys.stdout, lines=0)
+            stack.enter_context(display.progress())
+            count = _export(log, sink, display)
         if count == 0:
             raise UlogError(f"{path} holds no record")
     except (UlogError, ValueError, OSError) as error:
@@ -57,7 +67,7 @@ def main(argv: list[str]) -> int:
             file=sys.stderr,
         )
         return COULD_NOT_START
-    print(f"{count} records of {path} in {read.csv or read.mcap}")
+    print(f"{count} records of {path} in {options.csv or options.mcap}")
     return DONE
 
 
@@ -73,13 +83,13 @@ def _sink(csv: Path | None, mcap: Path | None, log: UlogFile, stack: contextlib.
     return stack.enter_context(McapSink(mcap, facts))
 
 
-def _export(log: UlogFile, sink: Sink, progress: Progress) -> int:
+def _export(log: UlogFile, sink: Sink, display: Display) -> int:
     count = 0
     for topic, t_us, names, values in _rows(log):
         sink.add(topic, t_us, names, values)
         count += 1
-        if count % _TOLD_RECORDS == 0:
-            progress.report("exporting", log.at, log.size)
+        if count % _SHOWN_RECORDS == 0:
+            display.share("exporting", log.at, log.size)
     return count
 
 
@@ -91,9 +101,9 @@ def _rows(log: UlogFile) -> Iterator[tuple[str, int, tuple[str, ...], tuple[Any,
     known: dict[int, tuple[Topic, Any, tuple[str, ...]]] = {}
     pieces = ""
     for record in log.records():
-        said = ulog.said(record.kind, record.body)
-        if said is not None:
-            severity, t_us, text = said
+        reported = ulog.said(record.kind, record.body)
+        if reported is not None:
+            severity, t_us, text = reported
             yield _TEXTS, t_us, ("timestamp", "severity", "text"), (t_us, severity, text)
         if record.kind != ulog.DATA:
             continue

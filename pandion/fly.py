@@ -1,97 +1,147 @@
-"""``pandion fly``: start both halves, watch them, and give the verdict."""
+"""``pandion fly``: start both processes, watch them, and print the result."""
 
 from __future__ import annotations
 
 import json
 import math
 import sys
+from dataclasses import dataclass, fields
+from pathlib import Path
 
-from fsw.link.link_choice import NO_LINK
+from command_line.options import as_words, declared, group, json_file, read
+from command_line.parser import COULD_NOT_START
+from fsw.arguments import OUT, PARAMS, FswOptions
+from fsw.link.link_choice import NO_LINK, LinkChoice, addresses
 from fsw.link.udp_endpoint import LinkError, parse_address
+from fsw.log.run_directory import new_run_directory
+from fsw.parameters.control_choice import ControlChoice
 from pandion.display import Display
-from pandion.fly_options import FlyOptions, add_arguments
-from pandion.fly_options import options as fly_options
 from pandion.join_truth import join_truth
 from pandion.output import write_text
-from pandion.parser import COULD_NOT_START, Parser
 from pandion.processor import ANYWHERE, lockstep_places
-from pandion.result import Parts, as_json
-from pandion.supervisor import Flown, HalfFailed, Supervisor
-from pandion.verdict import rows
+from pandion.result import FlightReports, as_json, table_rows
+from pandion.supervisor import Flown, ProcessFailed, Supervisor
 from pandion.version import version
-from sitl.scenario_file import ScenarioError
+from sitl.arguments import RunOptions, SitlOptions
+from sitl.scenario_file import ScenarioError, load_scenario, scenario_digest
 
 COMPLETED, NOT_COMPLETED = 0, 1  # exit codes
+# The flight software compiles when it is started for the first time; the supervisor ends the wait
+# if it fails.
+_WAIT_S = 600.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FlyOptions(RunOptions):
+    """One flight, as asked for."""
+
+    control: ControlChoice = group(ControlChoice)
+    params: Path | None = declared(PARAMS)
+    links: LinkChoice = group(LinkChoice)
+    out: Path | None = declared(OUT)
+    json: str | None = json_file("the result")
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedFlight:
+    """One flight, checked as far as that goes before a process is started."""
+
+    options: FlyOptions
+    name: str  # of the scenario
+    digest: str  # of the scenario's file
+    duration_s: float
+    out: Path
 
 
 def main(argv: list[str]) -> int:
     """Fly once; returns the exit code."""
-    parser = Parser("pandion fly", "Fly a scenario and judge the flight.")
-    add_arguments(parser)
+    options = read(FlyOptions, "pandion fly", "Fly a scenario and judge the flight.", argv)
     try:
-        options = fly_options(parser.read(argv))
-    except (ValueError, ScenarioError, LinkError, OSError) as error:
+        flight = planned(options)
+    except (ScenarioError, LinkError, OSError) as error:
         print(f"pandion fly: {error}", file=sys.stderr)
         return COULD_NOT_START
     display = Display(sys.stderr if options.json == "-" else sys.stdout)
-    _banner(options, display)
+    _banner(flight, display)
     try:
         places = ANYWHERE if options.realtime else lockstep_places()
-        flown = Supervisor(display, options.out, places).fly(
-            _sitl_arguments(options), lambda port: _fsw_arguments(options, port)
+        flown = Supervisor(display, flight.out, places).run(
+            as_words(_sitl_options(flight)), lambda port: as_words(_fsw_options(flight, port))
         )
-    except HalfFailed as error:
+    except ProcessFailed as error:
         print(f"pandion fly: {error}", file=sys.stderr)
         return error.exit_code
-    return _judge(options, display, flown)
+    return _judge(flight, display, flown)
 
 
-def _banner(options: FlyOptions, display: Display) -> None:
+def planned(options: FlyOptions) -> PlannedFlight:
+    """Check everything that can be checked before a process is started.
+
+    Raises:
+        ScenarioError: There is no such scenario.
+        LinkError: An address of a link is none.
+        OSError: The directory for the logs cannot be made.
+    """
+    scenario = load_scenario(options.scenario)
+    addresses(options.links)
+    if options.realtime and options.speed not in (None, 1.0):
+        raise ScenarioError("--realtime flies at speed 1; --speed needs --lockstep")
+    return PlannedFlight(
+        options=options,
+        name=scenario.name,
+        digest=scenario_digest(options.scenario),
+        duration_s=scenario.duration_s if options.duration_s is None else options.duration_s,
+        out=_directory(options.out, f"{scenario.name}-seed{options.seed}"),
+    )
+
+
+def _directory(wanted: Path | None, stem: str) -> Path:
+    if wanted is None:
+        return new_run_directory(Path("runs"), stem)
+    wanted.mkdir(parents=True, exist_ok=True)
+    if any((wanted / name).exists() for name in ("result.json", "flight.tlog", "flight.ulg")):
+        raise FileExistsError(f"{wanted} already holds a flight; name another --out")
+    return wanted
+
+
+def _banner(flight: PlannedFlight, display: Display) -> None:
+    options = flight.options
     pacing = "real time" if options.realtime else "lockstep"
-    endless = math.isinf(options.duration_s)
-    length = "until interrupted" if endless else f"{options.duration_s:g} s"
+    endless = math.isinf(flight.duration_s)
+    length = "until interrupted" if endless else f"{flight.duration_s:g} s"
     display.say(
-        f"Pandion {version()}: {options.scenario_name}, seed {options.seed}, "
+        f"Pandion {version()}: {flight.name}, seed {options.seed}, "
         f"{length}, {options.control.controller} controller, {pacing}"
     )
     port = parse_address(options.links.gcs)[1]
     display.say(f"telemetry to {options.links.gcs}: QGroundControl connects on UDP {port}")
     if options.links.api != NO_LINK:
         display.say(f"programs (MAVSDK) find the vehicle at {options.links.api}")
-    display.say(f"logs in {options.out}")
+    display.say(f"logs in {flight.out}")
 
 
-def _sitl_arguments(options: FlyOptions) -> list[str]:
-    return [
-        options.scenario,
-        "--listen=udp:127.0.0.1:0",
-        f"--seed={options.seed}",
-        *([] if math.isinf(options.duration_s) else [f"--duration={options.duration_s!r}"]),
-        "--realtime" if options.realtime else "--lockstep",
-        f"--speed={'max' if options.speed is None else repr(options.speed)}",
-        # The flight software compiles when it is started for the first time; the supervisor
-        # ends the wait if it fails.
-        "--wait=600",
-        f"--out={options.out}",
-    ]
+def _sitl_options(flight: PlannedFlight) -> SitlOptions:
+    common = {field.name: getattr(flight.options, field.name) for field in fields(RunOptions)}
+    return SitlOptions(**common, listen="udp:127.0.0.1:0", wait_s=_WAIT_S, out=flight.out)
 
 
-def _fsw_arguments(options: FlyOptions, port: int) -> list[str]:
-    return [
-        f"--sim=udp:127.0.0.1:{port}",
-        *options.links.as_arguments(),
-        *options.control.as_arguments(),
-        *([] if options.params is None else [f"--params={options.params}"]),
-        f"--out={options.out}",
-        "--wait=600",
-        f"--scenario={options.scenario_name}",
-        f"--scenario-digest={options.scenario_digest}",
-        f"--seed={options.seed}",
-    ]
+def _fsw_options(flight: PlannedFlight, port: int) -> FswOptions:
+    options = flight.options
+    return FswOptions(
+        sim=f"udp:127.0.0.1:{port}",
+        links=options.links,
+        control=options.control,
+        params=options.params,
+        out=flight.out,
+        wait_s=_WAIT_S,
+        scenario=flight.name,
+        scenario_digest=flight.digest,
+        seed=options.seed,
+    )
 
 
-def _judge(options: FlyOptions, display: Display, flown: Flown) -> int:
-    out = options.out
+def _judge(flight: PlannedFlight, display: Display, flown: Flown) -> int:
+    options, out = flight.options, flight.out
     names = {
         "ulog": "flight.ulg",
         "truth": "truth.ulg",
@@ -103,8 +153,8 @@ def _judge(options: FlyOptions, display: Display, flown: Flown) -> int:
         "fsw_log": "fsw.log",
     }
     join_truth(out, flown.fsw)
-    parts = Parts(
-        scenario=options.scenario_name,
+    reports = FlightReports(
+        scenario=flight.name,
         seed=options.seed,
         controller=options.control.controller,
         sitl=flown.sitl,
@@ -117,10 +167,10 @@ def _judge(options: FlyOptions, display: Display, flown: Flown) -> int:
             if name == "result.json" or (out / name).exists()
         },
     )
-    result = as_json(parts)
+    result = as_json(reports)
     text = json.dumps(result, indent=2) + "\n"
     lost = _write(str(out / "result.json"), text)
-    display.verdict(result, rows(result, (flown.sitl or {}).get("tracking_error_max_m")))
+    display.result(result, table_rows(result, (flown.sitl or {}).get("tracking_error_max_m")))
     unwritten = [*flown.unwritten, *lost, *_write(options.json, text)]
     if unwritten:
         print(f"pandion fly: results could not be written: {'; '.join(unwritten)}", file=sys.stderr)

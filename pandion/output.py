@@ -2,24 +2,9 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
 from pathlib import Path
 from typing import TextIO
-
-
-def json_target(text: str) -> str:
-    """The value of ``--json``, for argparse: a file that can be made, or ``-``."""
-    if text != "-" and not Path(text).parent.is_dir():
-        raise argparse.ArgumentTypeError(f"no directory for {text}")
-    return text
-
-
-def add_json_option(parser: argparse.ArgumentParser, what: str) -> None:
-    """Add ``--json FILE``, to which a verb writes ``what``."""
-    parser.add_argument(
-        "--json", metavar="FILE", type=json_target, help=f"write {what}; - for standard output"
-    )
 
 
 def console_beside(target: str | None) -> TextIO:

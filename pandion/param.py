@@ -2,34 +2,68 @@
 
 from __future__ import annotations
 
-import argparse
 import fnmatch
 import json
 import sys
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Protocol
+from typing import Any, Final, Protocol
 
+from command_line.options import OneOf, option, read, switch
+from command_line.parser import COULD_NOT_START, unknown_name
 from fsw.link.udp_endpoint import LinkError, parse_address
-from pandion.parser import COULD_NOT_START, Parser, unknown_name
-
-if TYPE_CHECKING:
-    pass
 
 DONE, REFUSED = 0, 1  # exit codes
+_WHERE: Final = OneOf()
 
-HELP: Final = """\
-usage: pandion param ACTION [arguments] [--vehicle udp:HOST:PORT | --file FILE]
 
-actions:
-  list [PATTERN]        show parameters, * and ? stand for anything
-  get NAME ...          show these
-  set NAME VALUE        change one
-  import FILE           take over every value of a .params or .parm file
-  export FILE           write all of them; .parm is MAVProxy's format, else QGroundControl's
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Where:
+    """Whose parameters."""
 
-`pandion param ACTION --help` prints the options of an action.
-"""
+    vehicle: str = option(
+        "--vehicle udp:HOST:PORT",
+        "address on which the vehicle listens",
+        default="udp:127.0.0.1:14580",
+        one_of=_WHERE,
+    )
+    file: Path | None = option("--file FILE", "a parameter file, instead", Path, one_of=_WHERE)
+
+
+def _as_json() -> Any:
+    return switch("--json", "for programs, with all that is known")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _List(_Where):
+    pattern: str = option("PATTERN", "of names", default="*")
+    changed: bool = switch("--changed", "only what is not the default")
+    json: bool = _as_json()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Get(_Where):
+    names: list[str] = option("NAME ...", "of a parameter", required=True)
+    json: bool = _as_json()
+
+
+def _value(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise ValueError(f"{text!r} is not a number") from None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Set(_Where):
+    name: str = option("NAME", "of the parameter", required=True)
+    value: float = option("VALUE", "in the parameter's unit", _value, required=True)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _File(_Where):
+    path: Path = option("FILE", ".params or .parm", Path, required=True)
 
 
 class Values(Protocol):
@@ -40,7 +74,7 @@ class Values(Protocol):
         ...
 
     def write(self, name: str, value: float) -> None:
-        """Change one value."""
+        """Change one parameter to ``value`` [the parameter's unit]."""
         ...
 
 
@@ -58,24 +92,24 @@ class FileValues:
         return {parameter.name: parameter.default for parameter in PARAMETERS} | self._kept()
 
     def write(self, name: str, value: float) -> None:
-        """Change one value in the file.
+        """Change one parameter in the file to ``value`` [the parameter's unit].
 
         Raises:
-            Refused: It is out of range or contradicts the others.
+            ParameterRefused: It is out of range or contradicts the others.
         """
         from fsw.parameters.flight_config import FlightConfig
-        from fsw.parameters.real32 import nearest_decimal
+        from fsw.parameters.float32 import nearest_decimal
         from fsw.parameters.registry import BY_NAME
         from fsw.parameters.storage import save
         from fsw.tuning import tuned
-        from pandion.param_vehicle import Refused
+        from pandion.param_vehicle import ParameterRefused
 
         parameter = BY_NAME.get(name)
         if parameter is None:
-            raise Refused(unknown_name("parameter", name, BY_NAME))
+            raise ParameterRefused(unknown_name("parameter", name, BY_NAME))
         refusal = parameter.refusal(value)
         if refusal is not None:
-            raise Refused(refusal)
+            raise ParameterRefused(refusal)
         kept = self._kept() | {name: nearest_decimal(value)}
         try:
             tuned(
@@ -83,7 +117,7 @@ class FileValues:
                 tuple((BY_NAME[n].path, v * BY_NAME[n].scale) for n, v in kept.items()),
             )
         except ValueError as error:
-            raise Refused(f"{name} is left as it is: {error}") from None
+            raise ParameterRefused(f"{name} is left as it is: {error}") from None
         save(self._path, kept)
 
     def _kept(self) -> dict[str, float]:
@@ -95,24 +129,25 @@ class FileValues:
 def main(argv: list[str]) -> int:
     """Do one thing with parameters; returns the exit code."""
     if not argv or argv[0] in ("-h", "--help"):
-        print(HELP, end="")
+        print(_help())
         return DONE
     action = ACTIONS.get(argv[0])
     if action is None:
         print(f"pandion param: {unknown_name('action', argv[0], ACTIONS)}", file=sys.stderr)
         return COULD_NOT_START
-    arguments = _parser(argv[0]).read(argv[1:])
-    from pandion.param_vehicle import NoAnswer, ParameterClient, Refused
+    kind, act, what = action
+    options = read(kind, f"pandion param {argv[0]}", what, argv[1:])
+    from pandion.param_vehicle import NoAnswer, ParameterClient, ParameterRefused
 
     try:
-        if arguments.file is not None:
-            return action(arguments, FileValues(arguments.file))
-        with ParameterClient(parse_address(arguments.vehicle)) as vehicle:
-            return action(arguments, vehicle)
+        if options.file is not None:
+            return act(options, FileValues(options.file))
+        with ParameterClient(parse_address(options.vehicle)) as vehicle:
+            return act(options, vehicle)
     except (LinkError, NoAnswer, OSError) as error:
         print(f"pandion param: {error}", file=sys.stderr)
         return COULD_NOT_START
-    except Refused as error:
+    except ParameterRefused as error:
         print(f"pandion param: {error}", file=sys.stderr)
         return REFUSED
     except KeyboardInterrupt:
@@ -120,67 +155,40 @@ def main(argv: list[str]) -> int:
         return REFUSED
 
 
-def _parser(action: str) -> Parser:
-    parser = Parser(f"pandion param {action}", "Parameters of a running vehicle or in a file.")
-    if action == "list":
-        parser.add_argument("pattern", metavar="PATTERN", nargs="?", default="*", help="of names")
-        parser.add_argument("--changed", action="store_true", help="only what is not the default")
-    elif action == "get":
-        parser.add_argument("names", metavar="NAME", nargs="+", help="of a parameter")
-    elif action == "set":
-        parser.add_argument("name", metavar="NAME", help="of the parameter")
-        parser.add_argument("value", metavar="VALUE", type=float, help="in the parameter's unit")
-    else:
-        parser.add_argument("path", metavar="FILE", type=Path, help=".params or .parm")
-    if action in ("list", "get"):
-        parser.add_argument(
-            "--json", action="store_true", help="for programs, with all that is known"
-        )
-    where = parser.add_mutually_exclusive_group()
-    where.add_argument(
-        "--vehicle",
-        metavar="udp:HOST:PORT",
-        default="udp:127.0.0.1:14580",
-        help="where the vehicle listens (default %(default)s)",
-    )
-    where.add_argument("--file", metavar="FILE", type=Path, help="a parameter file, instead")
-    return parser
-
-
-def _list(arguments: argparse.Namespace, values: Values) -> int:
+def _list(options: _List, values: Values) -> int:
     from fsw.parameters.registry import BY_NAME
 
     shown = {
         name: value
         for name, value in sorted(values.read_all().items())
-        if fnmatch.fnmatchcase(name, arguments.pattern.upper())
-        and not (arguments.changed and name in BY_NAME and value == BY_NAME[name].default)
+        if fnmatch.fnmatchcase(name, options.pattern.upper())
+        and not (options.changed and name in BY_NAME and value == BY_NAME[name].default)
     }
-    _show(shown, as_json=arguments.json)
+    _show(shown, as_json=options.json)
     return DONE
 
 
-def _get(arguments: argparse.Namespace, values: Values) -> int:
-    from pandion.param_vehicle import Refused
+def _get(options: _Get, values: Values) -> int:
+    from pandion.param_vehicle import ParameterRefused
 
     known = values.read_all()
-    for name in arguments.names:
+    for name in options.names:
         if name not in known:
-            raise Refused(unknown_name("parameter", name, known))
-    _show({name: known[name] for name in arguments.names}, as_json=arguments.json)
+            raise ParameterRefused(unknown_name("parameter", name, known))
+    _show({name: known[name] for name in options.names}, as_json=options.json)
     return DONE
 
 
-def _set(arguments: argparse.Namespace, values: Values) -> int:
-    values.write(arguments.name, arguments.value)
-    print(f"{arguments.name} is {_number(arguments.value)}")
+def _set(options: _Set, values: Values) -> int:
+    values.write(options.name, options.value)
+    print(f"{options.name} is {_number(options.value)}")
     return DONE
 
 
-def _import(arguments: argparse.Namespace, values: Values) -> int:
-    from pandion.param_vehicle import Refused
+def _import(options: _File, values: Values) -> int:
+    from pandion.param_vehicle import ParameterRefused
 
-    wanted, held = _read_file(arguments.path), values.read_all()
+    wanted, held = _read_file(options.path), values.read_all()
     changed = refused = 0
     for name, value in wanted.items():
         if held.get(name) == value:
@@ -188,24 +196,24 @@ def _import(arguments: argparse.Namespace, values: Values) -> int:
         try:
             values.write(name, value)
             changed += 1
-        except Refused as error:
+        except ParameterRefused as error:
             print(f"pandion param: {error}", file=sys.stderr)
             refused += 1
     print(f"{len(wanted)} parameters read, {changed} changed, {refused} refused")
     return REFUSED if refused else DONE
 
 
-def _export(arguments: argparse.Namespace, values: Values) -> int:
+def _export(options: _File, values: Values) -> int:
     from fsw.parameters.storage import save
 
     known = values.read_all()
-    save(arguments.path, known)
-    print(f"{len(known)} parameters written to {arguments.path}")
+    save(options.path, known)
+    print(f"{len(known)} parameters written to {options.path}")
     return DONE
 
 
 def _read_file(path: Path) -> dict[str, float]:
-    """The values of a file; what is of no use in it is said on standard error."""
+    """The values of a file; unusable lines are reported on standard error."""
     from fsw.parameters.storage import load
 
     loaded = load(path)
@@ -229,38 +237,45 @@ def _described(name: str, value: float) -> dict[str, Any]:
     from fsw.parameters.facts import FACT_BY_NAME, GROUP
     from fsw.parameters.registry import BY_NAME
 
-    parameter, fact = BY_NAME.get(name), FACT_BY_NAME.get(name)
-    if fact is not None:
-        told = {
-            "unit": fact.unit,
-            "group": GROUP,
-            "meaning": f"{fact.label}: {fact.meaning} (read only)",
+    entry: dict[str, Any] = {"name": name, "value": value}
+    if (fact := FACT_BY_NAME.get(name)) is not None:
+        meaning = f"{fact.label}: {fact.meaning} (read only)"
+        entry |= {"unit": fact.unit, "group": GROUP, "meaning": meaning}
+    elif (parameter := BY_NAME.get(name)) is not None:
+        entry |= {
+            "default": parameter.default,
+            "unit": parameter.unit,
+            "min": parameter.least,
+            "max": parameter.most,
+            "group": parameter.group,
+            "meaning": parameter.meaning,
         }
-        return {"name": name, "value": value, **told}
-    if parameter is None:  # of a vehicle with another version
-        return {"name": name, "value": value}
-    return {
-        "name": name,
-        "value": value,
-        "default": parameter.default,
-        "unit": parameter.unit,
-        "min": parameter.least,
-        "max": parameter.most,
-        "group": parameter.group,
-        "meaning": parameter.meaning,
-    }
+    return entry  # bare if it is of a vehicle with another version
 
 
 def _number(value: float) -> str:
-    from fsw.parameters.real32 import as_text
+    from fsw.parameters.float32 import as_text
 
     return as_text(value)
 
 
-ACTIONS: Final[dict[str, Callable[[argparse.Namespace, Values], int]]] = {
-    "list": _list,
-    "get": _get,
-    "set": _set,
-    "import": _import,
-    "export": _export,
+ACTIONS: Final[dict[str, tuple[type[_Where], Callable[[Any, Values], int], str]]] = {
+    "list": (_List, _list, "Show parameters; in PATTERN * and ? stand for anything."),
+    "get": (_Get, _get, "Show parameters by name."),
+    "set": (_Set, _set, "Change one parameter."),
+    "import": (_File, _import, "Take over every value of a .params or .parm file."),
+    "export": (
+        _File,
+        _export,
+        "Write all parameters; .parm is MAVProxy's format, anything else QGroundControl's.",
+    ),
 }
+
+
+def _help() -> str:
+    rows = (f"  {name:8}{what}" for name, (_, _, what) in ACTIONS.items())
+    return "\n".join(
+        ("usage: pandion param ACTION [options] [--vehicle udp:HOST:PORT | --file FILE]", "")
+        + ("Parameters of a running vehicle or in a file.", "", "actions:", *rows, "")
+        + ("`pandion param ACTION --help` prints the options of an action.",)
+    )

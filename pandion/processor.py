@@ -1,9 +1,9 @@
-"""Which processors two halves in lockstep should run on.
+"""Which processors the two processes of a flight in lockstep should run on.
 
-In lockstep the halves take turns. On two processors each keeps its caches, and the one that waits
-looks for the datagram instead of sleeping (``messages/eager.py``). On one, the kernel switches from
-one to the other, which is slower (docs/decisions/0017). But looking is of use only while the other
-half runs: on a machine that has more to do, both on the quietest processor is what disturbs least.
+In lockstep the two take turns. On two processors each keeps its caches, and the one that waits
+polls for the datagram instead of sleeping (``messages/busy_poll.py``). On one, the kernel switches
+from one to the other, which is slower (docs/decisions/0017). But polling is of use only while the
+other one runs: on a busy machine, both on the quietest processor disturb least.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 _GLANCE_S: Final = 0.05
-_IDLE: Final = 0.7  # share of a processor's time that must be nobody's
+_IDLE: Final = 0.7  # share of a processor's time that must be unused
 
 
 class Places(NamedTuple):
-    """A processor for each half; None: wherever the system likes."""
+    """A processor for each process; None: wherever the system likes."""
 
     sitl: int | None = None
     fsw: int | None = None

@@ -10,10 +10,11 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from command_line.options import json_file, option, read, switch
+from command_line.parser import COULD_NOT_START
 from fsw.signals import Origin
-from pandion.output import add_json_option, console_beside, write_text
-from pandion.parser import COULD_NOT_START, Parser
-from pandion.progress import Progress
+from pandion.display import Display
+from pandion.output import console_beside, write_text
 
 if TYPE_CHECKING:
     from fsw.runtime.program import FlightProgram
@@ -25,27 +26,21 @@ SAME, DIFFERS = 0, 1  # exit codes
 _NOTES_SHOWN = 5
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ReplayOptions:
     """One replay."""
 
-    log: Path
-    verify: bool
-    json: str | None
+    log: Path = option("LOG", "flight.ulg, or its directory", Path, required=True)
+    verify: bool = switch(
+        "--verify", "feed the inputs through the same tick; exit code 1 at the first difference"
+    )
+    json: str | None = json_file("the result")
 
 
 def main(argv: list[str]) -> int:
     """Read a log, and compare if asked; returns the exit code."""
-    parser = Parser("pandion replay", "Show what a flight log holds, or fly its inputs again.")
-    parser.add_argument("log", metavar="LOG", type=Path, help="flight.ulg, or its directory")
-    parser.add_argument(
-        "--verify",
-        action="store_true",
-        help="feed the inputs through the same tick; exit code 1 at the first difference",
-    )
-    add_json_option(parser, "the result")
-    read = parser.read(argv)
-    options = ReplayOptions(read.log, read.verify, read.json)
+    what = "Show what a flight log holds, or fly its inputs again."
+    options = read(ReplayOptions, "pandion replay", what, argv)
     from fsw.log.reader import open_flight
     from messages.ulog_reader import UlogError
 
@@ -67,8 +62,9 @@ def _verify(options: ReplayOptions, log: UlogFile) -> int:
         print(f"note: {note}", file=console)
     if len(notes) > _NOTES_SHOWN:
         print(f"note: {len(notes) - _NOTES_SHOWN} more numbers differ", file=console)
-    with Progress(console, counted=False) as progress:
-        found = replay(log, program, partial(progress.report, "replaying"))
+    display = Display(console, lines=0)
+    with display.progress():
+        found = replay(log, program, partial(display.share, "replaying"))
     same = found.difference is None and not found.lost_ms
     print(_sentence(found, log), file=console)
     figures = {"log": str(log.path), "same": same, **dataclasses.asdict(found)}
@@ -79,18 +75,12 @@ def _verify(options: ReplayOptions, log: UlogFile) -> int:
 
 def _program(log: UlogFile) -> FlightProgram[Any]:
     """The flight software of this build, configured by the names in the log."""
-    from fsw.parameters.control_choice import ControlChoice
+    from fsw.parameters.control_choice import choice_of
     from fsw.runtime.assembly import flight_software
     from fsw.runtime.replay import fact
 
     return flight_software(
-        ControlChoice(
-            controller=fact(log, "controller"),
-            inner=fact(log, "inner"),
-            robustness=fact(log, "robustness"),
-            solver=fact(log, "solver"),
-            soft=fact(log, "soft") != "0",
-        ),
+        choice_of(partial(fact, log)),
         origin=_origin(log),
         to_plan=False,
     )
@@ -129,8 +119,9 @@ def _summarise(options: ReplayOptions, log: UlogFile) -> int:
     from pandion.log_summary import summary
 
     console = console_beside(options.json)
-    with Progress(console, counted=False) as progress:
-        result = summary(log, partial(progress.report, "reading"))
+    display = Display(console, lines=0)
+    with display.progress():
+        result = summary(log, partial(display.share, "reading"))
     for name, value in result.items():
         if name not in ("topics", "texts"):
             print(f"{name:15} {value}", file=console)

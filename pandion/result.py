@@ -1,4 +1,4 @@
-"""The result of a flight out of both halves' parts, as JSON and as a verdict."""
+"""The result of a flight from the reports of both processes, as JSON and as a table."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _NOTHING: dict[str, float] = {"sum": 0.0, "mean": 0.0}
 
 
 @dataclass(frozen=True, slots=True)
-class Parts:
+class FlightReports:
     """What there is to judge after a flight."""
 
     scenario: str
@@ -30,24 +30,24 @@ class Parts:
     controller: str
     sitl: dict[str, Any] | None  # sitl's result; None if it did not get to write one
     fsw: dict[str, Any] | None  # fsw.json
-    failure: str | None  # what a half reported as an error
+    failure: str | None  # what a process reported as an error
     logs: dict[str, Path]
-    aftermath: str | None = None  # what went wrong when the halves were to end
+    aftermath: str | None = None  # what went wrong after the flight
 
 
-def as_json(parts: Parts) -> dict[str, Any]:
+def as_json(reports: FlightReports) -> dict[str, Any]:
     """The result with the keys that `docs/` promises, and no others."""
-    truth, vehicle = parts.sitl or {}, parts.fsw or {}
+    truth, vehicle = reports.sitl or {}, reports.fsw or {}
     mpc, inner = vehicle.get("mpc", {}), vehicle.get("inner", {})
     return {
-        "scenario": parts.scenario,
-        "controller": parts.controller,
-        "seed": parts.seed,
+        "scenario": reports.scenario,
+        "controller": reports.controller,
+        "seed": reports.seed,
         "duration_s": truth.get("duration_s", 0.0),
         "completed": bool(truth.get("completed"))
-        and parts.failure is None
-        and parts.aftermath is None,
-        "end_reason": _end_reason(parts),
+        and reports.failure is None
+        and reports.aftermath is None,
+        "end_reason": _end_reason(reports),
         "tracking_error_rms_m": truth.get("tracking_error_rms_m"),
         "control_effort": vehicle.get("control_effort", _NOTHING),
         "control_smoothness": vehicle.get("control_smoothness", _NOTHING),
@@ -56,11 +56,54 @@ def as_json(parts: Parts) -> dict[str, Any]:
         "mpc": {key: mpc.get(key) for key in _MPC_KEYS},
         "inner": {key: inner.get(key) for key in _INNER_KEYS},
         "real_time_factor": truth.get("real_time_factor", 0.0),
-        "logs": {name: str(path) for name, path in parts.logs.items()},
+        "logs": {name: str(path) for name, path in reports.logs.items()},
     }
 
 
-def _end_reason(parts: Parts) -> str:
-    seen = parts.sitl.get("end_reason") if parts.sitl is not None else None
-    reasons = [reason for reason in (parts.failure, seen, parts.aftermath) if reason]
+def _end_reason(reports: FlightReports) -> str:
+    seen = reports.sitl.get("end_reason") if reports.sitl is not None else None
+    reasons = [reason for reason in (reports.failure, seen, reports.aftermath) if reason]
     return "; ".join(reasons) or "the simulator ended without a result"
+
+
+Rows = list[tuple[str, str]]
+
+
+def table_rows(result: dict[str, Any], tracking_max_m: float | None) -> Rows:
+    """What a flight comes down to, as text.
+
+    Args:
+        result: From :func:`pandion.result.as_json`.
+        tracking_max_m: Largest tracking error [m], which the JSON does not carry.
+    """
+    return [
+        ("flown", f"{result['duration_s']:.1f} s"),
+        *[(f"margin {name}", _mm(value)) for name, value in result["margins_m"].items()],
+        ("minimum margin", _mm(result["min_margin_m"])),
+        ("tracking RMS / max", f"{_mm(result['tracking_error_rms_m'])} / {_mm(tracking_max_m)}"),
+        ("control effort, sum / mean", _sum_and_mean(result["control_effort"])),
+        ("control smoothness, sum / mean", _sum_and_mean(result["control_smoothness"])),
+        *_timing_rows(result["mpc"], result["inner"]),
+        ("real-time factor", f"{result['real_time_factor']:.1f}"),
+    ]
+
+
+def _timing_rows(mpc: dict[str, Any], inner: dict[str, Any]) -> Rows:
+    if mpc["p50_us"] is None or inner["p50_us"] is None:
+        return [("flight software", "no timing")]
+    times = (mpc["p50_us"], mpc["p99_us"], mpc["max_us"])
+    return [
+        ("MPC p50 / p99 / max", " / ".join(f"{time / 1000.0:.2f}" for time in times) + " ms"),
+        ("MPC missed deadlines", str(mpc["missed_deadlines"])),
+        ("MPC fallbacks", str(mpc["fallbacks"])),
+        ("tick p50 / p99", f"{inner['p50_us']:.0f} / {inner['p99_us']:.0f} us"),
+        ("ticks late", f"{100.0 * inner['late_share']:.2f} %"),
+    ]
+
+
+def _mm(value: float | None) -> str:
+    return "none" if value is None else f"{1000.0 * value:.1f} mm"
+
+
+def _sum_and_mean(value: dict[str, float]) -> str:
+    return f"{value['sum']:.1f} / {value['mean']:.3f}"

@@ -2,22 +2,16 @@
 
 from __future__ import annotations
 
-import argparse
 import os
 import sys
 
-from sitl import arguments
+from command_line.options import read
+from sitl.arguments import SitlOptions
 
 
-def main(argv: list[str] | None = None) -> int:
+def main(argv: list[str] | None = None, prog: str = "sitl") -> int:
     """Simulate one flight; returns the exit code."""
-    parser = argparse.ArgumentParser(prog="sitl", description="The simulator.", allow_abbrev=False)
-    arguments.add_arguments(parser)
-    return run(arguments.options(parser.parse_args(argv)))
-
-
-def run(options: arguments.SitlOptions) -> int:
-    """Simulate with parsed options; returns the exit code."""
+    options = read(SitlOptions, prog, "Run the simulator alone.", argv)
     # One thread for BLAS, before NumPy reads it: the other core is the flight software's.
     os.environ["OPENBLAS_NUM_THREADS"] = "1"
     from sitl import app

@@ -5,12 +5,11 @@ from __future__ import annotations
 import dataclasses
 import signal
 import traceback
-from pathlib import Path
 from types import FrameType
 
 from sitl.arguments import SitlOptions
 from sitl.events import Events, JsonEvents, TextEvents
-from sitl.link.udp_endpoint import RESEND_S, LinkError, UdpEndpoint, parse_address
+from sitl.link.udp_endpoint import RESEND_S, LinkError, PeerSocket, parse_address
 from sitl.scenario import Scenario
 from sitl.scenario_file import ScenarioError, load_scenario
 
@@ -38,47 +37,47 @@ class StopRequest:
 
 def run(options: SitlOptions) -> int:
     """Simulate one flight; returns the exit code."""
-    told: Events = JsonEvents() if options.events == "json" else TextEvents(options.json == "-")
+    events: Events = JsonEvents() if options.events == "json" else TextEvents(options.json == "-")
     try:
-        return _run(options, told)
+        return _run(options, events)
     except (CouldNotStart, LinkError, ScenarioError) as error:
-        told.report("error", f"sitl: {error}")
+        events.report("error", f"sitl: {error}")
         return COULD_NOT_START
     except KeyboardInterrupt:
-        told.report("error", "sitl: interrupted before the flight began")
+        events.report("error", "sitl: interrupted before the flight began")
         return NOT_COMPLETED
     except BrokenPipeError:
-        return NOT_COMPLETED  # whoever read the events is gone
+        return NOT_COMPLETED  # the reader of the events is gone
     except Exception as error:
         traceback.print_exc()
-        told.report("error", f"sitl: internal error, {type(error).__name__}: {error}")
+        events.report("error", f"sitl: internal error, {type(error).__name__}: {error}")
         return NOT_COMPLETED
 
 
-def _run(options: SitlOptions, told: Events) -> int:
+def _run(options: SitlOptions, events: Events) -> int:
     if options.realtime and options.speed not in (None, 1.0):
         raise CouldNotStart("--realtime flies at speed 1; --speed needs --lockstep")
     scenario = _scenario(options)
     _check_outputs(options)
-    endpoint = UdpEndpoint(parse_address(options.listen), RESEND_S)
+    endpoint = PeerSocket.bound(parse_address(options.listen, any_port=True), RESEND_S)
     try:
         host, port = endpoint.address
         sentence = f"sitl: {scenario.name}, seed {options.seed}, on udp:{host}:{port}"
-        told.report("listening", sentence, host=host, port=port, duration_s=scenario.duration_s)
+        events.report("listening", sentence, host=host, port=port, duration_s=scenario.duration_s)
         # NumPy and numba take a second to load; the flight software can start meanwhile.
         from sitl.flight import Flight
 
-        flight = Flight(options, scenario, endpoint, told)
+        flight = Flight(options, scenario, endpoint, events)
         stop = StopRequest()
         stop.listen()
-        told.report("ready", "sitl: ready, waiting for the flight software")
+        events.report("ready", "sitl: ready, waiting for the flight software")
         if flight.wait_for_vehicle(stop):
             return flight.fly(stop)
         if not stop.requested:
             raise CouldNotStart(
                 f"no flight software spoke to udp:{host}:{port} within {options.wait_s:g} s"
             )
-        told.report("error", "sitl: interrupted before the flight began")
+        events.report("error", "sitl: interrupted before the flight began")
         return NOT_COMPLETED
     finally:
         endpoint.close()
@@ -98,5 +97,3 @@ def _check_outputs(options: SitlOptions) -> None:
             options.out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise CouldNotStart(f"cannot write to {options.out}: {error.strerror}") from None
-    if options.json not in (None, "-") and not Path(str(options.json)).parent.is_dir():
-        raise CouldNotStart(f"cannot write {options.json}: its directory does not exist")

@@ -53,8 +53,8 @@ def kernel(function: Callable[P, R]) -> Callable[P, R]:
 def machine_code(function: Callable[P, R], *example: Any) -> Callable[P, R]:
     """The machine code of a compiled function for arguments of the types of an example.
 
-    Called directly it is spared numba's look at the types of all arguments; whoever calls it
-    answers for them. The function is called once.
+    Called directly it is spared numba's look at the types of all arguments; the caller
+    must pass the right ones. The function is called once.
     """
     dispatcher = cast(Any, function)
     dispatcher(*example)

@@ -11,7 +11,7 @@ class Events(Protocol):
     """Where the life of the process is reported."""
 
     def report(self, event: str, sentence: str, **details: object) -> None:
-        """Tell one thing that happened.
+        """Report one event.
 
         Args:
             event: Its name, for programs.

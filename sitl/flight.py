@@ -17,12 +17,12 @@ from sitl.link.encode import StepEncoder
 from sitl.link.exchange import Exchange, ExchangeCounts, Lockstep, RealTime, Stop
 from sitl.link.pilot import flight_plan
 from sitl.link.server import RunTiming, fly, shut_down, wait_for_vehicle
-from sitl.link.udp_endpoint import UdpEndpoint
+from sitl.link.udp_endpoint import PeerSocket
+from sitl.result import EndKind, TruthResult
 from sitl.scenario import Scenario
 from sitl.simulation import START_US, STEP_US, Controls, Simulation
 from sitl.trajectory import TrajectoryPoint
 from sitl.truth_log import TruthLog
-from sitl.verdict import EndKind, TruthResult
 
 COMPLETED, NOT_COMPLETED, COULD_NOT_START = 0, 1, 2  # exit codes
 
@@ -33,7 +33,7 @@ class Flight:
     """Everything of one run, ready to meet the vehicle."""
 
     def __init__(
-        self, options: SitlOptions, scenario: Scenario, endpoint: UdpEndpoint, told: Events
+        self, options: SitlOptions, scenario: Scenario, endpoint: PeerSocket, events: Events
     ) -> None:
         """Build the plant and compile it.
 
@@ -42,18 +42,18 @@ class Flight:
         """
         self._options = options
         self._endpoint = endpoint
-        self._told = told
+        self._events = events
         self._simulation = Simulation(scenario, options.seed)
         _rehearse(Simulation(scenario, options.seed))
 
     def wait_for_vehicle(self, stop: Stop) -> bool:
-        """Wait as long as the options allow; False if nobody came."""
+        """Wait as long as the options allow; False if none came."""
         return wait_for_vehicle(self._endpoint, self._options.wait_s, stop)
 
     def fly(self, stop: Stop) -> int:
         """Fly to the end and report; returns the exit code."""
         options, simulation, endpoint = self._options, self._simulation, self._endpoint
-        self._told.report("flying", "sitl: flying")
+        self._events.report("flying", "sitl: flying")
         encoder = StepEncoder(lockstep=not options.realtime)
         plan = flight_plan(simulation.scenario, self._target_at, self._yaw_at)
         self._settle()
@@ -65,20 +65,20 @@ class Flight:
         if silent_since is not None:
             simulation.note_silence(silent_since)
         heard = shut_down(endpoint, encoder, self._tries(silent_since is not None))
-        self._tell_pauses(exchange.counts)
+        self._report_pauses(exchange.counts)
         result = simulation.result()
         described = self._as_json(result, timing, exchange.counts)
         unwritten = self._write(described)
         sentence = f"sitl: {_summary(result, timing)}"
-        self._told.report("ended", sentence, result=described, vehicle_silent=not heard)
+        self._events.report("ended", sentence, result=described, vehicle_silent=not heard)
         for what in unwritten:
-            self._told.report("unwritten", f"sitl: cannot write {what}", what=what)
+            self._events.report("unwritten", f"sitl: cannot write {what}", what=what)
         if simulation.ended is not None and simulation.ended.kind is EndKind.REFUSED:
             return COULD_NOT_START
         return COMPLETED if result.completed and not unwritten else NOT_COMPLETED
 
     def _tries(self, silent: bool) -> int:
-        """How often to tell the vehicle that it is over; one that is silent may not hear it."""
+        """How often to send the shutdown command; a silent vehicle may not receive it."""
         end = self._simulation.ended
         if end is not None and end.kind is EndKind.STOPPED:
             return 0
@@ -86,11 +86,11 @@ class Flight:
             return 1
         return 2 if end is not None and end.kind is EndKind.INTERRUPTED else 4
 
-    def _tell_pauses(self, counts: ExchangeCounts) -> None:
+    def _report_pauses(self, counts: ExchangeCounts) -> None:
         if counts.pauses:
             times = "once" if counts.pauses == 1 else f"{counts.pauses} times"
             length = f"{counts.paused_s:.2f} s in all"
-            self._warn(f"stood still {times}, {length}, and simulated time with it")
+            self._warn(f"process was suspended {times} ({length}); simulated time paused with it")
 
     def _truth(self, files: contextlib.ExitStack) -> Callable[[Simulation], None]:
         """What takes the true state of every step: a log, where results are wanted."""
@@ -106,7 +106,7 @@ class Flight:
         return files.enter_context(contextlib.closing(log)).add
 
     def _warn(self, sentence: str) -> None:
-        self._told.report("warning", f"sitl: {sentence}")
+        self._events.report("warning", f"sitl: {sentence}")
 
     def _target_at(self, t_us: int) -> TrajectoryPoint:
         return self._simulation.target_at(1e-6 * (t_us - START_US))
@@ -116,7 +116,7 @@ class Flight:
 
     def _progress(self, time_s: float, margin_m: float | None, real_time_factor: float) -> None:
         values = {"t_s": time_s, "min_margin_m": margin_m, "real_time_factor": real_time_factor}
-        self._told.report("progress", "", **values)
+        self._events.report("progress", "", **values)
 
     def _exchange(self, stop: Stop) -> Exchange:
         joints = len(self._simulation.vehicle.links)

@@ -1,8 +1,8 @@
 """Which way the vehicle looks along its path.
 
 The arm moves in one vertical plane of the body. In that plane it holds the end-effector while the
-base is pushed about; across it can do nothing. Whoever works beside walls therefore turns that
-plane to the wall.
+base is pushed about; across it can do nothing. Work
+beside a wall therefore needs that plane turned to the wall.
 """
 
 from __future__ import annotations
@@ -10,8 +10,8 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from sitl.scenario import Scenario, Wall
-from sitl.trajectory import V3, Reference
+from sitl.scenario import V3, Scenario, ScenarioWall
+from sitl.trajectory import Reference
 
 _NEAR_M: Final = 0.05  # this much farther away, a wall counts 1/e of the nearer one
 _AROUND_S: Final = tuple(0.5 * k for k in range(-4, 5))  # the vehicle turns slowly: seen ahead
@@ -28,14 +28,14 @@ class Heading:
         self._reference = reference
 
     def at(self, t: float) -> float:
-        """Yaw [rad], ``t`` seconds after the start of the trajectory."""
+        """Yaw [rad, NED] at t [s] after the start of the trajectory."""
         if not self._walls:
             return self._fixed
         yaws = [facing(self._walls, self._reference.place(t + around)) for around in _AROUND_S]
         return sum(yaws) / len(yaws)
 
 
-def facing(walls: tuple[Wall, ...], p: V3) -> float:
+def facing(walls: tuple[ScenarioWall, ...], p: V3) -> float:
     """Yaw in [0, pi) that turns the arm's plane to the nearest wall, between two near ones.
 
     A plane faces a wall with either side, so half a turn more is the same.

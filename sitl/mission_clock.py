@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from sitl.heading import Heading
 from sitl.scenario import Scenario
 from sitl.trajectory import TrajectoryPoint, curve_row, reference
@@ -20,7 +22,7 @@ class MissionClock:
         airborne = scenario.start.kind == "airborne"
         self.reference = reference(scenario.trajectory)
         self._heading = Heading(scenario, self.reference)
-        self.curve = curve_row(scenario.trajectory)  # the same for compiled code
+        self.curve = np.array(curve_row(scenario.trajectory))  # the same for compiled code
         self.starts_s: float | None = scenario.pilot.start_delay_s if airborne else None
         self.stops_s = math.inf
 

@@ -1,134 +1,154 @@
-"""What a simulated flight consists of, as frozen data; read from TOML by ``scenario_file``."""
+"""What a simulated flight consists of, as frozen data; read from TOML by ``scenario_file``.
+
+A key is declared once: its name carries the unit, its annotation the type and the allowed range.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Literal, TypeAlias
-
-from sitl.bounds import choices, inside
+import math
+from dataclasses import dataclass
+from typing import Annotated, Literal, NamedTuple, TypeAlias
 
 V3: TypeAlias = tuple[float, float, float]
 V2: TypeAlias = tuple[float, float]
 
-WORLD_M = 1000.0  # m: far beyond any flight here, close enough to refuse slips of the unit
+WORLD_M = 1000.0  # m: far beyond any flight here, close enough to reject slips of the unit
+
+
+class Range(NamedTuple):
+    """Closed interval of a number, or of every entry of a vector; optionally on a grid."""
+
+    low: float
+    high: float
+    step: float | None = None
+    or_inf: bool = False
+
+    def contains(self, value: float) -> bool:
+        """Whether a value [unit of the key] is in the range; NaN is not."""
+        if not math.isfinite(value):
+            return self.or_inf and value > 0.0
+        on_grid = self.step is None or math.isclose(
+            value / self.step, round(value / self.step), abs_tol=1e-9
+        )
+        return self.low <= value <= self.high and on_grid
+
+    def __str__(self) -> str:
+        grid = f" in steps of {self.step:g}" if self.step is not None else ""
+        return f"{self.low:g} to {self.high:g}{grid}{' or inf' if self.or_inf else ''}"
 
 
 @dataclass(frozen=True, slots=True)
 class Start:
     """How the flight begins."""
 
-    kind: Literal["airborne", "ground"] = field(metadata=choices("airborne", "ground"))
+    kind: Literal["airborne", "ground"]
     # Joint angles; the default folds the elbow backwards with the end-effector exactly
     # 0.225 m below the base (cos = 3/4).
-    arm_deg: V2 = field(
-        default=(-41.40962210927086, 82.81924421854171), metadata=inside(-180.0, 180.0)
-    )
-    yaw_deg: float = field(default=0.0, metadata=inside(-180.0, 180.0))
-    position_m: V2 = field(default=(0.0, 0.0), metadata=inside(-WORLD_M, WORLD_M))  # ground start
+    arm_deg: Annotated[V2, Range(-180.0, 180.0)] = (-41.40962210927086, 82.81924421854171)
+    yaw_deg: Annotated[float, Range(-180.0, 180.0)] = 0.0
+    position_m: Annotated[V2, Range(-WORLD_M, WORLD_M)] = (0.0, 0.0)  # ground start
 
 
 @dataclass(frozen=True, slots=True)
 class Pilot:
     """What the scenario's pilot asks of the vehicle, by messages."""
 
-    plan: Literal["none", "trajectory", "hop"] = field(
-        metadata=choices("none", "trajectory", "hop")
-    )
-    start_delay_s: float = field(default=1.0, metadata=inside(0.0, 60.0))
-    takeoff_height_m: float = field(default=1.5, metadata=inside(0.4, 50.0))
+    plan: Literal["none", "trajectory", "hop"]
+    start_delay_s: Annotated[float, Range(0.0, 60.0)] = 1.0
+    takeoff_height_m: Annotated[float, Range(0.4, 50.0)] = 1.5
 
 
 @dataclass(frozen=True, slots=True)
 class Lissajous:
     """Sinusoids per axis, started and stopped smoothly."""
 
-    centre_m: V3 = field(metadata=inside(-WORLD_M, WORLD_M))
-    amplitude_m: V3 = field(metadata=inside(0.0, WORLD_M))
-    period_s: V3 = field(metadata=inside(1.0, 3600.0))
-    phase_deg: V3 = field(metadata=inside(-360.0, 360.0))
-    ramp_s: float = field(metadata=inside(0.1, 600.0))
-    duration_s: float = field(metadata=inside(1.0, 86400.0))
+    centre_m: Annotated[V3, Range(-WORLD_M, WORLD_M)]
+    amplitude_m: Annotated[V3, Range(0.0, WORLD_M)]
+    period_s: Annotated[V3, Range(1.0, 3600.0)]
+    phase_deg: Annotated[V3, Range(-360.0, 360.0)]
+    ramp_s: Annotated[float, Range(0.1, 600.0)]
+    duration_s: Annotated[float, Range(1.0, 86400.0)]
     # "walls" turns the arm's plane to the nearest wall; "start" keeps the yaw of the start.
-    heading: Literal["start", "walls"] = field(default="start", metadata=choices("start", "walls"))
-    kind: Literal["lissajous"] = field(default="lissajous", metadata=choices("lissajous"))
+    heading: Literal["start", "walls"] = "start"
+    kind: Literal["lissajous"] = "lissajous"
 
 
 @dataclass(frozen=True, slots=True)
 class Hold:
-    """One point."""
+    """One position."""
 
-    position_m: V3 = field(metadata=inside(-WORLD_M, WORLD_M))
-    kind: Literal["hold"] = field(default="hold", metadata=choices("hold"))
+    position_m: Annotated[V3, Range(-WORLD_M, WORLD_M)]
+    kind: Literal["hold"] = "hold"
 
 
 Trajectory: TypeAlias = Lissajous | Hold
 
 
 @dataclass(frozen=True, slots=True)
-class Wall:
+class ScenarioWall:
     """A plane; free space is where n·p > offset."""
 
     name: str
-    normal: V3 = field(metadata=inside(-1.0, 1.0))  # unit, NED, into free space
-    offset_m: float = field(metadata=inside(-WORLD_M, WORLD_M))
-    clearance_m: float = field(metadata=inside(0.0, 10.0))  # s_min
+    normal: Annotated[V3, Range(-1.0, 1.0)]  # unit, NED, into free space
+    offset_m: Annotated[float, Range(-WORLD_M, WORLD_M)]
+    clearance_m: Annotated[float, Range(0.0, 10.0)]  # s_min
 
 
 @dataclass(frozen=True, slots=True)
 class Obstacle:
-    """A point without a size of its own, such as the tip of a branch."""
+    """An obstacle without a size of its own, such as the tip of a branch."""
 
     name: str
-    position_m: V3 = field(metadata=inside(-WORLD_M, WORLD_M))
-    clearance_m: float = field(metadata=inside(0.001, 10.0))  # d_s
+    position_m: Annotated[V3, Range(-WORLD_M, WORLD_M)]
+    clearance_m: Annotated[float, Range(0.001, 10.0)]  # d_s
 
 
 @dataclass(frozen=True, slots=True)
 class Workspace:
     """Sphere the base must stay in, riding above the end-effector's reference."""
 
-    radius_m: float = field(metadata=inside(0.001, 10.0))
-    d_iw_m: float = field(metadata=inside(0.0, 10.0))
+    radius_m: Annotated[float, Range(0.001, 10.0)]
+    d_iw_m: Annotated[float, Range(0.0, 10.0)]
 
 
 @dataclass(frozen=True, slots=True)
 class Uniform:
     """Acceleration drawn uniformly from ±amplitude per axis, anew every period."""
 
-    amplitude_m_s2: float = field(metadata=inside(0.0, 50.0))
-    period_s: float = field(default=0.1, metadata=inside(0.002, 3600.0))
+    amplitude_m_s2: Annotated[float, Range(0.0, 50.0)]
+    period_s: Annotated[float, Range(0.002, 3600.0)] = 0.1
     name: str = "uniform"
-    kind: Literal["uniform"] = field(default="uniform", metadata=choices("uniform"))
+    kind: Literal["uniform"] = "uniform"
 
 
 @dataclass(frozen=True, slots=True)
 class Wind:
     """Constant acceleration, NED."""
 
-    acceleration_m_s2: V3 = field(metadata=inside(-50.0, 50.0))
+    acceleration_m_s2: Annotated[V3, Range(-50.0, 50.0)]
     name: str = "wind"
-    kind: Literal["wind"] = field(default="wind", metadata=choices("wind"))
+    kind: Literal["wind"] = "wind"
 
 
 @dataclass(frozen=True, slots=True)
 class Impulses:
     """Pushes of fixed size and length in random directions after random pauses."""
 
-    mean_interval_s: float = field(metadata=inside(0.01, 3600.0))
-    magnitude_m_s2: float = field(metadata=inside(0.0, 200.0))
-    duration_s: float = field(metadata=inside(0.002, 60.0))
+    mean_interval_s: Annotated[float, Range(0.01, 3600.0)]
+    magnitude_m_s2: Annotated[float, Range(0.0, 200.0)]
+    duration_s: Annotated[float, Range(0.002, 60.0)]
     name: str = "impulses"
-    kind: Literal["impulses"] = field(default="impulses", metadata=choices("impulses"))
+    kind: Literal["impulses"] = "impulses"
 
 
 @dataclass(frozen=True, slots=True)
 class Torque:
     """Torque on the base drawn uniformly from ±amplitude per axis, anew every period."""
 
-    amplitude_n_m: float = field(metadata=inside(0.0, 10.0))
-    period_s: float = field(default=0.1, metadata=inside(0.002, 3600.0))
+    amplitude_n_m: Annotated[float, Range(0.0, 10.0)]
+    period_s: Annotated[float, Range(0.002, 3600.0)] = 0.1
     name: str = "torque"
-    kind: Literal["torque"] = field(default="torque", metadata=choices("torque"))
+    kind: Literal["torque"] = "torque"
 
 
 Disturbance: TypeAlias = Uniform | Wind | Impulses | Torque
@@ -138,35 +158,35 @@ Disturbance: TypeAlias = Uniform | Wind | Impulses | Torque
 class ImuErrors:
     """Standard deviations per sample and delay of the inertial unit."""
 
-    gyro_rad_s: float = field(default=0.0, metadata=inside(0.0, 10.0))
-    accel_m_s2: float = field(default=0.0, metadata=inside(0.0, 100.0))
-    latency_ms: float = field(default=0.0, metadata=inside(0.0, 1000.0, step=2.0))
+    gyro_rad_s: Annotated[float, Range(0.0, 10.0)] = 0.0
+    accel_m_s2: Annotated[float, Range(0.0, 100.0)] = 0.0
+    latency_ms: Annotated[float, Range(0.0, 1000.0, step=2.0)] = 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class PoseErrors:
     """Standard deviations per sample and delay of position, velocity, attitude and rates."""
 
-    position_m: float = field(default=0.0, metadata=inside(0.0, 10.0))
-    velocity_m_s: float = field(default=0.0, metadata=inside(0.0, 10.0))
-    attitude_rad: float = field(default=0.0, metadata=inside(0.0, 1.0))
-    rate_rad_s: float = field(default=0.0, metadata=inside(0.0, 10.0))
-    latency_ms: float = field(default=0.0, metadata=inside(0.0, 1000.0, step=2.0))
+    position_m: Annotated[float, Range(0.0, 10.0)] = 0.0
+    velocity_m_s: Annotated[float, Range(0.0, 10.0)] = 0.0
+    attitude_rad: Annotated[float, Range(0.0, 1.0)] = 0.0
+    rate_rad_s: Annotated[float, Range(0.0, 10.0)] = 0.0
+    latency_ms: Annotated[float, Range(0.0, 1000.0, step=2.0)] = 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class EncoderErrors:
     """Standard deviations per sample and delay of the joint encoders."""
 
-    angle_rad: float = field(default=0.0, metadata=inside(0.0, 1.0))
-    rate_rad_s: float = field(default=0.0, metadata=inside(0.0, 10.0))
-    torque_n_m: float = field(default=0.0, metadata=inside(0.0, 10.0))
-    latency_ms: float = field(default=0.0, metadata=inside(0.0, 1000.0, step=2.0))
+    angle_rad: Annotated[float, Range(0.0, 1.0)] = 0.0
+    rate_rad_s: Annotated[float, Range(0.0, 10.0)] = 0.0
+    torque_n_m: Annotated[float, Range(0.0, 10.0)] = 0.0
+    latency_ms: Annotated[float, Range(0.0, 1000.0, step=2.0)] = 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class Sensors:
-    """All sensors; exact unless said otherwise."""
+    """All sensors; exact by default."""
 
     imu: ImuErrors = ImuErrors()
     pose: PoseErrors = PoseErrors()
@@ -177,10 +197,10 @@ class Sensors:
 class VehicleScale:
     """How the real vehicle differs from what the controller believes."""
 
-    mass: float = field(default=1.0, metadata=inside(0.2, 5.0))
-    inertia: float = field(default=1.0, metadata=inside(0.2, 5.0))
-    rotor_lag: float = field(default=1.0, metadata=inside(0.1, 10.0))
-    joint_friction: float = field(default=1.0, metadata=inside(0.0, 100.0))
+    mass: Annotated[float, Range(0.2, 5.0)] = 1.0
+    inertia: Annotated[float, Range(0.2, 5.0)] = 1.0
+    rotor_lag: Annotated[float, Range(0.1, 10.0)] = 1.0
+    joint_friction: Annotated[float, Range(0.0, 100.0)] = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -188,12 +208,12 @@ class Scenario:
     """One flight."""
 
     name: str
-    duration_s: float = field(metadata=inside(0.1, 86400.0, or_endless=True))
+    duration_s: Annotated[float, Range(0.1, 86400.0, or_inf=True)]
     start: Start
     pilot: Pilot
     trajectory: Trajectory
     description: str = ""
-    walls: tuple[Wall, ...] = ()
+    walls: tuple[ScenarioWall, ...] = ()
     obstacles: tuple[Obstacle, ...] = ()
     workspace: Workspace | None = None
     disturbances: tuple[Disturbance, ...] = ()

@@ -1,19 +1,18 @@
-"""Scenario TOML to frozen data; whatever is not exactly right is refused with its reason."""
+"""Reads scenario files. Invalid ones are rejected with the key, the value and what is allowed."""
 
 from __future__ import annotations
 
 import dataclasses
 import difflib
 import hashlib
-import math
 import tomllib
 import types
 import typing
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal, get_args, get_origin
 
-from sitl.bounds import Choices, Range
-from sitl.scenario import Scenario
+from sitl.scenario import Range, Scenario
 
 _DIGITS = 12
 PACKAGED = Path(__file__).parent / "scenarios"
@@ -42,7 +41,7 @@ def load_scenario(name_or_path: str) -> Scenario:
 
 
 def scenario_digest(name_or_path: str) -> str:
-    """What tells a scenario from another of its name: how the SHA-256 of its file begins.
+    """First digits of the SHA-256 of the file; they differ if two scenarios of one name differ.
 
     Raises:
         ScenarioError: Unknown name or unreadable file.
@@ -85,8 +84,8 @@ def parse_scenario(text: str, name: str) -> Scenario:
     return scenario
 
 
-def _nearest(word: str, known: typing.Iterable[str]) -> str:
-    match = difflib.get_close_matches(word, list(known), n=1, cutoff=0.4)
+def _nearest(word: object, known: Iterable[str]) -> str:
+    match = difflib.get_close_matches(str(word), list(known), n=1, cutoff=0.4)
     return f', did you mean "{match[0]}"?' if match else ""
 
 
@@ -94,92 +93,84 @@ def _build(kind: Any, table: Any, path: str) -> Any:
     """An instance of the dataclass ``kind`` from a TOML table."""
     if not isinstance(table, dict):
         raise ScenarioError(f"{path} = {table!r}: must be a table")
-    hints = typing.get_type_hints(kind)
-    fields = {field.name: field for field in dataclasses.fields(kind)}
+    hints = typing.get_type_hints(kind, include_extras=True)
     prefix = f"{path}." if path else ""
     for key in table:
-        if key not in fields:
+        if key not in hints:
             raise ScenarioError(
-                f'unknown key "{prefix}{key}" = {table[key]!r}{_nearest(key, fields)}'
-                f" (known here: {', '.join(name for name in fields if name != 'name' or path)})"
+                f'unknown key "{prefix}{key}" = {table[key]!r}{_nearest(key, hints)}'
+                f" (known here: {', '.join(name for name in hints if name != 'name' or path)})"
             )
-    for name, field in fields.items():
-        required = field.default is dataclasses.MISSING
-        if required and name not in table:
-            raise ScenarioError(f'missing key "{prefix}{name}"{_allowed(field.metadata)}')
-    values = {
-        key: _value(hints[key], value, f"{prefix}{key}", fields[key].metadata)
-        for key, value in table.items()
-    }
-    return kind(**values)
+    for field in dataclasses.fields(kind):
+        if field.default is dataclasses.MISSING and field.name not in table:
+            allowed = _allowed(hints[field.name])
+            raise ScenarioError(f'missing key "{prefix}{field.name}"{allowed}')
+    return kind(**{key: _value(hints[key], table[key], f"{prefix}{key}") for key in table})
 
 
-def _value(hint: Any, value: Any, path: str, metadata: Any) -> Any:
-    """One value checked against its type hint and declared range."""
-    origin, arguments = typing.get_origin(hint), typing.get_args(hint)
-    if origin in (typing.Union, types.UnionType):
-        return _variant([a for a in arguments if a is not types.NoneType], value, path, metadata)
+def _value(hint: Any, value: Any, path: str) -> Any:
+    """One value, checked against its annotation."""
+    origin, parts = get_origin(hint), get_args(hint)
+    if origin is Annotated:
+        return _numbers(parts[0], parts[1], value, path)
+    if origin is types.UnionType:
+        return _table_of_a_kind([part for part in parts if part is not types.NoneType], value, path)
     if dataclasses.is_dataclass(hint):
         return _build(hint, value, path)
-    if origin is tuple and arguments[-1] is Ellipsis:
+    if origin is tuple:
         if not isinstance(value, list):
             raise ScenarioError(f"{path} = {value!r}: must be an array of tables ([[{path}]])")
-        return tuple(
-            _value(arguments[0], item, f"{path}[{i}]", metadata) for i, item in enumerate(value)
-        )
-    if origin is tuple:
-        return _vector(len(arguments), value, path, metadata)
-    if hint is float:
-        return _number(value, path, metadata)
+        return tuple(_value(parts[0], item, f"{path}[{i}]") for i, item in enumerate(value))
     if not isinstance(value, str):
-        raise ScenarioError(f"{path} = {value!r}: must be a text{_allowed(metadata)}")
-    allowed = metadata.get("choices")
-    if isinstance(allowed, Choices) and value not in allowed.words:
-        hint_text = _nearest(value, allowed.words)
-        raise ScenarioError(f'{path} = "{value}": must be {allowed}{hint_text}')
+        raise ScenarioError(f"{path} = {value!r}: must be a text{_allowed(hint)}")
+    if origin is Literal and value not in parts:
+        raise ScenarioError(f'{path} = "{value}": must be {_words(parts)}{_nearest(value, parts)}')
     return value
 
 
-def _variant(kinds: list[Any], value: Any, path: str, metadata: Any) -> Any:
-    """A table whose ``kind`` names its type."""
+def _table_of_a_kind(kinds: list[Any], value: Any, path: str) -> Any:
+    """A table whose key ``kind`` names its type, where there are several."""
     if len(kinds) == 1:
-        return _value(kinds[0], value, path, metadata)
-    words = {typing.get_args(typing.get_type_hints(kind)["kind"])[0]: kind for kind in kinds}
+        return _build(kinds[0], value, path)
+    words = {get_args(typing.get_type_hints(kind)["kind"])[0]: kind for kind in kinds}
     if not isinstance(value, dict):
         raise ScenarioError(f"{path} = {value!r}: must be a table")
-    word = value.get("kind")
+    if "kind" not in value:
+        raise ScenarioError(f'missing key "{path}.kind": must be {_words(words)}')
+    word = value["kind"]
     if word not in words:
-        allowed = Choices(tuple(words))
-        if word is None:
-            raise ScenarioError(f'missing key "{path}.kind": must be {allowed}')
         raise ScenarioError(
-            f"{path}.kind = {word!r}: must be {allowed}{_nearest(str(word), words)}"
+            f"{path}.kind = {word!r}: must be {_words(words)}{_nearest(word, words)}"
         )
     return _build(words[word], value, path)
 
 
-def _vector(size: int, value: Any, path: str, metadata: Any) -> tuple[float, ...]:
-    if not isinstance(value, list) or len(value) != size:
-        raise ScenarioError(
-            f"{path} = {value!r}: must be an array of {size} numbers{_allowed(metadata)}"
-        )
-    return tuple(_number(item, f"{path}[{i}]", metadata) for i, item in enumerate(value))
+def _numbers(hint: Any, allowed: Range, value: Any, path: str) -> float | tuple[float, ...]:
+    """A number or a vector of numbers within its range."""
+    if hint is not float:
+        size = len(get_args(hint))
+        if not isinstance(value, list) or len(value) != size:
+            raise ScenarioError(
+                f"{path} = {value!r}: must be an array of {size} numbers ({allowed})"
+            )
+        return tuple(_number(item, allowed, f"{path}[{i}]") for i, item in enumerate(value))
+    return _number(value, allowed, path)
 
 
-def _number(value: Any, path: str, metadata: Any) -> float:
+def _number(value: Any, allowed: Range, path: str) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ScenarioError(f"{path} = {value!r}: must be a number{_allowed(metadata)}")
-    allowed = metadata.get("range")
-    if isinstance(allowed, Range) and allowed.refuses(float(value)):
+        raise ScenarioError(f"{path} = {value!r}: must be a number ({allowed})")
+    if not allowed.contains(float(value)):
         raise ScenarioError(f"{path} = {value!r}: must be {allowed}")
-    endless = isinstance(allowed, Range) and allowed.or_endless
-    if not math.isfinite(value) and not endless:
-        raise ScenarioError(f"{path} = {value!r}: must be finite")
     return float(value)
 
 
-def _allowed(metadata: Any) -> str:
-    for key in ("range", "choices"):
-        if key in metadata:
-            return f" ({metadata[key]})"
-    return ""
+def _words(words: Iterable[str]) -> str:
+    return "one of " + ", ".join(f'"{word}"' for word in words)
+
+
+def _allowed(hint: Any) -> str:
+    """What a sentence about a key says in brackets."""
+    if get_origin(hint) is Annotated:
+        return f" ({get_args(hint)[1]})"
+    return f" ({_words(get_args(hint))})" if get_origin(hint) is Literal else ""

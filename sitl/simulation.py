@@ -3,27 +3,27 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 
-from sitl.admission import check
 from sitl.compiled import machine_code
 from sitl.disturbances.items import push
+from sitl.flight_evaluator import FlightEvaluator, Points, critical
 from sitl.mission_clock import MissionClock
-from sitl.plant.aerial_manipulator import plant
-from sitl.plant.integrator import STEP_S
+from sitl.plant.aerial_manipulator import Plant, plant
+from sitl.plant.integrator import STEP_S, step
 from sitl.plant.kinematics import places
-from sitl.plant.parcel import parcel, travel
 from sitl.plant.state import ARM, P_WB, Q_WB, THRUST, V_WB, W_WB_B
-from sitl.referee import Points, Referee, critical
+from sitl.result import EndKind, EndReason, TruthResult
 from sitl.scenario import V3, Scenario
 from sitl.scenario_file import ScenarioError
+from sitl.scenario_validation import check
 from sitl.sensors.suite import V4, SensorReadings, SensorSuite
 from sitl.start import first_state, flown_vehicle
 from sitl.trajectory import TrajectoryPoint
-from sitl.verdict import EndKind, EndReason, TruthResult
 
 STEP_US = 2000  # one exchange with the flight software
 START_US = 1_000_000  # so that no stamp is 0
@@ -78,7 +78,7 @@ class Simulation:
         self.clock = MissionClock(scenario)
         self.step = 0
         self._plant = plant(self.vehicle)
-        self._parcel = parcel(self._plant)
+        self._plants = cast(Sequence[Plant], np.array([self._plant]))  # cheaper to hand over
         self._mass = self.vehicle.mass
         self._sensors = SensorSuite(scenario.sensors, seed, STEP_US)
         self._pushes = [push(item, seed, 1e-6 * STEP_US) for item in scenario.disturbances]
@@ -88,10 +88,10 @@ class Simulation:
         still = (0.0, 0.0, 0.0)
         # No steps: only what the accelerometer feels at the start.
         example = (self._thrust, self._torque, still, still, STEP_S, self._places[:0])
-        self._travel = machine_code(travel, self._parcel, self._state, *example)
-        self._felt = self._travel(self._parcel, self._state, *example).felt
+        self._step = machine_code(step, self._plants, self._state, *example)
+        self._felt = self._step(self._plants, self._state, *example).felt
         self._reading: SensorReadings | None = None
-        self._referee = Referee(scenario, self.clock, self._points_now())
+        self._evaluator = FlightEvaluator(scenario, self.clock, self._points_now())
 
     @property
     def t_us(self) -> int:
@@ -106,17 +106,17 @@ class Simulation:
     @property
     def ended(self) -> EndReason | None:
         """Why the run is over, None while it is not."""
-        return self._referee.ended
+        return self._evaluator.ended
 
     @property
     def margin_keys(self) -> tuple[str, ...]:
         """Names of the margins, e.g. ``front/end_effector``."""
-        return self._referee.world.keys
+        return self._evaluator.world.keys
 
     @property
     def min_margin_m(self) -> float | None:
         """Smallest margin so far [m], None without constraints."""
-        record = self._referee.record
+        record = self._evaluator.record
         worst = record.worst()
         return None if worst is None else record.minimum[worst]
 
@@ -132,14 +132,14 @@ class Simulation:
         The run goes on, but not to completion; the first time counts.
         """
         time_s = 1e-6 * (t_us - START_US)
-        if self._referee.left is None:
+        if self._evaluator.left is None:
             self.clock.stop(time_s)
-            self._referee.left = f"{why} at {time_s:.1f} s"
+            self._evaluator.left = f"{why} at {time_s:.1f} s"
 
     def note_silence(self, step: int) -> None:
         """Nothing came from the vehicle since this step: whatever ended was not flown."""
         if self.ended is None or self.ended.kind is not EndKind.STOPPED:  # which says it itself
-            self._referee.silent = f"the flight software was silent since step {step}"
+            self._evaluator.silent = f"the flight software was silent since step {step}"
 
     def target_at(self, time_s: float) -> TrajectoryPoint:
         """End-effector reference ``time_s`` after the start of the simulation."""
@@ -147,7 +147,7 @@ class Simulation:
 
     def end(self, kind: EndKind, sentence: str) -> None:
         """End the run from outside; the first reason stands."""
-        self._referee.end(kind, sentence, self.time_s)
+        self._evaluator.end(kind, sentence, self.time_s)
 
     def sense(self) -> SensorReadings:
         """Measurements of the current state; asking twice in a step gives the same ones."""
@@ -162,8 +162,8 @@ class Simulation:
             ValueError: A control is not finite or their number is wrong.
         """
         self._command(controls)
-        arrival = self._travel(
-            self._parcel,
+        arrival = self._step(
+            self._plants,
             self._state,
             self._thrust,
             self._torque,
@@ -191,7 +191,7 @@ class Simulation:
             qd_arm=exact.qd_arm,
             p_WE=points[2],
             target=self.target_at(self.time_s),
-            margins_m=self._referee.margins(points, self.time_s),
+            margins_m=self._evaluator.margins(points, self.time_s),
         )
 
     def state_bytes(self) -> bytes:
@@ -200,7 +200,7 @@ class Simulation:
 
     def result(self) -> TruthResult:
         """The score so far, or of the whole run once ``ended`` is set."""
-        return self._referee.result(self.time_s)
+        return self._evaluator.result(self.time_s)
 
     def _exact_reading(self) -> SensorReadings:
         # Taken apart as a list: a view into the vector costs as much as all of this.
@@ -250,11 +250,11 @@ class Simulation:
 
     def _judge(self, before_s: float, landing_speed: float) -> None:
         """Judge every plant step of the exchange that began at ``before_s``."""
-        self._referee.judge_all(self._places, before_s, STEP_S)
+        self._evaluator.judge_all(self._places, before_s, STEP_S)
         if self.step % SAMPLE_STEPS == 0:
-            self._referee.sample_error(critical(self._places[-1].tolist()), self.time_s)
-        self._referee.judge_landing(landing_speed, self.time_s)
-        self._referee.judge_time(self.time_s)
+            self._evaluator.sample_error(critical(self._places[-1].tolist()), self.time_s)
+        self._evaluator.judge_landing(landing_speed, self.time_s)
+        self._evaluator.judge_time(self.time_s)
 
     def _points_now(self) -> Points:
         out = np.empty((1, *self._places.shape[1:]))

@@ -1,16 +1,16 @@
 """The true state of every step, in a file that the flight software never sees.
 
-``truth.ulg`` is a ULog of its own; whoever started both halves may join it to the flight log.
+``truth.ulg`` is a ULog of its own; ``pandion fly`` joins it to the flight log.
 """
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
 from messages import ulog
+from messages.block_file import BlockFile
 from messages.ground_truth import FIRST_NUMBER, SIM_GROUND_TRUTH, SIM_TRACKING, TRUTH_TOPICS
 from messages.ulog_reader import unpacker
 from sitl.simulation import SAMPLE_STEPS, START_US, Simulation
@@ -31,15 +31,14 @@ class TruthLog:
             path: Where to write; what is there is replaced, as the simulator's other results are.
             scenario: What is flown.
             seed: The root of its randomness.
-            warn: Told once if the disk refuses; the simulation goes on.
+            warn: Called once if the disk refuses; the simulation goes on.
 
         Raises:
             OSError: The file cannot be created.
         """
-        self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_CLOEXEC, 0o666)
+        path.unlink(missing_ok=True)
+        self._file = BlockFile(path)
         self._warn = warn
-        self._failed = False
-        self._size = 0
         self._records = bytearray(_definitions(scenario, seed))
 
     def add(self, simulation: Simulation) -> None:
@@ -56,22 +55,14 @@ class TruthLog:
     def close(self) -> None:
         """Write what is left and close the file."""
         self._flush()
-        os.close(self._file)
+        self._file.close()
 
     def _flush(self) -> None:
-        records, self._records = self._records, bytearray()
-        if self._failed:
-            return
-        rest = memoryview(records)
-        try:
-            while rest:
-                rest = rest[os.write(self._file, rest) :]
-        except OSError as error:
-            self._failed = True
-            os.ftruncate(self._file, self._size)
-            self._warn(f"truth.ulg ends early: {error.strerror}")
-            return
-        self._size += len(records)
+        failed_before = self._file.failure is not None
+        self._file.put(self._records)
+        self._records = bytearray()
+        if self._file.failure is not None and not failed_before:
+            self._warn(f"truth.ulg ends early: {self._file.failure}")
 
 
 def _definitions(scenario: str, seed: int) -> bytes:

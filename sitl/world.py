@@ -1,4 +1,4 @@
-"""Walls, points, workspace and ground, judged on the plant's true state.
+"""Walls, obstacles, workspace and ground, judged on the plant's true state.
 
 Source: docs/equations.md E11, E14, E15.
 """
@@ -14,7 +14,7 @@ from sitl.plant.vector import Array
 from sitl.scenario import V3, Scenario, Workspace
 from sitl.trajectory import place_on_curve
 
-POINTS = ("base", "joint2", "end_effector")  # critical points, in the order of the paper
+CRITICAL_POINTS = ("base", "joint2", "end_effector")  # critical points, in the order of the paper
 
 
 def workspace_margin(workspace: Workspace, p_base: V3, p_target: V3) -> float:
@@ -32,7 +32,7 @@ class World:
         self.walls = scenario.walls
         self.workspace = scenario.workspace
         names = [one.name for one in self.walls] + [one.name for one in scenario.obstacles]
-        keys = [f"{name}/{point}" for name in names for point in POINTS]
+        keys = [f"{name}/{point}" for name in names for point in CRITICAL_POINTS]
         self._planes = [(*wall.normal, wall.offset_m + wall.clearance_m) for wall in self.walls]
         self.planes = np.array(self._planes).reshape(-1, 4)  # normal, least distance [m]
         self._balls = [(*one.position_m, one.clearance_m) for one in scenario.obstacles]
@@ -66,7 +66,7 @@ class World:
     def collision(self, points: tuple[V3, V3, V3], margins: tuple[float, ...]) -> str | None:
         """A sentence if a critical point touches a wall or the ground, else None.
 
-        A point has no size that could be touched: coming too close to it is a violation only.
+        An obstacle is a point and cannot be touched: coming too close to it is a violation only.
 
         Args:
             points: Base, joint 2 and end-effector [m, NED].
@@ -76,10 +76,10 @@ class World:
         if max(base, joint2, end) < 0.0 < min(margins, default=1.0):
             return None
         for i, wall in enumerate(self.walls):
-            for k, name in enumerate(POINTS):
-                if not (margins[len(POINTS) * i + k] + wall.clearance_m > 0.0):
+            for k, name in enumerate(CRITICAL_POINTS):
+                if not (margins[len(CRITICAL_POINTS) * i + k] + wall.clearance_m > 0.0):
                     return f"{spoken(name)} hit the {wall.name} wall"
-        for name, point in zip(POINTS, points, strict=True):
+        for name, point in zip(CRITICAL_POINTS, points, strict=True):
             if not (point[2] < 0.0):
                 return f"{spoken(name)} hit the ground"
         return None
@@ -99,15 +99,15 @@ def record_if_clear(
     """``World.margins`` of plant steps without any incident, into the record of the smallest.
 
     Args:
-        planes: (walls, 4), of a World.
-        balls: (obstacles, 4), of a World.
+        planes: (walls, 4) [m] of a World: normal and least distance.
+        balls: (obstacles, 4) [m] of a World: centre and least distance.
         sphere: Its radius and height above the target [m].
         aim: The end-effector's curve (``trajectory.curve_row``) and when it begins [s]; a row
             without numbers where the workspace does not apply.
-        places: (steps, 2 + j, 3) m: base, joint 1, joint 2, …, end-effector.
+        places: (steps, 2 + j, 3) [m, NED]: base, joint 1, joint 2, …, end-effector.
         instants: Time one step before the first, and between two steps [s].
-        lowest: (margins,) m, smallest so far.
-        when_s: (margins,) s, when that was.
+        lowest: (margins,) [m], smallest so far.
+        when_s: (margins,) [s], when that was.
 
     Returns:
         True; or False, with nothing recorded, if any point is not clearly above ground and

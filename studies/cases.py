@@ -6,11 +6,13 @@ Tuning used seeds below ``REPORTING_FROM``; what is reported should use others.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Literal
 
+from fsw.barriers.safe_approach import BarrierTuning
 from fsw.control.cascade import Inner
-from fsw.model.prediction import LagModel
+from fsw.model.airframe import AIRFRAME, AttitudeLag
 from fsw.mpc.planner_config import PlannerConfig
 from fsw.parameters.flight_config import FlightConfig, flight_config
 from sitl.mission_clock import MissionClock
@@ -32,6 +34,7 @@ _TIGHTENING: dict[Case, float] = {"I": 0.08, "II": 0.05}  # m
 # Kept by every other HC: without it, calm flights fail by the micrometres of the solver's
 # tolerance and of the path's curvature between nodes, which is not what is compared.
 _ROUNDING_M = 0.001
+_WITHOUT_LAG = replace(AIRFRAME, attitude_lag=AttitudeLag(at_once=True))
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,56 +66,43 @@ def configuration(
     Inconsistent ones fly as well: what becomes of them is what a study wants to see.
     """
     config = flight_config(controller, inner, soft=True)
-    return config if plant == "full" else replace(config, planner=_at_once(config.planner))
+    return config if plant == "full" else _at_once(config)
 
 
-def _at_once(planner: PlannerConfig) -> PlannerConfig:
-    """The planner for a plant whose acceleration follows at once.
+def _at_once(config: FlightConfig) -> FlightConfig:
+    """The configuration for a plant whose acceleration follows at once.
 
     No lag in the prediction and hence no node that the inputs cannot move. The MPC alone meets
     the disturbance here, so eq 25 needs its whole share, lambda >= d (1 + k_S T / 2) / gamma:
     0.373 m/s for the paper's 0.8 m/s^2 at k_S = 8 /s. The sphere of 75 mm leaves room for it, as
     its centre at rest has h = S(r) = 0.487; at k_S = 4 it would not (0.32 against 0.30).
     """
-    walls, workspace = (
-        replace(tuning, skipped_nodes=0, slope=8.0, robustness=0.4)
-        for tuning in (planner.walls, planner.workspace)
+    planner = _barriers(
+        config.planner, lambda it: replace(it, skipped_nodes=0, slope=8.0, lambda_=0.4)
     )
-    return replace(
-        planner,
-        lag=LagModel(at_once=True),
-        walls=walls,
-        workspace=workspace,
-        barrier_slack=200.0,
-    )
+    return replace(config, airframe=_WITHOUT_LAG, planner=replace(planner, barrier_slack=200.0))
+
+
+def _barriers(
+    planner: PlannerConfig, change: Callable[[BarrierTuning], BarrierTuning]
+) -> PlannerConfig:
+    """The same with both barriers changed."""
+    return replace(planner, walls=change(planner.walls), workspace=change(planner.workspace))
 
 
 def with_lambda(config: FlightConfig, robustness: float) -> FlightConfig:
-    """The same with another lambda of eq 25 in both cases."""
-    planner = config.planner
-    return replace(
-        config,
-        planner=replace(
-            planner,
-            walls=replace(planner.walls, robustness=robustness),
-            workspace=replace(planner.workspace, robustness=robustness),
-        ),
-    )
+    """The same with another lambda of eq 25, ``robustness`` [m/s], in both cases."""
+    planner = _barriers(config.planner, lambda it: replace(it, lambda_=robustness))
+    return replace(config, planner=planner)
 
 
 def with_horizon(config: FlightConfig, horizon: int) -> FlightConfig:
     """The same with another horizon; no more first nodes are skipped than leave one."""
-    planner = config.planner
-    walls, workspace = planner.walls, planner.workspace
-    return replace(
-        config,
-        planner=replace(
-            planner,
-            horizon=horizon,
-            walls=replace(walls, skipped_nodes=min(walls.skipped_nodes, horizon - 1)),
-            workspace=replace(workspace, skipped_nodes=min(workspace.skipped_nodes, horizon - 1)),
-        ),
+    planner = _barriers(
+        replace(config.planner, horizon=horizon),
+        lambda it: replace(it, skipped_nodes=min(it.skipped_nodes, horizon - 1)),
     )
+    return replace(config, planner=planner)
 
 
 def entrants(case: Case, plant: PlantName, inner: Inner) -> tuple[Entrant, ...]:
@@ -150,8 +140,7 @@ def entrants(case: Case, plant: PlantName, inner: Inner) -> tuple[Entrant, ...]:
     paper = [("naive", naive), ("hc", hard), ("sc", sc), ("blf", blf)]
     paper.append(("blf-lambda-5", with_lambda(blf, 5.0)))
     if plant == "full":
-        printed = replace(blf.planner, lag=LagModel(at_once=True))
-        paper.append(("blf-no-lag", replace(blf, inner="pid", planner=printed)))
+        paper.append(("blf-no-lag", replace(blf, inner="pid", airframe=_WITHOUT_LAG)))
     return tuple(
         [Entrant("paper", name, config) for name, config in paper]
         + [Entrant("like-for-like", name, config) for name, config in fair]

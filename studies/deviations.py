@@ -14,7 +14,7 @@ PLANT: dict[str, tuple[str, ...]] = {
         "Plant: the exact coupled vehicle and arm with rotor lag instead of the printed eq 6, "
         "whose constant mass matrix neglects the moving centre of mass and counts the links "
         "twice.",
-        "Fast loop: 500 Hz tracking of the MPC's plan for every controller; `--inner pid` flies "
+        "Fast loop: 500 Hz tracking of the MPC's plan for every controller; `--tracking pid` flies "
         "the paper's PIDs instead.",
         "c_s and c_e are those of the MPC's inputs, as in the paper. Where the MPC plans from its "
         "own plan, the fast loop meets the disturbance and its effort is not in them.",

@@ -1,7 +1,7 @@
 """The paper's own prediction model as the plant: six double integrators (eq 16).
 
 The commanded acceleration is reached at once and the disturbance adds to it; the body stays
-level. The same trajectories, safe sets, disturbances and referee as in the full plant, so
+level. The same trajectories, safe sets, disturbances and evaluator as in the full plant, so
 that only the plant differs. Motion between disturbance changes is a parabola and is judged
 every exchange of 2 ms.
 """
@@ -12,18 +12,18 @@ import math
 from dataclasses import dataclass
 
 from fsw.control.braking import Brake
+from fsw.flight.plan_exchange import plan_input
 from fsw.model.airframe import AIRFRAME
 from fsw.mpc.planner import Planner
 from fsw.parameters.flight_config import FlightConfig
-from fsw.runtime.planning import plan_input
 from fsw.signals import Plan, PlanInput, PlanRequest, PredictionState, Vec2, Vec3
-from sitl.admission import check
 from sitl.disturbances.items import push
+from sitl.flight_evaluator import FlightEvaluator, Points
 from sitl.mission_clock import MissionClock
-from sitl.referee import Points, Referee
+from sitl.result import EndReason, TruthResult
 from sitl.scenario import V3, Scenario
+from sitl.scenario_validation import check
 from sitl.simulation import SAMPLE_STEPS, START_US, STEP_US
-from sitl.verdict import EndReason, TruthResult
 from studies.flight_result import (
     TRACE_STEPS,
     FlightRecorder,
@@ -112,7 +112,7 @@ class DoubleIntegrator:
         self.step = 0
         self.state = _first_state(scenario, self.clock.target_at(0.0).p)
         self._pushes = [push(item, seed, _STEP_S) for item in scenario.disturbances]
-        self.referee = Referee(scenario, self.clock, self.state.points())
+        self.evaluator = FlightEvaluator(scenario, self.clock, self.state.points())
 
     @property
     def time_s(self) -> float:
@@ -127,7 +127,7 @@ class DoubleIntegrator:
     @property
     def ended(self) -> EndReason | None:
         """Why the run is over, None while it is not."""
-        return self.referee.ended
+        return self.evaluator.ended
 
     def advance(self, u: PlanInput) -> None:
         """One exchange of 2 ms under an input, judged at its end."""
@@ -135,14 +135,14 @@ class DoubleIntegrator:
         self.state = self.state.after(u, push_W, _STEP_S)
         self.step += 1
         points = self.state.points()
-        self.referee.judge(points, self.time_s)
+        self.evaluator.judge(points, self.time_s)
         if self.step % SAMPLE_STEPS == 0:
-            self.referee.sample_error(points, self.time_s)
-        self.referee.judge_time(self.time_s)
+            self.evaluator.sample_error(points, self.time_s)
+        self.evaluator.judge_time(self.time_s)
 
     def result(self) -> TruthResult:
         """The score so far."""
-        return self.referee.result(self.time_s)
+        return self.evaluator.result(self.time_s)
 
     def _push(self) -> V3:
         x = y = z = 0.0
@@ -161,12 +161,12 @@ def fly(
     Args:
         scenario: With a trajectory that starts in the air.
         seed: Of every random number of the plant.
-        config: Its planner is flown; give it ``LagModel(at_once=True)``.
+        config: Its planner is flown; give it ``AttitudeLag(at_once=True)``.
         traced: Keep the truth for figures.
     """
     plant = DoubleIntegrator(scenario, seed)
-    planner = Planner(config.planner, processor_time_us)
-    brake = Brake(config.planner.lag, config.planner.limits.tilt)
+    planner = Planner(config.planner, config.airframe, processor_time_us)
+    brake = Brake(config.airframe, config.planner.limits.tilt)
     recorder = FlightRecorder()
     held, running = safe_set(scenario), None
     steps = config.mpc_period_us // STEP_US
@@ -208,6 +208,6 @@ def _first_state(scenario: Scenario, p_target: V3) -> PointMass:
 
 def _trace_point(plant: DoubleIntegrator) -> TracePoint:
     points = plant.state.points()
-    margins = plant.referee.margins(points, plant.time_s)
+    margins = plant.evaluator.margins(points, plant.time_s)
     aim = plant.clock.target_at(plant.time_s).p
     return TracePoint(plant.time_s, points[0], points[2], aim, min(margins))

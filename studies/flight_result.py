@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 
 from fsw.runtime.effort import EffortRecord
 from fsw.signals import Plan, PlanFailure
+from sitl.result import TruthResult
 from sitl.scenario import V3
-from sitl.verdict import TruthResult
 
 TRACE_STEPS = 20  # 40 ms between points of a trace
 

@@ -53,7 +53,12 @@ class InverseWorkspace:
         self._nearest = cKDTree(self.boundary)
 
     def contains(self, x: Array, up: Array) -> NDArray[np.bool_]:
-        """Whether some permitted elbow reaches the end-effector from these base positions."""
+        """Whether some permitted elbow reaches the end-effector from these base positions.
+
+        Args:
+            x: Forward of the end-effector (n,) [m].
+            up: Above the end-effector (n,) [m].
+        """
         l1, l2 = self._airframe.link_length
         cosine = (x * x + up * up - l1 * l1 - l2 * l2) / (2.0 * l1 * l2)
         bend = np.arccos(np.clip(cosine, -1.0, 1.0))
@@ -69,7 +74,7 @@ class InverseWorkspace:
         return inside
 
     def inscribed_radius(self, x: float, up: float) -> float:
-        """Radius of the largest disc about a centre [m]; negative depth outside the set."""
+        """Radius [m] of the largest disc about ``x``, ``up`` [m]; negative outside the set."""
         return float(self._radii(np.array([x]), np.array([up]))[0])
 
     def largest(self, *, on_axis: bool = False) -> Inscribed:

@@ -1,24 +1,23 @@
 """A point obstacle as a wall: the tangent plane of its clearance ball, from where one looks.
 
 An upright obstacle has a cylinder in place of the ball, whose tangent planes are upright.
-The half-space in front of that plane lies outside the ball. So whoever keeps off the plane, or
-stops in front of it, keeps off the obstacle, and what is right beside a wall is right here.
+The half-space in front of that plane lies outside the ball. A point that keeps off the plane, or
+stops in front of it, keeps off the obstacle, so the rules for walls apply.
 
 Source: docs/equations.md E11.
 """
 
 from __future__ import annotations
 
-import math
-
+from fsw.geometry.vectors import dot, norm
 from fsw.signals import PointObstacle, SafeSet, Vec3, Wall
 
 CENTRE_BALL = 0.002  # m; closer to the obstacle its direction is noise and any does
 
 
 def distance_to(obstacle: PointObstacle, p: Vec3) -> float:
-    """From an obstacle to a point [m]: level where the obstacle is upright."""
-    return math.sqrt(sum(c * c for c in _away(obstacle, p)))
+    """From an obstacle to ``p`` [m, NED], level where the obstacle is upright [m]."""
+    return norm(_away(obstacle, p))
 
 
 def tangent(obstacle: PointObstacle, p: Vec3) -> Wall:
@@ -26,13 +25,12 @@ def tangent(obstacle: PointObstacle, p: Vec3) -> Wall:
 
     Args:
         obstacle: Whose distance to the point is the wall's.
-        p: The point [m].
+        p: The point [m, NED].
     """
-    o = obstacle.position
-    x, y, z = _away(obstacle, p)
-    length = math.sqrt(x * x + y * y + z * z)
+    x, y, z = away = _away(obstacle, p)
+    length = norm(away)
     n = (x / length, y / length, z / length) if length > CENTRE_BALL else (1.0, 0.0, 0.0)
-    return Wall(n, n[0] * o[0] + n[1] * o[1] + n[2] * o[2], obstacle.clearance)
+    return Wall(n, dot(n, obstacle.position), obstacle.clearance)
 
 
 def _away(obstacle: PointObstacle, p: Vec3) -> Vec3:
@@ -41,7 +39,7 @@ def _away(obstacle: PointObstacle, p: Vec3) -> Vec3:
 
 
 def planes(safe_set: SafeSet, p: Vec3) -> tuple[Wall, ...]:
-    """Everything that a point [m] is to keep off, as walls; a sphere is not among it."""
+    """All walls and obstacles, the latter as walls seen from ``p`` [m, NED]."""
     if not safe_set.obstacles:
         return safe_set.walls
     return (*safe_set.walls, *(tangent(obstacle, p) for obstacle in safe_set.obstacles))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from fsw.compiled import compilable
+from fsw.geometry.vectors import clamp, clamp_magnitude
 from fsw.model.airframe import Airframe
 from fsw.signals import Vec3, Vec4
 
@@ -16,8 +17,8 @@ def allocate(airframe: Airframe, torque: Vec3, thrust: float, yaw_limit: float) 
 
     Args:
         airframe: Rotor arm, drag and thrust limits.
-        torque: Wanted body torque [N m].
-        thrust: Wanted total thrust [N].
+        torque: Commanded body torque [N m, FRD].
+        thrust: Commanded total thrust [N].
         yaw_limit: Most thrust a rotor may spend on yaw [N].
 
     Returns:
@@ -25,15 +26,10 @@ def allocate(airframe: Airframe, torque: Vec3, thrust: float, yaw_limit: float) 
     """
     top = airframe.rotor_thrust_max
     half = 0.5 * top
-    roll = _limit(torque[0] / (2.0 * airframe.rotor_arm), half)
-    pitch = _limit(torque[1] / (2.0 * airframe.rotor_arm), half)
+    roll = clamp_magnitude(torque[0] / (2.0 * airframe.rotor_arm), half)
+    pitch = clamp_magnitude(torque[1] / (2.0 * airframe.rotor_arm), half)
     spread = max(abs(roll), abs(pitch))
-    lift = min(max(0.25 * thrust, spread), top - spread)
+    lift = clamp(0.25 * thrust, spread, top - spread)
     room = min(yaw_limit, lift - spread, top - spread - lift)
-    yaw = _limit(0.25 * torque[2] / airframe.yaw_per_thrust, max(room, 0.0))
+    yaw = clamp_magnitude(0.25 * torque[2] / airframe.yaw_per_thrust, max(room, 0.0))
     return (lift - pitch + yaw, lift + roll - yaw, lift + pitch + yaw, lift - roll - yaw)
-
-
-@compilable
-def _limit(value: float, bound: float) -> float:
-    return min(max(value, -bound), bound)

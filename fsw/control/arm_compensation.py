@@ -17,8 +17,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from fsw.compiled import compilable
+from fsw.geometry.rotation import rotate_back
+from fsw.geometry.vectors import clamp, clamp_magnitude, norm, subtract
 from fsw.model.airframe import Airframe
-from fsw.model.arm_kinematics import END_EFFECTOR, arm_points
+from fsw.model.kinematics import END_EFFECTOR, arm_points, links
 from fsw.model.prediction import to_vector
 from fsw.signals import PredictionState, StateEstimate, Vec2, Vec3
 
@@ -66,11 +68,12 @@ def compensated_joints(
     l1, l2 = airframe.link_length[0], airframe.link_length[1]
     p_WE, v_WE = planned_end_effector(airframe, plan)
     x, z, vx, vz = _seen_from_base(estimate, p_WE, v_WE)
-    share = _share(_distance(plan.p, estimate.p_WB), limits.whole, limits.none)
+    share = _share(norm(subtract(plan.p, estimate.p_WB)), limits.whole, limits.none)
     if share < 1.0:
-        th1, th12 = plan.q_arm[0], plan.q_arm[0] + plan.q_arm[1]
-        x = share * x + (1.0 - share) * (l1 * math.sin(th1) + l2 * math.sin(th12))
-        z = share * z + (1.0 - share) * (l1 * math.cos(th1) + l2 * math.cos(th12))
+        th1 = plan.q_arm[0]
+        (x1, z1), (x2, z2) = links(airframe.link_length, th1, th1 + plan.q_arm[1])
+        x = share * x + (1.0 - share) * (x1 + x2)
+        z = share * z + (1.0 - share) * (z1 + z2)
         vx, vz = share * vx, share * vz
     length = math.hypot(x, z)
     if length < 1e-3:
@@ -78,25 +81,19 @@ def compensated_joints(
     # A plan that is nearly straight has no side; the arm then stays on the one it is on.
     side = plan.q_arm[1] if abs(plan.q_arm[1]) >= _LEAST_BEND else estimate.q_arm[1]
     straight = l1 + l2
-    scale = min(max(length, limits.fold * straight), limits.reach * straight) / length
+    scale = clamp(length, limits.fold * straight, limits.reach * straight) / length
     x, z = x * scale, z * scale
     cos2 = (x * x + z * z - l1 * l1 - l2 * l2) / (2.0 * l1 * l2)
-    th2 = math.copysign(math.acos(min(max(cos2, -1.0), 1.0)), side)
+    th2 = math.copysign(math.acos(clamp_magnitude(cos2, 1.0)), side)
     th1 = math.atan2(x, z) - math.atan2(l2 * math.sin(th2), l1 + l2 * math.cos(th2))
     th1, th12 = _within_limits(airframe, limits, th1, th1 + th2)
     return (th1, th12 - th1), _rates(airframe, th1, th12, vx, vz)
 
 
 @compilable
-def _distance(a: Vec3, b: Vec3) -> float:
-    dx, dy, dz = a[0] - b[0], a[1] - b[1], a[2] - b[2]
-    return math.sqrt(dx * dx + dy * dy + dz * dz)
-
-
-@compilable
 def _share(distance: float, whole: float, none: float) -> float:
     """From 1 up to ``whole`` to 0 from ``none`` on."""
-    return min(max((none - distance) / (none - whole), 0.0), 1.0)
+    return clamp((none - distance) / (none - whole), 0.0, 1.0)
 
 
 _LEAST_BEND = 0.2  # rad; a straighter plan has no side
@@ -107,15 +104,12 @@ def _seen_from_base(
     estimate: StateEstimate, p_WE: Vec3, v_WE: Vec3
 ) -> tuple[float, float, float, float]:
     """Where the point is in the arm's plane of the real body, and how it moves there."""
-    R, p, v = estimate.R_WB, estimate.p_WB, estimate.v_WB
-    dx, dy, dz = p_WE[0] - p[0], p_WE[1] - p[1], p_WE[2] - p[2]
-    ux, uy, uz = v_WE[0] - v[0], v_WE[1] - v[1], v_WE[2] - v[2]
-    x = R[0] * dx + R[3] * dy + R[6] * dz
-    y = R[1] * dx + R[4] * dy + R[7] * dz
-    z = R[2] * dx + R[5] * dy + R[8] * dz
+    R = estimate.R_WB
+    x, y, z = rotate_back(R, subtract(p_WE, estimate.p_WB))
+    ux, _, uz = rotate_back(R, subtract(v_WE, estimate.v_WB))
     wx, wy, wz = estimate.w_WB_B
-    vx = R[0] * ux + R[3] * uy + R[6] * uz - (wy * z - wz * y)
-    vz = R[2] * ux + R[5] * uy + R[8] * uz - (wx * y - wy * x)
+    vx = ux - (wy * z - wz * y)
+    vz = uz - (wx * y - wy * x)
     return x, z, vx, vz
 
 
@@ -123,15 +117,14 @@ def _seen_from_base(
 def _within_limits(airframe: Airframe, limits: CompensationLimits, th1: float, th12: float) -> Vec2:
     bound1 = airframe.joint1_limit - limits.joint_margin
     bound12 = airframe.joint12_limit - limits.joint_margin
-    return min(max(th1, -bound1), bound1), min(max(th12, -bound12), bound12)
+    return clamp_magnitude(th1, bound1), clamp_magnitude(th12, bound12)
 
 
 @compilable
 def _rates(airframe: Airframe, th1: float, th12: float, vx: float, vz: float) -> Vec2:
     """Joint rates for a velocity of the end-effector in the body's x-z plane."""
     l1, l2 = airframe.link_length[0], airframe.link_length[1]
-    x1, z1 = l1 * math.sin(th1), l1 * math.cos(th1)
-    x2, z2 = l2 * math.sin(th12), l2 * math.cos(th12)
+    (x1, z1), (x2, z2) = links(airframe.link_length, th1, th12)
     # [vx, vz] = [[z1, z2], [-x1, -x2]] [w1, w12]
     determinant = z2 * x1 - z1 * x2
     if abs(determinant) < 0.1 * l1 * l2:

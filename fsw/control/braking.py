@@ -22,8 +22,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import solve_continuous_are
 
-from fsw.model.airframe import GRAVITY
-from fsw.model.prediction import A, J, LagModel, S, V, continuous_model
+from fsw.geometry.vectors import clamp_magnitude
+from fsw.model.airframe import GRAVITY, Airframe
+from fsw.model.prediction import A, J, S, V, continuous_model
 from fsw.signals import PlanInput, PredictionState, Vec2
 
 
@@ -31,7 +32,7 @@ from fsw.signals import PlanInput, PredictionState, Vec2
 class BrakeTuning:
     """How hard to brake."""
 
-    effort: float = 0.02  # price of (m/s^2)^2 against (m/s)^2
+    input_weight: float = 0.02  # LQR weight of (m/s^2)^2 against (m/s)^2
     vertical_rate: float = 4.0  # 1/s
     vertical: float = 2.0  # m/s^2
     joint_rate: float = 6.0  # 1/s
@@ -42,22 +43,22 @@ class BrakeTuning:
 class Brake:
     """The braking law of one prediction model."""
 
-    def __init__(self, lag: LagModel, tilt: float, tuning: BrakeTuning | None = None) -> None:
+    def __init__(self, airframe: Airframe, tilt: float, tuning: BrakeTuning | None = None) -> None:
         """Solve for the gains.
 
         Args:
-            lag: Of the attitude and the rotors.
+            airframe: The lag of its attitude and of its rotors.
             tilt: The most that may be asked for [rad]: the planner's own limit, ``PLN_TILT_MAX``.
             tuning: How hard to brake.
         """
         self._tuning = tuning or BrakeTuning()
         self._tilt_slope = math.tan(tilt)
-        self._gains = _gains(lag, self._tuning.effort)
+        self._gains = _gains(airframe, self._tuning.input_weight)
 
     def __call__(self, x: PredictionState) -> PlanInput:
         """The input that brings a state of the plan towards rest."""
         tuning = self._tuning
-        vertical = _limited(-tuning.vertical_rate * x.v[2], tuning.vertical)
+        vertical = clamp_magnitude(-tuning.vertical_rate * x.v[2], tuning.vertical)
         kv, ka, kj, ks = self._gains
         wish_x = -(kv * x.v[0] + ka * x.a[0] + kj * x.j[0] + ks * x.s[0])
         wish_y = -(kv * x.v[1] + ka * x.a[1] + kj * x.j[1] + ks * x.s[1])
@@ -66,25 +67,23 @@ class Brake:
         scale = min(1.0, most / max(math.hypot(wish_x, wish_y), 1e-9))
         first, second = x.qd_arm
         joints: Vec2 = (
-            _limited(-tuning.joint_rate * first, tuning.joint),
-            _limited(-tuning.joint_rate * second, tuning.joint),
+            clamp_magnitude(-tuning.joint_rate * first, tuning.joint),
+            clamp_magnitude(-tuning.joint_rate * second, tuning.joint),
         )
         return PlanInput(
-            (scale * wish_x, scale * wish_y, vertical), _limited(-x.yaw_rate, tuning.yaw), joints
+            (scale * wish_x, scale * wish_y, vertical),
+            clamp_magnitude(-x.yaw_rate, tuning.yaw),
+            joints,
         )
 
 
-def _gains(lag: LagModel, effort: float) -> tuple[float, float, float, float]:
+def _gains(airframe: Airframe, input_weight: float) -> tuple[float, float, float, float]:
     """On velocity, acceleration, jerk and snap of one horizontal axis."""
-    if lag.at_once:
-        return 1.0 / math.sqrt(effort), 0.0, 0.0, 0.0
-    a, b = continuous_model(lag)
+    if airframe.attitude_lag.at_once:
+        return 1.0 / math.sqrt(input_weight), 0.0, 0.0, 0.0
+    a, b = continuous_model(airframe)
     axis = [V, A, J, S]
     a_axis, b_axis = a[np.ix_(axis, axis)], b[axis, :1]
-    price = solve_continuous_are(a_axis, b_axis, np.diag([1.0, 0.0, 0.0, 0.0]), [[effort]])
-    kv, ka, kj, ks = (b_axis.T @ price / effort)[0].tolist()
+    riccati = solve_continuous_are(a_axis, b_axis, np.diag([1.0, 0.0, 0.0, 0.0]), [[input_weight]])
+    kv, ka, kj, ks = (b_axis.T @ riccati / input_weight)[0].tolist()
     return kv, ka, kj, ks
-
-
-def _limited(value: float, bound: float) -> float:
-    return min(max(value, -bound), bound)

@@ -6,6 +6,7 @@ import math
 
 from fsw.compiled import compilable
 from fsw.control.pid import PidGains, pid_step
+from fsw.geometry.vectors import clamp_magnitude
 from fsw.model.airframe import Airframe
 from fsw.signals import StateEstimate, Vec2
 
@@ -53,7 +54,7 @@ def joint_torques(
         specific_thrust,
     )
     bound = airframe.joint_torque_max
-    torques = (min(max(torque1, -bound), bound), min(max(torque2, -bound), bound))
+    torques = (clamp_magnitude(torque1, bound), clamp_magnitude(torque2, bound))
     return torques, (kept1, kept2)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from fsw.compiled import compilable
+from fsw.geometry.vectors import clamp_magnitude
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +36,7 @@ def pid_step(
     """
     grown = integral + error * dt
     raw = gains.kp * error + gains.ki * grown + gains.kd * error_rate
-    output = min(max(raw, -gains.limit), gains.limit)
+    output = clamp_magnitude(raw, gains.limit)
     # Integrating while saturated would have to be unwound before the output could leave
     # the limit; keep growth only when it pulls back inside.
     winding_up = raw != output and error * raw > 0.0

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from fsw.geometry.rotation import rotate, yaw_of
+from fsw.geometry.vectors import add_scaled, norm
 from fsw.model.airframe import GRAVITY
 from fsw.signals import Mat3, StateEstimate, Vec3
 
@@ -14,29 +15,25 @@ def moved_on(x: StateEstimate, seconds: float) -> StateEstimate:
 
     Args:
         x: As measured.
-        seconds: How old that is; milliseconds, not more.
+        seconds: Age of the measurement [s], a few milliseconds.
     """
     t, R = seconds, x.R_WB
     a = (-x.specific_force * R[2], -x.specific_force * R[5], GRAVITY - x.specific_force * R[8])
     (q1, q2), (qd1, qd2) = x.q_arm, x.qd_arm
     turned = _turned(R, (t * x.w_WB_B[0], t * x.w_WB_B[1], t * x.w_WB_B[2]))
     return x._replace(
-        p_WB=_added(x.p_WB, t, _added(x.v_WB, 0.5 * t, a)),
-        v_WB=_added(x.v_WB, t, a),
+        p_WB=add_scaled(x.p_WB, add_scaled(x.v_WB, a, 0.5 * t), t),
+        v_WB=add_scaled(x.v_WB, a, t),
         R_WB=turned,
         yaw=yaw_of(turned),
         q_arm=(q1 + t * qd1, q2 + t * qd2),
     )
 
 
-def _added(x: Vec3, t: float, rate: Vec3) -> Vec3:
-    return x[0] + t * rate[0], x[1] + t * rate[1], x[2] + t * rate[2]
-
-
 def _turned(R: Mat3, angle: Vec3) -> Mat3:
     """R times the rotation by a small vector in body components (Rodrigues)."""
     x, y, z = angle
-    size = math.sqrt(x * x + y * y + z * z)
+    size = norm(angle)
     if size < 1e-12:
         return R
     s, c = math.sin(size) / size, (1.0 - math.cos(size)) / (size * size)

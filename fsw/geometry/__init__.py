@@ -1,1 +1,1 @@
-"""Rotations and frames."""
+"""Rotations, vectors and frames."""

@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 
 from fsw.compiled import compilable
+from fsw.geometry.vectors import clamp_magnitude
 from fsw.signals import Mat3, Vec3, Vec4
 
 
 @compilable
 def matrix_from_quaternion(q: Vec4) -> Mat3:
-    """Rotation matrix of a quaternion [w, x, y, z] that is close to unit length."""
+    """Rotation matrix of a quaternion ``q`` [1], (w, x, y, z), close to unit length."""
     w, x, y, z = q
     s = 2.0 / (w * w + x * x + y * y + z * z)
     xs, ys, zs = x * s, y * s, z * s
@@ -39,7 +40,7 @@ def yaw_of(R: Mat3) -> float:
 @compilable
 def euler_zyx(R: Mat3) -> Vec3:
     """Roll, pitch and yaw of a rotation [rad]."""
-    return math.atan2(R[7], R[8]), -math.asin(min(max(R[6], -1.0), 1.0)), yaw_of(R)
+    return math.atan2(R[7], R[8]), -math.asin(clamp_magnitude(R[6], 1.0)), yaw_of(R)
 
 
 def quaternion_from_matrix(R: Mat3) -> Vec4:
@@ -67,7 +68,7 @@ def quaternion_from_matrix(R: Mat3) -> Vec4:
 
 @compilable
 def rotate(R: Mat3, v: Vec3) -> Vec3:
-    """World components of a body vector."""
+    """World components of ``v`` [any unit, FRD]."""
     x, y, z = v
     return (
         R[0] * x + R[1] * y + R[2] * z,
@@ -77,6 +78,17 @@ def rotate(R: Mat3, v: Vec3) -> Vec3:
 
 
 @compilable
+def rotate_back(R: Mat3, v: Vec3) -> Vec3:
+    """Body components of ``v`` [any unit, NED]."""
+    x, y, z = v
+    return (
+        R[0] * x + R[3] * y + R[6] * z,
+        R[1] * x + R[4] * y + R[7] * z,
+        R[2] * x + R[5] * y + R[8] * z,
+    )
+
+
+@compilable
 def wrap_angle(angle: float) -> float:
-    """The same angle in [-pi, pi)."""
+    """The same ``angle`` [rad] within -pi..pi, pi excluded."""
     return (angle + math.pi) % (2.0 * math.pi) - math.pi

@@ -36,7 +36,7 @@ def build_links(
         inbox: Takes what is for the vehicle, from all of them.
         context: What encoders need.
         clocks: Monotonic time and Unix time [us].
-        record: Is told every frame of the ground station's link; the programs' link would repeat
+        record: Takes every frame of the ground station's link; the programs' link would repeat
             the same telemetry under the same sequence numbers.
         services: Makes what one link serves.
 

@@ -16,7 +16,7 @@ from fsw.link.outbox import Outbox, packed
 from fsw.link.peers import Peers
 from fsw.link.services.dispatch import Dispatch
 from fsw.link.services.service import LinkService
-from fsw.link.signing.signing import Signing, Verdict
+from fsw.link.signing.signing import FrameTrust, Signing
 from fsw.link.signing.signing_setup import set_up_signing
 from fsw.link.telemetry.link_commands import LinkCommands
 from fsw.link.telemetry.stream_rates import StreamRates
@@ -44,10 +44,10 @@ _FILE_DATA: Final = frozenset(
 
 @dataclass(frozen=True, slots=True)
 class LinkSetup:
-    """What tells one link from another."""
+    """Configuration of one link."""
 
     name: str  # in fsw.json
-    target: Address  # who is spoken to first
+    target: Address  # peer that is spoken to first
     local_port: int  # if it is free
     rates_hz: tuple[float, ...]  # of each stream
     unheard: bool  # whether everything is sent before anybody has been heard
@@ -55,7 +55,7 @@ class LinkSetup:
 
 
 class GcsLink:
-    """Serves the configured peer and those who speak to the vehicle."""
+    """Serves the configured peer and the peers that send valid frames."""
 
     def __init__(
         self,
@@ -75,7 +75,7 @@ class GcsLink:
             context: What encoders need.
             signing: Of this link.
             clock: Wall time, in which peers live.
-            record: Is told every frame of both directions.
+            record: Takes every frame of both directions.
             services: Of this link alone.
         """
         self.name = setup.name
@@ -110,7 +110,7 @@ class GcsLink:
 
     @property
     def peers(self) -> tuple[Address, ...]:
-        """Everyone who receives telemetry."""
+        """All receivers of telemetry."""
         return self._peers.all
 
     def fileno(self) -> int:
@@ -146,7 +146,7 @@ class GcsLink:
         return budget
 
     def announce(self, snapshot: FlightSnapshot, changed: bool) -> None:
-        """Say that the vehicle is there, to whoever has not spoken; see :meth:`publish`."""
+        """Send a heartbeat to a link without a client; see :meth:`publish`."""
         self._snapshot = snapshot
         if changed or snapshot.t_us >= self._housekeeping_us:
             self._housekeeping_us = snapshot.t_us + _HOUSEKEEPING_US
@@ -155,19 +155,19 @@ class GcsLink:
 
     def serve(self, t_us: int) -> None:
         """Let services go on with what they are sending; call it once a tick if it talks."""
-        self.dispatch.poll(t_us, partial(self.outbox.add_said, t_us=t_us))
+        self.dispatch.poll(t_us, partial(self.outbox.add_output, t_us=t_us))
         if self.outbox.waiting:
             self._send(t_us)
 
     def serve_bulk(self, t_us: int) -> bool:
         """Send a datagram of what clients wait for; whether there was anything."""
-        if not self.dispatch.bulk(t_us, partial(self.outbox.add_said, t_us=t_us)):
+        if not self.dispatch.bulk(t_us, partial(self.outbox.add_output, t_us=t_us)):
             return False
         self._send(t_us)
         return True
 
     def publish(self, outputs: TickOutputs, changed: bool) -> None:
-        """Send what is due, to whoever listens.
+        """Send what is due to all peers.
 
         Args:
             outputs: Of this tick.
@@ -199,13 +199,13 @@ class GcsLink:
 
     def _take(self, t_us: int, frame: Frame, raw: bytes, sender: Address) -> None:
         """Let a frame whose checksum is right do what it may."""
-        verdict = self.signing.judge(frame, raw)
-        if verdict is Verdict.REFUSED:
+        trust = self.signing.judge(frame, raw)
+        if trust is FrameTrust.REFUSED:
             return
         self.accepted += 1
         if self._record is not None:
             self._record(t_us, raw)
-        if verdict is Verdict.TRUSTED:
+        if trust is FrameTrust.TRUSTED:
             self._peers.heard(sender, self._clock(), version_1=is_version_1(raw))
             self.talks = True
             if len(self._speakers) < _MAX_SPEAKERS:
@@ -216,7 +216,7 @@ class GcsLink:
             if text is not None:
                 self.outbox.add_text(text, t_us)
             return
-        answer = self._commands.answer(frame, t_us, self._snapshot)
+        answer = self._commands.handle(frame, t_us, self._snapshot)
         if answer is None:
             self._inbox.accept(frame)
         else:
@@ -225,7 +225,7 @@ class GcsLink:
                 self.outbox.add_asked_for(message)
             if refusal is not None:
                 self.outbox.add_text(refusal, t_us)
-        self.dispatch.receive(frame, t_us, partial(self.outbox.add_said, t_us=t_us))
+        self.dispatch.handle(frame, t_us, partial(self.outbox.add_output, t_us=t_us))
 
     def _encode(self, stream: Stream, snapshot: FlightSnapshot) -> None:
         try:

@@ -14,7 +14,7 @@ from fsw.ports import Clock
 from fsw.signals import CommandAck, TickOutputs
 
 _READ_BYTES: Final = 4096  # of each link a slot in lockstep, of all links a tick in real time
-_UNHEARD_SLOTS: Final = 5  # from one look at a link that nobody speaks on to the next
+_UNHEARD_SLOTS: Final = 5  # between two polls of a link without a client
 # Tick of a slot on which its messages are encoded; they are sent on the next one. So neither the
 # sending nor what a planning period begins with falls on the same tick.
 _ENCODES: Final = 2
@@ -42,7 +42,7 @@ class GroundLinks:
         if self._attends or self._tick % self._slot_ticks:
             return
         for link in self.links:
-            # A system call for each look; whoever has not spoken yet can wait a little longer.
+            # Each poll is a system call; a link without a client can wait a little longer.
             if link.talks or self._tick % (_UNHEARD_SLOTS * self._slot_ticks) == 0:
                 link.read(t_us, _READ_BYTES)
 
@@ -101,7 +101,7 @@ class GroundLinks:
                 link.read(t_us, _ONE)
 
     def acknowledge(self, t_us: int, ack: CommandAck) -> None:
-        """Answer a command on the link it came from; on all where that cannot be told."""
+        """Answer a command on the link it came from; on all where that is not known."""
         hearing = [
             link for link in self.links if link.hears(ack.target_system, ack.target_component)
         ]

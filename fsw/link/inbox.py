@@ -4,17 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Final, cast
 
-from fsw.link.wire import decode, decode_setpoints, message_ids
+from fsw.geometry.geodesy import DEFAULT_ORIGIN, to_local
+from fsw.link.wire import decode, decode_commands, decode_setpoints, message_ids
 from fsw.link.wire.decode import Numbers
 from fsw.signals import (
     AttitudeSetpoint,
+    Command,
     CommandRequest,
     EndEffectorTarget,
     JointSetpoint,
     MissionUpdate,
     MotionSetpoint,
+    Origin,
     Plan,
     PlanFailure,
     PointObstacle,
@@ -35,7 +39,7 @@ Setpoint = MotionSetpoint | AttitudeSetpoint | JointSetpoint
 
 @dataclass(frozen=True, slots=True)
 class Setpoints:
-    """The newest set-points for now; at most one of motion and attitude."""
+    """The newest setpoints for now; at most one of motion and attitude."""
 
     motion: MotionSetpoint | None = None
     attitude: AttitudeSetpoint | None = None
@@ -52,9 +56,11 @@ class Inbox:
     Bounded: what does not fit is dropped and counted, as a lost datagram would be.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, origin: Origin = DEFAULT_ORIGIN) -> None:
+        """Begin empty; commands name places on Earth, from ``origin`` of the local frame on."""
+        self._locate = partial(to_local, origin)
         self.refused = 0  # messages with numbers of no use, or too many of them
-        self._commands: list[CommandRequest] = []
+        self._commands: list[Command] = []
         self._targets: list[EndEffectorTarget] = []
         self._setpoints = NO_SETPOINTS
         self._station_heard = False
@@ -86,7 +92,7 @@ class Inbox:
         if handler is not None:
             handler(frame)
 
-    def take_commands(self) -> tuple[CommandRequest, ...]:
+    def take_commands(self) -> tuple[Command, ...]:
         """Hand over the commands, in order of arrival."""
         if not self._commands:
             return ()
@@ -108,7 +114,7 @@ class Inbox:
         return taken
 
     def take_setpoints(self) -> Setpoints:
-        """Hand over the newest set-points for now."""
+        """Hand over the newest setpoints for now."""
         taken, self._setpoints = self._setpoints, NO_SETPOINTS
         return taken
 
@@ -166,7 +172,7 @@ class Inbox:
         if len(self._commands) >= _MAX_COMMANDS:
             self.refused += 1
             return
-        self._commands.append(request)
+        self._commands.append(decode_commands.command(request, self._locate))
 
     def _target(self, frame: Frame) -> None:
         values = cast(Numbers, frame.payload_values)
@@ -196,7 +202,7 @@ class Inbox:
     def _add(
         self, values: Numbers, target: Numbers, read: Callable[[Numbers], Setpoint | None]
     ) -> None:
-        """Keep the newest of each kind; one for somebody else is refused like a wrong one."""
+        """Keep the newest of each kind; one for another vehicle is refused like a wrong one."""
         setpoint = read(values) if decode.for_this_vehicle(*target) else None
         kept = self._setpoints
         if setpoint is None:

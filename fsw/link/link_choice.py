@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from command_line.options import option, switch
+from command_line.values import one_of
 from fsw.geometry.geodesy import DEFAULT_ORIGIN
 from fsw.link.udp_endpoint import Address, LinkError, parse_address
 from fsw.link.wire.telemetry_context import GENERIC, PX4
@@ -14,30 +16,6 @@ from fsw.signals import Origin
 
 NO_LINK: Final = "none"
 AUTOPILOTS: Final = {"px4": PX4, "generic": GENERIC}
-
-
-@dataclass(frozen=True, slots=True)
-class LinkChoice:
-    """Where telemetry goes and who is heard; the defaults are those of the command line."""
-
-    gcs: str = "udp:127.0.0.1:14550"  # udp:HOST:PORT of the ground station
-    api: str = "udp:127.0.0.1:14540"  # the same of a program, or "none"
-    allow_remote: bool = False  # hear other machines though both are on this one
-    autopilot: str = "px4"  # or "generic": what the vehicle says it is
-    origin: Origin = DEFAULT_ORIGIN  # where on Earth the local frame begins
-    keys: Path | None = None  # directory of the signing keys; None: default_keys()
-
-    def as_arguments(self) -> list[str]:
-        """The same as words of a command line."""
-        words = [f"--gcs={self.gcs}", f"--api={self.api}", f"--autopilot={self.autopilot}"]
-        place = self.origin
-        if place != DEFAULT_ORIGIN:
-            words.append(f"--origin={place.latitude!r},{place.longitude!r},{place.altitude!r}")
-        if self.allow_remote:
-            words.append("--allow-remote")
-        if self.keys is not None:
-            words.append(f"--keys={self.keys}")
-        return words
 
 
 def parse_origin(text: str) -> Origin:
@@ -57,6 +35,45 @@ def parse_origin(text: str) -> Origin:
             "altitude -500 to 9000 m"
         )
     return Origin(latitude, longitude, altitude)
+
+
+def origin_text(origin: Origin) -> str:
+    """The opposite of :func:`parse_origin`."""
+    return f"{origin.latitude!r},{origin.longitude!r},{origin.altitude!r}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LinkChoice:
+    """Where telemetry goes and who is heard; the fields are the options of a command line."""
+
+    gcs: str = option(
+        "--gcs udp:HOST:PORT", "GCS address for telemetry", default="udp:127.0.0.1:14550"
+    )
+    api: str = option(
+        "--api udp:HOST:PORT",
+        "address of a program, such as one with MAVSDK, or none",
+        default="udp:127.0.0.1:14540",
+    )
+    allow_remote: bool = switch(
+        "--allow-remote", "accept other machines even while telemetry goes to this one"
+    )
+    autopilot: str = option(
+        "--autopilot NAME",
+        "MAV_AUTOPILOT reported in HEARTBEAT: px4 or generic",
+        one_of("autopilot", *AUTOPILOTS),
+        default="px4",
+    )
+    origin: Origin = option(
+        "--origin LAT,LON,ALT",
+        "origin of the local frame, in degrees and metres above sea level; "
+        "a negative latitude needs --origin=LAT,LON,ALT",
+        parse_origin,
+        default=DEFAULT_ORIGIN,
+        text=origin_text,
+    )
+    keys: Path | None = option(
+        "--keys DIR", "directory of the signing keys (default ~/.local/state/pandion)", Path
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,6 +98,6 @@ def addresses(choice: LinkChoice) -> LinkAddresses:
 
 
 def default_keys() -> Path:
-    """Where signing keys are kept unless told otherwise."""
+    """Default directory of signing keys."""
     state = os.environ.get("XDG_STATE_HOME")
     return (Path(state) if state else Path.home() / ".local" / "state") / "pandion"

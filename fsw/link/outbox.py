@@ -9,7 +9,7 @@ from fsw.link.signing.signing import Signing
 from fsw.link.text_limiter import TextLimiter
 from fsw.link.wire import encode_replies, message_ids
 from fsw.link.wire.message_ids import AUTOPILOT, PANDION, SYSTEM_ID
-from fsw.link.wire.outgoing import Outgoing, Said, WireValues
+from fsw.link.wire.outgoing import Outgoing, ServiceOutput, WireValues
 from fsw.signals import StatusText
 from messages.frames import FrameWriter
 
@@ -45,8 +45,8 @@ class Outbox:
             return
         self._add_frame(frame)
 
-    def add_said(self, outgoing: Said, t_us: int) -> None:
-        """Take what a service says."""
+    def add_output(self, outgoing: ServiceOutput, t_us: int) -> None:
+        """Take an output of a service."""
         if isinstance(outgoing, StatusText):
             self.add_text(outgoing, t_us)
             return
@@ -57,16 +57,16 @@ class Outbox:
         self._add_frame(writer.packed_frame(outgoing.message_id, outgoing.payload))
 
     def add_asked_for(self, outgoing: Outgoing) -> None:
-        """Take what somebody asked for: in MAVLink 2 if MAVLink 1 has no such message.
+        """Take a requested message: in MAVLink 2 if MAVLink 1 has no such message.
 
-        That a peer speaks MAVLink 1 may just come of not having been told the version.
+        A peer may speak MAVLink 1 only because it does not know our version yet.
         """
         before = len(self._frames)
         self.add(outgoing.component, outgoing.message_id, outgoing.values)
         self._asked_for.update(self._frames[before:])
 
     def add_text(self, text: StatusText, t_us: int) -> None:
-        """Take a sentence, unless it has just been said."""
+        """Take a text, unless it has just been sent."""
         admitted = self._limiter.admit(text, t_us)
         if admitted is not None:
             self._add_text(admitted)

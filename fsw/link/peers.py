@@ -1,4 +1,4 @@
-"""Who receives telemetry."""
+"""Receivers of telemetry."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ _MAX_LEARNT: Final = 4
 class Peers:
     """The configured peer and the few others that were heard last.
 
-    Bounded, so that a flood of forged sources cannot turn the vehicle into an amplifier; who falls
-    silent is forgotten. Times are wall time [us], because peers live in it.
+    Bounded, so that a flood of forged sources cannot turn the vehicle into an amplifier; silent
+    peers are removed. Times are wall time [us], because peers live in it.
     """
 
     def __init__(self, configured: Address) -> None:
@@ -42,7 +42,7 @@ class Peers:
         self._list()
 
     def expire(self, now_us: int) -> None:
-        """Forget who has been silent for too long; call it now and then."""
+        """Remove peers that have been silent for too long; call it once a second."""
         silent = [peer for peer, at in self._heard_us.items() if now_us - at > EXPIRY_US]
         for peer in silent:
             del self._heard_us[peer]

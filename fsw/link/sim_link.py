@@ -11,35 +11,36 @@ from enum import Enum
 from typing import Final, cast
 
 from fsw.link.inbox import Inbox
-from fsw.link.udp_endpoint import Address, ConnectedEndpoint
+from fsw.link.udp_endpoint import Address
 from fsw.link.wire import decode, encode_replies, message_ids
 from fsw.link.wire.decode import Numbers
 from fsw.link.wire.message_ids import AUTOPILOT, SYSTEM_ID
 from fsw.link.wire.px4_mode import custom_mode
-from fsw.link.wire.telemetry_context import VehicleFacts
+from fsw.ports import VehicleFacts
 from fsw.signals import CommandAck, FlightSnapshot, Mode, SensorFrame, TickOutputs
-from messages.convoy import ConvoyReader
 from messages.frames import Frame, FrameWriter, split
+from messages.lockstep_codec import LockstepReader
+from messages.udp import PeerSocket
 
 PATIENCE_S: Final = 0.2  # one wait for a datagram; also the interval of announcements
 
 _SHUTDOWN: Final = 246  # MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN
 _POWER_OFF: Final = 2.0  # its second parameter here: shut the autopilot down
 _ACCEPTED: Final = 0  # MAV_RESULT
-_TELL_US: Final = 1_000_000  # the mode is told when it changes, and this often
+_REPORT_US: Final = 1_000_000  # the mode is reported when it changes, and this often
 _QUADROTOR: Final = 2  # MAV_TYPE
 _PX4: Final = 12  # MAV_AUTOPILOT
 _CUSTOM_MODE: Final = 1  # MAV_MODE_FLAG
 _ARMED: Final = 128
 _STANDBY, _ACTIVE = 3, 4  # MAV_STATE
 # An ordinary step; with the number of first values that are of use.
-_STEP: Final = ConvoyReader(
+_STEP: Final = LockstepReader(
     (message_ids.ODOMETRY, 14), (message_ids.ARM_JOINT_STATE, 7), (message_ids.HIL_SENSOR, 7)
 )
 
 
 class Pacing(Enum):
-    """Who waits for whom; the simulator says it in the custom_mode of its HEARTBEAT."""
+    """Lockstep or real time, from the custom_mode of the simulator's HEARTBEAT."""
 
     REALTIME = 0
     LOCKSTEP = 1
@@ -52,7 +53,7 @@ class SimLink:
         self.pacing: Pacing | None = None  # known with the first step in lockstep
         self.shutdown = False  # the simulator has ended the run
         self.retransmissions = 0
-        self._endpoint = ConnectedEndpoint(simulator, PATIENCE_S)
+        self._endpoint = PeerSocket.connected(simulator, PATIENCE_S)
         self._inbox = inbox
         self._writer = FrameWriter(SYSTEM_ID, AUTOPILOT)
         self._thrust_scale = 1.0 / facts.rotor_thrust_max
@@ -61,15 +62,15 @@ class SimLink:
         self._answer: tuple[int, bytes] = (-1, b"")
         self._acks: list[CommandAck] = []
         self._text_id = 0
-        self._told_us = -_TELL_US
-        self._told_mode: Mode | None = None
+        self._reported_us = -_REPORT_US
+        self._reported_mode: Mode | None = None
 
     def announce(self) -> None:
-        """Tell the simulator where the vehicle is, until it sends steps."""
+        """Send a heartbeat, until the simulator sends steps."""
         values = (0, _QUADROTOR, _PX4, 0, _STANDBY, 3)
         self._endpoint.send(self._writer.frame(message_ids.HEARTBEAT, *values))
 
-    def receive(self) -> SensorFrame | None:
+    def wait_for_step(self) -> SensorFrame | None:
         """Wait for the next new step.
 
         Returns:
@@ -86,15 +87,15 @@ class SimLink:
             newest = self._read(datagram) or newest
         return newest
 
-    def wait(self, seconds: float) -> bool:
+    def wait(self, wait_s: float) -> bool:
         """Wait until a datagram is there; False when the time is over."""
-        return self._endpoint.wait(seconds)
+        return self._endpoint.wait(wait_s)
 
     def queue_ack(self, ack: CommandAck) -> None:
         """Send an acknowledgement with the next answer."""
         self._acks.append(ack)
 
-    def answer(self, t_us: int, outputs: TickOutputs) -> None:
+    def send_actuators(self, t_us: int, outputs: TickOutputs) -> None:
         """Send the actuator command that belongs to the step of ``t_us``."""
         values = encode_replies.hil_actuator_controls(
             t_us,
@@ -104,8 +105,8 @@ class SimLink:
             self._torque_scale,
         )
         controls = self._writer.frame(message_ids.HIL_ACTUATOR_CONTROLS, *values)
-        told = t_us - self._told_us >= _TELL_US
-        if self._acks or outputs.texts or told or outputs.snapshot.mode is not self._told_mode:
+        due = t_us - self._reported_us >= _REPORT_US
+        if self._acks or outputs.texts or due or outputs.snapshot.mode is not self._reported_mode:
             controls = self._mode(t_us, outputs.snapshot) + self._replies(outputs) + controls
         self._answer = (t_us, controls)
         self._endpoint.send(controls)
@@ -183,7 +184,7 @@ class SimLink:
 
     def _mode(self, t_us: int, snapshot: FlightSnapshot) -> bytes:
         """HEARTBEAT: the simulator sees whether its trajectory is being flown."""
-        self._told_us, self._told_mode = t_us, snapshot.mode
+        self._reported_us, self._reported_mode = t_us, snapshot.mode
         base_mode = _CUSTOM_MODE | (_ARMED if snapshot.armed else 0)
         status = _ACTIVE if snapshot.armed else _STANDBY
         values = (custom_mode(snapshot.mode), _QUADROTOR, _PX4, base_mode, status, 3)

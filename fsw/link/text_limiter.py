@@ -1,73 +1,100 @@
-"""Sentences on their way to one link: a repeated one is counted, not said again and again.
+"""Limits the status texts of one link: repeated ones are counted, floods are cut.
 
 An operator reads a handful of texts, and a ground station speaks them. A program that repeats a
-command that cannot be carried out, twice a second, must not bury the texts that matter.
+command that cannot be carried out, twice a second, must not bury the texts that matter. Nor may its
+refusals use up the budget of a failsafe's text, which is as severe: see ``_has_room``.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Any, Final
 
 from fsw.signals import Severity, StatusText
 
-REPEAT_US: Final = 5_000_000  # the same sentence is said once in this time
-_MOST: Final = 32  # sentences remembered
-_RATE_PER_S: Final = 5  # of different sentences, in the long run
+REPEAT_US: Final = 5_000_000  # the same text is sent once in this time
+_MOST: Final = 32  # texts and budgets remembered
+_RATE_PER_S: Final = 5  # texts of one budget, in the long run
 _BURST: Final = 20
+_NUMBER: Final = re.compile(r"[-+]?\d+(\.\d+)?")
 
 
 @dataclass(slots=True)
-class _Said:
+class _Sent:
     text: StatusText
     at_us: int
     held_back: int = 0
+
+
+@dataclass(slots=True)
+class _Budget:
+    room: float = _BURST
+    at_us: int = 0
 
 
 class TextLimiter:
     """One link's."""
 
     def __init__(self) -> None:
-        self._said: dict[str, _Said] = {}  # oldest first
-        self._room = float(_BURST)
-        self._room_us = 0
+        self._sent: dict[str, _Sent] = {}  # oldest first
+        self._budgets: dict[str, _Budget] = {}  # the same
         self._dropped = 0
+        self._dropped_us = 0
 
     def admit(self, text: StatusText, t_us: int) -> StatusText | None:
-        """The sentence if it is to be said now; None if it is counted only.
+        """The text if it is to be sent now; None if it is counted only.
 
         Args:
-            text: The sentence.
+            text: The text.
             t_us: Sensor time [us].
         """
-        before = self._said.get(text.text)
+        before = self._sent.get(text.text)
         if before is not None and t_us - before.at_us < REPEAT_US:
             before.held_back += 1
             return None
-        self._room = min(self._room + 1e-6 * _RATE_PER_S * (t_us - self._room_us), float(_BURST))
-        self._room_us = t_us
-        if self._room < 1.0:
+        if not self._has_room(text, t_us):
             self._dropped += 1
+            self._dropped_us = t_us
             return None
-        self._room -= 1.0
-        self._said.pop(text.text, None)
-        self._said[text.text] = _Said(text, t_us)
-        if len(self._said) > _MOST:
-            del self._said[next(iter(self._said))]
+        _renew(self._sent, text.text, _Sent(text, t_us))
         return _counted(before) if before is not None and before.held_back else text
 
     def overdue(self, t_us: int) -> Iterator[StatusText]:
-        """What was held back and has not come again, as information; call it now and then."""
-        for said in self._said.values():
-            if said.held_back and t_us - said.at_us >= REPEAT_US:
-                yield replace(_counted(said), severity=Severity.INFO)
-                said.at_us, said.held_back = t_us, 0
-        if self._dropped and self._room + 1e-6 * _RATE_PER_S * (t_us - self._room_us) >= 1.0:
+        """What was held back and has not come again, as information; call it once a second."""
+        for sent in self._sent.values():
+            if sent.held_back and t_us - sent.at_us >= REPEAT_US:
+                yield replace(_counted(sent), severity=Severity.INFO)
+                sent.at_us, sent.held_back = t_us, 0
+        if self._dropped and _RATE_PER_S * (t_us - self._dropped_us) >= 1_000_000:
             yield StatusText(Severity.WARNING, f"{self._dropped} more texts were left out")
             self._dropped = 0
 
+    def _has_room(self, text: StatusText, t_us: int) -> bool:
+        """Charge the text to its budget.
 
-def _counted(said: _Said) -> StatusText:
-    times = "once" if said.held_back == 1 else f"{said.held_back} times"
-    return replace(said.text, text=f"{said.text.text} (again, {times})")
+        Emergencies have no limit: only the vehicle itself raises them. Critical texts share a
+        budget with those that differ in their numbers only, all others share one. So whatever a
+        client provokes, the first text of a failsafe is sent.
+        """
+        if text.severity <= Severity.EMERGENCY:
+            return True
+        key = _NUMBER.sub("#", text.text) if text.severity <= Severity.CRITICAL else ""
+        budget = self._budgets.get(key) or _Budget()
+        room = min(budget.room + 1e-6 * _RATE_PER_S * (t_us - budget.at_us), float(_BURST))
+        _renew(self._budgets, key, _Budget(room - 1.0 if room >= 1.0 else room, t_us))
+        return room >= 1.0
+
+
+def _renew(kept: dict[str, Any], key: str, value: object) -> None:
+    """Put a value in as the newest, and forget the oldest where there are too many."""
+    kept.pop(key, None)
+    kept[key] = value
+    if len(kept) > _MOST:
+        del kept[next(iter(kept))]
+
+
+def _counted(sent: _Sent) -> StatusText:
+    times = "once" if sent.held_back == 1 else f"{sent.held_back} times"
+    return replace(sent.text, text=f"{sent.text.text} (again, {times})")

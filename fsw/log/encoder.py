@@ -1,4 +1,4 @@
-"""What a tick was given and what it said, as records of the flight log.
+"""Inputs and outputs of a tick as records of the flight log.
 
 The flight and ``pandion replay`` call the same encoder, so comparing their bytes compares every
 field of every topic. Records that come with every tick are packed in one call: at 500 Hz a call
@@ -15,8 +15,8 @@ from typing import Any, Final
 
 from fsw.geometry.rotation import quaternion_from_matrix
 from fsw.log import topics
-from fsw.log.input_text import InputText
-from fsw.model.arm_kinematics import point_in_flight
+from fsw.log.json_codec import JsonCodec
+from fsw.model.kinematics import point_in_flight
 from fsw.signals import (
     CommandRequest,
     FlightSnapshot,
@@ -116,11 +116,11 @@ class LogEncoder:
         """
         self._detail_us = DETAIL_US[profile]
         self._detailed = -1  # number of the interval of which details were written last
-        self.inputs = InputText(TickInputs, {} if measured else {PlanTimings: _UNMEASURED})
+        self.inputs = JsonCodec(TickInputs, {} if measured else {PlanTimings: _UNMEASURED})
         self._measured = measured
         self._per_newton = 1.0 / thrust_max
         self._link_length = link_length
-        self._changing = tuple(name for name in self.inputs.fields if name != TYPED)
+        self._changing = tuple(name for name in self.inputs.names if name != TYPED)
         self._changing_of = attrgetter(*self._changing)
         self._last_values: tuple[Any, ...] | None = None
         self._last: FlightSnapshot | None = None
@@ -205,10 +205,10 @@ class LogEncoder:
         for k, (name, value) in enumerate(zip(self._changing, values, strict=True)):
             if last is not None and (value is last[k] or value == last[k]):
                 continue
-            _add_text(t_us, name, self.inputs.text(name, value), out)
+            _add_text(t_us, name, self.inputs.encode(name, value), out)
             if name == "commands":
                 for command in inputs.commands:
-                    out += _command(t_us, command)
+                    out += _command(t_us, command.request)
 
     def _planning(self, snapshot: FlightSnapshot) -> bytes:
         t_us, report, target = snapshot.t_us, snapshot.constraints, snapshot.reference

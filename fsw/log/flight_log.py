@@ -15,11 +15,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from fsw.log.block_file import BlockFile
 from fsw.log.encoder import FULL, LogEncoder, loop_timing
 from fsw.log.topics import TOPICS
 from fsw.signals import StatusText, TickInputs, TickOutputs, Vec2
 from messages import ulog
+from messages.block_file import BlockFile
 from messages.ground_truth import TRUTH_TOPICS
 
 Number = int | float | bool
@@ -106,7 +106,7 @@ class FlightLog:
         self._records += loop_timing(t_us, group, counts, times)
 
     def add_notice(self, t_us: int, notice: StatusText) -> None:
-        """Append what the loop said; a replay of the tick does not say it again."""
+        """Append a text of the loop; a replay of the tick does not repeat it."""
         self._records += ulog.tagged_text(notice.severity & 7, _OF_THE_LOOP, t_us, notice.text)
 
     def close(self) -> None:

@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from fsw.log import topics
 from fsw.log.encoder import TYPED
-from fsw.log.input_text import InputText
+from fsw.log.json_codec import JsonCodec
 from fsw.signals import SensorFrame, TickInputs
 from messages import ulog
 from messages.ulog_reader import Record, UlogError, UlogFile, open_log, unpacker
@@ -50,7 +50,7 @@ def open_flight(path: Path) -> UlogFile:
     log = open_log(path / "flight.ulg" if path.is_dir() else path)
     if "inputs" not in log.information:
         raise UlogError(f"{log.path} is not a flight log of Pandion: it records no inputs")
-    if log.information["inputs"] != InputText(TickInputs).schema or not _has_our_topics(log):
+    if log.information["inputs"] != JsonCodec(TickInputs).schema or not _has_our_topics(log):
         written = log.information.get("ver_sw", "an unknown revision")
         raise UlogError(f"{log.path} has other fields than this build reads; it is of {written}")
     return log
@@ -59,7 +59,7 @@ def open_flight(path: Path) -> UlogFile:
 def _has_our_topics(log: UlogFile) -> bool:
     try:
         return all(log.formats[topic.name].codes == topic.codes for topic in topics.TOPICS)
-    except (KeyError, ValueError):  # a topic is missing, or has a type nobody knows
+    except (KeyError, ValueError):  # a topic is missing, or has an unknown type
         return False
 
 
@@ -99,7 +99,7 @@ class _Inputs:
 
     def __init__(self, log: UlogFile) -> None:
         self._log = log
-        self._text = InputText(TickInputs)
+        self._codec = JsonCodec(TickInputs)
         self._values: dict[str, Any] = {}
         self._pieces = b""
         self._sensors = unpacker(topics.SENSOR_FRAME)
@@ -130,7 +130,7 @@ class _Inputs:
         if part + 1 < parts:
             return
         name = field.rstrip(b"\0").decode("ascii", "backslashreplace")
-        self._values[name] = self._text.value(name, self._pieces.rstrip(b"\0"))
+        self._values[name] = self._codec.decode(name, self._pieces.rstrip(b"\0"))
 
 
 def _sensor_frame(values: tuple[Any, ...]) -> SensorFrame:

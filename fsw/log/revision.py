@@ -17,16 +17,16 @@ def revision() -> str:
     if (_SOURCE / ".git").exists():
         command = ["git", "-C", str(_SOURCE), "describe", "--always", "--dirty", "--abbrev=40"]
         try:
-            said = subprocess.run(
+            described = subprocess.run(
                 [*command, "--exclude=*"],
                 capture_output=True,
                 text=True,
                 timeout=_PATIENCE_S,
                 check=True,
-                # Looking must not lock the index against whoever works in the tree.
+                # Reading must not lock the index of the work tree.
                 env={**os.environ, "GIT_OPTIONAL_LOCKS": "0"},
             )
-            return said.stdout.strip()
+            return described.stdout.strip()
         except (OSError, subprocess.SubprocessError):
             pass
     try:

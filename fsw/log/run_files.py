@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from fsw.log.block_file import BlockFile
 from fsw.log.flight_log import FlightLog, LogSubject
 from fsw.log.tlog import TlogWriter
+from messages.block_file import BlockFile
 
 
 class RunFiles:
-    """``flight.ulg`` and ``flight.tlog``. A disk that refuses is told about once a file."""
+    """``flight.ulg`` and ``flight.tlog``. A disk error is reported once per file."""
 
     def __init__(
         self,
@@ -34,15 +34,15 @@ class RunFiles:
         self.ulog = FlightLog(directory / "flight.ulg", subject)
         self.tlog = TlogWriter(directory / "flight.tlog", start_unix_us)
         self._warn = warn
-        self._told: set[str] = set()
+        self._reported: set[str] = set()
 
     def check(self) -> None:
-        """Tell what went wrong since the last time; costs nothing worth mentioning."""
+        """Report what went wrong since the last call; cheap."""
         for file in self._files():
             if file.failure is not None:
-                self._tell(f"{file.path.name} ends early: {file.failure}")
+                self._report(f"{file.path.name} ends early: {file.failure}")
             elif file.dropped:
-                self._tell(f"{file.path.name} has gaps: the disk does not keep up")
+                self._report(f"{file.path.name} has gaps: the disk does not keep up")
 
     def close(self) -> None:
         """Write what is left; safe to call twice."""
@@ -69,7 +69,7 @@ class RunFiles:
     def _files(self) -> tuple[BlockFile, BlockFile]:
         return self.ulog.file, self.tlog.file
 
-    def _tell(self, sentence: str) -> None:
-        if sentence not in self._told:
-            self._told.add(sentence)
+    def _report(self, sentence: str) -> None:
+        if sentence not in self._reported:
+            self._reported.add(sentence)
             self._warn(sentence)

@@ -10,7 +10,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Final
 
-from fsw.log.block_file import BlockFile
+from messages.block_file import BlockFile
 
 _FLUSH_INTERVAL_US: Final = 500_000
 _FLUSH_BYTES: Final = 1 << 16

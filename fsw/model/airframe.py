@@ -3,11 +3,22 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from fsw.signals import Vec2, Vec3
 
 GRAVITY = 9.81  # m/s^2, along +z of the world
+
+
+@dataclass(frozen=True, slots=True)
+class AttitudeLag:
+    """How fast the attitude loop turns a commanded acceleration into a real one."""
+
+    kp: float = 50.0  # 1/s^2, the paper's PID
+    kd: float = 15.0  # 1/s
+    # Eq 16 as printed: u is the acceleration. The states a, j and s then keep their start values,
+    # and a start with zeros in them has no tilt in the arm's kinematics either.
+    at_once: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,6 +35,7 @@ class Airframe:
     yaw_per_thrust: float = 0.016  # m, b
     rotor_thrust_max: float = 2.0 * 3.5 * GRAVITY / 4.0  # N; thrust-to-weight 2, our choice
     rotor_lag: float = 0.04  # s, our choice
+    attitude_lag: AttitudeLag = field(default_factory=AttitudeLag)
     link_length: Vec2 = (0.15, 0.15)  # m
     link_mass: Vec2 = (0.2, 0.2)  # kg, from the laboratory's public model
     link_com: Vec2 = (0.075, 0.075)  # m from the link's joint
@@ -31,7 +43,6 @@ class Airframe:
     joint_torque_max: float = 2.0  # N m, our choice
     joint1_limit: float = math.pi / 3.0  # rad, |th1|
     joint12_limit: float = math.pi / 2.0  # rad, |th1 + th2|
-    tilt_limit: float = math.pi / 10.0  # rad
     leg_length: float = 0.32  # m, body origin above ground when standing
 
 

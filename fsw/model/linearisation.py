@@ -8,13 +8,13 @@ file computes them and their exact gradients once an iteration; the others only 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
 from fsw.compiled import compiled
-from fsw.model.airframe import Airframe
-from fsw.model.arm_kinematics import arm_points
-from fsw.model.prediction import INPUTS, Q_ARM, STATES, Array, CondensedModel
+from fsw.model.kinematics import arm_points, links
+from fsw.model.prediction import INPUTS, Q_ARM, STATES, YAW, YAW_RATE, Array, CondensedModel
 
 BASE, JOINT2, END_EFFECTOR = 0, 1, 2
 POINTS = 3
@@ -36,6 +36,28 @@ _REACHED = np.array(
 _STEP = 1e-30  # complex step: no subtraction, hence no rounding
 
 
+class PointMotions(NamedTuple):
+    """The three points at every node, for kernels; axes are those of the world (NED)."""
+
+    position: Array  # (n + 1, 3 points, 3) m
+    velocity: Array  # (n + 1, 3 points, 3) m/s
+    d_position: Array  # (n + 1, 3 points, 3, 6 n)
+    d_velocity: Array  # (n + 1, 3 points, 3, 6 n)
+
+
+class Tracked(NamedTuple):
+    """What the tracking cost compares with its targets, for kernels: end-effector, yaw, arm."""
+
+    yaw: Array  # (n + 1, 2) rad and rad/s
+    position: Array  # (n + 1, 3) m
+    velocity: Array  # (n + 1, 3) m/s
+    arm_com: Array  # (n + 1,) m
+    d_yaw: Array  # (n + 1, 2, 6 n)
+    d_position: Array  # (n + 1, 3, 6 n)
+    d_velocity: Array  # (n + 1, 3, 6 n)
+    d_arm_com: Array  # (n + 1, 6 n)
+
+
 @dataclass(frozen=True)
 class Linearisation:
     """Preallocated results of one linearisation; node 0 is the start of the horizon."""
@@ -46,8 +68,10 @@ class Linearisation:
     velocity: Array = field(init=False)  # (n + 1, 3 points, 3) m/s
     d_position: Array = field(init=False)  # (n + 1, 3 points, 3, 6 n)
     d_velocity: Array = field(init=False)  # (n + 1, 3 points, 3, 6 n)
-    arm_cog: Array = field(init=False)  # (n + 1,) m along body x
-    d_arm_cog: Array = field(init=False)  # (n + 1, 6 n)
+    arm_com: Array = field(init=False)  # (n + 1,) m along body x
+    d_arm_com: Array = field(init=False)  # (n + 1, 6 n)
+    points: PointMotions = field(init=False)  # views of the above, as are those of
+    tracked: Tracked = field(init=False)
 
     def __post_init__(self) -> None:
         nodes, unknowns = self.model.horizon + 1, INPUTS * self.model.horizon
@@ -57,20 +81,33 @@ class Linearisation:
             "velocity": (nodes, POINTS, 3),
             "d_position": (nodes, POINTS, 3, unknowns),
             "d_velocity": (nodes, POINTS, 3, unknowns),
-            "arm_cog": (nodes,),
-            "d_arm_cog": (nodes, unknowns),
+            "arm_com": (nodes,),
+            "d_arm_com": (nodes, unknowns),
         }
         for name, shape in shapes.items():
             object.__setattr__(self, name, np.zeros(shape))
+        points = PointMotions(self.position, self.velocity, self.d_position, self.d_velocity)
+        tracked = Tracked(
+            yaw=self.states[:, YAW : YAW_RATE + 1],
+            position=self.position[:, END_EFFECTOR],
+            velocity=self.velocity[:, END_EFFECTOR],
+            arm_com=self.arm_com,
+            d_yaw=self.model.gamma[:, YAW : YAW_RATE + 1],
+            d_position=self.d_position[:, END_EFFECTOR],
+            d_velocity=self.d_velocity[:, END_EFFECTOR],
+            d_arm_com=self.d_arm_com,
+        )
+        object.__setattr__(self, "points", points)
+        object.__setattr__(self, "tracked", tracked)
 
-    def refill(self, airframe: Airframe, start: Array, inputs: Array) -> None:
+    def refill(self, start: Array, inputs: Array) -> None:
         """Linearise around ``inputs``.
 
         Args:
-            airframe: Link geometry and masses.
-            start: Prediction state at node 0, (19,).
-            inputs: Guess of all inputs, (6 n,).
+            start: (19,) [SI], prediction state at node 0.
+            inputs: (6 n,) [SI], guess of all inputs.
         """
+        airframe = self.model.airframe
         np.matmul(self.model.phi, start, out=self.states)
         np.add(self.states, self.model.gamma @ inputs, out=self.states)
         _fill_points(
@@ -78,19 +115,16 @@ class Linearisation:
             self.model.gamma,
             airframe.link_length[0],
             airframe.link_length[1],
-            self.position,
-            self.velocity,
-            self.d_position,
-            self.d_velocity,
+            self.points,
         )
         m1, m2 = airframe.link_mass
-        _fill_arm_cog(
+        _fill_arm_com(
             self.states,
             self.model.gamma,
             (m1 * airframe.link_com[0] + m2 * airframe.link_length[0]) / (m1 + m2),
             m2 * airframe.link_com[1] / (m1 + m2),
-            self.arm_cog,
-            self.d_arm_cog,
+            self.arm_com,
+            self.d_arm_com,
         )
 
 
@@ -100,22 +134,19 @@ def _fill_points(
     gamma: Array,
     l1: float,
     l2: float,
-    position: Array,
-    velocity: Array,
-    d_position: Array,
-    d_velocity: Array,
+    points: PointMotions,
 ) -> None:
     values = np.zeros((2, 2, 3))
     jacobian = np.zeros((2, 2, 3, STATES))  # of joint 2 and end-effector in the state
     for i in range(states.shape[0]):
         arm_points(states[i], l1, l2, values)
-        position[i, 0] = states[i, 0:3]
-        velocity[i, 0] = states[i, 3:6]
-        position[i, 1:] = values[:, 0]
-        velocity[i, 1:] = values[:, 1]
+        points.position[i, 0] = states[i, 0:3]
+        points.velocity[i, 0] = states[i, 3:6]
+        points.position[i, 1:] = values[:, 0]
+        points.velocity[i, 1:] = values[:, 1]
         if i > 0:  # the start does not depend on the inputs
             _differentiate(states[i], l1, l2, jacobian)
-            _chain(jacobian, gamma[i], INPUTS * i, d_position[i], d_velocity[i])
+            _chain(jacobian, gamma[i], INPUTS * i, points.d_position[i], points.d_velocity[i])
 
 
 @compiled
@@ -155,13 +186,13 @@ def _chain(
 
 
 @compiled
-def _fill_arm_cog(
+def _fill_arm_com(
     states: Array, gamma: Array, arm1: float, arm2: float, cog: Array, d_cog: Array
 ) -> None:
     for i in range(states.shape[0]):
-        th1, th12 = states[i, Q_ARM], states[i, Q_ARM] + states[i, Q_ARM + 1]
-        cog[i] = arm1 * np.sin(th1) + arm2 * np.sin(th12)
-        c1, c12 = arm1 * np.cos(th1), arm2 * np.cos(th12)
+        th1 = states[i, Q_ARM]
+        (x1, c1), (x2, c12) = links((arm1, arm2), th1, th1 + states[i, Q_ARM + 1])
+        cog[i] = x1 + x2
         for column in range(INPUTS * i):
             d_cog[i, column] = (c1 + c12) * gamma[i, Q_ARM, column] + c12 * gamma[
                 i, Q_ARM + 1, column

@@ -11,7 +11,8 @@ from typing import Any
 from numpy.typing import NDArray
 
 from fsw.compiled import compilable, compiled, machine_code, packed
-from fsw.model.prediction import A, LagModel, P, S, discretise
+from fsw.model.airframe import Airframe
+from fsw.model.prediction import A, P, S, discretise
 from fsw.signals import PlanInput, PredictionState, Vec3
 
 REST_INPUT = PlanInput((0.0, 0.0, 0.0), 0.0, (0.0, 0.0))
@@ -42,8 +43,8 @@ class TickModel:
 class NominalModel:
     """Moves a PredictionState on by ticks under a held input."""
 
-    def __init__(self, lag: LagModel, dt: float) -> None:
-        a, b = discretise(lag, dt)
+    def __init__(self, airframe: Airframe, dt: float) -> None:
+        a, b = discretise(airframe, dt)
         horizontal = [P, P + 3, A, 9, S]  # p, v, a, j, s along x
         vertical = [P + 2, P + 5, A + 2]
         self.model = TickModel(
@@ -73,7 +74,7 @@ def advance(model: TickModel, x: PredictionState, u: PlanInput, ticks: int) -> P
 
 @compiled
 def _advance(model: NDArray[Any], x: PredictionState, u: PlanInput, ticks: int) -> tuple[Any, ...]:
-    """``advance`` that returns a plain tuple, which leaves machine code at half the price."""
+    """``advance`` that returns a plain tuple, which leaves machine code at half the cost."""
     x = advance(model[0], x, u, ticks)
     return (x.p, x.v, x.a, x.j, x.s, x.yaw, x.yaw_rate, x.q_arm, x.qd_arm)
 

@@ -10,7 +10,7 @@ loop and the rotors, a vertical one through the rotors alone. With the attitude 
           \dot s = (k_p (u - a) - k_d j - s)/\tau
 
 and the vertical axis :math:`\dot a = (u - a)/\tau`. Yaw and joints stay double integrators.
-The paper's own model is there as well, for a plant that is one: ``LagModel(at_once=True)``.
+The paper's own model is there as well, for a plant that is one: ``AttitudeLag(at_once=True)``.
 The chain is linear, time-invariant and the same in x and y, so it is discretised exactly
 once (zero-order hold) and condensed once.
 
@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from fsw.compiled import compilable
+from fsw.model.airframe import Airframe
 from fsw.signals import PredictionState
 
 Array = NDArray[np.float64]
@@ -37,38 +38,27 @@ STATES = 19
 INPUTS = 6
 
 
-@dataclass(frozen=True, slots=True)
-class LagModel:
-    """How fast a commanded acceleration becomes a real one."""
-
-    kp: float = 50.0  # 1/s^2, attitude loop, the paper's PID
-    kd: float = 15.0  # 1/s
-    rotor_lag: float = 0.04  # s
-    # Eq 16 as printed: u is the acceleration. The states a, j and s then keep their start values,
-    # and a start with zeros in them has no tilt in the arm's kinematics either.
-    at_once: bool = False
-
-
 @dataclass(frozen=True)
 class CondensedModel:
     """Prediction over a horizon: ``x_i = phi[i] x_0 + gamma[i] U`` for i = 0..n."""
 
+    airframe: Airframe
     horizon: int
     period: float  # s
     phi: Array  # (n + 1, 19, 19)
     gamma: Array  # (n + 1, 19, 6 n)
 
 
-def continuous_model(lag: LagModel) -> tuple[Array, Array]:
+def continuous_model(airframe: Airframe) -> tuple[Array, Array]:
     """Continuous-time A (19, 19) and B (19, 6) of the module docstring."""
     a = np.zeros((STATES, STATES))
     b = np.zeros((STATES, INPUTS))
     for axis in range(3):
         a[P + axis, V + axis] = 1.0
-        if lag.at_once:
+        if airframe.attitude_lag.at_once:
             b[V + axis, axis] = 1.0
-    if not lag.at_once:
-        _add_lag(lag, a, b)
+    if not airframe.attitude_lag.at_once:
+        _add_lag(airframe, a, b)
     a[YAW, YAW_RATE] = 1.0
     b[YAW_RATE, 3] = 1.0
     for joint in range(2):
@@ -77,24 +67,23 @@ def continuous_model(lag: LagModel) -> tuple[Array, Array]:
     return a, b
 
 
-def _add_lag(lag: LagModel, a: Array, b: Array) -> None:
+def _add_lag(airframe: Airframe, a: Array, b: Array) -> None:
     """From commanded acceleration to velocity, through attitude and rotors."""
+    lag, rotor_lag = airframe.attitude_lag, airframe.rotor_lag
     for axis in range(3):
         a[V + axis, A + axis] = 1.0
     for axis in range(2):
         a[A + axis, J + axis] = 1.0
         a[J + axis, S + axis] = 1.0
-        a[S + axis, [A + axis, J + axis, S + axis]] = (
-            np.array([-lag.kp, -lag.kd, -1.0]) / lag.rotor_lag
-        )
-        b[S + axis, axis] = lag.kp / lag.rotor_lag
-    a[A + 2, A + 2] = -1.0 / lag.rotor_lag
-    b[A + 2, 2] = 1.0 / lag.rotor_lag
+        a[S + axis, [A + axis, J + axis, S + axis]] = np.array([-lag.kp, -lag.kd, -1.0]) / rotor_lag
+        b[S + axis, axis] = lag.kp / rotor_lag
+    a[A + 2, A + 2] = -1.0 / rotor_lag
+    b[A + 2, 2] = 1.0 / rotor_lag
 
 
-def discretise(lag: LagModel, period: float) -> tuple[Array, Array]:
-    """Exact zero-order-hold A (19, 19) and B (19, 6) over one period [s]."""
-    a, b = continuous_model(lag)
+def discretise(airframe: Airframe, period: float) -> tuple[Array, Array]:
+    """Exact zero-order-hold A (19, 19) and B (19, 6) over one ``period`` [s]."""
+    a, b = continuous_model(airframe)
     block = np.zeros((STATES + INPUTS, STATES + INPUTS))
     block[:STATES, :STATES] = a * period
     block[:STATES, STATES:] = b * period
@@ -102,9 +91,9 @@ def discretise(lag: LagModel, period: float) -> tuple[Array, Array]:
     return exponential[:STATES, :STATES].copy(), exponential[:STATES, STATES:].copy()
 
 
-def condense(lag: LagModel, period: float, horizon: int) -> CondensedModel:
-    """Stack the discrete model over the horizon, inputs as the only unknowns."""
-    a, b = discretise(lag, period)
+def condense(airframe: Airframe, period: float, horizon: int) -> CondensedModel:
+    """Stack the model of one ``period`` [s] over the horizon, inputs as the only unknowns."""
+    a, b = discretise(airframe, period)
     phi = np.zeros((horizon + 1, STATES, STATES))
     gamma = np.zeros((horizon + 1, STATES, INPUTS * horizon))
     phi[0] = np.eye(STATES)
@@ -112,7 +101,7 @@ def condense(lag: LagModel, period: float, horizon: int) -> CondensedModel:
         phi[i + 1] = a @ phi[i]
         gamma[i + 1] = a @ gamma[i]
         gamma[i + 1, :, INPUTS * i : INPUTS * (i + 1)] = b
-    return CondensedModel(horizon, period, phi, gamma)
+    return CondensedModel(airframe, horizon, period, phi, gamma)
 
 
 @compilable

@@ -15,14 +15,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from fsw.barriers.soft_rows import TargetPoints
-from fsw.compiled import compiled
-from fsw.model.linearisation import END_EFFECTOR, Linearisation
-from fsw.model.prediction import INPUTS, Q_ARM, YAW, YAW_RATE, Array
+from fsw.barriers.constraint_block import TargetPoints
+from fsw.compiled import compiled, of_fixed_types
+from fsw.model.linearisation import Linearisation, Tracked
+from fsw.model.prediction import INPUTS, Q_ARM, Array
+from fsw.signals import Vec4
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,8 +34,8 @@ class CostWeights:
     tracking_terminal: float = 50.0  # w_s1
     velocity: float = 2.0  # w_2
     velocity_terminal: float = 10.0  # w_s2
-    arm_cog: float = 1.0  # w_3
-    arm_cog_terminal: float = 5.0  # w_s3
+    arm_com: float = 1.0  # w_3
+    arm_com_terminal: float = 5.0  # w_s3
     # Ours: with base and arm both free to reach a point, nothing in the paper's cost says where
     # to look, and beside walls the vehicle wandered through half a turn.
     yaw: float = 0.05
@@ -46,6 +47,14 @@ class CostWeights:
     relative_velocity: bool = True  # v_e - v_d in eq 20 instead of the printed v_e
 
 
+class Quadratic(NamedTuple):
+    """``1/2 U' hessian U + gradient' U``, refilled in place."""
+
+    guess: Array  # (6 n,) inputs of the linearisation
+    hessian: Array  # (6 n, 6 n), upper triangle
+    gradient: Array  # (6 n,)
+
+
 class Cost(Protocol):
     """Something the planner minimises, as a quadratic around a guess of the inputs."""
 
@@ -53,18 +62,14 @@ class Cost(Protocol):
         self,
         horizon: Linearisation,
         targets: TargetPoints,
-        guess: Array,
-        hessian: Array,
-        gradient: Array,
+        quadratic: Quadratic,
     ) -> float:
-        """Add ``1/2 U' hessian U + gradient' U`` of this cost.
+        """Add this cost to the quadratic.
 
         Args:
-            horizon: Linearisation around ``guess``.
+            horizon: Linearisation around ``quadratic.guess``.
             targets: Reference at the nodes.
-            guess: Inputs of the linearisation, (6 n,).
-            hessian: (6 n, 6 n), upper triangle added to.
-            gradient: (6 n,), added to.
+            quadratic: Hessian and gradient are added to.
 
         Returns:
             The cost at the guess.
@@ -72,49 +77,51 @@ class Cost(Protocol):
         ...
 
 
+class _TrackingWeights(NamedTuple):
+    node: Array  # (2, 3): running and terminal; position, velocity, centre of mass
+    inputs: float
+    yaw: float
+    yaw_lead: float  # s
+    target_velocity: float  # share of the target's velocity that is subtracted, 0 or 1
+
+
+class _Target(NamedTuple):
+    yaw: Array  # (n + 1,) rad
+    position: Array  # (n + 1, 3) m
+    velocity: Array  # (n + 1, 3) m/s
+
+
 class TrackingCost:
     """Eqs 18, 20 and 21 and the inputs: what all of the paper's controllers minimise."""
 
     def __init__(self, weights: CostWeights) -> None:
-        self._weights = np.array(
-            (
-                (weights.tracking, weights.velocity, weights.arm_cog),
-                (weights.tracking_terminal, weights.velocity_terminal, weights.arm_cog_terminal),
-            )
+        self._weights = _TrackingWeights(
+            node=np.array(
+                (
+                    (weights.tracking, weights.velocity, weights.arm_com),
+                    (
+                        weights.tracking_terminal,
+                        weights.velocity_terminal,
+                        weights.arm_com_terminal,
+                    ),
+                )
+            ),
+            inputs=weights.inputs,
+            yaw=weights.yaw,
+            yaw_lead=weights.yaw_lead,
+            target_velocity=1.0 if weights.relative_velocity else 0.0,
         )
-        self._inputs = weights.inputs
-        self._yaw = (weights.yaw, weights.yaw_lead)
-        self._velocity_share = 1.0 if weights.relative_velocity else 0.0
+        self._add_tracking = of_fixed_types(_add_tracking)
 
     def add(
         self,
         horizon: Linearisation,
         targets: TargetPoints,
-        guess: Array,
-        hessian: Array,
-        gradient: Array,
+        quadratic: Quadratic,
     ) -> float:
         """See ``Cost``."""
-        return _add_tracking(
-            self._weights,
-            self._inputs,
-            *self._yaw,
-            self._velocity_share,
-            horizon.states[:, YAW : YAW_RATE + 1],
-            horizon.model.gamma[:, YAW : YAW_RATE + 1],
-            targets.yaw,
-            horizon.position[:, END_EFFECTOR],
-            horizon.velocity[:, END_EFFECTOR],
-            horizon.arm_cog,
-            horizon.d_position[:, END_EFFECTOR],
-            horizon.d_velocity[:, END_EFFECTOR],
-            horizon.d_arm_cog,
-            targets.position,
-            targets.velocity,
-            guess,
-            hessian,
-            gradient,
-        )
+        target = _Target(targets.yaw, targets.position, targets.velocity)
+        return self._add_tracking(self._weights, horizon.tracked, target, quadratic)
 
 
 class PostureCost:
@@ -127,9 +134,7 @@ class PostureCost:
         self,
         horizon: Linearisation,
         targets: TargetPoints,
-        guess: Array,
-        hessian: Array,
-        gradient: Array,
+        quadratic: Quadratic,
     ) -> float:
         """See ``Cost``; nothing where no joints are asked for."""
         if targets.q_arm is None:
@@ -139,9 +144,7 @@ class PostureCost:
             horizon.states[:, Q_ARM : Q_ARM + 2],
             horizon.model.gamma[:, Q_ARM : Q_ARM + 2],
             targets.q_arm,
-            guess,
-            hessian,
-            gradient,
+            quadratic,
         )
 
 
@@ -150,32 +153,31 @@ def _add_posture(
     weight: float,
     q_arm: Array,
     d_q_arm: Array,
-    wanted: Array,
-    guess: Array,
-    hessian: Array,
-    gradient: Array,
+    targets: Array,
+    quadratic: Quadratic,
 ) -> float:
     cost = 0.0
     for i in range(1, q_arm.shape[0]):
         for joint in range(2):
-            value = q_arm[i, joint] - wanted[i, joint]
+            value = q_arm[i, joint] - targets[i, joint]
             cost += weight * value * value
             row = d_q_arm[i, joint]
-            add_square(weight, value, row, INPUTS * i, guess, hessian, gradient)
+            add_square(weight, value, row, INPUTS * i, quadratic)
     return cost
 
 
 @compiled
-def add_square(
-    weight: float,
-    value: float,
-    row: Array,
-    columns: int,
-    guess: Array,
-    hessian: Array,
-    gradient: Array,
-) -> None:
-    """Add ``weight (value + row (U - guess))^2`` over the first columns."""
+def add_square(weight: float, value: float, row: Array, columns: int, quadratic: Quadratic) -> None:
+    """Add ``weight (value + row (U - guess))^2`` over the first columns.
+
+    Args:
+        weight: Of the square [1 / unit of value^2].
+        value: The residual at the guess [any unit].
+        row: Its gradient in the inputs (6 n,) [unit of value / unit of the input].
+        columns: How many inputs the residual depends on.
+        quadratic: Hessian and gradient are added to.
+    """
+    guess, hessian, gradient = quadratic
     at_zero = value
     for k in range(columns):
         at_zero -= row[k] * guess[k]
@@ -187,77 +189,72 @@ def add_square(
                 hessian[k, m] += scaled * row[m]
 
 
+_RESIDUALS = 8  # of a node: position and velocity of the end-effector, centre of mass, yaw
+
+
 @compiled
 def _add_tracking(
-    weights: Array,
-    input_weight: float,
-    yaw_weight: float,
-    yaw_lead: float,
-    velocity_share: float,
-    yaw: Array,
-    d_yaw: Array,
-    target_yaw: Array,
-    position: Array,
-    velocity: Array,
-    cog: Array,
-    d_position: Array,
-    d_velocity: Array,
-    d_cog: Array,
-    target_position: Array,
-    target_velocity: Array,
-    guess: Array,
-    hessian: Array,
-    gradient: Array,
+    weights: _TrackingWeights, tracked: Tracked, target: _Target, quadratic: Quadratic
 ) -> float:
-    n = position.shape[0] - 1
+    guess, hessian = quadratic.guess, quadratic.hessian
+    n = tracked.position.shape[0] - 1
     cost = 0.0
     for k in range(INPUTS * n):
-        hessian[k, k] += 2.0 * input_weight
-        cost += input_weight * guess[k] * guess[k]
-    rows, values, weight = np.zeros((8, INPUTS * n)), np.zeros(8), np.zeros(8)
+        hessian[k, k] += 2.0 * weights.inputs
+        cost += weights.inputs * guess[k] * guess[k]
+    rows = np.zeros((_RESIDUALS, INPUTS * n))
+    values, weight = np.zeros(_RESIDUALS), np.zeros(_RESIDUALS)
+    weight[7] = weights.yaw
     for i in range(1, n + 1):
-        w = weights[1 if i == n else 0]
-        rows[0:3], rows[3:6], rows[6] = d_position[i], d_velocity[i], d_cog[i]
-        rows[7] = d_yaw[i, 0] + yaw_lead * d_yaw[i, 1]
-        weight[0:3], weight[3:6], weight[6], weight[7] = w[0], w[1], w[2], yaw_weight
-        values[0:3] = position[i] - target_position[i]
-        values[3:6] = velocity[i] - velocity_share * target_velocity[i]
-        values[6] = cog[i]
+        w = weights.node[1 if i == n else 0]
+        weight[0:3], weight[3:6], weight[6] = w[0], w[1], w[2]
+        rows[0:3], rows[3:6] = tracked.d_position[i], tracked.d_velocity[i]
+        rows[6] = tracked.d_arm_com[i]
+        rows[7] = tracked.d_yaw[i, 0] + weights.yaw_lead * tracked.d_yaw[i, 1]
+        values[0:3] = tracked.position[i] - target.position[i]
+        values[3:6] = tracked.velocity[i] - weights.target_velocity * target.velocity[i]
+        values[6] = tracked.arm_com[i]
         # The short way round: a target half a turn away must not unwind whole turns.
-        turn = (yaw[i, 0] - target_yaw[i] + math.pi) % (2.0 * math.pi) - math.pi
-        values[7] = turn + yaw_lead * yaw[i, 1]
-        _add_eight_squares(weight, values, rows, INPUTS * i, guess, hessian, gradient)
-        for residual in range(8):
+        turn = (tracked.yaw[i, 0] - target.yaw[i] + math.pi) % (2.0 * math.pi) - math.pi
+        values[7] = turn + weights.yaw_lead * tracked.yaw[i, 1]
+        _add_squares(weight, values, rows, INPUTS * i, quadratic)
+        for residual in range(_RESIDUALS):
             cost += weight[residual] * values[residual] * values[residual]
     return cost
 
 
 @compiled
-def _add_eight_squares(
-    weight: Array,
-    value: Array,
-    rows: Array,
-    columns: int,
-    guess: Array,
-    hessian: Array,
-    gradient: Array,
+def _add_squares(
+    weight: Array, value: Array, rows: Array, columns: int, quadratic: Quadratic
 ) -> None:
     """``add_square`` for all residuals of a node at once: the Hessian is walked through once."""
-    s0, s1, s2, s3, s4, s5, s6, s7 = rows
-    at_zero = value.copy()
-    for residual in range(8):
+    guess, hessian, gradient = quadratic
+    at_zero = value.copy().reshape(_RESIDUALS, 1)
+    for residual in range(_RESIDUALS):
         for k in range(columns):
-            at_zero[residual] -= rows[residual, k] * guess[k]
+            at_zero[residual, 0] -= rows[residual, k] * guess[k]
     for k in range(columns):
-        c0, c1 = 2.0 * weight[0] * s0[k], 2.0 * weight[1] * s1[k]
-        c2, c3 = 2.0 * weight[2] * s2[k], 2.0 * weight[3] * s3[k]
-        c4, c5 = 2.0 * weight[4] * s4[k], 2.0 * weight[5] * s5[k]
-        c6, c7 = 2.0 * weight[6] * s6[k], 2.0 * weight[7] * s7[k]
-        gradient[k] += (c0 * at_zero[0] + c1 * at_zero[1] + c2 * at_zero[2] + c3 * at_zero[3]) + (
-            c4 * at_zero[4] + c5 * at_zero[5] + c6 * at_zero[6] + c7 * at_zero[7]
-        )
+        a, b = _scaled(weight, rows, 0, k), _scaled(weight, rows, 4, k)
+        gradient[k] += _sum4(a, at_zero, 0, 0) + _sum4(b, at_zero, 4, 0)
         h = hessian[k]
         for m in range(k, columns):
-            h[m] += (c0 * s0[m] + c1 * s1[m] + c2 * s2[m] + c3 * s3[m]) + (
-                c4 * s4[m] + c5 * s5[m] + c6 * s6[m] + c7 * s7[m]
-            )
+            # Two sums of four, which a processor computes side by side.
+            h[m] += _sum4(a, rows, 0, m) + _sum4(b, rows, 4, m)
+
+
+@compiled
+def _scaled(weight: Array, rows: Array, r: int, k: int) -> Vec4:
+    """Twice the weighted derivative of four residuals in one input."""
+    return (
+        2.0 * weight[r] * rows[r, k],
+        2.0 * weight[r + 1] * rows[r + 1, k],
+        2.0 * weight[r + 2] * rows[r + 2, k],
+        2.0 * weight[r + 3] * rows[r + 3, k],
+    )
+
+
+@compiled
+def _sum4(a: Vec4, rows: Array, r: int, k: int) -> float:
+    return float(
+        a[0] * rows[r, k] + a[1] * rows[r + 1, k] + a[2] * rows[r + 2, k] + a[3] * rows[r + 3, k]
+    )

@@ -15,13 +15,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fsw.barriers.constraint_block import TargetPoints
 from fsw.barriers.point_obstacle import vertical_shares
-from fsw.barriers.soft_rows import TargetPoints
 from fsw.barriers.tangent import CENTRE_BALL
 from fsw.compiled import compiled
 from fsw.model.linearisation import BASE, POINTS, Linearisation
 from fsw.model.prediction import INPUTS, Array
-from fsw.mpc.costs import add_square
+from fsw.mpc.costs import Quadratic, add_square
 from fsw.signals import PointObstacle, Wall, WorkspaceSphere
 
 _LEAST_GAP = 0.02  # m; from here on eq 29 goes on as a parabola
@@ -50,9 +50,7 @@ class SoftWallCost:
         self,
         horizon: Linearisation,
         targets: TargetPoints,
-        guess: Array,
-        hessian: Array,
-        gradient: Array,
+        quadratic: Quadratic,
     ) -> float:
         """See ``fsw.mpc.costs.Cost``."""
         return _add_walls(
@@ -61,9 +59,7 @@ class SoftWallCost:
             *self._weights,
             horizon.position,
             horizon.d_position,
-            guess,
-            hessian,
-            gradient,
+            quadratic,
         )
 
 
@@ -80,9 +76,7 @@ class SoftObstacleCost:
         self,
         horizon: Linearisation,
         targets: TargetPoints,
-        guess: Array,
-        hessian: Array,
-        gradient: Array,
+        quadratic: Quadratic,
     ) -> float:
         """See ``fsw.mpc.costs.Cost``."""
         return _add_obstacles(
@@ -92,9 +86,7 @@ class SoftObstacleCost:
             *self._weights,
             horizon.position,
             horizon.d_position,
-            guess,
-            hessian,
-            gradient,
+            quadratic,
         )
 
 
@@ -115,9 +107,7 @@ class SphereCost:
         self,
         horizon: Linearisation,
         targets: TargetPoints,
-        guess: Array,
-        hessian: Array,
-        gradient: Array,
+        quadratic: Quadratic,
     ) -> float:
         """See ``fsw.mpc.costs.Cost``."""
         return _add_sphere(
@@ -126,15 +116,13 @@ class SphereCost:
             *self._weights,
             horizon.position[:, BASE],
             horizon.d_position[:, BASE],
-            guess,
-            hessian,
-            gradient,
+            quadratic,
         )
 
 
 @compiled
 def one_sided_reciprocal(gap: float, weight: float) -> tuple[float, float, float]:
-    """Eq 29 of a gap, one-sided: value, slope (negative) and curvature (positive)."""
+    """Eq 29 of a ``gap`` [m] and ``weight`` [1/m^2]: value, slope (< 0) and curvature (> 0)."""
     d = max(gap, _LEAST_GAP)
     value, slope, curvature = 1.0 / d**2, -2.0 / d**3, 6.0 / d**4
     step = min(gap - d, 0.0)
@@ -151,12 +139,10 @@ def _add_walls(
     terminal: float,
     position: Array,
     d_position: Array,
-    guess: Array,
-    hessian: Array,
-    gradient: Array,
+    quadratic: Quadratic,
 ) -> float:
     n = position.shape[0] - 1
-    row = np.zeros(guess.shape[0])
+    row = np.zeros(quadratic.guess.shape[0])
     cost = 0.0
     for i in range(1, n + 1):
         for wall in range(normals.shape[0]):
@@ -167,7 +153,7 @@ def _add_walls(
                 for k in range(INPUTS * i):
                     row[k] = nx * dp[0, k] + ny * dp[1, k] + nz * dp[2, k]
                 w = terminal if i == n else weight
-                cost += _add_gap(gap, w, row, INPUTS * i, guess, hessian, gradient)
+                cost += _add_gap(gap, w, row, INPUTS * i, quadratic)
     return cost
 
 
@@ -180,12 +166,10 @@ def _add_obstacles(
     terminal: float,
     position: Array,
     d_position: Array,
-    guess: Array,
-    hessian: Array,
-    gradient: Array,
+    quadratic: Quadratic,
 ) -> float:
     n = position.shape[0] - 1
-    row = np.zeros(guess.shape[0])
+    row = np.zeros(quadratic.guess.shape[0])
     cost = 0.0
     for i in range(1, n + 1):
         for number in range(centres.shape[0]):
@@ -197,7 +181,7 @@ def _add_obstacles(
                 for k in range(INPUTS * i):
                     row[k] = scale * (x * dp[0, k] + y * dp[1, k] + z * dp[2, k])
                 w, gap = terminal if i == n else weight, length - clearances[number]
-                cost += _add_gap(gap, w, row, INPUTS * i, guess, hessian, gradient)
+                cost += _add_gap(gap, w, row, INPUTS * i, quadratic)
     return cost
 
 
@@ -207,14 +191,12 @@ def _add_gap(
     weight: float,
     row: Array,
     columns: int,
-    guess: Array,
-    hessian: Array,
-    gradient: Array,
+    quadratic: Quadratic,
 ) -> float:
     """Eq 29 of one gap that moves with the inputs by ``row``."""
     value, slope, curvature = one_sided_reciprocal(gap, weight)
     # value + slope x + curvature x^2 / 2 as a square about its minimum.
-    add_square(0.5 * curvature, slope / curvature, row, columns, guess, hessian, gradient)
+    add_square(0.5 * curvature, slope / curvature, row, columns, quadratic)
     return value
 
 
@@ -226,9 +208,7 @@ def _add_sphere(
     terminal: float,
     position: Array,
     d_position: Array,
-    guess: Array,
-    hessian: Array,
-    gradient: Array,
+    quadratic: Quadratic,
 ) -> float:
     n = position.shape[0] - 1
     cost = 0.0
@@ -240,5 +220,5 @@ def _add_sphere(
         w = terminal if i == n else weight
         cost += w * square
         for axis in range(3):
-            add_square(w, e[axis], d_position[i, axis], INPUTS * i, guess, hessian, gradient)
+            add_square(w, e[axis], d_position[i, axis], INPUTS * i, quadratic)
     return cost

@@ -20,11 +20,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+from fsw.barriers.constraint_block import Barrier
 from fsw.barriers.hard_set import HardObstacles, HardWalls, HardWorkspace
 from fsw.barriers.point_obstacle import PointObstacleBarrier
-from fsw.barriers.soft_rows import Barrier
 from fsw.barriers.wall import WallBarrier
 from fsw.barriers.workspace import WorkspaceBarrier
+from fsw.model.prediction import CondensedModel
 from fsw.mpc.costs import Cost, PostureCost, TrackingCost
 from fsw.mpc.planner_config import PlannerConfig
 from fsw.mpc.soft_costs import SoftObstacleCost, SoftWallCost, SphereCost
@@ -37,10 +38,10 @@ class Parts:
 
     costs: tuple[Cost, ...]
     barriers: tuple[Barrier, ...] = ()
-    slack: float | None = None  # price of softening their rows; None: they are hard
+    slack: float | None = None  # penalty of softening their rows; None: they are hard
 
 
-def _naive(config: PlannerConfig, safe_set: SafeSet) -> Parts:
+def _naive(config: PlannerConfig, model: CondensedModel, safe_set: SafeSet) -> Parts:
     costs: tuple[Cost, ...] = (TrackingCost(config.weights),)
     weight = config.soft.centring
     if config.centred and safe_set.sphere is not None:
@@ -49,9 +50,9 @@ def _naive(config: PlannerConfig, safe_set: SafeSet) -> Parts:
     return Parts(costs)
 
 
-def _hard(config: PlannerConfig, safe_set: SafeSet) -> Parts:
+def _hard(config: PlannerConfig, model: CondensedModel, safe_set: SafeSet) -> Parts:
     costs, first = (TrackingCost(config.weights),), 1 + config.hard_skipped_nodes
-    where = (config.horizon, config.tightening, first)
+    where = (model.horizon, config.tightening, first)
     if safe_set.sphere is not None:
         return Parts(costs, (HardWorkspace(safe_set.sphere, *where),), config.hard_slack)
     barriers: list[Barrier] = []
@@ -62,7 +63,7 @@ def _hard(config: PlannerConfig, safe_set: SafeSet) -> Parts:
     return Parts(costs, tuple(barriers), config.hard_slack)
 
 
-def _soft(config: PlannerConfig, safe_set: SafeSet) -> Parts:
+def _soft(config: PlannerConfig, model: CondensedModel, safe_set: SafeSet) -> Parts:
     tracking, weights = TrackingCost(config.weights), config.soft
     if safe_set.sphere is not None:
         outside = SphereCost(
@@ -77,22 +78,22 @@ def _soft(config: PlannerConfig, safe_set: SafeSet) -> Parts:
     return Parts(tuple(costs))
 
 
-def _blf(config: PlannerConfig, safe_set: SafeSet) -> Parts:
+def _blf(config: PlannerConfig, model: CondensedModel, safe_set: SafeSet) -> Parts:
     costs = (TrackingCost(config.weights),)
     if safe_set.sphere is not None:
-        sphere = WorkspaceBarrier(safe_set.sphere, config.workspace, config.horizon)
+        sphere = WorkspaceBarrier(safe_set.sphere, config.workspace, model)
         return Parts(costs, (sphere,), config.barrier_slack)
     barriers: list[Barrier] = []
     if safe_set.walls:
-        barriers.append(WallBarrier(safe_set.walls, config.walls, config.horizon))
+        barriers.append(WallBarrier(safe_set.walls, config.walls, model))
     if safe_set.obstacles:
         # A point is the wall that its ball's tangent plane is, so it has the walls' tuning.
         obstacles, tuning = safe_set.obstacles, config.walls
-        barriers.append(PointObstacleBarrier(obstacles, tuning, config.horizon))
+        barriers.append(PointObstacleBarrier(obstacles, tuning, model))
     return Parts(costs, tuple(barriers), config.barrier_slack)
 
 
-VARIANTS: dict[str, Callable[[PlannerConfig, SafeSet], Parts]] = {
+VARIANTS: dict[str, Callable[[PlannerConfig, CondensedModel, SafeSet], Parts]] = {
     "naive": _naive,
     "hc": _hard,
     "sc": _soft,
@@ -100,7 +101,7 @@ VARIANTS: dict[str, Callable[[PlannerConfig, SafeSet], Parts]] = {
 }
 
 
-def parts_of(config: PlannerConfig, safe_set: SafeSet) -> Parts:
+def parts_of(config: PlannerConfig, model: CondensedModel, safe_set: SafeSet) -> Parts:
     """The parts of the configured controller; joints that are asked for are none of its own."""
-    parts = VARIANTS[config.controller](config, safe_set)
+    parts = VARIANTS[config.controller](config, model, safe_set)
     return replace(parts, costs=(*parts.costs, PostureCost(config.weights)))

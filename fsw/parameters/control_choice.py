@@ -1,47 +1,101 @@
-"""What flies, by name; imports nothing, so that a command line can offer it at once."""
+"""What flies, by name; imports little, so that a command line can offer it at once."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
-
-@dataclass(frozen=True, slots=True)
-class ControlChoice:
-    """What flies, by name; the names are checked where the flight software is built."""
-
-    controller: str
-    inner: str
-    robustness: str
-    solver: str
-    soft: bool
-
-    def as_arguments(self) -> list[str]:
-        """The same choice as a command line."""
-        named = (
-            f"--controller={self.controller}",
-            f"--inner={self.inner}",
-            f"--robustness={self.robustness}",
-            f"--solver={self.solver}",
-        )
-        return [*named, *(["--soft"] if self.soft else [])]
-
+from command_line.options import option, switch
+from command_line.values import one_of
 
 # What can be chosen, by the name of the choice; a test holds it against what can be built.
 KNOWN: dict[str, tuple[str, ...]] = {
     "controller": ("blf", "hc", "sc", "naive"),
-    "inner": ("tracking", "pid"),
-    "robustness": ("consistent", "paper-1", "paper-5"),
+    "tracking": ("lqr", "pid"),
+    "lambda": ("consistent", "paper-1", "paper-5"),
     "solver": ("clarabel", "slsqp"),
 }
+_INNER = {"lqr": "tracking", "pid": "pid"}  # names of the inner loops in logs and configurations
 
 
-def check(choice: ControlChoice) -> None:
-    """Refuse an unknown name before anything is started.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ControlChoice:
+    """What flies, by name; the fields are the options of a command line."""
+
+    controller: str = option(
+        "--controller NAME",
+        "predictive controller: blf, hc, sc or naive",
+        one_of("controller", *KNOWN["controller"]),
+        default="blf",
+    )
+    tracking: str = option(
+        "--tracking NAME",
+        "inner loop that tracks the plan: lqr or pid",
+        one_of("tracking", *KNOWN["tracking"], old={"tracking": "lqr"}),
+        default="lqr",
+        old="--inner",
+    )
+    lambda_: str = option(
+        "--lambda NAME",
+        "lambda of the barrier: consistent, or the paper's, paper-1 or paper-5, which "
+        "need --allow-inconsistent",
+        one_of("lambda", *KNOWN["lambda"]),
+        default="consistent",
+        old="--robustness",
+    )
+    solver: str = option(
+        "--solver NAME",
+        "optimiser: clarabel or the paper's slsqp",
+        one_of("solver", *KNOWN["solver"]),
+        default="clarabel",
+    )
+    allow_inconsistent: bool = switch(
+        "--allow-inconsistent",
+        "fly a configuration that cannot keep its safe set, with a warning",
+        old="--soft",
+    )
+
+    @property
+    def inner(self) -> str:
+        """The name of the inner loop in logs and configurations."""
+        return _INNER[self.tracking]
+
+    def facts(self) -> dict[str, str | int]:
+        """What a flight log says about the choice."""
+        return {
+            "controller": self.controller,
+            "inner": self.inner,
+            "robustness": self.lambda_,
+            "solver": self.solver,
+            "soft": int(self.allow_inconsistent),
+        }
+
+
+def choice_of(fact: Callable[[str], str]) -> ControlChoice:
+    """The choice that a flight log tells of.
+
+    Args:
+        fact: What the log says under a name.
 
     Raises:
-        ValueError: naming it and the known ones.
+        ValueError: There is no such inner loop.
     """
-    for what, known in KNOWN.items():
-        name = getattr(choice, what)
-        if name not in known:
-            raise ValueError(f"unknown {what} '{name}'; known: {', '.join(known)}")
+    return ControlChoice(
+        controller=fact("controller"),
+        tracking=tracking_of(fact("inner")),
+        lambda_=fact("robustness"),
+        solver=fact("solver"),
+        allow_inconsistent=fact("soft") != "0",
+    )
+
+
+def tracking_of(inner: str) -> str:
+    """What ``--tracking`` calls an inner loop.
+
+    Raises:
+        ValueError: There is none of this name.
+    """
+    for tracking, known in _INNER.items():
+        if known == inner:
+            return tracking
+    raise ValueError(f"unknown inner loop '{inner}'; known: {', '.join(_INNER.values())}")

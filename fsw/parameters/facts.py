@@ -12,8 +12,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
+from fsw.model.battery import BatteryModel
 from fsw.parameters.registry import BY_NAME, Choices
-from fsw.vehicle.battery import BatteryModel
 
 GROUP: Final = "Read only"
 

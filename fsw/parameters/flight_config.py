@@ -5,17 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 from fsw.control.cascade import Inner
-from fsw.control.inner_tuning import InnerTuning
+from fsw.control.gains import InnerTuning
 from fsw.geometry.geodesy import DEFAULT_ORIGIN
 from fsw.model.airframe import AIRFRAME, Airframe
-from fsw.mpc.planner_config import PlannerConfig, Solver
+from fsw.model.battery import BatteryModel
+from fsw.mpc.planner_config import PlannerConfig
+from fsw.mpc.solvers import SOLVERS
 from fsw.mpc.variants import VARIANTS
+from fsw.periods import TICK_US
 from fsw.signals import Origin
-from fsw.vehicle.battery import BatteryModel
-from fsw.vehicle.steering import SteeringLimits
 
 CONTROLLERS = tuple(VARIANTS)
-SOLVERS: tuple[Solver, ...] = ("clarabel", "slsqp")
 INNERS: tuple[Inner, ...] = ("tracking", "pid")
 
 
@@ -29,7 +29,7 @@ class FlightLimits:
     climb_speed: float = 0.4  # m/s
     land_speed: float = 0.25  # m/s
     landed_height: float = 0.1  # m above standing; the origin's height is known no better
-    airborne_height: float = 0.3  # m above standing; lower and not landed: nobody knows
+    airborne_height: float = 0.3  # m above standing; lower and not landed: unknown
     landed_speed: float = 0.05  # m/s
     landed_time_us: int = 500_000  # at rest this long
     idle_thrust: float = 0.8  # N a rotor while armed on the ground
@@ -51,6 +51,21 @@ class FlightLimits:
 
 
 @dataclass(frozen=True, slots=True)
+class SetpointLimits:
+    """How fast a generated setpoint moves."""
+
+    cruise_speed: float = 1.0  # m/s, on the way to a place
+    # Faster and harder, setpoints that change every half second drove the fast loop into the
+    # rotors' limits, and the vehicle off its plan.
+    speed: float = 1.5  # m/s, at most
+    acceleration: float = 1.0  # m/s^2
+    yaw_rate: float = 0.3  # rad/s
+    yaw_acceleration: float = 0.06  # rad/s^2; the plan's limit is 0.1
+    joint_speed: float = 0.6  # rad/s
+    max_lead_distance: float = 0.3  # m, from the vehicle to the setpoint
+
+
+@dataclass(frozen=True, slots=True)
 class Surroundings:
     """What the vehicle must expect; ``consistency.py`` asks whether it can cope."""
 
@@ -63,11 +78,7 @@ class Surroundings:
 
 @dataclass(frozen=True, slots=True)
 class FlightConfig:
-    """One configuration of the whole flight software.
-
-    The planner's airframe and its rotors' lag are this airframe's, whatever it is given: what
-    describes the vehicle is written once.
-    """
+    """One configuration of the whole flight software."""
 
     controller: str = "blf"
     inner: Inner = "tracking"
@@ -76,12 +87,11 @@ class FlightConfig:
     tuning: InnerTuning = field(default_factory=InnerTuning)
     limits: FlightLimits = field(default_factory=FlightLimits)
     surroundings: Surroundings = field(default_factory=Surroundings)
-    steering: SteeringLimits = field(default_factory=SteeringLimits)
+    steering: SetpointLimits = field(default_factory=SetpointLimits)
     battery: BatteryModel = field(default_factory=BatteryModel)
     origin: Origin = DEFAULT_ORIGIN
     soft: bool = False  # fly an inconsistent configuration all the same, with a warning
-    tick_period_us: int = 2_000
-    mpc_period_us: int = 100_000
+    tick_period_us: int = TICK_US
     # 20 ms between question and answer: 20 times the planner's median, and a fixed number of
     # ticks, so that a slow machine flies exactly like a fast one. A plan that starts from the
     # nominal state loses nothing by waiting.
@@ -93,11 +103,10 @@ class FlightConfig:
     upset_distance: float = 0.15  # m
     upset_yaw: float = 0.35  # rad
 
-    def __post_init__(self) -> None:
-        """Hand the airframe down to the planner."""
-        lag = replace(self.planner.lag, rotor_lag=self.airframe.rotor_lag)
-        planner = replace(self.planner, airframe=self.airframe, lag=lag)
-        object.__setattr__(self, "planner", planner)
+    @property
+    def mpc_period_us(self) -> int:
+        """Of the planner."""
+        return self.planner.period_us
 
 
 # lambda of eq 25 [m/s]. The paper's two contradict its own sphere and tilt limits and fly only
@@ -110,7 +119,7 @@ def flight_config(
     inner: Inner = "tracking",
     robustness: str = "consistent",
     *,
-    solver: Solver = "clarabel",
+    solver: str = "clarabel",
     soft: bool = False,
 ) -> FlightConfig:
     """The configuration of a controller, an inner loop, a lambda and a solver, by name.
@@ -132,7 +141,7 @@ def flight_config(
     if wanted is not None:
         planner = replace(
             planner,
-            walls=replace(planner.walls, robustness=wanted),
-            workspace=replace(planner.workspace, robustness=wanted),
+            walls=replace(planner.walls, lambda_=wanted),
+            workspace=replace(planner.workspace, lambda_=wanted),
         )
     return FlightConfig(controller=controller, inner=inner, planner=planner, soft=soft)

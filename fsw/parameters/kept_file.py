@@ -60,7 +60,7 @@ class KeptFile:
         save(self._record, values)
 
 
-class Keeping:
+class ParameterFile:
     """A store whose changes are kept, from the start of a flight to its end."""
 
     def __init__(self, store: ParameterStore, file: KeptFile) -> None:

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Final
 
 from fsw.parameters.facts import FACT_BY_NAME
-from fsw.parameters.real32 import as_text, nearest_decimal
+from fsw.parameters.float32 import as_text, nearest_decimal
 from fsw.parameters.registry import BY_NAME
 
 VEHICLE: Final = 1  # MAVLink system of the vehicle
@@ -84,7 +84,7 @@ def as_parm(values: Mapping[str, float]) -> str:
 
 
 def save(path: Path, values: Mapping[str, float]) -> None:
-    """Write a file, whole or not at all: whoever reads it meanwhile finds the old one.
+    """Write a file, atomically: a concurrent reader finds the old one.
 
     Args:
         path: ``.parm`` makes it MAVProxy's format, anything else QGroundControl's.

@@ -7,19 +7,18 @@ from functools import partial
 from typing import Any, cast
 
 from fsw.control.cascade import Inner
+from fsw.flight.state import FlightState
+from fsw.flight.tuned_autopilot import TunedAutopilot
 from fsw.geometry.geodesy import DEFAULT_ORIGIN, to_local
 from fsw.link.services.mission_store import MissionStore, Site
-from fsw.link.wire.telemetry_context import VehicleFacts
 from fsw.mpc.planner import Planner
-from fsw.mpc.planner_config import Solver
 from fsw.parameters.control_choice import ControlChoice
 from fsw.parameters.flat import flat
 from fsw.parameters.flight_config import FlightConfig, flight_config
 from fsw.parameters.store import ParameterStore
+from fsw.ports import VehicleFacts
 from fsw.runtime import clock
-from fsw.runtime.flight_state import FlightState
 from fsw.runtime.program import FlightProgram
-from fsw.runtime.tuned_flight import TunedFlight
 from fsw.signals import Origin
 
 
@@ -31,17 +30,17 @@ def flight_software(
     Raises:
         ValueError: For an unknown name, listing the known ones.
     """
-    # What is no name of an inner loop or solver is refused by the call itself.
+    # An unknown name is refused by the call itself.
     config = flight_config(
         choice.controller,
         cast(Inner, choice.inner),
-        choice.robustness,
-        solver=cast(Solver, choice.solver),
-        soft=choice.soft,
+        choice.lambda_,
+        solver=choice.solver,
+        soft=choice.allow_inconsistent,
     )
     config = replace(config, origin=origin)
-    planner = Planner(config.planner, clock.stopwatch_us)
-    flight = TunedFlight(config)
+    planner = Planner(config.planner, config.airframe, clock.stopwatch_us)
+    flight = TunedAutopilot(config)
     if to_plan:
         planner.warm_up()
         flight.warm_up()

@@ -18,7 +18,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final, NoReturn
 
-from fsw.ports import Clock, Planner
+from fsw.ports import Clock, PlanningCycle
 from fsw.runtime.process import die_with_parent
 from fsw.runtime.process_link import PeerGone, ProcessLink, process_link
 from fsw.runtime.realtime import PLANNER_PRIORITY, claim_real_time
@@ -51,7 +51,7 @@ class Died:
     exit_code: int  # negative: the signal
 
 
-def start(planner: Planner, clock: Clock) -> tuple[int, ProcessLink]:
+def start(planner: PlanningCycle, clock: Clock) -> tuple[int, ProcessLink]:
     """Fork the nursery; returns its process number and our end of the link."""
     ours, theirs = process_link()
     parent = os.getpid()
@@ -62,7 +62,7 @@ def start(planner: Planner, clock: Clock) -> tuple[int, ProcessLink]:
     return nursery, ours
 
 
-def answer(planner: Planner, clock: Clock, request: PlanRequest) -> Answer:
+def answer(planner: PlanningCycle, clock: Clock, request: PlanRequest) -> Answer:
     """Plan, whatever comes of it."""
     begin = clock()
     try:
@@ -75,7 +75,7 @@ def answer(planner: Planner, clock: Clock, request: PlanRequest) -> Answer:
     return Answer(request.t_apply_us, result, begin, clock() - begin)
 
 
-def _nurse(planner: Planner, clock: Clock, link: ProcessLink) -> None:
+def _nurse(planner: PlanningCycle, clock: Clock, link: ProcessLink) -> None:
     """Keep one worker alive until the one that is served has gone."""
     claim_real_time(PLANNER_PRIORITY)
     while True:
@@ -91,7 +91,7 @@ def _nurse(planner: Planner, clock: Clock, link: ProcessLink) -> None:
         time.sleep(_RECOVERY_S)
 
 
-def _work(planner: Planner, clock: Clock, link: ProcessLink) -> None:
+def _work(planner: PlanningCycle, clock: Clock, link: ProcessLink) -> None:
     """Answer requests, always the newest, until the one that asks has gone."""
     claim_real_time(PLANNER_PRIORITY)
     link.send(Born(os.getpid()))

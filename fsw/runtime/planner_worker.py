@@ -15,7 +15,7 @@ from collections import Counter
 from dataclasses import dataclass, field
 from typing import Final
 
-from fsw.ports import Clock, Planner
+from fsw.ports import Clock, PlanningCycle
 from fsw.runtime.planner_process import Answer, Born, Died, answer, start
 from fsw.runtime.process_link import PeerGone
 from fsw.runtime.timing import GroupTimer
@@ -50,7 +50,7 @@ class PlannerRecord:
 class InlinePlanner:
     """Plans at once, in the caller's process; the answer waits for its tick."""
 
-    def __init__(self, planner: Planner, clock: Clock, record: PlannerRecord) -> None:
+    def __init__(self, planner: PlanningCycle, clock: Clock, record: PlannerRecord) -> None:
         self._planner = planner
         self._clock = clock
         self._record = record
@@ -76,7 +76,7 @@ class InlinePlanner:
 class ProcessPlanner:
     """Asks the worker process; the newest request replaces one that has not been started."""
 
-    def __init__(self, planner: Planner, clock: Clock, record: PlannerRecord) -> None:
+    def __init__(self, planner: PlanningCycle, clock: Clock, record: PlannerRecord) -> None:
         """Start the processes; do it early, before there are threads and open files."""
         self.worker: int | None = None  # its process, once it has said so
         self._planner = planner

@@ -7,8 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Generic, TypeVar
 
 from fsw.link.services.mission_store import MissionStore
-from fsw.link.wire.telemetry_context import VehicleFacts
-from fsw.ports import Planner
+from fsw.ports import PlanningCycle, VehicleFacts
 from fsw.signals import TickInputs, TickOutputs
 
 if TYPE_CHECKING:
@@ -25,7 +24,7 @@ class FlightProgram(Generic[State]):
     facts: VehicleFacts
     first_state: State
     tick: Callable[[State, TickInputs], tuple[State, TickOutputs]]
-    planner: Planner
+    planner: PlanningCycle
     parameters: ParameterStore
     missions: MissionStore
     numbers: Mapping[str, float] = field(default_factory=dict)  # of the configuration, by name

@@ -11,6 +11,8 @@ import enum
 from dataclasses import dataclass
 from typing import Final
 
+from fsw.periods import PLANNING_US, TICK_US
+
 
 class Member(enum.Enum):
     """What a group does; the loop has one method for each."""
@@ -36,10 +38,10 @@ class RateGroup:
     members: tuple[Member, ...]
 
 
-INNER: Final = RateGroup("inner", 0, 2_000, (Member.HEAR, Member.TICK, Member.ACTUATE))
-MPC: Final = RateGroup("mpc", 1, 100_000, (Member.ASK,))
+INNER: Final = RateGroup("inner", 0, TICK_US, (Member.HEAR, Member.TICK, Member.ACTUATE))
+MPC: Final = RateGroup("mpc", 1, PLANNING_US, (Member.ASK,))
 # Every stream of messages has a rate of its own, in whole ticks: fsw/link/telemetry/streams.py.
-TELEMETRY: Final = RateGroup("telemetry", 2, 2_000, (Member.PUBLISH, Member.RECORD))
+TELEMETRY: Final = RateGroup("telemetry", 2, TICK_US, (Member.PUBLISH, Member.RECORD))
 HOUSEKEEPING: Final = RateGroup(
     "housekeeping", 3, 1_000_000, (Member.SUM_UP, Member.WARN, Member.WATCH_FILES)
 )

@@ -39,7 +39,7 @@ class SensorLink(Protocol):
         """Whether there will be no more."""
         ...
 
-    def receive(self) -> SensorFrame | None:
+    def wait_for_step(self) -> SensorFrame | None:
         """Wait for the next frame, with some patience."""
         ...
 
@@ -92,7 +92,7 @@ class StepReleases:
 
     def next(self) -> Release | None:
         """See :class:`Releases`."""
-        sensors = self._sim.receive()
+        sensors = self._sim.wait_for_step()
         if sensors is None:
             return None
         now_us = self._clock()
@@ -154,7 +154,7 @@ class GridReleases:
 
     def _settle(self) -> Release | None:
         """Tick on arrival, and lay the grid by the promptest of the first frames."""
-        sensors, now_us = self._sim.receive(), self._clock()
+        sensors, now_us = self._sim.wait_for_step(), self._clock()
         if sensors is None:
             return None
         self._readings, self._t_us, self._grid_us = sensors, sensors.t_us, sensors.t_us

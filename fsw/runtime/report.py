@@ -6,7 +6,7 @@ import json
 from dataclasses import dataclass
 from pathlib import Path
 
-from fsw.link.wire.telemetry_context import VehicleFacts
+from fsw.ports import VehicleFacts
 from fsw.runtime.planner_worker import PlannerRecord
 from fsw.runtime.rates import HOUSEKEEPING, INNER, TELEMETRY
 from fsw.runtime.sim_loop import FlightEnd, FlightRecord

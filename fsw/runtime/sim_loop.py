@@ -16,9 +16,8 @@ from fsw.link.ground_links import GroundLinks
 from fsw.link.inbox import Inbox
 from fsw.link.sim_link import Pacing, SimLink
 from fsw.link.wire.message_ids import PATH_PLANNER, SYSTEM_ID
-from fsw.link.wire.telemetry_context import GroupTiming, LoopHealth
 from fsw.log.run_files import RunFiles
-from fsw.ports import Clock, PlanService
+from fsw.ports import Clock, GroupTiming, LoopHealth, PlanService
 from fsw.runtime.effort import EffortRecord
 from fsw.runtime.guarded_tick import GuardedTick
 from fsw.runtime.missed import MissedReleases
@@ -147,7 +146,7 @@ class SimLoop(Generic[State]):
             if self._clock() - announced >= 200_000:
                 announced = self._clock()
                 self._sim.announce()
-            sensors = self._sim.receive()
+            sensors = self._sim.wait_for_step()
             if sensors is not None:
                 return sensors
         return None
@@ -232,7 +231,7 @@ class SimLoop(Generic[State]):
                 self._sim.queue_ack(ack)
             else:
                 self._ground.acknowledge(t_us, ack)
-        self._sim.answer(t_us, outputs)
+        self._sim.send_actuators(t_us, outputs)
 
     def _ask(self, cycle: Cycle) -> None:
         request, applied = cycle.outputs.plan_request, cycle.outputs.snapshot.plan_input

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from fsw.link.wire.telemetry_context import GroupTiming
+from fsw.ports import GroupTiming
 
 _BINS_PER_E: Final = 50.0  # 2 % resolution
 _BINS: Final = 900  # up to exp(18) us, about a minute

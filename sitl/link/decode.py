@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple, cast
 
-from messages.convoy import ConvoyReader
 from messages.frames import Frame, split
+from messages.lockstep_codec import LockstepReader
 from sitl.link import message_ids
 from sitl.link.message_ids import PATH_PLANNER
 from sitl.link.pilot_messages import Ack
@@ -13,10 +13,10 @@ from sitl.simulation import Controls
 
 _ARMED: Final = 128  # MAV_MODE_FLAG in the mode of HIL_ACTUATOR_CONTROLS
 _JOINTS_AT: Final = 6  # wire index of controls[4]
-_CONTROLS_ALONE: Final = ConvoyReader((message_ids.HIL_ACTUATOR_CONTROLS, 19))
+_CONTROLS_ALONE: Final = LockstepReader((message_ids.HIL_ACTUATOR_CONTROLS, 19))
 
 
-class Answer(NamedTuple):
+class VehicleReply(NamedTuple):
     """What the vehicle answered to one step."""
 
     t_us: int  # the step's time stamp
@@ -27,11 +27,11 @@ class Answer(NamedTuple):
 
 
 def is_vehicle(datagram: bytes) -> bool:
-    """Tell whether a datagram holds at least one valid frame."""
+    """Whether a datagram holds at least one valid frame."""
     return any(True for _ in split(datagram))
 
 
-def answer(datagram: bytes, joints: int) -> Answer | None:
+def read_reply(datagram: bytes, joints: int) -> VehicleReply | None:
     """Read an answer.
 
     Args:
@@ -43,13 +43,13 @@ def answer(datagram: bytes, joints: int) -> Answer | None:
     """
     alone = _CONTROLS_ALONE.read(datagram)
     if alone is not None:
-        return Answer(int(alone[0][0]), _controls(alone[0], joints))
+        return VehicleReply(int(alone[0][0]), _controls(alone[0], joints))
     frames = list(split(datagram))
     if not frames or frames[-1].message_id != message_ids.HIL_ACTUATOR_CONTROLS:
         return None
     values = cast("tuple[float, ...]", frames[-1].payload_values)
     controls = _controls(values, joints)
-    return Answer(
+    return VehicleReply(
         int(values[0]), controls, acknowledgements(frames), _texts(frames), _custom_mode(frames)
     )
 
@@ -74,8 +74,8 @@ def acknowledgements(frames: list[Frame]) -> tuple[Ack, ...]:
 
 
 def _custom_mode(frames: list[Frame]) -> int | None:
-    told = [frame for frame in frames if frame.message_id == message_ids.HEARTBEAT]
-    return cast(int, told[-1].payload_values[0]) if told else None
+    heartbeats = [frame for frame in frames if frame.message_id == message_ids.HEARTBEAT]
+    return cast(int, heartbeats[-1].payload_values[0]) if heartbeats else None
 
 
 def _texts(frames: list[Frame]) -> tuple[str, ...]:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from messages.convoy import ConvoyFrame
 from messages.frames import FrameWriter
+from messages.lockstep_codec import LockstepFrame
 from sitl.link import message_ids
 from sitl.link.message_ids import PATH_PLANNER, SENSORS, SYSTEM_ID
 from sitl.link.pilot_messages import (
@@ -47,10 +47,10 @@ class StepEncoder:
         self._sensors = FrameWriter(SYSTEM_ID, SENSORS)
         self._pilot = FrameWriter(SYSTEM_ID, PATH_PLANNER)
         self._pacing = 1 if lockstep else 0
-        self._odometry = ConvoyFrame(self._sensors, message_ids.ODOMETRY, *_ODOMETRY_TAIL)
-        self._hil_sensor = ConvoyFrame(self._sensors, message_ids.HIL_SENSOR, *_HIL_TAIL)
+        self._odometry = LockstepFrame(self._sensors, message_ids.ODOMETRY, *_ODOMETRY_TAIL)
+        self._hil_sensor = LockstepFrame(self._sensors, message_ids.HIL_SENSOR, *_HIL_TAIL)
         self._arms = {
-            joints: ConvoyFrame(self._sensors, message_ids.ARM_JOINT_STATE, *_ARM_TAIL, joints)
+            joints: LockstepFrame(self._sensors, message_ids.ARM_JOINT_STATE, *_ARM_TAIL, joints)
             for joints in range(1, 5)
         }
 
@@ -67,7 +67,7 @@ class StepEncoder:
         return self._spoken(messages) + step if messages else step
 
     def heartbeat(self) -> bytes:
-        """HEARTBEAT; its custom_mode says who waits for whom: 1 lockstep, 0 real time."""
+        """HEARTBEAT; its custom_mode is the pacing: 1 lockstep, 0 real time."""
         values = (self._pacing, _GENERIC, _NO_AUTOPILOT, _HIL, _ACTIVE, _MAVLINK_VERSION)
         return self._sensors.frame(message_ids.HEARTBEAT, *values)
 

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 from typing import Final, Protocol
 
 from sitl.link import decode
-from sitl.link.decode import Answer
+from sitl.link.decode import VehicleReply
 from sitl.link.step_grid import StepGrid
-from sitl.link.udp_endpoint import RESEND_S, UdpEndpoint
+from sitl.link.udp_endpoint import RESEND_S, PeerSocket
 from sitl.simulation import Controls
 
-STALL_S: Final = 1.2  # so that 2 s after a stall both halves have ended; a pause of 1 s passes
+STALL_S: Final = 1.2  # so that 2 s after a stall both processes have ended; a pause of 1 s passes
 SILENT_S: Final = 0.1  # real time: older controls are not held, the rotors stop
 _FIRST_PLAN_S: Final = 0.05  # between the first answer and the start of the clock
 
@@ -30,7 +30,7 @@ class ExchangeCounts:
 
     resent: int = 0  # lockstep: steps that were sent again
     missed: int = 0  # real time: steps whose answer was not there at the end of the step
-    pauses: int = 0  # real time: how often the simulator stood still and moved its grid
+    pauses: int = 0  # real time: how often the simulator was suspended and moved its grid
     paused_s: float = 0.0  # real time: by how much in all
     waited_s: float = 0.0  # lockstep: for answers, sending included, the first step's left out
 
@@ -53,7 +53,7 @@ class Exchange(Protocol):
 
     def step(
         self, number: int, t_us: int, datagram: bytes, meanwhile: Callable[[], None]
-    ) -> Answer:
+    ) -> VehicleReply:
         """Send a step and return what to apply during it.
 
         Args:
@@ -72,7 +72,7 @@ class Lockstep:
     """Waits for the answer of every step, and repeats a step whose answer does not come."""
 
     def __init__(
-        self, endpoint: UdpEndpoint, joints: int, period_s: float | None, stop: Stop
+        self, endpoint: PeerSocket, joints: int, period_s: float | None, stop: Stop
     ) -> None:
         """Ready to start.
 
@@ -98,7 +98,7 @@ class Lockstep:
 
     def step(
         self, number: int, t_us: int, datagram: bytes, meanwhile: Callable[[], None]
-    ) -> Answer:
+    ) -> VehicleReply:
         """See :class:`Exchange`."""
         if self._period_s is not None:
             _sleep_until(self._start_s + number * self._period_s)
@@ -112,11 +112,11 @@ class Lockstep:
             if received is not None:
                 if number:
                     self.counts.waited_s += time.perf_counter() - begin_s
-                answer = decode.answer(received, self._joints)
+                answer = decode.read_reply(received, self._joints)
                 if answer is not None and answer.t_us == t_us:
                     return answer
             now_s = time.perf_counter()
-            # More than its patience a receive takes only if this process itself stood still.
+            # More than its patience a receive takes only if this process itself was suspended.
             self._listened_s += min(now_s - looked_s, RESEND_S)
             looked_s = now_s
             if self._stop.requested:
@@ -142,7 +142,7 @@ class RealTime:
 
     def __init__(
         self,
-        endpoint: UdpEndpoint,
+        endpoint: PeerSocket,
         joints: int,
         period_s: float,
         stop: Stop,
@@ -178,7 +178,7 @@ class RealTime:
 
     def step(
         self, number: int, t_us: int, datagram: bytes, meanwhile: Callable[[], None]
-    ) -> Answer:
+    ) -> VehicleReply:
         """See :class:`Exchange`."""
         if number == 0:
             return self._first_step(t_us, datagram, meanwhile)
@@ -198,7 +198,7 @@ class RealTime:
             )
         if not any(answer.t_us == t_us for answer in answers):
             self.counts.missed += 1
-        return Answer(
+        return VehicleReply(
             t_us,
             self._held,
             acks=tuple(ack for answer in answers for ack in answer.acks),
@@ -208,7 +208,9 @@ class RealTime:
             ),
         )
 
-    def _first_step(self, t_us: int, datagram: bytes, meanwhile: Callable[[], None]) -> Answer:
+    def _first_step(
+        self, t_us: int, datagram: bytes, meanwhile: Callable[[], None]
+    ) -> VehicleReply:
         """Wait for the first answer as lockstep does, then start the grid."""
         answer = self._first.step(0, t_us, datagram, meanwhile)
         self._held = answer.controls
@@ -218,17 +220,17 @@ class RealTime:
         return answer
 
     def _wait(self, number: int) -> None:
-        """Sleep until the step is over; what this process stood still is nobody's silence."""
+        """Sleep until the step is over; a suspension here is no silence of the vehicle."""
         paused_s = self._grid.wait(number)
         if paused_s > 0.0:
             self.counts.pauses += 1
             self.counts.paused_s += paused_s
             self._heard_s += paused_s
 
-    def _waiting(self) -> list[Answer]:
+    def _waiting(self) -> list[VehicleReply]:
         answers = []
         while (received := self._endpoint.receive_waiting()) is not None:
-            answer = decode.answer(received, self._joints)
+            answer = decode.read_reply(received, self._joints)
             if answer is not None:
                 answers.append(answer)
         return answers

@@ -91,7 +91,7 @@ class PilotState:
     start_height_m: float = 0.0
     last_text: str = ""
     refusal: str | None = None  # ends the run
-    left: str | None = None  # somebody else took the vehicle off the trajectory
+    left: str | None = None  # another client took the vehicle off the trajectory
 
     @property
     def done(self) -> bool:

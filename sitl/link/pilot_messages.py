@@ -1,11 +1,11 @@
-"""What the scenario's pilot says to the vehicle, before it is encoded."""
+"""Messages of the scenario's pilot to the vehicle, before they are encoded."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import NamedTuple, TypeAlias
 
-from sitl.scenario import Obstacle, Wall, Workspace
+from sitl.scenario import Obstacle, ScenarioWall, Workspace
 from sitl.trajectory import TrajectoryPoint
 
 Params: TypeAlias = tuple[float, float, float, float, float, float, float]
@@ -15,14 +15,14 @@ Params: TypeAlias = tuple[float, float, float, float, float, float, float]
 class AnnounceWall:
     """One wall of the safe set."""
 
-    wall: Wall
+    wall: ScenarioWall
     index: int
     count: int
 
 
 @dataclass(frozen=True, slots=True)
 class AnnounceObstacle:
-    """One point of the safe set; walls and points are counted together."""
+    """One obstacle of the safe set; walls and obstacles are counted together."""
 
     obstacle: Obstacle
     index: int
@@ -74,4 +74,4 @@ class Heard(NamedTuple):
     armed: bool = False
     height_m: float = 0.0  # above the ground, as the sensors measured it
     speed_m_s: float = 0.0
-    custom_mode: int | None = None  # None: it said nothing
+    custom_mode: int | None = None  # None: not reported

@@ -10,16 +10,16 @@ from typing import Final, Protocol
 
 from messages.frames import split
 from sitl.link import decode, pilot
-from sitl.link.decode import Answer
+from sitl.link.decode import VehicleReply
 from sitl.link.encode import StepEncoder
 from sitl.link.exchange import Exchange, SimulatorError, Stop
 from sitl.link.message_ids import ACCEPTED, CMD_REBOOT_SHUTDOWN
 from sitl.link.pilot import FlightPlan, PilotState
 from sitl.link.pilot_messages import Heard, PilotMessage, SendCommand
-from sitl.link.udp_endpoint import UdpEndpoint
+from sitl.link.udp_endpoint import PeerSocket
+from sitl.result import EndKind
 from sitl.sensors.suite import SensorReadings
 from sitl.simulation import Simulation
-from sitl.verdict import EndKind
 
 _HEARTBEAT_STEPS: Final = 500  # 1 Hz
 _PROGRESS_S: Final = 0.1  # wall time between two reports
@@ -31,7 +31,7 @@ _SHUTDOWN: Final = SendCommand(
 
 
 class Progress(Protocol):
-    """Told about ten times a second of wall time."""
+    """Reports progress about ten times a second of wall time."""
 
     def __call__(self, time_s: float, margin_m: float | None, real_time_factor: float) -> None:
         """Take simulated time, the smallest margin so far and the speed."""
@@ -47,8 +47,8 @@ class RunTiming:
     real_time_factor: float
 
 
-def wait_for_vehicle(endpoint: UdpEndpoint, wait_s: float, stop: Stop) -> bool:
-    """Serve the first sender of a valid frame; False if nobody came in time."""
+def wait_for_vehicle(endpoint: PeerSocket, wait_s: float, stop: Stop) -> bool:
+    """Serve the first sender of a valid frame; False if none came in time."""
     until_s = time.perf_counter() + wait_s
     while time.perf_counter() < until_s and not stop.requested:
         received = endpoint.receive_from_anyone()
@@ -107,8 +107,8 @@ def fly(
     return RunTiming(simulation.step, wall_s, simulation.time_s / max(wall_s, 1e-9))
 
 
-def shut_down(endpoint: UdpEndpoint, encoder: StepEncoder, tries: int) -> bool:
-    """Tell the vehicle that the run is over; True once it has acknowledged."""
+def shut_down(endpoint: PeerSocket, encoder: StepEncoder, tries: int) -> bool:
+    """Command the vehicle to shut down; True once it has acknowledged."""
     for _ in range(tries):
         endpoint.send(encoder.command(_SHUTDOWN))
         until_s = time.perf_counter() + 0.25
@@ -132,14 +132,14 @@ def _datagram(
     return encoder.heartbeat() + datagram if step % _HEARTBEAT_STEPS == 0 else datagram
 
 
-def _advance(simulation: Simulation, answer: Answer) -> None:
+def _advance(simulation: Simulation, answer: VehicleReply) -> None:
     try:
         simulation.advance(answer.controls)
     except ValueError as error:
         raise SimulatorError(f"the flight software sent unusable controls: {error}") from None
 
 
-def _heard(answer: Answer, readings: SensorReadings) -> Heard:
+def _heard(answer: VehicleReply, readings: SensorReadings) -> Heard:
     return Heard(
         answer.acks,
         answer.texts,

@@ -12,8 +12,8 @@ MOST_BEHIND_S: Final = 0.05  # is caught up with; the vehicle takes no part in s
 class StepGrid:
     """A late step shortens the next one and shifts nothing, up to ``MOST_BEHIND_S``.
 
-    Behind that the process has been standing still, and simulated time stood still with it:
-    hundreds of steps in a row would fly a vehicle that nobody controls into a wall.
+    Further behind, the process was suspended, and simulated time is paused with it:
+    hundreds of steps in a row would fly an uncontrolled vehicle into a wall.
     """
 
     def __init__(

@@ -10,13 +10,20 @@ from sitl.plant.vector import V3, V4
 
 @kernel
 def thrust_rate(thrust: float, command: float, thrust_max: float, lag: float) -> float:
-    """First-order lag of one rotor [N/s]; the command saturates at 0 and ``thrust_max`` [N]."""
+    """First-order lag of one rotor [N/s].
+
+    Args:
+        thrust: Present thrust [N].
+        command: Wanted thrust [N]; saturates at 0 and ``thrust_max``.
+        thrust_max: Full thrust [N].
+        lag: Time constant [s].
+    """
     return (min(max(command, 0.0), thrust_max) - thrust) / lag
 
 
 @kernel
 def rotor_torque(thrust: V4, arm: float, yaw_ratio: float) -> V3:
-    """Torque of the four thrusts on the base [N·m, B].
+    """Torque [N·m, B] of four thrusts at a lever arm [m] with yaw_ratio [m], torque per thrust.
 
     .. math:: τ = [L(f_2 − f_4), L(f_3 − f_1), b(f_1 − f_2 + f_3 − f_4)]
     """
@@ -28,7 +35,16 @@ def rotor_torque(thrust: V4, arm: float, yaw_ratio: float) -> V3:
 def joint_torque(
     command: float, rate: float, torque_max: float, viscous: float, coulomb: float, width: float
 ) -> float:
-    """Torque that reaches a joint after limit, viscous and smoothed Coulomb friction [N·m]."""
+    """Torque that reaches a joint after limit, viscous and smoothed Coulomb friction [N·m].
+
+    Args:
+        command: Commanded torque [N·m].
+        rate: Joint rate [rad/s].
+        torque_max: Limit of the drive [N·m].
+        viscous: Viscous friction [N·m·s/rad].
+        coulomb: Coulomb friction [N·m].
+        width: Rate at which Coulomb friction has reached 76 % [rad/s].
+    """
     driven = min(max(command, -torque_max), torque_max)
     friction: float = viscous * rate + coulomb * np.tanh(rate / width)
     return driven - friction

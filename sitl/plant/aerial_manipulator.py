@@ -15,7 +15,8 @@ from sitl.plant.bodies import Chain, Posture, empty_posture, posture_into
 from sitl.plant.contact import Feet, ground_wrench
 from sitl.plant.mass_matrix import mass_matrix_into, solve_in_place
 from sitl.plant.newton_euler import wrench_needed_into
-from sitl.plant.parameters import Vehicle, chain
+from sitl.plant.packing import pack_params
+from sitl.plant.parameters import Joints, Rotors, Vehicle, chain
 from sitl.plant.state import ARM, P_WB, Q_WB, THRUST, V_WB, W_WB_B
 from sitl.plant.vector import (
     V3,
@@ -31,12 +32,12 @@ from sitl.plant.vector import (
 
 
 class Plant(NamedTuple):
-    """Every number the kernels need."""
+    """Every number the kernels need; numba reads them by name from one block of memory."""
 
     chain: Chain
     feet: Feet
-    rotors: Array  # arm m, yaw ratio m, thrust_max N, lag s
-    joints: Array  # torque_max N·m, viscous N·m·s/rad, coulomb N·m, coulomb rate rad/s
+    rotors: Rotors
+    joints: Joints
     gravity: float  # m/s²
 
 
@@ -61,11 +62,11 @@ class Workspace(NamedTuple):
 
 
 def plant(vehicle: Vehicle) -> Plant:
-    """Pack a vehicle for the kernels."""
-    legs, rotors, joints = vehicle.legs, vehicle.rotors, vehicle.joints
+    """The numbers of a vehicle for the kernels."""
+    legs = vehicle.legs
     s, h = legs.spread, legs.length
     points = np.array([(x, y, h) for x in (-s, s) for y in (-s, s)])
-    return Plant(
+    numbers = Plant(
         chain=chain(vehicle),
         feet=Feet(
             points=points,
@@ -75,10 +76,11 @@ def plant(vehicle: Vehicle) -> Plant:
             friction=legs.friction,
             slip_rate=legs.slip_rate,
         ),
-        rotors=np.array([rotors.arm, rotors.yaw_ratio, rotors.thrust_max, rotors.lag]),
-        joints=np.array([joints.torque_max, joints.viscous, joints.coulomb, joints.coulomb_rate]),
+        rotors=vehicle.rotors,
+        joints=vehicle.joints,
         gravity=vehicle.gravity,
     )
+    return pack_params(numbers)
 
 
 @compiled
@@ -97,13 +99,13 @@ def empty_workspace(joints: int) -> Workspace:
 
 @kernel
 def gravity_in_body(rotation: Array, g: float) -> V3:
-    """Gravity [m/s²] written in B for R_WB (3, 3); W is NED, so it points along +z."""
+    """Gravity g [m/s²] in B for the rotation (3, 3) [1], R_WB; in NED it points along +z."""
     return transposed_times(rotation, (0.0, 0.0, g))
 
 
 @kernel
 def load_into(plant: Plant, state: Array, inputs: Inputs, work: Workspace) -> None:
-    """Generalised force of everything but inertia: rotors, drives, ground, disturbance."""
+    """Forces of rotors, drives, ground, disturbance at a state (17 + 2j,) [SI], into work.load."""
     load, rotation = work.load, work.rotation
     feet_force, feet_moment = ground_wrench(
         plant.feet, triple(state, P_WB), triple(state, V_WB), triple(state, W_WB_B), rotation
@@ -112,17 +114,26 @@ def load_into(plant: Plant, state: Array, inputs: Inputs, work: Workspace) -> No
     lift = (0.0, 0.0, -(thrust[0] + thrust[1] + thrust[2] + thrust[3]))
     push = transposed_times(rotation, triple(inputs.force_W, 0))
     put(load, 0, add(add(lift, push), feet_force))
-    turn = rotor_torque(thrust, plant.rotors[0], plant.rotors[1])
+    turn = rotor_torque(thrust, plant.rotors.arm, plant.rotors.yaw_ratio)
     put(load, 3, add(add(turn, triple(inputs.torque_B, 0)), feet_moment))
     joints, drive = work.still.shape[0], plant.joints
     for i in range(joints):
         rate = state[ARM + joints + i]
-        load[6 + i] = joint_torque(inputs.torque[i], rate, drive[0], drive[1], drive[2], drive[3])
+        load[6 + i] = joint_torque(
+            inputs.torque[i],
+            rate,
+            drive.torque_max,
+            drive.viscous,
+            drive.coulomb,
+            drive.coulomb_rate,
+        )
 
 
 @kernel
 def acceleration_into(plant: Plant, state: Array, inputs: Inputs, work: Workspace) -> None:
     """Solve M x = load − bias into ``work.load``: base linear and angular, joint accelerations.
+
+    Taken at a state (17 + 2j,) [SI], see ``sitl.plant.state``.
 
     The linear part is the acceleration of the base origin written in B (not the rate of the
     velocity's components in B).
@@ -145,7 +156,7 @@ def acceleration_into(plant: Plant, state: Array, inputs: Inputs, work: Workspac
 def derivative_into(
     plant: Plant, state: Array, inputs: Inputs, work: Workspace, out: Array
 ) -> None:
-    """Time derivative of the state vector (17 + 2j,)."""
+    """Time derivative into out (17 + 2j,) [SI/s] at a state (17 + 2j,) [SI]."""
     acceleration_into(plant, state, inputs, work)
     put(out, P_WB, triple(state, V_WB))
     put(out, V_WB, times(work.rotation, triple(work.load, 0)))
@@ -156,7 +167,7 @@ def derivative_into(
     out[Q_WB + 1] = 0.5 * (w * a + y * c - z * b)
     out[Q_WB + 2] = 0.5 * (w * b + z * a - x * c)
     out[Q_WB + 3] = 0.5 * (w * c + x * b - y * a)
-    limit, lag = plant.rotors[2], plant.rotors[3]
+    limit, lag = plant.rotors.thrust_max, plant.rotors.lag
     for i in range(4):
         out[THRUST + i] = thrust_rate(state[THRUST + i], inputs.thrust[i], limit, lag)
     joints = work.still.shape[0]

@@ -23,7 +23,7 @@ class Feet(NamedTuple):
 
 @kernel
 def foot_force(feet: Feet, depth: float, v: V3) -> V3:
-    """Ground reaction on one foot [N, W].
+    """Ground reaction [N, NED] on a foot at a depth [m] below ground, moving with ``v`` [m/s, NED].
 
     Hunt–Crossley normal force: unlike a linear damper it grows from zero at touch-down, so
     the integrator sees no jump. Never pulls.
@@ -36,7 +36,15 @@ def foot_force(feet: Feet, depth: float, v: V3) -> V3:
 
 @kernel
 def ground_wrench(feet: Feet, p: V3, v: V3, w: V3, rotation: Array) -> tuple[V3, V3]:
-    """Force and moment about the base origin of all feet [N and N·m, both in B]."""
+    """Force [N, B] and moment about the base origin [N·m, B] of all feet.
+
+    Args:
+        feet: Numbers of the landing gear.
+        p: Base origin [m, NED].
+        v: Its velocity [m/s, NED].
+        w: Angular velocity of the base [rad/s, B].
+        rotation: R_WB (3, 3) [1].
+    """
     force = moment = (0.0, 0.0, 0.0)
     if p[2] + feet.reach < 0.0:
         return force, moment

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -18,7 +19,7 @@ from sitl.plant.aerial_manipulator import (
 )
 from sitl.plant.kinematics import place_into, touch_down_speed
 from sitl.plant.state import ARM, Q_WB
-from sitl.plant.vector import V3, Array, sub, triple
+from sitl.plant.vector import V3, V4, Array, sub, triple
 
 STEP_S = 0.001  # 1e-9 error after a second of tumbling (tests/sitl/test_conservation.py)
 
@@ -40,7 +41,7 @@ class Arrival(NamedTuple):
 
 @kernel
 def specific_force(plant: Plant, state: Array, inputs: Inputs, work: Workspace) -> V3:
-    """What an accelerometer at the base origin feels [m/s², B]: acceleration minus gravity."""
+    """Acceleration minus gravity at the base origin [m/s², B] in a state (17 + 2j,) [SI]."""
     acceleration_into(plant, state, inputs, work)
     return sub(triple(work.load, 0), gravity_in_body(work.rotation, plant.gravity))
 
@@ -49,7 +50,7 @@ def specific_force(plant: Plant, state: Array, inputs: Inputs, work: Workspace) 
 def rk4_step(
     plant: Plant, state: Array, inputs: Inputs, step: float, work: Workspace, slopes: Slopes
 ) -> None:
-    """Advance ``state`` in place by ``step`` [s]; the attitude leaves with unit length."""
+    """Advance a state (17 + 2j,) [SI] in place by ``step`` [s]; the attitude gets unit length."""
     n = state.shape[0]
     one, total, middle = slopes.one, slopes.total, slopes.middle
     derivative_into(plant, state, inputs, work, total)
@@ -82,10 +83,10 @@ def integrate(plant: Plant, state: Array, inputs: Inputs, step: float, places: A
 
     Args:
         plant: Numbers of the vehicle.
-        state: (17 + 2j,), see ``sitl.plant.state``.
+        state: (17 + 2j,) [SI], see ``sitl.plant.state``.
         inputs: Commands and disturbance, held over all steps.
         step: Length of one step [s].
-        places: (steps, 2 + j, 3) m, overwritten: positions in W of the base origin and of
+        places: (steps, 2 + j, 3) [m, NED], overwritten: positions of the base origin and of
             every DH frame's origin after each step. No rows: the state stays as it is.
     """
     n = state.shape[0]
@@ -97,3 +98,30 @@ def integrate(plant: Plant, state: Array, inputs: Inputs, step: float, places: A
         place_into(plant, state, work, k, places)
         fastest = max(fastest, touch_down_speed(plant, state, work))
     return Arrival(fastest, specific_force(plant, state, inputs, work))
+
+
+@compiled
+def step(
+    plants: Sequence[Plant],
+    state: Array,
+    thrust: V4,
+    torque: tuple[float, ...],
+    force_W: V3,
+    torque_B: V3,
+    step_s: float,
+    places: Array,
+) -> Arrival:
+    """``integrate`` with the plant in an array of one and inputs in tuples: the cheapest to call.
+
+    Args:
+        plants: Numbers of the vehicle.
+        state: State vector (17 + 2j,) [SI], advanced in place.
+        thrust: Commanded thrusts [N], rotors 1 to 4.
+        torque: (j,) commanded joint torques [N·m].
+        force_W: Disturbance on the base origin [N, NED].
+        torque_B: Disturbance on the base [N·m, B].
+        step_s: Length of one step.
+        places: (steps, 2 + j, 3) [m, NED], overwritten; see ``integrate``.
+    """
+    inputs = Inputs(np.array(thrust), np.array(torque), np.array(force_W), np.array(torque_B))
+    return integrate(plants[0], state, inputs, step_s, places)

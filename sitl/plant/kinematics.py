@@ -15,10 +15,10 @@ def place_into(plant: Plant, state: Array, work: Workspace, k: int, out: Array) 
 
     Args:
         plant: Numbers of the vehicle.
-        state: (17 + 2j,).
+        state: (17 + 2j,) [SI].
         work: Memory; its rotation and posture are left valid for ``state``.
         k: Which entry of ``out`` to fill.
-        out: (n, 2 + j, 3) m: base, DH frame 0 (joint 1), …, DH frame j (end-effector).
+        out: (n, 2 + j, 3) [m, NED]: base, DH frame 0 (joint 1), …, DH frame j (end-effector).
     """
     joints = work.still.shape[0]
     rotation_into(state, Q_WB, work.rotation)
@@ -36,13 +36,13 @@ def _put(out: Array, k: int, i: int, p: V3) -> None:
 
 @compiled
 def places(plant: Plant, state: Array, out: Array) -> None:
-    """``place_into`` for one state; ``out`` is (1, 2 + j, 3)."""
+    """``place_into`` for one state (17 + 2j,) [SI], into out (1, 2 + j, 3) [m, NED]."""
     place_into(plant, state, empty_workspace((state.shape[0] - ARM) // 2), 0, out)
 
 
 @kernel
 def touch_down_speed(plant: Plant, state: Array, work: Workspace) -> float:
-    """Largest downward speed of a foot that is below ground [m/s]; 0 if none is.
+    """Largest downward speed [m/s] of a foot below ground in a state (17 + 2j,) [SI]; 0 if none is.
 
     ``work.rotation`` must be that of ``state``.
     """

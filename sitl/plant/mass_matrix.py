@@ -14,7 +14,7 @@ from sitl.plant.vector import Array, add, column, cross, dot, put_row, row, scal
 
 @kernel
 def mass_matrix_into(chain: Chain, at: Posture, out: Array) -> None:
-    """Lower triangle of the exact coupled mass matrix (6+j, 6+j).
+    """Lower triangle of the exact coupled mass matrix into out (6+j, 6+j) [kg, kg·m, kg·m²].
 
     Rows and columns: base linear acceleration, base angular acceleration (both in B), joints.
     Equal, column by column, to ``wrench_needed_into`` with unit accelerations and zero rates;
@@ -67,7 +67,10 @@ def mass_matrix_into(chain: Chain, at: Posture, out: Array) -> None:
 
 @kernel
 def solve_in_place(m: Array, b: Array) -> None:
-    """Solve M x = b by Cholesky; ``m`` (n, n) lower triangle and ``b`` (n,) are overwritten."""
+    """Solve m (n, n) [any unit] x = b (n,) [any unit] by Cholesky; both are overwritten.
+
+    Only the lower triangle of ``m`` is read.
+    """
     n = b.shape[0]
     for k in range(n):
         pivot, value = m[k, k], b[k]

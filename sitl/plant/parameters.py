@@ -102,7 +102,7 @@ class Vehicle:
         return self.base_mass + sum(link.mass for link in self.links)
 
     def scaled(self, mass: float, inertia: float) -> Vehicle:
-        """The same vehicle with all masses and all inertias multiplied."""
+        """The same vehicle, masses times ``mass`` [1] and inertias times ``inertia`` [1]."""
         ixx, iyy, izz = self.base_inertia
         return replace(
             self,

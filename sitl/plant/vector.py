@@ -1,4 +1,4 @@
-"""Three-vectors as tuples: inside a compiled kernel they cost no allocation."""
+"""Three-vectors as tuples, of any unit: inside a compiled kernel they cost no allocation."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ V4: TypeAlias = tuple[float, float, float, float]
 
 @kernel
 def triple(a: Array, i: int) -> V3:
-    """Entries i, i+1, i+2 of a vector."""
+    """Entries i, i+1, i+2 of a (n,) [any unit]."""
     return (a[i], a[i + 1], a[i + 2])
 
 
 @kernel
 def put(out: Array, i: int, v: V3) -> None:
-    """Store ``v`` in entries i, i+1, i+2 of a vector."""
+    """Store ``v`` in entries i, i+1, i+2 of out (n,) [any unit]."""
     out[i] = v[0]
     out[i + 1] = v[1]
     out[i + 2] = v[2]
@@ -34,13 +34,13 @@ def put(out: Array, i: int, v: V3) -> None:
 
 @kernel
 def row(a: Array, i: int) -> V3:
-    """Row ``i`` of an (n, 3) array."""
+    """Row ``i`` of a (n, 3) [any unit]."""
     return (a[i, 0], a[i, 1], a[i, 2])
 
 
 @kernel
 def put_row(out: Array, i: int, v: V3) -> None:
-    """Store ``v`` in row ``i`` of an (n, 3) array."""
+    """Store ``v`` in row ``i`` of out (n, 3) [any unit]."""
     out[i, 0] = v[0]
     out[i, 1] = v[1]
     out[i, 2] = v[2]
@@ -48,13 +48,13 @@ def put_row(out: Array, i: int, v: V3) -> None:
 
 @kernel
 def column(stack: Array, i: int, c: int) -> V3:
-    """Column ``c`` of matrix ``i`` in an (n, 3, 3) array."""
+    """Column ``c`` of matrix ``i`` in a stack (n, 3, 3) [any unit]."""
     return (stack[i, 0, c], stack[i, 1, c], stack[i, 2, c])
 
 
 @kernel
 def times_one(stack: Array, i: int, v: V3) -> V3:
-    """M v for matrix ``i`` in an (n, 3, 3) array."""
+    """M v for matrix ``i`` in a stack (n, 3, 3) [any unit]."""
     return (
         stack[i, 0, 0] * v[0] + stack[i, 0, 1] * v[1] + stack[i, 0, 2] * v[2],
         stack[i, 1, 0] * v[0] + stack[i, 1, 1] * v[1] + stack[i, 1, 2] * v[2],
@@ -76,7 +76,7 @@ def sub(a: V3, b: V3) -> V3:
 
 @kernel
 def scale(s: float, a: V3) -> V3:
-    """S a."""
+    """Vector ``a`` times s [any unit]."""
     return (s * a[0], s * a[1], s * a[2])
 
 
@@ -98,7 +98,7 @@ def cross(a: V3, b: V3) -> V3:
 
 @kernel
 def times(m: Array, v: V3) -> V3:
-    """M v for a (3, 3) array."""
+    """M v for m (3, 3) [any unit]."""
     return (
         m[0, 0] * v[0] + m[0, 1] * v[1] + m[0, 2] * v[2],
         m[1, 0] * v[0] + m[1, 1] * v[1] + m[1, 2] * v[2],
@@ -108,7 +108,7 @@ def times(m: Array, v: V3) -> V3:
 
 @kernel
 def transposed_times(m: Array, v: V3) -> V3:
-    """Mᵀ v for a (3, 3) array."""
+    """Mᵀ v for m (3, 3) [any unit]."""
     return (
         m[0, 0] * v[0] + m[1, 0] * v[1] + m[2, 0] * v[2],
         m[0, 1] * v[0] + m[1, 1] * v[1] + m[2, 1] * v[2],
@@ -118,9 +118,9 @@ def transposed_times(m: Array, v: V3) -> V3:
 
 @kernel
 def rotation_into(a: Array, i: int, out: Array) -> None:
-    """R_WB (3, 3) of the quaternion [w, x, y, z] in entries i … i+3, of any length.
+    """R_WB into out (3, 3) [1] from the quaternion w, x, y, z in entries i … i+3 of a (n,) [1].
 
-    Dividing by the squared length keeps the derivative smooth at Runge–Kutta stages, where
+    Of any length: dividing by its square keeps the derivative smooth at Runge–Kutta stages, where
     the length is off one by O(dt²).
     """
     w, x, y, z = a[i], a[i + 1], a[i + 2], a[i + 3]

@@ -40,14 +40,14 @@ class DelayLine(Generic[T]):
         return self._line[0]
 
 
-class Noise:
+class GaussianNoise:
     """Gaussian noise from a stream of its own."""
 
     def __init__(self, seed: int, *path: str) -> None:
         self._random = stream(seed, "sensor", *path)
 
     def on(self, values: tuple[float, ...], sigma: float) -> tuple[float, ...]:
-        """``values`` with independent noise of standard deviation ``sigma`` each."""
+        """``values`` with independent noise of standard deviation sigma [unit of the values]."""
         if sigma == 0.0:
             return values
         draws = self._random.standard_normal(len(values))
@@ -92,7 +92,7 @@ class SensorSuite:
         self._encoders: DelayLine[SensorReadings] = DelayLine(steps[2])
         self._exact = sensors == Sensors()
         self._noise = {
-            name: Noise(seed, name)
+            name: GaussianNoise(seed, name)
             for name in ("gyro", "accel", "p", "v", "q", "w", "angle", "rate", "torque")
         }
 

@@ -5,9 +5,9 @@ in the docstring, its name and a bracket behind it, in the summary line or in ``
 
     thrust [N]        p_WE [m]        rate [rad/s, FRD]        share [1]        states (n, 8) [SI]
 
-A name that ends with a unit (``t_us``, ``wait_s``) needs none. A vector needs its frame as well: in
-the name in monogram notation (``p_WE``, ``v_B``) or in the bracket after the unit (``[m, NED]``). An
-array needs its shape in parentheses before the bracket. The exact form is ``problems``.
+A name that ends with a unit (``t_us``, ``wait_s``) needs none. A vector needs its frame as well:
+in the name in monogram notation (``p_WE``, ``v_B``) or in the bracket after the unit
+(``[m, NED]``). An array needs its shape in parentheses before the bracket. See ``problems``.
 """
 
 from __future__ import annotations

@@ -38,7 +38,7 @@ def test_results_that_cannot_be_written_are_told_behind_the_verdict(tmp_path: Pa
     done = fly(out, "--json", str(FULL))
     assert done.returncode == 1
     assert "PASS flew 1.0 s" in done.stdout
-    assert "MPC p50" in done.stdout  # the table has what the halves found
+    assert "MPC p50" in done.stdout  # the table has what the processes found
     assert one_sentence(done.stderr), done.stderr
     for path in (*(out / name for name in names), FULL):
         assert f"{path}: No space left on device" in done.stderr

@@ -48,7 +48,7 @@ def test_set_and_get_in_a_new_file(tmp_path: Path, capsys: pytest.CaptureFixture
         (["set", "PID_YAW_P", "nan"], 1, "nan is refused"),
         (["set", "PID_YAW_Q", "1"], 1, "unknown parameter PID_YAW_Q; did you mean PID_YAW_P?"),
         (["get", "WAL_ALPHA"], 1, "did you mean WALL_ALPHA?"),
-        (["set", "PID_YAW_P", "much"], 2, "invalid float value: 'much'"),
+        (["set", "PID_YAW_P", "much"], 2, "'much' is not a number"),
         (["import", "nowhere.params"], 2, "nowhere.params"),
         (["export", "nowhere/x.params"], 2, "nowhere"),
         (["lost"], 2, "unknown action lost; did you mean list?"),

@@ -15,7 +15,7 @@ from tests.cli.test_stall import flying, half_of
 
 
 @pytest.mark.parametrize(
-    ("pace", "halves", "pause_s"),
+    ("pace", "processes", "pause_s"),
     [
         (("--realtime",), ("sitl",), 1.0),
         pytest.param(  # what a laptop does whose lid is closed
@@ -26,12 +26,12 @@ from tests.cli.test_stall import flying, half_of
     ],
 )
 def test_a_flight_survives_a_pause(
-    pace: tuple[str, ...], halves: tuple[str, ...], pause_s: float, tmp_path: Path
+    pace: tuple[str, ...], processes: tuple[str, ...], pause_s: float, tmp_path: Path
 ) -> None:
     out = tmp_path / "out"
     flight = flying(out, *pace, duration="3")
     try:
-        stopped = [half_of(flight.pid, half) for half in halves]
+        stopped = [half_of(flight.pid, half) for half in processes]
         for process in stopped:
             os.kill(process, signal.SIGSTOP)
         time.sleep(pause_s)
@@ -44,7 +44,7 @@ def test_a_flight_survives_a_pause(
         if pace == ("--realtime",):
             assert simulator["pauses"] >= 1
             assert pause_s - 0.1 <= simulator["paused_s"] <= pause_s + 0.5
-            assert "sitl: stood still" in said
+            assert "sitl: process was suspended" in said
         else:
             assert simulator["pauses"] == 0
     finally:

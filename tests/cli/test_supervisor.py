@@ -1,4 +1,4 @@
-"""Ways of two halves to end, and what the supervisor says about each."""
+"""Ways of two processes to end, and what the supervisor says about each."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pytest
 from pandion.display import Display
 from pandion.supervisor import Flown, Supervisor
 from tests.cli.command import environment
-from tests.cli.fake_halves import event
+from tests.cli.fake_processes import event
 
 LISTENING = event("listening", port=1, duration_s=1.0)
 FLYING = event("flying")
@@ -27,8 +27,8 @@ def _importable(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def watched(out: Path, sitl: list[str], fsw: list[str]) -> Flown:
-    supervisor = Supervisor(Display(io.StringIO()), out, runner="tests.cli.fake_halves")
-    return supervisor.fly([LISTENING, FLYING, *sitl, "0"], lambda port: [*fsw, "0"])
+    supervisor = Supervisor(Display(io.StringIO()), out, runner="tests.cli.fake_processes")
+    return supervisor.run([LISTENING, FLYING, *sitl, "0"], lambda port: [*fsw, "0"])
 
 
 def test_two_results_and_no_failure(tmp_path: Path) -> None:

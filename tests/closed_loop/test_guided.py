@@ -9,19 +9,19 @@ from dataclasses import replace
 import pytest
 
 from fsw.geometry.geodesy import to_global
+from fsw.link.wire.mission_items import MissionItem, read_step
+from fsw.model.battery import charge_of
 from fsw.parameters.flight_config import FlightConfig, FlightLimits, flight_config
 from fsw.signals import (
     BatteryState,
     Charge,
-    CommandRequest,
+    Command,
     MissionUpdate,
     Mode,
     MotionSetpoint,
     PointObstacle,
     SafeSet,
 )
-from fsw.vehicle.battery import charge_of
-from fsw.vehicle.mission_items import MissionItem, read_step
 from sitl.scenario_file import load_scenario
 from tests.closed_loop.harness import ARM, SET_MODE, TAKEOFF, Flight, command, hover, on_the_ground
 
@@ -30,8 +30,8 @@ GOTO, ORBIT, ROI, ROI_NONE, SPEED, MISSION_START = 192, 34, 195, 197, 178, 300
 ACCEPTED, LATER, DENIED = 0, 1, 2
 
 
-def as_int(number: int, frame: int, *params: float) -> CommandRequest:
-    return replace(command(number, *params), frame=frame)
+def as_int(number: int, frame: int, *params: float) -> Command:
+    return command(number, *params, frame=frame)
 
 
 def hovering(**changes: object) -> Flight:
@@ -59,23 +59,23 @@ def test_a_takeoff_before_arming_is_flown_on_arming() -> None:
     flight.step(command(TAKEOFF, -1.0, 0.0, 0.0, NAN, NAN, NAN, amsl))
     assert flight.results[-1] == (TAKEOFF, ACCEPTED)
     assert flight.mode is Mode.DISARMED
-    assert flight.snapshot.standby is Mode.TAKEOFF
+    assert flight.snapshot.intended_mode is Mode.TAKEOFF
     flight.run(1.0)
     flight.step(command(ARM, 1.0))
     assert flight.mode is Mode.TAKEOFF
     flight.run(5.0)
     assert flight.mode is Mode.HOLD
     assert -flight.sim.truth().p_WB[2] == pytest.approx(1.32, abs=0.05)
-    assert flight.snapshot.standby is Mode.HOLD, "flown once"
+    assert flight.snapshot.intended_mode is Mode.HOLD, "flown once"
 
 
 def test_a_takeoff_that_nobody_arms_for_is_forgotten_and_told_so() -> None:
     flight = standing(Flight(on_the_ground(), config=limits(takeoff_wait_us=2_000_000)))
     flight.step(command(TAKEOFF))
     flight.run(1.9)
-    assert flight.snapshot.standby is Mode.TAKEOFF
+    assert flight.snapshot.intended_mode is Mode.TAKEOFF
     flight.run(0.3)
-    assert flight.snapshot.standby is Mode.HOLD
+    assert flight.snapshot.intended_mode is Mode.HOLD
     assert sum("takeoff forgotten" in text for text in flight.texts) == 1
     flight.step(command(ARM, 1.0))
     flight.run(2.0)
@@ -90,7 +90,7 @@ def test_offboard_can_be_chosen_before_arming_and_not_without_set_points() -> No
     flight.streamed = {"motion": MotionSetpoint(False, (0.0, 0.0, -1.2))}
     flight.run(0.2)
     flight.step(command(SET_MODE, 1.0, 6.0, 0.0))
-    assert flight.snapshot.standby is Mode.OFFBOARD
+    assert flight.snapshot.intended_mode is Mode.OFFBOARD
     flight.step(command(ARM, 1.0))
     flight.run(4.0)
     assert flight.mode is Mode.OFFBOARD
@@ -101,7 +101,7 @@ def test_offboard_can_be_chosen_before_arming_and_not_without_set_points() -> No
     second.step(command(SET_MODE, 1.0, 6.0, 0.0))
     second.streamed = {}
     second.run(0.7)
-    assert second.snapshot.standby is Mode.HOLD
+    assert second.snapshot.intended_mode is Mode.HOLD
     assert any("offboard forgotten" in text for text in second.texts)
 
 

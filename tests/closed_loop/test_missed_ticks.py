@@ -6,13 +6,12 @@ import math
 
 import pytest
 
+from fsw.flight.autopilot import Autopilot
+from fsw.flight.state import FlightState
 from fsw.model.nominal import NominalModel
 from fsw.mpc.planner import Planner
 from fsw.parameters.flight_config import flight_config
-from fsw.runtime.flight_loop import FlightLoop
-from fsw.runtime.flight_state import FlightState
 from fsw.signals import (
-    CommandRequest,
     EndEffectorTarget,
     Mode,
     Plan,
@@ -20,11 +19,12 @@ from fsw.signals import (
     SensorFrame,
     TickInputs,
 )
+from tests.closed_loop.harness import command
 
 CONFIG = flight_config()
 START_US = 1_000_000
-ARM = CommandRequest(400, (1.0, *(0.0,) * 6), 1, 195)
-TRAJECTORY = CommandRequest(176, (1.0, 4.0, 11.0, *(0.0,) * 4), 1, 195)
+ARM = command(400, 1.0)
+TRAJECTORY = command(176, 1.0, 4.0, 11.0)
 ARM_FOLDED = (-0.7227, 1.4454)
 
 
@@ -43,8 +43,8 @@ def target(t_us: int) -> EndEffectorTarget:
 
 def fly(lost: set[int], ticks: int) -> tuple[FlightState, list[PlanRequest]]:
     """Ticks of a loop that never hears the lost ones; plans arrive when they are due."""
-    loop, state = FlightLoop(CONFIG), FlightState()
-    planner = Planner(CONFIG.planner, lambda: 0.0)
+    loop, state = Autopilot(CONFIG), FlightState()
+    planner = Planner(CONFIG.planner, CONFIG.airframe, lambda: 0.0)
     waiting: Plan | None = None
     asked = []
     for k in range(ticks):
@@ -98,7 +98,7 @@ def test_a_lost_planning_tick_is_planned_on_the_next_and_the_grid_stays() -> Non
 
 def test_without_loss_every_step_is_one_step_of_the_model() -> None:
     state, asked = fly(set(), CONFIG.plan_delay_ticks + 4)
-    model = NominalModel(CONFIG.planner.lag, CONFIG.tick_period_us * 1e-6)
+    model = NominalModel(CONFIG.airframe, CONFIG.tick_period_us * 1e-6)
     plan = state.plan.running
     assert plan is not None
     assert len(asked) == 1

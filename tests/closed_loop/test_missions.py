@@ -6,6 +6,8 @@ import itertools
 import math
 from dataclasses import replace
 
+from fsw.link.wire.fence_items import CIRCLE_INCLUSION, POLYGON_INCLUSION, read_fence
+from fsw.link.wire.mission_items import MissionItem
 from fsw.signals import (
     EndEffectorTarget,
     MissionAction,
@@ -16,8 +18,6 @@ from fsw.signals import (
     SafeSet,
     Vec3,
 )
-from fsw.vehicle.fence import CIRCLE_INCLUSION, POLYGON_INCLUSION, read_fence
-from fsw.vehicle.mission_items import MissionItem
 from sitl.scenario import Pilot
 from sitl.scenario_file import load_scenario
 from tests.closed_loop.harness import (
@@ -85,7 +85,7 @@ def test_a_mission_from_the_ground_to_the_ground() -> None:
     )
     told(flight, steps)
     flight.step(command(SET_MODE, 1.0, 4.0, 4.0))
-    assert flight.snapshot.standby is Mode.MISSION
+    assert flight.snapshot.intended_mode is Mode.MISSION
     flight.step(command(ARM, 1.0))
     assert flight.mode is Mode.MISSION
     reached: dict[int, Vec3] = {}
@@ -99,7 +99,7 @@ def test_a_mission_from_the_ground_to_the_ground() -> None:
     assert math.dist(reached[2], (0.3, 0.2, -0.8)) < 0.1
     assert flight.snapshot.mission.state is MissionState.COMPLETE
     assert flight.snapshot.mission.reached_count == 4
-    assert flight.snapshot.standby is Mode.HOLD
+    assert flight.snapshot.intended_mode is Mode.HOLD
 
 
 def test_waypoints_beyond_the_walls_of_an_uploaded_fence_are_flown_up_to_it() -> None:
@@ -135,7 +135,7 @@ def test_the_sphere_of_case_2_can_be_a_fence() -> None:
     farthest = 0.0
     for _ in range(100):
         flight.run(0.1)
-        leg = flight.state.mission.flight.leg
+        leg = flight.state.mission.flight.segment
         assert leg is not None
         target = leg.at(flight.sim.t_us)
         centre = (target.p_WE[0], target.p_WE[1], target.p_WE[2] - 0.225)

@@ -66,7 +66,7 @@ def moved(flight: Flight) -> tuple[Array, Array]:
     plan = flight.snapshot.plan
     assert plan is not None
     config = flight.config
-    model = NominalModel(config.planner.lag, 1e-6 * config.tick_period_us)
+    model = NominalModel(config.airframe, 1e-6 * config.tick_period_us)
     first_us = estimate.t_us + config.plan_delay_ticks * config.tick_period_us
     ticks = (flight.sim.t_us - first_us) // config.tick_period_us
     end = model.advance(at_rest(estimate), plan.inputs[0], ticks)
@@ -113,7 +113,7 @@ def open_loop() -> FlightConfig:
     Height has no loop either: its thrust is the plan's acceleration fed forward.
     """
     config = flight_config(inner="pid")
-    lag = config.planner.lag
+    lag = config.airframe.attitude_lag
     tuning = replace(
         config.tuning,
         attitude=PidGains(lag.kp, 0.0, lag.kd, 25.0),

@@ -81,7 +81,7 @@ def _kernels() -> Iterator[tuple[str, Dispatcher]]:
 
 def _fly(name: str) -> list[str]:
     flight, fly = FLIGHTS[name]()
-    flight_software(ControlChoice("blf", "tracking", "consistent", "clarabel", False))
+    flight_software(ControlChoice())
     ready = _variants()
     assert all(ready[f"fsw.mpc.dual_solver.{kernel}"] for kernel in _WHERE_ROWS_BIND)
     assert ready["fsw.control.cascade._close_loops"] > 0

@@ -66,7 +66,7 @@ class ThroughTheWall(Flight):
 
     speed: float = 1.0
 
-    def _targets(self) -> tuple[EndEffectorTarget, ...]:
+    def targets(self) -> tuple[EndEffectorTarget, ...]:
         if self.sim.step % 50:
             return ()
         ahead = (self.sim.t_us + 100_000 * k for k in range(20))
@@ -205,7 +205,7 @@ def test_without_a_set_point_in_the_last_half_second_it_does_not_begin() -> None
     flight.step(command(ARM, 1.0))
     flight.step(command(SET_MODE, 1.0, 6.0, 0.0))
     assert flight.results[-1] == (SET_MODE, 1)
-    assert "no set-point" in flight.texts[-1]
+    assert "no setpoint" in flight.texts[-1]
     flight.streamed = body(v=(0.0, 0.0, 0.0))
     flight.run(0.1)
     flight.streamed = {}
@@ -220,7 +220,7 @@ def test_silence_for_half_a_second_ends_it_in_hold_with_a_text() -> None:
     flight.streamed = {}
     flight.run(0.6)
     assert flight.mode is Mode.HOLD
-    assert any("set-points stopped" in text for text in flight.texts)
+    assert any("setpoints stopped" in text for text in flight.texts)
     flight.run(4.0)
     assert math.hypot(*flight.sim.truth().v_WB) < 0.04
 

@@ -9,7 +9,7 @@ import pytest
 
 from fsw.geometry.geodesy import to_global
 from fsw.parameters.flight_config import flight_config
-from fsw.signals import CommandRequest, Mode, SafeSet, SensorFrame, WorkspaceSphere
+from fsw.signals import Command, Mode, SafeSet, SensorFrame, WorkspaceSphere
 from sitl.scenario_file import load_scenario
 from tests.closed_loop.harness import (
     ARM,
@@ -27,8 +27,8 @@ NAN = math.nan
 RETURN, SET_ACTUATOR, GOTO = 20, 187, 192
 
 
-def as_int(number: int, frame: int, *params: float) -> CommandRequest:
-    return replace(command(number, *params), frame=frame)
+def as_int(number: int, frame: int, *params: float) -> Command:
+    return command(number, *params, frame=frame)
 
 
 def up() -> Flight:
@@ -95,7 +95,7 @@ def test_a_takeoff_that_is_sent_again_climbs_once() -> None:
     height = flight.sim.truth().p_WB[2]
     flight.step(command(LAND))
     flight.run(0.2)
-    flight.step(replace(command(TAKEOFF), confirmation=1))
+    flight.step(command(TAKEOFF, confirmation=1))
     assert flight.results[-1] != (TAKEOFF, 0), "the last command of this sender was another"
     second = Flight(on_the_ground())
     second.step(command(ARM, 1.0))

@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import pytest
 
+from fsw.flight.failsafe import Condition
 from fsw.mpc.planner import Planner
 from fsw.parameters.flight_config import flight_config
 from fsw.signals import Mode, Plan, PlanFailure, PlanRequest, PlanTimings, SensorFrame, SolverStatus
-from fsw.vehicle.faults import Fault
 from sitl.scenario_file import load_scenario
 from sitl.simulation import START_US, STEP_US
 from tests.closed_loop.harness import ARM, Flight, command, hover, real_planner
@@ -67,8 +68,8 @@ def test_without_plans_the_vehicle_brakes_and_stays_put(first_failure: int) -> N
     flight = Flight(load_scenario("workspace-calm"), config=config, planner=planner)
     flight.follow()
     flight.run(0.1 * first_failure + 0.5)
-    assert Fault.PLAN_STALE.value in flight.snapshot.failures
-    assert f"{Fault.PLAN_STALE.value}: brake" in flight.texts
+    assert Condition.PLAN_STALE.value in flight.snapshot.failures
+    assert f"{Condition.PLAN_STALE.value}: brake" in flight.texts
     braked = flight.sim.truth().p_WB
     for _ in range(6):
         flight.run(0.5)
@@ -100,7 +101,7 @@ def test_an_estimate_lost_for_ten_milliseconds_ends_the_flight_for_good() -> Non
             assert outputs.actuators.rotor_thrust == (0.0, 0.0, 0.0, 0.0)
             assert outputs.actuators.joint_torque == (0.0, 0.0)
             assert not outputs.snapshot.armed
-    assert any(Fault.ESTIMATE_INVALID.value in text for text in flight.texts)
+    assert any(Condition.ESTIMATE_INVALID.value in text for text in flight.texts)
     flight.step(command(ARM, 1.0))
     assert flight.mode is Mode.FAULT
 
@@ -121,6 +122,8 @@ class OnePush:
     torque: bool
     first: int
     last: int
+    name: str = "one push"
+    kind: str = "push"
 
     def sample(self, step: int) -> tuple[float, float, float]:
         return self.value if self.first <= step <= self.last else (0.0, 0.0, 0.0)
@@ -137,10 +140,12 @@ class OnePush:
     ],
 )
 def test_a_hard_push_is_recovered_from(
-    value: tuple[float, float, float], torque: bool, felt: float
+    value: tuple[float, float, float], torque: bool, felt: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    flight = Flight(hover())
-    flight.sim._pushes.append(OnePush(value, torque, 100, 175))
+    # A disturbance of a kind that no scenario can name.
+    monkeypatch.setattr("sitl.simulation.push", lambda item, seed, step_s: item)
+    push: Any = OnePush(value, torque, 100, 175)
+    flight = Flight(replace(hover(), disturbances=(push,)))
     flight.step(command(ARM, 1.0))
     held = flight.sim.truth().p_WE
     farthest = 0.0

@@ -30,13 +30,14 @@ from fsw.link.services.parameter_service import ParameterService
 from fsw.link.services.time_service import TimeService
 from fsw.link.signing.signing import Signing
 from fsw.link.telemetry.streams import GROUND_RATES
-from fsw.link.wire.telemetry_context import LoopHealth, TelemetryContext
+from fsw.link.wire.telemetry_context import TelemetryContext
 from fsw.parameters.flight_config import FlightConfig
 from fsw.parameters.store import ParameterStore
+from fsw.ports import LoopHealth
 from fsw.runtime.assembly import vehicle_facts
 from messages import dialect
 from messages.frames import as_version_1
-from tests.closed_loop.harness import Flight, frame, on_the_ground
+from tests.closed_loop.harness import Flight, on_the_ground
 
 Message = Any
 TICK_S = 0.002
@@ -105,10 +106,10 @@ class Connected:
 
     def _step(self) -> None:
         flight, inbox = self.flight, self.inbox
-        sensors = frame(flight.sim.sense())
+        sensors = flight.closed.sense()
         tuning = self.parameters.take_tuning()
         inputs = inbox.take_inputs(
-            sensors, flight._due(sensors.t_us), tuning, self.missions.take_update()
+            sensors, flight.closed.planner.take(sensors.t_us), tuning, self.missions.take_update()
         )
         outputs = flight.fly(inputs)
         self.missions.observe(outputs.snapshot)

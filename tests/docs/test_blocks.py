@@ -21,9 +21,9 @@ import pytest
 
 from pandion.__main__ import VERBS, main
 from pandion.reproduce import WHAT
-from sitl.admission import check
 from sitl.link.encode import StepEncoder
 from sitl.scenario_file import load_scenario, parse_scenario, scenario_names
+from sitl.scenario_validation import check
 from sitl.simulation import Simulation
 from tests.docs.fences import PAGES, ROOT, Fence, commands, fences, named
 

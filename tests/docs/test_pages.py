@@ -7,17 +7,16 @@ from pathlib import Path
 
 import pytest
 
+from docs.pages.messages import OF_MISSIONS, reference, traffic
+from docs.pages.parameters import reference as parameter_reference
+from docs.pages.topics import inserted
 from fsw.link.services.mission_service import MissionService
 from fsw.link.services.mission_store import MissionStore, Site
 from fsw.link.telemetry.streams import STREAMS
 from fsw.link.wire import message_ids as ids
-from fsw.log.reference import inserted
 from fsw.mpc.planner_config import PlannerConfig
-from fsw.parameters.reference import reference as parameter_reference
 from messages import dialect
-from messages.reference import reference
-from pandion.message_page import OF_MISSIONS, traffic
-from pandion.result import Parts, as_json
+from pandion.result import FlightReports, as_json
 from tests.docs.fences import DOCS, PAGES, ROOT, named, without_fences
 
 REFERENCE = DOCS / "reference"
@@ -63,7 +62,7 @@ def test_decisions_that_the_code_cites_exist() -> None:
 
 
 def test_the_keys_of_the_result_on_the_page_are_those_that_are_written() -> None:
-    result = as_json(Parts("walls", 0, "blf", None, None, None, {}))
+    result = as_json(FlightReports("walls", 0, "blf", None, None, None, {}))
     rows = re.findall(r"^\| (`.*?) \| (.*) \|$", (REFERENCE / "result.md").read_text("utf-8"), re.M)
     meaning = {key: text for keys, text in rows for key in re.findall(r"`(\w+)`", keys)}
     assert list(meaning) == list(result)
@@ -73,18 +72,18 @@ def test_the_keys_of_the_result_on_the_page_are_those_that_are_written() -> None
 
 def test_the_reference_of_messages_is_not_stale() -> None:
     page = (REFERENCE / "messages.md").read_text(encoding="utf-8")
-    assert page == reference(traffic()), "run python -m pandion.message_page"
+    assert page == reference(traffic()), "run make pages"
 
 
 def test_the_topics_of_the_flight_log_are_not_stale() -> None:
     page = (REFERENCE / "flight-log.md").read_text(encoding="utf-8")
-    assert page == inserted(page), "run python -m fsw.log.reference"
+    assert page == inserted(page), "run make pages"
 
 
 def test_the_reference_of_parameters_is_not_stale() -> None:
     page = REFERENCE / "parameters.md"
     expected = parameter_reference()
-    assert page.read_text(encoding="utf-8") == expected, "run python -m fsw.parameters.reference"
+    assert page.read_text(encoding="utf-8") == expected, "run make pages"
 
 
 def test_the_reference_of_messages_names_all_that_is_sent_and_heard() -> None:
@@ -119,5 +118,5 @@ def test_the_barrier_constants_on_the_page_are_those_that_are_flown() -> None:
     text = (DOCS / "equations.md").read_text(encoding="utf-8")
     config = PlannerConfig()
     for name, tuning in (("walls", config.walls), ("sphere", config.workspace)):
-        cells = (tuning.alpha, tuning.slope, tuning.gamma, tuning.robustness)
+        cells = (tuning.alpha, tuning.slope, tuning.gamma, tuning.lambda_)
         assert f"| {name} | " + " | ".join(f"{value:g}" for value in cells) + " |" in text

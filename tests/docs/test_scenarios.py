@@ -6,13 +6,13 @@ import dataclasses
 import re
 import typing
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import pytest
 
 from sitl import scenario
-from sitl.admission import check
 from sitl.scenario_file import parse_scenario
+from sitl.scenario_validation import check
 from sitl.simulation import Simulation
 
 PAGE = Path(__file__).parents[2] / "docs" / "reference" / "scenarios.md"
@@ -22,7 +22,7 @@ TABLES = (
     scenario.Pilot,
     scenario.Lissajous,
     scenario.Hold,
-    scenario.Wall,
+    scenario.ScenarioWall,
     scenario.Obstacle,
     scenario.Workspace,
     scenario.Uniform,
@@ -36,15 +36,18 @@ TABLES = (
 )
 
 
-def allowed(kind: Any, field: dataclasses.Field[Any]) -> str:
+def hints(kind: Any) -> dict[str, Any]:
+    """Annotations of a table's keys, with their ranges."""
+    return typing.get_type_hints(kind, include_extras=True)
+
+
+def allowed(hint: Any) -> str:
     """What the table says about the value."""
-    hint = typing.get_type_hints(kind)[field.name]
-    count = len(typing.get_args(hint)) if typing.get_origin(hint) is tuple else 0
-    numbers = f"{count} numbers, " if count else ""
-    for key in ("range", "choices"):
-        if key in field.metadata:
-            return numbers + str(field.metadata[key]).replace('"', "`").removeprefix("one of ")
-    return "text"
+    if typing.get_origin(hint) is Annotated:
+        plain, permitted = typing.get_args(hint)
+        count = len(typing.get_args(plain))
+        return f"{count} numbers, {permitted}" if count else str(permitted)
+    return ", ".join(f"`{word}`" for word in typing.get_args(hint)) or "text"
 
 
 def default(field: dataclasses.Field[Any]) -> str:
@@ -64,10 +67,11 @@ def expected(kind: Any) -> set[tuple[str, str, str]]:
     """Rows of one table; keys that hold other tables have tables of their own."""
     rows = set()
     for field in dataclasses.fields(kind):
-        plain = "range" in field.metadata or "choices" in field.metadata or field.type == "str"
+        hint = hints(kind)[field.name]
+        plain = typing.get_origin(hint) in (Annotated, Literal) or hint is str
         named_by_file = kind is scenario.Scenario and field.name == "name"
         if plain and not named_by_file:
-            rows.add((f"`{field.name}`", allowed(kind, field), default(field)))
+            rows.add((f"`{field.name}`", allowed(hint), default(field)))
     return rows
 
 

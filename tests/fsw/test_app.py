@@ -25,7 +25,7 @@ from fsw.runtime.program import FlightProgram
 from fsw.signals import Plan, PlanFailure, PlanRequest, TickInputs, TickOutputs
 from tests.fsw.link.snapshots import FACTS, outputs_at
 
-CHOICE = ControlChoice("blf", "tracking", "consistent", "clarabel", soft=False)
+CHOICE = ControlChoice()
 
 
 class NoPlanner:
@@ -59,7 +59,7 @@ def options(silent: socket.socket, tmp_path: Path) -> Iterator[FswOptions]:
     handlers = [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)]
     address = f"udp:127.0.0.1:{silent.getsockname()[1]}"
     links = LinkChoice(gcs=address, api=NO_LINK)
-    yield FswOptions(address, links, CHOICE, tmp_path, 0.4, None, "text")
+    yield FswOptions(sim=address, links=links, control=CHOICE, out=tmp_path, wait_s=0.4)
     for number, handler in zip((signal.SIGINT, signal.SIGTERM), handlers, strict=True):
         signal.signal(number, handler)
 

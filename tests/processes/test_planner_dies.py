@@ -14,6 +14,7 @@ import pytest
 
 from messages import dialect
 from tests.processes.halves import Half
+from tests.waiting import wait_for
 
 STATUSTEXT = 253
 
@@ -41,14 +42,17 @@ def texts(ground: socket.socket) -> list[str]:
 
 def planner_of(fsw: int) -> tuple[int, int]:
     """The nursery and the worker in it, once both are there."""
-    until = time.monotonic() + 10.0
-    while time.monotonic() < until:
+
+    def both() -> tuple[int, int] | None:
         with contextlib.suppress(ValueError, FileNotFoundError):
             (nursery,) = children(fsw)
             (worker,) = children(nursery)
             return nursery, worker
-        time.sleep(0.01)
-    raise AssertionError("no planner")
+        return None
+
+    found = wait_for(both, "a planner's processes")
+    assert found is not None
+    return found
 
 
 def test_killing_the_planner_costs_no_barrier(tmp_path: Path) -> None:
@@ -63,13 +67,13 @@ def test_killing_the_planner_costs_no_barrier(tmp_path: Path) -> None:
             telemetry = ("--gcs", f"udp:127.0.0.1:{ground.getsockname()[1]}")
             with Half("fsw", *addresses, *telemetry, "--out", str(tmp_path), "--wait", "90") as fsw:
                 sitl.wait_for("flying", patience_s=120.0)
-                time.sleep(2.0)
+                time.sleep(1.0)  # some of the flight
                 nursery, first = planner_of(fsw.process.pid)
                 os.kill(first, signal.SIGKILL)
-                time.sleep(1.5)
+                wait_for(lambda: planner_of(fsw.process.pid)[1] != first, "another worker")
                 same, second = planner_of(fsw.process.pid)
                 assert same == nursery
-                assert second != first
+                time.sleep(1.0)  # some of the flight with it
                 os.kill(nursery, signal.SIGKILL)
                 ended = sitl.wait_for("ended", patience_s=30.0)
                 assert fsw.finish() == 0

@@ -10,11 +10,11 @@ from fsw.log.flight_log import FlightLog, LogSubject
 from fsw.parameters.control_choice import ControlChoice
 from fsw.parameters.flat import flat
 from fsw.parameters.flight_config import FlightConfig
-from fsw.signals import CommandRequest, TickInputs, TickOutputs
+from fsw.signals import Command, TickInputs, TickOutputs
 from sitl.scenario_file import load_scenario
 from tests.closed_loop.harness import LAND, Flight, command
 
-CHOICE = ControlChoice("blf", "tracking", "consistent", "clarabel", soft=False)
+CHOICE = ControlChoice()
 
 
 @dataclasses.dataclass
@@ -23,7 +23,7 @@ class Recorded(Flight):
 
     ticks: list[tuple[TickInputs, TickOutputs]] = field(default_factory=list)
 
-    def step(self, *commands: CommandRequest) -> TickOutputs:
+    def step(self, *commands: Command) -> TickOutputs:
         outputs = super().step(*commands)
         assert self.inputs is not None
         self.ticks.append((self.inputs, outputs))
@@ -42,7 +42,7 @@ def flight(seconds: float) -> list[tuple[TickInputs, TickOutputs]]:
 
 def written(path: Path, ticks: list[tuple[TickInputs, TickOutputs]], lockstep: bool = True) -> Path:
     """The log of these ticks."""
-    facts: dict[str, str | int] = {**dataclasses.asdict(CHOICE), "soft": int(CHOICE.soft)}
+    facts: dict[str, str | int] = CHOICE.facts()
     log = FlightLog(path, LogSubject(facts, flat(FlightConfig()), {}, 17.1675, (0.15, 0.15)))
     log.begin(ticks[0][0].sensors.t_us, lockstep)
     for inputs, outputs in ticks:

@@ -85,7 +85,7 @@ def test_a_log_cut_among_its_definitions_is_refused_and_among_its_data_read_up_t
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    attempt, chance = Attempt(command, tmp_path, capsys), random.Random(2)
+    attempt, chance = Attempt(command, tmp_path, capsys), random.Random(3)
     second_tick = whole.index(SENSORS, whole.index(SENSORS) + 1)
     for _ in range(20):
         assert attempt(whole[: chance.randrange(definitions)]) == 2

@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from fsw.flight.autopilot import Autopilot
+from fsw.flight.state import FlightState
 from fsw.log import topics
 from fsw.log.flight_log import LogSubject, definitions
 from fsw.log.reader import open_flight
@@ -17,8 +19,6 @@ from fsw.log.topics import TOPICS
 from fsw.parameters.flat import flat
 from fsw.parameters.flight_config import FlightConfig
 from fsw.runtime.assembly import flight_software
-from fsw.runtime.flight_loop import FlightLoop
-from fsw.runtime.flight_state import FlightState
 from fsw.runtime.replay import Replayed, other_numbers, replay
 from fsw.signals import TickInputs, TickOutputs
 from messages import ulog
@@ -39,7 +39,7 @@ def replayed(path: Path, config: FlightConfig | None = None) -> Replayed:
     """What a replay finds; with another configuration than the flight's, if one is given."""
     program = flight_software(CHOICE, to_plan=False)
     if config is not None:
-        program = replace(program, tick=FlightLoop(config).tick, numbers=flat(config))
+        program = replace(program, tick=Autopilot(config).tick, numbers=flat(config))
     return replay(open_flight(path), program, lambda done, total: None)
 
 
@@ -62,7 +62,7 @@ def test_one_gain_changed_is_found_at_the_tick_at_which_it_first_matters(
 ) -> None:
     path = written(tmp_path / "flight.ulg", flown)
     config = with_another_gain()
-    loop, state, right = FlightLoop(config), FlightState(), -1
+    loop, state, right = Autopilot(config), FlightState(), -1
     for k, (inputs, outputs) in enumerate(flown):
         state, now = loop.tick(state, inputs)
         if now.actuators != outputs.actuators:
@@ -122,11 +122,13 @@ def test_a_text_said_otherwise_is_found(
     flown: list[tuple[TickInputs, TickOutputs]], tmp_path: Path
 ) -> None:
     path = written(tmp_path / "flight.ulg", flown)
-    path.write_bytes(path.read_bytes().replace(b"follow trajectory", b"follow trajectorx"))
+    path.write_bytes(
+        path.read_bytes().replace(b"hold to trajectory: command", b"hold to trajectory: commanx")
+    )
     found = replayed(path).difference
     assert found is not None
     assert (found.tick, found.field) == (1, "text")
-    assert str(found.logged).replace("trajectorx", "trajectory") == found.replayed
+    assert str(found.logged).replace("commanx", "command") == found.replayed
 
 
 @pytest.mark.parametrize(

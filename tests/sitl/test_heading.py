@@ -10,18 +10,18 @@ import pytest
 
 from sitl.heading import facing
 from sitl.mission_clock import MissionClock
-from sitl.scenario import Wall
+from sitl.scenario import ScenarioWall
 from sitl.scenario_file import load_scenario
 
-FRONT = Wall("front", (-1.0, 0.0, 0.0), -1.0, 0.1)
-LEFT = Wall("left", (0.0, 1.0, 0.0), -1.0, 0.1)
-CEILING = Wall("ceiling", (0.0, 0.0, 1.0), -3.0, 0.1)
+FRONT = ScenarioWall("front", (-1.0, 0.0, 0.0), -1.0, 0.1)
+LEFT = ScenarioWall("left", (0.0, 1.0, 0.0), -1.0, 0.1)
+CEILING = ScenarioWall("ceiling", (0.0, 0.0, 1.0), -3.0, 0.1)
 
 
 @pytest.mark.parametrize("degrees", [0.0, 30.0, 90.0, 135.0, 200.0, 300.0])
 def test_beside_one_wall_its_normal_lies_in_the_arms_plane(degrees: float) -> None:
     normal = (math.cos(math.radians(degrees)), math.sin(math.radians(degrees)), 0.0)
-    yaw = facing((Wall("any", normal, -1.0, 0.1),), (0.0, 0.0, 0.0))
+    yaw = facing((ScenarioWall("any", normal, -1.0, 0.1),), (0.0, 0.0, 0.0))
     across = -math.sin(yaw) * normal[0] + math.cos(yaw) * normal[1]
     assert across == pytest.approx(0.0, abs=1e-12)
     assert 0.0 <= yaw < math.pi

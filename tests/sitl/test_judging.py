@@ -1,4 +1,4 @@
-"""Steps without an incident are judged by one compiled call: it says what the referee says."""
+"""Steps without an incident are judged by one compiled call: it says what the evaluator says."""
 
 from __future__ import annotations
 
@@ -7,24 +7,21 @@ import math
 import numpy as np
 import pytest
 
+from sitl.flight_evaluator import FlightEvaluator, critical
 from sitl.mission_clock import MissionClock
-from sitl.plant.aerial_manipulator import plant
-from sitl.plant.parameters import Vehicle
-from sitl.plant.parcel import parcel, unpacked
 from sitl.plant.vector import Array
-from sitl.referee import Referee, critical
+from sitl.result import EndKind
 from sitl.scenario_file import load_scenario
-from sitl.verdict import EndKind
 
 STEP_S = 0.001
 
 
-def referee(name: str) -> Referee:
+def evaluator(name: str) -> FlightEvaluator:
     scenario = load_scenario(name)
     clock = MissionClock(scenario)
     target = clock.target_at(0.0).p
     above = (target[0], target[1], target[2] - 0.225)
-    return Referee(scenario, clock, (above, above, target))
+    return FlightEvaluator(scenario, clock, (above, above, target))
 
 
 def places(random: np.random.Generator, name: str) -> Array:
@@ -37,7 +34,7 @@ def places(random: np.random.Generator, name: str) -> Array:
 @pytest.mark.parametrize("name", ["walls", "workspace", "branches"])
 def test_the_quick_look_records_what_the_slow_one_does(name: str) -> None:
     random = np.random.default_rng(3)
-    quick, slow = referee(name), referee(name)
+    quick, slow = evaluator(name), evaluator(name)
     for step in range(200):
         passed, before_s = places(random, name), 0.002 * step
         quick.judge_all(passed, before_s, STEP_S)
@@ -52,7 +49,7 @@ def test_the_quick_look_records_what_the_slow_one_does(name: str) -> None:
 @pytest.mark.parametrize("step", [0, 1])
 def test_an_incident_in_any_step_at_any_point_is_seen(step: int, point: int) -> None:
     for where, kind in (((0.0, 0.0, 0.1), EndKind.COLLISION), ((math.nan,) * 3, EndKind.DIVERGED)):
-        judge, passed = referee("walls"), places(np.random.default_rng(4), "walls")
+        judge, passed = evaluator("walls"), places(np.random.default_rng(4), "walls")
         passed[step, point] = where
         judge.judge_all(passed, 0.0, STEP_S)
         assert judge.ended is not None
@@ -61,17 +58,7 @@ def test_an_incident_in_any_step_at_any_point_is_seen(step: int, point: int) -> 
 
 
 def test_joint_1_is_no_critical_point() -> None:
-    judge, passed = referee("walls"), places(np.random.default_rng(4), "walls")
+    judge, passed = evaluator("walls"), places(np.random.default_rng(4), "walls")
     passed[:, 1] = (99.0, 99.0, 99.0)
     judge.judge_all(passed, 0.0, STEP_S)
     assert judge.ended is None
-
-
-def test_a_parcel_holds_the_whole_plant() -> None:
-    packed = plant(Vehicle())
-    again = unpacked(parcel(packed), 2)
-    for one, other in zip((*packed.chain, *packed.feet), (*again.chain, *again.feet), strict=True):
-        np.testing.assert_array_equal(one, other)
-    np.testing.assert_array_equal(packed.rotors, again.rotors)
-    np.testing.assert_array_equal(packed.joints, again.joints)
-    assert packed.gravity == again.gravity

@@ -27,12 +27,12 @@ from sitl.link.pilot_messages import (
     SendCommand,
     SendTarget,
 )
-from sitl.scenario import Hold, Obstacle, Pilot, Scenario, Start, Wall, Workspace
+from sitl.scenario import Hold, Obstacle, Pilot, Scenario, ScenarioWall, Start, Workspace
 from sitl.simulation import START_US, STEP_US
 from sitl.trajectory import TrajectoryPoint
 
 ARM, MODE, TAKE_OFF, LAND = 400, 176, 22, 21
-WALLS = tuple(Wall(name, (-1.0, 0.0, 0.0), -1.0, 0.1) for name in ("a", "b", "c"))
+WALLS = tuple(ScenarioWall(name, (-1.0, 0.0, 0.0), -1.0, 0.1) for name in ("a", "b", "c"))
 
 
 def still(t_us: int) -> TrajectoryPoint:

@@ -8,11 +8,11 @@ from dataclasses import replace
 import pytest
 
 from sitl.plant.trim import level_hover
+from sitl.result import EndKind
 from sitl.scenario import Hold, Impulses, ImuErrors, Pilot, Scenario, Sensors, Wind, Workspace
 from sitl.scenario_file import ScenarioError, load_scenario
 from sitl.sensors.suite import SensorReadings
 from sitl.simulation import Controls, Simulation, Truth
-from sitl.verdict import EndKind
 
 OFF = Controls((0.0, 0.0, 0.0, 0.0), (0.0, 0.0), armed=False)
 

@@ -10,7 +10,7 @@ from numba import njit
 
 from sitl.scenario import Hold
 from sitl.scenario_file import load_scenario, scenario_names
-from sitl.trajectory import HoldReference, Warp, curve_row, place_on_curve, reference
+from sitl.trajectory import HoldReference, curve_row, place_on_curve, reference, warped
 
 STEP = 1e-4
 
@@ -41,7 +41,7 @@ def test_a_trajectory_starts_and_stops_at_rest(name: str) -> None:
 @pytest.mark.parametrize("name", scenario_names())
 def test_compiled_code_sees_the_same_curve(name: str) -> None:
     trajectory = load_scenario(name).trajectory
-    row, curve = curve_row(trajectory), reference(trajectory)
+    row, curve = np.array(curve_row(trajectory)), reference(trajectory)
     compiled = njit(place_on_curve)
     for t in np.linspace(-1.0, 121.0, 300):
         at = float(t)
@@ -50,11 +50,10 @@ def test_compiled_code_sees_the_same_curve(name: str) -> None:
 
 
 def test_the_warp_runs_at_full_speed_between_its_ramps() -> None:
-    warp = Warp(ramp=4.0, duration=20.0)
-    assert warp.at(4.0)[0] == pytest.approx(2.0)
-    assert warp.at(10.0) == pytest.approx((8.0, 1.0, 0.0))
-    assert warp.at(20.0)[0] == pytest.approx(16.0)
-    rates = [warp.at(t)[1] for t in np.linspace(-1.0, 21.0, 300)]
+    assert warped(4.0, 4.0, 20.0)[0] == pytest.approx(2.0)
+    assert warped(10.0, 4.0, 20.0) == pytest.approx((8.0, 1.0, 0.0))
+    assert warped(20.0, 4.0, 20.0)[0] == pytest.approx(16.0)
+    rates = [warped(float(t), 4.0, 20.0)[1] for t in np.linspace(-1.0, 21.0, 300)]
     assert min(rates) >= 0.0
     assert max(rates) <= 1.0
 

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fsw.model.airframe import AIRFRAME
-from fsw.model.arm_kinematics import arm_points
-from fsw.model.prediction import LagModel, discretise, to_vector
+from fsw.model.airframe import AIRFRAME, AttitudeLag
+from fsw.model.kinematics import arm_points
+from fsw.model.prediction import discretise, to_vector
 from fsw.signals import PlanInput
 from sitl.scenario import Uniform, Wind
 from studies.cases import scenario
@@ -25,7 +25,7 @@ def test_a_period_in_ticks_is_the_planners_period() -> None:
     state = MOVING
     for _ in range(50):
         state = state.after(U, STILL, 0.002)
-    a, b = discretise(LagModel(at_once=True), 0.1)
+    a, b = discretise(replace(AIRFRAME, attitude_lag=AttitudeLag(at_once=True)), 0.1)
     whole = a @ to_vector(MOVING.as_prediction()) + b @ np.array([*U.a, U.yaw_acc, *U.qdd_arm])
     np.testing.assert_allclose(to_vector(state.as_prediction()), whole, atol=1e-12)
 
@@ -58,7 +58,7 @@ def test_it_starts_with_the_end_effector_on_its_reference_and_the_base_in_the_ce
         target = plant.clock.target_at(0.0).p
         np.testing.assert_allclose(end_effector, target, atol=1e-12)
         if case == "II":
-            assert plant.referee.record.minimum[0] == pytest.approx(0.075, abs=1e-9)
+            assert plant.evaluator.record.minimum[0] == pytest.approx(0.075, abs=1e-9)
             assert math.dist(base, (target[0], target[1], target[2] - 0.225)) < 1e-9
 
 

@@ -13,16 +13,15 @@ from typing import Any, cast
 
 import pytest
 
+from fsw.flight.autopilot import Autopilot
+from fsw.flight.state import FlightState
 from fsw.link.inbox import Inbox
 from fsw.link.sim_link import Pacing
-from fsw.link.wire.telemetry_context import LoopHealth
-from fsw.log.block_file import BlockFile
 from fsw.log.flight_log import FlightLog
 from fsw.log.reader import LoggedTick, open_flight, ticks
 from fsw.parameters.flight_config import flight_config
+from fsw.ports import LoopHealth
 from fsw.runtime.effort import EffortRecord
-from fsw.runtime.flight_loop import FlightLoop
-from fsw.runtime.flight_state import FlightState
 from fsw.runtime.planner_worker import PlannerRecord
 from fsw.runtime.process import StopRequest
 from fsw.runtime.program import FlightProgram
@@ -30,7 +29,6 @@ from fsw.runtime.rates import HOUSEKEEPING, INNER, MPC, RATE_GROUPS, TELEMETRY, 
 from fsw.runtime.sim_loop import Ending, FlightRecord, SimLoop
 from fsw.runtime.timing import GroupTimer
 from fsw.signals import (
-    CommandRequest,
     PlannerCounters,
     PlanRequest,
     SensorFrame,
@@ -39,13 +37,20 @@ from fsw.signals import (
     TickOutputs,
 )
 from messages import dialect
+from messages.block_file import BlockFile
+from messages.frames import Frame, FrameWriter, split
 from tests.fsw.link.snapshots import FACTS, outputs_at
 from tests.fsw.log.test_recorded_inputs import SUBJECT
 from tests.timing.virtual_time import FIRST_US, PERIOD_US, VirtualSensors, VirtualTime, frame
 
 Tick = Callable[[Any, TickInputs], tuple[Any, TickOutputs]]
-ARM = CommandRequest(400, (1.0, *(0.0,) * 6), 255, 190)
-KILL = CommandRequest(400, (0.0, 21196.0, *(0.0,) * 5), 255, 190)
+
+
+def command_frame(number: int, *params: float) -> Frame:
+    """A COMMAND_LONG of a ground station."""
+    seven = (*params, *(0.0,) * (7 - len(params)))
+    (frame,) = split(FrameWriter(255, 190).frame(76, *seven, number, 1, 1, 0))
+    return frame
 
 
 @dataclass
@@ -60,7 +65,7 @@ class Sim(VirtualSensors):
         self.done.append("sensors")
         return super().newest()
 
-    def answer(self, t_us: int, outputs: TickOutputs) -> None:
+    def send_actuators(self, t_us: int, outputs: TickOutputs) -> None:
         self.done.append("actuators")
         self.answers.append((self.time.now_us, outputs))
 
@@ -268,14 +273,14 @@ def test_a_planner_that_died_is_told_at_once_and_logged() -> None:
 
 @pytest.mark.parametrize("moment_us", [100, 900, 1_700])
 def test_a_command_acts_on_the_actuators_within_one_tick_of_its_arrival(moment_us: int) -> None:
-    bench = Bench(FlightLoop(flight_config()).tick, FlightState())
-    bench.inbox._commands.append(ARM)
+    bench = Bench(Autopilot(flight_config()).tick, FlightState())
+    bench.inbox.accept(command_frame(400, 1.0))
     arrived: list[int] = []
 
     def hear_between_two_ticks() -> None:
         if len(bench.sim.answers) == 200 and not arrived:
             bench.time.work(moment_us)
-            bench.inbox._commands.append(KILL)
+            bench.inbox.accept(command_frame(400, 0.0, 21196.0))
             arrived.append(bench.time.now_us)
 
     bench.asleep = hear_between_two_ticks

@@ -7,7 +7,6 @@ import json
 import mmap
 import os
 import threading
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -15,11 +14,12 @@ from typing import Any
 import pytest
 
 from fsw.link.wire import encode_dialect
-from fsw.log.block_file import BlockFile
 from fsw.runtime import realtime
 from fsw.runtime.process import settle_memory
 from fsw.runtime.rates import RATE_GROUPS
+from messages.block_file import BlockFile
 from tests.fsw.link.snapshots import CONTEXT, outputs_at
+from tests.waiting import wait_for
 
 
 def test_what_is_refused_is_named_and_nothing_raises(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -145,9 +145,7 @@ def test_a_log_s_thread_leaves_its_rank_to_the_loop(tmp_path: Path) -> None:
         log.start_thread()
         log.put(b"a block")
         (thread,) = (one for one in threading.enumerate() if one is not threading.main_thread())
-        until = time.monotonic() + 5.0
-        while not log.size and time.monotonic() < until:
-            time.sleep(0.001)
+        wait_for(lambda: log.size)
         assert thread.native_id is not None
         return {"refused": refused, "policy": os.sched_getscheduler(thread.native_id)}
 

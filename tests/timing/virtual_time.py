@@ -62,7 +62,7 @@ class VirtualSensors:
         delay = self.delay_us(step)
         return None if delay is None else self.begun_us + step * self.period_us + delay
 
-    def receive(self) -> SensorFrame | None:
+    def wait_for_step(self) -> SensorFrame | None:
         until_us = self.time.now_us + 200_000
         step = self._next(until_us)
         if step is None:

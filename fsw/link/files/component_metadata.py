@@ -1,4 +1,4 @@
-"""Component metadata: documents over FTP that tell a ground station units, ranges and meanings.
+"""Component metadata: documents over FTP with the units, ranges and meanings of parameters.
 
 Source: https://mavlink.io/en/services/component_information.html
 """
@@ -28,9 +28,9 @@ def metadata_files() -> dict[str, Node]:
 
 
 def component_metadata(
-    _: float, snapshot: FlightSnapshot, __: TelemetryContext
+    _which: float, snapshot: FlightSnapshot, __: TelemetryContext
 ) -> Sequence[Outgoing]:
-    """COMPONENT_METADATA: where the general document is."""
+    """COMPONENT_METADATA: where the general document is; ``_which`` [1] is not used."""
     uri = _uri(_GENERAL).encode()
     values = (snapshot.t_us // 1000, _general_crc(), uri)
     return [Outgoing(message_ids.COMPONENT_METADATA, values)]

@@ -20,7 +20,7 @@ _MAX_FLIGHTS: Final = 1000  # the newest; more would take a ground station minut
 
 
 @dataclass(frozen=True, slots=True)
-class FlightLog:
+class LoggedFlight:
     """The files of one flight."""
 
     flight: str  # name of its directory
@@ -35,7 +35,7 @@ class FlightLog:
 class Erasure:
     """Finished logs on their way from the disk, in a thread: that takes longer than a tick."""
 
-    def __init__(self, logs: Sequence[FlightLog]) -> None:
+    def __init__(self, logs: Sequence[LoggedFlight]) -> None:
         self.erased = 0  # flights
         self.failed = 0
         self.reason = ""  # of the last that could not be
@@ -78,7 +78,7 @@ class FlightLogs:
         return Erasure(finished)
 
 
-def flight_logs(directory: Path) -> tuple[FlightLog, ...]:
+def flight_logs(directory: Path) -> tuple[LoggedFlight, ...]:
     """List this flight and those in the directories beside it, oldest first, this one last.
 
     Args:
@@ -98,9 +98,9 @@ def flight_logs(directory: Path) -> tuple[FlightLog, ...]:
     return tuple([*earlier_flights, *([present] if present else [])][-_MAX_FLIGHTS:])
 
 
-def _flight(directory: Path, *, present: bool = False) -> FlightLog | None:
+def _flight(directory: Path, *, present: bool = False) -> LoggedFlight | None:
     paths = [directory / name for name in NAMES]
     files = tuple(DiskFile(path) for path in paths if path.is_file() and not path.is_symlink())
     if all(file.size() == 0 for file in files) and not present:
         return None  # a download of nothing never ends
-    return FlightLog(directory.name, files) if files else None
+    return LoggedFlight(directory.name, files) if files else None

@@ -74,7 +74,7 @@ class FtpService:
             Opcode.CALC_FILE_CRC32: self._checksum,
         }
 
-    def receive(self, frame: Frame, t_us: int) -> Sequence[PackedOutgoing]:
+    def handle(self, frame: Frame, t_us: int) -> Sequence[PackedOutgoing]:
         """Answer a request, or start the job that will."""
         _, system, component, *payload = cast("tuple[int, ...]", frame.payload_values)
         if not for_this_vehicle(system, component):

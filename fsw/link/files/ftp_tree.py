@@ -37,12 +37,12 @@ def listing(directory: Directory, first: int) -> bytes:
 
     An entry is ``D``, name, NUL for a directory; ``F``, name, tab, size, NUL for a file.
     """
-    said = b""
+    entries = b""
     for entry in _entries(directory, first):
-        if len(said) + len(entry) > MAX_DATA:
+        if len(entries) + len(entry) > MAX_DATA:
             break
-        said += entry
-    return said
+        entries += entry
+    return entries
 
 
 def _entries(directory: Directory, first: int) -> Iterator[bytes]:

@@ -1,7 +1,7 @@
 """Log download: LOG_REQUEST_LIST, LOG_REQUEST_DATA and what follows from them.
 
-The size of a log is the one that was last listed, so that a client gets exactly the file it was
-told about even while the flight goes on and the file grows.
+The size of a log is the one that was last listed, so that a client gets exactly the file that
+was listed even while the flight goes on and the file grows.
 
 Source: https://mavlink.io/en/messages/common.html#LOG_REQUEST_LIST
 """
@@ -17,7 +17,7 @@ from fsw.link.files.flight_logs import Erasure, FlightLogs
 from fsw.link.files.served_file import OpenFile
 from fsw.link.wire import message_ids
 from fsw.link.wire.decode import Numbers, for_this_vehicle
-from fsw.link.wire.outgoing import Outgoing, PackedOutgoing, Said
+from fsw.link.wire.outgoing import Outgoing, PackedOutgoing, ServiceOutput
 from fsw.signals import Severity, StatusText
 from messages.frames import Frame
 
@@ -62,7 +62,7 @@ class LogService:
         self._requests: deque[_Request] = deque()
         self._open: tuple[int, OpenFile] | None = None
 
-    def receive(self, frame: Frame, t_us: int) -> Sequence[Outgoing]:
+    def handle(self, frame: Frame, t_us: int) -> Sequence[Outgoing]:
         """Note what is asked for."""
         values = cast(Numbers, frame.payload_values)
         if not for_this_vehicle(*values[-2:]):
@@ -79,20 +79,22 @@ class LogService:
             self._look_again()
         return ()
 
-    def poll(self, t_us: int) -> Sequence[Said]:
-        """Send the next entries, and the next piece of a log to who asked for all of it at once."""
+    def poll(self, t_us: int) -> Sequence[ServiceOutput]:
+        """Send the next entries, and the next piece of a log that was requested whole."""
         if not self._to_list and not self._requests and self._erasure is None:
             return ()
-        answers: list[Said] = [self._entry(self._to_list.popleft()) for _ in self._next_entries()]
+        answers: list[ServiceOutput] = [
+            self._entry(self._to_list.popleft()) for _ in self._next_entries()
+        ]
         if self._erasure is not None and self._erasure.done:
-            answers.append(_told(self._erasure))
+            answers.append(_erasure_text(self._erasure))
             self._erasure = None
         if self._requests and not self._requests[0].paced:
             answers += self._data(_FRAMES - len(answers))
         return answers
 
-    def bulk(self, t_us: int) -> Sequence[Said]:
-        """Send the next datagram to who asks for a log piece by piece."""
+    def bulk(self, t_us: int) -> Sequence[ServiceOutput]:
+        """Send the next datagram of a log that is requested piece by piece."""
         if not self._requests or not self._requests[0].paced:
             return ()
         return self._data(_DATAGRAM_FRAMES)
@@ -154,20 +156,20 @@ class LogService:
             data = b""  # gone or damaged: nothing more will come of it
         if data is None or frames <= 0:
             return []
-        told = []
+        messages = []
         for at in range(0, len(data), CHUNK):
             piece = data[at : at + CHUNK]
-            told.append(_log_data(log_id, offset + at, piece))
+            messages.append(_log_data(log_id, offset + at, piece))
         offset += len(data)
         if data and offset < end:
             self._requests[0] = _Request(log_id, offset, end, closed, paced)
-            return told
+            return messages
         self._requests.popleft()
         # Without an end of its own a request is over for the client at the first message that is
         # not full, so one more is due where the last byte filled its message.
         if not data or (closed and len(data) % CHUNK == 0):
-            told.append(_log_data(log_id, offset, b""))
-        return told
+            messages.append(_log_data(log_id, offset, b""))
+        return messages
 
     def _file(self, log_id: int) -> OpenFile:
         if self._open is None or self._open[0] != log_id:
@@ -185,7 +187,7 @@ class LogService:
             self._open = None
 
 
-def _told(erasure: Erasure) -> StatusText:
+def _erasure_text(erasure: Erasure) -> StatusText:
     logs = "log" if erasure.erased == 1 else "logs"
     text = f"{erasure.erased} {logs} erased, this flight's is kept"
     if not erasure.failed:

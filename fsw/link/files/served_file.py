@@ -1,6 +1,6 @@
 """Files that a ground station may read: on disk, or made by the program.
 
-Whoever reads one is in the middle of a tick, so nothing here waits for a disk.
+They are read within a tick, so nothing here waits for a disk.
 """
 
 from __future__ import annotations

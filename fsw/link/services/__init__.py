@@ -1,1 +1,1 @@
-"""MAVLink services on one link: parameters, missions, time, and who hands them their frames."""
+"""MAVLink services on one link: parameters, missions, time, and their dispatch."""

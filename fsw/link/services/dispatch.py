@@ -6,10 +6,10 @@ import traceback
 from collections.abc import Callable, Sequence
 
 from fsw.link.services.service import BulkService, LinkService
-from fsw.link.wire.outgoing import Said
+from fsw.link.wire.outgoing import ServiceOutput
 from messages.frames import Frame
 
-Answers = Callable[[Said], None]
+Answers = Callable[[ServiceOutput], None]
 """Takes each thing a service wants to say."""
 
 
@@ -25,11 +25,11 @@ class Dispatch:
             for id_ in service.message_ids:
                 self._wanting[id_] = (*self._wanting.get(id_, ()), service)
 
-    def receive(self, frame: Frame, t_us: int, send: Answers) -> None:
+    def handle(self, frame: Frame, t_us: int, send: Answers) -> None:
         """Let every service that wants the frame answer it."""
         for service in self._wanting.get(frame.message_id, ()):
             try:
-                for outgoing in service.receive(frame, t_us):
+                for outgoing in service.handle(frame, t_us):
                     send(outgoing)
             except Exception:
                 self._note()
@@ -56,7 +56,7 @@ class Dispatch:
         return sent
 
     def _note(self) -> None:
-        """A mistake in a service must not end the flight it serves; it is told once."""
+        """A mistake in a service must not end the flight it serves; it is reported once."""
         if self.failures == 0:
             traceback.print_exc()
         self.failures += 1

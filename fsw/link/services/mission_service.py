@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Final, cast
 
 from fsw.link.services.mission_store import ALL_KINDS, ROOM, Kind, Meaning, MissionStore
@@ -27,10 +28,12 @@ from fsw.link.services.mission_wire import (
 )
 from fsw.link.wire import message_ids as ids
 from fsw.link.wire.decode import Numbers, for_this_vehicle
-from fsw.link.wire.outgoing import Outgoing, Said
+from fsw.link.wire.mission_items import DENIED, UNSUPPORTED, MissionItem, Refused
+from fsw.link.wire.outgoing import Outgoing, ServiceOutput
 from fsw.signals import Severity, StatusText
-from fsw.vehicle.mission_items import DENIED, UNSUPPORTED, MissionItem, Refused
 from messages.frames import Frame
+
+_ReadItem = Callable[[Numbers], MissionItem | Refused]
 
 # MAV_MISSION_RESULT
 ACCEPTED: Final = 0
@@ -81,13 +84,13 @@ class MissionService:
         self._show_again = False
         self._repeats = 0  # of MISSION_ITEM_REACHED that are still to be sent
         self._repeat_us = 0
-        self._handlers: dict[int, Callable[[Numbers, Peer, int], Sequence[Said]]] = {
+        self._handlers: dict[int, Callable[[Numbers, Peer, int], Sequence[ServiceOutput]]] = {
             ids.MISSION_COUNT: self._count,
-            ids.MISSION_ITEM: self._item,
-            ids.MISSION_ITEM_INT: self._item_int,
+            ids.MISSION_ITEM: partial(self._take, item_float),
+            ids.MISSION_ITEM_INT: partial(self._take, item_int),
             ids.MISSION_REQUEST_LIST: self._request_list,
-            ids.MISSION_REQUEST: self._request,
-            ids.MISSION_REQUEST_INT: self._request_int,
+            ids.MISSION_REQUEST: partial(self._send_item, False),
+            ids.MISSION_REQUEST_INT: partial(self._send_item, True),
             ids.MISSION_ACK: self._ack,
             ids.MISSION_CLEAR_ALL: self._clear_all,
             ids.MISSION_SET_CURRENT: self._set_current,
@@ -96,7 +99,7 @@ class MissionService:
         }
         self.message_ids = frozenset(self._handlers)
 
-    def receive(self, frame: Frame, t_us: int) -> Sequence[Said]:
+    def handle(self, frame: Frame, t_us: int) -> Sequence[ServiceOutput]:
         """See :class:`~fsw.link.services.service.LinkService`."""
         values = cast(Numbers, frame.payload_values)
         at = _TARGET_AT[frame.message_id]
@@ -105,45 +108,45 @@ class MissionService:
         peer = (frame.system_id, frame.component_id)
         return self._handlers[frame.message_id](values, peer, t_us)
 
-    def poll(self, t_us: int) -> Sequence[Said]:
-        """Ask again for what did not come, and tell how far the mission is."""
-        told: list[Said] = []
+    def poll(self, t_us: int) -> Sequence[ServiceOutput]:
+        """Ask again for what did not come, and report the mission's progress."""
+        replies: list[ServiceOutput] = []
         if self._store.progress is not self._shown or self._show_again:
-            told += self._show_progress(t_us)
+            replies += self._show_progress(t_us)
         elif self._repeats and t_us >= self._repeat_us:
-            told.append(self._reached(t_us))
+            replies.append(self._reached(t_us))
         upload = self._upload
         if upload is not None and t_us - upload.asked_us >= ASK_AGAIN_US:
             if upload.tries < TRIES:
-                told.append(self._ask(upload, t_us))
+                replies.append(self._ask(upload, t_us))
             else:
                 self._upload = None
                 silence = f"upload broken off: item {len(upload.items)} did not come; kept the old"
-                told.append(encode_ack(CANCELLED, upload.kind, upload.peer))
-                told.append(StatusText(Severity.WARNING, silence))
-        return told
+                replies.append(encode_ack(CANCELLED, upload.kind, upload.peer))
+                replies.append(StatusText(Severity.WARNING, silence))
+        return replies
 
     def _show_progress(self, t_us: int) -> list[Outgoing]:
         before, now = self._shown, self._store.progress
         self._shown, self._show_again = now, False
         values = current_values(now, self._store.in_mission, self._store.ids)
-        told = [Outgoing(ids.MISSION_CURRENT, values)]
+        replies = [Outgoing(ids.MISSION_CURRENT, values)]
         if now.reached_count > before.reached_count:
             self._repeats = 1 + REACHED_REPEATS
-            told.append(self._reached(t_us))
+            replies.append(self._reached(t_us))
         elif now.reached < 0:
             self._repeats = 0  # begun again, or another mission
-        return told
+        return replies
 
     def _reached(self, t_us: int) -> Outgoing:
-        """The item that was reached last, said again for a while: it has no acknowledgement."""
+        """The item that was reached last, repeated for a while: it has no acknowledgement."""
         self._repeats -= 1
         self._repeat_us = t_us + _REPEAT_US
         return Outgoing(ids.MISSION_ITEM_REACHED, (self._shown.reached,))
 
     # ------------------------------------------------------------ upload
 
-    def _count(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[Said]:
+    def _count(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[ServiceOutput]:
         number, count = int(values[3]), int(values[0])
         refused = self._unavailable(number, peer, t_us)
         if refused is not None:
@@ -158,16 +161,11 @@ class MissionService:
             return self._finish(self._upload)
         return (self._ask(self._upload, t_us),)
 
-    def _item(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[Said]:
-        return self._take(item_float(values), values, peer, t_us)
-
-    def _item_int(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[Said]:
-        return self._take(item_int(values), values, peer, t_us)
-
     def _take(
-        self, item: MissionItem | Refused, values: Numbers, peer: Peer, t_us: int
-    ) -> Sequence[Said]:
+        self, read: _ReadItem, values: Numbers, peer: Peer, t_us: int
+    ) -> Sequence[ServiceOutput]:
         """Add the item that was asked for; the last one completes the upload."""
+        item = read(values)
         seq, number = int(values[7]), int(values[14])
         upload = self._upload
         if upload is None or upload.peer != peer or upload.kind != number:
@@ -190,7 +188,7 @@ class MissionService:
         upload.tries = 0
         return (self._ask(upload, t_us),)
 
-    def _stray(self, seq: int, number: int, peer: Peer) -> Sequence[Said]:
+    def _stray(self, seq: int, number: int, peer: Peer) -> Sequence[ServiceOutput]:
         """An item of no upload; after one that ended, its acknowledgement may have been lost."""
         if self._done is not None and self._done[:2] == (peer, number):
             again = encode_ack(ACCEPTED, number, peer, self._store.identity(self._done[1]))
@@ -204,7 +202,7 @@ class MissionService:
         upload.tries += 1
         return encode_request(len(upload.items), upload.kind, upload.peer)
 
-    def _finish(self, upload: _Upload) -> Sequence[Said]:
+    def _finish(self, upload: _Upload) -> Sequence[ServiceOutput]:
         kind, peer = upload.kind, upload.peer
         refused = self._store.keep(kind, tuple(upload.items), tuple(upload.meanings))
         if refused is not None:
@@ -219,7 +217,7 @@ class MissionService:
 
     # ------------------------------------------------------------ download
 
-    def _request_list(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[Said]:
+    def _request_list(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[ServiceOutput]:
         number = int(values[2])
         refused = self._unavailable(number, peer, t_us)
         if refused is not None:
@@ -230,13 +228,9 @@ class MissionService:
         self._download = _Download(peer, kind, items, t_us) if items else None
         return (encode_count(len(items), kind, peer, self._store.identity(kind)),)
 
-    def _request(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[Said]:
-        return self._send_item(values, peer, t_us, as_int=False)
-
-    def _request_int(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[Said]:
-        return self._send_item(values, peer, t_us, as_int=True)
-
-    def _send_item(self, values: Numbers, peer: Peer, t_us: int, as_int: bool) -> Sequence[Said]:
+    def _send_item(
+        self, as_int: bool, values: Numbers, peer: Peer, t_us: int
+    ) -> Sequence[ServiceOutput]:
         """Any item in any order and as often as asked: requests and items may be lost."""
         seq, number = int(values[0]), int(values[3])
         download = self._download
@@ -252,7 +246,7 @@ class MissionService:
 
     # ------------------------------------------------------------ the rest
 
-    def _ack(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[Said]:
+    def _ack(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[ServiceOutput]:
         """The other side has all it wanted, or wants no more; the old items stay."""
         if self._download is not None and self._download.peer == peer:
             self._download = None
@@ -260,7 +254,7 @@ class MissionService:
             self._upload = None
         return ()
 
-    def _clear_all(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[Said]:
+    def _clear_all(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[ServiceOutput]:
         number = int(values[2])
         kinds = tuple(Kind) if number == ALL_KINDS else (number,)
         refused = self._unavailable(kinds[0], peer, t_us)
@@ -271,7 +265,7 @@ class MissionService:
             self._store.keep(Kind(kind), (), ())
         return (encode_ack(ACCEPTED, number, peer),)
 
-    def _set_current(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[Said]:
+    def _set_current(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[ServiceOutput]:
         seq = int(values[0])
         if self._store.set_current(seq):
             self._show_again = True
@@ -282,11 +276,11 @@ class MissionService:
             StatusText(Severity.WARNING, refused.reason),
         )
 
-    def _partial(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[Said]:
+    def _partial(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[ServiceOutput]:
         """A part of a list cannot be checked by itself; ground stations then send all of it."""
         return (encode_ack(UNSUPPORTED, int(values[4]), peer),)
 
-    def _unavailable(self, number: int, peer: Peer, t_us: int) -> Sequence[Said] | None:
+    def _unavailable(self, number: int, peer: Peer, t_us: int) -> Sequence[ServiceOutput] | None:
         """Why no transfer of this type can begin now."""
         if number not in ROOM:
             return (encode_ack(UNSUPPORTED, number, peer),)
@@ -298,7 +292,7 @@ class MissionService:
             return (encode_ack(DENIED, number, peer),)
         return None
 
-    def _refuse(self, refused: Refused, kind: Kind, peer: Peer) -> Sequence[Said]:
+    def _refuse(self, refused: Refused, kind: Kind, peer: Peer) -> Sequence[ServiceOutput]:
         self._upload = None
         text = f"{kind.name.lower()} refused: {refused.reason}"
         return (encode_ack(refused.result, kind, peer), StatusText(Severity.WARNING, text))

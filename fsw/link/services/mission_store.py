@@ -14,6 +14,15 @@ from enum import IntEnum
 from typing import Final
 
 from fsw.barriers.tangent import planes
+from fsw.link.wire.fence_items import read_fence, read_fence_item
+from fsw.link.wire.mission_items import (
+    DENIED,
+    Locate,
+    MissionItem,
+    Refused,
+    read_rally,
+    read_step,
+)
 from fsw.link.wire.telemetry_context import PlanIds
 from fsw.signals import (
     FlightSnapshot,
@@ -24,8 +33,6 @@ from fsw.signals import (
     SafeSet,
     Vec2,
 )
-from fsw.vehicle.fence import read_fence, read_fence_item
-from fsw.vehicle.mission_items import DENIED, Locate, MissionItem, Refused, read_rally, read_step
 
 Judge = Callable[[SafeSet], tuple[str, ...]]
 """Why the vehicle could not keep a safe set; nothing where it can."""

@@ -7,21 +7,21 @@ from typing import Final, cast
 
 from fsw.link.wire import message_ids as ids
 from fsw.link.wire.decode import Numbers
-from fsw.link.wire.outgoing import Outgoing, WireValues
-from fsw.link.wire.telemetry_context import PlanIds, TelemetryContext
-from fsw.signals import FlightSnapshot, MissionProgress, MissionState, Mode, Vec4
-from fsw.vehicle.mission_items import (
+from fsw.link.wire.mission_items import (
     INVALID_PARAM1,
     LOCAL_FRAMES,
     NO_PLACE,
     MissionItem,
     Refused,
 )
+from fsw.link.wire.outgoing import Outgoing, WireValues
+from fsw.link.wire.telemetry_context import PlanIds, TelemetryContext
+from fsw.signals import FlightSnapshot, MissionProgress, MissionState, Mode, Vec4
 
 Peer = tuple[int, int]
-"""System and component of whoever speaks."""
+"""System and component of a client."""
 
-_NO_MISSION: Final = 0xFFFF  # in place of a total; 0 would mean that totals are not told
+_NO_MISSION: Final = 0xFFFF  # in place of a total; 0 would mean that totals are not supported
 _ACTIVE, _SUSPENDED = 1, 2  # mission_mode
 _FRAME_MISSION: Final = 2  # MAV_FRAME of a command without a place
 
@@ -54,7 +54,7 @@ def item_float(values: Numbers) -> MissionItem | Refused:
 
 
 def encode_item(item: MissionItem, seq: int, kind: int, peer: Peer, as_int: bool) -> Outgoing:
-    """MISSION_ITEM_INT, or MISSION_ITEM for those who asked in floats."""
+    """MISSION_ITEM_INT, or MISSION_ITEM for a request in floats."""
     x: float = item.x
     y: float = item.y
     if not as_int:

@@ -2,7 +2,7 @@
 
 A list is paced, so that no tick sends more than a datagram of it. A set is answered with the value
 that holds when it has been decided: the new one, or the old one after a text that says why. A
-change is told on every link.
+change is reported on every link.
 
 Source: https://mavlink.io/en/services/parameter.html
 """
@@ -16,7 +16,7 @@ from typing import Final, cast
 
 from fsw.link.wire import message_ids as ids
 from fsw.link.wire.decode import for_this_vehicle
-from fsw.link.wire.outgoing import Outgoing, Said
+from fsw.link.wire.outgoing import Outgoing, ServiceOutput
 from fsw.parameters.facts import FACT_BY_NAME, REPEATED
 from fsw.parameters.registry import BY_NAME
 from fsw.parameters.storage import REAL32
@@ -50,7 +50,7 @@ class ParameterService:
         self._next = _COUNT  # index of the next one to list
         self._burst_us = 0
 
-    def receive(self, frame: Frame, t_us: int) -> Sequence[Said]:
+    def handle(self, frame: Frame, t_us: int) -> Sequence[ServiceOutput]:
         """Answer a question at once, begin to list, or pass a wish on."""
         values = frame.payload_values
         if frame.message_id == ids.PARAM_REQUEST_LIST:
@@ -58,7 +58,7 @@ class ParameterService:
             if not for_this_vehicle(system, component):
                 return ()
             self._next, self._burst_us = 0, t_us
-            # First, as PX4 has it: who knows all values from last time says so and needs no list.
+            # First, as PX4 has it: a client that knows all values needs no list.
             return (self._hash(),)
         if frame.message_id == ids.PARAM_REQUEST_READ:
             index, system, component, text = cast("tuple[int, int, int, bytes]", values)
@@ -70,12 +70,12 @@ class ParameterService:
             return ()
         return self._set(_name(text), value, type_, (frame.system_id, frame.component_id))
 
-    def poll(self, t_us: int) -> Sequence[Said]:
-        """Tell what has changed, and go on with a list."""
+    def poll(self, t_us: int) -> Sequence[ServiceOutput]:
+        """Report what has changed, and continue a list."""
         news = self._news
         if self._next == _COUNT and not news.changed and not news.texts:
             return ()
-        answers: list[Said] = []
+        answers: list[ServiceOutput] = []
         if news.texts:
             answers.append(StatusText(Severity.WARNING, news.texts.popleft()))
         while news.changed and len(answers) < BURST:
@@ -91,7 +91,7 @@ class ParameterService:
             self._next = end
         return answers
 
-    def _read(self, index: int, name: str, asker: _Peer) -> Sequence[Said]:
+    def _read(self, index: int, name: str, asker: _Peer) -> Sequence[ServiceOutput]:
         if index < 0 and name == _HASH:
             return (self._hash(),)
         wanted = _INDEX.get(name, _COUNT) if index < 0 else index
@@ -99,16 +99,16 @@ class ParameterService:
             return (self._value(wanted),)
         return (_error(index, name, _DOES_NOT_EXIST, asker),)
 
-    def _set(self, name: str, value: float, type_: int, asker: _Peer) -> Sequence[Said]:
+    def _set(self, name: str, value: float, type_: int, asker: _Peer) -> Sequence[ServiceOutput]:
         if name == _HASH:
             self._next = _COUNT  # QGroundControl's word that it needs no list
             return ()
         if name in FACT_BY_NAME:
-            told, index = self._value(_INDEX[name]), _INDEX[name]
-            if value == told.values[0]:
-                return (told,)
+            kept, index = self._value(_INDEX[name]), _INDEX[name]
+            if value == kept.values[0]:
+                return (kept,)
             why = f"{name} is read only: {FACT_BY_NAME[name].meaning}"
-            return (StatusText(Severity.WARNING, why), told, _error(index, name, _READ_ONLY, asker))
+            return (StatusText(Severity.WARNING, why), kept, _error(index, name, _READ_ONLY, asker))
         if name not in BY_NAME:
             return (_error(_BY_NAME, name, _DOES_NOT_EXIST, asker),)
         if type_ == REAL32:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Protocol, runtime_checkable
 
-from fsw.link.wire.outgoing import Said
+from fsw.link.wire.outgoing import ServiceOutput
 from messages.frames import Frame
 
 
@@ -18,7 +18,7 @@ class LinkService(Protocol):
 
     message_ids: frozenset[int]  # what it wants to hear
 
-    def receive(self, frame: Frame, t_us: int) -> Sequence[Said]:
+    def handle(self, frame: Frame, t_us: int) -> Sequence[ServiceOutput]:
         """Answer a valid frame at once; never raises.
 
         Args:
@@ -27,7 +27,7 @@ class LinkService(Protocol):
         """
         ...
 
-    def poll(self, t_us: int) -> Sequence[Said]:
+    def poll(self, t_us: int) -> Sequence[ServiceOutput]:
         """Go on with an answer that is paced; called every tick, so idle must cost nothing.
 
         Args:
@@ -40,7 +40,7 @@ class LinkService(Protocol):
 class BulkService(LinkService, Protocol):
     """A service with much to send to clients that set the pace themselves, piece by piece."""
 
-    def bulk(self, t_us: int) -> Sequence[Said]:
+    def bulk(self, t_us: int) -> Sequence[ServiceOutput]:
         """The next datagram of it; nothing where nothing is under way.
 
         Called in what is left of a tick, several times, so that it delays none.

@@ -16,7 +16,7 @@ class TimeService:
 
     message_ids = frozenset({PING, TIMESYNC})
 
-    def receive(self, frame: Frame, t_us: int) -> Sequence[Outgoing]:
+    def handle(self, frame: Frame, t_us: int) -> Sequence[Outgoing]:
         """Answer a request; answers of others to their own requests are not for us."""
         if frame.message_id == TIMESYNC:
             answered_ns, sent_ns = frame.payload_values

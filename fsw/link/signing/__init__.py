@@ -1,1 +1,1 @@
-"""MAVLink 2 signing: of frames, who may set a key, and where it is kept."""
+"""MAVLink 2 signing: signatures, the setting of a key, and its file."""

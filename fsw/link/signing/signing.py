@@ -24,13 +24,13 @@ _SIGNATURE_SIZE: Final = 13  # bytes: link, time (6), hash (6)
 _EPOCH_UNIX_S: Final = 1_420_070_400  # 2015-01-01 UTC, where signing time begins
 _UNIT_US: Final = 10  # of signing time
 _TOLERANCE: Final = 6_000_000  # one minute, in units
-_MAX_SENDERS: Final = 64  # that are remembered; only who holds the key can add one
+_MAX_SENDERS: Final = 64  # that are remembered; only holders of the key can add one
 # A radio that puts its own status on the link has no key, and presence asks for nothing. MAVLink 1
 # cannot be signed, so nothing of it passes.
 _EXEMPT: Final = frozenset({HEARTBEAT, RADIO_STATUS})
 
 
-class Verdict(Enum):
+class FrameTrust(Enum):
     """What a frame may do."""
 
     TRUSTED = "trusted"
@@ -54,7 +54,7 @@ class Signing:
         """Take up the key that an earlier flight left.
 
         Args:
-            link_id: 0..255, tells our links apart in our own signatures.
+            link_id: 0..255, distinguishes our links in our own signatures.
             unix_us: Wall time [us since 1970].
             file: Where the key is kept; None forgets it with the process.
 
@@ -84,7 +84,7 @@ class Signing:
         stamp = bytes([self._link_id]) + self._sent.to_bytes(6, "little")
         return marked + stamp + self._hash(marked + stamp)
 
-    def judge(self, frame: Frame, raw: bytes) -> Verdict:
+    def judge(self, frame: Frame, raw: bytes) -> FrameTrust:
         """Decide about a frame whose checksum is right.
 
         Args:
@@ -92,28 +92,28 @@ class Signing:
             raw: All of its bytes, signature included.
         """
         if not self._key:
-            return Verdict.TRUSTED
+            return FrameTrust.TRUSTED
         if not is_signed(raw):
             if frame.message_id in _EXEMPT and not is_version_1(raw):
-                return Verdict.EXEMPT
+                return FrameTrust.EXEMPT
             self.counters.unsigned += 1
-            return Verdict.REFUSED
+            return FrameTrust.REFUSED
         if not hmac.compare_digest(self._hash(raw[:-_HASH_SIZE]), raw[-_HASH_SIZE:]):
             self.counters.wrong_hash += 1
-            return Verdict.REFUSED
+            return FrameTrust.REFUSED
         link_id = raw[-_SIGNATURE_SIZE]
         time = int.from_bytes(raw[1 - _SIGNATURE_SIZE : -_HASH_SIZE], "little")
         if not self._in_time((frame.system_id, frame.component_id, link_id), time):
             self.counters.wrong_time += 1
-            return Verdict.REFUSED
-        return Verdict.TRUSTED
+            return FrameTrust.REFUSED
+        return FrameTrust.TRUSTED
 
     def set_up(self, key: bytes, initial_time: int) -> None:
         """Sign from now on with ``key``, or stop signing if it is all zeros.
 
         Args:
             key: 32 bytes.
-            initial_time: Signing time of who asks; ours does not begin before it, unless it is
+            initial_time: Signing time of the sender; ours does not begin before it, unless it is
                 further ahead than a minute.
 
         Raises:

@@ -1,4 +1,4 @@
-"""Who may set a signing key, and when."""
+"""SETUP_SIGNING: conditions for setting a signing key."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def set_up_signing(
         armed: Whether anything may move.
 
     Returns:
-        What to tell the operator; None if the message was not for this vehicle.
+        The text for the operator; None if the message was not for this vehicle.
     """
     initial_time, system, component, *key = cast(Numbers, frame.payload_values)
     if not for_this_vehicle(system, component):

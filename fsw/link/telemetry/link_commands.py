@@ -17,12 +17,15 @@ from fsw.link.wire.telemetry_context import TelemetryContext
 from fsw.signals import CommandAck, CommandRequest, FlightSnapshot, Severity, StatusText
 from messages.frames import Frame
 
-_GET_HOME_POSITION: Final = 410  # MAV_CMD
-_GET_MESSAGE_INTERVAL: Final = 510
+_GET_MESSAGE_INTERVAL: Final = 510  # MAV_CMD
 _SET_MESSAGE_INTERVAL: Final = 511
 _REQUEST_MESSAGE: Final = 512
-_REQUEST_PROTOCOL_VERSION: Final = 519
-_REQUEST_AUTOPILOT_CAPABILITIES: Final = 520
+# MAV_CMD: the message it asks for, and whether its param1 must be 1.
+_REQUESTS: Final = {
+    410: (message_ids.HOME_POSITION, False),  # GET_HOME_POSITION
+    519: (message_ids.PROTOCOL_VERSION, True),  # REQUEST_PROTOCOL_VERSION
+    520: (message_ids.AUTOPILOT_VERSION, True),  # REQUEST_AUTOPILOT_CAPABILITIES
+}
 _ACCEPTED, _TEMPORARILY_REJECTED, _DENIED, _FAILED = 0, 1, 2, 4  # MAV_RESULT
 _DECODERS: Final = {
     message_ids.COMMAND_LONG: decode.command_long,
@@ -41,15 +44,13 @@ class LinkCommands:
         self._handlers: dict[
             int, Callable[[CommandRequest, int, FlightSnapshot | None], _Outcome]
         ] = {
-            _GET_HOME_POSITION: self._get_home,
             _GET_MESSAGE_INTERVAL: self._get_interval,
             _SET_MESSAGE_INTERVAL: self._set_interval,
             _REQUEST_MESSAGE: self._request_message,
-            _REQUEST_AUTOPILOT_CAPABILITIES: self._request_capabilities,
-            _REQUEST_PROTOCOL_VERSION: self._request_protocol_version,
+            **dict.fromkeys(_REQUESTS, self._request_one),
         }
 
-    def answer(
+    def handle(
         self, frame: Frame, t_us: int, snapshot: FlightSnapshot | None
     ) -> tuple[Sequence[Outgoing], StatusText | None] | None:
         """Carry out a command to the link.
@@ -57,7 +58,7 @@ class LinkCommands:
         Args:
             frame: Any valid frame.
             t_us: Sensor time [us].
-            snapshot: What there is to tell about.
+            snapshot: The newest snapshot; None before the first tick.
 
         Returns:
             What to send and why it was refused, if it was; None if the frame is something else.
@@ -69,8 +70,8 @@ class LinkCommands:
             return None
         result, reason, messages = handler(request, t_us, snapshot)
         ack = CommandAck(request.command, result, request.source_system, request.source_component)
-        told = Outgoing(message_ids.COMMAND_ACK, encode_replies.command_ack(ack))
-        return (told, *messages), StatusText(Severity.INFO, reason) if reason else None
+        reply = Outgoing(message_ids.COMMAND_ACK, encode_replies.command_ack(ack))
+        return (reply, *messages), StatusText(Severity.INFO, reason) if reason else None
 
     def _get_interval(
         self, request: CommandRequest, t_us: int, snapshot: FlightSnapshot | None
@@ -101,34 +102,24 @@ class LinkCommands:
             return _DENIED, "request message: param1 is no message id", ()
         return self._now(message_id, request.params[1], snapshot)
 
-    def _get_home(
+    def _request_one(
         self, request: CommandRequest, t_us: int, snapshot: FlightSnapshot | None
     ) -> _Outcome:
-        return self._now(message_ids.HOME_POSITION, math.nan, snapshot)
-
-    def _request_capabilities(
-        self, request: CommandRequest, t_us: int, snapshot: FlightSnapshot | None
-    ) -> _Outcome:
-        if request.params[0] != 1.0:
-            return _DENIED, "request capabilities: param1 = 1 asks for them", ()
-        return self._now(message_ids.AUTOPILOT_VERSION, math.nan, snapshot)
-
-    def _request_protocol_version(
-        self, request: CommandRequest, t_us: int, snapshot: FlightSnapshot | None
-    ) -> _Outcome:
-        if request.params[0] != 1.0:
-            return _DENIED, "request protocol version: param1 = 1 asks for it", ()
-        return self._now(message_ids.PROTOCOL_VERSION, math.nan, snapshot)
+        """The older commands, each of which asks for one message."""
+        message_id, param1_is_1 = _REQUESTS[request.command]
+        if param1_is_1 and request.params[0] != 1.0:
+            return _DENIED, f"command {request.command}: param1 must be 1 to request it", ()
+        return self._now(message_id, math.nan, snapshot)
 
     def _now(self, message_id: int, which: float, snapshot: FlightSnapshot | None) -> _Outcome:
         if snapshot is None:
-            return _TEMPORARILY_REJECTED, "the vehicle has not begun to fly", ()
+            return _TEMPORARILY_REJECTED, "the flight software has not run a tick yet", ()
         messages = messages_now(message_id, which, snapshot, self._context)
         if messages is None:
             # No text: ground stations probe for cameras, gimbals and much else at every start.
             return _DENIED, "", ()
         if not messages:
-            return _TEMPORARILY_REJECTED, f"message {message_id}: nothing to tell yet", ()
+            return _TEMPORARILY_REJECTED, f"message {message_id}: no data yet", ()
         return _ACCEPTED, "", messages
 
 

@@ -79,10 +79,10 @@ STREAMS: Final = (
     Stream(message_ids.SETPOINT_STATUS, 5, 5, PANDION, encode_dialect.setpoint_status),
     Stream(message_ids.BARRIER_MARGIN, 10, 10, PANDION, encode_dialect.barrier_margin),
     Stream(message_ids.MPC_STATUS, 10, 10, PANDION, encode_dialect.mpc_status),
-    Stream(message_ids.LOOP_TIMING, 1, 1, PANDION, encode_dialect.inner_timing),
-    Stream(message_ids.LOOP_TIMING, 1, 1, PANDION, encode_dialect.mpc_timing),
-    Stream(message_ids.LOOP_TIMING, 1, 1, PANDION, encode_dialect.telemetry_timing),
-    Stream(message_ids.LOOP_TIMING, 1, 1, PANDION, encode_dialect.housekeeping_timing),
+    *(
+        Stream(message_ids.LOOP_TIMING, 1, 1, PANDION, encode_dialect.loop_timing(group))
+        for group in range(4)
+    ),
 )
 
 # These leave at once when mode, arming, landing or health change.
@@ -105,7 +105,7 @@ def messages_now(
 
     Args:
         message_id: Which.
-        which: Part of it, where it has several.
+        which: Number of the part [1], where it has several.
         snapshot: Of the last tick.
         context: What encoders need.
 

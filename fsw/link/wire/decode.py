@@ -38,7 +38,7 @@ _ZERO: Final[Vec3] = (0.0, 0.0, 0.0)
 
 @dataclass(frozen=True, slots=True)
 class IndexedObstacle:
-    """One wall or point of a set of ``count``."""
+    """One wall or obstacle of a set of ``count``."""
 
     obstacle: Wall | PointObstacle
     index: int
@@ -46,12 +46,12 @@ class IndexedObstacle:
 
 
 def for_this_vehicle(target_system: float, target_component: float) -> bool:
-    """Tell whether a message is addressed to the autopilot or to everyone."""
+    """Whether ``target_system`` [1], ``target_component`` [1] is the autopilot or everyone."""
     return target_system in (0, SYSTEM_ID) and target_component in (0, 1, 191)
 
 
 def sensor_frame(odometry: Numbers, arm: Numbers, hil_sensor: Numbers) -> SensorFrame:
-    """Put together what the sensors said at one step.
+    """Sensor readings of one step.
 
     Args:
         odometry: ODOMETRY, pose and velocity in local NED, body rates.
@@ -127,7 +127,7 @@ def _scaled(number: float, scale: float) -> float:
 
 
 def end_effector_target(values: Numbers) -> EndEffectorTarget | None:
-    """Read an END_EFFECTOR_TARGET; None if it is of no use as a set-point.
+    """Read an END_EFFECTOR_TARGET; None if it is of no use as a setpoint.
 
     A masked velocity, acceleration or yaw reads as zero; a target without a position, in another
     frame than local NED or with a number that is not finite is refused.

@@ -7,17 +7,20 @@ Each encoder returns every field of its message in wire order (larger types firs
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Final
 
 from fsw.link.wire.encode_setpoints import as_asked
 from fsw.link.wire.outgoing import WireValues
-from fsw.link.wire.telemetry_context import GroupTiming, TelemetryContext
-from fsw.model.arm_kinematics import point_in_flight
+from fsw.link.wire.telemetry_context import TelemetryContext
+from fsw.model.kinematics import point_in_flight
+from fsw.ports import GroupTiming
 from fsw.signals import FlightSnapshot, SetpointKind, Vec2, Vec4
 
 _LOCAL_NED: Final = 1  # MAV_FRAME
 _MAX_CONSTRAINTS: Final = 16
 _U32: Final = 0xFFFFFFFF
+_RATE_GROUPS: Final = ("inner", "mpc", "telemetry", "housekeeping")  # of LoopHealth
 
 
 def arm_joint_state(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues:
@@ -54,7 +57,7 @@ def arm_joint_setpoint(snapshot: FlightSnapshot, _: TelemetryContext) -> WireVal
 
 
 def end_effector_target(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues | None:
-    """END_EFFECTOR_TARGET in use; shows whether a set-point was accepted."""
+    """END_EFFECTOR_TARGET in use; shows whether a setpoint was accepted."""
     asked = snapshot.offboard.motion
     if snapshot.offboard.kind is SetpointKind.END_EFFECTOR and asked is not None:
         numbers, mask = as_asked(asked)
@@ -67,7 +70,7 @@ def end_effector_target(snapshot: FlightSnapshot, _: TelemetryContext) -> WireVa
 
 
 def setpoint_status(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues:
-    """SETPOINT_STATUS: how many set-points were of use, and which kind is flown."""
+    """SETPOINT_STATUS: how many setpoints were of use, and which kind is flown."""
     report = snapshot.offboard
     counts = (report.accepted & _U32, report.refused & _U32, min(report.age_us, _U32))
     return (snapshot.t_us, *counts, int(report.kind))
@@ -120,41 +123,28 @@ def mpc_status(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValue
     )
 
 
-def inner_timing(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues:
-    """LOOP_TIMING of the fast tick."""
-    return _loop_timing(snapshot.t_us, context.health.inner, group=0)
+def loop_timing(group: int) -> Callable[[FlightSnapshot, TelemetryContext], WireValues]:
+    """The encoder of LOOP_TIMING of one PANDION_RATE_GROUP."""
+    name = _RATE_GROUPS[group]
 
+    def encode(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues:
+        timing: GroupTiming = getattr(context.health, name)
+        return (
+            snapshot.t_us,
+            timing.ticks,
+            timing.late_ticks,
+            timing.skipped_ticks,
+            timing.period_us,
+            timing.execution_p50_us,
+            timing.execution_p99_us,
+            timing.execution_max_us,
+            timing.lateness_p50_us,
+            timing.lateness_p99_us,
+            timing.lateness_max_us,
+            group,
+        )
 
-def mpc_timing(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues:
-    """LOOP_TIMING of the planning cycle."""
-    return _loop_timing(snapshot.t_us, context.health.mpc, group=1)
-
-
-def telemetry_timing(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues:
-    """LOOP_TIMING of telemetry and log."""
-    return _loop_timing(snapshot.t_us, context.health.telemetry, group=2)
-
-
-def housekeeping_timing(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues:
-    """LOOP_TIMING of what is done once a second."""
-    return _loop_timing(snapshot.t_us, context.health.housekeeping, group=3)
-
-
-def _loop_timing(t_us: int, timing: GroupTiming, group: int) -> WireValues:
-    return (
-        t_us,
-        timing.ticks,
-        timing.late_ticks,
-        timing.skipped_ticks,
-        timing.period_us,
-        timing.execution_p50_us,
-        timing.execution_p99_us,
-        timing.execution_max_us,
-        timing.lateness_p50_us,
-        timing.lateness_p99_us,
-        timing.lateness_max_us,
-        group,
-    )
+    return encode
 
 
 def _microseconds(value: float) -> int:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from fsw.flight.failsafe import Condition
 from fsw.link.wire.outgoing import WireValues
 from fsw.link.wire.telemetry_context import TelemetryContext
 from fsw.signals import BatteryState, Charge, FlightSnapshot
-from fsw.vehicle.faults import Fault
 
 # MAV_SYS_STATUS_SENSOR bits of what this vehicle has. It has no magnetometer and no satellite
 # receiver: heading and position come from motion capture. Their bits say whether heading and
@@ -21,11 +21,11 @@ _CONTROL: Final = _RATE_CONTROL | _ATTITUDE | _YAW | _HEIGHT | _POSITION
 _PRESENT: Final = _SENSING | _CONTROL | _MOTORS | _FENCE | _BATTERY | _PREARM
 # Which subsystem an operator should look at; any fault also forbids arming.
 _SUSPECT: Final[dict[str, int]] = {
-    Fault.PLAN_REFUSED.value: 0,
-    Fault.PLAN_STALE.value: _POSITION | _HEIGHT,
-    Fault.OUTPUT_NOT_FINITE.value: _MOTORS,
-    Fault.ESTIMATE_INVALID.value: _SENSING,
-    Fault.TILT_LOST.value: _ATTITUDE | _RATE_CONTROL,
+    Condition.PLAN_REFUSED.value: 0,
+    Condition.PLAN_STALE.value: _POSITION | _HEIGHT,
+    Condition.OUTPUT_NOT_FINITE.value: _MOTORS,
+    Condition.ESTIMATE_INVALID.value: _SENSING,
+    Condition.TILT_LOST.value: _ATTITUDE | _RATE_CONTROL,
 }
 # MAV_BATTERY_CHARGE_STATE: 0 is undefined, OK is 1.
 _CHARGE_STATES: Final = {charge: int(charge) + 1 for charge in Charge}
@@ -70,7 +70,7 @@ def sys_status(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValue
 
 
 def battery_status(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues:
-    """BATTERY_STATUS: one pack whose cells are not told apart."""
+    """BATTERY_STATUS: one pack without voltages of its cells."""
     battery = snapshot.battery
     return (
         round(1000.0 * battery.consumed),
@@ -93,7 +93,7 @@ def battery_status(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues:
 
 def estimator_status(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues:
     """ESTIMATOR_STATUS: what is known. There is no filter, hence no innovation to report."""
-    invalid = Fault.ESTIMATE_INVALID.value in snapshot.failures
+    invalid = Condition.ESTIMATE_INVALID.value in snapshot.failures
     return (snapshot.t_us, *(math.nan,) * 8, 0 if invalid else _ESTIMATED)
 
 

@@ -60,12 +60,12 @@ def current_mode(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues:
 
 
 def protocol_version(_: FlightSnapshot, __: TelemetryContext) -> WireValues:
-    """PROTOCOL_VERSION: 2, and 1 with those who speak it; the hashes say nothing."""
+    """PROTOCOL_VERSION: 2, and 1 for peers that use it; the hashes are not set."""
     return (_PROTOCOL_2, _PROTOCOL_1, _PROTOCOL_2, *(0,) * 16)
 
 
 def available_modes(which: float, _: FlightSnapshot, __: TelemetryContext) -> Sequence[Outgoing]:
-    """AVAILABLE_MODES: all of them, or the one whose number, from 1, is asked for."""
+    """AVAILABLE_MODES: all of them, or the one whose number ``which`` [1], from 1, is asked for."""
     count = len(AVAILABLE_MODES)
     every = not which >= 1.0  # NaN and 0 ask for all
     return [

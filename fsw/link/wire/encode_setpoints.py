@@ -1,4 +1,4 @@
-"""A motion set-point as the numbers and the mask it came with; pure."""
+"""A motion setpoint as the numbers and the mask it came with; pure."""
 
 from __future__ import annotations
 

@@ -93,7 +93,7 @@ def local_position(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues:
 
 
 def position_target(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues:
-    """POSITION_TARGET_LOCAL_NED: the set-point flown, or where the plan wants the body now."""
+    """POSITION_TARGET_LOCAL_NED: the setpoint flown, or where the plan wants the body now."""
     plan, offboard = snapshot.plan_state, snapshot.offboard
     if offboard.kind is SetpointKind.BODY and offboard.motion is not None:
         numbers, mask = as_asked(offboard.motion)
@@ -107,7 +107,7 @@ def position_target(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues
 
 
 def attitude_target(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues:
-    """ATTITUDE_TARGET: the set-point flown, or attitude reference and thrust, 0 to 1."""
+    """ATTITUDE_TARGET: the setpoint flown, or attitude reference and thrust, 0 to 1."""
     asked = snapshot.offboard.attitude
     if snapshot.offboard.kind is SetpointKind.ATTITUDE and asked is not None:
         mask = _RATES_IGNORED if asked.w_WB_B is None else _ATTITUDE_IGNORED

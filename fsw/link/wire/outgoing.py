@@ -29,5 +29,5 @@ class PackedOutgoing:
     component: int = AUTOPILOT
 
 
-Said = Outgoing | PackedOutgoing | StatusText
-"""What a service says: messages, and sentences for the operator."""
+ServiceOutput = Outgoing | PackedOutgoing | StatusText
+"""What a service sends: messages, and texts for the operator."""

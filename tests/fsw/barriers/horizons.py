@@ -6,17 +6,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fsw.barriers.root import BarrierTuning
-from fsw.barriers.soft_rows import TargetPoints
+from fsw.barriers.constraint_block import TargetPoints
+from fsw.barriers.safe_approach import BarrierTuning
 from fsw.model.airframe import AIRFRAME
 from fsw.model.linearisation import Linearisation
-from fsw.model.prediction import INPUTS, Array, LagModel, condense
+from fsw.model.prediction import INPUTS, Array, condense
+from tests.fsw.model.geometry_by_rotation import moved_on, tips_of_prediction
 from tests.fsw.random_states import prediction_vector
 
 NODES = 5
-TUNING = BarrierTuning(alpha=2.0, slope=4.0, gamma=3.0, robustness=0.3, skipped_nodes=1)
-BETA = 1.0 - TUNING.gamma * TUNING.period
-_MODEL = condense(LagModel(), TUNING.period, NODES)
+TUNING = BarrierTuning(alpha=2.0, slope=4.0, gamma=3.0, lambda_=0.3, skipped_nodes=1)
+PERIOD = 0.1
+BETA = 1.0 - TUNING.gamma * PERIOD
+MODEL = condense(AIRFRAME, PERIOD, NODES)
 
 
 @dataclass(frozen=True)
@@ -29,8 +31,8 @@ class Case:
 
     def horizon(self, change: Array | float = 0.0) -> Linearisation:
         """The horizon of these inputs, or of changed ones."""
-        horizon = Linearisation(_MODEL)
-        horizon.refill(AIRFRAME, self.start, self.inputs + change)
+        horizon = Linearisation(MODEL)
+        horizon.refill(self.start, self.inputs + change)
         return horizon
 
 
@@ -52,3 +54,21 @@ def safe_speed(d: float) -> float:
 def lowest_allowed(h_start: float, node: int) -> float:
     """What the decay of eq 25 leaves of h at a node."""
     return float(TUNING.robustness + BETA**node * (h_start - TUNING.robustness))
+
+
+def measured(horizon: Linearisation) -> tuple[Array, Array]:
+    """Positions (n + 1, 3 points, 3) of every node and their rates, without the product's geometry.
+
+    Base, joint 2 and end-effector by chained rotations from each node's state; the rate is the
+    difference over a moment of the motion.
+    """
+    moment = 1e-4
+
+    def places(x: Array) -> Array:
+        return np.array([x[0:3], *tips_of_prediction(x, np.array(AIRFRAME.link_length))])
+
+    states = horizon.states
+    before, after = (
+        np.array([places(moved_on(x, t)) for x in states]) for t in (-moment, moment)
+    )  # fmt: skip
+    return np.array([places(x) for x in states]), (after - before) / (2.0 * moment)

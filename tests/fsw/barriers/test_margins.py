@@ -20,7 +20,7 @@ from fsw.signals import (
     Wall,
     WorkspaceSphere,
 )
-from tests.fsw.barriers.horizons import NODES, TUNING, Case, random_case
+from tests.fsw.barriers.horizons import MODEL, TUNING, Case, random_case
 from tests.fsw.random_states import vec3
 
 STILL = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
@@ -43,7 +43,7 @@ def test_wall_report_equals_the_rows_at_the_start() -> None:
     walls = (Wall((-1.0, 0.0, 0.0), -1.0, 0.1), Wall((0.0, 0.6, 0.8), -2.0, 0.05))
     for _ in range(10):
         case = random_case(random)
-        barrier = WallBarrier(walls, TUNING, NODES)
+        barrier = WallBarrier(walls, TUNING, MODEL)
         barrier.refill(case.horizon(), case.targets)
         report = constraint_report(SafeSet(walls), TUNING, points_at_start(case.horizon()), None)
         assert report.kind is ConstraintKind.WALLS
@@ -59,8 +59,8 @@ def test_the_report_of_walls_and_points_equals_the_rows_at_the_start() -> None:
         points = points_at_start(case.horizon())
         rows: list[float] = []
         for barrier in (
-            WallBarrier(walls, TUNING, NODES),
-            PointObstacleBarrier(obstacles, TUNING, NODES),
+            WallBarrier(walls, TUNING, MODEL),
+            PointObstacleBarrier(obstacles, TUNING, MODEL),
         ):
             barrier.refill(case.horizon(), case.targets)
             rows += barrier.at_start().tolist()
@@ -91,7 +91,7 @@ def test_sphere_report_is_the_outward_row_at_the_start() -> None:
         case = random_case(random)
         case.targets.position[0] = case.start[0:3] + random.uniform(-0.2, 0.2, 3)
         horizon, target = case.horizon(), target_at_start(case)
-        barrier = WorkspaceBarrier(sphere, TUNING, NODES)
+        barrier = WorkspaceBarrier(sphere, TUNING, MODEL)
         barrier.refill(horizon, case.targets)
         report = constraint_report(SafeSet(sphere=sphere), TUNING, points_at_start(horizon), target)
         e = case.start[0:3] - case.targets.position[0] - np.array(sphere.centre_from_target)

@@ -12,6 +12,7 @@ from fsw.model.linearisation import Linearisation
 from fsw.model.prediction import INPUTS, Array
 from fsw.signals import PointObstacle, SafeSet, Wall
 from tests.fsw.barriers.horizons import (
+    MODEL,
     NODES,
     TUNING,
     Case,
@@ -37,7 +38,7 @@ def refilled(places: Array, case: Case) -> PointObstacleBarrier:
         PointObstacle(vec3(place), clearance)
         for place, clearance in zip(places, CLEARANCES, strict=True)
     )
-    barrier = PointObstacleBarrier(obstacles, TUNING, NODES)
+    barrier = PointObstacleBarrier(obstacles, TUNING, MODEL)
     barrier.refill(case.horizon(), case.targets)
     return barrier
 
@@ -97,15 +98,15 @@ def test_the_rows_ask_for_the_decay_of_h_from_where_the_vehicle_is() -> None:
                 p, v = horizon.position[0, point] - place, horizon.velocity[0, point]
                 required.append(lowest_allowed(safe_speed(n @ p - clearance) + n @ v, node))
     np.testing.assert_allclose(barrier.at_start(), start, atol=1e-12)
-    np.testing.assert_allclose(barrier.rows.required, required, atol=1e-12)
+    np.testing.assert_allclose(barrier.rows.lower_bound, required, atol=1e-12)
 
 
 def test_far_away_an_obstacle_is_the_wall_that_its_tangent_plane_is() -> None:
     """Seen from a thousand kilometres the direction is the same for every point and node."""
     case = random_case(np.random.default_rng(5))
     obstacle = PointObstacle((1e6, 2e6, -3e6), 0.2)
-    point = PointObstacleBarrier((obstacle,), TUNING, NODES)
-    wall = WallBarrier((tangent(obstacle, vec3(case.start[0:3])),), TUNING, NODES)
+    point = PointObstacleBarrier((obstacle,), TUNING, MODEL)
+    wall = WallBarrier((tangent(obstacle, vec3(case.start[0:3])),), TUNING, MODEL)
     for barrier in (point, wall):
         barrier.refill(case.horizon(), case.targets)
     np.testing.assert_allclose(point.rows.gradient, wall.rows.gradient, atol=1e-4)

@@ -12,6 +12,7 @@ from fsw.model.linearisation import BASE, Linearisation
 from fsw.model.prediction import INPUTS, Array
 from fsw.signals import WorkspaceSphere
 from tests.fsw.barriers.horizons import (
+    MODEL,
     NODES,
     TUNING,
     Case,
@@ -77,7 +78,7 @@ def test_rows_equal_h_and_its_finite_difference_along_the_prediction(rho: float)
     random = np.random.default_rng(1)
     for _ in range(2):
         case = case_at(random, rho)
-        barrier = WorkspaceBarrier(SPHERE, TUNING, NODES)
+        barrier = WorkspaceBarrier(SPHERE, TUNING, MODEL)
         barrier.refill(case.horizon(), case.targets)
         normals, rows = frozen_normals(case), barrier.rows
         np.testing.assert_allclose(rows.value, h_by_hand(case, 0.0, normals), atol=1e-12)
@@ -87,7 +88,7 @@ def test_rows_equal_h_and_its_finite_difference_along_the_prediction(rho: float)
             for node in range(2, NODES + 1)
             for n in normals[node]
         ]
-        np.testing.assert_allclose(rows.required, required, atol=1e-12)
+        np.testing.assert_allclose(rows.lower_bound, required, atol=1e-12)
         for column in range(INPUTS * NODES):
             change = np.zeros(INPUTS * NODES)
             change[column] = STEP
@@ -101,7 +102,7 @@ def test_rows_equal_h_and_its_finite_difference_along_the_prediction(rho: float)
 @pytest.mark.parametrize("rho", [0.05, RADIUS, 0.5], ids=["inside", "boundary", "outside"])
 def test_first_pair_of_rows_is_the_papers_pair(rho: float) -> None:
     case = case_at(np.random.default_rng(2), rho)
-    barrier = WorkspaceBarrier(SPHERE, TUNING, NODES)
+    barrier = WorkspaceBarrier(SPHERE, TUNING, MODEL)
     barrier.refill(case.horizon(), case.targets)
     for node in range(2, NODES + 1):
         e, w = relative(case, case.horizon(), node)
@@ -115,7 +116,7 @@ def test_first_pair_of_rows_is_the_papers_pair(rho: float) -> None:
 def test_reported_h_is_the_smaller_of_the_papers_pair_at_the_start() -> None:
     for seed in range(10):
         case = case_at(np.random.default_rng(seed), 0.05)
-        barrier = WorkspaceBarrier(SPHERE, TUNING, NODES)
+        barrier = WorkspaceBarrier(SPHERE, TUNING, MODEL)
         barrier.refill(case.horizon(), case.targets)
         e, w = relative(case, case.horizon(), 0)
         n = e / np.linalg.norm(e)
@@ -124,7 +125,7 @@ def test_reported_h_is_the_smaller_of_the_papers_pair_at_the_start() -> None:
 
 
 def test_one_slack_a_node() -> None:
-    rows = WorkspaceBarrier(SPHERE, TUNING, NODES).rows
+    rows = WorkspaceBarrier(SPHERE, TUNING, MODEL).rows
     np.testing.assert_array_equal(rows.slack, rows.node - 2)
     assert rows.slacks == NODES - 1
 

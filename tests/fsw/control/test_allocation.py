@@ -89,3 +89,18 @@ def test_sign_of_every_rotor(
 def test_hover_is_shared_equally() -> None:
     hover = allocate(AIRFRAME, (0.0, 0.0, 0.0), HOVER, YAW_LIMIT)
     assert hover == pytest.approx((HOVER / 4.0,) * 4)
+
+
+@given(st.floats(-3.0, 3.0), st.floats(-3.0, 3.0), st.floats(-1.0, 1.0), st.floats(0.0, 100.0))
+def test_yaw_takes_the_whole_of_what_roll_pitch_and_thrust_leave(
+    roll: float, pitch: float, yaw: float, thrust: float
+) -> None:
+    """However near to either limit of the rotors: the yaw that is given is the most there is."""
+    got = allocate(AIRFRAME, (roll, pitch, yaw), thrust, YAW_LIMIT)
+    without = allocate(AIRFRAME, (roll, pitch, 0.0), thrust, YAW_LIMIT)
+    spent = abs(wrench(got)[2]) / (4.0 * 0.016)
+    # Rear and front share one sign of yaw and left and right the other, so one of each pair that
+    # is highest and lowest limits it.
+    room = min(YAW_LIMIT, min(without), TOP - max(without))
+    assert spent == pytest.approx(min(abs(yaw) / (4.0 * 0.016), max(room, 0.0)), abs=1e-9)
+    assert wrench(got)[3] == pytest.approx(wrench(without)[3])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -111,17 +112,72 @@ def later(plan: PredictionState, estimate: StateEstimate, t: float) -> Vec2:
     return compensated_joints(AIRFRAME, LIMITS, moved, ahead)[0]
 
 
-def test_far_off_the_arm_stays_within_its_limits() -> None:
-    random = np.random.default_rng(1)
-    for _ in range(100):
-        plan = plan_of(random)
-        along, up = (float(x) for x in random.uniform(-1.0, 1.0, 2))
-        q_arm, rates = compensated_joints(
-            AIRFRAME, LIMITS, pushed_within_the_arms_plane(plan, along, up, 0.0), plan
-        )
-        assert abs(q_arm[0]) <= AIRFRAME.joint1_limit
-        assert abs(q_arm[0] + q_arm[1]) <= AIRFRAME.joint12_limit
-        assert all(map(math.isfinite, rates))
+def bent_plan(q_arm: Vec2) -> PredictionState:
+    return plan_of(np.random.default_rng(3))._replace(q_arm=q_arm)
+
+
+# Near to a limit of the first joint, near to one of the second link, and the same mirrored. The
+# base leans by what the limits cannot make up for, at a place where compensation is whole.
+NEAR_A_LIMIT = [
+    ((1.0, -0.8), -0.3, 0), ((-1.0, 0.8), 0.3, 0), ((0.3, 1.2), -0.3, 1), ((-0.3, -1.2), 0.3, 1),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("q_arm", "lean", "which"), NEAR_A_LIMIT)
+def test_an_arm_that_would_have_to_pass_a_limit_stops_just_before_it(
+    q_arm: Vec2, lean: float, which: int
+) -> None:
+    plan = bent_plan(q_arm)
+    estimate = pushed_within_the_arms_plane(plan, 0.0, 0.0, lean)
+    boundless = replace(AIRFRAME, joint1_limit=3.0, joint12_limit=3.0)
+    free, _ = compensated_joints(boundless, LIMITS, estimate, plan)
+    kept, rates = compensated_joints(AIRFRAME, LIMITS, estimate, plan)
+    limit = (AIRFRAME.joint1_limit, AIRFRAME.joint12_limit)[which]
+    links_free, links = (free[0], sum(free)), (kept[0], sum(kept))
+    assert abs(links_free[which]) > limit, "the free arm passes the limit"
+    assert abs(links[which]) == pytest.approx(limit - LIMITS.joint_margin)
+    assert links[which] * links_free[which] > 0.0
+    assert links[1 - which] == pytest.approx(links_free[1 - which]), "the other link is free"
+    assert all(map(math.isfinite, rates))
+
+
+@pytest.mark.parametrize("away", [0.06, -0.06])
+def test_the_arm_neither_stretches_nor_folds_wholly(away: float) -> None:
+    """With the end-effector out of reach, or too near, the arm still points at it."""
+    reach = LIMITS.reach * LENGTHS.sum() if away > 0.0 else LIMITS.fold * LENGTHS.sum()
+    # At equal links the distance of the end-effector is 2 l cos(th2 / 2).
+    bend = 2.0 * math.acos((reach - 0.4 * away) / LENGTHS.sum())
+    plan = bent_plan((-0.5 * bend, bend))._replace(a=(0.0, 0.0, 0.0), yaw=0.0)
+    boundless = replace(AIRFRAME, joint1_limit=3.0, joint12_limit=3.0)
+    estimate = pushed_within_the_arms_plane(plan, 0.0, -away, 0.0)
+    q_arm, _ = compensated_joints(boundless, LIMITS, estimate, plan)
+    seen = reached(estimate, q_arm) - np.array(estimate.p_WB)
+    assert np.linalg.norm(seen) == pytest.approx(reach)
+    np.testing.assert_allclose(seen[:2], 0.0, atol=1e-9)
+    assert seen[2] > 0.0
+    assert 0.0 < LIMITS.fold * LENGTHS.sum() < LIMITS.reach * LENGTHS.sum() < LENGTHS.sum()
+
+
+@pytest.mark.parametrize("straight", [0.0, 0.02])
+def test_an_arm_that_is_nearly_straight_is_not_asked_for_a_rate(straight: float) -> None:
+    """It could not move along itself: the rates that would be needed have no bound."""
+    long_reach = replace(LIMITS, reach=1.0)
+    plan = bent_plan((0.2, straight))._replace(v=(3.0, 0.0, 2.0))
+    estimate = pushed_within_the_arms_plane(plan, 0.0, 0.0, 0.0)._replace(v_WB=(0.0, 0.0, 0.0))
+    assert compensated_joints(AIRFRAME, long_reach, estimate, plan)[1] == (0.0, 0.0)
+
+
+@pytest.mark.parametrize("metres", [0.0, 0.069])
+def test_up_to_the_limit_the_end_effector_is_held_wholly_across_links_of_unlike_length(
+    metres: float,
+) -> None:
+    unlike = replace(AIRFRAME, link_length=(0.18, 0.13), joint1_limit=3.0, joint12_limit=3.0)
+    plan = bent_plan((-0.6, 1.4))
+    estimate = pushed_within_the_arms_plane(plan, 0.0, metres, 0.0)
+    q_arm, _ = compensated_joints(unlike, LIMITS, estimate, plan)
+    R_WB = Rotation.from_matrix(np.reshape(estimate.R_WB, (3, 3)))
+    tip = tips(np.array(estimate.p_WB), R_WB, np.array(q_arm), np.array(unlike.link_length))[1]
+    np.testing.assert_allclose(tip, planned_end_effector(unlike, plan)[0], atol=1e-9)
 
 
 @pytest.mark.parametrize("bend", [-0.1, 0.0, 0.1])
@@ -155,3 +211,18 @@ def test_far_off_the_plan_the_arm_goes_back_to_its_planned_pose_without_a_jump()
             assert q_arm == pytest.approx(plan.q_arm)
             assert rates == pytest.approx((0.0, 0.0), abs=1e-12)
     assert np.abs(np.diff(np.array(angles), axis=0)).max() < 0.02
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_rates_feel_every_turn_of_a_base_that_is_pushed_sideways(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    plan = plan_of(random)._replace(j=(0.0, 0.0), yaw_rate=0.0)
+    pushed = pushed_within_the_arms_plane(plan, 0.01, -0.01, 0.02)
+    R_WB = Rotation.from_matrix(np.reshape(pushed.R_WB, (3, 3)))
+    aside = vec3(np.array(pushed.p_WB) + R_WB.apply([0.0, 0.04, 0.0]))
+    estimate = pushed._replace(p_WB=aside, w_WB_B=(0.6, 0.2, -0.9))
+    _, rates = compensated_joints(AIRFRAME, LIMITS, estimate, plan)
+    moment = 1e-5
+    angles = [later(plan, estimate, t) for t in (-moment, moment)]
+    expected = (np.array(angles[1]) - np.array(angles[0])) / (2.0 * moment)
+    np.testing.assert_allclose(rates, expected, atol=1e-5)

@@ -97,3 +97,16 @@ def test_rotations_agree_with_scipy(q: tuple[float, float, float, float]) -> Non
         roll, pitch, yaw = euler_zyx(R)
         rebuilt = Rotation.from_euler("ZYX", [yaw, pitch, roll])
         assert (rebuilt * reference.inv()).magnitude() < 1e-7
+
+
+def test_each_axis_has_its_own_error_and_its_own_integral() -> None:
+    """At rest and within the limit the output is kp times error plus ki times integral."""
+    integral: Vec3 = (0.1, -0.2, 0.3)
+    roll, pitch, yaw = 0.11, -0.07, 0.4
+    at = estimate_of(Rotation.from_euler("ZYX", [yaw, pitch, roll]))
+    for errors in ((0.0, 0.0, 0.0), (0.02, 0.0, 0.0), (0.0, 0.03, 0.0), (0.0, 0.0, -0.05)):
+        reference = (roll + errors[0], pitch + errors[1], yaw + errors[2])
+        got, kept = attitude_pid(GAINS, integral, at, reference, 0.002)
+        grown = np.array(integral) + 0.002 * np.array(errors)
+        np.testing.assert_allclose(kept, grown, atol=1e-12)
+        np.testing.assert_allclose(got, 50.0 * np.array(errors) + 8.0 * grown, atol=1e-9)

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from fsw.control.attitude import attitude_pid, attitude_reference
-from fsw.control.cascade import Cascade, Inner, in_hover
-from fsw.control.inner_tuning import InnerTuning
+from fsw.control.cascade import Cascade, Inner, at_rest, in_hover
+from fsw.control.gains import InnerTuning
+from fsw.control.pid import PidGains
+from fsw.control.tracking import Observed, observe
 from fsw.model.airframe import AIRFRAME
-from fsw.model.prediction import Array, LagModel
+from fsw.model.prediction import Array
+from fsw.model.rotors import motion_state
 from fsw.signals import ActuatorCommand, PlanInput, PredictionState, StateEstimate, Vec2, Vec3
 from tests.fsw.random_states import estimate_of
 
@@ -39,7 +43,7 @@ def one_step(
     u: PlanInput = NO_INPUT,
     inner: Inner = "tracking",
 ) -> ActuatorCommand:
-    cascade = Cascade(AIRFRAME, LagModel(), TUNING, inner, DT)
+    cascade = Cascade(AIRFRAME, TUNING, inner, DT)
     return cascade.step(in_hover(AIRFRAME, estimate), estimate, plan, u)[0]
 
 
@@ -112,10 +116,104 @@ def test_a_commanded_acceleration_tilts_the_thrust_its_way(inner: Inner) -> None
 
 def test_the_rotor_model_lags_behind_what_was_sent() -> None:
     estimate = turned(0.0)
-    cascade = Cascade(AIRFRAME, LagModel(), TUNING, "tracking", DT)
+    cascade = Cascade(AIRFRAME, TUNING, "tracking", DT)
     memory = in_hover(AIRFRAME, estimate)
     sent = ActuatorCommand((10.0, 10.0, 10.0, 10.0), (0.0, 0.0))
     _, after = cascade.step(memory._replace(commanded=sent), estimate, plan_at(), NO_INPUT)
     share = 1.0 - math.exp(-DT / AIRFRAME.rotor_lag)
     hover = 3.5 * 9.81 / 4.0
     assert after.rotors == pytest.approx((hover + share * (10.0 - hover),) * 4)
+
+
+def test_what_the_gate_sent_is_what_the_rotors_follow_next() -> None:
+    memory = in_hover(AIRFRAME, turned(0.0))
+    other = ActuatorCommand((1.0, 2.0, 3.0, 4.0), (0.1, 0.2))
+    assert memory.after_sending(memory.commanded) is memory
+    assert memory.after_sending(other) == memory._replace(commanded=other)
+
+
+def test_a_vehicle_taken_over_carries_its_weight_and_one_at_rest_nothing() -> None:
+    moving = turned(0.3)._replace(v_WB=(0.1, -0.2, 0.3))
+    hovering, standing = in_hover(AIRFRAME, moving), at_rest(AIRFRAME, moving)
+    assert sum(hovering.rotors) == pytest.approx(AIRFRAME.mass * 9.81)
+    assert len(set(hovering.rotors)) == 1
+    assert hovering.commanded == ActuatorCommand(hovering.rotors, (0.0, 0.0))
+    assert standing.rotors == standing.commanded.rotor_thrust == (0.0,) * 4
+    for memory in (hovering, standing):
+        assert memory.mass == AIRFRAME.mass
+        assert memory.observed == Observed(moving.v_WB, STILL)
+        assert (memory.attitude, memory.height, memory.joints) == (STILL, 0.0, (0.0, 0.0))
+
+
+@pytest.mark.parametrize("ticks", [1, 2, 5])
+def test_missed_ticks_are_made_up_for_by_rotor_model_and_observer(ticks: int) -> None:
+    """As if the vehicle had been seen in each of them, with the rotors where they are now."""
+    estimate = turned(0.0)._replace(v_WB=(0.05, -0.04, 0.03))
+    cascade = Cascade(AIRFRAME, TUNING, "tracking", DT)
+    sent = ActuatorCommand((10.0, 10.0, 10.0, 10.0), (0.0, 0.0))
+    memory = in_hover(AIRFRAME, turned(0.0))._replace(commanded=sent)
+    _, after = cascade.step(memory, estimate, plan_at(), NO_INPUT, ticks)
+    hover = 3.5 * 9.81 / 4.0
+    left = math.exp(-ticks * DT / AIRFRAME.rotor_lag)
+    assert after.rotors == pytest.approx((10.0 + left * (hover - 10.0),) * 4)
+    expected, lift = memory.observed, 9.81 - sum(after.rotors) / after.mass
+    for _ in range(ticks):
+        expected = observe(expected, estimate.v_WB, (0.0, 0.0, lift), TUNING.tracking, DT)
+    np.testing.assert_allclose(after.observed.v, expected.v, atol=1e-12)
+    np.testing.assert_allclose(after.observed.d, expected.d, atol=1e-12)
+    np.testing.assert_allclose(after.observed.disturbance_bias, expected.lasting, atol=1e-12)
+
+
+def test_the_servos_hold_the_arm_in_the_field_that_the_thrust_makes() -> None:
+    q_arm = (0.5, -0.9)
+    (m1, m2), (c1, c2), l1 = AIRFRAME.link_mass, AIRFRAME.link_com, AIRFRAME.link_length[0]
+    estimate = estimate_of(Rotation.identity(), q_arm=q_arm)
+    cascade = Cascade(AIRFRAME, TUNING, "pid", DT)
+    # One that weighs more than it does needs a stronger field of thrust to stand in.
+    for thrust, field in ((3.5 * 9.81, 9.81), (1.2 * 3.5 * 9.81, 1.2 * 9.81)):
+        each = (0.25 * thrust,) * 4
+        memory = in_hover(AIRFRAME, estimate)._replace(
+            rotors=each, commanded=ActuatorCommand(each, (0.0, 0.0))
+        )
+        # The accelerometer agrees that the mass is what it was.
+        seen = estimate._replace(specific_force=thrust / 3.5)
+        command, _ = cascade.step(memory, seen, plan_at(q_arm=q_arm), NO_INPUT)
+        lower = field * m2 * c2 * math.sin(sum(q_arm))
+        upper = field * (m1 * c1 + m2 * l1) * math.sin(q_arm[0])
+        np.testing.assert_allclose(command.joint_torque, (upper + lower, lower), rtol=1e-3)
+
+
+def test_the_motion_is_that_of_the_rotors_one_tick_on_and_of_the_first_joints_torque() -> None:
+    estimate = estimate_of(Rotation.from_euler("ZYX", [0.4, 0.1, -0.2]), (0.1, -0.2, 0.3))
+    cascade = Cascade(AIRFRAME, TUNING, "tracking", DT)
+    memory = in_hover(AIRFRAME, estimate)._replace(mass=3.6)
+    sent = ActuatorCommand((8.0, 9.0, 10.0, 11.0), (0.3, -0.7))
+    got = cascade.motion(memory._replace(commanded=sent), estimate)
+    left = math.exp(-DT / AIRFRAME.rotor_lag)
+    f = [
+        target + left * (now - target)
+        for now, target in zip(memory.rotors, sent.rotor_thrust, strict=True)
+    ]
+    assert got == motion_state(AIRFRAME, 3.6, estimate, (f[0], f[1], f[2], f[3]), 0.3)
+
+
+def test_a_large_heading_error_is_turned_away_at_a_limited_rate_either_way() -> None:
+    for sign in (-1.0, 1.0):
+        inside = torque_of(one_step(turned(0.0), plan_at(sign * 0.05)))[2]
+        assert inside == pytest.approx(sign * 0.6 * TUNING.yaw.kp * 0.05)
+        most = torque_of(one_step(turned(0.0), plan_at(sign * 3.0)))[2]
+        yaw_limit = 4.0 * AIRFRAME.yaw_per_thrust * TUNING.yaw_thrust_limit
+        assert most == pytest.approx(sign * min(0.6 * TUNING.yaw.limit, yaw_limit))
+
+
+def test_spinning_about_two_axes_the_third_torque_is_eulers() -> None:
+    """With an unlike inertia about every axis; small enough for the rotors' drag."""
+    unlike = replace(AIRFRAME, inertia=(0.25, 0.32, 0.6))
+    w: Vec3 = (0.5, -0.4, 0.3)
+    estimate = estimate_of(Rotation.identity(), w)
+    free = replace(TUNING, attitude=PidGains(0.0, 0.0, 0.0, 1.0))
+    cascade = Cascade(unlike, free, "pid", DT)
+    command, _ = cascade.step(in_hover(unlike, estimate), estimate, plan_at(), NO_INPUT)
+    inertia, spin = np.array(unlike.inertia), np.array(w)
+    expected = np.cross(spin, inertia * spin) + [0.0, command.joint_torque[0], 0.0]
+    np.testing.assert_allclose(torque_of(command), expected, atol=1e-9)

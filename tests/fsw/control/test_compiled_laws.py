@@ -11,12 +11,11 @@ import numpy as np
 import pytest
 
 from fsw.control.cascade import Cascade, CascadeMemory, Inner, close_loops
-from fsw.control.inner_tuning import InnerTuning
+from fsw.control.gains import InnerTuning
 from fsw.control.tracking import Observed
 from fsw.estimation.estimator import attitude, estimate_state
-from fsw.model.airframe import AIRFRAME
+from fsw.model.airframe import AIRFRAME, AttitudeLag
 from fsw.model.nominal import NominalModel, advance
-from fsw.model.prediction import LagModel
 from fsw.signals import ActuatorCommand, PlanInput, SensorFrame, Vec4
 from tests.fsw.random_states import as_state, prediction_vector, random_estimate, vec3
 
@@ -65,7 +64,7 @@ def test_the_loops_do_as_machine_code_what_they_say_in_python(
     inner: Inner, tuning: InnerTuning, ticks: int
 ) -> None:
     random = np.random.default_rng(7)
-    cascade = Cascade(AIRFRAME, LagModel(), tuning, inner, 0.002)
+    cascade = Cascade(AIRFRAME, tuning, inner, 0.002)
     for _ in range(STATES):
         case = (
             memory(random),
@@ -80,16 +79,16 @@ def test_the_loops_do_as_machine_code_what_they_say_in_python(
 
 def test_a_number_that_is_none_comes_out_as_none_and_is_left_to_the_gate() -> None:
     random = np.random.default_rng(8)
-    cascade = Cascade(AIRFRAME, LagModel(), InnerTuning(), "tracking", 0.002)
+    cascade = Cascade(AIRFRAME, InnerTuning(), "tracking", 0.002)
     plan = as_state(prediction_vector(random))._replace(q_arm=(math.nan, 0.0))
     wanted, _ = cascade.step(memory(random), random_estimate(random), plan, plan_input(random))
     assert not math.isfinite(sum(wanted.joint_torque))
 
 
-@pytest.mark.parametrize("lag", [LagModel(), LagModel(at_once=True)])
-def test_the_plans_state_moves_on_as_in_python(lag: LagModel) -> None:
+@pytest.mark.parametrize("lag", [AttitudeLag(), AttitudeLag(at_once=True)])
+def test_the_plans_state_moves_on_as_in_python(lag: AttitudeLag) -> None:
     random = np.random.default_rng(9)
-    nominal = NominalModel(lag, 0.002)
+    nominal = NominalModel(replace(AIRFRAME, attitude_lag=lag), 0.002)
     for ticks in range(20):
         x, u = as_state(prediction_vector(random)), plan_input(random)
         plain = list(numbers(advance(nominal.model, x, u, ticks)))

@@ -7,8 +7,8 @@ import math
 import pytest
 from scipy.spatial.transform import Rotation
 
+from fsw.control.gains import InnerTuning
 from fsw.control.height import height_pid
-from fsw.control.inner_tuning import InnerTuning
 from fsw.model.airframe import AIRFRAME, GRAVITY
 from fsw.signals import PlanInput, PredictionState, StateEstimate
 from tests.fsw.random_states import estimate_of
@@ -61,3 +61,23 @@ def test_tilted_the_vertical_part_still_carries_the_weight() -> None:
 
 def test_a_sideways_vehicle_asks_for_a_finite_thrust() -> None:
     assert thrust(estimate_of(Rotation.from_euler("X", 1.6))) <= 2.0 * WEIGHT + 1e-9
+
+
+def test_only_the_vertical_parts_of_plan_and_vehicle_count() -> None:
+    sideways = estimate_of(LEVEL, p_WB=(3.0, -4.0, -1.0), v_WB=(1.0, -2.0, 0.0))
+    u = PlanInput((1.5, -2.5, 0.0), 0.0, (0.0, 0.0))
+    plan = PLAN._replace(p=(7.0, 8.0, -1.0), v=(0.7, -0.6, 0.0))
+    assert height_pid(AIRFRAME, GAINS, 0.0, sideways, plan, u, 0.002)[0] == pytest.approx(WEIGHT)
+
+
+def test_a_plan_that_sinks_as_fast_as_the_vehicle_is_followed() -> None:
+    sinking = estimate_of(LEVEL, v_WB=(0.0, 0.0, 0.4))
+    u = PlanInput((0.0, 0.0, 0.0), 0.0, (0.0, 0.0))
+    plan = PLAN._replace(v=(0.3, 0.2, 0.4))
+    assert height_pid(AIRFRAME, GAINS, 0.0, sinking, plan, u, 0.002)[0] == pytest.approx(WEIGHT)
+
+
+@pytest.mark.parametrize("tilt", [60.1, 75.0, 90.0, 120.0, 180.0])
+def test_beyond_sixty_degrees_thrust_is_doubled_and_not_more(tilt: float) -> None:
+    leaning = estimate_of(Rotation.from_euler("X", math.radians(tilt)))
+    assert thrust(leaning) == pytest.approx(2.0 * WEIGHT)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,9 +11,9 @@ import pinocchio as pin
 import pytest
 from scipy.spatial.transform import Rotation
 
-from fsw.control.inner_tuning import InnerTuning
+from fsw.control.gains import InnerTuning
 from fsw.control.joints import arm_inverse_dynamics, joint_torques
-from fsw.model.airframe import AIRFRAME
+from fsw.model.airframe import AIRFRAME, Airframe
 from fsw.signals import Vec2
 from tests.fsw.random_states import estimate_of
 
@@ -20,7 +21,7 @@ GAINS = InnerTuning().joint
 FIELD = 9.81
 
 
-def planar_arm() -> Any:
+def planar_arm(airframe: Airframe = AIRFRAME) -> Any:
     """Two links that turn about +y and hang along +z, in a field along +z."""
     model = pin.Model()
     model.gravity.linear = np.array([0.0, 0.0, FIELD])
@@ -28,12 +29,12 @@ def planar_arm() -> Any:
     for link in range(2):
         parent = model.addJoint(parent, pin.JointModelRY(), place, f"joint{link}")
         inertia = pin.Inertia(
-            AIRFRAME.link_mass[link],
-            np.array([0.0, 0.0, AIRFRAME.link_com[link]]),
-            np.diag([1e-5, AIRFRAME.link_inertia[link], 1e-5]),
+            airframe.link_mass[link],
+            np.array([0.0, 0.0, airframe.link_com[link]]),
+            np.diag([1e-5, airframe.link_inertia[link], 1e-5]),
         )
         model.appendBodyToJoint(parent, inertia, pin.SE3.Identity())
-        place = pin.SE3(np.eye(3), np.array([0.0, 0.0, AIRFRAME.link_length[link]]))
+        place = pin.SE3(np.eye(3), np.array([0.0, 0.0, airframe.link_length[link]]))
     return model
 
 
@@ -105,3 +106,45 @@ def test_in_closed_loop_the_arm_settles_on_its_reference() -> None:
         qd = qd + dt * np.array(pin.aba(model, data, q, qd, np.array(torque) - 0.02 * qd))
         q = q + dt * qd
     assert math.dist(q, (-0.5, 1.0)) < 2e-3
+
+
+def test_the_errors_of_both_joints_obey_their_own_pid_whatever_the_arm_does() -> None:
+    """Computed torque, seen through Pinocchio's forward dynamics of an arm of two unlike links."""
+    unlike = replace(AIRFRAME, link_mass=(0.3, 0.15), link_com=(0.06, 0.09), joint_torque_max=1e3)
+    model, random = planar_arm(unlike), np.random.default_rng(7)
+    data, far = model.createData(), replace(GAINS, limit=1e9)
+    for _ in range(50):
+        q, error = random.uniform(-1.0, 1.0, (2, 2)) * [[1.0], [0.02]]
+        qd, error_rate, integral, qdd = random.uniform(-1.0, 1.0, (4, 2)) * 0.5
+        pitch_rate, pitch_acceleration = (float(x) for x in random.uniform(-2.0, 2.0, 2))
+        estimate = estimate_of(
+            Rotation.identity(), (0.0, pitch_rate, 0.0), q_arm=pair(q), qd_arm=pair(qd)
+        )
+        torque, kept = joint_torques(
+            unlike,
+            far,
+            pair(integral),
+            estimate,
+            (pair(q + error), pair(qd + error_rate), pair(qdd)),
+            FIELD,
+            pitch_acceleration,
+            0.002,
+        )
+        inertial = qd + [pitch_rate, 0.0]
+        got = pin.aba(model, data, q, inertial, np.array(torque)) - [pitch_acceleration, 0.0]
+        np.testing.assert_allclose(kept, integral + 0.002 * error, atol=1e-12)
+        pid = GAINS.kp * error + GAINS.ki * np.array(kept) + GAINS.kd * error_rate
+        np.testing.assert_allclose(got, qdd + pid, atol=1e-6)
+
+
+def pair(values: Any) -> Vec2:
+    return float(values[0]), float(values[1])
+
+
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_a_torque_beyond_the_servos_limit_becomes_the_limit(sign: float) -> None:
+    weak = replace(AIRFRAME, joint_torque_max=0.1)
+    still = estimate_of(Rotation.identity())
+    reference = ((3.0 * sign, 3.0 * sign), (0.0, 0.0), (0.0, 0.0))
+    limited, _ = joint_torques(weak, GAINS, (0.0, 0.0), still, reference, 0.0, 0.0, 0.002)
+    assert limited == (0.1 * sign, 0.1 * sign)

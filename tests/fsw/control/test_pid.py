@@ -56,3 +56,15 @@ def test_a_long_saturation_is_not_paid_back_by_an_overshoot() -> None:
 @given(st.floats(-1e6, 1e6), st.floats(-1e6, 1e6), st.floats(-1e6, 1e6))
 def test_output_never_leaves_its_limit(integral: float, error: float, rate: float) -> None:
     assert abs(pid_step(GAINS, integral, error, rate, DT)[0]) <= GAINS.limit
+
+
+@pytest.mark.parametrize("error", [1e-3, -1e-3, 0.3, -0.3])
+@pytest.mark.parametrize("rate", [10.0, -10.0])
+def test_while_saturated_only_an_error_that_pulls_back_is_integrated(
+    error: float, rate: float
+) -> None:
+    """The rate alone saturates the output; however small the error, its sign decides."""
+    output, integral = pid_step(GAINS, 0.25, error, rate, DT)
+    assert output == (GAINS.limit if rate > 0.0 else -GAINS.limit)
+    pulls_back = error * rate < 0.0
+    assert integral == (pytest.approx(0.25 + error * DT) if pulls_back else 0.25)

@@ -6,16 +6,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import fftconvolve
 
-from fsw.control.inner_tuning import TrackingGains, TrackingTuning, tracking_gains
-from fsw.control.tracking import Observed, TrackingLaw, observe, snap_command
+from fsw.control.allocation import allocate
+from fsw.control.gains import TrackingGains, TrackingTuning, tracking_gains
+from fsw.control.tracking import AxisState, Observed, TrackingLaw, observe, snap_command
 from fsw.control.tube import Tube, peak_snap_share, tube
-from fsw.model.airframe import AIRFRAME
-from fsw.model.prediction import LagModel
+from fsw.model.airframe import AIRFRAME, GRAVITY
+from fsw.model.prediction import Array
 
 DT = 0.002
 # Without limits, so that the loop under test is the linear one the bound is about.
 TUNING = replace(TrackingTuning(), position_error_limit=1e9, acceleration_limit=1e9, jerk_limit=1e9)
+REST = AxisState(0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 def _gains() -> TrackingGains:
@@ -28,7 +31,7 @@ def _tube() -> Tube:
 
 def _position_under(disturbance: np.ndarray, tuning: TrackingTuning = TUNING) -> np.ndarray:
     """One axis of the loop as it is flown, its law called tick by tick."""
-    law = TrackingLaw(AIRFRAME, LagModel(), tuning, _gains())
+    law = TrackingLaw(AIRFRAME.attitude_lag, tuning, _gains())
     decay = np.exp(-DT / AIRFRAME.rotor_lag)
     p = v = a = j = s = 0.0
     believed = Observed((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
@@ -36,8 +39,8 @@ def _position_under(disturbance: np.ndarray, tuning: TrackingTuning = TUNING) ->
     for d in disturbance:
         believed = observe(believed, (v, 0.0, 0.0), (a, 0.0, 0.0), tuning, DT)
         # Far from the jerk limit that the square root sets, snap_command is linear.
-        d_hat, lasting = believed.d[0], believed.lasting[0]
-        w = snap_command(law, -p, -believed.v[0], -s, d_hat, lasting, a, j, 0.0, 0.0, 0.0)
+        d_hat, lasting = believed.d[0], believed.disturbance_bias[0]
+        w = snap_command(law, AxisState(p, believed.v[0], a, j, s), d_hat, lasting, REST, 0.0)
         s = w + (s - w) * decay
         p, v, a, j = p + DT * v, v + DT * (a + d), a + DT * j, j + DT * s
         positions.append(p)
@@ -74,7 +77,76 @@ def test_a_push_that_turns_once_it_is_taken_for_wind_needs_the_wider_tube() -> N
 
 @pytest.mark.parametrize("cheaper", [0.5, 0.2])
 def test_a_cheaper_effort_narrows_the_tube_and_needs_more_snap(cheaper: float) -> None:
-    bold = replace(TUNING, effort=TUNING.effort * cheaper)
+    bold = replace(TUNING, input_weight=TUNING.input_weight * cheaper)
     reach = tube(AIRFRAME, bold, tracking_gains(bold, AIRFRAME.rotor_lag, DT), 0.225, 0.1, DT)
     assert reach.base < _tube().base
     assert peak_snap_share(AIRFRAME, reach, 0.8) > peak_snap_share(AIRFRAME, _tube(), 0.8)
+
+
+HANGING = 0.3
+QUICK = replace(TUNING, observer_bandwidth=60.0, wind_limit=0.2)
+
+
+def _pushed_once(wind: bool) -> tuple[Array, Array, Array]:
+    """Position, acceleration and commanded snap after one tick's push, the law called tick by tick.
+
+    The push is a disturbance of 1 m/s^2, or a memory of wind of 1 m/s^2 without a wind.
+    """
+    gains = tracking_gains(QUICK, AIRFRAME.rotor_lag, DT)
+    law = TrackingLaw(AIRFRAME.attitude_lag, QUICK, gains)
+    # Finer than the ticks: the tube is that of the continuous loop.
+    fine = DT / 8.0
+    decay = np.exp(-fine / AIRFRAME.rotor_lag)
+    p = v = a = j = s = 0.0
+    believed = Observed((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    history = []
+    for k in range(round(6.0 / fine)):
+        now = 1.0 if k < 8 else 0.0
+        # Without its slow memory, which the tube counts apart.
+        believed = observe(believed, (v, 0.0, 0.0), (a, 0.0, 0.0), QUICK, fine)
+        d = believed.d[0]
+        w = snap_command(law, -p, -believed.v[0], -s, d, now * wind, a, j, 0.0, 0.0, 0.0)
+        s = w + (s - w) * decay
+        p, v, a, j = p + fine * v, v + fine * (a + now * (not wind)), a + fine * j, j + fine * s
+        if k % 8 == 7:
+            history.append((p, a, w))
+    found = np.array(history)
+    return found[:, 0], found[:, 1], found[:, 2]
+
+
+def test_every_figure_of_the_tube_is_that_of_the_loop_that_is_flown() -> None:
+    """The worst disturbance pushes with the response's sign; a random one is drawn and averaged."""
+    gains = tracking_gains(QUICK, AIRFRAME.rotor_lag, DT)
+    got = tube(AIRFRAME, QUICK, gains, hanging=HANGING, hold_s=0.1, dt=DT)
+    base, acceleration, snap = _pushed_once(wind=False)
+    tip = base - HANGING / GRAVITY * acceleration
+    wind_base, wind_acceleration, _ = _pushed_once(wind=True)
+    wind_tip = wind_base - HANGING / GRAVITY * wind_acceleration
+    close = {"rel": 0.03}
+    assert got.base == pytest.approx(np.abs(base).sum(), **close)
+    assert got.end_effector == pytest.approx(np.abs(tip).sum(), **close)
+    limit = QUICK.wind_limit
+    assert got.base_wind == pytest.approx(limit * np.abs(wind_base).sum(), **close)
+    assert got.end_effector_wind == pytest.approx(limit * np.abs(wind_tip).sum(), **close)
+    pushes = np.repeat(np.random.default_rng(2).uniform(-1.0, 1.0, 8000), round(0.1 / DT))
+    for figure, response in (
+        (got.base_expected, base),
+        (got.end_effector_expected, tip),
+        (got.snap_expected, snap),
+    ):
+        drawn = fftconvolve(pushes, response)[len(response) : len(pushes)]
+        assert figure == pytest.approx(3.7 * drawn.std(), rel=0.05)
+
+
+def test_the_share_of_snap_is_that_of_the_torque_the_mixer_can_give_in_hover() -> None:
+    unlike = replace(AIRFRAME, inertia=(0.25, 0.35, 0.9), rotor_thrust_max=15.0)
+    per_unit, weight = _tube(), unlike.mass * GRAVITY
+    f = allocate(unlike, (100.0, 0.0, 0.0), weight, 0.0)
+    torque = unlike.rotor_arm * (f[1] - f[3])
+    # While the lift stays the weight.
+    headroom = min(weight / 4.0, 15.0 - weight / 4.0)
+    torque = min(torque, 2.0 * headroom * unlike.rotor_arm)
+    most = GRAVITY * torque / 0.35
+    for disturbance in (0.2, 0.8):
+        share = peak_snap_share(unlike, per_unit, disturbance)
+        assert share * most == pytest.approx(per_unit.snap_expected * disturbance)

@@ -78,3 +78,25 @@ def test_both_signs_of_a_quaternion_are_one_attitude() -> None:
     assert one is not None
     assert two is not None
     np.testing.assert_allclose(one.R_WB, two.R_WB)
+
+
+def test_the_specific_force_is_the_push_against_the_bodys_third_axis() -> None:
+    estimate = estimate_state(replace(GOOD, accel_B=(1.0, 2.0, -11.5)))
+    assert estimate is not None
+    assert estimate.specific_force == 11.5
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+def test_the_one_accelerometer_axis_that_is_used_must_be_a_number(value: float) -> None:
+    assert estimate_state(replace(GOOD, accel_B=(0.0, 0.0, value))) is None
+
+
+@pytest.mark.parametrize(
+    ("norm2", "usable"), [(0.5, False), (0.51, True), (1.0, True), (1.99, True), (2.0, False)]
+)
+def test_the_square_of_the_quaternions_length_lies_between_a_half_and_two(
+    norm2: float, usable: bool
+) -> None:
+    # Two equal components: a half and two come out exactly.
+    part = 0.5 if norm2 == 0.5 else 1.0 if norm2 == 2.0 else math.sqrt(0.5 * norm2)
+    assert (estimate_state(replace(GOOD, q_WB=(part, part, 0.0, 0.0))) is not None) is usable

@@ -5,13 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from fsw.link.wire.telemetry_context import (
-    GroupTiming,
-    LoopHealth,
-    PlanIds,
-    TelemetryContext,
-    VehicleFacts,
-)
+from fsw.link.wire.telemetry_context import PlanIds, TelemetryContext
+from fsw.ports import GroupTiming, LoopHealth, VehicleFacts
 from fsw.signals import (
     ActuatorCommand,
     BatteryState,

@@ -10,6 +10,7 @@ from pathlib import Path
 import fastcrc
 import pytest
 
+from docs.pages.messages import heard
 from fsw.link.files.flight_logs import FlightLogs
 from fsw.link.files.ftp_service import FtpService
 from fsw.link.files.log_service import LogService
@@ -24,7 +25,6 @@ from fsw.parameters.store import ParameterStore
 from fsw.signals import SafeSet, Vec3
 from messages import dialect
 from messages.frames import as_version_1
-from pandion.message_page import heard
 from tests.fsw.link.ground import Ground, ground_station
 
 # Bytes that make NaN, infinities, extremes and our own address more likely than chance would.

@@ -275,7 +275,7 @@ class Echo:
         self.left = 0
         self.broken = False
 
-    def receive(self, frame: Frame, t_us: int) -> list[Outgoing]:
+    def handle(self, frame: Frame, t_us: int) -> list[Outgoing]:
         if self.broken:
             raise RuntimeError("a mistake in a service")
         self.left = 2

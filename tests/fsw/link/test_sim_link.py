@@ -74,7 +74,7 @@ def wire() -> Iterator[Wire]:
 def test_every_sensor_arrives_where_it_belongs(wire: Wire) -> None:
     sent = readings(1_002_000)
     wire.send(StepEncoder(lockstep=True).datagram(sent, ()))
-    got = wire.link.receive()
+    got = wire.link.wait_for_step()
     assert got is not None
     assert got.t_us == 1_002_000
     for name, other in (
@@ -96,7 +96,7 @@ def test_walls_and_points_arrive_as_the_pilot_announces_them(wire: Wire) -> None
     plan = flight_plan(scenario, lambda t_us: clock.target_at(0.0), lambda t_us: 0.0)
     encoder = StepEncoder(lockstep=True)
     wire.send(encoder.datagram(readings(1_002_000), plan.announcements))
-    assert wire.link.receive() is not None
+    assert wire.link.wait_for_step() is not None
     safe_set = wire.inbox.take_safe_set()
     assert safe_set is not None
     assert [wall.offset for wall in safe_set.walls] == [-1.0]
@@ -108,11 +108,11 @@ def test_walls_and_points_arrive_as_the_pilot_announces_them(wire: Wire) -> None
 def test_a_repeated_step_gets_the_same_answer_and_no_tick(wire: Wire) -> None:
     step = StepEncoder(lockstep=True).datagram(readings(1_002_000), ())
     wire.send(step)
-    assert wire.link.receive() is not None
-    wire.link.answer(1_002_000, outputs_at(1_002_000))
+    assert wire.link.wait_for_step() is not None
+    wire.link.send_actuators(1_002_000, outputs_at(1_002_000))
     answer = wire.hear()
     wire.send(step)
-    assert wire.link.receive() is None
+    assert wire.link.wait_for_step() is None
     assert wire.hear() == answer
     assert wire.link.retransmissions == 1
 
@@ -121,11 +121,11 @@ def test_an_older_step_is_ignored(wire: Wire) -> None:
     encoder = StepEncoder(lockstep=True)
     for t_us in (1_002_000, 1_004_000):
         wire.send(encoder.datagram(readings(t_us), ()))
-        assert wire.link.receive() is not None
-        wire.link.answer(t_us, outputs_at(t_us))
+        assert wire.link.wait_for_step() is not None
+        wire.link.send_actuators(t_us, outputs_at(t_us))
         wire.hear()
     wire.send(encoder.datagram(readings(1_002_000), ()))
-    assert wire.link.receive() is None
+    assert wire.link.wait_for_step() is None
     with pytest.raises(TimeoutError):
         wire.hear()
 
@@ -133,9 +133,9 @@ def test_an_older_step_is_ignored(wire: Wire) -> None:
 def test_a_step_without_its_barrier_releases_no_tick(wire: Wire) -> None:
     step = StepEncoder(lockstep=True).datagram(readings(1_002_000), ())
     wire.send(step[:-10])
-    assert wire.link.receive() is None
+    assert wire.link.wait_for_step() is None
     wire.send(step)
-    assert wire.link.receive() is not None
+    assert wire.link.wait_for_step() is not None
 
 
 def test_commands_of_a_repeated_step_are_taken_once(wire: Wire) -> None:
@@ -143,21 +143,21 @@ def test_commands_of_a_repeated_step_are_taken_once(wire: Wire) -> None:
     step = StepEncoder(lockstep=True).datagram(readings(1_002_000), (arm,))
     for _ in range(2):
         wire.send(step)
-        wire.link.receive()
+        wire.link.wait_for_step()
     assert len(wire.inbox.take_commands()) == 1
 
 
 def test_acknowledgements_come_before_the_actuators_and_are_repeated_with_them(wire: Wire) -> None:
     step = StepEncoder(lockstep=True).datagram(readings(1_002_000), ())
     wire.send(step)
-    wire.link.receive()
+    wire.link.wait_for_step()
     wire.link.queue_ack(CommandAck(400, 0, 1, 195))
-    wire.link.answer(1_002_000, outputs_at(1_002_000))
+    wire.link.send_actuators(1_002_000, outputs_at(1_002_000))
     answer = wire.hear()
     order = [frame.message_id for frame in split(answer)]
     assert order == [ids.HEARTBEAT, ids.COMMAND_ACK, ids.HIL_ACTUATOR_CONTROLS]
     wire.send(step)
-    wire.link.receive()
+    wire.link.wait_for_step()
     assert wire.hear() == answer
 
 
@@ -168,7 +168,7 @@ def test_the_simulator_is_told_the_mode_when_it_changes_and_once_a_second(wire: 
         outputs = outputs_at(t_us)
         if step >= 700:
             outputs = replace(outputs, snapshot=replace(outputs.snapshot, mode=Mode.HOLD))
-        wire.link.answer(t_us, outputs)
+        wire.link.send_actuators(t_us, outputs)
         for frame in split(wire.hear()):
             if frame.message_id == ids.HEARTBEAT:
                 told.append((step, frame.payload_values[0]))
@@ -178,7 +178,7 @@ def test_the_simulator_is_told_the_mode_when_it_changes_and_once_a_second(wire: 
 def test_the_heartbeat_of_the_simulator_says_who_waits(wire: Wire) -> None:
     encoder = StepEncoder(lockstep=False)
     wire.send(encoder.heartbeat() + encoder.datagram(readings(1_002_000), ()))
-    assert wire.link.receive() is not None
+    assert wire.link.wait_for_step() is not None
     assert wire.link.pacing is Pacing.REALTIME
 
 
@@ -187,7 +187,7 @@ def test_of_steps_that_piled_up_the_newest_counts_and_every_message_is_kept(
 ) -> None:
     encoder = StepEncoder(lockstep=False)
     wire.send(encoder.heartbeat() + encoder.datagram(readings(1_002_000), ()))
-    assert wire.link.receive() is not None
+    assert wire.link.wait_for_step() is not None
     assert not wire.link.wait(0.0)
     arm = SendCommand(400, (1.0, NAN, NAN, NAN, NAN, NAN, NAN))
     wire.send(encoder.datagram(readings(1_004_000), (arm,)))
@@ -197,13 +197,13 @@ def test_of_steps_that_piled_up_the_newest_counts_and_every_message_is_kept(
     newest = wire.link.newest()
     assert newest is not None
     assert newest.t_us == 1_008_000
-    assert [request.command for request in wire.inbox.take_commands()] == [400]
+    assert [one.request.command for one in wire.inbox.take_commands()] == [400]
     assert wire.link.newest() is None
 
 
 def test_shutdown_is_acknowledged_and_ends_the_flight(wire: Wire) -> None:
     wire.send(StepEncoder(lockstep=True).command(SHUTDOWN))
-    assert wire.link.receive() is None
+    assert wire.link.wait_for_step() is None
     assert wire.link.shutdown
     (ack,) = split(wire.hear())
     assert ack.message_id == ids.COMMAND_ACK
@@ -213,11 +213,11 @@ def test_shutdown_is_acknowledged_and_ends_the_flight(wire: Wire) -> None:
 def test_a_reboot_is_not_a_shutdown(wire: Wire) -> None:
     reboot = SendCommand(246, (1.0, 1.0, NAN, NAN, NAN, NAN, NAN))
     wire.send(StepEncoder(lockstep=True).command(reboot))
-    assert wire.link.receive() is None
+    assert wire.link.wait_for_step() is None
     assert not wire.link.shutdown
 
 
 def test_garbage_releases_no_tick(wire: Wire) -> None:
     for datagram in (b"", b"\xfd" * 300, FrameWriter(1, 200).frame(ids.HEARTBEAT, *(0,) * 6)):
         wire.send(datagram)
-        assert wire.link.receive() is None
+        assert wire.link.wait_for_step() is None

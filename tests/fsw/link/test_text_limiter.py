@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pytest
+
 from fsw.link.text_limiter import REPEAT_US, TextLimiter
 from fsw.signals import Severity, StatusText
 
@@ -46,3 +48,23 @@ def test_a_flood_of_different_sentences_is_bounded_and_told() -> None:
     (left_out,) = [text for text in limiter.overdue(11 * S) if "left out" in text.text]
     assert left_out.text.startswith(f"{sum(text is None for text in said)} more texts")
     assert limiter.admit(REFUSED, 20 * S) is REFUSED, "and then there is room again"
+
+
+FAILSAFE = StatusText(Severity.CRITICAL, "failsafe: battery critical, returning")
+
+
+@pytest.mark.parametrize("severity", list(Severity))
+def test_no_flood_keeps_a_failsafe_or_an_emergency_from_being_sent(severity: Severity) -> None:
+    """Whatever a client provokes in one tick: more refusals than a budget has, of any kind."""
+    limiter = TextLimiter()
+    for k in range(100):
+        limiter.admit(StatusText(severity, f"no goto: {k}.5 m is too low"), 1 * S)
+    assert limiter.admit(FAILSAFE, 1 * S) is FAILSAFE
+    emergencies = [StatusText(Severity.EMERGENCY, f"tilt lost: {k}") for k in range(50)]
+    assert [limiter.admit(text, 1 * S) for text in emergencies] == emergencies
+
+
+def test_a_flood_of_less_severe_sentences_is_cut() -> None:
+    limiter = TextLimiter()
+    texts = [StatusText(Severity.WARNING, f"parameter {chr(97 + k % 26)}{k}") for k in range(200)]
+    assert sum(limiter.admit(text, 1 * S) is not None for text in texts) == 20

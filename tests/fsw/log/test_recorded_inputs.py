@@ -15,7 +15,7 @@ import pytest
 from fsw.log import topics
 from fsw.log.encoder import NAV_STATES, TYPED, LogEncoder
 from fsw.log.flight_log import FlightLog, LogSubject
-from fsw.log.input_text import InputText
+from fsw.log.json_codec import JsonCodec
 from fsw.log.reader import LoggedTick, open_flight, ticks
 from fsw.signals import Mode, PlanTimings, SensorFrame, TickInputs
 from tests.fsw.link.snapshots import outputs_at
@@ -96,11 +96,11 @@ def test_an_input_that_would_not_survive_is_refused_at_once() -> None:
 
     for kind in (Bad,):
         with pytest.raises(TypeError, match="would not survive a log"):
-            InputText(kind)
+            JsonCodec(kind)
 
 
 def test_the_schema_names_every_field_down_to_the_numbers() -> None:
-    schema = json.loads(InputText(TickInputs).schema)
+    schema = json.loads(JsonCodec(TickInputs).schema)
     assert schema["sensors"]["p_WB"] == ["float", "float", "float"]
     assert set(schema["plan"]) == {"Plan", "PlanFailure"}
 

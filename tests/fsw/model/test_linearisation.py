@@ -6,18 +6,18 @@ import numpy as np
 
 from fsw.model.airframe import AIRFRAME
 from fsw.model.linearisation import BASE, END_EFFECTOR, JOINT2, Linearisation
-from fsw.model.prediction import INPUTS, Array, LagModel, condense, discretise
+from fsw.model.prediction import INPUTS, Array, condense, discretise
 from tests.fsw.model.geometry_by_rotation import tips_of_prediction
 from tests.fsw.random_states import prediction_vector
 
 HORIZON = 5
-MODEL = condense(LagModel(), 0.1, HORIZON)
+MODEL = condense(AIRFRAME, 0.1, HORIZON)
 STEP = 1e-6
 
 
 def around(start: Array, inputs: Array) -> Linearisation:
     horizon = Linearisation(MODEL)
-    horizon.refill(AIRFRAME, start, inputs)
+    horizon.refill(start, inputs)
     return horizon
 
 
@@ -27,7 +27,7 @@ def random_horizon(random: np.random.Generator) -> tuple[Array, Array]:
 
 def test_points_of_every_node_are_those_of_the_stepped_state() -> None:
     random = np.random.default_rng(1)
-    a, b = discretise(LagModel(), 0.1)
+    a, b = discretise(AIRFRAME, 0.1)
     for _ in range(10):
         start, inputs = random_horizon(random)
         horizon = around(start, inputs)
@@ -53,7 +53,7 @@ def test_gradients_equal_finite_differences_over_random_states() -> None:
             for gradient, high, low in (
                 (horizon.d_position, above.position, below.position),
                 (horizon.d_velocity, above.velocity, below.velocity),
-                (horizon.d_arm_cog, above.arm_cog, below.arm_cog),
+                (horizon.d_arm_com, above.arm_com, below.arm_com),
             ):
                 np.testing.assert_allclose(
                     gradient[..., column], (high - low) / (2.0 * STEP), atol=3e-8, rtol=1e-6
@@ -63,11 +63,11 @@ def test_gradients_equal_finite_differences_over_random_states() -> None:
 def test_refilling_forgets_the_previous_guess() -> None:
     random = np.random.default_rng(3)
     used = Linearisation(MODEL)
-    used.refill(AIRFRAME, *random_horizon(random))
+    used.refill(*random_horizon(random))
     start, inputs = random_horizon(random)
-    used.refill(AIRFRAME, start, inputs)
+    used.refill(start, inputs)
     fresh = around(start, inputs)
-    for name in ("states", "position", "velocity", "d_position", "d_velocity", "d_arm_cog"):
+    for name in ("states", "position", "velocity", "d_position", "d_velocity", "d_arm_com"):
         np.testing.assert_array_equal(getattr(used, name), getattr(fresh, name))
 
 

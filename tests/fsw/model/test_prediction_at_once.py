@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
-from fsw.model.airframe import AIRFRAME
+from fsw.model.airframe import AIRFRAME, AttitudeLag
 from fsw.model.linearisation import END_EFFECTOR, Linearisation
 from fsw.model.nominal import NominalModel
 from fsw.model.prediction import (
@@ -15,7 +17,6 @@ from fsw.model.prediction import (
     YAW,
     YAW_RATE,
     A,
-    LagModel,
     P,
     V,
     condense,
@@ -24,7 +25,7 @@ from fsw.model.prediction import (
 from fsw.signals import PlanInput
 from tests.fsw.random_states import as_state
 
-AT_ONCE = LagModel(at_once=True)
+AT_ONCE = replace(AIRFRAME, attitude_lag=AttitudeLag(at_once=True))
 MOVED = [(P, V), (P + 1, V + 1), (P + 2, V + 2), (YAW, YAW_RATE)] + [
     (Q_ARM + joint, QD_ARM + joint) for joint in range(2)
 ]
@@ -56,7 +57,7 @@ def test_the_arm_hangs_in_a_level_body_whatever_is_commanded() -> None:
     model = condense(AT_ONCE, 0.1, 3)
     horizon = Linearisation(model)
     inputs = np.tile([3.0, -2.0, 1.0, 0.0, 0.0, 0.0], 3)
-    horizon.refill(AIRFRAME, np.zeros(STATES), inputs)
+    horizon.refill(np.zeros(STATES), inputs)
     below = horizon.position[:, END_EFFECTOR] - horizon.position[:, 0]
     np.testing.assert_allclose(below, np.tile([0.0, 0.0, 0.3], (4, 1)), atol=1e-15)
 

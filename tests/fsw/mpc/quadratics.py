@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from fsw.barriers.soft_rows import TargetPoints
+from fsw.barriers.constraint_block import TargetPoints
 from fsw.model.linearisation import Linearisation
 from fsw.model.prediction import Array
-from fsw.mpc.costs import Cost
+from fsw.mpc.costs import Cost, Quadratic
 
 
 def quadratic(
@@ -15,6 +15,6 @@ def quadratic(
 ) -> tuple[float, Array, Array]:
     """Value, slope and full Hessian at the guess."""
     hessian, gradient = np.zeros((len(guess), len(guess))), np.zeros(len(guess))
-    value = cost.add(horizon, targets, guess, hessian, gradient)
+    value = cost.add(horizon, targets, Quadratic(guess, hessian, gradient))
     full = np.triu(hessian) + np.triu(hessian, 1).T
     return value, full @ guess + gradient, full

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fsw.model.airframe import AIRFRAME
 from fsw.mpc.planner import Planner
 from fsw.mpc.planner_config import PlannerConfig
 from fsw.signals import (
@@ -19,7 +20,7 @@ PERIOD_US = 100_000
 
 
 def planner(config: PlannerConfig | None = None) -> Planner:
-    return Planner(config or PlannerConfig(), stopwatch_us=lambda: 0.0)
+    return Planner(config or PlannerConfig(), AIRFRAME, stopwatch_us=lambda: 0.0)
 
 
 def hovering(p: Vec3 = (0.0, 0.0, -1.2)) -> PredictionState:

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fsw.barriers.soft_rows import TargetPoints
+from fsw.barriers.constraint_block import TargetPoints
 from fsw.model.airframe import AIRFRAME
 from fsw.model.linearisation import Linearisation
-from fsw.model.prediction import INPUTS, YAW, Array, LagModel, condense
+from fsw.model.prediction import INPUTS, YAW, Array, condense
 from fsw.mpc.costs import Cost, CostWeights, TrackingCost
 from fsw.mpc.soft_costs import (
     SoftObstacleCost,
@@ -24,7 +24,7 @@ from tests.fsw.mpc.quadratics import quadratic
 from tests.fsw.random_states import prediction_vector
 
 N = 5
-MODEL = condense(LagModel(), 0.1, N)
+MODEL = condense(AIRFRAME, 0.1, N)
 WALLS = (Wall((-1.0, 0.0, 0.0), -1.0, 0.1), Wall((0.0, 0.6, 0.8), -1.5, 0.1))
 POINTS = (PointObstacle((0.3, -0.2, 0.1), 0.1), PointObstacle((-0.5, 0.4, 0.6), 0.2))
 SPHERE = WorkspaceSphere((0.0, 0.0, -0.225), 0.075)
@@ -41,7 +41,7 @@ COSTS: dict[str, Cost] = {
 
 def horizon_of(start: Array, inputs: Array) -> Linearisation:
     horizon = Linearisation(MODEL)
-    horizon.refill(AIRFRAME, start, inputs)
+    horizon.refill(start, inputs)
     return horizon
 
 

@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from fsw.model.airframe import AIRFRAME
 from fsw.model.prediction import INPUTS, Array, condense, to_vector
+from fsw.mpc.ocp import Ocp
 from fsw.mpc.planner_config import PlannerConfig
-from fsw.mpc.problem import Problem
 from fsw.signals import (
     EndEffectorTarget,
     Plan,
@@ -28,7 +29,7 @@ from tests.fsw.mpc.requests import PERIOD_US, STILL, below, hovering, planned, p
 from tests.fsw.random_states import as_state, prediction_vector, vec3
 
 CONFIG = PlannerConfig()
-MODEL = condense(CONFIG.lag, CONFIG.period, CONFIG.horizon)
+MODEL = condense(AIRFRAME, CONFIG.period, CONFIG.horizon)
 AHEAD = SafeSet((Wall((-1.0, 0.0, 0.0), -1.0, 0.1),))
 SPHERE = SafeSet(sphere=WorkspaceSphere((0.0, 0.0, -0.225), 0.075))
 
@@ -67,8 +68,8 @@ def test_joints_stay_within_their_limits_when_the_target_is_out_of_reach() -> No
         target = EndEffectorTarget(0, (side * 3.0, 0.0, -2.0), STILL, STILL)
         answer = planned(planner().plan(request(hovering(), target)))
         angles = nodes_of(answer)[:, 15:17]
-        assert np.abs(angles[:, 0]).max() <= CONFIG.airframe.joint1_limit + 1e-3
-        assert np.abs(angles.sum(axis=1)).max() <= CONFIG.airframe.joint12_limit + 1e-3
+        assert np.abs(angles[:, 0]).max() <= AIRFRAME.joint1_limit + 1e-3
+        assert np.abs(angles.sum(axis=1)).max() <= AIRFRAME.joint12_limit + 1e-3
         assert np.abs(angles).max() > 0.1
 
 
@@ -88,7 +89,7 @@ def test_the_plan_goes_towards_its_target(axis: int, sign: float) -> None:
     offset[axis] = sign * 0.4
     target = below((start.p[0] + offset[0], start.p[1] + offset[1], start.p[2]))
     last = nodes_of(planned(planner().plan(request(start, target))))[-1]
-    end_effector = tips_of_prediction(last, np.array(CONFIG.airframe.link_length))[1]
+    end_effector = tips_of_prediction(last, np.array(AIRFRAME.link_length))[1]
     assert sign * end_effector[axis] > 0.05
     assert abs(end_effector[1 - axis]) < 0.005
 
@@ -199,15 +200,15 @@ def test_the_last_plan_moved_on_by_a_period_is_the_next_guess(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     guesses: list[Array] = []
-    linearise = Problem.linearise
+    linearise = Ocp.linearise
 
-    def recorded(self: Problem, start: Array, guess: Array, targets: Any) -> None:
+    def recorded(self: Ocp, start: Array, guess: Array, targets: Any) -> None:
         guesses.append(guess.copy())
         linearise(self, start, guess, targets)
 
     used, target = planner(), below((0.5, 0.0, -1.2))
     first = flat(planned(used.plan(request(hovering(), target))))
-    monkeypatch.setattr(Problem, "linearise", recorded)
+    monkeypatch.setattr(Ocp, "linearise", recorded)
     used.plan(request(hovering(), target, t_us=1_000_000 + PERIOD_US))
     expected = np.vstack((first[1:], first[-1:]))
     np.testing.assert_array_equal(guesses[0].reshape(-1, INPUTS), expected)

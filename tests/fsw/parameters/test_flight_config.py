@@ -1,36 +1,56 @@
-"""What describes the vehicle is written once, in the airframe."""
+"""What describes the vehicle and its clocks is written once."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from fsw.model.airframe import AIRFRAME
-from fsw.model.prediction import LagModel, discretise
-from fsw.parameters.flight_config import flight_config
+from fsw.model.prediction import discretise
+from fsw.mpc.planner import Planner
+from fsw.parameters.flight_config import FlightConfig, flight_config
+from fsw.signals import Plan
+from fsw.tuning import leaves
+from tests.fsw.mpc.requests import below, hovering, request
 
 
 @given(st.floats(0.01, 0.2))
-def test_the_planner_believes_in_the_airframe_that_flies(rotor_lag: float) -> None:
-    airframe = replace(AIRFRAME, rotor_lag=rotor_lag, joint1_limit=0.5)
-    config = replace(flight_config(), airframe=airframe)
-    assert config.planner.airframe == airframe
-    assert config.planner.lag == replace(LagModel(), rotor_lag=rotor_lag)
-    # A vertical acceleration follows its command as the rotors do.
-    a, _ = discretise(config.planner.lag, 0.1)
+def test_a_predicted_vertical_acceleration_follows_as_the_rotors_do(rotor_lag: float) -> None:
+    a, _ = discretise(replace(AIRFRAME, rotor_lag=rotor_lag), 0.1)
     assert np.isclose(a[8, 8], np.exp(-0.1 / rotor_lag))
 
 
-def test_a_planner_with_a_vehicle_of_its_own_is_corrected() -> None:
-    config = flight_config()
-    other = replace(config.planner, airframe=replace(AIRFRAME, link_length=(0.1, 0.1)))
-    assert replace(config, planner=other) == config
+@pytest.mark.parametrize(
+    ("word", "paths"),
+    [
+        ("rotor_lag", ["airframe.rotor_lag"]),
+        ("tilt", ["planner.limits.tilt"]),
+        ("period", ["planner.period_us", "tick_period_us"]),
+        ("link_length", ["airframe.link_length"]),
+    ],
+)
+def test_a_number_of_the_vehicle_is_configured_in_one_place(word: str, paths: list[str]) -> None:
+    assert [path for path, _ in leaves(FlightConfig()) if word in path] == paths
 
 
-def test_the_papers_own_model_keeps_its_lack_of_lag() -> None:
+def test_a_barrier_too_quick_for_the_planners_period_is_refused() -> None:
+    planner = flight_config().planner
+    with pytest.raises(ValueError, match=r"must not exceed 5\.0 1/s"):
+        replace(planner, period_us=200_000, walls=replace(planner.walls, slope=6.0))
+
+
+def test_the_planner_predicts_with_the_airframe_it_is_given() -> None:
     config = flight_config()
-    printed = replace(config.planner, lag=LagModel(at_once=True))
-    assert replace(config, planner=printed).planner.lag.at_once
+    slow = replace(config.airframe, rotor_lag=0.2)
+    plans = [
+        Planner(config.planner, airframe, lambda: 0.0).plan(
+            request(hovering(), below((0.5, 0.0, -1.2)))
+        )
+        for airframe in (config.airframe, slow)
+    ]
+    assert all(isinstance(plan, Plan) for plan in plans)
+    assert plans[0] != plans[1]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from fsw.parameters.flight_config import CONTROLLERS, FlightConfig, flight_config
-from fsw.parameters.real32 import as_text, nearest_decimal
+from fsw.parameters.float32 import as_text, nearest_decimal
 from fsw.parameters.registry import BY_NAME, NO_PARAMETERS, PARAMETERS, Parameter
 from fsw.tuning import leaves, number_at, tuned
 

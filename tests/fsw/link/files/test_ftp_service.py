@@ -28,7 +28,7 @@ SECOND_US = 1_000_000
 
 
 @dataclass(frozen=True)
-class Said:
+class ServiceOutput:
     """A message of the server."""
 
     sequence: int
@@ -45,7 +45,7 @@ class Said:
         return self.data[0] if self.opcode == Opcode.NAK else None
 
 
-def said(outgoing: PackedOutgoing) -> Said:
+def said(outgoing: PackedOutgoing) -> ServiceOutput:
     assert outgoing.message_id == ids.FILE_TRANSFER_PROTOCOL
     network, system, component, *payload = (int(value) for value in values_of(outgoing))
     assert network == 0
@@ -53,7 +53,7 @@ def said(outgoing: PackedOutgoing) -> Said:
         bytes(payload)
     )
     data = bytes(payload[HEADER.size : HEADER.size + size])
-    return Said(
+    return ServiceOutput(
         sequence, session, opcode, requested, bool(complete), offset, data, (system, component)
     )
 
@@ -80,7 +80,7 @@ class Client:
         size: int | None = None,
         repeat: bool = False,
         target: tuple[int, int] = (1, 1),
-    ) -> list[Said]:
+    ) -> list[ServiceOutput]:
         """Ask, and poll until there is silence."""
         if not repeat:
             self.sequence = (self.sequence + 1) & 0xFFFF
@@ -89,14 +89,14 @@ class Client:
         payload = (header + data).ljust(251, b"\0")
         frame = self.writer.frame(ids.FILE_TRANSFER_PROTOCOL, 0, *target, *payload)
         (received,) = split(frame)
-        return [said(answer) for answer in self.service.receive(received, self.t_us)]
+        return [said(answer) for answer in self.service.handle(received, self.t_us)]
 
-    def polled(self) -> list[Said]:
+    def polled(self) -> list[ServiceOutput]:
         answers = [said(answer) for answer in self.service.poll(self.t_us)]
         assert len(answers) <= FRAMES_A_TICK
         return answers
 
-    def ask(self, opcode: int, data: bytes = b"", **header: int) -> Said:
+    def ask(self, opcode: int, data: bytes = b"", **header: int) -> ServiceOutput:
         """The one answer to a request, at once or within a few ticks."""
         answers = self.send(opcode, data, **header)  # type: ignore[arg-type]
         for _ in range(200):
@@ -124,7 +124,7 @@ class Client:
             assert answer.opcode == Opcode.ACK
             found += [entry.decode() for entry in answer.data.split(b"\0") if entry]
 
-    def burst(self, session: int, offset: int, size: int = MAX_DATA) -> list[Said]:
+    def burst(self, session: int, offset: int, size: int = MAX_DATA) -> list[ServiceOutput]:
         answers = self.send(Opcode.BURST_READ_FILE, session=session, offset=offset, size=size)
         while more := self.polled():
             answers += more

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from fsw.link.wire.outgoing import Outgoing, PackedOutgoing, Said, WireValues
+from fsw.link.wire.outgoing import Outgoing, PackedOutgoing, ServiceOutput, WireValues
 from fsw.signals import StatusText
 from messages.frames import FrameWriter, split
 
 
-def message_of(said: Said) -> int:
+def message_of(said: ServiceOutput) -> int:
     """The id of a message."""
     assert not isinstance(said, StatusText)
     return said.message_id
 
 
-def values_of(said: Said) -> WireValues:
+def values_of(said: ServiceOutput) -> WireValues:
     """Every field of a message, whether it was packed already or not."""
     if isinstance(said, Outgoing):
         return said.values

@@ -23,7 +23,7 @@ def question() -> Frame:
 
 def test_home_is_told_at_once_where_there_is_one() -> None:
     commands = LinkCommands(StreamRates(STREAMS, GROUND_RATES, 2_000), CONTEXT)
-    answer = commands.answer(question(), 1_000_000, SNAPSHOT)
+    answer = commands.handle(question(), 1_000_000, SNAPSHOT)
     assert answer is not None
     (ack, home), refusal = answer
     assert (ack.message_id, ack.values[:2], ack.values[4:]) == (77, (410, 0), (255, 190))
@@ -33,7 +33,7 @@ def test_home_is_told_at_once_where_there_is_one() -> None:
 
 def test_before_there_is_a_home_the_question_is_refused_for_now() -> None:
     commands = LinkCommands(StreamRates(STREAMS, GROUND_RATES, 2_000), CONTEXT)
-    answer = commands.answer(question(), 1_000_000, replace(SNAPSHOT, home=None))
+    answer = commands.handle(question(), 1_000_000, replace(SNAPSHOT, home=None))
     assert answer is not None
     (ack,), refusal = answer
     assert ack.values[:2] == (410, 1)

@@ -166,7 +166,7 @@ def test_a_data_stream_request_changes_no_rate(ground: Ground) -> None:
 def test_other_commands_go_to_the_tick(ground: Ground) -> None:
     ground.heard()
     ground.polled(long(400, 1.0) + integer(400, 1.0))
-    assert [request.command for request in ground.inbox.take_commands()] == [400, 400]
+    assert [one.request.command for one in ground.inbox.take_commands()] == [400, 400]
     assert ground.heard() == []
 
 

@@ -8,6 +8,7 @@ import pytest
 
 from fsw.link.inbox import Inbox
 from fsw.link.wire import message_ids as ids
+from fsw.signals import Arm
 from messages.frames import Frame, FrameWriter, split, wire_fields
 
 NAN = math.nan
@@ -42,10 +43,12 @@ def test_nan_in_an_unused_parameter_of_a_command_is_normal() -> None:
     inbox = Inbox()
     inbox.accept(frame(ids.COMMAND_LONG, command=400, param1=1.0, param5=NAN, param7=NAN))
     (command,) = inbox.take_commands()
-    assert command.command == 400
-    assert command.params[0] == 1.0
-    assert math.isnan(command.params[6])
-    assert (command.source_system, command.source_component) == (255, 190)
+    assert command.action == Arm()
+    request = command.request
+    assert request.command == 400
+    assert request.params[0] == 1.0
+    assert math.isnan(request.params[6])
+    assert (request.source_system, request.source_component) == (255, 190)
     assert inbox.take_commands() == ()
     assert inbox.refused == 0
 
@@ -62,8 +65,8 @@ def test_command_int_scales_x_by_its_frame(mav_frame: int, x: float) -> None:
     inbox = Inbox()
     inbox.accept(frame(ids.COMMAND_INT, command=192, x=25_000, z=-3.0, frame=mav_frame))
     (command,) = inbox.take_commands()
-    assert command.params[4] == pytest.approx(x)
-    assert command.params[6] == -3.0
+    assert command.request.params[4] == pytest.approx(x)
+    assert command.request.params[6] == -3.0
 
 
 @pytest.mark.parametrize("bad", [NAN, math.inf, -math.inf])

@@ -1,4 +1,4 @@
-"""Set-points for now: the masks that clients send, and everything that is of no use."""
+"""Setpoints for now: the masks that clients send, and everything that is of no use."""
 
 from __future__ import annotations
 

@@ -292,7 +292,7 @@ def test_without_a_home_there_is_no_home_position() -> None:
     [
         ({"mode": Mode.DISARMED, "armed": False}, 29, 3),
         ({"mode": Mode.DISARMED, "armed": False, "arming_refusal": "not armed: why"}, 29, 0),
-        ({"mode": Mode.DISARMED, "armed": False, "standby": Mode.OFFBOARD}, 17, 3),
+        ({"mode": Mode.DISARMED, "armed": False, "intended_mode": Mode.OFFBOARD}, 17, 3),
         ({"mode": Mode.HOLD}, 157, 4),
         ({"mode": Mode.ORBIT}, 157, 4),
         ({"mode": Mode.OFFBOARD}, 145, 4),

@@ -1,0 +1,1 @@
+"""Measurements of Pandion, run from a checkout: ``python -m benchmarks NAME …``."""

@@ -1,0 +1,51 @@
+"""Entry point: ``python -m benchmarks NAME …``, from a checkout."""
+
+from __future__ import annotations
+
+import sys
+from importlib import import_module
+from typing import Final
+
+from command_line.parser import COULD_NOT_START, unknown_name
+
+_INTERRUPTED: Final = 1  # exit code
+
+BENCHMARKS: Final = {
+    "mpc": "the planner's optimiser against others, on recorded requests",
+    "loop": "a flight in real time: lateness, stage times, memory, against budgets",
+    "lockstep": "a whole flight as fast as it goes, and where its time goes",
+    "flood": "a flight in real time under 5000 useless datagrams a second",
+    "download": "how fast a flight log comes over the link during a flight",
+    "plant": "one step of the simulator's plant",
+}
+
+
+def help_text() -> str:
+    """The list of the benchmarks."""
+    rows = (f"  {name:10}{what}" for name, what in BENCHMARKS.items())
+    return "\n".join(
+        ("usage: python -m benchmarks NAME [options]", "", "benchmarks:", *rows, "")
+        + ("`python -m benchmarks NAME --help` prints the options of one.",)
+    )
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run one benchmark; returns the exit code."""
+    words = sys.argv[1:] if argv is None else argv
+    if not words or words[0] in ("-h", "--help", "help"):
+        print(help_text())
+        return 0
+    name, *options = words
+    if name not in BENCHMARKS:
+        sentence = unknown_name("benchmark", name, BENCHMARKS)
+        print(f"python -m benchmarks: {sentence}", file=sys.stderr)
+        return COULD_NOT_START
+    try:
+        return int(import_module(f"benchmarks.{name}").main(options))
+    except KeyboardInterrupt:
+        print(f"python -m benchmarks {name}: interrupted", file=sys.stderr)
+        return _INTERRUPTED
+
+
+if __name__ == "__main__":
+    sys.exit(main())

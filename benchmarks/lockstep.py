@@ -1,0 +1,184 @@
+"""``python -m benchmarks lockstep``: how fast a whole flight is, and where its time goes.
+
+Everything is on: both processes, telemetry, logs, the MPC. The peer is the same loop with
+pymavlink's own packing of the lockstep frames; the two take turns: a busy machine slows both.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import statistics
+import sys
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final, TextIO
+
+from command_line.options import json_file, option, read
+from command_line.parser import COULD_NOT_START
+from command_line.values import number, whole
+from pandion.child import Event
+from pandion.display import Display
+from pandion.output import console_beside, write_text
+from pandion.processor import Places, lockstep_places
+from pandion.supervisor import ProcessFailed, Supervisor
+from pandion.version import version
+
+DONE, SLOW = 0, 1  # exit codes
+TARGET: Final = 25.0  # times real time, at 500 Hz
+PEER: Final = "benchmarks.pymavlink_process"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LockstepOptions:
+    """One measurement."""
+
+    json: str | None = json_file("the result")
+    scenario: str = option("--scenario NAME", "what to fly", default="walls")
+    duration_s: float = option(
+        "--duration S", "of a flight, in seconds", number(1.0, 600.0, "s"), default=60.0
+    )
+    rounds: int = option("--rounds N", "flights of each", whole(1, 100), default=3)
+    processors: int | None = option(
+        "--processors N",
+        "how many the two processes share, 1 or 2 (default as pandion fly decides, by what is "
+        "idle)",
+        whole(1, 2),
+    )
+
+
+def main(argv: list[str]) -> int:
+    """Measure and report; returns the exit code: 1 if the best flight was too slow."""
+    what = "Time a whole flight in lockstep and its peer."
+    options = read(LockstepOptions, "python -m benchmarks lockstep", what, argv)
+    console = console_beside(options.json)
+    try:
+        found = _measure(options, console)
+    except (ProcessFailed, OSError) as error:
+        print(f"python -m benchmarks lockstep: {error}", file=sys.stderr)
+        return COULD_NOT_START
+    write_text(options.json, json.dumps(found, indent=1, allow_nan=False) + "\n")
+    print("\n".join(_lines(found)), file=console)
+    return DONE if found["real_time_factor_best"] >= TARGET else SLOW
+
+
+def _measure(options: LockstepOptions, console: TextIO) -> dict[str, Any]:
+    load = os.getloadavg()[0]
+    flights: dict[str, list[dict[str, Any]]] = {"pandion": [], "pymavlink": []}
+    for round_ in range(1, options.rounds + 1):
+        for name, runner in (("pandion", None), ("pymavlink", PEER)):
+            flown = _measure_one(options, runner)
+            flights[name].append(flown)
+            factor = flown["sitl"]["real_time_factor"]
+            print(f"round {round_}, {name}: {factor:.1f} times real time", file=console, flush=True)
+    ours, theirs = (_factors(flights[name]) for name in ("pandion", "pymavlink"))
+    best = max(flights["pandion"], key=lambda flown: float(flown["sitl"]["real_time_factor"]))
+    return {
+        "version": version(),
+        "scenario": options.scenario,
+        "duration_s": options.duration_s,
+        "rate_hz": 500,
+        "real_time_factor": statistics.median(ours),
+        "real_time_factor_best": max(ours),
+        "rounds": ours,
+        "pymavlink_rounds": theirs,
+        "ratio_to_pymavlink": statistics.median(
+            one / other for one, other in zip(ours, theirs, strict=True)
+        ),
+        "stages_us": _stages(best),
+        "places": best["places"],
+        "cores": os.cpu_count(),
+        "load_average_before": round(load, 2),
+        "load_average_after": round(os.getloadavg()[0], 2),
+    }
+
+
+def _factors(flights: list[dict[str, Any]]) -> list[float]:
+    return [float(flown["sitl"]["real_time_factor"]) for flown in flights]
+
+
+class _Silent(Display):
+    """Says nothing: the bench has lines of its own."""
+
+    def say(self, sentence: str) -> None:
+        """See :class:`Display`."""
+
+    def flying(self, *_: Any) -> None:
+        """See :class:`Display`."""
+
+
+def _measure_one(options: LockstepOptions, runner: str | None) -> dict[str, Any]:
+    """One flight; what both processes wrote about it.
+
+    Raises:
+        ProcessFailed: It did not begin, or did not end as it should.
+    """
+    with tempfile.TemporaryDirectory(prefix="pandion-bench-") as name:
+        out, places = Path(name), _places(options.processors)
+        sitl = [
+            options.scenario,
+            "--listen=udp:127.0.0.1:0",
+            f"--duration={options.duration_s!r}",
+            "--wait=600",
+            f"--out={out}",
+        ]
+        flown = Supervisor(_Silent(sys.stderr), out, places, runner).run(
+            sitl, lambda port: [f"--sim=udp:127.0.0.1:{port}", f"--out={out}", "--wait=600"]
+        )
+        if flown.failure is not None or flown.sitl is None or flown.interrupted:
+            raise ProcessFailed(flown.failure or "the flight was interrupted", exit_code=1)
+        written = out / "fsw.json"
+        if not written.exists():
+            raise ProcessFailed("the flight software was ended before it wrote its result", 1)
+        fsw: Event = json.loads(written.read_text(encoding="utf-8"))
+        return {"sitl": flown.sitl, "fsw": fsw, "places": _described(places)}
+
+
+def _places(processors: int | None) -> Places:
+    places = lockstep_places()
+    if processors is None or places.sitl is None:
+        return places
+    allowed = sorted(os.sched_getaffinity(0))
+    return Places(allowed[0], allowed[min(processors, len(allowed)) - 1])
+
+
+def _described(places: Places) -> str:
+    if places.sitl is None:
+        return "wherever the system likes"
+    together = places.sitl == places.fsw
+    return "both processes on one processor" if together else "a processor for each process"
+
+
+def _stages(flown: dict[str, Any]) -> dict[str, float]:
+    """Microseconds a step: means of the whole, medians of the flight software's stages."""
+    sitl, fsw = flown["sitl"], flown["fsw"]
+    steps = max(sitl["steps"], 1)
+    whole, waited = 1e6 * sitl["wall_s"] / steps, 1e6 * sitl["waited_s"] / steps
+    stages, mpc = fsw["stages"], fsw["mpc"]
+    per_plan = 500.0 / mpc["rate_hz"]
+    return {
+        "step": whole,
+        "simulator": whole - waited,
+        "wait for the answer": waited,
+        "fsw receive": stages["hear"]["p50_us"],
+        "fsw tick": stages["tick"]["p50_us"],
+        "fsw send": stages["actuate"]["p50_us"],
+        "fsw telemetry and log": fsw["telemetry"]["p50_us"],
+        "mpc, share of a step": mpc["p50_us"] / per_plan,
+        "mpc, a cycle": mpc["p50_us"],
+    }
+
+
+def _lines(found: dict[str, Any]) -> list[str]:
+    rows = [f"  {name:<24}{value:8.1f} us" for name, value in found["stages_us"].items()]
+    met = "met" if found["real_time_factor_best"] >= TARGET else "missed"
+    return [
+        f"{found['scenario']}, {found['duration_s']:g} s at 500 Hz, {found['places']}:",
+        *rows,
+        f"median {found['real_time_factor']:.1f}, best {found['real_time_factor_best']:.1f} times "
+        f"real time (target {TARGET:g}: {met})",
+        f"{found['ratio_to_pymavlink']:.2f} times as fast as with pymavlink's packing",
+        f"{found['cores']} cores, load average {found['load_average_before']} before, "
+        f"{found['load_average_after']} after",
+    ]

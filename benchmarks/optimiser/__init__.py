@@ -1,0 +1,1 @@
+"""The planner's optimiser against others, on the same recorded requests."""

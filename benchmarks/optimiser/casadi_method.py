@@ -1,0 +1,168 @@
+"""CasADi with IPOPT and FATROP on the planner's problem: for comparison only, never flown.
+
+Neither is needed anywhere else; without the optional dependency `bench` they are reported as
+not installed.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+from typing import Any
+
+import numpy as np
+
+from benchmarks.optimiser.instances import Instance
+from benchmarks.optimiser.solved import Solved, timed
+from fsw.barriers.cbf_row import cbf_lower_bound
+from fsw.barriers.safe_approach import safe_approach_speed
+from fsw.barriers.workspace import outward_frame
+from fsw.model.airframe import AIRFRAME
+from fsw.model.linearisation import POINTS, Linearisation
+from fsw.model.prediction import INPUTS, STATES, Array, condense, to_vector
+from fsw.mpc.planner_config import PlannerConfig
+from fsw.signals import PlanRequest, SafeSet
+
+SOLVERS = ("ipopt", "fatrop")
+_TOLERANCE = 1e-6  # as Clarabel's
+
+
+def installed(solver: str) -> bool:
+    """Whether CasADi is there and brings the solver."""
+    if importlib.util.find_spec("casadi") is None:
+        return False
+    import casadi
+
+    return bool(casadi.has_nlpsol(solver))
+
+
+class CasadiMethod:
+    """One compiled-graph program for one horizon and safe set."""
+
+    def __init__(self, config: PlannerConfig, safe_set: SafeSet, solver: str) -> None:
+        import casadi
+
+        from benchmarks.optimiser.ocp import build
+
+        self._config, self._safe_set = config, safe_set
+        self._model = condense(AIRFRAME, config.period, config.horizon)
+        self._horizon = Linearisation(self._model)
+        program, parameters = build(config, safe_set)
+        self._states, self._controls = program.states, program.controls
+        self._bounds = {
+            "lbx": program.lower,
+            "ubx": program.upper,
+            "lbg": np.zeros(len(program.row_upper)),
+            "ubg": program.row_upper,
+        }
+        equality = [upper == 0.0 for upper in program.row_upper]
+        self._solve = casadi.nlpsol(
+            "planner",
+            solver,
+            {
+                "x": casadi.vertcat(*program.unknowns),
+                "f": program.cost,
+                "g": casadi.vertcat(*program.rows),
+                "p": parameters,
+            },
+            _options(
+                solver, config.horizon, program.path_rows, self._states, self._controls, equality
+            ),
+        )
+
+    def solve(self, instance: Instance, guess: Array, optimum: Array) -> Solved:
+        """See ``Method``; ``guess`` and ``optimum`` (6 n,) [m/s^2, rad/s^2]."""
+        parameters = self._parameters(instance.request, optimum)
+        initial = self._unknowns(instance.request, guess)
+        found, spent = timed(lambda: self._solve(x0=initial, p=parameters, **self._bounds))
+        if not self._solve.stats()["success"]:
+            return Solved(spent, None, None)
+        return Solved(spent, self._inputs(np.array(found["x"]).ravel()), None)
+
+    def _unknowns(self, request: PlanRequest, inputs: Array) -> Array:
+        """States that follow from the inputs, stage by stage, and no slack."""
+        states = self._model.phi @ to_vector(request.start) + self._model.gamma @ inputs
+        parts: list[Array] = [states[0]]
+        for i, controls in enumerate(self._controls):
+            u = inputs[INPUTS * i : INPUTS * (i + 1)]
+            parts.append(np.concatenate((u, np.zeros(controls - len(u)))))
+            if i + 1 < len(self._states):
+                parts.append(states[i + 1])
+        return np.concatenate(parts)
+
+    def _inputs(self, x: Array) -> Array:
+        """The inputs among the unknowns, (6 n,)."""
+        inputs, at = [], STATES
+        for controls in self._controls[:-1]:
+            inputs.append(x[at : at + INPUTS])
+            at += controls + STATES
+        return np.concatenate(inputs)
+
+    def _parameters(self, request: PlanRequest, optimum: Array) -> Array:
+        """Start, targets, directions at the optimum and the h that eq 25 requires."""
+        start = to_vector(request.start)
+        self._horizon.refill(start, optimum)
+        yaws = self._horizon.states[:, 13]
+        parts: list[Any] = [start]
+        for i in range(1, self._config.horizon + 1):
+            target = request.targets[i]
+            turns = np.round((yaws[i] - target.yaw) / (2.0 * np.pi))  # the short way round
+            frame = np.eye(3)
+            if self._safe_set.sphere is not None:
+                centre = np.array(target.p_WE) + self._safe_set.sphere.centre_from_target
+                outward_frame(self._horizon.position[i, 0] - centre, frame)
+            parts += [target.p_WE, target.v_WE, [target.yaw + 2.0 * np.pi * turns], frame.ravel()]
+            parts.append(self._required(request, i, frame))
+        return np.concatenate(parts)
+
+    def _required(self, request: PlanRequest, i: int, frame: Array) -> Array:
+        tuning = self._config.walls if self._safe_set.sphere is None else self._config.workspace
+        position, velocity = self._horizon.position[0], self._horizon.velocity[0]
+        h_start = []
+        if self._safe_set.sphere is None:
+            for wall in self._safe_set.walls:
+                for point in range(POINTS):
+                    gap = position[point] @ wall.normal - wall.offset - wall.clearance
+                    speed = velocity[point] @ wall.normal
+                    h_start.append(safe_approach_speed(gap, tuning.alpha, tuning.slope) + speed)
+        else:
+            target, sphere = request.targets[0], self._safe_set.sphere
+            e = position[0] - target.p_WE - np.array(sphere.centre_from_target)
+            w = velocity[0] - target.v_WE
+            for axis in frame:
+                for n in (axis, -axis):
+                    h_start.append(
+                        safe_approach_speed(sphere.radius - n @ e, tuning.alpha, tuning.slope)
+                        - n @ w
+                    )
+        return np.array(
+            [cbf_lower_bound(h, i, tuning.numbers(self._config.period)) for h in h_start]
+        )
+
+
+def _options(
+    solver: str,
+    horizon: int,
+    path_rows: list[int],
+    states: list[int],
+    controls: list[int],
+    equality: list[bool],
+) -> dict[str, Any]:
+    options: dict[str, Any] = {"print_time": False, "error_on_fail": False}
+    if solver == "ipopt":
+        return options | {
+            "ipopt.print_level": 0,
+            "ipopt.sb": "yes",
+            "ipopt.tol": _TOLERANCE,
+            "ipopt.max_iter": 200,
+        }
+    return options | {
+        "structure_detection": "manual",
+        "N": horizon,
+        "nx": states,
+        "nu": controls,
+        "ng": path_rows,
+        "equality": equality,
+        "fatrop.print_level": 0,
+        "fatrop.tol": _TOLERANCE,
+        "fatrop.max_iter": 200,
+    }

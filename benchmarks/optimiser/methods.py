@@ -1,0 +1,126 @@
+"""The optimisers that are compared, each behind one call that is timed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+
+from benchmarks.optimiser.casadi_method import SOLVERS, CasadiMethod, installed
+from benchmarks.optimiser.instances import Instance
+from benchmarks.optimiser.price import target_points
+from benchmarks.optimiser.solved import Solved, stopwatch_us, timed
+from fsw.model.airframe import AIRFRAME
+from fsw.model.prediction import INPUTS, Array, condense, to_vector
+from fsw.mpc.ocp import Ocp
+from fsw.mpc.planner import Planner
+from fsw.mpc.planner_config import PlannerConfig
+from fsw.mpc.slsqp_solver import Gradients, SlsqpSolver
+from fsw.signals import Plan, SafeSet
+
+_ITERATIONS = (1, 2, 3)
+
+
+class Method(Protocol):
+    """One optimiser for one horizon and safe set."""
+
+    def solve(self, instance: Instance, guess: Array, optimum: Array) -> Solved:
+        """Time one instance.
+
+        Args:
+            instance: The question and those before it.
+            guess: Inputs (6 n,) [m/s^2, rad/s^2] of the running plan, moved on by one period.
+            optimum: Inputs (6 n,) [m/s^2, rad/s^2] of the converged solution.
+        """
+        ...
+
+
+Build = Callable[[PlannerConfig, SafeSet], Method]
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """A method by name; ``build`` is None where its package is not installed."""
+
+    name: str
+    sqp_iterations: int | None  # None: until it converges
+    build: Build | None
+
+
+class PlannerMethod:
+    """The planner as it flies, all of it: request in, plan out."""
+
+    def __init__(self, config: PlannerConfig, safe_set: SafeSet, iterations: int) -> None:
+        self._planner = Planner(replace(config, sqp_iterations=iterations), AIRFRAME, stopwatch_us)
+        self._planner.warm_up()
+
+    def solve(self, instance: Instance, guess: Array, optimum: Array) -> Solved:
+        """See ``Method``; ``guess`` and ``optimum`` (6 n,) [m/s^2, rad/s^2] are not used."""
+        for request in instance.before:
+            self._planner.plan(request)
+        plan, spent = timed(lambda: self._planner.plan(instance.request))
+        if not isinstance(plan, Plan):
+            return Solved(spent, None, None)
+        timings = plan.timings
+        return Solved(
+            spent, flat(plan), plan.sqp_iterations, timings.linearise_us, timings.solve_us
+        )
+
+
+class SlsqpMethod:
+    """The paper's optimiser, from u = 0 as in the paper."""
+
+    def __init__(self, config: PlannerConfig, safe_set: SafeSet, gradients: Gradients) -> None:
+        model = condense(AIRFRAME, config.period, config.horizon)
+        self._ocp = Ocp(config, model, safe_set)
+        self._solver = SlsqpSolver(gradients)
+
+    def solve(self, instance: Instance, guess: Array, optimum: Array) -> Solved:
+        """See ``Method``; ``guess`` and ``optimum`` (6 n,) [m/s^2, rad/s^2] are not used."""
+        start, targets = to_vector(instance.request.start), target_points(instance.request)
+        solution, spent = timed(lambda: self._solver.minimise(self._ocp, start, targets))
+        inputs = solution.x[: len(guess)].copy() if solution.usable else None
+        return Solved(spent, inputs, solution.iterations)
+
+
+def entries() -> tuple[Entry, ...]:
+    """Everything that is compared, in the order of the table."""
+
+    def planner(solver: str, iterations: int) -> Build:
+        return lambda config, safe_set: PlannerMethod(
+            replace(config, solver=solver), safe_set, iterations
+        )
+
+    def slsqp(gradients: Gradients) -> Build:
+        return lambda config, safe_set: SlsqpMethod(config, safe_set, gradients)
+
+    def casadi(solver: str) -> Build:
+        return lambda config, safe_set: CasadiMethod(config, safe_set, solver)
+
+    return (
+        *(Entry("clarabel", count, planner("clarabel", count)) for count in _ITERATIONS),
+        Entry("slsqp-numeric", None, slsqp("numeric")),
+        Entry("slsqp-analytic", None, slsqp("analytic")),
+        *(
+            Entry(f"casadi-{name}", None, casadi(name) if installed(name) else None)
+            for name in SOLVERS
+        ),
+    )
+
+
+def guess_for(planner: Planner, instance: Instance) -> Array:
+    """The running plan moved on by one period, as the planner guesses."""
+    inputs = np.zeros(0)
+    for request in instance.before:
+        plan = planner.plan(request)
+        inputs = flat(plan) if isinstance(plan, Plan) else np.zeros(0)
+    if not len(inputs):
+        return np.zeros(INPUTS * (len(instance.request.targets) - 1))
+    return np.concatenate((inputs[INPUTS:], inputs[-INPUTS:]))
+
+
+def flat(plan: Plan) -> Array:
+    """Inputs of a plan, (6 n,)."""
+    return np.array([(*u.a, u.yaw_acc, *u.qdd_arm) for u in plan.inputs]).ravel()

@@ -1,0 +1,60 @@
+"""What a plan is worth: its cost on the nonlinear problem, whichever method found it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fsw.barriers.constraint_block import TargetPoints
+from fsw.model.airframe import AIRFRAME
+from fsw.model.prediction import INPUTS, Array, condense, to_vector
+from fsw.mpc.ocp import Ocp
+from fsw.mpc.planner_config import PlannerConfig
+from fsw.signals import PlanRequest, SafeSet
+
+_MOST_ITERATIONS = 60
+_STAYS = 1e-7  # m/s^2 and rad/s^2
+
+
+class Judge:
+    """Prices inputs, and knows the converged solution of a request."""
+
+    def __init__(self, config: PlannerConfig, safe_set: SafeSet) -> None:
+        self._ocp = Ocp(config, condense(AIRFRAME, config.period, config.horizon), safe_set)
+        self._unknowns = INPUTS * config.horizon
+
+    def price(self, request: PlanRequest, inputs: Array) -> float:
+        """Cost of ``inputs`` (6 n,) [m/s^2, rad/s^2] with the smallest slacks that admit them."""
+        ocp = self._ocp
+        ocp.linearise(to_vector(request.start), inputs, target_points(request))
+        program = ocp.program
+        return float(ocp.cost + program.penalty @ program.least_slacks(inputs))
+
+    def converged(self, request: PlanRequest, guess: Array) -> tuple[Array, float]:
+        """Inputs and price after programs from ``guess`` (6 n,) [m/s^2, rad/s^2] until they stay.
+
+        Where they keep on changing (the directions of eq 23 turn with the iterate) the best
+        that was met counts.
+        """
+        start, targets = to_vector(request.start), target_points(request)
+        inputs, best = guess, (guess, self.price(request, guess))
+        for _ in range(_MOST_ITERATIONS):
+            self._ocp.linearise(start, inputs, targets)
+            solution = self._ocp.solve()
+            if not solution.usable:
+                break
+            step = solution.x[: self._unknowns] - inputs
+            inputs = solution.x[: self._unknowns]
+            price = self.price(request, inputs)
+            best = min(best, (inputs, price), key=lambda known: known[1])
+            if np.abs(step).max() < _STAYS:
+                return inputs, price
+        return best
+
+
+def target_points(request: PlanRequest) -> TargetPoints:
+    """The reference at the nodes as arrays."""
+    return TargetPoints(
+        np.array([target.p_WE for target in request.targets]),
+        np.array([target.v_WE for target in request.targets]),
+        np.array([target.yaw for target in request.targets]),
+    )

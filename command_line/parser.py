@@ -1,0 +1,43 @@
+"""An argument parser whose errors are one sentence with the nearest known name."""
+
+from __future__ import annotations
+
+import argparse
+import difflib
+import sys
+from collections.abc import Iterable
+from typing import NoReturn
+
+COULD_NOT_START = 2  # exit code
+
+
+class Parser(argparse.ArgumentParser):
+    """Options in full only; the first unknown one is named."""
+
+    def __init__(self, prog: str, description: str) -> None:
+        super().__init__(prog=prog, description=description, allow_abbrev=False)
+
+    def read(self, argv: list[str] | None) -> argparse.Namespace:
+        """Parse or exit with code 2."""
+        arguments, unknown = self.parse_known_args(argv)
+        if unknown:
+            first = next((word for word in unknown if word.startswith("-")), unknown[0])
+            self.error(unknown_name("option", first.partition("=")[0], self._option_names()))
+        return arguments
+
+    def error(self, message: str) -> NoReturn:
+        """Say what is wrong in one sentence and exit with code 2."""
+        print(f"{self.prog}: {message.removeprefix('argument ')}", file=sys.stderr)
+        raise SystemExit(COULD_NOT_START)
+
+    def _option_names(self) -> list[str]:
+        shown = (action for action in self._actions if action.help != argparse.SUPPRESS)
+        return [name for action in shown for name in action.option_strings]
+
+
+def unknown_name(what: str, name: str, known: Iterable[str]) -> str:
+    """A sentence about a name that does not exist."""
+    names = list(known)
+    nearest = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
+    hint = f"did you mean {nearest[0]}?" if nearest else f"known: {', '.join(names)}"
+    return f"unknown {what} {name}; {hint}"

@@ -1,0 +1,87 @@
+"""What an option's word may be: each returns a parser that refuses with what is allowed."""
+
+from __future__ import annotations
+
+import math
+from argparse import ArgumentTypeError
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from command_line.parser import unknown_name
+
+LONGEST_S = 1e9
+LARGEST_SEED = (1 << 63) - 1
+
+
+def whole(least: int = 0, most: int = LARGEST_SEED) -> Callable[[str], int]:
+    """A whole number from ``least`` to ``most``."""
+
+    def parse(text: str) -> int:
+        if not text.isdecimal() or not least <= int(text) <= most:
+            raise ArgumentTypeError(f"{text!r} is not a whole number from {least} to {most}")
+        return int(text)
+
+    return parse
+
+
+def number(least: float, most: float, unit: str) -> Callable[[str], float]:
+    """A number from ``least`` to ``most``, both in the ``unit`` that the sentence names [unit]."""
+
+    def parse(text: str) -> float:
+        value = _float(text)
+        if not least <= value <= most:
+            allowed = f"a number from {least:g} to {most:g} {unit}".rstrip()
+            raise ArgumentTypeError(f"{text!r} is not {allowed}")
+        return value
+
+    return parse
+
+
+def seconds(text: str) -> float:
+    """A time that is more than nothing [s]."""
+    value = _float(text)
+    if not 0.0 < value <= LONGEST_S:
+        raise ArgumentTypeError(f"{text!r} is not a positive number of seconds, such as 20")
+    return value
+
+
+def several(parse: Callable[[str], int], example: str) -> Callable[[str], tuple[int, ...]]:
+    """Numbers with commas between them."""
+
+    def parse_all(text: str) -> tuple[int, ...]:
+        try:
+            return tuple(parse(part) for part in text.split(","))
+        except ArgumentTypeError as error:
+            raise ArgumentTypeError(f"{error}; several are written as {example}") from None
+
+    return parse_all
+
+
+def one_of(what: str, *names: str, old: Mapping[str, str] | None = None) -> Callable[[str], str]:
+    """One of these names; ``old`` maps names of earlier releases to today's."""
+
+    def parse(text: str) -> str:
+        name = (old or {}).get(text, text)
+        if name not in names:
+            hint = unknown_name(what, f"'{text}'", names)
+            known = "" if "known:" in hint else f" (known: {', '.join(names)})"
+            raise ArgumentTypeError(hint + known)
+        return name
+
+    return parse
+
+
+def output_file(text: str) -> str:
+    """A file that can be made, or ``-`` for standard output."""
+    if text != "-" and Path(text).is_dir():
+        raise ArgumentTypeError(f"cannot write {text}: it is a directory")
+    if text != "-" and not Path(text).parent.is_dir():
+        raise ArgumentTypeError(f"cannot write {text}: its directory does not exist")
+    return text
+
+
+def _float(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan

@@ -1,0 +1,43 @@
+"""The table of topics in docs/reference/flight-log.md."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from fsw.log.topics import TOPICS
+from messages.ground_truth import TRUTH_TOPICS
+from messages.ulog import Field, Topic
+
+BEGIN: Final = "<!-- topics: make pages -->\n"
+END: Final = "<!-- end -->"
+
+
+def reference() -> str:
+    """The topics as Markdown: a table of them, then the fields of each."""
+    rows = ["| topic | written | content |", "|---|---|---|"]
+    every = (*TOPICS, *TRUTH_TOPICS)
+    rows += [f"| [`{t.name}`](#{t.name}) | {t.when} | {t.about} |" for t in every]
+    return "\n".join(rows) + "\n\n" + "\n".join(_fields(topic) for topic in every) + "\n"
+
+
+def inserted(page: str) -> str:
+    """The page with the table as it should be.
+
+    Raises:
+        ValueError: The page has no place for it.
+    """
+    before, begin, rest = page.partition(BEGIN)
+    _, end, after = rest.partition(END)
+    if not begin or not end:
+        raise ValueError("the page has no place for the topics")
+    return f"{before}{begin}{reference()}{end}{after}"
+
+
+def _fields(topic: Topic) -> str:
+    rows = [f"### {topic.name}\n", "| field | type | |", "|---|---|---|"]
+    rows += [f"| `{field.name}` | {_type(field)} | {field.note} |" for field in topic.fields]
+    return "\n".join(rows) + "\n"
+
+
+def _type(field: Field) -> str:
+    return field.declared.split(" ")[0]

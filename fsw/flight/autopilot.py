@@ -1,0 +1,319 @@
+"""One tick of the flight software, top to bottom: (state, inputs) -> (state, outputs).
+
+No clock, socket, thread or random number: real time, lockstep, replay and tests all call this.
+``Autopilot.tick`` reads in the order things happen.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from fsw.control.cascade import Cascade, CascadeMemory, at_rest, in_hover
+from fsw.control.safety_gate import gate
+from fsw.estimation.dead_reckoning import moved_on
+from fsw.estimation.estimator import estimate_state
+from fsw.flight.commander import Commander, acknowledgement
+from fsw.flight.failsafe import FAULTS
+from fsw.flight.modes.mission import with_update
+from fsw.flight.modes.offboard import receive, report
+from fsw.flight.plan_exchange import PlanExchange, measured_state, nominal_at_rest, requested
+from fsw.flight.reference_horizon import ReferenceHorizon
+from fsw.flight.safe_set import SafeSetCheck
+from fsw.flight.state import FlightState, PlanMemory
+from fsw.model.battery import drained
+from fsw.model.nominal import REST_INPUT
+from fsw.mpc.reference import merge
+from fsw.parameters.consistency import Finding
+from fsw.parameters.flight_config import FlightConfig
+from fsw.signals import (
+    STOPPED,
+    ActuatorCommand,
+    BatteryState,
+    CommandAck,
+    CommandResult,
+    FlightSnapshot,
+    Mode,
+    PlanInput,
+    PlanRequest,
+    PredictionState,
+    SafeSet,
+    SensorFrame,
+    Severity,
+    StateEstimate,
+    StatusText,
+    TickInputs,
+    TickOutputs,
+    Vec2,
+)
+
+_STILL = SensorFrame(
+    t_us=1_000_000,
+    p_WB=(0.0, 0.0, -1.0),
+    v_WB=(0.0, 0.0, 0.0),
+    q_WB=(1.0, 0.0, 0.0, 0.0),
+    gyro_B=(0.0, 0.0, 0.0),
+    accel_B=(0.0, 0.0, -9.81),
+    q_arm=(0.0, 0.0),
+    qd_arm=(0.0, 0.0),
+)
+# N m s/rad, about critical for the hanging arm: it is let down beside walls as well.
+_ARM_DAMPING: Vec2 = (0.15, 0.04)
+
+
+class Autopilot:
+    """The tick of one configuration; holds only what never changes in flight."""
+
+    def __init__(self, config: FlightConfig) -> None:
+        self.config = config
+        tick = config.tick_period_us * 1e-6
+        self._safe_sets = SafeSetCheck(config)
+        self._commander = Commander(config)
+        self._horizon = ReferenceHorizon(config)
+        self._plans = PlanExchange(config)
+        self._cascade = Cascade(config.airframe, config.tuning, config.inner, tick)
+        self._ticks_per_plan = config.mpc_period_us // config.tick_period_us
+
+    def warm_up(self) -> None:
+        """Compile every kernel of the tick, before anything flies."""
+        estimate = estimate_state(_STILL)
+        assert estimate is not None
+        nominal = self._plans.step(nominal_at_rest(estimate), REST_INPUT)
+        self._cascade.step(in_hover(self.config.airframe, estimate), estimate, nominal, REST_INPUT)
+
+    def analyse(self, safe_set: SafeSet) -> tuple[Finding, ...]:
+        """What speaks for and against keeping a safe set with this configuration."""
+        return self._safe_sets.analyse(safe_set)
+
+    def tick(self, state: FlightState, inputs: TickInputs) -> tuple[FlightState, TickOutputs]:
+        """Everything the vehicle does at one instant.
+
+        Args:
+            state: What the last tick left.
+            inputs: One sensor frame and what arrived since the last tick.
+
+        Returns:
+            The state for the next tick and everything this one says.
+        """
+        now_us, texts = inputs.sensors.t_us, list[StatusText]()
+        state, estimate = _estimate(state, inputs)
+        state = self._receive(state, inputs, texts)
+        if estimate is None:
+            return state, _blind(inputs, texts)
+
+        acks: list[CommandAck] = []
+        if inputs.commands:
+            state, acks = self._commander.handle_commands(state, estimate, inputs.commands, texts)
+        state = self._commander.check_failsafes(state, estimate, texts)
+        state = self._commander.check_mode_completion(state, estimate, texts)
+
+        ticks = self._elapsed_ticks(state, now_us)
+        index, per_plan = state.index + ticks, self._ticks_per_plan
+        planning_due = index // per_plan != state.index // per_plan
+        nominal, plan, u = state.nominal, state.plan, REST_INPUT
+        if state.vehicle.flies and nominal is not None:
+            nominal, plan, u = self._plans.follow(plan, nominal, inputs.plan, now_us, ticks)
+        request = None
+        if planning_due:
+            if state.vehicle.flies and nominal is not None:
+                state, request, plan = self._request_plan(state, estimate, nominal, plan, now_us)
+            state = self._report_slowly(state, estimate, now_us)
+        sent, memory, replaced = self._actuate(state, estimate, nominal, u, ticks)
+        state = FlightState(
+            index=index,
+            t_us=now_us,
+            estimate=estimate,
+            invalid_ticks=state.invalid_ticks,
+            nominal=nominal,
+            output_replaced=replaced,
+            cascade=memory,
+            vehicle=state.vehicle,
+            mission=state.mission,
+            plan=plan,
+            constraints=state.constraints,
+            reference=state.reference,
+            tuning=state.tuning,
+            setpoint=state.setpoint,
+            offboard=state.offboard,
+            battery=state.battery,
+            arming_refusal=state.arming_refusal,
+        )
+        snapshot = _snapshot(state, estimate, u, inputs)
+        return state, TickOutputs(sent, snapshot, request, tuple(acks), tuple(texts))
+
+    def _receive(
+        self, state: FlightState, inputs: TickInputs, texts: list[StatusText]
+    ) -> FlightState:
+        """Take in targets, safe set, mission, setpoints and a ground station's heartbeat."""
+        now_us = inputs.sensors.t_us
+        if inputs.targets or inputs.safe_set is not None or inputs.mission is not None:
+            stream = merge(state.mission.stream, inputs.targets, now_us)
+            mission = self._safe_sets.receive(
+                replace(state.mission, stream=stream),
+                inputs.mission,
+                inputs.safe_set,
+                texts,
+                flies=state.vehicle.flies,
+            )
+            state = replace(state, mission=mission)
+            if inputs.mission is not None:
+                state = with_update(state, inputs.mission, self.config, now_us)
+        if inputs.ground_station_heard:
+            state = replace(state, vehicle=replace(state.vehicle, gcs_heard_us=now_us))
+        heard = (inputs.motion, inputs.attitude, inputs.joints) != (None, None, None)
+        if heard or inputs.refused_setpoints:
+            state = replace(state, offboard=receive(state.offboard, inputs, self.config))
+        return state
+
+    def _elapsed_ticks(self, state: FlightState, now_us: int) -> int:
+        """Ticks since the last one: more than one where sensor frames were missed."""
+        elapsed = (now_us - state.t_us) // self.config.tick_period_us
+        return min(max(elapsed, 1), self.config.catch_up_ticks) if state.index >= 0 else 1
+
+    def _request_plan(
+        self,
+        state: FlightState,
+        estimate: StateEstimate,
+        nominal: PredictionState,
+        plan: PlanMemory,
+        now_us: int,
+    ) -> tuple[FlightState, PlanRequest, PlanMemory]:
+        """Ask the planner for what takes effect a fixed delay from now."""
+        config = self.config
+        apply_us = now_us + config.plan_delay_ticks * config.tick_period_us
+        mode = self._commander.mode(state)
+        state, (targets, joints) = self._horizon(mode, state, estimate, apply_us)
+        measured = measured_state(estimate, self._cascade.motion(state.cascade, estimate))
+        start, from_nominal = self._plans.start(plan, nominal, measured, now_us)
+        request = PlanRequest(
+            plan_id=plan.next_id,
+            t_apply_us=apply_us,
+            start=start,
+            targets=targets,
+            safe_set=state.mission.safe_set,
+            from_nominal=from_nominal,
+            joint_targets=joints,
+        )
+        return state, request, requested(plan, apply_us)
+
+    def _report_slowly(
+        self, state: FlightState, estimate: StateEstimate, now_us: int
+    ) -> FlightState:
+        """Reference, margins, arming checks and battery, once a planning period."""
+        target = self._commander.mode(state).target(state, now_us)
+        return replace(
+            state,
+            constraints=self._safe_sets.margins(state.mission.safe_set, estimate, target),
+            reference=target if state.vehicle.flies else None,
+            arming_refusal=self._commander.arming_refusal(state, estimate),
+            battery=self._battery(state),
+        )
+
+    def _battery(self, state: FlightState) -> BatteryState:
+        thrust = state.cascade.commanded.rotor_thrust
+        period = 1e-6 * self.config.mpc_period_us
+        limits = self.config.limits
+        levels = (limits.battery_low, limits.battery_critical, limits.battery_emergency)
+        return drained(self.config.battery, levels, state.battery, thrust, period)
+
+    def _actuate(
+        self,
+        state: FlightState,
+        estimate: StateEstimate,
+        nominal: PredictionState | None,
+        u: PlanInput,
+        ticks: int,
+    ) -> tuple[ActuatorCommand, CascadeMemory, bool]:
+        """Close the loops, idle or stay still; the safety gate is the last law."""
+        memory, wanted = state.cascade, STOPPED
+        if state.vehicle.flies and nominal is not None:
+            wanted, memory = self._cascade.step(memory, estimate, nominal, u, ticks)
+        elif state.vehicle.armed:
+            idle = self.config.limits.idle_thrust
+            wanted = ActuatorCommand((idle, idle, idle, idle), _let_down(estimate))
+            memory = at_rest(self.config.airframe, estimate)
+        sent, replaced = gate(
+            self.config.airframe, wanted, state.cascade.commanded, state.vehicle.armed
+        )
+        if replaced:
+            # What made the command no number is in the loops' new memory too: forget it.
+            memory = state.cascade
+        return sent, memory.after_sending(sent), replaced
+
+
+def _estimate(state: FlightState, inputs: TickInputs) -> tuple[FlightState, StateEstimate | None]:
+    """The estimate of now, or the last valid one; invalid ones are counted."""
+    valid = estimate_state(inputs.sensors)
+    if valid is None:
+        return replace(state, invalid_ticks=state.invalid_ticks + 1), state.estimate
+    if inputs.stale_us:
+        valid = moved_on(valid, 1e-6 * inputs.stale_us)
+    return (replace(state, invalid_ticks=0) if state.invalid_ticks else state), valid
+
+
+def _let_down(estimate: StateEstimate) -> Vec2:
+    """Joint torques that let a folded arm hang without swinging through."""
+    (rate1, rate2), (damping1, damping2) = estimate.qd_arm, _ARM_DAMPING
+    return -damping1 * rate1, -damping2 * rate2
+
+
+def _snapshot(
+    state: FlightState, estimate: StateEstimate, u: PlanInput, inputs: TickInputs
+) -> FlightSnapshot:
+    vehicle, plan, goal = state.vehicle, state.plan, state.setpoint.goal
+    flies = vehicle.flies and state.nominal is not None
+    return FlightSnapshot(
+        t_us=estimate.t_us,
+        mode=vehicle.mode,
+        armed=vehicle.armed,
+        estimate=estimate,
+        reference=state.reference,
+        plan_state=state.nominal if flies else None,
+        plan_input=u if flies else None,
+        actuators=state.cascade.commanded,
+        plan=plan.running,
+        plan_status=plan.status,
+        counters=plan.counters,
+        constraints=state.constraints,
+        failures=tuple([c.value for c in vehicle.conditions if c in FAULTS]),
+        landed=vehicle.landed,
+        home=vehicle.home,
+        battery=state.battery,
+        arming_refusal=state.arming_refusal,
+        offboard=report(state, inputs.sensors.t_us),
+        intended_mode=vehicle.intended_mode,
+        mission=state.mission.flight.progress,
+        failsafe_from=vehicle.failsafe_from,
+        orbit=goal.orbit if vehicle.mode is Mode.ORBIT and goal is not None else None,
+        accel_B=inputs.sensors.accel_B,
+    )
+
+
+def _blind(inputs: TickInputs, texts: list[StatusText]) -> TickOutputs:
+    """Before the first valid sensor frame: nothing moves, and commands are refused."""
+    zero = (0.0, 0.0, 0.0)
+    level = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+    nowhere = StateEstimate(
+        inputs.sensors.t_us, zero, zero, level, zero, 0.0, (0.0, 0.0), (0.0, 0.0)
+    )
+    empty = FlightState()
+    snapshot = FlightSnapshot(
+        t_us=inputs.sensors.t_us,
+        mode=Mode.DISARMED,
+        armed=False,
+        estimate=nowhere,
+        reference=None,
+        plan_state=None,
+        plan_input=None,
+        actuators=STOPPED,
+        plan=None,
+        plan_status=empty.plan.status,
+        counters=empty.plan.counters,
+        constraints=empty.constraints,
+    )
+    acks = [
+        acknowledgement(command, CommandResult.TEMPORARILY_REJECTED) for command in inputs.commands
+    ]
+    if acks:
+        reason = "command refused: there is no valid state estimate yet"
+        texts.append(StatusText(Severity.CRITICAL, reason))
+    return TickOutputs(STOPPED, snapshot, None, tuple(acks), tuple(texts))

@@ -1,0 +1,396 @@
+"""The commander: commands, failsafes and completed modes move the vehicle between modes.
+
+Every function takes a state and returns one; almost every tick it is the same object.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from fsw.control.cascade import at_rest, in_hover
+from fsw.flight import arming, failsafe
+from fsw.flight.command_dedup import answered_before, remember
+from fsw.flight.command_handlers import Decision, decide
+from fsw.flight.failsafe import FailsafeContext
+from fsw.flight.land_detector import standing_unclear, stands
+from fsw.flight.mission_sequencer import refusal as mission_refusal
+from fsw.flight.modes import MODES
+from fsw.flight.modes.base import CommandContext, FlightMode, Handover
+from fsw.flight.modes.hold import stop
+from fsw.flight.modes.mission import left as mission_left
+from fsw.flight.modes.mission import with_update
+from fsw.flight.modes.offboard import is_fresh
+from fsw.flight.plan_exchange import nominal_at_rest
+from fsw.flight.setpoint_generator import PositionGoal, SetpointGenerator
+from fsw.flight.state import FlightState, PlanMemory, SetpointMemory
+from fsw.model.kinematics import point_in_flight
+from fsw.mpc.reference import still_at
+from fsw.parameters.flight_config import FlightConfig
+from fsw.signals import (
+    Command,
+    CommandAck,
+    CommandResult,
+    EndEffectorTarget,
+    Home,
+    MissionUpdate,
+    Mode,
+    MotionSetpoint,
+    Severity,
+    StateEstimate,
+    StatusText,
+    Vec2,
+)
+
+
+class Commander:
+    """Moves the vehicle of one configuration between modes."""
+
+    def __init__(self, config: FlightConfig) -> None:
+        self._config = config
+        self._generator = SetpointGenerator(config)
+        self._modes: dict[Mode, FlightMode] = {mode: kind(config) for mode, kind in MODES.items()}
+        self._no_mode = FlightMode(config)  # disarmed or terminated
+
+    def mode(self, state: FlightState) -> FlightMode:
+        """The flight mode of now; a vehicle in none stays where it is."""
+        return self._modes.get(state.vehicle.mode, self._no_mode)
+
+    def handle_commands(
+        self,
+        state: FlightState,
+        estimate: StateEstimate,
+        commands: tuple[Command, ...],
+        texts: list[StatusText],
+    ) -> tuple[FlightState, list[CommandAck]]:
+        """Carry out commands in the order they came; a repeated one is acknowledged again only."""
+        acks = []
+        for command in commands:
+            request, memory = command.request, state.vehicle.answered
+            before = answered_before(memory, request, estimate.t_us)
+            if before is not None:
+                result = before.result
+            else:
+                decision = decide(command, self.context(state, estimate), self._modes)
+                result = decision.result
+                texts += _reason(decision)
+                state = self._carry_out(state, decision, estimate, texts)
+                memory = remember(state.vehicle.answered, request, result, estimate.t_us)
+                state = replace(state, vehicle=replace(state.vehicle, answered=memory))
+            acks.append(acknowledgement(command, result))
+        return state, acks
+
+    def context(self, state: FlightState, estimate: StateEstimate) -> CommandContext:
+        """What a decision may depend on now."""
+        limits, vehicle, stream = self._config.limits, state.vehicle, state.mission.stream
+        setpoint_limits, goal = self._config.steering, state.setpoint.goal
+        asked = goal.joints if goal is not None else None
+        return CommandContext(
+            mode=vehicle.mode,
+            landed=vehicle.landed,
+            estimate_valid=state.invalid_ticks == 0,
+            targets_ahead=bool(stream) and stream[-1].t_us >= estimate.t_us,
+            standing_unclear=standing_unclear(self._config, estimate),
+            inconsistent="; ".join(state.mission.refusals),
+            mission=state.mission.flight.progress,
+            mission_refusal=mission_refusal(state.mission.flight, vehicle.landed),
+            setpoint_fresh=is_fresh(self._config, state, estimate.t_us),
+            position=estimate.p_WB,
+            yaw=estimate.yaw,
+            joints=asked or estimate.q_arm,
+            home=vehicle.home,
+            safe_set=state.mission.safe_set,
+            climb_range=(limits.airborne_height, limits.takeoff_climb_most),
+            airframe=self._config.airframe,
+            charge=state.battery.charge,
+            speed=vehicle.speed or setpoint_limits.cruise_speed,
+            max_speed=setpoint_limits.speed,
+            yaw_rate=setpoint_limits.yaw_rate,
+            acceleration=setpoint_limits.acceleration,
+        )
+
+    def arming_refusal(self, state: FlightState, estimate: StateEstimate) -> str:
+        """Why the vehicle cannot be armed now, for telemetry; empty if it could be, or is."""
+        if state.vehicle.armed:
+            return ""
+        if state.vehicle.mode is Mode.FAULT:
+            return "terminated: restart the flight software"
+        return arming.refusal(self.context(state, estimate)) or ""
+
+    def check_failsafes(
+        self, state: FlightState, estimate: StateEstimate, texts: list[StatusText]
+    ) -> FlightState:
+        """Report each condition once, when it becomes active, and act on it then."""
+        before = state.vehicle.conditions
+        if state.vehicle.mode is Mode.FAULT:
+            return state  # what ended the flight stays on show
+        rows = failsafe.active(self._failsafe_context(state, estimate))
+        if not rows and not before:
+            return state
+        now = tuple([row.condition for row in rows])
+        if now == before:
+            return state
+        state = replace(state, vehicle=replace(state.vehicle, conditions=now))
+        for row in rows:
+            if row.condition in before or state.vehicle.mode is Mode.FAULT:
+                continue
+            context = self._failsafe_context(state, estimate)
+            action = row.action(context)
+            if action is not failsafe.Action.NONE:
+                texts.append(StatusText(*failsafe.report(row, context, action)))
+            if action.mode is not None:
+                state = self._fail_safe(state, action.mode, estimate, texts)
+        return state
+
+    def _failsafe_context(self, state: FlightState, estimate: StateEstimate) -> FailsafeContext:
+        vehicle, plan, now_us = state.vehicle, state.plan, estimate.t_us
+        return FailsafeContext(
+            limits=self._config.limits,
+            mode=vehicle.mode,
+            manual=self.mode(state).manual,
+            armed=vehicle.armed,
+            flies=vehicle.flies,
+            invalid_ticks=state.invalid_ticks,
+            up=estimate.R_WB[8],
+            plan_age_us=now_us - plan.since_us,
+            plan_period_us=self._config.mpc_period_us,
+            plan_refused=plan.refused,
+            output_replaced=state.output_replaced,
+            setpoint_fresh=is_fresh(self._config, state, now_us),
+            gcs_silent_us=now_us - vehicle.gcs_heard_us if vehicle.gcs_heard_us >= 0 else -1,
+            battery=state.battery,
+        )
+
+    def _fail_safe(
+        self, state: FlightState, mode: Mode, estimate: StateEstimate, texts: list[StatusText]
+    ) -> FlightState:
+        """Take the vehicle over; a pilot's next mode takes it back."""
+        if mode is Mode.FAULT:
+            return self._switch(state, mode, "terminate", estimate, texts)
+        before = state.vehicle.failsafe_from or state.vehicle.mode
+        state = self._switch(state, mode, "failsafe", estimate, texts)
+        return replace(state, vehicle=replace(state.vehicle, failsafe_from=before))
+
+    def check_mode_completion(
+        self, state: FlightState, estimate: StateEstimate, texts: list[StatusText]
+    ) -> FlightState:
+        """Let the mode do its part of the tick; where it is done, the next one follows."""
+        vehicle = state.vehicle
+        if vehicle.home is None:
+            home = Home(estimate.p_WB, estimate.yaw)
+            return replace(state, vehicle=replace(vehicle, home=home))
+        if vehicle.mode is Mode.DISARMED:
+            return self._check_intended_mode(state, estimate, texts)
+        state, result = self.mode(state).update(state, estimate)
+        texts += result.texts
+        if result.lift_off:
+            return replace(self._lift_off(state, estimate), setpoint=SetpointMemory())
+        if result.next_mode is None:
+            return state
+        return self._switch(
+            state, result.next_mode, result.cause, estimate, texts, completed=result.completed
+        )
+
+    def _check_intended_mode(
+        self, state: FlightState, estimate: StateEstimate, texts: list[StatusText]
+    ) -> FlightState:
+        """Forget what was chosen before arming, where it waits too long or is gone."""
+        intended = self._modes[state.vehicle.intended_mode]
+        forgotten = intended.waits(state, estimate.t_us)
+        if forgotten is None:
+            return state
+        texts.append(StatusText(Severity.WARNING, forgotten))
+        return replace(state, vehicle=replace(state.vehicle, intended_mode=Mode.HOLD))
+
+    def _carry_out(
+        self,
+        state: FlightState,
+        decision: Decision,
+        estimate: StateEstimate,
+        texts: list[StatusText],
+    ) -> FlightState:
+        if decision.result != CommandResult.ACCEPTED:
+            return state
+        state = self._remember(state, decision, estimate)
+        if decision.arm:
+            state = self._arm(state, estimate, texts)
+        elif decision.mode is not None:
+            state = self._switch(state, decision.mode, "command", estimate, texts)
+        if decision.stop and state.setpoint.reference is not None:
+            state = replace(state, setpoint=stop(self._generator, state.setpoint, estimate))
+        if decision.goal is not None:
+            state = replace(state, setpoint=self._towards(state, decision.goal, estimate))
+        if decision.joints is not None:
+            state = replace(state, setpoint=self._with_joints(state, decision.joints, estimate))
+        return state
+
+    def _remember(
+        self, state: FlightState, decision: Decision, estimate: StateEstimate
+    ) -> FlightState:
+        """What a decision says about the flight that follows."""
+        vehicle, limits = state.vehicle, self._config.limits
+        if decision.home is not None:
+            vehicle = replace(vehicle, home=decision.home)
+        if Mode.TAKEOFF in (decision.mode, decision.intended_mode):
+            climb = limits.takeoff_climb if decision.climb is None else decision.climb
+            vehicle = replace(vehicle, climb=climb)
+        if decision.intended_mode is not None:
+            intended = decision.intended_mode
+            vehicle = replace(vehicle, intended_mode=intended, intended_us=estimate.t_us)
+        if decision.look_at is not None:
+            vehicle = replace(vehicle, look_at=decision.look_at.place)
+        if decision.speed is not None:
+            vehicle = replace(vehicle, speed=decision.speed.speed)
+            flight = replace(state.mission.flight, speed=decision.speed.speed)
+            state = replace(state, mission=replace(state.mission, flight=flight))
+        if vehicle is not state.vehicle:
+            state = replace(state, vehicle=vehicle)
+        if decision.look_at is not None:
+            state = self._turnable(state, estimate)
+        if decision.mission_step is None:
+            return state
+        step = MissionUpdate(current=decision.mission_step)
+        return with_update(state, step, self._config, estimate.t_us)
+
+    def _turnable(self, state: FlightState, estimate: StateEstimate) -> FlightState:
+        """A hold that just stays needs a setpoint to turn."""
+        holds = state.vehicle.mode is Mode.HOLD and state.vehicle.flies
+        if not holds or state.setpoint.reference is not None:
+            return state
+        reference = self._generator.begin(estimate)
+        goal = PositionGoal(MotionSetpoint(False, reference.p))
+        return replace(state, setpoint=SetpointMemory(reference, goal))
+
+    def _towards(
+        self, state: FlightState, goal: PositionGoal, estimate: StateEstimate
+    ) -> SetpointMemory:
+        """A setpoint of the body towards a goal; the arm stays as it was asked for."""
+        reference, last = state.setpoint.reference, state.setpoint.goal
+        if reference is None or reference.of_end_effector:
+            reference = self._generator.begin(estimate)
+        goal = replace(goal, joints=last.joints if last is not None else None)
+        if goal.orbit is not None:
+            goal = replace(goal, motion=replace(goal.motion, yaw=reference.yaw))
+        return SetpointMemory(reference, goal)
+
+    def _with_joints(
+        self, state: FlightState, q_arm: Vec2, estimate: StateEstimate
+    ) -> SetpointMemory:
+        """Hold the body where it is or on its way, and the arm as asked, from now on."""
+        setpoint, goal = state.setpoint, state.setpoint.goal
+        if setpoint.reference is None or goal is None or setpoint.reference.of_end_effector:
+            reference = self._generator.begin(estimate)
+            return SetpointMemory(
+                reference, PositionGoal(MotionSetpoint(False, reference.p), q_arm)
+            )
+        return replace(setpoint, goal=replace(goal, joints=q_arm))
+
+    def _arm(
+        self, state: FlightState, estimate: StateEstimate, texts: list[StatusText]
+    ) -> FlightState:
+        """Close the loops, in Hold; then go on to the mode that was chosen before arming."""
+        airframe, landed = self._config.airframe, stands(self._config, estimate)
+        intended = state.vehicle.intended_mode
+        state = self._switch(state, Mode.HOLD, "arm", estimate, texts)
+        vehicle = replace(
+            state.vehicle,
+            home=Home(estimate.p_WB, estimate.yaw),
+            landed=landed,
+            look_at=None,
+            speed=None,
+            intended_mode=Mode.HOLD,
+            conditions=tuple(c for c in state.vehicle.conditions if c not in failsafe.BATTERY),
+        )
+        state = replace(
+            state,
+            vehicle=vehicle,
+            setpoint=SetpointMemory(),
+            nominal=nominal_at_rest(estimate),
+            plan=_plan_from(state.plan, estimate),
+            cascade=at_rest(airframe, estimate) if landed else in_hover(airframe, estimate),
+        )
+        if intended is Mode.HOLD:
+            return state
+        refusal = self._modes[intended].refusal(self.context(state, estimate))
+        if refusal is None:
+            return self._switch(state, intended, "chosen before arming", estimate, texts)
+        texts.append(StatusText(Severity.CRITICAL, refusal))
+        return state
+
+    def _switch(
+        self,
+        state: FlightState,
+        mode: Mode,
+        cause: str,
+        estimate: StateEstimate,
+        texts: list[StatusText],
+        *,
+        completed: bool = False,
+    ) -> FlightState:
+        """Begin another mode.
+
+        Args:
+            state: In the mode that is left.
+            mode: That begins.
+            cause: For the operator.
+            estimate: The vehicle now.
+            texts: Takes the sentence for the operator.
+            completed: The mode that is left was done; a failsafe's mark stays.
+        """
+        before, vehicle = state.vehicle.mode, state.vehicle
+        texts.append(StatusText(Severity.INFO, f"{before.value} to {mode.value}: {cause}"))
+        handover = Handover(self._reference(state, estimate), completed)
+        follower = self._modes.get(mode, self._no_mode)
+        continues = vehicle.flies and (completed or follower.continues_reference)
+        here = point_in_flight(estimate, self._config.airframe.link_length)[0]
+        origin, yaw = here, estimate.yaw
+        if continues:
+            origin, yaw = handover.reference.p_WE, handover.reference.yaw
+        state = follower.activate(mission_left(state, mode), estimate, handover)
+        if follower.lifts_off and vehicle.landed:
+            state = self._lift_off(state, estimate)
+        vehicle = replace(
+            state.vehicle,
+            mode=mode,
+            mode_origin=origin,
+            mode_yaw=yaw,
+            mode_begin_us=estimate.t_us,
+            moved_us=estimate.t_us,
+            failsafe_from=vehicle.failsafe_from if completed else None,
+        )
+        return replace(state, vehicle=vehicle)
+
+    def _lift_off(self, state: FlightState, estimate: StateEstimate) -> FlightState:
+        """Start the fast loops where the vehicle stands."""
+        return replace(
+            state,
+            vehicle=replace(state.vehicle, landed=False),
+            nominal=nominal_at_rest(estimate),
+            plan=_plan_from(state.plan, estimate),
+        )
+
+    def _reference(self, state: FlightState, estimate: StateEstimate) -> EndEffectorTarget:
+        """Of the mode of now; where the vehicle is if it does not fly."""
+        if state.vehicle.flies:
+            return self.mode(state).target(state, estimate.t_us)
+        here = point_in_flight(estimate, self._config.airframe.link_length)[0]
+        return still_at(here, estimate.t_us, estimate.yaw)
+
+
+def acknowledgement(command: Command, result: int) -> CommandAck:
+    """The answer to its sender."""
+    request = command.request
+    return CommandAck(request.command, result, request.source_system, request.source_component)
+
+
+def _plan_from(plan: PlanMemory, estimate: StateEstimate) -> PlanMemory:
+    """No plan runs yet, and the count of requests goes on."""
+    return PlanMemory(since_us=estimate.t_us, next_id=plan.next_id, counters=plan.counters)
+
+
+def _reason(decision: Decision) -> tuple[StatusText, ...]:
+    """A decision's reason as a text for the operator."""
+    if not decision.reason:
+        return ()
+    harmless = decision.result == CommandResult.ACCEPTED and not decision.alarming
+    severity = Severity.INFO if harmless else Severity.CRITICAL
+    return (StatusText(severity, decision.reason),)

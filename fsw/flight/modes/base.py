@@ -1,0 +1,173 @@
+"""What every flight mode is to the commander and to the tick.
+
+A flight mode is one file in this folder: a subclass of ``FlightMode`` and a name in
+``fsw.signals.Mode``. Disarmed and terminated vehicles are in no flight mode.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import ClassVar
+
+from fsw.flight.setpoint_generator import PositionGoal, SetpointGenerator
+from fsw.flight.state import FlightState, SetpointMemory
+from fsw.model.airframe import AIRFRAME, Airframe
+from fsw.mpc.reference import still_at
+from fsw.parameters.flight_config import FlightConfig
+from fsw.signals import (
+    Charge,
+    EndEffectorTarget,
+    Home,
+    MissionProgress,
+    Mode,
+    SafeSet,
+    StateEstimate,
+    StatusText,
+    Vec2,
+    Vec3,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Px4Mode:
+    """A mode in PX4's numbers, so that ground stations name it and offer their buttons."""
+
+    main: int  # PX4_CUSTOM_MAIN_MODE
+    sub: int = 0  # PX4_CUSTOM_SUB_MODE_*
+    standard: int = 0  # MAV_STANDARD_MODE as announced; 0: none
+    also_standard: int = 0  # MAV_STANDARD_MODE that is understood though not announced
+    selectable: bool = True  # offered to the operator; else entered by a command of its own
+
+
+@dataclass(frozen=True, slots=True)
+class CommandContext:
+    """What commands, arming checks and the needs of a mode are decided on."""
+
+    mode: Mode
+    landed: bool
+    estimate_valid: bool
+    targets_ahead: bool  # the stream holds a point at or after now
+    standing_unclear: bool = False  # too high to stand, too low to be surely in the air
+    inconsistent: str = ""  # why the configuration cannot keep the safe set
+    mission: MissionProgress = field(default_factory=MissionProgress)
+    mission_refusal: str | None = "no mission: none was uploaded"  # None: it can be flown
+    setpoint_fresh: bool = False  # an offboard setpoint came within the last 0.5 s
+    position: Vec3 = (0.0, 0.0, 0.0)  # m, of the body
+    yaw: float = 0.0  # rad
+    joints: Vec2 = (0.0, 0.0)  # rad, asked for last or as they are
+    home: Home | None = None
+    safe_set: SafeSet = field(default_factory=SafeSet)
+    climb_range: Vec2 = (0.3, 50.0)  # m, of a takeoff
+    airframe: Airframe = AIRFRAME
+    charge: Charge = Charge.OK
+    speed: float = 1.0  # m/s, on the way to places
+    max_speed: float = 1.5  # m/s, that can be asked for
+    yaw_rate: float = 0.3  # rad/s, at most
+    acceleration: float = 1.0  # m/s^2, of a generated setpoint
+
+
+@dataclass(frozen=True, slots=True)
+class ModeResult:
+    """What a tick in a mode came to."""
+
+    next_mode: Mode | None = None  # None: the mode goes on
+    cause: str = ""  # of the change, for the operator
+    texts: tuple[StatusText, ...] = ()
+    completed: bool = True  # the mode is done; False: it cannot go on
+    lift_off: bool = False  # a vehicle that stands is to fly, in the same mode
+
+
+CONTINUE = ModeResult()
+
+
+@dataclass(frozen=True, slots=True)
+class Handover:
+    """How one mode takes over from another."""
+
+    reference: EndEffectorTarget  # of the mode that is left, now
+    completed: bool  # that mode was done; it was neither commanded nor a failsafe
+
+
+class FlightMode:
+    """One flight mode of one configuration; holds nothing that changes in flight.
+
+    ``refusal`` is what it needs, ``activate`` how it begins, ``update`` what it does each tick and
+    which mode follows when it is done, ``reference`` where the end-effector should be.
+    """
+
+    mode: ClassVar[Mode]
+    px4: ClassVar[Px4Mode]
+    enter_from: ClassVar[frozenset[Mode] | None] = None  # None: from every interruptible mode
+    interruptible: ClassVar[bool] = True  # by any other mode
+    interrupts_landing: ClassVar[bool] = False
+    before_arming: ClassVar[bool] = False  # can be chosen while disarmed, and is flown on arming
+    lifts_off: ClassVar[bool] = False  # closes the loops of a vehicle that stands
+    continues_reference: ClassVar[bool] = False  # begins where the last reference was
+    manual: ClassVar[bool] = False  # flown by an operator, whose loss is acted upon
+    external_reference: ClassVar[bool] = False  # targets from outside pass the governor
+
+    def __init__(self, config: FlightConfig) -> None:
+        self.config = config
+        self.generator = SetpointGenerator(config)
+
+    def can_follow(self, current: FlightMode) -> bool:
+        """Whether this mode can take over from another."""
+        if self.enter_from is not None:
+            return current.mode in self.enter_from
+        return current.interruptible or self.interrupts_landing
+
+    def refusal(self, context: CommandContext) -> str | None:
+        """What the mode needs and is not there."""
+        return None
+
+    def denial(self, context: CommandContext) -> str | None:
+        """What the mode needs and no waiting brings: another configuration only."""
+        return None
+
+    def activate(
+        self, state: FlightState, estimate: StateEstimate, handover: Handover
+    ) -> FlightState:
+        """Begin, in the state of the mode that is left.
+
+        Args:
+            state: ``state.vehicle.mode`` is the mode that is left.
+            estimate: The vehicle now.
+            handover: How it is left.
+        """
+        return replace(state, setpoint=SetpointMemory())
+
+    def update(self, state: FlightState, estimate: StateEstimate) -> tuple[FlightState, ModeResult]:
+        """What the mode does in each tick, and the mode that follows when it is done."""
+        return state, CONTINUE
+
+    def waits(self, state: FlightState, now_us: int) -> str | None:
+        """Why the mode, chosen before arming, is forgotten now; None: it waits on."""
+        return None
+
+    def aim(self, state: FlightState, estimate: StateEstimate) -> FlightState:
+        """Bring the setpoint's goal up to date; called once a planning period."""
+        return state
+
+    def guided(self, goal: PositionGoal, state: FlightState) -> PositionGoal:
+        """The goal with the speed and the heading that commands asked for."""
+        vehicle = state.vehicle
+        if vehicle.look_at is None and (vehicle.speed is None or goal.speed is not None):
+            return goal
+        return replace(goal, speed=goal.speed or vehicle.speed, look_at=vehicle.look_at)
+
+    def reference(self, state: FlightState, t_us: int) -> EndEffectorTarget:
+        """Where the end-effector should be at an instant, where no setpoint is generated."""
+        vehicle = state.vehicle
+        return still_at(vehicle.mode_origin, t_us, vehicle.mode_yaw)
+
+    def target(self, state: FlightState, t_us: int) -> EndEffectorTarget:
+        """Where the end-effector should be at an instant."""
+        reference = state.setpoint.reference
+        if reference is None:
+            return self.reference(state, t_us)
+        return self.generator.target(reference, t_us)
+
+
+def moved(state: FlightState, estimate: StateEstimate) -> FlightState:
+    """The state of a vehicle that moves: the land detector begins anew."""
+    return replace(state, vehicle=replace(state.vehicle, moved_us=estimate.t_us))

@@ -1,0 +1,180 @@
+"""Offboard: a ground station's setpoints for now are followed, for as long as they come."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from fsw.flight.land_detector import stands
+from fsw.flight.modes.base import CONTINUE, CommandContext, FlightMode, ModeResult, Px4Mode, moved
+from fsw.flight.offboard_setpoints import (
+    Tilt,
+    as_motion,
+    attitude_refusal,
+    joints_refusal,
+    motion_refusal,
+    tilted,
+)
+from fsw.flight.setpoint_generator import PositionGoal
+from fsw.flight.state import FlightState, OffboardMemory, SetpointMemory
+from fsw.parameters.flight_config import FlightConfig
+from fsw.signals import (
+    Mode,
+    MotionSetpoint,
+    OffboardReport,
+    SetpointKind,
+    StateEstimate,
+    TickInputs,
+    Vec3,
+)
+
+_RISING = 0.1  # m, m/s or m/s^2 upwards: the setpoint asks a standing vehicle to fly
+_SINKING = 0.1  # m that the setpoint is below the vehicle: it presses on the ground
+_NO_SETPOINTS = OffboardReport()
+
+
+class Offboard(FlightMode):
+    """PX4's OFFBOARD; what happens when setpoints stop is in ``failsafe.py``."""
+
+    mode = Mode.OFFBOARD
+    px4 = Px4Mode(6)
+    before_arming = True
+    manual = True
+
+    def refusal(self, context: CommandContext) -> str | None:
+        """Setpoints."""
+        if context.setpoint_fresh:
+            return None
+        return "not offboard: no setpoint was received in the last 0.5 s"
+
+    def waits(self, state: FlightState, now_us: int) -> str | None:
+        """Forgotten where setpoints stop."""
+        if is_fresh(self.config, state, now_us):
+            return None
+        return "offboard forgotten: setpoints stopped before arming"
+
+    def update(self, state: FlightState, estimate: StateEstimate) -> tuple[FlightState, ModeResult]:
+        """On the ground, wait for a setpoint to fly; in the air, notice that one has landed it."""
+        vehicle = state.vehicle
+        if vehicle.landed:
+            if self._asks_to_rise(state, estimate):
+                return state, ModeResult(lift_off=True)
+            return state, CONTINUE
+        if not (stands(self.config, estimate) and _presses(state, estimate)):
+            return moved(state, estimate), CONTINUE
+        if estimate.t_us - vehicle.moved_us < self.config.limits.landed_time_us:
+            return state, CONTINUE
+        return replace(state, vehicle=replace(vehicle, landed=True)), CONTINUE
+
+    def _asks_to_rise(self, state: FlightState, estimate: StateEstimate) -> bool:
+        motion = self._motion(state, estimate)[0]
+        if motion.p is not None:
+            return estimate.p_WB[2] - motion.p[2] > (0.0 if motion.of_end_effector else _RISING)
+        if motion.v is not None:
+            return -motion.v[2] > _RISING
+        return motion.a is not None and -motion.a[2] > _RISING
+
+    def aim(self, state: FlightState, estimate: StateEstimate) -> FlightState:
+        """Follow the newest setpoints."""
+        motion, tilt = self._motion(state, estimate)
+        memory, goal, reference = state.offboard, state.setpoint.goal, state.setpoint.reference
+        if reference is None or reference.of_end_effector != motion.of_end_effector:
+            reference = self.generator.begin(estimate, of_end_effector=motion.of_end_effector)
+        joints = goal.joints if goal is not None else None
+        if memory.joints is not None and self._is_young(memory.joints_us, estimate.t_us):
+            joints = memory.joints.q_arm
+        if joints is not None and reference.q_arm is None:
+            reference = replace(reference, q_arm=estimate.q_arm)
+        goal = PositionGoal(motion, joints, self.config.steering.speed)
+        setpoint = SetpointMemory(reference, goal)
+        return replace(state, setpoint=setpoint, offboard=replace(memory, tilt=tilt))
+
+    def guided(self, goal: PositionGoal, state: FlightState) -> PositionGoal:
+        """Setpoints alone say how fast and where the nose points."""
+        return goal
+
+    def _motion(self, state: FlightState, estimate: StateEstimate) -> tuple[MotionSetpoint, Tilt]:
+        memory, config = state.offboard, self.config
+        ahead = Tilt(yaw=estimate.yaw)
+        if not self._is_young(memory.motion_us, estimate.t_us):
+            # Joints alone: the body stays.
+            return MotionSetpoint(False, v=(0.0, 0.0, 0.0)), ahead
+        if memory.attitude is not None:
+            last = ahead if state.setpoint.reference is None else memory.tilt
+            tilt_limit = config.planner.limits.tilt
+            tilt = tilted(memory.attitude, last, tilt_limit, config.planner.period)
+            thrust = 4.0 * config.airframe.rotor_thrust_max * memory.attitude.thrust
+            return as_motion(tilt, thrust / state.cascade.mass), tilt
+        assert memory.motion is not None, "one of the two is young"
+        return _moved_on(memory.motion, estimate.t_us - memory.motion_us), ahead
+
+    def _is_young(self, heard_us: int, now_us: int) -> bool:
+        return _is_young(self.config, heard_us, now_us)
+
+
+def receive(memory: OffboardMemory, inputs: TickInputs, config: FlightConfig) -> OffboardMemory:
+    """Take in setpoints; what is out of range is counted and not kept."""
+    refused, accepted, now_us = inputs.refused_setpoints, 0, inputs.sensors.t_us
+    motion, attitude, joints = inputs.motion, inputs.attitude, inputs.joints
+    if motion is not None and motion_refusal(motion) is None:
+        memory = replace(memory, motion=motion, attitude=None, motion_us=now_us)
+        accepted += 1
+    if attitude is not None and attitude_refusal(attitude) is None:
+        memory = replace(memory, attitude=attitude, motion=None, motion_us=now_us)
+        accepted += 1
+    if joints is not None and joints_refusal(joints.q_arm, config.airframe) is None:
+        memory = replace(memory, joints=joints, joints_us=now_us)
+        accepted += 1
+    refused += sum(one is not None for one in (motion, attitude, joints)) - accepted
+    return replace(memory, accepted=memory.accepted + accepted, refused=memory.refused + refused)
+
+
+def is_fresh(config: FlightConfig, state: FlightState, now_us: int) -> bool:
+    """Whether a setpoint came a moment ago."""
+    return _is_young(config, max(state.offboard.motion_us, state.offboard.joints_us), now_us)
+
+
+def report(state: FlightState, now_us: int) -> OffboardReport:
+    """The setpoints of now, for telemetry."""
+    memory = state.offboard
+    if memory.accepted == memory.refused == 0:
+        return _NO_SETPOINTS
+    heard_us = max(memory.motion_us, memory.joints_us)
+    return OffboardReport(
+        kind=_kind(memory) if state.vehicle.mode is Mode.OFFBOARD else SetpointKind.NONE,
+        motion=memory.motion,
+        attitude=memory.attitude,
+        joints=memory.joints,
+        accepted=memory.accepted,
+        refused=memory.refused,
+        age_us=now_us - heard_us if heard_us >= 0 else 0,
+    )
+
+
+def _is_young(config: FlightConfig, heard_us: int, now_us: int) -> bool:
+    return heard_us >= 0 and now_us - heard_us < config.limits.setpoint_timeout_us
+
+
+def _presses(state: FlightState, estimate: StateEstimate) -> bool:
+    """Whether the setpoint is pressed on the ground."""
+    reference = state.setpoint.reference
+    if reference is None or reference.of_end_effector:
+        return False
+    return reference.p[2] - estimate.p_WB[2] > _SINKING
+
+
+def _moved_on(motion: MotionSetpoint, age_us: int) -> MotionSetpoint:
+    """A place that moves has moved since it was sent."""
+    if motion.p is None or motion.v is None or motion.along_heading:
+        return motion
+    age = 1e-6 * age_us
+    p, v = motion.p, motion.v
+    now: Vec3 = (p[0] + age * v[0], p[1] + age * v[1], p[2] + age * v[2])
+    return replace(motion, p=now)
+
+
+def _kind(memory: OffboardMemory) -> SetpointKind:
+    if memory.attitude is not None:
+        return SetpointKind.ATTITUDE
+    if memory.motion is None:
+        return SetpointKind.JOINTS
+    return SetpointKind.END_EFFECTOR if memory.motion.of_end_effector else SetpointKind.BODY

@@ -1,0 +1,24 @@
+"""Orbit: circles a point, level; entered by its own command, which names the circle."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from fsw.flight.modes.base import FlightMode, Handover, Px4Mode
+from fsw.flight.state import FlightState, SetpointMemory
+from fsw.signals import Mode, StateEstimate
+
+
+class Orbit(FlightMode):
+    """PX4's POSCTL.ORBIT."""
+
+    mode = Mode.ORBIT
+    px4 = Px4Mode(3, 1, standard=2, selectable=False)
+    manual = True
+
+    def activate(
+        self, state: FlightState, estimate: StateEstimate, handover: Handover
+    ) -> FlightState:
+        """Go on from the setpoint of now; the command sets the circle right after."""
+        last = state.setpoint
+        return replace(state, setpoint=SetpointMemory(last.reference, last.goal))

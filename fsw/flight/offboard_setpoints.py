@@ -1,0 +1,101 @@
+"""Setpoints for now: which are in range, and what they ask for."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from fsw.geometry.rotation import euler_zyx, matrix_from_quaternion
+from fsw.geometry.vectors import clamp_magnitude
+from fsw.model.airframe import GRAVITY, Airframe
+from fsw.signals import MAX_DISTANCE, AttitudeSetpoint, MotionSetpoint, Vec2, Vec3
+
+_MAX_SPEED = 20.0  # m/s; faster is a slip of the unit
+_MAX_ACCELERATION = 20.0  # m/s^2
+_MAX_RATE = 10.0  # rad/s
+_MAX_YAW = 4.0 * math.pi  # rad
+
+
+@dataclass(frozen=True, slots=True)
+class Tilt:
+    """Attitude asked for by rates, summed up."""
+
+    roll: float = 0.0  # rad
+    pitch: float = 0.0  # rad
+    yaw: float = 0.0  # rad
+
+
+def motion_refusal(setpoint: MotionSetpoint) -> str | None:
+    """Why a motion is out of any range that a vehicle like this could mean."""
+    for vector, most, what in (
+        (setpoint.p, MAX_DISTANCE, "position"),
+        (setpoint.v, _MAX_SPEED, "velocity"),
+        (setpoint.a, _MAX_ACCELERATION, "acceleration"),
+    ):
+        if vector is not None and not math.hypot(*vector) <= most:
+            return f"{what} out of range"
+    if setpoint.yaw is not None and not abs(setpoint.yaw) <= _MAX_YAW:
+        return "yaw out of range"
+    if setpoint.yaw_rate is not None and not abs(setpoint.yaw_rate) <= _MAX_RATE:
+        return "yaw rate out of range"
+    return None
+
+
+def attitude_refusal(setpoint: AttitudeSetpoint) -> str | None:
+    """Why an attitude is out of range."""
+    if not 0.0 <= setpoint.thrust <= 1.0:
+        return "thrust out of range"
+    if setpoint.q_WB is not None and not abs(math.hypot(*setpoint.q_WB) - 1.0) < 0.01:
+        return "the quaternion is not of length 1"
+    if setpoint.w_WB_B is not None and not math.hypot(*setpoint.w_WB_B) <= _MAX_RATE:
+        return "body rates out of range"
+    return None
+
+
+def joints_refusal(q_arm: Vec2, airframe: Airframe) -> str | None:
+    """Why the arm cannot have the angles ``q_arm`` [rad]."""
+    both = q_arm[0] + q_arm[1]
+    if not abs(q_arm[0]) <= airframe.joint1_limit + 1e-6:
+        return f"joint 1 at {math.degrees(q_arm[0]):.0f} deg is beyond its limit"
+    if not abs(both) <= airframe.joint12_limit + 1e-6:
+        return f"joints 1 and 2 together at {math.degrees(both):.0f} deg are beyond their limit"
+    return None
+
+
+def tilted(setpoint: AttitudeSetpoint, last: Tilt, most: float, dt: float) -> Tilt:
+    """The attitude a set-point asks for, within the tilt that is flown.
+
+    Args:
+        setpoint: Attitude, or rates that go on from the last one.
+        last: What was asked for the last time.
+        most: Largest roll and pitch [rad].
+        dt: Time since then [s].
+    """
+    if setpoint.q_WB is not None:
+        roll, pitch, yaw = euler_zyx(matrix_from_quaternion(setpoint.q_WB))
+    else:
+        wx, wy, wz = setpoint.w_WB_B or (0.0, 0.0, 0.0)
+        s, c = math.sin(last.roll), math.cos(last.roll)
+        turning = (wy * s + wz * c) / math.cos(last.pitch)
+        roll = last.roll + dt * (wx + turning * math.sin(last.pitch))
+        pitch = last.pitch + dt * (wy * c - wz * s)
+        yaw = last.yaw + dt * turning
+    return Tilt(clamp_magnitude(roll, most), clamp_magnitude(pitch, most), yaw)
+
+
+def as_motion(tilt: Tilt, specific_thrust: float) -> MotionSetpoint:
+    """The acceleration of an attitude and a thrust: the planner flies it, and keeps the barriers.
+
+    Args:
+        tilt: Attitude.
+        specific_thrust: Thrust of all rotors over the mass [m/s^2].
+    """
+    sr, cr = math.sin(tilt.roll), math.cos(tilt.roll)
+    sp, cp = math.sin(tilt.pitch), math.cos(tilt.pitch)
+    sy, cy = math.sin(tilt.yaw), math.cos(tilt.yaw)
+    a: Vec3 = (
+        -specific_thrust * (cr * sp * cy + sr * sy),
+        -specific_thrust * (cr * sp * sy - sr * cy),
+        GRAVITY - specific_thrust * cr * cp,
+    )
+    return MotionSetpoint(of_end_effector=False, a=a, yaw=tilt.yaw)

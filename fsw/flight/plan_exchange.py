@@ -1,0 +1,226 @@
+"""Between tick and planner: what to ask, when an answer begins, what to fly while it ages."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+from fsw.control.braking import Brake
+from fsw.flight.failsafe import PLAN_STALE_PERIODS
+from fsw.flight.state import PlanMemory
+from fsw.geometry.rotation import wrap_angle
+from fsw.geometry.vectors import clamp_magnitude
+from fsw.model.airframe import Airframe
+from fsw.model.nominal import NominalModel
+from fsw.model.rotors import MotionState
+from fsw.parameters.flight_config import FlightConfig
+from fsw.signals import (
+    Plan,
+    PlanFailure,
+    PlanInput,
+    PredictionState,
+    StateEstimate,
+    Vec3,
+)
+
+_JOINT_RATE = 3.0  # rad/s, which the plan stops within its horizon
+
+
+def nominal_at_rest(estimate: StateEstimate) -> PredictionState:
+    """A plan state that stands where the vehicle is."""
+    return PredictionState(
+        estimate.p_WB,
+        (0.0, 0.0, 0.0),
+        (0.0, 0.0, 0.0),
+        (0.0, 0.0),
+        (0.0, 0.0),
+        estimate.yaw,
+        0.0,
+        estimate.q_arm,
+        (0.0, 0.0),
+    )
+
+
+def measured_state(estimate: StateEstimate, motion: MotionState) -> PredictionState:
+    """The vehicle itself as a state of the prediction model."""
+    R = estimate.R_WB
+    _, wy, wz = estimate.w_WB_B
+    # ZYX yaw rate: the body rates' share about the vertical, over the cosine of pitch squared.
+    yaw_rate = (R[7] * wy + R[8] * wz) / max(R[7] * R[7] + R[8] * R[8], 1e-6)
+    return PredictionState(
+        estimate.p_WB,
+        estimate.v_WB,
+        motion.a,
+        motion.j,
+        motion.s,
+        estimate.yaw,
+        yaw_rate,
+        estimate.q_arm,
+        estimate.qd_arm,
+    )
+
+
+def with_arm_in_bounds(x: PredictionState, airframe: Airframe) -> PredictionState:
+    """The state with the arm in the nearest pose and at the nearest rate to plan from.
+
+    A hard push slings the arm about. A plan that began with it so would need seconds to catch it,
+    and the arm would follow the plan round and round.
+    """
+    th1 = clamp_magnitude(x.q_arm[0], airframe.joint1_limit)
+    th12 = clamp_magnitude(x.q_arm[0] + x.q_arm[1], airframe.joint12_limit)
+    first, second = x.qd_arm
+    rates = (clamp_magnitude(first, _JOINT_RATE), clamp_magnitude(second, _JOINT_RATE))
+    return x._replace(q_arm=(th1, th12 - th1), qd_arm=rates)
+
+
+def coast(x: PredictionState, seconds: float) -> PredictionState:
+    """A measured state a moment later, its jerk held.
+
+    Off its plan the vehicle does what the fast loop makes of the error, not what the plan's
+    input says; its own motion is the better guess.
+    """
+    t, j = seconds, (*x.j, 0.0)
+    return x._replace(
+        p=_each(lambda k: x.p[k] + t * (x.v[k] + t * (x.a[k] / 2.0 + t * j[k] / 6.0))),
+        v=_each(lambda k: x.v[k] + t * (x.a[k] + t * j[k] / 2.0)),
+        a=_each(lambda k: x.a[k] + t * j[k]),
+        yaw=x.yaw + t * x.yaw_rate,
+        q_arm=(x.q_arm[0] + t * x.qd_arm[0], x.q_arm[1] + t * x.qd_arm[1]),
+    )
+
+
+def _each(value: Callable[[int], float]) -> Vec3:
+    return value(0), value(1), value(2)
+
+
+def plan_input(plan: Plan | None, nominal: PredictionState, now_us: int, brake: Brake) -> PlanInput:
+    """The running plan's input at its age; braking where there is none young enough."""
+    if plan is not None:
+        step = (now_us - plan.t_us) // plan.period_us
+        if 0 <= step < min(PLAN_STALE_PERIODS, len(plan.inputs)):
+            return plan.inputs[step]
+    return brake(nominal)
+
+
+def take_answer(
+    memory: PlanMemory, answer: Plan | PlanFailure | None, now_us: int
+) -> tuple[PlanMemory, Plan | None]:
+    """Account for the planner: a plan starts, a refusal is counted, a missing one is noticed.
+
+    Args:
+        memory: Before this tick.
+        answer: What arrived, at most one.
+        now_us: This tick.
+
+    Returns:
+        The memory, and the plan where one starts now.
+    """
+    if memory.awaited_id < 0:
+        return memory, None
+    counters = memory.counters
+    if answer is not None and answer.plan_id == memory.awaited_id:
+        if isinstance(answer, Plan):
+            taken = replace(
+                memory,
+                awaited_id=-1,
+                running=answer,
+                since_us=answer.t_us,
+                status=answer.status,
+                refused=False,
+                counters=replace(counters, plans=counters.plans + 1),
+            )
+            return taken, answer
+        counters = replace(counters, fallbacks=counters.fallbacks + 1)
+        refused = replace(
+            memory, awaited_id=-1, status=answer.status, refused=True, counters=counters
+        )
+        return refused, None
+    if now_us >= memory.awaited_us and not memory.awaited_missed:
+        counters = replace(counters, missed_deadlines=counters.missed_deadlines + 1)
+        return replace(memory, awaited_missed=True, counters=counters), None
+    return memory, None
+
+
+class PlanExchange:
+    """Requests to the planner and its answers, for one configuration."""
+
+    def __init__(self, config: FlightConfig) -> None:
+        self._config = config
+        self._model = NominalModel(config.airframe, config.tick_period_us * 1e-6)
+        self._brake = Brake(config.airframe, config.planner.limits.tilt)
+
+    def follow(
+        self,
+        memory: PlanMemory,
+        nominal: PredictionState,
+        answer: Plan | PlanFailure | None,
+        now_us: int,
+        ticks: int,
+    ) -> tuple[PredictionState, PlanMemory, PlanInput]:
+        """Bring the plan's state to this tick, by a new plan or by one more step.
+
+        Args:
+            memory: Of the last tick.
+            nominal: The plan's state then.
+            answer: Of the planner, where one came.
+            now_us: This tick.
+            ticks: Since the last tick; more than one where some were missed.
+
+        Returns:
+            The plan's state, the memory, and the plan's input now.
+        """
+        tick_us, running = self._config.tick_period_us, memory.running
+        memory, new_plan = take_answer(memory, answer, now_us)
+        if new_plan is not None:
+            late = max(now_us - new_plan.t_us, 0) // tick_us
+            nominal = self._model.advance(new_plan.start, new_plan.inputs[0], late)
+        elif now_us > memory.since_us:
+            for ago in range(ticks, 0, -1):
+                u = plan_input(running, nominal, now_us - ago * tick_us, self._brake)
+                nominal = self._model.step(nominal, u)
+        return nominal, memory, plan_input(memory.running, nominal, now_us, self._brake)
+
+    def step(self, nominal: PredictionState, u: PlanInput) -> PredictionState:
+        """The plan's state one tick later."""
+        return self._model.step(nominal, u)
+
+    def start(
+        self,
+        memory: PlanMemory,
+        nominal: PredictionState,
+        measured: PredictionState,
+        now_us: int,
+    ) -> tuple[PredictionState, bool]:
+        """The state from which to plan, and whether it is the running plan's own.
+
+        It is that as long as the fast loop holds the vehicle to it, and the measurement otherwise:
+        with the PID inner loop, which follows no state, and after an upset. Either is moved on to
+        the instant the answer takes effect.
+        """
+        config, delay = self._config, self._config.plan_delay_ticks
+        from_nominal = (
+            config.inner == "tracking"
+            and math.dist(nominal.p, measured.p) < config.upset_distance
+            and abs(wrap_angle(nominal.yaw - measured.yaw)) < config.upset_yaw
+        )
+        if from_nominal:
+            u = plan_input(memory.running, nominal, now_us, self._brake)
+            return self._model.advance(nominal, u, delay), True
+        settled = with_arm_in_bounds(measured, config.airframe)
+        return coast(settled, delay * config.tick_period_us * 1e-6), False
+
+
+def requested(memory: PlanMemory, apply_us: int) -> PlanMemory:
+    """The memory once the next request is out; one without an answer is given up."""
+    counters = memory.counters
+    if memory.awaited_id >= 0:
+        counters = replace(counters, fallbacks=counters.fallbacks + 1)
+    return replace(
+        memory,
+        awaited_id=memory.next_id,
+        awaited_us=apply_us,
+        awaited_missed=False,
+        next_id=memory.next_id + 1,
+        counters=counters,
+    )

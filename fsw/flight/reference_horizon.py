@@ -1,0 +1,77 @@
+"""The reference over the planner's horizon, from the flight mode through the reference governor."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from fsw.flight.land_detector import height_above_ground
+from fsw.flight.modes.base import FlightMode
+from fsw.flight.reference_governor import ReferenceGovernor
+from fsw.flight.setpoint_generator import PositionGoal, ReferenceState, arrived
+from fsw.flight.state import FlightState, SetpointMemory
+from fsw.model.kinematics import point_in_flight
+from fsw.parameters.flight_config import FlightConfig
+from fsw.signals import EndEffectorTarget, MotionSetpoint, StateEstimate, Vec2
+
+_OFF_PLAN = 0.05  # m; beyond what a disturbance alone does nearly always
+
+Horizon = tuple[tuple[EndEffectorTarget, ...], tuple[Vec2, ...]]
+"""Targets at the nodes; joints at the nodes, or none where the arm is the planner's choice."""
+
+
+class ReferenceHorizon:
+    """Makes the horizons of one configuration."""
+
+    def __init__(self, config: FlightConfig) -> None:
+        self._config = config
+        self._governor = ReferenceGovernor(config)
+
+    def __call__(
+        self, mode: FlightMode, state: FlightState, estimate: StateEstimate, t_us: int
+    ) -> tuple[FlightState, Horizon]:
+        """Move the mode's setpoint on by a planning period; its horizon from ``t_us`` on."""
+        state = mode.aim(state, estimate)
+        reference, goal = state.setpoint.reference, state.setpoint.goal
+        if reference is not None and goal is not None:
+            state, (targets, joints) = self._generated(mode, state, reference, goal, estimate, t_us)
+        else:
+            nodes, period_us = self._config.planner.horizon + 1, self._config.mpc_period_us
+            targets = tuple(mode.target(state, t_us + node * period_us) for node in range(nodes))
+            joints = ()
+            if not mode.external_reference:
+                return state, (targets, joints)
+        p_WE, v_WE = point_in_flight(estimate, self._config.airframe.link_length)
+        safe_set = state.mission.safe_set
+        return state, (self._governor.limit_horizon(targets, p_WE, v_WE, safe_set), joints)
+
+    def _generated(
+        self,
+        mode: FlightMode,
+        state: FlightState,
+        reference: ReferenceState,
+        goal: PositionGoal,
+        estimate: StateEstimate,
+        t_us: int,
+    ) -> tuple[FlightState, Horizon]:
+        safe_set, waypoints, kept = state.mission.safe_set, state.setpoint.waypoints, goal
+        if self._is_off_plan(state, estimate):
+            still = MotionSetpoint(reference.of_end_effector, v=(0.0, 0.0, 0.0))
+            goal = replace(goal, motion=still, orbit=None)
+        else:
+            goal = mode.guided(goal, state)
+        reference = mode.generator.advance(reference, goal, estimate, safe_set)
+        if waypoints and goal.motion.p is not None and arrived(reference, goal.motion.p):
+            kept = goal = replace(goal, motion=replace(goal.motion, p=waypoints[0]))
+            waypoints = waypoints[1:]
+        state = replace(state, setpoint=SetpointMemory(reference, kept, waypoints))
+        return state, mode.generator.horizon(reference, goal, estimate, safe_set, t_us)
+
+    def _is_off_plan(self, state: FlightState, estimate: StateEstimate) -> bool:
+        """Whether the fast loop is not where the plan is: then nothing new is asked of it."""
+        if state.nominal is None:
+            return False
+        (x, y, z), (px, py, pz) = estimate.p_WB, state.nominal.p
+        # On the ground the plan may well be lower.
+        low = height_above_ground(self._config, estimate) < self._config.limits.airborne_height
+        return math.hypot(px - x, py - y, 0.0 if low else pz - z) > _OFF_PLAN

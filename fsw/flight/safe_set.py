@@ -1,0 +1,103 @@
+"""Which safe set is in force: the announced one and the fence together, if they can be kept."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from fsw.barriers.margins import constraint_report
+from fsw.flight.state import MissionMemory
+from fsw.model.kinematics import point_in_flight
+from fsw.parameters.consistency import Finding, analyse, loop_tube, refusals, warnings
+from fsw.parameters.flight_config import FlightConfig
+from fsw.signals import (
+    ConstraintKind,
+    ConstraintReport,
+    EndEffectorTarget,
+    MissionUpdate,
+    SafeSet,
+    Severity,
+    StateEstimate,
+    StatusText,
+)
+
+
+class SafeSetCheck:
+    """Analyses a safe set for one configuration before it is in force."""
+
+    def __init__(self, config: FlightConfig) -> None:
+        self._config = config
+        self._loop_tube = loop_tube(config)
+
+    def analyse(self, safe_set: SafeSet) -> tuple[Finding, ...]:
+        """What speaks for and against keeping a safe set with this configuration."""
+        return analyse(self._config, safe_set, self._loop_tube)
+
+    def receive(
+        self,
+        mission: MissionMemory,
+        update: MissionUpdate | None,
+        announced: SafeSet | None,
+        texts: list[StatusText],
+        *,
+        flies: bool,
+    ) -> MissionMemory:
+        """Take in what was uploaded and announced; in flight only what can be kept."""
+        wanted = _together(mission, update, announced)
+        if wanted.safe_set == mission.safe_set:
+            return wanted
+        if wanted.safe_set == mission.refused_set:
+            return replace(mission, rally=wanted.rally)
+        findings = self.analyse(wanted.safe_set)
+        against = (*contradictions(wanted.safe_set), *refusals(findings))
+        texts += [StatusText(Severity.WARNING, text) for text in against]
+        texts += [StatusText(Severity.INFO, text) for text in warnings(findings)]
+        if against and not self._config.soft and flies:
+            texts.append(StatusText(Severity.WARNING, "safe set refused: the old one is kept"))
+            return replace(mission, rally=wanted.rally, refused_set=wanted.safe_set)
+        return replace(wanted, refused_set=None, refusals=() if self._config.soft else against)
+
+    def margins(
+        self, safe_set: SafeSet, estimate: StateEstimate, target: EndEffectorTarget
+    ) -> ConstraintReport:
+        """How far inside the safe set the vehicle is now."""
+        length, planner = self._config.airframe.link_length, self._config.planner
+        points = (
+            (estimate.p_WB, estimate.v_WB),
+            point_in_flight(estimate, (length[0], 0.0)),
+            point_in_flight(estimate, length),
+        )
+        in_sphere = safe_set.kind is ConstraintKind.WORKSPACE
+        barrier = planner.workspace if in_sphere else planner.walls
+        return constraint_report(safe_set, barrier, points, target)
+
+
+def _together(
+    memory: MissionMemory, update: MissionUpdate | None, announced: SafeSet | None
+) -> MissionMemory:
+    """The memory with the safe set of what was uploaded and announced."""
+    if announced is not None:
+        memory = replace(memory, announced=announced)
+    if update is not None:
+        if update.fence is not None:
+            memory = replace(memory, fence=update.fence)
+        if update.rally is not None:
+            memory = replace(memory, rally=update.rally)
+    safe_set = joined(memory.announced, memory.fence)
+    return memory if safe_set == memory.safe_set else replace(memory, safe_set=safe_set)
+
+
+def joined(announced: SafeSet, fence: SafeSet) -> SafeSet:
+    """Both safe sets at once."""
+    return SafeSet(
+        announced.walls + fence.walls,
+        announced.sphere or fence.sphere,
+        announced.obstacles + fence.obstacles,
+    )
+
+
+def contradictions(safe_set: SafeSet) -> tuple[str, ...]:
+    """Why a safe set cannot be kept at all: the planner knows walls and obstacles, or a sphere."""
+    if safe_set.sphere is None or not (safe_set.walls or safe_set.obstacles):
+        return ()
+    what = "walls" if safe_set.walls else "obstacles"
+    return (f"{what} and a workspace sphere cannot be kept at once",)

@@ -1,0 +1,244 @@
+r"""A setpoint that moves as the vehicle can, towards whatever is asked for.
+
+What is asked for (a place, a velocity, an acceleration, a circle) may be anything, at any moment,
+and on the far side of a wall. The planner tracks a point, of the body or of the end-effector, that
+runs ahead of the vehicle within limits:
+
+.. math:: v \to v_{ff} + S(|e|)\,\frac{e}{|e|}, \qquad |\dot v| \le a, \qquad |v| \le v_{max}
+
+towards a place, with the barrier's own :math:`S` so that it can stop there. The reference governor
+keeps it near the vehicle and off walls and ground. Source: decision 0010 in docs/decisions.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+from fsw.barriers.safe_approach import safe_approach_speed
+from fsw.flight.orbit_path import looking_at, on_orbit
+from fsw.flight.reference_governor import SETTLE_RATE, ReferenceGovernor
+from fsw.geometry.rotation import wrap_angle
+from fsw.geometry.vectors import add_scaled, clamp_magnitude, limit_norm, norm, subtract
+from fsw.model.kinematics import point_in_flight
+from fsw.parameters.flight_config import FlightConfig, SetpointLimits
+from fsw.signals import (
+    EndEffectorTarget,
+    Facing,
+    MotionSetpoint,
+    Orbit,
+    SafeSet,
+    StateEstimate,
+    Vec2,
+    Vec3,
+)
+
+_BRAKING_SHARE = 0.7  # of the acceleration; the rest is what stepping costs
+_ARRIVED = 0.02  # m
+_AT_REST = 0.05  # m/s
+
+
+@dataclass(frozen=True, slots=True)
+class ReferenceState:
+    """The point that runs ahead: the body's origin or the end-effector."""
+
+    of_end_effector: bool
+    p: Vec3  # m
+    v: Vec3  # m/s
+    yaw: float  # rad
+    yaw_rate: float = 0.0  # rad/s
+    q_arm: Vec2 | None = None  # rad, joints to hold; None leaves them to the planner
+
+
+@dataclass(frozen=True, slots=True)
+class PositionGoal:
+    """What the point is after."""
+
+    motion: MotionSetpoint
+    joints: Vec2 | None = None  # rad
+    speed: float | None = None  # m/s, towards a place; None: as usual
+    orbit: Orbit | None = None  # in place of the motion
+    look_at: Vec3 | None = None  # m, where the nose points in place of the motion's heading
+
+
+def step(
+    reference: ReferenceState, goal: PositionGoal, limits: SetpointLimits, dt: float
+) -> ReferenceState:
+    """The point a moment later, as if there were neither vehicle nor walls.
+
+    Args:
+        reference: The point now.
+        goal: What it is after; the kinds of point agree.
+        limits: How fast it may move.
+        dt: The moment [s].
+    """
+    motion = _motion_now(reference, goal)
+    p, v = _move_point(reference, motion, goal, limits, dt)
+    yaw, yaw_rate = _turn(reference, motion, limits, dt)
+    q_arm = reference.q_arm
+    if q_arm is not None and goal.joints is not None:
+        most = limits.joint_speed * dt
+        q_arm = (
+            q_arm[0] + clamp_magnitude(goal.joints[0] - q_arm[0], most),
+            q_arm[1] + clamp_magnitude(goal.joints[1] - q_arm[1], most),
+        )
+    return replace(reference, p=p, v=v, yaw=yaw, yaw_rate=yaw_rate, q_arm=q_arm)
+
+
+def arrived(reference: ReferenceState, place: Vec3) -> bool:
+    """Whether the point rests at ``place`` [m, NED]."""
+    return norm(subtract(place, reference.p)) < _ARRIVED and norm(reference.v) < _AT_REST
+
+
+class SetpointGenerator:
+    """Makes the setpoints of one configuration."""
+
+    def __init__(self, config: FlightConfig) -> None:
+        self._config = config
+        self._governor = ReferenceGovernor(config)
+
+    def begin(self, estimate: StateEstimate, *, of_end_effector: bool = False) -> ReferenceState:
+        """A point that begins where the vehicle is and moves as it does."""
+        if of_end_effector:
+            p, v = point_in_flight(estimate, self._config.airframe.link_length)
+            return ReferenceState(True, p, v, estimate.yaw)
+        return ReferenceState(
+            False, estimate.p_WB, estimate.v_WB, estimate.yaw, 0.0, estimate.q_arm
+        )
+
+    def advance(
+        self,
+        reference: ReferenceState,
+        goal: PositionGoal,
+        estimate: StateEstimate,
+        safe_set: SafeSet,
+    ) -> ReferenceState:
+        """The point one planning period later."""
+        config = self._config
+        moved = step(reference, goal, config.steering, config.planner.period)
+        if reference.of_end_effector:
+            vehicle = point_in_flight(estimate, config.airframe.link_length)[0]
+        else:
+            vehicle = estimate.p_WB
+        p = self._governor.limit_lead(moved.p, vehicle)
+        return self._limited(replace(moved, p=p), estimate, safe_set)
+
+    def horizon(
+        self,
+        reference: ReferenceState,
+        goal: PositionGoal,
+        estimate: StateEstimate,
+        safe_set: SafeSet,
+        t_us: int,
+    ) -> tuple[tuple[EndEffectorTarget, ...], tuple[Vec2, ...]]:
+        """Targets and joints at the nodes, the first at ``t_us``; joints only if some are asked."""
+        config, targets, joint_targets = self._config, [], []
+        for node in range(config.planner.horizon + 1):
+            if node > 0:
+                reference = step(reference, goal, config.steering, config.planner.period)
+                reference = self._limited(reference, estimate, safe_set)
+            target = self.target(reference, t_us + node * config.mpc_period_us)
+            # The planner looks ahead at the vehicle's yaw rate, so it has to see where ours leads.
+            ahead = config.planner.weights.yaw_lead * reference.yaw_rate
+            targets.append(replace(target, yaw=wrap_angle(target.yaw + ahead)))
+            if reference.q_arm is not None:
+                joint_targets.append(reference.q_arm)
+        return tuple(targets), tuple(joint_targets)
+
+    def target(self, reference: ReferenceState, t_us: int) -> EndEffectorTarget:
+        """The end-effector's target where a setpoint is for the body or the end-effector."""
+        p, v, w = reference.p, reference.v, reference.yaw_rate
+        if reference.of_end_effector or reference.q_arm is None:
+            return EndEffectorTarget(t_us, p, v, (0.0, 0.0, 0.0), reference.yaw)
+        x, y, z = self._hanging(reference.q_arm, reference.yaw)
+        return EndEffectorTarget(
+            t_us,
+            (p[0] + x, p[1] + y, p[2] + z),
+            (v[0] - w * y, v[1] + w * x, v[2]),
+            (0.0, 0.0, 0.0),
+            reference.yaw,
+        )
+
+    def _limited(
+        self, reference: ReferenceState, estimate: StateEstimate, safe_set: SafeSet
+    ) -> ReferenceState:
+        x, y, z = self._hanging(reference.q_arm or estimate.q_arm, reference.yaw)
+        p, v = self._governor.limit_setpoint(
+            reference.p,
+            reference.v,
+            other_end=(-x, -y, -z) if reference.of_end_effector else (x, y, z),
+            of_end_effector=reference.of_end_effector,
+            safe_set=safe_set,
+        )
+        return replace(reference, p=p, v=v)
+
+    def _hanging(self, q_arm: Vec2, yaw: float) -> Vec3:
+        """From the body to the end-effector while level [m]."""
+        l1, l2 = self._config.airframe.link_length
+        th1, th12 = q_arm[0], q_arm[0] + q_arm[1]
+        ahead = l1 * math.sin(th1) + l2 * math.sin(th12)
+        down = l1 * math.cos(th1) + l2 * math.cos(th12)
+        return ahead * math.cos(yaw), ahead * math.sin(yaw), down
+
+
+def _motion_now(reference: ReferenceState, goal: PositionGoal) -> MotionSetpoint:
+    """What the point is after where it is now."""
+    motion, look_at = goal.motion, goal.look_at
+    if goal.orbit is not None:
+        motion = on_orbit(goal.orbit, reference.p)
+        if goal.orbit.facing is Facing.INITIAL:
+            motion = replace(motion, yaw=goal.motion.yaw)
+        elif goal.orbit.facing is Facing.CENTRE and look_at is None:
+            look_at = goal.orbit.centre
+    return motion if look_at is None else looking_at(motion, look_at, reference.p, reference.v)
+
+
+def _move_point(
+    reference: ReferenceState,
+    motion: MotionSetpoint,
+    goal: PositionGoal,
+    limits: SetpointLimits,
+    dt: float,
+) -> tuple[Vec3, Vec3]:
+    braking, most = _BRAKING_SHARE * limits.acceleration, limits.speed
+    wanted = (0.0, 0.0, 0.0) if motion.v is None else motion.v
+    if motion.along_heading:
+        wanted = _level(wanted, reference.yaw)
+    if motion.p is not None:
+        error = subtract(motion.p, reference.p)
+        distance = norm(error)
+        if distance > 0.0:
+            cruise = min(goal.speed or limits.cruise_speed, limits.speed)
+            if goal.orbit is not None:  # on the way to a circle too
+                most = max(cruise, goal.orbit.speed)
+            closing = min(safe_approach_speed(distance, braking, SETTLE_RATE), cruise)
+            wanted = add_scaled(wanted, error, closing / distance)
+    elif motion.v is None and motion.a is not None:
+        a = _level(motion.a, reference.yaw) if motion.along_heading else motion.a
+        wanted = add_scaled(reference.v, a, dt)
+    wanted = limit_norm(wanted, most)
+    change = limit_norm(subtract(wanted, reference.v), limits.acceleration * dt)
+    v = add_scaled(reference.v, change, 1.0)
+    mean = add_scaled(reference.v, change, 0.5)
+    return add_scaled(reference.p, mean, dt), v
+
+
+def _turn(
+    reference: ReferenceState, motion: MotionSetpoint, limits: SetpointLimits, dt: float
+) -> tuple[float, float]:
+    wanted = 0.0
+    if motion.yaw_rate is not None:
+        wanted = clamp_magnitude(motion.yaw_rate, limits.yaw_rate)
+    if motion.yaw is not None:
+        error = wrap_angle(motion.yaw - reference.yaw)
+        braking = _BRAKING_SHARE * limits.yaw_acceleration
+        closing = min(safe_approach_speed(abs(error), braking, 0.5), limits.yaw_rate)
+        wanted = clamp_magnitude(wanted + math.copysign(closing, error), limits.yaw_rate)
+    change = clamp_magnitude(wanted - reference.yaw_rate, limits.yaw_acceleration * dt)
+    yaw = wrap_angle(reference.yaw + dt * (reference.yaw_rate + 0.5 * change))
+    return yaw, reference.yaw_rate + change
+
+
+def _level(ahead: Vec3, yaw: float) -> Vec3:
+    c, s = math.cos(yaw), math.sin(yaw)
+    return c * ahead[0] - s * ahead[1], s * ahead[0] + c * ahead[1], ahead[2]

@@ -1,0 +1,149 @@
+"""What the flight software remembers from tick to tick, all of it."""
+
+from __future__ import annotations
+
+from dataclasses import field
+
+from fsw.control.cascade import CascadeMemory
+from fsw.control.tracking import Observed
+from fsw.flight.command_dedup import AnsweredCommand
+from fsw.flight.failsafe import Condition
+from fsw.flight.mission_sequencer import MissionFlight
+from fsw.flight.offboard_setpoints import Tilt
+from fsw.flight.setpoint_generator import PositionGoal, ReferenceState
+from fsw.frozen import dataclass
+from fsw.model.airframe import AIRFRAME
+from fsw.signals import (
+    STOPPED,
+    AttitudeSetpoint,
+    BatteryState,
+    ConstraintReport,
+    EndEffectorTarget,
+    Home,
+    JointSetpoint,
+    Mode,
+    MotionSetpoint,
+    Plan,
+    PlannerCounters,
+    PredictionState,
+    SafeSet,
+    SolverStatus,
+    StateEstimate,
+    Vec2,
+    Vec3,
+)
+from fsw.tuning import Tuning
+
+_NOWHERE: Vec3 = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class VehicleMemory:
+    """Mode and what belongs to it; changes with commands, failsafes and completed modes."""
+
+    mode: Mode = Mode.DISARMED
+    landed: bool = True
+    moved_us: int = 0  # when the vehicle last moved, for the land detector
+    mode_origin: Vec3 = _NOWHERE  # where a mode's own reference begins, end-effector [m]
+    mode_yaw: float = 0.0  # rad, there
+    mode_begin_us: int = 0
+    climb: float = 0.0  # m, of a takeoff
+    conditions: tuple[Condition, ...] = ()  # that are active
+    home: Home | None = None
+    gcs_heard_us: int = -1  # when a ground station was last heard; -1: never
+    answered: tuple[AnsweredCommand, ...] = ()  # each sender's last command
+    intended_mode: Mode = Mode.HOLD  # what arming leads to
+    intended_us: int = 0  # when that was chosen
+    failsafe_from: Mode | None = None  # what was flown when a failsafe took over
+    look_at: Vec3 | None = None  # m, where the nose is to point
+    speed: float | None = None  # m/s, on the way to places; None: as usual
+
+    @property
+    def armed(self) -> bool:
+        """Whether anything may move."""
+        return self.mode is not Mode.DISARMED and self.mode is not Mode.FAULT
+
+    @property
+    def flies(self) -> bool:
+        """Whether the loops are closed."""
+        return self.armed and not self.landed
+
+
+@dataclass(frozen=True, slots=True)
+class SetpointMemory:
+    """The generated setpoint; there is one only in Hold, Return, Orbit and Offboard."""
+
+    reference: ReferenceState | None = None
+    goal: PositionGoal | None = None
+    waypoints: tuple[Vec3, ...] = ()  # after the goal's place
+
+
+@dataclass(frozen=True, slots=True)
+class OffboardMemory:
+    """Setpoints for now, flown or not: the newest ones, and how many there were."""
+
+    motion: MotionSetpoint | None = None
+    attitude: AttitudeSetpoint | None = None
+    joints: JointSetpoint | None = None
+    motion_us: int = -1  # when motion or attitude came
+    joints_us: int = -1
+    accepted: int = 0
+    refused: int = 0
+    tilt: Tilt = field(default_factory=Tilt)
+
+
+@dataclass(frozen=True, slots=True)
+class MissionMemory:
+    """What was sent to be flown and to be kept clear of."""
+
+    stream: tuple[EndEffectorTarget, ...] = ()
+    safe_set: SafeSet = field(default_factory=SafeSet)  # in force: announced and fence together
+    refused_set: SafeSet | None = None  # announced in flight, and of no use
+    refusals: tuple[str, ...] = ()  # why this configuration cannot keep the safe set
+    announced: SafeSet = field(default_factory=SafeSet)
+    fence: SafeSet = field(default_factory=SafeSet)
+    rally: tuple[Vec2, ...] = ()  # m, where a return may lead beside home
+    flight: MissionFlight = field(default_factory=MissionFlight)
+
+
+@dataclass(frozen=True, slots=True)
+class PlanMemory:
+    """The running plan and the request that is out."""
+
+    running: Plan | None = None
+    since_us: int = 0  # when the running plan began, or the vehicle was taken over
+    awaited_id: int = -1  # -1: no request is out
+    awaited_us: int = 0
+    awaited_missed: bool = False
+    next_id: int = 0
+    status: SolverStatus = SolverStatus.UNKNOWN
+    refused: bool = False
+    counters: PlannerCounters = field(default_factory=PlannerCounters)
+
+
+@dataclass(frozen=True, slots=True)
+class FlightState:
+    """Everything a tick starts from; the upper half changes every tick, the lower rarely."""
+
+    index: int = -1  # of the last tick on the absolute grid, missed ones counted
+    t_us: int = 0  # of the last tick
+    estimate: StateEstimate | None = None  # last valid
+    invalid_ticks: int = 0
+    nominal: PredictionState | None = None  # where the running plan wants the vehicle now
+    output_replaced: bool = False
+    cascade: CascadeMemory = field(
+        default_factory=lambda: CascadeMemory(
+            STOPPED.rotor_thrust, STOPPED, Observed(_NOWHERE, _NOWHERE), AIRFRAME.mass
+        )
+    )
+
+    vehicle: VehicleMemory = field(default_factory=VehicleMemory)
+    mission: MissionMemory = field(default_factory=MissionMemory)
+    plan: PlanMemory = field(default_factory=PlanMemory)
+    constraints: ConstraintReport = field(default_factory=ConstraintReport)
+    reference: EndEffectorTarget | None = None  # in use when last planned
+    tuning: Tuning = ()  # in use: what differs from the configuration of the start
+    setpoint: SetpointMemory = field(default_factory=SetpointMemory)
+    offboard: OffboardMemory = field(default_factory=OffboardMemory)
+    battery: BatteryState = field(default_factory=BatteryState)
+    arming_refusal: str = ""

@@ -1,0 +1,141 @@
+r"""A straight segment of a mission: from rest to rest, or from a speed to rest.
+
+The share s of the way rises with a rate that follows a cubic smooth step up, stays, and
+follows one down again:
+
+.. math:: \dot s = u\,S(t/t_u),\qquad S(x) = 3x^2 - 2x^3,\qquad |\ddot s| \le 1.5\,u/t_u
+
+Position and heading share it, so both are twice continuously differentiable, also where one segment
+follows another at rest. The fastest segment within a speed and an acceleration is closed form.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from fsw.geometry.rotation import wrap_angle
+from fsw.signals import EndEffectorTarget, Vec3
+
+_PEAK = 1.5  # largest slope of S
+
+
+@dataclass(frozen=True, slots=True)
+class MotionLimits:
+    """How fast a segment may be flown."""
+
+    speed: float  # m/s
+    acceleration: float  # m/s^2
+    turn_rate: float  # rad/s
+    turn_acceleration: float  # rad/s^2
+
+
+@dataclass(frozen=True, slots=True)
+class TrajectorySegment:
+    """One straight line and one turn, begun at ``start_us``."""
+
+    start_us: int
+    start: Vec3  # m, end-effector
+    way: Vec3  # m, from start to end
+    yaw: float  # rad, at the start
+    turn: float  # rad
+    up: float  # s, speed rises
+    cruise: float  # s
+    down: float  # s, speed falls
+
+    @property
+    def end_us(self) -> int:
+        """When the segment is flown."""
+        return self.start_us + math.ceil(1e6 * (self.up + self.cruise + self.down))
+
+    @property
+    def end(self) -> Vec3:
+        """Where it ends [m]."""
+        return (
+            self.start[0] + self.way[0],
+            self.start[1] + self.way[1],
+            self.start[2] + self.way[2],
+        )
+
+    def at(self, t_us: int) -> EndEffectorTarget:
+        """The reference at an instant, at rest before and after."""
+        s, rate, bend = self._share((t_us - self.start_us) * 1e-6)
+        (x, y, z), (dx, dy, dz) = self.start, self.way
+        return EndEffectorTarget(
+            t_us,
+            (x + s * dx, y + s * dy, z + s * dz),
+            (rate * dx, rate * dy, rate * dz),
+            (bend * dx, bend * dy, bend * dz),
+            wrap_angle(self.yaw + s * self.turn),
+        )
+
+    def _share(self, t: float) -> tuple[float, float, float]:
+        """Share of the way [1], its rate [1/s] and the rate's slope [1/s^2]."""
+        left = self.up + self.cruise + self.down - t
+        if left <= 0.0:
+            return 1.0, 0.0, 0.0
+        if t < 0.0:
+            return 0.0, 0.0, 0.0
+        u = 1.0 / (0.5 * self.up + self.cruise + 0.5 * self.down)
+        if t < self.up:
+            s, rate, bend = _rise(t, self.up)
+            return u * s, u * rate, u * bend
+        if left < self.down:
+            s, rate, bend = _rise(left, self.down)
+            return 1.0 - u * s, u * rate, -u * bend
+        return u * (t - 0.5 * self.up), u, 0.0
+
+
+def segment_to(
+    start: EndEffectorTarget, end: Vec3, yaw: float | None, limits: MotionLimits
+) -> TrajectorySegment:
+    """The fastest segment within limits from rest at ``start`` to rest at a point.
+
+    Args:
+        start: Where and when it begins; its velocity is not looked at.
+        end: End-effector position [m].
+        yaw: Heading at the end [rad]; None keeps it.
+        limits: All positive.
+    """
+    way = (end[0] - start.p_WE[0], end[1] - start.p_WE[1], end[2] - start.p_WE[2])
+    turn = 0.0 if yaw is None else wrap_angle(yaw - start.yaw)
+    distance, angle = math.hypot(*way), abs(turn)
+    if distance < 1e-9 and angle < 1e-9:
+        return TrajectorySegment(
+            start.t_us, start.p_WE, (0.0, 0.0, 0.0), start.yaw, 0.0, 0.0, 0.0, 0.0
+        )
+    u = _smaller(limits.speed, distance, limits.turn_rate, angle)
+    slope = _smaller(limits.acceleration, distance, limits.turn_acceleration, angle)
+    ramp = _PEAK * u / slope
+    if u * ramp > 1.0:  # too short to reach the speed
+        u = math.sqrt(slope / _PEAK)
+        ramp = 1.0 / u
+    return TrajectorySegment(
+        start.t_us, start.p_WE, way, start.yaw, turn, ramp, max(1.0 / u - ramp, 0.0), ramp
+    )
+
+
+def braking_segment(start: EndEffectorTarget, limits: MotionLimits) -> TrajectorySegment:
+    """Straight on from a moving reference until it rests, heading kept."""
+    down = _PEAK * math.hypot(*start.v_WE) / limits.acceleration
+    vx, vy, vz = start.v_WE
+    way = (0.5 * down * vx, 0.5 * down * vy, 0.5 * down * vz)
+    return TrajectorySegment(start.t_us, start.p_WE, way, start.yaw, 0.0, 0.0, 0.0, down)
+
+
+def _rise(t: float, ramp: float) -> tuple[float, float, float]:
+    """Integral of S(t / ramp) over time, S and its slope."""
+    x = t / ramp
+    return (
+        ramp * x**3 * (1.0 - 0.5 * x),
+        x * x * (3.0 - 2.0 * x),
+        6.0 * x * (1.0 - x) / ramp,
+    )
+
+
+def _smaller(linear: float, distance: float, angular: float, angle: float) -> float:
+    """The limit on s that a limit along the way and one on the turn leave."""
+    return min(
+        linear / distance if distance > 0.0 else math.inf,
+        angular / angle if angle > 0.0 else math.inf,
+    )

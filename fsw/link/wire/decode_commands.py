@@ -1,0 +1,293 @@
+"""MAVLink commands as what they ask of this vehicle: numbers in, a typed action out; pure.
+
+A parameter that means nothing is refused here with a sentence; a NaN leaves it to the vehicle. What
+depends on the state of the vehicle is decided in ``fsw.flight.command_handlers``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Final
+
+from fsw.flight.command_handlers import MIN_SPEED
+from fsw.link.wire.mission_items import GLOBAL_FRAMES, HOME_FRAMES, LOCAL_NED, Locate
+from fsw.link.wire.px4_mode import MODE_BY_PX4, MODE_BY_STANDARD
+from fsw.signals import (
+    Arm,
+    ChangeSpeed,
+    Command,
+    CommandAction,
+    CommandRequest,
+    CommandResult,
+    Disarm,
+    Facing,
+    FlyOrbit,
+    GoTo,
+    LookAt,
+    Mode,
+    MoveJoints,
+    Order,
+    Place,
+    Rejected,
+    SetHome,
+    SetMissionStep,
+    StartMission,
+    SwitchMode,
+    TakeOff,
+)
+
+_FORCE: Final = 21196.0  # the value MAVLink asks for to arm or disarm against all checks
+_MAY_SWITCH_MODE: Final = 1  # MAV_DO_REPOSITION_FLAGS
+_RADIUS_RANGE: Final = (0.5, 100.0)  # m
+_USUAL_RADIUS: Final = 2.0  # m
+_UNCHANGED: Final = 5.0  # ORBIT_YAW_BEHAVIOUR: what an earlier orbit said, here the usual
+_FACINGS: Final = {float(facing): facing for facing in Facing} | {_UNCHANGED: Facing.CENTRE}
+_SPEED_TYPES: Final = (0.0, 1.0)  # SPEED_TYPE of air and ground, which are one here
+_KEEP_SPEED, _USUAL_SPEED = -1.0, -2.0  # of DO_CHANGE_SPEED
+_ROI_NONE, _ROI_LOCATION = 0.0, 3.0  # MAV_ROI
+
+
+class _InvalidError(Exception):
+    """A parameter that means nothing."""
+
+
+def command(request: CommandRequest, locate: Locate) -> Command:
+    """A command with what it asks for.
+
+    Args:
+        request: As it came.
+        locate: Local NED of a place on Earth.
+    """
+    reader = _READERS.get(request.command)
+    if reader is None:
+        return Command(Rejected(CommandResult.UNSUPPORTED), request)
+    try:
+        return Command(reader(request, locate), request)
+    except _InvalidError as error:
+        return Command(Rejected(CommandResult.DENIED, str(error)), request)
+
+
+def _arm_or_disarm(request: CommandRequest, _: Locate) -> CommandAction:
+    wish, force = request.params[0], request.params[1] == _FORCE
+    if wish == 1.0:
+        return Arm(force)
+    if wish == 0.0:
+        return Disarm(force)
+    raise _InvalidError("arm/disarm wants param1 = 1 or 0")
+
+
+def _terminate(request: CommandRequest, _: Locate) -> CommandAction:
+    return Order.TERMINATE if request.params[0] > 0.5 else Order.NOTHING
+
+
+def _set_mode(request: CommandRequest, _: Locate) -> CommandAction:
+    main, sub = request.params[1], request.params[2]
+    mode = MODE_BY_PX4.get((main, 0.0 if math.isnan(sub) else sub))
+    if mode is None:
+        raise _InvalidError(f"mode {main:g}/{sub:g} is not one of this vehicle")
+    return SwitchMode(mode)
+
+
+def _set_standard_mode(request: CommandRequest, _: Locate) -> CommandAction:
+    mode = MODE_BY_STANDARD.get(request.params[0])
+    if mode is None:
+        raise _InvalidError(f"standard mode {request.params[0]:g} is not one of this vehicle")
+    return SwitchMode(mode)
+
+
+def _take_off(request: CommandRequest, locate: Locate) -> CommandAction:
+    return TakeOff(_height(request, locate, "no takeoff"))
+
+
+def _reposition(request: CommandRequest, locate: Locate) -> CommandAction:
+    speed, flags, _, yaw = request.params[:4]
+    return GoTo(
+        _place(request, locate, "no goto"),
+        yaw if math.isfinite(yaw) else None,
+        speed if math.isfinite(speed) and speed > 0.0 else None,
+        may_switch_mode=math.isfinite(flags) and bool(int(flags) & _MAY_SWITCH_MODE),
+    )
+
+
+def _orbit(request: CommandRequest, locate: Locate) -> CommandAction:
+    """Parameter 1 is the radius, negative anticlockwise, then speed, heading and turns."""
+    radius, speed, behaviour, turns = request.params[:4]
+    clockwise = not radius < 0.0
+    radius = _USUAL_RADIUS if math.isnan(radius) else abs(radius)
+    least, most = _RADIUS_RANGE
+    if not least <= radius <= most:
+        raise _InvalidError(
+            f"no orbit: a radius of {radius:g} m is outside {least:g} to {most:g} m"
+        )
+    facing = Facing.CENTRE if math.isnan(behaviour) else _FACINGS.get(behaviour)
+    if facing is None:
+        known = "0 centre, 1 as it is, 3 tangent"
+        raise _InvalidError(f"no orbit: heading {behaviour:g} is not one of {known}")
+    if math.isfinite(turns) and turns > 0.0:
+        raise _InvalidError("no orbit: turns are not counted; param4 must be 0 or NaN")
+    if abs(speed) < MIN_SPEED:
+        raise _InvalidError(f"no orbit: {speed:g} m/s is no speed")
+    centre = _place(request, locate, "no orbit")
+    return FlyOrbit(centre, radius, None if math.isnan(speed) else abs(speed), clockwise, facing)
+
+
+def _look_at(request: CommandRequest, locate: Locate) -> CommandAction:
+    """The height does not matter; a ground station that clicked on a map sends NaN for it."""
+    if any(math.isnan(value) for value in request.params[4:6]):
+        raise _InvalidError("nothing to look at: latitude and longitude are needed")
+    return LookAt(Place(_north_east(request, locate, "nothing to look at")))
+
+
+def _look_away(request: CommandRequest, _: Locate) -> CommandAction:
+    return LookAt(None)
+
+
+def _look(request: CommandRequest, locate: Locate) -> CommandAction:
+    """DO_SET_ROI, the older form: parameter 1 says whether there is a place at all."""
+    kind = request.params[0]
+    if kind == _ROI_NONE:
+        return LookAt(None)
+    if kind == _ROI_LOCATION:
+        return _look_at(request, locate)
+    raise _InvalidError(f"kind {kind:g} of a region of interest is not 0 or 3")
+
+
+def _change_speed(request: CommandRequest, _: Locate) -> CommandAction:
+    kind, speed = request.params[:2]
+    if kind not in _SPEED_TYPES:
+        reason = f"speed type {kind:g} is neither air speed (0) nor ground speed (1)"
+        raise _InvalidError(f"speed unchanged: {reason}")
+    if speed == _KEEP_SPEED:
+        return Order.NOTHING
+    return ChangeSpeed(None if speed == _USUAL_SPEED else speed)
+
+
+def _set_actuator(request: CommandRequest, _: Locate) -> CommandAction:
+    """1 and 2 of index 0 are the joints."""
+    first, second, *others, index = request.params
+    if math.isfinite(index) and index != 0.0:
+        raise _InvalidError("no such actuators: the joints are 1 and 2 of index 0")
+    if any(math.isfinite(value) for value in others):
+        raise _InvalidError("no such actuator: only the joints, 1 and 2, can be set")
+    if any(math.isinf(value) or abs(value) > 1.0 for value in (first, second)):
+        raise _InvalidError("joints not moved: an actuator's range is -1 to 1")
+    return MoveJoints(_or_none(first), _or_none(second))
+
+
+def _set_home(request: CommandRequest, locate: Locate) -> CommandAction:
+    if request.params[0] == 1.0:
+        return SetHome(None)
+    if any(math.isnan(value) for value in request.params[4:7]):
+        raise _InvalidError("home not set: latitude, longitude and altitude are needed")
+    return SetHome(_place(request, locate, "home not set"))
+
+
+def _start_mission(request: CommandRequest, _: Locate) -> CommandAction:
+    first, last = (value if math.isfinite(value) else 0.0 for value in request.params[:2])
+    return StartMission(first, last)
+
+
+def _pause_or_continue(request: CommandRequest, _: Locate) -> CommandAction:
+    wish = request.params[0]
+    if wish == 0.0:
+        return Order.PAUSE_MISSION
+    if wish == 1.0:
+        return Order.CONTINUE_MISSION
+    raise _InvalidError("pause/continue wants param1 = 0 or 1")
+
+
+def _set_mission_step(request: CommandRequest, _: Locate) -> CommandAction:
+    return SetMissionStep(request.params[0], request.params[1] == 1.0)
+
+
+def _check_arming(request: CommandRequest, _: Locate) -> CommandAction:
+    return Order.CHECK_ARMING
+
+
+def _calibrate(request: CommandRequest, _: Locate) -> CommandAction:
+    """All zeros break a calibration off, which is so already."""
+    if all(value == 0.0 or math.isnan(value) for value in request.params):
+        return Order.NOTHING
+    # The prefix is how PX4 tells a ground station's calibration page.
+    raise _InvalidError("[cal] calibration failed: these sensors need none")
+
+
+def _test_actuator(request: CommandRequest, _: Locate) -> CommandAction:
+    reason = "rotors and joints move only in closed loop; arm and fly instead"
+    raise _InvalidError(f"no actuator test: {reason}")
+
+
+def _to(mode: Mode) -> Callable[[CommandRequest, Locate], CommandAction]:
+    return lambda *_: SwitchMode(mode)
+
+
+def _height(request: CommandRequest, locate: Locate, refused: str) -> Place:
+    """The height that parameter 7 names."""
+    z, frame = request.params[6], request.frame
+    if math.isnan(z):
+        return Place()
+    if not math.isfinite(z):
+        raise _InvalidError(f"{refused}: the altitude is not finite")
+    if frame is None or frame in GLOBAL_FRAMES:
+        return Place(height=-locate(0.0, 0.0, z)[2])
+    if frame in HOME_FRAMES:
+        return Place(height=z, above_home=True)
+    if frame == LOCAL_NED:
+        return Place(height=-z)
+    wanted = "use global, relative or local NED"
+    raise _InvalidError(f"{refused}: frame {frame} is not supported; {wanted}")
+
+
+def _north_east(
+    request: CommandRequest, locate: Locate, refused: str
+) -> tuple[float, float] | None:
+    """The place that parameters 5 and 6 name [m]; None: here."""
+    x, y = request.params[4:6]
+    if math.isnan(x) and math.isnan(y):
+        return None
+    if not (math.isfinite(x) and math.isfinite(y)):
+        raise _InvalidError(f"{refused}: the place is not finite")
+    if request.frame == LOCAL_NED:
+        return x, y
+    if not (abs(x) <= 90.0 and abs(y) <= 180.0):
+        raise _InvalidError(f"{refused}: {x:g}, {y:g} is no latitude and longitude")
+    return locate(x, y, 0.0)[:2]
+
+
+def _place(request: CommandRequest, locate: Locate, refused: str) -> Place:
+    """The place that parameters 5 to 7 name."""
+    height = _height(request, locate, refused)
+    return Place(_north_east(request, locate, refused), height.height, height.above_home)
+
+
+def _or_none(value: float) -> float | None:
+    return None if math.isnan(value) else value
+
+
+# By MAV_CMD of MAVLink common.xml.
+_READERS: Final[dict[int, Callable[[CommandRequest, Locate], CommandAction]]] = {
+    17: _to(Mode.HOLD),  # NAV_LOITER_UNLIM
+    20: _to(Mode.RETURN),  # NAV_RETURN_TO_LAUNCH
+    21: _to(Mode.LAND),  # NAV_LAND
+    22: _take_off,  # NAV_TAKEOFF
+    34: _orbit,  # DO_ORBIT
+    176: _set_mode,  # DO_SET_MODE
+    178: _change_speed,  # DO_CHANGE_SPEED
+    179: _set_home,  # DO_SET_HOME
+    185: _terminate,  # DO_FLIGHTTERMINATION
+    187: _set_actuator,  # DO_SET_ACTUATOR
+    192: _reposition,  # DO_REPOSITION
+    193: _pause_or_continue,  # DO_PAUSE_CONTINUE
+    195: _look_at,  # DO_SET_ROI_LOCATION
+    197: _look_away,  # DO_SET_ROI_NONE
+    201: _look,  # DO_SET_ROI
+    209: _test_actuator,  # DO_MOTOR_TEST
+    224: _set_mission_step,  # DO_SET_MISSION_CURRENT
+    241: _calibrate,  # PREFLIGHT_CALIBRATION
+    262: _set_standard_mode,  # DO_SET_STANDARD_MODE
+    300: _start_mission,  # MISSION_START
+    310: _test_actuator,  # ACTUATOR_TEST
+    400: _arm_or_disarm,  # COMPONENT_ARM_DISARM
+    401: _check_arming,  # RUN_PREARM_CHECKS
+}

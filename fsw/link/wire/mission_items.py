@@ -1,0 +1,269 @@
+"""Mission items as ground stations upload them, read one by one into steps of the vehicle.
+
+An item that means nothing here is refused with MAVLink's own result and a sentence. NaN and 0 in
+parameters that a command does not use are normal; a NaN heading keeps the heading.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+from fsw.signals import MAX_DISTANCE, MissionAction, MissionStep, Vec2, Vec3, Vec4
+
+# MAV_CMD
+NAV_WAYPOINT: Final = 16
+NAV_LOITER_UNLIMITED: Final = 17
+NAV_LOITER_TIME: Final = 19
+NAV_RETURN: Final = 20
+NAV_LAND: Final = 21
+NAV_TAKEOFF: Final = 22
+NAV_DELAY: Final = 93
+DO_CHANGE_SPEED: Final = 178
+DO_SET_ROI_LOCATION: Final = 195
+DO_SET_ROI_NONE: Final = 197
+DO_SET_ROI: Final = 201
+NAV_RALLY_POINT: Final = 5100
+
+# MAV_FRAME
+GLOBAL_FRAMES: Final = frozenset({0, 5})
+HOME_FRAMES: Final = frozenset({3, 6})  # global, altitude above home
+LOCAL_NED: Final = 1
+LOCAL_OFFSET_NED: Final = 7  # axes of local NED, origin travels with the vehicle
+LOCAL_FRAMES: Final = frozenset({1, 7})  # x and y in 1e-4 m
+
+# MAV_MISSION_RESULT
+UNSUPPORTED_FRAME: Final = 2
+UNSUPPORTED: Final = 3
+INVALID: Final = 5
+INVALID_PARAM1: Final = 6  # and so on up to parameter 7
+DENIED: Final = 14
+
+NO_PLACE: Final = 2**31 - 1  # x or y of an item that names none, as MAVLink writes NaN there
+LONGEST_STAY: Final = 3600.0  # s
+WIDEST_ACCEPTANCE: Final = 10.0  # m
+USUAL_ACCEPTANCE: Final = 0.1  # m
+
+Locate = Callable[[float, float, float], Vec3]
+"""Local NED [m] of a latitude and longitude [deg] and an altitude above the sea [m]."""
+
+
+@dataclass(frozen=True, slots=True)
+class MissionItem:
+    """A MISSION_ITEM_INT as it came, so that a download returns it bit for bit."""
+
+    command: int  # MAV_CMD
+    frame: int  # MAV_FRAME
+    params: Vec4  # parameters 1 to 4
+    x: int  # 1e-7 deg of latitude, or 1e-4 m north in a local frame
+    y: int
+    z: float  # m
+    autocontinue: int = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Refused:
+    """Why something uploaded is of no use."""
+
+    result: int  # MAV_MISSION_RESULT
+    reason: str
+
+
+def read_step(item: MissionItem, locate: Locate) -> MissionStep | Refused:
+    """What an item means to this vehicle."""
+    reader = _READERS.get(item.command)
+    if reader is None:
+        return Refused(UNSUPPORTED, f"command {item.command} is not one of this vehicle's missions")
+    return reader(item, locate)
+
+
+def read_rally(item: MissionItem, locate: Locate) -> Vec2 | Refused:
+    """North and east of a rally point [m]; its altitude is not used, a return has its own."""
+    if item.command != NAV_RALLY_POINT:
+        return Refused(UNSUPPORTED, f"command {item.command} is no rally point")
+    place = _place(item, locate)
+    if isinstance(place, Refused):
+        return place
+    return (place[0], place[1]) if place is not None else _bad(5, "a rally point needs a place")
+
+
+def horizontal_place(item: MissionItem, locate: Locate) -> Vec2 | Refused:
+    """North and east of an item's x and y [m]."""
+    for number, value in ((5, item.x), (6, item.y)):
+        if value == NO_PLACE:
+            return _bad(number, "a place is missing")
+    if item.frame == LOCAL_NED:
+        north, east = 1e-4 * item.x, 1e-4 * item.y
+    elif item.frame in GLOBAL_FRAMES | HOME_FRAMES:
+        latitude, longitude = 1e-7 * item.x, 1e-7 * item.y
+        if not (abs(latitude) < 90.0 and abs(longitude) <= 180.0):
+            return _bad(5, f"{latitude:g}, {longitude:g} is no place on Earth")
+        north, east, _ = locate(latitude, longitude, 0.0)
+    else:
+        return Refused(UNSUPPORTED_FRAME, f"frame {item.frame} is not supported for this item")
+    for number, metres in ((5, north), (6, east)):
+        if not abs(metres) <= MAX_DISTANCE:
+            return _bad(number, f"{math.hypot(north, east):.0f} m from the origin is too far")
+    return north, east
+
+
+def _waypoint(item: MissionItem, locate: Locate) -> MissionStep | Refused:
+    hold, acceptance = item.params[0], item.params[1]
+    if not _within(hold, LONGEST_STAY):
+        return _bad(1, f"a stay of {hold:g} s is outside 0 to {LONGEST_STAY:g} s")
+    if not _within(acceptance, WIDEST_ACCEPTANCE):
+        return _bad(2, f"an acceptance of {acceptance:g} m is outside 0 to {WIDEST_ACCEPTANCE:g} m")
+    return _go(item, locate, hold, acceptance or USUAL_ACCEPTANCE)
+
+
+def _loiter_time(item: MissionItem, locate: Locate) -> MissionStep | Refused:
+    if not _within(item.params[0], LONGEST_STAY):
+        return _bad(1, f"a stay of {item.params[0]:g} s is outside 0 to {LONGEST_STAY:g} s")
+    return _go(item, locate, item.params[0], USUAL_ACCEPTANCE)
+
+
+def _loiter_unlimited(item: MissionItem, locate: Locate) -> MissionStep | Refused:
+    return _go(item, locate, math.inf, USUAL_ACCEPTANCE)
+
+
+def _go(item: MissionItem, locate: Locate, hold: float, accept: float) -> MissionStep | Refused:
+    place = _place(item, locate)
+    if isinstance(place, Refused):
+        return place
+    if place is None:
+        return _bad(5, "a waypoint needs a place")
+    return MissionStep(
+        MissionAction.GO,
+        place,
+        item.frame in HOME_FRAMES,
+        _heading(item.params[3]),
+        hold,
+        accept,
+        stop_after=not item.autocontinue,
+    )
+
+
+def _take_off(item: MissionItem, locate: Locate) -> MissionStep | Refused:
+    """Straight up: the place of a takeoff is where the vehicle stands."""
+    height = _z(item, locate)
+    if isinstance(height, Refused):
+        return height
+    return MissionStep(
+        MissionAction.TAKE_OFF,
+        (0.0, 0.0, height),
+        item.frame in HOME_FRAMES,
+        _heading(item.params[3]),
+        acceptance=USUAL_ACCEPTANCE,
+        stop_after=not item.autocontinue,
+    )
+
+
+def _land(item: MissionItem, locate: Locate) -> MissionStep | Refused:
+    yaw = _heading(item.params[3])
+    if item.x == NO_PLACE and item.y == NO_PLACE:
+        return MissionStep(MissionAction.LAND, yaw=yaw)
+    place = horizontal_place(item, locate)
+    if isinstance(place, Refused):
+        return place
+    position = (place[0], place[1], 0.0)  # the descent is the landing's
+    return MissionStep(MissionAction.LAND, position, yaw=yaw, acceptance=USUAL_ACCEPTANCE)
+
+
+def _return(item: MissionItem, _: Locate) -> MissionStep | Refused:
+    return MissionStep(MissionAction.RETURN)
+
+
+def _delay(item: MissionItem, _: Locate) -> MissionStep | Refused:
+    if not _within(item.params[0], LONGEST_STAY):
+        return _bad(1, f"a delay of {item.params[0]:g} s is outside 0 to {LONGEST_STAY:g} s")
+    return MissionStep(MissionAction.DELAY, hold_s=item.params[0], stop_after=not item.autocontinue)
+
+
+def _change_speed(item: MissionItem, _: Locate) -> MissionStep | Refused:
+    """Air speed and ground speed are one here; -1 and -2 mean the usual speed.
+
+    A ground station writes what it takes for usual, QGroundControl 5 m/s: the mission is kept as
+    it came and flown no faster than ``MAX_MISSION_SPEED``.
+    """
+    kind, speed = item.params[0], item.params[1]
+    if kind not in (0.0, 1.0):
+        return _bad(1, f"speed type {kind:g} is neither air speed (0) nor ground speed (1)")
+    if speed in (-1.0, -2.0):
+        return MissionStep(MissionAction.SPEED)
+    if not 0.01 <= speed <= _MAX_SPEED:
+        return _bad(2, f"a speed of {speed:g} m/s is outside 0.01 to {_MAX_SPEED:g} m/s")
+    return MissionStep(MissionAction.SPEED, speed=speed)
+
+
+def _look_at(item: MissionItem, locate: Locate) -> MissionStep | Refused:
+    """The nose points there on the segments that follow; its height does not matter."""
+    place = horizontal_place(item, locate)
+    if isinstance(place, Refused):
+        return place
+    return MissionStep(MissionAction.LOOK_AT, (*place, 0.0))
+
+
+def _look_away(item: MissionItem, _: Locate) -> MissionStep | Refused:
+    return MissionStep(MissionAction.LOOK_AT)
+
+
+def _look(item: MissionItem, locate: Locate) -> MissionStep | Refused:
+    if item.params[0] == 0.0:
+        return _look_away(item, locate)
+    if item.params[0] == 3.0:
+        return _look_at(item, locate)
+    return _bad(1, f"kind {item.params[0]:g} of a region of interest is not 0 or 3")
+
+
+_MAX_SPEED: Final = 20.0  # m/s; faster is a slip of the unit
+_READERS: Final[dict[int, Callable[[MissionItem, Locate], MissionStep | Refused]]] = {
+    NAV_WAYPOINT: _waypoint,
+    NAV_LOITER_UNLIMITED: _loiter_unlimited,
+    NAV_LOITER_TIME: _loiter_time,
+    NAV_RETURN: _return,
+    NAV_LAND: _land,
+    NAV_TAKEOFF: _take_off,
+    NAV_DELAY: _delay,
+    DO_CHANGE_SPEED: _change_speed,
+    DO_SET_ROI_LOCATION: _look_at,
+    DO_SET_ROI_NONE: _look_away,
+    DO_SET_ROI: _look,
+}
+
+
+def _place(item: MissionItem, locate: Locate) -> Vec3 | Refused | None:
+    if item.x == NO_PLACE and item.y == NO_PLACE:
+        return None
+    across, height = horizontal_place(item, locate), _z(item, locate)
+    if isinstance(across, Refused):
+        return across
+    return height if isinstance(height, Refused) else (*across, height)
+
+
+def _z(item: MissionItem, locate: Locate) -> float | Refused:
+    """NED z of an item [m], from home where its frame says so."""
+    if item.frame == LOCAL_NED:
+        z = item.z
+    elif item.frame in HOME_FRAMES:
+        z = -item.z
+    elif item.frame in GLOBAL_FRAMES:
+        z = locate(0.0, 0.0, item.z)[2]
+    else:
+        return Refused(UNSUPPORTED_FRAME, f"frame {item.frame} is not supported for this item")
+    if not -MAX_DISTANCE <= z <= 0.0:
+        return _bad(7, f"a height of {-z:g} m is outside 0 to {MAX_DISTANCE:g} m")
+    return z
+
+
+def _heading(degrees: float) -> float | None:
+    return math.radians(degrees) if math.isfinite(degrees) else None
+
+
+def _within(value: float, most: float) -> bool:
+    return 0.0 <= value <= most
+
+
+def _bad(number: int, reason: str) -> Refused:
+    return Refused(INVALID_PARAM1 + number - 1, reason)

@@ -1,0 +1,145 @@
+"""The UDP socket between simulator and flight software, and the addresses of all links.
+
+Timeouts are set in the kernel (SO_RCVTIMEO): Python's own timeout costs one more system call for
+each datagram.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import re
+import select
+import socket
+import struct
+from typing import Final
+
+from messages.busy_poll import BusyPollReceiver
+
+Address = tuple[str, int]
+
+MAX_DATAGRAM: Final = 2048  # bytes; a larger datagram is cut and its last frame then refused
+
+_ADDRESS = re.compile(r"udp:(?P<host>[^:\s]+):(?P<port>\d{1,5})")
+_RECEIVE_BUFFER: Final = 1 << 20  # bytes: rides out a pause of the receiver
+
+
+class LinkError(Exception):
+    """A link that cannot be opened, in one sentence for the operator."""
+
+
+def parse_address(text: str, *, any_port: bool = False) -> Address:
+    """Read ``udp:HOST:PORT``.
+
+    Args:
+        text: The address as typed.
+        any_port: Allow port 0, which lets the system choose.
+
+    Returns:
+        The host as an IPv4 address and the port.
+
+    Raises:
+        LinkError: The text has another form, the port is out of range, or the host is unknown.
+    """
+    match = _ADDRESS.fullmatch(text)
+    if match is None:
+        raise LinkError(f"address {text!r} is not of the form udp:HOST:PORT")
+    port, lowest = int(match["port"]), 0 if any_port else 1
+    if not lowest <= port <= 65535:
+        raise LinkError(f"address {text!r}: port {port} is outside {lowest}..65535")
+    try:
+        return socket.gethostbyname(match["host"]), port
+    except OSError:
+        raise LinkError(f"address {text!r}: host {match['host']!r} is not known") from None
+
+
+class PeerSocket:
+    """Talks to one peer: the one it is connected to, or, once bound, the one it decides to serve.
+
+    Once there is a peer the kernel drops whatever comes from elsewhere.
+    """
+
+    def __init__(self, patience_s: float) -> None:
+        """Open a socket whose :meth:`receive` waits for ``patience_s``."""
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        seconds = int(patience_s)
+        waiting = struct.pack("ll", seconds, round((patience_s - seconds) * 1e6))
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, waiting)
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _RECEIVE_BUFFER)
+        self._receive = BusyPollReceiver(self._socket, MAX_DATAGRAM)
+
+    @classmethod
+    def connected(cls, peer: Address, patience_s: float) -> PeerSocket:
+        """A socket towards ``peer``.
+
+        Raises:
+            LinkError: The system refuses the peer's address.
+        """
+        opened = cls(patience_s)
+        try:
+            opened.serve(peer)
+        except OSError as error:
+            opened.close()
+            raise LinkError(f"cannot send to udp:{peer[0]}:{peer[1]}: {error.strerror}") from None
+        return opened
+
+    @classmethod
+    def bound(cls, local: Address, patience_s: float) -> PeerSocket:
+        """A socket at a port of this machine; port 0 lets the system choose.
+
+        Raises:
+            LinkError: The port is in use or the address is not of this machine.
+        """
+        opened = cls(patience_s)
+        try:
+            opened._socket.bind(local)
+        except OSError as error:
+            opened.close()
+            reason = error.strerror or str(error)
+            raise LinkError(
+                f"cannot listen on udp:{local[0]}:{local[1]}: {reason[0].lower()}{reason[1:]}"
+            ) from None
+        return opened
+
+    @property
+    def address(self) -> Address:
+        """Where this socket listens."""
+        host, port = self._socket.getsockname()
+        return str(host), int(port)
+
+    def serve(self, peer: Address) -> None:
+        """Talk to this peer only from now on."""
+        self._socket.connect(peer)
+
+    def receive_from_anyone(self) -> tuple[bytes, Address] | None:
+        """Wait for a datagram and its sender; None when the patience is over."""
+        try:
+            return self._socket.recvfrom(MAX_DATAGRAM)
+        except (BlockingIOError, ConnectionRefusedError):
+            return None
+
+    def receive(self) -> bytes | None:
+        """Wait for a datagram; None when the patience is over or the peer's port is closed."""
+        try:
+            return self._receive()
+        except (BlockingIOError, ConnectionRefusedError):
+            return None
+
+    def receive_waiting(self) -> bytes | None:
+        """Return a datagram of the peer that is already there, or None."""
+        try:
+            return self._socket.recv(MAX_DATAGRAM, socket.MSG_DONTWAIT)
+        except (BlockingIOError, ConnectionRefusedError):
+            return None
+
+    def wait(self, wait_s: float) -> bool:
+        """Wait until a datagram is there; False when the time is over."""
+        return bool(select.select((self._socket,), (), (), wait_s)[0])
+
+    def send(self, datagram: bytes) -> None:
+        """Send one datagram; UDP promises nothing, so neither does this."""
+        with contextlib.suppress(OSError):
+            self._socket.send(datagram)
+
+    def close(self) -> None:
+        """Give the port back."""
+        self._socket.close()

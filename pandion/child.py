@@ -1,0 +1,125 @@
+"""A child process of a flight: started, listened to, and never left behind."""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Final
+
+Event = dict[str, Any]
+"""One JSON object that a child wrote on its standard output."""
+
+_PR_SET_PDEATHSIG: Final = 1
+
+
+class Child:
+    """A process of the system. Its events come from its standard output, line by line."""
+
+    def __init__(
+        self,
+        name: str,
+        arguments: list[str],
+        log: Path,
+        processor: int | None = None,
+        runner: str | None = None,
+    ) -> None:
+        """Start ``python -m name``.
+
+        Args:
+            name: ``sitl`` or ``fsw``.
+            arguments: Its command line.
+            log: Where its standard error goes.
+            processor: The only one it may run on; any if None.
+            runner: A module that runs the process of this name in its own way.
+        """
+        module = [name] if runner is None else [runner, name]
+        self.name = name
+        self.interrupted = False  # by us
+        self.killed = False  # by us
+        self._rest = b""
+        with log.open("wb") as errors:
+            self._process = subprocess.Popen(
+                # -P: a directory of the same name where the user stands must not be imported.
+                [sys.executable, "-P", "-m", *module, *arguments, "--events", "json"],
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                stderr=errors,
+                preexec_fn=_die_with(os.getpid(), processor),
+            )
+        assert self._process.stdout is not None
+        self._pipe = self._process.stdout.fileno()
+        os.set_blocking(self._pipe, False)
+
+    def fileno(self) -> int:
+        """The pipe of its events, for a selector."""
+        return self._pipe
+
+    def events(self) -> list[Event] | None:
+        """Events that are there; None once it has closed its standard output."""
+        try:
+            data = os.read(self._pipe, 1 << 16)
+        except BlockingIOError:
+            return []
+        if not data:
+            return None
+        *lines, self._rest = (self._rest + data).split(b"\n")
+        return [event for line in lines if (event := _event(line)) is not None]
+
+    @property
+    def exit_code(self) -> int | None:
+        """None while it runs; negative if a signal ended it."""
+        return self._process.poll()
+
+    def interrupt(self) -> None:
+        """Ask it to end."""
+        if self._process.poll() is None:
+            self.interrupted = True
+            self._process.send_signal(signal.SIGINT)
+
+    def kill(self) -> None:
+        """End it now."""
+        if self._process.poll() is None:
+            self.killed = True
+            self._process.kill()
+
+    def end(self, patience_s: float) -> None:
+        """Wait for it, and kill it if it does not end in time."""
+        try:
+            self._process.wait(timeout=patience_s)
+        except subprocess.TimeoutExpired:
+            self.kill()
+            self._process.wait()
+        assert self._process.stdout is not None
+        self._process.stdout.close()
+
+
+def _event(line: bytes) -> Event | None:
+    """An event, or None for a line that some library printed."""
+    try:
+        event = json.loads(line)
+    except ValueError:
+        return None
+    return event if isinstance(event, dict) and "event" in event else None
+
+
+def _die_with(parent: int, processor: int | None) -> Callable[[], None] | None:
+    """What a new child does before it becomes Python: tie its life to ours (Linux only)."""
+    if sys.platform != "linux":
+        return None
+    # Loaded here, because the child must not import anything between fork and exec.
+    prctl = ctypes.CDLL(None).prctl
+
+    def tie() -> None:
+        prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+        if os.getppid() != parent:
+            os._exit(1)
+        if processor is not None:
+            os.sched_setaffinity(0, {processor})
+
+    return tie

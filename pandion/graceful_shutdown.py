@@ -1,0 +1,39 @@
+"""How a process is made to end: it has a moment, then it is interrupted, then it is killed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+from pandion.child import Child
+
+GRACE_S: Final = 0.6  # between one way to end a process and the next, stronger one
+
+
+@dataclass(slots=True)
+class GracefulShutdown:
+    """One process on its way out; nothing happens before it is expected to end."""
+
+    child: Child
+    due_s: float | None = None  # on the monotonic clock: when the next step is taken
+    _grace_s: float = GRACE_S
+    _asked: bool = False
+
+    def expect(self, due_s: float, grace_s: float = GRACE_S) -> None:
+        """It should have ended by then; of two times the earlier one counts."""
+        if self.due_s is None or due_s < self.due_s:
+            self.due_s, self._grace_s = due_s, grace_s
+
+    def escalate(self, now_s: float) -> None:
+        """Past its time: interrupt it, and the next time kill it."""
+        if self.due_s is None or now_s < self.due_s:
+            return
+        if self.child.exit_code is not None:
+            self.due_s = None
+            return
+        if self._asked:
+            self.child.kill()
+        else:
+            self.child.interrupt()
+        self._asked = True
+        self.due_s = now_s + self._grace_s

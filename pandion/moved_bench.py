@@ -1,0 +1,27 @@
+"""``pandion bench``, for one more release; the benchmarks are in a checkout's ``benchmarks/``."""
+
+from __future__ import annotations
+
+import sys
+from importlib import import_module
+from pathlib import Path
+from typing import Final
+
+from command_line.parser import COULD_NOT_START
+
+CHECKOUT: Final = Path(__file__).parents[1]
+
+
+def main(argv: list[str]) -> int:
+    """Name the new command and run it; returns its exit code."""
+    if not (CHECKOUT / "benchmarks" / "__main__.py").exists():
+        print(
+            "pandion bench: the benchmarks are not part of the installed package; "
+            "run `python -m benchmarks` in a checkout of the repository",
+            file=sys.stderr,
+        )
+        return COULD_NOT_START
+    command = " ".join(["python -m benchmarks", *argv[:1]])
+    print(f"pandion bench: this command has moved; use `{command}`", file=sys.stderr)
+    # By name: the shipped package may not depend on the folder.
+    return int(import_module("benchmarks.__main__").main(argv))

@@ -1,0 +1,147 @@
+"""Judges a run on the plant's truth: margins, collisions, landing, tracking error."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from sitl.mission_clock import MissionClock
+from sitl.plant.vector import Array
+from sitl.result import EndKind, EndReason, MarginRecord, TrackingError, TruthResult, score
+from sitl.scenario import V3, Scenario
+from sitl.scenario_validation import check_start
+from sitl.world import World, record_if_clear
+
+TOUCH_DOWN_MAX = 2.0  # m/s; a drop from 0.2 m
+Points = tuple[V3, V3, V3]  # base, joint 2, end-effector [m, NED]
+
+_NO_CURVE = np.empty(0)
+
+
+class FlightEvaluator:
+    """The score of one run and the first reason to end it.
+
+    Args:
+        scenario: What is flown.
+        clock: When the trajectory runs.
+        points: Critical points at the start.
+
+    Raises:
+        ScenarioError: The start is outside the safe set.
+    """
+
+    def __init__(self, scenario: Scenario, clock: MissionClock, points: Points) -> None:
+        self.world = World(scenario)
+        self.record = MarginRecord(self.world.keys)
+        self.ended: EndReason | None = None
+        self.left: str | None = None  # why the trajectory is no longer flown
+        self.silent: str | None = None  # since which step the flight software was silent
+        self._clock = clock
+        self._error = TrackingError()
+        self._duration_s = scenario.duration_s
+        self._whole = _whole(scenario)
+        margins = self.margins(points, 0.0)
+        check_start(self.world.keys, margins)
+        self.record.add(margins, 0.0)
+        self.sample_error(points, 0.0)
+
+    def end(self, kind: EndKind, sentence: str, time_s: float) -> None:
+        """End the run; the first reason stands."""
+        if self.ended is None:
+            self.ended = EndReason(kind, sentence, time_s)
+
+    def margins(self, points: Points, time_s: float) -> tuple[float, ...]:
+        """Margins [m] in the order of ``world.keys``."""
+        applies = self.world.workspace is not None and self._clock.counts(time_s)
+        return self.world.margins(points, self._clock.target_at(time_s).p if applies else None)
+
+    def judge(self, points: Points, time_s: float) -> None:
+        """Look at one plant step."""
+        if self.ended is not None:
+            return
+        margins = self.margins(points, time_s)
+        self.record.add(margins, time_s)
+        # Twice a step: comparisons that are false for what is not a number settle almost every one.
+        (_, _, base), (_, _, joint2), (_, _, end) = points
+        if base < 0.0 and joint2 < 0.0 and end < 0.0 < min(margins, default=1.0):
+            return
+        if not math.isfinite(sum(map(sum, points))):
+            self.end(EndKind.DIVERGED, f"the simulation diverged at {time_s:.3f} s", time_s)
+            return
+        touched = self.world.collision(points, margins)
+        if touched is not None:
+            self.end(EndKind.COLLISION, f"{touched} at {time_s:.2f} s", time_s)
+
+    def judge_all(self, places: Array, before_s: float, step_s: float) -> None:
+        """Look at every plant step of an exchange.
+
+        Args:
+            places: (steps, 2 + j, 3) [m, NED], from ``sitl.plant.integrator.integrate``.
+            before_s: Time at the begin of the exchange [s].
+            step_s: Length of a plant step [s].
+        """
+        if self.ended is None and self._all_clear(places, before_s, step_s):
+            return
+        for k, rows in enumerate(places.tolist(), start=1):
+            self.judge(critical(rows), before_s + k * step_s)
+
+    def _all_clear(self, places: Array, before_s: float, step_s: float) -> bool:
+        """Record the margins of steps without any incident; False, and nothing done, otherwise."""
+        curve, starts_s = _NO_CURVE, 0.0
+        if self.world.workspace is not None:
+            clock, last_s = self._clock, before_s + len(places) * step_s
+            if clock.starts_s is None or not clock.counts(last_s):
+                return False
+            curve, starts_s = clock.curve, clock.starts_s
+        lowest, when_s = self.record.arrays
+        return record_if_clear(
+            self.world.planes,
+            self.world.balls,
+            self.world.sphere,
+            (curve, starts_s),
+            places,
+            (before_s, step_s),
+            lowest,
+            when_s,
+        )
+
+    def judge_landing(self, speed: float, time_s: float) -> None:
+        """Look at the landing speed [m/s] of the fastest foot on the ground."""
+        if not (speed <= TOUCH_DOWN_MAX):
+            sentence = (
+                f"the legs hit the ground at {speed:.1f} m/s at {time_s:.2f} s, "
+                f"{TOUCH_DOWN_MAX:.1f} m/s is the most they stand"
+            )
+            self.end(EndKind.CRASH, sentence, time_s)
+
+    def judge_time(self, time_s: float) -> None:
+        """Look at the clock."""
+        if time_s >= self._duration_s - 1e-6:
+            self.end(EndKind.DURATION, f"flew {time_s:.1f} s", time_s)
+
+    def sample_error(self, points: Points, time_s: float) -> None:
+        """Take one sample of the tracking error, if the trajectory is on."""
+        if self._clock.counts(time_s):
+            self._error.add(points[2], self._clock.target_at(time_s).p)
+
+    def result(self, time_s: float) -> TruthResult:
+        """The score up to ``time_s``."""
+        flaws = tuple(flaw for flaw in (self.left, self.silent) if flaw is not None)
+        return score(self.ended, time_s, self._error, self.record, self._whole, flaws)
+
+
+def _whole(scenario: Scenario) -> EndKind:
+    """The end that a completed run of a scenario has."""
+    if scenario.pilot.plan == "hop":
+        return EndKind.MISSION
+    return EndKind.DURATION if math.isfinite(scenario.duration_s) else EndKind.INTERRUPTED
+
+
+def critical(rows: list[list[float]]) -> Points:
+    """Base, joint 2 and end-effector out of base, joint 1, …, end-effector."""
+    return _three(rows[0]), _three(rows[2]), _three(rows[-1])
+
+
+def _three(values: list[float]) -> V3:
+    return (values[0], values[1], values[2])

@@ -1,0 +1,101 @@
+"""Checks across the keys of a scenario: what no single range can say."""
+
+from __future__ import annotations
+
+import math
+
+from sitl.scenario import Lissajous, Scenario, Start
+from sitl.scenario_file import ScenarioError
+from sitl.world import CRITICAL_POINTS
+
+FIRST_JOINT_DEG, BOTH_JOINTS_DEG = 60.0, 90.0  # the arm's limits, Table I of the paper
+MARGINS_MAX = 16  # what one BARRIER_MARGIN message carries
+
+
+def check(scenario: Scenario) -> None:
+    """Refuse a scenario whose parts contradict each other.
+
+    Raises:
+        ScenarioError: With the key, the value and what is allowed.
+    """
+    _check_start(scenario.start)
+    _check_walls(scenario)
+    _check_names(scenario)
+    curve = scenario.trajectory
+    if isinstance(curve, Lissajous) and not (2.0 * curve.ramp_s <= curve.duration_s):
+        raise ScenarioError(
+            f"trajectory.ramp_s = {curve.ramp_s:g}: must be at most half of "
+            f"trajectory.duration_s = {curve.duration_s:g}"
+        )
+    hop, ground = scenario.pilot.plan == "hop", scenario.start.kind == "ground"
+    if hop != ground and scenario.pilot.plan != "none":
+        raise ScenarioError(
+            f'pilot.plan = "{scenario.pilot.plan}": start.kind = "{scenario.start.kind}" needs '
+            f'"{"hop" if ground else "trajectory"}" or "none"'
+        )
+
+
+def _check_start(start: Start) -> None:
+    given = Start(kind=start.kind, yaw_deg=start.yaw_deg)
+    if start.kind == "airborne" and start.position_m != given.position_m:
+        raise ScenarioError(
+            f"start.position_m = {list(start.position_m)}: only for a start on the ground, in the "
+            "air the trajectory's first point decides"
+        )
+    if start.kind == "ground" and start.arm_deg != given.arm_deg:
+        raise ScenarioError(
+            f"start.arm_deg = {list(start.arm_deg)}: only for a start in the air, on the ground "
+            "the arm is limp"
+        )
+    first, second = start.arm_deg
+    if not (abs(first) <= FIRST_JOINT_DEG and abs(first + second) <= BOTH_JOINTS_DEG):
+        raise ScenarioError(
+            f"start.arm_deg = {list(start.arm_deg)}: must be within ±{FIRST_JOINT_DEG:g} for the "
+            f"first joint and ±{BOTH_JOINTS_DEG:g} for the sum"
+        )
+
+
+def _check_walls(scenario: Scenario) -> None:
+    for i, wall in enumerate(scenario.walls):
+        length = math.sqrt(sum(c * c for c in wall.normal))
+        if not (abs(length - 1.0) <= 1e-6):
+            raise ScenarioError(
+                f"walls[{i}].normal = {list(wall.normal)}: must have length 1, has {length:.6g}"
+            )
+    kept = len(scenario.walls) + len(scenario.obstacles)
+    if kept * len(CRITICAL_POINTS) + (scenario.workspace is not None) > MARGINS_MAX:
+        most = MARGINS_MAX // len(CRITICAL_POINTS)
+        both = f"walls and obstacles = {kept}" if scenario.obstacles else f"walls = {kept}"
+        raise ScenarioError(f"{both} tables: must be at most {most}")
+    if scenario.obstacles and scenario.workspace is not None:
+        raise ScenarioError("obstacles: cannot be kept together with a workspace")
+
+
+def _check_names(scenario: Scenario) -> None:
+    walls = [wall.name for wall in scenario.walls]
+    for key, taken, names in (
+        ("walls", [], walls),
+        ("obstacles", walls, [one.name for one in scenario.obstacles]),
+        ("disturbances", [], [item.name for item in scenario.disturbances]),
+    ):
+        for i, name in enumerate(names):
+            if name in (*taken, *names[:i]):
+                raise ScenarioError(f'{key}[{i}].name = "{name}": must differ from the others')
+            if not name or len(name) > 24 or "/" in name:
+                raise ScenarioError(
+                    f'{key}[{i}].name = "{name}": must be 1 to 24 characters without "/"'
+                )
+
+
+def check_start(keys: tuple[str, ...], margins: tuple[float, ...]) -> None:
+    """Refuse a start outside the safe set.
+
+    Raises:
+        ScenarioError: With the constraint and its margin at t = 0.
+    """
+    for key, margin in zip(keys, margins, strict=True):
+        if not (margin > 0.0):
+            raise ScenarioError(
+                f"the scenario starts outside its safe set: margin {key} = "
+                f"{1000.0 * margin:.1f} mm at t = 0, must be above 0"
+            )

@@ -1,0 +1,64 @@
+"""Nothing but finite values within limits ever leaves, and nothing while disarmed."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from fsw.control.safety_gate import gate
+from fsw.model.airframe import AIRFRAME
+from fsw.signals import STOPPED, ActuatorCommand
+
+anything = st.floats(allow_nan=True, allow_infinity=True)
+wishes = st.builds(
+    ActuatorCommand,
+    rotor_thrust=st.tuples(*[anything] * 4),
+    joint_torque=st.tuples(*[anything] * 2),
+)
+allowed = st.builds(
+    ActuatorCommand,
+    rotor_thrust=st.tuples(*[st.floats(0.0, AIRFRAME.rotor_thrust_max)] * 4),
+    joint_torque=st.tuples(*[st.floats(-2.0, 2.0)] * 2),
+)
+
+
+@given(wishes, allowed, st.booleans())
+def test_what_is_sent_is_finite_and_within_limits(
+    wish: ActuatorCommand, last: ActuatorCommand, armed: bool
+) -> None:
+    sent, _ = gate(AIRFRAME, wish, last, armed)
+    assert all(0.0 <= f <= AIRFRAME.rotor_thrust_max for f in sent.rotor_thrust)
+    assert all(abs(t) <= AIRFRAME.joint_torque_max for t in sent.joint_torque)
+
+
+@given(wishes, allowed)
+def test_disarmed_everything_stands_still(wish: ActuatorCommand, last: ActuatorCommand) -> None:
+    assert gate(AIRFRAME, wish, last, armed=False) == (STOPPED, False)
+
+
+@given(allowed, allowed)
+def test_an_allowed_wish_passes_unchanged(wish: ActuatorCommand, last: ActuatorCommand) -> None:
+    assert gate(AIRFRAME, wish, last, armed=True) == (wish, False)
+
+
+LAST = ActuatorCommand((1.0, 2.0, 3.0, 4.0), (0.1, 0.2))
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize("place", range(6))
+def test_a_wish_that_is_no_number_repeats_the_last_and_is_reported(
+    value: float, place: int
+) -> None:
+    values = [5.0, 5.0, 5.0, 5.0, 0.0, 0.0]
+    values[place] = value
+    f1, f2, f3, f4, t1, t2 = values
+    wish = ActuatorCommand((f1, f2, f3, f4), (t1, t2))
+    assert gate(AIRFRAME, wish, LAST, armed=True) == (LAST, True)
+
+
+def test_opposite_infinities_do_not_cancel() -> None:
+    wish = ActuatorCommand((math.inf, -math.inf, 1.0, 1.0), (0.0, 0.0))
+    assert gate(AIRFRAME, wish, LAST, armed=True) == (LAST, True)

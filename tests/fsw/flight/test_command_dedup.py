@@ -1,0 +1,54 @@
+"""A command that comes twice acts once."""
+
+from __future__ import annotations
+
+import math
+
+from fsw.flight.command_dedup import answered_before, remember
+from fsw.signals import CommandRequest
+
+NAN = math.nan
+
+
+def asked(
+    command: int = 22, first: float = NAN, sender: int = 255, again: int = 0
+) -> CommandRequest:
+    return CommandRequest(command, (first, *(NAN,) * 6), sender, 190, again)  # type: ignore[arg-type]
+
+
+def test_the_same_words_within_half_a_second_are_the_same_command() -> None:
+    memory = remember((), asked(), 0, 1_000_000)
+    before = answered_before(memory, asked(first=math.nan), 1_499_999)
+    assert before is not None
+    assert before.result == 0
+    assert answered_before(memory, asked(), 1_500_000) is None
+
+
+def test_one_that_says_it_is_a_repetition_is_known_for_three_seconds() -> None:
+    memory = remember((), asked(), 0, 1_000_000)
+    assert answered_before(memory, asked(again=3), 3_999_999) is not None
+    assert answered_before(memory, asked(again=3), 4_000_000) is None
+
+
+def test_other_words_another_sender_or_something_in_between_are_a_new_command() -> None:
+    memory = remember((), asked(), 0, 0)
+    assert answered_before(memory, asked(first=1.0), 1) is None
+    assert answered_before(memory, asked(sender=1), 1) is None
+    memory = remember(memory, asked(command=21), 0, 1)
+    assert answered_before(memory, asked(again=1), 2) is None
+
+
+def test_a_refusal_is_no_answer_for_good() -> None:
+    memory = remember((), asked(), 1, 0)
+    assert answered_before(memory, asked(), 1) is None
+    before = answered_before(memory, asked(again=1), 1)
+    assert before is not None
+    assert before.result == 1
+
+
+def test_a_flood_of_senders_does_not_grow_the_memory() -> None:
+    memory = ()
+    for sender in range(256):
+        memory = remember(memory, asked(sender=sender), 0, sender)  # type: ignore[assignment]
+    assert len(memory) <= 8
+    assert answered_before(memory, asked(sender=255), 256) is not None

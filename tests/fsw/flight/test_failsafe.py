@@ -1,0 +1,181 @@
+"""Which condition is active when, and what is done about it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from fsw.flight.failsafe import (
+    FAILSAFES,
+    FAULTS,
+    Action,
+    Condition,
+    FailsafeContext,
+    active,
+    report,
+)
+from fsw.parameters.flight_config import FlightLimits
+from fsw.signals import BatteryState, Charge, Mode, Severity
+
+PERIOD_US = 100_000
+FINE = FailsafeContext(
+    limits=FlightLimits(),
+    mode=Mode.HOLD,
+    manual=True,
+    armed=True,
+    flies=True,
+    invalid_ticks=0,
+    up=1.0,
+    plan_age_us=PERIOD_US,
+    plan_period_us=PERIOD_US,
+    plan_refused=False,
+    output_replaced=False,
+    setpoint_fresh=False,
+    gcs_silent_us=0,
+    battery=BatteryState(),
+)
+OFFBOARD = replace(FINE, mode=Mode.OFFBOARD)
+
+
+def charged(charge: Charge) -> BatteryState:
+    return BatteryState(remaining=0.07, charge=charge)
+
+
+def conditions(context: FailsafeContext) -> tuple[Condition, ...]:
+    return tuple(row.condition for row in active(context))
+
+
+def action(context: FailsafeContext) -> Action:
+    (row,) = active(context)
+    return row.action(context)
+
+
+def test_every_condition_has_one_row() -> None:
+    assert [row.condition for row in FAILSAFES] == list(Condition)
+
+
+def test_without_attitude_or_estimate_the_flight_is_ended_and_only_then() -> None:
+    ending = {row.condition for row in FAILSAFES if row.action(FINE) is Action.TERMINATE}
+    assert ending == {Condition.ESTIMATE_INVALID, Condition.TILT_LOST}
+
+
+def test_nothing_wrong_is_no_condition() -> None:
+    assert active(FINE) == ()
+
+
+@pytest.mark.parametrize(
+    ("context", "condition"),
+    [
+        (replace(FINE, invalid_ticks=5), Condition.ESTIMATE_INVALID),
+        (replace(FINE, up=0.339), Condition.TILT_LOST),
+        (replace(FINE, up=-1.0), Condition.TILT_LOST),
+        (replace(FINE, up=math.nan), Condition.TILT_LOST),
+        (replace(FINE, plan_age_us=3 * PERIOD_US + 1), Condition.PLAN_STALE),
+        (replace(FINE, plan_refused=True), Condition.PLAN_REFUSED),
+        (replace(FINE, output_replaced=True), Condition.OUTPUT_NOT_FINITE),
+        (OFFBOARD, Condition.SETPOINTS_LOST),
+        (replace(FINE, gcs_silent_us=10_000_000), Condition.DATALINK_LOST),
+        (replace(FINE, battery=charged(Charge.LOW)), Condition.BATTERY_LOW),
+        (replace(FINE, battery=charged(Charge.CRITICAL)), Condition.BATTERY_CRITICAL),
+        (replace(FINE, battery=charged(Charge.EMERGENCY)), Condition.BATTERY_EMERGENCY),
+    ],
+)
+def test_each_evidence_is_its_condition(context: FailsafeContext, condition: Condition) -> None:
+    assert conditions(context) == (condition,)
+
+
+@pytest.mark.parametrize(
+    "context",
+    [
+        replace(FINE, invalid_ticks=4),  # a lost frame or two are flown through
+        replace(FINE, up=0.341),  # just short of 70 degrees
+        replace(FINE, plan_age_us=3 * PERIOD_US),
+        replace(FINE, flies=False, up=-1.0),  # carried about upside down
+        replace(FINE, flies=False, plan_age_us=10**9),
+        replace(FINE, armed=False, flies=False, invalid_ticks=1000),  # sensors not yet on
+        replace(OFFBOARD, setpoint_fresh=True),
+        replace(FINE, gcs_silent_us=9_999_999),
+        replace(FINE, gcs_silent_us=-1),  # there never was one
+    ],
+)
+def test_what_can_be_lived_with_is_no_condition(context: FailsafeContext) -> None:
+    assert active(context) == ()
+
+
+@given(st.integers(0, 5), st.floats(allow_nan=True), st.integers(0, 10**6), st.booleans())
+def test_the_strongest_action_comes_first(
+    invalid: int, up: float, age_us: int, refused: bool
+) -> None:
+    context = replace(FINE, invalid_ticks=invalid, up=up, plan_age_us=age_us, plan_refused=refused)
+    order = list(Action)
+    strengths = [order.index(row.action(context)) for row in active(context)]
+    assert strengths == sorted(strengths, reverse=True)
+
+
+@pytest.mark.parametrize(
+    ("number", "expected"),
+    [(0, Action.HOLD), (3, Action.RETURN), (4, Action.LAND), (5, Action.HOLD)],
+)
+def test_lost_setpoints_are_acted_on_as_the_parameter_says(number: int, expected: Action) -> None:
+    assert action(replace(OFFBOARD, limits=FlightLimits(setpoint_loss_action=number))) is expected
+
+
+@pytest.mark.parametrize(
+    ("number", "expected"),
+    [(0, Action.NONE), (1, Action.HOLD), (2, Action.RETURN), (3, Action.LAND)],
+)
+def test_a_lost_station_is_acted_on_as_the_parameter_says(number: int, expected: Action) -> None:
+    lost = replace(FINE, gcs_silent_us=10_000_000, limits=FlightLimits(station_loss_action=number))
+    assert action(lost) is expected
+    assert action(replace(lost, manual=False)) is Action.NONE, "it flies by itself, and goes on"
+    assert action(replace(lost, flies=False)) is Action.NONE
+
+
+@pytest.mark.parametrize(
+    ("number", "charge", "expected"),
+    [
+        (0, Charge.CRITICAL, Action.WARN),
+        (0, Charge.EMERGENCY, Action.WARN),
+        (2, Charge.LOW, Action.WARN),
+        (2, Charge.CRITICAL, Action.LAND),
+        (2, Charge.EMERGENCY, Action.LAND),
+        (3, Charge.LOW, Action.WARN),
+        (3, Charge.CRITICAL, Action.RETURN),
+        (3, Charge.EMERGENCY, Action.LAND),
+    ],
+)
+def test_a_low_battery_is_acted_on_as_the_parameter_says(
+    number: int, charge: Charge, expected: Action
+) -> None:
+    context = replace(FINE, battery=charged(charge), limits=FlightLimits(low_battery_action=number))
+    assert action(context) is expected
+    assert action(replace(context, flies=False)) is Action.WARN
+    assert action(replace(context, mode=Mode.LAND)) is Action.WARN, "it lands already"
+    returning = action(replace(context, mode=Mode.RETURN))
+    assert returning is (Action.WARN if expected is Action.RETURN else expected)
+
+
+def test_a_report_names_the_condition_its_number_and_what_is_done() -> None:
+    lost = replace(FINE, gcs_silent_us=12_000_000)
+    (row,) = active(lost)
+    assert report(row, lost, Action.RETURN) == (
+        Severity.CRITICAL,
+        "failsafe: no ground station for 12 s, returning",
+    )
+    low = replace(FINE, battery=charged(Charge.CRITICAL))
+    (row,) = active(low)
+    assert report(row, low, Action.WARN) == (Severity.CRITICAL, "battery critical: 7 % left")
+    over = replace(FINE, up=0.0)
+    (row,) = active(over)
+    severity, text = report(row, over, Action.TERMINATE)
+    assert (severity, text) == (Severity.EMERGENCY, "tilt beyond recovery: terminate")
+
+
+def test_a_fault_is_the_vehicles_own() -> None:
+    others = {Condition.SETPOINTS_LOST, Condition.DATALINK_LOST, Condition.BATTERY_LOW}
+    others |= {Condition.BATTERY_CRITICAL, Condition.BATTERY_EMERGENCY}
+    assert set(Condition) - others == FAULTS

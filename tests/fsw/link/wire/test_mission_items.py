@@ -1,0 +1,129 @@
+"""What uploaded items mean, and with which result the others are refused."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from fsw.link.wire import mission_items as items
+from fsw.link.wire.mission_items import MissionItem, Refused, read_rally, read_step
+from fsw.signals import MissionAction, MissionStep, Vec3, Vec4
+
+NAN = math.nan
+GLOBAL, LOCAL, RELATIVE, MISSION = 5, 1, 6, 2
+
+
+def locate(latitude: float, longitude: float, altitude: float) -> Vec3:
+    """A flat Earth whose origin is at 47 N, 8 E, 400 m."""
+    return (latitude - 47.0) * 111_000.0, (longitude - 8.0) * 76_000.0, 400.0 - altitude
+
+
+def item(
+    command: int,
+    frame: int = LOCAL,
+    params: Vec4 = (0.0, 0.0, 0.0, NAN),
+    place: tuple[int, int, float] = (10_000, -20_000, -1.5),
+    autocontinue: int = 1,
+) -> MissionItem:
+    return MissionItem(command, frame, params, *place, autocontinue)
+
+
+def step(given: MissionItem) -> MissionStep:
+    read = read_step(given, locate)
+    assert isinstance(read, MissionStep), read
+    return read
+
+
+def refused(given: MissionItem) -> Refused:
+    read = read_step(given, locate)
+    assert isinstance(read, Refused), read
+    assert read.reason
+    return read
+
+
+def test_a_waypoint_in_the_local_frame_is_north_east_down_in_tenths_of_millimetres() -> None:
+    read = step(item(items.NAV_WAYPOINT, params=(3.0, 0.25, 0.0, 90.0)))
+    assert read.action is MissionAction.GO
+    assert read.position == (1.0, -2.0, -1.5)
+    assert (read.hold_s, read.acceptance) == (3.0, 0.25)
+    assert read.yaw == pytest.approx(math.pi / 2.0)
+    assert not read.above_home
+    assert not read.stop_after
+
+
+def test_altitudes_count_from_home_or_from_the_sea() -> None:
+    place = (470_001_000, 80_002_000, 2.0)
+    above_home = step(item(items.NAV_WAYPOINT, RELATIVE, place=place))
+    assert above_home.position == pytest.approx((11.1, 15.2, -2.0), abs=0.01)
+    assert above_home.above_home
+    sea = step(item(items.NAV_WAYPOINT, GLOBAL, place=(*place[:2], 402.0)))
+    assert sea.position == pytest.approx((11.1, 15.2, -2.0), abs=0.01)
+    assert not sea.above_home
+
+
+def test_no_heading_keeps_the_heading_and_no_acceptance_is_the_usual_one() -> None:
+    read = step(item(items.NAV_WAYPOINT))
+    assert read.yaw is None
+    assert read.acceptance == items.USUAL_ACCEPTANCE
+
+
+def test_nan_where_it_is_not_used_is_normal() -> None:
+    assert step(item(items.NAV_WAYPOINT, params=(0.0, 0.0, NAN, NAN))).position
+    assert step(item(items.NAV_RETURN, MISSION, (NAN, NAN, NAN, NAN), (0, 0, NAN)))
+    assert step(item(items.NAV_TAKEOFF, params=(NAN, NAN, NAN, NAN)))
+    assert step(item(items.DO_CHANGE_SPEED, MISSION, (1.0, 0.2, -1.0, NAN), (0, 0, NAN)))
+
+
+@pytest.mark.parametrize(
+    ("given", "result"),
+    [
+        (item(items.NAV_WAYPOINT, params=(NAN, 0.0, 0.0, 0.0)), 6),
+        (item(items.NAV_WAYPOINT, params=(-1.0, 0.0, 0.0, 0.0)), 6),
+        (item(items.NAV_WAYPOINT, params=(0.0, NAN, 0.0, 0.0)), 7),
+        (item(items.NAV_WAYPOINT, place=(items.NO_PLACE, items.NO_PLACE, -1.0)), 10),
+        (item(items.NAV_WAYPOINT, place=(100_000_000, 0, -1.0)), 10),
+        (item(items.NAV_WAYPOINT, place=(0, 100_000_000, -1.0)), 11),
+        (item(items.NAV_WAYPOINT, place=(0, 0, NAN)), 12),
+        (item(items.NAV_WAYPOINT, place=(0, 0, 1.0)), 12),
+        (item(items.NAV_WAYPOINT, RELATIVE, place=(470_000_000, 80_000_000, -1.0)), 12),
+        (item(items.NAV_WAYPOINT, RELATIVE, place=(0, 0, 1.0)), 10),
+        (item(items.NAV_WAYPOINT, frame=4), 2),
+        (item(items.NAV_WAYPOINT, frame=MISSION), 2),
+        (item(items.NAV_TAKEOFF, place=(0, 0, NAN)), 12),
+        (item(items.NAV_DELAY, MISSION, (-1.0, 0.0, 0.0, 0.0)), 6),
+        (item(items.NAV_LOITER_TIME, params=(NAN, 0.0, 0.0, NAN)), 6),
+        (item(items.DO_CHANGE_SPEED, MISSION, (2.0, 0.2, 0.0, 0.0)), 6),
+        (item(items.DO_CHANGE_SPEED, MISSION, (1.0, 0.0, 0.0, 0.0)), 7),
+        (item(items.DO_CHANGE_SPEED, MISSION, (1.0, NAN, 0.0, 0.0)), 7),
+        (item(items.DO_CHANGE_SPEED, MISSION, (1.0, 21.0, 0.0, 0.0)), 7),
+        (item(82), 3),
+        (item(5001), 3),
+    ],
+)
+def test_what_is_of_no_use_is_refused_with_its_own_result(given: MissionItem, result: int) -> None:
+    assert refused(given).result == result
+
+
+def test_a_landing_without_a_place_is_right_here() -> None:
+    here = (items.NO_PLACE, items.NO_PLACE, 0.0)
+    assert step(item(items.NAV_LAND, RELATIVE, place=here)).position is None
+    there = step(item(items.NAV_LAND, place=(10_000, 0, 0.0)))
+    assert there.position == (1.0, 0.0, 0.0)
+
+
+def test_without_autocontinue_the_vehicle_stops_after_the_item() -> None:
+    assert step(item(items.NAV_WAYPOINT, autocontinue=0)).stop_after
+
+
+def test_loitering_is_staying() -> None:
+    assert step(item(items.NAV_LOITER_TIME, params=(7.0, 0.0, 0.0, NAN))).hold_s == 7.0
+    assert step(item(items.NAV_LOITER_UNLIMITED)).hold_s == math.inf
+
+
+def test_a_rally_point_is_a_place_and_nothing_else() -> None:
+    rally = item(items.NAV_RALLY_POINT, 3, place=(470_001_000, 80_000_000, 5.0))
+    assert read_rally(rally, locate) == pytest.approx((11.1, 0.0), abs=0.01)
+    wrong = read_rally(item(items.NAV_WAYPOINT), locate)
+    assert isinstance(wrong, Refused)
+    assert wrong.result == 3

@@ -1,0 +1,168 @@
+"""What can be changed in a module: cosmic-ray's changes, less those that prove nothing."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any, ClassVar
+
+import parso
+from cosmic_ray.ast import ast_nodes, get_ast
+from cosmic_ray.mutating import mutate_code
+from cosmic_ray.operators.operator import Operator
+from cosmic_ray.plugins import get_operator
+
+# One or two plausible slips for every construct. cosmic-ray's full list replaces each + by eleven
+# other operators; << of two floats is a type error, which any test finds and which proves nothing.
+_BINARY = "Add_Sub Sub_Add Mul_Div Div_Mul FloorDiv_Mul Mod_Mul Pow_Mul BitOr_BitAnd BitAnd_BitOr"
+_COMPARISON = (
+    "Lt_LtE Lt_GtE LtE_Lt LtE_Gt Gt_GtE Gt_LtE GtE_Gt GtE_Lt Eq_NotEq NotEq_Eq Is_IsNot IsNot_Is"
+)
+_OTHERS = (
+    "ReplaceUnaryOperator_USub_UAdd ReplaceUnaryOperator_Delete_Not AddNot ReplaceTrueWithFalse "
+    "ReplaceFalseWithTrue ReplaceAndWithOr ReplaceOrWithAnd ReplaceBreakWithContinue "
+    "ReplaceContinueWithBreak NumberReplacer ZeroIterationForLoop"
+)
+
+
+class SwapMinMax(Operator):
+    """``min`` for ``max`` and the other way round: a limit turned inside out."""
+
+    _OTHER: ClassVar = {"min": "max", "max": "min", "minimum": "maximum", "maximum": "minimum"}
+
+    def mutation_positions(self, node: Any) -> Iterator[Any]:
+        if isinstance(node, parso.python.tree.Name) and node.value in self._OTHER:
+            following = node.get_next_leaf()
+            if following is not None and following.value == "(":
+                yield node.start_pos, node.end_pos
+
+    def mutate(self, node: Any, index: int) -> Any:
+        return parso.python.tree.Name(self._OTHER[node.value], node.start_pos, node.prefix)
+
+    @classmethod
+    def examples(cls) -> tuple[()]:
+        return ()
+
+
+def _operators() -> Iterator[tuple[str, Operator]]:
+    for family, names in (("Binary", _BINARY), ("Comparison", _COMPARISON)):
+        for name in names.split():
+            full = f"Replace{family}Operator_{name}"
+            yield full, get_operator(f"core/{full}")()
+    for full in _OTHERS.split():
+        yield full, get_operator(f"core/{full}")()
+    yield "SwapMinMax", SwapMinMax()
+
+
+OPERATORS = dict(_operators())
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """One change of one line; the texts name it, because line numbers move."""
+
+    module: str
+    function: str
+    line: str
+    mutated: str
+    nth: int  # among those with the same texts in the same function
+    operator: str
+    occurrence: int  # as cosmic-ray counts
+    number: int  # of the line
+
+    @property
+    def key(self) -> tuple[str, str, str, str, int]:
+        return self.module, self.function, self.line, self.mutated, self.nth
+
+    def __str__(self) -> str:
+        return (
+            f"{self.module}:{self.number} {self.function}\n    - {self.line}\n    + {self.mutated}"
+        )
+
+
+Span = tuple[tuple[int, int], tuple[int, int]]
+
+
+def _span(node: Any) -> Span:
+    return (node.lineno, node.col_offset), (node.end_lineno, node.end_col_offset)
+
+
+def _not_run(tree: ast.Module) -> list[Span]:
+    """Where a change changes nothing that flies: annotations, decorators, types, examples."""
+    nodes: list[Any] = []
+    for node in ast.walk(tree):
+        nodes += getattr(node, "decorator_list", [])
+        nodes += filter(None, [getattr(node, "returns", None), getattr(node, "annotation", None)])
+        # The examples of machine code say types only.
+        if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "machine_code":
+            nodes.append(node)
+        if isinstance(node, ast.If) and getattr(node.test, "id", "") == "TYPE_CHECKING":
+            nodes.append(node)
+    nodes += [node for node in tree.body if isinstance(node, ast.Assign) and _is_type(node.value)]
+    return [_span(node) for node in nodes]
+
+
+def _is_type(value: ast.expr) -> bool:
+    """Whether it reads like an alias: tuple[float, ...] | None."""
+    while isinstance(value, ast.BinOp | ast.Subscript):
+        value = value.left if isinstance(value, ast.BinOp) else value.value
+    return getattr(value, "id", "") in ("tuple", "dict", "Callable", "NDArray", "Vec3")
+
+
+def _names(tree: ast.Module) -> list[tuple[int, int, str]]:
+    """First and last line of every function and class, outer ones first."""
+    found: list[tuple[int, int, str]] = []
+
+    def visit(node: ast.AST, prefix: str) -> None:
+        for child in ast.iter_child_nodes(node):
+            if isinstance(child, ast.FunctionDef | ast.ClassDef):
+                name = f"{prefix}{child.name}"
+                found.append((child.lineno, child.end_lineno or child.lineno, name))
+                visit(child, f"{name}.")
+            else:
+                visit(child, prefix)
+
+    visit(tree, "")
+    return found
+
+
+@cache
+def mutants(copy: Path, module: str) -> tuple[Mutant, ...]:
+    """All mutants of a module, in the order of its lines."""
+    source = (copy / module).read_text()
+    lines = source.splitlines()
+    tree = ast.parse(source)
+    skipped, names = _not_run(tree), _names(tree)
+    found: list[tuple[Any, ...]] = []
+    parsed = get_ast(source)
+    for operator_name, operator in OPERATORS.items():
+        positions = (
+            position for node in ast_nodes(parsed) for position in operator.mutation_positions(node)
+        )
+        for occurrence, (start, end) in enumerate(positions):
+            if any(low <= start and end <= high for low, high in skipped):
+                continue
+            found.append((start, operator_name, occurrence))
+    counted: dict[tuple[str, ...], int] = {}
+    result = []
+    for _start, operator_name, occurrence in sorted(found):
+        mutated = mutate_code(source, OPERATORS[operator_name], occurrence)
+        changed = [
+            (number, before, after)
+            for number, (before, after) in enumerate(
+                zip(lines, mutated.splitlines(), strict=False), start=1
+            )
+            if before != after
+        ]
+        if not changed:
+            continue
+        number, before, after = changed[0]
+        inside = [name for first, last, name in names if first <= number <= last]
+        function = inside[-1] if inside else ""
+        texts = (function, before.strip(), after.strip())
+        counted[texts] = counted.get(texts, 0) + 1
+        result.append(Mutant(module, *texts, counted[texts], operator_name, occurrence, number))
+    return tuple(result)
