@@ -20,11 +20,11 @@ from pathlib import Path
 import pytest
 
 from pandion.__main__ import VERBS, main
-from pandion.reproduce import WHAT
 from sitl.link.encode import StepEncoder
 from sitl.scenario_file import load_scenario, parse_scenario, scenario_names
 from sitl.scenario_validation import check
 from sitl.simulation import Simulation
+from studies.catalogue import STUDIES
 from tests.docs.fences import PAGES, ROOT, Fence, commands, fences, named
 
 BLOCKS = [fence for page in PAGES for fence in fences(page)]
@@ -223,7 +223,7 @@ def check_verb(words: list[str]) -> None:
     if verb in ("fly", "sitl") and len(words) > 1 and not words[1].startswith("-"):
         assert words[1] in scenario_names() or words[1].endswith(".toml")
     if verb == "reproduce":
-        assert words[1] in WHAT
+        assert words[1] in STUDIES
 
 
 def test_the_page_of_the_command_line_names_every_option_of_a_flight() -> None:
