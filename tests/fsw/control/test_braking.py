@@ -172,7 +172,8 @@ def test_the_paper_s_model_is_braked_without_a_lag() -> None:
 
 
 LEVEL_SPEEDS = st.tuples(*[st.floats(-0.05, 0.05)] * 2)
-LINEAR = Brake(AIRFRAME, 0.3, BrakeTuning(input_weight=1.0))  # gentle enough to stay within the tilt
+# Gentle enough to stay within the tilt.
+LINEAR = Brake(AIRFRAME, 0.3, BrakeTuning(input_weight=1.0))
 
 
 def linear_state(v: Vec2, a: Vec2, j: Vec2, s: Vec2) -> PredictionState:
