@@ -1,4 +1,4 @@
-# Every target does its own set-up; needed are python 3.11-3.13, pip, make and git; no root.
+# Every target does its own set-up. Requirements: Python 3.11-3.13, pip, make, git. Root is not needed.
 # The environment is .venv, at the versions and hashes of requirements-dev.lock, wheels only.
 
 PYTHON ?= python3
@@ -57,7 +57,8 @@ test-long: setup ## the tests that make test leaves out for its four minutes
 	$(BIN)/pytest -m long
 
 # cosmic-ray in an environment of its own; the tests run in .venv, on a copy of the checkout. FILES are
-# files and folders, SAMPLE mutants of each file, drawn with SEED; none of them: every mutant.
+# files and folders, SAMPLE mutants of each file, drawn with SEED, BUDGET the seconds that the tests of
+# a file may take; none of them: every mutant, 20 s.
 MUTATION := tests/mutation
 .mutation/ready: $(MUTATION)/tool.lock | $(READY)
 	@.boot/uv venv --quiet --allow-existing --no-project --python .venv/bin/python .mutation/tool
@@ -66,7 +67,7 @@ MUTATION := tests/mutation
 
 mutate: setup .mutation/ready ## change fsw a little, see if a test notices: SAMPLE=40 SEED=1 FILES=fsw/mpc JSON=1
 	@PYTHONPATH=. .mutation/tool/bin/python -m tests.mutation.mutate $(FILES) --seed $(or $(SEED),1) \
-		$(if $(SAMPLE),--sample $(SAMPLE)) $(if $(JSON),--json)
+		$(if $(SAMPLE),--sample $(SAMPLE)) $(if $(BUDGET),--budget $(BUDGET)) $(if $(JSON),--json)
 
 # Of other people's clients; each has a lock of its own, and none is needed to fly or to test.
 EXTERNAL := tests/interop/external

@@ -45,14 +45,14 @@ class BareLoops:
     def __exit__(self, *_: object) -> None:
         for loop in self._loops:
             loop.terminate()
-        said = [loop.communicate()[0] for loop in self._loops]
-        if said and all(said):
-            late = [[(due, woken) for due, woken in json.loads(text)] for text in said]
+        reported = [loop.communicate()[0] for loop in self._loops]
+        if reported and all(reported):
+            late = [[(due, woken) for due, woken in json.loads(text)] for text in reported]
             self.stops = Stops(late, INNER.period_us)
 
 
 def main(processor: int) -> None:
-    """Sleep from release to release until told to end; print from when to when it was late."""
+    """Sleep from release to release until asked to end; print from when to when it was late."""
     stop = StopRequest()
     stop.listen()
     os.sched_setaffinity(0, {processor})

@@ -38,7 +38,7 @@ _JUDGED: Final = (
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class BudgetRow:
     """One figure and its budget."""
 
     name: str
@@ -52,7 +52,7 @@ class Row:
 
 
 @dataclass(frozen=True, slots=True)
-class Noise:
+class MachineNoise:
     """What else the machine did meanwhile."""
 
     others: float  # processors used by programs that are not ours
@@ -74,7 +74,7 @@ def load_budgets(path: Path | None = None) -> Budgets:
     return content
 
 
-def judge(measured: Mapping[str, Any], budgets: Budgets) -> list[Row]:
+def judge(measured: Mapping[str, Any], budgets: Budgets) -> list[BudgetRow]:
     """Every budget with what was measured.
 
     Args:
@@ -82,12 +82,12 @@ def judge(measured: Mapping[str, Any], budgets: Budgets) -> list[Row]:
         budgets: From :func:`load_budgets`.
     """
     return [
-        Row(name, measured.get(group, {}).get(key), budgets[group][key])
+        BudgetRow(name, measured.get(group, {}).get(key), budgets[group][key])
         for group, key, name in _JUDGED
     ]
 
 
-def verdict(rows: list[Row], noise: Noise) -> str:
+def result(rows: list[BudgetRow], noise: MachineNoise) -> str:
     """``pass``, ``over budget``, or ``too noisy``, which is neither."""
     if noise.too_much:
         return "too noisy"

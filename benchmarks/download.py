@@ -24,7 +24,7 @@ from pandion.supervisor import ProcessFailed, Supervisor
 from pandion.version import version_and_machine
 
 PASSED, NOT_PASSED = 0, 1  # exit codes
-LEAST_MB_PER_S: Final = 2.0
+MIN_MB_PER_S: Final = 2.0
 _CONNECT_S: Final = 60.0
 _EARLIER: Final = "earlier"  # directory of the log that is fetched
 _MB: Final = 1e6
@@ -55,7 +55,7 @@ class Download:
     @property
     def passed(self) -> bool:
         """Whether every byte came, soon enough."""
-        return self.identical and self.mb_per_s >= LEAST_MB_PER_S
+        return self.identical and self.mb_per_s >= MIN_MB_PER_S
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,17 +80,17 @@ def main(argv: list[str]) -> int:
     console = console_beside(options.json)
     print(version_and_machine(), file=console)
     try:
-        fetched = fly(int(options.size_mb * _MB), Display(console))
+        fetched = measure(int(options.size_mb * _MB), Display(console))
     except (ProcessFailed, NothingCame) as error:
         print(f"python -m benchmarks download: {error}", file=sys.stderr)
         return error.exit_code if isinstance(error, ProcessFailed) else NOT_PASSED
     for each in fetched.downloads:
-        said = "identical" if each.identical else "NOT identical"
+        same = "identical" if each.identical else "NOT identical"
         times = each.mb_per_s / fetched.logged_mb_per_s
         print(
             f"{each.way:10} {each.size / _MB:6.1f} MB in {each.took_s:5.1f} s: "
-            f"{each.mb_per_s:5.2f} MB/s >= {LEAST_MB_PER_S:g}, {times:.0f} times what it "
-            f"logs, {said}  {'pass' if each.passed else 'FAIL'}",
+            f"{each.mb_per_s:5.2f} MB/s >= {MIN_MB_PER_S:g}, {times:.0f} times what it "
+            f"logs, {same}  {'pass' if each.passed else 'FAIL'}",
             file=console,
         )
     print(
@@ -103,7 +103,7 @@ def main(argv: list[str]) -> int:
     return PASSED if fetched.passed else NOT_PASSED
 
 
-def fly(size: int, display: Display) -> Downloads:
+def measure(size: int, display: Display) -> Downloads:
     """Stand on the ground in real time while a log of ``size`` bytes is fetched both ways.
 
     Raises:
@@ -118,8 +118,8 @@ def fly(size: int, display: Display) -> Downloads:
         out = runs / "now"
         out.mkdir()
         client = stack.enter_context(closing(DownloadClient()))
-        # At the least speed each way, and a while to connect.
-        duration_s = 2.0 * size / _MB / LEAST_MB_PER_S + 2.0
+        # At the minimum speed each way, and a while to connect.
+        duration_s = 2.0 * size / _MB / MIN_MB_PER_S + 2.0
         found: list[Download] = []
         failures: list[NothingCame] = []
         helper = threading.Thread(target=_fetch, args=(client, log, found, failures), daemon=True)
@@ -180,7 +180,7 @@ def _facts(fetched: Downloads) -> dict[str, Any]:
             }
             for each in fetched.downloads
         ],
-        "least_mb_per_s": LEAST_MB_PER_S,
+        "min_mb_per_s": MIN_MB_PER_S,
         "logged_mb_per_s": fetched.logged_mb_per_s,
         "asked_again": fetched.asked_again,
         "cores": os.cpu_count(),

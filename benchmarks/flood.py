@@ -60,7 +60,7 @@ class Flight:
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class Requirement:
     """One requirement."""
 
     name: str
@@ -81,8 +81,8 @@ def main(argv: list[str]) -> int:
     console = console_beside(options.json)
     print(version_and_machine(), file=console)
     try:
-        calm = fly(options.duration_s, flooded=False, display=Display(console))
-        flooded = fly(options.duration_s, flooded=True, display=Display(console))
+        calm = measure(options.duration_s, flooded=False, display=Display(console))
+        flooded = measure(options.duration_s, flooded=True, display=Display(console))
     except ProcessFailed as error:
         print(f"python -m benchmarks flood: {error}", file=sys.stderr)
         return error.exit_code
@@ -97,7 +97,7 @@ def main(argv: list[str]) -> int:
     return PASSED if all(row.passed for row in rows) else NOT_PASSED
 
 
-def fly(duration_s: float, *, flooded: bool, display: Display) -> Flight:
+def measure(duration_s: float, *, flooded: bool, display: Display) -> Flight:
     """Fly the walls once, and flood the ground station's link for ``duration_s`` if asked to.
 
     Raises:
@@ -132,7 +132,9 @@ def fly(duration_s: float, *, flooded: bool, display: Display) -> Flight:
         if flown.interrupted or flown.sitl is None:
             raise ProcessFailed(flown.failure or "interrupted", exit_code=NOT_PASSED)
     sent, sent_valid = (int(count) for count in counts) if counts else (0, 0)
-    return Flight(monitor.heard, vehicle, flown.sitl, sent, sent_valid)
+    return Flight(
+        heard=monitor.heard, vehicle=vehicle, sitl=flown.sitl, sent=sent, sent_valid=sent_valid
+    )
 
 
 @contextmanager
@@ -159,48 +161,50 @@ def _flood(
         counts += sender.communicate(f"{monitor.vehicle[1]} {RATE_HZ} {duration_s}\n")[0].split()
 
 
-def correctness(flight: Flight) -> list[Row]:
+def correctness(flight: Flight) -> list[Requirement]:
     """What must hold on any machine: nothing invalid did anything."""
     link = flight.vehicle["links"]["gcs"]
     heard = flight.heard
     accepted = [ack for ack in heard.others if ack[1] == _ACCEPTED]
     own = heard.asked + len(heard.heartbeats) + 60  # commands and heartbeats of the monitor
     return [
-        Row("commands of the flood that were accepted", len(accepted), 0, ""),
-        Row("acknowledgements to strangers", _strangers(heard), 0, ""),
-        Row(
+        Requirement("commands of the flood that were accepted", len(accepted), 0, ""),
+        Requirement("acknowledgements to strangers", _strangers(heard), 0, ""),
+        Requirement(
             "frames believed beyond the valid ones",
             link["frames_accepted"] - own - flight.sent_valid,
             0,
             "",
         ),
         # The monitor, and the one socket of the flood that sent valid frames.
-        Row("peers", link["peers"], 2, ""),
-        Row("services that failed", link["service_failures"], 0, ""),
-        Row("messages that could not be encoded", link["encode_failures"], 0, ""),
+        Requirement("peers", link["peers"], 2, ""),
+        Requirement("services that failed", link["service_failures"], 0, ""),
+        Requirement("messages that could not be encoded", link["encode_failures"], 0, ""),
     ]
 
 
-def timing(flight: Flight, calm: Flight) -> list[Row]:
+def timing(flight: Flight, calm: Flight) -> list[Requirement]:
     """What depends on the machine as well."""
     heard = flight.heard
     gaps = [b - a for a, b in itertools.pairwise(heard.heartbeats)]
     inner, before = flight.vehicle["inner"], calm.vehicle["inner"]
     rows = [
-        Row(
+        Requirement(
             "command to acknowledgement, longest",
             max(heard.acknowledged_s, default=9.9),
             MOST_ACK_S,
             "s",
         ),
-        Row("changes of mode", max(len(heard.modes) - 1, 0), 0, ""),
-        Row("heartbeat, largest gap", max(gaps, default=float("nan")), MOST_GAP_S, "s"),
-        Row("commands without an answer", heard.asked - len(heard.acknowledged_s), 1, ""),
-        Row("telemetry rate, largest deviation", rate_deviation(heard), RATE_TOLERANCE, ""),
+        Requirement("changes of mode", max(len(heard.modes) - 1, 0), 0, ""),
+        Requirement("heartbeat, largest gap", max(gaps, default=float("nan")), MOST_GAP_S, "s"),
+        Requirement("commands without an answer", heard.asked - len(heard.acknowledged_s), 1, ""),
+        Requirement("telemetry rate, largest deviation", rate_deviation(heard), RATE_TOLERANCE, ""),
     ]
     for name in ("lateness_p50_us", "lateness_p99_us"):
         bound = max(LATENESS_FACTOR * before[name], before[name] + LATENESS_SLACK_US)
-        rows.append(Row(f"inner loop, {name[:-3].replace('_', ' ')}", inner[name], bound, "us"))
+        rows.append(
+            Requirement(f"inner loop, {name[:-3].replace('_', ' ')}", inner[name], bound, "us")
+        )
     return rows
 
 
@@ -221,7 +225,7 @@ def _strangers(heard: Heard) -> int:
     return sum((system, component) != (SYSTEM, SYSTEM) for _, _, system, component in heard.others)
 
 
-def _write(target: str | None, rows: list[Row], calm: Flight, flooded: Flight) -> None:
+def _write(target: str | None, rows: list[Requirement], calm: Flight, flooded: Flight) -> None:
     if target is None:
         return
     figures = {

@@ -64,7 +64,7 @@ class Monitor:
         self.heard = Heard(modes=modes)
 
     def _listen(self) -> None:
-        said = asked = 0.0
+        sent = asked = 0.0
         while not self._closing:
             ready, _, _ = select.select([self._socket], (), (), 0.01)
             if ready:
@@ -74,8 +74,8 @@ class Monitor:
             if self.vehicle is None:
                 continue
             now = time.monotonic()
-            if now - said >= 1.0:
-                said = now
+            if now - sent >= 1.0:
+                sent = now
                 self._send(_HEARTBEAT, 0, 6, 8, 0, 4, 3)
             if now - asked >= _ASK_EVERY_S:
                 asked = now

@@ -147,7 +147,7 @@ class Flood:
 
 
 if __name__ == "__main__":
-    # Whoever started it ends it; a Ctrl-C at the terminal is for the flight.
+    # Its parent ends it; a Ctrl-C at the terminal is for the flight.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     traffic = Flood(seed=1)
     words = sys.stdin.readline().split()

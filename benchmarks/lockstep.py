@@ -26,7 +26,7 @@ from pandion.supervisor import ProcessFailed, Supervisor
 from pandion.version import version
 
 DONE, SLOW = 0, 1  # exit codes
-WANTED: Final = 25.0  # times real time, at 500 Hz
+TARGET: Final = 25.0  # times real time, at 500 Hz
 PEER: Final = "benchmarks.pymavlink_process"
 
 
@@ -60,7 +60,7 @@ def main(argv: list[str]) -> int:
         return COULD_NOT_START
     write_text(options.json, json.dumps(found, indent=1, allow_nan=False) + "\n")
     print("\n".join(_lines(found)), file=console)
-    return DONE if found["real_time_factor_best"] >= WANTED else SLOW
+    return DONE if found["real_time_factor_best"] >= TARGET else SLOW
 
 
 def _measure(options: LockstepOptions, console: TextIO) -> dict[str, Any]:
@@ -68,7 +68,7 @@ def _measure(options: LockstepOptions, console: TextIO) -> dict[str, Any]:
     flights: dict[str, list[dict[str, Any]]] = {"pandion": [], "pymavlink": []}
     for round_ in range(1, options.rounds + 1):
         for name, runner in (("pandion", None), ("pymavlink", PEER)):
-            flown = _fly(options, runner)
+            flown = _measure_one(options, runner)
             flights[name].append(flown)
             factor = flown["sitl"]["real_time_factor"]
             print(f"round {round_}, {name}: {factor:.1f} times real time", file=console, flush=True)
@@ -108,7 +108,7 @@ class _Silent(Display):
         """See :class:`Display`."""
 
 
-def _fly(options: LockstepOptions, runner: str | None) -> dict[str, Any]:
+def _measure_one(options: LockstepOptions, runner: str | None) -> dict[str, Any]:
     """One flight; what both processes wrote about it.
 
     Raises:
@@ -163,7 +163,7 @@ def _stages(flown: dict[str, Any]) -> dict[str, float]:
         "wait for the answer": waited,
         "fsw receive": stages["receive"]["p50_us"],
         "fsw tick": stages["tick"]["p50_us"],
-        "fsw answer": stages["actuate"]["p50_us"],
+        "fsw send": stages["actuate"]["p50_us"],
         "fsw telemetry and log": fsw["telemetry"]["p50_us"],
         "mpc, share of a step": mpc["p50_us"] / per_plan,
         "mpc, a cycle": mpc["p50_us"],
@@ -172,12 +172,12 @@ def _stages(flown: dict[str, Any]) -> dict[str, float]:
 
 def _lines(found: dict[str, Any]) -> list[str]:
     rows = [f"  {name:<24}{value:8.1f} us" for name, value in found["stages_us"].items()]
-    met = "met" if found["real_time_factor_best"] >= WANTED else "missed"
+    met = "met" if found["real_time_factor_best"] >= TARGET else "missed"
     return [
         f"{found['scenario']}, {found['duration_s']:g} s at 500 Hz, {found['places']}:",
         *rows,
         f"median {found['real_time_factor']:.1f}, best {found['real_time_factor_best']:.1f} times "
-        f"real time (wanted {WANTED:g}: {met})",
+        f"real time (target {TARGET:g}: {met})",
         f"{found['ratio_to_pymavlink']:.2f} times as fast as with pymavlink's packing",
         f"{found['cores']} cores, load average {found['load_average_before']} before, "
         f"{found['load_average_after']} after",

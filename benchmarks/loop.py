@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from benchmarks.bare_loop import BareLoops
-from benchmarks.budgets import Budgets, Row, judge, load_budgets, verdict
+from benchmarks.budgets import BudgetRow, Budgets, judge, load_budgets, result
 from benchmarks.machine_watch import Watch
 from command_line.options import json_file, option, read
 from command_line.values import seconds, several, whole
@@ -49,8 +49,8 @@ class Measured:
     """One flight."""
 
     hogs: int
-    rows: list[Row]
-    verdict: str
+    rows: list[BudgetRow]
+    result: str  # pass, over budget, or too noisy
     facts: dict[str, Any]
 
 
@@ -63,7 +63,7 @@ def main(argv: list[str]) -> int:
     machine = _machine()
     print("Pandion {version}: {cores} cores, load {load}, {kernel}".format(**machine), file=console)
     try:
-        flown = [_fly(options, hogs, budgets, console) for hogs in options.hogs]
+        flown = [_measure(options, hogs, budgets, console) for hogs in options.hogs]
     except ProcessFailed as error:
         print(f"python -m benchmarks loop: {error}", file=sys.stderr)
         return error.exit_code
@@ -72,10 +72,10 @@ def main(argv: list[str]) -> int:
         print("\n".join(_lines(measured)), file=console)
     figures = {"machine": machine, "flights": [_as_json(one) for one in flown]}
     write_text(options.json, json.dumps(figures, indent=2) + "\n")
-    return PASSED if all(one.verdict == "pass" for one in flown) else NOT_PASSED
+    return PASSED if all(one.result == "pass" for one in flown) else NOT_PASSED
 
 
-def _fly(options: LoopOptions, hogs: int, budgets: Budgets, console: TextIO) -> Measured:
+def _measure(options: LoopOptions, hogs: int, budgets: Budgets, console: TextIO) -> Measured:
     """One flight; its logs are thrown away.
 
     Raises:
@@ -95,7 +95,7 @@ def _fly(options: LoopOptions, hogs: int, budgets: Budgets, console: TextIO) -> 
         ]
         flown = Supervisor(Display(console), out).run(
             sitl,
-            # Telemetry goes where nobody listens: it is encoded and sent all the same.
+            # Telemetry goes where nothing listens: it is encoded and sent all the same.
             lambda port: [
                 f"--sim=udp:127.0.0.1:{port}",
                 *("--gcs=udp:127.0.0.1:9", "--wait=600", f"--out={out}"),
@@ -119,7 +119,7 @@ def _fly(options: LoopOptions, hogs: int, budgets: Budgets, console: TextIO) -> 
         "vehicle": vehicle,
     }
     rows = judge(_figures(vehicle, watch, elsewhere), budgets)
-    return Measured(hogs, rows, verdict(rows, noise), facts)
+    return Measured(hogs, rows, result(rows, noise), facts)
 
 
 def _figures(
@@ -173,7 +173,7 @@ def _lines(measured: Measured) -> list[str]:
         f"  {'' if row.kept else 'over'}"
         for row in measured.rows
     ]
-    return [head, f"  {'':<30}{'measured':>12}{'budget':>12}", *table, f"  {measured.verdict}"]
+    return [head, f"  {'':<30}{'measured':>12}{'budget':>12}", *table, f"  {measured.result}"]
 
 
 def _number(value: float | None) -> str:
@@ -183,7 +183,7 @@ def _number(value: float | None) -> str:
 def _as_json(measured: Measured) -> dict[str, Any]:
     return {
         "hogs": measured.hogs,
-        "verdict": measured.verdict,
+        "result": measured.result,
         "figures": {
             row.name: {"value": row.value, "budget": row.budget, "kept": row.kept}
             for row in measured.rows

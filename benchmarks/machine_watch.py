@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
-from benchmarks.budgets import Noise
+from benchmarks.budgets import MachineNoise
 
 _GLANCE_S: Final = 1.0
 _SETTLED_S: Final = 5.0  # from here on memory may not grow
@@ -28,7 +28,7 @@ class Watch:
     module: str = "fsw"
     resident: list[tuple[float, int]] = field(default_factory=list)  # seconds, bytes
     children_bytes: int = 0  # what its children have for themselves
-    noise: Noise | None = None
+    noise: MachineNoise | None = None
     _done: threading.Event = field(default_factory=threading.Event)
     _thread: threading.Thread | None = None
     _begin: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
@@ -45,7 +45,7 @@ class Watch:
         self._thread.join()
         wall, busy, stolen, ours = (b - a for a, b in zip(self._begin, _busy(), strict=True))
         cores = os.cpu_count() or 1
-        self.noise = Noise(max(busy - ours, 0.0) / wall, stolen / (wall * cores))
+        self.noise = MachineNoise(max(busy - ours, 0.0) / wall, stolen / (wall * cores))
 
     @property
     def resident_mb(self) -> float | None:

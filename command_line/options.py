@@ -117,8 +117,8 @@ class Option:
 
     def _help(self) -> str:
         text = self.help
-        told = self.default is None or isinstance(self.default, bool) or self.default == ""
-        if not told and "(default" not in text:
+        obvious = self.default is None or isinstance(self.default, bool) or self.default == ""
+        if not obvious and "(default" not in text:
             shown = f"{self.default:g}" if isinstance(self.default, float) else self.default
             text += f" (default {self.text(shown) if self.text else shown})"
         return text.replace("%", "%%")

@@ -65,29 +65,29 @@ def run(options: FswOptions, load: ProgramLoader | None = None) -> int:
     Returns:
         The exit code.
     """
-    told = Events(options.events)
+    reporter = Events(options.events)
     try:
-        return _Session(options, told, load or load_flight_software).run()
+        return _Session(options, reporter, load or load_flight_software).run()
     except (CouldNotStart, LinkError) as error:
-        told.report("error", f"fsw: {error}")
+        reporter.report("error", f"fsw: {error}")
         return COULD_NOT_START
     except KeyboardInterrupt:
-        told.report("error", "fsw: interrupted before the flight began")
+        reporter.report("error", "fsw: interrupted before the flight began")
         return NOT_COMPLETED
     except BrokenPipeError:
-        return NOT_COMPLETED  # whoever read the events is gone
+        return NOT_COMPLETED  # the reader of the events is gone
     except Exception as error:
         traceback.print_exc()
-        told.report("error", f"fsw: internal error, {type(error).__name__}: {error}")
+        reporter.report("error", f"fsw: internal error, {type(error).__name__}: {error}")
         return NOT_COMPLETED
 
 
 class _Session:
     """One start of the program."""
 
-    def __init__(self, options: FswOptions, told: Events, load: ProgramLoader) -> None:
+    def __init__(self, options: FswOptions, events: Events, load: ProgramLoader) -> None:
         self._options = options
-        self._told = told
+        self._events = events
         self._load = load
         self._stop = StopRequest()
 
@@ -96,7 +96,7 @@ class _Session:
         simulator = parse_address(options.sim)
         addresses(options.links)  # what is no address is refused before a minute of compiling
         directory = _output_directory(options.out)
-        self._told.report(
+        self._events.report(
             "preparing", "fsw: preparing (the first start compiles, which takes a minute)"
         )
         program = self._load(options)
@@ -144,10 +144,10 @@ class _Session:
         result |= {"retransmissions": sim.retransmissions, **link_report.as_json(ground, inbox)}
         result["files"] = files.as_json()
         unwritten = report.write(directory / "fsw.json", result)
-        told = f"fsw: {end.sentence}"
-        self._told.report("ended", told, ending=end.ending.value, result=result)
+        sentence = f"fsw: {end.sentence}"
+        self._events.report("ended", sentence, ending=end.ending.value, result=result)
         if unwritten is not None:
-            self._told.report("unwritten", f"fsw: cannot write {unwritten}", what=unwritten)
+            self._events.report("unwritten", f"fsw: cannot write {unwritten}", what=unwritten)
             return NOT_COMPLETED
         return DONE if end.ending is Ending.SHUTDOWN else NOT_COMPLETED
 
@@ -163,7 +163,7 @@ class _Session:
             raise CouldNotStart(f"cannot write {error.filename}: {error.strerror}") from None
 
     def _warn(self, sentence: str) -> None:
-        self._told.report("warning", f"fsw: {sentence}")
+        self._events.report("warning", f"fsw: {sentence}")
 
     def _services(self, program: FlightProgram[Any], logs: FlightLogs) -> tuple[LinkService, ...]:
         """What one link serves; called once a link."""
@@ -192,10 +192,10 @@ class _Session:
         except ValueError as error:
             raise CouldNotStart(f"parameters in {path} contradict each other: {error}") from None
         for complaint in keeping.complaints:
-            self._told.report("warning", f"fsw: {path}, {complaint}")
+            self._events.report("warning", f"fsw: {path}, {complaint}")
         if path is not None:
             text = f"fsw: parameters from {path}, {keeping.restored} of them not the default"
-            self._told.report("parameters", text)
+            self._events.report("parameters", text)
         return keeping
 
     def _fly(
@@ -208,7 +208,7 @@ class _Session:
     ) -> FlightEnd:
         options = self._options
         self._stop.listen()
-        self._told.report("ready", f"fsw: ready, looking for the simulator at {options.sim}")
+        self._events.report("ready", f"fsw: ready, looking for the simulator at {options.sim}")
         first = loop.connect(options.wait_s)
         if first is None:
             if self._stop.requested:
@@ -265,12 +265,12 @@ def _subject(options: FswOptions, program: FlightProgram[Any]) -> LogSubject:
         facts["seed"] = options.seed
     vehicle = program.facts
     return LogSubject(
-        facts,
-        program.numbers,
-        program.parameters.values,
-        vehicle.rotor_thrust_max,
-        vehicle.link_length,
-        round(program.parameters.values["LOG_PROFILE"]),
+        facts=facts,
+        numbers=program.numbers,
+        parameters=program.parameters.values,
+        thrust_max=vehicle.rotor_thrust_max,
+        link_length=vehicle.link_length,
+        profile=round(program.parameters.values["LOG_PROFILE"]),
     )
 
 

@@ -1,7 +1,7 @@
-"""``dataclass`` for values made in every tick: frozen for whoever reads, cheap for who makes them.
+"""``dataclass`` for values made in every tick: frozen for the type checker, cheap to make.
 
 A frozen dataclass sets each field through ``object.__setattr__``: 2.6 us for fourteen of them,
-against 0.16 us here. Nobody may change such a value all the same; mypy, which sees the ordinary
+against 0.16 us here. Such values must not be changed all the same; mypy, which sees the ordinary
 ``dataclass``, refuses the assignment before it runs.
 """
 

@@ -498,7 +498,7 @@ class PlanRequest:
     from_nominal: bool  # start carried over from the running plan, not measured
     tuning: Tuning = ()  # of the planner's configuration
     # (2,) rad, joints to hold at the nodes; empty: where the arm is is the planner's choice
-    postures: tuple[Vec2, ...] = ()
+    joint_targets: tuple[Vec2, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

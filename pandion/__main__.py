@@ -64,18 +64,18 @@ def main(argv: list[str] | None = None) -> int:
         finally:
             sys.stdout.flush()  # here, where a reader that has left or a full disk has its answer
     except BrokenPipeError:
-        _say_no_more()  # whoever read the output has left
+        _silence_stdout()  # the reader of the output has left
     except OSError as error:
         if error.errno not in (errno.ENOSPC, errno.EDQUOT):
             raise
-        _say_no_more()
+        _silence_stdout()
         print(f"pandion: cannot write {error.filename or 'output'}: disk full", file=sys.stderr)
     except KeyboardInterrupt:
         print("pandion: interrupted", file=sys.stderr)
     return _INTERRUPTED
 
 
-def _say_no_more() -> None:
+def _silence_stdout() -> None:
     """Nothing can be written to standard output, at exit neither."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 

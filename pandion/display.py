@@ -64,7 +64,7 @@ class Display:
 
     def report(self, what: str, done: float, total: float, state: str = "") -> None:
         """Show how much of one thing is done, ``done`` of ``total`` [any unit]."""
-        state = state or f"{done} of {total}"
+        counted, state = not state, state or f"{done} of {total}"
         if self._bar is not None:
             self._bar.update(
                 self._bar.task_ids[0],
@@ -76,7 +76,7 @@ class Display:
             )
             return
         shown = (what, int(self._lines * done / max(total, 1e-9)))
-        if shown != self._shown and shown[1] > 0:
+        if shown != self._shown and (counted or shown[1] > 0):
             self.say(f"{what} {state}")
         self._shown = shown
 

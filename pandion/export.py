@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 DONE: Final = 0  # exit code
 
 _SHOWN_RECORDS: Final = 5_000
-_TEXTS: Final = "texts"  # the channel of what the vehicle said
+_TEXTS: Final = "texts"  # the channel of status texts
 
 
 _TARGET: Final = OneOf(required=True)
@@ -101,9 +101,9 @@ def _rows(log: UlogFile) -> Iterator[tuple[str, int, tuple[str, ...], tuple[Any,
     known: dict[int, tuple[Topic, Any, tuple[str, ...]]] = {}
     pieces = ""
     for record in log.records():
-        said = ulog.said(record.kind, record.body)
-        if said is not None:
-            severity, t_us, text = said
+        reported = ulog.said(record.kind, record.body)
+        if reported is not None:
+            severity, t_us, text = reported
             yield _TEXTS, t_us, ("timestamp", "severity", "text"), (t_us, severity, text)
         if record.kind != ulog.DATA:
             continue

@@ -25,7 +25,7 @@ def join_truth(directory: Path, fsw: dict[str, Any] | None) -> None:
 
     Args:
         directory: Of the flight.
-        fsw: What the flight software said of itself at its end, None if it did not get there.
+        fsw: The flight software's result, None if it did not get to write one.
     """
     truth, flight = directory / "truth.ulg", directory / "flight.ulg"
     file = (fsw or {}).get("files", {}).get("flight.ulg")

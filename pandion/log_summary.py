@@ -24,7 +24,7 @@ _SHOWN_RECORDS = 10_000
 
 
 def summary(log: UlogFile, progress: Callable[[int, int], None]) -> dict[str, Any]:
-    """Facts, length, records of each topic and what the vehicle said."""
+    """Facts, length, records of each topic and status texts."""
     counts: Counter[str] = Counter()
     texts: list[str] = []
     first_us = last_us = lost_ms = 0
@@ -33,8 +33,8 @@ def summary(log: UlogFile, progress: Callable[[int, int], None]) -> dict[str, An
             counts[log.topics[record.number].name] += 1
             last_us = max(last_us, int.from_bytes(record.body[:8], "little"))
             first_us = first_us or last_us
-        elif (said := ulog.said(record.kind, record.body)) is not None:
-            _, t_us, text = said
+        elif (reported := ulog.said(record.kind, record.body)) is not None:
+            _, t_us, text = reported
             texts.append(f"{1e-6 * t_us:9.3f} s  {text}")
         elif record.kind == ulog.DROPOUT:
             lost_ms += int.from_bytes(record.body, "little")

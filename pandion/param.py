@@ -15,18 +15,6 @@ from command_line.parser import COULD_NOT_START, unknown_name
 from fsw.link.udp_endpoint import LinkError, parse_address
 
 DONE, REFUSED = 0, 1  # exit codes
-HELP: Final = """\
-usage: pandion param ACTION [arguments] [--vehicle udp:HOST:PORT | --file FILE]
-
-actions:
-  list [PATTERN]        show parameters, * and ? stand for anything
-  get NAME ...          show these
-  set NAME VALUE        change one
-  import FILE           take over every value of a .params or .parm file
-  export FILE           write all of them; .parm is MAVProxy's format, else QGroundControl's
-
-`pandion param ACTION --help` prints the options of an action.
-"""
 _WHERE: Final = OneOf()
 
 
@@ -107,21 +95,21 @@ class FileValues:
         """Change one parameter in the file to ``value`` [the parameter's unit].
 
         Raises:
-            Refused: It is out of range or contradicts the others.
+            ParameterRefused: It is out of range or contradicts the others.
         """
         from fsw.parameters.flight_config import FlightConfig
         from fsw.parameters.float32 import nearest_decimal
         from fsw.parameters.registry import BY_NAME
         from fsw.parameters.storage import save
         from fsw.tuning import tuned
-        from pandion.param_vehicle import Refused
+        from pandion.param_vehicle import ParameterRefused
 
         parameter = BY_NAME.get(name)
         if parameter is None:
-            raise Refused(unknown_name("parameter", name, BY_NAME))
+            raise ParameterRefused(unknown_name("parameter", name, BY_NAME))
         refusal = parameter.refusal(value)
         if refusal is not None:
-            raise Refused(refusal)
+            raise ParameterRefused(refusal)
         kept = self._kept() | {name: nearest_decimal(value)}
         try:
             tuned(
@@ -129,7 +117,7 @@ class FileValues:
                 tuple((BY_NAME[n].path, v * BY_NAME[n].scale) for n, v in kept.items()),
             )
         except ValueError as error:
-            raise Refused(f"{name} is left as it is: {error}") from None
+            raise ParameterRefused(f"{name} is left as it is: {error}") from None
         save(self._path, kept)
 
     def _kept(self) -> dict[str, float]:
@@ -141,16 +129,15 @@ class FileValues:
 def main(argv: list[str]) -> int:
     """Do one thing with parameters; returns the exit code."""
     if not argv or argv[0] in ("-h", "--help"):
-        print(HELP, end="")
+        print(_help())
         return DONE
     action = ACTIONS.get(argv[0])
     if action is None:
         print(f"pandion param: {unknown_name('action', argv[0], ACTIONS)}", file=sys.stderr)
         return COULD_NOT_START
-    kind, act = action
-    what = "Parameters of a running vehicle or in a file."
+    kind, act, what = action
     options = read(kind, f"pandion param {argv[0]}", what, argv[1:])
-    from pandion.param_vehicle import NoAnswer, ParameterClient, Refused
+    from pandion.param_vehicle import NoAnswer, ParameterClient, ParameterRefused
 
     try:
         if options.file is not None:
@@ -160,7 +147,7 @@ def main(argv: list[str]) -> int:
     except (LinkError, NoAnswer, OSError) as error:
         print(f"pandion param: {error}", file=sys.stderr)
         return COULD_NOT_START
-    except Refused as error:
+    except ParameterRefused as error:
         print(f"pandion param: {error}", file=sys.stderr)
         return REFUSED
     except KeyboardInterrupt:
@@ -182,12 +169,12 @@ def _list(options: _List, values: Values) -> int:
 
 
 def _get(options: _Get, values: Values) -> int:
-    from pandion.param_vehicle import Refused
+    from pandion.param_vehicle import ParameterRefused
 
     known = values.read_all()
     for name in options.names:
         if name not in known:
-            raise Refused(unknown_name("parameter", name, known))
+            raise ParameterRefused(unknown_name("parameter", name, known))
     _show({name: known[name] for name in options.names}, as_json=options.json)
     return DONE
 
@@ -199,7 +186,7 @@ def _set(options: _Set, values: Values) -> int:
 
 
 def _import(options: _File, values: Values) -> int:
-    from pandion.param_vehicle import Refused
+    from pandion.param_vehicle import ParameterRefused
 
     wanted, held = _read_file(options.path), values.read_all()
     changed = refused = 0
@@ -209,7 +196,7 @@ def _import(options: _File, values: Values) -> int:
         try:
             values.write(name, value)
             changed += 1
-        except Refused as error:
+        except ParameterRefused as error:
             print(f"pandion param: {error}", file=sys.stderr)
             refused += 1
     print(f"{len(wanted)} parameters read, {changed} changed, {refused} refused")
@@ -226,7 +213,7 @@ def _export(options: _File, values: Values) -> int:
 
 
 def _read_file(path: Path) -> dict[str, float]:
-    """The values of a file; what is of no use in it is said on standard error."""
+    """The values of a file; unusable lines are reported on standard error."""
     from fsw.parameters.storage import load
 
     loaded = load(path)
@@ -250,26 +237,20 @@ def _described(name: str, value: float) -> dict[str, Any]:
     from fsw.parameters.facts import FACT_BY_NAME, GROUP
     from fsw.parameters.registry import BY_NAME
 
-    parameter, fact = BY_NAME.get(name), FACT_BY_NAME.get(name)
-    if fact is not None:
-        told = {
-            "unit": fact.unit,
-            "group": GROUP,
-            "meaning": f"{fact.label}: {fact.meaning} (read only)",
+    entry: dict[str, Any] = {"name": name, "value": value}
+    if (fact := FACT_BY_NAME.get(name)) is not None:
+        meaning = f"{fact.label}: {fact.meaning} (read only)"
+        entry |= {"unit": fact.unit, "group": GROUP, "meaning": meaning}
+    elif (parameter := BY_NAME.get(name)) is not None:
+        entry |= {
+            "default": parameter.default,
+            "unit": parameter.unit,
+            "min": parameter.least,
+            "max": parameter.most,
+            "group": parameter.group,
+            "meaning": parameter.meaning,
         }
-        return {"name": name, "value": value, **told}
-    if parameter is None:  # of a vehicle with another version
-        return {"name": name, "value": value}
-    return {
-        "name": name,
-        "value": value,
-        "default": parameter.default,
-        "unit": parameter.unit,
-        "min": parameter.least,
-        "max": parameter.most,
-        "group": parameter.group,
-        "meaning": parameter.meaning,
-    }
+    return entry  # bare if it is of a vehicle with another version
 
 
 def _number(value: float) -> str:
@@ -278,10 +259,23 @@ def _number(value: float) -> str:
     return as_text(value)
 
 
-ACTIONS: Final[dict[str, tuple[type[_Where], Callable[[Any, Values], int]]]] = {
-    "list": (_List, _list),
-    "get": (_Get, _get),
-    "set": (_Set, _set),
-    "import": (_File, _import),
-    "export": (_File, _export),
+ACTIONS: Final[dict[str, tuple[type[_Where], Callable[[Any, Values], int], str]]] = {
+    "list": (_List, _list, "Show parameters; in PATTERN * and ? stand for anything."),
+    "get": (_Get, _get, "Show parameters by name."),
+    "set": (_Set, _set, "Change one parameter."),
+    "import": (_File, _import, "Take over every value of a .params or .parm file."),
+    "export": (
+        _File,
+        _export,
+        "Write all parameters; .parm is MAVProxy's format, anything else QGroundControl's.",
+    ),
 }
+
+
+def _help() -> str:
+    rows = (f"  {name:8}{what}" for name, (_, _, what) in ACTIONS.items())
+    return "\n".join(
+        ("usage: pandion param ACTION [options] [--vehicle udp:HOST:PORT | --file FILE]", "")
+        + ("Parameters of a running vehicle or in a file.", "", "actions:", *rows, "")
+        + ("`pandion param ACTION --help` prints the options of an action.",)
+    )

@@ -12,7 +12,7 @@ from fsw.link.udp_endpoint import MAX_DATAGRAM, Address
 from fsw.parameters.float32 import nearest_decimal
 from messages.frames import Frame, FrameWriter, split
 
-_SYSTEM, _COMPONENT = 254, 190  # nobody's ground station
+_SYSTEM, _COMPONENT = 254, 190  # of no ground station in use
 _VEHICLE: Final = (1, 1)
 _NO_INDEX: Final = 0xFFFF
 _HEARTBEAT, _STATUSTEXT = 0, 253
@@ -27,7 +27,7 @@ class NoAnswer(Exception):
     """The vehicle is silent, in one sentence."""
 
 
-class Refused(Exception):
+class ParameterRefused(Exception):
     """The vehicle's reason."""
 
 
@@ -85,15 +85,15 @@ class ParameterClient:
         """Change one parameter to ``value`` [the parameter's unit].
 
         Raises:
-            Refused: The vehicle's reason.
+            ParameterRefused: The vehicle's reason.
             NoAnswer: The vehicle is silent.
         """
         held, texts = self._ask(name, value)
         if held != nearest_decimal(value):
-            raise Refused("; ".join(texts) or f"the vehicle leaves {name} at {held:g}")
+            raise ParameterRefused("; ".join(texts) or f"the vehicle leaves {name} at {held:g}")
 
     def _ask(self, name: str, value: float) -> tuple[float, list[str]]:
-        """Set a value until one comes back; that and what the vehicle said meanwhile."""
+        """Set a value until one comes back; that and the status texts meanwhile."""
         texts = _Texts()
         for _ in range(_TRIES):
             self._send(_SET, value, *_VEHICLE, name.encode(), _REAL32)
@@ -111,7 +111,7 @@ class ParameterClient:
                     if _text(named) == name:
                         return nearest_decimal(held), texts.whole
                 elif _text(cast(bytes, frame.payload_values[3])) == name and not texts.whole:
-                    raise Refused(f"the vehicle has no parameter {name}")
+                    raise ParameterRefused(f"the vehicle has no parameter {name}")
         raise NoAnswer(f"no answer from the vehicle at {self._where}")
 
     @property
@@ -120,7 +120,7 @@ class ParameterClient:
 
     def _send(self, message_id: int, *values: float | bytes) -> None:
         beat = self._writer.frame(_HEARTBEAT, 0, _GCS, _NO_AUTOPILOT, 0, _ACTIVE, _VERSION)
-        # Nobody there: the vehicle may come.
+        # Nothing listens yet: the vehicle may start.
         with contextlib.suppress(ConnectionRefusedError):
             self._socket.send(beat + self._writer.frame(message_id, *values))
 

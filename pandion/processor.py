@@ -2,8 +2,8 @@
 
 In lockstep the two take turns. On two processors each keeps its caches, and the one that waits
 polls for the datagram instead of sleeping (``messages/busy_poll.py``). On one, the kernel switches
-from one to the other, which is slower (docs/decisions/0017). But polling is of use only while the other
-one runs: on a busy machine, both on the quietest processor disturb least.
+from one to the other, which is slower (docs/decisions/0017). But polling is of use only while the
+other one runs: on a busy machine, both on the quietest processor disturb least.
 """
 
 from __future__ import annotations

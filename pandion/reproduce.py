@@ -18,12 +18,11 @@ from fsw.parameters.control_choice import KNOWN
 from pandion.display import Display
 from pandion.output import console_beside, write_text
 from pandion.version import version
+from studies.catalogue import STUDIES, study
 
 if TYPE_CHECKING:
     from studies.settings import Report, Settings
 
-# As in studies.catalogue, which takes a second to import; a test compares the two.
-WHAT = ("table3", "table4", "fig2", "fig6", "fig7", "fig8", "robustness", "smallest-sphere")
 PLANTS = ("double-integrator", "full")
 TRACKING = KNOWN["tracking"]
 
@@ -50,7 +49,7 @@ def _seeds_text(seeds: range) -> str:
 class ReproduceOptions:
     """One study."""
 
-    what: str = option("WHAT", ", ".join(WHAT), one_of("study", *WHAT), required=True)
+    what: str = option("WHAT", ", ".join(STUDIES), one_of("study", *STUDIES), required=True)
     plant: str = option(
         "--plant NAME",
         "full, or double-integrator: the paper's prediction model as the plant",
@@ -109,8 +108,7 @@ def main(argv: list[str]) -> int:
 
 def _run(options: ReproduceOptions) -> int:
     from studies.campaign import Campaign
-    from studies.catalogue import STUDIES
-    from studies.output import json_text, write
+    from studies.page import json_text, write
 
     console = console_beside(options.json)
     settings = _settings(options)
@@ -124,7 +122,7 @@ def _run(options: ReproduceOptions) -> int:
             campaign = Campaign(
                 options.workers, folder / "journal.jsonl", partial(display.report, "flown")
             )
-            report = STUDIES[options.what](settings, campaign)
+            report = study(options.what)(settings, campaign)
     except KeyboardInterrupt:
         print(f"pandion reproduce: interrupted; --out {folder} resumes", file=sys.stderr)
         return BROKEN

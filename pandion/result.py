@@ -32,7 +32,7 @@ class FlightReports:
     fsw: dict[str, Any] | None  # fsw.json
     failure: str | None  # what a process reported as an error
     logs: dict[str, Path]
-    aftermath: str | None = None  # what went wrong when the processes were to end
+    aftermath: str | None = None  # what went wrong after the flight
 
 
 def as_json(reports: FlightReports) -> dict[str, Any]:

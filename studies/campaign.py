@@ -14,13 +14,13 @@ from collections import deque
 from collections.abc import Callable, Generator, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 from fsw.runtime.process import pin_numerics_to_one_thread
 from studies.job import Job, Outcome, broken, outcome
 
-Report = Callable[[int, int], None]  # flights done, flights in all
+ProgressReport = Callable[[int, int], None]  # flights done, flights in all
 
 _Named = tuple[str, Job]  # a flight and its key
 
@@ -35,14 +35,14 @@ class Campaign:
 
     workers: int = 1  # 0: in this process
     journal: Path | None = None  # JSON lines; what is in it is not flown again
-    report: Report = silent
+    report: ProgressReport = silent
     _known: dict[str, Outcome] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if self.journal is not None and self.journal.exists():
             self._known.update(_read(self.journal))
 
-    def fly(self, jobs: list[Job]) -> list[Outcome]:
+    def run(self, jobs: list[Job]) -> list[Outcome]:
         """Outcomes in the order of the jobs."""
         keys = [job.key() for job in jobs]
         missing = {key: job for key, job in zip(keys, jobs, strict=True) if key not in self._known}
@@ -84,7 +84,7 @@ class Campaign:
         except BrokenProcessPool:
             return tuple(out.values())
         except BaseException:
-            _end_processes()  # or leaving would wait for flights that nobody wants any more
+            _end_processes()  # or leaving would wait for flights that are no longer wanted
             raise
         finally:
             pool.shutdown(wait=True, cancel_futures=True)
@@ -96,7 +96,7 @@ class Campaign:
             self.journal.parent.mkdir(parents=True, exist_ok=True)
             with self.journal.open("a", encoding="utf-8") as lines:
                 # A line of its own even after one that an interrupt cut short.
-                lines.write("\n" + json.dumps({"key": key, **row.as_json()}) + "\n")
+                lines.write("\n" + json.dumps({"key": key, **asdict(row)}) + "\n")
 
 
 def _pool(workers: int) -> ProcessPoolExecutor:

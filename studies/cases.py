@@ -6,11 +6,14 @@ Tuning used seeds below ``REPORTING_FROM``; what is reported should use others.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Literal
 
+from fsw.barriers.safe_approach import BarrierTuning
 from fsw.control.cascade import Inner
 from fsw.model.airframe import AIRFRAME, AttitudeLag
+from fsw.mpc.planner_config import PlannerConfig
 from fsw.parameters.flight_config import FlightConfig, flight_config
 from sitl.mission_clock import MissionClock
 from sitl.scenario import Scenario
@@ -74,41 +77,32 @@ def _at_once(config: FlightConfig) -> FlightConfig:
     0.373 m/s for the paper's 0.8 m/s^2 at k_S = 8 /s. The sphere of 75 mm leaves room for it, as
     its centre at rest has h = S(r) = 0.487; at k_S = 4 it would not (0.32 against 0.30).
     """
-    planner = config.planner
-    walls, workspace = (
-        replace(tuning, skipped_nodes=0, slope=8.0, robustness=0.4)
-        for tuning in (planner.walls, planner.workspace)
+    planner = _barriers(
+        config.planner, lambda it: replace(it, skipped_nodes=0, slope=8.0, lambda_=0.4)
     )
-    planner = replace(planner, walls=walls, workspace=workspace, barrier_slack=200.0)
-    return replace(config, airframe=_WITHOUT_LAG, planner=planner)
+    return replace(config, airframe=_WITHOUT_LAG, planner=replace(planner, barrier_slack=200.0))
+
+
+def _barriers(
+    planner: PlannerConfig, change: Callable[[BarrierTuning], BarrierTuning]
+) -> PlannerConfig:
+    """The same with both barriers changed."""
+    return replace(planner, walls=change(planner.walls), workspace=change(planner.workspace))
 
 
 def with_lambda(config: FlightConfig, robustness: float) -> FlightConfig:
     """The same with another lambda of eq 25, ``robustness`` [m/s], in both cases."""
-    planner = config.planner
-    return replace(
-        config,
-        planner=replace(
-            planner,
-            walls=replace(planner.walls, robustness=robustness),
-            workspace=replace(planner.workspace, robustness=robustness),
-        ),
-    )
+    planner = _barriers(config.planner, lambda it: replace(it, lambda_=robustness))
+    return replace(config, planner=planner)
 
 
 def with_horizon(config: FlightConfig, horizon: int) -> FlightConfig:
     """The same with another horizon; no more first nodes are skipped than leave one."""
-    planner = config.planner
-    walls, workspace = planner.walls, planner.workspace
-    return replace(
-        config,
-        planner=replace(
-            planner,
-            horizon=horizon,
-            walls=replace(walls, skipped_nodes=min(walls.skipped_nodes, horizon - 1)),
-            workspace=replace(workspace, skipped_nodes=min(workspace.skipped_nodes, horizon - 1)),
-        ),
+    planner = _barriers(
+        replace(config.planner, horizon=horizon),
+        lambda it: replace(it, skipped_nodes=min(it.skipped_nodes, horizon - 1)),
     )
+    return replace(config, planner=planner)
 
 
 def entrants(case: Case, plant: PlantName, inner: Inner) -> tuple[Entrant, ...]:

@@ -9,12 +9,14 @@ mode commands of the scenario's pilot come on the first two ticks.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from typing import Generic, TypeVar
 
 from fsw.flight.autopilot import Autopilot
 from fsw.flight.state import FlightState
+from fsw.model.airframe import Airframe
 from fsw.mpc.planner import Planner
 from fsw.parameters.flight_config import FlightConfig
+from fsw.ports import PlanningCycle, PlanService
 from fsw.signals import (
     Arm,
     Command,
@@ -30,7 +32,6 @@ from fsw.signals import (
     TickOutputs,
 )
 from sitl.scenario import Scenario
-from sitl.sensors.suite import SensorReadings
 from sitl.simulation import STEP_US, Controls, Simulation
 from studies.flight_result import (
     TRACE_STEPS,
@@ -41,7 +42,7 @@ from studies.flight_result import (
 )
 from studies.mission import safe_set, target
 
-_TARGET_US = 100_000  # between points of the reference, as the pilot sends them
+TARGET_US = 100_000  # between points of the reference, as the pilot sends them
 _TARGETS_AHEAD = 20
 _PILOT = (1, 195)
 _ARM = Command(Arm(), CommandRequest(400, (1.0, *(0.0,) * 6), *_PILOT))
@@ -49,15 +50,92 @@ _FOLLOW = Command(
     SwitchMode(Mode.TRAJECTORY), CommandRequest(176, (1.0, 4.0, 11.0, *(0.0,) * 4), *_PILOT)
 )
 
+State = TypeVar("State")
 
-@dataclass(frozen=True, slots=True)
-class _Answer:
-    due_us: int
-    plan: Plan | PlanFailure
+
+class ClosedLoop(Generic[State]):
+    """Plant, tick and planner, joined; whoever flies gives the inputs of each step."""
+
+    def __init__(
+        self,
+        simulation: Simulation,
+        tick: Callable[[State, TickInputs], tuple[State, TickOutputs]],
+        state: State,
+        planner: PlanService,
+        airframe: Airframe,
+    ) -> None:
+        self.simulation = simulation
+        self.state = state
+        self.planner = planner
+        self._tick = tick
+        self._airframe = airframe
+
+    def sense(self) -> SensorFrame:
+        """Sensor readings of this step."""
+        now = self.simulation.sense()
+        (q1, q2), (qd1, qd2) = now.q_arm, now.qd_arm
+        return SensorFrame(
+            t_us=now.t_us,
+            p_WB=now.p_WB,
+            v_WB=now.v_WB,
+            q_WB=now.q_WB,
+            gyro_B=now.gyro_B,
+            accel_B=now.accel_B,
+            q_arm=(q1, q2),
+            qd_arm=(qd1, qd2),
+        )
+
+    def targets(self) -> tuple[EndEffectorTarget, ...]:
+        """What the scenario's pilot streams: twenty points at once, then one every 0.1 s."""
+        simulation = self.simulation
+        start_us, step = simulation.trajectory_start_us, simulation.step
+        every = TARGET_US // STEP_US
+        if start_us is None or step % every != 0:
+            return ()
+        newest = _TARGETS_AHEAD - 1 + step // every
+        first = 0 if step == 0 else newest
+        clock = simulation.clock
+        return tuple(target(clock, start_us + TARGET_US * k) for k in range(first, newest + 1))
+
+    def fly(self, inputs: TickInputs) -> TickOutputs:
+        """Tick, plan, advance."""
+        self.state, outputs = self._tick(self.state, inputs)
+        if outputs.plan_request is not None:
+            self.planner.submit(outputs.plan_request)
+        self.simulation.advance(self._controls(outputs))
+        return outputs
+
+    def _controls(self, outputs: TickOutputs) -> Controls:
+        sent, airframe = outputs.actuators, self._airframe
+        f1, f2, f3, f4 = (thrust / airframe.rotor_thrust_max for thrust in sent.rotor_thrust)
+        torque = tuple(value / airframe.joint_torque_max for value in sent.joint_torque)
+        return Controls((f1, f2, f3, f4), torque, outputs.snapshot.armed)
 
 
 class RefusedError(RuntimeError):
     """The flight software denied a command of the study's pilot."""
+
+
+class InlinePlanner:
+    """Plans at once; the answer waits for its tick."""
+
+    def __init__(self, planner: PlanningCycle) -> None:
+        self._planner = planner
+        self._answer: tuple[int, Plan | PlanFailure] | None = None
+
+    def submit(self, request: PlanRequest) -> None:
+        """See ``PlanService``."""
+        self._answer = (request.t_apply_us, self._planner.plan(request))
+
+    def take(self, t_us: int) -> Plan | PlanFailure | None:
+        """See ``PlanService``."""
+        if self._answer is None or t_us < self._answer[0]:
+            return None
+        (_, answer), self._answer = self._answer, None
+        return answer
+
+    def close(self) -> None:
+        """Nothing to stop."""
 
 
 def fly(
@@ -75,110 +153,48 @@ def fly(
         seed: Of every random number of the plant.
         config: Of the flight software.
         traced: Keep the truth every TRACE_STEPS steps.
-        asked: Hears every request to the planner.
+        asked: Receives every request to the planner.
 
     Raises:
         RefusedError: The vehicle refused to arm or to follow.
     """
-    flight = _Flight(scenario, seed, config, traced, asked)
-    while flight.simulation.ended is None:
-        flight.step()
-    return flight.recorder.result(flight.simulation.result())
-
-
-class _Flight:
-    def __init__(
-        self,
-        scenario: Scenario,
-        seed: int,
-        config: FlightConfig,
-        traced: bool,
-        asked: Callable[[PlanRequest], None] | None,
-    ) -> None:
-        self.simulation = Simulation(scenario, seed)
-        self.recorder = FlightRecorder()
-        self._safe_set = safe_set(scenario)
-        self._config = config
-        self._loop = Autopilot(config)
-        self._state = FlightState()
-        self._planner = Planner(config.planner, config.airframe, processor_time_us)
-        self._answer: _Answer | None = None
-        self._steps_per_plan = config.mpc_period_us // config.tick_period_us
-        self._traced = traced
-        self._asked = asked
-
-    def step(self) -> None:
-        """One exchange between plant and flight software."""
-        simulation = self.simulation
-        step, readings = simulation.step, simulation.sense()
+    simulation, recorder = Simulation(scenario, seed), FlightRecorder()
+    planner = InlinePlanner(Planner(config.planner, config.airframe, processor_time_us))
+    loop = ClosedLoop(simulation, Autopilot(config).tick, FlightState(), planner, config.airframe)
+    announced = safe_set(scenario)
+    steps_per_plan = config.mpc_period_us // config.tick_period_us
+    while simulation.ended is None:
+        step, sensors = simulation.step, loop.sense()
+        answer = planner.take(sensors.t_us)
+        if answer is not None:
+            recorder.planned(answer)
         inputs = TickInputs(
-            _frame(readings),
-            self._take(readings.t_us),
-            ((_ARM,), (_FOLLOW,))[step] if step < 2 else (),
-            self._targets(step),
-            self._safe_set if step == 0 else None,
+            sensors=sensors,
+            plan=answer,
+            commands=((_ARM,), (_FOLLOW,))[step] if step < 2 else (),
+            targets=loop.targets(),
+            safe_set=announced if step == 0 else None,
         )
-        self._state, outputs = self._loop.tick(self._state, inputs)
+        if traced and step % TRACE_STEPS == 0:
+            recorder.trace.append(_trace_point(simulation))
+        outputs = loop.fly(inputs)
         _insist(outputs)
         applied = outputs.snapshot.plan_input
-        if step % self._steps_per_plan == 0 and applied is not None:
-            self.recorder.metrics.add(applied)
-        if self._traced and step % TRACE_STEPS == 0:
-            self.recorder.trace.append(self._trace_point())
-        if outputs.plan_request is not None:
-            if self._asked is not None:
-                self._asked(outputs.plan_request)
-            answer = self._planner.plan(outputs.plan_request)
-            self.recorder.planned(answer)
-            self._answer = _Answer(outputs.plan_request.t_apply_us, answer)
-        simulation.advance(self._controls(outputs))
-
-    def _take(self, t_us: int) -> Plan | PlanFailure | None:
-        answer = self._answer
-        if answer is None or t_us < answer.due_us:
-            return None
-        self._answer = None
-        return answer.plan
-
-    def _targets(self, step: int) -> tuple[EndEffectorTarget, ...]:
-        """Twenty points ahead at once, then one every point's interval."""
-        start_us = self.simulation.trajectory_start_us
-        every = _TARGET_US // STEP_US
-        if start_us is None or step % every != 0:
-            return ()
-        newest = _TARGETS_AHEAD - 1 + step // every
-        first = 0 if step == 0 else newest
-        clock = self.simulation.clock
-        return tuple(target(clock, start_us + _TARGET_US * k) for k in range(first, newest + 1))
-
-    def _controls(self, outputs: TickOutputs) -> Controls:
-        sent, airframe = outputs.actuators, self._config.airframe
-        f1, f2, f3, f4 = (thrust / airframe.rotor_thrust_max for thrust in sent.rotor_thrust)
-        torque = tuple(value / airframe.joint_torque_max for value in sent.joint_torque)
-        return Controls((f1, f2, f3, f4), torque, outputs.snapshot.armed)
-
-    def _trace_point(self) -> TracePoint:
-        truth = self.simulation.truth()
-        return TracePoint(
-            self.simulation.time_s,
-            truth.p_WB,
-            truth.p_WE,
-            truth.target.p,
-            min(truth.margins_m),
-        )
+        if step % steps_per_plan == 0 and applied is not None:
+            recorder.metrics.add(applied)
+        if outputs.plan_request is not None and asked is not None:
+            asked(outputs.plan_request)
+    return recorder.result(simulation.result())
 
 
-def _frame(readings: SensorReadings) -> SensorFrame:
-    (q1, q2), (qd1, qd2) = readings.q_arm, readings.qd_arm
-    return SensorFrame(
-        readings.t_us,
-        readings.p_WB,
-        readings.v_WB,
-        readings.q_WB,
-        readings.gyro_B,
-        readings.accel_B,
-        (q1, q2),
-        (qd1, qd2),
+def _trace_point(simulation: Simulation) -> TracePoint:
+    truth = simulation.truth()
+    return TracePoint(
+        t_s=simulation.time_s,
+        p_WB=truth.p_WB,
+        p_WE=truth.p_WE,
+        p_target=truth.target.p,
+        margin_m=min(truth.margins_m),
     )
 
 

@@ -9,11 +9,11 @@ import numpy as np
 
 from sitl.scenario import Scenario
 from studies import deviations
-from studies.campaign import Report as Progress
+from studies.campaign import Campaign
 from studies.cases import Case, Entrant, entrants, scenario
 from studies.drawing import BASE, BOUND, END_EFFECTOR, TARGET, WALL, Sheet, sheet
 from studies.flight_result import FlightResult
-from studies.job import Job, fly
+from studies.job import Job, fly_job
 from studies.settings import Figure, Report, Settings, Table
 from studies.summary import metres, millimetres
 
@@ -28,30 +28,30 @@ Arrays = dict[str, dict[str, list[float]]]  # controller -> quantity -> values
 Draw = Callable[[Arrays, Scenario], Sheet]
 
 
-def fig6(settings: Settings, progress: Progress) -> Report:
+def fig6(settings: Settings, campaign: Campaign) -> Report:
     """Position against time in Case II."""
     caption = "Case II with disturbance: desired (green), UAV (blue), end-effector (orange)"
-    return _report("fig6", caption, "II", settings, progress, _over_time)
+    return _report("fig6", caption, "II", settings, campaign, _over_time)
 
 
-def fig7(settings: Settings, progress: Progress) -> Report:
+def fig7(settings: Settings, campaign: Campaign) -> Report:
     """The base relative to the workspace sphere in Case II."""
     caption = "Case II with disturbance: UAV relative to the workspace sphere, in mm"
-    return _report("fig7", caption, "II", settings, progress, _in_sphere)
+    return _report("fig7", caption, "II", settings, campaign, _in_sphere)
 
 
-def fig8(settings: Settings, progress: Progress) -> Report:
+def fig8(settings: Settings, campaign: Campaign) -> Report:
     """Position towards the front wall in Case I."""
     caption = "Case I with disturbance: x of the desired path (green), UAV (blue) and "
     caption += "end-effector (orange); wall (red), its safety zone (dashed), collision (dot)"
-    return _report("fig8", caption, "I", settings, progress, _towards_wall)
+    return _report("fig8", caption, "I", settings, campaign, _towards_wall)
 
 
 def _report(
-    name: str, caption: str, case: Case, settings: Settings, progress: Progress, draw: Draw
+    name: str, caption: str, case: Case, settings: Settings, campaign: Campaign, draw: Draw
 ) -> Report:
     flown = scenario(case, disturbed=True, duration_s=settings.duration_s)
-    flights = _fly(case, flown, settings, progress)
+    flights = _fly(case, flown, settings, campaign)
     arrays = {controller: _arrays(flight) for controller, flight in flights.items()}
     return Report(
         title=f"{name.capitalize()}, {settings.plant} plant, seed {settings.seeds[0]}",
@@ -62,7 +62,7 @@ def _report(
     )
 
 
-def _fly(case: Case, flown: Scenario, settings: Settings, progress: Progress) -> Flights:
+def _fly(case: Case, flown: Scenario, settings: Settings, campaign: Campaign) -> Flights:
     chosen: list[Entrant] = [
         entrant
         for entrant in entrants(case, settings.plant, settings.inner)
@@ -70,10 +70,10 @@ def _fly(case: Case, flown: Scenario, settings: Settings, progress: Progress) ->
     ]
     flights: Flights = {}
     for entrant in chosen:
-        progress(len(flights), len(chosen))
+        campaign.report(len(flights), len(chosen))
         job = Job(settings.plant, flown, entrant.config, settings.seeds[0])
-        flights[entrant.name] = fly(job, traced=True)
-    progress(len(chosen), len(chosen))
+        flights[entrant.name] = fly_job(job, traced=True)
+    campaign.report(len(chosen), len(chosen))
     return flights
 
 

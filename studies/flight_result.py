@@ -72,11 +72,11 @@ class FlightRecorder:
         """The whole flight."""
         totals = self.metrics.as_json()
         return FlightResult(
-            truth,
-            InputTotals(**totals["control_effort"]),
-            InputTotals(**totals["control_smoothness"]),
-            tuple(self.step_us),
-            self.plans,
-            self.failures,
-            tuple(self.trace),
+            truth=truth,
+            effort=InputTotals(**totals["control_effort"]),
+            smoothness=InputTotals(**totals["control_smoothness"]),
+            step_us=tuple(self.step_us),
+            plans=self.plans,
+            failures=self.failures,
+            trace=tuple(self.trace),
         )

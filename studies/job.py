@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -73,12 +73,8 @@ class Outcome:
     failures: int = 0  # planning steps without a plan
     error: bool = False  # the flight itself broke, not the vehicle
 
-    def as_json(self) -> dict[str, Any]:
-        """Every field by name."""
-        return asdict(self)
 
-
-def fly(job: Job, *, traced: bool = False) -> FlightResult:
+def fly_job(job: Job, *, traced: bool = False) -> FlightResult:
     """Fly one job here and now."""
     plants = {"full": closed_loop.fly, "double-integrator": double_integrator.fly}
     return plants[job.plant](job.scenario, job.seed, job.config, traced=traced)
@@ -87,7 +83,7 @@ def fly(job: Job, *, traced: bool = False) -> FlightResult:
 def outcome(job: Job) -> Outcome:
     """Fly one job; whatever it raises becomes a row that says so."""
     try:
-        return score(job.seed, fly(job))
+        return score(job.seed, fly_job(job))
     except Exception as error:
         return broken(job, f"{type(error).__name__}: {error}")
 

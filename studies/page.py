@@ -1,8 +1,10 @@
-"""One self-contained HTML page: nothing is fetched when it is opened."""
+"""A study written down: a self-contained HTML page, its drawings and its numbers."""
 
 from __future__ import annotations
 
 import html
+import json
+from pathlib import Path
 
 from studies.settings import Figure, Report, Settings, Table
 
@@ -18,6 +20,34 @@ svg { max-width: 100%; height: auto; }
 figure { margin: 1.5rem 0; } figcaption { color: #57606a; }
 .warning { border-left: 4px solid #b3261e; padding-left: .8rem; }
 """
+
+
+def write(
+    report: Report, settings: Settings, provenance: tuple[str, ...], name: str, folder: Path
+) -> Path:
+    """Write everything into a folder; returns the page.
+
+    Args:
+        report: What was found.
+        settings: What was asked for.
+        provenance: For the page.
+        name: Of the study, and of its files.
+        folder: Made if it is not there.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    written = folder / f"{name}.html"
+    written.write_text(page(report, settings, provenance), encoding="utf-8")
+    (folder / f"{name}-rows.json").write_text(json_text(report), encoding="utf-8")
+    for figure in report.figures:
+        (folder / f"{figure.name}.svg").write_text(figure.svg, encoding="utf-8")
+        arrays = json.dumps(figure.arrays, separators=(",", ":"))
+        (folder / f"{figure.name}.json").write_text(arrays + "\n", encoding="utf-8")
+    return written
+
+
+def json_text(report: Report) -> str:
+    """The rows as JSON text; a number that does not exist is null."""
+    return json.dumps(report.rows, indent=1, allow_nan=False) + "\n"
 
 
 def page(report: Report, settings: Settings, provenance: tuple[str, ...]) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 from sitl.scenario import (
     EncoderErrors,
@@ -16,12 +16,11 @@ from sitl.scenario import (
     VehicleScale,
     Wind,
 )
-from studies import deviations
+from studies import deviations, summary
 from studies.campaign import Campaign
 from studies.cases import CASES, Case, configuration, grazing, scenario
-from studies.job import Job
 from studies.settings import Report, Settings, Table
-from studies.summary import Cell, fly_cells, interval, metres, millimetres, seen
+from studies.summary import fly_cells
 
 Change = Callable[[Scenario], Scenario]
 
@@ -31,7 +30,7 @@ def _vehicle(scale: VehicleScale) -> Change:
 
 
 def _late(latency_ms: float) -> Change:
-    """Every sensor late, which the flight software is not told."""
+    """Every sensor late, which the flight software does not know."""
     sensors = Sensors(
         ImuErrors(latency_ms=latency_ms),
         PoseErrors(latency_ms=latency_ms),
@@ -77,7 +76,7 @@ CHANGES: dict[str, Change] = {
 
 GRAZING = "grazing path"  # of Case I only
 
-_HEADERS = ("case", "change", "passed", "95 %", "worst margin mm", "TE m")
+_HEADERS = ("case", "change", *summary.HEADERS)
 
 
 def _changed(case: Case, name: str, duration_s: float | None) -> Scenario:
@@ -90,43 +89,20 @@ def run(settings: Settings, campaign: Campaign) -> Report:
     config = configuration("full", "blf", settings.inner)
     named = [(case, name) for case in CASES for name in CHANGES]
     named.append(("I", GRAZING))
-    cells = [
-        Cell(
-            tuple(
-                Job(
-                    "full",
-                    _changed(case, name, settings.duration_s),
-                    config,
-                    seed,
-                )
-                for seed in settings.seeds
-            )
-        )
-        for case, name in named
-    ]
-    summaries, errors = fly_cells(campaign, cells)
+    cells = [(_changed(case, name, settings.duration_s), config) for case, name in named]
+    summaries, errors = fly_cells(campaign, replace(settings, plant="full"), cells)
     found = list(zip(named, summaries, strict=True))
     return Report(
         title="Robustness of MPC-BLF, full plant, with the paper's disturbance",
         rows=[
-            {"plant": "full", "case": case, "change": name, "controller": "blf"} | summary.as_json()
-            for (case, name), summary in found
+            {"plant": "full", "case": case, "change": name, "controller": "blf"} | asdict(row)
+            for (case, name), row in found
         ],
         tables=(
             Table(
                 "MPC-BLF",
                 _HEADERS,
-                tuple(
-                    (
-                        case,
-                        name,
-                        seen(row),
-                        interval(row),
-                        millimetres(row.worst_margin_m),
-                        metres(row.te_m),
-                    )
-                    for (case, name), row in found
-                ),
+                tuple((case, name, *summary.cells(row)) for (case, name), row in found),
             ),
         ),
         deviations=deviations.ROBUSTNESS,

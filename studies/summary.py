@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
+from fsw.parameters.flight_config import FlightConfig
+from sitl.scenario import Scenario
 from studies.campaign import Campaign
 from studies.job import Job, Outcome
+from studies.settings import Settings
 from studies.statistics import wilson
+
+HEADERS = ("passed", "95 %", "worst margin mm", "TE m")
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,26 +37,18 @@ class Summary:
     wilson_high: float
     planning_failures: int
 
-    def as_json(self) -> dict[str, Any]:
-        """Every field by name."""
-        return asdict(self)
 
-
-@dataclass(frozen=True, slots=True)
-class Cell:
-    """What a cell of a table flies: one job a seed."""
-
-    jobs: tuple[Job, ...]
-
-
-def fly_cells(campaign: Campaign, cells: Sequence[Cell]) -> tuple[list[Summary], tuple[str, ...]]:
-    """Fly all cells as one campaign; the second value names flights that broke."""
-    outcomes = campaign.fly([job for cell in cells for job in cell.jobs])
-    summaries, begin = [], 0
-    for cell in cells:
-        end = begin + len(cell.jobs)
-        summaries.append(summarise(cell.jobs, outcomes[begin:end]))
-        begin = end
+def fly_cells(
+    campaign: Campaign, settings: Settings, cells: Sequence[tuple[Scenario, FlightConfig]]
+) -> tuple[list[Summary], tuple[str, ...]]:
+    """Fly all cells of a table, one job a seed; the second value names flights that broke."""
+    jobs = [
+        [Job(settings.plant, flown, config, seed) for seed in settings.seeds]
+        for flown, config in cells
+    ]
+    outcomes = campaign.run([job for cell in jobs for job in cell])
+    rows = iter(outcomes)
+    summaries = [summarise(cell, [next(rows) for _ in cell]) for cell in jobs]
     errors = {f"seed {row.seed}: {row.reason}" for row in outcomes if row.error}
     return summaries, tuple(sorted(errors))
 
@@ -89,22 +85,22 @@ def summarise(jobs: Sequence[Job], outcomes: Sequence[Outcome]) -> Summary:
     )
 
 
-def seen(summary: Summary) -> str:
-    """Passed of total, for a table."""
-    count = f"{summary.passed}/{summary.total}"
-    return f"{count} (one flight)" if summary.flown < summary.total else count
+def cells(summary: Summary) -> tuple[str, ...]:
+    """A summary for a table, under ``HEADERS``."""
+    passed = f"{summary.passed}/{summary.total}"
+    return (
+        f"{passed} (one flight)" if summary.flown < summary.total else passed,
+        f"{summary.wilson_low:.2f}–{summary.wilson_high:.2f}",
+        millimetres(summary.worst_margin_m),
+        metres(summary.te_m),
+    )
 
 
-def metres(value: float | None, digits: int = 4) -> str:
+def metres(value: float | None) -> str:
     """A length ``value`` [m] for a table."""
-    return "–" if value is None else f"{value:.{digits}f}"
+    return "–" if value is None else f"{value:.4f}"
 
 
 def millimetres(value: float | None) -> str:
     """A margin ``value`` [m] for a table, in millimetres and with its sign."""
     return "–" if value is None else f"{1000.0 * value:+.1f}"
-
-
-def interval(summary: Summary) -> str:
-    """Wilson's interval for a table."""
-    return f"{summary.wilson_low:.2f}–{summary.wilson_high:.2f}"

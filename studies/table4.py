@@ -2,32 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from sitl.scenario import Scenario
-from studies import deviations
+from studies import deviations, paper, summary
 from studies.campaign import Campaign
 from studies.cases import CASES, Case, Entrant, entrants, reference_floor_m, scenario
-from studies.job import Job
-from studies.paper import TABLE_4
 from studies.settings import Report, Settings, Table
-from studies.summary import Cell, Summary, fly_cells, interval, metres, millimetres, seen
+from studies.summary import Summary, fly_cells, metres
 
-_HEADERS = (
-    "case",
-    "controller",
-    "passed",
-    "95 %",
-    "worst margin mm",
-    "TE m",
-    "c_s",
-    "c_e",
-    "paper",
-    "paper TE m",
-    "paper c_s",
-    "paper c_e",
-)
+_HEADERS = ("case", "controller", *summary.HEADERS, "c_s", "c_e", "paper", *paper.HEADERS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +21,11 @@ class _Entry:
     disturbed: bool
     entrant: Entrant
     flown: Scenario
+
+    @property
+    def printed(self) -> paper.Completion | None:
+        """What the paper has for it."""
+        return paper.TABLE_4.get((self.entrant.name, self.case, self.disturbed))
 
 
 def run(settings: Settings, campaign: Campaign) -> Report:
@@ -51,20 +41,12 @@ def run(settings: Settings, campaign: Campaign) -> Report:
         for case in CASES
         for entrant in entrants(case, settings.plant, settings.inner)
     ]
-    cells = [
-        Cell(
-            tuple(
-                Job(settings.plant, entry.flown, entry.entrant.config, seed)
-                for seed in settings.seeds
-            )
-        )
-        for entry in entries
-    ]
-    summaries, errors = fly_cells(campaign, cells)
+    cells = [(entry.flown, entry.entrant.config) for entry in entries]
+    summaries, errors = fly_cells(campaign, settings, cells)
     pairs = list(zip(entries, summaries, strict=True))
     return Report(
         title=f"Table IV, {settings.plant} plant",
-        rows=[_row(settings, entry, summary) for entry, summary in pairs],
+        rows=[_row(settings, entry, row) for entry, row in pairs],
         tables=tuple(
             _table(pairs, comparison, disturbed)
             for comparison in ("paper", "like-for-like")
@@ -76,34 +58,30 @@ def run(settings: Settings, campaign: Campaign) -> Report:
     )
 
 
-def _row(settings: Settings, entry: _Entry, summary: Summary) -> dict[str, Any]:
-    printed = TABLE_4.get((entry.entrant.name, entry.case, entry.disturbed))
+def _row(settings: Settings, entry: _Entry, row: Summary) -> dict[str, Any]:
     return {
         "plant": settings.plant,
         "case": entry.case,
         "disturbance": entry.disturbed,
         "controller": entry.entrant.name,
         "comparison": entry.entrant.comparison,
-        **summary.as_json(),
+        **asdict(row),
         "te_floor_m": reference_floor_m(entry.flown),
-        "paper_completed": None if printed is None else printed.completed,
-        "paper_te_m": None if printed is None else printed.te_m,
-        "paper_cs": None if printed is None else printed.cs,
-        "paper_ce": None if printed is None else printed.ce,
+        **paper.as_json(paper.Completion, entry.printed),
     }
 
 
 def _table(pairs: list[tuple[_Entry, Summary]], comparison: str, disturbed: bool) -> Table:
     air = "with disturbance" if disturbed else "without disturbance"
     chosen = [
-        (entry, summary)
-        for entry, summary in pairs
+        (entry, row)
+        for entry, row in pairs
         if entry.entrant.comparison == comparison and entry.disturbed == disturbed
     ]
     return Table(
         f"{comparison.capitalize()} comparison, {air}",
         _HEADERS,
-        tuple(_cells(entry, summary) for entry, summary in chosen),
+        tuple(_cells(entry, row) for entry, row in chosen),
     )
 
 
@@ -113,26 +91,20 @@ def _floors(settings: Settings) -> Table:
         for case in CASES
     ]
     return Table(
-        "Least TE of any safe controller: RMS distance of the reference from the safe set",
+        "Minimum TE of any safe controller: RMS distance of the reference from the safe set",
         ("case", "TE m"),
         tuple((case, metres(floor)) for case, floor in floors),
     )
 
 
-def _cells(entry: _Entry, summary: Summary) -> tuple[str, ...]:
-    printed = TABLE_4.get((entry.entrant.name, entry.case, entry.disturbed))
-    theirs = ("–",) * 4
-    if printed is not None:
-        mark = "✓" if printed.completed else "×"
-        theirs = (mark, f"{printed.te_m:.4f}", f"{printed.cs:.4f}", f"{printed.ce:.4f}")
+def _cells(entry: _Entry, row: Summary) -> tuple[str, ...]:
+    printed = entry.printed
     return (
         entry.case,
         entry.entrant.name,
-        seen(summary),
-        interval(summary),
-        millimetres(summary.worst_margin_m),
-        metres(summary.te_m),
-        f"{summary.cs_mean:.4f}",
-        f"{summary.ce_mean:.4f}",
-        *theirs,
+        *summary.cells(row),
+        f"{row.cs_mean:.4f}",
+        f"{row.ce_mean:.4f}",
+        "–" if printed is None else "✓" if printed.completed else "×",
+        *paper.cells(printed),
     )

@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.optimiser.answer import Answer, timed
 from benchmarks.optimiser.instances import Instance
-from fsw.barriers.robust import required_h
-from fsw.barriers.root import root
+from benchmarks.optimiser.solved import Solved, timed
+from fsw.barriers.cbf_row import cbf_lower_bound
+from fsw.barriers.safe_approach import safe_approach_speed
 from fsw.barriers.workspace import outward_frame
 from fsw.model.airframe import AIRFRAME
 from fsw.model.linearisation import POINTS, Linearisation
@@ -69,14 +69,14 @@ class CasadiMethod:
             ),
         )
 
-    def answer(self, instance: Instance, guess: Array, optimum: Array) -> Answer:
+    def solve(self, instance: Instance, guess: Array, optimum: Array) -> Solved:
         """See ``Method``; ``guess`` and ``optimum`` (6 n,) [m/s^2, rad/s^2]."""
         parameters = self._parameters(instance.request, optimum)
         initial = self._unknowns(instance.request, guess)
         found, spent = timed(lambda: self._solve(x0=initial, p=parameters, **self._bounds))
         if not self._solve.stats()["success"]:
-            return Answer(spent, None, None)
-        return Answer(spent, self._inputs(np.array(found["x"]).ravel()), None)
+            return Solved(spent, None, None)
+        return Solved(spent, self._inputs(np.array(found["x"]).ravel()), None)
 
     def _unknowns(self, request: PlanRequest, inputs: Array) -> Array:
         """States that follow from the inputs, stage by stage, and no slack."""
@@ -123,15 +123,20 @@ class CasadiMethod:
                 for point in range(POINTS):
                     gap = position[point] @ wall.normal - wall.offset - wall.clearance
                     speed = velocity[point] @ wall.normal
-                    h_start.append(root(gap, tuning.alpha, tuning.slope) + speed)
+                    h_start.append(safe_approach_speed(gap, tuning.alpha, tuning.slope) + speed)
         else:
             target, sphere = request.targets[0], self._safe_set.sphere
             e = position[0] - target.p_WE - np.array(sphere.centre_from_target)
             w = velocity[0] - target.v_WE
             for axis in frame:
                 for n in (axis, -axis):
-                    h_start.append(root(sphere.radius - n @ e, tuning.alpha, tuning.slope) - n @ w)
-        return np.array([required_h(h, i, tuning.numbers(self._config.period)) for h in h_start])
+                    h_start.append(
+                        safe_approach_speed(sphere.radius - n @ e, tuning.alpha, tuning.slope)
+                        - n @ w
+                    )
+        return np.array(
+            [cbf_lower_bound(h, i, tuning.numbers(self._config.period)) for h in h_start]
+        )
 
 
 def _options(

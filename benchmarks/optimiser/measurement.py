@@ -13,10 +13,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from benchmarks.optimiser.answer import Answer, stopwatch_us
 from benchmarks.optimiser.instances import Instance, planner_of, record
 from benchmarks.optimiser.methods import Entry, Method, entries, guess_for
 from benchmarks.optimiser.price import Judge
+from benchmarks.optimiser.solved import Solved, stopwatch_us
 from fsw.model.airframe import AIRFRAME
 from fsw.model.prediction import Array
 from fsw.mpc.planner import Planner
@@ -45,7 +45,7 @@ class Samples:
 
     horizon: int
     entry: Entry
-    answers: list[Answer] = field(default_factory=list)
+    answers: list[Solved] = field(default_factory=list)
     suboptimality: list[float] = field(default_factory=list)  # against the best known cost
     spent_us: float = 0.0
 
@@ -103,7 +103,7 @@ def _at_horizon(horizon: int, effort: Effort, report: Report) -> list[Samples]:
     rivals = _Rivals(horizon, effort)
     rivals.warm_up(instances[:2])
     gc.collect()
-    gc.disable()  # a collection would fall on whoever happens to run
+    gc.disable()  # a collection would fall on the method that happens to run
     try:
         for k, instance in enumerate(instances):
             report(f"n = {horizon}: timing", k, len(instances))
@@ -137,7 +137,7 @@ class _Rivals:
             guess, optimum, _ = self._truth(lane, instance)
             for samples, method in zip(self.samples, lane.methods, strict=True):
                 if method is not None and samples.spent_us < 0.1 * self._effort.budget_us:
-                    samples.spent_us += method.answer(instance, guess, optimum).spent.wall_us
+                    samples.spent_us += method.solve(instance, guess, optimum).spent.wall_us
         for samples in self.samples:
             samples.spent_us = 0.0
 
@@ -151,7 +151,7 @@ class _Rivals:
             samples, method = self.samples[at], lane.methods[at]
             if method is None or samples.spent_us > self._effort.budget_us:
                 continue
-            answer = method.answer(instance, guess, optimum)
+            answer = method.solve(instance, guess, optimum)
             samples.spent_us += answer.spent.wall_us
             samples.answers.append(answer)
             if answer.inputs is not None:

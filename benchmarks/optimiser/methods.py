@@ -8,15 +8,15 @@ from typing import Protocol
 
 import numpy as np
 
-from benchmarks.optimiser.answer import Answer, stopwatch_us, timed
 from benchmarks.optimiser.casadi_method import SOLVERS, CasadiMethod, installed
 from benchmarks.optimiser.instances import Instance
 from benchmarks.optimiser.price import target_points
+from benchmarks.optimiser.solved import Solved, stopwatch_us, timed
 from fsw.model.airframe import AIRFRAME
 from fsw.model.prediction import INPUTS, Array, condense, to_vector
+from fsw.mpc.ocp import Ocp
 from fsw.mpc.planner import Planner
-from fsw.mpc.planner_config import PlannerConfig, Solver
-from fsw.mpc.problem import Problem
+from fsw.mpc.planner_config import PlannerConfig
 from fsw.mpc.slsqp_solver import Gradients, SlsqpSolver
 from fsw.signals import Plan, SafeSet
 
@@ -26,7 +26,7 @@ _ITERATIONS = (1, 2, 3)
 class Method(Protocol):
     """One optimiser for one horizon and safe set."""
 
-    def answer(self, instance: Instance, guess: Array, optimum: Array) -> Answer:
+    def solve(self, instance: Instance, guess: Array, optimum: Array) -> Solved:
         """Time one instance.
 
         Args:
@@ -56,16 +56,20 @@ class PlannerMethod:
         self._planner = Planner(replace(config, sqp_iterations=iterations), AIRFRAME, stopwatch_us)
         self._planner.warm_up()
 
-    def answer(self, instance: Instance, guess: Array, optimum: Array) -> Answer:
+    def solve(self, instance: Instance, guess: Array, optimum: Array) -> Solved:
         """See ``Method``; ``guess`` and ``optimum`` (6 n,) [m/s^2, rad/s^2] are not used."""
         for request in instance.before:
             self._planner.plan(request)
         plan, spent = timed(lambda: self._planner.plan(instance.request))
         if not isinstance(plan, Plan):
-            return Answer(spent, None, None)
+            return Solved(spent, None, None)
         timings = plan.timings
-        return Answer(
-            spent, flat(plan), plan.sqp_iterations, timings.linearise_us, timings.solve_us
+        return Solved(
+            spent=spent,
+            inputs=flat(plan),
+            sqp_iterations=plan.sqp_iterations,
+            linearise_us=timings.linearise_us,
+            solve_us=timings.solve_us,
         )
 
 
@@ -74,21 +78,21 @@ class SlsqpMethod:
 
     def __init__(self, config: PlannerConfig, safe_set: SafeSet, gradients: Gradients) -> None:
         model = condense(AIRFRAME, config.period, config.horizon)
-        self._problem = Problem(config, model, safe_set)
+        self._ocp = Ocp(config, model, safe_set)
         self._solver = SlsqpSolver(gradients)
 
-    def answer(self, instance: Instance, guess: Array, optimum: Array) -> Answer:
+    def solve(self, instance: Instance, guess: Array, optimum: Array) -> Solved:
         """See ``Method``; ``guess`` and ``optimum`` (6 n,) [m/s^2, rad/s^2] are not used."""
         start, targets = to_vector(instance.request.start), target_points(instance.request)
-        solution, spent = timed(lambda: self._solver.minimise(self._problem, start, targets))
+        solution, spent = timed(lambda: self._solver.minimise(self._ocp, start, targets))
         inputs = solution.x[: len(guess)].copy() if solution.usable else None
-        return Answer(spent, inputs, solution.iterations)
+        return Solved(spent, inputs, solution.iterations)
 
 
 def entries() -> tuple[Entry, ...]:
     """Everything that is compared, in the order of the table."""
 
-    def planner(solver: Solver, iterations: int) -> Build:
+    def planner(solver: str, iterations: int) -> Build:
         return lambda config, safe_set: PlannerMethod(
             replace(config, solver=solver), safe_set, iterations
         )

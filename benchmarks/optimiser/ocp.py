@@ -15,7 +15,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from fsw.barriers.root import BarrierTuning
+from fsw.barriers.safe_approach import BarrierTuning
 from fsw.model.airframe import AIRFRAME, GRAVITY
 from fsw.model.kinematics import arm_points
 from fsw.model.prediction import INPUTS, Q_ARM, STATES, YAW, YAW_RATE, P, V, discretise

@@ -1,14 +1,14 @@
-"""What a plan is worth: its cost on the nonlinear problem, whoever found it."""
+"""What a plan is worth: its cost on the nonlinear problem, whichever method found it."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from fsw.barriers.soft_rows import TargetPoints
+from fsw.barriers.constraint_block import TargetPoints
 from fsw.model.airframe import AIRFRAME
 from fsw.model.prediction import INPUTS, Array, condense, to_vector
+from fsw.mpc.ocp import Ocp
 from fsw.mpc.planner_config import PlannerConfig
-from fsw.mpc.problem import Problem
 from fsw.signals import PlanRequest, SafeSet
 
 _MOST_ITERATIONS = 60
@@ -19,15 +19,15 @@ class Judge:
     """Prices inputs, and knows the converged solution of a request."""
 
     def __init__(self, config: PlannerConfig, safe_set: SafeSet) -> None:
-        self._problem = Problem(config, condense(AIRFRAME, config.period, config.horizon), safe_set)
+        self._ocp = Ocp(config, condense(AIRFRAME, config.period, config.horizon), safe_set)
         self._unknowns = INPUTS * config.horizon
 
     def price(self, request: PlanRequest, inputs: Array) -> float:
         """Cost of ``inputs`` (6 n,) [m/s^2, rad/s^2] with the smallest slacks that admit them."""
-        problem = self._problem
-        problem.linearise(to_vector(request.start), inputs, target_points(request))
-        program = problem.program
-        return float(problem.cost + program.price @ program.least_slacks(inputs))
+        ocp = self._ocp
+        ocp.linearise(to_vector(request.start), inputs, target_points(request))
+        program = ocp.program
+        return float(ocp.cost + program.penalty @ program.least_slacks(inputs))
 
     def converged(self, request: PlanRequest, guess: Array) -> tuple[Array, float]:
         """Inputs and price after programs from ``guess`` (6 n,) [m/s^2, rad/s^2] until they stay.
@@ -38,8 +38,8 @@ class Judge:
         start, targets = to_vector(request.start), target_points(request)
         inputs, best = guess, (guess, self.price(request, guess))
         for _ in range(_MOST_ITERATIONS):
-            self._problem.linearise(start, inputs, targets)
-            solution = self._problem.solve()
+            self._ocp.linearise(start, inputs, targets)
+            solution = self._ocp.solve()
             if not solution.usable:
                 break
             step = solution.x[: self._unknowns] - inputs

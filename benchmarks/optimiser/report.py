@@ -13,7 +13,7 @@ import numpy as np
 from benchmarks.optimiser.measurement import Samples
 
 OURS = ("clarabel", 2)  # as it flies
-# Least factors at n = 5 and n = 10 by which the others should be slower.
+# Minimum factors at n = 5 and n = 10 by which the others should be slower.
 TARGETS = {
     "slsqp-numeric": {5: 150.0, 10: 250.0},
     "slsqp-analytic": {5: 6.0, 10: 10.0},
@@ -27,7 +27,7 @@ _PACKAGES = ("numpy", "scipy", "clarabel", "numba", "casadi")
 
 def lines(all_samples: list[Samples]) -> list[str]:
     """The whole report, a line each."""
-    return [*_table(all_samples), "", *_stages(all_samples), "", *_verdicts(all_samples)]
+    return [*_table(all_samples), "", *_stages(all_samples), "", *_results(all_samples)]
 
 
 def _table(all_samples: list[Samples]) -> list[str]:
@@ -62,7 +62,7 @@ def _stages(all_samples: list[Samples]) -> list[str]:
     return found
 
 
-def _verdicts(all_samples: list[Samples]) -> list[str]:
+def _results(all_samples: list[Samples]) -> list[str]:
     """Ratios of medians against ours, and whether each is what it should be."""
     known = {(s.entry.name, s.entry.sqp_iterations, s.horizon): s for s in all_samples}
     own_name, iterations = OURS
@@ -137,10 +137,10 @@ def details(all_samples: list[Samples]) -> list[dict[str, Any]]:
 
 def _processor() -> str:
     try:
-        told = Path("/proc/cpuinfo").read_text(encoding="utf-8")
+        text = Path("/proc/cpuinfo").read_text(encoding="utf-8")
     except OSError:
         return platform.processor()
-    names = [line.partition(":")[2].strip() for line in told.splitlines() if "model name" in line]
+    names = [line.partition(":")[2].strip() for line in text.splitlines() if "model name" in line]
     return names[0] if names else platform.processor()
 
 

@@ -1,7 +1,7 @@
 """MPC-HC: the safe set itself as rows (eqs 14 and 15, and points), without regard to velocity.
 
 The rows have the same shape as a barrier's, with the distance in place of h, so that the
-same program carries both; whether they are softened is the program's price, not theirs.
+same program carries both; whether they are softened is the program's penalty, not theirs.
 
 Source: docs/equations.md E14, E15.
 """
@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from fsw.barriers.constraint_block import ConstraintBlock, TargetPoints
 from fsw.barriers.point_obstacle import vertical_shares
-from fsw.barriers.soft_rows import SoftRows, TargetPoints
 from fsw.model.linearisation import BASE, POINTS, Linearisation
 from fsw.model.prediction import INPUTS, Array
 from fsw.signals import PointObstacle, Wall, WorkspaceSphere
@@ -31,8 +31,8 @@ class HardWalls:
         nodes = np.arange(first_node, horizon + 1)
         node, wall, _ = np.meshgrid(nodes, np.arange(len(walls)), np.arange(POINTS), indexing="ij")
         slack = (node - first_node) * len(walls) + wall
-        self.rows = SoftRows(node.ravel(), slack.ravel(), INPUTS * horizon)
-        self.rows.required[:] = tightening
+        self.rows = ConstraintBlock(node.ravel(), slack.ravel(), INPUTS * horizon)
+        self.rows.lower_bound[:] = tightening
         self._start = np.zeros(len(walls) * POINTS)
 
     def refill(self, horizon: Linearisation, targets: TargetPoints) -> None:
@@ -67,8 +67,8 @@ class HardObstacles:
         count, nodes = len(obstacles), np.arange(first_node, horizon + 1)
         node, number, _ = np.meshgrid(nodes, np.arange(count), np.arange(POINTS), indexing="ij")
         slack = (node - first_node) * count + number
-        self.rows = SoftRows(node.ravel(), slack.ravel(), INPUTS * horizon)
-        self.rows.required[:] = tightening
+        self.rows = ConstraintBlock(node.ravel(), slack.ravel(), INPUTS * horizon)
+        self.rows.lower_bound[:] = tightening
         self._start = np.zeros(count * POINTS)
 
     def refill(self, horizon: Linearisation, targets: TargetPoints) -> None:
@@ -99,8 +99,8 @@ class HardWorkspace:
         self._offset = np.array(sphere.centre_from_target)
         self._first = first_node
         nodes = np.arange(first_node, horizon + 1)
-        self.rows = SoftRows(nodes, nodes - first_node, INPUTS * horizon)
-        self.rows.required[:] = tightening
+        self.rows = ConstraintBlock(nodes, nodes - first_node, INPUTS * horizon)
+        self.rows.lower_bound[:] = tightening
         self._start = np.zeros(1)
 
     def refill(self, horizon: Linearisation, targets: TargetPoints) -> None:

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import math
-
-from fsw.barriers.root import BarrierTuning
+from fsw.barriers.safe_approach import BarrierTuning
 from fsw.barriers.tangent import tangent
-from fsw.geometry.vectors import dot
+from fsw.geometry.vectors import dot, norm, subtract
 from fsw.signals import ConstraintKind, ConstraintReport, EndEffectorTarget, SafeSet, Vec3, Wall
 
 PointMotion = tuple[Vec3, Vec3]  # position [m], velocity [m/s]
@@ -39,33 +37,20 @@ def constraint_report(
         ]
     elif safe_set.sphere is not None and target is not None:
         offset, (p, v) = safe_set.sphere.centre_from_target, points[0]
-        e = tuple(p[k] - target.p_WE[k] - offset[k] for k in range(3))
-        w = tuple(v[k] - target.v_WE[k] for k in range(3))
-        distance = math.sqrt(sum(x * x for x in e))
-        outward = sum(a * b for a, b in zip(e, w, strict=True)) / max(distance, 1e-6)
+        e = subtract(subtract(p, target.p_WE), offset)
+        distance = norm(e)
+        outward = dot(e, subtract(v, target.v_WE)) / max(distance, 1e-6)
         inner, outer = safe_set.sphere.radius - distance, safe_set.sphere.radius + distance
-        h = min(_root(inner, tuning) - outward, _root(outer, tuning) + outward)
+        h = min(tuning.approach_speed(inner) - outward, tuning.approach_speed(outer) + outward)
         return ConstraintReport(safe_set.kind, (inner,), (h,))
     else:
         pairs = []
     return ConstraintReport(
         safe_set.kind,
         tuple(margin for margin, _ in pairs),
-        tuple(_root(margin, tuning) + rate for margin, rate in pairs),
+        tuple(tuning.approach_speed(margin) + rate for margin, rate in pairs),
     )
 
 
 def _margin_and_rate(wall: Wall, p: Vec3, v: Vec3) -> tuple[float, float]:
     return dot(wall.normal, p) - wall.offset - wall.clearance, dot(wall.normal, v)
-
-
-def plain_root(distance: float, alpha: float, slope: float) -> float:
-    """S of ``root.py`` without its compiler: called ten times a second on plain floats."""
-    knee = alpha / (slope * slope)
-    if distance < knee:
-        return slope * distance
-    return math.sqrt(2.0 * alpha * (distance - 0.5 * knee))
-
-
-def _root(distance: float, tuning: BarrierTuning) -> float:
-    return plain_root(distance, tuning.alpha, tuning.slope)

@@ -1,8 +1,8 @@
 """A point obstacle as a wall: the tangent plane of its clearance ball, from where one looks.
 
 An upright obstacle has a cylinder in place of the ball, whose tangent planes are upright.
-The half-space in front of that plane lies outside the ball. So whoever keeps off the plane, or
-stops in front of it, keeps off the obstacle, and what is right beside a wall is right here.
+The half-space in front of that plane lies outside the ball. A point that keeps off the plane, or
+stops in front of it, keeps off the obstacle, so the rules for walls apply.
 
 Source: docs/equations.md E11.
 """
@@ -16,7 +16,7 @@ CENTRE_BALL = 0.002  # m; closer to the obstacle its direction is noise and any 
 
 
 def distance_to(obstacle: PointObstacle, p: Vec3) -> float:
-    """From an obstacle to a point [m]: level where the obstacle is upright."""
+    """From an obstacle to ``p`` [m, NED], level where the obstacle is upright [m]."""
     return norm(_away(obstacle, p))
 
 
@@ -25,7 +25,7 @@ def tangent(obstacle: PointObstacle, p: Vec3) -> Wall:
 
     Args:
         obstacle: Whose distance to the point is the wall's.
-        p: The point [m].
+        p: The point [m, NED].
     """
     x, y, z = away = _away(obstacle, p)
     length = norm(away)
@@ -39,7 +39,7 @@ def _away(obstacle: PointObstacle, p: Vec3) -> Vec3:
 
 
 def planes(safe_set: SafeSet, p: Vec3) -> tuple[Wall, ...]:
-    """Everything that a point [m] is to keep off, as walls; a sphere is not among it."""
+    """All walls and obstacles, the latter as walls seen from ``p`` [m, NED]."""
     if not safe_set.obstacles:
         return safe_set.walls
     return (*safe_set.walls, *(tangent(obstacle, p) for obstacle in safe_set.obstacles))

@@ -9,15 +9,23 @@ be negative; here :math:`\alpha` is a scalar (docs/equations.md E22).
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from fsw.barriers.robust import required_h
-from fsw.barriers.root import BarrierNumbers, BarrierTuning, root, root_slope
-from fsw.barriers.soft_rows import SoftRows, TargetPoints
-from fsw.compiled import compiled
-from fsw.model.linearisation import POINTS, Linearisation
+from fsw.barriers.cbf_row import Plane, barrier_value, fill_row
+from fsw.barriers.constraint_block import ConstraintBlock, Rows, TargetPoints
+from fsw.barriers.safe_approach import BarrierNumbers, BarrierTuning
+from fsw.compiled import compiled, of_fixed_types
+from fsw.geometry.vectors import dot
+from fsw.model.linearisation import POINTS, Linearisation, PointMotions
 from fsw.model.prediction import INPUTS, Array, CondensedModel
 from fsw.signals import Wall
+
+
+class _Walls(NamedTuple):
+    normals: Array  # (walls, 3) unit, into the free side
+    offsets: Array  # (walls,) m, with the clearance
 
 
 class WallBarrier:
@@ -27,30 +35,20 @@ class WallBarrier:
         self, walls: tuple[Wall, ...], tuning: BarrierTuning, model: CondensedModel
     ) -> None:
         self._tuning = tuning.numbers(model.period)
-        self._normals = np.array([wall.normal for wall in walls]).reshape(-1, 3)
-        self._offsets = np.array([wall.offset + wall.clearance for wall in walls])
+        self._walls = _Walls(
+            np.array([wall.normal for wall in walls]).reshape(-1, 3),
+            np.array([wall.offset + wall.clearance for wall in walls]),
+        )
         nodes = np.arange(1 + tuning.skipped_nodes, model.horizon + 1)
         node, wall, _ = np.meshgrid(nodes, np.arange(len(walls)), np.arange(POINTS), indexing="ij")
         slack = (node - nodes[0]) * len(walls) + wall
-        self.rows = SoftRows(node.ravel(), slack.ravel(), INPUTS * model.horizon)
+        self.rows = ConstraintBlock(node.ravel(), slack.ravel(), INPUTS * model.horizon)
+        self._rows, self._fill = self.rows.rows, of_fixed_types(_fill)
         self._h_start = np.zeros(len(walls) * POINTS)
 
     def refill(self, horizon: Linearisation, targets: TargetPoints) -> None:
         """Linearise h of every wall, point and node."""
-        rows = self.rows
-        _fill(
-            self._normals,
-            self._offsets,
-            horizon.position,
-            horizon.velocity,
-            horizon.d_position,
-            horizon.d_velocity,
-            self._tuning,
-            self._h_start,
-            rows.value,
-            rows.required,
-            rows.gradient,
-        )
+        self._fill(self._walls, horizon.points, self._tuning, self._h_start, self._rows)
 
     def at_start(self) -> Array:
         """h at node 0 by wall and point [m/s]."""
@@ -59,60 +57,25 @@ class WallBarrier:
 
 @compiled
 def _fill(
-    normals: Array,
-    offsets: Array,
-    position: Array,
-    velocity: Array,
-    d_position: Array,
-    d_velocity: Array,
+    walls: _Walls,
+    points: PointMotions,
     tuning: BarrierNumbers,
     h_start: Array,
-    value: Array,
-    required: Array,
-    gradient: Array,
+    rows: Rows,
 ) -> None:
-    walls, nodes = normals.shape[0], position.shape[0]
     row = 0
-    for i in range(nodes):
+    for i in range(points.position.shape[0]):
         if 0 < i < tuning.first_node:
             continue
-        for wall in range(walls):
-            nx, ny, nz = normals[wall]
+        for wall in range(walls.normals.shape[0]):
+            normal = walls.normals[wall]
             for point in range(POINTS):
-                p, v = position[i, point], velocity[i, point]
-                distance = nx * p[0] + ny * p[1] + nz * p[2] - offsets[wall]
-                approach = nx * v[0] + ny * v[1] + nz * v[2]
-                h = root(distance, tuning.alpha, tuning.slope) + approach
+                p, v = points.position[i, point], points.velocity[i, point]
+                plane = Plane(normal, dot(normal, p) - walls.offsets[wall], dot(normal, v))
+                column = wall * POINTS + point
                 if i == 0:
-                    h_start[wall * POINTS + point] = h
+                    h_start[column] = barrier_value(plane, tuning)
                     continue
-                steepness = root_slope(distance, tuning.alpha, tuning.slope)
-                dp, dv = d_position[i, point], d_velocity[i, point]
-                gradient_along(normals[wall], steepness, dp, dv, INPUTS * i, gradient[row])
-                value[row] = h
-                anchor = h_start[wall * POINTS + point]
-                required[row] = required_h(anchor, i, tuning)
+                gradients = (points.d_position[i, point], points.d_velocity[i, point])
+                fill_row(rows, row, i, plane, h_start[column], gradients, tuning)
                 row += 1
-
-
-@compiled
-def gradient_along(
-    n: Array, steepness: float, dp: Array, dv: Array, columns: int, row: Array
-) -> None:
-    """Slope of ``S(n . p - c) + n . v`` in the inputs, into a row's first columns.
-
-    Args:
-        n: (3,), unit.
-        steepness: Of S [1/s].
-        dp: (3, inputs), of the point's position.
-        dv: (3, inputs), of its velocity.
-        columns: How many inputs come before the row's node.
-        row: (inputs,), overwritten.
-    """
-    nx, ny, nz = n
-    for column in range(columns):
-        row[column] = (
-            nx * (steepness * dp[0, column] + dv[0, column])
-            + ny * (steepness * dp[1, column] + dv[1, column])
-            + nz * (steepness * dp[2, column] + dv[2, column])
-        )

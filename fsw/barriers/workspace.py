@@ -16,19 +16,27 @@ Source: docs/equations.md E23.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
-from fsw.barriers.robust import required_h
-from fsw.barriers.root import BarrierNumbers, BarrierTuning, root, root_slope
-from fsw.barriers.soft_rows import SoftRows, TargetPoints
-from fsw.compiled import compiled
-from fsw.model.linearisation import BASE, Linearisation
+from fsw.barriers.cbf_row import Plane, barrier_value, fill_row
+from fsw.barriers.constraint_block import ConstraintBlock, Rows, TargetPoints
+from fsw.barriers.safe_approach import BarrierNumbers, BarrierTuning
+from fsw.compiled import compiled, of_fixed_types
+from fsw.geometry.vectors import dot
+from fsw.model.linearisation import BASE, Linearisation, PointMotions
 from fsw.model.prediction import INPUTS, Array, CondensedModel
 from fsw.signals import WorkspaceSphere
 
 DIRECTIONS = 6
 _CENTRE_BALL = 0.002  # m; closer than this the outward ray is noise and any frame does
+
+
+class _Centre(NamedTuple):
+    position: Array  # (n + 1, 3) m
+    velocity: Array  # (n + 1, 3) m/s
+    radius: float  # m
 
 
 class WorkspaceBarrier:
@@ -42,26 +50,14 @@ class WorkspaceBarrier:
         self._offset = np.array(sphere.centre_from_target)
         nodes = np.arange(1 + tuning.skipped_nodes, model.horizon + 1)
         node = np.repeat(nodes, DIRECTIONS)
-        self.rows = SoftRows(node, node - nodes[0], INPUTS * model.horizon)
+        self.rows = ConstraintBlock(node, node - nodes[0], INPUTS * model.horizon)
+        self._rows, self._fill = self.rows.rows, of_fixed_types(_fill)
         self._h_start = np.zeros(1)
 
     def refill(self, horizon: Linearisation, targets: TargetPoints) -> None:
         """Linearise h along six directions, frozen at the guess, at every node."""
-        rows = self.rows
-        _fill(
-            self._radius,
-            targets.position + self._offset,
-            targets.velocity,
-            horizon.position[:, BASE],
-            horizon.velocity[:, BASE],
-            horizon.d_position[:, BASE],
-            horizon.d_velocity[:, BASE],
-            self._tuning,
-            self._h_start,
-            rows.value,
-            rows.required,
-            rows.gradient,
-        )
+        centre = _Centre(targets.position + self._offset, targets.velocity, self._radius)
+        self._fill(centre, horizon.points, self._tuning, self._h_start, self._rows)
 
     def at_start(self) -> Array:
         """The smaller of h2a and h2b at node 0 [m/s], (1,)."""
@@ -73,8 +69,8 @@ def outward_frame(e: Array, frame: Array) -> None:
     """Orthonormal rows, the first along e or, at the centre, along x.
 
     Args:
-        e: (3,) m, base from the sphere's centre.
-        frame: (3, 3), overwritten.
+        e: (3,) [m, NED], base from the sphere's centre.
+        frame: (3, 3) [1], overwritten.
     """
     length = math.sqrt(e[0] * e[0] + e[1] * e[1] + e[2] * e[2])
     frame[0] = 0.0
@@ -97,50 +93,36 @@ def outward_frame(e: Array, frame: Array) -> None:
 
 
 @compiled
-def _h_along(n: Array, e: Array, w: Array, radius: float, tuning: BarrierNumbers) -> float:
-    gap = radius - (n[0] * e[0] + n[1] * e[1] + n[2] * e[2])
-    outward_speed: float = n[0] * w[0] + n[1] * w[1] + n[2] * w[2]
-    return root(gap, tuning.alpha, tuning.slope) - outward_speed
+def _tangent_plane(n: Array, e: Array, w: Array, radius: float) -> Plane:
+    """The sphere's tangent plane at n, with its normal towards the centre, and the base."""
+    return Plane(-n, radius - dot(n, e), -dot(n, w))
 
 
 @compiled
 def _fill(
-    radius: float,
-    centre: Array,
-    centre_velocity: Array,
-    position: Array,
-    velocity: Array,
-    d_position: Array,
-    d_velocity: Array,
+    centre: _Centre,
+    points: PointMotions,
     tuning: BarrierNumbers,
     h_start: Array,
-    value: Array,
-    required: Array,
-    gradient: Array,
+    rows: Rows,
 ) -> None:
-    frame = np.zeros((3, 3))
-    e_start, w_start = position[0] - centre[0], velocity[0] - centre_velocity[0]
+    frame, radius = np.zeros((3, 3)), centre.radius
+    e_start = points.position[0, BASE] - centre.position[0]
+    w_start = points.velocity[0, BASE] - centre.velocity[0]
     outward_frame(e_start, frame)
     h_start[0] = min(
-        _h_along(frame[0], e_start, w_start, radius, tuning),
-        _h_along(-frame[0], e_start, w_start, radius, tuning),
+        barrier_value(_tangent_plane(frame[0], e_start, w_start, radius), tuning),
+        barrier_value(_tangent_plane(-frame[0], e_start, w_start, radius), tuning),
     )
     row = 0
-    for i in range(tuning.first_node, position.shape[0]):
-        e, w = position[i] - centre[i], velocity[i] - centre_velocity[i]
+    for i in range(tuning.first_node, points.position.shape[0]):
+        e = points.position[i, BASE] - centre.position[i]
+        w = points.velocity[i, BASE] - centre.velocity[i]
         outward_frame(e, frame)
+        gradients = (points.d_position[i, BASE], points.d_velocity[i, BASE])
         for direction in range(DIRECTIONS):
             n = frame[direction // 2] if direction % 2 == 0 else -frame[direction // 2]
-            gap = radius - (n[0] * e[0] + n[1] * e[1] + n[2] * e[2])
-            steepness = root_slope(gap, tuning.alpha, tuning.slope)
-            for column in range(INPUTS * i):
-                moved = 0.0
-                for axis in range(3):
-                    moved -= n[axis] * (
-                        steepness * d_position[i, axis, column] + d_velocity[i, axis, column]
-                    )
-                gradient[row, column] = moved
-            value[row] = _h_along(n, e, w, radius, tuning)
-            anchor = _h_along(n, e_start, w_start, radius, tuning)
-            required[row] = required_h(anchor, i, tuning)
+            at_start = barrier_value(_tangent_plane(n, e_start, w_start, radius), tuning)
+            plane = _tangent_plane(n, e, w, radius)
+            fill_row(rows, row, i, plane, at_start, gradients, tuning)
             row += 1

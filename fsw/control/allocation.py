@@ -17,8 +17,8 @@ def allocate(airframe: Airframe, torque: Vec3, thrust: float, yaw_limit: float) 
 
     Args:
         airframe: Rotor arm, drag and thrust limits.
-        torque: Wanted body torque [N m].
-        thrust: Wanted total thrust [N].
+        torque: Commanded body torque [N m, FRD].
+        thrust: Commanded total thrust [N].
         yaw_limit: Most thrust a rotor may spend on yaw [N].
 
     Returns:

@@ -16,8 +16,8 @@ def attitude_reference(a: Vec3, yaw: float) -> Vec3:
     """Roll, pitch and yaw whose thrust direction gives an acceleration (exact, ZYX).
 
     Args:
-        a: Wanted acceleration, world [m/s^2].
-        yaw: Wanted yaw [rad].
+        a: Commanded acceleration [m/s^2, NED].
+        yaw: Commanded yaw [rad].
     """
     c, s = math.cos(yaw), math.sin(yaw)
     forward, right = c * a[0] + s * a[1], -s * a[0] + c * a[1]
@@ -40,10 +40,10 @@ def attitude_pid(
     Small-angle PID of the paper: body rates damp, Euler errors drive.
 
     Args:
-        gains: On angle [1/s^2], its integral [1/s^3] and rate [1/s].
-        integral: Integrals of the errors [rad s].
+        gains: On angle, its integral and rate.
+        integral: Integrals of the errors [rad s, roll pitch yaw].
         estimate: The vehicle now.
-        reference: Roll, pitch, yaw [rad].
+        reference: Roll, pitch, yaw [rad, ZYX].
         dt: Tick length [s].
 
     Returns:

@@ -32,7 +32,7 @@ from fsw.signals import PlanInput, PredictionState, Vec2
 class BrakeTuning:
     """How hard to brake."""
 
-    effort: float = 0.02  # price of (m/s^2)^2 against (m/s)^2
+    input_weight: float = 0.02  # LQR weight of (m/s^2)^2 against (m/s)^2
     vertical_rate: float = 4.0  # 1/s
     vertical: float = 2.0  # m/s^2
     joint_rate: float = 6.0  # 1/s
@@ -53,7 +53,7 @@ class Brake:
         """
         self._tuning = tuning or BrakeTuning()
         self._tilt_slope = math.tan(tilt)
-        self._gains = _gains(airframe, self._tuning.effort)
+        self._gains = _gains(airframe, self._tuning.input_weight)
 
     def __call__(self, x: PredictionState) -> PlanInput:
         """The input that brings a state of the plan towards rest."""
@@ -77,13 +77,13 @@ class Brake:
         )
 
 
-def _gains(airframe: Airframe, effort: float) -> tuple[float, float, float, float]:
+def _gains(airframe: Airframe, input_weight: float) -> tuple[float, float, float, float]:
     """On velocity, acceleration, jerk and snap of one horizontal axis."""
     if airframe.attitude_lag.at_once:
-        return 1.0 / math.sqrt(effort), 0.0, 0.0, 0.0
+        return 1.0 / math.sqrt(input_weight), 0.0, 0.0, 0.0
     a, b = continuous_model(airframe)
     axis = [V, A, J, S]
     a_axis, b_axis = a[np.ix_(axis, axis)], b[axis, :1]
-    price = solve_continuous_are(a_axis, b_axis, np.diag([1.0, 0.0, 0.0, 0.0]), [[effort]])
-    kv, ka, kj, ks = (b_axis.T @ price / effort)[0].tolist()
+    riccati = solve_continuous_are(a_axis, b_axis, np.diag([1.0, 0.0, 0.0, 0.0]), [[input_weight]])
+    kv, ka, kj, ks = (b_axis.T @ riccati / input_weight)[0].tolist()
     return kv, ka, kj, ks

@@ -11,8 +11,8 @@ from fsw.compiled import compilable, compiled, machine_code, packed
 from fsw.control.allocation import allocate
 from fsw.control.arm_compensation import compensated_joints
 from fsw.control.attitude import attitude_pid, attitude_reference
+from fsw.control.gains import InnerTuning, tracking_gains
 from fsw.control.height import height_pid
-from fsw.control.inner_tuning import InnerTuning, tracking_gains
 from fsw.control.joints import joint_torques
 from fsw.control.pid import PidGains
 from fsw.control.tracking import Observed, TrackingLaw, follow_plan, observe
@@ -20,7 +20,7 @@ from fsw.geometry.rotation import wrap_angle
 from fsw.geometry.vectors import clamp_magnitude
 from fsw.model.airframe import GRAVITY, Airframe
 from fsw.model.nominal import REST_INPUT, REST_STATE
-from fsw.model.rotors import MotionState, lag_rotors, motion_state, rotor_decay, weigh
+from fsw.model.rotors import MotionState, estimate_mass, lag_rotors, motion_state, rotor_decay
 from fsw.signals import (
     STOPPED,
     ActuatorCommand,
@@ -159,7 +159,7 @@ def close_loops(
     rotors, observed = memory.rotors, memory.observed
     for _ in range(ticks):
         rotors = lag_rotors(rotors, memory.commanded.rotor_thrust, law.rotor_decay)
-    mass = weigh(airframe, memory.mass, rotors, estimate.specific_force, dt * ticks)
+    mass = estimate_mass(airframe, memory.mass, rotors, estimate.specific_force, dt * ticks)
     motion = motion_state(airframe, mass, estimate, rotors, memory.commanded.joint_torque[0])
     for _ in range(ticks):
         observed = observe(observed, estimate.v_WB, motion.a, tuning.tracking, dt)
@@ -200,12 +200,12 @@ def _close_loops(
     u: PlanInput,
     ticks: int,
 ) -> tuple[tuple[Vec4, Vec2], Vec4, tuple[Vec3, Vec3, Vec2], float, tuple[Vec3, float, Vec2]]:
-    """``close_loops`` that returns plain tuples, which leave machine code at half the price."""
+    """``close_loops`` that returns plain tuples, which leave machine code at half the cost."""
     command, kept = close_loops(law[0], memory, estimate, plan, u, ticks)
     return (
         (command.rotor_thrust, command.joint_torque),
         kept.rotors,
-        (kept.observed.v, kept.observed.d, kept.observed.lasting),
+        (kept.observed.v, kept.observed.d, kept.observed.disturbance_bias),
         kept.mass,
         (kept.attitude, kept.height, kept.joints),
     )

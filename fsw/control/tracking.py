@@ -23,7 +23,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from fsw.compiled import compilable
-from fsw.control.inner_tuning import TrackingGains, TrackingTuning
+from fsw.control.gains import TrackingGains, TrackingTuning
 from fsw.geometry.vectors import clamp_magnitude
 from fsw.model.airframe import GRAVITY, AttitudeLag
 from fsw.model.rotors import MotionState
@@ -46,7 +46,7 @@ class Observed(NamedTuple):
 
     v: Vec3  # m/s
     d: Vec3  # m/s^2, disturbance acceleration
-    lasting: Vec2 = (0.0, 0.0)  # m/s^2, horizontal part of d that stays: wind
+    disturbance_bias: Vec2 = (0.0, 0.0)  # m/s^2, horizontal part of d that stays: wind
 
 
 @compilable
@@ -59,8 +59,8 @@ def observe(memory: Observed, v: Vec3, a: Vec3, tuning: TrackingTuning, dt: floa
 
     Args:
         memory: From the last tick.
-        v: Measured velocity [m/s].
-        a: Acceleration the rotors produce [m/s^2].
+        v: Measured velocity [m/s, NED].
+        a: Acceleration the rotors produce [m/s^2, NED].
         tuning: Bandwidth of the observer, and how slowly it takes a disturbance for wind.
         dt: Tick length [s].
     """
@@ -69,8 +69,12 @@ def observe(memory: Observed, v: Vec3, a: Vec3, tuning: TrackingTuning, dt: floa
     vy, dy = _observe_axis(memory.v[1], memory.d[1], v[1], a[1], bandwidth, dt)
     vz, dz = _observe_axis(memory.v[2], memory.d[2], v[2], a[2], bandwidth, dt)
     share, most = min(dt / tuning.wind_time, 1.0), tuning.wind_limit
-    wind_x = clamp_magnitude(memory.lasting[0] + share * (dx - memory.lasting[0]), most)
-    wind_y = clamp_magnitude(memory.lasting[1] + share * (dy - memory.lasting[1]), most)
+    wind_x = clamp_magnitude(
+        memory.disturbance_bias[0] + share * (dx - memory.disturbance_bias[0]), most
+    )
+    wind_y = clamp_magnitude(
+        memory.disturbance_bias[1] + share * (dy - memory.disturbance_bias[1]), most
+    )
     return Observed((vx, vy, vz), (dx, dy, dz), (wind_x, wind_y))
 
 
@@ -87,33 +91,42 @@ def _observe_axis(
     )
 
 
+class AxisState(NamedTuple):
+    """One horizontal axis of the vehicle or of the plan, world."""
+
+    p: float  # m
+    v: float  # m/s
+    a: float  # m/s^2
+    j: float  # m/s^3
+    s: float  # m/s^4
+
+
 @compilable
 def snap_command(
-    law: TrackingLaw,
-    e_p: float,
-    e_v: float,
-    e_s: float,
-    d: float,
-    lasting: float,
-    a: float,
-    j: float,
-    a_plan: float,
-    j_plan: float,
-    u: float,
+    law: TrackingLaw, vehicle: AxisState, d: float, bias: float, plan: AxisState, u: float
 ) -> float:
-    """Commanded snap of one horizontal axis [m/s^4]."""
+    """Commanded snap of one horizontal axis [m/s^4].
+
+    Args:
+        law: Lag of the attitude, limits and gains.
+        vehicle: Measured, and from the rotor model.
+        d: Observed disturbance [m/s^2].
+        bias: Its slow part, wind, which is cancelled whole [m/s^2].
+        plan: Where the plan wants the vehicle now.
+        u: The plan's acceleration command now [m/s^2].
+    """
     tuning, lag = law.tuning, law.lag
     k = law.gains.k
     k1, k2, k3, k4, k5 = k[0], k[1], k[2], k[3], k[4]
-    e_p = clamp_magnitude(e_p, tuning.position_error_limit)
-    passing = law.gains.k_disturbance * (d - lasting)
-    wanted_a = a_plan + (k1 * e_p + k2 * e_v - passing) / k3 - lasting
-    wanted_a = clamp_magnitude(wanted_a, tuning.acceleration_limit)
-    wanted_j = j_plan + k3 / k4 * (wanted_a - a)
+    e_p = clamp_magnitude(plan.p - vehicle.p, tuning.position_error_limit)
+    e_v, e_s = plan.v - vehicle.v, plan.s - vehicle.s
+    feedback = k1 * e_p + k2 * e_v - law.gains.k_disturbance * (d - bias)
+    a_ref = clamp_magnitude(plan.a + feedback / k3 - bias, tuning.acceleration_limit)
+    j_ref = plan.j + k3 / k4 * (a_ref - vehicle.a)
     # A jerk that can still be stopped before the acceleration overshoots.
-    stoppable = math.sqrt(60.0 * (abs(wanted_a - a) + 0.15))
-    wanted_j = clamp_magnitude(wanted_j, min(tuning.jerk_limit, stoppable))
-    return lag.kp * (u - a_plan) - lag.kd * j_plan + k5 * e_s + k4 * (wanted_j - j)
+    stoppable = math.sqrt(60.0 * (abs(a_ref - vehicle.a) + 0.15))
+    j_ref = clamp_magnitude(j_ref, min(tuning.jerk_limit, stoppable))
+    return lag.kp * (u - plan.a) - lag.kd * plan.j + k5 * e_s + k4 * (j_ref - vehicle.j)
 
 
 @compilable
@@ -130,7 +143,7 @@ def follow_plan(
 
     Args:
         law: Lag of the attitude, tuning and gains.
-        mass: Of the whole vehicle, as weighed in flight [kg].
+        mass: Of the whole vehicle, as estimated in flight [kg].
         estimate: The vehicle now.
         motion: Its acceleration, jerk and snap.
         observed: Its velocity without the reading's noise, and the disturbance.
@@ -166,16 +179,9 @@ def _horizontal_snap(
     plan: PredictionState,
     u: PlanInput,
 ) -> float:
+    p, v, a, j, s = estimate.p_WB, observed.v, motion.a, motion.j, motion.s
+    vehicle = AxisState(p[axis], v[axis], a[axis], j[axis], s[axis])
+    planned = AxisState(plan.p[axis], plan.v[axis], plan.a[axis], plan.j[axis], plan.s[axis])
     return snap_command(
-        law,
-        plan.p[axis] - estimate.p_WB[axis],
-        plan.v[axis] - observed.v[axis],
-        plan.s[axis] - motion.s[axis],
-        observed.d[axis],
-        observed.lasting[axis],
-        motion.a[axis],
-        motion.j[axis],
-        plan.a[axis],
-        plan.j[axis],
-        u.a[axis],
+        law, vehicle, observed.d[axis], observed.disturbance_bias[axis], planned, u.a[axis]
     )

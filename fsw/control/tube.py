@@ -27,7 +27,7 @@ from functools import lru_cache
 import numpy as np
 from scipy.linalg import expm
 
-from fsw.control.inner_tuning import TrackingGains, TrackingTuning
+from fsw.control.gains import TrackingGains, TrackingTuning
 from fsw.model.airframe import GRAVITY, Airframe
 from fsw.model.prediction import Array
 
@@ -83,7 +83,7 @@ def tube(
 
 
 def peak_snap_share(airframe: Airframe, tube_per_unit: Tube, disturbance: float) -> float:
-    """Share of the snap that the rotors' torque gives in hover which a disturbance needs."""
+    """Share of the rotors' snap in hover that a ``disturbance`` [m/s^2] uses."""
     hover = airframe.mass * GRAVITY / 4.0
     headroom = min(hover, airframe.rotor_thrust_max - hover)
     limit = GRAVITY * 2.0 * airframe.rotor_arm * headroom / max(airframe.inertia[:2])

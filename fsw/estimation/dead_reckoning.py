@@ -15,7 +15,7 @@ def moved_on(x: StateEstimate, seconds: float) -> StateEstimate:
 
     Args:
         x: As measured.
-        seconds: How old that is; milliseconds, not more.
+        seconds: Age of the measurement [s], a few milliseconds.
     """
     t, R = seconds, x.R_WB
     a = (-x.specific_force * R[2], -x.specific_force * R[5], GRAVITY - x.specific_force * R[8])

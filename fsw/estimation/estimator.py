@@ -30,7 +30,17 @@ def estimate_state(sensors: SensorFrame) -> StateEstimate | None:
 def attitude(
     p_WB: Vec3, v_WB: Vec3, q_WB: Vec4, gyro_B: Vec3, accel_B: Vec3, q_arm: Vec2, qd_arm: Vec2
 ) -> tuple[bool, Mat3, float]:
-    """Whether all readings are of use, and then the rotation R_WB and its yaw [rad]."""
+    """Whether all readings are valid, the rotation R_WB and its yaw [rad].
+
+    Args:
+        p_WB: Position [m].
+        v_WB: Velocity [m/s].
+        q_WB: Attitude, [w, x, y, z] [1].
+        gyro_B: Body rates [rad/s].
+        accel_B: Specific force [m/s^2].
+        q_arm: Joint angles [rad].
+        qd_arm: Joint rates [rad/s].
+    """
     norm2 = q_WB[0] * q_WB[0] + q_WB[1] * q_WB[1] + q_WB[2] * q_WB[2] + q_WB[3] * q_WB[3]
     # The sum is finite exactly when every reading is (infinities of both signs give NaN).
     total = (

@@ -22,7 +22,7 @@ class VibrationMeter:
         self._last: tuple[Vec3, Vec3] | None = None
 
     def add(self, gyro_B: Vec3, accel_B: Vec3) -> None:
-        """Take in one reading of gyro [rad/s] and accelerometer [m/s^2]; NaN is passed over."""
+        """Add a reading of ``gyro_B`` [rad/s] and ``accel_B`` [m/s^2]; NaN is ignored."""
         last, self._last = self._last, (gyro_B, accel_B)
         if last is None:
             return

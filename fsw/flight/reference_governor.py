@@ -21,7 +21,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from fsw.barriers.margins import plain_root
+from fsw.barriers.safe_approach import safe_approach_speed
 from fsw.barriers.tangent import planes, tangent
 from fsw.geometry.vectors import add_scaled, dot, norm, subtract
 from fsw.parameters.flight_config import FlightConfig
@@ -86,7 +86,7 @@ def _off(
     distance = dot(n, p) + reach - wall.offset - wall.clearance
     if distance < 0.0:
         p = add_scaled(p, n, -distance)
-    return p, _slowed(v, n, plain_root(max(distance, 0.0), braking, slope))
+    return p, _slowed(v, n, safe_approach_speed(max(distance, 0.0), braking, slope))
 
 
 def _slowed(v: Vec3, n: Vec3, most: float) -> Vec3:
@@ -108,7 +108,7 @@ def limit_descent(p: Vec3, v: Vec3, body_height: float, touch_speed: float) -> t
     if touch_speed == 0.0 and body_height < _CLEAR_OF_GROUND:
         z -= _CLEAR_OF_GROUND - body_height
     room = max(body_height - (0.0 if touch_speed > 0.0 else _CLEAR_OF_GROUND), 0.0)
-    most = plain_root(room, _GROUND_BRAKING, SETTLE_RATE)
+    most = safe_approach_speed(room, _GROUND_BRAKING, SETTLE_RATE)
     vz = min(vz, max(most, touch_speed))
     level = math.hypot(vx, vy)
     if level > most + _CREEP:
@@ -160,7 +160,7 @@ def limit_reference(
 def _fastest(wall: Wall, p_WE: Vec3, braking: float, slope: float) -> float:
     """How fast to approach a wall [m/s]."""
     room = max(dot(wall.normal, p_WE) - (wall.offset + wall.clearance), 0.0)
-    return max(plain_root(room, braking, slope), _ALWAYS)
+    return max(safe_approach_speed(room, braking, slope), _ALWAYS)
 
 
 def project_to_safe_set(p: Vec3, safe_set: SafeSet) -> Vec3:

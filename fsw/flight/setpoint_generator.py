@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from fsw.barriers.margins import plain_root
+from fsw.barriers.safe_approach import safe_approach_speed
 from fsw.flight.orbit_path import looking_at, on_orbit
 from fsw.flight.reference_governor import SETTLE_RATE, ReferenceGovernor
 from fsw.geometry.rotation import wrap_angle
@@ -103,7 +103,12 @@ class SetpointGenerator:
             p, v = point_in_flight(estimate, self._config.airframe.link_length)
             return ReferenceState(True, p, v, estimate.yaw)
         return ReferenceState(
-            False, estimate.p_WB, estimate.v_WB, estimate.yaw, 0.0, estimate.q_arm
+            of_end_effector=False,
+            p=estimate.p_WB,
+            v=estimate.v_WB,
+            yaw=estimate.yaw,
+            yaw_rate=0.0,
+            q_arm=estimate.q_arm,
         )
 
     def advance(
@@ -211,7 +216,7 @@ def _move_point(
             cruise = min(goal.speed or limits.cruise_speed, limits.speed)
             if goal.orbit is not None:  # on the way to a circle too
                 most = max(cruise, goal.orbit.speed)
-            closing = min(plain_root(distance, braking, SETTLE_RATE), cruise)
+            closing = min(safe_approach_speed(distance, braking, SETTLE_RATE), cruise)
             wanted = add_scaled(wanted, error, closing / distance)
     elif motion.v is None and motion.a is not None:
         a = _level(motion.a, reference.yaw) if motion.along_heading else motion.a
@@ -232,7 +237,7 @@ def _turn(
     if motion.yaw is not None:
         error = wrap_angle(motion.yaw - reference.yaw)
         braking = _BRAKING_SHARE * limits.yaw_acceleration
-        closing = min(plain_root(abs(error), braking, 0.5), limits.yaw_rate)
+        closing = min(safe_approach_speed(abs(error), braking, 0.5), limits.yaw_rate)
         wanted = clamp_magnitude(wanted + math.copysign(closing, error), limits.yaw_rate)
     change = clamp_magnitude(wanted - reference.yaw_rate, limits.yaw_acceleration * dt)
     yaw = wrap_angle(reference.yaw + dt * (reference.yaw_rate + 0.5 * change))

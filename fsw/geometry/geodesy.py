@@ -23,8 +23,8 @@ def to_local(origin: Origin, latitude: float, longitude: float, altitude: float)
 
     Args:
         origin: Of the local frame.
-        latitude: Degrees.
-        longitude: Degrees.
+        latitude: North positive [deg].
+        longitude: East positive [deg].
         altitude: Above mean sea level [m].
 
     Returns:
@@ -46,7 +46,7 @@ def to_global(origin: Origin, p: Vec3) -> Vec3:
 
     Args:
         origin: Of the local frame.
-        p: North, east, down [m].
+        p: Local position [m, NED].
     """
     distance = math.hypot(p[0], p[1])
     altitude = origin.altitude - p[2]

@@ -11,7 +11,7 @@ from fsw.signals import Mat3, Vec3, Vec4
 
 @compilable
 def matrix_from_quaternion(q: Vec4) -> Mat3:
-    """Rotation matrix of a quaternion [w, x, y, z] that is close to unit length."""
+    """Rotation matrix of a quaternion ``q`` [1], (w, x, y, z), close to unit length."""
     w, x, y, z = q
     s = 2.0 / (w * w + x * x + y * y + z * z)
     xs, ys, zs = x * s, y * s, z * s
@@ -68,7 +68,7 @@ def quaternion_from_matrix(R: Mat3) -> Vec4:
 
 @compilable
 def rotate(R: Mat3, v: Vec3) -> Vec3:
-    """World components of a body vector."""
+    """World components of ``v`` [any unit, FRD]."""
     x, y, z = v
     return (
         R[0] * x + R[1] * y + R[2] * z,
@@ -79,7 +79,7 @@ def rotate(R: Mat3, v: Vec3) -> Vec3:
 
 @compilable
 def rotate_back(R: Mat3, v: Vec3) -> Vec3:
-    """Body components of a world vector."""
+    """Body components of ``v`` [any unit, NED]."""
     x, y, z = v
     return (
         R[0] * x + R[3] * y + R[6] * z,
@@ -90,5 +90,5 @@ def rotate_back(R: Mat3, v: Vec3) -> Vec3:
 
 @compilable
 def wrap_angle(angle: float) -> float:
-    """The same angle in [-pi, pi)."""
+    """The same ``angle`` [rad] within -pi..pi, pi excluded."""
     return (angle + math.pi) % (2.0 * math.pi) - math.pi

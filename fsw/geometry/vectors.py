@@ -8,13 +8,18 @@ contract: a recorded flight replays to the last bit.
 from __future__ import annotations
 
 import math
+from typing import Any
+
+from numpy.typing import NDArray
 
 from fsw.compiled import compilable
 from fsw.signals import Vec3
 
+Vector = Vec3 | NDArray[Any]  # compiled code may hand over a row of an array (3,)
+
 
 @compilable
-def dot(a: Vec3, b: Vec3) -> float:
+def dot(a: Vector, b: Vector) -> float:
     """Inner product of ``a`` [any unit, any frame] and ``b`` [any unit, the same frame]."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 

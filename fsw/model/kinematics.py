@@ -96,10 +96,10 @@ def arm_points(x: NDArray[np.generic], l1: float, l2: float, out: NDArray[np.gen
     complex states: the derivative is then exact (complex step).
 
     Args:
-        x: Prediction state (19,), real or complex.
+        x: Prediction state (19,) [SI], real or complex.
         l1: Length of link 1 [m].
         l2: Length of link 2 [m].
-        out: (2, 2, 3), same type: [joint 2 | end-effector][position | velocity][axis].
+        out: (2, 2, 3) [m, m/s], NED: [joint 2 | end-effector][position | velocity][axis].
     """
     # Thrust along f = g e3 - a; its derivative needs the horizontal jerk only: a vertical
     # jerk changes the length of f, hardly its direction.

@@ -104,8 +104,8 @@ class Linearisation:
         """Linearise around ``inputs``.
 
         Args:
-            start: Prediction state at node 0, (19,).
-            inputs: Guess of all inputs, (6 n,).
+            start: (19,) [SI], prediction state at node 0.
+            inputs: (6 n,) [SI], guess of all inputs.
         """
         airframe = self.model.airframe
         np.matmul(self.model.phi, start, out=self.states)

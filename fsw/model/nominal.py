@@ -74,7 +74,7 @@ def advance(model: TickModel, x: PredictionState, u: PlanInput, ticks: int) -> P
 
 @compiled
 def _advance(model: NDArray[Any], x: PredictionState, u: PlanInput, ticks: int) -> tuple[Any, ...]:
-    """``advance`` that returns a plain tuple, which leaves machine code at half the price."""
+    """``advance`` that returns a plain tuple, which leaves machine code at half the cost."""
     x = advance(model[0], x, u, ticks)
     return (x.p, x.v, x.a, x.j, x.s, x.yaw, x.yaw_rate, x.q_arm, x.qd_arm)
 

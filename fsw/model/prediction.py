@@ -82,7 +82,7 @@ def _add_lag(airframe: Airframe, a: Array, b: Array) -> None:
 
 
 def discretise(airframe: Airframe, period: float) -> tuple[Array, Array]:
-    """Exact zero-order-hold A (19, 19) and B (19, 6) over one period [s]."""
+    """Exact zero-order-hold A (19, 19) and B (19, 6) over one ``period`` [s]."""
     a, b = continuous_model(airframe)
     block = np.zeros((STATES + INPUTS, STATES + INPUTS))
     block[:STATES, :STATES] = a * period
@@ -92,7 +92,7 @@ def discretise(airframe: Airframe, period: float) -> tuple[Array, Array]:
 
 
 def condense(airframe: Airframe, period: float, horizon: int) -> CondensedModel:
-    """Stack the discrete model over the horizon, inputs as the only unknowns."""
+    """Stack the model of one ``period`` [s] over the horizon, inputs as the only unknowns."""
     a, b = discretise(airframe, period)
     phi = np.zeros((horizon + 1, STATES, STATES))
     gamma = np.zeros((horizon + 1, STATES, INPUTS * horizon))
@@ -101,7 +101,7 @@ def condense(airframe: Airframe, period: float, horizon: int) -> CondensedModel:
         phi[i + 1] = a @ phi[i]
         gamma[i + 1] = a @ gamma[i]
         gamma[i + 1, :, INPUTS * i : INPUTS * (i + 1)] = b
-    return CondensedModel(airframe, horizon, period, phi, gamma)
+    return CondensedModel(airframe=airframe, horizon=horizon, period=period, phi=phi, gamma=gamma)
 
 
 @compilable

@@ -37,7 +37,7 @@ class MotionState(NamedTuple):
 
 @compilable
 def lag_rotors(thrust: Vec4, command: Vec4, decay: float) -> Vec4:
-    """Rotor thrusts one tick later [N]; ``decay`` is exp(-dt / lag)."""
+    """``thrust`` [N] of each rotor a tick later under ``command`` [N]; ``decay`` [1] per tick."""
     return (
         command[0] + (thrust[0] - command[0]) * decay,
         command[1] + (thrust[1] - command[1]) * decay,
@@ -47,12 +47,12 @@ def lag_rotors(thrust: Vec4, command: Vec4, decay: float) -> Vec4:
 
 
 def rotor_decay(airframe: Airframe, dt: float) -> float:
-    """Share of a rotor's error left after a tick."""
+    """Share of a rotor's thrust error left after ``dt`` [s]: exp(-dt / lag)."""
     return math.exp(-dt / airframe.rotor_lag)
 
 
 @compilable
-def weigh(
+def estimate_mass(
     airframe: Airframe, mass: float, rotors: Vec4, specific_force: float, seconds: float
 ) -> float:
     """The vehicle's mass [kg], from what the accelerometer makes of the rotors' thrust.
@@ -65,7 +65,7 @@ def weigh(
         mass: Estimate of the last tick [kg].
         rotors: Thrust of each rotor now [N].
         specific_force: Accelerometer along -z of the body [m/s^2].
-        seconds: Since the last tick.
+        seconds: Since the last tick [s].
     """
     thrust = rotors[0] + rotors[1] + rotors[2] + rotors[3]
     if not (thrust > _WEIGHING_THRUST * airframe.mass and specific_force > _WEIGHING_THRUST):

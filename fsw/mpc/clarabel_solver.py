@@ -5,7 +5,7 @@ from __future__ import annotations
 import clarabel
 import numpy as np
 
-from fsw.mpc.program import QuadraticProgram
+from fsw.mpc.qp_data import QuadraticProgram
 from fsw.mpc.solution import Solution
 from fsw.signals import SolverStatus
 

@@ -19,8 +19,8 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from fsw.barriers.soft_rows import TargetPoints
-from fsw.compiled import compiled
+from fsw.barriers.constraint_block import TargetPoints
+from fsw.compiled import compiled, of_fixed_types
 from fsw.model.linearisation import Linearisation, Tracked
 from fsw.model.prediction import INPUTS, Q_ARM, Array
 from fsw.signals import Vec4
@@ -111,6 +111,7 @@ class TrackingCost:
             yaw_lead=weights.yaw_lead,
             target_velocity=1.0 if weights.relative_velocity else 0.0,
         )
+        self._add_tracking = of_fixed_types(_add_tracking)
 
     def add(
         self,
@@ -120,7 +121,7 @@ class TrackingCost:
     ) -> float:
         """See ``Cost``."""
         target = _Target(targets.yaw, targets.position, targets.velocity)
-        return _add_tracking(self._weights, horizon.tracked, target, quadratic)
+        return self._add_tracking(self._weights, horizon.tracked, target, quadratic)
 
 
 class PostureCost:

@@ -2,16 +2,16 @@ r"""Solves the planner's program for the multipliers of the few rows that can bi
 
 An interior-point method pays for every unknown and every row in each iteration. A horizon has
 30 to 120 inputs and a hundred rows or more, of which a few matter. So the inputs are
-eliminated by one Cholesky factor of the Hessian, :math:`H = L L^T`, and the rows by asking for
-the wanted ones only. With :math:`U_0 = -H^{-1} c`, the optimum without any row, what is left is
+eliminated by one Cholesky factor of the Hessian, :math:`H = L L^T`, and only the rows of a
+working set are kept. With :math:`U_0 = -H^{-1} c`, the optimum without any row, what is left is
 
 .. math:: \min_z \tfrac12 z^T G H^{-1} G^T z + (b - G U_0)^T z, \quad z \ge 0,\;
-          \sum_{i \in j} z_i \le \mathrm{price}_j
+          \sum_{i \in j} z_i \le \mathrm{penalty}_j
 
 (z of a tilt cone in that cone), where the sum goes over the rows that share a slack: a slack
-with a linear price is a bound on multipliers. Then :math:`U = U_0 - H^{-1} G^T z`. It is the
+with a linear penalty is a bound on multipliers. Then :math:`U = U_0 - H^{-1} G^T z`. It is the
 optimum of the whole if it satisfies the rows that were left out; this is checked after every
-solve, and rows that are violated are wanted as well and the program is solved again.
+solve, and rows that are violated enter the working set and the program is solved again.
 
 Source: docs/equations.md E17 and docs/decisions/0009; Boyd and Vandenberghe, Convex Optimization,
 5.2 and 5.7.
@@ -31,28 +31,28 @@ from scipy.linalg.lapack import dpotrf, dpotrs
 from fsw.compiled import compiled
 from fsw.model.prediction import Array
 from fsw.mpc.clarabel_solver import ClarabelSolver
-from fsw.mpc.program import CONE, Program, QuadraticProgram
+from fsw.mpc.qp_data import CONE, QpData, QuadraticProgram
 from fsw.mpc.solution import Solution
 from fsw.signals import SolverStatus
 
-# Room at the guess (m/s, rad, m/s^2) below which a row is wanted from the start: the first
+# Residual at the guess (m/s, rad, m/s^2) below which a row starts in the working set: the first
 # always, the second if the optimum without any row violates it. Only speed depends on them.
 _BINDS, _NEAR = 1e-3, 0.05
 _TOLERANCE = 1e-6  # a left-out row may be missed by no more than the solver's own error
-_SOLVES = 4  # after so many every row is wanted
+_SOLVES = 4  # after so many every row is in the working set
 _PATTERNS = 64  # programs kept ready; others are built when they occur
 # Unknowns and costs of the order of one save the interior-point method a third of its iterations:
-# multipliers are counted in a slack's price, and the cost so that its tolerance is fine enough.
+# multipliers are counted in a slack's penalty, and the cost so that its tolerance is fine enough.
 _MULTIPLIER, _COST = 20.0, 0.25
 _SPREAD = _MULTIPLIER / math.sqrt(_COST)
 
-Wanted = NDArray[np.bool_]
+WorkingSet = NDArray[np.bool_]
 
 
 class DualSolver:
     """Solves one program again and again with new numbers."""
 
-    def __init__(self, program: Program) -> None:
+    def __init__(self, program: QpData) -> None:
         self._program = program
         self._multipliers = lru_cache(maxsize=_PATTERNS)(_Multipliers)
 
@@ -60,8 +60,8 @@ class DualSolver:
         """Solve the program as filled now.
 
         Args:
-            guess: Inputs (6 n,) that say where rows may bind; the optimum does not depend on
-                them.
+            guess: Inputs (6 n,) [SI] that say where rows may be active; the optimum does not
+                depend on them.
 
         Returns:
             Inputs and slacks. Where the multipliers have no optimum (rows that contradict each
@@ -73,38 +73,38 @@ class DualSolver:
         if failed:
             return ClarabelSolver(program.whole()).solve()
         free = -dpotrs(factor, program.linear, lower=1)[0]
-        room_free = rows.b - rows.g @ free
-        wanted = np.zeros(len(rows.b), dtype=np.bool_)
-        _want_near(room_free, rows.b - rows.g @ guess, rows.first_cone, wanted)
-        inputs, room = free, room_free
-        slacks = np.zeros(len(program.price))
+        residual_free = rows.b - rows.g @ free
+        working_set = np.zeros(len(rows.b), dtype=np.bool_)
+        _add_near(residual_free, rows.b - rows.g @ guess, rows.first_cone, working_set)
+        inputs, residual = free, residual_free
+        slacks = np.zeros(len(program.penalty))
         status, iterations = SolverStatus.SOLVED, 0
         for solves in range(len(rows.b)):
-            chosen = np.flatnonzero(wanted)
+            chosen = np.flatnonzero(working_set)
             if len(chosen):
                 # L^-1 G', scaled so that its square is the quadratic term.
                 spread = dtrsm(_SPREAD, factor, rows.g[chosen].T, lower=1, overwrite_b=1)
-                solution = self._by_multipliers(chosen, spread, room_free[chosen])
+                solution = self._by_multipliers(chosen, spread, residual_free[chosen])
                 status = solution.status
                 iterations += solution.iterations
                 if not solution.usable:
                     break
                 moved = spread @ (_MULTIPLIER / _SPREAD * solution.x)
                 inputs = free - dtrsv(factor, moved, lower=1, trans=1)
-                room = rows.b - rows.g @ inputs
-            if not _want_violated(room, rows.slack, rows.first_cone, wanted, slacks):
+                residual = rows.b - rows.g @ inputs
+            if not _add_violated(residual, rows.slack, rows.first_cone, working_set, slacks):
                 return Solution(status, np.concatenate((inputs, slacks)), iterations)
             if solves >= _SOLVES:
-                wanted[:] = True
+                working_set[:] = True
         return ClarabelSolver(program.whole()).solve()
 
-    def _by_multipliers(self, chosen: NDArray[np.intp], spread: Array, room: Array) -> Solution:
+    def _by_multipliers(self, chosen: NDArray[np.intp], spread: Array, residual: Array) -> Solution:
         """Multipliers of the chosen rows, counted in ``_MULTIPLIER``."""
         program = self._program
         simple = int(chosen.searchsorted(program.rows.first_cone))
-        softening, held = _numbered(program.rows.slack[chosen[:simple]], len(program.price))
+        softening, held = _numbered(program.rows.slack[chosen[:simple]], len(program.penalty))
         same = self._multipliers(tuple(held.tolist()), (len(chosen) - simple) // CONE)
-        return same.solve(spread.T @ spread, room, program.price[softening])
+        return same.solve(spread.T @ spread, residual, program.penalty[softening])
 
 
 class _Multipliers:
@@ -118,77 +118,100 @@ class _Multipliers:
             cones: How many follow.
         """
         simple, slacks, size = len(held), max(held, default=-1) + 1, len(held) + CONE * cones
-        column, row = np.tril_indices(size)  # of the upper triangle, column by column
-        self._upper = row * size + column
-        ends = np.arange(size + 1)
-        p = sparse.csc_matrix((np.ones(len(row)), row, ends * (ends + 1) // 2), shape=(size, size))
-        # A column has -1 for its own sign and, in a row that shares a slack, 1 in the sum for it.
-        entries = [((k, -1.0), (simple + its, 1.0))[: 1 + (its >= 0)] for k, its in enumerate(held)]
-        entries += [((slacks + k, -1.0),) for k in range(simple, size)]
-        a = sparse.csc_matrix(
-            (
-                np.array([value for column in entries for _, value in column]),
-                np.array([row for column in entries for row, _ in column], dtype=np.intp),
-                np.cumsum([0, *map(len, entries)]),
-            ),
-            shape=(size + slacks, size),
-        )
+        p, self._upper = _upper_triangle(size)
+        a = _signs_and_sums(held, slacks, size)
         self._program = QuadraticProgram(
             p, np.zeros(size), a, np.zeros(size + slacks), simple + slacks, cones
         )
-        self._price = self._program.b[simple : simple + slacks]
+        self._penalty = self._program.b[simple : simple + slacks]
         self._solver = ClarabelSolver(self._program)
 
-    def solve(self, gram: Array, room: Array, price: Array) -> Solution:
+    def solve(self, gram: Array, residual: Array, penalty: Array) -> Solution:
         """Multipliers, simple rows before cones.
 
         Args:
             gram: G H^-1 G', (multipliers, multipliers), as scaled by ``_SPREAD``.
-            room: Of the rows at the optimum without any, (multipliers,).
-            price: Of the slacks.
+            residual: Of the rows at the optimum without any, (multipliers,).
+            penalty: Of the slacks.
         """
         gram.take(self._upper, out=self._program.p.data)
-        np.multiply(room, _MULTIPLIER / _COST, out=self._program.q)
-        np.divide(price, _MULTIPLIER, out=self._price)
+        np.multiply(residual, _MULTIPLIER / _COST, out=self._program.q)
+        np.divide(penalty, _MULTIPLIER, out=self._penalty)
         return self._solver.solve()
 
 
+def _upper_triangle(size: int) -> tuple[sparse.csc_matrix, NDArray[np.intp]]:
+    """A full upper triangle, and where its entries are in the flat square, column by column."""
+    column, row = np.tril_indices(size)
+    ends = np.arange(size + 1)
+    pattern = sparse.csc_matrix(
+        (np.ones(len(row)), row, ends * (ends + 1) // 2), shape=(size, size)
+    )
+    return pattern, row * size + column
+
+
+def _signs_and_sums(held: tuple[int, ...], slacks: int, size: int) -> sparse.csc_matrix:
+    """Rows for the signs of simple multipliers, for their sums by slack, and for the cones'.
+
+    A column has -1 for its own sign and, in a row that shares a slack, 1 in the sum for it.
+    """
+    simple = len(held)
+    entries = [((k, -1.0), (simple + its, 1.0))[: 1 + (its >= 0)] for k, its in enumerate(held)]
+    entries += [((slacks + k, -1.0),) for k in range(simple, size)]
+    return sparse.csc_matrix(
+        (
+            np.array([value for column in entries for _, value in column]),
+            np.array([row for column in entries for row, _ in column], dtype=np.intp),
+            np.cumsum([0, *map(len, entries)]),
+        ),
+        shape=(size + slacks, size),
+    )
+
+
 @compiled
-def _room(room: Array, row: int, first_cone: int) -> float:
+def _residual(residual: Array, row: int, first_cone: int) -> float:
     """Distance of a row, or of the cone that begins there, to its boundary."""
     if row < first_cone:
-        return float(room[row])
-    return float(room[row] - np.hypot(room[row + 1], room[row + 2]))
+        return float(residual[row])
+    return float(residual[row] - np.hypot(residual[row + 1], residual[row + 2]))
 
 
 @compiled
-def _want_near(at_free: Array, at_guess: Array, first_cone: int, wanted: Wanted) -> None:
+def _add_near(at_free: Array, at_guess: Array, first_cone: int, working_set: WorkingSet) -> None:
     """Mark the rows that probably bind; what is not a number counts as violated."""
     row = 0
-    while row < len(wanted):
+    while row < len(working_set):
         rows = 1 if row < first_cone else CONE
-        near = _room(at_guess, row, first_cone)
-        if not (near >= _BINDS) or (near < _NEAR and not (_room(at_free, row, first_cone) >= 0.0)):
-            wanted[row : row + rows] = True
+        near = _residual(at_guess, row, first_cone)
+        if not (near >= _BINDS) or (
+            near < _NEAR and not (_residual(at_free, row, first_cone) >= 0.0)
+        ):
+            working_set[row : row + rows] = True
         row += rows
 
 
 @compiled
-def _want_violated(
-    room: Array, slack: NDArray[np.intp], first_cone: int, wanted: Wanted, slacks: Array
+def _add_violated(
+    residual: Array,
+    slack: NDArray[np.intp],
+    first_cone: int,
+    working_set: WorkingSet,
+    slacks: Array,
 ) -> bool:
-    """Fill the slacks that the wanted rows need, mark violated rows; whether there are any."""
+    """Fill the slacks of the working set, add violated rows to it; whether there are any."""
     slacks[:] = 0.0
     for row in range(first_cone):
-        if wanted[row] and slack[row] >= 0 and -room[row] > slacks[slack[row]]:
-            slacks[slack[row]] = -room[row]
+        if working_set[row] and slack[row] >= 0 and -residual[row] > slacks[slack[row]]:
+            slacks[slack[row]] = -residual[row]
     more = False
     row = 0
-    while row < len(wanted):
+    while row < len(working_set):
         rows = 1 if row < first_cone else CONE
         softened = slacks[slack[row]] if slack[row] >= 0 else 0.0
-        if not wanted[row] and not (_room(room, row, first_cone) + softened >= -_TOLERANCE):
-            wanted[row : row + rows] = True
+        if not working_set[row] and not (
+            _residual(residual, row, first_cone) + softened >= -_TOLERANCE
+        ):
+            working_set[row : row + rows] = True
             more = True
         row += rows
     return more

@@ -7,17 +7,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
-from fsw.barriers.soft_rows import TargetPoints
+from fsw.barriers.constraint_block import TargetPoints
 from fsw.model.airframe import Airframe
 from fsw.model.prediction import INPUTS, Array, condense, to_vector
+from fsw.mpc.ocp import Ocp
 from fsw.mpc.planner_config import PlannerConfig
-from fsw.mpc.problem import Problem
-from fsw.mpc.slsqp_solver import SlsqpSolver
-from fsw.mpc.solution import Solution
+from fsw.mpc.solvers import SOLVERS, Search
 from fsw.signals import (
     EndEffectorTarget,
     Plan,
@@ -33,21 +31,6 @@ from fsw.signals import (
     WorkspaceSphere,
 )
 from fsw.tuning import Tuning, tuned
-
-
-@dataclass(frozen=True, slots=True)
-class _Search:
-    """How one request was answered; the plan is usable where the last solution is."""
-
-    solution: Solution
-    sqp_iterations: int
-    solver_iterations: int
-    linearise_us: float
-    solve_us: float
-
-    def timings(self, total_us: float) -> PlanTimings:
-        """Where the time went."""
-        return PlanTimings(self.linearise_us, self.solve_us, total_us)
 
 
 class Planner:
@@ -73,7 +56,7 @@ class Planner:
         self._period_us = config.period_us
         self._model = condense(airframe, config.period, config.horizon)
         self._safe_set: SafeSet | None = None
-        self._problem: Problem | None = None
+        self._ocp: Ocp | None = None
         self._inputs: Array = np.zeros(INPUTS * config.horizon)
         self._t_us = -1
 
@@ -100,8 +83,18 @@ class Planner:
             SafeSet(walls=(wall,), obstacles=(point,)),
             SafeSet(sphere=sphere),
         ):
-            for postures in ((), (rest.q_arm,) * len(targets)):
-                self.plan(PlanRequest(0, 0, rest, targets, safe_set, False, postures=postures))
+            for joint_targets in ((), (rest.q_arm,) * len(targets)):
+                self.plan(
+                    PlanRequest(
+                        plan_id=0,
+                        t_apply_us=0,
+                        start=rest,
+                        targets=targets,
+                        safe_set=safe_set,
+                        from_nominal=False,
+                        joint_targets=joint_targets,
+                    )
+                )
         self._t_us = -1
         self._inputs[:] = 0.0
 
@@ -120,22 +113,20 @@ class Planner:
             )
         if request.tuning != self._tuning:
             self._retune(request.tuning)
-        problem = self._problem_for(request.safe_set)
+        ocp = self._ocp_for(request.safe_set)
         targets = TargetPoints(
             np.array([target.p_WE for target in request.targets]),
             np.array([target.v_WE for target in request.targets]),
             np.array([target.yaw for target in request.targets]),
-            np.array(request.postures) if request.postures else None,
+            np.array(request.joint_targets) if request.joint_targets else None,
         )
-        if self._config.solver == "slsqp":
-            search = self._by_slsqp(problem, start, targets)
-        else:
-            search = self._by_programs(problem, start, targets, request.t_apply_us)
+        solver = SOLVERS[self._config.solver](self._config, self._stopwatch_us)
+        search = solver.solve(ocp, start, targets, self._guess(request.t_apply_us))
         solution = search.solution
         if not solution.usable:
             after = f"after {search.solver_iterations} iterations"
             reason = f"solver stopped with {solution.status.name} {after}"
-            timings = search.timings(self._stopwatch_us() - begin)
+            timings = _timings(search, self._stopwatch_us() - begin)
             return PlanFailure(request.plan_id, solution.status, reason, timings)
         inputs = solution.x[: len(self._inputs)]
         self._inputs = inputs
@@ -147,41 +138,13 @@ class Planner:
             start=request.start,
             inputs=_as_plan_inputs(inputs),
             status=solution.status,
-            cost=problem.cost,
-            slack_max=problem.largest_barrier_slack(solution.x),
-            barrier=problem.barrier_at_start(),
+            cost=ocp.cost,
+            slack_max=ocp.largest_barrier_slack(solution.x),
+            barrier=ocp.barrier_at_start(),
             sqp_iterations=search.sqp_iterations,
             solver_iterations=search.solver_iterations,
-            timings=search.timings(self._stopwatch_us() - begin),
+            timings=_timings(search, self._stopwatch_us() - begin),
         )
-
-    def _by_programs(
-        self, problem: Problem, start: Array, targets: TargetPoints, t_us: int
-    ) -> _Search:
-        """A fixed number of quadratic programs from the last solution on."""
-        inputs = self._guess(t_us)
-        linearise_us = solve_us = 0.0
-        iterations = done = 0
-        while done < self._config.sqp_iterations:
-            mark = self._stopwatch_us()
-            problem.linearise(start, inputs, targets)
-            linearised = self._stopwatch_us()
-            solution = problem.solve()
-            linearise_us += linearised - mark
-            solve_us += self._stopwatch_us() - linearised
-            iterations += solution.iterations
-            done += 1
-            if not solution.usable:
-                break
-            inputs = solution.x[: len(inputs)]
-        return _Search(solution, done, iterations, linearise_us, solve_us)
-
-    def _by_slsqp(self, problem: Problem, start: Array, targets: TargetPoints) -> _Search:
-        """The paper's optimiser, from rest whatever was planned before."""
-        mark = self._stopwatch_us()
-        solution = SlsqpSolver().minimise(problem, start, targets)
-        solve_us = self._stopwatch_us() - mark
-        return _Search(solution, solution.iterations, solution.iterations, 0.0, solve_us)
 
     def _refusal(self, request: PlanRequest, start: Array) -> str | None:
         if len(request.targets) != self._config.horizon + 1:
@@ -191,9 +154,11 @@ class Planner:
         for target in request.targets:
             if not all(map(math.isfinite, (*target.p_WE, *target.v_WE, target.yaw))):
                 return "a target is not finite"
-        if len(request.postures) not in (0, len(request.targets)):
-            return f"{len(request.postures)} joint targets given for {len(request.targets)} nodes"
-        if not all(math.isfinite(angle) for joints in request.postures for angle in joints):
+        if len(request.joint_targets) not in (0, len(request.targets)):
+            return (
+                f"{len(request.joint_targets)} joint targets given for {len(request.targets)} nodes"
+            )
+        if not all(math.isfinite(angle) for joints in request.joint_targets for angle in joints):
             return "a joint target is not finite"
         return None
 
@@ -201,19 +166,23 @@ class Planner:
         """Plan with other weights, limits and barriers from now on."""
         self._config = tuned(self._untuned, tuning)
         self._tuning = tuning
-        self._problem = None
+        self._ocp = None
 
-    def _problem_for(self, safe_set: SafeSet) -> Problem:
-        if self._problem is None or safe_set != self._safe_set:
-            self._problem = Problem(self._config, self._model, safe_set)
+    def _ocp_for(self, safe_set: SafeSet) -> Ocp:
+        if self._ocp is None or safe_set != self._safe_set:
+            self._ocp = Ocp(self._config, self._model, safe_set)
             self._safe_set = safe_set
-        return self._problem
+        return self._ocp
 
     def _guess(self, t_us: int) -> Array:
         """The last solution moved on by one period, or rest after a break."""
         if t_us - self._t_us != self._period_us:
             return np.zeros_like(self._inputs)
         return np.concatenate((self._inputs[INPUTS:], self._inputs[-INPUTS:]))
+
+
+def _timings(search: Search, total_us: float) -> PlanTimings:
+    return PlanTimings(search.linearise_us, search.solve_us, total_us)
 
 
 def _as_plan_inputs(inputs: Array) -> tuple[PlanInput, ...]:

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Literal
 
-from fsw.barriers.root import BarrierTuning
+from fsw.barriers.safe_approach import BarrierTuning
 from fsw.mpc.costs import CostWeights
-from fsw.mpc.program import InputLimits
+from fsw.mpc.qp_data import InputLimits
 from fsw.mpc.soft_costs import SoftWeights
 from fsw.periods import PLANNING_US
-
-Solver = Literal["clarabel", "slsqp"]  # slsqp: the paper's, with numeric gradients
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,19 +18,19 @@ class PlannerConfig:
     controller: str = "blf"  # a name in variants.py
     horizon: int = 5  # n
     period_us: int = PLANNING_US  # T
-    solver: Solver = "clarabel"
+    solver: str = "clarabel"  # a name in solvers.py; slsqp is the paper's
     sqp_iterations: int = 2  # slsqp goes on until it converges
     weights: CostWeights = field(default_factory=CostWeights)
     limits: InputLimits = field(default_factory=InputLimits)
-    joint_slack: float = 50.0  # price of a rad outside the limits
+    joint_slack: float = 50.0  # penalty of a rad outside the limits
     # blf
     # Beside walls the end-effector counts too, which swings more than the base wanders.
-    walls: BarrierTuning = field(default_factory=lambda: BarrierTuning(robustness=0.345))
+    walls: BarrierTuning = field(default_factory=lambda: BarrierTuning(lambda_=0.345))
     workspace: BarrierTuning = field(default_factory=BarrierTuning)
-    barrier_slack: float = 20.0  # price of a m/s less than the barrier requires
+    barrier_slack: float = 20.0  # penalty of a m/s less than the barrier requires
     # hc
     tightening: float = 0.0  # m, kept in addition to the safe set
-    hard_slack: float | None = None  # price of a m outside; None: hard, as in the paper
+    hard_slack: float | None = None  # penalty of a m outside; None: hard, as in the paper
     hard_skipped_nodes: int = 0
     # sc, and naive with centring
     soft: SoftWeights = field(default_factory=SoftWeights)

@@ -13,7 +13,7 @@ KEPT_POINTS = 256  # 25 s of a 10 Hz stream; a flood must not grow the memory
 
 
 def still_at(p_WE: Vec3, t_us: int = 0, yaw: float = 0.0) -> EndEffectorTarget:
-    """A target that does not move."""
+    """A target at rest at ``p_WE`` [m] with ``yaw`` [rad]."""
     return EndEffectorTarget(t_us, p_WE, _REST, _REST, yaw)
 
 

@@ -16,9 +16,9 @@ from typing import Any, Literal, Protocol
 import numpy as np
 from scipy.optimize import OptimizeResult, minimize
 
-from fsw.barriers.soft_rows import TargetPoints
+from fsw.barriers.constraint_block import TargetPoints
 from fsw.model.prediction import Array
-from fsw.mpc.program import CONE, Program
+from fsw.mpc.qp_data import CONE, QpData
 from fsw.mpc.solution import Solution
 from fsw.signals import SolverStatus
 
@@ -36,17 +36,17 @@ _STATUS = {
 
 
 class Linearisable(Protocol):
-    """The part of ``fsw.mpc.problem.Problem`` that is needed here."""
+    """The part of ``fsw.mpc.ocp.Problem`` that is needed here."""
 
     cost: float
 
     @property
-    def program(self) -> Program:
+    def program(self) -> QpData:
         """The program around the last guess."""
         ...
 
     def linearise(self, start: Array, guess: Array, targets: TargetPoints) -> None:
-        """Refill the program around a guess."""
+        """Refill the program around ``guess`` (6 n,) [SI] from ``start`` (19,) [SI]."""
         ...
 
 
@@ -58,18 +58,18 @@ class SlsqpSolver:
     tolerance: float = TOLERANCE
     max_iterations: int = MAX_ITERATIONS
 
-    def minimise(self, problem: Linearisable, start: Array, targets: TargetPoints) -> Solution:
+    def minimise(self, ocp: Linearisable, start: Array, targets: TargetPoints) -> Solution:
         """Solve the nonlinear problem.
 
         Args:
-            problem: Of the safe set; holds the program around the optimum afterwards.
-            start: Prediction state at node 0, (19,).
+            ocp: Of the safe set; holds the program around the optimum afterwards.
+            start: (19,) [SI], prediction state at node 0.
             targets: Reference at the nodes.
 
         Returns:
             Inputs and slacks; usable only where SLSQP says that it converged.
         """
-        point = _Point(problem, start, targets)
+        point = _Point(ocp, start, targets)
         analytic = self.gradients == "analytic"
         constraints: dict[str, Any] = {"type": "ineq", "fun": point.margins}
         if analytic:
@@ -105,15 +105,15 @@ class _Point:
     difference in a slack the inputs stay the same.
     """
 
-    def __init__(self, problem: Linearisable, start: Array, targets: TargetPoints) -> None:
-        self._problem, self._start, self._targets = problem, start, targets
-        program = problem.program
+    def __init__(self, ocp: Linearisable, start: Array, targets: TargetPoints) -> None:
+        self._ocp, self._start, self._targets = ocp, start, targets
+        program = ocp.program
         self._inputs = np.zeros(program.inputs)
         rows = program.rows
-        self._holds = np.zeros((program.soft_rows, len(program.price)))  # slacks of soft rows
+        self._holds = np.zeros((program.block_rows, len(program.penalty)))  # slacks of soft rows
         softened = np.flatnonzero(rows.slack >= 0)
         self._holds[softened, rows.slack[softened]] = 1.0
-        problem.linearise(start, self._inputs, targets)
+        ocp.linearise(start, self._inputs, targets)
 
     def rest(self) -> Array:
         """u = 0, and the slacks that make it admissible."""
@@ -122,25 +122,25 @@ class _Point:
 
     def bounds(self) -> list[tuple[float | None, float | None]]:
         """Of every unknown; the tilt bounds the horizontal acceleration through the margins."""
-        program = self._problem.program
-        rows, first = program.rows, program.soft_rows
+        program = self._ocp.program
+        rows, first = program.rows, program.block_rows
         upper = slice(first, (first + rows.first_cone) // 2)  # the lower bounds mirror them
         bounds: list[tuple[float | None, float | None]] = [(None, None)] * program.inputs
         for row, bound in zip(rows.g[upper], rows.b[upper], strict=True):
             bounds[int(row.argmax())] = (-bound, bound)
-        return bounds + [(0.0, None)] * len(program.price)
+        return bounds + [(0.0, None)] * len(program.penalty)
 
     def cost(self, x: Array) -> float:
-        """Costs at the inputs and the price of the slacks."""
+        """Costs at the inputs and the penalty of the slacks."""
         program = self._at(x)
-        return float(self._problem.cost + program.price @ x[program.inputs :])
+        return float(self._ocp.cost + program.penalty @ x[program.inputs :])
 
     def slope(self, x: Array) -> Array:
         """Of ``cost``: the quadratic model around a point has the true slope there."""
         program = self._at(x)
         upper, inputs = program.hessian, x[: program.inputs]
         slope = upper @ inputs + upper.T @ inputs - upper.diagonal() * inputs + program.linear
-        return np.concatenate((slope, program.price))
+        return np.concatenate((slope, program.penalty))
 
     def margins(self, x: Array) -> Array:
         """Non-negative where admissible: soft rows, then one a tilt cone.
@@ -149,7 +149,7 @@ class _Point:
         where the paper starts.
         """
         program = self._at(x)
-        rows, soft = program.rows, program.soft_rows
+        rows, soft = program.rows, program.block_rows
         left = rows.b - rows.g @ x[: program.inputs]
         left[:soft] += self._holds @ x[program.inputs :]
         t, ax, ay = left[rows.first_cone :].reshape(-1, CONE).T
@@ -158,18 +158,18 @@ class _Point:
     def margin_slopes(self, x: Array) -> Array:
         """Of ``margins``, (margins, unknowns)."""
         program = self._at(x)
-        rows, soft = program.rows, program.soft_rows
+        rows, soft = program.rows, program.block_rows
         g, b = rows.g[rows.first_cone :], rows.b[rows.first_cone :]
         cones = (b - g @ x[: program.inputs]).reshape(-1, CONE)
         signed = 2.0 * cones * np.array([-1.0, 1.0, 1.0])
         tilt = np.einsum("ca,cak->ck", signed, g.reshape(-1, CONE, program.inputs))
-        unfelt = np.zeros((len(tilt), len(program.price)))
+        unfelt = np.zeros((len(tilt), len(program.penalty)))
         return np.block([[-rows.g[:soft], self._holds], [tilt, unfelt]])
 
-    def _at(self, x: Array) -> Program:
-        problem = self._problem
+    def _at(self, x: Array) -> QpData:
+        ocp = self._ocp
         inputs = x[: len(self._inputs)]
         if not np.array_equal(inputs, self._inputs):
             self._inputs = inputs.copy()  # SLSQP writes into its x
-            problem.linearise(self._start, self._inputs, self._targets)
-        return problem.program
+            ocp.linearise(self._start, self._inputs, self._targets)
+        return ocp.program

@@ -15,8 +15,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fsw.barriers.constraint_block import TargetPoints
 from fsw.barriers.point_obstacle import vertical_shares
-from fsw.barriers.soft_rows import TargetPoints
 from fsw.barriers.tangent import CENTRE_BALL
 from fsw.compiled import compiled
 from fsw.model.linearisation import BASE, POINTS, Linearisation
@@ -122,7 +122,7 @@ class SphereCost:
 
 @compiled
 def one_sided_reciprocal(gap: float, weight: float) -> tuple[float, float, float]:
-    """Eq 29 of a gap, one-sided: value, slope (negative) and curvature (positive)."""
+    """Eq 29 of a ``gap`` [m] and ``weight`` [1/m^2]: value, slope (< 0) and curvature (> 0)."""
     d = max(gap, _LEAST_GAP)
     value, slope, curvature = 1.0 / d**2, -2.0 / d**3, 6.0 / d**4
     step = min(gap - d, 0.0)

@@ -20,9 +20,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+from fsw.barriers.constraint_block import Barrier
 from fsw.barriers.hard_set import HardObstacles, HardWalls, HardWorkspace
 from fsw.barriers.point_obstacle import PointObstacleBarrier
-from fsw.barriers.soft_rows import Barrier
 from fsw.barriers.wall import WallBarrier
 from fsw.barriers.workspace import WorkspaceBarrier
 from fsw.model.prediction import CondensedModel
@@ -38,7 +38,7 @@ class Parts:
 
     costs: tuple[Cost, ...]
     barriers: tuple[Barrier, ...] = ()
-    slack: float | None = None  # price of softening their rows; None: they are hard
+    slack: float | None = None  # penalty of softening their rows; None: they are hard
 
 
 def _naive(config: PlannerConfig, model: CondensedModel, safe_set: SafeSet) -> Parts:

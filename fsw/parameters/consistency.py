@@ -13,8 +13,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from fsw.barriers.root import BarrierTuning
-from fsw.control.inner_tuning import tracking_gains
+from fsw.barriers.safe_approach import BarrierTuning
+from fsw.control.gains import tracking_gains
 from fsw.control.tube import Tube, peak_snap_share, tube
 from fsw.model.airframe import GRAVITY
 from fsw.parameters.flight_config import FlightConfig, Surroundings
@@ -86,9 +86,9 @@ def loop_tube(config: FlightConfig) -> Tube:
 def stand_off(tuning: BarrierTuning) -> float:
     """Distance to the boundary at which a plan at rest meets h = lambda [m]."""
     knee = tuning.alpha / tuning.slope**2
-    if tuning.robustness <= tuning.slope * knee:
-        return tuning.robustness / tuning.slope
-    return tuning.robustness**2 / (2.0 * tuning.alpha) + 0.5 * knee
+    if tuning.lambda_ <= tuning.slope * knee:
+        return tuning.lambda_ / tuning.slope
+    return tuning.lambda_**2 / (2.0 * tuning.alpha) + 0.5 * knee
 
 
 def sampled_robustness(tuning: BarrierTuning, disturbance: float, period: float) -> float:
@@ -106,7 +106,7 @@ def _actuation(
     config: FlightConfig, tuning: BarrierTuning, safe_set: SafeSet, surroundings: Surroundings
 ) -> Finding:
     available = GRAVITY * math.tan(config.planner.limits.tilt)
-    wanted = tuning.alpha + tuning.gamma * tuning.robustness + surroundings.target_acceleration
+    wanted = tuning.alpha + tuning.gamma * tuning.lambda_ + surroundings.target_acceleration
     parts = "alpha + gamma lambda + |a_t|"
     if safe_set.sphere is not None:
         wanted += surroundings.tangential_speed**2 / safe_set.sphere.radius
@@ -115,7 +115,7 @@ def _actuation(
     remedy = (
         f"alpha <= {best:.2f} m/s^2 would do"
         if best > 0.0
-        else f"lambda <= {(available - wanted) / tuning.gamma + tuning.robustness:.2f} m/s would do"
+        else f"lambda <= {(available - wanted) / tuning.gamma + tuning.lambda_:.2f} m/s would do"
     )
     return _finding(
         "actuation",
@@ -126,17 +126,12 @@ def _actuation(
 
 
 def _room_in_sphere(tuning: BarrierTuning, radius: float) -> Finding:
-    knee = tuning.alpha / tuning.slope**2
-    at_centre = (
-        tuning.slope * radius
-        if radius < knee
-        else math.sqrt(2.0 * tuning.alpha * (radius - 0.5 * knee))
-    )
+    at_centre = tuning.approach_speed(radius)
     return _finding(
         "sphere",
-        at_centre >= tuning.robustness,
+        at_centre >= tuning.lambda_,
         f"h2a and h2b at the centre are S(r) = {at_centre:.3f} m/s and lambda is "
-        f"{tuning.robustness:.3f}",
+        f"{tuning.lambda_:.3f}",
         f"lambda <= {at_centre:.3f} m/s or r >= {stand_off(tuning):.3f} m would do",
     )
 
@@ -197,12 +192,12 @@ def _snap(config: FlightConfig, loop: Tube, surroundings: Surroundings) -> Findi
 
 def _sampled(tuning: BarrierTuning, surroundings: Surroundings, period: float) -> Finding:
     least = sampled_robustness(tuning, surroundings.disturbance, period)
-    margin = (tuning.robustness - least) / tuning.slope
+    margin = (tuning.lambda_ - least) / tuning.slope
     return _finding(
         "sampled",
-        tuning.robustness >= least,
+        tuning.lambda_ >= least,
         f"rejecting {surroundings.disturbance:g} m/s^2 by planning alone needs lambda >= "
-        f"d (1 + k_S T/2) / gamma = {least:.3f} m/s and lambda is {tuning.robustness:.3f}: margin "
+        f"d (1 + k_S T/2) / gamma = {least:.3f} m/s and lambda is {tuning.lambda_:.3f}: margin "
         f"{margin * 1e3:+.0f} mm",
         f"lambda = {least:.3f} m/s would do",
         refuses=False,

@@ -5,17 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 from fsw.control.cascade import Inner
-from fsw.control.inner_tuning import InnerTuning
+from fsw.control.gains import InnerTuning
 from fsw.geometry.geodesy import DEFAULT_ORIGIN
 from fsw.model.airframe import AIRFRAME, Airframe
 from fsw.model.battery import BatteryModel
-from fsw.mpc.planner_config import PlannerConfig, Solver
+from fsw.mpc.planner_config import PlannerConfig
+from fsw.mpc.solvers import SOLVERS
 from fsw.mpc.variants import VARIANTS
 from fsw.periods import TICK_US
 from fsw.signals import Origin
 
 CONTROLLERS = tuple(VARIANTS)
-SOLVERS: tuple[Solver, ...] = ("clarabel", "slsqp")
 INNERS: tuple[Inner, ...] = ("tracking", "pid")
 
 
@@ -29,7 +29,7 @@ class FlightLimits:
     climb_speed: float = 0.4  # m/s
     land_speed: float = 0.25  # m/s
     landed_height: float = 0.1  # m above standing; the origin's height is known no better
-    airborne_height: float = 0.3  # m above standing; lower and not landed: nobody knows
+    airborne_height: float = 0.3  # m above standing; lower and not landed: unknown
     landed_speed: float = 0.05  # m/s
     landed_time_us: int = 500_000  # at rest this long
     idle_thrust: float = 0.8  # N a rotor while armed on the ground
@@ -119,7 +119,7 @@ def flight_config(
     inner: Inner = "tracking",
     robustness: str = "consistent",
     *,
-    solver: Solver = "clarabel",
+    solver: str = "clarabel",
     soft: bool = False,
 ) -> FlightConfig:
     """The configuration of a controller, an inner loop, a lambda and a solver, by name.
@@ -141,7 +141,7 @@ def flight_config(
     if wanted is not None:
         planner = replace(
             planner,
-            walls=replace(planner.walls, robustness=wanted),
-            workspace=replace(planner.workspace, robustness=wanted),
+            walls=replace(planner.walls, lambda_=wanted),
+            workspace=replace(planner.workspace, lambda_=wanted),
         )
     return FlightConfig(controller=controller, inner=inner, planner=planner, soft=soft)

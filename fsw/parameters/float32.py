@@ -10,11 +10,11 @@ import numpy as np
 
 
 def nearest_decimal(value: float) -> float:
-    """The number with the fewest digits that is the same REAL32; NaN and infinity stay."""
+    """The shortest decimal with the REAL32 of ``value`` [any unit]; NaN and infinity stay."""
     with np.errstate(over="ignore"):
         return float(str(np.float32(value)))
 
 
 def as_text(value: float) -> str:
-    """The same as text, without an exponent where that is short."""
+    """``value`` [any unit] as text, without an exponent where that is short."""
     return f"{nearest_decimal(value):.9g}"

@@ -84,7 +84,7 @@ def as_parm(values: Mapping[str, float]) -> str:
 
 
 def save(path: Path, values: Mapping[str, float]) -> None:
-    """Write a file, whole or not at all: whoever reads it meanwhile finds the old one.
+    """Write a file, atomically: a concurrent reader finds the old one.
 
     Args:
         path: ``.parm`` makes it MAVProxy's format, anything else QGroundControl's.

@@ -2,7 +2,7 @@
 
 A change passes four stages: its range is checked at once; its flight loop is designed in a thread,
 because that takes longer than a tick; a tick takes it over or refuses it; and it is written to the
-file, again in the thread, before anybody is told that it holds. One change at a time is under way,
+file, again in the thread, before it is confirmed. One change at a time is under way,
 the others wait, and every link hears of each.
 """
 
@@ -26,7 +26,7 @@ Save = Callable[[Mapping[str, float]], None]
 """Writes all values down; raises OSError."""
 
 WAITING: Final = 64  # changes; a client sends one at a time and repeats it
-# Between two changes: whoever sends nothing but changes gets a third of a core, not all of it.
+# Between two changes: a flood of changes gets a third of a core, not all of it.
 REST_TICKS: Final = 10
 
 
@@ -54,7 +54,7 @@ class ParameterStore:
         """Start with the values of a configuration.
 
         Args:
-            config: What flies before anybody changes it.
+            config: The configuration at start.
             prepare: Called in the executor's thread.
         """
         self.defaults: Final[Mapping[str, float]] = {p.name: p.read(config) for p in PARAMETERS}
@@ -110,7 +110,7 @@ class ParameterStore:
         return self._listeners[-1]
 
     def change(self, name: str, value: float, asker: Listener) -> str | None:
-        """Ask for a value; the asker hears of it whatever comes of it.
+        """Request a ``value`` [unit of the parameter]; the asker is told the outcome.
 
         Returns:
             Why it cannot be, where that is clear at once.
@@ -183,7 +183,7 @@ class ParameterStore:
         self._tell(change.parameter.name)
 
     def _drop(self, change: _Change) -> None:
-        """The asker is shown what holds; nobody else has lost anything."""
+        """Show the asker the value in use; other listeners are not affected."""
         change.asker.changed[change.parameter.name] = None
         self._change = None
 

@@ -12,7 +12,6 @@ from fsw.flight.tuned_autopilot import TunedAutopilot
 from fsw.geometry.geodesy import DEFAULT_ORIGIN, to_local
 from fsw.link.services.mission_store import MissionStore, Site
 from fsw.mpc.planner import Planner
-from fsw.mpc.planner_config import Solver
 from fsw.parameters.control_choice import ControlChoice
 from fsw.parameters.flat import flat
 from fsw.parameters.flight_config import FlightConfig, flight_config
@@ -36,7 +35,7 @@ def flight_software(
         choice.controller,
         cast(Inner, choice.inner),
         choice.lambda_,
-        solver=cast(Solver, choice.solver),
+        solver=choice.solver,
         soft=choice.allow_inconsistent,
     )
     config = replace(config, origin=origin)
@@ -54,13 +53,13 @@ def flight_software(
         )
     )
     return FlightProgram(
-        vehicle_facts(config),
-        FlightState(),
-        flight.tick,
-        planner,
-        parameters,
-        missions,
-        flat(config),
+        facts=vehicle_facts(config),
+        first_state=FlightState(),
+        tick=flight.tick,
+        planner=planner,
+        parameters=parameters,
+        missions=missions,
+        numbers=flat(config),
     )
 
 

@@ -94,7 +94,9 @@ def _difference(
     except Exception as error:  # of a tick that was flown, whatever its inputs look like
         raised = f"{type(error).__name__}: {error}"
         t_us = logged.inputs.sensors.t_us
-        return Difference(logged.index, t_us, "the tick", "flown", raised)
+        return Difference(
+            tick=logged.index, t_us=t_us, field="the tick", logged="flown", replayed=raised
+        )
     return first_difference(logged, bytes(out))
 
 

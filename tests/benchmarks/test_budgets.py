@@ -13,12 +13,12 @@ from pathlib import Path
 import pytest
 
 from benchmarks.bare_loop import BareLoops
-from benchmarks.budgets import Noise, judge, load_budgets, verdict
+from benchmarks.budgets import MachineNoise, judge, load_budgets, result
 from benchmarks.loop import main
 from fsw.runtime.clock import now_us
 
 BUDGETS = load_budgets()
-QUIET = Noise(others=0.05, stolen=0.0)
+QUIET = MachineNoise(others=0.05, stolen=0.0)
 AT_BUDGET = {group: dict(values) for group, values in BUDGETS.items()}
 
 
@@ -29,28 +29,33 @@ def test_every_budget_of_the_file_is_judged() -> None:
 def test_at_its_budget_everything_is_kept() -> None:
     rows = judge(AT_BUDGET, BUDGETS)
     assert all(row.kept for row in rows)
-    assert verdict(rows, QUIET) == "pass"
+    assert result(rows, QUIET) == "pass"
 
 
 @pytest.mark.parametrize("group", sorted(BUDGETS))
 def test_one_figure_above_its_budget_is_no_pass(group: str) -> None:
     key = next(iter(BUDGETS[group]))
     measured = {**AT_BUDGET, group: {**AT_BUDGET[group], key: BUDGETS[group][key] + 1.0}}
-    assert verdict(judge(measured, BUDGETS), QUIET) == "over budget"
+    assert result(judge(measured, BUDGETS), QUIET) == "over budget"
 
 
 @pytest.mark.parametrize("value", [None, float("nan")])
 def test_what_was_not_measured_is_not_kept(value: float | None) -> None:
     measured = {**AT_BUDGET, "wake_up": {"p50_us": 1.0, "p99_us": value}}
-    assert verdict(judge(measured, BUDGETS), QUIET) == "over budget"
+    assert result(judge(measured, BUDGETS), QUIET) == "over budget"
 
 
 @pytest.mark.parametrize(
     "noise",
-    [Noise(0.5, 0.0), Noise(0.0, 0.1), Noise(float("nan"), 0.0), Noise(0.0, 0.0, stopped=0.001)],
+    [
+        MachineNoise(0.5, 0.0),
+        MachineNoise(0.0, 0.1),
+        MachineNoise(float("nan"), 0.0),
+        MachineNoise(0.0, 0.0, stopped=0.001),
+    ],
 )
-def test_on_a_noisy_machine_there_is_no_pass_and_no_fail(noise: Noise) -> None:
-    assert verdict(judge(AT_BUDGET, BUDGETS), noise) == "too noisy"
+def test_on_a_noisy_machine_there_is_no_pass_and_no_fail(noise: MachineNoise) -> None:
+    assert result(judge(AT_BUDGET, BUDGETS), noise) == "too noisy"
 
 
 def test_a_loop_that_only_sleeps_sees_the_machine_stand_still_and_leaves_nothing() -> None:
@@ -80,7 +85,7 @@ def test_a_short_flight_beside_a_busy_program_is_measured_and_leaves_nothing(
     target = tmp_path / "loop.json"
     code = main(["--duration", "2", "--hogs", "1", "--json", str(target)])
     (flight,) = json.loads(target.read_text())["flights"]
-    assert code == (0 if flight["verdict"] == "pass" else 1)
+    assert code == (0 if flight["result"] == "pass" else 1)
     assert flight["hogs"] == 1
     assert flight["vehicle"]["inner"]["ticks"] > 900
     measured = {name: figure["value"] for name, figure in flight["figures"].items()}

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from benchmarks.flood import Row, correctness, fly
+from benchmarks.flood import Requirement, correctness, measure
 from benchmarks.flood_traffic import KINDS, out_of_range
 from messages.frames import FrameWriter, Losses, split
 from pandion.display import Display
@@ -24,7 +24,7 @@ def test_only_what_asks_for_nonsense_is_a_valid_frame(kind: object) -> None:
 
 @pytest.mark.long
 def test_nothing_invalid_is_believed_and_the_vehicle_stays_in_touch() -> None:
-    flight = fly(1.5, flooded=True, display=Display(sys.stderr))
+    flight = measure(1.5, flooded=True, display=Display(sys.stderr))
     assert flight.sent > 0.5 * 1.5 * 5000.0
     assert [row for row in correctness(flight) if not row.passed] == []
     assert flight.vehicle["links"]["gcs"]["false_starts"] > 0.3 * flight.sent
@@ -35,4 +35,4 @@ def test_nothing_invalid_is_believed_and_the_vehicle_stays_in_touch() -> None:
 
 
 def test_a_figure_that_is_missing_does_not_pass() -> None:
-    assert not Row("gap", float("nan"), 1.5, "s").passed
+    assert not Requirement("gap", float("nan"), 1.5, "s").passed

@@ -73,7 +73,7 @@ def test_factor_ratio_and_stages_come_from_both_halves(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     factors = iter([24.0, 12.0, 30.0, 10.0, 27.0, 9.0])  # ours and the peer's take turns
-    monkeypatch.setattr(lockstep, "_fly", lambda *_: _flown(next(factors)))
+    monkeypatch.setattr(lockstep, "_measure_one", lambda *_: _flown(next(factors)))
     assert lockstep.main([]) == 0
     said = capsys.readouterr().out
     assert "median 27.0, best 30.0" in said
@@ -83,5 +83,5 @@ def test_factor_ratio_and_stages_come_from_both_halves(
 
 
 def test_too_slow_is_an_exit_code(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(lockstep, "_fly", lambda *_: _flown(24.9))
+    monkeypatch.setattr(lockstep, "_measure_one", lambda *_: _flown(24.9))
     assert lockstep.main(["--rounds", "1"]) == 1

@@ -7,8 +7,9 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
+
+from tests.waiting import becomes
 
 PANDION = [sys.executable, "-m", "pandion"]
 
@@ -58,12 +59,11 @@ def read_until(process: subprocess.Popen[str], word: str) -> str:
 
 def group_is_empty(leader: int, patience_s: float = 2.0) -> bool:
     """True once no process of the leader's group is left."""
-    until = time.monotonic() + patience_s
-    while time.monotonic() < until:
-        if not any(_lives_in(leader, entry) for entry in Path("/proc").iterdir()):
-            return True
-        time.sleep(0.02)
-    return False
+
+    def is_empty() -> bool:
+        return not any(_lives_in(leader, entry) for entry in Path("/proc").iterdir())
+
+    return becomes(is_empty, patience_s)
 
 
 def _lives_in(group: int, entry: Path) -> bool:

@@ -1,4 +1,4 @@
-"""One process stands still or is gone: both are gone in two seconds, and the end names the step."""
+"""One half stands still or is gone: both are gone in two seconds, and the end names the step."""
 
 from __future__ import annotations
 
@@ -13,9 +13,10 @@ import pytest
 
 from tests.cli.command import clean_up, group_is_empty, read_until, start
 from tests.processes.halves import free_port
+from tests.waiting import LostTime
 
 PROMISED_S = 2.0  # from the stall to the end of `pandion fly`, verdict included
-TRIES = 3  # a machine that is itself stopped for a while is asked again
+TRIES = 3  # a tenth of a second before the end is hard to hit
 
 
 def half_of(parent: int, module: str) -> int:
@@ -43,11 +44,13 @@ def flying(out: Path, *options: str, duration: str = "8") -> subprocess.Popen[st
 
 
 def end_of(flight: subprocess.Popen[str], half: str, number: signal.Signals) -> tuple[float, str]:
-    """Send a signal to a process; returns the seconds until nothing runs, and what was said."""
-    begin_s = time.monotonic()
-    os.kill(half_of(flight.pid, half), number)
-    assert flight.wait(timeout=20.0) == 1
-    took_s = time.monotonic() - begin_s
+    """Send a signal to a half; returns the seconds until nothing runs, and what was said."""
+    with LostTime() as lost:
+        begin_s = time.monotonic()
+        os.kill(half_of(flight.pid, half), number)
+        assert flight.wait(timeout=20.0) == 1
+        took_s = time.monotonic() - begin_s
+    took_s -= 2.0 * lost.seconds  # two of our processes end one after the other, and lose it both
     assert group_is_empty(flight.pid)
     assert flight.stdout is not None
     return took_s, flight.stdout.read()
@@ -72,19 +75,14 @@ NOT_SENT = r"FAIL fsw: the simulator sent nothing for .* after step \d{3,}; sitl
 def test_a_stall_of_a_half_ends_both_in_time_and_names_the_step(
     pace: tuple[str, ...], half: str, number: signal.Signals, sentence: str, tmp_path: Path
 ) -> None:
-    took_s = []
-    for attempt in range(TRIES):
-        flight = flying(tmp_path / f"{attempt}", *pace)
-        try:
-            seconds, said = end_of(flight, half, number)
-        finally:
-            clean_up(flight)
-        assert re.search(sentence, said), said
-        assert "Traceback" not in said
-        took_s.append(seconds)
-        if seconds <= PROMISED_S:
-            return
-    raise AssertionError(f"{took_s} s, and {PROMISED_S} s are promised")
+    flight = flying(tmp_path / "out", *pace)
+    try:
+        took_s, said = end_of(flight, half, number)
+    finally:
+        clean_up(flight)
+    assert re.search(sentence, said), said
+    assert "Traceback" not in said
+    assert took_s <= PROMISED_S
 
 
 def test_a_stall_shortly_before_the_end_is_no_pass(tmp_path: Path) -> None:

@@ -24,18 +24,16 @@ from fsw.signals import (
     Mode,
     Plan,
     PlanFailure,
-    PointObstacle,
-    SafeSet,
+    PlanRequest,
     SensorFrame,
     TickInputs,
     TickOutputs,
-    Wall,
-    WorkspaceSphere,
 )
 from fsw.tuning import Tuning
 from sitl.scenario import Hold, Pilot, Scenario, Start
-from sitl.sensors.suite import SensorReadings
-from sitl.simulation import START_US, STEP_US, Controls, Simulation
+from sitl.simulation import STEP_US, Simulation
+from studies.closed_loop import ClosedLoop
+from studies.mission import safe_set
 
 ARM, TAKEOFF, LAND, SET_MODE = 400, 22, 21, 176
 TARGET_PERIOD_US = 100_000
@@ -97,9 +95,13 @@ class Flight:
         self.sim = Simulation(self.scenario, self.seed)
         self.loop = TunedAutopilot(self.config)
         self.planner = self.planner or real_planner(self.config)
+        self.closed = ClosedLoop(self.sim, self._tick, None, Late(self), self.config.airframe)
         self.inputs: TickInputs | None = None  # of the last tick
         self._outputs: TickOutputs | None = None
-        self._answer: tuple[int, Plan | PlanFailure] | None = None
+
+    def _tick(self, _: None, inputs: TickInputs) -> tuple[None, TickOutputs]:
+        self.state, outputs = self.loop.tick(self.state, inputs)
+        return None, outputs
 
     @property
     def outputs(self) -> TickOutputs:
@@ -130,12 +132,12 @@ class Flight:
 
     def step(self, *commands: Command, tuning: Tuning | None = None) -> TickOutputs:
         """Sense, tick, plan, advance."""
-        sensors = self.spoil(frame(self.sim.sense()))
+        sensors = self.spoil(self.closed.sense())
         self.inputs = TickInputs(
             sensors,
-            self._due(sensors.t_us),
+            self.closed.planner.take(sensors.t_us),
             commands,
-            self._targets(),
+            self.targets(),
             safe_set(self.scenario) if self.announces and self.sim.step == 0 else None,
             tuning=tuning,
             mission=self.upload,
@@ -145,55 +147,42 @@ class Flight:
             self.inputs = replace(self.inputs, **self.streamed)
         return self.fly(self.inputs)
 
+    def targets(self) -> tuple[EndEffectorTarget, ...]:
+        return self.closed.targets() if self.scenario.pilot.plan == "trajectory" else ()
+
     def fly(self, inputs: TickInputs) -> TickOutputs:
         """Tick, plan, advance, with inputs from somewhere else."""
         before = self.mode
-        self.state, outputs = self.loop.tick(self.state, inputs)
-        self._outputs = outputs
-        self._submit(outputs)
+        outputs = self._outputs = self.closed.fly(inputs)
         self.texts += [text.text for text in outputs.texts]
         self.results += [(ack.command, ack.result) for ack in outputs.acks]
         if self.mode is not before:
             self.modes.append(self.mode)
         self.sent.append(outputs.actuators)
-        self.sim.advance(self._controls(outputs))
         return outputs
 
-    def _submit(self, outputs: TickOutputs) -> None:
-        request = outputs.plan_request
-        if request is not None and self.planner is not None:
-            due_us = request.t_apply_us + STEP_US * self.late_ticks(request.plan_id)
-            self._answer = (due_us, self.planner.plan(request))
 
-    def _due(self, t_us: int) -> Plan | PlanFailure | None:
+class Late:
+    """The planner of a flight; each plan comes as many ticks late as the flight says."""
+
+    def __init__(self, flight: Flight) -> None:
+        self._flight = flight
+        self._answer: tuple[int, Plan | PlanFailure] | None = None
+
+    def submit(self, request: PlanRequest) -> None:
+        flight = self._flight
+        assert flight.planner is not None
+        due_us = request.t_apply_us + STEP_US * flight.late_ticks(request.plan_id)
+        self._answer = (due_us, flight.planner.plan(request))
+
+    def take(self, t_us: int) -> Plan | PlanFailure | None:
         if self._answer is None or t_us < self._answer[0]:
             return None
         answer, self._answer = self._answer[1], None
         return answer
 
-    def _targets(self) -> tuple[EndEffectorTarget, ...]:
-        """A stream that stays two seconds ahead, as the scenario's pilot sends it."""
-        start_us = self.sim.trajectory_start_us
-        if self.scenario.pilot.plan != "trajectory" or start_us is None:
-            return ()
-        points, rest = divmod(self.sim.step * STEP_US, TARGET_PERIOD_US)
-        if self.sim.step == 0:
-            return tuple(
-                self._target(start_us + k * TARGET_PERIOD_US) for k in range(TARGETS_AHEAD)
-            )
-        if rest:
-            return ()
-        return (self._target(start_us + (TARGETS_AHEAD + points - 1) * TARGET_PERIOD_US),)
-
-    def _target(self, t_us: int) -> EndEffectorTarget:
-        point = self.sim.target_at(1e-6 * (t_us - START_US))
-        return EndEffectorTarget(t_us, point.p, point.v, point.a)
-
-    def _controls(self, outputs: TickOutputs) -> Controls:
-        airframe, sent = self.config.airframe, outputs.actuators
-        f1, f2, f3, f4 = (f / airframe.rotor_thrust_max for f in sent.rotor_thrust)
-        torque = tuple(t / airframe.joint_torque_max for t in sent.joint_torque)
-        return Controls((f1, f2, f3, f4), torque, outputs.snapshot.armed)
+    def close(self) -> None:
+        """Nothing to stop."""
 
 
 def command(
@@ -203,27 +192,3 @@ def command(
     p = (*params, *[float("nan")] * (7 - len(params)))
     values = (p[0], p[1], p[2], p[3], p[4], p[5], p[6])
     return read_command(CommandRequest(number, values, 255, 190, confirmation, frame), LOCATE)
-
-
-def frame(readings: SensorReadings) -> SensorFrame:
-    q1, q2 = readings.q_arm
-    qd1, qd2 = readings.qd_arm
-    return SensorFrame(
-        readings.t_us,
-        readings.p_WB,
-        readings.v_WB,
-        readings.q_WB,
-        readings.gyro_B,
-        readings.accel_B,
-        (q1, q2),
-        (qd1, qd2),
-    )
-
-
-def safe_set(scenario: Scenario) -> SafeSet:
-    walls = tuple(Wall(wall.normal, wall.offset_m, wall.clearance_m) for wall in scenario.walls)
-    obstacles = tuple(PointObstacle(one.position_m, one.clearance_m) for one in scenario.obstacles)
-    if scenario.workspace is None:
-        return SafeSet(walls, obstacles=obstacles)
-    centre = (0.0, 0.0, -scenario.workspace.d_iw_m)
-    return SafeSet(walls, WorkspaceSphere(centre, scenario.workspace.radius_m))

@@ -66,7 +66,7 @@ class ThroughTheWall(Flight):
 
     speed: float = 1.0
 
-    def _targets(self) -> tuple[EndEffectorTarget, ...]:
+    def targets(self) -> tuple[EndEffectorTarget, ...]:
         if self.sim.step % 50:
             return ()
         ahead = (self.sim.t_us + 100_000 * k for k in range(20))

@@ -8,47 +8,50 @@ deadline; a later one answers a question that was given up.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import pytest
 
 from fsw.flight.failsafe import Condition
 from fsw.model.airframe import GRAVITY
-from fsw.mpc.planner import Planner
 from fsw.parameters.flight_config import flight_config
-from fsw.signals import Mode, Plan, PlanFailure, PlanRequest, TickOutputs
+from fsw.signals import Mode, Plan, PlanFailure, PlanRequest
 from sitl.scenario_file import load_scenario
-from tests.closed_loop.harness import ARM, Flight, command, hover, real_planner
+from tests.closed_loop.harness import ARM, Flight, command, hover
 
 SLOW_FROM_S, SLOW_TO_S, END_S = 2.0, 4.0, 6.0
 
 
 @dataclass
 class OneAtATime:
-    """Answers when its time of work is over, counted in simulated time."""
+    """A flight's planner, which answers when its time of work is over, in simulated time."""
 
-    planner: Planner
-    takes_us: int = 0
+    flight: SlowFlight
     waiting: PlanRequest | None = None
     at_work: PlanRequest | None = None
     ready_us: int = 0
 
-    def submit(self, request: PlanRequest, now_us: int) -> None:
+    def submit(self, request: PlanRequest) -> None:
         self.waiting = request
-        self._begin(now_us)
+        self._begin(self.flight.sim.t_us)
 
-    def take(self, now_us: int) -> Plan | PlanFailure | None:
+    def take(self, t_us: int) -> Plan | PlanFailure | None:
         request = self.at_work
-        if request is None or now_us < max(self.ready_us, request.t_apply_us):
+        if request is None or t_us < max(self.ready_us, request.t_apply_us):
             return None
         self.at_work = None
-        self._begin(now_us)
-        return self.planner.plan(request)
+        self._begin(t_us)
+        assert self.flight.planner is not None
+        return self.flight.planner.plan(request)
+
+    def close(self) -> None:
+        """Nothing to stop."""
 
     def _begin(self, now_us: int) -> None:
+        slow = SLOW_FROM_S <= self.flight.sim.time_s < SLOW_TO_S
         if self.at_work is None and self.waiting is not None:
             self.at_work, self.waiting = self.waiting, None
-            self.ready_us = now_us + self.takes_us
+            self.ready_us = now_us + (1000 * self.flight.takes_ms if slow else 1000)
 
 
 @dataclass
@@ -56,20 +59,10 @@ class SlowFlight(Flight):
     """A flight whose planner is slow for a while."""
 
     takes_ms: int = 1
-    service: OneAtATime = field(init=False)
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self.service = OneAtATime(real_planner(self.config))
-
-    def _due(self, t_us: int) -> Plan | PlanFailure | None:
-        slow = SLOW_FROM_S <= self.sim.time_s < SLOW_TO_S
-        self.service.takes_us = 1000 * self.takes_ms if slow else 1000
-        return self.service.take(t_us)
-
-    def _submit(self, outputs: TickOutputs) -> None:
-        if outputs.plan_request is not None:
-            self.service.submit(outputs.plan_request, outputs.snapshot.t_us)
+        self.closed.planner = OneAtATime(self)
 
 
 @pytest.mark.parametrize(

@@ -51,9 +51,10 @@ def test_a_target_that_is_no_number_does_not_keep_the_vehicle_from_landing(
     flight = Flight(load_scenario("workspace-calm"))
     flight.follow()
     flight.run(1.0)
-    real = flight._target
+    real = flight.targets
+    nowhere = (math.nan, 0.0, 0.0)
     monkeypatch.setattr(
-        flight, "_target", lambda t_us: replace(real(t_us), p_WE=(math.nan, 0.0, 0.0))
+        flight, "targets", lambda: tuple(replace(one, p_WE=nowhere) for one in real())
     )
     flight.run(3.0)
     height = flight.sim.truth().p_WB[2]

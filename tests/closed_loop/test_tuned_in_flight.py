@@ -19,15 +19,15 @@ from tests.closed_loop.harness import real_planner as planner_of
 SOFTER_JOINTS: Tuning = (("tuning.joint.kp", 380.0),)
 EVERYTHING: Tuning = (
     ("planner.weights.tracking", 12.0),
-    ("planner.walls.robustness", 0.33),
+    ("planner.walls.lambda_", 0.33),
     ("tuning.yaw.kp", 6.0),
     ("tuning.joint.kp", 380.0),
-    ("tuning.tracking.effort", 1.3e-7),
+    ("tuning.tracking.input_weight", 1.3e-7),
     ("tuning.tracking.observer_bandwidth", 120.0),
     ("limits.climb_speed", 0.3),
     ("upset_distance", 0.2),
 )
-TOO_LITTLE_KEPT: Tuning = (("planner.walls.robustness", 0.1),)
+TOO_LITTLE_KEPT: Tuning = (("planner.walls.lambda_", 0.1),)
 
 
 def beside_walls(seconds: float = 1.0) -> Flight:
@@ -90,7 +90,7 @@ def test_the_planner_hears_of_a_change_with_the_question_of_that_tick() -> None:
     while outputs.plan_request is None:
         outputs = flight.step()
     request = outputs.plan_request
-    assert dict(request.tuning) == {"weights.tracking": 12.0, "walls.robustness": 0.33}
+    assert dict(request.tuning) == {"weights.tracking": 12.0, "walls.lambda_": 0.33}
     assert flight.planner is not None
     answer, expected = flight.planner.plan(request), tuned_planner.plan(replace(request, tuning=()))
     untuned = planner_of(flight_config()).plan(replace(request, tuning=()))
@@ -164,7 +164,7 @@ def test_what_is_broken_already_may_be_mended_in_steps() -> None:
     strict = TunedAutopilot(flight_config())
     assert flight.inputs is not None
     _, outputs = strict.tick(
-        flight.state, replace(flight.inputs, tuning=(("planner.walls.robustness", 0.15),))
+        flight.state, replace(flight.inputs, tuning=(("planner.walls.lambda_", 0.15),))
     )
     assert outputs.tuning_taken is True
 
@@ -175,8 +175,8 @@ def test_walls_are_kept_whatever_harmless_is_changed_in_flight() -> None:
     harmless: list[Tuning] = [
         (("planner.weights.tracking", 15.0), ("planner.weights.velocity", 3.0)),
         (("tuning.yaw.kp", 5.0), ("tuning.joint.kp", 450.0)),
-        (("planner.walls.robustness", 0.36), ("planner.limits.joint_acc", 8.0)),
-        (("tuning.tracking.effort", 1.4e-7),),
+        (("planner.walls.lambda_", 0.36), ("planner.limits.joint_acc", 8.0)),
+        (("tuning.tracking.input_weight", 1.4e-7),),
         (("tuning.tracking.observer_bandwidth", 120.0),),
         (),
     ]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import pytest
 
@@ -121,6 +122,8 @@ class OnePush:
     torque: bool
     first: int
     last: int
+    name: str = "one push"
+    kind: str = "push"
 
     def sample(self, step: int) -> tuple[float, float, float]:
         return self.value if self.first <= step <= self.last else (0.0, 0.0, 0.0)
@@ -137,10 +140,12 @@ class OnePush:
     ],
 )
 def test_a_hard_push_is_recovered_from(
-    value: tuple[float, float, float], torque: bool, felt: float
+    value: tuple[float, float, float], torque: bool, felt: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    flight = Flight(hover())
-    flight.sim._pushes.append(OnePush(value, torque, 100, 175))
+    # A disturbance of a kind that no scenario can name.
+    monkeypatch.setattr("sitl.simulation.push", lambda item, seed, step_s: item)
+    push: Any = OnePush(value, torque, 100, 175)
+    flight = Flight(replace(hover(), disturbances=(push,)))
     flight.step(command(ARM, 1.0))
     held = flight.sim.truth().p_WE
     farthest = 0.0

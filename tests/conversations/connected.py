@@ -37,7 +37,7 @@ from fsw.ports import LoopHealth
 from fsw.runtime.assembly import vehicle_facts
 from messages import dialect
 from messages.frames import as_version_1
-from tests.closed_loop.harness import Flight, frame, on_the_ground
+from tests.closed_loop.harness import Flight, on_the_ground
 
 Message = Any
 TICK_S = 0.002
@@ -106,10 +106,10 @@ class Connected:
 
     def _step(self) -> None:
         flight, inbox = self.flight, self.inbox
-        sensors = frame(flight.sim.sense())
+        sensors = flight.closed.sense()
         tuning = self.parameters.take_tuning()
         inputs = inbox.take_inputs(
-            sensors, flight._due(sensors.t_us), tuning, self.missions.take_update()
+            sensors, flight.closed.planner.take(sensors.t_us), tuning, self.missions.take_update()
         )
         outputs = flight.fly(inputs)
         self.missions.observe(outputs.snapshot)

@@ -118,5 +118,5 @@ def test_the_barrier_constants_on_the_page_are_those_that_are_flown() -> None:
     text = (DOCS / "equations.md").read_text(encoding="utf-8")
     config = PlannerConfig()
     for name, tuning in (("walls", config.walls), ("sphere", config.workspace)):
-        cells = (tuning.alpha, tuning.slope, tuning.gamma, tuning.robustness)
+        cells = (tuning.alpha, tuning.slope, tuning.gamma, tuning.lambda_)
         assert f"| {name} | " + " | ".join(f"{value:g}" for value in cells) + " |" in text

@@ -10,6 +10,8 @@ from typing import Any
 
 from mavsdk import ComponentType, Configuration, Mavsdk, System
 
+from tests.waiting import becomes
+
 CONNECT_S = 120.0  # the first start of the vehicle compiles
 
 
@@ -28,12 +30,7 @@ def connected(port: int) -> Iterator[System]:
 
 def eventually(true: Callable[[], bool], patience_s: float = 10.0) -> bool:
     """Whether something becomes true."""
-    until = time.monotonic() + patience_s
-    while time.monotonic() < until:
-        if true():
-            return True
-        time.sleep(0.02)
-    return true()
+    return becomes(true, patience_s)
 
 
 def finished(begin: Callable[..., None], *arguments: object, patience_s: float = 30.0) -> str:

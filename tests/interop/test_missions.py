@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Iterator
 
 import pytest
@@ -110,4 +109,3 @@ def test_a_mission_is_uploaded_flown_and_told_of(system: System) -> None:
     mission.clear_mission()
     action.land()
     assert eventually(lambda: not telemetry.armed(), 60.0)
-    time.sleep(0.1)

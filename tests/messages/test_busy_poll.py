@@ -64,13 +64,24 @@ def test_looking_in_vain_is_given_up_for_a_while_and_tried_again() -> None:
     assert looked[5010:5013] == [True, True, False]
 
 
+class LateOnceInFifty(Slow):
+    """A socket of which forty-nine datagrams in fifty are there at the first look."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.received = 0
+
+    def recv(self, size: int, flags: int = 0) -> bytes:
+        if self.received % 50 == 49:
+            datagram = super().recv(size, flags)
+        else:
+            assert flags & socket.MSG_DONTWAIT, "it has given up looking"
+            datagram = b"there"
+        self.received += 1
+        return datagram
+
+
 def test_one_late_answer_in_fifty_does_not_end_the_looking() -> None:
-    one, other = connected()
-    receive = BusyPollReceiver(one, 100)
-    for _ in range(20):
-        for _ in range(49):
-            other.send(b"x")
-            receive()
-        with pytest.raises(BlockingIOError):
-            receive()
-    assert not receive._rest
+    receive = BusyPollReceiver(LateOnceInFifty(), 100)  # type: ignore[arg-type]
+    answers = [receive() for _ in range(1000)]
+    assert answers.count(b"late") == 20

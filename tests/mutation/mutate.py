@@ -132,6 +132,9 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("files", nargs="*", help="files, folders (default: those of mutation.toml)")
     parser.add_argument("--sample", type=int, help="mutants of each file (default: all)")
     parser.add_argument("--seed", type=int, default=1, help="of the sample (default: 1)")
+    parser.add_argument(
+        "--budget", type=float, default=20.0, help="of the tests of a module [s] (default: 20)"
+    )
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     parser.add_argument("--check", action="store_true", help="check the list of equivalents only")
     parser.add_argument(
@@ -143,7 +146,8 @@ def _arguments() -> argparse.Namespace:
 def _drawn(every: tuple[Mutant, ...], module: str, size: int | None, seed: int) -> list[Mutant]:
     if size is None or size >= len(every):
         return list(every)
-    drawn = random.Random(f"{seed} {module}").sample(every, size)
+    # A larger sample begins with the smaller one: what is known of it stays of use.
+    drawn = random.Random(f"{seed} {module}").sample(every, len(every))[:size]
     return sorted(drawn, key=lambda mutant: (mutant.number, mutant.occurrence))
 
 
@@ -159,7 +163,7 @@ class Run:
         self._extra = config["extra_tests"]
         self._equivalents = _equivalents(self._copy, config.get("equivalent", []))
         self.modules = self._copy.modules(options.files or config["folders"])
-        self._tests = Tests(work, self._copy)
+        self._tests = Tests(work, self._copy, options.budget)
         self._results = Results(work, self._copy)
         self.report = Report()
         self._started = time.monotonic()

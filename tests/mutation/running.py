@@ -21,7 +21,6 @@ from tests.mutation.mutants import OPERATORS, Mutant
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
 EACH = 5.0  # s, the longest a single test may take in plain Python
-ALL = 20.0  # s, and all tests of a module; unit tests first, and the quickest
 
 
 class Copy:
@@ -109,8 +108,16 @@ class Selection:
 class Tests:
     """The warm process that runs tests in the copy."""
 
-    def __init__(self, work: Path, copy: Copy) -> None:
-        self._copy = copy
+    def __init__(self, work: Path, copy: Copy, budget: float) -> None:
+        """Start it.
+
+        Args:
+            work: Where results are kept.
+            copy: What the tests run in.
+            budget: The most that the tests of a module may take [s]: unit tests first, and the
+                quickest.
+        """
+        self._copy, self._budget = copy, budget
         self._process = subprocess.Popen(
             [ROOT / ".venv/bin/python", HERE / "warm_pytest.py"],
             cwd=copy.path, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
@@ -134,7 +141,7 @@ class Tests:
             ]
         total, used = 0.0, set()
         for _, seconds, name, file in sorted(fit):
-            if total + seconds <= ALL:
+            if total + seconds <= self._budget:
                 total += seconds
                 used.add(file)
             else:
@@ -151,7 +158,7 @@ class Tests:
         try:
             answer = self._run(
                 tests=selection.files, deselect=selection.left_out,
-                timeout=10.0 + 4.0 * selection.seconds, each=None, stop=True,
+                timeout=30.0 + 10.0 * selection.seconds, each=None, stop=True,
             )  # fmt: skip
         finally:
             path.write_text(original)

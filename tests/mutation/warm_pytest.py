@@ -1,9 +1,10 @@
 """Run pytest again and again in forks of one process that has the libraries loaded.
 
 Reads one JSON request a line: ``tests`` (pytest's arguments), ``deselect`` (test ids), ``timeout``
-[s] for the whole run, ``each`` [s] for every test or null, ``stop`` (at the first failure).
-Answers one JSON object a line: ``failed`` (test ids), ``seconds`` (id to duration), ``status``.
-Runs in the environment of the tests, in the copy; nothing of the copy is loaded before a fork.
+[s] for the whole run, ``each`` [s] for every test or null, ``stop`` (at the first failure). Answers
+one JSON object a line: ``failed`` (test ids), ``seconds`` (of each id), ``status``. The time of a
+test is the processor's, which other work on the machine does not lengthen. Runs in the environment
+of the tests, in the copy; nothing of the copy is loaded before a fork.
 """
 
 from __future__ import annotations
@@ -60,17 +61,16 @@ class _Recorder:
         hypothesis.settings.load_profile("mutation")
 
     @pytest.hookimpl(wrapper=True)
-    def pytest_runtest_protocol(self) -> Any:
-        if self._each is None:
-            return (yield)
-        signal.setitimer(signal.ITIMER_REAL, self._each)
+    def pytest_runtest_protocol(self, item: pytest.Item) -> Any:
+        begin = time.process_time()
+        signal.setitimer(signal.ITIMER_PROF, self._each or 0.0)
         try:
             return (yield)
         finally:
-            signal.setitimer(signal.ITIMER_REAL, 0.0)
+            signal.setitimer(signal.ITIMER_PROF, 0.0)
+            self.seconds[item.nodeid] = time.process_time() - begin
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        self.seconds[report.nodeid] = self.seconds.get(report.nodeid, 0.0) + report.duration
         if report.failed and report.nodeid not in self.failed:
             self.failed.append(report.nodeid)
 
@@ -87,7 +87,7 @@ def _child(request: dict[str, Any], answer: int) -> None:
     os.setsid()
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     sys.path.insert(0, str(Path.cwd()))
-    signal.signal(signal.SIGALRM, _too_slow)
+    signal.signal(signal.SIGPROF, _too_slow)
     nowhere = os.open(os.devnull, os.O_RDWR)
     for standard in (0, 1, 2):
         os.dup2(nowhere, standard)

@@ -34,7 +34,7 @@ def test_equal_jobs_are_flown_once_and_answered_each(monkeypatch: pytest.MonkeyP
 
     monkeypatch.setattr(campaign_module, "outcome", count)
     told: list[tuple[int, int]] = []
-    rows = Campaign(0, report=lambda done, total: told.append((done, total))).fly(JOBS)
+    rows = Campaign(0, report=lambda done, total: told.append((done, total))).run(JOBS)
     assert flown == [1, 2]
     assert [row.seed for row in rows] == [1, 2, 1]
     assert told == [(0, 2), (1, 2), (2, 2)]
@@ -44,7 +44,7 @@ def test_a_journal_resumes_and_survives_a_line_cut_short(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     journal = tmp_path / "journal.jsonl"
-    first = Campaign(0, journal).fly(JOBS[:1])
+    first = Campaign(0, journal).run(JOBS[:1])
     with journal.open("a") as lines:
         lines.write('{"key": "cut sh')
     flown = []
@@ -54,10 +54,10 @@ def test_a_journal_resumes_and_survives_a_line_cut_short(
         return Outcome(job.seed, completed=False, reason="")
 
     monkeypatch.setattr(campaign_module, "outcome", count)
-    rows = Campaign(0, journal).fly(JOBS)
+    rows = Campaign(0, journal).run(JOBS)
     assert flown == [2]
     assert rows[0] == first[0]
-    assert Campaign(0, journal).fly(JOBS) == rows
+    assert Campaign(0, journal).run(JOBS) == rows
     assert flown == [2]
 
 
@@ -71,10 +71,10 @@ class Deadly:
 
 def test_a_flight_that_kills_its_process_is_a_row_and_the_others_are_flown() -> None:
     deadly = replace(JOBS[0], config=cast(FlightConfig, Deadly()))
-    dead, alive = Campaign(1).fly([deadly, JOBS[1]])
+    dead, alive = Campaign(1).run([deadly, JOBS[1]])
     assert dead.error
     assert "died" in dead.reason
-    (here,) = Campaign(0).fly(JOBS[1:2])
+    (here,) = Campaign(0).run(JOBS[1:2])
     assert (alive.te_m, alive.margin_m, alive.ce_sum) == (here.te_m, here.margin_m, here.ce_sum)
 
 

@@ -7,7 +7,6 @@ import json
 import mmap
 import os
 import threading
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -20,6 +19,7 @@ from fsw.runtime.process import settle_memory
 from fsw.runtime.rate_groups import RATE_GROUPS
 from messages.block_file import BlockFile
 from tests.fsw.link.snapshots import CONTEXT, outputs_at
+from tests.waiting import wait_for
 
 
 def test_what_is_refused_is_named_and_nothing_raises(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -145,9 +145,7 @@ def test_a_log_s_thread_leaves_its_rank_to_the_loop(tmp_path: Path) -> None:
         log.start_thread()
         log.put(b"a block")
         (thread,) = (one for one in threading.enumerate() if one is not threading.main_thread())
-        until = time.monotonic() + 5.0
-        while not log.size and time.monotonic() < until:
-            time.sleep(0.001)
+        wait_for(lambda: log.size)
         assert thread.native_id is not None
         return {"refused": refused, "policy": os.sched_getscheduler(thread.native_id)}
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fsw.barriers.root import BarrierTuning
-from fsw.barriers.soft_rows import TargetPoints
+from fsw.barriers.constraint_block import TargetPoints
+from fsw.barriers.safe_approach import BarrierTuning
 from fsw.model.airframe import AIRFRAME
 from fsw.model.linearisation import Linearisation
 from fsw.model.prediction import INPUTS, Array, condense
@@ -15,7 +15,7 @@ from tests.fsw.model.geometry_by_rotation import moved_on, tips_of_prediction
 from tests.fsw.random_states import prediction_vector
 
 NODES = 5
-TUNING = BarrierTuning(alpha=2.0, slope=4.0, gamma=3.0, robustness=0.3, skipped_nodes=1)
+TUNING = BarrierTuning(alpha=2.0, slope=4.0, gamma=3.0, lambda_=0.3, skipped_nodes=1)
 PERIOD = 0.1
 BETA = 1.0 - TUNING.gamma * PERIOD
 MODEL = condense(AIRFRAME, PERIOD, NODES)
@@ -53,7 +53,7 @@ def safe_speed(d: float) -> float:
 
 def lowest_allowed(h_start: float, node: int) -> float:
     """What the decay of eq 25 leaves of h at a node."""
-    return float(TUNING.robustness + BETA**node * (h_start - TUNING.robustness))
+    return float(TUNING.lambda_ + BETA**node * (h_start - TUNING.lambda_))
 
 
 def measured(horizon: Linearisation) -> tuple[Array, Array]:

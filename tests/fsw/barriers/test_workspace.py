@@ -88,7 +88,7 @@ def test_rows_equal_h_and_its_finite_difference_along_the_prediction(rho: float)
             for node in range(2, NODES + 1)
             for n in normals[node]
         ]
-        np.testing.assert_allclose(rows.required, required, atol=1e-12)
+        np.testing.assert_allclose(rows.lower_bound, required, atol=1e-12)
         for column in range(INPUTS * NODES):
             change = np.zeros(INPUTS * NODES)
             change[column] = STEP

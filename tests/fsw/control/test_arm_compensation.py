@@ -211,3 +211,18 @@ def test_far_off_the_plan_the_arm_goes_back_to_its_planned_pose_without_a_jump()
             assert q_arm == pytest.approx(plan.q_arm)
             assert rates == pytest.approx((0.0, 0.0), abs=1e-12)
     assert np.abs(np.diff(np.array(angles), axis=0)).max() < 0.02
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_rates_feel_every_turn_of_a_base_that_is_pushed_sideways(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    plan = plan_of(random)._replace(j=(0.0, 0.0), yaw_rate=0.0)
+    pushed = pushed_within_the_arms_plane(plan, 0.01, -0.01, 0.02)
+    R_WB = Rotation.from_matrix(np.reshape(pushed.R_WB, (3, 3)))
+    aside = vec3(np.array(pushed.p_WB) + R_WB.apply([0.0, 0.04, 0.0]))
+    estimate = pushed._replace(p_WB=aside, w_WB_B=(0.6, 0.2, -0.9))
+    _, rates = compensated_joints(AIRFRAME, LIMITS, estimate, plan)
+    moment = 1e-5
+    angles = [later(plan, estimate, t) for t in (-moment, moment)]
+    expected = (np.array(angles[1]) - np.array(angles[0])) / (2.0 * moment)
+    np.testing.assert_allclose(rates, expected, atol=1e-5)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from fsw.control.cascade import Cascade, CascadeMemory, Inner, close_loops
-from fsw.control.inner_tuning import InnerTuning
+from fsw.control.gains import InnerTuning
 from fsw.control.tracking import Observed
 from fsw.estimation.estimator import attitude, estimate_state
 from fsw.model.airframe import AIRFRAME, AttitudeLag

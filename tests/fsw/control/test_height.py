@@ -7,8 +7,8 @@ import math
 import pytest
 from scipy.spatial.transform import Rotation
 
+from fsw.control.gains import InnerTuning
 from fsw.control.height import height_pid
-from fsw.control.inner_tuning import InnerTuning
 from fsw.model.airframe import AIRFRAME, GRAVITY
 from fsw.signals import PlanInput, PredictionState, StateEstimate
 from tests.fsw.random_states import estimate_of

@@ -11,7 +11,7 @@ import pinocchio as pin
 import pytest
 from scipy.spatial.transform import Rotation
 
-from fsw.control.inner_tuning import InnerTuning
+from fsw.control.gains import InnerTuning
 from fsw.control.joints import arm_inverse_dynamics, joint_torques
 from fsw.model.airframe import AIRFRAME, Airframe
 from fsw.signals import Vec2

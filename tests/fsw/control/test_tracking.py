@@ -12,8 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from fsw.control.inner_tuning import TrackingTuning, tracking_gains
+from fsw.control.gains import TrackingTuning, tracking_gains
 from fsw.control.tracking import (
+    AxisState,
     Observed,
     TrackingLaw,
     follow_plan,
@@ -32,6 +33,7 @@ BRISK = replace(TUNING, observer_bandwidth=100.0)
 WEIGHT = AIRFRAME.mass * GRAVITY
 CALM: Vec3 = (0.0, 0.0, 0.0)
 NOTHING = Observed(CALM, CALM)
+REST = AxisState(0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 def calm(estimate: StateEstimate) -> Observed:
@@ -116,9 +118,9 @@ def test_wind_is_cancelled_whole_once_it_is_believed(sign: float) -> None:
     """On the plan, in wind, the acceleration that is asked for is the opposite of the wind's."""
     wind = sign * TUNING.wind_limit
     k3 = LAW.gains.k[2]
-    asked = snap_command(LAW, 0.0, 0.0, 0.0, wind, wind, 0.0, 0.0, 0.0, 0.0, 0.0)
+    asked = snap_command(LAW, AxisState(0.0, 0.0, 0.0, 0.0, 0.0), wind, wind, REST, 0.0)
     assert asked == pytest.approx(-k3 * wind)
-    leaning = snap_command(LAW, 0.0, 0.0, 0.0, wind, wind, -wind, 0.0, 0.0, 0.0, 0.0)
+    leaning = snap_command(LAW, AxisState(0.0, 0.0, -wind, 0.0, 0.0), wind, wind, REST, 0.0)
     assert leaning == pytest.approx(0.0, abs=1e-9)
 
 
@@ -129,16 +131,16 @@ def test_a_lasting_push_is_taken_for_wind_up_to_its_limit_and_forgotten(sign: fl
     believed = Observed(CALM, (d, 0.0, 0.0))
     for _ in range(round(math.log(2.0) * TUNING.wind_time / dt)):
         believed = observe(believed._replace(v=CALM), (dt * d, 0.0, 0.0), CALM, TUNING, dt)
-    assert believed.lasting == pytest.approx((0.5 * d, 0.0), abs=0.01 * abs(d))
+    assert believed.disturbance_bias == pytest.approx((0.5 * d, 0.0), abs=0.01 * abs(d))
     pushed = believed._replace(d=(5.0 * sign, 0.0, 0.0))
     for _ in range(1000):
         pushed = observe(pushed._replace(v=CALM), (dt * 5.0 * sign, 0.0, 0.0), CALM, TUNING, dt)
-        assert abs(pushed.lasting[0]) <= TUNING.wind_limit
-    assert pushed.lasting[0] == pytest.approx(sign * TUNING.wind_limit)
+        assert abs(pushed.disturbance_bias[0]) <= TUNING.wind_limit
+    assert pushed.disturbance_bias[0] == pytest.approx(sign * TUNING.wind_limit)
     calm_again = believed._replace(d=CALM)
     for _ in range(round(10.0 * TUNING.wind_time / dt)):
         calm_again = observe(calm_again._replace(v=CALM), CALM, CALM, TUNING, dt)
-    assert calm_again.lasting == pytest.approx((0.0, 0.0), abs=1e-3 * TUNING.wind_limit)
+    assert calm_again.disturbance_bias == pytest.approx((0.0, 0.0), abs=1e-3 * TUNING.wind_limit)
 
 
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
@@ -164,7 +166,7 @@ def test_far_from_the_plan_acceleration_and_jerk_wishes_are_limited(
     e_p: float, e_v: float, d: float
 ) -> None:
     """At the vehicle's own a = j = 0 the wish is K4 times a jerk of at most its limit."""
-    wanted = snap_command(LAW, e_p, e_v, 0.0, d, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    wanted = snap_command(LAW, AxisState(-e_p, -e_v, 0.0, 0.0, 0.0), d, 0.0, REST, 0.0)
     k4 = LAW.gains.k[3]
     assert abs(wanted) <= k4 * TUNING.jerk_limit + 1e-9
     stoppable = math.sqrt(60.0 * (TUNING.acceleration_limit + 0.15))
@@ -175,12 +177,15 @@ def test_far_from_the_plan_acceleration_and_jerk_wishes_are_limited(
 def test_a_vehicle_at_the_acceleration_limit_is_not_asked_for_more(e_p: float) -> None:
     side = math.copysign(1.0, e_p)
     at_limit = side * TUNING.acceleration_limit
-    assert side * snap_command(LAW, e_p, 0.0, 0.0, 0.0, 0.0, at_limit, 0.0, 0.0, 0.0, 0.0) <= 1e-9
+    assert (
+        side * snap_command(LAW, AxisState(-e_p, 0.0, at_limit, 0.0, 0.0), 0.0, 0.0, REST, 0.0)
+        <= 1e-9
+    )
 
 
 def test_beyond_the_position_limit_more_error_asks_for_nothing_more() -> None:
     def at(error: float) -> float:
-        return snap_command(LAW, error, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        return snap_command(LAW, AxisState(-error, 0.0, 0.0, 0.0, 0.0), 0.0, 0.0, REST, 0.0)
 
     assert at(TUNING.position_error_limit) == at(10.0)
 
@@ -222,3 +227,32 @@ def test_tracking_gains_stabilise_the_chain_they_are_designed_for() -> None:
         z, v = z + dt * v, v + dt * a
         a += dt * (u - a) / lag
     assert abs(z) < 1e-6
+
+
+@given(st.tuples(*[st.floats(-50.0, 50.0)] * 3), st.tuples(*[st.floats(-2.0, 2.0)] * 3))
+def test_only_differences_of_place_and_velocity_count(there: Vec3, moving: Vec3) -> None:
+    """The same vehicle and plan somewhere else, or seen from a moving train."""
+
+    def moved(p: Vec3, by: Vec3) -> Vec3:
+        return p[0] + by[0], p[1] + by[1], p[2] + by[2]
+
+    ahead = PLAN._replace(p=(0.02, -0.01, -1.01), v=(0.05, 0.04, -0.02))
+    estimate, motion = on_plan(Rotation.from_euler("ZYX", [0.7, 0.1, -0.2]), PLAN)
+    here = follow_plan(LAW, 3.5, estimate, motion, calm(estimate), ahead, REST_INPUT)
+    estimate = estimate._replace(p_WB=moved(estimate.p_WB, there), v_WB=moving)
+    ahead = ahead._replace(p=moved(ahead.p, there), v=moved(ahead.v, moving))
+    same = follow_plan(LAW, 3.5, estimate, motion, calm(estimate), ahead, REST_INPUT)
+    assert same[0] == pytest.approx(here[0], abs=1e-6)
+    assert same[1] == pytest.approx(here[1], abs=1e-6)
+
+
+def test_both_poles_of_the_observer_are_at_its_bandwidth() -> None:
+    """The poles of its error, from what it believes a moment after one of each."""
+    dt = 1e-6
+    columns = []
+    for v, d in ((1.0, 0.0), (0.0, 1.0)):
+        after = observe(Observed((v, 0.0, 0.0), (d, 0.0, 0.0)), CALM, CALM, BRISK, dt)
+        columns.append((after.v[0], after.d[0]))
+    slope = (np.array(columns).T - np.eye(2)) / dt
+    b = BRISK.observer_bandwidth
+    assert np.poly(slope) == pytest.approx([1.0, 2.0 * b, b * b], rel=1e-3)

@@ -9,8 +9,8 @@ import pytest
 from scipy.signal import fftconvolve
 
 from fsw.control.allocation import allocate
-from fsw.control.inner_tuning import TrackingGains, TrackingTuning, tracking_gains
-from fsw.control.tracking import Observed, TrackingLaw, observe, snap_command
+from fsw.control.gains import TrackingGains, TrackingTuning, tracking_gains
+from fsw.control.tracking import AxisState, Observed, TrackingLaw, observe, snap_command
 from fsw.control.tube import Tube, peak_snap_share, tube
 from fsw.model.airframe import AIRFRAME, GRAVITY
 from fsw.model.prediction import Array
@@ -18,6 +18,7 @@ from fsw.model.prediction import Array
 DT = 0.002
 # Without limits, so that the loop under test is the linear one the bound is about.
 TUNING = replace(TrackingTuning(), position_error_limit=1e9, acceleration_limit=1e9, jerk_limit=1e9)
+REST = AxisState(0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 def _gains() -> TrackingGains:
@@ -38,8 +39,8 @@ def _position_under(disturbance: np.ndarray, tuning: TrackingTuning = TUNING) ->
     for d in disturbance:
         believed = observe(believed, (v, 0.0, 0.0), (a, 0.0, 0.0), tuning, DT)
         # Far from the jerk limit that the square root sets, snap_command is linear.
-        d_hat, lasting = believed.d[0], believed.lasting[0]
-        w = snap_command(law, -p, -believed.v[0], -s, d_hat, lasting, a, j, 0.0, 0.0, 0.0)
+        d_hat, lasting = believed.d[0], believed.disturbance_bias[0]
+        w = snap_command(law, AxisState(p, believed.v[0], a, j, s), d_hat, lasting, REST, 0.0)
         s = w + (s - w) * decay
         p, v, a, j = p + DT * v, v + DT * (a + d), a + DT * j, j + DT * s
         positions.append(p)
@@ -76,7 +77,7 @@ def test_a_push_that_turns_once_it_is_taken_for_wind_needs_the_wider_tube() -> N
 
 @pytest.mark.parametrize("cheaper", [0.5, 0.2])
 def test_a_cheaper_effort_narrows_the_tube_and_needs_more_snap(cheaper: float) -> None:
-    bold = replace(TUNING, effort=TUNING.effort * cheaper)
+    bold = replace(TUNING, input_weight=TUNING.input_weight * cheaper)
     reach = tube(AIRFRAME, bold, tracking_gains(bold, AIRFRAME.rotor_lag, DT), 0.225, 0.1, DT)
     assert reach.base < _tube().base
     assert peak_snap_share(AIRFRAME, reach, 0.8) > peak_snap_share(AIRFRAME, _tube(), 0.8)
@@ -104,7 +105,8 @@ def _pushed_once(wind: bool) -> tuple[Array, Array, Array]:
         # Without its slow memory, which the tube counts apart.
         believed = observe(believed, (v, 0.0, 0.0), (a, 0.0, 0.0), QUICK, fine)
         d = believed.d[0]
-        w = snap_command(law, -p, -believed.v[0], -s, d, now * wind, a, j, 0.0, 0.0, 0.0)
+        axis = AxisState(p, believed.v[0], a, j, s)
+        w = snap_command(law, axis, d, now * wind, REST, 0.0)
         s = w + (s - w) * decay
         p, v, a, j = p + fine * v, v + fine * (a + now * (not wind)), a + fine * j, j + fine * s
         if k % 8 == 7:

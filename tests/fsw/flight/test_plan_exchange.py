@@ -24,7 +24,7 @@ from fsw.flight.state import PlanMemory
 from fsw.model.airframe import AIRFRAME
 from fsw.model.nominal import NominalModel
 from fsw.model.rotors import MotionState, motion_state
-from fsw.mpc.program import InputLimits
+from fsw.mpc.qp_data import InputLimits
 from fsw.parameters.flight_config import flight_config
 from fsw.signals import (
     Plan,

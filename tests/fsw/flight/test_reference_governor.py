@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fsw.flight.reference_governor import limit_reference
+from fsw.flight.reference_governor import (
+    ReferenceGovernor,
+    limit_reference,
+    project,
+    project_to_safe_set,
+)
+from fsw.parameters.flight_config import flight_config
 from fsw.signals import EndEffectorTarget, PointObstacle, SafeSet, Vec3, Wall
 
 WALL = SafeSet((Wall((-1.0, 0.0, 0.0), -1.0, 0.1),))
@@ -84,3 +91,100 @@ def test_nothing_pulls_deep_into_the_ball_of_a_point_or_fast_towards_it(
     (tame,) = limit_reference(targets, p_WE, STILL, BRANCH, 2.0, 4.0)
     assert math.dist(tame.p_WE, (1.0, 0.0, -1.2)) == pytest.approx(max(distance, 0.2))
     assert math.hypot(*tame.v_WE) <= 0.5 + 1e-9
+
+
+CONFIG = flight_config()
+GOVERNOR = ReferenceGovernor(CONFIG)
+LEGS = CONFIG.airframe.leg_length
+NO_WALLS = SafeSet()
+
+
+def limited(
+    p: Vec3, v: Vec3, other_end: Vec3 = (0.0, 0.0, 0.3), *, tip: bool = False,
+    safe_set: SafeSet = NO_WALLS,
+) -> tuple[Vec3, Vec3]:  # fmt: skip
+    return GOVERNOR.limit_setpoint(
+        p, v, other_end=other_end, of_end_effector=tip, safe_set=safe_set
+    )
+
+
+@given(st.floats(0.0, 3.0), st.floats(-2.0, 2.0))
+def test_a_setpoint_of_the_body_sinks_no_faster_than_braking_at_1_m_s2_allows(
+    height: float, sink: float
+) -> None:
+    _, (_, _, vz) = limited((0.0, 0.0, -LEGS - height), (0.0, 0.0, sink))
+    # At the ground the landing speed; above it what stops, linear in the last quarter of a metre.
+    stops = 2.0 * height if height < 0.25 else math.sqrt(2.0 * (height - 0.125))
+    assert vz == pytest.approx(min(sink, max(stops, CONFIG.limits.land_speed)))
+
+
+@given(st.floats(-0.2, 3.0), st.floats(-2.0, 2.0))
+def test_a_setpoint_of_the_end_effector_keeps_the_body_a_decimetre_above_its_standing_height(
+    height: float, sink: float
+) -> None:
+    hanging = 0.25
+    p, (_, _, vz) = limited(
+        (0.0, 0.0, -LEGS - height + hanging), (0.0, 0.0, sink), (0.0, 0.0, -hanging), tip=True
+    )
+    assert -(p[2] - hanging) - LEGS == pytest.approx(max(height, 0.1))
+    room = max(height - 0.1, 0.0)
+    stops = 2.0 * room if room < 0.25 else math.sqrt(2.0 * (room - 0.125))
+    assert vz == pytest.approx(min(sink, stops), abs=1e-9)
+
+
+@given(st.floats(0.0, 2.0), st.floats(0.01, 2.0), st.floats(-math.pi, math.pi))
+def test_near_the_ground_a_setpoint_hardly_slides(height: float, speed: float, way: float) -> None:
+    level = (speed * math.cos(way), speed * math.sin(way), 0.0)
+    _, (vx, vy, _) = limited((0.0, 0.0, -LEGS - height), level)
+    stops = 2.0 * height if height < 0.25 else math.sqrt(2.0 * (height - 0.125))
+    assert math.hypot(vx, vy) == pytest.approx(min(speed, stops + 0.05))
+    assert math.cos(math.atan2(vy, vx) - way) == pytest.approx(1.0)
+
+
+def test_a_setpoint_is_kept_off_walls_and_off_points_whichever_there_is() -> None:
+    into = (1.0, 0.0, 0.0)
+    for safe_set in (WALL, BRANCH):
+        p, v = limited((0.95, 0.0, -1.2), into, safe_set=safe_set)
+        assert p[0] < 0.94
+        assert v[0] == pytest.approx(0.0, abs=1e-9)
+    assert limited((0.95, 0.0, -1.2), into) == ((0.95, 0.0, -1.2), into)
+
+
+def test_a_setpoint_stays_within_the_configured_distance_of_the_vehicle() -> None:
+    most = CONFIG.steering.max_lead_distance
+    led = GOVERNOR.limit_lead((10.0, 0.0, 0.0), (1.0, 0.0, 0.0))
+    assert led == pytest.approx((1.0 + most, 0.0, 0.0))
+    near = (1.0 + 0.99 * most, 0.0, 0.0)
+    assert GOVERNOR.limit_lead(near, (1.0, 0.0, 0.0)) == near
+
+
+def test_a_horizon_is_limited_with_the_barriers_own_braking() -> None:
+    barrier = CONFIG.planner.walls
+    targets, here = horizon((0.8, 0.0, -1.2), (3.0, 0.0, 0.0)), (0.4, 0.0, -1.2)
+    expected = limit_reference(targets, here, STILL, WALL, barrier.alpha, barrier.slope)
+    assert GOVERNOR.limit_horizon(targets, here, STILL, WALL) == expected
+    assert expected != targets
+
+
+def test_a_target_beyond_a_wall_rests_at_the_boundary_and_one_inside_goes_on() -> None:
+    moving = EndEffectorTarget(5, (0.5, 1.0, -1.0), (1.0, 0.0, 0.0), (0.1, 0.0, 0.0), 0.3)
+    assert project(moving, WALL) is moving
+    beyond = replace(moving, p_WE=(1.4, 1.0, -1.0))
+    assert project(beyond, WALL) == EndEffectorTarget(5, (0.9, 1.0, -1.0), STILL, STILL, 0.3)
+
+
+@given(st.tuples(*[st.floats(-3.0, 3.0)] * 3))
+def test_a_projected_place_keeps_every_clearance_and_is_the_nearest_of_a_single_wall(
+    p: Vec3,
+) -> None:
+    corner = SafeSet(
+        (Wall((-1.0, 0.0, 0.0), -1.0, 0.1), Wall((-0.6, -0.8, 0.0), -1.0, 0.1)),
+        obstacles=(PointObstacle((-1.0, -1.0, 0.0), 0.4),),
+    )
+    x, y, z = project_to_safe_set(p, corner)
+    assert 1.0 - x >= 0.1 - 2e-4
+    assert 1.0 - 0.6 * x - 0.8 * y >= 0.1 - 2e-4
+    assert math.dist((x, y, z), (-1.0, -1.0, 0.0)) >= 0.4 - 2e-4
+    alone = project_to_safe_set(p, WALL)
+    # Within the tolerance a place counts as inside.
+    assert alone == (p if p[0] <= 0.9 + 1e-4 else pytest.approx((0.9, p[1], p[2])))

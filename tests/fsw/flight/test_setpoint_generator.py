@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fsw.barriers.margins import plain_root
+from fsw.barriers.safe_approach import safe_approach_speed
 from fsw.flight.reference_governor import limit_approach, limit_descent, limit_lead
 from fsw.flight.setpoint_generator import PositionGoal, ReferenceState, arrived, step
 from fsw.parameters.flight_config import SetpointLimits
@@ -115,7 +115,7 @@ def test_no_end_of_the_arm_is_wanted_in_a_wall_and_the_approach_can_stop(
     kept = limited(lead, (reach, 0.0, 0.3), WALL, 2.0, 4.0)
     room = 2.9 - max(kept.p[0], kept.p[0] + reach)
     assert room >= -1e-9
-    assert kept.v[0] <= plain_root(max(room, 0.0), 2.0, 4.0) + 1e-9
+    assert kept.v[0] <= safe_approach_speed(max(room, 0.0), 2.0, 4.0) + 1e-9
     assert kept.v[0] <= max(speed, 0.0) + 1e-9 or speed < 0.0
 
 
@@ -131,7 +131,7 @@ def test_what_hangs_below_is_not_wanted_near_a_point_and_the_approach_can_stop(
     distance = math.hypot(*away)
     assert distance >= 0.2 - 1e-9
     approach = -sum(a * v for a, v in zip(away, kept.v, strict=True)) / distance
-    assert approach <= plain_root(max(distance - 0.2, 0.0), 2.0, 4.0) + 1e-9
+    assert approach <= safe_approach_speed(max(distance - 0.2, 0.0), 2.0, 4.0) + 1e-9
 
 
 def test_the_body_is_not_wanted_near_a_point_that_its_arm_is_far_from() -> None:

@@ -25,6 +25,7 @@ from messages.block_file import BlockFile
 from tests.fsw.link.snapshots import outputs_at
 from tests.fsw.log.specimens import inputs
 from tests.fsw.log.test_recorded_inputs import SUBJECT
+from tests.waiting import wait_for
 
 _THREE = (0.5, 0.5, 0.5)
 STILL = SensorFrame(0, _THREE, _THREE, (1.0, 0.0, 0.0, 0.0), _THREE, _THREE, (0.5,) * 2, (0.5,) * 2)
@@ -96,7 +97,7 @@ def test_a_slow_disk_delays_no_tick_and_leaves_a_marked_gap(tmp_path: Path) -> N
         longest_s = max(longest_s, time.thread_time() - begin_s)
         if k == 11_000:
             disk_is_back.set()
-            time.sleep(0.3)
+            wait_for(lambda: log.file.size > 0)
     log.close()
     assert longest_s < 0.01
     assert log.lost_us > 1_000_000
@@ -119,13 +120,17 @@ for name in ("lockstep", "realtime"):
     log = FlightLog(Path(sys.argv[1]) / name, SUBJECT)
     log.begin(1_000_000, lockstep=name == "lockstep")
     write_ticks(log, 1000)
-time.sleep(0.3)
 print("written", flush=True)
 time.sleep(60)
 """
 
 
+def ticks_in(path: Path) -> int:
+    return sum(isinstance(tick, LoggedTick) for tick in ticks(open_flight(path)))
+
+
 def test_a_killed_process_leaves_readable_logs(tmp_path: Path) -> None:
+    paths = (tmp_path / "lockstep", tmp_path / "realtime")
     process = subprocess.Popen(
         [sys.executable, "-c", KILLED, str(tmp_path)],
         stdout=subprocess.PIPE,
@@ -134,12 +139,14 @@ def test_a_killed_process_leaves_readable_logs(tmp_path: Path) -> None:
     )
     assert process.stdout is not None
     assert process.stdout.readline() == "written\n"
+    for path in paths:
+        wait_for(lambda path=path: ticks_in(path) >= 1000 - 130)  # type: ignore[misc]
     process.send_signal(signal.SIGKILL)
     process.wait()
     process.stdout.close()
-    for path in (tmp_path / "lockstep", tmp_path / "realtime"):
+    for path in paths:
         log = ULog(str(path))
         assert not log.file_corruption
         count = len(log.get_dataset("sensor_frame").data["q_WB[0]"])
         assert count >= 1000 - 130  # at most the last quarter of a second of a flight is lost
-        assert sum(isinstance(tick, LoggedTick) for tick in ticks(open_flight(path))) == count
+        assert ticks_in(path) == count

@@ -13,6 +13,7 @@ from pymavlink import mavutil
 from fsw.log.run_directory import new_run_directory
 from fsw.log.tlog import TlogWriter
 from messages.frames import FrameWriter
+from tests.waiting import wait_for
 
 START_US = 1_700_000_000_000_000
 
@@ -50,7 +51,6 @@ from messages.frames import FrameWriter
 log, writer = TlogWriter(Path(sys.argv[1]), 1_700_000_000_000_000), FrameWriter(1, 1)
 for tick in range(5000):
     log.add(2000 * tick, writer.frame(0, 0, 2, 12, 0, 4, 3))
-time.sleep(0.3)
 print("written", flush=True)
 time.sleep(60)
 """
@@ -63,6 +63,8 @@ def test_a_killed_process_leaves_whole_records(tmp_path: Path) -> None:
     )
     assert process.stdout is not None
     assert process.stdout.readline() == "written\n"
+    # At most the last half second of a flight of ten is lost.
+    wait_for(lambda: path.stat().st_size >= 4750 * (8 + 21))
     process.send_signal(signal.SIGKILL)
     process.wait()
     process.stdout.close()
@@ -70,6 +72,5 @@ def test_a_killed_process_leaves_whole_records(tmp_path: Path) -> None:
     count = 0
     while reader.recv_match() is not None:
         count += 1
-    # At most the last half second of a flight of ten is lost.
     assert count >= 4750
     assert path.stat().st_size % (8 + 21) == 0

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from fsw.model.airframe import AIRFRAME, GRAVITY
 from fsw.model.prediction import Array
-from fsw.model.rotors import lag_rotors, motion_state, rotor_decay, weigh
+from fsw.model.rotors import estimate_mass, lag_rotors, motion_state, rotor_decay
 from fsw.signals import Vec3, Vec4
 from tests.fsw.random_states import estimate_of, vec3
 
@@ -125,17 +125,17 @@ def test_rotors_close_63_percent_of_a_step_in_one_time_constant() -> None:
 def test_the_vehicle_is_weighed_within_seconds(true_mass: float) -> None:
     mass, rotors = AIRFRAME.mass, (9.0, 8.0, 8.5, 8.0)
     for _ in range(2500):
-        mass = weigh(AIRFRAME, mass, rotors, sum(rotors) / true_mass, 0.002)
+        mass = estimate_mass(AIRFRAME, mass, rotors, sum(rotors) / true_mass, 0.002)
     assert mass == pytest.approx(true_mass, rel=0.01)
 
 
 @pytest.mark.parametrize("specific_force", [0.0, -9.81, math.nan, 1e-3])
 def test_what_is_no_flight_is_not_weighed(specific_force: float) -> None:
-    assert weigh(AIRFRAME, 3.3, (8.0,) * 4, specific_force, 0.002) == 3.3
+    assert estimate_mass(AIRFRAME, 3.3, (8.0,) * 4, specific_force, 0.002) == 3.3
 
 
 def test_the_scales_stay_near_what_is_believed() -> None:
     mass = AIRFRAME.mass
     for _ in range(5000):
-        mass = weigh(AIRFRAME, mass, (10.0,) * 4, 100.0, 0.002)
+        mass = estimate_mass(AIRFRAME, mass, (10.0,) * 4, 100.0, 0.002)
     assert mass == pytest.approx(0.7 * AIRFRAME.mass)

@@ -14,7 +14,7 @@ from typing import Any
 import cvxpy as cp
 import numpy as np
 
-from fsw.barriers.root import BarrierTuning
+from fsw.barriers.safe_approach import BarrierTuning
 from fsw.model.airframe import AIRFRAME
 from fsw.model.linearisation import BASE, END_EFFECTOR, Linearisation
 from fsw.model.prediction import INPUTS, Array
@@ -100,7 +100,7 @@ def optimum(question: Question, config: PlannerConfig) -> Optimum:
             cp.abs(th1) <= AIRFRAME.joint1_limit + joint_slack[node - 1],
             cp.abs(th1 + th2) <= AIRFRAME.joint12_limit + joint_slack[node - 1],
         ]
-    problem = cp.Problem(
+    ocp = cp.Problem(
         cp.Minimize(
             _cost(question, linear, U, config)
             + _safety_cost(question, linear, config)
@@ -110,17 +110,15 @@ def optimum(question: Question, config: PlannerConfig) -> Optimum:
         constraints,
     )
     tolerance = 1e-7
-    problem.solve(
-        solver=cp.CLARABEL, tol_gap_abs=tolerance, tol_gap_rel=tolerance, tol_feas=tolerance
-    )
-    if problem.status in (cp.INFEASIBLE, cp.INFEASIBLE_INACCURATE):
+    ocp.solve(solver=cp.CLARABEL, tol_gap_abs=tolerance, tol_gap_rel=tolerance, tol_feas=tolerance)
+    if ocp.status in (cp.INFEASIBLE, cp.INFEASIBLE_INACCURATE):
         raise InfeasibleError
-    assert problem.status == cp.OPTIMAL
+    assert ocp.status == cp.OPTIMAL
     return Optimum(
         np.asarray(U.value),
         np.asarray(joint_slack.value),
         np.asarray(barrier_slack.value),
-        float(problem.value),
+        float(ocp.value),
     )
 
 
@@ -248,7 +246,7 @@ def _barrier(
 
 def _required(h_start: float, node: int, tuning: BarrierTuning) -> float:
     decay = (1.0 - tuning.gamma * _PERIOD) ** node
-    return decay * h_start + (1.0 - decay) * tuning.robustness
+    return decay * h_start + (1.0 - decay) * tuning.lambda_
 
 
 def _wall_rows(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fsw.barriers.soft_rows import TargetPoints
+from fsw.barriers.constraint_block import TargetPoints
 from fsw.model.linearisation import Linearisation
 from fsw.model.prediction import Array
 from fsw.mpc.costs import Cost, Quadratic

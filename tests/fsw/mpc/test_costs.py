@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fsw.barriers.soft_rows import TargetPoints
+from fsw.barriers.constraint_block import TargetPoints
 from fsw.model.airframe import AIRFRAME
 from fsw.model.linearisation import Linearisation
 from fsw.model.prediction import INPUTS, YAW, Array, condense

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from fsw.barriers.soft_rows import TargetPoints
+from fsw.barriers.constraint_block import TargetPoints
 from fsw.model.airframe import AIRFRAME
 from fsw.model.prediction import INPUTS, Array, condense
 from fsw.mpc.clarabel_solver import ClarabelSolver
 from fsw.mpc.dual_solver import DualSolver
+from fsw.mpc.ocp import Ocp
 from fsw.mpc.planner_config import PlannerConfig
-from fsw.mpc.problem import Problem
-from fsw.mpc.program import Program
+from fsw.mpc.qp_data import QpData
 from fsw.signals import SafeSet, SolverStatus, Wall, WorkspaceSphere
 from tests.fsw.random_states import prediction_vector
 
@@ -32,10 +32,10 @@ def filled(
     *,
     config: PlannerConfig = CONFIG,
     off: float = 0.05,
-) -> Problem:
+) -> Ocp:
     """A program around rest, of a vehicle somewhere, moving, its target so far off [m]."""
     n = config.horizon
-    problem = Problem(config, condense(AIRFRAME, config.period, n), safe_set)
+    ocp = Ocp(config, condense(AIRFRAME, config.period, n), safe_set)
     start = prediction_vector(random)
     start[0:3] = random.uniform(-0.9, 0.9, 3)
     start[3:19] *= 0.4
@@ -45,8 +45,8 @@ def filled(
         random.uniform(-0.3, 0.3, (n + 1, 3)),
         start[13] + random.uniform(-1.0, 1.0, n + 1),
     )
-    problem.linearise(start, np.zeros(INPUTS * n), targets)
-    return problem
+    ocp.linearise(start, np.zeros(INPUTS * n), targets)
+    return ocp
 
 
 def difference(x: Array, expected: Array, inputs: int) -> float:
@@ -54,7 +54,7 @@ def difference(x: Array, expected: Array, inputs: int) -> float:
     return float(np.abs(scaled).max())
 
 
-def cost(program: Program, x: Array) -> float:
+def cost(program: QpData, x: Array) -> float:
     whole = program.whole()
     return float(
         whole.q @ x + 0.5 * x @ (whole.p + whole.p.T - sparse.diags(whole.p.diagonal())) @ x
@@ -77,10 +77,10 @@ def test_the_optimum_is_that_of_the_whole_program(
     )
     cones_bound = 0
     for _ in range(6):
-        problem = filled(random, safe_set, config=config, off=off)
-        program = problem.program
+        ocp = filled(random, safe_set, config=config, off=off)
+        program = ocp.program
         expected = ClarabelSolver(program.whole()).solve()
-        found = problem.solve()
+        found = ocp.solve()
         assert found.usable
         assert expected.usable
         least = cost(program, expected.x)
@@ -104,8 +104,8 @@ def test_the_optimum_is_that_of_the_whole_program(
 def test_the_guess_says_where_to_look_and_not_what_is_found(safe_set: SafeSet) -> None:
     random = np.random.default_rng(8)
     for _ in range(10):
-        problem = filled(random, safe_set)
-        program, solver = problem.program, DualSolver(problem.program)
+        ocp = filled(random, safe_set)
+        program, solver = ocp.program, DualSolver(ocp.program)
         first = solver.solve(np.zeros(program.inputs)).x
         for size in (0.1, 3.0, 30.0):
             again = solver.solve(random.uniform(-size, size, program.inputs)).x
@@ -133,12 +133,12 @@ def test_what_was_solved_before_leaves_no_trace() -> None:
 def test_hard_rows_that_contradict_each_other_are_infeasible() -> None:
     """Two walls, 0.2 m apart, that both want 0.5 m."""
     narrow = SafeSet((Wall((1.0, 0.0, 0.0), -0.1, 0.5), Wall((-1.0, 0.0, 0.0), -0.1, 0.5)))
-    problem = filled(np.random.default_rng(10), narrow, config=replace(CONFIG, controller="hc"))
-    assert problem.solve().status is SolverStatus.INFEASIBLE
+    ocp = filled(np.random.default_rng(10), narrow, config=replace(CONFIG, controller="hc"))
+    assert ocp.solve().status is SolverStatus.INFEASIBLE
 
 
 def test_a_hessian_that_is_not_positive_is_never_flown() -> None:
-    problem = filled(np.random.default_rng(11), WALLS)
-    problem.program.hessian[0, 0] = -1.0
-    solution = problem.solve()
+    ocp = filled(np.random.default_rng(11), WALLS)
+    ocp.program.hessian[0, 0] = -1.0
+    solution = ocp.solve()
     assert not solution.usable

@@ -11,8 +11,8 @@ import pytest
 
 from fsw.model.airframe import AIRFRAME
 from fsw.model.prediction import INPUTS, Array, condense, to_vector
+from fsw.mpc.ocp import Ocp
 from fsw.mpc.planner_config import PlannerConfig
-from fsw.mpc.problem import Problem
 from fsw.signals import (
     EndEffectorTarget,
     Plan,
@@ -200,15 +200,15 @@ def test_the_last_plan_moved_on_by_a_period_is_the_next_guess(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     guesses: list[Array] = []
-    linearise = Problem.linearise
+    linearise = Ocp.linearise
 
-    def recorded(self: Problem, start: Array, guess: Array, targets: Any) -> None:
+    def recorded(self: Ocp, start: Array, guess: Array, targets: Any) -> None:
         guesses.append(guess.copy())
         linearise(self, start, guess, targets)
 
     used, target = planner(), below((0.5, 0.0, -1.2))
     first = flat(planned(used.plan(request(hovering(), target))))
-    monkeypatch.setattr(Problem, "linearise", recorded)
+    monkeypatch.setattr(Ocp, "linearise", recorded)
     used.plan(request(hovering(), target, t_us=1_000_000 + PERIOD_US))
     expected = np.vstack((first[1:], first[-1:]))
     np.testing.assert_array_equal(guesses[0].reshape(-1, INPUTS), expected)

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from fsw.barriers.root import BarrierTuning, root
+from fsw.barriers.safe_approach import BarrierTuning, safe_approach_speed
 from fsw.parameters.consistency import (
     Finding,
     analyse,
@@ -48,17 +48,19 @@ def test_the_papers_lambda_is_refused_with_a_value_that_would_do(
 def test_the_sphere_finding_turns_exactly_where_the_centre_can_hold() -> None:
     config = flight_config()
     tuning = config.planner.workspace
-    at_centre = root(0.075, tuning.alpha, tuning.slope)
+    at_centre = safe_approach_speed(0.075, tuning.alpha, tuning.slope)
     for robustness, holds in ((0.999 * at_centre, True), (1.001 * at_centre, False)):
-        workspace = replace(tuning, robustness=robustness)
+        workspace = replace(tuning, lambda_=robustness)
         changed = replace(config, planner=replace(config.planner, workspace=workspace))
         assert _findings(changed, SPHERE)["sphere"].holds is holds
 
 
 @pytest.mark.parametrize("robustness", [0.1, 0.3, 0.5, 0.9, 2.0])
 def test_at_the_stand_off_a_vehicle_at_rest_meets_lambda(robustness: float) -> None:
-    tuning = BarrierTuning(robustness=robustness)
-    assert root(stand_off(tuning), tuning.alpha, tuning.slope) == pytest.approx(robustness)
+    tuning = BarrierTuning(lambda_=robustness)
+    assert safe_approach_speed(stand_off(tuning), tuning.alpha, tuning.slope) == pytest.approx(
+        robustness
+    )
 
 
 def test_the_tube_finding_turns_where_the_stand_off_equals_the_reach() -> None:
@@ -67,7 +69,7 @@ def test_the_tube_finding_turns_where_the_stand_off_equals_the_reach() -> None:
     loop = loop_tube(config)
     reach = 0.8 * loop.base + loop.base_wind
     for factor, holds in ((1.01, True), (0.99, False)):
-        walls = replace(tuning, robustness=factor * reach * tuning.slope)
+        walls = replace(tuning, lambda_=factor * reach * tuning.slope)
         changed = replace(config, planner=replace(config.planner, walls=walls))
         assert _findings(changed, WALLS)["tube"].holds is holds
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from fsw.mpc.solvers import SOLVERS
 from fsw.parameters.control_choice import KNOWN, tracking_of
-from fsw.parameters.flight_config import CONTROLLERS, INNERS, ROBUSTNESS_PRESETS, SOLVERS
+from fsw.parameters.flight_config import CONTROLLERS, INNERS, ROBUSTNESS_PRESETS
 
 
 def test_every_name_offered_can_be_built_and_none_is_left_out() -> None:

@@ -99,10 +99,10 @@ def test_each_tuning_is_whole(store: ParameterStore) -> None:
     store.change("TRK_EFFORT", 0.2, asker)
     store.change("LND_T_STILL", 0.7, asker)
     first, second = ticks(store, 3 * REST_TICKS)
-    assert first == (("tuning.tracking.effort", pytest.approx(0.2e-6)),)
+    assert first == (("tuning.tracking.input_weight", pytest.approx(0.2e-6)),)
     assert dict(second) == {
         "limits.landed_time_us": pytest.approx(700_000.0),
-        "tuning.tracking.effort": pytest.approx(0.2e-6),
+        "tuning.tracking.input_weight": pytest.approx(0.2e-6),
     }
     store.change("TRK_EFFORT", 0.12, asker)
     (third,) = ticks(store)
@@ -111,7 +111,7 @@ def test_each_tuning_is_whole(store: ParameterStore) -> None:
 
 def test_a_client_s_single_precision_is_the_number_it_meant(store: ParameterStore) -> None:
     store.change("WALL_LAMBDA", 0.33000001311302185, store.listen())
-    assert ticks(store) == [(("planner.walls.robustness", 0.33),)]
+    assert ticks(store) == [(("planner.walls.lambda_", 0.33),)]
 
 
 def test_what_is_out_of_range_never_comes_near_a_tick(store: ParameterStore, kept: Kept) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import random
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -19,6 +18,7 @@ from fsw.link.wire.outgoing import ServiceOutput
 from fsw.signals import Severity, StatusText
 from messages.frames import FrameWriter, split
 from tests.fsw.link.files.wire_values import message_of, values_of
+from tests.waiting import wait_for
 
 ALL = 0xFFFFFFFF
 FRAMES_A_TICK = 6
@@ -200,10 +200,7 @@ def test_finished_logs_are_erased_this_flight_s_is_kept_and_the_operator_is_told
     assert len(other.entries()) == 3
     other.ask(ids.LOG_REQUEST_DATA, 0, ALL, 0, 1, 1)
     assert client.ask(ids.LOG_ERASE, 1, 1) == []
-    told: list[ServiceOutput] = []
-    until = time.monotonic() + 5.0
-    while not told and time.monotonic() < until:
-        told += client.service.poll(0)
+    told = wait_for(lambda: list(client.service.poll(0)))
     assert told == [StatusText(Severity.INFO, "2 logs erased, this flight's is kept")]
     assert client.entries() == [(0, 4, 1, 0)]
     left = sorted(str(path.relative_to(tmp_path)) for path in tmp_path.glob("*/*"))
@@ -218,10 +215,7 @@ def test_a_log_that_cannot_be_erased_is_told(tmp_path: Path) -> None:
     client = Client(LogService(FlightLogs(flight(tmp_path, "run-2", b"kept"))))
     (earlier / "flight.tlog").unlink()  # somebody else was faster
     client.ask(ids.LOG_ERASE, 1, 1)
-    told: list[ServiceOutput] = []
-    until = time.monotonic() + 5.0
-    while not told and time.monotonic() < until:
-        told += client.service.poll(0)
+    told = wait_for(lambda: list(client.service.poll(0)))
     (text,) = told
     assert isinstance(text, StatusText)
     assert text.severity == 4

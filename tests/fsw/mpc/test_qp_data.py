@@ -1,4 +1,4 @@
-"""The program as filled against the same problem written a second time."""
+"""The program as filled against the same ocp written a second time."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fsw.barriers.soft_rows import TargetPoints
+from fsw.barriers.constraint_block import TargetPoints
 from fsw.model.airframe import AIRFRAME
 from fsw.model.linearisation import END_EFFECTOR, Linearisation
 from fsw.model.prediction import INPUTS, Array, condense, to_vector
@@ -92,7 +92,7 @@ def test_the_plan_is_the_optimum_of_the_problem_written_a_second_time(
 
 
 @pytest.mark.parametrize("seed", [31, 32, 33, 34])
-def test_a_point_beside_a_wall_that_is_in_the_way_is_in_the_problem(seed: int) -> None:
+def test_a_point_beside_a_wall_that_is_in_the_way_is_in_the_ocp(seed: int) -> None:
     random = np.random.default_rng(seed)
     start, asked = question(random, SafeSet())
     way = asked.target_p[-1] - asked.horizon.position[0, END_EFFECTOR]

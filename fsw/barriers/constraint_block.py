@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,9 +12,17 @@ from fsw.model.linearisation import Linearisation
 from fsw.model.prediction import Array
 
 
+class Rows(NamedTuple):
+    """The numbers of a block, for kernels."""
+
+    value: Array  # (rows,)
+    lower_bound: Array  # (rows,)
+    gradient: Array  # (rows, 6 n)
+
+
 @dataclass(frozen=True)
-class SoftRows:
-    """Rows ``value + gradient (U - U_guess) + slack >= required``, slack >= 0.
+class ConstraintBlock:
+    """Rows ``value + gradient (U - U_guess) + slack >= lower_bound``, slack >= 0.
 
     Which slack softens a row never changes; the numbers are refilled in place each iteration.
     """
@@ -23,14 +31,19 @@ class SoftRows:
     slack: NDArray[np.intp]  # (rows,) index of its slack among this block's slacks
     unknowns: int  # 6 n
     value: Array = field(init=False)  # (rows,)
-    required: Array = field(init=False)  # (rows,)
+    lower_bound: Array = field(init=False)  # (rows,)
     gradient: Array = field(init=False)  # (rows, 6 n)
 
     def __post_init__(self) -> None:
         rows = len(self.node)
         object.__setattr__(self, "value", np.zeros(rows))
-        object.__setattr__(self, "required", np.zeros(rows))
+        object.__setattr__(self, "lower_bound", np.zeros(rows))
         object.__setattr__(self, "gradient", np.zeros((rows, self.unknowns)))
+
+    @property
+    def rows(self) -> Rows:
+        """The arrays themselves."""
+        return Rows(self.value, self.lower_bound, self.gradient)
 
     @property
     def slacks(self) -> int:
@@ -47,12 +60,17 @@ class TargetPoints:
     yaw: Array  # (n + 1,) rad
     q_arm: Array | None = None  # (n + 1, 2) rad; None: the planner is free to choose
 
+    def __post_init__(self) -> None:
+        for name in ("position", "velocity", "yaw"):  # kernels rely on the layout
+            array = np.ascontiguousarray(getattr(self, name), dtype=np.float64)
+            object.__setattr__(self, name, array)
+
 
 class Barrier(Protocol):
     """A safe set that keeps the horizon inside by soft rows."""
 
     @property
-    def rows(self) -> SoftRows:
+    def rows(self) -> ConstraintBlock:
         """The rows as of the last refill."""
         ...
 

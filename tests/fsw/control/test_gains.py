@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.signal import cont2discrete
 
-from fsw.control.inner_tuning import InnerTuning, TrackingTuning, tracking_gains
+from fsw.control.gains import InnerTuning, TrackingTuning, tracking_gains
 from fsw.model.airframe import AIRFRAME, GRAVITY
 from fsw.model.prediction import Array
 
@@ -16,17 +16,17 @@ DT = 0.002
 # Prices and lags unlike the flown ones: the design must follow them.
 TUNINGS = [
     TrackingTuning(),
-    replace(TrackingTuning(), effort=4e-7, point_below_base=0.3, vertical_effort=1e-5),
+    replace(TrackingTuning(), input_weight=4e-7, point_below_base=0.3, vertical_input_weight=1e-5),
     replace(TrackingTuning(), disturbance_correlation=0.4),
 ]
 
 
-def cheapest(a: Array, b: Array, price: Array, effort: float) -> Array:
+def cheapest(a: Array, b: Array, price: Array, input_weight: float) -> Array:
     """The gain of a sampled chain by value iteration: the cost of ever longer flights."""
     ad, bd, *_ = cont2discrete((a, b, np.eye(len(a)), np.zeros_like(b)), DT)
     value = price
     for _ in range(6000):
-        gain = bd.T @ value @ ad / (effort + bd.T @ value @ bd)
+        gain = bd.T @ value @ ad / (input_weight + bd.T @ value @ bd)
         value = price + ad.T @ value @ (ad - bd @ gain)
     return np.asarray(gain[0])
 
@@ -43,7 +43,7 @@ def test_the_horizontal_gains_are_the_cheapest(tuning: TrackingTuning, lag: floa
     a[1, 5], a[5, 5] = 1.0, -1.0 / tuning.disturbance_correlation
     # A vehicle that accelerates leans, and what hangs below it swings back.
     point = np.array([1.0, 0.0, -tuning.point_below_base / GRAVITY, 0.0, 0.0, 0.0])
-    expected = cheapest(a, b, np.outer(point, point), tuning.effort)
+    expected = cheapest(a, b, np.outer(point, point), tuning.input_weight)
     gains = tracking_gains(tuning, lag, DT)
     np.testing.assert_allclose((*gains.k, gains.k_disturbance), expected, rtol=1e-5)
 
@@ -53,7 +53,7 @@ def test_the_vertical_gains_are_the_cheapest(tuning: TrackingTuning) -> None:
     a, b, lag = np.zeros((3, 3)), np.zeros((3, 1)), 0.07
     a[0, 1] = a[1, 2] = 1.0
     a[2, 2], b[2, 0] = -1.0 / lag, 1.0 / lag
-    expected = cheapest(a, b, np.diag([1.0, 0.0, 0.0]), tuning.vertical_effort)
+    expected = cheapest(a, b, np.diag([1.0, 0.0, 0.0]), tuning.vertical_input_weight)
     np.testing.assert_allclose(tracking_gains(tuning, lag, DT).k_vertical, expected, rtol=1e-5)
 
 

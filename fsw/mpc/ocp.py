@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-from fsw.barriers.soft_rows import SoftRows, TargetPoints
+import numpy as np
+
+from fsw.barriers.constraint_block import ConstraintBlock, TargetPoints
 from fsw.model.linearisation import Linearisation
 from fsw.model.prediction import Array, CondensedModel
 from fsw.mpc.costs import Quadratic
 from fsw.mpc.dual_solver import DualSolver
-from fsw.mpc.limits import JointLimits
+from fsw.mpc.joint_limits import JointLimits
 from fsw.mpc.planner_config import PlannerConfig
-from fsw.mpc.program import Program
+from fsw.mpc.qp_data import QpData
 from fsw.mpc.solution import Solution
 from fsw.mpc.variants import parts_of
 from fsw.signals import SafeSet
 
 
-class Problem:
+class Ocp:
     """Costs, barrier and limits of one safe set in one program."""
 
     def __init__(self, config: PlannerConfig, model: CondensedModel, safe_set: SafeSet) -> None:
@@ -23,24 +25,27 @@ class Problem:
         self._limits = JointLimits(model)
         parts = parts_of(config, model, safe_set)
         self._costs, self._barriers = parts.costs, parts.barriers
-        blocks: list[tuple[SoftRows, float | None]] = [(self._limits.rows, config.joint_slack)]
+        blocks: list[tuple[ConstraintBlock, float | None]] = [
+            (self._limits.rows, config.joint_slack)
+        ]
         blocks += [(barrier.rows, parts.slack) for barrier in parts.barriers]
-        self._program = Program(config.horizon, config.limits, tuple(blocks))
+        self._program = QpData(config.horizon, config.limits, tuple(blocks))
         self._first_barrier_slack = self._program.inputs + self._limits.rows.slacks
         self.cost = 0.0
         self._solver = DualSolver(self._program)
 
     @property
-    def program(self) -> Program:
+    def program(self) -> QpData:
         """The program as last linearised."""
         return self._program
 
     def linearise(self, start: Array, guess: Array, targets: TargetPoints) -> None:
-        """Refill the program around a guess of the inputs (6 n,) from a start (19,)."""
+        """Refill the program around ``guess`` (6 n,) [SI inputs] from ``start`` (19,) [SI]."""
         program = self._program
         self._horizon.refill(start, guess)
         program.hessian[:] = 0.0
         program.linear[:] = 0.0
+        guess = np.ascontiguousarray(guess)
         quadratic = Quadratic(guess, program.hessian, program.linear)
         self.cost = sum(cost.add(self._horizon, targets, quadratic) for cost in self._costs)
         self._limits.refill(self._horizon)
@@ -58,6 +63,6 @@ class Problem:
         return tuple(h for barrier in self._barriers for h in barrier.at_start().tolist())
 
     def largest_barrier_slack(self, x: Array) -> float:
-        """How far a solution softens the barrier [m/s]."""
+        """Largest slack of the barrier's rows in a solution ``x`` (unknowns,) [SI], [m/s]."""
         slacks = x[self._first_barrier_slack :]
         return float(slacks.max()) if len(slacks) else 0.0

@@ -1,15 +1,15 @@
 """The planner's quadratic program as data: dense numbers, refilled in place.
 
-Minimise ``1/2 U' H U + c' U + price' s`` over the inputs U (6 n) and the slacks s >= 0 of the
+Minimise ``1/2 U' H U + c' U + penalty' s`` over the inputs U (6 n) and the slacks s >= 0 of the
 soft rows, subject to
 
-====================  ==========================================  =============
-rows, in this order   meaning                                     cone
-====================  ==========================================  =============
-soft blocks           gradient U + slack >= required - constant   non-negative
-input bounds          -u_max <= u <= u_max                        non-negative
-tilt, one a node      |a_xy| <= tan(tilt) (g - a_z)               second-order
-====================  ==========================================  =============
+====================  ============================================  =============
+rows, in this order   meaning                                       cone
+====================  ============================================  =============
+soft blocks           gradient U + slack >= lower bound - constant  non-negative
+input bounds          -u_max <= u <= u_max                          non-negative
+tilt, one a node      |a_xy| <= tan(tilt) (g - a_z)                 second-order
+====================  ============================================  =============
 
 Source: docs/equations.md E17.
 """
@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from fsw.barriers.soft_rows import SoftRows
+from fsw.barriers.constraint_block import ConstraintBlock
 from fsw.model.airframe import GRAVITY
 from fsw.model.prediction import INPUTS, Array
 
@@ -65,35 +65,35 @@ class QuadraticProgram:
     cones: int  # second-order, of three rows each, after the non-negative ones
 
 
-class Program:
+class QpData:
     """Lays the rows out once and keeps the numbers."""
 
     def __init__(
         self,
         horizon: int,
         limits: InputLimits,
-        blocks: tuple[tuple[SoftRows, float | None], ...],
+        blocks: tuple[tuple[ConstraintBlock, float | None], ...],
     ) -> None:
         """Lay out the rows.
 
         Args:
             horizon: n.
             limits: Of the inputs.
-            blocks: Rows, and the price of a unit of their slacks; None makes them hard. The
-                price is linear, hence the penalty exact: rows that can hold, do hold.
+            blocks: Rows, and the penalty of a unit of their slacks; None makes them hard. The
+                penalty is linear, hence exact: rows that can hold, do hold.
         """
         self._blocks = tuple(rows for rows, _ in blocks)
         self.inputs = INPUTS * horizon
         self.hessian = np.zeros((self.inputs, self.inputs))  # upper triangle
         self.linear = np.zeros(self.inputs)
         slack: list[NDArray[np.intp]] = []
-        prices: list[Array] = []
-        for rows, price in blocks:
-            first = sum(map(len, prices))
-            slack.append(np.full(len(rows.node), -1) if price is None else first + rows.slack)
-            prices.append(np.full(0 if price is None else rows.slacks, price or 0.0))
-        self.price = np.concatenate(prices)  # (slacks,)
-        soft = self.soft_rows = sum(map(len, slack))
+        penalties: list[Array] = []
+        for rows, penalty in blocks:
+            first = sum(map(len, penalties))
+            slack.append(np.full(len(rows.node), -1) if penalty is None else first + rows.slack)
+            penalties.append(np.full(0 if penalty is None else rows.slacks, penalty or 0.0))
+        self.penalty = np.concatenate(penalties)  # (slacks,)
+        soft = self.block_rows = sum(map(len, slack))
         bound_rows, bounds = _bounds(horizon, limits)
         tilt_rows, tilts = _tilt_cones(horizon, limits.tilt)
         self.rows = Rows(
@@ -106,31 +106,31 @@ class Program:
     @property
     def unknowns(self) -> int:
         """Inputs and slacks."""
-        return self.inputs + len(self.price)
+        return self.inputs + len(self.penalty)
 
     def refill(self, guess: Array) -> None:
         """Bring the rows up to date with the soft blocks.
 
         Args:
-            guess: Inputs around which the blocks are linearised, (6 n,).
+            guess: (6 n,) [SI], inputs around which the blocks are linearised.
         """
         row = 0
         for block in self._blocks:
             end = row + len(block.node)
             np.negative(block.gradient, out=self.rows.g[row:end])
-            self.rows.b[row:end] = block.value - block.gradient @ guess - block.required
+            self.rows.b[row:end] = block.value - block.gradient @ guess - block.lower_bound
             row = end
 
     def least_slacks(self, inputs: Array) -> Array:
-        """Smallest slacks (slacks,) with which the soft rows admit these inputs (6 n,)."""
-        rows, slacks = self.rows, np.zeros(len(self.price))
+        """Smallest slacks (slacks,) with which the soft rows admit ``inputs`` (6 n,) [SI]."""
+        rows, slacks = self.rows, np.zeros(len(self.penalty))
         held = np.flatnonzero(rows.slack >= 0)
         np.maximum.at(slacks, rows.slack[held], rows.g[held] @ inputs - rows.b[held])
         return slacks
 
     def whole(self) -> QuadraticProgram:
         """All of it in Clarabel's form, unknowns (U, s), with a row for every slack >= 0."""
-        rows, slacks = self.rows, len(self.price)
+        rows, slacks = self.rows, len(self.penalty)
         softened = np.flatnonzero(rows.slack >= 0)
         holds = sparse.csc_matrix(
             (-np.ones(len(softened)), (softened, rows.slack[softened])),
@@ -142,12 +142,12 @@ class Program:
         positive = sparse.hstack((sparse.csc_matrix((slacks, self.inputs)), -sparse.eye(slacks)))
         cut = rows.first_cone
         return QuadraticProgram(
-            sparse.block_diag((upper, nothing)).tocsc(),
-            np.concatenate((self.linear, self.price)),
-            sparse.vstack((inside[:cut], positive, inside[cut:])).tocsc(),
-            np.concatenate((rows.b[:cut], np.zeros(slacks), rows.b[cut:])),
-            cut + slacks,
-            (len(rows.b) - cut) // CONE,
+            p=sparse.block_diag((upper, nothing)).tocsc(),
+            q=np.concatenate((self.linear, self.penalty)),
+            a=sparse.vstack((inside[:cut], positive, inside[cut:])).tocsc(),
+            b=np.concatenate((rows.b[:cut], np.zeros(slacks), rows.b[cut:])),
+            nonnegative_rows=cut + slacks,
+            cones=(len(rows.b) - cut) // CONE,
         )
 
 

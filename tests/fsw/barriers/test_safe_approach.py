@@ -10,8 +10,8 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from fsw.barriers.robust import required_h
-from fsw.barriers.root import BarrierTuning, root, root_slope
+from fsw.barriers.cbf_row import cbf_lower_bound
+from fsw.barriers.safe_approach import BarrierTuning, safe_approach_slope, safe_approach_speed
 
 alphas = st.floats(0.1, 10.0)
 slopes = st.floats(0.5, 10.0)
@@ -21,18 +21,18 @@ distances = st.floats(-2.0, 5.0)
 @given(distances, alphas, slopes)
 def test_never_above_the_true_root(d: float, alpha: float, slope: float) -> None:
     assume(d >= 0.0)
-    assert root(d, alpha, slope) <= math.sqrt(2.0 * alpha * d) + 1e-12
+    assert safe_approach_speed(d, alpha, slope) <= math.sqrt(2.0 * alpha * d) + 1e-12
 
 
 @given(distances, alphas, slopes)
 def test_outside_the_set_only_speeds_back_in_are_safe(d: float, alpha: float, slope: float) -> None:
     assume(d < -1e-9)
-    assert root(d, alpha, slope) < 0.0
+    assert safe_approach_speed(d, alpha, slope) < 0.0
 
 
 @given(distances, st.floats(1e-6, 1.0), alphas, slopes)
 def test_more_room_allows_more_speed(d: float, more: float, alpha: float, slope: float) -> None:
-    assert root(d + more, alpha, slope) > root(d, alpha, slope)
+    assert safe_approach_speed(d + more, alpha, slope) > safe_approach_speed(d, alpha, slope)
 
 
 @given(alphas, slopes)
@@ -41,9 +41,11 @@ def test_value_and_slope_are_continuous_where_line_and_root_meet(
 ) -> None:
     knee = alpha / slope**2
     below, above = knee * (1.0 - 1e-9), knee * (1.0 + 1e-9)
-    assert root(below, alpha, slope) == pytest.approx(root(above, alpha, slope), rel=1e-7)
-    assert root_slope(below, alpha, slope) == pytest.approx(
-        root_slope(above, alpha, slope), rel=1e-7
+    assert safe_approach_speed(below, alpha, slope) == pytest.approx(
+        safe_approach_speed(above, alpha, slope), rel=1e-7
+    )
+    assert safe_approach_slope(below, alpha, slope) == pytest.approx(
+        safe_approach_slope(above, alpha, slope), rel=1e-7
     )
 
 
@@ -52,16 +54,18 @@ def test_slope_is_the_finite_difference_and_never_above_its_bound(
     d: float, alpha: float, slope: float
 ) -> None:
     step = 1e-6
-    difference = (root(d + step, alpha, slope) - root(d - step, alpha, slope)) / (2.0 * step)
-    assert root_slope(d, alpha, slope) == pytest.approx(difference, rel=1e-3, abs=1e-6)
-    assert 0.0 < root_slope(d, alpha, slope) <= slope
+    difference = (
+        safe_approach_speed(d + step, alpha, slope) - safe_approach_speed(d - step, alpha, slope)
+    ) / (2.0 * step)
+    assert safe_approach_slope(d, alpha, slope) == pytest.approx(difference, rel=1e-3, abs=1e-6)
+    assert 0.0 < safe_approach_slope(d, alpha, slope) <= slope
 
 
 @given(st.floats(0.001, 4.0), alphas, slopes)
 def test_braking_at_alpha_from_the_safe_speed_stops_inside(
     d: float, alpha: float, slope: float
 ) -> None:
-    assert root(d, alpha, slope) ** 2 / (2.0 * alpha) <= d + 1e-9
+    assert safe_approach_speed(d, alpha, slope) ** 2 / (2.0 * alpha) <= d + 1e-9
 
 
 @given(
@@ -76,15 +80,15 @@ def test_required_h_is_the_one_step_condition_iterated(
     period, h = 0.1, h_start
     for _ in range(node):  # h' + gamma (h - lambda) = 0 over one sample
         h -= gamma * period * (h - robustness)
-    tuning = BarrierTuning(gamma=gamma, robustness=robustness, slope=1.0)
-    assert required_h(h_start, node, tuning.numbers(period)) == pytest.approx(h, abs=1e-12)
+    tuning = BarrierTuning(gamma=gamma, lambda_=robustness, slope=1.0)
+    assert cbf_lower_bound(h_start, node, tuning.numbers(period)) == pytest.approx(h, abs=1e-12)
 
 
-@pytest.mark.parametrize("name", ["alpha", "slope", "gamma", "robustness"])
+@pytest.mark.parametrize("name", ["alpha", "slope", "gamma", "lambda_"])
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, 0.0, -1.0])
 def test_tuning_refuses_what_is_not_a_positive_number(name: str, value: float) -> None:
     build: Callable[..., Any] = BarrierTuning
-    with pytest.raises(ValueError, match=name):
+    with pytest.raises(ValueError, match=name.strip("_")):
         build(**{name: value})
 
 
@@ -92,5 +96,5 @@ def test_tuning_refuses_what_is_not_a_positive_number(name: str, value: float) -
 def test_tuning_refuses_a_rate_too_fast_for_its_period(name: str) -> None:
     build: Callable[..., Any] = BarrierTuning
     build(**{name: 10.0}).check_sampling(0.1)
-    with pytest.raises(ValueError, match=name):
+    with pytest.raises(ValueError, match=name.strip("_")):
         build(**{name: 10.1}).check_sampling(0.1)

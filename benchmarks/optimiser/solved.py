@@ -21,7 +21,7 @@ class Spent:
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
+class Solved:
     """What one timed call gave."""
 
     spent: Spent

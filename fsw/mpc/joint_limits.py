@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fsw.barriers.soft_rows import SoftRows
+from fsw.barriers.constraint_block import ConstraintBlock
 from fsw.model.linearisation import Linearisation
 from fsw.model.prediction import INPUTS, Q_ARM, CondensedModel
 
@@ -17,9 +17,9 @@ class JointLimits:
     def __init__(self, model: CondensedModel) -> None:
         airframe = model.airframe
         nodes = np.repeat(np.arange(1, model.horizon + 1), len(_LIMITED))
-        self.rows = SoftRows(nodes, nodes - 1, INPUTS * model.horizon)
+        self.rows = ConstraintBlock(nodes, nodes - 1, INPUTS * model.horizon)
         limits = np.array([airframe.joint1_limit] * 2 + [airframe.joint12_limit] * 2)
-        self.rows.required[:] = np.tile(-limits, model.horizon)
+        self.rows.lower_bound[:] = np.tile(-limits, model.horizon)
         angles = model.gamma[1:, Q_ARM : Q_ARM + 2]  # (n, 2, 6 n)
         self.rows.gradient[:] = -np.einsum("lj,njk->nlk", _LIMITED, angles).reshape(
             self.rows.gradient.shape

@@ -19,7 +19,7 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from fsw.compiled import compiled
+from fsw.compiled import compilable
 
 
 class BarrierNumbers(NamedTuple):
@@ -28,7 +28,7 @@ class BarrierNumbers(NamedTuple):
     alpha: float  # m/s^2
     slope: float  # 1/s
     gamma: float  # 1/s
-    robustness: float  # m/s
+    lambda_: float  # m/s
     period: float  # s
     first_node: int  # the first one with rows
 
@@ -46,14 +46,20 @@ class BarrierTuning:
     gamma: float = 3.0  # 1/s
     # lambda of eq 25 [m/s]. At rest the plan keeps lambda / slope = 67 mm from the boundary,
     # more than the 58 mm the fast loop can be pushed off the plan by 0.8 m/s^2.
-    robustness: float = 0.28
+    lambda_: float = 0.28
     skipped_nodes: int = 1  # first nodes, which the inputs can hardly move
 
     def __post_init__(self) -> None:
-        for name in ("alpha", "slope", "gamma", "robustness"):
+        for name in ("alpha", "slope", "gamma", "lambda_"):
             value = getattr(self, name)
             if not (0.0 < value < math.inf):
-                raise ValueError(f"barrier {name} is {value}; it must be positive and finite")
+                raise ValueError(
+                    f"barrier {name.strip('_')} is {value}; it must be positive and finite"
+                )
+
+    def approach_speed(self, distance: float) -> float:
+        """S of these constants [m/s] at a ``distance`` [m] to the boundary."""
+        return safe_approach_speed(distance, self.alpha, self.slope)
 
     def check_sampling(self, period: float) -> None:
         """Check the sampled-data conditions ``k_S T <= 1`` and ``gamma T <= 1``.
@@ -77,23 +83,31 @@ class BarrierTuning:
             alpha=self.alpha,
             slope=self.slope,
             gamma=self.gamma,
-            robustness=self.robustness,
+            lambda_=self.lambda_,
             period=period,
             first_node=1 + self.skipped_nodes,
         )
 
 
-@compiled
-def root(distance: float, alpha: float, slope: float) -> float:
-    """Largest safe approach speed S(distance) [m/s]."""
-    if distance < alpha / (slope * slope):
+@compilable
+def safe_approach_speed(distance: float, alpha: float, slope: float) -> float:
+    """Largest safe approach speed S [m/s].
+
+    Args:
+        distance: To the boundary, negative outside [m].
+        alpha: Assumed braking deceleration [m/s^2].
+        slope: k_S, of the tangent that continues the root [1/s].
+    """
+    knee = alpha / (slope * slope)
+    if distance < knee:
         return slope * distance
-    return math.sqrt(2.0 * alpha * (distance - alpha / (2.0 * slope * slope)))
+    return math.sqrt(2.0 * alpha * (distance - 0.5 * knee))
 
 
-@compiled
-def root_slope(distance: float, alpha: float, slope: float) -> float:
-    """Derivative of S in the distance [1/s]."""
-    if distance < alpha / (slope * slope):
+@compilable
+def safe_approach_slope(distance: float, alpha: float, slope: float) -> float:
+    """Derivative of S in the ``distance`` [m]; ``alpha`` [m/s^2] and ``slope`` [1/s] as there."""
+    knee = alpha / (slope * slope)
+    if distance < knee:
         return slope
-    return alpha / math.sqrt(2.0 * alpha * (distance - alpha / (2.0 * slope * slope)))
+    return alpha / math.sqrt(2.0 * alpha * (distance - 0.5 * knee))

@@ -18,22 +18,22 @@ from fsw.model.prediction import Array
 class TrackingTuning:
     """Design of the loop that follows the plan (docs/decisions/0005-tracking-inner-loop.md).
 
-    The gains are those of a discrete LQR on the position of one point; ``effort`` is its
-    price of snap. A cheaper price follows the plan more closely until the rotors saturate,
+    The gains are those of a discrete LQR on the position of one point; ``input_weight`` is its
+    weight on snap. A smaller weight follows the plan more closely until the rotors saturate,
     which makes the loop diverge: 1e-8 does, 1.2e-7 leaves 15 % of the rotors' torque at
     0.8 m/s^2 of disturbance (``tube.py``).
     """
 
-    effort: float = 1.2e-7  # horizontal, on (m/s^4)^2
+    input_weight: float = 1.2e-7  # horizontal, on (m/s^4)^2
     # The point sits half-way down to a hanging end-effector: holding the base alone, every
     # correction swings the end-effector; holding the end-effector alone, the base wanders.
     point_below_base: float = 0.1125  # m
-    vertical_effort: float = 1e-6  # on (m/s^2)^2
+    vertical_input_weight: float = 1e-6  # on (m/s^2)^2
     disturbance_correlation: float = 0.05  # s, of the Ornstein-Uhlenbeck model
     observer_bandwidth: float = 130.0  # rad/s
     # Wind: what stays of the observed disturbance is cancelled whole. Slowly, because the mean of
-    # a random one is nobody's wind, and within a limit, because whoever pushes one way for long
-    # and then the other finds it added to his push (``tube.py``).
+    # a random one is not wind, and within a limit, because the estimate adds to a push that
+    # acts one way for long and then the other (``tube.py``).
     wind_time: float = 3.0  # s
     wind_limit: float = 0.15  # m/s^2 an axis
     position_error_limit: float = 0.07  # m
@@ -83,10 +83,12 @@ def tracking_gains(tuning: TrackingTuning, rotor_lag: float, dt: float) -> Track
     b = np.array([[0.0], [0.0], [0.0], [0.0], [1.0 / rotor_lag], [0.0]])
     # Tilting for an acceleration moves the point below the base by -height / g times it.
     point = np.array([1.0, 0.0, -tuning.point_below_base / GRAVITY, 0.0, 0.0, 0.0])
-    k = _lqr(a, b, np.outer(point, point), tuning.effort, dt)
+    k = _lqr(a, b, np.outer(point, point), tuning.input_weight, dt)
     a_vertical = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, -1.0 / rotor_lag]])
     b_vertical = np.array([[0.0], [0.0], [1.0 / rotor_lag]])
-    k_vertical = _lqr(a_vertical, b_vertical, np.diag([1.0, 0.0, 0.0]), tuning.vertical_effort, dt)
+    k_vertical = _lqr(
+        a_vertical, b_vertical, np.diag([1.0, 0.0, 0.0]), tuning.vertical_input_weight, dt
+    )
     return TrackingGains(
         k=(k[0], k[1], k[2], k[3], k[4]),
         k_disturbance=k[5],
@@ -94,13 +96,13 @@ def tracking_gains(tuning: TrackingTuning, rotor_lag: float, dt: float) -> Track
     )
 
 
-def _lqr(a: Array, b: Array, q: Array, effort: float, dt: float) -> list[float]:
+def _lqr(a: Array, b: Array, q: Array, input_weight: float, dt: float) -> list[float]:
     """Discrete LQR gain of a single-input chain."""
     n = len(a)
     block = np.zeros((n + 1, n + 1))
     block[:n, :n], block[:n, n:] = a * dt, b * dt
     exponential = expm(block)
     ad, bd = exponential[:n, :n], exponential[:n, n:]
-    p = solve_discrete_are(ad, bd, q, np.array([[effort]]))
-    gain = np.linalg.solve(effort + bd.T @ p @ bd, bd.T @ p @ ad)
+    p = solve_discrete_are(ad, bd, q, np.array([[input_weight]]))
+    gain = np.linalg.solve(input_weight + bd.T @ p @ bd, bd.T @ p @ ad)
     return [float(value) for value in gain[0]]

@@ -1,0 +1,98 @@
+"""The worked examples of docs/architecture.md: each applies, is small, and does what it says."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PAGE = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+DIFFS = re.findall(r"\*\*(.+?)\*\*:.*?```diff\n(.*?)```", PAGE, re.DOTALL)
+MOST_FILES = 2
+
+NEW_MODE = """
+from fsw.flight.modes import MODES
+from fsw.link.wire.px4_mode import AVAILABLE_MODES
+from fsw.signals import CommandResult, Mode
+from tests.fsw.flight.asked import ask
+from tests.fsw.flight.contexts import flying
+assert ask(flying(), 176, 1.0, 4.0, 12.0).mode is Mode.STOW
+refused = ask(flying(landed=True), 176, 1.0, 4.0, 12.0)
+assert refused.result == CommandResult.TEMPORARILY_REJECTED
+assert "ground" in refused.reason
+assert "Stow" in [one.name for one in AVAILABLE_MODES]
+assert MODES[Mode.STOW].__module__ == "fsw.flight.modes.stow"
+"""
+NEW_CONDITION = """
+from dataclasses import replace
+from fsw.flight.commander import Commander
+from fsw.flight.state import FlightState, VehicleMemory
+from fsw.parameters.flight_config import flight_config
+from fsw.signals import ConstraintReport, Mode
+from tests.fsw.random_states import random_estimate
+import numpy
+level = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+estimate = random_estimate(numpy.random.default_rng(1))._replace(R_WB=level)
+vehicle = VehicleMemory(mode=Mode.TRAJECTORY, landed=False)
+state = FlightState(vehicle=vehicle, estimate=estimate, t_us=estimate.t_us)
+state = replace(state, plan=replace(state.plan, since_us=estimate.t_us))
+commander = Commander(flight_config())
+for margin, mode in ((0.01, Mode.TRAJECTORY), (-0.01, Mode.HOLD)):
+    texts = []
+    near = replace(state, constraints=ConstraintReport(margins=(1.0, margin)))
+    after = commander.check_failsafes(near, estimate, texts)
+    assert after.vehicle.mode is mode, (margin, after.vehicle)
+    assert bool(texts) == (mode is Mode.HOLD)
+assert "inside the clearance" in texts[0].text
+"""
+NEW_TILT = """
+import math
+from fsw.control.braking import Brake
+from fsw.model.airframe import AIRFRAME, GRAVITY
+from fsw.parameters.flight_config import flight_config
+from fsw.signals import PredictionState
+limit = flight_config().planner.limits.tilt
+assert limit == math.pi / 12.0
+level, still = (0.0, 0.0), (0.0, 0.0, 0.0)
+fast = PredictionState(still, (5.0, 0.0, 0.0), still, level, level, 0.0, 0.0, level, level)
+braking = Brake(AIRFRAME, limit)(fast)
+assert math.isclose(-braking.a[0], math.tan(limit) * GRAVITY)
+"""
+CHECKS = {
+    "Add a flight mode": NEW_MODE,
+    "Act on a condition": NEW_CONDITION,
+    "Change the tilt limit": NEW_TILT,
+}
+
+
+def test_there_is_an_example_of_each() -> None:
+    assert [title for title, _ in DIFFS] == list(CHECKS)
+
+
+@pytest.mark.parametrize(("title", "diff"), DIFFS, ids=[title for title, _ in DIFFS])
+def test_the_example_applies_and_does_what_it_says(title: str, diff: str, tmp_path: Path) -> None:
+    files = set(re.findall(r"^\+\+\+ b/(.+)$", diff, re.MULTILINE))
+    assert 1 <= len(files) <= MOST_FILES
+    for folder in ("fsw", "messages", "tests/fsw"):
+        ignored = shutil.ignore_patterns("__pycache__")
+        shutil.copytree(ROOT / folder, tmp_path / folder, ignore=ignored)
+    applied = subprocess.run(
+        ["git", "apply", "--recount", "-"], input=diff, text=True, cwd=tmp_path, capture_output=True
+    )
+    assert applied.returncode == 0, applied.stderr
+    # Plain Python: a copy of the kernels would be compiled anew, which takes a minute.
+    environment = {**os.environ, "NUMBA_DISABLE_JIT": "1", "PYTHONPATH": str(tmp_path)}
+    checked = subprocess.run(
+        [sys.executable, "-c", CHECKS[title]],
+        cwd=tmp_path,
+        env=environment,
+        capture_output=True,
+        text=True,
+    )
+    assert checked.returncode == 0, checked.stderr
