@@ -7,13 +7,13 @@ import json
 import os
 import signal
 import socket
-import time
 from pathlib import Path
 
 import pytest
 
 from messages import dialect
 from tests.processes.halves import Half
+from tests.waiting import wait_for
 
 STATUSTEXT = 253
 
@@ -41,15 +41,17 @@ def texts(ground: socket.socket) -> list[str]:
 
 def planner_of(fsw: int, instead_of: int | None = None) -> tuple[int, int]:
     """The fork server and its worker, once a worker that is not ``instead_of`` is there."""
-    until = time.monotonic() + 10.0
-    while time.monotonic() < until:
+
+    def found() -> tuple[int, int] | None:
         with contextlib.suppress(ValueError, FileNotFoundError):
             (server,) = children(fsw)
             (worker,) = children(server)
-            if worker != instead_of:
-                return server, worker
-        time.sleep(0.01)
-    raise AssertionError("no planner")
+            return None if worker == instead_of else (server, worker)
+        return None
+
+    both = wait_for(found, "a planner")
+    assert both is not None
+    return both
 
 
 def fly_until(t_s: float, sitl: Half) -> None:

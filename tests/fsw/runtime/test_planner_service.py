@@ -5,8 +5,7 @@ from __future__ import annotations
 import mmap
 import os
 import signal
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -27,6 +26,7 @@ from fsw.signals import (
     SafeSet,
     SolverStatus,
 )
+from tests.waiting import wait_for
 
 REST = PredictionState(
     (0.0,) * 3, (0.0,) * 3, (0.0,) * 3, (0.0,) * 2, (0.0,) * 2, 0.0, 0.0, (0.0,) * 2, (0.0,) * 2
@@ -113,17 +113,10 @@ def gated(record: PlannerRecord, clock: SharedClock, gate: Path) -> Iterator[Pro
     planner.close()
 
 
-def wait_for(condition: Callable[[], object]) -> None:
-    until = time.monotonic() + 20.0
-    while not condition():
-        assert time.monotonic() < until
-        time.sleep(0.001)
-
-
-def answer(service: ProcessPlanner, t_us: int = ALWAYS_US) -> Plan | PlanFailure:
-    answers: list[Plan | PlanFailure] = []
-    wait_for(lambda: answers.append(a) or True if (a := service.take(t_us)) else False)
-    return answers[0]
+def answer(service: ProcessPlanner) -> Plan | PlanFailure:
+    given = wait_for(lambda: service.take(ALWAYS_US))
+    assert given is not None
+    return given
 
 
 def processes_of(service: ProcessPlanner) -> tuple[int, int]:
