@@ -283,19 +283,22 @@ def test_nothing_is_left_of_it(service: ProcessPlanner) -> None:
     wait_for(lambda: is_gone(worker))
 
 
-def test_a_parent_that_is_killed_leaves_no_orphans() -> None:
+@pytest.mark.parametrize("ended_by", [signal.SIGTERM, signal.SIGKILL])
+@pytest.mark.parametrize("task", [2, HANG], ids=["idle", "busy"])
+def test_a_parent_that_is_ended_leaves_no_orphans(ended_by: signal.Signals, task: int) -> None:
     reading, writing = os.pipe()
     parent = os.fork()
     if parent == 0:
         service = ProcessPlanner(Refusing(), SharedClock(), PlannerRecord(GroupTimer(100_000)))
         service.submit(request(1))
         answer(service)
+        service.submit(request(task))
         os.write(writing, f"{service.worker} {service.fork_server}".encode())
         signal.pause()
         os._exit(0)
     os.close(writing)
     worker, server = map(int, os.read(reading, 100).split())
     os.close(reading)
-    os.kill(parent, signal.SIGKILL)
+    os.kill(parent, ended_by)
     os.waitpid(parent, 0)
     wait_for(lambda: is_gone(worker) and is_gone(server))
