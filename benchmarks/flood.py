@@ -132,7 +132,9 @@ def measure(duration_s: float, *, flooded: bool, display: Display) -> Flight:
         if flown.interrupted or flown.sitl is None:
             raise ProcessFailed(flown.failure or "interrupted", exit_code=NOT_PASSED)
     sent, sent_valid = (int(count) for count in counts) if counts else (0, 0)
-    return Flight(monitor.heard, vehicle, flown.sitl, sent, sent_valid)
+    return Flight(
+        heard=monitor.heard, vehicle=vehicle, sitl=flown.sitl, sent=sent, sent_valid=sent_valid
+    )
 
 
 @contextmanager

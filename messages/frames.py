@@ -279,7 +279,13 @@ def _frame_at(datagram: bytes, start: int) -> tuple[int, Frame | None]:
     size = layout.payload.size
     payload = datagram[payload_at:payload_end][:size].ljust(size, b"\0")
     values = layout.payload.unpack(payload)
-    return end - start, Frame(system_id, component_id, sequence, message_id, values)
+    return end - start, Frame(
+        system_id=system_id,
+        component_id=component_id,
+        sequence=sequence,
+        message_id=message_id,
+        payload_values=values,
+    )
 
 
 def _frame_1_at(datagram: bytes, start: int) -> tuple[int, Frame | None]:
@@ -307,7 +313,13 @@ def _frame_1_at(datagram: bytes, start: int) -> tuple[int, Frame | None]:
         return 0, None
     payload = datagram[payload_at:payload_end].ljust(layout.payload.size, b"\0")
     values = layout.payload.unpack(payload)
-    return end - start, Frame(system_id, component_id, sequence, message_id, values)
+    return end - start, Frame(
+        system_id=system_id,
+        component_id=component_id,
+        sequence=sequence,
+        message_id=message_id,
+        payload_values=values,
+    )
 
 
 def wire_fields(message_id: int) -> tuple[str, ...]:

@@ -169,11 +169,11 @@ def fly(
         if answer is not None:
             recorder.planned(answer)
         inputs = TickInputs(
-            sensors,
-            answer,
-            ((_ARM,), (_FOLLOW,))[step] if step < 2 else (),
-            loop.targets(),
-            announced if step == 0 else None,
+            sensors=sensors,
+            plan=answer,
+            commands=((_ARM,), (_FOLLOW,))[step] if step < 2 else (),
+            targets=loop.targets(),
+            safe_set=announced if step == 0 else None,
         )
         if traced and step % TRACE_STEPS == 0:
             recorder.trace.append(_trace_point(simulation))
@@ -181,7 +181,7 @@ def fly(
         _insist(outputs)
         applied = outputs.snapshot.plan_input
         if step % steps_per_plan == 0 and applied is not None:
-            recorder.effort.add(applied)
+            recorder.metrics.add(applied)
         if outputs.plan_request is not None and asked is not None:
             asked(outputs.plan_request)
     return recorder.result(simulation.result())

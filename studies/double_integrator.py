@@ -60,16 +60,16 @@ class PointMass:
         p, v, half = self.p, self.v, 0.5 * dt * dt
         (q1, q2), (qd1, qd2), (qdd1, qdd2) = self.q_arm, self.qd_arm, u.qdd_arm
         return PointMass(
-            (
+            p=(
                 p[0] + dt * v[0] + half * a[0],
                 p[1] + dt * v[1] + half * a[1],
                 p[2] + dt * v[2] + half * a[2],
             ),
-            (v[0] + dt * a[0], v[1] + dt * a[1], v[2] + dt * a[2]),
-            self.yaw + dt * self.yaw_rate + half * u.yaw_acc,
-            self.yaw_rate + dt * u.yaw_acc,
-            (q1 + dt * qd1 + half * qdd1, q2 + dt * qd2 + half * qdd2),
-            (qd1 + dt * qdd1, qd2 + dt * qdd2),
+            v=(v[0] + dt * a[0], v[1] + dt * a[1], v[2] + dt * a[2]),
+            yaw=self.yaw + dt * self.yaw_rate + half * u.yaw_acc,
+            yaw_rate=self.yaw_rate + dt * u.yaw_acc,
+            q_arm=(q1 + dt * qd1 + half * qdd1, q2 + dt * qd2 + half * qdd2),
+            qd_arm=(qd1 + dt * qdd1, qd2 + dt * qdd2),
         )
 
     def points(self) -> Points:
@@ -83,15 +83,15 @@ class PointMass:
     def as_prediction(self) -> PredictionState:
         """The same for the planner: no tilt, no tilt rate."""
         return PredictionState(
-            self.p,
-            self.v,
-            (0.0, 0.0, 0.0),
-            _LEVEL,
-            _LEVEL,
-            self.yaw,
-            self.yaw_rate,
-            self.q_arm,
-            self.qd_arm,
+            p=self.p,
+            v=self.v,
+            a=(0.0, 0.0, 0.0),
+            j=_LEVEL,
+            s=_LEVEL,
+            yaw=self.yaw,
+            yaw_rate=self.yaw_rate,
+            q_arm=self.q_arm,
+            qd_arm=self.qd_arm,
         )
 
     def _hung(self, forward: float, down: float) -> Vec3:
@@ -177,12 +177,21 @@ def fly(
             target(plant.clock, t_us + node * config.mpc_period_us)
             for node in range(config.planner.horizon + 1)
         )
-        answer = planner.plan(PlanRequest(len(recorder.step_us), t_us, start, targets, held, False))
+        answer = planner.plan(
+            PlanRequest(
+                plan_id=len(recorder.step_us),
+                t_apply_us=t_us,
+                start=start,
+                targets=targets,
+                safe_set=held,
+                from_nominal=False,
+            )
+        )
         recorder.planned(answer)
         running = answer if isinstance(answer, Plan) else running
         # As in flight: without an answer the running plan goes on, then the vehicle brakes.
         u = plan_input(running, start, t_us, brake)
-        recorder.effort.add(u)
+        recorder.metrics.add(u)
         for _ in range(steps):
             if traced and plant.step % TRACE_STEPS == 0:
                 recorder.trace.append(_trace_point(plant))
@@ -194,20 +203,24 @@ def fly(
 def _first_state(scenario: Scenario, p_target: V3) -> PointMass:
     th1, th2 = (math.radians(angle) for angle in scenario.start.arm_deg)
     here = PointMass(
-        (0.0, 0.0, 0.0),
-        (0.0, 0.0, 0.0),
-        math.radians(scenario.start.yaw_deg),
-        0.0,
-        (th1, th2),
-        (0.0, 0.0),
+        p=(0.0, 0.0, 0.0),
+        v=(0.0, 0.0, 0.0),
+        yaw=math.radians(scenario.start.yaw_deg),
+        yaw_rate=0.0,
+        q_arm=(th1, th2),
+        qd_arm=(0.0, 0.0),
     )
     x, y, z = here.points()[2]
     p = (p_target[0] - x, p_target[1] - y, p_target[2] - z)
-    return PointMass(p, here.v, here.yaw, here.yaw_rate, here.q_arm, here.qd_arm)
+    return PointMass(
+        p=p, v=here.v, yaw=here.yaw, yaw_rate=here.yaw_rate, q_arm=here.q_arm, qd_arm=here.qd_arm
+    )
 
 
 def _trace_point(plant: DoubleIntegrator) -> TracePoint:
     points = plant.state.points()
     margins = plant.evaluator.margins(points, plant.time_s)
     aim = plant.clock.target_at(plant.time_s).p
-    return TracePoint(plant.time_s, points[0], points[2], aim, min(margins))
+    return TracePoint(
+        t_s=plant.time_s, p_WB=points[0], p_WE=points[2], p_target=aim, margin_m=min(margins)
+    )

@@ -65,7 +65,11 @@ class PlannerMethod:
             return Solved(spent, None, None)
         timings = plan.timings
         return Solved(
-            spent, flat(plan), plan.sqp_iterations, timings.linearise_us, timings.solve_us
+            spent=spent,
+            inputs=flat(plan),
+            sqp_iterations=plan.sqp_iterations,
+            linearise_us=timings.linearise_us,
+            solve_us=timings.solve_us,
         )
 
 

@@ -138,7 +138,13 @@ class Autopilot:
             arming_refusal=state.arming_refusal,
         )
         snapshot = _snapshot(state, estimate, u, inputs)
-        return state, TickOutputs(sent, snapshot, request, tuple(acks), tuple(texts))
+        return state, TickOutputs(
+            actuators=sent,
+            snapshot=snapshot,
+            plan_request=request,
+            acks=tuple(acks),
+            texts=tuple(texts),
+        )
 
     def _receive(
         self, state: FlightState, inputs: TickInputs, texts: list[StatusText]
@@ -293,7 +299,14 @@ def _blind(inputs: TickInputs, texts: list[StatusText]) -> TickOutputs:
     zero = (0.0, 0.0, 0.0)
     level = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
     nowhere = StateEstimate(
-        inputs.sensors.t_us, zero, zero, level, zero, 0.0, (0.0, 0.0), (0.0, 0.0)
+        t_us=inputs.sensors.t_us,
+        p_WB=zero,
+        v_WB=zero,
+        R_WB=level,
+        w_WB_B=zero,
+        yaw=0.0,
+        q_arm=(0.0, 0.0),
+        qd_arm=(0.0, 0.0),
     )
     empty = FlightState()
     snapshot = FlightSnapshot(
@@ -316,4 +329,10 @@ def _blind(inputs: TickInputs, texts: list[StatusText]) -> TickOutputs:
     if acks:
         reason = "command refused: there is no valid state estimate yet"
         texts.append(StatusText(Severity.CRITICAL, reason))
-    return TickOutputs(STOPPED, snapshot, None, tuple(acks), tuple(texts))
+    return TickOutputs(
+        actuators=STOPPED,
+        snapshot=snapshot,
+        plan_request=None,
+        acks=tuple(acks),
+        texts=tuple(texts),
+    )

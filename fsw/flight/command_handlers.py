@@ -208,7 +208,9 @@ def _orbit(action: FlyOrbit, context: CommandContext, modes: Modes) -> Decision:
     if decision.result != ACCEPTED:
         return decision
     flown = min(asked, most)
-    orbit = Orbit(centre, radius, flown, action.clockwise, action.facing)
+    orbit = Orbit(
+        centre=centre, radius=radius, speed=flown, clockwise=action.clockwise, facing=action.facing
+    )
     slower = f"orbit at {flown:.2f} m/s: faster cannot be flown at {radius:g} m"
     goal = PositionGoal(MotionSetpoint(False, centre), orbit=orbit)
     return replace(decision, goal=goal, reason=slower if asked > most else "")

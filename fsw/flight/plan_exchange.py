@@ -30,15 +30,15 @@ _JOINT_RATE = 3.0  # rad/s, which the plan stops within its horizon
 def nominal_at_rest(estimate: StateEstimate) -> PredictionState:
     """A plan state that stands where the vehicle is."""
     return PredictionState(
-        estimate.p_WB,
-        (0.0, 0.0, 0.0),
-        (0.0, 0.0, 0.0),
-        (0.0, 0.0),
-        (0.0, 0.0),
-        estimate.yaw,
-        0.0,
-        estimate.q_arm,
-        (0.0, 0.0),
+        p=estimate.p_WB,
+        v=(0.0, 0.0, 0.0),
+        a=(0.0, 0.0, 0.0),
+        j=(0.0, 0.0),
+        s=(0.0, 0.0),
+        yaw=estimate.yaw,
+        yaw_rate=0.0,
+        q_arm=estimate.q_arm,
+        qd_arm=(0.0, 0.0),
     )
 
 
@@ -49,15 +49,15 @@ def measured_state(estimate: StateEstimate, motion: MotionState) -> PredictionSt
     # ZYX yaw rate: the body rates' share about the vertical, over the cosine of pitch squared.
     yaw_rate = (R[7] * wy + R[8] * wz) / max(R[7] * R[7] + R[8] * R[8], 1e-6)
     return PredictionState(
-        estimate.p_WB,
-        estimate.v_WB,
-        motion.a,
-        motion.j,
-        motion.s,
-        estimate.yaw,
-        yaw_rate,
-        estimate.q_arm,
-        estimate.qd_arm,
+        p=estimate.p_WB,
+        v=estimate.v_WB,
+        a=motion.a,
+        j=motion.j,
+        s=motion.s,
+        yaw=estimate.yaw,
+        yaw_rate=yaw_rate,
+        q_arm=estimate.q_arm,
+        qd_arm=estimate.qd_arm,
     )
 
 

@@ -103,7 +103,12 @@ class SetpointGenerator:
             p, v = point_in_flight(estimate, self._config.airframe.link_length)
             return ReferenceState(True, p, v, estimate.yaw)
         return ReferenceState(
-            False, estimate.p_WB, estimate.v_WB, estimate.yaw, 0.0, estimate.q_arm
+            of_end_effector=False,
+            p=estimate.p_WB,
+            v=estimate.v_WB,
+            yaw=estimate.yaw,
+            yaw_rate=0.0,
+            q_arm=estimate.q_arm,
         )
 
     def advance(

@@ -102,7 +102,14 @@ def segment_to(
     distance, angle = math.hypot(*way), abs(turn)
     if distance < 1e-9 and angle < 1e-9:
         return TrajectorySegment(
-            start.t_us, start.p_WE, (0.0, 0.0, 0.0), start.yaw, 0.0, 0.0, 0.0, 0.0
+            start_us=start.t_us,
+            start=start.p_WE,
+            way=(0.0, 0.0, 0.0),
+            yaw=start.yaw,
+            turn=0.0,
+            up=0.0,
+            cruise=0.0,
+            down=0.0,
         )
     u = _smaller(limits.speed, distance, limits.turn_rate, angle)
     slope = _smaller(limits.acceleration, distance, limits.turn_acceleration, angle)
@@ -111,7 +118,14 @@ def segment_to(
         u = math.sqrt(slope / _PEAK)
         ramp = 1.0 / u
     return TrajectorySegment(
-        start.t_us, start.p_WE, way, start.yaw, turn, ramp, max(1.0 / u - ramp, 0.0), ramp
+        start_us=start.t_us,
+        start=start.p_WE,
+        way=way,
+        yaw=start.yaw,
+        turn=turn,
+        up=ramp,
+        cruise=max(1.0 / u - ramp, 0.0),
+        down=ramp,
     )
 
 
@@ -120,7 +134,16 @@ def braking_segment(start: EndEffectorTarget, limits: MotionLimits) -> Trajector
     down = _PEAK * math.hypot(*start.v_WE) / limits.acceleration
     vx, vy, vz = start.v_WE
     way = (0.5 * down * vx, 0.5 * down * vy, 0.5 * down * vz)
-    return TrajectorySegment(start.t_us, start.p_WE, way, start.yaw, 0.0, 0.0, 0.0, down)
+    return TrajectorySegment(
+        start_us=start.t_us,
+        start=start.p_WE,
+        way=way,
+        yaw=start.yaw,
+        turn=0.0,
+        up=0.0,
+        cruise=0.0,
+        down=down,
+    )
 
 
 def _rise(t: float, ramp: float) -> tuple[float, float, float]:

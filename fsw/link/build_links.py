@@ -47,12 +47,26 @@ def build_links(
     now_us, unix_us = clocks
     keys = choice.keys or default_keys()
     setups = [
-        LinkSetup("gcs", chosen.gcs, _GCS_PORT, GROUND_RATES, True, choice.allow_remote),
+        LinkSetup(
+            name="gcs",
+            target=chosen.gcs,
+            local_port=_GCS_PORT,
+            rates_hz=GROUND_RATES,
+            unheard=True,
+            remote=choice.allow_remote,
+        ),
     ]
     if chosen.api is not None:
         setups.append(
             # Until a program speaks, a heartbeat a second is all it needs to find the vehicle.
-            LinkSetup("api", chosen.api, _API_PORT, API_RATES, False, choice.allow_remote)
+            LinkSetup(
+                name="api",
+                target=chosen.api,
+                local_port=_API_PORT,
+                rates_hz=API_RATES,
+                unheard=False,
+                remote=choice.allow_remote,
+            )
         )
     links = [
         GcsLink(

@@ -66,4 +66,10 @@ def drained(
     remaining = max(1.0 - consumed / model.capacity, 0.0)
     at_rest = model.empty + (model.full - model.empty) * remaining
     voltage = at_rest - model.resistance * current
-    return BatteryState(voltage, current, consumed, remaining, charge_of(remaining, levels))
+    return BatteryState(
+        voltage=voltage,
+        current=current,
+        consumed=consumed,
+        remaining=remaining,
+        charge=charge_of(remaining, levels),
+    )

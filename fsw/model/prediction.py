@@ -101,7 +101,7 @@ def condense(airframe: Airframe, period: float, horizon: int) -> CondensedModel:
         phi[i + 1] = a @ phi[i]
         gamma[i + 1] = a @ gamma[i]
         gamma[i + 1, :, INPUTS * i : INPUTS * (i + 1)] = b
-    return CondensedModel(airframe, horizon, period, phi, gamma)
+    return CondensedModel(airframe=airframe, horizon=horizon, period=period, phi=phi, gamma=gamma)
 
 
 @compilable

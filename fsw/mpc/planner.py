@@ -85,7 +85,15 @@ class Planner:
         ):
             for joint_targets in ((), (rest.q_arm,) * len(targets)):
                 self.plan(
-                    PlanRequest(0, 0, rest, targets, safe_set, False, joint_targets=joint_targets)
+                    PlanRequest(
+                        plan_id=0,
+                        t_apply_us=0,
+                        start=rest,
+                        targets=targets,
+                        safe_set=safe_set,
+                        from_nominal=False,
+                        joint_targets=joint_targets,
+                    )
                 )
         self._t_us = -1
         self._inputs[:] = 0.0

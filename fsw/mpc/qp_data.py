@@ -3,13 +3,13 @@
 Minimise ``1/2 U' H U + c' U + penalty' s`` over the inputs U (6 n) and the slacks s >= 0 of the
 soft rows, subject to
 
-====================  ==========================================  =============
-rows, in this order   meaning                                     cone
-====================  ==========================================  =============
-soft blocks           gradient U + slack >= lower bound - constant   non-negative
-input bounds          -u_max <= u <= u_max                        non-negative
-tilt, one a node      |a_xy| <= tan(tilt) (g - a_z)               second-order
-====================  ==========================================  =============
+====================  ============================================  =============
+rows, in this order   meaning                                       cone
+====================  ============================================  =============
+soft blocks           gradient U + slack >= lower bound - constant  non-negative
+input bounds          -u_max <= u <= u_max                          non-negative
+tilt, one a node      |a_xy| <= tan(tilt) (g - a_z)                 second-order
+====================  ============================================  =============
 
 Source: docs/equations.md E17.
 """
@@ -142,12 +142,12 @@ class QpData:
         positive = sparse.hstack((sparse.csc_matrix((slacks, self.inputs)), -sparse.eye(slacks)))
         cut = rows.first_cone
         return QuadraticProgram(
-            sparse.block_diag((upper, nothing)).tocsc(),
-            np.concatenate((self.linear, self.penalty)),
-            sparse.vstack((inside[:cut], positive, inside[cut:])).tocsc(),
-            np.concatenate((rows.b[:cut], np.zeros(slacks), rows.b[cut:])),
-            cut + slacks,
-            (len(rows.b) - cut) // CONE,
+            p=sparse.block_diag((upper, nothing)).tocsc(),
+            q=np.concatenate((self.linear, self.penalty)),
+            a=sparse.vstack((inside[:cut], positive, inside[cut:])).tocsc(),
+            b=np.concatenate((rows.b[:cut], np.zeros(slacks), rows.b[cut:])),
+            nonnegative_rows=cut + slacks,
+            cones=(len(rows.b) - cut) // CONE,
         )
 
 

@@ -316,7 +316,17 @@ def _parameter(group: str, row: _Row) -> Parameter:
     name, path, unit, least, most, meaning = row[:6]
     scale = row[6] if len(row) == 7 else 1.0
     choices = _CHOICES.get(name, ())
-    return Parameter(name, path, unit, least, most, meaning, group, scale, choices)
+    return Parameter(
+        name=name,
+        path=path,
+        unit=unit,
+        least=least,
+        most=most,
+        meaning=meaning,
+        group=group,
+        scale=scale,
+        choices=choices,
+    )
 
 
 # In the order of their index on the wire, which is that of their names: clients sort so too.

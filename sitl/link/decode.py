@@ -50,7 +50,11 @@ def read_reply(datagram: bytes, joints: int) -> VehicleReply | None:
     values = cast("tuple[float, ...]", frames[-1].payload_values)
     controls = _controls(values, joints)
     return VehicleReply(
-        int(values[0]), controls, acknowledgements(frames), _texts(frames), _custom_mode(frames)
+        t_us=int(values[0]),
+        controls=controls,
+        acks=acknowledgements(frames),
+        texts=_texts(frames),
+        custom_mode=_custom_mode(frames),
     )
 
 

@@ -41,12 +41,12 @@ def empty_posture(joints: int) -> Posture:
     """Room for a posture of an arm with ``joints`` joints."""
     n = joints + 1
     return Posture(
-        np.empty((n, 3, 3)),
-        np.empty((n, 3)),
-        np.empty((n, 3)),
-        np.empty((n, 3, 3)),
-        np.empty((n, 3)),
-        np.empty((n, 3)),
+        axes=np.empty((n, 3, 3)),
+        origin=np.empty((n, 3)),
+        com=np.empty((n, 3)),
+        inertia=np.empty((n, 3, 3)),
+        force=np.empty((n, 3)),
+        moment=np.empty((n, 3)),
     )
 
 

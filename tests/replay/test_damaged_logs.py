@@ -99,7 +99,7 @@ def test_a_log_cut_among_its_definitions_is_refused_and_among_its_data_read_up_t
         (b":uint64_t timestamp;double", b":uint64_t timestamp;doublx", "fields than this build"),
         (b"sensor_frame:", b"sensor_frume:", "fields than this build"),
         (b"\0\0\0sensor_frame", b"\0\0\0sensor_frume", "topic 'sensor_frume' was not declared"),
-        (b"char[3] controller", b"char[3] contrXller", "does not say its controller"),
+        (b"char[3] controller", b"char[3] contrXller", "its controller is missing"),
         (b'"origin.latitude"', b'"origin.latitudX"', "does not say where it began"),
         (b"D\x00\x00", b"X\x00\x00", "is damaged at byte"),
     ],

@@ -41,7 +41,17 @@ def _piece(request: Request, session: Session, offset: int, *, burst_complete: b
         return
     try:
         for data in _delivered(session.file, offset, request.size or MAX_DATA):
-            yield (Reply(Opcode.ACK, None, offset, data, burst_complete) if data else None)
+            yield (
+                Reply(
+                    opcode=Opcode.ACK,
+                    session=None,
+                    offset=offset,
+                    data=data,
+                    burst_complete=burst_complete,
+                )
+                if data
+                else None
+            )
     except OSError:
         yield refused(Refusal.FAIL)
 

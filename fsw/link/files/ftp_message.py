@@ -87,7 +87,9 @@ def read(payload: bytes) -> Request:
     """Take a payload of 251 bytes apart."""
     sequence, session, opcode, size, _, _, offset = _HEADER.unpack_from(payload)
     data = payload[_HEADER.size : _HEADER.size + size]
-    return Request(sequence, session, opcode, size, offset, data)
+    return Request(
+        sequence=sequence, session=session, opcode=opcode, size=size, offset=offset, data=data
+    )
 
 
 def write(reply: Reply, request: Request, sequence: int) -> bytes:

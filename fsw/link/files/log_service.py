@@ -145,7 +145,9 @@ class LogService:
             end = min(offset + count, size)
             closed = count == _TO_THE_END or offset >= size
             paced = count <= _PACED_BY_CLIENT
-            self._requests.append(_Request(log_id, offset, end, closed, paced))
+            self._requests.append(
+                _Request(log_id=log_id, offset=offset, end=end, closed=closed, paced=paced)
+            )
 
     def _data(self, frames: int) -> list[PackedOutgoing]:
         """The next LOG_DATA of the first request; none while the disk has not delivered."""
@@ -162,7 +164,9 @@ class LogService:
             messages.append(_log_data(log_id, offset + at, piece))
         offset += len(data)
         if data and offset < end:
-            self._requests[0] = _Request(log_id, offset, end, closed, paced)
+            self._requests[0] = _Request(
+                log_id=log_id, offset=offset, end=end, closed=closed, paced=paced
+            )
             return messages
         self._requests.popleft()
         # Without an end of its own a request is over for the client at the first message that is

@@ -129,7 +129,13 @@ def _orbit(request: CommandRequest, locate: Locate) -> CommandAction:
     if abs(speed) < MIN_SPEED:
         raise _InvalidError(f"no orbit: {speed:g} m/s is no speed")
     centre = _place(request, locate, "no orbit")
-    return FlyOrbit(centre, radius, None if math.isnan(speed) else abs(speed), clockwise, facing)
+    return FlyOrbit(
+        centre=centre,
+        radius=radius,
+        speed=None if math.isnan(speed) else abs(speed),
+        clockwise=clockwise,
+        facing=facing,
+    )
 
 
 def _look_at(request: CommandRequest, locate: Locate) -> CommandAction:

@@ -39,7 +39,13 @@ def body_setpoint(values: Numbers) -> MotionSetpoint | None:
     if setpoint.p is not None:
         return None
     return MotionSetpoint(
-        False, None, setpoint.v, setpoint.a, setpoint.yaw, setpoint.yaw_rate, along_heading=True
+        of_end_effector=False,
+        p=None,
+        v=setpoint.v,
+        a=setpoint.a,
+        yaw=setpoint.yaw,
+        yaw_rate=setpoint.yaw_rate,
+        along_heading=True,
     )
 
 
@@ -81,7 +87,11 @@ def _motion(numbers: Numbers, mask: int, *, of_end_effector: bool) -> MotionSetp
     yaw = None if mask & _YAW else numbers[9]
     yaw_rate = None if mask & _YAW_RATE else numbers[10]
     used = (*(p or ()), *(v or ()), *(a or ()), yaw or 0.0, yaw_rate or 0.0)
-    return MotionSetpoint(of_end_effector, p, v, a, yaw, yaw_rate) if _finite(used) else None
+    return (
+        MotionSetpoint(of_end_effector=of_end_effector, p=p, v=v, a=a, yaw=yaw, yaw_rate=yaw_rate)
+        if _finite(used)
+        else None
+    )
 
 
 def _finite(numbers: tuple[float, ...]) -> bool:

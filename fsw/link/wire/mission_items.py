@@ -135,12 +135,12 @@ def _go(item: MissionItem, locate: Locate, hold: float, accept: float) -> Missio
     if place is None:
         return _bad(5, "a waypoint needs a place")
     return MissionStep(
-        MissionAction.GO,
-        place,
-        item.frame in HOME_FRAMES,
-        _heading(item.params[3]),
-        hold,
-        accept,
+        action=MissionAction.GO,
+        position=place,
+        above_home=item.frame in HOME_FRAMES,
+        yaw=_heading(item.params[3]),
+        hold_s=hold,
+        acceptance=accept,
         stop_after=not item.autocontinue,
     )
 
