@@ -67,17 +67,7 @@ class GcsLink:
         record: RecordFrame | None = None,
         services: Sequence[LinkService] = (),
     ) -> None:
-        """Open the link.
-
-        Args:
-            setup: Addresses and rates.
-            inbox: Takes what is for the vehicle.
-            context: What encoders need.
-            signing: Of this link.
-            clock: Wall time, in which peers live.
-            record: Takes every frame of both directions.
-            services: Of this link alone.
-        """
+        """Open the link; ``record`` takes all frames of both directions; the clock is wall time."""
         self.name = setup.name
         self.losses = Losses()
         self.dispatch = Dispatch(services)
@@ -122,15 +112,10 @@ class GcsLink:
         return (system, component) in self._speakers
 
     def read(self, t_us: int, budget: int) -> int:
-        """Read datagrams that are there, and answer them.
+        """Read datagrams that are there, and answer them; returns what is left of the budget.
 
-        Args:
-            t_us: Sensor time [us].
-            budget: Bytes after which to stop; what is left waits in the kernel, and is lost there
-                if it becomes too much.
-
-        Returns:
-            What is left of the budget; all of it if nothing was there.
+        What lies beyond the budget [bytes] waits in the kernel, and is lost there if it becomes too
+        much.
         """
         while budget > 0:
             received = self._endpoint.receive_waiting()
@@ -167,12 +152,7 @@ class GcsLink:
         return True
 
     def publish(self, outputs: TickOutputs, changed: bool) -> None:
-        """Send what is due to all peers.
-
-        Args:
-            outputs: Of this tick.
-            changed: Whether mode, arming, landing or health are other than they were.
-        """
+        """Send what is due to all peers; at once if mode, arming, landing or health ``changed``."""
         snapshot = self._snapshot = outputs.snapshot
         if changed:
             for stream in AT_ONCE:

@@ -126,14 +126,9 @@ class Inbox:
         mission: MissionUpdate | None,
         stale_us: int = 0,
     ) -> TickInputs:
-        """Everything that arrived since the last tick, with what did not come from the ground.
+        """Everything since the last tick, and what did not come from the ground.
 
-        Args:
-            sensors: Of this tick.
-            plan: The planner's answer that is due, if one is.
-            tuning: Parameters to take over, if any.
-            mission: A change of the mission, if there is one.
-            stale_us: How much older the sensors' readings are [us].
+        The sensors' readings are ``stale_us`` older than their stamp says.
         """
         setpoints = self.take_setpoints()
         return TickInputs(

@@ -51,12 +51,9 @@ class Signing:
     """The key of one link and the times of its senders; without a key everything passes."""
 
     def __init__(self, link_id: int, unix_us: Callable[[], int], file: KeyFile | None) -> None:
-        """Take up the key that an earlier flight left.
+        """Take up the key that an earlier flight left; without a file it ends with the process.
 
-        Args:
-            link_id: 0..255, distinguishes our links in our own signatures.
-            unix_us: Wall time [us since 1970].
-            file: Where the key is kept; None forgets it with the process.
+        ``link_id``, 0..255, distinguishes our links in our own signatures.
 
         Raises:
             LinkError: The file is there and cannot be trusted or read.
@@ -85,12 +82,7 @@ class Signing:
         return marked + stamp + self._hash(marked + stamp)
 
     def judge(self, frame: Frame, raw: bytes) -> FrameTrust:
-        """Decide about a frame whose checksum is right.
-
-        Args:
-            frame: What it says.
-            raw: All of its bytes, signature included.
-        """
+        """Decide about a frame whose checksum is right; ``raw`` is all of its bytes."""
         if not self._key:
             return FrameTrust.TRUSTED
         if not is_signed(raw):
@@ -109,12 +101,10 @@ class Signing:
         return FrameTrust.TRUSTED
 
     def set_up(self, key: bytes, initial_time: int) -> None:
-        """Sign from now on with ``key``, or stop signing if it is all zeros.
+        """Sign from now on with a key of 32 bytes, or stop signing if it is all zeros.
 
-        Args:
-            key: 32 bytes.
-            initial_time: Signing time of the sender; ours does not begin before it, unless it is
-                further ahead than a minute.
+        Our signing time does not begin before the sender's ``initial_time``, unless that is further
+        ahead than a minute.
 
         Raises:
             OSError: The key cannot be stored; nothing has changed.

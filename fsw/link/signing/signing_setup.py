@@ -14,19 +14,10 @@ from messages.frames import Frame
 def set_up_signing(
     signing: Signing, frame: Frame, sender: Address, armed: bool
 ) -> StatusText | None:
-    """Carry out SETUP_SIGNING.
+    """Carry out SETUP_SIGNING, judged already; None if the message was not for this vehicle.
 
     The key crosses the link in the clear, so only this machine may send it; and storing it takes
-    time, which an armed vehicle does not have.
-
-    Args:
-        signing: Of the link it came on.
-        frame: SETUP_SIGNING; already judged, so on a signed link it was signed.
-        sender: Where it came from.
-        armed: Whether anything may move.
-
-    Returns:
-        The text for the operator; None if the message was not for this vehicle.
+    time, which an armed vehicle does not have. The answer is a text for the operator.
     """
     initial_time, system, component, *key = cast(Numbers, frame.payload_values)
     if not for_this_vehicle(system, component):

@@ -54,12 +54,9 @@ _Shape = list[Wall] | list[PointObstacle] | WorkspaceSphere
 def read_fence(
     items: tuple[MissionItem, ...], locate: Locate, clearance: float
 ) -> SafeSet | Refused:
-    """The safe set of a whole fence.
+    """The safe set of a whole fence, whose walls keep a ``clearance`` [m] from critical points.
 
-    Args:
-        items: As uploaded; the vertices of a polygon follow one another.
-        locate: Of places on Earth.
-        clearance: Distance that every critical point keeps from a wall [m].
+    The vertices of a polygon follow one another.
     """
     walls: list[Wall] = []
     cylinders: list[PointObstacle] = []
@@ -144,11 +141,9 @@ def _shape(items: tuple[MissionItem, ...], locate: Locate, clearance: float) -> 
 
 
 def walls_of(corners: list[Vec2], clearance: float) -> list[Wall] | Refused:
-    """Upright walls along the edges of a convex polygon, normals inward.
+    """Upright walls with a ``clearance`` [m] along the edges of a convex polygon, normals inward.
 
-    Args:
-        corners: North and east [m], in either sense of rotation.
-        clearance: Of each wall [m].
+    The corners, north and east [m], may go round in either sense.
     """
     edges = list(zip(corners, corners[1:] + corners[:1], strict=True))
     if any(math.dist(a, b) < _SHORTEST_EDGE for a, b in edges):
@@ -170,14 +165,10 @@ def walls_of(corners: list[Vec2], clearance: float) -> list[Wall] | Refused:
 
 
 def cylinders_over(corners: list[Vec2], clearance: float) -> list[PointObstacle]:
-    """Upright cylinders that cover a polygon of any shape.
+    """Upright cylinders that cover a polygon of any shape, and a ``clearance`` [m] around it.
 
     The polygon is cut across its long side into pieces about as long as it is wide, and each piece
     is covered by one cylinder about the middle of its bounding box.
-
-    Args:
-        corners: North and east [m].
-        clearance: Kept from the polygon in addition [m].
     """
     along = _long_direction(corners)
     across = (-along[1], along[0])
