@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fsw.arguments import FswOptions
-from fsw.link import link_report
 from fsw.link.build_links import build_links
 from fsw.link.files.flight_logs import FlightLogs
 from fsw.link.files.ftp_service import FtpService
@@ -143,7 +142,8 @@ class _Session:
                 part.close()
         setup = report.Setup(options.control.controller, options.control.inner, facts)
         result = report.as_json(setup, end, record, sim.retransmissions)
-        result |= link_report.as_json(ground, inbox)
+        result["inbox_refused"] = inbox.refused
+        result["links"] = {link.name: link.as_json() for link in ground.links}
         result["files"] = files.as_json()
         unwritten = report.write(directory / "fsw.json", result)
         sentence = f"fsw: {end.sentence}"

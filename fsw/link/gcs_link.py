@@ -7,17 +7,14 @@ said.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass
-from functools import partial
+from dataclasses import asdict, dataclass
 from typing import Final
 
 from fsw.link.inbox import Inbox
 from fsw.link.outbox import Outbox, packed
 from fsw.link.peers import Peers
-from fsw.link.services.dispatch import Dispatch
-from fsw.link.services.service import LinkService
-from fsw.link.signing.signing import FrameTrust, Signing
-from fsw.link.signing.signing_setup import set_up_signing
+from fsw.link.services.service import Dispatch, LinkService
+from fsw.link.signing.signing import FrameTrust, Signing, set_up_signing
 from fsw.link.telemetry.link_commands import LinkCommands
 from fsw.link.telemetry.stream_rates import StreamRates
 from fsw.link.telemetry.streams import AT_ONCE, HEARTBEAT, STREAMS, Stream
@@ -70,9 +67,9 @@ class GcsLink:
         """Open the link; ``record`` takes all frames of both directions; the clock is wall time."""
         self.name = setup.name
         self.losses = Losses()
-        self.dispatch = Dispatch(services)
         self.signing = signing
         self.outbox = Outbox(signing)
+        self.dispatch = Dispatch(services, self.outbox.add_output)
         self.accepted = 0  # frames
         self.rates = StreamRates(STREAMS, setup.rates_hz, context.facts.tick_period_us)
         self.talks = setup.unheard  # whether more than a heartbeat is sent
@@ -140,13 +137,13 @@ class GcsLink:
 
     def serve(self, t_us: int) -> None:
         """Let services go on with what they are sending; call it once a tick if it talks."""
-        self.dispatch.poll(t_us, partial(self.outbox.add_output, t_us=t_us))
+        self.dispatch.poll(t_us)
         if self.outbox.waiting:
             self._send(t_us)
 
     def serve_bulk(self, t_us: int) -> bool:
         """Send a datagram of what clients wait for; whether there was anything."""
-        if not self.dispatch.bulk(t_us, partial(self.outbox.add_output, t_us=t_us)):
+        if not self.dispatch.bulk(t_us):
             return False
         self._send(t_us)
         return True
@@ -171,6 +168,20 @@ class GcsLink:
         """Answer a command that came over this link."""
         self.outbox.add(AUTOPILOT, message_ids.COMMAND_ACK, encode_replies.command_ack(ack))
         self._send(t_us)
+
+    def as_json(self) -> dict[str, object]:
+        """Counts since start, for ``fsw.json``."""
+        return {
+            "frames_accepted": self.accepted,
+            "false_starts": self.losses.frames,
+            "bytes_lost": self.losses.bytes,
+            "datagrams_dropped": self.dropped,
+            "refused": asdict(self.signing.counters),
+            "signed": self.signing.active,
+            "peers": len(self.peers),
+            "encode_failures": self.outbox.encode_failures,
+            "service_failures": self.dispatch.failures,
+        }
 
     def close(self) -> None:
         """Close the socket."""
@@ -205,7 +216,7 @@ class GcsLink:
                 self.outbox.add_asked_for(message)
             if refusal is not None:
                 self.outbox.add_text(refusal, t_us)
-        self.dispatch.handle(frame, t_us, partial(self.outbox.add_output, t_us=t_us))
+        self.dispatch.handle(frame, t_us)
 
     def _encode(self, stream: Stream, snapshot: FlightSnapshot) -> None:
         try:

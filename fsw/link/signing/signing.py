@@ -13,10 +13,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 from hashlib import sha256
-from typing import Final
+from typing import Final, cast
 
 from fsw.link.signing.key_file import KeyFile, SigningKey
+from fsw.link.udp_endpoint import Address, is_loopback
+from fsw.link.wire.decode import Numbers, for_this_vehicle
 from fsw.link.wire.message_ids import HEARTBEAT, RADIO_STATUS
+from fsw.signals import Severity, StatusText
 from messages.frames import Frame, announcing_signature, is_signed, is_version_1
 
 _HASH_SIZE: Final = 6  # bytes, the first of SHA-256
@@ -145,3 +148,29 @@ class Signing:
 
     def _now(self) -> int:
         return (self._unix_us() - 1_000_000 * _EPOCH_UNIX_S) // _UNIT_US
+
+
+def set_up_signing(
+    signing: Signing, frame: Frame, sender: Address, armed: bool
+) -> StatusText | None:
+    """Carry out SETUP_SIGNING, judged already; None if the message was not for this vehicle.
+
+    The key crosses the link in the clear, so only this machine may send it; and storing it takes
+    time, which an armed vehicle does not have. The answer is a text for the operator.
+    """
+    initial_time, system, component, *key = cast(Numbers, frame.payload_values)
+    if not for_this_vehicle(system, component):
+        return None
+    if not is_loopback(sender):
+        return StatusText(
+            Severity.WARNING, "signing unchanged: a key is taken from this machine only"
+        )
+    if armed:
+        return StatusText(Severity.WARNING, "signing unchanged: disarm first")
+    try:
+        signing.set_up(bytes(int(byte) for byte in key), int(initial_time))
+    except OSError as error:
+        return StatusText(
+            Severity.WARNING, f"signing unchanged: the key cannot be kept, {error.strerror}"
+        )
+    return StatusText(Severity.NOTICE, "signing is on" if signing.active else "signing is off")
