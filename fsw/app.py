@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 from fsw.arguments import FswOptions
 from fsw.control.control_metrics import ControlMetrics
-from fsw.link import link_report
 from fsw.link.build_links import build_links
 from fsw.link.files.flight_logs import FlightLogs
 from fsw.link.files.ftp_service import FtpService
@@ -141,7 +140,9 @@ class _Session:
             for part in (planner, sim, ground, files, keeping):
                 part.close()
         result = report.as_json(options.control, facts, end, record)
-        result |= {"retransmissions": sim.retransmissions, **link_report.as_json(ground, inbox)}
+        result["retransmissions"] = sim.retransmissions
+        result["inbox_refused"] = inbox.refused
+        result["links"] = {link.name: link.as_json() for link in ground.links}
         result["files"] = files.as_json()
         unwritten = report.write(directory / "fsw.json", result)
         sentence = f"fsw: {end.sentence}"

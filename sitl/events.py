@@ -11,12 +11,9 @@ class Events(Protocol):
     """Where the life of the process is reported."""
 
     def report(self, event: str, sentence: str, **details: object) -> None:
-        """Report one event.
+        """Report an event by its name, and to people by a sentence, empty if they need not know.
 
-        Args:
-            event: Its name, for programs.
-            sentence: The same for people; empty if they need not know.
-            **details: Values that go with it, JSON types only.
+        The details are values that go with it, JSON types only.
         """
         ...
 

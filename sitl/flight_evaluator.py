@@ -22,10 +22,7 @@ _NO_CURVE = np.empty(0)
 class FlightEvaluator:
     """The score of one run and the first reason to end it.
 
-    Args:
-        scenario: What is flown.
-        clock: When the trajectory runs.
-        points: Critical points at the start.
+    It begins with the critical points at the start.
 
     Raises:
         ScenarioError: The start is outside the safe set.
@@ -74,12 +71,9 @@ class FlightEvaluator:
             self.end(EndKind.COLLISION, f"{touched} at {time_s:.2f} s", time_s)
 
     def judge_all(self, places: Array, before_s: float, step_s: float) -> None:
-        """Look at every plant step of an exchange.
+        """Look at every plant step, ``step_s`` long, of an exchange that began at ``before_s``.
 
-        Args:
-            places: (steps, 2 + j, 3) [m, NED], from ``sitl.plant.integrator.integrate``.
-            before_s: Time at the begin of the exchange [s].
-            step_s: Length of a plant step [s].
+        ``places`` (steps, 2 + j, 3) [m, NED] are from ``sitl.plant.integrator.integrate``.
         """
         if self.ended is None and self._all_clear(places, before_s, step_s):
             return

@@ -52,13 +52,9 @@ class HoldReference:
 def warped(t: float, ramp: float, duration: float) -> tuple[float, float, float]:
     """Own time s [s] of a curve that starts and stops smoothly, ds/dt [1] and d²s/dt² [1/s].
 
-    ds/dt follows the quintic smooth step from 0 to 1 over ``ramp`` and back before ``duration``, so
-    that velocity and acceleration of any curve p(s) vanish at both ends.
-
-    Args:
-        t: Time since the start [s].
-        ramp: Length of the start [s], above 0.
-        duration: Length of the whole [s], at least 2 ramps.
+    At t [s] after the start ds/dt has followed the quintic smooth step from 0 to 1 over ``ramp``
+    [s] and goes back before ``duration`` [s], at least 2 ramps, so that velocity and acceleration
+    of any curve p(s) vanish at both ends.
     """
     # The second half is the first one backwards.
     backwards = t > 0.5 * duration
@@ -75,14 +71,9 @@ def warped(t: float, ramp: float, duration: float) -> tuple[float, float, float]
 
 @compilable
 def lissajous_at(centre: float, amplitude: float, period: float, phase: float, s: float) -> float:
-    """One coordinate [m] of a Lissajous curve.
+    """One coordinate [m] of a Lissajous curve at its own time s [s], from ``warped``.
 
-    Args:
-        centre: Middle of the oscillation [m].
-        amplitude: Its size [m].
-        period: Its period [s].
-        phase: Its phase at ``s`` = 0 [deg].
-        s: Time of the curve itself, from ``warped`` [s].
+    It swings about ``centre`` [m] by ``amplitude`` [m] with ``period`` [s] and ``phase`` [deg].
     """
     return centre + amplitude * math.sin(2.0 * math.pi / period * s + math.radians(phase))
 

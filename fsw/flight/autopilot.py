@@ -85,15 +85,7 @@ class Autopilot:
         return self._safe_sets.analyse(safe_set)
 
     def tick(self, state: FlightState, inputs: TickInputs) -> tuple[FlightState, TickOutputs]:
-        """Everything the vehicle does at one instant.
-
-        Args:
-            state: What the last tick left.
-            inputs: One sensor frame and what arrived since the last tick.
-
-        Returns:
-            The state for the next tick and everything this one says.
-        """
+        """Everything the vehicle does at one instant: the next state, and everything it says."""
         now_us, texts = inputs.sensors.t_us, list[StatusText]()
         state, estimate = _estimate(state, inputs)
         state = self._receive(state, inputs, texts)

@@ -328,16 +328,7 @@ class Commander:
         *,
         completed: bool = False,
     ) -> FlightState:
-        """Begin another mode.
-
-        Args:
-            state: In the mode that is left.
-            mode: That begins.
-            cause: For the operator.
-            estimate: The vehicle now.
-            texts: Takes the sentence for the operator.
-            completed: The mode that is left was done; a failsafe's mark stays.
-        """
+        """Begin another mode; a failsafe's mark stays if the one that is left was ``completed``."""
         before, vehicle = state.vehicle.mode, state.vehicle
         texts.append(StatusText(Severity.INFO, f"{before.value} to {mode.value}: {cause}"))
         handover = Handover(self._reference(state, estimate), completed)

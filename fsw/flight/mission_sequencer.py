@@ -93,12 +93,7 @@ NOTHING = MissionEvent()
 
 
 def loaded(steps: tuple[MissionStep, ...], count: int = 0) -> MissionFlight:
-    """A mission that was received, not begun.
-
-    Args:
-        steps: All of it.
-        count: Steps reached so far in earlier missions, so that the count only grows.
-    """
+    """A mission that was received, not begun; ``count`` steps were reached in earlier missions."""
     state = MissionState.NOT_STARTED if steps else MissionState.NO_MISSION
     progress = MissionProgress(state, total=len(steps), reached_count=count)
     return MissionFlight(steps, progress=progress)
@@ -117,7 +112,7 @@ def refusal(flight: MissionFlight, landed: bool) -> str | None:
 
 
 def nearest(home: Home, rally: tuple[Vec2, ...], p: Vec3) -> Home:
-    """Home, or a rally point where one is nearer; both are at home's height."""
+    """Home, or a rally point where one is nearer to ``p`` [m, NED]; both are at home's height."""
     x, y, z = home.p
     places = ((x, y), *rally)
     x, y = min(places, key=lambda place: math.dist(place, p[:2]))
@@ -170,12 +165,9 @@ def jumped(flight: MissionFlight, step: int, now_us: int, limits: MotionLimits) 
 def advance(
     flight: MissionFlight, context: MissionContext, limits: MotionLimits
 ) -> tuple[MissionFlight, MissionEvent]:
-    """One tick: at most one thing happens, in almost every tick none.
+    """One tick of a mission that has begun: at most one thing happens, in almost every tick none.
 
-    Args:
-        flight: With a segment, that is after ``begun``.
-        context: The vehicle now.
-        limits: Of a segment where the mission names no speed.
+    The limits are those of a segment where the mission names no speed.
     """
     segment, now_us = flight.segment, context.now_us
     if segment is None:

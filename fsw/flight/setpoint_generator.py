@@ -64,13 +64,9 @@ class PositionGoal:
 def step(
     reference: ReferenceState, goal: PositionGoal, limits: SetpointLimits, dt: float
 ) -> ReferenceState:
-    """The point a moment later, as if there were neither vehicle nor walls.
+    """The point ``dt`` [s] later, as if there were neither vehicle nor walls.
 
-    Args:
-        reference: The point now.
-        goal: What it is after; the kinds of point agree.
-        limits: How fast it may move.
-        dt: The moment [s].
+    Point and goal are both of the body or both of the end-effector.
     """
     motion = _motion_now(reference, goal)
     p, v = _move_point(reference, motion, goal, limits, dt)

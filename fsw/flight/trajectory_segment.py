@@ -89,13 +89,9 @@ class TrajectorySegment:
 def segment_to(
     start: EndEffectorTarget, end: Vec3, yaw: float | None, limits: MotionLimits
 ) -> TrajectorySegment:
-    """The fastest segment within limits from rest at ``start`` to rest at a point.
+    """The fastest segment within limits from ``start``, taken at rest, to rest at ``end`` [m, NED].
 
-    Args:
-        start: Where and when it begins; its velocity is not looked at.
-        end: End-effector position [m].
-        yaw: Heading at the end [rad]; None keeps it.
-        limits: All positive.
+    Its heading ends at ``yaw`` [rad]; None keeps it.
     """
     way = (end[0] - start.p_WE[0], end[1] - start.p_WE[1], end[2] - start.p_WE[2])
     turn = 0.0 if yaw is None else wrap_angle(yaw - start.yaw)

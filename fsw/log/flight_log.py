@@ -63,11 +63,9 @@ class FlightLog:
         self._unmarked_us = 0  # lost, and not yet marked as lost
 
     def begin(self, t_us: int, lockstep: bool) -> None:
-        """Write what stands before the data.
+        """Write what stands before the data of the first tick, that of ``t_us``.
 
-        Args:
-            t_us: Sensor time of the first tick [us].
-            lockstep: Write in this thread and nothing that the wall clock measured.
+        In lockstep, write in this thread and nothing that the wall clock measured.
         """
         subject, self._measured = self._subject, not lockstep
         self._encoder = LogEncoder(
@@ -129,14 +127,7 @@ class FlightLog:
 
 
 def definitions(t_us: int, subject: LogSubject, pacing: str, schema: str) -> bytes:
-    """Everything before the first record.
-
-    Args:
-        t_us: Sensor time at which the log begins [us].
-        subject: What was flown.
-        pacing: ``lockstep`` or ``realtime``.
-        schema: Shape of the recorded inputs, without which they cannot be read back.
-    """
+    """Everything before the first record, with the shape of the inputs, to read them back."""
     exact = json.dumps(dict(subject.numbers), separators=(",", ":"))
     named = {**subject.numbers, **subject.parameters}
     facts: dict[str, str | int] = {

@@ -39,10 +39,7 @@ class Gap:
 
 
 def open_flight(path: Path) -> UlogFile:
-    """Open a flight log whose inputs this build can read.
-
-    Args:
-        path: The file, or the directory of a flight.
+    """Open a flight log, by its file or its directory, whose inputs this build can read.
 
     Raises:
         UlogError: It is no flight log, or its inputs have another shape.

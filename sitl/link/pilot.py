@@ -113,13 +113,7 @@ def flight_plan(
     target_at: Callable[[int], TrajectoryPoint],
     yaw_at: Callable[[int], float],
 ) -> FlightPlan:
-    """The plan of a scenario.
-
-    Args:
-        scenario: What to fly.
-        target_at: End-effector reference by time stamp [us].
-        yaw_at: Its yaw [rad] by time stamp [us].
-    """
+    """The plan of a scenario; its reference and yaw [rad] are asked for by time stamp [us]."""
     walls, obstacles = scenario.walls, scenario.obstacles
     count = len(walls) + len(obstacles)
     announcements: tuple[PilotMessage, ...] = (

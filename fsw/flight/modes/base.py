@@ -127,13 +127,7 @@ class FlightMode:
     def activate(
         self, state: FlightState, estimate: StateEstimate, handover: Handover
     ) -> FlightState:
-        """Begin, in the state of the mode that is left.
-
-        Args:
-            state: ``state.vehicle.mode`` is the mode that is left.
-            estimate: The vehicle now.
-            handover: How it is left.
-        """
+        """Begin, in the state of the mode that is left: that is still ``state.vehicle.mode``."""
         return replace(state, setpoint=SetpointMemory())
 
     def update(self, state: FlightState, estimate: StateEstimate) -> tuple[FlightState, ModeResult]:

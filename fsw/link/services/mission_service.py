@@ -33,7 +33,7 @@ from fsw.link.wire.outgoing import Outgoing, ServiceOutput
 from fsw.signals import Severity, StatusText
 from messages.frames import Frame
 
-_ReadItem = Callable[[Numbers], MissionItem | Refused]
+_ReadItem = Callable[[Numbers], MissionItem]
 
 # MAV_MISSION_RESULT
 ACCEPTED: Final = 0
@@ -165,7 +165,6 @@ class MissionService:
         self, read: _ReadItem, values: Numbers, peer: Peer, t_us: int
     ) -> Sequence[ServiceOutput]:
         """Add the item that was asked for; the last one completes the upload."""
-        item = read(values)
         seq, number = int(values[7]), int(values[14])
         upload = self._upload
         if upload is None or upload.peer != peer or upload.kind != number:
@@ -175,14 +174,13 @@ class MissionService:
             return self._refuse(Refused(INVALID_SEQUENCE, reason), upload.kind, peer)
         if seq != len(upload.items):
             return ()
-        meaning = item if isinstance(item, Refused) else self._store.read(upload.kind, item)
-        if isinstance(item, Refused) or isinstance(meaning, Refused):
-            wrong = item if isinstance(item, Refused) else meaning
-            assert isinstance(wrong, Refused)
+        try:
+            item = read(values)
+            upload.meanings.append(self._store.read(upload.kind, item))
+        except Refused as wrong:
             named = Refused(wrong.result, f"item {seq}: {wrong.reason}")
             return self._refuse(named, upload.kind, peer)
         upload.items.append(item)
-        upload.meanings.append(meaning)
         if len(upload.items) == upload.count:
             return self._finish(upload)
         upload.tries = 0
@@ -204,8 +202,9 @@ class MissionService:
 
     def _finish(self, upload: _Upload) -> Sequence[ServiceOutput]:
         kind, peer = upload.kind, upload.peer
-        refused = self._store.keep(kind, tuple(upload.items), tuple(upload.meanings))
-        if refused is not None:
+        try:
+            self._store.keep(kind, tuple(upload.items), tuple(upload.meanings))
+        except Refused as refused:
             return self._refuse(refused, kind, peer)
         self._upload = None
         self._done = (peer, kind, upload.count - 1)
@@ -261,8 +260,11 @@ class MissionService:
         if refused is not None:
             return refused
         self._upload = self._download = None
-        for kind in kinds:
-            self._store.keep(Kind(kind), (), ())
+        for kind in map(Kind, kinds):
+            try:
+                self._store.keep(kind, (), ())
+            except Refused as wrong:
+                return self._refuse(wrong, kind, peer)
         return (encode_ack(ACCEPTED, number, peer),)
 
     def _set_current(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[ServiceOutput]:
@@ -270,10 +272,9 @@ class MissionService:
         if self._store.set_current(seq):
             self._show_again = True
             return ()
-        refused = Refused(INVALID_SEQUENCE, f"there is no mission item {seq}")
         return (
-            encode_ack(refused.result, Kind.MISSION, peer),
-            StatusText(Severity.WARNING, refused.reason),
+            encode_ack(INVALID_SEQUENCE, Kind.MISSION, peer),
+            StatusText(Severity.WARNING, f"there is no mission item {seq}"),
         )
 
     def _partial(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[ServiceOutput]:

@@ -53,15 +53,9 @@ class LinkCommands:
     def handle(
         self, frame: Frame, t_us: int, snapshot: FlightSnapshot | None
     ) -> tuple[Sequence[Outgoing], StatusText | None] | None:
-        """Carry out a command to the link.
+        """Carry out a command to the link: what to send, and why it was refused, if it was.
 
-        Args:
-            frame: Any valid frame.
-            t_us: Sensor time [us].
-            snapshot: The newest snapshot; None before the first tick.
-
-        Returns:
-            What to send and why it was refused, if it was; None if the frame is something else.
+        None if the frame is something else. The snapshot is the newest, None before the first tick.
         """
         decoder = _DECODERS.get(frame.message_id)
         request = None if decoder is None else decoder(frame)

@@ -53,12 +53,7 @@ class _InvalidError(Exception):
 
 
 def command(request: CommandRequest, locate: Locate) -> Command:
-    """A command with what it asks for.
-
-    Args:
-        request: As it came.
-        locate: Local NED of a place on Earth.
-    """
+    """A command with what it asks for; places on Earth are taken to local NED."""
     reader = _READERS.get(request.command)
     if reader is None:
         return Command(Rejected(CommandResult.UNSUPPORTED), request)

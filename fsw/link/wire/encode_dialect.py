@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable
 from typing import Final
 
-from fsw.link.wire.encode_setpoints import as_asked
+from fsw.link.wire.encode_standard import as_asked
 from fsw.link.wire.outgoing import WireValues
 from fsw.link.wire.telemetry_context import TelemetryContext
 from fsw.model.kinematics import point_in_flight

@@ -16,7 +16,6 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v10 import common as old_protocol
 
-from fsw.link import link_report
 from fsw.link.files.flight_logs import FlightLogs
 from fsw.link.files.log_service import LogService
 from fsw.link.peers import EXPIRY_US
@@ -247,9 +246,7 @@ def test_what_a_flood_left_for_the_kernel_to_drop_is_counted_to_the_datagram(
 
 def counts(ground: Ground) -> dict[str, Any]:
     """Of the link, as `fsw.json` has them."""
-    told: Any = link_report.as_json(ground.links, ground.inbox)
-    link: dict[str, Any] = told["links"]["test"]
-    return link
+    return ground.link.as_json()
 
 
 def test_both_directions_are_recorded_frame_by_frame(ground: Ground) -> None:

@@ -250,7 +250,7 @@ def test_a_key_for_another_vehicle_is_not_taken(file: Path) -> None:
 
 
 def test_a_key_from_another_machine_is_not_taken(file: Path) -> None:
-    from fsw.link.signing.signing_setup import set_up_signing
+    from fsw.link.signing.signing import set_up_signing
     from messages.frames import split
 
     with ground_station(key_file=KeyFile(file)) as ground:
