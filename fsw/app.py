@@ -181,12 +181,11 @@ class _Session:
         Raises:
             CouldNotStart: The file cannot be read or written, or contradicts itself.
         """
-        from fsw.parameters.kept_file import KeptFile, ParameterFile
+        from fsw.parameters.kept_file import ParameterFile
 
-        path, store = self._options.params, program.parameters
-        file = KeptFile(path, directory / "parameters.params", store.defaults)
+        path = self._options.params
         try:
-            keeping = ParameterFile(store, file)
+            keeping = ParameterFile(program.parameters, path, directory / "parameters.params")
         except OSError as error:
             where = path or directory
             raise CouldNotStart(f"cannot keep parameters in {where}: {error.strerror}") from None

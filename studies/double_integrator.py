@@ -9,14 +9,16 @@ every exchange of 2 ms.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 from fsw.control.braking import Brake
 from fsw.flight.plan_exchange import plan_input
+from fsw.geometry.vectors import add_scaled, subtract
 from fsw.model.airframe import AIRFRAME
+from fsw.model.kinematics import end_effector_when_level
+from fsw.model.nominal import REST_STATE
 from fsw.mpc.planner import Planner
 from fsw.parameters.flight_config import FlightConfig
-from fsw.signals import Plan, PlanInput, PlanRequest, PredictionState, Vec2, Vec3
+from fsw.signals import Plan, PlanInput, PlanRequest, PredictionState
 from sitl.disturbances.items import push
 from sitl.flight_evaluator import FlightEvaluator, Points
 from sitl.mission_clock import MissionClock
@@ -34,69 +36,42 @@ from studies.flight_result import (
 from studies.mission import safe_set, target
 
 _STEP_S = 1e-6 * STEP_US
-_LEVEL = (0.0, 0.0)
 
 
-@dataclass(frozen=True, slots=True)
-class PointMass:
-    """The paper's twelve states."""
+def after(state: PredictionState, u: PlanInput, push_W: V3, dt: float) -> PredictionState:
+    """The state a time later, under a constant input and disturbance, exactly.
 
-    p: Vec3  # m, NED
-    v: Vec3  # m/s
-    yaw: float  # rad
-    yaw_rate: float  # rad/s
-    q_arm: Vec2  # rad
-    qd_arm: Vec2  # rad/s
+    Args:
+        state: Now; acceleration, jerk and snap are none of this plant's states and stay.
+        u: Accelerations commanded.
+        push_W: Disturbance acceleration [m/s^2].
+        dt: The time [s].
+    """
+    a = (u.a[0] + push_W[0], u.a[1] + push_W[1], u.a[2] + push_W[2])
+    p, v, half = state.p, state.v, 0.5 * dt * dt
+    (q1, q2), (qd1, qd2), (qdd1, qdd2) = state.q_arm, state.qd_arm, u.qdd_arm
+    return state._replace(
+        p=(
+            p[0] + dt * v[0] + half * a[0],
+            p[1] + dt * v[1] + half * a[1],
+            p[2] + dt * v[2] + half * a[2],
+        ),
+        v=(v[0] + dt * a[0], v[1] + dt * a[1], v[2] + dt * a[2]),
+        yaw=state.yaw + dt * state.yaw_rate + half * u.yaw_acc,
+        yaw_rate=state.yaw_rate + dt * u.yaw_acc,
+        q_arm=(q1 + dt * qd1 + half * qdd1, q2 + dt * qd2 + half * qdd2),
+        qd_arm=(qd1 + dt * qdd1, qd2 + dt * qdd2),
+    )
 
-    def after(self, u: PlanInput, push_W: V3, dt: float) -> PointMass:
-        """The state a time later, under a constant input and disturbance, exactly.
 
-        Args:
-            u: Accelerations commanded.
-            push_W: Disturbance acceleration [m/s^2].
-            dt: The time [s].
-        """
-        a = (u.a[0] + push_W[0], u.a[1] + push_W[1], u.a[2] + push_W[2])
-        p, v, half = self.p, self.v, 0.5 * dt * dt
-        (q1, q2), (qd1, qd2), (qdd1, qdd2) = self.q_arm, self.qd_arm, u.qdd_arm
-        return PointMass(
-            p=(
-                p[0] + dt * v[0] + half * a[0],
-                p[1] + dt * v[1] + half * a[1],
-                p[2] + dt * v[2] + half * a[2],
-            ),
-            v=(v[0] + dt * a[0], v[1] + dt * a[1], v[2] + dt * a[2]),
-            yaw=self.yaw + dt * self.yaw_rate + half * u.yaw_acc,
-            yaw_rate=self.yaw_rate + dt * u.yaw_acc,
-            q_arm=(q1 + dt * qd1 + half * qdd1, q2 + dt * qd2 + half * qdd2),
-            qd_arm=(qd1 + dt * qdd1, qd2 + dt * qdd2),
-        )
-
-    def points(self) -> Points:
-        """Base, joint 2 and end-effector of the level body [m, NED]."""
-        l1, l2 = AIRFRAME.link_length
-        th1, th12 = self.q_arm[0], self.q_arm[0] + self.q_arm[1]
-        x1, z1 = l1 * math.sin(th1), l1 * math.cos(th1)
-        x2, z2 = x1 + l2 * math.sin(th12), z1 + l2 * math.cos(th12)
-        return self.p, self._hung(x1, z1), self._hung(x2, z2)
-
-    def as_prediction(self) -> PredictionState:
-        """The same for the planner: no tilt, no tilt rate."""
-        return PredictionState(
-            p=self.p,
-            v=self.v,
-            a=(0.0, 0.0, 0.0),
-            j=_LEVEL,
-            s=_LEVEL,
-            yaw=self.yaw,
-            yaw_rate=self.yaw_rate,
-            q_arm=self.q_arm,
-            qd_arm=self.qd_arm,
-        )
-
-    def _hung(self, forward: float, down: float) -> Vec3:
-        x, y, z = self.p
-        return (x + math.cos(self.yaw) * forward, y + math.sin(self.yaw) * forward, z + down)
+def points(state: PredictionState) -> Points:
+    """Base, joint 2 and end-effector of the level body [m, NED]."""
+    l1, l2 = AIRFRAME.link_length
+    joint2, end_effector = (
+        end_effector_when_level(lengths, state.q_arm, state.yaw)
+        for lengths in ((l1, 0.0), (l1, l2))
+    )
+    return state.p, add_scaled(state.p, joint2, 1.0), add_scaled(state.p, end_effector, 1.0)
 
 
 class DoubleIntegrator:
@@ -112,7 +87,7 @@ class DoubleIntegrator:
         self.step = 0
         self.state = _first_state(scenario, self.clock.target_at(0.0).p)
         self._pushes = [push(item, seed, _STEP_S) for item in scenario.disturbances]
-        self.evaluator = FlightEvaluator(scenario, self.clock, self.state.points())
+        self.evaluator = FlightEvaluator(scenario, self.clock, points(self.state))
 
     @property
     def time_s(self) -> float:
@@ -132,12 +107,12 @@ class DoubleIntegrator:
     def advance(self, u: PlanInput) -> None:
         """One exchange of 2 ms under an input, judged at its end."""
         push_W = self._push()
-        self.state = self.state.after(u, push_W, _STEP_S)
+        self.state = after(self.state, u, push_W, _STEP_S)
         self.step += 1
-        points = self.state.points()
-        self.evaluator.judge(points, self.time_s)
+        now = points(self.state)
+        self.evaluator.judge(now, self.time_s)
         if self.step % SAMPLE_STEPS == 0:
-            self.evaluator.sample_error(points, self.time_s)
+            self.evaluator.sample_error(now, self.time_s)
         self.evaluator.judge_time(self.time_s)
 
     def result(self) -> TruthResult:
@@ -171,8 +146,7 @@ def fly(
     held, running = safe_set(scenario), None
     steps = config.mpc_period_us // STEP_US
     while plant.ended is None:
-        start = plant.state.as_prediction()
-        t_us = plant.t_us
+        start, t_us = plant.state, plant.t_us
         targets = tuple(
             target(plant.clock, t_us + node * config.mpc_period_us)
             for node in range(config.planner.horizon + 1)
@@ -200,27 +174,14 @@ def fly(
     return recorder.result(plant.result())
 
 
-def _first_state(scenario: Scenario, p_target: V3) -> PointMass:
+def _first_state(scenario: Scenario, p_target: V3) -> PredictionState:
     th1, th2 = (math.radians(angle) for angle in scenario.start.arm_deg)
-    here = PointMass(
-        p=(0.0, 0.0, 0.0),
-        v=(0.0, 0.0, 0.0),
-        yaw=math.radians(scenario.start.yaw_deg),
-        yaw_rate=0.0,
-        q_arm=(th1, th2),
-        qd_arm=(0.0, 0.0),
-    )
-    x, y, z = here.points()[2]
-    p = (p_target[0] - x, p_target[1] - y, p_target[2] - z)
-    return PointMass(
-        p=p, v=here.v, yaw=here.yaw, yaw_rate=here.yaw_rate, q_arm=here.q_arm, qd_arm=here.qd_arm
-    )
+    at_origin = REST_STATE._replace(yaw=math.radians(scenario.start.yaw_deg), q_arm=(th1, th2))
+    return at_origin._replace(p=subtract(p_target, points(at_origin)[2]))
 
 
 def _trace_point(plant: DoubleIntegrator) -> TracePoint:
-    points = plant.state.points()
-    margins = plant.evaluator.margins(points, plant.time_s)
+    p_WB, joint2, p_WE = points(plant.state)
+    margins = plant.evaluator.margins((p_WB, joint2, p_WE), plant.time_s)
     aim = plant.clock.target_at(plant.time_s).p
-    return TracePoint(
-        t_s=plant.time_s, p_WB=points[0], p_WE=points[2], p_target=aim, margin_m=min(margins)
-    )
+    return TracePoint(t_s=plant.time_s, p_WB=p_WB, p_WE=p_WE, p_target=aim, margin_m=min(margins))

@@ -9,12 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fsw.model.linearisation import Linearisation
-from fsw.model.prediction import Array
+from fsw.model.prediction import INPUTS, Array
 
 
 class Rows(NamedTuple):
     """The numbers of a block, for kernels."""
 
+    start: Array  # (surfaces x points,)
     value: Array  # (rows,)
     lower_bound: Array  # (rows,)
     gradient: Array  # (rows, 6 n)
@@ -30,12 +31,15 @@ class ConstraintBlock:
     node: NDArray[np.intp]  # (rows,) node of each row, 1..n
     slack: NDArray[np.intp]  # (rows,) index of its slack among this block's slacks
     unknowns: int  # 6 n
+    starts: int  # values at node 0
+    start: Array = field(init=False)  # (starts,) the value of each surface and point at node 0
     value: Array = field(init=False)  # (rows,)
     lower_bound: Array = field(init=False)  # (rows,)
     gradient: Array = field(init=False)  # (rows, 6 n)
 
     def __post_init__(self) -> None:
         rows = len(self.node)
+        object.__setattr__(self, "start", np.zeros(self.starts))
         object.__setattr__(self, "value", np.zeros(rows))
         object.__setattr__(self, "lower_bound", np.zeros(rows))
         object.__setattr__(self, "gradient", np.zeros((rows, self.unknowns)))
@@ -43,12 +47,25 @@ class ConstraintBlock:
     @property
     def rows(self) -> Rows:
         """The arrays themselves."""
-        return Rows(self.value, self.lower_bound, self.gradient)
+        return Rows(self.start, self.value, self.lower_bound, self.gradient)
 
     @property
     def slacks(self) -> int:
         """How many slacks soften this block."""
         return int(self.slack.max()) + 1 if len(self.slack) else 0
+
+
+def surface_rows(
+    surfaces: int, points: int, first_node: int, horizon: int, starts: int | None = None
+) -> ConstraintBlock:
+    """Rows for nodes x surfaces x points from a first node on, one slack a node and surface."""
+    nodes = np.arange(first_node, horizon + 1)
+    return ConstraintBlock(
+        node=np.repeat(nodes, surfaces * points),
+        slack=np.repeat(np.arange(len(nodes) * surfaces), points),
+        unknowns=INPUTS * horizon,
+        starts=surfaces * points if starts is None else starts,
+    )
 
 
 @dataclass(frozen=True)
@@ -76,8 +93,4 @@ class Barrier(Protocol):
 
     def refill(self, horizon: Linearisation, targets: TargetPoints) -> None:
         """Bring the rows up to date with a linearisation."""
-        ...
-
-    def at_start(self) -> Array:
-        """h of each constraint at node 0 as of the last refill [m/s]."""
         ...

@@ -17,13 +17,13 @@ from typing import NamedTuple
 import numpy as np
 
 from fsw.barriers.cbf_row import Plane, barrier_value, fill_row
-from fsw.barriers.constraint_block import ConstraintBlock, Rows, TargetPoints
+from fsw.barriers.constraint_block import Rows, TargetPoints, surface_rows
 from fsw.barriers.safe_approach import BarrierNumbers, BarrierTuning
 from fsw.barriers.tangent import CENTRE_BALL
 from fsw.compiled import compiled, of_fixed_types
 from fsw.geometry.vectors import dot, norm
 from fsw.model.linearisation import POINTS, Linearisation, PointMotions
-from fsw.model.prediction import INPUTS, Array, CondensedModel
+from fsw.model.prediction import Array, CondensedModel
 from fsw.signals import PointObstacle
 
 
@@ -50,21 +50,13 @@ class PointObstacleBarrier:
             np.array([obstacle.clearance for obstacle in obstacles]),
             vertical_shares(obstacles),
         )
-        count = len(obstacles)
-        nodes = np.arange(1 + tuning.skipped_nodes, model.horizon + 1)
-        node, number, _ = np.meshgrid(nodes, np.arange(count), np.arange(POINTS), indexing="ij")
-        slack = (node - nodes[0]) * count + number
-        self.rows = ConstraintBlock(node.ravel(), slack.ravel(), INPUTS * model.horizon)
+        first = 1 + tuning.skipped_nodes
+        self.rows = surface_rows(len(obstacles), POINTS, first, model.horizon)
         self._rows, self._fill = self.rows.rows, of_fixed_types(_fill)
-        self._h_start = np.zeros(count * POINTS)
 
     def refill(self, horizon: Linearisation, targets: TargetPoints) -> None:
         """Linearise h0 of every obstacle, point and node along the guess's ray."""
-        self._fill(self._obstacles, horizon.points, self._tuning, self._h_start, self._rows)
-
-    def at_start(self) -> Array:
-        """h0 at node 0 by obstacle and point [m/s]."""
-        return self._h_start
+        self._fill(self._obstacles, horizon.points, self._tuning, self._rows)
 
 
 @compiled
@@ -72,7 +64,6 @@ def _fill(
     obstacles: _Obstacles,
     points: PointMotions,
     tuning: BarrierNumbers,
-    h_start: Array,
     rows: Rows,
 ) -> None:
     n = np.zeros(3)
@@ -85,7 +76,7 @@ def _fill(
                 _ray(obstacles, k, points.position[i, point], n)
                 plane = _tangent_plane(obstacles, k, points, i, point, n)
                 if i == 0:
-                    h_start[k * POINTS + point] = barrier_value(plane, tuning)
+                    rows.start[k * POINTS + point] = barrier_value(plane, tuning)
                     continue
                 at_start = barrier_value(_tangent_plane(obstacles, k, points, 0, point, n), tuning)
                 gradients = (points.d_position[i, point], points.d_velocity[i, point])

@@ -14,12 +14,12 @@ from typing import NamedTuple
 import numpy as np
 
 from fsw.barriers.cbf_row import Plane, barrier_value, fill_row
-from fsw.barriers.constraint_block import ConstraintBlock, Rows, TargetPoints
+from fsw.barriers.constraint_block import Rows, TargetPoints, surface_rows
 from fsw.barriers.safe_approach import BarrierNumbers, BarrierTuning
 from fsw.compiled import compiled, of_fixed_types
 from fsw.geometry.vectors import dot
 from fsw.model.linearisation import POINTS, Linearisation, PointMotions
-from fsw.model.prediction import INPUTS, Array, CondensedModel
+from fsw.model.prediction import Array, CondensedModel
 from fsw.signals import Wall
 
 
@@ -39,20 +39,13 @@ class WallBarrier:
             np.array([wall.normal for wall in walls]).reshape(-1, 3),
             np.array([wall.offset + wall.clearance for wall in walls]),
         )
-        nodes = np.arange(1 + tuning.skipped_nodes, model.horizon + 1)
-        node, wall, _ = np.meshgrid(nodes, np.arange(len(walls)), np.arange(POINTS), indexing="ij")
-        slack = (node - nodes[0]) * len(walls) + wall
-        self.rows = ConstraintBlock(node.ravel(), slack.ravel(), INPUTS * model.horizon)
+        first = 1 + tuning.skipped_nodes
+        self.rows = surface_rows(len(walls), POINTS, first, model.horizon)
         self._rows, self._fill = self.rows.rows, of_fixed_types(_fill)
-        self._h_start = np.zeros(len(walls) * POINTS)
 
     def refill(self, horizon: Linearisation, targets: TargetPoints) -> None:
         """Linearise h of every wall, point and node."""
-        self._fill(self._walls, horizon.points, self._tuning, self._h_start, self._rows)
-
-    def at_start(self) -> Array:
-        """h at node 0 by wall and point [m/s]."""
-        return self._h_start
+        self._fill(self._walls, horizon.points, self._tuning, self._rows)
 
 
 @compiled
@@ -60,7 +53,6 @@ def _fill(
     walls: _Walls,
     points: PointMotions,
     tuning: BarrierNumbers,
-    h_start: Array,
     rows: Rows,
 ) -> None:
     row = 0
@@ -74,8 +66,8 @@ def _fill(
                 plane = Plane(normal, dot(normal, p) - walls.offsets[wall], dot(normal, v))
                 column = wall * POINTS + point
                 if i == 0:
-                    h_start[column] = barrier_value(plane, tuning)
+                    rows.start[column] = barrier_value(plane, tuning)
                     continue
                 gradients = (points.d_position[i, point], points.d_velocity[i, point])
-                fill_row(rows, row, i, plane, h_start[column], gradients, tuning)
+                fill_row(rows, row, i, plane, rows.start[column], gradients, tuning)
                 row += 1

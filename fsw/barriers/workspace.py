@@ -21,12 +21,12 @@ from typing import NamedTuple
 import numpy as np
 
 from fsw.barriers.cbf_row import Plane, barrier_value, fill_row
-from fsw.barriers.constraint_block import ConstraintBlock, Rows, TargetPoints
+from fsw.barriers.constraint_block import Rows, TargetPoints, surface_rows
 from fsw.barriers.safe_approach import BarrierNumbers, BarrierTuning
 from fsw.compiled import compiled, of_fixed_types
 from fsw.geometry.vectors import dot
 from fsw.model.linearisation import BASE, Linearisation, PointMotions
-from fsw.model.prediction import INPUTS, Array, CondensedModel
+from fsw.model.prediction import Array, CondensedModel
 from fsw.signals import WorkspaceSphere
 
 DIRECTIONS = 6
@@ -48,20 +48,14 @@ class WorkspaceBarrier:
         self._tuning = tuning.numbers(model.period)
         self._radius = sphere.radius
         self._offset = np.array(sphere.centre_from_target)
-        nodes = np.arange(1 + tuning.skipped_nodes, model.horizon + 1)
-        node = np.repeat(nodes, DIRECTIONS)
-        self.rows = ConstraintBlock(node, node - nodes[0], INPUTS * model.horizon)
+        first = 1 + tuning.skipped_nodes
+        self.rows = surface_rows(1, DIRECTIONS, first, model.horizon, starts=1)
         self._rows, self._fill = self.rows.rows, of_fixed_types(_fill)
-        self._h_start = np.zeros(1)
 
     def refill(self, horizon: Linearisation, targets: TargetPoints) -> None:
         """Linearise h along six directions, frozen at the guess, at every node."""
         centre = _Centre(targets.position + self._offset, targets.velocity, self._radius)
-        self._fill(centre, horizon.points, self._tuning, self._h_start, self._rows)
-
-    def at_start(self) -> Array:
-        """The smaller of h2a and h2b at node 0 [m/s], (1,)."""
-        return self._h_start
+        self._fill(centre, horizon.points, self._tuning, self._rows)
 
 
 @compiled
@@ -103,14 +97,13 @@ def _fill(
     centre: _Centre,
     points: PointMotions,
     tuning: BarrierNumbers,
-    h_start: Array,
     rows: Rows,
 ) -> None:
     frame, radius = np.zeros((3, 3)), centre.radius
     e_start = points.position[0, BASE] - centre.position[0]
     w_start = points.velocity[0, BASE] - centre.velocity[0]
     outward_frame(e_start, frame)
-    h_start[0] = min(
+    rows.start[0] = min(
         barrier_value(_tangent_plane(frame[0], e_start, w_start, radius), tuning),
         barrier_value(_tangent_plane(-frame[0], e_start, w_start, radius), tuning),
     )

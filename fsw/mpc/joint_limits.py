@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from fsw.barriers.constraint_block import ConstraintBlock
+from fsw.barriers.constraint_block import surface_rows
 from fsw.model.linearisation import Linearisation
-from fsw.model.prediction import INPUTS, Q_ARM, CondensedModel
+from fsw.model.prediction import Q_ARM, CondensedModel
 
 _LIMITED = np.array([[1.0, 0.0], [-1.0, 0.0], [1.0, 1.0], [-1.0, -1.0]])  # +-th1, +-(th1 + th2)
 
@@ -16,8 +16,7 @@ class JointLimits:
 
     def __init__(self, model: CondensedModel) -> None:
         airframe = model.airframe
-        nodes = np.repeat(np.arange(1, model.horizon + 1), len(_LIMITED))
-        self.rows = ConstraintBlock(nodes, nodes - 1, INPUTS * model.horizon)
+        self.rows = surface_rows(1, len(_LIMITED), 1, model.horizon)
         limits = np.array([airframe.joint1_limit] * 2 + [airframe.joint12_limit] * 2)
         self.rows.lower_bound[:] = np.tile(-limits, model.horizon)
         angles = model.gamma[1:, Q_ARM : Q_ARM + 2]  # (n, 2, 6 n)

@@ -60,7 +60,7 @@ class Ocp:
 
     def barrier_at_start(self) -> tuple[float, ...]:
         """h of each constraint at node 0 [m/s]."""
-        return tuple(h for barrier in self._barriers for h in barrier.at_start().tolist())
+        return tuple(h for barrier in self._barriers for h in barrier.rows.start.tolist())
 
     def largest_barrier_slack(self, x: Array) -> float:
         """Largest slack of the barrier's rows in a solution ``x`` (unknowns,) [SI], [m/s]."""

@@ -14,15 +14,15 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fsw.barriers.constraint_block import TargetPoints
-from fsw.barriers.point_obstacle import vertical_shares
-from fsw.barriers.tangent import CENTRE_BALL
+from fsw.barriers.hard_set import HardSet
 from fsw.compiled import compiled
-from fsw.model.linearisation import BASE, POINTS, Linearisation
+from fsw.model.linearisation import BASE, Linearisation
 from fsw.model.prediction import INPUTS, Array
 from fsw.mpc.costs import Quadratic, add_square
-from fsw.signals import PointObstacle, Wall, WorkspaceSphere
+from fsw.signals import WorkspaceSphere
 
 _LEAST_GAP = 0.02  # m; from here on eq 29 goes on as a parabola
 
@@ -38,12 +38,11 @@ class SoftWeights:
     centring: float = 100.0  # ours, for the like-for-like Naive
 
 
-class SoftWallCost:
-    """Eq 29 for every wall, critical point and node."""
+class SurfaceCost:
+    """Eq 29 of the distance of every critical point to walls or obstacles, at every node."""
 
-    def __init__(self, walls: tuple[Wall, ...], weights: SoftWeights) -> None:
-        self._normals = np.array([wall.normal for wall in walls]).reshape(-1, 3)
-        self._offsets = np.array([wall.offset + wall.clearance for wall in walls])
+    def __init__(self, surfaces: HardSet, weights: SoftWeights) -> None:
+        self._surfaces = surfaces
         self._weights = (weights.wall, weights.wall_terminal)
 
     def add(
@@ -53,41 +52,9 @@ class SoftWallCost:
         quadratic: Quadratic,
     ) -> float:
         """See ``fsw.mpc.costs.Cost``."""
-        return _add_walls(
-            self._normals,
-            self._offsets,
-            *self._weights,
-            horizon.position,
-            horizon.d_position,
-            quadratic,
-        )
-
-
-class SoftObstacleCost:
-    """Eq 29 of the distance to every obstacle, along the ray of the guess."""
-
-    def __init__(self, obstacles: tuple[PointObstacle, ...], weights: SoftWeights) -> None:
-        self._centres = np.array([obstacle.position for obstacle in obstacles])
-        self._clearances = np.array([obstacle.clearance for obstacle in obstacles])
-        self._verticals = vertical_shares(obstacles)
-        self._weights = (weights.wall, weights.wall_terminal)
-
-    def add(
-        self,
-        horizon: Linearisation,
-        targets: TargetPoints,
-        quadratic: Quadratic,
-    ) -> float:
-        """See ``fsw.mpc.costs.Cost``."""
-        return _add_obstacles(
-            self._centres,
-            self._clearances,
-            self._verticals,
-            *self._weights,
-            horizon.position,
-            horizon.d_position,
-            quadratic,
-        )
+        self._surfaces.refill(horizon, targets)
+        rows = self._surfaces.rows
+        return _add_gaps(*self._weights, rows.node, rows.value, rows.gradient, quadratic)
 
 
 class SphereCost:
@@ -132,72 +99,23 @@ def one_sided_reciprocal(gap: float, weight: float) -> tuple[float, float, float
 
 
 @compiled
-def _add_walls(
-    normals: Array,
-    offsets: Array,
+def _add_gaps(
     weight: float,
     terminal: float,
-    position: Array,
-    d_position: Array,
+    node: NDArray[np.intp],
+    gap: Array,
+    gradient: Array,
     quadratic: Quadratic,
 ) -> float:
-    n = position.shape[0] - 1
-    row = np.zeros(quadratic.guess.shape[0])
     cost = 0.0
-    for i in range(1, n + 1):
-        for wall in range(normals.shape[0]):
-            nx, ny, nz = normals[wall]
-            for point in range(POINTS):
-                p, dp = position[i, point], d_position[i, point]
-                gap = nx * p[0] + ny * p[1] + nz * p[2] - offsets[wall]
-                for k in range(INPUTS * i):
-                    row[k] = nx * dp[0, k] + ny * dp[1, k] + nz * dp[2, k]
-                w = terminal if i == n else weight
-                cost += _add_gap(gap, w, row, INPUTS * i, quadratic)
+    for row in range(len(node)):
+        columns = INPUTS * node[row]
+        w = terminal if columns == len(quadratic.guess) else weight
+        value, slope, curvature = one_sided_reciprocal(gap[row], w)
+        cost += value
+        # value + slope x + curvature x^2 / 2 as a square about its minimum.
+        add_square(0.5 * curvature, slope / curvature, gradient[row], columns, quadratic)
     return cost
-
-
-@compiled
-def _add_obstacles(
-    centres: Array,
-    clearances: Array,
-    verticals: Array,
-    weight: float,
-    terminal: float,
-    position: Array,
-    d_position: Array,
-    quadratic: Quadratic,
-) -> float:
-    n = position.shape[0] - 1
-    row = np.zeros(quadratic.guess.shape[0])
-    cost = 0.0
-    for i in range(1, n + 1):
-        for number in range(centres.shape[0]):
-            for point in range(POINTS):
-                away, dp = position[i, point] - centres[number], d_position[i, point]
-                x, y, z = away[0], away[1], verticals[number] * away[2]
-                length = math.sqrt(x * x + y * y + z * z)
-                scale = 1.0 / max(length, CENTRE_BALL)
-                for k in range(INPUTS * i):
-                    row[k] = scale * (x * dp[0, k] + y * dp[1, k] + z * dp[2, k])
-                w, gap = terminal if i == n else weight, length - clearances[number]
-                cost += _add_gap(gap, w, row, INPUTS * i, quadratic)
-    return cost
-
-
-@compiled
-def _add_gap(
-    gap: float,
-    weight: float,
-    row: Array,
-    columns: int,
-    quadratic: Quadratic,
-) -> float:
-    """Eq 29 of one gap that moves with the inputs by ``row``."""
-    value, slope, curvature = one_sided_reciprocal(gap, weight)
-    # value + slope x + curvature x^2 / 2 as a square about its minimum.
-    add_square(0.5 * curvature, slope / curvature, row, columns, quadratic)
-    return value
 
 
 @compiled

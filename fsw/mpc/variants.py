@@ -21,14 +21,14 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from fsw.barriers.constraint_block import Barrier
-from fsw.barriers.hard_set import HardObstacles, HardWalls, HardWorkspace
+from fsw.barriers.hard_set import HardObstacles, HardSet, HardWalls, HardWorkspace
 from fsw.barriers.point_obstacle import PointObstacleBarrier
 from fsw.barriers.wall import WallBarrier
 from fsw.barriers.workspace import WorkspaceBarrier
 from fsw.model.prediction import CondensedModel
 from fsw.mpc.costs import Cost, PostureCost, TrackingCost
 from fsw.mpc.planner_config import PlannerConfig
-from fsw.mpc.soft_costs import SoftObstacleCost, SoftWallCost, SphereCost
+from fsw.mpc.soft_costs import SphereCost, SurfaceCost
 from fsw.signals import SafeSet
 
 
@@ -55,12 +55,19 @@ def _hard(config: PlannerConfig, model: CondensedModel, safe_set: SafeSet) -> Pa
     where = (model.horizon, config.tightening, first)
     if safe_set.sphere is not None:
         return Parts(costs, (HardWorkspace(safe_set.sphere, *where),), config.hard_slack)
-    barriers: list[Barrier] = []
+    return Parts(costs, _surfaces(safe_set, *where), config.hard_slack)
+
+
+def _surfaces(
+    safe_set: SafeSet, horizon: int, tightening: float, first_node: int
+) -> tuple[HardSet, ...]:
+    """The distances to walls and obstacles, where there are any."""
+    surfaces: list[HardSet] = []
     if safe_set.walls:
-        barriers.append(HardWalls(safe_set.walls, *where))
+        surfaces.append(HardWalls(safe_set.walls, horizon, tightening, first_node))
     if safe_set.obstacles:
-        barriers.append(HardObstacles(safe_set.obstacles, *where))
-    return Parts(costs, tuple(barriers), config.hard_slack)
+        surfaces.append(HardObstacles(safe_set.obstacles, horizon, tightening, first_node))
+    return tuple(surfaces)
 
 
 def _soft(config: PlannerConfig, model: CondensedModel, safe_set: SafeSet) -> Parts:
@@ -70,12 +77,8 @@ def _soft(config: PlannerConfig, model: CondensedModel, safe_set: SafeSet) -> Pa
             safe_set.sphere, weights.workspace, weights.workspace_terminal, only_outside=True
         )
         return Parts((tracking, outside))
-    costs: list[Cost] = [tracking]
-    if safe_set.walls:
-        costs.append(SoftWallCost(safe_set.walls, weights))
-    if safe_set.obstacles:
-        costs.append(SoftObstacleCost(safe_set.obstacles, weights))
-    return Parts(tuple(costs))
+    surfaces = _surfaces(safe_set, model.horizon, tightening=0.0, first_node=1)
+    return Parts((tracking, *(SurfaceCost(each, weights) for each in surfaces)))
 
 
 def _blf(config: PlannerConfig, model: CondensedModel, safe_set: SafeSet) -> Parts:

@@ -10,30 +10,38 @@ import pytest
 
 from fsw.model.airframe import AIRFRAME, AttitudeLag
 from fsw.model.kinematics import arm_points
+from fsw.model.nominal import REST_STATE
 from fsw.model.prediction import discretise, to_vector
 from fsw.signals import PlanInput
 from sitl.scenario import Uniform, Wind
 from studies.cases import scenario
-from studies.double_integrator import DoubleIntegrator, PointMass
+from studies.double_integrator import DoubleIntegrator, after, points
 
 U = PlanInput((0.3, -0.2, 0.1), 0.05, (0.4, -0.6))
-MOVING = PointMass((1.0, 2.0, -3.0), (0.3, -0.1, 0.2), 0.4, -0.3, (-0.6, 1.1), (0.2, -0.5))
+MOVING = REST_STATE._replace(
+    p=(1.0, 2.0, -3.0),
+    v=(0.3, -0.1, 0.2),
+    yaw=0.4,
+    yaw_rate=-0.3,
+    q_arm=(-0.6, 1.1),
+    qd_arm=(0.2, -0.5),
+)
 STILL = (0.0, 0.0, 0.0)
 
 
 def test_a_period_in_ticks_is_the_planners_period() -> None:
     state = MOVING
     for _ in range(50):
-        state = state.after(U, STILL, 0.002)
+        state = after(state, U, STILL, 0.002)
     a, b = discretise(replace(AIRFRAME, attitude_lag=AttitudeLag(at_once=True)), 0.1)
-    whole = a @ to_vector(MOVING.as_prediction()) + b @ np.array([*U.a, U.yaw_acc, *U.qdd_arm])
-    np.testing.assert_allclose(to_vector(state.as_prediction()), whole, atol=1e-12)
+    whole = a @ to_vector(MOVING) + b @ np.array([*U.a, U.yaw_acc, *U.qdd_arm])
+    np.testing.assert_allclose(to_vector(state), whole, atol=1e-12)
 
 
 def test_its_points_are_the_planners_points() -> None:
     expected = np.zeros((2, 2, 3))
-    arm_points(to_vector(MOVING.as_prediction()), *AIRFRAME.link_length, expected)
-    base, joint2, end_effector = MOVING.points()
+    arm_points(to_vector(MOVING), *AIRFRAME.link_length, expected)
+    base, joint2, end_effector = points(MOVING)
     assert base == MOVING.p
     np.testing.assert_allclose([joint2, end_effector], expected[:, 0], atol=1e-14)
 
@@ -54,7 +62,7 @@ def test_wind_moves_it_by_half_a_t_squared() -> None:
 def test_it_starts_with_the_end_effector_on_its_reference_and_the_base_in_the_centre() -> None:
     for case in ("I", "II"):
         plant = DoubleIntegrator(scenario(case, disturbed=False), seed=0)
-        base, _, end_effector = plant.state.points()
+        base, _, end_effector = points(plant.state)
         target = plant.clock.target_at(0.0).p
         np.testing.assert_allclose(end_effector, target, atol=1e-12)
         if case == "II":

@@ -102,7 +102,7 @@ def test_obstacle_rows_are_distances_to_balls_and_cylinders(first_node: int) -> 
     hard = HardObstacles(OBSTACLES, NODES, tightening=0.04, first_node=first_node)
     hard.refill(case.horizon(), case.targets)
     rows, every = hard.rows, clear_of(case.horizon(), 0)
-    np.testing.assert_allclose(hard.at_start(), every[:9], atol=1e-9)
+    np.testing.assert_allclose(hard.rows.start, every[:9], atol=1e-9)
     np.testing.assert_allclose(rows.value, every[9 * first_node :], atol=1e-9)
     assert (rows.lower_bound == 0.04).all()
     change = np.zeros(INPUTS * NODES)
@@ -144,7 +144,7 @@ def test_each_surface_has_a_slack_of_its_own_at_each_node(
     assert hard.rows.node.tolist() == nodes
     assert hard.rows.slack.tolist() == slacks
     assert hard.rows.slacks == slacks[-1] + 1
-    assert hard.at_start().shape == (surfaces * points,)
+    assert hard.rows.start.shape == (surfaces * points,)
 
 
 def test_the_start_is_told_of_node_zero() -> None:
@@ -157,9 +157,9 @@ def test_the_start_is_told_of_node_zero() -> None:
         for wall in WALLS
         for point in range(3)
     ]
-    np.testing.assert_allclose(walls.at_start(), left, atol=1e-9)
+    np.testing.assert_allclose(walls.rows.start, left, atol=1e-9)
     np.testing.assert_allclose(walls.rows.value, distances(case.horizon())[6:], atol=1e-9)
     sphere = HardWorkspace(WorkspaceSphere((0.0, 0.0, -0.225), 0.3), NODES, 0.0, first_node=2)
     sphere.refill(case.horizon(), case.targets)
     away = position[0, BASE] - case.targets.position[0] - OFFSET
-    assert sphere.at_start() == pytest.approx([0.3 - np.linalg.norm(away)])
+    assert sphere.rows.start == pytest.approx([0.3 - np.linalg.norm(away)])

@@ -47,7 +47,7 @@ def test_wall_report_equals_the_rows_at_the_start() -> None:
         barrier.refill(case.horizon(), case.targets)
         report = constraint_report(SafeSet(walls), TUNING, points_at_start(case.horizon()), None)
         assert report.kind is ConstraintKind.WALLS
-        np.testing.assert_allclose(report.barrier, barrier.at_start(), atol=1e-12)
+        np.testing.assert_allclose(report.barrier, barrier.rows.start, atol=1e-12)
 
 
 def test_the_report_of_walls_and_points_equals_the_rows_at_the_start() -> None:
@@ -63,7 +63,7 @@ def test_the_report_of_walls_and_points_equals_the_rows_at_the_start() -> None:
             PointObstacleBarrier(obstacles, TUNING, MODEL),
         ):
             barrier.refill(case.horizon(), case.targets)
-            rows += barrier.at_start().tolist()
+            rows += barrier.rows.start.tolist()
         report = constraint_report(SafeSet(walls, obstacles=obstacles), TUNING, points, None)
         assert report.kind is ConstraintKind.OBSTACLES
         np.testing.assert_allclose(report.barrier, rows, atol=1e-12)
@@ -100,9 +100,9 @@ def test_sphere_report_is_the_outward_row_at_the_start() -> None:
         assert report.margins == pytest.approx((0.5 - rho,))
         outward_speed = e @ w / rho
         if outward_speed >= 0.0:  # then the outward row is the tighter of the paper's pair
-            assert report.barrier[0] == pytest.approx(float(barrier.at_start()[0]))
+            assert report.barrier[0] == pytest.approx(float(barrier.rows.start[0]))
         else:
-            assert report.barrier[0] >= barrier.at_start()[0] - 1e-12
+            assert report.barrier[0] >= barrier.rows.start[0] - 1e-12
 
 
 def test_sphere_report_at_the_centre_is_a_number() -> None:

@@ -98,7 +98,7 @@ def test_the_rows_ask_for_the_decay_of_h_from_where_the_vehicle_is() -> None:
                 n = rays_at(horizon, place)[node, point]
                 p, v = horizon.position[0, point] - place, horizon.velocity[0, point]
                 required.append(lowest_allowed(safe_speed(n @ p - clearance) + n @ v, node))
-    np.testing.assert_allclose(barrier.at_start(), start, atol=1e-12)
+    np.testing.assert_allclose(barrier.rows.start, start, atol=1e-12)
     np.testing.assert_allclose(barrier.rows.lower_bound, required, atol=1e-12)
 
 

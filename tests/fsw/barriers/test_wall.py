@@ -83,7 +83,7 @@ def test_rows_ask_for_what_the_decay_from_the_start_leaves() -> None:
     walls = random_walls(random, case.start[0:3], 0.4)
     barrier = refilled(walls, case)
     start = braked(walls, case.horizon(), 0)[: 3 * len(walls)]
-    np.testing.assert_allclose(barrier.at_start(), start, atol=1e-5)
+    np.testing.assert_allclose(barrier.rows.start, start, atol=1e-5)
     expected = [lowest_allowed(h, node) for node in range(2, NODES + 1) for h in start]
     np.testing.assert_allclose(barrier.rows.lower_bound, expected, atol=1e-5)
 

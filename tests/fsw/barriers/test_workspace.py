@@ -121,7 +121,7 @@ def test_reported_h_is_the_smaller_of_the_papers_pair_at_the_start() -> None:
         e, w = relative(case, case.horizon(), 0)
         n = e / np.linalg.norm(e)
         expected = min(h_along(n, e, w), h_along(-n, e, w))
-        assert barrier.at_start()[0] == pytest.approx(expected)
+        assert barrier.rows.start[0] == pytest.approx(expected)
 
 
 def test_one_slack_a_node() -> None:

@@ -8,15 +8,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fsw.barriers.constraint_block import TargetPoints
+from fsw.barriers.hard_set import HardObstacles, HardWalls
 from fsw.model.airframe import AIRFRAME
 from fsw.model.linearisation import Linearisation
 from fsw.model.prediction import INPUTS, YAW, Array, condense
 from fsw.mpc.costs import Cost, CostWeights, TrackingCost
 from fsw.mpc.soft_costs import (
-    SoftObstacleCost,
-    SoftWallCost,
     SoftWeights,
     SphereCost,
+    SurfaceCost,
     one_sided_reciprocal,
 )
 from fsw.signals import PointObstacle, Wall, WorkspaceSphere
@@ -32,8 +32,8 @@ SPHERE = WorkspaceSphere((0.0, 0.0, -0.225), 0.075)
 COSTS: dict[str, Cost] = {
     "tracking": TrackingCost(CostWeights()),
     "printed": TrackingCost(CostWeights(relative_velocity=False)),
-    "soft walls": SoftWallCost(WALLS, SoftWeights()),
-    "soft points": SoftObstacleCost(POINTS, SoftWeights()),
+    "soft walls": SurfaceCost(HardWalls(WALLS, N, 0.0, 1), SoftWeights()),
+    "soft points": SurfaceCost(HardObstacles(POINTS, N, 0.0, 1), SoftWeights()),
     "outside the sphere": SphereCost(SPHERE, 5.0, 20.0, only_outside=True),
     "centring": SphereCost(SPHERE, 100.0, 500.0, only_outside=False),
 }

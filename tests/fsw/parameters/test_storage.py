@@ -14,7 +14,7 @@ from pymavlink.mavparm import MAVParmDict
 from fsw.parameters import storage
 from fsw.parameters.flight_config import FlightConfig
 from fsw.parameters.float32 import nearest_decimal
-from fsw.parameters.kept_file import KeptFile, ParameterFile
+from fsw.parameters.kept_file import ParameterFile
 from fsw.parameters.registry import BY_NAME, PARAMETERS
 from fsw.parameters.storage import as_params, as_parm, load, parse, save
 from fsw.parameters.store import ParameterStore
@@ -134,7 +134,7 @@ def test_a_write_that_fails_leaves_the_old_file_whole(
 
 def keeping(path: Path | None, tmp_path: Path) -> tuple[ParameterStore, ParameterFile]:
     store = ParameterStore(FlightConfig(), lambda tuning: None)
-    kept = ParameterFile(store, KeptFile(path, tmp_path / "record.params", store.defaults))
+    kept = ParameterFile(store, path, tmp_path / "record.params")
     kept.start()
     return store, kept
 
