@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fsw.arguments import FswOptions
+from fsw.control.control_metrics import ControlMetrics
 from fsw.link import link_report
 from fsw.link.build_links import build_links
 from fsw.link.files.flight_logs import FlightLogs
@@ -27,9 +28,8 @@ from fsw.log.run_directory import new_run_directory
 from fsw.log.run_files import RunFiles
 from fsw.ports import LoopHealth, PlanningCycle
 from fsw.runtime import clock, report
-from fsw.runtime.effort import EffortRecord
-from fsw.runtime.events import Events, events
-from fsw.runtime.planner_worker import InlinePlanner, PlannerRecord, ProcessPlanner
+from fsw.runtime.events import Events
+from fsw.runtime.planner_service import InlinePlanner, PlannerRecord, ProcessPlanner
 from fsw.runtime.process import StopRequest, in_a_child, settle_memory
 from fsw.runtime.program import FlightProgram
 from fsw.runtime.realtime import (
@@ -37,7 +37,6 @@ from fsw.runtime.realtime import (
     claim_real_time,
     release_real_time,
     scheduler,
-    share_interpreter_fairly,
 )
 from fsw.runtime.sim_loop import Ending, FlightEnd, FlightRecord, SimLoop
 from fsw.runtime.timing import GroupTimer
@@ -66,7 +65,7 @@ def run(options: FswOptions, load: ProgramLoader | None = None) -> int:
     Returns:
         The exit code.
     """
-    reporter = events(options.events)
+    reporter = Events(options.events)
     try:
         return _Session(options, reporter, load or load_flight_software).run()
     except (CouldNotStart, LinkError) as error:
@@ -104,7 +103,7 @@ class _Session:
         facts = program.facts
         record = FlightRecord(
             mpc=PlannerRecord(GroupTimer(facts.mpc_period_us)),
-            effort=EffortRecord(),
+            control=ControlMetrics(),
             health=LoopHealth(),
         )
         keeping = self._keep_parameters(program, directory)
@@ -141,9 +140,8 @@ class _Session:
         finally:
             for part in (planner, sim, ground, files, keeping):
                 part.close()
-        setup = report.Setup(options.control.controller, options.control.inner, facts)
-        result = report.as_json(setup, end, record, sim.retransmissions)
-        result |= link_report.as_json(ground, inbox)
+        result = report.as_json(options.control, facts, end, record)
+        result |= {"retransmissions": sim.retransmissions, **link_report.as_json(ground, inbox)}
         result["files"] = files.as_json()
         unwritten = report.write(directory / "fsw.json", result)
         sentence = f"fsw: {end.sentence}"
@@ -223,7 +221,6 @@ class _Session:
             settle_memory()
             record.scheduler = scheduler()
             return loop.fly(first, InlinePlanner(inline, clock.now_us, record.mpc))
-        share_interpreter_fairly()
         refused = claim_real_time(TICK_PRIORITY)
         record.scheduler = scheduler()
         if refused:

@@ -181,7 +181,7 @@ def fly(
         _insist(outputs)
         applied = outputs.snapshot.plan_input
         if step % steps_per_plan == 0 and applied is not None:
-            recorder.effort.add(applied)
+            recorder.metrics.add(applied)
         if outputs.plan_request is not None and asked is not None:
             asked(outputs.plan_request)
     return recorder.result(simulation.result())

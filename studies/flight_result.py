@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass, field
 
-from fsw.runtime.effort import EffortRecord
+from fsw.control.control_metrics import ControlMetrics
 from fsw.signals import Plan, PlanFailure
 from sitl.result import TruthResult
 from sitl.scenario import V3
@@ -54,7 +54,7 @@ class FlightResult:
 class FlightRecorder:
     """Collects what a flight's result consists of beside the truth."""
 
-    effort: EffortRecord = field(default_factory=EffortRecord)
+    metrics: ControlMetrics = field(default_factory=ControlMetrics)
     step_us: list[float] = field(default_factory=list)
     plans: int = 0
     failures: int = 0
@@ -70,7 +70,7 @@ class FlightRecorder:
 
     def result(self, truth: TruthResult) -> FlightResult:
         """The whole flight."""
-        totals = self.effort.as_json()
+        totals = self.metrics.as_json()
         return FlightResult(
             truth=truth,
             effort=InputTotals(**totals["control_effort"]),

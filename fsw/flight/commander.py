@@ -47,6 +47,7 @@ class Commander:
 
     def __init__(self, config: FlightConfig) -> None:
         self._config = config
+        self._plan_period_us = config.mpc_period_us
         self._generator = SetpointGenerator(config)
         self._modes: dict[Mode, FlightMode] = {mode: kind(config) for mode, kind in MODES.items()}
         self._no_mode = FlightMode(config)  # disarmed or terminated
@@ -143,6 +144,7 @@ class Commander:
 
     def _failsafe_context(self, state: FlightState, estimate: StateEstimate) -> FailsafeContext:
         vehicle, plan, now_us = state.vehicle, state.plan, estimate.t_us
+        offboard = vehicle.mode is Mode.OFFBOARD
         return FailsafeContext(
             limits=self._config.limits,
             mode=vehicle.mode,
@@ -152,10 +154,10 @@ class Commander:
             invalid_ticks=state.invalid_ticks,
             up=estimate.R_WB[8],
             plan_age_us=now_us - plan.since_us,
-            plan_period_us=self._config.mpc_period_us,
+            plan_period_us=self._plan_period_us,
             plan_refused=plan.refused,
             output_replaced=state.output_replaced,
-            setpoint_fresh=is_fresh(self._config, state, now_us),
+            setpoint_fresh=not offboard or is_fresh(self._config, state, now_us),
             gcs_silent_us=now_us - vehicle.gcs_heard_us if vehicle.gcs_heard_us >= 0 else -1,
             battery=state.battery,
         )

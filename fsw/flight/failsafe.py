@@ -76,7 +76,7 @@ class FailsafeContext:
     plan_period_us: int
     plan_refused: bool
     output_replaced: bool
-    setpoint_fresh: bool
+    setpoint_fresh: bool  # or none is needed
     gcs_silent_us: int  # -1: no ground station was ever heard
     battery: BatteryState
 
@@ -160,7 +160,7 @@ FAILSAFES: Final = (
     ),
     Failsafe(
         Condition.SETPOINTS_LOST,
-        lambda c: c.mode is Mode.OFFBOARD and not c.setpoint_fresh,
+        lambda c: not c.setpoint_fresh,
         _on_setpoints_lost,
     ),
     Failsafe(

@@ -1,4 +1,4 @@
-"""What the process asks of the operating system before it flies."""
+"""The process itself: threads of libraries, signals, memory, and children."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class StopRequest:
 
 
 def settle_memory() -> None:
-    """Take everything built so far out of the garbage collector's sight, and stop it.
+    """Stop the garbage collector, and return memory that only building needed.
 
     The loop makes no reference cycles, so counting references frees all it allocates; a
     collection over numba's and SciPy's objects would cost tens of milliseconds in a tick.
@@ -85,10 +85,10 @@ def _give_memory_back() -> None:
 
 
 def in_a_child(work: Callable[[], object]) -> None:
-    """Do something for what it leaves on disk, in a child that takes its memory away with it.
+    """Do work that leaves its result on disk, in a child, so that its memory is returned.
 
-    Call it while there is one thread. What fails there fails silently: whoever needs the result
-    finds it missing and does the work itself.
+    Call it while there is one thread. Errors are silent: the caller finds the result missing and
+    does the work itself.
     """
     parent = os.getpid()
     child = os.fork()
@@ -103,8 +103,7 @@ def in_a_child(work: Callable[[], object]) -> None:
 
 
 def die_with_parent(parent: int) -> None:
-    """Tie the life of a process that was just forked to its parent's (Linux only)."""
-    if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
+    """In a process that was just forked: let the kernel kill it when its ``parent`` ends."""
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
     if os.getppid() != parent:
         os._exit(1)

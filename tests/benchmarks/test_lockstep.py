@@ -60,7 +60,7 @@ def _flown(factor: float) -> dict[str, Any]:
     def took(us: float) -> dict[str, float]:
         return {"p50_us": us}
 
-    stages = {"hear": took(4.0), "tick": took(20.0), "actuate": took(6.0)}
+    stages = {"receive": took(4.0), "tick": took(20.0), "actuate": took(6.0)}
     mpc = {"p50_us": 700.0, "rate_hz": 10.0}
     return {
         "sitl": {"real_time_factor": factor, "steps": 1000, "wall_s": 0.08, "waited_s": 0.05},

@@ -128,8 +128,7 @@ def test_replay_names_the_first_difference(log: Path, tmp_path: Path) -> None:
     (line,) = done.stdout.splitlines()
     assert line.startswith("first difference at tick ")
     assert line.endswith(
-        ": text was 'HOLD to trajectory: follow trajectory' and is "
-        "'hold to trajectory: follow trajectory'"
+        ": text was 'HOLD to trajectory: command' and is 'hold to trajectory: command'"
     )
 
 

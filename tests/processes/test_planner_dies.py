@@ -14,7 +14,6 @@ import pytest
 
 from messages import dialect
 from tests.processes.halves import Half
-from tests.waiting import wait_for
 
 STATUSTEXT = 253
 
@@ -40,23 +39,27 @@ def texts(ground: socket.socket) -> list[str]:
                 said.append(message.text)
 
 
-def planner_of(fsw: int) -> tuple[int, int]:
-    """The nursery and the worker in it, once both are there."""
-
-    def both() -> tuple[int, int] | None:
+def planner_of(fsw: int, instead_of: int | None = None) -> tuple[int, int]:
+    """The fork server and its worker, once a worker that is not ``instead_of`` is there."""
+    until = time.monotonic() + 10.0
+    while time.monotonic() < until:
         with contextlib.suppress(ValueError, FileNotFoundError):
-            (nursery,) = children(fsw)
-            (worker,) = children(nursery)
-            return nursery, worker
-        return None
+            (server,) = children(fsw)
+            (worker,) = children(server)
+            if worker != instead_of:
+                return server, worker
+        time.sleep(0.01)
+    raise AssertionError("no planner")
 
-    found = wait_for(both, "a planner's processes")
-    assert found is not None
-    return found
+
+def fly_until(t_s: float, sitl: Half) -> None:
+    """Wait for simulated time."""
+    while sitl.wait_for("progress")["t_s"] < t_s:
+        pass
 
 
 def test_killing_the_planner_costs_no_barrier(tmp_path: Path) -> None:
-    """The worker first, which its nursery replaces; later the nursery with the new worker in it."""
+    """The worker first, which the fork server replaces; later the fork server with its worker."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as ground:
         ground.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 22)
         ground.bind(("127.0.0.1", 0))
@@ -67,14 +70,13 @@ def test_killing_the_planner_costs_no_barrier(tmp_path: Path) -> None:
             telemetry = ("--gcs", f"udp:127.0.0.1:{ground.getsockname()[1]}")
             with Half("fsw", *addresses, *telemetry, "--out", str(tmp_path), "--wait", "90") as fsw:
                 sitl.wait_for("flying", patience_s=120.0)
-                time.sleep(1.0)  # some of the flight
-                nursery, first = planner_of(fsw.process.pid)
+                fly_until(2.0, sitl)
+                server, first = planner_of(fsw.process.pid)
                 os.kill(first, signal.SIGKILL)
-                wait_for(lambda: planner_of(fsw.process.pid)[1] != first, "another worker")
-                same, second = planner_of(fsw.process.pid)
-                assert same == nursery
-                time.sleep(1.0)  # some of the flight with it
-                os.kill(nursery, signal.SIGKILL)
+                fly_until(3.5, sitl)
+                same, second = planner_of(fsw.process.pid, instead_of=first)
+                assert same == server
+                os.kill(server, signal.SIGKILL)
                 ended = sitl.wait_for("ended", patience_s=30.0)
                 assert fsw.finish() == 0
         said = texts(ground)
@@ -85,6 +87,6 @@ def test_killing_the_planner_costs_no_barrier(tmp_path: Path) -> None:
     assert vehicle["mpc"]["cycles"] > 40, "planned on with the new one"
     for what in ("planner process died", "planner processes died"):
         assert any(what in text for text in said), said
-    for process in (nursery, first, second):
+    for process in (server, first, second):
         with pytest.raises(ProcessLookupError):
             os.kill(process, 0)

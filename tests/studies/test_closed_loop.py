@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import pytest
 
+from fsw.control.control_metrics import ControlMetrics
 from fsw.parameters.flight_config import flight_config
-from fsw.runtime.effort import EffortRecord
 from fsw.signals import PlanInput
 from studies import closed_loop
 from studies.cases import configuration, scenario
@@ -18,7 +18,7 @@ BRIEF = 2.0  # s
 
 
 def test_effort_and_smoothness_are_the_papers_sums_in_its_order() -> None:
-    record = EffortRecord()
+    record = ControlMetrics()
     inputs = [(1.0, 2.0, 3.0, 4.0, 5.0, 6.0), (1.0, 2.0, 0.0, 4.0, 9.0, 6.0)]
     for ax, ay, az, yaw, j1, j2 in inputs:
         record.add(PlanInput((ax, ay, az), yaw, (j1, j2)))

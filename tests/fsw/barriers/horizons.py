@@ -53,7 +53,7 @@ def safe_speed(d: float) -> float:
 
 def lowest_allowed(h_start: float, node: int) -> float:
     """What the decay of eq 25 leaves of h at a node."""
-    return float(TUNING.robustness + BETA**node * (h_start - TUNING.robustness))
+    return float(TUNING.lambda_ + BETA**node * (h_start - TUNING.lambda_))
 
 
 def measured(horizon: Linearisation) -> tuple[Array, Array]:

@@ -104,7 +104,7 @@ def test_obstacle_rows_are_distances_to_balls_and_cylinders(first_node: int) -> 
     rows, every = hard.rows, clear_of(case.horizon(), 0)
     np.testing.assert_allclose(hard.at_start(), every[:9], atol=1e-9)
     np.testing.assert_allclose(rows.value, every[9 * first_node :], atol=1e-9)
-    assert (rows.required == 0.04).all()
+    assert (rows.lower_bound == 0.04).all()
     change = np.zeros(INPUTS * NODES)
     for column in range(0, INPUTS * NODES, 2):
         change[:] = 0.0

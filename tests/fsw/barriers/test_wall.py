@@ -85,7 +85,7 @@ def test_rows_ask_for_what_the_decay_from_the_start_leaves() -> None:
     start = braked(walls, case.horizon(), 0)[: 3 * len(walls)]
     np.testing.assert_allclose(barrier.at_start(), start, atol=1e-5)
     expected = [lowest_allowed(h, node) for node in range(2, NODES + 1) for h in start]
-    np.testing.assert_allclose(barrier.rows.required, expected, atol=1e-5)
+    np.testing.assert_allclose(barrier.rows.lower_bound, expected, atol=1e-5)
 
 
 def test_each_node_and_wall_has_a_slack_of_its_own() -> None:

@@ -34,11 +34,11 @@ FINE = FailsafeContext(
     plan_period_us=PERIOD_US,
     plan_refused=False,
     output_replaced=False,
-    setpoint_fresh=False,
+    setpoint_fresh=True,
     gcs_silent_us=0,
     battery=BatteryState(),
 )
-OFFBOARD = replace(FINE, mode=Mode.OFFBOARD)
+OFFBOARD = replace(FINE, mode=Mode.OFFBOARD, setpoint_fresh=False)
 
 
 def charged(charge: Charge) -> BatteryState:
