@@ -22,7 +22,7 @@ def max_orbit_speed(orbit_radius: float, turn_rate: float, acceleration: float) 
 
 
 def on_orbit(orbit: Orbit, p: Vec3) -> MotionSetpoint:
-    """What a reference at a point [m] is after: the nearest point of the circle, moving along it.
+    """Setpoint of a reference at p [m, NED]: the nearest point of the circle, moving along it.
 
     On the circle its velocity is the tangent's; off it the correction of
     ``setpoint_generator.step`` leads there. It depends on the place alone, so it can be followed
@@ -42,13 +42,13 @@ def on_orbit(orbit: Orbit, p: Vec3) -> MotionSetpoint:
 
 
 def looking_at(motion: MotionSetpoint, place: Vec3, p: Vec3, v: Vec3) -> MotionSetpoint:
-    """A motion with the heading from a point that moves to a place.
+    """A motion with the heading from a moving point to a place.
 
     Args:
-        motion: Whatever its heading is.
-        place: Where the nose is to point [m].
-        p: The point [m].
-        v: Its velocity [m/s].
+        motion: Its own heading is replaced.
+        place: Where the nose is to point [m, NED].
+        p: The point [m, NED].
+        v: Its velocity [m/s, NED].
     """
     dx, dy = place[0] - p[0], place[1] - p[1]
     square = dx * dx + dy * dy

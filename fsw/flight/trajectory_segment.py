@@ -92,8 +92,8 @@ def segment_to(
     """The fastest segment within limits from rest at ``start`` to rest at a point.
 
     Args:
-        start: Where and when it begins; its velocity is not looked at.
-        end: End-effector position [m].
+        start: Where and when it begins; its velocity is ignored.
+        end: End-effector position [m, NED].
         yaw: Heading at the end [rad]; None keeps it.
         limits: All positive.
     """
