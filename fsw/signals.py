@@ -76,7 +76,7 @@ class ConstraintKind(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class SensorFrame:
-    """What the sensors said at one instant."""
+    """Sensor readings of one instant."""
 
     t_us: int  # sensor time, the only clock a tick knows
     p_WB: Vec3  # m
@@ -410,7 +410,7 @@ class MissionStep:
     hold_s: float = 0.0
     acceptance: float = 0.1  # m, end-effector to position
     speed: float | None = None  # m/s; None: the usual
-    stop_after: bool = False  # hold until told to go on
+    stop_after: bool = False  # hold until commanded to continue
 
 
 @dataclass(frozen=True, slots=True)
@@ -435,7 +435,7 @@ class MissionState(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class MissionProgress:
-    """What ground stations are told of the mission."""
+    """Mission state as reported to ground stations."""
 
     state: MissionState = MissionState.NO_MISSION
     current: int = 0

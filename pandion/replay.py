@@ -111,7 +111,7 @@ def _sentence(found: Replayed, log: UlogFile) -> str:
             f"no difference in {found.ticks} ticks; behind them {found.lost_ms} ms are missing "
             "in the log, and what follows cannot be fed"
         )
-    cut = "" if log.whole else "; the log ends in the middle of a record"
+    cut = "" if log.whole else "; the log was cut there, and an incomplete tick is not compared"
     return f"no difference in {found.ticks} ticks{cut}"
 
 

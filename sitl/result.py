@@ -61,7 +61,7 @@ class TrackingError:
         self.maximum: float | None = None
 
     def add(self, p: V3, target: V3) -> None:
-        """Take one sample of the true and the desired position [m]."""
+        """Add a sample: true position p [m, NED] and desired position target [m, NED]."""
         error = math.dist(p, target)
         self._squares += error * error
         self._count += 1

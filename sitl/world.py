@@ -18,7 +18,10 @@ CRITICAL_POINTS = ("base", "joint2", "end_effector")  # critical points, in the 
 
 
 def workspace_margin(workspace: Workspace, p_base: V3, p_target: V3) -> float:
-    """R − |base − centre| [m]; the centre rides ``d_iw`` above the end-effector's reference."""
+    """R − |base − centre| [m] of a base at p_base [m, NED].
+
+    The centre is ``d_iw`` above the end-effector's reference, p_target [m, NED].
+    """
     x, y = p_base[0] - p_target[0], p_base[1] - p_target[1]
     z = p_base[2] - (p_target[2] - workspace.d_iw_m)
     distance: float = (x * x + y * y + z * z) ** 0.5

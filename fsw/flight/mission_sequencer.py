@@ -112,7 +112,7 @@ def refusal(flight: MissionFlight, landed: bool) -> str | None:
 
 
 def nearest(home: Home, rally: tuple[Vec2, ...], p: Vec3) -> Home:
-    """Home, or a rally point where one is nearer to ``p`` [m, NED]; both are at home's height."""
+    """The nearest to p [m, NED] of home and the rally points; all have home's height."""
     x, y, z = home.p
     places = ((x, y), *rally)
     x, y = min(places, key=lambda place: math.dist(place, p[:2]))

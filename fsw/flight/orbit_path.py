@@ -20,7 +20,7 @@ def max_orbit_speed(orbit_radius: float, turn_rate: float, acceleration: float) 
 
 
 def on_orbit(orbit: Orbit, p: Vec3) -> MotionSetpoint:
-    """What a reference at ``p`` [m, NED] is after: the circle's nearest point, moving along it.
+    """Setpoint of a reference at p [m, NED]: the nearest point of the circle, moving along it.
 
     On the circle its velocity is the tangent's; off it the correction of
     ``setpoint_generator.step`` leads there. It depends on the place alone, so it can be followed

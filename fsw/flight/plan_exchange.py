@@ -75,10 +75,10 @@ def with_arm_in_bounds(x: PredictionState, airframe: Airframe) -> PredictionStat
 
 
 def coast(x: PredictionState, seconds: float) -> PredictionState:
-    """A measured state ``seconds`` [s] later, its jerk held.
+    """Predict a measured state over ``seconds`` [s] at constant jerk.
 
-    Off its plan the vehicle does what the fast loop makes of the error, not what the plan's input
-    says; its own motion is the better guess.
+    Off its plan the vehicle follows the tracking loop's correction, not the plan's input, so its
+    own motion predicts better.
     """
     t, j = seconds, (*x.j, 0.0)
     return x._replace(

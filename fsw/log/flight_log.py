@@ -43,7 +43,7 @@ class LogSubject:
 
 
 class FlightLog:
-    """One flight's ULog file."""
+    """One flight's ULog file; a sync message follows each block, so that a cut end is seen."""
 
     def __init__(self, path: Path, subject: LogSubject) -> None:
         """Create the file; nothing is in it before :meth:`begin`.
@@ -114,13 +114,12 @@ class FlightLog:
         self.file.close()
 
     def _flush(self, t_us: int) -> None:
-        block, begin_us = self._records, self._block_us
+        block, begin_us = self._records + ulog.sync(), self._block_us
         self._records, self._block_us = bytearray(), t_us
         if self._unmarked_us:
             block = bytearray(ulog.dropout(round(1e-3 * self._unmarked_us))) + block
         if self.file.put(block):
             self._unmarked_us = 0
-            self._records += ulog.sync()
         else:
             self.lost_us += t_us - begin_us
             self._unmarked_us += t_us - begin_us

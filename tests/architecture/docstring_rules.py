@@ -17,8 +17,8 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-_QUANTITIES = re.compile(r"^(float|Vec[234]|Quaternion|Matrix\w*|Array|NDArray.*|.*ndarray.*)$")
-_VECTOR = re.compile(r"^(Vec3|Quaternion|Matrix\w*)$")
+_QUANTITIES = re.compile(r"^(float|Vec[234]|V3|Quaternion|Matrix\w*|Array|NDArray.*|.*ndarray.*)$")
+_VECTOR = re.compile(r"^(Vec3|V3|Quaternion|Matrix\w*)$")
 _ARRAY = re.compile(r"^(Array|NDArray.*|.*ndarray.*)$")
 _UNIT_SUFFIX = re.compile(r"_(us|ms|ns|s|hz|m|rad|deg|bytes|mb|percent|per_\w+)$")
 _MONOGRAM = re.compile(r"_(W|B|E|[A-Z]{1,3}\d?)(_[A-Z]+)*\d?(_\w+)?$")

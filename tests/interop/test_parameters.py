@@ -132,23 +132,25 @@ def test_mavsdk_lists_everything_within_a_second_and_is_told_the_truth(ground: G
 def test_the_command_line_lists_sets_exports_and_imports(
     ground: Ground, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    def said(*arguments: str, code: int = 0) -> tuple[str, str]:
+    def output_of(*arguments: str, code: int = 0) -> tuple[str, str]:
         assert param.main([*arguments, f"--vehicle=udp:127.0.0.1:{ground.port}"]) == code
         output = capsys.readouterr()
         return output.out, output.err
 
-    entries = {entry["name"]: entry for entry in json.loads(said("list", "trk_*", "--json")[0])}
+    entries = {
+        entry["name"]: entry for entry in json.loads(output_of("list", "trk_*", "--json")[0])
+    }
     assert set(entries) == {name for name in DEFAULTS if name.startswith("TRK_")}
     assert entries["TRK_EFFORT"]["max"] == BY_NAME["TRK_EFFORT"].most
-    _, error = said("set", "TRK_EFFORT", "1e9", code=1)
+    _, error = output_of("set", "TRK_EFFORT", "1e9", code=1)
     assert error.startswith("pandion param: TRK_EFFORT is to be ")
     assert error.count("\n") == 1
-    assert said("set", "TRK_EFFORT", "0.2")[0] == "TRK_EFFORT is 0.2\n"
+    assert output_of("set", "TRK_EFFORT", "0.2")[0] == "TRK_EFFORT is 0.2\n"
     file = tmp_path / "out.parm"
-    said("export", str(file))
+    output_of("export", str(file))
     assert load(file).values["TRK_EFFORT"] == 0.2
     file.write_text("TRK_EFFORT 0.12\nPLN_W_YAW 0.06\nGONE 1\n")
-    told, error = said("import", str(file))
+    told, error = output_of("import", str(file))
     assert told == "2 parameters read, 2 changed, 0 refused\n"
     assert "GONE is unknown" in error
     assert "TRK_EFFORT" not in load(ground.params).values, "the default again needs no keeping"

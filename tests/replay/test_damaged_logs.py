@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import random
 from collections.abc import Callable
 from pathlib import Path
@@ -85,12 +86,30 @@ def test_a_log_cut_among_its_definitions_is_refused_and_among_its_data_read_up_t
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    attempt, chance = Attempt(command, tmp_path, capsys), random.Random(3)
+    attempt, chance = Attempt(command, tmp_path, capsys), random.Random(2)
     second_tick = whole.index(SENSORS, whole.index(SENSORS) + 1)
     for _ in range(20):
         assert attempt(whole[: chance.randrange(definitions)]) == 2
     for _ in range(20):
         assert attempt(whole[: chance.randrange(second_tick + len(SENSORS), len(whole))]) == 0
+
+
+def test_a_log_cut_between_two_records_is_compared_up_to_its_last_whole_tick(
+    whole: bytes, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    attempt = Attempt(COMMANDS["verify"], tmp_path, capsys)
+    attempt.log.write_bytes(whole)
+    log = open_log(attempt.log)
+    ends = [(log.at, record) for record in log.records()]
+    starts = [k for k, (_, r) in enumerate(ends) if r.number == TOPICS.index(SENSOR_FRAME)]
+    ticks = len(starts)
+    for k in range(starts[-4], len(ends)):
+        assert attempt(whole[: ends[k][0]]) == 0
+        found = json.loads((tmp_path / "j").read_text())
+        complete = k == len(ends) - 1
+        begun = sum(start <= k for start in starts)
+        assert (found["ticks"], found["whole"]) == (ticks if complete else begun - 1, complete)
+        assert found["difference"] is None
 
 
 @pytest.mark.parametrize(
