@@ -11,7 +11,7 @@ from fsw.compiled import compilable, compiled, machine_code, packed
 from fsw.control.allocation import allocate
 from fsw.control.arm_compensation import compensated_joints
 from fsw.control.attitude import attitude_pid, attitude_reference
-from fsw.control.gains import InnerTuning, tracking_gains
+from fsw.control.gains import LoopGains, tracking_gains
 from fsw.control.height import height_pid
 from fsw.control.joints import joint_torques
 from fsw.control.pid import PidGains
@@ -77,7 +77,7 @@ class CascadeLaw:
     """Everything the loops need that does not change in flight."""
 
     airframe: Airframe
-    tuning: InnerTuning
+    tuning: LoopGains
     tracking: TrackingLaw
     follows_plan: bool  # or only the plan's acceleration
     rotor_decay: float  # share of a rotor's error left after a tick
@@ -87,7 +87,7 @@ class CascadeLaw:
 class Cascade:
     """The inner loops of one configuration; laws are pure, memory goes in and comes out."""
 
-    def __init__(self, airframe: Airframe, tuning: InnerTuning, inner: Inner, dt: float) -> None:
+    def __init__(self, airframe: Airframe, tuning: LoopGains, inner: Inner, dt: float) -> None:
         """Choose the inner loop and design its gains, before flight.
 
         Args:

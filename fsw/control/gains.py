@@ -51,7 +51,7 @@ class TrackingGains:
 
 
 @dataclass(frozen=True, slots=True)
-class InnerTuning:
+class LoopGains:
     """Everything the cascade can be tuned by."""
 
     attitude: PidGains = field(default_factory=lambda: PidGains(50.0, 8.0, 15.0, 25.0))

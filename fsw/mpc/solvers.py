@@ -14,7 +14,7 @@ from fsw.barriers.constraint_block import TargetPoints
 from fsw.model.prediction import Array
 from fsw.mpc.ocp import Ocp
 from fsw.mpc.planner_config import PlannerConfig
-from fsw.mpc.slsqp_solver import SlsqpSolver
+from fsw.mpc.slsqp_solver import NonlinearProgram, minimise
 from fsw.mpc.solution import Solution
 
 Stopwatch = Callable[[], float]
@@ -82,7 +82,7 @@ class PaperSolver:
     def solve(self, ocp: Ocp, start: Array, targets: TargetPoints, guess: Array) -> Search:
         """See ``Solver``: ``start`` (19,) [SI]; ``guess`` (6 n,) [SI] is not used."""
         mark = self._stopwatch_us()
-        solution = SlsqpSolver().minimise(ocp, start, targets)
+        solution = minimise(NonlinearProgram(ocp, start, targets))
         solve_us = self._stopwatch_us() - mark
         return Search(solution, solution.iterations, solution.iterations, 0.0, solve_us)
 
