@@ -29,14 +29,10 @@ class Child:
         processor: int | None = None,
         runner: str | None = None,
     ) -> None:
-        """Start ``python -m name``.
+        """Start ``python -m name``, ``sitl`` or ``fsw``; its standard error goes to the log.
 
-        Args:
-            name: ``sitl`` or ``fsw``.
-            arguments: Its command line.
-            log: Where its standard error goes.
-            processor: The only one it may run on; any if None.
-            runner: A module that runs the process of this name in its own way.
+        It may run on one processor only, any if None. A runner is a module that runs the process
+        of this name in its own way.
         """
         module = [name] if runner is None else [runner, name]
         self.name = name

@@ -80,11 +80,7 @@ class Supervisor:
         self._selector = selectors.DefaultSelector()
 
     def run(self, sitl: list[str], fsw: Callable[[int], list[str]]) -> Flown:
-        """Run one flight.
-
-        Args:
-            sitl: Command line of the simulator.
-            fsw: Command line of the flight software, given the simulator's port.
+        """Run one flight of both command lines, the flight software's given the simulator's port.
 
         Raises:
             ProcessFailed: The flight did not begin.

@@ -88,13 +88,9 @@ class Cascade:
     """The inner loops of one configuration; laws are pure, memory goes in and comes out."""
 
     def __init__(self, airframe: Airframe, tuning: LoopGains, inner: Inner, dt: float) -> None:
-        """Choose the inner loop and design its gains, before flight.
+        """Choose the inner loop and design its gains for a tick of ``dt`` [s], before flight.
 
-        Args:
-            airframe: The vehicle.
-            tuning: Gains of every loop.
-            inner: ``tracking`` follows the plan's state, ``pid`` only its acceleration.
-            dt: Tick length [s].
+        The loop ``tracking`` follows the plan's state, ``pid`` only its acceleration.
         """
         gains = tracking_gains(tuning.tracking, airframe.rotor_lag, dt)
         self.law = CascadeLaw(
@@ -142,18 +138,9 @@ def close_loops(
     u: PlanInput,
     ticks: int,
 ) -> tuple[ActuatorCommand, CascadeMemory]:
-    """One tick.
+    """One tick, or several at once where some were missed.
 
-    Args:
-        law: Airframe and gains.
-        memory: From the last tick.
-        estimate: The vehicle now.
-        plan: Where the plan wants the vehicle now.
-        u: The plan's input now.
-        ticks: Ticks since the last call; more than one where some were missed.
-
-    Returns:
-        Actuator command, not yet gated, and the memory to pass back after sending.
+    Returns the actuator command, not yet gated, and the memory to pass back after sending.
     """
     airframe, tuning, dt = law.airframe, law.tuning, law.dt
     rotors, observed = memory.rotors, memory.observed

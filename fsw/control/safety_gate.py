@@ -12,17 +12,7 @@ from fsw.signals import STOPPED, ActuatorCommand
 def gate(
     airframe: Airframe, command: ActuatorCommand, last: ActuatorCommand, armed: bool
 ) -> tuple[ActuatorCommand, bool]:
-    """What may be sent.
-
-    Args:
-        airframe: Actuator limits.
-        command: What the cascade wants.
-        last: What was sent last tick; repeated where the wish is not a number.
-        armed: Whether anything may move.
-
-    Returns:
-        The command to send, and whether the wish had to be replaced because it was not finite.
-    """
+    """What may be sent, and whether the last command replaces one that was not finite."""
     if not armed:
         return STOPPED, False
     if not math.isfinite(sum(command.rotor_thrust) + sum(command.joint_torque)):

@@ -23,7 +23,7 @@ Levels = tuple[float, float, float]
 
 
 def charge_of(remaining: float, levels: Levels) -> Charge:
-    """The level of a share of the capacity; what is no number is an emergency."""
+    """The level of ``remaining`` [1] of the capacity; what is no number is an emergency."""
     if remaining >= levels[0]:
         return Charge.OK
     if remaining >= levels[1]:
@@ -47,15 +47,7 @@ class BatteryModel:
 def drained(
     model: BatteryModel, levels: Levels, state: BatteryState, thrust: Vec4, dt: float
 ) -> BatteryState:
-    """The battery a moment later.
-
-    Args:
-        model: Of the battery.
-        levels: Of its charge.
-        state: Now.
-        thrust: Of each rotor [N].
-        dt: The moment [s].
-    """
+    """The battery after ``dt`` [s] of ``thrust`` [N] of each rotor."""
     power = model.idle_power
     for f in thrust:
         power += (

@@ -64,16 +64,7 @@ class Cost(Protocol):
         targets: TargetPoints,
         quadratic: Quadratic,
     ) -> float:
-        """Add this cost to the quadratic.
-
-        Args:
-            horizon: Linearisation around ``quadratic.guess``.
-            targets: Reference at the nodes.
-            quadratic: Hessian and gradient are added to.
-
-        Returns:
-            The cost at the guess.
-        """
+        """Add this cost, around ``quadratic.guess``; returns the cost at the guess."""
         ...
 
 
@@ -168,14 +159,10 @@ def _add_posture(
 
 @compiled
 def add_square(weight: float, value: float, row: Array, columns: int, quadratic: Quadratic) -> None:
-    """Add ``weight (value + row (U - guess))^2`` over the first columns.
+    """Add ``weight`` [1 / unit of value^2] times ``(value + row (U - guess))^2``.
 
-    Args:
-        weight: Of the square [1 / unit of value^2].
-        value: The residual at the guess [any unit].
-        row: Its gradient in the inputs (6 n,) [unit of value / unit of the input].
-        columns: How many inputs the residual depends on.
-        quadratic: Hessian and gradient are added to.
+    ``value`` [any unit] is the residual at the guess and ``row`` (6 n,) [value / input] its
+    gradient, of which only the first ``columns`` count.
     """
     guess, hessian, gradient = quadratic
     at_zero = value

@@ -43,13 +43,7 @@ class Planner:
     def __init__(
         self, config: PlannerConfig, airframe: Airframe, stopwatch_us: Callable[[], float]
     ) -> None:
-        """Build the prediction model.
-
-        Args:
-            config: Horizon, weights, limits and barriers.
-            airframe: What the prediction model describes.
-            stopwatch_us: Monotonic time for the reported stage times only [us].
-        """
+        """Build the prediction model; ``stopwatch_us`` is for the reported stage times only."""
         self._untuned = self._config = config
         self._tuning: Tuning = ()
         self._stopwatch_us = stopwatch_us

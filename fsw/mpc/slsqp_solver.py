@@ -39,15 +39,10 @@ _STATUS = {
 def minimise(
     problem: NonlinearProgram, max_iterations: int = MAX_ITERATIONS, slopes: Slopes | None = None
 ) -> Solution:
-    """Solve the nonlinear problem with SciPy's finite differences, as in the paper.
+    """Solve the nonlinear problem by SciPy's finite differences, as in the paper, or by slopes.
 
-    Args:
-        problem: Around its optimum afterwards.
-        max_iterations: After which there is no solution.
-        slopes: Of cost and margins, in place of the differences.
-
-    Returns:
-        Inputs and slacks; usable only where SLSQP says that it converged.
+    The problem is left around its optimum. The solution is usable only where SLSQP says that it
+    converged.
     """
     cost_slope, margin_slopes = slopes or (None, None)
     constraint = {"type": "ineq", "fun": problem.margins}

@@ -36,13 +36,10 @@ class Solver(Protocol):
     """Minimises an optimal control problem."""
 
     def solve(self, ocp: Ocp, start: Array, targets: TargetPoints, guess: Array) -> Search:
-        """Solve one request.
+        """Solve one request from the prediction state ``start`` (19,) [SI] at node 0.
 
-        Args:
-            ocp: Of the safe set; holds the program around the optimum afterwards.
-            start: (19,) [SI], prediction state at node 0.
-            targets: Reference at the nodes.
-            guess: (6 n,) [SI], the last solution moved on by one period, or zeros.
+        The ``guess`` (6 n,) [SI] is the last solution moved on by one period, or zeros. The
+        problem is the one of the safe set; it holds the program around the optimum afterwards.
         """
         ...
 
