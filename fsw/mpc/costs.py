@@ -58,12 +58,7 @@ class Quadratic(NamedTuple):
 class Cost(Protocol):
     """Something the planner minimises, as a quadratic around a guess of the inputs."""
 
-    def add(
-        self,
-        horizon: Linearisation,
-        targets: TargetPoints,
-        quadratic: Quadratic,
-    ) -> float:
+    def add(self, horizon: Linearisation, targets: TargetPoints, quadratic: Quadratic) -> float:
         """Add this cost, around ``quadratic.guess``; returns the cost at the guess."""
         ...
 
@@ -104,12 +99,7 @@ class TrackingCost:
         )
         self._add_tracking = of_fixed_types(_add_tracking)
 
-    def add(
-        self,
-        horizon: Linearisation,
-        targets: TargetPoints,
-        quadratic: Quadratic,
-    ) -> float:
+    def add(self, horizon: Linearisation, targets: TargetPoints, quadratic: Quadratic) -> float:
         """See ``Cost``."""
         target = _Target(targets.yaw, targets.position, targets.velocity)
         return self._add_tracking(self._weights, horizon.tracked, target, quadratic)
@@ -121,12 +111,7 @@ class PostureCost:
     def __init__(self, weights: CostWeights) -> None:
         self._weight = weights.posture
 
-    def add(
-        self,
-        horizon: Linearisation,
-        targets: TargetPoints,
-        quadratic: Quadratic,
-    ) -> float:
+    def add(self, horizon: Linearisation, targets: TargetPoints, quadratic: Quadratic) -> float:
         """See ``Cost``; nothing where no joints are asked for."""
         if targets.q_arm is None:
             return 0.0
