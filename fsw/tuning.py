@@ -13,6 +13,8 @@ from typing import Any, TypeVar, cast
 Tuning = tuple[tuple[str, float], ...]
 """Dotted path and value of every number that differs; what is absent is as configured."""
 
+Number = int | float | bool
+
 Config = TypeVar("Config")
 
 
@@ -58,14 +60,25 @@ def number_at(config: object, path: str) -> float:
     return float(cast(float, config))
 
 
-def leaves(config: object, prefix: str = "") -> Iterator[tuple[str, object]]:
-    """Every leaf of a configuration: its path and its value."""
-    for field in fields(cast(Any, config)):
-        value = getattr(config, field.name)
-        if is_dataclass(value):
-            yield from leaves(value, f"{prefix}{field.name}.")
-        else:
-            yield f"{prefix}{field.name}", value
+def flat(config: object) -> dict[str, Number]:
+    """The numbers of nested dataclasses and tuples by dotted path, in the order of declaration.
+
+    ``planner.walls.alpha`` is a field, ``airframe.link_length.0`` the first of a tuple. What is
+    neither a number nor holds any is left out.
+    """
+    return dict(_numbers("", config))
+
+
+def _numbers(path: str, value: object) -> Iterator[tuple[str, Number]]:
+    if isinstance(value, int | float):
+        yield path, value
+    elif isinstance(value, tuple):
+        for k, one in enumerate(value):
+            yield from _numbers(f"{path}.{k}", one)
+    elif is_dataclass(value):
+        for field in fields(value):
+            inner = f"{path}.{field.name}" if path else field.name
+            yield from _numbers(inner, getattr(value, field.name))
 
 
 def _like(old: object, value: float) -> float:

@@ -1,4 +1,7 @@
-"""A child process of a flight: started, listened to, and never left behind."""
+"""A child process of a flight: started, listened to, and never left behind.
+
+It is made to end in steps: it has a moment, then it is interrupted, then it is killed.
+"""
 
 from __future__ import annotations
 
@@ -8,9 +11,12 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
+
+GRACE_S: Final = 0.6  # between one way to end a process and the next, stronger one
 
 Event = dict[str, Any]
 """One JSON object that a child wrote on its standard output."""
@@ -29,19 +35,18 @@ class Child:
         processor: int | None = None,
         runner: str | None = None,
     ) -> None:
-        """Start ``python -m name``.
+        """Start ``python -m name``, ``sitl`` or ``fsw``; its standard error goes to the log.
 
-        Args:
-            name: ``sitl`` or ``fsw``.
-            arguments: Its command line.
-            log: Where its standard error goes.
-            processor: The only one it may run on; any if None.
-            runner: A module that runs the process of this name in its own way.
+        It may run on one processor only, any if None. A runner is a module that runs the process
+        of this name in its own way.
         """
         module = [name] if runner is None else [runner, name]
         self.name = name
         self.interrupted = False  # by us
         self.killed = False  # by us
+        self.due_s: float | None = None  # on the monotonic clock: when it is made to end
+        self._grace_s = GRACE_S
+        self._escalated = False
         self._rest = b""
         with log.open("wb") as errors:
             self._process = subprocess.Popen(
@@ -75,6 +80,27 @@ class Child:
     def exit_code(self) -> int | None:
         """None while it runs; negative if a signal ended it."""
         return self._process.poll()
+
+    def expect(self, within_s: float, grace_s: float = GRACE_S) -> None:
+        """It should end within this time; of two times the earlier one counts."""
+        due_s = time.monotonic() + within_s
+        if self.due_s is None or due_s < self.due_s:
+            self.due_s, self._grace_s = due_s, grace_s
+
+    def escalate(self) -> None:
+        """Past its time: interrupt it, and a grace later kill it."""
+        now_s = time.monotonic()
+        if self.due_s is None or now_s < self.due_s:
+            return
+        if self.exit_code is not None:
+            self.due_s = None
+            return
+        if self._escalated:
+            self.kill()
+        else:
+            self.interrupt()
+        self._escalated = True
+        self.due_s = now_s + self._grace_s
 
     def interrupt(self) -> None:
         """Ask it to end."""

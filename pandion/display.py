@@ -17,10 +17,8 @@ class Display:
     def __init__(self, stream: TextIO, *, lines: int = 10, threaded: bool = True) -> None:
         """Draw nothing yet.
 
-        Args:
-            stream: Where to.
-            lines: How many report on one thing where there is no terminal.
-            threaded: Draw between steps too, from a thread, which would be measured with them.
+        ``lines`` report on one thing where there is no terminal. ``threaded`` draws between steps
+        too, from a thread, which would be measured with them.
         """
         self._stream = stream
         self._lines = lines

@@ -20,12 +20,9 @@ _TIME_AT: Final = len(_STATE_HEAD)  # in a record
 def join_truth(directory: Path, fsw: dict[str, Any] | None) -> None:
     """Append ``truth.ulg`` to ``flight.ulg``, which has declared its topics, and remove it.
 
-    A flight log that may end in the middle of a record is left alone, and the truth beside it. The
-    true state is thinned out as the estimate is in this log (LOG_PROFILE).
-
-    Args:
-        directory: Of the flight.
-        fsw: The flight software's result, None if it did not get to write one.
+    A flight log that may end in the middle of a record is left alone, and the truth beside it, as
+    is one whose flight software did not get to write its result. The true state is thinned out as
+    the estimate is in this log (LOG_PROFILE).
     """
     truth, flight = directory / "truth.ulg", directory / "flight.ulg"
     file = (fsw or {}).get("files", {}).get("flight.ulg")

@@ -20,11 +20,7 @@ class McapSink(contextlib.ExitStack):
     """Writes one file; arrays of a topic are arrays again."""
 
     def __init__(self, path: Path, facts: dict[str, str]) -> None:
-        """Create the file.
-
-        Args:
-            path: Where to write.
-            facts: What the log says about the flight; becomes its metadata.
+        """Create the file; the facts about the flight become its metadata.
 
         Raises:
             OSError: It cannot be created.

@@ -35,12 +35,7 @@ class ParameterClient:
     """Asks one vehicle; a context manager."""
 
     def __init__(self, vehicle: Address, patience_s: float = 1.0) -> None:
-        """Open a socket.
-
-        Args:
-            vehicle: Where it listens.
-            patience_s: For each answer; it is asked three times.
-        """
+        """Open a socket; each answer is waited for ``patience_s``, three times."""
         self._vehicle = vehicle
         self._patience_s = patience_s
         self._writer = FrameWriter(_SYSTEM, _COMPONENT)

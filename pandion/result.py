@@ -70,12 +70,7 @@ Rows = list[tuple[str, str]]
 
 
 def table_rows(result: dict[str, Any], tracking_max_m: float | None) -> Rows:
-    """What a flight comes down to, as text.
-
-    Args:
-        result: From :func:`pandion.result.as_json`.
-        tracking_max_m: Largest tracking error [m], which the JSON does not carry.
-    """
+    """What a flight comes down to, as text; ``tracking_max_m`` is not in the JSON."""
     return [
         ("flown", f"{result['duration_s']:.1f} s"),
         *[(f"margin {name}", _mm(value)) for name, value in result["margins_m"].items()],

@@ -13,9 +13,8 @@ from types import FrameType
 from typing import Any, Final
 
 from command_line.parser import COULD_NOT_START
-from pandion.child import Child, Event
+from pandion.child import GRACE_S, Child, Event
 from pandion.display import Display
-from pandion.graceful_shutdown import GRACE_S, GracefulShutdown
 from pandion.processor import ANYWHERE, Places
 
 _LISTEN_S: Final = 30.0  # until sitl has bound its port
@@ -76,15 +75,11 @@ class Supervisor:
         self._runner = runner
         self._out = out
         self._flown = Flown()
-        self._processes: list[GracefulShutdown] = []
+        self._children: list[Child] = []
         self._selector = selectors.DefaultSelector()
 
     def run(self, sitl: list[str], fsw: Callable[[int], list[str]]) -> Flown:
-        """Run one flight.
-
-        Args:
-            sitl: Command line of the simulator.
-            fsw: Command line of the flight software, given the simulator's port.
+        """Run one flight of both command lines, the flight software's given the simulator's port.
 
         Raises:
             ProcessFailed: The flight did not begin.
@@ -101,10 +96,10 @@ class Supervisor:
                 with self._display.progress():
                     self._watch(lambda: False)
         finally:
-            for process in self._processes:
-                process.child.interrupt()
-            for process in self._processes:
-                process.child.end(patience_s=1.0)
+            for child in self._children:
+                child.interrupt()
+            for child in self._children:
+                child.end(patience_s=1.0)
             self._selector.close()
             for number, handler in previous.items():
                 signal.signal(number, handler)
@@ -116,7 +111,7 @@ class Supervisor:
 
     def _start(self, name: str, arguments: list[str], processor: int | None) -> None:
         child = Child(name, arguments, self._log(name), processor, self._runner)
-        self._processes.append(GracefulShutdown(child))
+        self._children.append(child)
         self._selector.register(child, selectors.EVENT_READ)
 
     def _watch(self, done: Callable[[], bool], patience_s: float = math.inf) -> None:
@@ -132,22 +127,16 @@ class Supervisor:
                     self._note_exit(child)
                 for event in events or ():
                     self._handle(child, event)
-            now_s = time.monotonic()
-            for process in self._processes:
-                process.escalate(now_s)
+            for child in self._children:
+                child.escalate()
 
     def _timeout_s(self) -> float:
         """Until the next process is due to end [s]."""
-        due_s = [process.due_s for process in self._processes if process.due_s is not None]
+        due_s = [child.due_s for child in self._children if child.due_s is not None]
         return min(max(min(due_s, default=math.inf) - time.monotonic(), 0.0), 0.1)
 
-    def _expect(self, child: Child, within_s: float, grace_s: float = GRACE_S) -> None:
-        for process in self._processes:
-            if process.child is child:
-                process.expect(time.monotonic() + within_s, grace_s)
-
     def _others(self, child: Child) -> list[Child]:
-        return [process.child for process in self._processes if process.child is not child]
+        return [other for other in self._children if other is not child]
 
     def _handle(self, child: Child, event: Event) -> None:
         kind, flown = event["event"], self._flown
@@ -174,9 +163,9 @@ class Supervisor:
         silent = event.get("vehicle_silent") or event.get("ending") == "link lost"
         if silent and child.name == "fsw":
             self._flown.errors["fsw"] = event["message"]
-        self._expect(child, _FOLLOW_S)
+        child.expect(_FOLLOW_S)
         for other in self._others(child) if silent else ():
-            self._expect(other, _STALLED_S, _STALLED_S)
+            other.expect(_STALLED_S, _STALLED_S)
 
     def _note_exit(self, child: Child) -> None:
         """Note a crash, and give the other process a moment to follow."""
@@ -191,7 +180,7 @@ class Supervisor:
             flown.errors[name] = f"{name} ended without a result; see {self._log(name)}"
         # Before the flight there is no link whose silence the other process would notice.
         for other in self._others(child):
-            self._expect(other, _FOLLOW_S if flown.started else 0.0)
+            other.expect(_FOLLOW_S if flown.started else 0.0)
 
     def _log(self, name: str) -> Path:
         return self._out / f"{name}.log"
@@ -199,7 +188,7 @@ class Supervisor:
     def _interrupt(self, number: int, frame: FrameType | None) -> None:
         """End the simulator, which ends the flight software and still gives a result."""
         self._flown.interrupted = True
-        for process in self._processes:
-            self._expect(process.child, GRACE_S)
-        for process in self._processes[:1]:
-            process.child.interrupt()
+        for child in self._children:
+            child.expect(GRACE_S)
+        for child in self._children[:1]:
+            child.interrupt()

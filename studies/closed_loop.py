@@ -146,14 +146,10 @@ def fly(
     traced: bool = False,
     asked: Callable[[PlanRequest], None] | None = None,
 ) -> FlightResult:
-    """Fly a scenario that starts in the air to its end.
+    """Fly a scenario that starts in the air, with a trajectory plan, to its end.
 
-    Args:
-        scenario: With a trajectory plan.
-        seed: Of every random number of the plant.
-        config: Of the flight software.
-        traced: Keep the truth every TRACE_STEPS steps.
-        asked: Receives every request to the planner.
+    ``traced`` keeps the truth every TRACE_STEPS steps; ``asked`` receives every request to the
+    planner.
 
     Raises:
         RefusedError: The vehicle refused to arm or to follow.

@@ -39,13 +39,10 @@ _STEP_S = 1e-6 * STEP_US
 
 
 def after(state: PredictionState, u: PlanInput, push_W: V3, dt: float) -> PredictionState:
-    """The state a time later, under a constant input and disturbance, exactly.
+    """The state ``dt`` [s] later, under a constant input and disturbance, exactly.
 
-    Args:
-        state: Now; acceleration, jerk and snap are none of this plant's states and stay.
-        u: Accelerations commanded.
-        push_W: Disturbance acceleration [m/s^2].
-        dt: The time [s].
+    ``push_W`` [m/s^2] disturbs; acceleration, jerk and snap are none of this plant's states and
+    stay.
     """
     a = (u.a[0] + push_W[0], u.a[1] + push_W[1], u.a[2] + push_W[2])
     p, v, half = state.p, state.v, 0.5 * dt * dt
@@ -133,11 +130,8 @@ def fly(
 ) -> FlightResult:
     """Fly the planner alone on the double integrators: measured start, no delay, no fast loop.
 
-    Args:
-        scenario: With a trajectory that starts in the air.
-        seed: Of every random number of the plant.
-        config: Its planner is flown; give it ``AttitudeLag(at_once=True)``.
-        traced: Keep the truth for figures.
+    The scenario's trajectory starts in the air; the planner's airframe is to be one with
+    ``AttitudeLag(at_once=True)``. ``traced`` keeps the truth for figures.
     """
     plant = DoubleIntegrator(scenario, seed)
     planner = Planner(config.planner, config.airframe, processor_time_us)

@@ -40,14 +40,9 @@ class Sheet:
 
 
 def sheet(rows: int, columns: int, width: float, height: float, **options: Any) -> Sheet:
-    """An empty sheet of axes.
+    """An empty sheet of axes, ``width`` [inch] by ``height`` [inch].
 
-    Args:
-        rows: Of axes.
-        columns: Of axes.
-        width: Of the sheet [inch].
-        height: Of the sheet [inch].
-        options: For ``Figure.subplots``, such as ``sharex``.
+    The options are those of ``Figure.subplots``, such as ``sharex``.
 
     Raises:
         NoMatplotlibError: With the sentence that says how to get it.

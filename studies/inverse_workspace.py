@@ -55,9 +55,7 @@ class InverseWorkspace:
     def contains(self, x: Array, up: Array) -> NDArray[np.bool_]:
         """Whether some permitted elbow reaches the end-effector from these base positions.
 
-        Args:
-            x: Forward of the end-effector (n,) [m].
-            up: Above the end-effector (n,) [m].
+        ``x`` (n,) [m] is forward of the end-effector, ``up`` (n,) [m] above it.
         """
         l1, l2 = self._airframe.link_length
         cosine = (x * x + up * up - l1 * l1 - l2 * l2) / (2.0 * l1 * l2)

@@ -25,15 +25,7 @@ figure { margin: 1.5rem 0; } figcaption { color: #57606a; }
 def write(
     report: Report, settings: Settings, provenance: tuple[str, ...], name: str, folder: Path
 ) -> Path:
-    """Write everything into a folder; returns the page.
-
-    Args:
-        report: What was found.
-        settings: What was asked for.
-        provenance: For the page.
-        name: Of the study, and of its files.
-        folder: Made if it is not there.
-    """
+    """Write page, rows, drawings and numbers into a folder, under the study's name; the page."""
     folder.mkdir(parents=True, exist_ok=True)
     written = folder / f"{name}.html"
     written.write_text(page(report, settings, provenance), encoding="utf-8")
@@ -51,13 +43,7 @@ def json_text(report: Report) -> str:
 
 
 def page(report: Report, settings: Settings, provenance: tuple[str, ...]) -> str:
-    """The page of one study.
-
-    Args:
-        report: What was found.
-        settings: What was asked for.
-        provenance: Sentences that say how to get the same again.
-    """
+    """The page of one study; provenance says in sentences how to get the same again."""
     parts = [f"<h1>{_text(report.title)}</h1>", _items(provenance), _seeds(settings)]
     parts += [_table(table) for table in report.tables]
     parts += [_figure(figure) for figure in report.figures]

@@ -13,10 +13,6 @@ def wilson(passed: int, total: int) -> tuple[float, float]:
     Unlike the normal approximation it says something sensible at 0 and at all of them: 20 of
     20 leave a lower bound of 0.84.
 
-    Args:
-        passed: Successes, 0..total.
-        total: Trials, positive.
-
     Raises:
         ValueError: No trial, or more successes than trials.
     """

@@ -11,13 +11,15 @@ import numpy as np
 from benchmarks.optimiser.casadi_method import SOLVERS, CasadiMethod, installed
 from benchmarks.optimiser.instances import Instance
 from benchmarks.optimiser.price import target_points
+from benchmarks.optimiser.slopes import slopes_of
 from benchmarks.optimiser.solved import Solved, stopwatch_us, timed
 from fsw.model.airframe import AIRFRAME
 from fsw.model.prediction import INPUTS, Array, condense, to_vector
 from fsw.mpc.ocp import Ocp
 from fsw.mpc.planner import Planner
 from fsw.mpc.planner_config import PlannerConfig
-from fsw.mpc.slsqp_solver import Gradients, SlsqpSolver
+from fsw.mpc.slsqp_solver import NonlinearProgram, minimise
+from fsw.mpc.solution import Solution
 from fsw.signals import Plan, SafeSet
 
 _ITERATIONS = (1, 2, 3)
@@ -76,15 +78,20 @@ class PlannerMethod:
 class SlsqpMethod:
     """The paper's optimiser, from u = 0 as in the paper."""
 
-    def __init__(self, config: PlannerConfig, safe_set: SafeSet, gradients: Gradients) -> None:
+    def __init__(self, config: PlannerConfig, safe_set: SafeSet, *, analytic: bool) -> None:
         model = condense(AIRFRAME, config.period, config.horizon)
         self._ocp = Ocp(config, model, safe_set)
-        self._solver = SlsqpSolver(gradients)
+        self._analytic = analytic
 
     def solve(self, instance: Instance, guess: Array, optimum: Array) -> Solved:
         """See ``Method``; ``guess`` and ``optimum`` (6 n,) [m/s^2, rad/s^2] are not used."""
         start, targets = to_vector(instance.request.start), target_points(instance.request)
-        solution, spent = timed(lambda: self._solver.minimise(self._ocp, start, targets))
+
+        def search() -> Solution:
+            problem = NonlinearProgram(self._ocp, start, targets)
+            return minimise(problem, slopes=slopes_of(problem) if self._analytic else None)
+
+        solution, spent = timed(search)
         inputs = solution.x[: len(guess)].copy() if solution.usable else None
         return Solved(spent, inputs, solution.iterations)
 
@@ -97,16 +104,16 @@ def entries() -> tuple[Entry, ...]:
             replace(config, solver=solver), safe_set, iterations
         )
 
-    def slsqp(gradients: Gradients) -> Build:
-        return lambda config, safe_set: SlsqpMethod(config, safe_set, gradients)
+    def slsqp(*, analytic: bool) -> Build:
+        return lambda config, safe_set: SlsqpMethod(config, safe_set, analytic=analytic)
 
     def casadi(solver: str) -> Build:
         return lambda config, safe_set: CasadiMethod(config, safe_set, solver)
 
     return (
         *(Entry("clarabel", count, planner("clarabel", count)) for count in _ITERATIONS),
-        Entry("slsqp-numeric", None, slsqp("numeric")),
-        Entry("slsqp-analytic", None, slsqp("analytic")),
+        Entry("slsqp-numeric", None, slsqp(analytic=False)),
+        Entry("slsqp-analytic", None, slsqp(analytic=True)),
         *(
             Entry(f"casadi-{name}", None, casadi(name) if installed(name) else None)
             for name in SOLVERS

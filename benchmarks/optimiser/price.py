@@ -26,7 +26,7 @@ class Judge:
         """Cost of ``inputs`` (6 n,) [m/s^2, rad/s^2] with the smallest slacks that admit them."""
         ocp = self._ocp
         ocp.linearise(to_vector(request.start), inputs, target_points(request))
-        program = ocp.program
+        program = ocp.qp
         return float(ocp.cost + program.penalty @ program.least_slacks(inputs))
 
     def converged(self, request: PlanRequest, guess: Array) -> tuple[Array, float]:

@@ -37,13 +37,7 @@ def barrier_value(plane: Plane, tuning: BarrierNumbers) -> float:
 
 @compiled
 def cbf_lower_bound(h_start: float, node: int, tuning: BarrierNumbers) -> float:
-    """Least h allowed at a node of the horizon [m/s].
-
-    Args:
-        h_start: h of the same point and plane at node 0 [m/s].
-        node: 1..n.
-        tuning: Of the barrier.
-    """
+    """Least h [m/s] allowed at a node, 1..n, where it is ``h_start`` [m/s] at node 0."""
     decay = (1.0 - tuning.gamma * tuning.period) ** node
     return decay * h_start + (1.0 - decay) * tuning.lambda_
 
@@ -60,14 +54,9 @@ def fill_row(
 ) -> None:
     """Write h of a point against a plane, its least value and its gradient in the inputs.
 
-    Args:
-        rows: Written to.
-        row: Which of them.
-        node: Of the horizon, 1..n; as many inputs act before it.
-        plane: At the node, frozen at the guess.
-        h_start: h of the same point and normal at node 0 [m/s].
-        gradients: Of the point's position and velocity at the node, (3, 6 n) each.
-        tuning: Of the barrier.
+    The plane is that of the node, frozen at the guess; as many inputs act before it. ``h_start``
+    [m/s] is h of the same point and normal at node 0; ``gradients`` are those of the point's
+    position and velocity, (3, 6 n) each.
     """
     rows.value[row] = barrier_value(plane, tuning)
     rows.lower_bound[row] = cbf_lower_bound(h_start, node, tuning)

@@ -18,15 +18,9 @@ def constraint_report(
 ) -> ConstraintReport:
     """Margins and barrier values of the active safe set.
 
-    Args:
-        safe_set: Walls, points or sphere.
-        tuning: Constants of the barrier in force.
-        points: Base, joint 2 and end-effector.
-        target: End-effector reference in use; the sphere hangs on it.
-
-    Returns:
-        For walls and then obstacles one margin each and critical point in that order; for the
-        sphere a single one.
+    The points are base, joint 2 and end-effector; the sphere hangs on the target. For walls and
+    then obstacles there is one margin each and critical point in that order; for the sphere a
+    single one.
     """
     if safe_set.kind in (ConstraintKind.WALLS, ConstraintKind.OBSTACLES):
         pairs = [_margin_and_rate(wall, p, v) for wall in safe_set.walls for p, v in points]

@@ -62,10 +62,7 @@ class BarrierTuning:
         return safe_approach_speed(distance, self.alpha, self.slope)
 
     def check_sampling(self, period: float) -> None:
-        """Check the sampled-data conditions ``k_S T <= 1`` and ``gamma T <= 1``.
-
-        Args:
-            period: Of the planner, T [s].
+        """Check ``k_S T <= 1`` and ``gamma T <= 1`` for the planner's ``period`` [s].
 
         Raises:
             ValueError: One of them fails.
@@ -91,12 +88,9 @@ class BarrierTuning:
 
 @compilable
 def safe_approach_speed(distance: float, alpha: float, slope: float) -> float:
-    """Largest safe approach speed S [m/s].
+    """Largest safe approach speed S [m/s] at a ``distance`` [m] to the boundary, negative outside.
 
-    Args:
-        distance: To the boundary, negative outside [m].
-        alpha: Assumed braking deceleration [m/s^2].
-        slope: k_S, of the tangent that continues the root [1/s].
+    ``alpha`` [m/s^2] is the assumed braking deceleration, ``slope`` [1/s] the k_S of the tangent.
     """
     knee = alpha / (slope * slope)
     if distance < knee:

@@ -21,12 +21,7 @@ def distance_to(obstacle: PointObstacle, p: Vec3) -> float:
 
 
 def tangent(obstacle: PointObstacle, p: Vec3) -> Wall:
-    """The wall that an obstacle is to a point: normal along the ray from the obstacle.
-
-    Args:
-        obstacle: Whose distance to the point is the wall's.
-        p: The point [m, NED].
-    """
+    """The wall that an obstacle is to ``p`` [m, NED]: normal along the ray from the obstacle."""
     x, y, z = away = _away(obstacle, p)
     length = norm(away)
     n = (x / length, y / length, z / length) if length > CENTRE_BALL else (1.0, 0.0, 0.0)

@@ -60,11 +60,9 @@ class WorkspaceBarrier:
 
 @compiled
 def outward_frame(e: Array, frame: Array) -> None:
-    """Orthonormal rows, the first along e or, at the centre, along x.
+    """Orthonormal rows ``frame`` (3, 3) [1], the first along ``e`` (3,) [m, NED].
 
-    Args:
-        e: (3,) [m, NED], base from the sphere's centre.
-        frame: (3, 3) [1], overwritten.
+    ``e`` is the base from the sphere's centre; at the centre the first row is x.
     """
     length = math.sqrt(e[0] * e[0] + e[1] * e[1] + e[2] * e[2])
     frame[0] = 0.0

@@ -10,19 +10,11 @@ from fsw.signals import Vec3, Vec4
 
 @compilable
 def allocate(airframe: Airframe, torque: Vec3, thrust: float, yaw_limit: float) -> Vec4:
-    """Rotor thrusts of the '+' mixer, each within its limits.
+    """Thrust of the rear, left, front and right rotor [N] of the '+' mixer, each within its limits.
 
-    Roll and pitch keep the vehicle upright and decide where it accelerates, so they are
+    Body ``torque`` [N m, FRD], total ``thrust`` [N]; no rotor spends more than ``yaw_limit`` [N] on
+    yaw. Roll and pitch keep the vehicle upright and decide where it accelerates, so they are
     served first, thrust gives way to them, and yaw takes what is left.
-
-    Args:
-        airframe: Rotor arm, drag and thrust limits.
-        torque: Commanded body torque [N m, FRD].
-        thrust: Commanded total thrust [N].
-        yaw_limit: Most thrust a rotor may spend on yaw [N].
-
-    Returns:
-        Thrust of the rear, left, front and right rotor [N].
     """
     top = airframe.rotor_thrust_max
     half = 0.5 * top

@@ -54,16 +54,9 @@ def compensated_joints(
     estimate: StateEstimate,
     plan: PredictionState,
 ) -> tuple[Vec2, Vec2]:
-    """Joint angles and rates that keep the end-effector on its planned path.
+    """Joint angles [rad] and rates [rad/s] that keep the end-effector on its planned path.
 
-    Args:
-        airframe: Links and joint limits.
-        limits: Where compensation stops.
-        estimate: The vehicle now.
-        plan: Where the plan wants it now; its elbow, where bent, decides on which side ours is.
-
-    Returns:
-        Angles [rad] and rates [rad/s].
+    The elbow of the plan, where bent, decides on which side ours is.
     """
     l1, l2 = airframe.link_length[0], airframe.link_length[1]
     p_WE, v_WE = planned_end_effector(airframe, plan)

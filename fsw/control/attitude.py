@@ -13,12 +13,7 @@ from fsw.signals import StateEstimate, Vec3
 
 @compilable
 def attitude_reference(a: Vec3, yaw: float) -> Vec3:
-    """Roll, pitch and yaw whose thrust direction gives an acceleration (exact, ZYX).
-
-    Args:
-        a: Commanded acceleration [m/s^2, NED].
-        yaw: Commanded yaw [rad].
-    """
+    """Roll, pitch and ``yaw`` [rad] whose thrust gives ``a`` [m/s^2, NED] (exact, ZYX)."""
     c, s = math.cos(yaw), math.sin(yaw)
     forward, right = c * a[0] + s * a[1], -s * a[0] + c * a[1]
     down = GRAVITY - a[2]
@@ -35,19 +30,10 @@ def attitude_pid(
     reference: Vec3,
     dt: float,
 ) -> tuple[Vec3, Vec3]:
-    """Angular acceleration that turns the vehicle to its attitude reference.
+    """Angular acceleration [rad/s^2, FRD] towards an attitude, and the integrals to pass back.
 
-    Small-angle PID of the paper: body rates damp, Euler errors drive.
-
-    Args:
-        gains: On angle, its integral and rate.
-        integral: Integrals of the errors [rad s, roll pitch yaw].
-        estimate: The vehicle now.
-        reference: Roll, pitch, yaw [rad, ZYX].
-        dt: Tick length [s].
-
-    Returns:
-        Angular acceleration in the body [rad/s^2] and the integrals to pass back.
+    Small-angle PID of the paper: body rates damp, Euler errors drive. Of roll, pitch and yaw:
+    ``integral`` [rad s, ZYX] and ``reference`` [rad, ZYX]. Tick length ``dt`` [s].
     """
     roll, pitch, yaw = euler_zyx(estimate.R_WB)
     wx, wy, wz = estimate.w_WB_B

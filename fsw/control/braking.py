@@ -44,13 +44,7 @@ class Brake:
     """The braking law of one prediction model."""
 
     def __init__(self, airframe: Airframe, tilt: float, tuning: BrakeTuning | None = None) -> None:
-        """Solve for the gains.
-
-        Args:
-            airframe: The lag of its attitude and of its rotors.
-            tilt: The most that may be asked for [rad]: the planner's own limit, ``PLN_TILT_MAX``.
-            tuning: How hard to brake.
-        """
+        """Solve for the gains; ``tilt`` [rad] is the planner's own limit, ``PLN_TILT_MAX``."""
         self._tuning = tuning or BrakeTuning()
         self._tilt_slope = math.tan(tilt)
         self._gains = _gains(airframe, self._tuning.input_weight)

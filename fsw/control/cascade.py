@@ -11,7 +11,7 @@ from fsw.compiled import compilable, compiled, machine_code, packed
 from fsw.control.allocation import allocate
 from fsw.control.arm_compensation import compensated_joints
 from fsw.control.attitude import attitude_pid, attitude_reference
-from fsw.control.gains import InnerTuning, tracking_gains
+from fsw.control.gains import LoopGains, tracking_gains
 from fsw.control.height import height_pid
 from fsw.control.joints import joint_torques
 from fsw.control.pid import PidGains
@@ -77,7 +77,7 @@ class CascadeLaw:
     """Everything the loops need that does not change in flight."""
 
     airframe: Airframe
-    tuning: InnerTuning
+    tuning: LoopGains
     tracking: TrackingLaw
     follows_plan: bool  # or only the plan's acceleration
     rotor_decay: float  # share of a rotor's error left after a tick
@@ -87,14 +87,10 @@ class CascadeLaw:
 class Cascade:
     """The inner loops of one configuration; laws are pure, memory goes in and comes out."""
 
-    def __init__(self, airframe: Airframe, tuning: InnerTuning, inner: Inner, dt: float) -> None:
-        """Choose the inner loop and design its gains, before flight.
+    def __init__(self, airframe: Airframe, tuning: LoopGains, inner: Inner, dt: float) -> None:
+        """Choose the inner loop and design its gains for a tick of ``dt`` [s], before flight.
 
-        Args:
-            airframe: The vehicle.
-            tuning: Gains of every loop.
-            inner: ``tracking`` follows the plan's state, ``pid`` only its acceleration.
-            dt: Tick length [s].
+        The loop ``tracking`` follows the plan's state, ``pid`` only its acceleration.
         """
         gains = tracking_gains(tuning.tracking, airframe.rotor_lag, dt)
         self.law = CascadeLaw(
@@ -142,18 +138,9 @@ def close_loops(
     u: PlanInput,
     ticks: int,
 ) -> tuple[ActuatorCommand, CascadeMemory]:
-    """One tick.
+    """One tick, or several at once where some were missed.
 
-    Args:
-        law: Airframe and gains.
-        memory: From the last tick.
-        estimate: The vehicle now.
-        plan: Where the plan wants the vehicle now.
-        u: The plan's input now.
-        ticks: Ticks since the last call; more than one where some were missed.
-
-    Returns:
-        Actuator command, not yet gated, and the memory to pass back after sending.
+    Returns the actuator command, not yet gated, and the memory to pass back after sending.
     """
     airframe, tuning, dt = law.airframe, law.tuning, law.dt
     rotors, observed = memory.rotors, memory.observed

@@ -51,7 +51,7 @@ class TrackingGains:
 
 
 @dataclass(frozen=True, slots=True)
-class InnerTuning:
+class LoopGains:
     """Everything the cascade can be tuned by."""
 
     attitude: PidGains = field(default_factory=lambda: PidGains(50.0, 8.0, 15.0, 25.0))
@@ -68,13 +68,7 @@ class InnerTuning:
 
 @lru_cache(maxsize=8)
 def tracking_gains(tuning: TrackingTuning, rotor_lag: float, dt: float) -> TrackingGains:
-    """Design the tracking loop for one tick length.
-
-    Args:
-        tuning: Prices and the disturbance model.
-        rotor_lag: Time constant of the rotors [s].
-        dt: Tick length [s].
-    """
+    """Design the tracking loop for a time constant ``rotor_lag`` [s] and a tick of ``dt`` [s]."""
     # p, v, a, j, s and the disturbance acceleration that adds to v's derivative.
     a = np.diag([1.0, 1.0, 1.0, 1.0, 0.0], 1)
     a[1, 5] = 1.0

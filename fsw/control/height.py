@@ -18,19 +18,10 @@ def height_pid(
     u: PlanInput,
     dt: float,
 ) -> tuple[float, float]:
-    """Total thrust that keeps the planned height.
+    """Total thrust [N] that keeps the planned height, and the integral to pass back.
 
-    Args:
-        airframe: Mass and limits.
-        gains: On height error [1/s^2], its integral [1/s^3] and rate [1/s].
-        integral: Integral of the height error [m s].
-        estimate: The vehicle now.
-        plan: Where the plan wants the vehicle now.
-        u: The plan's input now; its vertical acceleration is fed forward.
-        dt: Tick length [s].
-
-    Returns:
-        Thrust [N] and the integral to pass back.
+    The plan's vertical acceleration is fed forward. ``integral`` [m s] of the height error, tick
+    length ``dt`` [s].
     """
     error = plan.p[2] - estimate.p_WB[2]
     rate = plan.v[2] - estimate.v_WB[2]

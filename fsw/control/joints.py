@@ -22,23 +22,12 @@ def joint_torques(
     pitch_acceleration: float,
     dt: float,
 ) -> tuple[Vec2, Vec2]:
-    """Torques that make the joints follow their reference (computed torque).
+    """Torques [N m] within the servos' limit (computed torque), and the integrals to pass back.
 
-    The arm hangs in the field the thrust makes: in the body frame, gravity minus the
-    base's acceleration is the specific thrust along +z, whatever the attitude.
-
-    Args:
-        airframe: Links and limits.
-        gains: On angle [1/s^2], its integral [1/s^3] and rate [1/s].
-        integral: Integrals of the errors [rad s].
-        estimate: The vehicle now.
-        reference: Angles, rates and accelerations [rad, rad/s, rad/s^2].
-        specific_thrust: Total thrust over mass [m/s^2].
-        pitch_acceleration: Base's angular acceleration about body y [rad/s^2].
-        dt: Tick length [s].
-
-    Returns:
-        Torques within the servos' limit [N m] and the integrals to pass back.
+    The arm hangs in the field the thrust makes: in the body frame, gravity minus the base's
+    acceleration is ``specific_thrust`` [m/s^2] along +z, whatever the attitude.
+    ``pitch_acceleration`` [rad/s^2] is the base's about body y. The reference has angles, rates and
+    accelerations [rad, rad/s, rad/s^2]; ``integral`` [rad s] of the errors, tick length ``dt`` [s].
     """
     q_ref, qd_ref, qdd_ref = reference
     wanted1, kept1 = pid_step(
@@ -62,16 +51,9 @@ def joint_torques(
 def arm_inverse_dynamics(
     airframe: Airframe, estimate: StateEstimate, qdd: Vec2, field: float
 ) -> Vec2:
-    """Joint torques of the planar two-link arm (Lagrange form) in a field along body +z.
+    """Joint torques [N m] of the planar two-link arm (Lagrange form) in a field along body +z.
 
-    Args:
-        airframe: Links.
-        estimate: Joint angles and rates, and the base's pitch rate.
-        qdd: Acceleration of link 1 against the inertial frame and of joint 2 [rad/s^2].
-        field: Strength of the field [m/s^2].
-
-    Returns:
-        Torques [N m].
+    ``field`` [m/s^2]; ``qdd`` [rad/s^2] is of link 1 against the inertial frame and of joint 2.
     """
     m1, m2 = airframe.link_mass[0], airframe.link_mass[1]
     l1, c1, c2 = airframe.link_length[0], airframe.link_com[0], airframe.link_com[1]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from fsw.geometry.vectors import clamp, clamp_magnitude
 from fsw.model.airframe import Airframe
 from fsw.signals import STOPPED, ActuatorCommand
 
@@ -11,17 +12,7 @@ from fsw.signals import STOPPED, ActuatorCommand
 def gate(
     airframe: Airframe, command: ActuatorCommand, last: ActuatorCommand, armed: bool
 ) -> tuple[ActuatorCommand, bool]:
-    """What may be sent.
-
-    Args:
-        airframe: Actuator limits.
-        command: What the cascade wants.
-        last: What was sent last tick; repeated where the wish is not a number.
-        armed: Whether anything may move.
-
-    Returns:
-        The command to send, and whether the wish had to be replaced because it was not finite.
-    """
+    """What may be sent, and whether the last command replaces one that was not finite."""
     if not armed:
         return STOPPED, False
     if not math.isfinite(sum(command.rotor_thrust) + sum(command.joint_torque)):
@@ -30,17 +21,6 @@ def gate(
     top, bound = airframe.rotor_thrust_max, airframe.joint_torque_max
     if min(rotors) >= 0.0 and max(rotors) <= top and max(map(abs, joints)) <= bound:
         return command, False
-    f1, f2, f3, f4 = rotors
-    t1, t2 = joints
-    return (
-        ActuatorCommand(
-            (
-                min(max(f1, 0.0), top),
-                min(max(f2, 0.0), top),
-                min(max(f3, 0.0), top),
-                min(max(f4, 0.0), top),
-            ),
-            (min(max(t1, -bound), bound), min(max(t2, -bound), bound)),
-        ),
-        False,
-    )
+    f1, f2, f3, f4 = (clamp(thrust, 0.0, top) for thrust in rotors)
+    t1, t2 = (clamp_magnitude(torque, bound) for torque in joints)
+    return ActuatorCommand((f1, f2, f3, f4), (t1, t2)), False

@@ -51,18 +51,11 @@ class Observed(NamedTuple):
 
 @compilable
 def observe(memory: Observed, v: Vec3, a: Vec3, tuning: TrackingTuning, dt: float) -> Observed:
-    """Velocity and disturbance from a velocity reading and the rotors' acceleration.
+    """Velocity and disturbance a tick of ``dt`` [s] later.
 
-    A second-order observer with both poles at ``bandwidth``: as
-    quick as differencing the velocity, but the disturbance is a state and does not carry
-    the reading's noise straight into the rotors.
-
-    Args:
-        memory: From the last tick.
-        v: Measured velocity [m/s, NED].
-        a: Acceleration the rotors produce [m/s^2, NED].
-        tuning: Bandwidth of the observer, and how slowly it takes a disturbance for wind.
-        dt: Tick length [s].
+    A second-order observer with both poles at ``observer_bandwidth``: as quick as differencing the
+    measured velocity ``v`` [m/s, NED], but the disturbance is a state and does not carry the
+    reading's noise straight into the rotors, which produce ``a`` [m/s^2, NED].
     """
     bandwidth = tuning.observer_bandwidth
     vx, dx = _observe_axis(memory.v[0], memory.d[0], v[0], a[0], bandwidth, dt)
@@ -105,15 +98,10 @@ class AxisState(NamedTuple):
 def snap_command(
     law: TrackingLaw, vehicle: AxisState, d: float, bias: float, plan: AxisState, u: float
 ) -> float:
-    """Commanded snap of one horizontal axis [m/s^4].
+    """Commanded snap [m/s^4] of one horizontal axis, for the plan's acceleration ``u`` [m/s^2].
 
-    Args:
-        law: Lag of the attitude, limits and gains.
-        vehicle: Measured, and from the rotor model.
-        d: Observed disturbance [m/s^2].
-        bias: Its slow part, wind, which is cancelled whole [m/s^2].
-        plan: Where the plan wants the vehicle now.
-        u: The plan's acceleration command now [m/s^2].
+    ``d`` [m/s^2] is the observed disturbance, ``bias`` [m/s^2] its slow part, wind, which is
+    cancelled whole.
     """
     tuning, lag = law.tuning, law.lag
     k = law.gains.k
@@ -141,14 +129,8 @@ def follow_plan(
 ) -> tuple[Vec2, float]:
     """Angular acceleration about body x and y [rad/s^2] and total thrust [N].
 
-    Args:
-        law: Lag of the attitude, tuning and gains.
-        mass: Of the whole vehicle, as estimated in flight [kg].
-        estimate: The vehicle now.
-        motion: Its acceleration, jerk and snap.
-        observed: Its velocity without the reading's noise, and the disturbance.
-        plan: Where the plan wants the vehicle now.
-        u: The plan's input now.
+    ``mass`` [kg] is the whole vehicle's, as estimated in flight; the observed velocity is without
+    the reading's noise.
     """
     p, v = estimate.p_WB, observed.v
     wx = _horizontal_snap(law, 0, estimate, motion, observed, plan, u)

@@ -57,15 +57,10 @@ def tube(
     hold_s: float,
     dt: float,
 ) -> Tube:
-    """The tube of the tracking loop.
+    """The tube of the tracking loop with a tick of ``dt`` [s].
 
-    Args:
-        airframe: Rotor lag.
-        tuning: Observer bandwidth and the limit of the memory of wind.
-        gains: Of the loop.
-        hanging: Height of the end-effector below the base [m].
-        hold_s: How long a random disturbance keeps its value [s].
-        dt: Tick length [s].
+    The end-effector is ``hanging`` [m] below the base; a random disturbance keeps its value for
+    ``hold_s``.
     """
     below = hanging / GRAVITY
     base, acceleration, snap = _impulse_responses(airframe, tuning, gains, dt, wind=False)

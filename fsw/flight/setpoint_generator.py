@@ -20,7 +20,7 @@ from fsw.flight.orbit_path import looking_at, on_orbit
 from fsw.flight.reference_governor import SETTLE_RATE, ReferenceGovernor
 from fsw.geometry.rotation import wrap_angle
 from fsw.geometry.vectors import add_scaled, clamp_magnitude, limit_norm, norm, subtract
-from fsw.model.kinematics import point_in_flight
+from fsw.model.kinematics import end_effector_when_level, point_in_flight
 from fsw.parameters.flight_config import FlightConfig, SetpointLimits
 from fsw.signals import (
     EndEffectorTarget,
@@ -175,11 +175,7 @@ class SetpointGenerator:
 
     def _hanging(self, q_arm: Vec2, yaw: float) -> Vec3:
         """From the body to the end-effector while level [m]."""
-        l1, l2 = self._config.airframe.link_length
-        th1, th12 = q_arm[0], q_arm[0] + q_arm[1]
-        ahead = l1 * math.sin(th1) + l2 * math.sin(th12)
-        down = l1 * math.cos(th1) + l2 * math.cos(th12)
-        return ahead * math.cos(yaw), ahead * math.sin(yaw), down
+        return end_effector_when_level(self._config.airframe.link_length, q_arm, yaw)
 
 
 def _motion_now(reference: ReferenceState, goal: PositionGoal) -> MotionSetpoint:

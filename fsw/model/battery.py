@@ -47,15 +47,7 @@ class BatteryModel:
 def drained(
     model: BatteryModel, levels: Levels, state: BatteryState, thrust: Vec4, dt: float
 ) -> BatteryState:
-    """The battery a moment later.
-
-    Args:
-        model: Of the battery.
-        levels: Of its charge.
-        state: Now.
-        thrust: Of each rotor [N].
-        dt: The moment [s].
-    """
+    """The battery after ``dt`` [s] of ``thrust`` [N] of each rotor."""
     power = model.idle_power
     for f in thrust:
         power += (

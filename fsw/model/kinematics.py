@@ -39,10 +39,7 @@ def _link(length: Any, sine: Any, cosine: Any, rate: Any) -> Any:
 def links(lengths: Vec2, th1: float, th12: float) -> tuple[Vec2, Vec2]:
     """Both links as vectors (forward, down) in the body's x-z plane [m].
 
-    Args:
-        lengths: Of the links [m].
-        th1: Angle of link 1 from straight down [rad].
-        th12: Angle of link 2 from straight down [rad].
+    Links of ``lengths`` [m], from straight down ``th1`` [rad] and ``th12`` [rad].
     """
     x1, z1, _, _ = _link(lengths[0], math.sin(th1), math.cos(th1), 0.0)
     x2, z2, _, _ = _link(lengths[1], math.sin(th12), math.cos(th12), 0.0)
@@ -52,10 +49,7 @@ def links(lengths: Vec2, th1: float, th12: float) -> tuple[Vec2, Vec2]:
 def end_effector_when_level(lengths: Vec2, q_arm: Vec2, yaw: float) -> Vec3:
     """From the body origin to the end-effector of a level vehicle [m, NED].
 
-    Args:
-        lengths: Of the links [m].
-        q_arm: Joint angles [rad].
-        yaw: Of the body [rad].
+    Links of ``lengths`` [m], joints at ``q_arm`` [rad], the body at ``yaw`` [rad].
     """
     (x1, z1), (x2, z2) = links(lengths, q_arm[0], q_arm[0] + q_arm[1])
     ahead = x1 + x2
@@ -72,14 +66,9 @@ def _tip_in_body(lengths: Vec2, q_arm: Vec2, qd_arm: Vec2) -> tuple[Vec3, Vec3]:
 
 
 def point_in_flight(estimate: StateEstimate, lengths: Vec2) -> tuple[Vec3, Vec3]:
-    """World position and velocity of an arm point of the estimated vehicle.
+    """World position p_WE [m] and velocity v_WE [m/s] of an arm point of the estimated vehicle.
 
-    Args:
-        estimate: The vehicle.
-        lengths: Link lengths; ``(l1, l2)`` gives the end-effector, ``(l1, 0)`` joint 2 [m].
-
-    Returns:
-        p_WE [m] and v_WE [m/s], each (3,).
+    Link ``lengths`` [m]: ``(l1, l2)`` gives the end-effector, ``(l1, 0)`` joint 2.
     """
     r, rd = _tip_in_body(lengths, estimate.q_arm, estimate.qd_arm)
     wx, wy, wz = estimate.w_WB_B
@@ -92,14 +81,9 @@ def point_in_flight(estimate: StateEstimate, lengths: Vec2) -> tuple[Vec3, Vec3]
 def arm_points(x: NDArray[np.generic], l1: float, l2: float, out: NDArray[np.generic]) -> None:
     """World position and velocity of joint 2 and end-effector of a prediction state.
 
-    Written without trigonometry of the tilt and without absolute values, so that it accepts
-    complex states: the derivative is then exact (complex step).
-
-    Args:
-        x: Prediction state (19,) [SI], real or complex.
-        l1: Length of link 1 [m].
-        l2: Length of link 2 [m].
-        out: (2, 2, 3) [m, m/s], NED: [joint 2 | end-effector][position | velocity][axis].
+    Written without trigonometry of the tilt and without absolute values, so that it accepts a
+    complex state ``x`` (19,) [SI]: the derivative is then exact (complex step). Links of ``l1`` [m]
+    and ``l2`` [m]; ``out`` (2, 2, 3) [m, m/s], NED: [joint 2 | end-effector][position | velocity].
     """
     # Thrust along f = g e3 - a; its derivative needs the horizontal jerk only: a vertical
     # jerk changes the length of f, hardly its direction.

@@ -101,12 +101,7 @@ class Linearisation:
         object.__setattr__(self, "tracked", tracked)
 
     def refill(self, start: Array, inputs: Array) -> None:
-        """Linearise around ``inputs``.
-
-        Args:
-            start: (19,) [SI], prediction state at node 0.
-            inputs: (6 n,) [SI], guess of all inputs.
-        """
+        """Linearise from the state ``start`` (19,) [SI] around the ``inputs`` (6 n,) [SI]."""
         airframe = self.model.airframe
         np.matmul(self.model.phi, start, out=self.states)
         np.add(self.states, self.model.gamma @ inputs, out=self.states)

@@ -58,14 +58,9 @@ def estimate_mass(
     """The vehicle's mass [kg], from what the accelerometer makes of the rotors' thrust.
 
     The tracking loop is quick, and its gain is thrust over mass: 20 % less mass than believed
-    makes it diverge. A second of averaging keeps gusts and arm motion out.
-
-    Args:
-        airframe: Believed mass; the estimate stays within 30 % of it.
-        mass: Estimate of the last tick [kg].
-        rotors: Thrust of each rotor now [N].
-        specific_force: Accelerometer along -z of the body [m/s^2].
-        seconds: Since the last tick [s].
+    makes it diverge. A second of averaging keeps gusts and arm motion out, and the estimate stays
+    within 30 % of the believed mass. ``mass`` [kg] is the last estimate, ``rotors`` [N] the thrust
+    of each, ``specific_force`` [m/s^2] along -z of the body, ``seconds`` [s] the time since.
     """
     thrust = rotors[0] + rotors[1] + rotors[2] + rotors[3]
     if not (thrust > _WEIGHING_THRUST * airframe.mass and specific_force > _WEIGHING_THRUST):
@@ -80,12 +75,8 @@ def motion_state(
 ) -> MotionState:
     """Acceleration, jerk and snap of the body origin from the rotor model.
 
-    Args:
-        airframe: Inertia and rotor arm.
-        mass: Of the whole vehicle, as weighed in flight [kg].
-        estimate: Attitude and body rates.
-        rotors: Thrust of each rotor now [N].
-        joint1_torque: Torque on link 1 about +y of the body [N m]; the base feels minus it.
+    ``mass`` [kg] of the whole vehicle, thrust of the ``rotors`` [N], ``joint1_torque`` [N m] on
+    link 1 about +y of the body; the base feels minus it.
     """
     R = estimate.R_WB
     wx, wy, _ = estimate.w_WB_B

@@ -58,22 +58,8 @@ class Quadratic(NamedTuple):
 class Cost(Protocol):
     """Something the planner minimises, as a quadratic around a guess of the inputs."""
 
-    def add(
-        self,
-        horizon: Linearisation,
-        targets: TargetPoints,
-        quadratic: Quadratic,
-    ) -> float:
-        """Add this cost to the quadratic.
-
-        Args:
-            horizon: Linearisation around ``quadratic.guess``.
-            targets: Reference at the nodes.
-            quadratic: Hessian and gradient are added to.
-
-        Returns:
-            The cost at the guess.
-        """
+    def add(self, horizon: Linearisation, targets: TargetPoints, quadratic: Quadratic) -> float:
+        """Add this cost, around ``quadratic.guess``; returns the cost at the guess."""
         ...
 
 
@@ -113,12 +99,7 @@ class TrackingCost:
         )
         self._add_tracking = of_fixed_types(_add_tracking)
 
-    def add(
-        self,
-        horizon: Linearisation,
-        targets: TargetPoints,
-        quadratic: Quadratic,
-    ) -> float:
+    def add(self, horizon: Linearisation, targets: TargetPoints, quadratic: Quadratic) -> float:
         """See ``Cost``."""
         target = _Target(targets.yaw, targets.position, targets.velocity)
         return self._add_tracking(self._weights, horizon.tracked, target, quadratic)
@@ -130,12 +111,7 @@ class PostureCost:
     def __init__(self, weights: CostWeights) -> None:
         self._weight = weights.posture
 
-    def add(
-        self,
-        horizon: Linearisation,
-        targets: TargetPoints,
-        quadratic: Quadratic,
-    ) -> float:
+    def add(self, horizon: Linearisation, targets: TargetPoints, quadratic: Quadratic) -> float:
         """See ``Cost``; nothing where no joints are asked for."""
         if targets.q_arm is None:
             return 0.0
@@ -168,14 +144,10 @@ def _add_posture(
 
 @compiled
 def add_square(weight: float, value: float, row: Array, columns: int, quadratic: Quadratic) -> None:
-    """Add ``weight (value + row (U - guess))^2`` over the first columns.
+    """Add ``weight`` [1 / unit of value^2] times ``(value + row (U - guess))^2``.
 
-    Args:
-        weight: Of the square [1 / unit of value^2].
-        value: The residual at the guess [any unit].
-        row: Its gradient in the inputs (6 n,) [unit of value / unit of the input].
-        columns: How many inputs the residual depends on.
-        quadratic: Hessian and gradient are added to.
+    ``value`` [any unit] is the residual at the guess and ``row`` (6 n,) [value / input] its
+    gradient, of which only the first ``columns`` count.
     """
     guess, hessian, gradient = quadratic
     at_zero = value

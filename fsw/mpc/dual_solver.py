@@ -57,16 +57,11 @@ class DualSolver:
         self._multipliers = lru_cache(maxsize=_PATTERNS)(_Multipliers)
 
     def solve(self, guess: Array) -> Solution:
-        """Solve the program as filled now.
+        """Inputs and slacks that solve the program as filled now.
 
-        Args:
-            guess: Inputs (6 n,) [SI] that say where rows may be active; the optimum does not
-                depend on them.
-
-        Returns:
-            Inputs and slacks. Where the multipliers have no optimum (rows that contradict each
-            other, a Hessian that is not positive) Clarabel solves the whole program and has
-            the last word.
+        The inputs ``guess`` (6 n,) [SI] say where rows may be active; the optimum does not depend
+        on them. Where the multipliers have no optimum (rows that contradict each other, a Hessian
+        that is not positive) Clarabel solves the whole program and has the last word.
         """
         program, rows = self._program, self._program.rows
         factor, failed = dpotrf(program.hessian.T, lower=1, clean=0)
@@ -111,12 +106,7 @@ class _Multipliers:
     """The dual program of rows that share slacks in one way, in Clarabel's form."""
 
     def __init__(self, held: tuple[int, ...], cones: int) -> None:
-        """Lay it out.
-
-        Args:
-            held: The slack of each simple row, numbered as they come; -1: none.
-            cones: How many follow.
-        """
+        """Lay it out for simple rows, each with the number of its slack or -1, and for cones."""
         simple, slacks, size = len(held), max(held, default=-1) + 1, len(held) + CONE * cones
         p, self._upper = _upper_triangle(size)
         a = _signs_and_sums(held, slacks, size)
@@ -129,10 +119,8 @@ class _Multipliers:
     def solve(self, gram: Array, residual: Array, penalty: Array) -> Solution:
         """Multipliers, simple rows before cones.
 
-        Args:
-            gram: G H^-1 G', (multipliers, multipliers), as scaled by ``_SPREAD``.
-            residual: Of the rows at the optimum without any, (multipliers,).
-            penalty: Of the slacks.
+        ``gram`` (multipliers, multipliers) [SI] is G H^-1 G' as scaled by ``_SPREAD``, ``residual``
+        (multipliers,) [SI] that at the optimum without any row, ``penalty`` (slacks,) [SI].
         """
         gram.take(self._upper, out=self._program.p.data)
         np.multiply(residual, _MULTIPLIER / _COST, out=self._program.q)

@@ -29,19 +29,14 @@ class Ocp:
             (self._limits.rows, config.joint_slack)
         ]
         blocks += [(barrier.rows, parts.slack) for barrier in parts.barriers]
-        self._program = QpData(config.horizon, config.limits, tuple(blocks))
-        self._first_barrier_slack = self._program.inputs + self._limits.rows.slacks
+        self.qp = QpData(config.horizon, config.limits, tuple(blocks))
+        self._first_barrier_slack = self.qp.inputs + self._limits.rows.slacks
         self.cost = 0.0
-        self._solver = DualSolver(self._program)
-
-    @property
-    def program(self) -> QpData:
-        """The program as last linearised."""
-        return self._program
+        self._solver = DualSolver(self.qp)
 
     def linearise(self, start: Array, guess: Array, targets: TargetPoints) -> None:
         """Refill the program around ``guess`` (6 n,) [SI inputs] from ``start`` (19,) [SI]."""
-        program = self._program
+        program = self.qp
         self._horizon.refill(start, guess)
         program.hessian[:] = 0.0
         program.linear[:] = 0.0

@@ -12,19 +12,19 @@ import numpy as np
 
 from fsw.barriers.constraint_block import TargetPoints
 from fsw.model.airframe import Airframe
+from fsw.model.nominal import REST_STATE
 from fsw.model.prediction import INPUTS, Array, condense, to_vector
 from fsw.mpc.ocp import Ocp
 from fsw.mpc.planner_config import PlannerConfig
+from fsw.mpc.reference import still_at
 from fsw.mpc.solvers import SOLVERS, Search
 from fsw.signals import (
-    EndEffectorTarget,
     Plan,
     PlanFailure,
     PlanInput,
     PlanRequest,
     PlanTimings,
     PointObstacle,
-    PredictionState,
     SafeSet,
     SolverStatus,
     Wall,
@@ -43,13 +43,7 @@ class Planner:
     def __init__(
         self, config: PlannerConfig, airframe: Airframe, stopwatch_us: Callable[[], float]
     ) -> None:
-        """Build the prediction model.
-
-        Args:
-            config: Horizon, weights, limits and barriers.
-            airframe: What the prediction model describes.
-            stopwatch_us: Monotonic time for the reported stage times only [us].
-        """
+        """Build the prediction model; ``stopwatch_us`` is for the reported stage times only."""
         self._untuned = self._config = config
         self._tuning: Tuning = ()
         self._stopwatch_us = stopwatch_us
@@ -62,19 +56,8 @@ class Planner:
 
     def warm_up(self) -> None:
         """Compile every kernel and load the solver, before anything flies."""
-        rest = PredictionState(
-            p=(0.0, 0.0, -1.0),
-            v=(0.0, 0.0, 0.0),
-            a=(0.0, 0.0, 0.0),
-            j=(0.0, 0.0),
-            s=(0.0, 0.0),
-            yaw=0.0,
-            yaw_rate=0.0,
-            q_arm=(0.0, 0.0),
-            qd_arm=(0.0, 0.0),
-        )
-        target = EndEffectorTarget(0, (0.0, 0.0, -0.7), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-        targets = (target,) * (self._config.horizon + 1)
+        rest = REST_STATE._replace(p=(0.0, 0.0, -1.0))
+        targets = (still_at((0.0, 0.0, -0.7)),) * (self._config.horizon + 1)
         wall = Wall((-1.0, 0.0, 0.0), 0.0, 0.1)  # too close: rows bind
         sphere = WorkspaceSphere((0.0, 0.0, -0.3), 0.1)
         point = PointObstacle((3.0, 0.0, -1.0), 0.1)

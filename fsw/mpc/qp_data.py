@@ -74,13 +74,10 @@ class QpData:
         limits: InputLimits,
         blocks: tuple[tuple[ConstraintBlock, float | None], ...],
     ) -> None:
-        """Lay out the rows.
+        """Lay out the rows of a horizon.
 
-        Args:
-            horizon: n.
-            limits: Of the inputs.
-            blocks: Rows, and the penalty of a unit of their slacks; None makes them hard. The
-                penalty is linear, hence exact: rows that can hold, do hold.
+        With each block comes the penalty of a unit of its slacks; None makes its rows hard. The
+        penalty is linear, hence exact: rows that can hold, do hold.
         """
         self._blocks = tuple(rows for rows, _ in blocks)
         self.inputs = INPUTS * horizon
@@ -109,11 +106,7 @@ class QpData:
         return self.inputs + len(self.penalty)
 
     def refill(self, guess: Array) -> None:
-        """Bring the rows up to date with the soft blocks.
-
-        Args:
-            guess: (6 n,) [SI], inputs around which the blocks are linearised.
-        """
+        """Take over the blocks, which are linearised around the inputs ``guess`` (6 n,) [SI]."""
         row = 0
         for block in self._blocks:
             end = row + len(block.node)

@@ -41,12 +41,7 @@ def _is_finite(point: EndEffectorTarget) -> bool:
 
 
 def sample(stream: tuple[EndEffectorTarget, ...], t_us: int) -> EndEffectorTarget:
-    """The reference at an instant: cubic between points, at rest beyond the ends.
-
-    Args:
-        stream: At least one point, sorted by time.
-        t_us: The instant.
-    """
+    """The reference at ``t_us``: cubic between points, sorted by time, at rest beyond the ends."""
     after = bisect_right(stream, t_us, key=lambda point: point.t_us)
     if after == 0:
         return still_at(stream[0].p_WE, t_us, stream[0].yaw)
@@ -78,13 +73,9 @@ def _hermite(first: EndEffectorTarget, last: EndEffectorTarget, t_us: int) -> En
 def vertical_ramp(
     start: EndEffectorTarget, climb: float, speed: float, t_us: int
 ) -> EndEffectorTarget:
-    """Straight up (climb > 0) or down from a point at constant speed, then still.
+    """Straight up or down from a point and its time on, then still.
 
-    Args:
-        start: Where and when the ramp begins.
-        climb: Height to gain [m].
-        speed: Of the ramp, positive [m/s].
-        t_us: The instant asked for.
+    ``climb`` [m] is the height to gain, ``speed`` [m/s] positive.
     """
     elapsed = max(t_us - start.t_us, 0) * 1e-6
     x, y, z = start.p_WE

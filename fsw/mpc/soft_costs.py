@@ -45,12 +45,7 @@ class SurfaceCost:
         self._surfaces = surfaces
         self._weights = (weights.wall, weights.wall_terminal)
 
-    def add(
-        self,
-        horizon: Linearisation,
-        targets: TargetPoints,
-        quadratic: Quadratic,
-    ) -> float:
+    def add(self, horizon: Linearisation, targets: TargetPoints, quadratic: Quadratic) -> float:
         """See ``fsw.mpc.costs.Cost``."""
         self._surfaces.refill(horizon, targets)
         rows = self._surfaces.rows
@@ -70,12 +65,7 @@ class SphereCost:
         self._weights = (weight, terminal)
         self._from_radius = sphere.radius if only_outside else -1.0
 
-    def add(
-        self,
-        horizon: Linearisation,
-        targets: TargetPoints,
-        quadratic: Quadratic,
-    ) -> float:
+    def add(self, horizon: Linearisation, targets: TargetPoints, quadratic: Quadratic) -> float:
         """See ``fsw.mpc.costs.Cost``."""
         return _add_sphere(
             targets.position + self._offset,

@@ -14,7 +14,7 @@ from fsw.barriers.constraint_block import TargetPoints
 from fsw.model.prediction import Array
 from fsw.mpc.ocp import Ocp
 from fsw.mpc.planner_config import PlannerConfig
-from fsw.mpc.slsqp_solver import SlsqpSolver
+from fsw.mpc.slsqp_solver import NonlinearProgram, minimise
 from fsw.mpc.solution import Solution
 
 Stopwatch = Callable[[], float]
@@ -36,13 +36,10 @@ class Solver(Protocol):
     """Minimises an optimal control problem."""
 
     def solve(self, ocp: Ocp, start: Array, targets: TargetPoints, guess: Array) -> Search:
-        """Solve one request.
+        """Solve one request from the prediction state ``start`` (19,) [SI] at node 0.
 
-        Args:
-            ocp: Of the safe set; holds the program around the optimum afterwards.
-            start: (19,) [SI], prediction state at node 0.
-            targets: Reference at the nodes.
-            guess: (6 n,) [SI], the last solution moved on by one period, or zeros.
+        The ``guess`` (6 n,) [SI] is the last solution moved on by one period, or zeros. The
+        problem is the one of the safe set; it holds the program around the optimum afterwards.
         """
         ...
 
@@ -82,7 +79,7 @@ class PaperSolver:
     def solve(self, ocp: Ocp, start: Array, targets: TargetPoints, guess: Array) -> Search:
         """See ``Solver``: ``start`` (19,) [SI]; ``guess`` (6 n,) [SI] is not used."""
         mark = self._stopwatch_us()
-        solution = SlsqpSolver().minimise(ocp, start, targets)
+        solution = minimise(NonlinearProgram(ocp, start, targets))
         solve_us = self._stopwatch_us() - mark
         return Search(solution, solution.iterations, solution.iterations, 0.0, solve_us)
 

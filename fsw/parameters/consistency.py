@@ -32,15 +32,11 @@ class Finding:
 
 
 def analyse(config: FlightConfig, safe_set: SafeSet, loop: Tube) -> tuple[Finding, ...]:
-    """Every finding about a controller with barriers in a safe set.
+    """Every finding about a controller with barriers in a safe set; there is none for the others.
 
-    There is none for the others. A point needs what a wall needs: its ball lies behind the
-    tangent plane, and going round it only takes the vehicle off that plane.
-
-    Args:
-        config: What would fly.
-        safe_set: What it would have to keep.
-        loop: ``loop_tube(config)``, which takes a moment and does not depend on the safe set.
+    A point needs what a wall needs: its ball lies behind the tangent plane, and going round it only
+    takes the vehicle off that plane. The loop is ``loop_tube(config)``, which takes a moment and
+    does not depend on the safe set.
     """
     surroundings = config.surroundings
     if config.controller != "blf" or safe_set.kind is ConstraintKind.NONE:
@@ -92,12 +88,9 @@ def stand_off(tuning: BarrierTuning) -> float:
 
 
 def sampled_robustness(tuning: BarrierTuning, disturbance: float, period: float) -> float:
-    """Least lambda that rejects a constant disturbance along the normal in sampled data.
+    """Least lambda [m/s] that rejects a constant ``disturbance`` [m/s^2] along the normal.
 
-    Args:
-        tuning: Of the barrier.
-        disturbance: On an axis [m/s^2].
-        period: Of the planner [s].
+    In sampled data, with the planner's ``period`` [s].
     """
     return disturbance * (1.0 + 0.5 * tuning.slope * period) / tuning.gamma
 

@@ -72,10 +72,7 @@ class ControlChoice:
 
 
 def choice_of(fact: Callable[[str], str]) -> ControlChoice:
-    """The choice that a flight log tells of.
-
-    Args:
-        fact: What the log says under a name.
+    """The choice that a flight log tells of, given what it says under a name.
 
     Raises:
         ValueError: There is no such inner loop.

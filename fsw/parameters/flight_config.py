@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 from fsw.control.cascade import Inner
-from fsw.control.gains import InnerTuning
+from fsw.control.gains import LoopGains
 from fsw.geometry.geodesy import DEFAULT_ORIGIN
 from fsw.model.airframe import AIRFRAME, Airframe
 from fsw.model.battery import BatteryModel
@@ -84,7 +84,7 @@ class FlightConfig:
     inner: Inner = "tracking"
     airframe: Airframe = AIRFRAME
     planner: PlannerConfig = field(default_factory=PlannerConfig)
-    tuning: InnerTuning = field(default_factory=InnerTuning)
+    tuning: LoopGains = field(default_factory=LoopGains)
     limits: FlightLimits = field(default_factory=FlightLimits)
     surroundings: Surroundings = field(default_factory=Surroundings)
     steering: SetpointLimits = field(default_factory=SetpointLimits)
@@ -127,15 +127,14 @@ def flight_config(
     Raises:
         ValueError: for an unknown name, listing the known ones.
     """
-    if controller not in CONTROLLERS:
-        raise ValueError(f"unknown controller '{controller}'; known: {', '.join(CONTROLLERS)}")
-    if inner not in INNERS:
-        raise ValueError(f"unknown inner loop '{inner}'; known: {', '.join(INNERS)}")
-    if robustness not in ROBUSTNESS_PRESETS:
-        known = ", ".join(ROBUSTNESS_PRESETS)
-        raise ValueError(f"unknown robustness '{robustness}'; known: {known}")
-    if solver not in SOLVERS:
-        raise ValueError(f"unknown solver '{solver}'; known: {', '.join(SOLVERS)}")
+    for what, name, known in (
+        ("controller", controller, CONTROLLERS),
+        ("inner loop", inner, INNERS),
+        ("robustness", robustness, ROBUSTNESS_PRESETS),
+        ("solver", solver, SOLVERS),
+    ):
+        if name not in known:
+            raise ValueError(f"unknown {what} '{name}'; known: {', '.join(known)}")
     planner = PlannerConfig(controller=controller, solver=solver)
     wanted = ROBUSTNESS_PRESETS[robustness]
     if wanted is not None:

@@ -19,12 +19,7 @@ class ParameterFile:
     """
 
     def __init__(self, store: ParameterStore, path: Path | None, record: Path) -> None:
-        """Take over what was kept.
-
-        Args:
-            store: Whose changes are kept.
-            path: Of the vehicle; None: changes end with the flight.
-            record: In the run's directory.
+        """Take over what was kept in the vehicle's file; without one changes end with the flight.
 
         Raises:
             ValueError: What was kept contradicts itself.

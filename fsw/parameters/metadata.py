@@ -29,9 +29,7 @@ def parameter_document() -> bytes:
 def general_document(parameter_uri: str, firmware_version: str) -> bytes:
     """The document that says where the others are, as JSON.
 
-    Args:
-        parameter_uri: Where ``parameter_document`` can be fetched, ``mftp://...``.
-        firmware_version: Three numbers with dots.
+    The parameters' is at an address ``mftp://...``; the version is three numbers with dots.
     """
     parameters = {
         "type": _PARAMETER_TYPE,

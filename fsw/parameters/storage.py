@@ -86,9 +86,7 @@ def as_parm(values: Mapping[str, float]) -> str:
 def save(path: Path, values: Mapping[str, float]) -> None:
     """Write a file, atomically: a concurrent reader finds the old one.
 
-    Args:
-        path: ``.parm`` makes it MAVProxy's format, anything else QGroundControl's.
-        values: By name.
+    ``.parm`` makes it MAVProxy's format, anything else QGroundControl's.
 
     Raises:
         OSError: It cannot be written; the old one is untouched.

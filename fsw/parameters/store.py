@@ -51,12 +51,7 @@ class ParameterStore:
     """Shared by all links; only what the executor is handed runs outside the loop's thread."""
 
     def __init__(self, config: FlightConfig, prepare: Prepare) -> None:
-        """Start with the values of a configuration.
-
-        Args:
-            config: The configuration at start.
-            prepare: Called in the executor's thread.
-        """
+        """Start with the values of a configuration; prepare is called in the executor's thread."""
         self.defaults: Final[Mapping[str, float]] = {p.name: p.read(config) for p in PARAMETERS}
         self._values = dict(self.defaults)
         self._prepare = prepare
@@ -76,13 +71,7 @@ class ParameterStore:
         return self._values
 
     def restore(self, values: Mapping[str, float]) -> int:
-        """Take values over before the first tick.
-
-        Args:
-            values: By name, within their ranges.
-
-        Returns:
-            How many are other than the configuration has them.
+        """Take values within their ranges over before the first tick; how many are not the default.
 
         Raises:
             ValueError: They contradict each other.
@@ -96,12 +85,7 @@ class ParameterStore:
         return len(tuning)
 
     def open(self, executor: Executor, save: Save) -> None:
-        """Allow changes.
-
-        Args:
-            executor: Of one thread; the store does not end it.
-            save: Called in it after each change.
-        """
+        """Allow changes, each saved in the executor's one thread; the store does not end it."""
         self._executor, self._save = executor, save
 
     def listen(self) -> Listener:

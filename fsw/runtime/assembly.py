@@ -13,13 +13,13 @@ from fsw.geometry.geodesy import DEFAULT_ORIGIN, to_local
 from fsw.link.services.mission_store import MissionStore, Site
 from fsw.mpc.planner import Planner
 from fsw.parameters.control_choice import ControlChoice
-from fsw.parameters.flat import flat
 from fsw.parameters.flight_config import FlightConfig, flight_config
 from fsw.parameters.store import ParameterStore
 from fsw.ports import VehicleFacts
 from fsw.runtime import clock
 from fsw.runtime.program import FlightProgram
 from fsw.signals import Origin
+from fsw.tuning import flat
 
 
 def flight_software(

@@ -8,9 +8,9 @@ from pathlib import Path
 
 from fsw.log.flight_log import FlightLog, LogSubject
 from fsw.parameters.control_choice import ControlChoice
-from fsw.parameters.flat import flat
 from fsw.parameters.flight_config import FlightConfig
 from fsw.signals import Command, TickInputs, TickOutputs
+from fsw.tuning import flat
 from sitl.scenario_file import load_scenario
 from tests.closed_loop.harness import LAND, Flight, command
 

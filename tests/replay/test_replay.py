@@ -16,11 +16,11 @@ from fsw.log import topics
 from fsw.log.flight_log import LogSubject, definitions
 from fsw.log.reader import open_flight
 from fsw.log.topics import TOPICS
-from fsw.parameters.flat import flat
 from fsw.parameters.flight_config import FlightConfig
 from fsw.runtime.assembly import flight_software
 from fsw.runtime.replay import Replayed, other_numbers, replay
 from fsw.signals import TickInputs, TickOutputs
+from fsw.tuning import flat
 from messages import ulog
 from messages.ulog import Topic
 from messages.ulog_reader import UlogError

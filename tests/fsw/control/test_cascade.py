@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from fsw.control.attitude import attitude_pid, attitude_reference
 from fsw.control.cascade import Cascade, Inner, at_rest, in_hover
-from fsw.control.gains import InnerTuning
+from fsw.control.gains import LoopGains
 from fsw.control.pid import PidGains
 from fsw.control.tracking import Observed, observe
 from fsw.model.airframe import AIRFRAME
@@ -21,7 +21,7 @@ from fsw.signals import ActuatorCommand, PlanInput, PredictionState, StateEstima
 from tests.fsw.random_states import estimate_of
 
 DT = 0.002
-TUNING = InnerTuning()
+TUNING = LoopGains()
 STILL: Vec3 = (0.0, 0.0, 0.0)
 NO_INPUT = PlanInput(STILL, 0.0, (0.0, 0.0))
 

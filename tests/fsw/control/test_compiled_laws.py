@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from fsw.control.cascade import Cascade, CascadeMemory, Inner, close_loops
-from fsw.control.gains import InnerTuning
+from fsw.control.gains import LoopGains
 from fsw.control.tracking import Observed
 from fsw.estimation.estimator import attitude, estimate_state
 from fsw.model.airframe import AIRFRAME, AttitudeLag
@@ -20,7 +20,7 @@ from fsw.signals import ActuatorCommand, PlanInput, SensorFrame, Vec4
 from tests.fsw.random_states import as_state, prediction_vector, random_estimate, vec3
 
 STATES = 300
-TUNINGS = [InnerTuning(), replace(InnerTuning(), compensate=False)]
+TUNINGS = [LoopGains(), replace(LoopGains(), compensate=False)]
 
 
 def numbers(value: Any) -> Iterator[float]:
@@ -61,7 +61,7 @@ def plan_input(random: np.random.Generator) -> PlanInput:
 @pytest.mark.parametrize("tuning", TUNINGS)
 @pytest.mark.parametrize("inner", ["tracking", "pid"])
 def test_the_loops_do_as_machine_code_what_they_say_in_python(
-    inner: Inner, tuning: InnerTuning, ticks: int
+    inner: Inner, tuning: LoopGains, ticks: int
 ) -> None:
     random = np.random.default_rng(7)
     cascade = Cascade(AIRFRAME, tuning, inner, 0.002)
@@ -79,7 +79,7 @@ def test_the_loops_do_as_machine_code_what_they_say_in_python(
 
 def test_a_number_that_is_none_comes_out_as_none_and_is_left_to_the_gate() -> None:
     random = np.random.default_rng(8)
-    cascade = Cascade(AIRFRAME, InnerTuning(), "tracking", 0.002)
+    cascade = Cascade(AIRFRAME, LoopGains(), "tracking", 0.002)
     plan = as_state(prediction_vector(random))._replace(q_arm=(math.nan, 0.0))
     wanted, _ = cascade.step(memory(random), random_estimate(random), plan, plan_input(random))
     assert not math.isfinite(sum(wanted.joint_torque))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.signal import cont2discrete
 
-from fsw.control.gains import InnerTuning, TrackingTuning, tracking_gains
+from fsw.control.gains import LoopGains, TrackingTuning, tracking_gains
 from fsw.model.airframe import AIRFRAME, GRAVITY
 from fsw.model.prediction import Array
 
@@ -60,14 +60,14 @@ def test_the_vertical_gains_are_the_cheapest(tuning: TrackingTuning) -> None:
 @pytest.mark.parametrize("loop", ["attitude", "height", "joint"])
 def test_each_pid_of_the_paper_settles_a_double_integrator_without_ringing(loop: str) -> None:
     """All poles of s^3 + kd s^2 + kp s + ki decay, none swings more than it decays."""
-    gains = getattr(InnerTuning(), loop)
+    gains = getattr(LoopGains(), loop)
     poles = np.roots([1.0, gains.kd, gains.kp, gains.ki])
     assert poles.real.max() < 0.0
     assert np.abs(poles.imag / poles.real).max() < 4.0 / 3.0  # damping of 0.6
 
 
 def test_the_heading_loop_is_critically_damped_and_cannot_spend_all_the_rotors_drag() -> None:
-    tuning = InnerTuning()
+    tuning = LoopGains()
     assert np.roots([1.0, tuning.yaw.kd, tuning.yaw.kp]) == pytest.approx([-2.0, -2.0])
     drag = 4.0 * AIRFRAME.yaw_per_thrust * tuning.yaw_thrust_limit / AIRFRAME.inertia[2]
     assert tuning.yaw.ki == 0.0

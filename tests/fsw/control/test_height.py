@@ -7,13 +7,13 @@ import math
 import pytest
 from scipy.spatial.transform import Rotation
 
-from fsw.control.gains import InnerTuning
+from fsw.control.gains import LoopGains
 from fsw.control.height import height_pid
 from fsw.model.airframe import AIRFRAME, GRAVITY
 from fsw.signals import PlanInput, PredictionState, StateEstimate
 from tests.fsw.random_states import estimate_of
 
-GAINS = InnerTuning().height
+GAINS = LoopGains().height
 WEIGHT = AIRFRAME.mass * GRAVITY
 PLAN = PredictionState(
     (0.0, 0.0, -1.0),

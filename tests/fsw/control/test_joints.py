@@ -11,13 +11,13 @@ import pinocchio as pin
 import pytest
 from scipy.spatial.transform import Rotation
 
-from fsw.control.gains import InnerTuning
+from fsw.control.gains import LoopGains
 from fsw.control.joints import arm_inverse_dynamics, joint_torques
 from fsw.model.airframe import AIRFRAME, Airframe
 from fsw.signals import Vec2
 from tests.fsw.random_states import estimate_of
 
-GAINS = InnerTuning().joint
+GAINS = LoopGains().joint
 FIELD = 9.81
 
 

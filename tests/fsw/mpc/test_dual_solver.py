@@ -78,7 +78,7 @@ def test_the_optimum_is_that_of_the_whole_program(
     cones_bound = 0
     for _ in range(6):
         ocp = filled(random, safe_set, config=config, off=off)
-        program = ocp.program
+        program = ocp.qp
         expected = ClarabelSolver(program.whole()).solve()
         found = ocp.solve()
         assert found.usable
@@ -105,7 +105,7 @@ def test_the_guess_says_where_to_look_and_not_what_is_found(safe_set: SafeSet) -
     random = np.random.default_rng(8)
     for _ in range(10):
         ocp = filled(random, safe_set)
-        program, solver = ocp.program, DualSolver(ocp.program)
+        program, solver = ocp.qp, DualSolver(ocp.qp)
         first = solver.solve(np.zeros(program.inputs)).x
         for size in (0.1, 3.0, 30.0):
             again = solver.solve(random.uniform(-size, size, program.inputs)).x
@@ -116,10 +116,10 @@ def test_what_was_solved_before_leaves_no_trace() -> None:
     random = np.random.default_rng(9)
     one, other = filled(random, WALLS), filled(random, WALLS)
     fresh = one.solve().x
-    kept = DualSolver(one.program)
-    numbers = (one.program.hessian, one.program.linear, one.program.rows.g, one.program.rows.b)
+    kept = DualSolver(one.qp)
+    numbers = (one.qp.hessian, one.qp.linear, one.qp.rows.g, one.qp.rows.b)
     saved = [array.copy() for array in numbers]
-    theirs = other.program
+    theirs = other.qp
     for array, another in zip(
         numbers, (theirs.hessian, theirs.linear, theirs.rows.g, theirs.rows.b), strict=True
     ):
@@ -139,6 +139,6 @@ def test_hard_rows_that_contradict_each_other_are_infeasible() -> None:
 
 def test_a_hessian_that_is_not_positive_is_never_flown() -> None:
     ocp = filled(np.random.default_rng(11), WALLS)
-    ocp.program.hessian[0, 0] = -1.0
+    ocp.qp.hessian[0, 0] = -1.0
     solution = ocp.solve()
     assert not solution.usable

@@ -9,12 +9,14 @@ import numpy as np
 import pytest
 from scipy.optimize import approx_fprime
 
+from benchmarks.optimiser.slopes import slopes_of
 from fsw.barriers.constraint_block import TargetPoints
 from fsw.model.airframe import AIRFRAME
 from fsw.model.prediction import INPUTS, STATES, Array, condense
 from fsw.mpc.ocp import Ocp
 from fsw.mpc.planner_config import PlannerConfig
-from fsw.mpc.slsqp_solver import Gradients, SlsqpSolver, _Point
+from fsw.mpc.slsqp_solver import MAX_ITERATIONS, NonlinearProgram, minimise
+from fsw.mpc.solution import Solution
 from fsw.mpc.variants import VARIANTS
 from fsw.signals import PlanFailure, SafeSet, SolverStatus, Wall, WorkspaceSphere
 from tests.fsw.mpc.requests import STILL, below, hovering, planned, planner, request
@@ -50,10 +52,23 @@ def instance(random: np.random.Generator, safe_set: SafeSet) -> tuple[Array, Tar
     return start, TargetPoints(at_start + along, np.tile(speed, (N + 1, 1)), np.zeros(N + 1))
 
 
+def search(
+    ocp: Ocp,
+    start: Array,
+    targets: TargetPoints,
+    *,
+    gradients: str = "analytic",
+    max_iterations: int = MAX_ITERATIONS,
+) -> Solution:
+    problem = NonlinearProgram(ocp, start, targets)
+    slopes = slopes_of(problem) if gradients == "analytic" else None
+    return minimise(problem, max_iterations, slopes)
+
+
 def price(ocp: Ocp, start: Array, targets: TargetPoints, inputs: Array) -> float:
     """Cost of inputs with the smallest slacks that admit them: what both optimisers minimise."""
     ocp.linearise(start, inputs, targets)
-    program = ocp.program
+    program = ocp.qp
     return float(ocp.cost + program.penalty @ program.least_slacks(inputs))
 
 
@@ -81,15 +96,13 @@ SEARCHES = [
 
 @pytest.mark.parametrize("case", CASES)
 @pytest.mark.parametrize(("controller", "gradients"), SEARCHES)
-def test_both_optimisers_find_the_same_cost(
-    controller: str, case: str, gradients: Gradients
-) -> None:
+def test_both_optimisers_find_the_same_cost(controller: str, case: str, gradients: str) -> None:
     config = replace(CONFIG, controller=controller, hard_skipped_nodes=1)
     ocp = Ocp(config, MODEL, CASES[case])
     turning = controller == "blf" and case == "sphere"
     for seed in (2, 5, 8)[: 1 if gradients == "numeric" else 3]:  # whose programs converge
         start, targets = instance(np.random.default_rng(seed), CASES[case])
-        answer = SlsqpSolver(gradients).minimise(ocp, start, targets)
+        answer = search(ocp, start, targets, gradients=gradients)
         # Where directions turn, analytic slopes leave the turning out, and the last line
         # searches may find no descent although the cost is reached.
         assert answer.usable or (turning and gradients == "analytic")
@@ -104,14 +117,15 @@ def test_analytic_slopes_are_those_of_the_cost_and_the_margins(controller: str, 
     random = np.random.default_rng(5)
     ocp = Ocp(replace(CONFIG, controller=controller), MODEL, CASES[case])
     start, targets = instance(random, CASES[case])
-    point = _Point(ocp, start, targets)
+    point = NonlinearProgram(ocp, start, targets)
     x = np.concatenate(
         (
-            random.uniform(-0.3, 0.3, ocp.program.inputs),
-            random.uniform(0.0, 0.1, ocp.program.unknowns - ocp.program.inputs),
+            random.uniform(-0.3, 0.3, ocp.qp.inputs),
+            random.uniform(0.0, 0.1, ocp.qp.unknowns - ocp.qp.inputs),
         )
     )
-    slope, slopes = point.slope(x).copy(), point.margin_slopes(x)
+    cost_slope, margin_slopes = slopes_of(point)
+    slope, slopes = cost_slope(x).copy(), margin_slopes(x)
     np.testing.assert_allclose(approx_fprime(x, point.cost, 1e-7), slope, rtol=1e-3, atol=1e-3)
     by_difference = approx_fprime(x, point.margins, 1e-7)
     if case == "sphere" and controller == "blf":
@@ -125,7 +139,7 @@ def test_analytic_slopes_are_those_of_the_cost_and_the_margins(controller: str, 
 def test_starts_at_rest_with_the_slacks_that_admit_it() -> None:
     start, targets = instance(np.random.default_rng(6), WALLS)
     start[3] = 1.0  # fast towards the wall: rest breaks the barrier
-    point = _Point(Ocp(CONFIG, MODEL, WALLS), start, targets)
+    point = NonlinearProgram(Ocp(CONFIG, MODEL, WALLS), start, targets)
     x = point.rest()
     assert (x[: INPUTS * N] == 0.0).all()
     assert x.max() > 0.0
@@ -136,7 +150,7 @@ def test_margins_and_bounds_together_admit_what_the_program_admits() -> None:
     random = np.random.default_rng(7)
     start, targets = instance(random, WALLS)
     ocp = Ocp(CONFIG, MODEL, WALLS)
-    point = _Point(ocp, start, targets)
+    point = NonlinearProgram(ocp, start, targets)
     verdicts = set()
     for _ in range(200):
         x = point.rest()
@@ -148,7 +162,7 @@ def test_margins_and_bounds_together_admit_what_the_program_admits() -> None:
             for value, (low, high) in zip(x, point.bounds(), strict=True)
         )
         point.cost(x)
-        whole = ocp.program.whole()
+        whole = ocp.qp.whole()
         left = whole.b - whole.a @ x
         t, ax, ay = left[whole.nonnegative_rows :].reshape(-1, 3).T
         expected = left[: whole.nonnegative_rows].min() >= 0.0 and (t >= np.hypot(ax, ay)).all()
@@ -159,9 +173,7 @@ def test_margins_and_bounds_together_admit_what_the_program_admits() -> None:
 
 def test_no_plan_without_convergence() -> None:
     start, targets = instance(np.random.default_rng(8), WALLS)
-    answer = SlsqpSolver("analytic", max_iterations=2).minimise(
-        Ocp(CONFIG, MODEL, WALLS), start, targets
-    )
+    answer = search(Ocp(CONFIG, MODEL, WALLS), start, targets, max_iterations=2)
     assert answer.status is SolverStatus.TIME_LIMIT
     assert not answer.usable
 
@@ -171,7 +183,7 @@ def test_what_cannot_be_kept_is_infeasible() -> None:
     start, targets = instance(np.random.default_rng(9), WALLS)
     start[0] = 3.0
     ocp = Ocp(replace(CONFIG, controller="hc"), MODEL, WALLS)
-    answer = SlsqpSolver("analytic").minimise(ocp, start, targets)
+    answer = search(ocp, start, targets)
     assert not answer.usable
 
 

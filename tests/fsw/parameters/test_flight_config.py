@@ -14,7 +14,7 @@ from fsw.model.prediction import discretise
 from fsw.mpc.planner import Planner
 from fsw.parameters.flight_config import FlightConfig, flight_config
 from fsw.signals import Plan
-from fsw.tuning import leaves
+from fsw.tuning import flat
 from tests.fsw.mpc.requests import below, hovering, request
 
 
@@ -30,11 +30,11 @@ def test_a_predicted_vertical_acceleration_follows_as_the_rotors_do(rotor_lag: f
         ("rotor_lag", ["airframe.rotor_lag"]),
         ("tilt", ["planner.limits.tilt"]),
         ("period", ["planner.period_us", "tick_period_us"]),
-        ("link_length", ["airframe.link_length"]),
+        ("link_length", ["airframe.link_length.0", "airframe.link_length.1"]),
     ],
 )
 def test_a_number_of_the_vehicle_is_configured_in_one_place(word: str, paths: list[str]) -> None:
-    assert [path for path, _ in leaves(FlightConfig()) if word in path] == paths
+    assert [path for path in flat(FlightConfig()) if word in path] == paths
 
 
 def test_a_barrier_too_quick_for_the_planners_period_is_refused() -> None:

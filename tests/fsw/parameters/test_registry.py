@@ -11,17 +11,12 @@ import pytest
 from fsw.parameters.flight_config import CONTROLLERS, FlightConfig, flight_config
 from fsw.parameters.float32 import as_text, nearest_decimal
 from fsw.parameters.registry import BY_NAME, NO_PARAMETERS, PARAMETERS, Parameter
-from fsw.tuning import leaves, number_at, tuned
+from fsw.tuning import flat, number_at, tuned
 
 
 def numbers(config: FlightConfig) -> list[str]:
     """Paths of every number, one a number, of tuples too."""
-    found = []
-    for path, value in leaves(config):
-        if isinstance(value, bool | str) or value is None:
-            continue
-        found.append(path)
-    return found
+    return [path for path, value in flat(config).items() if not isinstance(value, bool)]
 
 
 def test_every_number_of_the_configuration_is_a_parameter_or_says_why_not() -> None:
@@ -71,11 +66,11 @@ def test_what_is_no_number_is_outside_every_range(parameter: Parameter) -> None:
 def test_both_ends_of_a_range_make_a_configuration_and_move_one_number(
     parameter: Parameter,
 ) -> None:
-    before = dict(leaves(FlightConfig()))
+    before = flat(FlightConfig())
     for value in (parameter.least, parameter.most):
         config = tuned(FlightConfig(), ((parameter.path, value * parameter.scale),))
         assert parameter.read(config) == pytest.approx(value, rel=1e-6)
-        moved = {path for path, number in leaves(config) if number != before[path]}
+        moved = {path for path, number in flat(config).items() if number != before[path]}
         assert moved <= {parameter.path}
 
 
