@@ -15,9 +15,9 @@ import time
 from typing import Final
 
 from benchmarks.stops import Stops, Stretch
+from command_line.process import StopRequest
 from fsw.runtime.clock import now_us
 from fsw.runtime.grid import Grid
-from fsw.runtime.process import StopRequest
 from fsw.runtime.rates import INNER
 from fsw.runtime.realtime import claim_real_time
 

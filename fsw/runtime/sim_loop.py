@@ -11,6 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Final, Generic
 
+from command_line.process import StopRequest
 from fsw.estimation.vibration import VibrationMeter
 from fsw.link.ground_links import GroundLinks
 from fsw.link.inbox import Inbox
@@ -22,7 +23,6 @@ from fsw.runtime.effort import EffortRecord
 from fsw.runtime.guarded_tick import GuardedTick
 from fsw.runtime.missed import MissedReleases
 from fsw.runtime.planner_worker import PlannerRecord
-from fsw.runtime.process import StopRequest
 from fsw.runtime.program import FlightProgram, State
 from fsw.runtime.rate_group import RateGroupRunner
 from fsw.runtime.rates import HOUSEKEEPING, INNER, MPC, RATE_GROUPS, TELEMETRY, Member

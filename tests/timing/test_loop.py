@@ -13,6 +13,7 @@ from typing import Any, cast
 
 import pytest
 
+from command_line.process import StopRequest
 from fsw.flight.autopilot import Autopilot
 from fsw.flight.state import FlightState
 from fsw.link.inbox import Inbox
@@ -23,7 +24,6 @@ from fsw.parameters.flight_config import flight_config
 from fsw.ports import LoopHealth
 from fsw.runtime.effort import EffortRecord
 from fsw.runtime.planner_worker import PlannerRecord
-from fsw.runtime.process import StopRequest
 from fsw.runtime.program import FlightProgram
 from fsw.runtime.rates import HOUSEKEEPING, INNER, MPC, RATE_GROUPS, TELEMETRY, Member
 from fsw.runtime.sim_loop import Ending, FlightRecord, SimLoop
