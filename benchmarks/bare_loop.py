@@ -15,8 +15,8 @@ import time
 from typing import Final
 
 from benchmarks.stops import Stops, Stretch
+from command_line.process import StopRequest
 from fsw.runtime.clock import now_us
-from fsw.runtime.process import StopRequest
 from fsw.runtime.rate_groups import INNER
 from fsw.runtime.realtime import claim_real_time
 from fsw.runtime.release_schedule import ReleaseSchedule

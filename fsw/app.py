@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from command_line.process import Events, JsonEvents, StopRequest, TextEvents
 from fsw.arguments import FswOptions
 from fsw.control.control_metrics import ControlMetrics
 from fsw.link.build_links import build_links
@@ -27,9 +28,8 @@ from fsw.log.run_directory import new_run_directory
 from fsw.log.run_files import RunFiles
 from fsw.ports import LoopHealth, PlanningCycle
 from fsw.runtime import clock, report
-from fsw.runtime.events import Events
 from fsw.runtime.planner_service import InlinePlanner, PlannerRecord, ProcessPlanner
-from fsw.runtime.process import StopRequest, in_a_child, settle_memory
+from fsw.runtime.process import in_a_child, settle_memory
 from fsw.runtime.program import FlightProgram
 from fsw.runtime.realtime import (
     TICK_PRIORITY,
@@ -64,7 +64,7 @@ def run(options: FswOptions, load: ProgramLoader | None = None) -> int:
     Returns:
         The exit code.
     """
-    reporter = Events(options.events)
+    reporter: Events = JsonEvents() if options.events == "json" else TextEvents()
     try:
         return _Session(options, reporter, load or load_flight_software).run()
     except (CouldNotStart, LinkError) as error:

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
-import signal
 import traceback
-from types import FrameType
 
+from command_line.process import Events, JsonEvents, StopRequest, TextEvents
 from sitl.arguments import SitlOptions
-from sitl.events import Events, JsonEvents, TextEvents
 from sitl.link.udp_endpoint import RESEND_S, LinkError, PeerSocket, parse_address
 from sitl.scenario import Scenario
 from sitl.scenario_file import ScenarioError, load_scenario
@@ -18,21 +16,6 @@ NOT_COMPLETED, COULD_NOT_START = 1, 2  # exit codes
 
 class CouldNotStart(Exception):
     """Why there is no run, in one sentence."""
-
-
-class StopRequest:
-    """Becomes true on SIGINT or SIGTERM, so that the run can end between two steps."""
-
-    def __init__(self) -> None:
-        self.requested = False
-
-    def listen(self) -> None:
-        """Take over both signals; until then SIGINT raises KeyboardInterrupt."""
-        signal.signal(signal.SIGINT, self._request)
-        signal.signal(signal.SIGTERM, self._request)
-
-    def _request(self, number: int, frame: FrameType | None) -> None:
-        self.requested = True
 
 
 def run(options: SitlOptions) -> int:

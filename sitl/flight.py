@@ -11,8 +11,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
+from command_line.process import Events
 from sitl.arguments import SitlOptions
-from sitl.events import Events
 from sitl.link.encode import StepEncoder
 from sitl.link.exchange import Exchange, ExchangeCounts, Lockstep, RealTime, Stop
 from sitl.link.pilot import flight_plan

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 from sitl.compiled import compilable
 from sitl.plant.vector import Array
@@ -18,34 +18,6 @@ class TrajectoryPoint(NamedTuple):
     p: V3  # m, NED
     v: V3  # m/s
     a: V3  # m/s²
-
-
-class Reference(Protocol):
-    """An end-effector reference; time counts from the pilot's trajectory start."""
-
-    def at(self, t: float) -> TrajectoryPoint:
-        """The reference at time t [s] after the start; at rest before 0."""
-        ...
-
-    def place(self, t: float) -> V3:
-        """Position of ``at(t)`` alone [m, NED]; t [s]."""
-        ...
-
-
-@dataclass(frozen=True, slots=True)
-class HoldReference:
-    """Stay at one point."""
-
-    hold: Hold
-
-    def at(self, t: float) -> TrajectoryPoint:
-        """See ``Reference``; t [s]."""
-        still = (0.0, 0.0, 0.0)
-        return TrajectoryPoint(self.hold.position_m, still, still)
-
-    def place(self, t: float) -> V3:
-        """See ``Reference``; t [s]."""
-        return self.hold.position_m
 
 
 @compilable
@@ -79,19 +51,22 @@ def lissajous_at(centre: float, amplitude: float, period: float, phase: float, s
 
 
 @dataclass(frozen=True, slots=True)
-class LissajousReference:
-    """p = c + A sin(2π s/T + φ) per axis, with s from ``warped``."""
+class Reference:
+    """p = c + A sin(2π s/T + φ) per axis, with s from ``warped``; to hold a point, A is zero.
+
+    Time counts from the pilot's trajectory start.
+    """
 
     row: tuple[float, ...]  # as ``curve_row``
 
     def at(self, t: float) -> TrajectoryPoint:
-        """See ``Reference``; t [s]."""
+        """The reference at time t [s] after the start; at rest before 0."""
         s, rate, bend = warped(t, self.row[12], self.row[13])
         x, y, z = (self._axis(i, s, rate, bend) for i in range(3))
         return TrajectoryPoint((x[0], y[0], z[0]), (x[1], y[1], z[1]), (x[2], y[2], z[2]))
 
     def place(self, t: float) -> V3:
-        """See ``Reference``; t [s]."""
+        """Position of ``at(t)`` alone [m, NED]; t [s]."""
         return place_on_curve(self.row, t)
 
     def _axis(self, i: int, s: float, rate: float, bend: float) -> V3:
@@ -109,9 +84,7 @@ class LissajousReference:
 
 def reference(trajectory: Trajectory) -> Reference:
     """The reference that a scenario describes."""
-    if isinstance(trajectory, Hold):
-        return HoldReference(trajectory)
-    return LissajousReference(curve_row(trajectory))
+    return Reference(curve_row(trajectory))
 
 
 def curve_row(trajectory: Trajectory) -> tuple[float, ...]:

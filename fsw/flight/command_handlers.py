@@ -57,13 +57,6 @@ class NewHeading:
 
 
 @dataclass(frozen=True, slots=True)
-class NewSpeed:
-    """How fast to fly to places from now on."""
-
-    speed: float | None  # m/s; None: as usual
-
-
-@dataclass(frozen=True, slots=True)
 class Decision:
     """Answer to a command, and what it causes."""
 
@@ -80,7 +73,7 @@ class Decision:
     home: Home | None = None
     mission_step: int | None = None  # to fly next
     look_at: NewHeading | None = None
-    speed: NewSpeed | None = None
+    speed: ChangeSpeed | None = None
 
 
 Modes = Mapping[Mode, FlightMode]
@@ -235,7 +228,7 @@ def _change_speed(action: ChangeSpeed, context: CommandContext, modes: Modes) ->
     if speed is not None and not MIN_SPEED <= speed <= context.max_speed:
         reason = f"{speed:g} m/s is outside {MIN_SPEED:g} to {context.max_speed:g} m/s"
         return Decision(DENIED, f"speed unchanged: {reason}")
-    return Decision(ACCEPTED, speed=NewSpeed(speed))
+    return Decision(ACCEPTED, speed=action)
 
 
 def _move_joints(action: MoveJoints, context: CommandContext, modes: Modes) -> Decision:

@@ -8,7 +8,6 @@ import os
 import signal
 from collections.abc import Callable
 from pathlib import Path
-from types import FrameType
 from typing import Final
 
 _PR_SET_PDEATHSIG: Final = 1
@@ -29,21 +28,6 @@ def pin_numerics_to_one_thread() -> None:
     """
     for name in _THREAD_VARIABLES:
         os.environ[name] = "1"
-
-
-class StopRequest:
-    """Becomes true on SIGINT or SIGTERM, so that the loop can end between two ticks."""
-
-    def __init__(self) -> None:
-        self.requested = False
-
-    def listen(self) -> None:
-        """Take over both signals; until then SIGINT raises KeyboardInterrupt."""
-        signal.signal(signal.SIGINT, self._request)
-        signal.signal(signal.SIGTERM, self._request)
-
-    def _request(self, number: int, frame: FrameType | None) -> None:
-        self.requested = True
 
 
 def settle_memory() -> None:

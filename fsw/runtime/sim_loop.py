@@ -11,6 +11,7 @@ from collections.abc import Callable
 from dataclasses import astuple, dataclass, field, replace
 from typing import Final, Generic
 
+from command_line.process import StopRequest
 from fsw.control.control_metrics import ControlMetrics
 from fsw.estimation.vibration import VibrationMeter
 from fsw.link.ground_links import GroundLinks
@@ -22,7 +23,6 @@ from fsw.ports import Clock, LoopHealth, PlanService
 from fsw.runtime.deadline_monitor import DeadlineMonitor
 from fsw.runtime.link_watchdog import LinkWatchdog
 from fsw.runtime.planner_service import PlannerRecord
-from fsw.runtime.process import StopRequest
 from fsw.runtime.program import FlightProgram, State
 from fsw.runtime.rate_groups import INNER, MPC, RATE_GROUPS, Member, RateGroupRunner
 from fsw.runtime.realtime import rank_threads

@@ -14,15 +14,13 @@ from typing import Final
 
 from sitl.link import message_ids
 from sitl.link.pilot_messages import (
-    AnnounceObstacle,
-    AnnounceWall,
-    AnnounceWorkspace,
+    Announce,
     Heard,
     PilotMessage,
     SendCommand,
     SendTarget,
 )
-from sitl.scenario import Scenario
+from sitl.scenario import Obstacle, Scenario, ScenarioWall
 from sitl.simulation import START_US
 from sitl.trajectory import TrajectoryPoint
 
@@ -114,17 +112,15 @@ def flight_plan(
     yaw_at: Callable[[int], float],
 ) -> FlightPlan:
     """The plan of a scenario; its reference and yaw [rad] are asked for by time stamp [us]."""
-    walls, obstacles = scenario.walls, scenario.obstacles
-    count = len(walls) + len(obstacles)
-    announcements: tuple[PilotMessage, ...] = (
-        *(AnnounceWall(wall, k, count) for k, wall in enumerate(walls)),
-        *(AnnounceObstacle(one, k, count) for k, one in enumerate(obstacles, len(walls))),
-    )
+    kept_from: tuple[ScenarioWall | Obstacle, ...] = (*scenario.walls, *scenario.obstacles)
+    announcements: list[PilotMessage] = [
+        Announce(one, index, len(kept_from)) for index, one in enumerate(kept_from)
+    ]
     if scenario.workspace is not None:
-        announcements += (AnnounceWorkspace(scenario.workspace),)
+        announcements.append(scenario.workspace)
     kind = scenario.pilot.plan
     return FlightPlan(
-        announcements=announcements,
+        announcements=tuple(announcements),
         target_at=target_at if kind == "trajectory" else None,
         yaw_at=yaw_at,
         hop=kind == "hop",

@@ -19,9 +19,7 @@ from sitl.link.pilot import (
 )
 from sitl.link.pilot_messages import (
     Ack,
-    AnnounceObstacle,
-    AnnounceWall,
-    AnnounceWorkspace,
+    Announce,
     Heard,
     PilotMessage,
     SendCommand,
@@ -90,8 +88,8 @@ def test_the_safe_set_is_announced_first() -> None:
     flight = Flight(plan(walls=WALLS, workspace=Workspace(0.1, 0.2)), {ARM: 0, MODE: 0})
     flight.fly(0.01)
     first = [message for _, message in flight.said[:4]]
-    assert [m.index for m in first if isinstance(m, AnnounceWall)] == [0, 1, 2]
-    assert isinstance(first[3], AnnounceWorkspace)
+    assert [m.index for m in first if isinstance(m, Announce)] == [0, 1, 2]
+    assert isinstance(first[3], Workspace)
     assert flight.said[3][0] == START_US
 
 
@@ -100,10 +98,10 @@ def test_walls_and_points_are_announced_as_one_set() -> None:
     flight = Flight(plan(walls=WALLS, obstacles=(branch,)), {ARM: 0, MODE: 0})
     flight.fly(0.01)
     first = [message for _, message in flight.said[:4]]
-    assert [(m.index, m.count) for m in first if isinstance(m, AnnounceWall)] == [
-        (0, 4), (1, 4), (2, 4),
+    assert [(m.index, m.count) for m in first if isinstance(m, Announce)] == [
+        (0, 4), (1, 4), (2, 4), (3, 4),
     ]  # fmt: skip
-    assert first[3] == AnnounceObstacle(branch, 3, 4)
+    assert first[3] == Announce(branch, 3, 4)
 
 
 def test_targets_arrive_a_second_and_a_half_ahead_without_gaps() -> None:
@@ -182,7 +180,7 @@ def test_a_hop_takes_off_hovers_lands_and_is_done_when_disarmed() -> None:
 def test_plan_none_leaves_the_flying_to_others() -> None:
     flight = Flight(plan("none", walls=WALLS), {})
     flight.fly(2.0)
-    assert all(isinstance(message, AnnounceWall) for _, message in flight.said)
+    assert all(isinstance(message, Announce) for _, message in flight.said)
 
 
 def test_walls_are_announced_again_every_second_for_a_datagram_may_be_lost() -> None:

@@ -13,6 +13,7 @@ from typing import Any, cast
 
 import pytest
 
+from command_line.process import StopRequest
 from fsw.control.control_metrics import ControlMetrics
 from fsw.flight.autopilot import Autopilot
 from fsw.flight.state import FlightState
@@ -24,7 +25,6 @@ from fsw.log.reader import LoggedTick, open_flight, ticks
 from fsw.parameters.flight_config import flight_config
 from fsw.ports import LoopHealth
 from fsw.runtime.planner_service import PlannerRecord
-from fsw.runtime.process import StopRequest
 from fsw.runtime.program import FlightProgram
 from fsw.runtime.rate_groups import HOUSEKEEPING, INNER, MPC, RATE_GROUPS, TELEMETRY, Member
 from fsw.runtime.sim_loop import Ending, FlightRecord, SimLoop

@@ -80,7 +80,7 @@ class Offboard(FlightMode):
         if reference is None or reference.of_end_effector != motion.of_end_effector:
             reference = self.generator.begin(estimate, of_end_effector=motion.of_end_effector)
         joints = goal.joints if goal is not None else None
-        if memory.joints is not None and self._is_young(memory.joints_us, estimate.t_us):
+        if memory.joints is not None and _is_young(self.config, memory.joints_us, estimate.t_us):
             joints = memory.joints.q_arm
         if joints is not None and reference.q_arm is None:
             reference = replace(reference, q_arm=estimate.q_arm)
@@ -95,7 +95,7 @@ class Offboard(FlightMode):
     def _motion(self, state: FlightState, estimate: StateEstimate) -> tuple[MotionSetpoint, Tilt]:
         memory, config = state.offboard, self.config
         ahead = Tilt(yaw=estimate.yaw)
-        if not self._is_young(memory.motion_us, estimate.t_us):
+        if not _is_young(config, memory.motion_us, estimate.t_us):
             # Joints alone: the body stays.
             return MotionSetpoint(False, v=(0.0, 0.0, 0.0)), ahead
         if memory.attitude is not None:
@@ -106,9 +106,6 @@ class Offboard(FlightMode):
             return as_motion(tilt, thrust / state.cascade.mass), tilt
         assert memory.motion is not None, "one of the two is young"
         return _moved_on(memory.motion, estimate.t_us - memory.motion_us), ahead
-
-    def _is_young(self, heard_us: int, now_us: int) -> bool:
-        return _is_young(self.config, heard_us, now_us)
 
 
 def receive(memory: OffboardMemory, inputs: TickInputs, config: FlightConfig) -> OffboardMemory:

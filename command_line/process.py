@@ -1,14 +1,16 @@
-"""Progress on standard output: sentences for people, JSON lines for the program that asked."""
+"""How a process of ours reports its life, and how it is asked to end."""
 
 from __future__ import annotations
 
 import json
+import signal
 import sys
+from types import FrameType
 from typing import Protocol
 
 
 class Events(Protocol):
-    """Where the life of the process is reported."""
+    """Progress on standard output."""
 
     def report(self, event: str, sentence: str, **details: object) -> None:
         """Report an event by its name, and to people by a sentence, empty if they need not know.
@@ -21,7 +23,7 @@ class Events(Protocol):
 class TextEvents:
     """Sentences; all on standard error when standard output carries the result."""
 
-    def __init__(self, to_stderr: bool) -> None:
+    def __init__(self, to_stderr: bool = False) -> None:
         self._out = sys.stderr if to_stderr else sys.stdout
 
     def report(self, event: str, sentence: str, **details: object) -> None:
@@ -32,8 +34,23 @@ class TextEvents:
 
 
 class JsonEvents:
-    """One JSON object a line."""
+    """One JSON object a line, for the program that asked."""
 
     def report(self, event: str, sentence: str, **details: object) -> None:
         """See :class:`Events`."""
         print(json.dumps({"event": event, "message": sentence, **details}), flush=True)
+
+
+class StopRequest:
+    """Becomes true on SIGINT or SIGTERM, so that a loop can end between two steps."""
+
+    def __init__(self) -> None:
+        self.requested = False
+
+    def listen(self) -> None:
+        """Take over both signals; until then SIGINT raises KeyboardInterrupt."""
+        signal.signal(signal.SIGINT, self._request)
+        signal.signal(signal.SIGTERM, self._request)
+
+    def _request(self, number: int, frame: FrameType | None) -> None:
+        self.requested = True
