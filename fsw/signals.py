@@ -620,7 +620,7 @@ class BatteryState:
 
 @dataclass(frozen=True, slots=True)
 class OffboardReport:
-    """The set-point in use while offboard, and how many were of no use since start."""
+    """The setpoint in use while offboard, and how many were of no use since start."""
 
     kind: SetpointKind = SetpointKind.NONE  # NONE unless flying offboard
     motion: MotionSetpoint | None = None
@@ -669,7 +669,7 @@ class TickInputs:
     commands: tuple[Command, ...] = ()
     targets: tuple[EndEffectorTarget, ...] = ()
     safe_set: SafeSet | None = None  # newly announced
-    # The newest set-points for now; at most one of motion and attitude.
+    # The newest setpoints for now; at most one of motion and attitude.
     motion: MotionSetpoint | None = None
     attitude: AttitudeSetpoint | None = None
     joints: JointSetpoint | None = None

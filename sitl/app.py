@@ -72,7 +72,7 @@ def _run(options: SitlOptions, events: Events) -> int:
         stop.listen()
         events.report("ready", "sitl: ready, waiting for the flight software")
         if flight.wait_for_vehicle(stop):
-            return flight.fly(stop)
+            return flight.run(stop)
         if not stop.requested:
             raise CouldNotStart(
                 f"no flight software spoke to udp:{host}:{port} within {options.wait_s:g} s"

@@ -97,7 +97,7 @@ class ClosedLoop(Generic[State]):
         clock = simulation.clock
         return tuple(target(clock, start_us + TARGET_US * k) for k in range(first, newest + 1))
 
-    def fly(self, inputs: TickInputs) -> TickOutputs:
+    def step(self, inputs: TickInputs) -> TickOutputs:
         """Tick, plan, advance."""
         self.state, outputs = self._tick(self.state, inputs)
         if outputs.plan_request is not None:
@@ -138,7 +138,7 @@ class InlinePlanner:
         """Nothing to stop."""
 
 
-def fly(
+def simulate(
     scenario: Scenario,
     seed: int,
     config: FlightConfig,
@@ -177,7 +177,7 @@ def fly(
         )
         if traced and step % TRACE_STEPS == 0:
             recorder.trace.append(_trace_point(simulation))
-        outputs = loop.fly(inputs)
+        outputs = loop.step(inputs)
         _insist(outputs)
         applied = outputs.snapshot.plan_input
         if step % steps_per_plan == 0 and applied is not None:

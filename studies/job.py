@@ -76,7 +76,7 @@ class Outcome:
 
 def fly_job(job: Job, *, traced: bool = False) -> FlightResult:
     """Fly one job here and now."""
-    plants = {"full": closed_loop.fly, "double-integrator": double_integrator.fly}
+    plants = {"full": closed_loop.simulate, "double-integrator": double_integrator.simulate}
     return plants[job.plant](job.scenario, job.seed, job.config, traced=traced)
 
 

@@ -15,7 +15,7 @@ from fsw.estimation.estimator import estimate_state
 from fsw.flight.commander import Commander, acknowledgement
 from fsw.flight.failsafe import FAULTS
 from fsw.flight.modes.mission import with_update
-from fsw.flight.modes.offboard import receive, report
+from fsw.flight.modes.offboard import accept_setpoints, report
 from fsw.flight.plan_exchange import PlanExchange, measured_state, nominal_at_rest, requested
 from fsw.flight.reference_horizon import ReferenceHorizon
 from fsw.flight.safe_set import SafeSetCheck
@@ -153,7 +153,7 @@ class Autopilot:
         now_us = inputs.sensors.t_us
         if inputs.targets or inputs.safe_set is not None or inputs.mission is not None:
             stream = merge(state.mission.stream, inputs.targets, now_us)
-            mission = self._safe_sets.receive(
+            mission = self._safe_sets.update(
                 replace(state.mission, stream=stream),
                 inputs.mission,
                 inputs.safe_set,
@@ -167,7 +167,7 @@ class Autopilot:
             state = replace(state, vehicle=replace(state.vehicle, gcs_heard_us=now_us))
         heard = (inputs.motion, inputs.attitude, inputs.joints) != (None, None, None)
         if heard or inputs.refused_setpoints:
-            state = replace(state, offboard=receive(state.offboard, inputs, self.config))
+            state = replace(state, offboard=accept_setpoints(state.offboard, inputs, self.config))
         return state
 
     def _elapsed_ticks(self, state: FlightState, now_us: int) -> int:

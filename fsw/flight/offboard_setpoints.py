@@ -63,7 +63,7 @@ def joints_refusal(q_arm: Vec2, airframe: Airframe) -> str | None:
 
 
 def tilted(setpoint: AttitudeSetpoint, last: Tilt, most: float, dt: float) -> Tilt:
-    """The attitude a set-point asks for, within the tilt that is flown.
+    """The attitude a setpoint asks for, within the tilt that is flown.
 
     Args:
         setpoint: Attitude, or rates that go on from the last one.

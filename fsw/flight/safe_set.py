@@ -32,7 +32,7 @@ class SafeSetCheck:
         """What speaks for and against keeping a safe set with this configuration."""
         return analyse(self._config, safe_set, self._loop_tube)
 
-    def receive(
+    def update(
         self,
         mission: MissionMemory,
         update: MissionUpdate | None,

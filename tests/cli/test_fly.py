@@ -25,7 +25,7 @@ from fsw.link.telemetry.streams import STREAMS
 from fsw.link.wire.message_ids import ORBIT_EXECUTION_STATUS
 from messages.frames import Frame, FrameWriter, split
 from tests.cli.command import clean_up, group_is_empty, pandion, read_until, start
-from tests.processes.halves import free_port
+from tests.processes.both_processes import free_port
 
 
 def documented() -> dict[str, list[str]]:
@@ -39,7 +39,7 @@ def documented() -> dict[str, list[str]]:
     }
 
 
-QUESTION = (0.0, *(math.nan,) * 6, 31010, 1, 1, 0)  # MAV_CMD_USER_1, which nobody supports
+QUESTION = (0.0, *(math.nan,) * 6, 31010, 1, 1, 0)  # MAV_CMD_USER_1, which is not supported
 
 
 class Listener:

@@ -12,10 +12,10 @@ from pathlib import Path
 import pytest
 
 from tests.cli.command import clean_up, group_is_empty, read_until, start
-from tests.processes.halves import free_port
+from tests.processes.both_processes import free_port
 from tests.waiting import LostTime
 
-PROMISED_S = 2.0  # from the stall to the end of `pandion fly`, verdict included
+PROMISED_S = 2.0  # from the stall to the end of `pandion fly`, result included
 TRIES = 3  # a tenth of a second before the end is hard to hit
 
 
@@ -66,7 +66,7 @@ NOT_SENT = r"FAIL fsw: the simulator sent nothing for .* after step \d{3,}; sitl
         (("--speed", "1"), "fsw", signal.SIGSTOP, NOT_ANSWERED),
         (("--speed", "1"), "sitl", signal.SIGSTOP, NOT_SENT),
         (("--speed", "1"), "fsw", signal.SIGKILL, r"FAIL fsw ended with code -9.*step \d{3,}"),
-        # In the air nobody waits for a stall to be sure: the vehicle falls before that.
+        # In the air the simulator ends at once: a wait would let the vehicle fall.
         (("--realtime",), "fsw", signal.SIGSTOP, r"FAIL .* silent since step \d{3,}"),
         (("--realtime",), "fsw", signal.SIGKILL, r"FAIL fsw .* -9.* silent since step \d{3,}"),
         (("--realtime",), "sitl", signal.SIGSTOP, NOT_SENT),

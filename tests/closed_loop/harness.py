@@ -145,15 +145,15 @@ class Flight:
         self.upload = None
         if self.streamed and self.sim.step % STREAM_STEPS == 0:
             self.inputs = replace(self.inputs, **self.streamed)
-        return self.fly(self.inputs)
+        return self.step_with(self.inputs)
 
     def targets(self) -> tuple[EndEffectorTarget, ...]:
         return self.closed.targets() if self.scenario.pilot.plan == "trajectory" else ()
 
-    def fly(self, inputs: TickInputs) -> TickOutputs:
+    def step_with(self, inputs: TickInputs) -> TickOutputs:
         """Tick, plan, advance, with inputs from somewhere else."""
         before = self.mode
-        outputs = self._outputs = self.closed.fly(inputs)
+        outputs = self._outputs = self.closed.step(inputs)
         self.texts += [text.text for text in outputs.texts]
         self.results += [(ack.command, ack.result) for ack in outputs.acks]
         if self.mode is not before:

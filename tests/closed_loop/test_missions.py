@@ -57,7 +57,7 @@ def niche() -> MissionUpdate:
 
 
 def among_walls(seed: int) -> Flight:
-    """Case I, disturbed; the vehicle hears of the walls from nobody but the fence."""
+    """Case I, disturbed; the fence is the vehicle's only source of the walls."""
     scenario = replace(load_scenario("walls"), pilot=Pilot("none"))
     flight = Flight(scenario, seed=seed, announces=False)
     flight.upload = niche()

@@ -1,4 +1,4 @@
-"""Set-points for now: what lets them in, what ends them, and that they cannot fly into a wall.
+"""Setpoints for now: what lets them in, what ends them, and that they cannot fly into a wall.
 
 The walls are those of Case I, the margin is the plant's own, between samples.
 """

@@ -187,8 +187,8 @@ def test_a_refused_parameter_comes_back_at_once_with_the_reason(
     vehicle: Connected, version: int
 ) -> None:
     speaks(vehicle, version)
-    for name, wish, held in ((b"COM_RC_IN_MODE", 4.0, 1.0), (b"STR_CRUISE", 9.0, 1.0)):
-        vehicle.send(d.MAVLink_param_set_message(1, 1, name, wish, 9))
+    for name, sent, held in ((b"COM_RC_IN_MODE", 4.0, 1.0), (b"STR_CRUISE", 9.0, 1.0)):
+        vehicle.send(d.MAVLink_param_set_message(1, 1, name, sent, 9))
         value = vehicle.run(1.0, lambda m: m.get_type() == "PARAM_VALUE")
         assert (value.param_id, value.param_value) == (name.decode(), held)
     vehicle.send(d.MAVLink_param_set_message(1, 1, b"STR_CRUISE", 0.75, 9))

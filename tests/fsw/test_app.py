@@ -32,7 +32,7 @@ class NoPlanner:
     """Never asked."""
 
     def plan(self, request: PlanRequest) -> Plan | PlanFailure:
-        raise AssertionError("nobody asks")
+        raise AssertionError("not expected to be called")
 
 
 def standing(state: int, inputs: TickInputs) -> tuple[int, TickOutputs]:
@@ -75,8 +75,8 @@ def test_a_simulator_that_never_answers_ends_the_wait(
 def test_nobody_at_the_simulators_port_is_the_same(
     options: FswOptions, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    nobody = replace(options, sim="udp:127.0.0.1:9")
-    assert app.run(nobody, load) == app.COULD_NOT_START
+    silent = replace(options, sim="udp:127.0.0.1:9")
+    assert app.run(silent, load) == app.COULD_NOT_START
     assert "no simulator answered at udp:127.0.0.1:9" in capsys.readouterr().err
 
 

@@ -24,7 +24,7 @@ from pandion import param
 from pandion.param_vehicle import NoAnswer, ParameterClient
 from tests.cli.command import clean_up, start
 from tests.parameters_on_the_wire import LISTED
-from tests.processes.halves import free_port
+from tests.processes.both_processes import free_port
 
 DEFAULTS = LISTED
 
@@ -171,7 +171,7 @@ def test_a_value_changed_on_one_link_is_told_to_every_client(mavlink: Any, groun
 
 def test_a_vehicle_that_is_not_there_is_one_sentence() -> None:
     with (
-        ParameterClient(("127.0.0.1", free_port()), patience_s=0.05) as nobody,
+        ParameterClient(("127.0.0.1", free_port()), patience_s=0.05) as client,
         pytest.raises(NoAnswer, match=r"nothing came from the vehicle at udp:127\.0\.0\.1:"),
     ):
-        nobody.read_all()
+        client.read_all()

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tests.cli.command import PANDION, environment
-from tests.processes.halves import free_port
+from tests.processes.both_processes import free_port
 
 # The client's clock is the wall's, the vehicle's is the simulator's and four times as fast. A busy
 # machine makes it slow, where real time would make it late.

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from messages import dialect
-from tests.processes.halves import Half
+from tests.processes.both_processes import SystemProcess
 
 STATUSTEXT = 253
 
@@ -52,7 +52,7 @@ def planner_of(fsw: int, instead_of: int | None = None) -> tuple[int, int]:
     raise AssertionError("no planner")
 
 
-def fly_until(t_s: float, sitl: Half) -> None:
+def fly_until(t_s: float, sitl: SystemProcess) -> None:
     """Wait for simulated time."""
     while sitl.wait_for("progress")["t_s"] < t_s:
         pass
@@ -64,11 +64,13 @@ def test_killing_the_planner_costs_no_barrier(tmp_path: Path) -> None:
         ground.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 22)
         ground.bind(("127.0.0.1", 0))
         flight = ("walls", "--realtime", "--seed", "2", "--duration", "6")
-        with Half("sitl", *flight, "--listen", "udp:127.0.0.1:0") as sitl:
+        with SystemProcess("sitl", *flight, "--listen", "udp:127.0.0.1:0") as sitl:
             port = sitl.wait_for("listening")["port"]
             addresses = ("--sim", f"udp:127.0.0.1:{port}")
             telemetry = ("--gcs", f"udp:127.0.0.1:{ground.getsockname()[1]}")
-            with Half("fsw", *addresses, *telemetry, "--out", str(tmp_path), "--wait", "90") as fsw:
+            with SystemProcess(
+                "fsw", *addresses, *telemetry, "--out", str(tmp_path), "--wait", "90"
+            ) as fsw:
                 sitl.wait_for("flying", patience_s=120.0)
                 fly_until(2.0, sitl)
                 server, first = planner_of(fsw.process.pid)

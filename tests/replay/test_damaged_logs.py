@@ -52,10 +52,10 @@ class Attempt:
     def __call__(self, content: bytes | bytearray) -> int:
         self.log.write_bytes(content)
         code = self._command(self.log)
-        said = self._capsys.readouterr()
-        assert "Traceback" not in said.err + said.out
+        output = self._capsys.readouterr()
+        assert "Traceback" not in output.err + output.out
         assert code in (0, 1, 2)
-        assert said.err == "" if code < 2 else one_sentence(said.err)
+        assert output.err == "" if code < 2 else one_sentence(output.err)
         return code
 
 
@@ -141,7 +141,7 @@ def test_what_is_wrong_is_named(
     assert one_sentence(sentence)
 
 
-def test_a_type_nobody_knows_is_refused_where_it_is_used(
+def test_an_unknown_type_is_refused_where_it_is_used(
     whole: bytes, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     log = tmp_path / "flight.ulg"

@@ -12,7 +12,7 @@ from fsw.parameters.flight_config import flight_config
 from fsw.signals import PlanInput
 from studies import closed_loop
 from studies.cases import configuration, scenario
-from studies.job import Job, fly, outcome
+from studies.job import Job, fly_job, outcome
 
 BRIEF = 2.0  # s
 
@@ -31,7 +31,7 @@ def test_effort_and_smoothness_are_the_papers_sums_in_its_order() -> None:
 def test_the_full_plant_flies_and_flies_the_same_again(case: str) -> None:
     flown = scenario("I" if case == "I" else "II", disturbed=True, duration_s=BRIEF)
     first, again = (
-        closed_loop.fly(flown, 5, flight_config(), traced=traced) for traced in (True, False)
+        closed_loop.simulate(flown, 5, flight_config(), traced=traced) for traced in (True, False)
     )
     assert first.truth.completed
     assert first.truth == again.truth
@@ -52,7 +52,7 @@ def test_calm_air_is_one_flight_whatever_the_seed(plant: str) -> None:
     jobs = [Job(name, flown, configuration(name), seed) for seed in (100, 101)]
     assert not jobs[0].random
     assert jobs[0].key() == jobs[1].key()
-    truths = [fly(job).truth for job in jobs]
+    truths = [fly_job(job).truth for job in jobs]
     assert truths[0] == truths[1]
 
 

@@ -1,4 +1,4 @@
-"""A clock that only moves when somebody sleeps, and a simulator that lives on it."""
+"""a clock that only a sleep moves, and a simulator that lives on it."""
 
 from __future__ import annotations
 

@@ -111,7 +111,9 @@ class Offboard(FlightMode):
         return _is_young(self.config, heard_us, now_us)
 
 
-def receive(memory: OffboardMemory, inputs: TickInputs, config: FlightConfig) -> OffboardMemory:
+def accept_setpoints(
+    memory: OffboardMemory, inputs: TickInputs, config: FlightConfig
+) -> OffboardMemory:
     """Take in setpoints; what is out of range is counted and not kept."""
     refused, accepted, now_us = inputs.refused_setpoints, 0, inputs.sensors.t_us
     motion, attitude, joints = inputs.motion, inputs.attitude, inputs.joints

@@ -28,12 +28,12 @@ from fsw.link.services.mission_wire import (
 )
 from fsw.link.wire import message_ids as ids
 from fsw.link.wire.decode import Numbers, for_this_vehicle
-from fsw.link.wire.mission_items import DENIED, UNSUPPORTED, MissionItem, Refused
+from fsw.link.wire.mission_items import DENIED, UNSUPPORTED, BadItem, MissionItem
 from fsw.link.wire.outgoing import Outgoing, ServiceOutput
 from fsw.signals import Severity, StatusText
 from messages.frames import Frame
 
-_ReadItem = Callable[[Numbers], MissionItem | Refused]
+_ReadItem = Callable[[Numbers], MissionItem | BadItem]
 
 # MAV_MISSION_RESULT
 ACCEPTED: Final = 0
@@ -155,7 +155,7 @@ class MissionService:
         self._upload = self._download = self._done = None
         if count > ROOM[kind]:
             reason = f"{count} items of {kind.name.lower()}; there is room for {ROOM[kind]}"
-            return self._refuse(Refused(NO_SPACE, reason), kind, peer)
+            return self._refuse(BadItem(NO_SPACE, reason), kind, peer)
         self._upload = _Upload(peer, kind, count)
         if count == 0:
             return self._finish(self._upload)
@@ -172,14 +172,14 @@ class MissionService:
             return self._stray(seq, number, peer)
         if seq >= upload.count:
             reason = f"item {seq} in an upload of {upload.count}"
-            return self._refuse(Refused(INVALID_SEQUENCE, reason), upload.kind, peer)
+            return self._refuse(BadItem(INVALID_SEQUENCE, reason), upload.kind, peer)
         if seq != len(upload.items):
             return ()
-        meaning = item if isinstance(item, Refused) else self._store.read(upload.kind, item)
-        if isinstance(item, Refused) or isinstance(meaning, Refused):
-            wrong = item if isinstance(item, Refused) else meaning
-            assert isinstance(wrong, Refused)
-            named = Refused(wrong.result, f"item {seq}: {wrong.reason}")
+        meaning = item if isinstance(item, BadItem) else self._store.read(upload.kind, item)
+        if isinstance(item, BadItem) or isinstance(meaning, BadItem):
+            wrong = item if isinstance(item, BadItem) else meaning
+            assert isinstance(wrong, BadItem)
+            named = BadItem(wrong.result, f"item {seq}: {wrong.reason}")
             return self._refuse(named, upload.kind, peer)
         upload.items.append(item)
         upload.meanings.append(meaning)
@@ -270,7 +270,7 @@ class MissionService:
         if self._store.set_current(seq):
             self._show_again = True
             return ()
-        refused = Refused(INVALID_SEQUENCE, f"there is no mission item {seq}")
+        refused = BadItem(INVALID_SEQUENCE, f"there is no mission item {seq}")
         return (
             encode_ack(refused.result, Kind.MISSION, peer),
             StatusText(Severity.WARNING, refused.reason),
@@ -292,7 +292,7 @@ class MissionService:
             return (encode_ack(DENIED, number, peer),)
         return None
 
-    def _refuse(self, refused: Refused, kind: Kind, peer: Peer) -> Sequence[ServiceOutput]:
+    def _refuse(self, refused: BadItem, kind: Kind, peer: Peer) -> Sequence[ServiceOutput]:
         self._upload = None
         text = f"{kind.name.lower()} refused: {refused.reason}"
         return (encode_ack(refused.result, kind, peer), StatusText(Severity.WARNING, text))

@@ -17,9 +17,9 @@ from fsw.barriers.tangent import planes
 from fsw.link.wire.fence_items import read_fence, read_fence_item
 from fsw.link.wire.mission_items import (
     DENIED,
+    BadItem,
     Locate,
     MissionItem,
-    Refused,
     read_rally,
     read_step,
 )
@@ -34,7 +34,7 @@ from fsw.signals import (
     Vec2,
 )
 
-Judge = Callable[[SafeSet], tuple[str, ...]]
+SafeSetCheck = Callable[[SafeSet], tuple[str, ...]]
 """Why the vehicle could not keep a safe set; nothing where it can."""
 
 Meaning = MissionStep | Vec2 | None
@@ -73,7 +73,7 @@ class Site:
     """Where missions are flown."""
 
     locate: Locate
-    judge: Judge
+    judge: SafeSetCheck
     clearance: Callable[[], float]  # m, from the walls of a fence uploaded now
 
 
@@ -99,7 +99,7 @@ class MissionStore:
         """What a download returns."""
         return self._items[kind]
 
-    def read(self, kind: Kind, item: MissionItem) -> Meaning | Refused:
+    def read(self, kind: Kind, item: MissionItem) -> Meaning | BadItem:
         """What an item means, or what is wrong with it by itself."""
         if kind is Kind.MISSION:
             return read_step(item, self._site.locate)
@@ -109,7 +109,7 @@ class MissionStore:
 
     def keep(
         self, kind: Kind, items: tuple[MissionItem, ...], meanings: tuple[Meaning, ...]
-    ) -> Refused | None:
+    ) -> BadItem | None:
         """Put a whole upload in the place of the old one, or say why not."""
         if kind is Kind.MISSION:
             steps = tuple(step for step in meanings if isinstance(step, MissionStep))
@@ -119,7 +119,7 @@ class MissionStore:
             self._change(MissionUpdate(rally=places))
         else:
             fence = self._fence(items)
-            if isinstance(fence, Refused):
+            if isinstance(fence, BadItem):
                 return fence
             self._change(MissionUpdate(fence=fence))
         self._items[kind] = items
@@ -142,13 +142,13 @@ class MissionStore:
         taken, self._update = self._update, None
         return taken
 
-    def _fence(self, items: tuple[MissionItem, ...]) -> SafeSet | Refused:
+    def _fence(self, items: tuple[MissionItem, ...]) -> SafeSet | BadItem:
         fence = read_fence(items, self._site.locate, self._site.clearance())
-        if isinstance(fence, Refused):
+        if isinstance(fence, BadItem):
             return fence
         against = self._site.judge(fence)
         if against:
-            return Refused(DENIED, f"the fence cannot be kept: {'; '.join(against)}")
+            return BadItem(DENIED, f"the fence cannot be kept: {'; '.join(against)}")
         if self._snapshot is not None:
             x, y, z = p = self._snapshot.estimate.p_WB
             for number, wall in enumerate(planes(fence, p)):
@@ -156,7 +156,7 @@ class MissionStore:
                 inside = n[0] * x + n[1] * y + n[2] * z - wall.offset - wall.clearance
                 if not inside > 0.0:
                     where = "not inside the fence" if number < len(fence.walls) else "excluded"
-                    return Refused(
+                    return BadItem(
                         DENIED,
                         f"the vehicle is {where}: {-inside:.2f} m beyond the clearance of "
                         f"wall or cylinder {number}",

@@ -27,9 +27,9 @@ from fsw.link.wire.mission_items import (
     INVALID_PARAM1,
     LOCAL_OFFSET_NED,
     UNSUPPORTED,
+    BadItem,
     Locate,
     MissionItem,
-    Refused,
     horizontal_place,
 )
 from fsw.signals import PointObstacle, SafeSet, Vec2, Wall, WorkspaceSphere
@@ -53,7 +53,7 @@ _Shape = list[Wall] | list[PointObstacle] | WorkspaceSphere
 
 def read_fence(
     items: tuple[MissionItem, ...], locate: Locate, clearance: float
-) -> SafeSet | Refused:
+) -> SafeSet | BadItem:
     """The safe set of a whole fence.
 
     Args:
@@ -69,46 +69,46 @@ def read_fence(
         item = items[at]
         size = _vertex_count(item)
         if size > len(items) - at:
-            return Refused(INVALID, f"a polygon of {size} vertices has {len(items) - at}")
+            return BadItem(INVALID, f"a polygon of {size} vertices has {len(items) - at}")
         at += size
         if item.command == RETURN_POINT:
             continue
         shape = _shape(items[at - size : at], locate, clearance)
-        if isinstance(shape, Refused):
+        if isinstance(shape, BadItem):
             return shape
         if isinstance(shape, WorkspaceSphere):
             if sphere is not None:
-                return Refused(INVALID, "there can be one workspace sphere")
+                return BadItem(INVALID, "there can be one workspace sphere")
             sphere = shape
         else:
             walls += [one for one in shape if isinstance(one, Wall)]
             cylinders += [one for one in shape if isinstance(one, PointObstacle)]
     if (walls or cylinders) and sphere is not None:
-        return Refused(INVALID, "a fence and a workspace sphere cannot be kept at once")
+        return BadItem(INVALID, "a fence and a workspace sphere cannot be kept at once")
     for count, most, what in (
         (len(walls), MOST_WALLS, "walls"),
         (len(cylinders), MOST_CYLINDERS, "cylinders of exclusion"),
     ):
         if count > most:
-            return Refused(INVALID, f"a fence of {count} {what}; {most} can be kept")
+            return BadItem(INVALID, f"a fence of {count} {what}; {most} can be kept")
     return SafeSet(tuple(walls), sphere, tuple(cylinders))
 
 
-def read_fence_item(item: MissionItem, locate: Locate) -> Refused | None:
+def read_fence_item(item: MissionItem, locate: Locate) -> BadItem | None:
     """What is wrong with one item by itself."""
     if item.command == CIRCLE_INCLUSION and item.frame == LOCAL_OFFSET_NED:
         sphere = _sphere(item)
-        return sphere if isinstance(sphere, Refused) else None
+        return sphere if isinstance(sphere, BadItem) else None
     if item.command not in (*_POLYGONS, *_CIRCLES, RETURN_POINT):
-        return Refused(UNSUPPORTED, f"command {item.command} is no fence of this vehicle")
+        return BadItem(UNSUPPORTED, f"command {item.command} is no fence of this vehicle")
     place = horizontal_place(item, locate)
-    if isinstance(place, Refused):
+    if isinstance(place, BadItem):
         return place
     number = item.params[0]
     if item.command in _CIRCLES and not 0.0 < number < math.inf:
-        return Refused(INVALID_PARAM1, f"a circle of radius {number:g} m")
+        return BadItem(INVALID_PARAM1, f"a circle of radius {number:g} m")
     if item.command in _POLYGONS and not 3.0 <= number <= MOST_WALLS:
-        return Refused(INVALID_PARAM1, f"a polygon of {number:g} vertices; 3 to {MOST_WALLS} do")
+        return BadItem(INVALID_PARAM1, f"a polygon of {number:g} vertices; 3 to {MOST_WALLS} do")
     return None
 
 
@@ -117,21 +117,21 @@ def _vertex_count(item: MissionItem) -> int:
     return int(count) if item.command in _POLYGONS and count >= 1.0 else 1
 
 
-def _shape(items: tuple[MissionItem, ...], locate: Locate, clearance: float) -> _Shape | Refused:
+def _shape(items: tuple[MissionItem, ...], locate: Locate, clearance: float) -> _Shape | BadItem:
     """One polygon, circle or sphere."""
     for item in items:
         wrong = read_fence_item(item, locate)
         if wrong is not None:
             return wrong
         if (item.command, item.params[0]) != (items[0].command, items[0].params[0]):
-            return Refused(INVALID, "the vertices of a polygon do not agree on their number")
+            return BadItem(INVALID, "the vertices of a polygon do not agree on their number")
     first = items[0]
     if first.command == CIRCLE_INCLUSION and first.frame == LOCAL_OFFSET_NED:
         return _sphere(first)
     places: list[Vec2] = []
     for item in items:
         place = horizontal_place(item, locate)
-        if isinstance(place, Refused):
+        if isinstance(place, BadItem):
             return place
         places.append(place)
     if first.command == CIRCLE_INCLUSION:
@@ -143,7 +143,7 @@ def _shape(items: tuple[MissionItem, ...], locate: Locate, clearance: float) -> 
     return walls_of(places, clearance)
 
 
-def walls_of(corners: list[Vec2], clearance: float) -> list[Wall] | Refused:
+def walls_of(corners: list[Vec2], clearance: float) -> list[Wall] | BadItem:
     """Upright walls along the edges of a convex polygon, normals inward.
 
     Args:
@@ -152,10 +152,10 @@ def walls_of(corners: list[Vec2], clearance: float) -> list[Wall] | Refused:
     """
     edges = list(zip(corners, corners[1:] + corners[:1], strict=True))
     if any(math.dist(a, b) < _SHORTEST_EDGE for a, b in edges):
-        return Refused(INVALID, f"a polygon with an edge shorter than {_SHORTEST_EDGE:g} m")
+        return BadItem(INVALID, f"a polygon with an edge shorter than {_SHORTEST_EDGE:g} m")
     area = 0.5 * sum(a[0] * b[1] - b[0] * a[1] for a, b in edges)
     if not abs(area) > _SHORTEST_EDGE**2:
-        return Refused(INVALID, "a polygon without an inside")
+        return BadItem(INVALID, "a polygon without an inside")
     sense = 1.0 if area > 0.0 else -1.0  # 1: clockwise as seen from above
     walls = []
     for a, b in edges:
@@ -164,7 +164,7 @@ def walls_of(corners: list[Vec2], clearance: float) -> list[Wall] | Refused:
         normal = (-sense * (b[1] - a[1]) / length, sense * (b[0] - a[0]) / length, 0.0)
         offset = normal[0] * a[0] + normal[1] * a[1]
         if any(normal[0] * c[0] + normal[1] * c[1] < offset - 1e-3 for c in corners):
-            return Refused(INVALID, "the polygon is not convex: its inside is no safe set here")
+            return BadItem(INVALID, "the polygon is not convex: its inside is no safe set here")
         walls.append(Wall(normal, offset, clearance))
     return walls
 
@@ -248,9 +248,9 @@ def _octagon(centre: Vec2, radius: float) -> list[Vec2]:
     ]
 
 
-def _sphere(item: MissionItem) -> WorkspaceSphere | Refused:
+def _sphere(item: MissionItem) -> WorkspaceSphere | BadItem:
     if not 0.0 < item.params[0] < math.inf:
-        return Refused(INVALID_PARAM1, f"a sphere of radius {item.params[0]:g} m")
+        return BadItem(INVALID_PARAM1, f"a sphere of radius {item.params[0]:g} m")
     if not math.isfinite(item.z):
-        return Refused(INVALID_PARAM1 + 6, "a sphere needs the height of its centre")
+        return BadItem(INVALID_PARAM1 + 6, "a sphere needs the height of its centre")
     return WorkspaceSphere((1e-4 * item.x, 1e-4 * item.y, item.z), item.params[0])

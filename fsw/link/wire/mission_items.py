@@ -64,32 +64,32 @@ class MissionItem:
 
 
 @dataclass(frozen=True, slots=True)
-class Refused:
+class BadItem:
     """Why something uploaded is of no use."""
 
     result: int  # MAV_MISSION_RESULT
     reason: str
 
 
-def read_step(item: MissionItem, locate: Locate) -> MissionStep | Refused:
+def read_step(item: MissionItem, locate: Locate) -> MissionStep | BadItem:
     """What an item means to this vehicle."""
     reader = _READERS.get(item.command)
     if reader is None:
-        return Refused(UNSUPPORTED, f"command {item.command} is not one of this vehicle's missions")
+        return BadItem(UNSUPPORTED, f"command {item.command} is not one of this vehicle's missions")
     return reader(item, locate)
 
 
-def read_rally(item: MissionItem, locate: Locate) -> Vec2 | Refused:
+def read_rally(item: MissionItem, locate: Locate) -> Vec2 | BadItem:
     """North and east of a rally point [m]; its altitude is not used, a return has its own."""
     if item.command != NAV_RALLY_POINT:
-        return Refused(UNSUPPORTED, f"command {item.command} is no rally point")
+        return BadItem(UNSUPPORTED, f"command {item.command} is no rally point")
     place = _place(item, locate)
-    if isinstance(place, Refused):
+    if isinstance(place, BadItem):
         return place
     return (place[0], place[1]) if place is not None else _bad(5, "a rally point needs a place")
 
 
-def horizontal_place(item: MissionItem, locate: Locate) -> Vec2 | Refused:
+def horizontal_place(item: MissionItem, locate: Locate) -> Vec2 | BadItem:
     """North and east of an item's x and y [m]."""
     for number, value in ((5, item.x), (6, item.y)):
         if value == NO_PLACE:
@@ -102,14 +102,14 @@ def horizontal_place(item: MissionItem, locate: Locate) -> Vec2 | Refused:
             return _bad(5, f"{latitude:g}, {longitude:g} is no place on Earth")
         north, east, _ = locate(latitude, longitude, 0.0)
     else:
-        return Refused(UNSUPPORTED_FRAME, f"frame {item.frame} is not supported for this item")
+        return BadItem(UNSUPPORTED_FRAME, f"frame {item.frame} is not supported for this item")
     for number, metres in ((5, north), (6, east)):
         if not abs(metres) <= MAX_DISTANCE:
             return _bad(number, f"{math.hypot(north, east):.0f} m from the origin is too far")
     return north, east
 
 
-def _waypoint(item: MissionItem, locate: Locate) -> MissionStep | Refused:
+def _waypoint(item: MissionItem, locate: Locate) -> MissionStep | BadItem:
     hold, acceptance = item.params[0], item.params[1]
     if not _within(hold, LONGEST_STAY):
         return _bad(1, f"a stay of {hold:g} s is outside 0 to {LONGEST_STAY:g} s")
@@ -118,19 +118,19 @@ def _waypoint(item: MissionItem, locate: Locate) -> MissionStep | Refused:
     return _go(item, locate, hold, acceptance or USUAL_ACCEPTANCE)
 
 
-def _loiter_time(item: MissionItem, locate: Locate) -> MissionStep | Refused:
+def _loiter_time(item: MissionItem, locate: Locate) -> MissionStep | BadItem:
     if not _within(item.params[0], LONGEST_STAY):
         return _bad(1, f"a stay of {item.params[0]:g} s is outside 0 to {LONGEST_STAY:g} s")
     return _go(item, locate, item.params[0], USUAL_ACCEPTANCE)
 
 
-def _loiter_unlimited(item: MissionItem, locate: Locate) -> MissionStep | Refused:
+def _loiter_unlimited(item: MissionItem, locate: Locate) -> MissionStep | BadItem:
     return _go(item, locate, math.inf, USUAL_ACCEPTANCE)
 
 
-def _go(item: MissionItem, locate: Locate, hold: float, accept: float) -> MissionStep | Refused:
+def _go(item: MissionItem, locate: Locate, hold: float, accept: float) -> MissionStep | BadItem:
     place = _place(item, locate)
-    if isinstance(place, Refused):
+    if isinstance(place, BadItem):
         return place
     if place is None:
         return _bad(5, "a waypoint needs a place")
@@ -145,10 +145,10 @@ def _go(item: MissionItem, locate: Locate, hold: float, accept: float) -> Missio
     )
 
 
-def _take_off(item: MissionItem, locate: Locate) -> MissionStep | Refused:
+def _take_off(item: MissionItem, locate: Locate) -> MissionStep | BadItem:
     """Straight up: the place of a takeoff is where the vehicle stands."""
     height = _z(item, locate)
-    if isinstance(height, Refused):
+    if isinstance(height, BadItem):
         return height
     return MissionStep(
         MissionAction.TAKE_OFF,
@@ -160,28 +160,28 @@ def _take_off(item: MissionItem, locate: Locate) -> MissionStep | Refused:
     )
 
 
-def _land(item: MissionItem, locate: Locate) -> MissionStep | Refused:
+def _land(item: MissionItem, locate: Locate) -> MissionStep | BadItem:
     yaw = _heading(item.params[3])
     if item.x == NO_PLACE and item.y == NO_PLACE:
         return MissionStep(MissionAction.LAND, yaw=yaw)
     place = horizontal_place(item, locate)
-    if isinstance(place, Refused):
+    if isinstance(place, BadItem):
         return place
     position = (place[0], place[1], 0.0)  # the descent is the landing's
     return MissionStep(MissionAction.LAND, position, yaw=yaw, acceptance=USUAL_ACCEPTANCE)
 
 
-def _return(item: MissionItem, _: Locate) -> MissionStep | Refused:
+def _return(item: MissionItem, _: Locate) -> MissionStep | BadItem:
     return MissionStep(MissionAction.RETURN)
 
 
-def _delay(item: MissionItem, _: Locate) -> MissionStep | Refused:
+def _delay(item: MissionItem, _: Locate) -> MissionStep | BadItem:
     if not _within(item.params[0], LONGEST_STAY):
         return _bad(1, f"a delay of {item.params[0]:g} s is outside 0 to {LONGEST_STAY:g} s")
     return MissionStep(MissionAction.DELAY, hold_s=item.params[0], stop_after=not item.autocontinue)
 
 
-def _change_speed(item: MissionItem, _: Locate) -> MissionStep | Refused:
+def _change_speed(item: MissionItem, _: Locate) -> MissionStep | BadItem:
     """Air speed and ground speed are one here; -1 and -2 mean the usual speed.
 
     A ground station writes what it takes for usual, QGroundControl 5 m/s: the mission is kept as
@@ -197,19 +197,19 @@ def _change_speed(item: MissionItem, _: Locate) -> MissionStep | Refused:
     return MissionStep(MissionAction.SPEED, speed=speed)
 
 
-def _look_at(item: MissionItem, locate: Locate) -> MissionStep | Refused:
+def _look_at(item: MissionItem, locate: Locate) -> MissionStep | BadItem:
     """The nose points there on the segments that follow; its height does not matter."""
     place = horizontal_place(item, locate)
-    if isinstance(place, Refused):
+    if isinstance(place, BadItem):
         return place
     return MissionStep(MissionAction.LOOK_AT, (*place, 0.0))
 
 
-def _look_away(item: MissionItem, _: Locate) -> MissionStep | Refused:
+def _look_away(item: MissionItem, _: Locate) -> MissionStep | BadItem:
     return MissionStep(MissionAction.LOOK_AT)
 
 
-def _look(item: MissionItem, locate: Locate) -> MissionStep | Refused:
+def _look(item: MissionItem, locate: Locate) -> MissionStep | BadItem:
     if item.params[0] == 0.0:
         return _look_away(item, locate)
     if item.params[0] == 3.0:
@@ -218,7 +218,7 @@ def _look(item: MissionItem, locate: Locate) -> MissionStep | Refused:
 
 
 _MAX_SPEED: Final = 20.0  # m/s; faster is a slip of the unit
-_READERS: Final[dict[int, Callable[[MissionItem, Locate], MissionStep | Refused]]] = {
+_READERS: Final[dict[int, Callable[[MissionItem, Locate], MissionStep | BadItem]]] = {
     NAV_WAYPOINT: _waypoint,
     NAV_LOITER_UNLIMITED: _loiter_unlimited,
     NAV_LOITER_TIME: _loiter_time,
@@ -233,16 +233,16 @@ _READERS: Final[dict[int, Callable[[MissionItem, Locate], MissionStep | Refused]
 }
 
 
-def _place(item: MissionItem, locate: Locate) -> Vec3 | Refused | None:
+def _place(item: MissionItem, locate: Locate) -> Vec3 | BadItem | None:
     if item.x == NO_PLACE and item.y == NO_PLACE:
         return None
     across, height = horizontal_place(item, locate), _z(item, locate)
-    if isinstance(across, Refused):
+    if isinstance(across, BadItem):
         return across
-    return height if isinstance(height, Refused) else (*across, height)
+    return height if isinstance(height, BadItem) else (*across, height)
 
 
-def _z(item: MissionItem, locate: Locate) -> float | Refused:
+def _z(item: MissionItem, locate: Locate) -> float | BadItem:
     """NED z of an item [m], from home where its frame says so."""
     if item.frame == LOCAL_NED:
         z = item.z
@@ -251,7 +251,7 @@ def _z(item: MissionItem, locate: Locate) -> float | Refused:
     elif item.frame in GLOBAL_FRAMES:
         z = locate(0.0, 0.0, item.z)[2]
     else:
-        return Refused(UNSUPPORTED_FRAME, f"frame {item.frame} is not supported for this item")
+        return BadItem(UNSUPPORTED_FRAME, f"frame {item.frame} is not supported for this item")
     if not -MAX_DISTANCE <= z <= 0.0:
         return _bad(7, f"a height of {-z:g} m is outside 0 to {MAX_DISTANCE:g} m")
     return z
@@ -265,5 +265,5 @@ def _within(value: float, most: float) -> bool:
     return 0.0 <= value <= most
 
 
-def _bad(number: int, reason: str) -> Refused:
-    return Refused(INVALID_PARAM1 + number - 1, reason)
+def _bad(number: int, reason: str) -> BadItem:
+    return BadItem(INVALID_PARAM1 + number - 1, reason)

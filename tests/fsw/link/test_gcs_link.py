@@ -200,12 +200,12 @@ def test_a_peer_that_falls_silent_is_forgotten(ground: Ground) -> None:
     other = station_socket()
     writer = FrameWriter(255, 190)
     ground.polled(writer.frame(ids.HEARTBEAT, *HEARTBEAT), other)
-    ground.wall.pass_s(0.6 * EXPIRY_US / 1e6)
+    ground.clock.pass_s(0.6 * EXPIRY_US / 1e6)
     ground.polled(writer.frame(ids.HEARTBEAT, *HEARTBEAT), other)
-    ground.wall.pass_s(0.6 * EXPIRY_US / 1e6)
+    ground.clock.pass_s(0.6 * EXPIRY_US / 1e6)
     ground.fly(500)
     assert other.getsockname() in ground.link.peers
-    ground.wall.pass_s(0.6 * EXPIRY_US / 1e6)
+    ground.clock.pass_s(0.6 * EXPIRY_US / 1e6)
     ground.fly(500)
     assert ground.link.peers == (ground.station.getsockname(),)
     other.close()
@@ -226,7 +226,7 @@ def test_a_flood_is_read_within_a_budget(ground: Ground) -> None:
     assert 0 < len(ground.recorded) < 400
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere nobody counts")
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux counts them")
 def test_what_a_flood_left_for_the_kernel_to_drop_is_counted_to_the_datagram(
     ground: Ground,
 ) -> None:

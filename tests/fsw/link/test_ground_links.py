@@ -81,7 +81,7 @@ def test_an_answer_goes_to_the_link_the_command_came_from(
     links.acknowledge(1_000_000, CommandAck(400, 0, 245, 190))
     assert [f.message_id for f in api.heard()] == [ids.COMMAND_ACK]
     assert gcs.heard() == []
-    links.acknowledge(1_000_000, CommandAck(400, 0, 99, 1))  # of nobody known: to all
+    links.acknowledge(1_000_000, CommandAck(400, 0, 99, 1))  # of no known peer: to all
     assert [len(ground.heard()) for ground in (gcs, api)] == [1, 1]
 
 

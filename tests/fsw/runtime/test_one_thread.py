@@ -35,7 +35,7 @@ def test_it_is_pinned_before_numpy_is_there_to_read_it(start: str) -> None:
     }
     done = subprocess.run(
         [sys.executable, "-c", START + start],
-        env={**outside, "OMP_NUM_THREADS": "2"},  # a user's own wish for other programs
+        env={**outside, "OMP_NUM_THREADS": "2"},  # a user's own setting for other programs
         capture_output=True,
         text=True,
         check=True,

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from fsw.flight.modes.offboard import Offboard, is_fresh, receive, report
+from fsw.flight.modes.offboard import Offboard, accept_setpoints, is_fresh, report
 from fsw.flight.setpoint_generator import PositionGoal, ReferenceState
 from fsw.flight.state import FlightState, OffboardMemory, SetpointMemory
 from fsw.signals import (
@@ -52,14 +52,14 @@ def hearing(**memory: Any) -> FlightState:
 
 
 def test_the_newest_of_motion_and_attitude_counts_and_joints_count_beside_them() -> None:
-    memory = receive(OffboardMemory(), told(motion=MOTION), CONFIG)
+    memory = accept_setpoints(OffboardMemory(), told(motion=MOTION), CONFIG)
     assert (memory.motion, memory.attitude, memory.motion_us) == (MOTION, None, NOW_US)
-    memory = receive(memory, told(NOW_US + 1, attitude=ATTITUDE), CONFIG)
+    memory = accept_setpoints(memory, told(NOW_US + 1, attitude=ATTITUDE), CONFIG)
     assert (memory.motion, memory.attitude, memory.motion_us) == (None, ATTITUDE, NOW_US + 1)
-    memory = receive(memory, told(NOW_US + 2, joints=JOINTS), CONFIG)
+    memory = accept_setpoints(memory, told(NOW_US + 2, joints=JOINTS), CONFIG)
     assert (memory.attitude, memory.joints) == (ATTITUDE, JOINTS)
     assert (memory.motion_us, memory.joints_us) == (NOW_US + 1, NOW_US + 2)
-    memory = receive(memory, told(NOW_US + 3, motion=MOTION), CONFIG)
+    memory = accept_setpoints(memory, told(NOW_US + 3, motion=MOTION), CONFIG)
     assert (memory.motion, memory.attitude, memory.joints) == (MOTION, None, JOINTS)
     assert (memory.accepted, memory.refused) == (4, 0)
 
@@ -72,8 +72,8 @@ def test_what_is_out_of_range_is_counted_and_not_kept() -> None:
         joints=JointSetpoint((9.0, 0.0)),
         refused_setpoints=4,
     )
-    assert receive(before, wild, CONFIG) == replace(before, refused=2 + 4 + 3)
-    mixed = receive(before, replace(wild, joints=JOINTS, refused_setpoints=0), CONFIG)
+    assert accept_setpoints(before, wild, CONFIG) == replace(before, refused=2 + 4 + 3)
+    mixed = accept_setpoints(before, replace(wild, joints=JOINTS, refused_setpoints=0), CONFIG)
     assert (mixed.accepted, mixed.refused) == (8, 4)
 
 

@@ -213,7 +213,7 @@ def test_finished_logs_are_erased_this_flight_s_is_kept_and_the_operator_is_told
 def test_a_log_that_cannot_be_erased_is_told(tmp_path: Path) -> None:
     earlier = flight(tmp_path, "run-1", b"finished")
     client = Client(LogService(FlightLogs(flight(tmp_path, "run-2", b"kept"))))
-    (earlier / "flight.tlog").unlink()  # somebody else was faster
+    (earlier / "flight.tlog").unlink()  # another client was faster
     client.ask(ids.LOG_ERASE, 1, 1)
     told = wait_for(lambda: list(client.service.poll(0)))
     (text,) = told

@@ -251,7 +251,7 @@ def test_the_hash_tells_a_ground_station_that_it_knows_every_value(
     service.handle(setting(b"PID_YAW_P", 5.0), 0)
     ticks(store)
     assert bits() == bitwise() != before
-    # Its thanks for that is no wish.
+    # Its acknowledgement is not a request.
     assert service.handle(setting(b"_HASH_CHECK", 1.0, type_=5), 0) == ()
 
 

@@ -20,7 +20,7 @@ from fsw.link.wire.fence_items import (
     cylinders_over,
     read_fence,
 )
-from fsw.link.wire.mission_items import MissionItem, Refused
+from fsw.link.wire.mission_items import BadItem, MissionItem
 from fsw.signals import PointObstacle, SafeSet, Vec3, WorkspaceSphere
 
 Corners = list[tuple[float, float]]
@@ -60,9 +60,9 @@ def safe(items: tuple[MissionItem, ...]) -> SafeSet:
     return read
 
 
-def reason(items: tuple[MissionItem, ...]) -> Refused:
+def reason(items: tuple[MissionItem, ...]) -> BadItem:
     read = read_fence(items, locate, 0.1)
-    assert isinstance(read, Refused), read
+    assert isinstance(read, BadItem), read
     return read
 
 
@@ -100,7 +100,7 @@ def test_the_inside_of_a_convex_polygon_is_free(
 ) -> None:
     corners = [(radius * math.cos(a), radius * math.sin(a)) for a in sorted(angles)]
     read = read_fence(polygon(corners[::-1] if backwards else corners), locate, 0.1)
-    if isinstance(read, Refused):
+    if isinstance(read, BadItem):
         assert "shorter" in read.reason or "inside" in read.reason
         return
     north = sum(corner[0] for corner in corners) / len(corners)

@@ -7,7 +7,7 @@ import math
 import pytest
 
 from fsw.link.wire import mission_items as items
-from fsw.link.wire.mission_items import MissionItem, Refused, read_rally, read_step
+from fsw.link.wire.mission_items import BadItem, MissionItem, read_rally, read_step
 from fsw.signals import MissionAction, MissionStep, Vec3, Vec4
 
 NAN = math.nan
@@ -35,9 +35,9 @@ def step(given: MissionItem) -> MissionStep:
     return read
 
 
-def refused(given: MissionItem) -> Refused:
+def refused(given: MissionItem) -> BadItem:
     read = read_step(given, locate)
-    assert isinstance(read, Refused), read
+    assert isinstance(read, BadItem), read
     assert read.reason
     return read
 
@@ -125,5 +125,5 @@ def test_a_rally_point_is_a_place_and_nothing_else() -> None:
     rally = item(items.NAV_RALLY_POINT, 3, place=(470_001_000, 80_000_000, 5.0))
     assert read_rally(rally, locate) == pytest.approx((11.1, 0.0), abs=0.01)
     wrong = read_rally(item(items.NAV_WAYPOINT), locate)
-    assert isinstance(wrong, Refused)
+    assert isinstance(wrong, BadItem)
     assert wrong.result == 3
