@@ -1,4 +1,4 @@
-"""How a process is made to end: it has a moment, then it is interrupted, then it is killed."""
+"""Ends a process in stages: wait, interrupt, kill."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ GRACE_S: Final = 0.6  # between one way to end a process and the next, stronger 
 
 @dataclass(slots=True)
 class GracefulShutdown:
-    """One process on its way out; nothing happens before it is expected to end."""
+    """The shutdown of one process; nothing happens before its end is due."""
 
     child: Child
     due_s: float | None = None  # on the monotonic clock: when the next step is taken
@@ -20,12 +20,12 @@ class GracefulShutdown:
     _asked: bool = False
 
     def expect(self, due_s: float, grace_s: float = GRACE_S) -> None:
-        """It should have ended by then; of two times the earlier one counts."""
+        """Set when it must have ended; the earlier of two times counts."""
         if self.due_s is None or due_s < self.due_s:
             self.due_s, self._grace_s = due_s, grace_s
 
     def escalate(self, now_s: float) -> None:
-        """Past its time: interrupt it, and the next time kill it."""
+        """After that time, interrupt it; at the next call, kill it."""
         if self.due_s is None or now_s < self.due_s:
             return
         if self.child.exit_code is not None:

@@ -23,7 +23,7 @@ _NOTHING: dict[str, float] = {"sum": 0.0, "mean": 0.0}
 
 @dataclass(frozen=True, slots=True)
 class FlightReports:
-    """What there is to judge after a flight."""
+    """Inputs to the result of a flight."""
 
     scenario: str
     seed: int
@@ -70,7 +70,7 @@ Rows = list[tuple[str, str]]
 
 
 def table_rows(result: dict[str, Any], tracking_max_m: float | None) -> Rows:
-    """What a flight comes down to, as text.
+    """Result table of a flight, as text.
 
     Args:
         result: From :func:`pandion.result.as_json`.

@@ -17,7 +17,7 @@ NOT_COMPLETED, COULD_NOT_START = 1, 2  # exit codes
 
 
 class CouldNotStart(Exception):
-    """Why there is no run, in one sentence."""
+    """A run that cannot start, in one sentence."""
 
 
 class StopRequest:
@@ -91,7 +91,7 @@ def _scenario(options: SitlOptions) -> Scenario:
 
 
 def _check_outputs(options: SitlOptions) -> None:
-    """Find out before the flight that its result could not be written."""
+    """Check before the flight that the result can be written."""
     try:
         if options.out is not None:
             options.out.mkdir(parents=True, exist_ok=True)

@@ -54,7 +54,7 @@ State = TypeVar("State")
 
 
 class ClosedLoop(Generic[State]):
-    """Plant, tick and planner, joined; whoever flies gives the inputs of each step."""
+    """Plant, tick and planner in one loop; the caller gives the inputs of each step."""
 
     def __init__(
         self,

@@ -81,7 +81,7 @@ def fly_job(job: Job, *, traced: bool = False) -> FlightResult:
 
 
 def outcome(job: Job) -> Outcome:
-    """Fly one job; whatever it raises becomes a row that says so."""
+    """Fly one job; an exception becomes a row with the error."""
     try:
         return score(job.seed, fly_job(job))
     except Exception as error:

@@ -29,7 +29,7 @@ def write(
 
     Args:
         report: What was found.
-        settings: What was asked for.
+        settings: The requested study.
         provenance: For the page.
         name: Of the study, and of its files.
         folder: Made if it is not there.
@@ -55,7 +55,7 @@ def page(report: Report, settings: Settings, provenance: tuple[str, ...]) -> str
 
     Args:
         report: What was found.
-        settings: What was asked for.
+        settings: The requested study.
         provenance: Sentences that say how to get the same again.
     """
     parts = [f"<h1>{_text(report.title)}</h1>", _items(provenance), _seeds(settings)]

@@ -81,11 +81,11 @@ class Autopilot:
         self._cascade.step(in_hover(self.config.airframe, estimate), estimate, nominal, REST_INPUT)
 
     def analyse(self, safe_set: SafeSet) -> tuple[Finding, ...]:
-        """What speaks for and against keeping a safe set with this configuration."""
+        """Findings on whether this configuration can keep a safe set."""
         return self._safe_sets.analyse(safe_set)
 
     def tick(self, state: FlightState, inputs: TickInputs) -> tuple[FlightState, TickOutputs]:
-        """Everything the vehicle does at one instant.
+        """Compute one tick.
 
         Args:
             state: What the last tick left.
@@ -149,7 +149,7 @@ class Autopilot:
     def _receive(
         self, state: FlightState, inputs: TickInputs, texts: list[StatusText]
     ) -> FlightState:
-        """Take in targets, safe set, mission, setpoints and a ground station's heartbeat."""
+        """Store received targets, safe set, mission, setpoints and ground station heartbeat."""
         now_us = inputs.sensors.t_us
         if inputs.targets or inputs.safe_set is not None or inputs.mission is not None:
             stream = merge(state.mission.stream, inputs.targets, now_us)
@@ -183,7 +183,7 @@ class Autopilot:
         plan: PlanMemory,
         now_us: int,
     ) -> tuple[FlightState, PlanRequest, PlanMemory]:
-        """Ask the planner for what takes effect a fixed delay from now."""
+        """Request a plan that takes effect after a fixed delay."""
         config = self.config
         apply_us = now_us + config.plan_delay_ticks * config.tick_period_us
         mode = self._commander.mode(state)
@@ -241,13 +241,13 @@ class Autopilot:
             self.config.airframe, wanted, state.cascade.commanded, state.vehicle.armed
         )
         if replaced:
-            # What made the command no number is in the loops' new memory too: forget it.
+            # The NaN is in the loops' new memory as well: discard that.
             memory = state.cascade
         return sent, memory.after_sending(sent), replaced
 
 
 def _estimate(state: FlightState, inputs: TickInputs) -> tuple[FlightState, StateEstimate | None]:
-    """The estimate of now, or the last valid one; invalid ones are counted."""
+    """The current estimate, or the last valid one; invalid ones are counted."""
     valid = estimate_state(inputs.sensors)
     if valid is None:
         return replace(state, invalid_ticks=state.invalid_ticks + 1), state.estimate
@@ -295,7 +295,7 @@ def _snapshot(
 
 
 def _blind(inputs: TickInputs, texts: list[StatusText]) -> TickOutputs:
-    """Before the first valid sensor frame: nothing moves, and commands are refused."""
+    """Outputs before the first valid sensor frame: actuators off, commands refused."""
     zero = (0.0, 0.0, 0.0)
     level = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
     nowhere = StateEstimate(

@@ -1,6 +1,6 @@
-"""The one limiter of references: nothing that is asked for leads the vehicle out of its safe set.
+"""The one limiter of references: no reference leads the vehicle out of its safe set.
 
-The planner's barriers keep the vehicle inside whatever is asked for, at a penalty that a reference
+The planner's barriers keep the vehicle inside for any reference, at a penalty that a reference
 far outside could outbid. So every reference passes here, by its origin:
 
 ============================  =====================================================
@@ -58,7 +58,7 @@ def limit_lead(p: Vec3, vehicle: Vec3, max_lead_distance: float) -> Vec3:
 def limit_approach(
     p: Vec3, v: Vec3, other_end: Vec3, safe_set: SafeSet, braking: float, slope: float
 ) -> tuple[Vec3, Vec3]:
-    """A point off every wall and obstacle, and no faster towards one than would let it stop.
+    """A point clear of walls and obstacles, with its approach speed limited so that it can stop.
 
     Args:
         p: The point [m, NED].

@@ -1,4 +1,4 @@
-"""What the links to the ground have to say after a flight, for `fsw.json`."""
+"""Report of the ground links after a flight, for `fsw.json`."""
 
 from __future__ import annotations
 

@@ -102,6 +102,6 @@ VARIANTS: dict[str, Callable[[PlannerConfig, CondensedModel, SafeSet], OcpTerms]
 
 
 def parts_of(config: PlannerConfig, model: CondensedModel, safe_set: SafeSet) -> OcpTerms:
-    """The parts of the configured controller; joints that are asked for are none of its own."""
+    """The terms of the configured controller, and the cost of requested joints."""
     parts = VARIANTS[config.controller](config, model, safe_set)
     return replace(parts, costs=(*parts.costs, PostureCost(config.weights)))

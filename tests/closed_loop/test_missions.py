@@ -209,7 +209,7 @@ def test_what_cannot_be_begun_is_refused_with_the_reason() -> None:
     ]
     assert flight.texts[1:] == [
         "no mission: none was uploaded",
-        *["no mission: on the ground, and step 0 is no takeoff; take off first"] * 2,
+        *["no mission: on the ground, and step 0 is not a takeoff; take off first"] * 2,
         "there is no mission step 1; 1 were uploaded",
     ]
 

@@ -119,7 +119,7 @@ def test_a_log_cut_between_two_records_is_compared_up_to_its_last_whole_tick(
         (b"sensor_frame:", b"sensor_frume:", "fields than this build"),
         (b"\0\0\0sensor_frame", b"\0\0\0sensor_frume", "topic 'sensor_frume' was not declared"),
         (b"char[3] controller", b"char[3] contrXller", "its controller is missing"),
-        (b'"origin.latitude"', b'"origin.latitudX"', "does not say where it began"),
+        (b'"origin.latitude"', b'"origin.latitudX"', "its origin is missing"),
         (b"D\x00\x00", b"X\x00\x00", "is damaged at byte"),
     ],
     ids=["type", "format", "subscription", "fact", "number", "kind"],

@@ -1,4 +1,4 @@
-"""Files that ground stations have open over FTP: few, and not for ever."""
+"""Open FTP sessions: limited in number, and with a timeout."""
 
 from __future__ import annotations
 

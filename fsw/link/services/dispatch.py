@@ -1,4 +1,4 @@
-"""Hands frames to the services that want them, and survives a service that fails."""
+"""Passes frames to the services; a service that raises is reported and does not end the flight."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Dispatch:
                 self._wanting[id_] = (*self._wanting.get(id_, ()), service)
 
     def handle(self, frame: Frame, t_us: int, send: Answers) -> None:
-        """Let every service that wants the frame answer it."""
+        """Let the services handle a frame."""
         for service in self._wanting.get(frame.message_id, ()):
             try:
                 for outgoing in service.handle(frame, t_us):
@@ -35,7 +35,7 @@ class Dispatch:
                 self._note()
 
     def poll(self, t_us: int, send: Answers) -> None:
-        """Let every service go on with what it is sending."""
+        """Let the services continue what they send."""
         for service in self._polled:
             try:
                 for outgoing in service.poll(t_us):

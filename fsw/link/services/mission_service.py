@@ -109,7 +109,7 @@ class MissionService:
         return self._handlers[frame.message_id](values, peer, t_us)
 
     def poll(self, t_us: int) -> Sequence[ServiceOutput]:
-        """Ask again for what did not come, and report the mission's progress."""
+        """Request missing items again, and report the mission's progress."""
         replies: list[ServiceOutput] = []
         if self._store.progress is not self._shown or self._show_again:
             replies += self._show_progress(t_us)
@@ -121,9 +121,11 @@ class MissionService:
                 replies.append(self._ask(upload, t_us))
             else:
                 self._upload = None
-                silence = f"upload broken off: item {len(upload.items)} did not come; kept the old"
+                missing = f"item {len(upload.items)} was not received"
                 replies.append(encode_ack(CANCELLED, upload.kind, upload.peer))
-                replies.append(StatusText(Severity.WARNING, silence))
+                replies.append(
+                    StatusText(Severity.WARNING, f"upload aborted: {missing}; kept the old list")
+                )
         return replies
 
     def _show_progress(self, t_us: int) -> list[Outgoing]:
@@ -154,7 +156,7 @@ class MissionService:
         kind = Kind(number)
         self._upload = self._download = self._done = None
         if count > ROOM[kind]:
-            reason = f"{count} items of {kind.name.lower()}; there is room for {ROOM[kind]}"
+            reason = f"{count} items of {kind.name.lower()}; the limit is {ROOM[kind]}"
             return self._refuse(BadItem(NO_SPACE, reason), kind, peer)
         self._upload = _Upload(peer, kind, count)
         if count == 0:
@@ -164,7 +166,7 @@ class MissionService:
     def _take(
         self, read: _ReadItem, values: Numbers, peer: Peer, t_us: int
     ) -> Sequence[ServiceOutput]:
-        """Add the item that was asked for; the last one completes the upload."""
+        """Add the requested item; the last one completes the upload."""
         item = read(values)
         seq, number = int(values[7]), int(values[14])
         upload = self._upload
@@ -189,7 +191,7 @@ class MissionService:
         return (self._ask(upload, t_us),)
 
     def _stray(self, seq: int, number: int, peer: Peer) -> Sequence[ServiceOutput]:
-        """An item of no upload; after one that ended, its acknowledgement may have been lost."""
+        """Handle an item without an upload; the acknowledgement of the last one may be lost."""
         if self._done is not None and self._done[:2] == (peer, number):
             again = encode_ack(ACCEPTED, number, peer, self._store.identity(self._done[1]))
             return (again,) if seq == self._done[2] else ()
@@ -231,7 +233,7 @@ class MissionService:
     def _send_item(
         self, as_int: bool, values: Numbers, peer: Peer, t_us: int
     ) -> Sequence[ServiceOutput]:
-        """Any item in any order and as often as asked: requests and items may be lost."""
+        """Send any item, in any order and repeatedly: requests and items may be lost."""
         seq, number = int(values[0]), int(values[3])
         download = self._download
         if download is None or download.peer != peer or download.kind != number:
@@ -247,7 +249,7 @@ class MissionService:
     # ------------------------------------------------------------ the rest
 
     def _ack(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[ServiceOutput]:
-        """The other side has all it wanted, or wants no more; the old items stay."""
+        """Handle the client's acknowledgement, which ends the transfer."""
         if self._download is not None and self._download.peer == peer:
             self._download = None
         if self._upload is not None and self._upload.peer == peer and values[2] != ACCEPTED:

@@ -50,9 +50,9 @@ class Kind(IntEnum):
 
 
 def _identity(items: tuple[MissionItem, ...]) -> int:
-    """A number that another list has not: a checksum of all that was uploaded, as PX4 has it.
+    """Identity of a list: a checksum of the upload, as in PX4.
 
-    0 means that nothing is there, so no list has it.
+    0 means an empty list, so no other list has it.
     """
     if not items:
         return 0
@@ -110,7 +110,7 @@ class MissionStore:
     def keep(
         self, kind: Kind, items: tuple[MissionItem, ...], meanings: tuple[Meaning, ...]
     ) -> BadItem | None:
-        """Put a whole upload in the place of the old one, or say why not."""
+        """Replace a list by a complete upload, or return why not."""
         if kind is Kind.MISSION:
             steps = tuple(step for step in meanings if isinstance(step, MissionStep))
             self._change(MissionUpdate(steps=steps, current=0 if steps else None))

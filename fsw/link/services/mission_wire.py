@@ -48,7 +48,7 @@ def item_float(values: Numbers) -> MissionItem | BadItem:
         if math.isnan(scaled):
             scaled = float(NO_PLACE)
         if not abs(scaled) <= NO_PLACE:
-            return BadItem(INVALID_PARAM1 + 4 + number, f"{value:g} is no place")
+            return BadItem(INVALID_PARAM1 + 4 + number, f"{value:g} is not a coordinate")
         whole.append(round(scaled))
     return item_int((*values[0:4], *whole, *values[6:]))
 

@@ -28,7 +28,7 @@ class LinkService(Protocol):
         ...
 
     def poll(self, t_us: int) -> Sequence[ServiceOutput]:
-        """Go on with an answer that is paced; called every tick, so idle must cost nothing.
+        """Continue a paced answer; called every tick, so it must be cheap when idle.
 
         Args:
             t_us: Sensor time [us].
@@ -41,9 +41,9 @@ class BulkService(LinkService, Protocol):
     """A service with much to send to clients that set the pace themselves, piece by piece."""
 
     def bulk(self, t_us: int) -> Sequence[ServiceOutput]:
-        """The next datagram of it; nothing where nothing is under way.
+        """The next datagram; nothing without a transfer.
 
-        Called in what is left of a tick, several times, so that it delays none.
+        Called repeatedly in the spare time of a tick, so that it delays none.
 
         Args:
             t_us: Sensor time [us].

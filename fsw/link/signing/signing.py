@@ -1,6 +1,6 @@
 """MAVLink 2 signing of one link.
 
-A frame is believed if its hash is right, then if its time is: newer than the last of its sender,
+A frame is accepted if its hash is right and then its time: newer than the last of its sender,
 not further ahead than a minute. In this order, because a time taken from a forged frame would lock
 its true sender out. Source: https://mavlink.io/en/guide/message_signing.html
 """
@@ -51,7 +51,7 @@ class Signing:
     """The key of one link and the times of its senders; without a key everything passes."""
 
     def __init__(self, link_id: int, unix_us: Callable[[], int], file: KeyFile | None) -> None:
-        """Take up the key that an earlier flight left.
+        """Load the stored key.
 
         Args:
             link_id: 0..255, distinguishes our links in our own signatures.
@@ -85,7 +85,7 @@ class Signing:
         return marked + stamp + self._hash(marked + stamp)
 
     def judge(self, frame: Frame, raw: bytes) -> FrameTrust:
-        """Decide about a frame whose checksum is right.
+        """Classify a frame whose checksum is right.
 
         Args:
             frame: What it says.

@@ -23,7 +23,7 @@ def set_up_signing(
         signing: Of the link it came on.
         frame: SETUP_SIGNING; already judged, so on a signed link it was signed.
         sender: Where it came from.
-        armed: Whether anything may move.
+        armed: Whether actuators may move.
 
     Returns:
         The text for the operator; None if the message was not for this vehicle.

@@ -95,12 +95,12 @@ def read_fence(
 
 
 def read_fence_item(item: MissionItem, locate: Locate) -> BadItem | None:
-    """What is wrong with one item by itself."""
+    """Why one item alone is invalid, None if it is valid."""
     if item.command == CIRCLE_INCLUSION and item.frame == LOCAL_OFFSET_NED:
         sphere = _sphere(item)
         return sphere if isinstance(sphere, BadItem) else None
     if item.command not in (*_POLYGONS, *_CIRCLES, RETURN_POINT):
-        return BadItem(UNSUPPORTED, f"command {item.command} is no fence of this vehicle")
+        return BadItem(UNSUPPORTED, f"command {item.command} is not a supported fence item")
     place = horizontal_place(item, locate)
     if isinstance(place, BadItem):
         return place
@@ -164,7 +164,7 @@ def walls_of(corners: list[Vec2], clearance: float) -> list[Wall] | BadItem:
         normal = (-sense * (b[1] - a[1]) / length, sense * (b[0] - a[0]) / length, 0.0)
         offset = normal[0] * a[0] + normal[1] * a[1]
         if any(normal[0] * c[0] + normal[1] * c[1] < offset - 1e-3 for c in corners):
-            return BadItem(INVALID, "the polygon is not convex: its inside is no safe set here")
+            return BadItem(INVALID, "the polygon is not convex, which is not supported")
         walls.append(Wall(normal, offset, clearance))
     return walls
 

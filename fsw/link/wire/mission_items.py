@@ -1,6 +1,6 @@
 """Mission items as ground stations upload them, read one by one into steps of the vehicle.
 
-An item that means nothing here is refused with MAVLink's own result and a sentence. NaN and 0 in
+Unsupported items are refused with MAVLink's own result and a sentence. NaN and 0 in
 parameters that a command does not use are normal; a NaN heading keeps the heading.
 """
 
@@ -65,24 +65,24 @@ class MissionItem:
 
 @dataclass(frozen=True, slots=True)
 class BadItem:
-    """Why something uploaded is of no use."""
+    """Why an uploaded item is refused."""
 
     result: int  # MAV_MISSION_RESULT
     reason: str
 
 
 def read_step(item: MissionItem, locate: Locate) -> MissionStep | BadItem:
-    """What an item means to this vehicle."""
+    """Convert an item to a mission step, or refuse it."""
     reader = _READERS.get(item.command)
     if reader is None:
-        return BadItem(UNSUPPORTED, f"command {item.command} is not one of this vehicle's missions")
+        return BadItem(UNSUPPORTED, f"command {item.command} is not supported in missions")
     return reader(item, locate)
 
 
 def read_rally(item: MissionItem, locate: Locate) -> Vec2 | BadItem:
     """North and east of a rally point [m]; its altitude is not used, a return has its own."""
     if item.command != NAV_RALLY_POINT:
-        return BadItem(UNSUPPORTED, f"command {item.command} is no rally point")
+        return BadItem(UNSUPPORTED, f"command {item.command} is not a rally point")
     place = _place(item, locate)
     if isinstance(place, BadItem):
         return place
@@ -99,7 +99,7 @@ def horizontal_place(item: MissionItem, locate: Locate) -> Vec2 | BadItem:
     elif item.frame in GLOBAL_FRAMES | HOME_FRAMES:
         latitude, longitude = 1e-7 * item.x, 1e-7 * item.y
         if not (abs(latitude) < 90.0 and abs(longitude) <= 180.0):
-            return _bad(5, f"{latitude:g}, {longitude:g} is no place on Earth")
+            return _bad(5, f"{latitude:g}, {longitude:g} is not a latitude and longitude")
         north, east, _ = locate(latitude, longitude, 0.0)
     else:
         return BadItem(UNSUPPORTED_FRAME, f"frame {item.frame} is not supported for this item")

@@ -174,7 +174,7 @@ def test_an_upload_that_breaks_off_leaves_the_old_mission_whole(vehicle: Vehicle
     ack = client.pump(8.0, lambda m: m.get_type() == "MISSION_ACK")
     assert ack is not None
     assert ack.type == CANCELLED
-    assert "broken off" in client.texts()
+    assert "aborted" in client.texts()
     assert vehicle.store.take_update() is None
     same(client.download(), WAYPOINTS)
 
