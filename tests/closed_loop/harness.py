@@ -69,7 +69,7 @@ def as_measured(frame: SensorFrame) -> SensorFrame:
 
 @dataclass
 class Flight:
-    """One flight, step by step; everything that was said is kept.
+    """One flight, step by step; all status texts are kept.
 
     ``spoil`` stands between sensors and flight software, ``late_ticks`` says by how many ticks
     each plan comes after its time.

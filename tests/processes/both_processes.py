@@ -100,7 +100,7 @@ class Misbehaviour:
 
 
 class Network:
-    """Stands between fsw, which is told this port, and sitl; notes what passes."""
+    """Relays between fsw, which connects to this port, and sitl; records the traffic."""
 
     def __init__(self, simulator_port: int, misbehaviour: Misbehaviour) -> None:
         self.to_fsw: list[bytes] = []  # as sitl sent it

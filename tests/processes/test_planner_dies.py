@@ -25,18 +25,18 @@ def children(process: int) -> list[int]:
 
 
 def texts(ground: socket.socket) -> list[str]:
-    """What the vehicle has said so far."""
-    parser, said = dialect.MAVLink(None), []
+    """Status texts of the vehicle so far."""
+    parser, reported = dialect.MAVLink(None), []
     parser.robust_parsing = True
     ground.setblocking(False)
     while True:
         try:
             datagram = ground.recv(4096)
         except BlockingIOError:
-            return said
+            return reported
         for message in parser.parse_buffer(datagram) or []:
             if message.get_type() == "STATUSTEXT":
-                said.append(message.text)
+                reported.append(message.text)
 
 
 def planner_of(fsw: int, instead_of: int | None = None) -> tuple[int, int]:
@@ -81,14 +81,14 @@ def test_killing_the_planner_costs_no_barrier(tmp_path: Path) -> None:
                 os.kill(server, signal.SIGKILL)
                 ended = sitl.wait_for("ended", patience_s=30.0)
                 assert fsw.finish() == 0
-        said = texts(ground)
+        reported = texts(ground)
     result, vehicle = ended["result"], json.loads((tmp_path / "fsw.json").read_text())
     assert result["completed"], result["end_reason"]
     assert min(result["margins_m"].values()) >= 0.0
     assert vehicle["mpc"]["restarts"] == 2
     assert vehicle["mpc"]["cycles"] > 40, "planned on with the new one"
     for what in ("planner process died", "planner processes died"):
-        assert any(what in text for text in said), said
+        assert any(what in text for text in reported), reported
     for process in (server, first, second):
         with pytest.raises(ProcessLookupError):
             os.kill(process, 0)

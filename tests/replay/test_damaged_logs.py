@@ -113,7 +113,7 @@ def test_a_log_cut_between_two_records_is_compared_up_to_its_last_whole_tick(
 
 
 @pytest.mark.parametrize(
-    ("was", "becomes", "said"),
+    ("was", "becomes", "reported"),
     [
         (b":uint64_t timestamp;double", b":uint64_t timestamp;doublx", "fields than this build"),
         (b"sensor_frame:", b"sensor_frume:", "fields than this build"),
@@ -127,7 +127,7 @@ def test_a_log_cut_between_two_records_is_compared_up_to_its_last_whole_tick(
 def test_what_is_wrong_is_named(
     was: bytes,
     becomes: bytes,
-    said: str,
+    reported: str,
     whole: bytes,
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
@@ -137,7 +137,7 @@ def test_what_is_wrong_is_named(
     log.write_bytes(whole.replace(was, becomes, 1))
     assert replay.main([str(log), "--verify"]) == 2
     sentence = capsys.readouterr().err
-    assert said in sentence
+    assert reported in sentence
     assert one_sentence(sentence)
 
 

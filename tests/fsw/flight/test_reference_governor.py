@@ -1,4 +1,4 @@
-"""A streamed trajectory passes as it is unless it pulls wildly."""
+"""A streamed trajectory is unchanged unless it is far from the vehicle or unsafe."""
 
 from __future__ import annotations
 

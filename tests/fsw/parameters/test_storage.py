@@ -27,9 +27,9 @@ DEFAULTS = {parameter.name: parameter.default for parameter in PARAMETERS}
 def by_mavproxy(path: Path) -> dict[str, float]:
     """What pymavlink's reader, which MAVProxy uses, makes of a file."""
     read = MAVParmDict()
-    with contextlib.redirect_stdout(io.StringIO()) as said:
+    with contextlib.redirect_stdout(io.StringIO()) as reported:
         assert read.load(str(path), use_excludes=False)
-    assert "Invalid" not in said.getvalue()
+    assert "Invalid" not in reported.getvalue()
     return dict(read)
 
 

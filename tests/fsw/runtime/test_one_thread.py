@@ -40,9 +40,9 @@ def test_it_is_pinned_before_numpy_is_there_to_read_it(start: str) -> None:
         text=True,
         check=True,
     )
-    early, threads, told = json.loads(done.stdout)
+    early, threads, reported = json.loads(done.stdout)
     assert not early
     assert threads == 1, "BLAS starts its threads when numpy is imported"
-    assert told == {
+    assert reported == {
         f"{library}_NUM_THREADS": "1" for library in ("OPENBLAS", "OMP", "MKL", "NUMBA", "RAYON")
     }

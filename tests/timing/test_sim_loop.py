@@ -41,7 +41,7 @@ from messages import dialect
 from messages.block_file import BlockFile
 from messages.frames import FrameWriter, split
 from tests.fsw.link.snapshots import FACTS, outputs_at
-from tests.fsw.log.test_recorded_inputs import SUBJECT
+from tests.fsw.log.test_reader import SUBJECT
 from tests.timing.virtual_time import FIRST_US, PERIOD_US, VirtualSensors, VirtualTime, frame
 
 Tick = Callable[[Any, TickInputs], tuple[Any, TickOutputs]]
@@ -224,8 +224,8 @@ def test_a_tick_that_overruns_is_counted_and_told_once() -> None:
     assert bench.timer(INNER.name).late == 60
     noted = [first for first, _ in bench.record.deadlines.missed]
     assert [b - a for a, b in pairwise(noted)] == [50 * PERIOD_US] * 59
-    (told,) = [text for text in bench.ground.texts if "late" in text]
-    assert re.fullmatch(r"ticks: 5\d late", told)
+    (reported,) = [text for text in bench.ground.texts if "late" in text]
+    assert re.fullmatch(r"ticks: 5\d late", reported)
 
 
 def test_a_telemetry_socket_that_blocks_costs_releases_but_no_answer_is_late() -> None:
