@@ -135,7 +135,7 @@ def _event(line: bytes) -> Event | None:
 
 
 def _die_with(parent: int, processor: int | None) -> Callable[[], None] | None:
-    """What a new child does before it becomes Python: tie its life to ours (Linux only)."""
+    """What a new child runs before exec, so that it ends with its parent (Linux only)."""
     if sys.platform != "linux":
         return None
     # Loaded here, because the child must not import anything between fork and exec.

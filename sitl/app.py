@@ -15,7 +15,7 @@ NOT_COMPLETED, COULD_NOT_START = 1, 2  # exit codes
 
 
 class CouldNotStart(Exception):
-    """Why there is no run, in one sentence."""
+    """A run that cannot start, in one sentence."""
 
 
 def run(options: SitlOptions) -> int:
@@ -55,7 +55,7 @@ def _run(options: SitlOptions, events: Events) -> int:
         stop.listen()
         events.report("ready", "sitl: ready, waiting for the flight software")
         if flight.wait_for_vehicle(stop):
-            return flight.fly(stop)
+            return flight.run(stop)
         if not stop.requested:
             raise CouldNotStart(
                 f"no flight software spoke to udp:{host}:{port} within {options.wait_s:g} s"
@@ -74,7 +74,7 @@ def _scenario(options: SitlOptions) -> Scenario:
 
 
 def _check_outputs(options: SitlOptions) -> None:
-    """Find out before the flight that its result could not be written."""
+    """Check before the flight that the result can be written."""
     try:
         if options.out is not None:
             options.out.mkdir(parents=True, exist_ok=True)

@@ -54,7 +54,7 @@ class FlightEvaluator:
         return self.world.margins(points, self._clock.target_at(time_s).p if applies else None)
 
     def judge(self, points: Points, time_s: float) -> None:
-        """Look at one plant step."""
+        """Evaluate one plant step."""
         if self.ended is not None:
             return
         margins = self.margins(points, time_s)
@@ -101,7 +101,7 @@ class FlightEvaluator:
         )
 
     def judge_landing(self, speed: float, time_s: float) -> None:
-        """Look at the landing speed [m/s] of the fastest foot on the ground."""
+        """Evaluate the landing speed [m/s] of the fastest foot on the ground."""
         if not (speed <= TOUCH_DOWN_MAX):
             sentence = (
                 f"the legs hit the ground at {speed:.1f} m/s at {time_s:.2f} s, "
@@ -110,7 +110,7 @@ class FlightEvaluator:
             self.end(EndKind.CRASH, sentence, time_s)
 
     def judge_time(self, time_s: float) -> None:
-        """Look at the clock."""
+        """End the run when its time is over."""
         if time_s >= self._duration_s - 1e-6:
             self.end(EndKind.DURATION, f"flew {time_s:.1f} s", time_s)
 

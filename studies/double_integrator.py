@@ -125,7 +125,7 @@ class DoubleIntegrator:
         return x, y, z
 
 
-def fly(
+def simulate(
     scenario: Scenario, seed: int, config: FlightConfig, *, traced: bool = False
 ) -> FlightResult:
     """Fly the planner alone on the double integrators: measured start, no delay, no fast loop.

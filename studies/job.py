@@ -76,12 +76,12 @@ class Outcome:
 
 def fly_job(job: Job, *, traced: bool = False) -> FlightResult:
     """Fly one job here and now."""
-    plants = {"full": closed_loop.fly, "double-integrator": double_integrator.fly}
+    plants = {"full": closed_loop.simulate, "double-integrator": double_integrator.simulate}
     return plants[job.plant](job.scenario, job.seed, job.config, traced=traced)
 
 
 def outcome(job: Job) -> Outcome:
-    """Fly one job; whatever it raises becomes a row that says so."""
+    """Fly one job; an exception becomes a row with the error."""
     try:
         return score(job.seed, fly_job(job))
     except Exception as error:

@@ -98,7 +98,7 @@ def _always(action: Action) -> Callable[[FailsafeContext], Action]:
 
 
 def _on_setpoints_lost(context: FailsafeContext) -> Action:
-    """COM_OBL_RC_ACT; to go on is impossible."""
+    """COM_OBL_RC_ACT; the mode cannot continue."""
     known = {3: Action.RETURN, 4: Action.LAND, 5: Action.HOLD}
     return known.get(context.limits.setpoint_loss_action, Action.HOLD)
 
@@ -198,7 +198,7 @@ BATTERY: Final = frozenset(
 
 
 def active(context: FailsafeContext) -> tuple[Failsafe, ...]:
-    """The rows whose condition is there, strongest first; almost always none."""
+    """Rows whose condition is active, strongest action first."""
     return tuple([row for row in FAILSAFES if row.active(context)])
 
 

@@ -1,4 +1,4 @@
-"""Setpoints for now: which are in range, and what they ask for."""
+"""Offboard setpoints: range checks and conversion."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _MAX_YAW = 4.0 * math.pi  # rad
 
 @dataclass(frozen=True, slots=True)
 class Tilt:
-    """Attitude asked for by rates, summed up."""
+    """Attitude setpoint integrated from body rates."""
 
     roll: float = 0.0  # rad
     pitch: float = 0.0  # rad
@@ -26,7 +26,7 @@ class Tilt:
 
 
 def motion_refusal(setpoint: MotionSetpoint) -> str | None:
-    """Why a motion is out of any range that a vehicle like this could mean."""
+    """Why a motion setpoint is out of range."""
     for vector, most, what in (
         (setpoint.p, MAX_DISTANCE, "position"),
         (setpoint.v, _MAX_SPEED, "velocity"),

@@ -1,4 +1,4 @@
-"""A circle as a reference that follows itself: from any point, where to and how fast; pure."""
+"""Orbit as a vector field: for any point, the target and velocity on the circle; pure."""
 
 from __future__ import annotations
 

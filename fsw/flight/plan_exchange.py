@@ -1,4 +1,4 @@
-"""Between tick and planner: what to ask, when an answer begins, what to fly while it ages."""
+"""Plan exchange: requests to the planner, the start of its plans, the state of a running one."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _JOINT_RATE = 3.0  # rad/s, which the plan stops within its horizon
 
 
 def nominal_at_rest(estimate: StateEstimate) -> PredictionState:
-    """A plan state that stands where the vehicle is."""
+    """A plan state at rest at the vehicle's position."""
     return PredictionState(
         p=estimate.p_WB,
         v=(0.0, 0.0, 0.0),
@@ -137,7 +137,7 @@ def take_answer(
 
 
 class PlanExchange:
-    """Requests to the planner and its answers, for one configuration."""
+    """Requests to the planner and its plans, for one configuration."""
 
     def __init__(self, config: FlightConfig) -> None:
         self._config = config
@@ -199,7 +199,7 @@ class PlanExchange:
 
 
 def requested(memory: PlanMemory, apply_us: int) -> PlanMemory:
-    """The memory once the next request is out; one without an answer is given up."""
+    """The memory after the next request; an unanswered one is dropped."""
     counters = memory.counters
     if memory.awaited_id >= 0:
         counters = replace(counters, fallbacks=counters.fallbacks + 1)

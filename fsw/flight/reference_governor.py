@@ -1,6 +1,6 @@
-"""The one limiter of references: nothing that is asked for leads the vehicle out of its safe set.
+"""The one limiter of references: no reference leads the vehicle out of its safe set.
 
-The planner's barriers keep the vehicle inside whatever is asked for, at a penalty that a reference
+The planner's barriers keep the vehicle inside for any reference, at a penalty that a reference
 far outside could outbid. So every reference passes here, by its origin:
 
 ============================  =====================================================

@@ -1,6 +1,6 @@
-r"""A setpoint that moves as the vehicle can, towards whatever is asked for.
+r"""Setpoint generator: a setpoint that moves as the vehicle can, towards a goal.
 
-What is asked for (a place, a velocity, an acceleration, a circle) may be anything, at any moment,
+A goal (a place, a velocity, an acceleration, a circle) may change to anything, at any time,
 and on the far side of a wall. The planner tracks a point, of the body or of the end-effector, that
 runs ahead of the vehicle within limits:
 
@@ -52,7 +52,7 @@ class ReferenceState:
 
 @dataclass(frozen=True, slots=True)
 class PositionGoal:
-    """What the point is after."""
+    """The goal of the point."""
 
     motion: MotionSetpoint
     joints: Vec2 | None = None  # rad
@@ -179,7 +179,7 @@ class SetpointGenerator:
 
 
 def _motion_now(reference: ReferenceState, goal: PositionGoal) -> MotionSetpoint:
-    """What the point is after where it is now."""
+    """The goal at the point's current position."""
     motion, look_at = goal.motion, goal.look_at
     if goal.orbit is not None:
         motion = on_orbit(goal.orbit, reference.p)

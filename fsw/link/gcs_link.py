@@ -1,7 +1,6 @@
 """One link to the ground: telemetry out, commands in, services both ways.
 
-Nothing that arrives here can raise, and nothing is kept between datagrams but what a valid frame
-said.
+Received data never raises, and only valid frames change the state of the link.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What arrived since the last tick, from whichever link."""
+"""Messages received since the last tick, from all links."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ Setpoint = MotionSetpoint | AttitudeSetpoint | JointSetpoint
 
 @dataclass(frozen=True, slots=True)
 class Setpoints:
-    """The newest setpoints for now; at most one of motion and attitude."""
+    """The newest offboard setpoints; at most one of motion and attitude."""
 
     motion: MotionSetpoint | None = None
     attitude: AttitudeSetpoint | None = None

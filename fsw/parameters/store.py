@@ -40,7 +40,7 @@ class Listener:
 
 @dataclass(frozen=True, slots=True)
 class _Change:
-    """One value somebody wants."""
+    """One requested change."""
 
     parameter: Parameter
     value: float

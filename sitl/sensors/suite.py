@@ -29,13 +29,13 @@ class SensorReadings(NamedTuple):
 
 
 class DelayLine(Generic[T]):
-    """Hands back what went in a fixed number of samples ago; before that, the first sample."""
+    """Delays samples by a fixed number; before that, returns the first sample."""
 
     def __init__(self, samples: int) -> None:
         self._line: deque[T] = deque(maxlen=samples + 1)
 
     def through(self, sample: T) -> T:
-        """Put in the newest sample, take out the delayed one."""
+        """Store the newest sample, return the delayed one."""
         self._line.append(sample)
         return self._line[0]
 

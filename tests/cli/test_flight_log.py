@@ -19,7 +19,7 @@ from pyulog import ULog
 
 from sitl.scenario_file import PACKAGED
 from tests.cli.command import clean_up, one_sentence, pandion, read_until, start
-from tests.processes.halves import free_port
+from tests.processes.both_processes import free_port
 from tests.waiting import wait_for
 
 FLIGHT = ("fly", "walls", "--lockstep", "--seed", "5", "--duration", "2")

@@ -52,10 +52,10 @@ class Attempt:
     def __call__(self, content: bytes | bytearray) -> int:
         self.log.write_bytes(content)
         code = self._command(self.log)
-        said = self._capsys.readouterr()
-        assert "Traceback" not in said.err + said.out
+        output = self._capsys.readouterr()
+        assert "Traceback" not in output.err + output.out
         assert code in (0, 1, 2)
-        assert said.err == "" if code < 2 else one_sentence(said.err)
+        assert output.err == "" if code < 2 else one_sentence(output.err)
         return code
 
 
@@ -113,13 +113,13 @@ def test_a_log_cut_between_two_records_is_compared_up_to_its_last_whole_tick(
 
 
 @pytest.mark.parametrize(
-    ("was", "becomes", "said"),
+    ("was", "becomes", "reported"),
     [
         (b":uint64_t timestamp;double", b":uint64_t timestamp;doublx", "fields than this build"),
         (b"sensor_frame:", b"sensor_frume:", "fields than this build"),
         (b"\0\0\0sensor_frame", b"\0\0\0sensor_frume", "topic 'sensor_frume' was not declared"),
         (b"char[3] controller", b"char[3] contrXller", "its controller is missing"),
-        (b'"origin.latitude"', b'"origin.latitudX"', "does not say where it began"),
+        (b'"origin.latitude"', b'"origin.latitudX"', "its origin is missing"),
         (b"D\x00\x00", b"X\x00\x00", "is damaged at byte"),
     ],
     ids=["type", "format", "subscription", "fact", "number", "kind"],
@@ -127,7 +127,7 @@ def test_a_log_cut_between_two_records_is_compared_up_to_its_last_whole_tick(
 def test_what_is_wrong_is_named(
     was: bytes,
     becomes: bytes,
-    said: str,
+    reported: str,
     whole: bytes,
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
@@ -137,11 +137,11 @@ def test_what_is_wrong_is_named(
     log.write_bytes(whole.replace(was, becomes, 1))
     assert replay.main([str(log), "--verify"]) == 2
     sentence = capsys.readouterr().err
-    assert said in sentence
+    assert reported in sentence
     assert one_sentence(sentence)
 
 
-def test_a_type_nobody_knows_is_refused_where_it_is_used(
+def test_an_unknown_type_is_refused_where_it_is_used(
     whole: bytes, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     log = tmp_path / "flight.ulg"

@@ -1,4 +1,4 @@
-"""What the scenario's pilot says, and when it gives up."""
+"""Messages of the scenario's pilot, and when it gives up."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class Flight:
     plan: FlightPlan
     results: dict[int, int]
     state: PilotState = field(init=False)
-    said: list[tuple[int, PilotMessage]] = field(default_factory=list)
+    reported: list[tuple[int, PilotMessage]] = field(default_factory=list)
     t_us: int = START_US
     heard: Heard = field(default_factory=Heard)
 
@@ -67,7 +67,7 @@ class Flight:
         for _ in range(round(seconds * 1e6 / STEP_US)):
             self.state, messages = speak(self.plan, self.state, self.t_us)
             assert len(messages) <= MESSAGES_PER_STEP
-            self.said += [(self.t_us, message) for message in messages]
+            self.reported += [(self.t_us, message) for message in messages]
             acks = tuple(
                 Ack(message.command, self.results[message.command])
                 for message in messages
@@ -78,10 +78,10 @@ class Flight:
             self.t_us += STEP_US
 
     def commands(self) -> list[tuple[int, int]]:
-        return [(t, m.command) for t, m in self.said if isinstance(m, SendCommand)]
+        return [(t, m.command) for t, m in self.reported if isinstance(m, SendCommand)]
 
     def targets(self) -> list[tuple[int, SendTarget]]:
-        return [(t, m) for t, m in self.said if isinstance(m, SendTarget)]
+        return [(t, m) for t, m in self.reported if isinstance(m, SendTarget)]
 
 
 def test_the_safe_set_is_announced_first() -> None:
@@ -186,7 +186,7 @@ def test_plan_none_leaves_the_flying_to_others() -> None:
 def test_walls_are_announced_again_every_second_for_a_datagram_may_be_lost() -> None:
     flight = Flight(plan("none", walls=WALLS), {})
     flight.fly(2.0)
-    times = [t_us for t_us, _ in flight.said]
+    times = [t_us for t_us, _ in flight.reported]
     assert times == [1_000_000] * len(WALLS) + [2_000_000] * len(WALLS)
 
 

@@ -1,4 +1,4 @@
-"""What is asked of Linux, and what is said where it refuses."""
+"""Real-time requests to Linux, and the warnings where they are refused."""
 
 from __future__ import annotations
 

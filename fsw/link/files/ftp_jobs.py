@@ -1,4 +1,4 @@
-"""Answers of MAVLink FTP that take more than a moment."""
+"""MAVLink FTP replies that take more than one tick."""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ _HEADER: Final = struct.Struct("<HBBBBBxI")
 
 
 class Opcode(enum.IntEnum):
-    """What is asked for, or answered."""
+    """Operation codes of requests and replies."""
 
     TERMINATE_SESSION = 1
     RESET_SESSIONS = 2
@@ -38,7 +38,7 @@ class Opcode(enum.IntEnum):
 
 
 class Refusal(enum.IntEnum):
-    """Why not: the byte of data in a NAK."""
+    """Error codes of a NAK."""
 
     FAIL = 1
     INVALID_DATA_SIZE = 3

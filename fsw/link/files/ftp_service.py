@@ -48,7 +48,7 @@ class _Session:
 
 @dataclass(frozen=True, slots=True)
 class _Answered:
-    """A request that must not be carried out twice, because it opens or closes a session."""
+    """A request that must run once only, because it opens or closes a session."""
 
     payload: bytes
     answer: PackedOutgoing
@@ -216,7 +216,7 @@ class FtpService:
         return None
 
     def _start(self, request: Request, client: Client, job: Job) -> None:
-        """Begin a job; it takes the place of the one that the client had there."""
+        """Start a job; it replaces the client's job of the same session."""
         reads = request.opcode != Opcode.CALC_FILE_CRC32
         key = client, request.session if reads else _NO_SESSION
         self._stop(key)

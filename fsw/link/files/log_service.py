@@ -63,7 +63,7 @@ class LogService:
         self._open: tuple[int, OpenFile] | None = None
 
     def handle(self, frame: Frame, t_us: int) -> Sequence[Outgoing]:
-        """Note what is asked for."""
+        """Store a request."""
         values = cast(Numbers, frame.payload_values)
         if not for_this_vehicle(*values[-2:]):
             return ()

@@ -17,9 +17,9 @@ from fsw.barriers.tangent import planes
 from fsw.link.wire.fence_items import check_fence_item, read_fence
 from fsw.link.wire.mission_items import (
     DENIED,
+    BadItem,
     Locate,
     MissionItem,
-    Refused,
     read_rally,
     read_step,
 )
@@ -34,7 +34,7 @@ from fsw.signals import (
     Vec2,
 )
 
-Judge = Callable[[SafeSet], tuple[str, ...]]
+SafeSetCheck = Callable[[SafeSet], tuple[str, ...]]
 """Why the vehicle could not keep a safe set; nothing where it can."""
 
 Meaning = MissionStep | Vec2 | None
@@ -50,9 +50,9 @@ class Kind(IntEnum):
 
 
 def _identity(items: tuple[MissionItem, ...]) -> int:
-    """A number that another list has not: a checksum of all that was uploaded, as PX4 has it.
+    """Identity of a list: a checksum of the upload, as in PX4.
 
-    0 means that nothing is there, so no list has it.
+    0 means an empty list, so no other list has it.
     """
     if not items:
         return 0
@@ -73,7 +73,7 @@ class Site:
     """Where missions are flown."""
 
     locate: Locate
-    judge: Judge
+    judge: SafeSetCheck
     clearance: Callable[[], float]  # m, from the walls of a fence uploaded now
 
 
@@ -100,7 +100,7 @@ class MissionStore:
         return self._items[kind]
 
     def read(self, kind: Kind, item: MissionItem) -> Meaning:
-        """What an item means; ``Refused`` where something is wrong with it by itself."""
+        """What an item means; ``BadItem`` where something is wrong with it by itself."""
         if kind is Kind.MISSION:
             return read_step(item, self._site.locate)
         if kind is Kind.RALLY:
@@ -111,7 +111,7 @@ class MissionStore:
     def keep(
         self, kind: Kind, items: tuple[MissionItem, ...], meanings: tuple[Meaning, ...]
     ) -> None:
-        """Put a whole upload in the place of the old one; ``Refused`` leaves that."""
+        """Put a whole upload in the place of the old one; ``BadItem`` leaves that."""
         if kind is Kind.MISSION:
             steps = tuple(step for step in meanings if isinstance(step, MissionStep))
             self._change(MissionUpdate(steps=steps, current=0 if steps else None))
@@ -143,7 +143,7 @@ class MissionStore:
         fence = read_fence(items, self._site.locate, self._site.clearance())
         against = self._site.judge(fence)
         if against:
-            raise Refused(DENIED, f"the fence cannot be kept: {'; '.join(against)}")
+            raise BadItem(DENIED, f"the fence cannot be kept: {'; '.join(against)}")
         if self._snapshot is not None:
             x, y, z = p = self._snapshot.estimate.p_WB
             for number, wall in enumerate(planes(fence, p)):
@@ -151,7 +151,7 @@ class MissionStore:
                 inside = n[0] * x + n[1] * y + n[2] * z - wall.offset - wall.clearance
                 if not inside > 0.0:
                     where = "not inside the fence" if number < len(fence.walls) else "excluded"
-                    raise Refused(
+                    raise BadItem(
                         DENIED,
                         f"the vehicle is {where}: {-inside:.2f} m beyond the clearance of "
                         f"wall or cylinder {number}",

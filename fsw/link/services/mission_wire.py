@@ -11,8 +11,8 @@ from fsw.link.wire.mission_items import (
     INVALID_PARAM1,
     LOCAL_FRAMES,
     NO_PLACE,
+    BadItem,
     MissionItem,
-    Refused,
 )
 from fsw.link.wire.outgoing import Outgoing, WireValues
 from fsw.link.wire.telemetry_context import PlanIds, TelemetryContext
@@ -48,7 +48,7 @@ def item_float(values: Numbers) -> MissionItem:
         if math.isnan(scaled):
             scaled = float(NO_PLACE)
         if not abs(scaled) <= NO_PLACE:
-            raise Refused(INVALID_PARAM1 + 4 + number, f"{value:g} is no place")
+            raise BadItem(INVALID_PARAM1 + 4 + number, f"{value:g} is no place")
         whole.append(round(scaled))
     return item_int((*values[0:4], *whole, *values[6:]))
 

@@ -34,7 +34,7 @@ class BulkService(LinkService, Protocol):
     """A service with much to send to clients that set the pace themselves, piece by piece."""
 
     def bulk(self, t_us: int) -> Sequence[ServiceOutput]:
-        """The next datagram of it; nothing where nothing is under way.
+        """The next datagram; nothing without a transfer.
 
         Called in what is left of a tick, several times, so that it delays none.
         """

@@ -1,6 +1,6 @@
 """MAVLink 2 signing of one link.
 
-A frame is believed if its hash is right, then if its time is: newer than the last of its sender,
+A frame is accepted if its hash is right and then its time: newer than the last of its sender,
 not further ahead than a minute. In this order, because a time taken from a forged frame would lock
 its true sender out. Source: https://mavlink.io/en/guide/message_signing.html
 """

@@ -72,7 +72,7 @@ class LinkCommands:
     ) -> _Outcome:
         message_id = _whole(request.params[0])
         if message_id is None:
-            return _DENIED, "message interval: param1 is no message id", ()
+            return _DENIED, "message interval: param1 is not a message id", ()
         interval = self._rates.interval_us(message_id)
         values = (interval, message_id & 0xFFFF)
         return _ACCEPTED, "", (Outgoing(message_ids.MESSAGE_INTERVAL, values),)
@@ -93,7 +93,7 @@ class LinkCommands:
     ) -> _Outcome:
         message_id = _whole(request.params[0])
         if message_id is None:
-            return _DENIED, "request message: param1 is no message id", ()
+            return _DENIED, "request message: param1 is not a message id", ()
         return self._now(message_id, request.params[1], snapshot)
 
     def _request_one(

@@ -1,4 +1,4 @@
-"""When each message of one link is due, and what SET_MESSAGE_INTERVAL changes about it."""
+"""Message schedule of one link, and its changes by SET_MESSAGE_INTERVAL."""
 
 from __future__ import annotations
 

@@ -121,7 +121,7 @@ def _scaled(number: float, scale: float) -> float:
 
 
 def end_effector_target(values: Numbers) -> EndEffectorTarget | None:
-    """Read an END_EFFECTOR_TARGET; None if it is of no use as a setpoint.
+    """Read an END_EFFECTOR_TARGET; None if it is not a valid setpoint.
 
     A masked velocity, acceleration or yaw reads as zero; a target without a position, in another
     frame than local NED or with a number that is not finite is refused.

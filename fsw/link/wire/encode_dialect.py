@@ -70,7 +70,7 @@ def end_effector_target(snapshot: FlightSnapshot, _: TelemetryContext) -> WireVa
 
 
 def setpoint_status(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues:
-    """SETPOINT_STATUS: how many setpoints were of use, and which kind is flown."""
+    """SETPOINT_STATUS: how many setpoints were accepted and refused, and which kind is flown."""
     report = snapshot.offboard
     counts = (report.accepted & _U32, report.refused & _U32, min(report.age_us, _U32))
     return (snapshot.t_us, *counts, int(report.kind))

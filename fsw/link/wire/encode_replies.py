@@ -1,4 +1,4 @@
-"""What the vehicle says in answer, to the simulator or a ground station; pure, in wire order."""
+"""Replies to the simulator and to ground stations; pure, in wire order."""
 
 from __future__ import annotations
 

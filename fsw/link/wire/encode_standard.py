@@ -40,7 +40,7 @@ _U32: Final = 0xFFFFFFFF
 
 
 def heartbeat(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues:
-    """HEARTBEAT as PX4 would send it, under whatever autopilot's name."""
+    """HEARTBEAT in PX4's format; the reported autopilot is configurable."""
     shown = shown_mode(snapshot)
     base_mode = _BASE_MODES.get(shown, _BY_ITSELF) | (_ARMED if snapshot.armed else 0)
     if snapshot.mode is Mode.FAULT:

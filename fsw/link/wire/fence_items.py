@@ -27,9 +27,9 @@ from fsw.link.wire.mission_items import (
     INVALID_PARAM1,
     LOCAL_OFFSET_NED,
     UNSUPPORTED,
+    BadItem,
     Locate,
     MissionItem,
-    Refused,
     horizontal_place,
 )
 from fsw.signals import PointObstacle, SafeSet, Vec2, Wall, WorkspaceSphere
@@ -64,26 +64,26 @@ def read_fence(items: tuple[MissionItem, ...], locate: Locate, clearance: float)
         item = items[at]
         size = _vertex_count(item)
         if size > len(items) - at:
-            raise Refused(INVALID, f"a polygon of {size} vertices has {len(items) - at}")
+            raise BadItem(INVALID, f"a polygon of {size} vertices has {len(items) - at}")
         at += size
         if item.command == RETURN_POINT:
             continue
         shape = _shape(items[at - size : at], locate, clearance)
         if isinstance(shape, WorkspaceSphere):
             if sphere is not None:
-                raise Refused(INVALID, "there can be one workspace sphere")
+                raise BadItem(INVALID, "there can be one workspace sphere")
             sphere = shape
         else:
             walls += [one for one in shape if isinstance(one, Wall)]
             cylinders += [one for one in shape if isinstance(one, PointObstacle)]
     if (walls or cylinders) and sphere is not None:
-        raise Refused(INVALID, "a fence and a workspace sphere cannot be kept at once")
+        raise BadItem(INVALID, "a fence and a workspace sphere cannot be kept at once")
     for count, most, what in (
         (len(walls), MOST_WALLS, "walls"),
         (len(cylinders), MOST_CYLINDERS, "cylinders of exclusion"),
     ):
         if count > most:
-            raise Refused(INVALID, f"a fence of {count} {what}; {most} can be kept")
+            raise BadItem(INVALID, f"a fence of {count} {what}; {most} can be kept")
     return SafeSet(tuple(walls), sphere, tuple(cylinders))
 
 
@@ -93,13 +93,13 @@ def check_fence_item(item: MissionItem, locate: Locate) -> None:
         _sphere(item)
         return
     if item.command not in (*_POLYGONS, *_CIRCLES, RETURN_POINT):
-        raise Refused(UNSUPPORTED, f"command {item.command} is no fence of this vehicle")
+        raise BadItem(UNSUPPORTED, f"command {item.command} is no fence of this vehicle")
     horizontal_place(item, locate)
     number = item.params[0]
     if item.command in _CIRCLES and not 0.0 < number < math.inf:
-        raise Refused(INVALID_PARAM1, f"a circle of radius {number:g} m")
+        raise BadItem(INVALID_PARAM1, f"a circle of radius {number:g} m")
     if item.command in _POLYGONS and not 3.0 <= number <= MOST_WALLS:
-        raise Refused(INVALID_PARAM1, f"a polygon of {number:g} vertices; 3 to {MOST_WALLS} do")
+        raise BadItem(INVALID_PARAM1, f"a polygon of {number:g} vertices; 3 to {MOST_WALLS} do")
 
 
 def _vertex_count(item: MissionItem) -> int:
@@ -112,7 +112,7 @@ def _shape(items: tuple[MissionItem, ...], locate: Locate, clearance: float) -> 
     for item in items:
         check_fence_item(item, locate)
         if (item.command, item.params[0]) != (items[0].command, items[0].params[0]):
-            raise Refused(INVALID, "the vertices of a polygon do not agree on their number")
+            raise BadItem(INVALID, "the vertices of a polygon do not agree on their number")
     first = items[0]
     if first.command == CIRCLE_INCLUSION and first.frame == LOCAL_OFFSET_NED:
         return _sphere(first)
@@ -133,10 +133,10 @@ def walls_of(corners: list[Vec2], clearance: float) -> list[Wall]:
     """
     edges = list(zip(corners, corners[1:] + corners[:1], strict=True))
     if any(math.dist(a, b) < _SHORTEST_EDGE for a, b in edges):
-        raise Refused(INVALID, f"a polygon with an edge shorter than {_SHORTEST_EDGE:g} m")
+        raise BadItem(INVALID, f"a polygon with an edge shorter than {_SHORTEST_EDGE:g} m")
     area = 0.5 * sum(a[0] * b[1] - b[0] * a[1] for a, b in edges)
     if not abs(area) > _SHORTEST_EDGE**2:
-        raise Refused(INVALID, "a polygon without an inside")
+        raise BadItem(INVALID, "a polygon without an inside")
     sense = 1.0 if area > 0.0 else -1.0  # 1: clockwise as seen from above
     walls = []
     for a, b in edges:
@@ -145,7 +145,7 @@ def walls_of(corners: list[Vec2], clearance: float) -> list[Wall]:
         normal = (-sense * (b[1] - a[1]) / length, sense * (b[0] - a[0]) / length, 0.0)
         offset = normal[0] * a[0] + normal[1] * a[1]
         if any(normal[0] * c[0] + normal[1] * c[1] < offset - 1e-3 for c in corners):
-            raise Refused(INVALID, "the polygon is not convex: its inside is no safe set here")
+            raise BadItem(INVALID, "the polygon is not convex: its inside is no safe set here")
         walls.append(Wall(normal, offset, clearance))
     return walls
 
@@ -227,7 +227,7 @@ def _octagon(centre: Vec2, radius: float) -> list[Vec2]:
 
 def _sphere(item: MissionItem) -> WorkspaceSphere:
     if not 0.0 < item.params[0] < math.inf:
-        raise Refused(INVALID_PARAM1, f"a sphere of radius {item.params[0]:g} m")
+        raise BadItem(INVALID_PARAM1, f"a sphere of radius {item.params[0]:g} m")
     if not math.isfinite(item.z):
-        raise Refused(INVALID_PARAM1 + 6, "a sphere needs the height of its centre")
+        raise BadItem(INVALID_PARAM1 + 6, "a sphere needs the height of its centre")
     return WorkspaceSphere((1e-4 * item.x, 1e-4 * item.y, item.z), item.params[0])

@@ -1,6 +1,6 @@
 """Mission items as ground stations upload them, read one by one into steps of the vehicle.
 
-An item that means nothing here is refused by an exception, ``Refused``, with MAVLink's own result
+An item that means nothing here is refused by an exception, ``BadItem``, with MAVLink's own result
 and a sentence. NaN and 0 in parameters that a command does not use are normal; a NaN heading keeps
 the heading.
 """
@@ -64,7 +64,7 @@ class MissionItem:
     autocontinue: int = 1
 
 
-class Refused(Exception):
+class BadItem(Exception):
     """Why something uploaded is of no use: a MAV_MISSION_RESULT and a sentence."""
 
     def __init__(self, result: int, reason: str) -> None:
@@ -74,17 +74,17 @@ class Refused(Exception):
 
 
 def read_step(item: MissionItem, locate: Locate) -> MissionStep:
-    """What an item means to this vehicle, or ``Refused``."""
+    """What an item means to this vehicle, or ``BadItem``."""
     reader = _READERS.get(item.command)
     if reader is None:
-        raise Refused(UNSUPPORTED, f"command {item.command} is not one of this vehicle's missions")
+        raise BadItem(UNSUPPORTED, f"command {item.command} is not one of this vehicle's missions")
     return reader(item, locate)
 
 
 def read_rally(item: MissionItem, locate: Locate) -> Vec2:
     """North and east of a rally point [m]; its altitude is not used, a return has its own."""
     if item.command != NAV_RALLY_POINT:
-        raise Refused(UNSUPPORTED, f"command {item.command} is no rally point")
+        raise BadItem(UNSUPPORTED, f"command {item.command} is no rally point")
     north, east, _ = _place(item, locate, "a rally point needs a place")
     return north, east
 
@@ -102,7 +102,7 @@ def horizontal_place(item: MissionItem, locate: Locate) -> Vec2:
             raise _bad(5, f"{latitude:g}, {longitude:g} is no place on Earth")
         north, east, _ = locate(latitude, longitude, 0.0)
     else:
-        raise Refused(UNSUPPORTED_FRAME, f"frame {item.frame} is not supported for this item")
+        raise BadItem(UNSUPPORTED_FRAME, f"frame {item.frame} is not supported for this item")
     for number, metres in ((5, north), (6, east)):
         if not abs(metres) <= MAX_DISTANCE:
             raise _bad(number, f"{math.hypot(north, east):.0f} m from the origin is too far")
@@ -234,7 +234,7 @@ def _z(item: MissionItem, locate: Locate) -> float:
     elif item.frame in GLOBAL_FRAMES:
         z = locate(0.0, 0.0, item.z)[2]
     else:
-        raise Refused(UNSUPPORTED_FRAME, f"frame {item.frame} is not supported for this item")
+        raise BadItem(UNSUPPORTED_FRAME, f"frame {item.frame} is not supported for this item")
     if not -MAX_DISTANCE <= z <= 0.0:
         raise _bad(7, f"a height of {-z:g} m is outside 0 to {MAX_DISTANCE:g} m")
     return z
@@ -248,5 +248,5 @@ def _within(value: float, most: float) -> bool:
     return 0.0 <= value <= most
 
 
-def _bad(number: int, reason: str) -> Refused:
-    return Refused(INVALID_PARAM1 + number - 1, reason)
+def _bad(number: int, reason: str) -> BadItem:
+    return BadItem(INVALID_PARAM1 + number - 1, reason)

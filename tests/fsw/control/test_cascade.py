@@ -1,4 +1,4 @@
-"""One fast cycle as a whole: what the rotors and joints are told to do to the body."""
+"""One fast cycle as a whole: the effect of the rotor and joint commands on the body."""
 
 from __future__ import annotations
 

@@ -51,10 +51,15 @@ def test_before_the_first_estimate_nothing_moves_and_commands_are_put_off() -> N
     assert "no valid state estimate" in outputs.texts[-1].text
     snapshot, level = outputs.snapshot, (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
     assert (snapshot.mode, snapshot.armed, snapshot.t_us) == (Mode.DISARMED, False, 5000)
-    told = snapshot.estimate
-    assert (told.t_us, told.p_WB, told.v_WB, told.w_WB_B) == (5000, STILL, STILL, STILL)
-    assert (told.R_WB, told.yaw) == (level, 0.0)
-    assert (told.q_arm, told.qd_arm) == ((0.0, 0.0), (0.0, 0.0))
+    reported = snapshot.estimate
+    assert (reported.t_us, reported.p_WB, reported.v_WB, reported.w_WB_B) == (
+        5000,
+        STILL,
+        STILL,
+        STILL,
+    )
+    assert (reported.R_WB, reported.yaw) == (level, 0.0)
+    assert (reported.q_arm, reported.qd_arm) == ((0.0, 0.0), (0.0, 0.0))
     assert (state.invalid_ticks, state.estimate) == (1, None)
     _, outputs = tick(state, 7000, sensors=blind)
     assert (outputs.acks, outputs.texts) == ((), ())

@@ -52,13 +52,13 @@ def test_what_matters_is_reported_at_once_and_once(what: str, count: int, words:
 
 def test_warnings_come_at_a_limited_rate_and_sum_up() -> None:
     monitor = DeadlineMonitor()
-    said = []
+    reported = []
     for second in range(60):
         sentence = monitor.warning(
             second * 1_000_000, late=30 * second, skipped=10 * second, plans_late=5 * second
         )
         if sentence is not None:
-            said.append(sentence)
-    assert len(said) == 6
-    assert said[1] == "ticks: 300 late, 100 skipped, 50 plans late"
-    assert all(len(sentence) <= 50 for sentence in said), "one STATUSTEXT"
+            reported.append(sentence)
+    assert len(reported) == 6
+    assert reported[1] == "ticks: 300 late, 100 skipped, 50 plans late"
+    assert all(len(sentence) <= 50 for sentence in reported), "one STATUSTEXT"

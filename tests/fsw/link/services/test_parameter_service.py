@@ -96,8 +96,8 @@ def test_who_sends_the_hash_back_needs_no_list(service: ParameterService) -> Non
 def test_what_is_read_only_says_so_and_shows_its_value(
     store: ParameterStore, service: ParameterService
 ) -> None:
-    *text, told, error = decoded(service.handle(setting(b"COM_RC_IN_MODE", 4.0), 0))
-    assert (told["message"], told["param_value"]) == (ids.PARAM_VALUE, 1.0)
+    *text, reported, error = decoded(service.handle(setting(b"COM_RC_IN_MODE", 4.0), 0))
+    assert (reported["message"], reported["param_value"]) == (ids.PARAM_VALUE, 1.0)
     assert error["error"] == dialect.MAV_PARAM_ERROR_READ_ONLY
     assert b"read only" in b"".join(bytes(t["text"]) for t in text)  # type: ignore[call-overload]
     (same,) = decoded(service.handle(setting(b"COM_RC_IN_MODE", 1.0), 0))
@@ -110,8 +110,8 @@ def test_px4_s_name_of_a_parameter_follows_it(
 ) -> None:
     service.handle(setting(b"STR_V_MAX", 1.25), 0)
     ticks(store)
-    told = {value["param_id"]: value["param_value"] for value in later(service, 3)}
-    assert told == {b"STR_V_MAX": 1.25, b"MPC_XY_VEL_MAX": 1.25}
+    reported = {value["param_id"]: value["param_value"] for value in later(service, 3)}
+    assert reported == {b"STR_V_MAX": 1.25, b"MPC_XY_VEL_MAX": 1.25}
 
 
 def test_a_choice_that_there_is_not_is_refused(
@@ -251,7 +251,7 @@ def test_the_hash_tells_a_ground_station_that_it_knows_every_value(
     service.handle(setting(b"PID_YAW_P", 5.0), 0)
     ticks(store)
     assert bits() == bitwise() != before
-    # Its thanks for that is no wish.
+    # Its acknowledgement is not a request.
     assert service.handle(setting(b"_HASH_CHECK", 1.0, type_=5), 0) == ()
 
 

@@ -20,7 +20,7 @@ from fsw.link.wire.fence_items import (
     cylinders_over,
     read_fence,
 )
-from fsw.link.wire.mission_items import MissionItem, Refused
+from fsw.link.wire.mission_items import BadItem, MissionItem
 from fsw.signals import PointObstacle, SafeSet, Vec3, WorkspaceSphere
 
 Corners = list[tuple[float, float]]
@@ -58,8 +58,8 @@ def safe(items: tuple[MissionItem, ...]) -> SafeSet:
     return read_fence(items, locate, 0.1)
 
 
-def reason(items: tuple[MissionItem, ...]) -> Refused:
-    with pytest.raises(Refused) as refused:
+def reason(items: tuple[MissionItem, ...]) -> BadItem:
+    with pytest.raises(BadItem) as refused:
         read_fence(items, locate, 0.1)
     return refused.value
 
@@ -100,7 +100,7 @@ def test_the_inside_of_a_convex_polygon_is_free(
     vertices = polygon(corners[::-1] if backwards else corners)
     try:
         read = safe(vertices)
-    except Refused:
+    except BadItem:
         assert any(word in reason(vertices).reason for word in ("shorter", "inside"))
         return
     north = sum(corner[0] for corner in corners) / len(corners)

@@ -7,7 +7,7 @@ import math
 import pytest
 
 from fsw.link.wire import mission_items as items
-from fsw.link.wire.mission_items import MissionItem, Refused, read_rally, read_step
+from fsw.link.wire.mission_items import BadItem, MissionItem, read_rally, read_step
 from fsw.signals import MissionAction, MissionStep, Vec3, Vec4
 
 NAN = math.nan
@@ -33,8 +33,8 @@ def step(given: MissionItem) -> MissionStep:
     return read_step(given, locate)
 
 
-def refused(given: MissionItem) -> Refused:
-    with pytest.raises(Refused) as refused:
+def refused(given: MissionItem) -> BadItem:
+    with pytest.raises(BadItem) as refused:
         read_step(given, locate)
     assert refused.value.reason
     return refused.value
@@ -122,6 +122,6 @@ def test_loitering_is_staying() -> None:
 def test_a_rally_point_is_a_place_and_nothing_else() -> None:
     rally = item(items.NAV_RALLY_POINT, 3, place=(470_001_000, 80_000_000, 5.0))
     assert read_rally(rally, locate) == pytest.approx((11.1, 0.0), abs=0.01)
-    with pytest.raises(Refused) as wrong:
+    with pytest.raises(BadItem) as wrong:
         read_rally(item(items.NAV_WAYPOINT), locate)
     assert wrong.value.result == 3

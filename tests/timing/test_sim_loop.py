@@ -41,7 +41,7 @@ from messages import dialect
 from messages.block_file import BlockFile
 from messages.frames import FrameWriter, split
 from tests.fsw.link.snapshots import FACTS, outputs_at
-from tests.fsw.log.test_recorded_inputs import SUBJECT
+from tests.fsw.log.test_reader import SUBJECT
 from tests.timing.virtual_time import FIRST_US, PERIOD_US, VirtualSensors, VirtualTime, frame
 
 Tick = Callable[[Any, TickInputs], tuple[Any, TickOutputs]]
@@ -73,7 +73,7 @@ class Sim(VirtualSensors):
 
 
 @dataclass
-class Planner:
+class StubPlanner:
     """Takes requests."""
 
     done: list[str]
@@ -157,7 +157,7 @@ class Bench:
 
     def run(self, seconds: float) -> None:
         self.until_us = self.time.now_us + round(1e6 * seconds)
-        end = self.loop.fly(frame(FIRST_US), Planner(self.sim.done))
+        end = self.loop.fly(frame(FIRST_US), StubPlanner(self.sim.done))
         assert end.ending is Ending.STOPPED
 
     def command(self, *parameters: float) -> None:
@@ -248,7 +248,7 @@ def test_with_the_simulator_s_end_there_is_nothing_left_to_miss() -> None:
     bench = Bench(standing)
     bench.asleep = bench.sim.end_after_a_second
     bench.until_us = bench.time.now_us + 10_000_000
-    end = bench.loop.fly(frame(FIRST_US), Planner(bench.sim.done))
+    end = bench.loop.fly(frame(FIRST_US), StubPlanner(bench.sim.done))
     assert end.ending is Ending.SHUTDOWN
     assert bench.timer(INNER.name).ticks == pytest.approx(500, abs=5)
     assert (bench.record.stale, bench.timer(INNER.name).skipped) == (0, 0)
