@@ -87,17 +87,17 @@ class Flight:
 def test_the_safe_set_is_announced_first() -> None:
     flight = Flight(plan(walls=WALLS, workspace=Workspace(0.1, 0.2)), {ARM: 0, MODE: 0})
     flight.fly(0.01)
-    first = [message for _, message in flight.said[:4]]
+    first = [message for _, message in flight.reported[:4]]
     assert [m.index for m in first if isinstance(m, Announce)] == [0, 1, 2]
     assert isinstance(first[3], Workspace)
-    assert flight.said[3][0] == START_US
+    assert flight.reported[3][0] == START_US
 
 
 def test_walls_and_points_are_announced_as_one_set() -> None:
     branch = Obstacle("branch", (0.0, 1.0, -1.0), 0.1)
     flight = Flight(plan(walls=WALLS, obstacles=(branch,)), {ARM: 0, MODE: 0})
     flight.fly(0.01)
-    first = [message for _, message in flight.said[:4]]
+    first = [message for _, message in flight.reported[:4]]
     assert [(m.index, m.count) for m in first if isinstance(m, Announce)] == [
         (0, 4), (1, 4), (2, 4), (3, 4),
     ]  # fmt: skip
@@ -180,7 +180,7 @@ def test_a_hop_takes_off_hovers_lands_and_is_done_when_disarmed() -> None:
 def test_plan_none_leaves_the_flying_to_others() -> None:
     flight = Flight(plan("none", walls=WALLS), {})
     flight.fly(2.0)
-    assert all(isinstance(message, Announce) for _, message in flight.said)
+    assert all(isinstance(message, Announce) for _, message in flight.reported)
 
 
 def test_walls_are_announced_again_every_second_for_a_datagram_may_be_lost() -> None:
