@@ -53,16 +53,22 @@ class Copy:
     def tests_of(self, module: str, extra: dict[str, list[str]]) -> list[list[str]]:
         """The test files of a module, the nearest first: most mutants fall there.
 
-        Its mirror and what imports it; the others of the mirror's folder; what is declared.
+        Its mirror; what imports it; the others of the mirror's folder; what is declared.
         """
         folder, _, name = module.rpartition("/")
         every = [self._name(path) for path in sorted((self.path / "tests/fsw").rglob("test_*.py"))]
-        near = [test for test in every if module in self.imported(test)]
-        near.sort(key=lambda test: not test.endswith(f"/test_{name}"))
+        mirror = [test for test in every if test == f"tests/{folder}/test_{name}"]
+        importing = [test for test in every if module in self.imported(test)]
         beside = [test for test in every if test.startswith(f"tests/{folder}/test_")]
-        declared = [test for prefix, tests in extra.items() if module.startswith(prefix)
-                    for test in tests]  # fmt: skip
-        return [near, [test for test in beside if test not in near], declared]
+        declared = [
+            test for prefix, tests in extra.items() if module.startswith(prefix) for test in tests
+        ]
+        groups: list[list[str]] = []
+        taken: set[str] = set()
+        for group in (mirror, importing, beside, declared):
+            groups.append([test for test in group if test not in taken])
+            taken.update(group)
+        return groups
 
     @cache  # noqa: B019 — there is one copy a run
     def imported(self, file: str) -> frozenset[str]:
