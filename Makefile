@@ -37,7 +37,7 @@ define check
 endef
 
 test: setup ## set up, then run every check: ruff, mypy, import-linter, pytest
-	@echo "checks in two rows at once, one a core; each is told when it is over"
+	@echo "checks in two rows at once, one a core; each reports when it is over"
 	@$(MAKE) --no-print-directory --jobs=2 tests-of-processes tests-of-the-rest
 
 # What reads the code only goes first in the row of the tests that often wait for clocks: meanwhile

@@ -15,11 +15,11 @@ import time
 from typing import Final
 
 from benchmarks.stops import Stops, Stretch
+from command_line.process import StopRequest
 from fsw.runtime.clock import now_us
-from fsw.runtime.grid import Grid
-from fsw.runtime.process import StopRequest
-from fsw.runtime.rates import INNER
+from fsw.runtime.rate_groups import INNER
 from fsw.runtime.realtime import claim_real_time
+from fsw.runtime.release_schedule import ReleaseSchedule
 
 _PRIORITY: Final = 60  # SCHED_FIFO; the tick has 50
 # Waking costs a virtual machine 30 us, and at twice the rate the tick's median grew by process. Not
@@ -61,13 +61,13 @@ def main(processor: int) -> None:
         return  # its lateness would say nothing about the machine
     gc.disable()
     late: list[Stretch] = []
-    grid = Grid(now_us() + _PERIOD_US, _PERIOD_US)
+    schedule = ReleaseSchedule(now_us() + _PERIOD_US, _PERIOD_US)
     while not stop.requested:
-        grid.advance(now_us())
-        time.sleep(1e-6 * max(grid.due_us - now_us(), 0))
+        schedule.advance(now_us())
+        time.sleep(1e-6 * max(schedule.due_us - now_us(), 0))
         woken_us = now_us()
-        if woken_us - grid.due_us > _STOPPED_US:
-            late.append((grid.due_us, woken_us))
+        if woken_us - schedule.due_us > _STOPPED_US:
+            late.append((schedule.due_us, woken_us))
     print(json.dumps(late))
 
 

@@ -161,7 +161,7 @@ def _stages(flown: dict[str, Any]) -> dict[str, float]:
         "step": whole,
         "simulator": whole - waited,
         "wait for the answer": waited,
-        "fsw receive": stages["hear"]["p50_us"],
+        "fsw receive": stages["receive"]["p50_us"],
         "fsw tick": stages["tick"]["p50_us"],
         "fsw send": stages["actuate"]["p50_us"],
         "fsw telemetry and log": fsw["telemetry"]["p50_us"],

@@ -25,8 +25,8 @@ from pandion.supervisor import ProcessFailed, Supervisor
 from pandion.version import version
 
 PASSED, NOT_PASSED = 0, 1  # exit codes
-_EXCHANGE = ("hear", "actuate")  # stages
-_LINK = (*_EXCHANGE, "publish", "record")  # everything of a tick but the tick itself
+_EXCHANGE = ("receive", "actuate")  # stages
+_LINK = (*_EXCHANGE, "publish", "log")  # everything of a tick but the tick itself
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

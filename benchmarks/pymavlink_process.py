@@ -37,7 +37,7 @@ def _swap_sitl() -> None:
         spoken: bytes = self._spoken(messages)
         return spoken + step(sender, readings)
 
-    def answer(received: bytes, joints: int) -> Any:
+    def read_reply(received: bytes, joints: int) -> Any:
         messages = receiver.parse_buffer(received) or []
         if len(messages) != 1 or messages[0].get_type() != "HIL_ACTUATOR_CONTROLS":
             return general(received, joints)
@@ -48,7 +48,7 @@ def _swap_sitl() -> None:
         return decode.VehicleReply(message.time_usec, wanted)
 
     StepEncoder.datagram = datagram  # type: ignore[method-assign]
-    decode.read_reply = answer  # type: ignore[assignment]
+    decode.read_reply = read_reply  # type: ignore[assignment]
 
 
 def step(sender: Any, readings: Any) -> bytes:

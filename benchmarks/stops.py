@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from fsw.runtime.releases import MOST_STALE
+from fsw.runtime.releases import MAX_STALE_TICKS
 
 Stretch = tuple[int, int]  # from, to: wall time in microseconds
 
@@ -24,7 +24,7 @@ class Stops:
         self._period_us = period_us
         # A stop began before it was seen. Behind it the vehicle finds its frames again, for as
         # long as it flies on old readings.
-        behind_us = MOST_STALE * period_us
+        behind_us = MAX_STALE_TICKS * period_us
         self._stretches = _united(
             (due_us - period_us, woken_us + behind_us) for one in late for due_us, woken_us in one
         )

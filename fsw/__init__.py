@@ -1,1 +1,1 @@
-"""Pandion flight software; read ``runtime/flight_loop.py`` first and ``signals.py`` second."""
+"""Pandion flight software; read ``flight/autopilot.py`` first and ``signals.py`` second."""

@@ -7,8 +7,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from command_line.process import Events, JsonEvents, StopRequest, TextEvents
 from fsw.arguments import FswOptions
-from fsw.link import link_report
+from fsw.control.control_metrics import ControlMetrics
 from fsw.link.build_links import build_links
 from fsw.link.files.flight_logs import FlightLogs
 from fsw.link.files.ftp_service import FtpService
@@ -27,17 +28,14 @@ from fsw.log.run_directory import new_run_directory
 from fsw.log.run_files import RunFiles
 from fsw.ports import LoopHealth, PlanningCycle
 from fsw.runtime import clock, report
-from fsw.runtime.effort import EffortRecord
-from fsw.runtime.events import Events, events
-from fsw.runtime.planner_worker import InlinePlanner, PlannerRecord, ProcessPlanner
-from fsw.runtime.process import StopRequest, in_a_child, settle_memory
+from fsw.runtime.planner_service import InlinePlanner, PlannerRecord, ProcessPlanner
+from fsw.runtime.process import in_a_child, settle_memory
 from fsw.runtime.program import FlightProgram
 from fsw.runtime.realtime import (
     TICK_PRIORITY,
     claim_real_time,
     release_real_time,
     scheduler,
-    share_interpreter_fairly,
 )
 from fsw.runtime.sim_loop import Ending, FlightEnd, FlightRecord, SimLoop
 from fsw.runtime.timing import GroupTimer
@@ -66,7 +64,7 @@ def run(options: FswOptions, load: ProgramLoader | None = None) -> int:
     Returns:
         The exit code.
     """
-    reporter = events(options.events)
+    reporter: Events = JsonEvents() if options.events == "json" else TextEvents()
     try:
         return _Session(options, reporter, load or load_flight_software).run()
     except (CouldNotStart, LinkError) as error:
@@ -104,7 +102,7 @@ class _Session:
         facts = program.facts
         record = FlightRecord(
             mpc=PlannerRecord(GroupTimer(facts.mpc_period_us)),
-            effort=EffortRecord(),
+            control=ControlMetrics(),
             health=LoopHealth(),
         )
         keeping = self._keep_parameters(program, directory)
@@ -141,9 +139,10 @@ class _Session:
         finally:
             for part in (planner, sim, ground, files, keeping):
                 part.close()
-        setup = report.Setup(options.control.controller, options.control.inner, facts)
-        result = report.as_json(setup, end, record, sim.retransmissions)
-        result |= link_report.as_json(ground, inbox)
+        result = report.as_json(options.control, facts, end, record)
+        result["retransmissions"] = sim.retransmissions
+        result["inbox_refused"] = inbox.refused
+        result["links"] = {link.name: link.as_json() for link in ground.links}
         result["files"] = files.as_json()
         unwritten = report.write(directory / "fsw.json", result)
         sentence = f"fsw: {end.sentence}"
@@ -222,7 +221,6 @@ class _Session:
             settle_memory()
             record.scheduler = scheduler()
             return loop.fly(first, InlinePlanner(inline, clock.now_us, record.mpc))
-        share_interpreter_fairly()
         refused = claim_real_time(TICK_PRIORITY)
         record.scheduler = scheduler()
         if refused:

@@ -38,7 +38,9 @@ class FswOptions:
     )
     events: str = events()
     # For the log only: what the simulator flies.
-    scenario: str = option("--scenario NAME", "what is flown, noted in the flight log", default="")
+    scenario: str = option(
+        "--scenario NAME", "name of the scenario, noted in the flight log", default=""
+    )
     scenario_digest: str = option(
         "--scenario-digest HEX", "digest of its file, noted in the flight log", default=""
     )

@@ -76,7 +76,7 @@ class ConstraintKind(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class SensorFrame:
-    """What the sensors said at one instant."""
+    """Sensor readings of one instant."""
 
     t_us: int  # sensor time, the only clock a tick knows
     p_WB: Vec3  # m
@@ -410,7 +410,7 @@ class MissionStep:
     hold_s: float = 0.0
     acceptance: float = 0.1  # m, end-effector to position
     speed: float | None = None  # m/s; None: the usual
-    stop_after: bool = False  # hold until told to go on
+    stop_after: bool = False  # hold until commanded to continue
 
 
 @dataclass(frozen=True, slots=True)
@@ -435,7 +435,7 @@ class MissionState(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class MissionProgress:
-    """What ground stations are told of the mission."""
+    """Mission state as reported to ground stations."""
 
     state: MissionState = MissionState.NO_MISSION
     current: int = 0
@@ -620,7 +620,7 @@ class BatteryState:
 
 @dataclass(frozen=True, slots=True)
 class OffboardReport:
-    """The set-point in use while offboard, and how many were of no use since start."""
+    """The setpoint in use while offboard, and how many were refused since start."""
 
     kind: SetpointKind = SetpointKind.NONE  # NONE unless flying offboard
     motion: MotionSetpoint | None = None
@@ -669,14 +669,14 @@ class TickInputs:
     commands: tuple[Command, ...] = ()
     targets: tuple[EndEffectorTarget, ...] = ()
     safe_set: SafeSet | None = None  # newly announced
-    # The newest set-points for now; at most one of motion and attitude.
+    # The newest offboard setpoints; at most one of motion and attitude.
     motion: MotionSetpoint | None = None
     attitude: AttitudeSetpoint | None = None
     joints: JointSetpoint | None = None
     refused_setpoints: int = 0  # that were of no use, since the last tick
     ground_station_heard: bool = False  # a heartbeat, since the last tick
     mission: MissionUpdate | None = None  # newly uploaded
-    tuning: Tuning | None = None  # newly wished for, whole
+    tuning: Tuning | None = None  # requested, whole
     stale_us: int = 0  # how much older the sensors' readings are, where no newer ones had come
 
 
@@ -689,4 +689,6 @@ class TickOutputs:
     plan_request: PlanRequest | None = None
     acks: tuple[CommandAck, ...] = ()
     texts: tuple[StatusText, ...] = field(default=())
-    tuning_taken: bool | None = None  # whether the one wished for is in use; None: none was
+    tuning_taken: bool | None = (
+        None  # whether the requested one is in use; None: none was requested
+    )

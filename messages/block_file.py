@@ -27,11 +27,7 @@ class BlockFile:
     """Append-only; blocks are written in order, completely or not at all."""
 
     def __init__(self, path: Path, write: Write = os.write) -> None:
-        """Create the file.
-
-        Args:
-            path: Where to write; must not exist.
-            write: Writes bytes to a file descriptor and says how many it took.
+        """Create the file; ``write`` takes a file descriptor and bytes and says how many it wrote.
 
         Raises:
             OSError: The file exists or cannot be created.

@@ -21,12 +21,7 @@ class BusyPollReceiver:
     """Receives from one socket, whose timeout is set in the kernel."""
 
     def __init__(self, source: socket.socket, size: int) -> None:
-        """Start out eager.
-
-        Args:
-            source: The socket.
-            size: Of the largest datagram [bytes].
-        """
+        """Start out eager; no datagram has more than ``size`` bytes."""
         self._receive = source.recv
         self._size = size
         self._credit = _MOST  # a first plan is slow, and more than one thing at a start

@@ -82,11 +82,7 @@ class FrameWriter:
     """Builds the frames of one component and counts their sequence."""
 
     def __init__(self, system_id: int, component_id: int) -> None:
-        """Start at sequence 0.
-
-        Args:
-            system_id: 1..255, written into every frame.
-            component_id: 1..255, written into every frame.
+        """Start at sequence 0, with ids of 1..255 that are written into every frame.
 
         Raises:
             ValueError: An id does not fit one byte or is 0, which is for addressing only.
@@ -100,14 +96,9 @@ class FrameWriter:
         self._origins = [bytes([0, 0, n, system_id, component_id]) for n in range(256)]
 
     def frame(self, message_id: int, *wire_values: float | bytes) -> bytes:
-        """Encode one message and advance the sequence.
+        """Encode every field of a message in wire order, arrays flattened; advance the sequence.
 
-        Args:
-            message_id: An id of the dialect or of common.xml.
-            *wire_values: Every field in wire order, extensions included, arrays flattened.
-
-        Returns:
-            The frame, unsigned, trailing zeros of the payload left out.
+        The frame is unsigned, and trailing zeros of the payload are left out.
 
         Raises:
             KeyError: The dialect has no such message.
@@ -118,11 +109,7 @@ class FrameWriter:
         return self._frame(layout, layout.payload.pack(*wire_values))
 
     def packed_frame(self, message_id: int, payload: bytes) -> bytes:
-        """Encode a message whose payload is packed already, and advance the sequence.
-
-        Args:
-            message_id: An id of the dialect or of common.xml.
-            payload: All of it, extensions included.
+        """Encode a message whose whole payload is packed already, and advance the sequence.
 
         Raises:
             KeyError: The dialect has no such message.
@@ -195,9 +182,8 @@ def is_signed(frame: bytes) -> bool:
 def as_version_1(frame: bytes) -> bytes | None:
     """Rewrite an unsigned frame of :class:`FrameWriter` for a peer that speaks MAVLink 1.
 
-    Returns:
-        The frame with the same sequence number, without extension fields and with the zeros that
-        MAVLink 2 leaves out; None where MAVLink 1 has no such message, its ids being one byte.
+    It has the same sequence number, no extension fields and the zeros that MAVLink 2 leaves out.
+    None where MAVLink 1 has no such message, its ids being one byte.
     """
     if frame[8] or frame[9]:
         return None
@@ -325,8 +311,7 @@ def _frame_1_at(datagram: bytes, start: int) -> tuple[int, Frame | None]:
 def wire_fields(message_id: int) -> tuple[str, ...]:
     """Name each value of :meth:`FrameWriter.frame` and :attr:`Frame.payload_values`, in order.
 
-    Returns:
-        Field names in wire order; array elements as ``name[0]``, ``name[1]``, …; text once.
+    An array's elements are ``name[0]``, ``name[1]``, …; a text is one value.
 
     Raises:
         KeyError: The dialect has no such message.

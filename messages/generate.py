@@ -33,12 +33,10 @@ class GenerationError(RuntimeError):
 def generate(
     definition: Path = DEFINITION, destination: Path = GENERATED, language: str = "Python3"
 ) -> None:
-    """Write what mavgen makes of a dialect.
+    """Write what mavgen makes of a dialect in one of its one-file languages: Python3, WLua.
 
-    Args:
-        definition: XML that may include any definition shipped with pymavlink.
-        destination: File to write; replaced in one step, so that a reader never sees half of it.
-        language: A language of mavgen's that is one file: Python3, WLua.
+    The definition may include any that is shipped with pymavlink. The destination is replaced in
+    one step, so that a reader never sees half of it.
 
     Raises:
         GenerationError: The XML is invalid or clashes with what it includes.

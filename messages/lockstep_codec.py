@@ -63,12 +63,7 @@ class LockstepFrame:
     """Writes one message whose last fields never change."""
 
     def __init__(self, writer: FrameWriter, message_id: int, *last_values: float | bytes) -> None:
-        """Fix the last values.
-
-        Args:
-            writer: Counts the sequence of its component.
-            message_id: An id of the dialect.
-            *last_values: In wire order; not all zero, so that the frame's length is fixed as well.
+        """Fix the last values in wire order; not all zero, so that the frame's length is fixed too.
 
         Raises:
             ValueError: The last values end a payload of no fixed length.

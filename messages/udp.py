@@ -28,14 +28,7 @@ class LinkError(Exception):
 
 
 def parse_address(text: str, *, any_port: bool = False) -> Address:
-    """Read ``udp:HOST:PORT``.
-
-    Args:
-        text: The address as typed.
-        any_port: Allow port 0, which lets the system choose.
-
-    Returns:
-        The host as an IPv4 address and the port.
+    """Read ``udp:HOST:PORT``; port 0, which lets the system choose, only with ``any_port``.
 
     Raises:
         LinkError: The text has another form, the port is out of range, or the host is unknown.

@@ -134,7 +134,7 @@ def tagged_text(severity: int, tag: int, t_us: int, text: str) -> bytes:
     return message(TAGGED, pack("<BHQ", ord("0") + severity, tag, t_us) + text.encode())
 
 
-def said(kind: bytes, body: bytes) -> tuple[int, int, str] | None:
+def text_of(kind: bytes, body: bytes) -> tuple[int, int, str] | None:
     """Severity, time and sentence of a text, tagged or not; None for what is no text."""
     if kind not in (TEXT, TAGGED):
         return None

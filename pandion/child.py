@@ -135,17 +135,17 @@ def _event(line: bytes) -> Event | None:
 
 
 def _die_with(parent: int, processor: int | None) -> Callable[[], None] | None:
-    """What a new child does before it becomes Python: tie its life to ours (Linux only)."""
+    """What a new child runs before exec, so that it ends with its parent (Linux only)."""
     if sys.platform != "linux":
         return None
     # Loaded here, because the child must not import anything between fork and exec.
     prctl = ctypes.CDLL(None).prctl
 
-    def tie() -> None:
+    def exit_with_parent() -> None:
         prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
         if os.getppid() != parent:
             os._exit(1)
         if processor is not None:
             os.sched_setaffinity(0, {processor})
 
-    return tie
+    return exit_with_parent

@@ -44,7 +44,7 @@ class DialectOptions:
 
 def main(argv: list[str]) -> int:
     """Install or print; returns the exit code."""
-    what = "Teach other programs the private messages."
+    what = "Install the private messages in other programs."
     options = read(DialectOptions, "pandion dialect", what, argv)
     if options.what == "xml":
         print(DEFINITION if options.path else DEFINITION.read_text(encoding="utf-8").rstrip())

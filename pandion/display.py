@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 class Display:
-    """Everything that a user sees of something long, on one stream."""
+    """Progress and sentences of a long operation, on one stream."""
 
     def __init__(self, stream: TextIO, *, lines: int = 10, threaded: bool = True) -> None:
         """Draw nothing yet.

@@ -101,7 +101,7 @@ def _rows(log: UlogFile) -> Iterator[tuple[str, int, tuple[str, ...], tuple[Any,
     known: dict[int, tuple[Topic, Any, tuple[str, ...]]] = {}
     pieces = ""
     for record in log.records():
-        reported = ulog.said(record.kind, record.body)
+        reported = ulog.text_of(record.kind, record.body)
         if reported is not None:
             severity, t_us, text = reported
             yield _TEXTS, t_us, ("timestamp", "severity", "text"), (t_us, severity, text)

@@ -33,7 +33,7 @@ _WAIT_S = 600.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlyOptions(RunOptions):
-    """One flight, as asked for."""
+    """Options of one flight."""
 
     control: ControlChoice = group(ControlChoice)
     params: Path | None = declared(PARAMS)
@@ -44,7 +44,7 @@ class FlyOptions(RunOptions):
 
 @dataclass(frozen=True, slots=True)
 class PlannedFlight:
-    """One flight, checked as far as that goes before a process is started."""
+    """One flight, checked before its processes start."""
 
     options: FlyOptions
     name: str  # of the scenario

@@ -1,4 +1,4 @@
-"""Makes one file of the flight log and the simulator's truth when both processes have ended."""
+"""Joins the flight log and the simulator's truth when both processes have ended."""
 
 from __future__ import annotations
 

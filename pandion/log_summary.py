@@ -33,7 +33,7 @@ def summary(log: UlogFile, progress: Callable[[int, int], None]) -> dict[str, An
             counts[log.topics[record.number].name] += 1
             last_us = max(last_us, int.from_bytes(record.body[:8], "little"))
             first_us = first_us or last_us
-        elif (reported := ulog.said(record.kind, record.body)) is not None:
+        elif (reported := ulog.text_of(record.kind, record.body)) is not None:
             _, t_us, text = reported
             texts.append(f"{1e-6 * t_us:9.3f} s  {text}")
         elif record.kind == ulog.DROPOUT:

@@ -32,13 +32,13 @@ class _Where:
 
 
 def _as_json() -> Any:
-    return switch("--json", "for programs, with all that is known")
+    return switch("--json", "as JSON, with all metadata")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _List(_Where):
     pattern: str = option("PATTERN", "of names", default="*")
-    changed: bool = switch("--changed", "only what is not the default")
+    changed: bool = switch("--changed", "only values that are not the default")
     json: bool = _as_json()
 
 
@@ -263,7 +263,7 @@ ACTIONS: Final[dict[str, tuple[type[_Where], Callable[[Any, Values], int], str]]
     "list": (_List, _list, "Show parameters; in PATTERN * and ? stand for anything."),
     "get": (_Get, _get, "Show parameters by name."),
     "set": (_Set, _set, "Change one parameter."),
-    "import": (_File, _import, "Take over every value of a .params or .parm file."),
+    "import": (_File, _import, "Set every value of a .params or .parm file."),
     "export": (
         _File,
         _export,

@@ -2,7 +2,7 @@
 
 In lockstep the two take turns. On two processors each keeps its caches, and the one that waits
 polls for the datagram instead of sleeping (``messages/busy_poll.py``). On one, the kernel switches
-from one to the other, which is slower (docs/decisions/0017). But polling is of use only while the
+from one to the other, which is slower (docs/decisions/0017). But polling helps only while the
 other one runs: on a busy machine, both on the quietest processor disturb least.
 """
 
@@ -19,7 +19,7 @@ _IDLE: Final = 0.7  # share of a processor's time that must be unused
 
 
 class Places(NamedTuple):
-    """A processor for each process; None: wherever the system likes."""
+    """A processor for each process; None: the system's choice."""
 
     sitl: int | None = None
     fsw: int | None = None
@@ -29,7 +29,7 @@ ANYWHERE: Final = Places()
 
 
 def lockstep_places() -> Places:
-    """Two idle processors, else the quietest one for both, else wherever the system likes."""
+    """Two idle processors, else the quietest one for both, else the system's choice."""
     if sys.platform != "linux":
         return ANYWHERE
     allowed = os.sched_getaffinity(0)

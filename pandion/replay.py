@@ -32,14 +32,14 @@ class ReplayOptions:
 
     log: Path = option("LOG", "flight.ulg, or its directory", Path, required=True)
     verify: bool = switch(
-        "--verify", "feed the inputs through the same tick; exit code 1 at the first difference"
+        "--verify", "replay the inputs and compare the outputs; exit code 1 at the first difference"
     )
     json: str | None = json_file("the result")
 
 
 def main(argv: list[str]) -> int:
     """Read a log, and compare if asked; returns the exit code."""
-    what = "Show what a flight log holds, or fly its inputs again."
+    what = "Show what a flight log holds, or replay its inputs."
     options = read(ReplayOptions, "pandion replay", what, argv)
     from fsw.log.reader import open_flight
     from messages.ulog_reader import UlogError
@@ -96,7 +96,7 @@ def _origin(log: UlogFile) -> Origin:
         parts = (numbers[f"origin.{part.name}"] for part in dataclasses.fields(Origin))
         return Origin(*map(float, parts))
     except (KeyError, TypeError, ValueError):
-        raise UlogError(f"{log.path} is damaged: it does not say where it began") from None
+        raise UlogError(f"{log.path} is damaged: its origin is missing") from None
 
 
 def _sentence(found: Replayed, log: UlogFile) -> str:
@@ -108,10 +108,10 @@ def _sentence(found: Replayed, log: UlogFile) -> str:
         )
     if found.lost_ms:
         return (
-            f"no difference in {found.ticks} ticks; behind them {found.lost_ms} ms are missing "
-            "in the log, and what follows cannot be fed"
+            f"no difference in {found.ticks} ticks; then {found.lost_ms} ms are missing "
+            "in the log, and later ticks cannot be replayed"
         )
-    cut = "" if log.whole else "; the log ends in the middle of a record"
+    cut = "" if log.whole else "; the log was cut there, and an incomplete tick is not compared"
     return f"no difference in {found.ticks} ticks{cut}"
 
 

@@ -92,7 +92,7 @@ class ReproduceOptions:
 
 def main(argv: list[str]) -> int:
     """Run one study; returns the exit code."""
-    what = "Fly a table or a figure of the paper again."
+    what = "Reproduce a table or a figure of the paper."
     options = read(ReproduceOptions, "pandion reproduce", what, argv)
     from fsw.runtime.process import pin_numerics_to_one_thread
 

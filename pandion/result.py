@@ -23,7 +23,7 @@ _NOTHING: dict[str, float] = {"sum": 0.0, "mean": 0.0}
 
 @dataclass(frozen=True, slots=True)
 class FlightReports:
-    """What there is to judge after a flight."""
+    """Inputs to the result of a flight."""
 
     scenario: str
     seed: int

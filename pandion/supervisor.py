@@ -65,7 +65,7 @@ class Flown:
 
 
 class Supervisor:
-    """Starts sitl, then fsw, and sees both to their end."""
+    """Starts sitl, then fsw, and waits for both to end."""
 
     def __init__(
         self, display: Display, out: Path, places: Places = ANYWHERE, runner: str | None = None
@@ -168,7 +168,7 @@ class Supervisor:
             other.expect(_STALLED_S, _STALLED_S)
 
     def _note_exit(self, child: Child) -> None:
-        """Note a crash, and give the other process a moment to follow."""
+        """Record a crash, and wait briefly for the other process."""
         child.end(patience_s=1.0)
         code, name, flown = child.exit_code, child.name, self._flown
         obeyed = child.interrupted and code == -signal.SIGINT

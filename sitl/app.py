@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
-import signal
 import traceback
-from types import FrameType
 
+from command_line.process import Events, JsonEvents, StopRequest, TextEvents
 from sitl.arguments import SitlOptions
-from sitl.events import Events, JsonEvents, TextEvents
 from sitl.link.udp_endpoint import RESEND_S, LinkError, PeerSocket, parse_address
 from sitl.scenario import Scenario
 from sitl.scenario_file import ScenarioError, load_scenario
@@ -17,22 +15,7 @@ NOT_COMPLETED, COULD_NOT_START = 1, 2  # exit codes
 
 
 class CouldNotStart(Exception):
-    """Why there is no run, in one sentence."""
-
-
-class StopRequest:
-    """Becomes true on SIGINT or SIGTERM, so that the run can end between two steps."""
-
-    def __init__(self) -> None:
-        self.requested = False
-
-    def listen(self) -> None:
-        """Take over both signals; until then SIGINT raises KeyboardInterrupt."""
-        signal.signal(signal.SIGINT, self._request)
-        signal.signal(signal.SIGTERM, self._request)
-
-    def _request(self, number: int, frame: FrameType | None) -> None:
-        self.requested = True
+    """A run that cannot start, in one sentence."""
 
 
 def run(options: SitlOptions) -> int:
@@ -72,7 +55,7 @@ def _run(options: SitlOptions, events: Events) -> int:
         stop.listen()
         events.report("ready", "sitl: ready, waiting for the flight software")
         if flight.wait_for_vehicle(stop):
-            return flight.fly(stop)
+            return flight.run(stop)
         if not stop.requested:
             raise CouldNotStart(
                 f"no flight software spoke to udp:{host}:{port} within {options.wait_s:g} s"
@@ -91,7 +74,7 @@ def _scenario(options: SitlOptions) -> Scenario:
 
 
 def _check_outputs(options: SitlOptions) -> None:
-    """Find out before the flight that its result could not be written."""
+    """Check before the flight that the result can be written."""
     try:
         if options.out is not None:
             options.out.mkdir(parents=True, exist_ok=True)

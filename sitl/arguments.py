@@ -28,7 +28,7 @@ def speed(text: str) -> float | None:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunOptions:
-    """What any way to start a simulated flight has in common."""
+    """Options shared by every way to start a simulated flight."""
 
     scenario: str = option("SCENARIO", "name or path of a .toml file", default="walls")
     seed: int = option("--seed N", "root of all randomness", whole(), default=0)

@@ -11,12 +11,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
+from command_line.process import Events
 from sitl.arguments import SitlOptions
-from sitl.events import Events
 from sitl.link.encode import StepEncoder
 from sitl.link.exchange import Exchange, ExchangeCounts, Lockstep, RealTime, Stop
 from sitl.link.pilot import flight_plan
-from sitl.link.server import RunTiming, fly, shut_down, wait_for_vehicle
+from sitl.link.server import RunTiming, serve, shut_down, wait_for_vehicle
 from sitl.link.udp_endpoint import PeerSocket
 from sitl.result import EndKind, TruthResult
 from sitl.scenario import Scenario
@@ -50,7 +50,7 @@ class Flight:
         """Wait as long as the options allow; False if none came."""
         return wait_for_vehicle(self._endpoint, self._options.wait_s, stop)
 
-    def fly(self, stop: Stop) -> int:
+    def run(self, stop: Stop) -> int:
         """Fly to the end and report; returns the exit code."""
         options, simulation, endpoint = self._options, self._simulation, self._endpoint
         self._events.report("flying", "sitl: flying")
@@ -60,7 +60,7 @@ class Flight:
         exchange = self._exchange(stop)
         with contextlib.ExitStack() as files:
             truth = self._truth(files)
-            timing = fly(simulation, plan, exchange, encoder, stop, self._progress, truth)
+            timing = serve(simulation, plan, exchange, encoder, stop, self._progress, truth)
         silent_since = exchange.silent_since
         if silent_since is not None:
             simulation.note_silence(silent_since)

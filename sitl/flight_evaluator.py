@@ -22,10 +22,7 @@ _NO_CURVE = np.empty(0)
 class FlightEvaluator:
     """The score of one run and the first reason to end it.
 
-    Args:
-        scenario: What is flown.
-        clock: When the trajectory runs.
-        points: Critical points at the start.
+    It begins with the critical points at the start.
 
     Raises:
         ScenarioError: The start is outside the safe set.
@@ -57,7 +54,7 @@ class FlightEvaluator:
         return self.world.margins(points, self._clock.target_at(time_s).p if applies else None)
 
     def judge(self, points: Points, time_s: float) -> None:
-        """Look at one plant step."""
+        """Evaluate one plant step."""
         if self.ended is not None:
             return
         margins = self.margins(points, time_s)
@@ -74,12 +71,9 @@ class FlightEvaluator:
             self.end(EndKind.COLLISION, f"{touched} at {time_s:.2f} s", time_s)
 
     def judge_all(self, places: Array, before_s: float, step_s: float) -> None:
-        """Look at every plant step of an exchange.
+        """Look at every plant step, ``step_s`` long, of an exchange that began at ``before_s``.
 
-        Args:
-            places: (steps, 2 + j, 3) [m, NED], from ``sitl.plant.integrator.integrate``.
-            before_s: Time at the begin of the exchange [s].
-            step_s: Length of a plant step [s].
+        ``places`` (steps, 2 + j, 3) [m, NED] are from ``sitl.plant.integrator.integrate``.
         """
         if self.ended is None and self._all_clear(places, before_s, step_s):
             return
@@ -107,7 +101,7 @@ class FlightEvaluator:
         )
 
     def judge_landing(self, speed: float, time_s: float) -> None:
-        """Look at the landing speed [m/s] of the fastest foot on the ground."""
+        """Evaluate the landing speed [m/s] of the fastest foot on the ground."""
         if not (speed <= TOUCH_DOWN_MAX):
             sentence = (
                 f"the legs hit the ground at {speed:.1f} m/s at {time_s:.2f} s, "
@@ -116,7 +110,7 @@ class FlightEvaluator:
             self.end(EndKind.CRASH, sentence, time_s)
 
     def judge_time(self, time_s: float) -> None:
-        """Look at the clock."""
+        """End the run when its time is over."""
         if time_s >= self._duration_s - 1e-6:
             self.end(EndKind.DURATION, f"flew {time_s:.1f} s", time_s)
 

@@ -36,9 +36,10 @@ class Heading:
 
 
 def facing(walls: tuple[ScenarioWall, ...], p: V3) -> float:
-    """Yaw in [0, pi) that turns the arm's plane to the nearest wall, between two near ones.
+    """Yaw in [0, pi) that turns the arm's plane at p [m, NED] to the nearest wall.
 
-    A plane faces a wall with either side, so half a turn more is the same.
+    Near two walls it lies between their yaws. A plane faces a wall with either side, so half a
+    turn more is the same.
     """
     x, y, z = p
     gaps = [a * x + b * y + c * z - wall.offset_m for wall in walls for a, b, c in (wall.normal,)]

@@ -61,7 +61,7 @@ class TrackingError:
         self.maximum: float | None = None
 
     def add(self, p: V3, target: V3) -> None:
-        """Take one sample of the true and the desired position [m]."""
+        """Add a sample: true position p [m, NED] and desired position target [m, NED]."""
         error = math.dist(p, target)
         self._squares += error * error
         self._count += 1
@@ -131,15 +131,10 @@ def score(
     whole: EndKind,
     flaws: tuple[str, ...] = (),
 ) -> TruthResult:
-    """The result of a run.
+    """The result of a run, up to ``time_s``; ``end`` is None while it goes on.
 
-    Args:
-        end: How it ended, None while it goes on.
-        time_s: Now, since the start of the simulation [s].
-        error: Of the end-effector.
-        record: Of the margins.
-        whole: The end that such a run should have.
-        flaws: What else was not as in a completed run, each in a sentence.
+    ``whole`` is the end that such a run should have; ``flaws`` say, each in a sentence, what else
+    was not as in a completed run.
     """
     broken = violation(record)
     worst = record.worst()

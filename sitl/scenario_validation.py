@@ -1,4 +1,4 @@
-"""Checks across the keys of a scenario: what no single range can say."""
+"""Checks that involve several keys of a scenario."""
 
 from __future__ import annotations
 

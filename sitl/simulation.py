@@ -137,7 +137,7 @@ class Simulation:
             self._evaluator.left = f"{why} at {time_s:.1f} s"
 
     def note_silence(self, step: int) -> None:
-        """Nothing came from the vehicle since this step: whatever ended was not flown."""
+        """The vehicle has been silent since this step: the run does not count as flown."""
         if self.ended is None or self.ended.kind is not EndKind.STOPPED:  # which says it itself
             self._evaluator.silent = f"the flight software was silent since step {step}"
 

@@ -30,12 +30,7 @@ def flown_vehicle(scenario: Scenario) -> Vehicle:
 
 
 def first_state(vehicle: Vehicle, scenario: Scenario, p_target: V3) -> tuple[Array, Trim]:
-    """State vector and actuator values at t = 0.
-
-    Args:
-        vehicle: What flies.
-        scenario: Says whether it flies or stands.
-        p_target: First end-effector reference [m, NED].
+    """State vector and actuator values at t = 0; ``p_target`` [m, NED] is the first reference.
 
     Raises:
         ScenarioError: No equilibrium within the actuators' limits.

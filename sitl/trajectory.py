@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 from sitl.compiled import compilable
 from sitl.plant.vector import Array
@@ -20,45 +20,13 @@ class TrajectoryPoint(NamedTuple):
     a: V3  # m/s²
 
 
-class Reference(Protocol):
-    """An end-effector reference; time counts from the pilot's trajectory start."""
-
-    def at(self, t: float) -> TrajectoryPoint:
-        """The reference at time t [s] after the start; at rest before 0."""
-        ...
-
-    def place(self, t: float) -> V3:
-        """Position of ``at(t)`` alone [m, NED]; t [s]."""
-        ...
-
-
-@dataclass(frozen=True, slots=True)
-class HoldReference:
-    """Stay at one point."""
-
-    hold: Hold
-
-    def at(self, t: float) -> TrajectoryPoint:
-        """See ``Reference``; t [s]."""
-        still = (0.0, 0.0, 0.0)
-        return TrajectoryPoint(self.hold.position_m, still, still)
-
-    def place(self, t: float) -> V3:
-        """See ``Reference``; t [s]."""
-        return self.hold.position_m
-
-
 @compilable
 def warped(t: float, ramp: float, duration: float) -> tuple[float, float, float]:
     """Own time s [s] of a curve that starts and stops smoothly, ds/dt [1] and d²s/dt² [1/s].
 
-    ds/dt follows the quintic smooth step from 0 to 1 over ``ramp`` and back before ``duration``, so
-    that velocity and acceleration of any curve p(s) vanish at both ends.
-
-    Args:
-        t: Time since the start [s].
-        ramp: Length of the start [s], above 0.
-        duration: Length of the whole [s], at least 2 ramps.
+    At t [s] after the start ds/dt has followed the quintic smooth step from 0 to 1 over ``ramp``
+    [s] and goes back before ``duration`` [s], at least 2 ramps, so that velocity and acceleration
+    of any curve p(s) vanish at both ends.
     """
     # The second half is the first one backwards.
     backwards = t > 0.5 * duration
@@ -75,32 +43,30 @@ def warped(t: float, ramp: float, duration: float) -> tuple[float, float, float]
 
 @compilable
 def lissajous_at(centre: float, amplitude: float, period: float, phase: float, s: float) -> float:
-    """One coordinate [m] of a Lissajous curve.
+    """One coordinate [m] of a Lissajous curve at its own time s [s], from ``warped``.
 
-    Args:
-        centre: Middle of the oscillation [m].
-        amplitude: Its size [m].
-        period: Its period [s].
-        phase: Its phase at ``s`` = 0 [deg].
-        s: Time of the curve itself, from ``warped`` [s].
+    It swings about ``centre`` [m] by ``amplitude`` [m] with ``period`` [s] and ``phase`` [deg].
     """
     return centre + amplitude * math.sin(2.0 * math.pi / period * s + math.radians(phase))
 
 
 @dataclass(frozen=True, slots=True)
-class LissajousReference:
-    """p = c + A sin(2π s/T + φ) per axis, with s from ``warped``."""
+class Reference:
+    """p = c + A sin(2π s/T + φ) per axis, with s from ``warped``; to hold a point, A is zero.
+
+    Time counts from the pilot's trajectory start.
+    """
 
     row: tuple[float, ...]  # as ``curve_row``
 
     def at(self, t: float) -> TrajectoryPoint:
-        """See ``Reference``; t [s]."""
+        """The reference at time t [s] after the start; at rest before 0."""
         s, rate, bend = warped(t, self.row[12], self.row[13])
         x, y, z = (self._axis(i, s, rate, bend) for i in range(3))
         return TrajectoryPoint((x[0], y[0], z[0]), (x[1], y[1], z[1]), (x[2], y[2], z[2]))
 
     def place(self, t: float) -> V3:
-        """See ``Reference``; t [s]."""
+        """Position of ``at(t)`` alone [m, NED]; t [s]."""
         return place_on_curve(self.row, t)
 
     def _axis(self, i: int, s: float, rate: float, bend: float) -> V3:
@@ -118,9 +84,7 @@ class LissajousReference:
 
 def reference(trajectory: Trajectory) -> Reference:
     """The reference that a scenario describes."""
-    if isinstance(trajectory, Hold):
-        return HoldReference(trajectory)
-    return LissajousReference(curve_row(trajectory))
+    return Reference(curve_row(trajectory))
 
 
 def curve_row(trajectory: Trajectory) -> tuple[float, ...]:

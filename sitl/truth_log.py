@@ -25,13 +25,7 @@ class TruthLog:
     """Whole records, appended a few hundred steps at a time."""
 
     def __init__(self, path: Path, scenario: str, seed: int, warn: Callable[[str], None]) -> None:
-        """Create the file.
-
-        Args:
-            path: Where to write; what is there is replaced, as the simulator's other results are.
-            scenario: What is flown.
-            seed: The root of its randomness.
-            warn: Called once if the disk refuses; the simulation goes on.
+        """Create the file in place of an older one; ``warn`` is called once if the disk refuses.
 
         Raises:
             OSError: The file cannot be created.

@@ -18,7 +18,10 @@ CRITICAL_POINTS = ("base", "joint2", "end_effector")  # critical points, in the 
 
 
 def workspace_margin(workspace: Workspace, p_base: V3, p_target: V3) -> float:
-    """R − |base − centre| [m]; the centre rides ``d_iw`` above the end-effector's reference."""
+    """R − |base − centre| [m] of a base at p_base [m, NED].
+
+    The centre is ``d_iw`` above the end-effector's reference, p_target [m, NED].
+    """
     x, y = p_base[0] - p_target[0], p_base[1] - p_target[1]
     z = p_base[2] - (p_target[2] - workspace.d_iw_m)
     distance: float = (x * x + y * y + z * z) ** 0.5
@@ -42,12 +45,10 @@ class World:
         self.keys = (*keys, *(("workspace/base",) if self.workspace else ()))
 
     def margins(self, points: tuple[V3, V3, V3], target: V3 | None) -> tuple[float, ...]:
-        """Margins [m] in the order of ``keys``; negative means violated.
+        """Margins [m] of base, joint 2 and end-effector, as ``keys``; negative means violated.
 
-        Args:
-            points: Base, joint 2 and end-effector [m, NED].
-            target: End-effector reference [m, NED]; None while the workspace does not apply,
-                its margin is then infinite.
+        Without a target, the end-effector's reference, the workspace does not apply: its margin is
+        infinite.
         """
         values = [
             a * x + b * y + c * z - limit for a, b, c, limit in self._planes for x, y, z in points
@@ -64,13 +65,9 @@ class World:
         return tuple(values)
 
     def collision(self, points: tuple[V3, V3, V3], margins: tuple[float, ...]) -> str | None:
-        """A sentence if a critical point touches a wall or the ground, else None.
+        """A sentence if a point with these margins touches a wall or the ground, else None.
 
         An obstacle is a point and cannot be touched: coming too close to it is a violation only.
-
-        Args:
-            points: Base, joint 2 and end-effector [m, NED].
-            margins: Their margins, from ``margins``.
         """
         (_, _, base), (_, _, joint2), (_, _, end) = points
         if max(base, joint2, end) < 0.0 < min(margins, default=1.0):
@@ -99,11 +96,11 @@ def record_if_clear(
     """``World.margins`` of plant steps without any incident, into the record of the smallest.
 
     Args:
-        planes: (walls, 4) [m] of a World: normal and least distance.
-        balls: (obstacles, 4) [m] of a World: centre and least distance.
+        planes: (walls, 4) [m] of a World.
+        balls: (obstacles, 4) [m] of a World.
         sphere: Its radius and height above the target [m].
-        aim: The end-effector's curve (``trajectory.curve_row``) and when it begins [s]; a row
-            without numbers where the workspace does not apply.
+        aim: The end-effector's ``curve_row`` and when it begins [s]; an empty row where the
+            workspace does not apply.
         places: (steps, 2 + j, 3) [m, NED]: base, joint 1, joint 2, …, end-effector.
         instants: Time one step before the first, and between two steps [s].
         lowest: (margins,) [m], smallest so far.

@@ -111,7 +111,7 @@ def _end_processes() -> None:
 
 
 def _leave_interrupts() -> None:
-    """An interrupt is for the campaign to handle, which ends its processes."""
+    """Ignore interrupts in a worker; the campaign ends its processes."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 

@@ -63,7 +63,7 @@ def configuration(
 ) -> FlightConfig:
     """A controller as it flies in a plant.
 
-    Inconsistent ones fly as well: what becomes of them is what a study wants to see.
+    Inconsistent ones fly as well: their outcome is what a study measures.
     """
     config = flight_config(controller, inner, soft=True)
     return config if plant == "full" else _at_once(config)

@@ -1,4 +1,4 @@
-"""Every study by the name it is asked for; imports nothing heavy until one is."""
+"""Studies by name; heavy imports happen when one is requested."""
 
 from __future__ import annotations
 

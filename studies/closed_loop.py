@@ -54,7 +54,7 @@ State = TypeVar("State")
 
 
 class ClosedLoop(Generic[State]):
-    """Plant, tick and planner, joined; whoever flies gives the inputs of each step."""
+    """Plant, tick and planner in one loop; the caller gives the inputs of each step."""
 
     def __init__(
         self,
@@ -97,7 +97,7 @@ class ClosedLoop(Generic[State]):
         clock = simulation.clock
         return tuple(target(clock, start_us + TARGET_US * k) for k in range(first, newest + 1))
 
-    def fly(self, inputs: TickInputs) -> TickOutputs:
+    def step(self, inputs: TickInputs) -> TickOutputs:
         """Tick, plan, advance."""
         self.state, outputs = self._tick(self.state, inputs)
         if outputs.plan_request is not None:
@@ -138,7 +138,7 @@ class InlinePlanner:
         """Nothing to stop."""
 
 
-def fly(
+def simulate(
     scenario: Scenario,
     seed: int,
     config: FlightConfig,
@@ -173,11 +173,11 @@ def fly(
         )
         if traced and step % TRACE_STEPS == 0:
             recorder.trace.append(_trace_point(simulation))
-        outputs = loop.fly(inputs)
+        outputs = loop.step(inputs)
         _insist(outputs)
         applied = outputs.snapshot.plan_input
         if step % steps_per_plan == 0 and applied is not None:
-            recorder.effort.add(applied)
+            recorder.metrics.add(applied)
         if outputs.plan_request is not None and asked is not None:
             asked(outputs.plan_request)
     return FlightResult(simulation.result(), recorder)

@@ -7,7 +7,7 @@ PLANT: dict[str, tuple[str, ...]] = {
         "Plant: the paper's own prediction model, six double integrators with the acceleration "
         "reached at once; nothing of a vehicle is in it, so that the constraints are compared "
         "and nothing else.",
-        "λ = 0.4, k_S = 8, slack price 200, no node skipped: without a fast loop the MPC alone "
+        "λ = 0.4, k_S = 8, slack penalty 200, no node skipped: without a fast loop the MPC alone "
         "meets the disturbance, and eq 25 needs λ ≥ d(1 + k_S T/2)/γ = 0.373 in sampled data.",
     ),
     "full": (

@@ -125,7 +125,7 @@ class DoubleIntegrator:
         return x, y, z
 
 
-def fly(
+def simulate(
     scenario: Scenario, seed: int, config: FlightConfig, *, traced: bool = False
 ) -> FlightResult:
     """Fly the planner alone on the double integrators: measured start, no delay, no fast loop.
@@ -159,7 +159,7 @@ def fly(
         running = answer if isinstance(answer, Plan) else running
         # As in flight: without an answer the running plan goes on, then the vehicle brakes.
         u = plan_input(running, start, t_us, brake)
-        recorder.effort.add(u)
+        recorder.metrics.add(u)
         for _ in range(steps):
             if traced and plant.step % TRACE_STEPS == 0:
                 recorder.trace.append(_trace_point(plant))

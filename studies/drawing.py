@@ -18,7 +18,7 @@ _METADATA = re.compile(r"\s*<metadata>.*?</metadata>", re.DOTALL)
 
 
 class NoMatplotlibError(RuntimeError):
-    """The figures were asked for where matplotlib is not installed."""
+    """Figures were requested and matplotlib is not installed."""
 
 
 @dataclass(frozen=True, slots=True)

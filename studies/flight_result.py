@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass, field
 
-from fsw.runtime.effort import EffortRecord
+from fsw.control.control_metrics import ControlMetrics
 from fsw.signals import Plan, PlanFailure
 from sitl.result import TruthResult
 from sitl.scenario import V3
@@ -33,7 +33,7 @@ class TracePoint:
 class FlightRecorder:
     """What the planner does in a flight."""
 
-    effort: EffortRecord = field(default_factory=EffortRecord)
+    metrics: ControlMetrics = field(default_factory=ControlMetrics)
     step_us: list[float] = field(default_factory=list)  # processor time of each planning step
     plans: int = 0
     failures: int = 0  # planning steps without a plan

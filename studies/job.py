@@ -76,12 +76,12 @@ class Outcome:
 
 def fly_job(job: Job, *, traced: bool = False) -> FlightResult:
     """Fly one job here and now."""
-    plants = {"full": closed_loop.fly, "double-integrator": double_integrator.fly}
+    plants = {"full": closed_loop.simulate, "double-integrator": double_integrator.simulate}
     return plants[job.plant](job.scenario, job.seed, job.config, traced=traced)
 
 
 def outcome(job: Job) -> Outcome:
-    """Fly one job; whatever it raises becomes a row that says so."""
+    """Fly one job; an exception becomes a row with the error."""
     try:
         return score(job.seed, fly_job(job))
     except Exception as error:
@@ -96,7 +96,7 @@ def broken(job: Job, reason: str) -> Outcome:
 def score(seed: int, result: FlightResult) -> Outcome:
     """The row of a flight."""
     truth, planner = result.truth, result.planner
-    steps, totals = np.array(planner.step_us or (0.0,)), planner.effort.as_json()
+    steps, totals = np.array(planner.step_us or (0.0,)), planner.metrics.as_json()
     smoothness, effort = totals["control_smoothness"], totals["control_effort"]
     return Outcome(
         seed=seed,

@@ -1,4 +1,4 @@
-"""What a study is asked for, and what it hands back to be written down."""
+"""Settings and results of a study."""
 
 from __future__ import annotations
 

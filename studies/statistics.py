@@ -17,7 +17,7 @@ def wilson(passed: int, total: int) -> tuple[float, float]:
         ValueError: No trial, or more successes than trials.
     """
     if not 0 <= passed <= total or total == 0:
-        raise ValueError(f"{passed} of {total} is no count of successes")
+        raise ValueError(f"{passed} of {total} is not a valid count of successes")
     z2 = _Z95 * _Z95
     share = passed / total
     middle = (share + 0.5 * z2 / total) / (1.0 + z2 / total)

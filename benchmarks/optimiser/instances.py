@@ -9,7 +9,7 @@ import numpy as np
 from fsw.parameters.flight_config import FlightConfig
 from fsw.signals import PlanRequest
 from studies.cases import CASES, Case, configuration, scenario, with_horizon
-from studies.closed_loop import fly
+from studies.closed_loop import simulate
 
 SEED = 100  # never used for tuning
 # 0.1 s ahead the lagging vehicle can hardly be moved: with n = 1 it hits the first wall. Shorter
@@ -47,7 +47,7 @@ def record(horizon: int, count: int, duration_s: float) -> list[Instance]:
 def _of_case(case: Case, horizon: int, count: int, duration_s: float) -> list[Instance]:
     heard: list[PlanRequest] = []
     flown = scenario(case, disturbed=True, duration_s=duration_s)
-    fly(flown, SEED, planner_of(max(horizon, _FLYABLE)), asked=heard.append)
+    simulate(flown, SEED, planner_of(max(horizon, _FLYABLE)), asked=heard.append)
     requests = [replace(request, targets=request.targets[: horizon + 1]) for request in heard]
     last = len(requests) - 1
     chosen = np.unique(np.linspace(min(_LED_BY + 10, last), last, count).astype(int))

@@ -13,9 +13,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from benchmarks.optimiser.converged import ConvergedOcp
 from benchmarks.optimiser.instances import Instance, planner_of, record
 from benchmarks.optimiser.methods import Entry, Method, entries, guess_for
-from benchmarks.optimiser.price import Judge
 from benchmarks.optimiser.solved import Solved, stopwatch_us
 from fsw.model.airframe import AIRFRAME
 from fsw.model.prediction import Array
@@ -119,7 +119,7 @@ class _Lane:
     """What belongs to one case: programs are built for one safe set."""
 
     planner: Planner
-    judge: Judge
+    converged: ConvergedOcp
     methods: list[Method | None]
 
 
@@ -146,7 +146,7 @@ class _Rivals:
         lane = self._lane(instance)
         guess, optimum, best = self._truth(lane, instance)
         order = np.roll(np.arange(len(self.samples)), turn)
-        prices: list[tuple[Samples, float]] = []
+        costs: list[tuple[Samples, float]] = []
         for at in order:
             samples, method = self.samples[at], lane.methods[at]
             if method is None or samples.spent_us > self._effort.budget_us:
@@ -155,15 +155,15 @@ class _Rivals:
             samples.spent_us += answer.spent.wall_us
             samples.answers.append(answer)
             if answer.inputs is not None:
-                prices.append((samples, lane.judge.price(instance.request, answer.inputs)))
+                costs.append((samples, lane.converged.cost(instance.request, answer.inputs)))
         # Where directions turn (eq 23), programs may settle above what another optimiser finds.
-        best = min([best, *(price for _, price in prices)])
-        for samples, price in prices:
-            samples.suboptimality.append(price / best - 1.0)
+        best = min([best, *(cost for _, cost in costs)])
+        for samples, cost in costs:
+            samples.suboptimality.append(cost / best - 1.0)
 
     def _truth(self, lane: _Lane, instance: Instance) -> tuple[Array, Array, float]:
         guess = guess_for(lane.planner, instance)
-        return guess, *lane.judge.converged(instance.request, guess)
+        return guess, *lane.converged.solve(instance.request, guess)
 
     def _lane(self, instance: Instance) -> _Lane:
         found = self._lanes.get(instance.case)
@@ -173,7 +173,9 @@ class _Rivals:
                 None if samples.entry.build is None else samples.entry.build(config, safe_set)
                 for samples in self.samples
             ]
-            found = _Lane(Planner(config, AIRFRAME, stopwatch_us), Judge(config, safe_set), built)
+            found = _Lane(
+                Planner(config, AIRFRAME, stopwatch_us), ConvergedOcp(config, safe_set), built
+            )
             self._lanes[instance.case] = found
         return found
 

@@ -9,8 +9,8 @@ from typing import Protocol
 import numpy as np
 
 from benchmarks.optimiser.casadi_method import SOLVERS, CasadiMethod, installed
+from benchmarks.optimiser.converged import target_points
 from benchmarks.optimiser.instances import Instance
-from benchmarks.optimiser.price import target_points
 from benchmarks.optimiser.slopes import slopes_of
 from benchmarks.optimiser.solved import Solved, stopwatch_us, timed
 from fsw.model.airframe import AIRFRAME

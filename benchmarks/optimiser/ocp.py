@@ -27,7 +27,7 @@ TARGET, DIRECTIONS = 7, 9
 
 
 @dataclass
-class Program:
+class NonlinearProgram:
     """A nonlinear program under construction."""
 
     unknowns: list[Any] = field(default_factory=list)
@@ -70,11 +70,11 @@ def tuning_of(config: PlannerConfig, safe_set: SafeSet) -> BarrierTuning:
     return config.workspace if safe_set.sphere is not None else config.walls
 
 
-def build(config: PlannerConfig, safe_set: SafeSet) -> tuple[Program, Any]:
+def build(config: PlannerConfig, safe_set: SafeSet) -> tuple[NonlinearProgram, Any]:
     """The program and its parameters: start (19,), then those of the nodes 1..n."""
     if hasattr(ca.GlobalOptions, "setNumpyMode"):
         ca.GlobalOptions.setNumpyMode(-1)  # symbols stay symbols in numpy's functions, silently
-    n, program = config.horizon, Program()
+    n, program = config.horizon, NonlinearProgram()
     a, b = (ca.DM(matrix) for matrix in discretise(AIRFRAME, config.period))
     rows = barrier_rows(safe_set)
     start = ca.SX.sym("start", STATES)
@@ -105,7 +105,7 @@ def build(config: PlannerConfig, safe_set: SafeSet) -> tuple[Program, Any]:
 
 
 def _controls(
-    program: Program, config: PlannerConfig, safe_set: SafeSet, i: int
+    program: NonlinearProgram, config: PlannerConfig, safe_set: SafeSet, i: int
 ) -> tuple[Any, Any]:
     limits, infinite = config.limits, float("inf")
     u = ca.SX(0, 1)
@@ -120,7 +120,7 @@ def _controls(
 
 
 def _node(
-    program: Program,
+    program: NonlinearProgram,
     config: PlannerConfig,
     safe_set: SafeSet,
     i: int,
@@ -155,7 +155,12 @@ def _points(config: PlannerConfig, x: Any) -> list[tuple[Any, Any]]:
 
 
 def _add_cost(
-    program: Program, config: PlannerConfig, last: bool, x: Any, tip: tuple[Any, Any], node: Any
+    program: NonlinearProgram,
+    config: PlannerConfig,
+    last: bool,
+    x: Any,
+    tip: tuple[Any, Any],
+    node: Any,
 ) -> None:
     w, airframe = config.weights, AIRFRAME
     target_v = node[3:6] if w.relative_velocity else 0.0

@@ -20,6 +20,6 @@ def refusal(context: CommandContext, *, force: bool = False) -> str | None:
 
 
 def is_permanent(context: CommandContext) -> bool:
-    """Whether what stands against arming is the configuration: waiting does not change that."""
+    """Whether the configuration prevents arming, so that waiting does not help."""
     ready = not context.standing_unclear and context.charge < Charge.CRITICAL
     return context.estimate_valid and ready and bool(context.inconsistent)

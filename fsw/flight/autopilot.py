@@ -15,7 +15,7 @@ from fsw.estimation.estimator import estimate_state
 from fsw.flight.commander import Commander, acknowledgement
 from fsw.flight.failsafe import FAULTS
 from fsw.flight.modes.mission import with_update
-from fsw.flight.modes.offboard import receive, report
+from fsw.flight.modes.offboard import accept_setpoints, report
 from fsw.flight.plan_exchange import PlanExchange, measured_state, nominal_at_rest, requested
 from fsw.flight.reference_horizon import ReferenceHorizon
 from fsw.flight.safe_set import SafeSetCheck
@@ -81,19 +81,11 @@ class Autopilot:
         self._cascade.step(in_hover(self.config.airframe, estimate), estimate, nominal, REST_INPUT)
 
     def analyse(self, safe_set: SafeSet) -> tuple[Finding, ...]:
-        """What speaks for and against keeping a safe set with this configuration."""
+        """Findings on whether this configuration can keep a safe set."""
         return self._safe_sets.analyse(safe_set)
 
     def tick(self, state: FlightState, inputs: TickInputs) -> tuple[FlightState, TickOutputs]:
-        """Everything the vehicle does at one instant.
-
-        Args:
-            state: What the last tick left.
-            inputs: One sensor frame and what arrived since the last tick.
-
-        Returns:
-            The state for the next tick and everything this one says.
-        """
+        """Everything the vehicle does at one instant: the next state, and everything it says."""
         now_us, texts = inputs.sensors.t_us, list[StatusText]()
         state, estimate = _estimate(state, inputs)
         state = self._receive(state, inputs, texts)
@@ -149,11 +141,11 @@ class Autopilot:
     def _receive(
         self, state: FlightState, inputs: TickInputs, texts: list[StatusText]
     ) -> FlightState:
-        """Take in targets, safe set, mission, setpoints and a ground station's heartbeat."""
+        """Store received targets, safe set, mission, setpoints and ground station heartbeat."""
         now_us = inputs.sensors.t_us
         if inputs.targets or inputs.safe_set is not None or inputs.mission is not None:
             stream = merge(state.mission.stream, inputs.targets, now_us)
-            mission = self._safe_sets.receive(
+            mission = self._safe_sets.update(
                 replace(state.mission, stream=stream),
                 inputs.mission,
                 inputs.safe_set,
@@ -167,7 +159,7 @@ class Autopilot:
             state = replace(state, vehicle=replace(state.vehicle, gcs_heard_us=now_us))
         heard = (inputs.motion, inputs.attitude, inputs.joints) != (None, None, None)
         if heard or inputs.refused_setpoints:
-            state = replace(state, offboard=receive(state.offboard, inputs, self.config))
+            state = replace(state, offboard=accept_setpoints(state.offboard, inputs, self.config))
         return state
 
     def _elapsed_ticks(self, state: FlightState, now_us: int) -> int:
@@ -183,7 +175,7 @@ class Autopilot:
         plan: PlanMemory,
         now_us: int,
     ) -> tuple[FlightState, PlanRequest, PlanMemory]:
-        """Ask the planner for what takes effect a fixed delay from now."""
+        """Request a plan that takes effect after a fixed delay."""
         config = self.config
         apply_us = now_us + config.plan_delay_ticks * config.tick_period_us
         mode = self._commander.mode(state)
@@ -241,13 +233,13 @@ class Autopilot:
             self.config.airframe, wanted, state.cascade.commanded, state.vehicle.armed
         )
         if replaced:
-            # What made the command no number is in the loops' new memory too: forget it.
+            # The NaN is in the loops' new memory as well: discard that.
             memory = state.cascade
         return sent, memory.after_sending(sent), replaced
 
 
 def _estimate(state: FlightState, inputs: TickInputs) -> tuple[FlightState, StateEstimate | None]:
-    """The estimate of now, or the last valid one; invalid ones are counted."""
+    """The current estimate, or the last valid one; invalid ones are counted."""
     valid = estimate_state(inputs.sensors)
     if valid is None:
         return replace(state, invalid_ticks=state.invalid_ticks + 1), state.estimate
@@ -295,7 +287,7 @@ def _snapshot(
 
 
 def _blind(inputs: TickInputs, texts: list[StatusText]) -> TickOutputs:
-    """Before the first valid sensor frame: nothing moves, and commands are refused."""
+    """Outputs before the first valid sensor frame: actuators off, commands refused."""
     zero = (0.0, 0.0, 0.0)
     level = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
     nowhere = StateEstimate(

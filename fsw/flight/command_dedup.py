@@ -28,7 +28,7 @@ class AnsweredCommand:
 def answered_before(
     memory: tuple[AnsweredCommand, ...], request: CommandRequest, t_us: int
 ) -> AnsweredCommand | None:
-    """What the same command of the same sender was answered a moment ago."""
+    """The recent result of the same command of the same sender."""
     for last in memory:
         if last.sender == _sender(request):
             patience = _RESENT_US if request.confirmation > 0 else _AT_ONCE_US

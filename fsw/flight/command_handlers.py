@@ -1,4 +1,4 @@
-"""What a command does: a decision, by the kind of the command; pure."""
+"""Command handlers: one pure function for each kind of command, which returns a decision."""
 
 from __future__ import annotations
 
@@ -51,21 +51,14 @@ _CLIMB_TOLERANCE: Final = 0.05  # m: a ground station rounds, and starts from it
 
 @dataclass(frozen=True, slots=True)
 class NewHeading:
-    """Where the nose points from now on."""
+    """New heading."""
 
     place: Vec3 | None  # m; None: along the flight
 
 
 @dataclass(frozen=True, slots=True)
-class NewSpeed:
-    """How fast to fly to places from now on."""
-
-    speed: float | None  # m/s; None: as usual
-
-
-@dataclass(frozen=True, slots=True)
 class Decision:
-    """Answer to a command, and what it causes."""
+    """Result of a command and its effects."""
 
     result: CommandResult
     reason: str = ""  # of a refusal, or what the operator must read though it is accepted
@@ -80,14 +73,14 @@ class Decision:
     home: Home | None = None
     mission_step: int | None = None  # to fly next
     look_at: NewHeading | None = None
-    speed: NewSpeed | None = None
+    speed: ChangeSpeed | None = None
 
 
 Modes = Mapping[Mode, FlightMode]
 
 
 def decide(command: Command, context: CommandContext, modes: Modes) -> Decision:
-    """Accept a command with what it causes, or refuse it with a reason to act on."""
+    """Accept a command with its effects, or refuse it with a reason."""
     handler = COMMAND_HANDLERS[type(command.action)]
     decision: Decision = handler(command.action, context, modes)
     if decision.alarming:
@@ -98,7 +91,7 @@ def decide(command: Command, context: CommandContext, modes: Modes) -> Decision:
 
 
 def _reject(action: Rejected, context: CommandContext, modes: Modes) -> Decision:
-    """What the link found to mean nothing.
+    """Refuse a command that the link could not decode.
 
     What is not supported has no reason: ground stations probe for cameras, gimbals and much else,
     and a text for each would hide the texts that matter.
@@ -155,7 +148,7 @@ def _switch(wanted: Mode, context: CommandContext, modes: Modes) -> Decision:
 
 
 def _take_off(action: TakeOff, context: CommandContext, modes: Modes) -> Decision:
-    """Straight up from where it stands; before arming, as soon as it is armed."""
+    """Take off vertically; a command before arming takes effect at arming."""
     decision = _switch(Mode.TAKEOFF, context, modes)
     height = _height(action.to, context)
     if height is None or Mode.TAKEOFF not in (decision.mode, decision.intended_mode):
@@ -223,19 +216,19 @@ def _look_at(action: LookAt, context: CommandContext, modes: Modes) -> Decision:
     place = _place(action.place, context)
     far = _too_far(place)
     if far is not None:
-        return Decision(DENIED, f"nothing to look at: {far}")
+        return Decision(DENIED, f"no region of interest: {far}")
     if not _is_armed(context):
-        return Decision(LATER, "nothing to look at: the vehicle is not armed")
+        return Decision(LATER, "no region of interest: the vehicle is not armed")
     return Decision(ACCEPTED, look_at=NewHeading(place))
 
 
 def _change_speed(action: ChangeSpeed, context: CommandContext, modes: Modes) -> Decision:
-    """Of the ways to places that follow, a mission's from its next segment on."""
+    """Change the speed towards position goals; in a mission from the next segment."""
     speed = action.speed
     if speed is not None and not MIN_SPEED <= speed <= context.max_speed:
         reason = f"{speed:g} m/s is outside {MIN_SPEED:g} to {context.max_speed:g} m/s"
         return Decision(DENIED, f"speed unchanged: {reason}")
-    return Decision(ACCEPTED, speed=NewSpeed(speed))
+    return Decision(ACCEPTED, speed=action)
 
 
 def _move_joints(action: MoveJoints, context: CommandContext, modes: Modes) -> Decision:
@@ -267,10 +260,10 @@ def _set_home(action: SetHome, context: CommandContext, modes: Modes) -> Decisio
 
 
 def _start_mission(action: StartMission, context: CommandContext, modes: Modes) -> Decision:
-    """A vehicle that is not armed is armed by it, as PX4 does."""
+    """Start the mission; this arms a disarmed vehicle, as in PX4."""
     first, total = action.first, context.mission.total
     if 0.0 < action.last < total - 1:
-        return Decision(DENIED, "no mission: it can be flown to its last step only")
+        return Decision(DENIED, "no mission: it can only be flown to its last step")
     decision = _switch(Mode.MISSION, context, modes)
     if decision.result == ACCEPTED and context.mode is Mode.DISARMED:
         armed = _arm(Arm(), context, modes)
@@ -296,7 +289,7 @@ def _order(action: Order, context: CommandContext, modes: Modes) -> Decision:
 
 
 def _terminate(context: CommandContext, modes: Modes) -> Decision:
-    """The rotors stop at once and for good."""
+    """Stop the rotors until the flight software is restarted."""
     if not _is_armed(context):
         return Decision(DENIED, "not terminated: the vehicle is not armed")
     reason = "flight terminated by {sender}: the rotors stop"
@@ -357,21 +350,21 @@ def _is_armed(context: CommandContext) -> bool:
 
 
 def _hovering_refusal(context: CommandContext) -> str | None:
-    """Why a vehicle cannot be sent anywhere now."""
+    """Why the vehicle cannot accept a position goal now."""
     if not _is_armed(context):
         return "the vehicle is not armed"
     return "the vehicle is on the ground; take off first" if context.landed else None
 
 
 def _height(place: Place, context: CommandContext) -> float | None:
-    """Above the origin [m]; None where none is named."""
+    """Height above the origin [m], None if the command gives none."""
     if place.height is None or not place.above_home:
         return place.height
     return place.height - (context.home.p[2] if context.home is not None else 0.0)
 
 
 def _place(place: Place, context: CommandContext) -> Vec3:
-    """In the local frame [m]; what is not named is as here."""
+    """Position in the local frame [m]; coordinates that are not given stay as they are."""
     north, east = place.north_east or context.position[:2]
     height = _height(place, context)
     return north, east, context.position[2] if height is None else -height
@@ -388,7 +381,7 @@ def _too_low(place: Vec3, context: CommandContext) -> str | None:
     least = context.airframe.leg_length + context.climb_range[0]
     if -place[2] >= least:
         return None
-    return f"{-place[2]:.1f} m above the origin is too low, {least:.1f} m is the least"
+    return f"{-place[2]:.1f} m above the origin is too low; the minimum is {least:.1f} m"
 
 
 def _too_close(place: Vec3, safe_set: SafeSet) -> str | None:

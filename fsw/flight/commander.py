@@ -47,12 +47,13 @@ class Commander:
 
     def __init__(self, config: FlightConfig) -> None:
         self._config = config
+        self._plan_period_us = config.mpc_period_us
         self._generator = SetpointGenerator(config)
         self._modes: dict[Mode, FlightMode] = {mode: kind(config) for mode, kind in MODES.items()}
         self._no_mode = FlightMode(config)  # disarmed or terminated
 
     def mode(self, state: FlightState) -> FlightMode:
-        """The flight mode of now; a vehicle in none stays where it is."""
+        """The current flight mode; without one, the vehicle stays where it is."""
         return self._modes.get(state.vehicle.mode, self._no_mode)
 
     def handle_commands(
@@ -80,7 +81,7 @@ class Commander:
         return state, acks
 
     def context(self, state: FlightState, estimate: StateEstimate) -> CommandContext:
-        """What a decision may depend on now."""
+        """The state that a decision may depend on."""
         limits, vehicle, stream = self._config.limits, state.vehicle, state.mission.stream
         setpoint_limits, goal = self._config.steering, state.setpoint.goal
         asked = goal.joints if goal is not None else None
@@ -119,7 +120,7 @@ class Commander:
     def check_failsafes(
         self, state: FlightState, estimate: StateEstimate, texts: list[StatusText]
     ) -> FlightState:
-        """Report each condition once, when it becomes active, and act on it then."""
+        """Report each condition once, when it becomes active, and take its action."""
         before = state.vehicle.conditions
         if state.vehicle.mode is Mode.FAULT:
             return state  # what ended the flight stays on show
@@ -143,6 +144,7 @@ class Commander:
 
     def _failsafe_context(self, state: FlightState, estimate: StateEstimate) -> FailsafeContext:
         vehicle, plan, now_us = state.vehicle, state.plan, estimate.t_us
+        offboard = vehicle.mode is Mode.OFFBOARD
         return FailsafeContext(
             limits=self._config.limits,
             mode=vehicle.mode,
@@ -152,10 +154,10 @@ class Commander:
             invalid_ticks=state.invalid_ticks,
             up=estimate.R_WB[8],
             plan_age_us=now_us - plan.since_us,
-            plan_period_us=self._config.mpc_period_us,
+            plan_period_us=self._plan_period_us,
             plan_refused=plan.refused,
             output_replaced=state.output_replaced,
-            setpoint_fresh=is_fresh(self._config, state, now_us),
+            setpoint_fresh=not offboard or is_fresh(self._config, state, now_us),
             gcs_silent_us=now_us - vehicle.gcs_heard_us if vehicle.gcs_heard_us >= 0 else -1,
             battery=state.battery,
         )
@@ -163,7 +165,7 @@ class Commander:
     def _fail_safe(
         self, state: FlightState, mode: Mode, estimate: StateEstimate, texts: list[StatusText]
     ) -> FlightState:
-        """Take the vehicle over; a pilot's next mode takes it back."""
+        """Switch to the failsafe's mode; the pilot's next mode command ends it."""
         if mode is Mode.FAULT:
             return self._switch(state, mode, "terminate", estimate, texts)
         before = state.vehicle.failsafe_from or state.vehicle.mode
@@ -173,7 +175,7 @@ class Commander:
     def check_mode_completion(
         self, state: FlightState, estimate: StateEstimate, texts: list[StatusText]
     ) -> FlightState:
-        """Let the mode do its part of the tick; where it is done, the next one follows."""
+        """Update the mode; when it is complete, switch to the next one."""
         vehicle = state.vehicle
         if vehicle.home is None:
             home = Home(estimate.p_WB, estimate.yaw)
@@ -193,7 +195,7 @@ class Commander:
     def _check_intended_mode(
         self, state: FlightState, estimate: StateEstimate, texts: list[StatusText]
     ) -> FlightState:
-        """Forget what was chosen before arming, where it waits too long or is gone."""
+        """Drop a mode chosen before arming when it times out or its conditions are lost."""
         intended = self._modes[state.vehicle.intended_mode]
         forgotten = intended.waits(state, estimate.t_us)
         if forgotten is None:
@@ -226,7 +228,7 @@ class Commander:
     def _remember(
         self, state: FlightState, decision: Decision, estimate: StateEstimate
     ) -> FlightState:
-        """What a decision says about the flight that follows."""
+        """Apply the effects of a decision."""
         vehicle, limits = state.vehicle, self._config.limits
         if decision.home is not None:
             vehicle = replace(vehicle, home=decision.home)
@@ -252,7 +254,7 @@ class Commander:
         return with_update(state, step, self._config, estimate.t_us)
 
     def _turnable(self, state: FlightState, estimate: StateEstimate) -> FlightState:
-        """A hold that just stays needs a setpoint to turn."""
+        """Give a stationary hold a setpoint, so that it can turn."""
         holds = state.vehicle.mode is Mode.HOLD and state.vehicle.flies
         if not holds or state.setpoint.reference is not None:
             return state
@@ -326,16 +328,7 @@ class Commander:
         *,
         completed: bool = False,
     ) -> FlightState:
-        """Begin another mode.
-
-        Args:
-            state: In the mode that is left.
-            mode: That begins.
-            cause: For the operator.
-            estimate: The vehicle now.
-            texts: Takes the sentence for the operator.
-            completed: The mode that is left was done; a failsafe's mark stays.
-        """
+        """Begin another mode; a failsafe's mark stays if the one that is left was ``completed``."""
         before, vehicle = state.vehicle.mode, state.vehicle
         texts.append(StatusText(Severity.INFO, f"{before.value} to {mode.value}: {cause}"))
         handover = Handover(self._reference(state, estimate), completed)
@@ -360,7 +353,7 @@ class Commander:
         return replace(state, vehicle=vehicle)
 
     def _lift_off(self, state: FlightState, estimate: StateEstimate) -> FlightState:
-        """Start the fast loops where the vehicle stands."""
+        """Initialise the fast loops at the vehicle's state."""
         return replace(
             state,
             vehicle=replace(state.vehicle, landed=False),
@@ -369,7 +362,7 @@ class Commander:
         )
 
     def _reference(self, state: FlightState, estimate: StateEstimate) -> EndEffectorTarget:
-        """Of the mode of now; where the vehicle is if it does not fly."""
+        """Reference of the current mode; the vehicle's position if it does not fly."""
         if state.vehicle.flies:
             return self.mode(state).target(state, estimate.t_us)
         here = point_in_flight(estimate, self._config.airframe.link_length)[0]

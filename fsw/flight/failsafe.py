@@ -76,7 +76,7 @@ class FailsafeContext:
     plan_period_us: int
     plan_refused: bool
     output_replaced: bool
-    setpoint_fresh: bool
+    setpoint_fresh: bool  # or none is needed
     gcs_silent_us: int  # -1: no ground station was ever heard
     battery: BatteryState
 
@@ -98,7 +98,7 @@ def _always(action: Action) -> Callable[[FailsafeContext], Action]:
 
 
 def _on_setpoints_lost(context: FailsafeContext) -> Action:
-    """COM_OBL_RC_ACT; to go on is impossible."""
+    """COM_OBL_RC_ACT; the mode cannot continue."""
     known = {3: Action.RETURN, 4: Action.LAND, 5: Action.HOLD}
     return known.get(context.limits.setpoint_loss_action, Action.HOLD)
 
@@ -160,7 +160,7 @@ FAILSAFES: Final = (
     ),
     Failsafe(
         Condition.SETPOINTS_LOST,
-        lambda c: c.mode is Mode.OFFBOARD and not c.setpoint_fresh,
+        lambda c: not c.setpoint_fresh,
         _on_setpoints_lost,
     ),
     Failsafe(
@@ -198,7 +198,7 @@ BATTERY: Final = frozenset(
 
 
 def active(context: FailsafeContext) -> tuple[Failsafe, ...]:
-    """The rows whose condition is there, strongest first; almost always none."""
+    """Rows whose condition is active, strongest action first."""
     return tuple([row for row in FAILSAFES if row.active(context)])
 
 

@@ -7,7 +7,7 @@ from fsw.signals import StateEstimate
 
 
 def height_above_ground(config: FlightConfig, estimate: StateEstimate) -> float:
-    """Of the vehicle above where it stands on the ground of the origin [m]."""
+    """Height of the vehicle above its standing height at the origin [m]."""
     return -estimate.p_WB[2] - config.airframe.leg_length
 
 

@@ -67,7 +67,7 @@ class MissionFlight:
 
 @dataclass(frozen=True, slots=True)
 class MissionContext:
-    """The vehicle as a mission needs to know it."""
+    """The vehicle's state as a mission needs it."""
 
     now_us: int
     p_WE: Vec3  # m, estimate
@@ -79,7 +79,7 @@ class MissionContext:
 
 @dataclass(frozen=True, slots=True)
 class MissionEvent:
-    """What a tick of a mission comes to."""
+    """Result of a mission tick."""
 
     next_mode: Mode | None = None
     cause: str = ""  # of that change
@@ -93,31 +93,26 @@ NOTHING = MissionEvent()
 
 
 def loaded(steps: tuple[MissionStep, ...], count: int = 0) -> MissionFlight:
-    """A mission that was received, not begun.
-
-    Args:
-        steps: All of it.
-        count: Steps reached so far in earlier missions, so that the count only grows.
-    """
+    """A mission that was received, not begun; ``count`` steps were reached in earlier missions."""
     state = MissionState.NOT_STARTED if steps else MissionState.NO_MISSION
     progress = MissionProgress(state, total=len(steps), reached_count=count)
     return MissionFlight(steps, progress=progress)
 
 
 def refusal(flight: MissionFlight, landed: bool) -> str | None:
-    """Why this mission cannot be begun or gone on with now."""
+    """Why this mission cannot start or continue now."""
     if not flight.steps:
         return "no mission: none was uploaded"
     first = flight.progress
     at = 0 if first.state is MissionState.COMPLETE else first.current
     moves = [step for step in flight.steps[at:] if step.action not in _NO_MOVES]
     if landed and (not moves or moves[0].action is not MissionAction.TAKE_OFF):
-        return f"no mission: on the ground, and step {at} is no takeoff; take off first"
+        return f"no mission: on the ground, and step {at} is not a takeoff; take off first"
     return None
 
 
 def nearest(home: Home, rally: tuple[Vec2, ...], p: Vec3) -> Home:
-    """Home, or a rally point where one is nearer; both are at home's height."""
+    """The nearest to p [m, NED] of home and the rally points; all have home's height."""
     x, y, z = home.p
     places = ((x, y), *rally)
     x, y = min(places, key=lambda place: math.dist(place, p[:2]))
@@ -142,7 +137,7 @@ def begun(
 
 
 def paused(flight: MissionFlight) -> MissionFlight:
-    """Another mode took over: the current step will be begun again."""
+    """Pause the mission: its current step will start again."""
     if flight.progress.state is not MissionState.ACTIVE:
         return replace(flight, stage=Stage.IDLE, segment=None)
     progress = replace(flight.progress, state=MissionState.PAUSED)
@@ -170,12 +165,9 @@ def jumped(flight: MissionFlight, step: int, now_us: int, limits: MotionLimits) 
 def advance(
     flight: MissionFlight, context: MissionContext, limits: MotionLimits
 ) -> tuple[MissionFlight, MissionEvent]:
-    """One tick: at most one thing happens, in almost every tick none.
+    """One tick of a mission that has begun: at most one thing happens, in almost every tick none.
 
-    Args:
-        flight: With a segment, that is after ``begun``.
-        context: The vehicle now.
-        limits: Of a segment where the mission names no speed.
+    The limits are those of a segment where the mission names no speed.
     """
     segment, now_us = flight.segment, context.now_us
     if segment is None:
@@ -197,7 +189,7 @@ def advance(
 
 
 def touched_down(flight: MissionFlight) -> MissionFlight:
-    """The landing that a mission ended with is done."""
+    """Complete a mission whose last step was a landing."""
     if flight.stage is not Stage.GONE:
         return flight
     return replace(_reached(flight), stage=Stage.IDLE, segment=None)
@@ -266,7 +258,7 @@ def _arrive(
 
 
 def _hand_over(flight: MissionFlight, step: MissionStep) -> tuple[MissionFlight, MissionEvent]:
-    """The step is flown: on to the next, or to the mode that it asks for."""
+    """Complete the step: continue with the next one or switch to its mode."""
     if step.action is MissionAction.LAND:
         return replace(flight, stage=Stage.GONE), MissionEvent(Mode.LAND, "land")
     if step.action is MissionAction.RETURN:

@@ -1,4 +1,4 @@
-"""Setpoints for now: which are in range, and what they ask for."""
+"""Offboard setpoints: range checks and conversion."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _MAX_YAW = 4.0 * math.pi  # rad
 
 @dataclass(frozen=True, slots=True)
 class Tilt:
-    """Attitude asked for by rates, summed up."""
+    """Attitude setpoint integrated from body rates."""
 
     roll: float = 0.0  # rad
     pitch: float = 0.0  # rad
@@ -26,7 +26,7 @@ class Tilt:
 
 
 def motion_refusal(setpoint: MotionSetpoint) -> str | None:
-    """Why a motion is out of any range that a vehicle like this could mean."""
+    """Why a motion setpoint is out of range."""
     for vector, most, what in (
         (setpoint.p, MAX_DISTANCE, "position"),
         (setpoint.v, _MAX_SPEED, "velocity"),
@@ -63,13 +63,9 @@ def joints_refusal(q_arm: Vec2, airframe: Airframe) -> str | None:
 
 
 def tilted(setpoint: AttitudeSetpoint, last: Tilt, most: float, dt: float) -> Tilt:
-    """The attitude a set-point asks for, within the tilt that is flown.
+    """The attitude a setpoint asks for, roll and pitch at most ``most`` [rad].
 
-    Args:
-        setpoint: Attitude, or rates that go on from the last one.
-        last: What was asked for the last time.
-        most: Largest roll and pitch [rad].
-        dt: Time since then [s].
+    Rates go on from the last attitude for ``dt`` [s].
     """
     if setpoint.q_WB is not None:
         roll, pitch, yaw = euler_zyx(matrix_from_quaternion(setpoint.q_WB))
@@ -84,11 +80,9 @@ def tilted(setpoint: AttitudeSetpoint, last: Tilt, most: float, dt: float) -> Ti
 
 
 def as_motion(tilt: Tilt, specific_thrust: float) -> MotionSetpoint:
-    """The acceleration of an attitude and a thrust: the planner flies it, and keeps the barriers.
+    """The acceleration of an attitude and a thrust over the mass, ``specific_thrust`` [m/s^2].
 
-    Args:
-        tilt: Attitude.
-        specific_thrust: Thrust of all rotors over the mass [m/s^2].
+    The planner flies it, and keeps the barriers.
     """
     sr, cr = math.sin(tilt.roll), math.cos(tilt.roll)
     sp, cp = math.sin(tilt.pitch), math.cos(tilt.pitch)

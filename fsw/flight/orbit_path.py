@@ -1,4 +1,4 @@
-"""A circle as a reference that follows itself: from any point, where to and how fast; pure."""
+"""Orbit as a vector field: for any point, the target and velocity on the circle; pure."""
 
 from __future__ import annotations
 
@@ -11,18 +11,16 @@ _SHARE = 0.8  # of a limit; the rest corrects what is off
 
 
 def max_orbit_speed(orbit_radius: float, turn_rate: float, acceleration: float) -> float:
-    """How fast a circle can be flown [m/s].
+    """How fast a circle of ``orbit_radius`` [m] can be flown [m/s].
 
-    Args:
-        orbit_radius: Of the circle [m].
-        turn_rate: Largest of a steered reference [rad/s]: the nose goes round as the body does.
-        acceleration: Largest of a steered reference [m/s^2].
+    Limits of a steered reference: ``turn_rate`` [rad/s], for the nose goes round as the body does,
+    and ``acceleration`` [m/s^2].
     """
     return min(_SHARE * turn_rate * orbit_radius, math.sqrt(_SHARE * acceleration * orbit_radius))
 
 
 def on_orbit(orbit: Orbit, p: Vec3) -> MotionSetpoint:
-    """What a reference at a point [m] is after: the nearest point of the circle, moving along it.
+    """Setpoint of a reference at p [m, NED]: the nearest point of the circle, moving along it.
 
     On the circle its velocity is the tangent's; off it the correction of
     ``setpoint_generator.step`` leads there. It depends on the place alone, so it can be followed
@@ -42,13 +40,9 @@ def on_orbit(orbit: Orbit, p: Vec3) -> MotionSetpoint:
 
 
 def looking_at(motion: MotionSetpoint, place: Vec3, p: Vec3, v: Vec3) -> MotionSetpoint:
-    """A motion with the heading from a point that moves to a place.
+    """A motion with the heading towards ``place`` [m, NED].
 
-    Args:
-        motion: Whatever its heading is.
-        place: Where the nose is to point [m].
-        p: The point [m].
-        v: Its velocity [m/s].
+    It is seen from the point ``p`` [m, NED], which moves at ``v`` [m/s, NED].
     """
     dx, dy = place[0] - p[0], place[1] - p[1]
     square = dx * dx + dy * dy

@@ -1,4 +1,4 @@
-"""Between tick and planner: what to ask, when an answer begins, what to fly while it ages."""
+"""Plan exchange: requests to the planner, the start of its plans, the state of a running one."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _JOINT_RATE = 3.0  # rad/s, which the plan stops within its horizon
 
 
 def nominal_at_rest(estimate: StateEstimate) -> PredictionState:
-    """A plan state that stands where the vehicle is."""
+    """A plan state at rest at the vehicle's position."""
     return PredictionState(
         p=estimate.p_WB,
         v=(0.0, 0.0, 0.0),
@@ -75,10 +75,10 @@ def with_arm_in_bounds(x: PredictionState, airframe: Airframe) -> PredictionStat
 
 
 def coast(x: PredictionState, seconds: float) -> PredictionState:
-    """A measured state a moment later, its jerk held.
+    """Predict a measured state over ``seconds`` [s] at constant jerk.
 
-    Off its plan the vehicle does what the fast loop makes of the error, not what the plan's
-    input says; its own motion is the better guess.
+    Off its plan the vehicle follows the tracking loop's correction, not the plan's input, so its
+    own motion predicts better.
     """
     t, j = seconds, (*x.j, 0.0)
     return x._replace(
@@ -108,13 +108,7 @@ def take_answer(
 ) -> tuple[PlanMemory, Plan | None]:
     """Account for the planner: a plan starts, a refusal is counted, a missing one is noticed.
 
-    Args:
-        memory: Before this tick.
-        answer: What arrived, at most one.
-        now_us: This tick.
-
-    Returns:
-        The memory, and the plan where one starts now.
+    Returns the memory after this tick, and the plan where one starts now.
     """
     if memory.awaited_id < 0:
         return memory, None
@@ -143,7 +137,7 @@ def take_answer(
 
 
 class PlanExchange:
-    """Requests to the planner and its answers, for one configuration."""
+    """Requests to the planner and its plans, for one configuration."""
 
     def __init__(self, config: FlightConfig) -> None:
         self._config = config
@@ -158,17 +152,10 @@ class PlanExchange:
         now_us: int,
         ticks: int,
     ) -> tuple[PredictionState, PlanMemory, PlanInput]:
-        """Bring the plan's state to this tick, by a new plan or by one more step.
+        """Bring the plan's state of the last tick to this one, by a new plan or by as many steps.
 
-        Args:
-            memory: Of the last tick.
-            nominal: The plan's state then.
-            answer: Of the planner, where one came.
-            now_us: This tick.
-            ticks: Since the last tick; more than one where some were missed.
-
-        Returns:
-            The plan's state, the memory, and the plan's input now.
+        ``ticks`` passed since, more than one where some were missed. Returns the plan's state, the
+        memory, and the plan's input now.
         """
         tick_us, running = self._config.tick_period_us, memory.running
         memory, new_plan = take_answer(memory, answer, now_us)
@@ -212,7 +199,7 @@ class PlanExchange:
 
 
 def requested(memory: PlanMemory, apply_us: int) -> PlanMemory:
-    """The memory once the next request is out; one without an answer is given up."""
+    """The memory after the next request; an unanswered one is dropped."""
     counters = memory.counters
     if memory.awaited_id >= 0:
         counters = replace(counters, fallbacks=counters.fallbacks + 1)

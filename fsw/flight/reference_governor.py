@@ -1,6 +1,6 @@
-"""The one limiter of references: nothing that is asked for leads the vehicle out of its safe set.
+"""The one limiter of references: no reference leads the vehicle out of its safe set.
 
-The planner's barriers keep the vehicle inside whatever is asked for, at a penalty that a reference
+The planner's barriers keep the vehicle inside for any reference, at a penalty that a reference
 far outside could outbid. So every reference passes here, by its origin:
 
 ============================  =====================================================
@@ -41,13 +41,7 @@ _TOLERANCE = 1e-4  # m
 
 
 def limit_lead(p: Vec3, vehicle: Vec3, max_lead_distance: float) -> Vec3:
-    """A point brought back to within a distance of the vehicle's own point.
-
-    Args:
-        p: The point [m, NED].
-        vehicle: Where the vehicle's own point is [m, NED].
-        max_lead_distance: The distance [m].
-    """
+    """``p`` [m, NED] brought to within ``max_lead_distance`` [m] of ``vehicle`` [m, NED]."""
     away = subtract(p, vehicle)
     length = norm(away)
     return (
@@ -58,15 +52,11 @@ def limit_lead(p: Vec3, vehicle: Vec3, max_lead_distance: float) -> Vec3:
 def limit_approach(
     p: Vec3, v: Vec3, other_end: Vec3, safe_set: SafeSet, braking: float, slope: float
 ) -> tuple[Vec3, Vec3]:
-    """A point off every wall and obstacle, and no faster towards one than would let it stop.
+    """``p`` [m, NED] off every wall and obstacle, and its ``v`` [m/s, NED] such that it can stop.
 
-    Args:
-        p: The point [m, NED].
-        v: Its velocity [m/s, NED].
-        other_end: From the point to the other end of the arm, which stays out as well [m, NED].
-        safe_set: Walls and obstacles; a sphere rides on the reference and needs nothing.
-        braking: Deceleration the barrier counts on [m/s^2].
-        slope: Of S at the boundary [1/s].
+    The arm's ``other_end`` [m, NED], as seen from the point, stays out as well. The barrier counts
+    on a deceleration ``braking`` [m/s^2] and the ``slope`` [1/s] of S at the boundary. A sphere
+    rides on the reference and needs nothing.
     """
     for wall in safe_set.walls:
         reach = min(0.0, dot(wall.normal, other_end))
@@ -96,13 +86,10 @@ def _slowed(v: Vec3, n: Vec3, most: float) -> Vec3:
 
 
 def limit_descent(p: Vec3, v: Vec3, body_height: float, touch_speed: float) -> tuple[Vec3, Vec3]:
-    """A point no faster towards the ground than a landing, and hardly along it.
+    """``p`` [m, NED], ``v`` [m/s, NED] no faster down than a landing, and hardly along the ground.
 
-    Args:
-        p: The point [m, NED].
-        v: Its velocity [m/s, NED].
-        body_height: Of the body above where it stands, as the point asks for it [m].
-        touch_speed: Downwards at the ground [m/s]; 0 where this point is not to land.
+    The point asks for the body at ``body_height`` [m] above where it stands; at the ground it may
+    move down at ``touch_speed`` [m/s], 0 where it is not to land.
     """
     (x, y, z), (vx, vy, vz) = p, v
     if touch_speed == 0.0 and body_height < _CLEAR_OF_GROUND:
@@ -126,16 +113,9 @@ def limit_reference(
 ) -> tuple[EndEffectorTarget, ...]:
     """The targets of a horizon, the same object where nothing had to be limited.
 
-    What is asked for near the vehicle's own motion, and not far behind a wall, passes as it is: the
-    paper's own path enters the safety zone.
-
-    Args:
-        targets: At the nodes.
-        p_WE: Where the end-effector is [m].
-        v_WE: How it moves [m/s].
-        safe_set: Its walls and obstacles are looked at.
-        braking: Deceleration the barrier counts on [m/s^2].
-        slope: Of S at the boundary [1/s].
+    What is asked for near the motion of the end-effector, ``p_WE`` [m] and ``v_WE`` [m/s], and not
+    far behind a wall passes as it is: the paper's own path enters the safety zone. The barrier
+    counts on a deceleration ``braking`` [m/s^2] and the ``slope`` [1/s] of S at the boundary.
     """
     begin_us, limited = targets[0].t_us, []
     approached = [
@@ -196,14 +176,9 @@ class ReferenceGovernor:
     def limit_setpoint(
         self, p: Vec3, v: Vec3, *, other_end: Vec3, of_end_effector: bool, safe_set: SafeSet
     ) -> tuple[Vec3, Vec3]:
-        """A generated setpoint off the ground and off every wall.
+        """A generated setpoint ``p`` [m, NED], ``v`` [m/s, NED] off the ground and off every wall.
 
-        Args:
-            p: Of the body or the end-effector [m, NED].
-            v: Its velocity [m/s, NED].
-            other_end: From it to the arm's other end [m, NED].
-            of_end_effector: Which of the two it is.
-            safe_set: In force.
+        ``other_end`` [m, NED] of the arm is seen from it.
         """
         body_down = p[2] + (other_end[2] if of_end_effector else 0.0)
         touch_speed = 0.0 if of_end_effector else self._config.limits.land_speed

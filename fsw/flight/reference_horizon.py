@@ -68,7 +68,7 @@ class ReferenceHorizon:
         return state, mode.generator.horizon(reference, goal, estimate, safe_set, t_us)
 
     def _is_off_plan(self, state: FlightState, estimate: StateEstimate) -> bool:
-        """Whether the fast loop is not where the plan is: then nothing new is asked of it."""
+        """Whether the fast loop is off the plan: then the reference does not advance."""
         if state.nominal is None:
             return False
         (x, y, z), (px, py, pz) = estimate.p_WB, state.nominal.p

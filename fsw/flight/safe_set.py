@@ -29,10 +29,10 @@ class SafeSetCheck:
         self._loop_tube = loop_tube(config)
 
     def analyse(self, safe_set: SafeSet) -> tuple[Finding, ...]:
-        """What speaks for and against keeping a safe set with this configuration."""
+        """Findings on whether this configuration can keep a safe set."""
         return analyse(self._config, safe_set, self._loop_tube)
 
-    def receive(
+    def update(
         self,
         mission: MissionMemory,
         update: MissionUpdate | None,
@@ -59,7 +59,7 @@ class SafeSetCheck:
     def margins(
         self, safe_set: SafeSet, estimate: StateEstimate, target: EndEffectorTarget
     ) -> ConstraintReport:
-        """How far inside the safe set the vehicle is now."""
+        """Margins and barrier values of the vehicle in the safe set."""
         length, planner = self._config.airframe.link_length, self._config.planner
         points = (
             (estimate.p_WB, estimate.v_WB),

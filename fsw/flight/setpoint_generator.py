@@ -1,6 +1,6 @@
-r"""A setpoint that moves as the vehicle can, towards whatever is asked for.
+r"""Setpoint generator: a setpoint that moves as the vehicle can, towards a goal.
 
-What is asked for (a place, a velocity, an acceleration, a circle) may be anything, at any moment,
+A goal (a place, a velocity, an acceleration, a circle) may change to anything, at any time,
 and on the far side of a wall. The planner tracks a point, of the body or of the end-effector, that
 runs ahead of the vehicle within limits:
 
@@ -52,7 +52,7 @@ class ReferenceState:
 
 @dataclass(frozen=True, slots=True)
 class PositionGoal:
-    """What the point is after."""
+    """The goal of the point."""
 
     motion: MotionSetpoint
     joints: Vec2 | None = None  # rad
@@ -64,13 +64,9 @@ class PositionGoal:
 def step(
     reference: ReferenceState, goal: PositionGoal, limits: SetpointLimits, dt: float
 ) -> ReferenceState:
-    """The point a moment later, as if there were neither vehicle nor walls.
+    """The point ``dt`` [s] later, as if there were neither vehicle nor walls.
 
-    Args:
-        reference: The point now.
-        goal: What it is after; the kinds of point agree.
-        limits: How fast it may move.
-        dt: The moment [s].
+    Point and goal are both of the body or both of the end-effector.
     """
     motion = _motion_now(reference, goal)
     p, v = _move_point(reference, motion, goal, limits, dt)
@@ -183,7 +179,7 @@ class SetpointGenerator:
 
 
 def _motion_now(reference: ReferenceState, goal: PositionGoal) -> MotionSetpoint:
-    """What the point is after where it is now."""
+    """The goal at the point's current position."""
     motion, look_at = goal.motion, goal.look_at
     if goal.orbit is not None:
         motion = on_orbit(goal.orbit, reference.p)

@@ -1,4 +1,4 @@
-"""What the flight software remembers from tick to tick, all of it."""
+"""The complete state of the flight software between two ticks."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class VehicleMemory:
 
     @property
     def armed(self) -> bool:
-        """Whether anything may move."""
+        """Whether actuators may move."""
         return self.mode is not Mode.DISARMED and self.mode is not Mode.FAULT
 
     @property
@@ -94,7 +94,7 @@ class OffboardMemory:
 
 @dataclass(frozen=True, slots=True)
 class MissionMemory:
-    """What was sent to be flown and to be kept clear of."""
+    """The uploaded mission, targets and safe set."""
 
     stream: tuple[EndEffectorTarget, ...] = ()
     safe_set: SafeSet = field(default_factory=SafeSet)  # in force: announced and fence together

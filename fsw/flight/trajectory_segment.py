@@ -38,10 +38,10 @@ class TrajectorySegment:
     start: Vec3  # m, end-effector
     way: Vec3  # m, from start to end
     yaw: float  # rad, at the start
-    turn: float  # rad
-    up: float  # s, speed rises
-    cruise: float  # s
-    down: float  # s, speed falls
+    turn: float = 0.0  # rad
+    up: float = 0.0  # s, speed rises
+    cruise: float = 0.0  # s
+    down: float = 0.0  # s, speed falls
 
     @property
     def end_us(self) -> int:
@@ -89,28 +89,15 @@ class TrajectorySegment:
 def segment_to(
     start: EndEffectorTarget, end: Vec3, yaw: float | None, limits: MotionLimits
 ) -> TrajectorySegment:
-    """The fastest segment within limits from rest at ``start`` to rest at a point.
+    """The fastest segment within limits from ``start``, taken at rest, to rest at ``end`` [m, NED].
 
-    Args:
-        start: Where and when it begins; its velocity is not looked at.
-        end: End-effector position [m].
-        yaw: Heading at the end [rad]; None keeps it.
-        limits: All positive.
+    Its heading ends at ``yaw`` [rad]; None keeps it.
     """
     way = (end[0] - start.p_WE[0], end[1] - start.p_WE[1], end[2] - start.p_WE[2])
     turn = 0.0 if yaw is None else wrap_angle(yaw - start.yaw)
     distance, angle = math.hypot(*way), abs(turn)
     if distance < 1e-9 and angle < 1e-9:
-        return TrajectorySegment(
-            start_us=start.t_us,
-            start=start.p_WE,
-            way=(0.0, 0.0, 0.0),
-            yaw=start.yaw,
-            turn=0.0,
-            up=0.0,
-            cruise=0.0,
-            down=0.0,
-        )
+        return TrajectorySegment(start.t_us, start.p_WE, (0.0, 0.0, 0.0), start.yaw)
     u = _smaller(limits.speed, distance, limits.turn_rate, angle)
     slope = _smaller(limits.acceleration, distance, limits.turn_acceleration, angle)
     ramp = _PEAK * u / slope
@@ -135,14 +122,7 @@ def braking_segment(start: EndEffectorTarget, limits: MotionLimits) -> Trajector
     vx, vy, vz = start.v_WE
     way = (0.5 * down * vx, 0.5 * down * vy, 0.5 * down * vz)
     return TrajectorySegment(
-        start_us=start.t_us,
-        start=start.p_WE,
-        way=way,
-        yaw=start.yaw,
-        turn=0.0,
-        up=0.0,
-        cruise=0.0,
-        down=down,
+        start_us=start.t_us, start=start.p_WE, way=way, yaw=start.yaw, down=down
     )
 
 

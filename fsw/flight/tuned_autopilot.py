@@ -46,7 +46,7 @@ class TunedAutopilot:
         return () if self._config.soft else refusals(self._in_use[1].analyse(safe_set))
 
     def tick(self, state: FlightState, inputs: TickInputs) -> tuple[FlightState, TickOutputs]:
-        """Take over a tuning that was wished for, if it may be, then do the tick; see Autopilot.
+        """Apply a requested tuning if allowed, then do the tick; see Autopilot.
 
         Raises:
             ValueError: The numbers of a tuning that was not prepared contradict each other.

@@ -29,16 +29,10 @@ def build_links(
     record: RecordFrame,
     services: Callable[[], Sequence[LinkService]],
 ) -> GroundLinks:
-    """Open the links.
+    """Open the links; ``clocks`` are monotonic time and Unix time [us].
 
-    Args:
-        choice: Which.
-        inbox: Takes what is for the vehicle, from all of them.
-        context: What encoders need.
-        clocks: Monotonic time and Unix time [us].
-        record: Takes every frame of the ground station's link; the programs' link would repeat
-            the same telemetry under the same sequence numbers.
-        services: Makes what one link serves.
+    Only the ground station's link is recorded: the programs' link would repeat the same telemetry
+    under the same sequence numbers. ``services`` makes what one link serves.
 
     Raises:
         LinkError: An address is none, or a key cannot be trusted.

@@ -1,23 +1,19 @@
 """One link to the ground: telemetry out, commands in, services both ways.
 
-Nothing that arrives here can raise, and nothing is kept between datagrams but what a valid frame
-said.
+Received data never raises, and only valid frames change the state of the link.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass
-from functools import partial
+from dataclasses import asdict, dataclass
 from typing import Final
 
 from fsw.link.inbox import Inbox
 from fsw.link.outbox import Outbox, packed
 from fsw.link.peers import Peers
-from fsw.link.services.dispatch import Dispatch
-from fsw.link.services.service import LinkService
-from fsw.link.signing.signing import FrameTrust, Signing
-from fsw.link.signing.signing_setup import set_up_signing
+from fsw.link.services.service import Dispatch, LinkService
+from fsw.link.signing.signing import FrameTrust, Signing, set_up_signing
 from fsw.link.telemetry.link_commands import LinkCommands
 from fsw.link.telemetry.stream_rates import StreamRates
 from fsw.link.telemetry.streams import AT_ONCE, HEARTBEAT, STREAMS, Stream
@@ -67,22 +63,12 @@ class GcsLink:
         record: RecordFrame | None = None,
         services: Sequence[LinkService] = (),
     ) -> None:
-        """Open the link.
-
-        Args:
-            setup: Addresses and rates.
-            inbox: Takes what is for the vehicle.
-            context: What encoders need.
-            signing: Of this link.
-            clock: Wall time, in which peers live.
-            record: Takes every frame of both directions.
-            services: Of this link alone.
-        """
+        """Open the link; ``record`` takes all frames of both directions; the clock is wall time."""
         self.name = setup.name
         self.losses = Losses()
-        self.dispatch = Dispatch(services)
         self.signing = signing
         self.outbox = Outbox(signing)
+        self.dispatch = Dispatch(services, self.outbox.add_output)
         self.accepted = 0  # frames
         self.rates = StreamRates(STREAMS, setup.rates_hz, context.facts.tick_period_us)
         self.talks = setup.unheard  # whether more than a heartbeat is sent
@@ -122,15 +108,10 @@ class GcsLink:
         return (system, component) in self._speakers
 
     def read(self, t_us: int, budget: int) -> int:
-        """Read datagrams that are there, and answer them.
+        """Read datagrams that are there, and answer them; returns what is left of the budget.
 
-        Args:
-            t_us: Sensor time [us].
-            budget: Bytes after which to stop; what is left waits in the kernel, and is lost there
-                if it becomes too much.
-
-        Returns:
-            What is left of the budget; all of it if nothing was there.
+        What lies beyond the budget [bytes] waits in the kernel, and is lost there if it becomes too
+        much.
         """
         while budget > 0:
             received = self._endpoint.receive_waiting()
@@ -155,24 +136,19 @@ class GcsLink:
 
     def serve(self, t_us: int) -> None:
         """Let services go on with what they are sending; call it once a tick if it talks."""
-        self.dispatch.poll(t_us, partial(self.outbox.add_output, t_us=t_us))
+        self.dispatch.poll(t_us)
         if self.outbox.waiting:
             self._send(t_us)
 
     def serve_bulk(self, t_us: int) -> bool:
         """Send a datagram of what clients wait for; whether there was anything."""
-        if not self.dispatch.bulk(t_us, partial(self.outbox.add_output, t_us=t_us)):
+        if not self.dispatch.bulk(t_us):
             return False
         self._send(t_us)
         return True
 
     def publish(self, outputs: TickOutputs, changed: bool) -> None:
-        """Send what is due to all peers.
-
-        Args:
-            outputs: Of this tick.
-            changed: Whether mode, arming, landing or health are other than they were.
-        """
+        """Send what is due to all peers; at once if mode, arming, landing or health ``changed``."""
         snapshot = self._snapshot = outputs.snapshot
         if changed:
             for stream in AT_ONCE:
@@ -191,6 +167,20 @@ class GcsLink:
         """Answer a command that came over this link."""
         self.outbox.add(AUTOPILOT, message_ids.COMMAND_ACK, encode_replies.command_ack(ack))
         self._send(t_us)
+
+    def as_json(self) -> dict[str, object]:
+        """Counts since start, for ``fsw.json``."""
+        return {
+            "frames_accepted": self.accepted,
+            "false_starts": self.losses.frames,
+            "bytes_lost": self.losses.bytes,
+            "datagrams_dropped": self.dropped,
+            "refused": asdict(self.signing.counters),
+            "signed": self.signing.active,
+            "peers": len(self.peers),
+            "encode_failures": self.outbox.encode_failures,
+            "service_failures": self.dispatch.failures,
+        }
 
     def close(self) -> None:
         """Close the socket."""
@@ -225,7 +215,7 @@ class GcsLink:
                 self.outbox.add_asked_for(message)
             if refusal is not None:
                 self.outbox.add_text(refusal, t_us)
-        self.dispatch.handle(frame, t_us, partial(self.outbox.add_output, t_us=t_us))
+        self.dispatch.handle(frame, t_us)
 
     def _encode(self, stream: Stream, snapshot: FlightSnapshot) -> None:
         try:

@@ -47,12 +47,9 @@ class GroundLinks:
                 link.read(t_us, _READ_BYTES)
 
     def attend(self, seconds: float) -> None:
-        """Sleep, and answer the ground meanwhile: in real time it is heard between two ticks.
+        """Sleep for ``seconds`` [s] and answer the ground: in real time it is heard between ticks.
 
         One datagram is read at a time and none shortly before the end, so a flood delays no tick.
-
-        Args:
-            seconds: How long to sleep [s].
         """
         self._attends = True
         begin = self._clock()

@@ -1,4 +1,4 @@
-"""What arrived since the last tick, from whichever link."""
+"""Messages received since the last tick, from all links."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ Setpoint = MotionSetpoint | AttitudeSetpoint | JointSetpoint
 
 @dataclass(frozen=True, slots=True)
 class Setpoints:
-    """The newest setpoints for now; at most one of motion and attitude."""
+    """The newest offboard setpoints; at most one of motion and attitude."""
 
     motion: MotionSetpoint | None = None
     attitude: AttitudeSetpoint | None = None
@@ -68,16 +68,22 @@ class Inbox:
         self._obstacles: dict[int, Wall | PointObstacle] = {}
         self._obstacle_count = 0
         self._handlers: dict[int, Callable[[Frame], None]] = {
-            message_ids.COMMAND_LONG: self._command_long,
-            message_ids.COMMAND_INT: self._command_int,
-            message_ids.SET_MODE: self._set_mode,
+            message_ids.COMMAND_LONG: partial(self._command, decode.command_long),
+            message_ids.COMMAND_INT: partial(self._command, decode.command_int),
+            message_ids.SET_MODE: partial(self._command, decode.set_mode),
             message_ids.END_EFFECTOR_TARGET: self._target,
-            message_ids.SET_POSITION_TARGET_LOCAL_NED: self._body,
-            message_ids.SET_ATTITUDE_TARGET: self._attitude,
-            message_ids.ARM_JOINT_SETPOINT: self._joints,
+            message_ids.SET_POSITION_TARGET_LOCAL_NED: partial(
+                self._setpoint, 13, decode_setpoints.body_setpoint
+            ),
+            message_ids.SET_ATTITUDE_TARGET: partial(
+                self._setpoint, 9, decode_setpoints.attitude_setpoint
+            ),
+            message_ids.ARM_JOINT_SETPOINT: partial(
+                self._setpoint, 13, decode_setpoints.joint_setpoint
+            ),
             message_ids.HEARTBEAT: self._heartbeat,
-            message_ids.OBSTACLE_WALL: self._wall,
-            message_ids.OBSTACLE_POINT: self._point,
+            message_ids.OBSTACLE_WALL: partial(self._obstacle, 5, decode.obstacle_wall),
+            message_ids.OBSTACLE_POINT: partial(self._obstacle, 4, decode.obstacle_point),
             message_ids.WORKSPACE_SPHERE: self._sphere,
         }
 
@@ -126,14 +132,9 @@ class Inbox:
         mission: MissionUpdate | None,
         stale_us: int = 0,
     ) -> TickInputs:
-        """Everything that arrived since the last tick, with what did not come from the ground.
+        """Everything since the last tick, and what did not come from the ground.
 
-        Args:
-            sensors: Of this tick.
-            plan: The planner's answer that is due, if one is.
-            tuning: Parameters to take over, if any.
-            mission: A change of the mission, if there is one.
-            stale_us: How much older the sensors' readings are [us].
+        The sensors' readings are ``stale_us`` older than their stamp says.
         """
         setpoints = self.take_setpoints()
         return TickInputs(
@@ -157,16 +158,8 @@ class Inbox:
         taken, self._station_heard = self._station_heard, False
         return taken
 
-    def _command_long(self, frame: Frame) -> None:
-        self._add_command(decode.command_long(frame))
-
-    def _command_int(self, frame: Frame) -> None:
-        self._add_command(decode.command_int(frame))
-
-    def _set_mode(self, frame: Frame) -> None:
-        self._add_command(decode.set_mode(frame))
-
-    def _add_command(self, request: CommandRequest | None) -> None:
+    def _command(self, read: Callable[[Frame], CommandRequest | None], frame: Frame) -> None:
+        request = read(frame)
         if request is None:
             return
         if len(self._commands) >= _MAX_COMMANDS:
@@ -177,7 +170,7 @@ class Inbox:
     def _target(self, frame: Frame) -> None:
         values = cast(Numbers, frame.payload_values)
         if values[0] == 0:  # not for a later time: for now
-            self._add(values, values[13:15], decode_setpoints.end_effector_setpoint)
+            self._setpoint(13, decode_setpoints.end_effector_setpoint, frame)
             return
         if not decode.for_this_vehicle(values[13], values[14]):
             return
@@ -187,23 +180,13 @@ class Inbox:
             return
         self._targets.append(target)
 
-    def _body(self, frame: Frame) -> None:
-        values = cast(Numbers, frame.payload_values)
-        self._add(values, values[13:15], decode_setpoints.body_setpoint)
+    def _setpoint(self, at: int, read: Callable[[Numbers], Setpoint | None], frame: Frame) -> None:
+        """Keep the newest of each kind; one for another vehicle is refused like a wrong one.
 
-    def _attitude(self, frame: Frame) -> None:
+        The target stands at the values ``at`` and behind.
+        """
         values = cast(Numbers, frame.payload_values)
-        self._add(values, values[9:11], decode_setpoints.attitude_setpoint)
-
-    def _joints(self, frame: Frame) -> None:
-        values = cast(Numbers, frame.payload_values)
-        self._add(values, values[13:15], decode_setpoints.joint_setpoint)
-
-    def _add(
-        self, values: Numbers, target: Numbers, read: Callable[[Numbers], Setpoint | None]
-    ) -> None:
-        """Keep the newest of each kind; one for another vehicle is refused like a wrong one."""
-        setpoint = read(values) if decode.for_this_vehicle(*target) else None
+        setpoint = read(values) if decode.for_this_vehicle(*values[at : at + 2]) else None
         kept = self._setpoints
         if setpoint is None:
             self.refused += 1
@@ -219,17 +202,13 @@ class Inbox:
         if frame.payload_values[1] == _GROUND_STATION:
             self._station_heard = True
 
-    def _wall(self, frame: Frame) -> None:
+    def _obstacle(
+        self, at: int, read: Callable[[Numbers], decode.IndexedObstacle | None], frame: Frame
+    ) -> None:
         values = cast(Numbers, frame.payload_values)
-        if decode.for_this_vehicle(values[5], values[6]):
-            self._add_obstacle(decode.obstacle_wall(values))
-
-    def _point(self, frame: Frame) -> None:
-        values = cast(Numbers, frame.payload_values)
-        if decode.for_this_vehicle(values[4], values[5]):
-            self._add_obstacle(decode.obstacle_point(values))
-
-    def _add_obstacle(self, indexed: decode.IndexedObstacle | None) -> None:
+        if not decode.for_this_vehicle(*values[at : at + 2]):
+            return
+        indexed = read(values)
         if indexed is None:
             self.refused += 1
             return

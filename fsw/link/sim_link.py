@@ -71,11 +71,9 @@ class SimLink:
         self._endpoint.send(self._writer.frame(message_ids.HEARTBEAT, *values))
 
     def wait_for_step(self) -> SensorFrame | None:
-        """Wait for the next new step.
+        """Wait for the sensors of the next new step; what else came with it is in the inbox.
 
-        Returns:
-            Its sensors; commands, targets and the safe set it came with are in the inbox. None
-            when nothing new came within the patience, or when the run is over.
+        None when nothing new came within the patience, or when the run is over.
         """
         datagram = self._endpoint.receive()
         return None if datagram is None else self._read(datagram)

@@ -44,12 +44,7 @@ class TextLimiter:
         self._dropped_us = 0
 
     def admit(self, text: StatusText, t_us: int) -> StatusText | None:
-        """The text if it is to be sent now; None if it is counted only.
-
-        Args:
-            text: The text.
-            t_us: Sensor time [us].
-        """
+        """The text if it is to be sent now; None if it is counted only."""
         before = self._sent.get(text.text)
         if before is not None and t_us - before.at_us < REPEAT_US:
             before.held_back += 1

@@ -27,14 +27,11 @@ class OpenEndpoint:
     """A socket that talks to anyone and never waits."""
 
     def __init__(self, target: Address, local_port: int = 0, *, remote: bool = False) -> None:
-        """Open the socket.
+        """Open the socket towards the peer that is spoken to first.
 
-        Args:
-            target: Peer that is spoken to first. Where that is this machine, only this machine is
-                heard: a vehicle must not take commands from a network by accident.
-            local_port: Preferred, so that a peer can know it beforehand; if it is taken, the system
-                chooses one, so that any number of vehicles share a machine.
-            remote: Hear other machines anyway.
+        Where that is this machine, only this machine is heard, unless ``remote``: a vehicle must
+        not take commands from a network by accident. If the preferred port is taken, the system
+        chooses one, so that any number of vehicles share a machine.
         """
         local = "" if remote or not is_loopback(target) else target[0]
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)

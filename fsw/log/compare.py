@@ -62,5 +62,5 @@ def _readable(value: int | float | bytes) -> int | float | str:
 
 
 def _text(record: Record) -> str:
-    said = ulog.said(record.kind, record.body)
-    return "" if said is None else said[2]
+    text = ulog.text_of(record.kind, record.body)
+    return "" if text is None else text[2]

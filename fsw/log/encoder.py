@@ -106,13 +106,9 @@ class LogEncoder:
     def __init__(
         self, *, measured: bool, thrust_max: float, link_length: Vec2, profile: int = FULL
     ) -> None:
-        """Start a log.
+        """Start a log; without times ``measured`` by the wall clock it repeats to the byte.
 
-        Args:
-            measured: Write times of the wall clock; without them a flight repeats to the byte.
-            thrust_max: Full thrust of a rotor [N].
-            link_length: Lengths of the arm's links [m].
-            profile: THIN or FULL.
+        A rotor gives ``thrust_max`` [N]; the arm's links have ``link_length`` [m]; THIN or FULL.
         """
         self._detail_us = DETAIL_US[profile]
         self._detailed = -1  # number of the interval of which details were written last
@@ -250,13 +246,10 @@ class LogEncoder:
 
 
 def loop_timing(t_us: int, group: int, counts: tuple[int, ...], times: tuple[float, ...]) -> bytes:
-    """A record of loop_timing.
+    """A record of loop_timing for rate group 0, the tick, or 1, the planner.
 
-    Args:
-        t_us: Sensor time [us].
-        group: 0 for the tick, 1 for the planner.
-        counts: Ticks, late and skipped ones, and the period [us].
-        times: Execution and lateness, each median, 99th percentile and most [us].
+    ``counts`` are ticks, late and skipped ones, and the period [us]; ``times`` [us] are execution
+    and lateness, each median, 99th percentile and most.
     """
     return _TIMING.pack((*_TIMING.heads, t_us, *counts, *times, group))
 

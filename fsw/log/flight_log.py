@@ -43,7 +43,7 @@ class LogSubject:
 
 
 class FlightLog:
-    """One flight's ULog file."""
+    """One flight's ULog file; a sync message follows each block, so that a cut end is seen."""
 
     def __init__(self, path: Path, subject: LogSubject) -> None:
         """Create the file; nothing is in it before :meth:`begin`.
@@ -63,11 +63,9 @@ class FlightLog:
         self._unmarked_us = 0  # lost, and not yet marked as lost
 
     def begin(self, t_us: int, lockstep: bool) -> None:
-        """Write what stands before the data.
+        """Write what stands before the data of the first tick, that of ``t_us``.
 
-        Args:
-            t_us: Sensor time of the first tick [us].
-            lockstep: Write in this thread and nothing that the wall clock measured.
+        In lockstep, write in this thread and nothing that the wall clock measured.
         """
         subject, self._measured = self._subject, not lockstep
         self._encoder = LogEncoder(
@@ -116,27 +114,19 @@ class FlightLog:
         self.file.close()
 
     def _flush(self, t_us: int) -> None:
-        block, begin_us = self._records, self._block_us
+        block, begin_us = self._records + ulog.sync(), self._block_us
         self._records, self._block_us = bytearray(), t_us
         if self._unmarked_us:
             block = bytearray(ulog.dropout(round(1e-3 * self._unmarked_us))) + block
         if self.file.put(block):
             self._unmarked_us = 0
-            self._records += ulog.sync()
         else:
             self.lost_us += t_us - begin_us
             self._unmarked_us += t_us - begin_us
 
 
 def definitions(t_us: int, subject: LogSubject, pacing: str, schema: str) -> bytes:
-    """Everything before the first record.
-
-    Args:
-        t_us: Sensor time at which the log begins [us].
-        subject: What was flown.
-        pacing: ``lockstep`` or ``realtime``.
-        schema: Shape of the recorded inputs, without which they cannot be read back.
-    """
+    """Everything before the first record, with the shape of the inputs, to read them back."""
     exact = json.dumps(dict(subject.numbers), separators=(",", ":"))
     named = {**subject.numbers, **subject.parameters}
     facts: dict[str, str | int] = {

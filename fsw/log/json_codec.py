@@ -34,12 +34,10 @@ class JsonCodec:
     """Converts the fields of one dataclass."""
 
     def __init__(self, kind: type, instead: dict[type, Any] | None = None) -> None:
-        """Prepare the conversion.
+        """Prepare the conversion of a dataclass.
 
-        Args:
-            kind: A dataclass.
-            instead: Values that are written in place of all values of a type, for wall-clock times
-                that would make two logs of the same flight differ.
+        The values of ``instead`` are written in place of all values of their type: wall-clock times
+        would make two logs of the same flight differ.
 
         Raises:
             TypeError: A field has a type that could not be read back.

@@ -39,10 +39,7 @@ class Gap:
 
 
 def open_flight(path: Path) -> UlogFile:
-    """Open a flight log whose inputs this build can read.
-
-    Args:
-        path: The file, or the directory of a flight.
+    """Open a flight log, by its file or its directory, whose inputs this build can read.
 
     Raises:
         UlogError: It is no flight log, or its inputs have another shape.
@@ -66,13 +63,18 @@ def _has_our_topics(log: UlogFile) -> bool:
 def ticks(log: UlogFile) -> Iterator[LoggedTick | Gap]:
     """Every whole tick of a log, and where some are missing.
 
+    The last tick is whole if the mark behind a block follows it. Without the mark the log was cut,
+    perhaps inside that tick: it is left out, and ``log.whole`` becomes False.
+
     Raises:
         UlogError: An input cannot be read back, or the log holds no whole tick.
     """
-    inputs, index, records, lost_ms = _Inputs(log), 0, list[Record](), 0
+    inputs, index, records, lost_ms, ended = _Inputs(log), 0, list[Record](), 0, False
     for record in log.records():
         if record.kind == ulog.DROPOUT:
             lost_ms += int.from_bytes(record.body, "little")
+        elif record.kind == ulog.SYNC:
+            ended = True
         elif _of_a_tick(record):
             if record.number == _SENSORS and records:
                 yield inputs.tick(index, records)
@@ -81,9 +83,12 @@ def ticks(log: UlogFile) -> Iterator[LoggedTick | Gap]:
                     yield Gap(index, lost_ms)
                     lost_ms = 0
             records.append(record)
-    if records and log.whole:
+            ended = False
+    if records and ended:
         yield inputs.tick(index, records)
-    elif index == 0:
+        return
+    log.whole = False
+    if index == 0:
         raise UlogError(f"{log.path} holds no whole tick")
 
 

@@ -20,13 +20,7 @@ class RunFiles:
         subject: LogSubject,
         warn: Callable[[str], None],
     ) -> None:
-        """Create both files.
-
-        Args:
-            directory: Where; exists.
-            start_unix_us: Wall time of sensor time 0, for the .tlog [us since 1970].
-            subject: What is flown.
-            warn: Takes a sentence for the operator.
+        """Create both files in a directory that exists; sensor time 0 is ``start_unix_us``.
 
         Raises:
             OSError: A file exists or cannot be created.

@@ -23,11 +23,7 @@ class TlogWriter:
     """
 
     def __init__(self, path: Path, start_unix_us: int) -> None:
-        """Create the file.
-
-        Args:
-            path: Where to write; must not exist.
-            start_unix_us: Wall time that sensor time 0 is stamped with [us since 1970].
+        """Create the file; sensor time 0 is stamped with ``start_unix_us``.
 
         Raises:
             OSError: The file exists or cannot be created.
@@ -39,12 +35,7 @@ class TlogWriter:
         self._flushed_us = 0
 
     def add(self, t_us: int, frame: bytes) -> None:
-        """Append one frame.
-
-        Args:
-            t_us: Sensor time [us].
-            frame: One whole MAVLink frame.
-        """
+        """Append one whole MAVLink frame."""
         self._records += (self._start_us + t_us).to_bytes(8, "big") + frame
         if t_us - self._flushed_us >= _FLUSH_INTERVAL_US or len(self._records) > _FLUSH_BYTES:
             self._flushed_us = t_us

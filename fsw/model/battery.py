@@ -23,7 +23,7 @@ Levels = tuple[float, float, float]
 
 
 def charge_of(remaining: float, levels: Levels) -> Charge:
-    """The level of ``remaining`` [1] of the capacity; what is no number is an emergency."""
+    """Charge level at a ``remaining`` share [1] of the capacity; NaN is an emergency."""
     if remaining >= levels[0]:
         return Charge.OK
     if remaining >= levels[1]:

@@ -3,13 +3,13 @@
 Minimise ``1/2 U' H U + c' U + penalty' s`` over the inputs U (6 n) and the slacks s >= 0 of the
 soft rows, subject to
 
-====================  ==========================================  =============
-rows, in this order   meaning                                     cone
-====================  ==========================================  =============
-soft blocks           gradient U + slack >= lower bound - constant   non-negative
-input bounds          -u_max <= u <= u_max                        non-negative
-tilt, one a node      |a_xy| <= tan(tilt) (g - a_z)               second-order
-====================  ==========================================  =============
+====================  ============================================  =============
+rows, in this order   meaning                                       cone
+====================  ============================================  =============
+soft blocks           gradient U + slack >= lower bound - constant  non-negative
+input bounds          -u_max <= u <= u_max                          non-negative
+tilt, one a node      |a_xy| <= tan(tilt) (g - a_z)                 second-order
+====================  ============================================  =============
 
 Source: docs/equations.md E17.
 """

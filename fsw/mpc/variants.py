@@ -33,7 +33,7 @@ from fsw.signals import SafeSet
 
 
 @dataclass(frozen=True)
-class Parts:
+class OcpTerms:
     """What shapes the optimum of one controller in one safe set."""
 
     costs: tuple[Cost, ...]
@@ -41,21 +41,21 @@ class Parts:
     slack: float | None = None  # penalty of softening their rows; None: they are hard
 
 
-def _naive(config: PlannerConfig, model: CondensedModel, safe_set: SafeSet) -> Parts:
+def _naive(config: PlannerConfig, model: CondensedModel, safe_set: SafeSet) -> OcpTerms:
     costs: tuple[Cost, ...] = (TrackingCost(config.weights),)
     weight = config.soft.centring
     if config.centred and safe_set.sphere is not None:
         centring = SphereCost(safe_set.sphere, weight, 5.0 * weight, only_outside=False)
         costs = (*costs, centring)
-    return Parts(costs)
+    return OcpTerms(costs)
 
 
-def _hard(config: PlannerConfig, model: CondensedModel, safe_set: SafeSet) -> Parts:
+def _hard(config: PlannerConfig, model: CondensedModel, safe_set: SafeSet) -> OcpTerms:
     costs, first = (TrackingCost(config.weights),), 1 + config.hard_skipped_nodes
     where = (model.horizon, config.tightening, first)
     if safe_set.sphere is not None:
-        return Parts(costs, (HardWorkspace(safe_set.sphere, *where),), config.hard_slack)
-    return Parts(costs, _surfaces(safe_set, *where), config.hard_slack)
+        return OcpTerms(costs, (HardWorkspace(safe_set.sphere, *where),), config.hard_slack)
+    return OcpTerms(costs, _surfaces(safe_set, *where), config.hard_slack)
 
 
 def _surfaces(
@@ -70,22 +70,22 @@ def _surfaces(
     return tuple(surfaces)
 
 
-def _soft(config: PlannerConfig, model: CondensedModel, safe_set: SafeSet) -> Parts:
+def _soft(config: PlannerConfig, model: CondensedModel, safe_set: SafeSet) -> OcpTerms:
     tracking, weights = TrackingCost(config.weights), config.soft
     if safe_set.sphere is not None:
         outside = SphereCost(
             safe_set.sphere, weights.workspace, weights.workspace_terminal, only_outside=True
         )
-        return Parts((tracking, outside))
+        return OcpTerms((tracking, outside))
     surfaces = _surfaces(safe_set, model.horizon, tightening=0.0, first_node=1)
-    return Parts((tracking, *(SurfaceCost(each, weights) for each in surfaces)))
+    return OcpTerms((tracking, *(SurfaceCost(each, weights) for each in surfaces)))
 
 
-def _blf(config: PlannerConfig, model: CondensedModel, safe_set: SafeSet) -> Parts:
+def _blf(config: PlannerConfig, model: CondensedModel, safe_set: SafeSet) -> OcpTerms:
     costs = (TrackingCost(config.weights),)
     if safe_set.sphere is not None:
         sphere = WorkspaceBarrier(safe_set.sphere, config.workspace, model)
-        return Parts(costs, (sphere,), config.barrier_slack)
+        return OcpTerms(costs, (sphere,), config.barrier_slack)
     barriers: list[Barrier] = []
     if safe_set.walls:
         barriers.append(WallBarrier(safe_set.walls, config.walls, model))
@@ -93,10 +93,10 @@ def _blf(config: PlannerConfig, model: CondensedModel, safe_set: SafeSet) -> Par
         # A point is the wall that its ball's tangent plane is, so it has the walls' tuning.
         obstacles, tuning = safe_set.obstacles, config.walls
         barriers.append(PointObstacleBarrier(obstacles, tuning, model))
-    return Parts(costs, tuple(barriers), config.barrier_slack)
+    return OcpTerms(costs, tuple(barriers), config.barrier_slack)
 
 
-VARIANTS: dict[str, Callable[[PlannerConfig, CondensedModel, SafeSet], Parts]] = {
+VARIANTS: dict[str, Callable[[PlannerConfig, CondensedModel, SafeSet], OcpTerms]] = {
     "naive": _naive,
     "hc": _hard,
     "sc": _soft,
@@ -104,7 +104,7 @@ VARIANTS: dict[str, Callable[[PlannerConfig, CondensedModel, SafeSet], Parts]] =
 }
 
 
-def parts_of(config: PlannerConfig, model: CondensedModel, safe_set: SafeSet) -> Parts:
-    """The parts of the configured controller; joints that are asked for are none of its own."""
+def parts_of(config: PlannerConfig, model: CondensedModel, safe_set: SafeSet) -> OcpTerms:
+    """The terms of the configured controller, and the cost of requested joints."""
     parts = VARIANTS[config.controller](config, model, safe_set)
     return replace(parts, costs=(*parts.costs, PostureCost(config.weights)))

@@ -3,7 +3,7 @@ r"""Whether a configuration can keep its safe set at all, before anything flies.
 The paper's :math:`\lambda \in \{1, 5\}` cannot be met in its own workspace sphere: at the
 centre, at rest, :math:`h = S(r)`, which would have to be at least :math:`\lambda`. Such
 contradictions show in a few inequalities. Each finding states one of them, whether it
-holds, and the nearest value that would do.
+holds, and the nearest value that is enough.
 
 Source: docs/equations.md T5.
 """
@@ -27,7 +27,7 @@ class Finding:
 
     name: str
     holds: bool
-    statement: str  # with numbers, and what would do where it does not hold
+    statement: str  # with numbers, and what is enough where it does not hold
     refuses: bool = True  # a finding that only warns says False
 
 
@@ -106,9 +106,9 @@ def _actuation(
         parts += " + w^2/r"
     best = tuning.alpha - (wanted - available)
     remedy = (
-        f"alpha <= {best:.2f} m/s^2 would do"
+        f"alpha <= {best:.2f} m/s^2 is enough"
         if best > 0.0
-        else f"lambda <= {(available - wanted) / tuning.gamma + tuning.lambda_:.2f} m/s would do"
+        else f"lambda <= {(available - wanted) / tuning.gamma + tuning.lambda_:.2f} m/s is enough"
     )
     return _finding(
         "actuation",
@@ -125,7 +125,7 @@ def _room_in_sphere(tuning: BarrierTuning, radius: float) -> Finding:
         at_centre >= tuning.lambda_,
         f"h2a and h2b at the centre are S(r) = {at_centre:.3f} m/s and lambda is "
         f"{tuning.lambda_:.3f}",
-        f"lambda <= {at_centre:.3f} m/s or r >= {stand_off(tuning):.3f} m would do",
+        f"lambda <= {at_centre:.3f} m/s or r >= {stand_off(tuning):.3f} m is enough",
     )
 
 
@@ -138,7 +138,7 @@ def _links(config: FlightConfig, clearance: float) -> Finding:
         left > 0.0,
         f"with both ends of a link {clearance * 1e3:.0f} mm from a point, the middle of the "
         f"longest, {longest * 1e3:.0f} mm, keeps {left * 1e3:.0f} mm",
-        f"a clearance above {0.5 * longest * 1e3:.0f} mm would do",
+        f"a clearance above {0.5 * longest * 1e3:.0f} mm is enough",
         refuses=False,
     )
 
@@ -151,7 +151,7 @@ def _base_tube(tuning: BarrierTuning, loop: Tube, surroundings: Surroundings) ->
         f"no disturbance within {surroundings.disturbance:g} m/s^2 pushes the base further than "
         f"{reach * 1e3:.0f} mm off its plan, which keeps {room * 1e3:.0f} mm from the boundary: "
         f"margin {(room - reach) * 1e3:+.0f} mm",
-        f"lambda >= {reach * tuning.slope:.3f} m/s would do",
+        f"lambda >= {reach * tuning.slope:.3f} m/s is enough",
     )
 
 
@@ -192,7 +192,7 @@ def _sampled(tuning: BarrierTuning, surroundings: Surroundings, period: float) -
         f"rejecting {surroundings.disturbance:g} m/s^2 by planning alone needs lambda >= "
         f"d (1 + k_S T/2) / gamma = {least:.3f} m/s and lambda is {tuning.lambda_:.3f}: margin "
         f"{margin * 1e3:+.0f} mm",
-        f"lambda = {least:.3f} m/s would do",
+        f"lambda = {least:.3f} m/s is enough",
         refuses=False,
     )
 

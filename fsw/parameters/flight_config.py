@@ -36,7 +36,7 @@ class FlightLimits:
     return_height: float = 2.0  # m above home, on the way back
     return_descent: float = 2.0  # m above home, where a return waits before it lands
     return_wait: float = 0.0  # s, there; negative: it stays
-    setpoint_timeout_us: int = 500_000  # without a set-point offboard ends
+    setpoint_timeout_us: int = 500_000  # without a setpoint offboard ends
     setpoint_loss_action: int = 5  # what then: 3 return, 4 land, 5 hold
     mission_speed: float = 0.3  # m/s, where the mission names none
     mission_turn_rate: float = 0.3  # rad/s

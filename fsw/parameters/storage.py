@@ -119,14 +119,14 @@ def _entry(words: list[str]) -> tuple[str, float]:
     elif len(words) == 2:
         name, number = words
     else:
-        raise ValueError("it is no parameter")
+        raise ValueError("it is not a parameter")
     parameter, fact = BY_NAME.get(name), FACT_BY_NAME.get(name)
     if parameter is None and fact is None:
         raise ValueError(f"{name[:40]} is unknown")
     try:
         value = nearest_decimal(float(number))
     except ValueError:
-        raise ValueError(f"{number[:40]} is no number") from None
+        raise ValueError(f"{number[:40]} is not a number") from None
     if fact is not None:
         # A file that a ground station saved holds them as well, and they say nothing new.
         if not fact.repeats and value != nearest_decimal(fact.value):

@@ -32,7 +32,7 @@ REST_TICKS: Final = 10
 
 @dataclass(eq=False, slots=True)
 class Listener:
-    """What one link has not yet told its peers."""
+    """What one link has not yet reported to its peers."""
 
     changed: dict[str, None] = field(default_factory=dict)  # names, in order
     texts: deque[str] = field(default_factory=lambda: deque(maxlen=WAITING))
@@ -40,7 +40,7 @@ class Listener:
 
 @dataclass(frozen=True, slots=True)
 class _Change:
-    """One value somebody wants."""
+    """One requested change."""
 
     parameter: Parameter
     value: float
@@ -89,12 +89,12 @@ class ParameterStore:
         self._executor, self._save = executor, save
 
     def listen(self) -> Listener:
-        """One more link that is to be told of changes."""
+        """Register a link that reports changes."""
         self._listeners.append(Listener())
         return self._listeners[-1]
 
     def change(self, name: str, value: float, asker: Listener) -> str | None:
-        """Request a ``value`` [unit of the parameter]; the asker is told the outcome.
+        """Request a ``value`` [unit of the parameter]; the outcome is reported to who asked.
 
         Returns:
             Why it cannot be, where that is clear at once.

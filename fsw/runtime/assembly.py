@@ -1,4 +1,4 @@
-"""Puts the flight software together from a configuration."""
+"""Builds the flight software from a configuration."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ from fsw.tuning import flat
 def flight_software(
     choice: ControlChoice, *, origin: Origin = DEFAULT_ORIGIN, to_plan: bool = True
 ) -> FlightProgram[Any]:
-    """Build everything that flies and, if it is to plan, compile it: a minute the first time.
+    """Build the program and, unless ``to_plan`` is False, compile it: a minute the first time.
 
     Raises:
         ValueError: For an unknown name, listing the known ones.
     """
-    # An unknown name is refused by the call itself.
+    # flight_config refuses unknown names of inner loops and solvers.
     config = flight_config(
         choice.controller,
         cast(Inner, choice.inner),
@@ -64,7 +64,7 @@ def flight_software(
 
 
 def vehicle_facts(config: FlightConfig) -> VehicleFacts:
-    """What telemetry shows of a configuration."""
+    """The constants of a configuration that links and logs need."""
     return VehicleFacts(
         rotor_thrust_max=config.airframe.rotor_thrust_max,
         joint_torque_max=config.airframe.joint_torque_max,

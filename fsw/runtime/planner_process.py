@@ -1,11 +1,13 @@
-r"""The planner's own processes: a nursery that never plans, and the worker it has forked.
+r"""The planner's processes: a fork server that never plans, and the worker that it forks.
 
     tick process  ==request, answer==  worker
-          \-- forks -- nursery -- forks --/
+          \-- forks -- fork server -- forks --/
 
-The nursery was forked when everything had been compiled and warmed up, and does nothing but wait
-for its worker to end. A worker that dies is replaced from there in milliseconds, without the tick
-process having to fork, and reads on from the same link. All end with the process they serve.
+The fork server is forked when everything has been compiled and warmed up, and only waits for its
+worker to end. It replaces a worker that dies in milliseconds, without a fork in the tick process;
+the new worker reads on from the same link. All end with the process that they serve.
+
+Why not ``multiprocessing``: docs/decisions/0024-planner-process.md.
 """
 
 from __future__ import annotations
@@ -24,7 +26,7 @@ from fsw.runtime.process_link import PeerGone, ProcessLink, process_link
 from fsw.runtime.realtime import PLANNER_PRIORITY, claim_real_time
 from fsw.signals import Plan, PlanFailure, PlanRequest, PlanTimings, SolverStatus
 
-_RECOVERY_S: Final = 0.02  # before the next worker, which might die at once as well
+_RESTART_DELAY_S: Final = 0.02  # the next worker might die at once as well
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,93 +40,90 @@ class Answer:
 
 
 @dataclass(frozen=True, slots=True)
-class Born:
-    """A worker is there."""
+class WorkerStarted:
+    """The fork server has forked a worker."""
 
     process: int
 
 
 @dataclass(frozen=True, slots=True)
-class Died:
-    """A worker has ended without having been told to."""
+class WorkerExited:
+    """A worker has ended without being asked to."""
 
     exit_code: int  # negative: the signal
 
 
-def start(planner: PlanningCycle, clock: Clock) -> tuple[int, ProcessLink]:
-    """Fork the nursery; returns its process number and our end of the link."""
+def start_fork_server(planner: PlanningCycle, clock: Clock) -> tuple[int, ProcessLink]:
+    """Fork the fork server; returns its process number and our end of the link."""
     ours, theirs = process_link()
-    parent = os.getpid()
-    nursery = os.fork()
-    if nursery == 0:
-        _live(lambda: _nurse(planner, clock, theirs), parent, theirs)
+    server = _fork(lambda: _serve(planner, clock, theirs), theirs)
     theirs.close()
-    return nursery, ours
+    return server, ours
 
 
 def answer(planner: PlanningCycle, clock: Clock, request: PlanRequest) -> Answer:
-    """Plan, whatever comes of it."""
+    """Plan; an error of the planner is a failed cycle, and the current plan goes on."""
     begin = clock()
     try:
         result = planner.plan(request)
     except Exception as error:
-        # To the tick a planner that raises is one more failed cycle, and the running plan goes on.
         reason = f"planner raised {type(error).__name__}: {error}"
-        nothing = PlanTimings(0.0, 0.0, 0.0)
-        result = PlanFailure(request.plan_id, SolverStatus.NUMERICAL_ERROR, reason, nothing)
+        unmeasured = PlanTimings(0.0, 0.0, 0.0)
+        result = PlanFailure(request.plan_id, SolverStatus.NUMERICAL_ERROR, reason, unmeasured)
     return Answer(request.t_apply_us, result, begin, clock() - begin)
 
 
-def _nurse(planner: PlanningCycle, clock: Clock, link: ProcessLink) -> None:
-    """Keep one worker alive until the one that is served has gone."""
+def _serve(planner: PlanningCycle, clock: Clock, link: ProcessLink) -> None:
+    """Keep one worker alive until the tick process has ended."""
     claim_real_time(PLANNER_PRIORITY)
     while True:
-        nursery = os.getpid()
-        worker = os.fork()
-        if worker == 0:
-            _live(lambda: _work(planner, clock, link), nursery, link)
-        _, status = os.waitpid(worker, 0)
-        exit_code = os.waitstatus_to_exitcode(status)
+        worker = _fork(lambda: _work(planner, clock, link), link)
+        link.send(WorkerStarted(worker))
+        exit_code = os.waitstatus_to_exitcode(os.waitpid(worker, 0)[1])
         if exit_code == 0:
             return
-        link.send(Died(exit_code))
-        time.sleep(_RECOVERY_S)
+        link.send(WorkerExited(exit_code))
+        time.sleep(_RESTART_DELAY_S)
 
 
 def _work(planner: PlanningCycle, clock: Clock, link: ProcessLink) -> None:
-    """Answer requests, always the newest, until the one that asks has gone."""
+    """Answer requests, always the newest, until the tick process has ended."""
     claim_real_time(PLANNER_PRIORITY)
-    link.send(Born(os.getpid()))
     while True:
-        request: PlanRequest = link.receive()
-        while (newer := link.receive_waiting()) is not None:
+        request: PlanRequest = link.receive(wait=True)
+        while (newer := link.receive(wait=False)) is not None:
             request = newer
         link.send(answer(planner, clock, request))
 
 
-def _live(life: Callable[[], None], parent: int, link: ProcessLink) -> NoReturn:
-    """The whole life of a forked process: nothing of its parent's is unwound or written twice."""
+def _fork(run: Callable[[], None], link: ProcessLink) -> int:
+    """Run in a new process that has nothing of this one's but its memory and ``link``."""
+    parent = os.getpid()
+    return os.fork() or _run_forked(run, parent, link)
+
+
+def _run_forked(run: Callable[[], None], parent: int, link: ProcessLink) -> NoReturn:
     code = 1
     try:
         die_with_parent(parent)
-        # The terminal's interrupt goes to all processes; the end of these is the end of the link.
+        # The terminal's interrupt goes to all processes; these end with their link.
         signal.signal(signal.SIGINT, signal.SIG_IGN)
         signal.signal(signal.SIGTERM, signal.SIG_DFL)
-        _keep_only(link.fileno())
-        life()
+        _close_all_but(link.fileno())
+        run()
         code = 0
     except PeerGone:
         code = 0
     except BaseException:
         traceback.print_exc()
     finally:
-        os._exit(code)
+        os._exit(code)  # the parent's buffers are not written twice, its handlers do not run
 
 
-def _keep_only(number: int) -> None:
-    """Close what was inherited: ports and logs are the parent's alone."""
-    nothing = os.open(os.devnull, os.O_RDWR)
+def _close_all_but(kept: int) -> None:
+    """Close what was inherited: ports and logs belong to the parent alone."""
+    null = os.open(os.devnull, os.O_RDWR)
     for standard in (0, 1):
-        os.dup2(nothing, standard)
-    os.closerange(3, number)
-    os.closerange(number + 1, os.sysconf("SC_OPEN_MAX"))
+        os.dup2(null, standard)
+    os.closerange(3, kept)
+    os.closerange(kept + 1, os.sysconf("SC_OPEN_MAX"))

@@ -1,4 +1,4 @@
-"""What the process asks of the operating system before it flies."""
+"""The process itself: threads of libraries, signals, memory, and children."""
 
 from __future__ import annotations
 
@@ -6,10 +6,8 @@ import ctypes
 import gc
 import os
 import signal
-import sys
 from collections.abc import Callable
 from pathlib import Path
-from types import FrameType
 from typing import Final
 
 _PR_SET_PDEATHSIG: Final = 1
@@ -32,23 +30,8 @@ def pin_numerics_to_one_thread() -> None:
         os.environ[name] = "1"
 
 
-class StopRequest:
-    """Becomes true on SIGINT or SIGTERM, so that the loop can end between two ticks."""
-
-    def __init__(self) -> None:
-        self.requested = False
-
-    def listen(self) -> None:
-        """Take over both signals; until then SIGINT raises KeyboardInterrupt."""
-        signal.signal(signal.SIGINT, self._request)
-        signal.signal(signal.SIGTERM, self._request)
-
-    def _request(self, number: int, frame: FrameType | None) -> None:
-        self.requested = True
-
-
 def settle_memory() -> None:
-    """Take everything built so far out of the garbage collector's sight, and stop it.
+    """Stop the garbage collector, and return memory that only building needed.
 
     The loop makes no reference cycles, so counting references frees all it allocates; a
     collection over numba's and SciPy's objects would cost tens of milliseconds in a tick.
@@ -57,38 +40,28 @@ def settle_memory() -> None:
     gc.freeze()
     gc.disable()
     _give_memory_back()
-    _fill_free_lists()
-
-
-def _fill_free_lists() -> None:
-    """Grow now what CPython would grow over minutes: it keeps 2000 freed tuples of every size."""
-    for size in range(1, 20):
-        kept = [tuple([None] * size) for _ in range(2000)]
-        del kept
 
 
 def _give_memory_back() -> None:
-    """Return what building needed and flying does not: freed memory, and the compiler's pages.
+    """Return freed memory, and the code of LLVM: 58 MB, which nothing runs once all is compiled.
 
-    Everything is compiled by now. LLVM's code can be dropped from memory as long as it is not
-    locked; a page that is wanted after all is read from its file again.
+    Its pages can be dropped as long as they are not locked; one that is used after all is read
+    from its file again.
     """
-    if sys.platform != "linux":
-        return
     libc = ctypes.CDLL(None)
     libc.malloc_trim(0)
     for line in Path("/proc/self/maps").read_text(encoding="utf-8").splitlines():
         addresses, rights, *_, path = line.split(maxsplit=5)
-        if "llvmlite" in path and rights == "r-xp":  # code: it alone is as it is in the file
+        if "llvmlite" in path and rights == "r-xp":  # code: unlike data, as it is in the file
             first, last = (int(address, 16) for address in addresses.split("-"))
             libc.madvise(ctypes.c_void_p(first), ctypes.c_size_t(last - first), _MADV_DONTNEED)
 
 
 def in_a_child(work: Callable[[], object]) -> None:
-    """Do something for what it leaves on disk, in a child that takes its memory away with it.
+    """Do work that leaves its result on disk, in a child, so that its memory is returned.
 
-    Call it while there is one thread. What fails there fails silently: whoever needs the result
-    finds it missing and does the work itself.
+    Call it while there is one thread. Errors are silent: the caller finds the result missing and
+    does the work itself.
     """
     parent = os.getpid()
     child = os.fork()
@@ -103,8 +76,7 @@ def in_a_child(work: Callable[[], object]) -> None:
 
 
 def die_with_parent(parent: int) -> None:
-    """Tie the life of a process that was just forked to its parent's (Linux only)."""
-    if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
+    """In a process that was just forked: let the kernel kill it when its ``parent`` ends."""
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
     if os.getppid() != parent:
         os._exit(1)

@@ -1,7 +1,7 @@
-"""What two processes of the flight software say to each other: whole values, never waiting to send.
+"""Values between two processes of the flight software; sending never waits.
 
 A pair of connected local sockets that keep message boundaries: a value arrives whole or not at
-all, whenever either side is killed, and a side that is gone is noticed at once.
+all, even if either side is killed while it writes, and the end of a side is noticed at once.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import pickle
 import socket
 from typing import Any, Final
 
-_MOST: Final = 1 << 17  # bytes of one value; a request has about 2 kB
+_MAX_BYTES: Final = 1 << 17  # of one value; a request has about 2 kB
 
 
 class PeerGone(Exception):
@@ -22,51 +22,32 @@ class ProcessLink:
 
     def __init__(self, end: socket.socket) -> None:
         self._socket = end
+        self.fileno = end.fileno
+        self.close = end.close  # the other side notices
 
-    def fileno(self) -> int:
-        """Its file descriptor."""
-        return self._socket.fileno()
-
-    def send(self, value: object) -> bool:
-        """Hand a value over; False where the other side has stopped reading.
+    def send(self, value: object) -> None:
+        """Send a value; it is dropped if the other side has not read for long.
 
         Raises:
-            PeerGone: There is no other side.
+            PeerGone: The other process has ended.
         """
         try:
             self._socket.send(pickle.dumps(value, pickle.HIGHEST_PROTOCOL), socket.MSG_DONTWAIT)
         except BlockingIOError:
-            return False
+            return
         except OSError:
             raise PeerGone from None
-        return True
 
-    def receive(self) -> Any:
-        """Wait for a value.
-
-        Raises:
-            PeerGone: There is no other side.
-        """
-        return self._read(0)
-
-    def receive_waiting(self) -> Any:
-        """A value that is already there, or None.
+    def receive(self, *, wait: bool) -> Any:
+        """The next value; None if there is none and ``wait`` is False.
 
         Raises:
-            PeerGone: There is no other side, and nothing it said is left.
+            PeerGone: The other process has ended, and nothing that it sent is left.
         """
         try:
-            return self._read(socket.MSG_DONTWAIT)
+            message = self._socket.recv(_MAX_BYTES, 0 if wait else socket.MSG_DONTWAIT)
         except BlockingIOError:
             return None
-
-    def close(self) -> None:
-        """Leave; the other side notices."""
-        self._socket.close()
-
-    def _read(self, flags: int) -> Any:
-        try:
-            message = self._socket.recv(_MOST, flags)
         except ConnectionError:
             raise PeerGone from None
         if not message:

@@ -1,4 +1,4 @@
-"""The flight software proper, as the loop sees it: a first state, a pure tick and a planner."""
+"""The flight program as the loop sees it: a first state, a pure tick and a planner."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from fsw.ports import PlanningCycle, VehicleFacts
 from fsw.signals import TickInputs, TickOutputs
 
 if TYPE_CHECKING:
-    # Its table of parameters imports all that flies, which a refusal need not wait for.
+    # Its table of parameters imports everything that flies; a refusal need not wait for that.
     from fsw.parameters.store import ParameterStore
 
 State = TypeVar("State")
@@ -19,7 +19,7 @@ State = TypeVar("State")
 
 @dataclass(frozen=True, slots=True)
 class FlightProgram(Generic[State]):
-    """Everything that flies; the loop adds time, links and logs."""
+    """Everything that is pure, with its stores; the loop adds time, links and logs."""
 
     facts: VehicleFacts
     first_state: State

@@ -1,4 +1,4 @@
-"""What a process asks of Linux to be on time, and what it was refused."""
+"""Real-time scheduling and locked memory, as far as Linux grants them to the process."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from typing import Final
 
 TICK_PRIORITY: Final = 50
 PLANNER_PRIORITY: Final = 40  # the tick goes first, ordinary programs come after both
-_SWITCH_INTERVAL_S: Final = 100e-6
+_SWITCH_INTERVAL_S: Final = 100e-6  # a due tick waits for another thread's Python, not 5 ms
 # Now and later, each page from its first use: all of it at once would copy what forks share.
 _MCL_CURRENT_FUTURE_ONFAULT: Final = 1 | 2 | 4
 _PR_SET_TIMERSLACK: Final = 29
 
 
 def claim_real_time(priority: int) -> tuple[str, ...]:
-    """Ask for everything for the calling process; returns what was refused, by name.
+    """Request both for the calling process; returns the names of what was refused.
 
-    Call :func:`rank_threads` once all threads are there.
+    Call :func:`rank_threads` once all threads have started.
     """
     refused = []
     try:
@@ -33,14 +33,15 @@ def claim_real_time(priority: int) -> tuple[str, ...]:
         refused.append("locked memory")
     # Only matters where real-time scheduling was refused: it has no slack.
     libc.prctl(_PR_SET_TIMERSLACK, 1, 0, 0, 0)
+    sys.setswitchinterval(_SWITCH_INTERVAL_S)
     return tuple(refused)
 
 
 def rank_threads() -> None:
     """Make the other threads of a real-time process real-time as well, right behind the caller.
 
-    One that loses its processor to an ordinary program while it holds the interpreter would stop
-    the tick for as long as that takes, which was seen to be 0.4 s.
+    A thread that loses its processor to an ordinary program while it holds the interpreter stops
+    the tick; 0.4 s were measured.
     """
     if os.sched_getscheduler(0) != os.SCHED_FIFO:
         return
@@ -59,17 +60,12 @@ def release_real_time() -> None:
 
 
 def _other_threads() -> list[int]:
-    """Threads of this process but for the caller (Linux; elsewhere none is known)."""
+    """Threads of this process except the caller's; none where there is no ``/proc``."""
     try:
         threads = [int(thread.name) for thread in Path("/proc/self/task").iterdir()]
     except OSError:
         return []
     return [thread for thread in threads if thread != threading.get_native_id()]
-
-
-def share_interpreter_fairly() -> None:
-    """Let a due tick wait for another thread's Python no longer than this, instead of 5 ms."""
-    sys.setswitchinterval(_SWITCH_INTERVAL_S)
 
 
 def scheduler() -> str:

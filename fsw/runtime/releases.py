@@ -1,97 +1,57 @@
-"""What releases a tick: in lockstep the simulator's step, in real time the vehicle's own grid.
+"""What releases a tick: in lockstep the simulator's step, in real time the vehicle's own schedule.
 
-In real time the vehicle wakes on an absolute grid of its own, which it has laid a little behind the
-arrival of the sensor frames, and takes the newest frame there is. A frame that is late or lost does
-not stop the inner loop: the tick gets the last readings and is told how old they are. After
-``MOST_STALE`` such ticks time stands still: nothing is commanded any more, and whoever drives the
-rotors stops them after 0.1 s.
+In real time the vehicle wakes on an absolute schedule of its own, a little behind the arrival of
+the sensor frames, and takes the newest frame. A late or lost frame does not stop the inner loop:
+the tick gets the last readings with their age. After ``MAX_STALE_TICKS`` such ticks no tick runs
+until a frame arrives; without commands the actuators stop the rotors after 0.1 s.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Final, Protocol
+from typing import Final
 
 from fsw.frozen import dataclass
+from fsw.link.sim_link import SimLink
 from fsw.ports import Clock
-from fsw.runtime.grid import Grid
-from fsw.runtime.missed import MissedReleases
+from fsw.runtime.deadline_monitor import DeadlineMonitor
+from fsw.runtime.release_schedule import ReleaseSchedule
 from fsw.signals import SensorFrame
 
-MOST_STALE: Final = 5  # ticks: 10 ms, as long as an estimate may be missing
+MAX_STALE_TICKS: Final = 5  # 10 ms, as long as an estimate may be missing
 LEAD_US: Final = 600  # frames arrive so much before their tick, and may be so much late
-_SETTLING: Final = 25  # frames until the grid is laid
-_LISTEN_TICKS: Final = 25  # between two looks at when a frame arrives
-# Before the release: listening begins well before a frame is due, and where the grid is further off
-# than that, it moves by the most anyway. Who listens for a frame does not hear the ground.
-_LISTEN_US: Final = LEAD_US + 300
-_MOST_SHIFT_US: Final = 25.0  # a look; 500 us/s is more than clocks differ
+_SETTLING_FRAMES: Final = 25  # until the schedule begins
+_PROBE_TICKS: Final = 25  # between two measurements of when a frame arrives
+# A measurement begins well before a frame is due. If the schedule is off by more, it moves by the
+# maximum anyway. The ground links are not read meanwhile.
+_PROBE_US: Final = LEAD_US + 300  # before the release
+_MAX_SHIFT_US: Final = 25.0  # a measurement; 500 us/s is more than clocks differ
 _GAIN: Final = 0.25
-_REPEATED: Final = 3  # frames in a row behind or ahead of their release, until it is another's
-
-
-class SensorLink(Protocol):
-    """Where sensor frames come from."""
-
-    @property
-    def shutdown(self) -> bool:
-        """Whether there will be no more."""
-        ...
-
-    def wait_for_step(self) -> SensorFrame | None:
-        """Wait for the next frame, with some patience."""
-        ...
-
-    def newest(self) -> SensorFrame | None:
-        """The newest of the frames that are there."""
-        ...
-
-    def wait(self, seconds: float) -> bool:
-        """Wait until something is there; False when the time is over."""
-        ...
+_REMATCH_FRAMES: Final = 3  # in a row behind or ahead of their release, until it is another's
 
 
 @dataclass(frozen=True, slots=True)
 class Release:
-    """A tick may run."""
+    """What a tick runs on."""
 
     sensors: SensorFrame  # stamped with the instant of the tick
     stale_us: int  # how much older its readings are
-    due_us: int  # wall time at which it should have begun
-    begun_us: int  # wall time
-
-
-class Releases(Protocol):
-    """One release after the other."""
-
-    stale: int  # ticks without a frame of their own
-
-    @property
-    def skipped(self) -> int:
-        """Releases that were never taken."""
-        ...
-
-    def next(self) -> Release | None:
-        """Wait for the next release; None when there was nothing to tick on."""
-        ...
+    due_us: int  # when it should have begun, monotonic
+    begun_us: int  # monotonic
 
 
 class StepReleases:
     """Lockstep: every step of the simulator releases a tick, whenever it comes."""
 
-    def __init__(self, sim: SensorLink, clock: Clock) -> None:
-        self.stale = 0
+    stale = skipped = 0  # every step is taken
+
+    def __init__(self, sim: SimLink, clock: Clock) -> None:
         self._sim = sim
         self._clock = clock
 
-    @property
-    def skipped(self) -> int:
-        """See :class:`Releases`: every step is taken."""
-        return 0
-
     def next(self) -> Release | None:
-        """See :class:`Releases`."""
+        """Wait for the next step; None if none came."""
         sensors = self._sim.wait_for_step()
         if sensors is None:
             return None
@@ -99,79 +59,80 @@ class StepReleases:
         return Release(sensors, 0, now_us, now_us)
 
 
-class GridReleases:
-    """Real time: an absolute grid, phased behind the arrival of the sensor frames."""
+class ScheduledReleases:
+    """Real time: an absolute schedule, phased behind the arrival of the sensor frames."""
 
     def __init__(
         self,
-        sim: SensorLink,
+        sim: SimLink,
         clock: Clock,
         sleep: Callable[[float], None],
         first: SensorFrame,
         period_us: int,
-        missed: MissedReleases,
+        deadlines: DeadlineMonitor,
     ) -> None:
-        """Follow the first frame, which has been ticked on.
+        """Follow the first frame, on which a tick has run.
 
         Args:
-            sim: Where the frames come from.
-            clock: Monotonic wall time.
+            sim: Source of the frames.
+            clock: Monotonic wall time [us].
             sleep: Sleeps for seconds, on the same clock.
             first: The frame whose time the vehicle's time begins with.
-            period_us: Of the inner loop.
-            missed: Where to note the releases that are skipped.
+            period_us: Period of the inner loop [us].
+            deadlines: Takes the skipped releases.
         """
-        self.stale = 0
+        self.stale = 0  # ticks without a frame of their own
         self._sim = sim
         self._clock = clock
         self._sleep = sleep
         self._period_us = period_us
-        self._missed = missed
-        self._grid: Grid | None = None
-        self._offsets: list[int] = []  # arrival minus stamp, while the grid is not laid
+        self._deadlines = deadlines
+        self._schedule: ReleaseSchedule | None = None
+        self._offsets: list[int] = []  # arrival minus stamp, before the schedule begins
         self._readings = first
         self._t_us = first.t_us  # of the last tick
-        self._grid_us = first.t_us  # of the frame that belongs to the last release
-        self._repeated = 0  # frames in a row that had been anticipated
+        self._expected_us = first.t_us  # stamp of the frame that belongs to the last release
+        self._repeated = 0  # frames in a row whose tick had run before they came
         self._ahead = 0  # frames in a row that were ahead of their release
-        self._left_out = 0
+        self._without_tick = 0  # releases taken, but with too old readings for a tick
 
     @property
     def skipped(self) -> int:
         """Releases that were never taken."""
-        return self._left_out + (0 if self._grid is None else self._grid.skipped)
+        return self._without_tick + (self._schedule.skipped if self._schedule else 0)
 
     def next(self) -> Release | None:
-        """See :class:`Releases`."""
-        if self._grid is None:
+        """Wait for the next release; None if there is nothing to tick on."""
+        schedule = self._schedule
+        if schedule is None:
             return self._settle()
-        steps = self._grid.advance(self._clock())
+        steps = schedule.advance(self._clock())
         if steps > 1:
-            due_us = self._grid.due_us
-            self._missed.add(due_us - (steps - 1) * self._period_us, due_us - self._period_us)
-        self._wait(self._grid, self._grid.due_us)
-        return self._release(self._grid, steps)
+            due_us = schedule.due_us
+            self._deadlines.add(due_us - (steps - 1) * self._period_us, due_us - self._period_us)
+        self._wait(schedule, schedule.due_us)
+        return self._release(schedule.due_us, steps)
 
     def _settle(self) -> Release | None:
-        """Tick on arrival, and lay the grid by the promptest of the first frames."""
+        """Tick on arrival, and begin the schedule behind the promptest of the first frames."""
         sensors, now_us = self._sim.wait_for_step(), self._clock()
         if sensors is None:
             return None
-        self._readings, self._t_us, self._grid_us = sensors, sensors.t_us, sensors.t_us
+        self._readings, self._t_us, self._expected_us = sensors, sensors.t_us, sensors.t_us
         self._offsets.append(now_us - sensors.t_us)
-        if len(self._offsets) >= _SETTLING:
+        if len(self._offsets) >= _SETTLING_FRAMES:
             start_us = min(self._offsets) + sensors.t_us + LEAD_US
-            self._grid = Grid(start_us + self._period_us, self._period_us)
+            self._schedule = ReleaseSchedule(start_us + self._period_us, self._period_us)
         return Release(sensors, 0, min(self._offsets) + sensors.t_us, now_us)
 
-    def _wait(self, grid: Grid, due_us: int) -> None:
-        """Sleep until the release; now and then listen for the frame, and follow its clock."""
-        if grid.index % _LISTEN_TICKS == 0 and not self._sim.wait(0.0):
-            self._sleep_until(due_us - _LISTEN_US)
+    def _wait(self, schedule: ReleaseSchedule, due_us: int) -> None:
+        """Sleep until the release; now and then measure when the frame comes, and follow it."""
+        if schedule.index % _PROBE_TICKS == 0 and not self._sim.wait(0.0):
+            self._sleep_until(due_us - _PROBE_US)
             arrived = self._sim.wait(1e-6 * max(due_us - self._clock(), 0))
             early_us = due_us - self._clock() if arrived else 0
             shift_us = _GAIN * (LEAD_US - early_us)
-            grid.steer(min(max(shift_us, -_MOST_SHIFT_US), _MOST_SHIFT_US))
+            schedule.shift(min(max(shift_us, -_MAX_SHIFT_US), _MAX_SHIFT_US))
         self._sleep_until(due_us)
 
     def _sleep_until(self, until_us: int) -> None:
@@ -179,12 +140,12 @@ class GridReleases:
         if remaining_us > 0:
             self._sleep(1e-6 * remaining_us)
 
-    def _release(self, grid: Grid, steps: int) -> Release | None:
-        due_us, begun_us = grid.due_us, self._clock()
+    def _release(self, due_us: int, steps: int) -> Release | None:
+        begun_us = self._clock()
         newest = self._sim.newest()
         if newest is None and self._sim.shutdown:
-            return None  # not missed: it is over
-        self._grid_us += steps * self._period_us
+            return None  # not missed: the run is over
+        self._expected_us += steps * self._period_us
         if newest is not None:
             self._readings = newest
             if newest.t_us > self._t_us:
@@ -193,19 +154,19 @@ class GridReleases:
                 return Release(newest, 0, due_us, begun_us)
             # Time has run ahead of the frames: wait for them once, or they stay behind.
             self._repeated += 1
-            if self._repeated >= _REPEATED:
-                self._repeated, self._grid_us = 0, newest.t_us
-        stale_us = self._grid_us - self._readings.t_us
-        if self._grid_us <= self._t_us or stale_us > MOST_STALE * self._period_us:
-            self._left_out += 1
-            self._missed.add(due_us)
+            if self._repeated >= _REMATCH_FRAMES:
+                self._repeated, self._expected_us = 0, newest.t_us
+        stale_us = self._expected_us - self._readings.t_us
+        if self._expected_us <= self._t_us or stale_us > MAX_STALE_TICKS * self._period_us:
+            self._without_tick += 1
+            self._deadlines.add(due_us)
             return None
-        self._t_us = self._grid_us
+        self._t_us = self._expected_us
         self.stale += 1
         return Release(replace(self._readings, t_us=self._t_us), stale_us, due_us, begun_us)
 
     def _match(self, t_us: int) -> None:
-        """Note which frame came to which release: at once behind, for good only if it repeats."""
-        self._ahead = self._ahead + 1 if t_us > self._grid_us else 0
-        if t_us < self._grid_us or self._ahead >= _REPEATED:
-            self._grid_us, self._ahead = t_us, 0
+        """Note which frame came with which release: one behind at once, one ahead if it repeats."""
+        self._ahead = self._ahead + 1 if t_us > self._expected_us else 0
+        if t_us < self._expected_us or self._ahead >= _REMATCH_FRAMES:
+            self._expected_us, self._ahead = t_us, 0

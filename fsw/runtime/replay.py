@@ -1,6 +1,6 @@
 """Feeds a logged flight through the tick again and compares all that comes out.
 
-The planner is not asked: its answers are inputs of the tick, and as such in the log.
+The planner does not run: its answers are inputs of the tick, and as such in the log.
 """
 
 from __future__ import annotations
@@ -13,13 +13,13 @@ from typing import Any
 from fsw.log.compare import Difference, first_difference
 from fsw.log.encoder import FULL, THIN, LogEncoder
 from fsw.log.reader import Gap, LoggedTick, UlogError, UlogFile, ticks
-from fsw.runtime.guarded_tick import GuardedTick
 from fsw.runtime.program import FlightProgram
+from fsw.runtime.tick_runner import TickRunner
 
 Progress = Callable[[int, int], None]
 """Takes bytes read and bytes in all."""
 
-_TOLD_TICKS = 500
+_PROGRESS_TICKS = 500
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +32,7 @@ class Replayed:
 
 
 def replay(log: UlogFile, program: FlightProgram[Any], progress: Progress) -> Replayed:
-    """Compare a log with what a program makes of its inputs, up to the first difference.
+    """Compare a log with the outputs of a program for its inputs, up to the first difference.
 
     Raises:
         UlogError: The log is damaged.
@@ -47,7 +47,7 @@ def replay(log: UlogFile, program: FlightProgram[Any], progress: Progress) -> Re
         link_length=facts.link_length,
         profile=int(profile),
     )
-    tick = GuardedTick(program.tick, program.first_state, tell=lambda: None)
+    tick = TickRunner(program.tick, program.first_state, on_error=lambda: None)
     compared = 0
     for logged in ticks(log):
         if isinstance(logged, Gap):
@@ -56,20 +56,20 @@ def replay(log: UlogFile, program: FlightProgram[Any], progress: Progress) -> Re
         if difference is not None:
             return Replayed(compared, difference, 0)
         compared += 1
-        if compared % _TOLD_TICKS == 0:
+        if compared % _PROGRESS_TICKS == 0:
             progress(log.at, log.size)
     progress(log.size, log.size)
     return Replayed(compared, None, 0)
 
 
 def fact(log: UlogFile, name: str) -> str:
-    """What a log says of its flight.
+    """An information of a log about its flight.
 
     Raises:
-        UlogError: It does not say it.
+        UlogError: It is missing.
     """
     if name not in log.information:
-        raise UlogError(f"{log.path} is damaged: it does not say its {name}")
+        raise UlogError(f"{log.path} is damaged: its {name} is missing")
     return str(log.information[name])
 
 
@@ -86,7 +86,7 @@ def logged_numbers(log: UlogFile) -> dict[str, float]:
 
 
 def _difference(
-    logged: LoggedTick, tick: GuardedTick[Any], encoder: LogEncoder
+    logged: LoggedTick, tick: TickRunner[Any], encoder: LogEncoder
 ) -> Difference | None:
     out = bytearray()
     try:
@@ -101,7 +101,7 @@ def _difference(
 
 
 def other_numbers(log: UlogFile, program: FlightProgram[Any]) -> tuple[str, ...]:
-    """In which numbers of its configuration the program is not the one that was logged."""
+    """Differences between the configuration of the program and the logged one."""
     logged = logged_numbers(log)
     here = program.numbers
     return tuple(

@@ -3,44 +3,35 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
 from pathlib import Path
 
+from fsw.parameters.control_choice import ControlChoice
 from fsw.ports import VehicleFacts
-from fsw.runtime.planner_worker import PlannerRecord
-from fsw.runtime.rates import HOUSEKEEPING, INNER, TELEMETRY
+from fsw.runtime.planner_service import PlannerRecord
+from fsw.runtime.rate_groups import HOUSEKEEPING, INNER, TELEMETRY
 from fsw.runtime.sim_loop import FlightEnd, FlightRecord
 from fsw.runtime.timing import GroupTimer, Histogram
 
 
-@dataclass(frozen=True, slots=True)
-class Setup:
-    """What was flown with."""
-
-    controller: str
-    inner: str
-    facts: VehicleFacts
-
-
 def as_json(
-    setup: Setup, end: FlightEnd, record: FlightRecord, retransmissions: int
+    control: ControlChoice, facts: VehicleFacts, end: FlightEnd, record: FlightRecord
 ) -> dict[str, object]:
-    """The result as it is written; times in microseconds."""
+    """What was flown with, how it ended and what the loop measured; times in microseconds."""
     for timer in record.groups.values():
         timer.close_interval()
     record.mpc.timer.close_interval()
     return {
-        "controller": setup.controller,
-        "inner_loop": setup.inner,
+        "controller": control.controller,
+        "inner_loop": control.inner,
         "end": end.ending.value,
         "end_reason": end.sentence,
-        **record.effort.as_json(),
-        "mpc": _mpc(setup.facts, record),
+        **record.control.as_json(),
+        "mpc": _mpc(facts, record),
         "inner": {
             **_group(record.groups[INNER.name]),
             "stale": record.stale,
             "begun_us": record.begun_us,
-            "missed_us": record.missed.stretches,
+            "missed_us": record.deadlines.missed,
         },
         "telemetry": _group(record.groups[TELEMETRY.name]),
         "housekeeping": _group(record.groups[HOUSEKEEPING.name]),
@@ -50,7 +41,6 @@ def as_json(
             "accepted": record.offboard.accepted,
             "refused": record.offboard.refused,
         },
-        "retransmissions": retransmissions,
     }
 
 

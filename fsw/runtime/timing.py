@@ -21,7 +21,7 @@ class Histogram:
         self._bins = [0] * _BINS
 
     def add(self, duration_us: float) -> None:
-        """Count one duration; anything below 1 us is in the first bin."""
+        """Count one duration [us]; anything below 1 us is in the first bin."""
         self.count += 1
         self.total_us += duration_us
         if duration_us > self.max_us:
@@ -30,13 +30,13 @@ class Histogram:
         self._bins[index if index < _BINS else -1] += 1
 
     def percentile_us(self, share: float) -> float:
-        """The duration that a share of all counts does not exceed; 0 before the first."""
+        """Duration [us] that a ``share`` [1] of all counts does not exceed; 0 before the first."""
         wanted = share * self.count
         seen = 0
         for index, count in enumerate(self._bins):
             seen += count
             if count and seen >= wanted:
-                # Upper edge of the bin, which the largest of all cannot exceed.
+                # The upper edge of the last bin in use lies above the maximum.
                 return min(math.exp((index + 1) / _BINS_PER_E), self.max_us)
         return 0.0
 
@@ -61,7 +61,7 @@ class GroupTimer:
         self._lateness = Histogram()
 
     def add(self, execution_us: float, lateness_us: float = 0.0) -> bool:
-        """Count one tick that started ``lateness_us`` after its release; True if it was late."""
+        """Count one tick by its times [us]; True if it ended after the next release."""
         self._execution.add(execution_us)
         self._lateness.add(lateness_us)
         late = lateness_us + execution_us > self.period_us

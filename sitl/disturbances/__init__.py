@@ -1,1 +1,1 @@
-"""What pushes the vehicle about: scenario items that add up."""
+"""Disturbances: scenario items that add up."""

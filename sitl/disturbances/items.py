@@ -1,4 +1,4 @@
-"""One class per kind of disturbance; each is asked once per step, in order."""
+"""One class per kind of disturbance; each is sampled once per step, in order."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Resampled:
 
 
 class Constant:
-    """The same push for ever."""
+    """A constant disturbance."""
 
     torque = False
 

@@ -32,15 +32,7 @@ def is_vehicle(datagram: bytes) -> bool:
 
 
 def read_reply(datagram: bytes, joints: int) -> VehicleReply | None:
-    """Read an answer.
-
-    Args:
-        datagram: From the vehicle.
-        joints: Number of joints that controls[4…] drive.
-
-    Returns:
-        None if there is no HIL_ACTUATOR_CONTROLS in it.
-    """
+    """Read an answer of a vehicle with so many joints; None without HIL_ACTUATOR_CONTROLS."""
     alone = _CONTROLS_ALONE.read(datagram)
     if alone is not None:
         return VehicleReply(int(alone[0][0]), _controls(alone[0], joints))

@@ -10,13 +10,11 @@ from messages.lockstep_codec import LockstepFrame
 from sitl.link import message_ids
 from sitl.link.message_ids import PATH_PLANNER, SENSORS, SYSTEM_ID
 from sitl.link.pilot_messages import (
-    AnnounceObstacle,
-    AnnounceWall,
-    AnnounceWorkspace,
     PilotMessage,
     SendCommand,
     SendTarget,
 )
+from sitl.scenario import ScenarioWall, Workspace
 from sitl.sensors.suite import SensorReadings
 
 WireValues = tuple[float | bytes, ...]
@@ -87,17 +85,10 @@ def _wire(message: PilotMessage) -> tuple[int, *WireValues]:
         return (message_ids.END_EFFECTOR_TARGET, message.t_us, *motion, *tail)
     if isinstance(message, SendCommand):
         return (message_ids.COMMAND_LONG, *message.params, message.command, SYSTEM_ID, 1, 0)
-    if isinstance(message, AnnounceWall):
-        wall = message.wall
-        plane = (*wall.normal, wall.offset_m, wall.clearance_m)
-        return (message_ids.OBSTACLE_WALL, *plane, SYSTEM_ID, 1, message.index, message.count)
-    if isinstance(message, AnnounceObstacle):
-        ball = (*message.obstacle.position_m, message.obstacle.clearance_m)
-        return (message_ids.OBSTACLE_POINT, *ball, SYSTEM_ID, 1, message.index, message.count)
-    return _workspace(message)
-
-
-def _workspace(message: AnnounceWorkspace) -> tuple[int, *WireValues]:
-    sphere = message.workspace
-    offset = (0.0, 0.0, -sphere.d_iw_m)
-    return (message_ids.WORKSPACE_SPHERE, *offset, sphere.radius_m, SYSTEM_ID, 1)
+    if isinstance(message, Workspace):
+        offset = (0.0, 0.0, -message.d_iw_m)
+        return (message_ids.WORKSPACE_SPHERE, *offset, message.radius_m, SYSTEM_ID, 1)
+    one, number = message.kept_from, (SYSTEM_ID, 1, message.index, message.count)
+    if isinstance(one, ScenarioWall):
+        return (message_ids.OBSTACLE_WALL, *one.normal, one.offset_m, one.clearance_m, *number)
+    return (message_ids.OBSTACLE_POINT, *one.position_m, one.clearance_m, *number)

@@ -54,13 +54,9 @@ class Exchange(Protocol):
     def step(
         self, number: int, t_us: int, datagram: bytes, meanwhile: Callable[[], None]
     ) -> VehicleReply:
-        """Send a step and return what to apply during it.
+        """Send the datagram of a step, from 0, stamped ``t_us``; returns what to apply during it.
 
-        Args:
-            number: Of the step, from 0.
-            t_us: Its time stamp.
-            datagram: What to send.
-            meanwhile: Work that can be done while the vehicle thinks; called once.
+        ``meanwhile`` is work that can be done while the vehicle thinks; it is called once.
 
         Raises:
             SimulatorError: The vehicle has been silent for too long.
@@ -74,13 +70,10 @@ class Lockstep:
     def __init__(
         self, endpoint: PeerSocket, joints: int, period_s: float | None, stop: Stop
     ) -> None:
-        """Ready to start.
+        """Steps begin ``period_s`` of wall time apart, or as soon as possible.
 
-        Args:
-            endpoint: Connected to the vehicle; its patience is the interval of repetition.
-            joints: Number of joints.
-            period_s: Wall time between two steps [s], None for as fast as possible.
-            stop: Ends a wait for a vehicle that was interrupted as well.
+        The endpoint's patience is the interval of repetition; ``stop`` ends a wait for a vehicle
+        that was interrupted as well.
         """
         self.counts = ExchangeCounts()
         self._stop = stop
@@ -149,16 +142,7 @@ class RealTime:
         clock: Callable[[], float] = time.perf_counter,
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
-        """Ready to start.
-
-        Args:
-            endpoint: Connected to the vehicle.
-            joints: Number of joints.
-            period_s: Wall time of a step [s].
-            stop: Ends the wait for the first answer.
-            clock: Monotonic wall time [s].
-            sleep: Sleeps for seconds, on the same clock.
-        """
+        """A step takes ``period_s`` of the clock; ``stop`` ends the wait for the first answer."""
         self._first = Lockstep(endpoint, joints, None, stop)
         self.counts = ExchangeCounts()
         self._endpoint = endpoint

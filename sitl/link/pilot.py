@@ -1,4 +1,4 @@
-"""The scenario's pilot: what to say to the vehicle at each step; pure.
+"""The scenario's pilot: the messages to the vehicle at each step; pure.
 
 It announces the safe set, keeps the trajectory two seconds ahead of the vehicle, and takes the
 vehicle through its plan by commands that it repeats until they are acknowledged.
@@ -14,15 +14,13 @@ from typing import Final
 
 from sitl.link import message_ids
 from sitl.link.pilot_messages import (
-    AnnounceObstacle,
-    AnnounceWall,
-    AnnounceWorkspace,
+    Announce,
     Heard,
     PilotMessage,
     SendCommand,
     SendTarget,
 )
-from sitl.scenario import Scenario
+from sitl.scenario import Obstacle, Scenario, ScenarioWall
 from sitl.simulation import START_US
 from sitl.trajectory import TrajectoryPoint
 
@@ -52,7 +50,7 @@ _NAMES: Final[dict[tuple[int, int], str]] = {
 
 
 class Phase(Enum):
-    """Where the pilot is in its plan."""
+    """Phase of the pilot's plan."""
 
     IDLE = "idle"  # plan none: a ground station flies
     ARM = "arm"
@@ -67,7 +65,7 @@ class Phase(Enum):
 
 @dataclass(frozen=True, slots=True)
 class FlightPlan:
-    """What the pilot knows from the start."""
+    """The pilot's constants."""
 
     announcements: tuple[PilotMessage, ...]  # the safe set
     target_at: Callable[[int], TrajectoryPoint] | None  # by time stamp [us]; None: no targets
@@ -79,7 +77,7 @@ class FlightPlan:
 
 @dataclass(frozen=True, slots=True)
 class PilotState:
-    """What the pilot remembers."""
+    """The pilot's state."""
 
     phase: Phase
     announced: int = 0  # announcements made in this round
@@ -113,24 +111,16 @@ def flight_plan(
     target_at: Callable[[int], TrajectoryPoint],
     yaw_at: Callable[[int], float],
 ) -> FlightPlan:
-    """The plan of a scenario.
-
-    Args:
-        scenario: What to fly.
-        target_at: End-effector reference by time stamp [us].
-        yaw_at: Its yaw [rad] by time stamp [us].
-    """
-    walls, obstacles = scenario.walls, scenario.obstacles
-    count = len(walls) + len(obstacles)
-    announcements: tuple[PilotMessage, ...] = (
-        *(AnnounceWall(wall, k, count) for k, wall in enumerate(walls)),
-        *(AnnounceObstacle(one, k, count) for k, one in enumerate(obstacles, len(walls))),
-    )
+    """The plan of a scenario; its reference and yaw [rad] are asked for by time stamp [us]."""
+    kept_from: tuple[ScenarioWall | Obstacle, ...] = (*scenario.walls, *scenario.obstacles)
+    announcements: list[PilotMessage] = [
+        Announce(one, index, len(kept_from)) for index, one in enumerate(kept_from)
+    ]
     if scenario.workspace is not None:
-        announcements += (AnnounceWorkspace(scenario.workspace),)
+        announcements.append(scenario.workspace)
     kind = scenario.pilot.plan
     return FlightPlan(
-        announcements=announcements,
+        announcements=tuple(announcements),
         target_at=target_at if kind == "trajectory" else None,
         yaw_at=yaw_at,
         hop=kind == "hop",
@@ -140,7 +130,7 @@ def flight_plan(
 
 
 def listen(plan: FlightPlan, state: PilotState, heard: Heard, t_us: int) -> PilotState:
-    """Take in the vehicle's answer to the step of ``t_us``."""
+    """Process the vehicle's answer to the step of ``t_us``."""
     if heard.texts:
         state = replace(state, last_text=heard.texts[-1])
     for ack in heard.acks:
@@ -159,7 +149,7 @@ def listen(plan: FlightPlan, state: PilotState, heard: Heard, t_us: int) -> Pilo
 def speak(
     plan: FlightPlan, state: PilotState, t_us: int
 ) -> tuple[PilotState, tuple[PilotMessage, ...]]:
-    """What to say at the step of ``t_us``; at most MESSAGES_PER_STEP messages."""
+    """Messages to send at the step of ``t_us``, at most MESSAGES_PER_STEP."""
     target_due = plan.target_at is not None and state.next_target_us <= t_us + TARGET_LEAD_US
     command_due = state.phase in _COMMANDS and t_us >= state.next_ask_us
     if plan.announcements and t_us >= state.next_round_us:
@@ -207,14 +197,14 @@ def _acknowledged(
 
 
 def _left(custom_mode: int | None) -> str:
-    """What became of the trajectory, in words."""
+    """State of the trajectory as part of a sentence."""
     number = custom_mode or 0
     main, sub = number >> 16 & 0xFF, number >> 24 & 0xFF
     return f"the vehicle left the trajectory for {_NAMES.get((main, sub), f'mode {main}/{sub}')}"
 
 
 def _stands(state: PilotState, heard: Heard) -> bool:
-    """Back where it took off from; a vehicle that disarms in the air is judged as it lands."""
+    """Whether the vehicle is as low and slow as after a landing, wherever it disarmed."""
     low = heard.height_m - state.start_height_m < _LANDED_M
     return low and heard.speed_m_s < _HOVER_SPEED_M_S
 

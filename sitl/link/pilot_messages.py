@@ -12,28 +12,12 @@ Params: TypeAlias = tuple[float, float, float, float, float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
-class AnnounceWall:
-    """One wall of the safe set."""
+class Announce:
+    """One of the walls and obstacles of the safe set, which are counted together."""
 
-    wall: ScenarioWall
+    kept_from: ScenarioWall | Obstacle
     index: int
     count: int
-
-
-@dataclass(frozen=True, slots=True)
-class AnnounceObstacle:
-    """One obstacle of the safe set; walls and obstacles are counted together."""
-
-    obstacle: Obstacle
-    index: int
-    count: int
-
-
-@dataclass(frozen=True, slots=True)
-class AnnounceWorkspace:
-    """The sphere above the end-effector's target."""
-
-    workspace: Workspace
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,9 +37,8 @@ class SendCommand:
     params: Params  # NaN where not used
 
 
-PilotMessage: TypeAlias = (
-    AnnounceWall | AnnounceObstacle | AnnounceWorkspace | SendTarget | SendCommand
-)
+PilotMessage: TypeAlias = Announce | Workspace | SendTarget | SendCommand
+"""The safe set, which may be a workspace, points to be met, and commands."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -58,7 +58,7 @@ def wait_for_vehicle(endpoint: PeerSocket, wait_s: float, stop: Stop) -> bool:
     return False
 
 
-def fly(
+def serve(
     simulation: Simulation,
     plan: FlightPlan,
     exchange: Exchange,

@@ -22,13 +22,7 @@ class StepGrid:
         clock: Callable[[], float] = time.perf_counter,
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
-        """Step 0 begins now.
-
-        Args:
-            period_s: Length of a step [s].
-            clock: Monotonic wall time [s].
-            sleep: Sleeps for seconds, on the same clock.
-        """
+        """Step 0 begins now, and each takes ``period_s``; ``sleep`` sleeps for seconds."""
         self._period_s = period_s
         self._clock = clock
         self._sleep = sleep

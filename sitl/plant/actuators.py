@@ -10,13 +10,9 @@ from sitl.plant.vector import V3, V4
 
 @kernel
 def thrust_rate(thrust: float, command: float, thrust_max: float, lag: float) -> float:
-    """First-order lag of one rotor [N/s].
+    """First-order lag of one rotor's ``thrust`` [N] behind its ``command`` [N], in N/s.
 
-    Args:
-        thrust: Present thrust [N].
-        command: Wanted thrust [N]; saturates at 0 and ``thrust_max``.
-        thrust_max: Full thrust [N].
-        lag: Time constant [s].
+    The command saturates at 0 and ``thrust_max`` [N]; the time constant is ``lag`` [s].
     """
     return (min(max(command, 0.0), thrust_max) - thrust) / lag
 
@@ -37,13 +33,8 @@ def joint_torque(
 ) -> float:
     """Torque that reaches a joint after limit, viscous and smoothed Coulomb friction [N·m].
 
-    Args:
-        command: Commanded torque [N·m].
-        rate: Joint rate [rad/s].
-        torque_max: Limit of the drive [N·m].
-        viscous: Viscous friction [N·m·s/rad].
-        coulomb: Coulomb friction [N·m].
-        width: Rate at which Coulomb friction has reached 76 % [rad/s].
+    ``command`` [N·m] is limited by ``torque_max`` [N·m]; at ``rate`` [rad/s] there act ``viscous``
+    [N·m·s/rad] and ``coulomb`` [N·m] friction, 76 % of it at ``width`` [rad/s].
     """
     driven = min(max(command, -torque_max), torque_max)
     friction: float = viscous * rate + coulomb * np.tanh(rate / width)

@@ -38,12 +38,8 @@ def foot_force(feet: Feet, depth: float, v: V3) -> V3:
 def ground_wrench(feet: Feet, p: V3, v: V3, w: V3, rotation: Array) -> tuple[V3, V3]:
     """Force [N, B] and moment about the base origin [N·m, B] of all feet.
 
-    Args:
-        feet: Numbers of the landing gear.
-        p: Base origin [m, NED].
-        v: Its velocity [m/s, NED].
-        w: Angular velocity of the base [rad/s, B].
-        rotation: R_WB (3, 3) [1].
+    The base origin is at p [m, NED] and moves at v [m/s, NED] and w [rad/s, B]; R_WB is in rotation
+    (3, 3) [1].
     """
     force = moment = (0.0, 0.0, 0.0)
     if p[2] + feet.reach < 0.0:

@@ -11,14 +11,10 @@ from sitl.plant.vector import V3, Array, add, cross, rotation_into, row, times, 
 
 @kernel
 def place_into(plant: Plant, state: Array, work: Workspace, k: int, out: Array) -> None:
-    """Positions in W of the base origin and of every DH frame's origin.
+    """Positions in W of base origin and DH frames for a state (17 + 2j,) [SI], into entry k.
 
-    Args:
-        plant: Numbers of the vehicle.
-        state: (17 + 2j,) [SI].
-        work: Memory; its rotation and posture are left valid for ``state``.
-        k: Which entry of ``out`` to fill.
-        out: (n, 2 + j, 3) [m, NED]: base, DH frame 0 (joint 1), …, DH frame j (end-effector).
+    Entries of out (n, 2 + j, 3) [m, NED] are base, DH frame 0 (joint 1), …, DH frame j
+    (end-effector). ``work`` is left with rotation and posture of the state.
     """
     joints = work.still.shape[0]
     rotation_into(state, Q_WB, work.rotation)

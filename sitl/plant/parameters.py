@@ -27,15 +27,11 @@ class Link:
 
 
 def slender_link(length: float, mass: float, inertia: float) -> Link:
-    """A planar link with its centre of mass half-way.
+    """A planar link of a ``length`` [m] and ``mass`` [kg], its centre of mass half-way.
 
-    Args:
-        length: Distance between its joints [m].
-        mass: Mass [kg].
-        inertia: About either axis across the link, through the centre of mass [kg·m²].
-
-    The paper gives one inertia per link. About the long axis we take a solid cylinder of
-    10 mm radius, m r²/2: small beside the rest, but a body without it would not be physical.
+    ``inertia`` [kg·m²] is about either axis across the link, through the centre of mass; the paper
+    gives one per link. About the long axis we take a solid cylinder of 10 mm radius, m r²/2: small
+    beside the rest, but a body without it would not be physical.
     """
     along = 0.5 * mass * 0.01**2
     return Link(

@@ -26,7 +26,7 @@ def triple(a: Array, i: int) -> V3:
 
 @kernel
 def put(out: Array, i: int, v: V3) -> None:
-    """Store ``v`` in entries i, i+1, i+2 of out (n,) [any unit]."""
+    """Store v [any unit, any frame] in entries i, i+1, i+2 of out (n,) [same unit]."""
     out[i] = v[0]
     out[i + 1] = v[1]
     out[i + 2] = v[2]
@@ -40,7 +40,7 @@ def row(a: Array, i: int) -> V3:
 
 @kernel
 def put_row(out: Array, i: int, v: V3) -> None:
-    """Store ``v`` in row ``i`` of out (n, 3) [any unit]."""
+    """Store v [any unit, any frame] in row ``i`` of out (n, 3) [same unit]."""
     out[i, 0] = v[0]
     out[i, 1] = v[1]
     out[i, 2] = v[2]
@@ -54,7 +54,7 @@ def column(stack: Array, i: int, c: int) -> V3:
 
 @kernel
 def times_one(stack: Array, i: int, v: V3) -> V3:
-    """M v for matrix ``i`` in a stack (n, 3, 3) [any unit]."""
+    """Product of matrix ``i`` in a stack (n, 3, 3) [any unit] and v [any unit, any frame]."""
     return (
         stack[i, 0, 0] * v[0] + stack[i, 0, 1] * v[1] + stack[i, 0, 2] * v[2],
         stack[i, 1, 0] * v[0] + stack[i, 1, 1] * v[1] + stack[i, 1, 2] * v[2],
@@ -64,31 +64,31 @@ def times_one(stack: Array, i: int, v: V3) -> V3:
 
 @kernel
 def add(a: V3, b: V3) -> V3:
-    """A + b."""
+    """Sum of a [any unit, any frame] and b [same unit, same frame]."""
     return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
 
 
 @kernel
 def sub(a: V3, b: V3) -> V3:
-    """A - b."""
+    """Difference of a [any unit, any frame] and b [same unit, same frame]."""
     return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
 
 
 @kernel
 def scale(s: float, a: V3) -> V3:
-    """Vector ``a`` times s [any unit]."""
+    """Product of s [any unit] and a [any unit, any frame]."""
     return (s * a[0], s * a[1], s * a[2])
 
 
 @kernel
 def dot(a: V3, b: V3) -> float:
-    """A · b."""
+    """Dot product of a [any unit, any frame] and b [any unit, same frame]."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @kernel
 def cross(a: V3, b: V3) -> V3:
-    """A × b."""
+    """Cross product of a [any unit, any frame] and b [any unit, same frame]."""
     return (
         a[1] * b[2] - a[2] * b[1],
         a[2] * b[0] - a[0] * b[2],
@@ -98,7 +98,7 @@ def cross(a: V3, b: V3) -> V3:
 
 @kernel
 def times(m: Array, v: V3) -> V3:
-    """M v for m (3, 3) [any unit]."""
+    """Product of m (3, 3) [any unit] and v [any unit, any frame]."""
     return (
         m[0, 0] * v[0] + m[0, 1] * v[1] + m[0, 2] * v[2],
         m[1, 0] * v[0] + m[1, 1] * v[1] + m[1, 2] * v[2],
@@ -108,7 +108,7 @@ def times(m: Array, v: V3) -> V3:
 
 @kernel
 def transposed_times(m: Array, v: V3) -> V3:
-    """Mᵀ v for m (3, 3) [any unit]."""
+    """Product of the transpose of m (3, 3) [any unit] and v [any unit, any frame]."""
     return (
         m[0, 0] * v[0] + m[1, 0] * v[1] + m[2, 0] * v[2],
         m[0, 1] * v[0] + m[1, 1] * v[1] + m[2, 1] * v[2],

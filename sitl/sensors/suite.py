@@ -29,13 +29,13 @@ class SensorReadings(NamedTuple):
 
 
 class DelayLine(Generic[T]):
-    """Hands back what went in a fixed number of samples ago; before that, the first sample."""
+    """Delays samples by a fixed number; before that, returns the first sample."""
 
     def __init__(self, samples: int) -> None:
         self._line: deque[T] = deque(maxlen=samples + 1)
 
     def through(self, sample: T) -> T:
-        """Put in the newest sample, take out the delayed one."""
+        """Store the newest sample, return the delayed one."""
         self._line.append(sample)
         return self._line[0]
 
@@ -79,17 +79,10 @@ class SensorSuite:
 
     def __init__(self, sensors: Sensors, seed: int, step_us: int) -> None:
         self._sensors = sensors
-        steps = [
-            round(1000.0 * latency / step_us)
-            for latency in (
-                sensors.imu.latency_ms,
-                sensors.pose.latency_ms,
-                sensors.encoders.latency_ms,
-            )
-        ]
-        self._imu: DelayLine[SensorReadings] = DelayLine(steps[0])
-        self._pose: DelayLine[SensorReadings] = DelayLine(steps[1])
-        self._encoders: DelayLine[SensorReadings] = DelayLine(steps[2])
+        self._imu, self._pose, self._encoders = (
+            DelayLine[SensorReadings](round(1000.0 * errors.latency_ms / step_us))
+            for errors in (sensors.imu, sensors.pose, sensors.encoders)
+        )
         self._exact = sensors == Sensors()
         self._noise = {
             name: GaussianNoise(seed, name)

@@ -17,8 +17,8 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-_QUANTITIES = re.compile(r"^(float|Vec[234]|Quaternion|Matrix\w*|Array|NDArray.*|.*ndarray.*)$")
-_VECTOR = re.compile(r"^(Vec3|Quaternion|Matrix\w*)$")
+_QUANTITIES = re.compile(r"^(float|Vec[234]|V3|Quaternion|Matrix\w*|Array|NDArray.*|.*ndarray.*)$")
+_VECTOR = re.compile(r"^(Vec3|V3|Quaternion|Matrix\w*)$")
 _ARRAY = re.compile(r"^(Array|NDArray.*|.*ndarray.*)$")
 _UNIT_SUFFIX = re.compile(r"_(us|ms|ns|s|hz|m|rad|deg|bytes|mb|percent|per_\w+)$")
 _MONOGRAM = re.compile(r"_(W|B|E|[A-Z]{1,3}\d?)(_[A-Z]+)*\d?(_\w+)?$")
@@ -48,7 +48,7 @@ def quantities(function: ast.FunctionDef) -> Iterator[tuple[str, str]]:
 
 
 def problems(path: Path) -> list[str]:
-    """One sentence for each quantity of the file whose unit, frame or shape is not said."""
+    """One sentence for each quantity of the file whose unit, frame or shape is missing."""
     found = []
     for function in functions(ast.parse(path.read_text())):
         text = ast.get_docstring(function) or ""
@@ -65,11 +65,11 @@ def _problem(name: str, kind: str, text: str) -> str:
     # In double backticks, as an entry of Args, or right before its bracket: not as a word of prose.
     own = re.escape(name)
     named = rf"(?:``{own}``|^\s*{own}:|\b{own}(?=\s*(?:\([^()\n]*\)\s*)?\[))"
-    said = re.search(rf"(?m){named}\s*{_BRACKET}", text)
-    if said is None:
+    reported = re.search(rf"(?m){named}\s*{_BRACKET}", text)
+    if reported is None:
         return f"no unit: say ``{name}`` [unit] in the docstring, [1] if it has none"
-    if _VECTOR.match(kind) and not (_MONOGRAM.search(name) or "," in said["unit"]):
-        return f"no frame: name it as in p_WE or say [{said['unit']}, NED]"
-    if _ARRAY.match(kind) and "(" not in said["between"]:
-        return f"no shape: say ``{name}`` (n, 3) [{said['unit']}]"
+    if _VECTOR.match(kind) and not (_MONOGRAM.search(name) or "," in reported["unit"]):
+        return f"no frame: name it as in p_WE or say [{reported['unit']}, NED]"
+    if _ARRAY.match(kind) and "(" not in reported["between"]:
+        return f"no shape: say ``{name}`` (n, 3) [{reported['unit']}]"
     return ""

@@ -20,21 +20,14 @@ _SPEC.loader.exec_module(rules)
 
 _FILES = sorted(
     path
-    for top in ("fsw", "sitl", "messages", "pandion", "studies")
+    for top in ("benchmarks", "command_line", "fsw", "messages", "pandion", "sitl", "studies")
     for path in (_ROOT / top).rglob("*.py")
     if path.name != "dialect.py"
 )
-# Folders that do not keep the rule yet; a folder that keeps it leaves this list for good.
-_NOT_YET = ("fsw", "pandion", "studies")
 
 
 def test_every_quantity_has_its_unit_frame_and_shape() -> None:
-    found = [
-        problem
-        for path in _FILES
-        if not str(path.relative_to(_ROOT)).startswith(_NOT_YET)
-        for problem in rules.problems(path)
-    ]
+    found = [problem for path in _FILES for problem in rules.problems(path)]
     assert not found, "\n".join(found)
 
 

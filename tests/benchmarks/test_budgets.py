@@ -1,4 +1,4 @@
-"""The judgement of a measurement: over budget is told from a machine too noisy to say."""
+"""The judgement of a measurement: over budget, or on a machine too noisy to measure."""
 
 from __future__ import annotations
 

@@ -51,16 +51,16 @@ def test_what_makes_no_sense_is_refused_in_a_sentence(
     except SystemExit as error:
         code = int(str(error.code))
     assert code == 2
-    said = capsys.readouterr().err.strip()
-    assert named in said
-    assert "\n" not in said
+    reported = capsys.readouterr().err.strip()
+    assert named in reported
+    assert "\n" not in reported
 
 
 def _flown(factor: float) -> dict[str, Any]:
     def took(us: float) -> dict[str, float]:
         return {"p50_us": us}
 
-    stages = {"hear": took(4.0), "tick": took(20.0), "actuate": took(6.0)}
+    stages = {"receive": took(4.0), "tick": took(20.0), "actuate": took(6.0)}
     mpc = {"p50_us": 700.0, "rate_hz": 10.0}
     return {
         "sitl": {"real_time_factor": factor, "steps": 1000, "wall_s": 0.08, "waited_s": 0.05},
@@ -75,11 +75,11 @@ def test_factor_ratio_and_stages_come_from_both_halves(
     factors = iter([24.0, 12.0, 30.0, 10.0, 27.0, 9.0])  # ours and the peer's take turns
     monkeypatch.setattr(lockstep, "_measure_one", lambda *_: _flown(next(factors)))
     assert lockstep.main([]) == 0
-    said = capsys.readouterr().out
-    assert "median 27.0, best 30.0" in said
-    assert "3.00 times as fast as with pymavlink's packing" in said
-    assert "simulator                   30.0 us" in said
-    assert "mpc, share of a step        14.0 us" in said
+    reported = capsys.readouterr().out
+    assert "median 27.0, best 30.0" in reported
+    assert "3.00 times as fast as with pymavlink's packing" in reported
+    assert "simulator                   30.0 us" in reported
+    assert "mpc, share of a step        14.0 us" in reported
 
 
 def test_too_slow_is_an_exit_code(monkeypatch: pytest.MonkeyPatch) -> None:

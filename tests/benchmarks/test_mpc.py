@@ -11,10 +11,10 @@ import pytest
 from benchmarks import __main__ as benchmarks
 from benchmarks.optimiser import casadi_method
 from benchmarks.optimiser.casadi_method import SOLVERS, CasadiMethod
+from benchmarks.optimiser.converged import ConvergedOcp
 from benchmarks.optimiser.instances import Instance, planner_of, record
 from benchmarks.optimiser.measurement import Effort, Samples, run
 from benchmarks.optimiser.methods import Entry, guess_for
-from benchmarks.optimiser.price import Judge
 from benchmarks.optimiser.report import lines
 from benchmarks.optimiser.solved import stopwatch_us
 from fsw.mpc.planner import Planner
@@ -97,14 +97,14 @@ def test_casadi_solves_the_same_problem(solver: str, recorded: list[Instance]) -
     pytest.importorskip("casadi")
     config = planner_of(5).planner
     for instance in recorded:
-        judge = Judge(config, instance.request.safe_set)
+        converged = ConvergedOcp(config, instance.request.safe_set)
         guess = guess_for(Planner(config, stopwatch_us), instance)
-        optimum, best = judge.converged(instance.request, guess)
+        optimum, best = converged.solve(instance.request, guess)
         method = CasadiMethod(config, instance.request.safe_set, solver)
         answer = method.solve(instance, guess, optimum)
         assert answer.inputs is not None
         np.testing.assert_allclose(answer.inputs[:3], optimum[:3], atol=5e-3)
-        assert judge.price(instance.request, answer.inputs) == pytest.approx(best, rel=5e-3)
+        assert converged.cost(instance.request, answer.inputs) == pytest.approx(best, rel=5e-3)
 
 
 def test_instances_are_consecutive_and_of_both_cases(recorded: list[Instance]) -> None:

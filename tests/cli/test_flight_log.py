@@ -19,7 +19,7 @@ from pyulog import ULog
 
 from sitl.scenario_file import PACKAGED
 from tests.cli.command import clean_up, one_sentence, pandion, read_until, start
-from tests.processes.halves import free_port
+from tests.processes.both_processes import free_port
 from tests.waiting import wait_for
 
 FLIGHT = ("fly", "walls", "--lockstep", "--seed", "5", "--duration", "2")
@@ -128,8 +128,7 @@ def test_replay_names_the_first_difference(log: Path, tmp_path: Path) -> None:
     (line,) = done.stdout.splitlines()
     assert line.startswith("first difference at tick ")
     assert line.endswith(
-        ": text was 'HOLD to trajectory: follow trajectory' and is "
-        "'hold to trajectory: follow trajectory'"
+        ": text was 'HOLD to trajectory: command' and is 'hold to trajectory: command'"
     )
 
 

@@ -25,7 +25,7 @@ from fsw.link.telemetry.streams import STREAMS
 from fsw.link.wire.message_ids import ORBIT_EXECUTION_STATUS
 from messages.frames import Frame, FrameWriter, split
 from tests.cli.command import clean_up, group_is_empty, pandion, read_until, start
-from tests.processes.halves import free_port
+from tests.processes.both_processes import free_port
 
 
 def documented() -> dict[str, list[str]]:
@@ -39,7 +39,7 @@ def documented() -> dict[str, list[str]]:
     }
 
 
-QUESTION = (0.0, *(math.nan,) * 6, 31010, 1, 1, 0)  # MAV_CMD_USER_1, which nobody supports
+QUESTION = (0.0, *(math.nan,) * 6, 31010, 1, 1, 0)  # MAV_CMD_USER_1, which is not supported
 
 
 class Listener:
@@ -122,10 +122,10 @@ def test_the_result_has_exactly_the_keys_that_its_page_promises(lockstep: Flight
 
 
 def test_the_verdict_is_told_and_the_files_are_there(lockstep: Flight) -> None:
-    told = lockstep.done.stderr
-    assert "PASS" in told
-    assert "QGroundControl connects on UDP" in told
-    assert "minimum margin" in told
+    reported = lockstep.done.stderr
+    assert "PASS" in reported
+    assert "QGroundControl connects on UDP" in reported
+    assert "minimum margin" in reported
     assert lockstep.directory.name == "walls-seed2-1"
     assert {"flight.tlog", "fsw.json", "sitl.json", "result.json"} <= set(lockstep.files)
     assert json.loads((lockstep.directory / "result.json").read_text()) == lockstep.result
@@ -196,12 +196,12 @@ def test_a_signal_ends_everything_within_two_seconds_with_a_verdict(
         os.killpg(flying.pid, signal.SIGINT)
     else:
         flying.send_signal(signal.SIGTERM)
-    told, _ = flying.communicate(timeout=10)
+    reported, _ = flying.communicate(timeout=10)
     assert time.monotonic() - begin < 2.0
     assert flying.returncode == 1
-    assert "FAIL" in told
-    assert "interrupted at step" in told
-    assert "Traceback" not in told
+    assert "FAIL" in reported
+    assert "interrupted at step" in reported
+    assert "Traceback" not in reported
     assert group_is_empty(flying.pid)
     result = json.loads((tmp_path / "out" / "result.json").read_text())
     assert result["completed"] is False
@@ -218,9 +218,9 @@ def test_a_vehicle_waits_on_the_ground_until_it_is_interrupted(tmp_path: Path) -
     try:
         read_until(process, "flying until interrupted")
         process.send_signal(signal.SIGINT)
-        told, _ = process.communicate(timeout=10)
+        reported, _ = process.communicate(timeout=10)
         assert process.returncode == 0
-        assert "PASS interrupted at step" in told
+        assert "PASS interrupted at step" in reported
         result = json.loads((out / "result.json").read_text())
         assert (result["completed"], result["min_margin_m"]) == (True, None)
     finally:
@@ -251,10 +251,10 @@ def test_a_crash_of_the_flight_software_is_one_sentence(
     flying: subprocess.Popen[str],
 ) -> None:
     os.kill(pid_of_fsw(flying.pid), signal.SIGKILL)
-    told, _ = flying.communicate(timeout=20)
+    reported, _ = flying.communicate(timeout=20)
     assert flying.returncode == 1
-    assert "fsw ended with code -9" in told
-    assert "Traceback" not in told
+    assert "fsw ended with code -9" in reported
+    assert "Traceback" not in reported
     assert group_is_empty(flying.pid)
 
 

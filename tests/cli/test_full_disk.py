@@ -1,4 +1,4 @@
-"""A disk that takes no results: the verdict all the same, one sentence, and no success."""
+"""A disk that takes no results: the result all the same, one sentence, and no success."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from sitl.scenario_file import load_scenario
 from sitl.simulation import Simulation
 from sitl.truth_log import TruthLog
 from tests.cli.command import PANDION, environment, one_sentence, pandion
-from tests.processes.halves import free_port
+from tests.processes.both_processes import free_port
 
 FULL = Path("/dev/full")
 pytestmark = pytest.mark.skipif(not FULL.is_char_device(), reason="needs /dev/full")

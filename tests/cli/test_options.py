@@ -48,9 +48,9 @@ def refused(kind: type[Any], *words: str, capsys: pytest.CaptureFixture[str]) ->
     with pytest.raises(SystemExit) as stop:
         read(kind, "test", "Test.", list(words))
     assert stop.value.code == 2
-    said = capsys.readouterr().err
-    assert one_sentence(said), said
-    return said
+    reported = capsys.readouterr().err
+    assert one_sentence(reported), reported
+    return reported
 
 
 @given(
@@ -89,11 +89,11 @@ def test_an_old_name_works_and_is_answered_by_the_new_one(
     old = ["--soft", "--inner", "tracking", "--robustness=paper-1"]
     new = ["--allow-inconsistent", "--tracking", "lqr", "--lambda=paper-1"]
     chosen = read(ControlChoice, "test", "Test.", old)
-    said = capsys.readouterr().err.splitlines()
+    reported = capsys.readouterr().err.splitlines()
     assert chosen == read(ControlChoice, "test", "Test.", new)
-    assert len(said) == 3
+    assert len(reported) == 3
     for line, name, today in zip(
-        said,
+        reported,
         ("--soft", "--inner", "--robustness"),
         ("--allow-inconsistent", "--tracking", "--lambda"),
         strict=True,
@@ -124,8 +124,8 @@ def test_every_program_refuses_an_unknown_option(
         field.metadata["option"].required for field in fields(program) if "option" in field.metadata
     )
     group = ["--csv", "x"] if program is ExportOptions else []
-    said = refused(program, *words, *group, "--jsno", "x", capsys=capsys)
-    assert "--jsno" in said
+    reported = refused(program, *words, *group, "--jsno", "x", capsys=capsys)
+    assert "--jsno" in reported
 
 
 @pytest.mark.parametrize(

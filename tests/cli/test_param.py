@@ -42,7 +42,7 @@ def test_set_and_get_in_a_new_file(tmp_path: Path, capsys: pytest.CaptureFixture
 
 
 @pytest.mark.parametrize(
-    ("arguments", "code", "said"),
+    ("arguments", "code", "reported"),
     [
         (["set", "PID_YAW_P", "99"], 1, "PID_YAW_P is to be 0..50, 99 is refused"),
         (["set", "PID_YAW_P", "nan"], 1, "nan is refused"),
@@ -58,7 +58,7 @@ def test_set_and_get_in_a_new_file(tmp_path: Path, capsys: pytest.CaptureFixture
 def test_what_cannot_be_done_is_one_sentence(
     arguments: list[str],
     code: int,
-    said: str,
+    reported: str,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
@@ -71,7 +71,7 @@ def test_what_cannot_be_done_is_one_sentence(
         ended = exit_.code  # type: ignore[assignment]
     assert ended == code
     error = capsys.readouterr().err
-    assert said in error
+    assert reported in error
     assert error.count("\n") == 1
     assert not (tmp_path / "v.params").exists()
 

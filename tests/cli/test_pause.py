@@ -37,14 +37,14 @@ def test_a_flight_survives_a_pause(
         time.sleep(pause_s)
         for process in stopped:
             os.kill(process, signal.SIGCONT)
-        said, _ = flight.communicate(timeout=30.0)
-        assert flight.returncode == 0, said
-        assert "PASS flew 3.0 s" in said
+        reported, _ = flight.communicate(timeout=30.0)
+        assert flight.returncode == 0, reported
+        assert "PASS flew 3.0 s" in reported
         simulator = json.loads((out / "sitl.json").read_text())
         if pace == ("--realtime",):
             assert simulator["pauses"] >= 1
             assert pause_s - 0.1 <= simulator["paused_s"] <= pause_s + 0.5
-            assert "sitl: process was suspended" in said
+            assert "sitl: process was suspended" in reported
         else:
             assert simulator["pauses"] == 0
     finally:

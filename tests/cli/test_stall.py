@@ -12,10 +12,10 @@ from pathlib import Path
 import pytest
 
 from tests.cli.command import clean_up, group_is_empty, read_until, start
-from tests.processes.halves import free_port
+from tests.processes.both_processes import free_port
 from tests.waiting import LostTime
 
-PROMISED_S = 2.0  # from the stall to the end of `pandion fly`, verdict included
+PROMISED_S = 2.0  # from the stall to the end of `pandion fly`, result included
 TRIES = 3  # a tenth of a second before the end is hard to hit
 
 
@@ -44,7 +44,7 @@ def flying(out: Path, *options: str, duration: str = "8") -> subprocess.Popen[st
 
 
 def end_of(flight: subprocess.Popen[str], half: str, number: signal.Signals) -> tuple[float, str]:
-    """Send a signal to a half; returns the seconds until nothing runs, and what was said."""
+    """Send a signal to a process; returns the seconds until nothing runs, and the output."""
     with LostTime() as lost:
         begin_s = time.monotonic()
         os.kill(half_of(flight.pid, half), number)
@@ -66,7 +66,7 @@ NOT_SENT = r"FAIL fsw: the simulator sent nothing for .* after step \d{3,}; sitl
         (("--speed", "1"), "fsw", signal.SIGSTOP, NOT_ANSWERED),
         (("--speed", "1"), "sitl", signal.SIGSTOP, NOT_SENT),
         (("--speed", "1"), "fsw", signal.SIGKILL, r"FAIL fsw ended with code -9.*step \d{3,}"),
-        # In the air nobody waits for a stall to be sure: the vehicle falls before that.
+        # In the air the simulator ends at once: a wait would let the vehicle fall.
         (("--realtime",), "fsw", signal.SIGSTOP, r"FAIL .* silent since step \d{3,}"),
         (("--realtime",), "fsw", signal.SIGKILL, r"FAIL fsw .* -9.* silent since step \d{3,}"),
         (("--realtime",), "sitl", signal.SIGSTOP, NOT_SENT),
@@ -77,17 +77,17 @@ def test_a_stall_of_a_half_ends_both_in_time_and_names_the_step(
 ) -> None:
     flight = flying(tmp_path / "out", *pace)
     try:
-        took_s, said = end_of(flight, half, number)
+        took_s, reported = end_of(flight, half, number)
     finally:
         clean_up(flight)
-    assert re.search(sentence, said), said
-    assert "Traceback" not in said
+    assert re.search(sentence, reported), reported
+    assert "Traceback" not in reported
     assert took_s <= PROMISED_S
 
 
 def test_a_stall_shortly_before_the_end_is_no_pass(tmp_path: Path) -> None:
     """The simulator ends as planned, and the flight software has to be killed."""
-    silent_s, said = 0.0, ""
+    silent_s, reported = 0.0, ""
     for attempt in range(TRIES):
         out = tmp_path / f"{attempt}"
         flight = flying(out, "--realtime", duration="2")
@@ -96,13 +96,13 @@ def test_a_stall_shortly_before_the_end_is_no_pass(tmp_path: Path) -> None:
             for line in flight.stdout:
                 if float(line.split()[1]) >= 1.7:  # of progress; too late for a fall to end it
                     break
-            _, said = end_of(flight, "fsw", signal.SIGSTOP)
+            _, reported = end_of(flight, "fsw", signal.SIGSTOP)
         finally:
             clean_up(flight)
-        assert re.search(r"FAIL flew 2\.0 s; (.*; )?fsw did not end by itself", said), said
+        assert re.search(r"FAIL flew 2\.0 s; (.*; )?fsw did not end by itself", reported), reported
         assert not (out / "fsw.json").exists()
-        since = re.search(r"silent since step (\d{3}); fsw", said)
+        since = re.search(r"silent since step (\d{3}); fsw", reported)
         if since is not None:  # a slow machine is slow to stop it, and a tenth of a second is short
             silent_s = 2.0 - 0.002 * int(since[1])
             break
-    assert 0.1 < silent_s < 0.4, said
+    assert 0.1 < silent_s < 0.4, reported

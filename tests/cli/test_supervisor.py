@@ -47,10 +47,10 @@ def test_a_simulator_that_leaves_no_result_is_a_failure(tmp_path: Path) -> None:
     assert flown.failure == f"sitl ended without a result; see {tmp_path / 'sitl.log'}"
 
 
-@pytest.mark.parametrize("said", [[], [SHUT_DOWN]])
-def test_a_half_that_has_to_be_killed_is_a_failure(said: list[str], tmp_path: Path) -> None:
+@pytest.mark.parametrize("reported", [[], [SHUT_DOWN]])
+def test_a_process_that_has_to_be_killed_is_a_failure(reported: list[str], tmp_path: Path) -> None:
     begin_s = time.monotonic()
-    flown = watched(tmp_path, ["short", FLEW_ALONE], ["deaf", *said, "sleep"])
+    flown = watched(tmp_path, ["short", FLEW_ALONE], ["deaf", *reported, "sleep"])
     assert flown.aftermath == ["fsw did not end by itself and had to be killed"]
     assert flown.sitl == {"completed": True}
     assert time.monotonic() - begin_s < 3.0

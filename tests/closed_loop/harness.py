@@ -69,7 +69,7 @@ def as_measured(frame: SensorFrame) -> SensorFrame:
 
 @dataclass
 class Flight:
-    """One flight, step by step; everything that was said is kept.
+    """One flight, step by step; all status texts are kept.
 
     ``spoil`` stands between sensors and flight software, ``late_ticks`` says by how many ticks
     each plan comes after its time.
@@ -145,15 +145,15 @@ class Flight:
         self.upload = None
         if self.streamed and self.sim.step % STREAM_STEPS == 0:
             self.inputs = replace(self.inputs, **self.streamed)
-        return self.fly(self.inputs)
+        return self.step_with(self.inputs)
 
     def targets(self) -> tuple[EndEffectorTarget, ...]:
         return self.closed.targets() if self.scenario.pilot.plan == "trajectory" else ()
 
-    def fly(self, inputs: TickInputs) -> TickOutputs:
+    def step_with(self, inputs: TickInputs) -> TickOutputs:
         """Tick, plan, advance, with inputs from somewhere else."""
         before = self.mode
-        outputs = self._outputs = self.closed.fly(inputs)
+        outputs = self._outputs = self.closed.step(inputs)
         self.texts += [text.text for text in outputs.texts]
         self.results += [(ack.command, ack.result) for ack in outputs.acks]
         if self.mode is not before:

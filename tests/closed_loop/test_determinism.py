@@ -37,9 +37,9 @@ def test_a_tick_depends_on_nothing_but_its_arguments_and_changes_neither() -> No
 
 def test_another_loop_continues_where_the_first_stopped() -> None:
     """All memory is in the state: a loop built anew flies on without a seam."""
-    whole, halves = flown(5), Flight(load_scenario("walls"), seed=5)
-    halves.follow()
-    halves.run(1.0)
-    halves.loop = type(halves.loop)(halves.config)
-    halves.run(1.0)
-    assert whole.sent == halves.sent
+    whole, split = flown(5), Flight(load_scenario("walls"), seed=5)
+    split.follow()
+    split.run(1.0)
+    split.loop = type(split.loop)(split.config)
+    split.run(1.0)
+    assert whole.sent == split.sent

@@ -76,7 +76,7 @@ def test_a_takeoff_that_nobody_arms_for_is_forgotten_and_told_so() -> None:
     assert flight.snapshot.intended_mode is Mode.TAKEOFF
     flight.run(0.3)
     assert flight.snapshot.intended_mode is Mode.HOLD
-    assert sum("takeoff forgotten" in text for text in flight.texts) == 1
+    assert sum("takeoff cancelled" in text for text in flight.texts) == 1
     flight.step(command(ARM, 1.0))
     flight.run(2.0)
     assert flight.mode is Mode.HOLD
@@ -102,7 +102,7 @@ def test_offboard_can_be_chosen_before_arming_and_not_without_set_points() -> No
     second.streamed = {}
     second.run(0.7)
     assert second.snapshot.intended_mode is Mode.HOLD
-    assert any("offboard forgotten" in text for text in second.texts)
+    assert any("offboard cancelled" in text for text in second.texts)
 
 
 def item(

@@ -57,7 +57,7 @@ def niche() -> MissionUpdate:
 
 
 def among_walls(seed: int) -> Flight:
-    """Case I, disturbed; the vehicle hears of the walls from nobody but the fence."""
+    """Case I, disturbed; the fence is the vehicle's only source of the walls."""
     scenario = replace(load_scenario("walls"), pilot=Pilot("none"))
     flight = Flight(scenario, seed=seed, announces=False)
     flight.upload = niche()
@@ -65,7 +65,7 @@ def among_walls(seed: int) -> Flight:
     return flight
 
 
-def told(flight: Flight, steps: tuple[MissionStep, ...]) -> None:
+def reported(flight: Flight, steps: tuple[MissionStep, ...]) -> None:
     flight.upload = MissionUpdate(steps=steps, current=0)
     flight.step()
 
@@ -83,7 +83,7 @@ def test_a_mission_from_the_ground_to_the_ground() -> None:
         MissionStep(A.GO, (0.3, 0.2, -0.8), yaw=0.3),
         MissionStep(A.LAND),
     )
-    told(flight, steps)
+    reported(flight, steps)
     flight.step(command(SET_MODE, 1.0, 4.0, 4.0))
     assert flight.snapshot.intended_mode is Mode.MISSION
     flight.step(command(ARM, 1.0))
@@ -104,7 +104,9 @@ def test_a_mission_from_the_ground_to_the_ground() -> None:
 
 def test_waypoints_beyond_the_walls_of_an_uploaded_fence_are_flown_up_to_it() -> None:
     flight = among_walls(seed=3)
-    told(flight, (go(1.8, 0.3, -1.2, hold=1.0), go(1.4, 1.7, -1.2, hold=1.0), go(0.0, 0.0, -1.2)))
+    reported(
+        flight, (go(1.8, 0.3, -1.2, hold=1.0), go(1.4, 1.7, -1.2, hold=1.0), go(0.0, 0.0, -1.2))
+    )
     flight.step(command(MISSION_START, 0.0, 0.0))
     flight.run(33.0)
     margins = flight.sim.result().margins_m
@@ -130,7 +132,7 @@ def test_the_sphere_of_case_2_can_be_a_fence() -> None:
     flight.upload = fence(MissionItem(CIRCLE_INCLUSION, 7, (0.075, 0, 0, 0), 0, 0, -0.225))
     flight.step(command(ARM, 1.0))
     flight.run(0.5)
-    told(flight, (go(0.5, 0.3, -1.3), go(0.0, 0.0, -1.2)))
+    reported(flight, (go(0.5, 0.3, -1.3), go(0.0, 0.0, -1.2)))
     flight.step(command(MISSION_START, 0.0, 0.0))
     farthest = 0.0
     for _ in range(100):
@@ -147,7 +149,7 @@ def test_the_sphere_of_case_2_can_be_a_fence() -> None:
 def test_pause_and_continue_come_back_to_the_current_step() -> None:
     flight = Flight(hover())
     flight.step(command(ARM, 1.0))
-    told(flight, (go(0.0, 0.0, -1.0), go(1.0, 0.0, -1.0)))
+    reported(flight, (go(0.0, 0.0, -1.0), go(1.0, 0.0, -1.0)))
     flight.step(command(MISSION_START, 1.0, 0.0))
     flight.run(5.0)
     flight.step(command(PAUSE_CONTINUE, 0.0))
@@ -168,7 +170,7 @@ def test_the_reference_does_not_jump_from_hold_into_a_mission_and_back() -> None
     flight = Flight(hover())
     flight.step(command(ARM, 1.0))
     flight.run(0.5)
-    told(flight, (go(0.3, 0.0, -1.1),))
+    reported(flight, (go(0.3, 0.0, -1.1),))
     flight.step(command(MISSION_START, 0.0, 0.0))
     seen: list[EndEffectorTarget] = []
     for _ in range(110):
@@ -185,11 +187,11 @@ def test_another_mission_or_none_ends_the_one_that_is_flown() -> None:
     flight = Flight(hover())
     flight.step(command(ARM, 1.0))
     for steps in ((go(0.5, 0.0, -1.0),), ()):
-        told(flight, (go(1.0, 0.0, -1.0),))
+        reported(flight, (go(1.0, 0.0, -1.0),))
         flight.step(command(SET_MODE, 1.0, 4.0, 4.0))
         assert flight.mode is Mode.MISSION
         flight.run(2.0)  # the same command sooner would be a repetition
-        told(flight, steps)
+        reported(flight, steps)
         assert flight.mode is Mode.HOLD
 
 
@@ -197,7 +199,7 @@ def test_what_cannot_be_begun_is_refused_with_the_reason() -> None:
     flight = Flight(on_the_ground())
     flight.step(command(ARM, 1.0))
     flight.step(command(MISSION_START, 0.0, 0.0))
-    told(flight, (go(1.0, 0.0, -1.0),))
+    reported(flight, (go(1.0, 0.0, -1.0),))
     flight.step(command(SET_MODE, 1.0, 4.0, 4.0))
     flight.step(command(MISSION_START, 7.0, 0.0))
     flight.step(command(SET_CURRENT, 1.0, 0.0))
@@ -209,7 +211,7 @@ def test_what_cannot_be_begun_is_refused_with_the_reason() -> None:
     ]
     assert flight.texts[1:] == [
         "no mission: none was uploaded",
-        *["no mission: on the ground, and step 0 is no takeoff; take off first"] * 2,
+        *["no mission: on the ground, and step 0 is not a takeoff; take off first"] * 2,
         "there is no mission step 1; 1 were uploaded",
     ]
 
@@ -217,7 +219,7 @@ def test_what_cannot_be_begun_is_refused_with_the_reason() -> None:
 def test_a_step_chosen_in_flight_is_flown_after_braking() -> None:
     flight = Flight(hover())
     flight.step(command(ARM, 1.0))
-    told(flight, (go(2.0, 0.0, -1.0), go(0.0, 0.5, -1.0)))
+    reported(flight, (go(2.0, 0.0, -1.0), go(0.0, 0.5, -1.0)))
     flight.step(command(MISSION_START, 0.0, 0.0))
     flight.run(5.0)
     flight.step(command(SET_CURRENT, 1.0, 0.0))
@@ -233,7 +235,7 @@ def test_a_return_leads_to_the_nearest_rally_point() -> None:
     flight.step(command(ARM, 1.0))
     flight.upload = MissionUpdate(rally=((0.0, 9.0), (0.8, 0.0)))
     flight.step()
-    told(flight, (go(0.6, 0.0, -1.2), MissionStep(A.RETURN)))
+    reported(flight, (go(0.6, 0.0, -1.2), MissionStep(A.RETURN)))
     flight.step(command(MISSION_START, 0.0, 0.0))
     for _ in range(300):
         flight.run(0.1)

@@ -21,7 +21,7 @@ from fsw.signals import AttitudeSetpoint, JointSetpoint, Mode, MotionSetpoint
 from sitl.scenario_file import load_scenario
 from tests.closed_loop.harness import ARM, SET_MODE, Flight, command, hover
 
-_WHERE_ROWS_BIND = ("_want_near", "_numbered", "_want_violated")
+_WORKING_SET_KERNELS = ("_add_near", "_numbered", "_add_violated")
 _LEVEL = (1.0, 0.0, 0.0, 0.0)
 
 
@@ -83,7 +83,7 @@ def _fly(name: str) -> list[str]:
     flight, fly = FLIGHTS[name]()
     flight_software(ControlChoice())
     ready = _variants()
-    assert all(ready[f"fsw.mpc.dual_solver.{kernel}"] for kernel in _WHERE_ROWS_BIND)
+    assert all(ready[f"fsw.mpc.dual_solver.{kernel}"] for kernel in _WORKING_SET_KERNELS)
     assert ready["fsw.control.cascade._close_loops"] > 0
     fly(flight)
     return [kernel for kernel, count in _variants().items() if count != ready.get(kernel)]

@@ -1,4 +1,4 @@
-"""Set-points for now: what lets them in, what ends them, and that they cannot fly into a wall.
+"""Setpoints for now: what lets them in, what ends them, and that they cannot fly into a wall.
 
 The walls are those of Case I, the margin is the plant's own, between samples.
 """
@@ -162,15 +162,15 @@ def test_a_set_point_moves_the_rotors_with_the_next_plan_and_not_before(
 ) -> None:
     """The planner is asked every 50 ticks and answers for 10 ticks later: 10 to 59 ticks."""
     monkeypatch.setattr(harness, "STREAM_STEPS", 1)
-    told, twin = (offboard(hover(), **body(v=(0.0, 0.0, 0.0))) for _ in range(2))
-    asked = told.state.index // 50 * 50 + 50 + phase
-    while told.state.index < asked - 1:
-        told.step()
+    reported, twin = (offboard(hover(), **body(v=(0.0, 0.0, 0.0))) for _ in range(2))
+    asked = reported.state.index // 50 * 50 + 50 + phase
+    while reported.state.index < asked - 1:
+        reported.step()
         twin.step()
-    told.streamed = wanted
+    reported.streamed = wanted
     until_asked = -asked % 50
-    ticks = next(n for n in range(60) if told.step().actuators != twin.step().actuators)
-    assert ticks == until_asked + told.config.plan_delay_ticks
+    ticks = next(n for n in range(60) if reported.step().actuators != twin.step().actuators)
+    assert ticks == until_asked + reported.config.plan_delay_ticks
 
 
 def test_an_attitude_accelerates_the_way_it_points() -> None:

@@ -123,7 +123,7 @@ def test_a_ground_station_that_falls_silent_brings_the_vehicle_home() -> None:
     flight = Flight(hover(), config=config)
     flight.step(command(ARM, 1.0))
     flight.run(4.0)
-    assert flight.mode is Mode.HOLD, "nobody was there, so nobody is missed"
+    assert flight.mode is Mode.HOLD, "no ground station was there, so none is missed"
     flight.streamed = {"ground_station_heard": True}
     flight.run(4.0)
     assert flight.mode is Mode.HOLD

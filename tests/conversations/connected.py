@@ -111,7 +111,7 @@ class Connected:
         inputs = inbox.take_inputs(
             sensors, flight.closed.planner.take(sensors.t_us), tuning, self.missions.take_update()
         )
-        outputs = flight.fly(inputs)
+        outputs = flight.step_with(inputs)
         self.missions.observe(outputs.snapshot)
         if tuning is not None:
             self.parameters.settle(outputs.tuning_taken)

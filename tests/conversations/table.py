@@ -1,4 +1,4 @@
-"""A conversation as a table: what is said, and what must be answered, within which time."""
+"""A conversation as a table: the messages sent, and the required answers, within which time."""
 
 from __future__ import annotations
 
@@ -58,8 +58,8 @@ def play(vehicle: Connected, turns: tuple[Turn, ...]) -> None:
     """Say one row after the other, and hold each answer against its row."""
     for turn in turns:
         begin = len(vehicle.heard)
-        said = turn.say(vehicle)
-        for message in said if isinstance(said, tuple) else (said,):
+        reported = turn.say(vehicle)
+        for message in reported if isinstance(reported, tuple) else (reported,):
             vehicle.send(message)
         for must in turn.must:
             met = any(must.met_by(message) for message in vehicle.heard[begin:])

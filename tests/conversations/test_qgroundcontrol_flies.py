@@ -187,8 +187,8 @@ def test_a_refused_parameter_comes_back_at_once_with_the_reason(
     vehicle: Connected, version: int
 ) -> None:
     speaks(vehicle, version)
-    for name, wish, held in ((b"COM_RC_IN_MODE", 4.0, 1.0), (b"STR_CRUISE", 9.0, 1.0)):
-        vehicle.send(d.MAVLink_param_set_message(1, 1, name, wish, 9))
+    for name, sent, held in ((b"COM_RC_IN_MODE", 4.0, 1.0), (b"STR_CRUISE", 9.0, 1.0)):
+        vehicle.send(d.MAVLink_param_set_message(1, 1, name, sent, 9))
         value = vehicle.run(1.0, lambda m: m.get_type() == "PARAM_VALUE")
         assert (value.param_id, value.param_value) == (name.decode(), held)
     vehicle.send(d.MAVLink_param_set_message(1, 1, b"STR_CRUISE", 0.75, 9))
@@ -229,8 +229,8 @@ def test_the_log_page_lists_downloads_and_erases(
     assert len(EARLIER) / (vehicle.t_s - begin) > 1.5e6, "bytes a second of the vehicle's time"
     vehicle.send(d.MAVLink_log_erase_message(1, 1))
     assert entries() == {0: 7}, "it asks for the list at once"
-    told = Must("STATUSTEXT", {"text": lambda t: "1 log erased" in t, "severity": 6})
-    assert any(told.met_by(m) for m in vehicle.heard) or vehicle.run(2.0, told.met_by)
+    reported = Must("STATUSTEXT", {"text": lambda t: "1 log erased" in t, "severity": 6})
+    assert any(reported.met_by(m) for m in vehicle.heard) or vehicle.run(2.0, reported.met_by)
     assert not (tmp_path / "earlier" / "flight.ulg").exists()
 
 

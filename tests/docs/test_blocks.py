@@ -29,12 +29,6 @@ from tests.docs.fences import PAGES, ROOT, Fence, commands, fences, named
 
 BLOCKS = [fence for page in PAGES for fence in fences(page)]
 LANGUAGES = {"console", "diff", "json", "math", "python", "text", "toml", "{include}", "{toctree}"}
-# New option or program -> the one that this version still has. Empty it when they have arrived.
-RENAMED = {
-    "--allow-inconsistent": "--soft",
-    "--lambda": "--robustness",
-    "--tracking": "--inner",
-}
 OPTION = re.compile(r"--[a-z][a-z-]*")
 BIN = Path(sys.executable).parent
 
@@ -202,8 +196,7 @@ def test_a_command_on_a_page_exists(line: str) -> None:
     elif program == "python":
         assert words[0] == "-m"
         module = words[1].replace(".", "/")
-        moved = {"benchmarks": "pandion/bench"}.get(module, module)
-        assert any((ROOT / found).exists() for found in (module, f"{module}.py", moved)), line
+        assert any((ROOT / found).exists() for found in (module, f"{module}.py")), line
     elif words[0] not in ("--help", "--version"):
         check_verb(words)
 
@@ -217,7 +210,7 @@ def check_verb(words: list[str]) -> None:
         main([verb, "--help"])
     options = {word.partition("=")[0] for word in words if word.startswith("--")}
     known = printed.getvalue()
-    unknown = [o for o in options if o not in known and RENAMED.get(o, o) not in known]
+    unknown = [option for option in options if option not in known]
     if verb != "param":
         assert unknown == []
     if verb in ("fly", "sitl") and len(words) > 1 and not words[1].startswith("-"):
@@ -234,6 +227,6 @@ def test_the_page_of_the_command_line_names_every_option_of_a_flight() -> None:
         with contextlib.redirect_stdout(printed), contextlib.suppress(SystemExit):
             main([verb, "--help"])
         rows = [row for row in table.splitlines()[2:] if verb in row.split("|")[2]]
-        named_here = {RENAMED.get(o, o) for row in rows for o in OPTION.findall(row.split("|")[1])}
-        given = {RENAMED.get(o, o) for o in OPTION.findall(printed.getvalue())} - {"--help"}
+        named_here = {option for row in rows for option in OPTION.findall(row.split("|")[1])}
+        given = set(OPTION.findall(printed.getvalue())) - {"--help"}
         assert named_here == given, verb

@@ -51,7 +51,7 @@ def estimate_of(
     q_arm: Vec2 = (0.0, 0.0),
     qd_arm: Vec2 = (0.0, 0.0),
 ) -> StateEstimate:
-    """An estimate with this attitude, otherwise at rest unless said."""
+    """An estimate with this attitude, otherwise at rest by default."""
     yaw = float(rotation.as_euler("ZYX")[0])
     return StateEstimate(0, p_WB, v_WB, mat3(rotation), w_WB_B, yaw, q_arm, qd_arm)
 

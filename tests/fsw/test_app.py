@@ -32,7 +32,7 @@ class NoPlanner:
     """Never asked."""
 
     def plan(self, request: PlanRequest) -> Plan | PlanFailure:
-        raise AssertionError("nobody asks")
+        raise AssertionError("not expected to be called")
 
 
 def standing(state: int, inputs: TickInputs) -> tuple[int, TickOutputs]:
@@ -68,15 +68,15 @@ def test_a_simulator_that_never_answers_ends_the_wait(
     options: FswOptions, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert app.run(options, load) == app.COULD_NOT_START
-    said = capsys.readouterr().err
-    assert said == f"fsw: no simulator answered at {options.sim} within 0.4 s\n"
+    reported = capsys.readouterr().err
+    assert reported == f"fsw: no simulator answered at {options.sim} within 0.4 s\n"
 
 
 def test_nobody_at_the_simulators_port_is_the_same(
     options: FswOptions, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    nobody = replace(options, sim="udp:127.0.0.1:9")
-    assert app.run(nobody, load) == app.COULD_NOT_START
+    silent = replace(options, sim="udp:127.0.0.1:9")
+    assert app.run(silent, load) == app.COULD_NOT_START
     assert "no simulator answered at udp:127.0.0.1:9" in capsys.readouterr().err
 
 
@@ -108,9 +108,9 @@ def test_kept_parameters_are_taken_over_and_what_is_of_no_use_is_said(
     file = tmp_path / "vehicle.params"
     file.write_text("PID_YAW_P 5\nOF_ANOTHER_AGE 1\n")
     assert app.run(replace(options, params=file), load) == app.COULD_NOT_START
-    said = "".join(capsys.readouterr())
-    assert f"fsw: {file}, line 2 is passed over: OF_ANOTHER_AGE is unknown\n" in said
-    assert f"fsw: parameters from {file}, 1 of them not the default\n" in said
+    reported = "".join(capsys.readouterr())
+    assert f"fsw: {file}, line 2 is passed over: OF_ANOTHER_AGE is unknown\n" in reported
+    assert f"fsw: parameters from {file}, 1 of them not the default\n" in reported
     record = parameter_file(Path(str(options.out)) / "parameters.params").values
     assert record["PID_YAW_P"] == 5.0
     assert len(record) == len(PARAMETERS)

@@ -50,10 +50,10 @@ def test_the_definition_is_printed(tmp_path: Path) -> None:
 
 
 def test_pymavlink_makes_a_dialect_of_what_is_installed(tmp_path: Path) -> None:
-    said = pandion("dialect", "install", "--to", "definitions", cwd=tmp_path)
-    assert said.returncode == 0
+    reported = pandion("dialect", "install", "--to", "definitions", cwd=tmp_path)
+    assert reported.returncode == 0
     folder = tmp_path / "definitions"
-    assert f"MDEF={folder} mavproxy.py --dialect=pandion" in said.stdout
+    assert f"MDEF={folder} mavproxy.py --dialect=pandion" in reported.stdout
     # mavutil would write into the installed pymavlink; mavgen is what it calls.
     made = tmp_path / "pandion.py"
     mavgen = [sys.executable, "-m", "pymavlink.tools.mavgen", "--wire-protocol=2.0"]

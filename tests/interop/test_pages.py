@@ -25,7 +25,7 @@ def test_the_program_on_the_page_runs(vehicle: Vehicle, tmp_path: Path, code: st
     assert "127.0.0.1:14540" in code
     program = tmp_path / "program.py"
     program.write_text(code.replace("14540", str(vehicle.api_port)), encoding="utf-8")
-    said = subprocess.run(
+    reported = subprocess.run(
         [sys.executable, str(program)], capture_output=True, text=True, timeout=120.0
     )
-    assert said.returncode == 0, said.stdout[-1000:] + said.stderr[-1000:]
+    assert reported.returncode == 0, reported.stdout[-1000:] + reported.stderr[-1000:]

@@ -24,7 +24,7 @@ from pandion import param
 from pandion.param_vehicle import NoAnswer, ParameterClient
 from tests.cli.command import clean_up, start
 from tests.parameters_on_the_wire import LISTED
-from tests.processes.halves import free_port
+from tests.processes.both_processes import free_port
 
 DEFAULTS = LISTED
 
@@ -98,9 +98,9 @@ def test_mavproxy_s_reader_loads_a_file_into_the_vehicle(
     file.write_text("PID_YAW_D 4.500000\nLND_SPEED 0.300000\n")
     known = MAVParmDict()
     known.update(downloaded(mavlink))
-    with contextlib.redirect_stdout(io.StringIO()) as said:
+    with contextlib.redirect_stdout(io.StringIO()) as reported:
         assert known.load(str(file), mav=mavlink)
-    assert "changed 2" in said.getvalue()
+    assert "changed 2" in reported.getvalue()
     assert downloaded(mavlink)["LND_SPEED"] == pytest.approx(0.3)
 
 
@@ -132,24 +132,26 @@ def test_mavsdk_lists_everything_within_a_second_and_is_told_the_truth(ground: G
 def test_the_command_line_lists_sets_exports_and_imports(
     ground: Ground, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    def said(*arguments: str, code: int = 0) -> tuple[str, str]:
+    def output_of(*arguments: str, code: int = 0) -> tuple[str, str]:
         assert param.main([*arguments, f"--vehicle=udp:127.0.0.1:{ground.port}"]) == code
         output = capsys.readouterr()
         return output.out, output.err
 
-    entries = {entry["name"]: entry for entry in json.loads(said("list", "trk_*", "--json")[0])}
+    entries = {
+        entry["name"]: entry for entry in json.loads(output_of("list", "trk_*", "--json")[0])
+    }
     assert set(entries) == {name for name in DEFAULTS if name.startswith("TRK_")}
     assert entries["TRK_EFFORT"]["max"] == BY_NAME["TRK_EFFORT"].most
-    _, error = said("set", "TRK_EFFORT", "1e9", code=1)
+    _, error = output_of("set", "TRK_EFFORT", "1e9", code=1)
     assert error.startswith("pandion param: TRK_EFFORT is to be ")
     assert error.count("\n") == 1
-    assert said("set", "TRK_EFFORT", "0.2")[0] == "TRK_EFFORT is 0.2\n"
+    assert output_of("set", "TRK_EFFORT", "0.2")[0] == "TRK_EFFORT is 0.2\n"
     file = tmp_path / "out.parm"
-    said("export", str(file))
+    output_of("export", str(file))
     assert load(file).values["TRK_EFFORT"] == 0.2
     file.write_text("TRK_EFFORT 0.12\nPLN_W_YAW 0.06\nGONE 1\n")
-    told, error = said("import", str(file))
-    assert told == "2 parameters read, 2 changed, 0 refused\n"
+    received, error = output_of("import", str(file))
+    assert received == "2 parameters read, 2 changed, 0 refused\n"
     assert "GONE is unknown" in error
     assert "TRK_EFFORT" not in load(ground.params).values, "the default again needs no keeping"
     assert "PLN_W_YAW" in load(ground.params).values
@@ -162,14 +164,14 @@ def test_a_value_changed_on_one_link_is_told_to_every_client(mavlink: Any, groun
     mavlink.mav.param_set_send(1, 1, b"LND_T_STILL", 0.6, 9)
     for link in (mavlink, other):
         for name in ("LND_T_STILL", "COM_DISARM_LAND"):  # which repeats it
-            told = link.recv_match(type="PARAM_VALUE", blocking=True, timeout=2.0)
-            assert (told.param_id, told.param_value) == (name, pytest.approx(0.6))
+            received = link.recv_match(type="PARAM_VALUE", blocking=True, timeout=2.0)
+            assert (received.param_id, received.param_value) == (name, pytest.approx(0.6))
     other.close()
 
 
 def test_a_vehicle_that_is_not_there_is_one_sentence() -> None:
     with (
-        ParameterClient(("127.0.0.1", free_port()), patience_s=0.05) as nobody,
+        ParameterClient(("127.0.0.1", free_port()), patience_s=0.05) as client,
         pytest.raises(NoAnswer, match=r"nothing came from the vehicle at udp:127\.0\.0\.1:"),
     ):
-        nobody.read_all()
+        client.read_all()

@@ -49,8 +49,8 @@ def ftp(station: Station, opcode: int, data: bytes = b"", session: int = 0) -> t
         f"FTP {opcode} {data!r}", send, lambda m: m.get_type() == "FILE_TRANSFER_PROTOCOL"
     )
     packed = bytes(answer.payload)
-    _, session, said, size, *_ = HEADER.unpack_from(packed)
-    return said, session, packed[HEADER.size : HEADER.size + size]
+    _, session, reported, size, *_ = HEADER.unpack_from(packed)
+    return reported, session, packed[HEADER.size : HEADER.size + size]
 
 
 def download(station: Station, path: str) -> bytes:
@@ -142,8 +142,8 @@ def test_its_logs(station: Station) -> None:
         lambda: station.mav.log_request_list_send(1, 1, 0, 0xFFFF),
         lambda m: m.get_type() == "LOG_ENTRY" and m.id == m.last_log_num,
     )
-    said, _, data = ftp(station, CREATE, b"/new")
-    assert (said, data) == (129, b"\x09")
+    reported, _, data = ftp(station, CREATE, b"/new")
+    assert (reported, data) == (129, b"\x09")
 
 
 @pytest.mark.parametrize("integers", [False, True], ids=["COMMAND_LONG", "COMMAND_INT"])
@@ -178,11 +178,11 @@ def test_pymavlink_s_tools_read_the_telemetry_log(
     vehicle: Vehicle, station: Station, tool: str, options: list[str], shows: str
 ) -> None:
     log = str(vehicle.out / "flight.tlog")
-    said = subprocess.run(
+    reported = subprocess.run(
         [sys.executable, "-m", f"pymavlink.tools.{tool}", *options, log],
         env={"MAVLINK20": "1"},
         capture_output=True,
         text=True,
         check=True,
     )
-    assert re.search(shows, said.stdout), said.stdout[-500:] + said.stderr
+    assert re.search(shows, reported.stdout), reported.stdout[-500:] + reported.stderr

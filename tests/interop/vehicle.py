@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tests.cli.command import PANDION, environment
-from tests.processes.halves import free_port
+from tests.processes.both_processes import free_port
 
 # The client's clock is the wall's, the vehicle's is the simulator's and four times as fast. A busy
 # machine makes it slow, where real time would make it late.
@@ -46,7 +46,7 @@ def standing_vehicle(folder: Path, *pacing: str) -> Iterator[Vehicle]:
         *pacing: Options such as ``--realtime``.
     """
     vehicle = Vehicle(free_port(), free_port(), folder / "present")
-    said = folder / "said.txt"
+    reported = folder / "said.txt"
     command = [
         *(*PANDION, "fly", "ground", *pacing),
         f"--gcs=udp:127.0.0.1:{vehicle.gcs_port}",
@@ -55,14 +55,14 @@ def standing_vehicle(folder: Path, *pacing: str) -> Iterator[Vehicle]:
         f"--params={folder / 'vehicle.params'}",
         f"--out={vehicle.out}",
     ]
-    with said.open("wb") as output:
+    with reported.open("wb") as output:
         process = subprocess.Popen(
             command, env=environment(), stdout=output, stderr=subprocess.STDOUT
         )
     try:
-        _wait_for_heartbeat(vehicle, process, said)
+        _wait_for_heartbeat(vehicle, process, reported)
         yield vehicle
-        assert process.poll() is None, said.read_text()
+        assert process.poll() is None, reported.read_text()
     finally:
         process.send_signal(signal.SIGINT)
         try:
@@ -73,14 +73,14 @@ def standing_vehicle(folder: Path, *pacing: str) -> Iterator[Vehicle]:
             raise
 
 
-def _wait_for_heartbeat(vehicle: Vehicle, process: subprocess.Popen[bytes], said: Path) -> None:
+def _wait_for_heartbeat(vehicle: Vehicle, process: subprocess.Popen[bytes], reported: Path) -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as station:
         station.bind(("127.0.0.1", vehicle.gcs_port))
         station.settimeout(0.2)
         until = time.monotonic() + START_S
         while time.monotonic() < until:
-            assert process.poll() is None, said.read_text()
+            assert process.poll() is None, reported.read_text()
             with contextlib.suppress(TimeoutError):
                 station.recv(2048)
                 return
-    raise AssertionError(f"no telemetry within {START_S:g} s: {said.read_text()}")
+    raise AssertionError(f"no telemetry within {START_S:g} s: {reported.read_text()}")

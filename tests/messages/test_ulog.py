@@ -91,8 +91,8 @@ def test_our_reader_reads_the_same(tmp_path: Path) -> None:
     assert log.parameters["airframe.mass"] == 3.5
     records = list(log.records())
     data = [record for record in records if record.kind == ulog.DATA]
-    said = [text for one in records if (text := ulog.said(one.kind, one.body)) is not None]
-    assert said == [(4, 1_000_500, "beware"), (3, 1_000_600, "it died")]
+    reported = [text for one in records if (text := ulog.text_of(one.kind, one.body)) is not None]
+    assert reported == [(4, 1_000_500, "beware"), (3, 1_000_600, "it died")]
     topic = log.topics[3]
     assert columns(topic) == (
         "timestamp", "a_bool", "small", "large", "real", "three[0]", "three[1]", "three[2]",

@@ -26,5 +26,9 @@ def machine_code(kernel: Callable[..., Any], *example: Any) -> Callable[..., Any
     return kernel
 
 
+def of_fixed_types(kernel: Callable[..., Any]) -> Callable[..., Any]:
+    return kernel
+
+
 def packed(numbers: Any) -> list[Any]:
     return [numbers]

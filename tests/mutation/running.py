@@ -50,20 +50,19 @@ class Copy:
             found += [self._name(file) for file in files if file.name != "__init__.py"]
         return found
 
-    def tests_of(self, module: str, extra: dict[str, list[str]]) -> list[str]:
-        """The test files of a module, its mirror first."""
+    def tests_of(self, module: str, extra: dict[str, list[str]]) -> list[list[str]]:
+        """The test files of a module, the nearest first: most mutants fall there.
+
+        Its mirror and what imports it; the others of the mirror's folder; what is declared.
+        """
         folder, _, name = module.rpartition("/")
-        found = [
-            test
-            for path in sorted((self.path / "tests/fsw").rglob("test_*.py"))
-            if module in self.imported(test := self._name(path))
-        ]
-        # The nearest first: most mutants fall there, and the rest need not be run.
-        mirror = f"tests/{folder}/test_{name}"
-        found.sort(key=lambda test: (test != mirror, not test.startswith(f"tests/{folder}/")))
-        for prefix, tests in extra.items():
-            found += tests if module.startswith(prefix) else []
-        return list(dict.fromkeys(found))
+        every = [self._name(path) for path in sorted((self.path / "tests/fsw").rglob("test_*.py"))]
+        near = [test for test in every if module in self.imported(test)]
+        near.sort(key=lambda test: not test.endswith(f"/test_{name}"))
+        beside = [test for test in every if test.startswith(f"tests/{folder}/test_")]
+        declared = [test for prefix, tests in extra.items() if module.startswith(prefix)
+                    for test in tests]  # fmt: skip
+        return [near, [test for test in beside if test not in near], declared]
 
     @cache  # noqa: B019 — there is one copy a run
     def imported(self, file: str) -> frozenset[str]:
@@ -126,19 +125,19 @@ class Tests:
         self._kept = work / "baseline.json"
         self._baseline = json.loads(self._kept.read_text()) if self._kept.is_file() else {}
 
-    def select(self, files: list[str]) -> Selection:
-        """Of some test files, the tests that pass in time where nothing is changed."""
+    def select(self, files: list[list[str]]) -> Selection:
+        """Of some test files, nearest first, the tests that pass in time if nothing is changed."""
         left_out: list[str] = []
-        fit: list[tuple[bool, float, str, str]] = []
-        for file in files:
-            base = self._without_mutant(file)
-            left_out += base["failed"]
-            is_unit = file.startswith("tests/fsw/")
-            fit += [
-                (not is_unit, seconds, name, file)
-                for name, seconds in base["seconds"].items()
-                if name not in base["failed"]
-            ]
+        fit: list[tuple[int, float, str, str]] = []
+        for rank, group in enumerate(files):
+            for file in group:
+                base = self._without_mutant(file)
+                left_out += base["failed"]
+                fit += [
+                    (rank, seconds, name, file)
+                    for name, seconds in base["seconds"].items()
+                    if name not in base["failed"]
+                ]
         total, used = 0.0, set()
         for _, seconds, name, file in sorted(fit):
             if total + seconds <= self._budget:
@@ -146,7 +145,7 @@ class Tests:
                 used.add(file)
             else:
                 left_out.append(name)
-        kept = [file for file in files if file in used]
+        kept = [file for group in files for file in group if file in used]
         helpers = [name for file in kept for name in self._copy.helpers(file)]
         return Selection(kept, left_out, total, self._copy.digest(*kept, *helpers))
 

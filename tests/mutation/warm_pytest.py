@@ -43,7 +43,7 @@ for library in (
         __import__(library)
 
 
-_PR_SET_PDEATHSIG = 1  # prctl(2): whoever stops the run stops the test it is at
+_PR_SET_PDEATHSIG = 1  # prctl(2): a stopped run stops its current test
 
 
 class _Recorder:

@@ -7,7 +7,7 @@ import socket
 from pathlib import Path
 
 from messages.frames import FrameWriter, split
-from tests.processes.halves import Half
+from tests.processes.both_processes import SystemProcess
 
 HEARTBEAT, COMMAND_LONG, COMMAND_ACK, STATUSTEXT = 0, 76, 77, 253
 SET_MODE, TRAJECTORY, HOLD = 176, 4 << 16 | 11 << 24, 4 << 16 | 3 << 24
@@ -20,11 +20,13 @@ def test_the_verdict_says_that_the_trajectory_was_left_and_for_what(tmp_path: Pa
     station.settimeout(60.0)
     writer = FrameWriter(255, 190)
     modes, acks = [], []
-    with Half("sitl", "walls-calm", "--listen", "udp:127.0.0.1:0", "--duration", "6") as sitl:
+    with SystemProcess(
+        "sitl", "walls-calm", "--listen", "udp:127.0.0.1:0", "--duration", "6"
+    ) as sitl:
         sim = f"udp:127.0.0.1:{sitl.wait_for('listening')['port']}"
         gcs = f"udp:127.0.0.1:{station.getsockname()[1]}"
         out = ("--api", "none", "--out", str(tmp_path / "out"))
-        with Half("fsw", "--sim", sim, "--gcs", gcs, *out) as fsw:
+        with SystemProcess("fsw", "--sim", sim, "--gcs", gcs, *out) as fsw:
             while not (TRAJECTORY in modes and modes[-1] == HOLD):
                 datagram, vehicle = station.recvfrom(4096)
                 for frame in split(datagram):

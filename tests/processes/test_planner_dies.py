@@ -7,13 +7,12 @@ import json
 import os
 import signal
 import socket
-import time
 from pathlib import Path
 
 import pytest
 
 from messages import dialect
-from tests.processes.halves import Half
+from tests.processes.both_processes import SystemProcess
 from tests.waiting import wait_for
 
 STATUSTEXT = 253
@@ -26,65 +25,72 @@ def children(process: int) -> list[int]:
 
 
 def texts(ground: socket.socket) -> list[str]:
-    """What the vehicle has said so far."""
-    parser, said = dialect.MAVLink(None), []
+    """Status texts of the vehicle so far."""
+    parser, reported = dialect.MAVLink(None), []
     parser.robust_parsing = True
     ground.setblocking(False)
     while True:
         try:
             datagram = ground.recv(4096)
         except BlockingIOError:
-            return said
+            return reported
         for message in parser.parse_buffer(datagram) or []:
             if message.get_type() == "STATUSTEXT":
-                said.append(message.text)
+                reported.append(message.text)
 
 
-def planner_of(fsw: int) -> tuple[int, int]:
-    """The nursery and the worker in it, once both are there."""
+def planner_of(fsw: int, instead_of: int | None = None) -> tuple[int, int]:
+    """The fork server and its worker, once a worker that is not ``instead_of`` is there."""
 
-    def both() -> tuple[int, int] | None:
+    def found() -> tuple[int, int] | None:
         with contextlib.suppress(ValueError, FileNotFoundError):
-            (nursery,) = children(fsw)
-            (worker,) = children(nursery)
-            return nursery, worker
+            (server,) = children(fsw)
+            (worker,) = children(server)
+            return None if worker == instead_of else (server, worker)
         return None
 
-    found = wait_for(both, "a planner's processes")
-    assert found is not None
-    return found
+    both = wait_for(found, "a planner")
+    assert both is not None
+    return both
+
+
+def fly_until(t_s: float, sitl: SystemProcess) -> None:
+    """Wait for simulated time."""
+    while sitl.wait_for("progress")["t_s"] < t_s:
+        pass
 
 
 def test_killing_the_planner_costs_no_barrier(tmp_path: Path) -> None:
-    """The worker first, which its nursery replaces; later the nursery with the new worker in it."""
+    """The worker first, which the fork server replaces; later the fork server with its worker."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as ground:
         ground.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 22)
         ground.bind(("127.0.0.1", 0))
         flight = ("walls", "--realtime", "--seed", "2", "--duration", "6")
-        with Half("sitl", *flight, "--listen", "udp:127.0.0.1:0") as sitl:
+        with SystemProcess("sitl", *flight, "--listen", "udp:127.0.0.1:0") as sitl:
             port = sitl.wait_for("listening")["port"]
             addresses = ("--sim", f"udp:127.0.0.1:{port}")
             telemetry = ("--gcs", f"udp:127.0.0.1:{ground.getsockname()[1]}")
-            with Half("fsw", *addresses, *telemetry, "--out", str(tmp_path), "--wait", "90") as fsw:
+            with SystemProcess(
+                "fsw", *addresses, *telemetry, "--out", str(tmp_path), "--wait", "90"
+            ) as fsw:
                 sitl.wait_for("flying", patience_s=120.0)
-                time.sleep(1.0)  # some of the flight
-                nursery, first = planner_of(fsw.process.pid)
+                fly_until(2.0, sitl)
+                server, first = planner_of(fsw.process.pid)
                 os.kill(first, signal.SIGKILL)
-                wait_for(lambda: planner_of(fsw.process.pid)[1] != first, "another worker")
-                same, second = planner_of(fsw.process.pid)
-                assert same == nursery
-                time.sleep(1.0)  # some of the flight with it
-                os.kill(nursery, signal.SIGKILL)
+                fly_until(3.5, sitl)
+                same, second = planner_of(fsw.process.pid, instead_of=first)
+                assert same == server
+                os.kill(server, signal.SIGKILL)
                 ended = sitl.wait_for("ended", patience_s=30.0)
                 assert fsw.finish() == 0
-        said = texts(ground)
+        reported = texts(ground)
     result, vehicle = ended["result"], json.loads((tmp_path / "fsw.json").read_text())
     assert result["completed"], result["end_reason"]
     assert min(result["margins_m"].values()) >= 0.0
     assert vehicle["mpc"]["restarts"] == 2
     assert vehicle["mpc"]["cycles"] > 40, "planned on with the new one"
     for what in ("planner process died", "planner processes died"):
-        assert any(what in text for text in said), said
-    for process in (nursery, first, second):
+        assert any(what in text for text in reported), reported
+    for process in (server, first, second):
         with pytest.raises(ProcessLookupError):
             os.kill(process, 0)

@@ -1,4 +1,4 @@
-"""Both halves as processes over real UDP: what is on the wire, and what a bad network changes."""
+"""Both processes over real UDP: what is on the wire, and what a bad network changes."""
 
 from __future__ import annotations
 
@@ -12,7 +12,13 @@ from pathlib import Path
 import pytest
 
 from messages import dialect
-from tests.processes.halves import Capture, Half, Misbehaviour, fly_through, free_port
+from tests.processes.both_processes import (
+    Capture,
+    Misbehaviour,
+    SystemProcess,
+    fly_through,
+    free_port,
+)
 
 FLIGHT = ("--duration", "1.6", "--seed", "3")
 
@@ -79,13 +85,15 @@ def test_neither_a_bad_network_nor_speed_changes_the_flight(clean: Capture, tmp_
 
 def test_a_stall_of_one_half_ends_the_other_naming_the_step(tmp_path: Path) -> None:
     arguments = ("--listen", "udp:127.0.0.1:0", "--speed", "1", "--duration", "60")
-    with contextlib.ExitStack() as halves:
+    with contextlib.ExitStack() as processes:
         pairs = []
         for stalled in ("fsw", "sitl"):
-            sitl = halves.enter_context(Half("sitl", "walls-calm", *arguments))
+            sitl = processes.enter_context(SystemProcess("sitl", "walls-calm", *arguments))
             sim = f"udp:127.0.0.1:{sitl.wait_for('listening')['port']}"
             gcs, out = f"udp:127.0.0.1:{free_port()}", str(tmp_path / stalled)
-            fsw = halves.enter_context(Half("fsw", "--sim", sim, "--gcs", gcs, "--out", out))
+            fsw = processes.enter_context(
+                SystemProcess("fsw", "--sim", sim, "--gcs", gcs, "--out", out)
+            )
             pairs.append((fsw, sitl) if stalled == "fsw" else (sitl, fsw))
         for pair in pairs:
             next(half for half in pair if half.name == "sitl").wait_for("progress")
@@ -101,7 +109,7 @@ def test_a_stall_of_one_half_ends_the_other_naming_the_step(tmp_path: Path) -> N
 
 
 def test_an_interrupt_ends_a_simulator_that_waits() -> None:
-    with Half("sitl", "--listen", "udp:127.0.0.1:0") as sitl:
+    with SystemProcess("sitl", "--listen", "udp:127.0.0.1:0") as sitl:
         sitl.wait_for("ready")
         begin = time.monotonic()
         sitl.signal(signal.SIGINT)

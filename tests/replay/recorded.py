@@ -31,7 +31,7 @@ class Recorded(Flight):
 
 
 def flight(seconds: float) -> list[tuple[TickInputs, TickOutputs]]:
-    """Walls, a trajectory, plans, a command nobody supports, and the way down."""
+    """Walls, a trajectory, plans, an unsupported command, and the way down."""
     flight = Recorded(load_scenario("walls"), seed=5)
     flight.follow()
     flight.run(seconds / 2)

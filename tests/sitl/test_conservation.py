@@ -1,4 +1,4 @@
-"""Energy and momentum of free motion, weighed by Pinocchio."""
+"""Energy and momentum of free motion, computed by Pinocchio."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the scenario's pilot says, and when it gives up."""
+"""Messages of the scenario's pilot, and when it gives up."""
 
 from __future__ import annotations
 
@@ -19,9 +19,7 @@ from sitl.link.pilot import (
 )
 from sitl.link.pilot_messages import (
     Ack,
-    AnnounceObstacle,
-    AnnounceWall,
-    AnnounceWorkspace,
+    Announce,
     Heard,
     PilotMessage,
     SendCommand,
@@ -58,7 +56,7 @@ class Flight:
     plan: FlightPlan
     results: dict[int, int]
     state: PilotState = field(init=False)
-    said: list[tuple[int, PilotMessage]] = field(default_factory=list)
+    reported: list[tuple[int, PilotMessage]] = field(default_factory=list)
     t_us: int = START_US
     heard: Heard = field(default_factory=Heard)
 
@@ -69,7 +67,7 @@ class Flight:
         for _ in range(round(seconds * 1e6 / STEP_US)):
             self.state, messages = speak(self.plan, self.state, self.t_us)
             assert len(messages) <= MESSAGES_PER_STEP
-            self.said += [(self.t_us, message) for message in messages]
+            self.reported += [(self.t_us, message) for message in messages]
             acks = tuple(
                 Ack(message.command, self.results[message.command])
                 for message in messages
@@ -80,18 +78,18 @@ class Flight:
             self.t_us += STEP_US
 
     def commands(self) -> list[tuple[int, int]]:
-        return [(t, m.command) for t, m in self.said if isinstance(m, SendCommand)]
+        return [(t, m.command) for t, m in self.reported if isinstance(m, SendCommand)]
 
     def targets(self) -> list[tuple[int, SendTarget]]:
-        return [(t, m) for t, m in self.said if isinstance(m, SendTarget)]
+        return [(t, m) for t, m in self.reported if isinstance(m, SendTarget)]
 
 
 def test_the_safe_set_is_announced_first() -> None:
     flight = Flight(plan(walls=WALLS, workspace=Workspace(0.1, 0.2)), {ARM: 0, MODE: 0})
     flight.fly(0.01)
     first = [message for _, message in flight.said[:4]]
-    assert [m.index for m in first if isinstance(m, AnnounceWall)] == [0, 1, 2]
-    assert isinstance(first[3], AnnounceWorkspace)
+    assert [m.index for m in first if isinstance(m, Announce)] == [0, 1, 2]
+    assert isinstance(first[3], Workspace)
     assert flight.said[3][0] == START_US
 
 
@@ -100,10 +98,10 @@ def test_walls_and_points_are_announced_as_one_set() -> None:
     flight = Flight(plan(walls=WALLS, obstacles=(branch,)), {ARM: 0, MODE: 0})
     flight.fly(0.01)
     first = [message for _, message in flight.said[:4]]
-    assert [(m.index, m.count) for m in first if isinstance(m, AnnounceWall)] == [
-        (0, 4), (1, 4), (2, 4),
+    assert [(m.index, m.count) for m in first if isinstance(m, Announce)] == [
+        (0, 4), (1, 4), (2, 4), (3, 4),
     ]  # fmt: skip
-    assert first[3] == AnnounceObstacle(branch, 3, 4)
+    assert first[3] == Announce(branch, 3, 4)
 
 
 def test_targets_arrive_a_second_and_a_half_ahead_without_gaps() -> None:
@@ -182,13 +180,13 @@ def test_a_hop_takes_off_hovers_lands_and_is_done_when_disarmed() -> None:
 def test_plan_none_leaves_the_flying_to_others() -> None:
     flight = Flight(plan("none", walls=WALLS), {})
     flight.fly(2.0)
-    assert all(isinstance(message, AnnounceWall) for _, message in flight.said)
+    assert all(isinstance(message, Announce) for _, message in flight.said)
 
 
 def test_walls_are_announced_again_every_second_for_a_datagram_may_be_lost() -> None:
     flight = Flight(plan("none", walls=WALLS), {})
     flight.fly(2.0)
-    times = [t_us for t_us, _ in flight.said]
+    times = [t_us for t_us, _ in flight.reported]
     assert times == [1_000_000] * len(WALLS) + [2_000_000] * len(WALLS)
 
 

@@ -75,7 +75,7 @@ def test_the_papers_cases_are_there() -> None:
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "said"),
+    ("old", "new", "reported"),
     [
         ("duration_s = 10.0", "duratoin_s = 10.0", ['"duratoin_s"', '"duration_s"', "10.0"]),
         ("duration_s = 10.0", "duration_s = -1", ["duration_s = -1", "0.1 to 86400"]),
@@ -97,15 +97,15 @@ def test_the_papers_cases_are_there() -> None:
     ],
 )
 def test_a_wrong_line_is_refused_with_key_value_and_what_is_allowed(
-    old: str, new: str, said: list[str]
+    old: str, new: str, reported: list[str]
 ) -> None:
     with pytest.raises(ScenarioError) as refusal:
         Simulation(parse_scenario(BASE.replace(old, new, 1), "test"), 0)
-    assert all(part in str(refusal.value) for part in said), str(refusal.value)
+    assert all(part in str(refusal.value) for part in reported), str(refusal.value)
 
 
 @pytest.mark.parametrize(
-    ("extra", "said"),
+    ("extra", "reported"),
     [
         (WALL.replace("-1.0, 0.0, 0.0", "-1.0, 0.5, 0.0"), ["walls[0].normal", "1.118"]),
         (WALL.replace("clearance_m", "clearence_m"), ['"walls[0].clearence_m"', '"clearance_m"']),
@@ -128,12 +128,12 @@ def test_a_wrong_line_is_refused_with_key_value_and_what_is_allowed(
         ('name = "x"', ['unknown key "name"']),
     ],
 )
-def test_a_wrong_addition_is_refused(extra: str, said: list[str]) -> None:
+def test_a_wrong_addition_is_refused(extra: str, reported: list[str]) -> None:
     # Bare keys belong before the first table.
     text = BASE + extra if extra.lstrip().startswith("[") else extra + BASE
     with pytest.raises(ScenarioError) as refusal:
         Simulation(parse_scenario(text, "test"), 0)
-    assert all(part in str(refusal.value) for part in said), str(refusal.value)
+    assert all(part in str(refusal.value) for part in reported), str(refusal.value)
 
 
 def test_an_unknown_scenario_names_the_nearest_and_all() -> None:

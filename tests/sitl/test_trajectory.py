@@ -10,7 +10,7 @@ from numba import njit
 
 from sitl.scenario import Hold
 from sitl.scenario_file import load_scenario, scenario_names
-from sitl.trajectory import HoldReference, curve_row, place_on_curve, reference, warped
+from sitl.trajectory import curve_row, place_on_curve, reference, warped
 
 STEP = 1e-4
 
@@ -68,6 +68,6 @@ def test_the_walls_path_enters_each_safety_zone_by_30_mm_and_stays_slow() -> Non
 
 
 def test_a_held_point_never_moves() -> None:
-    point = HoldReference(Hold((1.0, 2.0, -3.0))).at(17.0)
+    point = reference(Hold((1.0, 2.0, -3.0))).at(17.0)
     assert point.p == (1.0, 2.0, -3.0)
     assert point.v == point.a == (0.0, 0.0, 0.0)

@@ -33,11 +33,11 @@ def test_equal_jobs_are_flown_once_and_answered_each(monkeypatch: pytest.MonkeyP
         return Outcome(job.seed, completed=True, reason="")
 
     monkeypatch.setattr(campaign_module, "outcome", count)
-    told: list[tuple[int, int]] = []
-    rows = Campaign(0, report=lambda done, total: told.append((done, total))).run(JOBS)
+    received: list[tuple[int, int]] = []
+    rows = Campaign(0, report=lambda done, total: received.append((done, total))).run(JOBS)
     assert flown == [1, 2]
     assert [row.seed for row in rows] == [1, 2, 1]
-    assert told == [(0, 2), (1, 2), (2, 2)]
+    assert received == [(0, 2), (1, 2), (2, 2)]
 
 
 def test_a_journal_resumes_and_survives_a_line_cut_short(
@@ -93,9 +93,9 @@ def test_an_interrupt_ends_the_campaign_and_its_processes_at_once(tmp_path: Path
             assert process.poll() is None
         time.sleep(1.0)
         os.killpg(process.pid, signal.SIGINT)
-        said, _ = process.communicate(timeout=20.0)
+        reported, _ = process.communicate(timeout=20.0)
     finally:
         with contextlib.suppress(ProcessLookupError):
             os.killpg(process.pid, signal.SIGKILL)
     assert process.returncode == 1
-    assert f"--out {tmp_path} resumes" in said
+    assert f"--out {tmp_path} resumes" in reported

@@ -7,18 +7,18 @@ from dataclasses import replace
 
 import pytest
 
+from fsw.control.control_metrics import ControlMetrics
 from fsw.parameters.flight_config import flight_config
-from fsw.runtime.effort import EffortRecord
 from fsw.signals import PlanInput
 from studies import closed_loop
 from studies.cases import configuration, scenario
-from studies.job import Job, fly, outcome
+from studies.job import Job, fly_job, outcome
 
 BRIEF = 2.0  # s
 
 
 def test_effort_and_smoothness_are_the_papers_sums_in_its_order() -> None:
-    record = EffortRecord()
+    record = ControlMetrics()
     inputs = [(1.0, 2.0, 3.0, 4.0, 5.0, 6.0), (1.0, 2.0, 0.0, 4.0, 9.0, 6.0)]
     for ax, ay, az, yaw, j1, j2 in inputs:
         record.add(PlanInput((ax, ay, az), yaw, (j1, j2)))
@@ -31,11 +31,11 @@ def test_effort_and_smoothness_are_the_papers_sums_in_its_order() -> None:
 def test_the_full_plant_flies_and_flies_the_same_again(case: str) -> None:
     flown = scenario("I" if case == "I" else "II", disturbed=True, duration_s=BRIEF)
     first, again = (
-        closed_loop.fly(flown, 5, flight_config(), traced=traced) for traced in (True, False)
+        closed_loop.simulate(flown, 5, flight_config(), traced=traced) for traced in (True, False)
     )
     assert first.truth.completed
     assert first.truth == again.truth
-    assert first.planner.effort.as_json() == again.planner.effort.as_json()
+    assert first.planner.metrics.as_json() == again.planner.metrics.as_json()
     assert (first.planner.plans, first.planner.failures) == (20, 0)
     assert len(first.planner.step_us) == 20
     # 20 steps of 2 ms between points; every margin in the trace is within the judged minimum.
@@ -52,7 +52,7 @@ def test_calm_air_is_one_flight_whatever_the_seed(plant: str) -> None:
     jobs = [Job(name, flown, configuration(name), seed) for seed in (100, 101)]
     assert not jobs[0].random
     assert jobs[0].key() == jobs[1].key()
-    truths = [fly(job).truth for job in jobs]
+    truths = [fly_job(job).truth for job in jobs]
     assert truths[0] == truths[1]
 
 

@@ -143,9 +143,9 @@ def test_a_slip_is_refused_in_one_sentence(
     with pytest.raises(SystemExit) as exit_code:
         reproduce.main(words)
     assert exit_code.value.code == 2
-    said = capsys.readouterr().err
-    assert reason in said
-    assert len(said.splitlines()) == 1
+    reported = capsys.readouterr().err
+    assert reason in reported
+    assert len(reported.splitlines()) == 1
 
 
 def test_the_command_writes_rows_page_and_a_verdict_on_the_seeds(
@@ -155,8 +155,8 @@ def test_the_command_writes_rows_page_and_a_verdict_on_the_seeds(
     words = ["smallest-sphere", "--plant", "double-integrator", "--seeds", "0:1"]
     words += ["--duration", "0.3", "--workers", "0", "--out", str(out), "--json", str(rows)]
     assert reproduce.main(words) == 0
-    said = capsys.readouterr().out
-    assert "used for tuning" in said
+    reported = capsys.readouterr().out
+    assert "used for tuning" in reported
     found = json.loads(rows.read_text())
     assert [row["radius_m"] for row in found][:2] == [0.075, 0.070]
     assert (out / "smallest-sphere.html").exists()

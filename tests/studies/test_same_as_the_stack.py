@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from studies.cases import configuration, scenario
-from studies.job import Job, fly
+from studies.job import Job, fly_job
 
 DURATION_S = 2.0
 SEED = 100
@@ -31,12 +31,12 @@ def test_in_process_and_over_the_wire_are_one_flight(tmp_path: Path) -> None:
         subprocess.run(command, check=True, capture_output=True, timeout=300)
     wire = json.loads(result.read_text())
     flown = scenario("II", disturbed=True, duration_s=DURATION_S)
-    here = fly(Job("full", flown, configuration("full"), SEED))
+    here = fly_job(Job("full", flown, configuration("full"), SEED))
     # The wire rounds to single precision: 1e-7 of a metre or so, and feedback keeps it there.
     truth = here.truth
     assert wire["min_margin_m"] == pytest.approx(truth.min_margin_m, abs=1e-5)
     assert wire["tracking_error_rms_m"] == pytest.approx(truth.tracking_error_rms_m, abs=1e-5)
-    assert wire["control_effort"]["sum"] == pytest.approx(here.planner.effort.effort, rel=1e-3)
+    assert wire["control_effort"]["sum"] == pytest.approx(here.planner.metrics.effort, rel=1e-3)
     assert wire["control_smoothness"]["sum"] == pytest.approx(
-        here.planner.effort.smoothness, rel=1e-3
+        here.planner.metrics.smoothness, rel=1e-3
     )

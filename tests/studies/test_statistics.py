@@ -28,5 +28,5 @@ def test_twenty_of_twenty_is_not_certainty() -> None:
 
 @pytest.mark.parametrize(("passed", "total"), [(0, 0), (3, 2), (-1, 5)])
 def test_what_is_no_count_is_refused(passed: int, total: int) -> None:
-    with pytest.raises(ValueError, match="no count"):
+    with pytest.raises(ValueError, match="not a valid count"):
         wilson(passed, total)

@@ -1,4 +1,4 @@
-"""What is asked of Linux, and what is said where it refuses."""
+"""Real-time requests to Linux, and the warnings where they are refused."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ import pytest
 from fsw.link.wire import encode_dialect
 from fsw.runtime import realtime
 from fsw.runtime.process import settle_memory
-from fsw.runtime.rates import RATE_GROUPS
+from fsw.runtime.rate_groups import RATE_GROUPS
 from messages.block_file import BlockFile
 from tests.fsw.link.snapshots import CONTEXT, outputs_at
 from tests.waiting import wait_for
@@ -157,7 +157,7 @@ def test_a_log_s_thread_leaves_its_rank_to_the_loop(tmp_path: Path) -> None:
 def test_every_group_s_timing_says_which_group_it_is() -> None:
     snapshot = outputs_at(2_000_000).snapshot
     for group in RATE_GROUPS:
-        encode = getattr(encode_dialect, f"{group.name}_timing")
+        encode = encode_dialect.loop_timing(group.number)
         values = encode(snapshot, CONTEXT)
         assert values[-1] == group.number
         assert values[4] == group.period_us

@@ -8,12 +8,12 @@ from itertools import pairwise
 
 import pytest
 
-from fsw.runtime.grid import Grid
-from fsw.runtime.missed import MissedReleases
-from fsw.runtime.releases import LEAD_US, MOST_STALE, GridReleases, Release
+from fsw.runtime.deadline_monitor import DeadlineMonitor
+from fsw.runtime.release_schedule import ReleaseSchedule
+from fsw.runtime.releases import LEAD_US, MAX_STALE_TICKS, Release, ScheduledReleases
 from tests.timing.virtual_time import FIRST_US, PERIOD_US, VirtualSensors, VirtualTime, frame
 
-LAID = 25  # the grid is laid by then
+SETTLED = 25  # the schedule has begun by then
 
 
 class Loop:
@@ -22,9 +22,9 @@ class Loop:
     def __init__(self, sensors: VirtualSensors, work_us: int = 150) -> None:
         self.time = sensors.time
         self.work_us: Callable[[int], int] = lambda tick: work_us
-        self.missed = MissedReleases()
-        self.releases = GridReleases(
-            sensors, self.time.clock, self.time.sleep, frame(FIRST_US), PERIOD_US, self.missed
+        self.deadlines = DeadlineMonitor()
+        self.releases = ScheduledReleases(
+            sensors, self.time.clock, self.time.sleep, frame(FIRST_US), PERIOD_US, self.deadlines
         )
         self.ticks: list[Release] = []
         self.nothing = 0
@@ -39,7 +39,7 @@ class Loop:
             else:
                 self.ticks.append(release)
                 self.time.work(self.work_us(len(self.ticks)))
-        noted = (round((last - first) / PERIOD_US) + 1 for first, last in self.missed.stretches)
+        noted = (round((last - first) / PERIOD_US) + 1 for first, last in self.deadlines.missed)
         # Every skipped release is noted once; a grid that follows a clock has other periods.
         assert sum(noted) == pytest.approx(self.releases.skipped, rel=0.001)
         return self.ticks[begin:]
@@ -56,16 +56,16 @@ def time() -> VirtualTime:
 
 def test_every_frame_has_its_tick_on_the_grid(time: VirtualTime) -> None:
     loop = Loop(VirtualSensors(time))
-    loop.run(LAID)
+    loop.run(SETTLED)
     ticks = loop.run(300)
-    assert stamps(ticks) == list(range(LAID + 1, LAID + 301))
+    assert stamps(ticks) == list(range(SETTLED + 1, SETTLED + 301))
     assert {tick.begun_us - tick.due_us for tick in ticks} == {0}
     assert all(b.due_us - a.due_us == PERIOD_US for a, b in pairwise(ticks))
     assert (loop.releases.skipped, loop.releases.stale, loop.nothing) == (0, 0, 0)
 
 
 @pytest.mark.parametrize("late_us", [LEAD_US + 100, 1_900])
-def test_a_late_frame_does_not_stop_the_tick_which_is_told_its_age(
+def test_a_late_frame_does_not_stop_the_tick_which_gets_its_age(
     time: VirtualTime, late_us: int
 ) -> None:
     loop = Loop(VirtualSensors(time, lambda step: late_us if step == 100 else 0))
@@ -82,7 +82,7 @@ def test_a_frame_that_is_less_late_than_the_lead_changes_nothing(time: VirtualTi
     assert loop.releases.stale == 0
 
 
-@pytest.mark.parametrize("lost", [1, 2, MOST_STALE])
+@pytest.mark.parametrize("lost", [1, 2, MAX_STALE_TICKS])
 def test_lost_frames_are_flown_through_on_the_last_readings(time: VirtualTime, lost: int) -> None:
     loop = Loop(VirtualSensors(time, lambda step: None if 100 <= step < 100 + lost else 0))
     ticks = loop.run(200)
@@ -96,8 +96,8 @@ def test_after_ten_milliseconds_without_sensors_nothing_is_commanded(time: Virtu
     silent = range(100, 150)
     loop = Loop(VirtualSensors(time, lambda step: None if step in silent else 0))
     ticks = loop.run(300)
-    assert loop.releases.stale == MOST_STALE
-    assert loop.nothing == len(silent) - MOST_STALE
+    assert loop.releases.stale == MAX_STALE_TICKS
+    assert loop.nothing == len(silent) - MAX_STALE_TICKS
     assert loop.releases.skipped == loop.nothing
     assert stamps(ticks)[98:106] == [99, 100, 101, 102, 103, 104, 150, 151]
 
@@ -112,7 +112,7 @@ def test_a_simulator_that_paused_and_catches_up_is_taken_at_its_newest_frame(
     ticks = loop.run(300)
     assert stamps(ticks)[:104] == list(range(1, 105))
     assert stamps(ticks)[104:] == list(range(140, 140 + len(ticks) - 104))
-    assert loop.releases.stale == MOST_STALE
+    assert loop.releases.stale == MAX_STALE_TICKS
 
 
 @pytest.mark.parametrize("pause_us", [80_000, 1_000_000, 3_000_000])
@@ -134,7 +134,7 @@ def test_a_tick_that_overruns_makes_the_next_late_and_shifts_nothing(
     time: VirtualTime, work_us: int, skipped: int
 ) -> None:
     loop = Loop(VirtualSensors(time))
-    loop.run(LAID)
+    loop.run(SETTLED)
     loop.work_us = lambda tick: work_us if tick == 100 else 150
     ticks = loop.run(200)
     before, after = ticks[:70], ticks[-70:]
@@ -186,33 +186,33 @@ def test_a_clock_that_jumps_back_is_waited_for_and_repeats_no_release(
     assert (loop.releases.skipped, loop.releases.stale, loop.nothing) == (0, 0, 0)
 
 
-def test_a_grid_whose_clock_jumps_back_goes_on_to_the_next_release() -> None:
-    grid = Grid(0.0, PERIOD_US)
-    grid.advance(10_100)
-    assert (grid.index, grid.due_us) == (5, 10_000)
-    assert grid.advance(1_000) == 1
-    assert grid.due_us == 12_000
+def test_a_schedule_whose_clock_jumps_back_goes_on_to_the_next_release() -> None:
+    schedule = ReleaseSchedule(0.0, PERIOD_US)
+    schedule.advance(10_100)
+    assert (schedule.index, schedule.due_us) == (5, 10_000)
+    assert schedule.advance(1_000) == 1
+    assert schedule.due_us == 12_000
 
 
-def test_who_listens_for_a_frame_is_deaf_to_the_ground_for_a_moment_only(
+def test_measuring_an_arrival_leaves_the_ground_links_unread_for_a_moment_only(
     time: VirtualTime, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     sensors = VirtualSensors(time)
     loop = Loop(sensors)
-    loop.run(LAID)
-    deaf_us: list[int] = []
+    loop.run(SETTLED)
+    unread_us: list[int] = []
 
     def wait(seconds: float) -> bool:
         begin = time.now_us
         there = VirtualSensors.wait(sensors, seconds)
-        deaf_us.append(time.now_us - begin)
+        unread_us.append(time.now_us - begin)
         return there
 
     monkeypatch.setattr(sensors, "wait", wait)
     loop.run(1000)
-    listened = [duration for duration in deaf_us if duration]
-    assert len(listened) == pytest.approx(40, abs=1)
-    assert max(listened) < PERIOD_US / 5
+    measurements = [duration for duration in unread_us if duration]
+    assert len(measurements) == pytest.approx(40, abs=1)
+    assert max(measurements) < PERIOD_US / 5
 
 
 @pytest.mark.parametrize("parts_per_million", [-200.0, 200.0])
@@ -250,7 +250,7 @@ def test_silence_ends_in_nothing_to_tick_on_so_that_the_loop_can_look_at_its_clo
     loop = Loop(VirtualSensors(time, lambda step: None if step > 50 else 0))
     loop.run(1_200)
     assert loop.nothing > 1_000
-    assert len(loop.ticks) == 50 + MOST_STALE
+    assert len(loop.ticks) == 50 + MAX_STALE_TICKS
 
 
 @pytest.mark.parametrize("seed", range(6))

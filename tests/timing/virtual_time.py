@@ -1,4 +1,4 @@
-"""A clock that only moves when somebody sleeps, and a simulator that lives on it."""
+"""A clock that only moves when the loop sleeps or works, and a simulator on that clock."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ FIRST_US = 1_000_000
 
 
 def frame(t_us: int, z: float = -2.0) -> SensorFrame:
-    """A vehicle that stands still in the air."""
+    """A vehicle that hovers."""
     return SensorFrame(
         t_us, (0.0, 0.0, z), (0.0,) * 3, (1.0, 0.0, 0.0, 0.0), (0.0,) * 3, (0.0, 0.0, -9.81),
         (-0.7227, 1.4454), (0.0, 0.0),

@@ -1,4 +1,4 @@
-"""What every flight mode is to the commander and to the tick.
+"""The interface of a flight mode.
 
 A flight mode is one file in this folder: a subclass of ``FlightMode`` and a name in
 ``fsw.signals.Mode``. Disarmed and terminated vehicles are in no flight mode.
@@ -68,7 +68,7 @@ class CommandContext:
 
 @dataclass(frozen=True, slots=True)
 class ModeResult:
-    """What a tick in a mode came to."""
+    """Result of a mode's tick."""
 
     next_mode: Mode | None = None  # None: the mode goes on
     cause: str = ""  # of the change, for the operator
@@ -117,23 +117,17 @@ class FlightMode:
         return current.interruptible or self.interrupts_landing
 
     def refusal(self, context: CommandContext) -> str | None:
-        """What the mode needs and is not there."""
+        """Why the mode cannot be entered now: a condition that it needs is missing."""
         return None
 
     def denial(self, context: CommandContext) -> str | None:
-        """What the mode needs and no waiting brings: another configuration only."""
+        """Why this configuration never allows the mode."""
         return None
 
     def activate(
         self, state: FlightState, estimate: StateEstimate, handover: Handover
     ) -> FlightState:
-        """Begin, in the state of the mode that is left.
-
-        Args:
-            state: ``state.vehicle.mode`` is the mode that is left.
-            estimate: The vehicle now.
-            handover: How it is left.
-        """
+        """Begin, in the state of the mode that is left: that is still ``state.vehicle.mode``."""
         return replace(state, setpoint=SetpointMemory())
 
     def update(self, state: FlightState, estimate: StateEstimate) -> tuple[FlightState, ModeResult]:
@@ -141,7 +135,7 @@ class FlightMode:
         return state, CONTINUE
 
     def waits(self, state: FlightState, now_us: int) -> str | None:
-        """Why the mode, chosen before arming, is forgotten now; None: it waits on."""
+        """Why the mode chosen before arming is dropped now; None if it stays chosen."""
         return None
 
     def aim(self, state: FlightState, estimate: StateEstimate) -> FlightState:

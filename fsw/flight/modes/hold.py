@@ -25,7 +25,7 @@ class Hold(FlightMode):
     def activate(
         self, state: FlightState, estimate: StateEstimate, handover: Handover
     ) -> FlightState:
-        """Come to rest; after a mode that is done the reference rests already."""
+        """Stop; after a completed mode the reference is at rest already."""
         if not state.vehicle.flies or (handover.completed and state.setpoint.reference is None):
             return replace(state, setpoint=SetpointMemory())
         return replace(state, setpoint=stop(self.generator, state.setpoint, estimate))
@@ -34,7 +34,7 @@ class Hold(FlightMode):
 def stop(
     generator: SetpointGenerator, setpoint: SetpointMemory, estimate: StateEstimate
 ) -> SetpointMemory:
-    """Come to rest; a vehicle that hardly moves just stays."""
+    """Stop; a vehicle that hardly moves stays where it is."""
     reference = setpoint.reference
     if reference is None:
         if math.hypot(*estimate.v_WB) < _AT_REST:

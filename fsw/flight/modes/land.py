@@ -1,4 +1,4 @@
-"""Land: the reference descends until the ground is felt, then the vehicle disarms."""
+"""Land: the reference descends until touch-down is detected, then the vehicle disarms."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ class Land(FlightMode):
     continues_reference = True
 
     def update(self, state: FlightState, estimate: StateEstimate) -> tuple[FlightState, ModeResult]:
-        """Touch-down: descending and not sinking. No loop may fight the ground.
+        """Touch-down: a descent is commanded and the vehicle does not sink.
 
-        Where the plan is lower than the vehicle can be, the ground has been felt already: to wait
-        until it lies still let loops and arm work against it until it tipped over.
+        A plan below the vehicle is contact as well: while it waited for the vehicle to lie still,
+        loops and arm worked against the ground until it tipped over.
         """
         limits = self.config.limits
         low = is_low(self.config, estimate)
@@ -48,5 +48,5 @@ class Land(FlightMode):
 
 
 def _presses(state: FlightState, estimate: StateEstimate) -> bool:
-    """Whether the plan has gone on down where the vehicle has not."""
+    """Whether the plan is lower than the vehicle can be."""
     return state.nominal is not None and state.nominal.p[2] - estimate.p_WB[2] > _PRESSING

@@ -43,13 +43,13 @@ class Mission(FlightMode):
     external_reference = True
 
     def refusal(self, context: CommandContext) -> str | None:
-        """A mission that can be begun or gone on with."""
+        """Needs a mission that can start or continue."""
         return context.mission_refusal
 
     def activate(
         self, state: FlightState, estimate: StateEstimate, handover: Handover
     ) -> FlightState:
-        """Fly the mission from the reference so far."""
+        """Fly the mission from the current reference."""
         start = self._start(state, estimate, handover.reference)
         flight = sequencer.begun(state.mission.flight, start, motion_limits(self.config))
         mission = replace(state.mission, flight=flight)
@@ -58,7 +58,7 @@ class Mission(FlightMode):
     def _start(
         self, state: FlightState, estimate: StateEstimate, last: EndEffectorTarget
     ) -> EndEffectorTarget:
-        """The reference so far, unless it is far off or fast; then where the vehicle is."""
+        """The current reference, or the vehicle's position if that is far off or moves fast."""
         here = point_in_flight(estimate, self.config.airframe.link_length)[0]
         if state.vehicle.flies:
             near = math.dist(last.p_WE, here) < self.config.steering.max_lead_distance
@@ -100,7 +100,7 @@ class Mission(FlightMode):
 
 
 def motion_limits(config: FlightConfig) -> MotionLimits:
-    """How fast missions are flown: within what the start-up analysis reckons with."""
+    """Mission speed [m/s], within the limit of the start-up analysis."""
     limits, surroundings = config.limits, config.surroundings
     return MotionLimits(
         limits.mission_speed,
@@ -128,7 +128,7 @@ def left(state: FlightState, next_mode: Mode) -> FlightState:
 def with_update(
     state: FlightState, update: MissionUpdate, config: FlightConfig, now_us: int
 ) -> FlightState:
-    """Take in a new mission or another current step."""
+    """Store a new mission or another current step."""
     flight = state.mission.flight
     if update.steps is not None:
         flight = sequencer.loaded(update.steps, flight.progress.reached_count)

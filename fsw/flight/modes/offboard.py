@@ -1,4 +1,4 @@
-"""Offboard: a ground station's setpoints for now are followed, for as long as they come."""
+"""Offboard: follows a ground station's setpoints while they arrive."""
 
 from __future__ import annotations
 
@@ -47,10 +47,10 @@ class Offboard(FlightMode):
         return "not offboard: no setpoint was received in the last 0.5 s"
 
     def waits(self, state: FlightState, now_us: int) -> str | None:
-        """Forgotten where setpoints stop."""
+        """Dropped when setpoints stop."""
         if is_fresh(self.config, state, now_us):
             return None
-        return "offboard forgotten: setpoints stopped before arming"
+        return "offboard cancelled: setpoints stopped before arming"
 
     def update(self, state: FlightState, estimate: StateEstimate) -> tuple[FlightState, ModeResult]:
         """On the ground, wait for a setpoint to fly; in the air, notice that one has landed it."""
@@ -80,7 +80,7 @@ class Offboard(FlightMode):
         if reference is None or reference.of_end_effector != motion.of_end_effector:
             reference = self.generator.begin(estimate, of_end_effector=motion.of_end_effector)
         joints = goal.joints if goal is not None else None
-        if memory.joints is not None and self._is_young(memory.joints_us, estimate.t_us):
+        if memory.joints is not None and _is_young(self.config, memory.joints_us, estimate.t_us):
             joints = memory.joints.q_arm
         if joints is not None and reference.q_arm is None:
             reference = replace(reference, q_arm=estimate.q_arm)
@@ -89,13 +89,13 @@ class Offboard(FlightMode):
         return replace(state, setpoint=setpoint, offboard=replace(memory, tilt=tilt))
 
     def guided(self, goal: PositionGoal, state: FlightState) -> PositionGoal:
-        """Setpoints alone say how fast and where the nose points."""
+        """Speed and heading come from setpoints alone."""
         return goal
 
     def _motion(self, state: FlightState, estimate: StateEstimate) -> tuple[MotionSetpoint, Tilt]:
         memory, config = state.offboard, self.config
         ahead = Tilt(yaw=estimate.yaw)
-        if not self._is_young(memory.motion_us, estimate.t_us):
+        if not _is_young(config, memory.motion_us, estimate.t_us):
             # Joints alone: the body stays.
             return MotionSetpoint(False, v=(0.0, 0.0, 0.0)), ahead
         if memory.attitude is not None:
@@ -107,12 +107,11 @@ class Offboard(FlightMode):
         assert memory.motion is not None, "one of the two is young"
         return _moved_on(memory.motion, estimate.t_us - memory.motion_us), ahead
 
-    def _is_young(self, heard_us: int, now_us: int) -> bool:
-        return _is_young(self.config, heard_us, now_us)
 
-
-def receive(memory: OffboardMemory, inputs: TickInputs, config: FlightConfig) -> OffboardMemory:
-    """Take in setpoints; what is out of range is counted and not kept."""
+def accept_setpoints(
+    memory: OffboardMemory, inputs: TickInputs, config: FlightConfig
+) -> OffboardMemory:
+    """Store setpoints; those out of range are counted and dropped."""
     refused, accepted, now_us = inputs.refused_setpoints, 0, inputs.sensors.t_us
     motion, attitude, joints = inputs.motion, inputs.attitude, inputs.joints
     if motion is not None and motion_refusal(motion) is None:
@@ -129,12 +128,12 @@ def receive(memory: OffboardMemory, inputs: TickInputs, config: FlightConfig) ->
 
 
 def is_fresh(config: FlightConfig, state: FlightState, now_us: int) -> bool:
-    """Whether a setpoint came a moment ago."""
+    """Whether the newest setpoint is within the timeout."""
     return _is_young(config, max(state.offboard.motion_us, state.offboard.joints_us), now_us)
 
 
 def report(state: FlightState, now_us: int) -> OffboardReport:
-    """The setpoints of now, for telemetry."""
+    """The current setpoints, for telemetry."""
     memory = state.offboard
     if memory.accepted == memory.refused == 0:
         return _NO_SETPOINTS
@@ -155,7 +154,7 @@ def _is_young(config: FlightConfig, heard_us: int, now_us: int) -> bool:
 
 
 def _presses(state: FlightState, estimate: StateEstimate) -> bool:
-    """Whether the setpoint is pressed on the ground."""
+    """Whether the setpoint commands a descent onto the ground."""
     reference = state.setpoint.reference
     if reference is None or reference.of_end_effector:
         return False
@@ -163,7 +162,7 @@ def _presses(state: FlightState, estimate: StateEstimate) -> bool:
 
 
 def _moved_on(motion: MotionSetpoint, age_us: int) -> MotionSetpoint:
-    """A place that moves has moved since it was sent."""
+    """A moving setpoint, extrapolated to now."""
     if motion.p is None or motion.v is None or motion.along_heading:
         return motion
     age = 1e-6 * age_us

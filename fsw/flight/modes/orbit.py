@@ -19,6 +19,6 @@ class Orbit(FlightMode):
     def activate(
         self, state: FlightState, estimate: StateEstimate, handover: Handover
     ) -> FlightState:
-        """Go on from the setpoint of now; the command sets the circle right after."""
+        """Start from the current setpoint; the command then sets the circle."""
         last = state.setpoint
         return replace(state, setpoint=SetpointMemory(last.reference, last.goal))

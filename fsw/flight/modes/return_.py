@@ -37,7 +37,7 @@ class Return(FlightMode):
     def activate(
         self, state: FlightState, estimate: StateEstimate, handover: Handover
     ) -> FlightState:
-        """Begin the way home."""
+        """Start the return."""
         home = state.vehicle.home
         if home is None:
             return replace(state, setpoint=SetpointMemory())
@@ -68,7 +68,7 @@ class Return(FlightMode):
 
 
 def _is_home(setpoint: SetpointMemory) -> bool:
-    """Whether the way home is flown."""
+    """Whether the return path is complete."""
     reference, goal = setpoint.reference, setpoint.goal
     if reference is None or goal is None or goal.motion.p is None or setpoint.waypoints:
         return False

@@ -25,11 +25,11 @@ class Takeoff(FlightMode):
         return None
 
     def waits(self, state: FlightState, now_us: int) -> str | None:
-        """Forgotten where arming does not follow soon."""
+        """Dropped when arming does not follow in time."""
         wait_us = self.config.limits.takeoff_wait_us
         if now_us - state.vehicle.intended_us < wait_us:
             return None
-        return f"takeoff forgotten: not armed within {wait_us * 1e-6:g} s"
+        return f"takeoff cancelled: not armed within {wait_us * 1e-6:g} s"
 
     def update(self, state: FlightState, estimate: StateEstimate) -> tuple[FlightState, ModeResult]:
         """Done when the reference has climbed."""

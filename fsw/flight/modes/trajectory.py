@@ -1,4 +1,4 @@
-"""Trajectory: the streamed END_EFFECTOR_TARGETs are followed."""
+"""Trajectory: follows streamed END_EFFECTOR_TARGETs."""
 
 from __future__ import annotations
 

@@ -63,11 +63,7 @@ class FlightLogs:
     """The list that all links share."""
 
     def __init__(self, directory: Path) -> None:
-        """Find this flight's log and those of the flights beside it.
-
-        Args:
-            directory: Where the present flight writes; its logs must exist already.
-        """
+        """Find this flight's log, which must exist already, and those of the flights beside it."""
         self._present = directory.absolute().name
         self.all = flight_logs(directory)
 
@@ -79,11 +75,7 @@ class FlightLogs:
 
 
 def flight_logs(directory: Path) -> tuple[LoggedFlight, ...]:
-    """List this flight and those in the directories beside it, oldest first, this one last.
-
-    Args:
-        directory: Where the present flight writes; its logs must exist already.
-    """
+    """List this flight and those in the directories beside it, oldest first, this one last."""
     directory = directory.absolute()
     dated = []
     with os.scandir(directory.parent) as entries:

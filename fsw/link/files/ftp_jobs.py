@@ -1,4 +1,4 @@
-"""Answers of MAVLink FTP that take more than a moment."""
+"""MAVLink FTP replies that take more than one tick."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from collections.abc import Generator, Iterator
 from typing import Final, TypeAlias
 
 from fsw.link.files.ftp_message import MAX_DATA, Opcode, Refusal, Reply, Request, refused
-from fsw.link.files.ftp_sessions import Session
 from fsw.link.files.served_file import OpenFile, ServedFile
 
 Job: TypeAlias = Generator[Reply | None, None, None]
@@ -18,40 +17,32 @@ _CRC_PIECE: Final = 1 << 16  # bytes a tick, about 30 µs
 _ALL_ONES: Final = 0xFFFFFFFF
 
 
-def read(request: Request, session: Session) -> Job:
+def read(request: Request, file: OpenFile) -> Job:
     """One piece of a file."""
-    yield from _piece(request, session, request.offset, burst_complete=False)
+    yield from _piece(request, file, request.offset, burst_complete=False)
 
 
-def burst(request: Request, session: Session) -> Job:
+def burst(request: Request, file: OpenFile) -> Job:
     """Piece after piece, to the end of the file or of the burst."""
     size = request.size or MAX_DATA
-    end = session.file.size
     for number in range(_BURST):
         offset = request.offset + number * size
-        last = number == _BURST - 1 or offset + size >= end
-        yield from _piece(request, session, offset, burst_complete=last)
+        last = number == _BURST - 1 or offset + size >= file.size
+        yield from _piece(request, file, offset, burst_complete=last)
         if last:
             return
 
 
-def _piece(request: Request, session: Session, offset: int, *, burst_complete: bool) -> Job:
-    if offset >= session.file.size:
+def _piece(request: Request, file: OpenFile, offset: int, *, burst_complete: bool) -> Job:
+    if offset >= file.size:
         yield refused(Refusal.END_OF_FILE)
         return
     try:
-        for data in _delivered(session.file, offset, request.size or MAX_DATA):
-            yield (
-                Reply(
-                    opcode=Opcode.ACK,
-                    session=None,
-                    offset=offset,
-                    data=data,
-                    burst_complete=burst_complete,
-                )
-                if data
-                else None
-            )
+        for data in _delivered(file, offset, request.size or MAX_DATA):
+            if data is None:
+                yield None
+            else:
+                yield Reply(Opcode.ACK, offset=offset, data=data, burst_complete=burst_complete)
     except OSError:
         yield refused(Refusal.FAIL)
 

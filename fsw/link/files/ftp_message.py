@@ -16,7 +16,7 @@ _HEADER: Final = struct.Struct("<HBBBBBxI")
 
 
 class Opcode(enum.IntEnum):
-    """What is asked for, or answered."""
+    """Operation codes of requests and replies."""
 
     TERMINATE_SESSION = 1
     RESET_SESSIONS = 2
@@ -38,7 +38,7 @@ class Opcode(enum.IntEnum):
 
 
 class Refusal(enum.IntEnum):
-    """Why not: the byte of data in a NAK."""
+    """Error codes of a NAK."""
 
     FAIL = 1
     INVALID_DATA_SIZE = 3
@@ -93,13 +93,7 @@ def read(payload: bytes) -> Request:
 
 
 def write(reply: Reply, request: Request, sequence: int) -> bytes:
-    """Make a payload of 251 bytes.
-
-    Args:
-        reply: What to say.
-        request: What is answered.
-        sequence: That of the request and one more; it starts again at 0 after 65535.
-    """
+    """Make a payload of 251 bytes; its sequence, modulo 65536, is the request's and one more."""
     header = _HEADER.pack(
         sequence & 0xFFFF,
         request.session if reply.session is None else reply.session,

@@ -9,13 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final, cast
+from typing import Final, TypeAlias, cast
 
 from fsw.link.files import ftp_jobs
 from fsw.link.files.ftp_jobs import Job
 from fsw.link.files.ftp_message import Opcode, Refusal, Reply, Request, read, refused, write
-from fsw.link.files.ftp_sessions import Client, Session, Sessions
 from fsw.link.files.ftp_tree import Directory, find, listing
+from fsw.link.files.served_file import OpenFile
 from fsw.link.wire import message_ids
 from fsw.link.wire.decode import for_this_vehicle
 from fsw.link.wire.outgoing import PackedOutgoing
@@ -24,15 +24,31 @@ from messages.frames import Frame
 _FRAMES: Final = 10  # a tick: two datagrams
 _DATAGRAM_FRAMES: Final = 5
 _MAX_JOBS: Final = 12
+_MAX_SESSIONS: Final = 8
+_EXPIRY_US: Final = 30_000_000  # of a session without a read: its client has gone without a word
 _MAX_REMEMBERED: Final = 8  # clients
 _REMEMBERED_US: Final = 3_000_000  # a client has given up repeating by then
 _WRITES: Final = range(Opcode.CREATE_FILE, Opcode.RENAME + 1)
 _NO_SESSION: Final = -1
 
+Client: TypeAlias = tuple[int, int]
+"""System and component id."""
+
+_Key: TypeAlias = tuple[Client, int]
+"""A client and the number of its session."""
+
+
+@dataclass(slots=True)
+class _Session:
+    """An open file."""
+
+    file: OpenFile
+    used_us: int
+
 
 @dataclass(frozen=True, slots=True)
 class _Answered:
-    """A request that must not be carried out twice, because it opens or closes a session."""
+    """A request that must run once only, because it opens or closes a session."""
 
     payload: bytes
     answer: PackedOutgoing
@@ -59,16 +75,14 @@ class FtpService:
 
     def __init__(self, root: Directory) -> None:
         self._root = root
-        self._sessions = Sessions()
+        self._sessions: dict[_Key, _Session] = {}
         self._answered: dict[Client, _Answered] = {}
-        self._jobs: dict[tuple[Client, int], _Running] = {}
-        self._at_once: dict[int, Callable[[Request, Client, int], Reply]] = {
+        self._jobs: dict[_Key, _Running] = {}
+        self._handlers: dict[int, Callable[[Request, Client, int], Reply | None]] = {
             Opcode.TERMINATE_SESSION: self._terminate,
             Opcode.RESET_SESSIONS: self._reset,
             Opcode.LIST_DIRECTORY: self._list_directory,
             Opcode.OPEN_FILE_RO: self._open,
-        }
-        self._in_time: dict[int, Callable[[Request, Client, int], Reply | None]] = {
             Opcode.READ_FILE: self._read,
             Opcode.BURST_READ_FILE: self._read,
             Opcode.CALC_FILE_CRC32: self._checksum,
@@ -103,7 +117,7 @@ class FtpService:
         bursts = [key for key, running in self._jobs.items() if running.bursts]
         return self._go_on(bursts, _DATAGRAM_FRAMES)
 
-    def _go_on(self, ready: list[tuple[Client, int]], frames: int) -> list[PackedOutgoing]:
+    def _go_on(self, ready: list[_Key], frames: int) -> list[PackedOutgoing]:
         answers: list[PackedOutgoing] = []
         while ready and len(answers) < frames:
             key = ready.pop(0)
@@ -123,7 +137,7 @@ class FtpService:
         """The answer; None if a job gives it."""
         if request.damaged:
             return refused(Refusal.INVALID_DATA_SIZE)
-        handler = self._at_once.get(request.opcode) or self._in_time.get(request.opcode)
+        handler = self._handlers.get(request.opcode)
         if handler is not None:
             return handler(request, client, t_us)
         if request.opcode in _WRITES:
@@ -131,15 +145,15 @@ class FtpService:
         return refused(Refusal.UNKNOWN_COMMAND)
 
     def _terminate(self, request: Request, client: Client, t_us: int) -> Reply:
-        if self._sessions.of(client, request.session) is None:
+        if (client, request.session) not in self._sessions:
             return refused(Refusal.INVALID_SESSION)
-        self._close(client, request.session)
+        self._close((client, request.session))
         return Reply(Opcode.ACK)
 
     def _reset(self, request: Request, client: Client, t_us: int) -> Reply:
         # Those of the client: another ground station goes on with its download.
-        for number in self._sessions.numbers_of(client):
-            self._close(client, number)
+        for key in [key for key in self._sessions if key[0] == client]:
+            self._close(key)
         return Reply(Opcode.ACK)
 
     def _list_directory(self, request: Request, client: Client, t_us: int) -> Reply:
@@ -155,23 +169,38 @@ class FtpService:
         node = find(self._root, request.path)
         if node is None or isinstance(node, Mapping):
             return refused(Refusal.FILE_NOT_FOUND)
-        number = self._sessions.room(client, request.session, t_us)
+        number = self._room(client, request.session, t_us)
         if number is None:
             return refused(Refusal.NO_SESSIONS_AVAILABLE)
         try:
             file = node.open()
         except OSError:
             return refused(Refusal.FILE_NOT_FOUND)
-        self._sessions.add(client, number, Session(file, t_us))
+        self._sessions[client, number] = _Session(file, t_us)
         return Reply(Opcode.ACK, session=number, data=file.size.to_bytes(4, "little"))
 
+    def _room(self, client: Client, wanted: int, t_us: int) -> int | None:
+        """A number for a further session; None if there are as many as there may be.
+
+        Some clients choose the number of a session when they open a file, others take the one that
+        is answered; so the wanted number is given unless the client has it open already.
+        """
+        for key, session in list(self._sessions.items()):
+            if t_us - session.used_us > _EXPIRY_US:
+                self._sessions.pop(key).file.close()
+        if len(self._sessions) >= _MAX_SESSIONS:
+            return None
+        numbers: tuple[int, ...] = (wanted, *range(_MAX_SESSIONS))
+        return next(number for number in numbers if (client, number) not in self._sessions)
+
     def _read(self, request: Request, client: Client, t_us: int) -> Reply | None:
-        session = self._sessions.of(client, request.session)
+        session = self._sessions.get((client, request.session))
         if session is None:
             return refused(Refusal.INVALID_SESSION)
         session.used_us = t_us
         burst = request.opcode == Opcode.BURST_READ_FILE
-        self._start(request, client, (ftp_jobs.burst if burst else ftp_jobs.read)(request, session))
+        job = (ftp_jobs.burst if burst else ftp_jobs.read)(request, session.file)
+        self._start(request, client, job)
         return None
 
     def _checksum(self, request: Request, client: Client, t_us: int) -> Reply | None:
@@ -187,20 +216,20 @@ class FtpService:
         return None
 
     def _start(self, request: Request, client: Client, job: Job) -> None:
-        """Begin a job; it takes the place of the one that the client had there."""
+        """Start a job; it replaces the client's job of the same session."""
         reads = request.opcode != Opcode.CALC_FILE_CRC32
         key = client, request.session if reads else _NO_SESSION
         self._stop(key)
         self._jobs[key] = _Running(client, request, job, request.sequence)
 
-    def _stop(self, key: tuple[Client, int]) -> None:
+    def _stop(self, key: _Key) -> None:
         running = self._jobs.pop(key, None)
         if running is not None:
             running.job.close()
 
-    def _close(self, client: Client, number: int) -> None:
-        self._stop((client, number))
-        self._sessions.close(client, number)
+    def _close(self, key: _Key) -> None:
+        self._stop(key)
+        self._sessions.pop(key).file.close()
 
     def _remember(self, client: Client, answered: _Answered) -> None:
         self._answered.pop(client, None)

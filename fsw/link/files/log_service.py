@@ -63,7 +63,7 @@ class LogService:
         self._open: tuple[int, OpenFile] | None = None
 
     def handle(self, frame: Frame, t_us: int) -> Sequence[Outgoing]:
-        """Note what is asked for."""
+        """Store a request."""
         values = cast(Numbers, frame.payload_values)
         if not for_this_vehicle(*values[-2:]):
             return ()
@@ -83,9 +83,9 @@ class LogService:
         """Send the next entries, and the next piece of a log that was requested whole."""
         if not self._to_list and not self._requests and self._erasure is None:
             return ()
-        answers: list[ServiceOutput] = [
-            self._entry(self._to_list.popleft()) for _ in self._next_entries()
-        ]
+        answers: list[ServiceOutput] = []
+        while self._to_list and len(answers) < _ENTRIES:
+            answers.append(self._entry(self._to_list.popleft()))
         if self._erasure is not None and self._erasure.done:
             answers.append(_erasure_text(self._erasure))
             self._erasure = None
@@ -112,9 +112,6 @@ class LogService:
             return [Outgoing(message_ids.LOG_ENTRY, (0, 0, 0, 0, 0))]
         self._to_list = deque(range(first, min(last, len(self._logs) - 1) + 1))
         return ()
-
-    def _next_entries(self) -> range:
-        return range(min(_ENTRIES, len(self._to_list)))
 
     def _entry(self, log_id: int) -> Outgoing:
         if self._open is not None and self._open[0] == log_id:
@@ -151,27 +148,26 @@ class LogService:
 
     def _data(self, frames: int) -> list[PackedOutgoing]:
         """The next LOG_DATA of the first request; none while the disk has not delivered."""
-        log_id, offset, end, closed, paced = self._requests[0]
+        request = self._requests[0]
+        log_id, offset, end = request.log_id, request.offset, request.end
         try:
             data = self._file(log_id).read(offset, min(CHUNK * frames, max(end - offset, 0)))
         except OSError:
             data = b""  # gone or damaged: nothing more will come of it
         if data is None or frames <= 0:
             return []
-        messages = []
-        for at in range(0, len(data), CHUNK):
-            piece = data[at : at + CHUNK]
-            messages.append(_log_data(log_id, offset + at, piece))
+        messages = [
+            _log_data(log_id, offset + at, data[at : at + CHUNK])
+            for at in range(0, len(data), CHUNK)
+        ]
         offset += len(data)
         if data and offset < end:
-            self._requests[0] = _Request(
-                log_id=log_id, offset=offset, end=end, closed=closed, paced=paced
-            )
+            self._requests[0] = request._replace(offset=offset)
             return messages
         self._requests.popleft()
         # Without an end of its own a request is over for the client at the first message that is
         # not full, so one more is due where the last byte filled its message.
-        if not data or (closed and len(data) % CHUNK == 0):
+        if not data or (request.closed and len(data) % CHUNK == 0):
             messages.append(_log_data(log_id, offset, b""))
         return messages
 

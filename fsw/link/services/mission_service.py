@@ -28,12 +28,12 @@ from fsw.link.services.mission_wire import (
 )
 from fsw.link.wire import message_ids as ids
 from fsw.link.wire.decode import Numbers, for_this_vehicle
-from fsw.link.wire.mission_items import DENIED, UNSUPPORTED, MissionItem, Refused
+from fsw.link.wire.mission_items import DENIED, UNSUPPORTED, BadItem, MissionItem
 from fsw.link.wire.outgoing import Outgoing, ServiceOutput
 from fsw.signals import Severity, StatusText
 from messages.frames import Frame
 
-_ReadItem = Callable[[Numbers], MissionItem | Refused]
+_ReadItem = Callable[[Numbers], MissionItem]
 
 # MAV_MISSION_RESULT
 ACCEPTED: Final = 0
@@ -109,7 +109,7 @@ class MissionService:
         return self._handlers[frame.message_id](values, peer, t_us)
 
     def poll(self, t_us: int) -> Sequence[ServiceOutput]:
-        """Ask again for what did not come, and report the mission's progress."""
+        """Request missing items again, and report the mission's progress."""
         replies: list[ServiceOutput] = []
         if self._store.progress is not self._shown or self._show_again:
             replies += self._show_progress(t_us)
@@ -121,9 +121,11 @@ class MissionService:
                 replies.append(self._ask(upload, t_us))
             else:
                 self._upload = None
-                silence = f"upload broken off: item {len(upload.items)} did not come; kept the old"
+                missing = f"item {len(upload.items)} was not received"
                 replies.append(encode_ack(CANCELLED, upload.kind, upload.peer))
-                replies.append(StatusText(Severity.WARNING, silence))
+                replies.append(
+                    StatusText(Severity.WARNING, f"upload aborted: {missing}; kept the old list")
+                )
         return replies
 
     def _show_progress(self, t_us: int) -> list[Outgoing]:
@@ -154,8 +156,8 @@ class MissionService:
         kind = Kind(number)
         self._upload = self._download = self._done = None
         if count > ROOM[kind]:
-            reason = f"{count} items of {kind.name.lower()}; there is room for {ROOM[kind]}"
-            return self._refuse(Refused(NO_SPACE, reason), kind, peer)
+            reason = f"{count} items of {kind.name.lower()}; the limit is {ROOM[kind]}"
+            return self._refuse(BadItem(NO_SPACE, reason), kind, peer)
         self._upload = _Upload(peer, kind, count)
         if count == 0:
             return self._finish(self._upload)
@@ -165,31 +167,29 @@ class MissionService:
         self, read: _ReadItem, values: Numbers, peer: Peer, t_us: int
     ) -> Sequence[ServiceOutput]:
         """Add the item that was asked for; the last one completes the upload."""
-        item = read(values)
         seq, number = int(values[7]), int(values[14])
         upload = self._upload
         if upload is None or upload.peer != peer or upload.kind != number:
             return self._stray(seq, number, peer)
         if seq >= upload.count:
             reason = f"item {seq} in an upload of {upload.count}"
-            return self._refuse(Refused(INVALID_SEQUENCE, reason), upload.kind, peer)
+            return self._refuse(BadItem(INVALID_SEQUENCE, reason), upload.kind, peer)
         if seq != len(upload.items):
             return ()
-        meaning = item if isinstance(item, Refused) else self._store.read(upload.kind, item)
-        if isinstance(item, Refused) or isinstance(meaning, Refused):
-            wrong = item if isinstance(item, Refused) else meaning
-            assert isinstance(wrong, Refused)
-            named = Refused(wrong.result, f"item {seq}: {wrong.reason}")
+        try:
+            item = read(values)
+            upload.meanings.append(self._store.read(upload.kind, item))
+        except BadItem as wrong:
+            named = BadItem(wrong.result, f"item {seq}: {wrong.reason}")
             return self._refuse(named, upload.kind, peer)
         upload.items.append(item)
-        upload.meanings.append(meaning)
         if len(upload.items) == upload.count:
             return self._finish(upload)
         upload.tries = 0
         return (self._ask(upload, t_us),)
 
     def _stray(self, seq: int, number: int, peer: Peer) -> Sequence[ServiceOutput]:
-        """An item of no upload; after one that ended, its acknowledgement may have been lost."""
+        """Handle an item without an upload; the acknowledgement of the last one may be lost."""
         if self._done is not None and self._done[:2] == (peer, number):
             again = encode_ack(ACCEPTED, number, peer, self._store.identity(self._done[1]))
             return (again,) if seq == self._done[2] else ()
@@ -204,8 +204,9 @@ class MissionService:
 
     def _finish(self, upload: _Upload) -> Sequence[ServiceOutput]:
         kind, peer = upload.kind, upload.peer
-        refused = self._store.keep(kind, tuple(upload.items), tuple(upload.meanings))
-        if refused is not None:
+        try:
+            self._store.keep(kind, tuple(upload.items), tuple(upload.meanings))
+        except BadItem as refused:
             return self._refuse(refused, kind, peer)
         self._upload = None
         self._done = (peer, kind, upload.count - 1)
@@ -231,7 +232,7 @@ class MissionService:
     def _send_item(
         self, as_int: bool, values: Numbers, peer: Peer, t_us: int
     ) -> Sequence[ServiceOutput]:
-        """Any item in any order and as often as asked: requests and items may be lost."""
+        """Send any item, in any order and repeatedly: requests and items may be lost."""
         seq, number = int(values[0]), int(values[3])
         download = self._download
         if download is None or download.peer != peer or download.kind != number:
@@ -247,7 +248,7 @@ class MissionService:
     # ------------------------------------------------------------ the rest
 
     def _ack(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[ServiceOutput]:
-        """The other side has all it wanted, or wants no more; the old items stay."""
+        """Handle the client's acknowledgement, which ends the transfer."""
         if self._download is not None and self._download.peer == peer:
             self._download = None
         if self._upload is not None and self._upload.peer == peer and values[2] != ACCEPTED:
@@ -261,8 +262,11 @@ class MissionService:
         if refused is not None:
             return refused
         self._upload = self._download = None
-        for kind in kinds:
-            self._store.keep(Kind(kind), (), ())
+        for kind in map(Kind, kinds):
+            try:
+                self._store.keep(kind, (), ())
+            except BadItem as wrong:
+                return self._refuse(wrong, kind, peer)
         return (encode_ack(ACCEPTED, number, peer),)
 
     def _set_current(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[ServiceOutput]:
@@ -270,10 +274,9 @@ class MissionService:
         if self._store.set_current(seq):
             self._show_again = True
             return ()
-        refused = Refused(INVALID_SEQUENCE, f"there is no mission item {seq}")
         return (
-            encode_ack(refused.result, Kind.MISSION, peer),
-            StatusText(Severity.WARNING, refused.reason),
+            encode_ack(INVALID_SEQUENCE, Kind.MISSION, peer),
+            StatusText(Severity.WARNING, f"there is no mission item {seq}"),
         )
 
     def _partial(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[ServiceOutput]:
@@ -292,7 +295,7 @@ class MissionService:
             return (encode_ack(DENIED, number, peer),)
         return None
 
-    def _refuse(self, refused: Refused, kind: Kind, peer: Peer) -> Sequence[ServiceOutput]:
+    def _refuse(self, refused: BadItem, kind: Kind, peer: Peer) -> Sequence[ServiceOutput]:
         self._upload = None
         text = f"{kind.name.lower()} refused: {refused.reason}"
         return (encode_ack(refused.result, kind, peer), StatusText(Severity.WARNING, text))

@@ -14,12 +14,12 @@ from enum import IntEnum
 from typing import Final
 
 from fsw.barriers.tangent import planes
-from fsw.link.wire.fence_items import read_fence, read_fence_item
+from fsw.link.wire.fence_items import check_fence_item, read_fence
 from fsw.link.wire.mission_items import (
     DENIED,
+    BadItem,
     Locate,
     MissionItem,
-    Refused,
     read_rally,
     read_step,
 )
@@ -34,7 +34,7 @@ from fsw.signals import (
     Vec2,
 )
 
-Judge = Callable[[SafeSet], tuple[str, ...]]
+SafeSetCheck = Callable[[SafeSet], tuple[str, ...]]
 """Why the vehicle could not keep a safe set; nothing where it can."""
 
 Meaning = MissionStep | Vec2 | None
@@ -50,9 +50,9 @@ class Kind(IntEnum):
 
 
 def _identity(items: tuple[MissionItem, ...]) -> int:
-    """A number that another list has not: a checksum of all that was uploaded, as PX4 has it.
+    """Identity of a list: a checksum of the upload, as in PX4.
 
-    0 means that nothing is there, so no list has it.
+    0 means an empty list, so no other list has it.
     """
     if not items:
         return 0
@@ -73,7 +73,7 @@ class Site:
     """Where missions are flown."""
 
     locate: Locate
-    judge: Judge
+    judge: SafeSetCheck
     clearance: Callable[[], float]  # m, from the walls of a fence uploaded now
 
 
@@ -99,18 +99,19 @@ class MissionStore:
         """What a download returns."""
         return self._items[kind]
 
-    def read(self, kind: Kind, item: MissionItem) -> Meaning | Refused:
-        """What an item means, or what is wrong with it by itself."""
+    def read(self, kind: Kind, item: MissionItem) -> Meaning:
+        """What an item means; ``BadItem`` where something is wrong with it by itself."""
         if kind is Kind.MISSION:
             return read_step(item, self._site.locate)
         if kind is Kind.RALLY:
             return read_rally(item, self._site.locate)
-        return read_fence_item(item, self._site.locate)
+        check_fence_item(item, self._site.locate)
+        return None
 
     def keep(
         self, kind: Kind, items: tuple[MissionItem, ...], meanings: tuple[Meaning, ...]
-    ) -> Refused | None:
-        """Put a whole upload in the place of the old one, or say why not."""
+    ) -> None:
+        """Put a whole upload in the place of the old one; ``BadItem`` leaves that."""
         if kind is Kind.MISSION:
             steps = tuple(step for step in meanings if isinstance(step, MissionStep))
             self._change(MissionUpdate(steps=steps, current=0 if steps else None))
@@ -118,13 +119,9 @@ class MissionStore:
             places = tuple(place for place in meanings if isinstance(place, tuple))
             self._change(MissionUpdate(rally=places))
         else:
-            fence = self._fence(items)
-            if isinstance(fence, Refused):
-                return fence
-            self._change(MissionUpdate(fence=fence))
+            self._change(MissionUpdate(fence=self._fence(items)))
         self._items[kind] = items
         setattr(self.ids, kind.name.lower(), _identity(items))
-        return None
 
     def identity(self, kind: Kind) -> int:
         """The opaque id of a list as it is now, 0 where it is empty."""
@@ -142,13 +139,11 @@ class MissionStore:
         taken, self._update = self._update, None
         return taken
 
-    def _fence(self, items: tuple[MissionItem, ...]) -> SafeSet | Refused:
+    def _fence(self, items: tuple[MissionItem, ...]) -> SafeSet:
         fence = read_fence(items, self._site.locate, self._site.clearance())
-        if isinstance(fence, Refused):
-            return fence
         against = self._site.judge(fence)
         if against:
-            return Refused(DENIED, f"the fence cannot be kept: {'; '.join(against)}")
+            raise BadItem(DENIED, f"the fence cannot be kept: {'; '.join(against)}")
         if self._snapshot is not None:
             x, y, z = p = self._snapshot.estimate.p_WB
             for number, wall in enumerate(planes(fence, p)):
@@ -156,7 +151,7 @@ class MissionStore:
                 inside = n[0] * x + n[1] * y + n[2] * z - wall.offset - wall.clearance
                 if not inside > 0.0:
                     where = "not inside the fence" if number < len(fence.walls) else "excluded"
-                    return Refused(
+                    raise BadItem(
                         DENIED,
                         f"the vehicle is {where}: {-inside:.2f} m beyond the clearance of "
                         f"wall or cylinder {number}",

@@ -11,8 +11,8 @@ from fsw.link.wire.mission_items import (
     INVALID_PARAM1,
     LOCAL_FRAMES,
     NO_PLACE,
+    BadItem,
     MissionItem,
-    Refused,
 )
 from fsw.link.wire.outgoing import Outgoing, WireValues
 from fsw.link.wire.telemetry_context import PlanIds, TelemetryContext
@@ -39,7 +39,7 @@ def item_int(values: Numbers) -> MissionItem:
     )
 
 
-def item_float(values: Numbers) -> MissionItem | Refused:
+def item_float(values: Numbers) -> MissionItem:
     """Read a MISSION_ITEM, whose x and y are degrees or metres."""
     frame = int(values[11])
     whole = []
@@ -48,7 +48,7 @@ def item_float(values: Numbers) -> MissionItem | Refused:
         if math.isnan(scaled):
             scaled = float(NO_PLACE)
         if not abs(scaled) <= NO_PLACE:
-            return Refused(INVALID_PARAM1 + 4 + number, f"{value:g} is no place")
+            raise BadItem(INVALID_PARAM1 + 4 + number, f"{value:g} is no place")
         whole.append(round(scaled))
     return item_int((*values[0:4], *whole, *values[6:]))
 

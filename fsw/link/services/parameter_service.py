@@ -51,7 +51,7 @@ class ParameterService:
         self._burst_us = 0
 
     def handle(self, frame: Frame, t_us: int) -> Sequence[ServiceOutput]:
-        """Answer a question at once, begin to list, or pass a wish on."""
+        """Answer a read, start a list, or pass a set request on."""
         values = frame.payload_values
         if frame.message_id == ids.PARAM_REQUEST_LIST:
             system, component = cast("tuple[int, int]", values)

@@ -2,11 +2,13 @@
 
 A service is asked by frames and answers with messages and sentences; sockets, sequence numbers,
 signatures and peers are the link's. There is one instance a link; what it serves may be shared.
+Times are sensor time [us].
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import traceback
+from collections.abc import Callable, Sequence
 from typing import Protocol, runtime_checkable
 
 from fsw.link.wire.outgoing import ServiceOutput
@@ -19,20 +21,11 @@ class LinkService(Protocol):
     message_ids: frozenset[int]  # what it wants to hear
 
     def handle(self, frame: Frame, t_us: int) -> Sequence[ServiceOutput]:
-        """Answer a valid frame at once; never raises.
-
-        Args:
-            frame: Its values are of the right type and number, not of any sense.
-            t_us: Sensor time [us].
-        """
+        """Answer a valid frame at once: values of the right type and number, not of any sense."""
         ...
 
     def poll(self, t_us: int) -> Sequence[ServiceOutput]:
-        """Go on with an answer that is paced; called every tick, so idle must cost nothing.
-
-        Args:
-            t_us: Sensor time [us].
-        """
+        """Go on with an answer that is paced; called every tick, so idle must cost nothing."""
         ...
 
 
@@ -41,11 +34,56 @@ class BulkService(LinkService, Protocol):
     """A service with much to send to clients that set the pace themselves, piece by piece."""
 
     def bulk(self, t_us: int) -> Sequence[ServiceOutput]:
-        """The next datagram of it; nothing where nothing is under way.
+        """The next datagram; nothing without a transfer.
 
         Called in what is left of a tick, several times, so that it delays none.
-
-        Args:
-            t_us: Sensor time [us].
         """
         ...
+
+
+class Dispatch:
+    """Hands frames to the services of one link that want them, and what they answer to the link."""
+
+    def __init__(
+        self, services: Sequence[LinkService], send: Callable[[ServiceOutput, int], None]
+    ) -> None:
+        self.failures = 0  # answers that ended in an exception
+        self._send = send
+        self._polled = tuple(services)
+        self._bulky = tuple(service for service in services if isinstance(service, BulkService))
+        self._wanting: dict[int, tuple[LinkService, ...]] = {}
+        for service in services:
+            for id_ in service.message_ids:
+                self._wanting[id_] = (*self._wanting.get(id_, ()), service)
+
+    def handle(self, frame: Frame, t_us: int) -> None:
+        """Let every service that wants the frame answer it."""
+        for service in self._wanting.get(frame.message_id, ()):
+            self._answer(t_us, service.handle, frame, t_us)
+
+    def poll(self, t_us: int) -> None:
+        """Let every service go on with what it is sending."""
+        for service in self._polled:
+            self._answer(t_us, service.poll, t_us)
+
+    def bulk(self, t_us: int) -> bool:
+        """Let services send a datagram each of what clients wait for; whether any did."""
+        sent = False
+        for service in self._bulky:
+            sent |= self._answer(t_us, service.bulk, t_us)
+        return sent
+
+    def _answer(
+        self, t_us: int, service: Callable[..., Sequence[ServiceOutput]], *about: Frame | int
+    ) -> bool:
+        """Send what a service says; its mistake must not end a flight, and is reported once."""
+        sent = False
+        try:
+            for outgoing in service(*about):
+                self._send(outgoing, t_us)
+                sent = True
+        except Exception:
+            if self.failures == 0:
+                traceback.print_exc()
+            self.failures += 1
+        return sent

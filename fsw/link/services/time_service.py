@@ -12,12 +12,12 @@ from messages.frames import Frame
 
 
 class TimeService:
-    """Answers at once, in the vehicle's own time: the one its messages are stamped with."""
+    """Answers in the vehicle's own time, with which its messages are stamped."""
 
     message_ids = frozenset({PING, TIMESYNC})
 
     def handle(self, frame: Frame, t_us: int) -> Sequence[Outgoing]:
-        """Answer a request; answers of others to their own requests are not for us."""
+        """Answer a request; replies to other systems are ignored."""
         if frame.message_id == TIMESYNC:
             answered_ns, sent_ns = frame.payload_values
             return () if answered_ns else (Outgoing(TIMESYNC, (1000 * t_us, sent_ns)),)

@@ -67,5 +67,5 @@ class KeyFile:
         beside.replace(self._path)
 
     def remove(self) -> None:
-        """Forget the key; raises OSError if that is not possible."""
+        """Delete the key; raises OSError if that is not possible."""
         self._path.unlink(missing_ok=True)

@@ -1,6 +1,6 @@
 """MAVLink 2 signing of one link.
 
-A frame is believed if its hash is right, then if its time is: newer than the last of its sender,
+A frame is accepted if its hash is right and then its time: newer than the last of its sender,
 not further ahead than a minute. In this order, because a time taken from a forged frame would lock
 its true sender out. Source: https://mavlink.io/en/guide/message_signing.html
 """
@@ -13,10 +13,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 from hashlib import sha256
-from typing import Final
+from typing import Final, cast
 
 from fsw.link.signing.key_file import KeyFile, SigningKey
+from fsw.link.udp_endpoint import Address, is_loopback
+from fsw.link.wire.decode import Numbers, for_this_vehicle
 from fsw.link.wire.message_ids import HEARTBEAT, RADIO_STATUS
+from fsw.signals import Severity, StatusText
 from messages.frames import Frame, announcing_signature, is_signed, is_version_1
 
 _HASH_SIZE: Final = 6  # bytes, the first of SHA-256
@@ -51,12 +54,9 @@ class Signing:
     """The key of one link and the times of its senders; without a key everything passes."""
 
     def __init__(self, link_id: int, unix_us: Callable[[], int], file: KeyFile | None) -> None:
-        """Take up the key that an earlier flight left.
+        """Take up the key that an earlier flight left; without a file it ends with the process.
 
-        Args:
-            link_id: 0..255, distinguishes our links in our own signatures.
-            unix_us: Wall time [us since 1970].
-            file: Where the key is kept; None forgets it with the process.
+        ``link_id``, 0..255, distinguishes our links in our own signatures.
 
         Raises:
             LinkError: The file is there and cannot be trusted or read.
@@ -85,12 +85,7 @@ class Signing:
         return marked + stamp + self._hash(marked + stamp)
 
     def judge(self, frame: Frame, raw: bytes) -> FrameTrust:
-        """Decide about a frame whose checksum is right.
-
-        Args:
-            frame: What it says.
-            raw: All of its bytes, signature included.
-        """
+        """Decide about a frame whose checksum is right; ``raw`` is all of its bytes."""
         if not self._key:
             return FrameTrust.TRUSTED
         if not is_signed(raw):
@@ -109,12 +104,10 @@ class Signing:
         return FrameTrust.TRUSTED
 
     def set_up(self, key: bytes, initial_time: int) -> None:
-        """Sign from now on with ``key``, or stop signing if it is all zeros.
+        """Sign from now on with a key of 32 bytes, or stop signing if it is all zeros.
 
-        Args:
-            key: 32 bytes.
-            initial_time: Signing time of the sender; ours does not begin before it, unless it is
-                further ahead than a minute.
+        Our signing time does not begin before the sender's ``initial_time``, unless that is further
+        ahead than a minute.
 
         Raises:
             OSError: The key cannot be stored; nothing has changed.
@@ -155,3 +148,29 @@ class Signing:
 
     def _now(self) -> int:
         return (self._unix_us() - 1_000_000 * _EPOCH_UNIX_S) // _UNIT_US
+
+
+def set_up_signing(
+    signing: Signing, frame: Frame, sender: Address, armed: bool
+) -> StatusText | None:
+    """Carry out SETUP_SIGNING, judged already; None if the message was not for this vehicle.
+
+    The key crosses the link in the clear, so only this machine may send it; and storing it takes
+    time, which an armed vehicle does not have. The answer is a text for the operator.
+    """
+    initial_time, system, component, *key = cast(Numbers, frame.payload_values)
+    if not for_this_vehicle(system, component):
+        return None
+    if not is_loopback(sender):
+        return StatusText(
+            Severity.WARNING, "signing unchanged: a key is taken from this machine only"
+        )
+    if armed:
+        return StatusText(Severity.WARNING, "signing unchanged: disarm first")
+    try:
+        signing.set_up(bytes(int(byte) for byte in key), int(initial_time))
+    except OSError as error:
+        return StatusText(
+            Severity.WARNING, f"signing unchanged: the key cannot be kept, {error.strerror}"
+        )
+    return StatusText(Severity.NOTICE, "signing is on" if signing.active else "signing is off")

@@ -53,15 +53,9 @@ class LinkCommands:
     def handle(
         self, frame: Frame, t_us: int, snapshot: FlightSnapshot | None
     ) -> tuple[Sequence[Outgoing], StatusText | None] | None:
-        """Carry out a command to the link.
+        """Carry out a command to the link: what to send, and why it was refused, if it was.
 
-        Args:
-            frame: Any valid frame.
-            t_us: Sensor time [us].
-            snapshot: The newest snapshot; None before the first tick.
-
-        Returns:
-            What to send and why it was refused, if it was; None if the frame is something else.
+        None if the frame is something else. The snapshot is the newest, None before the first tick.
         """
         decoder = _DECODERS.get(frame.message_id)
         request = None if decoder is None else decoder(frame)
@@ -78,7 +72,7 @@ class LinkCommands:
     ) -> _Outcome:
         message_id = _whole(request.params[0])
         if message_id is None:
-            return _DENIED, "message interval: param1 is no message id", ()
+            return _DENIED, "message interval: param1 is not a message id", ()
         interval = self._rates.interval_us(message_id)
         values = (interval, message_id & 0xFFFF)
         return _ACCEPTED, "", (Outgoing(message_ids.MESSAGE_INTERVAL, values),)
@@ -99,7 +93,7 @@ class LinkCommands:
     ) -> _Outcome:
         message_id = _whole(request.params[0])
         if message_id is None:
-            return _DENIED, "request message: param1 is no message id", ()
+            return _DENIED, "request message: param1 is not a message id", ()
         return self._now(message_id, request.params[1], snapshot)
 
     def _request_one(

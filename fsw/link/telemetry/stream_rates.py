@@ -1,4 +1,4 @@
-"""When each message of one link is due, and what SET_MESSAGE_INTERVAL changes about it."""
+"""Message schedule of one link, and its changes by SET_MESSAGE_INTERVAL."""
 
 from __future__ import annotations
 
@@ -28,13 +28,7 @@ class StreamRates:
     """The timetable of one link, in sensor time: the same in real time and in lockstep."""
 
     def __init__(self, streams: Sequence[Stream], rates_hz: Sequence[float], tick_us: int) -> None:
-        """Lay out the defaults.
-
-        Args:
-            streams: What there is to send.
-            rates_hz: Of each stream; 0 for one that is sent on request only.
-            tick_us: No message is sent more often than once a tick [us].
-        """
+        """Lay out the defaults, at most one message a tick; a rate of 0 is sent on request only."""
         self._tick_us = tick_us
         self._begun = False
         self._rows = []
@@ -66,16 +60,7 @@ class StreamRates:
         return UNKNOWN
 
     def set_interval(self, message_id: int, interval_us: int, t_us: int) -> str:
-        """Change how often a message is sent.
-
-        Args:
-            message_id: Which.
-            interval_us: Time between two [us]; 0 for the default, -1 for never.
-            t_us: Sensor time; the next one is due an interval from now.
-
-        Returns:
-            Why not, empty if it is done.
-        """
+        """Change how often a message is sent, 0 as by default, -1 never; says why not."""
         rows = [row for row in self._rows if row.stream.message_id == message_id]
         if not rows:
             return f"message {message_id} is not one that this vehicle sends"

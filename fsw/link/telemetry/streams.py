@@ -101,17 +101,9 @@ API_RATES: Final = tuple(stream.api_hz for stream in STREAMS)
 def messages_now(
     message_id: int, which: float, snapshot: FlightSnapshot, context: TelemetryContext
 ) -> Sequence[Outgoing] | None:
-    """Any message of this vehicle, as it would be sent now.
+    """Any message of this vehicle as it would be sent now; ``which`` [1] is its part, if any.
 
-    Args:
-        message_id: Which.
-        which: Number of the part [1], where it has several.
-        snapshot: Of the last tick.
-        context: What encoders need.
-
-    Returns:
-        The message, or several; nothing where there is nothing to say yet; None if the vehicle has
-        no such message.
+    Empty where there is nothing to say yet; None if the vehicle has no such message.
     """
     answerer = ON_REQUEST.get(message_id)
     if answerer is not None:

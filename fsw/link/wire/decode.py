@@ -51,13 +51,7 @@ def for_this_vehicle(target_system: float, target_component: float) -> bool:
 
 
 def sensor_frame(odometry: Numbers, arm: Numbers, hil_sensor: Numbers) -> SensorFrame:
-    """Sensor readings of one step.
-
-    Args:
-        odometry: ODOMETRY, pose and velocity in local NED, body rates.
-        arm: ARM_JOINT_STATE, joint encoders.
-        hil_sensor: HIL_SENSOR, whose time stamp is the frame's.
-    """
+    """Sensor readings of one step: ODOMETRY in local NED, ARM_JOINT_STATE and HIL_SENSOR."""
     _, px, py, pz, qw, qx, qy, qz, vx, vy, vz = odometry[:11]
     t_us, ax, ay, az, wx, wy, wz = hil_sensor[:7]
     _, q1, q2, _, _, qd1, qd2 = arm[:7]
@@ -127,7 +121,7 @@ def _scaled(number: float, scale: float) -> float:
 
 
 def end_effector_target(values: Numbers) -> EndEffectorTarget | None:
-    """Read an END_EFFECTOR_TARGET; None if it is of no use as a setpoint.
+    """Read an END_EFFECTOR_TARGET; None if it is not a valid setpoint.
 
     A masked velocity, acceleration or yaw reads as zero; a target without a position, in another
     frame than local NED or with a number that is not finite is refused.

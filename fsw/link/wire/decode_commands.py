@@ -1,6 +1,6 @@
-"""MAVLink commands as what they ask of this vehicle: numbers in, a typed action out; pure.
+"""Decodes MAVLink commands: parameters in, a typed action out; pure.
 
-A parameter that means nothing is refused here with a sentence; a NaN leaves it to the vehicle. What
+Invalid parameters are refused here with a sentence; NaN means the vehicle's default. What
 depends on the state of the vehicle is decided in ``fsw.flight.command_handlers``.
 """
 
@@ -49,16 +49,11 @@ _ROI_NONE, _ROI_LOCATION = 0.0, 3.0  # MAV_ROI
 
 
 class _InvalidError(Exception):
-    """A parameter that means nothing."""
+    """An invalid parameter."""
 
 
 def command(request: CommandRequest, locate: Locate) -> Command:
-    """A command with what it asks for.
-
-    Args:
-        request: As it came.
-        locate: Local NED of a place on Earth.
-    """
+    """A command with what it asks for; places on Earth are taken to local NED."""
     reader = _READERS.get(request.command)
     if reader is None:
         return Command(Rejected(CommandResult.UNSUPPORTED), request)
@@ -74,7 +69,7 @@ def _arm_or_disarm(request: CommandRequest, _: Locate) -> CommandAction:
         return Arm(force)
     if wish == 0.0:
         return Disarm(force)
-    raise _InvalidError("arm/disarm wants param1 = 1 or 0")
+    raise _InvalidError("arm/disarm needs param1 = 1 or 0")
 
 
 def _terminate(request: CommandRequest, _: Locate) -> CommandAction:
@@ -85,14 +80,14 @@ def _set_mode(request: CommandRequest, _: Locate) -> CommandAction:
     main, sub = request.params[1], request.params[2]
     mode = MODE_BY_PX4.get((main, 0.0 if math.isnan(sub) else sub))
     if mode is None:
-        raise _InvalidError(f"mode {main:g}/{sub:g} is not one of this vehicle")
+        raise _InvalidError(f"mode {main:g}/{sub:g} is not supported")
     return SwitchMode(mode)
 
 
 def _set_standard_mode(request: CommandRequest, _: Locate) -> CommandAction:
     mode = MODE_BY_STANDARD.get(request.params[0])
     if mode is None:
-        raise _InvalidError(f"standard mode {request.params[0]:g} is not one of this vehicle")
+        raise _InvalidError(f"standard mode {request.params[0]:g} is not supported")
     return SwitchMode(mode)
 
 
@@ -127,7 +122,7 @@ def _orbit(request: CommandRequest, locate: Locate) -> CommandAction:
     if math.isfinite(turns) and turns > 0.0:
         raise _InvalidError("no orbit: turns are not counted; param4 must be 0 or NaN")
     if abs(speed) < MIN_SPEED:
-        raise _InvalidError(f"no orbit: {speed:g} m/s is no speed")
+        raise _InvalidError(f"no orbit: {speed:g} m/s is not a valid speed")
     centre = _place(request, locate, "no orbit")
     return FlyOrbit(
         centre=centre,
@@ -141,8 +136,8 @@ def _orbit(request: CommandRequest, locate: Locate) -> CommandAction:
 def _look_at(request: CommandRequest, locate: Locate) -> CommandAction:
     """The height does not matter; a ground station that clicked on a map sends NaN for it."""
     if any(math.isnan(value) for value in request.params[4:6]):
-        raise _InvalidError("nothing to look at: latitude and longitude are needed")
-    return LookAt(Place(_north_east(request, locate, "nothing to look at")))
+        raise _InvalidError("no region of interest: latitude and longitude are needed")
+    return LookAt(Place(_north_east(request, locate, "no region of interest")))
 
 
 def _look_away(request: CommandRequest, _: Locate) -> CommandAction:
@@ -200,7 +195,7 @@ def _pause_or_continue(request: CommandRequest, _: Locate) -> CommandAction:
         return Order.PAUSE_MISSION
     if wish == 1.0:
         return Order.CONTINUE_MISSION
-    raise _InvalidError("pause/continue wants param1 = 0 or 1")
+    raise _InvalidError("pause/continue needs param1 = 0 or 1")
 
 
 def _set_mission_step(request: CommandRequest, _: Locate) -> CommandAction:
@@ -212,7 +207,7 @@ def _check_arming(request: CommandRequest, _: Locate) -> CommandAction:
 
 
 def _calibrate(request: CommandRequest, _: Locate) -> CommandAction:
-    """All zeros break a calibration off, which is so already."""
+    """All zeros cancel a calibration; none is running."""
     if all(value == 0.0 or math.isnan(value) for value in request.params):
         return Order.NOTHING
     # The prefix is how PX4 tells a ground station's calibration page.
@@ -257,7 +252,7 @@ def _north_east(
     if request.frame == LOCAL_NED:
         return x, y
     if not (abs(x) <= 90.0 and abs(y) <= 180.0):
-        raise _InvalidError(f"{refused}: {x:g}, {y:g} is no latitude and longitude")
+        raise _InvalidError(f"{refused}: {x:g}, {y:g} is not a latitude and longitude")
     return locate(x, y, 0.0)[:2]
 
 

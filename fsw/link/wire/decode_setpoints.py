@@ -1,4 +1,4 @@
-"""Setpoints for now, from wire values; pure. None: of no use, to be refused and counted.
+"""Offboard setpoints from wire values; pure. None: invalid, to be refused and counted.
 
 Groups of three are used whole or not at all; a number that is not used may be NaN, one that is
 used may not. What is out of range is for the vehicle to judge.

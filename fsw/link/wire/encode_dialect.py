@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable
 from typing import Final
 
-from fsw.link.wire.encode_setpoints import as_asked
+from fsw.link.wire.encode_standard import as_asked
 from fsw.link.wire.outgoing import WireValues
 from fsw.link.wire.telemetry_context import TelemetryContext
 from fsw.model.kinematics import point_in_flight
@@ -70,7 +70,7 @@ def end_effector_target(snapshot: FlightSnapshot, _: TelemetryContext) -> WireVa
 
 
 def setpoint_status(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues:
-    """SETPOINT_STATUS: how many setpoints were of use, and which kind is flown."""
+    """SETPOINT_STATUS: how many setpoints were accepted and refused, and which kind is flown."""
     report = snapshot.offboard
     counts = (report.accepted & _U32, report.refused & _U32, min(report.age_us, _U32))
     return (snapshot.t_us, *counts, int(report.kind))

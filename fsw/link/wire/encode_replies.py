@@ -1,4 +1,4 @@
-"""What the vehicle says in answer, to the simulator or a ground station; pure, in wire order."""
+"""Replies to the simulator and to ground stations; pure, in wire order."""
 
 from __future__ import annotations
 
@@ -21,9 +21,7 @@ def command_ack(ack: CommandAck) -> WireValues:
 def status_texts(text: StatusText, text_id: int) -> list[WireValues]:
     """STATUSTEXT messages for one sentence, cut into pieces of 50 bytes.
 
-    Args:
-        text: The sentence.
-        text_id: 1..65535, the same for all pieces so that the receiver joins them.
+    The id, 1..65535, is the same for all pieces, so that the receiver joins them.
     """
     whole = text.text.encode("utf-8")
     if len(whole) <= _TEXT_SIZE:
@@ -38,14 +36,9 @@ def status_texts(text: StatusText, text_id: int) -> list[WireValues]:
 def hil_actuator_controls(
     t_us: int, actuators: ActuatorCommand, armed: bool, thrust_scale: float, torque_scale: float
 ) -> WireValues:
-    """HIL_ACTUATOR_CONTROLS: the answer to the step of ``t_us``.
+    """HIL_ACTUATOR_CONTROLS: the answer to the HIL_SENSOR of ``t_us``.
 
-    Args:
-        t_us: Time stamp of the HIL_SENSOR that is answered.
-        actuators: Rotor thrusts [N] and joint torques [N m].
-        armed: Goes into bit 7 of the mode.
-        thrust_scale: 1 / maximum thrust of a rotor [1/N].
-        torque_scale: 1 / maximum joint torque [1/(N m)].
+    ``thrust_scale`` [1/N] and ``torque_scale`` [1/(N m)] are the inverses of the largest values.
     """
     f1, f2, f3, f4 = actuators.rotor_thrust
     tau1, tau2 = actuators.joint_torque

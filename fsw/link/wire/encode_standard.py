@@ -12,11 +12,10 @@ from typing import Final
 from fsw.control.attitude import attitude_reference
 from fsw.geometry.geodesy import to_global
 from fsw.geometry.rotation import euler_zyx, quaternion_from_matrix
-from fsw.link.wire.encode_setpoints import as_asked
 from fsw.link.wire.outgoing import WireValues
 from fsw.link.wire.px4_mode import custom_mode, shown_mode
 from fsw.link.wire.telemetry_context import TelemetryContext
-from fsw.signals import FlightSnapshot, Mode, SetpointKind, Vec3, Vec4
+from fsw.signals import FlightSnapshot, Mode, MotionSetpoint, SetpointKind, Vec3, Vec4
 
 _QUADROTOR: Final = 2  # MAV_TYPE
 _ARMED: Final = 128  # MAV_MODE_FLAG
@@ -41,7 +40,7 @@ _U32: Final = 0xFFFFFFFF
 
 
 def heartbeat(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues:
-    """HEARTBEAT as PX4 would send it, under whatever autopilot's name."""
+    """HEARTBEAT in PX4's format; the reported autopilot is configurable."""
     shown = shown_mode(snapshot)
     base_mode = _BASE_MODES.get(shown, _BY_ITSELF) | (_ARMED if snapshot.armed else 0)
     if snapshot.mode is Mode.FAULT:
@@ -151,6 +150,15 @@ def orbit_status(snapshot: FlightSnapshot, context: TelemetryContext) -> WireVal
     radius = orbit.radius if orbit.clockwise else -orbit.radius
     place = (round(1e7 * latitude), round(1e7 * longitude), altitude)
     return (snapshot.t_us, radius, *place, _GLOBAL)
+
+
+def as_asked(motion: MotionSetpoint) -> tuple[tuple[float, ...], int]:
+    """A setpoint as it came: position to yaw rate, and POSITION_TARGET_TYPEMASK."""
+    groups = ((motion.p, 0x007), (motion.v, 0x038), (motion.a, 0x1C0))
+    mask = sum(ignored for vector, ignored in groups if vector is None)
+    mask |= (0x400 if motion.yaw is None else 0) | (0x800 if motion.yaw_rate is None else 0)
+    numbers = tuple(number for vector, _ in groups for number in vector or (0.0, 0.0, 0.0))
+    return (*numbers, motion.yaw or 0.0, motion.yaw_rate or 0.0), mask
 
 
 def _boot_ms(t_us: int) -> int:

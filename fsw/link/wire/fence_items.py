@@ -27,9 +27,9 @@ from fsw.link.wire.mission_items import (
     INVALID_PARAM1,
     LOCAL_OFFSET_NED,
     UNSUPPORTED,
+    BadItem,
     Locate,
     MissionItem,
-    Refused,
     horizontal_place,
 )
 from fsw.signals import PointObstacle, SafeSet, Vec2, Wall, WorkspaceSphere
@@ -51,15 +51,10 @@ _CIRCLES: Final = (CIRCLE_INCLUSION, CIRCLE_EXCLUSION)
 _Shape = list[Wall] | list[PointObstacle] | WorkspaceSphere
 
 
-def read_fence(
-    items: tuple[MissionItem, ...], locate: Locate, clearance: float
-) -> SafeSet | Refused:
-    """The safe set of a whole fence.
+def read_fence(items: tuple[MissionItem, ...], locate: Locate, clearance: float) -> SafeSet:
+    """The safe set of a whole fence, whose walls keep a ``clearance`` [m] from critical points.
 
-    Args:
-        items: As uploaded; the vertices of a polygon follow one another.
-        locate: Of places on Earth.
-        clearance: Distance that every critical point keeps from a wall [m].
+    The vertices of a polygon follow one another.
     """
     walls: list[Wall] = []
     cylinders: list[PointObstacle] = []
@@ -69,47 +64,42 @@ def read_fence(
         item = items[at]
         size = _vertex_count(item)
         if size > len(items) - at:
-            return Refused(INVALID, f"a polygon of {size} vertices has {len(items) - at}")
+            raise BadItem(INVALID, f"a polygon of {size} vertices has {len(items) - at}")
         at += size
         if item.command == RETURN_POINT:
             continue
         shape = _shape(items[at - size : at], locate, clearance)
-        if isinstance(shape, Refused):
-            return shape
         if isinstance(shape, WorkspaceSphere):
             if sphere is not None:
-                return Refused(INVALID, "there can be one workspace sphere")
+                raise BadItem(INVALID, "there can be one workspace sphere")
             sphere = shape
         else:
             walls += [one for one in shape if isinstance(one, Wall)]
             cylinders += [one for one in shape if isinstance(one, PointObstacle)]
     if (walls or cylinders) and sphere is not None:
-        return Refused(INVALID, "a fence and a workspace sphere cannot be kept at once")
+        raise BadItem(INVALID, "a fence and a workspace sphere cannot be kept at once")
     for count, most, what in (
         (len(walls), MOST_WALLS, "walls"),
         (len(cylinders), MOST_CYLINDERS, "cylinders of exclusion"),
     ):
         if count > most:
-            return Refused(INVALID, f"a fence of {count} {what}; {most} can be kept")
+            raise BadItem(INVALID, f"a fence of {count} {what}; {most} can be kept")
     return SafeSet(tuple(walls), sphere, tuple(cylinders))
 
 
-def read_fence_item(item: MissionItem, locate: Locate) -> Refused | None:
-    """What is wrong with one item by itself."""
+def check_fence_item(item: MissionItem, locate: Locate) -> None:
+    """Refuse an item that is wrong by itself."""
     if item.command == CIRCLE_INCLUSION and item.frame == LOCAL_OFFSET_NED:
-        sphere = _sphere(item)
-        return sphere if isinstance(sphere, Refused) else None
+        _sphere(item)
+        return
     if item.command not in (*_POLYGONS, *_CIRCLES, RETURN_POINT):
-        return Refused(UNSUPPORTED, f"command {item.command} is no fence of this vehicle")
-    place = horizontal_place(item, locate)
-    if isinstance(place, Refused):
-        return place
+        raise BadItem(UNSUPPORTED, f"command {item.command} is no fence of this vehicle")
+    horizontal_place(item, locate)
     number = item.params[0]
     if item.command in _CIRCLES and not 0.0 < number < math.inf:
-        return Refused(INVALID_PARAM1, f"a circle of radius {number:g} m")
+        raise BadItem(INVALID_PARAM1, f"a circle of radius {number:g} m")
     if item.command in _POLYGONS and not 3.0 <= number <= MOST_WALLS:
-        return Refused(INVALID_PARAM1, f"a polygon of {number:g} vertices; 3 to {MOST_WALLS} do")
-    return None
+        raise BadItem(INVALID_PARAM1, f"a polygon of {number:g} vertices; 3 to {MOST_WALLS} do")
 
 
 def _vertex_count(item: MissionItem) -> int:
@@ -117,23 +107,16 @@ def _vertex_count(item: MissionItem) -> int:
     return int(count) if item.command in _POLYGONS and count >= 1.0 else 1
 
 
-def _shape(items: tuple[MissionItem, ...], locate: Locate, clearance: float) -> _Shape | Refused:
+def _shape(items: tuple[MissionItem, ...], locate: Locate, clearance: float) -> _Shape:
     """One polygon, circle or sphere."""
     for item in items:
-        wrong = read_fence_item(item, locate)
-        if wrong is not None:
-            return wrong
+        check_fence_item(item, locate)
         if (item.command, item.params[0]) != (items[0].command, items[0].params[0]):
-            return Refused(INVALID, "the vertices of a polygon do not agree on their number")
+            raise BadItem(INVALID, "the vertices of a polygon do not agree on their number")
     first = items[0]
     if first.command == CIRCLE_INCLUSION and first.frame == LOCAL_OFFSET_NED:
         return _sphere(first)
-    places: list[Vec2] = []
-    for item in items:
-        place = horizontal_place(item, locate)
-        if isinstance(place, Refused):
-            return place
-        places.append(place)
+    places = [horizontal_place(item, locate) for item in items]
     if first.command == CIRCLE_INCLUSION:
         return walls_of(_octagon(places[0], first.params[0]), clearance)
     if first.command == CIRCLE_EXCLUSION:
@@ -143,19 +126,17 @@ def _shape(items: tuple[MissionItem, ...], locate: Locate, clearance: float) -> 
     return walls_of(places, clearance)
 
 
-def walls_of(corners: list[Vec2], clearance: float) -> list[Wall] | Refused:
-    """Upright walls along the edges of a convex polygon, normals inward.
+def walls_of(corners: list[Vec2], clearance: float) -> list[Wall]:
+    """Upright walls with a ``clearance`` [m] along the edges of a convex polygon, normals inward.
 
-    Args:
-        corners: North and east [m], in either sense of rotation.
-        clearance: Of each wall [m].
+    The corners, north and east [m], may go round in either sense.
     """
     edges = list(zip(corners, corners[1:] + corners[:1], strict=True))
     if any(math.dist(a, b) < _SHORTEST_EDGE for a, b in edges):
-        return Refused(INVALID, f"a polygon with an edge shorter than {_SHORTEST_EDGE:g} m")
+        raise BadItem(INVALID, f"a polygon with an edge shorter than {_SHORTEST_EDGE:g} m")
     area = 0.5 * sum(a[0] * b[1] - b[0] * a[1] for a, b in edges)
     if not abs(area) > _SHORTEST_EDGE**2:
-        return Refused(INVALID, "a polygon without an inside")
+        raise BadItem(INVALID, "a polygon without an inside")
     sense = 1.0 if area > 0.0 else -1.0  # 1: clockwise as seen from above
     walls = []
     for a, b in edges:
@@ -164,20 +145,16 @@ def walls_of(corners: list[Vec2], clearance: float) -> list[Wall] | Refused:
         normal = (-sense * (b[1] - a[1]) / length, sense * (b[0] - a[0]) / length, 0.0)
         offset = normal[0] * a[0] + normal[1] * a[1]
         if any(normal[0] * c[0] + normal[1] * c[1] < offset - 1e-3 for c in corners):
-            return Refused(INVALID, "the polygon is not convex: its inside is no safe set here")
+            raise BadItem(INVALID, "the polygon is not convex: its inside is no safe set here")
         walls.append(Wall(normal, offset, clearance))
     return walls
 
 
 def cylinders_over(corners: list[Vec2], clearance: float) -> list[PointObstacle]:
-    """Upright cylinders that cover a polygon of any shape.
+    """Upright cylinders that cover a polygon of any shape, and a ``clearance`` [m] around it.
 
     The polygon is cut across its long side into pieces about as long as it is wide, and each piece
     is covered by one cylinder about the middle of its bounding box.
-
-    Args:
-        corners: North and east [m].
-        clearance: Kept from the polygon in addition [m].
     """
     along = _long_direction(corners)
     across = (-along[1], along[0])
@@ -248,9 +225,9 @@ def _octagon(centre: Vec2, radius: float) -> list[Vec2]:
     ]
 
 
-def _sphere(item: MissionItem) -> WorkspaceSphere | Refused:
+def _sphere(item: MissionItem) -> WorkspaceSphere:
     if not 0.0 < item.params[0] < math.inf:
-        return Refused(INVALID_PARAM1, f"a sphere of radius {item.params[0]:g} m")
+        raise BadItem(INVALID_PARAM1, f"a sphere of radius {item.params[0]:g} m")
     if not math.isfinite(item.z):
-        return Refused(INVALID_PARAM1 + 6, "a sphere needs the height of its centre")
+        raise BadItem(INVALID_PARAM1 + 6, "a sphere needs the height of its centre")
     return WorkspaceSphere((1e-4 * item.x, 1e-4 * item.y, item.z), item.params[0])

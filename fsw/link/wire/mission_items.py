@@ -1,7 +1,8 @@
 """Mission items as ground stations upload them, read one by one into steps of the vehicle.
 
-An item that means nothing here is refused with MAVLink's own result and a sentence. NaN and 0 in
-parameters that a command does not use are normal; a NaN heading keeps the heading.
+An item that means nothing here is refused by an exception, ``BadItem``, with MAVLink's own result
+and a sentence. NaN and 0 in parameters that a command does not use are normal; a NaN heading keeps
+the heading.
 """
 
 from __future__ import annotations
@@ -63,80 +64,74 @@ class MissionItem:
     autocontinue: int = 1
 
 
-@dataclass(frozen=True, slots=True)
-class Refused:
-    """Why something uploaded is of no use."""
+class BadItem(Exception):
+    """Why something uploaded is of no use: a MAV_MISSION_RESULT and a sentence."""
 
-    result: int  # MAV_MISSION_RESULT
-    reason: str
+    def __init__(self, result: int, reason: str) -> None:
+        super().__init__(reason)
+        self.result = result
+        self.reason = reason
 
 
-def read_step(item: MissionItem, locate: Locate) -> MissionStep | Refused:
-    """What an item means to this vehicle."""
+def read_step(item: MissionItem, locate: Locate) -> MissionStep:
+    """What an item means to this vehicle, or ``BadItem``."""
     reader = _READERS.get(item.command)
     if reader is None:
-        return Refused(UNSUPPORTED, f"command {item.command} is not one of this vehicle's missions")
+        raise BadItem(UNSUPPORTED, f"command {item.command} is not one of this vehicle's missions")
     return reader(item, locate)
 
 
-def read_rally(item: MissionItem, locate: Locate) -> Vec2 | Refused:
+def read_rally(item: MissionItem, locate: Locate) -> Vec2:
     """North and east of a rally point [m]; its altitude is not used, a return has its own."""
     if item.command != NAV_RALLY_POINT:
-        return Refused(UNSUPPORTED, f"command {item.command} is no rally point")
-    place = _place(item, locate)
-    if isinstance(place, Refused):
-        return place
-    return (place[0], place[1]) if place is not None else _bad(5, "a rally point needs a place")
+        raise BadItem(UNSUPPORTED, f"command {item.command} is no rally point")
+    north, east, _ = _place(item, locate, "a rally point needs a place")
+    return north, east
 
 
-def horizontal_place(item: MissionItem, locate: Locate) -> Vec2 | Refused:
+def horizontal_place(item: MissionItem, locate: Locate) -> Vec2:
     """North and east of an item's x and y [m]."""
     for number, value in ((5, item.x), (6, item.y)):
         if value == NO_PLACE:
-            return _bad(number, "a place is missing")
+            raise _bad(number, "a place is missing")
     if item.frame == LOCAL_NED:
         north, east = 1e-4 * item.x, 1e-4 * item.y
     elif item.frame in GLOBAL_FRAMES | HOME_FRAMES:
         latitude, longitude = 1e-7 * item.x, 1e-7 * item.y
         if not (abs(latitude) < 90.0 and abs(longitude) <= 180.0):
-            return _bad(5, f"{latitude:g}, {longitude:g} is no place on Earth")
+            raise _bad(5, f"{latitude:g}, {longitude:g} is no place on Earth")
         north, east, _ = locate(latitude, longitude, 0.0)
     else:
-        return Refused(UNSUPPORTED_FRAME, f"frame {item.frame} is not supported for this item")
+        raise BadItem(UNSUPPORTED_FRAME, f"frame {item.frame} is not supported for this item")
     for number, metres in ((5, north), (6, east)):
         if not abs(metres) <= MAX_DISTANCE:
-            return _bad(number, f"{math.hypot(north, east):.0f} m from the origin is too far")
+            raise _bad(number, f"{math.hypot(north, east):.0f} m from the origin is too far")
     return north, east
 
 
-def _waypoint(item: MissionItem, locate: Locate) -> MissionStep | Refused:
+def _waypoint(item: MissionItem, locate: Locate) -> MissionStep:
     hold, acceptance = item.params[0], item.params[1]
     if not _within(hold, LONGEST_STAY):
-        return _bad(1, f"a stay of {hold:g} s is outside 0 to {LONGEST_STAY:g} s")
+        raise _bad(1, f"a stay of {hold:g} s is outside 0 to {LONGEST_STAY:g} s")
     if not _within(acceptance, WIDEST_ACCEPTANCE):
-        return _bad(2, f"an acceptance of {acceptance:g} m is outside 0 to {WIDEST_ACCEPTANCE:g} m")
+        raise _bad(2, f"an acceptance of {acceptance:g} m is outside 0 to {WIDEST_ACCEPTANCE:g} m")
     return _go(item, locate, hold, acceptance or USUAL_ACCEPTANCE)
 
 
-def _loiter_time(item: MissionItem, locate: Locate) -> MissionStep | Refused:
+def _loiter_time(item: MissionItem, locate: Locate) -> MissionStep:
     if not _within(item.params[0], LONGEST_STAY):
-        return _bad(1, f"a stay of {item.params[0]:g} s is outside 0 to {LONGEST_STAY:g} s")
+        raise _bad(1, f"a stay of {item.params[0]:g} s is outside 0 to {LONGEST_STAY:g} s")
     return _go(item, locate, item.params[0], USUAL_ACCEPTANCE)
 
 
-def _loiter_unlimited(item: MissionItem, locate: Locate) -> MissionStep | Refused:
+def _loiter_unlimited(item: MissionItem, locate: Locate) -> MissionStep:
     return _go(item, locate, math.inf, USUAL_ACCEPTANCE)
 
 
-def _go(item: MissionItem, locate: Locate, hold: float, accept: float) -> MissionStep | Refused:
-    place = _place(item, locate)
-    if isinstance(place, Refused):
-        return place
-    if place is None:
-        return _bad(5, "a waypoint needs a place")
+def _go(item: MissionItem, locate: Locate, hold: float, accept: float) -> MissionStep:
     return MissionStep(
         action=MissionAction.GO,
-        position=place,
+        position=_place(item, locate, "a waypoint needs a place"),
         above_home=item.frame in HOME_FRAMES,
         yaw=_heading(item.params[3]),
         hold_s=hold,
@@ -145,14 +140,11 @@ def _go(item: MissionItem, locate: Locate, hold: float, accept: float) -> Missio
     )
 
 
-def _take_off(item: MissionItem, locate: Locate) -> MissionStep | Refused:
+def _take_off(item: MissionItem, locate: Locate) -> MissionStep:
     """Straight up: the place of a takeoff is where the vehicle stands."""
-    height = _z(item, locate)
-    if isinstance(height, Refused):
-        return height
     return MissionStep(
         MissionAction.TAKE_OFF,
-        (0.0, 0.0, height),
+        (0.0, 0.0, _z(item, locate)),
         item.frame in HOME_FRAMES,
         _heading(item.params[3]),
         acceptance=USUAL_ACCEPTANCE,
@@ -160,28 +152,25 @@ def _take_off(item: MissionItem, locate: Locate) -> MissionStep | Refused:
     )
 
 
-def _land(item: MissionItem, locate: Locate) -> MissionStep | Refused:
+def _land(item: MissionItem, locate: Locate) -> MissionStep:
     yaw = _heading(item.params[3])
     if item.x == NO_PLACE and item.y == NO_PLACE:
         return MissionStep(MissionAction.LAND, yaw=yaw)
-    place = horizontal_place(item, locate)
-    if isinstance(place, Refused):
-        return place
-    position = (place[0], place[1], 0.0)  # the descent is the landing's
+    position = (*horizontal_place(item, locate), 0.0)  # the descent is the landing's
     return MissionStep(MissionAction.LAND, position, yaw=yaw, acceptance=USUAL_ACCEPTANCE)
 
 
-def _return(item: MissionItem, _: Locate) -> MissionStep | Refused:
+def _return(item: MissionItem, _: Locate) -> MissionStep:
     return MissionStep(MissionAction.RETURN)
 
 
-def _delay(item: MissionItem, _: Locate) -> MissionStep | Refused:
+def _delay(item: MissionItem, _: Locate) -> MissionStep:
     if not _within(item.params[0], LONGEST_STAY):
-        return _bad(1, f"a delay of {item.params[0]:g} s is outside 0 to {LONGEST_STAY:g} s")
+        raise _bad(1, f"a delay of {item.params[0]:g} s is outside 0 to {LONGEST_STAY:g} s")
     return MissionStep(MissionAction.DELAY, hold_s=item.params[0], stop_after=not item.autocontinue)
 
 
-def _change_speed(item: MissionItem, _: Locate) -> MissionStep | Refused:
+def _change_speed(item: MissionItem, _: Locate) -> MissionStep:
     """Air speed and ground speed are one here; -1 and -2 mean the usual speed.
 
     A ground station writes what it takes for usual, QGroundControl 5 m/s: the mission is kept as
@@ -189,36 +178,33 @@ def _change_speed(item: MissionItem, _: Locate) -> MissionStep | Refused:
     """
     kind, speed = item.params[0], item.params[1]
     if kind not in (0.0, 1.0):
-        return _bad(1, f"speed type {kind:g} is neither air speed (0) nor ground speed (1)")
+        raise _bad(1, f"speed type {kind:g} is neither air speed (0) nor ground speed (1)")
     if speed in (-1.0, -2.0):
         return MissionStep(MissionAction.SPEED)
     if not 0.01 <= speed <= _MAX_SPEED:
-        return _bad(2, f"a speed of {speed:g} m/s is outside 0.01 to {_MAX_SPEED:g} m/s")
+        raise _bad(2, f"a speed of {speed:g} m/s is outside 0.01 to {_MAX_SPEED:g} m/s")
     return MissionStep(MissionAction.SPEED, speed=speed)
 
 
-def _look_at(item: MissionItem, locate: Locate) -> MissionStep | Refused:
+def _look_at(item: MissionItem, locate: Locate) -> MissionStep:
     """The nose points there on the segments that follow; its height does not matter."""
-    place = horizontal_place(item, locate)
-    if isinstance(place, Refused):
-        return place
-    return MissionStep(MissionAction.LOOK_AT, (*place, 0.0))
+    return MissionStep(MissionAction.LOOK_AT, (*horizontal_place(item, locate), 0.0))
 
 
-def _look_away(item: MissionItem, _: Locate) -> MissionStep | Refused:
+def _look_away(item: MissionItem, _: Locate) -> MissionStep:
     return MissionStep(MissionAction.LOOK_AT)
 
 
-def _look(item: MissionItem, locate: Locate) -> MissionStep | Refused:
+def _look(item: MissionItem, locate: Locate) -> MissionStep:
     if item.params[0] == 0.0:
         return _look_away(item, locate)
     if item.params[0] == 3.0:
         return _look_at(item, locate)
-    return _bad(1, f"kind {item.params[0]:g} of a region of interest is not 0 or 3")
+    raise _bad(1, f"kind {item.params[0]:g} of a region of interest is not 0 or 3")
 
 
 _MAX_SPEED: Final = 20.0  # m/s; faster is a slip of the unit
-_READERS: Final[dict[int, Callable[[MissionItem, Locate], MissionStep | Refused]]] = {
+_READERS: Final[dict[int, Callable[[MissionItem, Locate], MissionStep]]] = {
     NAV_WAYPOINT: _waypoint,
     NAV_LOITER_UNLIMITED: _loiter_unlimited,
     NAV_LOITER_TIME: _loiter_time,
@@ -233,16 +219,13 @@ _READERS: Final[dict[int, Callable[[MissionItem, Locate], MissionStep | Refused]
 }
 
 
-def _place(item: MissionItem, locate: Locate) -> Vec3 | Refused | None:
+def _place(item: MissionItem, locate: Locate, missing: str) -> Vec3:
     if item.x == NO_PLACE and item.y == NO_PLACE:
-        return None
-    across, height = horizontal_place(item, locate), _z(item, locate)
-    if isinstance(across, Refused):
-        return across
-    return height if isinstance(height, Refused) else (*across, height)
+        raise _bad(5, missing)
+    return (*horizontal_place(item, locate), _z(item, locate))
 
 
-def _z(item: MissionItem, locate: Locate) -> float | Refused:
+def _z(item: MissionItem, locate: Locate) -> float:
     """NED z of an item [m], from home where its frame says so."""
     if item.frame == LOCAL_NED:
         z = item.z
@@ -251,9 +234,9 @@ def _z(item: MissionItem, locate: Locate) -> float | Refused:
     elif item.frame in GLOBAL_FRAMES:
         z = locate(0.0, 0.0, item.z)[2]
     else:
-        return Refused(UNSUPPORTED_FRAME, f"frame {item.frame} is not supported for this item")
+        raise BadItem(UNSUPPORTED_FRAME, f"frame {item.frame} is not supported for this item")
     if not -MAX_DISTANCE <= z <= 0.0:
-        return _bad(7, f"a height of {-z:g} m is outside 0 to {MAX_DISTANCE:g} m")
+        raise _bad(7, f"a height of {-z:g} m is outside 0 to {MAX_DISTANCE:g} m")
     return z
 
 
@@ -265,5 +248,5 @@ def _within(value: float, most: float) -> bool:
     return 0.0 <= value <= most
 
 
-def _bad(number: int, reason: str) -> Refused:
-    return Refused(INVALID_PARAM1 + number - 1, reason)
+def _bad(number: int, reason: str) -> BadItem:
+    return BadItem(INVALID_PARAM1 + number - 1, reason)

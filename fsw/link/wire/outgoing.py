@@ -1,4 +1,4 @@
-"""A message on its way out, before it is a frame."""
+"""Outgoing messages, before framing."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Our modes in PX4's numbers, as each flight mode names its own."""
+"""Flight modes in PX4's numbering."""
 
 from __future__ import annotations
 

@@ -17,6 +17,7 @@ from tests.fsw.barriers.horizons import (
     TUNING,
     Case,
     lowest_allowed,
+    measured,
     random_case,
     safe_speed,
 )
@@ -143,3 +144,21 @@ def test_the_tangent_plane_has_the_ball_behind_it() -> None:
 def test_without_obstacles_the_planes_are_the_walls_themselves() -> None:
     walls = (Wall((-1.0, 0.0, 0.0), -1.0, 0.1),)
     assert planes(SafeSet(walls), (0.0, 0.0, 0.0)) is walls
+
+
+def test_an_upright_obstacle_is_kept_off_at_any_height() -> None:
+    """Its rows are those of a ball at the height of each point."""
+    case = random_case(np.random.default_rng(7))
+    place = case.start[0:3] + [0.9, -0.6, 0.0]
+    upright = PointObstacle((float(place[0]), float(place[1]), 50.0), 0.2, upright=True)
+    barrier = PointObstacleBarrier((upright,), TUNING, MODEL)
+    barrier.refill(case.horizon(), case.targets)
+    position, velocity = measured(case.horizon())
+    expected = []
+    for node in range(2, NODES + 1):
+        for point in range(3):
+            away = (position[node, point] - place)[:2]
+            distance = float(np.linalg.norm(away))
+            approach = float(away @ velocity[node, point, :2]) / distance
+            expected.append(safe_speed(distance - 0.2) + approach)
+    np.testing.assert_allclose(barrier.rows.value, expected, atol=1e-5)

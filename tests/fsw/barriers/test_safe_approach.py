@@ -98,3 +98,13 @@ def test_tuning_refuses_a_rate_too_fast_for_its_period(name: str) -> None:
     build(**{name: 10.0}).check_sampling(0.1)
     with pytest.raises(ValueError, match=name.strip("_")):
         build(**{name: 10.1}).check_sampling(0.1)
+
+
+@pytest.mark.parametrize("period", [0.05, 0.25])
+def test_a_rate_too_fast_is_refused_with_the_fastest_that_is_not(period: float) -> None:
+    most = 1.0 / period
+    BarrierTuning(slope=most, gamma=most).check_sampling(period)
+    with pytest.raises(ValueError, match=rf"must not exceed {most} 1/s"):
+        BarrierTuning(slope=1.01 * most, gamma=most).check_sampling(period)
+    with pytest.raises(ValueError, match=rf"gamma is .*; .* must not exceed {most} 1/s"):
+        BarrierTuning(slope=most, gamma=1.01 * most).check_sampling(period)

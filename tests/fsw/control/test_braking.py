@@ -172,7 +172,8 @@ def test_the_paper_s_model_is_braked_without_a_lag() -> None:
 
 
 LEVEL_SPEEDS = st.tuples(*[st.floats(-0.05, 0.05)] * 2)
-LINEAR = Brake(AIRFRAME, 0.3, BrakeTuning(effort=1.0))  # gentle enough to stay within the tilt
+# Gentle enough to stay within the tilt.
+LINEAR = Brake(AIRFRAME, 0.3, BrakeTuning(input_weight=1.0))
 
 
 def linear_state(v: Vec2, a: Vec2, j: Vec2, s: Vec2) -> PredictionState:
@@ -202,7 +203,7 @@ def test_braking_costs_least_of_all_feedbacks_of_the_planned_axis(part: str) -> 
     The cost is the integral of v^2 + price u^2 from a unit of each part, by the Lyapunov equation
     of the axis that the prediction model integrates: v' = a, a' = j, j' = s, s' = kp (u - a) - ...
     """
-    effort = BrakeTuning().effort
+    input_weight = BrakeTuning().input_weight
     a_model, b_model = continuous_model(AIRFRAME)
     axis = [V, A, J, S]
     a_axis, b_axis = a_model[np.ix_(axis, axis)], b_model[axis, :1]
@@ -212,7 +213,7 @@ def test_braking_costs_least_of_all_feedbacks_of_the_planned_axis(part: str) -> 
 
     def cost(k: Array) -> float:
         closed = a_axis - b_axis @ k
-        price = np.diag([1.0, 0.0, 0.0, 0.0]) + effort * k.T @ k
+        price = np.diag([1.0, 0.0, 0.0, 0.0]) + input_weight * k.T @ k
         return float(np.trace(solve_continuous_lyapunov(closed.T, -price)))
 
     index = ["v", "a", "j", "s"].index(part)
@@ -225,7 +226,7 @@ def test_braking_costs_least_of_all_feedbacks_of_the_planned_axis(part: str) -> 
 def test_without_a_lag_only_the_velocity_is_fed_back_with_one_over_the_root_of_the_price() -> None:
     brake = Brake(replace(AIRFRAME, attitude_lag=AttitudeLag(at_once=True)), 0.3)
     moving = linear_state((0.05, -0.04), (3.0, 2.0), (5.0, -4.0), (9.0, 8.0))
-    gain = 1.0 / math.sqrt(BrakeTuning().effort)
+    gain = 1.0 / math.sqrt(BrakeTuning().input_weight)
     assert brake(moving).a == pytest.approx((-0.05 * gain, 0.04 * gain, 0.0))
 
 

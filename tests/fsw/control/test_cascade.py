@@ -1,4 +1,4 @@
-"""One fast cycle as a whole: what the rotors and joints are told to do to the body."""
+"""One fast cycle as a whole: the effect of the rotor and joint commands on the body."""
 
 from __future__ import annotations
 
@@ -161,7 +161,9 @@ def test_missed_ticks_are_made_up_for_by_rotor_model_and_observer(ticks: int) ->
         expected = observe(expected, estimate.v_WB, (0.0, 0.0, lift), TUNING.tracking, DT)
     np.testing.assert_allclose(after.observed.v, expected.v, atol=1e-12)
     np.testing.assert_allclose(after.observed.d, expected.d, atol=1e-12)
-    np.testing.assert_allclose(after.observed.disturbance_bias, expected.lasting, atol=1e-12)
+    np.testing.assert_allclose(
+        after.observed.disturbance_bias, expected.disturbance_bias, atol=1e-12
+    )
 
 
 def test_the_servos_hold_the_arm_in_the_field_that_the_thrust_makes() -> None:

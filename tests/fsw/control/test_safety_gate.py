@@ -13,7 +13,7 @@ from fsw.model.airframe import AIRFRAME
 from fsw.signals import STOPPED, ActuatorCommand
 
 anything = st.floats(allow_nan=True, allow_infinity=True)
-wishes = st.builds(
+commands = st.builds(
     ActuatorCommand,
     rotor_thrust=st.tuples(*[anything] * 4),
     joint_torque=st.tuples(*[anything] * 2),
@@ -25,23 +25,25 @@ allowed = st.builds(
 )
 
 
-@given(wishes, allowed, st.booleans())
+@given(commands, allowed, st.booleans())
 def test_what_is_sent_is_finite_and_within_limits(
-    wish: ActuatorCommand, last: ActuatorCommand, armed: bool
+    wanted: ActuatorCommand, last: ActuatorCommand, armed: bool
 ) -> None:
-    sent, _ = gate(AIRFRAME, wish, last, armed)
+    sent, _ = gate(AIRFRAME, wanted, last, armed)
     assert all(0.0 <= f <= AIRFRAME.rotor_thrust_max for f in sent.rotor_thrust)
     assert all(abs(t) <= AIRFRAME.joint_torque_max for t in sent.joint_torque)
 
 
-@given(wishes, allowed)
-def test_disarmed_everything_stands_still(wish: ActuatorCommand, last: ActuatorCommand) -> None:
-    assert gate(AIRFRAME, wish, last, armed=False) == (STOPPED, False)
+@given(commands, allowed)
+def test_disarmed_everything_stands_still(wanted: ActuatorCommand, last: ActuatorCommand) -> None:
+    assert gate(AIRFRAME, wanted, last, armed=False) == (STOPPED, False)
 
 
 @given(allowed, allowed)
-def test_an_allowed_wish_passes_unchanged(wish: ActuatorCommand, last: ActuatorCommand) -> None:
-    assert gate(AIRFRAME, wish, last, armed=True) == (wish, False)
+def test_an_allowed_command_passes_unchanged(
+    wanted: ActuatorCommand, last: ActuatorCommand
+) -> None:
+    assert gate(AIRFRAME, wanted, last, armed=True) == (wanted, False)
 
 
 LAST = ActuatorCommand((1.0, 2.0, 3.0, 4.0), (0.1, 0.2))
@@ -55,10 +57,10 @@ def test_a_wish_that_is_no_number_repeats_the_last_and_is_reported(
     values = [5.0, 5.0, 5.0, 5.0, 0.0, 0.0]
     values[place] = value
     f1, f2, f3, f4, t1, t2 = values
-    wish = ActuatorCommand((f1, f2, f3, f4), (t1, t2))
-    assert gate(AIRFRAME, wish, LAST, armed=True) == (LAST, True)
+    wanted = ActuatorCommand((f1, f2, f3, f4), (t1, t2))
+    assert gate(AIRFRAME, wanted, LAST, armed=True) == (LAST, True)
 
 
 def test_opposite_infinities_do_not_cancel() -> None:
-    wish = ActuatorCommand((math.inf, -math.inf, 1.0, 1.0), (0.0, 0.0))
-    assert gate(AIRFRAME, wish, LAST, armed=True) == (LAST, True)
+    wanted = ActuatorCommand((math.inf, -math.inf, 1.0, 1.0), (0.0, 0.0))
+    assert gate(AIRFRAME, wanted, LAST, armed=True) == (LAST, True)

@@ -165,7 +165,7 @@ errors = st.floats(-1e3, 1e3)
 def test_far_from_the_plan_acceleration_and_jerk_wishes_are_limited(
     e_p: float, e_v: float, d: float
 ) -> None:
-    """At the vehicle's own a = j = 0 the wish is K4 times a jerk of at most its limit."""
+    """At the vehicle's own a = j = 0 the command is K4 times a jerk of at most its limit."""
     wanted = snap_command(LAW, AxisState(-e_p, -e_v, 0.0, 0.0, 0.0), d, 0.0, REST, 0.0)
     k4 = LAW.gains.k[3]
     assert abs(wanted) <= k4 * TUNING.jerk_limit + 1e-9

@@ -105,7 +105,8 @@ def _pushed_once(wind: bool) -> tuple[Array, Array, Array]:
         # Without its slow memory, which the tube counts apart.
         believed = observe(believed, (v, 0.0, 0.0), (a, 0.0, 0.0), QUICK, fine)
         d = believed.d[0]
-        w = snap_command(law, -p, -believed.v[0], -s, d, now * wind, a, j, 0.0, 0.0, 0.0)
+        axis = AxisState(p, believed.v[0], a, j, s)
+        w = snap_command(law, axis, d, now * wind, REST, 0.0)
         s = w + (s - w) * decay
         p, v, a, j = p + fine * v, v + fine * (a + now * (not wind)), a + fine * j, j + fine * s
         if k % 8 == 7:

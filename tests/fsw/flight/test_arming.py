@@ -1,4 +1,4 @@
-"""What stands against arming, what force overrides, and what waiting will not change."""
+"""Why arming is refused, what force overrides, and what waiting does not change."""
 
 from __future__ import annotations
 

@@ -52,3 +52,9 @@ def test_a_flood_of_senders_does_not_grow_the_memory() -> None:
         memory = remember(memory, asked(sender=sender), 0, sender)  # type: ignore[assignment]
     assert len(memory) <= 8
     assert answered_before(memory, asked(sender=255), 256) is not None
+
+
+def test_the_first_repetition_is_a_repetition() -> None:
+    memory = remember((), asked(), 0, 1_000_000)
+    assert answered_before(memory, asked(again=1), 3_999_999) is not None
+    assert answered_before(memory, asked(again=0), 3_999_999) is None

@@ -34,11 +34,11 @@ FINE = FailsafeContext(
     plan_period_us=PERIOD_US,
     plan_refused=False,
     output_replaced=False,
-    setpoint_fresh=False,
+    setpoint_fresh=True,
     gcs_silent_us=0,
     battery=BatteryState(),
 )
-OFFBOARD = replace(FINE, mode=Mode.OFFBOARD)
+OFFBOARD = replace(FINE, mode=Mode.OFFBOARD, setpoint_fresh=False)
 
 
 def charged(charge: Charge) -> BatteryState:
@@ -179,3 +179,11 @@ def test_a_fault_is_the_vehicles_own() -> None:
     others = {Condition.SETPOINTS_LOST, Condition.DATALINK_LOST, Condition.BATTERY_LOW}
     others |= {Condition.BATTERY_CRITICAL, Condition.BATTERY_EMERGENCY}
     assert set(Condition) - others == FAULTS
+
+
+@pytest.mark.parametrize("share", [0.0, 0.5, 0.994, 1.0])
+def test_what_is_left_of_the_battery_is_told_in_percent(share: float) -> None:
+    battery = BatteryState(remaining=share, charge=Charge.LOW)
+    context = replace(FINE, battery=battery)
+    (row,) = active(context)
+    assert report(row, context, Action.WARN)[1] == f"battery low: {round(100 * share)} % left"

@@ -52,7 +52,7 @@ def go(*p: float, hold: float = 0.0, **more: object) -> MissionStep:
 
 @dataclass
 class Flown:
-    """A mission flown by a vehicle that is always where the reference is, unless told."""
+    """A mission flown by a vehicle that is always where the reference is, unless set otherwise."""
 
     flight: MissionFlight
     t_us: int = 0

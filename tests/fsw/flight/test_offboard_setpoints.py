@@ -80,9 +80,9 @@ def test_a_motion_is_refused_beyond_its_range_in_any_direction(
         for vector in ((1.0, 0.0, 0.0), (0.0, -0.6, 0.8), (-0.6, 0.0, -0.8)):
             value = tuple(c * share * most if c else 0.0 for c in vector)
             setpoint = MotionSetpoint(False, **{name: value})  # type: ignore[arg-type]
-            told = motion_refusal(setpoint)
-            assert (told == f"{words} out of range") is refused
-            assert (told is None) is not refused
+            reported = motion_refusal(setpoint)
+            assert (reported == f"{words} out of range") is refused
+            assert (reported is None) is not refused
 
 
 @pytest.mark.parametrize(("name", "most"), [("yaw", 4.0 * math.pi), ("yaw_rate", 10.0)])
@@ -112,8 +112,8 @@ def test_a_heading_is_refused_beyond_its_range_either_way(name: str, most: float
     ],
 )
 def test_an_attitude_is_refused_out_of_range(setpoint: AttitudeSetpoint, words: str | None) -> None:
-    told = attitude_refusal(setpoint)
-    assert told is None if words is None else words in (told or "")
+    reported = attitude_refusal(setpoint)
+    assert reported is None if words is None else words in (reported or "")
 
 
 LIMIT1, LIMIT12 = AIRFRAME.joint1_limit, AIRFRAME.joint12_limit
@@ -135,5 +135,5 @@ LIMIT1, LIMIT12 = AIRFRAME.joint1_limit, AIRFRAME.joint12_limit
     ],
 )
 def test_the_arm_is_refused_what_it_cannot_do(q_arm: Vec2, words: str | None) -> None:
-    told = joints_refusal(q_arm, AIRFRAME)
-    assert told is None if words is None else words in (told or "")
+    reported = joints_refusal(q_arm, AIRFRAME)
+    assert reported is None if words is None else words in (reported or "")

@@ -1,4 +1,4 @@
-"""Between tick and planner: what is asked, what is flown, what is counted."""
+"""Requests to the planner, the plans that are flown, and the counters."""
 
 from __future__ import annotations
 

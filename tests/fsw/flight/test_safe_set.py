@@ -36,7 +36,7 @@ def received(
 ) -> tuple[MissionMemory, list[StatusText]]:  # fmt: skip
     texts: list[StatusText] = []
     uploaded = MissionUpdate(**update) if update else None  # type: ignore[arg-type]
-    return check.receive(memory, uploaded, announced, texts, flies=flies), texts
+    return check.update(memory, uploaded, announced, texts, flies=flies), texts
 
 
 def test_what_is_announced_and_the_fence_are_in_force_together() -> None:

@@ -1,4 +1,4 @@
-"""The reference that runs ahead: within limits, to its place, out of the walls."""
+"""The generated setpoint: within limits, to its goal, clear of the walls."""
 
 from __future__ import annotations
 

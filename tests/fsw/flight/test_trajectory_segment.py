@@ -1,4 +1,4 @@
-"""Legs of a mission: smooth, within their limits, and not slower than need be."""
+"""Mission segments: smooth, within their limits, and as fast as these allow."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ def station_socket() -> socket.socket:
 
 
 @dataclass
-class Wall:
+class ManualClock:
     """Clocks that a test moves."""
 
     now_us: int = 0
@@ -48,7 +48,7 @@ class Ground:
     link: GcsLink
     links: GroundLinks
     inbox: Inbox
-    wall: Wall
+    clock: ManualClock
     recorded: list[tuple[int, bytes]] = field(default_factory=list)
     t_us: int = 1_000_000
     ticks: int = 0
@@ -96,22 +96,22 @@ def ground_station(
     api: bool = False,
     key_file: KeyFile | None = None,
 ) -> Iterator[Ground]:
-    """A link to a ground station, or to a program, that nobody else knows."""
-    station, inbox, wall = station_socket(), Inbox(), Wall()
+    """A link to a ground station, or to a program, of its own."""
+    station, inbox, clock = station_socket(), Inbox(), ManualClock()
     recorded: list[tuple[int, bytes]] = []
     rates = API_RATES if api else GROUND_RATES
     link = GcsLink(
         LinkSetup("test", station.getsockname(), 0, rates, unheard=not api),
         inbox,
         CONTEXT,
-        Signing(0, lambda: wall.unix_us, key_file),
-        lambda: wall.now_us,
+        Signing(0, lambda: clock.unix_us, key_file),
+        lambda: clock.now_us,
         lambda t, frame: recorded.append((t, frame)),
         services,
     )
-    links = GroundLinks([link], 2_000, lambda: wall.now_us)
+    links = GroundLinks([link], 2_000, lambda: clock.now_us)
     try:
-        yield Ground(station, link, links, inbox, wall, recorded)
+        yield Ground(station, link, links, inbox, clock, recorded)
     finally:
         links.close()
         station.close()

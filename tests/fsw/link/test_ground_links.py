@@ -81,7 +81,7 @@ def test_an_answer_goes_to_the_link_the_command_came_from(
     links.acknowledge(1_000_000, CommandAck(400, 0, 245, 190))
     assert [f.message_id for f in api.heard()] == [ids.COMMAND_ACK]
     assert gcs.heard() == []
-    links.acknowledge(1_000_000, CommandAck(400, 0, 99, 1))  # of nobody known: to all
+    links.acknowledge(1_000_000, CommandAck(400, 0, 99, 1))  # of no known peer: to all
     assert [len(ground.heard()) for ground in (gcs, api)] == [1, 1]
 
 
@@ -92,7 +92,7 @@ def test_between_ticks_the_time_is_told_within_a_millisecond(
     _, api, links = both
     client = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     client.settimeout(1.0)
-    delays, told = [], []
+    delays, reported = [], []
 
     def ask() -> None:
         writer = FrameWriter(245, 190)
@@ -101,8 +101,8 @@ def test_between_ticks_the_time_is_told_within_a_millisecond(
             values = (0, number) if number % 2 else (number, number, 0, 0)
             frame = writer.frame(ids.TIMESYNC if number % 2 else ids.PING, *values)
             client.sendto(frame, ("127.0.0.1", api.link.port))
-            while not told or told[-1].payload_values[1] != number:
-                told.extend(
+            while not reported or reported[-1].payload_values[1] != number:
+                reported.extend(
                     f for f in split(client.recv(2048)) if f.message_id in (ids.TIMESYNC, ids.PING)
                 )
             delays.append((time.monotonic_ns() - sent) / 1e6)
@@ -118,7 +118,7 @@ def test_between_ticks_the_time_is_told_within_a_millisecond(
     asking.join()
     client.close()
     assert sorted(delays)[len(delays) // 2] < 1.0  # ms
-    synced = [f for f in told if f.message_id == ids.TIMESYNC]
+    synced = [f for f in reported if f.message_id == ids.TIMESYNC]
     assert len(synced) == 20
     assert all(5_000_000 <= f.payload_values[0] / 1000 <= t_us + 2_000 for f in synced)
 

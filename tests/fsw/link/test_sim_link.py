@@ -100,9 +100,9 @@ def test_walls_and_points_arrive_as_the_pilot_announces_them(wire: Wire) -> None
     safe_set = wire.inbox.take_safe_set()
     assert safe_set is not None
     assert [wall.offset for wall in safe_set.walls] == [-1.0]
-    for heard, told in zip(safe_set.obstacles, scenario.obstacles, strict=True):
-        assert heard.position == pytest.approx(told.position_m)
-        assert heard.clearance == pytest.approx(told.clearance_m)
+    for heard, reported in zip(safe_set.obstacles, scenario.obstacles, strict=True):
+        assert heard.position == pytest.approx(reported.position_m)
+        assert heard.clearance == pytest.approx(reported.clearance_m)
 
 
 def test_a_repeated_step_gets_the_same_answer_and_no_tick(wire: Wire) -> None:
@@ -162,7 +162,7 @@ def test_acknowledgements_come_before_the_actuators_and_are_repeated_with_them(w
 
 
 def test_the_simulator_is_told_the_mode_when_it_changes_and_once_a_second(wire: Wire) -> None:
-    told = []
+    reported = []
     for step in range(1, 1001):
         t_us = 1_000_000 + 2_000 * step
         outputs = outputs_at(t_us)
@@ -171,8 +171,8 @@ def test_the_simulator_is_told_the_mode_when_it_changes_and_once_a_second(wire: 
         wire.link.send_actuators(t_us, outputs)
         for frame in split(wire.hear()):
             if frame.message_id == ids.HEARTBEAT:
-                told.append((step, frame.payload_values[0]))
-    assert told == [(1, 0x0B040000), (501, 0x0B040000), (700, 0x03040000)]
+                reported.append((step, frame.payload_values[0]))
+    assert reported == [(1, 0x0B040000), (501, 0x0B040000), (700, 0x03040000)]
 
 
 def test_the_heartbeat_of_the_simulator_says_who_waits(wire: Wire) -> None:

@@ -1,4 +1,4 @@
-"""Repeated sentences are counted, others are said, and a flood of them ends in one."""
+"""Repeated texts are counted, others are sent, and a flood ends in one summary."""
 
 from __future__ import annotations
 
@@ -40,13 +40,13 @@ def test_other_sentences_are_said_at_once() -> None:
 def test_a_flood_of_different_sentences_is_bounded_and_told() -> None:
     """Refusals with a number that changes, a hundred times a second."""
     limiter = TextLimiter()
-    said = [
+    reported = [
         limiter.admit(StatusText(Severity.CRITICAL, f"no goto: {k} m is too low"), k * S // 100)
         for k in range(1000)
     ]
-    assert sum(text is not None for text in said) <= 20 + 5 * 10 + 1
+    assert sum(text is not None for text in reported) <= 20 + 5 * 10 + 1
     (left_out,) = [text for text in limiter.overdue(11 * S) if "left out" in text.text]
-    assert left_out.text.startswith(f"{sum(text is None for text in said)} more texts")
+    assert left_out.text.startswith(f"{sum(text is None for text in reported)} more texts")
     assert limiter.admit(REFUSED, 20 * S) is REFUSED, "and then there is room again"
 
 

@@ -1,4 +1,4 @@
-"""Whom a vehicle listens to."""
+"""From which addresses a vehicle accepts datagrams."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ from fsw.signals import SensorFrame, TickInputs
 from messages.block_file import BlockFile
 from tests.fsw.link.snapshots import outputs_at
 from tests.fsw.log.specimens import inputs
-from tests.fsw.log.test_recorded_inputs import SUBJECT
+from tests.fsw.log.test_reader import SUBJECT
 from tests.waiting import wait_for
 
 _THREE = (0.5, 0.5, 0.5)
@@ -53,8 +53,8 @@ def small_disk() -> Iterator[None]:
 def test_a_full_disk_ends_the_files_and_is_told_once_a_file(
     lockstep: bool, tmp_path: Path, small_disk: None
 ) -> None:
-    told: list[str] = []
-    files = RunFiles(tmp_path, 0, SUBJECT, told.append)
+    received: list[str] = []
+    files = RunFiles(tmp_path, 0, SUBJECT, received.append)
     files.ulog.begin(1_000_000, lockstep)
     for _ in range(3):
         write_ticks(files.ulog, 300)
@@ -63,12 +63,12 @@ def test_a_full_disk_ends_the_files_and_is_told_once_a_file(
         files.check()
     files.close()
     files.close()
-    assert sorted(told) == [
+    assert sorted(received) == [
         "flight.tlog ends early: File too large",
         "flight.ulg ends early: File too large",
     ]
-    said = files.as_json()
-    assert said["flight.ulg"] == {
+    reported = files.as_json()
+    assert reported["flight.ulg"] == {
         "bytes": (tmp_path / "flight.ulg").stat().st_size,
         "dropped_blocks": 0,
         "failure": "File too large",

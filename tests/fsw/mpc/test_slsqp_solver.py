@@ -151,7 +151,7 @@ def test_margins_and_bounds_together_admit_what_the_program_admits() -> None:
     start, targets = instance(random, WALLS)
     ocp = Ocp(CONFIG, MODEL, WALLS)
     point = NonlinearProgram(ocp, start, targets)
-    verdicts = set()
+    results = set()
     for _ in range(200):
         x = point.rest()
         x[: INPUTS * N] += random.uniform(-1.0, 1.0, INPUTS * N) * random.choice([0.1, 2.0, 5.0])
@@ -167,8 +167,8 @@ def test_margins_and_bounds_together_admit_what_the_program_admits() -> None:
         t, ax, ay = left[whole.nonnegative_rows :].reshape(-1, 3).T
         expected = left[: whole.nonnegative_rows].min() >= 0.0 and (t >= np.hypot(ax, ay)).all()
         assert admitted == expected
-        verdicts.add(admitted)
-    assert verdicts == {True, False}
+        results.add(admitted)
+    assert results == {True, False}
 
 
 def test_no_plan_without_convergence() -> None:

@@ -1,4 +1,4 @@
-"""A configuration that cannot keep its safe set says so, with a value that would do."""
+"""A configuration that cannot keep its safe set says so, with a value that is enough."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def test_the_papers_lambda_is_refused_with_a_value_that_would_do(
     config = flight_config(robustness=preset)
     against = refusals(analyse(config, safe_set, loop_tube(config)))
     assert against
-    assert all("would do" in sentence for sentence in against)
+    assert all("is enough" in sentence for sentence in against)
 
 
 def test_the_sphere_finding_turns_exactly_where_the_centre_can_hold() -> None:

@@ -27,9 +27,9 @@ DEFAULTS = {parameter.name: parameter.default for parameter in PARAMETERS}
 def by_mavproxy(path: Path) -> dict[str, float]:
     """What pymavlink's reader, which MAVProxy uses, makes of a file."""
     read = MAVParmDict()
-    with contextlib.redirect_stdout(io.StringIO()) as said:
+    with contextlib.redirect_stdout(io.StringIO()) as reported:
         assert read.load(str(path), use_excludes=False)
-    assert "Invalid" not in said.getvalue()
+    assert "Invalid" not in reported.getvalue()
     return dict(read)
 
 
@@ -86,14 +86,14 @@ def test_a_params_file_has_qgroundcontrol_s_columns() -> None:
     ("line", "why"),
     [
         ("1\t1\tNOT_OURS\t1\t9", "NOT_OURS is unknown"),
-        ("PID_YAW_P five", "five is no number"),
+        ("PID_YAW_P five", "five is not a number"),
         ("PID_YAW_P nan", "PID_YAW_P is to be 0..50, nan is refused"),
         ("PID_YAW_P inf", "inf is refused"),
         ("PID_YAW_P 1e9", "1e+09 is refused"),
         ("1\t154\tPID_YAW_P\t1\t9", "it is for component 1/154"),
-        ("garbage", "it is no parameter"),
-        ("\x00\ufffd\x1b[2J a b", "it is no parameter"),
-        ("PID_YAW_P 0x10", "0x10 is no number"),
+        ("garbage", "it is not a parameter"),
+        ("\x00\ufffd\x1b[2J a b", "it is not a parameter"),
+        ("PID_YAW_P 0x10", "0x10 is not a number"),
     ],
 )
 def test_a_line_of_no_use_is_passed_over_with_a_sentence(line: str, why: str) -> None:

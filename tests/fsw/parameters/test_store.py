@@ -1,4 +1,4 @@
-"""Changes on their way into use: one at a time, whole, kept before they are told."""
+"""Changes on their way into use: one at a time, whole, stored before they are reported."""
 
 from __future__ import annotations
 

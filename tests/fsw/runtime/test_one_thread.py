@@ -35,14 +35,14 @@ def test_it_is_pinned_before_numpy_is_there_to_read_it(start: str) -> None:
     }
     done = subprocess.run(
         [sys.executable, "-c", START + start],
-        env={**outside, "OMP_NUM_THREADS": "2"},  # a user's own wish for other programs
+        env={**outside, "OMP_NUM_THREADS": "2"},  # set by a user for other programs
         capture_output=True,
         text=True,
         check=True,
     )
-    early, threads, told = json.loads(done.stdout)
+    early, threads, variables = json.loads(done.stdout)
     assert not early
     assert threads == 1, "BLAS starts its threads when numpy is imported"
-    assert told == {
+    assert variables == {
         f"{library}_NUM_THREADS": "1" for library in ("OPENBLAS", "OMP", "MKL", "NUMBA", "RAYON")
     }

@@ -1,4 +1,4 @@
-"""What a child does is left on disk, and nowhere else."""
+"""A child process leaves its results on disk and changes nothing in its parent."""
 
 from __future__ import annotations
 

@@ -19,10 +19,10 @@ ACCEPTED, UNSUPPORTED = 0, 3
 
 def test_node_mavlink_reads_and_commands_the_vehicle(vehicle: Vehicle) -> None:
     client = environment_of("node") / "client.mjs"
-    said = subprocess.run(
+    reported = subprocess.run(
         ["node", str(client), str(vehicle.gcs_port)], capture_output=True, text=True, check=True
     )
-    seen = json.loads(said.stdout)
+    seen = json.loads(reported.stdout)
     assert {"HEARTBEAT", "ATTITUDE", "LOCAL_POSITION_NED", "SYS_STATUS"} <= set(seen["messages"])
     assert seen["messages"]["ATTITUDE"] > 100
     assert seen["acks"] == {ARM: ACCEPTED, UNKNOWN: UNSUPPORTED}

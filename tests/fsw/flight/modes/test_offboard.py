@@ -1,4 +1,4 @@
-"""Setpoints for now: which is the newest, how long it counts, and what it makes of the vehicle."""
+"""Offboard setpoints: the newest one, its timeout, and its effect on the vehicle."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from fsw.flight.modes.offboard import Offboard, is_fresh, receive, report
+from fsw.flight.modes.offboard import Offboard, accept_setpoints, is_fresh, report
 from fsw.flight.setpoint_generator import PositionGoal, ReferenceState
 from fsw.flight.state import FlightState, OffboardMemory, SetpointMemory
 from fsw.signals import (
@@ -43,7 +43,7 @@ NOW_US = 10_000_000
 HERE: Vec3 = (0.0, 0.0, -2.0)
 
 
-def told(t_us: int = NOW_US, **fields: Any) -> TickInputs:
+def reported(t_us: int = NOW_US, **fields: Any) -> TickInputs:
     return TickInputs(replace(SENSORS, t_us=t_us), **fields)
 
 
@@ -52,28 +52,28 @@ def hearing(**memory: Any) -> FlightState:
 
 
 def test_the_newest_of_motion_and_attitude_counts_and_joints_count_beside_them() -> None:
-    memory = receive(OffboardMemory(), told(motion=MOTION), CONFIG)
+    memory = accept_setpoints(OffboardMemory(), reported(motion=MOTION), CONFIG)
     assert (memory.motion, memory.attitude, memory.motion_us) == (MOTION, None, NOW_US)
-    memory = receive(memory, told(NOW_US + 1, attitude=ATTITUDE), CONFIG)
+    memory = accept_setpoints(memory, reported(NOW_US + 1, attitude=ATTITUDE), CONFIG)
     assert (memory.motion, memory.attitude, memory.motion_us) == (None, ATTITUDE, NOW_US + 1)
-    memory = receive(memory, told(NOW_US + 2, joints=JOINTS), CONFIG)
+    memory = accept_setpoints(memory, reported(NOW_US + 2, joints=JOINTS), CONFIG)
     assert (memory.attitude, memory.joints) == (ATTITUDE, JOINTS)
     assert (memory.motion_us, memory.joints_us) == (NOW_US + 1, NOW_US + 2)
-    memory = receive(memory, told(NOW_US + 3, motion=MOTION), CONFIG)
+    memory = accept_setpoints(memory, reported(NOW_US + 3, motion=MOTION), CONFIG)
     assert (memory.motion, memory.attitude, memory.joints) == (MOTION, None, JOINTS)
     assert (memory.accepted, memory.refused) == (4, 0)
 
 
 def test_what_is_out_of_range_is_counted_and_not_kept() -> None:
     before = OffboardMemory(motion=MOTION, motion_us=5, accepted=7, refused=2)
-    wild = told(
+    wild = reported(
         motion=MotionSetpoint(False, (1e9, 0.0, 0.0)),
         attitude=AttitudeSetpoint(9.0),
         joints=JointSetpoint((9.0, 0.0)),
         refused_setpoints=4,
     )
-    assert receive(before, wild, CONFIG) == replace(before, refused=2 + 4 + 3)
-    mixed = receive(before, replace(wild, joints=JOINTS, refused_setpoints=0), CONFIG)
+    assert accept_setpoints(before, wild, CONFIG) == replace(before, refused=2 + 4 + 3)
+    mixed = accept_setpoints(before, replace(wild, joints=JOINTS, refused_setpoints=0), CONFIG)
     assert (mixed.accepted, mixed.refused) == (8, 4)
 
 
@@ -225,8 +225,13 @@ def test_telemetry_shows_the_kind_in_use_and_its_age(
     memory: dict[str, Any], kind: SetpointKind
 ) -> None:
     state = hearing(accepted=3, refused=1, **memory)
-    told = report(state, 1005)
-    assert (told.kind, told.accepted, told.refused, told.age_us) == (kind, 3, 1, 1000)
+    reported = report(state, 1005)
+    assert (reported.kind, reported.accepted, reported.refused, reported.age_us) == (
+        kind,
+        3,
+        1,
+        1000,
+    )
     elsewhere = replace(state, vehicle=replace(state.vehicle, mode=Mode.HOLD))
     assert report(elsewhere, 1005).kind is SetpointKind.NONE
     assert report(hearing(), 1005) == OffboardReport()

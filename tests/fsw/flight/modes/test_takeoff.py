@@ -45,7 +45,7 @@ def test_it_is_done_when_the_reference_has_climbed(t_us: int, done: bool) -> Non
 def test_chosen_before_arming_it_is_forgotten_after_a_while(later_us: int, forgotten: bool) -> None:
     state = replace(STATE, vehicle=replace(STATE.vehicle, intended_us=500_000))
     text = TAKEOFF.waits(state, 500_000 + later_us)
-    assert (text == "takeoff forgotten: not armed within 3 s") is forgotten
+    assert (text == "takeoff cancelled: not armed within 3 s") is forgotten
     assert (text is None) is not forgotten
 
 

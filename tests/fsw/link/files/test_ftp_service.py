@@ -45,7 +45,7 @@ class ServiceOutput:
         return self.data[0] if self.opcode == Opcode.NAK else None
 
 
-def said(outgoing: PackedOutgoing) -> ServiceOutput:
+def decoded(outgoing: PackedOutgoing) -> ServiceOutput:
     assert outgoing.message_id == ids.FILE_TRANSFER_PROTOCOL
     network, system, component, *payload = (int(value) for value in values_of(outgoing))
     assert network == 0
@@ -89,10 +89,10 @@ class Client:
         payload = (header + data).ljust(251, b"\0")
         frame = self.writer.frame(ids.FILE_TRANSFER_PROTOCOL, 0, *target, *payload)
         (received,) = split(frame)
-        return [said(answer) for answer in self.service.handle(received, self.t_us)]
+        return [decoded(answer) for answer in self.service.handle(received, self.t_us)]
 
     def polled(self) -> list[ServiceOutput]:
-        answers = [said(answer) for answer in self.service.poll(self.t_us)]
+        answers = [decoded(answer) for answer in self.service.poll(self.t_us)]
         assert len(answers) <= FRAMES_A_TICK
         return answers
 

@@ -200,8 +200,8 @@ def test_finished_logs_are_erased_this_flight_s_is_kept_and_the_operator_is_told
     assert len(other.entries()) == 3
     other.ask(ids.LOG_REQUEST_DATA, 0, ALL, 0, 1, 1)
     assert client.ask(ids.LOG_ERASE, 1, 1) == []
-    told = wait_for(lambda: list(client.service.poll(0)))
-    assert told == [StatusText(Severity.INFO, "2 logs erased, this flight's is kept")]
+    reported = wait_for(lambda: list(client.service.poll(0)))
+    assert reported == [StatusText(Severity.INFO, "2 logs erased, this flight's is kept")]
     assert client.entries() == [(0, 4, 1, 0)]
     left = sorted(str(path.relative_to(tmp_path)) for path in tmp_path.glob("*/*"))
     assert left == ["run-1/result.json", "run-3/flight.tlog"]
@@ -213,10 +213,10 @@ def test_finished_logs_are_erased_this_flight_s_is_kept_and_the_operator_is_told
 def test_a_log_that_cannot_be_erased_is_told(tmp_path: Path) -> None:
     earlier = flight(tmp_path, "run-1", b"finished")
     client = Client(LogService(FlightLogs(flight(tmp_path, "run-2", b"kept"))))
-    (earlier / "flight.tlog").unlink()  # somebody else was faster
+    (earlier / "flight.tlog").unlink()  # another client was faster
     client.ask(ids.LOG_ERASE, 1, 1)
-    told = wait_for(lambda: list(client.service.poll(0)))
-    (text,) = told
+    reported = wait_for(lambda: list(client.service.poll(0)))
+    (text,) = reported
     assert isinstance(text, StatusText)
     assert text.severity == 4
     assert "0 logs erased" in text.text

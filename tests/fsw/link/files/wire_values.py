@@ -7,16 +7,16 @@ from fsw.signals import StatusText
 from messages.frames import FrameWriter, split
 
 
-def message_of(said: ServiceOutput) -> int:
+def message_of(reported: ServiceOutput) -> int:
     """The id of a message."""
-    assert not isinstance(said, StatusText)
-    return said.message_id
+    assert not isinstance(reported, StatusText)
+    return reported.message_id
 
 
-def values_of(said: ServiceOutput) -> WireValues:
+def values_of(reported: ServiceOutput) -> WireValues:
     """Every field of a message, whether it was packed already or not."""
-    if isinstance(said, Outgoing):
-        return said.values
-    assert isinstance(said, PackedOutgoing)
-    (frame,) = split(FrameWriter(1, 1).packed_frame(said.message_id, said.payload))
+    if isinstance(reported, Outgoing):
+        return reported.values
+    assert isinstance(reported, PackedOutgoing)
+    (frame,) = split(FrameWriter(1, 1).packed_frame(reported.message_id, reported.payload))
     return frame.payload_values

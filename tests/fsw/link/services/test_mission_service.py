@@ -174,7 +174,7 @@ def test_an_upload_that_breaks_off_leaves_the_old_mission_whole(vehicle: Vehicle
     ack = client.pump(8.0, lambda m: m.get_type() == "MISSION_ACK")
     assert ack is not None
     assert ack.type == CANCELLED
-    assert "broken off" in client.texts()
+    assert "aborted" in client.texts()
     assert vehicle.store.take_update() is None
     same(client.download(), WAYPOINTS)
 
@@ -333,8 +333,8 @@ def test_what_is_for_another_system_is_not_answered(vehicle: Vehicle) -> None:
     client.send(mav.mission_count_encode(1, 42, 2, 0))
     client.pump(1.0)
     streamed = "MISSION_CURRENT"
-    told = [m.get_type() for m in client.heard if m.get_type().startswith("MISSION")]
-    assert set(told) <= {streamed}
+    reported = [m.get_type() for m in client.heard if m.get_type().startswith("MISSION")]
+    assert set(reported) <= {streamed}
 
 
 def test_a_fence_that_cannot_be_kept_is_refused_with_the_inequality(vehicle: Vehicle) -> None:

@@ -53,7 +53,7 @@ def setting(name: bytes, value: float, type_: int = 9, system: int = 1) -> Frame
     return frame(ids.PARAM_SET, value, system, 1, name, type_)
 
 
-def said(answers: Iterable[ServiceOutput]) -> list[dict[str, object]]:
+def decoded(answers: Iterable[ServiceOutput]) -> list[dict[str, object]]:
     """Answers by field, and every one must fit its message."""
     writer, fields = FrameWriter(1, 1), []
     for outgoing in answers:
@@ -68,13 +68,13 @@ def said(answers: Iterable[ServiceOutput]) -> list[dict[str, object]]:
 
 
 def later(service: ParameterService, count: int, start_us: int = 0) -> list[dict[str, object]]:
-    return [field for k in range(count) for field in said(service.poll(start_us + k * TICK_US))]
+    return [field for k in range(count) for field in decoded(service.poll(start_us + k * TICK_US))]
 
 
 def test_a_list_is_whole_paced_and_in_order(service: ParameterService) -> None:
-    (hash_,) = said(service.handle(listing(), 0))
+    (hash_,) = decoded(service.handle(listing(), 0))
     assert (hash_["param_id"], hash_["param_index"]) == (b"_HASH_CHECK", 65535)
-    bursts = [said(service.poll(k * TICK_US)) for k in range(500)]
+    bursts = [decoded(service.poll(k * TICK_US)) for k in range(500)]
     assert max(map(len, bursts)) <= BURST, "no tick sends more than a datagram"
     values = [value for burst in bursts for value in burst]
     assert [value["param_index"] for value in values] == list(range(COUNT))
@@ -85,7 +85,7 @@ def test_a_list_is_whole_paced_and_in_order(service: ParameterService) -> None:
 
 
 def test_who_sends_the_hash_back_needs_no_list(service: ParameterService) -> None:
-    (hash_,) = said(service.handle(listing(), 0))
+    (hash_,) = decoded(service.handle(listing(), 0))
     assert len(later(service, 1)) == BURST
     bits = hash_["param_value"]
     assert isinstance(bits, float)
@@ -96,11 +96,11 @@ def test_who_sends_the_hash_back_needs_no_list(service: ParameterService) -> Non
 def test_what_is_read_only_says_so_and_shows_its_value(
     store: ParameterStore, service: ParameterService
 ) -> None:
-    *text, told, error = said(service.handle(setting(b"COM_RC_IN_MODE", 4.0), 0))
-    assert (told["message"], told["param_value"]) == (ids.PARAM_VALUE, 1.0)
+    *text, reported, error = decoded(service.handle(setting(b"COM_RC_IN_MODE", 4.0), 0))
+    assert (reported["message"], reported["param_value"]) == (ids.PARAM_VALUE, 1.0)
     assert error["error"] == dialect.MAV_PARAM_ERROR_READ_ONLY
     assert b"read only" in b"".join(bytes(t["text"]) for t in text)  # type: ignore[call-overload]
-    (same,) = said(service.handle(setting(b"COM_RC_IN_MODE", 1.0), 0))
+    (same,) = decoded(service.handle(setting(b"COM_RC_IN_MODE", 1.0), 0))
     assert same["param_value"] == 1.0
     assert ticks(store) == []
 
@@ -110,14 +110,14 @@ def test_px4_s_name_of_a_parameter_follows_it(
 ) -> None:
     service.handle(setting(b"STR_V_MAX", 1.25), 0)
     ticks(store)
-    told = {value["param_id"]: value["param_value"] for value in later(service, 3)}
-    assert told == {b"STR_V_MAX": 1.25, b"MPC_XY_VEL_MAX": 1.25}
+    reported = {value["param_id"]: value["param_value"] for value in later(service, 3)}
+    assert reported == {b"STR_V_MAX": 1.25, b"MPC_XY_VEL_MAX": 1.25}
 
 
 def test_a_choice_that_there_is_not_is_refused(
     store: ParameterStore, service: ParameterService
 ) -> None:
-    *text, error = said(service.handle(setting(b"COM_LOW_BAT_ACT", 1.0), 0))
+    *text, error = decoded(service.handle(setting(b"COM_LOW_BAT_ACT", 1.0), 0))
     assert error["error"] == dialect.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE
     assert b"2 Land when critical" in b"".join(
         bytes(t["text"])
@@ -128,17 +128,17 @@ def test_a_choice_that_there_is_not_is_refused(
 
 def test_a_second_request_starts_the_list_again(service: ParameterService) -> None:
     service.handle(listing(), 0)
-    assert len(said(service.poll(0))) == BURST
+    assert len(decoded(service.poll(0))) == BURST
     service.handle(listing(), TICK_US)
-    assert said(service.poll(TICK_US))[0]["param_index"] == 0
+    assert decoded(service.poll(TICK_US))[0]["param_index"] == 0
 
 
 def test_one_parameter_by_name_or_index(service: ParameterService) -> None:
-    (by_name,) = said(service.handle(reading(b"PID_YAW_P"), 0))
+    (by_name,) = decoded(service.handle(reading(b"PID_YAW_P"), 0))
     assert by_name["param_value"] == 4.0
     index = by_name["param_index"]
     assert isinstance(index, int)
-    assert said(service.handle(reading(index=index), 0)) == [by_name]
+    assert decoded(service.handle(reading(index=index), 0)) == [by_name]
     assert NAMES[index] == "PID_YAW_P"
 
 
@@ -146,7 +146,7 @@ def test_one_parameter_by_name_or_index(service: ParameterService) -> None:
 def test_the_unknown_is_answered_with_an_error_for_the_one_who_asked(
     service: ParameterService, index: int
 ) -> None:
-    (error,) = said(service.handle(reading(b"NO_SUCH_THING_16", index), 0))
+    (error,) = decoded(service.handle(reading(b"NO_SUCH_THING_16", index), 0))
     assert error["message"] == ids.PARAM_ERROR
     assert error["error"] == dialect.MAV_PARAM_ERROR_DOES_NOT_EXIST
     assert error["param_id"] == b"NO_SUCH_THING_16"
@@ -155,7 +155,7 @@ def test_the_unknown_is_answered_with_an_error_for_the_one_who_asked(
 
 def test_a_name_of_noise_is_unknown(service: ParameterService) -> None:
     for name in (bytes(range(240, 256)), b"\0" * 16, b"\xff" * 16):
-        (error,) = said(service.handle(reading(name), 0))
+        (error,) = decoded(service.handle(reading(name), 0))
         assert error["message"] == ids.PARAM_ERROR
 
 
@@ -176,7 +176,7 @@ def test_a_set_is_echoed_once_it_holds_and_on_every_link(
 def test_a_refused_set_shows_the_value_that_holds_and_says_why(
     store: ParameterStore, service: ParameterService, value: float
 ) -> None:
-    text, *more, error = said(service.handle(setting(b"PID_YAW_P", value), 0))
+    text, *more, error = decoded(service.handle(setting(b"PID_YAW_P", value), 0))
     assert text["message"] == ids.STATUSTEXT
     assert b"PID_YAW_P is to be 0..50" in bytes(text["text"])  # type: ignore[call-overload]
     assert error["error"] == dialect.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE
@@ -198,14 +198,14 @@ def test_what_the_tick_refuses_is_shown_unchanged(
 def test_an_integer_is_refused_because_nobody_agrees_on_its_bits(
     store: ParameterStore, service: ParameterService
 ) -> None:
-    answers = said(service.handle(setting(b"PID_YAW_P", 5.0, type_=6), 0))
+    answers = decoded(service.handle(setting(b"PID_YAW_P", 5.0, type_=6), 0))
     assert [answer["message"] for answer in answers] == [ids.STATUSTEXT, ids.PARAM_ERROR]
     assert ticks(store) == []
     assert later(service, 3)[0]["param_value"] == 4.0
 
 
 def test_setting_the_unknown_is_an_error(service: ParameterService) -> None:
-    (error,) = said(service.handle(setting(b"NOPE", 1.0), 0))
+    (error,) = decoded(service.handle(setting(b"NOPE", 1.0), 0))
     assert error["error"] == dialect.MAV_PARAM_ERROR_DOES_NOT_EXIST
 
 
@@ -230,7 +230,7 @@ def test_the_hash_tells_a_ground_station_that_it_knows_every_value(
     store: ParameterStore, service: ParameterService
 ) -> None:
     def bits() -> int:
-        (value,) = said(service.handle(reading(b"_HASH_CHECK"), 0))
+        (value,) = decoded(service.handle(reading(b"_HASH_CHECK"), 0))
         assert value["param_type"] == dialect.MAV_PARAM_TYPE_UINT32
         assert value["param_index"] == 65535
         return int.from_bytes(struct.pack("<f", value["param_value"]), "little")
@@ -251,7 +251,7 @@ def test_the_hash_tells_a_ground_station_that_it_knows_every_value(
     service.handle(setting(b"PID_YAW_P", 5.0), 0)
     ticks(store)
     assert bits() == bitwise() != before
-    # Its thanks for that is no wish.
+    # Its acknowledgement is not a request.
     assert service.handle(setting(b"_HASH_CHECK", 1.0, type_=5), 0) == ()
 
 

@@ -36,7 +36,7 @@ class Client:
         self.mav.signing.timestamp = self.now()
 
     def now(self) -> int:
-        return (self._ground.wall.unix_us - EPOCH_UNIX_US) // 10
+        return (self._ground.clock.unix_us - EPOCH_UNIX_US) // 10
 
     def at(self, time: int) -> Client:
         self.mav.signing.timestamp = time
@@ -91,7 +91,7 @@ def test_pymavlink_believes_what_we_sign_and_only_with_the_key(ground: Ground) -
 
     ground.heard()
     for _ in range(100):
-        ground.wall.pass_s(0.002)
+        ground.clock.pass_s(0.002)
         ground.fly(1)
     ground.fly(100)  # the wall clock stands still: times still grow
     kept = [raw for _, raw in ground.recorded if is_signed(raw)]
@@ -250,7 +250,7 @@ def test_a_key_for_another_vehicle_is_not_taken(file: Path) -> None:
 
 
 def test_a_key_from_another_machine_is_not_taken(file: Path) -> None:
-    from fsw.link.signing.signing_setup import set_up_signing
+    from fsw.link.signing.signing import set_up_signing
     from messages.frames import split
 
     with ground_station(key_file=KeyFile(file)) as ground:

@@ -55,10 +55,10 @@ def ask(ground: Ground, datagram: bytes) -> tuple[tuple[Any, ...], list[Frame]]:
 @pytest.mark.parametrize("form", [long, integer])
 def test_an_interval_is_set_acknowledged_and_kept(ground: Ground, form: Any) -> None:
     assert ask(ground, form(SET, ids.ATTITUDE, 100_000)) == ((SET, ACCEPTED), [])
-    ack, (told,) = ask(ground, form(GET, ids.ATTITUDE))
+    ack, (received,) = ask(ground, form(GET, ids.ATTITUDE))
     assert ack == (GET, ACCEPTED)
-    assert told.message_id == ids.MESSAGE_INTERVAL
-    assert told.payload_values == (100_000, ids.ATTITUDE)
+    assert received.message_id == ids.MESSAGE_INTERVAL
+    assert received.payload_values == (100_000, ids.ATTITUDE)
     attitudes = [f for f in ground.fly(2500) if f.message_id == ids.ATTITUDE]
     assert abs(len(attitudes) - 50) <= 1
 
@@ -87,8 +87,8 @@ def test_a_refusal_says_why(
     ack, texts = ask(ground, long(command, *params))
     assert ack == (command, DENIED)
     assert {text.message_id for text in texts} == {ids.STATUSTEXT}
-    said = b"".join(bytes(text.payload_values[1]) for text in texts)  # type: ignore[arg-type]
-    assert word in said.decode()
+    reported = b"".join(bytes(text.payload_values[1]) for text in texts)  # type: ignore[arg-type]
+    assert word in reported.decode()
 
 
 @pytest.mark.parametrize(
@@ -108,9 +108,9 @@ def test_a_probe_for_what_is_not_there_is_acknowledged_without_a_text(
 
 
 def test_the_protocol_version_comes_by_the_old_command_too(ground: Ground) -> None:
-    ack, (told,) = ask(ground, long(519, 1.0))
+    ack, (received,) = ask(ground, long(519, 1.0))
     assert ack == (519, ACCEPTED)
-    assert told.payload_values[:3] == (200, 100, 200)
+    assert received.payload_values[:3] == (200, 100, 200)
 
 
 @pytest.mark.parametrize("form", [long, integer])
@@ -118,9 +118,9 @@ def test_the_protocol_version_comes_by_the_old_command_too(ground: Ground) -> No
 def test_every_message_that_is_sent_can_be_requested(
     ground: Ground, form: Any, message_id: int
 ) -> None:
-    ack, told = ask(ground, form(REQUEST, message_id))
+    ack, received = ask(ground, form(REQUEST, message_id))
     assert ack == (REQUEST, ACCEPTED)
-    assert {frame.message_id for frame in told} == {message_id}
+    assert {frame.message_id for frame in received} == {message_id}
 
 
 def test_what_does_not_exist_yet_is_refused_for_now(ground: Ground) -> None:
@@ -131,17 +131,17 @@ def test_what_does_not_exist_yet_is_refused_for_now(ground: Ground) -> None:
 
 
 def test_the_version_comes_by_the_old_command_too(ground: Ground) -> None:
-    ack, (told,) = ask(ground, long(CAPABILITIES, 1.0, target=0))
+    ack, (received,) = ask(ground, long(CAPABILITIES, 1.0, target=0))
     assert ack == (CAPABILITIES, ACCEPTED)
-    capabilities = int(told.payload_values[0])
+    capabilities = int(received.payload_values[0])
     for name in ("COMMAND_INT", "FTP", "MAVLINK2", "MISSION_INT", "PARAM_FLOAT"):
         assert capabilities & getattr(dialect, f"MAV_PROTOCOL_CAPABILITY_{name}"), name
 
 
 @pytest.mark.parametrize("which", [NAN, 0.0])
 def test_all_modes_are_listed_once(ground: Ground, which: float) -> None:
-    _, told = ask(ground, long(REQUEST, ids.AVAILABLE_MODES, which))
-    rows = [frame.payload_values for frame in told]
+    _, received = ask(ground, long(REQUEST, ids.AVAILABLE_MODES, which))
+    rows = [frame.payload_values for frame in received]
     assert [row[3] for row in rows] == list(range(1, len(AVAILABLE_MODES) + 1))
     assert {row[2] for row in rows} == {len(AVAILABLE_MODES)}
     names = [bytes(row[5]).rstrip(b"\0").decode() for row in rows]  # type: ignore[arg-type]
@@ -149,8 +149,8 @@ def test_all_modes_are_listed_once(ground: Ground, which: float) -> None:
 
 
 def test_one_mode_is_listed_if_one_is_asked_for(ground: Ground) -> None:
-    _, (told,) = ask(ground, long(REQUEST, ids.AVAILABLE_MODES, 2.0))
-    assert told.payload_values[0] == AVAILABLE_MODES[1].custom_mode
+    _, (received,) = ask(ground, long(REQUEST, ids.AVAILABLE_MODES, 2.0))
+    assert received.payload_values[0] == AVAILABLE_MODES[1].custom_mode
     ack, _ = ask(ground, long(REQUEST, ids.AVAILABLE_MODES, 99.0))
     assert ack == (REQUEST, LATER)
 

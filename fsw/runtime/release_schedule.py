@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 
-class Grid:
-    """Release times ``start + k * period``: what is missed is skipped, and the grid stays."""
+class ReleaseSchedule:
+    """Releases at ``start + k * period``. Missed ones are skipped; the others do not move."""
 
     def __init__(self, start_us: float, period_us: int) -> None:
-        """Begin.
+        """Begin before the first release.
 
         Args:
-            start_us: The first release.
-            period_us: Between two releases.
+            start_us: First release [us, monotonic].
+            period_us: Period [us].
         """
         self.index = -1  # of the last release
         self.skipped = 0  # releases that were never taken
@@ -19,10 +19,10 @@ class Grid:
         self._period_us = period_us
 
     def advance(self, now_us: int) -> int:
-        """Go on to the next release worth taking; returns how many grid steps that is.
+        """Go to the next release whose period is not over at ``now_us`` [us]; returns the steps.
 
         A release whose period is not over yet is still taken, late; one whose period is over is
-        skipped. A clock that jumps back makes the loop wait for the next release, not repeat one.
+        skipped. If the clock jumps back, the next release is waited for, and none is repeated.
         """
         current = int((now_us - self._start_us) // self._period_us)
         steps = max(current - self.index, 1)
@@ -32,9 +32,9 @@ class Grid:
 
     @property
     def due_us(self) -> int:
-        """When the release of now is or was due."""
+        """When the current release is or was due [us, monotonic]."""
         return round(self._start_us + self.index * self._period_us)
 
-    def steer(self, shift_us: float) -> None:
-        """Move all coming releases: the sensors' clock is not quite ours."""
+    def shift(self, shift_us: float) -> None:
+        """Move all coming releases by ``shift_us`` [us]: the sensors' clock differs from ours."""
         self._start_us += shift_us

@@ -13,19 +13,20 @@ from typing import Any, cast
 
 import pytest
 
+from command_line.process import StopRequest
+from fsw.control.control_metrics import ControlMetrics
 from fsw.flight.autopilot import Autopilot
 from fsw.flight.state import FlightState
 from fsw.link.inbox import Inbox
 from fsw.link.sim_link import Pacing
+from fsw.link.wire import message_ids
 from fsw.log.flight_log import FlightLog
 from fsw.log.reader import LoggedTick, open_flight, ticks
 from fsw.parameters.flight_config import flight_config
 from fsw.ports import LoopHealth
-from fsw.runtime.effort import EffortRecord
-from fsw.runtime.planner_worker import PlannerRecord
-from fsw.runtime.process import StopRequest
+from fsw.runtime.planner_service import PlannerRecord
 from fsw.runtime.program import FlightProgram
-from fsw.runtime.rates import HOUSEKEEPING, INNER, MPC, RATE_GROUPS, TELEMETRY, Member
+from fsw.runtime.rate_groups import HOUSEKEEPING, INNER, MPC, RATE_GROUPS, TELEMETRY, Member
 from fsw.runtime.sim_loop import Ending, FlightRecord, SimLoop
 from fsw.runtime.timing import GroupTimer
 from fsw.signals import (
@@ -38,19 +39,13 @@ from fsw.signals import (
 )
 from messages import dialect
 from messages.block_file import BlockFile
-from messages.frames import Frame, FrameWriter, split
+from messages.frames import FrameWriter, split
 from tests.fsw.link.snapshots import FACTS, outputs_at
-from tests.fsw.log.test_recorded_inputs import SUBJECT
+from tests.fsw.log.test_reader import SUBJECT
 from tests.timing.virtual_time import FIRST_US, PERIOD_US, VirtualSensors, VirtualTime, frame
 
 Tick = Callable[[Any, TickInputs], tuple[Any, TickOutputs]]
-
-
-def command_frame(number: int, *params: float) -> Frame:
-    """A COMMAND_LONG of a ground station."""
-    seven = (*params, *(0.0,) * (7 - len(params)))
-    (frame,) = split(FrameWriter(255, 190).frame(76, *seven, number, 1, 1, 0))
-    return frame
+ARM, KILL = (1.0, 0.0), (0.0, 21196.0)  # parameters of MAV_CMD_COMPONENT_ARM_DISARM
 
 
 @dataclass
@@ -78,7 +73,7 @@ class Sim(VirtualSensors):
 
 
 @dataclass
-class Planner:
+class StubPlanner:
     """Takes requests."""
 
     done: list[str]
@@ -113,14 +108,14 @@ class Ground:
         pass
 
 
-class Nobody:
-    """Whatever is asked of it, there is nothing."""
+class Null:
+    """Every method exists and returns None."""
 
     def __getattr__(self, name: str) -> Callable[..., None]:
         return lambda *about, **more: None
 
 
-class Log(Nobody):
+class Log(Null):
     """Keeps what the loop says beside the ticks."""
 
     def __init__(self) -> None:
@@ -130,7 +125,7 @@ class Log(Nobody):
         self.notices.append(notice.text)
 
 
-class NoFiles(Nobody):
+class NoFiles(Null):
     """Nothing is written."""
 
     def __init__(self) -> None:
@@ -148,10 +143,12 @@ class Bench:
         self.asleep: Callable[[], None] = lambda: None
         self.sim = Sim(self.time)
         self.ground = Ground(self.sim.done, self._publish)
-        self.record = FlightRecord(PlannerRecord(GroupTimer(100_000)), EffortRecord(), LoopHealth())
+        self.record = FlightRecord(
+            PlannerRecord(GroupTimer(100_000)), ControlMetrics(), LoopHealth()
+        )
         self.files = NoFiles()
-        nobody: Any = Nobody()
-        program = FlightProgram(FACTS, first, tick, nobody, nobody, nobody)
+        null: Any = Null()
+        program = FlightProgram(FACTS, first, tick, null, null, null)
         self.loop = SimLoop(
             program, cast(Any, self.sim), cast(Any, self.ground), self.inbox, self.record,
             self.time.clock, self.stop, cast(Any, self.files), self._sleep,
@@ -160,8 +157,14 @@ class Bench:
 
     def run(self, seconds: float) -> None:
         self.until_us = self.time.now_us + round(1e6 * seconds)
-        end = self.loop.fly(frame(FIRST_US), Planner(self.sim.done))
+        end = self.loop.fly(frame(FIRST_US), StubPlanner(self.sim.done))
         assert end.ending is Ending.STOPPED
+
+    def command(self, *parameters: float) -> None:
+        """COMPONENT_ARM_DISARM arrives from a ground station."""
+        values = (*parameters, *(0.0,) * (7 - len(parameters)), 400, 1, 1, 0)
+        for one in split(FrameWriter(255, 190).frame(message_ids.COMMAND_LONG, *values)):
+            self.inbox.accept(one)
 
     def timer(self, name: str) -> GroupTimer:
         return self.record.groups[name]
@@ -199,10 +202,10 @@ def test_groups_run_at_their_rates_and_their_members_in_order() -> None:
     done = bench.sim.done
     tick = ["sensors", "plan", "actuators", "telemetry", "ground"]
     asking = ["sensors", "plan", "actuators", "request", "telemetry", "ground"]
-    laid = done.index("sensors")
-    second = done.index("sensors", laid + 1)
-    assert done[laid:second] == tick
-    ask = done.index("request", laid)
+    begun = done.index("sensors")
+    second = done.index("sensors", begun + 1)
+    assert done[begun:second] == tick
+    ask = done.index("request", begun)
     assert done[ask - 3 : ask + 3] == asking
     ticks = bench.timer(INNER.name).ticks
     assert ticks == pytest.approx(1000, abs=2)
@@ -211,7 +214,7 @@ def test_groups_run_at_their_rates_and_their_members_in_order() -> None:
     assert (bench.timer(INNER.name).late, bench.timer(INNER.name).skipped) == (0, 0)
 
 
-def test_a_tick_that_overruns_is_counted_and_told_once() -> None:
+def test_a_tick_that_overruns_is_counted_and_reported_once() -> None:
     def overrunning(state: int, inputs: TickInputs) -> tuple[int, TickOutputs]:
         bench.time.work(2_500 if state in range(800, 3800, 50) else 100)
         return standing(state, inputs)
@@ -219,10 +222,10 @@ def test_a_tick_that_overruns_is_counted_and_told_once() -> None:
     bench = Bench(overrunning)
     bench.run(9.0)
     assert bench.timer(INNER.name).late == 60
-    noted = [first for first, _ in bench.record.missed.stretches]
+    noted = [first for first, _ in bench.record.deadlines.missed]
     assert [b - a for a, b in pairwise(noted)] == [50 * PERIOD_US] * 59
-    (told,) = [text for text in bench.ground.texts if "late" in text]
-    assert re.fullmatch(r"ticks: 5\d late", told)
+    (warning,) = [text for text in bench.ground.texts if "late" in text]
+    assert re.fullmatch(r"ticks: 5\d late", warning)
 
 
 def test_a_telemetry_socket_that_blocks_costs_releases_but_no_answer_is_late() -> None:
@@ -245,11 +248,11 @@ def test_with_the_simulator_s_end_there_is_nothing_left_to_miss() -> None:
     bench = Bench(standing)
     bench.asleep = bench.sim.end_after_a_second
     bench.until_us = bench.time.now_us + 10_000_000
-    end = bench.loop.fly(frame(FIRST_US), Planner(bench.sim.done))
+    end = bench.loop.fly(frame(FIRST_US), StubPlanner(bench.sim.done))
     assert end.ending is Ending.SHUTDOWN
     assert bench.timer(INNER.name).ticks == pytest.approx(500, abs=5)
     assert (bench.record.stale, bench.timer(INNER.name).skipped) == (0, 0)
-    assert bench.record.missed.stretches == []
+    assert bench.record.deadlines.missed == []
 
 
 def test_what_was_missed_in_the_last_second_is_counted() -> None:
@@ -259,7 +262,7 @@ def test_what_was_missed_in_the_last_second_is_counted() -> None:
     assert bench.timer(INNER.name).skipped == 3
 
 
-def test_a_planner_that_died_is_told_at_once_and_logged() -> None:
+def test_a_planner_that_died_is_reported_at_once_and_logged() -> None:
     bench = Bench(standing)
     bench.asleep = lambda: (
         bench.record.mpc.events.append("planner process died (-9), restarted")
@@ -274,16 +277,16 @@ def test_a_planner_that_died_is_told_at_once_and_logged() -> None:
 @pytest.mark.parametrize("moment_us", [100, 900, 1_700])
 def test_a_command_acts_on_the_actuators_within_one_tick_of_its_arrival(moment_us: int) -> None:
     bench = Bench(Autopilot(flight_config()).tick, FlightState())
-    bench.inbox.accept(command_frame(400, 1.0))
+    bench.command(*ARM)
     arrived: list[int] = []
 
-    def hear_between_two_ticks() -> None:
+    def receive_between_two_ticks() -> None:
         if len(bench.sim.answers) == 200 and not arrived:
             bench.time.work(moment_us)
-            bench.inbox.accept(command_frame(400, 0.0, 21196.0))
+            bench.command(*KILL)
             arrived.append(bench.time.now_us)
 
-    bench.asleep = hear_between_two_ticks
+    bench.asleep = receive_between_two_ticks
     bench.run(0.6)
     thrust = [(at, sum(outputs.actuators.rotor_thrust)) for at, outputs in bench.sim.answers]
     running = [at for at, total in thrust if total > 1.0]
@@ -333,4 +336,4 @@ def test_a_clock_that_jumps_back_costs_waiting_and_repeats_no_tick() -> None:
     assert stamps == list(range(FIRST_US, FIRST_US + PERIOD_US * len(stamps), PERIOD_US))
     assert len(bench.sim.answers) == len(stamps) == pytest.approx(1000, abs=30)
     assert (bench.timer(INNER.name).late, bench.timer(INNER.name).skipped) == (0, 0)
-    assert bench.record.missed.stretches == []
+    assert bench.record.deadlines.missed == []

@@ -7,7 +7,7 @@ import math
 from fsw.signals import PlanInput
 
 
-class EffortRecord:
+class ControlMetrics:
     """Sums over u_k, one a planning period: c_e = sum ||u_k||^2 and c_s = sum ||u_k - u_{k-1}||.
 
     u is [acceleration (3) m/s^2, yaw acceleration rad/s^2, joint accelerations (2) rad/s^2], in
@@ -24,7 +24,7 @@ class EffortRecord:
         self._last: tuple[float, ...] | None = None
 
     def add(self, applied: PlanInput) -> None:
-        """Take the input in use during one planning period."""
+        """Add the input applied during one planning period."""
         u = (*applied.a, applied.yaw_acc, *applied.qdd_arm)
         self.count += 1
         self.effort += sum(value * value for value in u)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from fsw.runtime.guarded_tick import PATIENCE_TICKS, GuardedTick
+from fsw.runtime.tick_runner import MAX_FAILED_TICKS, TickRunner
 from fsw.signals import CommandAck, SensorFrame, TickInputs, TickOutputs
 from tests.fsw.link.snapshots import ACTUATORS, outputs_at
 
@@ -31,7 +31,7 @@ class Raising:
 
 
 def test_a_tick_that_fails_repeats_the_last_command_and_says_so() -> None:
-    tick = GuardedTick(Raising({2}), 0)
+    tick = TickRunner(Raising({2}), 0)
     tick(INPUTS)
     failed = tick(INPUTS)
     assert failed.actuators == ACTUATORS
@@ -42,20 +42,20 @@ def test_a_tick_that_fails_repeats_the_last_command_and_says_so() -> None:
 
 
 def test_an_error_that_stays_is_raised() -> None:
-    tick = GuardedTick(Raising(set(range(2, 100))), 0)
+    tick = TickRunner(Raising(set(range(2, 100))), 0)
     tick(INPUTS)
-    for _ in range(PATIENCE_TICKS):
+    for _ in range(MAX_FAILED_TICKS):
         tick(INPUTS)
     with pytest.raises(ZeroDivisionError):
         tick(INPUTS)
 
 
 def test_errors_apart_from_each_other_do_not_add_up() -> None:
-    tick = GuardedTick(Raising(set(range(2, 60, 2))), 0)
+    tick = TickRunner(Raising(set(range(2, 60, 2))), 0)
     for _ in range(59):
         tick(INPUTS)
 
 
 def test_a_first_tick_that_fails_has_nothing_to_repeat() -> None:
     with pytest.raises(ZeroDivisionError):
-        GuardedTick(Raising({1}), 0)(INPUTS)
+        TickRunner(Raising({1}), 0)(INPUTS)

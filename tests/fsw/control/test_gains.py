@@ -16,17 +16,17 @@ DT = 0.002
 # Prices and lags unlike the flown ones: the design must follow them.
 TUNINGS = [
     TrackingTuning(),
-    replace(TrackingTuning(), effort=4e-7, point_below_base=0.3, vertical_input_weight=1e-5),
+    replace(TrackingTuning(), input_weight=4e-7, point_below_base=0.3, vertical_input_weight=1e-5),
     replace(TrackingTuning(), disturbance_correlation=0.4),
 ]
 
 
-def cheapest(a: Array, b: Array, price: Array, effort: float) -> Array:
+def cheapest(a: Array, b: Array, price: Array, input_weight: float) -> Array:
     """The gain of a sampled chain by value iteration: the cost of ever longer flights."""
     ad, bd, *_ = cont2discrete((a, b, np.eye(len(a)), np.zeros_like(b)), DT)
     value = price
     for _ in range(6000):
-        gain = bd.T @ value @ ad / (effort + bd.T @ value @ bd)
+        gain = bd.T @ value @ ad / (input_weight + bd.T @ value @ bd)
         value = price + ad.T @ value @ (ad - bd @ gain)
     return np.asarray(gain[0])
 

@@ -1,7 +1,8 @@
-"""The list of mutants that no test can kill is about lines that exist; mutate.py checks more."""
+"""What mutation testing says of the product is still so; mutate.py itself checks more."""
 
 from __future__ import annotations
 
+import ast
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,17 @@ def test_every_line_of_the_list_exists(entry: dict[str, Any]) -> None:
     lines = {line.strip() for line in (ROOT / entry["module"]).read_text().splitlines()}
     assert set(entry["line"]) <= lines
     assert entry["reason"]
+
+
+def public_functions(path: Path) -> set[str]:
+    tree = ast.parse(path.read_text())
+    names = {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
+    return {name for name in names if not name.startswith("_")}
+
+
+def test_what_stands_in_for_the_compiler_has_all_its_functions() -> None:
+    stand_in = public_functions(ROOT / "tests/mutation/plain_compiled.py")
+    assert stand_in == public_functions(ROOT / "fsw/compiled.py")
 
 
 def test_every_folder_and_every_extra_test_exists() -> None:

@@ -15,28 +15,28 @@ _MOST_ITERATIONS = 60
 _STAYS = 1e-7  # m/s^2 and rad/s^2
 
 
-class Judge:
-    """Prices inputs, and knows the converged solution of a request."""
+class ConvergedOcp:
+    """Cost of given inputs, and the converged solution of a request."""
 
     def __init__(self, config: PlannerConfig, safe_set: SafeSet) -> None:
         self._ocp = Ocp(config, condense(AIRFRAME, config.period, config.horizon), safe_set)
         self._unknowns = INPUTS * config.horizon
 
-    def price(self, request: PlanRequest, inputs: Array) -> float:
+    def cost(self, request: PlanRequest, inputs: Array) -> float:
         """Cost of ``inputs`` (6 n,) [m/s^2, rad/s^2] with the smallest slacks that admit them."""
         ocp = self._ocp
         ocp.linearise(to_vector(request.start), inputs, target_points(request))
         program = ocp.qp
         return float(ocp.cost + program.penalty @ program.least_slacks(inputs))
 
-    def converged(self, request: PlanRequest, guess: Array) -> tuple[Array, float]:
-        """Inputs and price after programs from ``guess`` (6 n,) [m/s^2, rad/s^2] until they stay.
+    def solve(self, request: PlanRequest, guess: Array) -> tuple[Array, float]:
+        """Inputs and cost after programs from ``guess`` (6 n,) [m/s^2, rad/s^2] until they stay.
 
         Where they keep on changing (the directions of eq 23 turn with the iterate) the best
         that was met counts.
         """
         start, targets = to_vector(request.start), target_points(request)
-        inputs, best = guess, (guess, self.price(request, guess))
+        inputs, best = guess, (guess, self.cost(request, guess))
         for _ in range(_MOST_ITERATIONS):
             self._ocp.linearise(start, inputs, targets)
             solution = self._ocp.solve()
@@ -44,10 +44,10 @@ class Judge:
                 break
             step = solution.x[: self._unknowns] - inputs
             inputs = solution.x[: self._unknowns]
-            price = self.price(request, inputs)
-            best = min(best, (inputs, price), key=lambda known: known[1])
+            cost = self.cost(request, inputs)
+            best = min(best, (inputs, cost), key=lambda known: known[1])
             if np.abs(step).max() < _STAYS:
-                return inputs, price
+                return inputs, cost
         return best
 
 

@@ -1,4 +1,4 @@
-"""The one place where an unexpected error in the tick is caught."""
+"""Runs the pure tick: the only place where an unexpected error in it is caught."""
 
 from __future__ import annotations
 
@@ -10,50 +10,50 @@ from typing import Final, Generic
 from fsw.runtime.program import State
 from fsw.signals import Severity, StatusText, TickInputs, TickOutputs
 
-PATIENCE_TICKS: Final = 5  # 10 ms, as long as the estimate may be missing
+MAX_FAILED_TICKS: Final = 5  # 10 ms, as long as the estimate may be missing
 
 
-class GuardedTick(Generic[State]):
-    """Keeps the state between ticks, and flies through a tick that fails.
+class TickRunner(Generic[State]):
+    """Keeps the state between ticks, and repeats the last command if a tick fails.
 
-    A failed tick leaves the state as it was and repeats the last actuator command: for a few
-    milliseconds that is the safest thing known. An error that stays is not survived by
-    ignoring it; it is raised and ends the process, with the rotors' controls timing out.
+    A failed tick leaves the state as it was. Repeating the last command is the safest thing known
+    for a few milliseconds. A lasting error is raised and ends the process; the rotors stop when
+    the actuators' time-out is over.
     """
 
     def __init__(
         self,
         tick: Callable[[State, TickInputs], tuple[State, TickOutputs]],
         first_state: State,
-        tell: Callable[[], None] = traceback.print_exc,
+        on_error: Callable[[], None] = traceback.print_exc,
     ) -> None:
-        """Start at the first tick.
+        """Start before the first tick.
 
         Args:
-            tick: May fail.
-            first_state: What it starts from.
-            tell: Called where it has failed, for whoever will look for the reason.
+            tick: The pure function; may raise.
+            first_state: Its state at the first tick.
+            on_error: Called in the handler of each error that is survived.
         """
         self._tick = tick
-        self._tell = tell
+        self._on_error = on_error
         self._state = first_state
         self._last: TickOutputs | None = None
-        self._failed = 0
+        self._failed = 0  # in a row
 
     def __call__(self, inputs: TickInputs) -> TickOutputs:
-        """One tick.
+        """Run one tick.
 
         Raises:
-            Exception: whatever the tick raised, if it is the first or has failed too often in a
-                row.
+            Exception: What the tick raised, if it is the first tick or ``MAX_FAILED_TICKS`` before
+                it failed.
         """
         try:
             self._state, outputs = self._tick(self._state, inputs)
         except Exception as error:
             self._failed += 1
-            if self._last is None or self._failed > PATIENCE_TICKS:
+            if self._last is None or self._failed > MAX_FAILED_TICKS:
                 raise
-            self._tell()
+            self._on_error()
             text = f"tick failed, {type(error).__name__}: last command repeated"
             return replace(
                 self._last,

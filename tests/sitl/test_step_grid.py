@@ -1,4 +1,4 @@
-"""Pauses of a simulator in real time, on a clock that only moves when somebody sleeps."""
+"""Pauses of a simulator in real time, on a clock that only a sleep moves."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ def test_a_long_stop_moves_the_grid_by_whole_steps(pause_s: float) -> None:
     phase = counts.paused_s / PERIOD_S
     assert phase == pytest.approx(round(phase), abs=1e-6)
     assert run.ends_s[-1] - run.ends_s[0] == pytest.approx(199 * PERIOD_S + counts.paused_s)
-    # Two steps may come together, where the first was stopped; no more hurry.
+    # Two steps may come together, where the first was stopped; nothing is caught up beyond that.
     hurried = sum(b - a < 0.9 * PERIOD_S for a, b in zip(run.ends_s, run.ends_s[1:], strict=False))
     assert hurried <= 1
 

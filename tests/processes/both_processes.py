@@ -1,4 +1,4 @@
-"""The two halves as processes, and a network between them that misbehaves."""
+"""Both processes of a flight, and a network between them that misbehaves."""
 
 from __future__ import annotations
 
@@ -22,20 +22,20 @@ HIL_ACTUATOR_CONTROLS = 93
 
 
 def free_port() -> int:
-    """A UDP port of this machine that nobody uses now."""
+    """A UDP port of this machine that is free now."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.bind(("127.0.0.1", 0))
         return int(probe.getsockname()[1])
 
 
-class Half:
+class SystemProcess:
     """``python -m sitl`` or ``python -m fsw`` and its events."""
 
     def __init__(self, module: str, *arguments: str) -> None:
         self.name = module
         self.events: list[dict[str, Any]] = []
         if module == "fsw" and "--api" not in arguments:
-            # The programs' port belongs to whoever tests with a program.
+            # The programs' port is for the tests of a program.
             arguments = (*arguments, "--api", "none")
         self.process = subprocess.Popen(
             [sys.executable, "-m", module, *arguments, "--events", "json"],
@@ -77,7 +77,7 @@ class Half:
         """Send a signal."""
         self.process.send_signal(number)
 
-    def __enter__(self) -> Half:
+    def __enter__(self) -> SystemProcess:
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -100,7 +100,7 @@ class Misbehaviour:
 
 
 class Network:
-    """Stands between fsw, which is told this port, and sitl; notes what passes."""
+    """Relays between fsw, which connects to this port, and sitl; records the traffic."""
 
     def __init__(self, simulator_port: int, misbehaviour: Misbehaviour) -> None:
         self.to_fsw: list[bytes] = []  # as sitl sent it
@@ -199,11 +199,13 @@ def fly_through(
 ) -> Capture:
     """Fly a scenario with a network in between."""
     gcs = f"udp:127.0.0.1:{free_port()}"
-    with Half("sitl", scenario, "--listen", "udp:127.0.0.1:0", *sitl_arguments) as sitl:
+    with SystemProcess("sitl", scenario, "--listen", "udp:127.0.0.1:0", *sitl_arguments) as sitl:
         port = sitl.wait_for("listening")["port"]
         network = Network(port, misbehaviour)
         sim = f"udp:127.0.0.1:{network.port}"
-        with Half("fsw", "--sim", sim, "--gcs", gcs, "--out", str(out), "--wait", "90") as fsw:
+        with SystemProcess(
+            "fsw", "--sim", sim, "--gcs", gcs, "--out", str(out), "--wait", "90"
+        ) as fsw:
             ended = sitl.wait_for("ended", patience_s=90.0)
             codes = sitl.finish(), fsw.finish()
         network.close()

@@ -1,4 +1,4 @@
-"""Steps without an incident are judged by one compiled call: it says what the evaluator says."""
+"""Steps without an incident are judged by one compiled call, which agrees with the evaluator."""
 
 from __future__ import annotations
 

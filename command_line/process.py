@@ -1,0 +1,56 @@
+"""How a process of ours reports its life, and how it is asked to end."""
+
+from __future__ import annotations
+
+import json
+import signal
+import sys
+from types import FrameType
+from typing import Protocol
+
+
+class Events(Protocol):
+    """Progress on standard output."""
+
+    def report(self, event: str, sentence: str, **details: object) -> None:
+        """Report an event by its name, and to people by a sentence, empty if they need not know.
+
+        The details are values that go with it, JSON types only.
+        """
+        ...
+
+
+class TextEvents:
+    """Sentences; all on standard error when standard output carries the result."""
+
+    def __init__(self, to_stderr: bool = False) -> None:
+        self._out = sys.stderr if to_stderr else sys.stdout
+
+    def report(self, event: str, sentence: str, **details: object) -> None:
+        """See :class:`Events`."""
+        if sentence:
+            wrong = event in ("error", "unwritten")
+            print(sentence, file=sys.stderr if wrong else self._out, flush=True)
+
+
+class JsonEvents:
+    """One JSON object a line, for the program that asked."""
+
+    def report(self, event: str, sentence: str, **details: object) -> None:
+        """See :class:`Events`."""
+        print(json.dumps({"event": event, "message": sentence, **details}), flush=True)
+
+
+class StopRequest:
+    """Becomes true on SIGINT or SIGTERM, so that a loop can end between two steps."""
+
+    def __init__(self) -> None:
+        self.requested = False
+
+    def listen(self) -> None:
+        """Take over both signals; until then SIGINT raises KeyboardInterrupt."""
+        signal.signal(signal.SIGINT, self._request)
+        signal.signal(signal.SIGTERM, self._request)
+
+    def _request(self, number: int, frame: FrameType | None) -> None:
+        self.requested = True

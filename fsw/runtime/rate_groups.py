@@ -1,0 +1,91 @@
+"""Which part of the flight software runs how often, and in which order: one table.
+
+The loop walks the table from top to bottom, each group's members from left to right. Releases are
+an absolute schedule on the monotonic clock; a missed release is skipped and counted, and shifts
+nothing. The planning cycle runs in a process of its own: its member here hands over the request.
+"""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Final, Generic, TypeVar
+
+from fsw.periods import PLANNING_US, TICK_US
+from fsw.ports import Clock
+from fsw.runtime.timing import GroupTimer, Histogram
+
+Cycle = TypeVar("Cycle")
+
+_STAGES_EVERY: Final = 8  # runs between two whose members are timed one by one
+
+
+class Member(enum.Enum):
+    """What a group does; the loop has one method for each."""
+
+    RECEIVE = "receive"  # from the simulator and the planner, and what the ground had sent
+    TICK = "tick"  # estimate, modes, control, safety gate: the pure function
+    ACTUATE = "actuate"  # answer the simulator; until here the vehicle waits
+    PLAN = "plan"  # hand a request to the planner
+    PUBLISH = "publish"  # telemetry to the ground, and read what it sends
+    LOG = "log"  # the flight log
+    SUMMARISE = "summarise"  # timing of the last second
+    WARN = "warn"  # what went wrong since the last warning
+    CHECK_FILES = "check files"  # whether the disk still takes them
+
+
+@dataclass(frozen=True, slots=True)
+class RateGroup:
+    """Members that share a rate."""
+
+    name: str
+    number: int  # PANDION_RATE_GROUP of the dialect
+    period_us: int
+    members: tuple[Member, ...]
+
+
+INNER: Final = RateGroup("inner", 0, TICK_US, (Member.RECEIVE, Member.TICK, Member.ACTUATE))
+MPC: Final = RateGroup("mpc", 1, PLANNING_US, (Member.PLAN,))
+# Every stream of messages has a rate of its own, in whole ticks: fsw/link/telemetry/streams.py.
+TELEMETRY: Final = RateGroup("telemetry", 2, TICK_US, (Member.PUBLISH, Member.LOG))
+HOUSEKEEPING: Final = RateGroup(
+    "housekeeping", 3, 1_000_000, (Member.SUMMARISE, Member.WARN, Member.CHECK_FILES)
+)
+
+RATE_GROUPS: Final = (INNER, MPC, TELEMETRY, HOUSEKEEPING)
+
+
+class RateGroupRunner(Generic[Cycle]):
+    """Runs the members of one group in their order, and times them."""
+
+    def __init__(
+        self, group: RateGroup, methods: Mapping[Member, Callable[[Cycle], None]], clock: Clock
+    ) -> None:
+        self.group = group
+        self.timer = GroupTimer(group.period_us)
+        self.stages = {member: Histogram() for member in group.members}
+        self._calls = tuple(methods[member] for member in group.members)
+        self._clock = clock
+        self._runs = 0
+
+    def run(self, cycle: Cycle, due_us: int, begin_us: int) -> bool:
+        """Run once; returns whether it ended after the group's next release.
+
+        Args:
+            cycle: What the members work on.
+            due_us: When the group was released [us, monotonic].
+            begin_us: When its work began: now, or when the process woke for it [us, monotonic].
+        """
+        self._runs += 1
+        if self._runs % _STAGES_EVERY:
+            for call in self._calls:
+                call(cycle)
+        else:
+            mark = begin_us
+            for call, stage in zip(self._calls, self.stages.values(), strict=True):
+                call(cycle)
+                now_us = self._clock()
+                stage.add(now_us - mark)
+                mark = now_us
+        return self.timer.add(self._clock() - begin_us, begin_us - due_us)

@@ -1,0 +1,140 @@
+"""One tick after the other: before the first estimate, after missed frames, on stale ones."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from fsw.estimation.dead_reckoning import moved_on
+from fsw.estimation.estimator import estimate_state
+from fsw.flight.autopilot import Autopilot
+from fsw.flight.state import FlightState
+from fsw.signals import STOPPED, CommandResult, Mode, SensorFrame, TickInputs, TickOutputs, Vec3
+from tests.fsw.flight.asked import command
+from tests.fsw.flight.in_flight import CONFIG, GROUND_Z
+
+AUTOPILOT = Autopilot(CONFIG)
+ARM = 400
+TICK_US = CONFIG.tick_period_us
+STILL: Vec3 = (0.0, 0.0, 0.0)
+
+
+def frame(t_us: int, **changes: Any) -> SensorFrame:
+    """Standing on the ground, or as changed."""
+    still = SensorFrame(
+        t_us=t_us,
+        p_WB=(0.0, 0.0, GROUND_Z),
+        v_WB=STILL,
+        q_WB=(1.0, 0.0, 0.0, 0.0),
+        gyro_B=STILL,
+        accel_B=(0.0, 0.0, -9.81),
+        q_arm=(0.0, 0.0),
+        qd_arm=(0.0, 0.0),
+    )
+    return replace(still, **changes)
+
+
+def tick(state: FlightState, t_us: int, **inputs: Any) -> tuple[FlightState, TickOutputs]:
+    sensors = inputs.pop("sensors", frame(t_us))
+    return AUTOPILOT.tick(state, TickInputs(sensors, **inputs))
+
+
+def test_before_the_first_estimate_nothing_moves_and_commands_are_put_off() -> None:
+    blind = frame(5000, p_WB=(math.nan, 0.0, 0.0))
+    asked = (command(ARM, 1.0),)
+    state, outputs = tick(FlightState(), 5000, sensors=blind, commands=asked)
+    assert outputs.actuators == outputs.snapshot.actuators == STOPPED
+    assert [ack.result for ack in outputs.acks] == [CommandResult.TEMPORARILY_REJECTED]
+    assert "no valid state estimate" in outputs.texts[-1].text
+    snapshot, level = outputs.snapshot, (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+    assert (snapshot.mode, snapshot.armed, snapshot.t_us) == (Mode.DISARMED, False, 5000)
+    reported = snapshot.estimate
+    assert (reported.t_us, reported.p_WB, reported.v_WB, reported.w_WB_B) == (
+        5000,
+        STILL,
+        STILL,
+        STILL,
+    )
+    assert (reported.R_WB, reported.yaw) == (level, 0.0)
+    assert (reported.q_arm, reported.qd_arm) == ((0.0, 0.0), (0.0, 0.0))
+    assert (state.invalid_ticks, state.estimate) == (1, None)
+    _, outputs = tick(state, 7000, sensors=blind)
+    assert (outputs.acks, outputs.texts) == ((), ())
+
+
+def test_an_invalid_frame_leaves_the_last_estimate_and_is_counted() -> None:
+    state, _ = tick(FlightState(), 100_000)
+    seen = state.estimate
+    blind = frame(102_000, q_WB=(0.0, 0.0, 0.0, math.nan))
+    for count in (1, 2, 3):
+        state, _ = tick(state, 102_000, sensors=blind)
+        assert (state.invalid_ticks, state.estimate) == (count, seen)
+    state, _ = tick(state, 104_000)
+    assert state.invalid_ticks == 0
+
+
+@pytest.mark.parametrize("ticks", [1, 2, 7, 24, 25, 26, 1000])
+def test_missed_ticks_are_counted_as_far_as_they_are_made_up_for(ticks: int) -> None:
+    state, _ = tick(FlightState(), 100_000)
+    assert state.index == 0
+    after, _ = tick(state, 100_000 + ticks * TICK_US)
+    assert after.index == min(ticks, CONFIG.catch_up_ticks)
+
+
+def test_a_first_tick_is_the_first_however_late_and_time_that_stands_still_is_a_tick() -> None:
+    state, _ = tick(FlightState(), 10**9)
+    assert state.index == 0
+    again, _ = tick(state, 10**9)
+    assert again.index == 1
+
+
+def test_a_frame_that_was_late_is_moved_on_to_now() -> None:
+    moving = frame(100_000, p_WB=(0.0, 0.0, -3.0), v_WB=(1.0, 2.0, 0.5), gyro_B=(0.1, 0.0, 0.2))
+    measured = estimate_state(moving)
+    assert measured is not None
+    state, _ = tick(FlightState(), 100_000, sensors=moving, stale_us=4000)
+    assert state.estimate == moved_on(measured, 0.004)
+    fresh, _ = tick(FlightState(), 100_000, sensors=moving)
+    assert fresh.estimate == measured
+
+
+def test_armed_on_the_ground_the_rotors_idle_and_the_arm_is_let_down() -> None:
+    state, _ = tick(FlightState(), 100_000)
+    armed, outputs = tick(state, 102_000, commands=(command(ARM, 1.0),))
+    assert outputs.acks[0].result == CommandResult.ACCEPTED
+    swinging = frame(104_000, qd_arm=(0.5, -1.0))
+    _, outputs = tick(armed, 104_000, sensors=swinging)
+    assert outputs.actuators.rotor_thrust == (CONFIG.limits.idle_thrust,) * 4
+    first, second = outputs.actuators.joint_torque
+    assert first < 0.0 < second, "against the swing"
+    _, outputs = tick(armed, 104_000)
+    assert outputs.actuators.joint_torque == pytest.approx((0.0, 0.0))
+
+
+@pytest.mark.parametrize("silent_s", [9.9, 10.1])
+def test_a_station_that_is_silent_is_counted_from_when_it_was_last_heard(silent_s: float) -> None:
+    state, _ = tick(FlightState(), 1_000_000, ground_station_heard=True)
+    assert state.vehicle.gcs_heard_us == 1_000_000
+    _, outputs = tick(state, 1_000_000 + round(1e6 * silent_s))
+    assert outputs.snapshot.failures == ()
+    state, _ = tick(state, 1_000_000 + round(1e6 * silent_s))
+    lost = [condition.value for condition in state.vehicle.conditions]
+    assert lost == (["no ground station"] if silent_s > 10.0 else [])
+    never, _ = tick(FlightState(), 10**9)
+    assert never.vehicle.conditions == ()
+
+
+def test_home_is_where_it_was_seen_first_until_it_is_armed() -> None:
+    state, _ = tick(FlightState(), 100_000)
+    assert state.vehicle.home is not None
+    assert state.vehicle.home.p == (0.0, 0.0, GROUND_Z)
+    carried = frame(102_000, p_WB=(3.0, 1.0, GROUND_Z))
+    moved, _ = tick(state, 102_000, sensors=carried)
+    assert moved.vehicle.home == state.vehicle.home
+    armed, _ = tick(moved, 104_000, sensors=replace(carried, t_us=104_000),
+                    commands=(command(ARM, 1.0),))  # fmt: skip
+    assert armed.vehicle.home is not None
+    assert armed.vehicle.home.p == (3.0, 1.0, GROUND_Z)
