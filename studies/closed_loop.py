@@ -180,7 +180,7 @@ def simulate(
             recorder.metrics.add(applied)
         if outputs.plan_request is not None and asked is not None:
             asked(outputs.plan_request)
-    return recorder.result(simulation.result())
+    return FlightResult(simulation.result(), recorder)
 
 
 def _trace_point(simulation: Simulation) -> TracePoint:

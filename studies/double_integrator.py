@@ -165,7 +165,7 @@ def simulate(
                 recorder.trace.append(_trace_point(plant))
             if plant.ended is None:
                 plant.advance(u)
-    return recorder.result(plant.result())
+    return FlightResult(plant.result(), recorder)
 
 
 def _first_state(scenario: Scenario, p_target: V3) -> PredictionState:

@@ -78,7 +78,7 @@ def _fly(case: Case, flown: Scenario, settings: Settings, campaign: Campaign) ->
 
 
 def _arrays(flight: FlightResult) -> dict[str, list[float]]:
-    points = flight.trace
+    points = flight.planner.trace
     arrays = {"t_s": [round(point.t_s, 3) for point in points]}
     for k, axis in enumerate(_AXES):
         arrays[f"target_{axis}_m"] = [round(point.p_target[k], 6) for point in points]

@@ -19,14 +19,6 @@ def processor_time_us() -> float:
 
 
 @dataclass(frozen=True, slots=True)
-class InputTotals:
-    """A quantity of the applied inputs over a flight, summed and per planning step."""
-
-    sum: float
-    mean: float
-
-
-@dataclass(frozen=True, slots=True)
 class TracePoint:
     """The truth at one instant, for figures."""
 
@@ -37,28 +29,15 @@ class TracePoint:
     margin_m: float  # the smallest
 
 
-@dataclass(frozen=True, slots=True)
-class FlightResult:
-    """Score of one flight from the plant's truth, and what the planner did."""
-
-    truth: TruthResult
-    effort: InputTotals  # c_e
-    smoothness: InputTotals  # c_s
-    step_us: tuple[float, ...]  # processor time of each planning step
-    plans: int
-    failures: int  # planning steps without a plan
-    trace: tuple[TracePoint, ...]  # empty unless asked for
-
-
 @dataclass(slots=True)
 class FlightRecorder:
-    """Collects what a flight's result consists of beside the truth."""
+    """What the planner does in a flight."""
 
     metrics: ControlMetrics = field(default_factory=ControlMetrics)
-    step_us: list[float] = field(default_factory=list)
+    step_us: list[float] = field(default_factory=list)  # processor time of each planning step
     plans: int = 0
-    failures: int = 0
-    trace: list[TracePoint] = field(default_factory=list)
+    failures: int = 0  # planning steps without a plan
+    trace: list[TracePoint] = field(default_factory=list)  # empty unless asked for
 
     def planned(self, answer: Plan | PlanFailure) -> None:
         """Account for one planning step."""
@@ -68,15 +47,10 @@ class FlightRecorder:
         else:
             self.failures += 1
 
-    def result(self, truth: TruthResult) -> FlightResult:
-        """The whole flight."""
-        totals = self.metrics.as_json()
-        return FlightResult(
-            truth=truth,
-            effort=InputTotals(**totals["control_effort"]),
-            smoothness=InputTotals(**totals["control_smoothness"]),
-            step_us=tuple(self.step_us),
-            plans=self.plans,
-            failures=self.failures,
-            trace=tuple(self.trace),
-        )
+
+@dataclass(frozen=True, slots=True)
+class FlightResult:
+    """Score of one flight from the plant's truth, and what the planner did."""
+
+    truth: TruthResult
+    planner: FlightRecorder

@@ -95,7 +95,9 @@ def broken(job: Job, reason: str) -> Outcome:
 
 def score(seed: int, result: FlightResult) -> Outcome:
     """The row of a flight."""
-    truth, steps = result.truth, np.array(result.step_us or (0.0,))
+    truth, planner = result.truth, result.planner
+    steps, totals = np.array(planner.step_us or (0.0,)), planner.metrics.as_json()
+    smoothness, effort = totals["control_smoothness"], totals["control_effort"]
     return Outcome(
         seed=seed,
         completed=truth.completed,
@@ -105,15 +107,15 @@ def score(seed: int, result: FlightResult) -> Outcome:
         te_max_m=truth.tracking_error_max_m,
         margin_m=truth.min_margin_m,
         margin_key=truth.min_margin_key,
-        cs_sum=result.smoothness.sum,
-        cs_mean=result.smoothness.mean,
-        ce_sum=result.effort.sum,
-        ce_mean=result.effort.mean,
+        cs_sum=smoothness["sum"],
+        cs_mean=smoothness["mean"],
+        ce_sum=effort["sum"],
+        ce_mean=effort["mean"],
         tc_p50_us=float(np.median(steps)),
         tc_p99_us=float(np.quantile(steps, 0.99)),
         tc_max_us=float(steps.max()),
-        plans=result.plans,
-        failures=result.failures,
+        plans=planner.plans,
+        failures=planner.failures,
     )
 
 

@@ -61,7 +61,8 @@ def compensated_joints(
     l1, l2 = airframe.link_length[0], airframe.link_length[1]
     p_WE, v_WE = planned_end_effector(airframe, plan)
     x, z, vx, vz = _seen_from_base(estimate, p_WE, v_WE)
-    share = _share(norm(subtract(plan.p, estimate.p_WB)), limits.whole, limits.none)
+    off_plan = norm(subtract(plan.p, estimate.p_WB))
+    share = clamp((limits.none - off_plan) / (limits.none - limits.whole), 0.0, 1.0)
     if share < 1.0:
         th1 = plan.q_arm[0]
         (x1, z1), (x2, z2) = links(airframe.link_length, th1, th1 + plan.q_arm[1])
@@ -81,12 +82,6 @@ def compensated_joints(
     th1 = math.atan2(x, z) - math.atan2(l2 * math.sin(th2), l1 + l2 * math.cos(th2))
     th1, th12 = _within_limits(airframe, limits, th1, th1 + th2)
     return (th1, th12 - th1), _rates(airframe, th1, th12, vx, vz)
-
-
-@compilable
-def _share(distance: float, whole: float, none: float) -> float:
-    """From 1 up to ``whole`` to 0 from ``none`` on."""
-    return clamp((none - distance) / (none - whole), 0.0, 1.0)
 
 
 _LEAST_BEND = 0.2  # rad; a straighter plan has no side

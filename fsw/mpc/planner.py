@@ -17,7 +17,7 @@ from fsw.model.prediction import INPUTS, Array, condense, to_vector
 from fsw.mpc.ocp import Ocp
 from fsw.mpc.planner_config import PlannerConfig
 from fsw.mpc.reference import still_at
-from fsw.mpc.solvers import SOLVERS, Search
+from fsw.mpc.solvers import SOLVERS, Question, Search
 from fsw.signals import (
     Plan,
     PlanFailure,
@@ -103,8 +103,8 @@ class Planner:
             np.array([target.yaw for target in request.targets]),
             np.array(request.joint_targets) if request.joint_targets else None,
         )
-        solver = SOLVERS[self._config.solver](self._config, self._stopwatch_us)
-        search = solver.solve(ocp, start, targets, self._guess(request.t_apply_us))
+        asked = Question(ocp, start, targets, self._guess(request.t_apply_us))
+        search = SOLVERS[self._config.solver](asked, self._config, self._stopwatch_us)
         solution = search.solution
         if not solution.usable:
             after = f"after {search.solver_iterations} iterations"

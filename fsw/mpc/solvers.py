@@ -1,14 +1,14 @@
-"""Optimisers of the planner, by name: one interface and one table.
+"""Optimisers of the planner, by name: one signature and one table.
 
-Another one is a class with ``solve`` and a row in ``SOLVERS`` (and in
-``fsw.parameters.control_choice``, which names it for the command line without importing it).
+Another one is a function and a row in ``SOLVERS`` (and in ``fsw.parameters.control_choice``, which
+names it for the command line without importing it).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple
 
 from fsw.barriers.constraint_block import TargetPoints
 from fsw.model.prediction import Array
@@ -19,6 +19,15 @@ from fsw.mpc.solution import Solution
 
 Stopwatch = Callable[[], float]
 """Monotonic time [us], for the reported stage times only."""
+
+
+class Question(NamedTuple):
+    """What is to be optimised for one request."""
+
+    ocp: Ocp  # of the safe set; holds the program around the optimum afterwards
+    start: Array  # (19,) SI, prediction state at node 0
+    targets: TargetPoints  # at the nodes
+    guess: Array  # (6 n,) SI, the last solution moved on by one period, or zeros
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,59 +41,35 @@ class Search:
     solve_us: float
 
 
-class Solver(Protocol):
-    """Minimises an optimal control problem."""
-
-    def solve(self, ocp: Ocp, start: Array, targets: TargetPoints, guess: Array) -> Search:
-        """Solve one request from the prediction state ``start`` (19,) [SI] at node 0.
-
-        The ``guess`` (6 n,) [SI] is the last solution moved on by one period, or zeros. The
-        problem is the one of the safe set; it holds the program around the optimum afterwards.
-        """
-        ...
-
-
-class SqpSolver:
+def by_programs(asked: Question, config: PlannerConfig, stopwatch_us: Stopwatch) -> Search:
     """A fixed number of quadratic programs from the guess on."""
-
-    def __init__(self, config: PlannerConfig, stopwatch_us: Stopwatch) -> None:
-        self._iterations, self._stopwatch_us = config.sqp_iterations, stopwatch_us
-
-    def solve(self, ocp: Ocp, start: Array, targets: TargetPoints, guess: Array) -> Search:
-        """See ``Solver``: ``start`` (19,) [SI], ``guess`` (6 n,) [SI]."""
-        inputs = guess
-        linearise_us = solve_us = 0.0
-        iterations = done = 0
-        while done < self._iterations:
-            mark = self._stopwatch_us()
-            ocp.linearise(start, inputs, targets)
-            linearised = self._stopwatch_us()
-            solution = ocp.solve()
-            linearise_us += linearised - mark
-            solve_us += self._stopwatch_us() - linearised
-            iterations += solution.iterations
-            done += 1
-            if not solution.usable:
-                break
-            inputs = solution.x[: len(inputs)]
-        return Search(solution, done, iterations, linearise_us, solve_us)
+    ocp, start, targets, inputs = asked
+    linearise_us = solve_us = 0.0
+    iterations = done = 0
+    while done < config.sqp_iterations:
+        mark = stopwatch_us()
+        ocp.linearise(start, inputs, targets)
+        linearised = stopwatch_us()
+        solution = ocp.solve()
+        linearise_us += linearised - mark
+        solve_us += stopwatch_us() - linearised
+        iterations += solution.iterations
+        done += 1
+        if not solution.usable:
+            break
+        inputs = solution.x[: len(inputs)]
+    return Search(solution, done, iterations, linearise_us, solve_us)
 
 
-class PaperSolver:
+def by_slsqp(asked: Question, config: PlannerConfig, stopwatch_us: Stopwatch) -> Search:
     """The paper's optimiser, from rest whatever was planned before."""
-
-    def __init__(self, config: PlannerConfig, stopwatch_us: Stopwatch) -> None:
-        self._stopwatch_us = stopwatch_us
-
-    def solve(self, ocp: Ocp, start: Array, targets: TargetPoints, guess: Array) -> Search:
-        """See ``Solver``: ``start`` (19,) [SI]; ``guess`` (6 n,) [SI] is not used."""
-        mark = self._stopwatch_us()
-        solution = minimise(NonlinearProgram(ocp, start, targets))
-        solve_us = self._stopwatch_us() - mark
-        return Search(solution, solution.iterations, solution.iterations, 0.0, solve_us)
+    mark = stopwatch_us()
+    solution = minimise(NonlinearProgram(asked.ocp, asked.start, asked.targets))
+    solve_us = stopwatch_us() - mark
+    return Search(solution, solution.iterations, solution.iterations, 0.0, solve_us)
 
 
-SOLVERS: dict[str, Callable[[PlannerConfig, Stopwatch], Solver]] = {
-    "clarabel": SqpSolver,
-    "slsqp": PaperSolver,
+SOLVERS: dict[str, Callable[[Question, PlannerConfig, Stopwatch], Search]] = {
+    "clarabel": by_programs,
+    "slsqp": by_slsqp,
 }

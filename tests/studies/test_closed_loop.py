@@ -35,14 +35,14 @@ def test_the_full_plant_flies_and_flies_the_same_again(case: str) -> None:
     )
     assert first.truth.completed
     assert first.truth == again.truth
-    assert first.effort == again.effort
-    assert (first.plans, first.failures) == (20, 0)
-    assert len(first.step_us) == 20
+    assert first.planner.metrics.as_json() == again.planner.metrics.as_json()
+    assert (first.planner.plans, first.planner.failures) == (20, 0)
+    assert len(first.planner.step_us) == 20
     # 20 steps of 2 ms between points; every margin in the trace is within the judged minimum.
-    assert len(first.trace) == 50
+    assert len(first.planner.trace) == 50
     assert first.truth.min_margin_m is not None
-    assert min(point.margin_m for point in first.trace) >= first.truth.min_margin_m
-    assert not again.trace
+    assert min(point.margin_m for point in first.planner.trace) >= first.truth.min_margin_m
+    assert not again.planner.trace
 
 
 @pytest.mark.parametrize("plant", ["double-integrator", "full"])

@@ -36,5 +36,7 @@ def test_in_process_and_over_the_wire_are_one_flight(tmp_path: Path) -> None:
     truth = here.truth
     assert wire["min_margin_m"] == pytest.approx(truth.min_margin_m, abs=1e-5)
     assert wire["tracking_error_rms_m"] == pytest.approx(truth.tracking_error_rms_m, abs=1e-5)
-    assert wire["control_effort"]["sum"] == pytest.approx(here.effort.sum, rel=1e-3)
-    assert wire["control_smoothness"]["sum"] == pytest.approx(here.smoothness.sum, rel=1e-3)
+    assert wire["control_effort"]["sum"] == pytest.approx(here.planner.metrics.effort, rel=1e-3)
+    assert wire["control_smoothness"]["sum"] == pytest.approx(
+        here.planner.metrics.smoothness, rel=1e-3
+    )
