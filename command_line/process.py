@@ -5,8 +5,14 @@ from __future__ import annotations
 import json
 import signal
 import sys
+import traceback
+from collections.abc import Callable
 from types import FrameType
-from typing import Protocol
+from typing import Final, Protocol
+
+from command_line.parser import COULD_NOT_START
+
+NOT_COMPLETED: Final = 1  # exit code
 
 
 class Events(Protocol):
@@ -54,3 +60,25 @@ class StopRequest:
 
     def _request(self, number: int, frame: FrameType | None) -> None:
         self.requested = True
+
+
+def run_reported(
+    name: str, events: Events, refusals: tuple[type[Exception], ...], work: Callable[[], int]
+) -> int:
+    """Do the work of a process and return its exit code; what ends it early is reported.
+
+    An exception of the ``refusals`` says in one sentence why there is no flight.
+    """
+    try:
+        return work()
+    except refusals as error:
+        events.report("error", f"{name}: {error}")
+        return COULD_NOT_START
+    except KeyboardInterrupt:
+        events.report("error", f"{name}: interrupted before the flight began")
+    except BrokenPipeError:
+        pass  # the reader of the events is gone
+    except Exception as error:
+        traceback.print_exc()
+        events.report("error", f"{name}: internal error, {type(error).__name__}: {error}")
+    return NOT_COMPLETED

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
-import traceback
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
-from command_line.process import Events, JsonEvents, StopRequest, TextEvents
+from command_line.process import (
+    NOT_COMPLETED,
+    Events,
+    JsonEvents,
+    StopRequest,
+    TextEvents,
+    run_reported,
+)
 from fsw.arguments import FswOptions
 from fsw.control.control_metrics import ControlMetrics
 from fsw.link.build_links import build_links
@@ -43,7 +49,7 @@ from fsw.runtime.timing import GroupTimer
 if TYPE_CHECKING:
     from fsw.parameters.kept_file import ParameterFile
 
-DONE, NOT_COMPLETED, COULD_NOT_START = 0, 1, 2  # exit codes
+DONE: Final = 0  # exit code
 
 NO_PERMISSION = "no permission for {}: ticks may be late on a busy machine"
 
@@ -55,30 +61,15 @@ class CouldNotStart(Exception):
 
 
 def run(options: FswOptions, load: ProgramLoader | None = None) -> int:
-    """Fly once.
-
-    Args:
-        options: From the command line.
-        load: Makes what is flown; the flight software proper when None.
-
-    Returns:
-        The exit code.
-    """
+    """Fly once, the flight software proper or what ``load`` makes; returns the exit code."""
     reporter: Events = JsonEvents() if options.events == "json" else TextEvents()
-    try:
-        return _Session(options, reporter, load or load_flight_software).run()
-    except (CouldNotStart, LinkError) as error:
-        reporter.report("error", f"fsw: {error}")
-        return COULD_NOT_START
-    except KeyboardInterrupt:
-        reporter.report("error", "fsw: interrupted before the flight began")
-        return NOT_COMPLETED
-    except BrokenPipeError:
-        return NOT_COMPLETED  # the reader of the events is gone
-    except Exception as error:
-        traceback.print_exc()
-        reporter.report("error", f"fsw: internal error, {type(error).__name__}: {error}")
-        return NOT_COMPLETED
+    refusals = (CouldNotStart, LinkError)
+    return run_reported(
+        "fsw",
+        reporter,
+        refusals,
+        lambda: _Session(options, reporter, load or load_flight_software).run(),
+    )
 
 
 class _Session:

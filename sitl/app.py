@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import dataclasses
-import traceback
 
-from command_line.process import Events, JsonEvents, StopRequest, TextEvents
+from command_line.process import (
+    NOT_COMPLETED,
+    Events,
+    JsonEvents,
+    StopRequest,
+    TextEvents,
+    run_reported,
+)
 from sitl.arguments import SitlOptions
 from sitl.link.udp_endpoint import RESEND_S, LinkError, PeerSocket, parse_address
 from sitl.scenario import Scenario
 from sitl.scenario_file import ScenarioError, load_scenario
-
-NOT_COMPLETED, COULD_NOT_START = 1, 2  # exit codes
 
 
 class CouldNotStart(Exception):
@@ -21,20 +25,8 @@ class CouldNotStart(Exception):
 def run(options: SitlOptions) -> int:
     """Simulate one flight; returns the exit code."""
     events: Events = JsonEvents() if options.events == "json" else TextEvents(options.json == "-")
-    try:
-        return _run(options, events)
-    except (CouldNotStart, LinkError, ScenarioError) as error:
-        events.report("error", f"sitl: {error}")
-        return COULD_NOT_START
-    except KeyboardInterrupt:
-        events.report("error", "sitl: interrupted before the flight began")
-        return NOT_COMPLETED
-    except BrokenPipeError:
-        return NOT_COMPLETED  # the reader of the events is gone
-    except Exception as error:
-        traceback.print_exc()
-        events.report("error", f"sitl: internal error, {type(error).__name__}: {error}")
-        return NOT_COMPLETED
+    refusals = (CouldNotStart, LinkError, ScenarioError)
+    return run_reported("sitl", events, refusals, lambda: _run(options, events))
 
 
 def _run(options: SitlOptions, events: Events) -> int:

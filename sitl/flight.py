@@ -11,7 +11,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
-from command_line.process import Events
+from command_line.parser import COULD_NOT_START
+from command_line.process import NOT_COMPLETED, Events
 from sitl.arguments import SitlOptions
 from sitl.link.encode import StepEncoder
 from sitl.link.exchange import Exchange, ExchangeCounts, Lockstep, RealTime, Stop
@@ -24,7 +25,7 @@ from sitl.simulation import START_US, STEP_US, Controls, Simulation
 from sitl.trajectory import TrajectoryPoint
 from sitl.truth_log import TruthLog
 
-COMPLETED, NOT_COMPLETED, COULD_NOT_START = 0, 1, 2  # exit codes
+COMPLETED: Final = 0  # exit code
 
 _FIFO_PRIORITY: Final = 50
 

@@ -57,11 +57,7 @@ class Truth:
 
 
 class Simulation:
-    """The plant in its scenario.
-
-    Args:
-        scenario: What to fly.
-        seed: Root of every random number of the run, 0 or more.
+    """The plant in its scenario; ``seed``, 0 or more, is the root of all randomness of the run.
 
     Raises:
         ScenarioError: The scenario contradicts itself or starts outside its safe set.

@@ -76,18 +76,13 @@ def rk4_step(
 
 @compiled
 def integrate(plant: Plant, state: Array, inputs: Inputs, step: float, places: Array) -> Arrival:
-    """Advance ``state`` in place by one step per row of ``places``.
+    """Advance ``state`` (17 + 2j,) [SI] in place by one ``step`` [s] per row of ``places``.
 
-    One call does all that an exchange needs, because handing the plant's arrays to compiled
-    code costs as much as two steps.
+    One call does all that an exchange needs, because handing the plant's arrays to compiled code
+    costs as much as two steps. The inputs are held over all steps.
 
-    Args:
-        plant: Numbers of the vehicle.
-        state: (17 + 2j,) [SI], see ``sitl.plant.state``.
-        inputs: Commands and disturbance, held over all steps.
-        step: Length of one step [s].
-        places: (steps, 2 + j, 3) [m, NED], overwritten: positions of the base origin and of
-            every DH frame's origin after each step. No rows: the state stays as it is.
+    Base origin and origin of every DH frame go to places (steps, 2 + j, 3) [m, NED], after each
+    step; without rows the state stays as it is.
     """
     n = state.shape[0]
     work = empty_workspace((n - ARM) // 2)
@@ -113,15 +108,10 @@ def step(
 ) -> Arrival:
     """``integrate`` with the plant in an array of one and inputs in tuples: the cheapest to call.
 
-    Args:
-        plants: Numbers of the vehicle.
-        state: State vector (17 + 2j,) [SI], advanced in place.
-        thrust: Commanded thrusts [N], rotors 1 to 4.
-        torque: (j,) commanded joint torques [N·m].
-        force_W: Disturbance on the base origin [N, NED].
-        torque_B: Disturbance on the base [N·m, B].
-        step_s: Length of one step.
-        places: (steps, 2 + j, 3) [m, NED], overwritten; see ``integrate``.
+    ``thrust`` [N] and ``torque`` [N·m] are commanded, rotors 1 to 4 and joints; ``force_W`` [N,
+    NED] and ``torque_B`` [N·m, B] disturb the base.
+
+    Overwritten are state (17 + 2j,) [SI] and places (steps, 2 + j, 3) [m, NED].
     """
     inputs = Inputs(np.array(thrust), np.array(torque), np.array(force_W), np.array(torque_B))
     return integrate(plants[0], state, inputs, step_s, places)

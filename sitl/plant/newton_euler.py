@@ -44,15 +44,9 @@ def wrench_needed_into(
 
     Forward recursion of ω, α, a (eq 4), backward recursion of f, τ (eq 5), base included.
 
-    Args:
-        chain: Rigid bodies.
-        at: Posture at the joint angles.
-        w: Angular velocity of the base [rad/s, B].
-        alpha: Angular acceleration of the base [rad/s², B].
-        a: Acceleration of the base origin minus gravity [m/s², B].
-        qd: Joint rates (j,) [rad/s].
-        qdd: Joint accelerations (j,) [rad/s²].
-        out: (6 + j,) force [N, B], moment about the base origin [N·m, B], joint torques [N·m].
+    The base has w [rad/s, B], alpha [rad/s², B] and, less gravity, a [m/s², B]; the joints have qd
+    (j,) [rad/s] and qdd (j,) [rad/s²]. Into out (6 + j,) [SI]: force [N, B], moment about the base
+    origin [N·m, B], joint torques [N·m].
 
     Source: eqs 4 and 5 with errata; docs/equations.md E4, E5.
     """

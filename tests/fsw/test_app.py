@@ -12,6 +12,8 @@ from pathlib import Path
 
 import pytest
 
+from command_line.parser import COULD_NOT_START
+from command_line.process import NOT_COMPLETED
 from fsw import app
 from fsw.arguments import FswOptions
 from fsw.link.link_choice import NO_LINK, LinkChoice
@@ -67,7 +69,7 @@ def options(silent: socket.socket, tmp_path: Path) -> Iterator[FswOptions]:
 def test_a_simulator_that_never_answers_ends_the_wait(
     options: FswOptions, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert app.run(options, load) == app.COULD_NOT_START
+    assert app.run(options, load) == COULD_NOT_START
     reported = capsys.readouterr().err
     assert reported == f"fsw: no simulator answered at {options.sim} within 0.4 s\n"
 
@@ -76,7 +78,7 @@ def test_nobody_at_the_simulators_port_is_the_same(
     options: FswOptions, capsys: pytest.CaptureFixture[str]
 ) -> None:
     silent = replace(options, sim="udp:127.0.0.1:9")
-    assert app.run(silent, load) == app.COULD_NOT_START
+    assert app.run(silent, load) == COULD_NOT_START
     assert "no simulator answered at udp:127.0.0.1:9" in capsys.readouterr().err
 
 
@@ -89,7 +91,7 @@ def test_a_signal_ends_the_wait(
         os.kill(os.getpid(), number)
 
     threading.Thread(target=signal_once_it_announces_itself, daemon=True).start()
-    assert app.run(replace(options, wait_s=30.0), load) == app.NOT_COMPLETED
+    assert app.run(replace(options, wait_s=30.0), load) == NOT_COMPLETED
     assert (Path(str(options.out)) / "fsw.json").exists()
 
 
@@ -98,7 +100,7 @@ def test_a_directory_with_a_flight_is_refused(
     name: str, options: FswOptions, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (Path(str(options.out)) / name).write_bytes(b"")
-    assert app.run(options, load) == app.COULD_NOT_START
+    assert app.run(options, load) == COULD_NOT_START
     assert "already holds a flight" in capsys.readouterr().err
 
 
@@ -107,7 +109,7 @@ def test_kept_parameters_are_taken_over_and_what_is_of_no_use_is_said(
 ) -> None:
     file = tmp_path / "vehicle.params"
     file.write_text("PID_YAW_P 5\nOF_ANOTHER_AGE 1\n")
-    assert app.run(replace(options, params=file), load) == app.COULD_NOT_START
+    assert app.run(replace(options, params=file), load) == COULD_NOT_START
     reported = "".join(capsys.readouterr())
     assert f"fsw: {file}, line 2 is passed over: OF_ANOTHER_AGE is unknown\n" in reported
     assert f"fsw: parameters from {file}, 1 of them not the default\n" in reported
@@ -120,7 +122,7 @@ def test_a_place_where_parameters_cannot_be_kept_is_one_sentence(
     options: FswOptions, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     nowhere = tmp_path / "nowhere" / "vehicle.params"
-    assert app.run(replace(options, params=nowhere), load) == app.COULD_NOT_START
+    assert app.run(replace(options, params=nowhere), load) == COULD_NOT_START
     assert capsys.readouterr().err == (
         f"fsw: cannot keep parameters in {nowhere}: No such file or directory\n"
     )
