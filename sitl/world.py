@@ -47,8 +47,8 @@ class World:
     def margins(self, points: tuple[V3, V3, V3], target: V3 | None) -> tuple[float, ...]:
         """Margins [m] of base, joint 2 and end-effector, as ``keys``; negative means violated.
 
-        Without a target, the end-effector's reference, the workspace does not apply: its margin is
-        infinite.
+        Without ``target`` [m, NED], the end-effector's reference, the workspace does not apply: its
+        margin is infinite.
         """
         values = [
             a * x + b * y + c * z - limit for a, b, c, limit in self._planes for x, y, z in points

@@ -108,8 +108,8 @@ def step(
 ) -> Arrival:
     """``integrate`` with the plant in an array of one and inputs in tuples: the cheapest to call.
 
-    ``thrust`` [N] and ``torque`` [N·m] are commanded, rotors 1 to 4 and joints; ``force_W`` [N,
-    NED] and ``torque_B`` [N·m, B] disturb the base.
+    ``thrust`` [N] and ``torque`` [N·m] are commanded, rotors 1 to 4 and joints;
+    ``force_W`` [N, NED] and ``torque_B`` [N·m, B] disturb the base.
 
     Overwritten are state (17 + 2j,) [SI] and places (steps, 2 + j, 3) [m, NED].
     """
