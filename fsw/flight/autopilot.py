@@ -13,7 +13,7 @@ from fsw.control.safety_gate import gate
 from fsw.estimation.dead_reckoning import moved_on
 from fsw.estimation.estimator import estimate_state
 from fsw.flight.commander import Commander, acknowledgement
-from fsw.flight.failsafe import FAULTS
+from fsw.flight.failsafe import FAULTS, Condition
 from fsw.flight.modes.mission import with_update
 from fsw.flight.modes.offboard import accept_setpoints, report
 from fsw.flight.plan_exchange import PlanExchange, measured_state, nominal_at_rest, requested
@@ -86,7 +86,8 @@ class Autopilot:
 
     def tick(self, state: FlightState, inputs: TickInputs) -> tuple[FlightState, TickOutputs]:
         """Everything the vehicle does at one instant: the next state, and everything it says."""
-        now_us, texts = inputs.sensors.t_us, list[StatusText]()
+        now_us = inputs.sensors.t_us
+        texts: list[StatusText] = []
         state, estimate = _estimate(state, inputs)
         state = self._receive(state, inputs, texts)
         if estimate is None:
@@ -110,24 +111,25 @@ class Autopilot:
                 state, request, plan = self._request_plan(state, estimate, nominal, plan, now_us)
             state = self._report_slowly(state, estimate, now_us)
         sent, memory, replaced = self._actuate(state, estimate, nominal, u, ticks)
+        # By position, as the snapshot: both are made in every tick, and names cost a microsecond.
         state = FlightState(
-            index=index,
-            t_us=now_us,
-            estimate=estimate,
-            invalid_ticks=state.invalid_ticks,
-            nominal=nominal,
-            output_replaced=replaced,
-            cascade=memory,
-            vehicle=state.vehicle,
-            mission=state.mission,
-            plan=plan,
-            constraints=state.constraints,
-            reference=state.reference,
-            tuning=state.tuning,
-            setpoint=state.setpoint,
-            offboard=state.offboard,
-            battery=state.battery,
-            arming_refusal=state.arming_refusal,
+            index,
+            now_us,
+            estimate,
+            state.invalid_ticks,
+            nominal,
+            replaced,
+            memory,
+            state.vehicle,
+            state.mission,
+            plan,
+            state.constraints,
+            state.reference,
+            state.tuning,
+            state.setpoint,
+            state.offboard,
+            state.battery,
+            state.arming_refusal,
         )
         snapshot = _snapshot(state, estimate, u, inputs)
         return state, TickOutputs(
@@ -260,30 +262,35 @@ def _snapshot(
     vehicle, plan, goal = state.vehicle, state.plan, state.setpoint.goal
     flies = vehicle.flies and state.nominal is not None
     return FlightSnapshot(
-        t_us=estimate.t_us,
-        mode=vehicle.mode,
-        armed=vehicle.armed,
-        estimate=estimate,
-        reference=state.reference,
-        plan_state=state.nominal if flies else None,
-        plan_input=u if flies else None,
-        actuators=state.cascade.commanded,
-        plan=plan.running,
-        plan_status=plan.status,
-        counters=plan.counters,
-        constraints=state.constraints,
-        failures=tuple([c.value for c in vehicle.conditions if c in FAULTS]),
-        landed=vehicle.landed,
-        home=vehicle.home,
-        battery=state.battery,
-        arming_refusal=state.arming_refusal,
-        offboard=report(state, inputs.sensors.t_us),
-        intended_mode=vehicle.intended_mode,
-        mission=state.mission.flight.progress,
-        failsafe_from=vehicle.failsafe_from,
-        orbit=goal.orbit if vehicle.mode is Mode.ORBIT and goal is not None else None,
-        accel_B=inputs.sensors.accel_B,
+        estimate.t_us,
+        vehicle.mode,
+        vehicle.armed,
+        estimate,
+        state.reference,
+        state.nominal if flies else None,
+        u if flies else None,
+        state.cascade.commanded,
+        plan.running,
+        plan.status,
+        plan.counters,
+        state.constraints,
+        _faults(vehicle.conditions),
+        vehicle.landed,
+        vehicle.home,
+        state.battery,
+        state.arming_refusal,
+        report(state, inputs.sensors.t_us),
+        vehicle.intended_mode,
+        state.mission.flight.progress,
+        vehicle.failsafe_from,
+        goal.orbit if vehicle.mode is Mode.ORBIT and goal is not None else None,
+        inputs.sensors.accel_B,
     )
+
+
+def _faults(conditions: tuple[Condition, ...]) -> tuple[str, ...]:
+    """The vehicle's own faults among the active conditions."""
+    return tuple([c.value for c in conditions if c in FAULTS]) if conditions else ()
 
 
 def _blind(inputs: TickInputs, texts: list[StatusText]) -> TickOutputs:

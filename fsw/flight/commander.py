@@ -50,6 +50,7 @@ class Commander:
         self._plan_period_us = config.mpc_period_us
         self._generator = SetpointGenerator(config)
         self._modes: dict[Mode, FlightMode] = {mode: kind(config) for mode, kind in MODES.items()}
+        self._manual_modes = frozenset(mode for mode, kind in MODES.items() if kind.manual)
         self._no_mode = FlightMode(config)  # disarmed or terminated
 
     def mode(self, state: FlightState) -> FlightMode:
@@ -144,22 +145,23 @@ class Commander:
 
     def _failsafe_context(self, state: FlightState, estimate: StateEstimate) -> FailsafeContext:
         vehicle, plan, now_us = state.vehicle, state.plan, estimate.t_us
-        offboard = vehicle.mode is Mode.OFFBOARD
+        mode, armed, heard_us = vehicle.mode, vehicle.armed, vehicle.gcs_heard_us
+        # By position: it is made in every tick.
         return FailsafeContext(
-            limits=self._config.limits,
-            mode=vehicle.mode,
-            manual=self.mode(state).manual,
-            armed=vehicle.armed,
-            flies=vehicle.flies,
-            invalid_ticks=state.invalid_ticks,
-            up=estimate.R_WB[8],
-            plan_age_us=now_us - plan.since_us,
-            plan_period_us=self._plan_period_us,
-            plan_refused=plan.refused,
-            output_replaced=state.output_replaced,
-            setpoint_fresh=not offboard or is_fresh(self._config, state, now_us),
-            gcs_silent_us=now_us - vehicle.gcs_heard_us if vehicle.gcs_heard_us >= 0 else -1,
-            battery=state.battery,
+            self._config.limits,
+            mode,
+            mode in self._manual_modes,
+            armed,
+            armed and not vehicle.landed,
+            state.invalid_ticks,
+            estimate.R_WB[8],
+            now_us - plan.since_us,
+            self._plan_period_us,
+            plan.refused,
+            state.output_replaced,
+            mode is not Mode.OFFBOARD or is_fresh(self._config, state, now_us),
+            now_us - heard_us if heard_us >= 0 else -1,
+            state.battery,
         )
 
     def _fail_safe(
