@@ -150,7 +150,7 @@ class Commander:
         return FailsafeContext(
             self._config.limits,
             mode,
-            mode in self._manual_modes,
+            self._manual_modes,
             armed,
             armed and not vehicle.landed,
             state.invalid_ticks,

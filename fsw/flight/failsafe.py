@@ -67,7 +67,7 @@ class FailsafeContext:
 
     limits: FlightLimits
     mode: Mode
-    manual: bool  # the mode is flown by an operator
+    manual_modes: frozenset[Mode]  # that an operator flies
     armed: bool
     flies: bool
     invalid_ticks: int  # since the last valid estimate
@@ -105,7 +105,7 @@ def _on_setpoints_lost(context: FailsafeContext) -> Action:
 
 def _on_datalink_lost(context: FailsafeContext) -> Action:
     """NAV_DLL_ACT, where an operator flies; the other modes fly by themselves and go on."""
-    if not (context.manual and context.flies):
+    if not (context.flies and context.mode in context.manual_modes):
         return Action.NONE
     known = {1: Action.HOLD, 2: Action.RETURN, 3: Action.LAND}
     return known.get(context.limits.station_loss_action, Action.NONE)
@@ -191,6 +191,7 @@ FAILSAFES: Final = (
     ),
 )
 
+_TESTS: Final = tuple((row.active, row) for row in FAILSAFES)
 FAULTS: Final = frozenset(row.condition for row in FAILSAFES if row.of_vehicle)
 BATTERY: Final = frozenset(
     (Condition.BATTERY_LOW, Condition.BATTERY_CRITICAL, Condition.BATTERY_EMERGENCY)
@@ -198,8 +199,12 @@ BATTERY: Final = frozenset(
 
 
 def active(context: FailsafeContext) -> tuple[Failsafe, ...]:
-    """Rows whose condition is active, strongest action first."""
-    return tuple([row for row in FAILSAFES if row.active(context)])
+    """Rows whose condition is active, strongest action first; almost always none."""
+    found: tuple[Failsafe, ...] = ()
+    for is_active, row in _TESTS:
+        if is_active(context):
+            found = (*found, row)
+    return found
 
 
 def report(row: Failsafe, context: FailsafeContext, action: Action) -> tuple[Severity, str]:

@@ -25,7 +25,7 @@ PERIOD_US = 100_000
 FINE = FailsafeContext(
     limits=FlightLimits(),
     mode=Mode.HOLD,
-    manual=True,
+    manual_modes=frozenset({Mode.HOLD, Mode.OFFBOARD}),
     armed=True,
     flies=True,
     invalid_ticks=0,
@@ -131,7 +131,9 @@ def test_lost_setpoints_are_acted_on_as_the_parameter_says(number: int, expected
 def test_a_lost_station_is_acted_on_as_the_parameter_says(number: int, expected: Action) -> None:
     lost = replace(FINE, gcs_silent_us=10_000_000, limits=FlightLimits(station_loss_action=number))
     assert action(lost) is expected
-    assert action(replace(lost, manual=False)) is Action.NONE, "it flies by itself, and goes on"
+    assert action(replace(lost, mode=Mode.MISSION)) is Action.NONE, (
+        "it flies by itself, and goes on"
+    )
     assert action(replace(lost, flies=False)) is Action.NONE
 
 
