@@ -51,7 +51,7 @@ _CLIMB_TOLERANCE: Final = 0.05  # m: a ground station rounds, and starts from it
 
 @dataclass(frozen=True, slots=True)
 class NewHeading:
-    """New heading."""
+    """Where the nose points from now on; a decision without one leaves the heading."""
 
     place: Vec3 | None  # m; None: along the flight
 

@@ -30,7 +30,6 @@ from fsw.signals import (
     Command,
     CommandAck,
     CommandResult,
-    EndEffectorTarget,
     Home,
     MissionUpdate,
     Mode,
@@ -187,7 +186,7 @@ class Commander:
         state, result = self.mode(state).update(state, estimate)
         texts += result.texts
         if result.lift_off:
-            return replace(self._lift_off(state, estimate), setpoint=SetpointMemory())
+            return replace(_lift_off(state, estimate), setpoint=SetpointMemory())
         if result.next_mode is None:
             return state
         return self._switch(
@@ -260,9 +259,12 @@ class Commander:
         holds = state.vehicle.mode is Mode.HOLD and state.vehicle.flies
         if not holds or state.setpoint.reference is not None:
             return state
+        return replace(state, setpoint=self._staying(estimate))
+
+    def _staying(self, estimate: StateEstimate, q_arm: Vec2 | None = None) -> SetpointMemory:
+        """A setpoint of the body that stays where it is."""
         reference = self._generator.begin(estimate)
-        goal = PositionGoal(MotionSetpoint(False, reference.p))
-        return replace(state, setpoint=SetpointMemory(reference, goal))
+        return SetpointMemory(reference, PositionGoal(MotionSetpoint(False, reference.p), q_arm))
 
     def _towards(
         self, state: FlightState, goal: PositionGoal, estimate: StateEstimate
@@ -282,10 +284,7 @@ class Commander:
         """Hold the body where it is or on its way, and the arm as asked, from now on."""
         setpoint, goal = state.setpoint, state.setpoint.goal
         if setpoint.reference is None or goal is None or setpoint.reference.of_end_effector:
-            reference = self._generator.begin(estimate)
-            return SetpointMemory(
-                reference, PositionGoal(MotionSetpoint(False, reference.p), q_arm)
-            )
+            return self._staying(estimate, q_arm)
         return replace(setpoint, goal=replace(goal, joints=q_arm))
 
     def _arm(
@@ -305,11 +304,9 @@ class Commander:
             conditions=tuple(c for c in state.vehicle.conditions if c not in failsafe.BATTERY),
         )
         state = replace(
-            state,
+            _without_plan(state, estimate),
             vehicle=vehicle,
             setpoint=SetpointMemory(),
-            nominal=nominal_at_rest(estimate),
-            plan=_plan_from(state.plan, estimate),
             cascade=at_rest(airframe, estimate) if landed else in_hover(airframe, estimate),
         )
         if intended is Mode.HOLD:
@@ -333,42 +330,25 @@ class Commander:
         """Begin another mode; a failsafe's mark stays if the one that is left was ``completed``."""
         before, vehicle = state.vehicle.mode, state.vehicle
         texts.append(StatusText(Severity.INFO, f"{before.value} to {mode.value}: {cause}"))
-        handover = Handover(self._reference(state, estimate), completed)
         follower = self._modes.get(mode, self._no_mode)
-        continues = vehicle.flies and (completed or follower.continues_reference)
-        here = point_in_flight(estimate, self._config.airframe.link_length)[0]
-        origin, yaw = here, estimate.yaw
-        if continues:
-            origin, yaw = handover.reference.p_WE, handover.reference.yaw
+        p_WE = point_in_flight(estimate, self._config.airframe.link_length)[0]
+        here = still_at(p_WE, estimate.t_us, estimate.yaw)
+        last = self.mode(state).target(state, estimate.t_us) if vehicle.flies else here
+        handover = Handover(last, completed)
+        origin = last if completed or follower.continues_reference else here
         state = follower.activate(mission_left(state, mode), estimate, handover)
         if follower.lifts_off and vehicle.landed:
-            state = self._lift_off(state, estimate)
+            state = _lift_off(state, estimate)
         vehicle = replace(
             state.vehicle,
             mode=mode,
-            mode_origin=origin,
-            mode_yaw=yaw,
+            mode_origin=origin.p_WE,
+            mode_yaw=origin.yaw,
             mode_begin_us=estimate.t_us,
             moved_us=estimate.t_us,
             failsafe_from=vehicle.failsafe_from if completed else None,
         )
         return replace(state, vehicle=vehicle)
-
-    def _lift_off(self, state: FlightState, estimate: StateEstimate) -> FlightState:
-        """Initialise the fast loops at the vehicle's state."""
-        return replace(
-            state,
-            vehicle=replace(state.vehicle, landed=False),
-            nominal=nominal_at_rest(estimate),
-            plan=_plan_from(state.plan, estimate),
-        )
-
-    def _reference(self, state: FlightState, estimate: StateEstimate) -> EndEffectorTarget:
-        """Reference of the current mode; the vehicle's position if it does not fly."""
-        if state.vehicle.flies:
-            return self.mode(state).target(state, estimate.t_us)
-        here = point_in_flight(estimate, self._config.airframe.link_length)[0]
-        return still_at(here, estimate.t_us, estimate.yaw)
 
 
 def acknowledgement(command: Command, result: int) -> CommandAck:
@@ -377,9 +357,17 @@ def acknowledgement(command: Command, result: int) -> CommandAck:
     return CommandAck(request.command, result, request.source_system, request.source_component)
 
 
-def _plan_from(plan: PlanMemory, estimate: StateEstimate) -> PlanMemory:
-    """No plan runs yet, and the count of requests goes on."""
-    return PlanMemory(since_us=estimate.t_us, next_id=plan.next_id, counters=plan.counters)
+def _lift_off(state: FlightState, estimate: StateEstimate) -> FlightState:
+    """Fly from now on, with the plan's state where the vehicle is."""
+    vehicle = replace(state.vehicle, landed=False)
+    return _without_plan(replace(state, vehicle=vehicle), estimate)
+
+
+def _without_plan(state: FlightState, estimate: StateEstimate) -> FlightState:
+    """No plan runs yet, its state is the vehicle's, and the count of requests goes on."""
+    last = state.plan
+    plan = PlanMemory(since_us=estimate.t_us, next_id=last.next_id, counters=last.counters)
+    return replace(state, nominal=nominal_at_rest(estimate), plan=plan)
 
 
 def _reason(decision: Decision) -> tuple[StatusText, ...]:

@@ -15,6 +15,7 @@ import math
 from dataclasses import dataclass
 
 from fsw.geometry.rotation import wrap_angle
+from fsw.geometry.vectors import subtract
 from fsw.signals import EndEffectorTarget, Vec3
 
 _PEAK = 1.5  # largest slope of S
@@ -47,15 +48,6 @@ class TrajectorySegment:
     def end_us(self) -> int:
         """When the segment is flown."""
         return self.start_us + math.ceil(1e6 * (self.up + self.cruise + self.down))
-
-    @property
-    def end(self) -> Vec3:
-        """Where it ends [m]."""
-        return (
-            self.start[0] + self.way[0],
-            self.start[1] + self.way[1],
-            self.start[2] + self.way[2],
-        )
 
     def at(self, t_us: int) -> EndEffectorTarget:
         """The reference at an instant, at rest before and after."""
@@ -93,7 +85,7 @@ def segment_to(
 
     Its heading ends at ``yaw`` [rad]; None keeps it.
     """
-    way = (end[0] - start.p_WE[0], end[1] - start.p_WE[1], end[2] - start.p_WE[2])
+    way = subtract(end, start.p_WE)
     turn = 0.0 if yaw is None else wrap_angle(yaw - start.yaw)
     distance, angle = math.hypot(*way), abs(turn)
     if distance < 1e-9 and angle < 1e-9:

@@ -1,6 +1,6 @@
 """The tick of the tuning in use, which is swapped between two ticks.
 
-Every tuning has a ``Autopilot`` of its own, with gains designed and limits set, so no tick can
+Every tuning has an ``Autopilot`` of its own, with gains designed and limits set, so no tick can
 mix two. Which one flies is part of the state: the same inputs fly the same flight again.
 """
 

@@ -137,20 +137,21 @@ class Inbox:
         The sensors' readings are ``stale_us`` older than their stamp says.
         """
         setpoints = self.take_setpoints()
+        # By position: it is made in every tick.
         return TickInputs(
-            sensors=sensors,
-            plan=plan,
-            commands=self.take_commands(),
-            targets=self.take_targets(),
-            safe_set=self.take_safe_set(),
-            motion=setpoints.motion,
-            attitude=setpoints.attitude,
-            joints=setpoints.joints,
-            refused_setpoints=setpoints.refused,
-            ground_station_heard=self.take_station_heard(),
-            stale_us=stale_us,
-            tuning=tuning,
-            mission=mission,
+            sensors,
+            plan,
+            self.take_commands(),
+            self.take_targets(),
+            self.take_safe_set(),
+            setpoints.motion,
+            setpoints.attitude,
+            setpoints.joints,
+            setpoints.refused,
+            self.take_station_heard(),
+            mission,
+            tuning,
+            stale_us,
         )
 
     def take_station_heard(self) -> bool:

@@ -32,12 +32,10 @@ from fsw.signals import (
 from fsw.tuning import Tuning
 from sitl.scenario import Hold, Pilot, Scenario, Start
 from sitl.simulation import STEP_US, Simulation
-from studies.closed_loop import ClosedLoop
+from studies.closed_loop import ClosedLoop, InlinePlanner
 from studies.mission import safe_set
 
 ARM, TAKEOFF, LAND, SET_MODE = 400, 22, 21, 176
-TARGET_PERIOD_US = 100_000
-TARGETS_AHEAD = 20
 STREAM_STEPS = 25
 LOCATE = partial(to_local, DEFAULT_ORIGIN)
 
@@ -162,27 +160,21 @@ class Flight:
         return outputs
 
 
-class Late:
+class Late(InlinePlanner):
     """The planner of a flight; each plan comes as many ticks late as the flight says."""
 
     def __init__(self, flight: Flight) -> None:
-        self._flight = flight
-        self._answer: tuple[int, Plan | PlanFailure] | None = None
+        assert flight.planner is not None
+        super().__init__(flight.planner)
+        self._late_ticks = flight.late_ticks
+        self._late_us = 0
 
     def submit(self, request: PlanRequest) -> None:
-        flight = self._flight
-        assert flight.planner is not None
-        due_us = request.t_apply_us + STEP_US * flight.late_ticks(request.plan_id)
-        self._answer = (due_us, flight.planner.plan(request))
+        super().submit(request)
+        self._late_us = STEP_US * self._late_ticks(request.plan_id)
 
     def take(self, t_us: int) -> Plan | PlanFailure | None:
-        if self._answer is None or t_us < self._answer[0]:
-            return None
-        answer, self._answer = self._answer[1], None
-        return answer
-
-    def close(self) -> None:
-        """Nothing to stop."""
+        return super().take(t_us - self._late_us)
 
 
 def command(

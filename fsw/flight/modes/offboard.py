@@ -16,6 +16,7 @@ from fsw.flight.offboard_setpoints import (
 )
 from fsw.flight.setpoint_generator import PositionGoal
 from fsw.flight.state import FlightState, OffboardMemory, SetpointMemory
+from fsw.geometry.vectors import add_scaled
 from fsw.parameters.flight_config import FlightConfig
 from fsw.signals import (
     Mode,
@@ -24,7 +25,6 @@ from fsw.signals import (
     SetpointKind,
     StateEstimate,
     TickInputs,
-    Vec3,
 )
 
 _RISING = 0.1  # m, m/s or m/s^2 upwards: the setpoint asks a standing vehicle to fly
@@ -165,10 +165,7 @@ def _moved_on(motion: MotionSetpoint, age_us: int) -> MotionSetpoint:
     """A moving setpoint, extrapolated to now."""
     if motion.p is None or motion.v is None or motion.along_heading:
         return motion
-    age = 1e-6 * age_us
-    p, v = motion.p, motion.v
-    now: Vec3 = (p[0] + age * v[0], p[1] + age * v[1], p[2] + age * v[2])
-    return replace(motion, p=now)
+    return replace(motion, p=add_scaled(motion.p, motion.v, 1e-6 * age_us))
 
 
 def _kind(memory: OffboardMemory) -> SetpointKind:
