@@ -46,7 +46,6 @@ class Commander:
 
     def __init__(self, config: FlightConfig) -> None:
         self._config = config
-        self._plan_period_us = config.mpc_period_us
         self._generator = SetpointGenerator(config)
         self._modes: dict[Mode, FlightMode] = {mode: kind(config) for mode, kind in MODES.items()}
         self._manual_modes = frozenset(mode for mode, kind in MODES.items() if kind.manual)
@@ -124,7 +123,8 @@ class Commander:
         before = state.vehicle.conditions
         if state.vehicle.mode is Mode.FAULT:
             return state  # what ended the flight stays on show
-        rows = failsafe.active(self._failsafe_context(state, estimate))
+        config, manual = self._config, self._manual_modes
+        rows = failsafe.active(FailsafeContext(state, estimate, config, manual))
         if not rows and not before:
             return state
         now = tuple([row.condition for row in rows])
@@ -134,34 +134,13 @@ class Commander:
         for row in rows:
             if row.condition in before or state.vehicle.mode is Mode.FAULT:
                 continue
-            context = self._failsafe_context(state, estimate)
+            context = FailsafeContext(state, estimate, config, manual)
             action = row.action(context)
             if action is not failsafe.Action.NONE:
                 texts.append(StatusText(*failsafe.report(row, context, action)))
             if action.mode is not None:
                 state = self._fail_safe(state, action.mode, estimate, texts)
         return state
-
-    def _failsafe_context(self, state: FlightState, estimate: StateEstimate) -> FailsafeContext:
-        vehicle, plan, now_us = state.vehicle, state.plan, estimate.t_us
-        mode, armed, heard_us = vehicle.mode, vehicle.armed, vehicle.gcs_heard_us
-        # By position: it is made in every tick.
-        return FailsafeContext(
-            self._config.limits,
-            mode,
-            self._manual_modes,
-            armed,
-            armed and not vehicle.landed,
-            state.invalid_ticks,
-            estimate.R_WB[8],
-            now_us - plan.since_us,
-            self._plan_period_us,
-            plan.refused,
-            state.output_replaced,
-            mode is not Mode.OFFBOARD or is_fresh(self._config, state, now_us),
-            now_us - heard_us if heard_us >= 0 else -1,
-            state.battery,
-        )
 
     def _fail_safe(
         self, state: FlightState, mode: Mode, estimate: StateEstimate, texts: list[StatusText]

@@ -2,7 +2,7 @@
 
 Each row names a condition, when it is active and the action on it. A condition is reported once,
 when it becomes active, and its action is taken then. Some actions are parameters, in PX4's names
-and numbers. To act on another condition, add a row, and to ``FailsafeContext`` what it looks at.
+and numbers. To act on another condition, name it and add a row.
 """
 
 from __future__ import annotations
@@ -10,11 +10,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from fsw.frozen import dataclass as value_dataclass
-from fsw.parameters.flight_config import FlightLimits
-from fsw.signals import BatteryState, Charge, Mode, Severity
+from fsw.parameters.flight_config import FlightConfig, FlightLimits
+from fsw.signals import Charge, Mode, Severity, StateEstimate
+
+if TYPE_CHECKING:
+    from fsw.flight.state import FlightState  # which keeps the active conditions
 
 PLAN_STALE_PERIODS: Final = 3
 INVALID_TICKS: Final = 5  # 10 ms without an estimate; a single lost frame is flown through
@@ -63,22 +66,22 @@ class Condition(Enum):
 
 @value_dataclass(frozen=True, slots=True)
 class FailsafeContext:
-    """What the table looks at, once a tick."""
+    """What the table looks at, once a tick: all that the vehicle knows, and its limits."""
 
-    limits: FlightLimits
-    mode: Mode
+    state: FlightState
+    estimate: StateEstimate
+    config: FlightConfig
     manual_modes: frozenset[Mode]  # that an operator flies
-    armed: bool
-    flies: bool
-    invalid_ticks: int  # since the last valid estimate
-    up: float  # cosine of tilt, R33
-    plan_age_us: int  # since the running plan (or take-over) began
-    plan_period_us: int
-    plan_refused: bool
-    output_replaced: bool
-    setpoint_fresh: bool  # or none is needed
-    gcs_silent_us: int  # -1: no ground station was ever heard
-    battery: BatteryState
+
+    @property
+    def limits(self) -> FlightLimits:
+        """Timeouts, and the parameters of actions."""
+        return self.config.limits
+
+    @property
+    def gcs_silent_us(self) -> int:
+        """Time since a ground station was heard."""
+        return self.estimate.t_us - self.state.vehicle.gcs_heard_us
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,6 +100,27 @@ def _always(action: Action) -> Callable[[FailsafeContext], Action]:
     return lambda _: action
 
 
+def _plan_is_stale(context: FailsafeContext) -> bool:
+    """In flight, the running plan (or taking over) began more than three periods ago."""
+    age_us = context.estimate.t_us - context.state.plan.since_us
+    stale_us = PLAN_STALE_PERIODS * context.config.planner.period_us
+    return age_us > stale_us and context.state.vehicle.flies
+
+
+def _setpoints_are_lost(context: FailsafeContext) -> bool:
+    state = context.state
+    if state.vehicle.mode is not Mode.OFFBOARD:
+        return False
+    timeout_us = context.limits.setpoint_timeout_us
+    return not state.offboard.is_fresh(context.estimate.t_us, timeout_us)
+
+
+def _datalink_is_lost(context: FailsafeContext) -> bool:
+    if context.state.vehicle.gcs_heard_us < 0:
+        return False  # there never was one
+    return context.gcs_silent_us >= context.limits.station_timeout_us
+
+
 def _on_setpoints_lost(context: FailsafeContext) -> Action:
     """COM_OBL_RC_ACT; the mode cannot continue."""
     known = {3: Action.RETURN, 4: Action.LAND, 5: Action.HOLD}
@@ -105,7 +129,8 @@ def _on_setpoints_lost(context: FailsafeContext) -> Action:
 
 def _on_datalink_lost(context: FailsafeContext) -> Action:
     """NAV_DLL_ACT, where an operator flies; the other modes fly by themselves and go on."""
-    if not (context.flies and context.mode in context.manual_modes):
+    vehicle = context.state.vehicle
+    if not (vehicle.flies and vehicle.mode in context.manual_modes):
         return Action.NONE
     known = {1: Action.HOLD, 2: Action.RETURN, 3: Action.LAND}
     return known.get(context.limits.station_loss_action, Action.NONE)
@@ -118,73 +143,74 @@ def _on_battery(context: FailsafeContext) -> Action:
         (2, Charge.EMERGENCY): Action.LAND,
         (3, Charge.CRITICAL): Action.RETURN,
         (3, Charge.EMERGENCY): Action.LAND,
-    }.get((context.limits.low_battery_action, context.battery.charge), Action.WARN)
-    under_way = context.mode is Mode.LAND or context.mode is action.mode
-    return Action.WARN if under_way or not context.flies else action
+    }.get((context.limits.low_battery_action, context.state.battery.charge), Action.WARN)
+    vehicle = context.state.vehicle
+    under_way = vehicle.mode is Mode.LAND or vehicle.mode is action.mode
+    return Action.WARN if under_way or not vehicle.flies else action
 
 
 def _charge_left(context: FailsafeContext) -> str:
-    return f": {100.0 * context.battery.remaining:.0f} % left"
+    return f": {100.0 * context.state.battery.remaining:.0f} % left"
 
 
 FAILSAFES: Final = (
     Failsafe(
         Condition.ESTIMATE_INVALID,
-        lambda c: c.armed and c.invalid_ticks >= INVALID_TICKS,
+        lambda c: c.state.invalid_ticks >= INVALID_TICKS and c.state.vehicle.armed,
         _always(Action.TERMINATE),
         of_vehicle=True,
     ),
     Failsafe(
         Condition.TILT_LOST,
-        lambda c: c.flies and not c.up > MIN_UP,
+        lambda c: not c.estimate.R_WB[8] > MIN_UP and c.state.vehicle.flies,
         _always(Action.TERMINATE),
         of_vehicle=True,
     ),
     Failsafe(
         Condition.PLAN_STALE,
-        lambda c: c.flies and c.plan_age_us > PLAN_STALE_PERIODS * c.plan_period_us,
+        _plan_is_stale,
         _always(Action.BRAKE),
         of_vehicle=True,
     ),
     Failsafe(
         Condition.OUTPUT_NOT_FINITE,
-        lambda c: c.output_replaced,
+        lambda c: c.state.output_replaced,
         _always(Action.WARN),
         of_vehicle=True,
     ),
     Failsafe(
         Condition.PLAN_REFUSED,
-        lambda c: c.plan_refused,
+        lambda c: c.state.plan.refused,
         _always(Action.WARN),
         of_vehicle=True,
     ),
     Failsafe(
         Condition.SETPOINTS_LOST,
-        lambda c: not c.setpoint_fresh,
+        _setpoints_are_lost,
         _on_setpoints_lost,
     ),
     Failsafe(
         Condition.DATALINK_LOST,
-        lambda c: c.gcs_silent_us >= c.limits.station_timeout_us,
+        _datalink_is_lost,
         _on_datalink_lost,
         detail=lambda c: f" for {c.gcs_silent_us * 1e-6:.0f} s",
     ),
     Failsafe(
         Condition.BATTERY_LOW,
-        lambda c: c.battery.charge is Charge.LOW,
+        lambda c: c.state.battery.charge is Charge.LOW,
         _on_battery,
         detail=_charge_left,
     ),
     Failsafe(
         Condition.BATTERY_CRITICAL,
-        lambda c: c.battery.charge is Charge.CRITICAL,
+        lambda c: c.state.battery.charge is Charge.CRITICAL,
         _on_battery,
         Severity.CRITICAL,
         _charge_left,
     ),
     Failsafe(
         Condition.BATTERY_EMERGENCY,
-        lambda c: c.battery.charge is Charge.EMERGENCY,
+        lambda c: c.state.battery.charge is Charge.EMERGENCY,
         _on_battery,
         Severity.EMERGENCY,
         _charge_left,

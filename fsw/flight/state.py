@@ -91,6 +91,20 @@ class OffboardMemory:
     refused: int = 0
     tilt: Tilt = field(default_factory=Tilt)
 
+    @property
+    def heard_us(self) -> int:
+        """When the newest setpoint of any kind came; -1: never."""
+        return max(self.motion_us, self.joints_us)
+
+    def is_fresh(self, now_us: int, timeout_us: int) -> bool:
+        """Whether the newest setpoint is within the timeout."""
+        return is_young(self.heard_us, now_us, timeout_us)
+
+
+def is_young(heard_us: int, now_us: int, timeout_us: int) -> bool:
+    """Whether what came at ``heard_us``, negative for never, is within the timeout."""
+    return heard_us >= 0 and now_us - heard_us < timeout_us
+
 
 @dataclass(frozen=True, slots=True)
 class MissionMemory:

@@ -15,7 +15,7 @@ from fsw.flight.offboard_setpoints import (
     tilted,
 )
 from fsw.flight.setpoint_generator import PositionGoal
-from fsw.flight.state import FlightState, OffboardMemory, SetpointMemory
+from fsw.flight.state import FlightState, OffboardMemory, SetpointMemory, is_young
 from fsw.geometry.vectors import add_scaled
 from fsw.parameters.flight_config import FlightConfig
 from fsw.signals import (
@@ -80,7 +80,8 @@ class Offboard(FlightMode):
         if reference is None or reference.of_end_effector != motion.of_end_effector:
             reference = self.generator.begin(estimate, of_end_effector=motion.of_end_effector)
         joints = goal.joints if goal is not None else None
-        if memory.joints is not None and _is_young(self.config, memory.joints_us, estimate.t_us):
+        timeout_us = self.config.limits.setpoint_timeout_us
+        if memory.joints is not None and is_young(memory.joints_us, estimate.t_us, timeout_us):
             joints = memory.joints.q_arm
         if joints is not None and reference.q_arm is None:
             reference = replace(reference, q_arm=estimate.q_arm)
@@ -95,7 +96,7 @@ class Offboard(FlightMode):
     def _motion(self, state: FlightState, estimate: StateEstimate) -> tuple[MotionSetpoint, Tilt]:
         memory, config = state.offboard, self.config
         ahead = Tilt(yaw=estimate.yaw)
-        if not _is_young(config, memory.motion_us, estimate.t_us):
+        if not is_young(memory.motion_us, estimate.t_us, config.limits.setpoint_timeout_us):
             # Joints alone: the body stays.
             return MotionSetpoint(False, v=(0.0, 0.0, 0.0)), ahead
         if memory.attitude is not None:
@@ -129,7 +130,7 @@ def accept_setpoints(
 
 def is_fresh(config: FlightConfig, state: FlightState, now_us: int) -> bool:
     """Whether the newest setpoint is within the timeout."""
-    return _is_young(config, max(state.offboard.motion_us, state.offboard.joints_us), now_us)
+    return state.offboard.is_fresh(now_us, config.limits.setpoint_timeout_us)
 
 
 def report(state: FlightState, now_us: int) -> OffboardReport:
@@ -137,7 +138,6 @@ def report(state: FlightState, now_us: int) -> OffboardReport:
     memory = state.offboard
     if memory.accepted == memory.refused == 0:
         return _NO_SETPOINTS
-    heard_us = max(memory.motion_us, memory.joints_us)
     return OffboardReport(
         kind=_kind(memory) if state.vehicle.mode is Mode.OFFBOARD else SetpointKind.NONE,
         motion=memory.motion,
@@ -145,12 +145,8 @@ def report(state: FlightState, now_us: int) -> OffboardReport:
         joints=memory.joints,
         accepted=memory.accepted,
         refused=memory.refused,
-        age_us=now_us - heard_us if heard_us >= 0 else 0,
+        age_us=now_us - memory.heard_us if memory.heard_us >= 0 else 0,
     )
-
-
-def _is_young(config: FlightConfig, heard_us: int, now_us: int) -> bool:
-    return heard_us >= 0 and now_us - heard_us < config.limits.setpoint_timeout_us
 
 
 def _presses(state: FlightState, estimate: StateEstimate) -> bool:

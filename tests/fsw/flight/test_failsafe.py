@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -18,40 +19,63 @@ from fsw.flight.failsafe import (
     active,
     report,
 )
-from fsw.parameters.flight_config import FlightLimits
+from fsw.flight.state import FlightState, OffboardMemory, PlanMemory, VehicleMemory
+from fsw.parameters.flight_config import FlightLimits, flight_config
 from fsw.signals import BatteryState, Charge, Mode, Severity
+from tests.fsw.random_states import random_estimate
 
 PERIOD_US = 100_000
-FINE = FailsafeContext(
-    limits=FlightLimits(),
-    mode=Mode.HOLD,
-    manual_modes=frozenset({Mode.HOLD, Mode.OFFBOARD}),
-    armed=True,
-    flies=True,
-    invalid_ticks=0,
-    up=1.0,
-    plan_age_us=PERIOD_US,
-    plan_period_us=PERIOD_US,
-    plan_refused=False,
-    output_replaced=False,
-    setpoint_fresh=True,
-    gcs_silent_us=0,
-    battery=BatteryState(),
-)
-OFFBOARD = replace(FINE, mode=Mode.OFFBOARD, setpoint_fresh=False)
+NOW_US = 10**9
+CONFIG = flight_config()
+MANUAL = frozenset({Mode.HOLD, Mode.OFFBOARD})
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What a condition may depend on, in the words of the tests."""
+
+    limits: FlightLimits = field(default_factory=FlightLimits)
+    mode: Mode = Mode.HOLD
+    landed: bool = False
+    invalid_ticks: int = 0
+    up: float = 1.0
+    plan_age_us: int = PERIOD_US
+    plan_refused: bool = False
+    output_replaced: bool = False
+    setpoint_age_us: int = 0
+    gcs_silent_us: int = 0
+    battery: BatteryState = field(default_factory=BatteryState)
+
+    def context(self) -> FailsafeContext:
+        heard_us = NOW_US - self.gcs_silent_us if self.gcs_silent_us >= 0 else -1
+        state = FlightState(
+            invalid_ticks=self.invalid_ticks,
+            output_replaced=self.output_replaced,
+            vehicle=VehicleMemory(mode=self.mode, landed=self.landed, gcs_heard_us=heard_us),
+            plan=PlanMemory(since_us=NOW_US - self.plan_age_us, refused=self.plan_refused),
+            offboard=OffboardMemory(motion_us=NOW_US - self.setpoint_age_us),
+            battery=self.battery,
+        )
+        level = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, self.up)
+        estimate = random_estimate(np.random.default_rng(1))._replace(t_us=NOW_US, R_WB=level)
+        return FailsafeContext(state, estimate, replace(CONFIG, limits=self.limits), MANUAL)
+
+
+FINE = Evidence()
+OFFBOARD = replace(FINE, mode=Mode.OFFBOARD, setpoint_age_us=500_000)
 
 
 def charged(charge: Charge) -> BatteryState:
     return BatteryState(remaining=0.07, charge=charge)
 
 
-def conditions(context: FailsafeContext) -> tuple[Condition, ...]:
-    return tuple(row.condition for row in active(context))
+def conditions(evidence: Evidence) -> tuple[Condition, ...]:
+    return tuple(row.condition for row in active(evidence.context()))
 
 
-def action(context: FailsafeContext) -> Action:
-    (row,) = active(context)
-    return row.action(context)
+def action(evidence: Evidence) -> Action:
+    (row,) = active(evidence.context())
+    return row.action(evidence.context())
 
 
 def test_every_condition_has_one_row() -> None:
@@ -59,16 +83,16 @@ def test_every_condition_has_one_row() -> None:
 
 
 def test_without_attitude_or_estimate_the_flight_is_ended_and_only_then() -> None:
-    ending = {row.condition for row in FAILSAFES if row.action(FINE) is Action.TERMINATE}
+    ending = {row.condition for row in FAILSAFES if row.action(FINE.context()) is Action.TERMINATE}
     assert ending == {Condition.ESTIMATE_INVALID, Condition.TILT_LOST}
 
 
 def test_nothing_wrong_is_no_condition() -> None:
-    assert active(FINE) == ()
+    assert active(FINE.context()) == ()
 
 
 @pytest.mark.parametrize(
-    ("context", "condition"),
+    ("evidence", "condition"),
     [
         (replace(FINE, invalid_ticks=5), Condition.ESTIMATE_INVALID),
         (replace(FINE, up=0.339), Condition.TILT_LOST),
@@ -84,33 +108,34 @@ def test_nothing_wrong_is_no_condition() -> None:
         (replace(FINE, battery=charged(Charge.EMERGENCY)), Condition.BATTERY_EMERGENCY),
     ],
 )
-def test_each_evidence_is_its_condition(context: FailsafeContext, condition: Condition) -> None:
-    assert conditions(context) == (condition,)
+def test_each_evidence_is_its_condition(evidence: Evidence, condition: Condition) -> None:
+    assert conditions(evidence) == (condition,)
 
 
 @pytest.mark.parametrize(
-    "context",
+    "evidence",
     [
         replace(FINE, invalid_ticks=4),  # a lost frame or two are flown through
         replace(FINE, up=0.341),  # just short of 70 degrees
         replace(FINE, plan_age_us=3 * PERIOD_US),
-        replace(FINE, flies=False, up=-1.0),  # carried about upside down
-        replace(FINE, flies=False, plan_age_us=10**9),
-        replace(FINE, armed=False, flies=False, invalid_ticks=1000),  # sensors not yet on
-        replace(OFFBOARD, setpoint_fresh=True),
+        replace(FINE, landed=True, up=-1.0),  # carried about upside down
+        replace(FINE, landed=True, plan_age_us=10**9),
+        replace(FINE, mode=Mode.DISARMED, landed=True, invalid_ticks=1000),  # sensors not yet on
+        replace(OFFBOARD, setpoint_age_us=499_999),
         replace(FINE, gcs_silent_us=9_999_999),
         replace(FINE, gcs_silent_us=-1),  # there never was one
     ],
 )
-def test_what_can_be_lived_with_is_no_condition(context: FailsafeContext) -> None:
-    assert active(context) == ()
+def test_what_can_be_lived_with_is_no_condition(evidence: Evidence) -> None:
+    assert active(evidence.context()) == ()
 
 
 @given(st.integers(0, 5), st.floats(allow_nan=True), st.integers(0, 10**6), st.booleans())
 def test_the_strongest_action_comes_first(
     invalid: int, up: float, age_us: int, refused: bool
 ) -> None:
-    context = replace(FINE, invalid_ticks=invalid, up=up, plan_age_us=age_us, plan_refused=refused)
+    evidence = replace(FINE, invalid_ticks=invalid, up=up, plan_age_us=age_us, plan_refused=refused)
+    context = evidence.context()
     order = list(Action)
     strengths = [order.index(row.action(context)) for row in active(context)]
     assert strengths == sorted(strengths, reverse=True)
@@ -134,7 +159,7 @@ def test_a_lost_station_is_acted_on_as_the_parameter_says(number: int, expected:
     assert action(replace(lost, mode=Mode.MISSION)) is Action.NONE, (
         "it flies by itself, and goes on"
     )
-    assert action(replace(lost, flies=False)) is Action.NONE
+    assert action(replace(lost, landed=True)) is Action.NONE
 
 
 @pytest.mark.parametrize(
@@ -155,23 +180,23 @@ def test_a_low_battery_is_acted_on_as_the_parameter_says(
 ) -> None:
     context = replace(FINE, battery=charged(charge), limits=FlightLimits(low_battery_action=number))
     assert action(context) is expected
-    assert action(replace(context, flies=False)) is Action.WARN
+    assert action(replace(context, landed=True)) is Action.WARN
     assert action(replace(context, mode=Mode.LAND)) is Action.WARN, "it lands already"
     returning = action(replace(context, mode=Mode.RETURN))
     assert returning is (Action.WARN if expected is Action.RETURN else expected)
 
 
 def test_a_report_names_the_condition_its_number_and_what_is_done() -> None:
-    lost = replace(FINE, gcs_silent_us=12_000_000)
+    lost = replace(FINE, gcs_silent_us=12_000_000).context()
     (row,) = active(lost)
     assert report(row, lost, Action.RETURN) == (
         Severity.CRITICAL,
         "failsafe: no ground station for 12 s, returning",
     )
-    low = replace(FINE, battery=charged(Charge.CRITICAL))
+    low = replace(FINE, battery=charged(Charge.CRITICAL)).context()
     (row,) = active(low)
     assert report(row, low, Action.WARN) == (Severity.CRITICAL, "battery critical: 7 % left")
-    over = replace(FINE, up=0.0)
+    over = replace(FINE, up=0.0).context()
     (row,) = active(over)
     severity, text = report(row, over, Action.TERMINATE)
     assert (severity, text) == (Severity.EMERGENCY, "tilt beyond recovery: terminate")
@@ -186,6 +211,6 @@ def test_a_fault_is_the_vehicles_own() -> None:
 @pytest.mark.parametrize("share", [0.0, 0.5, 0.994, 1.0])
 def test_what_is_left_of_the_battery_is_told_in_percent(share: float) -> None:
     battery = BatteryState(remaining=share, charge=Charge.LOW)
-    context = replace(FINE, battery=battery)
+    context = replace(FINE, battery=battery).context()
     (row,) = active(context)
     assert report(row, context, Action.WARN)[1] == f"battery low: {round(100 * share)} % left"
