@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -53,6 +54,7 @@ def as_json(reports: FlightReports) -> dict[str, Any]:
         "control_smoothness": vehicle.get("control_smoothness", _NOTHING),
         "margins_m": truth.get("margins_m", {}),
         "min_margin_m": truth.get("min_margin_m"),
+        "limits": truth.get("limits", {}),
         "mpc": {key: mpc.get(key) for key in _MPC_KEYS},
         "inner": {key: inner.get(key) for key in _INNER_KEYS},
         "real_time_factor": truth.get("real_time_factor", 0.0),
@@ -75,6 +77,7 @@ def table_rows(result: dict[str, Any], tracking_max_m: float | None) -> Rows:
         ("flown", f"{result['duration_s']:.1f} s"),
         *[(f"margin {name}", _mm(value)) for name, value in result["margins_m"].items()],
         ("minimum margin", _mm(result["min_margin_m"])),
+        *[(f"limit {name.replace('_', ' ')}", _use(use)) for name, use in result["limits"].items()],
         ("tracking RMS / max", f"{_mm(result['tracking_error_rms_m'])} / {_mm(tracking_max_m)}"),
         ("control effort, sum / mean", _sum_and_mean(result["control_effort"])),
         ("control smoothness, sum / mean", _sum_and_mean(result["control_smoothness"])),
@@ -98,6 +101,15 @@ def _timing_rows(mpc: dict[str, Any], inner: dict[str, Any]) -> Rows:
 
 def _mm(value: float | None) -> str:
     return "none" if value is None else f"{1000.0 * value:.1f} mm"
+
+
+def _use(use: dict[str, Any]) -> str:
+    """How much of a limit was used, and for how long it was exceeded."""
+    largest, most, unit = use["largest"], use["most"], use["unit"]
+    if unit == "rad":
+        largest, most, unit = math.degrees(largest), math.degrees(most), "deg"
+    beyond = f", {use['beyond_s']:.2f} s beyond" if use["beyond_s"] > 0.0 else ""
+    return f"{largest:.2f} of {most:.2f} {unit}{beyond}" + ("" if use["kept"] else ": broken")
 
 
 def _sum_and_mean(value: dict[str, float]) -> str:

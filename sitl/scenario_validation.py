@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 
+from sitl.limits import BOTH_JOINTS_DEG, FIRST_JOINT_DEG
 from sitl.scenario import Lissajous, Scenario, Start
 from sitl.scenario_file import ScenarioError
 from sitl.world import CRITICAL_POINTS
 
-FIRST_JOINT_DEG, BOTH_JOINTS_DEG = 60.0, 90.0  # the arm's limits, Table I of the paper
 MARGINS_MAX = 16  # what one BARRIER_MARGIN message carries
 
 

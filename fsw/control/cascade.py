@@ -13,10 +13,18 @@ from fsw.control.arm_compensation import compensated_joints
 from fsw.control.attitude import attitude_pid, attitude_reference
 from fsw.control.gains import LoopGains, tracking_gains
 from fsw.control.height import height_pid
-from fsw.control.joints import joint_torques
+from fsw.control.joint_reference import joint_reference
+from fsw.control.joints import (
+    JointMemory,
+    arm_dynamics,
+    joint_torques,
+    joints_at_rest,
+    observe_disturbance,
+)
 from fsw.control.pid import PidGains
+from fsw.control.tilt_limit import limited_turn
 from fsw.control.tracking import Observed, TrackingLaw, follow_plan, observe
-from fsw.geometry.rotation import wrap_angle
+from fsw.geometry.rotation import rotate_back, wrap_angle
 from fsw.geometry.vectors import clamp_magnitude
 from fsw.model.airframe import GRAVITY, Airframe
 from fsw.model.nominal import REST_INPUT, REST_STATE
@@ -49,7 +57,7 @@ class CascadeMemory(NamedTuple):
     mass: float  # kg, weighed in flight
     attitude: Vec3 = (0.0, 0.0, 0.0)  # rad s, integrals
     height: float = 0.0  # m s, integral
-    joints: Vec2 = (0.0, 0.0)  # rad s, integrals
+    joints: JointMemory = JointMemory((0.0, 0.0), (0.0, 0.0))
 
     def after_sending(self, sent: ActuatorCommand) -> CascadeMemory:
         """The memory for the next tick, once the safety gate has decided."""
@@ -59,7 +67,11 @@ class CascadeMemory(NamedTuple):
 def at_rest(airframe: Airframe, estimate: StateEstimate) -> CascadeMemory:
     """Memory of a vehicle whose rotors stand still."""
     return CascadeMemory(
-        STOPPED.rotor_thrust, STOPPED, Observed(estimate.v_WB, _NONE), airframe.mass
+        STOPPED.rotor_thrust,
+        STOPPED,
+        Observed(estimate.v_WB, _NONE),
+        airframe.mass,
+        joints=joints_at_rest(airframe, estimate),
     )
 
 
@@ -68,7 +80,11 @@ def in_hover(airframe: Airframe, estimate: StateEstimate) -> CascadeMemory:
     each = 0.25 * airframe.mass * GRAVITY
     thrust = (each, each, each, each)
     return CascadeMemory(
-        thrust, ActuatorCommand(thrust, (0.0, 0.0)), Observed(estimate.v_WB, _NONE), airframe.mass
+        thrust,
+        ActuatorCommand(thrust, (0.0, 0.0)),
+        Observed(estimate.v_WB, _NONE),
+        airframe.mass,
+        joints=joints_at_rest(airframe, estimate),
     )
 
 
@@ -122,11 +138,13 @@ class Cascade:
         ticks: int = 1,
     ) -> tuple[ActuatorCommand, CascadeMemory]:
         """See ``close_loops``, of which this is the machine code."""
-        sent, rotors, believed, mass, integrals = self._close_loops(
+        sent, rotors, believed, mass, integrals, joints = self._close_loops(
             self._packed, memory, estimate, plan, u, ticks
         )
         command = ActuatorCommand(*sent)
-        return command, CascadeMemory(rotors, command, Observed(*believed), mass, *integrals)
+        return command, CascadeMemory(
+            rotors, command, Observed(*believed), mass, *integrals, JointMemory(*joints)
+        )
 
 
 @compilable
@@ -159,23 +177,33 @@ def close_loops(
             tuning.attitude, attitude, estimate, attitude_reference(u.a, plan.yaw), dt
         )
         thrust, height = height_pid(airframe, tuning.height, height, estimate, plan, u, dt)
-    q_ref, qd_ref = plan.q_arm, plan.qd_arm
+    wdx, wdy, wdz = limited_turn(airframe, estimate, motion.turning, (wdx, wdy, wdz))
+    wanted = plan.q_arm, plan.qd_arm
     if law.follows_plan and tuning.compensate:
-        q_ref, qd_ref = compensated_joints(airframe, tuning.compensation, estimate, plan)
-    joints, kept = joint_torques(
+        wanted = compensated_joints(
+            airframe, tuning.compensation, tuning.joint_limits, estimate, plan
+        )
+    q_ref, qd_ref = joint_reference(
+        airframe, tuning.joint_limits, memory.joints.reference, wanted, dt * ticks
+    )
+    arm = arm_dynamics(airframe, estimate, _field(estimate, motion.thrust / mass, observed.d))
+    arm_memory = memory.joints
+    for _ in range(ticks):
+        arm_memory = observe_disturbance(arm_memory, arm, memory.commanded.joint_torque, dt)
+    joints, arm_memory = joint_torques(
         airframe,
         tuning.joint,
-        memory.joints,
+        arm_memory,
         estimate,
         (q_ref, qd_ref, u.qdd_arm),
-        motion.thrust / mass,
-        wdy,
+        arm,
+        motion.turning[1],  # not what is commanded: the rotors take 40 ms to give it
         dt,
     )
     torque = _body_torque(airframe, estimate, (wdx, wdy, wdz), joints[0])
     rotor_thrust = allocate(airframe, torque, thrust, tuning.yaw_thrust_limit)
     command = ActuatorCommand(rotor_thrust, joints)
-    return command, CascadeMemory(rotors, command, observed, mass, attitude, height, kept)
+    return command, CascadeMemory(rotors, command, observed, mass, attitude, height, arm_memory)
 
 
 @compiled
@@ -186,7 +214,14 @@ def _close_loops(
     plan: PredictionState,
     u: PlanInput,
     ticks: int,
-) -> tuple[tuple[Vec4, Vec2], Vec4, tuple[Vec3, Vec3, Vec2], float, tuple[Vec3, float, Vec2]]:
+) -> tuple[
+    tuple[Vec4, Vec2],
+    Vec4,
+    tuple[Vec3, Vec3, Vec2],
+    float,
+    tuple[Vec3, float],
+    tuple[Vec2, Vec2, Vec2, Vec2],
+]:
     """``close_loops`` that returns plain tuples, which leave machine code at half the cost."""
     command, kept = close_loops(law[0], memory, estimate, plan, u, ticks)
     return (
@@ -194,7 +229,13 @@ def _close_loops(
         kept.rotors,
         (kept.observed.v, kept.observed.d, kept.observed.disturbance_bias),
         kept.mass,
-        (kept.attitude, kept.height, kept.joints),
+        (kept.attitude, kept.height),
+        (
+            kept.joints.reference,
+            kept.joints.momentum,
+            kept.joints.disturbance,
+            kept.joints.integral,
+        ),
     )
 
 
@@ -203,6 +244,13 @@ def _yaw_correction(gains: PidGains, estimate: StateEstimate, plan: PredictionSt
     error = wrap_angle(plan.yaw - estimate.yaw)
     raw = gains.kp * error + gains.kd * (plan.yaw_rate - estimate.w_WB_B[2])
     return clamp_magnitude(raw, gains.limit)
+
+
+@compilable
+def _field(estimate: StateEstimate, specific_thrust: float, d: Vec3) -> Vec2:
+    """Gravity minus the base's acceleration [m/s^2] along body x and z."""
+    pushed_x, _, pushed_z = rotate_back(estimate.R_WB, d)
+    return -pushed_x, specific_thrust - pushed_z
 
 
 @compilable

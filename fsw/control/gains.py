@@ -9,6 +9,7 @@ import numpy as np
 from scipy.linalg import expm, solve_discrete_are
 
 from fsw.control.arm_compensation import CompensationLimits
+from fsw.control.joint_reference import JointReferenceLimits
 from fsw.control.pid import PidGains
 from fsw.model.airframe import GRAVITY
 from fsw.model.prediction import Array
@@ -56,10 +57,12 @@ class LoopGains:
 
     attitude: PidGains = field(default_factory=lambda: PidGains(50.0, 8.0, 15.0, 25.0))
     height: PidGains = field(default_factory=lambda: PidGains(7.1429, 1.4286, 3.4286, 4.0))
-    joint: PidGains = field(default_factory=lambda: PidGains(400.0, 400.0, 40.0, 200.0))
+    # No integral: what stays of a disturbance, the joint loop's observer takes off.
+    joint: PidGains = field(default_factory=lambda: PidGains(625.0, 0.0, 50.0, 300.0))
     yaw: PidGains = field(default_factory=lambda: PidGains(4.0, 0.0, 4.0, 0.5))
     compensate: bool = True  # the arm holds the end-effector while the base is pushed
     compensation: CompensationLimits = field(default_factory=CompensationLimits)
+    joint_limits: JointReferenceLimits = field(default_factory=JointReferenceLimits)
     # N a rotor, of what roll and pitch leave: three times the plan's yaw acceleration, so that
     # the loop has something left to correct with
     yaw_thrust_limit: float = 3.0

@@ -33,6 +33,7 @@ class MotionState(NamedTuple):
     a: Vec3  # m/s^2, without disturbance
     j: Vec2  # m/s^3, horizontal
     s: Vec2  # m/s^4, horizontal
+    turning: Vec2 = (0.0, 0.0)  # rad/s^2, about body x and y
 
 
 @compilable
@@ -90,4 +91,5 @@ def motion_state(
         (-f * R[2], -f * R[5], GRAVITY - f * R[8]),
         (-f * (wy * R[0] - wx * R[1]), -f * (wy * R[3] - wx * R[4])),
         (-f * (wdy * R[0] - wdx * R[1]), -f * (wdy * R[3] - wdx * R[4])),
+        (wdx, wdy),
     )
