@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -13,6 +14,7 @@ import numpy as np
 import fsw
 import sitl
 from fsw.parameters.flight_config import FlightConfig
+from sitl.result import TruthResult
 from sitl.scenario import EncoderErrors, ImuErrors, PoseErrors, Scenario
 from studies import closed_loop, double_integrator, mission
 from studies.flight_result import FlightResult
@@ -62,6 +64,8 @@ class Outcome:
     te_max_m: float | None = None
     margin_m: float | None = None
     margin_key: str | None = None
+    limits_kept: bool = True
+    link_angles_deg: tuple[float, float] | None = None  # largest |th1| and |th1 + th2|
     cs_sum: float = 0.0
     cs_mean: float = 0.0
     ce_sum: float = 0.0
@@ -107,6 +111,8 @@ def score(seed: int, result: FlightResult) -> Outcome:
         te_max_m=truth.tracking_error_max_m,
         margin_m=truth.min_margin_m,
         margin_key=truth.min_margin_key,
+        limits_kept=all(use.kept for use in truth.limits.values()),
+        link_angles_deg=_link_angles_deg(truth),
         cs_sum=smoothness["sum"],
         cs_mean=smoothness["mean"],
         ce_sum=effort["sum"],
@@ -117,6 +123,14 @@ def score(seed: int, result: FlightResult) -> Outcome:
         plans=planner.plans,
         failures=planner.failures,
     )
+
+
+def _link_angles_deg(truth: TruthResult) -> tuple[float, float] | None:
+    """None on a plant without limits."""
+    if not truth.limits:
+        return None
+    first, both = truth.limits["joint_1_angle"], truth.limits["link_2_angle"]
+    return math.degrees(first.largest), math.degrees(both.largest)
 
 
 @cache

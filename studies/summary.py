@@ -14,7 +14,7 @@ from studies.job import Job, Outcome
 from studies.settings import Settings
 from studies.statistics import wilson
 
-HEADERS = ("passed", "95 %", "worst margin mm", "TE m")
+HEADERS = ("passed", "95 %", "worst margin mm", "limits kept", "joints deg", "TE m")
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,6 +27,8 @@ class Summary:
     te_m: float | None  # mean of the flights' TE
     te_worst_m: float | None
     worst_margin_m: float | None
+    limits_kept: int  # flights without a broken limit
+    worst_angles_deg: tuple[float, float] | None  # largest |th1| and |th1 + th2|
     cs_mean: float  # per planning step
     ce_mean: float
     cs_sum: float  # over a flight, as the paper defines it
@@ -73,6 +75,8 @@ def summarise(jobs: Sequence[Job], outcomes: Sequence[Outcome]) -> Summary:
         te_m=float(np.mean(errors)) if errors else None,
         te_worst_m=max(errors, default=None),
         worst_margin_m=min(margins, default=None),
+        limits_kept=sum(row.limits_kept for row in whole),
+        worst_angles_deg=_worst_angles_deg(whole),
         cs_mean=mean(lambda row: row.cs_mean),
         ce_mean=mean(lambda row: row.ce_mean),
         cs_sum=mean(lambda row: row.cs_sum),
@@ -92,8 +96,23 @@ def cells(summary: Summary) -> tuple[str, ...]:
         f"{passed} (one flight)" if summary.flown < summary.total else passed,
         f"{summary.wilson_low:.2f}–{summary.wilson_high:.2f}",
         millimetres(summary.worst_margin_m),
+        "–" if summary.worst_angles_deg is None else f"{summary.limits_kept}/{summary.total}",
+        _angles(summary.worst_angles_deg),
         metres(summary.te_m),
     )
+
+
+def _worst_angles_deg(rows: Sequence[Outcome]) -> tuple[float, float] | None:
+    """None on a plant without limits."""
+    seen = [row.link_angles_deg for row in rows if row.link_angles_deg is not None]
+    if not seen:
+        return None
+    return max(first for first, _ in seen), max(both for _, both in seen)
+
+
+def _angles(value: tuple[float, float] | None) -> str:
+    """The largest angles of both links for a table, in degrees."""
+    return "–" if value is None else f"{value[0]:.1f}, {value[1]:.1f}"
 
 
 def metres(value: float | None) -> str:
