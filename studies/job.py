@@ -65,7 +65,8 @@ class Outcome:
     margin_m: float | None = None
     margin_key: str | None = None
     limits_kept: bool = True
-    link_angles_deg: tuple[float, float] | None = None  # largest |th1| and |th1 + th2|
+    joint_1_deg: float | None = None  # largest |th1|; None on a plant without limits
+    link_2_deg: float | None = None  # largest |th1 + th2|
     cs_sum: float = 0.0
     cs_mean: float = 0.0
     ce_sum: float = 0.0
@@ -112,7 +113,8 @@ def score(seed: int, result: FlightResult) -> Outcome:
         margin_m=truth.min_margin_m,
         margin_key=truth.min_margin_key,
         limits_kept=all(use.kept for use in truth.limits.values()),
-        link_angles_deg=_link_angles_deg(truth),
+        joint_1_deg=_largest_deg(truth, "joint_1_angle"),
+        link_2_deg=_largest_deg(truth, "link_2_angle"),
         cs_sum=smoothness["sum"],
         cs_mean=smoothness["mean"],
         ce_sum=effort["sum"],
@@ -125,12 +127,8 @@ def score(seed: int, result: FlightResult) -> Outcome:
     )
 
 
-def _link_angles_deg(truth: TruthResult) -> tuple[float, float] | None:
-    """None on a plant without limits."""
-    if not truth.limits:
-        return None
-    first, both = truth.limits["joint_1_angle"], truth.limits["link_2_angle"]
-    return math.degrees(first.largest), math.degrees(both.largest)
+def _largest_deg(truth: TruthResult, angle: str) -> float | None:
+    return math.degrees(truth.limits[angle].largest) if truth.limits else None
 
 
 @cache

@@ -28,7 +28,8 @@ class Summary:
     te_worst_m: float | None
     worst_margin_m: float | None
     limits_kept: int  # flights without a broken limit
-    worst_angles_deg: tuple[float, float] | None  # largest |th1| and |th1 + th2|
+    joint_1_deg: float | None  # largest |th1|; None on a plant without limits
+    link_2_deg: float | None  # largest |th1 + th2|
     cs_mean: float  # per planning step
     ce_mean: float
     cs_sum: float  # over a flight, as the paper defines it
@@ -76,7 +77,8 @@ def summarise(jobs: Sequence[Job], outcomes: Sequence[Outcome]) -> Summary:
         te_worst_m=max(errors, default=None),
         worst_margin_m=min(margins, default=None),
         limits_kept=sum(row.limits_kept for row in whole),
-        worst_angles_deg=_worst_angles_deg(whole),
+        joint_1_deg=max((row.joint_1_deg for row in whole if row.joint_1_deg), default=None),
+        link_2_deg=max((row.link_2_deg for row in whole if row.link_2_deg), default=None),
         cs_mean=mean(lambda row: row.cs_mean),
         ce_mean=mean(lambda row: row.ce_mean),
         cs_sum=mean(lambda row: row.cs_sum),
@@ -96,23 +98,15 @@ def cells(summary: Summary) -> tuple[str, ...]:
         f"{passed} (one flight)" if summary.flown < summary.total else passed,
         f"{summary.wilson_low:.2f}–{summary.wilson_high:.2f}",
         millimetres(summary.worst_margin_m),
-        "–" if summary.worst_angles_deg is None else f"{summary.limits_kept}/{summary.total}",
-        _angles(summary.worst_angles_deg),
+        "–" if summary.joint_1_deg is None else f"{summary.limits_kept}/{summary.total}",
+        f"{degrees(summary.joint_1_deg)}, {degrees(summary.link_2_deg)}",
         metres(summary.te_m),
     )
 
 
-def _worst_angles_deg(rows: Sequence[Outcome]) -> tuple[float, float] | None:
-    """None on a plant without limits."""
-    seen = [row.link_angles_deg for row in rows if row.link_angles_deg is not None]
-    if not seen:
-        return None
-    return max(first for first, _ in seen), max(both for _, both in seen)
-
-
-def _angles(value: tuple[float, float] | None) -> str:
-    """The largest angles of both links for a table, in degrees."""
-    return "–" if value is None else f"{value[0]:.1f}, {value[1]:.1f}"
+def degrees(value: float | None) -> str:
+    """An angle ``value`` [deg] for a table."""
+    return "–" if value is None else f"{value:.1f}"
 
 
 def metres(value: float | None) -> str:
