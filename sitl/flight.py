@@ -12,10 +12,10 @@ from pathlib import Path
 from typing import Final
 
 from command_line.parser import COULD_NOT_START
-from command_line.process import NOT_COMPLETED, Events
+from command_line.process import NOT_COMPLETED, Events, StopRequest
 from sitl.arguments import SitlOptions
 from sitl.link.encode import StepEncoder
-from sitl.link.exchange import Exchange, ExchangeCounts, Lockstep, RealTime, Stop
+from sitl.link.exchange import Exchange, ExchangeCounts, Lockstep, RealTime
 from sitl.link.pilot import flight_plan
 from sitl.link.server import RunTiming, serve, shut_down, wait_for_vehicle
 from sitl.link.udp_endpoint import PeerSocket
@@ -47,11 +47,11 @@ class Flight:
         self._simulation = Simulation(scenario, options.seed)
         _rehearse(Simulation(scenario, options.seed))
 
-    def wait_for_vehicle(self, stop: Stop) -> bool:
+    def wait_for_vehicle(self, stop: StopRequest) -> bool:
         """Wait as long as the options allow; False if none came."""
         return wait_for_vehicle(self._endpoint, self._options.wait_s, stop)
 
-    def run(self, stop: Stop) -> int:
+    def run(self, stop: StopRequest) -> int:
         """Fly to the end and report; returns the exit code."""
         options, simulation, endpoint = self._options, self._simulation, self._endpoint
         self._events.report("flying", "sitl: flying")
@@ -119,7 +119,7 @@ class Flight:
         values = {"t_s": time_s, "min_margin_m": margin_m, "real_time_factor": real_time_factor}
         self._events.report("progress", "", **values)
 
-    def _exchange(self, stop: Stop) -> Exchange:
+    def _exchange(self, stop: StopRequest) -> Exchange:
         joints = len(self._simulation.vehicle.links)
         period_s = 1e-6 * STEP_US
         if self._options.realtime:

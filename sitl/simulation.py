@@ -53,7 +53,7 @@ class Truth:
     qd_arm: tuple[float, ...]  # rad/s
     p_WE: V3  # m, NED, end-effector
     target: TrajectoryPoint  # its reference
-    margins_m: tuple[float, ...]  # m, in the order of ``Simulation.margin_keys``
+    margins_m: tuple[float, ...]  # m, in the order of ``World.keys``
 
 
 class Simulation:
@@ -103,11 +103,6 @@ class Simulation:
     def ended(self) -> EndReason | None:
         """Why the run is over, None while it is not."""
         return self._evaluator.ended
-
-    @property
-    def margin_keys(self) -> tuple[str, ...]:
-        """Names of the margins, e.g. ``front/end_effector``."""
-        return self._evaluator.world.keys
 
     @property
     def min_margin_m(self) -> float | None:

@@ -6,13 +6,14 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final, Protocol
+from typing import Final
 
+from command_line.process import StopRequest
 from messages.frames import split
 from sitl.link import decode, pilot
 from sitl.link.decode import VehicleReply
 from sitl.link.encode import StepEncoder
-from sitl.link.exchange import Exchange, SimulatorError, Stop
+from sitl.link.exchange import Exchange, SimulatorError
 from sitl.link.message_ids import ACCEPTED, CMD_REBOOT_SHUTDOWN
 from sitl.link.pilot import FlightPlan, PilotState
 from sitl.link.pilot_messages import Heard, PilotMessage, SendCommand
@@ -30,12 +31,8 @@ _SHUTDOWN: Final = SendCommand(
 )
 
 
-class Progress(Protocol):
-    """Reports progress about ten times a second of wall time."""
-
-    def __call__(self, time_s: float, margin_m: float | None, real_time_factor: float) -> None:
-        """Take simulated time, the smallest margin so far and the speed."""
-        ...
+Progress = Callable[[float, float | None, float], None]
+"""Takes simulated time [s], the smallest margin so far [m] and the speed, ten times a second."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +44,7 @@ class RunTiming:
     real_time_factor: float
 
 
-def wait_for_vehicle(endpoint: PeerSocket, wait_s: float, stop: Stop) -> bool:
+def wait_for_vehicle(endpoint: PeerSocket, wait_s: float, stop: StopRequest) -> bool:
     """Serve the first sender of a valid frame; False if none came in time."""
     until_s = time.perf_counter() + wait_s
     while time.perf_counter() < until_s and not stop.requested:
@@ -63,7 +60,7 @@ def serve(
     plan: FlightPlan,
     exchange: Exchange,
     encoder: StepEncoder,
-    stop: Stop,
+    stop: StopRequest,
     progress: Progress,
     truth: Callable[[Simulation], None],
 ) -> RunTiming:
