@@ -8,8 +8,14 @@ from functools import partial
 from typing import Final, cast
 
 from fsw.geometry.geodesy import DEFAULT_ORIGIN, to_local
-from fsw.link.wire import decode, decode_commands, decode_setpoints, message_ids
+from fsw.link.wire import decode, decode_commands, message_ids
 from fsw.link.wire.decode import Numbers
+from fsw.link.wire.decode_setpoints import (
+    attitude_setpoint,
+    body_setpoint,
+    end_effector_setpoint,
+    joint_setpoint,
+)
 from fsw.signals import (
     AttitudeSetpoint,
     Command,
@@ -72,18 +78,12 @@ class Inbox:
             message_ids.COMMAND_INT: partial(self._command, decode.command_int),
             message_ids.SET_MODE: partial(self._command, decode.set_mode),
             message_ids.END_EFFECTOR_TARGET: self._target,
-            message_ids.SET_POSITION_TARGET_LOCAL_NED: partial(
-                self._setpoint, 13, decode_setpoints.body_setpoint
-            ),
-            message_ids.SET_ATTITUDE_TARGET: partial(
-                self._setpoint, 9, decode_setpoints.attitude_setpoint
-            ),
-            message_ids.ARM_JOINT_SETPOINT: partial(
-                self._setpoint, 13, decode_setpoints.joint_setpoint
-            ),
+            message_ids.SET_POSITION_TARGET_LOCAL_NED: partial(self._setpoint, body_setpoint),
+            message_ids.SET_ATTITUDE_TARGET: partial(self._setpoint, attitude_setpoint),
+            message_ids.ARM_JOINT_SETPOINT: partial(self._setpoint, joint_setpoint),
             message_ids.HEARTBEAT: self._heartbeat,
-            message_ids.OBSTACLE_WALL: partial(self._obstacle, 5, decode.obstacle_wall),
-            message_ids.OBSTACLE_POINT: partial(self._obstacle, 4, decode.obstacle_point),
+            message_ids.OBSTACLE_WALL: partial(self._obstacle, decode.obstacle_wall),
+            message_ids.OBSTACLE_POINT: partial(self._obstacle, decode.obstacle_point),
             message_ids.WORKSPACE_SPHERE: self._sphere,
         }
 
@@ -171,9 +171,9 @@ class Inbox:
     def _target(self, frame: Frame) -> None:
         values = cast(Numbers, frame.payload_values)
         if values[0] == 0:  # not for a later time: for now
-            self._setpoint(13, decode_setpoints.end_effector_setpoint, frame)
+            self._setpoint(end_effector_setpoint, frame)
             return
-        if not decode.for_this_vehicle(values[13], values[14]):
+        if not decode.for_this_vehicle(frame):
             return
         target = decode.end_effector_target(values)
         if target is None or len(self._targets) >= _MAX_TARGETS:
@@ -181,13 +181,10 @@ class Inbox:
             return
         self._targets.append(target)
 
-    def _setpoint(self, at: int, read: Callable[[Numbers], Setpoint | None], frame: Frame) -> None:
-        """Keep the newest of each kind; one for another vehicle is refused like a wrong one.
-
-        The target stands at the values ``at`` and behind.
-        """
+    def _setpoint(self, read: Callable[[Numbers], Setpoint | None], frame: Frame) -> None:
+        """Keep the newest of each kind; one for another vehicle is refused like a wrong one."""
         values = cast(Numbers, frame.payload_values)
-        setpoint = read(values) if decode.for_this_vehicle(*values[at : at + 2]) else None
+        setpoint = read(values) if decode.for_this_vehicle(frame) else None
         kept = self._setpoints
         if setpoint is None:
             self.refused += 1
@@ -204,12 +201,11 @@ class Inbox:
             self._station_heard = True
 
     def _obstacle(
-        self, at: int, read: Callable[[Numbers], decode.IndexedObstacle | None], frame: Frame
+        self, read: Callable[[Numbers], decode.IndexedObstacle | None], frame: Frame
     ) -> None:
-        values = cast(Numbers, frame.payload_values)
-        if not decode.for_this_vehicle(*values[at : at + 2]):
+        if not decode.for_this_vehicle(frame):
             return
-        indexed = read(values)
+        indexed = read(cast(Numbers, frame.payload_values))
         if indexed is None:
             self.refused += 1
             return
@@ -227,10 +223,9 @@ class Inbox:
             self._obstacles.clear()
 
     def _sphere(self, frame: Frame) -> None:
-        values = cast(Numbers, frame.payload_values)
-        if not decode.for_this_vehicle(values[4], values[5]):
+        if not decode.for_this_vehicle(frame):
             return
-        sphere = decode.workspace_sphere(values)
+        sphere = decode.workspace_sphere(cast(Numbers, frame.payload_values))
         if sphere is None:
             self.refused += 1
             return

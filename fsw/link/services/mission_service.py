@@ -101,11 +101,9 @@ class MissionService:
 
     def handle(self, frame: Frame, t_us: int) -> Sequence[ServiceOutput]:
         """See :class:`~fsw.link.services.service.LinkService`."""
-        values = cast(Numbers, frame.payload_values)
-        at = _TARGET_AT[frame.message_id]
-        if not for_this_vehicle(values[at], values[at + 1]):
+        if not for_this_vehicle(frame):
             return ()
-        peer = (frame.system_id, frame.component_id)
+        values, peer = cast(Numbers, frame.payload_values), (frame.system_id, frame.component_id)
         return self._handlers[frame.message_id](values, peer, t_us)
 
     def poll(self, t_us: int) -> Sequence[ServiceOutput]:
@@ -299,19 +297,3 @@ class MissionService:
         self._upload = None
         text = f"{kind.name.lower()} refused: {refused.reason}"
         return (encode_ack(refused.result, kind, peer), StatusText(Severity.WARNING, text))
-
-
-# Where the wire values of a message name the system it is for; its component follows.
-_TARGET_AT: Final = {
-    ids.MISSION_COUNT: 1,
-    ids.MISSION_ITEM: 9,
-    ids.MISSION_ITEM_INT: 9,
-    ids.MISSION_REQUEST_LIST: 0,
-    ids.MISSION_REQUEST: 1,
-    ids.MISSION_REQUEST_INT: 1,
-    ids.MISSION_ACK: 0,
-    ids.MISSION_CLEAR_ALL: 0,
-    ids.MISSION_SET_CURRENT: 1,
-    ids.MISSION_WRITE_PARTIAL_LIST: 2,
-    ids.MISSION_REQUEST_PARTIAL_LIST: 2,
-}
