@@ -10,6 +10,7 @@ from pathlib import Path
 
 from command_line.options import as_words, declared, group, json_file, read
 from command_line.parser import COULD_NOT_START
+from command_line.version import version
 from fsw.arguments import OUT, PARAMS, FswOptions
 from fsw.link.link_choice import NO_LINK, LinkChoice, addresses
 from fsw.link.udp_endpoint import LinkError, parse_address
@@ -21,7 +22,6 @@ from pandion.output import write_text
 from pandion.processor import ANYWHERE, lockstep_places
 from pandion.result import FlightReports, as_json, table_rows
 from pandion.supervisor import Flown, ProcessFailed, Supervisor
-from pandion.version import version
 from sitl.arguments import RunOptions, SitlOptions
 from sitl.scenario_file import ScenarioError, load_scenario, scenario_digest
 

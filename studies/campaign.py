@@ -7,6 +7,7 @@ flown one by one, each in a process of its own, and the one that kills it again 
 
 from __future__ import annotations
 
+import contextlib
 import json
 import multiprocessing
 import signal
@@ -125,13 +126,10 @@ def _alone(job: Job) -> Outcome:
 
 
 def _read(journal: Path) -> dict[str, Outcome]:
-    """Rows of a journal; empty lines and one cut short by an interrupt are dropped."""
+    """Rows of a journal; lines cut short by an interrupt or of another version are dropped."""
     known = {}
     for line in journal.read_text(encoding="utf-8").splitlines():
-        try:
+        with contextlib.suppress(json.JSONDecodeError, TypeError):
             row = json.loads(line)
-        except json.JSONDecodeError:
-            continue
-        key = row.pop("key")
-        known[key] = Outcome(**row)
+            known[row.pop("key")] = Outcome(**row)
     return known

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cache
-from importlib.metadata import PackageNotFoundError, version
 from typing import Final
 
+from command_line.version import version
 from fsw.link.files.ftp_tree import Node
 from fsw.link.files.served_file import MemoryFile
 from fsw.link.wire import message_ids
@@ -53,11 +53,7 @@ def _parameters() -> bytes:
 def _general() -> bytes:
     from fsw.parameters.metadata import general_document
 
-    try:
-        firmware = version("pandion")
-    except PackageNotFoundError:
-        firmware = "0.0.0"
-    return general_document(_uri(_PARAMETERS), firmware)
+    return general_document(_uri(_PARAMETERS), version())
 
 
 @cache

@@ -189,7 +189,7 @@ class MissionService:
     def _stray(self, seq: int, number: int, peer: Peer) -> Sequence[ServiceOutput]:
         """Handle an item without an upload; the acknowledgement of the last one may be lost."""
         if self._done is not None and self._done[:2] == (peer, number):
-            again = encode_ack(ACCEPTED, number, peer, self._store.identity(self._done[1]))
+            again = encode_ack(ACCEPTED, number, peer, self._store.ids[self._done[1]])
             return (again,) if seq == self._done[2] else ()
         if self._upload is not None and self._upload.peer == peer:
             return ()
@@ -210,7 +210,7 @@ class MissionService:
         self._done = (peer, kind, upload.count - 1)
         text = f"{kind.name.lower()} of {upload.count} items received"
         return (
-            encode_ack(ACCEPTED, kind, peer, self._store.identity(kind)),
+            encode_ack(ACCEPTED, kind, peer, self._store.ids[kind]),
             StatusText(Severity.INFO, text),
         )
 
@@ -225,7 +225,7 @@ class MissionService:
         self._upload = None
         items = self._store.items(kind)
         self._download = _Download(peer, kind, items, t_us) if items else None
-        return (encode_count(len(items), kind, peer, self._store.identity(kind)),)
+        return (encode_count(len(items), kind, peer, self._store.ids[kind]),)
 
     def _send_item(
         self, as_int: bool, values: Numbers, peer: Peer, t_us: int

@@ -23,7 +23,6 @@ from fsw.link.wire.mission_items import (
     read_rally,
     read_step,
 )
-from fsw.link.wire.telemetry_context import PlanIds
 from fsw.signals import (
     FlightSnapshot,
     MissionProgress,
@@ -83,7 +82,7 @@ class MissionStore:
     def __init__(self, site: Site) -> None:
         self.progress = MissionProgress()
         self.in_mission = False
-        self.ids = PlanIds()
+        self.ids: dict[int, int] = dict.fromkeys(Kind, 0)  # see ``PlanIds``
         self._site = site
         self._items: dict[Kind, tuple[MissionItem, ...]] = dict.fromkeys(Kind, ())
         self._update: MissionUpdate | None = None
@@ -121,11 +120,7 @@ class MissionStore:
         else:
             self._change(MissionUpdate(fence=self._fence(items)))
         self._items[kind] = items
-        setattr(self.ids, kind.name.lower(), _identity(items))
-
-    def identity(self, kind: Kind) -> int:
-        """The opaque id of a list as it is now, 0 where it is empty."""
-        return int(getattr(self.ids, kind.name.lower()))
+        self.ids[kind] = _identity(items)
 
     def set_current(self, number: int) -> bool:
         """Make a step the current one; False where there is no such step."""

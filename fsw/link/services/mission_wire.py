@@ -88,7 +88,7 @@ def mission_current(snapshot: FlightSnapshot, context: TelemetryContext) -> Wire
 
 def current_values(progress: MissionProgress, in_mission: bool, plans: PlanIds) -> WireValues:
     """MISSION_CURRENT."""
-    which = (plans.mission, plans.fence, plans.rally)
+    which = (plans[0], plans[1], plans[2])
     if progress.state is MissionState.NO_MISSION:
         return (0, _NO_MISSION, int(progress.state), _SUSPENDED, *which)
     mode = _ACTIVE if in_mission else _SUSPENDED
