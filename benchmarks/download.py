@@ -18,9 +18,9 @@ from typing import Any, Final
 from benchmarks.download_client import DownloadClient, NothingCame
 from benchmarks.machine_watch import version_and_machine
 from command_line.options import json_file, option, read
+from command_line.output import console_beside, write_text
 from command_line.values import number
 from pandion.display import Display
-from pandion.output import console_beside, write_text
 from pandion.supervisor import ProcessFailed, Supervisor
 
 PASSED, NOT_PASSED = 0, 1  # exit codes

@@ -16,12 +16,12 @@ from pathlib import Path
 from typing import Any, Final, TextIO
 
 from command_line.options import json_file, option, read
+from command_line.output import console_beside, write_text
 from command_line.parser import COULD_NOT_START
 from command_line.values import number, whole
 from command_line.version import version
 from pandion.child import Event
 from pandion.display import Display
-from pandion.output import console_beside, write_text
 from pandion.processor import Places, lockstep_places
 from pandion.supervisor import ProcessFailed, Supervisor
 

@@ -18,10 +18,10 @@ from benchmarks.bare_loop import BareLoops
 from benchmarks.budgets import BudgetRow, Budgets, judge, load_budgets, result
 from benchmarks.machine_watch import Watch
 from command_line.options import json_file, option, read
+from command_line.output import console_beside, write_text
 from command_line.values import seconds, several, whole
 from command_line.version import version
 from pandion.display import Display
-from pandion.output import console_beside, write_text
 from pandion.supervisor import ProcessFailed, Supervisor
 
 PASSED, NOT_PASSED = 0, 1  # exit codes

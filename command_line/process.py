@@ -47,6 +47,11 @@ class JsonEvents:
         print(json.dumps({"event": event, "message": sentence, **details}), flush=True)
 
 
+def events_of(how: str, *, to_stderr: bool = False) -> Events:
+    """What ``--events`` asks for, ``text`` or ``json``; text goes to standard error on request."""
+    return JsonEvents() if how == "json" else TextEvents(to_stderr)
+
+
 class StopRequest:
     """Becomes true on SIGINT or SIGTERM, so that a loop can end between two steps."""
 

@@ -4,14 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 
-from command_line.process import (
-    NOT_COMPLETED,
-    Events,
-    JsonEvents,
-    StopRequest,
-    TextEvents,
-    run_reported,
-)
+from command_line.process import NOT_COMPLETED, Events, StopRequest, events_of, run_reported
 from sitl.arguments import SitlOptions
 from sitl.link.udp_endpoint import RESEND_S, LinkError, PeerSocket, parse_address
 from sitl.scenario import Scenario
@@ -24,7 +17,7 @@ class CouldNotStart(Exception):
 
 def run(options: SitlOptions) -> int:
     """Simulate one flight; returns the exit code."""
-    events: Events = JsonEvents() if options.events == "json" else TextEvents(options.json == "-")
+    events = events_of(options.events, to_stderr=options.json == "-")
     refusals = (CouldNotStart, LinkError, ScenarioError)
     return run_reported("sitl", events, refusals, lambda: _run(options, events))
 

@@ -8,9 +8,9 @@ import gc
 import json
 import os
 from collections.abc import Callable
-from pathlib import Path
 from typing import Final
 
+from command_line.output import unwritten
 from command_line.parser import COULD_NOT_START
 from command_line.process import NOT_COMPLETED, Events, StopRequest
 from sitl.arguments import SitlOptions
@@ -69,14 +69,16 @@ class Flight:
         self._report_pauses(exchange.counts)
         result = simulation.result()
         described = self._as_json(result, timing, exchange.counts)
-        unwritten = self._write(described)
+        text = json.dumps(described, indent=2) + "\n"
+        in_directory = None if options.out is None else options.out / "sitl.json"
+        lost = [*unwritten(options.json, text), *unwritten(in_directory, text)]
         sentence = f"sitl: {_summary(result, timing)}"
         self._events.report("ended", sentence, result=described, vehicle_silent=not heard)
-        for what in unwritten:
+        for what in lost:
             self._events.report("unwritten", f"sitl: cannot write {what}", what=what)
         if simulation.ended is not None and simulation.ended.kind is EndKind.REFUSED:
             return COULD_NOT_START
-        return COMPLETED if result.completed and not unwritten else NOT_COMPLETED
+        return COMPLETED if result.completed and not lost else NOT_COMPLETED
 
     def _tries(self, silent: bool) -> int:
         """How often to send the shutdown command; a silent vehicle may not receive it."""
@@ -159,21 +161,6 @@ class Flight:
             "pauses": counts.pauses,
             "paused_s": counts.paused_s,
         }
-
-    def _write(self, result: dict[str, object]) -> list[str]:
-        """Write the result where it is wanted; returns what could not be written, and why."""
-        options, text = self._options, json.dumps(result, indent=2) + "\n"
-        if options.json == "-":
-            print(text, end="", flush=True)
-        files = [] if options.json in (None, "-") else [Path(str(options.json))]
-        files += [] if options.out is None else [options.out / "sitl.json"]
-        unwritten = []
-        for file in files:
-            try:
-                file.write_text(text, encoding="utf-8")
-            except OSError as error:
-                unwritten.append(f"{file}: {error.strerror}")
-        return unwritten
 
 
 def _rehearse(simulation: Simulation) -> None:

@@ -8,18 +8,7 @@ from pathlib import Path
 
 from studies.settings import Figure, Report, Settings, Table
 
-_STYLE = """
-body { font: 15px/1.45 system-ui, sans-serif; max-width: 75rem; margin: 2rem auto; padding: 0 1rem;
-       color: #1b1f24; background: #fff; }
-h1 { font-size: 1.5rem; } h2 { font-size: 1.1rem; margin-top: 2rem; }
-table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
-caption { text-align: left; font-weight: 600; padding: .4rem 0; }
-th, td { border-bottom: 1px solid #d5d9de; padding: .25rem .6rem; text-align: right; }
-th:nth-child(-n+2), td:nth-child(-n+2) { text-align: left; }
-svg { max-width: 100%; height: auto; }
-figure { margin: 1.5rem 0; } figcaption { color: #57606a; }
-.warning { border-left: 4px solid #b3261e; padding-left: .8rem; }
-"""
+_STYLE = Path(__file__).with_suffix(".css")
 
 
 def write(
@@ -54,7 +43,7 @@ def page(report: Report, settings: Settings, provenance: tuple[str, ...]) -> str
     body = "\n".join(parts)
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-        f"<title>{_text(report.title)}</title>\n<style>{_STYLE}</style>\n</head>\n"
+        f"<title>{_text(report.title)}</title>\n<style>\n{_STYLE.read_text(encoding='utf-8')}</style>\n</head>\n"
         f"<body>\n{body}\n</body>\n</html>\n"
     )
 

@@ -16,9 +16,10 @@ from sitl.scenario import (
     VehicleScale,
     Wind,
 )
-from studies import deviations, summary
+from studies import summary
 from studies.campaign import Campaign
 from studies.cases import CASES, Case, configuration, grazing, scenario
+from studies.deviations import deviations
 from studies.settings import Report, Settings, Table
 from studies.summary import fly_cells
 
@@ -105,6 +106,6 @@ def run(settings: Settings, campaign: Campaign) -> Report:
                 tuple((case, name, *summary.cells(row)) for (case, name), row in found),
             ),
         ),
-        deviations=deviations.ROBUSTNESS,
+        deviations=deviations("robustness"),
         errors=errors,
     )

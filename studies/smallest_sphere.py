@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import asdict, replace
 
 from sitl.scenario import Scenario
-from studies import deviations, summary
+from studies import summary
 from studies.campaign import Campaign
 from studies.cases import configuration, scenario
+from studies.deviations import deviations
 from studies.settings import Report, Settings, Table
 from studies.summary import Summary, fly_cells
 
@@ -38,7 +39,7 @@ def run(settings: Settings, campaign: Campaign) -> Report:
                 tuple((f"{radius:.3f}", *summary.cells(row)) for radius, row in found),
             ),
         ),
-        deviations=deviations.SPHERE,
+        deviations=deviations("smallest-sphere"),
         errors=errors,
     )
 
