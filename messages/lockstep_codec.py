@@ -31,11 +31,7 @@ class LockstepReader:
     """Reads datagrams that hold these messages and nothing else."""
 
     def __init__(self, *parts: tuple[int, int]) -> None:
-        """Choose what to read.
-
-        Args:
-            *parts: Message id and number of first values (wire order) of each frame, in order.
-        """
+        """Take message id and number of first values (wire order) of each frame, in order."""
         self._parts = tuple(_part(message_id, count) for message_id, count in parts)
 
     def read(self, datagram: bytes) -> list[tuple[float, ...]] | None:

@@ -7,12 +7,7 @@ class ReleaseSchedule:
     """Releases at ``start + k * period``. Missed ones are skipped; the others do not move."""
 
     def __init__(self, start_us: float, period_us: int) -> None:
-        """Begin before the first release.
-
-        Args:
-            start_us: First release [us, monotonic].
-            period_us: Period [us].
-        """
+        """Begin before the first release, at ``start_us`` [us, monotonic]."""
         self.index = -1  # of the last release
         self.skipped = 0  # releases that were never taken
         self._start_us = start_us

@@ -1,9 +1,12 @@
-"""One class per kind of disturbance; each is sampled once per step, in order."""
+"""One class per kind of disturbance; each is sampled once per step, in increasing order.
+
+A sample is held over its step: a torque [N·m, B] if ``torque`` is set, else an acceleration
+[m/s², W].
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
@@ -11,16 +14,6 @@ from sitl.scenario import V3, Disturbance, Torque, Uniform, Wind
 from sitl.seeds import stream
 
 STILL: V3 = (0.0, 0.0, 0.0)
-
-
-class Push(Protocol):
-    """A disturbance in flight."""
-
-    torque: bool  # what ``sample`` returns: torque [N·m, B] if set, else acceleration [m/s², W]
-
-    def sample(self, step: int) -> V3:
-        """The value held over step ``step``; steps are asked for in increasing order."""
-        ...
 
 
 @dataclass
@@ -34,7 +27,7 @@ class Resampled:
     _held: V3 = STILL
 
     def sample(self, step: int) -> V3:
-        """See ``Push``."""
+        """The value held over step ``step``."""
         if step % self.every == 0:
             x, y, z = self.random.uniform(-self.amplitude, self.amplitude, 3)
             self._held = (float(x), float(y), float(z))
@@ -49,7 +42,7 @@ class Constant:
     torque = False
 
     def sample(self, step: int) -> V3:
-        """See ``Push``."""
+        """The value held over step ``step``."""
         return self.acceleration
 
 
@@ -73,7 +66,7 @@ class RandomImpulses:
         return max(1, round(self._random.exponential(self._pause_steps)))
 
     def sample(self, step: int) -> V3:
-        """See ``Push``."""
+        """The value held over step ``step``."""
         if step == self._from:
             direction = self._random.standard_normal(3)
             x, y, z = self._magnitude * direction / np.linalg.norm(direction)
@@ -81,6 +74,9 @@ class RandomImpulses:
             self._until = step + self._length
             self._from = self._until + self._pause()
         return self._held if step < self._until else STILL
+
+
+Push = Resampled | Constant | RandomImpulses
 
 
 def push(item: Disturbance, seed: int, step_s: float) -> Push:
