@@ -34,12 +34,13 @@ def _run(options: SitlOptions, events: Events) -> int:
         events.report("listening", sentence, host=host, port=port, duration_s=scenario.duration_s)
         # NumPy and numba take a second to load; the flight software can start meanwhile.
         from sitl.flight import Flight
+        from sitl.link.server import wait_for_vehicle
 
         flight = Flight(options, scenario, endpoint, events)
         stop = StopRequest()
         stop.listen()
         events.report("ready", "sitl: ready, waiting for the flight software")
-        if flight.wait_for_vehicle(stop):
+        if wait_for_vehicle(endpoint, options.wait_s, stop):
             return flight.run(stop)
         if not stop.requested:
             raise CouldNotStart(

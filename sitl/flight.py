@@ -17,7 +17,7 @@ from sitl.arguments import SitlOptions
 from sitl.link.encode import StepEncoder
 from sitl.link.exchange import Exchange, ExchangeCounts, Lockstep, RealTime
 from sitl.link.pilot import flight_plan
-from sitl.link.server import RunTiming, serve, shut_down, wait_for_vehicle
+from sitl.link.server import RunTiming, serve, shut_down
 from sitl.link.udp_endpoint import PeerSocket
 from sitl.result import EndKind, TruthResult
 from sitl.scenario import Scenario
@@ -46,10 +46,6 @@ class Flight:
         self._events = events
         self._simulation = Simulation(scenario, options.seed)
         _rehearse(Simulation(scenario, options.seed))
-
-    def wait_for_vehicle(self, stop: StopRequest) -> bool:
-        """Wait as long as the options allow; False if none came."""
-        return wait_for_vehicle(self._endpoint, self._options.wait_s, stop)
 
     def run(self, stop: StopRequest) -> int:
         """Fly to the end and report; returns the exit code."""

@@ -20,9 +20,7 @@ from fsw.link.services.mission_wire import (
     Peer,
     current_values,
     encode_ack,
-    encode_count,
     encode_item,
-    encode_request,
     item_float,
     item_int,
 )
@@ -198,7 +196,7 @@ class MissionService:
     def _ask(self, upload: _Upload, t_us: int) -> Outgoing:
         upload.asked_us = t_us
         upload.tries += 1
-        return encode_request(len(upload.items), upload.kind, upload.peer)
+        return Outgoing(ids.MISSION_REQUEST_INT, (len(upload.items), *upload.peer, upload.kind))
 
     def _finish(self, upload: _Upload) -> Sequence[ServiceOutput]:
         kind, peer = upload.kind, upload.peer
@@ -225,7 +223,8 @@ class MissionService:
         self._upload = None
         items = self._store.items(kind)
         self._download = _Download(peer, kind, items, t_us) if items else None
-        return (encode_count(len(items), kind, peer, self._store.ids[kind]),)
+        count = (len(items), *peer, kind, self._store.ids[kind])
+        return (Outgoing(ids.MISSION_COUNT, count),)
 
     def _send_item(
         self, as_int: bool, values: Numbers, peer: Peer, t_us: int
