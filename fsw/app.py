@@ -4,11 +4,19 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from command_line.output import unwritten
-from command_line.process import NOT_COMPLETED, Events, StopRequest, events_of, run_reported
+from command_line.process import (
+    NOT_COMPLETED,
+    CouldNotStart,
+    Events,
+    StopRequest,
+    events_of,
+    run_reported,
+)
 from fsw.arguments import FswOptions
 from fsw.control.control_metrics import ControlMetrics
 from fsw.link.build_links import build_links
@@ -51,25 +59,21 @@ NO_PERMISSION = "no permission for {}: ticks may be late on a busy machine"
 ProgramLoader = Callable[[FswOptions], FlightProgram[Any]]
 
 
-class CouldNotStart(Exception):
-    """Why there is no flight, in one sentence."""
-
-
 def run(options: FswOptions, load: ProgramLoader | None = None) -> int:
     """Fly once, the flight software proper or what ``load`` makes; returns the exit code."""
     events = events_of(options.events)
     session = _Session(options, events, load or load_flight_software)
-    return run_reported("fsw", events, (CouldNotStart, LinkError), session.run)
+    return run_reported("fsw", events, (LinkError,), session.run)
 
 
+@dataclass
 class _Session:
     """One start of the program."""
 
-    def __init__(self, options: FswOptions, events: Events, load: ProgramLoader) -> None:
-        self._options = options
-        self._events = events
-        self._load = load
-        self._stop = StopRequest()
+    _options: FswOptions
+    _events: Events
+    _load: ProgramLoader
+    _stop: StopRequest = field(default_factory=StopRequest)
 
     def run(self) -> int:
         options = self._options

@@ -4,28 +4,32 @@ from __future__ import annotations
 
 import dataclasses
 
-from command_line.process import NOT_COMPLETED, Events, StopRequest, events_of, run_reported
+from command_line.process import (
+    NOT_COMPLETED,
+    CouldNotStart,
+    Events,
+    StopRequest,
+    events_of,
+    run_reported,
+)
 from sitl.arguments import SitlOptions
 from sitl.link.udp_endpoint import RESEND_S, LinkError, PeerSocket, parse_address
-from sitl.scenario import Scenario
 from sitl.scenario_file import ScenarioError, load_scenario
-
-
-class CouldNotStart(Exception):
-    """A run that cannot start, in one sentence."""
 
 
 def run(options: SitlOptions) -> int:
     """Simulate one flight; returns the exit code."""
     events = events_of(options.events, to_stderr=options.json == "-")
-    refusals = (CouldNotStart, LinkError, ScenarioError)
+    refusals = (LinkError, ScenarioError)
     return run_reported("sitl", events, refusals, lambda: _run(options, events))
 
 
 def _run(options: SitlOptions, events: Events) -> int:
     if options.realtime and options.speed not in (None, 1.0):
         raise CouldNotStart("--realtime flies at speed 1; --speed needs --lockstep")
-    scenario = _scenario(options)
+    scenario = load_scenario(options.scenario)
+    if options.duration_s is not None:
+        scenario = dataclasses.replace(scenario, duration_s=options.duration_s)
     _check_outputs(options)
     endpoint = PeerSocket.bound(parse_address(options.listen, any_port=True), RESEND_S)
     try:
@@ -50,13 +54,6 @@ def _run(options: SitlOptions, events: Events) -> int:
         return NOT_COMPLETED
     finally:
         endpoint.close()
-
-
-def _scenario(options: SitlOptions) -> Scenario:
-    scenario = load_scenario(options.scenario)
-    if options.duration_s is None:
-        return scenario
-    return dataclasses.replace(scenario, duration_s=options.duration_s)
 
 
 def _check_outputs(options: SitlOptions) -> None:

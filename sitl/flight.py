@@ -108,7 +108,7 @@ class Flight:
         self._events.report("warning", f"sitl: {sentence}")
 
     def _target_at(self, t_us: int) -> TrajectoryPoint:
-        return self._simulation.target_at(1e-6 * (t_us - START_US))
+        return self._simulation.clock.target_at(1e-6 * (t_us - START_US))
 
     def _yaw_at(self, t_us: int) -> float:
         return self._simulation.clock.yaw_at(1e-6 * (t_us - START_US))

@@ -63,8 +63,6 @@ class Simulation:
         ScenarioError: The scenario contradicts itself or starts outside its safe set.
     """
 
-    step_us = STEP_US
-
     def __init__(self, scenario: Scenario, seed: int) -> None:
         if not (seed >= 0):
             raise ScenarioError(f"seed = {seed}: must be 0 or more")
@@ -132,10 +130,6 @@ class Simulation:
         if self.ended is None or self.ended.kind is not EndKind.STOPPED:  # which says it itself
             self._evaluator.silent = f"the flight software was silent since step {step}"
 
-    def target_at(self, time_s: float) -> TrajectoryPoint:
-        """End-effector reference ``time_s`` after the start of the simulation."""
-        return self.clock.target_at(time_s)
-
     def end(self, kind: EndKind, sentence: str) -> None:
         """End the run from outside; the first reason stands."""
         self._evaluator.end(kind, sentence, self.time_s)
@@ -181,7 +175,7 @@ class Simulation:
             q_arm=exact.q_arm,
             qd_arm=exact.qd_arm,
             p_WE=points[2],
-            target=self.target_at(self.time_s),
+            target=self.clock.target_at(self.time_s),
             margins_m=self._evaluator.margins(points, self.time_s),
         )
 

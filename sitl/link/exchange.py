@@ -72,7 +72,8 @@ class Lockstep:
             SimulatorError: The vehicle has been silent for too long.
         """
         if self._period_s is not None:
-            _sleep_until(self._start_s + number * self._period_s)
+            due_s = self._start_s + number * self._period_s
+            time.sleep(max(due_s - time.perf_counter(), 0.0))
         begin_s = sent_s = time.perf_counter()
         self._endpoint.send(datagram)
         meanwhile()
@@ -200,9 +201,3 @@ class RealTime:
 
 Exchange = Lockstep | RealTime
 """How a step is exchanged with the vehicle."""
-
-
-def _sleep_until(release_s: float) -> None:
-    remaining = release_s - time.perf_counter()
-    if remaining > 0.0:
-        time.sleep(remaining)

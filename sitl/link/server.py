@@ -16,7 +16,7 @@ from sitl.link.encode import StepEncoder
 from sitl.link.exchange import Exchange, SimulatorError
 from sitl.link.message_ids import ACCEPTED, CMD_REBOOT_SHUTDOWN
 from sitl.link.pilot import FlightPlan, PilotState
-from sitl.link.pilot_messages import Heard, PilotMessage, SendCommand
+from sitl.link.pilot_messages import Heard, SendCommand
 from sitl.link.udp_endpoint import PeerSocket
 from sitl.result import EndKind
 from sitl.sensors.suite import SensorReadings
@@ -73,7 +73,8 @@ def serve(
     while simulation.ended is None:
         readings = simulation.sense()
         state, messages = pilot.speak(plan, state, readings.t_us)
-        datagram = _datagram(encoder, simulation.step, readings, messages)
+        heartbeat = encoder.heartbeat() if simulation.step % _HEARTBEAT_STEPS == 0 else b""
+        datagram = heartbeat + encoder.datagram(readings, messages)
         try:
             answer = exchange.step(
                 simulation.step, readings.t_us, datagram, lambda: truth(simulation)
@@ -117,16 +118,6 @@ def shut_down(endpoint: PeerSocket, encoder: StepEncoder, tries: int) -> bool:
                 if ack.command == CMD_REBOOT_SHUTDOWN and ack.result == ACCEPTED:
                     return True
     return False
-
-
-def _datagram(
-    encoder: StepEncoder,
-    step: int,
-    readings: SensorReadings,
-    messages: tuple[PilotMessage, ...],
-) -> bytes:
-    datagram = encoder.datagram(readings, messages)
-    return encoder.heartbeat() + datagram if step % _HEARTBEAT_STEPS == 0 else datagram
 
 
 def _advance(simulation: Simulation, answer: VehicleReply) -> None:

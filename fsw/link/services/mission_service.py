@@ -221,7 +221,7 @@ class MissionService:
             return refused
         kind = Kind(number)
         self._upload = None
-        items = self._store.items(kind)
+        items = self._store.items[kind]
         self._download = _Download(peer, kind, items, t_us) if items else None
         count = (len(items), *peer, kind, self._store.ids[kind])
         return (Outgoing(ids.MISSION_COUNT, count),)
@@ -236,7 +236,7 @@ class MissionService:
             refused = self._unavailable(number, peer, t_us)
             if refused is not None:
                 return refused
-            download = _Download(peer, Kind(number), self._store.items(Kind(number)), t_us)
+            download = _Download(peer, Kind(number), self._store.items[Kind(number)], t_us)
         if seq >= len(download.items):
             return (encode_ack(INVALID_SEQUENCE, number, peer),)
         download.heard_us = t_us
