@@ -11,6 +11,7 @@ from typing import Final, cast
 from fsw.link.udp_endpoint import MAX_DATAGRAM, Address
 from fsw.link.wire import message_ids as ids
 from fsw.parameters.float32 import nearest_decimal
+from messages import status_text
 from messages.frames import Frame, FrameWriter, split
 
 _SYSTEM, _COMPONENT = 254, 190  # of no ground station in use
@@ -86,9 +87,9 @@ class ParameterClient:
         if held != nearest_decimal(value):
             raise ParameterRefused("; ".join(texts) or f"the vehicle leaves {name} at {held:g}")
 
-    def _ask(self, name: str, value: float) -> tuple[float, list[str]]:
+    def _ask(self, name: str, value: float) -> tuple[float, tuple[str, ...]]:
         """Set a value until one comes back; that and the status texts meanwhile."""
-        texts = _Texts()
+        said: list[Frame] = []  # status texts
         for _ in range(_TRIES):
             self._send(ids.PARAM_SET, value, *_VEHICLE, name.encode(), _REAL32)
             until = time.monotonic() + self._patience_s
@@ -97,14 +98,14 @@ class ParameterClient:
                 if frame is None:
                     break
                 if frame.message_id == ids.STATUSTEXT:
-                    texts.add(frame)
+                    said.append(frame)
                 elif frame.message_id == ids.PARAM_VALUE:
                     held, _, _, named, _ = cast(
                         "tuple[float, int, int, bytes, int]", frame.payload_values
                     )
                     if _text(named) == name:
-                        return nearest_decimal(held), texts.whole
-                elif _text(cast(bytes, frame.payload_values[3])) == name and not texts.whole:
+                        return nearest_decimal(held), status_text.joined(said)
+                elif _text(cast(bytes, frame.payload_values[3])) == name and not said:
                     raise ParameterRefused(f"the vehicle has no parameter {name}")
         raise NoAnswer(f"no answer from the vehicle at {self._where}")
 
@@ -133,22 +134,6 @@ class ParameterClient:
                 self._waiting = split(self._socket.recv(MAX_DATAGRAM))
 
     _waiting: Iterator[Frame] = iter(())
-
-
-class _Texts:
-    """Status texts, put together from their pieces."""
-
-    def __init__(self) -> None:
-        self.whole: list[str] = []
-        self._id = 0
-
-    def add(self, frame: Frame) -> None:
-        _, text, id_, piece = cast("tuple[int, bytes, int, int]", frame.payload_values)
-        if id_ and id_ == self._id and piece:
-            self.whole[-1] += _text(text)
-        else:
-            self.whole.append(_text(text))
-        self._id = id_
 
 
 def _text(padded: bytes) -> str:

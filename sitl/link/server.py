@@ -49,7 +49,7 @@ def wait_for_vehicle(endpoint: PeerSocket, wait_s: float, stop: StopRequest) -> 
     until_s = time.perf_counter() + wait_s
     while time.perf_counter() < until_s and not stop.requested:
         received = endpoint.receive_from_anyone()
-        if received is not None and decode.is_vehicle(received[0]):
+        if received is not None and any(split(received[0])):
             endpoint.serve(received[1])
             return True
     return False
