@@ -55,7 +55,7 @@ def _layout(message_id: int, message: Any) -> Layout:
     return Layout(message.unpacker, bytes([message.crc_extra]), id_bytes, base_size)
 
 
-_LAYOUTS: Final[dict[int, Layout]] = {
+LAYOUTS: Final[dict[int, Layout]] = {
     message_id: _layout(message_id, message) for message_id, message in dialect.mavlink_map.items()
 }
 
@@ -105,7 +105,7 @@ class FrameWriter:
             struct.error: Wrong number of values, or one that does not fit its field; the sequence
                 is not advanced.
         """
-        layout = _LAYOUTS[message_id]
+        layout = LAYOUTS[message_id]
         return self._frame(layout, layout.payload.pack(*wire_values))
 
     def packed_frame(self, message_id: int, payload: bytes) -> bytes:
@@ -115,7 +115,7 @@ class FrameWriter:
             KeyError: The dialect has no such message.
             ValueError: The payload is not of the message's size.
         """
-        layout = _LAYOUTS[message_id]
+        layout = LAYOUTS[message_id]
         if len(payload) != layout.payload.size:
             raise ValueError(f"message {message_id} has {layout.payload.size} bytes of payload")
         return self._frame(layout, payload)
@@ -133,21 +133,12 @@ class FrameWriter:
         return origin
 
 
-def layout_of(message_id: int) -> Layout:
-    """How a message lies in a frame.
-
-    Raises:
-        KeyError: The dialect has no such message.
-    """
-    return _LAYOUTS[message_id]
-
-
 def announcing_signature(frame: bytes) -> bytes:
     """Mark an unsigned frame of :class:`FrameWriter` as signed; the signature is to follow it.
 
     The flag is part of what the checksum covers, so that is renewed.
     """
-    layout = _LAYOUTS[int.from_bytes(frame[7:10], "little")]
+    layout = LAYOUTS[int.from_bytes(frame[7:10], "little")]
     body = b"%b%c%b" % (frame[1:2], _SIGNED, frame[3:-_CHECKSUM_SIZE])
     return closed_frame(body, layout.crc_extra)
 
@@ -187,7 +178,7 @@ def as_version_1(frame: bytes) -> bytes | None:
     """
     if frame[8] or frame[9]:
         return None
-    layout = _LAYOUTS[frame[7]]
+    layout = LAYOUTS[frame[7]]
     size = layout.base_size
     payload = frame[_HEADER_SIZE:-_CHECKSUM_SIZE][:size].ljust(size, b"\0")
     body = b"%c%b%b" % (size, frame[4:8], payload)
@@ -246,7 +237,7 @@ def _frame_at(datagram: bytes, start: int) -> tuple[int, Frame | None]:
         start:payload_at
     ]
     message_id = id_0 | id_1 << 8 | id_2 << 16
-    layout = _LAYOUTS.get(message_id)
+    layout = LAYOUTS.get(message_id)
     payload_end = payload_at + length
     end = payload_end + _CHECKSUM_SIZE
     if incompatible:
@@ -272,7 +263,7 @@ def _frame_1_at(datagram: bytes, start: int) -> tuple[int, Frame | None]:
     if len(datagram) < payload_at + _CHECKSUM_SIZE:
         return 0, None
     _, length, sequence, system_id, component_id, message_id = datagram[start:payload_at]
-    layout = _LAYOUTS.get(message_id)
+    layout = LAYOUTS.get(message_id)
     payload_end = payload_at + length
     end = payload_end + _CHECKSUM_SIZE
     if len(datagram) < end:

@@ -12,7 +12,7 @@ import re
 from struct import Struct
 from typing import Final, NamedTuple
 
-from messages.frames import FrameWriter, checksum, closed_frame, layout_of
+from messages.frames import LAYOUTS, FrameWriter, checksum, closed_frame
 
 _HEADER_SIZE: Final = 10
 _CHECKSUM_SIZE: Final = 2
@@ -64,7 +64,7 @@ class LockstepFrame:
         Raises:
             ValueError: The last values end a payload of no fixed length.
         """
-        layout = layout_of(message_id)
+        layout = LAYOUTS[message_id]
         fields = _fields(layout.payload)
         count = len(fields) - len(last_values)
         first = Struct("<" + "".join(fields[:count]))
@@ -86,7 +86,7 @@ class LockstepFrame:
 
 
 def _part(message_id: int, count: int) -> _Part:
-    layout = layout_of(message_id)
+    layout = LAYOUTS[message_id]
     first = Struct("<" + "".join(_fields(layout.payload)[:count]))
     return _Part(layout.id_bytes, layout.crc_extra, first)
 

@@ -34,7 +34,6 @@ _VELOCITY_IGNORED: Final = 0x038  # POSITION_TARGET_TYPEMASK
 _ACCELERATION_IGNORED: Final = 0x1C0
 _YAW_IGNORED: Final = 0x400
 _POSITION_IGNORED: Final = 0x007
-_OURS: Final = ((0, SYSTEM_ID), (0, AUTOPILOT, PANDION))  # targets that are this vehicle
 _ZERO: Final[Vec3] = (0.0, 0.0, 0.0)
 
 
@@ -49,15 +48,17 @@ class IndexedObstacle:
 
 def for_this_vehicle(frame: Frame) -> bool:
     """Whether a frame is addressed to the autopilot or to everyone."""
-    places = _target_at(frame.message_id)
-    return all(frame.payload_values[at] in ours for at, ours in zip(places, _OURS, strict=False))
+    values, (system_at, component_at) = frame.payload_values, _target_at(frame.message_id)
+    system = 0 if system_at is None else values[system_at]
+    component = 0 if component_at is None else values[component_at]
+    return system in (0, SYSTEM_ID) and component in (0, AUTOPILOT, PANDION)
 
 
 @cache
-def _target_at(message_id: int) -> list[int]:
+def _target_at(message_id: int) -> tuple[int | None, int | None]:
     """Places of the target's system and component in wire order, as far as a message has them."""
-    fields = wire_fields(message_id)
-    return [fields.index(name) for name in ("target_system", "target_component") if name in fields]
+    at = {name: place for place, name in enumerate(wire_fields(message_id))}
+    return at.get("target_system"), at.get("target_component")
 
 
 def sensor_frame(odometry: Numbers, arm: Numbers, hil_sensor: Numbers) -> SensorFrame:

@@ -72,13 +72,9 @@ def available_modes(which: float, _: FlightSnapshot, __: TelemetryContext) -> Se
             message_ids.AVAILABLE_MODES,
             (
                 *(mode.custom_mode, mode.properties, count, number, mode.standard_mode),
-                _name(mode.name),
+                mode.name.encode("ascii")[: _NAME_SIZE - 1],
             ),
         )
         for number, mode in enumerate(AVAILABLE_MODES, start=1)
         if every or number == which
     ]
-
-
-def _name(name: str) -> bytes:
-    return name.encode("ascii")[: _NAME_SIZE - 1]
