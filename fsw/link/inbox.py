@@ -27,11 +27,10 @@ from fsw.signals import (
     Origin,
     Plan,
     PlanFailure,
-    PointObstacle,
     SafeSet,
     SensorFrame,
     TickInputs,
-    Wall,
+    Zone,
 )
 from fsw.tuning import Tuning
 from messages.frames import Frame
@@ -68,7 +67,7 @@ class Inbox:
         self._locate = partial(to_local, origin)
         self.refused = 0  # messages with numbers of no use, or too many of them
         self._received = Received()
-        self._obstacles: dict[int, Wall | PointObstacle] = {}
+        self._obstacles: dict[int, Zone] = {}
         self._obstacle_count = 0
         self._handlers: dict[int, Callable[[Frame], None]] = {
             message_ids.COMMAND_LONG: partial(self._command, decode.command_long),
@@ -184,13 +183,10 @@ class Inbox:
             # Another count announces another set; those of two sets must not mix.
             self._obstacles.clear()
             self._obstacle_count = indexed.count
-        self._obstacles[indexed.index] = indexed.obstacle
+        self._obstacles[indexed.index] = indexed.zone
         if len(self._obstacles) == indexed.count:
-            whole = [self._obstacles[i] for i in range(indexed.count)]
-            self._received.safe_set = SafeSet(
-                walls=tuple(one for one in whole if isinstance(one, Wall)),
-                obstacles=tuple(one for one in whole if isinstance(one, PointObstacle)),
-            )
+            whole = tuple(self._obstacles[i] for i in range(indexed.count))
+            self._received.safe_set = SafeSet(whole)
             self._obstacles.clear()
 
     def _sphere(self, frame: Frame) -> None:
@@ -200,4 +196,4 @@ class Inbox:
         if sphere is None:
             self.refused += 1
             return
-        self._received.safe_set = SafeSet(sphere=sphere)
+        self._received.safe_set = SafeSet((sphere,))
