@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-import fsw.signals as fsw_signals
-from fsw.signals import EndEffectorTarget, PointObstacle, SafeSet, WorkspaceSphere
+from fsw.shapes.ball import point
+from fsw.shapes.half_space import wall
+from fsw.shapes.target_sphere import target_sphere
+from fsw.signals import EndEffectorTarget, SafeSet
 from sitl.mission_clock import MissionClock
 from sitl.scenario import Scenario
 from sitl.simulation import START_US
@@ -11,18 +13,16 @@ from sitl.simulation import START_US
 
 def safe_set(scenario: Scenario) -> SafeSet:
     """The safe set of a scenario in the flight software's terms."""
-    walls = tuple(
-        fsw_signals.Wall(wall.normal, wall.offset_m, wall.clearance_m) for wall in scenario.walls
-    )
-    obstacles = tuple(PointObstacle(one.position_m, one.clearance_m) for one in scenario.obstacles)
+    zones = [wall(one.normal, one.offset_m, one.clearance_m) for one in scenario.walls]
+    zones += [point(one.position_m, one.clearance_m) for one in scenario.obstacles]
     workspace = scenario.workspace
-    if workspace is None:
-        return SafeSet(walls, obstacles=obstacles)
-    return SafeSet(walls, WorkspaceSphere((0.0, 0.0, -workspace.d_iw_m), workspace.radius_m))
+    if workspace is not None:
+        zones.append(target_sphere((0.0, 0.0, -workspace.d_iw_m), workspace.radius_m))
+    return SafeSet(tuple(zones))
 
 
 def target(clock: MissionClock, t_us: int) -> EndEffectorTarget:
     """The end-effector reference at a time stamp."""
     time_s = 1e-6 * (t_us - START_US)
-    point = clock.target_at(time_s)
-    return EndEffectorTarget(t_us, point.p, point.v, point.a, clock.yaw_at(time_s))
+    at = clock.target_at(time_s)
+    return EndEffectorTarget(t_us, at.p, at.v, at.a, clock.yaw_at(time_s))

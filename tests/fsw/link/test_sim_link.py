@@ -20,6 +20,7 @@ from sitl.mission_clock import MissionClock
 from sitl.scenario_file import load_scenario
 from sitl.sensors.suite import SensorReadings
 from tests.fsw.link.snapshots import FACTS, outputs_at
+from tests.fsw.zones import of_kind, walls_of
 
 NAN = float("nan")
 SHUTDOWN = SendCommand(246, (0.0, 2.0, NAN, NAN, NAN, NAN, NAN))
@@ -99,9 +100,9 @@ def test_walls_and_points_arrive_as_the_pilot_announces_them(wire: Wire) -> None
     assert wire.link.wait_for_step() is not None
     safe_set = wire.inbox.take().safe_set
     assert safe_set is not None
-    assert [wall.offset for wall in safe_set.walls] == [-1.0]
-    for heard, reported in zip(safe_set.obstacles, scenario.obstacles, strict=True):
-        assert heard.position == pytest.approx(reported.position_m)
+    assert [wall.shape.numbers[3] for wall in walls_of(safe_set)] == [-1.0]
+    for heard, reported in zip(of_kind(safe_set, "ball"), scenario.obstacles, strict=True):
+        assert heard.shape.numbers == pytest.approx((*reported.position_m, 0.0))
         assert heard.clearance == pytest.approx(reported.clearance_m)
 
 

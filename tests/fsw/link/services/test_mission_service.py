@@ -13,17 +13,18 @@ import pytest
 from fsw.link.services.mission_service import MissionService
 from fsw.link.services.mission_store import Kind, MissionStore, Site
 from fsw.signals import (
+    TARGET_SPHERE,
     MissionAction,
     MissionProgress,
     MissionState,
     Mode,
     SafeSet,
     Vec3,
-    WorkspaceSphere,
 )
 from tests.fsw.link.ground import Ground, ground_station
 from tests.fsw.link.services.mission_client import Client, Item, Weather
 from tests.fsw.link.snapshots import SNAPSHOT, outputs_at
+from tests.fsw.zones import of_kind
 
 NAN = math.nan
 ACCEPTED, ERROR, UNSUPPORTED_FRAME, UNSUPPORTED, NO_SPACE = 0, 1, 2, 3, 4
@@ -49,7 +50,7 @@ def locate(latitude: float, longitude: float, altitude: float) -> Vec3:
 
 
 def judge(safe_set: SafeSet) -> tuple[str, ...]:
-    if safe_set.sphere is not None and safe_set.sphere.radius < 0.05:
+    if any(one.shape.numbers[3] < 0.05 for one in of_kind(safe_set, TARGET_SPHERE)):
         return ("S(r) = 0.04 is less than lambda",)
     return ()
 
@@ -344,9 +345,9 @@ def test_a_fence_that_cannot_be_kept_is_refused_with_the_inequality(vehicle: Veh
     update = vehicle.store.take_update()
     assert update is not None
     assert update.fence is not None
-    centre = pytest.approx((0.0, 0.0, -0.225))
-    assert isinstance(update.fence.sphere, WorkspaceSphere)
-    assert update.fence.sphere.centre_from_target == centre
+    (kept,) = update.fence.zones
+    assert kept.shape.kind == TARGET_SPHERE
+    assert kept.shape.numbers == pytest.approx((0.0, 0.0, -0.225, 0.075))
     small = {**sphere, "params": (0.04, 0.0, 0.0, 0.0)}
     assert client.upload([small], FENCE) == DENIED
     assert "S(r) = 0.04" in client.texts()

@@ -102,7 +102,7 @@ def test_walls_arrive_as_one_set_in_any_order() -> None:
     inbox.accept(wall(0, 2, offset=-1.0))
     safe_set = inbox.take().safe_set
     assert safe_set is not None
-    assert [wall.offset for wall in safe_set.walls] == [-1.0, -2.0]
+    assert [one.shape.numbers[3] for one in safe_set.zones] == [-1.0, -2.0]
     assert inbox.take().safe_set is None
 
 
@@ -122,12 +122,12 @@ def test_walls_and_points_are_one_set() -> None:
     inbox.accept(point(1, 3, **{"position[0]": 7.0}))
     safe_set = inbox.take().safe_set
     assert safe_set is not None
-    assert len(safe_set.walls) == 1
-    assert [obstacle.position[0] for obstacle in safe_set.obstacles] == [7.0, 2.0]
+    assert [one.shape.kind for one in safe_set.zones] == ["half-space", "ball", "ball"]
+    assert [one.shape.numbers[0] for one in safe_set.zones[1:]] == [7.0, 2.0]
     inbox.accept(wall(0, 1))
     safe_set = inbox.take().safe_set
     assert safe_set is not None
-    assert safe_set.obstacles == ()
+    assert [one.shape.kind for one in safe_set.zones] == ["half-space"]
 
 
 @pytest.mark.parametrize(
