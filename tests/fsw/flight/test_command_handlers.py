@@ -22,7 +22,7 @@ NAN = math.nan
 ARM, TAKEOFF, LAND, SET_MODE, SHUTDOWN = 400, 22, 21, 176, 246
 
 IDLING = replace(STANDING, mode=Mode.HOLD)
-HOLDING = CommandContext(Mode.HOLD, landed=False, estimate_valid=True, targets_ahead=True)
+HOLDING = replace(STANDING, mode=Mode.HOLD, landed=False, targets_ahead=True)
 
 
 @pytest.mark.parametrize(
