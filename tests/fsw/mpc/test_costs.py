@@ -12,7 +12,7 @@ from fsw.barriers.hard_set import HardObstacles, HardWalls
 from fsw.model.airframe import AIRFRAME
 from fsw.model.linearisation import Linearisation
 from fsw.model.prediction import INPUTS, YAW, Array, condense
-from fsw.mpc.costs import Cost, CostWeights, TrackingCost
+from fsw.mpc.costs import Cost, CostWeights, PostureCost, TrackingCost
 from fsw.mpc.soft_costs import (
     SoftWeights,
     SphereCost,
@@ -32,6 +32,7 @@ SPHERE = WorkspaceSphere((0.0, 0.0, -0.225), 0.075)
 COSTS: dict[str, Cost] = {
     "tracking": TrackingCost(CostWeights()),
     "printed": TrackingCost(CostWeights(relative_velocity=False)),
+    "posture": PostureCost(CostWeights()),
     "soft walls": SurfaceCost(HardWalls(WALLS, N, 0.0, 1), SoftWeights()),
     "soft points": SurfaceCost(HardObstacles(POINTS, N, 0.0, 1), SoftWeights()),
     "outside the sphere": SphereCost(SPHERE, 5.0, 20.0, only_outside=True),
@@ -55,8 +56,10 @@ def test_slope_is_the_finite_difference_and_the_model_is_convex(cost: Cost) -> N
             start[0:3] + random.uniform(-0.3, 0.3, (N + 1, 3)),
             random.uniform(-0.3, 0.3, (N + 1, 3)),
             start[YAW] + random.uniform(-2.5, 2.5, N + 1),
+            random.uniform(-1.0, 1.0, (N + 1, 2)),
         )
         _, slope, hessian = quadratic(cost, horizon_of(start, guess), guess, targets)
+        assert slope.any() or cost is COSTS["outside the sphere"]
         for column in range(INPUTS * N):
             step = np.zeros(INPUTS * N)
             step[column] = 1e-6
@@ -77,6 +80,17 @@ def test_terminal_node_weighs_five_times_as_table_two_says() -> None:
     targets = TargetPoints(tip - error, np.zeros((N + 1, 3)), np.zeros(N + 1))
     value, _, _ = quadratic(TrackingCost(CostWeights()), horizon, guess, targets)
     assert value == pytest.approx(float(error @ error) * (10.0 * (N - 1) + 50.0))
+
+
+def test_joints_that_are_asked_for_weigh_alike_at_every_node_and_none_weigh_nothing() -> None:
+    start, guess = np.zeros(19), np.zeros(INPUTS * N)
+    horizon = horizon_of(start, guess)
+    points = (horizon.position[:, 2], np.zeros((N + 1, 3)), np.zeros(N + 1))
+    asked = TargetPoints(*points, np.tile([0.3, -0.4], (N + 1, 1)))
+    cost = PostureCost(CostWeights(posture=8.0))
+    assert quadratic(cost, horizon, guess, asked)[0] == pytest.approx(8.0 * 0.25 * N)
+    value, slope, _ = quadratic(cost, horizon, guess, TargetPoints(*points))
+    assert (value, slope.any()) == (0.0, False)
 
 
 @pytest.mark.parametrize(
