@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import math
+import re
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import pytest
 
+from fsw.mpc.costs import CostWeights
 from fsw.mpc.planner_config import PlannerConfig
+from fsw.mpc.qp_data import InputLimits
+from fsw.mpc.soft_costs import SoftWeights
 
 CONFIG = PlannerConfig()
 
@@ -16,6 +22,26 @@ CONFIG = PlannerConfig()
 def test_a_period_that_is_not_positive_is_refused(period_us: int) -> None:
     with pytest.raises(ValueError, match=r"period is .* it must be positive"):
         PlannerConfig(period_us=period_us)
+
+
+UNITS = {"deg": math.pi / 180.0}
+PARTS = {
+    "planner.weights": CostWeights(),
+    "planner.limits": InputLimits(),
+    "planner.soft": SoftWeights(),
+    "planner": PlannerConfig(),
+}
+ROW = re.compile(r"^\| `\w+` \| ([^|]+) \| ([^|]*) \|.*\| `([\w.]+)\.(\w+)` \|$", re.MULTILINE)
+
+
+@pytest.mark.parametrize("part", PARTS)
+def test_an_operator_reads_the_figures_that_are_flown(part: str) -> None:
+    page = Path(__file__).parents[3] / "docs/reference/parameters.md"
+    rows = [row for row in ROW.findall(page.read_text("utf-8")) if row[2] == part]
+    assert len(rows) >= 3
+    for figure, unit, _, name in rows:
+        flown = float(figure) * UNITS.get(unit.strip(), 1.0)
+        assert getattr(PARTS[part], name) == pytest.approx(flown, rel=1e-5), name
 
 
 def test_a_period_counts_in_seconds() -> None:
