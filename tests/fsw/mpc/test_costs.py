@@ -119,6 +119,37 @@ def test_soft_wall_always_pushes_away_and_more_when_closer(
     assert near[2] > 0.0
 
 
+@pytest.mark.parametrize("gap", [0.02, 0.05, 0.5, 2.0])
+def test_soft_wall_is_eq_29_beyond_a_small_gap(gap: float) -> None:
+    expected = (1.0 / (5.0 * gap**2), -2.0 / (5.0 * gap**3), 6.0 / (5.0 * gap**4))
+    assert one_sided_reciprocal(gap, 5.0) == pytest.approx(expected)
+
+
+def test_soft_wall_goes_on_as_a_parabola_from_there() -> None:
+    value, slope, curvature = one_sided_reciprocal(0.02, 5.0)
+    for into in (0.001, 0.02, 1.0):
+        on = one_sided_reciprocal(0.02 - into, 5.0)
+        assert on[0] == pytest.approx(value - slope * into + 0.5 * curvature * into**2)
+        assert on[1:] == pytest.approx((slope - curvature * into, curvature))
+
+
+def test_soft_walls_weigh_by_their_node_in_the_denominator() -> None:
+    """At rest all nodes are alike: n - 1 of them at w_4 and one at w_s4."""
+    guess = np.zeros(INPUTS * N)
+    horizon = horizon_of(np.zeros(19), guess)
+    targets = TargetPoints(np.zeros((N + 1, 3)), np.zeros((N + 1, 3)), np.zeros(N + 1))
+    light, heavy = (
+        quadratic(
+            SurfaceCost(HardWalls(WALLS, N, 0.0, 1), SoftWeights(wall=4.0, wall_terminal=w)),
+            horizon,
+            guess,
+            targets,
+        )[0]
+        for w in (4.0, 16.0)
+    )
+    assert heavy / light == pytest.approx((N - 1 + 0.25) / N)
+
+
 def test_sphere_cost_of_eq_30_is_silent_inside() -> None:
     start, guess = np.zeros(19), np.zeros(INPUTS * N)
     horizon = horizon_of(start, guess)

@@ -189,6 +189,7 @@ def test_a_wrong_number_of_targets_is_refused(count: int) -> None:
     answer = planner().plan(replace(asked, targets=(asked.targets[0],) * count))
     assert isinstance(answer, PlanFailure)
     assert answer.status is SolverStatus.INPUT_REFUSED
+    assert answer.reason == f"{count} targets given, 6 needed"
 
 
 @pytest.mark.parametrize(
@@ -261,7 +262,7 @@ def test_what_is_known_of_a_safe_set_is_built_once(monkeypatch: pytest.MonkeyPat
 
 
 def test_the_reported_times_are_those_of_the_stages_and_of_the_whole() -> None:
-    seconds = itertools.count(step=1000)
+    seconds = itertools.count(5000, step=1000)
     used = Planner(CONFIG, AIRFRAME, lambda: float(next(seconds)))
     asked = request(hovering(), below((0.5, 0.0, -1.2)))
     # Two programs, each between marks: begin, linearised, solved.
@@ -269,7 +270,7 @@ def test_the_reported_times_are_those_of_the_stages_and_of_the_whole() -> None:
 
 
 def test_a_program_without_an_answer_is_the_last_and_its_time_is_reported() -> None:
-    seconds = itertools.count(step=1000)
+    seconds = itertools.count(5000, step=1000)
     used = Planner(replace(CONFIG, controller="hc"), AIRFRAME, lambda: float(next(seconds)))
     behind = hovering((3.0, 0.0, -1.2))
     answer = used.plan(request(behind, below(behind.p), AHEAD))
