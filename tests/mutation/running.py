@@ -171,7 +171,7 @@ class Tests:
             for tests in filter(None, (selection.files[:1], selection.files[1:])):
                 answer = self._run(
                     tests=tests, deselect=selection.left_out,
-                    timeout=30.0 + 10.0 * selection.seconds, each=None, stop=True,
+                    timeout=20.0 + 5.0 * selection.seconds, each=None, stop=True,
                 )  # fmt: skip
                 if answer["status"] in (4, 5):
                     sys.exit(f"pytest ran no test of {mutant.module}")
