@@ -146,7 +146,7 @@ def test_starts_at_rest_with_the_slacks_that_admit_it() -> None:
     x = point.rest()
     assert (x[: INPUTS * N] == 0.0).all()
     assert x.max() > 0.0
-    assert point.margins(x).min() >= -1e-12
+    assert point.margins(x).min() == pytest.approx(0.0, abs=1e-12), "and no more than that"
 
 
 def test_margins_and_bounds_together_admit_what_the_program_admits() -> None:

@@ -14,7 +14,7 @@ from fsw.model.prediction import Array
 from fsw.mpc.ocp import Ocp
 from fsw.mpc.planner_config import PlannerConfig
 from fsw.mpc.solution import Solution
-from fsw.mpc.solvers import Question, Search, by_programs
+from fsw.mpc.solvers import Question, Search, by_programs, by_slsqp
 from fsw.signals import SolverStatus
 
 INPUTS, SLACKS = 6, 2
@@ -70,3 +70,15 @@ def test_both_stages_are_timed_over_all_programs() -> None:
     search = searched(Programs(), 3, itertools.accumulate(range(9)))
     assert search.linearise_us == 1.0 + 4.0 + 7.0
     assert search.solve_us == 2.0 + 5.0 + 8.0
+
+
+def test_what_is_searched_in_one_piece_is_timed_in_one_piece(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    found = Solution(SolverStatus.SOLVED, np.zeros(INPUTS), 17)
+    monkeypatch.setattr("fsw.mpc.solvers.NonlinearProgram", lambda *_: None)
+    monkeypatch.setattr("fsw.mpc.solvers.minimise", lambda _: found)
+    marks = itertools.count(5000, 1000)
+    question = Question(cast(Ocp, Programs()), START, TARGETS, GUESS)
+    search = by_slsqp(question, PlannerConfig(), lambda: float(next(marks)))
+    assert search == Search(found, 17, 17, linearise_us=0.0, solve_us=1000.0)
