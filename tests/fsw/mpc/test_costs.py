@@ -33,9 +33,10 @@ MODEL = condense(AIRFRAME, 0.1, N)
 WALLS = (wall((-1.0, 0.0, 0.0), -1.0, 0.1), wall((0.0, 0.6, 0.8), -1.5, 0.1))
 POINTS = (point((0.3, -0.2, 0.1), 0.1), point((-0.5, 0.4, 0.6), 0.2))
 SPHERE = target_sphere((0.0, 0.0, -0.225), 0.075)
+SOFT = SoftWeights()
 
 
-def soft(*zones: Zone, weights: SoftWeights = SoftWeights()) -> ZoneCost:
+def soft(*zones: Zone, weights: SoftWeights = SOFT) -> ZoneCost:
     points, tuning = body_of("points", AIRFRAME), BarrierTuning()
     rows = ZoneRows(
         SafeSet(zones), points, MODEL, (tuning, tuning), distances=True, skipped_nodes=0
