@@ -176,9 +176,10 @@ def _fill(
                         value = barrier_value(d, rate, tuning)
                         least = cbf_lower_bound(barrier_value(d0, rate0, tuning), i, tuning)
                         steepness = safe_approach_slope(d, tuning.alpha, tuning.slope)
-                        binds = value - least < steepness * reach[0] + reach[1]
+                        # Not "<": a row that is no number stays, for the solver to refuse.
+                        binds = not value - least >= steepness * reach[0] + reach[1]
                     elif binds:
-                        binds = value - least < reach[0]
+                        binds = not value - least >= reach[0]
                     if binds:
                         fill_slopes(frame, on, local, n, slopes)
                         if distances:
