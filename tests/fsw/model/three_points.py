@@ -8,7 +8,15 @@ import numpy as np
 
 from fsw.model.airframe import AIRFRAME
 from fsw.model.body import body_of
-from fsw.model.linearisation import Linearisation, chain, fill_slopes, position, velocity
+from fsw.model.linearisation import (
+    TURNED,
+    Linearisation,
+    chain,
+    fill_slopes,
+    fill_turned,
+    position,
+    velocity,
+)
 from fsw.model.prediction import STATES, Array
 
 BASE, JOINT2, END_EFFECTOR = 0, 1, 2
@@ -45,11 +53,12 @@ def points_of(linearised: Linearisation) -> Points:
         np.zeros((nodes, 3, 3, unknowns)),
         np.zeros((nodes, 3, 3, unknowns)),
     )
-    slopes = np.zeros((2, STATES))
+    turned, slopes = np.zeros((TURNED, 3)), np.zeros((2, STATES))
     for node in range(1, nodes):  # the start feels no input
         for k, (on, local) in enumerate(_PLACES):
             for axis, n in enumerate(_AXES):
-                fill_slopes(horizon.frames[node], on, local, n, slopes)
+                fill_turned(horizon.frames[node], n, turned)
+                fill_slopes(horizon.frames[node], on, local, n, turned, slopes)
                 chain(horizon.impulse, node, slopes[0], points.d_position[node, k, axis])
                 chain(horizon.impulse, node, slopes[1], points.d_velocity[node, k, axis])
     return points

@@ -127,7 +127,7 @@ def test_items_in_floats_are_taken_and_given(vehicle: Vehicle) -> None:
     """MAVProxy sends what it is asked for, and older ground stations know nothing else."""
     client = vehicle.client()
     assert client.upload(WAYPOINTS[:1] + WAYPOINTS[2:4], floats=True) == ACCEPTED
-    stored = vehicle.store.items(MISSION)
+    stored = vehicle.store.items[MISSION]
     assert (stored[1].x, stored[1].y) == (5_000, -12_345)
     assert stored[0].x == pytest.approx(470_000_100, abs=40)  # as exact as a float is
     items = client.download(floats=True)
@@ -284,7 +284,7 @@ def test_clearing_clears_what_it_names(vehicle: Vehicle, kind: int) -> None:
     assert client.upload([{"command": 5100}], RALLY) == ACCEPTED
     vehicle.store.take_update()
     assert client.ask(mav.mission_clear_all_encode(1, 1, kind), "MISSION_ACK").type == ACCEPTED
-    left = [len(vehicle.store.items(k)) for k in Kind]
+    left = [len(vehicle.store.items[k]) for k in Kind]
     full = [len(WAYPOINTS), 3, 1]
     assert left == ([0, 0, 0] if kind == 255 else [0 if k == kind else full[k] for k in range(3)])
     update = vehicle.store.take_update()
