@@ -10,12 +10,12 @@ import importlib.util
 from typing import Any
 
 import numpy as np
+from fsw.barriers.workspace import outward_frame
 
 from benchmarks.optimiser.instances import Instance
 from benchmarks.optimiser.solved import Solved, timed
 from fsw.barriers.cbf_row import cbf_lower_bound
 from fsw.barriers.safe_approach import safe_approach_speed
-from fsw.barriers.workspace import outward_frame
 from fsw.model.airframe import AIRFRAME
 from fsw.model.linearisation import POINTS, Linearisation
 from fsw.model.prediction import INPUTS, STATES, Array, condense, to_vector

@@ -49,12 +49,15 @@ class Margins:
             p_target[0], v_target[0] = target.p_WE, target.v_WE
         moves = Moves(*shifts(safe_set, np.array([estimate.t_us]), p_target, v_target))
         vehicle = as_horizon(estimate, self._links)
-        size = sum(1 if follows else len(self.parts) for follows in zones.follows)
+        per_zone = tuple(1 if follows else len(self.parts) for follows in zones.follows)
+        size = sum(per_zone)
         margins, values = np.empty(size), np.empty(size)
         how = (zones, moves, self._probes, vehicle, self._tunings)
         self._fill(*how, True, margins)
         self._fill(*how, False, values)
-        return ConstraintReport(safe_set.kind, tuple(margins.tolist()), tuple(values.tolist()))
+        return ConstraintReport(
+            safe_set.kind, tuple(margins.tolist()), tuple(values.tolist()), per_zone
+        )
 
 
 def as_horizon(estimate: StateEstimate, links: Vec2) -> Horizon:

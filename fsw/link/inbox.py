@@ -83,6 +83,7 @@ class Inbox:
             message_ids.HEARTBEAT: self._heartbeat,
             message_ids.OBSTACLE_WALL: partial(self._obstacle, 5, decode.obstacle_wall),
             message_ids.OBSTACLE_POINT: partial(self._obstacle, 4, decode.obstacle_point),
+            message_ids.OBSTACLE_SHAPE: partial(self._obstacle, 21, decode.obstacle_shape),
             message_ids.WORKSPACE_SPHERE: self._sphere,
         }
 
@@ -113,9 +114,16 @@ class Inbox:
         self._targets.clear()
         return taken
 
-    def take_safe_set(self) -> SafeSet | None:
-        """Hand over the safe set if a new one is complete."""
+    def take_safe_set(self, now_us: int = 0) -> SafeSet | None:
+        """Hand over the safe set if a new one is complete.
+
+        A zone that moves and did not say since when is where it is now, ``now_us``.
+        """
+        if self._safe_set is None:
+            return None
         taken, self._safe_set = self._safe_set, None
+        if any(zone.t_us == 0 and any(zone.velocity) for zone in taken.zones):
+            return SafeSet(tuple(_begun(zone, now_us) for zone in taken.zones))
         return taken
 
     def take_setpoints(self) -> Setpoints:
@@ -142,7 +150,7 @@ class Inbox:
             plan,
             self.take_commands(),
             self.take_targets(),
-            self.take_safe_set(),
+            self.take_safe_set(sensors.t_us),
             setpoints.motion,
             setpoints.attitude,
             setpoints.joints,
@@ -230,3 +238,9 @@ class Inbox:
             self.refused += 1
             return
         self._safe_set = SafeSet((sphere,))
+
+
+def _begun(zone: Zone, now_us: int) -> Zone:
+    if zone.t_us or not any(zone.velocity):
+        return zone
+    return replace(zone, t_us=now_us)

@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-
 from fsw.barriers.hard_set import HardObstacles, HardWalls, HardWorkspace
+
 from fsw.model.linearisation import BASE, Linearisation
 from fsw.model.prediction import INPUTS, Array
 from fsw.signals import PointObstacle, Wall, WorkspaceSphere

@@ -6,11 +6,11 @@ import math
 
 import numpy as np
 import pytest
-
-from fsw.barriers.margins import PointMotion, constraint_report
 from fsw.barriers.point_obstacle import PointObstacleBarrier
 from fsw.barriers.wall import WallBarrier
 from fsw.barriers.workspace import WorkspaceBarrier
+
+from fsw.barriers.margins import PointMotion, constraint_report
 from fsw.model.linearisation import Linearisation
 from fsw.signals import (
     ConstraintKind,

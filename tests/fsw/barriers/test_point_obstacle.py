@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
 from fsw.barriers.point_obstacle import PointObstacleBarrier
 from fsw.barriers.tangent import planes, tangent
 from fsw.barriers.wall import WallBarrier
+
 from fsw.model.linearisation import Linearisation
 from fsw.model.prediction import INPUTS, Array
 from fsw.signals import PointObstacle, SafeSet, Wall

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from fsw.barriers.wall import WallBarrier
 
 from fsw.barriers.safe_approach import BarrierTuning
-from fsw.barriers.wall import WallBarrier
 from fsw.model.linearisation import Linearisation
 from fsw.model.prediction import INPUTS, Array
 from fsw.signals import Wall

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from fsw.barriers.workspace import DIRECTIONS, WorkspaceBarrier, outward_frame
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fsw.barriers.workspace import DIRECTIONS, WorkspaceBarrier, outward_frame
 from fsw.model.linearisation import BASE, Linearisation
 from fsw.model.prediction import INPUTS, Array
 from fsw.signals import WorkspaceSphere

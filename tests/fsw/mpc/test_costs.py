@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from fsw.barriers.hard_set import HardObstacles, HardWalls
 from hypothesis import given
 from hypothesis import strategies as st
 
 from fsw.barriers.constraint_block import TargetPoints
-from fsw.barriers.hard_set import HardObstacles, HardWalls
 from fsw.model.airframe import AIRFRAME
 from fsw.model.linearisation import Linearisation
 from fsw.model.prediction import INPUTS, YAW, Array, condense

@@ -6,11 +6,11 @@ import math
 
 import numpy as np
 import pytest
+from fsw.barriers.tangent import distance_to
 from hypothesis import given
 from hypothesis import strategies as st
 from matplotlib.path import Path
 
-from fsw.barriers.tangent import distance_to
 from fsw.link.wire.fence_items import (
     CIRCLE_EXCLUSION,
     CIRCLE_INCLUSION,
