@@ -7,8 +7,11 @@ from dataclasses import replace
 from fsw.barriers.margins import Margins
 from fsw.flight.state import MissionMemory
 from fsw.model.body import body_of
+from fsw.mpc.reference import still_at
 from fsw.parameters.consistency import Finding, analyse, loop_tube, refusals, warnings
 from fsw.parameters.flight_config import FlightConfig
+from fsw.shapes.half_space import wall
+from fsw.shapes.zones import surfaces
 from fsw.signals import (
     ConstraintReport,
     EndEffectorTarget,
@@ -64,6 +67,12 @@ class SafeSetCheck:
                 texts.append(StatusText(Severity.WARNING, "safe set refused: the old one is kept"))
             return replace(mission, rally=wanted.rally, refused_set=wanted.safe_set)
         return replace(wanted, refused_set=None, refusals=() if self._config.soft else against)
+
+    def warm_up(self, estimate: StateEstimate) -> None:
+        """Compile every kernel of distances and margins, before anything flies."""
+        walled = SafeSet((wall((0.0, 0.0, -1.0), 0.0, 0.0),))
+        surfaces(walled, estimate.p_WB, estimate.t_us)
+        self.margins(walled, estimate, still_at(estimate.p_WB))
 
     def margins(
         self, safe_set: SafeSet, estimate: StateEstimate, target: EndEffectorTarget

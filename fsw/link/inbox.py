@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Final, cast
 
 from fsw.geometry.geodesy import DEFAULT_ORIGIN, to_local
-from fsw.link.wire import decode, decode_commands, decode_setpoints, message_ids
+from fsw.link.wire import decode, decode_commands, message_ids
 from fsw.link.wire.decode import Numbers
+from fsw.link.wire.decode_setpoints import (
+    attitude_setpoint,
+    body_setpoint,
+    end_effector_setpoint,
+    joint_setpoint,
+)
 from fsw.signals import (
     AttitudeSetpoint,
     Command,
@@ -36,17 +42,18 @@ _GROUND_STATION: Final = 6  # MAV_TYPE
 Setpoint = MotionSetpoint | AttitudeSetpoint | JointSetpoint
 
 
-@dataclass(frozen=True, slots=True)
-class Setpoints:
-    """The newest offboard setpoints; at most one of motion and attitude."""
+@dataclass(slots=True)
+class Received:
+    """What came since the last tick."""
 
-    motion: MotionSetpoint | None = None
+    commands: list[Command] = field(default_factory=list)  # in order of arrival
+    targets: list[EndEffectorTarget] = field(default_factory=list)  # the same
+    safe_set: SafeSet | None = None  # newly complete
+    motion: MotionSetpoint | None = None  # the newest; at most one of motion and attitude
     attitude: AttitudeSetpoint | None = None
     joints: JointSetpoint | None = None
-    refused: int = 0  # that were of no use
-
-
-NO_SETPOINTS: Final = Setpoints()
+    refused_setpoints: int = 0  # that were of no use
+    station_heard: bool = False  # a ground station's heartbeat
 
 
 class Inbox:
@@ -59,11 +66,7 @@ class Inbox:
         """Begin empty; commands name places on Earth, from ``origin`` of the local frame on."""
         self._locate = partial(to_local, origin)
         self.refused = 0  # messages with numbers of no use, or too many of them
-        self._commands: list[Command] = []
-        self._targets: list[EndEffectorTarget] = []
-        self._setpoints = NO_SETPOINTS
-        self._station_heard = False
-        self._safe_set: SafeSet | None = None
+        self._received = Received()
         self._obstacles: dict[int, Zone] = {}
         self._obstacle_count = 0
         self._handlers: dict[int, Callable[[Frame], None]] = {
@@ -71,19 +74,13 @@ class Inbox:
             message_ids.COMMAND_INT: partial(self._command, decode.command_int),
             message_ids.SET_MODE: partial(self._command, decode.set_mode),
             message_ids.END_EFFECTOR_TARGET: self._target,
-            message_ids.SET_POSITION_TARGET_LOCAL_NED: partial(
-                self._setpoint, 13, decode_setpoints.body_setpoint
-            ),
-            message_ids.SET_ATTITUDE_TARGET: partial(
-                self._setpoint, 9, decode_setpoints.attitude_setpoint
-            ),
-            message_ids.ARM_JOINT_SETPOINT: partial(
-                self._setpoint, 13, decode_setpoints.joint_setpoint
-            ),
+            message_ids.SET_POSITION_TARGET_LOCAL_NED: partial(self._setpoint, body_setpoint),
+            message_ids.SET_ATTITUDE_TARGET: partial(self._setpoint, attitude_setpoint),
+            message_ids.ARM_JOINT_SETPOINT: partial(self._setpoint, joint_setpoint),
             message_ids.HEARTBEAT: self._heartbeat,
-            message_ids.OBSTACLE_WALL: partial(self._obstacle, 5, decode.obstacle_wall),
-            message_ids.OBSTACLE_POINT: partial(self._obstacle, 4, decode.obstacle_point),
-            message_ids.OBSTACLE_SHAPE: partial(self._obstacle, 21, decode.obstacle_shape),
+            message_ids.OBSTACLE_WALL: partial(self._obstacle, decode.obstacle_wall),
+            message_ids.OBSTACLE_POINT: partial(self._obstacle, decode.obstacle_point),
+            message_ids.OBSTACLE_SHAPE: partial(self._obstacle, decode.obstacle_shape),
             message_ids.WORKSPACE_SPHERE: self._sphere,
         }
 
@@ -98,37 +95,9 @@ class Inbox:
         if handler is not None:
             handler(frame)
 
-    def take_commands(self) -> tuple[Command, ...]:
-        """Hand over the commands, in order of arrival."""
-        if not self._commands:
-            return ()
-        taken = tuple(self._commands)
-        self._commands.clear()
-        return taken
-
-    def take_targets(self) -> tuple[EndEffectorTarget, ...]:
-        """Hand over the trajectory points, in order of arrival."""
-        if not self._targets:
-            return ()
-        taken = tuple(self._targets)
-        self._targets.clear()
-        return taken
-
-    def take_safe_set(self, now_us: int = 0) -> SafeSet | None:
-        """Hand over the safe set if a new one is complete.
-
-        A zone that moves and did not say since when is where it is now, ``now_us``.
-        """
-        if self._safe_set is None:
-            return None
-        taken, self._safe_set = self._safe_set, None
-        if any(zone.t_us == 0 and any(zone.velocity) for zone in taken.zones):
-            return SafeSet(tuple(_begun(zone, now_us) for zone in taken.zones))
-        return taken
-
-    def take_setpoints(self) -> Setpoints:
-        """Hand over the newest setpoints for now."""
-        taken, self._setpoints = self._setpoints, NO_SETPOINTS
+    def take(self) -> Received:
+        """Hand over what came."""
+        taken, self._received = self._received, Received()
         return taken
 
     def take_inputs(
@@ -143,80 +112,71 @@ class Inbox:
 
         The sensors' readings are ``stale_us`` older than their stamp says.
         """
-        setpoints = self.take_setpoints()
+        came = self.take()
         # By position: it is made in every tick.
         return TickInputs(
             sensors,
             plan,
-            self.take_commands(),
-            self.take_targets(),
-            self.take_safe_set(sensors.t_us),
-            setpoints.motion,
-            setpoints.attitude,
-            setpoints.joints,
-            setpoints.refused,
-            self.take_station_heard(),
+            tuple(came.commands),
+            tuple(came.targets),
+            _begun(came.safe_set, sensors.t_us),
+            came.motion,
+            came.attitude,
+            came.joints,
+            came.refused_setpoints,
+            came.station_heard,
             mission,
             tuning,
             stale_us,
         )
 
-    def take_station_heard(self) -> bool:
-        """Whether a ground station's heartbeat came."""
-        taken, self._station_heard = self._station_heard, False
-        return taken
-
     def _command(self, read: Callable[[Frame], CommandRequest | None], frame: Frame) -> None:
         request = read(frame)
         if request is None:
             return
-        if len(self._commands) >= _MAX_COMMANDS:
+        if len(self._received.commands) >= _MAX_COMMANDS:
             self.refused += 1
             return
-        self._commands.append(decode_commands.command(request, self._locate))
+        self._received.commands.append(decode_commands.command(request, self._locate))
 
     def _target(self, frame: Frame) -> None:
         values = cast(Numbers, frame.payload_values)
         if values[0] == 0:  # not for a later time: for now
-            self._setpoint(13, decode_setpoints.end_effector_setpoint, frame)
+            self._setpoint(end_effector_setpoint, frame)
             return
-        if not decode.for_this_vehicle(values[13], values[14]):
+        if not decode.for_this_vehicle(frame):
             return
         target = decode.end_effector_target(values)
-        if target is None or len(self._targets) >= _MAX_TARGETS:
+        if target is None or len(self._received.targets) >= _MAX_TARGETS:
             self.refused += 1
             return
-        self._targets.append(target)
+        self._received.targets.append(target)
 
-    def _setpoint(self, at: int, read: Callable[[Numbers], Setpoint | None], frame: Frame) -> None:
-        """Keep the newest of each kind; one for another vehicle is refused like a wrong one.
-
-        The target stands at the values ``at`` and behind.
-        """
+    def _setpoint(self, read: Callable[[Numbers], Setpoint | None], frame: Frame) -> None:
+        """Keep the newest of each kind; one for another vehicle is refused like a wrong one."""
         values = cast(Numbers, frame.payload_values)
-        setpoint = read(values) if decode.for_this_vehicle(*values[at : at + 2]) else None
-        kept = self._setpoints
+        setpoint = read(values) if decode.for_this_vehicle(frame) else None
+        received = self._received
         if setpoint is None:
             self.refused += 1
-            self._setpoints = replace(kept, refused=kept.refused + 1)
+            received.refused_setpoints += 1
         elif isinstance(setpoint, JointSetpoint):
-            self._setpoints = replace(kept, joints=setpoint)
+            received.joints = setpoint
         elif isinstance(setpoint, AttitudeSetpoint):
-            self._setpoints = replace(kept, attitude=setpoint, motion=None)
+            received.attitude, received.motion = setpoint, None
         else:
-            self._setpoints = replace(kept, motion=setpoint, attitude=None)
+            received.motion, received.attitude = setpoint, None
 
     def _heartbeat(self, frame: Frame) -> None:
         if frame.payload_values[1] == _GROUND_STATION:
-            self._station_heard = True
+            self._received.station_heard = True
 
     def _obstacle(
-        self, at: int, read: Callable[[Numbers], decode.IndexedObstacle | None], frame: Frame
+        self, read: Callable[[Numbers], decode.IndexedObstacle | None], frame: Frame
     ) -> None:
-        values = cast(Numbers, frame.payload_values)
-        if not decode.for_this_vehicle(*values[at : at + 2]):
+        if not decode.for_this_vehicle(frame):
             return
-        indexed = read(values)
+        indexed = read(cast(Numbers, frame.payload_values))
         if indexed is None:
             self.refused += 1
             return
@@ -226,21 +186,27 @@ class Inbox:
             self._obstacle_count = indexed.count
         self._obstacles[indexed.index] = indexed.zone
         if len(self._obstacles) == indexed.count:
-            self._safe_set = SafeSet(tuple(self._obstacles[i] for i in range(indexed.count)))
+            whole = tuple(self._obstacles[i] for i in range(indexed.count))
+            self._received.safe_set = SafeSet(whole)
             self._obstacles.clear()
 
     def _sphere(self, frame: Frame) -> None:
-        values = cast(Numbers, frame.payload_values)
-        if not decode.for_this_vehicle(values[4], values[5]):
+        if not decode.for_this_vehicle(frame):
             return
-        sphere = decode.workspace_sphere(values)
+        sphere = decode.workspace_sphere(cast(Numbers, frame.payload_values))
         if sphere is None:
             self.refused += 1
             return
-        self._safe_set = SafeSet((sphere,))
+        self._received.safe_set = SafeSet((sphere,))
 
 
-def _begun(zone: Zone, now_us: int) -> Zone:
-    if zone.t_us or not any(zone.velocity):
-        return zone
-    return replace(zone, t_us=now_us)
+def _begun(safe_set: SafeSet | None, now_us: int) -> SafeSet | None:
+    """The safe set with zones that move, and did not say since when, where they are now."""
+    if safe_set is None or all(zone.t_us or not any(zone.velocity) for zone in safe_set.zones):
+        return safe_set
+    return SafeSet(
+        tuple(
+            replace(zone, t_us=now_us) if any(zone.velocity) and not zone.t_us else zone
+            for zone in safe_set.zones
+        )
+    )

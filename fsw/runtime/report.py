@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import json
-from pathlib import Path
-
 from fsw.parameters.control_choice import ControlChoice
 from fsw.ports import VehicleFacts
 from fsw.runtime.planner_service import PlannerRecord
@@ -42,15 +39,6 @@ def as_json(
             "refused": record.offboard.refused,
         },
     }
-
-
-def write(path: Path, result: dict[str, object]) -> str | None:
-    """Write the result as one JSON object; returns why that was not possible."""
-    try:
-        path.write_text(json.dumps(result, indent=2) + "\n", encoding="utf-8")
-    except OSError as error:
-        return f"{path}: {error.strerror}"
-    return None
 
 
 def _mpc(facts: VehicleFacts, record: FlightRecord) -> dict[str, object]:

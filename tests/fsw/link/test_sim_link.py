@@ -109,7 +109,7 @@ def test_walls_and_points_arrive_as_the_pilot_announces_them(wire: Wire) -> None
     _, messages = speak(plan, PilotState(Phase.IDLE), 1_000_000)
     wire.send(StepEncoder(lockstep=True).datagram(readings(1_002_000), messages))
     assert wire.link.wait_for_step() is not None
-    safe_set = wire.inbox.take_safe_set()
+    safe_set = wire.inbox.take().safe_set
     assert safe_set is not None
     assert safe_set == simulated(scenario)
     kinds = [zone.shape.kind for zone in safe_set.zones]
@@ -173,7 +173,7 @@ def test_commands_of_a_repeated_step_are_taken_once(wire: Wire) -> None:
     for _ in range(2):
         wire.send(step)
         wire.link.wait_for_step()
-    assert len(wire.inbox.take_commands()) == 1
+    assert len(wire.inbox.take().commands) == 1
 
 
 def test_acknowledgements_come_before_the_actuators_and_are_repeated_with_them(wire: Wire) -> None:
@@ -226,7 +226,7 @@ def test_of_steps_that_piled_up_the_newest_counts_and_every_message_is_kept(
     newest = wire.link.newest()
     assert newest is not None
     assert newest.t_us == 1_008_000
-    assert [one.request.command for one in wire.inbox.take_commands()] == [400]
+    assert [one.request.command for one in wire.inbox.take().commands] == [400]
     assert wire.link.newest() is None
 
 
