@@ -55,10 +55,16 @@ class SafeSetCheck:
             return replace(mission, rally=wanted.rally)
         findings = self.analyse(wanted.safe_set)
         against = refusals(findings)
-        texts += [StatusText(Severity.WARNING, text) for text in against]
-        texts += [StatusText(Severity.INFO, text) for text in warnings(findings)]
+        # Where a zone moves, there is another set ten times a second: what is known is not said.
+        known = {
+            finding.statement for finding in self.analyse(mission.refused_set or mission.safe_set)
+        }
+        new = [StatusText(Severity.WARNING, text) for text in against if text not in known]
+        new += [StatusText(Severity.INFO, text) for text in warnings(findings) if text not in known]
+        texts += new
         if against and not self._config.soft and flies:
-            texts.append(StatusText(Severity.WARNING, "safe set refused: the old one is kept"))
+            if new:
+                texts.append(StatusText(Severity.WARNING, "safe set refused: the old one is kept"))
             return replace(mission, rally=wanted.rally, refused_set=wanted.safe_set)
         return replace(wanted, refused_set=None, refusals=() if self._config.soft else against)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Final, cast
 
@@ -80,6 +80,7 @@ class Inbox:
             message_ids.HEARTBEAT: self._heartbeat,
             message_ids.OBSTACLE_WALL: partial(self._obstacle, decode.obstacle_wall),
             message_ids.OBSTACLE_POINT: partial(self._obstacle, decode.obstacle_point),
+            message_ids.OBSTACLE_SHAPE: partial(self._obstacle, decode.obstacle_shape),
             message_ids.WORKSPACE_SPHERE: self._sphere,
         }
 
@@ -118,7 +119,7 @@ class Inbox:
             plan,
             tuple(came.commands),
             tuple(came.targets),
-            came.safe_set,
+            _begun(came.safe_set, sensors.t_us),
             came.motion,
             came.attitude,
             came.joints,
@@ -197,3 +198,15 @@ class Inbox:
             self.refused += 1
             return
         self._received.safe_set = SafeSet((sphere,))
+
+
+def _begun(safe_set: SafeSet | None, now_us: int) -> SafeSet | None:
+    """The safe set with zones that move, and did not say since when, where they are now."""
+    if safe_set is None or all(zone.t_us or not any(zone.velocity) for zone in safe_set.zones):
+        return safe_set
+    return SafeSet(
+        tuple(
+            replace(zone, t_us=now_us) if any(zone.velocity) and not zone.t_us else zone
+            for zone in safe_set.zones
+        )
+    )
