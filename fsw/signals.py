@@ -211,6 +211,39 @@ class SafeSet:
         return ConstraintKind.WALLS if self.walls else ConstraintKind.NONE
 
 
+@dataclass(frozen=True, slots=True)
+class MessageSource:
+    """Who sent a message, as far as its link can say."""
+
+    system: int  # MAVLink ids, which anyone can write into a frame
+    component: int
+    link: str  # "simulator", "gcs" or "api"
+    address: str = ""  # host:port; empty where the link has a single peer
+    signed: bool = False  # with the link's key
+
+    def __str__(self) -> str:
+        """As an operator reads it."""
+        where = self.link + (f" {self.address}" if self.address else "")
+        return f"{self.system}/{self.component} ({where})"
+
+    def is_same(self, other: MessageSource | None) -> bool:
+        """Whether both are one sender: of the same address, unless signatures vouch for both."""
+        if other is None:
+            return False
+        ids = (self.system, self.component, self.link, self.signed)
+        return ids == (other.system, other.component, other.link, other.signed) and (
+            self.signed or self.address == other.address
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class SafeSetAnnouncement:
+    """A safe set, whole, and who wants it."""
+
+    source: MessageSource
+    safe_set: SafeSet
+
+
 # ---------------------------------------------------------------- commands
 
 
@@ -421,6 +454,7 @@ class MissionUpdate:
     fence: SafeSet | None = None
     rally: tuple[Vec2, ...] | None = None  # m, north and east
     current: int | None = None  # the step to fly next
+    fence_source: MessageSource | None = None  # who uploaded the fence
 
 
 class MissionState(IntEnum):
@@ -668,7 +702,7 @@ class TickInputs:
     plan: Plan | PlanFailure | None = None  # newly arrived, at most one
     commands: tuple[Command, ...] = ()
     targets: tuple[EndEffectorTarget, ...] = ()
-    safe_set: SafeSet | None = None  # newly announced
+    announced: tuple[SafeSetAnnouncement, ...] = ()  # safe sets, in order of arrival
     # The newest offboard setpoints; at most one of motion and attitude.
     motion: MotionSetpoint | None = None
     attitude: AttitudeSetpoint | None = None

@@ -40,7 +40,7 @@ from studies.flight_result import (
     TracePoint,
     processor_time_us,
 )
-from studies.mission import safe_set, target
+from studies.mission import announced, target
 
 TARGET_US = 100_000  # between points of the reference, as the pilot sends them
 _TARGETS_AHEAD = 20
@@ -157,7 +157,6 @@ def simulate(
     simulation, recorder = Simulation(scenario, seed), FlightRecorder()
     planner = InlinePlanner(Planner(config.planner, config.airframe, processor_time_us))
     loop = ClosedLoop(simulation, Autopilot(config).tick, FlightState(), planner, config.airframe)
-    announced = safe_set(scenario)
     steps_per_plan = config.mpc_period_us // config.tick_period_us
     while simulation.ended is None:
         step, sensors = simulation.step, loop.sense()
@@ -169,7 +168,7 @@ def simulate(
             plan=answer,
             commands=((_ARM,), (_FOLLOW,))[step] if step < 2 else (),
             targets=loop.targets(),
-            safe_set=announced if step == 0 else None,
+            announced=announced(scenario) if step == 0 else (),
         )
         if traced and step % TRACE_STEPS == 0:
             recorder.trace.append(_trace_point(simulation))

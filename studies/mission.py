@@ -3,10 +3,19 @@
 from __future__ import annotations
 
 import fsw.signals as fsw_signals
-from fsw.signals import EndEffectorTarget, PointObstacle, SafeSet, WorkspaceSphere
+from fsw.signals import (
+    EndEffectorTarget,
+    MessageSource,
+    PointObstacle,
+    SafeSet,
+    SafeSetAnnouncement,
+    WorkspaceSphere,
+)
 from sitl.mission_clock import MissionClock
 from sitl.scenario import Scenario
 from sitl.simulation import START_US
+
+SIMULATOR = MessageSource(1, 195, "simulator")
 
 
 def safe_set(scenario: Scenario) -> SafeSet:
@@ -19,6 +28,12 @@ def safe_set(scenario: Scenario) -> SafeSet:
     if workspace is None:
         return SafeSet(walls, obstacles=obstacles)
     return SafeSet(walls, WorkspaceSphere((0.0, 0.0, -workspace.d_iw_m), workspace.radius_m))
+
+
+def announced(scenario: Scenario) -> tuple[SafeSetAnnouncement, ...]:
+    """What the scenario's pilot announces."""
+    held = safe_set(scenario)
+    return (SafeSetAnnouncement(SIMULATOR, held),) if held != SafeSet() else ()
 
 
 def target(clock: MissionClock, t_us: int) -> EndEffectorTarget:

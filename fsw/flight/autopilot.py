@@ -145,12 +145,12 @@ class Autopilot:
     ) -> FlightState:
         """Store received targets, safe set, mission, setpoints and ground station heartbeat."""
         now_us = inputs.sensors.t_us
-        if inputs.targets or inputs.safe_set is not None or inputs.mission is not None:
+        if inputs.targets or inputs.announced or inputs.mission is not None:
             stream = merge(state.mission.stream, inputs.targets, now_us)
             mission = self._safe_sets.update(
                 replace(state.mission, stream=stream),
-                inputs.mission,
-                inputs.safe_set,
+                inputs,
+                state.estimate,
                 texts,
                 flies=state.vehicle.flies,
             )

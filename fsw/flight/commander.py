@@ -327,6 +327,9 @@ class Commander:
             moved_us=estimate.t_us,
             failsafe_from=vehicle.failsafe_from if completed else None,
         )
+        if not vehicle.armed:
+            # On the ground another source may own the safe set from now on.
+            state = replace(state, mission=replace(state.mission, owner_heard_us=-1))
         return replace(state, vehicle=vehicle)
 
 

@@ -21,12 +21,14 @@ from fsw.signals import (
     EndEffectorTarget,
     Home,
     JointSetpoint,
+    MessageSource,
     Mode,
     MotionSetpoint,
     Plan,
     PlannerCounters,
     PredictionState,
     SafeSet,
+    SafeSetAnnouncement,
     SolverStatus,
     StateEstimate,
     Vec2,
@@ -112,10 +114,14 @@ class MissionMemory:
 
     stream: tuple[EndEffectorTarget, ...] = ()
     safe_set: SafeSet = field(default_factory=SafeSet)  # in force: announced and fence together
-    refused_set: SafeSet | None = None  # announced in flight, and of no use
+    refused: SafeSetAnnouncement | None = None  # the last one
     refusals: tuple[str, ...] = ()  # why this configuration cannot keep the safe set
     announced: SafeSet = field(default_factory=SafeSet)
     fence: SafeSet = field(default_factory=SafeSet)
+    owner: MessageSource | None = None  # of what is announced
+    owner_heard_us: int = -1  # when it was announced last; -1: not since the vehicle disarmed
+    fence_owner: MessageSource | None = None  # who uploaded the fence
+    accepted: tuple[SafeSetAnnouncement, ...] = ()  # the last one of each source
     rally: tuple[Vec2, ...] = ()  # m, where a return may lead beside home
     flight: MissionFlight = field(default_factory=MissionFlight)
 

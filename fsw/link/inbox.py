@@ -16,6 +16,7 @@ from fsw.signals import (
     CommandRequest,
     EndEffectorTarget,
     JointSetpoint,
+    MessageSource,
     MissionUpdate,
     MotionSetpoint,
     Origin,
@@ -23,6 +24,7 @@ from fsw.signals import (
     PlanFailure,
     PointObstacle,
     SafeSet,
+    SafeSetAnnouncement,
     SensorFrame,
     TickInputs,
     Wall,
@@ -32,7 +34,10 @@ from messages.frames import Frame
 
 _MAX_COMMANDS: Final = 16  # a tick; a client sends one at a time and repeats it
 _MAX_TARGETS: Final = 64  # a tick
+_MAX_ANNOUNCEMENTS: Final = 4  # a tick
+_MAX_ANNOUNCERS: Final = 8  # whose safe sets may be incomplete at the same time
 _GROUND_STATION: Final = 6  # MAV_TYPE
+UNKNOWN_SOURCE: Final = MessageSource(0, 0, "unknown")
 
 Setpoint = MotionSetpoint | AttitudeSetpoint | JointSetpoint
 
@@ -50,8 +55,16 @@ class Setpoints:
 NO_SETPOINTS: Final = Setpoints()
 
 
+@dataclass(slots=True)
+class _Incomplete:
+    """The walls and points that one source has announced so far, of a set of ``count``."""
+
+    count: int
+    shapes: dict[int, Wall | PointObstacle]
+
+
 class Inbox:
-    """Collects commands, targets and the safe set until a tick takes them.
+    """Collects commands, targets and safe sets until a tick takes them.
 
     Bounded: what does not fit is dropped and counted, as a lost datagram would be.
     """
@@ -64,9 +77,10 @@ class Inbox:
         self._targets: list[EndEffectorTarget] = []
         self._setpoints = NO_SETPOINTS
         self._station_heard = False
-        self._safe_set: SafeSet | None = None
-        self._obstacles: dict[int, Wall | PointObstacle] = {}
-        self._obstacle_count = 0
+        self._announced: list[SafeSetAnnouncement] = []
+        # By source: the walls of two announcers must not mix.
+        self._incomplete: dict[MessageSource, _Incomplete] = {}
+        self._source = UNKNOWN_SOURCE  # of the frame that is read now
         self._handlers: dict[int, Callable[[Frame], None]] = {
             message_ids.COMMAND_LONG: partial(self._command, decode.command_long),
             message_ids.COMMAND_INT: partial(self._command, decode.command_int),
@@ -92,10 +106,11 @@ class Inbox:
         """What it keeps something of."""
         return frozenset(self._handlers)
 
-    def accept(self, frame: Frame) -> None:
+    def accept(self, frame: Frame, source: MessageSource = UNKNOWN_SOURCE) -> None:
         """Keep what the frame says if it is for this vehicle and of use; never raises."""
         handler = self._handlers.get(frame.message_id)
         if handler is not None:
+            self._source = source
             handler(frame)
 
     def take_commands(self) -> tuple[Command, ...]:
@@ -114,9 +129,12 @@ class Inbox:
         self._targets.clear()
         return taken
 
-    def take_safe_set(self) -> SafeSet | None:
-        """Hand over the safe set if a new one is complete."""
-        taken, self._safe_set = self._safe_set, None
+    def take_announced(self) -> tuple[SafeSetAnnouncement, ...]:
+        """Hand over the safe sets that are complete, in order of arrival."""
+        if not self._announced:
+            return ()
+        taken = tuple(self._announced)
+        self._announced.clear()
         return taken
 
     def take_setpoints(self) -> Setpoints:
@@ -143,7 +161,7 @@ class Inbox:
             plan,
             self.take_commands(),
             self.take_targets(),
-            self.take_safe_set(),
+            self.take_announced(),
             setpoints.motion,
             setpoints.attitude,
             setpoints.joints,
@@ -213,18 +231,32 @@ class Inbox:
         if indexed is None:
             self.refused += 1
             return
-        if indexed.count != self._obstacle_count:
+        incomplete = self._incomplete.pop(self._source, None)
+        if incomplete is None or indexed.count != incomplete.count:
             # Another count announces another set; those of two sets must not mix.
-            self._obstacles.clear()
-            self._obstacle_count = indexed.count
-        self._obstacles[indexed.index] = indexed.obstacle
-        if len(self._obstacles) == indexed.count:
-            whole = [self._obstacles[i] for i in range(indexed.count)]
-            self._safe_set = SafeSet(
+            incomplete = _Incomplete(indexed.count, {})
+        shapes = incomplete.shapes
+        shapes[indexed.index] = indexed.obstacle
+        if len(shapes) < indexed.count:
+            self._incomplete[self._source] = incomplete
+            if len(self._incomplete) > _MAX_ANNOUNCERS:
+                del self._incomplete[next(iter(self._incomplete))]
+            return
+        whole = [shapes[i] for i in range(indexed.count)]
+        self._announce(
+            SafeSet(
                 walls=tuple(one for one in whole if isinstance(one, Wall)),
                 obstacles=tuple(one for one in whole if isinstance(one, PointObstacle)),
             )
-            self._obstacles.clear()
+        )
+
+    def _announce(self, safe_set: SafeSet) -> None:
+        """Keep the newest safe set of a source."""
+        kept = [one for one in self._announced if one.source != self._source]
+        if len(kept) >= _MAX_ANNOUNCEMENTS:
+            self.refused += 1
+            return
+        self._announced = [*kept, SafeSetAnnouncement(self._source, safe_set)]
 
     def _sphere(self, frame: Frame) -> None:
         values = cast(Numbers, frame.payload_values)
@@ -234,4 +266,4 @@ class Inbox:
         if sphere is None:
             self.refused += 1
             return
-        self._safe_set = SafeSet(sphere=sphere)
+        self._announce(SafeSet(sphere=sphere))

@@ -48,6 +48,8 @@ class FlightLimits:
     battery_critical: float = 0.1
     battery_emergency: float = 0.05
     low_battery_action: int = 0  # 0 warn; 2 land when critical; 3 return then, land in emergency
+    safe_set_owner: int = 0  # MAVLink system that owns the safe set; 0: the first to announce one
+    owner_timeout_us: int = 10_000_000  # a silent owner may be replaced on the ground
 
 
 @dataclass(frozen=True, slots=True)

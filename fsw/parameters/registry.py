@@ -265,6 +265,13 @@ _ROWS: Final[dict[str, list[_Row]]] = {
         ("COM_LOW_BAT_ACT", "limits.low_battery_action", "", 0.0, 3.0,
          "Low battery action"),
     ],
+    "Safe set": [
+        ("SAFE_OWNER", "limits.safe_set_owner", "", 0.0, 255.0,
+         "MAVLink system that owns the safe set and may grow it in flight; 0: the first one"),
+        ("SAFE_OWNER_T", "limits.owner_timeout_us", "s", 2.0, 300.0,
+         "Silence after which another source may own the safe set, on the ground",
+         _IN_MICROSECONDS),
+    ],
     "Log": [
         ("LOG_PROFILE", "log_profile", "", 0.0, 1.0,
          "Contents of flight.ulg; takes effect at the next start"),

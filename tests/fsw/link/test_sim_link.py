@@ -11,7 +11,7 @@ import pytest
 from fsw.link.inbox import Inbox
 from fsw.link.sim_link import Pacing, SimLink
 from fsw.link.wire import message_ids as ids
-from fsw.signals import CommandAck, Mode
+from fsw.signals import CommandAck, MessageSource, Mode
 from messages.frames import FrameWriter, split
 from sitl.link.encode import StepEncoder
 from sitl.link.pilot import flight_plan
@@ -97,8 +97,9 @@ def test_walls_and_points_arrive_as_the_pilot_announces_them(wire: Wire) -> None
     encoder = StepEncoder(lockstep=True)
     wire.send(encoder.datagram(readings(1_002_000), plan.announcements))
     assert wire.link.wait_for_step() is not None
-    safe_set = wire.inbox.take_safe_set()
-    assert safe_set is not None
+    (announced,) = wire.inbox.take_announced()
+    safe_set = announced.safe_set
+    assert announced.source == MessageSource(1, 195, "simulator")
     assert [wall.offset for wall in safe_set.walls] == [-1.0]
     for heard, reported in zip(safe_set.obstacles, scenario.obstacles, strict=True):
         assert heard.position == pytest.approx(reported.position_m)
