@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from dataclasses import field
 from enum import Enum, IntEnum
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from fsw.frozen import dataclass
 from fsw.tuning import Tuning
@@ -164,51 +164,42 @@ class Orbit:
     facing: Facing = Facing.CENTRE
 
 
-@dataclass(frozen=True, slots=True)
-class Wall:
-    """A plane ``normal . p = offset``; free space is where ``normal . p > offset``."""
+class Shape(NamedTuple):
+    """Geometry only; the kinds and what their numbers mean are in ``fsw/shapes``, a file each."""
 
-    normal: Vec3  # unit, world
-    offset: float  # m
-    clearance: float  # m, s_min of eq 14
+    kind: str  # a name in fsw.shapes.BY_NAME
+    numbers: tuple[float, ...]  # m, NED
 
 
-@dataclass(frozen=True, slots=True)
-class PointObstacle:
-    """A known point, the tip of a branch say, and the distance to keep from it (eq 11)."""
-
-    position: Vec3  # m, world
-    clearance: float  # m, d_s
-    upright: bool = False  # an upright cylinder of that radius: the height does not count
+TARGET_SPHERE: Final = "target sphere"  # the shape that follows the end-effector's target
 
 
 @dataclass(frozen=True, slots=True)
-class WorkspaceSphere:
-    """Sphere that follows the end-effector target and must contain the body origin (eq 15)."""
+class Zone:
+    """A shape to keep out of, or inside of, that may move."""
 
-    centre_from_target: Vec3  # m, world; (0, 0, -d_iw) for a sphere straight above
-    radius: float  # m
+    shape: Shape
+    clearance: float  # m, kept from its surface: s_min of eq 14, d_s of eq 11
+    keep_in: bool = False
+    velocity: Vec3 = (0.0, 0.0, 0.0)  # m/s, NED
+    t_us: int = 0  # when the shape was where its numbers say
 
 
 @dataclass(frozen=True, slots=True)
 class SafeSet:
-    """Where the vehicle may be.
+    """Where the vehicle may be: out of some zones (Case I) and inside of others (Case II)."""
 
-    Off known walls (Case I) and points, or in a workspace sphere (Case II), or anywhere.
-    """
-
-    walls: tuple[Wall, ...] = ()
-    sphere: WorkspaceSphere | None = None
-    obstacles: tuple[PointObstacle, ...] = ()
+    zones: tuple[Zone, ...] = ()
 
     @property
     def kind(self) -> ConstraintKind:
-        """The sphere rules where both are given: it is the tighter set."""
-        if self.sphere is not None:
+        """The family that telemetry names."""
+        kinds = {zone.shape.kind for zone in self.zones}
+        if TARGET_SPHERE in kinds:
             return ConstraintKind.WORKSPACE
-        if self.obstacles:
+        if kinds - {"half-space"}:
             return ConstraintKind.OBSTACLES
-        return ConstraintKind.WALLS if self.walls else ConstraintKind.NONE
+        return ConstraintKind.WALLS if kinds else ConstraintKind.NONE
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,6 +23,7 @@ from fsw.flight.modes.offboard import is_fresh
 from fsw.flight.plan_exchange import nominal_at_rest
 from fsw.flight.setpoint_generator import PositionGoal, SetpointGenerator
 from fsw.flight.state import FlightState, PlanMemory, SetpointMemory
+from fsw.model.body import body_of
 from fsw.model.kinematics import point_in_flight
 from fsw.mpc.reference import still_at
 from fsw.parameters.flight_config import FlightConfig
@@ -46,6 +47,7 @@ class Commander:
 
     def __init__(self, config: FlightConfig) -> None:
         self._config = config
+        self._body = body_of(config.planner.body, config.airframe)
         self._generator = SetpointGenerator(config)
         self._modes: dict[Mode, FlightMode] = {mode: kind(config) for mode, kind in MODES.items()}
         self._manual_modes = frozenset(mode for mode, kind in MODES.items() if kind.manual)
@@ -99,6 +101,8 @@ class Commander:
             joints=asked or estimate.q_arm,
             home=vehicle.home,
             safe_set=state.mission.safe_set,
+            body=self._body,
+            now_us=estimate.t_us,
             climb_range=(limits.airborne_height, limits.takeoff_climb_most),
             airframe=self._config.airframe,
             charge=state.battery.charge,

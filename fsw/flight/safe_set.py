@@ -10,14 +10,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from fsw.barriers.margins import constraint_report
-from fsw.flight.safe_set_change import growth, summary
+from fsw.barriers.margins import Margins
+from fsw.flight.safe_set_change import growth, is_update, summary
 from fsw.flight.state import MissionMemory
-from fsw.model.kinematics import point_in_flight
+from fsw.model.body import body_of
 from fsw.parameters.consistency import Finding, analyse, loop_tube, refusals, warnings
 from fsw.parameters.flight_config import FlightConfig
 from fsw.signals import (
-    ConstraintKind,
     ConstraintReport,
     EndEffectorTarget,
     MessageSource,
@@ -39,6 +38,10 @@ class SafeSetCheck:
     def __init__(self, config: FlightConfig) -> None:
         self._config = config
         self._loop_tube = loop_tube(config)
+        planner, airframe = config.planner, config.airframe
+        body = body_of(planner.body, airframe)
+        links = airframe.link_length
+        self._margins = Margins(body, links, planner.tunings, planner.period)
 
     def analyse(self, safe_set: SafeSet) -> tuple[Finding, ...]:
         """Findings on whether this configuration can keep a safe set."""
@@ -180,7 +183,7 @@ class SafeSetCheck:
         against: tuple[str, ...] = wanted.refusals
         if safe_set != mission.safe_set:
             findings = self.analyse(safe_set)
-            against = (*contradictions(safe_set), *refusals(findings))
+            against = refusals(findings)
             texts += [StatusText(Severity.WARNING, text) for text in against]
             texts += [StatusText(Severity.INFO, text) for text in warnings(findings)]
             if against and not self._config.soft and flies:
@@ -189,22 +192,15 @@ class SafeSetCheck:
                 return mission
             if self._config.soft:
                 against = ()
-        texts.append(StatusText(Severity.INFO, change))
+        if not is_update(mission.safe_set, safe_set) or wanted.owner != mission.owner:
+            texts.append(StatusText(Severity.INFO, change))
         return replace(wanted, safe_set=safe_set, refused=None, refusals=against)
 
     def margins(
         self, safe_set: SafeSet, estimate: StateEstimate, target: EndEffectorTarget | None
     ) -> ConstraintReport:
         """Margins and barrier values of the vehicle in the safe set."""
-        length, planner = self._config.airframe.link_length, self._config.planner
-        points = (
-            (estimate.p_WB, estimate.v_WB),
-            point_in_flight(estimate, (length[0], 0.0)),
-            point_in_flight(estimate, length),
-        )
-        in_sphere = safe_set.kind is ConstraintKind.WORKSPACE
-        barrier = planner.workspace if in_sphere else planner.walls
-        return constraint_report(safe_set, barrier, points, target)
+        return self._margins.report(safe_set, estimate, target)
 
 
 def may_grow_fence(owner: MessageSource | None, source: MessageSource | None, chosen: int) -> bool:
@@ -219,16 +215,4 @@ def may_grow_fence(owner: MessageSource | None, source: MessageSource | None, ch
 
 def joined(announced: SafeSet, fence: SafeSet) -> SafeSet:
     """Both safe sets at once."""
-    return SafeSet(
-        announced.walls + fence.walls,
-        announced.sphere or fence.sphere,
-        announced.obstacles + fence.obstacles,
-    )
-
-
-def contradictions(safe_set: SafeSet) -> tuple[str, ...]:
-    """Why a safe set cannot be kept at all: the planner knows walls and obstacles, or a sphere."""
-    if safe_set.sphere is None or not (safe_set.walls or safe_set.obstacles):
-        return ()
-    what = "walls" if safe_set.walls else "obstacles"
-    return (f"{what} and a workspace sphere cannot be kept at once",)
+    return SafeSet(announced.zones + fence.zones)

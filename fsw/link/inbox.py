@@ -22,12 +22,11 @@ from fsw.signals import (
     Origin,
     Plan,
     PlanFailure,
-    PointObstacle,
     SafeSet,
     SafeSetAnnouncement,
     SensorFrame,
     TickInputs,
-    Wall,
+    Zone,
 )
 from fsw.tuning import Tuning
 from messages.frames import Frame
@@ -57,10 +56,10 @@ NO_SETPOINTS: Final = Setpoints()
 
 @dataclass(slots=True)
 class _Incomplete:
-    """The walls and points that one source has announced so far, of a set of ``count``."""
+    """The zones that one source has announced so far, of a set of ``count``."""
 
     count: int
-    shapes: dict[int, Wall | PointObstacle]
+    zones: dict[int, Zone]
 
 
 class Inbox:
@@ -235,20 +234,14 @@ class Inbox:
         if incomplete is None or indexed.count != incomplete.count:
             # Another count announces another set; those of two sets must not mix.
             incomplete = _Incomplete(indexed.count, {})
-        shapes = incomplete.shapes
-        shapes[indexed.index] = indexed.obstacle
-        if len(shapes) < indexed.count:
+        zones = incomplete.zones
+        zones[indexed.index] = indexed.zone
+        if len(zones) < indexed.count:
             self._incomplete[self._source] = incomplete
             if len(self._incomplete) > _MAX_ANNOUNCERS:
                 del self._incomplete[next(iter(self._incomplete))]
             return
-        whole = [shapes[i] for i in range(indexed.count)]
-        self._announce(
-            SafeSet(
-                walls=tuple(one for one in whole if isinstance(one, Wall)),
-                obstacles=tuple(one for one in whole if isinstance(one, PointObstacle)),
-            )
-        )
+        self._announce(SafeSet(tuple(zones[i] for i in range(indexed.count))))
 
     def _announce(self, safe_set: SafeSet) -> None:
         """Keep the newest safe set of a source."""
@@ -266,4 +259,4 @@ class Inbox:
         if sphere is None:
             self.refused += 1
             return
-        self._announce(SafeSet(sphere=sphere))
+        self._announce(SafeSet((sphere,)))

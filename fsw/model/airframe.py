@@ -22,6 +22,19 @@ class AttitudeLag:
 
 
 @dataclass(frozen=True, slots=True)
+class BodySize:
+    """How far the vehicle reaches beyond its joints and its rotors' hubs."""
+
+    hull: float = 0.08  # m, radius of the sphere that holds frame and battery
+    blade: float = 0.165  # m, radius of a rotor
+    disc: float = 0.02  # m, half the thickness of the space that the blades sweep
+    feet_spread: float = 0.2  # m, feet at (+-spread, +-spread)
+    leg: float = 0.01  # m, radius
+    link: float = 0.02  # m, radius
+    tool: float = 0.025  # m, radius about the end-effector
+
+
+@dataclass(frozen=True, slots=True)
 class Airframe:
     """'+' quadrotor with a planar two-joint arm whose first joint is at the body origin.
 
@@ -44,6 +57,7 @@ class Airframe:
     joint1_limit: float = math.pi / 3.0  # rad, |th1|
     joint12_limit: float = math.pi / 2.0  # rad, |th1 + th2|
     leg_length: float = 0.32  # m, body origin above ground when standing
+    size: BodySize = field(default_factory=BodySize)
 
 
 AIRFRAME = Airframe()

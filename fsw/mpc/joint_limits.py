@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fsw.barriers.constraint_block import surface_rows
+from fsw.barriers.constraint_block import block
 from fsw.model.linearisation import Linearisation
 from fsw.model.prediction import Q_ARM, CondensedModel
 
@@ -16,7 +16,7 @@ class JointLimits:
 
     def __init__(self, model: CondensedModel) -> None:
         airframe = model.airframe
-        self.rows = surface_rows(1, len(_LIMITED), 1, model.horizon)
+        self.rows = block((len(_LIMITED),), 1, model.horizon)
         limits = np.array([airframe.joint1_limit] * 2 + [airframe.joint12_limit] * 2)
         self.rows.lower_bound[:] = np.tile(-limits, model.horizon)
         angles = model.gamma[1:, Q_ARM : Q_ARM + 2]  # (n, 2, 6 n)

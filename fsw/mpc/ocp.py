@@ -34,6 +34,11 @@ class Ocp:
         self.cost = 0.0
         self._solver = DualSolver(self.qp)
 
+    def update(self, safe_set: SafeSet) -> None:
+        """Take other numbers of a safe set of the same layout, whose zones moved."""
+        for barrier in self._barriers:
+            barrier.update(safe_set)
+
     def linearise(self, start: Array, guess: Array, targets: TargetPoints) -> None:
         """Refill the program around ``guess`` (6 n,) [SI inputs] from ``start`` (19,) [SI]."""
         program = self.qp

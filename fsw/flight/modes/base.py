@@ -12,6 +12,7 @@ from typing import ClassVar
 from fsw.flight.setpoint_generator import PositionGoal, SetpointGenerator
 from fsw.flight.state import FlightState, SetpointMemory
 from fsw.model.airframe import AIRFRAME, Airframe
+from fsw.model.body import Body, body_of
 from fsw.mpc.reference import still_at
 from fsw.parameters.flight_config import FlightConfig
 from fsw.signals import (
@@ -57,6 +58,8 @@ class CommandContext:
     joints: Vec2 = (0.0, 0.0)  # rad, asked for last or as they are
     home: Home | None = None
     safe_set: SafeSet = field(default_factory=SafeSet)
+    body: Body = field(default_factory=lambda: body_of("points", AIRFRAME))
+    now_us: int = 0
     climb_range: Vec2 = (0.3, 50.0)  # m, of a takeoff
     airframe: Airframe = AIRFRAME
     charge: Charge = Charge.OK

@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import Final
 
-from fsw.barriers.tangent import planes
 from fsw.flight.safe_set import may_grow_fence
 from fsw.flight.safe_set_change import growth
 from fsw.link.wire.fence_items import check_fence_item, read_fence
@@ -26,6 +25,7 @@ from fsw.link.wire.mission_items import (
     read_step,
 )
 from fsw.link.wire.telemetry_context import PlanIds
+from fsw.shapes.zones import surfaces
 from fsw.signals import (
     FlightSnapshot,
     MessageSource,
@@ -165,15 +165,14 @@ class MissionStore:
         if against:
             raise BadItem(DENIED, f"the fence cannot be kept: {'; '.join(against)}")
         if self._snapshot is not None:
-            x, y, z = p = self._snapshot.estimate.p_WB
-            for number, wall in enumerate(planes(fence, p)):
-                n = wall.normal
-                inside = n[0] * x + n[1] * y + n[2] * z - wall.offset - wall.clearance
-                if not inside > 0.0:
-                    where = "not inside the fence" if number < len(fence.walls) else "excluded"
+            estimate = self._snapshot.estimate
+            for number, at in enumerate(surfaces(fence, estimate.p_WB, estimate.t_us)):
+                if not at.distance > 0.0:
+                    wall = fence.zones[number].shape.kind == "half-space"
+                    where = "not inside the fence" if wall else "excluded"
                     raise BadItem(
                         DENIED,
-                        f"the vehicle is {where}: {-inside:.2f} m beyond the clearance of "
+                        f"the vehicle is {where}: {-at.distance:.2f} m beyond the clearance of "
                         f"wall or cylinder {number}",
                     )
         return fence

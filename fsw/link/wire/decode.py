@@ -12,14 +12,16 @@ from dataclasses import dataclass
 from typing import Final, cast
 
 from fsw.link.wire.message_ids import SYSTEM_ID
+from fsw.shapes import kind_of
+from fsw.shapes.ball import point
+from fsw.shapes.half_space import wall
+from fsw.shapes.target_sphere import target_sphere
 from fsw.signals import (
     CommandRequest,
     EndEffectorTarget,
-    PointObstacle,
     SensorFrame,
     Vec3,
-    Wall,
-    WorkspaceSphere,
+    Zone,
 )
 from messages.frames import Frame
 
@@ -38,9 +40,9 @@ _ZERO: Final[Vec3] = (0.0, 0.0, 0.0)
 
 @dataclass(frozen=True, slots=True)
 class IndexedObstacle:
-    """One wall or obstacle of a set of ``count``."""
+    """One zone of a set of ``count``."""
 
-    obstacle: Wall | PointObstacle
+    zone: Zone
     index: int
     count: int
 
@@ -144,11 +146,10 @@ def obstacle_wall(values: Numbers) -> IndexedObstacle | None:
     index, count = int(values[7]), int(values[8])
     if not _all_finite(numbers) or not index < count:
         return None
-    # f32 rounding leaves a unit normal within 1e-6; anything further off is another vector.
-    if not abs(math.hypot(*values[0:3]) - 1.0) < 1e-3 or not values[4] >= 0.0:
+    zone = wall(cast(Vec3, values[0:3]), values[3], values[4])
+    if kind_of(zone.shape).check(zone.shape) is not None or not values[4] >= 0.0:
         return None
-    wall = Wall(normal=cast(Vec3, values[0:3]), offset=values[3], clearance=values[4])
-    return IndexedObstacle(wall, index, count)
+    return IndexedObstacle(zone, index, count)
 
 
 def obstacle_point(values: Numbers) -> IndexedObstacle | None:
@@ -156,14 +157,14 @@ def obstacle_point(values: Numbers) -> IndexedObstacle | None:
     index, count = int(values[6]), int(values[7])
     if not _all_finite(values[0:4]) or not index < count or not values[3] > 0.0:
         return None
-    return IndexedObstacle(PointObstacle(cast(Vec3, values[0:3]), values[3]), index, count)
+    return IndexedObstacle(point(cast(Vec3, values[0:3]), values[3]), index, count)
 
 
-def workspace_sphere(values: Numbers) -> WorkspaceSphere | None:
+def workspace_sphere(values: Numbers) -> Zone | None:
     """Read a WORKSPACE_SPHERE; None if it contains nothing."""
     if not _all_finite(values[0:4]) or not values[3] > 0.0:
         return None
-    return WorkspaceSphere(centre_from_target=cast(Vec3, values[0:3]), radius=values[3])
+    return target_sphere(cast(Vec3, values[0:3]), values[3])
 
 
 def _all_finite(numbers: Numbers) -> bool:

@@ -6,35 +6,37 @@ from dataclasses import replace
 
 import pytest
 
-from fsw.flight.safe_set import SafeSetCheck, contradictions, joined
+from fsw.flight.safe_set import SafeSetCheck, joined
 from fsw.flight.state import MissionMemory
 from fsw.model.kinematics import point_in_flight
 from fsw.parameters.consistency import loop_tube
+from fsw.shapes.ball import point
+from fsw.shapes.half_space import wall
+from fsw.shapes.target_sphere import target_sphere
+from fsw.shapes.vertical_cylinder import vertical_cylinder
 from fsw.signals import (
     ConstraintKind,
     EndEffectorTarget,
     MessageSource,
     MissionUpdate,
-    PointObstacle,
     SafeSet,
     SafeSetAnnouncement,
     Severity,
     StatusText,
     TickInputs,
     Vec3,
-    Wall,
-    WorkspaceSphere,
+    Zone,
 )
 from tests.fsw.flight.in_flight import CONFIG, limits, vehicle_at
 from tests.fsw.flight.test_autopilot import frame
 
 CHECK = SafeSetCheck(CONFIG)
-NORTH, SOUTH = Wall((-1.0, 0.0, 0.0), -5.0, 0.1), Wall((1.0, 0.0, 0.0), -5.0, 0.1)
-TREE = PointObstacle((2.0, 2.0, -1.0), 0.3)
-SPHERE = WorkspaceSphere((0.0, 0.0, -0.225), 0.075)
+NORTH, SOUTH = wall((-1.0, 0.0, 0.0), -5.0, 0.1), wall((1.0, 0.0, 0.0), -5.0, 0.1)
+TREE = point((2.0, 2.0, -1.0), 0.3)
+SPHERE = target_sphere((0.0, 0.0, -0.225), 0.075)
 OWNER = MessageSource(1, 195, "simulator")
 STRANGER = MessageSource(1, 195, "api", "127.0.0.1:40001")  # who writes the owner's ids
-TINY = SafeSet(sphere=WorkspaceSphere((0.0, 0.0, -0.225), 0.001))
+TINY = SafeSet((target_sphere((0.0, 0.0, -0.225), 0.001),))
 
 
 def received(
@@ -67,43 +69,26 @@ def told(texts: list[StatusText]) -> list[str]:
 def walled(*offsets: float, clearance: float = 0.1) -> SafeSet:
     """A wall north and one south, at these distances."""
     normals = ((-1.0, 0.0, 0.0), (1.0, 0.0, 0.0))
-    return SafeSet(tuple(Wall(n, -d, clearance) for n, d in zip(normals, offsets, strict=True)))
+    return SafeSet(tuple(wall(n, -d, clearance) for n, d in zip(normals, offsets, strict=True)))
 
 
 def test_what_is_announced_and_the_fence_are_in_force_together() -> None:
     memory, _ = received(MissionMemory(), SafeSet((NORTH,)))
     assert memory.safe_set == memory.announced == SafeSet((NORTH,))
-    memory, _ = received(memory, fence=SafeSet((SOUTH,), obstacles=(TREE,)))
-    assert memory.safe_set == SafeSet((NORTH, SOUTH), obstacles=(TREE,))
+    memory, _ = received(memory, fence=SafeSet((SOUTH, TREE)))
+    assert memory.safe_set == SafeSet((NORTH, SOUTH, TREE))
     assert memory.announced == SafeSet((NORTH,))
     memory, _ = received(memory, SafeSet())
-    assert memory.safe_set == SafeSet((SOUTH,), obstacles=(TREE,))
+    assert memory.safe_set == SafeSet((SOUTH, TREE))
     memory, texts = received(memory, rally=((1.0, 2.0),))
     assert texts == []
     assert memory.rally == ((1.0, 2.0),)
-    assert memory.safe_set == SafeSet((SOUTH,), obstacles=(TREE,))
+    assert memory.safe_set == SafeSet((SOUTH, TREE))
 
 
-def test_joined_keeps_everything_of_both_and_one_sphere() -> None:
-    other = WorkspaceSphere((0.0, 0.0, -0.3), 0.1)
-    both = joined(SafeSet((NORTH,), SPHERE, (TREE,)), SafeSet((SOUTH,), other, (TREE, TREE)))
-    assert both == SafeSet((NORTH, SOUTH), SPHERE, (TREE, TREE, TREE))
-    assert joined(SafeSet(), SafeSet(sphere=other)).sphere == other
-
-
-@pytest.mark.parametrize(
-    ("safe_set", "words"),
-    [
-        (SafeSet((NORTH,), SPHERE), "walls"),
-        (SafeSet(sphere=SPHERE, obstacles=(TREE,)), "obstacles"),
-        (SafeSet((NORTH,), SPHERE, (TREE,)), "walls"),
-    ],
-)
-def test_a_sphere_cannot_be_kept_beside_anything_else(safe_set: SafeSet, words: str) -> None:
-    (text,) = contradictions(safe_set)
-    assert text.startswith(words)
-    for fine in (SafeSet(), SafeSet(sphere=SPHERE), SafeSet((NORTH,), obstacles=(TREE,))):
-        assert contradictions(fine) == ()
+def test_joined_keeps_everything_of_both() -> None:
+    both = joined(SafeSet((NORTH, SPHERE, TREE)), SafeSet((SOUTH, TREE)))
+    assert both == SafeSet((NORTH, SPHERE, TREE, SOUTH, TREE))
 
 
 def test_in_flight_one_that_cannot_be_kept_is_refused_once_and_the_old_one_kept() -> None:
@@ -149,29 +134,29 @@ def test_margins_are_of_base_elbow_and_end_effector() -> None:
     assert elbow != tip
     places = (estimate.p_WB, elbow, tip)
     assert report.margins == pytest.approx([5.0 - p[0] - 0.1 for p in places])
-    ball = CHECK.margins(SafeSet(sphere=SPHERE), estimate, target)
+    ball = CHECK.margins(SafeSet((SPHERE,)), estimate, target)
     assert ball.kind is ConstraintKind.WORKSPACE
     assert ball.margins == pytest.approx((0.075,))
 
 
 def test_a_stranger_in_flight_may_shrink_what_is_announced_and_is_named() -> None:
     memory, texts = received(MissionMemory(), walled(5.0, 5.0))
-    assert told(texts) == ["safe set of 1/195 (simulator): 2 walls; it owns the safe set now"]
+    assert told(texts) == ["safe set of 1/195 (simulator): 2 half-spaces; it owns the safe set now"]
     memory, texts = received(memory, walled(4.0, 5.0), source=STRANGER)
     assert memory.safe_set == memory.announced == walled(4.0, 5.0)
     assert memory.owner == OWNER
-    assert told(texts) == ["safe set of 1/195 (api 127.0.0.1:40001): 2 walls"]
+    assert told(texts) == ["safe set of 1/195 (api 127.0.0.1:40001): 2 half-spaces"]
 
 
 @pytest.mark.parametrize("flies", [True, False])
 @pytest.mark.parametrize(
     ("wanted", "why"),
     [
-        (walled(5.0286, 5.0), "wall 0 moves out by 28.6 mm"),
-        (walled(4.0, 5.001), "wall 1 moves out by 1.0 mm"),
-        (walled(5.0, 5.0, clearance=0.09), "wall 0 moves out by 10.0 mm"),
-        (SafeSet((NORTH,)), "wall 1 is removed or turned"),
-        (SafeSet(), "wall 0 is removed or turned"),
+        (walled(5.0286, 5.0), "zone 1 (half-space) moves out by 28.6 mm"),
+        (walled(4.0, 5.001), "zone 2 (half-space) moves out by 1.0 mm"),
+        (walled(5.0, 5.0, clearance=0.09), "zone 1 (half-space) loses 10.0 mm of clearance"),
+        (SafeSet((NORTH,)), "zone 2 (half-space) is removed, moved or turned"),
+        (SafeSet(), "zone 1 (half-space) is removed, moved or turned"),
     ],
 )
 def test_a_stranger_may_not_grow_it_and_is_told_so_once(
@@ -191,10 +176,28 @@ def test_the_owner_grows_it_in_flight_and_repeats_it_without_a_word() -> None:
     memory, _ = received(MissionMemory(), walled(5.0, 5.0))
     memory, texts = received(memory, walled(9.0, 5.0))
     assert memory.safe_set == walled(9.0, 5.0)
-    assert told(texts) == ["safe set of 1/195 (simulator): 2 walls"]
+    assert told(texts) == ["safe set of 1/195 (simulator): 2 half-spaces"]
     again, texts = received(memory, walled(9.0, 5.0), t_s=2.0)
     assert (again.safe_set, texts) == (memory.safe_set, [])
     assert again.owner_heard_us == 2_000_000
+
+
+def test_a_zone_that_moves_is_told_of_once_however_often_it_is_updated() -> None:
+    def person(north: float, t_us: int, clearance: float = 0.3) -> SafeSet:
+        at = vertical_cylinder((north, 3.0), 0.25, -1.8, 0.0)
+        return SafeSet((NORTH, Zone(at, clearance, velocity=(0.5, 0.0, 0.0), t_us=t_us)))
+
+    memory, texts = received(MissionMemory(), person(0.0, 1_000_000))
+    assert "vertical cylinder" in told(texts)[-1]
+    for k in range(2, 5):
+        memory, texts = received(memory, person(0.4 * k, k * 1_000_000), t_s=k)
+        assert memory.safe_set == person(0.4 * k, k * 1_000_000)
+        assert [text for text in texts if "safe set" in text.text] == []
+    memory, texts = received(memory, person(2.0, 5_000_000, clearance=0.2), t_s=5.0)
+    assert len(told(texts)) == 1
+    after, texts = received(memory, person(2.0, 6_000_000, clearance=0.2), source=STRANGER)
+    assert after.safe_set == memory.safe_set
+    assert "zone 2 (vertical cylinder)" in refused(texts)
 
 
 def test_a_repetition_of_the_owner_does_not_take_back_what_another_source_shrank() -> None:

@@ -14,7 +14,7 @@ from fsw.link.inbox import Inbox
 from fsw.link.sim_link import SimLink
 from fsw.link.wire import message_ids as ids
 from fsw.parameters.flight_config import flight_config
-from fsw.signals import MessageSource, SensorFrame, Severity, TickOutputs, Wall
+from fsw.signals import MessageSource, SensorFrame, Severity, TickOutputs
 from messages.frames import FrameWriter
 from sitl.link.encode import StepEncoder
 from sitl.link.pilot_messages import Announce
@@ -80,7 +80,7 @@ class Vehicle:
 
     @property
     def walls(self) -> list[float]:
-        return [wall.offset for wall in self.state.mission.safe_set.walls]
+        return [zone.shape.numbers[3] for zone in self.state.mission.safe_set.zones]
 
     def texts(self) -> list[tuple[int, str]]:
         """Severity and text of all that the station heard about safe sets."""
@@ -126,7 +126,7 @@ def test_a_stranger_cannot_move_a_wall_outwards(vehicle: Vehicle, ids_of: tuple[
     port = stranger.getsockname()[1]
     assert told[0] == Severity.CRITICAL
     assert f"safe set of {ids_of[0]}/{ids_of[1]} (test 127.0.0.1:{port}) refused" in told[1]
-    assert "wall 0 moves out by 28.6 mm" in told[1]
+    assert "zone 1 (half-space) moves out by 28.6 mm" in told[1]
     assert "1/195 (simulator) owns" in told[1]
     stranger.close()
 
@@ -137,7 +137,7 @@ def test_the_owner_moves_it_and_every_station_is_told_once(vehicle: Vehicle) -> 
     for _ in range(3):
         vehicle.announce(FALSE_WALL)
     assert vehicle.walls == pytest.approx([FALSE_WALL])
-    assert [text for _, text in vehicle.texts()] == ["safe set of 1/195 (simulator): 1 wall"]
+    assert [text for _, text in vehicle.texts()] == ["safe set of 1/195 (simulator): 1 half-space"]
 
 
 def test_a_stranger_may_move_it_inwards_and_the_owner_s_repetition_leaves_it(
@@ -165,10 +165,10 @@ def test_the_walls_of_two_sources_do_not_make_one_set(vehicle: Vehicle) -> None:
     assert vehicle.inbox.take_announced() == ()
     ground.polled(wall_frame(writer, -3.0, index=1, count=2), one)
     (announced,) = vehicle.inbox.take_announced()
-    assert announced.safe_set.walls == (
-        Wall((-1.0, 0.0, 0.0), -1.0, pytest.approx(CLEARANCE)),  # type: ignore[arg-type]
-        Wall((-1.0, 0.0, 0.0), -3.0, pytest.approx(CLEARANCE)),  # type: ignore[arg-type]
-    )
+    assert [zone.shape.numbers for zone in announced.safe_set.zones] == [
+        (-1.0, 0.0, 0.0, -1.0),
+        (-1.0, 0.0, 0.0, -3.0),
+    ]
     port = one.getsockname()[1]
     assert announced.source == MessageSource(255, 190, "test", f"127.0.0.1:{port}")
     one.close()
