@@ -614,6 +614,15 @@ class PlannerCounters:
 
 
 @dataclass(frozen=True, slots=True)
+class SafetyCounters:
+    """What should not happen, since start, in episodes."""
+
+    departures: int = 0  # from the tube around the plan
+    breaches: int = 0  # of the safe set
+    interventions: int = 0  # of the safety filter
+
+
+@dataclass(frozen=True, slots=True)
 class ConstraintReport:
     """Margins of the active safe set, from the vehicle's own estimate."""
 
@@ -683,6 +692,7 @@ class FlightSnapshot:
     failsafe_from: Mode | None = None  # what was flown when a failsafe took over; None: none did
     orbit: Orbit | None = None  # that is being flown
     accel_B: Vec3 = (0.0, 0.0, -9.81)  # m/s^2, specific force as measured
+    safety: SafetyCounters = SafetyCounters()
 
 
 @dataclass(frozen=True, slots=True)

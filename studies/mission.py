@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import fsw.signals as fsw_signals
+from fsw.shapes.ball import point
+from fsw.shapes.half_space import wall
+from fsw.shapes.target_sphere import target_sphere
 from fsw.signals import (
     EndEffectorTarget,
     MessageSource,
-    PointObstacle,
     SafeSet,
     SafeSetAnnouncement,
-    WorkspaceSphere,
 )
 from sitl.mission_clock import MissionClock
 from sitl.scenario import Scenario
@@ -20,14 +20,12 @@ SIMULATOR = MessageSource(1, 195, "simulator")
 
 def safe_set(scenario: Scenario) -> SafeSet:
     """The safe set of a scenario in the flight software's terms."""
-    walls = tuple(
-        fsw_signals.Wall(wall.normal, wall.offset_m, wall.clearance_m) for wall in scenario.walls
-    )
-    obstacles = tuple(PointObstacle(one.position_m, one.clearance_m) for one in scenario.obstacles)
+    zones = [wall(one.normal, one.offset_m, one.clearance_m) for one in scenario.walls]
+    zones += [point(one.position_m, one.clearance_m) for one in scenario.obstacles]
     workspace = scenario.workspace
-    if workspace is None:
-        return SafeSet(walls, obstacles=obstacles)
-    return SafeSet(walls, WorkspaceSphere((0.0, 0.0, -workspace.d_iw_m), workspace.radius_m))
+    if workspace is not None:
+        zones.append(target_sphere((0.0, 0.0, -workspace.d_iw_m), workspace.radius_m))
+    return SafeSet(tuple(zones))
 
 
 def announced(scenario: Scenario) -> tuple[SafeSetAnnouncement, ...]:

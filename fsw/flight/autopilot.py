@@ -19,6 +19,7 @@ from fsw.flight.modes.offboard import accept_setpoints, report
 from fsw.flight.plan_exchange import PlanExchange, measured_state, nominal_at_rest, requested
 from fsw.flight.reference_horizon import ReferenceHorizon
 from fsw.flight.safe_set import SafeSetCheck
+from fsw.flight.safety_watch import SafetyWatch
 from fsw.flight.state import FlightState, PlanMemory
 from fsw.model.battery import drained
 from fsw.model.nominal import REST_INPUT
@@ -70,6 +71,7 @@ class Autopilot:
         self._commander = Commander(config)
         self._horizon = ReferenceHorizon(config)
         self._plans = PlanExchange(config)
+        self._watch = SafetyWatch(config, self._safe_sets.loop_tube)
         self._cascade = Cascade(config.airframe, config.tuning, config.inner, tick)
         self._ticks_per_plan = config.mpc_period_us // config.tick_period_us
 
@@ -103,13 +105,19 @@ class Autopilot:
         index, per_plan = state.index + ticks, self._ticks_per_plan
         planning_due = index // per_plan != state.index // per_plan
         nominal, plan, u = state.nominal, state.plan, REST_INPUT
-        if state.vehicle.flies and nominal is not None:
+        flown = state.vehicle.flies and nominal is not None
+        if flown and nominal is not None:
             nominal, plan, u = self._plans.follow(plan, nominal, inputs.plan, now_us, ticks)
+        safety = self._watch.off_plan(state.safety, estimate, nominal if flown else None)
         request = None
         if planning_due:
-            if state.vehicle.flies and nominal is not None:
-                state, request, plan = self._request_plan(state, estimate, nominal, plan, now_us)
+            if flown and nominal is not None:
+                state, request, plan = self._request_plan(
+                    state, estimate, nominal, plan, now_us, safety.replan
+                )
+                safety = replace(safety, replan=False) if safety.replan else safety
             state = self._report_slowly(state, estimate, now_us)
+            safety = self._watch.breach(safety, estimate, state.constraints, flies=flown)
         sent, memory, replaced = self._actuate(state, estimate, nominal, u, ticks)
         # By position, as the snapshot: both are made in every tick, and names cost a microsecond.
         state = FlightState(
@@ -130,6 +138,7 @@ class Autopilot:
             state.offboard,
             state.battery,
             state.arming_refusal,
+            safety,
         )
         snapshot = _snapshot(state, estimate, u, inputs)
         return state, TickOutputs(
@@ -176,14 +185,15 @@ class Autopilot:
         nominal: PredictionState,
         plan: PlanMemory,
         now_us: int,
+        replan: bool,
     ) -> tuple[FlightState, PlanRequest, PlanMemory]:
-        """Request a plan that takes effect after a fixed delay."""
+        """Request a plan that takes effect after a fixed delay, from the vehicle if ``replan``."""
         config = self.config
         apply_us = now_us + config.plan_delay_ticks * config.tick_period_us
         mode = self._commander.mode(state)
         state, (targets, joints) = self._horizon(mode, state, estimate, apply_us)
         measured = measured_state(estimate, self._cascade.motion(state.cascade, estimate))
-        start, from_nominal = self._plans.start(plan, nominal, measured, now_us)
+        start, from_nominal = self._plans.start(plan, nominal, measured, now_us, replan)
         request = PlanRequest(
             plan_id=plan.next_id,
             t_apply_us=apply_us,
@@ -285,6 +295,7 @@ def _snapshot(
         vehicle.failsafe_from,
         goal.orbit if vehicle.mode is Mode.ORBIT and goal is not None else None,
         inputs.sensors.accel_B,
+        state.safety.counters,
     )
 
 

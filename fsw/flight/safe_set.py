@@ -37,7 +37,7 @@ class SafeSetCheck:
 
     def __init__(self, config: FlightConfig) -> None:
         self._config = config
-        self._loop_tube = loop_tube(config)
+        self.loop_tube = loop_tube(config)
         planner, airframe = config.planner, config.airframe
         body = body_of(planner.body, airframe)
         links = airframe.link_length
@@ -45,7 +45,7 @@ class SafeSetCheck:
 
     def analyse(self, safe_set: SafeSet) -> tuple[Finding, ...]:
         """Findings on whether this configuration can keep a safe set."""
-        return analyse(self._config, safe_set, self._loop_tube)
+        return analyse(self._config, safe_set, self.loop_tube)
 
     def update(
         self,

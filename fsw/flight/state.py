@@ -29,6 +29,7 @@ from fsw.signals import (
     PredictionState,
     SafeSet,
     SafeSetAnnouncement,
+    SafetyCounters,
     SolverStatus,
     StateEstimate,
     Vec2,
@@ -142,6 +143,18 @@ class PlanMemory:
 
 
 @dataclass(frozen=True, slots=True)
+class SafetyMemory:
+    """Episodes off the plan and outside the safe set; times are when it was last so, -1: not."""
+
+    off_plan_us: int = -1
+    off_plan_by: float = 0.0  # m, when it began
+    replan: bool = False  # from the measurement, next time
+    breach_us: int = -1
+    breach_by: float = 0.0  # m, when it began
+    counters: SafetyCounters = field(default_factory=SafetyCounters)
+
+
+@dataclass(frozen=True, slots=True)
 class FlightState:
     """Everything a tick starts from; the upper half changes every tick, the lower rarely."""
 
@@ -167,3 +180,4 @@ class FlightState:
     offboard: OffboardMemory = field(default_factory=OffboardMemory)
     battery: BatteryState = field(default_factory=BatteryState)
     arming_refusal: str = ""
+    safety: SafetyMemory = field(default_factory=SafetyMemory)

@@ -208,6 +208,7 @@ class LogEncoder:
 
     def _planning(self, snapshot: FlightSnapshot) -> bytes:
         t_us, report, target = snapshot.t_us, snapshot.constraints, snapshot.reference
+        safety = snapshot.safety
         margins, barrier = report.margins[: topics.MARGINS], report.barrier[: topics.MARGINS]
         least = min(margins, default=math.nan)
         argmin = margins.index(least) if least in margins else 0xFF
@@ -221,6 +222,7 @@ class LogEncoder:
             (
                 *(_BARRIER, t_us, *_filled(margins), *_filled(barrier), least),
                 *(int(report.kind), len(margins), argmin),
+                *(safety.breaches, safety.departures, safety.interventions),
                 *(_END_EFFECTOR, t_us, *p, *v, *wanted),
             )
         )

@@ -268,6 +268,8 @@ _ROWS: Final[dict[str, list[_Row]]] = {
     "Safe set": [
         ("SAFE_OWNER", "limits.safe_set_owner", "", 0.0, 255.0,
          "MAVLink system that owns the safe set and may grow it in flight; 0: the first one"),
+        ("SAFE_BREACH_ACT", "limits.breach_action", "", 1.0, 6.0,
+         "Action when the vehicle is outside its safe set"),
         ("SAFE_OWNER_T", "limits.owner_timeout_us", "s", 2.0, 300.0,
          "Silence after which another source may own the safe set, on the ground",
          _IN_MICROSECONDS),
@@ -295,6 +297,12 @@ _CHOICES: Final[dict[str, Choices]] = {
     ),
     "COM_OBL_RC_ACT": ((3, "Return"), (4, "Land"), (5, "Hold")),
     "NAV_DLL_ACT": ((0, "Disabled"), (1, "Hold"), (2, "Return"), (3, "Land")),
+    "SAFE_BREACH_ACT": (
+        (1, "Warning"),
+        (2, "Hold"),
+        (5, "Land"),
+        (6, "Retreat along the normal, then hold"),
+    ),
     "COM_LOW_BAT_ACT": (
         (0, "Warning"),
         (2, "Land when critical"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import asdict
 from pathlib import Path
 
 from fsw.parameters.control_choice import ControlChoice
@@ -37,6 +38,7 @@ def as_json(
         "housekeeping": _group(record.groups[HOUSEKEEPING.name]),
         "scheduler": record.scheduler,
         "stages": {name: _percentiles(times) for name, times in record.stages.items()},
+        "safety": asdict(record.safety),
         "setpoints": {
             "accepted": record.offboard.accepted,
             "refused": record.offboard.refused,

@@ -150,6 +150,7 @@ PERSON = Zone(vertical_cylinder((2.0, 0.0), 0.25, -1.8, 0.0), 0.3, velocity=(0.5
         (BALL, Zone(box((1.0, 0.0, -1.0), (0.2, 0.2, 0.2)), 0.11), ""),
         (POST, BALL, "is removed"),
         (POST, column((1.1, 0.0), 0.41), ""),
+        (POST, column((1.1, 0.0), 0.39), "is removed"),
         (POST, Zone(vertical_cylinder((1.0, 0.0), 0.5, -3.0, 0.0), 0.3), "is removed"),
         (SHELF, Zone(box((1.0, 0.0, -1.0), (0.3, 0.25, 0.1)), 0.1), ""),
         (SHELF, Zone(box((1.0, 0.0, -1.0), (0.3, 0.19, 0.2)), 0.1), "is removed"),
