@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from fsw.barriers.safe_approach import BarrierTuning
-from fsw.barriers.zone_rows import Moves, Tunings, fill_starts
+from fsw.barriers.zone_rows import Tunings, fill_starts
 from fsw.compiled import of_fixed_types
 from fsw.model.body import Body
-from fsw.model.linearisation import Horizon
-from fsw.model.prediction import INPUTS, Q_ARM, QD_ARM, STATES, P, V
-from fsw.shapes.zones import shifts, zone_arrays
+from fsw.model.linearisation import FRAME, put_arm
+from fsw.model.prediction import Array
+from fsw.shapes.zones import FOLLOWS, shifts, zone_arrays
 from fsw.signals import ConstraintReport, EndEffectorTarget, SafeSet, StateEstimate, Vec2
 
 
@@ -42,29 +42,28 @@ class Margins:
         single one, and none while there is no target.
         """
         zones = zone_arrays(safe_set)
-        if not safe_set.zones or (target is None and zones.follows.any()):
+        following = zones[:, FOLLOWS] > 0.0
+        if not safe_set.zones or (target is None and following.any()):
             return ConstraintReport(safe_set.kind)
         p_target, v_target = np.zeros((1, 3)), np.zeros((1, 3))
         if target is not None:
             p_target[0], v_target[0] = target.p_WE, target.v_WE
-        moves = Moves(*shifts(safe_set, np.array([estimate.t_us]), p_target, v_target))
-        vehicle = as_horizon(estimate, self._links)
-        size = sum(1 if follows else len(self.parts) for follows in zones.follows)
+        shift, speed = shifts(safe_set, np.array([estimate.t_us]), p_target, v_target)
+        vehicle = frame_of(estimate, self._links)
+        size = sum(1 if follows else len(self.parts) for follows in following)
         margins, values = np.empty(size), np.empty(size)
-        how = (zones, moves, self._probes, vehicle, self._tunings)
+        how = (zones, shift[0], speed[0], self._probes, vehicle, self._tunings)
         self._fill(*how, True, margins)
         self._fill(*how, False, values)
         return ConstraintReport(safe_set.kind, tuple(margins.tolist()), tuple(values.tolist()))
 
 
-def as_horizon(estimate: StateEstimate, links: Vec2) -> Horizon:
-    """The vehicle itself as a horizon of one node; ``links`` [m]."""
-    state = np.zeros((1, STATES))
-    state[0, P : P + 3], state[0, V : V + 3] = estimate.p_WB, estimate.v_WB
-    state[0, Q_ARM : Q_ARM + 2], state[0, QD_ARM : QD_ARM + 2] = estimate.q_arm, estimate.qd_arm
+def frame_of(estimate: StateEstimate, links: Vec2) -> Array:
+    """The vehicle itself as a frame of ``fsw.model.linearisation`` (FRAME,); ``links`` [m]."""
+    frame = np.zeros(FRAME)
     rotation = np.array(estimate.R_WB).reshape(3, 3)
     wx, wy, wz = estimate.w_WB_B
-    turning = np.array(((1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, wz, -wy), (wy, -wx, 0.0)))
-    axes = (turning @ rotation.T).reshape(1, 4, 3)
-    nothing = np.zeros((1, 4, 4, 3))
-    return Horizon(state, axes, nothing, np.zeros((1, STATES, INPUTS)), links)
+    turning = rotation @ np.array(((0.0, -wz, wy), (wz, 0.0, -wx), (-wy, wx, 0.0)))
+    frame[:24] = *estimate.p_WB, *estimate.v_WB, *estimate.R_WB, *turning.ravel()
+    put_arm(frame, estimate.q_arm, estimate.qd_arm, links)
+    return frame

@@ -18,12 +18,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fsw.compiled import compiled
 from fsw.model.airframe import Airframe
 from fsw.signals import Vec3
 
@@ -49,17 +48,10 @@ class Part:
     rim: float = 0.0  # m, radius of a disc in the body's x-y plane
 
 
-class Probes(NamedTuple):
-    """All probes of a body, for kernels."""
-
-    part: NDArray[np.int64]  # (probes,) index of the part
-    form: NDArray[np.int64]  # (probes,) SPHERE, CAPSULE or DISC
-    on: NDArray[np.int64]  # (probes,)
-    begin: NDArray[np.float64]  # (probes, 3) m
-    end: NDArray[np.float64]  # (probes, 3) m
-    radius: NDArray[np.float64]  # (probes,) m
-    rim: NDArray[np.float64]  # (probes,) m
-    turn: NDArray[np.float64]  # (probes,) rad, along the rim from its nearest place
+# Columns of a probe's row, for kernels.
+PART, FORM, ON, BEGIN, END, RADIUS, RIM, TURN = 0, 1, 2, 3, 6, 9, 10, 11
+"""Index of its part; SPHERE, CAPSULE or DISC; what it is on; begin and end (3 each), radius, rim
+[m]; angle along the rim from the nearest place [rad]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,25 +62,16 @@ class Body:
     parts: tuple[Part, ...]
 
     @property
-    def probes(self) -> Probes:
-        """One entry a row of the planner's program, in the order of the parts."""
-        listed = [
-            (k, part, turn)
-            for k, part in enumerate(self.parts)
-            for turn in range(_RIM_PLACES if part.rim > 0.0 else 1)
-        ]
-        parts = [part for _, part, _ in listed]
-        forms = [DISC if p.rim > 0.0 else SPHERE if p.end is None else CAPSULE for p in parts]
-        return Probes(
-            part=np.array([k for k, _, _ in listed], dtype=np.int64),
-            form=np.array(forms, dtype=np.int64),
-            on=np.array([part.on for part in parts], dtype=np.int64),
-            begin=np.array([part.begin for part in parts]),
-            end=np.array([part.end or part.begin for part in parts]),
-            radius=np.array([part.radius for part in parts]),
-            rim=np.array([part.rim for part in parts]),
-            turn=np.array([0.5 * math.pi * turn for _, _, turn in listed]),
-        )
+    def probes(self) -> NDArray[np.float64]:
+        """A row of numbers a probe (probes, 12) [SI], in the order of the parts."""
+        rows = []
+        for k, part in enumerate(self.parts):
+            form = DISC if part.rim > 0.0 else SPHERE if part.end is None else CAPSULE
+            ends = (*part.begin, *(part.end or part.begin))
+            for turn in range(_RIM_PLACES if form == DISC else 1):
+                angle = 2.0 * math.pi * turn / _RIM_PLACES
+                rows.append((k, form, part.on, *ends, part.radius, part.rim, angle))
+        return np.array(rows, dtype=np.float64)
 
 
 def body_of(name: BodyName, airframe: Airframe) -> Body:
@@ -141,24 +124,3 @@ def hull_reach(body: Body, normal: Vec3) -> float:
         if part.on == ON_BASE
         for x, y, z in (part.begin, part.end or part.begin)
     )
-
-
-@compiled
-def nearest_on_segment(begin: Vec3, end: Vec3, p: Vec3) -> Vec3:
-    """The place between ``begin`` [m] and ``end`` [m] nearest to ``p`` [m], in one frame."""
-    ax, ay, az = end[0] - begin[0], end[1] - begin[1], end[2] - begin[2]
-    square = ax * ax + ay * ay + az * az
-    if square == 0.0:
-        return begin
-    share = ((p[0] - begin[0]) * ax + (p[1] - begin[1]) * ay + (p[2] - begin[2]) * az) / square
-    share = min(max(share, 0.0), 1.0)
-    return begin[0] + share * ax, begin[1] + share * ay, begin[2] + share * az
-
-
-@compiled
-def nearest_on_disc(centre: Vec3, rim: float, p: Vec3) -> Vec3:
-    """The place of a level disc, ``rim`` [m] about ``centre`` [m], nearest to ``p`` [m] (body)."""
-    x, y = p[0] - centre[0], p[1] - centre[1]
-    length = math.sqrt(x * x + y * y)
-    scale = 1.0 if length <= rim else rim / length
-    return centre[0] + scale * x, centre[1] + scale * y, centre[2]

@@ -3,7 +3,8 @@
 Everything that shapes the optimum (costs, barriers, limits) is written in terms of positions and
 velocities of places on the vehicle: the end-effector that tracks, the probes that keep clear. A
 place is rigid on the base or on a link. From the body's axes at a node, their rates and their exact
-derivatives follow its position, its velocity and both gradients in the inputs.
+derivatives follow its position, its velocity and both gradients in the inputs. The model is
+time-invariant: what an input does depends on how long ago it acted, not on the node.
 """
 
 from __future__ import annotations
@@ -35,29 +36,45 @@ from fsw.signals import Vec2, Vec3
 
 # Prediction states that turn the body: the accelerations, by the tilt they take, and yaw.
 _TURNING = np.array([A, A + 1, A + 2, YAW])
-# Prediction states each input can move, -1 where it moves fewer.
-_REACHED = np.array(
-    [
-        [0, 3, 6, 9],
-        [1, 4, 7, 10],
-        [2, 5, 8, -1],
-        [13, 14, -1, -1],
-        [15, 17, -1, -1],
-        [16, 18, -1, -1],
-    ]
-)
 _STEP = 1e-30  # complex step: no subtraction, hence no rounding
 _AXES = 4  # b1, b3 and their rates
+
+
+# What a frame holds of a node, in this order; matrices row by row. One array, because compiled code
+# counts the references to each array it is handed.
+_AT_P, _AT_V = 0, 3  # of the base
+_AT_R, _AT_TURNING = 6, 15  # R_WB and its rate
+_AT_D_R, _AT_D_TURNING = 24, 60  # their derivatives in each turning state
+_AT_SWAY = 96  # of each link: sine and cosine of its angle from straight down, and its rate
+_AT_LINKS = 102  # lengths
+FRAME = 104
 
 
 class Horizon(NamedTuple):
     """The nodes of a horizon, for kernels; node 0 is its start. Axes are those of the world."""
 
     states: Array  # (n + 1, 19)
-    axes: Array  # (n + 1, 4, 3) b1, b3 and their rates
-    d_axes: Array  # (n + 1, 4, 4, 3) their derivatives in a_x, a_y, a_z, yaw
-    gamma: Array  # (n + 1, 19, 6 n)
-    links: Vec2  # m
+    frames: Array  # (n + 1, FRAME)
+    impulse: Array  # (n, 11) see ``impulses``
+    inputs: Array  # (6 n,) of the guess
+
+
+def impulses(model: CondensedModel) -> Array:
+    """What an input does so many periods later (n, 11) [SI].
+
+    Of a horizontal acceleration on p, v, a and j, of the vertical one on p, v and a, of yaw and
+    joint acceleration on angle and rate. All axes of a kind are the same, and so are all nodes.
+    """
+    last, rows = model.gamma[model.horizon], []
+    for k in range(model.horizon):
+        at = INPUTS * (model.horizon - 1 - k)
+        rows.append(
+            [last[state, at] for state in (P, V, A, J)]
+            + [last[state, at + 2] for state in (P + 2, V + 2, A + 2)]
+            + [last[state, at + 3] for state in (YAW, YAW_RATE)]
+            + [last[state, at + 4] for state in (Q_ARM, QD_ARM)]
+        )
+    return np.array(rows)
 
 
 class Tracked(NamedTuple):
@@ -88,10 +105,9 @@ class Linearisation:
         states = np.zeros((nodes, STATES))
         horizon = Horizon(
             states=states,
-            axes=np.zeros((nodes, _AXES, 3)),
-            d_axes=np.zeros((nodes, len(_TURNING), _AXES, 3)),
-            gamma=model.gamma,
-            links=model.airframe.link_length,
+            frames=np.zeros((nodes, FRAME)),
+            impulse=impulses(model),
+            inputs=np.zeros(unknowns),
         )
         tracked = Tracked(
             yaw=states[:, YAW : YAW_RATE + 1],
@@ -110,6 +126,7 @@ class Linearisation:
     def refill(self, start: Array, inputs: Array) -> None:
         """Linearise from the state ``start`` (19,) [SI] around the ``inputs`` (6 n,) [SI]."""
         airframe = self.model.airframe
+        self.horizon.inputs[:] = inputs
         np.matmul(self.model.phi, start, out=self.states)
         np.add(self.states, self.model.gamma @ inputs, out=self.states)
         m1, m2 = airframe.link_mass
@@ -117,210 +134,241 @@ class Linearisation:
             (m1 * airframe.link_com[0] + m2 * airframe.link_length[0]) / (m1 + m2),
             m2 * airframe.link_com[1] / (m1 + m2),
         )
-        _refill(self.horizon, self.tracked, com)
+        _refill(self.horizon, self.tracked, airframe.link_length, com)
 
 
 @compiled
-def _refill(horizon: Horizon, tracked: Tracked, com: Vec2) -> None:
-    at_position, at_velocity = np.zeros(STATES), np.zeros(STATES)
-    tip = (0.0, 0.0, horizon.links[1])
+def _refill(horizon: Horizon, tracked: Tracked, lengths: Vec2, com: Vec2) -> None:
+    slopes = np.zeros((2, STATES))
+    tip = (0.0, 0.0, lengths[1])
     for i in range(horizon.states.shape[0]):
-        state = horizon.states[i]
-        body_axes(state, horizon.axes[i])
+        frame = horizon.frames[i]
+        fill_frame(horizon.states[i], lengths, frame)
         if i > 0:  # the start does not depend on the inputs
-            _differentiate(state, horizon.d_axes[i])
-        p, v = place(horizon, i, ON_LINK2, tip)
+            _differentiate(horizon.states[i], frame)
+        p, v = position(frame, ON_LINK2, tip), velocity(frame, ON_LINK2, tip)
         for k in range(3):
             tracked.position[i, k], tracked.velocity[i, k] = p[k], v[k]
             if i > 0:
                 n = (1.0 * (k == 0), 1.0 * (k == 1), 1.0 * (k == 2))
-                slopes(horizon, i, ON_LINK2, tip, n, at_position, at_velocity)
-                chain(horizon, i, at_position, tracked.d_position[i, k])
-                chain(horizon, i, at_velocity, tracked.d_velocity[i, k])
+                fill_slopes(frame, ON_LINK2, tip, n, slopes)
+                chain(horizon.impulse, i, slopes[0], tracked.d_position[i, k])
+                chain(horizon.impulse, i, slopes[1], tracked.d_velocity[i, k])
         _fill_arm_com(horizon, i, com, tracked)
 
 
 @compiled
-def _differentiate(state: Array, d_axes: Array) -> None:
-    """Derivative of ``body_axes`` in the turning states (4, 4, 3), by complex steps."""
-    stepped = np.zeros((_AXES, 3), dtype=np.complex128)
+def fill_frame(state: Array, lengths: Vec2, frame: Array) -> None:
+    """Where the vehicle is in a prediction ``state`` (19,) [SI], into a ``frame`` (FRAME,) [SI].
+
+    Links of ``lengths`` [m]. The derivatives stay as they are.
+    """
+    axes = np.empty((_AXES, 3))
+    body_axes(state, axes)
+    for k in range(3):
+        frame[_AT_P + k], frame[_AT_V + k] = state[P + k], state[V + k]
+    _put_matrix(frame, _AT_R, axes[0], axes[1])
+    _put_rate(frame, _AT_TURNING, axes[0], axes[1], axes[2], axes[3])
+    put_arm(
+        frame,
+        (state[Q_ARM], state[Q_ARM + 1]),
+        (state[QD_ARM], state[QD_ARM + 1]),
+        lengths,
+    )
+
+
+@compiled
+def put_arm(frame: Array, q_arm: Vec2, qd_arm: Vec2, lengths: Vec2) -> None:
+    """The arm in a ``frame`` (FRAME,) [SI]: ``q_arm`` [rad], ``qd_arm`` [rad/s], lengths [m]."""
+    angle, rate = 0.0, 0.0
+    for link in range(2):
+        angle, rate = angle + q_arm[link], rate + qd_arm[link]
+        at = _AT_SWAY + 3 * link
+        frame[at], frame[at + 1], frame[at + 2] = math.sin(angle), math.cos(angle), rate
+        frame[_AT_LINKS + link] = lengths[link]
+
+
+@compiled
+def _differentiate(state: Array, frame: Array) -> None:
+    """Derivatives of rotation and its rate in the turning states, by complex steps."""
+    axes, stepped = np.empty((_AXES, 3)), np.zeros((_AXES, 3), dtype=np.complex128)
+    body_axes(state, axes)
     x = state.astype(np.complex128)
-    for turning in range(len(_TURNING)):
-        k = _TURNING[turning]
+    for turned in range(len(_TURNING)):
+        k = _TURNING[turned]
         x[k] = complex(state[k], _STEP)
         body_axes(x, stepped)
         x[k] = state[k]
-        d_axes[turning] = stepped.imag / _STEP
+        e = stepped.imag / _STEP
+        _put_rate(frame, _AT_D_R + 9 * turned, axes[0], axes[1], e[0], e[1])
+        _put_rate(frame, _AT_D_TURNING + 9 * turned, axes[0], axes[1], e[2], e[3])
+        # The rate of b2 = b3 x b1 is a product itself: what is left of its derivative.
+        at = _AT_D_TURNING + 9 * turned
+        b, c = _cross(axes[3], e[0]), _cross(e[1], axes[2])
+        for row in range(3):
+            frame[at + 3 * row + 1] += b[row] + c[row]
 
 
 @compiled
-def in_body(horizon: Horizon, node: int, on: int, local: Vec3) -> tuple[Vec3, Vec3]:
+def _put_matrix(frame: Array, at: int, b1: Array, b3: Array) -> None:
+    b2 = _cross(b3, b1)
+    for row in range(3):
+        frame[at + 3 * row], frame[at + 3 * row + 1] = b1[row], b2[row]
+        frame[at + 3 * row + 2] = b3[row]
+
+
+@compiled
+def _put_rate(frame: Array, at: int, b1: Array, b3: Array, d1: Array, d3: Array) -> None:
+    """The change of ``_put_matrix`` by the product rule, for any change of its axes."""
+    a, b = _cross(d3, b1), _cross(b3, d1)
+    for row in range(3):
+        frame[at + 3 * row], frame[at + 3 * row + 1] = d1[row], a[row] + b[row]
+        frame[at + 3 * row + 2] = d3[row]
+
+
+@compiled
+def _cross(a: Array, b: Array) -> Vec3:
+    return (
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    )
+
+
+@compiled
+def in_body(frame: Array, on: int, local: Vec3) -> tuple[Vec3, Vec3]:
     """Where a place of the vehicle is in the body [m, FRD], and its velocity there [m/s].
 
-    ``on`` [1] is what the place is rigid on, ``local`` [m] where there (``fsw.model.body.Part``).
+    ``frame`` (FRAME,) [SI] is of a node, ``on`` [1] what the place is rigid on, ``local`` [m] where
+    there (``fsw.model.body.Part``).
     """
     if on == ON_BASE:
         return local, (0.0, 0.0, 0.0)
-    state = horizon.states[node]
-    th1, w1 = state[Q_ARM], state[QD_ARM]
-    th12, w12 = th1 + state[Q_ARM + 1], w1 + state[QD_ARM + 1]
-    if on == ON_LINK1:
-        x, z = local[2] * math.sin(th1), local[2] * math.cos(th1)
-        return (x, 0.0, z), (z * w1, 0.0, -x * w1)
-    x1, z1 = horizon.links[0] * math.sin(th1), horizon.links[0] * math.cos(th1)
-    x2, z2 = local[2] * math.sin(th12), local[2] * math.cos(th12)
-    return (x1 + x2, 0.0, z1 + z2), (z1 * w1 + z2 * w12, 0.0, -x1 * w1 - x2 * w12)
-
-
-@compiled
-def place(horizon: Horizon, node: int, on: int, local: Vec3) -> tuple[Vec3, Vec3]:
-    """Position [m, NED] and velocity [m/s, NED] of a place of the vehicle at a node.
-
-    ``on`` [1] and ``local`` [m] are as in ``in_body``.
-    """
-    r, rd = in_body(horizon, node, on, local)
-    state, axes = horizon.states[node], horizon.axes[node]
-    b1, b3, d1, d3 = axes[0], axes[1], axes[2], axes[3]
-    # b2 = b3 x b1 and its rate
-    px, py, pz = _body_vector(b1, b3, r)
-    vx, vy, vz = _body_vector(b1, b3, rd)
-    tx, ty, tz = _turned(b1, b3, d1, d3, r)
-    return (
-        (state[P] + px, state[P + 1] + py, state[P + 2] + pz),
-        (state[V] + vx + tx, state[V + 1] + vy + ty, state[V + 2] + vz + tz),
-    )
-
-
-@compiled
-def _body_vector(b1: Array, b3: Array, r: Vec3) -> Vec3:
-    """A vector of body components in the world: r_x b1 + r_y (b3 x b1) + r_z b3."""
-    x, y, z = r
-    return (
-        x * b1[0] + z * b3[0] + y * (b3[1] * b1[2] - b3[2] * b1[1]),
-        x * b1[1] + z * b3[1] + y * (b3[2] * b1[0] - b3[0] * b1[2]),
-        x * b1[2] + z * b3[2] + y * (b3[0] * b1[1] - b3[1] * b1[0]),
-    )
-
-
-@compiled
-def _turned(b1: Array, b3: Array, d1: Array, d3: Array, r: Vec3) -> Vec3:
-    """How ``_body_vector`` changes with its axes by the product rule, for any change of these."""
-    x, y, z = r
-    return (
-        x * d1[0] + z * d3[0] + y * (d3[1] * b1[2] - d3[2] * b1[1] + b3[1] * d1[2] - b3[2] * d1[1]),
-        x * d1[1] + z * d3[1] + y * (d3[2] * b1[0] - d3[0] * b1[2] + b3[2] * d1[0] - b3[0] * d1[2]),
-        x * d1[2] + z * d3[2] + y * (d3[0] * b1[1] - d3[1] * b1[0] + b3[0] * d1[1] - b3[1] * d1[0]),
-    )
-
-
-@compiled
-def slopes(
-    horizon: Horizon,
-    node: int,
-    on: int,
-    local: Vec3,
-    n: Vec3,
-    at_position: Array,
-    at_velocity: Array,
-) -> None:
-    """Derivatives of ``n . p`` and ``n . v`` of a place in the state, (19,) [SI] each.
-
-    ``on`` [1] and ``local`` [m] are as in ``in_body``; ``n`` [1, NED] is any direction.
-    """
-    r, rd = in_body(horizon, node, on, local)
-    axes, d_axes = horizon.axes[node], horizon.d_axes[node]
-    b1, b3, d1, d3 = axes[0], axes[1], axes[2], axes[3]
-    for k in range(3):
-        at_position[P + k], at_velocity[P + k] = n[k], 0.0
-        at_position[V + k], at_velocity[V + k] = 0.0, n[k]
-    for turning in range(4):
-        e1, e3, f1, f3 = (
-            d_axes[turning, 0],
-            d_axes[turning, 1],
-            d_axes[turning, 2],
-            d_axes[turning, 3],
-        )
-        of_r = _along(n, _turned(b1, b3, e1, e3, r))
-        of_v = _along(n, _turned(b1, b3, e1, e3, rd)) + _along(n, _turned(b1, b3, f1, f3, r))
-        if r[1] != 0.0:  # the product rule's mixed terms of b2's rate
-            of_v += r[1] * _mixed(n, e1, e3, d1, d3)
-        k = _TURNING[turning]
-        at_position[k], at_velocity[k] = of_r, of_v
-        # The rate of a turning state turns the place as the state itself does.
-        if turning < 2:
-            at_position[J + turning], at_velocity[J + turning] = 0.0, of_r
-        if turning == 3:
-            at_position[YAW_RATE], at_velocity[YAW_RATE] = 0.0, of_r
-    for k in range(11, 13):  # snap moves nothing at once
-        at_position[k], at_velocity[k] = 0.0, 0.0
-    _arm_slopes(horizon, node, on, local, n, at_position, at_velocity)
-
-
-@compiled
-def _mixed(n: Vec3, e1: Array, e3: Array, d1: Array, d3: Array) -> float:
-    """``n`` times e3 x d1 + d3 x e1."""
-    return float(
-        n[0] * (e3[1] * d1[2] - e3[2] * d1[1] + d3[1] * e1[2] - d3[2] * e1[1])
-        + n[1] * (e3[2] * d1[0] - e3[0] * d1[2] + d3[2] * e1[0] - d3[0] * e1[2])
-        + n[2] * (e3[0] * d1[1] - e3[1] * d1[0] + d3[0] * e1[1] - d3[1] * e1[0])
-    )
-
-
-@compiled
-def _arm_slopes(
-    horizon: Horizon,
-    node: int,
-    on: int,
-    local: Vec3,
-    n: Vec3,
-    at_position: Array,
-    at_velocity: Array,
-) -> None:
-    """The part of ``slopes`` that is the joints'."""
-    for k in range(Q_ARM, QD_ARM + 2):
-        at_position[k], at_velocity[k] = 0.0, 0.0
-    if on == ON_BASE:
-        return
-    state, axes = horizon.states[node], horizon.axes[node]
-    th1, w1 = state[Q_ARM], state[QD_ARM]
-    th12, w12 = th1 + state[Q_ARM + 1], w1 + state[QD_ARM + 1]
-    # n in the arm's plane, and how that turns.
-    n1, n3 = _along_row(n, axes[0]), _along_row(n, axes[1])
-    t1, t3 = _along_row(n, axes[2]), _along_row(n, axes[3])
-    length1 = local[2] if on == ON_LINK1 else horizon.links[0]
-    x, z = length1 * math.sin(th1), length1 * math.cos(th1)
-    p1 = z * n1 - x * n3
-    v1 = z * t1 - x * t3 - w1 * (x * n1 + z * n3)
-    p2 = v2 = 0.0
+    first = local[2] if on == ON_LINK1 else frame[_AT_LINKS]
+    x, z, w = first * frame[_AT_SWAY], first * frame[_AT_SWAY + 1], frame[_AT_SWAY + 2]
+    vx, vz = z * w, -x * w
     if on == ON_LINK2:
-        x, z = local[2] * math.sin(th12), local[2] * math.cos(th12)
-        p2 = z * n1 - x * n3
-        v2 = z * t1 - x * t3 - w12 * (x * n1 + z * n3)
-    at_position[Q_ARM], at_position[Q_ARM + 1] = p1 + p2, p2
-    at_velocity[Q_ARM], at_velocity[Q_ARM + 1] = v1 + v2, v2
-    at_velocity[QD_ARM], at_velocity[QD_ARM + 1] = p1 + p2, p2
+        at, w = _AT_SWAY + 3, frame[_AT_SWAY + 5]
+        x2, z2 = local[2] * frame[at], local[2] * frame[at + 1]
+        x, z, vx, vz = x + x2, z + z2, vx + z2 * w, vz - x2 * w
+    return (x, 0.0, z), (vx, 0.0, vz)
 
 
 @compiled
-def _along(n: Vec3, v: Vec3) -> float:
-    return n[0] * v[0] + n[1] * v[1] + n[2] * v[2]
+def position(frame: Array, on: int, local: Vec3) -> Vec3:
+    """Position of a place [m, NED]; ``frame`` (FRAME,) [SI], ``on`` [1], ``local`` [m] as above."""
+    (x, y, z), _ = in_body(frame, on, local)
+    return (
+        frame[0] + frame[6] * x + frame[7] * y + frame[8] * z,
+        frame[1] + frame[9] * x + frame[10] * y + frame[11] * z,
+        frame[2] + frame[12] * x + frame[13] * y + frame[14] * z,
+    )
 
 
 @compiled
-def _along_row(n: Vec3, v: Array) -> float:
-    return float(n[0] * v[0] + n[1] * v[1] + n[2] * v[2])
+def velocity(frame: Array, on: int, local: Vec3) -> Vec3:
+    """Velocity of a place [m/s, NED]; ``frame`` (FRAME,) [SI], ``on``, ``local`` [m] as above."""
+    (x, y, z), (vx, _, vz) = in_body(frame, on, local)
+    r, t = _AT_R, _AT_TURNING
+    return (
+        frame[3]
+        + frame[t] * x
+        + frame[t + 1] * y
+        + frame[t + 2] * z
+        + frame[r] * vx
+        + frame[r + 2] * vz,
+        frame[4]
+        + frame[t + 3] * x
+        + frame[t + 4] * y
+        + frame[t + 5] * z
+        + frame[r + 3] * vx
+        + frame[r + 5] * vz,
+        frame[5]
+        + frame[t + 6] * x
+        + frame[t + 7] * y
+        + frame[t + 8] * z
+        + frame[r + 6] * vx
+        + frame[r + 8] * vz,
+    )
 
 
 @compiled
-def chain(horizon: Horizon, node: int, at_state: Array, gradient: Array) -> None:
-    """From a slope in the state (19,) [any / SI] to one in the inputs before a node, (6 n,)."""
-    gamma = horizon.gamma[node]
-    for column in range(INPUTS * node):
-        total = 0.0
-        for k in _REACHED[column % INPUTS]:
-            if k >= 0:
-                total += at_state[k] * gamma[k, column]
-        gradient[column] = total
+def times_matrix(frame: Array, at: int, n: Vec3) -> Vec3:
+    """``n`` [1, NED] times the matrix that begins ``at`` [1] in a ``frame`` (FRAME,) [SI]."""
+    return (
+        n[0] * frame[at] + n[1] * frame[at + 3] + n[2] * frame[at + 6],
+        n[0] * frame[at + 1] + n[1] * frame[at + 4] + n[2] * frame[at + 7],
+        n[0] * frame[at + 2] + n[1] * frame[at + 5] + n[2] * frame[at + 8],
+    )
+
+
+@compiled
+def in_axes(frame: Array, n: Vec3) -> Vec3:
+    """A direction ``n`` [1, NED] in the body's axes, of a ``frame`` (FRAME,) [SI]."""
+    return times_matrix(frame, _AT_R, n)
+
+
+@compiled
+def fill_slopes(frame: Array, on: int, local: Vec3, n: Vec3, slopes: Array) -> None:
+    """Derivatives of ``n . p`` and ``n . v`` of a place in the state, into ``slopes`` (2, 19) [SI].
+
+    ``frame`` (FRAME,) [SI], ``on`` [1] and ``local`` [m] are as in ``in_body``; ``n`` [1, NED] is
+    any direction. Snap moves nothing at once, so its entries stay as they are: 0.
+    """
+    (rx, ry, rz), (vx, _, vz) = in_body(frame, on, local)
+    for k in range(3):
+        slopes[0, P + k], slopes[1, P + k] = n[k], 0.0
+        slopes[0, V + k], slopes[1, V + k] = 0.0, n[k]
+    for turned in range(4):
+        mx, my, mz = times_matrix(frame, _AT_D_R + 9 * turned, n)
+        tx, ty, tz = times_matrix(frame, _AT_D_TURNING + 9 * turned, n)
+        of_r = mx * rx + my * ry + mz * rz
+        k = _TURNING[turned]
+        slopes[0, k] = of_r
+        slopes[1, k] = mx * vx + mz * vz + tx * rx + ty * ry + tz * rz
+        # The rate of a turning state turns the place as the state itself does.
+        if turned < 2:
+            slopes[0, J + turned], slopes[1, J + turned] = 0.0, of_r
+        if turned == 3:
+            slopes[0, YAW_RATE], slopes[1, YAW_RATE] = 0.0, of_r
+    p1 = p2 = v1 = v2 = 0.0
+    if on != ON_BASE:
+        # n in the arm's plane, and how that turns.
+        n1, _, n3 = times_matrix(frame, _AT_R, n)
+        t1, _, t3 = times_matrix(frame, _AT_TURNING, n)
+        length = local[2] if on == ON_LINK1 else frame[_AT_LINKS]
+        x, z = length * frame[_AT_SWAY], length * frame[_AT_SWAY + 1]
+        p1 = z * n1 - x * n3
+        v1 = z * t1 - x * t3 - frame[_AT_SWAY + 2] * (x * n1 + z * n3)
+        if on == ON_LINK2:
+            x, z = local[2] * frame[_AT_SWAY + 3], local[2] * frame[_AT_SWAY + 4]
+            p2 = z * n1 - x * n3
+            v2 = z * t1 - x * t3 - frame[_AT_SWAY + 5] * (x * n1 + z * n3)
+    slopes[0, Q_ARM], slopes[0, Q_ARM + 1] = p1 + p2, p2
+    slopes[1, Q_ARM], slopes[1, Q_ARM + 1] = v1 + v2, v2
+    slopes[0, QD_ARM], slopes[0, QD_ARM + 1] = 0.0, 0.0
+    slopes[1, QD_ARM], slopes[1, QD_ARM + 1] = p1 + p2, p2
+
+
+@compiled
+def chain(impulse: Array, node: int, slope: Array, gradient: Array) -> None:
+    """From a ``slope`` (19,) [any / SI] in the state to one in the inputs before a node, (6 n,).
+
+    ``impulse`` (n, 11) [SI] is of the horizon, ``gradient`` (6 n,) [any / input] is filled.
+    """
+    for step in range(node):
+        g, at = impulse[node - 1 - step], INPUTS * step
+        for axis in range(2):
+            gradient[at + axis] = (
+                slope[P + axis] * g[0]
+                + slope[V + axis] * g[1]
+                + slope[A + axis] * g[2]
+                + slope[J + axis] * g[3]
+            )
+        gradient[at + 2] = slope[P + 2] * g[4] + slope[V + 2] * g[5] + slope[A + 2] * g[6]
+        gradient[at + 3] = slope[YAW] * g[7] + slope[YAW_RATE] * g[8]
+        gradient[at + 4] = slope[Q_ARM] * g[9] + slope[QD_ARM] * g[10]
+        gradient[at + 5] = slope[Q_ARM + 1] * g[9] + slope[QD_ARM + 1] * g[10]
 
 
 @compiled
@@ -328,8 +376,7 @@ def _fill_arm_com(horizon: Horizon, i: int, com: Vec2, tracked: Tracked) -> None
     th1 = horizon.states[i, Q_ARM]
     (x1, c1), (x2, c12) = links(com, th1, th1 + horizon.states[i, Q_ARM + 1])
     tracked.arm_com[i] = x1 + x2
-    gamma = horizon.gamma[i]
-    for column in range(INPUTS * i):
-        tracked.d_arm_com[i, column] = (c1 + c12) * gamma[Q_ARM, column] + c12 * gamma[
-            Q_ARM + 1, column
-        ]
+    for step in range(i):
+        gain, at = horizon.impulse[i - 1 - step, 9], INPUTS * step
+        tracked.d_arm_com[i, at + 4] = (c1 + c12) * gain
+        tracked.d_arm_com[i, at + 5] = c12 * gain

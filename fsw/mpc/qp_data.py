@@ -26,6 +26,7 @@ from scipy import sparse
 from fsw.barriers.constraint_block import ConstraintBlock
 from fsw.model.airframe import GRAVITY
 from fsw.model.prediction import INPUTS, Array
+from fsw.signals import Vec4
 
 CONE = 3  # rows of a tilt cone: what there is, then the two that it must cover
 
@@ -38,6 +39,12 @@ class InputLimits:
     vertical: float = 3.0  # m/s^2, |a_z|
     yaw_acc: float = 0.1  # rad/s^2; the rotors' drag gives hardly more
     joint_acc: float = 10.0  # rad/s^2
+
+    @property
+    def most(self) -> Vec4:
+        """Largest horizontal and vertical, yaw and joint accelerations that they admit."""
+        level = math.tan(self.tilt) * (GRAVITY + self.vertical)
+        return level, self.vertical, self.yaw_acc, self.joint_acc
 
 
 @dataclass(frozen=True)

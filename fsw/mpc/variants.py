@@ -70,6 +70,7 @@ def _distances(
         distances=True,
         tightening=tightening,
         skipped_nodes=skipped_nodes,
+        most=config.limits.most,
     )
 
 
@@ -93,7 +94,7 @@ def _split(safe_set: SafeSet) -> tuple[tuple[Zone, ...], SafeSet]:
 
 def _blf(config: PlannerConfig, model: CondensedModel, safe_set: SafeSet) -> OcpTerms:
     body = body_of(config.body, model.airframe)
-    barrier = ZoneRows(safe_set, body, model, config.tunings)
+    barrier = ZoneRows(safe_set, body, model, config.tunings, most=config.limits.most)
     return OcpTerms((TrackingCost(config.weights),), (barrier,), config.barrier_slack)
 
 

@@ -60,13 +60,13 @@ def _plane(
     if square > 0.0 and not keep_in:
         away = math.sqrt(square)
         return Surface(away, nx / away, ny / away, nz / away)
-    face = (nearest + which // 2) % 3 if keep_in else nearest
+    face = which // 2 if keep_in else nearest
     ax, ay, az = _axis(numbers, face)
     along = ax * x + ay * y + az * z
-    sign = 1.0 if along >= 0.0 else -1.0
     if keep_in:
-        sign = sign if which % 2 == 0 else -sign
+        sign = 1.0 if which % 2 == 0 else -1.0
         return Surface(numbers[3 + face] - sign * along, -sign * ax, -sign * ay, -sign * az)
+    sign = 1.0 if along >= 0.0 else -1.0
     return Surface(deepest, sign * ax, sign * ay, sign * az)
 
 

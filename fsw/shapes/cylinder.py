@@ -42,7 +42,7 @@ def cylinder_surface(
 
     ``half_length`` [m] and ``radius`` [m] are its size, ``p`` [m, NED] the point. Outside, it
     touches where the cylinder is nearest, at a rim too. Inside, the planes are two and two along
-    and across the ray from the axis, and the ends; the nearest comes first.
+    and across the ray from the axis, and the two ends.
     """
     x, y, z = p[0] - middle[0], p[1] - middle[1], p[2] - middle[2]
     along = x * axis[0] + y * axis[1] + z * axis[2]
@@ -58,18 +58,13 @@ def cylinder_surface(
         length = math.sqrt(rx * rx + ry * ry + rz * rz)
         rx, ry, rz = rx / length, ry / length, rz / length
         distance = 0.0
-    end = 1.0 if along >= 0.0 else -1.0
-    aside, beyond = distance - radius, abs(along) - half_length
     if keep_in:
-        first_end = aside < beyond  # the nearest is an end
-        turn = which if not first_end else (which + 4) % PLANES_INSIDE
-        if turn >= 4:
-            sign = end if turn == 4 else -end
+        sign = 1.0 if which % 2 == 0 else -1.0
+        if which >= 4:
             return Surface(
                 half_length - sign * along, -sign * axis[0], -sign * axis[1], -sign * axis[2]
             )
-        sign = 1.0 if turn % 2 == 0 else -1.0
-        if turn < 2:
+        if which < 2:
             return Surface(radius - sign * distance, -sign * rx, -sign * ry, -sign * rz)
         return Surface(
             radius,
@@ -77,6 +72,8 @@ def cylinder_surface(
             -sign * (axis[2] * rx - axis[0] * rz),
             -sign * (axis[0] * ry - axis[1] * rx),
         )
+    end = 1.0 if along >= 0.0 else -1.0
+    aside, beyond = distance - radius, abs(along) - half_length
     if aside > 0.0 and beyond > 0.0:
         away = math.sqrt(aside * aside + beyond * beyond)
         a, b = aside / away, end * beyond / away

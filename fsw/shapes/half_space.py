@@ -46,4 +46,5 @@ KIND = ShapeKind(
     planes_inside=1,
     plane=_plane,
     problem=_problem,
+    flat=True,
 )

@@ -37,8 +37,7 @@ class ShapeKind:
     """One kind of shape.
 
     To keep a point out of a convex shape one plane is enough, the one that touches it where it is
-    nearest. To keep a point inside, planes all round are needed: ``planes_inside``, the first of
-    them at the nearest place of the surface.
+    nearest. To keep a point inside, planes all round are needed: ``planes_inside``.
     """
 
     name: str  # as in scenarios and texts
@@ -47,6 +46,7 @@ class ShapeKind:
     planes_inside: int
     plane: PlaneOf  # compiled; the free side is outside, or inside where ``keep_in``
     problem: Callable[[tuple[float, ...]], str | None]  # why numbers describe no such shape
+    flat: bool = False  # its plane is the same wherever the point is
     follows_target: bool = False  # rides on the end-effector's target, and keeps the base alone
 
     @property

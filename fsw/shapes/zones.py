@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
 from numba import literal_unroll
@@ -20,56 +19,40 @@ _PLANES = tuple(kind.plane for kind in KINDS)
 _INDEX = {kind.name: k for k, kind in enumerate(KINDS)}
 
 
-class ZoneArrays(NamedTuple):
-    """The zones of a safe set, for kernels."""
-
-    kind: NDArray[np.int64]  # (zones,) which of KINDS
-    numbers: Array  # (zones, 16)
-    keep_in: NDArray[np.bool_]  # (zones,)
-    clearance: Array  # (zones,) m
-    planes: NDArray[np.int64]  # (zones,) planes of each point
-    follows: NDArray[np.bool_]  # (zones,) rides on the target, keeps the base alone
+# Columns of a zone's row; one array, because compiled code counts the references to each.
+KIND, KEEP_IN, CLEARANCE, PLANES, FLAT, FOLLOWS, FIRST = range(7)
+"""Which of KINDS; whether to keep in; clearance [m]; how many planes each place has; whether they
+are the same everywhere; whether it rides on the target and keeps the base alone; its numbers."""
 
 
 @lru_cache(maxsize=16)
-def zone_arrays(safe_set: SafeSet) -> ZoneArrays:
-    """The arrays of a safe set."""
-    zones = safe_set.zones
-    numbers = np.zeros((len(zones), NUMBERS))
-    for row, zone in zip(numbers, zones, strict=True):
-        row[: len(zone.shape.numbers)] = zone.shape.numbers
-    kinds = [BY_NAME[zone.shape.kind] for zone in zones]
-    return ZoneArrays(
-        kind=np.array([_INDEX[kind.name] for kind in kinds], dtype=np.int64),
-        numbers=numbers,
-        keep_in=np.array([zone.keep_in for zone in zones], dtype=np.bool_),
-        clearance=np.array([zone.clearance for zone in zones], dtype=np.float64),
-        planes=np.array(
-            [
-                kind.planes_inside if zone.keep_in else 1
-                for kind, zone in zip(kinds, zones, strict=True)
-            ],
-            dtype=np.int64,
-        ),
-        follows=np.array([kind.follows_target for kind in kinds], dtype=np.bool_),
-    )
+def zone_arrays(safe_set: SafeSet) -> Array:
+    """A safe set as rows of numbers (zones, FIRST + 16), for kernels."""
+    rows = np.zeros((len(safe_set.zones), FIRST + NUMBERS))
+    for row, zone in zip(rows, safe_set.zones, strict=True):
+        kind = BY_NAME[zone.shape.kind]
+        row[KIND], row[KEEP_IN], row[CLEARANCE] = _INDEX[kind.name], zone.keep_in, zone.clearance
+        row[PLANES] = kind.planes_inside if zone.keep_in else 1
+        row[FLAT], row[FOLLOWS] = kind.flat, kind.follows_target
+        row[FIRST : FIRST + kind.size] = zone.shape.numbers
+    return rows
 
 
 @compiled
-def surface_at(zones: ZoneArrays, zone: int, which: int, x: float, y: float, z: float) -> Surface:
-    """Distance [m] from a ``zone`` with its clearance to a point, and the normal [1].
+def surface_at(zones: Array, zone: int, which: int, x: float, y: float, z: float) -> Surface:
+    """Distance [m] from a ``zone`` [1] with its clearance to a point, and the normal [1].
 
-    ``x``, ``y``, ``z`` [m, NED] are seen from where the zone is: its movement is taken off.
-    ``which`` [1] of its planes is asked for.
+    ``zones`` (zones, FIRST + 16) [SI] are all of them; ``x``, ``y``, ``z`` [m, NED] are seen from
+    where the zone is: its movement is taken off. ``which`` [1] of its planes is asked for.
     """
-    kind, row, keep_in = zones.kind[zone], zones.numbers[zone], zones.keep_in[zone]
+    kind, keep_in, numbers = zones[zone, KIND], zones[zone, KEEP_IN] > 0.0, zones[zone, FIRST:]
     at = Surface(0.0, 0.0, 0.0, 0.0)
     k = 0
     for plane in literal_unroll(_PLANES):
         if k == kind:
-            at = plane(row, keep_in, which, x, y, z)
+            at = plane(numbers, keep_in, which, x, y, z)
         k += 1  # noqa: SIM113 - numba unrolls no enumerate
-    return Surface(at.distance - zones.clearance[zone], at.nx, at.ny, at.nz)
+    return Surface(at.distance - zones[zone, CLEARANCE], at.nx, at.ny, at.nz)
 
 
 def shifts(
@@ -85,8 +68,8 @@ def shifts(
     elapsed = 1e-6 * (times_us[:, None] - begin_us)
     moved = elapsed[:, :, None] * velocity
     velocities = np.broadcast_to(velocity, moved.shape).copy()
-    for k, follows in enumerate(zone_arrays(safe_set).follows):
-        if follows:
+    for k, zone in enumerate(zones):
+        if BY_NAME[zone.shape.kind].follows_target:
             moved[:, k], velocities[:, k] = p_target, v_target
     return moved, velocities
 
@@ -99,7 +82,7 @@ def surfaces(
 ) -> tuple[Surface, ...]:
     """The plane of each zone near ``p`` [m, NED] at a time, with its clearance taken off.
 
-    Of a zone to keep in, the nearest; a zone that follows the target is left out without one.
+    Of a zone to keep in, the nearest one. A zone that follows the target is left out without one.
     """
     if not safe_set.zones:
         return ()
@@ -109,7 +92,10 @@ def surfaces(
         if shift is None:
             continue
         x, y, z = p[0] - shift[0], p[1] - shift[1], p[2] - shift[2]
-        seen.append(Surface(*_surface_at(arrays, k, 0, x, y, z)))
+        tried = [
+            Surface(*_surface_at(arrays, k, i, x, y, z)) for i in range(int(arrays[k, PLANES]))
+        ]
+        seen.append(min(tried, key=lambda at: at.distance))
     return tuple(seen)
 
 
