@@ -27,7 +27,7 @@ from fsw.flight.state import FlightState, PlanMemory, SetpointMemory
 from fsw.model.body import body_of
 from fsw.model.kinematics import point_in_flight
 from fsw.mpc.reference import still_at
-from fsw.parameters.consistency import stand_off
+from fsw.parameters.consistency import base_reach, loop_tube, stand_off
 from fsw.parameters.flight_config import FlightConfig
 from fsw.signals import (
     Command,
@@ -49,6 +49,7 @@ class Commander:
 
     def __init__(self, config: FlightConfig) -> None:
         self._config = config
+        self._tube_radius = base_reach(loop_tube(config), config.surroundings)
         self._body = body_of(config.planner.body, config.airframe)
         self._generator = SetpointGenerator(config)
         self._modes: dict[Mode, FlightMode] = {mode: kind(config) for mode, kind in MODES.items()}
@@ -161,9 +162,12 @@ class Commander:
         return replace(state, vehicle=replace(state.vehicle, failsafe_from=before))
 
     def _retreating(self, state: FlightState, estimate: StateEstimate) -> SetpointMemory:
-        """A setpoint off every zone by what a plan at rest keeps from it."""
+        """A setpoint off every zone by what a plan at rest keeps from it, and by the tube again.
+
+        What has pushed the vehicle out may go on to push it.
+        """
         config = self._config
-        room = stand_off(config.planner.walls)
+        room = stand_off(config.planner.walls) + self._tube_radius
         place = retreat_place(
             state.mission.safe_set, estimate, self._body, config.airframe.link_length, room
         )

@@ -30,6 +30,7 @@ class Action(Enum):
     NONE = "none"  # not even reported
     WARN = "warn"
     REPLAN = "replanning"  # from the measurement, which the tick does by itself
+    PUSH = "pushed off"  # by the safety filter, in every tick that needs it
     BRAKE = "brake"  # the tick does so whenever no plan is young enough
     HOLD = "holding"
     RETREAT = "retreating"  # off the zones that are too close, then hold
@@ -59,6 +60,7 @@ class Condition(Enum):
     TILT_LOST = "tilt beyond recovery"
     BREACH = "outside the safe set"
     TUBE_LEFT = "off the plan"
+    FILTER_ACTIVE = "too fast towards a zone"
     PLAN_STALE = "no plan for three periods"
     OUTPUT_NOT_FINITE = "actuator command not finite"
     PLAN_REFUSED = "last plan refused"
@@ -194,6 +196,13 @@ FAILSAFES: Final = (
         _always(Action.REPLAN),
         Severity.CRITICAL,
         detail=lambda c: f" by {1e3 * c.state.safety.off_plan_by:.0f} mm",
+        of_vehicle=True,
+    ),
+    Failsafe(
+        Condition.FILTER_ACTIVE,
+        lambda c: c.state.safety.filter_us >= 0,
+        _always(Action.PUSH),
+        Severity.CRITICAL,
         of_vehicle=True,
     ),
     Failsafe(

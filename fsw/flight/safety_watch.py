@@ -25,6 +25,7 @@ _BACK = 0.5  # of the tube's radius: closer than this the vehicle is on its plan
 _BACK_US = 500_000  # for as long
 _CLEAR = 0.01  # m of margin that end a breach
 _CLEAR_US = 500_000
+_FILTER_US = 1_000_000  # of silence end an intervention of the filter
 
 
 class SafetyWatch:
@@ -75,12 +76,16 @@ class SafetyWatch:
         *,
         flies: bool,
     ) -> SafetyMemory:
-        """Look at the margins of the safe set, once a planning period."""
+        """Look at all margins of the safe set, once a planning period."""
         if not flies or not report.margins:
             return memory if memory.breach_us < 0 else replace(memory, breach_us=-1)
-        least, now_us = min(report.margins), estimate.t_us
+        least = min(report.margins)
         if math.isnan(sum(report.margins)):
             least = -math.inf  # which no comparison with NaN would find
+        return self.margin(memory, estimate.t_us, least)
+
+    def margin(self, memory: SafetyMemory, now_us: int, least: float) -> SafetyMemory:
+        """Look at the ``least`` margin [m] that is known now."""
         if not least >= 0.0:
             if memory.breach_us >= 0:
                 return replace(memory, breach_us=now_us)
@@ -92,6 +97,17 @@ class SafetyWatch:
             return replace(memory, breach_us=now_us)
         ended = now_us - memory.breach_us >= _CLEAR_US
         return replace(memory, breach_us=-1) if ended else memory
+
+    def filtered(self, memory: SafetyMemory, now_us: int, *, pushed: bool) -> SafetyMemory:
+        """Note whether the safety filter changed the acceleration of this tick."""
+        if pushed:
+            if memory.filter_us >= 0:
+                return replace(memory, filter_us=now_us)
+            counters = replace(memory.counters, interventions=memory.counters.interventions + 1)
+            return replace(memory, filter_us=now_us, counters=counters)
+        if memory.filter_us < 0 or now_us - memory.filter_us < _FILTER_US:
+            return memory
+        return replace(memory, filter_us=-1)
 
     def _is_low(self, estimate: StateEstimate) -> bool:
         """On the ground, where the plan may well be lower than the vehicle can be."""

@@ -151,6 +151,7 @@ class SafetyMemory:
     replan: bool = False  # from the measurement, next time
     breach_us: int = -1
     breach_by: float = 0.0  # m, when it began
+    filter_us: int = -1  # when the safety filter changed an acceleration last
     counters: SafetyCounters = field(default_factory=SafetyCounters)
 
 

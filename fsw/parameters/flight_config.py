@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 
 from fsw.control.cascade import Inner
 from fsw.control.gains import LoopGains
+from fsw.control.safety_filter import FilterTuning
 from fsw.geometry.geodesy import DEFAULT_ORIGIN
 from fsw.model.airframe import AIRFRAME, Airframe
 from fsw.model.battery import BatteryModel
@@ -91,6 +92,7 @@ class FlightConfig:
     limits: FlightLimits = field(default_factory=FlightLimits)
     surroundings: Surroundings = field(default_factory=Surroundings)
     steering: SetpointLimits = field(default_factory=SetpointLimits)
+    safety_filter: FilterTuning = field(default_factory=FilterTuning)
     battery: BatteryModel = field(default_factory=BatteryModel)
     origin: Origin = DEFAULT_ORIGIN
     soft: bool = False  # fly an inconsistent configuration all the same, with a warning
