@@ -19,11 +19,7 @@ Config = TypeVar("Config")
 
 
 def tuned(config: Config, tuning: Tuning) -> Config:
-    """A configuration with the numbers of a tuning in it.
-
-    Args:
-        config: A frozen dataclass of numbers and of such dataclasses.
-        tuning: Paths and values; a number that is an int stays one.
+    """A configuration, a tree of frozen dataclasses, with a tuning's numbers; an int stays one.
 
     Raises:
         ValueError: A dataclass refuses its new numbers, or a value is no number for its field.

@@ -53,7 +53,7 @@ class Truth:
     qd_arm: tuple[float, ...]  # rad/s
     p_WE: V3  # m, NED, end-effector
     target: TrajectoryPoint  # its reference
-    margins_m: tuple[float, ...]  # m, in the order of ``Simulation.margin_keys``
+    margins_m: tuple[float, ...]  # m, in the order of ``World.keys``
 
 
 class Simulation:
@@ -62,8 +62,6 @@ class Simulation:
     Raises:
         ScenarioError: The scenario contradicts itself or starts outside its safe set.
     """
-
-    step_us = STEP_US
 
     def __init__(self, scenario: Scenario, seed: int) -> None:
         if not (seed >= 0):
@@ -105,11 +103,6 @@ class Simulation:
         return self._evaluator.ended
 
     @property
-    def margin_keys(self) -> tuple[str, ...]:
-        """Names of the margins, e.g. ``front/end_effector``."""
-        return self._evaluator.world.keys
-
-    @property
     def min_margin_m(self) -> float | None:
         """Smallest margin so far [m], None without constraints."""
         record = self._evaluator.record
@@ -136,10 +129,6 @@ class Simulation:
         """The vehicle has been silent since this step: the run does not count as flown."""
         if self.ended is None or self.ended.kind is not EndKind.STOPPED:  # which says it itself
             self._evaluator.silent = f"the flight software was silent since step {step}"
-
-    def target_at(self, time_s: float) -> TrajectoryPoint:
-        """End-effector reference ``time_s`` after the start of the simulation."""
-        return self.clock.target_at(time_s)
 
     def end(self, kind: EndKind, sentence: str) -> None:
         """End the run from outside; the first reason stands."""
@@ -186,7 +175,7 @@ class Simulation:
             q_arm=exact.q_arm,
             qd_arm=exact.qd_arm,
             p_WE=points[2],
-            target=self.target_at(self.time_s),
+            target=self.clock.target_at(self.time_s),
             margins_m=self._evaluator.margins(points, self.time_s),
         )
 

@@ -9,6 +9,7 @@ mode commands of the scenario's pilot come on the first two ticks.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 from fsw.flight.autopilot import Autopilot
@@ -53,22 +54,15 @@ _FOLLOW = Command(
 State = TypeVar("State")
 
 
+@dataclass
 class ClosedLoop(Generic[State]):
     """Plant, tick and planner in one loop; the caller gives the inputs of each step."""
 
-    def __init__(
-        self,
-        simulation: Simulation,
-        tick: Callable[[State, TickInputs], tuple[State, TickOutputs]],
-        state: State,
-        planner: PlanService,
-        airframe: Airframe,
-    ) -> None:
-        self.simulation = simulation
-        self.state = state
-        self.planner = planner
-        self._tick = tick
-        self._airframe = airframe
+    simulation: Simulation
+    tick: Callable[[State, TickInputs], tuple[State, TickOutputs]]
+    state: State
+    planner: PlanService
+    airframe: Airframe
 
     def sense(self) -> SensorFrame:
         """Sensor readings of this step."""
@@ -99,14 +93,14 @@ class ClosedLoop(Generic[State]):
 
     def step(self, inputs: TickInputs) -> TickOutputs:
         """Tick, plan, advance."""
-        self.state, outputs = self._tick(self.state, inputs)
+        self.state, outputs = self.tick(self.state, inputs)
         if outputs.plan_request is not None:
             self.planner.submit(outputs.plan_request)
         self.simulation.advance(self._controls(outputs))
         return outputs
 
     def _controls(self, outputs: TickOutputs) -> Controls:
-        sent, airframe = outputs.actuators, self._airframe
+        sent, airframe = outputs.actuators, self.airframe
         f1, f2, f3, f4 = (thrust / airframe.rotor_thrust_max for thrust in sent.rotor_thrust)
         torque = tuple(value / airframe.joint_torque_max for value in sent.joint_torque)
         return Controls((f1, f2, f3, f4), torque, outputs.snapshot.armed)

@@ -59,16 +59,13 @@ class Outcome:
     reason: str
     duration_s: float = 0.0
     te_m: float | None = None
-    te_max_m: float | None = None
     margin_m: float | None = None
-    margin_key: str | None = None
     cs_sum: float = 0.0
     cs_mean: float = 0.0
     ce_sum: float = 0.0
     ce_mean: float = 0.0
     tc_p50_us: float = 0.0
     tc_p99_us: float = 0.0
-    tc_max_us: float = 0.0
     plans: int = 0
     failures: int = 0  # planning steps without a plan
     error: bool = False  # the flight itself broke, not the vehicle
@@ -104,16 +101,13 @@ def score(seed: int, result: FlightResult) -> Outcome:
         reason=truth.end_reason,
         duration_s=truth.duration_s,
         te_m=truth.tracking_error_rms_m,
-        te_max_m=truth.tracking_error_max_m,
         margin_m=truth.min_margin_m,
-        margin_key=truth.min_margin_key,
         cs_sum=smoothness["sum"],
         cs_mean=smoothness["mean"],
         ce_sum=effort["sum"],
         ce_mean=effort["mean"],
         tc_p50_us=float(np.median(steps)),
         tc_p99_us=float(np.quantile(steps, 0.99)),
-        tc_max_us=float(steps.max()),
         plans=planner.plans,
         failures=planner.failures,
     )

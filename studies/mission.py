@@ -37,5 +37,5 @@ def announced(scenario: Scenario) -> tuple[SafeSetAnnouncement, ...]:
 def target(clock: MissionClock, t_us: int) -> EndEffectorTarget:
     """The end-effector reference at a time stamp."""
     time_s = 1e-6 * (t_us - START_US)
-    point = clock.target_at(time_s)
-    return EndEffectorTarget(t_us, point.p, point.v, point.a, clock.yaw_at(time_s))
+    at = clock.target_at(time_s)
+    return EndEffectorTarget(t_us, at.p, at.v, at.a, clock.yaw_at(time_s))

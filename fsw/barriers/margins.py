@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fsw.barriers.safe_approach import BarrierTuning
-from fsw.barriers.zone_rows import Tunings, fill_starts
+from fsw.barriers.zone_rows import fill_starts, settings
 from fsw.compiled import of_fixed_types
 from fsw.model.body import Body
 from fsw.model.linearisation import FRAME, put_arm
@@ -30,7 +30,7 @@ class Margins:
         """
         self.parts = tuple(part.name for part in body.parts)
         self._probes, self._links = body.probes, links
-        self._tunings = Tunings(*(tuning.numbers(period) for tuning in tunings))
+        self._settings = settings(tunings, period)
         self._fill = of_fixed_types(fill_starts)
 
     def report(
@@ -52,7 +52,7 @@ class Margins:
         vehicle = frame_of(estimate, self._links)
         size = sum(1 if follows else len(self.parts) for follows in following)
         margins, values = np.empty(size), np.empty(size)
-        how = (zones, shift[0], speed[0], self._probes, vehicle, self._tunings)
+        how = (zones, shift[0], speed[0], self._probes, vehicle, self._settings)
         self._fill(*how, True, margins)
         self._fill(*how, False, values)
         return ConstraintReport(safe_set.kind, tuple(margins.tolist()), tuple(values.tolist()))

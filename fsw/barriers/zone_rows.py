@@ -18,21 +18,22 @@ Source: docs/equations.md E10, E11, E14, E15, E22, E23.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
 from fsw.barriers.cbf_row import barrier_value, cbf_lower_bound
 from fsw.barriers.constraint_block import Rows, TargetPoints, block
 from fsw.barriers.safe_approach import BarrierNumbers, BarrierTuning, safe_approach_slope
-from fsw.compiled import compiled, of_fixed_types
+from fsw.compiled import leaf, of_fixed_types
 from fsw.geometry.vectors import add_scaled, dot
 from fsw.model.body import BEGIN, CAPSULE, DISC, END, FORM, ON, PART, RADIUS, RIM, TURN, Body
 from fsw.model.linearisation import (
+    TURNED,
     Horizon,
     Linearisation,
     chain,
     fill_slopes,
+    fill_turned,
     in_axes,
     position,
     velocity,
@@ -58,11 +59,25 @@ _LEVER = 0.6  # m, no place of the vehicle is farther from the base
 _LEAST_THRUST = 6.0  # m/s^2, specific, within the limits of the inputs
 
 
-class Tunings(NamedTuple):
-    """Of the zones to keep off, and of the sphere that follows the target."""
+# Entries of the settings, for kernels: one array costs what one number costs to hand over.
+_DISTANCES, _TIGHTENING, _FIRST, _MOST, _KEPT, _FOLLOWING = 0, 1, 2, 3, 7, 13
 
-    kept: BarrierNumbers
-    following: BarrierNumbers
+
+def settings(
+    tunings: tuple[BarrierTuning, BarrierTuning],
+    period: float,
+    *,
+    distances: bool = False,
+    tightening: float = 0.0,
+    first_node: int = 1,
+    most: Vec4 = (math.inf, 0.0, 0.0, 0.0),
+) -> Array:
+    """What the kernels need to know besides geometry (19,) [SI]; arguments as of ``ZoneRows``.
+
+    ``period`` [s] is the planner's, ``first_node`` [1] the first with rows.
+    """
+    numbers = [entry for tuning in tunings for entry in tuning.numbers(period)]
+    return np.array([distances, tightening, first_node, *most, *numbers], dtype=np.float64)
 
 
 class ZoneRows:
@@ -88,17 +103,24 @@ class ZoneRows:
         default no row is left out.
         """
         self._probes = body.probes
-        self._tunings = Tunings(*(tuning.numbers(model.period) for tuning in tunings))
-        self._distances, self._tightening = distances, tightening
-        self._period_us, self._most = round(1e6 * model.period), most
+        self._period_us = round(1e6 * model.period)
         self.update(safe_set)
         following = self._zones[:, FOLLOWS] > 0.0
         per_zone = self._zones[:, PLANES] * np.where(following, 1, len(self._probes))
         skipped = tunings[0].skipped_nodes if skipped_nodes is None else skipped_nodes
-        self._first = 1 + skipped
+        first_node = 1 + skipped
+        self._work = (np.empty((TURNED, 3)), np.zeros((2, STATES)))
+        self._settings = settings(
+            tunings,
+            model.period,
+            distances=distances,
+            tightening=tightening,
+            first_node=first_node,
+            most=most,
+        )
         parts = len(body.parts)
         starts = sum(1 if follows else parts for follows in following)
-        self.rows = block(tuple(per_zone.astype(int).tolist()), self._first, model.horizon, starts)
+        self.rows = block(tuple(per_zone.astype(int).tolist()), first_node, model.horizon, starts)
         self._rows, self._fill = self.rows.rows, of_fixed_types(_fill)
 
     def update(self, safe_set: SafeSet) -> None:
@@ -117,10 +139,9 @@ class ZoneRows:
             self._moves,
             self._probes,
             horizon.horizon,
-            self._tunings,
-            (self._distances, self._tightening, self._first),
-            self._most,
+            self._settings,
             self._rows,
+            self._work,
         )
 
 
@@ -129,58 +150,61 @@ def layout(safe_set: SafeSet) -> tuple[tuple[str, bool], ...]:
     return tuple((zone.shape.kind, zone.keep_in) for zone in safe_set.zones)
 
 
-@compiled
+@leaf
+def _tuning(settings: Array, follows: bool) -> BarrierNumbers:
+    at = _FOLLOWING if follows else _KEPT
+    return BarrierNumbers(
+        settings[at],
+        settings[at + 1],
+        settings[at + 2],
+        settings[at + 3],
+        settings[at + 4],
+        int(settings[at + 5]),
+    )
+
+
+@leaf
 def _fill(
     zones: Array,
     moves: tuple[Array, Array],
     probes: Array,
     horizon: Horizon,
-    tunings: Tunings,
-    how: tuple[bool, float, int],
-    most: Vec4,
+    settings: Array,
     rows: Rows,
+    work: tuple[Array, Array],
 ) -> None:
     """All rows; ``moves`` are shift and velocity of the zones at the nodes (n + 1, zones, 3)."""
-    distances, tightening, first = how
+    distances = settings[_DISTANCES] > 0.0
     frames, impulse, (shifts, speeds) = horizon.frames, horizon.impulse, moves
     gradients, values, least_values = rows.gradient, rows.value, rows.lower_bound
-    slopes = np.zeros((2, STATES))
+    turned, slopes = work
     start = frames[0]
-    fill_starts(zones, shifts[0], speeds[0], probes, start, tunings, distances, rows.start)
+    fill_starts(zones, shifts[0], speeds[0], probes, start, settings, distances, rows.start)
     row = 0
-    for i in range(first, len(frames)):
-        frame, shift, speed = frames[i], shifts[i], speeds[i]
-        reach = _reach(horizon, i, most)
+    for i in range(int(settings[_FIRST]), len(frames)):
+        frame, shift = frames[i], shifts[i]
+        reach = _reach(horizon, i, settings)
+        approach = 0.0 if distances else reach[1]
+        turned_for = (0.0, 0.0, 0.0)
         for k in range(len(zones)):
             follows = zones[k, FOLLOWS] > 0.0
-            tuning = tunings.following if follows else tunings.kept
-            speed_at_start = (speeds[0, k, 0], speeds[0, k, 1], speeds[0, k, 2])
-            moved = (
-                shift[k, 0] - shifts[0, k, 0],
-                shift[k, 1] - shifts[0, k, 1],
-                shift[k, 2] - shifts[0, k, 2],
-            )
+            tuning = _tuning(settings, follows)
             for b in range(1 if follows else len(probes)):
                 radius, on = 0.0 if follows else probes[b, RADIUS], int(probes[b, ON])
                 for which in range(int(zones[k, PLANES])):
                     local, at, binds = nearest_place(zones, k, which, shift, probes, b, frame)
                     n, d = (at.nx, at.ny, at.nz), at.distance - radius
-                    value, least, steepness = d, tightening, 1.0
+                    value, least, steepness = d, settings[_TIGHTENING], 1.0
                     if binds and not distances:
-                        p, p0 = position(frame, on, local), position(start, on, local)
-                        # The plane of the node, where the zone was at node 0, and the probe then.
-                        d0 = d + dot(n, p0) - dot(n, p) + dot(n, moved)
-                        rate0 = dot(n, velocity(start, on, local)) - dot(n, speed_at_start)
-                        rate = dot(n, velocity(frame, on, local))
-                        rate -= n[0] * speed[k, 0] + n[1] * speed[k, 1] + n[2] * speed[k, 2]
-                        value = barrier_value(d, rate, tuning)
-                        least = cbf_lower_bound(barrier_value(d0, rate0, tuning), i, tuning)
-                        steepness = safe_approach_slope(d, tuning.alpha, tuning.slope)
-                        binds = value - least < steepness * reach[0] + reach[1]
-                    elif binds:
-                        binds = value - least < reach[0]
+                        value, least, steepness = _barrier(
+                            frame, start, on, local, (n, d), (shifts, speeds), i, k, tuning
+                        )
+                    binds = binds and value - least < steepness * reach[0] + approach
                     if binds:
-                        fill_slopes(frame, on, local, n, slopes)
+                        if n != turned_for:
+                            fill_turned(frame, n, turned)
+                            turned_for = n
+                        fill_slopes(frame, on, local, n, turned, slopes)
                         if distances:
                             chain(impulse, i, slopes[0], gradients[row])
                         else:
@@ -194,13 +218,42 @@ def _fill(
                     row += 1
 
 
-@compiled
-def _reach(horizon: Horizon, node: int, most: Vec4) -> tuple[float, float]:
+@leaf
+def _barrier(
+    frame: Array,
+    start: Array,
+    on: int,
+    local: Vec3,
+    plane: tuple[Vec3, float],
+    moves: tuple[Array, Array],
+    node: int,
+    zone: int,
+    tuning: BarrierNumbers,
+) -> tuple[float, float, float]:
+    """h of a place, the least that is allowed, and the slope of S: all at the plane of a node."""
+    (n, d), (shifts, speeds) = plane, moves
+    p, p0 = position(frame, on, local), position(start, on, local)
+    v, v0 = velocity(frame, on, local), velocity(start, on, local)
+    # Where the place was at node 0, against the plane where the zone was then.
+    d0, rate0, rate = d, 0.0, 0.0
+    for axis in range(3):
+        moved = shifts[node, zone, axis] - shifts[0, zone, axis]
+        d0 += n[axis] * (p0[axis] - p[axis] + moved)
+        rate0 += n[axis] * (v0[axis] - speeds[0, zone, axis])
+        rate += n[axis] * (v[axis] - speeds[node, zone, axis])
+    least = cbf_lower_bound(barrier_value(d0, rate0, tuning), node, tuning)
+    steepness = safe_approach_slope(d, tuning.alpha, tuning.slope)
+    return barrier_value(d, rate, tuning), least, steepness
+
+
+@leaf
+def _reach(horizon: Horizon, node: int, settings: Array) -> tuple[float, float]:
     """How far [m] and how much faster [m/s] any place can be at a node than at the guess.
 
-    A bound for all inputs within their limits, ``most``: horizontal, vertical, yaw, joints. A
+    A bound for all inputs within their limits: horizontal, vertical, yaw, joints. A
     place swings about the base by the tilt that a change of acceleration takes, by yaw and joints.
     """
+    most = settings[_MOST : _MOST + 4]
     far = fast = up = up_fast = 0.0
     tilt = tilt_rate = turn = turn_rate = swing = swing_rate = 0.0
     for step in range(node):
@@ -230,20 +283,20 @@ def _reach(horizon: Horizon, node: int, most: Vec4) -> tuple[float, float]:
     )
 
 
-@compiled
+@leaf
 def fill_starts(
     zones: Array,
     shift: Array,
     speed: Array,
     probes: Array,
     frame: Array,
-    tunings: Tunings,
+    settings: Array,
     distances: bool,
     starts: Array,
 ) -> None:
     """The least value of each zone and part at one instant: h [m/s], or the distance [m].
 
-    ``zones`` and ``probes`` are rows of numbers [SI], ``frame`` (FRAME,) [SI] is the vehicle;
+    ``zones``, ``probes`` and ``settings`` are numbers [SI], ``frame`` (FRAME,) [SI] the vehicle;
     ``shift`` (zones, 3) [m, NED] and ``speed`` (zones, 3) [m/s, NED] those of the zones. Into
     ``starts`` (zones x parts,), zone by zone; a zone that follows the target has one entry.
     """
@@ -251,7 +304,7 @@ def fill_starts(
     first = 0
     for k in range(len(zones)):
         follows = zones[k, FOLLOWS] > 0.0
-        tuning = tunings.following if follows else tunings.kept
+        tuning = _tuning(settings, follows)
         tried = 1 if follows else len(probes)
         # Of the sphere the paper's pair h2a and h2b: towards the nearest place, and away from it.
         planes = 2 if follows else int(zones[k, PLANES])
@@ -268,7 +321,7 @@ def fill_starts(
         first += int(probes[tried - 1, PART]) + 1
 
 
-@compiled
+@leaf
 def nearest_place(
     zones: Array, zone: int, which: int, shift: Array, probes: Array, probe: int, frame: Array
 ) -> tuple[Vec3, Surface, bool]:
@@ -288,16 +341,17 @@ def nearest_place(
     return begin, _seen(zones, zone, which, shift, x), True
 
 
-@compiled
+@leaf
 def _nearest_on_capsule(
     zones: Array, zone: int, which: int, shift: Array, probe: Array, frame: Array
 ) -> tuple[Vec3, Surface, bool]:
     begin = (probe[BEGIN], probe[BEGIN + 1], probe[BEGIN + 2])
     end = (probe[END], probe[END + 1], probe[END + 2])
     first = position(frame, int(probe[ON]), begin)
-    if zones[zone, FLAT] > 0.0:  # then an end is nearest, which is a sphere of another part
-        return begin, _seen(zones, zone, which, shift, first), False
     last = position(frame, int(probe[ON]), end)
+    if zones[zone, FLAT] > 0.0:  # then an end is nearest, which is a sphere of another part
+        at, other = _seen(zones, zone, which, shift, first), _seen(zones, zone, which, shift, last)
+        return (begin, at, False) if at.distance <= other.distance else (end, other, False)
     axis = (last[0] - first[0], last[1] - first[1], last[2] - first[2])
     square = dot(axis, axis)
     share = 0.5
@@ -318,7 +372,7 @@ def _nearest_on_capsule(
     return local, at, 0.0 < share < 1.0
 
 
-@compiled
+@leaf
 def _nearest_on_disc(
     zones: Array, zone: int, which: int, shift: Array, probe: Array, frame: Array
 ) -> tuple[Vec3, Surface, bool]:
@@ -327,6 +381,8 @@ def _nearest_on_disc(
     local = begin
     at = _seen(zones, zone, which, shift, position(frame, on, local))
     n1, n2, n3 = in_axes(frame, (at.nx, at.ny, at.nz))
+    if probe[TURN] > 0.0 and abs(n3) < 0.5 * _AXIAL:
+        return local, at, False
     u = v = 0.0  # of the place, from the disc's centre
     for _ in range(_NEAREST_STEPS):
         step = 1e3 if flat else max(at.distance, 0.05)
@@ -352,7 +408,7 @@ def _nearest_on_disc(
     return local, _seen(zones, zone, which, shift, position(frame, on, local)), True
 
 
-@compiled
+@leaf
 def _seen(zones: Array, zone: int, which: int, shift: Array, x: Vec3) -> Surface:
     """The plane of a zone near a place in the world."""
     return surface_at(

@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Final, cast
 
 from fsw.geometry.geodesy import DEFAULT_ORIGIN, to_local
-from fsw.link.wire import decode, decode_commands, decode_setpoints, message_ids
+from fsw.link.wire import decode, decode_commands, message_ids
 from fsw.link.wire.decode import Numbers
+from fsw.link.wire.decode_setpoints import (
+    attitude_setpoint,
+    body_setpoint,
+    end_effector_setpoint,
+    joint_setpoint,
+)
 from fsw.signals import (
     AttitudeSetpoint,
     Command,
@@ -41,17 +47,18 @@ UNKNOWN_SOURCE: Final = MessageSource(0, 0, "unknown")
 Setpoint = MotionSetpoint | AttitudeSetpoint | JointSetpoint
 
 
-@dataclass(frozen=True, slots=True)
-class Setpoints:
-    """The newest offboard setpoints; at most one of motion and attitude."""
+@dataclass(slots=True)
+class Received:
+    """What came since the last tick."""
 
-    motion: MotionSetpoint | None = None
+    commands: list[Command] = field(default_factory=list)  # in order of arrival
+    targets: list[EndEffectorTarget] = field(default_factory=list)  # the same
+    announced: list[SafeSetAnnouncement] = field(default_factory=list)  # safe sets, the same
+    motion: MotionSetpoint | None = None  # the newest; at most one of motion and attitude
     attitude: AttitudeSetpoint | None = None
     joints: JointSetpoint | None = None
-    refused: int = 0  # that were of no use
-
-
-NO_SETPOINTS: Final = Setpoints()
+    refused_setpoints: int = 0  # that were of no use
+    station_heard: bool = False  # a ground station's heartbeat
 
 
 @dataclass(slots=True)
@@ -72,11 +79,7 @@ class Inbox:
         """Begin empty; commands name places on Earth, from ``origin`` of the local frame on."""
         self._locate = partial(to_local, origin)
         self.refused = 0  # messages with numbers of no use, or too many of them
-        self._commands: list[Command] = []
-        self._targets: list[EndEffectorTarget] = []
-        self._setpoints = NO_SETPOINTS
-        self._station_heard = False
-        self._announced: list[SafeSetAnnouncement] = []
+        self._received = Received()
         # By source: the walls of two announcers must not mix.
         self._incomplete: dict[MessageSource, _Incomplete] = {}
         self._source = UNKNOWN_SOURCE  # of the frame that is read now
@@ -85,18 +88,12 @@ class Inbox:
             message_ids.COMMAND_INT: partial(self._command, decode.command_int),
             message_ids.SET_MODE: partial(self._command, decode.set_mode),
             message_ids.END_EFFECTOR_TARGET: self._target,
-            message_ids.SET_POSITION_TARGET_LOCAL_NED: partial(
-                self._setpoint, 13, decode_setpoints.body_setpoint
-            ),
-            message_ids.SET_ATTITUDE_TARGET: partial(
-                self._setpoint, 9, decode_setpoints.attitude_setpoint
-            ),
-            message_ids.ARM_JOINT_SETPOINT: partial(
-                self._setpoint, 13, decode_setpoints.joint_setpoint
-            ),
+            message_ids.SET_POSITION_TARGET_LOCAL_NED: partial(self._setpoint, body_setpoint),
+            message_ids.SET_ATTITUDE_TARGET: partial(self._setpoint, attitude_setpoint),
+            message_ids.ARM_JOINT_SETPOINT: partial(self._setpoint, joint_setpoint),
             message_ids.HEARTBEAT: self._heartbeat,
-            message_ids.OBSTACLE_WALL: partial(self._obstacle, 5, decode.obstacle_wall),
-            message_ids.OBSTACLE_POINT: partial(self._obstacle, 4, decode.obstacle_point),
+            message_ids.OBSTACLE_WALL: partial(self._obstacle, decode.obstacle_wall),
+            message_ids.OBSTACLE_POINT: partial(self._obstacle, decode.obstacle_point),
             message_ids.WORKSPACE_SPHERE: self._sphere,
         }
 
@@ -112,33 +109,9 @@ class Inbox:
             self._source = source
             handler(frame)
 
-    def take_commands(self) -> tuple[Command, ...]:
-        """Hand over the commands, in order of arrival."""
-        if not self._commands:
-            return ()
-        taken = tuple(self._commands)
-        self._commands.clear()
-        return taken
-
-    def take_targets(self) -> tuple[EndEffectorTarget, ...]:
-        """Hand over the trajectory points, in order of arrival."""
-        if not self._targets:
-            return ()
-        taken = tuple(self._targets)
-        self._targets.clear()
-        return taken
-
-    def take_announced(self) -> tuple[SafeSetAnnouncement, ...]:
-        """Hand over the safe sets that are complete, in order of arrival."""
-        if not self._announced:
-            return ()
-        taken = tuple(self._announced)
-        self._announced.clear()
-        return taken
-
-    def take_setpoints(self) -> Setpoints:
-        """Hand over the newest setpoints for now."""
-        taken, self._setpoints = self._setpoints, NO_SETPOINTS
+    def take(self) -> Received:
+        """Hand over what came."""
+        taken, self._received = self._received, Received()
         return taken
 
     def take_inputs(
@@ -153,80 +126,71 @@ class Inbox:
 
         The sensors' readings are ``stale_us`` older than their stamp says.
         """
-        setpoints = self.take_setpoints()
+        came = self.take()
         # By position: it is made in every tick.
         return TickInputs(
             sensors,
             plan,
-            self.take_commands(),
-            self.take_targets(),
-            self.take_announced(),
-            setpoints.motion,
-            setpoints.attitude,
-            setpoints.joints,
-            setpoints.refused,
-            self.take_station_heard(),
+            tuple(came.commands),
+            tuple(came.targets),
+            tuple(came.announced),
+            came.motion,
+            came.attitude,
+            came.joints,
+            came.refused_setpoints,
+            came.station_heard,
             mission,
             tuning,
             stale_us,
         )
 
-    def take_station_heard(self) -> bool:
-        """Whether a ground station's heartbeat came."""
-        taken, self._station_heard = self._station_heard, False
-        return taken
-
     def _command(self, read: Callable[[Frame], CommandRequest | None], frame: Frame) -> None:
         request = read(frame)
         if request is None:
             return
-        if len(self._commands) >= _MAX_COMMANDS:
+        if len(self._received.commands) >= _MAX_COMMANDS:
             self.refused += 1
             return
-        self._commands.append(decode_commands.command(request, self._locate))
+        self._received.commands.append(decode_commands.command(request, self._locate))
 
     def _target(self, frame: Frame) -> None:
         values = cast(Numbers, frame.payload_values)
         if values[0] == 0:  # not for a later time: for now
-            self._setpoint(13, decode_setpoints.end_effector_setpoint, frame)
+            self._setpoint(end_effector_setpoint, frame)
             return
-        if not decode.for_this_vehicle(values[13], values[14]):
+        if not decode.for_this_vehicle(frame):
             return
         target = decode.end_effector_target(values)
-        if target is None or len(self._targets) >= _MAX_TARGETS:
+        if target is None or len(self._received.targets) >= _MAX_TARGETS:
             self.refused += 1
             return
-        self._targets.append(target)
+        self._received.targets.append(target)
 
-    def _setpoint(self, at: int, read: Callable[[Numbers], Setpoint | None], frame: Frame) -> None:
-        """Keep the newest of each kind; one for another vehicle is refused like a wrong one.
-
-        The target stands at the values ``at`` and behind.
-        """
+    def _setpoint(self, read: Callable[[Numbers], Setpoint | None], frame: Frame) -> None:
+        """Keep the newest of each kind; one for another vehicle is refused like a wrong one."""
         values = cast(Numbers, frame.payload_values)
-        setpoint = read(values) if decode.for_this_vehicle(*values[at : at + 2]) else None
-        kept = self._setpoints
+        setpoint = read(values) if decode.for_this_vehicle(frame) else None
+        received = self._received
         if setpoint is None:
             self.refused += 1
-            self._setpoints = replace(kept, refused=kept.refused + 1)
+            received.refused_setpoints += 1
         elif isinstance(setpoint, JointSetpoint):
-            self._setpoints = replace(kept, joints=setpoint)
+            received.joints = setpoint
         elif isinstance(setpoint, AttitudeSetpoint):
-            self._setpoints = replace(kept, attitude=setpoint, motion=None)
+            received.attitude, received.motion = setpoint, None
         else:
-            self._setpoints = replace(kept, motion=setpoint, attitude=None)
+            received.motion, received.attitude = setpoint, None
 
     def _heartbeat(self, frame: Frame) -> None:
         if frame.payload_values[1] == _GROUND_STATION:
-            self._station_heard = True
+            self._received.station_heard = True
 
     def _obstacle(
-        self, at: int, read: Callable[[Numbers], decode.IndexedObstacle | None], frame: Frame
+        self, read: Callable[[Numbers], decode.IndexedObstacle | None], frame: Frame
     ) -> None:
-        values = cast(Numbers, frame.payload_values)
-        if not decode.for_this_vehicle(*values[at : at + 2]):
+        if not decode.for_this_vehicle(frame):
             return
-        indexed = read(values)
+        indexed = read(cast(Numbers, frame.payload_values))
         if indexed is None:
             self.refused += 1
             return
@@ -245,17 +209,16 @@ class Inbox:
 
     def _announce(self, safe_set: SafeSet) -> None:
         """Keep the newest safe set of a source."""
-        kept = [one for one in self._announced if one.source != self._source]
+        kept = [one for one in self._received.announced if one.source != self._source]
         if len(kept) >= _MAX_ANNOUNCEMENTS:
             self.refused += 1
             return
-        self._announced = [*kept, SafeSetAnnouncement(self._source, safe_set)]
+        self._received.announced = [*kept, SafeSetAnnouncement(self._source, safe_set)]
 
     def _sphere(self, frame: Frame) -> None:
-        values = cast(Numbers, frame.payload_values)
-        if not decode.for_this_vehicle(values[4], values[5]):
+        if not decode.for_this_vehicle(frame):
             return
-        sphere = decode.workspace_sphere(values)
+        sphere = decode.workspace_sphere(cast(Numbers, frame.payload_values))
         if sphere is None:
             self.refused += 1
             return

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import struct
+from dataclasses import astuple
 from operator import attrgetter
 from struct import Struct
 from typing import Any, Final
@@ -17,6 +18,7 @@ from fsw.geometry.rotation import quaternion_from_matrix
 from fsw.log import topics
 from fsw.log.json_codec import JsonCodec
 from fsw.model.kinematics import point_in_flight
+from fsw.ports import GroupTiming
 from fsw.signals import (
     CommandRequest,
     FlightSnapshot,
@@ -247,13 +249,11 @@ class LogEncoder:
         )
 
 
-def loop_timing(t_us: int, group: int, counts: tuple[int, ...], times: tuple[float, ...]) -> bytes:
-    """A record of loop_timing for rate group 0, the tick, or 1, the planner.
-
-    ``counts`` are ticks, late and skipped ones, and the period [us]; ``times`` [us] are execution
-    and lateness, each median, 99th percentile and most.
-    """
-    return _TIMING.pack((*_TIMING.heads, t_us, *counts, *times, group))
+def loop_timing(t_us: int, group: int, timing: GroupTiming) -> bytes:
+    """A record of loop_timing for rate group 0, the tick, or 1, the planner."""
+    period_us, *counts_and_times, _ = astuple(timing)
+    counts, times = counts_and_times[:3], counts_and_times[3:]
+    return _TIMING.pack((*_TIMING.heads, t_us, *counts, period_us, *times, group))
 
 
 def _plan_changed(now: FlightSnapshot, last: FlightSnapshot) -> bool:

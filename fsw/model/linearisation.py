@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fsw.compiled import compiled
+from fsw.compiled import compiled, leaf
 from fsw.model.body import ON_BASE, ON_LINK1, ON_LINK2
 from fsw.model.kinematics import body_axes, links
 from fsw.model.prediction import (
@@ -48,6 +48,7 @@ _AT_D_R, _AT_D_TURNING = 24, 60  # their derivatives in each turning state
 _AT_SWAY = 96  # of each link: sine and cosine of its angle from straight down, and its rate
 _AT_LINKS = 102  # lengths
 FRAME = 104
+TURNED = 10  # matrices in it
 
 
 class Horizon(NamedTuple):
@@ -139,7 +140,7 @@ class Linearisation:
 
 @compiled
 def _refill(horizon: Horizon, tracked: Tracked, lengths: Vec2, com: Vec2) -> None:
-    slopes = np.zeros((2, STATES))
+    turned, slopes = np.empty((TURNED, 3)), np.zeros((2, STATES))
     tip = (0.0, 0.0, lengths[1])
     for i in range(horizon.states.shape[0]):
         frame = horizon.frames[i]
@@ -151,7 +152,8 @@ def _refill(horizon: Horizon, tracked: Tracked, lengths: Vec2, com: Vec2) -> Non
             tracked.position[i, k], tracked.velocity[i, k] = p[k], v[k]
             if i > 0:
                 n = (1.0 * (k == 0), 1.0 * (k == 1), 1.0 * (k == 2))
-                fill_slopes(frame, ON_LINK2, tip, n, slopes)
+                fill_turned(frame, n, turned)
+                fill_slopes(frame, ON_LINK2, tip, n, turned, slopes)
                 chain(horizon.impulse, i, slopes[0], tracked.d_position[i, k])
                 chain(horizon.impulse, i, slopes[1], tracked.d_velocity[i, k])
         _fill_arm_com(horizon, i, com, tracked)
@@ -235,7 +237,7 @@ def _cross(a: Array, b: Array) -> Vec3:
     )
 
 
-@compiled
+@leaf
 def in_body(frame: Array, on: int, local: Vec3) -> tuple[Vec3, Vec3]:
     """Where a place of the vehicle is in the body [m, FRD], and its velocity there [m/s].
 
@@ -254,7 +256,7 @@ def in_body(frame: Array, on: int, local: Vec3) -> tuple[Vec3, Vec3]:
     return (x, 0.0, z), (vx, 0.0, vz)
 
 
-@compiled
+@leaf
 def position(frame: Array, on: int, local: Vec3) -> Vec3:
     """Position of a place [m, NED]; ``frame`` (FRAME,) [SI], ``on`` [1], ``local`` [m] as above."""
     (x, y, z), _ = in_body(frame, on, local)
@@ -265,7 +267,7 @@ def position(frame: Array, on: int, local: Vec3) -> Vec3:
     )
 
 
-@compiled
+@leaf
 def velocity(frame: Array, on: int, local: Vec3) -> Vec3:
     """Velocity of a place [m/s, NED]; ``frame`` (FRAME,) [SI], ``on``, ``local`` [m] as above."""
     (x, y, z), (vx, _, vz) = in_body(frame, on, local)
@@ -292,50 +294,60 @@ def velocity(frame: Array, on: int, local: Vec3) -> Vec3:
     )
 
 
-@compiled
-def times_matrix(frame: Array, at: int, n: Vec3) -> Vec3:
-    """``n`` [1, NED] times the matrix that begins ``at`` [1] in a ``frame`` (FRAME,) [SI]."""
+@leaf
+def in_axes(frame: Array, n: Vec3) -> Vec3:
+    """A direction ``n`` [1, NED] in the body's axes, of a ``frame`` (FRAME,) [SI]."""
     return (
-        n[0] * frame[at] + n[1] * frame[at + 3] + n[2] * frame[at + 6],
-        n[0] * frame[at + 1] + n[1] * frame[at + 4] + n[2] * frame[at + 7],
-        n[0] * frame[at + 2] + n[1] * frame[at + 5] + n[2] * frame[at + 8],
+        n[0] * frame[6] + n[1] * frame[9] + n[2] * frame[12],
+        n[0] * frame[7] + n[1] * frame[10] + n[2] * frame[13],
+        n[0] * frame[8] + n[1] * frame[11] + n[2] * frame[14],
     )
 
 
-@compiled
-def in_axes(frame: Array, n: Vec3) -> Vec3:
-    """A direction ``n`` [1, NED] in the body's axes, of a ``frame`` (FRAME,) [SI]."""
-    return times_matrix(frame, _AT_R, n)
+@leaf
+def fill_turned(frame: Array, n: Vec3, turned: Array) -> None:
+    """``n`` [1, NED] times every matrix of a ``frame`` (FRAME,) [SI], into ``turned`` (10, 3) [SI].
+
+    R_WB and its rate, their derivatives in the turning states, in the order of the frame.
+    """
+    for k in range(TURNED):
+        at = _AT_R + 9 * k
+        for column in range(3):
+            turned[k, column] = (
+                n[0] * frame[at + column]
+                + n[1] * frame[at + 3 + column]
+                + n[2] * frame[at + 6 + column]
+            )
 
 
-@compiled
-def fill_slopes(frame: Array, on: int, local: Vec3, n: Vec3, slopes: Array) -> None:
+@leaf
+def fill_slopes(frame: Array, on: int, local: Vec3, n: Vec3, turned: Array, slopes: Array) -> None:
     """Derivatives of ``n . p`` and ``n . v`` of a place in the state, into ``slopes`` (2, 19) [SI].
 
     ``frame`` (FRAME,) [SI], ``on`` [1] and ``local`` [m] are as in ``in_body``; ``n`` [1, NED] is
-    any direction. Snap moves nothing at once, so its entries stay as they are: 0.
+    any direction and ``turned`` (10, 3) [SI] of ``fill_turned`` for it. Snap moves nothing at once,
+    so its entries stay as they are: 0.
     """
     (rx, ry, rz), (vx, _, vz) = in_body(frame, on, local)
     for k in range(3):
         slopes[0, P + k], slopes[1, P + k] = n[k], 0.0
         slopes[0, V + k], slopes[1, V + k] = 0.0, n[k]
-    for turned in range(4):
-        mx, my, mz = times_matrix(frame, _AT_D_R + 9 * turned, n)
-        tx, ty, tz = times_matrix(frame, _AT_D_TURNING + 9 * turned, n)
-        of_r = mx * rx + my * ry + mz * rz
-        k = _TURNING[turned]
+    for turning in range(4):
+        a, b = 2 + turning, 6 + turning
+        of_r = turned[a, 0] * rx + turned[a, 1] * ry + turned[a, 2] * rz
+        of_v = turned[a, 0] * vx + turned[a, 2] * vz
+        k = _TURNING[turning]
         slopes[0, k] = of_r
-        slopes[1, k] = mx * vx + mz * vz + tx * rx + ty * ry + tz * rz
+        slopes[1, k] = of_v + turned[b, 0] * rx + turned[b, 1] * ry + turned[b, 2] * rz
         # The rate of a turning state turns the place as the state itself does.
-        if turned < 2:
-            slopes[0, J + turned], slopes[1, J + turned] = 0.0, of_r
-        if turned == 3:
+        if turning < 2:
+            slopes[0, J + turning], slopes[1, J + turning] = 0.0, of_r
+        if turning == 3:
             slopes[0, YAW_RATE], slopes[1, YAW_RATE] = 0.0, of_r
     p1 = p2 = v1 = v2 = 0.0
     if on != ON_BASE:
         # n in the arm's plane, and how that turns.
-        n1, _, n3 = times_matrix(frame, _AT_R, n)
-        t1, _, t3 = times_matrix(frame, _AT_TURNING, n)
+        n1, n3, t1, t3 = turned[0, 0], turned[0, 2], turned[1, 0], turned[1, 2]
         length = local[2] if on == ON_LINK1 else frame[_AT_LINKS]
         x, z = length * frame[_AT_SWAY], length * frame[_AT_SWAY + 1]
         p1 = z * n1 - x * n3
@@ -350,7 +362,7 @@ def fill_slopes(frame: Array, on: int, local: Vec3, n: Vec3, slopes: Array) -> N
     slopes[1, QD_ARM], slopes[1, QD_ARM + 1] = p1 + p2, p2
 
 
-@compiled
+@leaf
 def chain(impulse: Array, node: int, slope: Array, gradient: Array) -> None:
     """From a ``slope`` (19,) [any / SI] in the state to one in the inputs before a node, (6 n,).
 

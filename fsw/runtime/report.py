@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict
-from pathlib import Path
 
 from fsw.parameters.control_choice import ControlChoice
 from fsw.ports import VehicleFacts
@@ -44,15 +42,6 @@ def as_json(
             "refused": record.offboard.refused,
         },
     }
-
-
-def write(path: Path, result: dict[str, object]) -> str | None:
-    """Write the result as one JSON object; returns why that was not possible."""
-    try:
-        path.write_text(json.dumps(result, indent=2) + "\n", encoding="utf-8")
-    except OSError as error:
-        return f"{path}: {error.strerror}"
-    return None
 
 
 def _mpc(facts: VehicleFacts, record: FlightRecord) -> dict[str, object]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import enum
 from collections.abc import Callable
-from dataclasses import astuple, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from typing import Final, Generic
 
 from command_line.process import StopRequest
@@ -266,11 +266,7 @@ class SimLoop(Generic[State]):
             timer = record.mpc.timer if group is MPC else record.groups[group.name]
             timing = timer.close_interval()
             setattr(record.health, group.name, timing)
-            period_us, ticks, late, skipped, *times, _ = astuple(timing)
-            counts = ticks, late, skipped, period_us
-            self._files.ulog.add_timing(
-                cycle.release.sensors.t_us, group.number, counts, tuple(times)
-            )
+            self._files.ulog.add_timing(cycle.release.sensors.t_us, group.number, timing)
 
     def _count_missed(self) -> None:
         self._record.stale = self._releases.stale

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from fsw.compiled import compiled
+from fsw.compiled import leaf
 from fsw.shapes.kind import ShapeKind, Surface
 from fsw.signals import Shape, Vec3, Zone
 
@@ -30,7 +30,7 @@ def _problem(numbers: tuple[float, ...]) -> str | None:
     return None
 
 
-@compiled
+@leaf
 def _plane(
     numbers: NDArray[np.float64], keep_in: bool, which: int, x: float, y: float, z: float
 ) -> Surface:

@@ -8,7 +8,7 @@ import numpy as np
 from numba import literal_unroll
 from numpy.typing import NDArray
 
-from fsw.compiled import compiled, of_fixed_types
+from fsw.compiled import leaf, of_fixed_types
 from fsw.shapes import BY_NAME, KINDS
 from fsw.shapes.kind import NUMBERS, Surface
 from fsw.signals import EndEffectorTarget, SafeSet, Vec3
@@ -38,7 +38,7 @@ def zone_arrays(safe_set: SafeSet) -> Array:
     return rows
 
 
-@compiled
+@leaf
 def surface_at(zones: Array, zone: int, which: int, x: float, y: float, z: float) -> Surface:
     """Distance [m] from a ``zone`` [1] with its clearance to a point, and the normal [1].
 

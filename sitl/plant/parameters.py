@@ -99,24 +99,19 @@ class Vehicle:
 
     def scaled(self, mass: float, inertia: float) -> Vehicle:
         """The same vehicle, masses times ``mass`` [1] and inertias times ``inertia`` [1]."""
-        ixx, iyy, izz = self.base_inertia
         return replace(
             self,
             base_mass=mass * self.base_mass,
-            base_inertia=(inertia * ixx, inertia * iyy, inertia * izz),
+            base_inertia=_times(inertia, self.base_inertia),
             links=tuple(
-                replace(
-                    link,
-                    mass=mass * link.mass,
-                    inertia=(
-                        inertia * link.inertia[0],
-                        inertia * link.inertia[1],
-                        inertia * link.inertia[2],
-                    ),
-                )
+                replace(link, mass=mass * link.mass, inertia=_times(inertia, link.inertia))
                 for link in self.links
             ),
         )
+
+
+def _times(factor: float, v: V3) -> V3:
+    return (factor * v[0], factor * v[1], factor * v[2])
 
 
 def chain(vehicle: Vehicle) -> Chain:

@@ -24,7 +24,6 @@ from fsw.link.wire.mission_items import (
     read_rally,
     read_step,
 )
-from fsw.link.wire.telemetry_context import PlanIds
 from fsw.shapes.zones import surfaces
 from fsw.signals import (
     FlightSnapshot,
@@ -87,9 +86,9 @@ class MissionStore:
     def __init__(self, site: Site) -> None:
         self.progress = MissionProgress()
         self.in_mission = False
-        self.ids = PlanIds()
+        self.ids: dict[int, int] = dict.fromkeys(Kind, 0)  # see ``PlanIds``
         self._site = site
-        self._items: dict[Kind, tuple[MissionItem, ...]] = dict.fromkeys(Kind, ())
+        self.items: dict[Kind, tuple[MissionItem, ...]] = dict.fromkeys(Kind, ())
         self._update: MissionUpdate | None = None
         self._snapshot: FlightSnapshot | None = None
         self._kept_fence: tuple[SafeSet, MessageSource | None] = (SafeSet(), None)
@@ -99,10 +98,6 @@ class MissionStore:
         self._snapshot = snapshot
         self.progress = snapshot.mission
         self.in_mission = snapshot.mode is Mode.MISSION
-
-    def items(self, kind: Kind) -> tuple[MissionItem, ...]:
-        """What a download returns."""
-        return self._items[kind]
 
     def read(self, kind: Kind, item: MissionItem) -> Meaning:
         """What an item means; ``BadItem`` where something is wrong with it by itself."""
@@ -132,16 +127,12 @@ class MissionStore:
             entitled = self._may_grow(source)
             self._kept_fence = (fence, source if entitled else self._kept_fence[1])
             self._change(MissionUpdate(fence=fence, fence_source=source))
-        self._items[kind] = items
-        setattr(self.ids, kind.name.lower(), _identity(items))
-
-    def identity(self, kind: Kind) -> int:
-        """The opaque id of a list as it is now, 0 where it is empty."""
-        return int(getattr(self.ids, kind.name.lower()))
+        self.items[kind] = items
+        self.ids[kind] = _identity(items)
 
     def set_current(self, number: int) -> bool:
         """Make a step the current one; False where there is no such step."""
-        if not 0 <= number < len(self._items[Kind.MISSION]):
+        if not 0 <= number < len(self.items[Kind.MISSION]):
             return False
         self._change(MissionUpdate(current=number))
         return True

@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cache
 from typing import Final, cast
 
-from fsw.link.wire.message_ids import SYSTEM_ID
+from fsw.link.wire.message_ids import AUTOPILOT, PANDION, SYSTEM_ID
 from fsw.shapes import kind_of
 from fsw.shapes.ball import point
 from fsw.shapes.half_space import wall
@@ -23,7 +24,7 @@ from fsw.signals import (
     Vec3,
     Zone,
 )
-from messages.frames import Frame
+from messages.frames import Frame, wire_fields
 
 Numbers = tuple[float, ...]  # a payload without text, in wire order
 
@@ -47,9 +48,19 @@ class IndexedObstacle:
     count: int
 
 
-def for_this_vehicle(target_system: float, target_component: float) -> bool:
-    """Whether ``target_system`` [1], ``target_component`` [1] is the autopilot or everyone."""
-    return target_system in (0, SYSTEM_ID) and target_component in (0, 1, 191)
+def for_this_vehicle(frame: Frame) -> bool:
+    """Whether a frame is addressed to the autopilot or to everyone."""
+    values, (system_at, component_at) = frame.payload_values, _target_at(frame.message_id)
+    system = 0 if system_at is None else values[system_at]
+    component = 0 if component_at is None else values[component_at]
+    return system in (0, SYSTEM_ID) and component in (0, AUTOPILOT, PANDION)
+
+
+@cache
+def _target_at(message_id: int) -> tuple[int | None, int | None]:
+    """Places of the target's system and component in wire order, as far as a message has them."""
+    at = {name: place for place, name in enumerate(wire_fields(message_id))}
+    return at.get("target_system"), at.get("target_component")
 
 
 def sensor_frame(odometry: Numbers, arm: Numbers, hil_sensor: Numbers) -> SensorFrame:
@@ -71,9 +82,9 @@ def sensor_frame(odometry: Numbers, arm: Numbers, hil_sensor: Numbers) -> Sensor
 
 def command_long(frame: Frame) -> CommandRequest | None:
     """Read a COMMAND_LONG; None if it is for another system."""
-    *params, command, system, component, confirmation = cast(Numbers, frame.payload_values)
-    if not for_this_vehicle(system, component):
+    if not for_this_vehicle(frame):
         return None
+    *params, command, _, _, confirmation = cast(Numbers, frame.payload_values)
     return CommandRequest(
         command=int(command),
         params=cast("tuple[float, float, float, float, float, float, float]", tuple(params)),
@@ -85,11 +96,9 @@ def command_long(frame: Frame) -> CommandRequest | None:
 
 def command_int(frame: Frame) -> CommandRequest | None:
     """Read a COMMAND_INT; parameters 5 and 6 come back in metres or degrees."""
-    p1, p2, p3, p4, x, y, z, command, system, component, mav_frame, _, _ = cast(
-        Numbers, frame.payload_values
-    )
-    if not for_this_vehicle(system, component):
+    if not for_this_vehicle(frame):
         return None
+    p1, p2, p3, p4, x, y, z, command, _, _, mav_frame, *_ = cast(Numbers, frame.payload_values)
     scale = 1e-4 if mav_frame in _LOCAL_FRAMES else 1e-7
     return CommandRequest(
         command=int(command),
@@ -105,9 +114,9 @@ def set_mode(frame: Frame) -> CommandRequest | None:
 
     It names PX4's main and sub mode in one number, and no component.
     """
-    custom_mode, system, base_mode = cast("tuple[int, int, int]", frame.payload_values)
-    if not for_this_vehicle(system, 0):
+    if not for_this_vehicle(frame):
         return None
+    custom_mode, _, base_mode = cast("tuple[int, int, int]", frame.payload_values)
     main, sub = custom_mode >> 16 & 0xFF, custom_mode >> 24
     return CommandRequest(
         command=_DO_SET_MODE,

@@ -86,9 +86,19 @@ def test_what_is_announced_and_the_fence_are_in_force_together() -> None:
     assert memory.safe_set == SafeSet((SOUTH, TREE))
 
 
-def test_joined_keeps_everything_of_both() -> None:
-    both = joined(SafeSet((NORTH, SPHERE, TREE)), SafeSet((SOUTH, TREE)))
-    assert both == SafeSet((NORTH, SPHERE, TREE, SOUTH, TREE))
+def test_joined_keeps_everything_of_both_in_order() -> None:
+    other = target_sphere((0.0, 0.0, -0.3), 0.1)
+    both = joined(SafeSet((NORTH, SPHERE, TREE)), SafeSet((SOUTH, other, TREE)))
+    assert both == SafeSet((NORTH, SPHERE, TREE, SOUTH, other, TREE))
+    assert joined(SafeSet(), SafeSet((other,))) == SafeSet((other,))
+
+
+@pytest.mark.parametrize("beside", [(NORTH,), (TREE,), (NORTH, TREE)])
+def test_a_sphere_is_kept_beside_anything_else(beside: tuple[Zone, ...]) -> None:
+    memory, texts = received(MissionMemory(), SafeSet((SPHERE,)), fence=SafeSet(beside))
+    assert memory.safe_set == SafeSet((SPHERE, *beside))
+    assert memory.refusals == ()
+    assert [text for text in texts if text.severity is Severity.WARNING] == []
 
 
 def test_in_flight_one_that_cannot_be_kept_is_refused_once_and_the_old_one_kept() -> None:

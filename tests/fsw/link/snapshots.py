@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from fsw.link.wire.telemetry_context import PlanIds, TelemetryContext
+from fsw.link.wire.telemetry_context import TelemetryContext
 from fsw.ports import GroupTiming, LoopHealth, VehicleFacts
 from fsw.signals import (
     ActuatorCommand,
@@ -49,7 +49,7 @@ CONTEXT = TelemetryContext(
         vibration=(0.02, 0.3),
     ),
     start_unix_us=1_750_000_000_000_000,
-    plan_ids=PlanIds(0xDEADBEEF, 7, 9),
+    plan_ids={0: 0xDEADBEEF, 1: 7, 2: 9},
 )
 
 # Yaw of 90 degrees: body x points east.

@@ -162,9 +162,9 @@ def test_the_walls_of_two_sources_do_not_make_one_set(vehicle: Vehicle) -> None:
     ground = vehicle.ground
     ground.polled(wall_frame(writer, -1.0, index=0, count=2), one)
     ground.polled(wall_frame(writer, -2.0, index=1, count=2), other)
-    assert vehicle.inbox.take_announced() == ()
+    assert vehicle.inbox.take().announced == []
     ground.polled(wall_frame(writer, -3.0, index=1, count=2), one)
-    (announced,) = vehicle.inbox.take_announced()
+    (announced,) = vehicle.inbox.take().announced
     assert [zone.shape.numbers for zone in announced.safe_set.zones] == [
         (-1.0, 0.0, 0.0, -1.0),
         (-1.0, 0.0, 0.0, -3.0),
@@ -179,16 +179,16 @@ def test_a_flood_of_sources_keeps_no_more_than_a_few(vehicle: Vehicle) -> None:
     stations = [station_socket() for _ in range(6)]
     for station in stations:
         vehicle.ground.polled(wall_frame(FrameWriter(255, 190), -1.0), station)
-    assert len(vehicle.inbox.take_announced()) == 4
+    assert len(vehicle.inbox.take().announced) == 4
     assert vehicle.inbox.refused == 2
     for system in range(1, 30):
         half = wall_frame(FrameWriter(system, 190), -1.0, count=2)
         vehicle.ground.polled(half, stations[0])
     first = wall_frame(FrameWriter(1, 190), -1.0, index=1, count=2)
     vehicle.ground.polled(first, stations[0])
-    assert vehicle.inbox.take_announced() == (), "the oldest was forgotten"
+    assert vehicle.inbox.take().announced == [], "the oldest was forgotten"
     last = wall_frame(FrameWriter(29, 190), -1.0, index=1, count=2)
     vehicle.ground.polled(last, stations[0])
-    assert len(vehicle.inbox.take_announced()) == 1
+    assert len(vehicle.inbox.take().announced) == 1
     for station in stations:
         station.close()

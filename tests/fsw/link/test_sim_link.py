@@ -20,6 +20,7 @@ from sitl.mission_clock import MissionClock
 from sitl.scenario_file import load_scenario
 from sitl.sensors.suite import SensorReadings
 from tests.fsw.link.snapshots import FACTS, outputs_at
+from tests.fsw.zones import of_kind, walls_of
 
 NAN = float("nan")
 SHUTDOWN = SendCommand(246, (0.0, 2.0, NAN, NAN, NAN, NAN, NAN))
@@ -97,12 +98,12 @@ def test_walls_and_points_arrive_as_the_pilot_announces_them(wire: Wire) -> None
     encoder = StepEncoder(lockstep=True)
     wire.send(encoder.datagram(readings(1_002_000), plan.announcements))
     assert wire.link.wait_for_step() is not None
-    (announced,) = wire.inbox.take_announced()
+    (announced,) = wire.inbox.take().announced
     safe_set = announced.safe_set
     assert announced.source == MessageSource(1, 195, "simulator")
-    assert [wall.offset for wall in safe_set.walls] == [-1.0]
-    for heard, reported in zip(safe_set.obstacles, scenario.obstacles, strict=True):
-        assert heard.position == pytest.approx(reported.position_m)
+    assert [wall.shape.numbers[3] for wall in walls_of(safe_set)] == [-1.0]
+    for heard, reported in zip(of_kind(safe_set, "ball"), scenario.obstacles, strict=True):
+        assert heard.shape.numbers == pytest.approx((*reported.position_m, 0.0))
         assert heard.clearance == pytest.approx(reported.clearance_m)
 
 
@@ -145,7 +146,7 @@ def test_commands_of_a_repeated_step_are_taken_once(wire: Wire) -> None:
     for _ in range(2):
         wire.send(step)
         wire.link.wait_for_step()
-    assert len(wire.inbox.take_commands()) == 1
+    assert len(wire.inbox.take().commands) == 1
 
 
 def test_acknowledgements_come_before_the_actuators_and_are_repeated_with_them(wire: Wire) -> None:
@@ -198,7 +199,7 @@ def test_of_steps_that_piled_up_the_newest_counts_and_every_message_is_kept(
     newest = wire.link.newest()
     assert newest is not None
     assert newest.t_us == 1_008_000
-    assert [one.request.command for one in wire.inbox.take_commands()] == [400]
+    assert [one.request.command for one in wire.inbox.take().commands] == [400]
     assert wire.link.newest() is None
 
 

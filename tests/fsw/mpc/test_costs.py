@@ -8,34 +8,48 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fsw.barriers.constraint_block import TargetPoints
-from fsw.barriers.hard_set import HardObstacles, HardWalls
+from fsw.barriers.safe_approach import BarrierTuning
+from fsw.barriers.zone_rows import ZoneRows
 from fsw.model.airframe import AIRFRAME
+from fsw.model.body import body_of
 from fsw.model.linearisation import Linearisation
 from fsw.model.prediction import INPUTS, YAW, Array, condense
 from fsw.mpc.costs import Cost, CostWeights, TrackingCost
 from fsw.mpc.soft_costs import (
     SoftWeights,
     SphereCost,
-    SurfaceCost,
+    ZoneCost,
     one_sided_reciprocal,
 )
-from fsw.signals import PointObstacle, Wall, WorkspaceSphere
+from fsw.shapes.ball import point
+from fsw.shapes.half_space import wall
+from fsw.shapes.target_sphere import target_sphere
+from fsw.signals import SafeSet, Zone
 from tests.fsw.mpc.quadratics import quadratic
 from tests.fsw.random_states import prediction_vector
 
 N = 5
 MODEL = condense(AIRFRAME, 0.1, N)
-WALLS = (Wall((-1.0, 0.0, 0.0), -1.0, 0.1), Wall((0.0, 0.6, 0.8), -1.5, 0.1))
-POINTS = (PointObstacle((0.3, -0.2, 0.1), 0.1), PointObstacle((-0.5, 0.4, 0.6), 0.2))
-SPHERE = WorkspaceSphere((0.0, 0.0, -0.225), 0.075)
+WALLS = (wall((-1.0, 0.0, 0.0), -1.0, 0.1), wall((0.0, 0.6, 0.8), -1.5, 0.1))
+POINTS = (point((0.3, -0.2, 0.1), 0.1), point((-0.5, 0.4, 0.6), 0.2))
+SPHERE = target_sphere((0.0, 0.0, -0.225), 0.075)
+
+
+def soft(*zones: Zone) -> ZoneCost:
+    points, tuning = body_of("points", AIRFRAME), BarrierTuning()
+    rows = ZoneRows(
+        SafeSet(zones), points, MODEL, (tuning, tuning), distances=True, skipped_nodes=0
+    )
+    return ZoneCost(rows, SoftWeights())
+
 
 COSTS: dict[str, Cost] = {
     "tracking": TrackingCost(CostWeights()),
     "printed": TrackingCost(CostWeights(relative_velocity=False)),
-    "soft walls": SurfaceCost(HardWalls(WALLS, N, 0.0, 1), SoftWeights()),
-    "soft points": SurfaceCost(HardObstacles(POINTS, N, 0.0, 1), SoftWeights()),
-    "outside the sphere": SphereCost(SPHERE, 5.0, 20.0, only_outside=True),
-    "centring": SphereCost(SPHERE, 100.0, 500.0, only_outside=False),
+    "soft walls": soft(*WALLS),
+    "soft points": soft(*POINTS),
+    "outside the sphere": SphereCost(SPHERE, (5.0, 20.0), only_outside=True),
+    "centring": SphereCost(SPHERE, (100.0, 500.0), only_outside=False),
 }
 
 
@@ -73,7 +87,7 @@ def test_terminal_node_weighs_five_times_as_table_two_says() -> None:
     start, guess = np.zeros(19), np.zeros(INPUTS * N)
     horizon = horizon_of(start, guess)
     error = np.array([0.1, -0.2, 0.05])
-    tip = horizon.position[:, 2]
+    tip = horizon.tracked.position
     targets = TargetPoints(tip - error, np.zeros((N + 1, 3)), np.zeros(N + 1))
     value, _, _ = quadratic(TrackingCost(CostWeights()), horizon, guess, targets)
     assert value == pytest.approx(float(error @ error) * (10.0 * (N - 1) + 50.0))
@@ -88,7 +102,7 @@ def test_the_heading_is_pulled_the_short_way_across_south(
     start, guess = np.zeros(19), np.zeros(INPUTS * N)
     start[YAW] = yaw
     horizon = horizon_of(start, guess)
-    there = TargetPoints(horizon.position[:, 2], np.zeros((N + 1, 3)), np.full(N + 1, target))
+    there = TargetPoints(horizon.tracked.position, np.zeros((N + 1, 3)), np.full(N + 1, target))
     value, slope, _ = quadratic(TrackingCost(CostWeights()), horizon, guess, there)
     turn = (target - yaw + np.pi) % (2.0 * np.pi) - np.pi
     assert value == pytest.approx(N * CostWeights().yaw * turn**2)
@@ -109,7 +123,7 @@ def test_sphere_cost_of_eq_30_is_silent_inside() -> None:
     start, guess = np.zeros(19), np.zeros(INPUTS * N)
     horizon = horizon_of(start, guess)
     centre = TargetPoints(
-        horizon.position[:, 0] - np.array(SPHERE.centre_from_target) + 0.01,
+        horizon.states[:, 0:3] - np.array(SPHERE.shape.numbers[:3]) + 0.01,
         np.zeros((N + 1, 3)),
         np.zeros(N + 1),
     )

@@ -16,12 +16,14 @@ from fsw.mpc.dual_solver import DualSolver
 from fsw.mpc.ocp import Ocp
 from fsw.mpc.planner_config import PlannerConfig
 from fsw.mpc.qp_data import QpData
-from fsw.signals import SafeSet, SolverStatus, Wall, WorkspaceSphere
+from fsw.shapes.half_space import wall
+from fsw.shapes.target_sphere import target_sphere
+from fsw.signals import SafeSet, SolverStatus
 from tests.fsw.random_states import prediction_vector
 
 CONFIG = PlannerConfig()
-WALLS = SafeSet((Wall((-1.0, 0.0, 0.0), -1.0, 0.1), Wall((0.0, 1.0, 0.0), -1.0, 0.1)))
-SPHERE = SafeSet(sphere=WorkspaceSphere((0.0, 0.0, -0.225), 0.075))
+WALLS = SafeSet((wall((-1.0, 0.0, 0.0), -1.0, 0.1), wall((0.0, 1.0, 0.0), -1.0, 0.1)))
+SPHERE = SafeSet((target_sphere((0.0, 0.0, -0.225), 0.075),))
 # Yaw hardly matters to the cost, which leaves it loose within the solver's tolerance.
 LOOSE = np.array([1.0, 1.0, 1.0, 10.0, 1.0, 1.0])
 
@@ -132,7 +134,7 @@ def test_what_was_solved_before_leaves_no_trace() -> None:
 
 def test_hard_rows_that_contradict_each_other_are_infeasible() -> None:
     """Two walls, 0.2 m apart, that both want 0.5 m."""
-    narrow = SafeSet((Wall((1.0, 0.0, 0.0), -0.1, 0.5), Wall((-1.0, 0.0, 0.0), -0.1, 0.5)))
+    narrow = SafeSet((wall((1.0, 0.0, 0.0), -0.1, 0.5), wall((-1.0, 0.0, 0.0), -0.1, 0.5)))
     ocp = filled(np.random.default_rng(10), narrow, config=replace(CONFIG, controller="hc"))
     assert ocp.solve().status is SolverStatus.INFEASIBLE
 

@@ -13,6 +13,8 @@ from fsw.model.airframe import AIRFRAME
 from fsw.model.prediction import INPUTS, Array, condense, to_vector
 from fsw.mpc.ocp import Ocp
 from fsw.mpc.planner_config import PlannerConfig
+from fsw.shapes.half_space import wall
+from fsw.shapes.target_sphere import target_sphere
 from fsw.signals import (
     EndEffectorTarget,
     Plan,
@@ -21,8 +23,6 @@ from fsw.signals import (
     PredictionState,
     SafeSet,
     SolverStatus,
-    Wall,
-    WorkspaceSphere,
 )
 from tests.fsw.model.geometry_by_rotation import tips_of_prediction
 from tests.fsw.mpc.requests import PERIOD_US, STILL, below, hovering, planned, planner, request
@@ -30,8 +30,8 @@ from tests.fsw.random_states import as_state, prediction_vector, vec3
 
 CONFIG = PlannerConfig()
 MODEL = condense(AIRFRAME, CONFIG.period, CONFIG.horizon)
-AHEAD = SafeSet((Wall((-1.0, 0.0, 0.0), -1.0, 0.1),))
-SPHERE = SafeSet(sphere=WorkspaceSphere((0.0, 0.0, -0.225), 0.075))
+AHEAD = SafeSet((wall((-1.0, 0.0, 0.0), -1.0, 0.1),))
+SPHERE = SafeSet((target_sphere((0.0, 0.0, -0.225), 0.075),))
 
 
 def flat(plan: Plan) -> Array:
@@ -160,10 +160,10 @@ def test_a_wrong_number_of_targets_is_refused(count: int) -> None:
 @pytest.mark.parametrize(
     "safe_set",
     [
-        SafeSet((Wall((math.nan, 0.0, 0.0), -1.0, 0.1),)),
-        SafeSet((Wall((-1.0, 0.0, 0.0), math.inf, 0.1),)),
-        SafeSet(sphere=WorkspaceSphere((0.0, 0.0, math.nan), 0.075)),
-        SafeSet(sphere=WorkspaceSphere((0.0, 0.0, -0.2), math.nan)),
+        SafeSet((wall((math.nan, 0.0, 0.0), -1.0, 0.1),)),
+        SafeSet((wall((-1.0, 0.0, 0.0), math.inf, 0.1),)),
+        SafeSet((target_sphere((0.0, 0.0, math.nan), 0.075),)),
+        SafeSet((target_sphere((0.0, 0.0, -0.2), math.nan),)),
     ],
 )
 @pytest.mark.filterwarnings("ignore:invalid value:RuntimeWarning")

@@ -18,14 +18,16 @@ from fsw.mpc.planner_config import PlannerConfig
 from fsw.mpc.slsqp_solver import MAX_ITERATIONS, NonlinearProgram, minimise
 from fsw.mpc.solution import Solution
 from fsw.mpc.variants import VARIANTS
-from fsw.signals import PlanFailure, SafeSet, SolverStatus, Wall, WorkspaceSphere
+from fsw.shapes.half_space import wall
+from fsw.shapes.target_sphere import target_sphere
+from fsw.signals import PlanFailure, SafeSet, SolverStatus
 from tests.fsw.mpc.requests import STILL, below, hovering, planned, planner, request
 
 CONFIG = PlannerConfig()
 N = CONFIG.horizon
 MODEL = condense(AIRFRAME, CONFIG.period, N)
-WALLS = SafeSet((Wall((-1.0, 0.0, 0.0), -1.0, 0.1), Wall((0.0, 1.0, 0.0), -1.0, 0.1)))
-SPHERE = SafeSet(sphere=WorkspaceSphere((0.0, 0.0, -0.225), 0.075))
+WALLS = SafeSet((wall((-1.0, 0.0, 0.0), -1.0, 0.1), wall((0.0, 1.0, 0.0), -1.0, 0.1)))
+SPHERE = SafeSet((target_sphere((0.0, 0.0, -0.225), 0.075),))
 CASES = {"walls": WALLS, "sphere": SPHERE}
 
 
@@ -42,7 +44,7 @@ def instance(random: np.random.Generator, safe_set: SafeSet) -> tuple[Array, Tar
     speed = random.uniform(-0.15, 0.15, 3)
     off = random.normal(size=3)
     off *= 0.02 / np.linalg.norm(off)
-    if safe_set.sphere is None:
+    if safe_set is WALLS:
         start[0] = random.uniform(0.6, 0.8)  # the wall is at 0.9
         start[3:6] = random.uniform(-0.3, 0.3, 3)
     else:
@@ -128,8 +130,8 @@ def test_analytic_slopes_are_those_of_the_cost_and_the_margins(controller: str, 
     slope, slopes = cost_slope(x).copy(), margin_slopes(x)
     np.testing.assert_allclose(approx_fprime(x, point.cost, 1e-7), slope, rtol=1e-3, atol=1e-3)
     by_difference = approx_fprime(x, point.margins, 1e-7)
-    if case == "sphere" and controller == "blf":
-        # The directions of eq 23 turn with the guess; the rows hold them still.
+    if case == "sphere" and controller in ("hc", "blf"):
+        # The directions of eqs 15 and 23 turn with the guess; the rows hold them still.
         inside = by_difference - slopes
         assert float(np.abs(inside).max()) < 0.2 * float(np.abs(slopes).max())
     else:

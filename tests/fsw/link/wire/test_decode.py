@@ -42,14 +42,14 @@ def point(index: int, count: int, **fields: float) -> Frame:
 def test_nan_in_an_unused_parameter_of_a_command_is_normal() -> None:
     inbox = Inbox()
     inbox.accept(frame(ids.COMMAND_LONG, command=400, param1=1.0, param5=NAN, param7=NAN))
-    (command,) = inbox.take_commands()
+    (command,) = inbox.take().commands
     assert command.action == Arm()
     request = command.request
     assert request.command == 400
     assert request.params[0] == 1.0
     assert math.isnan(request.params[6])
     assert (request.source_system, request.source_component) == (255, 190)
-    assert inbox.take_commands() == ()
+    assert inbox.take().commands == []
     assert inbox.refused == 0
 
 
@@ -57,14 +57,14 @@ def test_a_command_for_another_system_is_not_ours() -> None:
     inbox = Inbox()
     inbox.accept(frame(ids.COMMAND_LONG, command=400, target_system=2))
     inbox.accept(frame(ids.COMMAND_LONG, command=400, target_system=1, target_component=154))
-    assert inbox.take_commands() == ()
+    assert inbox.take().commands == []
 
 
 @pytest.mark.parametrize(("mav_frame", "x"), [(1, 2.5), (6, 0.0025)])
 def test_command_int_scales_x_by_its_frame(mav_frame: int, x: float) -> None:
     inbox = Inbox()
     inbox.accept(frame(ids.COMMAND_INT, command=192, x=25_000, z=-3.0, frame=mav_frame))
-    (command,) = inbox.take_commands()
+    (command,) = inbox.take().commands
     assert command.request.params[4] == pytest.approx(x)
     assert command.request.params[6] == -3.0
 
@@ -74,7 +74,7 @@ def test_command_int_scales_x_by_its_frame(mav_frame: int, x: float) -> None:
 def test_a_target_that_is_not_finite_is_refused_and_counted(field: str, bad: float) -> None:
     inbox = Inbox()
     inbox.accept(target(**{field: bad}))
-    assert inbox.take_targets() == ()
+    assert inbox.take().targets == []
     assert inbox.refused == 1
 
 
@@ -82,7 +82,7 @@ def test_a_masked_field_of_a_target_may_be_nan() -> None:
     inbox = Inbox()
     mask = 0x038 | 0x1C0 | 0x400
     inbox.accept(target(**{"position[2]": -1.0, "velocity[0]": NAN, "yaw": NAN, "type_mask": mask}))
-    (point,) = inbox.take_targets()
+    (point,) = inbox.take().targets
     assert point.v_WE == (0.0, 0.0, 0.0)
     assert point.yaw == 0.0
 
@@ -91,19 +91,19 @@ def test_a_masked_field_of_a_target_may_be_nan() -> None:
 def test_a_target_in_another_frame_or_without_position_is_refused(fields: dict[str, int]) -> None:
     inbox = Inbox()
     inbox.accept(target(**fields))
-    assert inbox.take_targets() == ()
+    assert inbox.take().targets == []
     assert inbox.refused == 1
 
 
 def test_walls_arrive_as_one_set_in_any_order() -> None:
     inbox = Inbox()
     inbox.accept(wall(1, 2, offset=-2.0))
-    assert inbox.take_announced() == ()
+    assert inbox.take().announced == []
     inbox.accept(wall(0, 2, offset=-1.0))
-    (announced,) = inbox.take_announced()
+    (announced,) = inbox.take().announced
     safe_set = announced.safe_set
-    assert [wall.offset for wall in safe_set.walls] == [-1.0, -2.0]
-    assert inbox.take_announced() == ()
+    assert [one.shape.numbers[3] for one in safe_set.zones] == [-1.0, -2.0]
+    assert inbox.take().announced == []
 
 
 def test_walls_of_two_sets_do_not_mix() -> None:
@@ -111,23 +111,23 @@ def test_walls_of_two_sets_do_not_mix() -> None:
     inbox.accept(wall(0, 2))
     inbox.accept(wall(0, 3))
     inbox.accept(wall(1, 2))
-    assert inbox.take_announced() == ()
+    assert inbox.take().announced == []
 
 
 def test_walls_and_points_are_one_set() -> None:
     inbox = Inbox()
     inbox.accept(point(2, 3))
     inbox.accept(wall(0, 3))
-    assert inbox.take_announced() == ()
+    assert inbox.take().announced == []
     inbox.accept(point(1, 3, **{"position[0]": 7.0}))
-    (announced,) = inbox.take_announced()
+    (announced,) = inbox.take().announced
     safe_set = announced.safe_set
-    assert len(safe_set.walls) == 1
-    assert [obstacle.position[0] for obstacle in safe_set.obstacles] == [7.0, 2.0]
+    assert [one.shape.kind for one in safe_set.zones] == ["half-space", "ball", "ball"]
+    assert [one.shape.numbers[0] for one in safe_set.zones[1:]] == [7.0, 2.0]
     inbox.accept(wall(0, 1))
-    (announced,) = inbox.take_announced()
+    (announced,) = inbox.take().announced
     safe_set = announced.safe_set
-    assert safe_set.obstacles == ()
+    assert [one.shape.kind for one in safe_set.zones] == ["half-space"]
 
 
 @pytest.mark.parametrize(
@@ -138,7 +138,7 @@ def test_walls_and_points_are_one_set() -> None:
 def test_a_point_that_keeps_nothing_away_is_refused(bad: dict[str, float]) -> None:
     inbox = Inbox()
     inbox.accept(point(**{"index": 0, "count": 1, **bad}))  # type: ignore[arg-type]
-    assert inbox.take_announced() == ()
+    assert inbox.take().announced == []
     assert inbox.refused == 1
 
 
@@ -149,7 +149,7 @@ def test_a_point_that_keeps_nothing_away_is_refused(bad: dict[str, float]) -> No
 def test_a_wall_that_is_no_plane_is_refused(bad: dict[str, float]) -> None:
     inbox = Inbox()
     inbox.accept(wall(0, 1, **bad))
-    assert inbox.take_announced() == ()
+    assert inbox.take().announced == []
     assert inbox.refused == 1
 
 
@@ -157,7 +157,7 @@ def test_a_wall_that_is_no_plane_is_refused(bad: dict[str, float]) -> None:
 def test_a_sphere_that_contains_nothing_is_refused(radius: float) -> None:
     inbox = Inbox()
     inbox.accept(frame(ids.WORKSPACE_SPHERE, radius=radius))
-    assert inbox.take_announced() == ()
+    assert inbox.take().announced == []
     assert inbox.refused == 1
 
 
@@ -166,6 +166,7 @@ def test_the_inbox_is_bounded() -> None:
     for _ in range(1000):
         inbox.accept(target())
         inbox.accept(frame(ids.COMMAND_LONG, command=400))
-    assert len(inbox.take_targets()) <= 64
-    assert len(inbox.take_commands()) <= 16
+    received = inbox.take()
+    assert len(received.targets) <= 64
+    assert len(received.commands) <= 16
     assert inbox.refused > 1900
