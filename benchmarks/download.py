@@ -16,12 +16,12 @@ from pathlib import Path
 from typing import Any, Final
 
 from benchmarks.download_client import DownloadClient, NothingCame
+from benchmarks.machine_watch import version_and_machine
 from command_line.options import json_file, option, read
+from command_line.output import console_beside, write_text
 from command_line.values import number
 from pandion.display import Display
-from pandion.output import console_beside, write_text
 from pandion.supervisor import ProcessFailed, Supervisor
-from pandion.version import version_and_machine
 
 PASSED, NOT_PASSED = 0, 1  # exit codes
 MIN_MB_PER_S: Final = 2.0

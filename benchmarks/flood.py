@@ -18,13 +18,13 @@ from typing import Any, Final
 
 from benchmarks.flood_monitor import Heard, Monitor
 from benchmarks.flood_traffic import SYSTEM
+from benchmarks.machine_watch import version_and_machine
 from command_line.options import json_file, option, read
+from command_line.output import console_beside, write_text
 from command_line.values import seconds
 from fsw.link.telemetry.streams import STREAMS
 from pandion.display import Display
-from pandion.output import console_beside, write_text
 from pandion.supervisor import ProcessFailed, Supervisor
-from pandion.version import version_and_machine
 
 PASSED, NOT_PASSED = 0, 1  # exit codes
 RATE_HZ: Final = 5000.0

@@ -16,14 +16,14 @@ from pathlib import Path
 from typing import Any, Final, TextIO
 
 from command_line.options import json_file, option, read
+from command_line.output import console_beside, write_text
 from command_line.parser import COULD_NOT_START
 from command_line.values import number, whole
+from command_line.version import version
 from pandion.child import Event
 from pandion.display import Display
-from pandion.output import console_beside, write_text
 from pandion.processor import Places, lockstep_places
 from pandion.supervisor import ProcessFailed, Supervisor
-from pandion.version import version
 
 DONE, SLOW = 0, 1  # exit codes
 TARGET: Final = 25.0  # times real time, at 500 Hz

@@ -17,12 +17,13 @@ from typing import Any, TextIO
 from benchmarks.bare_loop import BareLoops
 from benchmarks.budgets import BudgetRow, Budgets, judge, load_budgets, result
 from benchmarks.machine_watch import Watch
+from benchmarks.values import several
 from command_line.options import json_file, option, read
-from command_line.values import seconds, several, whole
+from command_line.output import console_beside, write_text
+from command_line.values import seconds, whole
+from command_line.version import version
 from pandion.display import Display
-from pandion.output import console_beside, write_text
 from pandion.supervisor import ProcessFailed, Supervisor
-from pandion.version import version
 
 PASSED, NOT_PASSED = 0, 1  # exit codes
 _EXCHANGE = ("receive", "actuate")  # stages

@@ -13,11 +13,17 @@ from pathlib import Path
 from typing import Final
 
 from benchmarks.budgets import MachineNoise
+from command_line.version import version
 
 _GLANCE_S: Final = 1.0
 _SETTLED_S: Final = 5.0  # from here on memory may not grow
 _PAGE: Final = os.sysconf("SC_PAGE_SIZE")
 _TICK_S: Final = 1.0 / os.sysconf("SC_CLK_TCK")
+
+
+def version_and_machine() -> str:
+    """The first line of a measurement."""
+    return f"Pandion {version()}: {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}"
 
 
 @dataclass(slots=True)

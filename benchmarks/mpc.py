@@ -9,12 +9,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from benchmarks.values import several
 from command_line.options import json_file, option, read, switch
+from command_line.output import console_beside, write_text
 from command_line.parser import COULD_NOT_START
-from command_line.values import several, whole
+from command_line.values import whole
+from command_line.version import version
 from pandion.display import Display
-from pandion.output import console_beside, write_text
-from pandion.version import version
 
 if TYPE_CHECKING:
     from benchmarks.optimiser.measurement import Samples

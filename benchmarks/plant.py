@@ -11,7 +11,7 @@ from command_line.parser import Parser
 from sitl.plant.aerial_manipulator import Inputs, plant
 from sitl.plant.integrator import STEP_S, integrate
 from sitl.plant.parameters import Vehicle
-from sitl.plant.state import StateView, at_rest
+from sitl.plant.state import ARM, P_WB, THRUST, W_WB_B, at_rest
 from sitl.scenario_file import load_scenario
 from sitl.simulation import STEP_US, Controls, Simulation
 
@@ -24,10 +24,9 @@ def plant_step_us() -> list[float]:
     """Microseconds per 1 ms plant step, one value per round."""
     numbers = plant(Vehicle())
     start = at_rest(2)
-    view = StateView(start)
-    view.p_WB[2] = -100.0
-    view.q_arm[:] = (-0.7, 1.4)
-    view.w_WB_B[:] = (0.1, -0.2, 0.3)
+    start[P_WB + 2] = -100.0
+    start[ARM : ARM + 2] = (-0.7, 1.4)
+    start[W_WB_B:THRUST] = (0.1, -0.2, 0.3)
     inputs = Inputs(np.full(4, 8.6), np.zeros(2), np.zeros(3), np.zeros(3))
     places = np.empty((STEPS, 4, 3))
     states = np.empty((STEPS, len(start)))

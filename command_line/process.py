@@ -15,6 +15,10 @@ from command_line.parser import COULD_NOT_START
 NOT_COMPLETED: Final = 1  # exit code
 
 
+class CouldNotStart(Exception):
+    """Why there is no flight, in one sentence."""
+
+
 class Events(Protocol):
     """Progress on standard output."""
 
@@ -47,6 +51,11 @@ class JsonEvents:
         print(json.dumps({"event": event, "message": sentence, **details}), flush=True)
 
 
+def events_of(how: str, *, to_stderr: bool = False) -> Events:
+    """What ``--events`` asks for, ``text`` or ``json``; text goes to standard error on request."""
+    return JsonEvents() if how == "json" else TextEvents(to_stderr)
+
+
 class StopRequest:
     """Becomes true on SIGINT or SIGTERM, so that a loop can end between two steps."""
 
@@ -67,8 +76,9 @@ def run_reported(
 ) -> int:
     """Do the work of a process and return its exit code; what ends it early is reported.
 
-    An exception of the ``refusals`` says in one sentence why there is no flight.
+    An exception of the ``refusals``, too, says in one sentence why there is no flight.
     """
+    refusals = (CouldNotStart, *refusals)
     try:
         return work()
     except refusals as error:

@@ -45,18 +45,6 @@ def seconds(text: str) -> float:
     return value
 
 
-def several(parse: Callable[[str], int], example: str) -> Callable[[str], tuple[int, ...]]:
-    """Numbers with commas between them."""
-
-    def parse_all(text: str) -> tuple[int, ...]:
-        try:
-            return tuple(parse(part) for part in text.split(","))
-        except ArgumentTypeError as error:
-            raise ArgumentTypeError(f"{error}; several are written as {example}") from None
-
-    return parse_all
-
-
 def one_of(what: str, *names: str, old: Mapping[str, str] | None = None) -> Callable[[str], str]:
     """One of these names; ``old`` maps names of earlier releases to today's."""
 

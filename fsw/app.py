@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from command_line.output import unwritten
 from command_line.process import (
     NOT_COMPLETED,
+    CouldNotStart,
     Events,
-    JsonEvents,
     StopRequest,
-    TextEvents,
+    events_of,
     run_reported,
 )
 from fsw.arguments import FswOptions
@@ -30,7 +33,7 @@ from fsw.link.udp_endpoint import LinkError, parse_address
 from fsw.link.wire.telemetry_context import TelemetryContext
 from fsw.log.flight_log import LogSubject
 from fsw.log.revision import revision
-from fsw.log.run_directory import new_run_directory
+from fsw.log.run_directory import run_directory
 from fsw.log.run_files import RunFiles
 from fsw.ports import LoopHealth, PlanningCycle
 from fsw.runtime import clock, report
@@ -56,30 +59,21 @@ NO_PERMISSION = "no permission for {}: ticks may be late on a busy machine"
 ProgramLoader = Callable[[FswOptions], FlightProgram[Any]]
 
 
-class CouldNotStart(Exception):
-    """Why there is no flight, in one sentence."""
-
-
 def run(options: FswOptions, load: ProgramLoader | None = None) -> int:
     """Fly once, the flight software proper or what ``load`` makes; returns the exit code."""
-    reporter: Events = JsonEvents() if options.events == "json" else TextEvents()
-    refusals = (CouldNotStart, LinkError)
-    return run_reported(
-        "fsw",
-        reporter,
-        refusals,
-        lambda: _Session(options, reporter, load or load_flight_software).run(),
-    )
+    events = events_of(options.events)
+    session = _Session(options, events, load or load_flight_software)
+    return run_reported("fsw", events, (LinkError,), session.run)
 
 
+@dataclass
 class _Session:
     """One start of the program."""
 
-    def __init__(self, options: FswOptions, events: Events, load: ProgramLoader) -> None:
-        self._options = options
-        self._events = events
-        self._load = load
-        self._stop = StopRequest()
+    _options: FswOptions
+    _events: Events
+    _load: ProgramLoader
+    _stop: StopRequest = field(default_factory=StopRequest)
 
     def run(self) -> int:
         options = self._options
@@ -135,13 +129,12 @@ class _Session:
         result["inbox_refused"] = inbox.refused
         result["links"] = {link.name: link.as_json() for link in ground.links}
         result["files"] = files.as_json()
-        unwritten = report.write(directory / "fsw.json", result)
+        lost = unwritten(directory / "fsw.json", json.dumps(result, indent=2) + "\n")
         sentence = f"fsw: {end.sentence}"
         self._events.report("ended", sentence, ending=end.ending.value, result=result)
-        if unwritten is not None:
-            self._events.report("unwritten", f"fsw: cannot write {unwritten}", what=unwritten)
-            return NOT_COMPLETED
-        return DONE if end.ending is Ending.SHUTDOWN else NOT_COMPLETED
+        for what in lost:
+            self._events.report("unwritten", f"fsw: cannot write {what}", what=what)
+        return DONE if end.ending is Ending.SHUTDOWN and not lost else NOT_COMPLETED
 
     def _files(self, directory: Path, start_us: int, program: FlightProgram[Any]) -> RunFiles:
         """Create the logs.
@@ -267,11 +260,7 @@ def _subject(options: FswOptions, program: FlightProgram[Any]) -> LogSubject:
 
 def _output_directory(wanted: Path | None) -> Path:
     try:
-        if wanted is None:
-            return new_run_directory(Path("runs"), "fsw")
-        wanted.mkdir(parents=True, exist_ok=True)
+        return run_directory(wanted, "fsw")
     except OSError as error:
-        raise CouldNotStart(f"cannot write to {error.filename}: {error.strerror}") from None
-    if any((wanted / name).exists() for name in ("flight.tlog", "flight.ulg")):
-        raise CouldNotStart(f"{wanted} already holds a flight; name another --out")
-    return wanted
+        reason = f"cannot write to {error.filename}: {error.strerror}" if error.filename else error
+        raise CouldNotStart(str(reason)) from None

@@ -55,7 +55,7 @@ def _layout(message_id: int, message: Any) -> Layout:
     return Layout(message.unpacker, bytes([message.crc_extra]), id_bytes, base_size)
 
 
-_LAYOUTS: Final[dict[int, Layout]] = {
+LAYOUTS: Final[dict[int, Layout]] = {
     message_id: _layout(message_id, message) for message_id, message in dialect.mavlink_map.items()
 }
 
@@ -105,7 +105,7 @@ class FrameWriter:
             struct.error: Wrong number of values, or one that does not fit its field; the sequence
                 is not advanced.
         """
-        layout = _LAYOUTS[message_id]
+        layout = LAYOUTS[message_id]
         return self._frame(layout, layout.payload.pack(*wire_values))
 
     def packed_frame(self, message_id: int, payload: bytes) -> bytes:
@@ -115,7 +115,7 @@ class FrameWriter:
             KeyError: The dialect has no such message.
             ValueError: The payload is not of the message's size.
         """
-        layout = _LAYOUTS[message_id]
+        layout = LAYOUTS[message_id]
         if len(payload) != layout.payload.size:
             raise ValueError(f"message {message_id} has {layout.payload.size} bytes of payload")
         return self._frame(layout, payload)
@@ -133,21 +133,12 @@ class FrameWriter:
         return origin
 
 
-def layout_of(message_id: int) -> Layout:
-    """How a message lies in a frame.
-
-    Raises:
-        KeyError: The dialect has no such message.
-    """
-    return _LAYOUTS[message_id]
-
-
 def announcing_signature(frame: bytes) -> bytes:
     """Mark an unsigned frame of :class:`FrameWriter` as signed; the signature is to follow it.
 
     The flag is part of what the checksum covers, so that is renewed.
     """
-    layout = _LAYOUTS[int.from_bytes(frame[7:10], "little")]
+    layout = LAYOUTS[int.from_bytes(frame[7:10], "little")]
     body = b"%b%c%b" % (frame[1:2], _SIGNED, frame[3:-_CHECKSUM_SIZE])
     return closed_frame(body, layout.crc_extra)
 
@@ -187,7 +178,7 @@ def as_version_1(frame: bytes) -> bytes | None:
     """
     if frame[8] or frame[9]:
         return None
-    layout = _LAYOUTS[frame[7]]
+    layout = LAYOUTS[frame[7]]
     size = layout.base_size
     payload = frame[_HEADER_SIZE:-_CHECKSUM_SIZE][:size].ljust(size, b"\0")
     body = b"%c%b%b" % (size, frame[4:8], payload)
@@ -211,9 +202,7 @@ def cut(datagram: bytes, losses: Losses | None = None) -> Iterator[tuple[Frame, 
     and behind another frame. Its header has 8 bits of message id where that of MAVLink 2 has 24, so
     in noise it would be found, by the luck of 16 bits of checksum, every few seconds of a flood.
 
-    Args:
-        datagram: What the socket delivered, any bytes.
-        losses: Counts of what was dropped are added to it once the datagram has been read through.
+    What was dropped is added to ``losses`` once the datagram has been read through.
     """
     delivered_bytes = refused = 0
     at, size = 0, len(datagram)
@@ -248,7 +237,7 @@ def _frame_at(datagram: bytes, start: int) -> tuple[int, Frame | None]:
         start:payload_at
     ]
     message_id = id_0 | id_1 << 8 | id_2 << 16
-    layout = _LAYOUTS.get(message_id)
+    layout = LAYOUTS.get(message_id)
     payload_end = payload_at + length
     end = payload_end + _CHECKSUM_SIZE
     if incompatible:
@@ -258,20 +247,11 @@ def _frame_at(datagram: bytes, start: int) -> tuple[int, Frame | None]:
         end += _SIGNATURE_SIZE
     if layout is None or len(datagram) < end:
         return 0, None
-    received = datagram[payload_end] | datagram[payload_end + 1] << 8
-    if checksum(datagram[start + 1 : payload_end] + layout.crc_extra) != received:
+    values = _payload_values(datagram, start, payload_at, payload_end, layout)
+    if values is None:
         return 0, None
-    # Longer than known: a peer with newer extensions. Shorter: trailing zeros were left out.
-    size = layout.payload.size
-    payload = datagram[payload_at:payload_end][:size].ljust(size, b"\0")
-    values = layout.payload.unpack(payload)
-    return end - start, Frame(
-        system_id=system_id,
-        component_id=component_id,
-        sequence=sequence,
-        message_id=message_id,
-        payload_values=values,
-    )
+    # By position: up to 2000 a second.
+    return end - start, Frame(system_id, component_id, sequence, message_id, values)
 
 
 def _frame_1_at(datagram: bytes, start: int) -> tuple[int, Frame | None]:
@@ -283,7 +263,7 @@ def _frame_1_at(datagram: bytes, start: int) -> tuple[int, Frame | None]:
     if len(datagram) < payload_at + _CHECKSUM_SIZE:
         return 0, None
     _, length, sequence, system_id, component_id, message_id = datagram[start:payload_at]
-    layout = _LAYOUTS.get(message_id)
+    layout = LAYOUTS.get(message_id)
     payload_end = payload_at + length
     end = payload_end + _CHECKSUM_SIZE
     if len(datagram) < end:
@@ -294,18 +274,22 @@ def _frame_1_at(datagram: bytes, start: int) -> tuple[int, Frame | None]:
     # MAVLink 1 leaves nothing out; what is longer was sent with extensions by a lenient library.
     if not layout.base_size <= length <= layout.payload.size:
         return 0, None
-    received = datagram[payload_end] | datagram[payload_end + 1] << 8
-    if checksum(datagram[start + 1 : payload_end] + layout.crc_extra) != received:
+    values = _payload_values(datagram, start, payload_at, payload_end, layout)
+    if values is None:
         return 0, None
-    payload = datagram[payload_at:payload_end].ljust(layout.payload.size, b"\0")
-    values = layout.payload.unpack(payload)
-    return end - start, Frame(
-        system_id=system_id,
-        component_id=component_id,
-        sequence=sequence,
-        message_id=message_id,
-        payload_values=values,
-    )
+    return end - start, Frame(system_id, component_id, sequence, message_id, values)
+
+
+def _payload_values(
+    datagram: bytes, start: int, begin: int, end: int, layout: Layout
+) -> tuple[Any, ...] | None:
+    """The values of a payload; None where the checksum behind it is wrong."""
+    received = datagram[end] | datagram[end + 1] << 8
+    if checksum(datagram[start + 1 : end] + layout.crc_extra) != received:
+        return None
+    # Longer than known: a peer with newer extensions. Shorter: trailing zeros were left out.
+    size = layout.payload.size
+    return layout.payload.unpack(datagram[begin:end][:size].ljust(size, b"\0"))
 
 
 def wire_fields(message_id: int) -> tuple[str, ...]:

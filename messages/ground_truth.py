@@ -8,32 +8,27 @@ from __future__ import annotations
 
 from typing import Final
 
-from messages.ulog import Field, Topic
-
-
-def _exact(name: str, size: int, note: str) -> Field:
-    return Field(name, "double", size, note)
-
+from messages.ulog import Topic, doubles
 
 SIM_GROUND_TRUTH: Final = Topic(
     "sim_ground_truth",
     "The simulator's true state",
     "50 Hz; every tick with `LOG_PROFILE` 1",
     (
-        _exact("p_WB", 3, "m, NED"),
-        _exact("v_WB", 3, "m/s, NED"),
-        _exact("q_WB", 4, "[w, x, y, z], body to NED"),
-        _exact("w_WB_B", 3, "rad/s, body"),
-        _exact("thrust", 4, "N: rear, left, front, right"),
-        _exact("q_arm", 2, "rad"),
-        _exact("qd_arm", 2, "rad/s"),
+        doubles("p_WB", 3, "m, NED"),
+        doubles("v_WB", 3, "m/s, NED"),
+        doubles("q_WB", 4, "[w, x, y, z], body to NED"),
+        doubles("w_WB_B", 3, "rad/s, body"),
+        doubles("thrust", 4, "N: rear, left, front, right"),
+        doubles("q_arm", 2, "rad"),
+        doubles("qd_arm", 2, "rad/s"),
     ),
 )
 SIM_TRACKING: Final = Topic(
     "sim_tracking",
     "True end-effector, and the reference it should follow",
     "10 Hz",
-    (_exact("p_WE", 3, "m, NED"), _exact("target", 3, "m, NED")),
+    (doubles("p_WE", 3, "m, NED"), doubles("target", 3, "m, NED")),
 )
 TRUTH_TOPICS: Final = (SIM_GROUND_TRUTH, SIM_TRACKING)
 FIRST_NUMBER: Final = 1000  # of their subscriptions, out of the way of the flight software's

@@ -12,7 +12,7 @@ import re
 from struct import Struct
 from typing import Final, NamedTuple
 
-from messages.frames import FrameWriter, checksum, closed_frame, layout_of
+from messages.frames import LAYOUTS, FrameWriter, checksum, closed_frame
 
 _HEADER_SIZE: Final = 10
 _CHECKSUM_SIZE: Final = 2
@@ -31,11 +31,7 @@ class LockstepReader:
     """Reads datagrams that hold these messages and nothing else."""
 
     def __init__(self, *parts: tuple[int, int]) -> None:
-        """Choose what to read.
-
-        Args:
-            *parts: Message id and number of first values (wire order) of each frame, in order.
-        """
+        """Take message id and number of first values (wire order) of each frame, in order."""
         self._parts = tuple(_part(message_id, count) for message_id, count in parts)
 
     def read(self, datagram: bytes) -> list[tuple[float, ...]] | None:
@@ -68,7 +64,7 @@ class LockstepFrame:
         Raises:
             ValueError: The last values end a payload of no fixed length.
         """
-        layout = layout_of(message_id)
+        layout = LAYOUTS[message_id]
         fields = _fields(layout.payload)
         count = len(fields) - len(last_values)
         first = Struct("<" + "".join(fields[:count]))
@@ -90,7 +86,7 @@ class LockstepFrame:
 
 
 def _part(message_id: int, count: int) -> _Part:
-    layout = layout_of(message_id)
+    layout = LAYOUTS[message_id]
     first = Struct("<" + "".join(_fields(layout.payload)[:count]))
     return _Part(layout.id_bytes, layout.crc_extra, first)
 

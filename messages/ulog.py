@@ -63,6 +63,11 @@ class Field:
         return 1 if self.type == "char" else self.count or 1
 
 
+def doubles(name: str, size: int, note: str) -> Field:
+    """A field of double precision: an array, or with ``size`` 0 a single value."""
+    return Field(name, "double", size, note)
+
+
 @dataclass(frozen=True, slots=True)
 class Topic:
     """A named record; every one begins with its time."""

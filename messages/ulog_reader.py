@@ -20,8 +20,6 @@ _NAME = re.compile(r"\w+", re.ASCII)  # of a topic; it also names a file of an e
 _TEXT_HEADS: Final = {ulog.TEXT: 9, ulog.TAGGED: 11}  # bytes: severity, tag and time
 _DAMAGE = (ValueError, IndexError, KeyError, struct.error)  # what a wrong byte leads to
 
-Value = int | float | bool | bytes
-
 
 class UlogError(Exception):
     """A file that is no log, in one sentence."""

@@ -85,7 +85,7 @@ def _run(words: list[str]) -> int:
         print(HELP, end="")
         return 0
     if words[0] == "--version":
-        from pandion.version import version
+        from command_line.version import version
 
         print(f"pandion {version()}")
         return 0

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Protocol
+from typing import TYPE_CHECKING, Any, Final
 
 from command_line.options import OneOf, option, read
 from command_line.parser import COULD_NOT_START
@@ -16,6 +16,10 @@ from pandion.display import Display
 if TYPE_CHECKING:
     from messages.ulog import Topic
     from messages.ulog_reader import UlogFile
+    from pandion.csv_export import CsvSink
+    from pandion.mcap_export import McapSink
+
+    Sink = CsvSink | McapSink
 
 DONE: Final = 0  # exit code
 
@@ -33,14 +37,6 @@ class ExportOptions:
     log: Path = option("LOG", "flight.ulg, or its directory", Path, required=True)
     csv: Path | None = option("--csv DIR", "one file a topic, into DIR", Path, one_of=_TARGET)
     mcap: Path | None = option("--mcap FILE", "one file, messages as JSON", Path, one_of=_TARGET)
-
-
-class Sink(Protocol):
-    """Where an export goes."""
-
-    def add(self, topic: str, t_us: int, names: tuple[str, ...], values: tuple[Any, ...]) -> None:
-        """Take one record; the names of a topic never change."""
-        ...
 
 
 def main(argv: list[str]) -> int:

@@ -5,23 +5,23 @@ from __future__ import annotations
 import json
 import math
 import sys
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
 from command_line.options import as_words, declared, group, json_file, read
+from command_line.output import unwritten
 from command_line.parser import COULD_NOT_START
+from command_line.version import version
 from fsw.arguments import OUT, PARAMS, FswOptions
 from fsw.link.link_choice import NO_LINK, LinkChoice, addresses
 from fsw.link.udp_endpoint import LinkError, parse_address
-from fsw.log.run_directory import new_run_directory
+from fsw.log.run_directory import run_directory
 from fsw.parameters.control_choice import ControlChoice
 from pandion.display import Display
 from pandion.join_truth import join_truth
-from pandion.output import write_text
 from pandion.processor import ANYWHERE, lockstep_places
 from pandion.result import FlightReports, as_json, table_rows
 from pandion.supervisor import Flown, ProcessFailed, Supervisor
-from pandion.version import version
 from sitl.arguments import RunOptions, SitlOptions
 from sitl.scenario_file import ScenarioError, load_scenario, scenario_digest
 
@@ -48,6 +48,7 @@ class PlannedFlight:
 
     options: FlyOptions
     name: str  # of the scenario
+    body: str  # that the scenario is for
     digest: str  # of the scenario's file
     duration_s: float
     out: Path
@@ -89,19 +90,11 @@ def planned(options: FlyOptions) -> PlannedFlight:
     return PlannedFlight(
         options=options,
         name=scenario.name,
+        body=scenario.body,
         digest=scenario_digest(options.scenario),
         duration_s=scenario.duration_s if options.duration_s is None else options.duration_s,
-        out=_directory(options.out, f"{scenario.name}-seed{options.seed}"),
+        out=run_directory(options.out, f"{scenario.name}-seed{options.seed}"),
     )
-
-
-def _directory(wanted: Path | None, stem: str) -> Path:
-    if wanted is None:
-        return new_run_directory(Path("runs"), stem)
-    wanted.mkdir(parents=True, exist_ok=True)
-    if any((wanted / name).exists() for name in ("result.json", "flight.tlog", "flight.ulg")):
-        raise FileExistsError(f"{wanted} already holds a flight; name another --out")
-    return wanted
 
 
 def _banner(flight: PlannedFlight, display: Display) -> None:
@@ -130,7 +123,7 @@ def _fsw_options(flight: PlannedFlight, port: int) -> FswOptions:
     return FswOptions(
         sim=f"udp:127.0.0.1:{port}",
         links=options.links,
-        control=options.control,
+        control=replace(options.control, body=options.control.body or flight.body),
         params=options.params,
         out=flight.out,
         wait_s=_WAIT_S,
@@ -169,22 +162,11 @@ def _judge(flight: PlannedFlight, display: Display, flown: Flown) -> int:
     )
     result = as_json(reports)
     text = json.dumps(result, indent=2) + "\n"
-    lost = _write(str(out / "result.json"), text)
+    lost = unwritten(out / "result.json", text)
     display.result(result, table_rows(result, (flown.sitl or {}).get("tracking_error_max_m")))
-    unwritten = [*flown.unwritten, *lost, *_write(options.json, text)]
-    if unwritten:
-        print(f"pandion fly: results could not be written: {'; '.join(unwritten)}", file=sys.stderr)
+    lost = [*flown.unwritten, *lost, *unwritten(options.json, text)]
+    if lost:
+        print(f"pandion fly: results could not be written: {'; '.join(lost)}", file=sys.stderr)
     if flown.sitl is not None and flown.sitl.get("end_kind") == "refused":
         return COULD_NOT_START
-    return COMPLETED if result["completed"] and not unwritten else NOT_COMPLETED
-
-
-def _write(target: str | None, text: str) -> list[str]:
-    """Write the result; returns what could not be written, and why."""
-    try:
-        write_text(target, text)
-    except BrokenPipeError:
-        raise
-    except OSError as error:
-        return [f"{'standard output' if target == '-' else target}: {error.strerror}"]
-    return []
+    return COMPLETED if result["completed"] and not lost else NOT_COMPLETED

@@ -8,11 +8,14 @@ import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, Protocol
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 from command_line.options import OneOf, option, read, switch
 from command_line.parser import COULD_NOT_START, unknown_name
 from fsw.link.udp_endpoint import LinkError, parse_address
+
+if TYPE_CHECKING:
+    from pandion.param_vehicle import ParameterClient
 
 DONE, REFUSED = 0, 1  # exit codes
 _WHERE: Final = OneOf()
@@ -66,18 +69,6 @@ class _File(_Where):
     path: Path = option("FILE", ".params or .parm", Path, required=True)
 
 
-class Values(Protocol):
-    """Where parameters are."""
-
-    def read_all(self) -> Mapping[str, float]:
-        """Every value, by name."""
-        ...
-
-    def write(self, name: str, value: float) -> None:
-        """Change one parameter to ``value`` [the parameter's unit]."""
-        ...
-
-
 class FileValues:
     """Parameters in a file; those it does not name are as the flight software has them."""
 
@@ -124,6 +115,9 @@ class FileValues:
         if not self._path.exists():
             return {}
         return _read_file(self._path)
+
+
+Values: TypeAlias = "FileValues | ParameterClient"
 
 
 def main(argv: list[str]) -> int:

@@ -9,16 +9,16 @@ from collections.abc import Iterator
 from typing import Final, cast
 
 from fsw.link.udp_endpoint import MAX_DATAGRAM, Address
+from fsw.link.wire import message_ids as ids
 from fsw.parameters.float32 import nearest_decimal
+from messages import status_text
 from messages.frames import Frame, FrameWriter, split
 
 _SYSTEM, _COMPONENT = 254, 190  # of no ground station in use
 _VEHICLE: Final = (1, 1)
 _NO_INDEX: Final = 0xFFFF
-_HEARTBEAT, _STATUSTEXT = 0, 253
-_READ, _LIST, _VALUE, _SET, _ERROR = 20, 21, 22, 23, 345
-_GCS, _NO_AUTOPILOT, _ACTIVE, _VERSION = 6, 8, 4, 3
 _REAL32: Final = 9
+_GCS, _NO_AUTOPILOT, _ACTIVE, _VERSION = 6, 8, 4, 3
 _TRIES: Final = 3
 _QUIET_S: Final = 0.3  # a list that pauses this long has lost something
 
@@ -58,12 +58,12 @@ class ParameterClient:
         count = 1
         for _ in range(_TRIES):
             if not values:
-                self._send(_LIST, *_VEHICLE)
+                self._send(ids.PARAM_REQUEST_LIST, *_VEHICLE)
             else:
                 for index in set(range(count)) - set(values):
-                    self._send(_READ, index, *_VEHICLE, b"")
+                    self._send(ids.PARAM_REQUEST_READ, index, *_VEHICLE, b"")
             patience_s = self._patience_s
-            while len(values) < count and (frame := self._hear((_VALUE,), patience_s)):
+            while len(values) < count and (frame := self._hear((ids.PARAM_VALUE,), patience_s)):
                 value, count, index, name, _ = cast(
                     "tuple[float, int, int, bytes, int]", frame.payload_values
                 )
@@ -87,25 +87,25 @@ class ParameterClient:
         if held != nearest_decimal(value):
             raise ParameterRefused("; ".join(texts) or f"the vehicle leaves {name} at {held:g}")
 
-    def _ask(self, name: str, value: float) -> tuple[float, list[str]]:
+    def _ask(self, name: str, value: float) -> tuple[float, tuple[str, ...]]:
         """Set a value until one comes back; that and the status texts meanwhile."""
-        texts = _Texts()
+        said: list[Frame] = []  # status texts
         for _ in range(_TRIES):
-            self._send(_SET, value, *_VEHICLE, name.encode(), _REAL32)
+            self._send(ids.PARAM_SET, value, *_VEHICLE, name.encode(), _REAL32)
             until = time.monotonic() + self._patience_s
             while (left_s := until - time.monotonic()) > 0.0:
-                frame = self._hear((_VALUE, _ERROR, _STATUSTEXT), left_s)
+                frame = self._hear((ids.PARAM_VALUE, ids.PARAM_ERROR, ids.STATUSTEXT), left_s)
                 if frame is None:
                     break
-                if frame.message_id == _STATUSTEXT:
-                    texts.add(frame)
-                elif frame.message_id == _VALUE:
+                if frame.message_id == ids.STATUSTEXT:
+                    said.append(frame)
+                elif frame.message_id == ids.PARAM_VALUE:
                     held, _, _, named, _ = cast(
                         "tuple[float, int, int, bytes, int]", frame.payload_values
                     )
                     if _text(named) == name:
-                        return nearest_decimal(held), texts.whole
-                elif _text(cast(bytes, frame.payload_values[3])) == name and not texts.whole:
+                        return nearest_decimal(held), status_text.joined(said)
+                elif _text(cast(bytes, frame.payload_values[3])) == name and not said:
                     raise ParameterRefused(f"the vehicle has no parameter {name}")
         raise NoAnswer(f"no answer from the vehicle at {self._where}")
 
@@ -114,7 +114,7 @@ class ParameterClient:
         return f"udp:{self._vehicle[0]}:{self._vehicle[1]}"
 
     def _send(self, message_id: int, *values: float | bytes) -> None:
-        beat = self._writer.frame(_HEARTBEAT, 0, _GCS, _NO_AUTOPILOT, 0, _ACTIVE, _VERSION)
+        beat = self._writer.frame(ids.HEARTBEAT, 0, _GCS, _NO_AUTOPILOT, 0, _ACTIVE, _VERSION)
         # Nothing listens yet: the vehicle may start.
         with contextlib.suppress(ConnectionRefusedError):
             self._socket.send(beat + self._writer.frame(message_id, *values))
@@ -134,22 +134,6 @@ class ParameterClient:
                 self._waiting = split(self._socket.recv(MAX_DATAGRAM))
 
     _waiting: Iterator[Frame] = iter(())
-
-
-class _Texts:
-    """Status texts, put together from their pieces."""
-
-    def __init__(self) -> None:
-        self.whole: list[str] = []
-        self._id = 0
-
-    def add(self, frame: Frame) -> None:
-        _, text, id_, piece = cast("tuple[int, bytes, int, int]", frame.payload_values)
-        if id_ and id_ == self._id and piece:
-            self.whole[-1] += _text(text)
-        else:
-            self.whole.append(_text(text))
-        self._id = id_
 
 
 def _text(padded: bytes) -> str:

@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from command_line.options import json_file, option, read, switch
+from command_line.output import console_beside, write_text
 from command_line.parser import COULD_NOT_START
 from fsw.signals import Origin
 from pandion.display import Display
-from pandion.output import console_beside, write_text
 
 if TYPE_CHECKING:
     from fsw.runtime.program import FlightProgram

@@ -11,13 +11,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
 from command_line.options import json_file, option, read
+from command_line.output import console_beside, write_text
 from command_line.parser import COULD_NOT_START
 from command_line.values import number, one_of, whole
+from command_line.version import version
 from fsw.log.run_directory import new_run_directory
 from fsw.parameters.control_choice import KNOWN
 from pandion.display import Display
-from pandion.output import console_beside, write_text
-from pandion.version import version
 from studies.catalogue import STUDIES, study
 
 if TYPE_CHECKING:

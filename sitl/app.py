@@ -6,33 +6,30 @@ import dataclasses
 
 from command_line.process import (
     NOT_COMPLETED,
+    CouldNotStart,
     Events,
-    JsonEvents,
     StopRequest,
-    TextEvents,
+    events_of,
     run_reported,
 )
 from sitl.arguments import SitlOptions
 from sitl.link.udp_endpoint import RESEND_S, LinkError, PeerSocket, parse_address
-from sitl.scenario import Scenario
 from sitl.scenario_file import ScenarioError, load_scenario
-
-
-class CouldNotStart(Exception):
-    """A run that cannot start, in one sentence."""
 
 
 def run(options: SitlOptions) -> int:
     """Simulate one flight; returns the exit code."""
-    events: Events = JsonEvents() if options.events == "json" else TextEvents(options.json == "-")
-    refusals = (CouldNotStart, LinkError, ScenarioError)
+    events = events_of(options.events, to_stderr=options.json == "-")
+    refusals = (LinkError, ScenarioError)
     return run_reported("sitl", events, refusals, lambda: _run(options, events))
 
 
 def _run(options: SitlOptions, events: Events) -> int:
     if options.realtime and options.speed not in (None, 1.0):
         raise CouldNotStart("--realtime flies at speed 1; --speed needs --lockstep")
-    scenario = _scenario(options)
+    scenario = load_scenario(options.scenario)
+    if options.duration_s is not None:
+        scenario = dataclasses.replace(scenario, duration_s=options.duration_s)
     _check_outputs(options)
     endpoint = PeerSocket.bound(parse_address(options.listen, any_port=True), RESEND_S)
     try:
@@ -41,12 +38,13 @@ def _run(options: SitlOptions, events: Events) -> int:
         events.report("listening", sentence, host=host, port=port, duration_s=scenario.duration_s)
         # NumPy and numba take a second to load; the flight software can start meanwhile.
         from sitl.flight import Flight
+        from sitl.link.server import wait_for_vehicle
 
         flight = Flight(options, scenario, endpoint, events)
         stop = StopRequest()
         stop.listen()
         events.report("ready", "sitl: ready, waiting for the flight software")
-        if flight.wait_for_vehicle(stop):
+        if wait_for_vehicle(endpoint, options.wait_s, stop):
             return flight.run(stop)
         if not stop.requested:
             raise CouldNotStart(
@@ -56,13 +54,6 @@ def _run(options: SitlOptions, events: Events) -> int:
         return NOT_COMPLETED
     finally:
         endpoint.close()
-
-
-def _scenario(options: SitlOptions) -> Scenario:
-    scenario = load_scenario(options.scenario)
-    if options.duration_s is None:
-        return scenario
-    return dataclasses.replace(scenario, duration_s=options.duration_s)
 
 
 def _check_outputs(options: SitlOptions) -> None:

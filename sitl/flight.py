@@ -8,16 +8,16 @@ import gc
 import json
 import os
 from collections.abc import Callable
-from pathlib import Path
 from typing import Final
 
+from command_line.output import unwritten
 from command_line.parser import COULD_NOT_START
-from command_line.process import NOT_COMPLETED, Events
+from command_line.process import NOT_COMPLETED, Events, StopRequest
 from sitl.arguments import SitlOptions
 from sitl.link.encode import StepEncoder
-from sitl.link.exchange import Exchange, ExchangeCounts, Lockstep, RealTime, Stop
+from sitl.link.exchange import Exchange, ExchangeCounts, Lockstep, RealTime
 from sitl.link.pilot import flight_plan
-from sitl.link.server import RunTiming, serve, shut_down, wait_for_vehicle
+from sitl.link.server import RunTiming, serve, shut_down
 from sitl.link.udp_endpoint import PeerSocket
 from sitl.result import EndKind, TruthResult
 from sitl.scenario import Scenario
@@ -47,11 +47,7 @@ class Flight:
         self._simulation = Simulation(scenario, options.seed)
         _rehearse(Simulation(scenario, options.seed))
 
-    def wait_for_vehicle(self, stop: Stop) -> bool:
-        """Wait as long as the options allow; False if none came."""
-        return wait_for_vehicle(self._endpoint, self._options.wait_s, stop)
-
-    def run(self, stop: Stop) -> int:
+    def run(self, stop: StopRequest) -> int:
         """Fly to the end and report; returns the exit code."""
         options, simulation, endpoint = self._options, self._simulation, self._endpoint
         self._events.report("flying", "sitl: flying")
@@ -69,14 +65,16 @@ class Flight:
         self._report_pauses(exchange.counts)
         result = simulation.result()
         described = self._as_json(result, timing, exchange.counts)
-        unwritten = self._write(described)
+        text = json.dumps(described, indent=2) + "\n"
+        in_directory = None if options.out is None else options.out / "sitl.json"
+        lost = [*unwritten(options.json, text), *unwritten(in_directory, text)]
         sentence = f"sitl: {_summary(result, timing)}"
         self._events.report("ended", sentence, result=described, vehicle_silent=not heard)
-        for what in unwritten:
+        for what in lost:
             self._events.report("unwritten", f"sitl: cannot write {what}", what=what)
         if simulation.ended is not None and simulation.ended.kind is EndKind.REFUSED:
             return COULD_NOT_START
-        return COMPLETED if result.completed and not unwritten else NOT_COMPLETED
+        return COMPLETED if result.completed and not lost else NOT_COMPLETED
 
     def _tries(self, silent: bool) -> int:
         """How often to send the shutdown command; a silent vehicle may not receive it."""
@@ -110,7 +108,7 @@ class Flight:
         self._events.report("warning", f"sitl: {sentence}")
 
     def _target_at(self, t_us: int) -> TrajectoryPoint:
-        return self._simulation.target_at(1e-6 * (t_us - START_US))
+        return self._simulation.clock.target_at(1e-6 * (t_us - START_US))
 
     def _yaw_at(self, t_us: int) -> float:
         return self._simulation.clock.yaw_at(1e-6 * (t_us - START_US))
@@ -119,7 +117,7 @@ class Flight:
         values = {"t_s": time_s, "min_margin_m": margin_m, "real_time_factor": real_time_factor}
         self._events.report("progress", "", **values)
 
-    def _exchange(self, stop: Stop) -> Exchange:
+    def _exchange(self, stop: StopRequest) -> Exchange:
         joints = len(self._simulation.vehicle.links)
         period_s = 1e-6 * STEP_US
         if self._options.realtime:
@@ -159,21 +157,6 @@ class Flight:
             "pauses": counts.pauses,
             "paused_s": counts.paused_s,
         }
-
-    def _write(self, result: dict[str, object]) -> list[str]:
-        """Write the result where it is wanted; returns what could not be written, and why."""
-        options, text = self._options, json.dumps(result, indent=2) + "\n"
-        if options.json == "-":
-            print(text, end="", flush=True)
-        files = [] if options.json in (None, "-") else [Path(str(options.json))]
-        files += [] if options.out is None else [options.out / "sitl.json"]
-        unwritten = []
-        for file in files:
-            try:
-                file.write_text(text, encoding="utf-8")
-            except OSError as error:
-                unwritten.append(f"{file}: {error.strerror}")
-        return unwritten
 
 
 def _rehearse(simulation: Simulation) -> None:

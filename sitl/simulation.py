@@ -11,12 +11,13 @@ import numpy as np
 
 from sitl.compiled import machine_code
 from sitl.disturbances.items import push
-from sitl.flight_evaluator import FlightEvaluator, Points, critical
+from sitl.flight_evaluator import FlightEvaluator, critical
 from sitl.mission_clock import MissionClock
 from sitl.plant.aerial_manipulator import Plant, plant
 from sitl.plant.integrator import STEP_S, step
-from sitl.plant.kinematics import places
+from sitl.plant.kinematics import places as places_into
 from sitl.plant.state import ARM, P_WB, Q_WB, THRUST, V_WB, W_WB_B
+from sitl.plant.vector import Array
 from sitl.result import EndKind, EndReason, TruthResult
 from sitl.scenario import V3, Scenario
 from sitl.scenario_file import ScenarioError
@@ -53,7 +54,7 @@ class Truth:
     qd_arm: tuple[float, ...]  # rad/s
     p_WE: V3  # m, NED, end-effector
     target: TrajectoryPoint  # its reference
-    margins_m: tuple[float, ...]  # m, in the order of ``Simulation.margin_keys``
+    margins_m: tuple[float, ...]  # m, in the order of ``World.keys``
 
 
 class Simulation:
@@ -62,8 +63,6 @@ class Simulation:
     Raises:
         ScenarioError: The scenario contradicts itself or starts outside its safe set.
     """
-
-    step_us = STEP_US
 
     def __init__(self, scenario: Scenario, seed: int) -> None:
         if not (seed >= 0):
@@ -81,7 +80,8 @@ class Simulation:
         self._state, trim = first_state(self.vehicle, scenario, self.clock.target_at(0.0).p)
         self._thrust, self._torque = trim.thrust, trim.torque
         self._sent = (0.0, 0.0)  # largest torque and thrust commanded, before any saturation
-        self._places = np.empty((SUBSTEPS, 2 + len(self.vehicle.links), 3))
+        axes = 3 if scenario.body == "full" else 0
+        self._places = np.empty((SUBSTEPS, 2 + len(self.vehicle.links) + axes, 3))
         self._states = np.empty((SUBSTEPS, len(self._state)))
         still = (0.0, 0.0, 0.0)
         # No steps: only what the accelerometer feels at the start.
@@ -90,7 +90,7 @@ class Simulation:
         self._step = machine_code(step, self._plants, self._state, *example)
         self._felt = self._step(self._plants, self._state, *example).felt
         self._reading: SensorReadings | None = None
-        self._evaluator = FlightEvaluator(scenario, self.clock, self._points_now())
+        self._evaluator = FlightEvaluator(scenario, self.clock, self._places_now())
 
     @property
     def t_us(self) -> int:
@@ -106,11 +106,6 @@ class Simulation:
     def ended(self) -> EndReason | None:
         """Why the run is over, None while it is not."""
         return self._evaluator.ended
-
-    @property
-    def margin_keys(self) -> tuple[str, ...]:
-        """Names of the margins, e.g. ``front/end_effector``."""
-        return self._evaluator.world.keys
 
     @property
     def min_margin_m(self) -> float | None:
@@ -139,10 +134,6 @@ class Simulation:
         """The vehicle has been silent since this step: the run does not count as flown."""
         if self.ended is None or self.ended.kind is not EndKind.STOPPED:  # which says it itself
             self._evaluator.silent = f"the flight software was silent since step {step}"
-
-    def target_at(self, time_s: float) -> TrajectoryPoint:
-        """End-effector reference ``time_s`` after the start of the simulation."""
-        return self.clock.target_at(time_s)
 
     def end(self, kind: EndKind, sentence: str) -> None:
         """End the run from outside; the first reason stands."""
@@ -179,7 +170,7 @@ class Simulation:
     def truth(self) -> Truth:
         """The true state now."""
         exact = self._exact_reading()
-        points = self._points_now()
+        places = self._places_now()
         return Truth(
             t_us=self.t_us,
             p_WB=exact.p_WB,
@@ -189,9 +180,9 @@ class Simulation:
             thrust=_four(self._state[THRUST:ARM].tolist()),
             q_arm=exact.q_arm,
             qd_arm=exact.qd_arm,
-            p_WE=points[2],
-            target=self.target_at(self.time_s),
-            margins_m=self._evaluator.margins(points, self.time_s),
+            p_WE=critical(places)[2],
+            target=self.clock.target_at(self.time_s),
+            margins_m=self._evaluator.margins(places, self.time_s),
         )
 
     def state_bytes(self) -> bytes:
@@ -256,14 +247,15 @@ class Simulation:
         self._evaluator.judge_limits(self._states, self._sent, before_s, STEP_S)
         self._evaluator.judge_all(self._places, before_s, STEP_S)
         if self.step % SAMPLE_STEPS == 0:
-            self._evaluator.sample_error(critical(self._places[-1].tolist()), self.time_s)
+            self._evaluator.sample_error(critical(self._places[-1]), self.time_s)
         self._evaluator.judge_landing(landing_speed, self.time_s)
         self._evaluator.judge_time(self.time_s)
 
-    def _points_now(self) -> Points:
+    def _places_now(self) -> Array:
         out = np.empty((1, *self._places.shape[1:]))
-        places(self._plant, self._state, out)
-        return critical(out[0].tolist())
+        places_into(self._plant, self._state, out)
+        now: Array = out[0]
+        return now
 
 
 def _four(values: list[float]) -> V4:

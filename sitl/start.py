@@ -6,7 +6,7 @@ import math
 from dataclasses import replace
 
 from sitl.plant.parameters import Vehicle, level_reach
-from sitl.plant.state import StateView, at_rest
+from sitl.plant.state import ARM, P_WB, Q_WB, THRUST, V_WB, W_WB_B, at_rest
 from sitl.plant.trim import NoTrimError, Trim, level_hover, standing_height
 from sitl.plant.vector import Array
 from sitl.scenario import V3, Scenario
@@ -55,11 +55,11 @@ def hovering(vehicle: Vehicle, scenario: Scenario, p_target: V3) -> tuple[Array,
     except NoTrimError as error:
         raise ScenarioError(f"start.arm_deg = {list(scenario.start.arm_deg)}: {error}") from error
     state = at_rest(len(angles))
-    view = StateView(state)
-    view.p_WB[:] = (p_target[0] - c * x + s * y, p_target[1] - s * x - c * y, p_target[2] - z)
-    view.q_WB[:] = (math.cos(0.5 * yaw), 0.0, 0.0, math.sin(0.5 * yaw))
-    view.q_arm[:] = angles
-    view.thrust[:] = trim.thrust
+    place = (p_target[0] - c * x + s * y, p_target[1] - s * x - c * y, p_target[2] - z)
+    state[P_WB:V_WB] = place
+    state[Q_WB:W_WB_B] = (math.cos(0.5 * yaw), 0.0, 0.0, math.sin(0.5 * yaw))
+    state[ARM : ARM + len(angles)] = angles
+    state[THRUST:ARM] = trim.thrust
     return state, trim
 
 
@@ -69,8 +69,7 @@ def standing(vehicle: Vehicle, scenario: Scenario) -> tuple[Array, Trim]:
     yaw = math.radians(scenario.start.yaw_deg)
     x, y = scenario.start.position_m
     state = at_rest(joints)
-    view = StateView(state)
-    view.p_WB[:] = (x, y, -standing_height(vehicle))
-    view.q_WB[:] = (math.cos(0.5 * yaw), 0.0, 0.0, math.sin(0.5 * yaw))
-    view.q_arm[:] = [-link.theta_offset for link in vehicle.links]
+    state[P_WB:V_WB] = (x, y, -standing_height(vehicle))
+    state[Q_WB:W_WB_B] = (math.cos(0.5 * yaw), 0.0, 0.0, math.sin(0.5 * yaw))
+    state[ARM : ARM + joints] = [-link.theta_offset for link in vehicle.links]
     return state, Trim((0.0, 0.0, 0.0, 0.0), (0.0,) * joints)

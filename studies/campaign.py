@@ -7,6 +7,7 @@ flown one by one, each in a process of its own, and the one that kills it again 
 
 from __future__ import annotations
 
+import contextlib
 import json
 import multiprocessing
 import signal
@@ -84,7 +85,8 @@ class Campaign:
         except BrokenProcessPool:
             return tuple(out.values())
         except BaseException:
-            _end_processes()  # or leaving would wait for flights that are no longer wanted
+            for process in multiprocessing.active_children():
+                process.kill()  # or leaving would wait for flights that are no longer wanted
             raise
         finally:
             pool.shutdown(wait=True, cancel_futures=True)
@@ -102,17 +104,8 @@ class Campaign:
 def _pool(workers: int) -> ProcessPoolExecutor:
     pin_numerics_to_one_thread()  # inherited by the processes, before they load their libraries
     spawn = multiprocessing.get_context("spawn")
-    return ProcessPoolExecutor(workers, mp_context=spawn, initializer=_leave_interrupts)
-
-
-def _end_processes() -> None:
-    for process in multiprocessing.active_children():
-        process.kill()
-
-
-def _leave_interrupts() -> None:
-    """Ignore interrupts in a worker; the campaign ends its processes."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    ignored = (signal.SIGINT, signal.SIG_IGN)  # the campaign ends its processes
+    return ProcessPoolExecutor(workers, spawn, initializer=signal.signal, initargs=ignored)
 
 
 def _alone(job: Job) -> Outcome:
@@ -125,13 +118,11 @@ def _alone(job: Job) -> Outcome:
 
 
 def _read(journal: Path) -> dict[str, Outcome]:
-    """Rows of a journal; empty lines and one cut short by an interrupt are dropped."""
+    """Rows of a journal; lines cut short by an interrupt or of another version are dropped."""
     known = {}
     for line in journal.read_text(encoding="utf-8").splitlines():
-        try:
+        with contextlib.suppress(json.JSONDecodeError, TypeError):
             row = json.loads(line)
-        except json.JSONDecodeError:
-            continue
-        key = row.pop("key")
-        known[key] = Outcome(**row)
+            key = row.pop("key")
+            known[key] = Outcome(**row)
     return known

@@ -9,6 +9,7 @@ mode commands of the scenario's pilot come on the first two ticks.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 from fsw.flight.autopilot import Autopilot
@@ -26,6 +27,7 @@ from fsw.signals import (
     Plan,
     PlanFailure,
     PlanRequest,
+    SafeSetAnnouncement,
     SensorFrame,
     SwitchMode,
     TickInputs,
@@ -40,7 +42,7 @@ from studies.flight_result import (
     TracePoint,
     processor_time_us,
 )
-from studies.mission import safe_set, target
+from studies.mission import SIMULATOR, moves, safe_set, target
 
 TARGET_US = 100_000  # between points of the reference, as the pilot sends them
 _TARGETS_AHEAD = 20
@@ -53,22 +55,15 @@ _FOLLOW = Command(
 State = TypeVar("State")
 
 
+@dataclass
 class ClosedLoop(Generic[State]):
     """Plant, tick and planner in one loop; the caller gives the inputs of each step."""
 
-    def __init__(
-        self,
-        simulation: Simulation,
-        tick: Callable[[State, TickInputs], tuple[State, TickOutputs]],
-        state: State,
-        planner: PlanService,
-        airframe: Airframe,
-    ) -> None:
-        self.simulation = simulation
-        self.state = state
-        self.planner = planner
-        self._tick = tick
-        self._airframe = airframe
+    simulation: Simulation
+    tick: Callable[[State, TickInputs], tuple[State, TickOutputs]]
+    state: State
+    planner: PlanService
+    airframe: Airframe
 
     def sense(self) -> SensorFrame:
         """Sensor readings of this step."""
@@ -97,16 +92,24 @@ class ClosedLoop(Generic[State]):
         clock = simulation.clock
         return tuple(target(clock, start_us + TARGET_US * k) for k in range(first, newest + 1))
 
+    def announced(self) -> tuple[SafeSetAnnouncement, ...]:
+        """What the scenario's pilot announces at this step: ten times a second where zones move."""
+        step, scenario = self.simulation.step, self.simulation.scenario
+        if step > 0 and (step % (TARGET_US // STEP_US) > 0 or not moves(scenario)):
+            return ()
+        held = safe_set(scenario, self.simulation.t_us)
+        return (SafeSetAnnouncement(SIMULATOR, held),) if held.zones else ()
+
     def step(self, inputs: TickInputs) -> TickOutputs:
         """Tick, plan, advance."""
-        self.state, outputs = self._tick(self.state, inputs)
+        self.state, outputs = self.tick(self.state, inputs)
         if outputs.plan_request is not None:
             self.planner.submit(outputs.plan_request)
         self.simulation.advance(self._controls(outputs))
         return outputs
 
     def _controls(self, outputs: TickOutputs) -> Controls:
-        sent, airframe = outputs.actuators, self._airframe
+        sent, airframe = outputs.actuators, self.airframe
         f1, f2, f3, f4 = (thrust / airframe.rotor_thrust_max for thrust in sent.rotor_thrust)
         torque = tuple(value / airframe.joint_torque_max for value in sent.joint_torque)
         return Controls((f1, f2, f3, f4), torque, outputs.snapshot.armed)
@@ -157,7 +160,6 @@ def simulate(
     simulation, recorder = Simulation(scenario, seed), FlightRecorder()
     planner = InlinePlanner(Planner(config.planner, config.airframe, processor_time_us))
     loop = ClosedLoop(simulation, Autopilot(config).tick, FlightState(), planner, config.airframe)
-    announced = safe_set(scenario)
     steps_per_plan = config.mpc_period_us // config.tick_period_us
     while simulation.ended is None:
         step, sensors = simulation.step, loop.sense()
@@ -169,7 +171,7 @@ def simulate(
             plan=answer,
             commands=((_ARM,), (_FOLLOW,))[step] if step < 2 else (),
             targets=loop.targets(),
-            safe_set=announced if step == 0 else None,
+            announced=loop.announced(),
         )
         if traced and step % TRACE_STEPS == 0:
             recorder.trace.append(_trace_point(simulation))

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from studies import deviations
 from studies.campaign import Campaign
+from studies.deviations import deviations
 from studies.drawing import BASE, BOUND, END_EFFECTOR, TARGET, Sheet, sheet
 from studies.inverse_workspace import BOTH_ELBOWS, Array, Inscribed, InverseWorkspace
 from studies.settings import Figure, Report, Settings, Table
@@ -61,7 +61,7 @@ def run(settings: Settings, campaign: Campaign) -> Report:
             ),
         ),
         figures=(Figure("fig2", caption, _draw(sets, spheres).svg(), arrays),),
-        deviations=deviations.FIGURE_2,
+        deviations=deviations("fig2"),
     )
 
 

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from sitl.scenario import Scenario
-from studies import deviations
 from studies.campaign import Campaign
 from studies.cases import Case, Entrant, entrants, scenario
+from studies.deviations import deviations
 from studies.drawing import BASE, BOUND, END_EFFECTOR, TARGET, WALL, Sheet, sheet
 from studies.flight_result import FlightResult
 from studies.job import Job, fly_job
@@ -58,7 +58,7 @@ def _report(
         rows=[_row(name, settings, controller, flight) for controller, flight in flights.items()],
         tables=(_table(flights),),
         figures=(Figure(name, caption, draw(arrays, flown).svg(), dict(arrays)),),
-        deviations=deviations.FIGURES + deviations.PLANT[settings.plant],
+        deviations=deviations("flight-figures", settings.plant),
     )
 
 

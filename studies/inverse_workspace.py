@@ -37,12 +37,7 @@ class Inscribed:
 
 
 class InverseWorkspace:
-    """The set of base positions of one arm.
-
-    Args:
-        airframe: Links and joint limits.
-        elbows: Signs of theta_2 that the arm may use.
-    """
+    """The set of base positions of one arm, which may use these ``elbows``, signs of theta_2."""
 
     def __init__(
         self, airframe: Airframe = AIRFRAME, elbows: tuple[int, ...] = BOTH_ELBOWS

@@ -61,9 +61,7 @@ class Outcome:
     reason: str
     duration_s: float = 0.0
     te_m: float | None = None
-    te_max_m: float | None = None
     margin_m: float | None = None
-    margin_key: str | None = None
     limits_kept: bool = True
     joint_1_deg: float | None = None  # largest |th1|; None on a plant without limits
     link_2_deg: float | None = None  # largest |th1 + th2|
@@ -73,7 +71,6 @@ class Outcome:
     ce_mean: float = 0.0
     tc_p50_us: float = 0.0
     tc_p99_us: float = 0.0
-    tc_max_us: float = 0.0
     plans: int = 0
     failures: int = 0  # planning steps without a plan
     error: bool = False  # the flight itself broke, not the vehicle
@@ -109,9 +106,7 @@ def score(seed: int, result: FlightResult) -> Outcome:
         reason=truth.end_reason,
         duration_s=truth.duration_s,
         te_m=truth.tracking_error_rms_m,
-        te_max_m=truth.tracking_error_max_m,
         margin_m=truth.min_margin_m,
-        margin_key=truth.min_margin_key,
         limits_kept=all(use.kept for use in truth.limits.values()),
         joint_1_deg=_largest_deg(truth, "joint_1_angle"),
         link_2_deg=_largest_deg(truth, "link_2_angle"),
@@ -121,7 +116,6 @@ def score(seed: int, result: FlightResult) -> Outcome:
         ce_mean=effort["mean"],
         tc_p50_us=float(np.median(steps)),
         tc_p99_us=float(np.quantile(steps, 0.99)),
-        tc_max_us=float(steps.max()),
         plans=planner.plans,
         failures=planner.failures,
     )

@@ -2,23 +2,32 @@
 
 from __future__ import annotations
 
-import fsw.signals as fsw_signals
-from fsw.signals import EndEffectorTarget, PointObstacle, SafeSet, WorkspaceSphere
+from fsw.shapes import BY_NUMBER
+from fsw.signals import EndEffectorTarget, MessageSource, SafeSet, Shape, Zone
 from sitl.mission_clock import MissionClock
 from sitl.scenario import Scenario
 from sitl.simulation import START_US
+from sitl.zones import Zone as SimulatedZone
+from sitl.zones import zones_of
+
+SIMULATOR = MessageSource(1, 195, "simulator")
 
 
-def safe_set(scenario: Scenario) -> SafeSet:
-    """The safe set of a scenario in the flight software's terms."""
-    walls = tuple(
-        fsw_signals.Wall(wall.normal, wall.offset_m, wall.clearance_m) for wall in scenario.walls
-    )
-    obstacles = tuple(PointObstacle(one.position_m, one.clearance_m) for one in scenario.obstacles)
-    workspace = scenario.workspace
-    if workspace is None:
-        return SafeSet(walls, obstacles=obstacles)
-    return SafeSet(walls, WorkspaceSphere((0.0, 0.0, -workspace.d_iw_m), workspace.radius_m))
+def safe_set(scenario: Scenario, t_us: int = START_US) -> SafeSet:
+    """The safe set of a scenario in the flight software's terms, as announced at a time stamp."""
+    return SafeSet(tuple(_zone(one, t_us) for one in zones_of(scenario)))
+
+
+def moves(scenario: Scenario) -> bool:
+    """Whether the safe set is another one as time passes."""
+    return any(one.moves for one in zones_of(scenario))
+
+
+def _zone(one: SimulatedZone, t_us: int) -> Zone:
+    place = one.at(1e-6 * (t_us - START_US))
+    shape = Shape(BY_NUMBER[one.kind.number].name, place.numbers)
+    since_us = t_us if any(place.velocity) else 0
+    return Zone(shape, one.table.clearance_m, one.table.keep_in, place.velocity, since_us)
 
 
 def target(clock: MissionClock, t_us: int) -> EndEffectorTarget:

@@ -8,18 +8,7 @@ from pathlib import Path
 
 from studies.settings import Figure, Report, Settings, Table
 
-_STYLE = """
-body { font: 15px/1.45 system-ui, sans-serif; max-width: 75rem; margin: 2rem auto; padding: 0 1rem;
-       color: #1b1f24; background: #fff; }
-h1 { font-size: 1.5rem; } h2 { font-size: 1.1rem; margin-top: 2rem; }
-table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
-caption { text-align: left; font-weight: 600; padding: .4rem 0; }
-th, td { border-bottom: 1px solid #d5d9de; padding: .25rem .6rem; text-align: right; }
-th:nth-child(-n+2), td:nth-child(-n+2) { text-align: left; }
-svg { max-width: 100%; height: auto; }
-figure { margin: 1.5rem 0; } figcaption { color: #57606a; }
-.warning { border-left: 4px solid #b3261e; padding-left: .8rem; }
-"""
+_STYLE = Path(__file__).with_suffix(".css")
 
 
 def write(
@@ -44,7 +33,7 @@ def json_text(report: Report) -> str:
 
 def page(report: Report, settings: Settings, provenance: tuple[str, ...]) -> str:
     """The page of one study; provenance says in sentences how to get the same again."""
-    parts = [f"<h1>{_text(report.title)}</h1>", _items(provenance), _seeds(settings)]
+    parts = [f"<h1>{html.escape(report.title)}</h1>", _items(provenance), _seeds(settings)]
     parts += [_table(table) for table in report.tables]
     parts += [_figure(figure) for figure in report.figures]
     if report.errors:
@@ -54,7 +43,8 @@ def page(report: Report, settings: Settings, provenance: tuple[str, ...]) -> str
     body = "\n".join(parts)
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-        f"<title>{_text(report.title)}</title>\n<style>{_STYLE}</style>\n</head>\n"
+        f"<title>{html.escape(report.title)}</title>\n"
+        f"<style>\n{_STYLE.read_text(encoding='utf-8')}</style>\n</head>\n"
         f"<body>\n{body}\n</body>\n</html>\n"
     )
 
@@ -71,23 +61,20 @@ def _seeds(settings: Settings) -> str:
 
 
 def _table(table: Table) -> str:
-    head = "".join(f"<th>{_text(name)}</th>" for name in table.headers)
+    head = "".join(f"<th>{html.escape(name)}</th>" for name in table.headers)
     rows = "\n".join(
-        "<tr>" + "".join(f"<td>{_text(cell)}</td>" for cell in row) + "</tr>" for row in table.rows
+        "<tr>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in row) + "</tr>"
+        for row in table.rows
     )
-    caption = f"<caption>{_text(table.caption)}</caption>"
+    caption = f"<caption>{html.escape(table.caption)}</caption>"
     return f"<table>{caption}<thead><tr>{head}</tr></thead>\n<tbody>{rows}</tbody></table>"
 
 
 def _figure(figure: Figure) -> str:
     drawing = figure.svg[figure.svg.index("<svg") :]  # no XML declaration inside HTML
     caption = f"{figure.caption} (numbers: {figure.name}.json)"
-    return f"<figure>{drawing}<figcaption>{_text(caption)}</figcaption></figure>"
+    return f"<figure>{drawing}<figcaption>{html.escape(caption)}</figcaption></figure>"
 
 
 def _items(sentences: tuple[str, ...]) -> str:
-    return "<ul>" + "".join(f"<li>{_text(line)}</li>" for line in sentences) + "</ul>"
-
-
-def _text(plain: str) -> str:
-    return html.escape(plain)
+    return "<ul>" + "".join(f"<li>{html.escape(line)}</li>" for line in sentences) + "</ul>"

@@ -16,9 +16,10 @@ from sitl.scenario import (
     VehicleScale,
     Wind,
 )
-from studies import deviations, summary
+from studies import summary
 from studies.campaign import Campaign
-from studies.cases import CASES, Case, configuration, grazing, scenario
+from studies.cases import CASES, configuration, grazing, scenario
+from studies.deviations import deviations
 from studies.settings import Report, Settings, Table
 from studies.summary import fly_cells
 
@@ -79,17 +80,14 @@ GRAZING = "grazing path"  # of Case I only
 _HEADERS = ("case", "change", *summary.HEADERS)
 
 
-def _changed(case: Case, name: str, duration_s: float | None) -> Scenario:
-    change = grazing if name == GRAZING else CHANGES[name]
-    return change(scenario(case, disturbed=True, duration_s=duration_s))
-
-
 def run(settings: Settings, campaign: Campaign) -> Report:
     """Fly every change in both cases; always the full plant, the other has nothing to change."""
     config = configuration("full", "blf", settings.inner)
     named = [(case, name) for case in CASES for name in CHANGES]
     named.append(("I", GRAZING))
-    cells = [(_changed(case, name, settings.duration_s), config) for case, name in named]
+    changes = CHANGES | {GRAZING: grazing}
+    flown = (scenario(case, disturbed=True, duration_s=settings.duration_s) for case, _ in named)
+    cells = [(changes[name](one), config) for (_, name), one in zip(named, flown, strict=True)]
     summaries, errors = fly_cells(campaign, replace(settings, plant="full"), cells)
     found = list(zip(named, summaries, strict=True))
     return Report(
@@ -105,6 +103,6 @@ def run(settings: Settings, campaign: Campaign) -> Report:
                 tuple((case, name, *summary.cells(row)) for (case, name), row in found),
             ),
         ),
-        deviations=deviations.ROBUSTNESS,
+        deviations=deviations("robustness"),
         errors=errors,
     )

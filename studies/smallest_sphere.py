@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import asdict, replace
 
-from sitl.scenario import Scenario
-from studies import deviations, summary
+from studies import summary
 from studies.campaign import Campaign
 from studies.cases import configuration, scenario
+from studies.deviations import deviations
 from studies.settings import Report, Settings, Table
 from studies.summary import Summary, fly_cells
 
@@ -20,9 +20,10 @@ def run(settings: Settings, campaign: Campaign) -> Report:
     flown = scenario("II", disturbed=True, duration_s=settings.duration_s)
     found: list[tuple[float, Summary]] = []
     errors: tuple[str, ...] = ()
+    assert flown.workspace is not None
     for radius in RADII_M:
-        cell = (with_radius(flown, radius), config)
-        (row,), broke = fly_cells(campaign, settings, [cell])
+        smaller = replace(flown, workspace=replace(flown.workspace, radius_m=radius))
+        (row,), broke = fly_cells(campaign, settings, [(smaller, config)])
         found.append((radius, row))
         errors += broke
         if row.passed < row.total:
@@ -38,12 +39,6 @@ def run(settings: Settings, campaign: Campaign) -> Report:
                 tuple((f"{radius:.3f}", *summary.cells(row)) for radius, row in found),
             ),
         ),
-        deviations=deviations.SPHERE,
+        deviations=deviations("smallest-sphere"),
         errors=errors,
     )
-
-
-def with_radius(flown: Scenario, radius_m: float) -> Scenario:
-    """The scenario with another workspace sphere."""
-    assert flown.workspace is not None
-    return replace(flown, workspace=replace(flown.workspace, radius_m=radius_m))

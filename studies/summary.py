@@ -6,13 +6,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import binomtest
 
 from fsw.parameters.flight_config import FlightConfig
 from sitl.scenario import Scenario
 from studies.campaign import Campaign
 from studies.job import Job, Outcome
 from studies.settings import Settings
-from studies.statistics import wilson
 
 HEADERS = ("passed", "95 %", "worst margin mm", "limits kept", "joints deg", "TE m")
 
@@ -61,7 +61,8 @@ def summarise(jobs: Sequence[Job], outcomes: Sequence[Outcome]) -> Summary:
     total = len(outcomes)
     flown = len({job.key() for job in jobs})
     passed = sum(row.completed for row in outcomes)
-    low, high = wilson(round(passed * flown / total), flown)
+    # Unlike the normal approximation, Wilson's interval means something where all passed.
+    low, high = binomtest(round(passed * flown / total), flown).proportion_ci(method="wilson")
     whole = [row for row in outcomes if not row.error]
     errors = [row.te_m for row in whole if row.te_m is not None]
     margins = [row.margin_m for row in whole if row.margin_m is not None]
@@ -85,8 +86,8 @@ def summarise(jobs: Sequence[Job], outcomes: Sequence[Outcome]) -> Summary:
         ce_sum=mean(lambda row: row.ce_sum),
         tc_p50_us=mean(lambda row: row.tc_p50_us),
         tc_p99_us=mean(lambda row: row.tc_p99_us),
-        wilson_low=low,
-        wilson_high=high,
+        wilson_low=float(low),
+        wilson_high=float(high),
         planning_failures=sum(row.failures for row in whole),
     )
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from dataclasses import asdict
 
-from studies import deviations, paper, summary
+from studies import paper, summary
 from studies.campaign import Campaign
 from studies.cases import configuration, scenario, with_horizon, with_lambda
+from studies.deviations import deviations
 from studies.settings import Report, Settings, Table
 from studies.summary import Summary, fly_cells
 
@@ -46,7 +47,7 @@ def run(settings: Settings, campaign: Campaign) -> Report:
                 tuple(_cells(horizon, value, row) for (horizon, value), row in found),
             ),
         ),
-        deviations=deviations.TABLE_3 + deviations.PLANT[settings.plant],
+        deviations=deviations("both-tables", "table3", settings.plant),
         errors=errors,
     )
 

@@ -6,9 +6,10 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from sitl.scenario import Scenario
-from studies import deviations, paper, summary
+from studies import paper, summary
 from studies.campaign import Campaign
 from studies.cases import CASES, Case, Entrant, entrants, reference_floor_m, scenario
+from studies.deviations import deviations
 from studies.settings import Report, Settings, Table
 from studies.summary import Summary, fly_cells, metres
 
@@ -53,7 +54,7 @@ def run(settings: Settings, campaign: Campaign) -> Report:
             for disturbed in (False, True)
         )
         + (_floors(settings),),
-        deviations=deviations.TABLE_4 + deviations.PLANT[settings.plant],
+        deviations=deviations("both-tables", "table4", settings.plant),
         errors=errors,
     )
 

@@ -15,11 +15,12 @@ from benchmarks.optimiser.instances import Instance
 from benchmarks.optimiser.solved import Solved, timed
 from fsw.barriers.cbf_row import cbf_lower_bound
 from fsw.barriers.safe_approach import safe_approach_speed
-from fsw.barriers.workspace import outward_frame
 from fsw.model.airframe import AIRFRAME
-from fsw.model.linearisation import POINTS, Linearisation
-from fsw.model.prediction import INPUTS, STATES, Array, condense, to_vector
+from fsw.model.body import body_of
+from fsw.model.linearisation import Linearisation, position, velocity
+from fsw.model.prediction import INPUTS, STATES, YAW, Array, P, V, condense, to_vector
 from fsw.mpc.planner_config import PlannerConfig
+from fsw.shapes.frame import outward_axis
 from fsw.signals import PlanRequest, SafeSet
 
 SOLVERS = ("ipopt", "fatrop")
@@ -41,9 +42,10 @@ class CasadiMethod:
     def __init__(self, config: PlannerConfig, safe_set: SafeSet, solver: str) -> None:
         import casadi
 
-        from benchmarks.optimiser.ocp import build
+        from benchmarks.optimiser.ocp import build, sphere_of
 
         self._config, self._safe_set = config, safe_set
+        self._sphere = sphere_of(safe_set)
         self._model = condense(AIRFRAME, config.period, config.horizon)
         self._horizon = Linearisation(self._model)
         program, parameters = build(config, safe_set)
@@ -101,38 +103,47 @@ class CasadiMethod:
         """Start, targets, directions at the optimum and the h that eq 25 requires."""
         start = to_vector(request.start)
         self._horizon.refill(start, optimum)
-        yaws = self._horizon.states[:, 13]
+        yaws = self._horizon.states[:, YAW]
         parts: list[Any] = [start]
         for i in range(1, self._config.horizon + 1):
             target = request.targets[i]
             turns = np.round((yaws[i] - target.yaw) / (2.0 * np.pi))  # the short way round
             frame = np.eye(3)
-            if self._safe_set.sphere is not None:
-                centre = np.array(target.p_WE) + self._safe_set.sphere.centre_from_target
-                outward_frame(self._horizon.position[i, 0] - centre, frame)
+            if self._sphere is not None:
+                centre = np.array(target.p_WE) + self._sphere.shape.numbers[:3]
+                x, y, z = self._horizon.states[i, P : P + 3] - centre
+                frame = np.array([outward_axis(x, y, z, which) for which in (0, 2, 4)])
             parts += [target.p_WE, target.v_WE, [target.yaw + 2.0 * np.pi * turns], frame.ravel()]
             parts.append(self._required(request, i, frame))
         return np.concatenate(parts)
 
     def _required(self, request: PlanRequest, i: int, frame: Array) -> Array:
-        tuning = self._config.walls if self._safe_set.sphere is None else self._config.workspace
-        position, velocity = self._horizon.position[0], self._horizon.velocity[0]
-        h_start = []
-        if self._safe_set.sphere is None:
-            for wall in self._safe_set.walls:
-                for point in range(POINTS):
-                    gap = position[point] @ wall.normal - wall.offset - wall.clearance
-                    speed = velocity[point] @ wall.normal
+        h_start: list[float] = []
+        if self._sphere is None:
+            tuning = self._config.walls
+            parts = body_of("points", AIRFRAME).parts
+            start = self._horizon.horizon.frames[0]
+            points = [
+                (position(start, part.on, part.begin), velocity(start, part.on, part.begin))
+                for part in parts
+            ]
+            for wall in self._safe_set.zones:
+                normal, offset = wall.shape.numbers[:3], wall.shape.numbers[3]
+                for p, v in points:
+                    gap = float(np.dot(normal, p)) - offset - wall.clearance
+                    speed = float(np.dot(normal, v))
                     h_start.append(safe_approach_speed(gap, tuning.alpha, tuning.slope) + speed)
         else:
-            target, sphere = request.targets[0], self._safe_set.sphere
-            e = position[0] - target.p_WE - np.array(sphere.centre_from_target)
-            w = velocity[0] - target.v_WE
+            tuning = self._config.workspace
+            start, target = self._horizon.states[0], request.targets[0]
+            *centre, radius = self._sphere.shape.numbers
+            e = start[P : P + 3] - target.p_WE - np.array(centre)
+            w = start[V : V + 3] - target.v_WE
             for axis in frame:
                 for n in (axis, -axis):
+                    room = float(radius - n @ e)
                     h_start.append(
-                        safe_approach_speed(sphere.radius - n @ e, tuning.alpha, tuning.slope)
-                        - n @ w
+                        safe_approach_speed(room, tuning.alpha, tuning.slope) - float(n @ w)
                     )
         return np.array(
             [cbf_lower_bound(h, i, tuning.numbers(self._config.period)) for h in h_start]

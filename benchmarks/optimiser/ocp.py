@@ -17,10 +17,10 @@ import numpy as np
 
 from fsw.barriers.safe_approach import BarrierTuning
 from fsw.model.airframe import AIRFRAME, GRAVITY
-from fsw.model.kinematics import arm_points
-from fsw.model.prediction import INPUTS, Q_ARM, STATES, YAW, YAW_RATE, P, V, discretise
+from fsw.model.kinematics import body_axes
+from fsw.model.prediction import INPUTS, Q_ARM, QD_ARM, STATES, YAW, YAW_RATE, P, V, discretise
 from fsw.mpc.planner_config import PlannerConfig
-from fsw.signals import SafeSet
+from fsw.signals import TARGET_SPHERE, SafeSet, Zone
 
 # A node's parameters: target position, velocity, yaw; directions as rows; required h of each row.
 TARGET, DIRECTIONS = 7, 9
@@ -60,14 +60,20 @@ class NonlinearProgram:
         self.row_upper += [float("inf")] * len(rows)
 
 
+def sphere_of(safe_set: SafeSet) -> Zone | None:
+    """The sphere that follows the target (Case II); None: there are walls alone (Case I)."""
+    spheres = [zone for zone in safe_set.zones if zone.shape.kind == TARGET_SPHERE]
+    return spheres[0] if spheres else None
+
+
 def barrier_rows(safe_set: SafeSet) -> int:
     """Rows of eq 22 or 23 at a node."""
-    return 6 if safe_set.sphere is not None else 3 * len(safe_set.walls)
+    return 6 if sphere_of(safe_set) is not None else 3 * len(safe_set.zones)
 
 
 def tuning_of(config: PlannerConfig, safe_set: SafeSet) -> BarrierTuning:
     """The barrier's constants in this safe set."""
-    return config.workspace if safe_set.sphere is not None else config.walls
+    return config.workspace if sphere_of(safe_set) is not None else config.walls
 
 
 def build(config: PlannerConfig, safe_set: SafeSet) -> tuple[NonlinearProgram, Any]:
@@ -114,8 +120,7 @@ def _controls(
         u = program.add(f"u{i}", [-value for value in bound], bound)
     count = 0
     if i > 0:
-        walls = 1 if safe_set.sphere is not None else len(safe_set.walls)
-        count = 1 + (walls if i > tuning_of(config, safe_set).skipped_nodes else 0)
+        count = 1 + (len(safe_set.zones) if i > tuning_of(config, safe_set).skipped_nodes else 0)
     return u, program.add(f"s{i}", [0.0] * count, [infinite] * count)
 
 
@@ -147,11 +152,20 @@ def _node(
 
 def _points(config: PlannerConfig, x: Any) -> list[tuple[Any, Any]]:
     """Position and velocity of base, joint 2 and end-effector."""
-    out = np.zeros((2, 2, 3), dtype=object)
-    plain = arm_points.py_func  # type: ignore[attr-defined]  # the equations, not compiled
-    plain(np.array(ca.vertsplit(x), dtype=object), *AIRFRAME.link_length, out)
-    arm = [(ca.vertcat(*point[0]), ca.vertcat(*point[1])) for point in out]
-    return [(x[P : P + 3], x[V : V + 3]), *arm]
+    axes = np.zeros((4, 3), dtype=object)
+    plain = body_axes.py_func  # type: ignore[attr-defined]  # the equations, not compiled
+    plain(np.array(ca.vertsplit(x), dtype=object), axes)
+    b1, b3, d1, d3 = (ca.vertcat(*axis) for axis in axes)
+    p, v = x[P : P + 3], x[V : V + 3]
+    points = [(p, v)]
+    angle, rate = 0.0, 0.0
+    for joint, length in enumerate(AIRFRAME.link_length):
+        angle, rate = angle + x[Q_ARM + joint], rate + x[QD_ARM + joint]
+        ahead, down = length * ca.sin(angle), length * ca.cos(angle)
+        p = p + ahead * b1 + down * b3
+        v = v + ahead * d1 + down * d3 + rate * (down * b1 - ahead * b3)
+        points.append((p, v))
+    return points
 
 
 def _add_cost(
@@ -180,19 +194,20 @@ def _barrier(
     tuning = tuning_of(config, safe_set)
     required = node[TARGET + DIRECTIONS :]
     rows: list[Any] = []
-    if safe_set.sphere is None:
-        for k, wall in enumerate(safe_set.walls):
-            normal = ca.DM(wall.normal)
+    sphere = sphere_of(safe_set)
+    if sphere is None:
+        for k, wall in enumerate(safe_set.zones):
+            normal, offset = ca.DM(wall.shape.numbers[:3]), wall.shape.numbers[3]
             for p, v in points:
-                gap = ca.dot(normal, p) - wall.offset - wall.clearance
+                gap = ca.dot(normal, p) - offset - wall.clearance
                 h = _root(gap, tuning) + ca.dot(normal, v)
                 rows.append(h + slack[1 + k] - required[len(rows)])
         return rows
-    centre = node[:3] + ca.DM(safe_set.sphere.centre_from_target)
+    centre, radius = node[:3] + ca.DM(sphere.shape.numbers[:3]), sphere.shape.numbers[3]
     e, w = points[0][0] - centre, points[0][1] - node[3:6]
     for k in range(6):
         along = node[TARGET + 3 * (k // 2) : TARGET + 3 * (k // 2) + 3] * (-1.0) ** k
-        h = _root(safe_set.sphere.radius - ca.dot(along, e), tuning) - ca.dot(along, w)
+        h = _root(radius - ca.dot(along, e), tuning) - ca.dot(along, w)
         rows.append(h + slack[1] - required[k])
     return rows
 

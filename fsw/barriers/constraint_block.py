@@ -1,4 +1,4 @@
-"""What every barrier contributes to the planner's program."""
+"""What every barrier and limit contributes to the planner's program."""
 
 from __future__ import annotations
 
@@ -10,12 +10,13 @@ from numpy.typing import NDArray
 
 from fsw.model.linearisation import Linearisation
 from fsw.model.prediction import INPUTS, Array
+from fsw.signals import SafeSet
 
 
 class Rows(NamedTuple):
     """The numbers of a block, for kernels."""
 
-    start: Array  # (surfaces x points,)
+    start: Array  # (starts,)
     value: Array  # (rows,)
     lower_bound: Array  # (rows,)
     gradient: Array  # (rows, 6 n)
@@ -32,7 +33,7 @@ class ConstraintBlock:
     slack: NDArray[np.intp]  # (rows,) index of its slack among this block's slacks
     unknowns: int  # 6 n
     starts: int  # values at node 0
-    start: Array = field(init=False)  # (starts,) the value of each surface and point at node 0
+    start: Array = field(init=False)  # (starts,) the value of each zone and part at node 0
     value: Array = field(init=False)  # (rows,)
     lower_bound: Array = field(init=False)  # (rows,)
     gradient: Array = field(init=False)  # (rows, 6 n)
@@ -55,16 +56,18 @@ class ConstraintBlock:
         return int(self.slack.max()) + 1 if len(self.slack) else 0
 
 
-def surface_rows(
-    surfaces: int, points: int, first_node: int, horizon: int, starts: int | None = None
+def block(
+    per_group: tuple[int, ...], first_node: int, horizon: int, starts: int = 0
 ) -> ConstraintBlock:
-    """Rows for nodes x surfaces x points from a first node on, one slack a node and surface."""
+    """Rows of the nodes from a first one on; at each node groups of so many share a slack."""
     nodes = np.arange(first_node, horizon + 1)
+    rows, groups = sum(per_group), len(per_group)
+    group = np.repeat(np.arange(groups), per_group)
     return ConstraintBlock(
-        node=np.repeat(nodes, surfaces * points),
-        slack=np.repeat(np.arange(len(nodes) * surfaces), points),
+        node=np.repeat(nodes, rows),
+        slack=(groups * np.arange(len(nodes))[:, None] + group).ravel(),
         unknowns=INPUTS * horizon,
-        starts=surfaces * points if starts is None else starts,
+        starts=starts,
     )
 
 
@@ -76,6 +79,7 @@ class TargetPoints:
     velocity: Array  # (n + 1, 3) m/s
     yaw: Array  # (n + 1,) rad
     q_arm: Array | None = None  # (n + 1, 2) rad; None: the planner is free to choose
+    t_us: int = 0  # of node 0; what moves by itself is placed by it
 
     def __post_init__(self) -> None:
         for name in ("position", "velocity", "yaw"):  # kernels rely on the layout
@@ -89,6 +93,10 @@ class Barrier(Protocol):
     @property
     def rows(self) -> ConstraintBlock:
         """The rows as of the last refill."""
+        ...
+
+    def update(self, safe_set: SafeSet) -> None:
+        """Take other numbers of the same zones: they moved, or their clearance changed."""
         ...
 
     def refill(self, horizon: Linearisation, targets: TargetPoints) -> None:

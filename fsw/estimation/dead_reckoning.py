@@ -11,12 +11,7 @@ from fsw.signals import Mat3, StateEstimate, Vec3
 
 
 def moved_on(x: StateEstimate, seconds: float) -> StateEstimate:
-    """The estimate a moment later: the specific force and all rates are held.
-
-    Args:
-        x: As measured.
-        seconds: Age of the measurement [s], a few milliseconds.
-    """
+    """The estimate a few ``seconds`` [s] later: the specific force and all rates are held."""
     t, R = seconds, x.R_WB
     a = (-x.specific_force * R[2], -x.specific_force * R[5], GRAVITY - x.specific_force * R[8])
     (q1, q2), (qd1, qd2) = x.q_arm, x.qd_arm

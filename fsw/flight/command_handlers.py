@@ -7,13 +7,15 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
-from fsw.barriers.tangent import distance_to
+from scipy.optimize import minimize_scalar
+
 from fsw.flight import arming
 from fsw.flight.modes.base import CommandContext, FlightMode
 from fsw.flight.offboard_setpoints import joints_refusal
 from fsw.flight.orbit_path import max_orbit_speed
 from fsw.flight.setpoint_generator import PositionGoal
-from fsw.geometry.vectors import dot
+from fsw.model.body import hull_reach
+from fsw.shapes.zones import surfaces
 from fsw.signals import (
     MAX_DISTANCE,
     Arm,
@@ -46,6 +48,7 @@ from fsw.signals import (
 ACCEPTED, DENIED = CommandResult.ACCEPTED, CommandResult.DENIED
 LATER: Final = CommandResult.TEMPORARILY_REJECTED
 MIN_SPEED: Final = 0.01  # m/s
+_CIRCLE_PLACES: Final = 64  # looked at, before the nearest is sought
 _CLIMB_TOLERANCE: Final = 0.05  # m: a ground station rounds, and starts from its last altitude
 
 
@@ -172,7 +175,7 @@ def _go_to(action: GoTo, context: CommandContext, modes: Modes) -> Decision:
         reason = "not in hold, and the command does not ask to change the mode"
         return Decision(LATER, f"no goto: {reason}")
     place = _place(action.place, context)
-    blocked = _too_far(place) or _too_low(place, context) or _too_close(place, context.safe_set)
+    blocked = _too_far(place) or _too_low(place, context) or _too_close(place, context)
     if blocked is not None:
         return Decision(DENIED, f"no goto: {blocked}")
     decision = _switch(Mode.HOLD, context, modes)
@@ -188,9 +191,7 @@ def _orbit(action: FlyOrbit, context: CommandContext, modes: Modes) -> Decision:
         return Decision(LATER, f"no orbit: {refusal}")
     centre, radius = _place(action.centre, context), action.radius
     blocked = (
-        _too_far(centre)
-        or _too_low(centre, context)
-        or _circle_too_close(centre, radius, context.safe_set)
+        _too_far(centre) or _too_low(centre, context) or _circle_too_close(centre, radius, context)
     )
     if blocked is not None:
         return Decision(DENIED, f"no orbit: {blocked}")
@@ -384,28 +385,34 @@ def _too_low(place: Vec3, context: CommandContext) -> str | None:
     return f"{-place[2]:.1f} m above the origin is too low; the minimum is {least:.1f} m"
 
 
-def _too_close(place: Vec3, safe_set: SafeSet) -> str | None:
+def _too_close(place: Vec3, context: CommandContext) -> str | None:
     """Why the body cannot be at a place."""
-    for number, wall in enumerate(safe_set.walls, start=1):
-        if not dot(wall.normal, place) - wall.offset > wall.clearance:
-            return f"the place is too close to the fence or a wall, or beyond it (wall {number})"
-    for number, obstacle in enumerate(safe_set.obstacles, start=1):
-        if not distance_to(obstacle, place) > obstacle.clearance:
-            return f"the place is too close to a fence or an obstacle, or in it (obstacle {number})"
+    for number, at in enumerate(surfaces(context.safe_set, place, context.now_us), start=1):
+        if not at.distance > hull_reach(context.body, at.normal):
+            return f"the place is too close to zone {number} of the safe set, or beyond it"
     return None
 
 
-def _circle_too_close(centre: Vec3, radius: float, safe_set: SafeSet) -> str | None:
+def _circle_too_close(centre: Vec3, radius: float, context: CommandContext) -> str | None:
     """Why the body cannot fly a circle."""
-    for number, wall in enumerate(safe_set.walls, start=1):
-        nearest = dot(wall.normal, centre) - radius * math.hypot(wall.normal[0], wall.normal[1])
-        if not nearest - wall.offset > wall.clearance:
-            return f"the circle comes too close to the fence or a wall (wall {number})"
-    for number, obstacle in enumerate(safe_set.obstacles, start=1):
-        across = math.dist(centre[:2], obstacle.position[:2]) - radius
-        up = 0.0 if obstacle.upright else centre[2] - obstacle.position[2]
-        if not math.hypot(across, up) > obstacle.clearance:
-            return f"the circle comes too close to a fence or an obstacle (obstacle {number})"
+    for number in range(len(context.safe_set.zones)):
+        zone = SafeSet(context.safe_set.zones[number : number + 1])
+
+        def room(angle: float, zone: SafeSet = zone) -> float:
+            x, y, z = centre
+            place = (x + radius * math.cos(angle), y + radius * math.sin(angle), z)
+            seen = surfaces(zone, place, context.now_us)
+            return min(
+                (at.distance - hull_reach(context.body, at.normal) for at in seen), default=1.0
+            )
+
+        # The nearest of some places on the circle, then the nearest between its neighbours.
+        apart = 2.0 * math.pi / _CIRCLE_PLACES
+        best = min((apart * k for k in range(_CIRCLE_PLACES)), key=room)
+        near = (best - apart, best + apart)
+        best = float(minimize_scalar(room, bounds=near, method="bounded").x)
+        if not room(best) > 0.0:
+            return f"the circle comes too close to zone {number + 1} of the safe set"
     return None
 
 

@@ -214,7 +214,7 @@ def _begin(
     if flight.speed is not None:
         limits = replace(limits, speed=min(flight.speed, MAX_MISSION_SPEED))
     place = _destination(step, at, context)
-    end = project_to_safe_set(place, context.safe_set)
+    end = project_to_safe_set(place, context.safe_set, context.now_us)
     segment = segment_to(at, end, _heading(step, end, context.look_at), limits)
     text = f"mission step {number}: {step.action.value}"
     moving = replace(

@@ -21,11 +21,13 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from fsw.barriers.safe_approach import safe_approach_speed
-from fsw.barriers.tangent import planes, tangent
+from fsw.barriers.safe_approach import BarrierTuning, safe_approach_speed
 from fsw.geometry.vectors import add_scaled, dot, norm, subtract
+from fsw.model.body import Body, body_of, hull_reach
 from fsw.parameters.flight_config import FlightConfig
-from fsw.signals import EndEffectorTarget, SafeSet, Vec3, Wall
+from fsw.shapes.kind import Surface
+from fsw.shapes.zones import surfaces
+from fsw.signals import EndEffectorTarget, SafeSet, Vec3
 
 SETTLE_RATE = 2.0  # 1/s, of the last bit of the way
 _GROUND_BRAKING = 1.0  # m/s^2
@@ -38,6 +40,7 @@ _MAX_DEPTH = 0.1  # m behind the clearance; the paper's path goes 0.03 m deep
 _ALWAYS = 0.5  # m/s towards a wall, half of what the penalty of a row stands
 _PROJECTIONS = 30  # one after the other; in a corner they have to settle
 _TOLERANCE = 1e-4  # m
+_HERE: Vec3 = (0.0, 0.0, 0.0)
 
 
 def limit_lead(p: Vec3, vehicle: Vec3, max_lead_distance: float) -> Vec3:
@@ -50,33 +53,29 @@ def limit_lead(p: Vec3, vehicle: Vec3, max_lead_distance: float) -> Vec3:
 
 
 def limit_approach(
-    p: Vec3, v: Vec3, other_end: Vec3, safe_set: SafeSet, braking: float, slope: float
+    p: Vec3,
+    v: Vec3,
+    ends: tuple[tuple[Vec3, Body | None], ...],
+    safe_set: SafeSet,
+    t_us: int,
+    barrier: BarrierTuning,
 ) -> tuple[Vec3, Vec3]:
-    """``p`` [m, NED] off every wall and obstacle, and its ``v`` [m/s, NED] such that it can stop.
+    """``p`` [m, NED] off every zone, and its ``v`` [m/s, NED] such that it can stop.
 
-    The arm's ``other_end`` [m, NED], as seen from the point, stays out as well. The barrier counts
-    on a deceleration ``braking`` [m/s^2] and the ``slope`` [1/s] of S at the boundary. A sphere
-    rides on the reference and needs nothing.
+    Both ``ends`` of the arm [m, NED], as seen from the point, stay out as well, one of them with
+    the body around it. A sphere rides on the reference and needs nothing.
     """
-    for wall in safe_set.walls:
-        reach = min(0.0, dot(wall.normal, other_end))
-        p, v = _off(wall, reach, p, v, braking, slope)
-    for obstacle in safe_set.obstacles:
-        for end in ((0.0, 0.0, 0.0), other_end):
-            wall = tangent(obstacle, add_scaled(p, end, 1.0))
-            p, v = _off(wall, dot(wall.normal, end), p, v, braking, slope)
+    for zone in range(len(safe_set.zones)):
+        one = SafeSet(safe_set.zones[zone : zone + 1])
+        for end, body in ends:
+            for at in surfaces(one, add_scaled(p, end, 1.0), t_us):
+                n = at.normal
+                distance = at.distance - (0.0 if body is None else hull_reach(body, n))
+                if distance < 0.0:
+                    p = add_scaled(p, n, -distance)
+                room = max(distance, 0.0)
+                v = _slowed(v, n, safe_approach_speed(room, barrier.alpha, barrier.slope))
     return p, v
-
-
-def _off(
-    wall: Wall, reach: float, p: Vec3, v: Vec3, braking: float, slope: float
-) -> tuple[Vec3, Vec3]:
-    """A point that something reaches out from along the normal [m], off one wall."""
-    n = wall.normal
-    distance = dot(n, p) + reach - wall.offset - wall.clearance
-    if distance < 0.0:
-        p = add_scaled(p, n, -distance)
-    return p, _slowed(v, n, safe_approach_speed(max(distance, 0.0), braking, slope))
 
 
 def _slowed(v: Vec3, n: Vec3, most: float) -> Vec3:
@@ -108,28 +107,23 @@ def limit_reference(
     p_WE: Vec3,
     v_WE: Vec3,
     safe_set: SafeSet,
-    braking: float,
-    slope: float,
+    barrier: BarrierTuning,
 ) -> tuple[EndEffectorTarget, ...]:
     """The targets of a horizon, the same object where nothing had to be limited.
 
     What is asked for near the motion of the end-effector, ``p_WE`` [m] and ``v_WE`` [m/s], and not
-    far behind a wall passes as it is: the paper's own path enters the safety zone. The barrier
-    counts on a deceleration ``braking`` [m/s^2] and the ``slope`` [1/s] of S at the boundary.
+    far behind a wall passes as it is: the paper's own path enters the safety zone.
     """
     begin_us, limited = targets[0].t_us, []
-    approached = [
-        (wall.normal, _fastest(wall, p_WE, braking, slope)) for wall in planes(safe_set, p_WE)
-    ]
+    approached = [(at.normal, _fastest(at, barrier)) for at in surfaces(safe_set, p_WE, begin_us)]
     for target in targets:
         ahead = 1e-6 * (target.t_us - begin_us)
         led = add_scaled(p_WE, v_WE, ahead)
         p = limit_lead(target.p_WE, led, _MAX_LEAD_DISTANCE + _LEAD_GROWTH * ahead)
         v = limit_lead(target.v_WE, v_WE, _MAX_VELOCITY_ERROR)
-        for wall in planes(safe_set, p):
-            depth = wall.offset + wall.clearance - dot(wall.normal, p)
-            if depth > _MAX_DEPTH:
-                p = add_scaled(p, wall.normal, depth - _MAX_DEPTH)
+        for at in surfaces(safe_set, p, target.t_us):
+            if -at.distance > _MAX_DEPTH:
+                p = add_scaled(p, at.normal, -at.distance - _MAX_DEPTH)
         for n, most in approached:
             v = _slowed(v, n, most)
         limited.append(EndEffectorTarget(target.t_us, p, v, target.a_WE, target.yaw))
@@ -137,20 +131,20 @@ def limit_reference(
     return targets if result == targets else result
 
 
-def _fastest(wall: Wall, p_WE: Vec3, braking: float, slope: float) -> float:
-    """How fast to approach a wall [m/s]."""
-    room = max(dot(wall.normal, p_WE) - (wall.offset + wall.clearance), 0.0)
-    return max(safe_approach_speed(room, braking, slope), _ALWAYS)
+def _fastest(at: Surface, barrier: BarrierTuning) -> float:
+    """How fast to approach a zone [m/s]."""
+    room = max(at.distance, 0.0)
+    return max(safe_approach_speed(room, barrier.alpha, barrier.slope), _ALWAYS)
 
 
-def project_to_safe_set(p: Vec3, safe_set: SafeSet) -> Vec3:
-    """``p`` [m, NED], or a point near it that keeps every wall's and obstacle's clearance."""
+def project_to_safe_set(p: Vec3, safe_set: SafeSet, t_us: int) -> Vec3:
+    """``p`` [m, NED], or a point near it that keeps the clearance of every zone at a time."""
     for _ in range(_PROJECTIONS):
         moved = p
-        for wall in planes(safe_set, p):
-            lacking = wall.offset + wall.clearance - dot(wall.normal, p)
-            if lacking > _TOLERANCE:
-                p = add_scaled(p, wall.normal, lacking)
+        for zone in range(len(safe_set.zones)):
+            for at in surfaces(SafeSet(safe_set.zones[zone : zone + 1]), p, t_us):
+                if -at.distance > _TOLERANCE:
+                    p = add_scaled(p, at.normal, -at.distance)
         if p is moved:
             break
     return p
@@ -158,7 +152,7 @@ def project_to_safe_set(p: Vec3, safe_set: SafeSet) -> Vec3:
 
 def project(target: EndEffectorTarget, safe_set: SafeSet) -> EndEffectorTarget:
     """The target, or at rest at the boundary where it is beyond a wall or near an obstacle."""
-    p = project_to_safe_set(target.p_WE, safe_set)
+    p = project_to_safe_set(target.p_WE, safe_set, target.t_us)
     if p is target.p_WE:
         return target
     rest = (0.0, 0.0, 0.0)
@@ -172,11 +166,19 @@ class ReferenceGovernor:
         self._config = config
         self._max_lead_distance = config.steering.max_lead_distance
         self._barrier = config.planner.walls
+        self._body = body_of(config.planner.body, config.airframe)
 
     def limit_setpoint(
-        self, p: Vec3, v: Vec3, *, other_end: Vec3, of_end_effector: bool, safe_set: SafeSet
+        self,
+        p: Vec3,
+        v: Vec3,
+        *,
+        other_end: Vec3,
+        of_end_effector: bool,
+        safe_set: SafeSet,
+        t_us: int,
     ) -> tuple[Vec3, Vec3]:
-        """A generated setpoint ``p`` [m, NED], ``v`` [m/s, NED] off the ground and off every wall.
+        """A generated setpoint ``p`` [m, NED], ``v`` [m/s, NED] off the ground and off every zone.
 
         ``other_end`` [m, NED] of the arm is seen from it.
         """
@@ -184,9 +186,10 @@ class ReferenceGovernor:
         touch_speed = 0.0 if of_end_effector else self._config.limits.land_speed
         height = -body_down - self._config.airframe.leg_length
         p, v = limit_descent(p, v, height, touch_speed)
-        if not (safe_set.walls or safe_set.obstacles):
-            return p, v
-        return limit_approach(p, v, other_end, safe_set, self._barrier.alpha, self._barrier.slope)
+        body, tip = (other_end, _HERE) if of_end_effector else (_HERE, other_end)
+        return limit_approach(
+            p, v, ((body, self._body), (tip, None)), safe_set, t_us, self._barrier
+        )
 
     def limit_lead(self, p: Vec3, vehicle: Vec3) -> Vec3:
         """``p`` [m, NED] within reach of the vehicle's own point ``vehicle`` [m, NED]."""
@@ -196,5 +199,4 @@ class ReferenceGovernor:
         self, targets: tuple[EndEffectorTarget, ...], p_WE: Vec3, v_WE: Vec3, safe_set: SafeSet
     ) -> tuple[EndEffectorTarget, ...]:
         """See ``limit_reference``; the end-effector is at ``p_WE`` [m] and moves at v_WE [m/s]."""
-        barrier = self._barrier
-        return limit_reference(targets, p_WE, v_WE, safe_set, barrier.alpha, barrier.slope)
+        return limit_reference(targets, p_WE, v_WE, safe_set, self._barrier)

@@ -122,7 +122,7 @@ class SetpointGenerator:
         else:
             vehicle = estimate.p_WB
         p = self._governor.limit_lead(moved.p, vehicle)
-        return self._limited(replace(moved, p=p), estimate, safe_set)
+        return self._limited(replace(moved, p=p), estimate, safe_set, estimate.t_us)
 
     def horizon(
         self,
@@ -135,10 +135,11 @@ class SetpointGenerator:
         """Targets and joints at the nodes, the first at ``t_us``; joints only if some are asked."""
         config, targets, joint_targets = self._config, [], []
         for node in range(config.planner.horizon + 1):
+            at_us = t_us + node * config.mpc_period_us
             if node > 0:
                 reference = step(reference, goal, config.steering, config.planner.period)
-                reference = self._limited(reference, estimate, safe_set)
-            target = self.target(reference, t_us + node * config.mpc_period_us)
+                reference = self._limited(reference, estimate, safe_set, at_us)
+            target = self.target(reference, at_us)
             # The planner looks ahead at the vehicle's yaw rate, so it has to see where ours leads.
             ahead = config.planner.weights.yaw_lead * reference.yaw_rate
             targets.append(replace(target, yaw=wrap_angle(target.yaw + ahead)))
@@ -161,7 +162,7 @@ class SetpointGenerator:
         )
 
     def _limited(
-        self, reference: ReferenceState, estimate: StateEstimate, safe_set: SafeSet
+        self, reference: ReferenceState, estimate: StateEstimate, safe_set: SafeSet, t_us: int
     ) -> ReferenceState:
         x, y, z = self._hanging(reference.q_arm or estimate.q_arm, reference.yaw)
         p, v = self._governor.limit_setpoint(
@@ -170,6 +171,7 @@ class SetpointGenerator:
             other_end=(-x, -y, -z) if reference.of_end_effector else (x, y, z),
             of_end_effector=reference.of_end_effector,
             safe_set=safe_set,
+            t_us=t_us,
         )
         return replace(reference, p=p, v=v)
 

@@ -19,16 +19,10 @@ DEFAULT_ORIGIN: Final = Origin(47.397742, 8.545594, 0.0)
 
 
 def to_local(origin: Origin, latitude: float, longitude: float, altitude: float) -> Vec3:
-    """Where a place lies in the local frame.
+    """North, east, down [m] from the origin of a place.
 
-    Args:
-        origin: Of the local frame.
-        latitude: North positive [deg].
-        longitude: East positive [deg].
-        altitude: Above mean sea level [m].
-
-    Returns:
-        North, east, down [m].
+    It lies at a ``latitude`` [deg], north positive, a ``longitude`` [deg], east positive, and an
+    ``altitude`` [m] above mean sea level.
     """
     lat0, lat = math.radians(origin.latitude), math.radians(latitude)
     east_by = math.radians(longitude - origin.longitude)
@@ -42,12 +36,7 @@ def to_local(origin: Origin, latitude: float, longitude: float, altitude: float)
 
 
 def to_global(origin: Origin, p: Vec3) -> Vec3:
-    """The place of a local point: latitude and longitude [deg], altitude [m].
-
-    Args:
-        origin: Of the local frame.
-        p: Local position [m, NED].
-    """
+    """The place of a local point p [m, NED]: latitude and longitude [deg], altitude [m]."""
     distance = math.hypot(p[0], p[1])
     altitude = origin.altitude - p[2]
     if distance == 0.0:

@@ -37,25 +37,25 @@ def build_links(
     Raises:
         LinkError: An address is none, or a key cannot be trusted.
     """
-    chosen = addresses(choice)
+    gcs, api = addresses(choice)
     now_us, unix_us = clocks
     keys = choice.keys or default_keys()
     setups = [
         LinkSetup(
             name="gcs",
-            target=chosen.gcs,
+            target=gcs,
             local_port=_GCS_PORT,
             rates_hz=GROUND_RATES,
             unheard=True,
             remote=choice.allow_remote,
         ),
     ]
-    if chosen.api is not None:
+    if api is not None:
         setups.append(
             # Until a program speaks, a heartbeat a second is all it needs to find the vehicle.
             LinkSetup(
                 name="api",
-                target=chosen.api,
+                target=api,
                 local_port=_API_PORT,
                 rates_hz=API_RATES,
                 unheard=False,

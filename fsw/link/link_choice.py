@@ -76,16 +76,8 @@ class LinkChoice:
     )
 
 
-@dataclass(frozen=True, slots=True)
-class LinkAddresses:
-    """A choice, checked."""
-
-    gcs: Address
-    api: Address | None
-
-
-def addresses(choice: LinkChoice) -> LinkAddresses:
-    """Read the addresses of a choice.
+def addresses(choice: LinkChoice) -> tuple[Address, Address | None]:
+    """Where ground stations and programs are: ``--gcs`` and ``--api`` of a choice.
 
     Raises:
         LinkError: One of them is none.
@@ -94,7 +86,7 @@ def addresses(choice: LinkChoice) -> LinkAddresses:
     gcs = parse_address(choice.gcs)
     if api == gcs:
         raise LinkError(f"--gcs and --api are both {choice.gcs}; give them different ports")
-    return LinkAddresses(gcs, api)
+    return gcs, api
 
 
 def default_keys() -> Path:

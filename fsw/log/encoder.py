@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import struct
+from dataclasses import astuple
 from operator import attrgetter
 from struct import Struct
 from typing import Any, Final
@@ -17,6 +18,7 @@ from fsw.geometry.rotation import quaternion_from_matrix
 from fsw.log import topics
 from fsw.log.json_codec import JsonCodec
 from fsw.model.kinematics import point_in_flight
+from fsw.ports import GroupTiming
 from fsw.signals import (
     CommandRequest,
     FlightSnapshot,
@@ -208,9 +210,10 @@ class LogEncoder:
 
     def _planning(self, snapshot: FlightSnapshot) -> bytes:
         t_us, report, target = snapshot.t_us, snapshot.constraints, snapshot.reference
-        margins, barrier = report.margins[: topics.MARGINS], report.barrier[: topics.MARGINS]
-        least = min(margins, default=math.nan)
-        argmin = margins.index(least) if least in margins else 0xFF
+        margins, barrier, smallest = report.shown(topics.MARGINS)
+        least = min(report.margins, default=math.nan)
+        argmin = 0xFF if smallest is None else smallest
+        safety = snapshot.safety
         p, v = point_in_flight(snapshot.estimate, self._link_length)
         wanted = (
             (*_NOWHERE, *_NOWHERE, math.nan)
@@ -221,6 +224,7 @@ class LogEncoder:
             (
                 *(_BARRIER, t_us, *_filled(margins), *_filled(barrier), least),
                 *(int(report.kind), len(margins), argmin),
+                *(safety.breaches, safety.departures, safety.interventions),
                 *(_END_EFFECTOR, t_us, *p, *v, *wanted),
             )
         )
@@ -245,13 +249,11 @@ class LogEncoder:
         )
 
 
-def loop_timing(t_us: int, group: int, counts: tuple[int, ...], times: tuple[float, ...]) -> bytes:
-    """A record of loop_timing for rate group 0, the tick, or 1, the planner.
-
-    ``counts`` are ticks, late and skipped ones, and the period [us]; ``times`` [us] are execution
-    and lateness, each median, 99th percentile and most.
-    """
-    return _TIMING.pack((*_TIMING.heads, t_us, *counts, *times, group))
+def loop_timing(t_us: int, group: int, timing: GroupTiming) -> bytes:
+    """A record of loop_timing for rate group 0, the tick, or 1, the planner."""
+    period_us, *counts_and_times, _ = astuple(timing)
+    counts, times = counts_and_times[:3], counts_and_times[3:]
+    return _TIMING.pack((*_TIMING.heads, t_us, *counts, period_us, *times, group))
 
 
 def _plan_changed(now: FlightSnapshot, last: FlightSnapshot) -> bool:

@@ -17,6 +17,7 @@ from typing import Final
 
 from fsw.log.encoder import FULL, LogEncoder, loop_timing
 from fsw.log.topics import TOPICS
+from fsw.ports import GroupTiming
 from fsw.signals import StatusText, TickInputs, TickOutputs, Vec2
 from messages import ulog
 from messages.block_file import BlockFile
@@ -94,14 +95,11 @@ class FlightLog:
         if len(records) > _FLUSH_BYTES or t_us - self._block_us >= _FLUSH_INTERVAL_US:
             self._flush(t_us)
 
-    def add_timing(
-        self, t_us: int, group: int, counts: tuple[int, int, int, int], times: tuple[float, ...]
-    ) -> None:
+    def add_timing(self, t_us: int, group: int, timing: GroupTiming) -> None:
         """Append the timing of a rate group; see :func:`fsw.log.encoder.loop_timing`."""
         if not self._measured:  # being late or skipped is measured too
-            ticks, _, _, period_us = counts
-            counts, times = (ticks, 0, 0, period_us), _UNMEASURED
-        self._records += loop_timing(t_us, group, counts, times)
+            timing = GroupTiming(timing.period_us, timing.ticks, 0, 0, *_UNMEASURED)
+        self._records += loop_timing(t_us, group, timing)
 
     def add_notice(self, t_us: int, notice: StatusText) -> None:
         """Append a text of the loop; a replay of the tick does not repeat it."""

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import os
 import subprocess
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Final
+
+from command_line.version import version
 
 _SOURCE: Final = Path(__file__).resolve().parents[2]
 _PATIENCE_S: Final = 5.0
@@ -29,7 +30,4 @@ def revision() -> str:
             return described.stdout.strip()
         except (OSError, subprocess.SubprocessError):
             pass
-    try:
-        return f"version {version('pandion')}"
-    except PackageNotFoundError:
-        return "unknown"
+    return f"version {version()}"

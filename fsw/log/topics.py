@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from messages.ulog import Field, Topic
+from messages.ulog import Field, Topic, doubles
 
 TEXT_SIZE: Final = 200  # characters of an input's text in one record
 MARGINS: Final = 16
@@ -29,22 +29,18 @@ def _vector(name: str, size: int, note: str) -> Field:
     return Field(name, "float", size, note)
 
 
-def _exact(name: str, size: int, note: str) -> Field:
-    return Field(name, "double", size, note)
-
-
 SENSOR_FRAME: Final = Topic(
     "sensor_frame",
     "Sensor readings; input of the tick",
     EVERY_TICK,
     (
-        _exact("p_WB", 3, "m, NED"),
-        _exact("v_WB", 3, "m/s, NED"),
-        _exact("q_WB", 4, "[w, x, y, z]"),
-        _exact("gyro_B", 3, "rad/s, body"),
-        _exact("accel_B", 3, "m/s^2, body"),
-        _exact("q_arm", 2, "rad"),
-        _exact("qd_arm", 2, "rad/s"),
+        doubles("p_WB", 3, "m, NED"),
+        doubles("v_WB", 3, "m/s, NED"),
+        doubles("q_WB", 4, "[w, x, y, z]"),
+        doubles("gyro_B", 3, "rad/s, body"),
+        doubles("accel_B", 3, "m/s^2, body"),
+        doubles("q_arm", 2, "rad"),
+        doubles("qd_arm", 2, "rad/s"),
     ),
 )
 VEHICLE_ATTITUDE: Final = Topic(
@@ -68,8 +64,8 @@ ACTUATOR_COMMAND: Final = Topic(
     "Actuator command, exactly as sent",
     EVERY_TICK,
     (
-        _exact("rotor_thrust", 4, "N: rear, left, front, right"),
-        _exact("joint_torque", 2, "N m"),
+        doubles("rotor_thrust", 4, "N: rear, left, front, right"),
+        doubles("joint_torque", 2, "N m"),
         Field("armed", "bool"),
     ),
 )
@@ -118,12 +114,20 @@ BARRIER_MARGIN: Final = Topic(
     "Margins of the active safe set, by the vehicle's own estimate",
     PLANNING,
     (
-        _vector("margin", MARGINS, "m; walls, then obstacles; base, joint 2, end-effector of each"),
+        _vector(
+            "margin",
+            MARGINS,
+            "m; of each zone and point (base, joint 2, end-effector); with the full body, or "
+            "more zones, the least of each zone",
+        ),
         _vector("barrier", MARGINS, "h, m/s, same order; active at or below 0"),
         *_floats("minimum", note="m"),
         Field("kind", "uint8_t", note="0 none, 1 walls, 2 workspace, 3 obstacles and walls"),
         Field("count", "uint8_t", note="number of valid entries"),
         Field("argmin", "uint8_t"),
+        Field("breaches", "uint32_t", note="times the safe set was left in flight"),
+        Field("departures", "uint32_t", note="times the vehicle left the tube around its plan"),
+        Field("interventions", "uint32_t", note="times the safety filter engaged"),
     ),
 )
 END_EFFECTOR: Final = Topic(
@@ -145,16 +149,16 @@ MPC_REQUEST: Final = Topic(
     (
         Field("plan_id", "uint32_t"),
         Field("t_apply", "uint64_t", note="us; when the answer takes effect"),
-        _exact("p", 3, "m, NED"),
-        _exact("v", 3, "m/s, NED"),
-        _exact("a", 3, "m/s^2, NED"),
-        _exact("j", 2, "m/s^3, horizontal"),
-        _exact("s", 2, "m/s^4, horizontal"),
-        _exact("yaw", 0, "rad"),
-        _exact("yaw_rate", 0, "rad/s"),
-        _exact("q_arm", 2, "rad"),
-        _exact("qd_arm", 2, "rad/s"),
-        _exact("p_WE", 3, "m, NED; first point of the reference"),
+        doubles("p", 3, "m, NED"),
+        doubles("v", 3, "m/s, NED"),
+        doubles("a", 3, "m/s^2, NED"),
+        doubles("j", 2, "m/s^3, horizontal"),
+        doubles("s", 2, "m/s^4, horizontal"),
+        doubles("yaw", 0, "rad"),
+        doubles("yaw_rate", 0, "rad/s"),
+        doubles("q_arm", 2, "rad"),
+        doubles("qd_arm", 2, "rad/s"),
+        doubles("p_WE", 3, "m, NED; first point of the reference"),
         Field("from_nominal", "bool", note="start taken from the running plan, not measured"),
     ),
 )

@@ -22,6 +22,19 @@ class AttitudeLag:
 
 
 @dataclass(frozen=True, slots=True)
+class BodySize:
+    """How far the vehicle reaches beyond its joints and its rotors' hubs."""
+
+    hull: float = 0.08  # m, radius of the sphere that holds frame and battery
+    blade: float = 0.165  # m, radius of a rotor
+    disc: float = 0.02  # m, half the thickness of the space that the blades sweep
+    feet_spread: float = 0.2  # m, feet at (+-spread, +-spread)
+    leg: float = 0.01  # m, radius
+    link: float = 0.02  # m, radius
+    tool: float = 0.025  # m, radius about the end-effector
+
+
+@dataclass(frozen=True, slots=True)
 class Airframe:
     """'+' quadrotor with a planar two-joint arm whose first joint is at the body origin.
 
@@ -52,6 +65,7 @@ class Airframe:
     # 2.9 rad/s. Yaw: three times what a setpoint may turn.
     body_rate_max: Vec2 = (3.0, 1.0)  # rad/s, of roll and pitch together, and of yaw
     leg_length: float = 0.32  # m, body origin above ground when standing
+    size: BodySize = field(default_factory=BodySize)
 
 
 AIRFRAME = Airframe()

@@ -78,12 +78,12 @@ def point_in_flight(estimate: StateEstimate, lengths: Vec2) -> tuple[Vec3, Vec3]
 
 
 @compiled
-def arm_points(x: NDArray[np.generic], l1: float, l2: float, out: NDArray[np.generic]) -> None:
-    """World position and velocity of joint 2 and end-effector of a prediction state.
+def body_axes(x: NDArray[np.generic], out: NDArray[np.generic]) -> None:
+    """The body's x and z axes of a prediction state, and how fast they turn.
 
     Written without trigonometry of the tilt and without absolute values, so that it accepts a
-    complex state ``x`` (19,) [SI]: the derivative is then exact (complex step). Links of ``l1`` [m]
-    and ``l2`` [m]; ``out`` (2, 2, 3) [m, m/s], NED: [joint 2 | end-effector][position | velocity].
+    complex state ``x`` (19,) [SI]: the derivative is then exact (complex step). ``out`` (4, 3)
+    [1, 1/s], NED: b1, b3 and their rates.
     """
     # Thrust along f = g e3 - a; its derivative needs the horizontal jerk only: a vertical
     # jerk changes the length of f, hardly its direction.
@@ -104,8 +104,24 @@ def arm_points(x: NDArray[np.generic], l1: float, l2: float, out: NDArray[np.gen
     n = np.sqrt(nx * nx + ny * ny + nz * nz)
     b1x, b1y, b1z = nx / n, ny / n, nz / n
     along = (b1x * dnx + b1y * dny + b1z * dnz) / n
-    d1x, d1y, d1z = dnx / n - b1x * along, dny / n - b1y * along, dnz / n - b1z * along
+    out[0, 0], out[0, 1], out[0, 2] = b1x, b1y, b1z
+    out[1, 0], out[1, 1], out[1, 2] = b3x, b3y, b3z
+    out[2, 0] = dnx / n - b1x * along
+    out[2, 1] = dny / n - b1y * along
+    out[2, 2] = dnz / n - b1z * along
+    out[3, 0], out[3, 1], out[3, 2] = d3x, d3y, d3z
 
+
+@compiled
+def arm_points(x: NDArray[np.float64], l1: float, l2: float, out: NDArray[np.float64]) -> None:
+    """World position and velocity of joint 2 and end-effector of a prediction state.
+
+    The state ``x`` is (19,) [SI], links are of ``l1`` [m] and ``l2`` [m]; ``out`` (2, 2, 3)
+    [m, m/s], NED: [joint 2 | end-effector][position | velocity].
+    """
+    axes = np.empty((4, 3))
+    body_axes(x, axes)
+    b1, b3, d1, d3 = axes
     th1, th12 = x[Q_ARM], x[Q_ARM] + x[Q_ARM + 1]
     w1, w12 = x[QD_ARM], x[QD_ARM] + x[QD_ARM + 1]
     rx, rz, vx, vz = _link(l1, np.sin(th1), np.cos(th1), w1)
@@ -113,9 +129,6 @@ def arm_points(x: NDArray[np.generic], l1: float, l2: float, out: NDArray[np.gen
         if point == 1:
             tx, tz, ux, uz = _link(l2, np.sin(th12), np.cos(th12), w12)
             rx, rz, vx, vz = rx + tx, rz + tz, vx + ux, vz + uz
-        out[point, 0, 0] = x[P] + rx * b1x + rz * b3x
-        out[point, 0, 1] = x[P + 1] + rx * b1y + rz * b3y
-        out[point, 0, 2] = x[P + 2] + rx * b1z + rz * b3z
-        out[point, 1, 0] = x[V] + vx * b1x + rx * d1x + vz * b3x + rz * d3x
-        out[point, 1, 1] = x[V + 1] + vx * b1y + rx * d1y + vz * b3y + rz * d3y
-        out[point, 1, 2] = x[V + 2] + vx * b1z + rx * d1z + vz * b3z + rz * d3z
+        for k in range(3):
+            out[point, 0, k] = x[P + k] + rx * b1[k] + rz * b3[k]
+            out[point, 1, k] = x[V + k] + vx * b1[k] + rx * d1[k] + vz * b3[k] + rz * d3[k]

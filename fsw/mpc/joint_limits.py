@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fsw.barriers.constraint_block import surface_rows
+from fsw.barriers.constraint_block import block
 from fsw.model.linearisation import Linearisation
 from fsw.model.prediction import Q_ARM, QD_ARM, CondensedModel
 from fsw.mpc.qp_data import InputLimits
@@ -22,7 +22,7 @@ class JointLimits:
 
     def __init__(self, model: CondensedModel, limits: InputLimits) -> None:
         airframe, horizon = model.airframe, model.horizon
-        self.rows = surface_rows(1, _ROWS, 1, horizon)
+        self.rows = block((_ROWS,), 1, horizon)
         angle1 = airframe.joint1_limit - limits.joint_margin
         angle12 = airframe.joint12_limit - limits.joint_margin
         node = np.repeat([angle1, angle12, limits.joint_rate], [2, 2, len(_RATES)])

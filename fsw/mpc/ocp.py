@@ -31,8 +31,12 @@ class Ocp:
         blocks += [(barrier.rows, parts.slack) for barrier in parts.barriers]
         self.qp = QpData(config.horizon, config.limits, tuple(blocks))
         self._first_barrier_slack = self.qp.inputs + self._limits.rows.slacks
-        self.cost = 0.0
         self._solver = DualSolver(self.qp)
+
+    def update(self, safe_set: SafeSet) -> None:
+        """Take other numbers of a safe set of the same layout, whose zones moved."""
+        for barrier in self._barriers:
+            barrier.update(safe_set)
 
     def linearise(self, start: Array, guess: Array, targets: TargetPoints) -> None:
         """Refill the program around ``guess`` (6 n,) [SI inputs] from ``start`` (19,) [SI]."""

@@ -11,6 +11,7 @@ from collections.abc import Callable
 import numpy as np
 
 from fsw.barriers.constraint_block import TargetPoints
+from fsw.barriers.zone_rows import layout
 from fsw.model.airframe import Airframe
 from fsw.model.nominal import REST_STATE
 from fsw.model.prediction import INPUTS, Array, condense, to_vector
@@ -18,17 +19,16 @@ from fsw.mpc.ocp import Ocp
 from fsw.mpc.planner_config import PlannerConfig
 from fsw.mpc.reference import still_at
 from fsw.mpc.solvers import SOLVERS, Question, Search
+from fsw.shapes.half_space import wall
+from fsw.shapes.target_sphere import target_sphere
 from fsw.signals import (
     Plan,
     PlanFailure,
     PlanInput,
     PlanRequest,
     PlanTimings,
-    PointObstacle,
     SafeSet,
     SolverStatus,
-    Wall,
-    WorkspaceSphere,
 )
 from fsw.tuning import Tuning, tuned
 
@@ -52,20 +52,14 @@ class Planner:
         self._safe_set: SafeSet | None = None
         self._ocp: Ocp | None = None
         self._inputs: Array = np.zeros(INPUTS * config.horizon)
-        self._t_us = -1
+        self._t_us = 0
 
     def warm_up(self) -> None:
         """Compile every kernel and load the solver, before anything flies."""
         rest = REST_STATE._replace(p=(0.0, 0.0, -1.0))
         targets = (still_at((0.0, 0.0, -0.7)),) * (self._config.horizon + 1)
-        wall = Wall((-1.0, 0.0, 0.0), 0.0, 0.1)  # too close: rows bind
-        sphere = WorkspaceSphere((0.0, 0.0, -0.3), 0.1)
-        point = PointObstacle((3.0, 0.0, -1.0), 0.1)
-        for safe_set in (
-            SafeSet(),
-            SafeSet(walls=(wall,), obstacles=(point,)),
-            SafeSet(sphere=sphere),
-        ):
+        near = wall((-1.0, 0.0, 0.0), 0.0, 0.1)  # too close: rows bind
+        for safe_set in (SafeSet(), SafeSet((near, target_sphere((0.0, 0.0, -0.3), 0.1)))):
             for joint_targets in ((), (rest.q_arm,) * len(targets)):
                 self.plan(
                     PlanRequest(
@@ -78,7 +72,6 @@ class Planner:
                         joint_targets=joint_targets,
                     )
                 )
-        self._t_us = -1
         self._inputs[:] = 0.0
 
     def plan(self, request: PlanRequest) -> Plan | PlanFailure:
@@ -102,6 +95,7 @@ class Planner:
             np.array([target.v_WE for target in request.targets]),
             np.array([target.yaw for target in request.targets]),
             np.array(request.joint_targets) if request.joint_targets else None,
+            request.t_apply_us,
         )
         asked = Question(ocp, start, targets, self._guess(request.t_apply_us))
         search = SOLVERS[self._config.solver](asked, self._config, self._stopwatch_us)
@@ -152,9 +146,17 @@ class Planner:
         self._ocp = None
 
     def _ocp_for(self, safe_set: SafeSet) -> Ocp:
-        if self._ocp is None or safe_set != self._safe_set:
+        """The program of a safe set, built anew only where its rows are others."""
+        if self._ocp is not None and safe_set == self._safe_set:
+            return self._ocp
+        known = None if self._safe_set is None else layout(self._safe_set)
+        self._safe_set = safe_set
+        # The costs of sc, and of a centred naive, hold the zones' numbers themselves.
+        in_rows = self._config.controller in ("blf", "hc")
+        if self._ocp is None or layout(safe_set) != known or not in_rows:
             self._ocp = Ocp(self._config, self._model, safe_set)
-            self._safe_set = safe_set
+        else:
+            self._ocp.update(safe_set)
         return self._ocp
 
     def _guess(self, t_us: int) -> Array:

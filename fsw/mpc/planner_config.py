@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from fsw.barriers.safe_approach import BarrierTuning
+from fsw.model.body import BodyName
 from fsw.mpc.costs import CostWeights
 from fsw.mpc.qp_data import InputLimits
 from fsw.mpc.soft_costs import SoftWeights
@@ -20,6 +21,7 @@ class PlannerConfig:
     period_us: int = PLANNING_US  # T
     solver: str = "clarabel"  # a name in solvers.py; slsqp is the paper's
     sqp_iterations: int = 2  # slsqp goes on until it converges
+    body: BodyName = "points"  # what keeps clear; "points" are the paper's
     weights: CostWeights = field(default_factory=CostWeights)
     limits: InputLimits = field(default_factory=InputLimits)
     joint_slack: float = 50.0  # penalty of a rad outside the limits
@@ -41,6 +43,11 @@ class PlannerConfig:
             raise ValueError(f"the planner's period is {self.period_us} us; it must be positive")
         self.walls.check_sampling(self.period)
         self.workspace.check_sampling(self.period)
+
+    @property
+    def tunings(self) -> tuple[BarrierTuning, BarrierTuning]:
+        """Of all zones, and of the sphere that follows the target."""
+        return self.walls, self.workspace
 
     @property
     def period(self) -> float:

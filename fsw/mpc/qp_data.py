@@ -26,6 +26,7 @@ from scipy import sparse
 from fsw.barriers.constraint_block import ConstraintBlock
 from fsw.model.airframe import GRAVITY
 from fsw.model.prediction import INPUTS, Array
+from fsw.signals import Vec4
 
 CONE = 3  # rows of a tilt cone: what there is, then the two that it must cover
 
@@ -45,6 +46,12 @@ class InputLimits:
     joint_rate: float = 3.0  # rad/s, which a plan stops within its horizon
     # To the limits of the angles: of a node 0.0125 rad for what happens between two of them.
     joint_margin: float = 0.03  # rad
+
+    @property
+    def most(self) -> Vec4:
+        """Largest horizontal and vertical, yaw and joint accelerations that they admit."""
+        level = math.tan(self.tilt) * (GRAVITY + self.vertical)
+        return level, self.vertical, self.yaw_acc, self.joint_acc
 
 
 @dataclass(frozen=True)
@@ -91,12 +98,13 @@ class QpData:
         self.hessian = np.zeros((self.inputs, self.inputs))  # upper triangle
         self.linear = np.zeros(self.inputs)
         slack: list[NDArray[np.intp]] = []
-        penalties: list[Array] = []
+        self.penalty: Array = np.zeros(0)  # (slacks,)
         for rows, penalty in blocks:
-            first = sum(map(len, penalties))
-            slack.append(np.full(len(rows.node), -1) if penalty is None else first + rows.slack)
-            penalties.append(np.full(0 if penalty is None else rows.slacks, penalty or 0.0))
-        self.penalty = np.concatenate(penalties)  # (slacks,)
+            if penalty is None:
+                slack.append(np.full(len(rows.node), -1))
+            else:
+                slack.append(len(self.penalty) + rows.slack)
+                self.penalty = np.append(self.penalty, np.full(rows.slacks, penalty))
         soft = self.block_rows = sum(map(len, slack))
         bound_rows, bounds = _bounds(horizon, limits)
         tilt_rows, tilts = _tilt_cones(horizon, limits.tilt)

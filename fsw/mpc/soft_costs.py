@@ -17,12 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fsw.barriers.constraint_block import TargetPoints
-from fsw.barriers.hard_set import HardSet
+from fsw.barriers.zone_rows import ZoneRows
 from fsw.compiled import compiled
-from fsw.model.linearisation import BASE, Linearisation
-from fsw.model.prediction import INPUTS, Array
+from fsw.model.linearisation import Linearisation
+from fsw.model.prediction import INPUTS, Array, P
 from fsw.mpc.costs import Quadratic, add_square
-from fsw.signals import WorkspaceSphere
+from fsw.signals import Zone
 
 _LEAST_GAP = 0.02  # m; from here on eq 29 goes on as a parabola
 
@@ -38,17 +38,17 @@ class SoftWeights:
     centring: float = 100.0  # ours, for the like-for-like Naive
 
 
-class SurfaceCost:
-    """Eq 29 of the distance of every critical point to walls or obstacles, at every node."""
+class ZoneCost:
+    """Eq 29 of the distance of every probe to every zone, at every node."""
 
-    def __init__(self, surfaces: HardSet, weights: SoftWeights) -> None:
-        self._surfaces = surfaces
+    def __init__(self, distances: ZoneRows, weights: SoftWeights) -> None:
+        self._distances = distances
         self._weights = (weights.wall, weights.wall_terminal)
 
     def add(self, horizon: Linearisation, targets: TargetPoints, quadratic: Quadratic) -> float:
         """See ``fsw.mpc.costs.Cost``."""
-        self._surfaces.refill(horizon, targets)
-        rows = self._surfaces.rows
+        self._distances.refill(horizon, targets)
+        rows = self._distances.rows
         return _add_gaps(*self._weights, rows.node, rows.value, rows.gradient, quadratic)
 
 
@@ -58,12 +58,11 @@ class SphereCost:
     Eq 30 applies it only where ``|e| >= r``; centring applies it everywhere.
     """
 
-    def __init__(
-        self, sphere: WorkspaceSphere, weight: float, terminal: float, *, only_outside: bool
-    ) -> None:
-        self._offset = np.array(sphere.centre_from_target)
-        self._weights = (weight, terminal)
-        self._from_radius = sphere.radius if only_outside else -1.0
+    def __init__(self, sphere: Zone, weights: tuple[float, float], *, only_outside: bool) -> None:
+        """The zone ``sphere`` follows the target; ``weights`` [1/m^2], the last is terminal."""
+        *offset, radius = sphere.shape.numbers
+        self._offset, self._weights = np.array(offset), weights
+        self._from_radius = radius if only_outside else -1.0
 
     def add(self, horizon: Linearisation, targets: TargetPoints, quadratic: Quadratic) -> float:
         """See ``fsw.mpc.costs.Cost``."""
@@ -71,8 +70,8 @@ class SphereCost:
             targets.position + self._offset,
             self._from_radius,
             *self._weights,
-            horizon.position[:, BASE],
-            horizon.d_position[:, BASE],
+            horizon.states[:, P : P + 3],
+            horizon.model.gamma[:, P : P + 3],
             quadratic,
         )
 

@@ -9,7 +9,7 @@ name        Case I, walls; and points              Case II, workspace sphere
 ``blf``     barrier of eq 22 with eq 25            barriers of eq 23 with eq 25
 ==========  =====================================  ==========================================
 
-Points, alone or beside walls, are to ``hc`` and ``sc`` what walls are; ``blf`` has eqs 11 and 12.
+Any other zone to keep out of or in is treated as a wall is, by the plane near each probe.
 
 Naive can be given a centring cost and HC a tightening, so that the barrier's own share in a
 comparison shows (docs/reference/paper-comparison.md).
@@ -21,15 +21,14 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from fsw.barriers.constraint_block import Barrier
-from fsw.barriers.hard_set import HardObstacles, HardSet, HardWalls, HardWorkspace
-from fsw.barriers.point_obstacle import PointObstacleBarrier
-from fsw.barriers.wall import WallBarrier
-from fsw.barriers.workspace import WorkspaceBarrier
+from fsw.barriers.zone_rows import ZoneRows
+from fsw.model.body import body_of
 from fsw.model.prediction import CondensedModel
 from fsw.mpc.costs import Cost, PostureCost, TrackingCost
 from fsw.mpc.planner_config import PlannerConfig
-from fsw.mpc.soft_costs import SphereCost, SurfaceCost
-from fsw.signals import SafeSet
+from fsw.mpc.soft_costs import SphereCost, ZoneCost
+from fsw.shapes import kind_of
+from fsw.signals import SafeSet, Zone
 
 
 @dataclass(frozen=True)
@@ -44,56 +43,57 @@ class OcpTerms:
 def _naive(config: PlannerConfig, model: CondensedModel, safe_set: SafeSet) -> OcpTerms:
     costs: tuple[Cost, ...] = (TrackingCost(config.weights),)
     weight = config.soft.centring
-    if config.centred and safe_set.sphere is not None:
-        centring = SphereCost(safe_set.sphere, weight, 5.0 * weight, only_outside=False)
-        costs = (*costs, centring)
+    if config.centred:
+        spheres, _ = _split(safe_set)
+        centring = (weight, 5.0 * weight)
+        costs += tuple(SphereCost(one, centring, only_outside=False) for one in spheres)
     return OcpTerms(costs)
 
 
 def _hard(config: PlannerConfig, model: CondensedModel, safe_set: SafeSet) -> OcpTerms:
-    costs, first = (TrackingCost(config.weights),), 1 + config.hard_skipped_nodes
-    where = (model.horizon, config.tightening, first)
-    if safe_set.sphere is not None:
-        return OcpTerms(costs, (HardWorkspace(safe_set.sphere, *where),), config.hard_slack)
-    return OcpTerms(costs, _surfaces(safe_set, *where), config.hard_slack)
-
-
-def _surfaces(
-    safe_set: SafeSet, horizon: int, tightening: float, first_node: int
-) -> tuple[HardSet, ...]:
-    """The distances to walls and obstacles, where there are any."""
-    surfaces: list[HardSet] = []
-    if safe_set.walls:
-        surfaces.append(HardWalls(safe_set.walls, horizon, tightening, first_node))
-    if safe_set.obstacles:
-        surfaces.append(HardObstacles(safe_set.obstacles, horizon, tightening, first_node))
-    return tuple(surfaces)
+    costs = (TrackingCost(config.weights),)
+    if not safe_set.zones:
+        return OcpTerms(costs)
+    rows = ZoneRows(
+        safe_set,
+        body_of(config.body, model.airframe),
+        model,
+        config.tunings,
+        distances=True,
+        tightening=config.tightening,
+        skipped_nodes=config.hard_skipped_nodes,
+        most=config.limits.most,
+    )
+    return OcpTerms(costs, (rows,), config.hard_slack)
 
 
 def _soft(config: PlannerConfig, model: CondensedModel, safe_set: SafeSet) -> OcpTerms:
-    tracking, weights = TrackingCost(config.weights), config.soft
-    if safe_set.sphere is not None:
-        outside = SphereCost(
-            safe_set.sphere, weights.workspace, weights.workspace_terminal, only_outside=True
-        )
-        return OcpTerms((tracking, outside))
-    surfaces = _surfaces(safe_set, model.horizon, tightening=0.0, first_node=1)
-    return OcpTerms((tracking, *(SurfaceCost(each, weights) for each in surfaces)))
+    costs: tuple[Cost, ...] = (TrackingCost(config.weights),)
+    spheres, others = _split(safe_set)
+    weights = (config.soft.workspace, config.soft.workspace_terminal)
+    costs += tuple(SphereCost(one, weights, only_outside=True) for one in spheres)
+    if others.zones:
+        # Every distance has its cost, also one that no input could make a bound.
+        body = body_of(config.body, model.airframe)
+        distances = ZoneRows(others, body, model, config.tunings, distances=True, skipped_nodes=0)
+        costs += (ZoneCost(distances, config.soft),)
+    return OcpTerms(costs)
+
+
+def _split(safe_set: SafeSet) -> tuple[tuple[Zone, ...], SafeSet]:
+    """The spheres that follow the target, and everything else."""
+    follows = [kind_of(zone.shape).follows_target for zone in safe_set.zones]
+    pairs = list(zip(safe_set.zones, follows, strict=True))
+    spheres = tuple(zone for zone, it_follows in pairs if it_follows)
+    return spheres, SafeSet(tuple(zone for zone, it_follows in pairs if not it_follows))
 
 
 def _blf(config: PlannerConfig, model: CondensedModel, safe_set: SafeSet) -> OcpTerms:
-    costs = (TrackingCost(config.weights),)
-    if safe_set.sphere is not None:
-        sphere = WorkspaceBarrier(safe_set.sphere, config.workspace, model)
-        return OcpTerms(costs, (sphere,), config.barrier_slack)
-    barriers: list[Barrier] = []
-    if safe_set.walls:
-        barriers.append(WallBarrier(safe_set.walls, config.walls, model))
-    if safe_set.obstacles:
-        # A point is the wall that its ball's tangent plane is, so it has the walls' tuning.
-        obstacles, tuning = safe_set.obstacles, config.walls
-        barriers.append(PointObstacleBarrier(obstacles, tuning, model))
-    return OcpTerms(costs, tuple(barriers), config.barrier_slack)
+    costs, body = (TrackingCost(config.weights),), body_of(config.body, model.airframe)
+    if not safe_set.zones:
+        return OcpTerms(costs)
+    barrier = ZoneRows(safe_set, body, model, config.tunings, most=config.limits.most)
+    return OcpTerms(costs, (barrier,), config.barrier_slack)
 
 
 VARIANTS: dict[str, Callable[[PlannerConfig, CondensedModel, SafeSet], OcpTerms]] = {

@@ -18,7 +18,8 @@ from fsw.control.gains import tracking_gains
 from fsw.control.tube import Tube, peak_snap_share, tube
 from fsw.model.airframe import GRAVITY
 from fsw.parameters.flight_config import FlightConfig, Surroundings
-from fsw.signals import ConstraintKind, SafeSet
+from fsw.shapes import kind_of
+from fsw.signals import SafeSet, Zone
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,28 +35,39 @@ class Finding:
 def analyse(config: FlightConfig, safe_set: SafeSet, loop: Tube) -> tuple[Finding, ...]:
     """Every finding about a controller with barriers in a safe set; there is none for the others.
 
-    A point needs what a wall needs: its ball lies behind the tangent plane, and going round it only
-    takes the vehicle off that plane. The loop is ``loop_tube(config)``, which takes a moment and
+    A zone needs what a wall needs: it lies behind its tangent plane, and going round it only takes
+    the vehicle off that plane. The loop is ``loop_tube(config)``, which takes a moment and
     does not depend on the safe set.
     """
-    surroundings = config.surroundings
-    if config.controller != "blf" or safe_set.kind is ConstraintKind.NONE:
+    surroundings, planner = config.surroundings, config.planner
+    if config.controller != "blf" or not safe_set.zones:
         return ()
-    in_sphere = safe_set.sphere is not None
-    tuning = config.planner.workspace if in_sphere else config.planner.walls
-    findings = [_actuation(config, tuning, safe_set, surroundings)]
-    if safe_set.sphere is not None:
-        findings.append(_room_in_sphere(tuning, safe_set.sphere.radius))
-    if safe_set.obstacles:
-        findings.append(_links(config, min(o.clearance for o in safe_set.obstacles)))
+    spheres = [zone for zone in safe_set.zones if kind_of(zone.shape).follows_target]
+    others = [zone for zone in safe_set.zones if zone not in spheres]
+    findings: list[Finding] = []
+    for sphere in spheres:
+        radius = sphere.shape.numbers[-1]
+        findings.append(_actuation(config, planner.workspace, surroundings, radius))
+        findings.append(_room_in_sphere(planner.workspace, radius))
+    if others:
+        findings.append(_actuation(config, planner.walls, surroundings, math.inf))
+        points = [zone.clearance for zone in others if _is_point(zone)]
+        if points and planner.body == "points":
+            findings.append(_links(config, min(points)))
+    for tuning in ([planner.workspace] if spheres else []) + ([planner.walls] if others else []):
+        if config.inner == "tracking":
+            findings.append(_base_tube(tuning, loop, surroundings))
+        else:
+            findings.append(_sampled(tuning, surroundings, planner.period))
     if config.inner == "tracking":
-        findings.append(_base_tube(tuning, loop, surroundings))
-        if not in_sphere:
-            findings.append(_end_effector_tube(tuning, loop, surroundings))
+        if others:
+            findings.append(_end_effector_tube(planner.walls, loop, surroundings))
         findings.append(_snap(config, loop, surroundings))
-    else:
-        findings.append(_sampled(tuning, surroundings, config.planner.period))
     return tuple(findings)
+
+
+def _is_point(zone: Zone) -> bool:
+    return zone.shape.kind == "ball" and zone.shape.numbers[-1] == 0.0
 
 
 def refusals(findings: tuple[Finding, ...]) -> tuple[str, ...]:
@@ -79,6 +91,11 @@ def loop_tube(config: FlightConfig) -> Tube:
     )
 
 
+def base_reach(loop: Tube, surroundings: Surroundings) -> float:
+    """How far a disturbance within the assumed one pushes the base off its plan [m], an axis."""
+    return loop.base * surroundings.disturbance + loop.base_wind
+
+
 def stand_off(tuning: BarrierTuning) -> float:
     """Distance to the boundary at which a plan at rest meets h = lambda [m]."""
     knee = tuning.alpha / tuning.slope**2
@@ -96,13 +113,13 @@ def sampled_robustness(tuning: BarrierTuning, disturbance: float, period: float)
 
 
 def _actuation(
-    config: FlightConfig, tuning: BarrierTuning, safe_set: SafeSet, surroundings: Surroundings
+    config: FlightConfig, tuning: BarrierTuning, surroundings: Surroundings, radius: float
 ) -> Finding:
     available = GRAVITY * math.tan(config.planner.limits.tilt)
     wanted = tuning.alpha + tuning.gamma * tuning.lambda_ + surroundings.target_acceleration
     parts = "alpha + gamma lambda + |a_t|"
-    if safe_set.sphere is not None:
-        wanted += surroundings.tangential_speed**2 / safe_set.sphere.radius
+    if radius < math.inf:
+        wanted += surroundings.tangential_speed**2 / radius
         parts += " + w^2/r"
     best = tuning.alpha - (wanted - available)
     remedy = (
@@ -144,7 +161,7 @@ def _links(config: FlightConfig, clearance: float) -> Finding:
 
 
 def _base_tube(tuning: BarrierTuning, loop: Tube, surroundings: Surroundings) -> Finding:
-    reach, room = loop.base * surroundings.disturbance + loop.base_wind, stand_off(tuning)
+    reach, room = base_reach(loop, surroundings), stand_off(tuning)
     return _finding(
         "tube",
         room >= reach,

@@ -14,8 +14,10 @@ KNOWN: dict[str, tuple[str, ...]] = {
     "tracking": ("lqr", "pid"),
     "lambda": ("consistent", "paper-1", "paper-5"),
     "solver": ("clarabel", "slsqp"),
+    "body": ("points", "full"),
 }
-_INNER = {"lqr": "tracking", "pid": "pid"}  # names of the inner loops in logs and configurations
+FULL = "full"  # the body where none is named
+INNER_LOOPS = {"lqr": "tracking", "pid": "pid"}  # their names in logs and configurations
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,6 +51,11 @@ class ControlChoice:
         one_of("solver", *KNOWN["solver"]),
         default="clarabel",
     )
+    body: str | None = option(
+        "--body NAME",
+        "what keeps clear: full, or the paper's points (default the scenario's, or full)",
+        one_of("body", *KNOWN["body"]),
+    )
     allow_inconsistent: bool = switch(
         "--allow-inconsistent",
         "fly a configuration that cannot keep its safe set, with a warning",
@@ -58,7 +65,7 @@ class ControlChoice:
     @property
     def inner(self) -> str:
         """The name of the inner loop in logs and configurations."""
-        return _INNER[self.tracking]
+        return INNER_LOOPS.get(self.tracking, self.tracking)
 
     def facts(self) -> dict[str, str | int]:
         """What a flight log says about the choice."""
@@ -67,32 +74,19 @@ class ControlChoice:
             "inner": self.inner,
             "robustness": self.lambda_,
             "solver": self.solver,
+            "body": self.body or FULL,
             "soft": int(self.allow_inconsistent),
         }
 
 
 def choice_of(fact: Callable[[str], str]) -> ControlChoice:
-    """The choice that a flight log tells of, given what it says under a name.
-
-    Raises:
-        ValueError: There is no such inner loop.
-    """
+    """The choice that a flight log tells of, given what it says under a name."""
+    inner = fact("inner")
     return ControlChoice(
         controller=fact("controller"),
-        tracking=tracking_of(fact("inner")),
+        tracking=next((name for name, known in INNER_LOOPS.items() if known == inner), inner),
         lambda_=fact("robustness"),
         solver=fact("solver"),
+        body=fact("body"),
         allow_inconsistent=fact("soft") != "0",
     )
-
-
-def tracking_of(inner: str) -> str:
-    """What ``--tracking`` calls an inner loop.
-
-    Raises:
-        ValueError: There is none of this name.
-    """
-    for tracking, known in _INNER.items():
-        if known == inner:
-            return tracking
-    raise ValueError(f"unknown inner loop '{inner}'; known: {', '.join(_INNER.values())}")

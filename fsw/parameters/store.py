@@ -122,11 +122,7 @@ class ParameterStore:
         return self._offered
 
     def settle(self, taken: bool | None) -> None:
-        """Learn what the tick did with the tuning it was given.
-
-        Args:
-            taken: Whether it is in use; None where the tick failed before it came to that.
-        """
+        """Learn whether the tick took its tuning; None where it failed before it came to that."""
         self._offered = None
         change = self._change
         if change is None:

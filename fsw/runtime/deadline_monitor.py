@@ -37,14 +37,10 @@ class DeadlineMonitor:
     def warning(
         self, t_us: int, *, late: int = 0, skipped: int = 0, stale: int = 0, plans_late: int = 0
     ) -> str | None:
-        """The text to send now, if any: what was missed since the last one.
+        """The text to send at ``t_us`` [us, vehicle time], if any: what was missed since the last.
 
-        Args:
-            t_us: Vehicle time [us].
-            late: Ticks since start that ended after the next release.
-            skipped: Releases since start without a tick.
-            stale: Ticks since start without a sensor frame of their own.
-            plans_late: Plans since start that missed their deadline.
+        Counts are since start: ticks that ended after the next release, releases without a tick,
+        ticks without a sensor frame of their own, plans that missed their deadline.
         """
         counts = Counter(dict(zip(WARNING_LIMITS, (late, skipped, stale, plans_late), strict=True)))
         if self._since_us is None:

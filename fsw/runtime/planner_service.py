@@ -50,18 +50,18 @@ class PlannerRecord:
         self.status[given.result.status.name.lower()] += 1
 
 
+@dataclass
 class InlinePlanner:
     """Plans at once, in the caller's process; the answer waits for its tick."""
 
-    def __init__(self, planner: PlanningCycle, clock: Clock, record: PlannerRecord) -> None:
-        self._planner = planner
-        self._clock = clock
-        self._record = record
-        self._answer: Answer | None = None
+    planner: PlanningCycle
+    clock: Clock
+    record: PlannerRecord
+    _answer: Answer | None = None
 
     def submit(self, request: PlanRequest) -> None:
         """Plan now."""
-        self._answer = answer(self._planner, self._clock, request)
+        self._answer = answer(self.planner, self.clock, request)
 
     def take(self, t_us: int) -> Plan | PlanFailure | None:
         """The answer, once, at or after the time from which it applies [us]."""
@@ -69,7 +69,7 @@ class InlinePlanner:
         if given is None or t_us < given.t_apply_us:
             return None
         self._answer = None
-        self._record.count(given, given.begun_us)
+        self.record.count(given, given.begun_us)
         return given.result
 
     def close(self) -> None:

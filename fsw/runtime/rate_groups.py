@@ -72,10 +72,8 @@ class RateGroupRunner(Generic[Cycle]):
     def run(self, cycle: Cycle, due_us: int, begin_us: int) -> bool:
         """Run once; returns whether it ended after the group's next release.
 
-        Args:
-            cycle: What the members work on.
-            due_us: When the group was released [us, monotonic].
-            begin_us: When its work began: now, or when the process woke for it [us, monotonic].
+        It was released at ``due_us`` [us, monotonic], and its work began at ``begin_us`` [us,
+        monotonic]: now, or when the process woke for it.
         """
         self._runs += 1
         if self._runs % _STAGES_EVERY:

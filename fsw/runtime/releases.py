@@ -71,15 +71,9 @@ class ScheduledReleases:
         period_us: int,
         deadlines: DeadlineMonitor,
     ) -> None:
-        """Follow the first frame, on which a tick has run.
+        """Follow the first frame, on which a tick has run: the vehicle's time begins with it.
 
-        Args:
-            sim: Source of the frames.
-            clock: Monotonic wall time [us].
-            sleep: Sleeps for seconds, on the same clock.
-            first: The frame whose time the vehicle's time begins with.
-            period_us: Period of the inner loop [us].
-            deadlines: Takes the skipped releases.
+        ``sleep`` sleeps for seconds, on the same clock; ``deadlines`` takes the skipped releases.
         """
         self.stale = 0  # ticks without a frame of their own
         self._sim = sim

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import json
-from pathlib import Path
+from dataclasses import asdict
 
 from fsw.parameters.control_choice import ControlChoice
 from fsw.ports import VehicleFacts
@@ -37,20 +36,12 @@ def as_json(
         "housekeeping": _group(record.groups[HOUSEKEEPING.name]),
         "scheduler": record.scheduler,
         "stages": {name: _percentiles(times) for name, times in record.stages.items()},
+        "safety": asdict(record.safety),
         "setpoints": {
             "accepted": record.offboard.accepted,
             "refused": record.offboard.refused,
         },
     }
-
-
-def write(path: Path, result: dict[str, object]) -> str | None:
-    """Write the result as one JSON object; returns why that was not possible."""
-    try:
-        path.write_text(json.dumps(result, indent=2) + "\n", encoding="utf-8")
-    except OSError as error:
-        return f"{path}: {error.strerror}"
-    return None
 
 
 def _mpc(facts: VehicleFacts, record: FlightRecord) -> dict[str, object]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import enum
 from collections.abc import Callable
-from dataclasses import astuple, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from typing import Final, Generic
 
 from command_line.process import StopRequest
@@ -32,6 +32,7 @@ from fsw.runtime.timing import GroupTimer, Histogram
 from fsw.signals import (
     OffboardReport,
     PlannerCounters,
+    SafetyCounters,
     SensorFrame,
     Severity,
     StatusText,
@@ -73,6 +74,7 @@ class FlightRecord:
     stale: int = 0  # ticks without a sensor frame of their own
     scheduler: str = ""  # class and priority of the tick process
     counters: PlannerCounters = field(default_factory=PlannerCounters)
+    safety: SafetyCounters = field(default_factory=SafetyCounters)
     offboard: OffboardReport = field(default_factory=OffboardReport)
 
 
@@ -237,6 +239,7 @@ class SimLoop(Generic[State]):
     def _publish(self, cycle: Cycle) -> None:
         record, outputs = self._record, cycle.outputs
         record.counters = outputs.snapshot.counters
+        record.safety = outputs.snapshot.safety
         record.offboard = outputs.snapshot.offboard
         events = record.mpc.events
         if events:
@@ -263,11 +266,7 @@ class SimLoop(Generic[State]):
             timer = record.mpc.timer if group is MPC else record.groups[group.name]
             timing = timer.close_interval()
             setattr(record.health, group.name, timing)
-            period_us, ticks, late, skipped, *times, _ = astuple(timing)
-            counts = ticks, late, skipped, period_us
-            self._files.ulog.add_timing(
-                cycle.release.sensors.t_us, group.number, counts, tuple(times)
-            )
+            self._files.ulog.add_timing(cycle.release.sensors.t_us, group.number, timing)
 
     def _count_missed(self) -> None:
         self._record.stale = self._releases.stale

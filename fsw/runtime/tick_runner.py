@@ -27,13 +27,7 @@ class TickRunner(Generic[State]):
         first_state: State,
         on_error: Callable[[], None] = traceback.print_exc,
     ) -> None:
-        """Start before the first tick.
-
-        Args:
-            tick: The pure function; may raise.
-            first_state: Its state at the first tick.
-            on_error: Called in the handler of each error that is survived.
-        """
+        """Start before the first tick; a survived error calls ``on_error`` in its handler."""
         self._tick = tick
         self._on_error = on_error
         self._state = first_state

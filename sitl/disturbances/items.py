@@ -1,58 +1,49 @@
-"""One class per kind of disturbance; each is sampled once per step, in order."""
+"""One class per kind of disturbance; each is sampled once per step, in increasing order.
+
+A sample is held over its step: a torque [N·m, B] if ``torque`` is set, else an acceleration
+[m/s², W].
+"""
 
 from __future__ import annotations
 
-from typing import Protocol
+from dataclasses import dataclass
 
 import numpy as np
 
-from sitl.scenario import V3, Disturbance, Impulses, Torque, Uniform, Wind
+from sitl.scenario import V3, Disturbance, Torque, Uniform, Wind
 from sitl.seeds import stream
 
 STILL: V3 = (0.0, 0.0, 0.0)
 
 
-class Push(Protocol):
-    """A disturbance in flight."""
-
-    torque: bool  # what ``sample`` returns: torque [N·m, B] if set, else acceleration [m/s², W]
-
-    def sample(self, step: int) -> V3:
-        """The value held over step ``step``; steps are asked for in increasing order."""
-        ...
-
-
+@dataclass
 class Resampled:
     """Uniform within ±amplitude on each axis, drawn anew every ``every`` steps."""
 
-    def __init__(
-        self, amplitude: float, every: int, torque: bool, random: np.random.Generator
-    ) -> None:
-        self.torque = torque
-        self._amplitude = amplitude
-        self._every = every
-        self._random = random
-        self._held = STILL
+    amplitude: float  # m/s², or N·m
+    every: int
+    torque: bool
+    random: np.random.Generator
+    _held: V3 = STILL
 
     def sample(self, step: int) -> V3:
-        """See ``Push``."""
-        if step % self._every == 0:
-            x, y, z = self._random.uniform(-self._amplitude, self._amplitude, 3)
+        """The value held over step ``step``."""
+        if step % self.every == 0:
+            x, y, z = self.random.uniform(-self.amplitude, self.amplitude, 3)
             self._held = (float(x), float(y), float(z))
         return self._held
 
 
+@dataclass
 class Constant:
     """A constant disturbance."""
 
+    acceleration: V3  # m/s²
     torque = False
 
-    def __init__(self, acceleration: V3) -> None:
-        self._acceleration = acceleration
-
     def sample(self, step: int) -> V3:
-        """See ``Push``."""
-        return self._acceleration
+        """The value held over step ``step``."""
+        return self.acceleration
 
 
 class RandomImpulses:
@@ -75,7 +66,7 @@ class RandomImpulses:
         return max(1, round(self._random.exponential(self._pause_steps)))
 
     def sample(self, step: int) -> V3:
-        """See ``Push``."""
+        """The value held over step ``step``."""
         if step == self._from:
             direction = self._random.standard_normal(3)
             x, y, z = self._magnitude * direction / np.linalg.norm(direction)
@@ -83,6 +74,9 @@ class RandomImpulses:
             self._until = step + self._length
             self._from = self._until + self._pause()
         return self._held if step < self._until else STILL
+
+
+Push = Resampled | Constant | RandomImpulses
 
 
 def push(item: Disturbance, seed: int, step_s: float) -> Push:
@@ -94,10 +88,6 @@ def push(item: Disturbance, seed: int, step_s: float) -> Push:
         return Resampled(item.amplitude_m_s2, round(item.period_s / step_s), False, random)
     if isinstance(item, Torque):
         return Resampled(item.amplitude_n_m, round(item.period_s / step_s), True, random)
-    return _impulses(item, random, step_s)
-
-
-def _impulses(item: Impulses, random: np.random.Generator, step_s: float) -> RandomImpulses:
     return RandomImpulses(
         item.magnitude_m_s2,
         item.mean_interval_s / step_s,

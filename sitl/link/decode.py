@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple, cast
 
+from messages import status_text
 from messages.frames import Frame, split
 from messages.lockstep_codec import LockstepReader
 from sitl.link import message_ids
@@ -26,11 +27,6 @@ class VehicleReply(NamedTuple):
     custom_mode: int | None = None  # of the vehicle's HEARTBEAT, where there is one
 
 
-def is_vehicle(datagram: bytes) -> bool:
-    """Whether a datagram holds at least one valid frame."""
-    return any(True for _ in split(datagram))
-
-
 def read_reply(datagram: bytes, joints: int) -> VehicleReply | None:
     """Read an answer of a vehicle with so many joints; None without HIL_ACTUATOR_CONTROLS."""
     alone = _CONTROLS_ALONE.read(datagram)
@@ -45,7 +41,7 @@ def read_reply(datagram: bytes, joints: int) -> VehicleReply | None:
         t_us=int(values[0]),
         controls=controls,
         acks=acknowledgements(frames),
-        texts=_texts(frames),
+        texts=status_text.joined(frames),
         custom_mode=_custom_mode(frames),
     )
 
@@ -72,19 +68,3 @@ def acknowledgements(frames: list[Frame]) -> tuple[Ack, ...]:
 def _custom_mode(frames: list[Frame]) -> int | None:
     heartbeats = [frame for frame in frames if frame.message_id == message_ids.HEARTBEAT]
     return cast(int, heartbeats[-1].payload_values[0]) if heartbeats else None
-
-
-def _texts(frames: list[Frame]) -> tuple[str, ...]:
-    """STATUSTEXTs, the pieces of a long one joined."""
-    pieces: dict[int, bytes] = {}
-    whole: list[bytes] = []
-    for frame in frames:
-        if frame.message_id != message_ids.STATUSTEXT:
-            continue
-        _, raw, text_id, _ = cast("tuple[int, bytes, int, int]", frame.payload_values)
-        text = raw.rstrip(b"\0")
-        if text_id == 0:
-            whole.append(text)
-        else:
-            pieces[text_id] = pieces.get(text_id, b"") + text
-    return tuple(text.decode("utf-8", "replace") for text in (*whole, *pieces.values()))

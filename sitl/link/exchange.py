@@ -5,8 +5,9 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final, Protocol
+from typing import Final
 
+from command_line.process import StopRequest
 from sitl.link import decode
 from sitl.link.decode import VehicleReply
 from sitl.link.step_grid import StepGrid
@@ -35,40 +36,11 @@ class ExchangeCounts:
     waited_s: float = 0.0  # lockstep: for answers, sending included, the first step's left out
 
 
-class Stop(Protocol):
-    """Asked between two steps, and while waiting."""
-
-    requested: bool
-
-
-class Exchange(Protocol):
-    """How a step is exchanged with the vehicle."""
-
-    counts: ExchangeCounts
-
-    @property
-    def silent_since(self) -> int | None:
-        """Step of the last answer, if the vehicle has been silent for 0.1 s; None if not."""
-        ...
-
-    def step(
-        self, number: int, t_us: int, datagram: bytes, meanwhile: Callable[[], None]
-    ) -> VehicleReply:
-        """Send the datagram of a step, from 0, stamped ``t_us``; returns what to apply during it.
-
-        ``meanwhile`` is work that can be done while the vehicle thinks; it is called once.
-
-        Raises:
-            SimulatorError: The vehicle has been silent for too long.
-        """
-        ...
-
-
 class Lockstep:
     """Waits for the answer of every step, and repeats a step whose answer does not come."""
 
     def __init__(
-        self, endpoint: PeerSocket, joints: int, period_s: float | None, stop: Stop
+        self, endpoint: PeerSocket, joints: int, period_s: float | None, stop: StopRequest
     ) -> None:
         """Steps begin ``period_s`` of wall time apart, or as soon as possible.
 
@@ -86,15 +58,22 @@ class Lockstep:
 
     @property
     def silent_since(self) -> int | None:
-        """See :class:`Exchange`."""
+        """Step of the last answer, if the vehicle has been silent for 0.1 s; None if not."""
         return self._number - 1 if self._number and self._listened_s >= SILENT_S else None
 
     def step(
         self, number: int, t_us: int, datagram: bytes, meanwhile: Callable[[], None]
     ) -> VehicleReply:
-        """See :class:`Exchange`."""
+        """Send the datagram of a step, from 0, stamped ``t_us``; returns what to apply during it.
+
+        ``meanwhile`` is work that can be done while the vehicle thinks; it is called once.
+
+        Raises:
+            SimulatorError: The vehicle has been silent for too long.
+        """
         if self._period_s is not None:
-            _sleep_until(self._start_s + number * self._period_s)
+            due_s = self._start_s + number * self._period_s
+            time.sleep(max(due_s - time.perf_counter(), 0.0))
         begin_s = sent_s = time.perf_counter()
         self._endpoint.send(datagram)
         meanwhile()
@@ -138,7 +117,7 @@ class RealTime:
         endpoint: PeerSocket,
         joints: int,
         period_s: float,
-        stop: Stop,
+        stop: StopRequest,
         clock: Callable[[], float] = time.perf_counter,
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
@@ -157,13 +136,13 @@ class RealTime:
 
     @property
     def silent_since(self) -> int | None:
-        """See :class:`Exchange`."""
+        """As of :class:`Lockstep`."""
         return self._heard_step if self._silent_s > SILENT_S else None
 
     def step(
         self, number: int, t_us: int, datagram: bytes, meanwhile: Callable[[], None]
     ) -> VehicleReply:
-        """See :class:`Exchange`."""
+        """As of :class:`Lockstep`."""
         if number == 0:
             return self._first_step(t_us, datagram, meanwhile)
         self._endpoint.send(datagram)
@@ -220,7 +199,5 @@ class RealTime:
         return answers
 
 
-def _sleep_until(release_s: float) -> None:
-    remaining = release_s - time.perf_counter()
-    if remaining > 0.0:
-        time.sleep(remaining)
+Exchange = Lockstep | RealTime
+"""How a step is exchanged with the vehicle."""

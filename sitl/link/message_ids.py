@@ -7,13 +7,10 @@ COMMAND_LONG: Final = 76
 COMMAND_ACK: Final = 77
 HIL_ACTUATOR_CONTROLS: Final = 93
 HIL_SENSOR: Final = 107
-STATUSTEXT: Final = 253
 ODOMETRY: Final = 331
 ARM_JOINT_STATE: Final = 60200
 END_EFFECTOR_TARGET: Final = 60202
-OBSTACLE_WALL: Final = 60207
-WORKSPACE_SPHERE: Final = 60208
-OBSTACLE_POINT: Final = 60210
+OBSTACLE_SHAPE: Final = 60211
 
 SYSTEM_ID: Final = 1  # the vehicle that is simulated
 SENSORS: Final = 200  # component of the simulated sensors
@@ -27,6 +24,4 @@ CMD_ARM_DISARM: Final = 400
 
 ACCEPTED: Final = 0  # MAV_RESULT
 TEMPORARILY_REJECTED: Final = 1
-DENIED: Final = 2
-UNSUPPORTED: Final = 3
 IN_PROGRESS: Final = 5

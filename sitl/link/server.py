@@ -6,16 +6,17 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final, Protocol
+from typing import Final
 
+from command_line.process import StopRequest
 from messages.frames import split
 from sitl.link import decode, pilot
 from sitl.link.decode import VehicleReply
 from sitl.link.encode import StepEncoder
-from sitl.link.exchange import Exchange, SimulatorError, Stop
+from sitl.link.exchange import Exchange, SimulatorError
 from sitl.link.message_ids import ACCEPTED, CMD_REBOOT_SHUTDOWN
 from sitl.link.pilot import FlightPlan, PilotState
-from sitl.link.pilot_messages import Heard, PilotMessage, SendCommand
+from sitl.link.pilot_messages import Heard, SendCommand
 from sitl.link.udp_endpoint import PeerSocket
 from sitl.result import EndKind
 from sitl.sensors.suite import SensorReadings
@@ -30,12 +31,8 @@ _SHUTDOWN: Final = SendCommand(
 )
 
 
-class Progress(Protocol):
-    """Reports progress about ten times a second of wall time."""
-
-    def __call__(self, time_s: float, margin_m: float | None, real_time_factor: float) -> None:
-        """Take simulated time, the smallest margin so far and the speed."""
-        ...
+Progress = Callable[[float, float | None, float], None]
+"""Takes simulated time [s], the smallest margin so far [m] and the speed, ten times a second."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,12 +44,12 @@ class RunTiming:
     real_time_factor: float
 
 
-def wait_for_vehicle(endpoint: PeerSocket, wait_s: float, stop: Stop) -> bool:
+def wait_for_vehicle(endpoint: PeerSocket, wait_s: float, stop: StopRequest) -> bool:
     """Serve the first sender of a valid frame; False if none came in time."""
     until_s = time.perf_counter() + wait_s
     while time.perf_counter() < until_s and not stop.requested:
         received = endpoint.receive_from_anyone()
-        if received is not None and decode.is_vehicle(received[0]):
+        if received is not None and any(split(received[0])):
             endpoint.serve(received[1])
             return True
     return False
@@ -63,7 +60,7 @@ def serve(
     plan: FlightPlan,
     exchange: Exchange,
     encoder: StepEncoder,
-    stop: Stop,
+    stop: StopRequest,
     progress: Progress,
     truth: Callable[[Simulation], None],
 ) -> RunTiming:
@@ -76,7 +73,8 @@ def serve(
     while simulation.ended is None:
         readings = simulation.sense()
         state, messages = pilot.speak(plan, state, readings.t_us)
-        datagram = _datagram(encoder, simulation.step, readings, messages)
+        heartbeat = encoder.heartbeat() if simulation.step % _HEARTBEAT_STEPS == 0 else b""
+        datagram = heartbeat + encoder.datagram(readings, messages)
         try:
             answer = exchange.step(
                 simulation.step, readings.t_us, datagram, lambda: truth(simulation)
@@ -120,16 +118,6 @@ def shut_down(endpoint: PeerSocket, encoder: StepEncoder, tries: int) -> bool:
                 if ack.command == CMD_REBOOT_SHUTDOWN and ack.result == ACCEPTED:
                     return True
     return False
-
-
-def _datagram(
-    encoder: StepEncoder,
-    step: int,
-    readings: SensorReadings,
-    messages: tuple[PilotMessage, ...],
-) -> bytes:
-    datagram = encoder.datagram(readings, messages)
-    return encoder.heartbeat() + datagram if step % _HEARTBEAT_STEPS == 0 else datagram
 
 
 def _advance(simulation: Simulation, answer: VehicleReply) -> None:

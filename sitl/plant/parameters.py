@@ -92,6 +92,20 @@ class Legs:
 
 
 @dataclass(frozen=True, slots=True)
+class Size:
+    """How far the vehicle reaches beyond its joints, feet and rotor hubs: our choice."""
+
+    hull: float = 0.08  # m, radius of a ball about the base origin: frame and battery
+    link: float = 0.02  # m, radius of an arm's link and of the joints between
+    tool: float = 0.025  # m, radius of a ball about the end-effector
+    leg: float = 0.01  # m, radius of a leg, from the base origin to a foot
+    blade: float = 0.165  # m, radius of a rotor: the blades' tips are 0.465 m from the base origin
+    disc: float = (
+        0.02  # m, half the height of what the blades sweep, as they flap and the hubs yield
+    )
+
+
+@dataclass(frozen=True, slots=True)
 class Vehicle:
     """The aerial manipulator; the defaults are the paper's Table I."""
 
@@ -107,6 +121,7 @@ class Vehicle:
     joints: Joints = Joints()
     stops: EndStops = EndStops()
     legs: Legs = Legs()
+    size: Size = Size()
     gravity: float = GRAVITY
 
     @property
@@ -116,24 +131,19 @@ class Vehicle:
 
     def scaled(self, mass: float, inertia: float) -> Vehicle:
         """The same vehicle, masses times ``mass`` [1] and inertias times ``inertia`` [1]."""
-        ixx, iyy, izz = self.base_inertia
         return replace(
             self,
             base_mass=mass * self.base_mass,
-            base_inertia=(inertia * ixx, inertia * iyy, inertia * izz),
+            base_inertia=_times(inertia, self.base_inertia),
             links=tuple(
-                replace(
-                    link,
-                    mass=mass * link.mass,
-                    inertia=(
-                        inertia * link.inertia[0],
-                        inertia * link.inertia[1],
-                        inertia * link.inertia[2],
-                    ),
-                )
+                replace(link, mass=mass * link.mass, inertia=_times(inertia, link.inertia))
                 for link in self.links
             ),
         )
+
+
+def _times(factor: float, v: V3) -> V3:
+    return (factor * v[0], factor * v[1], factor * v[2])
 
 
 def chain(vehicle: Vehicle) -> Chain:

@@ -17,6 +17,7 @@ from benchmarks.optimiser.measurement import Effort, Samples, run
 from benchmarks.optimiser.methods import Entry, guess_for
 from benchmarks.optimiser.report import lines
 from benchmarks.optimiser.solved import stopwatch_us
+from fsw.model.airframe import AIRFRAME
 from fsw.mpc.planner import Planner
 
 KEYS = {"n", "method", "sqp_iterations", "median_us", "p99_us", "max_us", "suboptimality_p50"}
@@ -98,7 +99,7 @@ def test_casadi_solves_the_same_problem(solver: str, recorded: list[Instance]) -
     config = planner_of(5).planner
     for instance in recorded:
         converged = ConvergedOcp(config, instance.request.safe_set)
-        guess = guess_for(Planner(config, stopwatch_us), instance)
+        guess = guess_for(Planner(config, AIRFRAME, stopwatch_us), instance)
         optimum, best = converged.solve(instance.request, guess)
         method = CasadiMethod(config, instance.request.safe_set, solver)
         answer = method.solve(instance, guess, optimum)

@@ -17,8 +17,9 @@ from benchmarks.flood import FloodOptions
 from benchmarks.lockstep import LockstepOptions
 from benchmarks.loop import LoopOptions
 from benchmarks.mpc import MpcOptions
+from benchmarks.values import several
 from command_line.options import as_words, option, read, switch
-from command_line.values import number, one_of, output_file, seconds, several, whole
+from command_line.values import number, one_of, output_file, seconds, whole
 from fsw.arguments import FswOptions
 from fsw.link.link_choice import LinkChoice
 from fsw.parameters.control_choice import ControlChoice

@@ -12,6 +12,7 @@ from fsw.geometry.geodesy import to_global
 from fsw.link.wire.mission_items import MissionItem, read_step
 from fsw.model.battery import charge_of
 from fsw.parameters.flight_config import FlightConfig, FlightLimits, flight_config
+from fsw.shapes.vertical_cylinder import column
 from fsw.signals import (
     BatteryState,
     Charge,
@@ -19,7 +20,6 @@ from fsw.signals import (
     MissionUpdate,
     Mode,
     MotionSetpoint,
-    PointObstacle,
     SafeSet,
 )
 from sitl.scenario_file import load_scenario
@@ -164,7 +164,7 @@ def test_an_orbit_that_reaches_behind_a_wall_is_refused() -> None:
     flight.run(0.5)
     flight.step(as_int(ORBIT, 1, 3.0, NAN, 0.0, NAN, 0.0, 0.0, -1.4))
     assert flight.results[-1] == (ORBIT, DENIED)
-    assert any("too close to the fence or a wall" in text for text in flight.texts)
+    assert any("too close to zone 1 of the safe set" in text for text in flight.texts)
     assert flight.mode is Mode.HOLD
 
 
@@ -324,8 +324,8 @@ def test_the_levels_of_the_battery() -> None:
 
 def test_a_goto_beyond_an_exclusion_stops_before_it() -> None:
     flight = hovering()
-    cylinder = PointObstacle((1.5, 0.0, 0.0), 0.5, upright=True)
-    flight.upload = MissionUpdate(fence=SafeSet(obstacles=(cylinder,)))
+    cylinder = column((1.5, 0.0), 0.5)
+    flight.upload = MissionUpdate(fence=SafeSet((cylinder,)))
     flight.step(as_int(GOTO, 1, -1.0, 1.0, 0.0, NAN, 4.0, 0.02, -1.4))
     least = math.inf
     for _ in range(100):

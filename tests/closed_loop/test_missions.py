@@ -28,6 +28,7 @@ from tests.closed_loop.harness import (
     hover,
     on_the_ground,
 )
+from tests.fsw.zones import walls_of
 
 A = MissionAction
 ACCEPTED, TEMPORARILY_REJECTED, DENIED = 0, 1, 2
@@ -120,7 +121,7 @@ def test_waypoints_beyond_the_walls_of_an_uploaded_fence_are_flown_up_to_it() ->
 
 def test_a_fence_takes_the_place_of_the_walls_that_nobody_announced() -> None:
     flight = among_walls(seed=5)
-    assert len(flight.state.mission.safe_set.walls) == 4
+    assert len(walls_of(flight.state.mission.safe_set)) == 4
     flight.upload = MissionUpdate(fence=SafeSet())
     flight.step()
     assert flight.state.mission.safe_set == SafeSet()

@@ -32,6 +32,7 @@ from tests.conversations.qgroundcontrol import (
     take_off,
 )
 from tests.conversations.table import Message, Must, play
+from tests.fsw.zones import of_kind, walls_of
 
 EARLIER = bytes(range(256)) * 400  # more than one piece of 512 messages
 TYPES = {0: items, 1: fence, 2: rally}
@@ -175,8 +176,8 @@ def test_fences_of_either_sense_and_rally_points_go_up_and_come_down(
     assert identity == acknowledged.opaque_id != 0
     if kind == 1:
         safe_set = vehicle.flight.state.mission.safe_set
-        assert len(safe_set.walls) == 4
-        assert len(safe_set.obstacles) >= 2
+        assert len(walls_of(safe_set)) == 4
+        assert len(of_kind(safe_set, "vertical cylinder")) >= 2
     assert upload(vehicle, kind, []).type == 0
     vehicle.send(d.MAVLink_mission_clear_all_message(1, 1, kind))
     assert vehicle.run(1.5, lambda m: m.get_type() == "MISSION_ACK").type == 0

@@ -20,7 +20,8 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from studies.statistics import wilson
+from scipy.stats import binomtest
+
 from tests.mutation.mutants import Mutant, mutants
 from tests.mutation.running import HERE, ROOT, Copy, Results, Tests
 
@@ -39,7 +40,7 @@ class Count:
         judged = self.tested - self.equivalent
         if judged == 0:
             return f"{self.name:34} {self.mutants:6} mutants, none tested"
-        low, high = wilson(self.killed, judged)
+        low, high = binomtest(self.killed, judged).proportion_ci(method="wilson")
         return (
             f"{self.name:34} {self.mutants:6} mutants, killed {self.killed:4} of {judged:4}: "
             f"{100 * self.killed / judged:5.1f} % ({100 * low:.1f}–{100 * high:.1f})"

@@ -9,6 +9,7 @@ from pathlib import Path
 from fsw.log.flight_log import FlightLog, LogSubject
 from fsw.parameters.control_choice import ControlChoice
 from fsw.parameters.flight_config import FlightConfig
+from fsw.ports import GroupTiming
 from fsw.signals import Command, TickInputs, TickOutputs
 from fsw.tuning import flat
 from sitl.scenario_file import load_scenario
@@ -47,6 +48,6 @@ def written(path: Path, ticks: list[tuple[TickInputs, TickOutputs]], lockstep: b
     log.begin(ticks[0][0].sensors.t_us, lockstep)
     for inputs, outputs in ticks:
         log.add(inputs, outputs)
-        log.add_timing(inputs.sensors.t_us, 0, (1, 2, 3, 4), (5.0,) * 6)
+        log.add_timing(inputs.sensors.t_us, 0, GroupTiming(4, 1, 2, 3, *(5.0,) * 6))
     log.close()
     return path

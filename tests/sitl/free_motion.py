@@ -9,8 +9,9 @@ import numpy as np
 from sitl.plant.aerial_manipulator import Inputs, plant
 from sitl.plant.integrator import integrate
 from sitl.plant.parameters import EndStops, Vehicle
-from sitl.plant.state import StateView, at_rest
+from sitl.plant.state import at_rest
 from sitl.plant.vector import Array
+from tests.sitl.state_view import StateView
 
 
 def frictionless(gravity: float) -> Vehicle:

@@ -14,8 +14,9 @@ from sitl.plant.actuators import joint_torque, thrust_rate
 from sitl.plant.aerial_manipulator import Inputs, acceleration_into, empty_workspace, plant
 from sitl.plant.integrator import integrate
 from sitl.plant.parameters import EndStops, Vehicle
-from sitl.plant.state import StateView, at_rest
+from sitl.plant.state import at_rest
 from sitl.plant.trim import NoTrimError, level_hover
+from tests.sitl.state_view import StateView
 
 
 def test_a_rotor_reaches_63_percent_of_a_step_after_its_lag() -> None:

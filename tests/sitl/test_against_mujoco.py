@@ -6,8 +6,8 @@ import mujoco
 import numpy as np
 
 from sitl.plant.parameters import GRAVITY, Vehicle
-from sitl.plant.state import StateView
 from tests.sitl.free_motion import flown, frictionless, tumbling
+from tests.sitl.state_view import StateView
 
 SECONDS = 2.0
 # Both integrate with RK4, but MuJoCo advances the attitude on the sphere and we renormalise, so

@@ -14,9 +14,10 @@ from sitl.plant.aerial_manipulator import (
     plant,
 )
 from sitl.plant.parameters import EndStops, Link, Vehicle
-from sitl.plant.state import StateView, at_rest
+from sitl.plant.state import at_rest
 from sitl.plant.vector import Array
 from tests.sitl.pinocchio_model import configuration, pinocchio_model
+from tests.sitl.state_view import StateView
 
 STATES = 1000
 TOLERANCE = 1e-9  # relative to the largest acceleration of the state

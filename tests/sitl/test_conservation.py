@@ -10,10 +10,10 @@ import pinocchio as pin
 import pytest
 
 from sitl.plant.parameters import GRAVITY, EndStops, Vehicle
-from sitl.plant.state import StateView
 from sitl.plant.vector import Array
 from tests.sitl.free_motion import flown, frictionless, tumbling
 from tests.sitl.pinocchio_model import configuration, pinocchio_model
+from tests.sitl.state_view import StateView
 
 
 def weigh(vehicle: Vehicle, state: Array) -> tuple[float, Array]:

@@ -12,9 +12,10 @@ from sitl.plant.actuators import stop_torque
 from sitl.plant.aerial_manipulator import Inputs, plant
 from sitl.plant.integrator import STEP_S, integrate
 from sitl.plant.parameters import GRAVITY, EndStops, Vehicle
-from sitl.plant.state import ARM, StateView, at_rest
+from sitl.plant.state import ARM, at_rest
 from sitl.plant.vector import Array
 from tests.sitl.free_motion import flown, frictionless, tumbling
+from tests.sitl.state_view import StateView
 from tests.sitl.test_conservation import weigh
 
 STOPS = EndStops()

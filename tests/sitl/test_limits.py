@@ -11,10 +11,11 @@ from scipy.spatial.transform import Rotation
 from fsw.model.airframe import AIRFRAME
 from sitl.limits import LimitRecord, limits
 from sitl.plant.parameters import EndStops, Vehicle
-from sitl.plant.state import StateView, at_rest
+from sitl.plant.state import at_rest
 from sitl.plant.vector import Array
 from sitl.scenario_file import load_scenario
 from sitl.simulation import Controls, Simulation
+from tests.sitl.state_view import StateView
 
 KEYS = [limit.key for limit in limits(Vehicle())]
 STEP_S = 0.001

@@ -7,9 +7,10 @@ import pytest
 
 from sitl.plant.aerial_manipulator import Inputs, acceleration_into, empty_workspace, plant
 from sitl.plant.parameters import Vehicle, level_reach
-from sitl.plant.state import StateView, at_rest
+from sitl.plant.state import at_rest
 from sitl.plant.trim import level_hover
 from sitl.plant.vector import Array
+from tests.sitl.state_view import StateView
 
 HOVER = Vehicle().mass * Vehicle().gravity / 4.0
 

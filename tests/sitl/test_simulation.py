@@ -232,11 +232,11 @@ def test_asking_twice_in_a_step_gives_the_same_reading() -> None:
 def test_the_trajectory_starts_after_the_delay_and_a_hop_has_none() -> None:
     simulation = Simulation(load_scenario("walls"), 0)
     assert simulation.trajectory_start_us == 2_000_000
-    assert simulation.target_at(0.5) == simulation.target_at(1.0)
-    assert simulation.target_at(5.0) != simulation.target_at(1.0)
+    assert simulation.clock.target_at(0.5) == simulation.clock.target_at(1.0)
+    assert simulation.clock.target_at(5.0) != simulation.clock.target_at(1.0)
     hop = Simulation(load_scenario("hop"), 0)
     assert hop.trajectory_start_us is None
-    assert hop.target_at(15.0) == hop.target_at(0.0)
+    assert hop.clock.target_at(15.0) == hop.clock.target_at(0.0)
     assert hop.result().tracking_error_rms_m is None
 
 

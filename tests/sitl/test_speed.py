@@ -8,10 +8,10 @@ from collections.abc import Callable
 import numpy as np
 import pinocchio as pin
 
-from sitl.plant.state import StateView
 from sitl.plant.vector import Array
 from tests.sitl.free_motion import flown, frictionless, tumbling
 from tests.sitl.pinocchio_model import configuration, pinocchio_model
+from tests.sitl.state_view import StateView
 
 STEPS = 200
 ROUNDS = 7

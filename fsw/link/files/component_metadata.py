@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cache
-from importlib.metadata import PackageNotFoundError, version
 from typing import Final
 
+from command_line.version import version
 from fsw.link.files.ftp_tree import Node
 from fsw.link.files.served_file import MemoryFile
 from fsw.link.wire import message_ids
@@ -23,8 +23,8 @@ _PARAMETERS: Final = "parameters.json"
 
 def metadata_files() -> dict[str, Node]:
     """The documents, by their names in the root of the tree."""
-    _general_crc()  # made now, so that no tick has to
-    return {_GENERAL: MemoryFile(_general), _PARAMETERS: MemoryFile(_parameters)}
+    _general()  # made now, so that no tick has to
+    return {_GENERAL: MemoryFile(lambda: _general()[0]), _PARAMETERS: MemoryFile(_parameters)}
 
 
 def component_metadata(
@@ -32,7 +32,7 @@ def component_metadata(
 ) -> Sequence[Outgoing]:
     """COMPONENT_METADATA: where the general document is; ``_which`` [1] is not used."""
     uri = _uri(_GENERAL).encode()
-    values = (snapshot.t_us // 1000, _general_crc(), uri)
+    values = (snapshot.t_us // 1000, _general()[1], uri)
     return [Outgoing(message_ids.COMPONENT_METADATA, values)]
 
 
@@ -50,18 +50,9 @@ def _parameters() -> bytes:
 
 
 @cache
-def _general() -> bytes:
-    from fsw.parameters.metadata import general_document
+def _general() -> tuple[bytes, int]:
+    """The general document and its checksum."""
+    from fsw.parameters.metadata import general_document, metadata_crc
 
-    try:
-        firmware = version("pandion")
-    except PackageNotFoundError:
-        firmware = "0.0.0"
-    return general_document(_uri(_PARAMETERS), firmware)
-
-
-@cache
-def _general_crc() -> int:
-    from fsw.parameters.metadata import metadata_crc
-
-    return metadata_crc(_general())
+    document = general_document(_uri(_PARAMETERS), version())
+    return document, metadata_crc(document)

@@ -23,14 +23,9 @@ class Opcode(enum.IntEnum):
     LIST_DIRECTORY = 3
     OPEN_FILE_RO = 4
     READ_FILE = 5
-    CREATE_FILE = 6
-    WRITE_FILE = 7
+    CREATE_FILE = 6  # the first that writes
     REMOVE_FILE = 8
-    CREATE_DIRECTORY = 9
-    REMOVE_DIRECTORY = 10
-    OPEN_FILE_WO = 11
-    TRUNCATE_FILE = 12
-    RENAME = 13
+    RENAME = 13  # the last
     CALC_FILE_CRC32 = 14
     BURST_READ_FILE = 15
     ACK = 128

@@ -90,9 +90,9 @@ class FtpService:
 
     def handle(self, frame: Frame, t_us: int) -> Sequence[PackedOutgoing]:
         """Answer a request, or start the job that will."""
-        _, system, component, *payload = cast("tuple[int, ...]", frame.payload_values)
-        if not for_this_vehicle(system, component):
+        if not for_this_vehicle(frame):
             return ()
+        _, _, _, *payload = cast("tuple[int, ...]", frame.payload_values)
         client, packed = (frame.system_id, frame.component_id), bytes(payload)
         before = self._answered.get(client)
         if before and before.payload == packed and t_us - before.t_us < _REMEMBERED_US:

@@ -6,7 +6,7 @@ not in it does not exist. So there is no way out of it, whatever a path is made 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import TypeAlias
 
 from fsw.link.files.ftp_message import MAX_DATA
@@ -38,17 +38,11 @@ def listing(directory: Directory, first: int) -> bytes:
     An entry is ``D``, name, NUL for a directory; ``F``, name, tab, size, NUL for a file.
     """
     entries = b""
-    for entry in _entries(directory, first):
+    for name in list(directory)[first:]:
+        node = directory[name]
+        text = f"D{name}\0" if isinstance(node, Mapping) else f"F{name}\t{node.size()}\0"
+        entry = text.encode()
         if len(entries) + len(entry) > MAX_DATA:
             break
         entries += entry
     return entries
-
-
-def _entries(directory: Directory, first: int) -> Iterator[bytes]:
-    for name in list(directory)[first:]:
-        node = directory[name]
-        if isinstance(node, Mapping):
-            yield f"D{name}\0".encode()
-        else:
-            yield f"F{name}\t{node.size()}\0".encode()

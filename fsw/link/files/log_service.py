@@ -64,9 +64,9 @@ class LogService:
 
     def handle(self, frame: Frame, t_us: int) -> Sequence[Outgoing]:
         """Store a request."""
-        values = cast(Numbers, frame.payload_values)
-        if not for_this_vehicle(*values[-2:]):
+        if not for_this_vehicle(frame):
             return ()
+        values = cast(Numbers, frame.payload_values)
         self._look_again()
         if frame.message_id == message_ids.LOG_REQUEST_LIST:
             return self._list(*map(int, values[:2]))

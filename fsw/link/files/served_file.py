@@ -11,36 +11,10 @@ import stat
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final, Protocol
+from typing import Final
 
 _PATIENCE: Final = 100  # refused reads in a row, a tick apart, before one waits for the disk
 _READ_AHEAD: Final = 1 << 17  # bytes asked of the disk at once
-
-
-class OpenFile(Protocol):
-    """A file whose size does not change any more, whatever is appended to it."""
-
-    size: int  # bytes
-
-    def read(self, offset: int, count: int) -> bytes | None:
-        """Read inside the size; None while the disk has not delivered, ask again next tick."""
-
-    def close(self) -> None:
-        """Give it back."""
-
-
-class ServedFile(Protocol):
-    """Something that can be listed and opened."""
-
-    def size(self) -> int:
-        """Bytes it has now."""
-
-    def open(self) -> OpenFile:
-        """Open it at the size it has now.
-
-        Raises:
-            OSError: It is gone or cannot be read.
-        """
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,3 +119,13 @@ class _Descriptor:
     def close(self) -> None:
         os.close(self._descriptor)
         self._descriptor = -1  # the system gives the number to the next file
+
+
+ServedFile = MemoryFile | DiskFile
+"""Something that can be listed, and opened at the size it has now."""
+
+OpenFile = _Bytes | _Descriptor
+"""A file whose size does not change any more, whatever is appended to it.
+
+It is read inside that size; None means that the disk has not delivered yet: ask at the next tick.
+"""

@@ -20,9 +20,7 @@ from fsw.link.services.mission_wire import (
     Peer,
     current_values,
     encode_ack,
-    encode_count,
     encode_item,
-    encode_request,
     item_float,
     item_int,
 )
@@ -30,7 +28,7 @@ from fsw.link.wire import message_ids as ids
 from fsw.link.wire.decode import Numbers, for_this_vehicle
 from fsw.link.wire.mission_items import DENIED, UNSUPPORTED, BadItem, MissionItem
 from fsw.link.wire.outgoing import Outgoing, ServiceOutput
-from fsw.signals import Severity, StatusText
+from fsw.signals import MessageSource, Severity, StatusText
 from messages.frames import Frame
 
 _ReadItem = Callable[[Numbers], MissionItem]
@@ -76,6 +74,7 @@ class MissionService:
     """The mission protocol on one link."""
 
     def __init__(self, store: MissionStore) -> None:
+        self.source: MessageSource | None = None  # of the frame that is handled now
         self._store = store
         self._upload: _Upload | None = None
         self._download: _Download | None = None
@@ -101,11 +100,9 @@ class MissionService:
 
     def handle(self, frame: Frame, t_us: int) -> Sequence[ServiceOutput]:
         """See :class:`~fsw.link.services.service.LinkService`."""
-        values = cast(Numbers, frame.payload_values)
-        at = _TARGET_AT[frame.message_id]
-        if not for_this_vehicle(values[at], values[at + 1]):
+        if not for_this_vehicle(frame):
             return ()
-        peer = (frame.system_id, frame.component_id)
+        values, peer = cast(Numbers, frame.payload_values), (frame.system_id, frame.component_id)
         return self._handlers[frame.message_id](values, peer, t_us)
 
     def poll(self, t_us: int) -> Sequence[ServiceOutput]:
@@ -191,7 +188,7 @@ class MissionService:
     def _stray(self, seq: int, number: int, peer: Peer) -> Sequence[ServiceOutput]:
         """Handle an item without an upload; the acknowledgement of the last one may be lost."""
         if self._done is not None and self._done[:2] == (peer, number):
-            again = encode_ack(ACCEPTED, number, peer, self._store.identity(self._done[1]))
+            again = encode_ack(ACCEPTED, number, peer, self._store.ids[self._done[1]])
             return (again,) if seq == self._done[2] else ()
         if self._upload is not None and self._upload.peer == peer:
             return ()
@@ -200,19 +197,20 @@ class MissionService:
     def _ask(self, upload: _Upload, t_us: int) -> Outgoing:
         upload.asked_us = t_us
         upload.tries += 1
-        return encode_request(len(upload.items), upload.kind, upload.peer)
+        return Outgoing(ids.MISSION_REQUEST_INT, (len(upload.items), *upload.peer, upload.kind))
 
     def _finish(self, upload: _Upload) -> Sequence[ServiceOutput]:
         kind, peer = upload.kind, upload.peer
         try:
-            self._store.keep(kind, tuple(upload.items), tuple(upload.meanings))
+            items, meanings = tuple(upload.items), tuple(upload.meanings)
+            self._store.keep(kind, items, meanings, self.source)
         except BadItem as refused:
             return self._refuse(refused, kind, peer)
         self._upload = None
         self._done = (peer, kind, upload.count - 1)
         text = f"{kind.name.lower()} of {upload.count} items received"
         return (
-            encode_ack(ACCEPTED, kind, peer, self._store.identity(kind)),
+            encode_ack(ACCEPTED, kind, peer, self._store.ids[kind]),
             StatusText(Severity.INFO, text),
         )
 
@@ -225,9 +223,10 @@ class MissionService:
             return refused
         kind = Kind(number)
         self._upload = None
-        items = self._store.items(kind)
+        items = self._store.items[kind]
         self._download = _Download(peer, kind, items, t_us) if items else None
-        return (encode_count(len(items), kind, peer, self._store.identity(kind)),)
+        count = (len(items), *peer, kind, self._store.ids[kind])
+        return (Outgoing(ids.MISSION_COUNT, count),)
 
     def _send_item(
         self, as_int: bool, values: Numbers, peer: Peer, t_us: int
@@ -239,7 +238,7 @@ class MissionService:
             refused = self._unavailable(number, peer, t_us)
             if refused is not None:
                 return refused
-            download = _Download(peer, Kind(number), self._store.items(Kind(number)), t_us)
+            download = _Download(peer, Kind(number), self._store.items[Kind(number)], t_us)
         if seq >= len(download.items):
             return (encode_ack(INVALID_SEQUENCE, number, peer),)
         download.heard_us = t_us
@@ -264,7 +263,7 @@ class MissionService:
         self._upload = self._download = None
         for kind in map(Kind, kinds):
             try:
-                self._store.keep(kind, (), ())
+                self._store.keep(kind, (), (), self.source)
             except BadItem as wrong:
                 return self._refuse(wrong, kind, peer)
         return (encode_ack(ACCEPTED, number, peer),)
@@ -299,19 +298,3 @@ class MissionService:
         self._upload = None
         text = f"{kind.name.lower()} refused: {refused.reason}"
         return (encode_ack(refused.result, kind, peer), StatusText(Severity.WARNING, text))
-
-
-# Where the wire values of a message name the system it is for; its component follows.
-_TARGET_AT: Final = {
-    ids.MISSION_COUNT: 1,
-    ids.MISSION_ITEM: 9,
-    ids.MISSION_ITEM_INT: 9,
-    ids.MISSION_REQUEST_LIST: 0,
-    ids.MISSION_REQUEST: 1,
-    ids.MISSION_REQUEST_INT: 1,
-    ids.MISSION_ACK: 0,
-    ids.MISSION_CLEAR_ALL: 0,
-    ids.MISSION_SET_CURRENT: 1,
-    ids.MISSION_WRITE_PARTIAL_LIST: 2,
-    ids.MISSION_REQUEST_PARTIAL_LIST: 2,
-}

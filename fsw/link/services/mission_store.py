@@ -13,7 +13,8 @@ from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import Final
 
-from fsw.barriers.tangent import planes
+from fsw.flight.safe_set import may_grow_fence
+from fsw.flight.safe_set_change import growth
 from fsw.link.wire.fence_items import check_fence_item, read_fence
 from fsw.link.wire.mission_items import (
     DENIED,
@@ -23,9 +24,10 @@ from fsw.link.wire.mission_items import (
     read_rally,
     read_step,
 )
-from fsw.link.wire.telemetry_context import PlanIds
+from fsw.shapes.zones import surfaces
 from fsw.signals import (
     FlightSnapshot,
+    MessageSource,
     MissionProgress,
     MissionStep,
     MissionUpdate,
@@ -75,6 +77,7 @@ class Site:
     locate: Locate
     judge: SafeSetCheck
     clearance: Callable[[], float]  # m, from the walls of a fence uploaded now
+    owner: Callable[[], int] = lambda: 0  # system that may grow a fence in flight; 0: its uploader
 
 
 class MissionStore:
@@ -83,21 +86,18 @@ class MissionStore:
     def __init__(self, site: Site) -> None:
         self.progress = MissionProgress()
         self.in_mission = False
-        self.ids = PlanIds()
+        self.ids: dict[int, int] = dict.fromkeys(Kind, 0)  # see ``PlanIds``
         self._site = site
-        self._items: dict[Kind, tuple[MissionItem, ...]] = dict.fromkeys(Kind, ())
+        self.items: dict[Kind, tuple[MissionItem, ...]] = dict.fromkeys(Kind, ())
         self._update: MissionUpdate | None = None
         self._snapshot: FlightSnapshot | None = None
+        self._kept_fence: tuple[SafeSet, MessageSource | None] = (SafeSet(), None)
 
     def observe(self, snapshot: FlightSnapshot) -> None:
         """See the vehicle after a tick."""
         self._snapshot = snapshot
         self.progress = snapshot.mission
         self.in_mission = snapshot.mode is Mode.MISSION
-
-    def items(self, kind: Kind) -> tuple[MissionItem, ...]:
-        """What a download returns."""
-        return self._items[kind]
 
     def read(self, kind: Kind, item: MissionItem) -> Meaning:
         """What an item means; ``BadItem`` where something is wrong with it by itself."""
@@ -109,7 +109,11 @@ class MissionStore:
         return None
 
     def keep(
-        self, kind: Kind, items: tuple[MissionItem, ...], meanings: tuple[Meaning, ...]
+        self,
+        kind: Kind,
+        items: tuple[MissionItem, ...],
+        meanings: tuple[Meaning, ...],
+        source: MessageSource | None = None,
     ) -> None:
         """Put a whole upload in the place of the old one; ``BadItem`` leaves that."""
         if kind is Kind.MISSION:
@@ -119,17 +123,16 @@ class MissionStore:
             places = tuple(place for place in meanings if isinstance(place, tuple))
             self._change(MissionUpdate(rally=places))
         else:
-            self._change(MissionUpdate(fence=self._fence(items)))
-        self._items[kind] = items
-        setattr(self.ids, kind.name.lower(), _identity(items))
-
-    def identity(self, kind: Kind) -> int:
-        """The opaque id of a list as it is now, 0 where it is empty."""
-        return int(getattr(self.ids, kind.name.lower()))
+            fence = self._fence(items, source)
+            entitled = self._may_grow(source)
+            self._kept_fence = (fence, source if entitled else self._kept_fence[1])
+            self._change(MissionUpdate(fence=fence, fence_source=source))
+        self.items[kind] = items
+        self.ids[kind] = _identity(items)
 
     def set_current(self, number: int) -> bool:
         """Make a step the current one; False where there is no such step."""
-        if not 0 <= number < len(self._items[Kind.MISSION]):
+        if not 0 <= number < len(self.items[Kind.MISSION]):
             return False
         self._change(MissionUpdate(current=number))
         return True
@@ -139,21 +142,28 @@ class MissionStore:
         taken, self._update = self._update, None
         return taken
 
-    def _fence(self, items: tuple[MissionItem, ...]) -> SafeSet:
+    def _may_grow(self, source: MessageSource | None) -> bool:
+        """As the tick will see it: on the ground every source, in flight the fence's owner."""
+        flies = self._snapshot is not None and self._snapshot.armed and not self._snapshot.landed
+        return not flies or may_grow_fence(self._kept_fence[1], source, self._site.owner())
+
+    def _fence(self, items: tuple[MissionItem, ...], source: MessageSource | None) -> SafeSet:
         fence = read_fence(items, self._site.locate, self._site.clearance())
+        grown = "" if self._may_grow(source) else growth(self._kept_fence[0], fence)
+        if grown:
+            raise BadItem(DENIED, f"{grown}, which {self._kept_fence[1]} owns")
         against = self._site.judge(fence)
         if against:
             raise BadItem(DENIED, f"the fence cannot be kept: {'; '.join(against)}")
         if self._snapshot is not None:
-            x, y, z = p = self._snapshot.estimate.p_WB
-            for number, wall in enumerate(planes(fence, p)):
-                n = wall.normal
-                inside = n[0] * x + n[1] * y + n[2] * z - wall.offset - wall.clearance
-                if not inside > 0.0:
-                    where = "not inside the fence" if number < len(fence.walls) else "excluded"
+            estimate = self._snapshot.estimate
+            for number, at in enumerate(surfaces(fence, estimate.p_WB, estimate.t_us)):
+                if not at.distance > 0.0:
+                    wall = fence.zones[number].shape.kind == "half-space"
+                    where = "not inside the fence" if wall else "excluded"
                     raise BadItem(
                         DENIED,
-                        f"the vehicle is {where}: {-inside:.2f} m beyond the clearance of "
+                        f"the vehicle is {where}: {-at.distance:.2f} m beyond the clearance of "
                         f"wall or cylinder {number}",
                     )
         return fence
@@ -165,7 +175,7 @@ class MissionStore:
                 waiting,
                 **{
                     name: value
-                    for name in ("steps", "fence", "rally", "current")
+                    for name in ("steps", "fence", "rally", "current", "fence_source")
                     if (value := getattr(update, name)) is not None
                 },
             )

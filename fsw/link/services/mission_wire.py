@@ -66,16 +66,6 @@ def encode_item(item: MissionItem, seq: int, kind: int, peer: Peer, as_int: bool
     return Outgoing(message_id, (*item.params, x, y, item.z, *tail))
 
 
-def encode_count(count: int, kind: int, peer: Peer, opaque_id: int) -> Outgoing:
-    """MISSION_COUNT."""
-    return Outgoing(ids.MISSION_COUNT, (count, *peer, kind, opaque_id))
-
-
-def encode_request(seq: int, kind: int, peer: Peer) -> Outgoing:
-    """MISSION_REQUEST_INT."""
-    return Outgoing(ids.MISSION_REQUEST_INT, (seq, *peer, kind))
-
-
 def encode_ack(result: int, kind: int, peer: Peer, opaque_id: int = 0) -> Outgoing:
     """MISSION_ACK; the id is that of the list which an upload has put on the vehicle."""
     return Outgoing(ids.MISSION_ACK, (*peer, result, kind, opaque_id))
@@ -88,7 +78,7 @@ def mission_current(snapshot: FlightSnapshot, context: TelemetryContext) -> Wire
 
 def current_values(progress: MissionProgress, in_mission: bool, plans: PlanIds) -> WireValues:
     """MISSION_CURRENT."""
-    which = (plans.mission, plans.fence, plans.rally)
+    which = (plans[0], plans[1], plans[2])
     if progress.state is MissionState.NO_MISSION:
         return (0, _NO_MISSION, int(progress.state), _SUSPENDED, *which)
     mode = _ACTIVE if in_mission else _SUSPENDED

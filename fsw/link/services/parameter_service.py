@@ -52,23 +52,19 @@ class ParameterService:
 
     def handle(self, frame: Frame, t_us: int) -> Sequence[ServiceOutput]:
         """Answer a read, start a list, or pass a set request on."""
-        values = frame.payload_values
+        if not for_this_vehicle(frame):
+            return ()
+        asker = (frame.system_id, frame.component_id)
         if frame.message_id == ids.PARAM_REQUEST_LIST:
-            system, component = cast("tuple[int, int]", values)
-            if not for_this_vehicle(system, component):
-                return ()
             self._next, self._burst_us = 0, t_us
             # First, as PX4 has it: a client that knows all values needs no list.
             return (self._hash(),)
         if frame.message_id == ids.PARAM_REQUEST_READ:
-            index, system, component, text = cast("tuple[int, int, int, bytes]", values)
-            if not for_this_vehicle(system, component):
-                return ()
-            return self._read(index, _name(text), (frame.system_id, frame.component_id))
-        value, system, component, text, type_ = cast("tuple[float, int, int, bytes, int]", values)
-        if not for_this_vehicle(system, component):
-            return ()
-        return self._set(_name(text), value, type_, (frame.system_id, frame.component_id))
+            index, _, _, text = cast("tuple[int, int, int, bytes]", frame.payload_values)
+            return self._read(index, _name(text), asker)
+        wanted = cast("tuple[float, int, int, bytes, int]", frame.payload_values)
+        value, _, _, text, type_ = wanted
+        return self._set(_name(text), value, type_, asker)
 
     def poll(self, t_us: int) -> Sequence[ServiceOutput]:
         """Report what has changed, and continue a list."""

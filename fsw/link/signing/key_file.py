@@ -41,14 +41,14 @@ class KeyFile:
                 raise LinkError(f"{self._path} may be read by others; chmod 600 it")
             content = json.loads(self._path.read_text(encoding="ascii"))
             key, newest = bytes.fromhex(content["key"]), content["newest"]
+            if len(key) != _KEY_SIZE or not isinstance(newest, int):
+                raise ValueError
         except FileNotFoundError:
             return None
         except (OSError, ValueError, KeyError, TypeError):
             raise LinkError(
                 f"{self._path} holds no signing key; remove it to fly unsigned"
             ) from None
-        if len(key) != _KEY_SIZE or not isinstance(newest, int):
-            raise LinkError(f"{self._path} holds no signing key; remove it to fly unsigned")
         return SigningKey(key, newest)
 
     def write(self, key: SigningKey) -> None:

@@ -158,9 +158,9 @@ def set_up_signing(
     The key crosses the link in the clear, so only this machine may send it; and storing it takes
     time, which an armed vehicle does not have. The answer is a text for the operator.
     """
-    initial_time, system, component, *key = cast(Numbers, frame.payload_values)
-    if not for_this_vehicle(system, component):
+    if not for_this_vehicle(frame):
         return None
+    initial_time, _, _, *key = cast(Numbers, frame.payload_values)
     if not is_loopback(sender):
         return StatusText(
             Severity.WARNING, "signing unchanged: a key is taken from this machine only"

@@ -6,7 +6,7 @@ They are answered here and do not reach the tick, because each link keeps its ow
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Final
 
 from fsw.link.telemetry.stream_rates import UNKNOWN, StreamRates
@@ -41,14 +41,6 @@ class LinkCommands:
     def __init__(self, rates: StreamRates, context: TelemetryContext) -> None:
         self._rates = rates
         self._context = context
-        self._handlers: dict[
-            int, Callable[[CommandRequest, int, FlightSnapshot | None], _Outcome]
-        ] = {
-            _GET_MESSAGE_INTERVAL: self._get_interval,
-            _SET_MESSAGE_INTERVAL: self._set_interval,
-            _REQUEST_MESSAGE: self._request_message,
-            **dict.fromkeys(_REQUESTS, self._request_one),
-        }
 
     def handle(
         self, frame: Frame, t_us: int, snapshot: FlightSnapshot | None
@@ -59,51 +51,46 @@ class LinkCommands:
         """
         decoder = _DECODERS.get(frame.message_id)
         request = None if decoder is None else decoder(frame)
-        handler = None if request is None else self._handlers.get(request.command)
-        if handler is None or request is None:
+        outcome = None if request is None else self._carry_out(request, t_us, snapshot)
+        if outcome is None or request is None:
             return None
-        result, reason, messages = handler(request, t_us, snapshot)
+        result, reason, messages = outcome
         ack = CommandAck(request.command, result, request.source_system, request.source_component)
         reply = Outgoing(message_ids.COMMAND_ACK, encode_replies.command_ack(ack))
         return (reply, *messages), StatusText(Severity.INFO, reason) if reason else None
 
-    def _get_interval(
+    def _carry_out(
         self, request: CommandRequest, t_us: int, snapshot: FlightSnapshot | None
-    ) -> _Outcome:
-        message_id = _whole(request.params[0])
+    ) -> _Outcome | None:
+        message_id, second = _whole(request.params[0]), request.params[1]
+        if request.command == _GET_MESSAGE_INTERVAL:
+            return self._get_interval(message_id)
+        if request.command == _SET_MESSAGE_INTERVAL:
+            return self._set_interval(message_id, _whole(second), t_us)
+        if request.command == _REQUEST_MESSAGE:
+            if message_id is None:
+                return _DENIED, "request message: param1 is not a message id", ()
+            return self._now(message_id, second, snapshot)
+        if request.command in _REQUESTS:  # the older commands, each of which asks for one message
+            wanted, param1_is_1 = _REQUESTS[request.command]
+            if param1_is_1 and request.params[0] != 1.0:
+                return _DENIED, f"command {request.command}: param1 must be 1 to request it", ()
+            return self._now(wanted, math.nan, snapshot)
+        return None
+
+    def _get_interval(self, message_id: int | None) -> _Outcome:
         if message_id is None:
             return _DENIED, "message interval: param1 is not a message id", ()
-        interval = self._rates.interval_us(message_id)
-        values = (interval, message_id & 0xFFFF)
+        values = (self._rates.interval_us(message_id), message_id & 0xFFFF)
         return _ACCEPTED, "", (Outgoing(message_ids.MESSAGE_INTERVAL, values),)
 
-    def _set_interval(
-        self, request: CommandRequest, t_us: int, snapshot: FlightSnapshot | None
-    ) -> _Outcome:
-        message_id, interval = _whole(request.params[0]), _whole(request.params[1])
+    def _set_interval(self, message_id: int | None, interval: int | None, t_us: int) -> _Outcome:
         if message_id is None or interval is None:
             return _DENIED, "message interval: param1 is a message id, param2 a time in us", ()
         if self._rates.interval_us(message_id) == UNKNOWN:
             return _FAILED, "", ()
         refusal = self._rates.set_interval(message_id, interval, t_us)
         return (_DENIED if refusal else _ACCEPTED), refusal, ()
-
-    def _request_message(
-        self, request: CommandRequest, t_us: int, snapshot: FlightSnapshot | None
-    ) -> _Outcome:
-        message_id = _whole(request.params[0])
-        if message_id is None:
-            return _DENIED, "request message: param1 is not a message id", ()
-        return self._now(message_id, request.params[1], snapshot)
-
-    def _request_one(
-        self, request: CommandRequest, t_us: int, snapshot: FlightSnapshot | None
-    ) -> _Outcome:
-        """The older commands, each of which asks for one message."""
-        message_id, param1_is_1 = _REQUESTS[request.command]
-        if param1_is_1 and request.params[0] != 1.0:
-            return _DENIED, f"command {request.command}: param1 must be 1 to request it", ()
-        return self._now(message_id, math.nan, snapshot)
 
     def _now(self, message_id: int, which: float, snapshot: FlightSnapshot | None) -> _Outcome:
         if snapshot is None:

@@ -70,16 +70,14 @@ class StreamRates:
         for row in rows:
             row.interval_us = interval_us or row.default_us
             row.due_us = t_us + max(row.interval_us, 0)
-        if self._per_second() > _MOST_PER_SECOND:
+        per_second = sum(1e6 / row.interval_us for row in self._rows if row.interval_us != OFF)
+        if per_second > _MOST_PER_SECOND:
             for row, interval in zip(rows, before, strict=True):
                 row.interval_us = interval
             return f"more than {_MOST_PER_SECOND} messages a second on one link"
         self._begun = True
         self._lay_out()
         return ""
-
-    def _per_second(self) -> float:
-        return sum(1e6 / row.interval_us for row in self._rows if row.interval_us != OFF)
 
     def _lay_out(self) -> None:
         self._sent = [row for row in self._rows if row.interval_us != OFF]

@@ -9,19 +9,24 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cache
 from typing import Final, cast
 
-from fsw.link.wire.message_ids import SYSTEM_ID
+from fsw.link.wire.message_ids import AUTOPILOT, PANDION, SYSTEM_ID
+from fsw.shapes import BY_NUMBER, kind_of
+from fsw.shapes.ball import point
+from fsw.shapes.half_space import wall
+from fsw.shapes.target_sphere import target_sphere
 from fsw.signals import (
+    MAX_DISTANCE,
     CommandRequest,
     EndEffectorTarget,
-    PointObstacle,
     SensorFrame,
+    Shape,
     Vec3,
-    Wall,
-    WorkspaceSphere,
+    Zone,
 )
-from messages.frames import Frame
+from messages.frames import Frame, wire_fields
 
 Numbers = tuple[float, ...]  # a payload without text, in wire order
 
@@ -34,20 +39,34 @@ _ACCELERATION_IGNORED: Final = 0x1C0
 _YAW_IGNORED: Final = 0x400
 _POSITION_IGNORED: Final = 0x007
 _ZERO: Final[Vec3] = (0.0, 0.0, 0.0)
+MAX_ZONES: Final = 64  # in a set
+_FARTHEST: Final = 1e4  # m; what has no end ends here
+_FASTEST: Final = 30.0  # m/s, of a shape that moves
+_KEEP_IN: Final = 1  # PANDION_SHAPE_FLAGS
 
 
 @dataclass(frozen=True, slots=True)
 class IndexedObstacle:
-    """One wall or obstacle of a set of ``count``."""
+    """One zone of a set of ``count``."""
 
-    obstacle: Wall | PointObstacle
+    zone: Zone
     index: int
     count: int
 
 
-def for_this_vehicle(target_system: float, target_component: float) -> bool:
-    """Whether ``target_system`` [1], ``target_component`` [1] is the autopilot or everyone."""
-    return target_system in (0, SYSTEM_ID) and target_component in (0, 1, 191)
+def for_this_vehicle(frame: Frame) -> bool:
+    """Whether a frame is addressed to the autopilot or to everyone."""
+    values, (system_at, component_at) = frame.payload_values, _target_at(frame.message_id)
+    system = 0 if system_at is None else values[system_at]
+    component = 0 if component_at is None else values[component_at]
+    return system in (0, SYSTEM_ID) and component in (0, AUTOPILOT, PANDION)
+
+
+@cache
+def _target_at(message_id: int) -> tuple[int | None, int | None]:
+    """Places of the target's system and component in wire order, as far as a message has them."""
+    at = {name: place for place, name in enumerate(wire_fields(message_id))}
+    return at.get("target_system"), at.get("target_component")
 
 
 def sensor_frame(odometry: Numbers, arm: Numbers, hil_sensor: Numbers) -> SensorFrame:
@@ -69,9 +88,9 @@ def sensor_frame(odometry: Numbers, arm: Numbers, hil_sensor: Numbers) -> Sensor
 
 def command_long(frame: Frame) -> CommandRequest | None:
     """Read a COMMAND_LONG; None if it is for another system."""
-    *params, command, system, component, confirmation = cast(Numbers, frame.payload_values)
-    if not for_this_vehicle(system, component):
+    if not for_this_vehicle(frame):
         return None
+    *params, command, _, _, confirmation = cast(Numbers, frame.payload_values)
     return CommandRequest(
         command=int(command),
         params=cast("tuple[float, float, float, float, float, float, float]", tuple(params)),
@@ -83,11 +102,9 @@ def command_long(frame: Frame) -> CommandRequest | None:
 
 def command_int(frame: Frame) -> CommandRequest | None:
     """Read a COMMAND_INT; parameters 5 and 6 come back in metres or degrees."""
-    p1, p2, p3, p4, x, y, z, command, system, component, mav_frame, _, _ = cast(
-        Numbers, frame.payload_values
-    )
-    if not for_this_vehicle(system, component):
+    if not for_this_vehicle(frame):
         return None
+    p1, p2, p3, p4, x, y, z, command, _, _, mav_frame, *_ = cast(Numbers, frame.payload_values)
     scale = 1e-4 if mav_frame in _LOCAL_FRAMES else 1e-7
     return CommandRequest(
         command=int(command),
@@ -103,9 +120,9 @@ def set_mode(frame: Frame) -> CommandRequest | None:
 
     It names PX4's main and sub mode in one number, and no component.
     """
-    custom_mode, system, base_mode = cast("tuple[int, int, int]", frame.payload_values)
-    if not for_this_vehicle(system, 0):
+    if not for_this_vehicle(frame):
         return None
+    custom_mode, _, base_mode = cast("tuple[int, int, int]", frame.payload_values)
     main, sub = custom_mode >> 16 & 0xFF, custom_mode >> 24
     return CommandRequest(
         command=_DO_SET_MODE,
@@ -142,28 +159,47 @@ def obstacle_wall(values: Numbers) -> IndexedObstacle | None:
     """Read an OBSTACLE_WALL; None if it describes no plane or no place in its set."""
     numbers = values[0:5]
     index, count = int(values[7]), int(values[8])
-    if not _all_finite(numbers) or not index < count:
+    if not _all_finite(numbers) or not index < count <= MAX_ZONES:
         return None
-    # f32 rounding leaves a unit normal within 1e-6; anything further off is another vector.
-    if not abs(math.hypot(*values[0:3]) - 1.0) < 1e-3 or not values[4] >= 0.0:
+    zone = wall(cast(Vec3, values[0:3]), values[3], values[4])
+    if kind_of(zone.shape).check(zone.shape) is not None or not values[4] >= 0.0:
         return None
-    wall = Wall(normal=cast(Vec3, values[0:3]), offset=values[3], clearance=values[4])
-    return IndexedObstacle(wall, index, count)
+    return IndexedObstacle(zone, index, count)
 
 
 def obstacle_point(values: Numbers) -> IndexedObstacle | None:
     """Read an OBSTACLE_POINT; None if it keeps nothing away or has no place in its set."""
     index, count = int(values[6]), int(values[7])
-    if not _all_finite(values[0:4]) or not index < count or not values[3] > 0.0:
+    if not _all_finite(values[0:4]) or not index < count <= MAX_ZONES or not values[3] > 0.0:
         return None
-    return IndexedObstacle(PointObstacle(cast(Vec3, values[0:3]), values[3]), index, count)
+    return IndexedObstacle(point(cast(Vec3, values[0:3]), values[3]), index, count)
 
 
-def workspace_sphere(values: Numbers) -> WorkspaceSphere | None:
+def obstacle_shape(values: Numbers) -> IndexedObstacle | None:
+    """Read an OBSTACLE_SHAPE; None if it is no shape, out of range or has no place in its set."""
+    index, count, number, flags = map(int, values[23:27])
+    kind = BY_NUMBER.get(number)
+    if kind is None or not _all_finite(values[1:21]) or not index < count <= MAX_ZONES:
+        return None
+    clearance, velocity, keep_in = values[1], cast(Vec3, values[2:5]), flags == _KEEP_IN
+    shape = Shape(kind.name, values[5 : 5 + kind.size])
+    within = 0.0 <= clearance <= MAX_DISTANCE and math.hypot(*velocity) <= _FASTEST
+    if not within or not all(abs(number) <= _FARTHEST for number in shape.numbers):
+        return None
+    if flags & ~_KEEP_IN or kind.check(shape) is not None:
+        return None
+    if kind.follows_target and (not keep_in or velocity != _ZERO):
+        return None
+    # One that stands is the same whenever it is announced.
+    t_us = int(values[0]) if velocity != _ZERO else 0
+    return IndexedObstacle(Zone(shape, clearance, keep_in, velocity, t_us), index, count)
+
+
+def workspace_sphere(values: Numbers) -> Zone | None:
     """Read a WORKSPACE_SPHERE; None if it contains nothing."""
     if not _all_finite(values[0:4]) or not values[3] > 0.0:
         return None
-    return WorkspaceSphere(centre_from_target=cast(Vec3, values[0:3]), radius=values[3])
+    return target_sphere(cast(Vec3, values[0:3]), values[3])
 
 
 def _all_finite(numbers: Numbers) -> bool:

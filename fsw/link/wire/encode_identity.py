@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from importlib.metadata import PackageNotFoundError, version
 from typing import Final
 
+from command_line.version import version
 from fsw.link.wire import message_ids
 from fsw.link.wire.outgoing import Outgoing, WireValues
 from fsw.link.wire.px4_mode import AVAILABLE_MODES, custom_mode, shown_mode
@@ -29,9 +29,8 @@ _UNRELEASED: Final = 0  # FIRMWARE_VERSION_TYPE_DEV
 def _version_number() -> int:
     """Major, minor and patch in the upper three bytes."""
     try:
-        parts = version("pandion").split(".")[:3]
-        major, minor, patch = (int(part) for part in parts)
-    except (PackageNotFoundError, ValueError):
+        major, minor, patch = (int(part) for part in version().split(".")[:3])
+    except ValueError:
         return 0
     return major << 24 | minor << 16 | patch << 8 | _UNRELEASED
 
@@ -73,13 +72,9 @@ def available_modes(which: float, _: FlightSnapshot, __: TelemetryContext) -> Se
             message_ids.AVAILABLE_MODES,
             (
                 *(mode.custom_mode, mode.properties, count, number, mode.standard_mode),
-                _name(mode.name),
+                mode.name.encode("ascii")[: _NAME_SIZE - 1],
             ),
         )
         for number, mode in enumerate(AVAILABLE_MODES, start=1)
         if every or number == which
     ]
-
-
-def _name(name: str) -> bytes:
-    return name.encode("ascii")[: _NAME_SIZE - 1]

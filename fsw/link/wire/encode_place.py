@@ -10,6 +10,7 @@ from typing import Final
 
 from fsw.geometry.geodesy import to_global
 from fsw.geometry.rotation import quaternion_from_matrix
+from fsw.link.wire.encode_standard import boot_ms
 from fsw.link.wire.outgoing import WireValues
 from fsw.link.wire.telemetry_context import TelemetryContext
 from fsw.signals import FlightSnapshot, Vec3
@@ -17,7 +18,6 @@ from fsw.signals import FlightSnapshot, Vec3
 _LOCAL_NED: Final = 1  # MAV_FRAME
 _BODY_FRD: Final = 12  # MAV_FRAME
 _MOCAP: Final = 4  # MAV_ESTIMATOR_TYPE
-_U32: Final = 0xFFFFFFFF
 _COVARIANCE_UNKNOWN: Final = (math.nan, *(0.0,) * 20)
 _I16: Final = 32767
 
@@ -29,7 +29,7 @@ def global_position(snapshot: FlightSnapshot, context: TelemetryContext) -> Wire
     vx, vy, vz = (_int16(100.0 * v) for v in estimate.v_WB)
     heading = round(100.0 * _degrees(estimate.yaw)) % 36000
     above = round(1000.0 * _above_home(snapshot))
-    return (_boot_ms(snapshot), latitude, longitude, altitude, above, vx, vy, vz, heading)
+    return (boot_ms(snapshot.t_us), latitude, longitude, altitude, above, vx, vy, vz, heading)
 
 
 def home_position(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues | None:
@@ -104,7 +104,3 @@ def _degrees(yaw: float) -> float:
 
 def _int16(value: float) -> int:
     return min(max(round(value), -_I16), _I16)
-
-
-def _boot_ms(snapshot: FlightSnapshot) -> int:
-    return (snapshot.t_us // 1000) & _U32

@@ -70,25 +70,25 @@ def extended_sys_state(snapshot: FlightSnapshot, _: TelemetryContext) -> WireVal
 
 def system_time(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues:
     """SYSTEM_TIME: the wall time of the start plus sensor time, as in the log."""
-    return (context.start_unix_us + snapshot.t_us, _boot_ms(snapshot.t_us))
+    return (context.start_unix_us + snapshot.t_us, boot_ms(snapshot.t_us))
 
 
 def attitude(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues:
     """ATTITUDE."""
     estimate = snapshot.estimate
-    return (_boot_ms(snapshot.t_us), *euler_zyx(estimate.R_WB), *estimate.w_WB_B)
+    return (boot_ms(snapshot.t_us), *euler_zyx(estimate.R_WB), *estimate.w_WB_B)
 
 
 def attitude_quaternion(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues:
     """ATTITUDE_QUATERNION; no offset for display."""
     quaternion = quaternion_from_matrix(snapshot.estimate.R_WB)
     rates = snapshot.estimate.w_WB_B
-    return (_boot_ms(snapshot.t_us), *quaternion, *rates, 0.0, 0.0, 0.0, 0.0)
+    return (boot_ms(snapshot.t_us), *quaternion, *rates, 0.0, 0.0, 0.0, 0.0)
 
 
 def local_position(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues:
     """LOCAL_POSITION_NED of the body origin."""
-    return (_boot_ms(snapshot.t_us), *snapshot.estimate.p_WB, *snapshot.estimate.v_WB)
+    return (boot_ms(snapshot.t_us), *snapshot.estimate.p_WB, *snapshot.estimate.v_WB)
 
 
 def position_target(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues:
@@ -97,12 +97,12 @@ def position_target(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues
     if offboard.kind is SetpointKind.BODY and offboard.motion is not None:
         numbers, mask = as_asked(offboard.motion)
         frame = _BODY_NED if offboard.motion.along_heading else _LOCAL_NED
-        return (_boot_ms(snapshot.t_us), *numbers, mask, frame)
+        return (boot_ms(snapshot.t_us), *numbers, mask, frame)
     if plan is None:
         # Nothing is followed: the stream goes on, as PX4's does, and says to ignore all of it.
-        return (_boot_ms(snapshot.t_us), *(0.0,) * 11, _IGNORE_ALL, _LOCAL_NED)
+        return (boot_ms(snapshot.t_us), *(0.0,) * 11, _IGNORE_ALL, _LOCAL_NED)
     motion = (*plan.p, *plan.v, *plan.a)
-    return (_boot_ms(snapshot.t_us), *motion, plan.yaw, plan.yaw_rate, 0, _LOCAL_NED)
+    return (boot_ms(snapshot.t_us), *motion, plan.yaw, plan.yaw_rate, 0, _LOCAL_NED)
 
 
 def attitude_target(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues:
@@ -111,12 +111,12 @@ def attitude_target(snapshot: FlightSnapshot, context: TelemetryContext) -> Wire
     if snapshot.offboard.kind is SetpointKind.ATTITUDE and asked is not None:
         mask = _RATES_IGNORED if asked.w_WB_B is None else _ATTITUDE_IGNORED
         rates, attitude = asked.w_WB_B or _ZERO, asked.q_WB or (1.0, 0.0, 0.0, 0.0)
-        return (_boot_ms(snapshot.t_us), *attitude, *rates, asked.thrust, mask)
+        return (boot_ms(snapshot.t_us), *attitude, *rates, asked.thrust, mask)
     thrust = sum(snapshot.actuators.rotor_thrust) / (4.0 * context.facts.rotor_thrust_max)
     plan, u = snapshot.plan_state, snapshot.plan_input
     yaw = snapshot.estimate.yaw if plan is None else plan.yaw
     quaternion = _quaternion(attitude_reference((0.0, 0.0, 0.0) if u is None else u.a, yaw))
-    return (_boot_ms(snapshot.t_us), *quaternion, 0.0, 0.0, 0.0, thrust, _RATES_IGNORED)
+    return (boot_ms(snapshot.t_us), *quaternion, 0.0, 0.0, 0.0, thrust, _RATES_IGNORED)
 
 
 def servo_outputs(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues:
@@ -161,7 +161,8 @@ def as_asked(motion: MotionSetpoint) -> tuple[tuple[float, ...], int]:
     return (*numbers, motion.yaw or 0.0, motion.yaw_rate or 0.0), mask
 
 
-def _boot_ms(t_us: int) -> int:
+def boot_ms(t_us: int) -> int:
+    """Milliseconds of the vehicle's time ``t_us`` [us], as MAVLink counts them."""
     return (t_us // 1000) & _U32
 
 

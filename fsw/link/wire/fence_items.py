@@ -32,7 +32,12 @@ from fsw.link.wire.mission_items import (
     MissionItem,
     horizontal_place,
 )
-from fsw.signals import PointObstacle, SafeSet, Vec2, Wall, WorkspaceSphere
+from fsw.shapes.half_space import KIND as HALF_SPACE
+from fsw.shapes.half_space import wall
+from fsw.shapes.target_sphere import target_sphere
+from fsw.shapes.vertical_cylinder import KIND as VERTICAL_CYLINDER
+from fsw.shapes.vertical_cylinder import column
+from fsw.signals import TARGET_SPHERE, SafeSet, Vec2, Zone
 
 RETURN_POINT: Final = 5000  # MAV_CMD_NAV_FENCE_RETURN_POINT
 POLYGON_INCLUSION: Final = 5001
@@ -45,10 +50,10 @@ _CIRCLE_WALLS: Final = 8
 MOST_CYLINDERS: Final = 16
 _CYLINDERS_OF_ONE: Final = 6  # that a polygon is covered with at most
 _SHORTEST_EDGE: Final = 0.05  # m
+_ORDER: Final = (HALF_SPACE.name, VERTICAL_CYLINDER.name, TARGET_SPHERE)  # of the zones
 
 _POLYGONS: Final = (POLYGON_INCLUSION, POLYGON_EXCLUSION)
 _CIRCLES: Final = (CIRCLE_INCLUSION, CIRCLE_EXCLUSION)
-_Shape = list[Wall] | list[PointObstacle] | WorkspaceSphere
 
 
 def read_fence(items: tuple[MissionItem, ...], locate: Locate, clearance: float) -> SafeSet:
@@ -56,9 +61,7 @@ def read_fence(items: tuple[MissionItem, ...], locate: Locate, clearance: float)
 
     The vertices of a polygon follow one another.
     """
-    walls: list[Wall] = []
-    cylinders: list[PointObstacle] = []
-    sphere: WorkspaceSphere | None = None
+    zones: list[Zone] = []
     at = 0
     while at < len(items):
         item = items[at]
@@ -68,23 +71,17 @@ def read_fence(items: tuple[MissionItem, ...], locate: Locate, clearance: float)
         at += size
         if item.command == RETURN_POINT:
             continue
-        shape = _shape(items[at - size : at], locate, clearance)
-        if isinstance(shape, WorkspaceSphere):
-            if sphere is not None:
-                raise BadItem(INVALID, "there can be one workspace sphere")
-            sphere = shape
-        else:
-            walls += [one for one in shape if isinstance(one, Wall)]
-            cylinders += [one for one in shape if isinstance(one, PointObstacle)]
-    if (walls or cylinders) and sphere is not None:
-        raise BadItem(INVALID, "a fence and a workspace sphere cannot be kept at once")
-    for count, most, what in (
-        (len(walls), MOST_WALLS, "walls"),
-        (len(cylinders), MOST_CYLINDERS, "cylinders of exclusion"),
+        zones += _zones(items[at - size : at], locate, clearance)
+    zones.sort(key=lambda zone: _ORDER.index(zone.shape.kind))
+    for kind, most, what in (
+        (HALF_SPACE.name, MOST_WALLS, "walls"),
+        (VERTICAL_CYLINDER.name, MOST_CYLINDERS, "cylinders of exclusion"),
+        (TARGET_SPHERE, 1, "workspace spheres"),
     ):
+        count = sum(zone.shape.kind == kind for zone in zones)
         if count > most:
             raise BadItem(INVALID, f"a fence of {count} {what}; {most} can be kept")
-    return SafeSet(tuple(walls), sphere, tuple(cylinders))
+    return SafeSet(tuple(zones))
 
 
 def check_fence_item(item: MissionItem, locate: Locate) -> None:
@@ -107,26 +104,26 @@ def _vertex_count(item: MissionItem) -> int:
     return int(count) if item.command in _POLYGONS and count >= 1.0 else 1
 
 
-def _shape(items: tuple[MissionItem, ...], locate: Locate, clearance: float) -> _Shape:
-    """One polygon, circle or sphere."""
+def _zones(items: tuple[MissionItem, ...], locate: Locate, clearance: float) -> list[Zone]:
+    """Of one polygon, circle or sphere."""
     for item in items:
         check_fence_item(item, locate)
         if (item.command, item.params[0]) != (items[0].command, items[0].params[0]):
             raise BadItem(INVALID, "the vertices of a polygon do not agree on their number")
     first = items[0]
     if first.command == CIRCLE_INCLUSION and first.frame == LOCAL_OFFSET_NED:
-        return _sphere(first)
+        return [_sphere(first)]
     places = [horizontal_place(item, locate) for item in items]
     if first.command == CIRCLE_INCLUSION:
         return walls_of(_octagon(places[0], first.params[0]), clearance)
     if first.command == CIRCLE_EXCLUSION:
-        return [_cylinder(places[0], first.params[0] + clearance)]
+        return [column(places[0], first.params[0] + clearance)]
     if first.command == POLYGON_EXCLUSION:
         return cylinders_over(places, clearance)
     return walls_of(places, clearance)
 
 
-def walls_of(corners: list[Vec2], clearance: float) -> list[Wall]:
+def walls_of(corners: list[Vec2], clearance: float) -> list[Zone]:
     """Upright walls with a ``clearance`` [m] along the edges of a convex polygon, normals inward.
 
     The corners, north and east [m], may go round in either sense.
@@ -146,11 +143,11 @@ def walls_of(corners: list[Vec2], clearance: float) -> list[Wall]:
         offset = normal[0] * a[0] + normal[1] * a[1]
         if any(normal[0] * c[0] + normal[1] * c[1] < offset - 1e-3 for c in corners):
             raise BadItem(INVALID, "the polygon is not convex: its inside is no safe set here")
-        walls.append(Wall(normal, offset, clearance))
+        walls.append(wall(normal, offset, clearance))
     return walls
 
 
-def cylinders_over(corners: list[Vec2], clearance: float) -> list[PointObstacle]:
+def cylinders_over(corners: list[Vec2], clearance: float) -> list[Zone]:
     """Upright cylinders that cover a polygon of any shape, and a ``clearance`` [m] around it.
 
     The polygon is cut across its long side into pieces about as long as it is wide, and each piece
@@ -172,12 +169,8 @@ def cylinders_over(corners: list[Vec2], clearance: float) -> list[PointObstacle]
         v = 0.5 * (min(p[1] for p in piece) + max(p[1] for p in piece))
         radius = max(math.dist((u, v), p) for p in piece)
         centre = (u * along[0] + v * across[0], u * along[1] + v * across[1])
-        cylinders.append(_cylinder(centre, radius + clearance))
+        cylinders.append(column(centre, radius + clearance))
     return cylinders
-
-
-def _cylinder(centre: Vec2, radius: float) -> PointObstacle:
-    return PointObstacle((*centre, 0.0), radius, upright=True)
 
 
 def _long_direction(corners: list[Vec2]) -> Vec2:
@@ -225,9 +218,9 @@ def _octagon(centre: Vec2, radius: float) -> list[Vec2]:
     ]
 
 
-def _sphere(item: MissionItem) -> WorkspaceSphere:
+def _sphere(item: MissionItem) -> Zone:
     if not 0.0 < item.params[0] < math.inf:
         raise BadItem(INVALID_PARAM1, f"a sphere of radius {item.params[0]:g} m")
     if not math.isfinite(item.z):
         raise BadItem(INVALID_PARAM1 + 6, "a sphere needs the height of its centre")
-    return WorkspaceSphere((1e-4 * item.x, 1e-4 * item.y, item.z), item.params[0])
+    return target_sphere((1e-4 * item.x, 1e-4 * item.y, item.z), item.params[0])

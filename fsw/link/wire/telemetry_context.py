@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from fsw.geometry.geodesy import DEFAULT_ORIGIN
@@ -11,13 +12,8 @@ from fsw.signals import Origin
 GENERIC, PX4 = 0, 12  # MAV_AUTOPILOT
 
 
-@dataclass(slots=True)
-class PlanIds:
-    """Identities of the uploaded lists, 0 for an empty one; from the mission store."""
-
-    mission: int = 0
-    fence: int = 0
-    rally: int = 0
+PlanIds = Mapping[int, int]
+"""Identities of the uploaded lists by MAV_MISSION_TYPE, 0 for an empty one; the mission store's."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,4 +25,4 @@ class TelemetryContext:
     autopilot: int = PX4
     origin: Origin = DEFAULT_ORIGIN
     start_unix_us: int = 0  # wall time at sensor time 0 [us since 1970]
-    plan_ids: PlanIds = field(default_factory=PlanIds)
+    plan_ids: PlanIds = field(default_factory=lambda: dict.fromkeys(range(3), 0))

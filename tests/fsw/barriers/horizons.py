@@ -8,9 +8,12 @@ import numpy as np
 
 from fsw.barriers.constraint_block import TargetPoints
 from fsw.barriers.safe_approach import BarrierTuning
+from fsw.barriers.zone_rows import ZoneRows
 from fsw.model.airframe import AIRFRAME
+from fsw.model.body import body_of
 from fsw.model.linearisation import Linearisation
 from fsw.model.prediction import INPUTS, Array, condense
+from fsw.signals import SafeSet, Zone
 from tests.fsw.model.geometry_by_rotation import moved_on, tips_of_prediction
 from tests.fsw.random_states import prediction_vector
 
@@ -19,6 +22,7 @@ TUNING = BarrierTuning(alpha=2.0, slope=4.0, gamma=3.0, lambda_=0.3, skipped_nod
 PERIOD = 0.1
 BETA = 1.0 - TUNING.gamma * PERIOD
 MODEL = condense(AIRFRAME, PERIOD, NODES)
+POINTS = body_of("points", AIRFRAME)
 
 
 @dataclass(frozen=True)
@@ -43,6 +47,32 @@ def random_case(random: np.random.Generator) -> Case:
         random.uniform(-3.0, 3.0, NODES + 1),
     )
     return Case(prediction_vector(random), random.uniform(-2.0, 2.0, INPUTS * NODES), targets)
+
+
+def barrier_of(zones: tuple[Zone, ...], tuning: BarrierTuning = TUNING) -> ZoneRows:
+    """Barriers of the paper's three points."""
+    return ZoneRows(SafeSet(zones), POINTS, MODEL, (tuning, tuning))
+
+
+def distances_of(
+    zones: tuple[Zone, ...], tightening: float = 0.0, skipped_nodes: int = 0
+) -> ZoneRows:
+    """MPC-HC's rows of the paper's three points."""
+    return ZoneRows(
+        SafeSet(zones),
+        POINTS,
+        MODEL,
+        (TUNING, TUNING),
+        distances=True,
+        tightening=tightening,
+        skipped_nodes=skipped_nodes,
+    )
+
+
+def front_of(wall: Zone) -> tuple[Array, float]:
+    """The normal of a wall, and the offset along it from which on its clearance is kept."""
+    nx, ny, nz, offset = wall.shape.numbers
+    return np.array([nx, ny, nz]), offset + wall.clearance
 
 
 def safe_speed(d: float) -> float:

@@ -5,22 +5,24 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fsw.barriers.point_obstacle import PointObstacleBarrier
-from fsw.barriers.tangent import planes, tangent
-from fsw.barriers.wall import WallBarrier
+from fsw.barriers.zone_rows import ZoneRows
 from fsw.model.linearisation import Linearisation
 from fsw.model.prediction import INPUTS, Array
-from fsw.signals import PointObstacle, SafeSet, Wall
+from fsw.shapes.ball import point
+from fsw.shapes.half_space import wall
+from fsw.shapes.vertical_cylinder import column
+from fsw.shapes.zones import surfaces
+from fsw.signals import SafeSet
 from tests.fsw.barriers.horizons import (
-    MODEL,
     NODES,
-    TUNING,
     Case,
+    barrier_of,
     lowest_allowed,
     measured,
     random_case,
     safe_speed,
 )
+from tests.fsw.model.three_points import positions_of
 from tests.fsw.random_states import vec3
 
 STEP = 1e-6
@@ -34,30 +36,31 @@ def obstacles_near(random: np.random.Generator, case: Case, distance: float) -> 
     return np.asarray(case.start[0:3] + away)
 
 
-def refilled(places: Array, case: Case) -> PointObstacleBarrier:
+def refilled(places: Array, case: Case) -> ZoneRows:
     obstacles = tuple(
-        PointObstacle(vec3(place), clearance)
-        for place, clearance in zip(places, CLEARANCES, strict=True)
+        point(vec3(place), clearance) for place, clearance in zip(places, CLEARANCES, strict=True)
     )
-    barrier = PointObstacleBarrier(obstacles, TUNING, MODEL)
+    barrier = barrier_of(obstacles)
     barrier.refill(case.horizon(), case.targets)
     return barrier
 
 
 def rays_at(horizon: Linearisation, place: Array) -> Array:
-    away = horizon.position - place
+    away = positions_of(horizon)[0] - place
     return np.asarray(away / np.linalg.norm(away, axis=2)[:, :, None])
 
 
 def h_by_hand(places: Array, frozen: Linearisation, horizon: Linearisation) -> Array:
     """By node from 2, obstacle and point, with the directions of the frozen horizon."""
     h = []
+    position, velocity = positions_of(horizon)
+    rays = [rays_at(frozen, place) for place in places]
     for node in range(2, NODES + 1):
-        for place, clearance in zip(places, CLEARANCES, strict=True):
-            for point in range(3):
-                n = rays_at(frozen, place)[node, point]
-                gap = n @ (horizon.position[node, point] - place) - clearance
-                h.append(safe_speed(gap) + n @ horizon.velocity[node, point])
+        for ray, place, clearance in zip(rays, places, CLEARANCES, strict=True):
+            for k in range(3):
+                n = ray[node, k]
+                gap = n @ (position[node, k] - place) - clearance
+                h.append(safe_speed(gap) + n @ velocity[node, k])
     return np.array(h)
 
 
@@ -71,13 +74,13 @@ def test_rows_are_h0_of_every_critical_point_and_their_slopes_its_differences(
         places = obstacles_near(random, case, distance)
         rows, frozen = refilled(places, case).rows, case.horizon()
         np.testing.assert_allclose(rows.value, h_by_hand(places, frozen, frozen), atol=1e-12)
-        for column in range(INPUTS * NODES):
+        for entry in range(INPUTS * NODES):
             change = np.zeros(INPUTS * NODES)
-            change[column] = STEP
+            change[entry] = STEP
             above = h_by_hand(places, frozen, case.horizon(change))
             below = h_by_hand(places, frozen, case.horizon(-change))
             np.testing.assert_allclose(
-                rows.gradient[:, column], (above - below) / (2.0 * STEP), atol=1e-4
+                rows.gradient[:, entry], (above - below) / (2.0 * STEP), atol=1e-4
             )
 
 
@@ -86,17 +89,18 @@ def test_the_rows_ask_for_the_decay_of_h_from_where_the_vehicle_is() -> None:
     case = random_case(random)
     places = obstacles_near(random, case, 1.0)
     barrier, horizon = refilled(places, case), case.horizon()
+    position, velocity = positions_of(horizon)
     required, start = [], []
     for place, clearance in zip(places, CLEARANCES, strict=True):
-        for point in range(3):
-            p, v = horizon.position[0, point] - place, horizon.velocity[0, point]
+        for k in range(3):
+            p, v = position[0, k] - place, velocity[0, k]
             distance = float(np.linalg.norm(p))
             start.append(safe_speed(distance - clearance) + p @ v / distance)
     for node in range(2, NODES + 1):
         for place, clearance in zip(places, CLEARANCES, strict=True):
-            for point in range(3):
-                n = rays_at(horizon, place)[node, point]
-                p, v = horizon.position[0, point] - place, horizon.velocity[0, point]
+            for k in range(3):
+                n = rays_at(horizon, place)[node, k]
+                p, v = position[0, k] - place, velocity[0, k]
                 required.append(lowest_allowed(safe_speed(n @ p - clearance) + n @ v, node))
     np.testing.assert_allclose(barrier.rows.start, start, atol=1e-12)
     np.testing.assert_allclose(barrier.rows.lower_bound, required, atol=1e-12)
@@ -105,13 +109,14 @@ def test_the_rows_ask_for_the_decay_of_h_from_where_the_vehicle_is() -> None:
 def test_far_away_an_obstacle_is_the_wall_that_its_tangent_plane_is() -> None:
     """Seen from a thousand kilometres the direction is the same for every point and node."""
     case = random_case(np.random.default_rng(5))
-    obstacle = PointObstacle((1e6, 2e6, -3e6), 0.2)
-    point = PointObstacleBarrier((obstacle,), TUNING, MODEL)
-    wall = WallBarrier((tangent(obstacle, vec3(case.start[0:3])),), TUNING, MODEL)
-    for barrier in (point, wall):
+    centre = np.array([1e6, 2e6, -3e6])
+    n = (case.start[0:3] - centre) / np.linalg.norm(case.start[0:3] - centre)
+    branch = barrier_of((point(vec3(centre), 0.2),))
+    plane = barrier_of((wall(vec3(n), float(n @ centre), 0.2),))
+    for barrier in (branch, plane):
         barrier.refill(case.horizon(), case.targets)
-    np.testing.assert_allclose(point.rows.gradient, wall.rows.gradient, atol=1e-4)
-    np.testing.assert_array_equal(point.rows.slack, wall.rows.slack)
+    np.testing.assert_allclose(branch.rows.gradient, plane.rows.gradient, atol=1e-4)
+    np.testing.assert_array_equal(branch.rows.slack, plane.rows.slack)
 
 
 def test_each_obstacle_has_its_slack_at_each_node() -> None:
@@ -127,38 +132,39 @@ def test_in_the_obstacle_itself_the_rows_are_numbers() -> None:
     rows = refilled(np.tile(case.start[0:3], (2, 1)), case).rows
     assert np.isfinite(rows.value).all()
     assert np.isfinite(rows.gradient).all()
-    wall = tangent(PointObstacle((1.0, 2.0, 3.0), 0.1), (1.0, 2.0, 3.0))
-    assert wall.normal == (1.0, 0.0, 0.0)
+    here = SafeSet((point((1.0, 2.0, 3.0), 0.1),))
+    assert surfaces(here, (1.0, 2.0, 3.0), 0) == ((-0.1, 1.0, 0.0, 0.0),)
 
 
 def test_the_tangent_plane_has_the_ball_behind_it() -> None:
     random = np.random.default_rng(8)
     for _ in range(50):
         centre, p = random.uniform(-1.0, 1.0, (2, 3))
-        wall = tangent(PointObstacle(vec3(centre), 0.3), vec3(p))
-        n = np.array(wall.normal)
-        assert n @ p - wall.offset == pytest.approx(np.linalg.norm(p - centre))
-        assert n @ (centre + 0.3 * n) <= wall.offset + wall.clearance + 1e-12
+        (at,) = surfaces(SafeSet((point(vec3(centre), 0.3),)), vec3(p), 0)
+        n = np.array(at.normal)
+        assert at.distance == pytest.approx(np.linalg.norm(p - centre) - 0.3)
+        assert n @ (centre + 0.3 * n) <= n @ p - at.distance + 1e-12
 
 
-def test_without_obstacles_the_planes_are_the_walls_themselves() -> None:
-    walls = (Wall((-1.0, 0.0, 0.0), -1.0, 0.1),)
-    assert planes(SafeSet(walls), (0.0, 0.0, 0.0)) is walls
+def test_the_plane_of_a_wall_is_the_wall_itself() -> None:
+    walls = SafeSet((wall((-0.6, 0.0, 0.8), -1.0, 0.1),))
+    (at,) = surfaces(walls, (0.5, 7.0, -0.25), 0)
+    assert at.normal == (-0.6, 0.0, 0.8)
+    assert at.distance == pytest.approx(0.4)
 
 
 def test_an_upright_obstacle_is_kept_off_at_any_height() -> None:
     """Its rows are those of a ball at the height of each point."""
     case = random_case(np.random.default_rng(7))
     place = case.start[0:3] + [0.9, -0.6, 0.0]
-    upright = PointObstacle((float(place[0]), float(place[1]), 50.0), 0.2, upright=True)
-    barrier = PointObstacleBarrier((upright,), TUNING, MODEL)
+    barrier = barrier_of((column((float(place[0]), float(place[1])), 0.2),))
     barrier.refill(case.horizon(), case.targets)
     position, velocity = measured(case.horizon())
     expected = []
     for node in range(2, NODES + 1):
-        for point in range(3):
-            away = (position[node, point] - place)[:2]
+        for k in range(3):
+            away = (position[node, k] - place)[:2]
             distance = float(np.linalg.norm(away))
-            approach = float(away @ velocity[node, point, :2]) / distance
+            approach = float(away @ velocity[node, k, :2]) / distance
             expected.append(safe_speed(distance - 0.2) + approach)
     np.testing.assert_allclose(barrier.rows.value, expected, atol=1e-5)

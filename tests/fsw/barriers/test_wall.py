@@ -6,15 +6,16 @@ import numpy as np
 import pytest
 
 from fsw.barriers.safe_approach import BarrierTuning
-from fsw.barriers.wall import WallBarrier
+from fsw.barriers.zone_rows import ZoneRows
 from fsw.model.linearisation import Linearisation
 from fsw.model.prediction import INPUTS, Array
-from fsw.signals import Wall
+from fsw.shapes.half_space import wall
+from fsw.signals import Zone
 from tests.fsw.barriers.horizons import (
-    MODEL,
     NODES,
-    TUNING,
     Case,
+    barrier_of,
+    front_of,
     lowest_allowed,
     measured,
     random_case,
@@ -23,22 +24,22 @@ from tests.fsw.barriers.horizons import (
 from tests.fsw.random_states import vec3
 
 STEP = 1e-4
-LEVEL = (Wall((-1.0, 0.0, 0.0), -1.0, 0.1), Wall((0.0, 1.0, 0.0), -1.0, 0.1))
-SLANTED = (Wall((0.48, -0.6, 0.64), -1.0, 0.1),)
+LEVEL = (wall((-1.0, 0.0, 0.0), -1.0, 0.1), wall((0.0, 1.0, 0.0), -1.0, 0.1))
+SLANTED = (wall((0.48, -0.6, 0.64), -1.0, 0.1),)
 
 
-def random_walls(random: np.random.Generator, through: Array, distance: float) -> tuple[Wall, ...]:
+def random_walls(random: np.random.Generator, through: Array, distance: float) -> tuple[Zone, ...]:
     """Two walls at this distance (clearance taken off) from a point."""
     walls = []
     for clearance in (0.1, 0.0):
         normal = random.standard_normal(3)
         normal /= np.linalg.norm(normal)
         offset = float(normal @ through) - distance - clearance
-        walls.append(Wall(vec3(normal), offset, clearance))
+        walls.append(wall(vec3(normal), offset, clearance))
     return tuple(walls)
 
 
-def braked(walls: tuple[Wall, ...], horizon: Linearisation, first_node: int) -> Array:
+def braked(walls: tuple[Zone, ...], horizon: Linearisation, first_node: int) -> Array:
     """What h is for: the speed that can still be braked, plus the rate at which distance grows.
 
     Distances and rates are those of the points measured along the motion, in the rows' order.
@@ -46,16 +47,16 @@ def braked(walls: tuple[Wall, ...], horizon: Linearisation, first_node: int) -> 
     position, velocity = measured(horizon)
     values = []
     for node in range(first_node, NODES + 1):
-        for wall in walls:
-            on_plane = (wall.offset + wall.clearance) * np.array(wall.normal)
+        for one in walls:
+            normal, offset = front_of(one)
             for point in range(3):
-                distance = (position[node, point] - on_plane) @ wall.normal
-                values.append(safe_speed(distance) + velocity[node, point] @ wall.normal)
+                distance = position[node, point] @ normal - offset
+                values.append(safe_speed(distance) + velocity[node, point] @ normal)
     return np.array(values)
 
 
-def refilled(walls: tuple[Wall, ...], case: Case) -> WallBarrier:
-    barrier = WallBarrier(walls, TUNING, MODEL)
+def refilled(walls: tuple[Zone, ...], case: Case) -> ZoneRows:
+    barrier = barrier_of(walls)
     barrier.refill(case.horizon(), case.targets)
     return barrier
 
@@ -89,21 +90,21 @@ def test_rows_ask_for_what_the_decay_from_the_start_leaves() -> None:
 
 
 def test_each_node_and_wall_has_a_slack_of_its_own() -> None:
-    walls = (Wall((1.0, 0.0, 0.0), 0.0, 0.1), Wall((0.0, 1.0, 0.0), 0.0, 0.1))
-    rows = WallBarrier(walls, TUNING, MODEL).rows
+    walls = (wall((1.0, 0.0, 0.0), 0.0, 0.1), wall((0.0, 1.0, 0.0), 0.0, 0.1))
+    rows = barrier_of(walls).rows
     shared = {(int(node), k // 3 % 2): int(rows.slack[k]) for k, node in enumerate(rows.node)}
     assert len(set(shared.values())) == len(shared) == rows.slacks == 2 * (NODES - 1)
 
 
 def test_skipped_nodes_have_no_rows() -> None:
     case = random_case(np.random.default_rng(3))
-    barrier = WallBarrier(LEVEL, BarrierTuning(skipped_nodes=2), MODEL)
+    barrier = barrier_of(LEVEL, BarrierTuning(skipped_nodes=2))
     barrier.refill(case.horizon(), case.targets)
     assert barrier.rows.node.min() == 3
 
 
 @pytest.mark.parametrize("walls", [LEVEL, SLANTED], ids=["along the axes", "slanted"])
-def test_no_row_feels_an_input_from_its_node_on(walls: tuple[Wall, ...]) -> None:
+def test_no_row_feels_an_input_from_its_node_on(walls: tuple[Zone, ...]) -> None:
     random = np.random.default_rng(4)
     for _ in range(10):
         rows = refilled(walls, random_case(random)).rows
@@ -115,7 +116,7 @@ def test_no_row_feels_an_input_from_its_node_on(walls: tuple[Wall, ...]) -> None
 def test_accelerating_away_from_the_wall_raises_h() -> None:
     case = random_case(np.random.default_rng(4))
     case.start[:] = 0.0
-    ahead = (Wall((-1.0, 0.0, 0.0), -1.0, 0.1),)  # plane x = 1, free space behind it
+    ahead = (wall((-1.0, 0.0, 0.0), -1.0, 0.1),)  # plane x = 1, free space behind it
     rows = refilled(ahead, case).rows
     base_last_node = len(rows.node) - 3
     assert rows.gradient[base_last_node, 0] < 0.0  # forward is towards the wall

@@ -7,30 +7,31 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fsw.barriers.workspace import DIRECTIONS, WorkspaceBarrier, outward_frame
-from fsw.model.linearisation import BASE, Linearisation
+from fsw.model.linearisation import Linearisation
 from fsw.model.prediction import INPUTS, Array
-from fsw.signals import WorkspaceSphere
+from fsw.shapes.frame import outward_axis
+from fsw.shapes.target_sphere import target_sphere
 from tests.fsw.barriers.horizons import (
-    MODEL,
     NODES,
-    TUNING,
     Case,
+    barrier_of,
     lowest_allowed,
     random_case,
     safe_speed,
 )
+from tests.fsw.random_states import vec3
 
 RADIUS = 0.1
+DIRECTIONS = 6
 OFFSET = np.array([0.02, -0.03, -0.225])
-SPHERE = WorkspaceSphere((0.02, -0.03, -0.225), RADIUS)
+SPHERE = target_sphere((0.02, -0.03, -0.225), RADIUS)
 STEP = 1e-6
 
 
 def case_at(random: np.random.Generator, rho: float) -> Case:
     """A random case with the centre at distance rho from the base, at every node."""
     case = random_case(random)
-    position = case.horizon().position[:, BASE]
+    position = case.horizon().states[:, 0:3]
     for node in range(NODES + 1):
         away = random.standard_normal(3)
         away *= rho / np.linalg.norm(away)
@@ -42,19 +43,23 @@ def relative(case: Case, horizon: Linearisation, node: int) -> tuple[Array, Arra
     """Base from the sphere's centre, and its velocity."""
     centre = case.targets.position[node] + OFFSET
     return (
-        horizon.position[node, BASE] - centre,
-        horizon.velocity[node, BASE] - case.targets.velocity[node],
+        horizon.states[node, 0:3] - centre,
+        horizon.states[node, 3:6] - case.targets.velocity[node],
     )
+
+
+def directions(e: Array) -> Array:
+    """All round the centre, (6, 3)."""
+    x, y, z = vec3(e)
+    return np.array([outward_axis(x, y, z, which) for which in range(DIRECTIONS)])
 
 
 def frozen_normals(case: Case) -> Array:
     """The six directions at each node of the guess (n + 1, 6, 3)."""
     normals = np.zeros((NODES + 1, DIRECTIONS, 3))
-    frame = np.zeros((3, 3))
     horizon = case.horizon()
     for node in range(NODES + 1):
-        outward_frame(relative(case, horizon, node)[0], frame)
-        normals[node, 0::2], normals[node, 1::2] = frame, -frame
+        normals[node] = directions(relative(case, horizon, node)[0])
     return normals
 
 
@@ -78,7 +83,7 @@ def test_rows_equal_h_and_its_finite_difference_along_the_prediction(rho: float)
     random = np.random.default_rng(1)
     for _ in range(2):
         case = case_at(random, rho)
-        barrier = WorkspaceBarrier(SPHERE, TUNING, MODEL)
+        barrier = barrier_of((SPHERE,))
         barrier.refill(case.horizon(), case.targets)
         normals, rows = frozen_normals(case), barrier.rows
         np.testing.assert_allclose(rows.value, h_by_hand(case, 0.0, normals), atol=1e-12)
@@ -102,7 +107,7 @@ def test_rows_equal_h_and_its_finite_difference_along_the_prediction(rho: float)
 @pytest.mark.parametrize("rho", [0.05, RADIUS, 0.5], ids=["inside", "boundary", "outside"])
 def test_first_pair_of_rows_is_the_papers_pair(rho: float) -> None:
     case = case_at(np.random.default_rng(2), rho)
-    barrier = WorkspaceBarrier(SPHERE, TUNING, MODEL)
+    barrier = barrier_of((SPHERE,))
     barrier.refill(case.horizon(), case.targets)
     for node in range(2, NODES + 1):
         e, w = relative(case, case.horizon(), node)
@@ -116,7 +121,7 @@ def test_first_pair_of_rows_is_the_papers_pair(rho: float) -> None:
 def test_reported_h_is_the_smaller_of_the_papers_pair_at_the_start() -> None:
     for seed in range(10):
         case = case_at(np.random.default_rng(seed), 0.05)
-        barrier = WorkspaceBarrier(SPHERE, TUNING, MODEL)
+        barrier = barrier_of((SPHERE,))
         barrier.refill(case.horizon(), case.targets)
         e, w = relative(case, case.horizon(), 0)
         n = e / np.linalg.norm(e)
@@ -125,16 +130,17 @@ def test_reported_h_is_the_smaller_of_the_papers_pair_at_the_start() -> None:
 
 
 def test_one_slack_a_node() -> None:
-    rows = WorkspaceBarrier(SPHERE, TUNING, MODEL).rows
+    rows = barrier_of((SPHERE,)).rows
     np.testing.assert_array_equal(rows.slack, rows.node - 2)
     assert rows.slacks == NODES - 1
 
 
 @given(st.tuples(*[st.floats(-5.0, 5.0)] * 3))
 def test_frame_is_orthonormal_and_starts_outward(components: tuple[float, float, float]) -> None:
-    e, frame = np.array(components), np.full((3, 3), np.nan)
-    outward_frame(e, frame)
-    np.testing.assert_allclose(frame @ frame.T, np.eye(3), atol=1e-12)
+    e = np.array(components)
+    frame = directions(e)
+    np.testing.assert_allclose(frame[0::2] @ frame[0::2].T, np.eye(3), atol=1e-12)
+    np.testing.assert_array_equal(frame[1::2], -frame[0::2])
     if np.linalg.norm(e) > 0.0021:
         np.testing.assert_allclose(frame[0], e / np.linalg.norm(e), atol=1e-12)
 
@@ -142,7 +148,7 @@ def test_frame_is_orthonormal_and_starts_outward(components: tuple[float, float,
 @pytest.mark.parametrize("axis", range(3))
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
 def test_frame_is_orthonormal_along_the_axes(axis: int, sign: float) -> None:
-    e, frame = np.zeros(3), np.zeros((3, 3))
+    e = np.zeros(3)
     e[axis] = sign
-    outward_frame(e, frame)
+    frame = directions(e)[0::2]
     np.testing.assert_allclose(frame @ frame.T, np.eye(3), atol=1e-15)

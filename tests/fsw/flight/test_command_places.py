@@ -13,6 +13,8 @@ from fsw.flight.modes.base import CommandContext
 from fsw.flight.setpoint_generator import PositionGoal
 from fsw.geometry.geodesy import to_global, to_local
 from fsw.link.wire.decode_commands import command as read_command
+from fsw.shapes.ball import point
+from fsw.shapes.half_space import wall
 from fsw.signals import (
     CommandRequest,
     CommandResult,
@@ -20,12 +22,11 @@ from fsw.signals import (
     Mode,
     MotionSetpoint,
     Origin,
-    PointObstacle,
     SafeSet,
     Vec3,
-    Wall,
 )
 from tests.fsw.flight.asked import FLIGHT_MODES, ask
+from tests.fsw.flight.contexts import STANDING
 
 ACCEPTED, DENIED = CommandResult.ACCEPTED, CommandResult.DENIED
 TEMPORARILY_REJECTED = CommandResult.TEMPORARILY_REJECTED
@@ -33,9 +34,7 @@ NAN = math.nan
 ORIGIN = Origin(48.0, 11.0, 500.0)
 HOME = Home((3.0, 4.0, -0.32), 0.0)
 HERE = (1.0, 2.0, -5.0)
-HOVERING = CommandContext(
-    Mode.HOLD, landed=False, estimate_valid=True, targets_ahead=False, position=HERE, home=HOME
-)
+HOVERING = replace(STANDING, mode=Mode.HOLD, landed=False, position=HERE, home=HOME)
 GOTO, SET_HOME, SET_ACTUATOR, MAY_SWITCH = 192, 179, 187, 1.0
 
 
@@ -125,21 +124,21 @@ def test_a_goto_out_of_another_mode_must_ask_for_the_change() -> None:
 
 
 def test_a_goto_into_a_wall_or_the_ground_is_refused() -> None:
-    walled = replace(HOVERING, safe_set=SafeSet((Wall((-1.0, 0.0, 0.0), -10.0, 0.5),)))
+    walled = replace(HOVERING, safe_set=SafeSet((wall((-1.0, 0.0, 0.0), -10.0, 0.5),)))
     assert decided(9.0, 0.0, -3.0, 1, context=walled).result == ACCEPTED
-    for x, z, word in ((9.6, -3.0, "wall"), (30.0, -3.0, "wall"), (5.0, -0.2, "too low")):
+    for x, z, word in ((9.6, -3.0, "zone 1"), (30.0, -3.0, "zone 1"), (5.0, -0.2, "too low")):
         decision = decided(x, 0.0, z, 1, context=walled)
         assert decision.result == DENIED
         assert word in decision.reason
 
 
 def test_a_goto_too_close_to_a_point_is_refused() -> None:
-    branch = PointObstacle((9.0, 0.0, -3.0), 0.5)
-    near = replace(HOVERING, safe_set=SafeSet(obstacles=(branch,)))
+    branch = point((9.0, 0.0, -3.0), 0.5)
+    near = replace(HOVERING, safe_set=SafeSet((branch,)))
     assert decided(9.0, 0.6, -3.0, 1, context=near).result == ACCEPTED
     decision = decided(9.0, 0.4, -3.0, 1, context=near)
     assert decision.result == DENIED
-    assert "obstacle 1" in decision.reason
+    assert "zone 1" in decision.reason
 
 
 def test_home_is_set_here_or_at_a_place() -> None:

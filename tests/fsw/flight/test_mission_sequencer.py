@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
-from hypothesis import given, settings
+import pytest
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from fsw.flight.mission_sequencer import (
@@ -23,8 +24,9 @@ from fsw.flight.mission_sequencer import (
     touched_down,
 )
 from fsw.flight.reference_governor import project, project_to_safe_set
-from fsw.flight.safe_set import contradictions, joined
 from fsw.flight.trajectory_segment import MotionLimits
+from fsw.shapes.ball import point
+from fsw.shapes.half_space import wall
 from fsw.signals import (
     EndEffectorTarget,
     Home,
@@ -32,11 +34,8 @@ from fsw.signals import (
     MissionState,
     MissionStep,
     Mode,
-    PointObstacle,
     SafeSet,
     Vec3,
-    Wall,
-    WorkspaceSphere,
 )
 
 A = MissionAction
@@ -118,12 +117,12 @@ def test_any_mission_is_smooth_and_within_its_pace(
     assert flown.flight.progress.state is MissionState.COMPLETE
     dt = STEP_US * 1e-6
     last = START
-    for point in flown.points:
-        assert math.hypot(*point.v_WE) <= PACE.speed * 1.0001
-        assert math.hypot(*point.a_WE) <= PACE.acceleration * 1.0001
-        assert math.dist(point.p_WE, last.p_WE) <= PACE.speed * dt * 1.0001 + 1e-9
-        assert math.dist(point.v_WE, last.v_WE) <= PACE.acceleration * dt * 1.001 + 1e-9
-        last = point
+    for at in flown.points:
+        assert math.hypot(*at.v_WE) <= PACE.speed * 1.0001
+        assert math.hypot(*at.a_WE) <= PACE.acceleration * 1.0001
+        assert math.dist(at.p_WE, last.p_WE) <= PACE.speed * dt * 1.0001 + 1e-9
+        assert math.dist(at.v_WE, last.v_WE) <= PACE.acceleration * dt * 1.001 + 1e-9
+        last = at
 
 
 @settings(max_examples=15, deadline=None)
@@ -133,15 +132,15 @@ def test_without_a_jump_the_acceleration_is_continuous_too(steps: list[MissionSt
     assert flown.reached == list(range(len(steps)))
     bend = 6.0 * PACE.acceleration / 0.5  # a ramp that short is a segment of a few millimetres
     last = START
-    for point in flown.points:
-        assert math.dist(point.a_WE, last.a_WE) <= bend * STEP_US * 1e-6 + 1e-9
-        last = point
+    for at in flown.points:
+        assert math.dist(at.a_WE, last.a_WE) <= bend * STEP_US * 1e-6 + 1e-9
+        last = at
 
 
 def test_steps_come_in_order_and_each_is_stayed_at() -> None:
     flown = start(go(1.0, 0.0, -1.0, hold=2.0), go(1.0, 1.0, -1.5)).fly()
     assert flown.reached == [0, 1]
-    there = [point for point in flown.points if math.dist(point.p_WE, (1.0, 0.0, -1.0)) < 1e-9]
+    there = [at for at in flown.points if math.dist(at.p_WE, (1.0, 0.0, -1.0)) < 1e-9]
     assert 2.0 <= len(there) * STEP_US * 1e-6 <= 2.3
     assert flown.points[-1].p_WE == (1.0, 1.0, -1.5)
     assert flown.texts[-1] == "mission complete"
@@ -150,17 +149,131 @@ def test_steps_come_in_order_and_each_is_stayed_at() -> None:
 def test_a_speed_holds_for_the_legs_that_follow_and_for_a_jump_behind_it() -> None:
     slow = MissionStep(A.SPEED, speed=0.1)
     flown = start(slow, go(5.0, 0.0, -1.0)).fly()
-    assert 0.0999 < max(math.hypot(*point.v_WE) for point in flown.points) < 0.1001
+    assert 0.0999 < max(math.hypot(*at.v_WE) for at in flown.points) < 0.1001
     flight = jumped(loaded((slow, go(1.0, 0.0, -1.0), go(5.0, 0.0, -1.0))), 2, 0, PACE)
     flown = Flown(begun(flight, START, PACE)).fly()
-    assert 0.0999 < max(math.hypot(*point.v_WE) for point in flown.points) < 0.1001
+    assert 0.0999 < max(math.hypot(*at.v_WE) for at in flown.points) < 0.1001
 
 
 def test_a_speed_beyond_the_greatest_is_flown_as_the_greatest_and_said() -> None:
     fast = MissionStep(A.SPEED, speed=5.0)
     flown = start(fast, go(50.0, 0.0, -1.0)).fly()
-    assert 0.999 < max(math.hypot(*point.v_WE) for point in flown.points) < 1.001
+    assert 0.999 < max(math.hypot(*at.v_WE) for at in flown.points) < 1.001
     assert "mission step 0: 5 m/s is flown as 1 m/s" in flown.texts
+
+
+def test_a_speed_that_is_given_up_is_the_usual_one_again() -> None:
+    slow, usual = MissionStep(A.SPEED, speed=0.1), MissionStep(A.SPEED)
+    flown = start(slow, usual, go(5.0, 0.0, -1.0)).fly()
+    assert max(math.hypot(*point.v_WE) for point in flown.points) > 0.2999
+    assert not any("is flown as" in text for text in flown.texts)
+
+
+def test_a_text_about_a_speed_does_not_hide_that_the_mission_is_complete() -> None:
+    flown = start(MissionStep(A.SPEED, speed=5.0)).fly()
+    assert flown.texts == ["mission step 0: 5 m/s is flown as 1 m/s; mission complete"]
+
+
+def arrival(look_at: Vec3 | None, end: Vec3, yaw: float | None = None) -> EndEffectorTarget:
+    """The end of a way to a place while the nose points at another."""
+    around = MissionContext(0, START.p_WE, 1.3, 0.0, look_at=look_at)
+    flight = begun(loaded((go(*end, yaw=yaw),)), START, PACE)
+    for _ in range(2):
+        flight, _ = advance(flight, around, PACE)
+    assert flight.segment is not None
+    return flight.segment.at(flight.segment.end_us)
+
+
+coordinates = st.tuples(st.floats(-9.0, 9.0), st.floats(-9.0, 9.0), st.floats(-9.0, -0.5))
+
+
+@given(coordinates, coordinates)
+def test_at_the_end_of_a_way_the_nose_points_at_what_is_looked_at_however_the_step_turns(
+    look_at: Vec3, end: Vec3
+) -> None:
+    assume(math.dist(look_at[:2], end[:2]) > 0.301)
+    yaw = arrival(look_at, end, yaw=1.0).yaw
+    distance = math.dist(look_at[:2], end[:2])
+    ahead = end[0] + distance * math.cos(yaw), end[1] + distance * math.sin(yaw)
+    assert ahead == pytest.approx(look_at[:2], abs=1e-6)
+
+
+@pytest.mark.parametrize("look_at", [None, (4.2, 5.1, -1.0), (4.0, 5.0, -9.0)])
+def test_above_what_is_looked_at_or_without_it_the_step_says_the_heading(
+    look_at: Vec3 | None,
+) -> None:
+    assert arrival(look_at, (4.0, 5.0, -1.0), yaw=1.0).yaw == pytest.approx(1.0)
+    assert arrival(look_at, (4.0, 5.0, -1.0)).yaw == pytest.approx(START.yaw)
+
+
+def test_what_is_looked_at_is_left_alone_by_other_steps() -> None:
+    around = MissionContext(0, START.p_WE, 1.3, 0.0)
+    flight = begun(loaded((go(1.0, 0.0, -1.0), MissionStep(A.LOOK_AT))), START, PACE)
+    for _ in range(2):
+        flight, event = advance(flight, around, PACE)
+        assert not event.looks
+    flight = begun(jumped(flight, 1, 0, PACE), START, PACE)
+    for _ in range(2):
+        flight, event = advance(flight, around, PACE)
+    assert (event.looks, event.look_at) == (True, None)
+
+
+@pytest.mark.parametrize(
+    ("late_us", "gives_up"), [(0, False), (4_999_999, False), (5_000_000, True)]
+)
+def test_a_place_is_waited_for_as_long_as_it_says(late_us: int, gives_up: bool) -> None:
+    flown = start(go(0.5, 0.0, -1.0), go(1.0, 0.0, -1.0))
+    flown.blocked = lambda _: START.p_WE
+    while flown.flight.stage is not Stage.ARRIVE:
+        flown.fly(STEP_US * 1e-6)
+    around = MissionContext(flown.flight.since_us + late_us, START.p_WE, 1.3, 0.0)
+    following, event = advance(flown.flight, around, PACE)
+    assert (following.progress.current == 1) is gives_up
+    assert event.unmet is gives_up
+
+
+@pytest.mark.parametrize(("off", "reached"), [(0.25, True), (0.2501, False)])
+def test_a_step_is_reached_within_its_acceptance(off: float, reached: bool) -> None:
+    flown = start(go(0.5, 0.0, -1.0, acceptance=0.25), go(1.0, 0.0, -1.0))
+    flown.blocked = lambda p: (p[0] + off, p[1], p[2])
+    flown.fly(30.0)
+    assert (0 in flown.reached) is reached
+
+
+def test_a_stay_lasts_as_long_as_the_step_says() -> None:
+    flown = start(MissionStep(A.DELAY, hold_s=2.0), go(1.0, 0.0, -1.0))
+    while flown.flight.stage is not Stage.STAY:
+        flown.fly(STEP_US * 1e-6)
+    begin = flown.flight.since_us
+    for later_us, done in ((1_999_999, False), (2_000_000, True)):
+        context = MissionContext(begin + later_us, START.p_WE, 1.3, 0.0)
+        assert (advance(flown.flight, context, PACE)[0].progress.current == 1) is done
+
+
+def test_a_mission_that_is_not_flown_does_nothing() -> None:
+    still = loaded((go(1.0, 0.0, -1.0),))
+    flight, event = advance(still, MissionContext(0, REST, 1.0, 0.0), PACE)
+    assert flight is still
+    assert (event.next_mode, event.text, event.unmet, event.looks) == (None, "", False, False)
+
+
+def test_progress_counts_from_a_mission_that_was_not_begun() -> None:
+    assert loaded(()).progress.state is MissionState.NO_MISSION
+    progress = loaded((go(1.0, 0.0, -1.0),) * 3, 4).progress
+    assert (progress.state, progress.current, progress.total) == (MissionState.NOT_STARTED, 0, 3)
+    assert (progress.reached, progress.reached_count) == (-1, 4)
+    again = begun(paused(start(go(0.1, 0.0, -1.0)).fly().flight), START, PACE).progress
+    assert (again.state, again.current, again.reached) == (MissionState.ACTIVE, 0, -1)
+
+
+def test_a_jump_in_a_mission_that_is_complete_lets_it_start_there() -> None:
+    done = paused(start(go(0.1, 0.0, -1.0), go(0.2, 0.0, -1.0)).fly().flight)
+    assert done.progress.state is MissionState.COMPLETE
+    jump = jumped(done, 1, 0, PACE).progress
+    assert (jump.state, jump.current) == (MissionState.NOT_STARTED, 1)
+    assert jumped(paused(start(go(9.0, 0.0, -1.0)).flight), 0, 0, PACE).progress.state is (
+        MissionState.PAUSED
+    )
 
 
 def test_altitude_above_home_counts_from_home() -> None:
@@ -189,39 +302,30 @@ def test_a_step_is_reached_by_the_vehicle_not_by_the_clock() -> None:
 
 
 def test_a_leg_beyond_a_wall_ends_at_its_clearance() -> None:
-    wall = Wall((-1.0, 0.0, 0.0), -1.0, 0.1)
+    ahead = wall((-1.0, 0.0, 0.0), -1.0, 0.1)
     flown = start(go(2.0, 0.5, -1.0))
-    flown.safe_set = SafeSet((wall,))
+    flown.safe_set = SafeSet((ahead,))
     flown.fly()
-    assert max(point.p_WE[0] for point in flown.points) <= 0.9 + 1e-4
+    assert max(at.p_WE[0] for at in flown.points) <= 0.9 + 1e-4
     assert flown.reached == []
     assert "not reached" in flown.texts[-1]
 
 
 def test_a_reference_in_a_corner_keeps_every_wall() -> None:
     half = math.sqrt(0.5)
-    walls = (Wall((-1.0, 0.0, 0.0), -1.0, 0.1), Wall((half, -half, 0.0), -1.0, 0.1))
-    x, y, _ = project_to_safe_set((5.0, 9.0, -1.0), SafeSet(walls))
+    walls = (wall((-1.0, 0.0, 0.0), -1.0, 0.1), wall((half, -half, 0.0), -1.0, 0.1))
+    x, y, _ = project_to_safe_set((5.0, 9.0, -1.0), SafeSet(walls), 0)
     assert x <= 0.9 + 1e-3
     assert half * (x - y) >= -0.9 - 1e-3
 
 
 def test_a_place_of_a_mission_in_the_ball_of_a_point_moves_to_its_surface() -> None:
-    branch = PointObstacle((1.0, 0.0, -1.0), 0.25)
-    around = SafeSet((Wall((-1.0, 0.0, 0.0), -1.2, 0.1),), obstacles=(branch,))
-    p = project_to_safe_set((1.05, 0.05, -1.0), around)
-    assert math.dist(p, branch.position) >= 0.25 - 1e-3
+    branch = point((1.0, 0.0, -1.0), 0.25)
+    around = SafeSet((wall((-1.0, 0.0, 0.0), -1.2, 0.1), branch))
+    p = project_to_safe_set((1.05, 0.05, -1.0), around, 0)
+    assert math.dist(p, (1.0, 0.0, -1.0)) >= 0.25 - 1e-3
     assert p[0] <= 1.1 + 1e-3
-    assert project_to_safe_set((0.0, 0.0, -1.0), around) == (0.0, 0.0, -1.0)
-
-
-def test_points_and_a_sphere_contradict_each_other() -> None:
-    branch = SafeSet(obstacles=(PointObstacle((1.0, 0.0, -1.0), 0.25),))
-    sphere = SafeSet(sphere=WorkspaceSphere((0.0, 0.0, -0.2), 0.1))
-    assert joined(branch, SafeSet()) == branch
-    assert contradictions(branch) == ()
-    (sentence,) = contradictions(joined(branch, sphere))
-    assert "obstacles" in sentence
+    assert project_to_safe_set((0.0, 0.0, -1.0), around, 0) == (0.0, 0.0, -1.0)
 
 
 def test_landing_and_return_are_handed_over_and_a_landing_is_reached_on_the_ground() -> None:
@@ -266,6 +370,15 @@ def test_a_flown_mission_can_be_flown_again() -> None:
     assert again.flight.progress.current == 0
     assert again.flight.progress.reached_count == 2
     assert again.fly().reached == [0, 1]
+
+
+def test_on_the_ground_the_step_that_comes_next_must_be_a_takeoff() -> None:
+    steps = (MissionStep(A.TAKE_OFF, (0.0, 0.0, -1.0)), go(1.0, 0.0, -1.0), MissionStep(A.SPEED))
+    for current, allowed in ((0, True), (1, False), (2, False)):
+        flight = jumped(loaded(steps), current, 0, PACE)
+        assert (refusal(flight, landed=True) is None) is allowed
+    done = replace(loaded(steps).progress, state=MissionState.COMPLETE, current=2)
+    assert refusal(replace(loaded(steps), progress=done), landed=True) is None, "it starts over"
 
 
 def test_what_speaks_against_a_mission() -> None:

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from fsw.barriers.safe_approach import BarrierTuning
 from fsw.flight.reference_governor import (
     ReferenceGovernor,
     limit_reference,
@@ -16,10 +17,13 @@ from fsw.flight.reference_governor import (
     project_to_safe_set,
 )
 from fsw.parameters.flight_config import flight_config
-from fsw.signals import EndEffectorTarget, PointObstacle, SafeSet, Vec3, Wall
+from fsw.shapes.ball import point
+from fsw.shapes.half_space import wall
+from fsw.signals import EndEffectorTarget, SafeSet, Vec3
 
-WALL = SafeSet((Wall((-1.0, 0.0, 0.0), -1.0, 0.1),))
+WALL = SafeSet((wall((-1.0, 0.0, 0.0), -1.0, 0.1),))
 STILL: Vec3 = (0.0, 0.0, 0.0)
+BARRIER = BarrierTuning(alpha=2.0, slope=4.0)
 
 
 def horizon(first: Vec3, v: Vec3 = STILL) -> tuple[EndEffectorTarget, ...]:
@@ -37,7 +41,7 @@ def horizon(first: Vec3, v: Vec3 = STILL) -> tuple[EndEffectorTarget, ...]:
 def kept(
     targets: tuple[EndEffectorTarget, ...], p_WE: Vec3, v_WE: Vec3 = STILL
 ) -> tuple[EndEffectorTarget, ...]:
-    return limit_reference(targets, p_WE, v_WE, WALL, 2.0, 4.0)
+    return limit_reference(targets, p_WE, v_WE, WALL, BARRIER)
 
 
 def test_the_paper_s_path_into_the_safety_zone_passes_untouched() -> None:
@@ -71,12 +75,12 @@ def test_nothing_pulls_deep_or_fast_into_a_wall(x: float, v: float, first: float
         assert abs(target.v_WE[0]) <= 1.0 + 1e-9
 
 
-BRANCH = SafeSet(obstacles=(PointObstacle((1.0, 0.0, -1.2), 0.3),))
+BRANCH = SafeSet((point((1.0, 0.0, -1.2), 0.3),))
 
 
 def test_a_path_that_passes_a_point_within_its_clearance_stays_as_it_is() -> None:
     targets = horizon((1.0, 0.25, -1.2), (0.3, 0.0, 0.0))
-    assert limit_reference(targets, (0.9, 0.3, -1.2), STILL, BRANCH, 2.0, 4.0) is targets
+    assert limit_reference(targets, (0.9, 0.3, -1.2), STILL, BRANCH, BARRIER) is targets
 
 
 @given(st.floats(-math.pi, math.pi), st.floats(0.01, 0.3), st.floats(0.5, 3.0))
@@ -88,7 +92,7 @@ def test_nothing_pulls_deep_into_the_ball_of_a_point_or_fast_towards_it(
     p_WE = (1.0 + 0.35 * away[0], 0.35 * away[1], -1.2)
     inward = (-speed * away[0], -speed * away[1], 0.0)
     targets = (EndEffectorTarget(0, target, inward, STILL),)
-    (limited,) = limit_reference(targets, p_WE, STILL, BRANCH, 2.0, 4.0)
+    (limited,) = limit_reference(targets, p_WE, STILL, BRANCH, BARRIER)
     assert math.dist(limited.p_WE, (1.0, 0.0, -1.2)) == pytest.approx(max(distance, 0.2))
     assert math.hypot(*limited.v_WE) <= 0.5 + 1e-9
 
@@ -104,7 +108,7 @@ def limited(
     safe_set: SafeSet = NO_WALLS,
 ) -> tuple[Vec3, Vec3]:  # fmt: skip
     return GOVERNOR.limit_setpoint(
-        p, v, other_end=other_end, of_end_effector=tip, safe_set=safe_set
+        p, v, other_end=other_end, of_end_effector=tip, safe_set=safe_set, t_us=0
     )
 
 
@@ -161,7 +165,7 @@ def test_a_setpoint_stays_within_the_configured_distance_of_the_vehicle() -> Non
 def test_a_horizon_is_limited_with_the_barriers_own_braking() -> None:
     barrier = CONFIG.planner.walls
     targets, here = horizon((0.8, 0.0, -1.2), (3.0, 0.0, 0.0)), (0.4, 0.0, -1.2)
-    expected = limit_reference(targets, here, STILL, WALL, barrier.alpha, barrier.slope)
+    expected = limit_reference(targets, here, STILL, WALL, barrier)
     assert GOVERNOR.limit_horizon(targets, here, STILL, WALL) == expected
     assert expected != targets
 
@@ -178,13 +182,16 @@ def test_a_projected_place_keeps_every_clearance_and_is_the_nearest_of_a_single_
     p: Vec3,
 ) -> None:
     corner = SafeSet(
-        (Wall((-1.0, 0.0, 0.0), -1.0, 0.1), Wall((-0.6, -0.8, 0.0), -1.0, 0.1)),
-        obstacles=(PointObstacle((-1.0, -1.0, 0.0), 0.4),),
+        (
+            wall((-1.0, 0.0, 0.0), -1.0, 0.1),
+            wall((-0.6, -0.8, 0.0), -1.0, 0.1),
+            point((-1.0, -1.0, 0.0), 0.4),
+        )
     )
-    x, y, z = project_to_safe_set(p, corner)
+    x, y, z = project_to_safe_set(p, corner, 0)
     assert 1.0 - x >= 0.1 - 2e-4
     assert 1.0 - 0.6 * x - 0.8 * y >= 0.1 - 2e-4
     assert math.dist((x, y, z), (-1.0, -1.0, 0.0)) >= 0.4 - 2e-4
-    alone = project_to_safe_set(p, WALL)
+    alone = project_to_safe_set(p, WALL, 0)
     # Within the tolerance a place counts as inside.
     assert alone == (p if p[0] <= 0.9 + 1e-4 else pytest.approx((0.9, p[1], p[2])))

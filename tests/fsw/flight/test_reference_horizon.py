@@ -18,6 +18,7 @@ from fsw.flight.setpoint_generator import PositionGoal, ReferenceState
 from fsw.flight.state import FlightState, SetpointMemory
 from fsw.model.kinematics import point_in_flight
 from fsw.mpc.reference import still_at
+from fsw.shapes.half_space import wall
 from fsw.signals import (
     EndEffectorTarget,
     Mode,
@@ -26,7 +27,6 @@ from fsw.signals import (
     SafeSet,
     StateEstimate,
     Vec3,
-    Wall,
 )
 from tests.fsw.flight.in_flight import CONFIG, GROUND_Z, flying, vehicle_at
 
@@ -129,8 +129,8 @@ def test_a_reference_from_outside_is_governed_and_one_of_the_vehicles_own_is_not
     estimate = vehicle_at(HERE)
     p_WE, _ = point_in_flight(estimate, CONFIG.airframe.link_length)
     walled = flying()
-    wall = SafeSet((Wall((-1.0, 0.0, 0.0), -0.2, 0.1),))
-    walled = replace(walled, mission=replace(walled.mission, safe_set=wall))
+    ahead = SafeSet((wall((-1.0, 0.0, 0.0), -0.2, 0.1),))
+    walled = replace(walled, mission=replace(walled.mission, safe_set=ahead))
     _, (own, _) = HORIZON(Elsewhere(CONFIG), flying(), estimate, 400_000)
     assert [target.t_us for target in own] == [
         400_000 + node * CONFIG.mpc_period_us for node in range(CONFIG.planner.horizon + 1)

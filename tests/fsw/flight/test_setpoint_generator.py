@@ -10,15 +10,24 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fsw.barriers.safe_approach import safe_approach_speed
+from fsw.barriers.safe_approach import BarrierTuning, safe_approach_speed
 from fsw.flight.reference_governor import limit_approach, limit_descent, limit_lead
-from fsw.flight.setpoint_generator import PositionGoal, ReferenceState, arrived, step
-from fsw.parameters.flight_config import SetpointLimits
-from fsw.signals import MotionSetpoint, PointObstacle, SafeSet, Vec3, Wall
+from fsw.flight.setpoint_generator import (
+    PositionGoal,
+    ReferenceState,
+    SetpointGenerator,
+    arrived,
+    step,
+)
+from fsw.parameters.flight_config import SetpointLimits, flight_config
+from fsw.shapes.ball import point
+from fsw.shapes.half_space import wall
+from fsw.signals import MotionSetpoint, SafeSet, Vec3
 
 LIMITS = SetpointLimits()
 STILL = ReferenceState(False, (0.0, 0.0, -2.0), (0.0, 0.0, 0.0), 0.0, 0.0, (0.0, 0.0))
-WALL = SafeSet((Wall((-1.0, 0.0, 0.0), -3.0, 0.1),))
+WALL = SafeSet((wall((-1.0, 0.0, 0.0), -3.0, 0.1),))
+BARRIER = BarrierTuning(alpha=2.0, slope=4.0)
 number = st.floats(-30.0, 30.0)
 vector = st.tuples(number, number, number)
 
@@ -60,6 +69,22 @@ def test_a_velocity_along_the_heading_turns_with_it() -> None:
     assert run(east, aim, 2.0)[-1].v == pytest.approx((0.0, 1.0, 0.0), abs=1e-9)
 
 
+def test_forward_and_right_are_seen_from_the_vehicle_and_down_stays_down() -> None:
+    turned = replace(STILL, yaw=0.5)
+    aim = PositionGoal(MotionSetpoint(False, v=(0.3, 0.4, 0.2), along_heading=True))
+    vx, vy, vz = run(turned, aim, 2.0)[-1].v
+    assert math.hypot(vx, vy) == pytest.approx(0.5)
+    assert math.atan2(vy, vx) == pytest.approx(0.5 + math.atan2(0.4, 0.3))
+    assert vz == pytest.approx(0.2)
+
+
+@pytest.mark.parametrize("of_end_effector", [True, False])
+def test_without_joints_the_point_itself_is_the_target(of_end_effector: bool) -> None:
+    free = replace(STILL, of_end_effector=of_end_effector, q_arm=None, v=(0.1, 0.2, 0.3), yaw=0.4)
+    target = SetpointGenerator(flight_config()).target(free, 5)
+    assert (target.t_us, target.p_WE, target.v_WE, target.yaw) == (5, free.p, free.v, 0.4)
+
+
 def test_an_acceleration_adds_up_to_the_largest_speed() -> None:
     path = run(STILL, PositionGoal(MotionSetpoint(False, a=(0.5, 0.0, 0.0))), 1.0)
     assert path[-1].v[0] == pytest.approx(0.5)
@@ -89,9 +114,10 @@ def test_whatever_is_asked_for_speed_and_acceleration_stay_within_limits(
 
 
 def limited(
-    lead: ReferenceState, other_end: Vec3, safe_set: SafeSet, braking: float, slope: float
+    lead: ReferenceState, other_end: Vec3, safe_set: SafeSet, barrier: BarrierTuning
 ) -> ReferenceState:
-    p, v = limit_approach(lead.p, lead.v, other_end, safe_set, braking, slope)
+    ends = (((0.0, 0.0, 0.0), None), (other_end, None))
+    p, v = limit_approach(lead.p, lead.v, ends, safe_set, 0, barrier)
     return replace(lead, p=p, v=v)
 
 
@@ -112,7 +138,7 @@ def test_no_end_of_the_arm_is_wanted_in_a_wall_and_the_approach_can_stop(
     x: float, speed: float, reach: float
 ) -> None:
     lead = replace(STILL, p=(x, 0.0, -2.0), v=(speed, 0.0, 0.0))
-    kept = limited(lead, (reach, 0.0, 0.3), WALL, 2.0, 4.0)
+    kept = limited(lead, (reach, 0.0, 0.3), WALL, BARRIER)
     room = 2.9 - max(kept.p[0], kept.p[0] + reach)
     assert room >= -1e-9
     assert kept.v[0] <= safe_approach_speed(max(room, 0.0), 2.0, 4.0) + 1e-9
@@ -123,11 +149,11 @@ def test_no_end_of_the_arm_is_wanted_in_a_wall_and_the_approach_can_stop(
 def test_what_hangs_below_is_not_wanted_near_a_point_and_the_approach_can_stop(
     x: float, y: float, speed: float
 ) -> None:
-    branch, below = PointObstacle((0.5, 0.0, -2.0), 0.2), (0.0, 0.0, 0.3)
+    branch, below = point((0.5, 0.0, -2.0), 0.2), (0.0, 0.0, 0.3)
     lead = replace(STILL, p=(x, y, -2.2), v=(speed, -speed, 0.0))
-    kept = limited(lead, below, SafeSet(obstacles=(branch,)), 2.0, 4.0)
+    kept = limited(lead, below, SafeSet((branch,)), BARRIER)
     end = (kept.p[0], kept.p[1], kept.p[2] + 0.3)
-    away = [a - b for a, b in zip(end, branch.position, strict=True)]
+    away = [a - b for a, b in zip(end, (0.5, 0.0, -2.0), strict=True)]
     distance = math.hypot(*away)
     assert distance >= 0.2 - 1e-9
     approach = -sum(a * v for a, v in zip(away, kept.v, strict=True)) / distance
@@ -135,14 +161,14 @@ def test_what_hangs_below_is_not_wanted_near_a_point_and_the_approach_can_stop(
 
 
 def test_the_body_is_not_wanted_near_a_point_that_its_arm_is_far_from() -> None:
-    branch, below = PointObstacle((0.1, 0.0, -2.0), 0.2), (0.0, 0.0, 5.0)
-    kept = limited(STILL, below, SafeSet(obstacles=(branch,)), 2.0, 4.0)
+    branch, below = point((0.1, 0.0, -2.0), 0.2), (0.0, 0.0, 5.0)
+    kept = limited(STILL, below, SafeSet((branch,)), BARRIER)
     assert kept.p == pytest.approx((-0.1, 0.0, -2.0))
 
 
 def test_away_from_walls_nothing_changes() -> None:
     lead = replace(STILL, v=(1.0, 0.5, 0.0))
-    assert limited(lead, (0.0, 0.0, 0.3), WALL, 2.0, 4.0) == lead
+    assert limited(lead, (0.0, 0.0, 0.3), WALL, BARRIER) == lead
 
 
 def test_near_the_ground_it_sinks_as_slowly_as_a_landing_and_hardly_slides() -> None:

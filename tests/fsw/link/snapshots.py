@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from fsw.link.wire.telemetry_context import PlanIds, TelemetryContext
+from fsw.link.wire.telemetry_context import TelemetryContext
 from fsw.ports import GroupTiming, LoopHealth, VehicleFacts
 from fsw.signals import (
     ActuatorCommand,
@@ -25,6 +25,7 @@ from fsw.signals import (
     PlannerCounters,
     PlanTimings,
     PredictionState,
+    SafetyCounters,
     SolverStatus,
     StateEstimate,
     TickOutputs,
@@ -48,7 +49,7 @@ CONTEXT = TelemetryContext(
         vibration=(0.02, 0.3),
     ),
     start_unix_us=1_750_000_000_000_000,
-    plan_ids=PlanIds(0xDEADBEEF, 7, 9),
+    plan_ids={0: 0xDEADBEEF, 1: 7, 2: 9},
 )
 
 # Yaw of 90 degrees: body x points east.
@@ -89,6 +90,7 @@ SNAPSHOT = FlightSnapshot(
     plan=PLAN,
     plan_status=SolverStatus.TIME_LIMIT,
     counters=PlannerCounters(plans=10, missed_deadlines=1, fallbacks=2),
+    safety=SafetyCounters(departures=5, breaches=3, interventions=7),
     constraints=ConstraintReport(ConstraintKind.WALLS, (0.3, 0.2, 0.4), (0.5, -0.1, 0.6)),
     home=Home((-0.5, 0.25, -0.3), math.pi),
     battery=BatteryState(voltage=15.2, current=18.3, consumed=1.9, remaining=0.62),

@@ -104,7 +104,7 @@ def test_no_payload_of_a_valid_frame_raises_or_breaks_a_service(vehicle: Ground)
         vehicle.polled(frame(listened[number % len(listened)], chance, number))
         if number % 20 == 0:
             vehicle.fly(1)
-            inbox.take_commands(), inbox.take_targets(), inbox.take_safe_set()
+            inbox.take()
     assert vehicle.link.accepted > 0.9 * COUNT
     assert vehicle.link.dispatch.failures == 0
     assert vehicle.link.outbox.encode_failures == 0

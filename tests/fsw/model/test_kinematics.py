@@ -108,7 +108,7 @@ def test_centre_of_gravity_is_the_mass_weighted_mean_of_the_links() -> None:
         start = np.zeros(STATES)
         start[Q_ARM : Q_ARM + 2] = q1, q2
         horizon.refill(start, np.zeros(INPUTS))
-        assert math.isclose(float(horizon.arm_com[0]), mean, abs_tol=1e-12)
+        assert math.isclose(float(horizon.tracked.arm_com[0]), mean, abs_tol=1e-12)
 
 
 def test_a_level_vehicle_has_its_end_effector_where_the_chained_rotations_put_it() -> None:

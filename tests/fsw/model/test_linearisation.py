@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from fsw.model.airframe import AIRFRAME
-from fsw.model.linearisation import BASE, END_EFFECTOR, JOINT2, Linearisation
+from fsw.model.linearisation import Linearisation
 from fsw.model.prediction import INPUTS, Array, condense, discretise
 from tests.fsw.model.geometry_by_rotation import tips_of_prediction
+from tests.fsw.model.three_points import BASE, END_EFFECTOR, JOINT2, points_of, positions_of
 from tests.fsw.random_states import prediction_vector
 
 HORIZON = 5
@@ -31,12 +32,14 @@ def test_points_of_every_node_are_those_of_the_stepped_state() -> None:
     for _ in range(10):
         start, inputs = random_horizon(random)
         horizon = around(start, inputs)
+        position, velocity = positions_of(horizon)
         x = start
         for node in range(HORIZON + 1):
             swung = tips_of_prediction(x, np.array(AIRFRAME.link_length))
-            np.testing.assert_allclose(horizon.position[node, BASE], x[0:3], atol=1e-10)
-            np.testing.assert_allclose(horizon.velocity[node, BASE], x[3:6], atol=1e-10)
-            np.testing.assert_allclose(horizon.position[node, JOINT2:], swung, atol=1e-10)
+            np.testing.assert_allclose(position[node, BASE], x[0:3], atol=1e-10)
+            np.testing.assert_allclose(velocity[node, BASE], x[3:6], atol=1e-10)
+            np.testing.assert_allclose(position[node, JOINT2:], swung, atol=1e-10)
+            np.testing.assert_allclose(horizon.tracked.position[node], swung[1], atol=1e-10)
             if node < HORIZON:
                 x = a @ x + b @ inputs[INPUTS * node : INPUTS * (node + 1)]
 
@@ -45,18 +48,22 @@ def test_gradients_equal_finite_differences_over_random_states() -> None:
     random = np.random.default_rng(2)
     for _ in range(6):
         start, inputs = random_horizon(random)
-        horizon = around(start, inputs)
+        points, tracked = points_of(around(start, inputs)), around(start, inputs).tracked
         for column in range(INPUTS * HORIZON):
             step = np.zeros_like(inputs)
             step[column] = STEP
             above, below = around(start, inputs + step), around(start, inputs - step)
-            for gradient, high, low in (
-                (horizon.d_position, above.position, below.position),
-                (horizon.d_velocity, above.velocity, below.velocity),
-                (horizon.d_arm_com, above.arm_com, below.arm_com),
+            high, low = positions_of(above), positions_of(below)
+            for gradient, more, less in (
+                (points.d_position, high[0], low[0]),
+                (points.d_velocity, high[1], low[1]),
+                (tracked.d_position, high[0][:, END_EFFECTOR], low[0][:, END_EFFECTOR]),
+                (tracked.d_velocity, high[1][:, END_EFFECTOR], low[1][:, END_EFFECTOR]),
+                (tracked.d_yaw, above.tracked.yaw, below.tracked.yaw),
+                (tracked.d_arm_com, above.tracked.arm_com, below.tracked.arm_com),
             ):
                 np.testing.assert_allclose(
-                    gradient[..., column], (high - low) / (2.0 * STEP), atol=3e-8, rtol=1e-6
+                    gradient[..., column], (more - less) / (2.0 * STEP), atol=3e-8, rtol=1e-6
                 )
 
 
@@ -67,14 +74,18 @@ def test_refilling_forgets_the_previous_guess() -> None:
     start, inputs = random_horizon(random)
     used.refill(start, inputs)
     fresh = around(start, inputs)
-    for name in ("states", "position", "velocity", "d_position", "d_velocity", "d_arm_com"):
-        np.testing.assert_array_equal(getattr(used, name), getattr(fresh, name))
+    for refilled, new in (
+        (used.horizon, fresh.horizon),
+        (used.tracked, fresh.tracked),
+    ):
+        for have, expected in zip(refilled, new, strict=True):
+            np.testing.assert_array_equal(have, expected)
 
 
 def test_a_forward_command_swings_the_end_effector_back_before_it_goes_forward() -> None:
     start, inputs = np.zeros(19), np.zeros(INPUTS * HORIZON)
-    horizon = around(start, inputs)
+    d_position = points_of(around(start, inputs)).d_position
     # The base only moves forward; the tip of the hanging arm first swings back with the tilt.
-    assert (horizon.d_position[1:, BASE, 0, 0] > 0.0).all()
-    assert horizon.d_position[1, END_EFFECTOR, 0, 0] < 0.0
-    assert horizon.d_position[5, END_EFFECTOR, 0, 0] > 0.0
+    assert (d_position[1:, BASE, 0, 0] > 0.0).all()
+    assert d_position[1, END_EFFECTOR, 0, 0] < 0.0
+    assert d_position[5, END_EFFECTOR, 0, 0] > 0.0

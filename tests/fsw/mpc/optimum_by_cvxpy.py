@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import cvxpy as cp
@@ -16,10 +17,11 @@ import numpy as np
 
 from fsw.barriers.safe_approach import BarrierTuning
 from fsw.model.airframe import AIRFRAME
-from fsw.model.linearisation import BASE, END_EFFECTOR, Linearisation
+from fsw.model.linearisation import Linearisation
 from fsw.model.prediction import INPUTS, Array
 from fsw.mpc.planner_config import PlannerConfig
-from fsw.signals import PointObstacle, SafeSet, Wall, WorkspaceSphere
+from fsw.signals import TARGET_SPHERE, SafeSet, Zone
+from tests.fsw.model.three_points import BASE, END_EFFECTOR, Points, points_of
 
 _PERIOD = 0.1  # s
 
@@ -45,23 +47,30 @@ class Question:
     target_yaw: Array  # (n + 1,) within half a turn of the horizon's
     safe_set: SafeSet
 
+    @cached_property
+    def points(self) -> Points:
+        """Base, joint 2 and end-effector over the horizon."""
+        return points_of(self.horizon)
+
 
 class _Linear:
     """The horizon's quantities as affine expressions of the unknown inputs."""
 
     def __init__(self, question: Question, U: cp.Variable) -> None:
         self._horizon, self._change = question.horizon, U - question.guess
+        self._points = question.points
 
     def position(self, node: int, point: int) -> Any:
-        horizon = self._horizon
-        return horizon.position[node, point] + horizon.d_position[node, point] @ self._change
+        points = self._points
+        return points.position[node, point] + points.d_position[node, point] @ self._change
 
     def velocity(self, node: int, point: int) -> Any:
-        horizon = self._horizon
-        return horizon.velocity[node, point] + horizon.d_velocity[node, point] @ self._change
+        points = self._points
+        return points.velocity[node, point] + points.d_velocity[node, point] @ self._change
 
     def arm_com(self, node: int) -> Any:
-        return self._horizon.arm_com[node] + self._horizon.d_arm_com[node] @ self._change
+        tracked = self._horizon.tracked
+        return tracked.arm_com[node] + tracked.d_arm_com[node] @ self._change
 
     def yaw(self, node: int) -> Any:
         return self._horizon.states[node, 13] + self._horizon.model.gamma[node, 13] @ self._change
@@ -149,63 +158,64 @@ def _cost(question: Question, linear: _Linear, U: cp.Variable, config: PlannerCo
 
 def _safety_cost(question: Question, linear: _Linear, config: PlannerConfig) -> Any:
     """Eqs 29 and 30 with Table II's 5 and 20, and our centring of 100 and 500."""
-    sphere, n = question.safe_set.sphere, config.horizon
     total: Any = 0.0
-    for node in range(1, n + 1):
-        last = node == n
-        if sphere is not None:
-            if config.controller == "sc":
-                centre = question.target_p[node] + np.array(sphere.centre_from_target)
-                outside = np.linalg.norm(question.horizon.position[node, BASE] - centre)
-                if outside >= sphere.radius:
-                    e = linear.position(node, BASE) - centre
+    for zone in question.safe_set.zones:
+        for node in range(1, config.horizon + 1):
+            last = node == config.horizon
+            if zone.shape.kind == TARGET_SPHERE:
+                e = linear.position(node, BASE) - _centre(question, zone, node)
+                here = question.points.position[node, BASE] - _centre(question, zone, node)
+                if config.controller == "sc" and np.linalg.norm(here) >= zone.shape.numbers[3]:
                     total += (20.0 if last else 5.0) * cp.sum_squares(e)
-            elif config.centred:
-                centre = question.target_p[node] + np.array(sphere.centre_from_target)
-                e = linear.position(node, BASE) - centre
-                total += (500.0 if last else 100.0) * cp.sum_squares(e)
-        elif config.controller == "sc":
-            for point, wall in _planes(question, node):
-                total += _wall_cost(question, linear, wall, node, point) / (20.0 if last else 5.0)
+                elif config.controller == "naive" and config.centred:
+                    total += (500.0 if last else 100.0) * cp.sum_squares(e)
+            elif config.controller == "sc":
+                for k in range(3):
+                    cost = _wall_cost(question, linear, zone, node, k)
+                    total += cost / (20.0 if last else 5.0)
     return total
 
 
-def _wall_cost(question: Question, linear: _Linear, wall: Wall, node: int, point: int) -> Any:
+def _wall_cost(question: Question, linear: _Linear, zone: Zone, node: int, point: int) -> Any:
     """1/d^2 to second order about the guess; from 20 mm on, about 20 mm."""
-    normal = np.array(wall.normal)
-    limit = wall.offset + wall.clearance
-    gap = float(normal @ question.horizon.position[node, point]) - limit
+    here = question.points.position[node, point]
+    normal, gap = _front(zone, here)
     about = max(gap, 0.02)
-    x = normal @ linear.position(node, point) - limit - about
+    x = gap + normal @ (linear.position(node, point) - here) - about
     return 1.0 / about**2 - 2.0 / about**3 * x + 3.0 / about**4 * cp.square(x)
 
 
-def _planes(question: Question, node: int) -> list[tuple[int, Wall]]:
-    """Every critical point with each wall, and with what each obstacle is to it at the guess."""
-    planes = [(point, wall) for point in range(3) for wall in question.safe_set.walls]
-    for obstacle in question.safe_set.obstacles:
-        for point in range(3):
-            away = question.horizon.position[node, point] - np.array(obstacle.position)
-            x, y, z = (away / np.linalg.norm(away)).tolist()
-            offset = float(np.dot((x, y, z), obstacle.position))
-            planes.append((point, Wall((x, y, z), offset, obstacle.clearance)))
-    return planes
+def _front(zone: Zone, p: Array) -> tuple[Array, float]:
+    """Direction away from a wall or a point, and what a place has left to its clearance."""
+    numbers = np.array(zone.shape.numbers)
+    if zone.shape.kind == "half-space":
+        return numbers[:3], float(numbers[:3] @ p) - numbers[3] - zone.clearance
+    assert (zone.shape.kind, numbers[3]) == ("ball", 0.0)
+    away = float(np.linalg.norm(p - numbers[:3]))
+    return (p - numbers[:3]) / away, away - zone.clearance
+
+
+def _centre(question: Question, sphere: Zone, node: int) -> Array:
+    return np.asarray(question.target_p[node] + np.array(sphere.shape.numbers[:3]))
 
 
 def _hard_rows(
     question: Question, linear: _Linear, config: PlannerConfig
 ) -> tuple[list[Any], cp.Variable]:
     """Eqs 14 and 15 at every node; the slack is for none of them."""
-    horizon, sphere, rows = question.horizon, question.safe_set.sphere, []
-    for node in range(1, config.horizon + 1):
-        for point, wall in _planes(question, node):
-            gap = np.array(wall.normal) @ linear.position(node, point) - wall.offset
-            rows.append(gap >= wall.clearance)
-        if sphere is not None:
-            centre = question.target_p[node] + np.array(sphere.centre_from_target)
-            e = horizon.position[node, BASE] - centre
-            outward = e / np.linalg.norm(e)
-            rows.append(outward @ (linear.position(node, BASE) - centre) <= sphere.radius)
+    rows: list[Any] = []
+    for zone in question.safe_set.zones:
+        for node in range(1, config.horizon + 1):
+            if zone.shape.kind == TARGET_SPHERE:
+                centre = _centre(question, zone, node)
+                e = linear.position(node, BASE) - centre
+                for n in _directions(question.points.position[node, BASE] - centre):
+                    rows.append(n @ e <= zone.shape.numbers[3])
+                continue
+            for k in range(3):
+                here = question.points.position[node, k]
+                normal, gap = _front(zone, here)
+                rows.append(gap + normal @ (linear.position(node, k) - here) >= 0.0)
     return rows, cp.Variable(1, nonneg=True)
 
 
@@ -237,16 +247,14 @@ def _barrier(
 ) -> tuple[list[Any], cp.Variable]:
     if config.controller != "blf":
         return [], cp.Variable(1, nonneg=True)
-    if question.safe_set.sphere is not None:
-        return _sphere_rows(question, linear, config, question.safe_set.sphere)
-    walls, obstacles = question.safe_set.walls, question.safe_set.obstacles
-    count = len(walls) + len(obstacles)
-    slack = cp.Variable((config.horizon + 1, max(count, 1)), nonneg=True)
+    zones = question.safe_set.zones
+    slack = cp.Variable((config.horizon + 1, max(len(zones), 1)), nonneg=True)
     rows: list[Any] = []
-    for k, wall in enumerate(walls):
-        rows += _wall_rows(question, linear, config.walls, wall, slack[:, k])
-    for k, obstacle in enumerate(obstacles, len(walls)):
-        rows += _point_rows(question, linear, config.walls, obstacle, slack[:, k])
+    for k, zone in enumerate(zones):
+        if zone.shape.kind == TARGET_SPHERE:
+            rows += _sphere_rows(question, linear, config, zone, slack[:, k])
+        else:
+            rows += _front_rows(question, linear, config.walls, zone, slack[:, k])
     return rows, slack
 
 
@@ -255,60 +263,42 @@ def _required(h_start: float, node: int, tuning: BarrierTuning) -> float:
     return decay * h_start + (1.0 - decay) * tuning.lambda_
 
 
-def _wall_rows(
-    question: Question, linear: _Linear, tuning: BarrierTuning, wall: Wall, slack: Any
+def _front_rows(
+    question: Question, linear: _Linear, tuning: BarrierTuning, zone: Zone, slack: Any
 ) -> list[Any]:
-    horizon, n = question.horizon, np.array(wall.normal)
-    limit, rows = wall.offset + wall.clearance, []
-    for point in range(3):
-        start_gap = float(n @ horizon.position[0, point]) - limit
-        h_start = _safe_speed(start_gap, tuning)[0] + float(n @ horizon.velocity[0, point])
-        for node in range(1 + tuning.skipped_nodes, len(horizon.position)):
-            gap = float(n @ horizon.position[node, point]) - limit
+    """Eqs 11 and 22 under eq 25, with the direction that a point has at a node of the guess."""
+    points, rows = question.points, []
+    for k in range(3):
+        for node in range(1 + tuning.skipped_nodes, len(points.position)):
+            here, start = points.position[node, k], points.position[0, k]
+            n, gap = _front(zone, here)
+            h_start = _safe_speed(gap + float(n @ (start - here)), tuning)[0]
+            h_start += float(n @ points.velocity[0, k])
             value, slope = _safe_speed(gap, tuning)
-            room = n @ linear.position(node, point) - limit - gap
-            h = value + slope * room + n @ linear.velocity(node, point)
+            h = value + slope * (n @ (linear.position(node, k) - here))
+            h += n @ linear.velocity(node, k)
             rows.append(h + slack[node] >= _required(h_start, node, tuning))
     return rows
 
 
-def _point_rows(
-    question: Question, linear: _Linear, tuning: BarrierTuning, obstacle: PointObstacle, slack: Any
-) -> list[Any]:
-    """Eq 11 under eq 25, with the direction that a point has at a node of the guess."""
-    horizon, centre, rows = question.horizon, np.array(obstacle.position), []
-    for point in range(3):
-        for node in range(1 + tuning.skipped_nodes, len(horizon.position)):
-            away = horizon.position[node, point] - centre
-            n = away / np.linalg.norm(away)
-            start = n @ (horizon.position[0, point] - centre) - obstacle.clearance
-            h_start = _safe_speed(float(start), tuning)[0] + n @ horizon.velocity[0, point]
-            value, slope = _safe_speed(float(n @ away) - obstacle.clearance, tuning)
-            room = n @ (linear.position(node, point) - horizon.position[node, point])
-            h = value + slope * room + n @ linear.velocity(node, point)
-            rows.append(h + slack[node] >= _required(float(h_start), node, tuning))
-    return rows
-
-
 def _sphere_rows(
-    question: Question, linear: _Linear, config: PlannerConfig, sphere: WorkspaceSphere
-) -> tuple[list[Any], cp.Variable]:
-    horizon, tuning = question.horizon, config.workspace
-    slack = cp.Variable(config.horizon + 1, nonneg=True)
-    centre = question.target_p + np.array(sphere.centre_from_target)
-    e_start = horizon.position[0, BASE] - centre[0]
-    w_start = horizon.velocity[0, BASE] - question.target_v[0]
+    question: Question, linear: _Linear, config: PlannerConfig, sphere: Zone, slack: Any
+) -> list[Any]:
+    points, tuning, radius = question.points, config.workspace, sphere.shape.numbers[3]
+    e_start = points.position[0, BASE] - _centre(question, sphere, 0)
+    w_start = points.velocity[0, BASE] - question.target_v[0]
     rows: list[Any] = []
     for node in range(1 + tuning.skipped_nodes, config.horizon + 1):
-        e = horizon.position[node, BASE] - centre[node]
+        centre = _centre(question, sphere, node)
+        e = points.position[node, BASE] - centre
         for n in _directions(e):
-            gap = sphere.radius - float(n @ e)
+            gap = radius - float(n @ e)
             value, slope = _safe_speed(gap, tuning)
-            room = sphere.radius - n @ (linear.position(node, BASE) - centre[node]) - gap
+            room = radius - n @ (linear.position(node, BASE) - centre) - gap
             h = value + slope * room - n @ (linear.velocity(node, BASE) - question.target_v[node])
-            start = _safe_speed(sphere.radius - float(n @ e_start), tuning)[0] - float(n @ w_start)
+            start = _safe_speed(radius - float(n @ e_start), tuning)[0] - float(n @ w_start)
             rows.append(h + slack[node] >= _required(start, node, tuning))
-    return rows, slack
+    return rows
 
 
 def _directions(e: Array) -> list[Array]:

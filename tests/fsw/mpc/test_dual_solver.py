@@ -16,12 +16,14 @@ from fsw.mpc.dual_solver import DualSolver
 from fsw.mpc.ocp import Ocp
 from fsw.mpc.planner_config import PlannerConfig
 from fsw.mpc.qp_data import QpData
-from fsw.signals import SafeSet, SolverStatus, Wall, WorkspaceSphere
+from fsw.shapes.half_space import wall
+from fsw.shapes.target_sphere import target_sphere
+from fsw.signals import SafeSet, SolverStatus
 from tests.fsw.random_states import prediction_vector
 
 CONFIG = PlannerConfig()
-WALLS = SafeSet((Wall((-1.0, 0.0, 0.0), -1.0, 0.1), Wall((0.0, 1.0, 0.0), -1.0, 0.1)))
-SPHERE = SafeSet(sphere=WorkspaceSphere((0.0, 0.0, -0.225), 0.075))
+WALLS = SafeSet((wall((-1.0, 0.0, 0.0), -1.0, 0.1), wall((0.0, 1.0, 0.0), -1.0, 0.1)))
+SPHERE = SafeSet((target_sphere((0.0, 0.0, -0.225), 0.075),))
 # Yaw hardly matters to the cost, which leaves it loose within the solver's tolerance.
 LOOSE = np.array([1.0, 1.0, 1.0, 10.0, 1.0, 1.0])
 
@@ -101,6 +103,25 @@ def test_the_optimum_is_that_of_the_whole_program(
     assert cones_bound >= 3 or off < 1.0
 
 
+@pytest.mark.parametrize("joint", [1.2, -1.2])
+def test_an_arm_outside_its_limits_is_softened_at_every_node_as_little_as_can_be(
+    joint: float,
+) -> None:
+    """The first slack too: no input brings the arm back within one period."""
+    ocp = Ocp(CONFIG, condense(AIRFRAME, CONFIG.period, CONFIG.horizon), SafeSet())
+    start, n = np.zeros(19), CONFIG.horizon
+    start[15] = joint
+    still = TargetPoints(np.zeros((n + 1, 3)), np.zeros((n + 1, 3)), np.zeros(n + 1))
+    ocp.linearise(start, np.zeros(INPUTS * n), still)
+    found, whole = ocp.solve(), ClarabelSolver(ocp.qp.whole()).solve()
+    assert found.usable
+    assert whole.usable
+    slacks = found.x[ocp.qp.inputs :]
+    assert slacks[0] > 0.1
+    np.testing.assert_allclose(slacks, whole.x[ocp.qp.inputs :], atol=1e-3)
+    np.testing.assert_allclose(slacks, ocp.qp.least_slacks(found.x[: ocp.qp.inputs]), atol=1e-4)
+
+
 @pytest.mark.parametrize("safe_set", [WALLS, SPHERE], ids=["walls", "sphere"])
 def test_the_guess_says_where_to_look_and_not_what_is_found(safe_set: SafeSet) -> None:
     random = np.random.default_rng(8)
@@ -133,7 +154,7 @@ def test_what_was_solved_before_leaves_no_trace() -> None:
 
 def test_hard_rows_that_contradict_each_other_are_infeasible() -> None:
     """Two walls, 0.2 m apart, that both want 0.5 m."""
-    narrow = SafeSet((Wall((1.0, 0.0, 0.0), -0.1, 0.5), Wall((-1.0, 0.0, 0.0), -0.1, 0.5)))
+    narrow = SafeSet((wall((1.0, 0.0, 0.0), -0.1, 0.5), wall((-1.0, 0.0, 0.0), -0.1, 0.5)))
     ocp = filled(np.random.default_rng(10), narrow, config=replace(CONFIG, controller="hc"))
     assert ocp.solve().status is SolverStatus.INFEASIBLE
 

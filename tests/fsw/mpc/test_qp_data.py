@@ -8,24 +8,26 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fsw.barriers.constraint_block import TargetPoints
+from fsw.barriers.constraint_block import ConstraintBlock, TargetPoints
 from fsw.model.airframe import AIRFRAME
-from fsw.model.linearisation import END_EFFECTOR, Linearisation
+from fsw.model.linearisation import Linearisation
 from fsw.model.prediction import INPUTS, Array, condense, to_vector
 from fsw.mpc.costs import CostWeights, TrackingCost
 from fsw.mpc.planner_config import PlannerConfig
+from fsw.mpc.qp_data import QpData
+from fsw.shapes.ball import point
+from fsw.shapes.half_space import wall
+from fsw.shapes.target_sphere import target_sphere
 from fsw.signals import (
     EndEffectorTarget,
     Plan,
     PlanFailure,
     PlanRequest,
-    PointObstacle,
     SafeSet,
     SolverStatus,
     Vec3,
-    Wall,
-    WorkspaceSphere,
 )
+from tests.fsw.model.three_points import END_EFFECTOR
 from tests.fsw.mpc.optimum_by_cvxpy import InfeasibleError, Question, optimum
 from tests.fsw.mpc.quadratics import quadratic
 from tests.fsw.mpc.requests import STILL, below, hovering, planned, planner, request
@@ -34,12 +36,16 @@ from tests.fsw.random_states import as_state, prediction_vector, vec3
 CONFIG = PlannerConfig()
 N = CONFIG.horizon
 MODEL = condense(AIRFRAME, CONFIG.period, N)
-WALLS = SafeSet((Wall((-1.0, 0.0, 0.0), -1.0, 0.1), Wall((0.0, 1.0, 0.0), -1.0, 0.1)))
+WALLS = SafeSet((wall((-1.0, 0.0, 0.0), -1.0, 0.1), wall((0.0, 1.0, 0.0), -1.0, 0.1)))
 POINTS = SafeSet(
-    (Wall((-1.0, 0.0, 0.0), -1.0, 0.1),),
-    obstacles=(PointObstacle((0.2, 0.1, 0.3), 0.15), PointObstacle((-0.5, 0.4, -0.2), 0.1)),
+    (
+        wall((-1.0, 0.0, 0.0), -1.0, 0.1),
+        point((0.2, 0.1, 0.3), 0.15),
+        point((-0.5, 0.4, -0.2), 0.1),
+    )
 )
-SPHERE = SafeSet(sphere=WorkspaceSphere((0.0, 0.0, -0.225), 0.075))
+SPHERE = SafeSet((target_sphere((0.0, 0.0, -0.225), 0.075),))
+BOTH = SafeSet((*SPHERE.zones, *POINTS.zones))
 
 
 def around(asked: Question, start: Array, guess: Array) -> Question:
@@ -71,7 +77,9 @@ def targets_of(asked: Question) -> TargetPoints:
 
 
 @pytest.mark.parametrize(
-    "safe_set", [SafeSet(), WALLS, POINTS, SPHERE], ids=["open", "walls", "points", "sphere"]
+    "safe_set",
+    [SafeSet(), WALLS, POINTS, SPHERE, BOTH],
+    ids=["open", "walls", "points", "sphere", "both"],
 )
 @pytest.mark.parametrize("seed", [1, 2, 3])
 @pytest.mark.parametrize(("iterations", "tolerance"), [(1, 0.01), (2, 0.1)])
@@ -95,12 +103,12 @@ def test_the_plan_is_the_optimum_of_the_problem_written_a_second_time(
 def test_a_point_beside_a_wall_that_is_in_the_way_is_in_the_ocp(seed: int) -> None:
     random = np.random.default_rng(seed)
     start, asked = question(random, SafeSet())
-    way = asked.target_p[-1] - asked.horizon.position[0, END_EFFECTOR]
-    tip = asked.horizon.position[0, END_EFFECTOR] + 0.15 * way / np.linalg.norm(way)
-    branch = PointObstacle(vec3(tip), 0.1)
-    asked = replace(asked, safe_set=SafeSet(POINTS.walls, obstacles=(branch,)))
+    way = asked.target_p[-1] - asked.points.position[0, END_EFFECTOR]
+    tip = asked.points.position[0, END_EFFECTOR] + 0.15 * way / np.linalg.norm(way)
+    branch = point(vec3(tip), 0.1)
+    asked = replace(asked, safe_set=SafeSet((POINTS.zones[0], branch)))
     expected = optimum(asked, CONFIG)
-    free = optimum(replace(asked, safe_set=SafeSet(POINTS.walls)), CONFIG)
+    free = optimum(replace(asked, safe_set=SafeSet(POINTS.zones[:1])), CONFIG)
     assert np.abs(expected.inputs - free.inputs).max() > 0.3, "or it was no test"
     answer = planned(answered(start, asked, CONFIG))
     loose = np.tile([1.0, 1.0, 1.0, 3.0, 1.0, 1.0], N)
@@ -117,15 +125,15 @@ def test_at_rest_before_a_point_every_controller_is_held_by_it_as_written_a_seco
     start, asked = question(np.random.default_rng(1), SafeSet())
     start[:] = to_vector(hovering())
     asked = around(asked, start, np.zeros(INPUTS * N))
-    here = asked.horizon.position[0, END_EFFECTOR]
+    here = asked.points.position[0, END_EFFECTOR]
     asked = replace(
         asked,
         target_p=np.tile(here + 0.1 * way, (N + 1, 1)),
         target_v=np.zeros((N + 1, 3)),
         target_yaw=np.zeros(N + 1),
     )
-    branch = PointObstacle(vec3(here + 0.12 * way), 0.1)
-    held = replace(asked, safe_set=SafeSet(obstacles=(branch,)))
+    branch = point(vec3(here + 0.12 * way), 0.1)
+    held = replace(asked, safe_set=SafeSet((branch,)))
     expected, free = optimum(held, config), optimum(asked, config)
     assert np.abs(expected.inputs - free.inputs).max() > 0.1, "or it was no test"
     difference = inputs_of(planned(answered(start, held, config))) - expected.inputs
@@ -147,7 +155,9 @@ def inputs_of(plan: Plan) -> Array:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("safe_set", [WALLS, POINTS, SPHERE], ids=["walls", "points", "sphere"])
+@pytest.mark.parametrize(
+    "safe_set", [WALLS, POINTS, SPHERE, BOTH], ids=["walls", "points", "sphere", "both"]
+)
 @pytest.mark.parametrize("controller", ["naive", "naive-centred", "hc", "sc", "blf"])
 def test_every_controller_is_its_problem_written_a_second_time(
     safe_set: SafeSet, controller: str
@@ -159,7 +169,7 @@ def test_every_controller_is_its_problem_written_a_second_time(
     compared = 0
     for seed in range(20, 28):
         # Eq 15 without slack has no answer unless the vehicle is nearly in formation.
-        liveliness = 0.2 if name == "hc" and safe_set is SPHERE and seed % 2 else 1.0
+        liveliness = 0.2 if name == "hc" and SPHERE.zones[0] in safe_set.zones and seed % 2 else 1.0
         start, asked = question(np.random.default_rng(seed), safe_set, liveliness)
         answer = answered(start, asked, config)
         try:
@@ -172,6 +182,24 @@ def test_every_controller_is_its_problem_written_a_second_time(
         np.testing.assert_allclose(difference / loose, 0.0, atol=0.01)
         compared += 1
     assert compared >= 2
+
+
+def test_every_soft_block_has_slacks_of_its_own_at_its_penalty_and_a_hard_one_has_none() -> None:
+    """Two rows that share a slack, three hard ones, two slacks, and one that costs nothing."""
+
+    def block(slack: list[int]) -> ConstraintBlock:
+        return ConstraintBlock(np.ones(len(slack), dtype=np.intp), np.array(slack), INPUTS, 0)
+
+    program = QpData(
+        1,
+        CONFIG.limits,
+        ((block([0, 0]), 7.0), (block([0, 1, 2]), None), (block([1, 0]), 3.0), (block([0]), 0.0)),
+    )
+    assert program.penalty.tolist() == [7.0, 3.0, 3.0, 0.0]
+    assert program.rows.slack[: program.block_rows].tolist() == [0, 0, -1, -1, -1, 2, 1, 3]
+    assert (program.rows.slack[program.block_rows :] == -1).all(), "input limits are hard"
+    assert program.unknowns == INPUTS + 4
+    assert program.whole().q.tolist() == [0.0] * INPUTS + [7.0, 3.0, 3.0, 0.0]
 
 
 def test_printed_velocity_cost_is_a_switch() -> None:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
-from scipy.optimize import approx_fprime
+from scipy.optimize import approx_fprime, fmin_slsqp
 
 from benchmarks.optimiser.slopes import slopes_of
 from fsw.barriers.constraint_block import TargetPoints
@@ -15,17 +18,19 @@ from fsw.model.airframe import AIRFRAME
 from fsw.model.prediction import INPUTS, STATES, Array, condense
 from fsw.mpc.ocp import Ocp
 from fsw.mpc.planner_config import PlannerConfig
-from fsw.mpc.slsqp_solver import MAX_ITERATIONS, NonlinearProgram, minimise
+from fsw.mpc.slsqp_solver import MAX_ITERATIONS, TOLERANCE, NonlinearProgram, minimise
 from fsw.mpc.solution import Solution
 from fsw.mpc.variants import VARIANTS
-from fsw.signals import PlanFailure, SafeSet, SolverStatus, Wall, WorkspaceSphere
+from fsw.shapes.half_space import wall
+from fsw.shapes.target_sphere import target_sphere
+from fsw.signals import PlanFailure, SafeSet, SolverStatus
 from tests.fsw.mpc.requests import STILL, below, hovering, planned, planner, request
 
 CONFIG = PlannerConfig()
 N = CONFIG.horizon
 MODEL = condense(AIRFRAME, CONFIG.period, N)
-WALLS = SafeSet((Wall((-1.0, 0.0, 0.0), -1.0, 0.1), Wall((0.0, 1.0, 0.0), -1.0, 0.1)))
-SPHERE = SafeSet(sphere=WorkspaceSphere((0.0, 0.0, -0.225), 0.075))
+WALLS = SafeSet((wall((-1.0, 0.0, 0.0), -1.0, 0.1), wall((0.0, 1.0, 0.0), -1.0, 0.1)))
+SPHERE = SafeSet((target_sphere((0.0, 0.0, -0.225), 0.075),))
 CASES = {"walls": WALLS, "sphere": SPHERE}
 
 
@@ -42,7 +47,7 @@ def instance(random: np.random.Generator, safe_set: SafeSet) -> tuple[Array, Tar
     speed = random.uniform(-0.15, 0.15, 3)
     off = random.normal(size=3)
     off *= 0.02 / np.linalg.norm(off)
-    if safe_set.sphere is None:
+    if safe_set is WALLS:
         start[0] = random.uniform(0.6, 0.8)  # the wall is at 0.9
         start[3:6] = random.uniform(-0.3, 0.3, 3)
     else:
@@ -128,8 +133,8 @@ def test_analytic_slopes_are_those_of_the_cost_and_the_margins(controller: str, 
     slope, slopes = cost_slope(x).copy(), margin_slopes(x)
     np.testing.assert_allclose(approx_fprime(x, point.cost, 1e-7), slope, rtol=1e-3, atol=1e-3)
     by_difference = approx_fprime(x, point.margins, 1e-7)
-    if case == "sphere" and controller == "blf":
-        # The directions of eq 23 turn with the guess; the rows hold them still.
+    if case == "sphere" and controller in ("hc", "blf"):
+        # The directions of eqs 15 and 23 turn with the guess; the rows hold them still.
         inside = by_difference - slopes
         assert float(np.abs(inside).max()) < 0.2 * float(np.abs(slopes).max())
     else:
@@ -143,7 +148,7 @@ def test_starts_at_rest_with_the_slacks_that_admit_it() -> None:
     x = point.rest()
     assert (x[: INPUTS * N] == 0.0).all()
     assert x.max() > 0.0
-    assert point.margins(x).min() >= -1e-12
+    assert point.margins(x).min() == pytest.approx(0.0, abs=1e-12), "and no more than that"
 
 
 def test_margins_and_bounds_together_admit_what_the_program_admits() -> None:
@@ -176,6 +181,37 @@ def test_no_plan_without_convergence() -> None:
     answer = search(Ocp(CONFIG, MODEL, WALLS), start, targets, max_iterations=2)
     assert answer.status is SolverStatus.TIME_LIMIT
     assert not answer.usable
+
+
+@pytest.mark.parametrize(
+    ("mode", "status"),
+    [
+        (0, SolverStatus.SOLVED),
+        (4, SolverStatus.INFEASIBLE),
+        (9, SolverStatus.TIME_LIMIT),
+        (8, SolverStatus.NUMERICAL_ERROR),
+    ],
+)
+@pytest.mark.parametrize("broken", ["", "x", "fun"])
+def test_only_what_slsqp_calls_converged_and_finite_is_solved(
+    monkeypatch: pytest.MonkeyPatch, mode: int, status: SolverStatus, broken: str
+) -> None:
+    """By its exit modes: converged, incompatible, out of iterations, uphill."""
+    start, targets = instance(np.random.default_rng(8), WALLS)
+    problem = NonlinearProgram(Ocp(CONFIG, MODEL, WALLS), start, targets)
+    said: dict[str, Any] = {"x": problem.rest(), "fun": 1.0, "status": mode, "nit": 3}
+    if broken:
+        said[broken] = math.nan * said[broken]
+    monkeypatch.setattr("fsw.mpc.slsqp_solver.minimize", lambda *_, **__: SimpleNamespace(**said))
+    answer = minimise(problem)
+    assert answer.status is (SolverStatus.NUMERICAL_ERROR if broken else status)
+    assert answer.usable is (mode == 0 and not broken)
+    assert answer.iterations == 3
+
+
+def test_it_stops_where_scipy_stops_by_default() -> None:
+    defaults = inspect.signature(fmin_slsqp).parameters
+    assert (defaults["iter"].default, defaults["acc"].default) == (MAX_ITERATIONS, TOLERANCE)
 
 
 def test_what_cannot_be_kept_is_infeasible() -> None:

@@ -16,11 +16,14 @@ from fsw.parameters.consistency import (
     stand_off,
 )
 from fsw.parameters.flight_config import FlightConfig, flight_config
-from fsw.signals import PointObstacle, SafeSet, Wall, WorkspaceSphere
+from fsw.shapes.ball import point
+from fsw.shapes.half_space import wall
+from fsw.shapes.target_sphere import target_sphere
+from fsw.signals import SafeSet
 
-WALLS = SafeSet(walls=(Wall((-1.0, 0.0, 0.0), -1.0, 0.1),))
-POINT = SafeSet(obstacles=(PointObstacle((1.0, 0.0, -1.0), 0.1),))
-SPHERE = SafeSet(sphere=WorkspaceSphere((0.0, 0.0, -0.225), 0.075))
+WALLS = SafeSet((wall((-1.0, 0.0, 0.0), -1.0, 0.1),))
+POINT = SafeSet((point((1.0, 0.0, -1.0), 0.1),))
+SPHERE = SafeSet((target_sphere((0.0, 0.0, -0.225), 0.075),))
 
 
 def _findings(config: FlightConfig, safe_set: SafeSet) -> dict[str, Finding]:
@@ -114,7 +117,7 @@ def test_beside_a_point_the_same_is_said_as_beside_a_wall_and_something_about_th
 def test_a_point_that_a_link_could_pass_through_is_worth_a_warning(
     clearance: float, holds: bool
 ) -> None:
-    safe_set = SafeSet(obstacles=(PointObstacle((1.0, 0.0, -1.0), clearance),))
+    safe_set = SafeSet((point((1.0, 0.0, -1.0), clearance),))
     finding = _findings(flight_config(), safe_set)["links"]
     assert finding.holds is holds
     assert not finding.refuses

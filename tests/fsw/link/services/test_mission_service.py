@@ -13,17 +13,18 @@ import pytest
 from fsw.link.services.mission_service import MissionService
 from fsw.link.services.mission_store import Kind, MissionStore, Site
 from fsw.signals import (
+    TARGET_SPHERE,
     MissionAction,
     MissionProgress,
     MissionState,
     Mode,
     SafeSet,
     Vec3,
-    WorkspaceSphere,
 )
 from tests.fsw.link.ground import Ground, ground_station
 from tests.fsw.link.services.mission_client import Client, Item, Weather
 from tests.fsw.link.snapshots import SNAPSHOT, outputs_at
+from tests.fsw.zones import of_kind
 
 NAN = math.nan
 ACCEPTED, ERROR, UNSUPPORTED_FRAME, UNSUPPORTED, NO_SPACE = 0, 1, 2, 3, 4
@@ -49,7 +50,7 @@ def locate(latitude: float, longitude: float, altitude: float) -> Vec3:
 
 
 def judge(safe_set: SafeSet) -> tuple[str, ...]:
-    if safe_set.sphere is not None and safe_set.sphere.radius < 0.05:
+    if any(one.shape.numbers[3] < 0.05 for one in of_kind(safe_set, TARGET_SPHERE)):
         return ("S(r) = 0.04 is less than lambda",)
     return ()
 
@@ -126,7 +127,7 @@ def test_items_in_floats_are_taken_and_given(vehicle: Vehicle) -> None:
     """MAVProxy sends what it is asked for, and older ground stations know nothing else."""
     client = vehicle.client()
     assert client.upload(WAYPOINTS[:1] + WAYPOINTS[2:4], floats=True) == ACCEPTED
-    stored = vehicle.store.items(MISSION)
+    stored = vehicle.store.items[MISSION]
     assert (stored[1].x, stored[1].y) == (5_000, -12_345)
     assert stored[0].x == pytest.approx(470_000_100, abs=40)  # as exact as a float is
     items = client.download(floats=True)
@@ -283,7 +284,7 @@ def test_clearing_clears_what_it_names(vehicle: Vehicle, kind: int) -> None:
     assert client.upload([{"command": 5100}], RALLY) == ACCEPTED
     vehicle.store.take_update()
     assert client.ask(mav.mission_clear_all_encode(1, 1, kind), "MISSION_ACK").type == ACCEPTED
-    left = [len(vehicle.store.items(k)) for k in Kind]
+    left = [len(vehicle.store.items[k]) for k in Kind]
     full = [len(WAYPOINTS), 3, 1]
     assert left == ([0, 0, 0] if kind == 255 else [0 if k == kind else full[k] for k in range(3)])
     update = vehicle.store.take_update()
@@ -344,9 +345,9 @@ def test_a_fence_that_cannot_be_kept_is_refused_with_the_inequality(vehicle: Veh
     update = vehicle.store.take_update()
     assert update is not None
     assert update.fence is not None
-    centre = pytest.approx((0.0, 0.0, -0.225))
-    assert isinstance(update.fence.sphere, WorkspaceSphere)
-    assert update.fence.sphere.centre_from_target == centre
+    (kept,) = update.fence.zones
+    assert kept.shape.kind == TARGET_SPHERE
+    assert kept.shape.numbers == pytest.approx((0.0, 0.0, -0.225, 0.075))
     small = {**sphere, "params": (0.04, 0.0, 0.0, 0.0)}
     assert client.upload([small], FENCE) == DENIED
     assert "S(r) = 0.04" in client.texts()

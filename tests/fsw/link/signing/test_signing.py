@@ -75,7 +75,7 @@ def ground(file: Path) -> Iterator[Ground]:
 
 
 def commands(ground: Ground) -> int:
-    return len(ground.inbox.take_commands())
+    return len(ground.inbox.take().commands)
 
 
 def test_pymavlink_believes_what_we_sign_and_only_with_the_key(ground: Ground) -> None:

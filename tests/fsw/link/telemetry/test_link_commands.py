@@ -48,7 +48,7 @@ def ask(ground: Ground, datagram: bytes) -> tuple[tuple[Any, ...], list[Frame]]:
     assert ack.message_id == ids.COMMAND_ACK
     assert (ack.system_id, ack.component_id) == (1, 1)
     assert ack.payload_values[4:] == (245, 190)
-    assert ground.inbox.take_commands() == ()  # none of the tick's business
+    assert ground.inbox.take().commands == []  # none of the tick's business
     return ack.payload_values[:2], rest
 
 
@@ -166,7 +166,7 @@ def test_a_data_stream_request_changes_no_rate(ground: Ground) -> None:
 def test_other_commands_go_to_the_tick(ground: Ground) -> None:
     ground.heard()
     ground.polled(long(400, 1.0) + integer(400, 1.0))
-    assert [one.request.command for one in ground.inbox.take_commands()] == [400, 400]
+    assert [one.request.command for one in ground.inbox.take().commands] == [400, 400]
     assert ground.heard() == []
 
 

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from fsw.link.inbox import Inbox, Setpoints
+from fsw.link.inbox import Inbox, Received
 from fsw.link.wire import message_ids as ids
 from fsw.signals import AttitudeSetpoint, JointSetpoint, MotionSetpoint
 from messages.frames import Frame, FrameWriter, split, wire_fields
@@ -26,13 +26,13 @@ def frame(message_id: int, **fields: float) -> Frame:
     return decoded
 
 
-def taken(*frames: Frame) -> Setpoints:
+def taken(*frames: Frame) -> Received:
     inbox = Inbox()
     for one in frames:
         inbox.accept(one)
-    setpoints = inbox.take_setpoints()
-    assert inbox.take_setpoints() == Setpoints()
-    return setpoints
+    received = inbox.take()
+    assert inbox.take() == Received()
+    return received
 
 
 def body(mask: int, **changes: float) -> Frame:
@@ -53,14 +53,14 @@ def body(mask: int, **changes: float) -> Frame:
     ],
 )
 def test_every_mask_that_clients_send_is_understood(mask: int, meant: MotionSetpoint) -> None:
-    assert taken(body(mask)) == Setpoints(motion=meant)
+    assert taken(body(mask)) == Received(motion=meant)
 
 
 def test_a_number_that_is_masked_may_be_nan_and_one_that_is_used_may_not() -> None:
     assert taken(body(0x9F8, vx=NAN, afz=NAN, yaw_rate=NAN)).motion is not None
     for field, mask in (("x", 0x9F8), ("vz", 0x9C7), ("afy", 0xC3F), ("yaw", 0x9F8)):
         for bad in (NAN, math.inf):
-            assert taken(body(mask, **{field: bad})) == Setpoints(refused=1)
+            assert taken(body(mask, **{field: bad})) == Received(refused_setpoints=1)
 
 
 @pytest.mark.parametrize(
@@ -77,7 +77,7 @@ def test_a_number_that_is_masked_may_be_nan_and_one_that_is_used_may_not() -> No
     ],
 )
 def test_what_is_of_no_use_is_refused_and_counted(wrong: dict[str, float]) -> None:
-    assert taken(body(0x9F8, **wrong)) == Setpoints(refused=1)
+    assert taken(body(0x9F8, **wrong)) == Received(refused_setpoints=1)
 
 
 def test_a_velocity_may_be_along_the_heading() -> None:
@@ -95,7 +95,7 @@ def test_an_attitude_or_rates_with_a_thrust() -> None:
     assert taken(attitude(7)).attitude == level
     assert taken(attitude(0x80)).attitude == AttitudeSetpoint(0.5, None, (0.25, 0.0, 0.0))
     assert taken(attitude(7, body_roll_rate=NAN)).attitude == level
-    assert taken(attitude(0x80, **{"q[1]": NAN})).refused == 0
+    assert taken(attitude(0x80, **{"q[1]": NAN})).refused_setpoints == 0
     for mask, bad in (
         (7, {"thrust": NAN}),
         (7, {"q[2]": NAN}),
@@ -104,22 +104,25 @@ def test_an_attitude_or_rates_with_a_thrust() -> None:
         (0x47, {}),
         (7, {"target_system": 3}),
     ):
-        assert taken(attitude(mask, **bad)) == Setpoints(refused=1)  # type: ignore[arg-type]
+        assert taken(attitude(mask, **bad)) == Received(refused_setpoints=1)  # type: ignore[arg-type]
 
 
 def test_joints_and_the_end_effector_of_our_own_dialect() -> None:
     joints = {"position[0]": 0.5, "position[1]": -0.25, "joint_count": 2}
     setpoint = frame(ids.ARM_JOINT_SETPOINT, **joints)
-    assert taken(setpoint) == Setpoints(joints=JointSetpoint((0.5, -0.25)))
+    assert taken(setpoint) == Received(joints=JointSetpoint((0.5, -0.25)))
     for bad in ({"position[1]": NAN}, {"joint_count": 3}, {"target_component": 7}):
-        assert taken(frame(ids.ARM_JOINT_SETPOINT, **{**joints, **bad})) == Setpoints(refused=1)
+        assert taken(frame(ids.ARM_JOINT_SETPOINT, **{**joints, **bad})) == Received(
+            refused_setpoints=1
+        )
     point = {"position[2]": -1.0, "type_mask": 0xDF8, "coordinate_frame": 1}
     now = taken(frame(ids.END_EFFECTOR_TARGET, **point))
-    assert now == Setpoints(motion=MotionSetpoint(True, p=(0.0, 0.0, -1.0)))
+    assert now == Received(motion=MotionSetpoint(True, p=(0.0, 0.0, -1.0)))
     inbox = Inbox()
     inbox.accept(frame(ids.END_EFFECTOR_TARGET, time_usec=5, **point))
-    assert inbox.take_setpoints() == Setpoints(), "a point with a time belongs to the trajectory"
-    assert len(inbox.take_targets()) == 1
+    received = inbox.take()
+    assert received.motion is None, "a point with a time belongs to the trajectory"
+    assert len(received.targets) == 1
 
 
 def test_the_newest_of_motion_and_attitude_counts_and_joints_stand_beside_it() -> None:
@@ -135,10 +138,10 @@ def test_the_newest_of_motion_and_attitude_counts_and_joints_stand_beside_it() -
 def test_only_a_ground_station_s_heartbeat_is_one() -> None:
     inbox = Inbox()
     inbox.accept(frame(ids.HEARTBEAT, type=18))
-    assert not inbox.take_station_heard()
+    assert not inbox.take().station_heard
     inbox.accept(frame(ids.HEARTBEAT, type=6))
-    assert inbox.take_station_heard()
-    assert not inbox.take_station_heard()
+    assert inbox.take().station_heard
+    assert not inbox.take().station_heard
 
 
 @pytest.mark.parametrize("message_id", [82, 84, 60201, 60202])
@@ -154,4 +157,4 @@ def test_whatever_numbers_come_nothing_raises(message_id: int) -> None:
                 values[names.index("type_mask")] = mask
             (decoded,) = split(FrameWriter(255, 190).frame(message_id, *values))
             inbox.accept(decoded)
-    assert inbox.take_setpoints().refused > 0
+    assert inbox.take().refused_setpoints > 0

@@ -10,7 +10,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from matplotlib.path import Path
 
-from fsw.barriers.tangent import distance_to
 from fsw.link.wire.fence_items import (
     CIRCLE_EXCLUSION,
     CIRCLE_INCLUSION,
@@ -21,7 +20,11 @@ from fsw.link.wire.fence_items import (
     read_fence,
 )
 from fsw.link.wire.mission_items import BadItem, MissionItem
-from fsw.signals import PointObstacle, SafeSet, Vec3, WorkspaceSphere
+from fsw.shapes.target_sphere import target_sphere
+from fsw.shapes.vertical_cylinder import column
+from fsw.shapes.zones import surfaces
+from fsw.signals import SafeSet, Vec3, Zone
+from tests.fsw.zones import walls_of
 
 Corners = list[tuple[float, float]]
 CASE_1: Corners = [(1.0, 1.0), (1.0, -1.0), (-9.0, -1.0), (-9.0, 1.0)]
@@ -66,15 +69,23 @@ def reason(items: tuple[MissionItem, ...]) -> BadItem:
 
 def room(safe_set: SafeSet, north: float, east: float) -> float:
     """Distance to the nearest wall, negative outside [m]."""
-    return min(w.normal[0] * north + w.normal[1] * east - w.offset for w in safe_set.walls)
+    walls = [wall.shape.numbers for wall in walls_of(safe_set)]
+    return min(n * north + e * east - offset for n, e, _, offset in walls)
+
+
+def left_to(cylinder: Zone, north: float, east: float, down: float) -> float:
+    """From the surface of an upright cylinder without end, its clearance taken off [m]."""
+    (at,) = surfaces(SafeSet((cylinder,)), (north, east, down), 0)
+    return at.distance
 
 
 def test_a_rectangle_holds_the_walls_of_case_1() -> None:
     for corners in (CASE_1, CASE_1[::-1]):
-        walls = safe(polygon(corners)).walls
-        found = {(round(w.normal[0]), round(w.normal[1]), round(w.offset, 9)) for w in walls}
+        walls = safe(polygon(corners)).zones
+        numbers = [wall.shape.numbers for wall in walls]
+        found = {(round(n), round(e), round(offset, 9)) for n, e, _, offset in numbers}
         assert found == {(-1, 0, -1.0), (0, 1, -1.0), (0, -1, -1.0), (1, 0, -9.0)}
-        assert all(wall.clearance == 0.1 and wall.normal[2] == 0.0 for wall in walls)
+        assert all(wall.clearance == 0.1 and wall.shape.numbers[2] == 0.0 for wall in walls)
 
 
 def test_places_on_earth_are_walls_too() -> None:
@@ -113,7 +124,7 @@ def test_the_inside_of_a_convex_polygon_is_free(
 
 def test_a_circle_is_an_octagon_inside_it() -> None:
     walls = safe((circle(2.0),))
-    assert len(walls.walls) == 8
+    assert len(walls.zones) == 8
     for k in range(100):
         direction = 2.0 * math.pi * k / 100
         n, e = math.cos(direction), math.sin(direction)
@@ -123,7 +134,7 @@ def test_a_circle_is_an_octagon_inside_it() -> None:
 
 def test_a_circle_that_travels_with_the_vehicle_is_the_workspace_sphere() -> None:
     item = MissionItem(CIRCLE_INCLUSION, 7, (0.075, 0.0, 0.0, 0.0), 0, 0, -0.225)
-    assert safe((item,)) == SafeSet(sphere=WorkspaceSphere((0.0, 0.0, -0.225), 0.075))
+    assert safe((item,)) == SafeSet((target_sphere((0.0, 0.0, -0.225), 0.075),))
 
 
 def test_two_polygons_are_kept_both() -> None:
@@ -143,15 +154,13 @@ def test_two_polygons_are_kept_both() -> None:
         (polygon(CASE_1[:2]), 6, "vertices"),
         (polygon(CASE_1[:2], POLYGON_EXCLUSION), 6, "vertices"),
         (polygon(CASE_1)[:3] + polygon(CASE_1, POLYGON_EXCLUSION)[:1], 5, "number"),
-        ((circle(0.1, 7), excluded(1.0)), 5, "at once"),
         ((excluded(math.inf),), 6, "radius"),
         ((excluded(1.0),) * 17, 5, "cylinders"),
         (polygon(CASE_1[:1], 16), 3, "16"),
         ((circle(0.0),), 6, "radius"),
         ((circle(math.nan),), 6, "radius"),
         ((circle(1.0, frame=8),), 2, "frame"),
-        ((circle(0.1, 7), circle(0.1, 7)), 5, "one"),
-        ((circle(0.1, 7), *polygon(CASE_1)), 5, "at once"),
+        ((circle(0.1, 7), circle(0.1, 7)), 5, "2 workspace spheres; 1 "),
         ((circle(0.1, 7, math.nan),), 12, "centre"),
         (polygon(CASE_1) * 5, 5, "walls"),
     ],
@@ -169,10 +178,10 @@ def test_no_fence_is_no_safe_set() -> None:
 
 
 def test_a_circle_of_exclusion_is_an_upright_cylinder() -> None:
-    (cylinder,) = safe((excluded(0.5),)).obstacles
-    assert cylinder == PointObstacle((3.0, 0.0, 0.0), 0.6, upright=True)
+    (cylinder,) = safe((excluded(0.5),)).zones
+    assert cylinder == column((3.0, 0.0), 0.6)
     for height in (0.0, -1.4, -50.0):
-        assert distance_to(cylinder, (3.0, 1.0, height)) == pytest.approx(1.0)
+        assert left_to(cylinder, 3.0, 1.0, height) == pytest.approx(0.4)
 
 
 def test_a_return_point_changes_nothing_and_is_no_reason_to_refuse_the_rest() -> None:
@@ -183,8 +192,16 @@ def test_a_return_point_changes_nothing_and_is_no_reason_to_refuse_the_rest() ->
 
 
 def test_inclusion_and_exclusion_are_kept_together() -> None:
-    fence = safe((*polygon(CASE_1), excluded(0.2)))
-    assert (len(fence.walls), len(fence.obstacles)) == (4, 1)
+    fence = safe((excluded(0.2), *polygon(CASE_1)))
+    kinds = [zone.shape.kind for zone in fence.zones]
+    assert kinds == ["half-space"] * 4 + ["vertical cylinder"]
+
+
+def test_a_workspace_sphere_is_kept_beside_walls_and_cylinders() -> None:
+    sphere = circle(0.1, 7, -0.2)
+    fence = safe((sphere, excluded(1.0), *polygon(CASE_1)))
+    others = safe((excluded(1.0), *polygon(CASE_1)))
+    assert fence == SafeSet((*others.zones, *safe((sphere,)).zones))
 
 
 @given(
@@ -203,7 +220,7 @@ def test_the_cylinders_cover_every_point_of_a_polygon(
             edge = (b[0] + other * (c[0] - b[0]), b[1] + other * (c[1] - b[1]))
             p = (a[0] + share * (edge[0] - a[0]), a[1] + share * (edge[1] - a[1]))
             if p in (a, edge) or path.contains_point(p):
-                inside = min(distance_to(o, (*p, -1.0)) - o.clearance for o in cylinders)
+                inside = min(left_to(o, *p, -1.0) for o in cylinders)
                 assert inside <= -0.1 + 1e-6
 
 
@@ -213,4 +230,4 @@ def test_a_long_polygon_is_covered_by_several_cylinders_and_not_by_a_wide_one() 
     cylinders = cylinders_over(wall, 0.1)
     assert len(cylinders) == 6
     assert max(o.clearance for o in cylinders) < 1.0
-    assert min(distance_to(o, (5.0, 2.0, -1.0)) - o.clearance for o in cylinders) > 0.5
+    assert min(left_to(o, 5.0, 2.0, -1.0) for o in cylinders) > 0.5

@@ -1,4 +1,4 @@
-"""Where ``--json`` goes."""
+"""Where results go."""
 
 from __future__ import annotations
 
@@ -19,3 +19,14 @@ def write_text(target: str | None, text: str) -> None:
         sys.stdout.flush()
     elif target is not None:
         Path(target).write_text(text, encoding="utf-8")
+
+
+def unwritten(target: str | Path | None, text: str) -> list[str]:
+    """Write to a target as ``write_text`` does; returns what could not be written, and why."""
+    try:
+        write_text(None if target is None else str(target), text)
+    except BrokenPipeError:
+        raise  # the reader has left
+    except OSError as error:
+        return [f"{'standard output' if target == '-' else target}: {error.strerror}"]
+    return []

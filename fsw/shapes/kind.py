@@ -1,0 +1,63 @@
+"""What a file of this folder must provide to be a shape."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fsw.signals import Shape, Vec3
+
+NUMBERS = 16  # most numbers that describe a shape
+
+
+class Surface(NamedTuple):
+    """The plane that stands for a shape near one point."""
+
+    distance: float  # m, of the point, positive on the free side
+    nx: float  # unit normal into the free side, NED
+    ny: float
+    nz: float
+
+    @property
+    def normal(self) -> Vec3:
+        """Unit normal into the free side, NED."""
+        return self.nx, self.ny, self.nz
+
+
+PlaneOf = Callable[[NDArray[np.float64], bool, int, float, float, float], Surface]
+"""From (numbers, keep_in, which, x, y, z [m, NED]) to the plane; see ``ShapeKind.plane``."""
+
+
+@dataclass(frozen=True, slots=True)
+class ShapeKind:
+    """One kind of shape.
+
+    To keep a point out of a convex shape one plane is enough, the one that touches it where it is
+    nearest. To keep a point inside, planes all round are needed: ``planes_inside``.
+    """
+
+    name: str  # as in scenarios and texts
+    number: int  # PANDION_SHAPE of the dialect
+    meaning: tuple[str, ...]  # of each of its numbers, with the unit
+    planes_inside: int
+    plane: PlaneOf  # compiled; the free side is outside, or inside where ``keep_in``
+    problem: Callable[[tuple[float, ...]], str | None]  # why numbers describe no such shape
+    flat: bool = False  # its plane is the same wherever the point is
+    follows_target: bool = False  # rides on the end-effector's target, and keeps the base alone
+
+    @property
+    def size(self) -> int:
+        """How many numbers describe it."""
+        return len(self.meaning)
+
+    def check(self, shape: Shape) -> str | None:
+        """Why this is not a shape of this kind, in a sentence; None if it is one."""
+        if len(shape.numbers) != self.size:
+            return f"a {self.name} has {self.size} numbers, not {len(shape.numbers)}"
+        if not np.isfinite(shape.numbers).all():
+            return f"a {self.name} has a number that is not finite"
+        return self.problem(shape.numbers)
