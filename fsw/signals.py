@@ -171,6 +171,7 @@ class Shape(NamedTuple):
     numbers: tuple[float, ...]  # m, NED
 
 
+_POINTS: Final = 3  # of the paper's body
 TARGET_SPHERE: Final = "target sphere"  # the shape that follows the end-effector's target
 
 
@@ -627,9 +628,28 @@ class ConstraintReport:
     """Margins of the active safe set, from the vehicle's own estimate."""
 
     kind: ConstraintKind = ConstraintKind.NONE
-    # m; walls in order, then points, base/joint2/end-effector within each
-    margins: tuple[float, ...] = ()
+    margins: tuple[float, ...] = ()  # m, of each zone and part of the body, zone by zone
     barrier: tuple[float, ...] = ()  # h, m/s, same order
+    per_zone: tuple[int, ...] = ()  # how many of them belong to each zone
+
+    def shown(self, most: int) -> tuple[tuple[float, ...], tuple[float, ...], int | None]:
+        """Margins [m] and barrier values [m/s] for a record with room for ``most``, and the least.
+
+        All of a body of three points, if they fit; otherwise the least of each zone, of the first
+        zones. The index of the least margin may lie behind them; None without margins.
+        """
+        margins, barrier = self.margins, self.barrier
+        if len(margins) > most or max(self.per_zone, default=1) > _POINTS:
+            margins, barrier = self._of_zones(margins), self._of_zones(barrier)
+        least = margins.index(min(margins)) if margins else None
+        return margins[:most], barrier[:most], least
+
+    def _of_zones(self, values: tuple[float, ...]) -> tuple[float, ...]:
+        begin, least = 0, []
+        for count in self.per_zone:
+            least.append(min(values[begin : begin + count]))
+            begin += count
+        return tuple(least)
 
 
 class Charge(IntEnum):

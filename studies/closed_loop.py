@@ -27,6 +27,7 @@ from fsw.signals import (
     Plan,
     PlanFailure,
     PlanRequest,
+    SafeSetAnnouncement,
     SensorFrame,
     SwitchMode,
     TickInputs,
@@ -41,7 +42,7 @@ from studies.flight_result import (
     TracePoint,
     processor_time_us,
 )
-from studies.mission import announced, target
+from studies.mission import announced, moves, target
 
 TARGET_US = 100_000  # between points of the reference, as the pilot sends them
 _TARGETS_AHEAD = 20
@@ -90,6 +91,13 @@ class ClosedLoop(Generic[State]):
         first = 0 if step == 0 else newest
         clock = simulation.clock
         return tuple(target(clock, start_us + TARGET_US * k) for k in range(first, newest + 1))
+
+    def announced(self) -> tuple[SafeSetAnnouncement, ...]:
+        """What the scenario's pilot announces at this step: ten times a second where zones move."""
+        step, scenario = self.simulation.step, self.simulation.scenario
+        if step == 0 or (step % (TARGET_US // STEP_US) == 0 and moves(scenario)):
+            return announced(scenario, self.simulation.t_us)
+        return ()
 
     def step(self, inputs: TickInputs) -> TickOutputs:
         """Tick, plan, advance."""
@@ -162,7 +170,7 @@ def simulate(
             plan=answer,
             commands=((_ARM,), (_FOLLOW,))[step] if step < 2 else (),
             targets=loop.targets(),
-            announced=announced(scenario) if step == 0 else (),
+            announced=loop.announced(),
         )
         if traced and step % TRACE_STEPS == 0:
             recorder.trace.append(_trace_point(simulation))

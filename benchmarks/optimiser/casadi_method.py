@@ -17,7 +17,7 @@ from fsw.barriers.cbf_row import cbf_lower_bound
 from fsw.barriers.safe_approach import safe_approach_speed
 from fsw.model.airframe import AIRFRAME
 from fsw.model.body import body_of
-from fsw.model.linearisation import Linearisation, place
+from fsw.model.linearisation import Linearisation, position, velocity
 from fsw.model.prediction import INPUTS, STATES, YAW, Array, P, V, condense, to_vector
 from fsw.mpc.planner_config import PlannerConfig
 from fsw.shapes.frame import outward_axis
@@ -122,7 +122,11 @@ class CasadiMethod:
         if self._sphere is None:
             tuning = self._config.walls
             parts = body_of("points", AIRFRAME).parts
-            points = [place(self._horizon.horizon, 0, part.on, part.begin) for part in parts]
+            start = self._horizon.horizon.frames[0]
+            points = [
+                (position(start, part.on, part.begin), velocity(start, part.on, part.begin))
+                for part in parts
+            ]
             for wall in self._safe_set.zones:
                 normal, offset = wall.shape.numbers[:3], wall.shape.numbers[3]
                 for p, v in points:

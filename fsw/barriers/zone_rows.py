@@ -199,7 +199,8 @@ def _fill(
                         value, least, steepness = _barrier(
                             frame, start, on, local, (n, d), (shifts, speeds), i, k, tuning
                         )
-                    binds = binds and value - least < steepness * reach[0] + approach
+                    # Not "<": a row that is no number stays, for the solver to refuse.
+                    binds = binds and not value - least >= steepness * reach[0] + approach
                     if binds:
                         if n != turned_for:
                             fill_turned(frame, n, turned)

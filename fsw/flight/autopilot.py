@@ -97,6 +97,7 @@ class Autopilot:
         assert estimate is not None
         nominal = self._plans.step(nominal_at_rest(estimate), REST_INPUT)
         self._cascade.step(in_hover(self.config.airframe, estimate), estimate, nominal, REST_INPUT)
+        self._safe_sets.warm_up(estimate)
 
     def analyse(self, safe_set: SafeSet) -> tuple[Finding, ...]:
         """Findings on whether this configuration can keep a safe set."""

@@ -14,8 +14,11 @@ from fsw.barriers.margins import Margins
 from fsw.flight.safe_set_change import growth, is_update, summary
 from fsw.flight.state import MissionMemory
 from fsw.model.body import body_of
+from fsw.mpc.reference import still_at
 from fsw.parameters.consistency import Finding, analyse, loop_tube, refusals, warnings
 from fsw.parameters.flight_config import FlightConfig
+from fsw.shapes.half_space import wall
+from fsw.shapes.zones import surfaces
 from fsw.signals import (
     ConstraintReport,
     EndEffectorTarget,
@@ -184,17 +187,31 @@ class SafeSetCheck:
         if safe_set != mission.safe_set:
             findings = self.analyse(safe_set)
             against = refusals(findings)
-            texts += [StatusText(Severity.WARNING, text) for text in against]
-            texts += [StatusText(Severity.INFO, text) for text in warnings(findings)]
+            # Where a zone moves, there is another set ten times a second: what is known is not
+            # said again.
+            last = mission.refused.safe_set if mission.refused else mission.safe_set
+            known = {finding.statement for finding in self.analyse(last)}
+            new = [StatusText(Severity.WARNING, text) for text in against if text not in known]
+            new += [
+                StatusText(Severity.INFO, text) for text in warnings(findings) if text not in known
+            ]
+            texts += new
             if against and not self._config.soft and flies:
-                text = f"safe set refused: the old one is kept; wanted: {change}"
-                texts.append(StatusText(Severity.WARNING, text))
+                if new:
+                    text = f"safe set refused: the old one is kept; wanted: {change}"
+                    texts.append(StatusText(Severity.WARNING, text))
                 return mission
             if self._config.soft:
                 against = ()
         if not is_update(mission.safe_set, safe_set) or wanted.owner != mission.owner:
             texts.append(StatusText(Severity.INFO, change))
         return replace(wanted, safe_set=safe_set, refused=None, refusals=against)
+
+    def warm_up(self, estimate: StateEstimate) -> None:
+        """Compile every kernel of distances and margins, before anything flies."""
+        walled = SafeSet((wall((0.0, 0.0, -1.0), 0.0, 0.0),))
+        surfaces(walled, estimate.p_WB, estimate.t_us)
+        self.margins(walled, estimate, still_at(estimate.p_WB))
 
     def margins(
         self, safe_set: SafeSet, estimate: StateEstimate, target: EndEffectorTarget | None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Final, cast
 
@@ -94,6 +94,7 @@ class Inbox:
             message_ids.HEARTBEAT: self._heartbeat,
             message_ids.OBSTACLE_WALL: partial(self._obstacle, decode.obstacle_wall),
             message_ids.OBSTACLE_POINT: partial(self._obstacle, decode.obstacle_point),
+            message_ids.OBSTACLE_SHAPE: partial(self._obstacle, decode.obstacle_shape),
             message_ids.WORKSPACE_SPHERE: self._sphere,
         }
 
@@ -133,7 +134,7 @@ class Inbox:
             plan,
             tuple(came.commands),
             tuple(came.targets),
-            tuple(came.announced),
+            tuple([_begun(one, sensors.t_us) for one in came.announced]),
             came.motion,
             came.attitude,
             came.joints,
@@ -223,3 +224,15 @@ class Inbox:
             self.refused += 1
             return
         self._announce(SafeSet((sphere,)))
+
+
+def _begun(announcement: SafeSetAnnouncement, now_us: int) -> SafeSetAnnouncement:
+    """The same with zones that move, and did not say since when, where they are now."""
+    zones = announcement.safe_set.zones
+    if all(zone.t_us or not any(zone.velocity) for zone in zones):
+        return announcement
+    begun = (
+        replace(zone, t_us=now_us) if any(zone.velocity) and not zone.t_us else zone
+        for zone in zones
+    )
+    return SafeSetAnnouncement(announcement.source, SafeSet(tuple(begun)))

@@ -114,7 +114,12 @@ BARRIER_MARGIN: Final = Topic(
     "Margins of the active safe set, by the vehicle's own estimate",
     PLANNING,
     (
-        _vector("margin", MARGINS, "m; walls, then obstacles; base, joint 2, end-effector of each"),
+        _vector(
+            "margin",
+            MARGINS,
+            "m; of each zone and point (base, joint 2, end-effector); with the full body, or "
+            "more zones, the least of each zone",
+        ),
         _vector("barrier", MARGINS, "h, m/s, same order; active at or below 0"),
         *_floats("minimum", note="m"),
         Field("kind", "uint8_t", note="0 none, 1 walls, 2 workspace, 3 obstacles and walls"),

@@ -51,27 +51,20 @@ def _naive(config: PlannerConfig, model: CondensedModel, safe_set: SafeSet) -> O
 
 
 def _hard(config: PlannerConfig, model: CondensedModel, safe_set: SafeSet) -> OcpTerms:
-    rows = _distances(config, model, safe_set, config.tightening, config.hard_skipped_nodes)
-    return OcpTerms((TrackingCost(config.weights),), (rows,), config.hard_slack)
-
-
-def _distances(
-    config: PlannerConfig,
-    model: CondensedModel,
-    safe_set: SafeSet,
-    tightening: float,
-    skipped_nodes: int,
-) -> ZoneRows:
-    return ZoneRows(
+    costs = (TrackingCost(config.weights),)
+    if not safe_set.zones:
+        return OcpTerms(costs)
+    rows = ZoneRows(
         safe_set,
         body_of(config.body, model.airframe),
         model,
         config.tunings,
         distances=True,
-        tightening=tightening,
-        skipped_nodes=skipped_nodes,
+        tightening=config.tightening,
+        skipped_nodes=config.hard_skipped_nodes,
         most=config.limits.most,
     )
+    return OcpTerms(costs, (rows,), config.hard_slack)
 
 
 def _soft(config: PlannerConfig, model: CondensedModel, safe_set: SafeSet) -> OcpTerms:
@@ -80,7 +73,10 @@ def _soft(config: PlannerConfig, model: CondensedModel, safe_set: SafeSet) -> Oc
     weights = (config.soft.workspace, config.soft.workspace_terminal)
     costs += tuple(SphereCost(one, weights, only_outside=True) for one in spheres)
     if others.zones:
-        costs += (ZoneCost(_distances(config, model, others, 0.0, 0), config.soft),)
+        # Every distance has its cost, also one that no input could make a bound.
+        body = body_of(config.body, model.airframe)
+        distances = ZoneRows(others, body, model, config.tunings, distances=True, skipped_nodes=0)
+        costs += (ZoneCost(distances, config.soft),)
     return OcpTerms(costs)
 
 
@@ -93,9 +89,11 @@ def _split(safe_set: SafeSet) -> tuple[tuple[Zone, ...], SafeSet]:
 
 
 def _blf(config: PlannerConfig, model: CondensedModel, safe_set: SafeSet) -> OcpTerms:
-    body = body_of(config.body, model.airframe)
+    costs, body = (TrackingCost(config.weights),), body_of(config.body, model.airframe)
+    if not safe_set.zones:
+        return OcpTerms(costs)
     barrier = ZoneRows(safe_set, body, model, config.tunings, most=config.limits.most)
-    return OcpTerms((TrackingCost(config.weights),), (barrier,), config.barrier_slack)
+    return OcpTerms(costs, (barrier,), config.barrier_slack)
 
 
 VARIANTS: dict[str, Callable[[PlannerConfig, CondensedModel, SafeSet], OcpTerms]] = {

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import cast
 
 from fsw.control.cascade import Inner
 from fsw.control.gains import LoopGains
@@ -10,6 +11,7 @@ from fsw.control.safety_filter import FilterTuning
 from fsw.geometry.geodesy import DEFAULT_ORIGIN
 from fsw.model.airframe import AIRFRAME, Airframe
 from fsw.model.battery import BatteryModel
+from fsw.model.body import BODIES, BodyName
 from fsw.mpc.planner_config import PlannerConfig
 from fsw.mpc.solvers import SOLVERS
 from fsw.mpc.variants import VARIANTS
@@ -125,9 +127,10 @@ def flight_config(
     robustness: str = "consistent",
     *,
     solver: str = "clarabel",
+    body: str = "full",
     soft: bool = False,
 ) -> FlightConfig:
-    """The configuration of a controller, an inner loop, a lambda and a solver, by name.
+    """The configuration of a controller, an inner loop, a lambda, a solver and a body, by name.
 
     Raises:
         ValueError: for an unknown name, listing the known ones.
@@ -137,10 +140,11 @@ def flight_config(
         ("inner loop", inner, INNERS),
         ("robustness", robustness, ROBUSTNESS_PRESETS),
         ("solver", solver, SOLVERS),
+        ("body", body, BODIES),
     ):
         if name not in known:
             raise ValueError(f"unknown {what} '{name}'; known: {', '.join(known)}")
-    planner = PlannerConfig(controller=controller, solver=solver)
+    planner = PlannerConfig(controller=controller, solver=solver, body=cast(BodyName, body))
     wanted = ROBUSTNESS_PRESETS[robustness]
     if wanted is not None:
         planner = replace(

@@ -175,6 +175,8 @@ _ROWS: Final[dict[str, list[_Row]]] = {
         ("PLN_JNT_MAX", "planner.limits.joint_acc", "rad/s^2", 0.5, 50.0,
          "Maximum joint acceleration"),
         ("PLN_JNT_SLACK", "planner.joint_slack", "", 0.0, 1e5, "Joint limit slack penalty"),
+        ("PLN_BODY", "planner.body", "", 0.0, 1.0,
+         "What keeps clear of obstacles"),
         ("PLN_UPS_DIST", "upset_distance", "m", 0.02, 1.0,
          "Position error above which planning restarts from the measured state"),
         ("PLN_UPS_YAW", "upset_yaw", "rad", 0.05, 3.0,
@@ -301,6 +303,7 @@ _ROWS: Final[dict[str, list[_Row]]] = {
 }  # fmt: skip
 
 _CHOICES: Final[dict[str, Choices]] = {
+    "PLN_BODY": ((0, "Base, joint 2 and end-effector as points"), (1, "Full body")),
     "LOG_PROFILE": (
         (0, "Sensors and actuators every tick, the rest at 50 Hz"),
         (1, "Everything every tick"),

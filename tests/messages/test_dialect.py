@@ -19,6 +19,7 @@ PINNED = {
     "WORKSPACE_SPHERE": (60208, 18, 197),
     "SETPOINT_STATUS": (60209, 21, 131),
     "OBSTACLE_POINT": (60210, 20, 254),
+    "OBSTACLE_SHAPE": (60211, 94, 185),
 }
 
 # From pymavlink's development.xml and upstream.xml, as MAVLink's common.xml and QGroundControl have
@@ -47,6 +48,14 @@ PINNED_ENUMS = {
         "INPUT_REFUSED",
     ),
     "PANDION_RATE_GROUP": ("INNER", "MPC"),
+    "PANDION_SHAPE": (
+        "HALF_SPACE",
+        "BALL",
+        "TARGET_SPHERE",
+        "VERTICAL_CYLINDER",
+        "CYLINDER",
+        "BOX",
+    ),
 }
 
 
@@ -107,7 +116,7 @@ def test_every_field_with_a_dimension_states_its_unit():
         *("joint_count", "count", "index", "margin_min_index", "horizon", "plan_id", "normal"),
         *("missed_deadlines", "fallbacks", "cost", "slack_max", "sqp_iterations"),
         *("solver_iterations", "ticks", "late_ticks", "skipped_ticks"),
-        *("target_system", "target_component", "accepted", "refused"),
+        *("target_system", "target_component", "accepted", "refused", "numbers"),
         *("breaches", "departures", "interventions"),
     }
     for message in ET.parse(DEFINITION).iter("message"):

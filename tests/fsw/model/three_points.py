@@ -8,7 +8,15 @@ import numpy as np
 
 from fsw.model.airframe import AIRFRAME
 from fsw.model.body import body_of
-from fsw.model.linearisation import Linearisation, chain, place, slopes
+from fsw.model.linearisation import (
+    TURNED,
+    Linearisation,
+    chain,
+    fill_slopes,
+    fill_turned,
+    position,
+    velocity,
+)
 from fsw.model.prediction import STATES, Array
 
 BASE, JOINT2, END_EFFECTOR = 0, 1, 2
@@ -27,26 +35,30 @@ class Points(NamedTuple):
 
 def positions_of(linearised: Linearisation) -> tuple[Array, Array]:
     """Positions and velocities of the three points at each node, (n + 1, 3, 3) each."""
-    horizon = linearised.horizon
-    nodes = range(horizon.states.shape[0])
-    seen = np.array([[place(horizon, i, on, local) for on, local in _PLACES] for i in nodes])
-    return seen[:, :, 0], seen[:, :, 1]
+    p, v = (
+        np.array(
+            [[seen(frame, *place) for place in _PLACES] for frame in linearised.horizon.frames]
+        )
+        for seen in (position, velocity)
+    )
+    return p, v
 
 
 def points_of(linearised: Linearisation) -> Points:
     """The three points of the paper over a horizon."""
     horizon = linearised.horizon
-    nodes, unknowns = horizon.states.shape[0], horizon.gamma.shape[2]
+    nodes, unknowns = len(horizon.frames), len(horizon.inputs)
     points = Points(
         *positions_of(linearised),
         np.zeros((nodes, 3, 3, unknowns)),
         np.zeros((nodes, 3, 3, unknowns)),
     )
-    at_position, at_velocity = np.zeros(STATES), np.zeros(STATES)
-    for node in range(nodes):
+    turned, slopes = np.zeros((TURNED, 3)), np.zeros((2, STATES))
+    for node in range(1, nodes):  # the start feels no input
         for k, (on, local) in enumerate(_PLACES):
-            for axis, n in enumerate(_AXES if node > 0 else ()):  # the start feels no input
-                slopes(horizon, node, on, local, n, at_position, at_velocity)
-                chain(horizon, node, at_position, points.d_position[node, k, axis])
-                chain(horizon, node, at_velocity, points.d_velocity[node, k, axis])
+            for axis, n in enumerate(_AXES):
+                fill_turned(horizon.frames[node], n, turned)
+                fill_slopes(horizon.frames[node], on, local, n, turned, slopes)
+                chain(horizon.impulse, node, slopes[0], points.d_position[node, k, axis])
+                chain(horizon.impulse, node, slopes[1], points.d_velocity[node, k, axis])
     return points

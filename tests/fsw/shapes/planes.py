@@ -1,0 +1,23 @@
+"""The planes of one shape near one point, by the machine code that flies."""
+
+from __future__ import annotations
+
+from fsw.compiled import of_fixed_types
+from fsw.shapes import kind_of
+from fsw.shapes.kind import Surface
+from fsw.shapes.zones import surface_at, zone_arrays
+from fsw.signals import SafeSet, Shape, Vec3, Zone
+
+_surface_at = of_fixed_types(surface_at)
+
+
+def outside(shape: Shape, p: Vec3) -> Surface:
+    """The plane that keeps a point out."""
+    return Surface(*_surface_at(zone_arrays(SafeSet((Zone(shape, 0.0),))), 0, 0, *p))
+
+
+def inside(shape: Shape, p: Vec3) -> tuple[Surface, ...]:
+    """The planes that keep a point in."""
+    zones = zone_arrays(SafeSet((Zone(shape, 0.0, keep_in=True),)))
+    count = kind_of(shape).planes_inside
+    return tuple(Surface(*_surface_at(zones, 0, which, *p)) for which in range(count))
