@@ -157,7 +157,8 @@ def test_the_rotors_reach_as_far_as_their_blades_and_the_feet_as_far_as_the_legs
 
 
 @pytest.mark.parametrize(
-    "normal", [(1.0, 0.0, 0.0), (0.0, 0.0, -1.0), (0.0, 0.0, 1.0), (0.6, 0.0, -0.8), (0.48, -0.6, 0.64)]
+    "normal",
+    [(1.0, 0.0, 0.0), (0.0, 0.0, -1.0), (0.0, 0.0, 1.0), (0.6, 0.0, -0.8), (0.48, -0.6, 0.64)],
 )
 def test_a_hull_reaches_as_far_as_its_farthest_place_at_the_worst_yaw(normal: Vec3) -> None:
     farthest = max(
