@@ -34,8 +34,7 @@ class ClarabelSolver:
         settings = clarabel.DefaultSettings()
         settings.verbose = False
         settings.max_iter = MAX_ITERATIONS
-        settings.max_threads = 1
-        settings.direct_solve_method = "qdldl"
+        settings.direct_solve_method = "qdldl"  # of one thread
         # The program is small, dense and scaled by its author; these stages cost more than
         # they give here (docs/decisions/0004-clarabel-settings.md) and presolve would
         # forbid updates in place.

@@ -31,7 +31,6 @@ class Ocp:
         blocks += [(barrier.rows, parts.slack) for barrier in parts.barriers]
         self.qp = QpData(config.horizon, config.limits, tuple(blocks))
         self._first_barrier_slack = self.qp.inputs + self._limits.rows.slacks
-        self.cost = 0.0
         self._solver = DualSolver(self.qp)
 
     def update(self, safe_set: SafeSet) -> None:

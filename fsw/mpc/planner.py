@@ -52,7 +52,7 @@ class Planner:
         self._safe_set: SafeSet | None = None
         self._ocp: Ocp | None = None
         self._inputs: Array = np.zeros(INPUTS * config.horizon)
-        self._t_us = -1
+        self._t_us = 0
 
     def warm_up(self) -> None:
         """Compile every kernel and load the solver, before anything flies."""
@@ -72,7 +72,6 @@ class Planner:
                         joint_targets=joint_targets,
                     )
                 )
-        self._t_us = -1
         self._inputs[:] = 0.0
 
     def plan(self, request: PlanRequest) -> Plan | PlanFailure:

@@ -91,12 +91,13 @@ class QpData:
         self.hessian = np.zeros((self.inputs, self.inputs))  # upper triangle
         self.linear = np.zeros(self.inputs)
         slack: list[NDArray[np.intp]] = []
-        penalties: list[Array] = []
+        self.penalty: Array = np.zeros(0)  # (slacks,)
         for rows, penalty in blocks:
-            first = sum(map(len, penalties))
-            slack.append(np.full(len(rows.node), -1) if penalty is None else first + rows.slack)
-            penalties.append(np.full(0 if penalty is None else rows.slacks, penalty or 0.0))
-        self.penalty = np.concatenate(penalties)  # (slacks,)
+            if penalty is None:
+                slack.append(np.full(len(rows.node), -1))
+            else:
+                slack.append(len(self.penalty) + rows.slack)
+                self.penalty = np.append(self.penalty, np.full(rows.slacks, penalty))
         soft = self.block_rows = sum(map(len, slack))
         bound_rows, bounds = _bounds(horizon, limits)
         tilt_rows, tilts = _tilt_cones(horizon, limits.tilt)

@@ -51,6 +51,9 @@ def _naive(config: PlannerConfig, model: CondensedModel, safe_set: SafeSet) -> O
 
 
 def _hard(config: PlannerConfig, model: CondensedModel, safe_set: SafeSet) -> OcpTerms:
+    costs = (TrackingCost(config.weights),)
+    if not safe_set.zones:
+        return OcpTerms(costs)
     rows = ZoneRows(
         safe_set,
         body_of(config.body, model.airframe),
@@ -61,7 +64,7 @@ def _hard(config: PlannerConfig, model: CondensedModel, safe_set: SafeSet) -> Oc
         skipped_nodes=config.hard_skipped_nodes,
         most=config.limits.most,
     )
-    return OcpTerms((TrackingCost(config.weights),), (rows,), config.hard_slack)
+    return OcpTerms(costs, (rows,), config.hard_slack)
 
 
 def _soft(config: PlannerConfig, model: CondensedModel, safe_set: SafeSet) -> OcpTerms:
@@ -86,9 +89,11 @@ def _split(safe_set: SafeSet) -> tuple[tuple[Zone, ...], SafeSet]:
 
 
 def _blf(config: PlannerConfig, model: CondensedModel, safe_set: SafeSet) -> OcpTerms:
-    body = body_of(config.body, model.airframe)
+    costs, body = (TrackingCost(config.weights),), body_of(config.body, model.airframe)
+    if not safe_set.zones:
+        return OcpTerms(costs)
     barrier = ZoneRows(safe_set, body, model, config.tunings, most=config.limits.most)
-    return OcpTerms((TrackingCost(config.weights),), (barrier,), config.barrier_slack)
+    return OcpTerms(costs, (barrier,), config.barrier_slack)
 
 
 VARIANTS: dict[str, Callable[[PlannerConfig, CondensedModel, SafeSet], OcpTerms]] = {

@@ -135,7 +135,7 @@ def _names(tree: ast.Module) -> list[tuple[int, int, str]]:
 
 # A star before keyword parameters that became a slash; a length for numpy to find, which any
 # negative number asks for.
-_ALIKE = re.compile(r"[(,]\s*/\s*,|reshape\(- ?2\b")
+_ALIKE = re.compile(r"(^|[(,])\s*/\s*,|reshape\(- ?2\b")
 
 
 def _proves_nothing(mutated: str, line: str) -> bool:

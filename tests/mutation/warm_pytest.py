@@ -2,8 +2,8 @@
 
 Reads one JSON request a line: ``tests`` (pytest's arguments), ``deselect`` (test ids), ``timeout``
 [s] for the whole run, ``each`` [s] for every test or null, ``stop`` (at the first failure). Answers
-one JSON object a line: ``failed`` (test ids), ``seconds`` (of each id), ``status``. The time of a
-test is the processor's, which other work on the machine does not lengthen. Runs in the environment
+one JSON object a line: ``failed`` (test ids), ``seconds`` (of each id), ``status``. Times are the
+processor's, which other work on the machine does not lengthen. Runs in the environment
 of the tests, in the copy; nothing of the copy is loaded before a fork.
 """
 
@@ -12,7 +12,9 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import json
+import math
 import os
+import resource
 import select
 import signal
 import sys
@@ -43,6 +45,7 @@ for library in (
         __import__(library)
 
 
+_WAITING = 10  # times the limit of a run may pass on the clock: the machine is busy, or it hangs
 _PR_SET_PDEATHSIG = 1  # prctl(2): a stopped run stops its current test
 
 
@@ -86,6 +89,8 @@ def _too_slow(_number: int, _frame: Any) -> None:
 def _child(request: dict[str, Any], answer: int) -> None:
     os.setsid()
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    most = math.ceil(request["timeout"])
+    resource.setrlimit(resource.RLIMIT_CPU, (most, most + 1))
     sys.path.insert(0, str(Path.cwd()))
     signal.signal(signal.SIGPROF, _too_slow)
     nowhere = os.open(os.devnull, os.O_RDWR)
@@ -112,7 +117,7 @@ def _run(request: dict[str, Any]) -> dict[str, Any]:
             os._exit(0)
     os.close(writing)
     text = b""
-    end = time.monotonic() + request["timeout"]
+    end = time.monotonic() + _WAITING * request["timeout"]
     timed_out = False
     with os.fdopen(reading, "rb") as pipe:
         while True:

@@ -6,13 +6,13 @@ A flight mode is one file in this folder: a subclass of ``FlightMode`` and a nam
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 from fsw.flight.setpoint_generator import PositionGoal, SetpointGenerator
 from fsw.flight.state import FlightState, SetpointMemory
-from fsw.model.airframe import AIRFRAME, Airframe
-from fsw.model.body import Body, body_of
+from fsw.model.airframe import Airframe
+from fsw.model.body import Body
 from fsw.mpc.reference import still_at
 from fsw.parameters.flight_config import FlightConfig
 from fsw.signals import (
@@ -40,7 +40,7 @@ class Px4Mode:
     selectable: bool = True  # offered to the operator; else entered by a command of its own
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class CommandContext:
     """What commands, arming checks and the needs of a mode are decided on."""
 
@@ -48,25 +48,25 @@ class CommandContext:
     landed: bool
     estimate_valid: bool
     targets_ahead: bool  # the stream holds a point at or after now
-    standing_unclear: bool = False  # too high to stand, too low to be surely in the air
-    inconsistent: str = ""  # why the configuration cannot keep the safe set
-    mission: MissionProgress = field(default_factory=MissionProgress)
-    mission_refusal: str | None = "no mission: none was uploaded"  # None: it can be flown
-    setpoint_fresh: bool = False  # an offboard setpoint came within the last 0.5 s
-    position: Vec3 = (0.0, 0.0, 0.0)  # m, of the body
-    yaw: float = 0.0  # rad
-    joints: Vec2 = (0.0, 0.0)  # rad, asked for last or as they are
-    home: Home | None = None
-    safe_set: SafeSet = field(default_factory=SafeSet)
-    body: Body = field(default_factory=lambda: body_of("points", AIRFRAME))
-    now_us: int = 0
-    climb_range: Vec2 = (0.3, 50.0)  # m, of a takeoff
-    airframe: Airframe = AIRFRAME
-    charge: Charge = Charge.OK
-    speed: float = 1.0  # m/s, on the way to places
-    max_speed: float = 1.5  # m/s, that can be asked for
-    yaw_rate: float = 0.3  # rad/s, at most
-    acceleration: float = 1.0  # m/s^2, of a generated setpoint
+    standing_unclear: bool  # too high to stand, too low to be surely in the air
+    inconsistent: str  # why the configuration cannot keep the safe set
+    mission: MissionProgress
+    mission_refusal: str | None  # None: it can be flown
+    setpoint_fresh: bool  # an offboard setpoint came within the last 0.5 s
+    position: Vec3  # m, of the body
+    yaw: float  # rad
+    joints: Vec2  # rad, asked for last or as they are
+    home: Home | None
+    safe_set: SafeSet
+    body: Body
+    now_us: int
+    climb_range: Vec2  # m, of a takeoff
+    airframe: Airframe
+    charge: Charge
+    speed: float  # m/s, on the way to places
+    max_speed: float  # m/s, that can be asked for
+    yaw_rate: float  # rad/s, at most
+    acceleration: float  # m/s^2, of a generated setpoint
 
 
 @dataclass(frozen=True, slots=True)

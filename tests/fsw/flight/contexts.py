@@ -6,9 +6,35 @@ from dataclasses import replace
 from typing import Any
 
 from fsw.flight.modes.base import CommandContext
-from fsw.signals import Mode
+from fsw.model.airframe import AIRFRAME
+from fsw.model.body import body_of
+from fsw.signals import Charge, MissionProgress, Mode, SafeSet
 
-STANDING = CommandContext(Mode.DISARMED, landed=True, estimate_valid=True, targets_ahead=False)
+STANDING = CommandContext(
+    mode=Mode.DISARMED,
+    landed=True,
+    estimate_valid=True,
+    targets_ahead=False,
+    standing_unclear=False,
+    inconsistent="",
+    mission=MissionProgress(),
+    mission_refusal="no mission: none was uploaded",
+    setpoint_fresh=False,
+    position=(0.0, 0.0, 0.0),
+    yaw=0.0,
+    joints=(0.0, 0.0),
+    home=None,
+    safe_set=SafeSet(),
+    body=body_of("points", AIRFRAME),
+    now_us=0,
+    climb_range=(0.3, 50.0),
+    airframe=AIRFRAME,
+    charge=Charge.OK,
+    speed=1.0,
+    max_speed=1.5,
+    yaw_rate=0.3,
+    acceleration=1.0,
+)
 READY = replace(STANDING, mission_refusal=None, setpoint_fresh=True, targets_ahead=True)
 _FLYING = replace(READY, mode=Mode.HOLD, landed=False)
 

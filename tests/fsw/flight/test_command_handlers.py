@@ -9,9 +9,35 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fsw.flight.command_handlers import Decision
+from fsw.flight.command_handlers import Decision, NewHeading, decide
 from fsw.flight.modes.base import CommandContext
-from fsw.signals import Charge, CommandResult, Mode
+from fsw.signals import (
+    MAX_DISTANCE,
+    ChangeSpeed,
+    Charge,
+    Command,
+    CommandAction,
+    CommandRequest,
+    CommandResult,
+    Facing,
+    FlyOrbit,
+    GoTo,
+    Home,
+    LookAt,
+    MissionProgress,
+    Mode,
+    MoveJoints,
+    Orbit,
+    Order,
+    Place,
+    PointObstacle,
+    SafeSet,
+    SetHome,
+    SetMissionStep,
+    StartMission,
+    TakeOff,
+    Wall,
+)
 from tests.fsw.flight.asked import FLIGHT_MODES, ask
 from tests.fsw.flight.contexts import STANDING
 
@@ -22,7 +48,7 @@ NAN = math.nan
 ARM, TAKEOFF, LAND, SET_MODE, SHUTDOWN = 400, 22, 21, 176, 246
 
 IDLING = replace(STANDING, mode=Mode.HOLD)
-HOLDING = CommandContext(Mode.HOLD, landed=False, estimate_valid=True, targets_ahead=True)
+HOLDING = replace(STANDING, mode=Mode.HOLD, landed=False, targets_ahead=True)
 
 
 @pytest.mark.parametrize(
@@ -248,3 +274,240 @@ def test_whatever_arrives_is_answered_and_a_mode_can_always_follow(
 def test_a_vehicle_in_the_air_is_not_disarmed_unless_forced(situation: CommandContext) -> None:
     decision = ask(replace(situation, landed=False), ARM, 0.0)
     assert decision.mode is None
+
+
+# ---------------------------------------------------------------- actions, as the link decodes them
+
+REQUEST = CommandRequest(0, (NAN,) * 7, 255, 190)
+HIGH = replace(HOLDING, position=(1.0, 2.0, -5.0), home=Home((0.0, 0.0, -0.5), 0.0))
+CIRCLE = FlyOrbit(Place((4.0, 6.0), 5.0), 2.0)
+WALLED = replace(HIGH, safe_set=SafeSet((Wall((-1.0, 0.0, 0.0), -10.0, 0.5),)))
+
+
+def decided(action: CommandAction, context: CommandContext = HIGH) -> Decision:
+    return decide(Command(action, REQUEST), context, FLIGHT_MODES)
+
+
+def test_an_orbit_is_flown_around_its_place_in_its_mode() -> None:
+    decision = decided(replace(CIRCLE, speed=0.3, clockwise=False, facing=Facing.TANGENT))
+    assert (decision.result, decision.mode, decision.reason) == (ACCEPTED, Mode.ORBIT, "")
+    goal = decision.goal
+    assert goal is not None
+    assert goal.orbit == Orbit((4.0, 6.0, -5.0), 2.0, 0.3, False, Facing.TANGENT)
+    assert goal.motion.p == (4.0, 6.0, -5.0)
+    again = decided(CIRCLE, replace(HIGH, mode=Mode.ORBIT))
+    assert (again.result, again.mode, again.goal is not None) == (ACCEPTED, None, True)
+
+
+@pytest.mark.parametrize(
+    ("asked", "usual", "flown", "slower"),
+    [(0.3, 1.0, 0.3, False), (None, 0.2, 0.2, False), (None, 1.5, 0.48, False),
+     (0.49, 1.0, 0.48, True), (9.0, 1.0, 0.48, True)],
+)  # fmt: skip
+def test_an_orbit_is_as_fast_as_asked_or_as_the_nose_can_turn_which_is_said(
+    asked: float | None, usual: float, flown: float, slower: bool
+) -> None:
+    """A radius of 2 m at a turn rate of 0.3 rad/s, of which a fifth is kept for corrections."""
+    decision = decided(replace(CIRCLE, speed=asked), replace(HIGH, speed=usual))
+    assert decision.goal is not None
+    assert decision.goal.orbit is not None
+    assert decision.goal.orbit.speed == pytest.approx(flown)
+    assert decision.reason == ("orbit at 0.48 m/s: faster cannot be flown at 2 m" if slower else "")
+
+
+def test_no_orbit_is_faster_than_the_vehicle_however_wide() -> None:
+    wide = decided(replace(CIRCLE, radius=50.0, speed=9.0))
+    assert wide.goal is not None
+    assert wide.goal.orbit is not None
+    assert wide.goal.orbit.speed == HIGH.max_speed
+
+
+@pytest.mark.parametrize(
+    ("context", "result", "word"),
+    [
+        (replace(HIGH, mode=Mode.LAND), TEMPORARILY_REJECTED, "not possible while land"),
+        (
+            replace(HIGH, landed=True),
+            TEMPORARILY_REJECTED,
+            "no orbit: the vehicle is on the ground",
+        ),
+        (replace(HIGH, mode=Mode.DISARMED), TEMPORARILY_REJECTED, "no orbit: the vehicle is not"),
+        (replace(HIGH, climb_range=(5.0, 50.0)), DENIED, "no orbit: 5.0 m"),
+    ],
+)
+def test_an_orbit_that_cannot_be_flown_now_is_refused(
+    context: CommandContext, result: CommandResult, word: str
+) -> None:
+    decision = decided(CIRCLE, context)
+    assert (decision.result, decision.goal, decision.mode) == (result, None, None)
+    assert word in decision.reason
+
+
+@pytest.mark.parametrize(
+    ("radius", "north", "refused"),
+    [
+        (2.0, 7.49, False),
+        (2.0, 7.5, True),
+        (4.0, 5.49, False),
+        (4.0, 5.51, True),
+        (1.0, 20.0, True),
+    ],
+)
+def test_a_circle_keeps_the_clearance_of_a_wall_with_its_nearest_point(
+    radius: float, north: float, refused: bool
+) -> None:
+    decision = decided(FlyOrbit(Place((north, 0.0), 5.0), radius), WALLED)
+    assert (decision.result == DENIED) is refused
+    assert ("wall 1" in decision.reason) is refused
+
+
+def test_a_circle_is_wider_than_a_slanted_wall_sees_it_only_along_the_ground() -> None:
+    slanted = replace(HIGH, safe_set=SafeSet((Wall((0.6, 0.0, -0.8), 0.0, 0.5),)))  # rises north
+    assert decided(FlyOrbit(Place((0.0, 0.0), 5.0), 5.8), slanted).result == ACCEPTED
+    assert decided(FlyOrbit(Place((0.0, 0.0), 5.0), 5.9), slanted).result == DENIED
+
+
+@pytest.mark.parametrize(
+    ("obstacle", "refused"),
+    [
+        (PointObstacle((6.4, 6.0, -5.0), 0.5), True),  # 0.4 m outside the circle
+        (PointObstacle((6.6, 6.0, -5.0), 0.5), False),
+        (PointObstacle((5.6, 6.0, -5.0), 0.5), True),  # as much inside
+        (PointObstacle((5.4, 6.0, -5.0), 0.5), False),
+        (PointObstacle((6.0, 6.0, -5.6), 0.5), False),  # above a point of it
+        (PointObstacle((6.0, 6.0, -4.6), 0.5), True),
+        (PointObstacle((6.0, 6.0, -9.0), 0.5, upright=True), True),  # at any height
+        (PointObstacle((4.0, 6.0, -5.0), 1.9), False),  # in the middle
+    ],
+)
+def test_a_circle_keeps_clear_of_points_beside_above_and_inside(
+    obstacle: PointObstacle, refused: bool
+) -> None:
+    decision = decided(CIRCLE, replace(HIGH, safe_set=SafeSet(obstacles=(obstacle,))))
+    assert (decision.result == DENIED) is refused
+    assert ("obstacle 1" in decision.reason) is refused
+
+
+@pytest.mark.parametrize(
+    ("speed", "refused"), [(0.0099, True), (0.01, False), (1.5, False), (1.51, True), (None, False)]
+)
+def test_a_speed_is_changed_within_its_range(speed: float | None, refused: bool) -> None:
+    decision = decided(ChangeSpeed(speed))
+    assert decision.result == (DENIED if refused else ACCEPTED)
+    assert decision.speed == (None if refused else ChangeSpeed(speed))
+
+
+def test_the_nose_is_turned_to_a_place_of_an_armed_vehicle_and_freed_anywhere() -> None:
+    look = LookAt(Place((3.0, 4.0), 1.0))
+    assert decided(look).look_at == NewHeading((3.0, 4.0, -1.0))
+    assert decided(look, STANDING).result == TEMPORARILY_REJECTED
+    assert decided(look, replace(HIGH, mode=Mode.FAULT)).result == TEMPORARILY_REJECTED
+    assert decided(LookAt(Place((MAX_DISTANCE, 1.0), 0.0))).result == DENIED
+    assert decided(LookAt(Place((MAX_DISTANCE, 0.0), 0.0))).result == ACCEPTED
+    assert decided(LookAt(None), STANDING) == Decision(ACCEPTED, look_at=NewHeading(None))
+
+
+@pytest.mark.parametrize(
+    ("height", "climb"),
+    [(5.3, 0.3), (5.26, 0.3), (5.24, None), (55.0, 50.0), (55.04, 50.0), (55.06, None), (7.0, 2.0)],
+)
+def test_a_takeoff_climbs_to_its_height_within_what_a_ground_station_rounds(
+    height: float, climb: float | None
+) -> None:
+    standing = replace(HIGH, landed=True)
+    decision = decided(TakeOff(Place(height=height)), standing)
+    assert decision.climb == (None if climb is None else pytest.approx(climb))
+    if climb is None:
+        assert decision.result == TEMPORARILY_REJECTED
+        assert "outside 5.3 to 55.0 m" in decision.reason
+    above_home = decided(TakeOff(Place(height=height - 0.5, above_home=True)), standing)
+    assert above_home.climb == decision.climb or above_home.climb == pytest.approx(decision.climb)
+
+
+@pytest.mark.parametrize("home", [None, HIGH.home])
+def test_a_height_above_home_needs_a_home_or_counts_from_the_origin(home: Home | None) -> None:
+    goal = decided(GoTo(Place((1.0, 1.0), 3.0, above_home=True)), replace(HIGH, home=home)).goal
+    assert goal is not None
+    assert goal.motion.p == (1.0, 1.0, -3.0 if home is None else -3.5)
+
+
+def test_a_place_without_coordinates_is_the_present_one() -> None:
+    goal = decided(GoTo(Place(), yaw=0.3)).goal
+    assert goal is not None
+    assert (goal.motion.p, goal.motion.yaw) == (HIGH.position, 0.3)
+
+
+def uploaded(total: int, current: int = 0, **changes: object) -> CommandContext:
+    progress = MissionProgress(total=total, current=current)
+    return replace(HIGH, mission=progress, mission_refusal=None, **changes)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("first", "last", "result", "step"),
+    [
+        (0.0, 0.0, ACCEPTED, None),
+        (0.0, 2.0, ACCEPTED, None),
+        (0.0, 1.0, DENIED, None),
+        (1.0, 0.0, ACCEPTED, 1),
+        (2.0, 9.0, ACCEPTED, 2),
+        (3.0, 0.0, DENIED, None),
+    ],
+)
+def test_a_mission_starts_at_a_step_and_goes_on_to_its_end(
+    first: float, last: float, result: CommandResult, step: int | None
+) -> None:
+    decision = decided(StartMission(first, last), uploaded(3))
+    assert (decision.result, decision.mission_step) == (result, step)
+    assert decision.mode is (Mode.MISSION if result == ACCEPTED else None)
+
+
+def test_a_mission_that_starts_on_the_ground_arms_if_arming_is_possible() -> None:
+    standing = uploaded(3, mode=Mode.DISARMED, landed=True)
+    decision = decided(StartMission(), standing)
+    assert (decision.arm, decision.intended_mode, decision.mode) == (True, Mode.MISSION, None)
+    unclear = decided(StartMission(), replace(standing, standing_unclear=True))
+    assert (unclear.result, unclear.arm) == (TEMPORARILY_REJECTED, False)
+
+
+@pytest.mark.parametrize(
+    ("number", "reset", "step"),
+    [(0.0, False, 0), (2.0, False, 2), (3.0, False, None), (-1.0, False, 1), (-1.0, True, 0),
+     (-2.0, False, None)],
+)  # fmt: skip
+def test_the_current_step_is_set_if_there_is_one(
+    number: float, reset: bool, step: int | None
+) -> None:
+    decision = decided(SetMissionStep(number, reset), uploaded(3, current=1))
+    assert (decision.mission_step, decision.result == ACCEPTED) == (step, step is not None)
+
+
+@pytest.mark.parametrize(
+    ("mode", "stops"), [(Mode.MISSION, True), (Mode.HOLD, True), (Mode.OFFBOARD, False)]
+)
+def test_a_mission_is_paused_by_holding(mode: Mode, stops: bool) -> None:
+    decision = decided(Order.PAUSE_MISSION, replace(HIGH, mode=mode))
+    assert (decision.result == ACCEPTED) is stops
+    assert decision.mode is (Mode.HOLD if mode is Mode.MISSION else None)
+    assert decision.stop is (mode is Mode.HOLD)
+
+
+def test_arming_checks_are_made_on_the_ground_and_answered_in_words() -> None:
+    assert decided(Order.CHECK_ARMING, STANDING).reason == "ready to arm"
+    nearly_empty = replace(STANDING, charge=Charge.CRITICAL)
+    assert "battery" in decided(Order.CHECK_ARMING, nearly_empty).reason
+    assert decided(Order.CHECK_ARMING).result == TEMPORARILY_REJECTED
+
+
+@pytest.mark.parametrize("mode", [Mode.LAND, Mode.MISSION])
+def test_joints_are_moved_in_hold_alone(mode: Mode) -> None:
+    decision = decided(MoveJoints(0.1, 0.1), replace(HIGH, mode=mode))
+    assert (decision.result, decision.joints) == (TEMPORARILY_REJECTED, None)
+    assert "hold first" in decision.reason
+    kept = decided(MoveJoints(None, None), replace(HIGH, joints=(0.2, -0.3)))
+    assert kept.joints == (0.2, -0.3)
+
+
+def test_home_needs_an_estimate_and_keeps_the_heading() -> None:
+    assert decided(SetHome(None), replace(HIGH, yaw=0.7)).home == Home(HIGH.position, 0.7)
+    lost = decided(SetHome(None), replace(HIGH, estimate_valid=False))
+    assert (lost.result, lost.home) == (TEMPORARILY_REJECTED, None)

@@ -26,6 +26,7 @@ from fsw.signals import (
     Vec3,
 )
 from tests.fsw.flight.asked import FLIGHT_MODES, ask
+from tests.fsw.flight.contexts import STANDING
 
 ACCEPTED, DENIED = CommandResult.ACCEPTED, CommandResult.DENIED
 TEMPORARILY_REJECTED = CommandResult.TEMPORARILY_REJECTED
@@ -33,9 +34,7 @@ NAN = math.nan
 ORIGIN = Origin(48.0, 11.0, 500.0)
 HOME = Home((3.0, 4.0, -0.32), 0.0)
 HERE = (1.0, 2.0, -5.0)
-HOVERING = CommandContext(
-    Mode.HOLD, landed=False, estimate_valid=True, targets_ahead=False, position=HERE, home=HOME
-)
+HOVERING = replace(STANDING, mode=Mode.HOLD, landed=False, position=HERE, home=HOME)
 GOTO, SET_HOME, SET_ACTUATOR, MAY_SWITCH = 192, 179, 187, 1.0
 
 

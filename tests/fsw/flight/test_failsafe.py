@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from fsw.flight.failsafe import (
     FAILSAFES,
     FAULTS,
+    MIN_UP,
     Action,
     Condition,
     FailsafeContext,
@@ -95,6 +96,7 @@ def test_nothing_wrong_is_no_condition() -> None:
     ("evidence", "condition"),
     [
         (replace(FINE, invalid_ticks=5), Condition.ESTIMATE_INVALID),
+        (replace(FINE, up=MIN_UP), Condition.TILT_LOST),
         (replace(FINE, up=0.339), Condition.TILT_LOST),
         (replace(FINE, up=-1.0), Condition.TILT_LOST),
         (replace(FINE, up=math.nan), Condition.TILT_LOST),

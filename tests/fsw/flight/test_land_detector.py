@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -42,3 +44,11 @@ def test_at_rest_the_height_decides(
 def test_low_and_moving_is_unclear_whatever_the_direction(v: Vec3) -> None:
     slow = v[0] ** 2 + v[1] ** 2 + v[2] ** 2 < 0.05**2
     assert at(0.0, v) == (True, slow, not slow)
+
+
+def test_at_a_limit_itself_it_is_not_low_and_no_longer_unclear() -> None:
+    coarse = limits(landed_height=0.25, airborne_height=0.5, landed_speed=0.5)
+    coarse = replace(coarse, airframe=replace(coarse.airframe, leg_length=0.5))
+    assert not is_low(coarse, vehicle_at((0.0, 0.0, -0.75)))
+    assert not standing_unclear(coarse, vehicle_at((0.0, 0.0, -1.0)))
+    assert not stands(coarse, vehicle_at((0.0, 0.0, -0.5), (0.0, 0.5, 0.0)))

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
-from hypothesis import given, settings
+import pytest
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from fsw.flight.mission_sequencer import (
@@ -161,6 +162,120 @@ def test_a_speed_beyond_the_greatest_is_flown_as_the_greatest_and_said() -> None
     assert "mission step 0: 5 m/s is flown as 1 m/s" in flown.texts
 
 
+def test_a_speed_that_is_given_up_is_the_usual_one_again() -> None:
+    slow, usual = MissionStep(A.SPEED, speed=0.1), MissionStep(A.SPEED)
+    flown = start(slow, usual, go(5.0, 0.0, -1.0)).fly()
+    assert max(math.hypot(*point.v_WE) for point in flown.points) > 0.2999
+    assert not any("is flown as" in text for text in flown.texts)
+
+
+def test_a_text_about_a_speed_does_not_hide_that_the_mission_is_complete() -> None:
+    flown = start(MissionStep(A.SPEED, speed=5.0)).fly()
+    assert flown.texts == ["mission step 0: 5 m/s is flown as 1 m/s; mission complete"]
+
+
+def arrival(look_at: Vec3 | None, end: Vec3, yaw: float | None = None) -> EndEffectorTarget:
+    """The end of a way to a place while the nose points at another."""
+    around = MissionContext(0, START.p_WE, 1.3, 0.0, look_at=look_at)
+    flight = begun(loaded((go(*end, yaw=yaw),)), START, PACE)
+    for _ in range(2):
+        flight, _ = advance(flight, around, PACE)
+    assert flight.segment is not None
+    return flight.segment.at(flight.segment.end_us)
+
+
+coordinates = st.tuples(st.floats(-9.0, 9.0), st.floats(-9.0, 9.0), st.floats(-9.0, -0.5))
+
+
+@given(coordinates, coordinates)
+def test_at_the_end_of_a_way_the_nose_points_at_what_is_looked_at_however_the_step_turns(
+    look_at: Vec3, end: Vec3
+) -> None:
+    assume(math.dist(look_at[:2], end[:2]) > 0.301)
+    yaw = arrival(look_at, end, yaw=1.0).yaw
+    distance = math.dist(look_at[:2], end[:2])
+    ahead = end[0] + distance * math.cos(yaw), end[1] + distance * math.sin(yaw)
+    assert ahead == pytest.approx(look_at[:2], abs=1e-6)
+
+
+@pytest.mark.parametrize("look_at", [None, (4.2, 5.1, -1.0), (4.0, 5.0, -9.0)])
+def test_above_what_is_looked_at_or_without_it_the_step_says_the_heading(
+    look_at: Vec3 | None,
+) -> None:
+    assert arrival(look_at, (4.0, 5.0, -1.0), yaw=1.0).yaw == pytest.approx(1.0)
+    assert arrival(look_at, (4.0, 5.0, -1.0)).yaw == pytest.approx(START.yaw)
+
+
+def test_what_is_looked_at_is_left_alone_by_other_steps() -> None:
+    around = MissionContext(0, START.p_WE, 1.3, 0.0)
+    flight = begun(loaded((go(1.0, 0.0, -1.0), MissionStep(A.LOOK_AT))), START, PACE)
+    for _ in range(2):
+        flight, event = advance(flight, around, PACE)
+        assert not event.looks
+    flight = begun(jumped(flight, 1, 0, PACE), START, PACE)
+    for _ in range(2):
+        flight, event = advance(flight, around, PACE)
+    assert (event.looks, event.look_at) == (True, None)
+
+
+@pytest.mark.parametrize(
+    ("late_us", "gives_up"), [(0, False), (4_999_999, False), (5_000_000, True)]
+)
+def test_a_place_is_waited_for_as_long_as_it_says(late_us: int, gives_up: bool) -> None:
+    flown = start(go(0.5, 0.0, -1.0), go(1.0, 0.0, -1.0))
+    flown.blocked = lambda _: START.p_WE
+    while flown.flight.stage is not Stage.ARRIVE:
+        flown.fly(STEP_US * 1e-6)
+    around = MissionContext(flown.flight.since_us + late_us, START.p_WE, 1.3, 0.0)
+    following, event = advance(flown.flight, around, PACE)
+    assert (following.progress.current == 1) is gives_up
+    assert event.unmet is gives_up
+
+
+@pytest.mark.parametrize(("off", "reached"), [(0.25, True), (0.2501, False)])
+def test_a_step_is_reached_within_its_acceptance(off: float, reached: bool) -> None:
+    flown = start(go(0.5, 0.0, -1.0, acceptance=0.25), go(1.0, 0.0, -1.0))
+    flown.blocked = lambda p: (p[0] + off, p[1], p[2])
+    flown.fly(30.0)
+    assert (0 in flown.reached) is reached
+
+
+def test_a_stay_lasts_as_long_as_the_step_says() -> None:
+    flown = start(MissionStep(A.DELAY, hold_s=2.0), go(1.0, 0.0, -1.0))
+    while flown.flight.stage is not Stage.STAY:
+        flown.fly(STEP_US * 1e-6)
+    begin = flown.flight.since_us
+    for later_us, done in ((1_999_999, False), (2_000_000, True)):
+        context = MissionContext(begin + later_us, START.p_WE, 1.3, 0.0)
+        assert (advance(flown.flight, context, PACE)[0].progress.current == 1) is done
+
+
+def test_a_mission_that_is_not_flown_does_nothing() -> None:
+    still = loaded((go(1.0, 0.0, -1.0),))
+    flight, event = advance(still, MissionContext(0, REST, 1.0, 0.0), PACE)
+    assert flight is still
+    assert (event.next_mode, event.text, event.unmet, event.looks) == (None, "", False, False)
+
+
+def test_progress_counts_from_a_mission_that_was_not_begun() -> None:
+    assert loaded(()).progress.state is MissionState.NO_MISSION
+    progress = loaded((go(1.0, 0.0, -1.0),) * 3, 4).progress
+    assert (progress.state, progress.current, progress.total) == (MissionState.NOT_STARTED, 0, 3)
+    assert (progress.reached, progress.reached_count) == (-1, 4)
+    again = begun(paused(start(go(0.1, 0.0, -1.0)).fly().flight), START, PACE).progress
+    assert (again.state, again.current, again.reached) == (MissionState.ACTIVE, 0, -1)
+
+
+def test_a_jump_in_a_mission_that_is_complete_lets_it_start_there() -> None:
+    done = paused(start(go(0.1, 0.0, -1.0), go(0.2, 0.0, -1.0)).fly().flight)
+    assert done.progress.state is MissionState.COMPLETE
+    jump = jumped(done, 1, 0, PACE).progress
+    assert (jump.state, jump.current) == (MissionState.NOT_STARTED, 1)
+    assert jumped(paused(start(go(9.0, 0.0, -1.0)).flight), 0, 0, PACE).progress.state is (
+        MissionState.PAUSED
+    )
+
+
 def test_altitude_above_home_counts_from_home() -> None:
     flown = Flown(begun(loaded((go(0.0, 0.0, -2.0, above_home=True),)), START, PACE), home_z=-0.35)
     assert flown.fly().points[-1].p_WE == (0.0, 0.0, -2.35)
@@ -255,6 +370,15 @@ def test_a_flown_mission_can_be_flown_again() -> None:
     assert again.flight.progress.current == 0
     assert again.flight.progress.reached_count == 2
     assert again.fly().reached == [0, 1]
+
+
+def test_on_the_ground_the_step_that_comes_next_must_be_a_takeoff() -> None:
+    steps = (MissionStep(A.TAKE_OFF, (0.0, 0.0, -1.0)), go(1.0, 0.0, -1.0), MissionStep(A.SPEED))
+    for current, allowed in ((0, True), (1, False), (2, False)):
+        flight = jumped(loaded(steps), current, 0, PACE)
+        assert (refusal(flight, landed=True) is None) is allowed
+    done = replace(loaded(steps).progress, state=MissionState.COMPLETE, current=2)
+    assert refusal(replace(loaded(steps), progress=done), landed=True) is None, "it starts over"
 
 
 def test_what_speaks_against_a_mission() -> None:

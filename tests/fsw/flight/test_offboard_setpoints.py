@@ -126,6 +126,9 @@ LIMIT1, LIMIT12 = AIRFRAME.joint1_limit, AIRFRAME.joint12_limit
         ((-LIMIT1, 0.0), None),
         ((LIMIT1, LIMIT12 - LIMIT1), None),
         ((0.0, -LIMIT12), None),
+        ((0.0, LIMIT12 + 1e-6), None),  # as much as a setpoint may be rounded
+        ((LIMIT1 + 1e-6, 0.0), None),
+        ((0.0, LIMIT12 + 2e-6), "together"),
         ((LIMIT1 + 0.01, -0.5), "joint 1 at 61 deg"),
         ((-LIMIT1 - 0.01, 0.5), "joint 1 at -61 deg"),
         ((0.5, LIMIT12 - 0.49), "joints 1 and 2 together at 91 deg"),

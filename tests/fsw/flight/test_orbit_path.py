@@ -7,7 +7,7 @@ import math
 from dataclasses import replace
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from fsw.flight.orbit_path import looking_at, max_orbit_speed, on_orbit
@@ -19,6 +19,7 @@ ORBIT = Orbit((3.0, -2.0, -1.5), 2.0, 0.4)
 places = st.tuples(st.floats(-30.0, 30.0), st.floats(-30.0, 30.0), st.floats(-10.0, -0.5))
 
 
+@example(p=ORBIT.centre, clockwise=True)
 @given(places, st.booleans())
 def test_from_anywhere_the_nearest_point_of_the_circle_is_the_target(
     p: tuple[float, float, float], clockwise: bool

@@ -16,6 +16,7 @@ from fsw.flight.plan_exchange import (
     PlanExchange,
     coast,
     measured_state,
+    nominal_at_rest,
     plan_input,
     take_answer,
     with_arm_in_bounds,
@@ -150,6 +151,15 @@ def test_measured_state_is_the_vehicle() -> None:
     assert (state.p, state.v, state.q_arm) == (estimate.p_WB, estimate.v_WB, estimate.q_arm)
     assert (state.a, state.j, state.s) == (motion.a, motion.j, motion.s)
     assert state.yaw == pytest.approx(1.0)
+
+
+def test_a_plan_s_state_at_rest_is_the_vehicle_s_place_and_pose_and_does_not_move() -> None:
+    estimate = random_estimate(np.random.default_rng(2))
+    still = nominal_at_rest(estimate)
+    place = (estimate.p_WB, estimate.yaw, estimate.q_arm)
+    assert (still.p, still.yaw, still.q_arm) == place
+    assert (still.v, still.a, still.j, still.s) == (STILL, STILL, (0.0, 0.0), (0.0, 0.0))
+    assert (still.yaw_rate, still.qd_arm) == (0.0, (0.0, 0.0))
 
 
 def test_a_slung_arm_is_planned_from_the_nearest_pose_it_may_have() -> None:

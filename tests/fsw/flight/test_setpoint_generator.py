@@ -12,8 +12,14 @@ from hypothesis import strategies as st
 
 from fsw.barriers.safe_approach import BarrierTuning, safe_approach_speed
 from fsw.flight.reference_governor import limit_approach, limit_descent, limit_lead
-from fsw.flight.setpoint_generator import PositionGoal, ReferenceState, arrived, step
-from fsw.parameters.flight_config import SetpointLimits
+from fsw.flight.setpoint_generator import (
+    PositionGoal,
+    ReferenceState,
+    SetpointGenerator,
+    arrived,
+    step,
+)
+from fsw.parameters.flight_config import SetpointLimits, flight_config
 from fsw.shapes.ball import point
 from fsw.shapes.half_space import wall
 from fsw.signals import MotionSetpoint, SafeSet, Vec3
@@ -61,6 +67,22 @@ def test_a_velocity_along_the_heading_turns_with_it() -> None:
     east = replace(STILL, yaw=0.5 * math.pi)
     aim = PositionGoal(MotionSetpoint(False, v=(1.0, 0.0, 0.0), along_heading=True))
     assert run(east, aim, 2.0)[-1].v == pytest.approx((0.0, 1.0, 0.0), abs=1e-9)
+
+
+def test_forward_and_right_are_seen_from_the_vehicle_and_down_stays_down() -> None:
+    turned = replace(STILL, yaw=0.5)
+    aim = PositionGoal(MotionSetpoint(False, v=(0.3, 0.4, 0.2), along_heading=True))
+    vx, vy, vz = run(turned, aim, 2.0)[-1].v
+    assert math.hypot(vx, vy) == pytest.approx(0.5)
+    assert math.atan2(vy, vx) == pytest.approx(0.5 + math.atan2(0.4, 0.3))
+    assert vz == pytest.approx(0.2)
+
+
+@pytest.mark.parametrize("of_end_effector", [True, False])
+def test_without_joints_the_point_itself_is_the_target(of_end_effector: bool) -> None:
+    free = replace(STILL, of_end_effector=of_end_effector, q_arm=None, v=(0.1, 0.2, 0.3), yaw=0.4)
+    target = SetpointGenerator(flight_config()).target(free, 5)
+    assert (target.t_us, target.p_WE, target.v_WE, target.yaw) == (5, free.p, free.v, 0.4)
 
 
 def test_an_acceleration_adds_up_to_the_largest_speed() -> None:

@@ -52,6 +52,13 @@ def test_a_program_that_is_filled_anew_is_solved_anew() -> None:
     assert solver.solve().x == pytest.approx((0.5, 0.0), abs=1e-4)
 
 
+def test_a_bound_that_was_infinite_may_be_set_later() -> None:
+    filled = program((4.0, 1.0), math.inf)
+    solver = ClarabelSolver(filled)
+    filled.b[0] = 2.0
+    assert solver.solve().x == pytest.approx((2.0, 1.0), abs=1e-4)
+
+
 def test_a_contradiction_is_infeasible() -> None:
     answer = ClarabelSolver(program((0.0, 0.0), bound=-1.0, least=1.0)).solve()
     assert answer.status is SolverStatus.INFEASIBLE

@@ -14,7 +14,7 @@ from fsw.model.airframe import AIRFRAME
 from fsw.model.body import body_of
 from fsw.model.linearisation import Linearisation
 from fsw.model.prediction import INPUTS, YAW, Array, condense
-from fsw.mpc.costs import Cost, CostWeights, TrackingCost
+from fsw.mpc.costs import Cost, CostWeights, PostureCost, TrackingCost
 from fsw.mpc.soft_costs import (
     SoftWeights,
     SphereCost,
@@ -33,19 +33,21 @@ MODEL = condense(AIRFRAME, 0.1, N)
 WALLS = (wall((-1.0, 0.0, 0.0), -1.0, 0.1), wall((0.0, 0.6, 0.8), -1.5, 0.1))
 POINTS = (point((0.3, -0.2, 0.1), 0.1), point((-0.5, 0.4, 0.6), 0.2))
 SPHERE = target_sphere((0.0, 0.0, -0.225), 0.075)
+SOFT = SoftWeights()
 
 
-def soft(*zones: Zone) -> ZoneCost:
+def soft(*zones: Zone, weights: SoftWeights = SOFT) -> ZoneCost:
     points, tuning = body_of("points", AIRFRAME), BarrierTuning()
     rows = ZoneRows(
         SafeSet(zones), points, MODEL, (tuning, tuning), distances=True, skipped_nodes=0
     )
-    return ZoneCost(rows, SoftWeights())
+    return ZoneCost(rows, weights)
 
 
 COSTS: dict[str, Cost] = {
     "tracking": TrackingCost(CostWeights()),
     "printed": TrackingCost(CostWeights(relative_velocity=False)),
+    "posture": PostureCost(CostWeights()),
     "soft walls": soft(*WALLS),
     "soft points": soft(*POINTS),
     "outside the sphere": SphereCost(SPHERE, (5.0, 20.0), only_outside=True),
@@ -69,8 +71,10 @@ def test_slope_is_the_finite_difference_and_the_model_is_convex(cost: Cost) -> N
             start[0:3] + random.uniform(-0.3, 0.3, (N + 1, 3)),
             random.uniform(-0.3, 0.3, (N + 1, 3)),
             start[YAW] + random.uniform(-2.5, 2.5, N + 1),
+            random.uniform(-1.0, 1.0, (N + 1, 2)),
         )
         _, slope, hessian = quadratic(cost, horizon_of(start, guess), guess, targets)
+        assert slope.any() or cost is COSTS["outside the sphere"]
         for column in range(INPUTS * N):
             step = np.zeros(INPUTS * N)
             step[column] = 1e-6
@@ -91,6 +95,17 @@ def test_terminal_node_weighs_five_times_as_table_two_says() -> None:
     targets = TargetPoints(tip - error, np.zeros((N + 1, 3)), np.zeros(N + 1))
     value, _, _ = quadratic(TrackingCost(CostWeights()), horizon, guess, targets)
     assert value == pytest.approx(float(error @ error) * (10.0 * (N - 1) + 50.0))
+
+
+def test_joints_that_are_asked_for_weigh_alike_at_every_node_and_none_weigh_nothing() -> None:
+    start, guess = np.zeros(19), np.zeros(INPUTS * N)
+    horizon = horizon_of(start, guess)
+    points = (horizon.position[:, 2], np.zeros((N + 1, 3)), np.zeros(N + 1))
+    asked = TargetPoints(*points, np.tile([0.3, -0.4], (N + 1, 1)))
+    cost = PostureCost(CostWeights(posture=8.0))
+    assert quadratic(cost, horizon, guess, asked)[0] == pytest.approx(8.0 * 0.25 * N)
+    value, slope, _ = quadratic(cost, horizon, guess, TargetPoints(*points))
+    assert (value, slope.any()) == (0.0, False)
 
 
 @pytest.mark.parametrize(
@@ -117,6 +132,37 @@ def test_soft_wall_always_pushes_away_and_more_when_closer(
     assert near[0] > far[0] > 0.0
     assert near[1] < far[1] < 0.0
     assert near[2] > 0.0
+
+
+@pytest.mark.parametrize("gap", [0.02, 0.05, 0.5, 2.0])
+def test_soft_wall_is_eq_29_beyond_a_small_gap(gap: float) -> None:
+    expected = (1.0 / (5.0 * gap**2), -2.0 / (5.0 * gap**3), 6.0 / (5.0 * gap**4))
+    assert one_sided_reciprocal(gap, 5.0) == pytest.approx(expected)
+
+
+def test_soft_wall_goes_on_as_a_parabola_from_there() -> None:
+    value, slope, curvature = one_sided_reciprocal(0.02, 5.0)
+    for into in (0.001, 0.02, 1.0):
+        on = one_sided_reciprocal(0.02 - into, 5.0)
+        assert on[0] == pytest.approx(value - slope * into + 0.5 * curvature * into**2)
+        assert on[1:] == pytest.approx((slope - curvature * into, curvature))
+
+
+def test_soft_walls_weigh_by_their_node_in_the_denominator() -> None:
+    """At rest all nodes are alike: n - 1 of them at w_4 and one at w_s4."""
+    guess = np.zeros(INPUTS * N)
+    horizon = horizon_of(np.zeros(19), guess)
+    targets = TargetPoints(np.zeros((N + 1, 3)), np.zeros((N + 1, 3)), np.zeros(N + 1))
+    light, heavy = (
+        quadratic(
+            soft(*WALLS, weights=SoftWeights(wall=4.0, wall_terminal=w)),
+            horizon,
+            guess,
+            targets,
+        )[0]
+        for w in (4.0, 16.0)
+    )
+    assert heavy / light == pytest.approx((N - 1 + 0.25) / N)
 
 
 def test_sphere_cost_of_eq_30_is_silent_inside() -> None:

@@ -102,6 +102,25 @@ def test_the_optimum_is_that_of_the_whole_program(
     assert cones_bound >= 3 or off < 1.0
 
 
+@pytest.mark.parametrize("joint", [1.2, -1.2])
+def test_an_arm_outside_its_limits_is_softened_at_every_node_as_little_as_can_be(
+    joint: float,
+) -> None:
+    """The first slack too: no input brings the arm back within one period."""
+    ocp = Ocp(CONFIG, condense(AIRFRAME, CONFIG.period, CONFIG.horizon), SafeSet())
+    start, n = np.zeros(19), CONFIG.horizon
+    start[15] = joint
+    still = TargetPoints(np.zeros((n + 1, 3)), np.zeros((n + 1, 3)), np.zeros(n + 1))
+    ocp.linearise(start, np.zeros(INPUTS * n), still)
+    found, whole = ocp.solve(), ClarabelSolver(ocp.qp.whole()).solve()
+    assert found.usable
+    assert whole.usable
+    slacks = found.x[ocp.qp.inputs :]
+    assert slacks[0] > 0.1
+    np.testing.assert_allclose(slacks, whole.x[ocp.qp.inputs :], atol=1e-3)
+    np.testing.assert_allclose(slacks, ocp.qp.least_slacks(found.x[: ocp.qp.inputs]), atol=1e-4)
+
+
 @pytest.mark.parametrize("safe_set", [WALLS, SPHERE], ids=["walls", "sphere"])
 def test_the_guess_says_where_to_look_and_not_what_is_found(safe_set: SafeSet) -> None:
     random = np.random.default_rng(8)

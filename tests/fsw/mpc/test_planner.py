@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import replace
 from typing import Any
@@ -10,8 +11,9 @@ import numpy as np
 import pytest
 
 from fsw.model.airframe import AIRFRAME
-from fsw.model.prediction import INPUTS, Array, condense, to_vector
+from fsw.model.prediction import INPUTS, Array, CondensedModel, condense, to_vector
 from fsw.mpc.ocp import Ocp
+from fsw.mpc.planner import Planner
 from fsw.mpc.planner_config import PlannerConfig
 from fsw.shapes.half_space import wall
 from fsw.shapes.target_sphere import target_sphere
@@ -20,6 +22,7 @@ from fsw.signals import (
     Plan,
     PlanFailure,
     PlanInput,
+    PlanTimings,
     PredictionState,
     SafeSet,
     SolverStatus,
@@ -148,6 +151,37 @@ def test_a_target_that_is_no_number_is_refused(name: str, value: float) -> None:
     assert answer.status is SolverStatus.INPUT_REFUSED
 
 
+def test_a_heading_that_is_no_number_is_refused() -> None:
+    asked = request(hovering(), replace(below((0.0, 0.0, -1.2)), yaw=math.nan))
+    answer = planner().plan(asked)
+    assert isinstance(answer, PlanFailure)
+    assert "target is not finite" in answer.reason
+
+
+@pytest.mark.parametrize(
+    ("joints", "reason"),
+    [
+        (((0.1, -0.1),) * 5, "5 joint targets given for 6 nodes"),
+        (((0.1, -0.1),) * 5 + ((0.1, math.nan),), "a joint target is not finite"),
+        (((math.inf, 0.0),) * 6, "a joint target is not finite"),
+    ],
+)
+def test_joints_that_are_no_numbers_or_too_few_are_refused(joints: Any, reason: str) -> None:
+    asked = request(hovering(), below((0.0, 0.0, -1.2)))
+    answer = planner().plan(replace(asked, joint_targets=joints))
+    assert isinstance(answer, PlanFailure)
+    assert (answer.status, answer.reason) == (SolverStatus.INPUT_REFUSED, reason)
+    assert answer.timings == PlanTimings(0.0, 0.0, 0.0)
+
+
+def test_joints_that_are_asked_for_are_moved_towards() -> None:
+    asked = request(hovering(), below((0.0, 0.0, -1.2)))
+    folded = planned(planner().plan(replace(asked, joint_targets=((0.3, -0.5),) * 6)))
+    first, second = nodes_of(folded)[-1, 15:17]
+    assert 0.05 < first < 0.35
+    assert -0.6 < second < -0.05
+
+
 @pytest.mark.parametrize("count", [0, 1, 5, 7])
 def test_a_wrong_number_of_targets_is_refused(count: int) -> None:
     start = hovering()
@@ -155,6 +189,7 @@ def test_a_wrong_number_of_targets_is_refused(count: int) -> None:
     answer = planner().plan(replace(asked, targets=(asked.targets[0],) * count))
     assert isinstance(answer, PlanFailure)
     assert answer.status is SolverStatus.INPUT_REFUSED
+    assert answer.reason == f"{count} targets given, 6 needed"
 
 
 @pytest.mark.parametrize(
@@ -194,6 +229,54 @@ def test_a_change_of_the_safe_set_changes_the_plan_at_once() -> None:
     assert free.barrier == ()
     assert len(held.barrier) == 3
     assert nodes_of(held)[-1, 0] < nodes_of(free)[-1, 0] - 0.02
+
+
+def test_a_tuning_plans_as_a_planner_configured_so_until_it_is_taken_back() -> None:
+    asked, used = request(hovering(), below((2.0, 0.0, -1.2)), AHEAD), planner()
+    before = used.plan(asked)
+    tuning = (("limits.tilt", 0.1), ("weights.tracking", 3.0))
+    tuned = replace(
+        CONFIG,
+        limits=replace(CONFIG.limits, tilt=0.1),
+        weights=replace(CONFIG.weights, tracking=3.0),
+    )
+    for _ in range(2):
+        assert used.plan(replace(asked, tuning=tuning)) == planner(tuned).plan(asked) != before
+    assert used.plan(asked) == before
+
+
+def test_what_is_known_of_a_safe_set_is_built_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    built: list[SafeSet] = []
+
+    class Counted(Ocp):
+        def __init__(self, config: PlannerConfig, model: CondensedModel, safe_set: SafeSet) -> None:
+            built.append(safe_set)
+            super().__init__(config, model, safe_set)
+
+    monkeypatch.setattr("fsw.mpc.planner.Ocp", Counted)
+    used, tuning = planner(), (("limits.tilt", 0.1),)
+    tuned = replace(request(hovering(), below((0.5, 0.0, -1.2)), AHEAD), tuning=tuning)
+    for asked in (tuned, tuned, replace(tuned, safe_set=SPHERE), tuned):
+        used.plan(asked)
+    assert built == [AHEAD, SPHERE, AHEAD]
+
+
+def test_the_reported_times_are_those_of_the_stages_and_of_the_whole() -> None:
+    seconds = itertools.count(5000, step=1000)
+    used = Planner(CONFIG, AIRFRAME, lambda: float(next(seconds)))
+    asked = request(hovering(), below((0.5, 0.0, -1.2)))
+    # Two programs, each between marks: begin, linearised, solved.
+    assert planned(used.plan(asked)).timings == PlanTimings(2000.0, 2000.0, 7000.0)
+
+
+def test_a_program_without_an_answer_is_the_last_and_its_time_is_reported() -> None:
+    seconds = itertools.count(5000, step=1000)
+    used = Planner(replace(CONFIG, controller="hc"), AIRFRAME, lambda: float(next(seconds)))
+    behind = hovering((3.0, 0.0, -1.2))
+    answer = used.plan(request(behind, below(behind.p), AHEAD))
+    assert isinstance(answer, PlanFailure)
+    assert (answer.plan_id, answer.status) == (7, SolverStatus.INFEASIBLE)
+    assert answer.timings == PlanTimings(1000.0, 1000.0, 4000.0)
 
 
 def test_the_last_plan_moved_on_by_a_period_is_the_next_guess(

@@ -8,12 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fsw.barriers.constraint_block import TargetPoints
+from fsw.barriers.constraint_block import ConstraintBlock, TargetPoints
 from fsw.model.airframe import AIRFRAME
 from fsw.model.linearisation import Linearisation
 from fsw.model.prediction import INPUTS, Array, condense, to_vector
 from fsw.mpc.costs import CostWeights, TrackingCost
 from fsw.mpc.planner_config import PlannerConfig
+from fsw.mpc.qp_data import QpData
 from fsw.shapes.ball import point
 from fsw.shapes.half_space import wall
 from fsw.shapes.target_sphere import target_sphere
@@ -181,6 +182,24 @@ def test_every_controller_is_its_problem_written_a_second_time(
         np.testing.assert_allclose(difference / loose, 0.0, atol=0.01)
         compared += 1
     assert compared >= 2
+
+
+def test_every_soft_block_has_slacks_of_its_own_at_its_penalty_and_a_hard_one_has_none() -> None:
+    """Two rows that share a slack, three hard ones, two slacks, and one that costs nothing."""
+
+    def block(slack: list[int]) -> ConstraintBlock:
+        return ConstraintBlock(np.ones(len(slack), dtype=np.intp), np.array(slack), INPUTS, 0)
+
+    program = QpData(
+        1,
+        CONFIG.limits,
+        ((block([0, 0]), 7.0), (block([0, 1, 2]), None), (block([1, 0]), 3.0), (block([0]), 0.0)),
+    )
+    assert program.penalty.tolist() == [7.0, 3.0, 3.0, 0.0]
+    assert program.rows.slack[: program.block_rows].tolist() == [0, 0, -1, -1, -1, 2, 1, 3]
+    assert (program.rows.slack[program.block_rows :] == -1).all(), "input limits are hard"
+    assert program.unknowns == INPUTS + 4
+    assert program.whole().q.tolist() == [0.0] * INPUTS + [7.0, 3.0, 3.0, 0.0]
 
 
 def test_printed_velocity_cost_is_a_switch() -> None:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
-from scipy.optimize import approx_fprime
+from scipy.optimize import approx_fprime, fmin_slsqp
 
 from benchmarks.optimiser.slopes import slopes_of
 from fsw.barriers.constraint_block import TargetPoints
@@ -15,7 +18,7 @@ from fsw.model.airframe import AIRFRAME
 from fsw.model.prediction import INPUTS, STATES, Array, condense
 from fsw.mpc.ocp import Ocp
 from fsw.mpc.planner_config import PlannerConfig
-from fsw.mpc.slsqp_solver import MAX_ITERATIONS, NonlinearProgram, minimise
+from fsw.mpc.slsqp_solver import MAX_ITERATIONS, TOLERANCE, NonlinearProgram, minimise
 from fsw.mpc.solution import Solution
 from fsw.mpc.variants import VARIANTS
 from fsw.shapes.half_space import wall
@@ -145,7 +148,7 @@ def test_starts_at_rest_with_the_slacks_that_admit_it() -> None:
     x = point.rest()
     assert (x[: INPUTS * N] == 0.0).all()
     assert x.max() > 0.0
-    assert point.margins(x).min() >= -1e-12
+    assert point.margins(x).min() == pytest.approx(0.0, abs=1e-12), "and no more than that"
 
 
 def test_margins_and_bounds_together_admit_what_the_program_admits() -> None:
@@ -178,6 +181,37 @@ def test_no_plan_without_convergence() -> None:
     answer = search(Ocp(CONFIG, MODEL, WALLS), start, targets, max_iterations=2)
     assert answer.status is SolverStatus.TIME_LIMIT
     assert not answer.usable
+
+
+@pytest.mark.parametrize(
+    ("mode", "status"),
+    [
+        (0, SolverStatus.SOLVED),
+        (4, SolverStatus.INFEASIBLE),
+        (9, SolverStatus.TIME_LIMIT),
+        (8, SolverStatus.NUMERICAL_ERROR),
+    ],
+)
+@pytest.mark.parametrize("broken", ["", "x", "fun"])
+def test_only_what_slsqp_calls_converged_and_finite_is_solved(
+    monkeypatch: pytest.MonkeyPatch, mode: int, status: SolverStatus, broken: str
+) -> None:
+    """By its exit modes: converged, incompatible, out of iterations, uphill."""
+    start, targets = instance(np.random.default_rng(8), WALLS)
+    problem = NonlinearProgram(Ocp(CONFIG, MODEL, WALLS), start, targets)
+    said: dict[str, Any] = {"x": problem.rest(), "fun": 1.0, "status": mode, "nit": 3}
+    if broken:
+        said[broken] = math.nan * said[broken]
+    monkeypatch.setattr("fsw.mpc.slsqp_solver.minimize", lambda *_, **__: SimpleNamespace(**said))
+    answer = minimise(problem)
+    assert answer.status is (SolverStatus.NUMERICAL_ERROR if broken else status)
+    assert answer.usable is (mode == 0 and not broken)
+    assert answer.iterations == 3
+
+
+def test_it_stops_where_scipy_stops_by_default() -> None:
+    defaults = inspect.signature(fmin_slsqp).parameters
+    assert (defaults["iter"].default, defaults["acc"].default) == (MAX_ITERATIONS, TOLERANCE)
 
 
 def test_what_cannot_be_kept_is_infeasible() -> None:

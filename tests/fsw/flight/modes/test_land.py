@@ -36,6 +36,11 @@ def test_the_reference_goes_straight_down_at_the_landing_speed(seconds: float) -
     assert LAND.reference(state, 20_000_000).v_WE == pytest.approx((0.0, 0.0, 0.25))
 
 
+def test_the_descent_goes_on_for_a_hundred_metres_wherever_the_ground_is() -> None:
+    state = flying(Mode.LAND, mode_origin=(1.0, 2.0, -9.0))
+    assert LAND.reference(state, 399_000_000).v_WE[2] > 0.0
+
+
 @pytest.mark.parametrize(
     ("height", "sink", "plan_below", "moved_us", "over"),
     [
@@ -47,6 +52,7 @@ def test_the_reference_goes_straight_down_at_the_landing_speed(seconds: float) -
         (0.0, 0.04, 0.0, 500_000, True),
         (0.0, -0.04, 0.0, 500_000, True),
         (0.0, 0.0, 0.0, 500_001, False),
+        (0.0, 0.05, 0.0, 500_000, False),
         # High above it neither.
         (0.2, 0.0, 0.5, 0, False),
         (0.2, 0.0, 0.0, 0, False),
