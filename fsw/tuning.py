@@ -8,12 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import fields, is_dataclass, replace
-from typing import Any, TypeVar, cast
+from typing import Any, Final, TypeVar, cast
 
 Tuning = tuple[tuple[str, float], ...]
 """Dotted path and value of every number that differs; what is absent is as configured."""
 
 Number = int | float | bool
+
+# Fields that are words and are tuned by the number of the word.
+WORDS: Final[dict[str, tuple[str, ...]]] = {"body": ("points", "full")}
 
 Config = TypeVar("Config")
 
@@ -25,14 +28,14 @@ def tuned(config: Config, tuning: Tuning) -> Config:
         ValueError: A dataclass refuses its new numbers, or a value is no number for its field.
         AttributeError: The configuration has no such path.
     """
-    here: dict[str, float] = {}
+    here: dict[str, float | str] = {}
     below: dict[str, list[tuple[str, float]]] = {}
     for path, value in tuning:
         name, _, rest = path.partition(".")
         if rest:
             below.setdefault(name, []).append((rest, value))
         else:
-            here[name] = _like(getattr(config, name), value)
+            here[name] = _like(name, getattr(config, name), value)
     changed: dict[str, Any] = dict(here)
     for name, inner in below.items():
         changed[name] = tuned(getattr(config, name), tuple(inner))
@@ -53,6 +56,8 @@ def number_at(config: object, path: str) -> float:
     """
     for name in path.split("."):
         config = getattr(config, name)
+    if isinstance(config, str):
+        return float(WORDS[name].index(config))
     return float(cast(float, config))
 
 
@@ -74,8 +79,13 @@ def _numbers(path: str, value: object) -> Iterator[tuple[str, Number]]:
     elif is_dataclass(value):
         for field in fields(value):
             inner = f"{path}.{field.name}" if path else field.name
-            yield from _numbers(inner, getattr(value, field.name))
+            found = getattr(value, field.name)
+            if field.name in WORDS and isinstance(found, str):
+                found = WORDS[field.name].index(found)
+            yield from _numbers(inner, found)
 
 
-def _like(old: object, value: float) -> float:
+def _like(name: str, old: object, value: float) -> float | str:
+    if isinstance(old, str):
+        return WORDS[name][round(value)]
     return round(value) if isinstance(old, int) else value

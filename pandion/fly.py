@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import sys
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
 from command_line.options import as_words, declared, group, json_file, read
@@ -48,6 +48,7 @@ class PlannedFlight:
 
     options: FlyOptions
     name: str  # of the scenario
+    body: str  # that the scenario is for
     digest: str  # of the scenario's file
     duration_s: float
     out: Path
@@ -89,6 +90,7 @@ def planned(options: FlyOptions) -> PlannedFlight:
     return PlannedFlight(
         options=options,
         name=scenario.name,
+        body=scenario.body,
         digest=scenario_digest(options.scenario),
         duration_s=scenario.duration_s if options.duration_s is None else options.duration_s,
         out=run_directory(options.out, f"{scenario.name}-seed{options.seed}"),
@@ -121,7 +123,7 @@ def _fsw_options(flight: PlannedFlight, port: int) -> FswOptions:
     return FswOptions(
         sim=f"udp:127.0.0.1:{port}",
         links=options.links,
-        control=options.control,
+        control=replace(options.control, body=options.control.body or flight.body),
         params=options.params,
         out=flight.out,
         wait_s=_WAIT_S,

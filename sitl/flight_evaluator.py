@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from sitl.body import BASE, END_EFFECTOR, JOINT2
 from sitl.mission_clock import MissionClock
 from sitl.plant.vector import Array
 from sitl.result import EndKind, EndReason, MarginRecord, TrackingError, TruthResult, score
@@ -22,15 +23,19 @@ _NO_CURVE = np.empty(0)
 class FlightEvaluator:
     """The score of one run and the first reason to end it.
 
-    It begins with the critical points at the start.
+    It begins with what the plant places at the start.
 
     Raises:
         ScenarioError: The start is outside the safe set.
     """
 
-    def __init__(self, scenario: Scenario, clock: MissionClock, points: Points) -> None:
+    def __init__(self, scenario: Scenario, clock: MissionClock, places: Array) -> None:
+        """Begin with places (rows, 3) [m, NED]: base, joint 1, joint 2, end-effector.
+
+        For the full body the base's axes [1, NED] follow.
+        """
         self.world = World(scenario)
-        self.record = MarginRecord(self.world.keys)
+        self.record = MarginRecord(self.world.keys, self.world.clearances)
         self.ended: EndReason | None = None
         self.left: str | None = None  # why the trajectory is no longer flown
         self.silent: str | None = None  # since which step the flight software was silent
@@ -38,61 +43,58 @@ class FlightEvaluator:
         self._error = TrackingError()
         self._duration_s = scenario.duration_s
         self._whole = _whole(scenario)
-        margins = self.margins(points, 0.0)
+        margins = self.margins(places, 0.0)
         check_start(self.world.keys, margins)
         self.record.add(margins, 0.0)
-        self.sample_error(points, 0.0)
+        self.sample_error(critical(places), 0.0)
 
     def end(self, kind: EndKind, sentence: str, time_s: float) -> None:
         """End the run; the first reason stands."""
         if self.ended is None:
             self.ended = EndReason(kind, sentence, time_s)
 
-    def margins(self, points: Points, time_s: float) -> tuple[float, ...]:
-        """Margins [m] in the order of ``world.keys``."""
-        applies = self.world.workspace is not None and self._clock.counts(time_s)
-        return self.world.margins(points, self._clock.target_at(time_s).p if applies else None)
+    def margins(self, places: Array, time_s: float) -> tuple[float, ...]:
+        """Margins [m] in the order of ``world.keys``, of places (rows, 3) [m, NED]."""
+        applies = self.world.follows and self._clock.counts(time_s)
+        target = self._clock.target_at(time_s).p if applies else None
+        return self.world.margins(places, time_s, target)
 
-    def judge(self, points: Points, time_s: float) -> None:
-        """Evaluate one plant step."""
+    def judge(self, places: Array, time_s: float, step_s: float = 0.0) -> None:
+        """Evaluate one plant step, ``step_s`` long, that ended with places (rows, 3) [m, NED]."""
         if self.ended is not None:
             return
-        margins = self.margins(points, time_s)
-        self.record.add(margins, time_s)
-        # Twice a step: comparisons that are false for what is not a number settle almost every one.
-        (_, _, base), (_, _, joint2), (_, _, end) = points
-        if base < 0.0 and joint2 < 0.0 and end < 0.0 < min(margins, default=1.0):
-            return
-        if not math.isfinite(sum(map(sum, points))):
+        margins = self.margins(places, time_s)
+        self.record.add(margins, time_s, step_s)
+        if not np.isfinite(places).all():
             self.end(EndKind.DIVERGED, f"the simulation diverged at {time_s:.3f} s", time_s)
             return
-        touched = self.world.collision(points, margins)
+        touched = self.world.collision(places, margins)
         if touched is not None:
             self.end(EndKind.COLLISION, f"{touched} at {time_s:.2f} s", time_s)
 
     def judge_all(self, places: Array, before_s: float, step_s: float) -> None:
         """Look at every plant step, ``step_s`` long, of an exchange that began at ``before_s``.
 
-        ``places`` (steps, 2 + j, 3) [m, NED] are from ``sitl.plant.integrator.integrate``.
+        ``places`` (steps, rows, 3) [m, NED] are from ``sitl.plant.integrator.integrate``.
         """
         if self.ended is None and self._all_clear(places, before_s, step_s):
             return
-        for k, rows in enumerate(places.tolist(), start=1):
-            self.judge(critical(rows), before_s + k * step_s)
+        for k, now in enumerate(places, start=1):
+            self.judge(now, before_s + k * step_s, step_s)
 
     def _all_clear(self, places: Array, before_s: float, step_s: float) -> bool:
         """Record the margins of steps without any incident; False, and nothing done, otherwise."""
         curve, starts_s = _NO_CURVE, 0.0
-        if self.world.workspace is not None:
+        if self.world.follows:
             clock, last_s = self._clock, before_s + len(places) * step_s
             if clock.starts_s is None or not clock.counts(last_s):
                 return False
             curve, starts_s = clock.curve, clock.starts_s
         lowest, when_s = self.record.arrays
+        world = self.world
         return record_if_clear(
-            self.world.planes,
-            self.world.balls,
-            self.world.sphere,
+            world.table,
+            world.parts,
             (curve, starts_s),
             places,
             (before_s, step_s),
@@ -132,9 +134,10 @@ def _whole(scenario: Scenario) -> EndKind:
     return EndKind.DURATION if math.isfinite(scenario.duration_s) else EndKind.INTERRUPTED
 
 
-def critical(rows: list[list[float]]) -> Points:
-    """Base, joint 2 and end-effector out of base, joint 1, …, end-effector."""
-    return _three(rows[0]), _three(rows[2]), _three(rows[-1])
+def critical(places: Array) -> Points:
+    """Base, joint 2 and end-effector out of places (rows, 3) [m, NED]."""
+    rows = places.tolist()
+    return _three(rows[BASE]), _three(rows[JOINT2]), _three(rows[END_EFFECTOR])
 
 
 def _three(values: list[float]) -> V3:

@@ -43,7 +43,9 @@ class TruthResult:
     duration_s: float
     tracking_error_rms_m: float | None  # None before the first sample
     tracking_error_max_m: float | None
-    margins_m: dict[str, float]  # intersample minimum per constraint
+    margins_m: dict[str, float]  # intersample minimum per zone and part
+    surfaces_m: dict[str, float]  # the same to the surface itself, without the clearance
+    beyond_s: dict[str, float]  # how long a part was beyond a surface, if it was
     min_margin_m: float | None  # None without constraints
     min_margin_key: str | None
     min_margin_time_s: float | None
@@ -76,8 +78,11 @@ class TrackingError:
 class MarginRecord:
     """Smallest value of every margin and when it was reached."""
 
-    def __init__(self, keys: tuple[str, ...]) -> None:
+    def __init__(self, keys: tuple[str, ...], clearances: Array) -> None:
+        """Begin without any, for ``keys`` with clearances (keys,) [m]."""
         self.keys = keys
+        self._clearances = clearances
+        self._beyond_s = np.zeros(len(keys))
         self._lowest = np.full(len(keys), math.inf)
         self._when_s = np.zeros(len(keys))
 
@@ -96,8 +101,20 @@ class MarginRecord:
         """The memory behind both, for kernels."""
         return self._lowest, self._when_s
 
-    def add(self, values: tuple[float, ...], time_s: float) -> None:
-        """Take the margins [m] at one time, in the order of ``keys``."""
+    @property
+    def surfaces(self) -> list[float]:
+        """Smallest distance to the surface of each so far [m]; infinite before the first."""
+        distances: list[float] = (self._lowest + self._clearances).tolist()
+        return distances
+
+    @property
+    def beyond_s(self) -> list[float]:
+        """How long each was beyond the surface [s]."""
+        return self._beyond_s.tolist()
+
+    def add(self, values: tuple[float, ...], time_s: float, step_s: float = 0.0) -> None:
+        """Take the margins [m] at one time, in the order of ``keys``, after a ``step_s``."""
+        self._beyond_s[np.array(values) + self._clearances < 0.0] += step_s
         for i, value in enumerate(values):
             # Written so that NaN is recorded, not passed over.
             if not (value >= self._lowest[i]):
@@ -123,6 +140,18 @@ def violation(record: MarginRecord) -> str | None:
     )
 
 
+def beyond(record: MarginRecord) -> str | None:
+    """A sentence about the part that was beyond a surface for longest, None if none was."""
+    longest = max(range(len(record.keys)), key=lambda i: record.beyond_s[i], default=None)
+    if longest is None or not record.beyond_s[longest] > 0.0:
+        return None
+    depth = -1000.0 * record.surfaces[longest]
+    return (
+        f"{record.keys[longest]} was beyond the surface for {record.beyond_s[longest]:.3f} s, "
+        f"by up to {depth:.1f} mm"
+    )
+
+
 def score(
     end: EndReason | None,
     time_s: float,
@@ -145,6 +174,9 @@ def score(
     parts += flaws
     if broken is not None:
         parts.append(broken)
+    behind = beyond(record)
+    if behind is not None:
+        parts.append(behind)
     return TruthResult(
         completed=flown and broken is None and not flaws,
         end_reason="; ".join(parts),
@@ -152,6 +184,10 @@ def score(
         tracking_error_rms_m=error.rms,
         tracking_error_max_m=error.maximum,
         margins_m={k: m for k, m in zip(record.keys, record.minimum, strict=True) if m != math.inf},
+        surfaces_m={
+            k: m for k, m in zip(record.keys, record.surfaces, strict=True) if m != math.inf
+        },
+        beyond_s={k: s for k, s in zip(record.keys, record.beyond_s, strict=True) if s > 0.0},
         min_margin_m=None if worst is None else record.minimum[worst],
         min_margin_key=None if worst is None else record.keys[worst],
         min_margin_time_s=None if worst is None else record.time_s[worst],

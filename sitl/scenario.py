@@ -112,6 +112,37 @@ class Workspace:
 
 
 @dataclass(frozen=True, slots=True)
+class WayPoint:
+    """Where a zone is at a time, as seen from where it begins."""
+
+    time_s: Annotated[float, Range(0.0, 86400.0)]  # since the start of the simulation
+    moved_m: Annotated[V3, Range(-WORLD_M, WORLD_M)]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ScenarioZone:
+    """What all zones have; what a shape adds is in its file in ``sitl/shapes``."""
+
+    name: str
+    clearance_m: Annotated[float, Range(0.0, 10.0)]
+    keep_in: bool = False  # to stay inside of
+    velocity_m_s: Annotated[V3, Range(-20.0, 20.0)] = (0.0, 0.0, 0.0)
+    starts_s: Annotated[float, Range(0.0, 86400.0)] = 0.0  # to move with that velocity
+    way_points: tuple[WayPoint, ...] = ()  # in place of a velocity: straight from one to the next
+
+    def numbers(self, moved: V3) -> tuple[float, ...]:
+        """The numbers of PANDION_SHAPE for a zone that has ``moved`` [m, NED]."""
+        raise NotImplementedError
+
+    def problem(self) -> str | None:
+        """Key, value and what is allowed, where its numbers contradict each other."""
+        raise NotImplementedError
+
+
+Body: TypeAlias = Literal["points", "full"]
+
+
+@dataclass(frozen=True, slots=True)
 class Uniform:
     """Acceleration drawn uniformly from ±amplitude per axis, anew every period."""
 
@@ -213,9 +244,12 @@ class Scenario:
     pilot: Pilot
     trajectory: Trajectory
     description: str = ""
+    # What of the vehicle keeps clear and is judged: the paper's three points, or all of it.
+    body: Body = "full"
     walls: tuple[ScenarioWall, ...] = ()
     obstacles: tuple[Obstacle, ...] = ()
     workspace: Workspace | None = None
+    zones: tuple[ScenarioZone, ...] = ()
     disturbances: tuple[Disturbance, ...] = ()
     sensors: Sensors = Sensors()
     vehicle_scale: VehicleScale = VehicleScale()

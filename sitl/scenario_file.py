@@ -12,7 +12,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_args, get_origin
 
-from sitl.scenario import Range, Scenario
+from sitl.scenario import Range, Scenario, ScenarioZone
 
 _DIGITS = 12
 PACKAGED = Path(__file__).parent / "scenarios"
@@ -115,32 +115,47 @@ def _value(hint: Any, value: Any, path: str) -> Any:
         return _numbers(parts[0], parts[1], value, path)
     if origin is types.UnionType:
         return _table_of_a_kind([part for part in parts if part is not types.NoneType], value, path)
+    if hint is ScenarioZone:
+        # Loads numba, for which a scenario without zones need not wait.
+        from sitl.shapes import TABLES
+
+        return _table_of_a_kind(list(TABLES), value, path, "shape")
     if dataclasses.is_dataclass(hint):
         return _build(hint, value, path)
     if origin is tuple:
         if not isinstance(value, list):
             raise ScenarioError(f"{path} = {value!r}: must be an array of tables ([[{path}]])")
         return tuple(_value(parts[0], item, f"{path}[{i}]") for i, item in enumerate(value))
+    if hint is bool:
+        if not isinstance(value, bool):
+            raise ScenarioError(f"{path} = {value!r}: must be true or false")
+        return value
+    return _word(hint, value, path)
+
+
+def _word(hint: Any, value: Any, path: str) -> str:
+    """A text, or one of several."""
+    parts = get_args(hint)
     if not isinstance(value, str):
         raise ScenarioError(f"{path} = {value!r}: must be a text{_allowed(hint)}")
-    if origin is Literal and value not in parts:
+    if get_origin(hint) is Literal and value not in parts:
         raise ScenarioError(f'{path} = "{value}": must be {_words(parts)}{_nearest(value, parts)}')
     return value
 
 
-def _table_of_a_kind(kinds: list[Any], value: Any, path: str) -> Any:
-    """A table whose key ``kind`` names its type, where there are several."""
+def _table_of_a_kind(kinds: list[Any], value: Any, path: str, key: str = "kind") -> Any:
+    """A table with a ``key`` that names its type, where there are several."""
     if len(kinds) == 1:
         return _build(kinds[0], value, path)
-    words = {get_args(typing.get_type_hints(kind)["kind"])[0]: kind for kind in kinds}
+    words = {get_args(typing.get_type_hints(kind)[key])[0]: kind for kind in kinds}
     if not isinstance(value, dict):
         raise ScenarioError(f"{path} = {value!r}: must be a table")
-    if "kind" not in value:
-        raise ScenarioError(f'missing key "{path}.kind": must be {_words(words)}')
-    word = value["kind"]
+    if key not in value:
+        raise ScenarioError(f'missing key "{path}.{key}": must be {_words(words)}')
+    word = value[key]
     if word not in words:
         raise ScenarioError(
-            f"{path}.kind = {word!r}: must be {_words(words)}{_nearest(word, words)}"
+            f"{path}.{key} = {word!r}: must be {_words(words)}{_nearest(word, words)}"
         )
     return _build(words[word], value, path)
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 from sitl.scenario import Lissajous, Scenario, Start
 from sitl.scenario_file import ScenarioError
-from sitl.world import CRITICAL_POINTS
 
 FIRST_JOINT_DEG, BOTH_JOINTS_DEG = 60.0, 90.0  # the arm's limits, Table I of the paper
-MARGINS_MAX = 16  # what one BARRIER_MARGIN message carries
+ZONES_MAX = 64  # in a set of OBSTACLE_SHAPE
 
 
 def check(scenario: Scenario) -> None:
@@ -20,6 +20,7 @@ def check(scenario: Scenario) -> None:
     """
     _check_start(scenario.start)
     _check_walls(scenario)
+    _check_zones(scenario)
     _check_names(scenario)
     curve = scenario.trajectory
     if isinstance(curve, Lissajous) and not (2.0 * curve.ramp_s <= curve.duration_s):
@@ -62,24 +63,44 @@ def _check_walls(scenario: Scenario) -> None:
             raise ScenarioError(
                 f"walls[{i}].normal = {list(wall.normal)}: must have length 1, has {length:.6g}"
             )
-    kept = len(scenario.walls) + len(scenario.obstacles)
-    if kept * len(CRITICAL_POINTS) + (scenario.workspace is not None) > MARGINS_MAX:
-        most = MARGINS_MAX // len(CRITICAL_POINTS)
-        both = f"walls and obstacles = {kept}" if scenario.obstacles else f"walls = {kept}"
-        raise ScenarioError(f"{both} tables: must be at most {most}")
-    if scenario.obstacles and scenario.workspace is not None:
-        raise ScenarioError("obstacles: cannot be kept together with a workspace")
+
+
+def _check_zones(scenario: Scenario) -> None:
+    for i, zone in enumerate(scenario.zones):
+        problem = zone.problem()
+        if problem is not None:
+            raise ScenarioError(f"zones[{i}].{problem}")
+        times = [point.time_s for point in zone.way_points]
+        if zone.way_points and any(zone.velocity_m_s):
+            raise ScenarioError(
+                f"zones[{i}].velocity_m_s: cannot be given together with way_points"
+            )
+        for k, (time_s, next_s) in enumerate(itertools.pairwise(times), start=1):
+            if not next_s > time_s:
+                raise ScenarioError(
+                    f"zones[{i}].way_points[{k}].time_s = {next_s:g}: must be after {time_s:g}, "
+                    "the one before"
+                )
+    count = len(scenario.walls) + len(scenario.obstacles) + len(scenario.zones)
+    count += scenario.workspace is not None
+    if count > ZONES_MAX:
+        raise ScenarioError(
+            f"walls, obstacles, zones and workspace are {count}: must be at most {ZONES_MAX}"
+        )
 
 
 def _check_names(scenario: Scenario) -> None:
     walls = [wall.name for wall in scenario.walls]
-    for key, taken, names in (
+    obstacles = [one.name for one in scenario.obstacles]
+    taken = [*walls, *obstacles, *(["workspace"] if scenario.workspace is not None else [])]
+    for key, others, names in (
         ("walls", [], walls),
-        ("obstacles", walls, [one.name for one in scenario.obstacles]),
+        ("obstacles", walls, obstacles),
+        ("zones", taken, [zone.name for zone in scenario.zones]),
         ("disturbances", [], [item.name for item in scenario.disturbances]),
     ):
         for i, name in enumerate(names):
-            if name in (*taken, *names[:i]):
+            if name in (*others, *names[:i]):
                 raise ScenarioError(f'{key}[{i}].name = "{name}": must differ from the others')
             if not name or len(name) > 24 or "/" in name:
                 raise ScenarioError(

@@ -11,12 +11,13 @@ import numpy as np
 
 from sitl.compiled import machine_code
 from sitl.disturbances.items import push
-from sitl.flight_evaluator import FlightEvaluator, Points, critical
+from sitl.flight_evaluator import FlightEvaluator, critical
 from sitl.mission_clock import MissionClock
 from sitl.plant.aerial_manipulator import Plant, plant
 from sitl.plant.integrator import STEP_S, step
-from sitl.plant.kinematics import places
+from sitl.plant.kinematics import places as places_into
 from sitl.plant.state import ARM, P_WB, Q_WB, THRUST, V_WB, W_WB_B
+from sitl.plant.vector import Array
 from sitl.result import EndKind, EndReason, TruthResult
 from sitl.scenario import V3, Scenario
 from sitl.scenario_file import ScenarioError
@@ -78,14 +79,15 @@ class Simulation:
         self._pushes = [push(item, seed, 1e-6 * STEP_US) for item in scenario.disturbances]
         self._state, trim = first_state(self.vehicle, scenario, self.clock.target_at(0.0).p)
         self._thrust, self._torque = trim.thrust, trim.torque
-        self._places = np.empty((SUBSTEPS, 2 + len(self.vehicle.links), 3))
+        axes = 3 if scenario.body == "full" else 0
+        self._places = np.empty((SUBSTEPS, 2 + len(self.vehicle.links) + axes, 3))
         still = (0.0, 0.0, 0.0)
         # No steps: only what the accelerometer feels at the start.
         example = (self._thrust, self._torque, still, still, STEP_S, self._places[:0])
         self._step = machine_code(step, self._plants, self._state, *example)
         self._felt = self._step(self._plants, self._state, *example).felt
         self._reading: SensorReadings | None = None
-        self._evaluator = FlightEvaluator(scenario, self.clock, self._points_now())
+        self._evaluator = FlightEvaluator(scenario, self.clock, self._places_now())
 
     @property
     def t_us(self) -> int:
@@ -164,7 +166,7 @@ class Simulation:
     def truth(self) -> Truth:
         """The true state now."""
         exact = self._exact_reading()
-        points = self._points_now()
+        places = self._places_now()
         return Truth(
             t_us=self.t_us,
             p_WB=exact.p_WB,
@@ -174,9 +176,9 @@ class Simulation:
             thrust=_four(self._state[THRUST:ARM].tolist()),
             q_arm=exact.q_arm,
             qd_arm=exact.qd_arm,
-            p_WE=points[2],
+            p_WE=critical(places)[2],
             target=self.clock.target_at(self.time_s),
-            margins_m=self._evaluator.margins(points, self.time_s),
+            margins_m=self._evaluator.margins(places, self.time_s),
         )
 
     def state_bytes(self) -> bytes:
@@ -237,14 +239,15 @@ class Simulation:
         """Judge every plant step of the exchange that began at ``before_s``."""
         self._evaluator.judge_all(self._places, before_s, STEP_S)
         if self.step % SAMPLE_STEPS == 0:
-            self._evaluator.sample_error(critical(self._places[-1].tolist()), self.time_s)
+            self._evaluator.sample_error(critical(self._places[-1]), self.time_s)
         self._evaluator.judge_landing(landing_speed, self.time_s)
         self._evaluator.judge_time(self.time_s)
 
-    def _points_now(self) -> Points:
+    def _places_now(self) -> Array:
         out = np.empty((1, *self._places.shape[1:]))
-        places(self._plant, self._state, out)
-        return critical(out[0].tolist())
+        places_into(self._plant, self._state, out)
+        now: Array = out[0]
+        return now
 
 
 def _four(values: list[float]) -> V4:

@@ -1,4 +1,4 @@
-"""Walls, obstacles, workspace and ground, judged on the plant's true state.
+"""Zones and ground, judged on the plant's true state.
 
 Source: docs/equations.md E11, E14, E15.
 """
@@ -6,87 +6,154 @@ Source: docs/equations.md E11, E14, E15.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
+from sitl.body import (
+    BALL,
+    BASE,
+    CRITICAL_POINTS,
+    END_EFFECTOR,
+    JOINT2,
+    Parts,
+    as_arrays,
+    parts_of,
+    spoken,
+)
 from sitl.compiled import compiled
-from sitl.plant.vector import Array
-from sitl.scenario import V3, Scenario, Workspace
+from sitl.distance import nearest, part_bound, part_distance
+from sitl.plant.parameters import Vehicle
+from sitl.plant.vector import V3, Array
+from sitl.scenario import Scenario
+from sitl.shapes import KINDS
+from sitl.shapes.kind import NUMBERS
 from sitl.trajectory import place_on_curve
+from sitl.zones import Zone, zones_of
 
-CRITICAL_POINTS = ("base", "joint2", "end_effector")  # critical points, in the order of the paper
+_NOWHERE = (math.nan, math.nan, math.nan)
 
 
-def workspace_margin(workspace: Workspace, p_base: V3, p_target: V3) -> float:
-    """R − |base − centre| [m] of a base at p_base [m, NED].
+class ZoneTable(NamedTuple):
+    """The zones as arrays for kernels."""
 
-    The centre is ``d_iw`` above the end-effector's reference, p_target [m, NED].
-    """
-    x, y = p_base[0] - p_target[0], p_base[1] - p_target[1]
-    z = p_base[2] - (p_target[2] - workspace.d_iw_m)
-    distance: float = (x * x + y * y + z * z) ** 0.5
-    return workspace.radius_m - distance
+    kind: npt.NDArray[np.int64]  # (zones,) which of KINDS
+    numbers: Array  # (zones, 16), where each zone begins
+    keep_in: npt.NDArray[np.bool_]  # (zones,)
+    clearance: Array  # (zones,) m
+    follows: npt.NDArray[np.bool_]  # (zones,) rides on the target and holds the base's origin alone
+    legs: Array  # (legs, 7): begin [s], moved until then [m, NED], velocity from then on [m/s, NED]
+    first_leg: npt.NDArray[np.int64]  # (zones + 1,)
 
 
 class World:
-    """The surroundings of one scenario."""
+    """The surroundings of one scenario, and what of the vehicle is kept clear of them."""
 
     def __init__(self, scenario: Scenario) -> None:
-        self.walls = scenario.walls
-        self.workspace = scenario.workspace
-        names = [one.name for one in self.walls] + [one.name for one in scenario.obstacles]
-        keys = [f"{name}/{point}" for name in names for point in CRITICAL_POINTS]
-        self._planes = [(*wall.normal, wall.offset_m + wall.clearance_m) for wall in self.walls]
-        self.planes = np.array(self._planes).reshape(-1, 4)  # normal, least distance [m]
-        self._balls = [(*one.position_m, one.clearance_m) for one in scenario.obstacles]
-        self.balls = np.array(self._balls).reshape(-1, 4)  # centre, least distance [m]
-        workspace = self.workspace
-        self.sphere = (0.0, 0.0) if workspace is None else (workspace.radius_m, workspace.d_iw_m)
-        self.keys = (*keys, *(("workspace/base",) if self.workspace else ()))
-
-    def margins(self, points: tuple[V3, V3, V3], target: V3 | None) -> tuple[float, ...]:
-        """Margins [m] of base, joint 2 and end-effector, as ``keys``; negative means violated.
-
-        Without ``target`` [m, NED], the end-effector's reference, the workspace does not apply: its
-        margin is infinite.
-        """
-        values = [
-            a * x + b * y + c * z - limit for a, b, c, limit in self._planes for x, y, z in points
+        self.zones, vehicle = zones_of(scenario), Vehicle()
+        parts = parts_of(scenario.body, vehicle)
+        self.table, self.parts = zone_table(self.zones), as_arrays(parts, vehicle)
+        self.follows = bool(self.table.follows.any())
+        kept = [
+            (zone, part.name)
+            for zone in self.zones
+            for part in (parts[:1] if zone.kind.follows_target else parts)
         ]
-        values += [
-            math.dist((x, y, z), points_at) - radius
-            for *points_at, radius in self._balls
-            for x, y, z in points
-        ]
-        if self.workspace is not None:
-            values.append(
-                math.inf if target is None else workspace_margin(self.workspace, points[0], target)
-            )
-        return tuple(values)
+        self.keys = tuple(f"{zone.table.name}/{part}" for zone, part in kept)
+        self._kept = kept
+        self.clearances = np.array([zone.table.clearance_m for zone, _ in kept])
 
-    def collision(self, points: tuple[V3, V3, V3], margins: tuple[float, ...]) -> str | None:
-        """A sentence if a point with these margins touches a wall or the ground, else None.
+    def margins(self, places: Array, time_s: float, target: V3 | None) -> tuple[float, ...]:
+        """Margins [m] as ``keys``, of places (rows, 3) [m, NED]; negative means violated.
 
-        An obstacle is a point and cannot be touched: coming too close to it is a violation only.
+        Without ``target`` [m, NED], the end-effector's reference, a zone that rides on it does not
+        apply: its margin is infinite.
         """
-        (_, _, base), (_, _, joint2), (_, _, end) = points
-        if max(base, joint2, end) < 0.0 < min(margins, default=1.0):
-            return None
-        for i, wall in enumerate(self.walls):
-            for k, name in enumerate(CRITICAL_POINTS):
-                if not (margins[len(CRITICAL_POINTS) * i + k] + wall.clearance_m > 0.0):
-                    return f"{spoken(name)} hit the {wall.name} wall"
-        for name, point in zip(CRITICAL_POINTS, points, strict=True):
-            if not (point[2] < 0.0):
+        out = np.empty(len(self.keys))
+        fill_margins(self.table, self.parts, places, time_s, target or _NOWHERE, out)
+        if target is None:
+            out[np.isnan(out) & np.isfinite(places[:1]).all()] = math.inf
+        return tuple(out.tolist())
+
+    def collision(self, places: Array, margins: tuple[float, ...]) -> str | None:
+        """A sentence if a part with these margins touches a zone or the ground, else None.
+
+        The ground is touched by the critical points of places (rows, 3) [m, NED]. To leave a zone
+        that is to be kept in is a violation, not a collision.
+        """
+        for (zone, part), margin in zip(self._kept, margins, strict=True):
+            if not zone.table.keep_in and not (margin + zone.table.clearance_m > 0.0):
+                return f"{spoken(part)} hit the {zone.table.name}{zone.kind.noun}"
+        for name, row in zip(CRITICAL_POINTS, (BASE, JOINT2, END_EFFECTOR), strict=True):
+            if not (places[row, 2] < 0.0):
                 return f"{spoken(name)} hit the ground"
         return None
 
 
+def zone_table(zones: tuple[Zone, ...]) -> ZoneTable:
+    """The zones for kernels."""
+    numbers = np.zeros((len(zones), NUMBERS))
+    for row, zone in zip(numbers, zones, strict=True):
+        begun = zone.table.numbers((0.0, 0.0, 0.0))
+        row[: len(begun)] = begun
+    legs = [(leg.begins_s, *leg.moved, *leg.velocity) for zone in zones for leg in zone.legs]
+    return ZoneTable(
+        kind=np.array([KINDS.index(zone.kind) for zone in zones], dtype=np.int64),
+        numbers=numbers,
+        keep_in=np.array([zone.table.keep_in for zone in zones], dtype=np.bool_),
+        clearance=np.array([zone.table.clearance_m for zone in zones], dtype=np.float64),
+        follows=np.array([zone.kind.follows_target for zone in zones], dtype=np.bool_),
+        legs=np.array(legs).reshape(-1, 7),
+        first_leg=np.cumsum([0, *(len(zone.legs) for zone in zones)]).astype(np.int64),
+    )
+
+
+@compiled
+def moved(table: ZoneTable, zone: int, time_s: float, target: V3) -> V3:
+    """How far a zone has moved [m, NED]; one that follows is as far as ``target`` [m, NED]."""
+    if table.follows[zone]:
+        return target
+    at = table.first_leg[zone]
+    while at + 1 < table.first_leg[zone + 1] and table.legs[at + 1, 0] <= time_s:
+        at += 1
+    since = max(time_s - table.legs[at, 0], 0.0)
+    return (
+        table.legs[at, 1] + since * table.legs[at, 4],
+        table.legs[at, 2] + since * table.legs[at, 5],
+        table.legs[at, 3] + since * table.legs[at, 6],
+    )
+
+
+@compiled
+def fill_margins(
+    table: ZoneTable, parts: Parts, places: Array, time_s: float, target: V3, out: Array
+) -> None:
+    """Every margin of places (rows, 3) [m, NED] into out (keys,) [m]; ``target`` [m, NED]."""
+    i = 0
+    for z in range(len(table.kind)):
+        shift = moved(table, z, time_s, target)
+        if table.follows[z]:
+            out[i] = _origin_margin(table, z, shift, places)
+            i += 1
+            continue
+        for b in range(len(parts.form)):
+            how = (table.kind[z], table.numbers[z], table.keep_in[z], shift, parts, b, places)
+            out[i] = part_distance(*how) - table.clearance[z]
+            i += 1
+
+
+@compiled
+def _origin_margin(table: ZoneTable, z: int, shift: V3, places: Array) -> float:
+    p = (places[0, 0] - shift[0], places[0, 1] - shift[1], places[0, 2] - shift[2])
+    d = nearest(table.kind[z], table.numbers[z], p).distance
+    return float((-d if table.keep_in[z] else d) - table.clearance[z])
+
+
 @compiled
 def record_if_clear(
-    planes: Array,
-    balls: Array,
-    sphere: tuple[float, float],
+    table: ZoneTable,
+    parts: Parts,
     aim: tuple[Array, float],
     places: Array,
     instants: tuple[float, float],
@@ -95,32 +162,31 @@ def record_if_clear(
 ) -> bool:
     """``World.margins`` of plant steps without any incident, into the record of the smallest.
 
+    A margin that can be no smaller than what is recorded is not worked out.
+
     Args:
-        planes: (walls, 4) [m] of a World.
-        balls: (obstacles, 4) [m] of a World.
-        sphere: Its radius and height above the target [m].
-        aim: The end-effector's ``curve_row`` and when it begins [s]; an empty row where the
-            workspace does not apply.
-        places: (steps, 2 + j, 3) [m, NED]: base, joint 1, joint 2, …, end-effector.
+        table: Zones of a World.
+        parts: Parts of a World.
+        aim: The end-effector's ``curve_row`` and when it begins [s]; an empty row where no zone
+            rides on the target.
+        places: (steps, rows, 3) [m, NED], as ``sitl.plant.kinematics.place_into`` has them.
         instants: Time one step before the first, and between two steps [s].
         lowest: (margins,) [m], smallest so far.
         when_s: (margins,) [s], when that was.
 
     Returns:
-        True; or False, with nothing recorded, if any point is not clearly above ground and
-        within every margin.
+        True; or False, with nothing recorded, if any point is not clearly above ground or any part
+        not within every margin.
     """
-    margins = np.empty((places.shape[0], lowest.shape[0]))
+    margins = np.full((places.shape[0], lowest.shape[0]), np.inf)
     before_s, step_s = instants
     curve, starts_s = aim
     for k in range(places.shape[0]):
-        _wall_margins_into(planes, places, k, margins)
-        _obstacle_margins_into(balls, places, k, margins[:, 3 * planes.shape[0] :])
+        time_s = before_s + (k + 1) * step_s
+        target = (0.0, 0.0, 0.0)
         if curve.shape[0]:
-            target = place_on_curve(curve, before_s + (k + 1) * step_s - starts_s)
-            margins[k, margins.shape[1] - 1] = _sphere_margin(sphere, target, places, k)
-        above = places[k, 0, 2] < 0.0 and places[k, 2, 2] < 0.0 and places[k, -1, 2] < 0.0
-        if not (above and (margins[k] > 0.0).all()):
+            target = place_on_curve(curve, time_s - starts_s)
+        if not _is_clear(table, parts, places[k], time_s, target, lowest, margins[k]):
             return False
     for k in range(places.shape[0]):
         for i in range(lowest.shape[0]):
@@ -131,32 +197,59 @@ def record_if_clear(
 
 
 @compiled
-def _wall_margins_into(planes: Array, places: Array, k: int, margins: Array) -> None:
-    for i in range(planes.shape[0]):
-        a, b, c, limit = planes[i, 0], planes[i, 1], planes[i, 2], planes[i, 3]
-        for point, row in enumerate((0, 2, places.shape[1] - 1)):
-            x, y, z = places[k, row, 0], places[k, row, 1], places[k, row, 2]
-            margins[k, 3 * i + point] = a * x + b * y + c * z - limit
+def _is_clear(
+    table: ZoneTable,
+    parts: Parts,
+    places: Array,
+    time_s: float,
+    target: V3,
+    lowest: Array,
+    margins: Array,
+) -> bool:
+    """Whether one step had no incident; the margins that may be below the lowest go to margins."""
+    if not (places[BASE, 2] < 0.0 and places[JOINT2, 2] < 0.0 and places[END_EFFECTOR, 2] < 0.0):
+        return False
+    i = 0
+    for z in range(len(table.kind)):
+        shift = moved(table, z, time_s, target)
+        of_origin = _origin_margin(table, z, shift, places)
+        if table.follows[z]:
+            margins[i] = of_origin
+            i += 1
+            if not of_origin > 0.0:
+                return False
+            continue
+        count = len(parts.form)
+        # No part is nearer than the base's origin less its reach.
+        bound = of_origin - parts.reach
+        far = bound > 0.0
+        for b in range(count):
+            far = far and lowest[i + b] <= bound
+        if not far and not _parts_clear(table, z, shift, parts, places, lowest, margins, i):
+            return False
+        i += count
+    return True
 
 
 @compiled
-def _obstacle_margins_into(balls: Array, places: Array, k: int, margins: Array) -> None:
-    for i in range(balls.shape[0]):
-        for point, row in enumerate((0, 2, places.shape[1] - 1)):
-            x, y = places[k, row, 0] - balls[i, 0], places[k, row, 1] - balls[i, 1]
-            z = places[k, row, 2] - balls[i, 2]
-            margins[k, 3 * i + point] = math.sqrt(x * x + y * y + z * z) - balls[i, 3]
-
-
-@compiled
-def _sphere_margin(sphere: tuple[float, float], target: V3, places: Array, k: int) -> float:
-    radius, above = sphere
-    x, y = places[k, 0, 0] - target[0], places[k, 0, 1] - target[1]
-    z = places[k, 0, 2] - (target[2] - above)
-    distance: float = np.sqrt(x * x + y * y + z * z)
-    return radius - distance
-
-
-def spoken(point: str) -> str:
-    """A critical point's name as part of a sentence."""
-    return {"base": "the base", "joint2": "joint 2", "end_effector": "the end-effector"}[point]
+def _parts_clear(
+    table: ZoneTable,
+    z: int,
+    shift: V3,
+    parts: Parts,
+    places: Array,
+    lowest: Array,
+    margins: Array,
+    first: int,
+) -> bool:
+    for b in range(len(parts.form)):
+        how = (table.kind[z], table.numbers[z], table.keep_in[z], shift, parts, b, places)
+        margin = part_bound(*how) - table.clearance[z]
+        if parts.form[b] == BALL:  # whose bound is the distance
+            margins[first + b] = margin
+        elif not (margin > 0.0 and lowest[first + b] <= margin):
+            margin = part_distance(*how) - table.clearance[z]
+            margins[first + b] = margin
+        if not margin > 0.0:
+            return False
+    return True

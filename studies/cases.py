@@ -65,7 +65,7 @@ def configuration(
 
     Inconsistent ones fly as well: their outcome is what a study measures.
     """
-    config = flight_config(controller, inner, soft=True)
+    config = flight_config(controller, inner, body="points", soft=True)
     return config if plant == "full" else _at_once(config)
 
 

@@ -27,6 +27,7 @@ from fsw.signals import (
     Plan,
     PlanFailure,
     PlanRequest,
+    SafeSetAnnouncement,
     SensorFrame,
     SwitchMode,
     TickInputs,
@@ -41,7 +42,7 @@ from studies.flight_result import (
     TracePoint,
     processor_time_us,
 )
-from studies.mission import safe_set, target
+from studies.mission import SIMULATOR, moves, safe_set, target
 
 TARGET_US = 100_000  # between points of the reference, as the pilot sends them
 _TARGETS_AHEAD = 20
@@ -90,6 +91,14 @@ class ClosedLoop(Generic[State]):
         first = 0 if step == 0 else newest
         clock = simulation.clock
         return tuple(target(clock, start_us + TARGET_US * k) for k in range(first, newest + 1))
+
+    def announced(self) -> tuple[SafeSetAnnouncement, ...]:
+        """What the scenario's pilot announces at this step: ten times a second where zones move."""
+        step, scenario = self.simulation.step, self.simulation.scenario
+        if step > 0 and (step % (TARGET_US // STEP_US) > 0 or not moves(scenario)):
+            return ()
+        held = safe_set(scenario, self.simulation.t_us)
+        return (SafeSetAnnouncement(SIMULATOR, held),) if held.zones else ()
 
     def step(self, inputs: TickInputs) -> TickOutputs:
         """Tick, plan, advance."""
@@ -151,7 +160,6 @@ def simulate(
     simulation, recorder = Simulation(scenario, seed), FlightRecorder()
     planner = InlinePlanner(Planner(config.planner, config.airframe, processor_time_us))
     loop = ClosedLoop(simulation, Autopilot(config).tick, FlightState(), planner, config.airframe)
-    announced = safe_set(scenario)
     steps_per_plan = config.mpc_period_us // config.tick_period_us
     while simulation.ended is None:
         step, sensors = simulation.step, loop.sense()
@@ -163,7 +171,7 @@ def simulate(
             plan=answer,
             commands=((_ARM,), (_FOLLOW,))[step] if step < 2 else (),
             targets=loop.targets(),
-            safe_set=announced if step == 0 else None,
+            announced=loop.announced(),
         )
         if traced and step % TRACE_STEPS == 0:
             recorder.trace.append(_trace_point(simulation))

@@ -9,6 +9,9 @@ every exchange of 2 ms.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+
+import numpy as np
 
 from fsw.control.braking import Brake
 from fsw.flight.plan_exchange import plan_input
@@ -22,6 +25,7 @@ from fsw.signals import Plan, PlanInput, PlanRequest, PredictionState
 from sitl.disturbances.items import push
 from sitl.flight_evaluator import FlightEvaluator, Points
 from sitl.mission_clock import MissionClock
+from sitl.plant.vector import Array
 from sitl.result import EndReason, TruthResult
 from sitl.scenario import V3, Scenario
 from sitl.scenario_validation import check
@@ -84,7 +88,8 @@ class DoubleIntegrator:
         self.step = 0
         self.state = _first_state(scenario, self.clock.target_at(0.0).p)
         self._pushes = [push(item, seed, _STEP_S) for item in scenario.disturbances]
-        self.evaluator = FlightEvaluator(scenario, self.clock, points(self.state))
+        scenario = replace(scenario, body="points")  # there is no attitude that a body could have
+        self.evaluator = FlightEvaluator(scenario, self.clock, _places(points(self.state)))
 
     @property
     def time_s(self) -> float:
@@ -107,7 +112,7 @@ class DoubleIntegrator:
         self.state = after(self.state, u, push_W, _STEP_S)
         self.step += 1
         now = points(self.state)
-        self.evaluator.judge(now, self.time_s)
+        self.evaluator.judge(_places(now), self.time_s, _STEP_S)
         if self.step % SAMPLE_STEPS == 0:
             self.evaluator.sample_error(now, self.time_s)
         self.evaluator.judge_time(self.time_s)
@@ -174,8 +179,14 @@ def _first_state(scenario: Scenario, p_target: V3) -> PredictionState:
     return at_origin._replace(p=subtract(p_target, points(at_origin)[2]))
 
 
+def _places(now: Points) -> Array:
+    """Base, joint 1 at its origin, joint 2 and end-effector, as the full plant places them."""
+    base, joint2, end_effector = now
+    return np.array((base, base, joint2, end_effector))
+
+
 def _trace_point(plant: DoubleIntegrator) -> TracePoint:
     p_WB, joint2, p_WE = points(plant.state)
-    margins = plant.evaluator.margins((p_WB, joint2, p_WE), plant.time_s)
+    margins = plant.evaluator.margins(_places((p_WB, joint2, p_WE)), plant.time_s)
     aim = plant.clock.target_at(plant.time_s).p
     return TracePoint(t_s=plant.time_s, p_WB=p_WB, p_WE=p_WE, p_target=aim, margin_m=min(margins))

@@ -2,27 +2,36 @@
 
 from __future__ import annotations
 
-from fsw.shapes.ball import point
-from fsw.shapes.half_space import wall
-from fsw.shapes.target_sphere import target_sphere
-from fsw.signals import EndEffectorTarget, SafeSet
+from fsw.shapes import BY_NUMBER
+from fsw.signals import EndEffectorTarget, MessageSource, SafeSet, Shape, Zone
 from sitl.mission_clock import MissionClock
 from sitl.scenario import Scenario
 from sitl.simulation import START_US
+from sitl.zones import Zone as SimulatedZone
+from sitl.zones import zones_of
+
+SIMULATOR = MessageSource(1, 195, "simulator")
 
 
-def safe_set(scenario: Scenario) -> SafeSet:
-    """The safe set of a scenario in the flight software's terms."""
-    zones = [wall(one.normal, one.offset_m, one.clearance_m) for one in scenario.walls]
-    zones += [point(one.position_m, one.clearance_m) for one in scenario.obstacles]
-    workspace = scenario.workspace
-    if workspace is not None:
-        zones.append(target_sphere((0.0, 0.0, -workspace.d_iw_m), workspace.radius_m))
-    return SafeSet(tuple(zones))
+def safe_set(scenario: Scenario, t_us: int = START_US) -> SafeSet:
+    """The safe set of a scenario in the flight software's terms, as announced at a time stamp."""
+    return SafeSet(tuple(_zone(one, t_us) for one in zones_of(scenario)))
+
+
+def moves(scenario: Scenario) -> bool:
+    """Whether the safe set is another one as time passes."""
+    return any(one.moves for one in zones_of(scenario))
+
+
+def _zone(one: SimulatedZone, t_us: int) -> Zone:
+    place = one.at(1e-6 * (t_us - START_US))
+    shape = Shape(BY_NUMBER[one.kind.number].name, place.numbers)
+    since_us = t_us if any(place.velocity) else 0
+    return Zone(shape, one.table.clearance_m, one.table.keep_in, place.velocity, since_us)
 
 
 def target(clock: MissionClock, t_us: int) -> EndEffectorTarget:
     """The end-effector reference at a time stamp."""
     time_s = 1e-6 * (t_us - START_US)
-    at = clock.target_at(time_s)
-    return EndEffectorTarget(t_us, at.p, at.v, at.a, clock.yaw_at(time_s))
+    point = clock.target_at(time_s)
+    return EndEffectorTarget(t_us, point.p, point.v, point.a, clock.yaw_at(time_s))

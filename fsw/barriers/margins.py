@@ -50,12 +50,15 @@ class Margins:
             p_target[0], v_target[0] = target.p_WE, target.v_WE
         shift, speed = shifts(safe_set, np.array([estimate.t_us]), p_target, v_target)
         vehicle = frame_of(estimate, self._links)
-        size = sum(1 if follows else len(self.parts) for follows in following)
+        per_zone = tuple(1 if follows else len(self.parts) for follows in following)
+        size = sum(per_zone)
         margins, values = np.empty(size), np.empty(size)
         how = (zones, shift[0], speed[0], self._probes, vehicle, self._settings)
         self._fill(*how, True, margins)
         self._fill(*how, False, values)
-        return ConstraintReport(safe_set.kind, tuple(margins.tolist()), tuple(values.tolist()))
+        return ConstraintReport(
+            safe_set.kind, tuple(margins.tolist()), tuple(values.tolist()), per_zone
+        )
 
 
 def frame_of(estimate: StateEstimate, links: Vec2) -> Array:

@@ -114,12 +114,20 @@ BARRIER_MARGIN: Final = Topic(
     "Margins of the active safe set, by the vehicle's own estimate",
     PLANNING,
     (
-        _vector("margin", MARGINS, "m; walls, then obstacles; base, joint 2, end-effector of each"),
+        _vector(
+            "margin",
+            MARGINS,
+            "m; of each zone and point (base, joint 2, end-effector); with the full body, or "
+            "more zones, the least of each zone",
+        ),
         _vector("barrier", MARGINS, "h, m/s, same order; active at or below 0"),
         *_floats("minimum", note="m"),
         Field("kind", "uint8_t", note="0 none, 1 walls, 2 workspace, 3 obstacles and walls"),
         Field("count", "uint8_t", note="number of valid entries"),
         Field("argmin", "uint8_t"),
+        Field("breaches", "uint32_t", note="times the safe set was left in flight"),
+        Field("departures", "uint32_t", note="times the vehicle left the tube around its plan"),
+        Field("interventions", "uint32_t", note="times the safety filter engaged"),
     ),
 )
 END_EFFECTOR: Final = Topic(

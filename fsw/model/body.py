@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal
+from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,7 @@ from fsw.model.airframe import Airframe
 from fsw.signals import Vec3
 
 BodyName = Literal["points", "full"]
+BODIES: Final[tuple[BodyName, ...]] = ("points", "full")
 
 ON_BASE, ON_LINK1, ON_LINK2 = 0, 1, 2
 SPHERE, CAPSULE, DISC = 0, 1, 2

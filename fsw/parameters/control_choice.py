@@ -14,7 +14,9 @@ KNOWN: dict[str, tuple[str, ...]] = {
     "tracking": ("lqr", "pid"),
     "lambda": ("consistent", "paper-1", "paper-5"),
     "solver": ("clarabel", "slsqp"),
+    "body": ("points", "full"),
 }
+FULL = "full"  # the body where none is named
 INNER_LOOPS = {"lqr": "tracking", "pid": "pid"}  # their names in logs and configurations
 
 
@@ -49,6 +51,11 @@ class ControlChoice:
         one_of("solver", *KNOWN["solver"]),
         default="clarabel",
     )
+    body: str | None = option(
+        "--body NAME",
+        "what keeps clear: full, or the paper's points (default the scenario's, or full)",
+        one_of("body", *KNOWN["body"]),
+    )
     allow_inconsistent: bool = switch(
         "--allow-inconsistent",
         "fly a configuration that cannot keep its safe set, with a warning",
@@ -67,6 +74,7 @@ class ControlChoice:
             "inner": self.inner,
             "robustness": self.lambda_,
             "solver": self.solver,
+            "body": self.body or FULL,
             "soft": int(self.allow_inconsistent),
         }
 
@@ -79,5 +87,6 @@ def choice_of(fact: Callable[[str], str]) -> ControlChoice:
         tracking=next((name for name, known in INNER_LOOPS.items() if known == inner), inner),
         lambda_=fact("robustness"),
         solver=fact("solver"),
+        body=fact("body"),
         allow_inconsistent=fact("soft") != "0",
     )

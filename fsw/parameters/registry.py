@@ -175,6 +175,8 @@ _ROWS: Final[dict[str, list[_Row]]] = {
         ("PLN_JNT_MAX", "planner.limits.joint_acc", "rad/s^2", 0.5, 50.0,
          "Maximum joint acceleration"),
         ("PLN_JNT_SLACK", "planner.joint_slack", "", 0.0, 1e5, "Joint limit slack penalty"),
+        ("PLN_BODY", "planner.body", "", 0.0, 1.0,
+         "What keeps clear of obstacles"),
         ("PLN_UPS_DIST", "upset_distance", "m", 0.02, 1.0,
          "Position error above which planning restarts from the measured state"),
         ("PLN_UPS_YAW", "upset_yaw", "rad", 0.05, 3.0,
@@ -265,6 +267,25 @@ _ROWS: Final[dict[str, list[_Row]]] = {
         ("COM_LOW_BAT_ACT", "limits.low_battery_action", "", 0.0, 3.0,
          "Low battery action"),
     ],
+    "Safe set": [
+        ("SAFE_OWNER", "limits.safe_set_owner", "", 0.0, 255.0,
+         "MAVLink system that owns the safe set and may grow it in flight; 0: the first one"),
+        ("SAFE_BREACH_ACT", "limits.breach_action", "", 1.0, 6.0,
+         "Action when the vehicle is outside its safe set"),
+        ("SAFE_FILTER", "safety_filter.enabled", "", 0.0, 1.0,
+         "Filter of the acceleration that the loops are about to realise"),
+        ("SAFE_FLT_GAMMA", "safety_filter.gamma", "1/s", 0.1, 20.0,
+         "Safety filter: CBF decay rate"),
+        ("SAFE_FLT_DIST", "safety_filter.allowance", "m/s^2", -5.0, 5.0,
+         "Safety filter: acceleration left for a disturbance that is not measured"),
+        ("SAFE_FLT_NEAR", "safety_filter.near", "m", 0.1, 5.0,
+         "Safety filter: distance from the base beyond which a zone is left out"),
+        ("SAFE_FLT_AZ_MAX", "safety_filter.vertical", "m/s^2", 0.5, 6.0,
+         "Safety filter: maximum vertical acceleration"),
+        ("SAFE_OWNER_T", "limits.owner_timeout_us", "s", 2.0, 300.0,
+         "Silence after which another source may own the safe set, on the ground",
+         _IN_MICROSECONDS),
+    ],
     "Log": [
         ("LOG_PROFILE", "log_profile", "", 0.0, 1.0,
          "Contents of flight.ulg; takes effect at the next start"),
@@ -282,12 +303,20 @@ _ROWS: Final[dict[str, list[_Row]]] = {
 }  # fmt: skip
 
 _CHOICES: Final[dict[str, Choices]] = {
+    "PLN_BODY": ((0, "Base, joint 2 and end-effector as points"), (1, "Full body")),
     "LOG_PROFILE": (
         (0, "Sensors and actuators every tick, the rest at 50 Hz"),
         (1, "Everything every tick"),
     ),
     "COM_OBL_RC_ACT": ((3, "Return"), (4, "Land"), (5, "Hold")),
     "NAV_DLL_ACT": ((0, "Disabled"), (1, "Hold"), (2, "Return"), (3, "Land")),
+    "SAFE_FILTER": ((0, "Disabled"), (1, "Enabled")),
+    "SAFE_BREACH_ACT": (
+        (1, "Warning"),
+        (2, "Hold"),
+        (5, "Land"),
+        (6, "Retreat along the normal, then hold"),
+    ),
     "COM_LOW_BAT_ACT": (
         (0, "Warning"),
         (2, "Land when critical"),

@@ -12,7 +12,7 @@ from fsw.flight.tuned_autopilot import TunedAutopilot
 from fsw.geometry.geodesy import DEFAULT_ORIGIN, to_local
 from fsw.link.services.mission_store import MissionStore, Site
 from fsw.mpc.planner import Planner
-from fsw.parameters.control_choice import ControlChoice
+from fsw.parameters.control_choice import FULL, ControlChoice
 from fsw.parameters.flight_config import FlightConfig, flight_config
 from fsw.parameters.store import ParameterStore
 from fsw.ports import VehicleFacts
@@ -36,6 +36,7 @@ def flight_software(
         cast(Inner, choice.inner),
         choice.lambda_,
         solver=choice.solver,
+        body=choice.body or FULL,
         soft=choice.allow_inconsistent,
     )
     config = replace(config, origin=origin)
@@ -50,6 +51,7 @@ def flight_software(
             locate=partial(to_local, config.origin),
             judge=lambda safe_set: flight.against(safe_set),
             clearance=lambda: flight.config.limits.fence_clearance,
+            owner=lambda: int(flight.config.limits.safe_set_owner),
         )
     )
     return FlightProgram(

@@ -14,8 +14,8 @@ from sitl.link.pilot_messages import (
     SendCommand,
     SendTarget,
 )
-from sitl.scenario import ScenarioWall, Workspace
 from sitl.sensors.suite import SensorReadings
+from sitl.shapes.kind import NUMBERS
 
 WireValues = tuple[float | bytes, ...]
 
@@ -85,10 +85,8 @@ def _wire(message: PilotMessage) -> tuple[int, *WireValues]:
         return (message_ids.END_EFFECTOR_TARGET, message.t_us, *motion, *tail)
     if isinstance(message, SendCommand):
         return (message_ids.COMMAND_LONG, *message.params, message.command, SYSTEM_ID, 1, 0)
-    if isinstance(message, Workspace):
-        offset = (0.0, 0.0, -message.d_iw_m)
-        return (message_ids.WORKSPACE_SPHERE, *offset, message.radius_m, SYSTEM_ID, 1)
-    one, number = message.kept_from, (SYSTEM_ID, 1, message.index, message.count)
-    if isinstance(one, ScenarioWall):
-        return (message_ids.OBSTACLE_WALL, *one.normal, one.offset_m, one.clearance_m, *number)
-    return (message_ids.OBSTACLE_POINT, *one.position_m, one.clearance_m, *number)
+    one, rest = message, (0.0,) * (NUMBERS - len(message.numbers))
+    about = (one.t_us, one.clearance_m, *one.velocity)
+    tail = (SYSTEM_ID, 1, one.index, one.count, one.number, int(one.keep_in))
+    values: WireValues = (*about, *one.numbers, *rest, *tail)
+    return (message_ids.OBSTACLE_SHAPE, *values)

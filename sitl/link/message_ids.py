@@ -10,9 +10,7 @@ HIL_SENSOR: Final = 107
 ODOMETRY: Final = 331
 ARM_JOINT_STATE: Final = 60200
 END_EFFECTOR_TARGET: Final = 60202
-OBSTACLE_WALL: Final = 60207
-WORKSPACE_SPHERE: Final = 60208
-OBSTACLE_POINT: Final = 60210
+OBSTACLE_SHAPE: Final = 60211
 
 SYSTEM_ID: Final = 1  # the vehicle that is simulated
 SENSORS: Final = 200  # component of the simulated sensors

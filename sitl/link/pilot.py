@@ -20,9 +20,10 @@ from sitl.link.pilot_messages import (
     SendCommand,
     SendTarget,
 )
-from sitl.scenario import Obstacle, Scenario, ScenarioWall
+from sitl.scenario import Scenario
 from sitl.simulation import START_US
 from sitl.trajectory import TrajectoryPoint
+from sitl.zones import Zone, zones_of
 
 TARGET_INTERVAL_US: Final = 100_000  # one point a planning period
 TARGET_LEAD_US: Final = 2_000_000  # 1.5 s are promised; the rest covers a lost datagram
@@ -30,6 +31,7 @@ MESSAGES_PER_STEP: Final = 8  # keeps a datagram below 1400 bytes
 
 _REPEAT_US: Final = 500_000
 _ROUND_US: Final = 1_000_000  # the safe set is announced again: a datagram may be lost
+_MOVING_ROUND_US: Final = 100_000  # and where a zone moves, ten times a second
 _PATIENCE_US: Final = 10_000_000  # of asking for the same thing
 _HOVER_SPEED_M_S: Final = 0.1
 _CLIMB_M: Final = 0.4  # at least, before a hop counts as flying
@@ -67,7 +69,8 @@ class Phase(Enum):
 class FlightPlan:
     """The pilot's constants."""
 
-    announcements: tuple[PilotMessage, ...]  # the safe set
+    zones: tuple[Zone, ...]  # the safe set
+    round_us: int  # between two announcements of it
     target_at: Callable[[int], TrajectoryPoint] | None  # by time stamp [us]; None: no targets
     yaw_at: Callable[[int], float]  # of the targets [rad], by time stamp [us]
     hop: bool
@@ -80,7 +83,8 @@ class PilotState:
     """The pilot's state."""
 
     phase: Phase
-    announced: int = 0  # announcements made in this round
+    announced: int = 0  # zones announced in this round
+    round_us: int = START_US  # begin of this round
     next_round_us: int = START_US  # of announcements
     next_target_us: int = START_US
     since_us: int = START_US  # start of the phase
@@ -112,15 +116,10 @@ def flight_plan(
     yaw_at: Callable[[int], float],
 ) -> FlightPlan:
     """The plan of a scenario; its reference and yaw [rad] are asked for by time stamp [us]."""
-    kept_from: tuple[ScenarioWall | Obstacle, ...] = (*scenario.walls, *scenario.obstacles)
-    announcements: list[PilotMessage] = [
-        Announce(one, index, len(kept_from)) for index, one in enumerate(kept_from)
-    ]
-    if scenario.workspace is not None:
-        announcements.append(scenario.workspace)
-    kind = scenario.pilot.plan
+    zones, kind = zones_of(scenario), scenario.pilot.plan
     return FlightPlan(
-        announcements=tuple(announcements),
+        zones=zones,
+        round_us=_MOVING_ROUND_US if any(zone.moves for zone in zones) else _ROUND_US,
         target_at=target_at if kind == "trajectory" else None,
         yaw_at=yaw_at,
         hop=kind == "hop",
@@ -152,11 +151,11 @@ def speak(
     """Messages to send at the step of ``t_us``, at most MESSAGES_PER_STEP."""
     target_due = plan.target_at is not None and state.next_target_us <= t_us + TARGET_LEAD_US
     command_due = state.phase in _COMMANDS and t_us >= state.next_ask_us
-    if plan.announcements and t_us >= state.next_round_us:
-        state = replace(state, announced=0, next_round_us=t_us + _ROUND_US)
-    if not target_due and not command_due and state.announced == len(plan.announcements):
+    if plan.zones and t_us >= state.next_round_us:
+        state = replace(state, announced=0, round_us=t_us, next_round_us=t_us + plan.round_us)
+    if not target_due and not command_due and state.announced == len(plan.zones):
         return state, ()
-    messages: list[PilotMessage] = list(plan.announcements[state.announced :][:MESSAGES_PER_STEP])
+    messages = _announcements(plan, state)
     state = replace(state, announced=state.announced + len(messages))
     # The trajectory is asked for once its points are there.
     waits_for_targets = state.phase is Phase.FOLLOW and target_due
@@ -173,6 +172,27 @@ def speak(
         messages.append(SendTarget(next_us, plan.target_at(next_us), plan.yaw_at(next_us)))
         next_us += TARGET_INTERVAL_US
     return replace(state, next_target_us=next_us), tuple(messages)
+
+
+def _announcements(plan: FlightPlan, state: PilotState) -> list[PilotMessage]:
+    """The next zones of this round, all as they are when it begins."""
+    time_s, first = 1e-6 * (state.round_us - START_US), state.announced
+    messages: list[PilotMessage] = []
+    for index, zone in enumerate(plan.zones[first : first + MESSAGES_PER_STEP], start=first):
+        place = zone.at(time_s)
+        messages.append(
+            Announce(
+                number=zone.kind.number,
+                numbers=place.numbers,
+                velocity=place.velocity,
+                clearance_m=zone.table.clearance_m,
+                keep_in=zone.table.keep_in,
+                t_us=state.round_us,
+                index=index,
+                count=len(plan.zones),
+            )
+        )
+    return messages
 
 
 def _acknowledged(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple, TypeAlias
 
-from sitl.scenario import Obstacle, ScenarioWall, Workspace
+from sitl.scenario import V3
 from sitl.trajectory import TrajectoryPoint
 
 Params: TypeAlias = tuple[float, float, float, float, float, float, float]
@@ -13,9 +13,14 @@ Params: TypeAlias = tuple[float, float, float, float, float, float, float]
 
 @dataclass(frozen=True, slots=True)
 class Announce:
-    """One of the walls and obstacles of the safe set, which are counted together."""
+    """One zone of the safe set."""
 
-    kept_from: ScenarioWall | Obstacle
+    number: int  # PANDION_SHAPE
+    numbers: tuple[float, ...]
+    velocity: V3  # m/s, NED
+    clearance_m: float
+    keep_in: bool
+    t_us: int  # when it is there
     index: int
     count: int
 
@@ -37,8 +42,8 @@ class SendCommand:
     params: Params  # NaN where not used
 
 
-PilotMessage: TypeAlias = Announce | Workspace | SendTarget | SendCommand
-"""The safe set, which may be a workspace, points to be met, and commands."""
+PilotMessage: TypeAlias = Announce | SendTarget | SendCommand
+"""The safe set, points to be met, and commands."""
 
 
 @dataclass(frozen=True, slots=True)

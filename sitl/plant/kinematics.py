@@ -14,7 +14,8 @@ def place_into(plant: Plant, state: Array, work: Workspace, k: int, out: Array) 
     """Positions in W of base origin and DH frames for a state (17 + 2j,) [SI], into entry k.
 
     Entries of out (n, 2 + j, 3) [m, NED] are base, DH frame 0 (joint 1), …, DH frame j
-    (end-effector). ``work`` is left with rotation and posture of the state.
+    (end-effector); where there is room for three more, the base's axes [1, NED]. ``work`` is left
+    with rotation and posture of the state.
     """
     joints = work.still.shape[0]
     rotation_into(state, Q_WB, work.rotation)
@@ -23,6 +24,10 @@ def place_into(plant: Plant, state: Array, work: Workspace, k: int, out: Array) 
     _put(out, k, 0, base)
     for i in range(joints + 1):
         _put(out, k, 1 + i, add(base, times(work.rotation, row(work.posture.origin, i))))
+    if out.shape[1] > joints + 2:
+        for i in range(3):
+            axis = (work.rotation[0, i], work.rotation[1, i], work.rotation[2, i])
+            _put(out, k, 2 + joints + i, axis)
 
 
 @kernel

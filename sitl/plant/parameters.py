@@ -76,6 +76,20 @@ class Legs:
 
 
 @dataclass(frozen=True, slots=True)
+class Size:
+    """How far the vehicle reaches beyond its joints, feet and rotor hubs: our choice."""
+
+    hull: float = 0.08  # m, radius of a ball about the base origin: frame and battery
+    link: float = 0.02  # m, radius of an arm's link and of the joints between
+    tool: float = 0.025  # m, radius of a ball about the end-effector
+    leg: float = 0.01  # m, radius of a leg, from the base origin to a foot
+    blade: float = 0.165  # m, radius of a rotor: the blades' tips are 0.465 m from the base origin
+    disc: float = (
+        0.02  # m, half the height of what the blades sweep, as they flap and the hubs yield
+    )
+
+
+@dataclass(frozen=True, slots=True)
 class Vehicle:
     """The aerial manipulator; the defaults are the paper's Table I."""
 
@@ -90,6 +104,7 @@ class Vehicle:
     rotors: Rotors = Rotors()
     joints: Joints = Joints()
     legs: Legs = Legs()
+    size: Size = Size()
     gravity: float = GRAVITY
 
     @property

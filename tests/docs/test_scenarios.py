@@ -13,9 +13,12 @@ import pytest
 from sitl import scenario
 from sitl.scenario_file import parse_scenario
 from sitl.scenario_validation import check
+from sitl.shapes import TABLES as ZONES
 from sitl.simulation import Simulation
 
 PAGE = Path(__file__).parents[2] / "docs" / "reference" / "scenarios.md"
+SHAPES = tuple(ZONES)
+NOT_COMMON = object()
 TABLES = (
     scenario.Scenario,
     scenario.Start,
@@ -25,6 +28,9 @@ TABLES = (
     scenario.ScenarioWall,
     scenario.Obstacle,
     scenario.Workspace,
+    scenario.ScenarioZone,
+    scenario.WayPoint,
+    *SHAPES,
     scenario.Uniform,
     scenario.Wind,
     scenario.Impulses,
@@ -43,6 +49,8 @@ def hints(kind: Any) -> dict[str, Any]:
 
 def allowed(hint: Any) -> str:
     """What the table says about the value."""
+    if hint is bool:
+        return "true, false"
     if typing.get_origin(hint) is Annotated:
         plain, permitted = typing.get_args(hint)
         count = len(typing.get_args(plain))
@@ -53,9 +61,11 @@ def allowed(hint: Any) -> str:
 def default(field: dataclasses.Field[Any]) -> str:
     """What the table says about leaving it out."""
     # In a file a table says its kind, even where the dataclass has only one.
-    if field.default is dataclasses.MISSING or field.name == "kind":
+    if field.default is dataclasses.MISSING or field.name in ("kind", "shape"):
         return "required"
     value = field.default
+    if isinstance(value, bool):
+        return str(value).lower()
     if isinstance(value, tuple):
         return "[" + ", ".join(f"{entry:.4g}" for entry in value) + "]"
     if isinstance(value, float):
@@ -66,9 +76,12 @@ def default(field: dataclasses.Field[Any]) -> str:
 def expected(kind: Any) -> set[tuple[str, str, str]]:
     """Rows of one table; keys that hold other tables have tables of their own."""
     rows = set()
+    common = {field.name: field.default for field in dataclasses.fields(scenario.ScenarioZone)}
     for field in dataclasses.fields(kind):
+        if kind in SHAPES and common.get(field.name, NOT_COMMON) is field.default:
+            continue
         hint = hints(kind)[field.name]
-        plain = typing.get_origin(hint) in (Annotated, Literal) or hint is str
+        plain = typing.get_origin(hint) in (Annotated, Literal) or hint in (str, bool)
         named_by_file = kind is scenario.Scenario and field.name == "name"
         if plain and not named_by_file:
             rows.add((f"`{field.name}`", allowed(hint), default(field)))
@@ -94,7 +107,7 @@ def test_every_dataclass_of_a_scenario_has_a_table() -> None:
         for name, value in vars(scenario).items()
         if dataclasses.is_dataclass(value) and value is not scenario.Sensors
     }
-    assert made == {kind.__name__ for kind in TABLES}
+    assert made == {kind.__name__ for kind in TABLES if kind not in SHAPES}
 
 
 def test_the_examples_on_the_page_can_be_flown() -> None:

@@ -12,13 +12,14 @@ PINNED = {
     "ARM_JOINT_STATE": (60200, 81, 222),
     "ARM_JOINT_SETPOINT": (60201, 59, 59),
     "END_EFFECTOR_TARGET": (60202, 57, 239),
-    "BARRIER_MARGIN": (60203, 149, 183),
+    "BARRIER_MARGIN": (60203, 155, 183),
     "MPC_STATUS": (60204, 53, 216),
     "LOOP_TIMING": (60206, 49, 31),
     "OBSTACLE_WALL": (60207, 24, 28),
     "WORKSPACE_SPHERE": (60208, 18, 197),
     "SETPOINT_STATUS": (60209, 21, 131),
     "OBSTACLE_POINT": (60210, 20, 254),
+    "OBSTACLE_SHAPE": (60211, 94, 185),
 }
 
 # From pymavlink's development.xml and upstream.xml, as MAVLink's common.xml and QGroundControl have
@@ -47,6 +48,14 @@ PINNED_ENUMS = {
         "INPUT_REFUSED",
     ),
     "PANDION_RATE_GROUP": ("INNER", "MPC"),
+    "PANDION_SHAPE": (
+        "HALF_SPACE",
+        "BALL",
+        "TARGET_SPHERE",
+        "VERTICAL_CYLINDER",
+        "CYLINDER",
+        "BOX",
+    ),
 }
 
 
@@ -107,7 +116,8 @@ def test_every_field_with_a_dimension_states_its_unit():
         *("joint_count", "count", "index", "margin_min_index", "horizon", "plan_id", "normal"),
         *("missed_deadlines", "fallbacks", "cost", "slack_max", "sqp_iterations"),
         *("solver_iterations", "ticks", "late_ticks", "skipped_ticks"),
-        *("target_system", "target_component", "accepted", "refused"),
+        *("target_system", "target_component", "accepted", "refused", "numbers"),
+        *("breaches", "departures", "interventions"),
     }
     for message in ET.parse(DEFINITION).iter("message"):
         for field in message.iter("field"):

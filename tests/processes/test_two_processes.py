@@ -52,11 +52,11 @@ def test_the_capture_decodes_entirely_with_pymavlink(clean: Capture) -> None:
         seen.update((message.get_srcComponent(), message.get_type()) for message in messages)
     assert seen[(200, "HIL_SENSOR")] == 800
     assert seen[(1, "HIL_ACTUATOR_CONTROLS")] == 800
-    assert seen[(195, "OBSTACLE_WALL")] == 6  # three walls, at once and again after a second
+    assert seen[(195, "OBSTACLE_SHAPE")] == 6  # three walls, at once and again after a second
     assert seen[(195, "END_EFFECTOR_TARGET")] >= 31
     assert {name for _, name in seen} == {
         "HEARTBEAT", "ODOMETRY", "ARM_JOINT_STATE", "HIL_SENSOR", "HIL_ACTUATOR_CONTROLS",
-        "OBSTACLE_WALL", "END_EFFECTOR_TARGET", "COMMAND_LONG", "COMMAND_ACK", "STATUSTEXT",
+        "OBSTACLE_SHAPE", "END_EFFECTOR_TARGET", "COMMAND_LONG", "COMMAND_ACK", "STATUSTEXT",
     } - ({"STATUSTEXT"} - {name for _, name in seen})  # fmt: skip
 
 

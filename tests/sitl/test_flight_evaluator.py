@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from sitl.flight_evaluator import FlightEvaluator, critical
+from sitl.flight_evaluator import FlightEvaluator
 from sitl.mission_clock import MissionClock
 from sitl.plant.vector import Array
 from sitl.result import EndKind
@@ -21,7 +21,7 @@ def evaluator(name: str) -> FlightEvaluator:
     clock = MissionClock(scenario)
     target = clock.target_at(0.0).p
     above = (target[0], target[1], target[2] - 0.225)
-    return FlightEvaluator(scenario, clock, (above, above, target))
+    return FlightEvaluator(scenario, clock, np.array([above, above, above, target]))
 
 
 def places(random: np.random.Generator, name: str) -> Array:
@@ -39,7 +39,7 @@ def test_the_quick_look_records_what_the_slow_one_does(name: str) -> None:
         passed, before_s = places(random, name), 0.002 * step
         quick.judge_all(passed, before_s, STEP_S)
         for k in (1, 2):
-            slow.judge(critical(passed[k - 1].tolist()), before_s + k * STEP_S)
+            slow.judge(passed[k - 1], before_s + k * STEP_S)
     assert quick.record.minimum == pytest.approx(slow.record.minimum, abs=1e-14)
     assert quick.record.time_s == slow.record.time_s
     assert max(quick.record.time_s) > 0.0

@@ -25,7 +25,18 @@ from sitl.link.pilot_messages import (
     SendCommand,
     SendTarget,
 )
-from sitl.scenario import Hold, Obstacle, Pilot, Scenario, ScenarioWall, Start, Workspace
+from sitl.scenario import (
+    Hold,
+    Obstacle,
+    Pilot,
+    Scenario,
+    ScenarioWall,
+    Start,
+    WayPoint,
+    Workspace,
+)
+from sitl.shapes.ball import Ball
+from sitl.shapes.vertical_cylinder import VerticalCylinder
 from sitl.simulation import START_US, STEP_US
 from sitl.trajectory import TrajectoryPoint
 
@@ -88,8 +99,8 @@ def test_the_safe_set_is_announced_first() -> None:
     flight = Flight(plan(walls=WALLS, workspace=Workspace(0.1, 0.2)), {ARM: 0, MODE: 0})
     flight.fly(0.01)
     first = [message for _, message in flight.reported[:4]]
-    assert [m.index for m in first if isinstance(m, Announce)] == [0, 1, 2]
-    assert isinstance(first[3], Workspace)
+    announced = [(m.index, m.count, m.number) for m in first if isinstance(m, Announce)]
+    assert announced == [(0, 4, 0), (1, 4, 0), (2, 4, 0), (3, 4, 2)]
     assert flight.reported[3][0] == START_US
 
 
@@ -101,7 +112,60 @@ def test_walls_and_points_are_announced_as_one_set() -> None:
     assert [(m.index, m.count) for m in first if isinstance(m, Announce)] == [
         (0, 4), (1, 4), (2, 4), (3, 4),
     ]  # fmt: skip
-    assert first[3] == Announce(branch, 3, 4)
+    assert first[3] == Announce(
+        number=1,
+        numbers=(0.0, 1.0, -1.0, 0.0),
+        velocity=(0.0, 0.0, 0.0),
+        clearance_m=0.1,
+        keep_in=False,
+        t_us=START_US,
+        index=3,
+        count=4,
+    )
+
+
+def test_zones_that_move_are_announced_ten_times_a_second_where_they_are() -> None:
+    person = VerticalCylinder(
+        name="person",
+        clearance_m=0.1,
+        north_east_m=(1.0, 2.0),
+        radius_m=0.3,
+        velocity_m_s=(0.5, 0.0, 0.0),
+        starts_s=0.25,
+    )
+    flight = Flight(plan("none", walls=WALLS, zones=(person,)), {})
+    flight.fly(0.55)
+    heard = [(t, m) for t, m in flight.reported if isinstance(m, Announce)]
+    assert len(heard) == 6 * 4
+    assert {m.t_us - t for t, m in heard} == {0}
+    seen = [(m.numbers[0], m.velocity[0]) for _, m in heard if m.number == 3]
+    expected = [(1.0, 0.0)] * 3 + [(1.025, 0.5), (1.075, 0.5), (1.125, 0.5)]
+    assert seen == [pytest.approx(pair) for pair in expected]
+
+
+def test_a_set_of_64_takes_several_steps_and_is_one_set() -> None:
+    zones = tuple(
+        Ball(name=f"b{k}", clearance_m=0.1, centre_m=(9.0, k, -1.0), radius_m=0.1)
+        for k in range(64)
+    )
+    flight = Flight(plan("none", zones=zones), {})
+    flight.fly(0.1)
+    assert [m.index for _, m in flight.reported if isinstance(m, Announce)] == list(range(64))
+
+
+def test_a_zone_goes_from_way_point_to_way_point_and_stays() -> None:
+    points = (
+        WayPoint(1.0, (0.0, 0.0, 0.0)),
+        WayPoint(3.0, (2.0, 0.0, 0.0)),
+        WayPoint(4.0, (2.0, 1.0, 0.0)),
+    )
+    ball = Ball(
+        name="b", clearance_m=0.1, centre_m=(0.0, 0.0, -1.0), radius_m=0.1, way_points=points
+    )
+    (zone,) = plan("none", zones=(ball,)).zones
+    placed = [zone.at(t) for t in (0.0, 1.0, 2.0, 3.5, 9.0)]
+    assert [at.numbers[:2] for at in placed] == [(0, 0), (0, 0), (1, 0), (2, 0.5), (2, 1)]
+    assert [at.velocity[:2] for at in placed] == [(0, 0), (1, 0), (1, 0), (0, 1), (0, 0)]
 
 
 def test_targets_arrive_a_second_and_a_half_ahead_without_gaps() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import typing
 from pathlib import Path
 
 import pytest
@@ -15,6 +16,8 @@ from sitl.scenario_file import (
     scenario_digest,
     scenario_names,
 )
+from sitl.scenario_validation import check
+from sitl.shapes import TABLES
 from sitl.simulation import Simulation
 from sitl.trajectory import reference
 
@@ -45,6 +48,17 @@ POINT = """
 name = "branch"
 position_m = [0.0, 1.0, -1.0]
 clearance_m = 0.1
+"""
+BOX = """
+[[zones]]
+name = "shelf"
+shape = "box"
+centre_m = [2.0, 0.0, -1.0]
+half_size_m = [0.2, 0.2, 0.2]
+clearance_m = 0.05
+"""
+MOVES = """
+way_points = [{ time_s = 1.0, moved_m = [0, 0, 0] }, { time_s = 2.0, moved_m = [0, 1, 0] }]
 """
 SPHERE = "[workspace]\nradius_m = 0.1\nd_iw_m = 0.225\n"
 
@@ -110,12 +124,20 @@ def test_a_wrong_line_is_refused_with_key_value_and_what_is_allowed(
         (WALL.replace("-1.0, 0.0, 0.0", "-1.0, 0.5, 0.0"), ["walls[0].normal", "1.118"]),
         (WALL.replace("clearance_m", "clearence_m"), ['"walls[0].clearence_m"', '"clearance_m"']),
         (WALL + WALL, ["walls[1].name", "differ"]),
-        (WALL.replace("offset_m = -1.0", "offset_m = -0.05"), ["front/base", "-50.0 mm"]),
+        (WALL.replace("offset_m = -1.0", "offset_m = -0.05"), ["front/base", "-130.0 mm"]),
         (WALL + POINT.replace("branch", "front"), ["obstacles[0].name", "differ"]),
         (POINT.replace("0.1", "0.0"), ["obstacles[0].clearance_m", "0.001 to 10"]),
-        (POINT.replace("1.0, -1.0", "0.05, -1.2"), ["branch/end_effector", "-50.0 mm"]),
-        (POINT + SPHERE, ["obstacles", "workspace"]),
-        (several(WALL, 3) + several(POINT, 3), ["walls and obstacles = 6", "at most 5"]),
+        (POINT.replace("1.0, -1.0", "0.05, -1.2"), ["branch/end_effector", "-75.0 mm"]),
+        (several(WALL, 40) + several(POINT, 25), ["are 65", "at most 64"]),
+        (BOX.replace('"box"', '"bx"'), ["zones[0].shape = 'bx'", '"box"', "did you mean"]),
+        (BOX.replace('shape = "box"', ""), ['missing key "zones[0].shape"', '"half-space"']),
+        (BOX.replace("0.2, 0.2, 0.2", "0.2, 0.0, 0.2"), ["zones[0].half_size_m[1]", "0.001"]),
+        (BOX + "radius_m = 1.0", ['"zones[0].radius_m"']),
+        (BOX + 'keep_in = "yes"', ["zones[0].keep_in", "true or false"]),
+        (WALL + BOX.replace("shelf", "front"), ["zones[0].name", "differ"]),
+        (BOX + MOVES + "velocity_m_s = [1, 0, 0]", ["zones[0].velocity_m_s", "way_points"]),
+        (BOX + MOVES.replace("2.0", "1.0"), ["zones[0].way_points[1].time_s = 1", "after 1"]),
+        (BOX.replace("2.0, 0.0, -1.0", "0.4, 0.0, -1.4"), ["shelf/leg1", "at t = 0"]),
         ("[workspace]\nradius_m = 0.0\nd_iw_m = 0.225", ["workspace.radius_m", "0.001 to 10"]),
         ("[workspace]\nradius_m = 0.1\nd_iw_m = 0.4", ["workspace/base", "-75.0 mm"]),
         ('[[disturbances]]\nkind = "unifrom"\n', ["disturbances[0].kind", '"uniform"']),
@@ -182,3 +204,48 @@ def test_the_grazing_path_touches_every_safety_zone_and_enters_none() -> None:
             for k in range(6000)
         ]
         assert -1e-9 < min(gaps) < 2e-3
+
+
+ZONES = {
+    "half-space": ("normal = [-1.0, 0.0, 0.0]\noffset_m = 1.0", ["normal = ", "length 1"]),
+    "ball": ("centre_m = [3.0, 0.0, 0.0]\nradius_m = 0.1\nkeep_in = true", ["radius_m", "above"]),
+    "vertical cylinder": (
+        "north_east_m = [3.0, 0.0]\nradius_m = 0.1\ntop_m = 0.0\nbottom_m = -1.0",
+        ["bottom_m = -1", "below top_m"],
+    ),
+    "cylinder": (
+        "begin_m = [3.0, 0.0, 0.0]\nend_m = [3.0, 0.0, 0.0]\nradius_m = 0.1",
+        ["end_m", "from begin_m"],
+    ),
+    "box": (
+        "centre_m = [3.0, 0.0, 0.0]\nhalf_size_m = [0.1, 1.0, 1.0]\nkeep_in = true",
+        ["half_size_m", "above clearance_m"],
+    ),
+    "target sphere": ("offset_m = [0.0, 0.0, 0.0]\nradius_m = 1.0\nkeep_in = false", ["keep_in"]),
+}
+
+
+@pytest.mark.parametrize("shape", ZONES)
+def test_every_shape_says_what_is_wrong_with_its_numbers(shape: str) -> None:
+    numbers, reported = ZONES[shape]
+    numbers = numbers.replace("normal = [-1.0", "normal = [-0.5")
+    table = f'[[zones]]\nname = "one"\nshape = "{shape}"\nclearance_m = 0.2\n{numbers}\n'
+    with pytest.raises(ScenarioError) as refusal:
+        check(parse_scenario(BASE + table, "test"))
+    assert all(part in str(refusal.value) for part in ["zones[0].", *reported])
+
+
+def test_all_shapes_have_been_tried() -> None:
+    words = {typing.get_args(typing.get_type_hints(table)["shape"])[0] for table in TABLES}
+    assert words == set(ZONES)
+
+
+def test_any_mixture_of_zones_walls_points_and_workspace_is_judged_together() -> None:
+    text = BASE + WALL + POINT + BOX + SPHERE
+    simulation = Simulation(parse_scenario(text, "test"), 0)
+    zones = [key.partition("/")[0] for key in simulation.margin_keys]
+    assert list(dict.fromkeys(zones)) == ["front", "branch", "shelf", "workspace"]
+    assert zones.count("workspace") == 1
+    assert zones.count("shelf") == 13
+    points = Simulation(parse_scenario('body = "points"\n' + text, "test"), 0)
+    assert len(points.margin_keys) == 3 + 3 + 3 + 1

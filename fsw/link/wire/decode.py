@@ -13,14 +13,16 @@ from functools import cache
 from typing import Final, cast
 
 from fsw.link.wire.message_ids import AUTOPILOT, PANDION, SYSTEM_ID
-from fsw.shapes import kind_of
+from fsw.shapes import BY_NUMBER, kind_of
 from fsw.shapes.ball import point
 from fsw.shapes.half_space import wall
 from fsw.shapes.target_sphere import target_sphere
 from fsw.signals import (
+    MAX_DISTANCE,
     CommandRequest,
     EndEffectorTarget,
     SensorFrame,
+    Shape,
     Vec3,
     Zone,
 )
@@ -37,6 +39,10 @@ _ACCELERATION_IGNORED: Final = 0x1C0
 _YAW_IGNORED: Final = 0x400
 _POSITION_IGNORED: Final = 0x007
 _ZERO: Final[Vec3] = (0.0, 0.0, 0.0)
+MAX_ZONES: Final = 64  # in a set
+_FARTHEST: Final = 1e4  # m; what has no end ends here
+_FASTEST: Final = 30.0  # m/s, of a shape that moves
+_KEEP_IN: Final = 1  # PANDION_SHAPE_FLAGS
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,7 +159,7 @@ def obstacle_wall(values: Numbers) -> IndexedObstacle | None:
     """Read an OBSTACLE_WALL; None if it describes no plane or no place in its set."""
     numbers = values[0:5]
     index, count = int(values[7]), int(values[8])
-    if not _all_finite(numbers) or not index < count:
+    if not _all_finite(numbers) or not index < count <= MAX_ZONES:
         return None
     zone = wall(cast(Vec3, values[0:3]), values[3], values[4])
     if kind_of(zone.shape).check(zone.shape) is not None or not values[4] >= 0.0:
@@ -164,9 +170,29 @@ def obstacle_wall(values: Numbers) -> IndexedObstacle | None:
 def obstacle_point(values: Numbers) -> IndexedObstacle | None:
     """Read an OBSTACLE_POINT; None if it keeps nothing away or has no place in its set."""
     index, count = int(values[6]), int(values[7])
-    if not _all_finite(values[0:4]) or not index < count or not values[3] > 0.0:
+    if not _all_finite(values[0:4]) or not index < count <= MAX_ZONES or not values[3] > 0.0:
         return None
     return IndexedObstacle(point(cast(Vec3, values[0:3]), values[3]), index, count)
+
+
+def obstacle_shape(values: Numbers) -> IndexedObstacle | None:
+    """Read an OBSTACLE_SHAPE; None if it is no shape, out of range or has no place in its set."""
+    index, count, number, flags = map(int, values[23:27])
+    kind = BY_NUMBER.get(number)
+    if kind is None or not _all_finite(values[1:21]) or not index < count <= MAX_ZONES:
+        return None
+    clearance, velocity, keep_in = values[1], cast(Vec3, values[2:5]), flags == _KEEP_IN
+    shape = Shape(kind.name, values[5 : 5 + kind.size])
+    within = 0.0 <= clearance <= MAX_DISTANCE and math.hypot(*velocity) <= _FASTEST
+    if not within or not all(abs(number) <= _FARTHEST for number in shape.numbers):
+        return None
+    if flags & ~_KEEP_IN or kind.check(shape) is not None:
+        return None
+    if kind.follows_target and (not keep_in or velocity != _ZERO):
+        return None
+    # One that stands is the same whenever it is announced.
+    t_us = int(values[0]) if velocity != _ZERO else 0
+    return IndexedObstacle(Zone(shape, clearance, keep_in, velocity, t_us), index, count)
 
 
 def workspace_sphere(values: Numbers) -> Zone | None:

@@ -19,6 +19,7 @@ from fsw.signals import FlightSnapshot, SetpointKind, Vec2, Vec4
 
 _LOCAL_NED: Final = 1  # MAV_FRAME
 _MAX_CONSTRAINTS: Final = 16
+_U16: Final = 0xFFFF
 _U32: Final = 0xFFFFFFFF
 _RATE_GROUPS: Final = ("inner", "mpc", "telemetry", "housekeeping")  # of LoopHealth
 
@@ -79,22 +80,23 @@ def setpoint_status(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues
 def barrier_margin(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues | None:
     """BARRIER_MARGIN of the active safe set; a barrier counts as active at or below zero."""
     report = snapshot.constraints
-    margins = report.margins[:_MAX_CONSTRAINTS]
-    if not margins:
+    margins, barrier, smallest = report.shown(_MAX_CONSTRAINTS)
+    if smallest is None:
         return None
-    barrier = report.barrier[:_MAX_CONSTRAINTS]
-    smallest = min(margins)
     active = sum(1 << i for i, value in enumerate(barrier) if not value > 0.0)
     return (
         snapshot.t_us,
         *_padded(margins, _MAX_CONSTRAINTS),
         *_padded(barrier, _MAX_CONSTRAINTS),
         snapshot.plan.slack_max if snapshot.plan is not None else 0.0,
-        smallest,
+        min(report.margins),
         active,
         int(report.kind),
         len(margins),
-        margins.index(smallest),
+        smallest,
+        snapshot.safety.breaches & _U16,
+        snapshot.safety.departures & _U16,
+        snapshot.safety.interventions & _U16,
     )
 
 

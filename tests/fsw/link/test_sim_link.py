@@ -6,21 +6,24 @@ import socket
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
+import numpy as np
 import pytest
 
 from fsw.link.inbox import Inbox
 from fsw.link.sim_link import Pacing, SimLink
 from fsw.link.wire import message_ids as ids
-from fsw.signals import CommandAck, Mode
+from fsw.signals import CommandAck, MessageSource, Mode, SafeSet, Shape
 from messages.frames import FrameWriter, split
 from sitl.link.encode import StepEncoder
-from sitl.link.pilot import flight_plan
+from sitl.link.pilot import Phase, PilotState, flight_plan, speak
 from sitl.link.pilot_messages import SendCommand
 from sitl.mission_clock import MissionClock
+from sitl.scenario import Scenario, Workspace
 from sitl.scenario_file import load_scenario
 from sitl.sensors.suite import SensorReadings
+from sitl.shapes.box import Box
+from studies.mission import safe_set as safe_set_of
 from tests.fsw.link.snapshots import FACTS, outputs_at
-from tests.fsw.zones import of_kind, walls_of
 
 NAN = float("nan")
 SHUTDOWN = SendCommand(246, (0.0, 2.0, NAN, NAN, NAN, NAN, NAN))
@@ -92,18 +95,44 @@ def test_every_sensor_arrives_where_it_belongs(wire: Wire) -> None:
 
 def test_walls_and_points_arrive_as_the_pilot_announces_them(wire: Wire) -> None:
     branches, walls = load_scenario("branches"), load_scenario("walls").walls
-    scenario = replace(branches, walls=walls[:1])
+    crate = Box(
+        name="crate",
+        clearance_m=0.2,
+        centre_m=(3.0, 2.0, -1.0),
+        half_size_m=(0.5, 0.25, 0.125),
+        attitude_deg=(0.0, 0.0, 90.0),
+        velocity_m_s=(0.0, 0.5, 0.0),
+    )
+    scenario = replace(branches, walls=walls[:1], zones=(crate,), workspace=Workspace(0.075, 0.225))
     clock = MissionClock(scenario)
     plan = flight_plan(scenario, lambda t_us: clock.target_at(0.0), lambda t_us: 0.0)
-    encoder = StepEncoder(lockstep=True)
-    wire.send(encoder.datagram(readings(1_002_000), plan.announcements))
+    _, messages = speak(plan, PilotState(Phase.IDLE), 1_000_000)
+    wire.send(StepEncoder(lockstep=True).datagram(readings(1_002_000), messages))
     assert wire.link.wait_for_step() is not None
-    safe_set = wire.inbox.take().safe_set
-    assert safe_set is not None
-    assert [wall.shape.numbers[3] for wall in walls_of(safe_set)] == [-1.0]
-    for heard, reported in zip(of_kind(safe_set, "ball"), scenario.obstacles, strict=True):
-        assert heard.shape.numbers == pytest.approx((*reported.position_m, 0.0))
-        assert heard.clearance == pytest.approx(reported.clearance_m)
+    (announced,) = wire.inbox.take().announced
+    assert announced.source == MessageSource(1, 195, "simulator")
+    safe_set = announced.safe_set
+    assert safe_set == simulated(scenario)
+    kinds = [zone.shape.kind for zone in safe_set.zones]
+    assert kinds == ["half-space", *["ball"] * 4, "box", "target sphere"]
+
+
+def simulated(scenario: Scenario) -> SafeSet:
+    """The safe set as the studies hand it over, in the wire's single precision."""
+    return SafeSet(
+        tuple(
+            replace(
+                zone,
+                shape=Shape(zone.shape.kind, singles(zone.shape.numbers)),
+                clearance=singles((zone.clearance,))[0],
+            )
+            for zone in safe_set_of(scenario, 1_000_000).zones
+        )
+    )
+
+
+def singles(numbers: tuple[float, ...]) -> tuple[float, ...]:
+    return tuple(np.array(numbers, dtype=np.float32).astype(float).tolist())
 
 
 def test_a_repeated_step_gets_the_same_answer_and_no_tick(wire: Wire) -> None:

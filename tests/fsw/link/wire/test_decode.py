@@ -8,7 +8,9 @@ import pytest
 
 from fsw.link.inbox import Inbox
 from fsw.link.wire import message_ids as ids
-from fsw.signals import Arm
+from fsw.shapes import BY_NAME, KINDS
+from fsw.signals import Arm, SensorFrame
+from messages import dialect
 from messages.frames import Frame, FrameWriter, split, wire_fields
 
 NAN = math.nan
@@ -98,12 +100,12 @@ def test_a_target_in_another_frame_or_without_position_is_refused(fields: dict[s
 def test_walls_arrive_as_one_set_in_any_order() -> None:
     inbox = Inbox()
     inbox.accept(wall(1, 2, offset=-2.0))
-    assert inbox.take().safe_set is None
+    assert inbox.take().announced == []
     inbox.accept(wall(0, 2, offset=-1.0))
-    safe_set = inbox.take().safe_set
-    assert safe_set is not None
+    (announced,) = inbox.take().announced
+    safe_set = announced.safe_set
     assert [one.shape.numbers[3] for one in safe_set.zones] == [-1.0, -2.0]
-    assert inbox.take().safe_set is None
+    assert inbox.take().announced == []
 
 
 def test_walls_of_two_sets_do_not_mix() -> None:
@@ -111,22 +113,22 @@ def test_walls_of_two_sets_do_not_mix() -> None:
     inbox.accept(wall(0, 2))
     inbox.accept(wall(0, 3))
     inbox.accept(wall(1, 2))
-    assert inbox.take().safe_set is None
+    assert inbox.take().announced == []
 
 
 def test_walls_and_points_are_one_set() -> None:
     inbox = Inbox()
     inbox.accept(point(2, 3))
     inbox.accept(wall(0, 3))
-    assert inbox.take().safe_set is None
+    assert inbox.take().announced == []
     inbox.accept(point(1, 3, **{"position[0]": 7.0}))
-    safe_set = inbox.take().safe_set
-    assert safe_set is not None
+    (announced,) = inbox.take().announced
+    safe_set = announced.safe_set
     assert [one.shape.kind for one in safe_set.zones] == ["half-space", "ball", "ball"]
     assert [one.shape.numbers[0] for one in safe_set.zones[1:]] == [7.0, 2.0]
     inbox.accept(wall(0, 1))
-    safe_set = inbox.take().safe_set
-    assert safe_set is not None
+    (announced,) = inbox.take().announced
+    safe_set = announced.safe_set
     assert [one.shape.kind for one in safe_set.zones] == ["half-space"]
 
 
@@ -138,7 +140,7 @@ def test_walls_and_points_are_one_set() -> None:
 def test_a_point_that_keeps_nothing_away_is_refused(bad: dict[str, float]) -> None:
     inbox = Inbox()
     inbox.accept(point(**{"index": 0, "count": 1, **bad}))  # type: ignore[arg-type]
-    assert inbox.take().safe_set is None
+    assert inbox.take().announced == []
     assert inbox.refused == 1
 
 
@@ -149,15 +151,139 @@ def test_a_point_that_keeps_nothing_away_is_refused(bad: dict[str, float]) -> No
 def test_a_wall_that_is_no_plane_is_refused(bad: dict[str, float]) -> None:
     inbox = Inbox()
     inbox.accept(wall(0, 1, **bad))
+    assert inbox.take().announced == []
+    assert inbox.refused == 1
+
+
+SHAPES = {
+    0: (0.6, 0.0, 0.8, 1.5),
+    1: (1.0, 2.0, -3.0, 0.5),
+    2: (0.0, 0.0, -0.225, 0.075),
+    3: (1.0, 2.0, -3.0, 0.0, 0.25),
+    4: (1.0, 2.0, -3.0, 1.0, 3.0, -3.0, 0.25),
+    5: (1.0, 2.0, -3.0, 0.5, 0.25, 0.125, 0.6, 0.0, 0.8, 0.0),
+}
+
+
+def shape(kind: int, index: int = 0, count: int = 1, **fields: float) -> Frame:
+    numbers = {f"numbers[{k}]": value for k, value in enumerate(SHAPES.get(kind, ()))}
+    default = {"clearance": 0.125, "flags": int(kind == 2)}
+    return frame(
+        ids.OBSTACLE_SHAPE, index=index, count=count, kind=kind, **{**default, **numbers, **fields}
+    )
+
+
+def test_the_dialect_names_every_shape_there_is() -> None:
+    named = dialect.enums["PANDION_SHAPE"]
+    for kind in KINDS:
+        words = kind.name.replace(" ", "_").replace("-", "_").upper()
+        assert named[kind.number].name == f"PANDION_SHAPE_{words}"
+    assert len(named) == len(KINDS) + 1  # and its end
+    assert set(SHAPES) == {kind.number for kind in KINDS}
+
+
+@pytest.mark.parametrize("kind", SHAPES)
+def test_a_shape_of_every_kind_is_read(kind: int) -> None:
+    inbox = Inbox()
+    inbox.accept(shape(kind))
+    safe_set = inbox.take().safe_set
+    assert safe_set is not None
+    (zone,) = safe_set.zones
+    assert BY_NAME[zone.shape.kind].number == kind
+    assert zone.shape.numbers == pytest.approx(SHAPES[kind])
+    assert (zone.clearance, zone.keep_in) == (0.125, kind == 2)
+
+
+def test_shapes_walls_points_and_a_sphere_are_one_set() -> None:
+    inbox = Inbox()
+    for message in (wall(0, 4), point(1, 4), shape(5, 2, 4), shape(2, 3, 4)):
+        inbox.accept(message)
+    safe_set = inbox.take().safe_set
+    assert safe_set is not None
+    kinds = [zone.shape.kind for zone in safe_set.zones]
+    assert kinds == ["half-space", "ball", "box", "target sphere"]
+
+
+def test_a_set_holds_64_shapes_and_no_more() -> None:
+    for count, complete in ((64, True), (65, False)):
+        inbox = Inbox()
+        for index in range(count):
+            inbox.accept(shape(1, index, count))
+        assert (inbox.take().safe_set is not None) == complete
+
+
+def test_what_stands_is_the_same_whenever_it_is_announced_and_what_moves_is_not() -> None:
+    inbox = Inbox()
+    stands, moves = [], []
+    for t_us in (5_000_000, 6_000_000):
+        inbox.accept(shape(1, time_usec=t_us))
+        stands.append(inbox.take().safe_set)
+        inbox.accept(shape(1, time_usec=t_us, **{"velocity[0]": 0.5}))
+        moves.append(inbox.take().safe_set)
+    assert stands[0] == stands[1]
+    assert [one.zones[0].t_us for one in moves if one is not None] == [5_000_000, 6_000_000]
+
+
+def test_a_moving_shape_without_a_time_is_where_it_is_when_it_arrives() -> None:
+    inbox = Inbox()
+    inbox.accept(shape(1, **{"velocity[0]": 0.5}))
+    sensors = SensorFrame(
+        t_us=7_000_000,
+        p_WB=(0.0, 0.0, 0.0),
+        v_WB=(0.0, 0.0, 0.0),
+        q_WB=(1.0, 0.0, 0.0, 0.0),
+        gyro_B=(0.0, 0.0, 0.0),
+        accel_B=(0.0, 0.0, 0.0),
+        q_arm=(0.0, 0.0),
+        qd_arm=(0.0, 0.0),
+    )
+    safe_set = inbox.take_inputs(sensors, None, None, None).safe_set
+    assert safe_set is not None
+    assert safe_set.zones[0].t_us == 7_000_000
+
+
+@pytest.mark.parametrize(
+    ("kind", "bad"),
+    [
+        *((kind, {"numbers[0]": NAN}) for kind in SHAPES),
+        *((kind, {"velocity[1]": math.inf}) for kind in SHAPES),
+        (1, {"clearance": -0.1}),
+        (1, {"clearance": NAN}),
+        (1, {"clearance": 5000.0}),
+        (1, {"numbers[0]": 2e4}),
+        (1, {"numbers[3]": -0.1}),
+        (1, {"velocity[0]": 40.0}),
+        (1, {"index": 1}),
+        (1, {"flags": 2}),
+        (0, {"numbers[0]": 0.5}),
+        (2, {"flags": 0}),
+        (2, {"velocity[0]": 0.5}),
+        (3, {"numbers[3]": -4.0}),
+        (4, {"numbers[4]": 2.0}),
+        (5, {"numbers[4]": 0.0}),
+        (5, {"numbers[6]": 0.5}),
+        (77, {}),
+    ],
+)
+def test_what_is_no_shape_is_refused_and_counted(kind: int, bad: dict[str, float]) -> None:
+    inbox = Inbox()
+    inbox.accept(shape(kind, **bad))  # type: ignore[arg-type]
     assert inbox.take().safe_set is None
     assert inbox.refused == 1
+
+
+def test_a_shape_for_another_vehicle_is_not_ours() -> None:
+    inbox = Inbox()
+    inbox.accept(shape(1, target_system=2))
+    assert inbox.take().safe_set is None
+    assert inbox.refused == 0
 
 
 @pytest.mark.parametrize("radius", [0.0, -1.0, NAN])
 def test_a_sphere_that_contains_nothing_is_refused(radius: float) -> None:
     inbox = Inbox()
     inbox.accept(frame(ids.WORKSPACE_SPHERE, radius=radius))
-    assert inbox.take().safe_set is None
+    assert inbox.take().announced == []
     assert inbox.refused == 1
 
 
