@@ -75,7 +75,7 @@ class Flight:
 
     scenario: Scenario
     seed: int = 11
-    config: FlightConfig = field(default_factory=flight_config)
+    config: FlightConfig = field(default_factory=lambda: flight_config(body="points"))
     planner: AnyPlanner | None = None
     spoil: Callable[[SensorFrame], SensorFrame] = as_measured
     late_ticks: Callable[[int], int] = on_time
