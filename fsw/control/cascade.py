@@ -9,18 +9,25 @@ from numpy.typing import NDArray
 
 from fsw.compiled import compilable, compiled, machine_code, packed
 from fsw.control.allocation import allocate
-from fsw.control.arm_compensation import compensated_joints
+from fsw.control.arm_compensation import compensated_joints, lately_off_plan
 from fsw.control.attitude import attitude_pid, attitude_reference
 from fsw.control.gains import LoopGains, tracking_gains
 from fsw.control.height import height_pid
 from fsw.control.joints import joint_torques
 from fsw.control.pid import PidGains
-from fsw.control.tracking import Observed, TrackingLaw, follow_plan, observe
+from fsw.control.tracking import Observed, TrackingLaw, follow_plan, observe, velocity_of_mass
 from fsw.geometry.rotation import wrap_angle
 from fsw.geometry.vectors import clamp_magnitude
 from fsw.model.airframe import GRAVITY, Airframe
 from fsw.model.nominal import REST_INPUT, REST_STATE
-from fsw.model.rotors import MotionState, estimate_mass, lag_rotors, motion_state, rotor_decay
+from fsw.model.rotors import (
+    MotionState,
+    estimate_mass,
+    hanging_arm,
+    lag_rotors,
+    motion_state,
+    rotor_decay,
+)
 from fsw.signals import (
     STOPPED,
     ActuatorCommand,
@@ -50,6 +57,7 @@ class CascadeMemory(NamedTuple):
     attitude: Vec3 = (0.0, 0.0, 0.0)  # rad s, integrals
     height: float = 0.0  # m s, integral
     joints: Vec2 = (0.0, 0.0)  # rad s, integrals
+    off_plan: float = 0.0  # m, largest deviation of late
 
     def after_sending(self, sent: ActuatorCommand) -> CascadeMemory:
         """The memory for the next tick, once the safety gate has decided."""
@@ -148,20 +156,27 @@ def close_loops(
         rotors = lag_rotors(rotors, memory.commanded.rotor_thrust, law.rotor_decay)
     mass = estimate_mass(airframe, memory.mass, rotors, estimate.specific_force, dt * ticks)
     motion = motion_state(airframe, mass, estimate, rotors, memory.commanded.joint_torque[0])
+    arm = hanging_arm(airframe, estimate.q_arm)
+    v = velocity_of_mass(estimate, arm.depth)
     for _ in range(ticks):
-        observed = observe(observed, estimate.v_WB, motion.a, tuning.tracking, dt)
+        observed = observe(observed, v, motion.a, tuning.tracking, dt)
     attitude, height = memory.attitude, memory.height
     if law.follows_plan:
-        (wdx, wdy), thrust = follow_plan(law.tracking, mass, estimate, motion, observed, plan, u)
+        (wdx, wdy), thrust = follow_plan(
+            law.tracking, mass, arm.depth, estimate, motion, observed, plan, u
+        )
         wdz = u.yaw_acc + _yaw_correction(tuning.yaw, estimate, plan)
+        roll_inertia = arm.roll_inertia
     else:
         (wdx, wdy, wdz), attitude = attitude_pid(
             tuning.attitude, attitude, estimate, attitude_reference(u.a, plan.yaw), dt
         )
+        roll_inertia = airframe.inertia[0]  # the paper's loop knows no arm
         thrust, height = height_pid(airframe, tuning.height, height, estimate, plan, u, dt)
-    q_ref, qd_ref = plan.q_arm, plan.qd_arm
+    q_ref, qd_ref, off_plan = plan.q_arm, plan.qd_arm, memory.off_plan
     if law.follows_plan and tuning.compensate:
-        q_ref, qd_ref = compensated_joints(airframe, tuning.compensation, estimate, plan)
+        off_plan = lately_off_plan(tuning.compensation, off_plan, estimate, plan, dt * ticks)
+        q_ref, qd_ref = compensated_joints(airframe, tuning.compensation, off_plan, estimate, plan)
     joints, kept = joint_torques(
         airframe,
         tuning.joint,
@@ -172,10 +187,11 @@ def close_loops(
         wdy,
         dt,
     )
-    torque = _body_torque(airframe, estimate, (wdx, wdy, wdz), joints[0])
+    torque = _body_torque(airframe, roll_inertia, estimate, (wdx, wdy, wdz), joints[0])
     rotor_thrust = allocate(airframe, torque, thrust, tuning.yaw_thrust_limit)
     command = ActuatorCommand(rotor_thrust, joints)
-    return command, CascadeMemory(rotors, command, observed, mass, attitude, height, kept)
+    memory = CascadeMemory(rotors, command, observed, mass, attitude, height, kept, off_plan)
+    return command, memory
 
 
 @compiled
@@ -186,7 +202,9 @@ def _close_loops(
     plan: PredictionState,
     u: PlanInput,
     ticks: int,
-) -> tuple[tuple[Vec4, Vec2], Vec4, tuple[Vec3, Vec3, Vec2], float, tuple[Vec3, float, Vec2]]:
+) -> tuple[
+    tuple[Vec4, Vec2], Vec4, tuple[Vec3, Vec3, Vec2], float, tuple[Vec3, float, Vec2, float]
+]:
     """``close_loops`` that returns plain tuples, which leave machine code at half the cost."""
     command, kept = close_loops(law[0], memory, estimate, plan, u, ticks)
     return (
@@ -194,7 +212,7 @@ def _close_loops(
         kept.rotors,
         (kept.observed.v, kept.observed.d, kept.observed.disturbance_bias),
         kept.mass,
-        (kept.attitude, kept.height, kept.joints),
+        (kept.attitude, kept.height, kept.joints, kept.off_plan),
     )
 
 
@@ -207,14 +225,18 @@ def _yaw_correction(gains: PidGains, estimate: StateEstimate, plan: PredictionSt
 
 @compilable
 def _body_torque(
-    airframe: Airframe, estimate: StateEstimate, wd: Vec3, joint1_torque: float
+    airframe: Airframe,
+    roll_inertia: float,
+    estimate: StateEstimate,
+    wd: Vec3,
+    joint1_torque: float,
 ) -> Vec3:
     """Rotor torque for an angular acceleration: inertia, gyroscopic part, arm's reaction."""
     inertia = airframe.inertia
     ix, iy, iz = inertia[0], inertia[1], inertia[2]
     wx, wy, wz = estimate.w_WB_B
     return (
-        ix * wd[0] + (iz - iy) * wy * wz,
+        roll_inertia * wd[0] + (iz - iy) * wy * wz,
         iy * wd[1] + (ix - iz) * wz * wx + joint1_torque,
         iz * wd[2] + (iy - ix) * wx * wy,
     )

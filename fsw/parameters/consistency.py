@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 from fsw.barriers.safe_approach import BarrierTuning
 from fsw.control.gains import tracking_gains
-from fsw.control.tube import Tube, peak_snap_share, tube
+from fsw.control.tube import Tube, all_axes, limits_used, tube
 from fsw.model.airframe import GRAVITY
 from fsw.parameters.flight_config import FlightConfig, Surroundings
 from fsw.signals import ConstraintKind, SafeSet
@@ -50,9 +50,10 @@ def analyse(config: FlightConfig, safe_set: SafeSet, loop: Tube) -> tuple[Findin
         findings.append(_links(config, min(o.clearance for o in safe_set.obstacles)))
     if config.inner == "tracking":
         findings.append(_base_tube(tuning, loop, surroundings))
+        findings.append(_tube_of_all_axes(tuning, loop, safe_set, surroundings))
         if not in_sphere:
             findings.append(_end_effector_tube(tuning, loop, surroundings))
-        findings.append(_snap(config, loop, surroundings))
+        findings.append(_limits(config, loop, surroundings))
     else:
         findings.append(_sampled(tuning, surroundings, config.planner.period))
     return tuple(findings)
@@ -148,10 +149,41 @@ def _base_tube(tuning: BarrierTuning, loop: Tube, surroundings: Surroundings) ->
     return _finding(
         "tube",
         room >= reach,
-        f"no disturbance within {surroundings.disturbance:g} m/s^2 pushes the base further than "
-        f"{reach * 1e3:.0f} mm off its plan, which keeps {room * 1e3:.0f} mm from the boundary: "
-        f"margin {(room - reach) * 1e3:+.0f} mm",
+        f"no disturbance within {surroundings.disturbance:g} m/s^2 on one axis pushes the base "
+        f"further than {reach * 1e3:.0f} mm off its plan, which keeps {room * 1e3:.0f} mm from "
+        f"the boundary: margin {(room - reach) * 1e3:+.0f} mm",
         f"lambda >= {reach * tuning.slope:.3f} m/s is enough",
+    )
+
+
+def _tube_of_all_axes(
+    tuning: BarrierTuning, loop: Tube, safe_set: SafeSet, surroundings: Surroundings
+) -> Finding:
+    """A wall meets one axis of it, if it stands along one; a sphere meets all of them together."""
+    most, room = surroundings.disturbance, stand_off(tuning)
+    across, up = all_axes(loop, most)
+    reach = _reach(safe_set, across, up)
+    scale = room / reach
+    return _finding(
+        "tube of all axes",
+        room >= reach,
+        f"pushed within {most:g} m/s^2 on all axes at once the base can be {across * 1e3:.0f} mm "
+        f"off its plan on a horizontal axis and {up * 1e3:.0f} mm vertically, {reach * 1e3:.0f} mm "
+        f"towards the boundary, and the plan keeps {room * 1e3:.0f} mm",
+        f"lambda >= {reach * tuning.slope:.3f} m/s would be proof, or at most about "
+        f"{scale * most:.2f} m/s^2",
+        refuses=False,
+    )
+
+
+def _reach(safe_set: SafeSet, across: float, up: float) -> float:
+    """The furthest [m] that a deviation of ``across`` [m] on x, y and ``up`` [m] is to a boundary."""
+    corner = math.hypot(across, across, up)
+    if safe_set.sphere is not None or safe_set.obstacles:
+        return corner
+    return max(
+        across * (abs(wall.normal[0]) + abs(wall.normal[1])) + up * abs(wall.normal[2])
+        for wall in safe_set.walls
     )
 
 
@@ -171,14 +203,17 @@ def _end_effector_tube(tuning: BarrierTuning, loop: Tube, surroundings: Surround
     )
 
 
-def _snap(config: FlightConfig, loop: Tube, surroundings: Surroundings) -> Finding:
-    share = peak_snap_share(config.airframe, loop, surroundings.disturbance)
+def _limits(config: FlightConfig, loop: Tube, surroundings: Surroundings) -> Finding:
+    """The tube is that of the linear loop: it holds while no limit is reached."""
+    disturbance = surroundings.disturbance
+    used = limits_used(config.airframe, config.tuning.tracking, loop, disturbance)
+    worst = max(used, key=lambda name: used[name])
     return _finding(
-        "snap",
-        share <= 0.85,
-        f"rejecting {surroundings.disturbance:g} m/s^2 uses {share:.0%} of the snap the rotors' "
-        "torque gives",
-        f"a disturbance up to {0.85 / share * surroundings.disturbance:.2f} m/s^2 leaves 15 %",
+        "limits",
+        used[worst] <= 1.0,
+        f"the tube holds while no limit is reached: the worst disturbance of {disturbance:g} "
+        f"m/s^2 on one axis uses {used[worst]:.0%} of the {worst}",
+        f"up to {disturbance / used[worst]:.2f} m/s^2 none is",
         refuses=False,
     )
 
