@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from fsw.barriers.safe_approach import BarrierTuning
 from fsw.compiled import compilable, compiled, machine_code, packed
 from fsw.control.allocation import allocate
-from fsw.control.arm_compensation import compensated_joints
+from fsw.control.arm_compensation import compensated_joints, lately_off_plan
 from fsw.control.attitude import attitude_pid, attitude_reference
 from fsw.control.gains import LoopGains, tracking_gains
 from fsw.control.height import height_pid
@@ -24,6 +24,7 @@ from fsw.control.tracking import (
     TrackingLaw,
     follow_plan,
     observe,
+    velocity_of_mass,
     wanted_accelerations,
 )
 from fsw.geometry.rotation import wrap_angle
@@ -31,7 +32,14 @@ from fsw.geometry.vectors import add_scaled, clamp_magnitude, subtract
 from fsw.model.airframe import GRAVITY, Airframe
 from fsw.model.body import Body, body_of
 from fsw.model.nominal import REST_INPUT, REST_STATE
-from fsw.model.rotors import MotionState, estimate_mass, lag_rotors, motion_state, rotor_decay
+from fsw.model.rotors import (
+    MotionState,
+    estimate_mass,
+    hanging_arm,
+    lag_rotors,
+    motion_state,
+    rotor_decay,
+)
 from fsw.signals import (
     STOPPED,
     ActuatorCommand,
@@ -64,6 +72,7 @@ class CascadeMemory(NamedTuple):
     attitude: Vec3 = (0.0, 0.0, 0.0)  # rad s, integrals
     height: float = 0.0  # m s, integral
     joints: Vec2 = (0.0, 0.0)  # rad s, integrals
+    off_plan: float = 0.0  # m, largest deviation of late
 
     def after_sending(self, sent: ActuatorCommand) -> CascadeMemory:
         """The memory for the next tick, once the safety gate has decided."""
@@ -192,22 +201,29 @@ def close_loops(
         rotors = lag_rotors(rotors, memory.commanded.rotor_thrust, law.rotor_decay)
     mass = estimate_mass(airframe, memory.mass, rotors, estimate.specific_force, dt * ticks)
     motion = motion_state(airframe, mass, estimate, rotors, memory.commanded.joint_torque[0])
+    arm = hanging_arm(airframe, estimate.q_arm)
+    v = velocity_of_mass(estimate, arm.depth)
     for _ in range(ticks):
-        observed = observe(observed, estimate.v_WB, motion.a, tuning.tracking, dt)
+        observed = observe(observed, v, motion.a, tuning.tracking, dt)
     attitude, height, guarded = memory.attitude, memory.height, (False, math.inf)
     if zones.shape[0] > 0 and law.filter.tuning.enabled > 0:
         plan, u, guarded = _kept_off(law, zones, estimate, motion, observed, plan, u)
     if law.follows_plan:
-        (wdx, wdy), thrust = follow_plan(law.tracking, mass, estimate, motion, observed, plan, u)
+        (wdx, wdy), thrust = follow_plan(
+            law.tracking, mass, arm.depth, estimate, motion, observed, plan, u
+        )
         wdz = u.yaw_acc + _yaw_correction(tuning.yaw, estimate, plan)
+        roll_inertia = arm.roll_inertia
     else:
         (wdx, wdy, wdz), attitude = attitude_pid(
             tuning.attitude, attitude, estimate, attitude_reference(u.a, plan.yaw), dt
         )
+        roll_inertia = airframe.inertia[0]  # the paper's loop knows no arm
         thrust, height = height_pid(airframe, tuning.height, height, estimate, plan, u, dt)
-    q_ref, qd_ref = plan.q_arm, plan.qd_arm
+    q_ref, qd_ref, off_plan = plan.q_arm, plan.qd_arm, memory.off_plan
     if law.follows_plan and tuning.compensate:
-        q_ref, qd_ref = compensated_joints(airframe, tuning.compensation, estimate, plan)
+        off_plan = lately_off_plan(tuning.compensation, off_plan, estimate, plan, dt * ticks)
+        q_ref, qd_ref = compensated_joints(airframe, tuning.compensation, off_plan, estimate, plan)
     joints, kept = joint_torques(
         airframe,
         tuning.joint,
@@ -218,10 +234,10 @@ def close_loops(
         wdy,
         dt,
     )
-    torque = _body_torque(airframe, estimate, (wdx, wdy, wdz), joints[0])
+    torque = _body_torque(airframe, roll_inertia, estimate, (wdx, wdy, wdz), joints[0])
     rotor_thrust = allocate(airframe, torque, thrust, tuning.yaw_thrust_limit)
     command = ActuatorCommand(rotor_thrust, joints)
-    memory = CascadeMemory(rotors, command, observed, mass, attitude, height, kept)
+    memory = CascadeMemory(rotors, command, observed, mass, attitude, height, kept, off_plan)
     return command, memory, guarded
 
 
@@ -275,7 +291,12 @@ def _close_loops(
     ticks: int,
     zones: NDArray[np.float64],
 ) -> tuple[
-    tuple[Vec4, Vec2], Vec4, tuple[Vec3, Vec3, Vec2], float, tuple[Vec3, float, Vec2], Guarded
+    tuple[Vec4, Vec2],
+    Vec4,
+    tuple[Vec3, Vec3, Vec2],
+    float,
+    tuple[Vec3, float, Vec2, float],
+    Guarded,
 ]:
     """``close_loops`` that returns plain tuples, which leave machine code at half the cost."""
     command, kept, guarded = close_loops(law[0], memory, estimate, plan, u, ticks, zones)
@@ -284,7 +305,7 @@ def _close_loops(
         kept.rotors,
         (kept.observed.v, kept.observed.d, kept.observed.disturbance_bias),
         kept.mass,
-        (kept.attitude, kept.height, kept.joints),
+        (kept.attitude, kept.height, kept.joints, kept.off_plan),
         guarded,
     )
 
@@ -298,14 +319,18 @@ def _yaw_correction(gains: PidGains, estimate: StateEstimate, plan: PredictionSt
 
 @compilable
 def _body_torque(
-    airframe: Airframe, estimate: StateEstimate, wd: Vec3, joint1_torque: float
+    airframe: Airframe,
+    roll_inertia: float,
+    estimate: StateEstimate,
+    wd: Vec3,
+    joint1_torque: float,
 ) -> Vec3:
     """Rotor torque for an angular acceleration: inertia, gyroscopic part, arm's reaction."""
     inertia = airframe.inertia
     ix, iy, iz = inertia[0], inertia[1], inertia[2]
     wx, wy, wz = estimate.w_WB_B
     return (
-        ix * wd[0] + (iz - iy) * wy * wz,
+        roll_inertia * wd[0] + (iz - iy) * wy * wz,
         iy * wd[1] + (ix - iz) * wz * wx + joint1_torque,
         iz * wd[2] + (iy - ix) * wx * wy,
     )

@@ -333,9 +333,7 @@ def test_disarmed_no_pulse_is_sent() -> None:
     assert outputs.servo1_raw == outputs.servo5_raw == 0
 
 
-def test_margins_of_three_points_are_all_sent_while_they_fit_else_one_a_zone() -> (
-    None
-):
+def test_margins_of_three_points_are_all_sent_while_they_fit_else_one_a_zone() -> None:
     kind = ConstraintKind.WALLS
     five = ConstraintReport(kind, tuple(range(1, 16)), tuple(range(15)), (3,) * 5)
     assert five.shown(16) == (five.margins, five.barrier, 0)
