@@ -24,7 +24,7 @@ from fsw.geometry.vectors import clamp, clamp_magnitude, norm, subtract
 from fsw.model.airframe import Airframe
 from fsw.model.kinematics import END_EFFECTOR, arm_points, links
 from fsw.model.prediction import to_vector
-from fsw.signals import PredictionState, StateEstimate, Vec2, Vec3
+from fsw.signals import PredictionState, StateEstimate, Vec2, Vec3, Vec4
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,10 +33,16 @@ class CompensationLimits:
 
     reach: float = 0.985  # of the straight arm; beyond it the elbow loses its side
     fold: float = 0.25  # of the straight arm; closer to the base it folds through itself
-    # Off its plan by more than any disturbance makes it, the vehicle needs its rotors' torque for
-    # itself: an arm that chases a far point slings it about.
-    whole: float = 0.07  # m, compensates wholly up to here
-    none: float = 0.12  # m, and not at all from here
+    # How far the end-effector is moved against its planned place in the base's frame. Every
+    # correction pushes off the base, and an arm that follows the worst disturbance in full needs
+    # the pitch torque with which the base rejects it.
+    whole: float = 0.02  # m, corrected wholly up to here
+    most: float = 0.04  # m, and never further than this
+    # What the base was off its plan by lately: it is compensated wholly up to ``near``, and not at
+    # all from ``far``, where the base needs its pitch torque for itself.
+    near: float = 0.035  # m
+    far: float = 0.055  # m
+    memory: float = 2.0  # s, in which a deviation is forgotten
 
 
 @compilable
@@ -49,30 +55,39 @@ def planned_end_effector(airframe: Airframe, plan: PredictionState) -> tuple[Vec
 
 
 @compilable
+def lately_off_plan(
+    limits: CompensationLimits,
+    before: float,
+    estimate: StateEstimate,
+    plan: PredictionState,
+    dt: float,
+) -> float:
+    """Largest recent distance [m] of the base from its plan, given that of a tick ``before`` [m].
+
+    ``dt`` [s] is the tick's length.
+    """
+    kept = before * (1.0 - min(dt / limits.memory, 1.0))
+    return max(norm(subtract(plan.p, estimate.p_WB)), kept)
+
+
+@compilable
 def compensated_joints(
     airframe: Airframe,
     limits: CompensationLimits,
     joint_limits: JointReferenceLimits,
+    off_plan: float,
     estimate: StateEstimate,
     plan: PredictionState,
 ) -> tuple[Vec2, Vec2]:
     """Joint angles [rad] and rates [rad/s] that keep the end-effector on its planned path.
 
-    The elbow of the plan, where bent, decides on which side ours is.
+    The elbow of the plan, where bent, decides on which side ours is. ``off_plan`` [m] is how far
+    the base was off its plan lately.
     """
     l1, l2 = airframe.link_length[0], airframe.link_length[1]
     p_WE, v_WE = planned_end_effector(airframe, plan)
     x, z, vx, vz = _seen_from_base(estimate, p_WE, v_WE)
-    off_plan = norm(subtract(plan.p, estimate.p_WB))
-    share = clamp((limits.none - off_plan) / (limits.none - limits.whole), 0.0, 1.0)
-    if share < 1.0:
-        w1, w12 = plan.qd_arm[0], plan.qd_arm[0] + plan.qd_arm[1]
-        th1 = plan.q_arm[0]
-        (x1, z1), (x2, z2) = links(airframe.link_length, th1, th1 + plan.q_arm[1])
-        x = share * x + (1.0 - share) * (x1 + x2)
-        z = share * z + (1.0 - share) * (z1 + z2)
-        vx = share * vx + (1.0 - share) * (z1 * w1 + z2 * w12)
-        vz = share * vz - (1.0 - share) * (x1 * w1 + x2 * w12)
+    x, z, vx, vz = _within_correction(airframe, limits, off_plan, plan, (x, z, vx, vz))
     length = math.hypot(x, z)
     if length < 1e-3:
         return plan.q_arm, plan.qd_arm
@@ -94,6 +109,38 @@ def compensated_joints(
 
 
 _LEAST_BEND = 0.2  # rad; a straighter plan has no side
+
+
+@compilable
+def _within_correction(
+    airframe: Airframe,
+    limits: CompensationLimits,
+    off_plan: float,
+    plan: PredictionState,
+    seen: Vec4,
+) -> Vec4:
+    """The point, and how it moves, no further from the planned one than the correction reaches."""
+    th1, w1 = plan.q_arm[0], plan.qd_arm[0]
+    th12, w12 = th1 + plan.q_arm[1], w1 + plan.qd_arm[1]
+    (x1, z1), (x2, z2) = links(airframe.link_length, th1, th12)
+    x, z, vx, vz = x1 + x2, z1 + z2, z1 * w1 + z2 * w12, -x1 * w1 - x2 * w12
+    dx, dz, dvx, dvz = seen[0] - x, seen[1] - z, seen[2] - vx, seen[3] - vz
+    far = math.hypot(dx, dz)
+    calm = clamp((limits.far - off_plan) / max(limits.far - limits.near, 1e-6), 0.0, 1.0)
+    share, slope = calm, calm
+    if far > limits.whole:
+        span = max(limits.most - limits.whole, 1e-6)
+        bend = math.tanh((far - limits.whole) / span)
+        share = calm * (limits.whole + span * bend) / far
+        slope = calm * (1.0 - bend * bend)
+    # Outwards the point slows down by the slope, along the circle by the share.
+    outwards = (slope - share) * (dx * dvx + dz * dvz) / max(far * far, 1e-12)
+    return (
+        x + share * dx,
+        z + share * dz,
+        vx + share * dvx + outwards * dx,
+        vz + share * dvz + outwards * dz,
+    )
 
 
 @compilable

@@ -21,13 +21,13 @@ class PlannerConfig:
     period_us: int = PLANNING_US  # T
     solver: str = "clarabel"  # a name in solvers.py; slsqp is the paper's
     sqp_iterations: int = 2  # slsqp goes on until it converges
-    body: BodyName = "points"  # what keeps clear; "points" are the paper's
+    body: BodyName = "full"  # what keeps clear; "points" are the paper's
     weights: CostWeights = field(default_factory=CostWeights)
     limits: InputLimits = field(default_factory=InputLimits)
     joint_slack: float = 50.0  # penalty of a rad outside the limits
     # blf
     # Beside walls the end-effector counts too, which swings more than the base wanders.
-    walls: BarrierTuning = field(default_factory=lambda: BarrierTuning(lambda_=0.345))
+    walls: BarrierTuning = field(default_factory=lambda: BarrierTuning(lambda_=0.353))
     workspace: BarrierTuning = field(default_factory=BarrierTuning)
     barrier_slack: float = 20.0  # penalty of a m/s less than the barrier requires
     # hc

@@ -50,11 +50,14 @@ def test_the_horizontal_gains_are_the_cheapest(tuning: TrackingTuning, lag: floa
 
 @pytest.mark.parametrize("tuning", TUNINGS)
 def test_the_vertical_gains_are_the_cheapest(tuning: TrackingTuning) -> None:
-    a, b, lag = np.zeros((3, 3)), np.zeros((3, 1)), 0.07
-    a[0, 1] = a[1, 2] = 1.0
+    a, b, lag = np.zeros((4, 4)), np.zeros((4, 1)), 0.07
+    a[0, 1] = a[1, 2] = a[1, 3] = 1.0
     a[2, 2], b[2, 0] = -1.0 / lag, 1.0 / lag
-    expected = cheapest(a, b, np.diag([1.0, 0.0, 0.0]), tuning.vertical_input_weight)
-    np.testing.assert_allclose(tracking_gains(tuning, lag, DT).k_vertical, expected, rtol=1e-5)
+    a[3, 3] = -1.0 / tuning.vertical_disturbance_correlation
+    expected = cheapest(a, b, np.diag([1.0, 0.0, 0.0, 0.0]), tuning.vertical_input_weight)
+    gains = tracking_gains(tuning, lag, DT)
+    got = (*gains.k_vertical, gains.k_vertical_disturbance)
+    np.testing.assert_allclose(got, expected, rtol=1e-5)
 
 
 @pytest.mark.parametrize("loop", ["attitude", "height", "joint"])
