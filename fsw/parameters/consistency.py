@@ -197,7 +197,7 @@ def _tube_of_all_axes(
 
 
 def _reach(safe_set: SafeSet, across: float, up: float) -> float:
-    """How far towards a boundary [m] ``across`` [m] on x and y and ``up`` [m] on z are at most."""
+    """How far towards a boundary ``across`` [m] on x and on y and ``up`` [m] can lead [m]."""
     corner = math.hypot(across, across, up)
     flat = [zone.shape.numbers for zone in safe_set.zones if kind_of(zone.shape).flat]
     if len(flat) < len(safe_set.zones):
