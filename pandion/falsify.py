@@ -10,12 +10,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from command_line.options import json_file, option, read
+from command_line.output import console_beside, write_text
 from command_line.parser import COULD_NOT_START
 from command_line.values import number, whole
+from command_line.version import version
 from fsw.log.run_directory import new_run_directory
 from pandion.display import Display
-from pandion.output import console_beside, write_text
-from pandion.version import version
 
 if TYPE_CHECKING:
     from fsw.parameters.flight_config import FlightConfig
@@ -84,10 +84,10 @@ def _check(scenario: Scenario) -> None:
         )
 
 
-def _config() -> FlightConfig:
-    from fsw.parameters.flight_config import FlightConfig
+def _config(scenario: Scenario) -> FlightConfig:
+    from fsw.parameters.flight_config import flight_config
 
-    return FlightConfig()
+    return flight_config(body=scenario.body)  # as pandion fly
 
 
 def _search(options: FalsifyOptions, scenario: Scenario) -> int:
@@ -104,7 +104,7 @@ def _search(options: FalsifyOptions, scenario: Scenario) -> int:
     with display.progress():
         outcome = search(
             scenario,
-            _config(),
+            _config(scenario),
             options.amplitude,
             options.evaluations,
             options.seed,
@@ -163,6 +163,7 @@ def _summary(found: Found) -> dict[str, Any]:
         "margin_m": found.margin_m if math.isfinite(found.margin_m) else None,
         "axes": found.axes,
         "kind": found.kind,
+        "filtered_ticks": found.filtered_ticks,
         "first_step": found.start.step,
     }
 
@@ -181,26 +182,27 @@ def _replay(options: FalsifyOptions, scenario: Scenario, path: Path) -> int:
     from studies.falsify import bounds, replay
 
     first_step, pushes = _read(path, scenario)
+    config = _config(scenario)
     amplitude = max(abs(value) for push in pushes for value in push)
     console = console_beside(options.json)
     display = Display(console)
     with display.progress():
         flown = replay(
             scenario,
-            _config(),
+            config,
             first_step,
             pushes,
             lambda what, done, total: display.report(
                 what, done, total, f"{done:.0f} of {total:.0f} s"
             ),
         )
-    bound = bounds(_config(), amplitude)
+    bound = bounds(config, amplitude)
     x, y, z = (value * _MM for value in flown.off_m)
     display.say(
         f"{x:.1f}, {y:.1f}, {z:.1f} mm off the plan; bound {bound.across * _MM:.0f} mm on a "
         f"horizontal axis, {bound.up * _MM:.0f} mm vertically"
     )
-    if flown.margin_m is not None:
+    if math.isfinite(flown.margin_m):
         display.say(f"least margin {flown.margin_m * _MM:+.1f} mm")
     if flown.ended is not None:
         display.say(flown.ended)
@@ -210,10 +212,9 @@ def _replay(options: FalsifyOptions, scenario: Scenario, path: Path) -> int:
 
 
 def _replayed(flown: Replayed) -> dict[str, Any]:
-    margin = flown.margin_m
     return {
         "off_plan_m": list(flown.off_m),
-        "margin_m": margin if margin is not None and math.isfinite(margin) else None,
+        "margin_m": flown.margin_m if math.isfinite(flown.margin_m) else None,
         "ended": flown.ended,
     }
 

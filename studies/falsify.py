@@ -25,10 +25,9 @@ from fsw.parameters.flight_config import FlightConfig
 from fsw.signals import TickOutputs
 from sitl.disturbances.sequence import Played
 from sitl.scenario import V3, Scenario
-from sitl.simulation import Simulation
-from sitl.world import World
+from sitl.simulation import STEP_US, Simulation
 from studies.plan_record import PlanRecord, Start, fly, record
-from studies.tracked_flight import BASE, FEATURES, OFF, PUSH, TIP, Disturbance, TrackedFlight
+from studies.tracked_flight import FEATURES, FILTERED, OFF, PUSH, Disturbance, TrackedFlight
 
 STRETCH_TICKS = 2500  # 5 s: the loop has forgotten what was before 3 s
 HELD_TICKS = 50  # as the paper's disturbance
@@ -61,6 +60,7 @@ class Found:
     axes: int  # pushed
     start: Start
     kind: str
+    filtered_ticks: int  # in which the safety filter acted
     pushes: tuple[V3, ...]  # m/s², one a tick
 
 
@@ -96,8 +96,6 @@ class Search:
         self.bounds = bounds(config, amplitude)
         self.evaluations = 0
         self._flight = TrackedFlight(scenario, config, flown)
-        self._world = World(scenario)
-        self._record = flown
         self._amplitude = amplitude
         last = len(flown.rows) - STRETCH_TICKS - 1
         usable = [start for start in flown.starts if start.row <= max(last, 0)]
@@ -124,7 +122,7 @@ class Search:
         )
 
     def _judge(self, start: Start, disturbance: Disturbance) -> float:
-        kept = self._flight.fly(start, STRETCH_TICKS, disturbance)
+        kept, margin = self._flight.fly(start, STRETCH_TICKS, disturbance)
         self.evaluations += 1
         off = np.abs(kept[:, OFF : OFF + 3]).max(axis=0)
         pushed = int(np.count_nonzero(np.abs(kept[:, PUSH : PUSH + 3]).max(axis=0)))
@@ -133,7 +131,6 @@ class Search:
         share = float(max(off[0] / across, off[1] / across, off[2] / self.bounds.up))
         if not math.isfinite(share):
             share = math.inf
-        margin = self._margin(start, kept)
         ranks = {"share": share, "margin": -margin} | ({"one axis": share} if one else {})
         for name, rank in ranks.items():
             best = self._kept.get(name)
@@ -146,27 +143,12 @@ class Search:
                     axes=pushed,
                     start=start,
                     kind=f"{kind}, held {disturbance.every * 2} ms",
-                    pushes=tuple((float(x), float(y), float(z)) for x, y, z in kept[:, PUSH:BASE]),
+                    filtered_ticks=int(kept[:, FILTERED].sum()),
+                    pushes=tuple(
+                        (float(x), float(y), float(z)) for x, y, z in kept[:, PUSH:FILTERED]
+                    ),
                 )
         return share
-
-    def _margin(self, start: Start, kept: Array) -> float:
-        """Smallest margin [m] of the critical points over a stretch."""
-        world = self._world
-        points = [kept[:, k : k + 3] for k in range(BASE, TIP + 3, 3)]
-        margins = [math.inf]
-        for a, b, c, limit in world.planes:
-            margins += [float((p @ np.array((a, b, c)) - limit).min()) for p in points]
-        for *centre, radius in world.balls:
-            away = [np.linalg.norm(p - np.array(centre), axis=1) for p in points]
-            margins += [float(distance.min() - radius) for distance in away]
-        if world.workspace is not None:
-            first = start.row + 1
-            centres = self._record.targets[first : first + len(kept)].copy()
-            centres[:, 2] -= world.workspace.d_iw_m
-            away_from = np.linalg.norm(kept[: len(centres), BASE : BASE + 3] - centres, axis=1)
-            margins.append(float(world.workspace.radius_m - away_from.max()))
-        return min(margins)
 
 
 def search(
@@ -257,7 +239,7 @@ class Replayed:
     """A disturbance that was found, flown again with planner and referee."""
 
     off_m: V3
-    margin_m: float | None
+    margin_m: float  # smallest of the stretch, infinite without zones
     ended: str | None  # why, if before the stretch was over
 
 
@@ -271,20 +253,25 @@ def replay(
     """Fly the whole stack, calm up to ``first_step``, then pushed by one value [m/s²] a step."""
     worst, last = np.zeros(3), first_step + len(pushes) - 1
     arrived: list[Array] = []
+    least = [math.inf]
 
     def see(simulation: Simulation, _: FlightState, outputs: TickOutputs) -> None:
         plan = outputs.snapshot.plan_state
         if plan is not None and arrived:
             np.maximum(worst, np.abs(arrived[0] - np.array(plan.p)), out=worst)
-        arrived[:] = [np.array(simulation.truth().p_WB)] if simulation.step > first_step else []
+        arrived.clear()
+        if simulation.step > first_step:
+            truth = simulation.truth()
+            arrived.append(np.array(truth.p_WB))
+            least[0] = min(least[0], *truth.margins_m, math.inf)
         if simulation.step % 500 == 0:
-            report("flown", simulation.time_s, last * 1e-6 * simulation.step_us)
+            report("flown", simulation.time_s, last * 1e-6 * STEP_US)
 
     calm = replace(scenario, disturbances=())
     simulation = fly(calm, config, (Played(pushes, first_step, 1),), see, last_step=last + 1)
     ended = simulation.ended
     return Replayed(
         (float(worst[0]), float(worst[1]), float(worst[2])),
-        simulation.min_margin_m,
+        least[0],
         None if ended is None else ended.sentence,
     )

@@ -14,22 +14,28 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from fsw.compiled import packed
+from fsw.compiled import compilable, packed
 from fsw.control.cascade import Cascade, CascadeLaw, CascadeMemory, close_loops
 from fsw.estimation.estimator import attitude
+from fsw.flight.autopilot import keep_clear
 from fsw.model.prediction import Array
 from fsw.parameters.flight_config import FlightConfig
 from fsw.signals import ActuatorCommand, PlanInput, PredictionState, StateEstimate
+from sitl.body import Parts
+from sitl.mission_clock import MissionClock
 from sitl.plant.aerial_manipulator import Inputs, Plant, plant
 from sitl.plant.integrator import STEP_S, integrate
 from sitl.plant.parameters import GRAVITY
 from sitl.scenario import Scenario
-from sitl.simulation import SUBSTEPS
+from sitl.simulation import START_US, STEP_US, SUBSTEPS
 from sitl.start import flown_vehicle
+from sitl.trajectory import place_on_curve
+from sitl.world import World, ZoneTable, fill_margins, record_if_clear
 from studies.plan_record import PlanRecord, Start
 
-# A row of what is kept: deviation, disturbance, base, joint 2 and end-effector, each (3,).
-OFF, PUSH, BASE, JOINT2, TIP, KEPT = 0, 3, 6, 9, 12, 15
+# A row of what is kept: deviation and disturbance, each (3,), and whether the safety filter acted.
+OFF, PUSH, FILTERED, KEPT = 0, 3, 6, 7
+_NO_CURVE = np.empty(0)
 FEATURES = 3  # position, velocity, acceleration off the plan
 
 
@@ -52,28 +58,45 @@ class TrackedFlight:
 
     def __init__(self, scenario: Scenario, config: FlightConfig, flown: PlanRecord) -> None:
         tick = config.tick_period_us * 1e-6
-        cascade = Cascade(config.airframe, config.tuning, config.inner, tick)
+        cascade = Cascade(config.airframe, config.tuning, config.inner, tick, keep_clear(config))
         self._law = np.asarray(packed(cascade.law))
         self._plants = np.array([plant(flown_vehicle(scenario))])
         self._record = flown
+        self._world, clock = World(scenario), MissionClock(scenario)
+        assert clock.starts_s is not None  # it starts in the air
+        self._aim = (clock.curve if self._world.follows else _NO_CURVE, clock.starts_s)
+        self._axes = 3 if scenario.body == "full" else 0
 
-    def fly(self, start: Start, ticks: int, disturbance: Disturbance) -> Array:
-        """What is kept of each tick, (ticks, KEPT) [SI]; shorter where the flight diverged."""
+    def fly(self, start: Start, ticks: int, disturbance: Disturbance) -> tuple[Array, float]:
+        """What is kept of each tick, (ticks, KEPT) [SI], and the smallest margin [m].
+
+        Fewer ticks where the flight diverged; an infinite margin without zones.
+        """
         rows = self._record.rows[start.row : start.row + ticks + 1]
         kept = np.zeros((len(rows) - 1, KEPT))
+        places = np.empty((SUBSTEPS, 4 + self._axes, 3))
+        lowest = np.full(len(self._world.keys), np.inf)
         flown = _track(
             self._plants,
             self._law,
             start.state.copy(),
             start.memory,
             rows,
+            self._record.zones,
+            self._record.spans[start.row :],
+            start.step,
             disturbance.amplitude,
             disturbance.every,
             disturbance.table,
             disturbance.weights,
             kept,
+            self._world.table,
+            self._world.parts,
+            self._aim,
+            places,
+            lowest,
         )
-        return kept[:flown]
+        return kept[:flown], float(lowest.min(initial=np.inf))
 
 
 def _compiled(function: Callable[..., int]) -> Callable[..., int]:
@@ -88,16 +111,25 @@ def _track(
     x: Array,
     memory: CascadeMemory,
     rows: Array,
+    zones: Array,
+    spans: NDArray[np.int64],
+    first_step: int,
     amplitude: float,
     every: int,
     table: Array,
     weights: Array,
     kept: Array,
+    table_of_zones: ZoneTable,
+    parts: Parts,
+    aim: tuple[Array, float],
+    places: Array,
+    lowest: Array,
 ) -> int:
     law: CascadeLaw = laws[0]
     body: Plant = plants[0]
     mass = body.chain.mass.sum()
-    places = np.empty((SUBSTEPS, 4, 3))
+    states = np.empty((SUBSTEPS, x.shape[0]))
+    margins, when_s = np.empty(lowest.shape[0]), np.zeros(lowest.shape[0])
     push = np.zeros(3)
     felt = (0.0, 0.0, -GRAVITY)
     top, drive = law.airframe.rotor_thrust_max, law.airframe.joint_torque_max
@@ -118,8 +150,12 @@ def _track(
         p, v, w = (x[0], x[1], x[2]), (x[3], x[4], x[5]), (x[10], x[11], x[12])
         q_arm, qd_arm = (x[17], x[18]), (x[19], x[20])
         _, R, yaw = attitude(p, v, (x[6], x[7], x[8], x[9]), w, felt, q_arm, qd_arm)
-        estimate = StateEstimate(0, p, v, R, w, yaw, q_arm, qd_arm, -felt[2])
-        command, memory = close_loops(law, memory, estimate, nominal, u, 1)
+        step = first_step + k
+        estimate = StateEstimate(
+            START_US + STEP_US * step, p, v, R, w, yaw, q_arm, qd_arm, -felt[2]
+        )
+        near = zones[spans[k, 0] : spans[k, 1]]
+        command, memory, guarded = close_loops(law, memory, estimate, nominal, u, 1, near)
         f, t = command.rotor_thrust, command.joint_torque
         sent = ActuatorCommand(
             (
@@ -157,13 +193,39 @@ def _track(
         inputs = Inputs(
             np.array(sent.rotor_thrust), np.array(sent.joint_torque), mass * push, np.zeros(3)
         )
-        felt = integrate(body, x, inputs, STEP_S, places).felt
+        felt = integrate(body, x, inputs, STEP_S, places, states).felt
+        before_s = 1e-6 * STEP_US * step
+        _judge(table_of_zones, parts, aim, places, before_s, lowest, when_s, margins)
         for axis in range(3):
             kept[k, OFF + axis] = x[axis] - ahead[axis]
             kept[k, PUSH + axis] = push[axis]
-            kept[k, BASE + axis] = places[SUBSTEPS - 1, 0, axis]
-            kept[k, JOINT2 + axis] = places[SUBSTEPS - 1, 2, axis]
-            kept[k, TIP + axis] = places[SUBSTEPS - 1, 3, axis]
+        kept[k, FILTERED] = 1.0 if guarded[0] else 0.0
         if not (abs(kept[k, OFF]) + abs(kept[k, OFF + 1]) + abs(kept[k, OFF + 2]) < 10.0):
             return k + 1
     return len(kept)
+
+
+@compilable
+def _judge(
+    table: ZoneTable,
+    parts: Parts,
+    aim: tuple[Array, float],
+    places: Array,
+    before_s: float,
+    lowest: Array,
+    when_s: Array,
+    margins: Array,
+) -> None:
+    """Take the margins of a tick into the lowest, as the simulator's judge does."""
+    if record_if_clear(table, parts, aim, places, (before_s, STEP_S), lowest, when_s):
+        return
+    curve, starts_s = aim
+    for k in range(places.shape[0]):
+        time_s = before_s + (k + 1) * STEP_S
+        target = (0.0, 0.0, 0.0)
+        if curve.shape[0]:
+            target = place_on_curve(curve, time_s - starts_s)
+        fill_margins(table, parts, places[k], time_s, target, margins)
+        for i in range(lowest.shape[0]):
+            # A margin that is no number is of a flight that diverged.
+            lowest[i] = min(lowest[i], margins[i]) if margins[i] == margins[i] else -np.inf

@@ -8,13 +8,13 @@ from functools import cache
 import numpy as np
 import pytest
 
-from fsw.parameters.flight_config import FlightConfig
+from fsw.parameters.flight_config import FlightConfig, flight_config
 from sitl.scenario_file import load_scenario
 from studies.falsify import Outcome, Search, replay, search
 from studies.plan_record import PlanRecord, record
 
 SCENARIO = replace(load_scenario("workspace"), duration_s=9.0)
-NOW = FlightConfig()
+NOW = flight_config(body="points")
 
 
 def _silent(_: str, __: float, ___: float) -> None:
