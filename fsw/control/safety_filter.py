@@ -12,8 +12,9 @@ keeps h from falling faster than :math:`-\gamma h`, with :math:`d_r` left for wh
 of the disturbance. An acceleration that is less is brought to b along n: the nearest one that
 keeps the condition, in closed form; several zones are satisfied one after the other, a few times.
 
-Every part of the body, the arm as it is now too, is taken to move as the base does: to push a
-swinging arm off by the base would first swing it on.
+Parts on the base are taken to move as its origin does. Parts on the arm count for the margin that
+is reported and not for the acceleration: to push a swinging arm off by the base would first swing
+it on, and the arm compensates by itself.
 
 The planner's own bound is :math:`h \ge \lambda`; this law has none, so in flights that go as
 planned it changes no bit. Its command can be no more than the loops stand.
@@ -49,9 +50,9 @@ class FilterTuning:
     """The barrier condition, for zones and for the sphere that follows the target."""
 
     gamma: float = 3.0  # 1/s
-    # m/s^2, d_r. Beside a wall the loops fall short of the condition by up to 1 against the assumed
-    # disturbance (the end-effector in walls): what they do by themselves is left alone.
-    allowance: float = -2.0
+    # m/s^2, d_r. In workspace the loops fall short of the condition by 0.2 against the assumed
+    # disturbance; in walls and branches 0.4 is left. What they do by themselves is left alone.
+    allowance: float = -1.0
     near: float = 0.6  # m from the base; what is farther off is left out
     vertical: float = 3.0  # m/s^2, at most
     enabled: int = 1  # 0: the loops' own acceleration is realised
@@ -206,6 +207,8 @@ def _condition(
     rate_ahead = approach + tau * along
     h = safe_approach_speed(ahead, alpha, slope) + rate_ahead
     steepness = safe_approach_slope(ahead, alpha, slope)
+    if not follows and law.parts[part][_ON] > 0.0:
+        return n, -math.inf, distance
     least = law.tuning.allowance - law.tuning.gamma * h - steepness * rate_ahead
     return n, least, distance
 

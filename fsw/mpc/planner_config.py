@@ -21,7 +21,7 @@ class PlannerConfig:
     period_us: int = PLANNING_US  # T
     solver: str = "clarabel"  # a name in solvers.py; slsqp is the paper's
     sqp_iterations: int = 2  # slsqp goes on until it converges
-    body: BodyName = "points"  # what keeps clear; "points" are the paper's
+    body: BodyName = "full"  # what keeps clear; "points" are the paper's
     weights: CostWeights = field(default_factory=CostWeights)
     limits: InputLimits = field(default_factory=InputLimits)
     joint_slack: float = 50.0  # penalty of a rad outside the limits

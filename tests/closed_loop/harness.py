@@ -33,6 +33,7 @@ from fsw.tuning import Tuning
 from sitl.scenario import Hold, Pilot, Scenario, Start
 from sitl.simulation import STEP_US, Simulation
 from studies.closed_loop import ClosedLoop, InlinePlanner
+from studies.mission import announced
 
 ARM, TAKEOFF, LAND, SET_MODE = 400, 22, 21, 176
 STREAM_STEPS = 25
@@ -74,7 +75,7 @@ class Flight:
 
     scenario: Scenario
     seed: int = 11
-    config: FlightConfig = field(default_factory=flight_config)
+    config: FlightConfig = field(default_factory=lambda: flight_config(body="points"))
     planner: AnyPlanner | None = None
     spoil: Callable[[SensorFrame], SensorFrame] = as_measured
     late_ticks: Callable[[int], int] = on_time
@@ -138,7 +139,7 @@ class Flight:
             self.closed.planner.take(sensors.t_us),
             commands,
             self.targets(),
-            self.closed.announced() if self.announces else (),
+            announced(self.scenario) if self.announces and self.sim.step == 0 else (),
             tuning=tuning,
             mission=self.upload,
         )

@@ -42,7 +42,9 @@ def test_a_point_among_walls_is_kept_with_them() -> None:
 
 
 def test_without_the_barrier_the_path_leads_too_close_to_a_branch() -> None:
-    flight = Flight(load_scenario("branches"), seed=11, config=flight_config("naive", "tracking"))
+    flight = Flight(
+        load_scenario("branches"), seed=11, config=flight_config("naive", "tracking", body="points")
+    )
     flight.follow()
     flight.run(13.0)
     margins = flight.sim.result().margins_m
@@ -68,7 +70,7 @@ def test_every_controller_and_inner_loop_flies_in_calm_air(
     name: str, controller: str, inner: Inner
 ) -> None:
     """All of the paper's controllers follow the path; what they keep clear of is another matter."""
-    flight = Flight(load_scenario(name), config=flight_config(controller, inner))
+    flight = Flight(load_scenario(name), config=flight_config(controller, inner, body="points"))
     flight.follow()
     flight.run(1.5)
     assert flight.snapshot.counters.fallbacks == 0

@@ -43,7 +43,7 @@ def hovering(**changes: object) -> Flight:
 
 
 def limits(**changes: object) -> FlightConfig:
-    config = flight_config()
+    config = flight_config(body="points")
     return replace(config, limits=replace(config.limits, **changes))  # type: ignore[arg-type]
 
 

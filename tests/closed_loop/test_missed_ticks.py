@@ -21,7 +21,7 @@ from fsw.signals import (
 )
 from tests.closed_loop.harness import command
 
-CONFIG = flight_config()
+CONFIG = flight_config(body="points")
 START_US = 1_000_000
 ARM = command(400, 1.0)
 TRAJECTORY = command(176, 1.0, 4.0, 11.0)

@@ -112,7 +112,7 @@ def open_loop() -> FlightConfig:
 
     Height has no loop either: its thrust is the plan's acceleration fed forward.
     """
-    config = flight_config(inner="pid")
+    config = flight_config(inner="pid", body="points")
     lag = config.airframe.attitude_lag
     tuning = replace(
         config.tuning,

@@ -98,7 +98,7 @@ def test_a_planner_that_is_gone_costs_no_barrier(name: str, gone_s: float) -> No
     flight = Flight(
         load_scenario(name),
         seed=4,
-        config=flight_config(),
+        config=flight_config(body="points"),
         late_ticks=lambda plan: 0 if plan < last else 10**9,
     )
     flight.follow()
@@ -111,7 +111,7 @@ def test_a_planner_that_is_gone_costs_no_barrier(name: str, gone_s: float) -> No
 @pytest.mark.parametrize("tilt_deg", [4.0, 12.0])
 def test_without_plans_it_brakes_with_the_tilt_that_the_plan_may_use(tilt_deg: float) -> None:
     """PLN_TILT_MAX reaches braking: at a metre a second it leans as far as that, no farther."""
-    config = flight_config()
+    config = flight_config(body="points")
     limits = replace(config.planner.limits, tilt=math.radians(tilt_deg))
     config = replace(config, planner=replace(config.planner, limits=limits))
     flight = Flight(hover(), config=config, late_ticks=lambda plan: 0 if plan < 60 else 10**9)

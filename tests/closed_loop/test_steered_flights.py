@@ -119,7 +119,7 @@ def test_a_takeoff_to_a_height_in_its_frame() -> None:
 
 
 def test_a_ground_station_that_falls_silent_brings_the_vehicle_home() -> None:
-    config = flight_config()
+    config = flight_config(body="points")
     config = replace(config, limits=replace(config.limits, station_timeout_us=3_000_000))
     flight = Flight(hover(), config=config)
     flight.step(command(ARM, 1.0))
@@ -135,7 +135,7 @@ def test_a_ground_station_that_falls_silent_brings_the_vehicle_home() -> None:
 
 
 def test_a_trajectory_goes_on_without_the_ground_station() -> None:
-    config = flight_config()
+    config = flight_config(body="points")
     config = replace(config, limits=replace(config.limits, station_timeout_us=3_000_000))
     flight = Flight(load_scenario("workspace-calm"), config=config)
     flight.streamed = {"ground_station_heard": True}
@@ -212,7 +212,7 @@ def test_the_fastest_landing_that_can_be_set_does_not_fight_the_ground(
     arm_deg: tuple[float, float],
 ) -> None:
     """It bounced at 0.6 m/s, never lay still, and loops and arm worked until it tipped over."""
-    config = flight_config()
+    config = flight_config(body="points")
     config = replace(config, limits=replace(config.limits, land_speed=0.6))
     flight = Flight(hover(arm_deg), config=config)
     flight.step(command(ARM, 1.0))

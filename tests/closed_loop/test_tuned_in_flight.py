@@ -85,7 +85,7 @@ def test_the_default_tuning_again_is_the_old_vehicle_again() -> None:
 
 def test_the_planner_hears_of_a_change_with_the_question_of_that_tick() -> None:
     flight = beside_walls()
-    tuned_planner = planner_of(tuned(flight_config(), EVERYTHING))
+    tuned_planner = planner_of(tuned(flight_config(body="points"), EVERYTHING))
     outputs = flight.step(tuning=EVERYTHING)
     while outputs.plan_request is None:
         outputs = flight.step()
@@ -93,7 +93,7 @@ def test_the_planner_hears_of_a_change_with_the_question_of_that_tick() -> None:
     assert dict(request.tuning) == {"weights.tracking": 12.0, "walls.lambda_": 0.33}
     assert flight.planner is not None
     answer, expected = flight.planner.plan(request), tuned_planner.plan(replace(request, tuning=()))
-    untuned = planner_of(flight_config()).plan(replace(request, tuning=()))
+    untuned = planner_of(flight_config(body="points")).plan(replace(request, tuning=()))
     assert isinstance(answer, Plan)
     assert isinstance(expected, Plan)
     assert isinstance(untuned, Plan)
@@ -109,7 +109,10 @@ def test_a_planner_asked_without_a_tuning_again_is_the_old_planner() -> None:
         pass
     request = flight.outputs.plan_request
     assert request is not None
-    planner, old = planner_of(flight_config()), planner_of(flight_config())
+    planner, old = (
+        planner_of(flight_config(body="points")),
+        planner_of(flight_config(body="points")),
+    )
     planner.plan(replace(request, tuning=(("weights.tracking", 50.0),)))
     back = planner.plan(replace(request, tuning=()))
     assert isinstance(back, Plan)
@@ -147,7 +150,7 @@ def test_on_the_ground_it_is_taken_and_keeps_the_vehicle_there() -> None:
 
 
 def test_a_soft_vehicle_is_warned_and_obeys() -> None:
-    config = flight_config(soft=True)
+    config = flight_config(body="points", soft=True)
     flight = Flight(load_scenario("walls"), config=config)
     flight.follow()
     outputs = flight.step(tuning=TOO_LITTLE_KEPT)
@@ -157,11 +160,11 @@ def test_a_soft_vehicle_is_warned_and_obeys() -> None:
 
 def test_what_is_broken_already_may_be_mended_in_steps() -> None:
     """Only an inequality that holds now can be broken: a change for the better is never refused."""
-    config = flight_config(soft=True)
+    config = flight_config(body="points", soft=True)
     flight = Flight(load_scenario("walls"), config=config)
     flight.follow()
     flight.step(tuning=TOO_LITTLE_KEPT)
-    strict = TunedAutopilot(flight_config())
+    strict = TunedAutopilot(flight_config(body="points"))
     assert flight.inputs is not None
     _, outputs = strict.tick(
         flight.state, replace(flight.inputs, tuning=(("planner.walls.lambda_", 0.15),))

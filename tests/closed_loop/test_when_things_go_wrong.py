@@ -63,7 +63,7 @@ def test_a_plan_that_never_comes_is_counted_given_up_and_survived() -> None:
 
 @pytest.mark.parametrize("first_failure", [0, 30], ids=["from the start", "in motion"])
 def test_without_plans_the_vehicle_brakes_and_stays_put(first_failure: int) -> None:
-    config = flight_config()
+    config = flight_config(body="points")
     planner = FailsFrom(real_planner(config), first_failure)
     flight = Flight(load_scenario("workspace-calm"), config=config, planner=planner)
     flight.follow()

@@ -46,7 +46,7 @@ def vehicle(tmp_path: Path) -> Iterator[Connected]:
     for name, content in (("earlier", EARLIER), ("present", b"not yet")):
         (tmp_path / name).mkdir()
         (tmp_path / name / "flight.ulg").write_bytes(content)
-    config = flight_config()
+    config = flight_config(body="points")
     # A quicker vehicle: ten metres of climb are a test's longest wait.
     limits = replace(config.limits, climb_speed=1.5, land_speed=0.6)
     with connected(tmp_path / "present", replace(config, limits=limits)) as vehicle:

@@ -187,7 +187,7 @@ def standing(state: int, inputs: TickInputs) -> tuple[int, TickOutputs]:
 
 
 def test_the_table_is_the_configuration_s_and_the_dialect_s() -> None:
-    config = flight_config()
+    config = flight_config(body="points")
     assert (INNER.period_us, MPC.period_us) == (config.tick_period_us, config.mpc_period_us)
     for group in RATE_GROUPS:
         name = f"PANDION_RATE_GROUP_{group.name.upper()}"
@@ -276,7 +276,7 @@ def test_a_planner_that_died_is_reported_at_once_and_logged() -> None:
 
 @pytest.mark.parametrize("moment_us", [100, 900, 1_700])
 def test_a_command_acts_on_the_actuators_within_one_tick_of_its_arrival(moment_us: int) -> None:
-    bench = Bench(Autopilot(flight_config()).tick, FlightState())
+    bench = Bench(Autopilot(flight_config(body="points")).tick, FlightState())
     bench.command(*ARM)
     arrived: list[int] = []
 

@@ -14,7 +14,7 @@ from fsw.parameters.flight_config import flight_config
 from fsw.signals import Command, CommandRequest, Origin
 
 NAN = math.nan
-CONFIG = flight_config()
+CONFIG = flight_config(body="points")
 FLIGHT_MODES = {mode: kind(CONFIG) for mode, kind in MODES.items()}
 
 

@@ -14,7 +14,7 @@ from fsw.parameters.flight_config import FlightConfig, flight_config
 from fsw.signals import Home, Mode, StateEstimate, Vec3
 from tests.fsw.random_states import estimate_of
 
-CONFIG = flight_config()
+CONFIG = flight_config(body="points")
 GROUND_Z = -CONFIG.airframe.leg_length
 HOME = Home((3.0, -2.0, GROUND_Z), 0.0)
 HANDOVER = Handover(still_at((0.0, 0.0, -1.0), 0, 0.0), completed=False)

@@ -27,7 +27,7 @@ from tests.fsw.random_states import random_estimate
 
 PERIOD_US = 100_000
 NOW_US = 10**9
-CONFIG = flight_config()
+CONFIG = flight_config(body="points")
 MANUAL = frozenset({Mode.HOLD, Mode.OFFBOARD})
 
 

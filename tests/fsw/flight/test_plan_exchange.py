@@ -90,7 +90,7 @@ def test_a_plan_on_time_starts_where_it_says() -> None:
     assert new is not None
     assert (memory.running, memory.since_us, memory.awaited_id) == (new, START_US, -1)
     assert (memory.counters.plans, memory.counters.missed_deadlines) == (1, 0)
-    exchange = PlanExchange(flight_config())
+    exchange = PlanExchange(flight_config(body="points"))
     assert exchange.follow(WAITING, moving(), plan(), START_US, 1)[0] == new.start
 
 
@@ -102,7 +102,9 @@ def test_a_late_plan_is_missed_once_and_starts_where_it_would_be_by_now() -> Non
         assert memory.counters.missed_deadlines == 1
     now_us = START_US + 3 * TICK_US
     new = plan()
-    state, memory, u = PlanExchange(flight_config()).follow(memory, moving(), new, now_us, 1)
+    state, memory, u = PlanExchange(flight_config(body="points")).follow(
+        memory, moving(), new, now_us, 1
+    )
     assert (memory.counters.missed_deadlines, memory.counters.plans) == (1, 1)
     assert state == MODEL.advance(new.start, new.inputs[0], 3)
     assert u == new.inputs[0]
@@ -202,7 +204,7 @@ def test_coasting_moves_every_quantity_by_its_rate_and_holds_the_jerk() -> None:
     assert (after.j, after.s, after.yaw_rate, after.qd_arm) == kept
 
 
-FLOWN = flight_config()
+FLOWN = flight_config(body="points")
 EXCHANGE = PlanExchange(FLOWN)
 DELAY_S = 1e-6 * FLOWN.plan_delay_ticks * FLOWN.tick_period_us
 
@@ -231,7 +233,7 @@ def test_off_its_plan_the_vehicle_is_planned_from_where_it_will_be(
 
 
 def test_a_pid_loop_is_planned_from_the_measurement_however_near() -> None:
-    exchange = PlanExchange(flight_config(inner="pid"))
+    exchange = PlanExchange(flight_config(inner="pid", body="points"))
     measured = moving((0.1, 0.0, 0.0))
     start, is_nominal = exchange.start(PlanMemory(), measured, measured, START_US)
     assert not is_nominal

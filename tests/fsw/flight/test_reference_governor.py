@@ -97,7 +97,7 @@ def test_nothing_pulls_deep_into_the_ball_of_a_point_or_fast_towards_it(
     assert math.hypot(*limited.v_WE) <= 0.5 + 1e-9
 
 
-CONFIG = flight_config()
+CONFIG = flight_config(body="points")
 GOVERNOR = ReferenceGovernor(CONFIG)
 LEGS = CONFIG.airframe.leg_length
 NO_WALLS = SafeSet()

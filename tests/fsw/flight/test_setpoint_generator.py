@@ -81,7 +81,7 @@ def test_forward_and_right_are_seen_from_the_vehicle_and_down_stays_down() -> No
 @pytest.mark.parametrize("of_end_effector", [True, False])
 def test_without_joints_the_point_itself_is_the_target(of_end_effector: bool) -> None:
     free = replace(STILL, of_end_effector=of_end_effector, q_arm=None, v=(0.1, 0.2, 0.3), yaw=0.4)
-    target = SetpointGenerator(flight_config()).target(free, 5)
+    target = SetpointGenerator(flight_config(body="points")).target(free, 5)
     assert (target.t_us, target.p_WE, target.v_WE, target.yaw) == (5, free.p, free.v, 0.4)
 
 

@@ -20,7 +20,7 @@ PERIOD_US = 100_000
 
 
 def planner(config: PlannerConfig | None = None) -> Planner:
-    return Planner(config or PlannerConfig(), AIRFRAME, stopwatch_us=lambda: 0.0)
+    return Planner(config or PlannerConfig(body="points"), AIRFRAME, stopwatch_us=lambda: 0.0)
 
 
 def hovering(p: Vec3 = (0.0, 0.0, -1.2)) -> PredictionState:

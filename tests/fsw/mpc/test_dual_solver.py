@@ -21,7 +21,7 @@ from fsw.shapes.target_sphere import target_sphere
 from fsw.signals import SafeSet, SolverStatus
 from tests.fsw.random_states import prediction_vector
 
-CONFIG = PlannerConfig()
+CONFIG = PlannerConfig(body="points")
 WALLS = SafeSet((wall((-1.0, 0.0, 0.0), -1.0, 0.1), wall((0.0, 1.0, 0.0), -1.0, 0.1)))
 SPHERE = SafeSet((target_sphere((0.0, 0.0, -0.225), 0.075),))
 # Yaw hardly matters to the cost, which leaves it loose within the solver's tolerance.

@@ -31,7 +31,7 @@ from tests.fsw.model.geometry_by_rotation import tips_of_prediction
 from tests.fsw.mpc.requests import PERIOD_US, STILL, below, hovering, planned, planner, request
 from tests.fsw.random_states import as_state, prediction_vector, vec3
 
-CONFIG = PlannerConfig()
+CONFIG = PlannerConfig(body="points")
 MODEL = condense(AIRFRAME, CONFIG.period, CONFIG.horizon)
 AHEAD = SafeSet((wall((-1.0, 0.0, 0.0), -1.0, 0.1),))
 SPHERE = SafeSet((target_sphere((0.0, 0.0, -0.225), 0.075),))

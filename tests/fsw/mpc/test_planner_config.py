@@ -14,8 +14,9 @@ from fsw.mpc.costs import CostWeights
 from fsw.mpc.planner_config import PlannerConfig
 from fsw.mpc.qp_data import InputLimits
 from fsw.mpc.soft_costs import SoftWeights
+from fsw.tuning import number_at
 
-CONFIG = PlannerConfig()
+CONFIG = PlannerConfig(body="points")
 
 
 @pytest.mark.parametrize("period_us", [0, -1, -100_000])
@@ -41,7 +42,7 @@ def test_an_operator_reads_the_figures_that_are_flown(part: str) -> None:
     assert len(rows) >= 3
     for figure, unit, _, name in rows:
         flown = float(figure) * UNITS.get(unit.strip(), 1.0)
-        assert getattr(PARTS[part], name) == pytest.approx(flown, rel=1e-5), name
+        assert number_at(PARTS[part], name) == pytest.approx(flown, rel=1e-5), name
 
 
 def test_a_period_counts_in_seconds() -> None:

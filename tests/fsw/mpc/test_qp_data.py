@@ -33,7 +33,7 @@ from tests.fsw.mpc.quadratics import quadratic
 from tests.fsw.mpc.requests import STILL, below, hovering, planned, planner, request
 from tests.fsw.random_states import as_state, prediction_vector, vec3
 
-CONFIG = PlannerConfig()
+CONFIG = PlannerConfig(body="points")
 N = CONFIG.horizon
 MODEL = condense(AIRFRAME, CONFIG.period, N)
 WALLS = SafeSet((wall((-1.0, 0.0, 0.0), -1.0, 0.1), wall((0.0, 1.0, 0.0), -1.0, 0.1)))

@@ -26,7 +26,7 @@ from fsw.shapes.target_sphere import target_sphere
 from fsw.signals import PlanFailure, SafeSet, SolverStatus
 from tests.fsw.mpc.requests import STILL, below, hovering, planned, planner, request
 
-CONFIG = PlannerConfig()
+CONFIG = PlannerConfig(body="points")
 N = CONFIG.horizon
 MODEL = condense(AIRFRAME, CONFIG.period, N)
 WALLS = SafeSet((wall((-1.0, 0.0, 0.0), -1.0, 0.1), wall((0.0, 1.0, 0.0), -1.0, 0.1)))

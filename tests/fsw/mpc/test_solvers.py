@@ -45,7 +45,9 @@ class Programs:
 def searched(programs: Programs, count: int, times: Any = None) -> Search:
     question = Question(cast(Ocp, programs), START, TARGETS, GUESS)
     stopwatch = (lambda: 0.0) if times is None else lambda: float(next(times))
-    return by_programs(question, replace(PlannerConfig(), sqp_iterations=count), stopwatch)
+    return by_programs(
+        question, replace(PlannerConfig(body="points"), sqp_iterations=count), stopwatch
+    )
 
 
 @pytest.mark.parametrize("count", [1, 2, 5])
@@ -80,5 +82,5 @@ def test_what_is_searched_in_one_piece_is_timed_in_one_piece(
     monkeypatch.setattr("fsw.mpc.solvers.minimise", lambda _: found)
     marks = itertools.count(5000, 1000)
     question = Question(cast(Ocp, Programs()), START, TARGETS, GUESS)
-    search = by_slsqp(question, PlannerConfig(), lambda: float(next(marks)))
+    search = by_slsqp(question, PlannerConfig(body="points"), lambda: float(next(marks)))
     assert search == Search(found, 17, 17, linearise_us=0.0, solve_us=1000.0)

@@ -22,7 +22,7 @@ from fsw.shapes.target_sphere import target_sphere
 from fsw.signals import SafeSet
 from tests.fsw.mpc.quadratics import quadratic
 
-CONFIG = PlannerConfig()
+CONFIG = PlannerConfig(body="points")
 N = CONFIG.horizon
 MODEL = condense(AIRFRAME, CONFIG.period, N)
 WALL, POINT = wall((-1.0, 0.0, 0.0), -1.0, 0.1), point((0.2, 0.1, 0.3), 0.15)

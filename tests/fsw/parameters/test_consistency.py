@@ -105,8 +105,8 @@ def test_controllers_without_a_barrier_have_nothing_to_refuse() -> None:
 
 
 def test_beside_a_point_the_same_is_said_as_beside_a_wall_and_something_about_the_links() -> None:
-    beside_wall = _findings(flight_config(), WALLS)
-    beside_point = _findings(flight_config(), POINT)
+    beside_wall = _findings(flight_config(body="points"), WALLS)
+    beside_point = _findings(flight_config(body="points"), POINT)
     links = beside_point.pop("links")
     assert beside_point == beside_wall
     assert links.holds
@@ -118,6 +118,6 @@ def test_a_point_that_a_link_could_pass_through_is_worth_a_warning(
     clearance: float, holds: bool
 ) -> None:
     safe_set = SafeSet((point((1.0, 0.0, -1.0), clearance),))
-    finding = _findings(flight_config(), safe_set)["links"]
+    finding = _findings(flight_config(body="points"), safe_set)["links"]
     assert finding.holds is holds
     assert not finding.refuses

@@ -15,6 +15,8 @@ from fsw.link.wire.telemetry_context import GENERIC
 from fsw.signals import (
     AttitudeSetpoint,
     Charge,
+    ConstraintKind,
+    ConstraintReport,
     FlightSnapshot,
     JointSetpoint,
     Mode,
@@ -329,3 +331,25 @@ def test_without_an_orbit_there_is_no_orbit_status() -> None:
 def test_disarmed_no_pulse_is_sent() -> None:
     outputs = read_back(stream_of(ids.SERVO_OUTPUT_RAW), replace(SNAPSHOT, armed=False))
     assert outputs.servo1_raw == outputs.servo5_raw == 0
+
+
+def test_margins_of_three_points_are_all_sent_while_they_fit_else_one_a_zone() -> (
+    None
+):
+    kind = ConstraintKind.WALLS
+    five = ConstraintReport(kind, tuple(range(1, 16)), tuple(range(15)), (3,) * 5)
+    assert five.shown(16) == (five.margins, five.barrier, 0)
+    six = ConstraintReport(kind, (*range(2, 19), 1), tuple(range(18)), (3,) * 6)
+    assert six.shown(16) == ((2, 5, 8, 11, 14, 1), (0, 3, 6, 9, 12, 15), 5)
+
+
+def test_margins_of_the_full_body_are_the_least_of_each_zone_and_the_least_of_all() -> None:
+    kind = ConstraintKind.OBSTACLES
+    one = ConstraintReport(kind, (3.0, 1.0, 2.0, 4.0), (9.0, 8.0, 7.0, 6.0), (4,))
+    assert one.shown(16) == ((1.0,), (6.0,), 0)
+    many = ConstraintReport(kind, tuple(map(float, range(80, 0, -1))), (1.0,) * 80, (4,) * 20)
+    margins, _, least = many.shown(16)
+    assert margins == tuple(float(80 - 4 * k - 3) for k in range(16))
+    assert least == 19
+    sent = read_back(stream_of(ids.BARRIER_MARGIN), replace(SNAPSHOT, constraints=many))
+    assert (sent.count, sent.margin_min, sent.margin_min_index) == (16, 1.0, 19)
