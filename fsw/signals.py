@@ -203,6 +203,39 @@ class SafeSet:
         return ConstraintKind.WALLS if kinds else ConstraintKind.NONE
 
 
+@dataclass(frozen=True, slots=True)
+class MessageSource:
+    """Who sent a message, as far as its link can say."""
+
+    system: int  # MAVLink ids, which anyone can write into a frame
+    component: int
+    link: str  # "simulator", "gcs" or "api"
+    address: str = ""  # host:port; empty where the link has a single peer
+    signed: bool = False  # with the link's key
+
+    def __str__(self) -> str:
+        """As an operator reads it."""
+        where = self.link + (f" {self.address}" if self.address else "")
+        return f"{self.system}/{self.component} ({where})"
+
+    def is_same(self, other: MessageSource | None) -> bool:
+        """Whether both are one sender: of the same address, unless signatures vouch for both."""
+        if other is None:
+            return False
+        ids = (self.system, self.component, self.link, self.signed)
+        return ids == (other.system, other.component, other.link, other.signed) and (
+            self.signed or self.address == other.address
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class SafeSetAnnouncement:
+    """A safe set, whole, and who wants it."""
+
+    source: MessageSource
+    safe_set: SafeSet
+
+
 # ---------------------------------------------------------------- commands
 
 
@@ -413,6 +446,7 @@ class MissionUpdate:
     fence: SafeSet | None = None
     rally: tuple[Vec2, ...] | None = None  # m, north and east
     current: int | None = None  # the step to fly next
+    fence_source: MessageSource | None = None  # who uploaded the fence
 
 
 class MissionState(IntEnum):
@@ -581,6 +615,15 @@ class PlannerCounters:
 
 
 @dataclass(frozen=True, slots=True)
+class SafetyCounters:
+    """What should not happen, since start, in episodes."""
+
+    departures: int = 0  # from the tube around the plan
+    breaches: int = 0  # of the safe set
+    interventions: int = 0  # of the safety filter
+
+
+@dataclass(frozen=True, slots=True)
 class ConstraintReport:
     """Margins of the active safe set, from the vehicle's own estimate."""
 
@@ -669,6 +712,7 @@ class FlightSnapshot:
     failsafe_from: Mode | None = None  # what was flown when a failsafe took over; None: none did
     orbit: Orbit | None = None  # that is being flown
     accel_B: Vec3 = (0.0, 0.0, -9.81)  # m/s^2, specific force as measured
+    safety: SafetyCounters = SafetyCounters()
 
 
 @dataclass(frozen=True, slots=True)
@@ -679,7 +723,7 @@ class TickInputs:
     plan: Plan | PlanFailure | None = None  # newly arrived, at most one
     commands: tuple[Command, ...] = ()
     targets: tuple[EndEffectorTarget, ...] = ()
-    safe_set: SafeSet | None = None  # newly announced
+    announced: tuple[SafeSetAnnouncement, ...] = ()  # safe sets, in order of arrival
     # The newest offboard setpoints; at most one of motion and attitude.
     motion: MotionSetpoint | None = None
     attitude: AttitudeSetpoint | None = None

@@ -18,6 +18,7 @@ _MPC_KEYS = (
     "status",
 )
 _INNER_KEYS = ("rate_hz", "p50_us", "p99_us", "late_share")
+_SAFETY_KEYS = ("breaches", "departures", "interventions")
 _NOTHING: dict[str, float] = {"sum": 0.0, "mean": 0.0}
 
 
@@ -55,6 +56,7 @@ def as_json(reports: FlightReports) -> dict[str, Any]:
         "min_margin_m": truth.get("min_margin_m"),
         "surfaces_m": truth.get("surfaces_m", {}),
         "beyond_s": truth.get("beyond_s", {}),
+        "safety": {key: vehicle.get("safety", {}).get(key) for key in _SAFETY_KEYS},
         "mpc": {key: mpc.get(key) for key in _MPC_KEYS},
         "inner": {key: inner.get(key) for key in _INNER_KEYS},
         "real_time_factor": truth.get("real_time_factor", 0.0),
@@ -81,6 +83,7 @@ def table_rows(result: dict[str, Any], tracking_max_m: float | None) -> Rows:
         ("tracking RMS / max", f"{_mm(result['tracking_error_rms_m'])} / {_mm(tracking_max_m)}"),
         ("control effort, sum / mean", _sum_and_mean(result["control_effort"])),
         ("control smoothness, sum / mean", _sum_and_mean(result["control_smoothness"])),
+        ("breaches / off plan / filter", _counts(result["safety"])),
         *_timing_rows(result["mpc"], result["inner"]),
         ("real-time factor", f"{result['real_time_factor']:.1f}"),
     ]
@@ -108,6 +111,10 @@ def _timing_rows(mpc: dict[str, Any], inner: dict[str, Any]) -> Rows:
         ("tick p50 / p99", f"{inner['p50_us']:.0f} / {inner['p99_us']:.0f} us"),
         ("ticks late", f"{100.0 * inner['late_share']:.2f} %"),
     ]
+
+
+def _counts(safety: dict[str, int | None]) -> str:
+    return " / ".join("-" if safety[key] is None else str(safety[key]) for key in _SAFETY_KEYS)
 
 
 def _mm(value: float | None) -> str:

@@ -27,7 +27,7 @@ from fsw.signals import (
     Plan,
     PlanFailure,
     PlanRequest,
-    SafeSet,
+    SafeSetAnnouncement,
     SensorFrame,
     SwitchMode,
     TickInputs,
@@ -42,7 +42,7 @@ from studies.flight_result import (
     TracePoint,
     processor_time_us,
 )
-from studies.mission import moves, safe_set, target
+from studies.mission import SIMULATOR, moves, safe_set, target
 
 TARGET_US = 100_000  # between points of the reference, as the pilot sends them
 _TARGETS_AHEAD = 20
@@ -92,12 +92,13 @@ class ClosedLoop(Generic[State]):
         clock = simulation.clock
         return tuple(target(clock, start_us + TARGET_US * k) for k in range(first, newest + 1))
 
-    def safe_set(self) -> SafeSet | None:
+    def announced(self) -> tuple[SafeSetAnnouncement, ...]:
         """What the scenario's pilot announces at this step: ten times a second where zones move."""
         step, scenario = self.simulation.step, self.simulation.scenario
-        if step == 0 or (step % (TARGET_US // STEP_US) == 0 and moves(scenario)):
-            return safe_set(scenario, self.simulation.t_us)
-        return None
+        if step > 0 and (step % (TARGET_US // STEP_US) > 0 or not moves(scenario)):
+            return ()
+        held = safe_set(scenario, self.simulation.t_us)
+        return (SafeSetAnnouncement(SIMULATOR, held),) if held.zones else ()
 
     def step(self, inputs: TickInputs) -> TickOutputs:
         """Tick, plan, advance."""
@@ -170,7 +171,7 @@ def simulate(
             plan=answer,
             commands=((_ARM,), (_FOLLOW,))[step] if step < 2 else (),
             targets=loop.targets(),
-            safe_set=loop.safe_set(),
+            announced=loop.announced(),
         )
         if traced and step % TRACE_STEPS == 0:
             recorder.trace.append(_trace_point(simulation))

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from fsw.shapes import BY_NUMBER
-from fsw.signals import EndEffectorTarget, SafeSet, Shape, Zone
+from fsw.signals import EndEffectorTarget, MessageSource, SafeSet, Shape, Zone
 from sitl.mission_clock import MissionClock
 from sitl.scenario import Scenario
 from sitl.simulation import START_US
 from sitl.zones import Zone as SimulatedZone
 from sitl.zones import zones_of
+
+SIMULATOR = MessageSource(1, 195, "simulator")
 
 
 def safe_set(scenario: Scenario, t_us: int = START_US) -> SafeSet:

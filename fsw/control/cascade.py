@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, field
 from typing import Any, Literal, NamedTuple
 
+import numpy as np
 from numpy.typing import NDArray
 
+from fsw.barriers.safe_approach import BarrierTuning
 from fsw.compiled import compilable, compiled, machine_code, packed
 from fsw.control.allocation import allocate
 from fsw.control.arm_compensation import compensated_joints
@@ -15,10 +18,18 @@ from fsw.control.gains import LoopGains, tracking_gains
 from fsw.control.height import height_pid
 from fsw.control.joints import joint_torques
 from fsw.control.pid import PidGains
-from fsw.control.tracking import Observed, TrackingLaw, follow_plan, observe
+from fsw.control.safety_filter import NO_ZONES, FilterLaw, FilterTuning, filter_law, filtered
+from fsw.control.tracking import (
+    Observed,
+    TrackingLaw,
+    follow_plan,
+    observe,
+    wanted_accelerations,
+)
 from fsw.geometry.rotation import wrap_angle
-from fsw.geometry.vectors import clamp_magnitude
+from fsw.geometry.vectors import add_scaled, clamp_magnitude, subtract
 from fsw.model.airframe import GRAVITY, Airframe
+from fsw.model.body import Body, body_of
 from fsw.model.nominal import REST_INPUT, REST_STATE
 from fsw.model.rotors import MotionState, estimate_mass, lag_rotors, motion_state, rotor_decay
 from fsw.signals import (
@@ -34,6 +45,9 @@ from fsw.signals import (
 )
 
 Inner = Literal["tracking", "pid"]
+Guarded = tuple[bool, float]
+"""Whether the safety filter changed the acceleration, and the least margin that it saw [m]."""
+UNGUARDED: Guarded = (False, math.inf)
 
 _NONE: Vec3 = (0.0, 0.0, 0.0)
 _LEVEL: Mat3 = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
@@ -73,6 +87,15 @@ def in_hover(airframe: Airframe, estimate: StateEstimate) -> CascadeMemory:
 
 
 @dataclass(frozen=True, slots=True)
+class KeepClear:
+    """What the safety filter keeps off zones, and how."""
+
+    body: Body
+    barriers: tuple[BarrierTuning, BarrierTuning] = (BarrierTuning(), BarrierTuning())
+    tuning: FilterTuning = field(default_factory=FilterTuning)
+
+
+@dataclass(frozen=True, slots=True)
 class CascadeLaw:
     """Everything the loops need that does not change in flight."""
 
@@ -80,6 +103,7 @@ class CascadeLaw:
     tuning: LoopGains
     tracking: TrackingLaw
     follows_plan: bool  # or only the plan's acceleration
+    filter: FilterLaw
     rotor_decay: float  # share of a rotor's error left after a tick
     dt: float  # s, tick length
 
@@ -87,23 +111,39 @@ class CascadeLaw:
 class Cascade:
     """The inner loops of one configuration; laws are pure, memory goes in and comes out."""
 
-    def __init__(self, airframe: Airframe, tuning: LoopGains, inner: Inner, dt: float) -> None:
+    def __init__(
+        self,
+        airframe: Airframe,
+        tuning: LoopGains,
+        inner: Inner,
+        dt: float,
+        keep_clear: KeepClear | None = None,
+    ) -> None:
         """Choose the inner loop and design its gains for a tick of ``dt`` [s], before flight.
 
         The loop ``tracking`` follows the plan's state, ``pid`` only its acceleration.
         """
+        clear = keep_clear or KeepClear(body=body_of("points", airframe))
         gains = tracking_gains(tuning.tracking, airframe.rotor_lag, dt)
         self.law = CascadeLaw(
             airframe,
             tuning,
             TrackingLaw(airframe.attitude_lag, tuning.tracking, gains),
             inner == "tracking",
+            filter_law(
+                clear.tuning,
+                clear.barriers,
+                clear.body,
+                airframe.link_length,
+                gains.k[3] / gains.k[2],
+                tuning.tracking.acceleration_limit,
+            ),
             rotor_decay(airframe, dt),
             dt,
         )
         self._packed = packed(self.law)
         memory = CascadeMemory(STOPPED.rotor_thrust, STOPPED, Observed(_NONE, _NONE), 1.0)
-        example = (self._packed, memory, _SOMEWHERE, REST_STATE, REST_INPUT, 1)
+        example = (self._packed, memory, _SOMEWHERE, REST_STATE, REST_INPUT, 1, NO_ZONES)
         self._close_loops = machine_code(_close_loops, *example)
 
     def motion(self, memory: CascadeMemory, estimate: StateEstimate) -> MotionState:
@@ -120,13 +160,15 @@ class Cascade:
         plan: PredictionState,
         u: PlanInput,
         ticks: int = 1,
-    ) -> tuple[ActuatorCommand, CascadeMemory]:
+        zones: NDArray[np.float64] = NO_ZONES,
+    ) -> tuple[ActuatorCommand, CascadeMemory, Guarded]:
         """See ``close_loops``, of which this is the machine code."""
-        sent, rotors, believed, mass, integrals = self._close_loops(
-            self._packed, memory, estimate, plan, u, ticks
+        sent, rotors, believed, mass, integrals, guarded = self._close_loops(
+            self._packed, memory, estimate, plan, u, ticks, zones
         )
         command = ActuatorCommand(*sent)
-        return command, CascadeMemory(rotors, command, Observed(*believed), mass, *integrals)
+        kept = CascadeMemory(rotors, command, Observed(*believed), mass, *integrals)
+        return command, kept, guarded
 
 
 @compilable
@@ -137,10 +179,12 @@ def close_loops(
     plan: PredictionState,
     u: PlanInput,
     ticks: int,
-) -> tuple[ActuatorCommand, CascadeMemory]:
+    zones: NDArray[np.float64],
+) -> tuple[ActuatorCommand, CascadeMemory, Guarded]:
     """One tick, or several at once where some were missed.
 
-    Returns the actuator command, not yet gated, and the memory to pass back after sending.
+    Returns the actuator command, not yet gated, the memory to pass back after sending, and what the
+    safety filter found about the ``zones``, those of ``moving_zones`` [SI].
     """
     airframe, tuning, dt = law.airframe, law.tuning, law.dt
     rotors, observed = memory.rotors, memory.observed
@@ -150,7 +194,9 @@ def close_loops(
     motion = motion_state(airframe, mass, estimate, rotors, memory.commanded.joint_torque[0])
     for _ in range(ticks):
         observed = observe(observed, estimate.v_WB, motion.a, tuning.tracking, dt)
-    attitude, height = memory.attitude, memory.height
+    attitude, height, guarded = memory.attitude, memory.height, (False, math.inf)
+    if zones.shape[0] > 0 and law.filter.tuning.enabled > 0:
+        plan, u, guarded = _kept_off(law, zones, estimate, motion, observed, plan, u)
     if law.follows_plan:
         (wdx, wdy), thrust = follow_plan(law.tracking, mass, estimate, motion, observed, plan, u)
         wdz = u.yaw_acc + _yaw_correction(tuning.yaw, estimate, plan)
@@ -175,7 +221,48 @@ def close_loops(
     torque = _body_torque(airframe, estimate, (wdx, wdy, wdz), joints[0])
     rotor_thrust = allocate(airframe, torque, thrust, tuning.yaw_thrust_limit)
     command = ActuatorCommand(rotor_thrust, joints)
-    return command, CascadeMemory(rotors, command, observed, mass, attitude, height, kept)
+    memory = CascadeMemory(rotors, command, observed, mass, attitude, height, kept)
+    return command, memory, guarded
+
+
+@compilable
+def _kept_off(
+    law: CascadeLaw,
+    zones: NDArray[np.float64],
+    estimate: StateEstimate,
+    motion: MotionState,
+    observed: Observed,
+    plan: PredictionState,
+    u: PlanInput,
+) -> tuple[PredictionState, PlanInput, Guarded]:
+    """The plan's state and input, changed such that the loops ask for a filtered acceleration."""
+    asked = u.a
+    if law.follows_plan:
+        asked = wanted_accelerations(law.tracking, estimate, motion, observed, plan, u)
+    level = law.filter.level
+    wanted = (
+        clamp_magnitude(asked[0], level),
+        clamp_magnitude(asked[1], level),
+        asked[2],
+    )
+    a = add_scaled(motion.a, observed.d, 1.0)
+    safe, changed, margin = filtered(law.filter, zones, estimate, observed.v, a, wanted)
+    if not changed:
+        return plan, u, (False, margin)
+    dx, dy, dz = subtract(safe, asked)
+    moved = PredictionState(
+        plan.p,
+        plan.v,
+        (plan.a[0] + dx, plan.a[1] + dy, plan.a[2]),
+        plan.j,
+        plan.s,
+        plan.yaw,
+        plan.yaw_rate,
+        plan.q_arm,
+        plan.qd_arm,
+    )
+    a_d = (u.a[0] + dx, u.a[1] + dy, u.a[2] + dz)
+    return moved, PlanInput(a_d, u.yaw_acc, u.qdd_arm), (True, margin)
 
 
 @compiled
@@ -186,15 +273,19 @@ def _close_loops(
     plan: PredictionState,
     u: PlanInput,
     ticks: int,
-) -> tuple[tuple[Vec4, Vec2], Vec4, tuple[Vec3, Vec3, Vec2], float, tuple[Vec3, float, Vec2]]:
+    zones: NDArray[np.float64],
+) -> tuple[
+    tuple[Vec4, Vec2], Vec4, tuple[Vec3, Vec3, Vec2], float, tuple[Vec3, float, Vec2], Guarded
+]:
     """``close_loops`` that returns plain tuples, which leave machine code at half the cost."""
-    command, kept = close_loops(law[0], memory, estimate, plan, u, ticks)
+    command, kept, guarded = close_loops(law[0], memory, estimate, plan, u, ticks, zones)
     return (
         (command.rotor_thrust, command.joint_torque),
         kept.rotors,
         (kept.observed.v, kept.observed.d, kept.observed.disturbance_bias),
         kept.mass,
         (kept.attitude, kept.height, kept.joints),
+        guarded,
     )
 
 

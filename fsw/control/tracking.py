@@ -95,6 +95,22 @@ class AxisState(NamedTuple):
 
 
 @compilable
+def wanted_acceleration(
+    law: TrackingLaw, vehicle: AxisState, d: float, bias: float, plan: AxisState
+) -> float:
+    """Acceleration [m/s^2] of one horizontal axis that the law asks for, before its limit.
+
+    ``d`` [m/s^2] and ``bias`` [m/s^2] are those of ``snap_command``.
+    """
+    k = law.gains.k
+    k1, k2, k3 = k[0], k[1], k[2]
+    e_p = clamp_magnitude(plan.p - vehicle.p, law.tuning.position_error_limit)
+    e_v = plan.v - vehicle.v
+    feedback = k1 * e_p + k2 * e_v - law.gains.k_disturbance * (d - bias)
+    return plan.a + feedback / k3 - bias
+
+
+@compilable
 def snap_command(
     law: TrackingLaw, vehicle: AxisState, d: float, bias: float, plan: AxisState, u: float
 ) -> float:
@@ -105,16 +121,56 @@ def snap_command(
     """
     tuning, lag = law.tuning, law.lag
     k = law.gains.k
-    k1, k2, k3, k4, k5 = k[0], k[1], k[2], k[3], k[4]
-    e_p = clamp_magnitude(plan.p - vehicle.p, tuning.position_error_limit)
-    e_v, e_s = plan.v - vehicle.v, plan.s - vehicle.s
-    feedback = k1 * e_p + k2 * e_v - law.gains.k_disturbance * (d - bias)
-    a_ref = clamp_magnitude(plan.a + feedback / k3 - bias, tuning.acceleration_limit)
+    k3, k4, k5 = k[2], k[3], k[4]
+    e_s = plan.s - vehicle.s
+    wanted = wanted_acceleration(law, vehicle, d, bias, plan)
+    a_ref = clamp_magnitude(wanted, tuning.acceleration_limit)
     j_ref = plan.j + k3 / k4 * (a_ref - vehicle.a)
     # A jerk that can still be stopped before the acceleration overshoots.
     stoppable = math.sqrt(60.0 * (abs(a_ref - vehicle.a) + 0.15))
     j_ref = clamp_magnitude(j_ref, min(tuning.jerk_limit, stoppable))
     return lag.kp * (u - plan.a) - lag.kd * plan.j + k5 * e_s + k4 * (j_ref - vehicle.j)
+
+
+@compilable
+def vertical_acceleration(
+    law: TrackingLaw, p: Vec3, v: Vec3, a: Vec3, plan: PredictionState, u: PlanInput
+) -> float:
+    """Acceleration down [m/s^2] that the law asks for.
+
+    ``p`` [m, NED], ``v`` [m/s, NED] and ``a`` [m/s^2, NED] are the body's.
+    """
+    k_z = law.gains.k_vertical
+    k1, k2, k3 = k_z[0], k_z[1], k_z[2]
+    return u.a[2] + k1 * (plan.p[2] - p[2]) + k2 * (plan.v[2] - v[2]) + k3 * (plan.a[2] - a[2])
+
+
+@compilable
+def wanted_accelerations(
+    law: TrackingLaw,
+    estimate: StateEstimate,
+    motion: MotionState,
+    observed: Observed,
+    plan: PredictionState,
+    u: PlanInput,
+) -> Vec3:
+    """What ``follow_plan`` asks for on all axes [m/s^2, NED]."""
+    p, v, a, j, s = estimate.p_WB, observed.v, motion.a, motion.j, motion.s
+    x = wanted_acceleration(
+        law,
+        AxisState(p[0], v[0], a[0], j[0], s[0]),
+        observed.d[0],
+        observed.disturbance_bias[0],
+        AxisState(plan.p[0], plan.v[0], plan.a[0], plan.j[0], plan.s[0]),
+    )
+    y = wanted_acceleration(
+        law,
+        AxisState(p[1], v[1], a[1], j[1], s[1]),
+        observed.d[1],
+        observed.disturbance_bias[1],
+        AxisState(plan.p[1], plan.v[1], plan.a[1], plan.j[1], plan.s[1]),
+    )
+    return x, y, vertical_acceleration(law, p, v, a, plan, u)
 
 
 @compilable
@@ -142,11 +198,7 @@ def follow_plan(
     wdy = (wx * -R[4] + R[1] * wy) / (-f * determinant)
     wdx = (R[0] * wy - R[3] * wx) / (-f * determinant)
 
-    k_z = law.gains.k_vertical
-    k1, k2, k3 = k_z[0], k_z[1], k_z[2]
-    a_z = (
-        u.a[2] + k1 * (plan.p[2] - p[2]) + k2 * (plan.v[2] - v[2]) + k3 * (plan.a[2] - motion.a[2])
-    )
+    a_z = vertical_acceleration(law, p, v, motion.a, plan, u)
     thrust = mass * (GRAVITY - a_z) / max(R[8], 0.5)
     return (wdx, wdy), thrust
 

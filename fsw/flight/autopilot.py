@@ -8,7 +8,16 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from fsw.control.cascade import Cascade, CascadeMemory, at_rest, in_hover
+from fsw.control.cascade import (
+    UNGUARDED,
+    Cascade,
+    CascadeMemory,
+    Guarded,
+    KeepClear,
+    at_rest,
+    in_hover,
+)
+from fsw.control.safety_filter import NO_ZONES, moving_zones
 from fsw.control.safety_gate import gate
 from fsw.estimation.dead_reckoning import moved_on
 from fsw.estimation.estimator import estimate_state
@@ -19,18 +28,23 @@ from fsw.flight.modes.offboard import accept_setpoints, report
 from fsw.flight.plan_exchange import PlanExchange, measured_state, nominal_at_rest, requested
 from fsw.flight.reference_horizon import ReferenceHorizon
 from fsw.flight.safe_set import SafeSetCheck
+from fsw.flight.safety_watch import SafetyWatch
 from fsw.flight.state import FlightState, PlanMemory
 from fsw.model.battery import drained
+from fsw.model.body import body_of
 from fsw.model.nominal import REST_INPUT
 from fsw.mpc.reference import merge
 from fsw.parameters.consistency import Finding
 from fsw.parameters.flight_config import FlightConfig
+from fsw.shapes.zones import Array
 from fsw.signals import (
     STOPPED,
     ActuatorCommand,
     BatteryState,
     CommandAck,
     CommandResult,
+    ConstraintKind,
+    EndEffectorTarget,
     FlightSnapshot,
     Mode,
     PlanInput,
@@ -70,7 +84,11 @@ class Autopilot:
         self._commander = Commander(config)
         self._horizon = ReferenceHorizon(config)
         self._plans = PlanExchange(config)
-        self._cascade = Cascade(config.airframe, config.tuning, config.inner, tick)
+        self._watch = SafetyWatch(config, self._safe_sets.loop_tube)
+        self._cascade = Cascade(
+            config.airframe, config.tuning, config.inner, tick, keep_clear(config)
+        )
+        self._zones: tuple[SafeSet, EndEffectorTarget | None, Array] = (SafeSet(), None, NO_ZONES)
         self._ticks_per_plan = config.mpc_period_us // config.tick_period_us
 
     def warm_up(self) -> None:
@@ -104,14 +122,24 @@ class Autopilot:
         index, per_plan = state.index + ticks, self._ticks_per_plan
         planning_due = index // per_plan != state.index // per_plan
         nominal, plan, u = state.nominal, state.plan, REST_INPUT
-        if state.vehicle.flies and nominal is not None:
+        flown = state.vehicle.flies and nominal is not None
+        if flown and nominal is not None:
             nominal, plan, u = self._plans.follow(plan, nominal, inputs.plan, now_us, ticks)
+        safety = self._watch.off_plan(state.safety, estimate, nominal if flown else None)
         request = None
         if planning_due:
-            if state.vehicle.flies and nominal is not None:
-                state, request, plan = self._request_plan(state, estimate, nominal, plan, now_us)
+            if flown and nominal is not None:
+                state, request, plan = self._request_plan(
+                    state, estimate, nominal, plan, now_us, safety.replan
+                )
+                safety = replace(safety, replan=False) if safety.replan else safety
             state = self._report_slowly(state, estimate, now_us)
-        sent, memory, replaced = self._actuate(state, estimate, nominal, u, ticks)
+            safety = self._watch.breach(safety, estimate, state.constraints, flies=flown)
+        sent, memory, replaced, (pushed, margin) = self._actuate(state, estimate, nominal, u, ticks)
+        if pushed or safety.filter_us >= 0:
+            safety = self._watch.filtered(safety, now_us, pushed=pushed)
+        if not margin >= 0.0:
+            safety = self._watch.margin(safety, now_us, margin)
         # By position, as the snapshot: both are made in every tick, and names cost a microsecond.
         state = FlightState(
             index,
@@ -131,6 +159,7 @@ class Autopilot:
             state.offboard,
             state.battery,
             state.arming_refusal,
+            safety,
         )
         snapshot = _snapshot(state, estimate, u, inputs)
         return state, TickOutputs(
@@ -146,12 +175,12 @@ class Autopilot:
     ) -> FlightState:
         """Store received targets, safe set, mission, setpoints and ground station heartbeat."""
         now_us = inputs.sensors.t_us
-        if inputs.targets or inputs.safe_set is not None or inputs.mission is not None:
+        if inputs.targets or inputs.announced or inputs.mission is not None:
             stream = merge(state.mission.stream, inputs.targets, now_us)
             mission = self._safe_sets.update(
                 replace(state.mission, stream=stream),
-                inputs.mission,
-                inputs.safe_set,
+                inputs,
+                state.estimate,
                 texts,
                 flies=state.vehicle.flies,
             )
@@ -177,14 +206,15 @@ class Autopilot:
         nominal: PredictionState,
         plan: PlanMemory,
         now_us: int,
+        replan: bool,
     ) -> tuple[FlightState, PlanRequest, PlanMemory]:
-        """Request a plan that takes effect after a fixed delay."""
+        """Request a plan that takes effect after a fixed delay, from the vehicle if ``replan``."""
         config = self.config
         apply_us = now_us + config.plan_delay_ticks * config.tick_period_us
         mode = self._commander.mode(state)
         state, (targets, joints) = self._horizon(mode, state, estimate, apply_us)
         measured = measured_state(estimate, self._cascade.motion(state.cascade, estimate))
-        start, from_nominal = self._plans.start(plan, nominal, measured, now_us)
+        start, from_nominal = self._plans.start(plan, nominal, measured, now_us, replan)
         request = PlanRequest(
             plan_id=plan.next_id,
             t_apply_us=apply_us,
@@ -223,11 +253,15 @@ class Autopilot:
         nominal: PredictionState | None,
         u: PlanInput,
         ticks: int,
-    ) -> tuple[ActuatorCommand, CascadeMemory, bool]:
-        """Close the loops, idle or stay still; the safety gate is the last law."""
-        memory, wanted = state.cascade, STOPPED
+    ) -> tuple[ActuatorCommand, CascadeMemory, bool, Guarded]:
+        """Close the loops, idle or stay still; the safety gate is the last law.
+
+        Also says whether the gate replaced the command, and what the safety filter found.
+        """
+        memory, wanted, guarded = state.cascade, STOPPED, UNGUARDED
         if state.vehicle.flies and nominal is not None:
-            wanted, memory = self._cascade.step(memory, estimate, nominal, u, ticks)
+            zones = self._zones_now(state)
+            wanted, memory, guarded = self._cascade.step(memory, estimate, nominal, u, ticks, zones)
         elif state.vehicle.armed:
             idle = self.config.limits.idle_thrust
             wanted = ActuatorCommand((idle, idle, idle, idle), _let_down(estimate))
@@ -238,7 +272,30 @@ class Autopilot:
         if replaced:
             # The NaN is in the loops' new memory as well: discard that.
             memory = state.cascade
-        return sent, memory.after_sending(sent), replaced
+        return sent, memory.after_sending(sent), replaced, guarded
+
+    def _zones_now(self, state: FlightState) -> Array:
+        """The zones for the safety filter; made anew where they or their target changed."""
+        safe_set, target = state.mission.safe_set, state.reference
+        known, known_target, zones = self._zones
+        if safe_set is not known or target is not known_target:
+            if safe_set is not known or safe_set.kind is ConstraintKind.WORKSPACE:
+                zones = moving_zones(safe_set, target)
+            self._zones = (safe_set, target, zones)
+        return zones
+
+
+def keep_clear(config: FlightConfig) -> KeepClear:
+    """What the safety filter keeps off zones; it works where the planner has barriers to rely on.
+
+    Controllers that are flown for comparison are to show what they do without it.
+    """
+    enabled = config.safety_filter.enabled and config.controller == "blf" and not config.soft
+    return KeepClear(
+        body_of(config.planner.body, config.airframe),
+        config.planner.tunings,
+        replace(config.safety_filter, enabled=int(enabled)),
+    )
 
 
 def _estimate(state: FlightState, inputs: TickInputs) -> tuple[FlightState, StateEstimate | None]:
@@ -286,6 +343,7 @@ def _snapshot(
         vehicle.failsafe_from,
         goal.orbit if vehicle.mode is Mode.ORBIT and goal is not None else None,
         inputs.sensors.accel_B,
+        state.safety.counters,
     )
 
 

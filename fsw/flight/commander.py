@@ -21,11 +21,13 @@ from fsw.flight.modes.mission import left as mission_left
 from fsw.flight.modes.mission import with_update
 from fsw.flight.modes.offboard import is_fresh
 from fsw.flight.plan_exchange import nominal_at_rest
+from fsw.flight.retreat import retreat_place
 from fsw.flight.setpoint_generator import PositionGoal, SetpointGenerator
 from fsw.flight.state import FlightState, PlanMemory, SetpointMemory
 from fsw.model.body import body_of
 from fsw.model.kinematics import point_in_flight
 from fsw.mpc.reference import still_at
+from fsw.parameters.consistency import base_reach, loop_tube, stand_off
 from fsw.parameters.flight_config import FlightConfig
 from fsw.signals import (
     Command,
@@ -47,6 +49,7 @@ class Commander:
 
     def __init__(self, config: FlightConfig) -> None:
         self._config = config
+        self._tube_radius = base_reach(loop_tube(config), config.surroundings)
         self._body = body_of(config.planner.body, config.airframe)
         self._generator = SetpointGenerator(config)
         self._modes: dict[Mode, FlightMode] = {mode: kind(config) for mode, kind in MODES.items()}
@@ -144,6 +147,8 @@ class Commander:
                 texts.append(StatusText(*failsafe.report(row, context, action)))
             if action.mode is not None:
                 state = self._fail_safe(state, action.mode, estimate, texts)
+            if action is failsafe.Action.RETREAT:
+                state = replace(state, setpoint=self._retreating(state, estimate))
         return state
 
     def _fail_safe(
@@ -155,6 +160,18 @@ class Commander:
         before = state.vehicle.failsafe_from or state.vehicle.mode
         state = self._switch(state, mode, "failsafe", estimate, texts)
         return replace(state, vehicle=replace(state.vehicle, failsafe_from=before))
+
+    def _retreating(self, state: FlightState, estimate: StateEstimate) -> SetpointMemory:
+        """A setpoint off every zone by what a plan at rest keeps from it, and by the tube again.
+
+        What has pushed the vehicle out may go on to push it.
+        """
+        config = self._config
+        room = stand_off(config.planner.walls) + self._tube_radius
+        place = retreat_place(
+            state.mission.safe_set, estimate, self._body, config.airframe.link_length, room
+        )
+        return self._towards(state, PositionGoal(MotionSetpoint(False, place)), estimate)
 
     def check_mode_completion(
         self, state: FlightState, estimate: StateEstimate, texts: list[StatusText]
@@ -331,6 +348,9 @@ class Commander:
             moved_us=estimate.t_us,
             failsafe_from=vehicle.failsafe_from if completed else None,
         )
+        if not vehicle.armed:
+            # On the ground another source may own the safe set from now on.
+            state = replace(state, mission=replace(state.mission, owner_heard_us=-1))
         return replace(state, vehicle=vehicle)
 
 

@@ -29,8 +29,11 @@ class Action(Enum):
 
     NONE = "none"  # not even reported
     WARN = "warn"
+    REPLAN = "replanning"  # from the measurement, which the tick does by itself
+    PUSH = "pushed off"  # by the safety filter, in every tick that needs it
     BRAKE = "brake"  # the tick does so whenever no plan is young enough
     HOLD = "holding"
+    RETREAT = "retreating"  # off the zones that are too close, then hold
     RETURN = "returning"
     LAND = "landing"
     TERMINATE = "terminate"
@@ -43,6 +46,7 @@ class Action(Enum):
 
 _MODES: Final = {
     Action.HOLD: Mode.HOLD,
+    Action.RETREAT: Mode.HOLD,
     Action.RETURN: Mode.RETURN,
     Action.LAND: Mode.LAND,
     Action.TERMINATE: Mode.FAULT,
@@ -54,6 +58,9 @@ class Condition(Enum):
 
     ESTIMATE_INVALID = "state estimate invalid"
     TILT_LOST = "tilt beyond recovery"
+    BREACH = "outside the safe set"
+    TUBE_LEFT = "off the plan"
+    FILTER_ACTIVE = "too fast towards a zone"
     PLAN_STALE = "no plan for three periods"
     OUTPUT_NOT_FINITE = "actuator command not finite"
     PLAN_REFUSED = "last plan refused"
@@ -149,6 +156,15 @@ def _on_battery(context: FailsafeContext) -> Action:
     return Action.WARN if under_way or not vehicle.flies else action
 
 
+def _on_breach(context: FailsafeContext) -> Action:
+    """SAFE_BREACH_ACT, where the controller has barriers that promise not to get there."""
+    config, vehicle = context.config, context.state.vehicle
+    if config.controller != "blf" or config.soft or vehicle.mode is Mode.LAND:
+        return Action.WARN
+    known = {2: Action.HOLD, 5: Action.LAND, 6: Action.RETREAT}
+    return known.get(context.limits.breach_action, Action.WARN)
+
+
 def _charge_left(context: FailsafeContext) -> str:
     return f": {100.0 * context.state.battery.remaining:.0f} % left"
 
@@ -164,6 +180,29 @@ FAILSAFES: Final = (
         Condition.TILT_LOST,
         lambda c: not c.estimate.R_WB[8] > MIN_UP and c.state.vehicle.flies,
         _always(Action.TERMINATE),
+        of_vehicle=True,
+    ),
+    Failsafe(
+        Condition.BREACH,
+        lambda c: c.state.safety.breach_us >= 0,
+        _on_breach,
+        Severity.CRITICAL,
+        detail=lambda c: f" by {1e3 * c.state.safety.breach_by:.0f} mm",
+        of_vehicle=True,
+    ),
+    Failsafe(
+        Condition.TUBE_LEFT,
+        lambda c: c.state.safety.off_plan_us >= 0,
+        _always(Action.REPLAN),
+        Severity.CRITICAL,
+        detail=lambda c: f" by {1e3 * c.state.safety.off_plan_by:.0f} mm",
+        of_vehicle=True,
+    ),
+    Failsafe(
+        Condition.FILTER_ACTIVE,
+        lambda c: c.state.safety.filter_us >= 0,
+        _always(Action.PUSH),
+        Severity.CRITICAL,
         of_vehicle=True,
     ),
     Failsafe(

@@ -178,16 +178,19 @@ class PlanExchange:
         nominal: PredictionState,
         measured: PredictionState,
         now_us: int,
+        replan: bool = False,
     ) -> tuple[PredictionState, bool]:
         """The state from which to plan, and whether it is the running plan's own.
 
         It is that as long as the fast loop holds the vehicle to it, and the measurement otherwise:
-        with the PID inner loop, which follows no state, and after an upset. Either is moved on to
-        the instant the answer takes effect.
+        with the PID inner loop, which follows no state, after an upset, and to ``replan`` a vehicle
+        that has left the tube around its plan. Either is moved on to the instant the answer takes
+        effect.
         """
         config, delay = self._config, self._config.plan_delay_ticks
         from_nominal = (
-            config.inner == "tracking"
+            not replan
+            and config.inner == "tracking"
             and math.dist(nominal.p, measured.p) < config.upset_distance
             and abs(wrap_angle(nominal.yaw - measured.yaw)) < config.upset_yaw
         )

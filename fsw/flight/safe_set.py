@@ -1,10 +1,17 @@
-"""Which safe set is in force: the announced one and the fence together, if they can be kept."""
+"""Which safe set is in force: the announced one and the fence together, if they can be kept.
+
+One source owns what is announced, the first or the configured one, and one the fence. In flight any
+source may shrink either, and only its owner may grow it (``safe_set_change.growth``); every change
+and every refusal is a text that says who and what. On the ground another source may become the
+owner once the old one has been silent for a while, or the vehicle has disarmed.
+"""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
 from fsw.barriers.margins import Margins
+from fsw.flight.safe_set_change import growth, is_update, summary
 from fsw.flight.state import MissionMemory
 from fsw.model.body import body_of
 from fsw.mpc.reference import still_at
@@ -15,12 +22,17 @@ from fsw.shapes.zones import surfaces
 from fsw.signals import (
     ConstraintReport,
     EndEffectorTarget,
+    MessageSource,
     MissionUpdate,
     SafeSet,
+    SafeSetAnnouncement,
     Severity,
     StateEstimate,
     StatusText,
+    TickInputs,
 )
+
+_ACCEPTED = 8  # sources whose last announcement is remembered
 
 
 class SafeSetCheck:
@@ -28,7 +40,7 @@ class SafeSetCheck:
 
     def __init__(self, config: FlightConfig) -> None:
         self._config = config
-        self._loop_tube = loop_tube(config)
+        self.loop_tube = loop_tube(config)
         planner, airframe = config.planner, config.airframe
         body = body_of(planner.body, airframe)
         links = airframe.link_length
@@ -36,37 +48,160 @@ class SafeSetCheck:
 
     def analyse(self, safe_set: SafeSet) -> tuple[Finding, ...]:
         """Findings on whether this configuration can keep a safe set."""
-        return analyse(self._config, safe_set, self._loop_tube)
+        return analyse(self._config, safe_set, self.loop_tube)
 
     def update(
         self,
         mission: MissionMemory,
-        update: MissionUpdate | None,
-        announced: SafeSet | None,
+        inputs: TickInputs,
+        estimate: StateEstimate | None,
         texts: list[StatusText],
         *,
         flies: bool,
     ) -> MissionMemory:
         """Take in what was uploaded and announced; in flight only what can be kept."""
-        wanted = _together(mission, update, announced)
-        if wanted.safe_set == mission.safe_set:
+        update = inputs.mission
+        if update is not None:
+            if update.rally is not None:
+                mission = replace(mission, rally=update.rally)
+            if update.fence is not None:
+                mission = self._take_fence(mission, update, texts, flies=flies)
+        for announcement in inputs.announced:
+            now_us = inputs.sensors.t_us
+            owns = self._owns(mission, announcement.source, now_us, flies=flies)
+            if owns and now_us != mission.owner_heard_us:
+                mission = replace(mission, owner_heard_us=now_us)
+            against = "" if owns else self._against(mission, announcement.safe_set, estimate, flies)
+            mission = self._take(mission, announcement, against, texts, owns=owns, flies=flies)
+        return mission
+
+    def _take_fence(
+        self,
+        mission: MissionMemory,
+        update: MissionUpdate,
+        texts: list[StatusText],
+        *,
+        flies: bool,
+    ) -> MissionMemory:
+        """A fence that was uploaded; in flight only its owner may grow it."""
+        fence, source = update.fence or SafeSet(), update.fence_source
+        entitled = not flies or may_grow_fence(mission.fence_owner, source, self._chosen)
+        grown = "" if entitled else growth(mission.fence, fence)
+        if grown:
+            text = f"fence of {source} refused: {grown}, which {mission.fence_owner} owns"
+            texts.append(StatusText(Severity.CRITICAL, text))
+            return mission
+        wanted = replace(
+            mission, fence=fence, fence_owner=source if entitled else mission.fence_owner
+        )
+        if fence == mission.fence:
             return wanted
-        if wanted.safe_set == mission.refused_set:
-            return replace(mission, rally=wanted.rally)
-        findings = self.analyse(wanted.safe_set)
-        against = refusals(findings)
-        # Where a zone moves, there is another set ten times a second: what is known is not said.
-        known = {
-            finding.statement for finding in self.analyse(mission.refused_set or mission.safe_set)
-        }
-        new = [StatusText(Severity.WARNING, text) for text in against if text not in known]
-        new += [StatusText(Severity.INFO, text) for text in warnings(findings) if text not in known]
-        texts += new
-        if against and not self._config.soft and flies:
-            if new:
-                texts.append(StatusText(Severity.WARNING, "safe set refused: the old one is kept"))
-            return replace(mission, rally=wanted.rally, refused_set=wanted.safe_set)
-        return replace(wanted, refused_set=None, refusals=() if self._config.soft else against)
+        who = "fence" if source is None else f"fence of {source}"
+        return self._kept(mission, wanted, f"{who}: {summary(fence)}", texts, flies=flies)
+
+    def _take(
+        self,
+        mission: MissionMemory,
+        announcement: SafeSetAnnouncement,
+        against: str,
+        texts: list[StatusText],
+        *,
+        owns: bool,
+        flies: bool,
+    ) -> MissionMemory:
+        """An announced safe set, unless something speaks ``against`` it or it is repeated."""
+        source, owner = announcement.source, mission.owner
+        becomes_owner = owns and not source.is_same(owner)
+        if announcement in mission.accepted and not becomes_owner:
+            return mission  # in case a datagram was lost
+        repeated = _is_repeated(announcement, mission.refused)
+        who, safe_set = f"safe set of {source}", announcement.safe_set
+        if against:
+            if not repeated:
+                texts.append(StatusText(Severity.CRITICAL, f"{who} refused: {against}"))
+            return replace(mission, refused=announcement)
+        if repeated and flies:
+            return mission
+        others = [one for one in mission.accepted if not one.source.is_same(source)]
+        wanted = replace(
+            mission,
+            announced=safe_set,
+            owner=source if owns else owner,
+            accepted=(*([] if becomes_owner else others)[1 - _ACCEPTED :], announcement),
+        )
+        change = f"{who}: {summary(safe_set)}"
+        if becomes_owner:
+            change += "; it owns the safe set now"
+        kept = self._kept(mission, wanted, change, texts, flies=flies)
+        return replace(mission, refused=announcement) if kept is mission else kept
+
+    def _against(
+        self,
+        mission: MissionMemory,
+        safe_set: SafeSet,
+        estimate: StateEstimate | None,
+        flies: bool,
+    ) -> str:
+        """Why a source that does not own the safe set may not change it so."""
+        grown = growth(mission.announced, safe_set)
+        if grown:
+            whose = "no source owns" if mission.owner is None else f"{mission.owner} owns"
+            return f"{grown}, which {whose}"
+        if flies and estimate is not None:
+            margins = self.margins(safe_set, estimate, None).margins
+            if not min(margins, default=0.0) >= 0.0:
+                return "the vehicle is not inside it, and another source owns the safe set"
+        return ""
+
+    def _owns(
+        self, mission: MissionMemory, source: MessageSource, now_us: int, *, flies: bool
+    ) -> bool:
+        """Whether a source owns what is announced, or may from now on."""
+        chosen, owner = self._chosen, mission.owner
+        if chosen not in (0, source.system):
+            return False
+        if owner is None or source.is_same(owner):
+            return True
+        if chosen and owner.system != chosen:
+            return True
+        silent_us = now_us - mission.owner_heard_us
+        gone = mission.owner_heard_us < 0 or silent_us >= self._config.limits.owner_timeout_us
+        return gone and not flies
+
+    @property
+    def _chosen(self) -> int:
+        return self._config.limits.safe_set_owner
+
+    def _kept(
+        self,
+        mission: MissionMemory,
+        wanted: MissionMemory,
+        change: str,
+        texts: list[StatusText],
+        *,
+        flies: bool,
+    ) -> MissionMemory:
+        """The memory with what is wanted; as it was where that cannot be kept in flight."""
+        safe_set = joined(wanted.announced, wanted.fence)
+        against: tuple[str, ...] = wanted.refusals
+        if safe_set != mission.safe_set:
+            findings = self.analyse(safe_set)
+            against = refusals(findings)
+            # Where a zone moves, another set comes ten times a second: what is known is not said.
+            known = {finding.statement for finding in self.analyse(mission.safe_set)}
+            new = [text for text in against if text not in known]
+            texts += [StatusText(Severity.WARNING, text) for text in new]
+            told = [text for text in warnings(findings) if text not in known]
+            texts += [StatusText(Severity.INFO, text) for text in told]
+            if against and not self._config.soft and flies:
+                text = f"safe set refused: the old one is kept; wanted: {change}"
+                texts.append(StatusText(Severity.WARNING, text))
+                return mission
+            if self._config.soft:
+                against = ()
+        if not is_update(mission.safe_set, safe_set) or wanted.owner != mission.owner:
+            texts.append(StatusText(Severity.INFO, change))
+        return replace(wanted, safe_set=safe_set, refused=None, refusals=against)
 
     def warm_up(self, estimate: StateEstimate) -> None:
         """Compile every kernel of distances and margins, before anything flies."""
@@ -75,25 +210,27 @@ class SafeSetCheck:
         self.margins(walled, estimate, still_at(estimate.p_WB))
 
     def margins(
-        self, safe_set: SafeSet, estimate: StateEstimate, target: EndEffectorTarget
+        self, safe_set: SafeSet, estimate: StateEstimate, target: EndEffectorTarget | None
     ) -> ConstraintReport:
         """Margins and barrier values of the vehicle in the safe set."""
         return self._margins.report(safe_set, estimate, target)
 
 
-def _together(
-    memory: MissionMemory, update: MissionUpdate | None, announced: SafeSet | None
-) -> MissionMemory:
-    """The memory with the safe set of what was uploaded and announced."""
-    if announced is not None:
-        memory = replace(memory, announced=announced)
-    if update is not None:
-        if update.fence is not None:
-            memory = replace(memory, fence=update.fence)
-        if update.rally is not None:
-            memory = replace(memory, rally=update.rally)
-    safe_set = joined(memory.announced, memory.fence)
-    return memory if safe_set == memory.safe_set else replace(memory, safe_set=safe_set)
+def _is_repeated(announcement: SafeSetAnnouncement, refused: SafeSetAnnouncement | None) -> bool:
+    """Whether it is the refused one again, or where that has moved to in the meantime."""
+    if refused is None or announcement.source != refused.source:
+        return False
+    return is_update(refused.safe_set, announcement.safe_set)
+
+
+def may_grow_fence(owner: MessageSource | None, source: MessageSource | None, chosen: int) -> bool:
+    """Whether a source may put any other fence in place in flight.
+
+    The owner is the source that uploaded the one in force, or all of a ``chosen`` system.
+    """
+    if source is None or (owner is None and not chosen):
+        return True
+    return source.system == chosen if chosen else source.is_same(owner)
 
 
 def joined(announced: SafeSet, fence: SafeSet) -> SafeSet:

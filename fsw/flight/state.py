@@ -21,12 +21,15 @@ from fsw.signals import (
     EndEffectorTarget,
     Home,
     JointSetpoint,
+    MessageSource,
     Mode,
     MotionSetpoint,
     Plan,
     PlannerCounters,
     PredictionState,
     SafeSet,
+    SafeSetAnnouncement,
+    SafetyCounters,
     SolverStatus,
     StateEstimate,
     Vec2,
@@ -112,10 +115,14 @@ class MissionMemory:
 
     stream: tuple[EndEffectorTarget, ...] = ()
     safe_set: SafeSet = field(default_factory=SafeSet)  # in force: announced and fence together
-    refused_set: SafeSet | None = None  # announced in flight, and of no use
+    refused: SafeSetAnnouncement | None = None  # the last one
     refusals: tuple[str, ...] = ()  # why this configuration cannot keep the safe set
     announced: SafeSet = field(default_factory=SafeSet)
     fence: SafeSet = field(default_factory=SafeSet)
+    owner: MessageSource | None = None  # of what is announced
+    owner_heard_us: int = -1  # when it was announced last; -1: not since the vehicle disarmed
+    fence_owner: MessageSource | None = None  # who uploaded the fence
+    accepted: tuple[SafeSetAnnouncement, ...] = ()  # the last one of each source
     rally: tuple[Vec2, ...] = ()  # m, where a return may lead beside home
     flight: MissionFlight = field(default_factory=MissionFlight)
 
@@ -133,6 +140,19 @@ class PlanMemory:
     status: SolverStatus = SolverStatus.UNKNOWN
     refused: bool = False
     counters: PlannerCounters = field(default_factory=PlannerCounters)
+
+
+@dataclass(frozen=True, slots=True)
+class SafetyMemory:
+    """Episodes off the plan and outside the safe set; times are when it was last so, -1: not."""
+
+    off_plan_us: int = -1
+    off_plan_by: float = 0.0  # m, when it began
+    replan: bool = False  # from the measurement, next time
+    breach_us: int = -1
+    breach_by: float = 0.0  # m, when it began
+    filter_us: int = -1  # when the safety filter changed an acceleration last
+    counters: SafetyCounters = field(default_factory=SafetyCounters)
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,3 +181,4 @@ class FlightState:
     offboard: OffboardMemory = field(default_factory=OffboardMemory)
     battery: BatteryState = field(default_factory=BatteryState)
     arming_refusal: str = ""
+    safety: SafetyMemory = field(default_factory=SafetyMemory)

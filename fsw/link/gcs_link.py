@@ -22,7 +22,7 @@ from fsw.link.wire import encode_replies, message_ids
 from fsw.link.wire.message_ids import AUTOPILOT
 from fsw.link.wire.telemetry_context import TelemetryContext
 from fsw.ports import Clock
-from fsw.signals import CommandAck, FlightSnapshot, TickOutputs
+from fsw.signals import CommandAck, FlightSnapshot, MessageSource, TickOutputs
 from messages.frames import Frame, Losses, as_version_1, cut, is_version_1
 
 RecordFrame = Callable[[int, bytes], None]
@@ -206,16 +206,21 @@ class GcsLink:
             if text is not None:
                 self.outbox.add_text(text, t_us)
             return
+        host, port = sender
+        signed = self.signing.active and trust is FrameTrust.TRUSTED
+        source = MessageSource(
+            frame.system_id, frame.component_id, self.name, f"{host}:{port}", signed
+        )
         answer = self._commands.handle(frame, t_us, self._snapshot)
         if answer is None:
-            self._inbox.accept(frame)
+            self._inbox.accept(frame, source)
         else:
             messages, refusal = answer
             for message in messages:
                 self.outbox.add_asked_for(message)
             if refusal is not None:
                 self.outbox.add_text(refusal, t_us)
-        self.dispatch.handle(frame, t_us)
+        self.dispatch.handle(frame, t_us, source)
 
     def _encode(self, stream: Stream, snapshot: FlightSnapshot) -> None:
         try:

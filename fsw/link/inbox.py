@@ -22,12 +22,14 @@ from fsw.signals import (
     CommandRequest,
     EndEffectorTarget,
     JointSetpoint,
+    MessageSource,
     MissionUpdate,
     MotionSetpoint,
     Origin,
     Plan,
     PlanFailure,
     SafeSet,
+    SafeSetAnnouncement,
     SensorFrame,
     TickInputs,
     Zone,
@@ -37,7 +39,10 @@ from messages.frames import Frame
 
 _MAX_COMMANDS: Final = 16  # a tick; a client sends one at a time and repeats it
 _MAX_TARGETS: Final = 64  # a tick
+_MAX_ANNOUNCEMENTS: Final = 4  # a tick
+_MAX_ANNOUNCERS: Final = 8  # whose safe sets may be incomplete at the same time
 _GROUND_STATION: Final = 6  # MAV_TYPE
+UNKNOWN_SOURCE: Final = MessageSource(0, 0, "unknown")
 
 Setpoint = MotionSetpoint | AttitudeSetpoint | JointSetpoint
 
@@ -48,7 +53,7 @@ class Received:
 
     commands: list[Command] = field(default_factory=list)  # in order of arrival
     targets: list[EndEffectorTarget] = field(default_factory=list)  # the same
-    safe_set: SafeSet | None = None  # newly complete
+    announced: list[SafeSetAnnouncement] = field(default_factory=list)  # safe sets, the same
     motion: MotionSetpoint | None = None  # the newest; at most one of motion and attitude
     attitude: AttitudeSetpoint | None = None
     joints: JointSetpoint | None = None
@@ -56,8 +61,16 @@ class Received:
     station_heard: bool = False  # a ground station's heartbeat
 
 
+@dataclass(slots=True)
+class _Incomplete:
+    """The zones that one source has announced so far, of a set of ``count``."""
+
+    count: int
+    zones: dict[int, Zone]
+
+
 class Inbox:
-    """Collects commands, targets and the safe set until a tick takes them.
+    """Collects commands, targets and safe sets until a tick takes them.
 
     Bounded: what does not fit is dropped and counted, as a lost datagram would be.
     """
@@ -67,8 +80,9 @@ class Inbox:
         self._locate = partial(to_local, origin)
         self.refused = 0  # messages with numbers of no use, or too many of them
         self._received = Received()
-        self._obstacles: dict[int, Zone] = {}
-        self._obstacle_count = 0
+        # By source: the walls of two announcers must not mix.
+        self._incomplete: dict[MessageSource, _Incomplete] = {}
+        self._source = UNKNOWN_SOURCE  # of the frame that is read now
         self._handlers: dict[int, Callable[[Frame], None]] = {
             message_ids.COMMAND_LONG: partial(self._command, decode.command_long),
             message_ids.COMMAND_INT: partial(self._command, decode.command_int),
@@ -89,10 +103,11 @@ class Inbox:
         """What it keeps something of."""
         return frozenset(self._handlers)
 
-    def accept(self, frame: Frame) -> None:
+    def accept(self, frame: Frame, source: MessageSource = UNKNOWN_SOURCE) -> None:
         """Keep what the frame says if it is for this vehicle and of use; never raises."""
         handler = self._handlers.get(frame.message_id)
         if handler is not None:
+            self._source = source
             handler(frame)
 
     def take(self) -> Received:
@@ -119,7 +134,7 @@ class Inbox:
             plan,
             tuple(came.commands),
             tuple(came.targets),
-            _begun(came.safe_set, sensors.t_us),
+            tuple([_begun(one, sensors.t_us) for one in came.announced]),
             came.motion,
             came.attitude,
             came.joints,
@@ -180,15 +195,26 @@ class Inbox:
         if indexed is None:
             self.refused += 1
             return
-        if indexed.count != self._obstacle_count:
+        incomplete = self._incomplete.pop(self._source, None)
+        if incomplete is None or indexed.count != incomplete.count:
             # Another count announces another set; those of two sets must not mix.
-            self._obstacles.clear()
-            self._obstacle_count = indexed.count
-        self._obstacles[indexed.index] = indexed.zone
-        if len(self._obstacles) == indexed.count:
-            whole = tuple(self._obstacles[i] for i in range(indexed.count))
-            self._received.safe_set = SafeSet(whole)
-            self._obstacles.clear()
+            incomplete = _Incomplete(indexed.count, {})
+        zones = incomplete.zones
+        zones[indexed.index] = indexed.zone
+        if len(zones) < indexed.count:
+            self._incomplete[self._source] = incomplete
+            if len(self._incomplete) > _MAX_ANNOUNCERS:
+                del self._incomplete[next(iter(self._incomplete))]
+            return
+        self._announce(SafeSet(tuple(zones[i] for i in range(indexed.count))))
+
+    def _announce(self, safe_set: SafeSet) -> None:
+        """Keep the newest safe set of a source."""
+        kept = [one for one in self._received.announced if one.source != self._source]
+        if len(kept) >= _MAX_ANNOUNCEMENTS:
+            self.refused += 1
+            return
+        self._received.announced = [*kept, SafeSetAnnouncement(self._source, safe_set)]
 
     def _sphere(self, frame: Frame) -> None:
         if not decode.for_this_vehicle(frame):
@@ -197,16 +223,16 @@ class Inbox:
         if sphere is None:
             self.refused += 1
             return
-        self._received.safe_set = SafeSet((sphere,))
+        self._announce(SafeSet((sphere,)))
 
 
-def _begun(safe_set: SafeSet | None, now_us: int) -> SafeSet | None:
-    """The safe set with zones that move, and did not say since when, where they are now."""
-    if safe_set is None or all(zone.t_us or not any(zone.velocity) for zone in safe_set.zones):
-        return safe_set
-    return SafeSet(
-        tuple(
-            replace(zone, t_us=now_us) if any(zone.velocity) and not zone.t_us else zone
-            for zone in safe_set.zones
-        )
-    )
+def _begun(announced: SafeSetAnnouncement, now_us: int) -> SafeSetAnnouncement:
+    """The announcement with zones that move, and did not say since when, where they are now."""
+    zones = announced.safe_set.zones
+    if all(zone.t_us or not any(zone.velocity) for zone in zones):
+        return announced
+    begun = [
+        replace(zone, t_us=now_us) if any(zone.velocity) and not zone.t_us else zone
+        for zone in zones
+    ]
+    return replace(announced, safe_set=SafeSet(tuple(begun)))

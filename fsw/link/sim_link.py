@@ -17,7 +17,14 @@ from fsw.link.wire.decode import Numbers
 from fsw.link.wire.message_ids import AUTOPILOT, SYSTEM_ID
 from fsw.link.wire.px4_mode import custom_mode
 from fsw.ports import VehicleFacts
-from fsw.signals import CommandAck, FlightSnapshot, Mode, SensorFrame, TickOutputs
+from fsw.signals import (
+    CommandAck,
+    FlightSnapshot,
+    MessageSource,
+    Mode,
+    SensorFrame,
+    TickOutputs,
+)
 from messages.frames import Frame, FrameWriter, split
 from messages.lockstep_codec import LockstepReader
 from messages.udp import PeerSocket
@@ -150,7 +157,7 @@ class SimLink:
             custom_mode = frame.payload_values[0]
             self.pacing = Pacing.LOCKSTEP if custom_mode == 1 else Pacing.REALTIME
         else:
-            self._inbox.accept(frame)
+            self._inbox.accept(frame, _source(frame))
 
     def _repeat(self, t_us: int) -> None:
         answered_us, answer = self._answer
@@ -190,3 +197,8 @@ class SimLink:
 
     def _ack_frame(self, ack: CommandAck) -> bytes:
         return self._writer.frame(message_ids.COMMAND_ACK, *encode_replies.command_ack(ack))
+
+
+def _source(frame: Frame) -> MessageSource:
+    """The simulator is the only peer of its link, whichever port it has."""
+    return MessageSource(frame.system_id, frame.component_id, "simulator")

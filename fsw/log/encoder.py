@@ -213,6 +213,7 @@ class LogEncoder:
         margins, barrier, smallest = report.shown(topics.MARGINS)
         least = min(report.margins, default=math.nan)
         argmin = 0xFF if smallest is None else smallest
+        safety = snapshot.safety
         p, v = point_in_flight(snapshot.estimate, self._link_length)
         wanted = (
             (*_NOWHERE, *_NOWHERE, math.nan)
@@ -223,6 +224,7 @@ class LogEncoder:
             (
                 *(_BARRIER, t_us, *_filled(margins), *_filled(barrier), least),
                 *(int(report.kind), len(margins), argmin),
+                *(safety.breaches, safety.departures, safety.interventions),
                 *(_END_EFFECTOR, t_us, *p, *v, *wanted),
             )
         )

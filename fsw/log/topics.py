@@ -125,6 +125,9 @@ BARRIER_MARGIN: Final = Topic(
         Field("kind", "uint8_t", note="0 none, 1 walls, 2 workspace, 3 obstacles and walls"),
         Field("count", "uint8_t", note="number of valid entries"),
         Field("argmin", "uint8_t"),
+        Field("breaches", "uint32_t", note="times the safe set was left in flight"),
+        Field("departures", "uint32_t", note="times the vehicle left the tube around its plan"),
+        Field("interventions", "uint32_t", note="times the safety filter engaged"),
     ),
 )
 END_EFFECTOR: Final = Topic(

@@ -91,6 +91,11 @@ def loop_tube(config: FlightConfig) -> Tube:
     )
 
 
+def base_reach(loop: Tube, surroundings: Surroundings) -> float:
+    """How far a disturbance within the assumed one pushes the base off its plan [m], an axis."""
+    return loop.base * surroundings.disturbance + loop.base_wind
+
+
 def stand_off(tuning: BarrierTuning) -> float:
     """Distance to the boundary at which a plan at rest meets h = lambda [m]."""
     knee = tuning.alpha / tuning.slope**2
@@ -156,7 +161,7 @@ def _links(config: FlightConfig, clearance: float) -> Finding:
 
 
 def _base_tube(tuning: BarrierTuning, loop: Tube, surroundings: Surroundings) -> Finding:
-    reach, room = loop.base * surroundings.disturbance + loop.base_wind, stand_off(tuning)
+    reach, room = base_reach(loop, surroundings), stand_off(tuning)
     return _finding(
         "tube",
         room >= reach,

@@ -7,6 +7,7 @@ from typing import cast
 
 from fsw.control.cascade import Inner
 from fsw.control.gains import LoopGains
+from fsw.control.safety_filter import FilterTuning
 from fsw.geometry.geodesy import DEFAULT_ORIGIN
 from fsw.model.airframe import AIRFRAME, Airframe
 from fsw.model.battery import BatteryModel
@@ -50,6 +51,9 @@ class FlightLimits:
     battery_critical: float = 0.1
     battery_emergency: float = 0.05
     low_battery_action: int = 0  # 0 warn; 2 land when critical; 3 return then, land in emergency
+    safe_set_owner: int = 0  # MAVLink system that owns the safe set; 0: the first to announce one
+    breach_action: int = 6  # of the safe set: 1 warn, 2 hold, 5 land, 6 retreat and hold
+    owner_timeout_us: int = 10_000_000  # a silent owner may be replaced on the ground
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,6 +94,7 @@ class FlightConfig:
     limits: FlightLimits = field(default_factory=FlightLimits)
     surroundings: Surroundings = field(default_factory=Surroundings)
     steering: SetpointLimits = field(default_factory=SetpointLimits)
+    safety_filter: FilterTuning = field(default_factory=FilterTuning)
     battery: BatteryModel = field(default_factory=BatteryModel)
     origin: Origin = DEFAULT_ORIGIN
     soft: bool = False  # fly an inconsistent configuration all the same, with a warning

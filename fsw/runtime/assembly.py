@@ -51,6 +51,7 @@ def flight_software(
             locate=partial(to_local, config.origin),
             judge=lambda safe_set: flight.against(safe_set),
             clearance=lambda: flight.config.limits.fence_clearance,
+            owner=lambda: int(flight.config.limits.safe_set_owner),
         )
     )
     return FlightProgram(

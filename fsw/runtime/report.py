@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
+
 from fsw.parameters.control_choice import ControlChoice
 from fsw.ports import VehicleFacts
 from fsw.runtime.planner_service import PlannerRecord
@@ -34,6 +36,7 @@ def as_json(
         "housekeeping": _group(record.groups[HOUSEKEEPING.name]),
         "scheduler": record.scheduler,
         "stages": {name: _percentiles(times) for name, times in record.stages.items()},
+        "safety": asdict(record.safety),
         "setpoints": {
             "accepted": record.offboard.accepted,
             "refused": record.offboard.refused,

@@ -32,6 +32,7 @@ from fsw.runtime.timing import GroupTimer, Histogram
 from fsw.signals import (
     OffboardReport,
     PlannerCounters,
+    SafetyCounters,
     SensorFrame,
     Severity,
     StatusText,
@@ -73,6 +74,7 @@ class FlightRecord:
     stale: int = 0  # ticks without a sensor frame of their own
     scheduler: str = ""  # class and priority of the tick process
     counters: PlannerCounters = field(default_factory=PlannerCounters)
+    safety: SafetyCounters = field(default_factory=SafetyCounters)
     offboard: OffboardReport = field(default_factory=OffboardReport)
 
 
@@ -237,6 +239,7 @@ class SimLoop(Generic[State]):
     def _publish(self, cycle: Cycle) -> None:
         record, outputs = self._record, cycle.outputs
         record.counters = outputs.snapshot.counters
+        record.safety = outputs.snapshot.safety
         record.offboard = outputs.snapshot.offboard
         events = record.mpc.events
         if events:

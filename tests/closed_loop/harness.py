@@ -33,7 +33,6 @@ from fsw.tuning import Tuning
 from sitl.scenario import Hold, Pilot, Scenario, Start
 from sitl.simulation import STEP_US, Simulation
 from studies.closed_loop import ClosedLoop, InlinePlanner
-from studies.mission import safe_set
 
 ARM, TAKEOFF, LAND, SET_MODE = 400, 22, 21, 176
 STREAM_STEPS = 25
@@ -136,7 +135,7 @@ class Flight:
             self.closed.planner.take(sensors.t_us),
             commands,
             self.targets(),
-            safe_set(self.scenario) if self.announces and self.sim.step == 0 else None,
+            self.closed.announced() if self.announces else (),
             tuning=tuning,
             mission=self.upload,
         )

@@ -10,8 +10,9 @@ import pytest
 from fsw.geometry.geodesy import to_global
 from fsw.parameters.flight_config import flight_config
 from fsw.shapes.target_sphere import target_sphere
-from fsw.signals import Command, Mode, SafeSet, SensorFrame
+from fsw.signals import Command, Mode, SafeSet, SafeSetAnnouncement, SensorFrame
 from sitl.scenario_file import load_scenario
+from studies.mission import SIMULATOR, safe_set
 from tests.closed_loop.harness import (
     ARM,
     LAND,
@@ -21,7 +22,6 @@ from tests.closed_loop.harness import (
     command,
     hover,
     on_the_ground,
-    safe_set,
 )  # fmt: skip
 
 NAN = math.nan
@@ -152,7 +152,7 @@ def test_a_safe_set_that_contradicts_itself_is_refused_in_flight_and_the_old_one
     flight.follow()
     flight.run(0.5)
     tiny = SafeSet((target_sphere((0.0, 0.0, -0.225), 0.01),))
-    flight.streamed = {"safe_set": tiny}
+    flight.streamed = {"announced": (SafeSetAnnouncement(SIMULATOR, tiny),)}
     flight.run(0.5)
     assert flight.state.mission.safe_set == safe_set(scenario)
     assert sum("old one is kept" in text for text in flight.texts) == 1
@@ -173,7 +173,7 @@ def test_what_keeps_it_from_arming_is_on_show() -> None:
     flight.run(0.3)
     assert flight.snapshot.arming_refusal == ""
     tiny = SafeSet((target_sphere((0.0, 0.0, -0.225), 0.01),))
-    flight.streamed = {"safe_set": tiny}
+    flight.streamed = {"announced": (SafeSetAnnouncement(SIMULATOR, tiny),)}
     flight.run(0.3)
     assert "not armed" in flight.snapshot.arming_refusal
 

@@ -34,7 +34,7 @@ from dataclasses import replace
 from fsw.flight.commander import Commander
 from fsw.flight.state import FlightState, VehicleMemory
 from fsw.parameters.flight_config import flight_config
-from fsw.signals import ConstraintReport, Mode
+from fsw.signals import Mode
 from tests.fsw.random_states import random_estimate
 import numpy
 level = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
@@ -43,13 +43,13 @@ vehicle = VehicleMemory(mode=Mode.TRAJECTORY, landed=False)
 state = FlightState(vehicle=vehicle, estimate=estimate, t_us=estimate.t_us)
 state = replace(state, plan=replace(state.plan, since_us=estimate.t_us))
 commander = Commander(flight_config())
-for margin, mode in ((0.01, Mode.TRAJECTORY), (-0.01, Mode.HOLD)):
+for rate, mode in ((5.9, Mode.TRAJECTORY), (-6.1, Mode.HOLD)):
     texts = []
-    near = replace(state, constraints=ConstraintReport(margins=(1.0, margin)))
-    after = commander.check_failsafes(near, estimate, texts)
-    assert after.vehicle.mode is mode, (margin, after.vehicle)
+    swinging = estimate._replace(qd_arm=(0.1, rate))
+    after = commander.check_failsafes(state, swinging, texts)
+    assert after.vehicle.mode is mode, (rate, after.vehicle)
     assert bool(texts) == (mode is Mode.HOLD)
-assert "inside the clearance" in texts[0].text
+assert "the arm swings" in texts[0].text
 """
 NEW_TILT = """
 import math

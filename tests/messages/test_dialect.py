@@ -12,7 +12,7 @@ PINNED = {
     "ARM_JOINT_STATE": (60200, 81, 222),
     "ARM_JOINT_SETPOINT": (60201, 59, 59),
     "END_EFFECTOR_TARGET": (60202, 57, 239),
-    "BARRIER_MARGIN": (60203, 149, 183),
+    "BARRIER_MARGIN": (60203, 155, 183),
     "MPC_STATUS": (60204, 53, 216),
     "LOOP_TIMING": (60206, 49, 31),
     "OBSTACLE_WALL": (60207, 24, 28),
@@ -117,6 +117,7 @@ def test_every_field_with_a_dimension_states_its_unit():
         *("missed_deadlines", "fallbacks", "cost", "slack_max", "sqp_iterations"),
         *("solver_iterations", "ticks", "late_ticks", "skipped_ticks"),
         *("target_system", "target_component", "accepted", "refused", "numbers"),
+        *("breaches", "departures", "interventions"),
     }
     for message in ET.parse(DEFINITION).iter("message"):
         for field in message.iter("field"):

@@ -28,7 +28,7 @@ from fsw.link.wire import message_ids as ids
 from fsw.link.wire.decode import Numbers, for_this_vehicle
 from fsw.link.wire.mission_items import DENIED, UNSUPPORTED, BadItem, MissionItem
 from fsw.link.wire.outgoing import Outgoing, ServiceOutput
-from fsw.signals import Severity, StatusText
+from fsw.signals import MessageSource, Severity, StatusText
 from messages.frames import Frame
 
 _ReadItem = Callable[[Numbers], MissionItem]
@@ -74,6 +74,7 @@ class MissionService:
     """The mission protocol on one link."""
 
     def __init__(self, store: MissionStore) -> None:
+        self.source: MessageSource | None = None  # of the frame that is handled now
         self._store = store
         self._upload: _Upload | None = None
         self._download: _Download | None = None
@@ -201,7 +202,8 @@ class MissionService:
     def _finish(self, upload: _Upload) -> Sequence[ServiceOutput]:
         kind, peer = upload.kind, upload.peer
         try:
-            self._store.keep(kind, tuple(upload.items), tuple(upload.meanings))
+            items, meanings = tuple(upload.items), tuple(upload.meanings)
+            self._store.keep(kind, items, meanings, self.source)
         except BadItem as refused:
             return self._refuse(refused, kind, peer)
         self._upload = None
@@ -261,7 +263,7 @@ class MissionService:
         self._upload = self._download = None
         for kind in map(Kind, kinds):
             try:
-                self._store.keep(kind, (), ())
+                self._store.keep(kind, (), (), self.source)
             except BadItem as wrong:
                 return self._refuse(wrong, kind, peer)
         return (encode_ack(ACCEPTED, number, peer),)

@@ -13,6 +13,8 @@ from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import Final
 
+from fsw.flight.safe_set import may_grow_fence
+from fsw.flight.safe_set_change import growth
 from fsw.link.wire.fence_items import check_fence_item, read_fence
 from fsw.link.wire.mission_items import (
     DENIED,
@@ -25,6 +27,7 @@ from fsw.link.wire.mission_items import (
 from fsw.shapes.zones import surfaces
 from fsw.signals import (
     FlightSnapshot,
+    MessageSource,
     MissionProgress,
     MissionStep,
     MissionUpdate,
@@ -74,6 +77,7 @@ class Site:
     locate: Locate
     judge: SafeSetCheck
     clearance: Callable[[], float]  # m, from the walls of a fence uploaded now
+    owner: Callable[[], int] = lambda: 0  # system that may grow a fence in flight; 0: its uploader
 
 
 class MissionStore:
@@ -87,6 +91,7 @@ class MissionStore:
         self.items: dict[Kind, tuple[MissionItem, ...]] = dict.fromkeys(Kind, ())
         self._update: MissionUpdate | None = None
         self._snapshot: FlightSnapshot | None = None
+        self._kept_fence: tuple[SafeSet, MessageSource | None] = (SafeSet(), None)
 
     def observe(self, snapshot: FlightSnapshot) -> None:
         """See the vehicle after a tick."""
@@ -104,7 +109,11 @@ class MissionStore:
         return None
 
     def keep(
-        self, kind: Kind, items: tuple[MissionItem, ...], meanings: tuple[Meaning, ...]
+        self,
+        kind: Kind,
+        items: tuple[MissionItem, ...],
+        meanings: tuple[Meaning, ...],
+        source: MessageSource | None = None,
     ) -> None:
         """Put a whole upload in the place of the old one; ``BadItem`` leaves that."""
         if kind is Kind.MISSION:
@@ -114,7 +123,10 @@ class MissionStore:
             places = tuple(place for place in meanings if isinstance(place, tuple))
             self._change(MissionUpdate(rally=places))
         else:
-            self._change(MissionUpdate(fence=self._fence(items)))
+            fence = self._fence(items, source)
+            entitled = self._may_grow(source)
+            self._kept_fence = (fence, source if entitled else self._kept_fence[1])
+            self._change(MissionUpdate(fence=fence, fence_source=source))
         self.items[kind] = items
         self.ids[kind] = _identity(items)
 
@@ -130,8 +142,16 @@ class MissionStore:
         taken, self._update = self._update, None
         return taken
 
-    def _fence(self, items: tuple[MissionItem, ...]) -> SafeSet:
+    def _may_grow(self, source: MessageSource | None) -> bool:
+        """As the tick will see it: on the ground every source, in flight the fence's owner."""
+        flies = self._snapshot is not None and self._snapshot.armed and not self._snapshot.landed
+        return not flies or may_grow_fence(self._kept_fence[1], source, self._site.owner())
+
+    def _fence(self, items: tuple[MissionItem, ...], source: MessageSource | None) -> SafeSet:
         fence = read_fence(items, self._site.locate, self._site.clearance())
+        grown = "" if self._may_grow(source) else growth(self._kept_fence[0], fence)
+        if grown:
+            raise BadItem(DENIED, f"{grown}, which {self._kept_fence[1]} owns")
         against = self._site.judge(fence)
         if against:
             raise BadItem(DENIED, f"the fence cannot be kept: {'; '.join(against)}")
@@ -155,7 +175,7 @@ class MissionStore:
                 waiting,
                 **{
                     name: value
-                    for name in ("steps", "fence", "rally", "current")
+                    for name in ("steps", "fence", "rally", "current", "fence_source")
                     if (value := getattr(update, name)) is not None
                 },
             )

@@ -12,6 +12,7 @@ from collections.abc import Callable, Sequence
 from typing import Protocol, runtime_checkable
 
 from fsw.link.wire.outgoing import ServiceOutput
+from fsw.signals import MessageSource
 from messages.frames import Frame
 
 
@@ -41,6 +42,13 @@ class BulkService(LinkService, Protocol):
         ...
 
 
+@runtime_checkable
+class SourcedService(LinkService, Protocol):
+    """A service whose answer depends on who asks."""
+
+    source: MessageSource | None  # of the frame that is handled now
+
+
 class Dispatch:
     """Hands frames to the services of one link that want them, and what they answer to the link."""
 
@@ -51,13 +59,16 @@ class Dispatch:
         self._send = send
         self._polled = tuple(services)
         self._bulky = tuple(service for service in services if isinstance(service, BulkService))
+        self._sourced = tuple(one for one in services if isinstance(one, SourcedService))
         self._wanting: dict[int, tuple[LinkService, ...]] = {}
         for service in services:
             for id_ in service.message_ids:
                 self._wanting[id_] = (*self._wanting.get(id_, ()), service)
 
-    def handle(self, frame: Frame, t_us: int) -> None:
+    def handle(self, frame: Frame, t_us: int, source: MessageSource | None = None) -> None:
         """Let every service that wants the frame answer it."""
+        for sourced in self._sourced:
+            sourced.source = source
         for service in self._wanting.get(frame.message_id, ()):
             self._answer(t_us, service.handle, frame, t_us)
 

@@ -19,6 +19,7 @@ from fsw.signals import FlightSnapshot, SetpointKind, Vec2, Vec4
 
 _LOCAL_NED: Final = 1  # MAV_FRAME
 _MAX_CONSTRAINTS: Final = 16
+_U16: Final = 0xFFFF
 _U32: Final = 0xFFFFFFFF
 _RATE_GROUPS: Final = ("inner", "mpc", "telemetry", "housekeeping")  # of LoopHealth
 
@@ -93,6 +94,9 @@ def barrier_margin(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues 
         int(report.kind),
         len(margins),
         smallest,
+        snapshot.safety.breaches & _U16,
+        snapshot.safety.departures & _U16,
+        snapshot.safety.interventions & _U16,
     )
 
 

@@ -119,7 +119,7 @@ def test_the_rotor_model_lags_behind_what_was_sent() -> None:
     cascade = Cascade(AIRFRAME, TUNING, "tracking", DT)
     memory = in_hover(AIRFRAME, estimate)
     sent = ActuatorCommand((10.0, 10.0, 10.0, 10.0), (0.0, 0.0))
-    _, after = cascade.step(memory._replace(commanded=sent), estimate, plan_at(), NO_INPUT)
+    _, after, _ = cascade.step(memory._replace(commanded=sent), estimate, plan_at(), NO_INPUT)
     share = 1.0 - math.exp(-DT / AIRFRAME.rotor_lag)
     hover = 3.5 * 9.81 / 4.0
     assert after.rotors == pytest.approx((hover + share * (10.0 - hover),) * 4)
@@ -152,7 +152,7 @@ def test_missed_ticks_are_made_up_for_by_rotor_model_and_observer(ticks: int) ->
     cascade = Cascade(AIRFRAME, TUNING, "tracking", DT)
     sent = ActuatorCommand((10.0, 10.0, 10.0, 10.0), (0.0, 0.0))
     memory = in_hover(AIRFRAME, turned(0.0))._replace(commanded=sent)
-    _, after = cascade.step(memory, estimate, plan_at(), NO_INPUT, ticks)
+    _, after, _ = cascade.step(memory, estimate, plan_at(), NO_INPUT, ticks)
     hover = 3.5 * 9.81 / 4.0
     left = math.exp(-ticks * DT / AIRFRAME.rotor_lag)
     assert after.rotors == pytest.approx((10.0 + left * (hover - 10.0),) * 4)
@@ -179,7 +179,7 @@ def test_the_servos_hold_the_arm_in_the_field_that_the_thrust_makes() -> None:
         )
         # The accelerometer agrees that the mass is what it was.
         seen = estimate._replace(specific_force=thrust / 3.5)
-        command, _ = cascade.step(memory, seen, plan_at(q_arm=q_arm), NO_INPUT)
+        command, _, _ = cascade.step(memory, seen, plan_at(q_arm=q_arm), NO_INPUT)
         lower = field * m2 * c2 * math.sin(sum(q_arm))
         upper = field * (m1 * c1 + m2 * l1) * math.sin(q_arm[0])
         np.testing.assert_allclose(command.joint_torque, (upper + lower, lower), rtol=1e-3)
@@ -215,7 +215,7 @@ def test_spinning_about_two_axes_the_third_torque_is_eulers() -> None:
     estimate = estimate_of(Rotation.identity(), w)
     free = replace(TUNING, attitude=PidGains(0.0, 0.0, 0.0, 1.0))
     cascade = Cascade(unlike, free, "pid", DT)
-    command, _ = cascade.step(in_hover(unlike, estimate), estimate, plan_at(), NO_INPUT)
+    command, _, _ = cascade.step(in_hover(unlike, estimate), estimate, plan_at(), NO_INPUT)
     inertia, spin = np.array(unlike.inertia), np.array(w)
     expected = np.cross(spin, inertia * spin) + [0.0, command.joint_torque[0], 0.0]
     np.testing.assert_allclose(torque_of(command), expected, atol=1e-9)

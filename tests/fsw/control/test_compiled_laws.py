@@ -12,11 +12,14 @@ import pytest
 
 from fsw.control.cascade import Cascade, CascadeMemory, Inner, close_loops
 from fsw.control.gains import LoopGains
+from fsw.control.safety_filter import moving_zones
 from fsw.control.tracking import Observed
 from fsw.estimation.estimator import attitude, estimate_state
 from fsw.model.airframe import AIRFRAME, AttitudeLag
 from fsw.model.nominal import NominalModel, advance
-from fsw.signals import ActuatorCommand, PlanInput, SensorFrame, Vec4
+from fsw.shapes.ball import point
+from fsw.shapes.half_space import wall
+from fsw.signals import ActuatorCommand, PlanInput, SafeSet, SensorFrame, Vec4
 from tests.fsw.random_states import as_state, prediction_vector, random_estimate, vec3
 
 STATES = 300
@@ -64,7 +67,10 @@ def test_the_loops_do_as_machine_code_what_they_say_in_python(
     inner: Inner, tuning: LoopGains, ticks: int
 ) -> None:
     random = np.random.default_rng(7)
-    cascade = Cascade(AIRFRAME, tuning, inner, 0.002)
+    cascade, pushed = Cascade(AIRFRAME, tuning, inner, 0.002), 0
+    zones = moving_zones(
+        SafeSet((wall((0.6, 0.0, 0.8), 0.0, 0.1), point((0.5, 0.0, 0.0), 0.3))), None
+    )
     for _ in range(STATES):
         case = (
             memory(random),
@@ -72,16 +78,19 @@ def test_the_loops_do_as_machine_code_what_they_say_in_python(
             as_state(prediction_vector(random)),
             plan_input(random),
             ticks,
+            zones,
         )
         plain = list(numbers(close_loops(cascade.law, *case)))
         np.testing.assert_allclose(list(numbers(cascade.step(*case))), plain, rtol=0, atol=1e-9)
+        pushed += cascade.step(*case)[2][0]
+    assert 0 < pushed < STATES, "with and without the safety filter"
 
 
 def test_a_number_that_is_none_comes_out_as_none_and_is_left_to_the_gate() -> None:
     random = np.random.default_rng(8)
     cascade = Cascade(AIRFRAME, LoopGains(), "tracking", 0.002)
     plan = as_state(prediction_vector(random))._replace(q_arm=(math.nan, 0.0))
-    wanted, _ = cascade.step(memory(random), random_estimate(random), plan, plan_input(random))
+    wanted, _, _ = cascade.step(memory(random), random_estimate(random), plan, plan_input(random))
     assert not math.isfinite(sum(wanted.joint_torque))
 
 

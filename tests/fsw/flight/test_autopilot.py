@@ -12,7 +12,19 @@ from fsw.estimation.dead_reckoning import moved_on
 from fsw.estimation.estimator import estimate_state
 from fsw.flight.autopilot import Autopilot
 from fsw.flight.state import FlightState
-from fsw.signals import STOPPED, CommandResult, Mode, SensorFrame, TickInputs, TickOutputs, Vec3
+from fsw.shapes.half_space import wall
+from fsw.signals import (
+    STOPPED,
+    CommandResult,
+    MessageSource,
+    Mode,
+    SafeSet,
+    SafeSetAnnouncement,
+    SensorFrame,
+    TickInputs,
+    TickOutputs,
+    Vec3,
+)
 from tests.fsw.flight.asked import command
 from tests.fsw.flight.in_flight import CONFIG, GROUND_Z
 
@@ -138,3 +150,16 @@ def test_home_is_where_it_was_seen_first_until_it_is_armed() -> None:
                     commands=(command(ARM, 1.0),))  # fmt: skip
     assert armed.vehicle.home is not None
     assert armed.vehicle.home.p == (3.0, 1.0, GROUND_Z)
+
+
+def test_disarming_opens_the_safe_set_to_another_owner() -> None:
+    ours, theirs = (MessageSource(1, 195, link) for link in ("simulator", "gcs"))
+    walls = SafeSet((wall((-1.0, 0.0, 0.0), -5.0, 0.1),))
+    state, _ = tick(FlightState(), 100_000, announced=(SafeSetAnnouncement(ours, walls),))
+    state, _ = tick(state, 102_000, commands=(command(ARM, 1.0),))
+    kept, _ = tick(state, 104_000, announced=(SafeSetAnnouncement(theirs, SafeSet()),))
+    assert (kept.mission.owner, kept.mission.safe_set) == (ours, walls)
+    state, outputs = tick(state, 106_000, commands=(command(ARM, 0.0),))
+    assert not outputs.snapshot.armed
+    state, _ = tick(state, 108_000, announced=(SafeSetAnnouncement(theirs, SafeSet()),))
+    assert (state.mission.owner, state.mission.safe_set) == (theirs, SafeSet())

@@ -11,6 +11,9 @@ from hypothesis import strategies as st
 
 from fsw.flight.command_handlers import Decision, NewHeading, decide
 from fsw.flight.modes.base import CommandContext
+from fsw.shapes.ball import point
+from fsw.shapes.half_space import wall
+from fsw.shapes.vertical_cylinder import column
 from fsw.signals import (
     MAX_DISTANCE,
     ChangeSpeed,
@@ -30,13 +33,12 @@ from fsw.signals import (
     Orbit,
     Order,
     Place,
-    PointObstacle,
     SafeSet,
     SetHome,
     SetMissionStep,
     StartMission,
     TakeOff,
-    Wall,
+    Zone,
 )
 from tests.fsw.flight.asked import FLIGHT_MODES, ask
 from tests.fsw.flight.contexts import STANDING
@@ -281,7 +283,7 @@ def test_a_vehicle_in_the_air_is_not_disarmed_unless_forced(situation: CommandCo
 REQUEST = CommandRequest(0, (NAN,) * 7, 255, 190)
 HIGH = replace(HOLDING, position=(1.0, 2.0, -5.0), home=Home((0.0, 0.0, -0.5), 0.0))
 CIRCLE = FlyOrbit(Place((4.0, 6.0), 5.0), 2.0)
-WALLED = replace(HIGH, safe_set=SafeSet((Wall((-1.0, 0.0, 0.0), -10.0, 0.5),)))
+WALLED = replace(HIGH, safe_set=SafeSet((wall((-1.0, 0.0, 0.0), -10.0, 0.5),)))
 
 
 def decided(action: CommandAction, context: CommandContext = HIGH) -> Decision:
@@ -358,11 +360,11 @@ def test_a_circle_keeps_the_clearance_of_a_wall_with_its_nearest_point(
 ) -> None:
     decision = decided(FlyOrbit(Place((north, 0.0), 5.0), radius), WALLED)
     assert (decision.result == DENIED) is refused
-    assert ("wall 1" in decision.reason) is refused
+    assert ("zone 1" in decision.reason) is refused
 
 
 def test_a_circle_is_wider_than_a_slanted_wall_sees_it_only_along_the_ground() -> None:
-    slanted = replace(HIGH, safe_set=SafeSet((Wall((0.6, 0.0, -0.8), 0.0, 0.5),)))  # rises north
+    slanted = replace(HIGH, safe_set=SafeSet((wall((0.6, 0.0, -0.8), 0.0, 0.5),)))  # rises north
     assert decided(FlyOrbit(Place((0.0, 0.0), 5.0), 5.8), slanted).result == ACCEPTED
     assert decided(FlyOrbit(Place((0.0, 0.0), 5.0), 5.9), slanted).result == DENIED
 
@@ -370,22 +372,22 @@ def test_a_circle_is_wider_than_a_slanted_wall_sees_it_only_along_the_ground() -
 @pytest.mark.parametrize(
     ("obstacle", "refused"),
     [
-        (PointObstacle((6.4, 6.0, -5.0), 0.5), True),  # 0.4 m outside the circle
-        (PointObstacle((6.6, 6.0, -5.0), 0.5), False),
-        (PointObstacle((5.6, 6.0, -5.0), 0.5), True),  # as much inside
-        (PointObstacle((5.4, 6.0, -5.0), 0.5), False),
-        (PointObstacle((6.0, 6.0, -5.6), 0.5), False),  # above a point of it
-        (PointObstacle((6.0, 6.0, -4.6), 0.5), True),
-        (PointObstacle((6.0, 6.0, -9.0), 0.5, upright=True), True),  # at any height
-        (PointObstacle((4.0, 6.0, -5.0), 1.9), False),  # in the middle
+        (point((6.4, 6.0, -5.0), 0.5), True),  # 0.4 m outside the circle
+        (point((6.6, 6.0, -5.0), 0.5), False),
+        (point((5.6, 6.0, -5.0), 0.5), True),  # as much inside
+        (point((5.4, 6.0, -5.0), 0.5), False),
+        (point((6.0, 6.0, -5.6), 0.5), False),  # above a point of it
+        (point((6.0, 6.0, -4.6), 0.5), True),
+        (column((6.0, 6.0), 0.5), True),  # at any height
+        (point((4.0, 6.0, -5.0), 1.9), False),  # in the middle
     ],
 )
 def test_a_circle_keeps_clear_of_points_beside_above_and_inside(
-    obstacle: PointObstacle, refused: bool
+    obstacle: Zone, refused: bool
 ) -> None:
-    decision = decided(CIRCLE, replace(HIGH, safe_set=SafeSet(obstacles=(obstacle,))))
+    decision = decided(CIRCLE, replace(HIGH, safe_set=SafeSet((obstacle,))))
     assert (decision.result == DENIED) is refused
-    assert ("obstacle 1" in decision.reason) is refused
+    assert ("zone 1" in decision.reason) is refused
 
 
 @pytest.mark.parametrize(

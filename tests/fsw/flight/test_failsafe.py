@@ -20,8 +20,8 @@ from fsw.flight.failsafe import (
     active,
     report,
 )
-from fsw.flight.state import FlightState, OffboardMemory, PlanMemory, VehicleMemory
-from fsw.parameters.flight_config import FlightLimits, flight_config
+from fsw.flight.state import FlightState, OffboardMemory, PlanMemory, SafetyMemory, VehicleMemory
+from fsw.parameters.flight_config import FlightConfig, FlightLimits, flight_config
 from fsw.signals import BatteryState, Charge, Mode, Severity
 from tests.fsw.random_states import random_estimate
 
@@ -46,6 +46,8 @@ class Evidence:
     setpoint_age_us: int = 0
     gcs_silent_us: int = 0
     battery: BatteryState = field(default_factory=BatteryState)
+    safety: SafetyMemory = field(default_factory=SafetyMemory)
+    config: FlightConfig = CONFIG
 
     def context(self) -> FailsafeContext:
         heard_us = NOW_US - self.gcs_silent_us if self.gcs_silent_us >= 0 else -1
@@ -56,13 +58,16 @@ class Evidence:
             plan=PlanMemory(since_us=NOW_US - self.plan_age_us, refused=self.plan_refused),
             offboard=OffboardMemory(motion_us=NOW_US - self.setpoint_age_us),
             battery=self.battery,
+            safety=self.safety,
         )
         level = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, self.up)
         estimate = random_estimate(np.random.default_rng(1))._replace(t_us=NOW_US, R_WB=level)
-        return FailsafeContext(state, estimate, replace(CONFIG, limits=self.limits), MANUAL)
+        return FailsafeContext(state, estimate, replace(self.config, limits=self.limits), MANUAL)
 
 
 FINE = Evidence()
+OUTSIDE = SafetyMemory(breach_us=NOW_US, breach_by=0.0123)
+OFF_PLAN = SafetyMemory(off_plan_us=NOW_US, off_plan_by=0.0834)
 OFFBOARD = replace(FINE, mode=Mode.OFFBOARD, setpoint_age_us=500_000)
 
 
@@ -103,6 +108,8 @@ def test_nothing_wrong_is_no_condition() -> None:
         (replace(FINE, plan_age_us=3 * PERIOD_US + 1), Condition.PLAN_STALE),
         (replace(FINE, plan_refused=True), Condition.PLAN_REFUSED),
         (replace(FINE, output_replaced=True), Condition.OUTPUT_NOT_FINITE),
+        (replace(FINE, safety=OUTSIDE), Condition.BREACH),
+        (replace(FINE, safety=OFF_PLAN), Condition.TUBE_LEFT),
         (OFFBOARD, Condition.SETPOINTS_LOST),
         (replace(FINE, gcs_silent_us=10_000_000), Condition.DATALINK_LOST),
         (replace(FINE, battery=charged(Charge.LOW)), Condition.BATTERY_LOW),
@@ -186,6 +193,36 @@ def test_a_low_battery_is_acted_on_as_the_parameter_says(
     assert action(replace(context, mode=Mode.LAND)) is Action.WARN, "it lands already"
     returning = action(replace(context, mode=Mode.RETURN))
     assert returning is (Action.WARN if expected is Action.RETURN else expected)
+
+
+@pytest.mark.parametrize(
+    ("number", "expected"),
+    [(1, Action.WARN), (2, Action.HOLD), (5, Action.LAND), (6, Action.RETREAT)],
+)
+def test_a_breach_is_acted_on_as_the_parameter_says(number: int, expected: Action) -> None:
+    outside = replace(FINE, safety=OUTSIDE, limits=FlightLimits(breach_action=number))
+    assert action(outside) is expected
+    assert action(replace(outside, mode=Mode.LAND)) is Action.WARN, "it lands already"
+    soft = replace(outside, config=replace(CONFIG, soft=True))
+    assert action(soft) is Action.WARN, "it was to be flown all the same"
+    naive = replace(outside, config=replace(CONFIG, controller="naive"))
+    assert action(naive) is Action.WARN, "it has no barriers"
+    retreat = action(replace(FINE, safety=OUTSIDE))
+    assert (retreat, retreat.mode) == (Action.RETREAT, Mode.HOLD)
+
+
+def test_a_breach_and_a_departure_are_critical_texts_with_a_length() -> None:
+    for safety, words in (
+        (OUTSIDE, "failsafe: outside the safe set by 12 mm, retreating"),
+        (OFF_PLAN, "off the plan by 83 mm: replanning"),
+    ):
+        context = replace(FINE, safety=safety).context()
+        (row,) = active(context)
+        assert report(row, context, row.action(context)) == (Severity.CRITICAL, words)
+    warned = replace(FINE, safety=OUTSIDE, limits=FlightLimits(breach_action=1)).context()
+    (row,) = active(warned)
+    severity, text = report(row, warned, Action.WARN)
+    assert (severity, text) == (Severity.CRITICAL, "outside the safe set by 12 mm: warn")
 
 
 def test_a_report_names_the_condition_its_number_and_what_is_done() -> None:

@@ -13,48 +13,77 @@ from fsw.parameters.consistency import loop_tube
 from fsw.shapes.ball import point
 from fsw.shapes.half_space import wall
 from fsw.shapes.target_sphere import target_sphere
+from fsw.shapes.vertical_cylinder import vertical_cylinder
 from fsw.signals import (
     ConstraintKind,
     EndEffectorTarget,
+    MessageSource,
     MissionUpdate,
     SafeSet,
+    SafeSetAnnouncement,
     Severity,
     StatusText,
+    TickInputs,
+    Vec3,
     Zone,
 )
-from tests.fsw.flight.in_flight import CONFIG, vehicle_at
+from tests.fsw.flight.in_flight import CONFIG, limits, vehicle_at
+from tests.fsw.flight.test_autopilot import frame
 
 CHECK = SafeSetCheck(CONFIG)
 NORTH, SOUTH = wall((-1.0, 0.0, 0.0), -5.0, 0.1), wall((1.0, 0.0, 0.0), -5.0, 0.1)
 TREE = point((2.0, 2.0, -1.0), 0.3)
 SPHERE = target_sphere((0.0, 0.0, -0.225), 0.075)
+OWNER = MessageSource(1, 195, "simulator")
+STRANGER = MessageSource(1, 195, "api", "127.0.0.1:40001")  # who writes the owner's ids
 TINY = SafeSet((target_sphere((0.0, 0.0, -0.225), 0.001),))
 
 
 def received(
     memory: MissionMemory, announced: SafeSet | None = None, *, flies: bool = True,
-    check: SafeSetCheck = CHECK, **update: object,
+    check: SafeSetCheck = CHECK, source: MessageSource = OWNER, t_s: float = 1.0,
+    at: Vec3 = (0.0, 0.0, -1.0), **update: object,
 ) -> tuple[MissionMemory, list[StatusText]]:  # fmt: skip
     texts: list[StatusText] = []
     uploaded = MissionUpdate(**update) if update else None  # type: ignore[arg-type]
-    return check.update(memory, uploaded, announced, texts, flies=flies), texts
+    heard = () if announced is None else (SafeSetAnnouncement(source, announced),)
+    sensors = frame(round(1e6 * t_s))
+    inputs = TickInputs(sensors, announced=heard, mission=uploaded)
+    return check.update(memory, inputs, vehicle_at(at), texts, flies=flies), texts
+
+
+def refused(texts: list[StatusText]) -> str:
+    """The text of a refusal, and there is no other text."""
+    (text,) = texts
+    assert text.severity is Severity.CRITICAL
+    assert "refused" in text.text
+    return text.text
+
+
+def told(texts: list[StatusText]) -> list[str]:
+    """What was told of changes, beside the findings of the analysis."""
+    assert {text.severity for text in texts} == {Severity.INFO}
+    return [text.text for text in texts if "safe set" in text.text]
+
+
+def walled(*offsets: float, clearance: float = 0.1) -> SafeSet:
+    """A wall north and one south, at these distances."""
+    normals = ((-1.0, 0.0, 0.0), (1.0, 0.0, 0.0))
+    return SafeSet(tuple(wall(n, -d, clearance) for n, d in zip(normals, offsets, strict=True)))
 
 
 def test_what_is_announced_and_the_fence_are_in_force_together() -> None:
     memory, _ = received(MissionMemory(), SafeSet((NORTH,)))
     assert memory.safe_set == memory.announced == SafeSet((NORTH,))
-    memory, _ = received(
-        memory,
-        fence=SafeSet((SOUTH, TREE)),
-    )
+    memory, _ = received(memory, fence=SafeSet((SOUTH, TREE)))
     assert memory.safe_set == SafeSet((NORTH, SOUTH, TREE))
     assert memory.announced == SafeSet((NORTH,))
     memory, _ = received(memory, SafeSet())
     assert memory.safe_set == SafeSet((SOUTH, TREE))
     memory, texts = received(memory, rally=((1.0, 2.0),))
+    assert texts == []
     assert memory.rally == ((1.0, 2.0),)
     assert memory.safe_set == SafeSet((SOUTH, TREE))
-    assert texts == []
 
 
 def test_joined_keeps_everything_of_both_in_order() -> None:
@@ -74,12 +103,12 @@ def test_a_sphere_is_kept_beside_anything_else(beside: tuple[Zone, ...]) -> None
 
 def test_in_flight_one_that_cannot_be_kept_is_refused_once_and_the_old_one_kept() -> None:
     start, _ = received(MissionMemory(), SafeSet((NORTH,)))
-    memory, texts = received(start, TINY, rally=((3.0, 4.0),), fence=SafeSet())
+    memory, texts = received(start, TINY, rally=((3.0, 4.0),))
     assert memory.safe_set == SafeSet((NORTH,))
     assert memory.announced == SafeSet((NORTH,))
-    assert memory.refused_set == TINY
+    assert memory.refused == SafeSetAnnouncement(OWNER, TINY)
     assert memory.rally == ((3.0, 4.0),)
-    assert texts[-1].text == "safe set refused: the old one is kept"
+    assert texts[-1].text.startswith("safe set refused: the old one is kept")
     assert all(text.severity in (Severity.WARNING, Severity.INFO) for text in texts)
     again, texts = received(memory, TINY)
     assert (again.safe_set, texts) == (SafeSet((NORTH,)), [])
@@ -138,3 +167,143 @@ def test_a_moving_set_that_cannot_be_kept_is_refused_once_and_stays_refused() ->
     assert memory.safe_set == SafeSet((NORTH,))
     assert first
     assert second == []
+
+
+def test_a_stranger_in_flight_may_shrink_what_is_announced_and_is_named() -> None:
+    memory, texts = received(MissionMemory(), walled(5.0, 5.0))
+    assert told(texts) == ["safe set of 1/195 (simulator): 2 half-spaces; it owns the safe set now"]
+    memory, texts = received(memory, walled(4.0, 5.0), source=STRANGER)
+    assert memory.safe_set == memory.announced == walled(4.0, 5.0)
+    assert memory.owner == OWNER
+    assert told(texts) == ["safe set of 1/195 (api 127.0.0.1:40001): 2 half-spaces"]
+
+
+@pytest.mark.parametrize("flies", [True, False])
+@pytest.mark.parametrize(
+    ("wanted", "why"),
+    [
+        (walled(5.0286, 5.0), "zone 1 (half-space) moves out by 28.6 mm"),
+        (walled(4.0, 5.001), "zone 2 (half-space) moves out by 1.0 mm"),
+        (walled(5.0, 5.0, clearance=0.09), "zone 1 (half-space) loses 10.0 mm of clearance"),
+        (SafeSet((NORTH,)), "zone 2 (half-space) is removed, moved or turned"),
+        (SafeSet(), "zone 1 (half-space) is removed, moved or turned"),
+    ],
+)
+def test_a_stranger_may_not_grow_it_and_is_told_so_once(
+    wanted: SafeSet, why: str, flies: bool
+) -> None:
+    memory, _ = received(MissionMemory(), walled(5.0, 5.0))
+    after, texts = received(memory, wanted, source=STRANGER, flies=flies)
+    assert (after.safe_set, after.announced) == (memory.safe_set, memory.announced)
+    text = refused(texts)
+    assert f"of {STRANGER} refused: {why}" in text
+    assert f"which {OWNER} owns" in text
+    again, texts = received(after, wanted, source=STRANGER, flies=flies)
+    assert (again.safe_set, texts) == (memory.safe_set, [])
+
+
+def test_the_owner_grows_it_in_flight_and_repeats_it_without_a_word() -> None:
+    memory, _ = received(MissionMemory(), walled(5.0, 5.0))
+    memory, texts = received(memory, walled(9.0, 5.0))
+    assert memory.safe_set == walled(9.0, 5.0)
+    assert told(texts) == ["safe set of 1/195 (simulator): 2 half-spaces"]
+    again, texts = received(memory, walled(9.0, 5.0), t_s=2.0)
+    assert (again.safe_set, texts) == (memory.safe_set, [])
+    assert again.owner_heard_us == 2_000_000
+
+
+def test_a_zone_that_moves_is_told_of_once_however_often_it_is_updated() -> None:
+    def person(north: float, t_us: int, clearance: float = 0.3) -> SafeSet:
+        at = vertical_cylinder((north, 3.0), 0.25, -1.8, 0.0)
+        return SafeSet((NORTH, Zone(at, clearance, velocity=(0.5, 0.0, 0.0), t_us=t_us)))
+
+    memory, texts = received(MissionMemory(), person(0.0, 1_000_000))
+    assert "vertical cylinder" in told(texts)[-1]
+    for k in range(2, 5):
+        memory, texts = received(memory, person(0.4 * k, k * 1_000_000), t_s=k)
+        assert memory.safe_set == person(0.4 * k, k * 1_000_000)
+        assert [text for text in texts if "safe set" in text.text] == []
+    memory, texts = received(memory, person(2.0, 5_000_000, clearance=0.2), t_s=5.0)
+    assert len(told(texts)) == 1
+    after, texts = received(memory, person(2.0, 6_000_000, clearance=0.2), source=STRANGER)
+    assert after.safe_set == memory.safe_set
+    assert "zone 2 (vertical cylinder)" in refused(texts)
+
+
+def test_a_repetition_of_the_owner_does_not_take_back_what_another_source_shrank() -> None:
+    memory, _ = received(MissionMemory(), walled(5.0, 5.0))
+    memory, _ = received(memory, walled(3.0, 5.0), source=STRANGER)
+    memory, texts = received(memory, walled(5.0, 5.0))
+    assert (memory.safe_set, texts) == (walled(3.0, 5.0), [])
+    memory, _ = received(memory, walled(5.0, 5.001))
+    assert memory.safe_set == walled(5.0, 5.001), "what it has not said before counts"
+
+
+def test_a_stranger_cannot_shut_the_vehicle_out_in_flight() -> None:
+    memory, _ = received(MissionMemory(), walled(5.0, 5.0))
+    after, texts = received(memory, walled(1.0, 5.0), source=STRANGER, at=(0.95, 0.0, -1.0))
+    assert after.safe_set == memory.safe_set
+    assert "not inside" in refused(texts)
+    after, _ = received(memory, walled(1.0, 5.0), at=(0.95, 0.0, -1.0))
+    assert after.safe_set == walled(1.0, 5.0), "the owner can"
+
+
+def test_on_the_ground_another_source_takes_over_once_the_owner_is_silent() -> None:
+    first, _ = received(MissionMemory(), walled(5.0, 5.0), t_s=1.0, flies=False)
+    late = 1.0 + 1e-6 * CONFIG.limits.owner_timeout_us
+    early, texts = received(first, SafeSet(), source=STRANGER, t_s=late - 0.01, flies=False)
+    assert "refused" in refused(texts)
+    aloft, _ = received(first, SafeSet(), source=STRANGER, t_s=late)
+    assert aloft.owner == OWNER, "in flight an owner that is silent stays one"
+    after, texts = received(early, SafeSet(), source=STRANGER, t_s=late, flies=False)
+    assert (after.owner, after.safe_set) == (STRANGER, SafeSet())
+    assert texts[-1].text.endswith("it owns the safe set now")
+    _, texts = received(after, walled(5.0, 5.0), t_s=late + 1.0, flies=False)
+    assert texts[-1].severity is Severity.INFO, "walls are a shrink of nothing"
+
+
+def test_once_it_has_disarmed_another_source_takes_over_at_once() -> None:
+    memory, _ = received(MissionMemory(), walled(5.0, 5.0))
+    memory = replace(memory, owner_heard_us=-1)
+    aloft, _ = received(memory, SafeSet(), source=STRANGER)
+    assert aloft.owner == OWNER
+    after, _ = received(memory, SafeSet(), source=STRANGER, flies=False)
+    assert (after.owner, after.safe_set) == (STRANGER, SafeSet())
+
+
+def test_a_chosen_owner_is_one_whoever_was_first() -> None:
+    check = SafeSetCheck(limits(safe_set_owner=255))
+    chosen = MessageSource(255, 190, "gcs", "127.0.0.1:40002")
+    memory, texts = received(MissionMemory(), walled(5.0, 5.0), check=check)
+    assert (memory.safe_set, memory.owner) == (walled(5.0, 5.0), None)
+    memory, texts = received(memory, SafeSet(), check=check)
+    assert "which no source owns" in refused(texts)
+    memory, _ = received(memory, SafeSet(), check=check, source=chosen)
+    assert (memory.safe_set, memory.owner) == (SafeSet(), chosen)
+
+
+def test_one_sender_has_one_address_unless_signatures_vouch_for_it() -> None:
+    here = MessageSource(255, 190, "gcs", "127.0.0.1:1")
+    there = replace(here, address="127.0.0.1:2")
+    assert here.is_same(here)
+    assert not here.is_same(None)
+    assert not here.is_same(there)
+    assert not here.is_same(replace(here, link="api"))
+    assert not here.is_same(replace(here, system=254))
+    assert not here.is_same(replace(here, component=191))
+    assert replace(here, signed=True).is_same(replace(there, signed=True))
+    assert not here.is_same(replace(here, signed=True))
+
+
+def test_in_flight_a_fence_is_grown_by_its_uploader_only() -> None:
+    theirs = {"source": OWNER, "fence_source": STRANGER}
+    memory, _ = received(MissionMemory(), fence=walled(5.0, 5.0), fence_source=OWNER)
+    after, texts = received(memory, fence=SafeSet(), **theirs)
+    assert after.fence == walled(5.0, 5.0)
+    assert f"fence of {STRANGER} refused" in refused(texts)
+    after, _ = received(memory, fence=walled(4.0, 5.0), **theirs)
+    assert (after.fence, after.fence_owner) == (walled(4.0, 5.0), OWNER)
+    after, _ = received(after, fence=SafeSet(), fence_source=OWNER)
+    assert after.safe_set == SafeSet()
+    ground, _ = received(memory, fence=SafeSet(), flies=False, **theirs)
+    assert (ground.fence, ground.fence_owner) == (SafeSet(), STRANGER)

@@ -11,6 +11,7 @@ from fsw.flight.plan_exchange import nominal_at_rest
 from fsw.flight.state import FlightState
 from fsw.flight.tuned_autopilot import TunedAutopilot
 from fsw.parameters.flight_config import FlightConfig
+from fsw.shapes.half_space import wall
 from fsw.signals import (
     Mode,
     SafeSet,
@@ -19,7 +20,6 @@ from fsw.signals import (
     TickInputs,
     TickOutputs,
     Vec3,
-    Wall,
 )
 from fsw.tuning import Tuning, tuned
 from tests.fsw.flight.in_flight import CONFIG, flying, vehicle_at
@@ -28,7 +28,7 @@ STILL: Vec3 = (0.0, 0.0, 0.0)
 HERE: Vec3 = (0.0, 0.0, -5.0)
 SLOW: Tuning = (("limits.climb_speed", 0.2), ("planner.weights.tracking", 12.0))
 UNSAFE: Tuning = (("planner.walls.lambda_", 0.1),)
-WALLED = SafeSet((Wall((-1.0, 0.0, 0.0), -50.0, 0.1),))
+WALLED = SafeSet((wall((-1.0, 0.0, 0.0), -50.0, 0.1),))
 SOFT = replace(CONFIG, soft=True)
 
 

@@ -12,7 +12,7 @@ import pytest
 from fsw.link.inbox import Inbox
 from fsw.link.sim_link import Pacing, SimLink
 from fsw.link.wire import message_ids as ids
-from fsw.signals import CommandAck, Mode, SafeSet, Shape
+from fsw.signals import CommandAck, MessageSource, Mode, SafeSet, Shape
 from messages.frames import FrameWriter, split
 from sitl.link.encode import StepEncoder
 from sitl.link.pilot import Phase, PilotState, flight_plan, speak
@@ -109,8 +109,9 @@ def test_walls_and_points_arrive_as_the_pilot_announces_them(wire: Wire) -> None
     _, messages = speak(plan, PilotState(Phase.IDLE), 1_000_000)
     wire.send(StepEncoder(lockstep=True).datagram(readings(1_002_000), messages))
     assert wire.link.wait_for_step() is not None
-    safe_set = wire.inbox.take().safe_set
-    assert safe_set is not None
+    (announced,) = wire.inbox.take().announced
+    assert announced.source == MessageSource(1, 195, "simulator")
+    safe_set = announced.safe_set
     assert safe_set == simulated(scenario)
     kinds = [zone.shape.kind for zone in safe_set.zones]
     assert kinds == ["half-space", *["ball"] * 4, "box", "target sphere"]

@@ -13,6 +13,7 @@ from fsw.flight.modes.base import Handover
 from fsw.flight.modes.mission import Mission, left, motion_limits, with_update
 from fsw.flight.state import FlightState
 from fsw.mpc.reference import still_at
+from fsw.shapes.half_space import wall
 from fsw.signals import (
     EndEffectorTarget,
     MissionAction,
@@ -23,7 +24,6 @@ from fsw.signals import (
     SafeSet,
     Severity,
     Vec3,
-    Wall,
 )
 from tests.fsw.flight.in_flight import CONFIG, GROUND_Z, flying, limits, vehicle_at
 
@@ -108,7 +108,7 @@ def test_the_reference_keeps_the_safe_set() -> None:
     state = ticks(under_way(GO), 3)
     late = 10**9
     assert MISSION.reference(state, late).p_WE == pytest.approx((1.0, 0.0, -2.0))
-    fenced = SafeSet((Wall((-1.0, 0.0, 0.0), -0.6, 0.1),))
+    fenced = SafeSet((wall((-1.0, 0.0, 0.0), -0.6, 0.1),))
     state = replace(state, mission=replace(state.mission, safe_set=fenced))
     assert MISSION.reference(state, late).p_WE == pytest.approx((0.5, 0.0, -2.0))
 

@@ -100,12 +100,12 @@ def test_a_target_in_another_frame_or_without_position_is_refused(fields: dict[s
 def test_walls_arrive_as_one_set_in_any_order() -> None:
     inbox = Inbox()
     inbox.accept(wall(1, 2, offset=-2.0))
-    assert inbox.take().safe_set is None
+    assert inbox.take().announced == []
     inbox.accept(wall(0, 2, offset=-1.0))
-    safe_set = inbox.take().safe_set
-    assert safe_set is not None
+    (announced,) = inbox.take().announced
+    safe_set = announced.safe_set
     assert [one.shape.numbers[3] for one in safe_set.zones] == [-1.0, -2.0]
-    assert inbox.take().safe_set is None
+    assert inbox.take().announced == []
 
 
 def test_walls_of_two_sets_do_not_mix() -> None:
@@ -113,22 +113,22 @@ def test_walls_of_two_sets_do_not_mix() -> None:
     inbox.accept(wall(0, 2))
     inbox.accept(wall(0, 3))
     inbox.accept(wall(1, 2))
-    assert inbox.take().safe_set is None
+    assert inbox.take().announced == []
 
 
 def test_walls_and_points_are_one_set() -> None:
     inbox = Inbox()
     inbox.accept(point(2, 3))
     inbox.accept(wall(0, 3))
-    assert inbox.take().safe_set is None
+    assert inbox.take().announced == []
     inbox.accept(point(1, 3, **{"position[0]": 7.0}))
-    safe_set = inbox.take().safe_set
-    assert safe_set is not None
+    (announced,) = inbox.take().announced
+    safe_set = announced.safe_set
     assert [one.shape.kind for one in safe_set.zones] == ["half-space", "ball", "ball"]
     assert [one.shape.numbers[0] for one in safe_set.zones[1:]] == [7.0, 2.0]
     inbox.accept(wall(0, 1))
-    safe_set = inbox.take().safe_set
-    assert safe_set is not None
+    (announced,) = inbox.take().announced
+    safe_set = announced.safe_set
     assert [one.shape.kind for one in safe_set.zones] == ["half-space"]
 
 
@@ -140,7 +140,7 @@ def test_walls_and_points_are_one_set() -> None:
 def test_a_point_that_keeps_nothing_away_is_refused(bad: dict[str, float]) -> None:
     inbox = Inbox()
     inbox.accept(point(**{"index": 0, "count": 1, **bad}))  # type: ignore[arg-type]
-    assert inbox.take().safe_set is None
+    assert inbox.take().announced == []
     assert inbox.refused == 1
 
 
@@ -151,7 +151,7 @@ def test_a_point_that_keeps_nothing_away_is_refused(bad: dict[str, float]) -> No
 def test_a_wall_that_is_no_plane_is_refused(bad: dict[str, float]) -> None:
     inbox = Inbox()
     inbox.accept(wall(0, 1, **bad))
-    assert inbox.take().safe_set is None
+    assert inbox.take().announced == []
     assert inbox.refused == 1
 
 
@@ -283,7 +283,7 @@ def test_a_shape_for_another_vehicle_is_not_ours() -> None:
 def test_a_sphere_that_contains_nothing_is_refused(radius: float) -> None:
     inbox = Inbox()
     inbox.accept(frame(ids.WORKSPACE_SPHERE, radius=radius))
-    assert inbox.take().safe_set is None
+    assert inbox.take().announced == []
     assert inbox.refused == 1
 
 

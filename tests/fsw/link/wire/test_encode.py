@@ -108,6 +108,7 @@ TELLING: dict[int, dict[str, Any]] = {
     ids.BARRIER_MARGIN: {
         "margin_min": 0.2, "margin_min_index": 1, "count": 3, "constraint_kind": 1,
         "active_mask": 0b010, "slack_max": 0.25,
+        "breaches": 3, "departures": 5, "interventions": 7,
     },
     ids.MPC_STATUS: {
         "plan_id": 7, "total_us": 703, "linearise_us": 101, "solve_us": 502, "budget_us": 10_000,
@@ -332,9 +333,7 @@ def test_disarmed_no_pulse_is_sent() -> None:
     assert outputs.servo1_raw == outputs.servo5_raw == 0
 
 
-def test_margins_of_three_points_are_all_sent_while_they_fit_else_one_a_zone() -> (
-    None
-):
+def test_margins_of_three_points_are_all_sent_while_they_fit_else_one_a_zone() -> None:
     kind = ConstraintKind.WALLS
     five = ConstraintReport(kind, tuple(range(1, 16)), tuple(range(15)), (3,) * 5)
     assert five.shown(16) == (five.margins, five.barrier, 0)

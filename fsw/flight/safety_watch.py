@@ -1,0 +1,115 @@
+"""Watches what the analysis promised: the tube around the plan, and the margins of the safe set.
+
+Leaving the tube means that the world is not as assumed: the disturbance is larger, the rotors are
+slower, something holds the arm. Then the next plan starts from the measurement. A negative margin
+is a breach. Both are episodes with hysteresis, so that each is told and acted on once.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from fsw.control.tube import Tube
+from fsw.flight.land_detector import height_above_ground
+from fsw.flight.state import SafetyMemory
+from fsw.parameters.consistency import base_reach
+from fsw.parameters.flight_config import FlightConfig
+from fsw.signals import ConstraintReport, PredictionState, StateEstimate
+
+# m, beyond the tube. The observer's velocity noise and the position's own, 1 mm rms each in the
+# simulator and in motion capture, move the base by 2 mm rms against its estimate; five times that.
+NOISE_ROOM = 0.01
+_LEAST_TUBE = 0.05  # m: where no disturbance is expected, the loop is not perfect all the same
+_BACK = 0.5  # of the tube's radius: closer than this the vehicle is on its plan again
+_BACK_US = 500_000  # for as long
+_CLEAR = 0.01  # m of margin that end a breach
+_CLEAR_US = 500_000
+_FILTER_US = 1_000_000  # of silence end an intervention of the filter
+
+
+class SafetyWatch:
+    """The watch of one configuration."""
+
+    def __init__(self, config: FlightConfig, loop: Tube) -> None:
+        self._config = config
+        follows_state = config.inner == "tracking"
+        reach = base_reach(loop, config.surroundings) + NOISE_ROOM
+        # The other loop follows no state: only an upset takes it off its plan.
+        self.radius = max(reach, _LEAST_TUBE) if follows_state else config.upset_distance
+        self._back = _BACK * self.radius
+
+    def off_plan(
+        self, memory: SafetyMemory, estimate: StateEstimate, nominal: PredictionState | None
+    ) -> SafetyMemory:
+        """Compare the base with where the running plan has it now; None: nothing is flown."""
+        if nominal is None:
+            return memory if memory.off_plan_us < 0 else replace(memory, off_plan_us=-1)
+        (x, y, z), (px, py, pz) = estimate.p_WB, nominal.p
+        dx, dy, dz, most = x - px, y - py, z - pz, self.radius
+        if (
+            memory.off_plan_us < 0
+            and -most <= dx <= most
+            and -most <= dy <= most
+            and (-most <= dz <= most or self._is_low(estimate))
+        ):
+            return memory
+        away = max(abs(dx), abs(dy), 0.0 if self._is_low(estimate) else abs(dz))
+        now_us = estimate.t_us
+        if not away <= most:
+            if memory.off_plan_us >= 0:
+                return replace(memory, off_plan_us=now_us, replan=True)
+            counters = replace(memory.counters, departures=memory.counters.departures + 1)
+            return replace(
+                memory, off_plan_us=now_us, off_plan_by=away, replan=True, counters=counters
+            )
+        if away > self._back:
+            return replace(memory, off_plan_us=now_us)
+        ended = now_us - memory.off_plan_us >= _BACK_US
+        return replace(memory, off_plan_us=-1) if ended else memory
+
+    def breach(
+        self,
+        memory: SafetyMemory,
+        estimate: StateEstimate,
+        report: ConstraintReport,
+        *,
+        flies: bool,
+    ) -> SafetyMemory:
+        """Look at all margins of the safe set, once a planning period."""
+        if not flies or not report.margins:
+            return memory if memory.breach_us < 0 else replace(memory, breach_us=-1)
+        least = min(report.margins)
+        if math.isnan(sum(report.margins)):
+            least = -math.inf  # which no comparison with NaN would find
+        return self.margin(memory, estimate.t_us, least)
+
+    def margin(self, memory: SafetyMemory, now_us: int, least: float) -> SafetyMemory:
+        """Look at the ``least`` margin [m] that is known now."""
+        if not least >= 0.0:
+            if memory.breach_us >= 0:
+                return replace(memory, breach_us=now_us)
+            counters = replace(memory.counters, breaches=memory.counters.breaches + 1)
+            return replace(memory, breach_us=now_us, breach_by=-least, counters=counters)
+        if memory.breach_us < 0:
+            return memory
+        if least < _CLEAR:
+            return replace(memory, breach_us=now_us)
+        ended = now_us - memory.breach_us >= _CLEAR_US
+        return replace(memory, breach_us=-1) if ended else memory
+
+    def filtered(self, memory: SafetyMemory, now_us: int, *, pushed: bool) -> SafetyMemory:
+        """Note whether the safety filter changed the acceleration of this tick."""
+        if pushed:
+            if memory.filter_us >= 0:
+                return replace(memory, filter_us=now_us)
+            counters = replace(memory.counters, interventions=memory.counters.interventions + 1)
+            return replace(memory, filter_us=now_us, counters=counters)
+        if memory.filter_us < 0 or now_us - memory.filter_us < _FILTER_US:
+            return memory
+        return replace(memory, filter_us=-1)
+
+    def _is_low(self, estimate: StateEstimate) -> bool:
+        """On the ground, where the plan may well be lower than the vehicle can be."""
+        config = self._config
+        return height_above_ground(config, estimate) < config.limits.airborne_height

@@ -1,0 +1,120 @@
+"""Off the plan and outside the safe set: when an episode begins, how it ends, what is counted."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from fsw.flight.plan_exchange import nominal_at_rest
+from fsw.flight.safety_watch import NOISE_ROOM, SafetyWatch
+from fsw.flight.state import SafetyMemory
+from fsw.parameters.consistency import base_reach, loop_tube
+from fsw.parameters.flight_config import flight_config
+from fsw.signals import ConstraintReport, SafetyCounters, Vec3
+from tests.fsw.flight.in_flight import CONFIG, GROUND_Z, vehicle_at
+
+TUBE = loop_tube(CONFIG)
+WATCH = SafetyWatch(CONFIG, TUBE)
+R = WATCH.radius
+HERE: Vec3 = (1.0, -2.0, -3.0)
+CALM = SafetyMemory()
+TICK_US = 2_000
+
+
+def away(memory: SafetyMemory, offset: Vec3, t_s: float = 1.0, here: Vec3 = HERE) -> SafetyMemory:
+    """The memory after a tick with the vehicle off its plan."""
+    plan = nominal_at_rest(vehicle_at(here))
+    p = (here[0] + offset[0], here[1] + offset[1], here[2] + offset[2])
+    return WATCH.off_plan(memory, vehicle_at(p, t_us=round(1e6 * t_s)), plan)
+
+
+def margins(memory: SafetyMemory, least: float, t_s: float = 1.0) -> SafetyMemory:
+    report = ConstraintReport(margins=(0.5, least, 0.3))
+    return WATCH.breach(memory, vehicle_at(HERE, t_us=round(1e6 * t_s)), report, flies=True)
+
+
+def test_the_tube_is_the_one_that_the_analysis_prints_and_room_for_noise() -> None:
+    assert pytest.approx(base_reach(TUBE, CONFIG.surroundings) + NOISE_ROOM) == R
+    # Closer to a wall than the plan may come, replanning would be of no use.
+    assert 0.05 < R < 0.086
+    still = replace(CONFIG, surroundings=replace(CONFIG.surroundings, disturbance=0.0))
+    assert SafetyWatch(still, TUBE).radius == pytest.approx(0.05)
+    pid = flight_config(inner="pid")
+    assert SafetyWatch(pid, TUBE).radius == pid.upset_distance
+
+
+@pytest.mark.parametrize("axis", range(3))
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_it_has_left_the_tube_beyond_its_radius_on_any_axis(axis: int, sign: float) -> None:
+    def offset(by: float) -> Vec3:
+        x, y, z = (sign * by if k == axis else 0.0 for k in range(3))
+        return x, y, z
+
+    assert away(CALM, offset(0.999 * R)) is CALM
+    left = away(CALM, offset(1.001 * R))
+    assert left.off_plan_us == 1_000_000
+    assert left.off_plan_by == pytest.approx(1.001 * R)
+    assert left.replan
+    assert left.counters == SafetyCounters(departures=1)
+
+
+def test_what_is_no_number_has_left_it() -> None:
+    assert away(CALM, (float("nan"), 0.0, 0.0)).off_plan_us >= 0
+
+
+def test_on_the_ground_the_plan_may_be_lower() -> None:
+    assert away(CALM, (0.0, 0.0, -2.0 * R), here=(0.0, 0.0, GROUND_Z + R)) is CALM
+    assert away(CALM, (2.0 * R, 0.0, 0.0), here=(0.0, 0.0, GROUND_Z)).off_plan_us >= 0
+
+
+def test_an_episode_is_one_until_it_has_been_on_its_plan_for_a_while() -> None:
+    memory = away(CALM, (1.1 * R, 0.0, 0.0), 1.0)
+    for t_s, by in ((1.1, 0.9), (1.2, 1.2), (1.3, 0.4), (1.7, 0.6), (1.9, 0.1)):
+        memory = away(memory, (by * R, 0.0, 0.0), t_s)
+        assert memory.off_plan_us >= 0
+    assert memory.counters.departures == 1
+    memory = away(memory, (0.1 * R, 0.0, 0.0), 2.19)
+    assert memory.off_plan_us >= 0, "0.5 s from when it was last away"
+    memory = away(memory, (0.1 * R, 0.0, 0.0), 2.2)
+    assert memory.off_plan_us == -1
+    assert away(memory, (1.1 * R, 0.0, 0.0), 3.0).counters.departures == 2
+
+
+def test_each_time_it_is_out_it_plans_anew() -> None:
+    memory = replace(away(CALM, (1.1 * R, 0.0, 0.0), 1.0), replan=False)
+    assert not away(memory, (0.9 * R, 0.0, 0.0), 1.1).replan
+    assert away(memory, (1.1 * R, 0.0, 0.0), 1.1).replan
+
+
+def test_without_a_plan_there_is_nothing_to_leave() -> None:
+    assert WATCH.off_plan(CALM, vehicle_at(HERE), None) is CALM
+    left = away(CALM, (1.1 * R, 0.0, 0.0))
+    assert WATCH.off_plan(left, vehicle_at(HERE), None).off_plan_us == -1
+
+
+def test_a_negative_margin_is_a_breach_and_counted_once() -> None:
+    assert margins(CALM, 0.0) is CALM
+    memory = margins(CALM, -0.003)
+    assert (memory.breach_us, memory.breach_by) == (1_000_000, 0.003)
+    for t_s, least in ((1.1, 0.002), (1.2, -0.02), (1.3, 0.009), (1.4, 0.011), (1.7, 0.02)):
+        memory = margins(memory, least, t_s)
+        assert memory.breach_us >= 0
+    assert memory.counters == SafetyCounters(breaches=1)
+    memory = margins(memory, 0.011, 1.8)
+    assert memory.breach_us == -1
+    assert margins(memory, -0.001, 2.0).counters.breaches == 2
+
+
+def test_a_margin_that_is_no_number_is_a_breach() -> None:
+    assert margins(CALM, float("nan")).breach_us >= 0
+
+
+@pytest.mark.parametrize(("report", "flies"), [((-0.1,), False), ((), True)])
+def test_on_the_ground_or_without_zones_there_is_no_breach(
+    report: tuple[float, ...], flies: bool
+) -> None:
+    constraints = ConstraintReport(margins=report)
+    assert WATCH.breach(CALM, vehicle_at(HERE), constraints, flies=flies) is CALM
+    outside = margins(CALM, -0.1)
+    assert WATCH.breach(outside, vehicle_at(HERE), constraints, flies=flies).breach_us == -1
