@@ -77,7 +77,8 @@ def settings(
 ) -> Array:
     """What the kernels need to know besides geometry (19,) [SI]; arguments as of ``ZoneRows``.
 
-    ``period`` [s] is the planner's, ``first_node`` [1] the first with rows.
+    ``period`` [s] is the planner's, ``first_node`` [1] the first with rows; ``tightening`` [m],
+    ``most`` [m/s^2, rad/s^2].
     """
     numbers = [entry for tuning in tunings for entry in tuning.numbers(period)]
     return np.array([distances, tightening, first_node, *most, *numbers], dtype=np.float64)
@@ -300,9 +301,10 @@ def fill_starts(
 ) -> None:
     """The least value of each zone and part at one instant: h [m/s], or the distance [m].
 
-    ``zones``, ``probes`` and ``settings`` are numbers [SI], ``frame`` (FRAME,) [SI] the vehicle;
+    ``zones`` (zones, 23) [SI], ``probes`` (probes, 12) [SI] and ``settings`` (19,) [SI] are numbers
+    as in ``fsw.shapes.zones``, ``fsw.model.body`` and above, ``frame`` (FRAME,) [SI] the vehicle;
     ``shift`` (zones, 3) [m, NED] and ``speed`` (zones, 3) [m/s, NED] those of the zones. Into
-    ``starts`` (zones x parts,), zone by zone; a zone that follows the target has one entry.
+    ``starts`` (zones x parts,) [SI], zone by zone; a zone that follows the target has one entry.
     """
     starts[:] = math.inf
     first = 0
@@ -331,9 +333,10 @@ def nearest_place(
 ) -> tuple[Vec3, Surface, bool]:
     """The place of a probe that counts against a plane of a zone, and that plane.
 
-    ``zones``, ``probes`` and ``frame`` [SI] are as in ``fill_starts``, the zones moved by ``shift``
-    (zones, 3) [m, NED]; ``which`` [1] of the planes. The place is given where it is on its part
-    [m]. False: this probe says nothing that another does not say.
+    ``zones`` (zones, 23) [SI], ``probes`` (probes, 12) [SI] and ``frame`` (FRAME,) [SI] are as in
+    ``fill_starts``, the zones moved by ``shift`` (zones, 3) [m, NED]; ``which`` [1] of the planes.
+    The place is given where it is on its part [m]. False: this probe says nothing that another does
+    not say.
     """
     form = probes[probe, FORM]
     if form == CAPSULE:

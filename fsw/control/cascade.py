@@ -187,7 +187,7 @@ class Cascade:
         ticks: int = 1,
         zones: NDArray[np.float64] = NO_ZONES,
     ) -> tuple[ActuatorCommand, CascadeMemory, Guarded]:
-        """See ``close_loops``, of which this is the machine code."""
+        """See ``close_loops``, of which this is the machine code; ``zones`` (zones, k) [SI]."""
         sent, rotors, believed, mass, integrals, joints, off_plan, guarded = self._close_loops(
             self._packed, memory, estimate, plan, u, ticks, zones
         )
@@ -211,7 +211,7 @@ def close_loops(
     """One tick, or several at once where some were missed.
 
     Returns the actuator command, not yet gated, the memory to pass back after sending, and what the
-    safety filter found about the ``zones``, those of ``moving_zones`` [SI].
+    safety filter found about the ``zones`` (zones, k) [SI], those of ``moving_zones``.
     """
     airframe, tuning, dt = law.airframe, law.tuning, law.dt
     rotors, observed = memory.rotors, memory.observed

@@ -124,11 +124,11 @@ def filtered(
     a: Vec3,
     wanted: Vec3,
 ) -> tuple[Vec3, bool, float]:
-    """The acceleration [m/s^2, NED] nearest to the one ``wanted`` [m/s^2] that keeps the condition.
+    """The acceleration nearest to the ``wanted`` [m/s^2, NED] one that keeps the condition.
 
-    ``zones`` are those of ``moving_zones``, ``v`` [m/s, NED] and ``a`` [m/s^2, NED] the body's own
-    now, disturbance included. Also says whether the wanted one was changed, and the least margin
-    [m] of all parts, infinite where no zone is near.
+    ``zones`` (zones, k) [SI] are those of ``moving_zones``, ``v`` [m/s, NED] and ``a`` [m/s^2, NED]
+    the body's own now, disturbance included. Also says whether the wanted one was changed, and the
+    least margin [m] of all parts, infinite where no zone is near.
     """
     changed, margin = False, math.inf
     for _ in range(_PASSES):

@@ -114,7 +114,7 @@ class SafeSetCheck:
         becomes_owner = owns and not source.is_same(owner)
         if announcement in mission.accepted and not becomes_owner:
             return mission  # in case a datagram was lost
-        repeated = announcement == mission.refused
+        repeated = _is_repeated(announcement, mission.refused)
         who, safe_set = f"safe set of {source}", announcement.safe_set
         if against:
             if not repeated:
@@ -218,6 +218,13 @@ class SafeSetCheck:
     ) -> ConstraintReport:
         """Margins and barrier values of the vehicle in the safe set."""
         return self._margins.report(safe_set, estimate, target)
+
+
+def _is_repeated(announcement: SafeSetAnnouncement, refused: SafeSetAnnouncement | None) -> bool:
+    """Whether it is the refused one again, or where that has moved to in the meantime."""
+    if refused is None or announcement.source != refused.source:
+        return False
+    return is_update(refused.safe_set, announcement.safe_set)
 
 
 def may_grow_fence(owner: MessageSource | None, source: MessageSource | None, chosen: int) -> bool:

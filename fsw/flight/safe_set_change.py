@@ -43,8 +43,12 @@ def is_update(old: SafeSet, new: SafeSet) -> bool:
 def summary(safe_set: SafeSet) -> str:
     """What a safe set consists of, in words."""
     counts = Counter(zone.shape.kind for zone in safe_set.zones)
-    parts = [f"{count} {kind}{'' if count == 1 else 's'}" for kind, count in counts.items()]
+    parts = [f"{count} {_plural(kind) if count > 1 else kind}" for kind, count in counts.items()]
     return ", ".join(parts) or "nothing to keep clear of"
+
+
+def _plural(kind: str) -> str:
+    return f"{kind}es" if kind.endswith("x") else f"{kind}s"
 
 
 def _moves(zone: Zone) -> bool:

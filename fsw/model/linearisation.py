@@ -241,8 +241,8 @@ def _cross(a: Array, b: Array) -> Vec3:
 def in_body(frame: Array, on: int, local: Vec3) -> tuple[Vec3, Vec3]:
     """Where a place of the vehicle is in the body [m, FRD], and its velocity there [m/s].
 
-    ``frame`` (FRAME,) [SI] is of a node, ``on`` [1] what the place is rigid on, ``local`` [m] where
-    there (``fsw.model.body.Part``).
+    ``frame`` (FRAME,) [SI] is of a node, ``on`` [1] what the place is rigid on, ``local`` [m, part]
+    where there (``fsw.model.body.Part``).
     """
     if on == ON_BASE:
         return local, (0.0, 0.0, 0.0)
@@ -258,7 +258,7 @@ def in_body(frame: Array, on: int, local: Vec3) -> tuple[Vec3, Vec3]:
 
 @leaf
 def position(frame: Array, on: int, local: Vec3) -> Vec3:
-    """Position of a place [m, NED]; ``frame`` (FRAME,) [SI], ``on`` [1], ``local`` [m] as above."""
+    """Position of a place [m, NED]; ``frame`` (FRAME,) [SI], ``on`` [1], ``local`` [m, part]."""
     (x, y, z), _ = in_body(frame, on, local)
     return (
         frame[0] + frame[6] * x + frame[7] * y + frame[8] * z,
@@ -269,7 +269,7 @@ def position(frame: Array, on: int, local: Vec3) -> Vec3:
 
 @leaf
 def velocity(frame: Array, on: int, local: Vec3) -> Vec3:
-    """Velocity of a place [m/s, NED]; ``frame`` (FRAME,) [SI], ``on``, ``local`` [m] as above."""
+    """Velocity of a place [m/s, NED]; ``frame`` (FRAME,) [SI], ``on`` [1], ``local`` [m, part]."""
     (x, y, z), (vx, _, vz) = in_body(frame, on, local)
     r, t = _AT_R, _AT_TURNING
     return (
@@ -324,9 +324,9 @@ def fill_turned(frame: Array, n: Vec3, turned: Array) -> None:
 def fill_slopes(frame: Array, on: int, local: Vec3, n: Vec3, turned: Array, slopes: Array) -> None:
     """Derivatives of ``n . p`` and ``n . v`` of a place in the state, into ``slopes`` (2, 19) [SI].
 
-    ``frame`` (FRAME,) [SI], ``on`` [1] and ``local`` [m] are as in ``in_body``; ``n`` [1, NED] is
-    any direction and ``turned`` (10, 3) [SI] of ``fill_turned`` for it. Snap moves nothing at once,
-    so its entries stay as they are: 0.
+    ``frame`` (FRAME,) [SI], ``on`` [1] and ``local`` [m, part] are as in ``in_body``; ``n`` [1,
+    NED] is any direction and ``turned`` (10, 3) [SI] of ``fill_turned`` for it. Snap moves nothing
+    at once, so its entries stay as they are: 0.
     """
     (rx, ry, rz), (vx, _, vz) = in_body(frame, on, local)
     for k in range(3):

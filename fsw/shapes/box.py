@@ -13,7 +13,7 @@ from fsw.signals import Shape, Vec3, Vec4
 
 
 def box(centre: Vec3, half_size: Vec3, attitude: Vec4 = (1.0, 0.0, 0.0, 0.0)) -> Shape:
-    """A box about ``centre`` [m, NED], ``half_size`` [m] along its own axes.
+    """A box about ``centre`` [m, NED], of ``half_size`` [m, its own axes].
 
     ``attitude`` [1] is the unit quaternion (w, x, y, z) from its axes to NED.
     """

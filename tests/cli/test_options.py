@@ -75,7 +75,12 @@ def test_what_the_processes_are_started_with_survives_the_command_line() -> None
         origin=Origin(-33.123456789012, 0.1, 2.0), keys=Path("a b"),
     )  # fmt: skip
     control = ControlChoice(
-        controller="hc", tracking="pid", lambda_="paper-5", solver="slsqp", allow_inconsistent=True
+        controller="hc",
+        tracking="pid",
+        lambda_="paper-5",
+        solver="slsqp",
+        body="points",
+        allow_inconsistent=True,
     )
     fsw = FswOptions(links=links, control=control, out=Path("o"), wait_s=0.1 + 0.2, seed=0)
     sitl = SitlOptions(scenario="x.toml", seed=2**63 - 1, realtime=True, speed=1.5, out=Path("o"))

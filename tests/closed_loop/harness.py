@@ -91,6 +91,9 @@ class Flight:
 
     def __post_init__(self) -> None:
         self.sim = Simulation(self.scenario, self.seed)
+        # A scenario says what keeps clear, as for `pandion fly`.
+        planner = replace(self.config.planner, body=self.scenario.body)
+        self.config = replace(self.config, planner=planner)
         self.loop = TunedAutopilot(self.config)
         self.planner = self.planner or real_planner(self.config)
         self.closed = ClosedLoop(self.sim, self._tick, None, Late(self), self.config.airframe)

@@ -22,6 +22,10 @@ def compilable(function: Callable[..., Any]) -> Callable[..., Any]:
     return function
 
 
+def leaf(kernel: Callable[..., Any]) -> Callable[..., Any]:
+    return kernel
+
+
 def machine_code(kernel: Callable[..., Any], *example: Any) -> Callable[..., Any]:
     return kernel
 

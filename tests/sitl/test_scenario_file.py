@@ -20,6 +20,7 @@ from sitl.scenario_validation import check
 from sitl.shapes import TABLES
 from sitl.simulation import Simulation
 from sitl.trajectory import reference
+from sitl.world import World
 
 BASE = """
 duration_s = 10.0
@@ -242,10 +243,9 @@ def test_all_shapes_have_been_tried() -> None:
 
 def test_any_mixture_of_zones_walls_points_and_workspace_is_judged_together() -> None:
     text = BASE + WALL + POINT + BOX + SPHERE
-    simulation = Simulation(parse_scenario(text, "test"), 0)
-    zones = [key.partition("/")[0] for key in simulation.margin_keys]
+    zones = [key.partition("/")[0] for key in World(parse_scenario(text, "test")).keys]
     assert list(dict.fromkeys(zones)) == ["front", "branch", "shelf", "workspace"]
     assert zones.count("workspace") == 1
     assert zones.count("shelf") == 13
-    points = Simulation(parse_scenario('body = "points"\n' + text, "test"), 0)
-    assert len(points.margin_keys) == 3 + 3 + 3 + 1
+    points = World(parse_scenario('body = "points"\n' + text, "test"))
+    assert len(points.keys) == 3 + 3 + 3 + 1

@@ -143,12 +143,30 @@ def test_margins_are_of_base_elbow_and_end_effector() -> None:
     tip = point_in_flight(estimate, CONFIG.airframe.link_length)[0]
     assert elbow != tip
     places = (estimate.p_WB, elbow, tip)
-    size = CONFIG.airframe.size
-    reach = zip(places, (size.hull, size.link, size.tool), strict=True)
-    assert report.margins[:3] == pytest.approx([5.0 - p[0] - 0.1 - radius for p, radius in reach])
+    assert report.margins == pytest.approx([5.0 - p[0] - 0.1 for p in places])
     ball = CHECK.margins(SafeSet((SPHERE,)), estimate, target)
     assert ball.kind is ConstraintKind.WORKSPACE
     assert ball.margins == pytest.approx((0.075,))
+
+
+def test_a_zone_that_moves_is_taken_and_what_is_known_of_it_is_not_said_again() -> None:
+    memory, first = received(MissionMemory(), SafeSet((replace(NORTH, velocity=(0.1, 0.0, 0.0)),)))
+    moved = replace(NORTH, velocity=(0.1, 0.0, 0.0), t_us=100_000)
+    memory, second = received(memory, SafeSet((moved,)))
+    assert memory.safe_set == SafeSet((moved,))
+    assert first
+    assert second == []
+
+
+def test_a_moving_set_that_cannot_be_kept_is_refused_once_and_stays_refused() -> None:
+    memory, _ = received(MissionMemory(), SafeSet((NORTH,)))
+    (tiny,) = TINY.zones
+    wandering = replace(NORTH, velocity=(0.1, 0.0, 0.0))
+    memory, first = received(memory, SafeSet((tiny, wandering)))
+    memory, second = received(memory, SafeSet((tiny, replace(wandering, t_us=100_000))))
+    assert memory.safe_set == SafeSet((NORTH,))
+    assert first
+    assert second == []
 
 
 def test_a_stranger_in_flight_may_shrink_what_is_announced_and_is_named() -> None:

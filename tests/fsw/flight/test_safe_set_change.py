@@ -193,3 +193,4 @@ def test_an_update_moves_what_moves_and_nothing_else() -> None:
 def test_a_safe_set_is_summed_up_in_words() -> None:
     assert summary(SafeSet()) == "nothing to keep clear of"
     assert summary(SafeSet((FRONT, BALL, BALL))) == "1 half-space, 2 balls"
+    assert summary(SafeSet((SHELF, SHELF))) == "2 boxes"

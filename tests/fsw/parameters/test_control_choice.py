@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fsw.model.body import BODIES
 from fsw.mpc.solvers import SOLVERS
 from fsw.parameters.control_choice import INNER_LOOPS, KNOWN
 from fsw.parameters.flight_config import CONTROLLERS, INNERS, ROBUSTNESS_PRESETS
@@ -13,5 +14,6 @@ def test_every_name_offered_can_be_built_and_none_is_left_out() -> None:
         "tracking": set(INNER_LOOPS),
         "lambda": set(ROBUSTNESS_PRESETS),
         "solver": set(SOLVERS),
+        "body": set(BODIES),
     }
     assert set(INNER_LOOPS.values()) == set(INNERS)
