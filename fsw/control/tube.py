@@ -122,11 +122,11 @@ def all_axes(loop: Tube, disturbance: float) -> tuple[float, float]:
     """Reach [m] on a horizontal axis and vertically under a ``disturbance`` [m/s^2] on every axis.
 
     The change of thrust that holds the height accelerates sideways by as much times the lean. What
-    a lean takes from the height is found by measurement, and less than half of its reach.
+    a lean takes from the height is found by measurement: less than its reach once more.
     """
     lean = disturbance * loop.acceleration / GRAVITY
     aside = lean * disturbance * loop.vertical_acceleration
-    return (disturbance + aside) * loop.base + loop.base_wind, 1.5 * disturbance * loop.height
+    return (disturbance + aside) * loop.base + loop.base_wind, 2.0 * disturbance * loop.height
 
 
 def _snap_in_hover(airframe: Airframe) -> float:

@@ -177,7 +177,7 @@ def _tube_of_all_axes(
 
 
 def _reach(safe_set: SafeSet, across: float, up: float) -> float:
-    """The furthest [m] that a deviation of ``across`` [m] on x, y and ``up`` [m] is to a boundary."""
+    """How far towards a boundary ``across`` [m] on x and on y and ``up`` [m] can lead [m]."""
     corner = math.hypot(across, across, up)
     if safe_set.sphere is not None or safe_set.obstacles:
         return corner

@@ -24,6 +24,7 @@ from fsw.link.link_choice import LinkChoice
 from fsw.parameters.control_choice import ControlChoice
 from fsw.signals import Origin
 from pandion.export import ExportOptions
+from pandion.falsify import FalsifyOptions
 from pandion.fly import FlyOptions
 from pandion.replay import ReplayOptions
 from pandion.reproduce import ReproduceOptions
@@ -32,6 +33,7 @@ from tests.cli.command import one_sentence
 
 PROGRAMS = (
     FlyOptions, FswOptions, SitlOptions, ReplayOptions, ReproduceOptions, ExportOptions,
+    FalsifyOptions,
     LoopOptions, LockstepOptions, FloodOptions, DownloadOptions, MpcOptions,
 )  # fmt: skip
 
