@@ -129,6 +129,8 @@ def _sentences(outcome: Outcome) -> list[str]:
         f"one axis   {_found(outcome.worst_of_one_axis)}, bound {bounds.one_axis * _MM:.0f} mm",
         f"worst      {_found(outcome.worst)}, bound {bounds.across * _MM:.0f} mm on a horizontal "
         f"axis, {bounds.up * _MM:.0f} mm vertically",
+        f"all axes   the bound holds up to {bounds.all_axes_up_to:.2f} m/s²; above it the rotors "
+        "can saturate",
         f"bound {verdict} after {outcome.evaluations} evaluations: the worst reaches "
         f"{outcome.worst.share:.0%} of it{margin}",
     ]
@@ -149,6 +151,7 @@ def _as_json(options: FalsifyOptions, outcome: Outcome) -> dict[str, Any]:
         "evaluations": outcome.evaluations,
         "holds": outcome.holds,
         "bound_one_axis_m": bounds.one_axis,
+        "bound_all_axes_up_to_m_s2": bounds.all_axes_up_to,
         "bound_all_axes_m": [bounds.across, bounds.across, bounds.up],
         "worst": _summary(outcome.worst),
         "worst_of_one_axis": _summary(outcome.worst_of_one_axis),

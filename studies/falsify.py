@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from cmaes import CMA
 
-from fsw.control.tube import all_axes
+from fsw.control.tube import all_axes, all_axes_up_to
 from fsw.flight.state import FlightState
 from fsw.model.prediction import Array
 from fsw.parameters.consistency import loop_tube
@@ -48,6 +48,7 @@ class Bounds:
     one_axis: float
     across: float  # a horizontal axis, all axes pushed
     up: float  # vertically, all axes pushed
+    all_axes_up_to: float  # m/s²; above it the rotors can saturate and the last two do not hold
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +85,8 @@ def bounds(config: FlightConfig, disturbance: float) -> Bounds:
     """The bounds for a ``disturbance`` [m/s²] an axis."""
     loop = loop_tube(config)
     across, up = all_axes(loop, disturbance)
-    return Bounds(disturbance * loop.base + loop.base_wind, across, up)
+    covered = all_axes_up_to(config.airframe, loop, config.surroundings.disturbance)
+    return Bounds(disturbance * loop.base + loop.base_wind, across, up, covered)
 
 
 class Search:

@@ -129,6 +129,23 @@ def all_axes(loop: Tube, disturbance: float) -> tuple[float, float]:
     return (disturbance + aside) * loop.base + loop.base_wind, 2.0 * disturbance * loop.height
 
 
+def all_axes_up_to(airframe: Airframe, loop: Tube, most: float) -> float:
+    """Largest disturbance [m/s^2] of all axes, up to ``most``, that saturates no rotor.
+
+    At the worst heading both horizontal axes ask the same pair of rotors, root 2 times as much,
+    while the height takes thrust away, which shrinks both lever and headroom.
+    """
+    low, high = 0.0, most
+    while high - low > 1e-3:
+        middle = 0.5 * (low + high)
+        lean = middle * loop.acceleration / GRAVITY
+        pushed = middle + lean * middle * loop.vertical_acceleration
+        lift = max(1.0 - middle * loop.vertical_acceleration / GRAVITY, 0.0)
+        fits = math.sqrt(2.0) * pushed * loop.snap <= _snap_in_hover(airframe) * lift * lift
+        low, high = (middle, high) if fits else (low, middle)
+    return low
+
+
 def _snap_in_hover(airframe: Airframe) -> float:
     """The snap [m/s^4] that the torque about one axis gives; straight down the arm weighs most."""
     hover = airframe.mass * GRAVITY / 4.0
