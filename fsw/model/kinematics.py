@@ -82,8 +82,8 @@ def body_axes(x: NDArray[np.generic], out: NDArray[np.generic]) -> None:
     """The body's x and z axes of a prediction state, and how fast they turn.
 
     Written without trigonometry of the tilt and without absolute values, so that it accepts a
-    complex state ``x`` (19,) [SI]: the derivative is then exact (complex step). ``out`` (4, 3) [1,
-    1/s] is in NED: b1, b3 and their rates.
+    complex state ``x`` (19,) [SI]: the derivative is then exact (complex step). Into
+    ``out`` (4, 3) [1, 1/s] go b1, b3 and their rates, in NED.
     """
     # Thrust along f = g e3 - a; its derivative needs the horizontal jerk only: a vertical
     # jerk changes the length of f, hardly its direction.
@@ -116,8 +116,8 @@ def body_axes(x: NDArray[np.generic], out: NDArray[np.generic]) -> None:
 def arm_points(x: NDArray[np.float64], l1: float, l2: float, out: NDArray[np.float64]) -> None:
     """World position and velocity of joint 2 and end-effector of a prediction state.
 
-    The state ``x`` is (19,) [SI], links are of ``l1`` [m] and ``l2`` [m]; ``out`` (2, 2, 3) [m,
-    m/s] is in NED: [joint 2 | end-effector][position | velocity].
+    The state ``x`` is (19,) [SI], links are of ``l1`` [m] and ``l2`` [m]. Into
+    ``out`` (2, 2, 3) [m, m/s] go, in NED, [joint 2 | end-effector][position | velocity].
     """
     axes = np.empty((4, 3))
     body_axes(x, axes)
