@@ -106,11 +106,11 @@ class Search:
         self._kept: dict[str, Found] = {}
 
     def adversary(self, start: Start, every: int, weights: Array) -> float:
-        """Fly against an adversary; how much of the bound it reaches."""
+        """Fly against an adversary of ``weights`` (3, FEATURES) [SI]; its share of the bound."""
         return self._judge(start, Disturbance(self._amplitude, every, _NO_TABLE, weights))
 
     def sequence(self, start: Start, table: Array) -> float:
-        """Fly under values from -1 to 1, (n, 3), each held for 0.1 s."""
+        """Fly under ``table`` (n, 3) [1, NED], -1 to 1, each held for 0.1 s; as ``adversary``."""
         return self._judge(start, Disturbance(self._amplitude, HELD_TICKS, table, _NO_WEIGHTS))
 
     def outcome(self) -> Outcome:

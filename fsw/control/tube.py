@@ -130,7 +130,7 @@ def all_axes(loop: Tube, disturbance: float) -> tuple[float, float]:
 
 
 def all_axes_up_to(airframe: Airframe, loop: Tube, most: float) -> float:
-    """Largest disturbance [m/s^2] of all axes, up to ``most``, that saturates no rotor.
+    """Largest disturbance of all axes, up to ``most`` [m/s^2], that saturates no rotor [m/s^2].
 
     At the worst heading both horizontal axes ask the same pair of rotors, root 2 times as much,
     while the height takes thrust away, which shrinks both lever and headroom.
