@@ -86,3 +86,25 @@ def test_what_was_found_flies_the_same_with_planner_and_referee() -> None:
     flown = replay(SCENARIO, NOW, worst.start.step, worst.pushes, _silent)
     assert flown.off_m == pytest.approx(worst.off_m, abs=1e-4)
     assert flown.margin_m == pytest.approx(worst.margin_m, abs=1e-3)
+
+
+@pytest.mark.parametrize("name", ["shelf", "crossing"])
+def test_the_margins_of_a_full_body_are_those_of_the_referee(name: str) -> None:
+    scenario = replace(load_scenario(name), duration_s=7.0)
+    config = flight_config(body=scenario.body)
+    worst = search(scenario, config, 0.8, 8, 1, _silent).least_margin
+    flown = replay(scenario, config, worst.start.step, worst.pushes, _silent)
+    assert flown.off_m == pytest.approx(worst.off_m, abs=1e-4)
+    assert flown.margin_m == pytest.approx(worst.margin_m, abs=1e-3)
+    assert flown.margin_m < 3.0
+
+
+def test_the_safety_filter_of_the_search_is_the_one_that_flies() -> None:
+    # It acts in every swing, instead of hardly ever.
+    eager = replace(NOW, safety_filter=replace(NOW.safety_filter, allowance=0.5))
+    hunt = Search(SCENARIO, eager, _flown(), 0.8)
+    hunt.adversary(hunt.starts[-1], 50, np.outer((1, 0, 0), (0.0, 1.0, 0.0)))
+    found = hunt.outcome().worst
+    assert found.filtered_ticks > 10
+    flown = replay(SCENARIO, eager, found.start.step, found.pushes, _silent)
+    assert flown.off_m == pytest.approx(found.off_m, abs=1e-4)
