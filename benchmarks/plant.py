@@ -29,12 +29,13 @@ def plant_step_us() -> list[float]:
     start[W_WB_B:THRUST] = (0.1, -0.2, 0.3)
     inputs = Inputs(np.full(4, 8.6), np.zeros(2), np.zeros(3), np.zeros(3))
     places = np.empty((STEPS, 4, 3))
-    integrate(numbers, start.copy(), inputs, STEP_S, places)
+    states = np.empty((STEPS, len(start)))
+    integrate(numbers, start.copy(), inputs, STEP_S, places, states)
     out = []
     for _ in range(ROUNDS):
         state = start.copy()
         began = time.perf_counter()
-        integrate(numbers, state, inputs, STEP_S, places)
+        integrate(numbers, state, inputs, STEP_S, places, states)
         out.append(1e6 * (time.perf_counter() - began) / STEPS)
     return out
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -54,6 +55,7 @@ def as_json(reports: FlightReports) -> dict[str, Any]:
         "control_smoothness": vehicle.get("control_smoothness", _NOTHING),
         "margins_m": truth.get("margins_m", {}),
         "min_margin_m": truth.get("min_margin_m"),
+        "limits": truth.get("limits", {}),
         "surfaces_m": truth.get("surfaces_m", {}),
         "beyond_s": truth.get("beyond_s", {}),
         "safety": {key: vehicle.get("safety", {}).get(key) for key in _SAFETY_KEYS},
@@ -79,6 +81,7 @@ def table_rows(result: dict[str, Any], tracking_max_m: float | None) -> Rows:
         ("flown", f"{result['duration_s']:.1f} s"),
         *[(f"margin {name}", _mm(value)) for name, value in _shown(result["margins_m"]).items()],
         ("minimum margin", _mm(result["min_margin_m"])),
+        *[(f"limit {name.replace('_', ' ')}", _use(use)) for name, use in result["limits"].items()],
         ("longest beyond a surface", f"{max(result['beyond_s'].values(), default=0.0):.3f} s"),
         ("tracking RMS / max", f"{_mm(result['tracking_error_rms_m'])} / {_mm(tracking_max_m)}"),
         ("control effort, sum / mean", _sum_and_mean(result["control_effort"])),
@@ -119,6 +122,15 @@ def _counts(safety: dict[str, int | None]) -> str:
 
 def _mm(value: float | None) -> str:
     return "none" if value is None else f"{1000.0 * value:.1f} mm"
+
+
+def _use(use: dict[str, Any]) -> str:
+    """How much of a limit was used, and for how long it was exceeded."""
+    largest, most, unit = use["largest"], use["most"], use["unit"]
+    if unit == "rad":
+        largest, most, unit = math.degrees(largest), math.degrees(most), "deg"
+    beyond = f", {use['beyond_s']:.2f} s beyond" if use["beyond_s"] > 0.0 else ""
+    return f"{largest:.2f} of {most:.2f} {unit}{beyond}" + ("" if use["kept"] else ": broken")
 
 
 def _sum_and_mean(value: dict[str, float]) -> str:

@@ -1,18 +1,21 @@
-"""Judges a run on the plant's truth: margins, collisions, landing, tracking error."""
+"""Judges a run on the plant's truth: margins, collisions, limits, landing, tracking error."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
 from sitl.body import BASE, END_EFFECTOR, JOINT2, Parts
 from sitl.compiled import machine_code
+from sitl.limits import LimitRecord
 from sitl.mission_clock import MissionClock
 from sitl.plant.vector import Array
 from sitl.result import EndKind, EndReason, MarginRecord, TrackingError, TruthResult, score
 from sitl.scenario import V3, Scenario
 from sitl.scenario_validation import check_start
+from sitl.start import flown_vehicle
 from sitl.world import World, ZoneTable, record_if_clear
 
 TOUCH_DOWN_MAX = 2.0  # m/s; a drop from 0.2 m
@@ -36,6 +39,7 @@ class FlightEvaluator:
         For the full body the base's axes [1, NED] follow.
         """
         self.world = World(scenario)
+        self.limits = LimitRecord(flown_vehicle(scenario))
         self.record = MarginRecord(self.world.keys, self.world.clearances)
         self.ended: EndReason | None = None
         self.left: str | None = None  # why the trajectory is no longer flown
@@ -104,6 +108,16 @@ class FlightEvaluator:
         """Arguments of ``record_if_clear``."""
         return (self.world.table, self.world.parts, aim, places, instants, *self.record.arrays)
 
+    def judge_limits(
+        self, states: Array, sent: tuple[float, float], before_s: float, step_s: float
+    ) -> None:
+        """Take the plant steps of an exchange, ``states`` (steps, 17 + 2j) [SI], into the limits.
+
+        ``sent`` are the largest torque [N·m] and thrust [N] commanded.
+        """
+        if self.ended is None:
+            self.limits.add(states, sent, before_s, step_s)
+
     def judge_landing(self, speed: float, time_s: float) -> None:
         """Evaluate the landing speed [m/s] of the fastest foot on the ground."""
         if not (speed <= TOUCH_DOWN_MAX):
@@ -126,7 +140,9 @@ class FlightEvaluator:
     def result(self, time_s: float) -> TruthResult:
         """The score up to ``time_s``."""
         flaws = tuple(flaw for flaw in (self.left, self.silent) if flaw is not None)
-        return score(self.ended, time_s, self._error, self.record, self._whole, flaws)
+        flaws += self.limits.flaws()
+        truth = score(self.ended, time_s, self._error, self.record, self._whole, flaws)
+        return replace(truth, limits=self.limits.uses())
 
 
 def _whole(scenario: Scenario) -> EndKind:

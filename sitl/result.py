@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import enum
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
+from sitl.limits import LimitUse
 from sitl.plant.vector import Array
 from sitl.scenario import V3
 
@@ -49,6 +50,7 @@ class TruthResult:
     min_margin_m: float | None  # None without constraints
     min_margin_key: str | None
     min_margin_time_s: float | None
+    limits: dict[str, LimitUse] = field(default_factory=dict)  # use of the vehicle's limits
 
 
 class TrackingError:

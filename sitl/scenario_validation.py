@@ -5,10 +5,10 @@ from __future__ import annotations
 import itertools
 import math
 
+from sitl.limits import BOTH_JOINTS_DEG, FIRST_JOINT_DEG
 from sitl.scenario import Lissajous, Scenario, Start
 from sitl.scenario_file import ScenarioError
 
-FIRST_JOINT_DEG, BOTH_JOINTS_DEG = 60.0, 90.0  # the arm's limits, Table I of the paper
 ZONES_MAX = 64  # in a set of OBSTACLE_SHAPE
 
 

@@ -79,11 +79,14 @@ class Simulation:
         self._pushes = [push(item, seed, 1e-6 * STEP_US) for item in scenario.disturbances]
         self._state, trim = first_state(self.vehicle, scenario, self.clock.target_at(0.0).p)
         self._thrust, self._torque = trim.thrust, trim.torque
+        self._sent = (0.0, 0.0)  # largest torque and thrust commanded, before any saturation
         axes = 3 if scenario.body == "full" else 0
         self._places = np.empty((SUBSTEPS, 2 + len(self.vehicle.links) + axes, 3))
+        self._states = np.empty((SUBSTEPS, len(self._state)))
         still = (0.0, 0.0, 0.0)
         # No steps: only what the accelerometer feels at the start.
-        example = (self._thrust, self._torque, still, still, STEP_S, self._places[:0])
+        none = (self._places[:0], self._states[:0])
+        example = (self._thrust, self._torque, still, still, STEP_S, *none)
         self._step = machine_code(step, self._plants, self._state, *example)
         self._felt = self._step(self._plants, self._state, *example).felt
         self._reading: SensorReadings | None = None
@@ -157,6 +160,7 @@ class Simulation:
             *self._disturbance(),
             STEP_S,
             self._places,
+            self._states,
         )
         self._felt = arrival.felt
         before = self.time_s
@@ -216,7 +220,10 @@ class Simulation:
             raise ValueError(f"{controls} at step {self.step}: every control must be finite")
         thrust = self.vehicle.rotors.thrust_max if armed else 0.0
         torque = self.vehicle.joints.torque_max if armed else 0.0
-        if min(wanted) < 0.0 or max(wanted) > 1.0 or max(map(abs, torques)) > 1.0:
+        least, most, twist = min(wanted), max(wanted), max(map(abs, torques))
+        # A thrust below zero is as far beyond its range as one that is as much too large.
+        self._sent = (torque * twist, thrust * (most if least >= 0.0 else max(most, 1.0 - least)))
+        if least < 0.0 or most > 1.0 or twist > 1.0:
             wanted = _four([min(max(f, 0.0), 1.0) for f in wanted])
             torques = tuple(min(max(f, -1.0), 1.0) for f in torques)
         f1, f2, f3, f4 = wanted
@@ -237,6 +244,7 @@ class Simulation:
 
     def _judge(self, before_s: float, landing_speed: float) -> None:
         """Judge every plant step of the exchange that began at ``before_s``."""
+        self._evaluator.judge_limits(self._states, self._sent, before_s, STEP_S)
         self._evaluator.judge_all(self._places, before_s, STEP_S)
         if self.step % SAMPLE_STEPS == 0:
             self._evaluator.sample_error(critical(self._places[-1]), self.time_s)

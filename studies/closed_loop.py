@@ -42,7 +42,7 @@ from studies.flight_result import (
     TracePoint,
     processor_time_us,
 )
-from studies.mission import SIMULATOR, moves, safe_set, target
+from studies.mission import announced, moves, target
 
 TARGET_US = 100_000  # between points of the reference, as the pilot sends them
 _TARGETS_AHEAD = 20
@@ -95,10 +95,9 @@ class ClosedLoop(Generic[State]):
     def announced(self) -> tuple[SafeSetAnnouncement, ...]:
         """What the scenario's pilot announces at this step: ten times a second where zones move."""
         step, scenario = self.simulation.step, self.simulation.scenario
-        if step > 0 and (step % (TARGET_US // STEP_US) > 0 or not moves(scenario)):
-            return ()
-        held = safe_set(scenario, self.simulation.t_us)
-        return (SafeSetAnnouncement(SIMULATOR, held),) if held.zones else ()
+        if step == 0 or (step % (TARGET_US // STEP_US) == 0 and moves(scenario)):
+            return announced(scenario, self.simulation.t_us)
+        return ()
 
     def step(self, inputs: TickInputs) -> TickOutputs:
         """Tick, plan, advance."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -13,6 +14,7 @@ import numpy as np
 import fsw
 import sitl
 from fsw.parameters.flight_config import FlightConfig
+from sitl.result import TruthResult
 from sitl.scenario import EncoderErrors, ImuErrors, PoseErrors, Scenario
 from studies import closed_loop, double_integrator, mission
 from studies.flight_result import FlightResult
@@ -60,6 +62,9 @@ class Outcome:
     duration_s: float = 0.0
     te_m: float | None = None
     margin_m: float | None = None
+    limits_kept: bool = True
+    joint_1_deg: float | None = None  # largest |th1|; None on a plant without limits
+    link_2_deg: float | None = None  # largest |th1 + th2|
     cs_sum: float = 0.0
     cs_mean: float = 0.0
     ce_sum: float = 0.0
@@ -102,6 +107,9 @@ def score(seed: int, result: FlightResult) -> Outcome:
         duration_s=truth.duration_s,
         te_m=truth.tracking_error_rms_m,
         margin_m=truth.min_margin_m,
+        limits_kept=all(use.kept for use in truth.limits.values()),
+        joint_1_deg=_largest_deg(truth, "joint_1_angle"),
+        link_2_deg=_largest_deg(truth, "link_2_angle"),
         cs_sum=smoothness["sum"],
         cs_mean=smoothness["mean"],
         ce_sum=effort["sum"],
@@ -111,6 +119,10 @@ def score(seed: int, result: FlightResult) -> Outcome:
         plans=planner.plans,
         failures=planner.failures,
     )
+
+
+def _largest_deg(truth: TruthResult, angle: str) -> float | None:
+    return math.degrees(truth.limits[angle].largest) if truth.limits else None
 
 
 @cache

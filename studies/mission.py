@@ -3,7 +3,14 @@
 from __future__ import annotations
 
 from fsw.shapes import BY_NUMBER
-from fsw.signals import EndEffectorTarget, MessageSource, SafeSet, Shape, Zone
+from fsw.signals import (
+    EndEffectorTarget,
+    MessageSource,
+    SafeSet,
+    SafeSetAnnouncement,
+    Shape,
+    Zone,
+)
 from sitl.mission_clock import MissionClock
 from sitl.scenario import Scenario
 from sitl.simulation import START_US
@@ -28,6 +35,12 @@ def _zone(one: SimulatedZone, t_us: int) -> Zone:
     shape = Shape(BY_NUMBER[one.kind.number].name, place.numbers)
     since_us = t_us if any(place.velocity) else 0
     return Zone(shape, one.table.clearance_m, one.table.keep_in, place.velocity, since_us)
+
+
+def announced(scenario: Scenario, t_us: int = START_US) -> tuple[SafeSetAnnouncement, ...]:
+    """What the scenario's pilot announces at a time stamp."""
+    held = safe_set(scenario, t_us)
+    return (SafeSetAnnouncement(SIMULATOR, held),) if held != SafeSet() else ()
 
 
 def target(clock: MissionClock, t_us: int) -> EndEffectorTarget:

@@ -14,7 +14,7 @@ from studies.campaign import Campaign
 from studies.job import Job, Outcome
 from studies.settings import Settings
 
-HEADERS = ("passed", "95 %", "worst margin mm", "TE m")
+HEADERS = ("passed", "95 %", "worst margin mm", "limits kept", "joints deg", "TE m")
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,6 +27,9 @@ class Summary:
     te_m: float | None  # mean of the flights' TE
     te_worst_m: float | None
     worst_margin_m: float | None
+    limits_kept: int  # flights without a broken limit
+    joint_1_deg: float | None  # largest |th1|; None on a plant without limits
+    link_2_deg: float | None  # largest |th1 + th2|
     cs_mean: float  # per planning step
     ce_mean: float
     cs_sum: float  # over a flight, as the paper defines it
@@ -74,6 +77,9 @@ def summarise(jobs: Sequence[Job], outcomes: Sequence[Outcome]) -> Summary:
         te_m=float(np.mean(errors)) if errors else None,
         te_worst_m=max(errors, default=None),
         worst_margin_m=min(margins, default=None),
+        limits_kept=sum(row.limits_kept for row in whole),
+        joint_1_deg=max((row.joint_1_deg for row in whole if row.joint_1_deg), default=None),
+        link_2_deg=max((row.link_2_deg for row in whole if row.link_2_deg), default=None),
         cs_mean=mean(lambda row: row.cs_mean),
         ce_mean=mean(lambda row: row.ce_mean),
         cs_sum=mean(lambda row: row.cs_sum),
@@ -93,8 +99,15 @@ def cells(summary: Summary) -> tuple[str, ...]:
         f"{passed} (one flight)" if summary.flown < summary.total else passed,
         f"{summary.wilson_low:.2f}–{summary.wilson_high:.2f}",
         millimetres(summary.worst_margin_m),
+        "–" if summary.joint_1_deg is None else f"{summary.limits_kept}/{summary.total}",
+        f"{degrees(summary.joint_1_deg)}, {degrees(summary.link_2_deg)}",
         metres(summary.te_m),
     )
+
+
+def degrees(value: float | None) -> str:
+    """An angle ``value`` [deg] for a table."""
+    return "–" if value is None else f"{value:.1f}"
 
 
 def metres(value: float | None) -> str:

@@ -44,9 +44,9 @@ class BarrierTuning:
     alpha: float = 2.0  # m/s^2, deceleration the barrier counts on
     slope: float = 4.0  # 1/s, k_S
     gamma: float = 3.0  # 1/s
-    # lambda of eq 25 [m/s]. At rest the plan keeps lambda / slope = 67 mm from the boundary,
-    # more than the 58 mm the fast loop can be pushed off the plan by 0.8 m/s^2.
-    lambda_: float = 0.28
+    # lambda of eq 25 [m/s]. At rest the plan keeps lambda / slope = 73.5 mm from the boundary, more
+    # than the fast loop can be pushed off the plan by 0.8 m/s^2 on one axis (``control/tube.py``).
+    lambda_: float = 0.294
     skipped_nodes: int = 1  # first nodes, which the inputs can hardly move
 
     def __post_init__(self) -> None:

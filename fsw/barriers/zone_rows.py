@@ -48,10 +48,13 @@ from fsw.model.prediction import (
     J,
 )
 from fsw.shapes.kind import Surface
-from fsw.shapes.zones import FLAT, FOLLOWS, PLANES, shifts, surface_at, zone_arrays
+from fsw.shapes.zones import FLAT, FOLLOWS, KEEP_IN, PLANES, shifts, surface_at, zone_arrays
 from fsw.signals import SafeSet, Vec3, Vec4
 
-_NEAREST_STEPS = 6  # alternating projections between a part and a zone
+_NEAREST_STEPS = 8  # at most, between two places
+_DISC_STEPS = 8  # at most, across a disc
+_EXACT = 1e-4  # m, by which a distance may be too long
+_LEVEL = 1e-9  # slope across a disc that is none
 _STILL = 1e-4  # m, a step that is none
 _AXIAL = 0.7  # cosine between a disc's axis and a normal from which all of its rim counts
 _NO_ROW = 1e3  # residual of a row that is left out
@@ -350,21 +353,11 @@ def _nearest_on_capsule(
     end = (probe[END], probe[END + 1], probe[END + 2])
     first = position(frame, int(probe[ON]), begin)
     last = position(frame, int(probe[ON]), end)
-    if zones[zone, FLAT] > 0.0:  # then an end is nearest, which is a sphere of another part
+    if zones[zone, FLAT] > 0.0 or zones[zone, KEEP_IN] > 0.0:
+        # Then an end is nearest, which is a sphere of another part.
         at, other = _seen(zones, zone, which, shift, first), _seen(zones, zone, which, shift, last)
         return (begin, at, False) if at.distance <= other.distance else (end, other, False)
-    axis = (last[0] - first[0], last[1] - first[1], last[2] - first[2])
-    square = dot(axis, axis)
-    share = 0.5
-    at = _seen(zones, zone, which, shift, add_scaled(first, axis, share))
-    for _ in range(_NEAREST_STEPS):
-        # From the nearest place of the zone back onto the capsule.
-        back = dot((at.nx, at.ny, at.nz), axis) * max(at.distance, 0.0) / square
-        moved = min(max(share - back, 0.0), 1.0)
-        if abs(moved - share) * math.sqrt(square) < _STILL:
-            break
-        share = moved
-        at = _seen(zones, zone, which, shift, add_scaled(first, axis, share))
+    share, at = _nearest_between(zones, zone, shift, first, last)
     local = (
         begin[0] + share * (end[0] - begin[0]),
         begin[1] + share * (end[1] - begin[1]),
@@ -374,31 +367,72 @@ def _nearest_on_capsule(
 
 
 @leaf
+def _nearest_between(
+    zones: Array, zone: int, shift: Array, first: Vec3, last: Vec3
+) -> tuple[float, Surface]:
+    """Where between two places of the world a zone to keep out of is nearest, as a share.
+
+    The distance is convex along the way, so the tangents at two places cross below the least: there
+    it is looked at next, until nothing is to be gained.
+    """
+    way = (last[0] - first[0], last[1] - first[1], last[2] - first[2])
+    a, at = 0.0, _seen(zones, zone, 0, shift, first)
+    at_a, slope_a = at.distance, dot((at.nx, at.ny, at.nz), way)
+    if slope_a >= 0.0:
+        return 0.0, at
+    b, at = 1.0, _seen(zones, zone, 0, shift, last)
+    at_b, slope_b = at.distance, dot((at.nx, at.ny, at.nz), way)
+    share = 1.0
+    if slope_b <= 0.0:
+        return 1.0, at
+    for _ in range(_NEAREST_STEPS):
+        share = (at_b - at_a + slope_a * a - slope_b * b) / (slope_a - slope_b)
+        least = at_a + slope_a * (share - a)
+        at = _seen(zones, zone, 0, shift, add_scaled(first, way, share))
+        if at.distance - least < _EXACT:
+            break
+        slope = dot((at.nx, at.ny, at.nz), way)
+        if slope > 0.0:
+            b, at_b, slope_b = share, at.distance, slope
+        else:
+            a, at_a, slope_a = share, at.distance, slope
+    return share, at
+
+
+@leaf
 def _nearest_on_disc(
     zones: Array, zone: int, which: int, shift: Array, probe: Array, frame: Array
 ) -> tuple[Vec3, Surface, bool]:
     begin, rim = (probe[BEGIN], probe[BEGIN + 1], probe[BEGIN + 2]), probe[RIM]
-    on, flat = int(probe[ON]), zones[zone, FLAT] > 0.0
+    on, at_rim = int(probe[ON]), zones[zone, FLAT] > 0.0 or zones[zone, KEEP_IN] > 0.0
     local = begin
-    at = _seen(zones, zone, which, shift, position(frame, on, local))
+    x = position(frame, on, local)
+    at = _seen(zones, zone, which, shift, x)
     n1, n2, n3 = in_axes(frame, (at.nx, at.ny, at.nz))
     if probe[TURN] > 0.0 and abs(n3) < 0.5 * _AXIAL:
         return local, at, False
     u = v = 0.0  # of the place, from the disc's centre
-    for _ in range(_NEAREST_STEPS):
-        step = 1e3 if flat else max(at.distance, 0.05)
-        aim_u, aim_v = u - step * n1, v - step * n2
-        length = math.sqrt(aim_u * aim_u + aim_v * aim_v)
-        if length > rim:
-            aim_u, aim_v = aim_u * rim / length, aim_v * rim / length
-        moved = abs(aim_u - u) + abs(aim_v - v)
-        u, v = aim_u, aim_v
-        if moved < _STILL:
+    step = 1e3  # m: first to the rim, then along it
+    for _ in range(_DISC_STEPS):
+        level = math.sqrt(n1 * n1 + n2 * n2)
+        if level < _LEVEL:
             break
+        # Down the slope, back onto the disc, and of that way as far as it goes down.
+        way_u, way_v = u - step * n1 / level, v - step * n2 / level
+        scale = min(rim / math.sqrt(way_u * way_u + way_v * way_v), 1.0)
+        way_u, way_v = way_u * scale - u, way_v * scale - v
+        step = min(step, 2.0 * rim) * 0.5
+        aim = position(frame, on, (begin[0] + u + way_u, begin[1] + v + way_v, begin[2]))
+        share = 1.0
+        if at_rim:
+            at = _seen(zones, zone, which, shift, aim)
+        else:
+            share, at = _nearest_between(zones, zone, shift, x, aim)
+        u, v = u + share * way_u, v + share * way_v
         local = (begin[0] + u, begin[1] + v, begin[2])
-        at = _seen(zones, zone, which, shift, position(frame, on, local))
+        x = position(frame, on, local)
         n1, n2, n3 = in_axes(frame, (at.nx, at.ny, at.nz))
-        if flat:
+        if share * (abs(way_u) + abs(way_v)) < _STILL or zones[zone, FLAT] > 0.0:
             break
     if probe[TURN] == 0.0:
         return local, at, True

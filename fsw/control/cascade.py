@@ -12,26 +12,42 @@ from numpy.typing import NDArray
 from fsw.barriers.safe_approach import BarrierTuning
 from fsw.compiled import compilable, compiled, machine_code, packed
 from fsw.control.allocation import allocate
-from fsw.control.arm_compensation import compensated_joints
+from fsw.control.arm_compensation import compensated_joints, lately_off_plan
 from fsw.control.attitude import attitude_pid, attitude_reference
 from fsw.control.gains import LoopGains, tracking_gains
 from fsw.control.height import height_pid
-from fsw.control.joints import joint_torques
+from fsw.control.joint_reference import joint_reference
+from fsw.control.joints import (
+    JointMemory,
+    arm_dynamics,
+    joint_torques,
+    joints_at_rest,
+    observe_disturbance,
+)
 from fsw.control.pid import PidGains
 from fsw.control.safety_filter import NO_ZONES, FilterLaw, FilterTuning, filter_law, filtered
+from fsw.control.tilt_limit import limited_turn
 from fsw.control.tracking import (
     Observed,
     TrackingLaw,
     follow_plan,
     observe,
+    velocity_of_mass,
     wanted_accelerations,
 )
-from fsw.geometry.rotation import wrap_angle
+from fsw.geometry.rotation import rotate_back, wrap_angle
 from fsw.geometry.vectors import add_scaled, clamp_magnitude, subtract
 from fsw.model.airframe import GRAVITY, Airframe
 from fsw.model.body import Body, body_of
 from fsw.model.nominal import REST_INPUT, REST_STATE
-from fsw.model.rotors import MotionState, estimate_mass, lag_rotors, motion_state, rotor_decay
+from fsw.model.rotors import (
+    MotionState,
+    estimate_mass,
+    hanging_arm,
+    lag_rotors,
+    motion_state,
+    rotor_decay,
+)
 from fsw.signals import (
     STOPPED,
     ActuatorCommand,
@@ -63,7 +79,8 @@ class CascadeMemory(NamedTuple):
     mass: float  # kg, weighed in flight
     attitude: Vec3 = (0.0, 0.0, 0.0)  # rad s, integrals
     height: float = 0.0  # m s, integral
-    joints: Vec2 = (0.0, 0.0)  # rad s, integrals
+    joints: JointMemory = JointMemory((0.0, 0.0), (0.0, 0.0))
+    off_plan: float = 0.0  # m, largest deviation of late
 
     def after_sending(self, sent: ActuatorCommand) -> CascadeMemory:
         """The memory for the next tick, once the safety gate has decided."""
@@ -73,7 +90,11 @@ class CascadeMemory(NamedTuple):
 def at_rest(airframe: Airframe, estimate: StateEstimate) -> CascadeMemory:
     """Memory of a vehicle whose rotors stand still."""
     return CascadeMemory(
-        STOPPED.rotor_thrust, STOPPED, Observed(estimate.v_WB, _NONE), airframe.mass
+        STOPPED.rotor_thrust,
+        STOPPED,
+        Observed(estimate.v_WB, _NONE),
+        airframe.mass,
+        joints=joints_at_rest(airframe, estimate),
     )
 
 
@@ -82,7 +103,11 @@ def in_hover(airframe: Airframe, estimate: StateEstimate) -> CascadeMemory:
     each = 0.25 * airframe.mass * GRAVITY
     thrust = (each, each, each, each)
     return CascadeMemory(
-        thrust, ActuatorCommand(thrust, (0.0, 0.0)), Observed(estimate.v_WB, _NONE), airframe.mass
+        thrust,
+        ActuatorCommand(thrust, (0.0, 0.0)),
+        Observed(estimate.v_WB, _NONE),
+        airframe.mass,
+        joints=joints_at_rest(airframe, estimate),
     )
 
 
@@ -163,11 +188,13 @@ class Cascade:
         zones: NDArray[np.float64] = NO_ZONES,
     ) -> tuple[ActuatorCommand, CascadeMemory, Guarded]:
         """See ``close_loops``, of which this is the machine code."""
-        sent, rotors, believed, mass, integrals, guarded = self._close_loops(
+        sent, rotors, believed, mass, integrals, joints, off_plan, guarded = self._close_loops(
             self._packed, memory, estimate, plan, u, ticks, zones
         )
         command = ActuatorCommand(*sent)
-        kept = CascadeMemory(rotors, command, Observed(*believed), mass, *integrals)
+        kept = CascadeMemory(
+            rotors, command, Observed(*believed), mass, *integrals, JointMemory(*joints), off_plan
+        )
         return command, kept, guarded
 
 
@@ -192,36 +219,53 @@ def close_loops(
         rotors = lag_rotors(rotors, memory.commanded.rotor_thrust, law.rotor_decay)
     mass = estimate_mass(airframe, memory.mass, rotors, estimate.specific_force, dt * ticks)
     motion = motion_state(airframe, mass, estimate, rotors, memory.commanded.joint_torque[0])
+    arm = hanging_arm(airframe, estimate.q_arm)
+    v = velocity_of_mass(estimate, arm.depth)
     for _ in range(ticks):
-        observed = observe(observed, estimate.v_WB, motion.a, tuning.tracking, dt)
+        observed = observe(observed, v, motion.a, tuning.tracking, dt)
     attitude, height, guarded = memory.attitude, memory.height, (False, math.inf)
     if zones.shape[0] > 0 and law.filter.tuning.enabled > 0:
         plan, u, guarded = _kept_off(law, zones, estimate, motion, observed, plan, u)
     if law.follows_plan:
-        (wdx, wdy), thrust = follow_plan(law.tracking, mass, estimate, motion, observed, plan, u)
+        (wdx, wdy), thrust = follow_plan(
+            law.tracking, mass, arm.depth, estimate, motion, observed, plan, u
+        )
         wdz = u.yaw_acc + _yaw_correction(tuning.yaw, estimate, plan)
+        roll_inertia = arm.roll_inertia
     else:
         (wdx, wdy, wdz), attitude = attitude_pid(
             tuning.attitude, attitude, estimate, attitude_reference(u.a, plan.yaw), dt
         )
+        roll_inertia = airframe.inertia[0]  # the paper's loop knows no arm
         thrust, height = height_pid(airframe, tuning.height, height, estimate, plan, u, dt)
-    q_ref, qd_ref = plan.q_arm, plan.qd_arm
+    wdx, wdy, wdz = limited_turn(airframe, estimate, motion.turning, (wdx, wdy, wdz))
+    wanted, off_plan = (plan.q_arm, plan.qd_arm), memory.off_plan
     if law.follows_plan and tuning.compensate:
-        q_ref, qd_ref = compensated_joints(airframe, tuning.compensation, estimate, plan)
-    joints, kept = joint_torques(
+        off_plan = lately_off_plan(tuning.compensation, off_plan, estimate, plan, dt * ticks)
+        wanted = compensated_joints(
+            airframe, tuning.compensation, tuning.joint_limits, off_plan, estimate, plan
+        )
+    q_ref, qd_ref = joint_reference(
+        airframe, tuning.joint_limits, memory.joints.reference, wanted, dt * ticks
+    )
+    dynamics = arm_dynamics(airframe, estimate, _field(estimate, motion.thrust / mass, observed.d))
+    arm_memory = memory.joints
+    for _ in range(ticks):
+        arm_memory = observe_disturbance(arm_memory, dynamics, memory.commanded.joint_torque, dt)
+    joints, arm_memory = joint_torques(
         airframe,
         tuning.joint,
-        memory.joints,
+        arm_memory,
         estimate,
         (q_ref, qd_ref, u.qdd_arm),
-        motion.thrust / mass,
-        wdy,
+        dynamics,
+        motion.turning[1],  # not what is commanded: the rotors take 40 ms to give it
         dt,
     )
-    torque = _body_torque(airframe, estimate, (wdx, wdy, wdz), joints[0])
+    torque = _body_torque(airframe, roll_inertia, estimate, (wdx, wdy, wdz), joints[0])
     rotor_thrust = allocate(airframe, torque, thrust, tuning.yaw_thrust_limit)
     command = ActuatorCommand(rotor_thrust, joints)
-    memory = CascadeMemory(rotors, command, observed, mass, attitude, height, kept)
+    memory = CascadeMemory(rotors, command, observed, mass, attitude, height, arm_memory, off_plan)
     return command, memory, guarded
 
 
@@ -275,7 +319,14 @@ def _close_loops(
     ticks: int,
     zones: NDArray[np.float64],
 ) -> tuple[
-    tuple[Vec4, Vec2], Vec4, tuple[Vec3, Vec3, Vec2], float, tuple[Vec3, float, Vec2], Guarded
+    tuple[Vec4, Vec2],
+    Vec4,
+    tuple[Vec3, Vec3, Vec2],
+    float,
+    tuple[Vec3, float],
+    tuple[Vec2, Vec2, Vec2, Vec2],
+    float,
+    Guarded,
 ]:
     """``close_loops`` that returns plain tuples, which leave machine code at half the cost."""
     command, kept, guarded = close_loops(law[0], memory, estimate, plan, u, ticks, zones)
@@ -284,7 +335,14 @@ def _close_loops(
         kept.rotors,
         (kept.observed.v, kept.observed.d, kept.observed.disturbance_bias),
         kept.mass,
-        (kept.attitude, kept.height, kept.joints),
+        (kept.attitude, kept.height),
+        (
+            kept.joints.reference,
+            kept.joints.momentum,
+            kept.joints.disturbance,
+            kept.joints.integral,
+        ),
+        kept.off_plan,
         guarded,
     )
 
@@ -297,15 +355,26 @@ def _yaw_correction(gains: PidGains, estimate: StateEstimate, plan: PredictionSt
 
 
 @compilable
+def _field(estimate: StateEstimate, specific_thrust: float, d: Vec3) -> Vec2:
+    """Gravity minus the base's acceleration [m/s^2] along body x and z."""
+    pushed_x, _, pushed_z = rotate_back(estimate.R_WB, d)
+    return -pushed_x, specific_thrust - pushed_z
+
+
+@compilable
 def _body_torque(
-    airframe: Airframe, estimate: StateEstimate, wd: Vec3, joint1_torque: float
+    airframe: Airframe,
+    roll_inertia: float,
+    estimate: StateEstimate,
+    wd: Vec3,
+    joint1_torque: float,
 ) -> Vec3:
     """Rotor torque for an angular acceleration: inertia, gyroscopic part, arm's reaction."""
     inertia = airframe.inertia
     ix, iy, iz = inertia[0], inertia[1], inertia[2]
     wx, wy, wz = estimate.w_WB_B
     return (
-        ix * wd[0] + (iz - iy) * wy * wz,
+        roll_inertia * wd[0] + (iz - iy) * wy * wz,
         iy * wd[1] + (ix - iz) * wz * wx + joint1_torque,
         iz * wd[2] + (iy - ix) * wx * wy,
     )

@@ -12,8 +12,9 @@ keeps h from falling faster than :math:`-\gamma h`, with :math:`d_r` left for wh
 of the disturbance. An acceleration that is less is brought to b along n: the nearest one that
 keeps the condition, in closed form; several zones are satisfied one after the other, a few times.
 
-Every part of the body, the arm as it is now too, is taken to move as the base does: to push a
-swinging arm off by the base would first swing it on.
+Parts on the base are taken to move as its origin does. Parts on the arm count for the margin that
+is reported and not for the acceleration: to push a swinging arm off by the base would first swing
+it on, and the arm compensates by itself.
 
 The planner's own bound is :math:`h \ge \lambda`; this law has none, so in flights that go as
 planned it changes no bit. Its command can be no more than the loops stand.
@@ -29,7 +30,7 @@ from numpy.typing import NDArray
 
 from fsw.barriers.safe_approach import BarrierTuning, safe_approach_slope, safe_approach_speed
 from fsw.compiled import compilable
-from fsw.geometry.rotation import rotate
+from fsw.geometry.rotation import rotate, rotate_back
 from fsw.geometry.vectors import add_scaled, clamp, dot, subtract
 from fsw.model.body import ON_LINK2, Body
 from fsw.shapes.kind import NUMBERS
@@ -37,6 +38,7 @@ from fsw.shapes.zones import FIRST, FOLLOWS, surface_at, zone_arrays
 from fsw.signals import EndEffectorTarget, SafeSet, StateEstimate, Vec2, Vec3
 
 _PASSES = 4  # over all zones
+_DISC_STEPS = 5  # from a disc to a zone and back
 _MOVE = FIRST + NUMBERS  # columns of a zone's movement: velocity, where it is at a time, that time
 _COLUMNS = _MOVE + 7
 _ON, _Z, _RADIUS, _RIM = 0, 3, 4, 5  # columns of a part
@@ -49,9 +51,9 @@ class FilterTuning:
     """The barrier condition, for zones and for the sphere that follows the target."""
 
     gamma: float = 3.0  # 1/s
-    # m/s^2, d_r. Beside a wall the loops fall short of the condition by up to 1 against the assumed
-    # disturbance (the end-effector in walls): what they do by themselves is left alone.
-    allowance: float = -2.0
+    # m/s^2, d_r. In workspace the loops fall short of the condition by 0.2 against the assumed
+    # disturbance; in walls and branches 0.4 is left. What they do by themselves is left alone.
+    allowance: float = -1.0
     near: float = 0.6  # m from the base; what is farther off is left out
     vertical: float = 3.0  # m/s^2, at most
     enabled: int = 1  # 0: the loops' own acceleration is realised
@@ -185,29 +187,54 @@ def _condition(
 
     In m/s^2 and m.
     """
-    p, radius, rim = estimate.p_WB, 0.0, 0.0
+    p, radius = estimate.p_WB, 0.0
     alpha, slope = law.kept[0], law.kept[1]
     if follows:
         alpha, slope = law.following[0], law.following[1]
     else:
         p = add_scaled(p, _place(law, part, estimate), 1.0)
-        radius, rim = law.parts[part][_RADIUS], law.parts[part][_RIM]
+        radius = law.parts[part][_RADIUS]
+        if law.parts[part][_RIM] > 0.0:
+            p = _nearest_of_disc(law, zones, zone, part, shift, estimate, p)
     x, y, z = subtract(p, shift)
     at = surface_at(zones, zone, 0, x, y, z)
     n = (at.nx, at.ny, at.nz)
     distance = at.distance - radius
-    if rim > 0.0:  # the normal's share in the disc's plane
-        R = estimate.R_WB
-        up = n[0] * R[2] + n[1] * R[5] + n[2] * R[8]
-        distance -= rim * math.sqrt(max(1.0 - up * up, 0.0))
     tau = law.lag
     approach, along = dot(n, subtract(v, drift)), dot(n, a)
     ahead = distance + tau * (approach + 0.5 * tau * along)
     rate_ahead = approach + tau * along
     h = safe_approach_speed(ahead, alpha, slope) + rate_ahead
     steepness = safe_approach_slope(ahead, alpha, slope)
+    if not follows and law.parts[part][_ON] > 0.0:
+        return n, -math.inf, distance
     least = law.tuning.allowance - law.tuning.gamma * h - steepness * rate_ahead
     return n, least, distance
+
+
+@compilable
+def _nearest_of_disc(
+    law: FilterLaw,
+    zones: NDArray[np.float64],
+    zone: int,
+    part: int,
+    shift: Vec3,
+    estimate: StateEstimate,
+    centre: Vec3,
+) -> Vec3:
+    """The place of a disc nearest to a zone [m, NED], by projecting from one to the other."""
+    p, numbers, R = centre, law.parts[part], estimate.R_WB
+    for _ in range(_DISC_STEPS):
+        x, y, z = subtract(p, shift)
+        at = surface_at(zones, zone, 0, x, y, z)
+        step = max(at.distance, 0.05)
+        aim = add_scaled(p, (at.nx, at.ny, at.nz), -step)
+        ax, ay, _ = rotate_back(R, subtract(aim, centre))
+        length = math.sqrt(ax * ax + ay * ay)
+        if length > numbers[_RIM]:
+            ax, ay = numbers[_RIM] / length * ax, numbers[_RIM] / length * ay
+        p = add_scaled(centre, rotate(R, (ax, ay, 0.0)), 1.0)
+    return p
 
 
 @compilable

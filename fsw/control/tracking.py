@@ -13,6 +13,9 @@ milliseconds; of what lasts, wind, :math:`\bar d` keeps the mean and all of it i
 The body's angular acceleration then solves
 :math:`-f(\dot\omega_y b_1 - \dot\omega_x b_2) = w`. Height is the same with one stage.
 
+Across the arm's plane the point that accelerates as the thrust leans is the centre of mass, a
+little below the body origin: position and velocity of the laws are those of that point.
+
 Source: docs/equations.md T2; docs/decisions/0005-tracking-inner-loop.md.
 """
 
@@ -127,22 +130,31 @@ def snap_command(
     a_ref = clamp_magnitude(wanted, tuning.acceleration_limit)
     j_ref = plan.j + k3 / k4 * (a_ref - vehicle.a)
     # A jerk that can still be stopped before the acceleration overshoots.
-    stoppable = math.sqrt(60.0 * (abs(a_ref - vehicle.a) + 0.15))
+    stoppable = math.sqrt(2.0 * tuning.stopping_snap * (abs(a_ref - vehicle.a) + 0.15))
     j_ref = clamp_magnitude(j_ref, min(tuning.jerk_limit, stoppable))
     return lag.kp * (u - plan.a) - lag.kd * plan.j + k5 * e_s + k4 * (j_ref - vehicle.j)
 
 
 @compilable
 def vertical_acceleration(
-    law: TrackingLaw, p: Vec3, v: Vec3, a: Vec3, plan: PredictionState, u: PlanInput
+    law: TrackingLaw,
+    p: Vec3,
+    v: Vec3,
+    a: Vec3,
+    d: float,
+    plan: PredictionState,
+    u: PlanInput,
 ) -> float:
     """Acceleration down [m/s^2] that the law asks for.
 
-    ``p`` [m, NED], ``v`` [m/s, NED] and ``a`` [m/s^2, NED] are the body's.
+    ``p`` [m, NED], ``v`` [m/s, NED] and ``a`` [m/s^2, NED] are the body's, ``d`` [m/s^2] is the
+    observed disturbance downwards.
     """
     k_z = law.gains.k_vertical
     k1, k2, k3 = k_z[0], k_z[1], k_z[2]
-    return u.a[2] + k1 * (plan.p[2] - p[2]) + k2 * (plan.v[2] - v[2]) + k3 * (plan.a[2] - a[2])
+    a_z = u.a[2] + k1 * (plan.p[2] - p[2]) + k2 * (plan.v[2] - v[2]) + k3 * (plan.a[2] - a[2])
+    d_z = clamp_magnitude(d, law.tuning.vertical_disturbance_limit)
+    return a_z - law.gains.k_vertical_disturbance * d_z
 
 
 @compilable
@@ -170,13 +182,21 @@ def wanted_accelerations(
         observed.disturbance_bias[1],
         AxisState(plan.p[1], plan.v[1], plan.a[1], plan.j[1], plan.s[1]),
     )
-    return x, y, vertical_acceleration(law, p, v, a, plan, u)
+    return x, y, vertical_acceleration(law, p, v, a, observed.d[2], plan, u)
+
+
+@compilable
+def velocity_of_mass(estimate: StateEstimate, depth: float) -> Vec3:
+    """Velocity [m/s, NED] ``depth`` [m] below the origin, as far as rolling makes it another."""
+    R, v, swing = estimate.R_WB, estimate.v_WB, depth * estimate.w_WB_B[0]
+    return v[0] - swing * R[1], v[1] - swing * R[4], v[2]
 
 
 @compilable
 def follow_plan(
     law: TrackingLaw,
     mass: float,
+    depth: float,
     estimate: StateEstimate,
     motion: MotionState,
     observed: Observed,
@@ -185,20 +205,24 @@ def follow_plan(
 ) -> tuple[Vec2, float]:
     """Angular acceleration about body x and y [rad/s^2] and total thrust [N].
 
-    ``mass`` [kg] is the whole vehicle's, as estimated in flight; the observed velocity is without
-    the reading's noise.
+    ``mass`` [kg] is the whole vehicle's, as estimated in flight, its centre ``depth`` [m] below the
+    origin; the observed velocity is that of the centre, without the reading's noise.
     """
-    p, v = estimate.p_WB, observed.v
-    wx = _horizontal_snap(law, 0, estimate, motion, observed, plan, u)
-    wy = _horizontal_snap(law, 1, estimate, motion, observed, plan, u)
-    R = estimate.R_WB
+    p, v, R = estimate.p_WB, observed.v, estimate.R_WB
+    north, east = -math.sin(estimate.yaw), math.cos(estimate.yaw)  # to the right, level
+    # How much further to the right than the plan's the centre of mass hangs, and goes.
+    lean = north * (R[2] + plan.a[0] / GRAVITY) + east * (R[5] + plan.a[1] / GRAVITY)
+    drift = (north * plan.j[0] + east * plan.j[1]) / GRAVITY
+    aside = (depth * lean, depth * drift)
+    wx = _horizontal_snap(law, 0, estimate, motion, observed, plan, u, aside, north)
+    wy = _horizontal_snap(law, 1, estimate, motion, observed, plan, u, aside, east)
     f = max(motion.thrust / mass, _LEAST_SPECIFIC_THRUST)
     # -f [b1_xy, -b2_xy] [wdy; wdx] = w_xy; the determinant is -R33, far from zero in flight.
     determinant = R[0] * -R[4] + R[1] * R[3]
     wdy = (wx * -R[4] + R[1] * wy) / (-f * determinant)
     wdx = (R[0] * wy - R[3] * wx) / (-f * determinant)
 
-    a_z = vertical_acceleration(law, p, v, motion.a, plan, u)
+    a_z = vertical_acceleration(law, p, v, motion.a, observed.d[2], plan, u)
     thrust = mass * (GRAVITY - a_z) / max(R[8], 0.5)
     return (wdx, wdy), thrust
 
@@ -212,9 +236,12 @@ def _horizontal_snap(
     observed: Observed,
     plan: PredictionState,
     u: PlanInput,
+    aside: Vec2,
+    share: float,
 ) -> float:
-    p, v, a, j, s = estimate.p_WB, observed.v, motion.a, motion.j, motion.s
-    vehicle = AxisState(p[axis], v[axis], a[axis], j[axis], s[axis])
+    v, a, j, s = observed.v, motion.a, motion.j, motion.s
+    p = estimate.p_WB[axis] + share * aside[0]
+    vehicle = AxisState(p, v[axis] + share * aside[1], a[axis], j[axis], s[axis])
     planned = AxisState(plan.p[axis], plan.v[axis], plan.a[axis], plan.j[axis], plan.s[axis])
     return snap_command(
         law, vehicle, observed.d[axis], observed.disturbance_bias[axis], planned, u.a[axis]

@@ -13,14 +13,19 @@ near; ``expected_peak`` is 3.7 standard deviations, about one in five thousand.
 The memory of wind is not linear, because it is limited. It acts on the loop as a second
 disturbance within that limit, and the worst that both can do together bounds what they do.
 
-The loop stays linear while the snap it commands stays within what the rotors' torque can
-give; ``peak_snap_share`` says how much of that is used.
+All of this is true only while no limit on the way from the error to the rotors is reached. The
+same sum over the response of what meets a limit is the most that it can be asked for, so
+``limits_used`` tells exactly up to which disturbance of one axis the loop is linear.
+
+Pushed on all axes at once, the thrust that holds the height also accelerates sideways, as far as
+the vehicle leans. ``all_axes`` counts that as more disturbance.
 
 Source: docs/equations.md T4.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -30,6 +35,7 @@ from scipy.linalg import expm
 from fsw.control.gains import TrackingGains, TrackingTuning
 from fsw.model.airframe import GRAVITY, Airframe
 from fsw.model.prediction import Array
+from fsw.model.rotors import hanging_arm
 
 _SETTLED_S = 6.0  # the slowest mode has decayed by e^-16 then
 _RARE = 3.7  # standard deviations
@@ -42,10 +48,17 @@ class Tube:
     base: float  # m, worst case, body origin
     end_effector: float  # m, worst case, a hanging end-effector across the arm's plane
     base_wind: float  # m, what the memory of wind can add to it, at its limit
+    height: float  # m, worst case, vertically
     end_effector_wind: float  # m
     base_expected: float  # m, 3.7 sigma under random steps
     end_effector_expected: float  # m
-    snap_expected: float  # m/s^4
+    # The most that each quantity can be, worst case:
+    acceleration: float  # m/s^2
+    wanted_acceleration: float  # m/s^2
+    acceleration_error: float  # m/s^2, wanted less present
+    jerk: float  # m/s^3, wanted
+    snap: float  # m/s^4, wanted
+    vertical_acceleration: float  # m/s^2
 
 
 @lru_cache(maxsize=8)  # 4 ms; most changes of a tuning do not touch it
@@ -63,32 +76,86 @@ def tube(
     ``hold_s``.
     """
     below = hanging / GRAVITY
-    base, acceleration, snap = _impulse_responses(airframe, tuning, gains, dt, wind=False)
+    states = _impulse_responses(airframe, tuning, gains, dt, wind=False)
+    base, acceleration = states[:, 0], states[:, 2]
+    k3, k4 = gains.k[2], gains.k[3]
+    wanted = states @ _wanted_acceleration(gains)
     end_effector = base - below * acceleration
-    base_wind, acceleration, _ = _impulse_responses(airframe, tuning, gains, dt, wind=True)
-    end_effector_wind = base_wind - below * acceleration
+    in_wind = _impulse_responses(airframe, tuning, gains, dt, wind=True)
+    base_wind = in_wind[:, 0]
+    end_effector_wind = base_wind - below * in_wind[:, 2]
+    climbs = _vertical_responses(airframe, tuning, gains, dt)
     per_hold = round(hold_s / dt)
     return Tube(
-        float(np.abs(base).sum()),
-        float(np.abs(end_effector).sum()),
-        tuning.wind_limit * float(np.abs(base_wind).sum()),
-        tuning.wind_limit * float(np.abs(end_effector_wind).sum()),
-        *(_RARE * _random_steps(response, per_hold) for response in (base, end_effector, snap)),
+        base=_sum(base),
+        end_effector=_sum(end_effector),
+        base_wind=tuning.wind_limit * _sum(base_wind),
+        height=_sum(climbs[:, 0]),
+        end_effector_wind=tuning.wind_limit * _sum(end_effector_wind),
+        base_expected=_RARE * _random_steps(base, per_hold),
+        end_effector_expected=_RARE * _random_steps(end_effector, per_hold),
+        acceleration=_sum(acceleration),
+        wanted_acceleration=_sum(wanted),
+        acceleration_error=_sum(wanted - acceleration),
+        jerk=k3 / k4 * _sum(wanted - acceleration),
+        snap=_sum(states @ _wanted_snap(gains)),
+        vertical_acceleration=_sum(climbs[:, 2]),
     )
 
 
-def peak_snap_share(airframe: Airframe, tube_per_unit: Tube, disturbance: float) -> float:
-    """Share of the rotors' snap in hover that a ``disturbance`` [m/s^2] uses."""
+def limits_used(
+    airframe: Airframe, tuning: TrackingTuning, loop: Tube, disturbance: float
+) -> dict[str, float]:
+    """Share of every limit of the loop that the worst ``disturbance`` [m/s^2] of one axis uses."""
+    stopping = 2.0 * tuning.stopping_snap * (disturbance * loop.acceleration_error + 0.15)
+    return {
+        "vertical disturbance": disturbance / tuning.vertical_disturbance_limit,
+        "rotor torque": disturbance * loop.snap / _snap_in_hover(airframe),
+        "position error": (disturbance * loop.base + loop.base_wind) / tuning.position_error_limit,
+        "acceleration": (disturbance * loop.wanted_acceleration + tuning.wind_limit)
+        / tuning.acceleration_limit,
+        "jerk": disturbance * loop.jerk / min(tuning.jerk_limit, math.sqrt(stopping)),
+    }
+
+
+def all_axes(loop: Tube, disturbance: float) -> tuple[float, float]:
+    """Reach [m] on a horizontal axis and vertically under a ``disturbance`` [m/s^2] on every axis.
+
+    The change of thrust that holds the height accelerates sideways by as much times the lean. What
+    a lean takes from the height is found by measurement, and less than half of its reach.
+    """
+    lean = disturbance * loop.acceleration / GRAVITY
+    aside = lean * disturbance * loop.vertical_acceleration
+    return (disturbance + aside) * loop.base + loop.base_wind, 1.5 * disturbance * loop.height
+
+
+def _snap_in_hover(airframe: Airframe) -> float:
+    """The snap [m/s^4] that the torque about one axis gives; straight down the arm weighs most."""
     hover = airframe.mass * GRAVITY / 4.0
     headroom = min(hover, airframe.rotor_thrust_max - hover)
-    limit = GRAVITY * 2.0 * airframe.rotor_arm * headroom / max(airframe.inertia[:2])
-    return tube_per_unit.snap_expected * disturbance / limit
+    inertia = max(hanging_arm(airframe, (0.0, 0.0)).roll_inertia, airframe.inertia[1])
+    return GRAVITY * 2.0 * airframe.rotor_arm * headroom / inertia
+
+
+def _sum(response: Array) -> float:
+    return float(np.abs(response).sum())
+
+
+def _wanted_acceleration(gains: TrackingGains) -> Array:
+    """The law's A as a row on the states of the loop, see ``fsw/control/tracking.py``."""
+    k = gains.k
+    return np.array([-k[0], 0.0, 0.0, 0.0, 0.0, -k[1], -gains.k_disturbance]) / k[2]
+
+
+def _wanted_snap(gains: TrackingGains) -> Array:
+    k = gains.k
+    return np.array([-k[0], 0.0, -k[2], -k[3], -k[4], -k[1], -gains.k_disturbance])
 
 
 def _impulse_responses(
     airframe: Airframe, tuning: TrackingTuning, gains: TrackingGains, dt: float, *, wind: bool
-) -> tuple[Array, Array, Array]:
-    """Position, acceleration and commanded snap after a unit push of one tick, per tick.
+) -> Array:
+    """States after a unit push of one tick, a row per tick: p, v, a, j, s and the observer's v, d.
 
     The push is a disturbance, or a memory of wind that is of no disturbance.
     """
@@ -97,26 +164,47 @@ def _impulse_responses(
     n = 7
     a = np.zeros((n, n))
     a[:4, 1:5] = np.eye(4)
-    snap = np.array([-k[0], 0.0, -k[2], -k[3], -k[4], -k[1], -kd])
-    a[4] = snap / airframe.rotor_lag
+    a[4] = _wanted_snap(gains) / airframe.rotor_lag
     a[4, 4] -= 1.0 / airframe.rotor_lag
     gain_v, gain_d = 2.0 * bandwidth, bandwidth**2
     a[5] = [0.0, gain_v, 1.0, 0.0, 0.0, -gain_v, 1.0]
     a[6] = [0.0, gain_d, 0.0, 0.0, 0.0, -gain_d, 0.0]
-    block = np.zeros((n + 1, n + 1))
-    block[:n, :n] = a * dt
+    b = np.zeros(n)
     if wind:
-        block[4, n] = dt * (kd - k[2]) / airframe.rotor_lag
+        b[4] = (kd - k[2]) / airframe.rotor_lag
     else:
-        block[1, n] = dt
+        b[1] = 1.0
+    return _after_a_push(a, b, dt)
+
+
+def _vertical_responses(
+    airframe: Airframe, tuning: TrackingTuning, gains: TrackingGains, dt: float
+) -> Array:
+    """States after a unit disturbance of one tick, a row per tick: p, v, a, the observer's v, d."""
+    k, bandwidth = gains.k_vertical, tuning.observer_bandwidth
+    a = np.zeros((5, 5))
+    a[:2, 1:3] = np.eye(2)
+    wanted = np.array([-k[0], 0.0, -k[2], -k[1], -gains.k_vertical_disturbance])
+    a[2] = wanted / airframe.rotor_lag
+    a[2, 2] -= 1.0 / airframe.rotor_lag
+    gain_v, gain_d = 2.0 * bandwidth, bandwidth**2
+    a[3] = [0.0, gain_v, 1.0, -gain_v, 1.0]
+    a[4] = [0.0, gain_d, 0.0, -gain_d, 0.0]
+    return _after_a_push(a, np.array([0.0, 1.0, 0.0, 0.0, 0.0]), dt)
+
+
+def _after_a_push(a: Array, b: Array, dt: float) -> Array:
+    """States of ``x' = a x + b d`` from one tick of d = 1 on, a row per tick."""
+    n = len(a)
+    block = np.zeros((n + 1, n + 1))
+    block[:n, :n], block[:n, n] = a * dt, b * dt
     exponential = expm(block)
     x = exponential[:n, n]
     states = []
     for _ in range(round(_SETTLED_S / dt)):
         states.append(x)
         x = exponential[:n, :n] @ x
-    history = np.array(states)
-    return history[:, 0], history[:, 2], history @ snap
+    return np.array(states)
 
 
 def _random_steps(response: Array, per_hold: int) -> float:

@@ -14,6 +14,7 @@ from fsw.geometry.vectors import clamp_magnitude
 from fsw.model.airframe import Airframe
 from fsw.model.nominal import NominalModel
 from fsw.model.rotors import MotionState
+from fsw.mpc.qp_data import InputLimits
 from fsw.parameters.flight_config import FlightConfig
 from fsw.signals import (
     Plan,
@@ -23,8 +24,6 @@ from fsw.signals import (
     StateEstimate,
     Vec3,
 )
-
-_JOINT_RATE = 3.0  # rad/s, which the plan stops within its horizon
 
 
 def nominal_at_rest(estimate: StateEstimate) -> PredictionState:
@@ -61,16 +60,19 @@ def measured_state(estimate: StateEstimate, motion: MotionState) -> PredictionSt
     )
 
 
-def with_arm_in_bounds(x: PredictionState, airframe: Airframe) -> PredictionState:
+def with_arm_in_bounds(
+    x: PredictionState, airframe: Airframe, limits: InputLimits
+) -> PredictionState:
     """The state with the arm in the nearest pose and at the nearest rate to plan from.
 
     A hard push slings the arm about. A plan that began with it so would need seconds to catch it,
     and the arm would follow the plan round and round.
     """
-    th1 = clamp_magnitude(x.q_arm[0], airframe.joint1_limit)
-    th12 = clamp_magnitude(x.q_arm[0] + x.q_arm[1], airframe.joint12_limit)
+    margin, rate = limits.joint_margin, limits.joint_rate
+    th1 = clamp_magnitude(x.q_arm[0], airframe.joint1_limit - margin)
+    th12 = clamp_magnitude(x.q_arm[0] + x.q_arm[1], airframe.joint12_limit - margin)
     first, second = x.qd_arm
-    rates = (clamp_magnitude(first, _JOINT_RATE), clamp_magnitude(second, _JOINT_RATE))
+    rates = (clamp_magnitude(first, rate), clamp_magnitude(second, rate))
     return x._replace(q_arm=(th1, th12 - th1), qd_arm=rates)
 
 
@@ -197,7 +199,7 @@ class PlanExchange:
         if from_nominal:
             u = plan_input(memory.running, nominal, now_us, self._brake)
             return self._model.advance(nominal, u, delay), True
-        settled = with_arm_in_bounds(measured, config.airframe)
+        settled = with_arm_in_bounds(measured, config.airframe, config.planner.limits)
         return coast(settled, delay * config.tick_period_us * 1e-6), False
 
 

@@ -187,15 +187,19 @@ class SafeSetCheck:
         if safe_set != mission.safe_set:
             findings = self.analyse(safe_set)
             against = refusals(findings)
-            # Where a zone moves, another set comes ten times a second: what is known is not said.
-            known = {finding.statement for finding in self.analyse(mission.safe_set)}
-            new = [text for text in against if text not in known]
-            texts += [StatusText(Severity.WARNING, text) for text in new]
-            told = [text for text in warnings(findings) if text not in known]
-            texts += [StatusText(Severity.INFO, text) for text in told]
+            # Where a zone moves, there is another set ten times a second: what is known is not
+            # said again.
+            last = mission.refused.safe_set if mission.refused else mission.safe_set
+            known = {finding.statement for finding in self.analyse(last)}
+            new = [StatusText(Severity.WARNING, text) for text in against if text not in known]
+            new += [
+                StatusText(Severity.INFO, text) for text in warnings(findings) if text not in known
+            ]
+            texts += new
             if against and not self._config.soft and flies:
-                text = f"safe set refused: the old one is kept; wanted: {change}"
-                texts.append(StatusText(Severity.WARNING, text))
+                if new:
+                    text = f"safe set refused: the old one is kept; wanted: {change}"
+                    texts.append(StatusText(Severity.WARNING, text))
                 return mission
             if self._config.soft:
                 against = ()

@@ -226,13 +226,13 @@ class Inbox:
         self._announce(SafeSet((sphere,)))
 
 
-def _begun(announced: SafeSetAnnouncement, now_us: int) -> SafeSetAnnouncement:
-    """The announcement with zones that move, and did not say since when, where they are now."""
-    zones = announced.safe_set.zones
+def _begun(announcement: SafeSetAnnouncement, now_us: int) -> SafeSetAnnouncement:
+    """The same with zones that move, and did not say since when, where they are now."""
+    zones = announcement.safe_set.zones
     if all(zone.t_us or not any(zone.velocity) for zone in zones):
-        return announced
-    begun = [
+        return announcement
+    begun = (
         replace(zone, t_us=now_us) if any(zone.velocity) and not zone.t_us else zone
         for zone in zones
-    ]
-    return replace(announced, safe_set=SafeSet(tuple(begun)))
+    )
+    return SafeSetAnnouncement(announcement.source, SafeSet(tuple(begun)))

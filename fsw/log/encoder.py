@@ -210,10 +210,10 @@ class LogEncoder:
 
     def _planning(self, snapshot: FlightSnapshot) -> bytes:
         t_us, report, target = snapshot.t_us, snapshot.constraints, snapshot.reference
+        safety = snapshot.safety
         margins, barrier, smallest = report.shown(topics.MARGINS)
         least = min(report.margins, default=math.nan)
         argmin = 0xFF if smallest is None else smallest
-        safety = snapshot.safety
         p, v = point_in_flight(snapshot.estimate, self._link_length)
         wanted = (
             (*_NOWHERE, *_NOWHERE, math.nan)

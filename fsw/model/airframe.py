@@ -56,6 +56,14 @@ class Airframe:
     joint_torque_max: float = 2.0  # N m, our choice
     joint1_limit: float = math.pi / 3.0  # rad, |th1|
     joint12_limit: float = math.pi / 2.0  # rad, |th1 + th2|
+    # A servo of 2.5 N m stall torque and 5.8 rad/s without load, common in this class, still turns
+    # at 5 rad/s against the arm's weight.
+    joint_rate_max: float = 5.0  # rad/s, each joint, our choice
+    # The planner's pi / 10 of Table I and what cancels 0.8 m/s^2 on both axes at once: 23.8 deg.
+    tilt_max: float = math.radians(25.0)  # rad, of the body's z axis against the vertical
+    # Roll and pitch: the fast loop's jerk of 20 m/s^3 on both axes turns a hovering body at
+    # 2.9 rad/s. Yaw: three times what a setpoint may turn.
+    body_rate_max: Vec2 = (3.0, 1.0)  # rad/s, of roll and pitch together, and of yaw
     leg_length: float = 0.32  # m, body origin above ground when standing
     size: BodySize = field(default_factory=BodySize)
 

@@ -33,6 +33,7 @@ class MotionState(NamedTuple):
     a: Vec3  # m/s^2, without disturbance
     j: Vec2  # m/s^3, horizontal
     s: Vec2  # m/s^4, horizontal
+    turning: Vec2 = (0.0, 0.0)  # rad/s^2, about body x and y
 
 
 @compilable
@@ -69,6 +70,25 @@ def estimate_mass(
     return clamp(moved, 0.7 * airframe.mass, 1.3 * airframe.mass)
 
 
+class HangingArm(NamedTuple):
+    """What the arm adds to a roll; in pitch its drives push off the base instead."""
+
+    roll_inertia: float  # kg m^2 of the whole vehicle, about its centre of mass
+    depth: float  # m, centre of mass below the body origin
+
+
+@compilable
+def hanging_arm(airframe: Airframe, q_arm: Vec2) -> HangingArm:
+    """The arm as a rigid pendulum across its plane, at the joint angles ``q_arm`` [rad]."""
+    upright1, upright2 = math.cos(q_arm[0]), math.cos(q_arm[0] + q_arm[1])
+    m1, m2 = airframe.link_mass[0], airframe.link_mass[1]
+    z1 = airframe.link_com[0] * upright1
+    z2 = airframe.link_length[0] * upright1 + airframe.link_com[1] * upright2
+    depth = (m1 * z1 + m2 * z2) / airframe.mass
+    inertia = airframe.inertia[0] + m1 * z1 * z1 + m2 * z2 * z2
+    return HangingArm(inertia - airframe.mass * depth * depth, depth)
+
+
 @compilable
 def motion_state(
     airframe: Airframe, mass: float, estimate: StateEstimate, rotors: Vec4, joint1_torque: float
@@ -83,11 +103,12 @@ def motion_state(
     f1, f2, f3, f4 = rotors
     thrust = f1 + f2 + f3 + f4
     f = thrust / mass
-    wdx = airframe.rotor_arm * (f2 - f4) / airframe.inertia[0]
+    wdx = airframe.rotor_arm * (f2 - f4) / hanging_arm(airframe, estimate.q_arm).roll_inertia
     wdy = (airframe.rotor_arm * (f3 - f1) - joint1_torque) / airframe.inertia[1]
     return MotionState(
         thrust,
         (-f * R[2], -f * R[5], GRAVITY - f * R[8]),
         (-f * (wy * R[0] - wx * R[1]), -f * (wy * R[3] - wx * R[4])),
         (-f * (wdy * R[0] - wdx * R[1]), -f * (wdy * R[3] - wdx * R[4])),
+        (wdx, wdy),
     )

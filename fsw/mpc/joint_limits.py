@@ -1,4 +1,4 @@
-"""Joint-angle limits (Table I) as soft rows: a disturbed arm may be found outside."""
+"""Joint limits as soft rows: angles (Table I) and rates. A disturbed arm may be found outside."""
 
 from __future__ import annotations
 
@@ -6,25 +6,35 @@ import numpy as np
 
 from fsw.barriers.constraint_block import block
 from fsw.model.linearisation import Linearisation
-from fsw.model.prediction import Q_ARM, CondensedModel
+from fsw.model.prediction import Q_ARM, QD_ARM, CondensedModel
+from fsw.mpc.qp_data import InputLimits
 
-_LIMITED = np.array([[1.0, 0.0], [-1.0, 0.0], [1.0, 1.0], [-1.0, -1.0]])  # +-th1, +-(th1 + th2)
+_ANGLES = np.array([[1.0, 0.0], [-1.0, 0.0], [1.0, 1.0], [-1.0, -1.0]])  # +-th1, +-(th1 + th2)
+_RATES = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])  # of each joint
+_ROWS = len(_ANGLES) + len(_RATES)  # of a node
 
 
 class JointLimits:
-    """``|th1|`` and ``|th1 + th2|`` within their limits at every node, one slack a node."""
+    """Angles of the links and rates of the joints within limits at every node.
 
-    def __init__(self, model: CondensedModel) -> None:
-        airframe = model.airframe
-        self.rows = block((len(_LIMITED),), 1, model.horizon)
-        limits = np.array([airframe.joint1_limit] * 2 + [airframe.joint12_limit] * 2)
-        self.rows.lower_bound[:] = np.tile(-limits, model.horizon)
+    One slack a node, of as many rad as rad/s: where the arm is found outside, either may give way.
+    """
+
+    def __init__(self, model: CondensedModel, limits: InputLimits) -> None:
+        airframe, horizon = model.airframe, model.horizon
+        self.rows = block((_ROWS,), 1, horizon)
+        angle1 = airframe.joint1_limit - limits.joint_margin
+        angle12 = airframe.joint12_limit - limits.joint_margin
+        node = np.repeat([angle1, angle12, limits.joint_rate], [2, 2, len(_RATES)])
+        self.rows.lower_bound[:] = np.tile(-node, horizon)
         angles = model.gamma[1:, Q_ARM : Q_ARM + 2]  # (n, 2, 6 n)
-        self.rows.gradient[:] = -np.einsum("lj,njk->nlk", _LIMITED, angles).reshape(
-            self.rows.gradient.shape
-        )
+        rates = model.gamma[1:, QD_ARM : QD_ARM + 2]
+        gradient = self.rows.gradient.reshape(horizon, _ROWS, -1)
+        gradient[:, : len(_ANGLES)] = -np.einsum("lj,njk->nlk", _ANGLES, angles)
+        gradient[:, len(_ANGLES) :] = -np.einsum("lj,njk->nlk", _RATES, rates)
 
     def refill(self, horizon: Linearisation) -> None:
-        """Bring the angles up to date; the gradient never changes."""
-        angles = horizon.states[1:, Q_ARM : Q_ARM + 2]
-        self.rows.value[:] = -(angles @ _LIMITED.T).ravel()
+        """Bring angles and rates up to date; the gradient never changes."""
+        value = self.rows.value.reshape(-1, _ROWS)
+        value[:, : len(_ANGLES)] = -(horizon.states[1:, Q_ARM : Q_ARM + 2] @ _ANGLES.T)
+        value[:, len(_ANGLES) :] = -(horizon.states[1:, QD_ARM : QD_ARM + 2] @ _RATES.T)

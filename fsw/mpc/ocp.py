@@ -22,7 +22,7 @@ class Ocp:
 
     def __init__(self, config: PlannerConfig, model: CondensedModel, safe_set: SafeSet) -> None:
         self._horizon = Linearisation(model)
-        self._limits = JointLimits(model)
+        self._limits = JointLimits(model, config.limits)
         parts = parts_of(config, model, safe_set)
         self._costs, self._barriers = parts.costs, parts.barriers
         blocks: list[tuple[ConstraintBlock, float | None]] = [

@@ -33,12 +33,19 @@ CONE = 3  # rows of a tilt cone: what there is, then the two that it must cover
 
 @dataclass(frozen=True, slots=True)
 class InputLimits:
-    """Bounds on the paper's u; the horizontal acceleration is bounded by the tilt."""
+    """Bounds on the paper's u, and on the arm.
+
+    The tilt bounds the horizontal acceleration, and its rate as well: the attitude's lag turns
+    from one limit to the other at 1.6 rad/s.
+    """
 
     tilt: float = math.pi / 10.0  # rad
     vertical: float = 3.0  # m/s^2, |a_z|
     yaw_acc: float = 0.1  # rad/s^2; the rotors' drag gives hardly more
     joint_acc: float = 10.0  # rad/s^2
+    joint_rate: float = 3.0  # rad/s, which a plan stops within its horizon
+    # To the limits of the angles: of a node 0.0125 rad for what happens between two of them.
+    joint_margin: float = 0.03  # rad
 
     @property
     def most(self) -> Vec4:

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 from fsw.barriers.safe_approach import BarrierTuning
 from fsw.control.gains import tracking_gains
-from fsw.control.tube import Tube, peak_snap_share, tube
+from fsw.control.tube import Tube, all_axes, limits_used, tube
 from fsw.model.airframe import GRAVITY
 from fsw.parameters.flight_config import FlightConfig, Surroundings
 from fsw.shapes import kind_of
@@ -54,15 +54,19 @@ def analyse(config: FlightConfig, safe_set: SafeSet, loop: Tube) -> tuple[Findin
         points = [zone.clearance for zone in others if _is_point(zone)]
         if points and planner.body == "points":
             findings.append(_links(config, min(points)))
-    for tuning in ([planner.workspace] if spheres else []) + ([planner.walls] if others else []):
+    for tuning, zones in ((planner.workspace, spheres), (planner.walls, others)):
+        if not zones:
+            continue
         if config.inner == "tracking":
+            kept = SafeSet(tuple(zones))
             findings.append(_base_tube(tuning, loop, surroundings))
+            findings.append(_tube_of_all_axes(tuning, loop, kept, surroundings))
         else:
             findings.append(_sampled(tuning, surroundings, planner.period))
     if config.inner == "tracking":
         if others:
             findings.append(_end_effector_tube(planner.walls, loop, surroundings))
-        findings.append(_snap(config, loop, surroundings))
+        findings.append(_limits(config, loop, surroundings))
     return tuple(findings)
 
 
@@ -165,11 +169,40 @@ def _base_tube(tuning: BarrierTuning, loop: Tube, surroundings: Surroundings) ->
     return _finding(
         "tube",
         room >= reach,
-        f"no disturbance within {surroundings.disturbance:g} m/s^2 pushes the base further than "
-        f"{reach * 1e3:.0f} mm off its plan, which keeps {room * 1e3:.0f} mm from the boundary: "
-        f"margin {(room - reach) * 1e3:+.0f} mm",
+        f"no disturbance within {surroundings.disturbance:g} m/s^2 on one axis pushes the base "
+        f"further than {reach * 1e3:.0f} mm off its plan, which keeps {room * 1e3:.0f} mm from "
+        f"the boundary: margin {(room - reach) * 1e3:+.0f} mm",
         f"lambda >= {reach * tuning.slope:.3f} m/s is enough",
     )
+
+
+def _tube_of_all_axes(
+    tuning: BarrierTuning, loop: Tube, safe_set: SafeSet, surroundings: Surroundings
+) -> Finding:
+    """A wall meets one axis of it, if it stands along one; a sphere meets all of them together."""
+    most, room = surroundings.disturbance, stand_off(tuning)
+    across, up = all_axes(loop, most)
+    reach = _reach(safe_set, across, up)
+    scale = room / reach
+    return _finding(
+        "tube of all axes",
+        room >= reach,
+        f"pushed within {most:g} m/s^2 on all axes at once the base can be {across * 1e3:.0f} mm "
+        f"off its plan on a horizontal axis and {up * 1e3:.0f} mm vertically, {reach * 1e3:.0f} mm "
+        f"towards the boundary, and the plan keeps {room * 1e3:.0f} mm",
+        f"lambda >= {reach * tuning.slope:.3f} m/s would be proof, or at most about "
+        f"{scale * most:.2f} m/s^2",
+        refuses=False,
+    )
+
+
+def _reach(safe_set: SafeSet, across: float, up: float) -> float:
+    """How far towards a boundary [m] ``across`` [m] on x and y and ``up`` [m] on z are at most."""
+    corner = math.hypot(across, across, up)
+    flat = [zone.shape.numbers for zone in safe_set.zones if kind_of(zone.shape).flat]
+    if len(flat) < len(safe_set.zones):
+        return corner
+    return max(across * (abs(n[0]) + abs(n[1])) + up * abs(n[2]) for n in flat)
 
 
 def _end_effector_tube(tuning: BarrierTuning, loop: Tube, surroundings: Surroundings) -> Finding:
@@ -188,14 +221,17 @@ def _end_effector_tube(tuning: BarrierTuning, loop: Tube, surroundings: Surround
     )
 
 
-def _snap(config: FlightConfig, loop: Tube, surroundings: Surroundings) -> Finding:
-    share = peak_snap_share(config.airframe, loop, surroundings.disturbance)
+def _limits(config: FlightConfig, loop: Tube, surroundings: Surroundings) -> Finding:
+    """The tube is that of the linear loop: it holds while no limit is reached."""
+    disturbance = surroundings.disturbance
+    used = limits_used(config.airframe, config.tuning.tracking, loop, disturbance)
+    worst = max(used, key=lambda name: used[name])
     return _finding(
-        "snap",
-        share <= 0.85,
-        f"rejecting {surroundings.disturbance:g} m/s^2 uses {share:.0%} of the snap the rotors' "
-        "torque gives",
-        f"a disturbance up to {0.85 / share * surroundings.disturbance:.2f} m/s^2 leaves 15 %",
+        "limits",
+        used[worst] <= 1.0,
+        f"the tube holds while no limit is reached: the worst disturbance of {disturbance:g} "
+        f"m/s^2 on one axis uses {used[worst]:.0%} of the {worst}",
+        f"up to {disturbance / used[worst]:.2f} m/s^2 none is",
         refuses=False,
     )
 

@@ -1,4 +1,4 @@
-"""Rotors and joint drives: from commands to thrust and torque."""
+"""Rotors, joint drives and their end stops: from commands to thrust and torque."""
 
 from __future__ import annotations
 
@@ -39,3 +39,17 @@ def joint_torque(
     driven = min(max(command, -torque_max), torque_max)
     friction: float = viscous * rate + coulomb * np.tanh(rate / width)
     return driven - friction
+
+
+@kernel
+def stop_torque(angle: float, rate: float, stop: float, stiffness: float, damping: float) -> float:
+    """Torque on a link at ``angle`` [rad] and ``rate`` [rad/s] from its end stop [N·m].
+
+    The stops are at ± ``stop`` [rad]; a spring of ``stiffness`` [N·m/rad] and a damper of
+    ``damping`` [N·m·s/rad] that push back and never pull.
+    """
+    if angle > stop:
+        return min(-stiffness * (angle - stop) - damping * rate, 0.0)
+    if angle < -stop:
+        return max(-stiffness * (angle + stop) - damping * rate, 0.0)
+    return 0.0

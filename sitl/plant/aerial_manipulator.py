@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sitl.compiled import compiled, kernel
-from sitl.plant.actuators import joint_torque, rotor_torque, thrust_rate
+from sitl.plant.actuators import joint_torque, rotor_torque, stop_torque, thrust_rate
 from sitl.plant.bodies import Chain, Posture, empty_posture, posture_into
 from sitl.plant.contact import Feet, ground_wrench
 from sitl.plant.mass_matrix import mass_matrix_into, solve_in_place
@@ -31,6 +31,14 @@ from sitl.plant.vector import (
 )
 
 
+class Stops(NamedTuple):
+    """Numbers of the end stops for the kernels (see ``parameters.EndStops``)."""
+
+    angle: Array  # (j,) rad, of each link against the base; infinite where there is none
+    stiffness: float  # N·m/rad
+    damping: float  # N·m·s/rad
+
+
 class Plant(NamedTuple):
     """Every number the kernels need; numba reads them by name from one block of memory."""
 
@@ -38,6 +46,7 @@ class Plant(NamedTuple):
     feet: Feet
     rotors: Rotors
     joints: Joints
+    stops: Stops
     gravity: float  # m/s²
 
 
@@ -66,6 +75,9 @@ def plant(vehicle: Vehicle) -> Plant:
     legs = vehicle.legs
     s, h = legs.spread, legs.length
     points = np.array([(x, y, h) for x in (-s, s) for y in (-s, s)])
+    stops = vehicle.stops
+    stop_angle = np.full(len(vehicle.links), np.inf)
+    stop_angle[: len(stops.angle)] = stops.angle[: len(stop_angle)]
     numbers = Plant(
         chain=chain(vehicle),
         feet=Feet(
@@ -78,6 +90,7 @@ def plant(vehicle: Vehicle) -> Plant:
         ),
         rotors=vehicle.rotors,
         joints=vehicle.joints,
+        stops=Stops(stop_angle, stops.stiffness, stops.damping),
         gravity=vehicle.gravity,
     )
     return pack_params(numbers)
@@ -116,7 +129,7 @@ def load_into(plant: Plant, state: Array, inputs: Inputs, work: Workspace) -> No
     put(load, 0, add(add(lift, push), feet_force))
     turn = rotor_torque(thrust, plant.rotors.arm, plant.rotors.yaw_ratio)
     put(load, 3, add(add(turn, triple(inputs.torque_B, 0)), feet_moment))
-    joints, drive = work.still.shape[0], plant.joints
+    joints, drive, stops = work.still.shape[0], plant.joints, plant.stops
     for i in range(joints):
         rate = state[ARM + joints + i]
         load[6 + i] = joint_torque(
@@ -127,6 +140,14 @@ def load_into(plant: Plant, state: Array, inputs: Inputs, work: Workspace) -> No
             drive.coulomb,
             drive.coulomb_rate,
         )
+    angle, rate = 0.0, 0.0  # of a link against the base: of all joints up to it
+    for i in range(joints):
+        angle += state[ARM + i]
+        rate += state[ARM + joints + i]
+        if abs(angle) > stops.angle[i]:
+            stop = stop_torque(angle, rate, stops.angle[i], stops.stiffness, stops.damping)
+            for k in range(i + 1):
+                load[6 + k] += stop
 
 
 @kernel

@@ -75,14 +75,17 @@ def rk4_step(
 
 
 @compiled
-def integrate(plant: Plant, state: Array, inputs: Inputs, step: float, places: Array) -> Arrival:
+def integrate(
+    plant: Plant, state: Array, inputs: Inputs, step: float, places: Array, states: Array
+) -> Arrival:
     """Advance ``state`` (17 + 2j,) [SI] in place by one ``step`` [s] per row of ``places``.
 
     One call does all that an exchange needs, because handing the plant's arrays to compiled code
     costs as much as two steps. The inputs are held over all steps.
 
     Base origin and origin of every DH frame go to places (steps, 2 + j, 3) [m, NED], after each
-    step; without rows the state stays as it is.
+    step, and the state itself to ``states`` (steps, 17 + 2j) [SI]; without rows the state stays as
+    it is.
     """
     n = state.shape[0]
     work = empty_workspace((n - ARM) // 2)
@@ -91,6 +94,7 @@ def integrate(plant: Plant, state: Array, inputs: Inputs, step: float, places: A
     for k in range(places.shape[0]):
         rk4_step(plant, state, inputs, step, work, slopes)
         place_into(plant, state, work, k, places)
+        states[k] = state
         fastest = max(fastest, touch_down_speed(plant, state, work))
     return Arrival(fastest, specific_force(plant, state, inputs, work))
 
@@ -105,13 +109,15 @@ def step(
     torque_B: V3,
     step_s: float,
     places: Array,
+    states: Array,
 ) -> Arrival:
     """``integrate`` with the plant in an array of one and inputs in tuples: the cheapest to call.
 
     ``thrust`` [N] and ``torque`` [N·m] are commanded, rotors 1 to 4 and joints;
     ``force_W`` [N, NED] and ``torque_B`` [N·m, B] disturb the base.
 
-    Overwritten are state (17 + 2j,) [SI] and places (steps, 2 + j, 3) [m, NED].
+    Overwritten are state (17 + 2j,) [SI], places (steps, 2 + j, 3) [m, NED] and ``states``
+    (steps, 17 + 2j) [SI].
     """
     inputs = Inputs(np.array(thrust), np.array(torque), np.array(force_W), np.array(torque_B))
-    return integrate(plants[0], state, inputs, step_s, places)
+    return integrate(plants[0], state, inputs, step_s, places, states)

@@ -51,12 +51,28 @@ class Rotors:
 
 @dataclass(frozen=True, slots=True)
 class Joints:
-    """Joint drives: a torque source behind friction. There are no end stops."""
+    """Joint drives: a torque source behind friction."""
 
     torque_max: float = 2.0  # N·m, our choice: ten times the arm's static load
     viscous: float = 0.005  # N·m·s/rad
     coulomb: float = 0.01  # N·m
     coulomb_rate: float = 0.05  # rad/s, width of the smoothed sign change
+
+
+@dataclass(frozen=True, slots=True)
+class EndStops:
+    """Springs and dampers that push a link back and never pull it.
+
+    Each is between a link and the base, as Table I's limits are: a parallelogram drives the second
+    link. An arm that reaches them at 5 rad/s with full torque behind it goes less than 4 deg
+    beyond, one that full torque has thrown across less than 8. On the lightest motion of the arm
+    spring and damper have poles at 1.4 / ms; RK4 is stable to 2.8.
+    """
+
+    # rad, either way, 3 deg beyond Table I; a link without an entry has none.
+    angle: tuple[float, ...] = (math.radians(63.0), math.radians(93.0))
+    stiffness: float = 600.0  # N·m/rad
+    damping: float = 0.6  # N·m·s/rad
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,6 +119,7 @@ class Vehicle:
     mount: V3 = (0.0, 0.0, 0.0)  # m, joint 1 in B
     rotors: Rotors = Rotors()
     joints: Joints = Joints()
+    stops: EndStops = EndStops()
     legs: Legs = Legs()
     size: Size = Size()
     gravity: float = GRAVITY

@@ -33,6 +33,7 @@ from fsw.tuning import Tuning
 from sitl.scenario import Hold, Pilot, Scenario, Start
 from sitl.simulation import STEP_US, Simulation
 from studies.closed_loop import ClosedLoop, InlinePlanner
+from studies.mission import announced
 
 ARM, TAKEOFF, LAND, SET_MODE = 400, 22, 21, 176
 STREAM_STEPS = 25
@@ -90,6 +91,9 @@ class Flight:
 
     def __post_init__(self) -> None:
         self.sim = Simulation(self.scenario, self.seed)
+        # A scenario says what keeps clear, as for `pandion fly`.
+        planner = replace(self.config.planner, body=self.scenario.body)
+        self.config = replace(self.config, planner=planner)
         self.loop = TunedAutopilot(self.config)
         self.planner = self.planner or real_planner(self.config)
         self.closed = ClosedLoop(self.sim, self._tick, None, Late(self), self.config.airframe)
@@ -135,7 +139,7 @@ class Flight:
             self.closed.planner.take(sensors.t_us),
             commands,
             self.targets(),
-            self.closed.announced() if self.announces else (),
+            announced(self.scenario) if self.announces and self.sim.step == 0 else (),
             tuning=tuning,
             mission=self.upload,
         )

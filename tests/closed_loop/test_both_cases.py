@@ -17,13 +17,21 @@ from tests.closed_loop.harness import Flight
 @pytest.mark.parametrize(
     ("name", "seconds"), [("walls", 20.0), ("workspace", 15.0), ("branches", 13.0)]
 )
-def test_every_margin_stays_positive_between_samples_too(name: str, seconds: float) -> None:
+def test_every_margin_stays_positive_and_every_limit_is_kept_between_samples_too(
+    name: str, seconds: float
+) -> None:
     flight = Flight(load_scenario(name), seed=11)
     flight.follow()
     flight.run(seconds)
     margins = flight.sim.result().margins_m
     assert margins
     assert min(margins.values()) > 0.0, margins
+    uses = flight.sim.result().limits
+    assert len(uses) == 9
+    assert all(use.kept for use in uses.values()), uses
+    # Within Table I, not merely within the tolerance; and the arm is used.
+    assert uses["joint_1_angle"].beyond_s == uses["link_2_angle"].beyond_s == 0.0
+    assert uses["joint_1_angle"].largest > 0.7
     counters = flight.snapshot.counters
     assert (counters.missed_deadlines, counters.fallbacks) == (0, 0)
     assert counters.plans >= 10.0 * seconds - 1

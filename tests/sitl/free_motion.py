@@ -8,17 +8,17 @@ import numpy as np
 
 from sitl.plant.aerial_manipulator import Inputs, plant
 from sitl.plant.integrator import integrate
-from sitl.plant.parameters import Vehicle
+from sitl.plant.parameters import EndStops, Vehicle
 from sitl.plant.state import at_rest
 from sitl.plant.vector import Array
 from tests.sitl.state_view import StateView
 
 
 def frictionless(gravity: float) -> Vehicle:
-    """The paper's vehicle without joint friction."""
+    """The paper's vehicle without joint friction, its arm free to swing through."""
     vehicle = Vehicle()
     joints = replace(vehicle.joints, viscous=0.0, coulomb=0.0)
-    return replace(vehicle, joints=joints, gravity=gravity)
+    return replace(vehicle, joints=joints, stops=EndStops(()), gravity=gravity)
 
 
 def tumbling() -> Array:
@@ -41,5 +41,6 @@ def flown(vehicle: Vehicle, start: Array, seconds: float, step: float) -> Array:
     state = start.copy()
     inputs = Inputs(np.zeros(4), np.zeros(joints), np.zeros(3), np.zeros(3))
     places = np.empty((round(seconds / step), 2 + joints, 3))
-    integrate(plant(vehicle), state, inputs, step, places)
+    states = np.empty((len(places), len(state)))
+    integrate(plant(vehicle), state, inputs, step, places, states)
     return state

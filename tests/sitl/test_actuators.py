@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from sitl.plant.actuators import joint_torque, thrust_rate
 from sitl.plant.aerial_manipulator import Inputs, acceleration_into, empty_workspace, plant
 from sitl.plant.integrator import integrate
-from sitl.plant.parameters import Vehicle
+from sitl.plant.parameters import EndStops, Vehicle
 from sitl.plant.state import at_rest
 from sitl.plant.trim import NoTrimError, level_hover
 from tests.sitl.state_view import StateView
@@ -24,7 +24,7 @@ def test_a_rotor_reaches_63_percent_of_a_step_after_its_lag() -> None:
     view = StateView(state)
     view.p_WB[2] = -50.0
     inputs = Inputs(np.array([5.0, 0.0, 99.0, -3.0]), np.zeros(2), np.zeros(3), np.zeros(3))
-    integrate(plant(vehicle), state, inputs, 0.001, np.empty((40, 4, 3)))
+    integrate(plant(vehicle), state, inputs, 0.001, np.empty((40, 4, 3)), np.empty((40, 21)))
     grown = 1.0 - math.exp(-1.0)
     # Commands beyond the rotor's range act like the limit they exceed.
     expected = [5.0 * grown, 0.0, vehicle.rotors.thrust_max * grown, 0.0]
@@ -53,7 +53,7 @@ def test_a_joint_drive_saturates() -> None:
 
 @given(st.floats(-1.0, 1.0), st.floats(-2.0, 2.0))
 def test_trim_is_an_equilibrium_at_any_arm_posture(first: float, second: float) -> None:
-    vehicle, state, work = Vehicle(), at_rest(2), empty_workspace(2)
+    vehicle, state, work = Vehicle(stops=EndStops(())), at_rest(2), empty_workspace(2)
     trim = level_hover(vehicle, (first, second))
     view = StateView(state)
     view.p_WB[2] = -5.0

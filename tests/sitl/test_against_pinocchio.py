@@ -13,7 +13,7 @@ from sitl.plant.aerial_manipulator import (
     empty_workspace,
     plant,
 )
-from sitl.plant.parameters import Link, Vehicle
+from sitl.plant.parameters import EndStops, Link, Vehicle
 from sitl.plant.state import at_rest
 from sitl.plant.vector import Array
 from tests.sitl.pinocchio_model import configuration, pinocchio_model
@@ -42,7 +42,9 @@ def random_vehicle(joints: int, random: np.random.Generator) -> Vehicle:
         )
         for _ in range(joints)
     )
-    return Vehicle(base_com=three(-0.05, 0.05), mount=three(-0.1, 0.1), links=links)
+    return Vehicle(
+        base_com=three(-0.05, 0.05), mount=three(-0.1, 0.1), links=links, stops=EndStops(())
+    )
 
 
 def random_state(joints: int, random: np.random.Generator) -> Array:

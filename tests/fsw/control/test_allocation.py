@@ -91,16 +91,24 @@ def test_hover_is_shared_equally() -> None:
     assert hover == pytest.approx((HOVER / 4.0,) * 4)
 
 
+@given(st.floats(-5.0, 5.0), st.floats(-5.0, 5.0), st.floats(-3.0, 3.0), st.floats(-20.0, 100.0))
+def test_thrust_is_met_as_far_as_the_rotors_reach_whatever_yaw_asks(
+    roll: float, pitch: float, yaw: float, thrust: float
+) -> None:
+    """A pair needs at least its own difference, and can give both rotors' most less that."""
+    least = (abs(roll) + abs(pitch)) / 0.3
+    got = wrench(allocate(AIRFRAME, (roll, pitch, yaw), thrust, YAW_LIMIT))
+    assert got[3] == pytest.approx(min(max(thrust, least), 4.0 * TOP - least), abs=1e-9)
+
+
 @given(st.floats(-3.0, 3.0), st.floats(-3.0, 3.0), st.floats(-1.0, 1.0), st.floats(0.0, 100.0))
 def test_yaw_takes_the_whole_of_what_roll_pitch_and_thrust_leave(
     roll: float, pitch: float, yaw: float, thrust: float
 ) -> None:
-    """However near to either limit of the rotors: the yaw that is given is the most there is."""
-    got = allocate(AIRFRAME, (roll, pitch, yaw), thrust, YAW_LIMIT)
-    without = allocate(AIRFRAME, (roll, pitch, 0.0), thrust, YAW_LIMIT)
-    spent = abs(wrench(got)[2]) / (4.0 * 0.016)
-    # Rear and front share one sign of yaw and left and right the other, so one of each pair that
-    # is highest and lowest limits it.
-    room = min(YAW_LIMIT, min(without), TOP - max(without))
-    assert spent == pytest.approx(min(abs(yaw) / (4.0 * 0.016), max(room, 0.0)), abs=1e-9)
-    assert wrench(got)[3] == pytest.approx(wrench(without)[3])
+    """No other split of the same thrust between the pairs is nearer to the yaw that is asked."""
+    got = wrench(allocate(AIRFRAME, (roll, pitch, yaw), thrust, YAW_LIMIT))
+    wish = max(-YAW_LIMIT, min(YAW_LIMIT, yaw / (4.0 * 0.016)))
+    half, own, other = got[3] / 2.0, abs(pitch) / 0.6, abs(roll) / 0.6
+    lowest, highest = max(own, half - (TOP - other)), min(TOP - own, half - other)
+    along = max(lowest, min(highest, 0.5 * half + wish))
+    assert got[2] == pytest.approx(0.016 * 2.0 * (2.0 * along - half), abs=1e-9)

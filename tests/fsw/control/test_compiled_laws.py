@@ -12,6 +12,7 @@ import pytest
 
 from fsw.control.cascade import Cascade, CascadeMemory, Inner, close_loops
 from fsw.control.gains import LoopGains
+from fsw.control.joints import JointMemory
 from fsw.control.safety_filter import moving_zones
 from fsw.control.tracking import Observed
 from fsw.estimation.estimator import attitude, estimate_state
@@ -19,7 +20,7 @@ from fsw.model.airframe import AIRFRAME, AttitudeLag
 from fsw.model.nominal import NominalModel, advance
 from fsw.shapes.ball import point
 from fsw.shapes.half_space import wall
-from fsw.signals import ActuatorCommand, PlanInput, SafeSet, SensorFrame, Vec4
+from fsw.signals import ActuatorCommand, PlanInput, SafeSet, SensorFrame, Vec2, Vec4
 from tests.fsw.random_states import as_state, prediction_vector, random_estimate, vec3
 
 STATES = 300
@@ -49,8 +50,13 @@ def memory(random: np.random.Generator) -> CascadeMemory:
         float(random.uniform(2.5, 4.5)),
         vec3(random.uniform(-0.2, 0.2, 3)),
         float(random.uniform(-0.2, 0.2)),
-        (float(random.uniform(-0.1, 0.1)), float(random.uniform(-0.1, 0.1))),
+        JointMemory(*(two(random, most) for most in (1.0, 0.01, 0.1, 0.1))),
     )
+
+
+def two(random: np.random.Generator, most: float) -> Vec2:
+    a, b = (float(value) for value in random.uniform(-most, most, 2))
+    return (a, b)
 
 
 def plan_input(random: np.random.Generator) -> PlanInput:

@@ -50,18 +50,21 @@ def test_the_horizontal_gains_are_the_cheapest(tuning: TrackingTuning, lag: floa
 
 @pytest.mark.parametrize("tuning", TUNINGS)
 def test_the_vertical_gains_are_the_cheapest(tuning: TrackingTuning) -> None:
-    a, b, lag = np.zeros((3, 3)), np.zeros((3, 1)), 0.07
-    a[0, 1] = a[1, 2] = 1.0
+    a, b, lag = np.zeros((4, 4)), np.zeros((4, 1)), 0.07
+    a[0, 1] = a[1, 2] = a[1, 3] = 1.0
     a[2, 2], b[2, 0] = -1.0 / lag, 1.0 / lag
-    expected = cheapest(a, b, np.diag([1.0, 0.0, 0.0]), tuning.vertical_input_weight)
-    np.testing.assert_allclose(tracking_gains(tuning, lag, DT).k_vertical, expected, rtol=1e-5)
+    a[3, 3] = -1.0 / tuning.vertical_disturbance_correlation
+    expected = cheapest(a, b, np.diag([1.0, 0.0, 0.0, 0.0]), tuning.vertical_input_weight)
+    gains = tracking_gains(tuning, lag, DT)
+    got = (*gains.k_vertical, gains.k_vertical_disturbance)
+    np.testing.assert_allclose(got, expected, rtol=1e-5)
 
 
 @pytest.mark.parametrize("loop", ["attitude", "height", "joint"])
 def test_each_pid_of_the_paper_settles_a_double_integrator_without_ringing(loop: str) -> None:
     """All poles of s^3 + kd s^2 + kp s + ki decay, none swings more than it decays."""
     gains = getattr(LoopGains(), loop)
-    poles = np.roots([1.0, gains.kd, gains.kp, gains.ki])
+    poles = np.roots([1.0, gains.kd, gains.kp, gains.ki][: 4 if gains.ki else 3])
     assert poles.real.max() < 0.0
     assert np.abs(poles.imag / poles.real).max() < 4.0 / 3.0  # damping of 0.6
 

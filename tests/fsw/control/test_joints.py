@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -12,19 +13,30 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from fsw.control.gains import LoopGains
-from fsw.control.joints import arm_inverse_dynamics, joint_torques
+from fsw.control.joints import (
+    JointMemory,
+    arm_dynamics,
+    joint_torques,
+    joints_at_rest,
+    limited_acceleration,
+    observe_disturbance,
+    torques_for,
+)
 from fsw.model.airframe import AIRFRAME, Airframe
-from fsw.signals import Vec2
+from fsw.model.prediction import Array
+from fsw.signals import StateEstimate, Vec2
 from tests.fsw.random_states import estimate_of
 
 GAINS = LoopGains().joint
-FIELD = 9.81
+WITH_INTEGRAL = replace(GAINS, ki=400.0)
+FIELD = (0.0, 9.81)
+DT = 0.002
 
 
-def planar_arm(airframe: Airframe = AIRFRAME) -> Any:
-    """Two links that turn about +y and hang along +z, in a field along +z."""
+def planar_arm(airframe: Airframe = AIRFRAME, field: Vec2 = FIELD) -> Any:
+    """Two links that turn about +y and hang along +z, in a field along x and z."""
     model = pin.Model()
-    model.gravity.linear = np.array([0.0, 0.0, FIELD])
+    model.gravity.linear = np.array([field[0], 0.0, field[1]])
     parent, place = 0, pin.SE3.Identity()
     for link in range(2):
         parent = model.addJoint(parent, pin.JointModelRY(), place, f"joint{link}")
@@ -38,22 +50,35 @@ def planar_arm(airframe: Airframe = AIRFRAME) -> Any:
     return model
 
 
-def test_inverse_dynamics_equal_recursive_newton_euler() -> None:
-    random, model = np.random.default_rng(1), planar_arm()
-    data = model.createData()
+def moving(random: np.random.Generator, pitch_rate: float) -> StateEstimate:
+    q, qd = random.uniform(-2.0, 2.0, 2), random.uniform(-5.0, 5.0, 2)
+    return estimate_of(Rotation.identity(), (0.0, pitch_rate, 0.0), q_arm=pair(q), qd_arm=pair(qd))
+
+
+def test_inverse_dynamics_and_momentum_equal_those_of_pinocchio() -> None:
+    random = np.random.default_rng(1)
     for _ in range(200):
-        q, qd, qdd = random.uniform(-2.0, 2.0, 2), *random.uniform(-5.0, 5.0, (2, 2))
+        field = pair(random.uniform(-10.0, 10.0, 2))
+        model = planar_arm(field=field)
+        data = model.createData()
         pitch_rate = float(random.uniform(-3.0, 3.0))
-        estimate = estimate_of(
-            Rotation.identity(),
-            (0.0, pitch_rate, 0.0),
-            q_arm=(float(q[0]), float(q[1])),
-            qd_arm=(float(qd[0]), float(qd[1])),
-        )
-        torque = arm_inverse_dynamics(AIRFRAME, estimate, (qdd[0], qdd[1]), FIELD)
+        estimate, qdd = moving(random, pitch_rate), random.uniform(-5.0, 5.0, 2)
+        arm = arm_dynamics(AIRFRAME, estimate, field)
         # To an inertial frame the first link turns with the base as well.
-        expected = pin.rnea(model, data, q, qd + np.array([pitch_rate, 0.0]), qdd)
-        np.testing.assert_allclose(torque, expected, atol=1e-12)
+        q, qd = np.array(estimate.q_arm), np.array(estimate.qd_arm) + [pitch_rate, 0.0]
+        np.testing.assert_allclose(
+            torques_for(arm, pair(qdd)), pin.rnea(model, data, q, qd, qdd), atol=1e-12
+        )
+        inertia = pin.crba(model, data, q)
+        inertia = np.triu(inertia) + np.triu(inertia, 1).T
+        np.testing.assert_allclose(arm.momentum, inertia @ qd, atol=1e-12)
+        # Without torque the momentum changes by the drift alone.
+        pin.computeAllTerms(model, data, q, qd)
+        free = np.linalg.solve(inertia, -data.nle)
+        ahead = pin.crba(model, data, q + 1e-6 * qd)
+        ahead = np.triu(ahead) + np.triu(ahead, 1).T
+        change = (ahead @ (qd + 1e-6 * free) - inertia @ qd) / 1e-6
+        np.testing.assert_allclose(arm.drift, change, atol=1e-4)
 
 
 def test_a_raised_arm_is_held_up() -> None:
@@ -64,10 +89,20 @@ def test_a_raised_arm_is_held_up() -> None:
     assert torque[1] > 0.02
 
 
-def hold(q: Vec2, q_ref: Vec2, thrust: float = FIELD, pitch: float = 0.0) -> tuple[Vec2, Vec2]:
+def hold(q: Vec2, q_ref: Vec2, thrust: float = 9.81, pitch: float = 0.0) -> tuple[Vec2, Vec2]:
+    """Torques and integrals of an arm at rest that is asked to rest elsewhere."""
     estimate = estimate_of(Rotation.identity(), q_arm=q)
-    reference = (q_ref, (0.0, 0.0), (0.0, 0.0))
-    return joint_torques(AIRFRAME, GAINS, (0.0, 0.0), estimate, reference, thrust, pitch, 0.002)
+    torque, kept = joint_torques(
+        AIRFRAME,
+        GAINS,
+        joints_at_rest(AIRFRAME, estimate),
+        estimate,
+        (q_ref, (0.0, 0.0), (0.0, 0.0)),
+        arm_dynamics(AIRFRAME, estimate, (0.0, thrust)),
+        pitch,
+        DT,
+    )
+    return torque, kept.integral
 
 
 @pytest.mark.parametrize("joint", [0, 1])
@@ -77,7 +112,7 @@ def test_each_joint_is_pushed_towards_its_reference(joint: int, sign: float) -> 
     q_ref[joint] = sign * 0.02
     torque, integral = hold((0.0, 0.0), (q_ref[0], q_ref[1]))
     assert sign * torque[joint] > 0.0
-    assert sign * integral[joint] > 0.0
+    assert sign * integral[joint] > 0.0, "kept, for those who set an integral gain"
 
 
 def test_pitching_the_base_up_is_followed_by_the_first_joint() -> None:
@@ -91,28 +126,103 @@ def test_torques_keep_the_servos_limit() -> None:
     assert max(map(abs, torque)) <= AIRFRAME.joint_torque_max
 
 
-def test_in_closed_loop_the_arm_settles_on_its_reference() -> None:
-    """Pinocchio's forward dynamics as the plant, with friction the law does not know of."""
+def followed(
+    start: Vec2,
+    references: Callable[[float], tuple[Vec2, Vec2]],
+    seconds: float,
+    friction: float = 0.0,
+    push: Callable[[float], Vec2] = lambda _: (0.0, 0.0),
+) -> tuple[Array, Array]:
+    """Angles and rates after every tick, Pinocchio's forward dynamics as the plant.
+
+    Dry friction in both joints, and a torque that the law does not know of.
+    """
     model = planar_arm()
     data = model.createData()
-    q, qd, integral = np.array([0.3, -0.8]), np.zeros(2), (0.0, 0.0)
-    dt = 0.002
-    for _ in range(4000):
-        estimate = estimate_of(Rotation.identity(), q_arm=(q[0], q[1]), qd_arm=(qd[0], qd[1]))
-        reference = ((-0.5, 1.0), (0.0, 0.0), (0.0, 0.0))
-        torque, integral = joint_torques(
-            AIRFRAME, GAINS, integral, estimate, reference, FIELD, 0.0, dt
+    q, qd, torque = np.array(start), np.zeros(2), (0.0, 0.0)
+    memory: JointMemory | None = None
+    angles, rates = [], []
+    for k in range(round(seconds / DT)):
+        estimate = estimate_of(Rotation.identity(), q_arm=pair(q), qd_arm=pair(qd))
+        arm = arm_dynamics(AIRFRAME, estimate, FIELD)
+        memory = memory or joints_at_rest(AIRFRAME, estimate)
+        memory = observe_disturbance(memory, arm, torque, DT)
+        q_ref, qd_ref = references(k * DT)
+        torque, memory = joint_torques(
+            AIRFRAME, GAINS, memory, estimate, (q_ref, qd_ref, (0.0, 0.0)), arm, 0.0, DT
         )
-        qd = qd + dt * np.array(pin.aba(model, data, q, qd, np.array(torque) - 0.02 * qd))
-        q = q + dt * qd
-    assert math.dist(q, (-0.5, 1.0)) < 2e-3
+        for _ in range(8):
+            dry = friction * np.tanh(qd / 0.05)
+            qd = qd + DT / 8.0 * np.array(
+                pin.aba(model, data, q, qd, np.array(torque) - dry + push(k * DT))
+            )
+            q = q + DT / 8.0 * qd
+        angles.append(q)
+        rates.append(qd)
+    return np.array(angles), np.array(rates)
+
+
+def resting(q: Vec2) -> Callable[[float], tuple[Vec2, Vec2]]:
+    return lambda _: (q, (0.0, 0.0))
+
+
+def test_in_closed_loop_the_arm_settles_on_its_reference_whatever_friction_there_is() -> None:
+    for friction in (0.0, 0.01, 0.03):
+        angles, _ = followed((0.3, -0.8), resting((-0.5, 1.0)), 1.5, friction)
+        assert math.dist(angles[-1], (-0.5, 1.0)) < 4e-3, friction
+
+
+def test_a_steady_torque_that_nothing_told_of_is_taken_off_within_two_tenths_of_a_second() -> None:
+    pushed = 0.05  # N m, half a second; the integral alone would need seconds
+    angles, _ = followed(
+        (0.4, 0.6), resting((0.4, 0.6)), 0.6, push=lambda t: (pushed, pushed) if t > 0.1 else (0, 0)
+    )
+    off = np.abs(angles - [0.4, 0.6]).max(axis=1)
+    assert off[round(0.1 / DT) :].max() > 5e-3, "it is a push"
+    assert off[round(0.3 / DT) :].max() < 5e-3
+
+
+LIMIT1, LIMIT12 = AIRFRAME.joint1_limit, AIRFRAME.joint12_limit
+
+
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+@pytest.mark.parametrize("far", [(2.0, -2.0), (0.2, 3.0), (2.0, 2.0)])
+def test_no_reference_takes_the_arm_past_a_limit_of_an_angle_or_a_rate(
+    far: Vec2, sign: float
+) -> None:
+    """Not even one that jumps far beyond: the loop itself keeps them, with friction too."""
+    start = (-0.3 * sign, 0.4 * sign)
+    goal = (sign * far[0], sign * far[1])
+    angles, rates = followed(start, resting(goal), 1.5, friction=0.01)
+    links = np.abs(np.column_stack((angles[:, 0], angles.sum(axis=1))))
+    assert (links.max(axis=0) > [0.95 * LIMIT1, 0.95 * LIMIT12]).any(), "or it was no test"
+    assert links[:, 0].max() < LIMIT1 + math.radians(0.5)
+    assert links[:, 1].max() < LIMIT12 + math.radians(0.5)
+    assert np.abs(rates).max() < AIRFRAME.joint_rate_max + 0.1
+
+
+def test_far_from_limits_accelerations_are_as_wanted_and_near_them_point_back() -> None:
+    free = limited_acceleration(AIRFRAME, (0.1, -0.2), (0.5, -0.5), (40.0, -60.0))
+    assert free == (40.0, -60.0)
+    beyond = (LIMIT1 + 0.02, -0.3)
+    assert limited_acceleration(AIRFRAME, beyond, (0.0, 0.0), (40.0, 0.0))[0] < 0.0
+    q = (0.2, LIMIT12 - 0.2 + 0.02)
+    assert sum(limited_acceleration(AIRFRAME, q, (0.0, 0.0), (10.0, 50.0))) < 0.0
 
 
 def test_the_errors_of_both_joints_obey_their_own_pid_whatever_the_arm_does() -> None:
     """Computed torque, seen through Pinocchio's forward dynamics of an arm of two unlike links."""
-    unlike = replace(AIRFRAME, link_mass=(0.3, 0.15), link_com=(0.06, 0.09), joint_torque_max=1e3)
+    unlike = replace(
+        AIRFRAME,
+        link_mass=(0.3, 0.15),
+        link_com=(0.06, 0.09),
+        joint_torque_max=1e3,
+        joint_rate_max=1e3,
+        joint1_limit=1e3,
+        joint12_limit=1e3,
+    )
     model, random = planar_arm(unlike), np.random.default_rng(7)
-    data, far = model.createData(), replace(GAINS, limit=1e9)
+    data, far = model.createData(), replace(WITH_INTEGRAL, limit=1e9)
     for _ in range(50):
         q, error = random.uniform(-1.0, 1.0, (2, 2)) * [[1.0], [0.02]]
         qd, error_rate, integral, qdd = random.uniform(-1.0, 1.0, (4, 2)) * 0.5
@@ -123,17 +233,17 @@ def test_the_errors_of_both_joints_obey_their_own_pid_whatever_the_arm_does() ->
         torque, kept = joint_torques(
             unlike,
             far,
-            pair(integral),
+            JointMemory((0.0, 0.0), (0.0, 0.0), integral=pair(integral)),
             estimate,
             (pair(q + error), pair(qd + error_rate), pair(qdd)),
-            FIELD,
+            arm_dynamics(unlike, estimate, FIELD),
             pitch_acceleration,
-            0.002,
+            DT,
         )
         inertial = qd + [pitch_rate, 0.0]
         got = pin.aba(model, data, q, inertial, np.array(torque)) - [pitch_acceleration, 0.0]
-        np.testing.assert_allclose(kept, integral + 0.002 * error, atol=1e-12)
-        pid = GAINS.kp * error + GAINS.ki * np.array(kept) + GAINS.kd * error_rate
+        np.testing.assert_allclose(kept.integral, integral + DT * error, atol=1e-12)
+        pid = far.kp * error + far.ki * np.array(kept.integral) + far.kd * error_rate
         np.testing.assert_allclose(got, qdd + pid, atol=1e-6)
 
 
@@ -145,6 +255,8 @@ def pair(values: Any) -> Vec2:
 def test_a_torque_beyond_the_servos_limit_becomes_the_limit(sign: float) -> None:
     weak = replace(AIRFRAME, joint_torque_max=0.1)
     still = estimate_of(Rotation.identity())
+    memory = joints_at_rest(weak, still)
     reference = ((3.0 * sign, 3.0 * sign), (0.0, 0.0), (0.0, 0.0))
-    limited, _ = joint_torques(weak, GAINS, (0.0, 0.0), still, reference, 0.0, 0.0, 0.002)
+    arm = arm_dynamics(weak, still, (0.0, 0.0))
+    limited, _ = joint_torques(weak, GAINS, memory, still, reference, arm, 0.0, DT)
     assert limited == (0.1 * sign, 0.1 * sign)

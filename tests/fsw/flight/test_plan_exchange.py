@@ -168,12 +168,14 @@ def test_a_slung_arm_is_planned_from_the_nearest_pose_it_may_have() -> None:
     estimate = random_estimate(np.random.default_rng(3))
     still = (0.0, 0.0, 0.0)
     measured = measured_state(estimate, MotionState(30.0, still, (0.0, 0.0), (0.0, 0.0)))
-    slung = with_arm_in_bounds(measured._replace(q_arm=(2.0, 3.0), qd_arm=(-20.0, 15.0)), AIRFRAME)
-    assert slung.q_arm[0] == AIRFRAME.joint1_limit
-    assert sum(slung.q_arm) == pytest.approx(AIRFRAME.joint12_limit)
-    assert slung.qd_arm == (-3.0, 3.0)
+    limits = InputLimits(joint_rate=2.0, joint_margin=0.1)
+    far = measured._replace(q_arm=(2.0, 3.0), qd_arm=(-20.0, 15.0))
+    slung = with_arm_in_bounds(far, AIRFRAME, limits)
+    assert slung.q_arm[0] == AIRFRAME.joint1_limit - 0.1
+    assert sum(slung.q_arm) == pytest.approx(AIRFRAME.joint12_limit - 0.1)
+    assert slung.qd_arm == (-2.0, 2.0)
     within = measured._replace(q_arm=(0.3, -0.5), qd_arm=(1.0, -2.0))
-    same = with_arm_in_bounds(within, AIRFRAME)
+    same = with_arm_in_bounds(within, AIRFRAME, limits)
     assert same.q_arm == pytest.approx(within.q_arm)
     assert same._replace(q_arm=within.q_arm) == within
 

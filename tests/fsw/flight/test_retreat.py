@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
 from hypothesis import given
@@ -23,7 +24,7 @@ from tests.fsw.flight.in_flight import CONFIG, vehicle_at
 
 LINKS = CONFIG.airframe.link_length
 POINTS = body_of("points", CONFIG.airframe)
-CHECK = SafeSetCheck(CONFIG)
+CHECK = SafeSetCheck(replace(CONFIG, planner=replace(CONFIG.planner, body="points")))
 ROOM = stand_off(CONFIG.planner.walls)
 AHEAD = wall((-1.0, 0.0, 0.0), -1.0, 0.1)
 

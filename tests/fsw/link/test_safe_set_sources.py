@@ -18,7 +18,6 @@ from fsw.signals import MessageSource, SensorFrame, Severity, TickOutputs
 from messages.frames import FrameWriter
 from sitl.link.encode import StepEncoder
 from sitl.link.pilot_messages import Announce
-from sitl.scenario import ScenarioWall
 from tests.fsw.flight.asked import command
 from tests.fsw.flight.test_autopilot import frame
 from tests.fsw.link.ground import Ground, ground_station, station_socket
@@ -57,10 +56,9 @@ class Vehicle:
 
     def announce(self, *offsets: float) -> TickOutputs:
         """The simulator's pilot announces walls; they are in the next tick."""
+        still = (0.0, 0.0, 0.0)
         whole = [
-            Announce(
-                ScenarioWall(f"wall {k}", (-1.0, 0.0, 0.0), offset, CLEARANCE), k, len(offsets)
-            )
+            Announce(0, (-1.0, 0.0, 0.0, offset), still, CLEARANCE, False, 0, k, len(offsets))
             for k, offset in enumerate(offsets)
         ]
         self.t_us += 2_000

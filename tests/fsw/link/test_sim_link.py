@@ -110,8 +110,8 @@ def test_walls_and_points_arrive_as_the_pilot_announces_them(wire: Wire) -> None
     wire.send(StepEncoder(lockstep=True).datagram(readings(1_002_000), messages))
     assert wire.link.wait_for_step() is not None
     (announced,) = wire.inbox.take().announced
-    assert announced.source == MessageSource(1, 195, "simulator")
     safe_set = announced.safe_set
+    assert announced.source == MessageSource(1, 195, "simulator")
     assert safe_set == simulated(scenario)
     kinds = [zone.shape.kind for zone in safe_set.zones]
     assert kinds == ["half-space", *["ball"] * 4, "box", "target sphere"]

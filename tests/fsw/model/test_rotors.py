@@ -11,7 +11,13 @@ from scipy.spatial.transform import Rotation
 
 from fsw.model.airframe import AIRFRAME, GRAVITY
 from fsw.model.prediction import Array
-from fsw.model.rotors import estimate_mass, lag_rotors, motion_state, rotor_decay
+from fsw.model.rotors import (
+    estimate_mass,
+    hanging_arm,
+    lag_rotors,
+    motion_state,
+    rotor_decay,
+)
 from fsw.signals import Vec3, Vec4
 from tests.fsw.random_states import estimate_of, vec3
 
@@ -33,7 +39,9 @@ def torque(rotors: Vec4, joint1: float) -> Array:
 
 def acceleration_at(t: float, rotation: Rotation, w: Array, rotors: Vec4, joint1: float) -> Array:
     """World acceleration after Euler's equation has turned the body for ``t`` (either sign)."""
-    inertia = np.array(AIRFRAME.inertia)
+    # The arm hangs straight down and rolls with the body.
+    roll = hanging_arm(AIRFRAME, (0.0, 0.0)).roll_inertia
+    inertia = np.array([roll, *AIRFRAME.inertia[1:]])
 
     def rates(_: float, y: Array) -> Array:
         turn, spin = y[:9].reshape(3, 3), y[9:]
@@ -139,3 +147,18 @@ def test_the_scales_stay_near_what_is_believed() -> None:
     for _ in range(5000):
         mass = estimate_mass(AIRFRAME, mass, (10.0,) * 4, 100.0, 0.002)
     assert mass == pytest.approx(0.7 * AIRFRAME.mass)
+
+
+@pytest.mark.parametrize("q_arm", [(0.0, 0.0), (0.6, -1.2), (-0.3, 0.9)])
+def test_the_hanging_arm_is_two_point_masses_below_the_base(q_arm: tuple[float, float]) -> None:
+    """Rolling about the centre of mass of base and links, each at its own depth."""
+    arm = hanging_arm(AIRFRAME, q_arm)
+    depths = [0.0]
+    elbow = AIRFRAME.link_length[0] * math.cos(q_arm[0])
+    depths.append(AIRFRAME.link_com[0] * math.cos(q_arm[0]))
+    depths.append(elbow + AIRFRAME.link_com[1] * math.cos(sum(q_arm)))
+    masses = np.array([AIRFRAME.mass - sum(AIRFRAME.link_mass), *AIRFRAME.link_mass])
+    centre = float(masses @ depths / masses.sum())
+    about = float(masses @ (np.array(depths) - centre) ** 2)
+    assert arm.depth == pytest.approx(centre)
+    assert arm.roll_inertia == pytest.approx(AIRFRAME.inertia[0] + about)

@@ -82,6 +82,10 @@ class _Linear:
         gamma = self._horizon.model.gamma[node, 15:17]
         return self._horizon.states[node, 15:17] + gamma @ self._change
 
+    def joint_rates(self, node: int) -> Any:
+        gamma = self._horizon.model.gamma[node, 17:19]
+        return self._horizon.states[node, 17:19] + gamma @ self._change
+
 
 class InfeasibleError(Exception):
     """The second program has no solution."""
@@ -103,11 +107,13 @@ def optimum(question: Question, config: PlannerConfig) -> Optimum:
         else _barrier(question, linear, config)
     )
     constraints = _input_limits(U, config) + rows
+    margin = config.limits.joint_margin
     for node in range(1, n + 1):
         th1, th2 = linear.angles(node)[0], linear.angles(node)[1]
         constraints += [
-            cp.abs(th1) <= AIRFRAME.joint1_limit + joint_slack[node - 1],
-            cp.abs(th1 + th2) <= AIRFRAME.joint12_limit + joint_slack[node - 1],
+            cp.abs(th1) <= AIRFRAME.joint1_limit - margin + joint_slack[node - 1],
+            cp.abs(th1 + th2) <= AIRFRAME.joint12_limit - margin + joint_slack[node - 1],
+            cp.abs(linear.joint_rates(node)) <= config.limits.joint_rate + joint_slack[node - 1],
         ]
     ocp = cp.Problem(
         cp.Minimize(

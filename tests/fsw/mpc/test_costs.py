@@ -100,7 +100,7 @@ def test_terminal_node_weighs_five_times_as_table_two_says() -> None:
 def test_joints_that_are_asked_for_weigh_alike_at_every_node_and_none_weigh_nothing() -> None:
     start, guess = np.zeros(19), np.zeros(INPUTS * N)
     horizon = horizon_of(start, guess)
-    points = (horizon.position[:, 2], np.zeros((N + 1, 3)), np.zeros(N + 1))
+    points = (horizon.tracked.position, np.zeros((N + 1, 3)), np.zeros(N + 1))
     asked = TargetPoints(*points, np.tile([0.3, -0.4], (N + 1, 1)))
     cost = PostureCost(CostWeights(posture=8.0))
     assert quadratic(cost, horizon, guess, asked)[0] == pytest.approx(8.0 * 0.25 * N)

@@ -28,7 +28,7 @@ def test_a_predicted_vertical_acceleration_follows_as_the_rotors_do(rotor_lag: f
     ("word", "paths"),
     [
         ("rotor_lag", ["airframe.rotor_lag"]),
-        ("tilt", ["planner.limits.tilt"]),
+        ("limits.tilt", ["planner.limits.tilt"]),
         ("period", ["planner.period_us", "tick_period_us"]),
         ("link_length", ["airframe.link_length.0", "airframe.link_length.1"]),
     ],

@@ -96,15 +96,15 @@ def test_nobody_is_told_until_both_threads_are_done(kept: Kept) -> None:
 
 def test_each_tuning_is_whole(store: ParameterStore) -> None:
     asker = store.listen()
-    store.change("TRK_EFFORT", 0.2, asker)
+    store.change("TRK_EFFORT", 0.3, asker)
     store.change("LND_T_STILL", 0.7, asker)
     first, second = ticks(store, 3 * REST_TICKS)
-    assert first == (("tuning.tracking.input_weight", pytest.approx(0.2e-6)),)
+    assert first == (("tuning.tracking.input_weight", pytest.approx(0.3e-6)),)
     assert dict(second) == {
         "limits.landed_time_us": pytest.approx(700_000.0),
-        "tuning.tracking.input_weight": pytest.approx(0.2e-6),
+        "tuning.tracking.input_weight": pytest.approx(0.3e-6),
     }
-    store.change("TRK_EFFORT", 0.12, asker)
+    store.change("TRK_EFFORT", 0.2, asker)
     (third,) = ticks(store)
     assert set(dict(third)) == {"limits.landed_time_us"}, "the default again is no difference"
 

@@ -186,8 +186,8 @@ def test_the_dialect_names_every_shape_there_is() -> None:
 def test_a_shape_of_every_kind_is_read(kind: int) -> None:
     inbox = Inbox()
     inbox.accept(shape(kind))
-    safe_set = inbox.take().safe_set
-    assert safe_set is not None
+    (announced,) = inbox.take().announced
+    safe_set = announced.safe_set
     (zone,) = safe_set.zones
     assert BY_NAME[zone.shape.kind].number == kind
     assert zone.shape.numbers == pytest.approx(SHAPES[kind])
@@ -198,8 +198,8 @@ def test_shapes_walls_points_and_a_sphere_are_one_set() -> None:
     inbox = Inbox()
     for message in (wall(0, 4), point(1, 4), shape(5, 2, 4), shape(2, 3, 4)):
         inbox.accept(message)
-    safe_set = inbox.take().safe_set
-    assert safe_set is not None
+    (announced,) = inbox.take().announced
+    safe_set = announced.safe_set
     kinds = [zone.shape.kind for zone in safe_set.zones]
     assert kinds == ["half-space", "ball", "box", "target sphere"]
 
@@ -209,7 +209,7 @@ def test_a_set_holds_64_shapes_and_no_more() -> None:
         inbox = Inbox()
         for index in range(count):
             inbox.accept(shape(1, index, count))
-        assert (inbox.take().safe_set is not None) == complete
+        assert bool(inbox.take().announced) == complete
 
 
 def test_what_stands_is_the_same_whenever_it_is_announced_and_what_moves_is_not() -> None:
@@ -217,11 +217,11 @@ def test_what_stands_is_the_same_whenever_it_is_announced_and_what_moves_is_not(
     stands, moves = [], []
     for t_us in (5_000_000, 6_000_000):
         inbox.accept(shape(1, time_usec=t_us))
-        stands.append(inbox.take().safe_set)
+        stands.append(inbox.take().announced)
         inbox.accept(shape(1, time_usec=t_us, **{"velocity[0]": 0.5}))
-        moves.append(inbox.take().safe_set)
+        moves.append(inbox.take().announced)
     assert stands[0] == stands[1]
-    assert [one.zones[0].t_us for one in moves if one is not None] == [5_000_000, 6_000_000]
+    assert [one[0].safe_set.zones[0].t_us for one in moves] == [5_000_000, 6_000_000]
 
 
 def test_a_moving_shape_without_a_time_is_where_it_is_when_it_arrives() -> None:
@@ -237,9 +237,8 @@ def test_a_moving_shape_without_a_time_is_where_it_is_when_it_arrives() -> None:
         q_arm=(0.0, 0.0),
         qd_arm=(0.0, 0.0),
     )
-    safe_set = inbox.take_inputs(sensors, None, None, None).safe_set
-    assert safe_set is not None
-    assert safe_set.zones[0].t_us == 7_000_000
+    (announced,) = inbox.take_inputs(sensors, None, None, None).announced
+    assert announced.safe_set.zones[0].t_us == 7_000_000
 
 
 @pytest.mark.parametrize(
@@ -268,14 +267,14 @@ def test_a_moving_shape_without_a_time_is_where_it_is_when_it_arrives() -> None:
 def test_what_is_no_shape_is_refused_and_counted(kind: int, bad: dict[str, float]) -> None:
     inbox = Inbox()
     inbox.accept(shape(kind, **bad))  # type: ignore[arg-type]
-    assert inbox.take().safe_set is None
+    assert inbox.take().announced == []
     assert inbox.refused == 1
 
 
 def test_a_shape_for_another_vehicle_is_not_ours() -> None:
     inbox = Inbox()
     inbox.accept(shape(1, target_system=2))
-    assert inbox.take().safe_set is None
+    assert inbox.take().announced == []
     assert inbox.refused == 0
 
 
