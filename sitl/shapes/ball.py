@@ -35,7 +35,7 @@ class Ball(ScenarioZone):
 
 @kernel
 def ball_nearest(numbers: Array, x: float, y: float, z: float) -> Nearest:
-    """A point x, y, z [m, NED] against a ball of ``numbers`` (16,) [m, NED]."""
+    """A point at x [m], y [m], z [m] of NED against a ball of ``numbers`` (16,) [m, NED]."""
     x, y, z = x - numbers[0], y - numbers[1], z - numbers[2]
     length = np.sqrt(x * x + y * y + z * z)
     if length == 0.0:

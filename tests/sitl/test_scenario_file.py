@@ -243,9 +243,9 @@ def test_all_shapes_have_been_tried() -> None:
 def test_any_mixture_of_zones_walls_points_and_workspace_is_judged_together() -> None:
     text = BASE + WALL + POINT + BOX + SPHERE
     simulation = Simulation(parse_scenario(text, "test"), 0)
-    zones = [key.partition("/")[0] for key in simulation.margin_keys]
+    zones = [key.partition("/")[0] for key in simulation.result().margins_m]
     assert list(dict.fromkeys(zones)) == ["front", "branch", "shelf", "workspace"]
     assert zones.count("workspace") == 1
     assert zones.count("shelf") == 13
     points = Simulation(parse_scenario('body = "points"\n' + text, "test"), 0)
-    assert len(points.margin_keys) == 3 + 3 + 3 + 1
+    assert len(points.result().margins_m) == 3 + 3 + 3 + 1
