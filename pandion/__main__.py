@@ -19,6 +19,10 @@ VERBS: Final[dict[str, tuple[str, str]]] = {
     "sitl": ("sitl.__main__", "run the simulator alone"),
     "fsw": ("fsw.__main__", "run the flight software alone"),
     "reproduce": ("pandion.reproduce", "fly a table or a figure of the paper again"),
+    "falsify": (
+        "pandion.falsify",
+        "search for the disturbance that pushes the vehicle furthest off its plan",
+    ),
     "param": (
         "pandion.param",
         "list, set, import and export the parameters of a vehicle or a file",

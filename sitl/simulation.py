@@ -10,7 +10,7 @@ from typing import NamedTuple, cast
 import numpy as np
 
 from sitl.compiled import machine_code
-from sitl.disturbances.items import push
+from sitl.disturbances.items import Push, push
 from sitl.flight_evaluator import FlightEvaluator, critical
 from sitl.mission_clock import MissionClock
 from sitl.plant.aerial_manipulator import Plant, plant
@@ -60,11 +60,13 @@ class Truth:
 class Simulation:
     """The plant in its scenario; ``seed``, 0 or more, is the root of all randomness of the run.
 
+    ``more`` pushes come on top of the scenario's disturbances.
+
     Raises:
         ScenarioError: The scenario contradicts itself or starts outside its safe set.
     """
 
-    def __init__(self, scenario: Scenario, seed: int) -> None:
+    def __init__(self, scenario: Scenario, seed: int, more: Sequence[Push] = ()) -> None:
         if not (seed >= 0):
             raise ScenarioError(f"seed = {seed}: must be 0 or more")
         check(scenario)
@@ -77,6 +79,7 @@ class Simulation:
         self._mass = self.vehicle.mass
         self._sensors = SensorSuite(scenario.sensors, seed, STEP_US)
         self._pushes = [push(item, seed, 1e-6 * STEP_US) for item in scenario.disturbances]
+        self._pushes += more
         self._state, trim = first_state(self.vehicle, scenario, self.clock.target_at(0.0).p)
         self._thrust, self._torque = trim.thrust, trim.torque
         self._sent = (0.0, 0.0)  # largest torque and thrust commanded, before any saturation

@@ -51,6 +51,7 @@ _ARM = Command(Arm(), CommandRequest(400, (1.0, *(0.0,) * 6), *_PILOT))
 _FOLLOW = Command(
     SwitchMode(Mode.TRAJECTORY), CommandRequest(176, (1.0, 4.0, 11.0, *(0.0,) * 4), *_PILOT)
 )
+FIRST_COMMANDS = ((_ARM,), (_FOLLOW,))  # of the first ticks
 
 State = TypeVar("State")
 
@@ -168,7 +169,7 @@ def simulate(
         inputs = TickInputs(
             sensors=sensors,
             plan=answer,
-            commands=((_ARM,), (_FOLLOW,))[step] if step < 2 else (),
+            commands=FIRST_COMMANDS[step] if step < len(FIRST_COMMANDS) else (),
             targets=loop.targets(),
             announced=loop.announced(),
         )

@@ -122,11 +122,28 @@ def all_axes(loop: Tube, disturbance: float) -> tuple[float, float]:
     """Reach [m] on a horizontal axis and vertically under a ``disturbance`` [m/s^2] on every axis.
 
     The change of thrust that holds the height accelerates sideways by as much times the lean. What
-    a lean takes from the height is found by measurement, and less than half of its reach.
+    a lean takes from the height is found by measurement: less than its reach once more.
     """
     lean = disturbance * loop.acceleration / GRAVITY
     aside = lean * disturbance * loop.vertical_acceleration
-    return (disturbance + aside) * loop.base + loop.base_wind, 1.5 * disturbance * loop.height
+    return (disturbance + aside) * loop.base + loop.base_wind, 2.0 * disturbance * loop.height
+
+
+def all_axes_up_to(airframe: Airframe, loop: Tube, most: float) -> float:
+    """Largest disturbance of all axes, up to ``most`` [m/s^2], that saturates no rotor [m/s^2].
+
+    At the worst heading both horizontal axes ask the same pair of rotors, root 2 times as much,
+    while the height takes thrust away, which shrinks both lever and headroom.
+    """
+    low, high = 0.0, most
+    while high - low > 1e-3:
+        middle = 0.5 * (low + high)
+        lean = middle * loop.acceleration / GRAVITY
+        pushed = middle + lean * middle * loop.vertical_acceleration
+        lift = max(1.0 - middle * loop.vertical_acceleration / GRAVITY, 0.0)
+        fits = math.sqrt(2.0) * pushed * loop.snap <= _snap_in_hover(airframe) * lift * lift
+        low, high = (middle, high) if fits else (low, middle)
+    return low
 
 
 def _snap_in_hover(airframe: Airframe) -> float:

@@ -27,7 +27,7 @@ class PlannerConfig:
     joint_slack: float = 50.0  # penalty of a rad outside the limits
     # blf
     # Beside walls the end-effector counts too, which swings more than the base wanders.
-    walls: BarrierTuning = field(default_factory=lambda: BarrierTuning(lambda_=0.353))
+    walls: BarrierTuning = field(default_factory=lambda: BarrierTuning(lambda_=0.35))
     workspace: BarrierTuning = field(default_factory=BarrierTuning)
     barrier_slack: float = 20.0  # penalty of a m/s less than the barrier requires
     # hc

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 from fsw.barriers.safe_approach import BarrierTuning
 from fsw.control.gains import tracking_gains
-from fsw.control.tube import Tube, all_axes, limits_used, tube
+from fsw.control.tube import Tube, all_axes, all_axes_up_to, limits_used, tube
 from fsw.model.airframe import GRAVITY
 from fsw.parameters.flight_config import FlightConfig, Surroundings
 from fsw.shapes import kind_of
@@ -60,7 +60,7 @@ def analyse(config: FlightConfig, safe_set: SafeSet, loop: Tube) -> tuple[Findin
         if config.inner == "tracking":
             kept = SafeSet(tuple(zones))
             findings.append(_base_tube(tuning, loop, surroundings))
-            findings.append(_tube_of_all_axes(tuning, loop, kept, surroundings))
+            findings.append(_tube_of_all_axes(config, tuning, loop, kept))
         else:
             findings.append(_sampled(tuning, surroundings, planner.period))
     if config.inner == "tracking":
@@ -177,27 +177,32 @@ def _base_tube(tuning: BarrierTuning, loop: Tube, surroundings: Surroundings) ->
 
 
 def _tube_of_all_axes(
-    tuning: BarrierTuning, loop: Tube, safe_set: SafeSet, surroundings: Surroundings
+    config: FlightConfig, tuning: BarrierTuning, loop: Tube, safe_set: SafeSet
 ) -> Finding:
-    """A wall meets one axis of it, if it stands along one; a sphere meets all of them together."""
-    most, room = surroundings.disturbance, stand_off(tuning)
+    """A wall meets one axis of it, if it stands along one; a sphere meets all of them together.
+
+    Above what saturates the rotors there is no bound.
+    """
+    expected, room = config.surroundings.disturbance, stand_off(tuning)
+    most = all_axes_up_to(config.airframe, loop, expected)
+    whole = most > 0.99 * expected
     across, up = all_axes(loop, most)
     reach = _reach(safe_set, across, up)
-    scale = room / reach
     return _finding(
         "tube of all axes",
-        room >= reach,
-        f"pushed within {most:g} m/s^2 on all axes at once the base can be {across * 1e3:.0f} mm "
+        room >= reach and whole,
+        f"pushed within {most:.2f} m/s^2 on all axes at once the base can be {across * 1e3:.0f} mm "
         f"off its plan on a horizontal axis and {up * 1e3:.0f} mm vertically, {reach * 1e3:.0f} mm "
         f"towards the boundary, and the plan keeps {room * 1e3:.0f} mm",
-        f"lambda >= {reach * tuning.slope:.3f} m/s would be proof, or at most about "
-        f"{scale * most:.2f} m/s^2",
+        f"above {most:.2f} m/s^2 on all axes the rotors can saturate, and nothing is bounded"
+        if not whole
+        else f"lambda >= {reach * tuning.slope:.3f} m/s would be proof",
         refuses=False,
     )
 
 
 def _reach(safe_set: SafeSet, across: float, up: float) -> float:
-    """How far towards a boundary [m] ``across`` [m] on x and y and ``up`` [m] on z are at most."""
+    """How far towards a boundary ``across`` [m] on x and on y and ``up`` [m] can lead [m]."""
     corner = math.hypot(across, across, up)
     flat = [zone.shape.numbers for zone in safe_set.zones if kind_of(zone.shape).flat]
     if len(flat) < len(safe_set.zones):

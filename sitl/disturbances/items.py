@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sitl.disturbances.sequence import Played
 from sitl.scenario import V3, Disturbance, Torque, Uniform, Wind
 from sitl.seeds import stream
 
@@ -76,7 +77,7 @@ class RandomImpulses:
         return self._held if step < self._until else STILL
 
 
-Push = Resampled | Constant | RandomImpulses
+Push = Resampled | Constant | RandomImpulses | Played
 
 
 def push(item: Disturbance, seed: int, step_s: float) -> Push:

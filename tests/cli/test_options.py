@@ -25,6 +25,7 @@ from fsw.link.link_choice import LinkChoice
 from fsw.parameters.control_choice import ControlChoice
 from fsw.signals import Origin
 from pandion.export import ExportOptions
+from pandion.falsify import FalsifyOptions
 from pandion.fly import FlyOptions
 from pandion.replay import ReplayOptions
 from pandion.reproduce import ReproduceOptions
@@ -33,6 +34,7 @@ from tests.cli.command import one_sentence
 
 PROGRAMS = (
     FlyOptions, FswOptions, SitlOptions, ReplayOptions, ReproduceOptions, ExportOptions,
+    FalsifyOptions,
     LoopOptions, LockstepOptions, FloodOptions, DownloadOptions, MpcOptions,
 )  # fmt: skip
 
@@ -73,7 +75,12 @@ def test_what_the_processes_are_started_with_survives_the_command_line() -> None
         origin=Origin(-33.123456789012, 0.1, 2.0), keys=Path("a b"),
     )  # fmt: skip
     control = ControlChoice(
-        controller="hc", tracking="pid", lambda_="paper-5", solver="slsqp", allow_inconsistent=True
+        controller="hc",
+        tracking="pid",
+        lambda_="paper-5",
+        solver="slsqp",
+        body="points",
+        allow_inconsistent=True,
     )
     fsw = FswOptions(links=links, control=control, out=Path("o"), wait_s=0.1 + 0.2, seed=0)
     sitl = SitlOptions(scenario="x.toml", seed=2**63 - 1, realtime=True, speed=1.5, out=Path("o"))

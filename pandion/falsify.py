@@ -1,0 +1,240 @@
+"""``pandion falsify``: look for a disturbance that breaks the printed bound; keep the worst."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from command_line.options import json_file, option, read
+from command_line.output import console_beside, write_text
+from command_line.parser import COULD_NOT_START
+from command_line.values import number, whole
+from command_line.version import version
+from fsw.log.run_directory import new_run_directory
+from pandion.display import Display
+
+if TYPE_CHECKING:
+    from fsw.parameters.flight_config import FlightConfig
+    from sitl.scenario import Scenario
+    from studies.falsify import Found, Outcome, Replayed
+
+HOLDS, BROKEN = 0, 1  # exit codes
+_FORMAT: Final = "pandion-disturbance-1"
+_MM: Final = 1e3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FalsifyOptions:
+    """One search, or one disturbance of an earlier one."""
+
+    scenario: str = option("SCENARIO", "name or path of a .toml file", default="walls")
+    evaluations: int = option(
+        "--evaluations N", "stretches of 5 s to fly", whole(1, 1_000_000), default=2000
+    )
+    seed: int = option("--seed N", "root of the search's random numbers", whole(), default=0)
+    amplitude: float = option(
+        "--amplitude A",
+        "of the disturbance on each axis, in m/s^2",
+        number(0.001, 50.0, "m/s^2"),
+        default=0.8,
+    )
+    replay: Path | None = option(
+        "--replay FILE", "fly a worst.json of an earlier search with planner and referee", Path
+    )
+    json: str | None = json_file("the result")
+    out: Path | None = option(
+        "--out DIR", "where worst.json goes (default a new directory in runs/)", Path
+    )
+
+
+class UnusableError(ValueError):
+    """A scenario or a file that cannot be searched or flown again."""
+
+
+def main(argv: list[str]) -> int:
+    """Search, or fly again; returns the exit code."""
+    what = "Search for the disturbance that pushes the base furthest off its plan."
+    options = read(FalsifyOptions, "pandion falsify", what, argv)
+    from fsw.runtime.process import pin_numerics_to_one_thread
+
+    pin_numerics_to_one_thread()  # before NumPy loads
+    from sitl.scenario_file import ScenarioError, load_scenario
+    from studies.closed_loop import RefusedError
+
+    try:
+        scenario = load_scenario(options.scenario)
+        _check(scenario)
+        if options.replay is not None:
+            return _replay(options, scenario, options.replay)
+        return _search(options, scenario)
+    except (ScenarioError, RefusedError, UnusableError, OSError) as error:
+        print(f"pandion falsify: {error}", file=sys.stderr)
+        return COULD_NOT_START
+
+
+def _check(scenario: Scenario) -> None:
+    if scenario.start.kind != "airborne" or scenario.pilot.plan != "trajectory":
+        raise UnusableError(
+            f"{scenario.name} does not start in the air on a trajectory; the search needs "
+            "start.kind = 'airborne' and pilot.plan = 'trajectory'"
+        )
+
+
+def _config(scenario: Scenario) -> FlightConfig:
+    from fsw.parameters.flight_config import flight_config
+
+    return flight_config(body=scenario.body)  # as pandion fly
+
+
+def _search(options: FalsifyOptions, scenario: Scenario) -> int:
+    from studies.falsify import search
+
+    console = console_beside(options.json)
+    display = Display(console)
+    folder = options.out or new_run_directory(Path("runs"), f"falsify-{scenario.name}")
+    folder.mkdir(parents=True, exist_ok=True)
+    display.say(
+        f"Pandion {version()}: {scenario.name}, {options.evaluations} evaluations, "
+        f"±{options.amplitude:g} m/s² on each axis"
+    )
+    with display.progress():
+        outcome = search(
+            scenario,
+            _config(scenario),
+            options.amplitude,
+            options.evaluations,
+            options.seed,
+            lambda what, done, total: display.report(
+                what, done, total, f"{done:.0f} of {total:.0f}"
+            ),
+        )
+    kept = folder / "worst.json"
+    kept.write_text(json.dumps(_as_file(scenario, outcome.worst)), encoding="utf-8")
+    for sentence in _sentences(outcome):
+        display.say(sentence)
+    display.say(f"worst disturbance {kept}; pandion falsify {options.scenario} --replay {kept}")
+    write_text(options.json, json.dumps(_as_json(options, outcome), indent=2) + "\n")
+    return HOLDS if outcome.holds else BROKEN
+
+
+def _sentences(outcome: Outcome) -> list[str]:
+    bounds, least = outcome.bounds, outcome.least_margin
+    verdict = "holds" if outcome.holds else "BROKEN"
+    margin = "" if math.isinf(least.margin_m) else f", least margin {least.margin_m * _MM:+.1f} mm"
+    return [
+        f"one axis   {_found(outcome.worst_of_one_axis)}, bound {bounds.one_axis * _MM:.0f} mm",
+        f"worst      {_found(outcome.worst)}, bound {bounds.across * _MM:.0f} mm on a horizontal "
+        f"axis, {bounds.up * _MM:.0f} mm vertically",
+        f"all axes   the bound holds up to {bounds.all_axes_up_to:.2f} m/s²; above it the rotors "
+        "can saturate",
+        f"bound {verdict} after {outcome.evaluations} evaluations: the worst reaches "
+        f"{outcome.worst.share:.0%} of it{margin}",
+    ]
+
+
+def _found(found: Found) -> str:
+    x, y, z = (value * _MM for value in found.off_m)
+    at = found.start.step * 0.002
+    return f"{x:.0f}, {y:.0f}, {z:.0f} mm off the plan ({found.kind}, from {at:.1f} s)"
+
+
+def _as_json(options: FalsifyOptions, outcome: Outcome) -> dict[str, Any]:
+    bounds = outcome.bounds
+    return {
+        "scenario": options.scenario,
+        "seed": options.seed,
+        "amplitude_m_s2": options.amplitude,
+        "evaluations": outcome.evaluations,
+        "holds": outcome.holds,
+        "bound_one_axis_m": bounds.one_axis,
+        "bound_all_axes_up_to_m_s2": bounds.all_axes_up_to,
+        "bound_all_axes_m": [bounds.across, bounds.across, bounds.up],
+        "worst": _summary(outcome.worst),
+        "worst_of_one_axis": _summary(outcome.worst_of_one_axis),
+        "least_margin": _summary(outcome.least_margin),
+    }
+
+
+def _summary(found: Found) -> dict[str, Any]:
+    return {
+        "share_of_bound": found.share if math.isfinite(found.share) else None,
+        "off_plan_m": list(found.off_m),
+        "margin_m": found.margin_m if math.isfinite(found.margin_m) else None,
+        "axes": found.axes,
+        "kind": found.kind,
+        "filtered_ticks": found.filtered_ticks,
+        "first_step": found.start.step,
+    }
+
+
+def _as_file(scenario: Scenario, found: Found) -> dict[str, Any]:
+    return {
+        "format": _FORMAT,
+        "scenario": scenario.name,
+        "first_step": found.start.step,
+        "off_plan_m": list(found.off_m),
+        "acceleration_m_s2": [list(push) for push in found.pushes],
+    }
+
+
+def _replay(options: FalsifyOptions, scenario: Scenario, path: Path) -> int:
+    from studies.falsify import bounds, replay
+
+    first_step, pushes = _read(path, scenario)
+    config = _config(scenario)
+    amplitude = max(abs(value) for push in pushes for value in push)
+    console = console_beside(options.json)
+    display = Display(console)
+    with display.progress():
+        flown = replay(
+            scenario,
+            config,
+            first_step,
+            pushes,
+            lambda what, done, total: display.report(
+                what, done, total, f"{done:.0f} of {total:.0f} s"
+            ),
+        )
+    bound = bounds(config, amplitude)
+    x, y, z = (value * _MM for value in flown.off_m)
+    display.say(
+        f"{x:.1f}, {y:.1f}, {z:.1f} mm off the plan; bound {bound.across * _MM:.0f} mm on a "
+        f"horizontal axis, {bound.up * _MM:.0f} mm vertically"
+    )
+    if math.isfinite(flown.margin_m):
+        display.say(f"least margin {flown.margin_m * _MM:+.1f} mm")
+    if flown.ended is not None:
+        display.say(flown.ended)
+    write_text(options.json, json.dumps(_replayed(flown), indent=2) + "\n")
+    within = max(flown.off_m[:2]) <= bound.across and flown.off_m[2] <= bound.up
+    return HOLDS if within else BROKEN
+
+
+def _replayed(flown: Replayed) -> dict[str, Any]:
+    return {
+        "off_plan_m": list(flown.off_m),
+        "margin_m": flown.margin_m if math.isfinite(flown.margin_m) else None,
+        "ended": flown.ended,
+    }
+
+
+def _read(path: Path, scenario: Scenario) -> tuple[int, tuple[tuple[float, float, float], ...]]:
+    """The first step and the values of a kept disturbance."""
+    try:
+        kept = json.loads(path.read_text(encoding="utf-8"))
+        if kept["format"] != _FORMAT:
+            raise KeyError("format")
+        first = int(kept["first_step"])
+        pushes = tuple((float(x), float(y), float(z)) for x, y, z in kept["acceleration_m_s2"])
+    except (UnicodeDecodeError, RecursionError, KeyError, TypeError, ValueError):
+        raise UnusableError(f"{path} is no disturbance that pandion falsify has kept") from None
+    values = [value for push in pushes for value in push]
+    if not (pushes and first >= 0 and all(abs(value) <= 50.0 for value in values)):
+        raise UnusableError(f"{path}: every value must be within ±50 m/s^2, and there must be some")
+    if kept.get("scenario") != scenario.name:
+        raise UnusableError(f"{path} was found in {kept.get('scenario')}, not in {scenario.name}")
+    return first, pushes

@@ -1,0 +1,25 @@
+"""A disturbance that was written down, value by value, and is played back."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from sitl.scenario import V3
+
+_STILL: V3 = (0.0, 0.0, 0.0)
+
+
+class Played:
+    """Accelerations [m/s², NED], each held for ``every`` steps, from the step ``first`` on."""
+
+    torque = False
+
+    def __init__(self, values: Sequence[V3], first: int, every: int) -> None:
+        self._values = values
+        self._first = first
+        self._every = every
+
+    def sample(self, step: int) -> V3:
+        """See ``Push``; nothing before the first and after the last."""
+        index = (step - self._first) // self._every
+        return self._values[index] if 0 <= index < len(self._values) else _STILL

@@ -1,0 +1,88 @@
+"""The search finds the defect that was flown once, and nothing beyond the bound that is printed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from fsw.parameters.flight_config import FlightConfig, flight_config
+from sitl.scenario_file import load_scenario
+from studies.falsify import Outcome, Search, replay, search
+from studies.plan_record import PlanRecord, record
+
+SCENARIO = replace(load_scenario("workspace"), duration_s=9.0)
+NOW = flight_config(body="points")
+
+
+def _silent(_: str, __: float, ___: float) -> None:
+    """No progress."""
+
+
+def _before() -> FlightConfig:
+    """The loop of the day on which 94 mm were measured for a bound of 69."""
+    tracking = replace(
+        NOW.tuning.tracking,
+        input_weight=1.2e-7,
+        vertical_input_weight=1e-6,
+        vertical_disturbance_limit=0.0,
+        stopping_snap=30.0,
+        wind_limit=0.15,
+        position_error_limit=0.07,
+    )
+    return replace(NOW, tuning=replace(NOW.tuning, tracking=tracking))
+
+
+@cache
+def _flown() -> PlanRecord:
+    return record(SCENARIO, NOW, lambda _, __: None)
+
+
+@cache
+def _found() -> Outcome:
+    return search(SCENARIO, NOW, 0.8, 120, 3, _silent)
+
+
+def _chase(config: FlightConfig, amplitude: float, axes: tuple[int, int, int]) -> Outcome:
+    hunt = Search(SCENARIO, config, _flown(), amplitude)
+    for lead in ((0.0, 1.0, 0.0), (3.0, 1.0, 0.05)):
+        for every in (1, 50):
+            hunt.adversary(hunt.starts[-1], every, np.outer(axes, lead))
+    return hunt.outcome()
+
+
+@pytest.mark.parametrize("axes", [(1, 0, 0), (0, 1, 0)])
+def test_the_old_loop_breaks_its_bound_on_one_axis(axes: tuple[int, int, int]) -> None:
+    outcome = _chase(_before(), 0.8, axes)
+    assert not outcome.holds
+    assert max(outcome.worst_of_one_axis.off_m) > 1.1 * outcome.bounds.one_axis
+
+
+@pytest.mark.parametrize("amplitude", [0.1, 0.2, 0.4, 0.6, 0.8])
+@pytest.mark.parametrize("axes", [(1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 1)])
+def test_the_loop_keeps_its_bound_at_every_amplitude(
+    amplitude: float, axes: tuple[int, int, int]
+) -> None:
+    outcome = _chase(NOW, amplitude, axes)
+    assert outcome.holds, outcome.worst
+    if sum(axes) == 1 and axes[2] == 0:
+        assert outcome.worst.axes == 1
+        assert outcome.worst.share > 0.6  # the adversary comes near
+
+
+def test_a_search_finds_nothing_beyond_the_bound_and_repeats_itself() -> None:
+    outcome = _found()
+    assert outcome.evaluations >= 120
+    assert outcome.holds, outcome.worst
+    assert outcome.worst.share > 0.7
+    again = search(SCENARIO, NOW, 0.8, 120, 3, _silent)
+    assert again.worst.off_m == outcome.worst.off_m
+
+
+def test_what_was_found_flies_the_same_with_planner_and_referee() -> None:
+    worst = _found().worst
+    flown = replay(SCENARIO, NOW, worst.start.step, worst.pushes, _silent)
+    assert flown.off_m == pytest.approx(worst.off_m, abs=1e-4)
+    assert flown.margin_m == pytest.approx(worst.margin_m, abs=1e-3)
