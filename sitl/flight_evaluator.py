@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from sitl.body import BASE, END_EFFECTOR, JOINT2
+from sitl.body import BASE, END_EFFECTOR, JOINT2, Parts
+from sitl.compiled import machine_code
 from sitl.limits import LimitRecord
 from sitl.mission_clock import MissionClock
 from sitl.plant.vector import Array
@@ -15,7 +16,7 @@ from sitl.result import EndKind, EndReason, MarginRecord, TrackingError, TruthRe
 from sitl.scenario import V3, Scenario
 from sitl.scenario_validation import check_start
 from sitl.start import flown_vehicle
-from sitl.world import World, record_if_clear
+from sitl.world import World, ZoneTable, record_if_clear
 
 TOUCH_DOWN_MAX = 2.0  # m/s; a drop from 0.2 m
 Points = tuple[V3, V3, V3]  # base, joint 2, end-effector [m, NED]
@@ -47,6 +48,10 @@ class FlightEvaluator:
         self._error = TrackingError()
         self._duration_s = scenario.duration_s
         self._whole = _whole(scenario)
+        # Without steps nothing is recorded: only its machine code is wanted, the cheapest to call.
+        self._record_if_clear = machine_code(
+            record_if_clear, *self._recorded((_NO_CURVE, 0.0), places[None][:0], (0.0, 0.0))
+        )
         margins = self.margins(places, 0.0)
         check_start(self.world.keys, margins)
         self.record.add(margins, 0.0)
@@ -94,17 +99,14 @@ class FlightEvaluator:
             if clock.starts_s is None or not clock.counts(last_s):
                 return False
             curve, starts_s = clock.curve, clock.starts_s
-        lowest, when_s = self.record.arrays
-        world = self.world
-        return record_if_clear(
-            world.table,
-            world.parts,
-            (curve, starts_s),
-            places,
-            (before_s, step_s),
-            lowest,
-            when_s,
-        )
+        how = self._recorded((curve, starts_s), places, (before_s, step_s))
+        return self._record_if_clear(*how)
+
+    def _recorded(
+        self, aim: tuple[Array, float], places: Array, instants: tuple[float, float]
+    ) -> tuple[ZoneTable, Parts, tuple[Array, float], Array, tuple[float, float], Array, Array]:
+        """Arguments of ``record_if_clear``."""
+        return (self.world.table, self.world.parts, aim, places, instants, *self.record.arrays)
 
     def judge_limits(
         self, states: Array, sent: tuple[float, float], before_s: float, step_s: float
