@@ -83,7 +83,7 @@ def test_the_joints_move_and_the_body_stays() -> None:
 
 def test_a_goto_towards_a_wall_stops_before_it() -> None:
     walls = load_scenario("walls").walls
-    flight = Flight(replace(hover(), walls=walls))
+    flight = Flight(replace(hover(), walls=walls, body="points"))
     flight.step(command(ARM, 1.0))
     flight.step(as_int(GOTO, 1, 2.0, 1.0, 0.0, NAN, 0.89, 0.0, -1.4))
     flight.run(5.0)

@@ -8,7 +8,7 @@ import pytest
 
 from fsw.flight.autopilot import Autopilot
 from fsw.flight.tuned_autopilot import TunedAutopilot
-from fsw.parameters.flight_config import FlightConfig, flight_config
+from fsw.parameters.flight_config import flight_config
 from fsw.parameters.registry import PARAMETERS
 from fsw.signals import Mode, Plan
 from fsw.tuning import Tuning, part, tuned
@@ -52,7 +52,7 @@ def test_no_tick_mixes_old_and_new() -> None:
     """A tick after a change is that of a vehicle which has never had another tuning."""
     flight = beside_walls()
     flight.step(tuning=EVERYTHING)
-    fresh = Autopilot(tuned(FlightConfig(), EVERYTHING))
+    fresh = Autopilot(tuned(flight_config(body="points"), EVERYTHING))
     for _ in range(60):  # more than a planning period
         before = flight.state
         outputs = flight.step()
@@ -70,7 +70,7 @@ def test_the_tick_of_the_change_itself_is_the_new_ones() -> None:
     before = flight.state
     outputs = flight.step(tuning=EVERYTHING)
     assert flight.inputs is not None
-    fresh = Autopilot(tuned(FlightConfig(), EVERYTHING))
+    fresh = Autopilot(tuned(flight_config(body="points"), EVERYTHING))
     _, expected = fresh.tick(before, replace(flight.inputs, tuning=None))
     assert outputs.actuators == expected.actuators
     assert outputs.tuning_taken is True
@@ -128,7 +128,7 @@ def test_in_the_air_what_breaks_an_inequality_is_refused_with_it() -> None:
     assert flight.state.tuning == ()
     (text,) = [text.text for text in outputs.texts]
     assert "refused while armed" in text
-    assert "pushes the base further than 69 mm" in text
+    assert "pushes the base further than 71 mm" in text
     assert "lambda >= 0.2" in text
     flight.run(0.2)
     assert flight.mode is Mode.TRAJECTORY

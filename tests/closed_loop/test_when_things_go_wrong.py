@@ -75,7 +75,9 @@ def test_without_plans_the_vehicle_brakes_and_stays_put(first_failure: int) -> N
         flight.run(0.5)
         assert math.dist(flight.sim.truth().p_WB, braked) < 0.1
     assert math.hypot(*flight.sim.truth().v_WB) < 0.02
-    assert flight.mode is Mode.TRAJECTORY
+    # The sphere that follows the target leaves the vehicle behind.
+    assert flight.mode is Mode.HOLD
+    assert any("outside the safe set" in text for text in flight.texts)
 
 
 def lost_between(first: int, last: int) -> Callable[[SensorFrame], SensorFrame]:

@@ -8,14 +8,14 @@ from pathlib import Path
 
 from fsw.log.flight_log import FlightLog, LogSubject
 from fsw.parameters.control_choice import ControlChoice
-from fsw.parameters.flight_config import FlightConfig
+from fsw.parameters.flight_config import flight_config
 from fsw.ports import GroupTiming
 from fsw.signals import Command, TickInputs, TickOutputs
 from fsw.tuning import flat
 from sitl.scenario_file import load_scenario
 from tests.closed_loop.harness import LAND, Flight, command
 
-CHOICE = ControlChoice()
+CHOICE = ControlChoice(body="points")
 
 
 @dataclasses.dataclass
@@ -44,7 +44,9 @@ def flight(seconds: float) -> list[tuple[TickInputs, TickOutputs]]:
 def written(path: Path, ticks: list[tuple[TickInputs, TickOutputs]], lockstep: bool = True) -> Path:
     """The log of these ticks."""
     facts: dict[str, str | int] = CHOICE.facts()
-    log = FlightLog(path, LogSubject(facts, flat(FlightConfig()), {}, 17.1675, (0.15, 0.15)))
+    log = FlightLog(
+        path, LogSubject(facts, flat(flight_config(body="points")), {}, 17.1675, (0.15, 0.15))
+    )
     log.begin(ticks[0][0].sensors.t_us, lockstep)
     for inputs, outputs in ticks:
         log.add(inputs, outputs)

@@ -16,7 +16,7 @@ from fsw.log import topics
 from fsw.log.flight_log import LogSubject, definitions
 from fsw.log.reader import open_flight
 from fsw.log.topics import TOPICS
-from fsw.parameters.flight_config import FlightConfig
+from fsw.parameters.flight_config import FlightConfig, flight_config
 from fsw.runtime.assembly import flight_software
 from fsw.runtime.replay import Replayed, other_numbers, replay
 from fsw.signals import TickInputs, TickOutputs
@@ -52,8 +52,8 @@ def test_the_same_code_does_the_same(
 
 
 def with_another_gain() -> FlightConfig:
-    config = FlightConfig()
-    tuning = replace(config.tuning, joint=replace(config.tuning.joint, kp=400.001))
+    config = flight_config(body="points")
+    tuning = replace(config.tuning, joint=replace(config.tuning.joint, kp=625.001))
     return replace(config, tuning=tuning)
 
 
@@ -79,7 +79,7 @@ def test_one_gain_changed_is_found_at_the_tick_at_which_it_first_matters(
     assert now_is in (*now.actuators.rotor_thrust, *now.actuators.joint_torque)
     program = replace(flight_software(CHOICE, to_plan=False), numbers=flat(config))
     assert other_numbers(open_flight(path), program) == (
-        "tuning.joint.kp is 400.001 here and was 400.0",
+        "tuning.joint.kp is 625.001 here and was 625.0",
     )
 
 
