@@ -12,7 +12,8 @@ of the probe's surface to it and w the zone's velocity, the paper's barriers are
 A row that cannot bind, whatever the inputs are, is left out exactly: over the horizon no place of
 the vehicle can go farther than its speed and the limits on the inputs allow.
 
-Source: docs/equations.md E10, E11, E14, E15, E22, E23.
+Source: docs/equations.md E10, E11, E12, E14, E15, E22, E23;
+docs/decisions/0029-shapes-and-a-body.md.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""A ball; of radius zero it is a point, such as the tip of a branch (eqs 11, 12)."""
+"""A ball; of radius zero it is a point, such as the tip of a branch.
+
+Source: docs/equations.md E11, E12, E23.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Half-space ``n . p <= o``: a wall, a floor, a ceiling. To keep out is to stay in front of it."""
+"""Half-space ``n . p <= o``: a wall, a floor, a ceiling. To keep out is to stay in front of it.
+
+Source: docs/equations.md E14, E22.
+"""
 
 from __future__ import annotations
 

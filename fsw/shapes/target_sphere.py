@@ -1,4 +1,7 @@
-"""The sphere that follows the end-effector's target and holds the base (Case II, eqs 15, 23)."""
+"""The sphere that follows the end-effector's target and holds the base (Case II).
+
+Source: docs/equations.md E15, E23.
+"""
 
 from __future__ import annotations
 
