@@ -108,3 +108,13 @@ def test_the_safety_filter_of_the_search_is_the_one_that_flies() -> None:
     assert found.filtered_ticks > 10
     flown = replay(SCENARIO, eager, found.start.step, found.pushes, _silent)
     assert flown.off_m == pytest.approx(found.off_m, abs=1e-4)
+
+
+def test_a_process_flies_both_bodies_alike() -> None:
+    scenario = replace(load_scenario("shelf"), duration_s=1.0)
+    for body in ("points", "full"):
+        assert len(record(scenario, flight_config(body=body), _silent_flight).rows) == 500
+
+
+def _silent_flight(_: float, __: float) -> None:
+    """No progress."""
