@@ -42,6 +42,8 @@ _DISC_STEPS = 5  # from a disc to a zone and back
 _MOVE = FIRST + NUMBERS  # columns of a zone's movement: velocity, where it is at a time, that time
 _COLUMNS = _MOVE + 7
 _ON, _Z, _RADIUS, _RIM = 0, 3, 4, 5  # columns of a part
+_MOST_PARTS = 12
+_NO_PART = (0.0,) * 6
 
 NO_ZONES: NDArray[np.float64] = np.zeros((0, _COLUMNS))
 
@@ -69,8 +71,10 @@ class FilterLaw:
     links: Vec2  # m
     lag: float  # s, tau
     level: float  # m/s^2, at most, an axis
-    # Spheres and discs of the body: what each is on, its place there [m], radius and rim [m].
+    # Spheres and discs of the body: what each is on, its place there [m], radius and rim [m]. As
+    # many rows for every body: of two layouts in one process the second is read wrongly.
     parts: tuple[tuple[float, ...], ...]
+    count: int  # of the rows, that are parts
 
 
 def filter_law(
@@ -86,6 +90,11 @@ def filter_law(
     Its ``links`` [m] are known; the loop takes ``lag`` [s] and stands ``level`` [m/s^2].
     """
     kept, following = barriers
+    parts = tuple(
+        (float(part.on), *part.begin, part.radius, part.rim)
+        for part in body.parts
+        if part.end is None
+    )
     return FilterLaw(
         tuning=tuning,
         kept=(kept.alpha, kept.slope),
@@ -93,11 +102,8 @@ def filter_law(
         links=links,
         lag=lag,
         level=level,
-        parts=tuple(
-            (float(part.on), *part.begin, part.radius, part.rim)
-            for part in body.parts
-            if part.end is None
-        ),
+        parts=parts + (_NO_PART,) * (_MOST_PARTS - len(parts)),
+        count=len(parts),
     )
 
 
@@ -146,7 +152,7 @@ def filtered(
             if surface_at(zones, k, 0, x, y, z).distance > law.tuning.near:
                 continue
             follows = zone[FOLLOWS] > 0.0
-            for j in range(1 if follows else len(law.parts)):
+            for j in range(1 if follows else law.count):
                 n, least, distance = _condition(
                     law, zones, k, j, follows, shift, drift, estimate, v, a
                 )

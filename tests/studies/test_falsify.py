@@ -10,6 +10,7 @@ import pytest
 
 from fsw.parameters.flight_config import FlightConfig, flight_config
 from sitl.scenario_file import load_scenario
+from studies.closed_loop import simulate
 from studies.falsify import Outcome, Search, replay, search
 from studies.plan_record import PlanRecord, record
 
@@ -108,3 +109,10 @@ def test_the_safety_filter_of_the_search_is_the_one_that_flies() -> None:
     assert found.filtered_ticks > 10
     flown = replay(SCENARIO, eager, found.start.step, found.pushes, _silent)
     assert flown.off_m == pytest.approx(found.off_m, abs=1e-4)
+
+
+def test_a_process_flies_both_bodies_alike() -> None:
+    scenario = replace(load_scenario("shelf"), duration_s=1.0)
+    for body in ("points", "full"):
+        truth = simulate(scenario, 0, flight_config(body=body)).truth
+        assert truth.completed, truth.end_reason
