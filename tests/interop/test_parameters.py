@@ -145,11 +145,11 @@ def test_the_command_line_lists_sets_exports_and_imports(
     _, error = output_of("set", "TRK_EFFORT", "1e9", code=1)
     assert error.startswith("pandion param: TRK_EFFORT is to be ")
     assert error.count("\n") == 1
-    assert output_of("set", "TRK_EFFORT", "0.2")[0] == "TRK_EFFORT is 0.2\n"
+    assert output_of("set", "TRK_EFFORT", "0.3")[0] == "TRK_EFFORT is 0.3\n"
     file = tmp_path / "out.parm"
     output_of("export", str(file))
-    assert load(file).values["TRK_EFFORT"] == 0.2
-    file.write_text("TRK_EFFORT 0.12\nPLN_W_YAW 0.06\nGONE 1\n")
+    assert load(file).values["TRK_EFFORT"] == 0.3
+    file.write_text("TRK_EFFORT 0.2\nPLN_W_YAW 0.06\nGONE 1\n")
     received, error = output_of("import", str(file))
     assert received == "2 parameters read, 2 changed, 0 refused\n"
     assert "GONE is unknown" in error
