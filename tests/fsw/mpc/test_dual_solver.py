@@ -63,7 +63,7 @@ def cost(program: QpData, x: Array) -> float:
     )
 
 
-@pytest.mark.parametrize("horizon", [1, 5, 20])
+@pytest.mark.parametrize("horizon", [1, 5, pytest.param(20, marks=pytest.mark.long)])
 @pytest.mark.parametrize("off", [0.05, 5.0], ids=["near", "far"])
 @pytest.mark.parametrize("safe_set", [SafeSet(), WALLS, SPHERE], ids=["open", "walls", "sphere"])
 def test_the_optimum_is_that_of_the_whole_program(
