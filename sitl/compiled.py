@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 import hashlib
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar, cast
 
 import numba
 from numba.extending import register_jitable
+
+# The shapes' kernels are called by a table of functions (sitl/distance.py), which numba has had for
+# years and still calls new.
+warnings.filterwarnings(
+    "ignore", "First-class function type", numba.NumbaExperimentalFeatureWarning
+)
 
 P = ParamSpec("P")
 R = TypeVar("R")

@@ -14,7 +14,7 @@ import math
 from numba import literal_unroll
 
 from sitl.body import AXES, BALL, CAPSULE, Parts
-from sitl.compiled import compiled
+from sitl.compiled import kernel
 from sitl.plant.vector import V3, Array, add, dot, scale, sub
 from sitl.shapes import KINDS
 from sitl.shapes.kind import Nearest
@@ -26,7 +26,7 @@ _GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 _SAMPLES = 48  # of a rotor's rim
 
 
-@compiled
+@kernel
 def nearest(kind: int, numbers: Array, p: V3) -> Nearest:
     """A point p [m, NED] against the shape of a kind with ``numbers`` (16,) [m, NED]."""
     at = Nearest(math.inf, 0.0, 0.0, 1.0)
@@ -38,7 +38,7 @@ def nearest(kind: int, numbers: Array, p: V3) -> Nearest:
     return at
 
 
-@compiled
+@kernel
 def _place(parts: Parts, b: int, end: int, places: Array) -> V3:
     row = parts.row[b, end]
     p = (places[row, 0], places[row, 1], places[row, 2])
@@ -50,7 +50,7 @@ def _place(parts: Parts, b: int, end: int, places: Array) -> V3:
     return p
 
 
-@compiled
+@kernel
 def part_bound(
     kind: int, numbers: Array, keep_in: bool, shift: V3, parts: Parts, b: int, places: Array
 ) -> float:
@@ -73,7 +73,7 @@ def part_bound(
     return (-d if keep_in else d) - reach
 
 
-@compiled
+@kernel
 def part_distance(
     kind: int, numbers: Array, keep_in: bool, shift: V3, parts: Parts, b: int, places: Array
 ) -> float:
@@ -99,7 +99,7 @@ def part_distance(
     return of_rotor(kind, numbers, begin, axis, radius, parts.half_height[b])
 
 
-@compiled
+@kernel
 def along_segment(kind: int, numbers: Array, begin: V3, end: V3) -> float:
     """The least distance [m] between ``begin`` [m, NED] and ``end`` [m, NED] to a shape.
 
@@ -123,7 +123,7 @@ def along_segment(kind: int, numbers: Array, begin: V3, end: V3) -> float:
     return min(ends, at_a, at_b)
 
 
-@compiled
+@kernel
 def _into_rotor(hub: V3, axis: V3, radius: float, half: float, p: V3) -> V3:
     """The place of a rotor nearest to p."""
     away = sub(p, hub)
@@ -134,7 +134,7 @@ def _into_rotor(hub: V3, axis: V3, radius: float, half: float, p: V3) -> V3:
     return add(hub, add(scale(min(max(along, -half), half), axis), scale(share, across)))
 
 
-@compiled
+@kernel
 def of_rotor(kind: int, numbers: Array, hub: V3, axis: V3, radius: float, half: float) -> float:
     """Distance [m] of a rotor to a shape of ``numbers`` (16,) [m, NED].
 
@@ -169,9 +169,9 @@ def of_rotor(kind: int, numbers: Array, hub: V3, axis: V3, radius: float, half: 
     return min(upper, _searched(kind, numbers, hub, axis, radius, half))
 
 
-@compiled
-def _searched(kind: int, numbers: Array, hub: V3, axis: V3, radius: float, half: float) -> float:
-    """The same by golden sections along the axis, across it, and across both."""
+@kernel
+def _across(axis: V3) -> tuple[V3, V3]:
+    """Two unit vectors that are normal to an axis and to each other."""
     x = sub((1.0, 0.0, 0.0), scale(axis[0], axis))
     if abs(axis[0]) > 0.7:
         x = sub((0.0, 1.0, 0.0), scale(axis[1], axis))
@@ -181,6 +181,13 @@ def _searched(kind: int, numbers: Array, hub: V3, axis: V3, radius: float, half:
         axis[2] * x[0] - axis[0] * x[2],
         axis[0] * x[1] - axis[1] * x[0],
     )
+    return x, y
+
+
+@kernel
+def _searched(kind: int, numbers: Array, hub: V3, axis: V3, radius: float, half: float) -> float:
+    """The same by golden sections along the axis, across it, and across both."""
+    x, y = _across(axis)
     low, high = -half, half
     a, b = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
     at_a = _on_disc(kind, numbers, add(hub, scale(a, axis)), x, y, radius)
@@ -199,7 +206,7 @@ def _searched(kind: int, numbers: Array, hub: V3, axis: V3, radius: float, half:
     return min(at_a, at_b, bottom, top)
 
 
-@compiled
+@kernel
 def _on_disc(kind: int, numbers: Array, centre: V3, x: V3, y: V3, radius: float) -> float:
     low, high = -radius, radius
     a, b = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
@@ -217,7 +224,7 @@ def _on_disc(kind: int, numbers: Array, centre: V3, x: V3, y: V3, radius: float)
     return min(at_a, at_b)
 
 
-@compiled
+@kernel
 def _on_chord(
     kind: int, numbers: Array, centre: V3, x: V3, y: V3, radius: float, at: float
 ) -> float:
@@ -226,7 +233,7 @@ def _on_chord(
     return along_segment(kind, numbers, sub(middle, half), add(middle, half))
 
 
-@compiled
+@kernel
 def farthest_of_rotor(
     kind: int, numbers: Array, hub: V3, axis: V3, radius: float, half: float
 ) -> float:
@@ -235,15 +242,7 @@ def farthest_of_rotor(
     About ``axis`` [1, NED] at hub [m, NED], with ``radius`` [m] and ``half`` its height [m]. A
     convex distance is largest on a rim.
     """
-    x = sub((1.0, 0.0, 0.0), scale(axis[0], axis))
-    if abs(axis[0]) > 0.7:
-        x = sub((0.0, 1.0, 0.0), scale(axis[1], axis))
-    x = scale(1.0 / math.sqrt(dot(x, x)), x)
-    y = (
-        axis[1] * x[2] - axis[2] * x[1],
-        axis[2] * x[0] - axis[0] * x[2],
-        axis[0] * x[1] - axis[1] * x[0],
-    )
+    x, y = _across(axis)
     farthest = -math.inf
     for side in range(2):
         centre = add(hub, scale(half if side else -half, axis))
@@ -267,7 +266,7 @@ def farthest_of_rotor(
     return farthest
 
 
-@compiled
+@kernel
 def _at_rim(
     kind: int, numbers: Array, centre: V3, x: V3, y: V3, radius: float, angle: float
 ) -> float:

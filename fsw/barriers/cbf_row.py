@@ -14,16 +14,16 @@ Source: docs/equations.md E10, E25.
 from __future__ import annotations
 
 from fsw.barriers.safe_approach import BarrierNumbers, safe_approach_speed
-from fsw.compiled import leaf
+from fsw.compiled import kernel
 
 
-@leaf
+@kernel
 def barrier_value(distance: float, rate: float, tuning: BarrierNumbers) -> float:
     """h [m/s] at a ``distance`` [m] that changes at a ``rate`` [m/s], eqs 11, 22 and 23 alike."""
     return safe_approach_speed(distance, tuning.alpha, tuning.slope) + rate
 
 
-@leaf
+@kernel
 def cbf_lower_bound(h_start: float, node: int, tuning: BarrierNumbers) -> float:
     """Least h [m/s] allowed at a node, 1..n, where it is ``h_start`` [m/s] at node 0."""
     decay = (1.0 - tuning.gamma * tuning.period) ** node

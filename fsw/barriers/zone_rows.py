@@ -25,7 +25,7 @@ import numpy as np
 from fsw.barriers.cbf_row import barrier_value, cbf_lower_bound
 from fsw.barriers.constraint_block import Rows, TargetPoints, block
 from fsw.barriers.safe_approach import BarrierNumbers, BarrierTuning, safe_approach_slope
-from fsw.compiled import leaf, of_fixed_types
+from fsw.compiled import kernel, of_fixed_types
 from fsw.geometry.vectors import add_scaled, dot
 from fsw.model.body import BEGIN, CAPSULE, DISC, END, FORM, ON, PART, RADIUS, RIM, TURN, Body
 from fsw.model.linearisation import (
@@ -155,7 +155,7 @@ def layout(safe_set: SafeSet) -> tuple[tuple[str, bool], ...]:
     return tuple((zone.shape.kind, zone.keep_in) for zone in safe_set.zones)
 
 
-@leaf
+@kernel
 def _tuning(settings: Array, follows: bool) -> BarrierNumbers:
     at = _FOLLOWING if follows else _KEPT
     return BarrierNumbers(
@@ -168,7 +168,7 @@ def _tuning(settings: Array, follows: bool) -> BarrierNumbers:
     )
 
 
-@leaf
+@kernel
 def _fill(
     zones: Array,
     moves: tuple[Array, Array],
@@ -224,7 +224,7 @@ def _fill(
                     row += 1
 
 
-@leaf
+@kernel
 def _barrier(
     frame: Array,
     start: Array,
@@ -252,7 +252,7 @@ def _barrier(
     return barrier_value(d, rate, tuning), least, steepness
 
 
-@leaf
+@kernel
 def _reach(horizon: Horizon, node: int, settings: Array) -> tuple[float, float]:
     """How far [m] and how much faster [m/s] any place can be at a node than at the guess.
 
@@ -289,7 +289,7 @@ def _reach(horizon: Horizon, node: int, settings: Array) -> tuple[float, float]:
     )
 
 
-@leaf
+@kernel
 def fill_starts(
     zones: Array,
     shift: Array,
@@ -328,7 +328,7 @@ def fill_starts(
         first += int(probes[tried - 1, PART]) + 1
 
 
-@leaf
+@kernel
 def nearest_place(
     zones: Array, zone: int, which: int, shift: Array, probes: Array, probe: int, frame: Array
 ) -> tuple[Vec3, Surface, bool]:
@@ -349,7 +349,7 @@ def nearest_place(
     return begin, _seen(zones, zone, which, shift, x), True
 
 
-@leaf
+@kernel
 def _nearest_on_capsule(
     zones: Array, zone: int, which: int, shift: Array, probe: Array, frame: Array
 ) -> tuple[Vec3, Surface, bool]:
@@ -370,7 +370,7 @@ def _nearest_on_capsule(
     return local, at, 0.0 < share < 1.0
 
 
-@leaf
+@kernel
 def _nearest_between(
     zones: Array, zone: int, shift: Array, first: Vec3, last: Vec3
 ) -> tuple[float, Surface]:
@@ -403,7 +403,7 @@ def _nearest_between(
     return share, at
 
 
-@leaf
+@kernel
 def _nearest_on_disc(
     zones: Array, zone: int, which: int, shift: Array, probe: Array, frame: Array
 ) -> tuple[Vec3, Surface, bool]:
@@ -447,7 +447,7 @@ def _nearest_on_disc(
     return local, _seen(zones, zone, which, shift, position(frame, on, local)), True
 
 
-@leaf
+@kernel
 def _seen(zones: Array, zone: int, which: int, shift: Array, x: Vec3) -> Surface:
     """The plane of a zone near a place in the world."""
     return surface_at(

@@ -33,6 +33,7 @@ from fsw.compiled import compilable
 from fsw.geometry.rotation import rotate, rotate_back
 from fsw.geometry.vectors import add_scaled, clamp, dot, subtract
 from fsw.model.body import ON_LINK2, Body
+from fsw.model.kinematics import links
 from fsw.shapes.kind import NUMBERS
 from fsw.shapes.zones import FIRST, FOLLOWS, surface_at, zone_arrays
 from fsw.signals import EndEffectorTarget, SafeSet, StateEstimate, Vec2, Vec3
@@ -251,9 +252,8 @@ def _place(law: FilterLaw, part: int, estimate: StateEstimate) -> Vec3:
     x, y, z = numbers[1], numbers[2], numbers[_Z]
     if on > 0.0:
         # On a link the place is (0, 0, distance from its joint).
-        first = numbers[_Z] if on < ON_LINK2 else law.links[0]
-        th1, th12 = estimate.q_arm[0], estimate.q_arm[0] + estimate.q_arm[1]
-        x, y, z = first * math.sin(th1), 0.0, first * math.cos(th1)
-        if on >= ON_LINK2:
-            x, z = x + numbers[_Z] * math.sin(th12), z + numbers[_Z] * math.cos(th12)
+        lengths = (numbers[_Z], 0.0) if on < ON_LINK2 else (law.links[0], numbers[_Z])
+        th1 = estimate.q_arm[0]
+        (x1, z1), (x2, z2) = links(lengths, th1, th1 + estimate.q_arm[1])
+        x, y, z = x1 + x2, 0.0, z1 + z2
     return rotate(estimate.R_WB, (x, y, z))

@@ -15,7 +15,7 @@ from fsw.flight.offboard_setpoints import joints_refusal
 from fsw.flight.orbit_path import max_orbit_speed
 from fsw.flight.setpoint_generator import PositionGoal
 from fsw.model.body import hull_reach
-from fsw.shapes.zones import surfaces
+from fsw.shapes.zones import surface, surfaces
 from fsw.signals import (
     MAX_DISTANCE,
     Arm,
@@ -35,7 +35,6 @@ from fsw.signals import (
     Order,
     Place,
     Rejected,
-    SafeSet,
     SetHome,
     SetMissionStep,
     StartMission,
@@ -396,15 +395,12 @@ def _too_close(place: Vec3, context: CommandContext) -> str | None:
 def _circle_too_close(centre: Vec3, radius: float, context: CommandContext) -> str | None:
     """Why the body cannot fly a circle."""
     for number in range(len(context.safe_set.zones)):
-        zone = SafeSet(context.safe_set.zones[number : number + 1])
 
-        def room(angle: float, zone: SafeSet = zone) -> float:
+        def room(angle: float, number: int = number) -> float:
             x, y, z = centre
             place = (x + radius * math.cos(angle), y + radius * math.sin(angle), z)
-            seen = surfaces(zone, place, context.now_us)
-            return min(
-                (at.distance - hull_reach(context.body, at.normal) for at in seen), default=1.0
-            )
+            at = surface(context.safe_set, number, place, context.now_us)
+            return 1.0 if at is None else at.distance - hull_reach(context.body, at.normal)
 
         # The nearest of some places on the circle, then the nearest between its neighbours.
         apart = 2.0 * math.pi / _CIRCLE_PLACES

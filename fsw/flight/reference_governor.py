@@ -26,7 +26,7 @@ from fsw.geometry.vectors import add_scaled, dot, norm, subtract
 from fsw.model.body import Body, body_of, hull_reach
 from fsw.parameters.flight_config import FlightConfig
 from fsw.shapes.kind import Surface
-from fsw.shapes.zones import surfaces
+from fsw.shapes.zones import surface, surfaces
 from fsw.signals import EndEffectorTarget, SafeSet, Vec3
 
 SETTLE_RATE = 2.0  # 1/s, of the last bit of the way
@@ -66,15 +66,16 @@ def limit_approach(
     the body around it. A sphere rides on the reference and needs nothing.
     """
     for zone in range(len(safe_set.zones)):
-        one = SafeSet(safe_set.zones[zone : zone + 1])
         for end, body in ends:
-            for at in surfaces(one, add_scaled(p, end, 1.0), t_us):
-                n = at.normal
-                distance = at.distance - (0.0 if body is None else hull_reach(body, n))
-                if distance < 0.0:
-                    p = add_scaled(p, n, -distance)
-                room = max(distance, 0.0)
-                v = _slowed(v, n, safe_approach_speed(room, barrier.alpha, barrier.slope))
+            at = surface(safe_set, zone, add_scaled(p, end, 1.0), t_us)
+            if at is None:
+                continue
+            n = at.normal
+            distance = at.distance - (0.0 if body is None else hull_reach(body, n))
+            if distance < 0.0:
+                p = add_scaled(p, n, -distance)
+            room = max(distance, 0.0)
+            v = _slowed(v, n, safe_approach_speed(room, barrier.alpha, barrier.slope))
     return p, v
 
 
@@ -121,8 +122,9 @@ def limit_reference(
         led = add_scaled(p_WE, v_WE, ahead)
         p = limit_lead(target.p_WE, led, _MAX_LEAD_DISTANCE + _LEAD_GROWTH * ahead)
         v = limit_lead(target.v_WE, v_WE, _MAX_VELOCITY_ERROR)
-        for at in surfaces(safe_set, p, target.t_us):
-            if -at.distance > _MAX_DEPTH:
+        for zone in range(len(safe_set.zones)):
+            at = surface(safe_set, zone, p, target.t_us)
+            if at is not None and -at.distance > _MAX_DEPTH:
                 p = add_scaled(p, at.normal, -at.distance - _MAX_DEPTH)
         for n, most in approached:
             v = _slowed(v, n, most)
@@ -142,9 +144,9 @@ def project_to_safe_set(p: Vec3, safe_set: SafeSet, t_us: int) -> Vec3:
     for _ in range(_PROJECTIONS):
         moved = p
         for zone in range(len(safe_set.zones)):
-            for at in surfaces(SafeSet(safe_set.zones[zone : zone + 1]), p, t_us):
-                if -at.distance > _TOLERANCE:
-                    p = add_scaled(p, at.normal, -at.distance)
+            at = surface(safe_set, zone, p, t_us)
+            if at is not None and -at.distance > _TOLERANCE:
+                p = add_scaled(p, at.normal, -at.distance)
         if p is moved:
             break
     return p

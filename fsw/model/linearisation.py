@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fsw.compiled import compiled, leaf
+from fsw.compiled import compiled, kernel
 from fsw.model.body import ON_BASE, ON_LINK1, ON_LINK2
 from fsw.model.kinematics import body_axes, links
 from fsw.model.prediction import (
@@ -237,7 +237,7 @@ def _cross(a: Array, b: Array) -> Vec3:
     )
 
 
-@leaf
+@kernel
 def in_body(frame: Array, on: int, local: Vec3) -> tuple[Vec3, Vec3]:
     """Where a place of the vehicle is in the body [m, FRD], and its velocity there [m/s].
 
@@ -256,7 +256,7 @@ def in_body(frame: Array, on: int, local: Vec3) -> tuple[Vec3, Vec3]:
     return (x, 0.0, z), (vx, 0.0, vz)
 
 
-@leaf
+@kernel
 def position(frame: Array, on: int, local: Vec3) -> Vec3:
     """Position of a place [m, NED]; ``frame`` (FRAME,) [SI], ``on`` [1], ``local`` [m, part]."""
     (x, y, z), _ = in_body(frame, on, local)
@@ -267,7 +267,7 @@ def position(frame: Array, on: int, local: Vec3) -> Vec3:
     )
 
 
-@leaf
+@kernel
 def velocity(frame: Array, on: int, local: Vec3) -> Vec3:
     """Velocity of a place [m/s, NED]; ``frame`` (FRAME,) [SI], ``on`` [1], ``local`` [m, part]."""
     (x, y, z), (vx, _, vz) = in_body(frame, on, local)
@@ -294,7 +294,7 @@ def velocity(frame: Array, on: int, local: Vec3) -> Vec3:
     )
 
 
-@leaf
+@kernel
 def in_axes(frame: Array, n: Vec3) -> Vec3:
     """A direction ``n`` [1, NED] in the body's axes, of a ``frame`` (FRAME,) [SI]."""
     return (
@@ -304,7 +304,7 @@ def in_axes(frame: Array, n: Vec3) -> Vec3:
     )
 
 
-@leaf
+@kernel
 def fill_turned(frame: Array, n: Vec3, turned: Array) -> None:
     """``n`` [1, NED] times every matrix of a ``frame`` (FRAME,) [SI], into ``turned`` (10, 3) [SI].
 
@@ -320,7 +320,7 @@ def fill_turned(frame: Array, n: Vec3, turned: Array) -> None:
             )
 
 
-@leaf
+@kernel
 def fill_slopes(frame: Array, on: int, local: Vec3, n: Vec3, turned: Array, slopes: Array) -> None:
     """Derivatives of ``n . p`` and ``n . v`` of a place in the state, into ``slopes`` (2, 19) [SI].
 
@@ -362,7 +362,7 @@ def fill_slopes(frame: Array, on: int, local: Vec3, n: Vec3, turned: Array, slop
     slopes[1, QD_ARM], slopes[1, QD_ARM + 1] = p1 + p2, p2
 
 
-@leaf
+@kernel
 def chain(impulse: Array, node: int, slope: Array, gradient: Array) -> None:
     """From a ``slope`` (19,) [any / SI] in the state to one in the inputs before a node, (6 n,).
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from fsw.compiled import leaf
+from fsw.compiled import kernel
 from fsw.shapes.frame import CENTRE_BALL, outward_axis
 from fsw.shapes.kind import ShapeKind, Surface
 from fsw.signals import Shape, Vec3, Zone
@@ -31,7 +31,7 @@ def radius_problem(numbers: tuple[float, ...]) -> str | None:
     return None if numbers[-1] >= 0.0 else f"the radius is {numbers[-1]:g} m; it must not be < 0"
 
 
-@leaf
+@kernel
 def ball_plane(
     numbers: NDArray[np.float64], keep_in: bool, which: int, x: float, y: float, z: float
 ) -> Surface:

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from fsw.compiled import leaf
+from fsw.compiled import kernel
 from fsw.shapes.kind import ShapeKind, Surface
 from fsw.signals import Shape, Vec3, Vec4
 
@@ -29,7 +29,7 @@ def _problem(numbers: tuple[float, ...]) -> str | None:
     return None
 
 
-@leaf
+@kernel
 def _axis(numbers: NDArray[np.float64], k: int) -> Vec3:
     """One of the box's axes in NED, a column of the rotation matrix."""
     w, x, y, z = numbers[6], numbers[7], numbers[8], numbers[9]
@@ -40,7 +40,7 @@ def _axis(numbers: NDArray[np.float64], k: int) -> Vec3:
     return 2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)
 
 
-@leaf
+@kernel
 def _plane(
     numbers: NDArray[np.float64], keep_in: bool, which: int, x: float, y: float, z: float
 ) -> Surface:

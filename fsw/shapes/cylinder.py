@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from fsw.compiled import leaf
+from fsw.compiled import kernel
 from fsw.shapes.frame import CENTRE_BALL
 from fsw.shapes.kind import ShapeKind, Surface
 from fsw.signals import Shape, Vec3
@@ -28,7 +28,7 @@ def _problem(numbers: tuple[float, ...]) -> str | None:
     return None if numbers[6] > 0.0 else f"a cylinder has radius {numbers[6]:g} m; > 0 is needed"
 
 
-@leaf
+@kernel
 def cylinder_surface(
     middle: Vec3,
     axis: Vec3,
@@ -83,7 +83,7 @@ def cylinder_surface(
     return Surface(beyond, end * axis[0], end * axis[1], end * axis[2])
 
 
-@leaf
+@kernel
 def _plane(
     numbers: NDArray[np.float64], keep_in: bool, which: int, x: float, y: float, z: float
 ) -> Surface:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 
-from fsw.compiled import leaf
+from fsw.compiled import kernel
 from fsw.signals import Vec3
 
 CENTRE_BALL = 0.002  # m; closer to a centre than this a direction is noise and any does
 
 
-@leaf
+@kernel
 def outward_axis(x: float, y: float, z: float, which: int) -> Vec3:
     """One of six unit vectors [1]: plus and minus an orthonormal frame, the first along (x, y, z).
 

@@ -10,7 +10,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from fsw.compiled import leaf
+from fsw.compiled import kernel
 from fsw.shapes.kind import ShapeKind, Surface
 from fsw.signals import Shape, Vec3, Zone
 
@@ -33,7 +33,7 @@ def _problem(numbers: tuple[float, ...]) -> str | None:
     return None
 
 
-@leaf
+@kernel
 def _plane(
     numbers: NDArray[np.float64], keep_in: bool, which: int, x: float, y: float, z: float
 ) -> Surface:

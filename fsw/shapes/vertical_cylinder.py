@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from fsw.compiled import leaf
+from fsw.compiled import kernel
 from fsw.shapes.cylinder import PLANES_INSIDE, cylinder_surface
 from fsw.shapes.kind import ShapeKind, Surface
 from fsw.signals import Shape, Vec2, Zone
@@ -34,7 +34,7 @@ def _problem(numbers: tuple[float, ...]) -> str | None:
     return None if numbers[4] >= 0.0 else f"the radius is {numbers[4]:g} m; it must not be < 0"
 
 
-@leaf
+@kernel
 def _plane(
     numbers: NDArray[np.float64], keep_in: bool, which: int, x: float, y: float, z: float
 ) -> Surface:

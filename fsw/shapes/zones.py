@@ -8,7 +8,7 @@ import numpy as np
 from numba import literal_unroll
 from numpy.typing import NDArray
 
-from fsw.compiled import leaf, of_fixed_types
+from fsw.compiled import kernel, of_fixed_types
 from fsw.shapes import BY_NAME, KINDS
 from fsw.shapes.kind import NUMBERS, Surface
 from fsw.signals import EndEffectorTarget, SafeSet, Vec3
@@ -38,7 +38,7 @@ def zone_arrays(safe_set: SafeSet) -> Array:
     return rows
 
 
-@leaf
+@kernel
 def surface_at(zones: Array, zone: int, which: int, x: float, y: float, z: float) -> Surface:
     """Distance [m] from a ``zone`` [1] with its clearance to a point, and the normal [1].
 
@@ -84,19 +84,22 @@ def surfaces(
 
     Of a zone to keep in, the nearest one. A zone that follows the target is left out without one.
     """
-    if not safe_set.zones:
-        return ()
-    arrays, seen = zone_arrays(safe_set), []
-    for k in range(len(safe_set.zones)):
-        shift = shift_of(safe_set, k, t_us, target)
-        if shift is None:
-            continue
-        x, y, z = p[0] - shift[0], p[1] - shift[1], p[2] - shift[2]
-        tried = [
-            Surface(*_surface_at(arrays, k, i, x, y, z)) for i in range(int(arrays[k, PLANES]))
-        ]
-        seen.append(min(tried, key=lambda at: at.distance))
-    return tuple(seen)
+    found = (surface(safe_set, k, p, t_us, target) for k in range(len(safe_set.zones)))
+    return tuple(at for at in found if at is not None)
+
+
+def surface(
+    safe_set: SafeSet, zone: int, p: Vec3, t_us: int, target: EndEffectorTarget | None = None
+) -> Surface | None:
+    """``surfaces`` of one zone, by its number; None where that leaves it out; ``p`` [m, NED]."""
+    shift = shift_of(safe_set, zone, t_us, target)
+    if shift is None:
+        return None
+    arrays = zone_arrays(safe_set)
+    x, y, z = p[0] - shift[0], p[1] - shift[1], p[2] - shift[2]
+    planes = range(int(arrays[zone, PLANES]))
+    tried = [Surface(*_surface_at(arrays, zone, which, x, y, z)) for which in planes]
+    return min(tried, key=lambda at: at.distance)
 
 
 def shift_of(

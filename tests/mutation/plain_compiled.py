@@ -22,7 +22,7 @@ def compilable(function: Callable[..., Any]) -> Callable[..., Any]:
     return function
 
 
-def leaf(kernel: Callable[..., Any]) -> Callable[..., Any]:
+def kernel(kernel: Callable[..., Any]) -> Callable[..., Any]:
     return kernel
 
 
