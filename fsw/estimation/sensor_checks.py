@@ -6,7 +6,10 @@ import math
 from typing import Final, NamedTuple
 
 from fsw.estimation.imu import TIME_TOLERANCE
-from fsw.estimation.measurements import (
+from fsw.estimation.sensor_fault import Sensor, SensorFault
+from fsw.estimation.tuning import EstimatorTuning
+from fsw.geometry.vectors import norm
+from fsw.measurements import (
     GnssSample,
     JointSample,
     MagneticSample,
@@ -14,9 +17,6 @@ from fsw.estimation.measurements import (
     PressureSample,
     RangeSample,
 )
-from fsw.estimation.sensor_fault import Sensor, SensorFault
-from fsw.estimation.tuning import EstimatorTuning
-from fsw.geometry.vectors import norm
 from fsw.signals import Vec3
 
 Aiding = PoseSample | GnssSample | PressureSample | MagneticSample | RangeSample

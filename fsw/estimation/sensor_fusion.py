@@ -21,7 +21,12 @@ from fsw.estimation import kernels
 from fsw.estimation.error_state import ERRORS, FILTER, IMU_CAPACITY, Array, Filter
 from fsw.estimation.imu import STUCK_READINGS
 from fsw.estimation.joint_filter import JointMemory, at_rest, joint_gain, stepped
-from fsw.estimation.measurements import (
+from fsw.estimation.sensor_checks import SENSOR_OF, Aiding, Health, arrived, believable
+from fsw.estimation.sensor_fault import Sensor, SensorFault
+from fsw.estimation.tuning import EstimatorTuning
+from fsw.geometry.quaternion import conjugate, multiply, normalised
+from fsw.geometry.rotation import quaternion_from_matrix
+from fsw.measurements import (
     GnssSample,
     ImuSample,
     JointSample,
@@ -31,11 +36,6 @@ from fsw.estimation.measurements import (
     RangeSample,
     Sample,
 )
-from fsw.estimation.sensor_checks import SENSOR_OF, Aiding, Health, arrived, believable
-from fsw.estimation.sensor_fault import Sensor, SensorFault
-from fsw.estimation.tuning import EstimatorTuning
-from fsw.geometry.quaternion import conjugate, multiply, normalised
-from fsw.geometry.rotation import quaternion_from_matrix
 from fsw.signals import StateEstimate, Vec2, Vec3, Vec4
 
 LATE: Final = 0.01  # s behind the filter, where a measurement is still fused as it stands
@@ -118,6 +118,19 @@ class SensorFusion:
             MagneticSample: self._fuse_heading,
             RangeSample: self._fuse_range,
         }
+
+    def warm_up(self) -> StateEstimate:
+        """Compile every kernel: stand for a while with every sensor, then take jumps."""
+        memory, estimate, t = at_start(), None, 0.0
+        for k in range(60):
+            t = 1.0 + 0.01 * k
+            memory, estimate = self.step(memory, _at_rest(t), t)
+        assert estimate is not None
+        for sample in _at_rest(t):
+            if isinstance(sample, PoseSample | GnssSample):
+                self._reset(memory, Waiting(t, 0, sample), (math.inf, math.inf))
+        self.covariance(memory, t)
+        return estimate
 
     def step(
         self,
@@ -384,3 +397,18 @@ def _levelled(x: Filter, field: Vec3, declination: float) -> Vec4:
     R = (*(c * north - s * east), *(s * north + c * east), *down)
     w, i, j, k = quaternion_from_matrix(tuple(float(r) for r in R))  # type: ignore[arg-type]
     return w, i, j, k
+
+
+def _at_rest(t: float) -> tuple[Sample, ...]:
+    """A reading of every sensor, of a vehicle that stands."""
+    none, fine, small = (0.0, 0.0, 0.0), (1e-4, 1e-4, 1e-4), 1e-3 * t
+    return (
+        ImuSample(t - 1e-3, (0.0, 0.0, -9.81), none),
+        ImuSample(t, (0.0, 0.0, -9.81 + small), none),
+        JointSample(t, (0.0, 0.0)),
+        PoseSample(t, (small, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), fine, fine),
+        GnssSample(t, (0.0, small, 0.0), none, fine, fine),
+        PressureSample(t, 0.0, 1.0),
+        MagneticSample(t, (0.2, 0.0, 0.4)),
+        RangeSample(t, 1.0, 1.0),
+    )

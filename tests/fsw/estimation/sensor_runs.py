@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from fsw.estimation.measurements import (
+from fsw.estimation.tuning import EstimatorTuning
+from fsw.measurements import (
     GnssSample,
     ImuSample,
     JointSample,
@@ -17,7 +18,6 @@ from fsw.estimation.measurements import (
     PressureSample,
     Sample,
 )
-from fsw.estimation.tuning import EstimatorTuning
 
 Array = NDArray[np.float64]
 TICK = 0.002  # s
