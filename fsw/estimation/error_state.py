@@ -182,7 +182,7 @@ def step_to(x: Any, law: Any, row: Array, before: Array, M: Array) -> None:
     Covariance ``M`` (17, 17) [SI]. Where readings are missing, in steps short enough.
     """
     gap = max(row[TIME] - x.time, 0.0)
-    lost = 1 if row[LOST] > 0.0 or gap > 3.0 * law.imu_period else 0
+    lost = 1 if row[LOST] > 0.0 or gap > law.imu_gap else 0
     _watch_biases(x, M, lost)
     f = (
         0.5 * (row[1] + before[1]) - x.accel_bias[0],
@@ -194,7 +194,7 @@ def step_to(x: Any, law: Any, row: Array, before: Array, M: Array) -> None:
         0.5 * (row[5] + before[5]) - x.gyro_bias[1],
         0.5 * (row[6] + before[6]) - x.gyro_bias[2],
     )
-    steps = max(1, math.ceil(gap / (3.0 * law.imu_period) - 1e-6))
+    steps = max(1, math.ceil(gap / law.imu_gap - 1e-6))
     dt = gap / steps
     p, v, q = vec3(x.p, 0), vec3(x.v, 0), vec4(x.q)
     a = (0.0, 0.0, 0.0)

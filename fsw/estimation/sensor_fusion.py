@@ -105,10 +105,11 @@ def at_start() -> FusionMemory:
 class SensorFusion:
     """The estimator of one configuration; holds only what never changes in flight."""
 
-    def __init__(self, tuning: EstimatorTuning) -> None:
+    def __init__(self, tuning: EstimatorTuning, tick: float) -> None:
+        """Design the joints' filter for a ``tick`` [s]."""
         self.tuning = tuning
         self._law = packed(tuning)
-        self._joint_gain = joint_gain(tuning, tuning.imu_period)
+        self._joint_gain = joint_gain(tuning, tick)
         self._least_p = tuning.position_floor**2
         self._least_q = tuning.attitude_floor**2
         self._fuse: dict[type, Callable[[FusionMemory, Any], tuple[float, ...]]] = {

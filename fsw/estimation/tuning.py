@@ -23,7 +23,7 @@ class EstimatorTuning:
     # 10 m/s^2 more than gravity; the rest is vibration.
     accel_jump: float = 60.0  # m/s^2
     gyro_jump: float = 3.0  # rad/s
-    imu_period: float = 0.002  # s
+    imu_gap: float = 0.006  # s; longer without a reading, the IMU was lost meanwhile
     # While the IMU is stuck or silent, what it reads is taken for the truth plus a bias that moves
     # as quickly as the vehicle does: the pose then gives acceleration and rate.
     lost_accel_walk: float = 10.0  # m/s^3/sqrt(Hz)

@@ -22,7 +22,7 @@ class SensedState:
     """The estimator of one configuration as the tick uses it."""
 
     def __init__(self, tuning: EstimatorTuning, cascade: Cascade) -> None:
-        self._fusion = SensorFusion(tuning)
+        self._fusion = SensorFusion(tuning, cascade.law.dt)
         self._cascade = cascade
         self._stale = tuning.stale_time
 
