@@ -51,7 +51,7 @@ class EstimatorTuning:
     ground: float = 0.0  # m, NED z of what the rangefinder measures against
 
     encoder_noise: float = 4.4e-4  # rad; 12 bit a turn are 1.5 mrad
-    joint_disturbance_walk: float = 15.0  # rad/s^3/sqrt(Hz): 90 rad/s of bandwidth
+    joint_disturbance_walk: float = 50.0  # rad/s^3/sqrt(Hz): 135 rad/s of bandwidth
 
     reset_time: float = 0.5  # s; aiding that was refused for so long is taken as it is
     stale_time: float = 0.5  # s without a reading
