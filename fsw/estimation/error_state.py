@@ -59,6 +59,7 @@ FILTER: Final = np.dtype(
         ("same", np.int64),  # how often the newest reading came in a row
         ("unlike", np.int64),  # how often in a row readings were too far from the last good one
         ("lost", np.int64),  # whether the state's own reading is an older one's
+        ("joints", float, (2, 3)),  # angle [rad], rate [rad/s] and disturbance [rad/s^2] of each
         # What is known of the biases while the readings are of no use.
         ("kept_bias", float, (6,)),
         ("kept_variance", float, (6,)),

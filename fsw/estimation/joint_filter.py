@@ -18,8 +18,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import solve_discrete_are
 
+from fsw.compiled import compilable
 from fsw.estimation.tuning import EstimatorTuning
-from fsw.signals import Vec2, Vec3
+from fsw.signals import Vec3
 
 
 class JointState(NamedTuple):
@@ -28,28 +29,6 @@ class JointState(NamedTuple):
     angle: float  # rad
     rate: float = 0.0  # rad/s
     disturbance: float = 0.0  # rad/s^2
-
-
-class JointMemory(NamedTuple):
-    """Both joints, at the time of the last tick."""
-
-    first: JointState
-    second: JointState
-
-    @property
-    def angles(self) -> Vec2:
-        """Joint angles [rad]."""
-        return self.first.angle, self.second.angle
-
-    @property
-    def rates(self) -> Vec2:
-        """Joint rates [rad/s]."""
-        return self.first.rate, self.second.rate
-
-
-def at_rest(angles: Vec2) -> JointMemory:
-    """Memory of an arm that stands still at ``angles`` [rad]."""
-    return JointMemory(JointState(angles[0]), JointState(angles[1]))
 
 
 @lru_cache(maxsize=8)
@@ -74,6 +53,7 @@ def joint_gain(tuning: EstimatorTuning, dt: float) -> Vec3:
     return angle, rate, disturbance
 
 
+@compilable
 def predicted(joint: JointState, u: float, dt: float) -> JointState:
     """A joint ``dt`` [s] later, accelerated by ``u`` [rad/s^2]."""
     a = u + joint.disturbance
@@ -82,6 +62,7 @@ def predicted(joint: JointState, u: float, dt: float) -> JointState:
     )
 
 
+@compilable
 def corrected(joint: JointState, reading: float, age: float, gain: Vec3) -> JointState:
     """A joint after a ``reading`` [rad] that is ``age`` [s] old; ``gain`` [SI, joint]."""
     surprise = reading - (joint.angle - age * joint.rate)
@@ -90,17 +71,3 @@ def corrected(joint: JointState, reading: float, age: float, gain: Vec3) -> Join
         joint.rate + gain[1] * surprise,
         joint.disturbance + gain[2] * surprise,
     )
-
-
-def stepped(
-    memory: JointMemory, u: Vec2, readings: tuple[tuple[float, Vec2], ...], dt: float, gain: Vec3
-) -> JointMemory:
-    """Both joints ``dt`` [s] later under ``u`` [rad/s^2, joints], with their ``readings``.
-
-    A reading is its age [s] and the angles [rad]; ``gain`` [SI, joint] of ``joint_gain``.
-    """
-    first, second = predicted(memory.first, u[0], dt), predicted(memory.second, u[1], dt)
-    for age, (angle1, angle2) in readings:
-        first = corrected(first, angle1, age, gain)
-        second = corrected(second, angle2, age, gain)
-    return JointMemory(first, second)

@@ -6,7 +6,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from fsw.compiled import kernel, of_fixed_types
+from fsw.compiled import compilable, kernel, of_fixed_types
 from fsw.estimation import fusion, imu
 from fsw.estimation.error_state import (
     BA,
@@ -31,20 +31,19 @@ from fsw.estimation.error_state import (
     vec3,
     vec4,
 )
+from fsw.estimation.joint_filter import JointState, corrected, predicted
 from fsw.geometry.rotation import matrix_from_quaternion, yaw_of
 from fsw.model.airframe import GRAVITY
-from fsw.signals import Mat3, Vec3, Vec4
+from fsw.signals import Mat3, Vec2, Vec3, Vec4
 
-Law = NDArray[Any]  # (1,) of a packed EstimatorTuning
-Present = tuple[Vec3, Vec3, Mat3, Vec3, float, float]
-"""Position, velocity, attitude, rate, yaw and specific force along -z, as in a StateEstimate."""
+Law = NDArray[Any]  # (1,) of a packed EstimatorLaw
+Present = tuple[Vec3, Vec3, Mat3, Vec3, float, Vec2, Vec2, float]
+"""All of a StateEstimate but its time, in its order."""
 
 
 @kernel
-def _begin_tick(
-    old: Filter, new: Filter, law: Law, now: float, time: float, f: Vec3, w: Vec3
-) -> int:
-    """Copy the filter, so that a tick leaves its inputs as they were, and add an IMU reading."""
+def _begin_tick(old: Filter, new: Filter, dt: float, u: Vec2) -> None:
+    """Copy the filter, so that a tick leaves its inputs as they were, and move its joints on."""
     a, b = old[0], new[0]
     b.time, b.baro_bias, b.pose_delay = a.time, a.baro_bias, a.pose_delay
     b.first, b.end, b.same, b.unlike, b.lost = a.first, a.end, a.same, a.unlike, a.lost
@@ -62,28 +61,62 @@ def _begin_tick(
     for k in range(a.first - 1, a.end):
         for i in range(COLUMNS):
             b.imu[k % IMU_CAPACITY, i] = a.imu[k % IMU_CAPACITY, i]
-    return imu.add_imu(b, law[0], now, time, f, w)
+    for i in range(2):
+        angle, rate, disturbance = a.joints[i, 0], a.joints[i, 1], a.joints[i, 2]
+        _keep_joint(b.joints[i], predicted(JointState(angle, rate, disturbance), u[i], dt))
+
+
+@compilable
+def _keep_joint(row: Array, joint: JointState) -> None:
+    row[0], row[1], row[2] = joint.angle, joint.rate, joint.disturbance
+
+
+@kernel
+def _read_joints(x: Filter, law: Law, angles: Vec2, age: float) -> None:
+    """Take in a reading of the encoders."""
+    g = law[0].joint_gain
+    for i in range(2):
+        row = x[0].joints[i]
+        joint = JointState(row[0], row[1], row[2])
+        _keep_joint(row, corrected(joint, angles[i], age, (g[0], g[1], g[2])))
+
+
+@kernel
+def _set_joints(x: Filter, angles: Vec2) -> None:
+    """Start from an arm that stands still."""
+    for i in range(2):
+        _keep_joint(x[0].joints[i], JointState(angles[i], 0.0, 0.0))
 
 
 @kernel
 def _add_imu(x: Filter, law: Law, now: float, time: float, f: Vec3, w: Vec3) -> int:
-    return imu.add_imu(x[0], law[0], now, time, f, w)
+    return imu.add_imu(x[0], law[0].tuning, now, time, f, w)
 
 
 @kernel
 def _advance(x: Filter, law: Law, until: float) -> float:
     """Predict up to ``until``; returns the state's time."""
-    advance(x[0], law[0], until)
+    advance(x[0], law[0].tuning, until)
     return float(x[0].time)
 
 
 @kernel
 def _end_tick(x: Filter, law: Law, until: float, now: float) -> Present:
     """Predict the filter up to ``until`` and from there the present."""
-    advance(x[0], law[0], until)
+    advance(x[0], law[0].tuning, until)
     p, v, q, w, f = present(x[0], now)
     R = matrix_from_quaternion(q)
-    return p, v, R, w, yaw_of(R), -f[2]
+    arm = x[0].joints
+    return (
+        p,
+        v,
+        R,
+        w,
+        yaw_of(R),
+        (arm[0, 0], arm[1, 0]),
+        (arm[0, 1], arm[1, 1]),
+        -f[2],
+    )
 
 
 @kernel
@@ -99,7 +132,7 @@ def _begin(
     q_variance: Vec3,
 ) -> None:
     """Start the filter from a known state; readings of the IMU before it are passed over."""
-    s, t = x[0], law[0]
+    s, t = x[0], law[0].tuning
     M = s.covariance
     for i in range(ERRORS):
         for j in range(ERRORS):
@@ -135,7 +168,7 @@ def _couple_level(x: Filter, law: Law) -> None:
     """
     s = x[0]
     M, R = s.covariance, matrix_from_quaternion(vec4(s.q))
-    g, variance = GRAVITY, law[0].accel_bias * law[0].accel_bias
+    g, variance = GRAVITY, law[0].tuning.accel_bias * law[0].tuning.accel_bias
     a, b, c = R[6] / g, R[7] / g, R[8] / g
     rows = ((0.0, c, -b), (-c, 0.0, a), (b, -a, 0.0))
     for i in range(3):
@@ -194,7 +227,7 @@ def _fuse_pose(
     p_variance: Vec3,
     q_variance: Vec3,
 ) -> tuple[float, float]:
-    return fusion.fuse_pose(x[0], law[0], time, p, q, p_variance, q_variance)
+    return fusion.fuse_pose(x[0], law[0].tuning, time, p, q, p_variance, q_variance)
 
 
 @kernel
@@ -207,28 +240,28 @@ def _fuse_gnss(
     p_variance: Vec3,
     v_variance: Vec3,
 ) -> tuple[float, float]:
-    return fusion.fuse_gnss(x[0], law[0], time, p, v, p_variance, v_variance)
+    return fusion.fuse_gnss(x[0], law[0].tuning, time, p, v, p_variance, v_variance)
 
 
 @kernel
 def _fuse_pressure(x: Filter, law: Law, time: float, altitude: float, variance: float) -> float:
-    return fusion.fuse_pressure(x[0], law[0], time, altitude, variance)
+    return fusion.fuse_pressure(x[0], law[0].tuning, time, altitude, variance)
 
 
 @kernel
 def _fuse_heading(x: Filter, law: Law, time: float, field: Vec3) -> float:
-    return fusion.fuse_heading(x[0], law[0], time, field)
+    return fusion.fuse_heading(x[0], law[0].tuning, time, field)
 
 
 @kernel
 def _fuse_range(x: Filter, law: Law, time: float, measured: float, variance: float) -> float:
-    return fusion.fuse_range(x[0], law[0], time, measured, variance)
+    return fusion.fuse_range(x[0], law[0].tuning, time, measured, variance)
 
 
 @kernel
 def _present_covariance(x: Filter, law: Law, now: float, M: Array) -> None:
     """The covariance (17, 17) of what ``_end_tick`` returned."""
-    s, t = x[0], law[0]
+    s, t = x[0], law[0].tuning
     for i in range(ERRORS):
         for j in range(ERRORS):
             M[i, j] = s.covariance[i, j]
@@ -252,6 +285,8 @@ def _present_covariance(x: Filter, law: Law, now: float, M: Array) -> None:
 
 
 begin_tick = of_fixed_types(_begin_tick)
+read_joints = of_fixed_types(_read_joints)
+set_joints = of_fixed_types(_set_joints)
 add_imu = of_fixed_types(_add_imu)
 advance_to = of_fixed_types(_advance)
 end_tick = of_fixed_types(_end_tick)

@@ -11,7 +11,6 @@ from fsw.estimation.tuning import EstimatorTuning
 from fsw.geometry.vectors import norm
 from fsw.measurements import (
     GnssSample,
-    JointSample,
     MagneticSample,
     PoseSample,
     PressureSample,
@@ -40,7 +39,7 @@ class Health(NamedTuple):
 
     sensor: Sensor
     time: float = -math.inf  # s, newest time stamp of a sample
-    came: float = -math.inf  # s, when that came
+    came: float = -1.0  # s, when that came; negative: never
     numbers: tuple[float, ...] = ()  # of that sample
     fused: tuple[float, ...] = ()  # s, when each part of it was fused last
     ratio: tuple[float, ...] = ()  # chi-square over gate, of each part
@@ -60,7 +59,7 @@ class Health(NamedTuple):
 
 def arrived(
     health: Health,
-    sample: Aiding | JointSample,
+    sample: Aiding,
     now: float,
     tuning: EstimatorTuning,
     *,
@@ -88,7 +87,7 @@ def arrived(
     return (health.with_fault(fault, now) if fault else health), fault
 
 
-def _numbers(sample: Aiding | JointSample) -> tuple[float, ...]:
+def _numbers(sample: Aiding) -> tuple[float, ...]:
     """All that a sample measures, without its variance."""
     match sample:
         case PoseSample():
@@ -101,11 +100,9 @@ def _numbers(sample: Aiding | JointSample) -> tuple[float, ...]:
             return sample.field
         case RangeSample():
             return (sample.distance,)
-        case JointSample():
-            return sample.angles
 
 
-def _plausible(sample: Aiding | JointSample, tuning: EstimatorTuning) -> bool:
+def _plausible(sample: Aiding, tuning: EstimatorTuning) -> bool:
     match sample:
         case PoseSample():
             squared = sum([c * c for c in sample.attitude])
@@ -119,8 +116,6 @@ def _plausible(sample: Aiding | JointSample, tuning: EstimatorTuning) -> bool:
             return 0.0 < norm(sample.field) < _STRONGEST_FIELD
         case RangeSample():
             return 0.0 < sample.distance < _FARTHEST_RANGE
-        case JointSample():
-            return max(abs(sample.angles[0]), abs(sample.angles[1])) < math.pi
 
 
 def believable(variance: Vec3, least: float) -> Vec3:

@@ -19,11 +19,11 @@ import numpy as np
 from fsw.compiled import packed
 from fsw.estimation import kernels
 from fsw.estimation.error_state import ERRORS, FILTER, IMU_CAPACITY, Array, Filter
-from fsw.estimation.imu import STUCK_READINGS
-from fsw.estimation.joint_filter import JointMemory, at_rest, joint_gain, stepped
+from fsw.estimation.imu import STUCK_READINGS, TIME_TOLERANCE
+from fsw.estimation.joint_filter import joint_gain
 from fsw.estimation.sensor_checks import SENSOR_OF, Aiding, Health, arrived, believable
 from fsw.estimation.sensor_fault import Sensor, SensorFault
-from fsw.estimation.tuning import EstimatorTuning
+from fsw.estimation.tuning import EstimatorLaw, EstimatorTuning
 from fsw.geometry.quaternion import conjugate, multiply, normalised
 from fsw.geometry.rotation import quaternion_from_matrix
 from fsw.measurements import (
@@ -72,8 +72,9 @@ class FusionMemory(NamedTuple):
     field: Vec3 | None = None  # Gauss, body, the last one
     reset_counter: int | None = None  # of the last pose
     reset: Reset = Reset()
-    joints: JointMemory | None = None
-    now: float = -math.inf  # s, of the last tick
+    now: float = -1.0  # s, of the last tick; negative: there was none
+    imu_came: float = -1.0  # s, when a reading came last; negative: never
+    joints_came: float = -1.0
 
     def of(self, sensor: Sensor) -> Health:
         """What is known of a sensor."""
@@ -81,6 +82,12 @@ class FusionMemory(NamedTuple):
             if one.sensor is sensor:
                 return one
         return Health(sensor)
+
+    def came(self, sensor: Sensor) -> float:
+        """When a reading of a sensor came last [s]; negative: never."""
+        if sensor is Sensor.IMU:
+            return self.imu_came
+        return self.joints_came if sensor is Sensor.ENCODERS else self.of(sensor).came
 
     def noting(self, health: Health) -> FusionMemory:
         """The memory with the health of one sensor renewed."""
@@ -108,8 +115,7 @@ class SensorFusion:
     def __init__(self, tuning: EstimatorTuning, tick: float) -> None:
         """Design the joints' filter for a ``tick`` [s]."""
         self.tuning = tuning
-        self._law = packed(tuning)
-        self._joint_gain = joint_gain(tuning, tick)
+        self._law = packed(EstimatorLaw(tuning, joint_gain(tuning, tick)))
         self._least_p = tuning.position_floor**2
         self._least_q = tuning.attitude_floor**2
         self._fuse: dict[type, Callable[[FusionMemory, Any], tuple[float, ...]]] = {
@@ -145,23 +151,24 @@ class SensorFusion:
         ``joint_acceleration`` [rad/s^2, joints] is what the torques make of the arm. None before
         there was a pose, or a position and a heading, to start from, and a reading of the arm.
         """
-        memory = self._move_joints(memory, samples, now, joint_acceleration)
-        memory = self._take_imu(memory, samples, now)
+        memory = self._copied(memory, now, joint_acceleration)
         for sample in samples:
-            if type(sample) in SENSOR_OF:
+            kind = type(sample)
+            if kind is ImuSample:
+                memory = self._take_imu(memory, sample, now)  # type: ignore[arg-type]
+            elif kind is JointSample:
+                memory = self._take_joints(memory, sample, now)  # type: ignore[arg-type]
+            else:
                 memory = self._take(memory, sample, now)  # type: ignore[arg-type]
         until = now - self.tuning.horizon
         if not memory.started:
             memory = self._start(memory)
-        joints = memory.joints
-        if not memory.started or joints is None:
+        if not memory.started or memory.joints_came < 0.0:
             return memory, None
         if memory.waiting and memory.waiting[0].time <= until:
             memory = self._fuse_due(memory, until, now)
-        p, v, R, w, yaw, force = kernels.end_tick(memory.numbers, self._law, until, now)
-        return memory, StateEstimate(
-            round(1e6 * now), p, v, R, w, yaw, joints.angles, joints.rates, force
-        )
+        known = kernels.end_tick(memory.numbers, self._law, until, now)
+        return memory, StateEstimate(round(1e6 * now), *known)
 
     def covariance(self, memory: FusionMemory, now: float) -> Array:
         """Covariance (17, 17) [SI] of the error of the state at ``now`` [s]."""
@@ -169,52 +176,31 @@ class SensorFusion:
         kernels.present_covariance(memory.numbers, self._law, now, found)
         return found
 
-    def _move_joints(
-        self, memory: FusionMemory, samples: Iterable[Sample], now: float, u: Vec2
-    ) -> FusionMemory:
-        """Predict the arm's joints and take in their encoders."""
-        readings: tuple[tuple[float, Vec2], ...] = ()
-        for sample in samples:
-            if type(sample) is JointSample:
-                health, fault = arrived(
-                    memory.of(Sensor.ENCODERS), sample, now, self.tuning, still=True
-                )
-                memory = memory.noting(health)
-                if not fault:
-                    readings = (*readings, (now - sample.time, sample.angles))
-        joints, dt = memory.joints, now - memory.now
-        if joints is None:
-            if readings:
-                joints = at_rest(readings[-1][1])
-        else:
-            dt = min(max(dt, 0.0), _LONGEST_STEP)
-            joints = stepped(joints, u, readings, dt, self._joint_gain)
-        return memory._replace(joints=joints, now=now)
+    def _copied(self, memory: FusionMemory, now: float, u: Vec2) -> FusionMemory:
+        """The memory with a filter of its own, whose joints are moved on."""
+        x = np.empty(1, dtype=FILTER)
+        dt = min(max(now - memory.now, 0.0), _LONGEST_STEP) if memory.now >= 0.0 else 0.0
+        kernels.begin_tick(memory.numbers, x, dt, u)
+        return memory._replace(numbers=x, now=now)
 
-    def _take_imu(
-        self, memory: FusionMemory, samples: Iterable[Sample], now: float
-    ) -> FusionMemory:
-        """Copy the filter and keep the readings of the IMU."""
-        x, law, count, faults = np.empty(1, dtype=FILTER), self._law, 0, 0
-        newest = math.nan
-        for sample in samples:
-            if type(sample) is ImuSample:
-                reading = sample.time, sample.acceleration, sample.rate
-                if count == 0:
-                    fault = kernels.begin_tick(memory.numbers, x, law, now, *reading)
-                else:
-                    fault = kernels.add_imu(x, law, now, *reading)
-                count += 1
-                newest = sample.time
-                if fault:
-                    faults = fault
-        if count == 0:
-            kernels.begin_tick(memory.numbers, x, law, now, math.nan, _REST, _REST)
-            return memory._replace(numbers=x)
-        health = memory.of(Sensor.IMU)._replace(time=newest, came=now)
-        if faults:
-            health = health.with_fault(SensorFault(faults), now)
-        return memory.noting(health)._replace(numbers=x)
+    def _take_imu(self, memory: FusionMemory, sample: ImuSample, now: float) -> FusionMemory:
+        reading = sample.time, sample.acceleration, sample.rate
+        fault = kernels.add_imu(memory.numbers, self._law, now, *reading)
+        if fault:
+            health = memory.of(Sensor.IMU).with_fault(SensorFault(fault), now)
+            memory = memory.noting(health)
+        return memory._replace(imu_came=now)
+
+    def _take_joints(self, memory: FusionMemory, sample: JointSample, now: float) -> FusionMemory:
+        farthest = max(abs(sample.angles[0]), abs(sample.angles[1]))
+        if not (farthest < math.pi and sample.time <= now + TIME_TOLERANCE):
+            health = memory.of(Sensor.ENCODERS).with_fault(SensorFault.IMPLAUSIBLE, now)
+            return memory.noting(health)
+        if memory.joints_came < 0.0:
+            kernels.set_joints(memory.numbers, sample.angles)
+        else:
+            kernels.read_joints(memory.numbers, self._law, sample.angles, now - sample.time)
+        return memory._replace(joints_came=now)
 
     def _take(self, memory: FusionMemory, sample: Aiding, now: float) -> FusionMemory:
         """Check a sample and let it wait for its time."""

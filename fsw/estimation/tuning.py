@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
+from fsw.signals import Vec3
+
 GATES: Final = (25.0, 28.7, 32.1)  # chi-square of 1, 2, 3 readings that one in 1.7 million exceeds
 
 
@@ -57,3 +59,11 @@ class EstimatorTuning:
     stale_time: float = 0.5  # s without a reading
     speed_limit: float = 50.0  # m/s
     place_limit: float = 1000.0  # m from the origin
+
+
+@dataclass(frozen=True, slots=True)
+class EstimatorLaw:
+    """Everything the kernels need that does not change in flight."""
+
+    tuning: EstimatorTuning
+    joint_gain: Vec3  # of angle [1], rate [1/s] and disturbance [1/s^2], a reading

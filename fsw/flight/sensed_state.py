@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from fsw.control.cascade import Cascade, in_hover
-from fsw.estimation.sensor_checks import Health
-from fsw.estimation.sensor_fault import SensorFault, sentence
-from fsw.estimation.sensor_fusion import Reset, SensorFusion, at_start
+from fsw.estimation.sensor_fault import Sensor, SensorFault, sentence
+from fsw.estimation.sensor_fusion import FusionMemory, Reset, SensorFusion, at_start
 from fsw.estimation.tuning import EstimatorTuning
 from fsw.flight.state import FlightState
 from fsw.geometry.rotation import matrix_from_quaternion, wrap_angle, yaw_of
@@ -15,6 +14,7 @@ from fsw.geometry.vectors import add_scaled, norm
 from fsw.model.airframe import AIRFRAME
 from fsw.signals import Severity, StateEstimate, StatusText, TickInputs
 
+_EVERY_TICK = (Sensor.IMU, Sensor.ENCODERS)
 _QUIET = 10.0  # s without a fault until the same one is reported again
 
 
@@ -41,8 +41,9 @@ class SensedState:
         if state.estimate is not None:
             pushed = self._cascade.joint_acceleration(state.cascade, state.estimate)
         memory, estimate = self._fusion.step(before, inputs.samples, now, pushed)
-        for health in memory.health:
-            self._report(before.of(health.sensor), health, (before.now, now), texts)
+        if memory.health is not before.health:
+            _report(before, memory, now, texts)
+        self._report_silence(memory, before.now, now, texts)
         if memory.reset.number != before.reset.number:
             texts.append(StatusText(Severity.WARNING, _told(memory.reset)))
             state = _jumped(state, memory.reset)
@@ -51,15 +52,33 @@ class SensedState:
             return state, state.estimate
         return replace(state, fusion=memory, invalid_ticks=0), estimate
 
-    def _report(
-        self, old: Health, new: Health, times: tuple[float, float], texts: list[StatusText]
+    def _report_silence(
+        self, memory: FusionMemory, before: float, now: float, texts: list[StatusText]
     ) -> None:
-        """Report a fault once, and again after it was gone for a while."""
+        """Report sensors that have just been silent for too long."""
+        for sensor in _EVERY_TICK:
+            self._silent(sensor, memory.came(sensor), (before, now), texts)
+        for health in memory.health:
+            if health.sensor not in _EVERY_TICK:
+                self._silent(health.sensor, health.came, (before, now), texts)
+
+    def _silent(
+        self, sensor: Sensor, came: float, times: tuple[float, float], texts: list[StatusText]
+    ) -> None:
         before, now = times
-        if new.fault_at == now and (old.fault is not new.fault or now - old.fault_at > _QUIET):
+        if came >= 0.0 and before - came <= self._stale < now - came:
+            texts.append(StatusText(Severity.WARNING, sentence(sensor, SensorFault.STALE)))
+
+
+def _report(
+    before: FusionMemory, memory: FusionMemory, now: float, texts: list[StatusText]
+) -> None:
+    """Report each fault once, and again after it was gone for a while."""
+    for new in memory.health:
+        old = before.of(new.sensor)
+        again = old.fault is not new.fault or now - old.fault_at > _QUIET
+        if new.fault_at == now and again:
             texts.append(StatusText(Severity.WARNING, sentence(new.sensor, new.fault)))
-        if before - new.came <= self._stale < now - new.came:
-            texts.append(StatusText(Severity.WARNING, sentence(new.sensor, SensorFault.STALE)))
 
 
 def _told(reset: Reset) -> str:
