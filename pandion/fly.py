@@ -83,7 +83,7 @@ def planned(options: FlyOptions) -> PlannedFlight:
         LinkError: An address of a link is none.
         OSError: The directory for the logs cannot be made.
     """
-    scenario = load_scenario(options.scenario)
+    scenario = load_scenario(options.scenario, options.sensors)
     addresses(options.links)
     if options.realtime and options.speed not in (None, 1.0):
         raise ScenarioError("--realtime flies at speed 1; --speed needs --lockstep")

@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Final
 
 from command_line.options import events, json_file, option, switch
-from command_line.values import number, seconds, whole
+from command_line.values import number, one_of, seconds, whole
+from sitl.scenario_file import SUITE_NAMES
 
 SLOWEST: Final = 0.05  # below it a step in lockstep would take longer than the stall time allows
 _FASTEST: Final = 1e6
@@ -34,6 +35,11 @@ class RunOptions:
     seed: int = option("--seed N", "root of all randomness", whole(), default=0)
     duration_s: float | None = option(
         "--duration S", "seconds to fly (default the scenario's)", seconds
+    )
+    sensors: str | None = option(
+        "--sensors SUITE",
+        f"sensors of the vehicle: {', '.join(SUITE_NAMES)} (default the scenario's)",
+        one_of("suite", *SUITE_NAMES),
     )
     realtime: bool = switch(
         "--realtime",

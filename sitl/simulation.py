@@ -16,13 +16,17 @@ from sitl.mission_clock import MissionClock
 from sitl.plant.aerial_manipulator import Plant, plant
 from sitl.plant.integrator import STEP_S, step
 from sitl.plant.kinematics import places as places_into
+from sitl.plant.parameters import Vehicle
 from sitl.plant.state import ARM, P_WB, Q_WB, THRUST, V_WB, W_WB_B
 from sitl.plant.vector import Array
 from sitl.result import EndKind, EndReason, TruthResult
-from sitl.scenario import V3, Scenario
+from sitl.scenario import V3, Scenario, Sensors
 from sitl.scenario_file import ScenarioError
 from sitl.scenario_validation import check
-from sitl.sensors.suite import V4, SensorReadings, SensorSuite
+from sitl.sensors.exact import V4, ExactSensors, SensorReadings
+from sitl.sensors.keys import MeasuredSensors
+from sitl.sensors.measurements import Measurement
+from sitl.sensors.suite import SensorSuite
 from sitl.start import first_state, flown_vehicle
 from sitl.trajectory import TrajectoryPoint
 
@@ -77,7 +81,7 @@ class Simulation:
         self._plant = plant(self.vehicle)
         self._plants = cast(Sequence[Plant], np.array([self._plant]))  # cheaper to hand over
         self._mass = self.vehicle.mass
-        self._sensors = SensorSuite(scenario.sensors, seed, STEP_US)
+        self._exact_sensors, self._suite = _sensors(scenario, self.vehicle, seed)
         self._pushes = [push(item, seed, 1e-6 * STEP_US) for item in scenario.disturbances]
         self._pushes += more
         self._state, trim = first_state(self.vehicle, scenario, self.clock.target_at(0.0).p)
@@ -93,6 +97,7 @@ class Simulation:
         self._step = machine_code(step, self._plants, self._state, *example)
         self._felt = self._step(self._plants, self._state, *example).felt
         self._reading: SensorReadings | None = None
+        self._measured: tuple[int, tuple[Measurement, ...]] = (-1, ())
         self._evaluator = FlightEvaluator(scenario, self.clock, self._places_now())
 
     @property
@@ -143,10 +148,25 @@ class Simulation:
         self._evaluator.end(kind, sentence, self.time_s)
 
     def sense(self) -> SensorReadings:
-        """Measurements of the current state; asking twice in a step gives the same ones."""
+        """The suite ``perfect``'s readings of the current state, exact with any other suite.
+
+        Asking twice in a step gives the same ones.
+        """
         if self._reading is None or self._reading.t_us != self.t_us:
-            self._reading = self._sensors.measure(self._exact_reading())
+            self._reading = self._exact_sensors.measure(self._exact_reading())
         return self._reading
+
+    def measurements(self) -> tuple[Measurement, ...] | None:
+        """What arrives from the sensors in this step; None with the suite ``perfect``.
+
+        Asking twice in a step gives the same ones; no step may be left out.
+        """
+        if self._suite is None:
+            return None
+        if self._measured[0] != self.step:
+            thrust = _four(self._state[THRUST:ARM].tolist())
+            self._measured = (self.step, tuple(self._suite.step(self.sense(), thrust)))
+        return self._measured[1]
 
     def advance(self, controls: Controls) -> None:
         """Integrate one step with ``controls`` held, judging every plant step.
@@ -259,6 +279,23 @@ class Simulation:
         places_into(self._plant, self._state, out)
         now: Array = out[0]
         return now
+
+
+def _sensors(
+    scenario: Scenario, vehicle: Vehicle, seed: int
+) -> tuple[ExactSensors, SensorSuite | None]:
+    """What senses exactly, and the suite where there is one."""
+    sensors = scenario.sensors
+    if not isinstance(sensors, MeasuredSensors):
+        return ExactSensors(sensors, seed, STEP_US), None
+    suite = SensorSuite(
+        sensors,
+        seed,
+        START_US,
+        joints=len(vehicle.links),
+        hover_thrust=0.25 * vehicle.mass * vehicle.gravity,
+    )
+    return ExactSensors(Sensors(), seed, STEP_US), suite
 
 
 def _four(values: list[float]) -> V4:

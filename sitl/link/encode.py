@@ -14,7 +14,7 @@ from sitl.link.pilot_messages import (
     SendCommand,
     SendTarget,
 )
-from sitl.sensors.suite import SensorReadings
+from sitl.sensors.exact import SensorReadings
 from sitl.shapes.kind import NUMBERS
 
 WireValues = tuple[float | bytes, ...]

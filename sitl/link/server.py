@@ -19,7 +19,7 @@ from sitl.link.pilot import FlightPlan, PilotState
 from sitl.link.pilot_messages import Heard, SendCommand
 from sitl.link.udp_endpoint import PeerSocket
 from sitl.result import EndKind
-from sitl.sensors.suite import SensorReadings
+from sitl.sensors.exact import SensorReadings
 from sitl.simulation import Simulation
 
 _HEARTBEAT_STEPS: Final = 500  # 1 Hz
