@@ -11,6 +11,7 @@ import numpy as np
 
 from sitl.compiled import machine_code
 from sitl.disturbances.items import Push, push
+from sitl.earth import DEFAULT_ORIGIN, Place
 from sitl.flight_evaluator import FlightEvaluator, critical
 from sitl.mission_clock import MissionClock
 from sitl.plant.aerial_manipulator import Plant, plant
@@ -21,7 +22,7 @@ from sitl.plant.state import ARM, P_WB, Q_WB, THRUST, V_WB, W_WB_B
 from sitl.plant.vector import Array
 from sitl.result import EndKind, EndReason, TruthResult
 from sitl.scenario import V3, Scenario, Sensors
-from sitl.scenario_file import ScenarioError
+from sitl.scenario_file import PERFECT, ScenarioError
 from sitl.scenario_validation import check
 from sitl.sensors.exact import V4, ExactSensors, SensorReadings
 from sitl.sensors.keys import MeasuredSensors
@@ -64,13 +65,20 @@ class Truth:
 class Simulation:
     """The plant in its scenario; ``seed``, 0 or more, is the root of all randomness of the run.
 
-    ``more`` pushes come on top of the scenario's disturbances.
+    ``more`` pushes come on top of the scenario's disturbances. The local frame is at ``origin``.
 
     Raises:
         ScenarioError: The scenario contradicts itself or starts outside its safe set.
     """
 
-    def __init__(self, scenario: Scenario, seed: int, more: Sequence[Push] = ()) -> None:
+    def __init__(
+        self,
+        scenario: Scenario,
+        seed: int,
+        more: Sequence[Push] = (),
+        *,
+        origin: Place = DEFAULT_ORIGIN,
+    ) -> None:
         if not (seed >= 0):
             raise ScenarioError(f"seed = {seed}: must be 0 or more")
         check(scenario)
@@ -81,7 +89,7 @@ class Simulation:
         self._plant = plant(self.vehicle)
         self._plants = cast(Sequence[Plant], np.array([self._plant]))  # cheaper to hand over
         self._mass = self.vehicle.mass
-        self._exact_sensors, self._suite = _sensors(scenario, self.vehicle, seed)
+        self._exact_sensors, self._suite = _sensors(scenario, self.vehicle, seed, origin)
         self._pushes = [push(item, seed, 1e-6 * STEP_US) for item in scenario.disturbances]
         self._pushes += more
         self._state, trim = first_state(self.vehicle, scenario, self.clock.target_at(0.0).p)
@@ -109,6 +117,12 @@ class Simulation:
     def time_s(self) -> float:
         """Seconds since the start of the simulation."""
         return 1e-6 * STEP_US * self.step
+
+    @property
+    def suite(self) -> str:
+        """Name of the suite of sensors."""
+        sensors = self.scenario.sensors
+        return sensors.suite if isinstance(sensors, MeasuredSensors) else PERFECT
 
     @property
     def ended(self) -> EndReason | None:
@@ -282,7 +296,7 @@ class Simulation:
 
 
 def _sensors(
-    scenario: Scenario, vehicle: Vehicle, seed: int
+    scenario: Scenario, vehicle: Vehicle, seed: int, origin: Place
 ) -> tuple[ExactSensors, SensorSuite | None]:
     """What senses exactly, and the suite where there is one."""
     sensors = scenario.sensors
@@ -294,6 +308,7 @@ def _sensors(
         START_US,
         joints=len(vehicle.links),
         hover_thrust=0.25 * vehicle.mass * vehicle.gravity,
+        origin_altitude=origin.altitude,
     )
     return ExactSensors(Sensors(), seed, STEP_US), suite
 

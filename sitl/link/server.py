@@ -74,7 +74,12 @@ def serve(
         readings = simulation.sense()
         state, messages = pilot.speak(plan, state, readings.t_us)
         heartbeat = encoder.heartbeat() if simulation.step % _HEARTBEAT_STEPS == 0 else b""
-        datagram = heartbeat + encoder.datagram(readings, messages)
+        measured = simulation.measurements()
+        datagram = heartbeat + (
+            encoder.datagram(readings, messages)
+            if measured is None
+            else encoder.measured_datagram(readings.t_us, measured, messages)
+        )
         try:
             answer = exchange.step(
                 simulation.step, readings.t_us, datagram, lambda: truth(simulation)

@@ -25,10 +25,20 @@ def standard_pressure(altitude: float) -> float:
     return float(SEA_LEVEL_PA * (1.0 - _LAPSE_K_M * altitude / _SEA_LEVEL_K) ** _EXPONENT)
 
 
-class BarometerSensor:
-    """The barometer of one flight; the origin of the local frame lies at sea level."""
+def standard_altitude(pressure_pa: float) -> float:
+    """Altitude [m] above mean sea level of a ``pressure_pa`` [Pa]; the opposite."""
+    ratio = (pressure_pa / SEA_LEVEL_PA) ** (1.0 / _EXPONENT)
+    return float(_SEA_LEVEL_K / _LAPSE_K_M * (1.0 - ratio))
 
-    def __init__(self, keys: Barometer, random: np.random.Generator) -> None:
+
+class BarometerSensor:
+    """The barometer of one flight."""
+
+    def __init__(
+        self, keys: Barometer, random: np.random.Generator, origin_altitude: float = 0.0
+    ) -> None:
+        """Draw this flight's day; the origin lies at ``origin_altitude`` [m] above the sea."""
+        self._origin_altitude = origin_altitude
         self._keys = keys
         self._random = random
         self._offset_pa = normal(random, keys.offset_pa, 1)[0]
@@ -43,5 +53,5 @@ class BarometerSensor:
         error = self._offset_pa + self._drift.step()[0] + normal(self._random, keys.noise_pa, 1)[0]
         if outlier:
             error += math.copysign(keys.outlier_pa, float(self._random.uniform(-1.0, 1.0)))
-        pressure = standard_pressure(-exact.p_WB[2]) + error
+        pressure = standard_pressure(self._origin_altitude - exact.p_WB[2]) + error
         return PressureMeasurement(stamp_us, rounded(pressure, keys.resolution_pa))

@@ -32,10 +32,12 @@ class SensorSuite:
         *,
         joints: int,
         hover_thrust: float,
+        origin_altitude: float = 0.0,
     ) -> None:
         """Draw the sensors of this flight, which begins at the stamp ``start_us``.
 
-        A rotor gives ``hover_thrust`` [N] in hover.
+        A rotor gives ``hover_thrust`` [N] in hover; the origin of the local frame lies at
+        ``origin_altitude`` [m] above the sea.
         """
         self._channels: list[Channel] = []
 
@@ -54,7 +56,8 @@ class SensorSuite:
             add("gnss", one.gnss, GnssSensor(one.gnss, stream(seed, "sensor", "gnss")))
         if one.barometer is not None:
             name, air = "barometer", one.barometer
-            add(name, air, BarometerSensor(air, stream(seed, "sensor", name)))
+            random = stream(seed, "sensor", name)
+            add(name, air, BarometerSensor(air, random, origin_altitude))
         if one.magnetometer is not None:
             name, compass = "magnetometer", one.magnetometer
             add(name, compass, MagnetometerSensor(compass, stream(seed, "sensor", name)))

@@ -8,7 +8,11 @@ axis; entries that are not positive or not finite mean that the sensor does not 
 from __future__ import annotations
 
 from fsw.frozen import dataclass
-from fsw.signals import Vec2, Vec3, Vec4
+
+# Named here, because ``fsw.signals`` builds upon this file.
+Vec2 = tuple[float, float]
+Vec3 = tuple[float, float, float]
+Vec4 = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
