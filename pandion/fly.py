@@ -23,6 +23,7 @@ from pandion.processor import ANYWHERE, lockstep_places
 from pandion.result import FlightReports, as_json, table_rows
 from pandion.supervisor import Flown, ProcessFailed, Supervisor
 from sitl.arguments import RunOptions, SitlOptions
+from sitl.earth import Place
 from sitl.scenario_file import ScenarioError, load_scenario, scenario_digest
 
 COMPLETED, NOT_COMPLETED = 0, 1  # exit codes
@@ -83,7 +84,7 @@ def planned(options: FlyOptions) -> PlannedFlight:
         LinkError: An address of a link is none.
         OSError: The directory for the logs cannot be made.
     """
-    scenario = load_scenario(options.scenario)
+    scenario = load_scenario(options.scenario, options.sensors)
     addresses(options.links)
     if options.realtime and options.speed not in (None, 1.0):
         raise ScenarioError("--realtime flies at speed 1; --speed needs --lockstep")
@@ -115,7 +116,14 @@ def _banner(flight: PlannedFlight, display: Display) -> None:
 
 def _sitl_options(flight: PlannedFlight) -> SitlOptions:
     common = {field.name: getattr(flight.options, field.name) for field in fields(RunOptions)}
-    return SitlOptions(**common, listen="udp:127.0.0.1:0", wait_s=_WAIT_S, out=flight.out)
+    at = flight.options.links.origin
+    return SitlOptions(
+        **common,
+        listen="udp:127.0.0.1:0",
+        wait_s=_WAIT_S,
+        origin=Place(at.latitude, at.longitude, at.altitude),
+        out=flight.out,
+    )
 
 
 def _fsw_options(flight: PlannedFlight, port: int) -> FswOptions:

@@ -11,18 +11,23 @@ import numpy as np
 
 from sitl.compiled import machine_code
 from sitl.disturbances.items import Push, push
+from sitl.earth import DEFAULT_ORIGIN, Place
 from sitl.flight_evaluator import FlightEvaluator, critical
 from sitl.mission_clock import MissionClock
 from sitl.plant.aerial_manipulator import Plant, plant
 from sitl.plant.integrator import STEP_S, step
 from sitl.plant.kinematics import places as places_into
+from sitl.plant.parameters import Vehicle
 from sitl.plant.state import ARM, P_WB, Q_WB, THRUST, V_WB, W_WB_B
 from sitl.plant.vector import Array
 from sitl.result import EndKind, EndReason, TruthResult
-from sitl.scenario import V3, Scenario
-from sitl.scenario_file import ScenarioError
+from sitl.scenario import V3, Scenario, Sensors
+from sitl.scenario_file import PERFECT, ScenarioError
 from sitl.scenario_validation import check
-from sitl.sensors.suite import V4, SensorReadings, SensorSuite
+from sitl.sensors.exact import V4, ExactSensors, SensorReadings
+from sitl.sensors.keys import MeasuredSensors
+from sitl.sensors.measurements import Measurement
+from sitl.sensors.suite import SensorSuite
 from sitl.start import first_state, flown_vehicle
 from sitl.trajectory import TrajectoryPoint
 
@@ -60,13 +65,20 @@ class Truth:
 class Simulation:
     """The plant in its scenario; ``seed``, 0 or more, is the root of all randomness of the run.
 
-    ``more`` pushes come on top of the scenario's disturbances.
+    ``more`` pushes come on top of the scenario's disturbances. The local frame is at ``origin``.
 
     Raises:
         ScenarioError: The scenario contradicts itself or starts outside its safe set.
     """
 
-    def __init__(self, scenario: Scenario, seed: int, more: Sequence[Push] = ()) -> None:
+    def __init__(
+        self,
+        scenario: Scenario,
+        seed: int,
+        more: Sequence[Push] = (),
+        *,
+        origin: Place = DEFAULT_ORIGIN,
+    ) -> None:
         if not (seed >= 0):
             raise ScenarioError(f"seed = {seed}: must be 0 or more")
         check(scenario)
@@ -77,7 +89,7 @@ class Simulation:
         self._plant = plant(self.vehicle)
         self._plants = cast(Sequence[Plant], np.array([self._plant]))  # cheaper to hand over
         self._mass = self.vehicle.mass
-        self._sensors = SensorSuite(scenario.sensors, seed, STEP_US)
+        self._exact_sensors, self._suite = _sensors(scenario, self.vehicle, seed, origin)
         self._pushes = [push(item, seed, 1e-6 * STEP_US) for item in scenario.disturbances]
         self._pushes += more
         self._state, trim = first_state(self.vehicle, scenario, self.clock.target_at(0.0).p)
@@ -93,6 +105,7 @@ class Simulation:
         self._step = machine_code(step, self._plants, self._state, *example)
         self._felt = self._step(self._plants, self._state, *example).felt
         self._reading: SensorReadings | None = None
+        self._measured: tuple[int, tuple[Measurement, ...]] = (-1, ())
         self._evaluator = FlightEvaluator(scenario, self.clock, self._places_now())
 
     @property
@@ -104,6 +117,12 @@ class Simulation:
     def time_s(self) -> float:
         """Seconds since the start of the simulation."""
         return 1e-6 * STEP_US * self.step
+
+    @property
+    def suite(self) -> str:
+        """Name of the suite of sensors."""
+        sensors = self.scenario.sensors
+        return sensors.suite if isinstance(sensors, MeasuredSensors) else PERFECT
 
     @property
     def ended(self) -> EndReason | None:
@@ -143,10 +162,25 @@ class Simulation:
         self._evaluator.end(kind, sentence, self.time_s)
 
     def sense(self) -> SensorReadings:
-        """Measurements of the current state; asking twice in a step gives the same ones."""
+        """The suite ``perfect``'s readings of the current state, exact with any other suite.
+
+        Asking twice in a step gives the same ones.
+        """
         if self._reading is None or self._reading.t_us != self.t_us:
-            self._reading = self._sensors.measure(self._exact_reading())
+            self._reading = self._exact_sensors.measure(self._exact_reading())
         return self._reading
+
+    def measurements(self) -> tuple[Measurement, ...] | None:
+        """What arrives from the sensors in this step; None with the suite ``perfect``.
+
+        Asking twice in a step gives the same ones; no step may be left out.
+        """
+        if self._suite is None:
+            return None
+        if self._measured[0] != self.step:
+            thrust = _four(self._state[THRUST:ARM].tolist())
+            self._measured = (self.step, tuple(self._suite.step(self.sense(), thrust)))
+        return self._measured[1]
 
     def advance(self, controls: Controls) -> None:
         """Integrate one step with ``controls`` held, judging every plant step.
@@ -259,6 +293,24 @@ class Simulation:
         places_into(self._plant, self._state, out)
         now: Array = out[0]
         return now
+
+
+def _sensors(
+    scenario: Scenario, vehicle: Vehicle, seed: int, origin: Place
+) -> tuple[ExactSensors, SensorSuite | None]:
+    """What senses exactly, and the suite where there is one."""
+    sensors = scenario.sensors
+    if not isinstance(sensors, MeasuredSensors):
+        return ExactSensors(sensors, seed, STEP_US), None
+    suite = SensorSuite(
+        sensors,
+        seed,
+        START_US,
+        joints=len(vehicle.links),
+        hover_thrust=0.25 * vehicle.mass * vehicle.gravity,
+        origin_altitude=origin.altitude,
+    )
+    return ExactSensors(Sensors(), seed, STEP_US), suite
 
 
 def _four(values: list[float]) -> V4:

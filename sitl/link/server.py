@@ -19,7 +19,7 @@ from sitl.link.pilot import FlightPlan, PilotState
 from sitl.link.pilot_messages import Heard, SendCommand
 from sitl.link.udp_endpoint import PeerSocket
 from sitl.result import EndKind
-from sitl.sensors.suite import SensorReadings
+from sitl.sensors.exact import SensorReadings
 from sitl.simulation import Simulation
 
 _HEARTBEAT_STEPS: Final = 500  # 1 Hz
@@ -74,7 +74,12 @@ def serve(
         readings = simulation.sense()
         state, messages = pilot.speak(plan, state, readings.t_us)
         heartbeat = encoder.heartbeat() if simulation.step % _HEARTBEAT_STEPS == 0 else b""
-        datagram = heartbeat + encoder.datagram(readings, messages)
+        measured = simulation.measurements()
+        datagram = heartbeat + (
+            encoder.datagram(readings, messages)
+            if measured is None
+            else encoder.measured_datagram(readings.t_us, measured, messages)
+        )
         try:
             answer = exchange.step(
                 simulation.step, readings.t_us, datagram, lambda: truth(simulation)

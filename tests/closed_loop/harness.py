@@ -142,6 +142,7 @@ class Flight:
             announced(self.scenario) if self.announces and self.sim.step == 0 else (),
             tuning=tuning,
             mission=self.upload,
+            samples=self.closed.samples(),
         )
         self.upload = None
         if self.streamed and self.sim.step % STREAM_STEPS == 0:

@@ -20,7 +20,7 @@ from sitl.link.pilot_messages import SendCommand
 from sitl.mission_clock import MissionClock
 from sitl.scenario import Scenario, Workspace
 from sitl.scenario_file import load_scenario
-from sitl.sensors.suite import SensorReadings
+from sitl.sensors.exact import SensorReadings
 from sitl.shapes.box import Box
 from studies.mission import safe_set as safe_set_of
 from tests.fsw.link.snapshots import FACTS, outputs_at
