@@ -39,6 +39,7 @@ from fsw.measurements import (
 from fsw.signals import StateEstimate, Vec2, Vec3, Vec4
 
 LATE: Final = 0.01  # s behind the filter, where a measurement is still fused as it stands
+_MARGIN: Final = 0.003  # s, by which a measurement may take longer than lately
 _LONGEST_STEP: Final = 0.05  # s, by which joints are predicted at once
 _REST: Vec3 = (0.0, 0.0, 0.0)
 _NO_TURN: Vec4 = (1.0, 0.0, 0.0, 0.0)
@@ -75,6 +76,7 @@ class FusionMemory(NamedTuple):
     now: float = -1.0  # s, of the last tick; negative: there was none
     imu_came: float = -1.0  # s, when a reading came last; negative: never
     joints_came: float = -1.0
+    delay: float = 0.0  # s, that measurements have lately taken
 
     def of(self, sensor: Sensor) -> Health:
         """What is known of a sensor."""
@@ -160,7 +162,7 @@ class SensorFusion:
                 memory = self._take_joints(memory, sample, now)  # type: ignore[arg-type]
             else:
                 memory = self._take(memory, sample, now)  # type: ignore[arg-type]
-        until = now - self.tuning.horizon
+        until = now - memory.delay - _MARGIN
         if not memory.started:
             memory = self._start(memory)
         if not memory.started or memory.joints_came < 0.0:
@@ -214,6 +216,8 @@ class SensorFusion:
         if not fault and memory.started and time < x["time"][0] - LATE:
             fault = SensorFault.TOO_OLD
             health = health.with_fault(fault, now)
+        if fault in (SensorFault.NONE, SensorFault.TOO_OLD):
+            memory = self._with_delay(memory, now - time, now - before.came)
         memory = memory.noting(health)
         if fault:
             return memory
@@ -221,6 +225,11 @@ class SensorFusion:
         if len(waiting) > 1 and waiting[-2].time > time:
             waiting = tuple(sorted(waiting))
         return memory._replace(waiting=waiting, arrivals=memory.arrivals + 1)
+
+    def _with_delay(self, memory: FusionMemory, delay: float, apart: float) -> FusionMemory:
+        """The memory after a measurement took so long, ``apart`` [s] from its sensor's last one."""
+        faded = memory.delay - self.tuning.delay_decay * min(apart, 1.0)
+        return memory._replace(delay=min(max(delay, faded), self.tuning.longest_delay))
 
     def _start(self, memory: FusionMemory) -> FusionMemory:
         """Start from the newest pose; else from a GNSS position, gravity and the compass."""

@@ -45,7 +45,10 @@ class EstimatorTuning:
     pose_delay_sigma: float = 0.0  # s, known so well at the start; 0: not estimated in flight
     pose_delay_walk: float = 1e-4  # s/sqrt(s)
 
-    horizon: float = 0.03  # s; measurements that are older when they come are of no use
+    # How far the filter stays behind: as long as measurements have lately taken to come, at most
+    # this; older ones are of no use.
+    longest_delay: float = 0.25  # s
+    delay_decay: float = 0.01  # s/s, by which it is forgotten how long they took
     position_floor: float = 2e-4  # m, the least standard deviation that a sensor is believed
     attitude_floor: float = 1e-3  # rad
     mag_noise: float = 0.01  # Gauss

@@ -165,7 +165,6 @@ VIO = Suite(
         gyro_noise=3e-4,
         accel_bias_walk=1e-3,
         gyro_bias_walk=5e-5,
-        horizon=0.06,
     ),
     pose=PoseSensor(30.0, 0.045, 5e-3, np.radians(0.5)),
 )
@@ -175,7 +174,6 @@ RTK = Suite(
         gyro_noise=3e-4,
         accel_bias_walk=1e-3,
         gyro_bias_walk=5e-5,
-        horizon=0.15,
         accel_bias=0.05,
         gyro_bias=0.005,
         baro_bias=1.0,

@@ -144,7 +144,7 @@ def test_innovations_are_as_large_as_expected(suite: Suite) -> None:
 
 
 def test_a_hidden_delay_of_the_pose_is_found_within_2_ms() -> None:
-    tuning = replace(MOCAP.tuning, pose_delay_sigma=0.01, horizon=0.05)
+    tuning = replace(MOCAP.tuning, pose_delay_sigma=0.01)
     pose = MOCAP.pose
     assert pose is not None
     suite = replace(MOCAP, tuning=tuning, pose=replace(pose, hidden_delay=0.012))
@@ -337,8 +337,18 @@ def test_without_a_pose_there_is_no_estimate() -> None:
         assert estimate is None
 
 
-def test_a_pose_later_than_the_horizon_is_named() -> None:
+@pytest.mark.parametrize("latency", [0.005, 0.06, 0.2])
+def test_the_filter_stays_as_far_behind_as_the_pose_is_late(latency: float) -> None:
     pose = MOCAP.pose
     assert pose is not None
-    flown = Flown(run(replace(MOCAP, pose=replace(pose, latency=0.06)), 3, 0.6))
+    flown = Flown(run(replace(MOCAP, pose=replace(pose, latency=latency)), 3, 1.0))
+    assert latency <= flown.memory.delay < latency + 0.003
+    assert flown.worst < 3.5
+    assert not flown.found
+
+
+def test_a_pose_later_than_all_delays_is_named() -> None:
+    pose = MOCAP.pose
+    assert pose is not None
+    flown = Flown(run(replace(MOCAP, pose=replace(pose, latency=0.3)), 3, 0.6))
     assert (Sensor.POSE, SensorFault.TOO_OLD) in flown.found
