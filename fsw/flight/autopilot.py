@@ -110,8 +110,9 @@ class Autopilot:
         """Everything the vehicle does at one instant: the next state, and everything it says."""
         now_us = inputs.sensors.t_us
         texts: list[StatusText] = []
-        if inputs.samples or state.fusion is not None:
-            state, estimate = self._sensed.estimate(state, inputs, texts)
+        fusion = state.fusion
+        if inputs.samples or fusion is not None:
+            state, fusion, estimate = self._sensed.estimate(state, inputs, texts)
         else:
             state, estimate = _estimate(state, inputs)
         state = self._receive(state, inputs, texts)
@@ -166,7 +167,7 @@ class Autopilot:
             state.battery,
             state.arming_refusal,
             safety,
-            state.fusion,
+            fusion,
         )
         snapshot = _snapshot(state, estimate, u, inputs)
         return state, TickOutputs(
