@@ -35,6 +35,8 @@ from sitl.trajectory import TrajectoryPoint
 
 STEP_US = 2000  # one exchange with the flight software
 START_US = 1_000_000  # so that no stamp is 0
+SETTLED_STEPS = 250  # for which the vehicle's sensors have run when the flight begins
+SETTLED_KEPT = 20  # of these, whose measurements the flight software still gets
 SUBSTEPS = 2  # plant steps per exchange
 SAMPLE_STEPS = 50  # tracking error at 10 Hz, as the paper's TE
 
@@ -192,8 +194,22 @@ class Simulation:
             exact = self.sense()
             if self._drives is not None:
                 exact = exact._replace(q_arm=self._drives.motor_angles(exact.q_arm))
-            self._measured = (self.step, tuple(self._suite.step(exact, thrust)))
+            before = self._settled(self._suite, thrust) if self.step == 0 else []
+            self._measured = (self.step, (*before, *self._suite.step(exact, thrust)))
         return self._measured[1]
+
+    def _settled(self, suite: SensorSuite, thrust: V4) -> list[Measurement]:
+        """What came before the first step, in which a flight software cannot wait for sensors.
+
+        The vehicle has been where it starts for a while: the newest of each sensor, and all of the
+        last few steps.
+        """
+        exact, arrived = self.sense(), list[tuple[int, Measurement]]()
+        for k in range(-SETTLED_STEPS, 0):
+            earlier = exact._replace(t_us=exact.t_us + k * STEP_US)
+            arrived += [(k, one) for one in suite.step(earlier, thrust)]
+        newest = {type(one): one for _, one in arrived}
+        return [one for k, one in arrived if k >= -SETTLED_KEPT or newest[type(one)] is one]
 
     def advance(self, controls: Controls) -> None:
         """Integrate one step with ``controls`` held, judging every plant step.
@@ -330,7 +346,7 @@ def _sensors(
     suite = SensorSuite(
         sensors,
         seed,
-        START_US,
+        START_US - SETTLED_STEPS * STEP_US,
         joints=len(vehicle.links),
         hover_thrust=0.25 * vehicle.mass * vehicle.gravity,
         origin_altitude=origin.altitude,

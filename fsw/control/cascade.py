@@ -19,6 +19,7 @@ from fsw.control.height import height_pid
 from fsw.control.joint_reference import joint_reference
 from fsw.control.joints import (
     JointMemory,
+    accelerations_of,
     arm_dynamics,
     joint_torques,
     joints_at_rest,
@@ -170,6 +171,7 @@ class Cascade:
         memory = CascadeMemory(STOPPED.rotor_thrust, STOPPED, Observed(_NONE, _NONE), 1.0)
         example = (self._packed, memory, _SOMEWHERE, REST_STATE, REST_INPUT, 1, NO_ZONES)
         self._close_loops = machine_code(_close_loops, *example)
+        self._joint_acceleration = machine_code(_joint_acceleration, *example[:3])
 
     def motion(self, memory: CascadeMemory, estimate: StateEstimate) -> MotionState:
         """Acceleration to snap right now, from the rotor model."""
@@ -177,6 +179,10 @@ class Cascade:
         return motion_state(
             self.law.airframe, memory.mass, estimate, rotors, memory.commanded.joint_torque[0]
         )
+
+    def joint_acceleration(self, memory: CascadeMemory, estimate: StateEstimate) -> Vec2:
+        """Accelerations [rad/s^2] of the joints under the torques sent last, by the model."""
+        return self._joint_acceleration(self._packed, memory, estimate)
 
     def step(
         self,
@@ -345,6 +351,18 @@ def _close_loops(
         kept.off_plan,
         guarded,
     )
+
+
+@compiled
+def _joint_acceleration(laws: NDArray[Any], memory: CascadeMemory, estimate: StateEstimate) -> Vec2:
+    law = laws[0]
+    rotors = lag_rotors(memory.rotors, memory.commanded.rotor_thrust, law.rotor_decay)
+    torque = memory.commanded.joint_torque
+    motion = motion_state(law.airframe, memory.mass, estimate, rotors, torque[0])
+    # The accelerometer knows of gusts, and of the ground.
+    dynamics = arm_dynamics(law.airframe, estimate, (0.0, estimate.specific_force))
+    first, second = accelerations_of(dynamics, torque)
+    return first - motion.turning[1], second
 
 
 @compilable

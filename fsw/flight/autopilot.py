@@ -29,6 +29,7 @@ from fsw.flight.plan_exchange import PlanExchange, measured_state, nominal_at_re
 from fsw.flight.reference_horizon import ReferenceHorizon
 from fsw.flight.safe_set import SafeSetCheck
 from fsw.flight.safety_watch import SafetyWatch
+from fsw.flight.sensed_state import SensedState
 from fsw.flight.state import FlightState, PlanMemory
 from fsw.model.battery import drained
 from fsw.model.body import body_of
@@ -88,6 +89,7 @@ class Autopilot:
         self._cascade = Cascade(
             config.airframe, config.tuning, config.inner, tick, keep_clear(config)
         )
+        self._sensed = SensedState(config.estimator, self._cascade)
         self._zones: tuple[SafeSet, EndEffectorTarget | None, Array] = (SafeSet(), None, NO_ZONES)
         self._ticks_per_plan = config.mpc_period_us // config.tick_period_us
 
@@ -98,6 +100,7 @@ class Autopilot:
         nominal = self._plans.step(nominal_at_rest(estimate), REST_INPUT)
         self._cascade.step(in_hover(self.config.airframe, estimate), estimate, nominal, REST_INPUT)
         self._safe_sets.warm_up(estimate)
+        self._sensed.warm_up()
 
     def analyse(self, safe_set: SafeSet) -> tuple[Finding, ...]:
         """Findings on whether this configuration can keep a safe set."""
@@ -107,7 +110,10 @@ class Autopilot:
         """Everything the vehicle does at one instant: the next state, and everything it says."""
         now_us = inputs.sensors.t_us
         texts: list[StatusText] = []
-        state, estimate = _estimate(state, inputs)
+        if inputs.samples or state.fusion is not None:
+            state, estimate = self._sensed.estimate(state, inputs, texts)
+        else:
+            state, estimate = _estimate(state, inputs)
         state = self._receive(state, inputs, texts)
         if estimate is None:
             return state, _blind(inputs, texts)
@@ -160,6 +166,7 @@ class Autopilot:
             state.battery,
             state.arming_refusal,
             safety,
+            state.fusion,
         )
         snapshot = _snapshot(state, estimate, u, inputs)
         return state, TickOutputs(

@@ -8,6 +8,7 @@ from typing import cast
 from fsw.control.cascade import Inner
 from fsw.control.gains import LoopGains
 from fsw.control.safety_filter import FilterTuning
+from fsw.estimation.tuning import EstimatorTuning
 from fsw.geometry.geodesy import DEFAULT_ORIGIN
 from fsw.model.airframe import AIRFRAME, Airframe
 from fsw.model.battery import BatteryModel
@@ -95,6 +96,7 @@ class FlightConfig:
     surroundings: Surroundings = field(default_factory=Surroundings)
     steering: SetpointLimits = field(default_factory=SetpointLimits)
     safety_filter: FilterTuning = field(default_factory=FilterTuning)
+    estimator: EstimatorTuning = field(default_factory=EstimatorTuning)
     battery: BatteryModel = field(default_factory=BatteryModel)
     origin: Origin = DEFAULT_ORIGIN
     soft: bool = False  # fly an inconsistent configuration all the same, with a warning

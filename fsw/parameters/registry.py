@@ -345,6 +345,7 @@ _CHOICES: Final[dict[str, Choices]] = {
 # Numbers of FlightConfig that are no parameters, by the beginning of their path, and why.
 NO_PARAMETERS: Final[dict[str, str]] = {
     "battery.": "describes the vehicle",
+    "estimator.": "describes the sensors",
     "origin.": "given at start: single precision is metres off in a latitude",
     "airframe.": "describes the vehicle; scales its actuators and telemetry, which must not change",
     "planner.horizon": "size of the program, which is laid out once",
