@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from fsw.control.cascade import Cascade, in_hover
+from fsw.estimation.error_state import Array
 from fsw.estimation.sensor_fault import Sensor, SensorFault, sentence
 from fsw.estimation.sensor_fusion import FusionMemory, Reset, SensorFusion, at_start
 from fsw.estimation.tuning import EstimatorTuning
@@ -30,6 +31,10 @@ class SensedState:
         """Compile every kernel."""
         estimate = self._fusion.warm_up()
         self._cascade.joint_acceleration(in_hover(AIRFRAME, estimate), estimate)
+
+    def covariance(self, memory: FusionMemory) -> Array:
+        """Covariance (17, 17) [SI] of the error of the last tick's estimate."""
+        return self._fusion.covariance(memory, memory.now)
 
     def estimate(
         self, state: FlightState, inputs: TickInputs, texts: list[StatusText]
