@@ -22,7 +22,7 @@ from tests.cli.test_stall import flying, half_of
             ("--realtime",), ("fsw", "sitl"), 3.0, marks=pytest.mark.long
         ),
         (("--speed", "2"), ("fsw",), 1.0),
-        (("--speed", "2"), ("sitl",), 1.0),
+        pytest.param(("--speed", "2"), ("sitl",), 1.0, marks=pytest.mark.long),
     ],
 )
 def test_a_flight_survives_a_pause(

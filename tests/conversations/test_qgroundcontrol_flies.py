@@ -141,8 +141,15 @@ def download(vehicle: Connected, kind: int) -> list[Message]:
     return found
 
 
-@clients
-@versions
+@pytest.mark.parametrize(
+    ("client", "version"),
+    [
+        pytest.param(QGC_5, 2, id="5-mavlink2"),
+        pytest.param(QGC_4_4, 1, id="4.4-mavlink1"),
+        pytest.param(QGC_5, 1, id="5-mavlink1", marks=pytest.mark.long),
+        pytest.param(QGC_4_4, 2, id="4.4-mavlink2", marks=pytest.mark.long),
+    ],
+)
 def test_a_plan_is_uploaded_started_paused_continued_and_flown_to_its_end(
     vehicle: Connected, client: Client, version: int
 ) -> None:
