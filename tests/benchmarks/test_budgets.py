@@ -78,6 +78,7 @@ def test_a_loop_that_only_sleeps_sees_the_machine_stand_still_and_leaves_nothing
         assert bare.stops.missed_elsewhere(before_it, begin_us - 500_000, 1_000) > 0.1
 
 
+@pytest.mark.long
 def test_a_short_flight_beside_a_busy_program_is_measured_and_leaves_nothing(
     tmp_path: Path,
 ) -> None:

@@ -86,6 +86,7 @@ def test_it_says_what_was_flown_and_holds_every_tick_and_the_truth(log: Path) ->
     assert not (log.parent / "truth.ulg").exists()
 
 
+@pytest.mark.long
 def test_with_the_full_profile_it_holds_everything_every_tick(tmp_path: Path) -> None:
     (tmp_path / "full.params").write_text("LOG_PROFILE 1\n")
     out = tmp_path / "full"

@@ -129,6 +129,7 @@ def ticks_in(path: Path) -> int:
     return sum(isinstance(tick, LoggedTick) for tick in ticks(open_flight(path)))
 
 
+@pytest.mark.long
 def test_a_killed_process_leaves_readable_logs(tmp_path: Path) -> None:
     paths = (tmp_path / "lockstep", tmp_path / "realtime")
     process = subprocess.Popen(
