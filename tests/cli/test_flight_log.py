@@ -49,6 +49,7 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out / "flight.ulg"
 
 
+@pytest.mark.long
 def test_the_same_seed_is_the_same_file_at_any_speed_on_a_busy_machine(log: Path) -> None:
     gcs = f"--gcs=udp:127.0.0.1:{free_port()}"
     flight = start(*FLIGHT, gcs, "--out", "two", "--speed", "1", cwd=log.parent.parent)

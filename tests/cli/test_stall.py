@@ -71,7 +71,9 @@ NOT_SENT = r"FAIL fsw: the simulator sent nothing for .* after step \d{3,}; sitl
         in_long(("--speed", "1"), "fsw", signal.SIGKILL, KILLED),
         # In the air the simulator ends at once: a wait would let the vehicle fall.
         in_long(("--realtime",), "fsw", signal.SIGSTOP, r"FAIL .* silent since step \d{3,}"),
-        (("--realtime",), "fsw", signal.SIGKILL, r"FAIL fsw .* -9.* silent since step \d{3,}"),
+        in_long(
+            ("--realtime",), "fsw", signal.SIGKILL, r"FAIL fsw .* -9.* silent since step \d{3,}"
+        ),
         (("--realtime",), "sitl", signal.SIGSTOP, NOT_SENT),
     ],
 )
