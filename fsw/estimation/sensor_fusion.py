@@ -85,12 +85,6 @@ class FusionMemory(NamedTuple):
                 return one
         return Health(sensor)
 
-    def came(self, sensor: Sensor) -> float:
-        """When a reading of a sensor came last [s]; negative: never."""
-        if sensor is Sensor.IMU:
-            return self.imu_came
-        return self.joints_came if sensor is Sensor.ENCODERS else self.of(sensor).came
-
     def noting(self, health: Health) -> FusionMemory:
         """The memory with the health of one sensor renewed."""
         others = [one for one in self.health if one.sensor is not health.sensor]

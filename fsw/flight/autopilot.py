@@ -31,6 +31,7 @@ from fsw.flight.safe_set import SafeSetCheck
 from fsw.flight.safety_watch import SafetyWatch
 from fsw.flight.sensed_state import SensedState
 from fsw.flight.state import FlightState, PlanMemory
+from fsw.flight.uncertain_clearance import widened
 from fsw.model.battery import drained
 from fsw.model.body import body_of
 from fsw.model.nominal import REST_INPUT
@@ -110,8 +111,9 @@ class Autopilot:
         """Everything the vehicle does at one instant: the next state, and everything it says."""
         now_us = inputs.sensors.t_us
         texts: list[StatusText] = []
-        if inputs.samples or state.fusion is not None:
-            state, estimate = self._sensed.estimate(state, inputs, texts)
+        fusion = state.fusion
+        if inputs.samples or fusion is not None:
+            state, fusion, estimate = self._sensed.estimate(state, inputs, texts)
         else:
             state, estimate = _estimate(state, inputs)
         state = self._receive(state, inputs, texts)
@@ -166,7 +168,7 @@ class Autopilot:
             state.battery,
             state.arming_refusal,
             safety,
-            state.fusion,
+            fusion,
         )
         snapshot = _snapshot(state, estimate, u, inputs)
         return state, TickOutputs(
@@ -227,11 +229,20 @@ class Autopilot:
             t_apply_us=apply_us,
             start=start,
             targets=targets,
-            safe_set=state.mission.safe_set,
+            safe_set=self._kept_clear(state, estimate),
             from_nominal=from_nominal,
             joint_targets=joints,
         )
         return state, request, requested(plan, apply_us)
+
+    def _kept_clear(self, state: FlightState, estimate: StateEstimate) -> SafeSet:
+        """The safe set in force; its clearances grow with what the estimator does not know."""
+        safe_set, sigmas = state.mission.safe_set, self.config.limits.clearance_sigmas
+        if state.fusion is None or not safe_set.zones or not sigmas > 0.0:
+            return safe_set
+        covariance = self._sensed.covariance(state.fusion)
+        links = self.config.airframe.link_length
+        return widened(safe_set, estimate, covariance, sigmas, links)
 
     def _report_slowly(
         self, state: FlightState, estimate: StateEstimate, now_us: int

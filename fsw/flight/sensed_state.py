@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from fsw.control.cascade import Cascade, in_hover
+from fsw.estimation.error_state import Array
 from fsw.estimation.sensor_fault import Sensor, SensorFault, sentence
 from fsw.estimation.sensor_fusion import FusionMemory, Reset, SensorFusion, at_start
 from fsw.estimation.tuning import EstimatorTuning
@@ -14,7 +15,7 @@ from fsw.geometry.vectors import add_scaled, norm
 from fsw.model.airframe import AIRFRAME
 from fsw.signals import Severity, StateEstimate, StatusText, TickInputs
 
-_EVERY_TICK = (Sensor.IMU, Sensor.ENCODERS)
+_CHECKED_US = 100_000  # between checks for silent sensors
 _QUIET = 10.0  # s without a fault until the same one is reported again
 
 
@@ -31,9 +32,13 @@ class SensedState:
         estimate = self._fusion.warm_up()
         self._cascade.joint_acceleration(in_hover(AIRFRAME, estimate), estimate)
 
+    def covariance(self, memory: FusionMemory) -> Array:
+        """Covariance (17, 17) [SI] of the error of the last tick's estimate."""
+        return self._fusion.covariance(memory, memory.now)
+
     def estimate(
         self, state: FlightState, inputs: TickInputs, texts: list[StatusText]
-    ) -> tuple[FlightState, StateEstimate | None]:
+    ) -> tuple[FlightState, FusionMemory, StateEstimate | None]:
         """The estimate of this tick, or the last one while there is none; appends to ``texts``."""
         before = state.fusion or at_start()
         now = 1e-6 * inputs.sensors.t_us
@@ -43,31 +48,26 @@ class SensedState:
         memory, estimate = self._fusion.step(before, inputs.samples, now, pushed)
         if memory.health is not before.health:
             _report(before, memory, now, texts)
-        self._report_silence(memory, before.now, now, texts)
+        if inputs.sensors.t_us // _CHECKED_US != state.t_us // _CHECKED_US:
+            self._report_silence(memory, now, texts)
         if memory.reset.number != before.reset.number:
             texts.append(StatusText(Severity.WARNING, _told(memory.reset)))
             state = _jumped(state, memory.reset)
         if estimate is None:
             state = replace(state, fusion=memory, invalid_ticks=state.invalid_ticks + 1)
-            return state, state.estimate
-        return replace(state, fusion=memory, invalid_ticks=0), estimate
+            return state, memory, state.estimate
+        if state.invalid_ticks:
+            state = replace(state, invalid_ticks=0)
+        return state, memory, estimate
 
-    def _report_silence(
-        self, memory: FusionMemory, before: float, now: float, texts: list[StatusText]
-    ) -> None:
-        """Report sensors that have just been silent for too long."""
-        for sensor in _EVERY_TICK:
-            self._silent(sensor, memory.came(sensor), (before, now), texts)
-        for health in memory.health:
-            if health.sensor not in _EVERY_TICK:
-                self._silent(health.sensor, health.came, (before, now), texts)
-
-    def _silent(
-        self, sensor: Sensor, came: float, times: tuple[float, float], texts: list[StatusText]
-    ) -> None:
-        before, now = times
-        if came >= 0.0 and before - came <= self._stale < now - came:
-            texts.append(StatusText(Severity.WARNING, sentence(sensor, SensorFault.STALE)))
+    def _report_silence(self, memory: FusionMemory, now: float, texts: list[StatusText]) -> None:
+        """Report sensors that have been silent for too long since the last check."""
+        times = [(Sensor.IMU, memory.imu_came), (Sensor.ENCODERS, memory.joints_came)]
+        times += [(health.sensor, health.came) for health in memory.health]
+        for sensor, came in times:
+            silent = now - came - self._stale
+            if came >= 0.0 and 0.0 < silent <= 1e-6 * _CHECKED_US:
+                texts.append(StatusText(Severity.WARNING, sentence(sensor, SensorFault.STALE)))
 
 
 def _report(

@@ -53,6 +53,7 @@ class FlightLimits:
     battery_emergency: float = 0.05
     low_battery_action: int = 0  # 0 warn; 2 land when critical; 3 return then, land in emergency
     safe_set_owner: int = 0  # MAVLink system that owns the safe set; 0: the first to announce one
+    clearance_sigmas: float = 3.0  # standard deviations of a point, kept from zones besides
     breach_action: int = 6  # of the safe set: 1 warn, 2 hold, 5 land, 6 retreat and hold
     owner_timeout_us: int = 10_000_000  # a silent owner may be replaced on the ground
 

@@ -290,6 +290,8 @@ _ROWS: Final[dict[str, list[_Row]]] = {
          "MAVLink system that owns the safe set and may grow it in flight; 0: the first one"),
         ("SAFE_BREACH_ACT", "limits.breach_action", "", 1.0, 6.0,
          "Action when the vehicle is outside its safe set"),
+        ("SAFE_SIGMAS", "limits.clearance_sigmas", "", 0.0, 6.0,
+         "Standard deviations of the estimate that clearances grow by"),
         ("SAFE_FILTER", "safety_filter.enabled", "", 0.0, 1.0,
          "Filter of the acceleration that the loops are about to realise"),
         ("SAFE_FLT_GAMMA", "safety_filter.gamma", "1/s", 0.1, 20.0,
