@@ -12,7 +12,8 @@ from sitl.plant.vector import V4
 from sitl.scenario import ActuatorKeys
 
 _MERIT = 0.5  # figure of merit 0.65, motor and controller 0.8
-_FREE_SPEED = 6.0  # rad/s, of a joint's motor without load
+# kg·m², of a joint's motor behind its gear: some 2e-8 of a small coreless one, and 353 to 1.
+_MOTOR_INERTIA = 0.0025
 
 
 class Drives:
@@ -28,9 +29,9 @@ class Drives:
         self.battery = (
             Battery(keys.battery_a_h, keys.battery_ohm) if keys.battery_a_h > 0.0 else None
         )
-        gap, torque_max = math.radians(keys.backlash_deg), vehicle.joints.torque_max
+        gap = math.radians(keys.backlash_deg)
         joints = len(vehicle.links) if gap > 0.0 else 0
-        self._gears = [Backlash(gap, _FREE_SPEED, torque_max) for _ in range(joints)]
+        self._gears = [Backlash(gap, _MOTOR_INERTIA) for _ in range(joints)]
 
     def rotors(self, command: V4, thrust: V4) -> V4:
         """What of a ``command`` [N] takes effect now [N]; the rotors give ``thrust`` [N]."""

@@ -24,7 +24,7 @@ from sitl.plant.state import ARM, P_WB, Q_WB, THRUST, V_WB, W_WB_B
 from sitl.plant.vector import Array
 from sitl.result import EndKind, EndReason, TruthResult
 from sitl.scenario import V3, ActuatorKeys, Scenario, Sensors
-from sitl.scenario_file import PERFECT, ScenarioError
+from sitl.scenario_file import ScenarioError
 from sitl.scenario_validation import check
 from sitl.sensors.exact import V4, ExactSensors, SensorReadings
 from sitl.sensors.keys import MeasuredSensors
@@ -129,12 +129,6 @@ class Simulation:
     def time_s(self) -> float:
         """Seconds since the start of the simulation."""
         return 1e-6 * STEP_US * self.step
-
-    @property
-    def suite(self) -> str:
-        """Name of the suite of sensors."""
-        sensors = self.scenario.sensors
-        return sensors.suite if isinstance(sensors, MeasuredSensors) else PERFECT
 
     @property
     def ended(self) -> EndReason | None:

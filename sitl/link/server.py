@@ -73,9 +73,7 @@ def serve(
     while simulation.ended is None:
         readings = simulation.sense()
         state, messages = pilot.speak(plan, state, readings.t_us)
-        ahead, datagram = _datagrams(simulation, encoder, messages)
-        for one in ahead:
-            exchange.send_ahead(one)
+        datagram = _datagram(simulation, encoder, messages, exchange)
         try:
             answer = exchange.step(
                 simulation.step, readings.t_us, datagram, lambda: truth(simulation)
@@ -106,15 +104,22 @@ def serve(
     return RunTiming(simulation.step, wall_s, simulation.time_s / max(wall_s, 1e-9))
 
 
-def _datagrams(
-    simulation: Simulation, encoder: StepEncoder, messages: tuple[PilotMessage, ...]
-) -> tuple[list[bytes], bytes]:
-    """What goes ahead of this step, and the step's own datagram."""
+def _datagram(
+    simulation: Simulation,
+    encoder: StepEncoder,
+    messages: tuple[PilotMessage, ...],
+    exchange: Exchange,
+) -> bytes:
+    """The datagram of this step; what has no room in it is sent ahead."""
     heartbeat = encoder.heartbeat() if simulation.step % _HEARTBEAT_STEPS == 0 else b""
     measured = simulation.measurements()
     if measured is None:
-        return [], heartbeat + encoder.datagram(simulation.sense(), messages)
-    return encoder.measured_datagrams(simulation.t_us, measured, messages, heartbeat)
+        return heartbeat + encoder.datagram(simulation.sense(), messages)
+    t_us = simulation.t_us
+    ahead, datagram = encoder.measured_datagrams(t_us, measured, messages, heartbeat)
+    for one in ahead:
+        exchange.send_ahead(one)
+    return datagram
 
 
 def shut_down(endpoint: PeerSocket, encoder: StepEncoder, tries: int) -> bool:

@@ -134,3 +134,15 @@ def test_a_flight_with_everything_is_the_same_twice() -> None:
         ),
     )  # fmt: skip
     assert flown(everything, 100).state_bytes() == flown(everything, 100).state_bytes()
+
+
+def test_backlash_keeps_the_torque_from_a_link_until_the_gap_is_crossed() -> None:
+    loose = replace(AIRBORNE, actuators=ActuatorKeys(backlash_deg=1.0))
+    rates = []
+    for scenario in (AIRBORNE, loose):
+        simulation = Simulation(scenario, 0)
+        for _ in range(2):
+            simulation.advance(Controls((0.5,) * 4, (0.1, 0.0), armed=True))
+        rates.append(state(simulation)[ARM + 2])
+    assert rates[0] > 0.01
+    assert abs(rates[1]) < 0.1 * rates[0]
