@@ -16,7 +16,7 @@ from fsw.flight.safe_set_change import growth, is_moving, is_update, summary
 from fsw.flight.state import MissionMemory
 from fsw.model.body import body_of
 from fsw.mpc.reference import still_at
-from fsw.parameters.consistency import Finding, analyse, loop_tube, refusals, warnings
+from fsw.parameters.consistency import Finding, analyse, loop_tube, part_tube, refusals, warnings
 from fsw.parameters.flight_config import FlightConfig
 from fsw.shapes import kind_of
 from fsw.shapes.half_space import wall
@@ -45,6 +45,7 @@ class SafeSetCheck:
     def __init__(self, config: FlightConfig) -> None:
         self._config = config
         self.loop_tube = loop_tube(config)
+        part_tube(config)  # takes a moment, and is then known
         planner, airframe = config.planner, config.airframe
         body = body_of(planner.body, airframe)
         links = airframe.link_length
