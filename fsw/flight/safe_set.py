@@ -216,16 +216,17 @@ class SafeSetCheck:
     def hold_silent_zones(self, mission: MissionMemory, now_us: int) -> MissionMemory:
         """Let zones stand whose announcements have stopped, where they are predicted to be then.
 
-        What is predicted longer than that is a guess, and one that leaves the vehicle's way free.
+        What is predicted longer than that is a guess, and one that leaves the vehicle's way free. A
+        time stamp that far ahead is of another clock: the zone stands where its numbers say.
         """
         timeout_us = self._config.limits.zone_timeout_us
         zones = mission.announced.zones
-        silent = [is_moving(zone) and now_us - zone.t_us >= timeout_us for zone in zones]
+        silent = [is_moving(zone) and abs(now_us - zone.t_us) >= timeout_us for zone in zones]
         if not any(silent):
             return mission
         held = SafeSet(
             tuple(
-                _held(zone, timeout_us) if stops else zone
+                _held(zone, timeout_us if now_us > zone.t_us else 0) if stops else zone
                 for zone, stops in zip(zones, silent, strict=True)
             )
         )

@@ -261,6 +261,14 @@ def test_a_moving_zone_that_is_silent_too_long_is_held_where_it_is_predicted_the
     assert told(texts)[-1].endswith(": 1 half-space, 1 vertical cylinder")
 
 
+def test_a_moving_zone_with_the_stamp_of_another_clock_stands_where_its_numbers_say() -> None:
+    """A station's Unix time; predicted back by it, the zone would be nowhere near."""
+    memory, _ = received(MissionMemory(), SafeSet((walker(1_700_000_000_000_000),)))
+    (stands,) = CHECK.hold_silent_zones(memory, 1_000_000).safe_set.zones
+    assert stands.shape == walker(0).shape
+    assert stands.velocity == (0.0, 0.0, 0.0)
+
+
 def test_a_repetition_of_the_owner_does_not_take_back_what_another_source_shrank() -> None:
     memory, _ = received(MissionMemory(), walled(5.0, 5.0))
     memory, _ = received(memory, walled(3.0, 5.0), source=STRANGER)
