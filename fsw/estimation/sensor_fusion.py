@@ -76,6 +76,7 @@ class FusionMemory(NamedTuple):
     now: float = -1.0  # s, of the last tick; negative: there was none
     imu_came: float = -1.0  # s, when a reading came last; negative: never
     joints_came: float = -1.0
+    gnss: GnssSample | None = None  # the newest one
     delay: float = 0.0  # s, that measurements have lately taken
 
     def of(self, sensor: Sensor) -> Health:
@@ -221,6 +222,8 @@ class SensorFusion:
         memory = memory.noting(health)
         if fault:
             return memory
+        if isinstance(sample, GnssSample):
+            memory = memory._replace(gnss=sample)
         waiting = (*memory.waiting, Waiting(time, memory.arrivals, sample))
         if len(waiting) > 1 and waiting[-2].time > time:
             waiting = tuple(sorted(waiting))
@@ -293,7 +296,9 @@ class SensorFusion:
         ratio = self._fuse[type(sample)](memory, sample)
         fused = health.fused or (now,) * len(ratio)
         fused = tuple([now if r <= 1.0 else before for r, before in zip(ratio, fused, strict=True)])
-        health = health._replace(ratio=ratio, fused=fused)
+        innovation = memory.numbers["innovation"][0].ravel().tolist()
+        shown = tuple(innovation if len(ratio) > 1 else innovation[:1])
+        health = health._replace(ratio=ratio, fused=fused, innovation=shown)
         if max(ratio) > 1.0:
             health = health.with_fault(SensorFault.JUMP, now)
         counted = sample.reset_counter if isinstance(sample, PoseSample) else memory.reset_counter

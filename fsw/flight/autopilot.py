@@ -140,6 +140,8 @@ class Autopilot:
                 )
                 safety = replace(safety, replan=False) if safety.replan else safety
             state = self._report_slowly(state, estimate, now_us)
+            if state.fusion is not None:
+                state = replace(state, estimator=self._sensed.report(state.fusion, estimate))
             safety = self._watch.breach(safety, estimate, state.constraints, flies=flown)
         sent, memory, replaced, (pushed, margin) = self._actuate(state, estimate, nominal, u, ticks)
         if pushed or safety.filter_us >= 0:
@@ -167,6 +169,7 @@ class Autopilot:
             state.arming_refusal,
             safety,
             state.fusion,
+            state.estimator,
         )
         snapshot = _snapshot(state, estimate, u, inputs)
         return state, TickOutputs(
@@ -351,6 +354,7 @@ def _snapshot(
         goal.orbit if vehicle.mode is Mode.ORBIT and goal is not None else None,
         inputs.sensors.accel_B,
         state.safety.counters,
+        state.estimator,
     )
 
 

@@ -8,11 +8,12 @@ from fsw.control.cascade import Cascade, in_hover
 from fsw.estimation.sensor_fault import Sensor, SensorFault, sentence
 from fsw.estimation.sensor_fusion import FusionMemory, Reset, SensorFusion, at_start
 from fsw.estimation.tuning import EstimatorTuning
+from fsw.flight.estimator_report import estimator_report
 from fsw.flight.state import FlightState
 from fsw.geometry.rotation import matrix_from_quaternion, wrap_angle, yaw_of
 from fsw.geometry.vectors import add_scaled, norm
 from fsw.model.airframe import AIRFRAME
-from fsw.signals import Severity, StateEstimate, StatusText, TickInputs
+from fsw.signals import EstimatorReport, Severity, StateEstimate, StatusText, TickInputs
 
 _EVERY_TICK = (Sensor.IMU, Sensor.ENCODERS)
 _QUIET = 10.0  # s without a fault until the same one is reported again
@@ -51,6 +52,13 @@ class SensedState:
             state = replace(state, fusion=memory, invalid_ticks=state.invalid_ticks + 1)
             return state, state.estimate
         return replace(state, fusion=memory, invalid_ticks=0), estimate
+
+    def report(self, memory: FusionMemory, estimate: StateEstimate) -> EstimatorReport | None:
+        """What the estimator says about itself now; None before it has started."""
+        if not memory.started:
+            return None
+        covariance = self._fusion.covariance(memory, memory.now)
+        return estimator_report(memory, covariance, estimate, memory.now, self._stale)
 
     def _report_silence(
         self, memory: FusionMemory, before: float, now: float, texts: list[StatusText]

@@ -20,6 +20,7 @@ from fsw.signals import (
     BatteryState,
     ConstraintReport,
     EndEffectorTarget,
+    EstimatorReport,
     Home,
     JointSetpoint,
     MessageSource,
@@ -184,3 +185,4 @@ class FlightState:
     arming_refusal: str = ""
     safety: SafetyMemory = field(default_factory=SafetyMemory)
     fusion: FusionMemory | None = None  # where sensors have times of their own
+    estimator: EstimatorReport | None = None  # what telemetry says of it, once a planning period

@@ -92,9 +92,27 @@ def battery_status(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues:
 
 
 def estimator_status(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues:
-    """ESTIMATOR_STATUS: what is known. There is no filter, hence no innovation to report."""
-    invalid = Condition.ESTIMATE_INVALID.value in snapshot.failures
-    return (snapshot.t_us, *(math.nan,) * 8, 0 if invalid else _ESTIMATED)
+    """ESTIMATOR_STATUS: test ratios of the last readings, accuracy, and what is known.
+
+    With exact states there is no filter, hence no innovation to report.
+    """
+    known = snapshot.estimator
+    if known is None:
+        invalid = Condition.ESTIMATE_INVALID.value in snapshot.failures
+        return (snapshot.t_us, *(math.nan,) * 8, 0 if invalid else _ESTIMATED)
+    ratios = known.ratios
+    return (
+        known.t_us,
+        ratios.velocity,
+        ratios.place,
+        ratios.height,
+        ratios.heading,
+        ratios.above_ground,
+        math.nan,
+        known.level_accuracy,
+        known.vertical_accuracy,
+        known.flags,
+    )
 
 
 def vibration(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues:
