@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import field
+from typing import Final, NamedTuple
 
 from fsw.control.cascade import CascadeMemory
 from fsw.control.tracking import Observed
+from fsw.estimation.frame_trust import FrameTrust
+from fsw.estimation.sensor_fault import Sensor, SensorFault
 from fsw.estimation.sensor_fusion import FusionMemory
 from fsw.flight.command_dedup import AnsweredCommand
 from fsw.flight.failsafe import Condition
@@ -157,6 +161,30 @@ class SafetyMemory:
     counters: SafetyCounters = field(default_factory=SafetyCounters)
 
 
+class Aiding(NamedTuple):
+    """What keeps the estimate from drifting, and what of it is missing."""
+
+    unaided_us: int = 0  # since a position was used last
+    pose: Sensor = Sensor.POSE  # that gives positions
+    pose_fault: SensorFault = SensorFault.STALE
+    position_sigma: float = 0.0  # m, of the worst axis
+    attitude_sigma: float = 0.0  # rad, of roll and pitch
+    sensor: Sensor | None = None  # another one that is of no use
+    fault: SensorFault = SensorFault.NONE  # of that
+    since_us: int = 0
+
+
+AIDED: Final = Aiding()
+
+
+class EncoderWatch(NamedTuple):
+    """Whether the joints' encoders still follow the joints."""
+
+    angles: Vec2 = (math.nan, math.nan)  # rad, the last reading
+    repeats: int = 0  # readings in a row that were the same
+    stuck: bool = False
+
+
 @dataclass(frozen=True, slots=True)
 class FlightState:
     """Everything a tick starts from; the upper half changes every tick, the lower rarely."""
@@ -186,3 +214,6 @@ class FlightState:
     safety: SafetyMemory = field(default_factory=SafetyMemory)
     fusion: FusionMemory | None = None  # where sensors have times of their own
     estimator: EstimatorReport | None = None  # what telemetry says of it, once a planning period
+    aiding: Aiding = AIDED
+    trust: FrameTrust = FrameTrust()  # where states are exact
+    encoders: EncoderWatch = EncoderWatch()  # where they are not

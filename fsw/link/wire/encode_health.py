@@ -25,6 +25,11 @@ _SUSPECT: Final[dict[str, int]] = {
     Condition.PLAN_STALE.value: _POSITION | _HEIGHT,
     Condition.OUTPUT_NOT_FINITE.value: _MOTORS,
     Condition.ESTIMATE_INVALID.value: _SENSING,
+    Condition.ATTITUDE_LOST.value: _ATTITUDE | _RATE_CONTROL | _AHRS,
+    Condition.POSITION_LOST.value: _PLACE | _EXTERNAL_POSE | _POSITION | _HEIGHT,
+    Condition.POSITION_LOW.value: _PLACE | _EXTERNAL_POSE,
+    Condition.AIDING_LOST.value: _EXTERNAL_POSE,
+    Condition.SENSOR_LOST.value: _GYRO | _ACCELEROMETER,
     Condition.TILT_LOST.value: _ATTITUDE | _RATE_CONTROL,
 }
 # MAV_BATTERY_CHARGE_STATE: 0 is undefined, OK is 1.
