@@ -54,6 +54,8 @@ _MEASURED_STEP: Final = LockstepReader((message_ids.JOINT_ENCODERS, 3), (message
 _FLAGS_AT: Final = -3
 _INERTIAL: Final = 0x3F
 _SENSOR_AT: Final = 15  # place of HIL_SENSOR's id; the step's clock has 0
+_FARTHEST_US: Final = 2_000_000  # from one step to the next; a silence of 1.2 s ends the flight
+_LAST_US: Final = 1 << 62  # no clock says so
 _LOCKSTEP_BIT, _MEASURED_BIT = 1, 2  # of the custom_mode in the simulator's HEARTBEAT
 _NO_VECTOR: Final = (math.nan, math.nan, math.nan)
 _NO_ATTITUDE: Final = (math.nan, math.nan, math.nan, math.nan)
@@ -82,6 +84,7 @@ class SimLink:
         self._thrust_scale = 1.0 / facts.rotor_thrust_max
         self._torque_scale = 1.0 / facts.joint_torque_max
         self._last_us = -1  # time of the newest step seen
+        self._ahead_us = _LAST_US  # of one that was too far ahead of it
         self._answer: tuple[int, bytes] = (-1, b"")
         self._acks: list[CommandAck] = []
         self._text_id = 0
@@ -182,8 +185,7 @@ class SimLink:
     ) -> SensorFrame | None:
         """The sensors of a step that is whole and not known yet; a known one is answered again."""
         t_us = int(barrier[0])
-        if t_us <= self._last_us:
-            self._repeat(t_us)
+        if not self._is_next(t_us):
             return None
         if odometry is None or arm is None:
             return None
@@ -192,8 +194,7 @@ class SimLink:
 
     def _new_measured(self, t_us: int, samples: list[Sample]) -> SensorFrame | None:
         """The time of a new step, whose samples are in the inbox; a known one is answered again."""
-        if t_us <= self._last_us:
-            self._repeat(t_us)
+        if not self._is_next(t_us):
             return None
         self._last_us = t_us
         self._inbox.accept_samples(samples)
@@ -208,6 +209,23 @@ class SimLink:
             q_arm=_NO_JOINTS,
             qd_arm=_NO_JOINTS,
         )
+
+    def _is_next(self, t_us: int) -> bool:
+        """Whether a step is a new one; a known one is answered again.
+
+        One far ahead is believed when the next one goes on from there: believed at once, a single
+        wrong stamp would make all that follow seem to be known.
+        """
+        if t_us <= self._last_us:
+            self._repeat(t_us)
+            return False
+        if self._last_us < 0 and t_us < _LAST_US:
+            return True
+        if t_us - self._last_us <= _FARTHEST_US or 0 < t_us - self._ahead_us <= _FARTHEST_US:
+            self._ahead_us = _LAST_US
+            return True
+        self._ahead_us = t_us if t_us < _LAST_US else self._ahead_us
+        return False
 
     def _repeat(self, t_us: int) -> None:
         answered_us, answer = self._answer
