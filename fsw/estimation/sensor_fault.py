@@ -14,7 +14,7 @@ class Sensor(Enum):
     BAROMETER = "barometer"
     MAGNETOMETER = "magnetometer"
     RANGEFINDER = "rangefinder"
-    ENCODERS = "joint encoders"
+    ENCODERS = "joint encoder"
 
 
 class SensorFault(IntEnum):

@@ -40,6 +40,7 @@ from fsw.signals import StateEstimate, Vec2, Vec3, Vec4
 
 LATE: Final = 0.01  # s behind the filter, where a measurement is still fused as it stands
 _MARGIN: Final = 0.003  # s, by which a measurement may take longer than lately
+_STUCK_JOINT: Final = 0.05  # rad that a joint is asked to move without being seen to
 _LONGEST_STEP: Final = 0.05  # s, by which joints are predicted at once
 _REST: Vec3 = (0.0, 0.0, 0.0)
 _NO_TURN: Vec4 = (1.0, 0.0, 0.0, 0.0)
@@ -77,6 +78,9 @@ class FusionMemory(NamedTuple):
     imu_came: float = -1.0  # s, when a reading came last; negative: never
     joints_came: float = -1.0
     delay: float = 0.0  # s, that measurements have lately taken
+    angles: Vec2 = (math.nan, math.nan)  # rad, as the encoders said last
+    asked: Vec2 = (0.0, 0.0)  # rad, what the joints were asked for when they said so first
+    joints_stuck: bool = False
 
     def of(self, sensor: Sensor) -> Health:
         """What is known of a sensor."""
@@ -172,6 +176,23 @@ class SensorFusion:
         kernels.present_covariance(memory.numbers, self._law, now, found)
         return found
 
+    def watch_joints(self, memory: FusionMemory, before: FusionMemory, asked: Vec2) -> FusionMemory:
+        """Find encoders that stand still while the joints are asked to move, to ``asked`` [rad].
+
+        Their resolution is coarse, so that in hover they may well say the same for long. While they
+        stand still, joints are believed where they are asked to be: what holds the arm against
+        gravity there also brings it there, while the difference to a frozen angle would drive it
+        into its end stops.
+        """
+        if memory.angles != before.angles:
+            return memory._replace(asked=asked, joints_stuck=False)
+        moved = max(abs(asked[0] - memory.asked[0]), abs(asked[1] - memory.asked[1]))
+        if not memory.joints_stuck and not moved > _STUCK_JOINT:
+            return memory
+        kernels.read_joints(memory.numbers, self._law, asked, 0.0)
+        health = memory.of(Sensor.ENCODERS).with_fault(SensorFault.STUCK, memory.now)
+        return memory.noting(health)._replace(joints_stuck=True)
+
     def _copied(self, memory: FusionMemory, now: float, u: Vec2) -> FusionMemory:
         """The memory with a filter of its own, whose joints are moved on."""
         x = np.empty(1, dtype=FILTER)
@@ -192,11 +213,11 @@ class SensorFusion:
         if not (farthest < math.pi and sample.time <= now + TIME_TOLERANCE):
             health = memory.of(Sensor.ENCODERS).with_fault(SensorFault.IMPLAUSIBLE, now)
             return memory.noting(health)
-        if memory.joints_came < 0.0:
+        if memory.joints_came < 0.0 or (memory.joints_stuck and sample.angles != memory.angles):
             kernels.set_joints(memory.numbers, sample.angles)
-        else:
+        elif not memory.joints_stuck:
             kernels.read_joints(memory.numbers, self._law, sample.angles, now - sample.time)
-        return memory._replace(joints_came=now)
+        return memory._replace(joints_came=now, angles=sample.angles)
 
     def _take(self, memory: FusionMemory, sample: Aiding, now: float) -> FusionMemory:
         """Check a sample and let it wait for its time."""

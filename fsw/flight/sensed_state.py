@@ -46,6 +46,9 @@ class SensedState:
         if state.estimate is not None:
             pushed = self._cascade.joint_acceleration(state.cascade, state.estimate)
         memory, estimate = self._fusion.step(before, inputs.samples, now, pushed)
+        if state.vehicle.flies:
+            asked = state.cascade.joints.reference
+            memory = self._fusion.watch_joints(memory, before, asked)
         if memory.health is not before.health:
             _report(before, memory, now, texts)
         if inputs.sensors.t_us // _CHECKED_US != state.t_us // _CHECKED_US:

@@ -56,6 +56,7 @@ class FlightLimits:
     clearance_sigmas: float = 3.0  # standard deviations of a point, kept from zones besides
     breach_action: int = 6  # of the safe set: 1 warn, 2 hold, 5 land, 6 retreat and hold
     owner_timeout_us: int = 10_000_000  # a silent owner may be replaced on the ground
+    zone_timeout_us: int = 3_000_000  # a moving zone that is not announced for this long stands
 
 
 @dataclass(frozen=True, slots=True)
