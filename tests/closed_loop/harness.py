@@ -74,8 +74,8 @@ def as_sampled(_step: int, samples: tuple[Sample, ...]) -> tuple[Sample, ...]:
 class Flight:
     """One flight, step by step; all status texts are kept.
 
-    ``spoil`` and ``spoil_samples`` stand between sensors and flight software, ``late_ticks`` says by
-    how many ticks each plan comes after its time.
+    ``spoil`` and ``spoil_samples`` stand between sensors and flight software, ``late_ticks`` says
+    by how many ticks each plan comes after its time.
     """
 
     scenario: Scenario
