@@ -24,7 +24,7 @@ from pandion.result import FlightReports, as_json, table_rows
 from pandion.supervisor import Flown, ProcessFailed, Supervisor
 from sitl.arguments import RunOptions, SitlOptions
 from sitl.earth import Place
-from sitl.scenario_file import ScenarioError, load_scenario, scenario_digest
+from sitl.scenario_file import ScenarioError, load_scenario, scenario_digest, suite_of
 
 COMPLETED, NOT_COMPLETED = 0, 1  # exit codes
 # The flight software compiles when it is started for the first time; the supervisor ends the wait
@@ -49,6 +49,7 @@ class PlannedFlight:
 
     options: FlyOptions
     name: str  # of the scenario
+    sensors: str  # suite
     body: str  # that the scenario is for
     digest: str  # of the scenario's file
     duration_s: float
@@ -91,6 +92,7 @@ def planned(options: FlyOptions) -> PlannedFlight:
     return PlannedFlight(
         options=options,
         name=scenario.name,
+        sensors=suite_of(scenario),
         body=scenario.body,
         digest=scenario_digest(options.scenario),
         duration_s=scenario.duration_s if options.duration_s is None else options.duration_s,
@@ -104,7 +106,7 @@ def _banner(flight: PlannedFlight, display: Display) -> None:
     endless = math.isinf(flight.duration_s)
     length = "until interrupted" if endless else f"{flight.duration_s:g} s"
     display.say(
-        f"Pandion {version()}: {flight.name}, seed {options.seed}, "
+        f"Pandion {version()}: {flight.name}, seed {options.seed}, {flight.sensors} sensors, "
         f"{length}, {options.control.controller} controller, {pacing}"
     )
     port = parse_address(options.links.gcs)[1]

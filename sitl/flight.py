@@ -21,6 +21,7 @@ from sitl.link.server import RunTiming, serve, shut_down
 from sitl.link.udp_endpoint import PeerSocket
 from sitl.result import EndKind, TruthResult
 from sitl.scenario import Scenario
+from sitl.scenario_file import suite_of
 from sitl.simulation import START_US, STEP_US, Controls, Simulation
 from sitl.trajectory import TrajectoryPoint
 from sitl.truth_log import TruthLog
@@ -148,7 +149,7 @@ class Flight:
         return {
             "scenario": self._simulation.scenario.name,
             "seed": self._options.seed,
-            "sensors": self._simulation.suite,
+            "sensors": suite_of(self._simulation.scenario),
             **dataclasses.asdict(result),
             "end_kind": None
             if self._simulation.ended is None

@@ -213,6 +213,31 @@ class VehicleScale:
 
 
 @dataclass(frozen=True, slots=True)
+class AirKeys:
+    """Real air; still, and felt by nothing but the rotors, by default."""
+
+    wind_m_s: Annotated[V3, Range(-30.0, 30.0)] = (0.0, 0.0, 0.0)  # NED, where the air goes
+    turbulence_m_s: Annotated[float, Range(0.0, 40.0)] = 0.0  # wind at 20 ft of MIL-F-8785C
+    turbulence_height_m: Annotated[float, Range(3.048, 304.8)] = 3.048
+    rotor_drag_1_s: Annotated[V3, Range(0.0, 5.0)] = (0.0, 0.0, 0.0)  # per mass, body axes
+    body_drag_m2: Annotated[float, Range(0.0, 1.0)] = 0.0  # drag coefficient times area
+    ground_effect: bool = False
+    ceiling_effect: bool = False
+    wall_suction: Annotated[float, Range(0.0, 0.5)] = 0.0  # of the thrust, where blades touch
+
+
+@dataclass(frozen=True, slots=True)
+class ActuatorKeys:
+    """Real actuators; ideal by default, but for what the vehicle always has."""
+
+    quadratic_thrust: bool = False  # the rotor's speed lags, and thrust is its square
+    dead_time_ms: Annotated[float, Range(0.0, 100.0, step=2.0)] = 0.0  # of the motor controllers
+    battery_a_h: Annotated[float, Range(0.0, 100.0)] = 0.0  # 0: a source that never sags
+    battery_ohm: Annotated[float, Range(0.0, 1.0)] = 0.02
+    backlash_deg: Annotated[float, Range(0.0, 5.0)] = 0.0  # of each joint's gear
+
+
+@dataclass(frozen=True, slots=True)
 class Scenario:
     """One flight."""
 
@@ -231,3 +256,5 @@ class Scenario:
     disturbances: tuple[Disturbance, ...] = ()
     sensors: Sensors | MeasuredSensors = Sensors()
     vehicle_scale: VehicleScale = VehicleScale()
+    air: AirKeys = AirKeys()
+    actuators: ActuatorKeys = ActuatorKeys()

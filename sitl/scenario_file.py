@@ -44,6 +44,12 @@ def load_scenario(name_or_path: str, suite: str | None = None) -> Scenario:
         raise ScenarioError(f"scenario {path} is not TOML: it is not UTF-8") from error
 
 
+def suite_of(scenario: Scenario) -> str:
+    """Name of the suite of sensors that a scenario is flown with."""
+    sensors = scenario.sensors
+    return sensors.suite if isinstance(sensors, MeasuredSensors) else PERFECT
+
+
 def scenario_digest(name_or_path: str) -> str:
     """First digits of the SHA-256 of the file; they differ if two scenarios of one name differ.
 

@@ -9,8 +9,10 @@ from typing import NamedTuple, cast
 
 import numpy as np
 
+from sitl.air.wind import WindField
 from sitl.compiled import machine_code
 from sitl.disturbances.items import Push, push
+from sitl.drives import Drives
 from sitl.earth import DEFAULT_ORIGIN, Place
 from sitl.flight_evaluator import FlightEvaluator, critical
 from sitl.mission_clock import MissionClock
@@ -21,8 +23,8 @@ from sitl.plant.parameters import Vehicle
 from sitl.plant.state import ARM, P_WB, Q_WB, THRUST, V_WB, W_WB_B
 from sitl.plant.vector import Array
 from sitl.result import EndKind, EndReason, TruthResult
-from sitl.scenario import V3, Scenario, Sensors
-from sitl.scenario_file import PERFECT, ScenarioError
+from sitl.scenario import V3, ActuatorKeys, Scenario, Sensors
+from sitl.scenario_file import ScenarioError
 from sitl.scenario_validation import check
 from sitl.sensors.exact import V4, ExactSensors, SensorReadings
 from sitl.sensors.keys import MeasuredSensors
@@ -96,6 +98,14 @@ class Simulation:
         self._pushes += more
         self._state, trim = first_state(self.vehicle, scenario, self.clock.target_at(0.0).p)
         self._thrust, self._torque = trim.thrust, trim.torque
+        step_s = 1e-6 * STEP_US
+        self._drives: Drives | None = None
+        if scenario.actuators != ActuatorKeys(quadratic_thrust=self.vehicle.rotors.quadratic):
+            self._drives = Drives(scenario.actuators, self.vehicle, trim.thrust, step_s)
+        self._wind: tuple[WindField, Array] | None = None
+        if self.vehicle.air.active:
+            moving = cast(Array, self._plants)["air"]["wind"][0]  # type: ignore[call-overload]
+            self._wind = (WindField(scenario.air, seed, step_s), moving)
         self._sent = (0.0, 0.0)  # largest torque and thrust commanded, before any saturation
         axes = 3 if scenario.body == "full" else 0
         self._places = np.empty((SUBSTEPS, 2 + len(self.vehicle.links) + axes, 3))
@@ -119,12 +129,6 @@ class Simulation:
     def time_s(self) -> float:
         """Seconds since the start of the simulation."""
         return 1e-6 * STEP_US * self.step
-
-    @property
-    def suite(self) -> str:
-        """Name of the suite of sensors."""
-        sensors = self.scenario.sensors
-        return sensors.suite if isinstance(sensors, MeasuredSensors) else PERFECT
 
     @property
     def ended(self) -> EndReason | None:
@@ -181,8 +185,11 @@ class Simulation:
             return None
         if self._measured[0] != self.step:
             thrust = _four(self._state[THRUST:ARM].tolist())
+            exact = self.sense()
+            if self._drives is not None:
+                exact = exact._replace(q_arm=self._drives.motor_angles(exact.q_arm))
             before = self._settled(self._suite, thrust) if self.step == 0 else []
-            self._measured = (self.step, (*before, *self._suite.step(self.sense(), thrust)))
+            self._measured = (self.step, (*before, *self._suite.step(exact, thrust)))
         return self._measured[1]
 
     def _settled(self, suite: SensorSuite, thrust: V4) -> list[Measurement]:
@@ -205,6 +212,11 @@ class Simulation:
             ValueError: A control is not finite or their number is wrong.
         """
         self._command(controls)
+        if self._drives is not None:
+            self._drive(self._drives)
+        if self._wind is not None:
+            field, moving = self._wind
+            moving[0], moving[1], moving[2] = field.step()
         arrival = self._step(
             self._plants,
             self._state,
@@ -282,6 +294,13 @@ class Simulation:
         f1, f2, f3, f4 = wanted
         self._thrust = (thrust * f1, thrust * f2, thrust * f3, thrust * f4)
         self._torque = tuple([torque * f for f in torques])
+
+    def _drive(self, drives: Drives) -> None:
+        """What of the command takes effect in this step."""
+        x: list[float] = self._state.tolist()
+        rates = tuple(x[ARM + len(self._torque) :])
+        self._thrust = drives.rotors(self._thrust, _four(x[THRUST:ARM]))
+        self._torque = drives.joints(self._torque, rates)
 
     def _disturbance(self) -> tuple[V3, V3]:
         """Force on the base [N, W] and torque [N·m, B] during this step."""

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fsw.barriers.safe_approach import BarrierTuning
-from fsw.compiled import compilable, compiled, machine_code, packed
+from fsw.compiled import compilable, compiled, kernel, machine_code, of_fixed_types, packed
 from fsw.control.allocation import allocate
 from fsw.control.arm_compensation import compensated_joints, lately_off_plan
 from fsw.control.attitude import attitude_pid, attitude_reference
@@ -26,7 +26,14 @@ from fsw.control.joints import (
     observe_disturbance,
 )
 from fsw.control.pid import PidGains
-from fsw.control.safety_filter import NO_ZONES, FilterLaw, FilterTuning, filter_law, filtered
+from fsw.control.safety_filter import (
+    NO_ZONES,
+    FilterLaw,
+    FilterTuning,
+    filter_law,
+    filter_probes,
+    filtered,
+)
 from fsw.control.tilt_limit import limited_turn
 from fsw.control.tracking import (
     Observed,
@@ -159,7 +166,6 @@ class Cascade:
             filter_law(
                 clear.tuning,
                 clear.barriers,
-                clear.body,
                 airframe.link_length,
                 gains.k[3] / gains.k[2],
                 tuning.tracking.acceleration_limit,
@@ -167,11 +173,13 @@ class Cascade:
             rotor_decay(airframe, dt),
             dt,
         )
+        self.probes = filter_probes(clear.body)
         self._packed = packed(self.law)
         memory = CascadeMemory(STOPPED.rotor_thrust, STOPPED, Observed(_NONE, _NONE), 1.0)
-        example = (self._packed, memory, _SOMEWHERE, REST_STATE, REST_INPUT, 1, NO_ZONES)
+        around = (NO_ZONES, self.probes)
+        example = (self._packed, memory, _SOMEWHERE, REST_STATE, REST_INPUT, 1, *around)
         self._close_loops = machine_code(_close_loops, *example)
-        self._joint_acceleration = machine_code(_joint_acceleration, *example[:3])
+        self._joint_acceleration = of_fixed_types(_joint_acceleration)
 
     def motion(self, memory: CascadeMemory, estimate: StateEstimate) -> MotionState:
         """Acceleration to snap right now, from the rotor model."""
@@ -182,7 +190,16 @@ class Cascade:
 
     def joint_acceleration(self, memory: CascadeMemory, estimate: StateEstimate) -> Vec2:
         """Accelerations [rad/s^2] of the joints under the torques sent last, by the model."""
-        return self._joint_acceleration(self._packed, memory, estimate)
+        return self._joint_acceleration(
+            self._packed,
+            memory.rotors,
+            memory.commanded.rotor_thrust,
+            memory.commanded.joint_torque,
+            estimate.w_WB_B,
+            estimate.q_arm,
+            estimate.qd_arm,
+            estimate.specific_force,
+        )
 
     def step(
         self,
@@ -195,7 +212,7 @@ class Cascade:
     ) -> tuple[ActuatorCommand, CascadeMemory, Guarded]:
         """See ``close_loops``, of which this is the machine code; ``zones`` (zones, k) [SI]."""
         sent, rotors, believed, mass, integrals, joints, off_plan, guarded = self._close_loops(
-            self._packed, memory, estimate, plan, u, ticks, zones
+            self._packed, memory, estimate, plan, u, ticks, zones, self.probes
         )
         command = ActuatorCommand(*sent)
         kept = CascadeMemory(
@@ -213,11 +230,13 @@ def close_loops(
     u: PlanInput,
     ticks: int,
     zones: NDArray[np.float64],
+    probes: NDArray[np.float64],
 ) -> tuple[ActuatorCommand, CascadeMemory, Guarded]:
     """One tick, or several at once where some were missed.
 
     Returns the actuator command, not yet gated, the memory to pass back after sending, and what the
-    safety filter found about the ``zones`` (zones, k) [SI], those of ``moving_zones``.
+    safety filter found: about the ``zones`` (zones, k) [SI] of ``moving_zones``, for the ``probes``
+    (probes, 12) [SI] of ``filter_probes``.
     """
     airframe, tuning, dt = law.airframe, law.tuning, law.dt
     rotors, observed = memory.rotors, memory.observed
@@ -231,7 +250,7 @@ def close_loops(
         observed = observe(observed, v, motion.a, tuning.tracking, dt)
     attitude, height, guarded = memory.attitude, memory.height, (False, math.inf)
     if zones.shape[0] > 0 and law.filter.tuning.enabled > 0:
-        plan, u, guarded = _kept_off(law, zones, estimate, motion, observed, plan, u)
+        plan, u, guarded = _kept_off(law, zones, probes, estimate, motion, observed, plan, u)
     if law.follows_plan:
         (wdx, wdy), thrust = follow_plan(
             law.tracking, mass, arm.depth, estimate, motion, observed, plan, u
@@ -279,6 +298,7 @@ def close_loops(
 def _kept_off(
     law: CascadeLaw,
     zones: NDArray[np.float64],
+    probes: NDArray[np.float64],
     estimate: StateEstimate,
     motion: MotionState,
     observed: Observed,
@@ -296,7 +316,7 @@ def _kept_off(
         asked[2],
     )
     a = add_scaled(motion.a, observed.d, 1.0)
-    safe, changed, margin = filtered(law.filter, zones, estimate, observed.v, a, wanted)
+    safe, changed, margin = filtered(law.filter, probes, zones, estimate, observed.v, a, wanted)
     if not changed:
         return plan, u, (False, margin)
     dx, dy, dz = subtract(safe, asked)
@@ -324,6 +344,7 @@ def _close_loops(
     u: PlanInput,
     ticks: int,
     zones: NDArray[np.float64],
+    probes: NDArray[np.float64],
 ) -> tuple[
     tuple[Vec4, Vec2],
     Vec4,
@@ -335,7 +356,7 @@ def _close_loops(
     Guarded,
 ]:
     """``close_loops`` that returns plain tuples, which leave machine code at half the cost."""
-    command, kept, guarded = close_loops(law[0], memory, estimate, plan, u, ticks, zones)
+    command, kept, guarded = close_loops(law[0], memory, estimate, plan, u, ticks, zones, probes)
     return (
         (command.rotor_thrust, command.joint_torque),
         kept.rotors,
@@ -353,16 +374,26 @@ def _close_loops(
     )
 
 
-@compiled
-def _joint_acceleration(laws: NDArray[Any], memory: CascadeMemory, estimate: StateEstimate) -> Vec2:
-    law = laws[0]
-    rotors = lag_rotors(memory.rotors, memory.commanded.rotor_thrust, law.rotor_decay)
-    torque = memory.commanded.joint_torque
-    motion = motion_state(law.airframe, memory.mass, estimate, rotors, torque[0])
+@kernel
+def _joint_acceleration(
+    laws: NDArray[Any],
+    rotors: Vec4,
+    commanded: Vec4,
+    torque: Vec2,
+    rate: Vec3,
+    q_arm: Vec2,
+    qd_arm: Vec2,
+    specific_force: float,
+) -> Vec2:
+    """Of the numbers that it needs alone: to hand over whole records takes longer than all else."""
+    airframe = laws[0].airframe
+    f = lag_rotors(rotors, commanded, laws[0].rotor_decay)
+    pitching = (airframe.rotor_arm * (f[2] - f[0]) - torque[0]) / airframe.inertia[1]
+    arm = StateEstimate(0, _NONE, _NONE, _LEVEL, rate, 0.0, q_arm, qd_arm, specific_force)
     # The accelerometer knows of gusts, and of the ground.
-    dynamics = arm_dynamics(law.airframe, estimate, (0.0, estimate.specific_force))
+    dynamics = arm_dynamics(airframe, arm, (0.0, specific_force))
     first, second = accelerations_of(dynamics, torque)
-    return first - motion.turning[1], second
+    return first - pitching, second
 
 
 @compilable

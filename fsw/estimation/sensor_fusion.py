@@ -62,6 +62,14 @@ class Reset(NamedTuple):
     turn: Vec4 = _NO_TURN  # new attitude times the inverse of the old one, NED
 
 
+class EncoderWatch(NamedTuple):
+    """Whether the joints' encoders still follow the joints."""
+
+    angles: Vec2 = (math.nan, math.nan)  # rad, the last reading
+    repeats: int = 0  # readings in a row that were the same
+    stuck: bool = False
+
+
 class FusionMemory(NamedTuple):
     """What the estimator carries from tick to tick."""
 
@@ -78,6 +86,7 @@ class FusionMemory(NamedTuple):
     joints_came: float = -1.0
     gnss: GnssSample | None = None  # the newest one
     delay: float = 0.0  # s, that measurements have lately taken
+    encoders: EncoderWatch = EncoderWatch()
 
     def of(self, sensor: Sensor) -> Health:
         """What is known of a sensor."""

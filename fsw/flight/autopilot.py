@@ -31,6 +31,7 @@ from fsw.flight.safe_set import SafeSetCheck
 from fsw.flight.safety_watch import SafetyWatch
 from fsw.flight.sensed_state import SensedState
 from fsw.flight.state import FlightState, PlanMemory
+from fsw.flight.uncertain_clearance import widened
 from fsw.model.battery import drained
 from fsw.model.body import body_of
 from fsw.model.nominal import REST_INPUT
@@ -112,8 +113,9 @@ class Autopilot:
         """Everything the vehicle does at one instant: the next state, and everything it says."""
         now_us = inputs.sensors.t_us
         texts: list[StatusText] = []
-        if inputs.samples or state.fusion is not None:
-            state, estimate = self._sensed.estimate(state, inputs, texts)
+        fusion = state.fusion
+        if inputs.samples or fusion is not None:
+            state, fusion, estimate = self._sensed.estimate(state, inputs, texts)
         else:
             state, estimate = self._exact.estimate(state, inputs, texts)
         state = self._receive(state, inputs, texts)
@@ -136,14 +138,16 @@ class Autopilot:
         safety = self._watch.off_plan(state.safety, estimate, nominal if flown else None)
         request = None
         if planning_due:
+            mission = self._safe_sets.hold_silent_zones(state.mission, now_us)
+            if mission is not state.mission:
+                state = replace(state, mission=mission)
             if flown and nominal is not None:
                 state, request, plan = self._request_plan(
                     state, estimate, nominal, plan, now_us, safety.replan
                 )
                 safety = replace(safety, replan=False) if safety.replan else safety
             state = self._report_slowly(state, estimate, now_us)
-            if state.fusion is not None:
-                state = self._sensed.reported(state, state.fusion, estimate)
+            state = self._sensed.reported(state, fusion, estimate)
             safety = self._watch.breach(safety, estimate, state.constraints, flies=flown)
         sent, memory, replaced, (pushed, margin) = self._actuate(state, estimate, nominal, u, ticks)
         if pushed or safety.filter_us >= 0:
@@ -170,11 +174,10 @@ class Autopilot:
             state.battery,
             state.arming_refusal,
             safety,
-            state.fusion,
+            fusion,
             state.estimator,
             state.aiding,
             state.trust,
-            state.encoders,
         )
         snapshot = _snapshot(state, estimate, u, inputs)
         return state, TickOutputs(
@@ -235,11 +238,20 @@ class Autopilot:
             t_apply_us=apply_us,
             start=start,
             targets=targets,
-            safe_set=state.mission.safe_set,
+            safe_set=self._kept_clear(state, estimate),
             from_nominal=from_nominal,
             joint_targets=joints,
         )
         return state, request, requested(plan, apply_us)
+
+    def _kept_clear(self, state: FlightState, estimate: StateEstimate) -> SafeSet:
+        """The safe set in force; its clearances grow with what the estimator does not know."""
+        safe_set, sigmas = state.mission.safe_set, self.config.limits.clearance_sigmas
+        if state.fusion is None or not safe_set.zones or not sigmas > 0.0:
+            return safe_set
+        covariance = self._sensed.covariance(state.fusion)
+        links = self.config.airframe.link_length
+        return widened(safe_set, estimate, covariance, sigmas, links)
 
     def _report_slowly(
         self, state: FlightState, estimate: StateEstimate, now_us: int

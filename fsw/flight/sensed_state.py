@@ -8,17 +8,18 @@ from dataclasses import replace
 from fsw.control.cascade import Cascade, in_hover
 from fsw.estimation import kernels
 from fsw.estimation.dead_reckoning import moved_on
-from fsw.estimation.error_state import IMU_CAPACITY
+from fsw.estimation.error_state import IMU_CAPACITY, Array
 from fsw.estimation.sensor_fault import Sensor, SensorFault, sentence
-from fsw.estimation.sensor_fusion import FusionMemory, SensorFusion, at_start
+from fsw.estimation.sensor_fusion import EncoderWatch, FusionMemory, SensorFusion, at_start
 from fsw.estimation.tuning import EstimatorTuning
 from fsw.flight.estimator_report import estimator_report, unaided
 from fsw.flight.jump import difference, jumped, told
-from fsw.flight.state import Aiding, EncoderWatch, FlightState
+from fsw.flight.state import Aiding, FlightState
 from fsw.measurements import ImuSample, JointSample, Sample
 from fsw.model.airframe import AIRFRAME
 from fsw.signals import EstimatorReport, Severity, StateEstimate, StatusText, TickInputs, Vec2
 
+_CHECKED_US = 100_000  # between checks for silent sensors
 _EVERY_TICK = (Sensor.IMU, Sensor.ENCODERS)
 _IMU_SILENT = 0.008  # s; longer than the filter takes for jitter
 _REPEATS = 6  # of encoders; a resting arm's 12 bits are the same for longer
@@ -44,9 +45,13 @@ class SensedState:
         estimate = self._fusion.warm_up()
         self._cascade.joint_acceleration(in_hover(AIRFRAME, estimate), estimate)
 
+    def covariance(self, memory: FusionMemory) -> Array:
+        """Covariance (17, 17) [SI] of the error of the last tick's estimate."""
+        return self._fusion.covariance(memory, memory.now)
+
     def estimate(
         self, state: FlightState, inputs: TickInputs, texts: list[StatusText]
-    ) -> tuple[FlightState, StateEstimate | None]:
+    ) -> tuple[FlightState, FusionMemory, StateEstimate | None]:
         """The estimate of this tick, or the last one while there is none; appends to ``texts``."""
         before = state.fusion or at_start()
         now = 1e-6 * inputs.sensors.t_us
@@ -54,13 +59,14 @@ class SensedState:
         if state.estimate is not None:
             pushed = self._cascade.joint_acceleration(state.cascade, state.estimate)
         again = _last_reading_again(before, now, inputs.samples)
-        state, started, samples = _without_stuck(state, before, inputs.samples)
+        started, samples = _without_stuck(state, before, inputs.samples)
         memory, estimate = self._fusion.step(started, (*samples, *again), now, pushed)
         if again:
             memory = memory._replace(imu_came=before.imu_came)
         if memory.health is not before.health:
             _report(before, memory, now, texts)
-        self._report_silence(memory, before.now, now, texts)
+        if inputs.sensors.t_us // _CHECKED_US != state.t_us // _CHECKED_US:
+            self._report_silence(memory, now, texts)
         if memory.reset.number != before.reset.number:
             texts.append(StatusText(Severity.WARNING, told(memory.reset)))
             state = jumped(state, memory.reset)
@@ -68,39 +74,33 @@ class SensedState:
             state = replace(state, fusion=memory, invalid_ticks=state.invalid_ticks + 1)
             last = state.estimate
             # Telemetry goes by its time, and goes on.
-            return state, None if last is None else last._replace(t_us=inputs.sensors.t_us)
+            return state, memory, None if last is None else last._replace(t_us=inputs.sensors.t_us)
         moved = memory.reset.number != before.reset.number
         away = unaided(before, now) > _AWAY > unaided(memory, now)
         if state.estimate is not None and away and not moved:
             state = _returned(state, estimate, texts)
-        return replace(state, fusion=memory, invalid_ticks=0), estimate
+        if state.invalid_ticks:
+            state = replace(state, invalid_ticks=0)
+        return state, memory, estimate
 
     def reported(
-        self, state: FlightState, memory: FusionMemory, estimate: StateEstimate
+        self, state: FlightState, memory: FusionMemory | None, estimate: StateEstimate
     ) -> FlightState:
         """The state with what the estimator says about itself now; nothing before it started."""
-        if not memory.started:
+        if memory is None or not memory.started:
             return state
         covariance = self._fusion.covariance(memory, memory.now)
         report = estimator_report(memory, covariance, estimate, memory.now, self._stale)
         return replace(state, estimator=report, aiding=_aiding(state, memory, report))
 
-    def _report_silence(
-        self, memory: FusionMemory, before: float, now: float, texts: list[StatusText]
-    ) -> None:
-        """Report sensors that have just been silent for too long."""
-        for sensor in _EVERY_TICK:
-            self._silent(sensor, memory.came(sensor), (before, now), texts)
-        for health in memory.health:
-            if health.sensor not in _EVERY_TICK:
-                self._silent(health.sensor, health.came, (before, now), texts)
-
-    def _silent(
-        self, sensor: Sensor, came: float, times: tuple[float, float], texts: list[StatusText]
-    ) -> None:
-        before, now = times
-        if came >= 0.0 and before - came <= self._stale < now - came:
-            texts.append(StatusText(Severity.WARNING, sentence(sensor, SensorFault.STALE)))
+    def _report_silence(self, memory: FusionMemory, now: float, texts: list[StatusText]) -> None:
+        """Report sensors that have been silent for too long since the last check."""
+        times = [(Sensor.IMU, memory.imu_came), (Sensor.ENCODERS, memory.joints_came)]
+        times += [(health.sensor, health.came) for health in memory.health]
+        for sensor, came in times:
+            silent = now - came - self._stale
+            if came >= 0.0 and 0.0 < silent <= 1e-6 * _CHECKED_US:
+                texts.append(StatusText(Severity.WARNING, sentence(sensor, SensorFault.STALE)))
 
 
 def _report(
@@ -142,29 +142,29 @@ def _last_reading_again(
 
 def _without_stuck(
     state: FlightState, memory: FusionMemory, samples: tuple[Sample, ...]
-) -> tuple[FlightState, FusionMemory, tuple[Sample, ...]]:
+) -> tuple[FusionMemory, tuple[Sample, ...]]:
     """The samples without those of encoders that are stuck: joints then follow from torques."""
-    watch = state.encoders
+    before = watch = memory.encoders
     for one in samples:
         if isinstance(one, JointSample):
-            found = _watched(state, memory, one.angles)
-            if found.stuck and not watch.stuck:
+            watch = _watched(watch, memory, one.angles, flies=state.vehicle.flies)
+            if watch.stuck and not before.stuck:
                 memory = _at_rest(memory, one.angles)
-            watch = found
-    if watch is not state.encoders:
-        state = replace(state, encoders=watch)
+    if watch is not before:
+        memory = memory._replace(encoders=watch)
     if watch.stuck:
         samples = tuple([one for one in samples if not isinstance(one, JointSample)])
-    return state, memory, samples
+    return memory, samples
 
 
-def _watched(state: FlightState, memory: FusionMemory, angles: Vec2) -> EncoderWatch:
+def _watched(
+    watch: EncoderWatch, memory: FusionMemory, angles: Vec2, *, flies: bool
+) -> EncoderWatch:
     """Encoders are stuck when they say the same while torques should have moved the joints.
 
     What of the acceleration does not show, the filter takes for a disturbance.
     """
-    watch = state.encoders
-    if angles != watch.angles or not state.vehicle.flies:
+    if angles != watch.angles or not flies:
         return EncoderWatch(angles)
     repeats, stuck = watch.repeats + 1, watch.stuck
     if repeats >= _REPEATS and not stuck:
@@ -186,7 +186,7 @@ def _aiding(state: FlightState, memory: FusionMemory, report: EstimatorReport) -
     aid = memory.of(Sensor.POSE)
     if aid.came < 0.0:
         aid = memory.of(Sensor.GNSS)
-    sensor, fault = _lost(memory, state.encoders)
+    sensor, fault = _lost(memory)
     P = report.pose_covariance
     since_us = before.since_us if sensor is before.sensor else report.t_us
     return Aiding(
@@ -201,10 +201,10 @@ def _aiding(state: FlightState, memory: FusionMemory, report: EstimatorReport) -
     )
 
 
-def _lost(memory: FusionMemory, encoders: EncoderWatch) -> tuple[Sensor | None, SensorFault]:
+def _lost(memory: FusionMemory) -> tuple[Sensor | None, SensorFault]:
     """A sensor that every tick needs and that is of no use now."""
     now = memory.now
-    if encoders.stuck:
+    if memory.encoders.stuck:
         return Sensor.ENCODERS, SensorFault.STUCK
     for sensor in _EVERY_TICK:
         if now - memory.came(sensor) > _LATELY:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import field
 from typing import Final, NamedTuple
 
@@ -129,6 +128,7 @@ class MissionMemory:
     owner_heard_us: int = -1  # when it was announced last; -1: not since the vehicle disarmed
     fence_owner: MessageSource | None = None  # who uploaded the fence
     accepted: tuple[SafeSetAnnouncement, ...] = ()  # the last one of each source
+    silent_zones: int = 0  # that moved, are not announced any more, and are held where they were
     rally: tuple[Vec2, ...] = ()  # m, where a return may lead beside home
     flight: MissionFlight = field(default_factory=MissionFlight)
 
@@ -177,14 +177,6 @@ class Aiding(NamedTuple):
 AIDED: Final = Aiding()
 
 
-class EncoderWatch(NamedTuple):
-    """Whether the joints' encoders still follow the joints."""
-
-    angles: Vec2 = (math.nan, math.nan)  # rad, the last reading
-    repeats: int = 0  # readings in a row that were the same
-    stuck: bool = False
-
-
 @dataclass(frozen=True, slots=True)
 class FlightState:
     """Everything a tick starts from; the upper half changes every tick, the lower rarely."""
@@ -216,4 +208,3 @@ class FlightState:
     estimator: EstimatorReport | None = None  # what telemetry says of it, once a planning period
     aiding: Aiding = AIDED
     trust: FrameTrust = FrameTrust()  # where states are exact
-    encoders: EncoderWatch = EncoderWatch()  # where they are not

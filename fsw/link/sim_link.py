@@ -157,12 +157,12 @@ class SimLink:
         """What :meth:`_read` says, of a datagram with anything in it."""
         payloads = {frame.message_id: cast(Numbers, frame.payload_values) for frame in frames}
         barrier = payloads.get(message_ids.HIL_SENSOR)  # the last one
-        if barrier is None or barrier[_SENSOR_AT] != 0:
-            self._read_between_steps(frames)
-            return None
         heartbeat = payloads.get(message_ids.HEARTBEAT)
         if heartbeat is not None:
             self._note_pacing(int(heartbeat[0]))
+        if barrier is None or barrier[_SENSOR_AT] != 0:
+            self._read_between_steps(frames)
+            return None
         if self.measured:
             samples = [one for frame in frames for one in self._decoder.samples(frame)]
             sensors = self._new_measured(int(barrier[0]), samples)
@@ -234,7 +234,10 @@ class SimLink:
             self._endpoint.send(answer)
 
     def _read_between_steps(self, frames: list[Frame]) -> None:
+        """What ends the run, and measurements for which the next step has no room."""
         for frame in frames:
+            if self.measured:
+                self._inbox.accept_samples(self._decoder.samples(frame))
             if frame.message_id == message_ids.COMMAND_LONG:
                 request = decode.command_long(frame)
                 if (

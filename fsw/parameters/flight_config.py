@@ -53,8 +53,10 @@ class FlightLimits:
     battery_emergency: float = 0.05
     low_battery_action: int = 0  # 0 warn; 2 land when critical; 3 return then, land in emergency
     safe_set_owner: int = 0  # MAVLink system that owns the safe set; 0: the first to announce one
+    clearance_sigmas: float = 3.0  # standard deviations of a point, kept from zones besides
     breach_action: int = 6  # of the safe set: 1 warn, 2 hold, 5 land, 6 retreat and hold
     owner_timeout_us: int = 10_000_000  # a silent owner may be replaced on the ground
+    zone_timeout_us: int = 3_000_000  # a moving zone that is not announced for this long stands
     # Loss of sensors. Hidden markers, 0.2 s, are none; a drift by a tenth of a metre is.
     aiding_loss_us: int = 250_000  # without a position that the estimate could use
     position_low: float = 0.1  # m, standard deviation in dead reckoning that is acted upon

@@ -305,6 +305,8 @@ _ROWS: Final[dict[str, list[_Row]]] = {
          "MAVLink system that owns the safe set and may grow it in flight; 0: the first one"),
         ("SAFE_BREACH_ACT", "limits.breach_action", "", 1.0, 6.0,
          "Action when the vehicle is outside its safe set"),
+        ("SAFE_SIGMAS", "limits.clearance_sigmas", "", 0.0, 6.0,
+         "Standard deviations of the estimate that clearances grow by"),
         ("SAFE_FILTER", "safety_filter.enabled", "", 0.0, 1.0,
          "Filter of the acceleration that the loops are about to realise"),
         ("SAFE_FLT_GAMMA", "safety_filter.gamma", "1/s", 0.1, 20.0,
@@ -317,6 +319,9 @@ _ROWS: Final[dict[str, list[_Row]]] = {
          "Safety filter: maximum vertical acceleration"),
         ("SAFE_OWNER_T", "limits.owner_timeout_us", "s", 2.0, 300.0,
          "Silence after which another source may own the safe set, on the ground",
+         _IN_MICROSECONDS),
+        ("SAFE_MOVE_T", "limits.zone_timeout_us", "s", 0.5, 60.0,
+         "Silence after which a moving zone is held where it is predicted then",
          _IN_MICROSECONDS),
     ],
     "Log": [

@@ -22,6 +22,7 @@ from sitl.shapes.kind import NUMBERS
 
 WireValues = tuple[float | bytes, ...]
 
+_MAX_DATAGRAM: Final = 1400  # bytes, fits an Ethernet packet
 _LOCAL_NED: Final = 1  # MAV_FRAME; of ODOMETRY's position and velocity
 _MOTION_CAPTURE: Final = 6  # MAV_ESTIMATOR_TYPE
 _ACCEL_AND_GYRO: Final = 0x3F  # HIL_SENSOR_UPDATED_FLAGS: there is no magnetometer or barometer
@@ -71,15 +72,31 @@ class StepEncoder:
         )
         return self._spoken(messages) + step if messages else step
 
-    def measured_datagram(
+    def measured_datagrams(
         self,
         t_us: int,
         measurements: tuple[Measurement, ...],
         messages: tuple[PilotMessage, ...],
-    ) -> bytes:
-        """Pilot's messages, what arrived from the sensors, and HIL_SENSOR last, as the barrier."""
-        step = self._measured.frames(t_us, measurements)
-        return self._spoken(messages) + step if messages else step
+        opening: bytes = b"",
+    ) -> tuple[list[bytes], bytes]:
+        """Pilot's messages, what arrived from the sensors, and HIL_SENSOR last, as the barrier.
+
+        That is the second; what arrived and has no room in it goes ahead, in the first, as it does
+        once at the start of a flight. Each datagram begins with ``opening``.
+        """
+        frames = self._measured.frames(t_us, measurements)
+        step = [opening, self._spoken(messages)] if messages else [opening]
+        size = sum(map(len, step)) + len(frames[-1])
+        first = len(frames) - 1
+        while first > 0 and size + len(frames[first - 1]) <= _MAX_DATAGRAM:
+            first -= 1
+            size += len(frames[first])
+        ahead: list[bytes] = []
+        for frame in frames[:first]:
+            if not ahead or len(ahead[-1]) + len(frame) > _MAX_DATAGRAM:
+                ahead.append(opening)
+            ahead[-1] += frame
+        return ahead, b"".join([*step, *frames[first:]])
 
     def heartbeat(self) -> bytes:
         """HEARTBEAT; in its custom_mode bit 0 is set in lockstep and bit 1 with sensors."""

@@ -60,8 +60,8 @@ class SensorEncoder:
             for count in range(1, _MOST_JOINTS + 1)
         }
 
-    def frames(self, t_us: int, measurements: tuple[Measurement, ...]) -> bytes:
-        """Everything that arrived in the step of ``t_us``, the barrier last."""
+    def frames(self, t_us: int, measurements: tuple[Measurement, ...]) -> list[bytes]:
+        """The frames of all that arrived in the step of ``t_us``, the barrier last."""
         clock: ImuMeasurement | None = None
         out = []
         for one in measurements:
@@ -75,7 +75,7 @@ class SensorEncoder:
             out.append(self._barrier(t_us, *clock.accel_B, *clock.gyro_B))
         else:
             out.append(self._hil_sensor(t_us, (0.0,) * 13, 0, 0))
-        return b"".join(out)
+        return out
 
     def _frame(self, one: Measurement) -> bytes:
         # A clock that is wrong by more than the flight is long cannot be sent.

@@ -66,7 +66,7 @@ def as_measured(frame: SensorFrame) -> SensorFrame:
     return frame
 
 
-def as_sampled(_step: int, samples: tuple[Sample, ...]) -> tuple[Sample, ...]:
+def as_sampled(samples: tuple[Sample, ...]) -> tuple[Sample, ...]:
     return samples
 
 
@@ -83,7 +83,7 @@ class Flight:
     config: FlightConfig = field(default_factory=lambda: flight_config(body="points"))
     planner: AnyPlanner | None = None
     spoil: Callable[[SensorFrame], SensorFrame] = as_measured
-    spoil_samples: Callable[[int, tuple[Sample, ...]], tuple[Sample, ...]] = as_sampled
+    spoil_samples: Callable[[tuple[Sample, ...]], tuple[Sample, ...]] = as_sampled
     late_ticks: Callable[[int], int] = on_time
     announces: bool = True  # the safe set
     upload: MissionUpdate | None = None  # told to the next tick
@@ -148,7 +148,7 @@ class Flight:
             announced(self.scenario) if self.announces and self.sim.step == 0 else (),
             tuning=tuning,
             mission=self.upload,
-            samples=self.spoil_samples(self.sim.step, self.closed.samples()),
+            samples=self.spoil_samples(self.closed.samples()),
         )
         self.upload = None
         if self.streamed and self.sim.step % STREAM_STEPS == 0:

@@ -10,11 +10,12 @@ from typing import Any
 import pytest
 
 from fsw.flight.failsafe import Condition
-from fsw.measurements import ImuSample, JointSample, PoseSample, Sample
+from fsw.measurements import ImuSample, JointSample, PoseSample
 from fsw.signals import Mode, SensorFrame
 from sitl.scenario_file import load_scenario
 from sitl.simulation import STEP_US
 from tests.closed_loop.harness import Flight
+from tests.closed_loop.test_real_sensors import Spoil, changed, frozen
 
 START_US = 1_000_000
 FIRST = 300  # step of the fault
@@ -95,32 +96,18 @@ def test_telemetry_goes_on_without_an_estimate_and_says_so() -> None:
     assert snapshot.estimate.t_us == snapshot.t_us
 
 
-def without(kind: type[Sample], steps: int) -> Callable[..., tuple[Sample, ...]]:
-    """A sensor is silent for a number of steps."""
-
-    def spoil(step: int, samples: tuple[Sample, ...]) -> tuple[Sample, ...]:
-        if not BESIDE <= step < BESIDE + steps:
-            return samples
-        return tuple([one for one in samples if not isinstance(one, kind)])
-
-    return spoil
-
-
-def stuck(kind: type[Sample], steps: int) -> Callable[..., tuple[Sample, ...]]:
-    """A sensor says the same, with the time going on, for a number of steps."""
-    held: list[Sample] = []
-
-    def spoil(step: int, samples: tuple[Sample, ...]) -> tuple[Sample, ...]:
-        if not BESIDE <= step < BESIDE + steps:
-            return samples
-        held.extend([one for one in samples if isinstance(one, kind)][: 1 - len(held)])
-        return tuple([replace(held[0], time=s.time) if isinstance(s, kind) else s for s in samples])
-
-    return spoil
-
-
 BESIDE = 4000  # at 8 s, on the way along the walls
 LONG = 1000  # steps, 2 s
+
+
+def without(kind: type) -> Spoil:
+    """A sensor is silent for two seconds."""
+    return changed(kind, 8.0, 10.0, lambda _: None)
+
+
+def stuck(kind: type) -> Spoil:
+    """A sensor says the same for two seconds, while time goes on."""
+    return changed(kind, 8.0, 10.0, frozen())
 
 
 def beside_walls(flight: Flight) -> None:
@@ -138,17 +125,17 @@ def beside_walls(flight: Flight) -> None:
 @pytest.mark.parametrize(
     ("spoil", "words"),
     [
-        (without(PoseSample, LONG), ("no position is measured", "pose is silent", "for 0.")),
-        (stuck(PoseSample, LONG), ("no position is measured", "pose is stuck")),
-        (stuck(ImuSample, LONG), ("sensor lost: IMU is stuck", "for 0.")),
-        (without(ImuSample, LONG), ("sensor lost: IMU is silent",)),
-        (stuck(JointSample, LONG), ("sensor lost: joint encoders are stuck", "for 0.")),
-        (without(JointSample, LONG), ("sensor lost: joint encoders are silent",)),
+        (without(PoseSample), ("no position is measured", "pose is silent", "for 0.")),
+        (stuck(PoseSample), ("no position is measured", "pose is stuck")),
+        (stuck(ImuSample), ("sensor lost: IMU is stuck", "for 0.")),
+        (without(ImuSample), ("sensor lost: IMU is silent",)),
+        (stuck(JointSample), ("sensor lost: joint encoders are stuck", "for 0.")),
+        (without(JointSample), ("sensor lost: joint encoders are silent",)),
     ],
     ids=["no pose", "pose stuck", "IMU stuck", "no IMU", "encoders stuck", "no encoders"],
 )
 def test_two_seconds_without_a_sensor_beside_walls_touch_nothing(
-    spoil: Callable[..., tuple[Sample, ...]], words: tuple[str, ...]
+    spoil: Spoil, words: tuple[str, ...]
 ) -> None:
     flight = Flight(load_scenario("walls", "mocap"), spoil_samples=spoil)
     beside_walls(flight)

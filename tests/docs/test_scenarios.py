@@ -39,6 +39,8 @@ TABLES = (
     scenario.PoseErrors,
     scenario.EncoderErrors,
     scenario.VehicleScale,
+    scenario.AirKeys,
+    scenario.ActuatorKeys,
 )
 
 

@@ -33,8 +33,9 @@ def test_the_link_and_the_studies_make_the_same_samples(suite: str) -> None:
     for _ in range(150):
         said = simulation.measurements()
         assert said is not None
-        datagram = encoder.measured_datagram(simulation.t_us, said, ())
-        received = [one for frame in split(datagram) for one in decoder.samples(frame)]
+        ahead, step = encoder.measured_datagrams(simulation.t_us, said, ())
+        frames = [frame for datagram in (*ahead, step) for frame in split(datagram)]
+        received = [one for frame in frames for one in decoder.samples(frame)]
         direct = [sample(one) for one in said]
         assert len(received) == len(direct)
         for one in direct:

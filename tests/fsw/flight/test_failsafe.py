@@ -25,6 +25,7 @@ from fsw.flight.state import (
     AIDED,
     Aiding,
     FlightState,
+    MissionMemory,
     OffboardMemory,
     PlanMemory,
     SafetyMemory,
@@ -55,6 +56,7 @@ class Evidence:
     setpoint_age_us: int = 0
     gcs_silent_us: int = 0
     battery: BatteryState = field(default_factory=BatteryState)
+    silent_zones: int = 0
     safety: SafetyMemory = field(default_factory=SafetyMemory)
     aiding: Aiding = AIDED
     config: FlightConfig = CONFIG
@@ -68,6 +70,7 @@ class Evidence:
             plan=PlanMemory(since_us=NOW_US - self.plan_age_us, refused=self.plan_refused),
             offboard=OffboardMemory(motion_us=NOW_US - self.setpoint_age_us),
             battery=self.battery,
+            mission=MissionMemory(silent_zones=self.silent_zones),
             safety=self.safety,
             aiding=self.aiding,
         )
@@ -135,6 +138,7 @@ def test_nothing_wrong_is_no_condition() -> None:
         (replace(FINE, safety=OUTSIDE), Condition.BREACH),
         (replace(FINE, safety=OFF_PLAN), Condition.TUBE_LEFT),
         (OFFBOARD, Condition.SETPOINTS_LOST),
+        (replace(FINE, silent_zones=1), Condition.ZONES_SILENT),
         (replace(FINE, gcs_silent_us=10_000_000), Condition.DATALINK_LOST),
         (replace(FINE, battery=charged(Charge.LOW)), Condition.BATTERY_LOW),
         (replace(FINE, battery=charged(Charge.CRITICAL)), Condition.BATTERY_CRITICAL),
@@ -325,6 +329,7 @@ def test_a_text_names_the_sensor_and_since_when() -> None:
 
 def test_a_fault_is_the_vehicles_own() -> None:
     others = {Condition.SETPOINTS_LOST, Condition.DATALINK_LOST, Condition.BATTERY_LOW}
+    others |= {Condition.ZONES_SILENT}
     others |= {Condition.BATTERY_CRITICAL, Condition.BATTERY_EMERGENCY}
     assert set(Condition) - others == FAULTS
 

@@ -53,7 +53,7 @@ POSE = PoseMeasurement(
 def decoded(one: Measurement, origin: earth.Place = earth.DEFAULT_ORIGIN) -> list[Sample]:
     """What the flight software makes of one measurement's frame, the barrier's left out."""
     encoder = StepEncoder(lockstep=True, measured=True, origin=origin)
-    first, *barrier = split(encoder.measured_datagram(NOW, (one,), ()))
+    first, *barrier = split(encoder.measured_datagrams(NOW, (one,), ())[1])
     assert [frame.message_id for frame in barrier] == [ids.HIL_SENSOR]
     inbox = Inbox(Origin(*origin))
     return SampleDecoder(inbox.locate).samples(first)
@@ -78,7 +78,7 @@ def test_a_pose_has_the_time_of_its_measurement_its_variance_and_its_resets() ->
 def test_odometry_says_where_it_comes_from_and_that_it_knows_no_velocity() -> None:
     for one, kind in ((POSE, 6), (POSE._replace(from_cameras_on_board=True), 3)):
         encoder = StepEncoder(lockstep=True, measured=True)
-        odometry, _ = split(encoder.measured_datagram(NOW, (one,), ()))
+        odometry, _ = split(encoder.measured_datagrams(NOW, (one,), ())[1])
         values = odometry.payload_values
         assert all(math.isnan(float(value)) for value in values[8:14])
         assert math.isnan(float(values[35]))  # the velocity's covariance
@@ -143,7 +143,7 @@ def test_a_distance_that_looks_ahead_is_no_height() -> None:
 
 def test_odometry_in_another_frame_is_no_sample() -> None:
     encoder = StepEncoder(lockstep=True, measured=True)
-    odometry, _ = split(encoder.measured_datagram(NOW, (POSE,), ()))
+    odometry, _ = split(encoder.measured_datagrams(NOW, (POSE,), ())[1])
     values = list(odometry.payload_values)
     values[56] = 20  # MAV_FRAME_LOCAL_FRD
     moved = odometry._replace(payload_values=tuple(values))
@@ -167,7 +167,7 @@ class Wire:
         self.inbox.take()
 
     def datagram(self, t_us: int, measurements: tuple[Measurement, ...]) -> bytes:
-        return self.encoder.measured_datagram(t_us, measurements, ())
+        return self.encoder.measured_datagrams(t_us, measurements, ())[1]
 
     def step(self, t_us: int, *measurements: Measurement) -> SensorFrame | None:
         self.socket.send(self.datagram(t_us, measurements))
@@ -252,17 +252,35 @@ def test_samples_of_several_steps_wait_for_one_tick_and_the_oldest_go_first(wire
     assert wire.inbox.refused == 88
 
 
+def test_what_has_no_room_in_a_step_goes_ahead_of_it_and_arrives_in_order(wire: Wire) -> None:
+    times = range(NOW - 100_000, NOW + 1, 2000)
+    said = [IMU._replace(t_us=t_us) for t_us in times]
+    encoder, opening = wire.encoder, wire.encoder.heartbeat()
+    ahead, step = encoder.measured_datagrams(NOW, (*said[:-1], POSE, said[-1]), (), opening)
+    assert len(ahead) > 1
+    for datagram in (*ahead, step):
+        assert len(datagram) <= 1400
+        wire.socket.send(datagram)
+    released = [wire.link.wait_for_step() for _ in (*ahead, step)]
+    assert released[:-1] == [None] * len(ahead)
+    assert released[-1] is not None
+    samples = wire.inbox.take().samples
+    assert [one.time for one in samples if isinstance(one, ImuSample)] == [1e-6 * t for t in times]
+    assert len(samples) == len(said) + 1
+
+
 def test_commands_come_with_measured_steps_too(wire: Wire) -> None:
     nan = math.nan
     arm = SendCommand(400, (1.0, nan, nan, nan, nan, nan, nan))
-    wire.socket.send(wire.encoder.measured_datagram(NOW, (JOINTS, IMU), (arm,)))
+    wire.socket.send(wire.encoder.measured_datagrams(NOW, (JOINTS, IMU), (arm,))[1])
     assert wire.link.wait_for_step() is not None
     assert len(wire.inbox.take().commands) == 1
 
 
 def test_a_ground_station_cannot_send_measurements() -> None:
     inbox = Inbox()
-    for frame in split(StepEncoder(lockstep=True).measured_datagram(NOW, (POSE, JOINTS, IMU), ())):
+    encoder = StepEncoder(lockstep=True, measured=True)
+    for frame in split(encoder.measured_datagrams(NOW, (POSE, JOINTS, IMU), ())[1]):
         inbox.accept(frame)
     assert inbox.take().samples == []
 
