@@ -54,8 +54,9 @@ _MEASURED_STEP: Final = LockstepReader((message_ids.JOINT_ENCODERS, 3), (message
 _FLAGS_AT: Final = -3
 _INERTIAL: Final = 0x3F
 _SENSOR_AT: Final = 15  # place of HIL_SENSOR's id; the step's clock has 0
-_FARTHEST_US: Final = 2_000_000  # from one step to the next; a silence of 1.2 s ends the flight
-_LAST_US: Final = 1 << 62  # no clock says so
+# A stamp farther ahead of the last one is believed only if the next step follows it: with a single
+# wrong one the vehicle would take all later steps for old ones. Such a silence ends the flight.
+_AHEAD_US: Final = 1_200_000
 _LOCKSTEP_BIT, _MEASURED_BIT = 1, 2  # of the custom_mode in the simulator's HEARTBEAT
 _NO_VECTOR: Final = (math.nan, math.nan, math.nan)
 _NO_ATTITUDE: Final = (math.nan, math.nan, math.nan, math.nan)
@@ -77,6 +78,7 @@ class SimLink:
         self.measured = False  # what comes is measured by sensors, each at its own time
         self.shutdown = False  # the simulator has ended the run
         self.retransmissions = 0
+        self.notices: list[str] = []  # what was odd, for the operator; the loop empties it
         self._endpoint = PeerSocket.connected(simulator, PATIENCE_S)
         self._inbox = inbox
         self._decoder = SampleDecoder(inbox.locate)
@@ -84,7 +86,7 @@ class SimLink:
         self._thrust_scale = 1.0 / facts.rotor_thrust_max
         self._torque_scale = 1.0 / facts.joint_torque_max
         self._last_us = -1  # time of the newest step seen
-        self._ahead_us = _LAST_US  # of one that was too far ahead of it
+        self._doubted_us = -1  # time of a step that was too far ahead
         self._answer: tuple[int, bytes] = (-1, b"")
         self._acks: list[CommandAck] = []
         self._text_id = 0
@@ -185,18 +187,14 @@ class SimLink:
     ) -> SensorFrame | None:
         """The sensors of a step that is whole and not known yet; a known one is answered again."""
         t_us = int(barrier[0])
-        if not self._is_next(t_us):
+        if odometry is None or arm is None or not self._is_next(t_us):
             return None
-        if odometry is None or arm is None:
-            return None
-        self._last_us = t_us
         return decode.sensor_frame(odometry, arm, barrier)
 
     def _new_measured(self, t_us: int, samples: list[Sample]) -> SensorFrame | None:
         """The time of a new step, whose samples are in the inbox; a known one is answered again."""
         if not self._is_next(t_us):
             return None
-        self._last_us = t_us
         self._inbox.accept_samples(samples)
         newest = samples[-1] if samples else None
         return SensorFrame(
@@ -211,21 +209,18 @@ class SimLink:
         )
 
     def _is_next(self, t_us: int) -> bool:
-        """Whether a step is a new one; a known one is answered again.
-
-        One far ahead is believed when the next one goes on from there: believed at once, a single
-        wrong stamp would make all that follow seem to be known.
-        """
+        """Whether a step is a new one, which it is only once; a known one is answered again."""
         if t_us <= self._last_us:
             self._repeat(t_us)
             return False
-        if self._last_us < 0 and t_us < _LAST_US:
-            return True
-        if t_us - self._last_us <= _FARTHEST_US or 0 < t_us - self._ahead_us <= _FARTHEST_US:
-            self._ahead_us = _LAST_US
-            return True
-        self._ahead_us = t_us if t_us < _LAST_US else self._ahead_us
-        return False
+        ahead_us = t_us - self._last_us
+        confirmed = 0 < t_us - self._doubted_us <= _AHEAD_US
+        if self._last_us >= 0 and ahead_us > _AHEAD_US and not confirmed:
+            self._doubted_us = t_us
+            self.notices.append(f"step stamped {1e-6 * ahead_us:.1f} s ahead: ignored")
+            return False
+        self._last_us, self._doubted_us = t_us, -1
+        return True
 
     def _repeat(self, t_us: int) -> None:
         answered_us, answer = self._answer
