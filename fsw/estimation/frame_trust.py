@@ -26,7 +26,7 @@ _NAMES: Final = ((POSE, Sensor.POSE), (INERTIAL, Sensor.IMU), (JOINTS, Sensor.EN
 # Of the parts in this order: frames in a row, until what has jumped is the truth; and frames that
 # are equal to the last bit while the others change, until that is no chance.
 _STAYS: Final = (100, 25, 25)
-_REPEATS: Final = (2, 5, 5)
+_REPEATS: Final = (1, 5, 5)
 # From one frame to the next, beside what the last estimate predicts. Rotors turn the body by
 # 17 rad/s^2; the rest is noise, and what hits the vehicle.
 _PLACE_JUMP: Final = 0.1  # m
@@ -41,7 +41,10 @@ _SPEED_LIMIT: Final = 100.0  # m/s
 _RATE_LIMIT: Final = 100.0  # rad/s, of body and joints
 _FORCE_LIMIT: Final = 1000.0  # m/s^2
 _RATE_SHARE: Final = 0.3  # of the newest rate from two poses
-_LONGEST: Final = 0.1  # s, moved on at once
+_LONGEST: Final = 1.0  # s, moved on at once
+# What a vehicle does while frames are missing.
+_STRONGEST: Final = 50.0  # m/s^2
+_QUICKEST: Final = 50.0  # rad/s^2, of the body
 # Errors of what stands in, standard deviations.
 _FORCE_ERROR: Final = 0.2  # m/s^2, of an accelerometer and the attitude that turns it
 _BLIND_FORCE: Final = 5.0  # m/s^2, where there is none
@@ -115,8 +118,9 @@ def unbelievable(
     """Parts that cannot be, and those that are too far from the last estimate, ``dt`` [s] older.
 
     Readings ``p`` [m, NED], ``v`` [m/s, NED], ``q`` [1], ``w`` [rad/s, FRD], ``f`` [m/s^2, FRD],
-    ``arm`` [rad], ``rates`` [rad/s]; the estimate's with 0, of which ``R0`` is body to NED and
-    ``f0`` [m/s^2] the specific force along -z of the body.
+    ``arm`` [rad], ``rates`` [rad/s]; of the estimate ``p0`` [m, NED], ``v0`` [m/s, NED], ``R0`` [1,
+    body to NED], ``w0`` [rad/s, FRD], ``f0`` [m/s^2, along -z of the body], ``arm0`` [rad] and
+    ``rates0`` [rad/s].
     """  # fmt: skip
     never, far = 0, 0
     norm2 = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]
@@ -135,8 +139,10 @@ def unbelievable(
             jump = max(jump, abs(p[i] - p0[i] - dt * v0[i]))
             change = max(change, abs(v[i] - v0[i]))
         turn = math.sqrt(w0[0] * w0[0] + w0[1] * w0[1] + w0[2] * w0[2]) * dt + _TURN_JUMP
+        turn += 0.5 * _QUICKEST * dt * dt
         apart = 0.5 * (trace - 1.0) < math.cos(min(turn, math.pi))
-        if jump > _PLACE_JUMP or change > _SPEED_JUMP + 50.0 * dt or apart:
+        room = _PLACE_JUMP + 0.5 * _STRONGEST * dt * dt
+        if jump > room or change > _SPEED_JUMP + _STRONGEST * dt or apart:
             far |= 1
     rate = max(abs(w[0]), abs(w[1]), abs(w[2]))
     finite = math.isfinite(w[0] + w[1] + w[2] + f[2])
@@ -144,7 +150,7 @@ def unbelievable(
         never |= 2
     else:
         change = max(abs(w[0] - w0[0]), abs(w[1] - w0[1]), abs(w[2] - w0[2]))
-        if change > _RATE_JUMP or abs(-f[2] - f0) > _FORCE_JUMP:
+        if change > _RATE_JUMP + _QUICKEST * dt or abs(-f[2] - f0) > _FORCE_JUMP:
             far |= 2
     finite = math.isfinite(arm[0] + arm[1] + rates[0] + rates[1])
     if not (finite and max(abs(rates[0]), abs(rates[1])) < _RATE_LIMIT):
@@ -152,7 +158,7 @@ def unbelievable(
     else:
         jump = max(abs(arm[0] - arm0[0] - dt * rates0[0]), abs(arm[1] - arm0[1] - dt * rates0[1]))
         change = max(abs(rates[0] - rates0[0]), abs(rates[1] - rates0[1]))
-        if jump > _JOINT_JUMP or change > _JOINT_RATE_JUMP:
+        if jump > _JOINT_JUMP + 10.0 * dt or change > _JOINT_RATE_JUMP:
             far |= 4
     return never, far
 
@@ -185,11 +191,9 @@ def believed(
     if known is not None:
         stuck = _repeating(s, known)
     if not (never or far or stuck or trust.doubted or trust.returned_us):
-        if trust.pose.repeats or trust.inertial.repeats or trust.joints.repeats:
-            trust = FrameTrust()
         found = estimate_state(s)
         assert found is not None
-        return trust._replace(last=s), found
+        return FrameTrust(s), found
     olds = trust.pose, trust.inertial, trust.joints
     pose, inertial, joints = [
         _part(old, s.t_us, bool(never & bit), bool(far & bit), bool(stuck & bit), k)
