@@ -66,6 +66,7 @@ class EncoderWatch(NamedTuple):
     """Whether the joints' encoders still follow the joints."""
 
     angles: Vec2 = (math.nan, math.nan)  # rad, the last reading
+    asked: Vec2 = (0.0, 0.0)  # rad, of the joints when it came first
     repeats: int = 0  # readings in a row that were the same
     stuck: bool = False
 

@@ -26,6 +26,7 @@ _REPEATS = 6  # of encoders; a resting arm's 12 bits are the same for longer
 # rad/s^2 of each joint that torques should have made of it and did not. In flight 15 and 35 at
 # most while readings repeat; 50 and 70 within 10 ms of stuck encoders.
 _HELD = (35.0, 70.0)
+_ASKED = 0.1  # rad that joints were asked to move meanwhile; friction has held one for half of it
 _LATELY = 0.02  # s, in which a fault is one of now
 _AWAY = 0.1  # s without a position, after which its return is a jump
 _TOLD = 0.02  # m, of a jump that the operator reads about
@@ -147,7 +148,7 @@ def _without_stuck(
     before = watch = memory.encoders
     for one in samples:
         if isinstance(one, JointSample):
-            watch = _watched(watch, memory, one.angles, flies=state.vehicle.flies)
+            watch = _watched(watch, memory, one.angles, state)
             if watch.stuck and not before.stuck:
                 memory = _at_rest(memory, one.angles)
     if watch is not before:
@@ -158,19 +159,23 @@ def _without_stuck(
 
 
 def _watched(
-    watch: EncoderWatch, memory: FusionMemory, angles: Vec2, *, flies: bool
+    watch: EncoderWatch, memory: FusionMemory, angles: Vec2, state: FlightState
 ) -> EncoderWatch:
     """Encoders are stuck when they say the same while torques should have moved the joints.
 
-    What of the acceleration does not show, the filter takes for a disturbance.
+    What of the acceleration does not show, the filter takes for a disturbance. Friction holds a
+    joint as well, but not one that is asked to move on.
     """
-    if angles != watch.angles or not flies:
-        return EncoderWatch(angles)
+    asked = state.cascade.joints.reference
+    if angles != watch.angles or not state.vehicle.flies:
+        return EncoderWatch(angles, asked)
     repeats, stuck = watch.repeats + 1, watch.stuck
     if repeats >= _REPEATS and not stuck:
         first, second = memory.numbers["joints"][0][:, 2].tolist()
-        stuck = abs(first) > _HELD[0] or abs(second) > _HELD[1]
-    return EncoderWatch(angles, repeats, stuck)
+        held = abs(first) > _HELD[0] or abs(second) > _HELD[1]
+        moved = max(abs(asked[0] - watch.asked[0]), abs(asked[1] - watch.asked[1]))
+        stuck = held and moved > _ASKED
+    return watch._replace(repeats=repeats, stuck=stuck)
 
 
 def _at_rest(memory: FusionMemory, angles: Vec2) -> FusionMemory:
