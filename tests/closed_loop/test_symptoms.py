@@ -94,6 +94,6 @@ def test_what_ended_the_flight_stays_on_show() -> None:
 
     flight = Flight(hover(), spoil=blinded)
     flight.step(command(ARM, 1.0))
-    flight.run(0.8)
+    flight.run(1.15)
     assert flight.mode is Mode.FAULT
     assert flight.snapshot.failures
