@@ -62,7 +62,9 @@ class FlightLimits:
     position_low: float = 0.1  # m, standard deviation in dead reckoning that is acted upon
     position_low_action: int = 2  # how: 1 warn, 2 hold, 5 land
     position_lost: float = 0.5  # m, the same: land
-    attitude_loss: float = 0.35  # rad, standard deviation of roll and pitch that ends the flight
+    # rad, standard deviation of roll and pitch that ends the flight: there is no way back from it,
+    # and a pose that is hidden for 0.2 s while the IMU is frozen as well (0.37) comes back.
+    attitude_loss: float = 0.7
     sensor_loss_us: int = 50_000  # without a use of the inertial unit, or of the encoders
     sensor_loss_action: int = 2  # what then: 1 warn, 2 hold, 5 land
 

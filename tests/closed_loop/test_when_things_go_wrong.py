@@ -116,13 +116,13 @@ def all_lost_between(first: int, last: int) -> Callable[[SensorFrame], SensorFra
 
 
 def test_an_attitude_that_is_unknown_for_long_ends_the_flight_for_good() -> None:
-    flight = Flight(load_scenario("workspace"), spoil=all_lost_between(300, 600))
+    flight = Flight(load_scenario("workspace"), spoil=all_lost_between(300, 1000))
     flight.follow()
-    for step in range(2, 600):
+    for step in range(2, 720):
         outputs = flight.step()
-        if step < 450:
+        if step < 500:
             assert sum(outputs.actuators.rotor_thrust) > 10.0
-        elif step > 490:
+        elif step > 660:
             assert flight.mode is Mode.FAULT
             assert outputs.actuators.rotor_thrust == (0.0, 0.0, 0.0, 0.0)
             assert outputs.actuators.joint_torque == (0.0, 0.0)

@@ -124,7 +124,7 @@ def test_nothing_wrong_is_no_condition() -> None:
     [
         (replace(FINE, invalid_ticks=5), Condition.ESTIMATE_INVALID),
         (replace(FINE, mode=Mode.DISARMED, invalid_ticks=5), Condition.ESTIMATE_INVALID),
-        (replace(FINE, aiding=Aiding(attitude_sigma=0.36)), Condition.ATTITUDE_LOST),
+        (replace(FINE, aiding=Aiding(attitude_sigma=0.71)), Condition.ATTITUDE_LOST),
         (replace(FINE, aiding=Aiding(attitude_sigma=math.nan)), Condition.ATTITUDE_LOST),
         (replace(FINE, aiding=Aiding(250_000)), Condition.AIDING_LOST),
         (replace(FINE, aiding=replaced_sensor(50_000)), Condition.SENSOR_LOST),
@@ -318,7 +318,7 @@ def test_a_text_names_the_sensor_and_since_when() -> None:
             "failsafe: sensor lost: IMU is stuck at one reading, for 0.06 s, holding",
         ),
         (
-            Aiding(400_000, Sensor.POSE, SensorFault.NOT_FINITE, attitude_sigma=0.4),
+            Aiding(400_000, Sensor.POSE, SensorFault.NOT_FINITE, attitude_sigma=0.8),
             "attitude unknown: pose says what is not a number, for 0.40 s: terminate",
         ),
     ):
