@@ -18,8 +18,8 @@ UV = UV_DEFAULT_INDEX="$${UV_DEFAULT_INDEX:-$(PIP_INDEX)}" .boot/uv
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: help setup run test test-long code-checks tests-of-processes tests-of-the-rest mutate \
-	interop lock docs docs-test pictures pages clean
+.PHONY: help setup run test test-long code-checks tests-of-processes tests-of-the-rest \
+	fsw-kernels sitl-kernels mutate interop lock docs docs-test pictures pages clean
 
 help: ## show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-9s %s\n", $$1, $$2 }' Makefile
@@ -40,18 +40,21 @@ test: setup ## set up, then run every check: ruff, mypy, import-linter, pytest
 	@echo "checks in two rows at once, one a core; each reports when it is over"
 	@$(MAKE) --no-print-directory --jobs=2 tests-of-processes tests-of-the-rest
 
-# What reads the code only goes first in the row of the tests that often wait for clocks: meanwhile
-# the other row compiles the kernels that both need.
-OF_PROCESSES := tests/benchmarks tests/cli tests/interop tests/processes tests/timing
-code-checks:
+# Each row compiles the kernels of one half first, because rows that compile the same kernels at once
+# take twice the time. Then comes what only reads the code in the row of the tests that often wait
+# for clocks: meanwhile the other row is done with the kernels that take longer.
+OF_PROCESSES := tests/benchmarks tests/cli tests/interop tests/processes tests/studies tests/timing
+code-checks: sitl-kernels
 	$(call check,lint,$(BIN)/ruff check .)
 	$(call check,format,$(BIN)/ruff format --check .)
 	$(call check,types,$(BIN)/mypy)
 	$(call check,imports,$(BIN)/lint-imports)
 tests-of-processes: code-checks
 	$(call check,processes,$(BIN)/pytest -m "not long" $(OF_PROCESSES))
-tests-of-the-rest:
+tests-of-the-rest: fsw-kernels
 	$(call check,the rest,$(BIN)/pytest -m "not long" $(addprefix --ignore=,$(OF_PROCESSES)))
+fsw-kernels sitl-kernels: %-kernels:
+	@$(BIN)/python -m tests.compile_kernels $*
 
 test-long: setup ## the tests that make test leaves out for its four minutes
 	$(BIN)/pytest -m long

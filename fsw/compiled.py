@@ -115,19 +115,31 @@ def packed(numbers: Any) -> NDArray[Any]:
 
     A kernel reads ``packed(tuning)[0].kp`` as a law reads ``tuning.kp``; handing it over costs
     as much as one float, however many numbers are in it. Tuples become arrays: laws pick their
-    entries by index.
+    entries by index. Whole numbers and truth values become floats.
+
+    Raises:
+        TypeError: An earlier record of this class had another layout.
     """
-    array = np.zeros(1, dtype=_layout(numbers))
+    layout = _layout(numbers)
+    # numba names the machine code of a record's callees by a number that it counts up in each
+    # process, so that of two layouts, one from the disk cache, either can run the other's code.
+    # Seen: njit f(r), cached, calls njit g(r[0]); run it with layout A alone, then with B and A.
+    known = _LAYOUTS.setdefault(type(numbers), layout)
+    if known != layout:
+        raise TypeError(f"records of {type(numbers).__name__} have two layouts: {known}, {layout}")
+    array = np.zeros(1, dtype=layout)
     array[0] = _values(numbers)
     return array
+
+
+_LAYOUTS: dict[type, np.dtype[Any]] = {}
 
 
 def _layout(value: Any) -> np.dtype[Any]:
     if dataclasses.is_dataclass(value):
         fields = [field.name for field in dataclasses.fields(value)]
         return np.dtype([(name, _layout(getattr(value, name))) for name in fields], align=True)
-    entries = np.asarray(value)
-    return np.dtype((entries.dtype, entries.shape))
+    return np.dtype((np.float64, np.shape(value)))
 
 
 def _values(value: Any) -> Any:

@@ -60,6 +60,7 @@ class TrackedFlight:
         tick = config.tick_period_us * 1e-6
         cascade = Cascade(config.airframe, config.tuning, config.inner, tick, keep_clear(config))
         self._law = np.asarray(packed(cascade.law))
+        self._probes = cascade.probes
         self._plants = np.array([plant(flown_vehicle(scenario))])
         self._record = flown
         self._world, clock = World(scenario), MissionClock(scenario)
@@ -79,6 +80,7 @@ class TrackedFlight:
         flown = _track(
             self._plants,
             self._law,
+            self._probes,
             start.state.copy(),
             start.memory,
             rows,
@@ -108,6 +110,7 @@ def _compiled(function: Callable[..., int]) -> Callable[..., int]:
 def _track(
     plants: NDArray[Any],
     laws: NDArray[Any],
+    probes: Array,
     x: Array,
     memory: CascadeMemory,
     rows: Array,
@@ -155,7 +158,7 @@ def _track(
             START_US + STEP_US * step, p, v, R, w, yaw, q_arm, qd_arm, -felt[2]
         )
         near = zones[spans[k, 0] : spans[k, 1]]
-        command, memory, guarded = close_loops(law, memory, estimate, nominal, u, 1, near)
+        command, memory, guarded = close_loops(law, memory, estimate, nominal, u, 1, near, probes)
         f, t = command.rotor_thrust, command.joint_torque
         sent = ActuatorCommand(
             (

@@ -25,7 +25,14 @@ from fsw.control.joints import (
     observe_disturbance,
 )
 from fsw.control.pid import PidGains
-from fsw.control.safety_filter import NO_ZONES, FilterLaw, FilterTuning, filter_law, filtered
+from fsw.control.safety_filter import (
+    NO_ZONES,
+    FilterLaw,
+    FilterTuning,
+    filter_law,
+    filter_probes,
+    filtered,
+)
 from fsw.control.tilt_limit import limited_turn
 from fsw.control.tracking import (
     Observed,
@@ -158,7 +165,6 @@ class Cascade:
             filter_law(
                 clear.tuning,
                 clear.barriers,
-                clear.body,
                 airframe.link_length,
                 gains.k[3] / gains.k[2],
                 tuning.tracking.acceleration_limit,
@@ -166,9 +172,11 @@ class Cascade:
             rotor_decay(airframe, dt),
             dt,
         )
+        self.probes = filter_probes(clear.body)
         self._packed = packed(self.law)
         memory = CascadeMemory(STOPPED.rotor_thrust, STOPPED, Observed(_NONE, _NONE), 1.0)
-        example = (self._packed, memory, _SOMEWHERE, REST_STATE, REST_INPUT, 1, NO_ZONES)
+        around = (NO_ZONES, self.probes)
+        example = (self._packed, memory, _SOMEWHERE, REST_STATE, REST_INPUT, 1, *around)
         self._close_loops = machine_code(_close_loops, *example)
 
     def motion(self, memory: CascadeMemory, estimate: StateEstimate) -> MotionState:
@@ -189,7 +197,7 @@ class Cascade:
     ) -> tuple[ActuatorCommand, CascadeMemory, Guarded]:
         """See ``close_loops``, of which this is the machine code; ``zones`` (zones, k) [SI]."""
         sent, rotors, believed, mass, integrals, joints, off_plan, guarded = self._close_loops(
-            self._packed, memory, estimate, plan, u, ticks, zones
+            self._packed, memory, estimate, plan, u, ticks, zones, self.probes
         )
         command = ActuatorCommand(*sent)
         kept = CascadeMemory(
@@ -207,11 +215,13 @@ def close_loops(
     u: PlanInput,
     ticks: int,
     zones: NDArray[np.float64],
+    probes: NDArray[np.float64],
 ) -> tuple[ActuatorCommand, CascadeMemory, Guarded]:
     """One tick, or several at once where some were missed.
 
     Returns the actuator command, not yet gated, the memory to pass back after sending, and what the
-    safety filter found about the ``zones`` (zones, k) [SI], those of ``moving_zones``.
+    safety filter found: about the ``zones`` (zones, k) [SI] of ``moving_zones``, for the ``probes``
+    (probes, 12) [SI] of ``filter_probes``.
     """
     airframe, tuning, dt = law.airframe, law.tuning, law.dt
     rotors, observed = memory.rotors, memory.observed
@@ -225,7 +235,7 @@ def close_loops(
         observed = observe(observed, v, motion.a, tuning.tracking, dt)
     attitude, height, guarded = memory.attitude, memory.height, (False, math.inf)
     if zones.shape[0] > 0 and law.filter.tuning.enabled > 0:
-        plan, u, guarded = _kept_off(law, zones, estimate, motion, observed, plan, u)
+        plan, u, guarded = _kept_off(law, zones, probes, estimate, motion, observed, plan, u)
     if law.follows_plan:
         (wdx, wdy), thrust = follow_plan(
             law.tracking, mass, arm.depth, estimate, motion, observed, plan, u
@@ -273,6 +283,7 @@ def close_loops(
 def _kept_off(
     law: CascadeLaw,
     zones: NDArray[np.float64],
+    probes: NDArray[np.float64],
     estimate: StateEstimate,
     motion: MotionState,
     observed: Observed,
@@ -290,7 +301,7 @@ def _kept_off(
         asked[2],
     )
     a = add_scaled(motion.a, observed.d, 1.0)
-    safe, changed, margin = filtered(law.filter, zones, estimate, observed.v, a, wanted)
+    safe, changed, margin = filtered(law.filter, probes, zones, estimate, observed.v, a, wanted)
     if not changed:
         return plan, u, (False, margin)
     dx, dy, dz = subtract(safe, asked)
@@ -318,6 +329,7 @@ def _close_loops(
     u: PlanInput,
     ticks: int,
     zones: NDArray[np.float64],
+    probes: NDArray[np.float64],
 ) -> tuple[
     tuple[Vec4, Vec2],
     Vec4,
@@ -329,7 +341,7 @@ def _close_loops(
     Guarded,
 ]:
     """``close_loops`` that returns plain tuples, which leave machine code at half the cost."""
-    command, kept, guarded = close_loops(law[0], memory, estimate, plan, u, ticks, zones)
+    command, kept, guarded = close_loops(law[0], memory, estimate, plan, u, ticks, zones, probes)
     return (
         (command.rotor_thrust, command.joint_torque),
         kept.rotors,

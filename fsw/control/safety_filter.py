@@ -12,7 +12,8 @@ keeps h from falling faster than :math:`-\gamma h`, with :math:`d_r` left for wh
 of the disturbance. An acceleration that is less is brought to b along n: the nearest one that
 keeps the condition, in closed form; several zones are satisfied one after the other, a few times.
 
-Parts on the base are taken to move as its origin does. Parts on the arm count for the margin that
+Each part counts where it is nearest to the zone (``fsw.barriers.nearest_place``). Parts on the base
+are taken to move as its origin does. Parts on the arm count for the margin that
 is reported and not for the acceleration: to push a swinging arm off by the base would first swing
 it on, and the arm compensates by itself.
 
@@ -28,23 +29,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fsw.barriers.nearest_place import nearest_place
 from fsw.barriers.safe_approach import BarrierTuning, safe_approach_slope, safe_approach_speed
 from fsw.compiled import compilable
-from fsw.geometry.rotation import rotate, rotate_back
 from fsw.geometry.vectors import add_scaled, clamp, dot, subtract
-from fsw.model.body import ON_LINK2, Body
-from fsw.model.kinematics import links
+from fsw.model.body import CAPSULE, FORM, ON, ON_BASE, RADIUS, TURN, Body
+from fsw.model.linearisation import FRAME, put_arm, put_pose
 from fsw.shapes.kind import NUMBERS
-from fsw.shapes.zones import FIRST, FOLLOWS, surface_at, zone_arrays
+from fsw.shapes.zones import FIRST, FLAT, FOLLOWS, KEEP_IN, PLANES, surface_at, zone_arrays
 from fsw.signals import EndEffectorTarget, SafeSet, StateEstimate, Vec2, Vec3
 
 _PASSES = 4  # over all zones
-_DISC_STEPS = 5  # from a disc to a zone and back
 _MOVE = FIRST + NUMBERS  # columns of a zone's movement: velocity, where it is at a time, that time
 _COLUMNS = _MOVE + 7
-_ON, _Z, _RADIUS, _RIM = 0, 3, 4, 5  # columns of a part
-_MOST_PARTS = 12
-_NO_PART = (0.0,) * 6
 
 NO_ZONES: NDArray[np.float64] = np.zeros((0, _COLUMNS))
 
@@ -64,7 +61,7 @@ class FilterTuning:
 
 @dataclass(frozen=True, slots=True)
 class FilterLaw:
-    """Everything the law needs that does not change in flight."""
+    """Everything the law needs that does not change in flight, but the body's probes."""
 
     tuning: FilterTuning
     kept: Vec2  # alpha [m/s^2] and k_S [1/s] of zones
@@ -72,30 +69,17 @@ class FilterLaw:
     links: Vec2  # m
     lag: float  # s, tau
     level: float  # m/s^2, at most, an axis
-    # Spheres and discs of the body: what each is on, its place there [m], radius and rim [m]. As
-    # many rows for every body: of two layouts in one process the second is read wrongly.
-    parts: tuple[tuple[float, ...], ...]
-    count: int  # of the rows, that are parts
 
 
 def filter_law(
     tuning: FilterTuning,
     barriers: tuple[BarrierTuning, BarrierTuning],
-    body: Body,
     links: Vec2,
     lag: float,
     level: float,
 ) -> FilterLaw:
-    """The law of a body, of which capsules are left to the spheres at their ends.
-
-    Its ``links`` [m] are known; the loop takes ``lag`` [s] and stands ``level`` [m/s^2].
-    """
+    """The law for ``links`` [m], a loop that takes ``lag`` [s] and stands ``level`` [m/s^2]."""
     kept, following = barriers
-    parts = tuple(
-        (float(part.on), *part.begin, part.radius, part.rim)
-        for part in body.parts
-        if part.end is None
-    )
     return FilterLaw(
         tuning=tuning,
         kept=(kept.alpha, kept.slope),
@@ -103,9 +87,14 @@ def filter_law(
         links=links,
         lag=lag,
         level=level,
-        parts=parts + (_NO_PART,) * (_MOST_PARTS - len(parts)),
-        count=len(parts),
     )
+
+
+def filter_probes(body: Body) -> NDArray[np.float64]:
+    """The probes of a body (probes, 12) [SI]; a disc has one, where it is nearest."""
+    probes = body.probes
+    nearest: NDArray[np.float64] = probes[probes[:, TURN] == 0.0]
+    return nearest
 
 
 def moving_zones(safe_set: SafeSet, target: EndEffectorTarget | None) -> NDArray[np.float64]:
@@ -125,6 +114,7 @@ def moving_zones(safe_set: SafeSet, target: EndEffectorTarget | None) -> NDArray
 @compilable
 def filtered(
     law: FilterLaw,
+    probes: NDArray[np.float64],
     zones: NDArray[np.float64],
     estimate: StateEstimate,
     v: Vec3,
@@ -133,38 +123,66 @@ def filtered(
 ) -> tuple[Vec3, bool, float]:
     """The acceleration nearest to the ``wanted`` [m/s^2, NED] one that keeps the condition.
 
-    ``zones`` (zones, k) [SI] are those of ``moving_zones``, ``v`` [m/s, NED] and ``a`` [m/s^2, NED]
-    the body's own now, disturbance included. Also says whether the wanted one was changed, and the
-    least margin [m] of all parts, infinite where no zone is near.
+    ``probes`` (probes, 12) [SI] are those of ``filter_probes``, ``zones`` (zones, k) [SI] those of
+    ``moving_zones``, ``v`` [m/s, NED] and ``a`` [m/s^2, NED] the body's own now, disturbance
+    included. Also says whether the wanted one was changed, and the least margin [m] of all parts,
+    infinite where no zone is near.
     """
+    frame, shift = np.empty(FRAME), np.empty((zones.shape[0], 3))
+    put_pose(frame, estimate.p_WB, estimate.R_WB)
+    put_arm(frame, estimate.q_arm, estimate.qd_arm, (law.links[0], law.links[1]))
+    for k in range(zones.shape[0]):
+        elapsed = 1e-6 * (estimate.t_us - zones[k, _MOVE + 6])
+        for axis in range(3):
+            shift[k, axis] = zones[k, _MOVE + 3 + axis] + elapsed * zones[k, _MOVE + axis]
     changed, margin = False, math.inf
     for _ in range(_PASSES):
         again = False
         for k in range(zones.shape[0]):
-            zone = zones[k]
-            elapsed = 1e-6 * (estimate.t_us - zone[_MOVE + 6])
-            drift = (zone[_MOVE], zone[_MOVE + 1], zone[_MOVE + 2])
-            shift = (
-                zone[_MOVE + 3] + elapsed * drift[0],
-                zone[_MOVE + 4] + elapsed * drift[1],
-                zone[_MOVE + 5] + elapsed * drift[2],
-            )
-            x, y, z = subtract(estimate.p_WB, shift)
-            if surface_at(zones, k, 0, x, y, z).distance > law.tuning.near:
-                continue
-            follows = zone[FOLLOWS] > 0.0
-            for j in range(1 if follows else law.count):
-                n, least, distance = _condition(
-                    law, zones, k, j, follows, shift, drift, estimate, v, a
-                )
-                margin = min(margin, distance)
-                lacking = least - dot(n, wanted)
-                if lacking > 0.0:
-                    wanted = _within(law, add_scaled(wanted, n, lacking))
-                    again = changed = True
+            x, y, z = subtract(estimate.p_WB, (shift[k, 0], shift[k, 1], shift[k, 2]))
+            for which in range(int(zones[k, PLANES])):
+                if surface_at(zones, k, which, x, y, z).distance <= law.tuning.near:
+                    wanted, lacked, least = _kept_off(
+                        law, probes, zones, k, which, shift, frame, v, a, wanted
+                    )
+                    again, margin = again or lacked, min(margin, least)
+        changed = changed or again
         if not again:
             break
     return wanted, changed, margin
+
+
+@compilable
+def _kept_off(
+    law: FilterLaw,
+    probes: NDArray[np.float64],
+    zones: NDArray[np.float64],
+    zone: int,
+    which: int,
+    shift: NDArray[np.float64],
+    frame: NDArray[np.float64],
+    v: Vec3,
+    a: Vec3,
+    wanted: Vec3,
+) -> tuple[Vec3, bool, float]:
+    """``filtered`` for one plane of one zone, once."""
+    drift = (zones[zone, _MOVE], zones[zone, _MOVE + 1], zones[zone, _MOVE + 2])
+    relative, follows = subtract(v, drift), zones[zone, FOLLOWS] > 0.0
+    lacked, margin = False, math.inf
+    ends_do = zones[zone, FLAT] > 0.0 or zones[zone, KEEP_IN] > 0.0  # which are spheres
+    for j in range(1 if follows else probes.shape[0]):
+        if ends_do and probes[j, FORM] == CAPSULE:
+            continue
+        _, at, _ = nearest_place(zones, zone, which, shift, probes, j, frame)
+        n, distance = (at.nx, at.ny, at.nz), at.distance
+        if not follows:
+            distance -= probes[j, RADIUS]
+        margin = min(margin, distance)
+        if probes[j, ON] == ON_BASE:
+            lacking = _needed(law, follows, distance, dot(n, relative), dot(n, a)) - dot(n, wanted)
+            if lacking > 0.0:
+                wanted, lacked = _within(law, add_scaled(wanted, n, lacking)), True
+    return wanted, lacked, margin
 
 
 @compilable
@@ -178,82 +196,17 @@ def _within(law: FilterLaw, a: Vec3) -> Vec3:
 
 
 @compilable
-def _condition(
-    law: FilterLaw,
-    zones: NDArray[np.float64],
-    zone: int,
-    part: int,
-    follows: bool,
-    shift: Vec3,
-    drift: Vec3,
-    estimate: StateEstimate,
-    v: Vec3,
-    a: Vec3,
-) -> tuple[Vec3, float, float]:
-    """The normal of a zone at a part of the body, the least acceleration along it, the margin.
+def _needed(law: FilterLaw, follows: bool, distance: float, approach: float, along: float) -> float:
+    """b, the least acceleration along a normal [m/s^2].
 
-    In m/s^2 and m.
+    At a ``distance`` [m] that changes by ``approach`` [m/s], accelerated by ``along`` [m/s^2].
     """
-    p, radius = estimate.p_WB, 0.0
     alpha, slope = law.kept[0], law.kept[1]
     if follows:
         alpha, slope = law.following[0], law.following[1]
-    else:
-        p = add_scaled(p, _place(law, part, estimate), 1.0)
-        radius = law.parts[part][_RADIUS]
-        if law.parts[part][_RIM] > 0.0:
-            p = _nearest_of_disc(law, zones, zone, part, shift, estimate, p)
-    x, y, z = subtract(p, shift)
-    at = surface_at(zones, zone, 0, x, y, z)
-    n = (at.nx, at.ny, at.nz)
-    distance = at.distance - radius
     tau = law.lag
-    approach, along = dot(n, subtract(v, drift)), dot(n, a)
     ahead = distance + tau * (approach + 0.5 * tau * along)
     rate_ahead = approach + tau * along
     h = safe_approach_speed(ahead, alpha, slope) + rate_ahead
     steepness = safe_approach_slope(ahead, alpha, slope)
-    if not follows and law.parts[part][_ON] > 0.0:
-        return n, -math.inf, distance
-    least = law.tuning.allowance - law.tuning.gamma * h - steepness * rate_ahead
-    return n, least, distance
-
-
-@compilable
-def _nearest_of_disc(
-    law: FilterLaw,
-    zones: NDArray[np.float64],
-    zone: int,
-    part: int,
-    shift: Vec3,
-    estimate: StateEstimate,
-    centre: Vec3,
-) -> Vec3:
-    """The place of a disc nearest to a zone [m, NED], by projecting from one to the other."""
-    p, numbers, R = centre, law.parts[part], estimate.R_WB
-    for _ in range(_DISC_STEPS):
-        x, y, z = subtract(p, shift)
-        at = surface_at(zones, zone, 0, x, y, z)
-        step = max(at.distance, 0.05)
-        aim = add_scaled(p, (at.nx, at.ny, at.nz), -step)
-        ax, ay, _ = rotate_back(R, subtract(aim, centre))
-        length = math.sqrt(ax * ax + ay * ay)
-        if length > numbers[_RIM]:
-            ax, ay = numbers[_RIM] / length * ax, numbers[_RIM] / length * ay
-        p = add_scaled(centre, rotate(R, (ax, ay, 0.0)), 1.0)
-    return p
-
-
-@compilable
-def _place(law: FilterLaw, part: int, estimate: StateEstimate) -> Vec3:
-    """Where a part is from the body's origin [m, NED]."""
-    numbers = law.parts[part]
-    on = numbers[_ON]
-    x, y, z = numbers[1], numbers[2], numbers[_Z]
-    if on > 0.0:
-        # On a link the place is (0, 0, distance from its joint).
-        lengths = (numbers[_Z], 0.0) if on < ON_LINK2 else (law.links[0], numbers[_Z])
-        th1 = estimate.q_arm[0]
-        (x1, z1), (x2, z2) = links(lengths, th1, th1 + estimate.q_arm[1])
-        x, y, z = x1 + x2, 0.0, z1 + z2
-    return rotate(estimate.R_WB, (x, y, z))
+    return law.tuning.allowance - law.tuning.gamma * h - steepness * rate_ahead

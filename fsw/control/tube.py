@@ -39,10 +39,9 @@ from fsw.model.prediction import Array
 from fsw.model.rotors import WEIGHING_TIME, hanging_arm
 
 _SETTLED_S = 6.0  # the slowest mode has decayed by e^-16 then
-CALM_HEIGHT = (
-    1e-3  # m, by which the plan's own motion and the arm's move the height: 0.7 mm measured
-)
-_RARE = 3.7  # standard deviations
+# What the plan's own motion and the arm's move the height by, 0.7 mm measured in calm flights.
+CALM_HEIGHT = 1e-3  # m
+RARE = 3.7  # standard deviations
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,12 +81,12 @@ def tube(
     ``hold_s``.
     """
     below = hanging / GRAVITY
-    states = _impulse_responses(airframe, tuning, gains, dt, wind=False)
+    states = impulse_responses(airframe, tuning, gains, dt, wind=False)
     base, acceleration = states[:, 0], states[:, 2]
     k3, k4 = gains.k[2], gains.k[3]
     wanted = states @ _wanted_acceleration(gains)
     end_effector = base - below * acceleration
-    in_wind = _impulse_responses(airframe, tuning, gains, dt, wind=True)
+    in_wind = impulse_responses(airframe, tuning, gains, dt, wind=True)
     base_wind = in_wind[:, 0]
     end_effector_wind = base_wind - below * in_wind[:, 2]
     climbs = _vertical_responses(airframe, tuning, gains, dt)
@@ -98,8 +97,8 @@ def tube(
         base_wind=tuning.wind_limit * _sum(base_wind),
         height=_sum(climbs[:, 0]),
         end_effector_wind=tuning.wind_limit * _sum(end_effector_wind),
-        base_expected=_RARE * _random_steps(base, per_hold),
-        end_effector_expected=_RARE * _random_steps(end_effector, per_hold),
+        base_expected=RARE * random_steps(base, per_hold),
+        end_effector_expected=RARE * random_steps(end_effector, per_hold),
         acceleration=_sum(acceleration),
         wanted_acceleration=_sum(wanted),
         acceleration_error=_sum(wanted - acceleration),
@@ -192,12 +191,12 @@ def _wanted_snap(gains: TrackingGains) -> Array:
     return np.array([-k[0], 0.0, -k[2], -k[3], -k[4], -k[1], -gains.k_disturbance])
 
 
-def _impulse_responses(
+def impulse_responses(
     airframe: Airframe, tuning: TrackingTuning, gains: TrackingGains, dt: float, *, wind: bool
 ) -> Array:
-    """States after a unit push of one tick, a row per tick: p, v, a, j, s and the observer's v, d.
+    """States after a unit push of one tick of ``dt`` [s]: p, v, a, j, s and the observer's v, d.
 
-    The push is a disturbance, or a memory of wind that is of no disturbance.
+    A row (7,) [SI] a tick. The push is a disturbance, or a memory of wind where there is none.
     """
     k, kd, bandwidth = gains.k, gains.k_disturbance, tuning.observer_bandwidth
     # p, v, a, j, s and the observer's velocity and disturbance; the plan stands still at 0.
@@ -255,11 +254,11 @@ def _after_a_push(a: Array, b: Array, dt: float) -> Array:
     return np.array(states)
 
 
-def _random_steps(response: Array, per_hold: int) -> float:
-    """Standard deviation under steps drawn uniformly from +-1 every ``per_hold`` ticks.
+def random_steps(response: Array, per_hold: int) -> float:
+    """Standard deviation of a ``response`` (ticks,) [any] to steps drawn uniformly from +-1.
 
-    The draws are independent, so their shares add up in squares; the mean over the instants
-    within a hold.
+    The steps last ``per_hold`` ticks each. The draws are independent, so their shares add up in
+    squares; the mean over the instants within a hold.
     """
     whole = len(response) // per_hold * per_hold
     variances = []

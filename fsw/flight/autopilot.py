@@ -128,6 +128,9 @@ class Autopilot:
         safety = self._watch.off_plan(state.safety, estimate, nominal if flown else None)
         request = None
         if planning_due:
+            mission = self._safe_sets.hold_silent_zones(state.mission, now_us)
+            if mission is not state.mission:
+                state = replace(state, mission=mission)
             if flown and nominal is not None:
                 state, request, plan = self._request_plan(
                     state, estimate, nominal, plan, now_us, safety.replan

@@ -65,6 +65,7 @@ class Condition(Enum):
     OUTPUT_NOT_FINITE = "actuator command not finite"
     PLAN_REFUSED = "last plan refused"
     SETPOINTS_LOST = "offboard setpoints stopped"
+    ZONES_SILENT = "moving zones not announced any more"
     DATALINK_LOST = "no ground station"
     BATTERY_LOW = "battery low"
     BATTERY_CRITICAL = "battery critical"
@@ -227,6 +228,13 @@ FAILSAFES: Final = (
         Condition.SETPOINTS_LOST,
         _setpoints_are_lost,
         _on_setpoints_lost,
+    ),
+    Failsafe(
+        Condition.ZONES_SILENT,
+        lambda c: c.state.mission.silent_zones > 0,
+        _always(Action.WARN),  # a place to go to is not known: nothing is known of the zone
+        Severity.CRITICAL,
+        detail=lambda c: f": {c.state.mission.silent_zones} held where predicted",
     ),
     Failsafe(
         Condition.DATALINK_LOST,

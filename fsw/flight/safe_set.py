@@ -3,7 +3,8 @@
 One source owns what is announced, the first or the configured one, and one the fence. In flight any
 source may shrink either, and only its owner may grow it (``safe_set_change.growth``); every change
 and every refusal is a text that says who and what. On the ground another source may become the
-owner once the old one has been silent for a while, or the vehicle has disarmed.
+owner once the old one has been silent for a while, or the vehicle has disarmed. A moving zone that
+is not announced any more is not predicted for ever: it is held where it is after a time-out.
 """
 
 from __future__ import annotations
@@ -11,12 +12,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 from fsw.barriers.margins import Margins
-from fsw.flight.safe_set_change import growth, is_update, summary
+from fsw.flight.safe_set_change import growth, is_moving, is_update, summary
 from fsw.flight.state import MissionMemory
 from fsw.model.body import body_of
 from fsw.mpc.reference import still_at
-from fsw.parameters.consistency import Finding, analyse, loop_tube, refusals, warnings
+from fsw.parameters.consistency import Finding, analyse, loop_tube, part_tube, refusals, warnings
 from fsw.parameters.flight_config import FlightConfig
+from fsw.shapes import kind_of
 from fsw.shapes.half_space import wall
 from fsw.shapes.zones import surfaces
 from fsw.signals import (
@@ -27,9 +29,11 @@ from fsw.signals import (
     SafeSet,
     SafeSetAnnouncement,
     Severity,
+    Shape,
     StateEstimate,
     StatusText,
     TickInputs,
+    Zone,
 )
 
 _ACCEPTED = 8  # sources whose last announcement is remembered
@@ -41,6 +45,7 @@ class SafeSetCheck:
     def __init__(self, config: FlightConfig) -> None:
         self._config = config
         self.loop_tube = loop_tube(config)
+        part_tube(config)  # takes a moment, and is then known
         planner, airframe = config.planner, config.airframe
         body = body_of(planner.body, airframe)
         links = airframe.link_length
@@ -126,6 +131,7 @@ class SafeSetCheck:
         wanted = replace(
             mission,
             announced=safe_set,
+            silent_zones=0,
             owner=source if owns else owner,
             accepted=(*([] if becomes_owner else others)[1 - _ACCEPTED :], announcement),
         )
@@ -207,6 +213,30 @@ class SafeSetCheck:
             texts.append(StatusText(Severity.INFO, change))
         return replace(wanted, safe_set=safe_set, refused=None, refusals=against)
 
+    def hold_silent_zones(self, mission: MissionMemory, now_us: int) -> MissionMemory:
+        """Let zones stand whose announcements have stopped, where they are predicted to be then.
+
+        What is predicted longer than that is a guess, and one that leaves the vehicle's way free. A
+        time stamp that far ahead is of another clock: the zone stands where its numbers say.
+        """
+        timeout_us = self._config.limits.zone_timeout_us
+        zones = mission.announced.zones
+        silent = [is_moving(zone) and abs(now_us - zone.t_us) >= timeout_us for zone in zones]
+        if not any(silent):
+            return mission
+        held = SafeSet(
+            tuple(
+                _held(zone, timeout_us if now_us > zone.t_us else 0) if stops else zone
+                for zone, stops in zip(zones, silent, strict=True)
+            )
+        )
+        return replace(
+            mission,
+            announced=held,
+            safe_set=joined(held, mission.fence),
+            silent_zones=mission.silent_zones + sum(silent),
+        )
+
     def warm_up(self, estimate: StateEstimate) -> None:
         """Compile every kernel of distances and margins, before anything flies."""
         walled = SafeSet((wall((0.0, 0.0, -1.0), 0.0, 0.0),))
@@ -235,6 +265,16 @@ def may_grow_fence(owner: MessageSource | None, source: MessageSource | None, ch
     if source is None or (owner is None and not chosen):
         return True
     return source.system == chosen if chosen else source.is_same(owner)
+
+
+def _held(zone: Zone, after_us: int) -> Zone:
+    """A moving zone, standing where it is so long after its time stamp."""
+    vx, vy, vz = zone.velocity
+    elapsed = 1e-6 * after_us
+    moved = kind_of(zone.shape).moved(
+        zone.shape.numbers, (elapsed * vx, elapsed * vy, elapsed * vz)
+    )
+    return Zone(Shape(zone.shape.kind, moved), zone.clearance, zone.keep_in)
 
 
 def joined(announced: SafeSet, fence: SafeSet) -> SafeSet:

@@ -35,7 +35,8 @@ def growth(old: SafeSet, new: SafeSet) -> str:
 def is_update(old: SafeSet, new: SafeSet) -> bool:
     """Whether only moving zones differ, and only in where they are and how fast they move."""
     return len(old.zones) == len(new.zones) and all(
-        before == after or (_moves(before) and _moves(after) and _look(before) == _look(after))
+        before == after
+        or (is_moving(before) and is_moving(after) and _look(before) == _look(after))
         for before, after in zip(old.zones, new.zones, strict=True)
     )
 
@@ -51,7 +52,8 @@ def _plural(kind: str) -> str:
     return f"{kind}es" if kind.endswith("x") else f"{kind}s"
 
 
-def _moves(zone: Zone) -> bool:
+def is_moving(zone: Zone) -> bool:
+    """Whether a zone is somewhere else at another time."""
     return zone.velocity != (0.0, 0.0, 0.0)
 
 
@@ -63,7 +65,7 @@ def _implies(new: Zone, old: Zone) -> bool:
     """Whether a place that is safe of the new zone is safe of the old one, as far as is shown."""
     if (new.velocity, new.keep_in) != (old.velocity, old.keep_in):
         return False
-    if _moves(new) and new.t_us != old.t_us:
+    if is_moving(new) and new.t_us != old.t_us:
         return False
     if new.shape == old.shape:
         return new.clearance >= old.clearance

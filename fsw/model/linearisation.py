@@ -32,7 +32,7 @@ from fsw.model.prediction import (
     P,
     V,
 )
-from fsw.signals import Vec2, Vec3
+from fsw.signals import Mat3, Vec2, Vec3
 
 # Prediction states that turn the body: the accelerations, by the tilt they take, and yaw.
 _TURNING = np.array([A, A + 1, A + 2, YAW])
@@ -177,6 +177,15 @@ def fill_frame(state: Array, lengths: Vec2, frame: Array) -> None:
         (state[QD_ARM], state[QD_ARM + 1]),
         lengths,
     )
+
+
+@kernel
+def put_pose(frame: Array, p: Vec3, R: Mat3) -> None:
+    """The base of a ``frame`` (FRAME,) [SI] at ``p`` [m, NED]; its velocity stays as it is."""
+    for k in range(3):
+        frame[_AT_P + k] = p[k]
+    for k in range(9):
+        frame[_AT_R + k] = R[k]
 
 
 @compiled

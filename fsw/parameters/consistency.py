@@ -15,8 +15,10 @@ from dataclasses import dataclass
 
 from fsw.barriers.safe_approach import BarrierTuning
 from fsw.control.gains import tracking_gains
+from fsw.control.part_tube import LoopOfParts, PartReach, part_reaches, towards
 from fsw.control.tube import Tube, all_axes, all_axes_up_to, limits_used, tube
 from fsw.model.airframe import GRAVITY
+from fsw.model.body import body_of
 from fsw.parameters.flight_config import FlightConfig, Surroundings
 from fsw.shapes import kind_of
 from fsw.signals import SafeSet, Zone
@@ -65,7 +67,7 @@ def analyse(config: FlightConfig, safe_set: SafeSet, loop: Tube) -> tuple[Findin
             findings.append(_sampled(tuning, surroundings, planner.period))
     if config.inner == "tracking":
         if others:
-            findings.append(_end_effector_tube(planner.walls, loop, surroundings))
+            findings += _tubes_of_parts(config, loop, others)
         findings.append(_limits(config, loop, surroundings))
     return tuple(findings)
 
@@ -210,20 +212,79 @@ def _reach(safe_set: SafeSet, across: float, up: float) -> float:
     return max(across * (abs(n[0]) + abs(n[1])) + up * abs(n[2]) for n in flat)
 
 
-def _end_effector_tube(tuning: BarrierTuning, loop: Tube, surroundings: Surroundings) -> Finding:
-    """Across the arm's plane the arm cannot compensate; along it, it does."""
+def _tubes_of_parts(config: FlightConfig, loop: Tube, zones: list[Zone]) -> list[Finding]:
+    found = [_end_effector_tube(config, loop)]
+    return [*found, _part_tube(config, zones)] if config.planner.body == "full" else found
+
+
+def _end_effector_tube(config: FlightConfig, loop: Tube) -> Finding:
+    """Across the arm's plane the arm cannot compensate; along it, it does until it gives way."""
+    tuning, surroundings = config.planner.walls, config.surroundings
     reach = loop.end_effector * surroundings.disturbance + loop.end_effector_wind
     expected = loop.end_effector_expected * surroundings.disturbance
-    room = stand_off(tuning)
+    room, compensation = stand_off(tuning), config.tuning.compensation
+    along = (
+        f", and along it once the base is {compensation.far * 1e3:.0f} mm off its plan"
+        if config.tuning.compensate
+        else " and along it"
+    )
     return _finding(
         "end-effector tube",
         room >= reach,
-        f"across the arm's plane a hanging end-effector can be pushed {reach * 1e3:.0f} mm by the "
-        f"worst disturbance ({expected * 1e3:.0f} mm expected at random) and the plan keeps "
-        f"{room * 1e3:.0f} mm",
-        f"lambda >= {reach * tuning.slope:.3f} m/s would be proof",
+        f"an end-effector that hangs {surroundings.hanging * 1e3:.0f} mm below the base can be "
+        f"pushed {reach * 1e3:.0f} mm across the arm's plane{along}, by the worst disturbance "
+        f"({expected * 1e3:.0f} mm expected at random), and the plan keeps {room * 1e3:.0f} mm",
+        _proof(config, reach),
         refuses=False,
     )
+
+
+def part_tube(config: FlightConfig) -> tuple[PartReach, ...]:
+    """Reach of the parts of the base with the configured tracking loop."""
+    surroundings, dt = config.surroundings, config.tick_period_us * 1e-6
+    tracking, airframe = config.tuning.tracking, config.airframe
+    loop = LoopOfParts(
+        airframe=airframe,
+        tuning=tracking,
+        gains=tracking_gains(tracking, airframe.rotor_lag, dt),
+        disturbance=surroundings.disturbance,
+        hold_s=surroundings.disturbance_hold,
+        dt=dt,
+    )
+    return part_reaches(loop, body_of(config.planner.body, airframe))
+
+
+def _part_tube(config: FlightConfig, zones: list[Zone]) -> Finding:
+    """The base tilts to push back, and moves feet and rotors with it."""
+    reaches = part_tube(config)
+    far: list[PartReach] = []
+    for zone in zones:
+        n = zone.shape.numbers
+        far += [towards(reaches, (n[0], n[1], n[2]))] if kind_of(zone.shape).flat else reaches
+    most, room = max(far, key=lambda reach: reach.worst), stand_off(config.planner.walls)
+    return _finding(
+        "part tube",
+        room >= most.worst,
+        f"the worst disturbance on one axis and the tilt against it can move the {most.name} "
+        f"{most.worst * 1e3:.0f} mm towards a boundary ({most.expected * 1e3:.0f} mm expected at "
+        f"random), and the plan keeps {room * 1e3:.0f} mm",
+        _proof(config, most.worst),
+        refuses=False,
+    )
+
+
+def _proof(config: FlightConfig, reach: float) -> str:
+    """What keeps ``reach`` [m] from a wall: lambda, and alpha where the tilt would not do then."""
+    tuning, limits = config.planner.walls, config.planner.limits
+    least = math.ceil(1e3 * reach * tuning.slope) / 1e3
+    target = config.surroundings.target_acceleration
+    left = GRAVITY * math.tan(limits.tilt) - tuning.gamma * least - target
+    if left >= tuning.alpha:
+        return f"lambda >= {least:.3f} m/s would be proof"
+    if left > 0.0:
+        least_alpha = math.floor(1e2 * left) / 1e2
+        return f"lambda >= {least:.3f} m/s with alpha <= {least_alpha:.2f} m/s^2 would be proof"
+    return "no lambda that the tilt can keep would be proof"
 
 
 def _limits(config: FlightConfig, loop: Tube, surroundings: Surroundings) -> Finding:

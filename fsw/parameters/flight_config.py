@@ -54,6 +54,7 @@ class FlightLimits:
     safe_set_owner: int = 0  # MAVLink system that owns the safe set; 0: the first to announce one
     breach_action: int = 6  # of the safe set: 1 warn, 2 hold, 5 land, 6 retreat and hold
     owner_timeout_us: int = 10_000_000  # a silent owner may be replaced on the ground
+    zone_timeout_us: int = 3_000_000  # a moving zone that is not announced for this long stands
 
 
 @dataclass(frozen=True, slots=True)

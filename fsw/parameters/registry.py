@@ -303,6 +303,9 @@ _ROWS: Final[dict[str, list[_Row]]] = {
         ("SAFE_OWNER_T", "limits.owner_timeout_us", "s", 2.0, 300.0,
          "Silence after which another source may own the safe set, on the ground",
          _IN_MICROSECONDS),
+        ("SAFE_MOVE_T", "limits.zone_timeout_us", "s", 0.5, 60.0,
+         "Silence after which a moving zone is held where it is predicted then",
+         _IN_MICROSECONDS),
     ],
     "Log": [
         ("LOG_PROFILE", "log_profile", "", 0.0, 1.0,

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from fsw.compiled import kernel
 from fsw.shapes.frame import CENTRE_BALL
-from fsw.shapes.kind import ShapeKind, Surface
+from fsw.shapes.kind import Numbers, ShapeKind, Surface, place_moved
 from fsw.signals import Shape, Vec3
 
 PLANES_INSIDE = 6
@@ -94,6 +94,11 @@ def _plane(
     return cylinder_surface(middle, axis, 0.5 * length, numbers[6], keep_in, which, (x, y, z))
 
 
+def _moved(numbers: Numbers, shift: Vec3) -> Numbers:
+    end = place_moved(numbers[3:], shift)
+    return (*place_moved(numbers[:3], shift), *end)
+
+
 KIND = ShapeKind(
     name="cylinder",
     number=4,
@@ -109,4 +114,5 @@ KIND = ShapeKind(
     planes_inside=PLANES_INSIDE,
     plane=_plane,
     problem=_problem,
+    moved=_moved,
 )

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fsw.compiled import kernel
-from fsw.shapes.kind import ShapeKind, Surface
+from fsw.geometry.vectors import dot
+from fsw.shapes.kind import Numbers, ShapeKind, Surface
 from fsw.signals import Shape, Vec3, Zone
 
 
@@ -42,6 +43,11 @@ def _plane(
     return Surface(-distance, -nx, -ny, -nz) if keep_in else Surface(distance, nx, ny, nz)
 
 
+def _moved(numbers: Numbers, shift: Vec3) -> Numbers:
+    normal = (numbers[0], numbers[1], numbers[2])
+    return (*normal, numbers[3] + dot(normal, shift))
+
+
 KIND = ShapeKind(
     name="half-space",
     number=0,
@@ -49,5 +55,6 @@ KIND = ShapeKind(
     planes_inside=1,
     plane=_plane,
     problem=_problem,
+    moved=_moved,
     flat=True,
 )

@@ -28,6 +28,15 @@ class Surface(NamedTuple):
         return self.nx, self.ny, self.nz
 
 
+Numbers = tuple[float, ...]
+
+
+def place_moved(numbers: Numbers, shift: Vec3) -> Numbers:
+    """``numbers`` [SI] that begin with a shape's place [m, NED], moved by ``shift`` [m, NED]."""
+    x, y, z, *rest = numbers
+    return (x + shift[0], y + shift[1], z + shift[2], *rest)
+
+
 PlaneOf = Callable[[NDArray[np.float64], bool, int, float, float, float], Surface]
 """From (numbers, keep_in, which, x, y, z [m, NED]) to the plane; see ``ShapeKind.plane``."""
 
@@ -45,7 +54,8 @@ class ShapeKind:
     meaning: tuple[str, ...]  # of each of its numbers, with the unit
     planes_inside: int
     plane: PlaneOf  # compiled; the free side is outside, or inside where ``keep_in``
-    problem: Callable[[tuple[float, ...]], str | None]  # why numbers describe no such shape
+    problem: Callable[[Numbers], str | None]  # why numbers describe no such shape
+    moved: Callable[[Numbers, Vec3], Numbers] = place_moved  # the numbers of the shape elsewhere
     flat: bool = False  # its plane is the same wherever the point is
     follows_target: bool = False  # rides on the end-effector's target, and keeps the base alone
 

@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from fsw.compiled import kernel
 from fsw.shapes.cylinder import PLANES_INSIDE, cylinder_surface
-from fsw.shapes.kind import ShapeKind, Surface
-from fsw.signals import Shape, Vec2, Zone
+from fsw.shapes.kind import Numbers, ShapeKind, Surface
+from fsw.signals import Shape, Vec2, Vec3, Zone
 
 ENDLESS = 1e4  # m, half the height of one that goes from far below to far above
 
@@ -43,6 +43,11 @@ def _plane(
     return cylinder_surface(middle, (0.0, 0.0, 1.0), half, numbers[4], keep_in, which, (x, y, z))
 
 
+def _moved(numbers: Numbers, shift: Vec3) -> Numbers:
+    north, east, top, bottom, radius = numbers
+    return north + shift[0], east + shift[1], top + shift[2], bottom + shift[2], radius
+
+
 KIND = ShapeKind(
     name="vertical cylinder",
     number=3,
@@ -50,4 +55,5 @@ KIND = ShapeKind(
     planes_inside=PLANES_INSIDE,
     plane=_plane,
     problem=_problem,
+    moved=_moved,
 )

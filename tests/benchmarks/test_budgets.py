@@ -5,8 +5,6 @@ from __future__ import annotations
 import json
 import os
 import signal
-import subprocess
-import sys
 import time
 from pathlib import Path
 
@@ -78,6 +76,7 @@ def test_a_loop_that_only_sleeps_sees_the_machine_stand_still_and_leaves_nothing
         assert bare.stops.missed_elsewhere(before_it, begin_us - 500_000, 1_000) > 0.1
 
 
+@pytest.mark.long
 def test_a_short_flight_beside_a_busy_program_is_measured_and_leaves_nothing(
     tmp_path: Path,
 ) -> None:
@@ -97,17 +96,15 @@ def test_a_short_flight_beside_a_busy_program_is_measured_and_leaves_nothing(
     assert _descendants() == before
 
 
-def test_bad_options_are_one_sentence() -> None:
-    for words in (["--hogs", "x"], ["--json", "/nowhere/at/all.json"], ["--duration", "0"]):
-        run = subprocess.run(
-            [sys.executable, "-m", "benchmarks", "loop", *words],
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-        assert run.returncode == 2
-        assert run.stderr.startswith("python -m benchmarks loop: ")
-        assert run.stderr.count("\n") == 1
+@pytest.mark.parametrize(
+    "words", [["--hogs", "x"], ["--json", "/nowhere/at/all.json"], ["--duration", "0"]]
+)
+def test_bad_options_are_one_sentence(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit, match="2"):
+        main(words)
+    sentence = capsys.readouterr().err
+    assert sentence.startswith("python -m benchmarks loop: ")
+    assert sentence.count("\n") == 1
 
 
 def _descendants() -> list[str]:

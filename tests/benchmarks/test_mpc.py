@@ -21,7 +21,7 @@ from fsw.model.airframe import AIRFRAME
 from fsw.mpc.planner import Planner
 
 KEYS = {"n", "method", "sqp_iterations", "median_us", "p99_us", "max_us", "suboptimality_p50"}
-LITTLE = Effort(instances=2, duration_s=3.0, budget_us=3e6)
+LITTLE = Effort(instances=2, duration_s=3.0, budget_us=5e5)
 
 
 def silent(what: str, done: int, total: int) -> None:

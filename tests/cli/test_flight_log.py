@@ -49,6 +49,7 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out / "flight.ulg"
 
 
+@pytest.mark.long
 def test_the_same_seed_is_the_same_file_at_any_speed_on_a_busy_machine(log: Path) -> None:
     gcs = f"--gcs=udp:127.0.0.1:{free_port()}"
     flight = start(*FLIGHT, gcs, "--out", "two", "--speed", "1", cwd=log.parent.parent)
@@ -86,6 +87,7 @@ def test_it_says_what_was_flown_and_holds_every_tick_and_the_truth(log: Path) ->
     assert not (log.parent / "truth.ulg").exists()
 
 
+@pytest.mark.long
 def test_with_the_full_profile_it_holds_everything_every_tick(tmp_path: Path) -> None:
     (tmp_path / "full.params").write_text("LOG_PROFILE 1\n")
     out = tmp_path / "full"

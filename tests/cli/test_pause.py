@@ -21,8 +21,8 @@ from tests.cli.test_stall import flying, half_of
         pytest.param(  # what a laptop does whose lid is closed
             ("--realtime",), ("fsw", "sitl"), 3.0, marks=pytest.mark.long
         ),
-        (("--speed", "2"), ("fsw",), 1.0),
-        (("--speed", "2"), ("sitl",), 1.0),
+        pytest.param(("--speed", "2"), ("fsw",), 1.0, marks=pytest.mark.long),
+        pytest.param(("--speed", "2"), ("sitl",), 1.0, marks=pytest.mark.long),
     ],
 )
 def test_a_flight_survives_a_pause(

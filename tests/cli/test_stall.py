@@ -7,6 +7,7 @@ import re
 import signal
 import subprocess
 import time
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -56,7 +57,9 @@ def end_of(flight: subprocess.Popen[str], half: str, number: signal.Signals) -> 
     return took_s, flight.stdout.read()
 
 
+in_long = partial(pytest.param, marks=pytest.mark.long)
 NOT_ANSWERED = r"FAIL the flight software did not answer step \d{3,} .*; fsw did not end"
+KILLED = r"FAIL fsw ended with code -9.*step \d{3,}"
 NOT_SENT = r"FAIL fsw: the simulator sent nothing for .* after step \d{3,}; sitl did not end"
 
 
@@ -64,11 +67,13 @@ NOT_SENT = r"FAIL fsw: the simulator sent nothing for .* after step \d{3,}; sitl
     ("pace", "half", "number", "sentence"),
     [
         (("--speed", "1"), "fsw", signal.SIGSTOP, NOT_ANSWERED),
-        (("--speed", "1"), "sitl", signal.SIGSTOP, NOT_SENT),
-        (("--speed", "1"), "fsw", signal.SIGKILL, r"FAIL fsw ended with code -9.*step \d{3,}"),
+        in_long(("--speed", "1"), "sitl", signal.SIGSTOP, NOT_SENT),
+        in_long(("--speed", "1"), "fsw", signal.SIGKILL, KILLED),
         # In the air the simulator ends at once: a wait would let the vehicle fall.
-        (("--realtime",), "fsw", signal.SIGSTOP, r"FAIL .* silent since step \d{3,}"),
-        (("--realtime",), "fsw", signal.SIGKILL, r"FAIL fsw .* -9.* silent since step \d{3,}"),
+        in_long(("--realtime",), "fsw", signal.SIGSTOP, r"FAIL .* silent since step \d{3,}"),
+        in_long(
+            ("--realtime",), "fsw", signal.SIGKILL, r"FAIL fsw .* -9.* silent since step \d{3,}"
+        ),
         (("--realtime",), "sitl", signal.SIGSTOP, NOT_SENT),
     ],
 )

@@ -56,7 +56,15 @@ FLIGHTS: dict[str, Callable[[], tuple[Flight, Callable[[Flight], None]]]] = {
 }
 
 
-@pytest.mark.parametrize("name", FLIGHTS)
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param("walls", marks=pytest.mark.long),
+        pytest.param("workspace", marks=pytest.mark.long),
+        "branches",  # walls and points
+        "setpoints",
+    ],
+)
 def test_a_flight_finds_every_kernel_ready(name: str) -> None:
     module = "tests.closed_loop.test_nothing_compiles_in_flight"
     flown = subprocess.run(

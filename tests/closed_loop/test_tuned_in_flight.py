@@ -192,6 +192,7 @@ def test_walls_are_kept_whatever_harmless_is_changed_in_flight() -> None:
     assert flight.snapshot.counters.fallbacks == 0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("end", ["least", "most"])
 def test_no_end_of_a_range_makes_a_tick_fail(end: str) -> None:
     """Not to be flown, but to be survived: one tick at each end of each range."""

@@ -12,7 +12,20 @@ import pytest
 from fsw.flight.failsafe import Condition
 from fsw.mpc.planner import Planner
 from fsw.parameters.flight_config import flight_config
-from fsw.signals import Mode, Plan, PlanFailure, PlanRequest, PlanTimings, SensorFrame, SolverStatus
+from fsw.shapes.vertical_cylinder import vertical_cylinder
+from fsw.signals import (
+    MessageSource,
+    Mode,
+    Plan,
+    PlanFailure,
+    PlanRequest,
+    PlanTimings,
+    SafeSet,
+    SafeSetAnnouncement,
+    SensorFrame,
+    SolverStatus,
+    Zone,
+)
 from sitl.scenario_file import load_scenario
 from sitl.simulation import START_US, STEP_US
 from tests.closed_loop.harness import ARM, Flight, command, hover, real_planner
@@ -158,3 +171,29 @@ def test_a_hard_push_is_recovered_from(
     assert flight.sim.ended is None
     assert farthest > felt, "or it was no test"
     assert math.dist(flight.sim.truth().p_WE, held) < 0.02
+
+
+def test_a_person_who_is_announced_no_longer_is_told_of_once_and_stands_until_heard_again() -> None:
+    config = flight_config(body="points")
+    config = replace(config, limits=replace(config.limits, zone_timeout_us=500_000))
+    flight = Flight(hover(), config=config)
+    source = MessageSource(1, 195, "simulator")
+
+    def announce() -> None:
+        at = vertical_cylinder((3.0, 0.0), 0.3, -1.8, 0.0)
+        person = Zone(at, 0.1, velocity=(0.0, 0.5, 0.0), t_us=flight.sim.t_us)
+        flight.streamed = {"announced": (SafeSetAnnouncement(source, SafeSet((person,))),)}
+
+    def where() -> tuple[float, float]:
+        (zone,) = flight.state.mission.safe_set.zones
+        return zone.shape.numbers[1], zone.velocity[1]
+
+    flight.step(command(ARM, 1.0))
+    text = f"{Condition.ZONES_SILENT.value}: 1 held where predicted"
+    for round_ in (1, 2):
+        announce()
+        flight.run(0.4)
+        assert where() == (0.0, 0.5)
+        flight.run(0.8)
+        assert where() == (pytest.approx(0.25), 0.0)
+        assert flight.texts.count(text) == round_

@@ -38,6 +38,15 @@ EARLIER = bytes(range(256)) * 400  # more than one piece of 512 messages
 TYPES = {0: items, 1: fence, 2: rally}
 
 clients = pytest.mark.parametrize("client", [QGC_4_4, QGC_5], ids=lambda c: c.name)
+either_way = pytest.mark.parametrize(
+    ("client", "version"),
+    [
+        pytest.param(QGC_5, 2, id="5-mavlink2"),
+        pytest.param(QGC_4_4, 1, id="4.4-mavlink1"),
+        pytest.param(QGC_5, 1, id="5-mavlink1", marks=pytest.mark.long),
+        pytest.param(QGC_4_4, 2, id="4.4-mavlink2", marks=pytest.mark.long),
+    ],
+)
 versions = pytest.mark.parametrize("version", [2, 1], ids=["mavlink2", "mavlink1"])
 
 
@@ -98,8 +107,7 @@ def test_no_parameter_that_it_insists_on_is_missing_and_none_asks_for_set_up(
     assert wrong == []
 
 
-@clients
-@versions
+@either_way
 def test_every_button_of_the_fly_view_works(
     vehicle: Connected, client: Client, version: int
 ) -> None:
@@ -141,8 +149,7 @@ def download(vehicle: Connected, kind: int) -> list[Message]:
     return found
 
 
-@clients
-@versions
+@either_way
 def test_a_plan_is_uploaded_started_paused_continued_and_flown_to_its_end(
     vehicle: Connected, client: Client, version: int
 ) -> None:

@@ -4,7 +4,7 @@ import struct
 
 import fastcrc
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymavlink.dialects.v10 import common as version_1
 
@@ -65,6 +65,7 @@ def pymavlink_sender(system_id=1, component_id=191, sequence=0):
 
 
 @pytest.mark.parametrize("name", SPOKEN)
+@settings(max_examples=30)
 @given(data=st.data())
 def test_frames_are_byte_identical_with_pymavlink_and_its_own_are_read_as_sent(name, data):
     message = MESSAGES[name]
@@ -140,6 +141,7 @@ OLD = {
 
 
 @pytest.mark.parametrize("name", OLD)
+@settings(max_examples=30)
 @given(data=st.data())
 def test_version_1_is_byte_identical_with_pymavlink_s(name, data):
     """pymavlink's modules of MAVLink 1 know no extensions."""

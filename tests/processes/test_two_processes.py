@@ -83,6 +83,7 @@ def test_neither_a_bad_network_nor_speed_changes_the_flight(clean: Capture, tmp_
     assert bad.result["tracking_error_rms_m"] == clean.result["tracking_error_rms_m"]
 
 
+@pytest.mark.long
 def test_a_stall_of_one_half_ends_the_other_naming_the_step(tmp_path: Path) -> None:
     arguments = ("--listen", "udp:127.0.0.1:0", "--speed", "1", "--duration", "60")
     with contextlib.ExitStack() as processes:

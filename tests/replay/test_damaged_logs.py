@@ -59,8 +59,10 @@ class Attempt:
         return code
 
 
+@pytest.mark.parametrize("flips", [12, pytest.param(120, marks=pytest.mark.long)])
 @each_command
 def test_a_byte_flipped_anywhere_is_no_traceback(
+    flips: int,
     command: Callable[[Path], int],
     whole: bytes,
     definitions: int,
@@ -71,11 +73,11 @@ def test_a_byte_flipped_anywhere_is_no_traceback(
     assert attempt(whole) == 0
     refused = 0
     for first, last in ((0, definitions), (definitions, len(whole))):
-        for _ in range(60):
+        for _ in range(flips):
             damaged = bytearray(whole)
             damaged[chance.randrange(first, last)] ^= chance.randrange(1, 256)
             refused += attempt(damaged) == 2
-    assert refused > 20
+    assert refused > flips // 3
 
 
 @each_command
@@ -103,7 +105,7 @@ def test_a_log_cut_between_two_records_is_compared_up_to_its_last_whole_tick(
     ends = [(log.at, record) for record in log.records()]
     starts = [k for k, (_, r) in enumerate(ends) if r.number == TOPICS.index(SENSOR_FRAME)]
     ticks = len(starts)
-    for k in range(starts[-4], len(ends)):
+    for k in range(starts[-2], len(ends)):
         assert attempt(whole[: ends[k][0]]) == 0
         found = json.loads((tmp_path / "j").read_text())
         complete = k == len(ends) - 1

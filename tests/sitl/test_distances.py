@@ -163,7 +163,7 @@ def points_of(parts: Parts, b: int, places: Array, random: np.random.Generator) 
 def test_no_point_of_a_part_is_nearer_and_its_bound_is_below(word: str, keep_in: bool) -> None:
     random, parts = np.random.default_rng(3), as_arrays(PARTS, VEHICLE)
     shift = (0.1, -0.2, 0.3)
-    for _ in range(8):
+    for _ in range(3):
         table, _, _ = zone(word, random)
         kind, values = numbers(table)
         places = posed(random)

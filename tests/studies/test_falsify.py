@@ -16,6 +16,9 @@ from studies.plan_record import PlanRecord, record
 from studies.tracked_flight import Disturbance
 from studies.whole_flight import WholeFlight
 
+# Its kernel is compiled for ten seconds in each process.
+pytestmark = pytest.mark.long
+
 SCENARIO = replace(load_scenario("workspace"), duration_s=9.0)
 NOW = flight_config(body="points")
 
@@ -56,7 +59,6 @@ def _chase(config: FlightConfig, amplitude: float, axes: tuple[int, int, int]) -
     return hunt.outcome()
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("axes", [(1, 0, 0), (0, 1, 0)])
 def test_the_old_loop_breaks_its_bound_on_one_axis(axes: tuple[int, int, int]) -> None:
     outcome = _chase(_before(), 0.8, axes)
@@ -99,7 +101,6 @@ def test_what_was_found_flies_the_same_with_planner_and_referee() -> None:
     assert flown.margin_m == pytest.approx(worst.margin_m, abs=1e-3)
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("name", ["shelf", "crossing"])
 def test_the_margins_of_a_full_body_are_those_of_the_referee(name: str) -> None:
     scenario = replace(load_scenario(name), duration_s=7.0)

@@ -10,7 +10,8 @@ from scipy.spatial.transform import Rotation
 
 from fsw.barriers.constraint_block import TargetPoints
 from fsw.barriers.margins import Margins
-from fsw.barriers.zone_rows import ZoneRows, layout, nearest_place
+from fsw.barriers.nearest_place import nearest_place
+from fsw.barriers.zone_rows import ZoneRows, layout
 from fsw.model.airframe import AIRFRAME
 from fsw.model.body import DISC, FORM, ON, RADIUS, SPHERE, Body, Part, body_of
 from fsw.model.linearisation import position, velocity
@@ -22,11 +23,12 @@ from fsw.shapes.box import box
 from fsw.shapes.half_space import wall
 from fsw.shapes.target_sphere import target_sphere
 from fsw.shapes.zones import zone_arrays
-from fsw.signals import SafeSet, Shape, StateEstimate, Vec3, Zone
+from fsw.signals import SafeSet, Shape, Vec3, Zone
 from tests.fsw.barriers.horizons import MODEL, NODES, PERIOD, TUNING, Case, random_case, safe_speed
 from tests.fsw.mpc.requests import below, hovering, planned, planner, request
 from tests.fsw.random_states import random_estimate, vec3
 from tests.fsw.shapes import by_coal
+from tests.fsw.vehicle_places import placed
 
 FULL = body_of("full", AIRFRAME)
 OUT = [
@@ -125,19 +127,6 @@ def test_a_zone_is_where_it_is_at_the_time_of_each_node() -> None:
         here.refill(case.horizon(), at_us(case.targets, 700_000))
         of_node = here.rows.node == node
         np.testing.assert_allclose(here.rows.value[of_node], there.rows.value[of_node], atol=1e-9)
-
-
-def placed(estimate: StateEstimate) -> dict[int, tuple[Array, Rotation]]:
-    """Origin and attitude of what parts are on: base, link 1, link 2."""
-    R_WB = Rotation.from_matrix(np.reshape(estimate.R_WB, (3, 3)))
-    first = R_WB * Rotation.from_euler("Y", estimate.q_arm[0])
-    second = first * Rotation.from_euler("Y", estimate.q_arm[1])
-    p = np.array(estimate.p_WB)
-    return {
-        0: (p, R_WB),
-        1: (p, first),
-        2: (p + first.apply([0.0, 0.0, AIRFRAME.link_length[0]]), second),
-    }
 
 
 def middle_of(part: Part, on: tuple[Array, Rotation]) -> by_coal.Solid:

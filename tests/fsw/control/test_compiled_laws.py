@@ -86,7 +86,7 @@ def test_the_loops_do_as_machine_code_what_they_say_in_python(
             ticks,
             zones,
         )
-        plain = list(numbers(close_loops(cascade.law, *case)))
+        plain = list(numbers(close_loops(cascade.law, *case, cascade.probes)))
         np.testing.assert_allclose(list(numbers(cascade.step(*case))), plain, rtol=0, atol=1e-9)
         pushed += cascade.step(*case)[2][0]
     assert 0 < pushed < STATES, "with and without the safety filter"

@@ -11,24 +11,31 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from fsw.barriers.margins import Margins
 from fsw.barriers.safe_approach import BarrierTuning
 from fsw.control.safety_filter import (
     NO_ZONES,
     FilterLaw,
     FilterTuning,
     filter_law,
+    filter_probes,
     filtered,
     moving_zones,
 )
 from fsw.geometry.vectors import dot
 from fsw.model.airframe import AIRFRAME
-from fsw.model.body import body_of
+from fsw.model.body import Part, body_of
+from fsw.model.prediction import Array
+from fsw.shapes import KINDS
 from fsw.shapes.ball import ball
+from fsw.shapes.box import box
 from fsw.shapes.half_space import wall
 from fsw.shapes.target_sphere import target_sphere
-from fsw.signals import EndEffectorTarget, SafeSet, StateEstimate, Vec3, Zone
-from tests.fsw.random_states import estimate_of
+from fsw.signals import EndEffectorTarget, SafeSet, Shape, StateEstimate, Vec3, Zone
+from sitl.distance import along_segment, farthest_of_rotor, nearest, of_rotor
+from sitl.shapes import KINDS as REFEREE_KINDS
+from tests.fsw.random_states import estimate_of, random_estimate, vec3
+from tests.fsw.shapes import by_coal
+from tests.fsw.vehicle_places import placed
 
 ZERO: Vec3 = (0.0, 0.0, 0.0)
 LAG = 0.11
@@ -37,12 +44,12 @@ STRICT = FilterTuning(allowance=0.0)
 AHEAD = wall((-1.0, 0.0, 0.0), -1.0, 0.1)  # the vehicle must stay at x < 0.9
 
 
-def law_of(body: str = "points", tuning: FilterTuning = STRICT, lag: float = LAG) -> FilterLaw:
-    shape = body_of(body, AIRFRAME)  # type: ignore[arg-type]
-    return filter_law(tuning, (TUNING, TUNING), shape, AIRFRAME.link_length, lag, 2.5)
+def law_of(tuning: FilterTuning = STRICT, lag: float = LAG) -> FilterLaw:
+    return filter_law(tuning, (TUNING, TUNING), AIRFRAME.link_length, lag, 2.5)
 
 
 LAW = law_of()
+POINTS = filter_probes(body_of("points", AIRFRAME))
 
 
 def at(p: Vec3, t_us: int = 0, rotation: Rotation | None = None) -> StateEstimate:
@@ -54,7 +61,7 @@ def at(p: Vec3, t_us: int = 0, rotation: Rotation | None = None) -> StateEstimat
 def asked(
     zones: tuple[Zone, ...], p: Vec3, v: Vec3, wanted: Vec3, a: Vec3 = ZERO, law: FilterLaw = LAW
 ) -> tuple[Vec3, bool, float]:
-    return filtered(law, moving_zones(SafeSet(zones), None), at(p), v, a, wanted)
+    return filtered(law, POINTS, moving_zones(SafeSet(zones), None), at(p), v, a, wanted)
 
 
 def least_needed(distance: float, rate: float, along: float = 0.0) -> float:
@@ -71,7 +78,11 @@ def least_needed(distance: float, rate: float, along: float = 0.0) -> float:
 
 def test_without_zones_or_far_from_them_nothing_is_changed() -> None:
     wanted = (2.5, 0.1, -0.3)
-    assert filtered(LAW, NO_ZONES, at(ZERO), ZERO, ZERO, wanted) == (wanted, False, math.inf)
+    assert filtered(LAW, POINTS, NO_ZONES, at(ZERO), ZERO, ZERO, wanted) == (
+        wanted,
+        False,
+        math.inf,
+    )
     assert asked((AHEAD,), (0.2, 0.0, -1.0), ZERO, wanted) == (wanted, False, math.inf)
     assert moving_zones(SafeSet(), None) is NO_ZONES
 
@@ -132,30 +143,66 @@ def test_a_vehicle_that_is_driven_at_a_wall_stops_in_front_of_it(
     assert x > 0.8 or eager == 0.0, "and it comes as close as it may"
 
 
-def test_a_part_of_the_body_is_kept_off_and_not_its_origin_alone() -> None:
-    law, tilted = law_of("full"), Rotation.from_euler("xyz", (0.1, 0.2, 0.7))
-    parts = body_of("full", AIRFRAME)
-    margins = Margins(parts, AIRFRAME.link_length, (TUNING, TUNING), 0.1)
-    for normal in ((-1.0, 0.0, 0.0), (0.6, 0.8, 0.0), (0.0, 0.0, -1.0), (0.0, -0.6, 0.8)):
-        safe_set = SafeSet((wall(normal, -0.45, 0.0),))
-        there = at((0.1, -0.1, 0.05), rotation=tilted)._replace(q_arm=(0.5, -0.3))
-        _, _, margin = filtered(law, moving_zones(safe_set, None), there, ZERO, ZERO, ZERO)
-        exact = margins.report(safe_set, there, None).margins
-        seen = [m for m, part in zip(exact, parts.parts, strict=True) if part.end is None]
-        assert margin == pytest.approx(min(seen), abs=2e-3)
+@pytest.mark.parametrize("keep_in", [False, True])
+@pytest.mark.parametrize("kind", [kind.name for kind in KINDS if not kind.follows_target])
+def test_the_margin_is_what_the_referee_sees_of_every_part(kind: str, keep_in: bool) -> None:
+    """The referee searches by golden sections with distances of its own; as near as it acts."""
+    random, law, compared = np.random.default_rng(5), law_of(replace(STRICT, near=100.0)), 0
+    full = body_of("full", AIRFRAME)
+    for _ in range(100):
+        there = random_estimate(random)._replace(p_WB=vec3(random.uniform(-1.2, 1.2, 3)))
+        shape, on = by_coal.random_shape(kind, random, 4.0 if keep_in else 1.0), placed(there)
+        zones = moving_zones(SafeSet((Zone(shape, 0.05, keep_in=keep_in),)), None)
+        seen = min(by_referee(shape, keep_in, part, *on[part.on]) for part in full.parts) - 0.05
+        if 0.0 < seen < STRICT.near:
+            compared += 1
+            _, _, margin = filtered(law, filter_probes(full), zones, there, ZERO, ZERO, ZERO)
+            assert margin == pytest.approx(seen, abs=5e-4)
+    assert compared > 10
+
+
+def by_referee(shape: Shape, keep_in: bool, part: Part, origin: Array, turned: Rotation) -> float:
+    number = next(kind.number for kind in KINDS if kind.name == shape.kind)
+    which = next(k for k, kind in enumerate(REFEREE_KINDS) if kind.number == number)
+    numbers = np.array((*shape.numbers, *(0.0,) * (16 - len(shape.numbers))))
+    begin = vec3(origin + turned.apply(part.begin))
+    end = vec3(origin + turned.apply(part.end or part.begin))
+    if part.rim > 0.0:
+        axis = vec3(turned.as_matrix()[:, 2])
+        if keep_in:
+            return -farthest_of_rotor(which, numbers, begin, axis, part.rim, 0.0) - part.radius
+        return of_rotor(which, numbers, begin, axis, part.rim, 0.0) - part.radius
+    if keep_in:
+        deep = [nearest(which, numbers, place).distance for place in (begin, end)]
+        return -max(deep) - part.radius
+    return along_segment(which, numbers, begin, end) - part.radius
+
+
+def test_every_wall_of_a_room_keeps_the_vehicle_in() -> None:
+    room = moving_zones(SafeSet((Zone(box(ZERO, (1.0, 1.2, 1.5)), 0.0, keep_in=True),)), None)
+    for axis, half in enumerate((1.0, 1.2, 1.5)):
+        for sign in (1.0, -1.0):
+            p = [0.0, 0.0, 0.0]
+            p[axis] = sign * (half - 0.05)
+            parts = POINTS[:1]  # the base alone
+            result, changed, margin = filtered(
+                LAW, parts, room, at(vec3(p)), vec3(np.multiply(4.0, p)), ZERO, ZERO
+            )
+            assert changed
+            assert margin == pytest.approx(0.05)
+            assert sign * result[axis] < -0.5
 
 
 def test_a_zone_that_moves_is_where_it_is_now_and_its_speed_counts() -> None:
     zone = Zone(ball((2.0, 0.0, -1.0), 0.3), 0.1, velocity=(-1.0, 0.0, 0.0), t_us=1_000_000)
     zones = moving_zones(SafeSet((zone,)), None)
     there = at((0.3, 0.0, -1.0), t_us=2_000_000)
-    result, changed, margin = filtered(law=LAW, zones=zones, estimate=there, v=ZERO, a=ZERO,
-                                       wanted=ZERO)  # fmt: skip
+    result, changed, margin = filtered(LAW, POINTS, zones, there, ZERO, ZERO, ZERO)
     assert margin == pytest.approx(0.3)
     assert changed
     assert result[0] < -0.5, "it yields"
     earlier = there._replace(t_us=1_000_000)
-    assert filtered(LAW, zones, earlier, ZERO, ZERO, ZERO) == (ZERO, False, math.inf)
+    assert filtered(LAW, POINTS, zones, earlier, ZERO, ZERO, ZERO) == (ZERO, False, math.inf)
 
 
 def test_the_sphere_rides_on_the_target_and_holds_the_base_alone() -> None:
@@ -164,17 +211,17 @@ def test_the_sphere_rides_on_the_target_and_holds_the_base_alone() -> None:
     assert len(moving_zones(safe_set, None)) == 1, "without a target there is no sphere"
     zones = moving_zones(SafeSet(safe_set.zones[:1]), target)
     centre = at((1.05, 0.0, -1.2), t_us=1_100_000)
-    _, changed, margin = filtered(LAW, zones, centre, (0.5, 0.0, 0.0), ZERO, ZERO)
+    _, changed, margin = filtered(LAW, POINTS, zones, centre, (0.5, 0.0, 0.0), ZERO, ZERO)
     assert (changed, margin) == (False, pytest.approx(0.1))
     behind = centre._replace(p_WB=(0.98, 0.0, -1.2))
-    result, changed, margin = filtered(LAW, zones, behind, ZERO, ZERO, ZERO)
+    result, changed, margin = filtered(LAW, POINTS, zones, behind, ZERO, ZERO, ZERO)
     assert changed
     assert margin == pytest.approx(0.03)
     assert result[0] > 0.5
 
 
 def test_less_is_asked_for_with_a_negative_allowance() -> None:
-    lenient = law_of(tuning=replace(STRICT, allowance=-1.0))
+    lenient = law_of(replace(STRICT, allowance=-1.0))
     args = ((AHEAD,), (0.85, 0.0, -1.0), (0.2, 0.0, 0.0), (0.5, 0.0, 0.0))
     strict, _, _ = asked(*args)
     less, _, _ = asked(*args, law=lenient)

@@ -20,7 +20,14 @@ from fsw.flight.failsafe import (
     active,
     report,
 )
-from fsw.flight.state import FlightState, OffboardMemory, PlanMemory, SafetyMemory, VehicleMemory
+from fsw.flight.state import (
+    FlightState,
+    MissionMemory,
+    OffboardMemory,
+    PlanMemory,
+    SafetyMemory,
+    VehicleMemory,
+)
 from fsw.parameters.flight_config import FlightConfig, FlightLimits, flight_config
 from fsw.signals import BatteryState, Charge, Mode, Severity
 from tests.fsw.random_states import random_estimate
@@ -46,6 +53,7 @@ class Evidence:
     setpoint_age_us: int = 0
     gcs_silent_us: int = 0
     battery: BatteryState = field(default_factory=BatteryState)
+    silent_zones: int = 0
     safety: SafetyMemory = field(default_factory=SafetyMemory)
     config: FlightConfig = CONFIG
 
@@ -58,6 +66,7 @@ class Evidence:
             plan=PlanMemory(since_us=NOW_US - self.plan_age_us, refused=self.plan_refused),
             offboard=OffboardMemory(motion_us=NOW_US - self.setpoint_age_us),
             battery=self.battery,
+            mission=MissionMemory(silent_zones=self.silent_zones),
             safety=self.safety,
         )
         level = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, self.up)
@@ -111,6 +120,7 @@ def test_nothing_wrong_is_no_condition() -> None:
         (replace(FINE, safety=OUTSIDE), Condition.BREACH),
         (replace(FINE, safety=OFF_PLAN), Condition.TUBE_LEFT),
         (OFFBOARD, Condition.SETPOINTS_LOST),
+        (replace(FINE, silent_zones=1), Condition.ZONES_SILENT),
         (replace(FINE, gcs_silent_us=10_000_000), Condition.DATALINK_LOST),
         (replace(FINE, battery=charged(Charge.LOW)), Condition.BATTERY_LOW),
         (replace(FINE, battery=charged(Charge.CRITICAL)), Condition.BATTERY_CRITICAL),
@@ -243,6 +253,7 @@ def test_a_report_names_the_condition_its_number_and_what_is_done() -> None:
 
 def test_a_fault_is_the_vehicles_own() -> None:
     others = {Condition.SETPOINTS_LOST, Condition.DATALINK_LOST, Condition.BATTERY_LOW}
+    others |= {Condition.ZONES_SILENT}
     others |= {Condition.BATTERY_CRITICAL, Condition.BATTERY_EMERGENCY}
     assert set(Condition) - others == FAULTS
 

@@ -230,6 +230,45 @@ def test_a_zone_that_moves_is_told_of_once_however_often_it_is_updated() -> None
     assert "zone 2 (vertical cylinder)" in refused(texts)
 
 
+def walker(t_us: int, north: float = 0.0) -> Zone:
+    at = vertical_cylinder((north, 3.0), 0.25, -1.8, 0.0)
+    return Zone(at, 0.3, velocity=(0.5, -0.1, 0.0), t_us=t_us)
+
+
+def test_a_moving_zone_that_is_silent_too_long_is_held_where_it_is_predicted_then() -> None:
+    announced = SafeSet((NORTH, walker(1_000_000)))
+    memory, _ = received(MissionMemory(), announced, fence=SafeSet((SOUTH,)))
+    late_us = 1_000_000 + CONFIG.limits.zone_timeout_us
+    assert CHECK.hold_silent_zones(memory, late_us - 1) is memory
+    held = CHECK.hold_silent_zones(memory, late_us + 50_000)
+    seconds = 1e-6 * CONFIG.limits.zone_timeout_us
+    there = vertical_cylinder((0.5 * seconds, 3.0 - 0.1 * seconds), 0.25, -1.8, 0.0)
+    (north, stands, south) = held.safe_set.zones
+    assert (north, south) == (NORTH, SOUTH)
+    assert (stands.velocity, stands.clearance, stands.keep_in) == ((0.0, 0.0, 0.0), 0.3, False)
+    assert stands.shape.numbers == pytest.approx(there.numbers)
+    assert held.silent_zones == 1
+    assert CHECK.hold_silent_zones(held, late_us + 10**9) is held, "once"
+    fenced, _ = received(held, fence=SafeSet((TREE,)), t_s=9.0)
+    assert fenced.safe_set == SafeSet((NORTH, stands, TREE)), "a fence does not start it again"
+    assert fenced.silent_zones == 1
+    late, texts = received(held, announced, t_s=9.0)
+    assert (late.safe_set, texts) == (held.safe_set, []), "what was heard before is not new"
+    again = SafeSet((NORTH, walker(9_000_000, north=4.0)))
+    back, texts = received(held, again, t_s=9.0)
+    assert back.safe_set == joined(again, SafeSet((SOUTH,)))
+    assert back.silent_zones == 0
+    assert told(texts)[-1].endswith(": 1 half-space, 1 vertical cylinder")
+
+
+def test_a_moving_zone_with_the_stamp_of_another_clock_stands_where_its_numbers_say() -> None:
+    """A station's Unix time; predicted back by it, the zone would be nowhere near."""
+    memory, _ = received(MissionMemory(), SafeSet((walker(1_700_000_000_000_000),)))
+    (stands,) = CHECK.hold_silent_zones(memory, 1_000_000).safe_set.zones
+    assert stands.shape == walker(0).shape
+    assert stands.velocity == (0.0, 0.0, 0.0)
+
+
 def test_a_repetition_of_the_owner_does_not_take_back_what_another_source_shrank() -> None:
     memory, _ = received(MissionMemory(), walled(5.0, 5.0))
     memory, _ = received(memory, walled(3.0, 5.0), source=STRANGER)

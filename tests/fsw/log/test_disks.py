@@ -49,7 +49,10 @@ def small_disk() -> Iterator[None]:
     signal.signal(signal.SIGXFSZ, handler)
 
 
-@pytest.mark.parametrize("lockstep", [True, False], ids=["lockstep", "realtime"])
+@pytest.mark.parametrize(
+    "lockstep",
+    [pytest.param(True, id="lockstep", marks=pytest.mark.long), pytest.param(False, id="realtime")],
+)
 def test_a_full_disk_ends_the_files_and_is_told_once_a_file(
     lockstep: bool, tmp_path: Path, small_disk: None
 ) -> None:
@@ -129,6 +132,7 @@ def ticks_in(path: Path) -> int:
     return sum(isinstance(tick, LoggedTick) for tick in ticks(open_flight(path)))
 
 
+@pytest.mark.long
 def test_a_killed_process_leaves_readable_logs(tmp_path: Path) -> None:
     paths = (tmp_path / "lockstep", tmp_path / "realtime")
     process = subprocess.Popen(

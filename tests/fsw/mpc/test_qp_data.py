@@ -81,7 +81,7 @@ def targets_of(asked: Question) -> TargetPoints:
     [SafeSet(), WALLS, POINTS, SPHERE, BOTH],
     ids=["open", "walls", "points", "sphere", "both"],
 )
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [1, *(pytest.param(k, marks=pytest.mark.long) for k in (2, 3))])
 @pytest.mark.parametrize(("iterations", "tolerance"), [(1, 0.01), (2, 0.1)])
 def test_the_plan_is_the_optimum_of_the_problem_written_a_second_time(
     safe_set: SafeSet, seed: int, iterations: int, tolerance: float

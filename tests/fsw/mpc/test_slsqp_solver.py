@@ -94,8 +94,13 @@ def converged(ocp: Ocp, start: Array, targets: TargetPoints) -> Array:
 # Differences in place of slopes only for the barriers: they are twenty times as slow, and the
 # slopes of every controller are compared with differences below.
 SEARCHES = [
-    *((controller, "analytic") for controller in VARIANTS),
-    ("blf", "numeric"),
+    ("blf", "analytic"),
+    *(
+        pytest.param(controller, "analytic", marks=pytest.mark.long)
+        for controller in VARIANTS
+        if controller != "blf"
+    ),
+    pytest.param("blf", "numeric", marks=pytest.mark.long),
 ]
 
 
@@ -247,6 +252,7 @@ def test_what_is_not_finite_is_refused() -> None:
     assert answer.status is SolverStatus.INPUT_REFUSED
 
 
+@pytest.mark.long
 def test_a_failure_is_no_plan() -> None:
     behind = hovering()._replace(p=(3.0, 0.0, -1.2))
     slsqp = planner(replace(CONFIG, controller="hc", solver="slsqp"))

@@ -126,3 +126,45 @@ def test_a_point_that_a_link_could_pass_through_is_worth_a_warning(
     finding = _findings(flight_config(body="points"), safe_set)["links"]
     assert finding.holds is holds
     assert not finding.refuses
+
+
+def with_walls(config: FlightConfig, **changes: float) -> FlightConfig:
+    walls = replace(config.planner.walls, **changes)
+    return replace(config, planner=replace(config.planner, walls=walls))
+
+
+def test_the_full_body_is_told_of_its_feet_and_rotors_with_values_that_do() -> None:
+    assert "part tube" not in _findings(flight_config(body="points"), WALLS)
+    config = flight_config(body="full")
+    beside, above = (
+        _findings(config, SafeSet((wall(normal, -1.0, 0.1),)))["part tube"].statement
+        for normal in ((-1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+    )
+    assert "can move the foot 122 mm" in beside
+    assert "can move the rotors 94 mm" in above
+    assert beside.endswith("lambda >= 0.488 m/s with alpha <= 1.67 m/s^2 would be proof")
+    for lambda_, holds in ((0.488, True), (0.48, False)):
+        found = _findings(with_walls(config, lambda_=lambda_, alpha=1.67), WALLS)
+        assert found["part tube"].holds is holds
+        assert found["actuation"].holds
+    assert not _findings(with_walls(config, lambda_=0.488, alpha=1.7), WALLS)["actuation"].holds
+
+
+def test_a_value_that_the_tilt_cannot_keep_is_not_given_as_proof() -> None:
+    config = flight_config(body="points")
+    windy = replace(config, surroundings=replace(config.surroundings, disturbance=2.5))
+    assert (
+        "no lambda that the tilt can keep" in _findings(windy, WALLS)["end-effector tube"].statement
+    )
+
+
+def test_the_end_effector_is_said_to_follow_the_base_where_the_arm_gives_way() -> None:
+    config = flight_config(body="points")
+    helped = _findings(config, WALLS)["end-effector tube"].statement
+    assert "225 mm below the base can be pushed 106 mm" in helped
+    assert "along it once the base is 55 mm off" in helped
+    rigid = replace(config, tuning=replace(config.tuning, compensate=False))
+    assert (
+        "across the arm's plane and along it, by"
+        in _findings(rigid, WALLS)["end-effector tube"].statement
+    )

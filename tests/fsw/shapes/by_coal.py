@@ -110,12 +110,12 @@ def _reach_of_cylinder(begin: Array, end: Array, radius: float, n: Array) -> flo
     return max(float(n @ begin), float(n @ end)) + radius * across
 
 
-def random_shape(kind: str, random: np.random.Generator) -> Shape:
-    """Of the size of what a vehicle meets, near the origin."""
+def random_shape(kind: str, random: np.random.Generator, larger: float = 1.0) -> Shape:
+    """Of the size of what a vehicle meets, or so many times larger, near the origin."""
     at = random.uniform(-0.5, 0.5, 3)
     direction = random.standard_normal(3)
     direction /= np.linalg.norm(direction)
-    size = random.uniform(0.1, 1.0, 3)
+    size = larger * random.uniform(0.1, 1.0, 3)
     match kind:
         case "half-space":
             numbers = [*direction, random.uniform(-0.5, 0.5)]

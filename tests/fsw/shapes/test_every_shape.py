@@ -136,6 +136,16 @@ def enclosed_by(normals: Array) -> bool:
     return np.linalg.matrix_rank(normals) == 3 and np.allclose(normals.sum(axis=0), 0.0)
 
 
+@every_kind
+@given(seed=seeds)
+def test_a_moved_shape_is_where_it_was_moved_to(kind: str, seed: int) -> None:
+    shape, random = drawn(kind, seed)
+    shift, p = vec3(random.uniform(-2.0, 2.0, 3)), random_point(random)
+    moved = Shape(kind, kind_of(shape).moved(shape.numbers, shift))
+    there, here = outside(moved, vec3(np.add(p, shift))), outside(shape, p)
+    assert there == pytest.approx(here, abs=1e-9)
+
+
 def test_names_and_numbers_are_each_of_one_kind() -> None:
     assert len(BY_NAME) == len(BY_NUMBER) == len(KINDS)
     assert all(kind.size <= NUMBERS for kind in KINDS)

@@ -1,0 +1,23 @@
+"""Compile the kernels of one half into the cache on disk, before tests that need them run."""
+
+from __future__ import annotations
+
+import sys
+
+
+def compile_kernels(half: str) -> None:
+    """Build what flies, or what simulates; either compiles all that it calls."""
+    if half == "fsw":
+        from fsw.parameters.control_choice import ControlChoice
+        from fsw.runtime.assembly import flight_software
+
+        flight_software(ControlChoice())
+    else:
+        from sitl.scenario_file import load_scenario
+        from sitl.simulation import Simulation
+
+        Simulation(load_scenario("walls"), 0)
+
+
+if __name__ == "__main__":
+    compile_kernels(sys.argv[1])
