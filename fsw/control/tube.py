@@ -146,9 +146,9 @@ def all_axes(airframe: Airframe, loop: Tube, disturbance: float) -> tuple[float,
 def all_axes_up_to(airframe: Airframe, loop: Tube, most: float) -> float:
     """Largest disturbance of all axes, up to ``most`` [m/s^2], that saturates no rotor [m/s^2].
 
-    At the worst heading both horizontal axes ask the same pair of rotors, root 2 times as much; a
-    quarter of a right angle on, each asks one pair. Less thrust turns the vehicle's lean
-    into less acceleration, and the pairs share it; one pair can have what the other one leaves.
+    Half-way between the axes both ask the same pair of rotors, root 2 times as much; along the axes
+    each asks a pair of its own. With less thrust a turn makes less snap, and the pairs share less
+    of it; a pair can have what the other one leaves.
     """
     low, high = 0.0, most
     while high - low > 1e-3:
