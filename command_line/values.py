@@ -73,3 +73,22 @@ def _float(text: str) -> float:
         return float(text)
     except ValueError:
         return math.nan
+
+
+def place(text: str) -> tuple[float, float, float]:
+    """Read LATITUDE,LONGITUDE,ALTITUDE in degrees and metres.
+
+    Raises:
+        ValueError: It is no place.
+    """
+    try:
+        latitude, longitude, altitude = (float(word) for word in text.split(","))
+    except ValueError:
+        raise ValueError(f"origin '{text}' is not LATITUDE,LONGITUDE,ALTITUDE") from None
+    # At the poles there is no north.
+    if not (abs(latitude) <= 89.0 and abs(longitude) <= 180.0 and -500.0 <= altitude <= 9000.0):
+        raise ValueError(
+            f"origin '{text}' is out of range: latitude -89 to 89, longitude -180 to 180 degrees, "
+            "altitude -500 to 9000 m"
+        )
+    return latitude, longitude, altitude

@@ -15,11 +15,12 @@ from enum import Enum, IntEnum
 from typing import Final, NamedTuple
 
 from fsw.frozen import dataclass
+from fsw.measurements import Sample
+from fsw.measurements import Vec2 as Vec2
+from fsw.measurements import Vec3 as Vec3
+from fsw.measurements import Vec4 as Vec4
 from fsw.tuning import Tuning
 
-Vec2 = tuple[float, float]
-Vec3 = tuple[float, float, float]
-Vec4 = tuple[float, float, float, float]
 MAX_DISTANCE = 1000.0  # m from the origin; a place farther off is a slip: of frame, unit or sign
 MAX_MISSION_SPEED = 1.0  # m/s, of a mission's segment
 Mat3 = tuple[float, float, float, float, float, float, float, float, float]  # row-major
@@ -733,6 +734,8 @@ class TickInputs:
     mission: MissionUpdate | None = None  # newly uploaded
     tuning: Tuning | None = None  # requested, whole
     stale_us: int = 0  # how much older the sensors' readings are, where no newer ones had come
+    # What sensors with times of their own measured; with any, the frame gives the time alone.
+    samples: tuple[Sample, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,7 +23,8 @@ from pandion.processor import ANYWHERE, lockstep_places
 from pandion.result import FlightReports, as_json, table_rows
 from pandion.supervisor import Flown, ProcessFailed, Supervisor
 from sitl.arguments import RunOptions, SitlOptions
-from sitl.scenario_file import ScenarioError, load_scenario, scenario_digest
+from sitl.earth import Place
+from sitl.scenario_file import ScenarioError, load_scenario, scenario_digest, suite_of
 
 COMPLETED, NOT_COMPLETED = 0, 1  # exit codes
 # The flight software compiles when it is started for the first time; the supervisor ends the wait
@@ -48,6 +49,7 @@ class PlannedFlight:
 
     options: FlyOptions
     name: str  # of the scenario
+    sensors: str  # suite
     body: str  # that the scenario is for
     digest: str  # of the scenario's file
     duration_s: float
@@ -83,13 +85,14 @@ def planned(options: FlyOptions) -> PlannedFlight:
         LinkError: An address of a link is none.
         OSError: The directory for the logs cannot be made.
     """
-    scenario = load_scenario(options.scenario)
+    scenario = load_scenario(options.scenario, options.sensors)
     addresses(options.links)
     if options.realtime and options.speed not in (None, 1.0):
         raise ScenarioError("--realtime flies at speed 1; --speed needs --lockstep")
     return PlannedFlight(
         options=options,
         name=scenario.name,
+        sensors=suite_of(scenario),
         body=scenario.body,
         digest=scenario_digest(options.scenario),
         duration_s=scenario.duration_s if options.duration_s is None else options.duration_s,
@@ -103,7 +106,7 @@ def _banner(flight: PlannedFlight, display: Display) -> None:
     endless = math.isinf(flight.duration_s)
     length = "until interrupted" if endless else f"{flight.duration_s:g} s"
     display.say(
-        f"Pandion {version()}: {flight.name}, seed {options.seed}, "
+        f"Pandion {version()}: {flight.name}, seed {options.seed}, {flight.sensors} sensors, "
         f"{length}, {options.control.controller} controller, {pacing}"
     )
     port = parse_address(options.links.gcs)[1]
@@ -115,7 +118,14 @@ def _banner(flight: PlannedFlight, display: Display) -> None:
 
 def _sitl_options(flight: PlannedFlight) -> SitlOptions:
     common = {field.name: getattr(flight.options, field.name) for field in fields(RunOptions)}
-    return SitlOptions(**common, listen="udp:127.0.0.1:0", wait_s=_WAIT_S, out=flight.out)
+    at = flight.options.links.origin
+    return SitlOptions(
+        **common,
+        listen="udp:127.0.0.1:0",
+        wait_s=_WAIT_S,
+        origin=Place(at.latitude, at.longitude, at.altitude),
+        out=flight.out,
+    )
 
 
 def _fsw_options(flight: PlannedFlight, port: int) -> FswOptions:

@@ -45,6 +45,7 @@ def as_json(reports: FlightReports) -> dict[str, Any]:
         "scenario": reports.scenario,
         "controller": reports.controller,
         "seed": reports.seed,
+        "sensors": truth.get("sensors"),
         "duration_s": truth.get("duration_s", 0.0),
         "completed": bool(truth.get("completed"))
         and reports.failure is None

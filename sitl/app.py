@@ -27,7 +27,7 @@ def run(options: SitlOptions) -> int:
 def _run(options: SitlOptions, events: Events) -> int:
     if options.realtime and options.speed not in (None, 1.0):
         raise CouldNotStart("--realtime flies at speed 1; --speed needs --lockstep")
-    scenario = load_scenario(options.scenario)
+    scenario = load_scenario(options.scenario, options.sensors)
     if options.duration_s is not None:
         scenario = dataclasses.replace(scenario, duration_s=options.duration_s)
     _check_outputs(options)

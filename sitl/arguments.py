@@ -8,7 +8,9 @@ from pathlib import Path
 from typing import Final
 
 from command_line.options import events, json_file, option, switch
-from command_line.values import number, seconds, whole
+from command_line.values import number, one_of, place, seconds, whole
+from sitl.earth import DEFAULT_ORIGIN, Place
+from sitl.scenario_file import SUITE_NAMES
 
 SLOWEST: Final = 0.05  # below it a step in lockstep would take longer than the stall time allows
 _FASTEST: Final = 1e6
@@ -35,6 +37,11 @@ class RunOptions:
     duration_s: float | None = option(
         "--duration S", "seconds to fly (default the scenario's)", seconds
     )
+    sensors: str | None = option(
+        "--sensors SUITE",
+        f"sensors of the vehicle: {', '.join(SUITE_NAMES)} (default the scenario's)",
+        one_of("suite", *SUITE_NAMES),
+    )
     realtime: bool = switch(
         "--realtime",
         "the simulator keeps real time and does not wait for the flight software",
@@ -57,6 +64,14 @@ class SitlOptions(RunOptions):
     )
     wait_s: float = option(
         "--wait S", "how long to wait for the flight software, in seconds", seconds, default=60.0
+    )
+    origin: Place = option(
+        "--origin LAT,LON,ALT",
+        "origin of the local frame, in degrees and metres above sea level, for satellites and "
+        "barometer; a negative latitude needs --origin=LAT,LON,ALT",
+        lambda text: Place(*place(text)),
+        default=DEFAULT_ORIGIN,
+        text=lambda origin: ",".join(map(repr, origin)),
     )
     json: str | None = json_file("the result")
     out: Path | None = option("--out DIR", "directory for sitl.json", Path)

@@ -21,6 +21,7 @@ from sitl.link.server import RunTiming, serve, shut_down
 from sitl.link.udp_endpoint import PeerSocket
 from sitl.result import EndKind, TruthResult
 from sitl.scenario import Scenario
+from sitl.scenario_file import suite_of
 from sitl.simulation import START_US, STEP_US, Controls, Simulation
 from sitl.trajectory import TrajectoryPoint
 from sitl.truth_log import TruthLog
@@ -44,14 +45,18 @@ class Flight:
         self._options = options
         self._endpoint = endpoint
         self._events = events
-        self._simulation = Simulation(scenario, options.seed)
+        self._simulation = Simulation(scenario, options.seed, origin=options.origin)
         _rehearse(Simulation(scenario, options.seed))
 
     def run(self, stop: StopRequest) -> int:
         """Fly to the end and report; returns the exit code."""
         options, simulation, endpoint = self._options, self._simulation, self._endpoint
         self._events.report("flying", "sitl: flying")
-        encoder = StepEncoder(lockstep=not options.realtime)
+        encoder = StepEncoder(
+            lockstep=not options.realtime,
+            measured=simulation.measurements() is not None,
+            origin=options.origin,
+        )
         plan = flight_plan(simulation.scenario, self._target_at, self._yaw_at)
         self._settle()
         exchange = self._exchange(stop)
@@ -144,6 +149,7 @@ class Flight:
         return {
             "scenario": self._simulation.scenario.name,
             "seed": self._options.seed,
+            "sensors": suite_of(self._simulation.scenario),
             **dataclasses.asdict(result),
             "end_kind": None
             if self._simulation.ended is None

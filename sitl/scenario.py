@@ -5,36 +5,14 @@ A key is declared once: its name carries the unit, its annotation the type and t
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
-from typing import Annotated, Literal, NamedTuple, TypeAlias
+from typing import Annotated, Literal, TypeAlias
 
-V3: TypeAlias = tuple[float, float, float]
-V2: TypeAlias = tuple[float, float]
-
-WORLD_M = 1000.0  # m: far beyond any flight here, close enough to reject slips of the unit
-
-
-class Range(NamedTuple):
-    """Closed interval of a number, or of every entry of a vector; optionally on a grid."""
-
-    low: float
-    high: float
-    step: float | None = None
-    or_inf: bool = False
-
-    def contains(self, value: float) -> bool:
-        """Whether a value [unit of the key] is in the range; NaN is not."""
-        if not math.isfinite(value):
-            return self.or_inf and value > 0.0
-        on_grid = self.step is None or math.isclose(
-            value / self.step, round(value / self.step), abs_tol=1e-9
-        )
-        return self.low <= value <= self.high and on_grid
-
-    def __str__(self) -> str:
-        grid = f" in steps of {self.step:g}" if self.step is not None else ""
-        return f"{self.low:g} to {self.high:g}{grid}{' or inf' if self.or_inf else ''}"
+from sitl.ranges import V2 as V2
+from sitl.ranges import V3 as V3
+from sitl.ranges import WORLD_M as WORLD_M
+from sitl.ranges import Range as Range
+from sitl.sensors.keys import MeasuredSensors
 
 
 @dataclass(frozen=True, slots=True)
@@ -217,7 +195,7 @@ class EncoderErrors:
 
 @dataclass(frozen=True, slots=True)
 class Sensors:
-    """All sensors; exact by default."""
+    """The suite ``perfect``: the true state at every step, without errors by default."""
 
     imu: ImuErrors = ImuErrors()
     pose: PoseErrors = PoseErrors()
@@ -232,6 +210,31 @@ class VehicleScale:
     inertia: Annotated[float, Range(0.2, 5.0)] = 1.0
     rotor_lag: Annotated[float, Range(0.1, 10.0)] = 1.0
     joint_friction: Annotated[float, Range(0.0, 100.0)] = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class AirKeys:
+    """Real air; still, and felt by nothing but the rotors, by default."""
+
+    wind_m_s: Annotated[V3, Range(-30.0, 30.0)] = (0.0, 0.0, 0.0)  # NED, where the air goes
+    turbulence_m_s: Annotated[float, Range(0.0, 40.0)] = 0.0  # wind at 20 ft of MIL-F-8785C
+    turbulence_height_m: Annotated[float, Range(3.048, 304.8)] = 3.048
+    rotor_drag_1_s: Annotated[V3, Range(0.0, 5.0)] = (0.0, 0.0, 0.0)  # per mass, body axes
+    body_drag_m2: Annotated[float, Range(0.0, 1.0)] = 0.0  # drag coefficient times area
+    ground_effect: bool = False
+    ceiling_effect: bool = False
+    wall_suction: Annotated[float, Range(0.0, 0.5)] = 0.0  # of the thrust, where blades touch
+
+
+@dataclass(frozen=True, slots=True)
+class ActuatorKeys:
+    """Real actuators; ideal by default, but for what the vehicle always has."""
+
+    quadratic_thrust: bool = False  # the rotor's speed lags, and thrust is its square
+    dead_time_ms: Annotated[float, Range(0.0, 100.0, step=2.0)] = 0.0  # of the motor controllers
+    battery_a_h: Annotated[float, Range(0.0, 100.0)] = 0.0  # 0: a source that never sags
+    battery_ohm: Annotated[float, Range(0.0, 1.0)] = 0.02
+    backlash_deg: Annotated[float, Range(0.0, 5.0)] = 0.0  # of each joint's gear
 
 
 @dataclass(frozen=True, slots=True)
@@ -251,5 +254,7 @@ class Scenario:
     workspace: Workspace | None = None
     zones: tuple[ScenarioZone, ...] = ()
     disturbances: tuple[Disturbance, ...] = ()
-    sensors: Sensors = Sensors()
+    sensors: Sensors | MeasuredSensors = Sensors()
     vehicle_scale: VehicleScale = VehicleScale()
+    air: AirKeys = AirKeys()
+    actuators: ActuatorKeys = ActuatorKeys()

@@ -12,10 +12,14 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_args, get_origin
 
-from sitl.scenario import Range, Scenario, ScenarioZone
+from sitl.scenario import Range, Scenario, ScenarioZone, Sensors
+from sitl.sensors.keys import MeasuredSensors, SuiteName
 
 _DIGITS = 12
 PACKAGED = Path(__file__).parent / "scenarios"
+SUITES = Path(__file__).parent / "sensors" / "suites"
+PERFECT = "perfect"
+SUITE_NAMES: tuple[str, ...] = get_args(SuiteName)
 
 
 class ScenarioError(ValueError):
@@ -27,17 +31,23 @@ def scenario_names() -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in PACKAGED.glob("*.toml")))
 
 
-def load_scenario(name_or_path: str) -> Scenario:
-    """Read a packaged scenario by name, or any by path.
+def load_scenario(name_or_path: str, suite: str | None = None) -> Scenario:
+    """Read a packaged scenario by name, or any by path; ``suite`` as of ``parse_scenario``.
 
     Raises:
         ScenarioError: Unknown name, unreadable file, unknown key or impossible value.
     """
     path = _path(name_or_path)
     try:
-        return parse_scenario(_content(path).decode("utf-8"), path.stem)
+        return parse_scenario(_content(path).decode("utf-8"), path.stem, suite)
     except UnicodeDecodeError as error:
         raise ScenarioError(f"scenario {path} is not TOML: it is not UTF-8") from error
+
+
+def suite_of(scenario: Scenario) -> str:
+    """Name of the suite of sensors that a scenario is flown with."""
+    sensors = scenario.sensors
+    return sensors.suite if isinstance(sensors, MeasuredSensors) else PERFECT
 
 
 def scenario_digest(name_or_path: str) -> str:
@@ -68,8 +78,10 @@ def _content(path: Path) -> bytes:
         raise ScenarioError(f"cannot read scenario {path}: {error.strerror}") from error
 
 
-def parse_scenario(text: str, name: str) -> Scenario:
-    """The scenario that a TOML text describes.
+def parse_scenario(text: str, name: str, suite: str | None = None) -> Scenario:
+    """The scenario that a TOML text describes, flown with a ``suite`` of sensors if one is named.
+
+    What the text says about sensors then counts only if it is about the same suite.
 
     Raises:
         ScenarioError: Not TOML, unknown key or impossible value.
@@ -80,6 +92,10 @@ def parse_scenario(text: str, name: str) -> Scenario:
         raise ScenarioError(f"scenario {name} is not TOML: {error}") from error
     if "name" in table:
         raise ScenarioError('unknown key "name": a scenario is named by its file')
+    if suite is not None:
+        given = table.get("sensors", {})
+        same = isinstance(given, dict) and given.get("suite", PERFECT) == suite
+        table["sensors"] = {**(given if same else {}), "suite": suite}
     scenario: Scenario = _build(Scenario, {**table, "name": name}, "")
     return scenario
 
@@ -113,6 +129,8 @@ def _value(hint: Any, value: Any, path: str) -> Any:
     origin, parts = get_origin(hint), get_args(hint)
     if origin is Annotated:
         return _numbers(parts[0], parts[1], value, path)
+    if hint == Sensors | MeasuredSensors:
+        return _sensors(value, path)
     if origin is types.UnionType:
         return _table_of_a_kind([part for part in parts if part is not types.NoneType], value, path)
     if hint is ScenarioZone:
@@ -131,6 +149,29 @@ def _value(hint: Any, value: Any, path: str) -> Any:
             raise ScenarioError(f"{path} = {value!r}: must be true or false")
         return value
     return _word(hint, value, path)
+
+
+def _sensors(value: Any, path: str) -> Sensors | MeasuredSensors:
+    """The numbers of a suite, with those of the scenario in their place where it has any."""
+    if not isinstance(value, dict):
+        raise ScenarioError(f"{path} = {value!r}: must be a table")
+    own = {key: part for key, part in value.items() if key != "suite"}
+    suite = _word(SuiteName, value.get("suite", PERFECT), f"{path}.suite")
+    if suite == PERFECT:
+        exact: Sensors = _build(Sensors, own, path)
+        return exact
+    tables = tomllib.loads((SUITES / f"{suite}.toml").read_text(encoding="utf-8"))
+    for key, part in own.items():
+        if key not in tables:
+            raise ScenarioError(
+                f'unknown key "{path}.{key}": the suite "{suite}" has no such sensor'
+                f"{_nearest(key, tables)} (known here: suite, {', '.join(tables)})"
+            )
+        if not isinstance(part, dict):
+            raise ScenarioError(f"{path}.{key} = {part!r}: must be a table")
+        tables[key] = {**tables[key], **part}
+    measured: MeasuredSensors = _build(MeasuredSensors, {**tables, "suite": suite}, path)
+    return measured
 
 
 def _word(hint: Any, value: Any, path: str) -> str:

@@ -9,25 +9,34 @@ from typing import NamedTuple, cast
 
 import numpy as np
 
+from sitl.air.wind import WindField
 from sitl.compiled import machine_code
 from sitl.disturbances.items import Push, push
+from sitl.drives import Drives
+from sitl.earth import DEFAULT_ORIGIN, Place
 from sitl.flight_evaluator import FlightEvaluator, critical
 from sitl.mission_clock import MissionClock
 from sitl.plant.aerial_manipulator import Plant, plant
 from sitl.plant.integrator import STEP_S, step
 from sitl.plant.kinematics import places as places_into
+from sitl.plant.parameters import Vehicle
 from sitl.plant.state import ARM, P_WB, Q_WB, THRUST, V_WB, W_WB_B
 from sitl.plant.vector import Array
 from sitl.result import EndKind, EndReason, TruthResult
-from sitl.scenario import V3, Scenario
+from sitl.scenario import V3, ActuatorKeys, Scenario, Sensors
 from sitl.scenario_file import ScenarioError
 from sitl.scenario_validation import check
-from sitl.sensors.suite import V4, SensorReadings, SensorSuite
+from sitl.sensors.exact import V4, ExactSensors, SensorReadings
+from sitl.sensors.keys import MeasuredSensors
+from sitl.sensors.measurements import Measurement
+from sitl.sensors.suite import SensorSuite
 from sitl.start import first_state, flown_vehicle
 from sitl.trajectory import TrajectoryPoint
 
 STEP_US = 2000  # one exchange with the flight software
 START_US = 1_000_000  # so that no stamp is 0
+SETTLED_STEPS = 250  # for which the vehicle's sensors have run when the flight begins
+SETTLED_KEPT = 20  # of these, whose measurements the flight software still gets
 SUBSTEPS = 2  # plant steps per exchange
 SAMPLE_STEPS = 50  # tracking error at 10 Hz, as the paper's TE
 
@@ -60,13 +69,20 @@ class Truth:
 class Simulation:
     """The plant in its scenario; ``seed``, 0 or more, is the root of all randomness of the run.
 
-    ``more`` pushes come on top of the scenario's disturbances.
+    ``more`` pushes come on top of the scenario's disturbances. The local frame is at ``origin``.
 
     Raises:
         ScenarioError: The scenario contradicts itself or starts outside its safe set.
     """
 
-    def __init__(self, scenario: Scenario, seed: int, more: Sequence[Push] = ()) -> None:
+    def __init__(
+        self,
+        scenario: Scenario,
+        seed: int,
+        more: Sequence[Push] = (),
+        *,
+        origin: Place = DEFAULT_ORIGIN,
+    ) -> None:
         if not (seed >= 0):
             raise ScenarioError(f"seed = {seed}: must be 0 or more")
         check(scenario)
@@ -77,11 +93,19 @@ class Simulation:
         self._plant = plant(self.vehicle)
         self._plants = cast(Sequence[Plant], np.array([self._plant]))  # cheaper to hand over
         self._mass = self.vehicle.mass
-        self._sensors = SensorSuite(scenario.sensors, seed, STEP_US)
+        self._exact_sensors, self._suite = _sensors(scenario, self.vehicle, seed, origin)
         self._pushes = [push(item, seed, 1e-6 * STEP_US) for item in scenario.disturbances]
         self._pushes += more
         self._state, trim = first_state(self.vehicle, scenario, self.clock.target_at(0.0).p)
         self._thrust, self._torque = trim.thrust, trim.torque
+        step_s = 1e-6 * STEP_US
+        self._drives: Drives | None = None
+        if scenario.actuators != ActuatorKeys(quadratic_thrust=self.vehicle.rotors.quadratic):
+            self._drives = Drives(scenario.actuators, self.vehicle, trim.thrust, step_s)
+        self._wind: tuple[WindField, Array] | None = None
+        if self.vehicle.air.active:
+            moving = cast(Array, self._plants)["air"]["wind"][0]  # type: ignore[call-overload]
+            self._wind = (WindField(scenario.air, seed, step_s), moving)
         self._sent = (0.0, 0.0)  # largest torque and thrust commanded, before any saturation
         axes = 3 if scenario.body == "full" else 0
         self._places = np.empty((SUBSTEPS, 2 + len(self.vehicle.links) + axes, 3))
@@ -93,6 +117,7 @@ class Simulation:
         self._step = machine_code(step, self._plants, self._state, *example)
         self._felt = self._step(self._plants, self._state, *example).felt
         self._reading: SensorReadings | None = None
+        self._measured: tuple[int, tuple[Measurement, ...]] = (-1, ())
         self._evaluator = FlightEvaluator(scenario, self.clock, self._places_now())
 
     @property
@@ -143,10 +168,42 @@ class Simulation:
         self._evaluator.end(kind, sentence, self.time_s)
 
     def sense(self) -> SensorReadings:
-        """Measurements of the current state; asking twice in a step gives the same ones."""
+        """The suite ``perfect``'s readings of the current state, exact with any other suite.
+
+        Asking twice in a step gives the same ones.
+        """
         if self._reading is None or self._reading.t_us != self.t_us:
-            self._reading = self._sensors.measure(self._exact_reading())
+            self._reading = self._exact_sensors.measure(self._exact_reading())
         return self._reading
+
+    def measurements(self) -> tuple[Measurement, ...] | None:
+        """What arrives from the sensors in this step; None with the suite ``perfect``.
+
+        Asking twice in a step gives the same ones; no step may be left out.
+        """
+        if self._suite is None:
+            return None
+        if self._measured[0] != self.step:
+            thrust = _four(self._state[THRUST:ARM].tolist())
+            exact = self.sense()
+            if self._drives is not None:
+                exact = exact._replace(q_arm=self._drives.motor_angles(exact.q_arm))
+            before = self._settled(self._suite, thrust) if self.step == 0 else []
+            self._measured = (self.step, (*before, *self._suite.step(exact, thrust)))
+        return self._measured[1]
+
+    def _settled(self, suite: SensorSuite, thrust: V4) -> list[Measurement]:
+        """What came before the first step, in which a flight software cannot wait for sensors.
+
+        The vehicle has been where it starts for a while: the newest of each sensor, and all of the
+        last few steps.
+        """
+        exact, arrived = self.sense(), list[tuple[int, Measurement]]()
+        for k in range(-SETTLED_STEPS, 0):
+            earlier = exact._replace(t_us=exact.t_us + k * STEP_US)
+            arrived += [(k, one) for one in suite.step(earlier, thrust)]
+        newest = {type(one): one for _, one in arrived}
+        return [one for k, one in arrived if k >= -SETTLED_KEPT or newest[type(one)] is one]
 
     def advance(self, controls: Controls) -> None:
         """Integrate one step with ``controls`` held, judging every plant step.
@@ -155,6 +212,11 @@ class Simulation:
             ValueError: A control is not finite or their number is wrong.
         """
         self._command(controls)
+        if self._drives is not None:
+            self._drive(self._drives)
+        if self._wind is not None:
+            field, moving = self._wind
+            moving[0], moving[1], moving[2] = field.step()
         arrival = self._step(
             self._plants,
             self._state,
@@ -233,6 +295,13 @@ class Simulation:
         self._thrust = (thrust * f1, thrust * f2, thrust * f3, thrust * f4)
         self._torque = tuple([torque * f for f in torques])
 
+    def _drive(self, drives: Drives) -> None:
+        """What of the command takes effect in this step."""
+        x: list[float] = self._state.tolist()
+        rates = tuple(x[ARM + len(self._torque) :])
+        self._thrust = drives.rotors(self._thrust, _four(x[THRUST:ARM]))
+        self._torque = drives.joints(self._torque, rates)
+
     def _disturbance(self) -> tuple[V3, V3]:
         """Force on the base [N, W] and torque [N·m, B] during this step."""
         force = torque = (0.0, 0.0, 0.0)
@@ -259,6 +328,24 @@ class Simulation:
         places_into(self._plant, self._state, out)
         now: Array = out[0]
         return now
+
+
+def _sensors(
+    scenario: Scenario, vehicle: Vehicle, seed: int, origin: Place
+) -> tuple[ExactSensors, SensorSuite | None]:
+    """What senses exactly, and the suite where there is one."""
+    sensors = scenario.sensors
+    if not isinstance(sensors, MeasuredSensors):
+        return ExactSensors(sensors, seed, STEP_US), None
+    suite = SensorSuite(
+        sensors,
+        seed,
+        START_US - SETTLED_STEPS * STEP_US,
+        joints=len(vehicle.links),
+        hover_thrust=0.25 * vehicle.mass * vehicle.gravity,
+        origin_altitude=origin.altitude,
+    )
+    return ExactSensors(Sensors(), seed, STEP_US), suite
 
 
 def _four(values: list[float]) -> V4:

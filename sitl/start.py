@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from sitl.plant.parameters import Vehicle, level_reach
+from sitl.air.load import SURFACES
+from sitl.plant.parameters import AirModel, Vehicle, level_reach
 from sitl.plant.state import ARM, P_WB, Q_WB, THRUST, V_WB, W_WB_B, at_rest
 from sitl.plant.trim import NoTrimError, Trim, level_hover, standing_height
 from sitl.plant.vector import Array
@@ -20,12 +21,41 @@ def flown_vehicle(scenario: Scenario) -> Vehicle:
     rotors, joints = vehicle.rotors, vehicle.joints
     return replace(
         vehicle,
-        rotors=replace(rotors, lag=scale.rotor_lag * rotors.lag),
+        rotors=replace(
+            rotors,
+            lag=scale.rotor_lag * rotors.lag,
+            quadratic=scenario.actuators.quadratic_thrust,
+        ),
         joints=replace(
             joints,
             viscous=scale.joint_friction * joints.viscous,
             coulomb=scale.joint_friction * joints.coulomb,
         ),
+        air=air_model(scenario),
+    )
+
+
+def air_model(scenario: Scenario) -> AirModel:
+    """What the scenario's air does, with the ground and every plane that stands still.
+
+    Raises:
+        ScenarioError: More planes than the kernels have room for.
+    """
+    keys = scenario.air
+    planes: list[tuple[V3, float]] = [((0.0, 0.0, -1.0), 0.0)]
+    planes += [(wall.normal, wall.offset_m) for wall in scenario.walls]
+    near = keys.ground_effect or keys.ceiling_effect or keys.wall_suction > 0.0
+    if near and len(planes) > SURFACES:
+        raise ScenarioError(
+            f"air: {len(planes) - 1} walls are near the rotors, must be at most {SURFACES - 1}"
+        )
+    return AirModel(
+        rotor_drag=keys.rotor_drag_1_s,
+        drag_area=keys.body_drag_m2,
+        ground=keys.ground_effect,
+        ceiling=keys.ceiling_effect,
+        suction=keys.wall_suction,
+        surfaces=tuple(planes) if near else (),
     )
 
 

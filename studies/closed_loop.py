@@ -14,6 +14,7 @@ from typing import Generic, TypeVar
 
 from fsw.flight.autopilot import Autopilot
 from fsw.flight.state import FlightState
+from fsw.measurements import Sample
 from fsw.model.airframe import Airframe
 from fsw.mpc.planner import Planner
 from fsw.parameters.flight_config import FlightConfig
@@ -43,6 +44,7 @@ from studies.flight_result import (
     processor_time_us,
 )
 from studies.mission import announced, moves, target
+from studies.samples import only_the_time, sample
 
 TARGET_US = 100_000  # between points of the reference, as the pilot sends them
 _TARGETS_AHEAD = 20
@@ -67,8 +69,10 @@ class ClosedLoop(Generic[State]):
     airframe: Airframe
 
     def sense(self) -> SensorFrame:
-        """Sensor readings of this step."""
+        """Sensor readings of this step; with a suite of sensors its time alone."""
         now = self.simulation.sense()
+        if self.simulation.measurements() is not None:
+            return only_the_time(now.t_us, self.samples())
         (q1, q2), (qd1, qd2) = now.q_arm, now.qd_arm
         return SensorFrame(
             t_us=now.t_us,
@@ -80,6 +84,10 @@ class ClosedLoop(Generic[State]):
             q_arm=(q1, q2),
             qd_arm=(qd1, qd2),
         )
+
+    def samples(self) -> tuple[Sample, ...]:
+        """What arrived from the suite of sensors in this step."""
+        return tuple([sample(said) for said in self.simulation.measurements() or ()])
 
     def targets(self) -> tuple[EndEffectorTarget, ...]:
         """What the scenario's pilot streams: twenty points at once, then one every 0.1 s."""
@@ -176,6 +184,7 @@ def simulate(
             commands=FIRST_COMMANDS[step] if step < len(FIRST_COMMANDS) else (),
             targets=loop.targets(),
             announced=loop.announced(),
+            samples=loop.samples(),
         )
         if traced and step % TRACE_STEPS == 0:
             recorder.trace.append(_trace_point(simulation))

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fsw.barriers.safe_approach import BarrierTuning
-from fsw.compiled import compilable, compiled, machine_code, packed
+from fsw.compiled import compilable, compiled, kernel, machine_code, of_fixed_types, packed
 from fsw.control.allocation import allocate
 from fsw.control.arm_compensation import compensated_joints, lately_off_plan
 from fsw.control.attitude import attitude_pid, attitude_reference
@@ -19,6 +19,7 @@ from fsw.control.height import height_pid
 from fsw.control.joint_reference import joint_reference
 from fsw.control.joints import (
     JointMemory,
+    accelerations_of,
     arm_dynamics,
     joint_torques,
     joints_at_rest,
@@ -178,12 +179,26 @@ class Cascade:
         around = (NO_ZONES, self.probes)
         example = (self._packed, memory, _SOMEWHERE, REST_STATE, REST_INPUT, 1, *around)
         self._close_loops = machine_code(_close_loops, *example)
+        self._joint_acceleration = of_fixed_types(_joint_acceleration)
 
     def motion(self, memory: CascadeMemory, estimate: StateEstimate) -> MotionState:
         """Acceleration to snap right now, from the rotor model."""
         rotors = lag_rotors(memory.rotors, memory.commanded.rotor_thrust, self.law.rotor_decay)
         return motion_state(
             self.law.airframe, memory.mass, estimate, rotors, memory.commanded.joint_torque[0]
+        )
+
+    def joint_acceleration(self, memory: CascadeMemory, estimate: StateEstimate) -> Vec2:
+        """Accelerations [rad/s^2] of the joints under the torques sent last, by the model."""
+        return self._joint_acceleration(
+            self._packed,
+            memory.rotors,
+            memory.commanded.rotor_thrust,
+            memory.commanded.joint_torque,
+            estimate.w_WB_B,
+            estimate.q_arm,
+            estimate.qd_arm,
+            estimate.specific_force,
         )
 
     def step(
@@ -357,6 +372,28 @@ def _close_loops(
         kept.off_plan,
         guarded,
     )
+
+
+@kernel
+def _joint_acceleration(
+    laws: NDArray[Any],
+    rotors: Vec4,
+    commanded: Vec4,
+    torque: Vec2,
+    rate: Vec3,
+    q_arm: Vec2,
+    qd_arm: Vec2,
+    specific_force: float,
+) -> Vec2:
+    """Of the numbers that it needs alone: to hand over whole records takes longer than all else."""
+    airframe = laws[0].airframe
+    f = lag_rotors(rotors, commanded, laws[0].rotor_decay)
+    pitching = (airframe.rotor_arm * (f[2] - f[0]) - torque[0]) / airframe.inertia[1]
+    arm = StateEstimate(0, _NONE, _NONE, _LEVEL, rate, 0.0, q_arm, qd_arm, specific_force)
+    # The accelerometer knows of gusts, and of the ground.
+    dynamics = arm_dynamics(airframe, arm, (0.0, specific_force))
+    first, second = accelerations_of(dynamics, torque)
+    return first - pitching, second
 
 
 @compilable

@@ -149,6 +149,21 @@ def torques_for(arm: ArmDynamics, qdd: Vec2) -> Vec2:
 
 
 @compilable
+def accelerations_of(arm: ArmDynamics, torque: Vec2) -> Vec2:
+    """Accelerations [rad/s^2] under a ``torque`` [N m]: the inverse of ``torques_for``.
+
+    Of link 1 in the inertial frame, and of joint 2.
+    """
+    m11, m12, m22 = arm.inertia
+    first, second = torque[0] - arm.bias[0], torque[1] - arm.bias[1]
+    determinant = m11 * m22 - m12 * m12
+    return (
+        (m22 * first - m12 * second) / determinant,
+        (m11 * second - m12 * first) / determinant,
+    )
+
+
+@compilable
 def arm_dynamics(airframe: Airframe, estimate: StateEstimate, field: Vec2) -> ArmDynamics:
     """The planar two-link arm (Lagrange form) in a ``field`` [m/s^2] along body x and z.
 

@@ -29,7 +29,9 @@ from fsw.flight.plan_exchange import PlanExchange, measured_state, nominal_at_re
 from fsw.flight.reference_horizon import ReferenceHorizon
 from fsw.flight.safe_set import SafeSetCheck
 from fsw.flight.safety_watch import SafetyWatch
+from fsw.flight.sensed_state import SensedState
 from fsw.flight.state import FlightState, PlanMemory
+from fsw.flight.uncertain_clearance import widened
 from fsw.model.battery import drained
 from fsw.model.body import body_of
 from fsw.model.nominal import REST_INPUT
@@ -88,6 +90,7 @@ class Autopilot:
         self._cascade = Cascade(
             config.airframe, config.tuning, config.inner, tick, keep_clear(config)
         )
+        self._sensed = SensedState(config.estimator, self._cascade)
         self._zones: tuple[SafeSet, EndEffectorTarget | None, Array] = (SafeSet(), None, NO_ZONES)
         self._ticks_per_plan = config.mpc_period_us // config.tick_period_us
 
@@ -98,6 +101,7 @@ class Autopilot:
         nominal = self._plans.step(nominal_at_rest(estimate), REST_INPUT)
         self._cascade.step(in_hover(self.config.airframe, estimate), estimate, nominal, REST_INPUT)
         self._safe_sets.warm_up(estimate)
+        self._sensed.warm_up()
 
     def analyse(self, safe_set: SafeSet) -> tuple[Finding, ...]:
         """Findings on whether this configuration can keep a safe set."""
@@ -107,7 +111,11 @@ class Autopilot:
         """Everything the vehicle does at one instant: the next state, and everything it says."""
         now_us = inputs.sensors.t_us
         texts: list[StatusText] = []
-        state, estimate = _estimate(state, inputs)
+        fusion = state.fusion
+        if inputs.samples or fusion is not None:
+            state, fusion, estimate = self._sensed.estimate(state, inputs, texts)
+        else:
+            state, estimate = _estimate(state, inputs)
         state = self._receive(state, inputs, texts)
         if estimate is None:
             return state, _blind(inputs, texts)
@@ -163,6 +171,7 @@ class Autopilot:
             state.battery,
             state.arming_refusal,
             safety,
+            fusion,
         )
         snapshot = _snapshot(state, estimate, u, inputs)
         return state, TickOutputs(
@@ -223,11 +232,20 @@ class Autopilot:
             t_apply_us=apply_us,
             start=start,
             targets=targets,
-            safe_set=state.mission.safe_set,
+            safe_set=self._kept_clear(state, estimate),
             from_nominal=from_nominal,
             joint_targets=joints,
         )
         return state, request, requested(plan, apply_us)
+
+    def _kept_clear(self, state: FlightState, estimate: StateEstimate) -> SafeSet:
+        """The safe set in force; its clearances grow with what the estimator does not know."""
+        safe_set, sigmas = state.mission.safe_set, self.config.limits.clearance_sigmas
+        if state.fusion is None or not safe_set.zones or not sigmas > 0.0:
+            return safe_set
+        covariance = self._sensed.covariance(state.fusion)
+        links = self.config.airframe.link_length
+        return widened(safe_set, estimate, covariance, sigmas, links)
 
     def _report_slowly(
         self, state: FlightState, estimate: StateEstimate, now_us: int

@@ -6,6 +6,7 @@ from dataclasses import field
 
 from fsw.control.cascade import CascadeMemory
 from fsw.control.tracking import Observed
+from fsw.estimation.sensor_fusion import FusionMemory
 from fsw.flight.command_dedup import AnsweredCommand
 from fsw.flight.failsafe import Condition
 from fsw.flight.mission_sequencer import MissionFlight
@@ -183,3 +184,4 @@ class FlightState:
     battery: BatteryState = field(default_factory=BatteryState)
     arming_refusal: str = ""
     safety: SafetyMemory = field(default_factory=SafetyMemory)
+    fusion: FusionMemory | None = None  # where sensors have times of their own

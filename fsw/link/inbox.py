@@ -16,6 +16,7 @@ from fsw.link.wire.decode_setpoints import (
     end_effector_setpoint,
     joint_setpoint,
 )
+from fsw.measurements import Sample
 from fsw.signals import (
     AttitudeSetpoint,
     Command,
@@ -41,6 +42,7 @@ _MAX_COMMANDS: Final = 16  # a tick; a client sends one at a time and repeats it
 _MAX_TARGETS: Final = 64  # a tick
 _MAX_ANNOUNCEMENTS: Final = 4  # a tick
 _MAX_ANNOUNCERS: Final = 8  # whose safe sets may be incomplete at the same time
+_MAX_SAMPLES: Final = 512  # a tick; a second of a suite has some 1300
 _GROUND_STATION: Final = 6  # MAV_TYPE
 UNKNOWN_SOURCE: Final = MessageSource(0, 0, "unknown")
 
@@ -59,6 +61,7 @@ class Received:
     joints: JointSetpoint | None = None
     refused_setpoints: int = 0  # that were of no use
     station_heard: bool = False  # a ground station's heartbeat
+    samples: list[Sample] = field(default_factory=list)  # of sensors, in order of arrival
 
 
 @dataclass(slots=True)
@@ -77,7 +80,7 @@ class Inbox:
 
     def __init__(self, origin: Origin = DEFAULT_ORIGIN) -> None:
         """Begin empty; commands name places on Earth, from ``origin`` of the local frame on."""
-        self._locate = partial(to_local, origin)
+        self.locate = partial(to_local, origin)
         self.refused = 0  # messages with numbers of no use, or too many of them
         self._received = Received()
         # By source: the walls of two announcers must not mix.
@@ -109,6 +112,14 @@ class Inbox:
         if handler is not None:
             self._source = source
             handler(frame)
+
+    def accept_samples(self, samples: list[Sample]) -> None:
+        """Keep what sensors have measured; the oldest go where a tick has taken none for long."""
+        kept = self._received.samples
+        kept += samples
+        if len(kept) > _MAX_SAMPLES:
+            self.refused += len(kept) - _MAX_SAMPLES
+            del kept[:-_MAX_SAMPLES]
 
     def take(self) -> Received:
         """Hand over what came."""
@@ -143,6 +154,7 @@ class Inbox:
             mission,
             tuning,
             stale_us,
+            tuple(came.samples),
         )
 
     def _command(self, read: Callable[[Frame], CommandRequest | None], frame: Frame) -> None:
@@ -152,7 +164,7 @@ class Inbox:
         if len(self._received.commands) >= _MAX_COMMANDS:
             self.refused += 1
             return
-        self._received.commands.append(decode_commands.command(request, self._locate))
+        self._received.commands.append(decode_commands.command(request, self.locate))
 
     def _target(self, frame: Frame) -> None:
         values = cast(Numbers, frame.payload_values)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Final
 
 from command_line.options import option, switch
-from command_line.values import one_of
+from command_line.values import one_of, place
 from fsw.geometry.geodesy import DEFAULT_ORIGIN
 from fsw.link.udp_endpoint import Address, LinkError, parse_address
 from fsw.link.wire.telemetry_context import GENERIC, PX4
@@ -24,17 +24,7 @@ def parse_origin(text: str) -> Origin:
     Raises:
         ValueError: It is no place.
     """
-    try:
-        latitude, longitude, altitude = (float(word) for word in text.split(","))
-    except ValueError:
-        raise ValueError(f"origin '{text}' is not LATITUDE,LONGITUDE,ALTITUDE") from None
-    # At the poles there is no north.
-    if not (abs(latitude) <= 89.0 and abs(longitude) <= 180.0 and -500.0 <= altitude <= 9000.0):
-        raise ValueError(
-            f"origin '{text}' is out of range: latitude -89 to 89, longitude -180 to 180 degrees, "
-            "altitude -500 to 9000 m"
-        )
-    return Origin(latitude, longitude, altitude)
+    return Origin(*place(text))
 
 
 def origin_text(origin: Origin) -> str:

@@ -1,12 +1,14 @@
 """The link to the simulator: one datagram in, one datagram out, per step.
 
-The simulator sends everything that belongs to step t_k with HIL_SENSOR last, as the barrier; the
-answer ends with exactly one HIL_ACTUATOR_CONTROLS of the same time stamp. In lockstep the
-simulator repeats a step whose answer got lost: the same answer is sent again and no tick runs.
+The simulator sends everything that belongs to step t_k with HIL_SENSOR last, as the barrier: either
+the true state, or what sensors have measured; its HEARTBEAT says which. The answer ends with
+exactly one HIL_ACTUATOR_CONTROLS of the same time stamp. In lockstep the simulator repeats a step
+whose answer got lost: the same answer is sent again and no tick runs.
 """
 
 from __future__ import annotations
 
+import math
 from enum import Enum
 from typing import Final, cast
 
@@ -14,8 +16,10 @@ from fsw.link.inbox import Inbox
 from fsw.link.udp_endpoint import Address
 from fsw.link.wire import decode, encode_replies, message_ids
 from fsw.link.wire.decode import Numbers
+from fsw.link.wire.decode_sensors import SampleDecoder, inertial_sample, joint_sample
 from fsw.link.wire.message_ids import AUTOPILOT, SYSTEM_ID
 from fsw.link.wire.px4_mode import custom_mode
+from fsw.measurements import ImuSample, Sample
 from fsw.ports import VehicleFacts
 from fsw.signals import (
     CommandAck,
@@ -44,10 +48,23 @@ _STANDBY, _ACTIVE = 3, 4  # MAV_STATE
 _STEP: Final = LockstepReader(
     (message_ids.ODOMETRY, 14), (message_ids.ARM_JOINT_STATE, 7), (message_ids.HIL_SENSOR, 7)
 )
+# The same of a vehicle with sensors, if its HIL_SENSOR is the inertial unit's: then the flags are
+# the last byte before the checksum, because zeros at the end are not sent.
+_MEASURED_STEP: Final = LockstepReader((message_ids.JOINT_ENCODERS, 3), (message_ids.HIL_SENSOR, 7))
+_FLAGS_AT: Final = -3
+_INERTIAL: Final = 0x3F
+_SENSOR_AT: Final = 15  # place of HIL_SENSOR's id; the step's clock has 0
+# A stamp farther ahead of the last one is believed only if the next step follows it: with a single
+# wrong one the vehicle would take all later steps for old ones. Such a silence ends the flight.
+_AHEAD_US: Final = 1_200_000
+_LOCKSTEP_BIT, _MEASURED_BIT = 1, 2  # of the custom_mode in the simulator's HEARTBEAT
+_NO_VECTOR: Final = (math.nan, math.nan, math.nan)
+_NO_ATTITUDE: Final = (math.nan, math.nan, math.nan, math.nan)
+_NO_JOINTS: Final = (math.nan, math.nan)
 
 
 class Pacing(Enum):
-    """Lockstep or real time, from the custom_mode of the simulator's HEARTBEAT."""
+    """Lockstep or real time, from bit 0 of custom_mode in the simulator's HEARTBEAT."""
 
     REALTIME = 0
     LOCKSTEP = 1
@@ -58,14 +75,18 @@ class SimLink:
 
     def __init__(self, simulator: Address, inbox: Inbox, facts: VehicleFacts) -> None:
         self.pacing: Pacing | None = None  # known with the first step in lockstep
+        self.measured = False  # what comes is measured by sensors, each at its own time
         self.shutdown = False  # the simulator has ended the run
         self.retransmissions = 0
+        self.notices: list[str] = []  # what was odd, for the operator; the loop empties it
         self._endpoint = PeerSocket.connected(simulator, PATIENCE_S)
         self._inbox = inbox
+        self._decoder = SampleDecoder(inbox.locate)
         self._writer = FrameWriter(SYSTEM_ID, AUTOPILOT)
         self._thrust_scale = 1.0 / facts.rotor_thrust_max
         self._torque_scale = 1.0 / facts.joint_torque_max
         self._last_us = -1  # time of the newest step seen
+        self._doubted_us = -1  # time of a step that was too far ahead
         self._answer: tuple[int, bytes] = (-1, b"")
         self._acks: list[CommandAck] = []
         self._text_id = 0
@@ -122,42 +143,84 @@ class SimLink:
 
     def _read(self, datagram: bytes) -> SensorFrame | None:
         """Decode one datagram; None unless it carries a whole new step."""
-        step = _STEP.read(datagram)
-        if step is not None:
-            return self._new(*step)
-        frames = list(split(datagram))
+        if not self.measured:
+            step = _STEP.read(datagram)
+            if step is not None:
+                return self._new(*step)
+        else:
+            measured = _MEASURED_STEP.read(datagram)
+            if measured is not None and datagram[_FLAGS_AT] == _INERTIAL:
+                joints, inertial = measured
+                samples: list[Sample] = [joint_sample(joints), inertial_sample(inertial)]
+                return self._new_measured(int(inertial[0]), samples)
+        return self._read_frames(list(split(datagram)))
+
+    def _read_frames(self, frames: list[Frame]) -> SensorFrame | None:
+        """What :meth:`_read` says, of a datagram with anything in it."""
         payloads = {frame.message_id: cast(Numbers, frame.payload_values) for frame in frames}
-        barrier = payloads.get(message_ids.HIL_SENSOR)
-        if barrier is None:
+        barrier = payloads.get(message_ids.HIL_SENSOR)  # the last one
+        heartbeat = payloads.get(message_ids.HEARTBEAT)
+        if heartbeat is not None:
+            self._note_pacing(int(heartbeat[0]))
+        if barrier is None or barrier[_SENSOR_AT] != 0:
             self._read_between_steps(frames)
             return None
-        odometry = payloads.get(message_ids.ODOMETRY)
-        arm = payloads.get(message_ids.ARM_JOINT_STATE)
-        sensors = self._new(odometry, arm, barrier)
+        if self.measured:
+            samples = [one for frame in frames for one in self._decoder.samples(frame)]
+            sensors = self._new_measured(int(barrier[0]), samples)
+        else:
+            odometry = payloads.get(message_ids.ODOMETRY)
+            arm = payloads.get(message_ids.ARM_JOINT_STATE)
+            sensors = self._new(odometry, arm, barrier)
         if sensors is not None:
             for frame in frames:
-                self._note(frame)
+                if frame.message_id != message_ids.HEARTBEAT:
+                    self._inbox.accept(frame, _source(frame))
         return sensors
+
+    def _note_pacing(self, custom_mode: int) -> None:
+        self.pacing = Pacing(custom_mode & _LOCKSTEP_BIT)
+        self.measured = bool(custom_mode & _MEASURED_BIT)
 
     def _new(
         self, odometry: Numbers | None, arm: Numbers | None, barrier: Numbers
     ) -> SensorFrame | None:
         """The sensors of a step that is whole and not known yet; a known one is answered again."""
         t_us = int(barrier[0])
-        if t_us <= self._last_us:
-            self._repeat(t_us)
+        if odometry is None or arm is None or not self._is_next(t_us):
             return None
-        if odometry is None or arm is None:
-            return None
-        self._last_us = t_us
         return decode.sensor_frame(odometry, arm, barrier)
 
-    def _note(self, frame: Frame) -> None:
-        if frame.message_id == message_ids.HEARTBEAT:
-            custom_mode = frame.payload_values[0]
-            self.pacing = Pacing.LOCKSTEP if custom_mode == 1 else Pacing.REALTIME
-        else:
-            self._inbox.accept(frame, _source(frame))
+    def _new_measured(self, t_us: int, samples: list[Sample]) -> SensorFrame | None:
+        """The time of a new step, whose samples are in the inbox; a known one is answered again."""
+        if not self._is_next(t_us):
+            return None
+        self._inbox.accept_samples(samples)
+        newest = samples[-1] if samples else None
+        return SensorFrame(
+            t_us,
+            p_WB=_NO_VECTOR,
+            v_WB=_NO_VECTOR,
+            q_WB=_NO_ATTITUDE,
+            gyro_B=newest.rate if isinstance(newest, ImuSample) else _NO_VECTOR,
+            accel_B=newest.acceleration if isinstance(newest, ImuSample) else _NO_VECTOR,
+            q_arm=_NO_JOINTS,
+            qd_arm=_NO_JOINTS,
+        )
+
+    def _is_next(self, t_us: int) -> bool:
+        """Whether a step is a new one, which it is only once; a known one is answered again."""
+        if t_us <= self._last_us:
+            self._repeat(t_us)
+            return False
+        ahead_us = t_us - self._last_us
+        confirmed = 0 < t_us - self._doubted_us <= _AHEAD_US
+        if self._last_us >= 0 and ahead_us > _AHEAD_US and not confirmed:
+            self._doubted_us = t_us
+            self.notices.append(f"step stamped {1e-6 * ahead_us:.1f} s ahead: ignored")
+            return False
+        self._last_us, self._doubted_us = t_us, -1
+        return True
 
     def _repeat(self, t_us: int) -> None:
         answered_us, answer = self._answer
@@ -166,7 +229,10 @@ class SimLink:
             self._endpoint.send(answer)
 
     def _read_between_steps(self, frames: list[Frame]) -> None:
+        """What ends the run, and measurements for which the next step has no room."""
         for frame in frames:
+            if self.measured:
+                self._inbox.accept_samples(self._decoder.samples(frame))
             if frame.message_id == message_ids.COMMAND_LONG:
                 request = decode.command_long(frame)
                 if (

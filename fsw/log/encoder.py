@@ -15,7 +15,7 @@ from struct import Struct
 from typing import Any, Final
 
 from fsw.geometry.rotation import quaternion_from_matrix
-from fsw.log import topics
+from fsw.log import samples, topics
 from fsw.log.json_codec import JsonCodec
 from fsw.model.kinematics import point_in_flight
 from fsw.ports import GroupTiming
@@ -31,7 +31,8 @@ from fsw.signals import (
 )
 from messages.ulog import Topic, data_head, logged_text
 
-TYPED: Final = "sensors"  # the input that has a topic of its own
+TYPED: Final = "sensors"  # the inputs that have topics of their own
+SAMPLES: Final = "samples"
 STATUS_TICKS: Final = 500
 THIN, FULL = 0, 1  # values of LOG_PROFILE
 DETAIL_US: Final = {
@@ -118,7 +119,7 @@ class LogEncoder:
         self._measured = measured
         self._per_newton = 1.0 / thrust_max
         self._link_length = link_length
-        self._changing = tuple(name for name in self.inputs.names if name != TYPED)
+        self._changing = tuple(name for name in self.inputs.names if name not in (TYPED, SAMPLES))
         self._changing_of = attrgetter(*self._changing)
         self._last_values: tuple[Any, ...] | None = None
         self._last: FlightSnapshot | None = None
@@ -128,6 +129,8 @@ class LogEncoder:
         """Append the records of one tick; the sensors' are the first."""
         snapshot = outputs.snapshot
         out += self._every_tick(inputs, snapshot)
+        for sample in inputs.samples:
+            out += samples.record(inputs.sensors.t_us, sample)
         interval = snapshot.t_us // self._detail_us
         if interval != self._detailed:
             self._detailed = interval

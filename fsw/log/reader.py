@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from fsw.log import topics
-from fsw.log.encoder import TYPED
+from fsw.log import samples, topics
+from fsw.log.encoder import SAMPLES, TYPED
 from fsw.log.json_codec import JsonCodec
 from fsw.signals import SensorFrame, TickInputs
 from messages import ulog
@@ -113,12 +113,18 @@ class _Inputs:
     def tick(self, index: int, records: list[Record]) -> LoggedTick:
         if index == 0:
             self._check_numbers()
+        measured = []
         try:
             for record in records:
-                if record.number == _SENSORS:
+                if record.kind != ulog.DATA:
+                    continue
+                if record.number in samples.TOPIC_NUMBERS:
+                    measured.append(samples.sample_of(record.number, record.body))
+                elif record.number == _SENSORS:
                     self._values[TYPED] = _sensor_frame(self._sensors.unpack(record.body))
                 elif record.number == _INPUT:
                     self._take(record.body)
+            self._values[SAMPLES] = tuple(measured)
             return LoggedTick(index, TickInputs(**self._values), records)
         except (ValueError, TypeError) as error:
             raise UlogError(f"{self._log.path} is damaged in tick {index}: {error}") from None

@@ -9,6 +9,16 @@ from __future__ import annotations
 
 from typing import Final
 
+from fsw.measurements import (
+    GnssSample,
+    ImuSample,
+    JointSample,
+    MagneticSample,
+    PoseSample,
+    PressureSample,
+    RangeSample,
+    Sample,
+)
 from messages.ulog import Field, Topic, doubles
 
 TEXT_SIZE: Final = 200  # characters of an input's text in one record
@@ -247,6 +257,81 @@ LOOP_TIMING: Final = Topic(
         Field("group", "uint8_t", note="PANDION_RATE_GROUP"),
     ),
 )
+_MEASURED: Final = "every measurement, with the tick that it arrived for; none with exact sensors"
+_MEASURED_AT: Final = doubles("time", 0, "s, of the measurement, on the clock of the tick")
+SENSOR_COMBINED: Final = Topic(
+    "sensor_combined",
+    "Inertial unit; input of the tick",
+    _MEASURED,
+    (
+        _MEASURED_AT,
+        doubles("accelerometer_m_s2", 3, "m/s^2, specific force, body"),
+        doubles("gyro_rad", 3, "rad/s, body"),
+    ),
+)
+VEHICLE_VISUAL_ODOMETRY: Final = Topic(
+    "vehicle_visual_odometry",
+    "Pose from motion capture or visual odometry; input of the tick",
+    _MEASURED,
+    (
+        _MEASURED_AT,
+        doubles("position", 3, "m, NED"),
+        doubles("q", 4, "[w, x, y, z], body to NED"),
+        doubles("position_variance", 3, "m^2"),
+        doubles("orientation_variance", 3, "rad^2"),
+        Field("reset_counter", "uint32_t"),
+    ),
+)
+GNSS_LOCAL: Final = Topic(
+    "gnss_local",
+    "Position and velocity from satellites, in the local frame; input of the tick",
+    _MEASURED,
+    (
+        _MEASURED_AT,
+        doubles("position", 3, "m, NED"),
+        doubles("velocity", 3, "m/s, NED"),
+        doubles("position_variance", 3, "m^2"),
+        doubles("velocity_variance", 3, "m^2/s^2"),
+    ),
+)
+VEHICLE_AIR_DATA: Final = Topic(
+    "vehicle_air_data",
+    "Barometer; input of the tick",
+    _MEASURED,
+    (
+        _MEASURED_AT,
+        doubles("baro_alt_meter", 0, "m above the origin of the local frame"),
+        doubles("variance", 0, "m^2"),
+    ),
+)
+VEHICLE_MAGNETOMETER: Final = Topic(
+    "vehicle_magnetometer",
+    "Magnetometer; input of the tick",
+    _MEASURED,
+    (_MEASURED_AT, doubles("magnetometer_ga", 3, "Gauss, body")),
+)
+DISTANCE_SENSOR: Final = Topic(
+    "distance_sensor",
+    "Distance to what is below; input of the tick",
+    _MEASURED,
+    (_MEASURED_AT, doubles("current_distance", 0, "m"), doubles("variance", 0, "m^2")),
+)
+JOINT_ENCODERS: Final = Topic(
+    "joint_encoders",
+    "Encoders of the arm; input of the tick",
+    _MEASURED,
+    (_MEASURED_AT, doubles("angle", 2, "rad")),
+)
+# Each kind of sample and its topic, whose fields are the sample's, in their order.
+OF_SAMPLES: Final[dict[type[Sample], Topic]] = {
+    ImuSample: SENSOR_COMBINED,
+    PoseSample: VEHICLE_VISUAL_ODOMETRY,
+    GnssSample: GNSS_LOCAL,
+    PressureSample: VEHICLE_AIR_DATA,
+    MagneticSample: VEHICLE_MAGNETOMETER,
+    RangeSample: DISTANCE_SENSOR,
+    JointSample: JOINT_ENCODERS,
+}
 TOPICS: Final = (
     SENSOR_FRAME,
     TICK_INPUT,
@@ -268,5 +353,6 @@ TOPICS: Final = (
     MPC_REQUEST,
     MPC_STATUS,
     LOOP_TIMING,
+    *OF_SAMPLES.values(),
 )
 """Everything the flight software writes; a topic's place is its number in the file."""

@@ -8,6 +8,7 @@ from typing import cast
 from fsw.control.cascade import Inner
 from fsw.control.gains import LoopGains
 from fsw.control.safety_filter import FilterTuning
+from fsw.estimation.tuning import EstimatorTuning
 from fsw.geometry.geodesy import DEFAULT_ORIGIN
 from fsw.model.airframe import AIRFRAME, Airframe
 from fsw.model.battery import BatteryModel
@@ -52,6 +53,7 @@ class FlightLimits:
     battery_emergency: float = 0.05
     low_battery_action: int = 0  # 0 warn; 2 land when critical; 3 return then, land in emergency
     safe_set_owner: int = 0  # MAVLink system that owns the safe set; 0: the first to announce one
+    clearance_sigmas: float = 3.0  # standard deviations of a point, kept from zones besides
     breach_action: int = 6  # of the safe set: 1 warn, 2 hold, 5 land, 6 retreat and hold
     owner_timeout_us: int = 10_000_000  # a silent owner may be replaced on the ground
     zone_timeout_us: int = 3_000_000  # a moving zone that is not announced for this long stands
@@ -96,6 +98,7 @@ class FlightConfig:
     surroundings: Surroundings = field(default_factory=Surroundings)
     steering: SetpointLimits = field(default_factory=SetpointLimits)
     safety_filter: FilterTuning = field(default_factory=FilterTuning)
+    estimator: EstimatorTuning = field(default_factory=EstimatorTuning)
     battery: BatteryModel = field(default_factory=BatteryModel)
     origin: Origin = DEFAULT_ORIGIN
     soft: bool = False  # fly an inconsistent configuration all the same, with a warning

@@ -290,6 +290,8 @@ _ROWS: Final[dict[str, list[_Row]]] = {
          "MAVLink system that owns the safe set and may grow it in flight; 0: the first one"),
         ("SAFE_BREACH_ACT", "limits.breach_action", "", 1.0, 6.0,
          "Action when the vehicle is outside its safe set"),
+        ("SAFE_SIGMAS", "limits.clearance_sigmas", "", 0.0, 6.0,
+         "Standard deviations of the estimate that clearances grow by"),
         ("SAFE_FILTER", "safety_filter.enabled", "", 0.0, 1.0,
          "Filter of the acceleration that the loops are about to realise"),
         ("SAFE_FLT_GAMMA", "safety_filter.gamma", "1/s", 0.1, 20.0,
@@ -348,6 +350,7 @@ _CHOICES: Final[dict[str, Choices]] = {
 # Numbers of FlightConfig that are no parameters, by the beginning of their path, and why.
 NO_PARAMETERS: Final[dict[str, str]] = {
     "battery.": "describes the vehicle",
+    "estimator.": "describes the sensors",
     "origin.": "given at start: single precision is metres off in a latitude",
     "airframe.": "describes the vehicle; scales its actuators and telemetry, which must not change",
     "planner.horizon": "size of the program, which is laid out once",

@@ -245,6 +245,9 @@ class SimLoop(Generic[State]):
         if events:
             self._notices += [StatusText(Severity.WARNING, event) for event in events]
             events.clear()
+        if self._sim.notices:
+            self._notices += [StatusText(Severity.WARNING, one) for one in self._sim.notices]
+            self._sim.notices.clear()
         if self._notices:
             outputs = replace(outputs, texts=(*outputs.texts, *self._notices))
         self._ground.publish(outputs)

@@ -7,18 +7,22 @@ from typing import Final
 
 from messages.frames import FrameWriter
 from messages.lockstep_codec import LockstepFrame
+from sitl.earth import DEFAULT_ORIGIN, Place
 from sitl.link import message_ids
+from sitl.link.encode_sensors import SensorEncoder
 from sitl.link.message_ids import PATH_PLANNER, SENSORS, SYSTEM_ID
 from sitl.link.pilot_messages import (
     PilotMessage,
     SendCommand,
     SendTarget,
 )
-from sitl.sensors.suite import SensorReadings
+from sitl.sensors.exact import SensorReadings
+from sitl.sensors.measurements import Measurement
 from sitl.shapes.kind import NUMBERS
 
 WireValues = tuple[float | bytes, ...]
 
+_MAX_DATAGRAM: Final = 1400  # bytes, fits an Ethernet packet
 _LOCAL_NED: Final = 1  # MAV_FRAME; of ODOMETRY's position and velocity
 _MOTION_CAPTURE: Final = 6  # MAV_ESTIMATOR_TYPE
 _ACCEL_AND_GYRO: Final = 0x3F  # HIL_SENSOR_UPDATED_FLAGS: there is no magnetometer or barometer
@@ -41,10 +45,14 @@ _ARM_TAIL: Final = (0.0,) * 6  # the end-effector's place and velocity: not meas
 class StepEncoder:
     """Builds the datagram of a step."""
 
-    def __init__(self, lockstep: bool) -> None:
+    def __init__(
+        self, lockstep: bool, *, measured: bool = False, origin: Place = DEFAULT_ORIGIN
+    ) -> None:
+        """Send the true state, or what sensors have ``measured``; the frame is at ``origin``."""
         self._sensors = FrameWriter(SYSTEM_ID, SENSORS)
         self._pilot = FrameWriter(SYSTEM_ID, PATH_PLANNER)
-        self._pacing = 1 if lockstep else 0
+        self._mode = (1 if lockstep else 0) | (2 if measured else 0)
+        self._measured = SensorEncoder(self._sensors, origin)
         self._odometry = LockstepFrame(self._sensors, message_ids.ODOMETRY, *_ODOMETRY_TAIL)
         self._hil_sensor = LockstepFrame(self._sensors, message_ids.HIL_SENSOR, *_HIL_TAIL)
         self._arms = {
@@ -64,9 +72,35 @@ class StepEncoder:
         )
         return self._spoken(messages) + step if messages else step
 
+    def measured_datagrams(
+        self,
+        t_us: int,
+        measurements: tuple[Measurement, ...],
+        messages: tuple[PilotMessage, ...],
+        opening: bytes = b"",
+    ) -> tuple[list[bytes], bytes]:
+        """Pilot's messages, what arrived from the sensors, and HIL_SENSOR last, as the barrier.
+
+        That is the second; what arrived and has no room in it goes ahead, in the first, as it does
+        once at the start of a flight. Each datagram begins with ``opening``.
+        """
+        frames = self._measured.frames(t_us, measurements)
+        step = [opening, self._spoken(messages)] if messages else [opening]
+        size = sum(map(len, step)) + len(frames[-1])
+        first = len(frames) - 1
+        while first > 0 and size + len(frames[first - 1]) <= _MAX_DATAGRAM:
+            first -= 1
+            size += len(frames[first])
+        ahead: list[bytes] = []
+        for frame in frames[:first]:
+            if not ahead or len(ahead[-1]) + len(frame) > _MAX_DATAGRAM:
+                ahead.append(opening)
+            ahead[-1] += frame
+        return ahead, b"".join([*step, *frames[first:]])
+
     def heartbeat(self) -> bytes:
-        """HEARTBEAT; its custom_mode is the pacing: 1 lockstep, 0 real time."""
-        values = (self._pacing, _GENERIC, _NO_AUTOPILOT, _HIL, _ACTIVE, _MAVLINK_VERSION)
+        """HEARTBEAT; in its custom_mode bit 0 is set in lockstep and bit 1 with sensors."""
+        values = (self._mode, _GENERIC, _NO_AUTOPILOT, _HIL, _ACTIVE, _MAVLINK_VERSION)
         return self._sensors.frame(message_ids.HEARTBEAT, *values)
 
     def command(self, message: SendCommand) -> bytes:

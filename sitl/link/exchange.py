@@ -61,6 +61,10 @@ class Lockstep:
         """Step of the last answer, if the vehicle has been silent for 0.1 s; None if not."""
         return self._number - 1 if self._number and self._listened_s >= SILENT_S else None
 
+    def send_ahead(self, datagram: bytes) -> None:
+        """Send what belongs to the next step and has no room in its datagram."""
+        self._endpoint.send(datagram)
+
     def step(
         self, number: int, t_us: int, datagram: bytes, meanwhile: Callable[[], None]
     ) -> VehicleReply:
@@ -138,6 +142,10 @@ class RealTime:
     def silent_since(self) -> int | None:
         """As of :class:`Lockstep`."""
         return self._heard_step if self._silent_s > SILENT_S else None
+
+    def send_ahead(self, datagram: bytes) -> None:
+        """Send what belongs to the next step and has no room in its datagram."""
+        self._endpoint.send(datagram)
 
     def step(
         self, number: int, t_us: int, datagram: bytes, meanwhile: Callable[[], None]

@@ -7,10 +7,13 @@ COMMAND_LONG: Final = 76
 COMMAND_ACK: Final = 77
 HIL_ACTUATOR_CONTROLS: Final = 93
 HIL_SENSOR: Final = 107
+HIL_GPS: Final = 113
+DISTANCE_SENSOR: Final = 132
 ODOMETRY: Final = 331
 ARM_JOINT_STATE: Final = 60200
 END_EFFECTOR_TARGET: Final = 60202
 OBSTACLE_SHAPE: Final = 60211
+JOINT_ENCODERS: Final = 60212
 
 SYSTEM_ID: Final = 1  # the vehicle that is simulated
 SENSORS: Final = 200  # component of the simulated sensors

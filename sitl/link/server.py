@@ -16,10 +16,10 @@ from sitl.link.encode import StepEncoder
 from sitl.link.exchange import Exchange, SimulatorError
 from sitl.link.message_ids import ACCEPTED, CMD_REBOOT_SHUTDOWN
 from sitl.link.pilot import FlightPlan, PilotState
-from sitl.link.pilot_messages import Heard, SendCommand
+from sitl.link.pilot_messages import Heard, PilotMessage, SendCommand
 from sitl.link.udp_endpoint import PeerSocket
 from sitl.result import EndKind
-from sitl.sensors.suite import SensorReadings
+from sitl.sensors.exact import SensorReadings
 from sitl.simulation import Simulation
 
 _HEARTBEAT_STEPS: Final = 500  # 1 Hz
@@ -73,8 +73,7 @@ def serve(
     while simulation.ended is None:
         readings = simulation.sense()
         state, messages = pilot.speak(plan, state, readings.t_us)
-        heartbeat = encoder.heartbeat() if simulation.step % _HEARTBEAT_STEPS == 0 else b""
-        datagram = heartbeat + encoder.datagram(readings, messages)
+        datagram = _datagram(simulation, encoder, messages, exchange)
         try:
             answer = exchange.step(
                 simulation.step, readings.t_us, datagram, lambda: truth(simulation)
@@ -103,6 +102,24 @@ def serve(
                 progress(simulation.time_s, simulation.min_margin_m, speed)
     wall_s = time.perf_counter() - begin_s
     return RunTiming(simulation.step, wall_s, simulation.time_s / max(wall_s, 1e-9))
+
+
+def _datagram(
+    simulation: Simulation,
+    encoder: StepEncoder,
+    messages: tuple[PilotMessage, ...],
+    exchange: Exchange,
+) -> bytes:
+    """The datagram of this step; what has no room in it is sent ahead."""
+    heartbeat = encoder.heartbeat() if simulation.step % _HEARTBEAT_STEPS == 0 else b""
+    measured = simulation.measurements()
+    if measured is None:
+        return heartbeat + encoder.datagram(simulation.sense(), messages)
+    t_us = simulation.t_us
+    ahead, datagram = encoder.measured_datagrams(t_us, measured, messages, heartbeat)
+    for one in ahead:
+        exchange.send_ahead(one)
+    return datagram
 
 
 def shut_down(endpoint: PeerSocket, encoder: StepEncoder, tries: int) -> bool:

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sitl.air.load import SURFACES, Air, drag_force, rotor_gain, wall_force
 from sitl.compiled import compiled, kernel
 from sitl.plant.actuators import joint_torque, rotor_torque, stop_torque, thrust_rate
 from sitl.plant.bodies import Chain, Posture, empty_posture, posture_into
@@ -17,6 +18,7 @@ from sitl.plant.mass_matrix import mass_matrix_into, solve_in_place
 from sitl.plant.newton_euler import wrench_needed_into
 from sitl.plant.packing import pack_params
 from sitl.plant.parameters import Joints, Rotors, Vehicle, chain
+from sitl.plant.rotor_speed import quadratic_thrust_rate
 from sitl.plant.state import ARM, P_WB, Q_WB, THRUST, V_WB, W_WB_B
 from sitl.plant.vector import (
     V3,
@@ -47,6 +49,7 @@ class Plant(NamedTuple):
     rotors: Rotors
     joints: Joints
     stops: Stops
+    air: Air
     gravity: float  # m/s²
 
 
@@ -91,9 +94,31 @@ def plant(vehicle: Vehicle) -> Plant:
         rotors=vehicle.rotors,
         joints=vehicle.joints,
         stops=Stops(stop_angle, stops.stiffness, stops.damping),
+        air=_air(vehicle),
         gravity=vehicle.gravity,
     )
     return pack_params(numbers)
+
+
+def _air(vehicle: Vehicle) -> Air:
+    model, rotors = vehicle.air, vehicle.rotors
+    surfaces = np.zeros((SURFACES, 4))
+    for k, (normal, offset) in enumerate(model.surfaces):
+        surfaces[k] = (*normal, offset)
+    return Air(
+        active=float(model.active),
+        wind=np.zeros(3),
+        drag=vehicle.mass * np.array(model.rotor_drag),
+        area=model.drag_area,
+        density=model.density,
+        radius=vehicle.size.blade,
+        arm=rotors.arm,
+        ground=float(model.ground),
+        ceiling=float(model.ceiling),
+        suction=model.suction,
+        surfaces=surfaces,
+        surface_count=float(len(model.surfaces)),
+    )
 
 
 @compiled
@@ -124,9 +149,22 @@ def load_into(plant: Plant, state: Array, inputs: Inputs, work: Workspace) -> No
         plant.feet, triple(state, P_WB), triple(state, V_WB), triple(state, W_WB_B), rotation
     )
     thrust = (state[THRUST], state[THRUST + 1], state[THRUST + 2], state[THRUST + 3])
+    air = plant.air
+    if air.active > 0.0:
+        p = triple(state, P_WB)
+        thrust = (
+            rotor_gain(air, p, rotation, 0) * thrust[0],
+            rotor_gain(air, p, rotation, 1) * thrust[1],
+            rotor_gain(air, p, rotation, 2) * thrust[2],
+            rotor_gain(air, p, rotation, 3) * thrust[3],
+        )
     lift = (0.0, 0.0, -(thrust[0] + thrust[1] + thrust[2] + thrust[3]))
     push = transposed_times(rotation, triple(inputs.force_W, 0))
-    put(load, 0, add(add(lift, push), feet_force))
+    force = add(add(lift, push), feet_force)
+    if air.active > 0.0:
+        force = add(force, drag_force(air, triple(state, V_WB), rotation))
+        force = add(force, wall_force(air, triple(state, P_WB), rotation, thrust))
+    put(load, 0, force)
     turn = rotor_torque(thrust, plant.rotors.arm, plant.rotors.yaw_ratio)
     put(load, 3, add(add(turn, triple(inputs.torque_B, 0)), feet_moment))
     joints, drive, stops = work.still.shape[0], plant.joints, plant.stops
@@ -190,7 +228,11 @@ def derivative_into(
     out[Q_WB + 3] = 0.5 * (w * c + x * b - y * a)
     limit, lag = plant.rotors.thrust_max, plant.rotors.lag
     for i in range(4):
-        out[THRUST + i] = thrust_rate(state[THRUST + i], inputs.thrust[i], limit, lag)
+        thrust, command = state[THRUST + i], inputs.thrust[i]
+        if plant.rotors.quadratic > 0.0:
+            out[THRUST + i] = quadratic_thrust_rate(thrust, command, limit, lag)
+        else:
+            out[THRUST + i] = thrust_rate(thrust, command, limit, lag)
     joints = work.still.shape[0]
     for i in range(joints):
         out[ARM + i] = state[ARM + joints + i]

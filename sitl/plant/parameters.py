@@ -47,6 +47,7 @@ class Rotors:
     yaw_ratio: float = 0.016  # m, reaction torque per thrust (same laboratory's public model)
     thrust_max: float = 2.0 * 3.5 * GRAVITY / 4.0  # N each: thrust-to-weight 2:1, our choice
     lag: float = 0.04  # s, first order, our choice
+    quadratic: bool = False  # the speed lags, not the thrust
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,6 +107,25 @@ class Size:
 
 
 @dataclass(frozen=True, slots=True)
+class AirModel:
+    """What the vehicle feels of the air beside its rotors' thrust; nothing by default."""
+
+    rotor_drag: V3 = (0.0, 0.0, 0.0)  # 1/s, per mass, along the body's axes
+    drag_area: float = 0.0  # m²
+    density: float = 1.225  # kg/m³, standard atmosphere at sea level
+    ground: bool = False
+    ceiling: bool = False
+    suction: float = 0.0  # of walls, share of the thrust
+    surfaces: tuple[tuple[V3, float], ...] = ()  # planes: normal into the air, NED, and offset, m
+
+    @property
+    def active(self) -> bool:
+        """Whether there is anything to feel."""
+        near = self.ground or self.ceiling or self.suction > 0.0
+        return near or any(self.rotor_drag) or self.drag_area > 0.0
+
+
+@dataclass(frozen=True, slots=True)
 class Vehicle:
     """The aerial manipulator; the defaults are the paper's Table I."""
 
@@ -122,6 +142,7 @@ class Vehicle:
     stops: EndStops = EndStops()
     legs: Legs = Legs()
     size: Size = Size()
+    air: AirModel = AirModel()
     gravity: float = GRAVITY
 
     @property

@@ -1,1 +1,1 @@
-"""What the vehicle can measure: truth, delayed and with noise."""
+"""What the vehicle can measure, one file a sensor."""

@@ -1,117 +1,81 @@
-"""All sensors of the vehicle: delay lines and noise around the truth."""
+"""All sensors of a suite: what arrives from them in each step."""
 
 from __future__ import annotations
 
-import math
-from collections import deque
-from typing import Generic, NamedTuple, TypeVar
-
-from sitl.scenario import V3, Sensors
 from sitl.seeds import stream
-
-V4 = tuple[float, float, float, float]
-T = TypeVar("T")
-
-
-class SensorReadings(NamedTuple):
-    """One sample of every sensor."""
-
-    t_us: int  # µs, time of the sample's delivery
-    p_WB: V3  # m, NED
-    v_WB: V3  # m/s, NED
-    q_WB: V4  # [w, x, y, z], maps B to W
-    w_WB_B: V3  # rad/s, B, as motion capture reports it
-    gyro_B: V3  # rad/s, B
-    accel_B: V3  # m/s², specific force at the base origin, B (at rest: 0, 0, -g)
-    q_arm: tuple[float, ...]  # (j,) rad
-    qd_arm: tuple[float, ...]  # (j,) rad/s
-    tau_arm: tuple[float, ...]  # (j,) N·m, at the drives, before friction
-
-
-class DelayLine(Generic[T]):
-    """Delays samples by a fixed number; before that, returns the first sample."""
-
-    def __init__(self, samples: int) -> None:
-        self._line: deque[T] = deque(maxlen=samples + 1)
-
-    def through(self, sample: T) -> T:
-        """Store the newest sample, return the delayed one."""
-        self._line.append(sample)
-        return self._line[0]
-
-
-class GaussianNoise:
-    """Gaussian noise from a stream of its own."""
-
-    def __init__(self, seed: int, *path: str) -> None:
-        self._random = stream(seed, "sensor", *path)
-
-    def on(self, values: tuple[float, ...], sigma: float) -> tuple[float, ...]:
-        """``values`` with independent noise of standard deviation sigma [unit of the values]."""
-        if sigma == 0.0:
-            return values
-        draws = self._random.standard_normal(len(values))
-        return tuple(v + sigma * float(d) for v, d in zip(values, draws, strict=True))
-
-
-def turned(q: V4, small: tuple[float, ...]) -> V4:
-    """Attitude ``q`` followed by the rotation vector ``small`` [rad, B]."""
-    angle = math.sqrt(sum(c * c for c in small))
-    if angle == 0.0:
-        return q
-    s = math.sin(0.5 * angle) / angle
-    a, b, c, d = math.cos(0.5 * angle), s * small[0], s * small[1], s * small[2]
-    w, x, y, z = q
-    return (
-        w * a - x * b - y * c - z * d,
-        w * b + x * a + y * d - z * c,
-        w * c - x * d + y * a + z * b,
-        w * d + x * c - y * b + z * a,
-    )
+from sitl.sensors.barometer import BarometerSensor
+from sitl.sensors.channel import Channel, Sensor
+from sitl.sensors.encoders import EncoderSensor
+from sitl.sensors.exact import V4, SensorReadings
+from sitl.sensors.gnss import GnssSensor
+from sitl.sensors.imu import ImuSensor
+from sitl.sensors.keys import MeasuredSensors, Timing
+from sitl.sensors.magnetometer import MagnetometerSensor
+from sitl.sensors.measurements import Measurement
+from sitl.sensors.motion_capture import MotionCaptureSensor
+from sitl.sensors.rangefinder import RangefinderSensor
+from sitl.sensors.visual_odometry import VisualOdometrySensor
 
 
 class SensorSuite:
-    """Turns exact readings into measured ones, one call per step.
+    """Every sensor with its channel, in the order in which messages of one step are sent.
 
-    Every quantity draws from a stream of its own, so switching one noise on does not change
-    another.
+    Each sensor draws from a stream of its own, of the seed and its name: another sensor, or a
+    disturbance, changes nothing of what it says.
     """
 
-    def __init__(self, sensors: Sensors, seed: int, step_us: int) -> None:
-        self._sensors = sensors
-        self._imu, self._pose, self._encoders = (
-            DelayLine[SensorReadings](round(1000.0 * errors.latency_ms / step_us))
-            for errors in (sensors.imu, sensors.pose, sensors.encoders)
-        )
-        self._exact = sensors == Sensors()
-        self._noise = {
-            name: GaussianNoise(seed, name)
-            for name in ("gyro", "accel", "p", "v", "q", "w", "angle", "rate", "torque")
-        }
+    def __init__(
+        self,
+        sensors: MeasuredSensors,
+        seed: int,
+        start_us: int,
+        *,
+        joints: int,
+        hover_thrust: float,
+        origin_altitude: float = 0.0,
+    ) -> None:
+        """Draw the sensors of this flight, which begins at the stamp ``start_us``.
 
-    def measure(self, exact: SensorReadings) -> SensorReadings:
-        """The readings delivered at ``exact.t_us``."""
-        if self._exact:
-            return exact
-        imu = self._imu.through(exact)
-        pose = self._pose.through(exact)
-        arm = self._encoders.through(exact)
-        errors, noise = self._sensors, self._noise
-        no_turn = (0.0, 0.0, 0.0)
-        return SensorReadings(
-            t_us=exact.t_us,
-            p_WB=_three(noise["p"].on(pose.p_WB, errors.pose.position_m)),
-            v_WB=_three(noise["v"].on(pose.v_WB, errors.pose.velocity_m_s)),
-            q_WB=turned(pose.q_WB, noise["q"].on(no_turn, errors.pose.attitude_rad)),
-            w_WB_B=_three(noise["w"].on(pose.w_WB_B, errors.pose.rate_rad_s)),
-            gyro_B=_three(noise["gyro"].on(imu.gyro_B, errors.imu.gyro_rad_s)),
-            accel_B=_three(noise["accel"].on(imu.accel_B, errors.imu.accel_m_s2)),
-            q_arm=noise["angle"].on(arm.q_arm, errors.encoders.angle_rad),
-            qd_arm=noise["rate"].on(arm.qd_arm, errors.encoders.rate_rad_s),
-            tau_arm=noise["torque"].on(arm.tau_arm, errors.encoders.torque_n_m),
-        )
+        A rotor gives ``hover_thrust`` [N] in hover; the origin of the local frame lies at
+        ``origin_altitude`` [m] above the sea.
+        """
+        self._channels: list[Channel] = []
 
+        def add(name: str, keys: Timing, sensor: Sensor) -> None:
+            random = stream(seed, "sensor", name, "channel")
+            self._channels.append(Channel(sensor, keys, random, start_us))
 
-def _three(values: tuple[float, ...]) -> V3:
-    x, y, z = values
-    return (x, y, z)
+        one = sensors
+        if one.motion_capture is not None:
+            name, keys = "motion capture", one.motion_capture
+            add(name, keys, MotionCaptureSensor(keys, stream(seed, "sensor", name)))
+        if one.visual_odometry is not None:
+            name, eyes = "visual odometry", one.visual_odometry
+            add(name, eyes, VisualOdometrySensor(eyes, stream(seed, "sensor", name)))
+        if one.gnss is not None:
+            add("gnss", one.gnss, GnssSensor(one.gnss, stream(seed, "sensor", "gnss")))
+        if one.barometer is not None:
+            name, air = "barometer", one.barometer
+            random = stream(seed, "sensor", name)
+            add(name, air, BarometerSensor(air, random, origin_altitude))
+        if one.magnetometer is not None:
+            name, compass = "magnetometer", one.magnetometer
+            add(name, compass, MagnetometerSensor(compass, stream(seed, "sensor", name)))
+        if one.rangefinder is not None:
+            name, ray = "rangefinder", one.rangefinder
+            add(name, ray, RangefinderSensor(ray, stream(seed, "sensor", name)))
+        name = "encoders"
+        encoders = EncoderSensor(one.encoders, stream(seed, "sensor", name), joints)
+        add(name, one.encoders, encoders)
+        add("imu", one.imu, ImuSensor(one.imu, stream(seed, "sensor", "imu"), hover_thrust))
+
+    def step(self, exact: SensorReadings, thrust: V4) -> list[Measurement]:
+        """What arrives in the step of the exact readings; to be called once a step.
+
+        The rotors give ``thrust`` [N].
+        """
+        arrived: list[Measurement] = []
+        for channel in self._channels:
+            if exact.t_us >= channel.next_us:
+                channel.step(exact, thrust, arrived)
+        return arrived

@@ -10,7 +10,7 @@ from benchmarks import lockstep
 from benchmarks.pymavlink_process import step
 from messages import dialect
 from sitl.link.encode import StepEncoder
-from sitl.sensors.suite import SensorReadings
+from sitl.sensors.exact import SensorReadings
 
 READINGS = SensorReadings(
     1_002_000,

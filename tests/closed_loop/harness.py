@@ -11,6 +11,7 @@ from fsw.flight.state import FlightState
 from fsw.flight.tuned_autopilot import TunedAutopilot
 from fsw.geometry.geodesy import DEFAULT_ORIGIN, to_local
 from fsw.link.wire.decode_commands import command as read_command
+from fsw.measurements import Sample
 from fsw.mpc.planner import Planner
 from fsw.parameters.flight_config import FlightConfig, flight_config
 from fsw.ports import PlanningCycle as AnyPlanner
@@ -65,12 +66,16 @@ def as_measured(frame: SensorFrame) -> SensorFrame:
     return frame
 
 
+def as_sampled(samples: tuple[Sample, ...]) -> tuple[Sample, ...]:
+    return samples
+
+
 @dataclass
 class Flight:
     """One flight, step by step; all status texts are kept.
 
-    ``spoil`` stands between sensors and flight software, ``late_ticks`` says by how many ticks
-    each plan comes after its time.
+    ``spoil`` and ``spoil_samples`` stand between sensors and flight software, ``late_ticks`` says
+    by how many ticks each plan comes after its time.
     """
 
     scenario: Scenario
@@ -78,6 +83,7 @@ class Flight:
     config: FlightConfig = field(default_factory=lambda: flight_config(body="points"))
     planner: AnyPlanner | None = None
     spoil: Callable[[SensorFrame], SensorFrame] = as_measured
+    spoil_samples: Callable[[tuple[Sample, ...]], tuple[Sample, ...]] = as_sampled
     late_ticks: Callable[[int], int] = on_time
     announces: bool = True  # the safe set
     upload: MissionUpdate | None = None  # told to the next tick
@@ -142,6 +148,7 @@ class Flight:
             announced(self.scenario) if self.announces and self.sim.step == 0 else (),
             tuning=tuning,
             mission=self.upload,
+            samples=self.spoil_samples(self.closed.samples()),
         )
         self.upload = None
         if self.streamed and self.sim.step % STREAM_STEPS == 0:

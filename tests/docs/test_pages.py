@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 from pathlib import Path
 
@@ -9,6 +10,8 @@ import pytest
 
 from docs.pages.messages import OF_MISSIONS, reference, traffic
 from docs.pages.parameters import reference as parameter_reference
+from docs.pages.sensors import TABLES
+from docs.pages.sensors import inserted as with_sensors
 from docs.pages.topics import inserted
 from fsw.link.services.mission_service import MissionService
 from fsw.link.services.mission_store import MissionStore, Site
@@ -17,6 +20,7 @@ from fsw.link.wire import message_ids as ids
 from fsw.mpc.planner_config import PlannerConfig
 from messages import dialect
 from pandion.result import FlightReports, as_json
+from sitl.sensors.keys import Timing
 from tests.docs.fences import DOCS, PAGES, ROOT, named, without_fences
 
 REFERENCE = DOCS / "reference"
@@ -78,6 +82,21 @@ def test_the_reference_of_messages_is_not_stale() -> None:
 def test_the_topics_of_the_flight_log_are_not_stale() -> None:
     page = (REFERENCE / "flight-log.md").read_text(encoding="utf-8")
     assert page == inserted(page), "run make pages"
+
+
+def test_the_tables_of_the_sensors_are_not_stale() -> None:
+    page = (REFERENCE / "sensors.md").read_text(encoding="utf-8")
+    assert page == with_sensors(page), "run make pages"
+
+
+def test_every_number_of_a_suite_has_a_place_in_a_table() -> None:
+    """A key that a table leaves out would be one that nobody can look up."""
+    page = (REFERENCE / "sensors.md").read_text(encoding="utf-8")
+    for name, kind in TABLES.items():
+        table = page.split(f"### `[sensors.{name}]`")[1].split("###")[0]
+        own = {field.name for field in dataclasses.fields(kind)}
+        own -= {field.name for field in dataclasses.fields(Timing)}
+        assert own <= set(re.findall(r"^\| `(\w+)`", table, re.MULTILINE)), name
 
 
 def test_the_reference_of_parameters_is_not_stale() -> None:

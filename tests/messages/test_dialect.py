@@ -20,6 +20,7 @@ PINNED = {
     "SETPOINT_STATUS": (60209, 21, 131),
     "OBSTACLE_POINT": (60210, 20, 254),
     "OBSTACLE_SHAPE": (60211, 94, 185),
+    "JOINT_ENCODERS": (60212, 25, 156),
 }
 
 # From pymavlink's development.xml and upstream.xml, as MAVLink's common.xml and QGroundControl have

@@ -11,7 +11,7 @@ from sitl.plant.trim import level_hover
 from sitl.result import EndKind
 from sitl.scenario import Hold, Impulses, ImuErrors, Pilot, Scenario, Sensors, Wind, Workspace
 from sitl.scenario_file import ScenarioError, load_scenario
-from sitl.sensors.suite import SensorReadings
+from sitl.sensors.exact import SensorReadings
 from sitl.simulation import Controls, Simulation, Truth
 
 OFF = Controls((0.0, 0.0, 0.0, 0.0), (0.0, 0.0), armed=False)

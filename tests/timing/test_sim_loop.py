@@ -55,6 +55,7 @@ class Sim(VirtualSensors):
     pacing: Pacing = Pacing.REALTIME
     done: list[str] = field(default_factory=list)  # shared by all parts
     answers: list[tuple[int, TickOutputs]] = field(default_factory=list)  # at, what
+    notices: list[str] = field(default_factory=list)
 
     def newest(self) -> SensorFrame | None:
         self.done.append("sensors")

@@ -20,7 +20,7 @@ from sitl.link.pilot_messages import SendCommand
 from sitl.mission_clock import MissionClock
 from sitl.scenario import Scenario, Workspace
 from sitl.scenario_file import load_scenario
-from sitl.sensors.suite import SensorReadings
+from sitl.sensors.exact import SensorReadings
 from sitl.shapes.box import Box
 from studies.mission import safe_set as safe_set_of
 from tests.fsw.link.snapshots import FACTS, outputs_at
@@ -158,6 +158,27 @@ def test_an_older_step_is_ignored(wire: Wire) -> None:
     assert wire.link.wait_for_step() is None
     with pytest.raises(TimeoutError):
         wire.hear()
+
+
+@pytest.mark.parametrize("wrong_us", [11_004_000, 2**63, 2**64 - 1])
+def test_one_stamp_far_ahead_does_not_make_the_vehicle_deaf(wire: Wire, wrong_us: int) -> None:
+    encoder = StepEncoder(lockstep=True)
+    released = []
+    for t_us in (1_002_000, wrong_us, 1_004_000, 1_006_000):
+        wire.send(encoder.datagram(readings(t_us), ()))
+        released.append(wire.link.wait_for_step())
+    assert [one and one.t_us for one in released] == [1_002_000, None, 1_004_000, 1_006_000]
+    (notice,) = wire.link.notices
+    assert "ahead: ignored" in notice
+
+
+def test_a_clock_that_goes_on_from_another_time_is_followed(wire: Wire) -> None:
+    encoder = StepEncoder(lockstep=True)
+    released = []
+    for t_us in (1_002_000, 9_004_000, 9_006_000, 9_008_000):
+        wire.send(encoder.datagram(readings(t_us), ()))
+        released.append(wire.link.wait_for_step())
+    assert [one and one.t_us for one in released] == [1_002_000, None, 9_006_000, 9_008_000]
 
 
 def test_a_step_without_its_barrier_releases_no_tick(wire: Wire) -> None:

@@ -33,7 +33,9 @@ def specimen(hint: Any, dice: random.Random, nothing: float = 0.2) -> Any:
         return tuple(specimen(part, dice) for part in parts)
     if typing.get_origin(hint) in (types.UnionType, typing.Union):
         kinds = [part for part in typing.get_args(hint) if part is not types.NoneType]
-        return None if dice.random() < nothing else specimen(dice.choice(kinds), dice)
+        if len(kinds) < len(typing.get_args(hint)) and dice.random() < nothing:
+            return None
+        return specimen(dice.choice(kinds), dice)
     if issubclass(hint, enum.Enum):
         return dice.choice(list(hint))
     hints = typing.get_type_hints(hint)

@@ -13,10 +13,11 @@ from typing import Any
 import pytest
 
 from fsw.log import topics
-from fsw.log.encoder import NAV_STATES, TYPED, LogEncoder
+from fsw.log.encoder import NAV_STATES, SAMPLES, TYPED, LogEncoder
 from fsw.log.flight_log import FlightLog, LogSubject
 from fsw.log.json_codec import JsonCodec
 from fsw.log.reader import LoggedTick, open_flight, ticks
+from fsw.measurements import Sample
 from fsw.signals import Mode, PlanTimings, SensorFrame, TickInputs
 from tests.fsw.link.snapshots import outputs_at
 from tests.fsw.log.specimens import inputs
@@ -74,6 +75,17 @@ def test_the_topic_of_the_sensors_has_every_field_of_theirs() -> None:
     assert {field.name for field in topics.SENSOR_FRAME.fields} == fields - {"t_us"}
     assert {field.type for field in topics.SENSOR_FRAME.fields} == {"double"}
     assert typing.get_type_hints(TickInputs)[TYPED] is SensorFrame
+
+
+def test_the_topic_of_each_kind_of_sample_has_its_fields_in_their_order() -> None:
+    assert set(topics.OF_SAMPLES) == set(typing.get_args(Sample))
+    for kind, topic in topics.OF_SAMPLES.items():
+        hints = typing.get_type_hints(kind)
+        sizes = [len(typing.get_args(hint)) for hint in hints.values()]
+        assert [field.count for field in topic.fields] == sizes
+        types = ["uint32_t" if hint is int else "double" for hint in hints.values()]
+        assert [field.type for field in topic.fields] == types
+    assert typing.get_type_hints(TickInputs)[SAMPLES] == tuple[Sample, ...]
 
 
 def test_in_lockstep_nothing_the_wall_clock_measured_is_written(tmp_path: Path) -> None:

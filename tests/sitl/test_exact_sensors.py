@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sitl.scenario import EncoderErrors, ImuErrors, PoseErrors, Sensors
-from sitl.sensors.suite import SensorReadings, SensorSuite, turned
+from sitl.sensors.exact import ExactSensors, SensorReadings, turned
 
 
 def _exact(k: int) -> SensorReadings:
@@ -30,14 +30,14 @@ def _exact(k: int) -> SensorReadings:
 
 
 def test_sensors_are_exact_by_default() -> None:
-    suite = SensorSuite(Sensors(), 0, 2000)
+    suite = ExactSensors(Sensors(), 0, 2000)
     assert all(suite.measure(_exact(k)) == _exact(k) for k in range(10))
 
 
 @pytest.mark.parametrize("latency_ms", [0.0, 2.0, 10.0, 200.0])
 def test_latency_hands_back_the_sample_of_exactly_that_age(latency_ms: float) -> None:
     sensors = Sensors(pose=PoseErrors(latency_ms=latency_ms))
-    suite = SensorSuite(sensors, 0, 2000)
+    suite = ExactSensors(sensors, 0, 2000)
     age = round(latency_ms / 2.0)
     for k in range(150):
         reading = suite.measure(_exact(k))
@@ -57,7 +57,7 @@ NOISY = Sensors(
 
 def _noise(sensors: Sensors, seed: int, samples: int) -> dict[str, np.ndarray]:
     """Measured minus true for each field of many readings of the same truth."""
-    suite, exact = SensorSuite(sensors, seed, 2000), _exact(0)
+    suite, exact = ExactSensors(sensors, seed, 2000), _exact(0)
     readings = [suite.measure(exact) for _ in range(samples)]
     names = [name for name in SensorReadings._fields if name != "t_us"]
     return {

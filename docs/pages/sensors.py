@@ -1,0 +1,218 @@
+"""The tables in docs/reference/sensors.md: every key of every sensor, and the suites' numbers."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+import tomllib
+import typing
+from typing import Annotated, Any, Final
+
+from sitl.scenario_file import SUITES
+from sitl.sensors import keys
+
+BEGIN: Final = "<!-- sensors: make pages -->\n"
+END: Final = "<!-- end -->"
+NAMES: Final = ("mocap", "vio", "rtk", "gnss")
+TABLES: Final[dict[str, type[keys.Timing]]] = {
+    "imu": keys.Imu,
+    "motion_capture": keys.MotionCapture,
+    "visual_odometry": keys.VisualOdometry,
+    "gnss": keys.Gnss,
+    "barometer": keys.Barometer,
+    "magnetometer": keys.Magnetometer,
+    "rangefinder": keys.Rangefinder,
+    "encoders": keys.Encoders,
+}
+
+_POSE: Final = {
+    "position_m": "noise of each axis",
+    "attitude_deg": "noise about each axis",
+    "outlier_m": "an outlier lies so far off, in any direction",
+    "outlier_deg": "and is turned by so much",
+}
+MEANINGS: Final[dict[str, dict[str, str]]] = {
+    "timing": {
+        "rate_hz": "measurements; at most that of the steps, 500",
+        "latency_ms": "mean, from measurement to arrival",
+        "jitter_ms": "deviation of the latency; messages do not overtake each other",
+        "stamp_error_ms": "the stamp says so much later than it was; the vehicle does not know",
+        "dropout_share": "of the messages are lost, each for itself",
+        "gap_ms": "length of a silence",
+        "gap_every_s": "one silence in each such interval, at a random place in it",
+        "outlier_share": "of the messages are outliers",
+    },
+    "imu": {
+        "gyro_density_rad_s": "white noise per √Hz; a sample has √rate times as much",
+        "accel_density_m_s2": "the same",
+        "gyro_bias_rad_s": "deviation of the bias that wanders, a Gauss–Markov process; 0.617 of "
+        "it is the bias instability",
+        "gyro_bias_time_s": "its correlation time",
+        "accel_bias_m_s2": "the same",
+        "accel_bias_time_s": "the same",
+        "gyro_turn_on_rad_s": "bias drawn once a flight",
+        "accel_turn_on_m_s2": "the same",
+        "gyro_scale_share": "scale error of each axis, drawn once a flight",
+        "accel_scale_share": "the same",
+        "misalignment_deg": "of each axis towards each other one, drawn once a flight",
+        "gyro_limit_rad_s": "end of the range",
+        "accel_limit_m_s2": "the same",
+        "gyro_resolution_rad_s": "step of the digits; 0: none",
+        "accel_resolution_m_s2": "the same",
+        "vibration_rad_s": "amplitude that one rotor causes in hover; grows with its thrust",
+        "vibration_m_s2": "the same",
+        "rotor_hz": "turns of a rotor in hover; with the root of its thrust",
+    },
+    "motion_capture": _POSE,
+    "visual_odometry": {
+        **_POSE,
+        "drift_m": "random walk of the frame, per √s on each axis",
+        "drift_deg": "random walk of the frame's yaw, per √s",
+        "recognises_every_s": "mean time until the frame jumps back, with a new `reset_counter`",
+        "recognised_m": "deviation of the frame after a jump",
+        "recognised_deg": "the same, of its yaw",
+    },
+    "gnss": {
+        "horizontal_m": "white noise, north and east",
+        "vertical_m": "white noise, down",
+        "wander_horizontal_m": "deviation of what changes slowly, a Gauss–Markov process",
+        "wander_vertical_m": "the same",
+        "wander_time_s": "its correlation time",
+        "velocity_m_s": "noise of each axis",
+        "outlier_m": "an outlier lies so far off, in any direction",
+        "rtk": "says that its fix is one with corrections (`fix_type` 6), or a plain one (3)",
+    },
+    "barometer": {
+        "noise_pa": "white noise",
+        "offset_pa": "pressure of the day against the standard, drawn once a flight",
+        "drift_pa": "deviation of what changes slowly, a Gauss–Markov process",
+        "drift_time_s": "its correlation time",
+        "resolution_pa": "step of the digits; 0: none",
+        "outlier_pa": "an outlier is off by so much",
+    },
+    "magnetometer": {
+        "field_gauss": "the Earth's field, NED",
+        "noise_gauss": "white noise of each axis",
+        "offset_gauss": "of each axis, drawn once a flight",
+        "scale_share": "scale error of each axis, drawn once a flight",
+        "resolution_gauss": "step of the digits; 0: none",
+        "outlier_gauss": "an outlier adds so much, in any direction",
+    },
+    "rangefinder": {
+        "least_m": "nearer, nothing is sent",
+        "most_m": "farther, nothing is sent",
+        "noise_m": "white noise",
+        "scale_share": "scale error, drawn once a flight",
+        "resolution_m": "step of the digits; 0: none",
+        "outlier_m": "an outlier is so much too short",
+    },
+    "encoders": {
+        "resolution_rad": "step of the digits; 0: none",
+        "noise_rad": "white noise of each joint",
+        "offset_rad": "error of each zero, drawn once a flight",
+        "outlier_rad": "an outlier of the first joint is off by so much",
+    },
+}
+
+
+def reference() -> str:
+    """The tables in Markdown."""
+    suites = {name: (SUITES / f"{name}.toml").read_text(encoding="utf-8") for name in NAMES}
+    parts = ["### Every sensor\n", _table("timing", keys.Timing, {}, {})]
+    numbers = {name: tomllib.loads(text) for name, text in suites.items()}
+    notes = {name: _comments(text) for name, text in suites.items()}
+    for name, kind in TABLES.items():
+        parts.append(f"### `[sensors.{name}]`\n")
+        values = {suite: found[name] for suite, found in numbers.items() if name in found}
+        said = {suite: found.get(name, {}) for suite, found in notes.items()}
+        parts.append(_table(name, kind, values, said))
+    parts.append("### Sources\n")
+    parts.append("Numbers of the brackets in the tables, suite by suite.\n")
+    for name, text in suites.items():
+        parts.append(f"- `{name}`: {'; '.join(_sources(text))}")
+    return "\n".join(parts) + "\n"
+
+
+def inserted(page: str) -> str:
+    """The page with the tables as they should be.
+
+    Raises:
+        ValueError: The page has no place for them.
+    """
+    before, begin, rest = page.partition(BEGIN)
+    _, end, after = rest.partition(END)
+    if not begin or not end:
+        raise ValueError("the page has no place for the sensors")
+    return f"{before}{begin}{reference()}{end}{after}"
+
+
+def _table(
+    name: str,
+    kind: type[keys.Timing],
+    values: dict[str, dict[str, Any]],
+    notes: dict[str, dict[str, str]],
+) -> str:
+    """Every key of one sensor: its own, and those of all sensors that a suite gives."""
+    head = ["key", "allowed", "meaning", *(f"`{suite}`" for suite in values)]
+    if values:
+        head.append("source")
+    rows = [_row(head), _row(["---"] * len(head))]
+    hints = typing.get_type_hints(kind, include_extras=True)
+    common = {field.name for field in dataclasses.fields(keys.Timing)}
+    for field in dataclasses.fields(kind):
+        given = [found.get(field.name) for found in values.values()]
+        if kind is not keys.Timing and field.name in common and not any(given):
+            continue
+        meaning = MEANINGS[name].get(field.name) or MEANINGS["timing"][field.name]
+        cells = [f"`{field.name}`", _allowed(hints[field.name]), meaning]
+        if values:
+            cells += ["" if value is None else _shown(value) for value in given]
+            cells.append(_source([notes[suite].get(field.name, "") for suite in values]))
+        rows.append(_row(cells))
+    return "\n".join(rows) + "\n"
+
+
+def _row(cells: list[str]) -> str:
+    return f"| {' | '.join(cells)} |"
+
+
+def _allowed(hint: Any) -> str:
+    if typing.get_origin(hint) is not Annotated:
+        return "true, false"
+    plain, permitted = typing.get_args(hint)
+    count = len(typing.get_args(plain))
+    return f"{count} numbers, {permitted}" if count else str(permitted)
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, list):
+        return "[" + ", ".join(f"{entry:g}" for entry in value) + "]"
+    return f"{value:g}"
+
+
+def _source(said: list[str]) -> str:
+    different = list(dict.fromkeys(text for text in said if text))
+    return "; ".join(different)
+
+
+def _comments(text: str) -> dict[str, dict[str, str]]:
+    """What stands behind each key of a suite's file, sensor by sensor."""
+    found: dict[str, dict[str, str]] = {}
+    table = ""
+    for line in text.splitlines():
+        heading = re.match(r"\[(\w+)\]", line)
+        if heading:
+            table = heading.group(1)
+            found[table] = {}
+        noted = re.match(r"(\w+) = [^#]+# (.+)", line)
+        if noted:
+            found[table][noted.group(1)] = noted.group(2)
+    return found
+
+
+def _sources(text: str) -> list[str]:
+    """The numbered sources at the head of a suite's file, one text each."""
+    head = text.partition("\n\n")[0].replace("\n#     ", " ")
+    return re.findall(r"^# (\[\d+\] .+)$", head, re.MULTILINE)

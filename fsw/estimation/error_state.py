@@ -1,0 +1,351 @@
+r"""The error-state Kalman filter: nominal state, its prediction by the IMU, and a correction.
+
+The nominal state is integrated from the IMU; the filter estimates its small error
+
+.. math:: \delta x = (\delta p, \delta v, \delta\theta, \delta a_b, \delta\omega_b,
+          \delta b, \delta\tau)
+
+with the attitude's error in body axes, :math:`q_t = q \otimes \mathrm{Exp}(\delta\theta)`, the
+biases of accelerometer and gyro, that of the barometer b, and the pose's further delay tau. A
+correction moves the error into the nominal state.
+
+The state lies a fixed time behind the present, so that measurements are fused at their own time.
+The present follows from it by integrating the IMU's readings since (``present``).
+
+Source: J. Solà, Quaternion kinematics for the error-state Kalman filter, 2017 (arXiv 1711.02508),
+section 5; docs/decisions/0030-an-estimate-of-the-present.md.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fsw.compiled import compilable
+from fsw.geometry.quaternion import turned
+from fsw.geometry.rotation import matrix_from_quaternion, rotate
+from fsw.model.airframe import GRAVITY
+from fsw.signals import Mat3, Vec3, Vec4
+
+Array = NDArray[np.float64]
+# Entries of the error.
+P, V, TH, BA, BG, BARO, DELAY = 0, 3, 6, 9, 12, 15, 16
+ERRORS: Final = 17
+ROWS: Final = 3  # of a measurement, at most
+IMU_CAPACITY: Final = 256  # readings since the filter's time
+# Columns of a reading: time [s], specific force [m/s^2] and rate [rad/s] in body axes, and whether
+# it is the sensor's own (0), an older one's (1).
+TIME, FORCE, RATE, LOST, COLUMNS = 0, 1, 4, 7, 8
+
+FILTER: Final = np.dtype(
+    [
+        ("time", float),  # s, of the state
+        ("p", float, (3,)),  # m, NED
+        ("v", float, (3,)),  # m/s, NED
+        ("q", float, (4,)),  # body to NED
+        ("accel_bias", float, (3,)),  # m/s^2, body
+        ("gyro_bias", float, (3,)),  # rad/s, body
+        ("baro_bias", float),  # m
+        ("pose_delay", float),  # s
+        ("covariance", float, (ERRORS, ERRORS)),
+        ("rate", float, (3,)),  # rad/s, body, at the state's time
+        ("acceleration", float, (3,)),  # m/s^2, NED, there
+        ("imu", float, (IMU_CAPACITY, COLUMNS)),  # ring
+        ("first", np.int64),  # of the readings after the state's time, counted from the start
+        ("end", np.int64),  # behind the newest reading
+        ("same", np.int64),  # how often the newest reading came in a row
+        ("unlike", np.int64),  # how often in a row readings were too far from the last good one
+        ("lost", np.int64),  # whether the state's own reading is an older one's
+        ("joints", float, (2, 3)),  # angle [rad], rate [rad/s] and disturbance [rad/s^2] of each
+        # What is known of the biases while the readings are of no use.
+        ("kept_bias", float, (6,)),
+        ("kept_variance", float, (6,)),
+        # Of the measurement that is being fused.
+        ("H", float, (ROWS, ERRORS)),
+        ("residual", float, (ROWS,)),
+        ("variance", float, (ROWS,)),
+        ("gain", float, (ERRORS, ROWS)),
+        ("factor", float, (ROWS, ROWS)),
+        ("error", float, (ERRORS,)),
+    ],
+    align=True,
+)
+Filter = NDArray[Any]  # (1,) of FILTER
+
+
+@compilable
+def vec3(row: Array, first: int) -> Vec3:
+    """Three entries of a ``row`` (n,) [any unit], from ``first`` on."""
+    return row[first], row[first + 1], row[first + 2]
+
+
+@compilable
+def vec4(row: Array) -> Vec4:
+    """Four entries of a ``row`` (4,) [any unit]."""
+    return row[0], row[1], row[2], row[3]
+
+
+@compilable
+def integrated(
+    p: Vec3, v: Vec3, q: Vec4, f: Vec3, w: Vec3, dt: float
+) -> tuple[Vec3, Vec3, Vec4, Vec3]:
+    """Position, velocity, attitude ``dt`` [s] later, and the acceleration meanwhile.
+
+    ``p`` [m, NED], ``v`` [m/s, NED], ``q`` [1]; specific force ``f`` [m/s^2, FRD] and rate ``w``
+    [rad/s, FRD] are means over the step. Solà, eq 260, with the force turned by half the step.
+    """
+    h = 0.5 * dt
+    half = (
+        f[0] + h * (w[1] * f[2] - w[2] * f[1]),
+        f[1] + h * (w[2] * f[0] - w[0] * f[2]),
+        f[2] + h * (w[0] * f[1] - w[1] * f[0]),
+    )
+    ax, ay, az = rotate(matrix_from_quaternion(q), half)
+    az += GRAVITY
+    placed = (
+        p[0] + dt * (v[0] + h * ax),
+        p[1] + dt * (v[1] + h * ay),
+        p[2] + dt * (v[2] + h * az),
+    )
+    moving = (v[0] + dt * ax, v[1] + dt * ay, v[2] + dt * az)
+    return placed, moving, turned(q, dt * w[0], dt * w[1], dt * w[2]), (ax, ay, az)
+
+
+@compilable
+def propagate(M: Array, R: Mat3, f: Vec3, w: Vec3, dt: float) -> None:
+    """Replace the covariance ``M`` (17, 17) [SI] by F M F^T, ``dt`` [s] later. Solà, eq 270.
+
+    ``R`` [1, body to NED] and the means ``f`` [m/s^2, FRD] and ``w`` [rad/s, FRD] are of the step.
+    """
+    # -R [f]x dt, Solà's slope of the velocity over the attitude.
+    fx, fy, fz = dt * f[0], dt * f[1], dt * f[2]
+    a00, a01, a02 = R[2] * fy - R[1] * fz, R[0] * fz - R[2] * fx, R[1] * fx - R[0] * fy
+    a10, a11, a12 = R[5] * fy - R[4] * fz, R[3] * fz - R[5] * fx, R[4] * fx - R[3] * fy
+    a20, a21, a22 = R[8] * fy - R[7] * fz, R[6] * fz - R[8] * fx, R[7] * fx - R[6] * fy
+    r00, r01, r02 = dt * R[0], dt * R[1], dt * R[2]
+    r10, r11, r12 = dt * R[3], dt * R[4], dt * R[5]
+    r20, r21, r22 = dt * R[6], dt * R[7], dt * R[8]
+    x, y, z = dt * w[0], dt * w[1], dt * w[2]
+    # Exp(-w dt) to second order.
+    e00, e01, e02 = 1.0 - 0.5 * (y * y + z * z), z + 0.5 * x * y, -y + 0.5 * x * z
+    e10, e11, e12 = -z + 0.5 * x * y, 1.0 - 0.5 * (x * x + z * z), x + 0.5 * y * z
+    e20, e21, e22 = y + 0.5 * x * z, -x + 0.5 * y * z, 1.0 - 0.5 * (x * x + y * y)
+    for j in range(ERRORS):
+        t0, t1, t2 = M[6, j], M[7, j], M[8, j]
+        b0, b1, b2 = M[9, j], M[10, j], M[11, j]
+        M[0, j] += dt * M[3, j]
+        M[1, j] += dt * M[4, j]
+        M[2, j] += dt * M[5, j]
+        M[3, j] += a00 * t0 + a01 * t1 + a02 * t2 - (r00 * b0 + r01 * b1 + r02 * b2)
+        M[4, j] += a10 * t0 + a11 * t1 + a12 * t2 - (r10 * b0 + r11 * b1 + r12 * b2)
+        M[5, j] += a20 * t0 + a21 * t1 + a22 * t2 - (r20 * b0 + r21 * b1 + r22 * b2)
+        M[6, j] = e00 * t0 + e01 * t1 + e02 * t2 - dt * M[12, j]
+        M[7, j] = e10 * t0 + e11 * t1 + e12 * t2 - dt * M[13, j]
+        M[8, j] = e20 * t0 + e21 * t1 + e22 * t2 - dt * M[14, j]
+    for i in range(ERRORS):
+        t0, t1, t2 = M[i, 6], M[i, 7], M[i, 8]
+        b0, b1, b2 = M[i, 9], M[i, 10], M[i, 11]
+        M[i, 0] += dt * M[i, 3]
+        M[i, 1] += dt * M[i, 4]
+        M[i, 2] += dt * M[i, 5]
+        M[i, 3] += a00 * t0 + a01 * t1 + a02 * t2 - (r00 * b0 + r01 * b1 + r02 * b2)
+        M[i, 4] += a10 * t0 + a11 * t1 + a12 * t2 - (r10 * b0 + r11 * b1 + r12 * b2)
+        M[i, 5] += a20 * t0 + a21 * t1 + a22 * t2 - (r20 * b0 + r21 * b1 + r22 * b2)
+        M[i, 6] = e00 * t0 + e01 * t1 + e02 * t2 - dt * M[i, 12]
+        M[i, 7] = e10 * t0 + e11 * t1 + e12 * t2 - dt * M[i, 13]
+        M[i, 8] = e20 * t0 + e21 * t1 + e22 * t2 - dt * M[i, 14]
+
+
+@compilable
+def add_noise(M: Array, law: Any, dt: float, lost: int) -> None:
+    """Add to the covariance ``M`` (17, 17) [SI] what ``dt`` [s] of noise add. Solà, eq 261-265."""
+    force = law.accel_noise * law.accel_noise * dt
+    turn = law.gyro_noise * law.gyro_noise * dt
+    accel_walk = law.lost_accel_walk if lost else law.accel_bias_walk
+    gyro_walk = law.lost_gyro_walk if lost else law.gyro_bias_walk
+    for i in range(3):
+        M[V + i, V + i] += force
+        M[TH + i, TH + i] += turn
+        M[BA + i, BA + i] += accel_walk * accel_walk * dt
+        M[BG + i, BG + i] += gyro_walk * gyro_walk * dt
+    M[BARO, BARO] += law.baro_bias_walk * law.baro_bias_walk * dt
+    if law.pose_delay_sigma > 0.0:
+        M[DELAY, DELAY] += law.pose_delay_walk * law.pose_delay_walk * dt
+
+
+@compilable
+def step_to(x: Any, law: Any, row: Array, before: Array, M: Array) -> None:
+    """Predict to the time of the reading ``row`` (8,) [SI], which follows ``before`` (8,) [SI].
+
+    Covariance ``M`` (17, 17) [SI]. Where readings are missing, in steps short enough.
+    """
+    gap = max(row[TIME] - x.time, 0.0)
+    lost = 1 if row[LOST] > 0.0 or gap > law.imu_gap else 0
+    _watch_biases(x, M, lost)
+    f = (
+        0.5 * (row[1] + before[1]) - x.accel_bias[0],
+        0.5 * (row[2] + before[2]) - x.accel_bias[1],
+        0.5 * (row[3] + before[3]) - x.accel_bias[2],
+    )
+    w = (
+        0.5 * (row[4] + before[4]) - x.gyro_bias[0],
+        0.5 * (row[5] + before[5]) - x.gyro_bias[1],
+        0.5 * (row[6] + before[6]) - x.gyro_bias[2],
+    )
+    steps = max(1, math.ceil(gap / law.imu_gap - 1e-6))
+    dt = gap / steps
+    p, v, q = vec3(x.p, 0), vec3(x.v, 0), vec4(x.q)
+    a = (0.0, 0.0, 0.0)
+    for _ in range(steps):
+        R = matrix_from_quaternion(q)
+        p, v, q, a = integrated(p, v, q, f, w, dt)
+        propagate(M, R, f, w, dt)
+        add_noise(M, law, dt, lost)
+    for i in range(3):
+        x.p[i], x.v[i], x.acceleration[i] = p[i], v[i], a[i]
+        x.rate[i] = row[RATE + i] - x.gyro_bias[i]
+    for i in range(4):
+        x.q[i] = q[i]
+    x.time = max(row[TIME], x.time)
+
+
+@compilable
+def _watch_biases(x: Any, M: Array, lost: int) -> None:
+    """Keep the biases when readings are lost, and take them up again when they are back."""
+    if lost == x.lost:
+        return
+    x.lost = lost
+    for i in range(6):
+        k, bias = BA + i, x.accel_bias if i < 3 else x.gyro_bias
+        if lost:
+            x.kept_bias[i], x.kept_variance[i] = bias[i % 3], M[k, k]
+        else:
+            bias[i % 3] = x.kept_bias[i]
+            for j in range(ERRORS):
+                M[k, j] = 0.0
+                M[j, k] = 0.0
+            M[k, k] = x.kept_variance[i]
+
+
+@compilable
+def advance(x: Any, law: Any, until: float) -> None:
+    """Move the state on through all readings up to ``until`` [s]."""
+    while x.first < x.end:
+        row = x.imu[x.first % IMU_CAPACITY]
+        if row[TIME] > until and x.end - x.first < IMU_CAPACITY - 2:
+            return
+        step_to(x, law, row, x.imu[(x.first - 1) % IMU_CAPACITY], x.covariance)
+        x.first += 1
+
+
+@compilable
+def present(x: Any, now: float) -> tuple[Vec3, Vec3, Vec4, Vec3, Vec3]:
+    """Position, velocity, attitude, rate and specific force at ``now`` [s].
+
+    All readings since the state's time are integrated anew, with the newest biases. After the last
+    reading, that one is held.
+    """
+    p, v, q = vec3(x.p, 0), vec3(x.v, 0), vec4(x.q)
+    t, last = x.time, x.imu[(x.first - 1) % IMU_CAPACITY]
+    b0, b1, b2 = x.accel_bias[0], x.accel_bias[1], x.accel_bias[2]
+    g0, g1, g2 = x.gyro_bias[0], x.gyro_bias[1], x.gyro_bias[2]
+    for k in range(x.first, x.end):
+        row = x.imu[k % IMU_CAPACITY]
+        f = (
+            0.5 * (row[1] + last[1]) - b0,
+            0.5 * (row[2] + last[2]) - b1,
+            0.5 * (row[3] + last[3]) - b2,
+        )
+        w = (
+            0.5 * (row[4] + last[4]) - g0,
+            0.5 * (row[5] + last[5]) - g1,
+            0.5 * (row[6] + last[6]) - g2,
+        )
+        p, v, q, _ = integrated(p, v, q, f, w, row[TIME] - t)
+        t, last = row[TIME], row
+    f = (last[1] - b0, last[2] - b1, last[3] - b2)
+    w = (last[4] - g0, last[5] - g1, last[6] - g2)
+    if now > t:
+        p, v, q, _ = integrated(p, v, q, f, w, now - t)
+    return p, v, q, w, f
+
+
+@compilable
+def distance(x: Any, rows: int) -> float:
+    """Chi-square of the residual: how unlikely the measurement is.
+
+    Leaves behind the Cholesky factor of its covariance and that part of the gain which needs it.
+    """
+    M, H, L, W = x.covariance, x.H, x.factor, x.gain
+    for i in range(ERRORS):
+        for k in range(rows):
+            total = 0.0
+            for j in range(ERRORS):
+                total += M[i, j] * H[k, j]
+            W[i, k] = total
+    for k in range(rows):
+        for m in range(k + 1):
+            total = x.variance[k] if k == m else 0.0
+            for j in range(ERRORS):
+                total += H[k, j] * W[j, m]
+            for j in range(m):
+                total -= L[k, j] * L[m, j]
+            L[k, m] = math.sqrt(total) if k == m else total / L[m, m]
+    squared = 0.0
+    for k in range(rows):
+        total = x.residual[k]
+        for j in range(k):
+            total -= L[k, j] * x.residual[j]
+        x.residual[k] = total / L[k, k]
+        squared += x.residual[k] * x.residual[k]
+    return squared
+
+
+@compilable
+def correct(x: Any, rows: int) -> None:
+    """Take in the measurement that ``distance`` has judged. Solà, eq 275, 276 and 283.
+
+    P - K S K^T is P - W W^T with W = P H^T L^-T: symmetric to the last bit.
+    """
+    M, L, W = x.covariance, x.factor, x.gain
+    for i in range(ERRORS):
+        error = 0.0
+        for k in range(rows):
+            total = W[i, k]
+            for j in range(k):
+                total -= L[k, j] * W[i, j]
+            W[i, k] = total / L[k, k]
+            error += W[i, k] * x.residual[k]
+        x.error[i] = error
+    for i in range(ERRORS):
+        for j in range(ERRORS):
+            total = 0.0
+            for k in range(rows):
+                total += W[i, k] * W[j, k]
+            M[i, j] -= total
+        # Rounding must not make a variance negative.
+        M[i, i] = max(M[i, i], 0.0)
+    inject(x)
+
+
+@compilable
+def inject(x: Any) -> None:
+    """Move the error into the nominal state. Solà, eq 283; the reset's Jacobian (287) is left out.
+
+    Half of the attitude's correction of 1e-3 rad would turn its covariance by as much.
+    """
+    error = x.error
+    for i in range(3):
+        x.p[i] += error[P + i]
+        x.v[i] += error[V + i]
+        x.accel_bias[i] += error[BA + i]
+        x.gyro_bias[i] += error[BG + i]
+        x.rate[i] -= error[BG + i]
+    x.baro_bias += error[BARO]
+    x.pose_delay += error[DELAY]
+    q = turned(vec4(x.q), error[TH], error[TH + 1], error[TH + 2])
+    for i in range(4):
+        x.q[i] = q[i]

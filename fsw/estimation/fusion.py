@@ -1,0 +1,235 @@
+r"""Measurements of the error-state filter: residual, slope over the error, and the gate.
+
+A measurement lies up to one period of the IMU beside the filter's time: the state is moved there by
+its own velocity, acceleration and rate. One whose chi-square is beyond its gate
+(``tuning.GATES``) is not fused. Each function returns chi-square over gate: fused if 1 or less.
+
+Source: J. Solà, Quaternion kinematics for the error-state Kalman filter, 2017, section 6.1.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from fsw.compiled import compilable
+from fsw.estimation.error_state import (
+    BARO,
+    BG,
+    DELAY,
+    ERRORS,
+    TH,
+    Array,
+    P,
+    V,
+    correct,
+    distance,
+    vec3,
+    vec4,
+)
+from fsw.estimation.tuning import GATES
+from fsw.geometry.quaternion import conjugate, multiply, rotation_vector, turned
+from fsw.geometry.rotation import matrix_from_quaternion, rotate, wrap_angle
+from fsw.signals import Vec3, Vec4
+
+_LEAST_FIELD = 0.02  # Gauss across the vertical; less says nothing about the heading
+
+
+@compilable
+def _cleared(x: Any, rows: int) -> None:
+    for k in range(rows):
+        for j in range(ERRORS):
+            x.H[k, j] = 0.0
+
+
+@compilable
+def _judged(x: Any, rows: int) -> float:
+    """Chi-square over gate; fuses what is within it."""
+    ratio = distance(x, rows) / GATES[rows - 1]
+    if ratio <= 1.0:
+        correct(x, rows)
+    return ratio
+
+
+@compilable
+def position_rows(x: Any, z: Vec3, variance: Vec3, dt: float, delayed: float) -> None:
+    """Rows of a position ``z`` [m, NED] of ``variance`` [m^2, NED], ``dt`` [s] after the state.
+
+    ``delayed`` [1] is 1 where its delay is estimated, else 0.
+    """
+    _cleared(x, 3)
+    for i in range(3):
+        moving = x.v[i] + dt * x.acceleration[i]
+        x.residual[i] = z[i] - (x.p[i] + dt * (x.v[i] + 0.5 * dt * x.acceleration[i]))
+        x.H[i, P + i] = 1.0
+        x.H[i, V + i] = dt
+        x.H[i, DELAY] = -delayed * moving
+        x.variance[i] = variance[i]
+
+
+@compilable
+def attitude_rows(x: Any, z: Vec4, variance: Vec3, dt: float, delayed: float) -> None:
+    """Rows of an attitude ``z`` [1] of ``variance`` [rad^2, FRD], ``dt`` [s] after the state.
+
+    ``delayed`` [1] is 1 where its delay is estimated, else 0.
+    """
+    _cleared(x, 3)
+    w = vec3(x.rate, 0)
+    there = turned(vec4(x.q), dt * w[0], dt * w[1], dt * w[2])
+    residual = rotation_vector(multiply(conjugate(there), z))
+    for i in range(3):
+        x.residual[i] = residual[i]
+        x.H[i, TH + i] = 1.0
+        x.H[i, BG + i] = -dt
+        x.H[i, DELAY] = -delayed * w[i]
+        x.variance[i] = variance[i]
+    # The rotation between the state and the measurement turns the error's axes, to first order.
+    x.H[0, TH + 1], x.H[0, TH + 2] = dt * w[2], -dt * w[1]
+    x.H[1, TH + 0], x.H[1, TH + 2] = -dt * w[2], dt * w[0]
+    x.H[2, TH + 0], x.H[2, TH + 1] = dt * w[1], -dt * w[0]
+
+
+@compilable
+def fuse_pose(
+    x: Any,
+    law: Any,
+    time: float,
+    position: Vec3,
+    attitude: Vec4,
+    position_variance: Vec3,
+    attitude_variance: Vec3,
+) -> tuple[float, float]:
+    """Fuse a pose stamped ``time`` [s]: chi-square over gate of its two halves.
+
+    ``position`` [m, NED], ``attitude`` [1], ``position_variance`` [m^2, NED] and
+    ``attitude_variance`` [rad^2, FRD].
+    """
+    delayed = 1.0 if law.pose_delay_sigma > 0.0 else 0.0
+    dt = time - x.pose_delay - x.time
+    position_rows(x, position, position_variance, dt, delayed)
+    first = _judged(x, 3)
+    dt = time - x.pose_delay - x.time
+    attitude_rows(x, attitude, attitude_variance, dt, delayed)
+    return first, _judged(x, 3)
+
+
+@compilable
+def velocity_rows(x: Any, z: Vec3, variance: Vec3, dt: float) -> None:
+    """Rows of a velocity ``z`` [m/s, NED], ``variance`` [m^2/s^2, NED], ``dt`` [s] after x."""
+    _cleared(x, 3)
+    for i in range(3):
+        x.residual[i] = z[i] - (x.v[i] + dt * x.acceleration[i])
+        x.H[i, V + i] = 1.0
+        x.variance[i] = variance[i]
+
+
+@compilable
+def fuse_gnss(
+    x: Any,
+    law: Any,
+    time: float,
+    position: Vec3,
+    velocity: Vec3,
+    position_variance: Vec3,
+    velocity_variance: Vec3,
+) -> tuple[float, float]:
+    """Fuse position and velocity of ``time`` [s]: chi-square over gate of each.
+
+    ``position`` [m, NED], ``velocity`` [m/s, NED], ``position_variance`` [m^2, NED],
+    ``velocity_variance`` [m^2/s^2, NED].
+    """
+    dt = time - x.time
+    position_rows(x, position, position_variance, dt, 0.0)
+    first = _judged(x, 3)
+    velocity_rows(x, velocity, velocity_variance, dt)
+    return first, _judged(x, 3)
+
+
+@compilable
+def pressure_rows(x: Any, altitude: float, variance: float, dt: float) -> None:
+    """The row of an ``altitude`` [m, up] of ``variance`` [m^2], ``dt`` [s] after the state."""
+    _cleared(x, 1)
+    x.residual[0] = altitude - (-(x.p[2] + dt * x.v[2]) + x.baro_bias)
+    x.H[0, P + 2] = -1.0
+    x.H[0, V + 2] = -dt
+    x.H[0, BARO] = 1.0
+    x.variance[0] = variance
+
+
+@compilable
+def fuse_pressure(x: Any, law: Any, time: float, altitude: float, variance: float) -> float:
+    """Fuse an ``altitude`` [m, up] of ``time`` [s] with ``variance`` [m^2]."""
+    pressure_rows(x, altitude, variance, time - x.time)
+    return _judged(x, 1)
+
+
+@compilable
+def heading_rows(x: Any, law: Any, field: Vec3, dt: float) -> bool:
+    """The row of a magnetic ``field`` [Gauss, FRD]: its heading alone, ``dt`` [s] after the state.
+
+    False where the field is too steep. Of the field's strength and dip nothing is believed.
+    """
+    _cleared(x, 1)
+    w = vec3(x.rate, 0)
+    R = matrix_from_quaternion(turned(vec4(x.q), dt * w[0], dt * w[1], dt * w[2]))
+    north, east, down = rotate(R, field)
+    level = north * north + east * east
+    if not level > _LEAST_FIELD * _LEAST_FIELD:
+        return False
+    x.residual[0] = wrap_angle(law.declination - math.atan2(east, north))
+    # Turning the body by its axis a turns the field's heading by a_z - z (x a_x + y a_y) / level.
+    # Of the field as expected: slopes from the measured one go with its noise, and pull at tilt.
+    size = math.sqrt(level)
+    north, east = size * math.cos(law.declination), size * math.sin(law.declination)
+    for i in range(3):
+        x.H[0, TH + i] = R[6 + i] - down * (north * R[i] + east * R[3 + i]) / level
+    x.variance[0] = law.mag_noise * law.mag_noise / level
+    return True
+
+
+@compilable
+def fuse_heading(x: Any, law: Any, time: float, field: Vec3) -> float:
+    """Fuse the heading of a magnetic ``field`` [Gauss, FRD] of ``time`` [s]."""
+    if not heading_rows(x, law, field, time - x.time):
+        return math.inf
+    return _judged(x, 1)
+
+
+@compilable
+def range_rows(x: Any, law: Any, measured: float, variance: float, dt: float) -> bool:
+    """The row of a ``measured`` [m] distance to level ground, ``dt`` [s] after the state.
+
+    ``variance`` [m^2]. False where the vehicle is tilted by more than 45 degrees.
+    """
+    _cleared(x, 1)
+    R = matrix_from_quaternion(vec4(x.q))
+    if not R[8] > math.sqrt(0.5):
+        return False
+    expected = (law.ground - (x.p[2] + dt * x.v[2])) / R[8]
+    x.residual[0] = measured - expected
+    x.H[0, P + 2] = -1.0 / R[8]
+    x.H[0, V + 2] = -dt / R[8]
+    # R33 changes by R31 dtheta_y - R32 dtheta_x.
+    x.H[0, TH] = expected * R[7] / R[8]
+    x.H[0, TH + 1] = -expected * R[6] / R[8]
+    x.variance[0] = variance
+    return True
+
+
+@compilable
+def fuse_range(x: Any, law: Any, time: float, measured: float, variance: float) -> float:
+    """Fuse a ``measured`` [m] distance to level ground of ``time`` [s] and ``variance`` [m^2]."""
+    if not range_rows(x, law, measured, variance, time - x.time):
+        return math.inf
+    return _judged(x, 1)
+
+
+@compilable
+def forget(M: Array, first: int, variance: Vec3) -> None:
+    """Give three errors of the covariance ``M`` (17, 17) [SI] a ``variance`` [SI, of M] anew."""
+    for i in range(3):
+        for j in range(ERRORS):
+            M[first + i, j] = 0.0
+            M[j, first + i] = 0.0
+    for i in range(3):
+        M[first + i, first + i] = variance[i]

@@ -1,0 +1,303 @@
+"""The filter's machine code: what the estimator calls, each once for a reading or a tick."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from numpy.typing import NDArray
+
+from fsw.compiled import compilable, kernel, of_fixed_types
+from fsw.estimation import fusion, imu
+from fsw.estimation.error_state import (
+    BA,
+    BARO,
+    BG,
+    COLUMNS,
+    DELAY,
+    ERRORS,
+    IMU_CAPACITY,
+    LOST,
+    TH,
+    TIME,
+    Array,
+    Filter,
+    P,
+    V,
+    add_noise,
+    advance,
+    integrated,
+    present,
+    propagate,
+    vec3,
+    vec4,
+)
+from fsw.estimation.joint_filter import JointState, corrected, predicted
+from fsw.geometry.rotation import matrix_from_quaternion, yaw_of
+from fsw.model.airframe import GRAVITY
+from fsw.signals import Mat3, Vec2, Vec3, Vec4
+
+Law = NDArray[Any]  # (1,) of a packed EstimatorLaw
+Present = tuple[Vec3, Vec3, Mat3, Vec3, float, Vec2, Vec2, float]
+"""All of a StateEstimate but its time, in its order."""
+
+
+@kernel
+def _begin_tick(old: Filter, new: Filter, dt: float, u: Vec2) -> None:
+    """Copy the filter, so that a tick leaves its inputs as they were, and move its joints on."""
+    a, b = old[0], new[0]
+    b.time, b.baro_bias, b.pose_delay = a.time, a.baro_bias, a.pose_delay
+    b.first, b.end, b.same, b.unlike, b.lost = a.first, a.end, a.same, a.unlike, a.lost
+    for i in range(3):
+        b.p[i], b.v[i] = a.p[i], a.v[i]
+        b.accel_bias[i], b.gyro_bias[i] = a.accel_bias[i], a.gyro_bias[i]
+        b.rate[i], b.acceleration[i] = a.rate[i], a.acceleration[i]
+    for i in range(4):
+        b.q[i] = a.q[i]
+    for i in range(6):
+        b.kept_bias[i], b.kept_variance[i] = a.kept_bias[i], a.kept_variance[i]
+    for i in range(ERRORS):
+        for j in range(ERRORS):
+            b.covariance[i, j] = a.covariance[i, j]
+    for k in range(a.first - 1, a.end):
+        for i in range(COLUMNS):
+            b.imu[k % IMU_CAPACITY, i] = a.imu[k % IMU_CAPACITY, i]
+    for i in range(2):
+        angle, rate, disturbance = a.joints[i, 0], a.joints[i, 1], a.joints[i, 2]
+        _keep_joint(b.joints[i], predicted(JointState(angle, rate, disturbance), u[i], dt))
+
+
+@compilable
+def _keep_joint(row: Array, joint: JointState) -> None:
+    row[0], row[1], row[2] = joint.angle, joint.rate, joint.disturbance
+
+
+@kernel
+def _read_joints(x: Filter, law: Law, angles: Vec2, age: float) -> None:
+    """Take in a reading of the encoders."""
+    g = law[0].joint_gain
+    for i in range(2):
+        row = x[0].joints[i]
+        joint = JointState(row[0], row[1], row[2])
+        _keep_joint(row, corrected(joint, angles[i], age, (g[0], g[1], g[2])))
+
+
+@kernel
+def _set_joints(x: Filter, angles: Vec2) -> None:
+    """Start from an arm that stands still."""
+    for i in range(2):
+        _keep_joint(x[0].joints[i], JointState(angles[i], 0.0, 0.0))
+
+
+@kernel
+def _add_imu(x: Filter, law: Law, now: float, time: float, f: Vec3, w: Vec3) -> int:
+    return imu.add_imu(x[0], law[0].tuning, now, time, f, w)
+
+
+@kernel
+def _advance(x: Filter, law: Law, until: float) -> float:
+    """Predict up to ``until``; returns the state's time."""
+    advance(x[0], law[0].tuning, until)
+    return float(x[0].time)
+
+
+@kernel
+def _end_tick(x: Filter, law: Law, until: float, now: float) -> Present:
+    """Predict the filter up to ``until`` and from there the present."""
+    advance(x[0], law[0].tuning, until)
+    p, v, q, w, f = present(x[0], now)
+    R = matrix_from_quaternion(q)
+    arm = x[0].joints
+    return (
+        p,
+        v,
+        R,
+        w,
+        yaw_of(R),
+        (arm[0, 0], arm[1, 0]),
+        (arm[0, 1], arm[1, 1]),
+        -f[2],
+    )
+
+
+@kernel
+def _begin(
+    x: Filter,
+    law: Law,
+    time: float,
+    p: Vec3,
+    v: Vec3,
+    q: Vec4,
+    p_variance: Vec3,
+    v_variance: Vec3,
+    q_variance: Vec3,
+) -> None:
+    """Start the filter from a known state; readings of the IMU before it are passed over."""
+    s, t = x[0], law[0].tuning
+    M = s.covariance
+    for i in range(ERRORS):
+        for j in range(ERRORS):
+            M[i, j] = 0.0
+    for i in range(3):
+        s.p[i], s.v[i], s.accel_bias[i], s.gyro_bias[i] = p[i], v[i], 0.0, 0.0
+        M[P + i, P + i], M[V + i, V + i], M[TH + i, TH + i] = (
+            p_variance[i],
+            v_variance[i],
+            q_variance[i],
+        )
+        M[BA + i, BA + i] = t.accel_bias * t.accel_bias
+        M[BG + i, BG + i] = t.gyro_bias * t.gyro_bias
+        s.acceleration[i] = 0.0
+    for i in range(4):
+        s.q[i] = q[i]
+    M[BARO, BARO] = t.baro_bias * t.baro_bias
+    M[DELAY, DELAY] = t.pose_delay_sigma * t.pose_delay_sigma
+    s.baro_bias, s.pose_delay, s.lost = 0.0, t.pose_delay, 0
+    s.time = time - t.pose_delay
+    while s.first < s.end - 1 and s.imu[s.first % IMU_CAPACITY, TIME] <= s.time:
+        s.first += 1
+    before = s.imu[(s.first - 1) % IMU_CAPACITY]
+    for i in range(3):
+        s.rate[i] = before[4 + i]
+
+
+@kernel
+def _couple_level(x: Filter, law: Law) -> None:
+    """What is wrong with an attitude that the accelerometer gave is what is wrong with it.
+
+    With d the vertical in body axes, a bias b turns it by -(d x b) / g.
+    """
+    s = x[0]
+    M, R = s.covariance, matrix_from_quaternion(vec4(s.q))
+    g, variance = GRAVITY, law[0].tuning.accel_bias * law[0].tuning.accel_bias
+    a, b, c = R[6] / g, R[7] / g, R[8] / g
+    rows = ((0.0, c, -b), (-c, 0.0, a), (b, -a, 0.0))
+    for i in range(3):
+        for j in range(3):
+            M[TH + i, BA + j] = rows[i][j] * variance
+            M[BA + j, TH + i] = rows[i][j] * variance
+            total = 0.0
+            for k in range(3):
+                total += rows[i][k] * rows[j][k]
+            M[TH + i, TH + j] += total * variance
+
+
+@kernel
+def _set_place(x: Filter, law: Law, time: float, p: Vec3, variance: Vec3) -> Vec3:
+    """Take a position as it is; returns by how much the state has jumped."""
+    s = x[0]
+    dt = time - s.time
+    jump = (
+        p[0] - s.p[0] - dt * s.v[0],
+        p[1] - s.p[1] - dt * s.v[1],
+        p[2] - s.p[2] - dt * s.v[2],
+    )
+    for i in range(3):
+        s.p[i] += jump[i]
+    fusion.forget(s.covariance, P, variance)
+    return jump
+
+
+@kernel
+def _set_velocity(x: Filter, law: Law, v: Vec3, variance: Vec3) -> Vec3:
+    """Take a velocity as it is; returns by how much the state's has jumped."""
+    s = x[0]
+    jump = (v[0] - s.v[0], v[1] - s.v[1], v[2] - s.v[2])
+    for i in range(3):
+        s.v[i] = v[i]
+    fusion.forget(s.covariance, V, variance)
+    return jump
+
+
+@kernel
+def _set_attitude(x: Filter, law: Law, q: Vec4, variance: Vec3) -> None:
+    """Take an attitude as it is."""
+    s = x[0]
+    for i in range(4):
+        s.q[i] = q[i]
+    fusion.forget(s.covariance, TH, variance)
+
+
+@kernel
+def _fuse_pose(
+    x: Filter,
+    law: Law,
+    time: float,
+    p: Vec3,
+    q: Vec4,
+    p_variance: Vec3,
+    q_variance: Vec3,
+) -> tuple[float, float]:
+    return fusion.fuse_pose(x[0], law[0].tuning, time, p, q, p_variance, q_variance)
+
+
+@kernel
+def _fuse_gnss(
+    x: Filter,
+    law: Law,
+    time: float,
+    p: Vec3,
+    v: Vec3,
+    p_variance: Vec3,
+    v_variance: Vec3,
+) -> tuple[float, float]:
+    return fusion.fuse_gnss(x[0], law[0].tuning, time, p, v, p_variance, v_variance)
+
+
+@kernel
+def _fuse_pressure(x: Filter, law: Law, time: float, altitude: float, variance: float) -> float:
+    return fusion.fuse_pressure(x[0], law[0].tuning, time, altitude, variance)
+
+
+@kernel
+def _fuse_heading(x: Filter, law: Law, time: float, field: Vec3) -> float:
+    return fusion.fuse_heading(x[0], law[0].tuning, time, field)
+
+
+@kernel
+def _fuse_range(x: Filter, law: Law, time: float, measured: float, variance: float) -> float:
+    return fusion.fuse_range(x[0], law[0].tuning, time, measured, variance)
+
+
+@kernel
+def _present_covariance(x: Filter, law: Law, now: float, M: Array) -> None:
+    """The covariance (17, 17) of what ``_end_tick`` returned."""
+    s, t = x[0], law[0].tuning
+    for i in range(ERRORS):
+        for j in range(ERRORS):
+            M[i, j] = s.covariance[i, j]
+    q, time = vec4(s.q), s.time
+    p, v = vec3(s.p, 0), vec3(s.v, 0)
+    for k in range(s.first - 1, s.end):
+        row = s.imu[k % IMU_CAPACITY]
+        end = s.imu[(k + 1) % IMU_CAPACITY, TIME] if k + 1 < s.end else now
+        f = (
+            row[1] - s.accel_bias[0],
+            row[2] - s.accel_bias[1],
+            row[3] - s.accel_bias[2],
+        )
+        w = (row[4] - s.gyro_bias[0], row[5] - s.gyro_bias[1], row[6] - s.gyro_bias[2])
+        dt = end - time
+        if dt > 0.0:
+            propagate(M, matrix_from_quaternion(q), f, w, dt)
+            add_noise(M, t, dt, int(row[LOST]))
+            p, v, q, _ = integrated(p, v, q, f, w, dt)
+            time = end
+
+
+begin_tick = of_fixed_types(_begin_tick)
+read_joints = of_fixed_types(_read_joints)
+set_joints = of_fixed_types(_set_joints)
+add_imu = of_fixed_types(_add_imu)
+advance_to = of_fixed_types(_advance)
+end_tick = of_fixed_types(_end_tick)
+begin = of_fixed_types(_begin)
+couple_level = of_fixed_types(_couple_level)
+set_place = of_fixed_types(_set_place)
+set_velocity = of_fixed_types(_set_velocity)
+set_attitude = of_fixed_types(_set_attitude)
+fuse_pose = of_fixed_types(_fuse_pose)
+fuse_gnss = of_fixed_types(_fuse_gnss)
+fuse_pressure = of_fixed_types(_fuse_pressure)
+fuse_heading = of_fixed_types(_fuse_heading)
+fuse_range = of_fixed_types(_fuse_range)
+present_covariance = of_fixed_types(_present_covariance)

@@ -1,0 +1,125 @@
+"""What is known of each sensor, and what is wrong with a sample before the filter looks at it."""
+
+from __future__ import annotations
+
+import math
+from typing import Final, NamedTuple
+
+from fsw.estimation.imu import TIME_TOLERANCE
+from fsw.estimation.sensor_fault import Sensor, SensorFault
+from fsw.estimation.tuning import EstimatorTuning
+from fsw.geometry.vectors import norm
+from fsw.measurements import (
+    GnssSample,
+    MagneticSample,
+    PoseSample,
+    PressureSample,
+    RangeSample,
+)
+from fsw.signals import Vec3
+
+Aiding = PoseSample | GnssSample | PressureSample | MagneticSample | RangeSample
+SENSOR_OF: Final[dict[type, Sensor]] = {
+    PoseSample: Sensor.POSE,
+    GnssSample: Sensor.GNSS,
+    PressureSample: Sensor.BAROMETER,
+    MagneticSample: Sensor.MAGNETOMETER,
+    RangeSample: Sensor.RANGEFINDER,
+}
+# Of these, a reading equal to the last one to the last bit is none: their noise is far above their
+# resolution. Barometers and rangefinders do repeat themselves.
+_NEVER_REPEAT: Final = (PoseSample, GnssSample)
+_SHOWN: Final = 1.0  # s, for which a fault counts after it was seen
+_FARTHEST_RANGE: Final = 200.0  # m
+_STRONGEST_FIELD: Final = 5.0  # Gauss, ten times the Earth's
+
+
+class Health(NamedTuple):
+    """What is known of one sensor; times are of the tick's clock."""
+
+    sensor: Sensor
+    time: float = -math.inf  # s, newest time stamp of a sample
+    came: float = -1.0  # s, when that came; negative: never
+    numbers: tuple[float, ...] = ()  # of that sample
+    fused: tuple[float, ...] = ()  # s, when each part of it was fused last
+    ratio: tuple[float, ...] = ()  # chi-square over gate, of each part
+    fault: SensorFault = SensorFault.NONE  # the last one
+    fault_at: float = -math.inf  # s
+
+    def fault_now(self, now: float, stale: float) -> SensorFault:
+        """What is wrong at ``now`` [s]; silence counts after ``stale`` [s]."""
+        if now - self.came > stale:
+            return SensorFault.STALE
+        return self.fault if now - self.fault_at <= _SHOWN else SensorFault.NONE
+
+    def with_fault(self, fault: SensorFault, now: float) -> Health:
+        """The same sensor, with a ``fault`` that was seen at ``now`` [s]."""
+        return self._replace(fault=fault, fault_at=now)
+
+
+def arrived(
+    health: Health,
+    sample: Aiding,
+    now: float,
+    tuning: EstimatorTuning,
+    *,
+    still: bool,
+) -> tuple[Health, SensorFault]:
+    """A sensor's health after a ``sample`` that came at ``now`` [s], and what is wrong with it.
+
+    Where the IMU too repeats itself (``still``), a reading that does is no fault: all stands.
+    """
+    if not sample.time <= now + TIME_TOLERANCE:
+        # Its time stamp is not kept: all that follow would seem to be old.
+        return health.with_fault(SensorFault.FUTURE, now), SensorFault.FUTURE
+    if sample.time <= health.time:
+        return health.with_fault(SensorFault.REPEATED, now), SensorFault.REPEATED
+    numbers = _numbers(sample)
+    if not math.isfinite(sum(numbers)):
+        fault = SensorFault.NOT_FINITE
+    elif not _plausible(sample, tuning):
+        fault = SensorFault.IMPLAUSIBLE
+    elif numbers == health.numbers and not still and isinstance(sample, _NEVER_REPEAT):
+        fault = SensorFault.STUCK
+    else:
+        fault = SensorFault.NONE
+    health = health._replace(time=sample.time, came=now, numbers=numbers)
+    return (health.with_fault(fault, now) if fault else health), fault
+
+
+def _numbers(sample: Aiding) -> tuple[float, ...]:
+    """All that a sample measures, without its variance."""
+    match sample:
+        case PoseSample():
+            return sample.position + sample.attitude
+        case GnssSample():
+            return sample.position + sample.velocity
+        case PressureSample():
+            return (sample.altitude,)
+        case MagneticSample():
+            return sample.field
+        case RangeSample():
+            return (sample.distance,)
+
+
+def _plausible(sample: Aiding, tuning: EstimatorTuning) -> bool:
+    match sample:
+        case PoseSample():
+            squared = sum([c * c for c in sample.attitude])
+            return 0.8 < squared < 1.25 and norm(sample.position) < tuning.place_limit
+        case GnssSample():
+            slow = norm(sample.velocity) < tuning.speed_limit
+            return slow and norm(sample.position) < tuning.place_limit
+        case PressureSample():
+            return abs(sample.altitude) < 10.0 * tuning.place_limit
+        case MagneticSample():
+            return 0.0 < norm(sample.field) < _STRONGEST_FIELD
+        case RangeSample():
+            return 0.0 < sample.distance < _FARTHEST_RANGE
+
+
+def believable(variance: Vec3, least: float) -> Vec3:
+    """A ``variance`` [any unit, any frame], at least ``least`` [same unit] where it is one."""
+    x, y, z = variance
+    # NaN and zero mean that the sensor does not know; both fail the comparison.
+    return (x if x > least else least, y if y > least else least, z if z > least else least)

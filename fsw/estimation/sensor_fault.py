@@ -1,0 +1,49 @@
+"""Sensors, and what can be wrong with what they say, as an operator reads it."""
+
+from __future__ import annotations
+
+from enum import Enum, IntEnum
+
+
+class Sensor(Enum):
+    """A source of measurements."""
+
+    IMU = "IMU"
+    POSE = "pose"
+    GNSS = "GNSS"
+    BAROMETER = "barometer"
+    MAGNETOMETER = "magnetometer"
+    RANGEFINDER = "rangefinder"
+    ENCODERS = "joint encoder"
+
+
+class SensorFault(IntEnum):
+    """Why a reading was not used."""
+
+    NONE = 0
+    NOT_FINITE = 1
+    IMPLAUSIBLE = 2
+    FUTURE = 3
+    REPEATED = 4
+    TOO_OLD = 5
+    STUCK = 6
+    JUMP = 7
+    STALE = 8
+
+
+_SENTENCES = {
+    SensorFault.NONE: "is in use",
+    SensorFault.NOT_FINITE: "says what is not a number",
+    SensorFault.IMPLAUSIBLE: "says what cannot be",
+    SensorFault.FUTURE: "has a time stamp in the future",
+    SensorFault.REPEATED: "has a time stamp that does not move on",
+    SensorFault.TOO_OLD: "comes too late to be of use",
+    SensorFault.STUCK: "is stuck at one reading",
+    SensorFault.JUMP: "jumps, and is not believed",
+    SensorFault.STALE: "is silent",
+}
+
+
+def sentence(sensor: Sensor, fault: SensorFault) -> str:
+    """What the operator reads."""
+    return f"{sensor.value} {_SENTENCES[fault]}"

@@ -1,0 +1,425 @@
+"""The estimator: samples of all sensors in, the present state with its uncertainty out.
+
+A sample is looked at when it comes (``sensor_checks.py``), waits until the filter has reached the
+time at which it was measured, and is fused there. What the gate refuses for long is taken as it is,
+and the jump that this makes is reported, so that a plan can jump along.
+
+Memory goes in and comes out, as everywhere in the tick; kernels work on the copy that the tick
+makes of the filter.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from fsw.compiled import packed
+from fsw.estimation import kernels
+from fsw.estimation.error_state import ERRORS, FILTER, IMU_CAPACITY, Array, Filter
+from fsw.estimation.imu import STUCK_READINGS, TIME_TOLERANCE
+from fsw.estimation.joint_filter import joint_gain
+from fsw.estimation.sensor_checks import SENSOR_OF, Aiding, Health, arrived, believable
+from fsw.estimation.sensor_fault import Sensor, SensorFault
+from fsw.estimation.tuning import EstimatorLaw, EstimatorTuning
+from fsw.geometry.quaternion import conjugate, multiply, normalised
+from fsw.geometry.rotation import quaternion_from_matrix
+from fsw.measurements import (
+    GnssSample,
+    ImuSample,
+    JointSample,
+    MagneticSample,
+    PoseSample,
+    PressureSample,
+    RangeSample,
+    Sample,
+)
+from fsw.signals import StateEstimate, Vec2, Vec3, Vec4
+
+LATE: Final = 0.01  # s behind the filter, where a measurement is still fused as it stands
+_MARGIN: Final = 0.003  # s, by which a measurement may take longer than lately
+_STUCK_JOINT: Final = 0.05  # rad that a joint is asked to move without being seen to
+_LONGEST_STEP: Final = 0.05  # s, by which joints are predicted at once
+_REST: Vec3 = (0.0, 0.0, 0.0)
+_NO_TURN: Vec4 = (1.0, 0.0, 0.0, 0.0)
+
+
+class Waiting(NamedTuple):
+    """A sample, and when the filter reaches it; a tie is broken by the order of arrival."""
+
+    time: float  # s
+    number: int
+    sample: Aiding
+
+
+class Reset(NamedTuple):
+    """Jumps of the estimate, as PX4 reports them: how many there were, and the last one."""
+
+    number: int = 0
+    position: Vec3 = _REST  # m, NED, new minus old
+    velocity: Vec3 = _REST  # m/s, NED, new minus old
+    turn: Vec4 = _NO_TURN  # new attitude times the inverse of the old one, NED
+
+
+class FusionMemory(NamedTuple):
+    """What the estimator carries from tick to tick."""
+
+    numbers: Filter
+    started: bool = False
+    waiting: tuple[Waiting, ...] = ()
+    arrivals: int = 0
+    health: tuple[Health, ...] = ()  # of each sensor heard so far
+    field: Vec3 | None = None  # Gauss, body, the last one
+    reset_counter: int | None = None  # of the last pose
+    reset: Reset = Reset()
+    now: float = -1.0  # s, of the last tick; negative: there was none
+    imu_came: float = -1.0  # s, when a reading came last; negative: never
+    joints_came: float = -1.0
+    delay: float = 0.0  # s, that measurements have lately taken
+    angles: Vec2 = (math.nan, math.nan)  # rad, as the encoders said last
+    asked: Vec2 = (0.0, 0.0)  # rad, what the joints were asked for when they said so first
+    joints_stuck: bool = False
+
+    def of(self, sensor: Sensor) -> Health:
+        """What is known of a sensor."""
+        for one in self.health:
+            if one.sensor is sensor:
+                return one
+        return Health(sensor)
+
+    def noting(self, health: Health) -> FusionMemory:
+        """The memory with the health of one sensor renewed."""
+        others = [one for one in self.health if one.sensor is not health.sensor]
+        return self._replace(health=(*others, health))
+
+    def jumped(
+        self, position: Vec3 = _REST, velocity: Vec3 = _REST, turn: Vec4 = _NO_TURN
+    ) -> FusionMemory:
+        """The memory after the estimate's ``position`` [m, NED] and all else have jumped.
+
+        ``velocity`` [m/s, NED] and ``turn`` [1] as in ``Reset``.
+        """
+        return self._replace(reset=Reset(self.reset.number + 1, position, velocity, turn))
+
+
+def at_start() -> FusionMemory:
+    """Memory before the first sample."""
+    return FusionMemory(np.zeros(1, dtype=FILTER))
+
+
+class SensorFusion:
+    """The estimator of one configuration; holds only what never changes in flight."""
+
+    def __init__(self, tuning: EstimatorTuning, tick: float) -> None:
+        """Design the joints' filter for a ``tick`` [s]."""
+        self.tuning = tuning
+        self._law = packed(EstimatorLaw(tuning, joint_gain(tuning, tick)))
+        self._least_p = tuning.position_floor**2
+        self._least_q = tuning.attitude_floor**2
+        self._fuse: dict[type, Callable[[FusionMemory, Any], tuple[float, ...]]] = {
+            PoseSample: self._fuse_pose,
+            GnssSample: self._fuse_gnss,
+            PressureSample: self._fuse_pressure,
+            MagneticSample: self._fuse_heading,
+            RangeSample: self._fuse_range,
+        }
+
+    def warm_up(self) -> StateEstimate:
+        """Compile every kernel: stand for a while with every sensor, then take jumps."""
+        memory, estimate, t = at_start(), None, 0.0
+        for k in range(60):
+            t = 1.0 + 0.01 * k
+            memory, estimate = self.step(memory, _at_rest(t), t)
+        assert estimate is not None
+        for sample in _at_rest(t):
+            if isinstance(sample, PoseSample | GnssSample):
+                self._reset(memory, Waiting(t, 0, sample), (math.inf, math.inf))
+        self.covariance(memory, t)
+        return estimate
+
+    def step(
+        self,
+        memory: FusionMemory,
+        samples: Iterable[Sample],
+        now: float,
+        joint_acceleration: Vec2 = (0.0, 0.0),
+    ) -> tuple[FusionMemory, StateEstimate | None]:
+        """Take in the ``samples`` that came since the last tick; the state at ``now`` [s].
+
+        ``joint_acceleration`` [rad/s^2, joints] is what the torques make of the arm. None before
+        there was a pose, or a position and a heading, to start from, and a reading of the arm.
+        """
+        memory = self._copied(memory, now, joint_acceleration)
+        for sample in samples:
+            kind = type(sample)
+            if kind is ImuSample:
+                memory = self._take_imu(memory, sample, now)  # type: ignore[arg-type]
+            elif kind is JointSample:
+                memory = self._take_joints(memory, sample, now)  # type: ignore[arg-type]
+            else:
+                memory = self._take(memory, sample, now)  # type: ignore[arg-type]
+        until = now - memory.delay - _MARGIN
+        if not memory.started:
+            memory = self._start(memory)
+        if not memory.started or memory.joints_came < 0.0:
+            return memory, None
+        if memory.waiting and memory.waiting[0].time <= until:
+            memory = self._fuse_due(memory, until, now)
+        known = kernels.end_tick(memory.numbers, self._law, until, now)
+        return memory, StateEstimate(round(1e6 * now), *known)
+
+    def covariance(self, memory: FusionMemory, now: float) -> Array:
+        """Covariance (17, 17) [SI] of the error of the state at ``now`` [s]."""
+        found = np.empty((ERRORS, ERRORS))
+        kernels.present_covariance(memory.numbers, self._law, now, found)
+        return found
+
+    def watch_joints(self, memory: FusionMemory, before: FusionMemory, asked: Vec2) -> FusionMemory:
+        """Find encoders that stand still while the joints are asked to move, to ``asked`` [rad].
+
+        Their resolution is coarse, so that in hover they may well say the same for long. While they
+        stand still, joints are believed where they are asked to be: what holds the arm against
+        gravity there also brings it there, while the difference to a frozen angle would drive it
+        into its end stops.
+        """
+        if memory.angles != before.angles:
+            return memory._replace(asked=asked, joints_stuck=False)
+        moved = max(abs(asked[0] - memory.asked[0]), abs(asked[1] - memory.asked[1]))
+        if not memory.joints_stuck and not moved > _STUCK_JOINT:
+            return memory
+        kernels.read_joints(memory.numbers, self._law, asked, 0.0)
+        health = memory.of(Sensor.ENCODERS).with_fault(SensorFault.STUCK, memory.now)
+        return memory.noting(health)._replace(joints_stuck=True)
+
+    def _copied(self, memory: FusionMemory, now: float, u: Vec2) -> FusionMemory:
+        """The memory with a filter of its own, whose joints are moved on."""
+        x = np.empty(1, dtype=FILTER)
+        dt = min(max(now - memory.now, 0.0), _LONGEST_STEP) if memory.now >= 0.0 else 0.0
+        kernels.begin_tick(memory.numbers, x, dt, u)
+        return memory._replace(numbers=x, now=now)
+
+    def _take_imu(self, memory: FusionMemory, sample: ImuSample, now: float) -> FusionMemory:
+        reading = sample.time, sample.acceleration, sample.rate
+        fault = kernels.add_imu(memory.numbers, self._law, now, *reading)
+        if fault:
+            health = memory.of(Sensor.IMU).with_fault(SensorFault(fault), now)
+            memory = memory.noting(health)
+        return memory._replace(imu_came=now)
+
+    def _take_joints(self, memory: FusionMemory, sample: JointSample, now: float) -> FusionMemory:
+        farthest = max(abs(sample.angles[0]), abs(sample.angles[1]))
+        if not (farthest < math.pi and sample.time <= now + TIME_TOLERANCE):
+            health = memory.of(Sensor.ENCODERS).with_fault(SensorFault.IMPLAUSIBLE, now)
+            return memory.noting(health)
+        if memory.joints_came < 0.0 or (memory.joints_stuck and sample.angles != memory.angles):
+            kernels.set_joints(memory.numbers, sample.angles)
+        elif not memory.joints_stuck:
+            kernels.read_joints(memory.numbers, self._law, sample.angles, now - sample.time)
+        return memory._replace(joints_came=now, angles=sample.angles)
+
+    def _take(self, memory: FusionMemory, sample: Aiding, now: float) -> FusionMemory:
+        """Check a sample and let it wait for its time."""
+        x = memory.numbers
+        still = bool(x["same"][0] >= STUCK_READINGS)
+        before = memory.of(SENSOR_OF[type(sample)])
+        health, fault = arrived(before, sample, now, self.tuning, still=still)
+        time = sample.time
+        if isinstance(sample, PoseSample):
+            time -= float(x["pose_delay"][0]) if memory.started else self.tuning.pose_delay
+        if not fault and memory.started and time < x["time"][0] - LATE:
+            fault = SensorFault.TOO_OLD
+            health = health.with_fault(fault, now)
+        if fault in (SensorFault.NONE, SensorFault.TOO_OLD):
+            memory = self._with_delay(memory, now - time, now - before.came)
+        memory = memory.noting(health)
+        if fault:
+            return memory
+        waiting = (*memory.waiting, Waiting(time, memory.arrivals, sample))
+        if len(waiting) > 1 and waiting[-2].time > time:
+            waiting = tuple(sorted(waiting))
+        return memory._replace(waiting=waiting, arrivals=memory.arrivals + 1)
+
+    def _with_delay(self, memory: FusionMemory, delay: float, apart: float) -> FusionMemory:
+        """The memory after a measurement took so long, ``apart`` [s] from its sensor's last one."""
+        faded = memory.delay - self.tuning.delay_decay * min(apart, 1.0)
+        return memory._replace(delay=min(max(delay, faded), self.tuning.longest_delay))
+
+    def _start(self, memory: FusionMemory) -> FusionMemory:
+        """Start from the newest pose; else from a GNSS position, gravity and the compass."""
+        if not memory.numbers["end"][0]:
+            return memory._replace(waiting=())
+        for one in reversed(memory.waiting):
+            sample = one.sample
+            if isinstance(sample, MagneticSample) and memory.field is None:
+                memory = memory._replace(field=sample.field)
+        for one in reversed(memory.waiting):
+            sample = one.sample
+            if isinstance(sample, PoseSample):
+                self._begin(
+                    memory,
+                    sample.time,
+                    (sample.position, _REST, normalised(sample.attitude)),
+                    believable(sample.position_variance, self._least_p),
+                    believable(sample.attitude_variance, self._least_q),
+                )
+                break
+            if isinstance(sample, GnssSample) and memory.field is not None:
+                level = _levelled(memory.numbers, memory.field, self.tuning.declination)
+                tilt = self.tuning.tilt**2
+                self._begin(
+                    memory,
+                    sample.time,
+                    (sample.position, sample.velocity, level),
+                    believable(sample.position_variance, self._least_p),
+                    (tilt, tilt, self.tuning.heading**2),
+                )
+                kernels.couple_level(memory.numbers, self._law)
+                break
+        else:
+            return memory._replace(waiting=())
+        return memory._replace(started=True, waiting=())
+
+    def _begin(
+        self,
+        memory: FusionMemory,
+        time: float,
+        state: tuple[Vec3, Vec3, Vec4],
+        p_variance: Vec3,
+        q_variance: Vec3,
+    ) -> None:
+        slow = self.tuning.velocity**2
+        variances = p_variance, (slow, slow, slow), q_variance
+        kernels.begin(memory.numbers, self._law, time, *state, *variances)
+
+    def _fuse_due(self, memory: FusionMemory, until: float, now: float) -> FusionMemory:
+        """Fuse every waiting sample that the filter has reached."""
+        waiting = memory.waiting
+        while waiting and waiting[0].time <= until:
+            one, waiting = waiting[0], waiting[1:]
+            kernels.advance_to(memory.numbers, self._law, one.time)
+            memory = self._fuse_one(memory, one, now)
+        return memory._replace(waiting=waiting)
+
+    def _fuse_one(self, memory: FusionMemory, one: Waiting, now: float) -> FusionMemory:
+        sample = one.sample
+        health = memory.of(SENSOR_OF[type(sample)])
+        ratio = self._fuse[type(sample)](memory, sample)
+        fused = health.fused or (now,) * len(ratio)
+        fused = tuple([now if r <= 1.0 else before for r, before in zip(ratio, fused, strict=True)])
+        health = health._replace(ratio=ratio, fused=fused)
+        if max(ratio) > 1.0:
+            health = health.with_fault(SensorFault.JUMP, now)
+        counted = sample.reset_counter if isinstance(sample, PoseSample) else memory.reset_counter
+        announced = memory.reset_counter is not None and counted != memory.reset_counter
+        memory = memory.noting(health)._replace(reset_counter=counted)
+        long_refused = now - min(fused) > self.tuning.reset_time
+        if max(ratio) > 1.0 and (announced or long_refused):
+            memory = self._reset(memory, one, ratio)
+            memory = memory.noting(health._replace(fused=(now,) * len(ratio)))
+        return memory
+
+    def _reset(self, memory: FusionMemory, one: Waiting, ratio: tuple[float, ...]) -> FusionMemory:
+        """Take what the gate refused for long as it is."""
+        x, law, sample = memory.numbers, self._law, one.sample
+        place, velocity, turn = _REST, _REST, _NO_TURN
+        if isinstance(sample, PoseSample):
+            variance = believable(sample.position_variance, self._least_p)
+            if ratio[0] > 1.0:
+                place = kernels.set_place(x, law, one.time, sample.position, variance)
+            if ratio[1] > 1.0:
+                before = _attitude(x)
+                after = normalised(sample.attitude)
+                kernels.set_attitude(
+                    x, law, after, believable(sample.attitude_variance, self._least_q)
+                )
+                turn = multiply(after, conjugate(before))
+        elif isinstance(sample, GnssSample):
+            if ratio[0] > 1.0:
+                variance = believable(sample.position_variance, self._least_p)
+                place = kernels.set_place(x, law, one.time, sample.position, variance)
+            if ratio[1] > 1.0:
+                variance = believable(sample.velocity_variance, self._least_p)
+                velocity = kernels.set_velocity(x, law, sample.velocity, variance)
+        else:
+            return memory
+        return memory.jumped(place, velocity, turn)
+
+    def _fuse_pose(self, memory: FusionMemory, sample: PoseSample) -> tuple[float, ...]:
+        return kernels.fuse_pose(
+            memory.numbers,
+            self._law,
+            sample.time,
+            sample.position,
+            normalised(sample.attitude),
+            believable(sample.position_variance, self._least_p),
+            believable(sample.attitude_variance, self._least_q),
+        )
+
+    def _fuse_gnss(self, memory: FusionMemory, sample: GnssSample) -> tuple[float, ...]:
+        return kernels.fuse_gnss(
+            memory.numbers,
+            self._law,
+            sample.time,
+            sample.position,
+            sample.velocity,
+            believable(sample.position_variance, self._least_p),
+            believable(sample.velocity_variance, self._least_p),
+        )
+
+    def _fuse_pressure(self, memory: FusionMemory, sample: PressureSample) -> tuple[float, ...]:
+        variance = max(sample.variance, self._least_p)
+        return (
+            kernels.fuse_pressure(
+                memory.numbers, self._law, sample.time, sample.altitude, variance
+            ),
+        )
+
+    def _fuse_heading(self, memory: FusionMemory, sample: MagneticSample) -> tuple[float, ...]:
+        return (kernels.fuse_heading(memory.numbers, self._law, sample.time, sample.field),)
+
+    def _fuse_range(self, memory: FusionMemory, sample: RangeSample) -> tuple[float, ...]:
+        variance = max(sample.variance, self._least_p)
+        return (
+            kernels.fuse_range(memory.numbers, self._law, sample.time, sample.distance, variance),
+        )
+
+
+def _attitude(x: Filter) -> Vec4:
+    w, i, j, k = x["q"][0].tolist()
+    return w, i, j, k
+
+
+def _levelled(x: Filter, field: Vec3, declination: float) -> Vec4:
+    """The attitude in which the accelerometer points up and the compass north.
+
+    True at rest and in unaccelerated flight; the mean of the readings kept so far.
+    """
+    first, end = int(x["first"][0]), int(x["end"][0])
+    rows = x["imu"][0][[k % IMU_CAPACITY for k in range(first, end)]]
+    down = -rows[:, 1:4].mean(axis=0)
+    down /= np.linalg.norm(down)
+    north = np.asarray(field) - down * (down @ np.asarray(field))
+    north /= np.linalg.norm(north)
+    east = np.cross(down, north)
+    c, s = math.cos(declination), math.sin(declination)
+    # Rows of the rotation from body to NED: north, east and down in body components.
+    R = (*(c * north - s * east), *(s * north + c * east), *down)
+    w, i, j, k = quaternion_from_matrix(tuple(float(r) for r in R))  # type: ignore[arg-type]
+    return w, i, j, k
+
+
+def _at_rest(t: float) -> tuple[Sample, ...]:
+    """A reading of every sensor, of a vehicle that stands."""
+    none, fine, small = (0.0, 0.0, 0.0), (1e-4, 1e-4, 1e-4), 1e-3 * t
+    return (
+        ImuSample(t - 1e-3, (0.0, 0.0, -9.81), none),
+        ImuSample(t, (0.0, 0.0, -9.81 + small), none),
+        JointSample(t, (0.0, 0.0)),
+        PoseSample(t, (small, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), fine, fine),
+        GnssSample(t, (0.0, small, 0.0), none, fine, fine),
+        PressureSample(t, 0.0, 1.0),
+        MagneticSample(t, (0.2, 0.0, 0.4)),
+        RangeSample(t, 1.0, 1.0),
+    )

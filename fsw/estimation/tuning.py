@@ -1,0 +1,72 @@
+"""What the estimator takes sensors for: noises, delays and limits of what is plausible."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+from fsw.signals import Vec3
+
+GATES: Final = (25.0, 28.7, 32.1)  # chi-square of 1, 2, 3 readings that one in 1.7 million exceeds
+
+
+@dataclass(frozen=True, slots=True)
+class EstimatorTuning:
+    """Densities are of white noise, one sided, as data sheets and PX4 give them."""
+
+    # IMU. More than a data sheet's: what rotors shake, and errors of scale, are in it.
+    accel_noise: float = 0.03  # m/s^2/sqrt(Hz)
+    gyro_noise: float = 1.5e-3  # rad/s/sqrt(Hz)
+    accel_bias_walk: float = 3e-3  # m/s^3/sqrt(Hz), PX4's EKF2_ACC_B_NOISE
+    gyro_bias_walk: float = 2e-4  # rad/s^2/sqrt(Hz)
+    accel_range: float = 160.0  # m/s^2; beyond it, a reading is none
+    gyro_range: float = 35.0  # rad/s
+    # From one reading to the next. The rotors turn the body by 17 rad/s^2 and accelerate it by
+    # 10 m/s^2 more than gravity; the rest is vibration.
+    accel_jump: float = 60.0  # m/s^2
+    gyro_jump: float = 3.0  # rad/s
+    imu_gap: float = 0.006  # s; longer without a reading, the IMU was lost meanwhile
+    # While the IMU is stuck or silent, what it reads is taken for the truth plus a bias that moves
+    # as quickly as the vehicle does: the pose then gives acceleration and rate.
+    lost_accel_walk: float = 10.0  # m/s^3/sqrt(Hz)
+    lost_gyro_walk: float = 6.0  # rad/s^2/sqrt(Hz)
+
+    # What is not known when the filter starts.
+    accel_bias: float = 0.3  # m/s^2
+    gyro_bias: float = 0.03  # rad/s
+    velocity: float = 0.5  # m/s
+    tilt: float = 0.02  # rad, where the accelerometer gives it, besides its bias
+    heading: float = 0.1  # rad, where the magnetometer gives it
+    baro_bias: float = 3.0  # m
+    baro_bias_walk: float = 0.03  # m/s/sqrt(Hz)
+
+    # How much longer than its time stamp says a pose takes: PX4's EKF2_EV_DELAY.
+    pose_delay: float = 0.0  # s
+    pose_delay_sigma: float = 0.0  # s, known so well at the start; 0: not estimated in flight
+    pose_delay_walk: float = 1e-4  # s/sqrt(s)
+
+    # How far the filter stays behind: as long as measurements have lately taken to come, at most
+    # this; older ones are of no use.
+    longest_delay: float = 0.25  # s
+    delay_decay: float = 0.01  # s/s, by which it is forgotten how long they took
+    position_floor: float = 2e-4  # m, the least standard deviation that a sensor is believed
+    attitude_floor: float = 1e-3  # rad
+    mag_noise: float = 0.01  # Gauss
+    declination: float = 0.0  # rad
+    ground: float = 0.0  # m, NED z of what the rangefinder measures against
+
+    encoder_noise: float = 4.4e-4  # rad; 12 bit a turn are 1.5 mrad
+    joint_disturbance_walk: float = 50.0  # rad/s^3/sqrt(Hz): 135 rad/s of bandwidth
+
+    reset_time: float = 0.5  # s; aiding that was refused for so long is taken as it is
+    stale_time: float = 0.5  # s without a reading
+    speed_limit: float = 50.0  # m/s
+    place_limit: float = 1000.0  # m from the origin
+
+
+@dataclass(frozen=True, slots=True)
+class EstimatorLaw:
+    """Everything the kernels need that does not change in flight."""
+
+    tuning: EstimatorTuning
+    joint_gain: Vec3  # of angle [1], rate [1/s] and disturbance [1/s^2], a reading

@@ -1,0 +1,150 @@
+"""From the wire values of measurements to samples; pure.
+
+A reading that is not a number is handed on: the estimator names the sensor that says it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Final, cast
+
+from fsw.link.wire import message_ids
+from fsw.link.wire.decode import Numbers
+from fsw.measurements import (
+    GnssSample,
+    ImuSample,
+    JointSample,
+    MagneticSample,
+    PoseSample,
+    PressureSample,
+    RangeSample,
+    Sample,
+    Vec3,
+    Vec4,
+)
+from messages.frames import Frame
+
+Locate = Callable[[float, float, float], Vec3]
+"""North, east, down [m] of a latitude [deg], a longitude [deg] and an altitude [m]."""
+
+# HIL_SENSOR_UPDATED_FLAGS
+_INERTIAL: Final = 0x3F
+_MAGNETIC: Final = 0x1C0
+_PRESSURE: Final = 0x200
+_RESET: Final = 0x80000000
+
+_LOCAL_NED: Final = 1  # MAV_FRAME
+_DOWNWARD: Final = 25  # MAV_SENSOR_ORIENTATION
+_UNKNOWN_EPH: Final = 0xFFFF
+_LEVEL_FIX: Final = 2  # GPS_FIX_TYPE; those above it have a height
+# HIL_SENSOR and HIL_GPS do not state these.
+_PRESSURE_VARIANCE: Final = 0.2**2  # m^2: noise of a small barometer, 0.1 m, and gusts
+_VELOCITY_VARIANCE: Final = 0.1**2  # m^2/s^2: receivers promise 0.05 m/s
+_SEA_LEVEL_HPA: Final = 1013.25
+_SEA_LEVEL_K: Final = 288.15
+_LAPSE_K_M: Final = 0.0065
+_EXPONENT: Final = 0.190263  # of the troposphere
+
+
+class SampleDecoder:
+    """Reads what a vehicle with one origin measures."""
+
+    def __init__(self, locate: Locate) -> None:
+        self._locate = locate
+        self._origin_altitude = locate(0.0, 0.0, 0.0)[2]  # m: the sea is so far below
+        self._readers: dict[int, Callable[[Numbers], Sample | None]] = {
+            message_ids.ODOMETRY: pose_sample,
+            message_ids.HIL_GPS: self._gnss,
+            message_ids.DISTANCE_SENSOR: range_sample,
+            message_ids.JOINT_ENCODERS: joint_sample,
+        }
+
+    def samples(self, frame: Frame) -> list[Sample]:
+        """What a frame has measured; nothing where it is no measurement."""
+        values = cast(Numbers, frame.payload_values)
+        if frame.message_id == message_ids.HIL_SENSOR:
+            return self._hil_sensor(values)
+        reader = self._readers.get(frame.message_id)
+        found = None if reader is None else reader(values)
+        return [] if found is None else [found]
+
+    def _hil_sensor(self, values: Numbers) -> list[Sample]:
+        """Those of the sensors in a HIL_SENSOR that have something new."""
+        time, updated = 1e-6 * values[0], int(values[14])
+        found: list[Sample] = []
+        if updated & _RESET:
+            return found
+        if updated & _INERTIAL == _INERTIAL:
+            found.append(inertial_sample(values))
+        if updated & _MAGNETIC == _MAGNETIC:
+            found.append(MagneticSample(time, cast(Vec3, values[7:10])))
+        if updated & _PRESSURE:
+            altitude = pressure_altitude(values[10]) - self._origin_altitude
+            found.append(PressureSample(time, altitude, _PRESSURE_VARIANCE))
+        return found
+
+    def _gnss(self, values: Numbers) -> GnssSample | None:
+        """HIL_GPS; None without a fix in space."""
+        time_us, latitude, longitude, altitude, eph, epv, _, north, east, down, _, fix = values[:12]
+        if fix <= _LEVEL_FIX:
+            return None
+        level = _stated(eph)
+        speed = _VELOCITY_VARIANCE
+        return GnssSample(
+            1e-6 * time_us,
+            self._locate(1e-7 * latitude, 1e-7 * longitude, 1e-3 * altitude),
+            (0.01 * north, 0.01 * east, 0.01 * down),
+            (level, level, _stated(epv)),
+            (speed, speed, speed),
+        )
+
+
+def inertial_sample(values: Numbers) -> ImuSample:
+    """The inertial unit's part of a HIL_SENSOR."""
+    _, ax, ay, az, wx, wy, wz = values[:7]
+    return ImuSample(1e-6 * values[0], (ax, ay, az), (wx, wy, wz))
+
+
+def joint_sample(values: Numbers) -> JointSample:
+    """JOINT_ENCODERS."""
+    return JointSample(1e-6 * values[0], (values[1], values[2]))
+
+
+def pose_sample(values: Numbers) -> PoseSample | None:
+    """ODOMETRY of motion capture or visual odometry; None in another frame than local NED."""
+    if values[56] != _LOCAL_NED:
+        return None
+    covariance = values[14:35]  # upper triangle of (6, 6), row by row
+    return PoseSample(
+        1e-6 * values[0],
+        cast(Vec3, values[1:4]),
+        cast(Vec4, values[4:8]),
+        (covariance[0], covariance[6], covariance[11]),
+        (covariance[15], covariance[18], covariance[20]),
+        int(values[58]),
+    )
+
+
+def range_sample(values: Numbers) -> RangeSample | None:
+    """DISTANCE_SENSOR; None out of range or in another direction than down."""
+    time_ms, least, most, distance, _, _, orientation, variance = values[:8]
+    if orientation != _DOWNWARD or not least <= distance <= most:
+        return None
+    return RangeSample(1e-3 * time_ms, 0.01 * distance, 1e-4 * variance)
+
+
+def pressure_altitude(pressure: float) -> float:
+    """Altitude [m] in the standard atmosphere of a ``pressure`` [hPa], to 11 km.
+
+    Source: ISO 2533:1975, Standard Atmosphere.
+    """
+    if not pressure > 0.0:
+        return math.nan
+    ratio = pressure / _SEA_LEVEL_HPA
+    return float(_SEA_LEVEL_K / _LAPSE_K_M * (1.0 - ratio**_EXPONENT))
+
+
+def _stated(deviation: float) -> float:
+    """The variance [m^2] of a deviation [cm]; not a number where none is stated."""
+    return math.nan if deviation == _UNKNOWN_EPH else (0.01 * deviation) ** 2

@@ -1,0 +1,64 @@
+"""Samples of sensors as records of the flight log, and back, exactly."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Iterator
+from struct import Struct
+from typing import Any, Final
+
+from fsw.log import topics
+from fsw.measurements import Sample
+from messages.ulog import Topic, data_head
+from messages.ulog_reader import unpacker
+
+Values = tuple[Any, ...]
+
+
+class _Codec:
+    """Records of one kind of sample."""
+
+    def __init__(self, kind: type[Sample], topic: Topic) -> None:
+        self.number = topics.TOPICS.index(topic)
+        self._kind = kind
+        self._names = tuple(field.name for field in dataclasses.fields(kind))
+        self._sizes = tuple(field.count for field in topic.fields)  # 0: a number by itself
+        self._head = data_head(self.number, topic)
+        self._record = Struct("<5s" + topic.codes)
+        self._unpack: Callable[[bytes], Values] = unpacker(topic).unpack
+
+    def write(self, t_us: int, sample: Sample) -> bytes:
+        """The record of a sample that arrived for the tick of ``t_us``."""
+        values: list[float] = []
+        for name, size in zip(self._names, self._sizes, strict=True):
+            value = getattr(sample, name)
+            if size:
+                values += value
+            else:
+                values.append(value)
+        return self._record.pack(self._head, t_us, *values)
+
+    def read(self, body: bytes) -> Sample:
+        """The sample again."""
+        return self._kind(*self._grouped(self._unpack(body)[1:]))
+
+    def _grouped(self, values: Values) -> Iterator[Any]:
+        at = 0
+        for size in self._sizes:
+            yield values[at : at + size] if size else values[at]
+            at += max(size, 1)
+
+
+_CODECS: Final = {kind: _Codec(kind, topic) for kind, topic in topics.OF_SAMPLES.items()}
+_BY_NUMBER: Final = {codec.number: codec for codec in _CODECS.values()}
+TOPIC_NUMBERS: Final = frozenset(_BY_NUMBER)
+
+
+def record(t_us: int, sample: Sample) -> bytes:
+    """The record of a sample that arrived for the tick of ``t_us``."""
+    return _CODECS[type(sample)].write(t_us, sample)
+
+
+def sample_of(number: int, body: bytes) -> Sample:
+    """The sample in the body of a record of topic ``number``, one of ``TOPIC_NUMBERS``."""
+    return _BY_NUMBER[number].read(body)

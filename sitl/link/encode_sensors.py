@@ -1,0 +1,150 @@
+"""Measurements as MAVLink frames, as PX4's simulators send them; wire order, see messages.frames.
+
+HIL_SENSOR with id 0 ends every step and is its clock. It carries what the inertial unit measured at
+that very instant, if anything; what is older comes before it, with id 1 and its own time.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from messages.frames import FrameWriter
+from messages.lockstep_codec import LockstepFrame
+from sitl.earth import Place, place_of
+from sitl.link import message_ids
+from sitl.sensors.barometer import standard_altitude
+from sitl.sensors.measurements import (
+    GnssMeasurement,
+    ImuMeasurement,
+    JointMeasurement,
+    MagneticMeasurement,
+    Measurement,
+    PoseMeasurement,
+    PressureMeasurement,
+    RangeMeasurement,
+)
+
+# HIL_SENSOR_UPDATED_FLAGS
+INERTIAL: Final = 0x3F
+MAGNETIC: Final = 0x1C0
+BAROMETRIC: Final = 0x1A00
+_AT_ANOTHER_TIME: Final = 1  # id of HIL_SENSOR
+
+_LOCAL_NED, _BODY_FRD = 1, 12  # MAV_FRAME
+_VIO, _MOTION_CAPTURE = 3, 6  # MAV_ESTIMATOR_TYPE
+_ALL_WELL: Final = 100  # quality
+_UNKNOWN: Final = (math.nan, *(0.0,) * 20)  # a covariance
+_NO_RATES: Final = (math.nan,) * 6
+_LASER, _DOWNWARD = 0, 25  # MAV_DISTANCE_SENSOR, MAV_SENSOR_ORIENTATION
+_FIXED, _PLAIN = 6, 3  # GPS_FIX_TYPE
+_SATELLITES: Final = 18
+_MOST_JOINTS: Final = 4
+_U8, _U16, _I16 = 0xFF, 0xFFFF, 0x7FFF
+_WARM_C: Final = 15.0
+
+
+class SensorEncoder:
+    """Builds the frames of what arrived in one step."""
+
+    def __init__(self, writer: FrameWriter, origin: Place) -> None:
+        """Write with a component's sequence; the local frame begins at ``origin``."""
+        self._writer = writer
+        self._origin = origin
+        tail = (*(0.0,) * 7, INERTIAL, 0)
+        self._barrier = LockstepFrame(writer, message_ids.HIL_SENSOR, *tail)
+        self._joints = {
+            count: LockstepFrame(
+                writer, message_ids.JOINT_ENCODERS, *(0.0,) * (_MOST_JOINTS - count), count
+            )
+            for count in range(1, _MOST_JOINTS + 1)
+        }
+
+    def frames(self, t_us: int, measurements: tuple[Measurement, ...]) -> list[bytes]:
+        """The frames of all that arrived in the step of ``t_us``, the barrier last."""
+        clock: ImuMeasurement | None = None
+        out = []
+        for one in measurements:
+            if isinstance(one, ImuMeasurement) and one.t_us == t_us:
+                clock = one
+            elif isinstance(one, JointMeasurement):
+                out.append(self._joints[len(one.angles)](max(one.t_us, 0), *one.angles))
+            else:
+                out.append(self._frame(one))
+        if clock is not None:
+            out.append(self._barrier(t_us, *clock.accel_B, *clock.gyro_B))
+        else:
+            out.append(self._hil_sensor(t_us, (0.0,) * 13, 0, 0))
+        return out
+
+    def _frame(self, one: Measurement) -> bytes:
+        # A clock that is wrong by more than the flight is long cannot be sent.
+        t_us = max(one.t_us, 0)
+        match one:
+            case PoseMeasurement():
+                return self._writer.frame(message_ids.ODOMETRY, t_us, *_odometry(one))
+            case GnssMeasurement():
+                return self._writer.frame(message_ids.HIL_GPS, t_us, *self._gps(one))
+            case RangeMeasurement():
+                return self._writer.frame(message_ids.DISTANCE_SENSOR, *_distance(one))
+            case PressureMeasurement():
+                altitude = standard_altitude(max(one.pressure_pa, 1.0))
+                values = (0.01 * one.pressure_pa, 0.0, altitude, _WARM_C)
+                return self._hil_sensor(t_us, (*(0.0,) * 9, *values), BAROMETRIC, _AT_ANOTHER_TIME)
+            case MagneticMeasurement():
+                fields = (*(0.0,) * 6, *one.field_B, *(0.0,) * 4)
+                return self._hil_sensor(t_us, fields, MAGNETIC, _AT_ANOTHER_TIME)
+            case ImuMeasurement():
+                fields = (*one.accel_B, *one.gyro_B, *(0.0,) * 7)
+                return self._hil_sensor(t_us, fields, INERTIAL, _AT_ANOTHER_TIME)
+        raise TypeError(f"{one} has no message")
+
+    def _hil_sensor(self, t_us: int, fields: tuple[float, ...], updated: int, sensor: int) -> bytes:
+        return self._writer.frame(message_ids.HIL_SENSOR, t_us, *fields, updated, sensor)
+
+    def _gps(self, one: GnssMeasurement) -> tuple[float, ...]:
+        place = place_of(self._origin, one.p_WB)
+        north, east, down = one.v_WB
+        course = math.degrees(math.atan2(east, north)) % 360.0
+        return (
+            round(1e7 * place.latitude),
+            round(1e7 * place.longitude),
+            round(1e3 * place.altitude),
+            _counted(100.0 * one.horizontal_deviation, _U16),
+            _counted(100.0 * one.vertical_deviation, _U16),
+            min(round(100.0 * math.hypot(north, east)), _U16),
+            *(min(max(round(100.0 * v), -_I16), _I16) for v in (north, east, down)),
+            round(100.0 * course) % 36_000,
+            _FIXED if one.rtk else _PLAIN,
+            _SATELLITES,
+            0,
+            0,  # no yaw
+        )
+
+
+def _odometry(one: PoseMeasurement) -> tuple[float, ...]:
+    p, q = one.position_variance, one.attitude_variance
+    # The upper triangle, row by row.
+    covariance = (
+        *(p, 0.0, 0.0, 0.0, 0.0, 0.0),
+        *(p, 0.0, 0.0, 0.0, 0.0),
+        *(p, 0.0, 0.0, 0.0),
+        *(q, 0.0, 0.0),
+        *(q, 0.0),
+        q,
+    )
+    kind = _VIO if one.from_cameras_on_board else _MOTION_CAPTURE
+    tail = (_LOCAL_NED, _BODY_FRD, one.resets, kind, _ALL_WELL)
+    return (*one.p_WB, *one.q_WB, *_NO_RATES, *covariance, *_UNKNOWN, *tail)
+
+
+def _distance(one: RangeMeasurement) -> tuple[float | bytes, ...]:
+    lengths = (100.0 * one.least, 100.0 * one.most, 100.0 * one.distance)
+    variance = _counted(1e4 * one.variance, _U8 - 1)
+    begin = (max(one.t_us, 0) // 1000, *(min(max(round(cm), 0), _U16) for cm in lengths))
+    return (*begin, _LASER, 0, _DOWNWARD, variance, 0.0, 0.0, *(0.0,) * 4, 0)
+
+
+def _counted(value: float, most: int) -> int:
+    """A deviation or variance in whole units: never stated as smaller than it is, nor as 0."""
+    return min(max(math.ceil(value - 1e-9), 1), most)

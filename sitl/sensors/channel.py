@@ -1,0 +1,100 @@
+"""When a sensor measures, and what its messages go through until they arrive."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from typing import Protocol
+
+import numpy as np
+
+from sitl.sensors.exact import V4, SensorReadings
+from sitl.sensors.keys import Timing
+from sitl.sensors.measurements import Measurement
+
+
+class Sensor(Protocol):
+    """One sensor of one flight."""
+
+    def measure(
+        self, exact: SensorReadings, thrust: V4, stamp_us: int, outlier: bool
+    ) -> Measurement | None:
+        """What it says about the vehicle now, or an outlier; None where it cannot measure.
+
+        The rotors give ``thrust`` [N].
+        """
+        ...
+
+
+class Channel:
+    """Rate, latency, jitter, dropouts and gaps of one sensor.
+
+    A sensor measures in the first step of all, and then in the first step at or after each tick of
+    its own clock, whose phase is drawn. A message arrives with the first step at or after its time;
+    messages do not overtake each other.
+    """
+
+    def __init__(
+        self, sensor: Sensor, keys: Timing, random: np.random.Generator, start_us: int
+    ) -> None:
+        """Begin at the stamp ``start_us``."""
+        self._sensor = sensor
+        self._random = random
+        self._period_us = 1e6 / keys.rate_hz
+        self._due_us = start_us - float(random.uniform()) * self._period_us
+        self.next_us = self._due_us  # nothing happens before this stamp
+        self._stamp_error_us = round(1e3 * keys.stamp_error_ms)
+        self._latency_us = 1e3 * keys.latency_ms
+        self._jitter_us = 1e3 * keys.jitter_ms
+        self._dropout_share = keys.dropout_share
+        self._outlier_share = keys.outlier_share
+        self._gap_us = 1e3 * keys.gap_ms
+        self._interval_us = 1e6 * keys.gap_every_s
+        self._start_us = start_us
+        self._interval = -1  # of which the gap is known
+        self._gap_begins_us = math.inf
+        self._newest_us = -math.inf  # arrival of the newest message
+        self._under_way: deque[tuple[float, Measurement]] = deque()
+
+    def step(self, exact: SensorReadings, thrust: V4, out: list[Measurement]) -> None:
+        """Measure if it is time, and append what arrives in this step, the oldest first.
+
+        The rotors give ``thrust`` [N].
+        """
+        t_us, under_way = exact.t_us, self._under_way
+        if t_us >= self._due_us:
+            self._due_us += self._period_us
+            if t_us >= self._due_us:  # faster than the steps
+                missed = math.floor((t_us - self._due_us) / self._period_us)
+                self._due_us += (missed + 1.0) * self._period_us
+            self._measure(exact, thrust)
+        while under_way and under_way[0][0] <= t_us:
+            out.append(under_way.popleft()[1])
+        self.next_us = min(under_way[0][0], self._due_us) if under_way else self._due_us
+
+    def _measure(self, exact: SensorReadings, thrust: V4) -> None:
+        """Measure and send, unless the message is lost."""
+        t_us = exact.t_us
+        outlier = self._outlier_share > 0.0 and self._random.random() < self._outlier_share
+        said = self._sensor.measure(exact, thrust, t_us + self._stamp_error_us, outlier)
+        if said is None:
+            return
+        if self._dropout_share > 0.0 and self._random.random() < self._dropout_share:
+            return
+        if self._gap_us > 0.0 and self._silent(t_us):
+            return
+        arrives_us = t_us + self._latency_us
+        if self._jitter_us > 0.0:
+            arrives_us += self._jitter_us * float(self._random.standard_normal())
+            arrives_us = max(arrives_us, t_us, self._newest_us)
+        self._newest_us = arrives_us
+        self._under_way.append((arrives_us, said))
+
+    def _silent(self, t_us: int) -> bool:
+        """Whether ``t_us`` is in a gap; each interval has one, at a place of its own."""
+        interval = math.floor((t_us - self._start_us) / self._interval_us)
+        while self._interval < interval:
+            self._interval += 1
+            begins = self._random.random() * max(self._interval_us - self._gap_us, 0.0)
+            self._gap_begins_us = self._start_us + self._interval * self._interval_us + begins
+        return self._gap_begins_us <= t_us < self._gap_begins_us + self._gap_us

@@ -1,0 +1,45 @@
+"""Satellite navigation: white noise, a part that wanders, and reflections as outliers."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from sitl.sensors.exact import V4, SensorReadings
+from sitl.sensors.keys import Gnss
+from sitl.sensors.measurements import GnssMeasurement
+from sitl.sensors.noise import GaussMarkov, anywhere
+
+
+class GnssSensor:
+    """The receiver of one flight."""
+
+    def __init__(self, keys: Gnss, random: np.random.Generator) -> None:
+        self._keys = keys
+        self._random = random
+        level, down = keys.wander_horizontal_m, keys.wander_vertical_m
+        sigmas = (level, level, down)
+        self._wander = GaussMarkov(sigmas, keys.wander_time_s, 1.0 / keys.rate_hz, random)
+        self._horizontal = math.hypot(keys.horizontal_m, level)
+        self._vertical = math.hypot(keys.vertical_m, down)
+
+    def measure(
+        self, exact: SensorReadings, thrust: V4, stamp_us: int, outlier: bool
+    ) -> GnssMeasurement:
+        """Position and velocity; an outlier's position is off by a fixed length."""
+        keys, (x, y, z), (vx, vy, vz) = self._keys, exact.p_WB, exact.v_WB
+        ox, oy, oz = self._wander.step()
+        dx, dy, dz, a, b, c = self._random.standard_normal(6).tolist()
+        if outlier:
+            fx, fy, fz = anywhere(self._random, keys.outlier_m)
+            ox, oy, oz = ox + fx, oy + fy, oz + fz
+        level, down, speed = keys.horizontal_m, keys.vertical_m, keys.velocity_m_s
+        return GnssMeasurement(
+            t_us=stamp_us,
+            p_WB=(x + ox + level * dx, y + oy + level * dy, z + oz + down * dz),
+            v_WB=(vx + speed * a, vy + speed * b, vz + speed * c),
+            horizontal_deviation=self._horizontal,
+            vertical_deviation=self._vertical,
+            rtk=keys.rtk,
+        )

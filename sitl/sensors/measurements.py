@@ -1,0 +1,82 @@
+"""What the sensors say, each with the stamp of its measurement [µs]."""
+
+from __future__ import annotations
+
+from typing import NamedTuple, TypeAlias
+
+from sitl.ranges import V3
+
+V4: TypeAlias = tuple[float, float, float, float]
+
+
+class ImuMeasurement(NamedTuple):
+    """Gyro and accelerometer."""
+
+    t_us: int
+    gyro_B: V3  # rad/s
+    accel_B: V3  # m/s², specific force
+
+
+class PoseMeasurement(NamedTuple):
+    """Position and attitude."""
+
+    t_us: int
+    p_WB: V3  # m, NED
+    q_WB: V4  # [w, x, y, z], maps B to W
+    position_variance: float  # m², of each axis, as the sensor states it
+    attitude_variance: float  # rad²
+    resets: int  # how often the sensor's frame has jumped
+    from_cameras_on_board: bool  # visual odometry, or motion capture
+
+
+class GnssMeasurement(NamedTuple):
+    """Position and velocity from satellites."""
+
+    t_us: int
+    p_WB: V3  # m, NED
+    v_WB: V3  # m/s, NED
+    horizontal_deviation: float  # m, as the receiver states it
+    vertical_deviation: float  # m
+    rtk: bool
+
+
+class PressureMeasurement(NamedTuple):
+    """Static pressure."""
+
+    t_us: int
+    pressure_pa: float
+
+
+class MagneticMeasurement(NamedTuple):
+    """Magnetic field."""
+
+    t_us: int
+    field_B: V3  # Gauss
+
+
+class RangeMeasurement(NamedTuple):
+    """Distance along the base's z axis."""
+
+    t_us: int
+    distance: float  # m
+    variance: float  # m²
+    least: float  # m, that it can measure
+    most: float  # m
+
+
+class JointMeasurement(NamedTuple):
+    """Angles of the joints."""
+
+    t_us: int
+    angles: tuple[float, ...]  # (j,) rad
+
+
+Measurement: TypeAlias = (
+    ImuMeasurement
+    | PoseMeasurement
+    | GnssMeasurement
+    | PressureMeasurement
+    | MagneticMeasurement
+    | RangeMeasurement
+    | JointMeasurement
+)

@@ -1,0 +1,36 @@
+"""Motion capture: cameras that see the vehicle, now and then confuse its markers."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from sitl.sensors.exact import V4, SensorReadings, turned
+from sitl.sensors.keys import MotionCapture
+from sitl.sensors.measurements import PoseMeasurement
+from sitl.sensors.noise import anywhere
+
+
+class MotionCaptureSensor:
+    """The system of one flight."""
+
+    def __init__(self, keys: MotionCapture, random: np.random.Generator) -> None:
+        self._keys = keys
+        self._random = random
+        self._attitude_rad = math.radians(keys.attitude_deg)
+
+    def measure(
+        self, exact: SensorReadings, thrust: V4, stamp_us: int, outlier: bool
+    ) -> PoseMeasurement:
+        """A pose; an outlier is off by a fixed length and angle in any direction."""
+        keys, (x, y, z) = self._keys, exact.p_WB
+        dx, dy, dz, a, b, c = self._random.standard_normal(6).tolist()
+        size, turn = keys.position_m, self._attitude_rad
+        p = (x + size * dx, y + size * dy, z + size * dz)
+        q = turned(exact.q_WB, (turn * a, turn * b, turn * c))
+        if outlier:
+            ox, oy, oz = anywhere(self._random, keys.outlier_m)
+            p = (p[0] + ox, p[1] + oy, p[2] + oz)
+            q = turned(q, anywhere(self._random, math.radians(keys.outlier_deg)))
+        return PoseMeasurement(stamp_us, p, q, size * size, turn * turn, 0, False)

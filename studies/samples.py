@@ -1,0 +1,73 @@
+"""What the simulated sensors say as the flight software's samples, without a link between them.
+
+What the messages would round stays exact; variances are stated as the link's decoder states them.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from fsw.measurements import (
+    GnssSample,
+    ImuSample,
+    JointSample,
+    MagneticSample,
+    PoseSample,
+    PressureSample,
+    RangeSample,
+    Sample,
+)
+from fsw.signals import SensorFrame
+from sitl.sensors.barometer import standard_altitude
+from sitl.sensors.measurements import (
+    GnssMeasurement,
+    ImuMeasurement,
+    JointMeasurement,
+    MagneticMeasurement,
+    Measurement,
+    PoseMeasurement,
+    PressureMeasurement,
+)
+
+_PRESSURE_VARIANCE: Final = 0.2**2  # m^2
+_VELOCITY_VARIANCE: Final = 0.1**2  # m^2/s^2
+_NO_VECTOR: Final = (math.nan, math.nan, math.nan)
+
+
+def sample(said: Measurement) -> Sample:
+    """One measurement, of a frame whose origin lies at sea level."""
+    time = 1e-6 * said.t_us
+    match said:
+        case ImuMeasurement():
+            return ImuSample(time, said.accel_B, said.gyro_B)
+        case JointMeasurement():
+            first, second = said.angles
+            return JointSample(time, (first, second))
+        case PoseMeasurement():
+            p, q = said.position_variance, said.attitude_variance
+            return PoseSample(time, said.p_WB, said.q_WB, (p, p, p), (q, q, q), said.resets)
+        case GnssMeasurement():
+            level, down = said.horizontal_deviation**2, said.vertical_deviation**2
+            speed = (_VELOCITY_VARIANCE,) * 3
+            return GnssSample(time, said.p_WB, said.v_WB, (level, level, down), speed)
+        case PressureMeasurement():
+            return PressureSample(time, standard_altitude(said.pressure_pa), _PRESSURE_VARIANCE)
+        case MagneticMeasurement():
+            return MagneticSample(time, said.field_B)
+    return RangeSample(time, said.distance, said.variance)
+
+
+def only_the_time(t_us: int, samples: tuple[Sample, ...]) -> SensorFrame:
+    """The frame of a tick that has samples instead, as the link makes it."""
+    newest = samples[-1] if samples else None
+    return SensorFrame(
+        t_us,
+        p_WB=_NO_VECTOR,
+        v_WB=_NO_VECTOR,
+        q_WB=(math.nan, *_NO_VECTOR),
+        gyro_B=newest.rate if isinstance(newest, ImuSample) else _NO_VECTOR,
+        accel_B=newest.acceleration if isinstance(newest, ImuSample) else _NO_VECTOR,
+        q_arm=(math.nan, math.nan),
+        qd_arm=(math.nan, math.nan),
+    )

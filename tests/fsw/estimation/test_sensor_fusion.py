@@ -1,0 +1,354 @@
+"""What the estimator makes of good and of bad sensors."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from fsw.estimation.sensor_fault import Sensor, SensorFault
+from fsw.estimation.sensor_fusion import FusionMemory, SensorFusion, at_start
+from fsw.geometry.rotation import quaternion_from_matrix
+from fsw.measurements import GnssSample, ImuSample, PoseSample, Sample
+from fsw.signals import StateEstimate
+from tests.fsw.estimation.sensor_runs import (
+    MOCAP,
+    RTK,
+    START,
+    TICK,
+    VIO,
+    Run,
+    Suite,
+    multiply,
+    run,
+)
+
+Array = NDArray[np.float64]
+Change = Callable[[float, Sample], Sample | None]
+
+
+def errors(estimate: StateEstimate, flown: Run, now: float) -> Array:
+    """Position, velocity and attitude, truth minus estimate (9,)."""
+    truth = flown.truth
+    k = truth.at(now)
+    q = np.array(quaternion_from_matrix(estimate.R_WB))
+    turn = multiply((q * [1.0, -1.0, -1.0, -1.0])[None], truth.q[k][None])[0]
+    turn *= np.sign(turn[0])
+    return np.concatenate([truth.p[k] - estimate.p_WB, truth.v[k] - estimate.v_WB, 2.0 * turn[1:]])
+
+
+class Flown:
+    """A run through the estimator; ``change`` alters or removes (None) samples."""
+
+    def __init__(self, flown: Run, change: Change | None = None) -> None:
+        self.fusion = SensorFusion(flown.suite.tuning, TICK)
+        self.run = flown
+        self.memory: FusionMemory = at_start()
+        self.found: set[tuple[Sensor, SensorFault]] = set()
+        self.worst = 0.0  # of the position's error against its standard deviation, on one axis
+        self.estimate: StateEstimate | None = None
+        self.now = 0.0
+        for tick, (now, samples) in enumerate(flown):
+            if change is not None:
+                changed = [change(now, sample) for sample in samples]
+                samples = [sample for sample in changed if sample is not None]
+            self.memory, self.estimate = self.fusion.step(self.memory, samples, now)
+            self.now = now
+            for health in self.memory.health:
+                if health.fault and health.fault_at == now:
+                    self.found.add((health.sensor, health.fault))
+            if tick % 25 == 0 and now > START + 0.5:
+                self.worst = max(self.worst, *self.in_sigmas()[:3])
+
+    def error(self) -> Array:
+        """Errors and biases now (15,)."""
+        assert self.estimate is not None
+        x = self.memory.numbers[0]
+        return np.concatenate(
+            [
+                errors(self.estimate, self.run, self.now),
+                self.run.accel_bias - x["accel_bias"],
+                self.run.gyro_bias - x["gyro_bias"],
+            ]
+        )
+
+    def in_sigmas(self) -> Array:
+        """Errors of position, velocity and attitude over their standard deviations (9,)."""
+        assert self.estimate is not None
+        sigma = np.sqrt(np.diag(self.fusion.covariance(self.memory, self.now)))[:9]
+        found: Array = abs(errors(self.estimate, self.run, self.now)) / sigma
+        return found
+
+
+def nees(suite: Suite, runs: int, duration: float) -> float:
+    """Mean of the normalised squared error of 15 states at the end of each of some runs."""
+    total = 0.0
+    for seed in range(runs):
+        flown = Flown(run(suite, seed, duration))
+        error = flown.error()
+        P = flown.fusion.covariance(flown.memory, flown.now)[:15, :15]
+        total += float(error @ np.linalg.solve(P, error))
+    return total / runs
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("suite", "duration"), [(MOCAP, 2.0), (VIO, 3.0), (RTK, 5.0)], ids=["mocap", "vio", "rtk"]
+)
+def test_the_filter_is_as_sure_as_it_may_be(suite: Suite, duration: float) -> None:
+    runs = 100
+    low, high = chi2.ppf([0.025, 0.975], 15 * runs) / runs
+    assert low < nees(suite, runs, duration) < high
+
+
+def test_a_few_runs_are_as_sure_as_they_may_be() -> None:
+    runs = 8
+    low, high = chi2.ppf([0.025, 0.975], 15 * runs) / runs
+    assert low < nees(MOCAP, runs, 1.0) < high
+
+
+def innovations(suite: Suite, seed: int, duration: float) -> tuple[float, int]:
+    """Sum of the chi-square of all innovations after the first second, and their dimension."""
+    flown = run(suite, seed, duration)
+    fusion, memory = SensorFusion(suite.tuning, TICK), at_start()
+    total, dimension = 0.0, 0
+    size = {Sensor.POSE: 3, Sensor.GNSS: 3, Sensor.BAROMETER: 1, Sensor.MAGNETOMETER: 1}
+    gate = {3: 32.1, 1: 25.0}
+    for now, samples in flown:
+        before = {h.sensor: h for h in memory.health}
+        memory, _ = fusion.step(memory, samples, now)
+        if now < START + 1.0:
+            continue
+        for health in memory.health:
+            old = before.get(health.sensor)
+            # A sensor's ratio is a new object whenever it was fused.
+            if health.ratio and (old is None or old.ratio is not health.ratio):
+                n = size[health.sensor]
+                total += gate[n] * sum(health.ratio)
+                dimension += n * len(health.ratio)
+    return total, dimension
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("suite", [MOCAP, VIO, RTK], ids=["mocap", "vio", "rtk"])
+def test_innovations_are_as_large_as_expected(suite: Suite) -> None:
+    found = [innovations(suite, seed, 3.0) for seed in range(100)]
+    total, dimension = sum(f[0] for f in found), sum(f[1] for f in found)
+    low, high = chi2.ppf([0.025, 0.975], dimension)
+    assert low < total < high
+
+
+def test_a_hidden_delay_of_the_pose_is_found_within_2_ms() -> None:
+    tuning = replace(MOCAP.tuning, pose_delay_sigma=0.01)
+    pose = MOCAP.pose
+    assert pose is not None
+    suite = replace(MOCAP, tuning=tuning, pose=replace(pose, hidden_delay=0.012))
+    for seed in (0, 1):
+        flown = Flown(run(suite, seed, 4.0))
+        assert flown.memory.numbers[0]["pose_delay"] == pytest.approx(0.012, abs=2e-3)
+        assert max(flown.in_sigmas()) < 4.0
+
+
+def at(t: float, change: Callable[[PoseSample], Sample | None], duration: float = 0.0) -> Change:
+    """A change of poses that are measured within an interval after the start."""
+    first, last = START + t, START + t + duration + 1.0 / 120.0
+
+    def changed(now: float, sample: Sample) -> Sample | None:
+        if isinstance(sample, PoseSample) and first <= sample.time < last:
+            return change(sample)
+        return sample
+
+    return changed
+
+
+def far(sample: PoseSample) -> PoseSample:
+    """A place 1e6 m away."""
+    return replace(sample, position=(1e6, 0.0, 0.0))
+
+
+def upside_down(sample: PoseSample) -> PoseSample:
+    """An attitude turned by 180 degrees."""
+    w, x, y, z = sample.attitude
+    return replace(sample, attitude=(-x, w, z, -y))
+
+
+def tilted(sample: PoseSample) -> PoseSample:
+    """An attitude turned by 11 degrees."""
+    q = multiply(np.array([sample.attitude]), np.array([[math.cos(0.1), math.sin(0.1), 0.0, 0.0]]))
+    return replace(sample, attitude=tuple(q[0].tolist()))
+
+
+FAULTS: list[tuple[str, Change, SensorFault]] = [
+    ("far away", at(1.2, far), SensorFault.IMPLAUSIBLE),
+    ("upside down", at(1.2, upside_down), SensorFault.JUMP),
+    ("tilted", at(1.2, tilted), SensorFault.JUMP),
+    (
+        "a metre aside for 0.1 s",
+        at(1.2, lambda s: replace(s, position=(s.position[0] + 1.0, *s.position[1:])), 0.1),
+        SensorFault.JUMP,
+    ),
+    (
+        "10 s ahead",
+        at(1.2, lambda s: replace(s, time=s.time + 10.0)),
+        SensorFault.FUTURE,
+    ),
+    ("1 s back", at(1.2, lambda s: replace(s, time=s.time - 1.0)), SensorFault.REPEATED),
+    (
+        "not a number",
+        at(1.2, lambda s: replace(s, attitude=(math.nan, 0.0, 0.0, 0.0))),
+        SensorFault.NOT_FINITE,
+    ),
+    ("gone for 0.2 s", at(1.2, lambda s: None, 0.2), SensorFault.NONE),
+]
+
+
+@pytest.mark.parametrize(("name", "change", "fault"), FAULTS, ids=[fault[0] for fault in FAULTS])
+def test_a_bad_pose_leaves_the_estimate_within_3_sigma(
+    name: str, change: Change, fault: SensorFault
+) -> None:
+    good, bad = Flown(run(MOCAP, 4, 1.6)), Flown(run(MOCAP, 4, 1.6), change)
+    assert good.worst < 3.0
+    assert bad.worst < 3.0
+    assert bad.found == good.found | ({(Sensor.POSE, fault)} if fault else set())
+    # It is fused again: as sure in the end as if nothing had been.
+    np.testing.assert_allclose(bad.error()[:3], good.error()[:3], atol=5e-4)
+
+
+def test_a_pose_frozen_for_300_ms_leaves_the_estimate_within_3_sigma() -> None:
+    held: list[PoseSample] = []
+
+    def freeze(sample: PoseSample) -> PoseSample:
+        held.append(sample)
+        return replace(held[0], time=sample.time)
+
+    flown = Flown(run(MOCAP, 5, 1.8), at(1.2, freeze, 0.3))
+    assert flown.worst < 3.0
+    assert (Sensor.POSE, SensorFault.STUCK) in flown.found
+
+
+def test_a_pose_with_a_frozen_time_stamp_is_not_fused() -> None:
+    held: list[PoseSample] = []
+
+    def freeze(sample: PoseSample) -> PoseSample:
+        held.append(sample)
+        return held[0]
+
+    flown = Flown(run(MOCAP, 5, 1.8), at(1.2, freeze, 0.3))
+    assert flown.worst < 3.0
+    assert (Sensor.POSE, SensorFault.REPEATED) in flown.found
+
+
+def test_a_velocity_of_a_million_is_not_believed() -> None:
+    def change(now: float, sample: Sample) -> Sample:
+        if isinstance(sample, GnssSample) and abs(sample.time - START - 2.0) < 0.01:
+            return replace(sample, velocity=(1e6, 0.0, 0.0))
+        return sample
+
+    flown = Flown(run(RTK, 1, 2.5), change)
+    assert flown.worst < 4.0
+    assert (Sensor.GNSS, SensorFault.IMPLAUSIBLE) in flown.found
+
+
+@pytest.mark.parametrize(
+    ("force", "rate", "fault"),
+    [
+        ((1e3, 0.0, 0.0), (0.0, 0.0, 0.0), SensorFault.IMPLAUSIBLE),
+        ((100.0, 0.0, 0.0), (0.0, 0.0, 0.0), SensorFault.JUMP),
+        ((0.0, 0.0, -9.81), (0.0, 20.0, 0.0), SensorFault.JUMP),
+        ((math.nan, 0.0, 0.0), (0.0, 0.0, 0.0), SensorFault.NOT_FINITE),
+    ],
+)
+def test_one_bad_reading_of_the_imu_is_not_integrated(
+    force: tuple[float, float, float], rate: tuple[float, float, float], fault: SensorFault
+) -> None:
+    def change(now: float, sample: Sample) -> Sample:
+        if isinstance(sample, ImuSample) and abs(now - START - 1.2) < 1e-4:
+            return ImuSample(sample.time, force, rate)
+        return sample
+
+    flown = Flown(run(MOCAP, 6, 1.6), change)
+    assert (Sensor.IMU, fault) in flown.found
+    assert flown.worst < 3.5
+
+
+def test_a_stuck_imu_is_found_and_the_pose_carries_on() -> None:
+    held: list[ImuSample] = []
+
+    def change(now: float, sample: Sample) -> Sample:
+        if isinstance(sample, ImuSample) and 1.2 <= now - START < 2.2:
+            held.append(sample)
+            return replace(held[0], time=sample.time)
+        return sample
+
+    flown = Flown(run(MOCAP, 7, 3.0), change)
+    assert (Sensor.IMU, SensorFault.STUCK) in flown.found
+    assert abs(flown.error()[:3]).max() < 2e-3
+    assert abs(flown.error()[9:12]).max() < 0.1  # the bias that was known before is taken up
+
+
+def test_a_pose_that_has_moved_for_good_is_taken_and_the_jump_reported() -> None:
+    def change(now: float, sample: Sample) -> Sample:
+        if isinstance(sample, PoseSample) and sample.time > START + 1.0:
+            x, y, z = sample.position
+            return replace(sample, position=(x - 0.3, y, z))
+        return sample
+
+    flown = Flown(run(MOCAP, 8, 2.5), change)
+    reset = flown.memory.reset
+    assert reset.number == 1
+    np.testing.assert_allclose(reset.position, (-0.3, 0.0, 0.0), atol=0.02)
+    np.testing.assert_allclose(flown.error()[:3], (0.3, 0.0, 0.0), atol=5e-3)
+
+
+def test_a_jump_that_the_sensor_announces_is_taken_at_once() -> None:
+    def change(now: float, sample: Sample) -> Sample:
+        if isinstance(sample, PoseSample) and sample.time > START + 1.0:
+            x, y, z = sample.position
+            return replace(sample, position=(x, y + 0.5, z), reset_counter=1)
+        return sample
+
+    flown = Flown(run(MOCAP, 8, 1.1), change)
+    assert flown.memory.reset.number == 1
+    np.testing.assert_allclose(flown.error()[:3], (0.0, -0.5, 0.0), atol=5e-3)
+
+
+def test_a_tick_leaves_the_memory_it_was_given_as_it_was() -> None:
+    flown = run(MOCAP, 9, 0.3)
+    fusion, memory = SensorFusion(MOCAP.tuning, TICK), at_start()
+    for now, samples in flown:
+        memory, _ = fusion.step(memory, samples, now)
+    now, samples = now + TICK, [ImuSample(now + TICK, (0.0, 0.0, -9.0), (0.1, 0.0, 0.0))]
+    _, first = fusion.step(memory, samples, now)
+    _, second = fusion.step(memory, samples, now)
+    assert first == second
+
+
+def test_without_a_pose_there_is_no_estimate() -> None:
+    flown = run(MOCAP, 9, 0.1)
+    fusion, memory = SensorFusion(MOCAP.tuning, TICK), at_start()
+    for now, samples in flown:
+        readings = [one for one in samples if not isinstance(one, PoseSample)]
+        memory, estimate = fusion.step(memory, readings, now)
+        assert estimate is None
+
+
+@pytest.mark.parametrize("latency", [0.005, 0.06, 0.2])
+def test_the_filter_stays_as_far_behind_as_the_pose_is_late(latency: float) -> None:
+    pose = MOCAP.pose
+    assert pose is not None
+    flown = Flown(run(replace(MOCAP, pose=replace(pose, latency=latency)), 3, 1.0))
+    assert latency <= flown.memory.delay < latency + 0.003
+    assert flown.worst < 3.5
+    assert not flown.found
+
+
+def test_a_pose_later_than_all_delays_is_named() -> None:
+    pose = MOCAP.pose
+    assert pose is not None
+    flown = Flown(run(replace(MOCAP, pose=replace(pose, latency=0.3)), 3, 0.6))
+    assert (Sensor.POSE, SensorFault.TOO_OLD) in flown.found
