@@ -10,6 +10,7 @@ time of a frozen dataclass (docs/decisions/0017-one-compiled-call-a-tick.md).
 
 from __future__ import annotations
 
+import math
 from dataclasses import field
 from enum import Enum, IntEnum
 from typing import Final, NamedTuple
@@ -686,6 +687,74 @@ class OffboardReport:
     age_us: int = 0  # of the newest accepted one
 
 
+class SensorReport(NamedTuple):
+    """One sensor, as the estimator sees it."""
+
+    name: str
+    silent_us: int  # since its newest reading came; -1: never
+    fault: str = ""  # what is wrong with it; empty: nothing
+    ratio: tuple[float, ...] = ()  # innovation over its limit, of each part of the last reading
+    innovation: tuple[float, ...] = ()  # m, m/s, rad
+
+
+class TestRatios(NamedTuple):
+    """Innovation over its limit, the largest of all sensors that measure it; 1: refused."""
+
+    velocity: float = math.nan
+    place: float = math.nan  # level
+    height: float = math.nan
+    heading: float = math.nan
+    above_ground: float = math.nan
+
+
+@dataclass(frozen=True, slots=True)
+class SatelliteFix:
+    """The newest reading of a receiver, as far as it was measured."""
+
+    t_us: int  # of the measurement
+    p: Vec3  # m, NED
+    v: Vec3  # m/s, NED
+    position_sigma: Vec3  # m, NED
+    velocity_sigma: float  # m/s
+
+
+@dataclass(frozen=True, slots=True)
+class EstimatorReport:
+    """What an estimator from sensors of their own times says about itself."""
+
+    t_us: int
+    pose_covariance: tuple[float, ...]  # (21,) upper triangle: m^2 NED, rad^2 about the body's axes
+    velocity_covariance: tuple[float, ...]  # (21,) the same: m^2/s^2 and rad^2/s^2, body
+    accel_bias: Vec3  # m/s^2, body
+    gyro_bias: Vec3  # rad/s, body
+    accel_bias_variance: Vec3
+    gyro_bias_variance: Vec3
+    pose_delay: float  # s
+    sensors: tuple[SensorReport, ...]
+    ratios: TestRatios
+    unaided_us: int  # since a position was used last; -1: none ever was
+    resets: int  # of the estimate
+    flags: int  # ESTIMATOR_STATUS_FLAGS
+    fix: SatelliteFix | None = None  # where there is a receiver
+
+    @property
+    def level_accuracy(self) -> float:
+        """Standard deviation of the horizontal position [m]."""
+        return math.sqrt(self.pose_covariance[0] + self.pose_covariance[6])
+
+    @property
+    def vertical_accuracy(self) -> float:
+        """Standard deviation of the height [m]."""
+        return math.sqrt(self.pose_covariance[11])
+
+    def innovation(self, name: str, count: int) -> tuple[float, ...]:
+        """The last innovation of a sensor, ``count`` numbers; NaN where there is none."""
+        for one in self.sensors:
+            if one.name == name and len(one.innovation) == count:
+                return one.innovation
+        return (math.nan,) * count
+
+
 @dataclass(frozen=True, slots=True)
 class FlightSnapshot:
     """The vehicle as telemetry shows it after a tick; what follows from it, encoders compute."""
@@ -714,6 +783,7 @@ class FlightSnapshot:
     orbit: Orbit | None = None  # that is being flown
     accel_B: Vec3 = (0.0, 0.0, -9.81)  # m/s^2, specific force as measured
     safety: SafetyCounters = SafetyCounters()
+    estimator: EstimatorReport | None = None  # None: states are exact
 
 
 @dataclass(frozen=True, slots=True)

@@ -67,6 +67,7 @@ FILTER: Final = np.dtype(
         ("H", float, (ROWS, ERRORS)),
         ("residual", float, (ROWS,)),
         ("variance", float, (ROWS,)),
+        ("innovation", float, (2, ROWS)),  # of both parts of a measurement, as it came
         ("gain", float, (ERRORS, ROWS)),
         ("factor", float, (ROWS, ROWS)),
         ("error", float, (ERRORS,)),

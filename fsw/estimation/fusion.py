@@ -43,8 +43,10 @@ def _cleared(x: Any, rows: int) -> None:
 
 
 @compilable
-def _judged(x: Any, rows: int) -> float:
-    """Chi-square over gate; fuses what is within it."""
+def _judged(x: Any, rows: int, part: int = 0) -> float:
+    """Chi-square over gate of a part of a measurement; fuses what is within it."""
+    for k in range(rows):
+        x.innovation[part, k] = x.residual[k]
     ratio = distance(x, rows) / GATES[rows - 1]
     if ratio <= 1.0:
         correct(x, rows)
@@ -110,7 +112,7 @@ def fuse_pose(
     first = _judged(x, 3)
     dt = time - x.pose_delay - x.time
     attitude_rows(x, attitude, attitude_variance, dt, delayed)
-    return first, _judged(x, 3)
+    return first, _judged(x, 3, 1)
 
 
 @compilable
@@ -142,7 +144,7 @@ def fuse_gnss(
     position_rows(x, position, position_variance, dt, 0.0)
     first = _judged(x, 3)
     velocity_rows(x, velocity, velocity_variance, dt)
-    return first, _judged(x, 3)
+    return first, _judged(x, 3, 1)
 
 
 @compilable

@@ -43,6 +43,7 @@ class Health(NamedTuple):
     numbers: tuple[float, ...] = ()  # of that sample
     fused: tuple[float, ...] = ()  # s, when each part of it was fused last
     ratio: tuple[float, ...] = ()  # chi-square over gate, of each part
+    innovation: tuple[float, ...] = ()  # of each part: m, m/s, rad
     fault: SensorFault = SensorFault.NONE  # the last one
     fault_at: float = -math.inf  # s
 

@@ -14,7 +14,7 @@ class Sensor(Enum):
     BAROMETER = "barometer"
     MAGNETOMETER = "magnetometer"
     RANGEFINDER = "rangefinder"
-    ENCODERS = "joint encoder"
+    ENCODERS = "joint encoders"
 
 
 class SensorFault(IntEnum):
@@ -46,4 +46,7 @@ _SENTENCES = {
 
 def sentence(sensor: Sensor, fault: SensorFault) -> str:
     """What the operator reads."""
-    return f"{sensor.value} {_SENTENCES[fault]}"
+    told = _SENTENCES[fault]
+    if sensor is Sensor.ENCODERS:  # there are several
+        told = told.replace("is ", "are ", 1).replace("says ", "say ", 1).replace("jumps", "jump")
+    return f"{sensor.value} {told}"

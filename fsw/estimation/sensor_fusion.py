@@ -40,7 +40,6 @@ from fsw.signals import StateEstimate, Vec2, Vec3, Vec4
 
 LATE: Final = 0.01  # s behind the filter, where a measurement is still fused as it stands
 _MARGIN: Final = 0.003  # s, by which a measurement may take longer than lately
-_STUCK_JOINT: Final = 0.05  # rad that a joint is asked to move without being seen to
 _LONGEST_STEP: Final = 0.05  # s, by which joints are predicted at once
 _REST: Vec3 = (0.0, 0.0, 0.0)
 _NO_TURN: Vec4 = (1.0, 0.0, 0.0, 0.0)
@@ -63,6 +62,14 @@ class Reset(NamedTuple):
     turn: Vec4 = _NO_TURN  # new attitude times the inverse of the old one, NED
 
 
+class EncoderWatch(NamedTuple):
+    """Whether the joints' encoders still follow the joints."""
+
+    angles: Vec2 = (math.nan, math.nan)  # rad, the last reading
+    repeats: int = 0  # readings in a row that were the same
+    stuck: bool = False
+
+
 class FusionMemory(NamedTuple):
     """What the estimator carries from tick to tick."""
 
@@ -77,10 +84,9 @@ class FusionMemory(NamedTuple):
     now: float = -1.0  # s, of the last tick; negative: there was none
     imu_came: float = -1.0  # s, when a reading came last; negative: never
     joints_came: float = -1.0
+    gnss: GnssSample | None = None  # the newest one
     delay: float = 0.0  # s, that measurements have lately taken
-    angles: Vec2 = (math.nan, math.nan)  # rad, as the encoders said last
-    asked: Vec2 = (0.0, 0.0)  # rad, what the joints were asked for when they said so first
-    joints_stuck: bool = False
+    encoders: EncoderWatch = EncoderWatch()
 
     def of(self, sensor: Sensor) -> Health:
         """What is known of a sensor."""
@@ -88,6 +94,12 @@ class FusionMemory(NamedTuple):
             if one.sensor is sensor:
                 return one
         return Health(sensor)
+
+    def came(self, sensor: Sensor) -> float:
+        """When a reading of a sensor came last [s]; negative: never."""
+        if sensor is Sensor.IMU:
+            return self.imu_came
+        return self.joints_came if sensor is Sensor.ENCODERS else self.of(sensor).came
 
     def noting(self, health: Health) -> FusionMemory:
         """The memory with the health of one sensor renewed."""
@@ -176,23 +188,6 @@ class SensorFusion:
         kernels.present_covariance(memory.numbers, self._law, now, found)
         return found
 
-    def watch_joints(self, memory: FusionMemory, before: FusionMemory, asked: Vec2) -> FusionMemory:
-        """Find encoders that stand still while the joints are asked to move, to ``asked`` [rad].
-
-        Their resolution is coarse, so that in hover they may well say the same for long. While they
-        stand still, joints are believed where they are asked to be: what holds the arm against
-        gravity there also brings it there, while the difference to a frozen angle would drive it
-        into its end stops.
-        """
-        if memory.angles != before.angles:
-            return memory._replace(asked=asked, joints_stuck=False)
-        moved = max(abs(asked[0] - memory.asked[0]), abs(asked[1] - memory.asked[1]))
-        if not memory.joints_stuck and not moved > _STUCK_JOINT:
-            return memory
-        kernels.read_joints(memory.numbers, self._law, asked, 0.0)
-        health = memory.of(Sensor.ENCODERS).with_fault(SensorFault.STUCK, memory.now)
-        return memory.noting(health)._replace(joints_stuck=True)
-
     def _copied(self, memory: FusionMemory, now: float, u: Vec2) -> FusionMemory:
         """The memory with a filter of its own, whose joints are moved on."""
         x = np.empty(1, dtype=FILTER)
@@ -213,11 +208,11 @@ class SensorFusion:
         if not (farthest < math.pi and sample.time <= now + TIME_TOLERANCE):
             health = memory.of(Sensor.ENCODERS).with_fault(SensorFault.IMPLAUSIBLE, now)
             return memory.noting(health)
-        if memory.joints_came < 0.0 or (memory.joints_stuck and sample.angles != memory.angles):
+        if memory.joints_came < 0.0:
             kernels.set_joints(memory.numbers, sample.angles)
-        elif not memory.joints_stuck:
+        else:
             kernels.read_joints(memory.numbers, self._law, sample.angles, now - sample.time)
-        return memory._replace(joints_came=now, angles=sample.angles)
+        return memory._replace(joints_came=now)
 
     def _take(self, memory: FusionMemory, sample: Aiding, now: float) -> FusionMemory:
         """Check a sample and let it wait for its time."""
@@ -236,6 +231,8 @@ class SensorFusion:
         memory = memory.noting(health)
         if fault:
             return memory
+        if isinstance(sample, GnssSample):
+            memory = memory._replace(gnss=sample)
         waiting = (*memory.waiting, Waiting(time, memory.arrivals, sample))
         if len(waiting) > 1 and waiting[-2].time > time:
             waiting = tuple(sorted(waiting))
@@ -308,7 +305,9 @@ class SensorFusion:
         ratio = self._fuse[type(sample)](memory, sample)
         fused = health.fused or (now,) * len(ratio)
         fused = tuple([now if r <= 1.0 else before for r, before in zip(ratio, fused, strict=True)])
-        health = health._replace(ratio=ratio, fused=fused)
+        innovation = memory.numbers["innovation"][0].ravel().tolist()
+        shown = tuple(innovation if len(ratio) > 1 else innovation[:1])
+        health = health._replace(ratio=ratio, fused=fused, innovation=shown)
         if max(ratio) > 1.0:
             health = health.with_fault(SensorFault.JUMP, now)
         counted = sample.reset_counter if isinstance(sample, PoseSample) else memory.reset_counter

@@ -19,9 +19,9 @@ from fsw.control.cascade import (
 )
 from fsw.control.safety_filter import NO_ZONES, moving_zones
 from fsw.control.safety_gate import gate
-from fsw.estimation.dead_reckoning import moved_on
 from fsw.estimation.estimator import estimate_state
 from fsw.flight.commander import Commander, acknowledgement
+from fsw.flight.exact_state import ExactState
 from fsw.flight.failsafe import FAULTS, Condition
 from fsw.flight.modes.mission import with_update
 from fsw.flight.modes.offboard import accept_setpoints, report
@@ -91,6 +91,7 @@ class Autopilot:
             config.airframe, config.tuning, config.inner, tick, keep_clear(config)
         )
         self._sensed = SensedState(config.estimator, self._cascade)
+        self._exact = ExactState(self._cascade)
         self._zones: tuple[SafeSet, EndEffectorTarget | None, Array] = (SafeSet(), None, NO_ZONES)
         self._ticks_per_plan = config.mpc_period_us // config.tick_period_us
 
@@ -102,6 +103,7 @@ class Autopilot:
         self._cascade.step(in_hover(self.config.airframe, estimate), estimate, nominal, REST_INPUT)
         self._safe_sets.warm_up(estimate)
         self._sensed.warm_up()
+        self._exact.warm_up(estimate, TickInputs(_STILL))
 
     def analyse(self, safe_set: SafeSet) -> tuple[Finding, ...]:
         """Findings on whether this configuration can keep a safe set."""
@@ -115,7 +117,7 @@ class Autopilot:
         if inputs.samples or fusion is not None:
             state, fusion, estimate = self._sensed.estimate(state, inputs, texts)
         else:
-            state, estimate = _estimate(state, inputs)
+            state, estimate = self._exact.estimate(state, inputs, texts)
         state = self._receive(state, inputs, texts)
         if estimate is None:
             return state, _blind(inputs, texts)
@@ -145,6 +147,7 @@ class Autopilot:
                 )
                 safety = replace(safety, replan=False) if safety.replan else safety
             state = self._report_slowly(state, estimate, now_us)
+            state = self._sensed.reported(state, fusion, estimate)
             safety = self._watch.breach(safety, estimate, state.constraints, flies=flown)
         sent, memory, replaced, (pushed, margin) = self._actuate(state, estimate, nominal, u, ticks)
         if pushed or safety.filter_us >= 0:
@@ -172,6 +175,9 @@ class Autopilot:
             state.arming_refusal,
             safety,
             fusion,
+            state.estimator,
+            state.aiding,
+            state.trust,
         )
         snapshot = _snapshot(state, estimate, u, inputs)
         return state, TickOutputs(
@@ -319,16 +325,6 @@ def keep_clear(config: FlightConfig) -> KeepClear:
     )
 
 
-def _estimate(state: FlightState, inputs: TickInputs) -> tuple[FlightState, StateEstimate | None]:
-    """The current estimate, or the last valid one; invalid ones are counted."""
-    valid = estimate_state(inputs.sensors)
-    if valid is None:
-        return replace(state, invalid_ticks=state.invalid_ticks + 1), state.estimate
-    if inputs.stale_us:
-        valid = moved_on(valid, 1e-6 * inputs.stale_us)
-    return (replace(state, invalid_ticks=0) if state.invalid_ticks else state), valid
-
-
 def _let_down(estimate: StateEstimate) -> Vec2:
     """Joint torques that let a folded arm hang without swinging through."""
     (rate1, rate2), (damping1, damping2) = estimate.qd_arm, _ARM_DAMPING
@@ -365,6 +361,7 @@ def _snapshot(
         goal.orbit if vehicle.mode is Mode.ORBIT and goal is not None else None,
         inputs.sensors.accel_B,
         state.safety.counters,
+        state.estimator,
     )
 
 
@@ -401,6 +398,7 @@ def _blind(inputs: TickInputs, texts: list[StatusText]) -> TickOutputs:
         plan_status=empty.plan.status,
         counters=empty.plan.counters,
         constraints=empty.constraints,
+        failures=(Condition.ESTIMATE_INVALID.value,),
     )
     acks = [
         acknowledgement(command, CommandResult.TEMPORARILY_REJECTED) for command in inputs.commands

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import TYPE_CHECKING, Final
 
+from fsw.estimation.sensor_fault import sentence
 from fsw.frozen import dataclass as value_dataclass
 from fsw.parameters.flight_config import FlightConfig, FlightLimits
 from fsw.signals import Charge, Mode, Severity, StateEstimate
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from fsw.flight.state import FlightState  # which keeps the active conditions
 
 PLAN_STALE_PERIODS: Final = 3
-INVALID_TICKS: Final = 5  # 10 ms without an estimate; a single lost frame is flown through
+INVALID_TICKS: Final = 5  # 10 ms without an estimate
 MIN_UP: Final = 0.34  # cosine of 70 degrees of tilt
 
 
@@ -31,6 +32,7 @@ class Action(Enum):
     WARN = "warn"
     REPLAN = "replanning"  # from the measurement, which the tick does by itself
     PUSH = "pushed off"  # by the safety filter, in every tick that needs it
+    DEAD_RECKON = "dead reckoning"  # which the estimator does by itself
     BRAKE = "brake"  # the tick does so whenever no plan is young enough
     HOLD = "holding"
     RETREAT = "retreating"  # off the zones that are too close, then hold
@@ -56,12 +58,17 @@ _MODES: Final = {
 class Condition(Enum):
     """Every condition, named for what the operator reads."""
 
-    ESTIMATE_INVALID = "state estimate invalid"
+    ATTITUDE_LOST = "attitude unknown"
     TILT_LOST = "tilt beyond recovery"
+    POSITION_LOST = "position unknown"
     BREACH = "outside the safe set"
+    POSITION_LOW = "position uncertain"
+    SENSOR_LOST = "sensor lost"
     TUBE_LEFT = "off the plan"
     FILTER_ACTIVE = "too fast towards a zone"
     PLAN_STALE = "no plan for three periods"
+    AIDING_LOST = "no position is measured"
+    ESTIMATE_INVALID = "state estimate invalid"
     OUTPUT_NOT_FINITE = "actuator command not finite"
     PLAN_REFUSED = "last plan refused"
     SETPOINTS_LOST = "offboard setpoints stopped"
@@ -166,15 +173,58 @@ def _on_breach(context: FailsafeContext) -> Action:
     return known.get(context.limits.breach_action, Action.WARN)
 
 
+def _is_unaided(context: FailsafeContext) -> bool:
+    aiding = context.state.aiding
+    return aiding.unaided_us >= context.limits.aiding_loss_us and context.state.vehicle.flies
+
+
+def _position_is_off(context: FailsafeContext, most: float) -> bool:
+    """Positions are missing, and the estimate has drifted by more than ``most`` [m] perhaps."""
+    return _is_unaided(context) and not context.state.aiding.position_sigma <= most
+
+
+def _sensor_is_lost(context: FailsafeContext) -> bool:
+    aiding, flies = context.state.aiding, context.state.vehicle.flies
+    lost_us = context.estimate.t_us - aiding.since_us
+    return aiding.sensor is not None and flies and lost_us >= context.limits.sensor_loss_us
+
+
+def _unless_landing(context: FailsafeContext, number: int) -> Action:
+    """1 warn, 2 hold, 5 land; a landing goes on."""
+    wanted = {2: Action.HOLD, 5: Action.LAND}.get(number, Action.WARN)
+    under_way = context.state.vehicle.mode in (Mode.LAND, wanted.mode)
+    return Action.WARN if under_way else wanted
+
+
+def _uncertain(context: FailsafeContext) -> str:
+    return f" by {1e3 * context.state.aiding.position_sigma:.0f} mm{_unaided(context)}"
+
+
+def _unaided(context: FailsafeContext) -> str:
+    aiding = context.state.aiding
+    return f": {sentence(aiding.pose, aiding.pose_fault)}, for {1e-6 * aiding.unaided_us:.2f} s"
+
+
+def _lost_sensor(context: FailsafeContext) -> str:
+    aiding = context.state.aiding
+    if aiding.sensor is None:
+        return ""
+    seconds = 1e-6 * (context.estimate.t_us - aiding.since_us)
+    return f": {sentence(aiding.sensor, aiding.fault)}, for {seconds:.2f} s"
+
+
 def _charge_left(context: FailsafeContext) -> str:
     return f": {100.0 * context.state.battery.remaining:.0f} % left"
 
 
 FAILSAFES: Final = (
     Failsafe(
-        Condition.ESTIMATE_INVALID,
-        lambda c: c.state.invalid_ticks >= INVALID_TICKS and c.state.vehicle.armed,
+        Condition.ATTITUDE_LOST,
+        lambda c: (
+            not c.state.aiding.attitude_sigma <= c.limits.attitude_loss and c.state.vehicle.flies
+        ),
         _always(Action.TERMINATE),
+        detail=_unaided,
         of_vehicle=True,
     ),
     Failsafe(
@@ -184,11 +234,35 @@ FAILSAFES: Final = (
         of_vehicle=True,
     ),
     Failsafe(
+        Condition.POSITION_LOST,
+        lambda c: _position_is_off(c, c.limits.position_lost),
+        lambda c: _unless_landing(c, 5),
+        Severity.CRITICAL,
+        _uncertain,
+        of_vehicle=True,
+    ),
+    Failsafe(
         Condition.BREACH,
         lambda c: c.state.safety.breach_us >= 0,
         _on_breach,
         Severity.CRITICAL,
         detail=lambda c: f" by {1e3 * c.state.safety.breach_by:.0f} mm",
+        of_vehicle=True,
+    ),
+    Failsafe(
+        Condition.POSITION_LOW,
+        lambda c: _position_is_off(c, c.limits.position_low),
+        lambda c: _unless_landing(c, c.limits.position_low_action),
+        Severity.CRITICAL,
+        _uncertain,
+        of_vehicle=True,
+    ),
+    Failsafe(
+        Condition.SENSOR_LOST,
+        _sensor_is_lost,
+        lambda c: _unless_landing(c, c.limits.sensor_loss_action),
+        Severity.CRITICAL,
+        _lost_sensor,
         of_vehicle=True,
     ),
     Failsafe(
@@ -210,6 +284,19 @@ FAILSAFES: Final = (
         Condition.PLAN_STALE,
         _plan_is_stale,
         _always(Action.BRAKE),
+        of_vehicle=True,
+    ),
+    Failsafe(
+        Condition.AIDING_LOST,
+        _is_unaided,
+        _always(Action.DEAD_RECKON),
+        detail=_unaided,
+        of_vehicle=True,
+    ),
+    Failsafe(
+        Condition.ESTIMATE_INVALID,
+        lambda c: c.state.invalid_ticks >= INVALID_TICKS,
+        _always(Action.WARN),
         of_vehicle=True,
     ),
     Failsafe(

@@ -2,20 +2,33 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 from fsw.control.cascade import Cascade, in_hover
-from fsw.estimation.error_state import Array
+from fsw.estimation import kernels
+from fsw.estimation.dead_reckoning import moved_on
+from fsw.estimation.error_state import IMU_CAPACITY, Array
 from fsw.estimation.sensor_fault import Sensor, SensorFault, sentence
-from fsw.estimation.sensor_fusion import FusionMemory, Reset, SensorFusion, at_start
+from fsw.estimation.sensor_fusion import EncoderWatch, FusionMemory, SensorFusion, at_start
 from fsw.estimation.tuning import EstimatorTuning
-from fsw.flight.state import FlightState
-from fsw.geometry.rotation import matrix_from_quaternion, wrap_angle, yaw_of
-from fsw.geometry.vectors import add_scaled, norm
+from fsw.flight.estimator_report import estimator_report, unaided
+from fsw.flight.jump import difference, jumped, told
+from fsw.flight.state import Aiding, FlightState
+from fsw.measurements import ImuSample, JointSample, Sample
 from fsw.model.airframe import AIRFRAME
-from fsw.signals import Severity, StateEstimate, StatusText, TickInputs
+from fsw.signals import EstimatorReport, Severity, StateEstimate, StatusText, TickInputs, Vec2
 
 _CHECKED_US = 100_000  # between checks for silent sensors
+_EVERY_TICK = (Sensor.IMU, Sensor.ENCODERS)
+_IMU_SILENT = 0.008  # s; longer than the filter takes for jitter
+_REPEATS = 6  # of encoders; a resting arm's 12 bits are the same for longer
+# rad/s^2 of each joint that torques should have made of it and did not. In flight 15 and 35 at
+# most while readings repeat; 50 and 70 within 10 ms of stuck encoders.
+_HELD = (35.0, 70.0)
+_LATELY = 0.02  # s, in which a fault is one of now
+_AWAY = 0.1  # s without a position, after which its return is a jump
+_TOLD = 0.02  # m, of a jump that the operator reads about
 _QUIET = 10.0  # s without a fault until the same one is reported again
 
 
@@ -45,23 +58,40 @@ class SensedState:
         pushed = (0.0, 0.0)
         if state.estimate is not None:
             pushed = self._cascade.joint_acceleration(state.cascade, state.estimate)
-        memory, estimate = self._fusion.step(before, inputs.samples, now, pushed)
-        if state.vehicle.flies:
-            asked = state.cascade.joints.reference
-            memory = self._fusion.watch_joints(memory, before, asked)
+        again = _last_reading_again(before, now, inputs.samples)
+        started, samples = _without_stuck(state, before, inputs.samples)
+        memory, estimate = self._fusion.step(started, (*samples, *again), now, pushed)
+        if again:
+            memory = memory._replace(imu_came=before.imu_came)
         if memory.health is not before.health:
             _report(before, memory, now, texts)
         if inputs.sensors.t_us // _CHECKED_US != state.t_us // _CHECKED_US:
             self._report_silence(memory, now, texts)
         if memory.reset.number != before.reset.number:
-            texts.append(StatusText(Severity.WARNING, _told(memory.reset)))
-            state = _jumped(state, memory.reset)
+            texts.append(StatusText(Severity.WARNING, told(memory.reset)))
+            state = jumped(state, memory.reset)
         if estimate is None:
             state = replace(state, fusion=memory, invalid_ticks=state.invalid_ticks + 1)
-            return state, memory, state.estimate
+            last = state.estimate
+            # Telemetry goes by its time, and goes on.
+            return state, memory, None if last is None else last._replace(t_us=inputs.sensors.t_us)
+        moved = memory.reset.number != before.reset.number
+        away = unaided(before, now) > _AWAY > unaided(memory, now)
+        if state.estimate is not None and away and not moved:
+            state = _returned(state, estimate, texts)
         if state.invalid_ticks:
             state = replace(state, invalid_ticks=0)
         return state, memory, estimate
+
+    def reported(
+        self, state: FlightState, memory: FusionMemory | None, estimate: StateEstimate
+    ) -> FlightState:
+        """The state with what the estimator says about itself now; nothing before it started."""
+        if memory is None or not memory.started:
+            return state
+        covariance = self._fusion.covariance(memory, memory.now)
+        report = estimator_report(memory, covariance, estimate, memory.now, self._stale)
+        return replace(state, estimator=report, aiding=_aiding(state, memory, report))
 
     def _report_silence(self, memory: FusionMemory, now: float, texts: list[StatusText]) -> None:
         """Report sensors that have been silent for too long since the last check."""
@@ -84,19 +114,102 @@ def _report(
             texts.append(StatusText(Severity.WARNING, sentence(new.sensor, new.fault)))
 
 
-def _told(reset: Reset) -> str:
-    yaw = yaw_of(matrix_from_quaternion(reset.turn))
-    place = 1e3 * norm(reset.position)
-    return f"estimate moved by {place:.0f} mm, {abs(yaw):.3f} rad: the plan moves along"
+def _returned(state: FlightState, estimate: StateEstimate, texts: list[StatusText]) -> FlightState:
+    """The state when positions are there again: the plan moves along with the estimate."""
+    last = state.estimate
+    assert last is not None
+    expected = moved_on(last, 1e-6 * (estimate.t_us - last.t_us))
+    reset = difference(estimate, expected)
+    if max(map(abs, reset.position)) > _TOLD:
+        texts.append(StatusText(Severity.WARNING, told(reset)))
+    return jumped(state, reset)
 
 
-def _jumped(state: FlightState, reset: Reset) -> FlightState:
-    """The plan and the observer's velocity moved along with the estimate."""
-    nominal, yaw = state.nominal, yaw_of(matrix_from_quaternion(reset.turn))
-    if nominal is not None:
-        nominal = nominal._replace(
-            p=add_scaled(nominal.p, reset.position, 1.0), yaw=wrap_angle(nominal.yaw + yaw)
-        )
-    observed = state.cascade.observed
-    observed = observed._replace(v=add_scaled(observed.v, reset.velocity, 1.0))
-    return replace(state, nominal=nominal, cascade=state.cascade._replace(observed=observed))
+def _last_reading_again(
+    memory: FusionMemory, now: float, samples: tuple[Sample, ...]
+) -> tuple[Sample, ...]:
+    """The last reading of an IMU that is silent; nothing while it is not.
+
+    The filter goes from one reading to the next, and knows what to do about one that repeats.
+    """
+    silent = 0.0 <= memory.imu_came < now - _IMU_SILENT
+    if not silent or any(isinstance(one, ImuSample) for one in samples):
+        return ()
+    x = memory.numbers
+    row = x["imu"][0][(int(x["end"][0]) - 1) % IMU_CAPACITY].tolist()
+    return (ImuSample(now, (row[1], row[2], row[3]), (row[4], row[5], row[6])),)
+
+
+def _without_stuck(
+    state: FlightState, memory: FusionMemory, samples: tuple[Sample, ...]
+) -> tuple[FusionMemory, tuple[Sample, ...]]:
+    """The samples without those of encoders that are stuck: joints then follow from torques."""
+    before = watch = memory.encoders
+    for one in samples:
+        if isinstance(one, JointSample):
+            watch = _watched(watch, memory, one.angles, flies=state.vehicle.flies)
+            if watch.stuck and not before.stuck:
+                memory = _at_rest(memory, one.angles)
+    if watch is not before:
+        memory = memory._replace(encoders=watch)
+    if watch.stuck:
+        samples = tuple([one for one in samples if not isinstance(one, JointSample)])
+    return memory, samples
+
+
+def _watched(
+    watch: EncoderWatch, memory: FusionMemory, angles: Vec2, *, flies: bool
+) -> EncoderWatch:
+    """Encoders are stuck when they say the same while torques should have moved the joints.
+
+    What of the acceleration does not show, the filter takes for a disturbance.
+    """
+    if angles != watch.angles or not flies:
+        return EncoderWatch(angles)
+    repeats, stuck = watch.repeats + 1, watch.stuck
+    if repeats >= _REPEATS and not stuck:
+        first, second = memory.numbers["joints"][0][:, 2].tolist()
+        stuck = abs(first) > _HELD[0] or abs(second) > _HELD[1]
+    return EncoderWatch(angles, repeats, stuck)
+
+
+def _at_rest(memory: FusionMemory, angles: Vec2) -> FusionMemory:
+    """The memory with an arm that stands still at ``angles`` [rad], which nothing disturbs."""
+    numbers = memory.numbers.copy()
+    kernels.set_joints(numbers, angles)
+    return memory._replace(numbers=numbers)
+
+
+def _aiding(state: FlightState, memory: FusionMemory, report: EstimatorReport) -> Aiding:
+    """What is missing, as failsafes look at it."""
+    before, now = state.aiding, memory.now
+    aid = memory.of(Sensor.POSE)
+    if aid.came < 0.0:
+        aid = memory.of(Sensor.GNSS)
+    sensor, fault = _lost(memory)
+    P = report.pose_covariance
+    since_us = before.since_us if sensor is before.sensor else report.t_us
+    return Aiding(
+        unaided_us=max(report.unaided_us, 0),
+        pose=aid.sensor,
+        pose_fault=aid.fault if now - aid.fault_at < _LATELY else SensorFault.STALE,
+        position_sigma=math.sqrt(max(P[0], P[6], P[11])),
+        attitude_sigma=math.sqrt(max(P[15], P[18])),
+        sensor=sensor,
+        fault=fault,
+        since_us=since_us,
+    )
+
+
+def _lost(memory: FusionMemory) -> tuple[Sensor | None, SensorFault]:
+    """A sensor that every tick needs and that is of no use now."""
+    now = memory.now
+    if memory.encoders.stuck:
+        return Sensor.ENCODERS, SensorFault.STUCK
+    for sensor in _EVERY_TICK:
+        if now - memory.came(sensor) > _LATELY:
+            return sensor, SensorFault.STALE
+        health = memory.of(sensor)
+        if now - health.fault_at < _LATELY and health.fault is not SensorFault.REPEATED:
+            return sensor, health.fault
+    return None, SensorFault.NONE

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import field
+from typing import Final, NamedTuple
 
 from fsw.control.cascade import CascadeMemory
 from fsw.control.tracking import Observed
+from fsw.estimation.frame_trust import FrameTrust
+from fsw.estimation.sensor_fault import Sensor, SensorFault
 from fsw.estimation.sensor_fusion import FusionMemory
 from fsw.flight.command_dedup import AnsweredCommand
 from fsw.flight.failsafe import Condition
@@ -20,6 +23,7 @@ from fsw.signals import (
     BatteryState,
     ConstraintReport,
     EndEffectorTarget,
+    EstimatorReport,
     Home,
     JointSetpoint,
     MessageSource,
@@ -157,6 +161,22 @@ class SafetyMemory:
     counters: SafetyCounters = field(default_factory=SafetyCounters)
 
 
+class Aiding(NamedTuple):
+    """What keeps the estimate from drifting, and what of it is missing."""
+
+    unaided_us: int = 0  # since a position was used last
+    pose: Sensor = Sensor.POSE  # that gives positions
+    pose_fault: SensorFault = SensorFault.STALE
+    position_sigma: float = 0.0  # m, of the worst axis
+    attitude_sigma: float = 0.0  # rad, of roll and pitch
+    sensor: Sensor | None = None  # another one that is of no use
+    fault: SensorFault = SensorFault.NONE  # of that
+    since_us: int = 0
+
+
+AIDED: Final = Aiding()
+
+
 @dataclass(frozen=True, slots=True)
 class FlightState:
     """Everything a tick starts from; the upper half changes every tick, the lower rarely."""
@@ -185,3 +205,6 @@ class FlightState:
     arming_refusal: str = ""
     safety: SafetyMemory = field(default_factory=SafetyMemory)
     fusion: FusionMemory | None = None  # where sensors have times of their own
+    estimator: EstimatorReport | None = None  # what telemetry says of it, once a planning period
+    aiding: Aiding = AIDED
+    trust: FrameTrust = FrameTrust()  # where states are exact

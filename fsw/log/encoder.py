@@ -14,6 +14,7 @@ from operator import attrgetter
 from struct import Struct
 from typing import Any, Final
 
+from fsw.estimation.sensor_fault import Sensor
 from fsw.geometry.rotation import quaternion_from_matrix
 from fsw.log import samples, topics
 from fsw.log.json_codec import JsonCodec
@@ -21,6 +22,7 @@ from fsw.model.kinematics import point_in_flight
 from fsw.ports import GroupTiming
 from fsw.signals import (
     CommandRequest,
+    EstimatorReport,
     FlightSnapshot,
     Mode,
     PlanRequest,
@@ -101,6 +103,9 @@ _ASKED: Final = _Packed(topics.VEHICLE_COMMAND)
 _ANSWERED: Final = _Packed(topics.VEHICLE_COMMAND_ACK)
 _INPUT: Final = _Packed(topics.TICK_INPUT)
 _TIMING: Final = _Packed(topics.LOOP_TIMING)
+_ESTIMATOR: Final = _Packed(
+    topics.ESTIMATOR_STATUS, topics.ESTIMATOR_INNOVATIONS, topics.ESTIMATOR_SENSOR_BIAS
+)
 
 
 class LogEncoder:
@@ -223,7 +228,9 @@ class LogEncoder:
             if target is None
             else (*target.p_WE, *target.v_WE, target.yaw)
         )
-        return _PLANNING.pack(
+        known = snapshot.estimator
+        rest = b"" if known is None else _estimator(t_us, known)
+        return rest + _PLANNING.pack(
             (
                 *(_BARRIER, t_us, *_filled(margins), *_filled(barrier), least),
                 *(int(report.kind), len(margins), argmin),
@@ -284,6 +291,32 @@ def _status(snapshot: FlightSnapshot) -> bytes:
             *(head, snapshot.t_us, 2 if snapshot.armed else 1, NAV_STATES.get(mode.value, _LOITER)),
             *(bool(snapshot.failures), mode.value.encode(), ",".join(snapshot.failures).encode()),
             *(landing, snapshot.t_us, snapshot.landed),
+        )
+    )
+
+
+def _estimator(t_us: int, known: EstimatorReport) -> bytes:
+    status, innovations, bias = _ESTIMATOR.heads
+    ratios, variance, motion = known.ratios, known.pose_covariance, known.velocity_covariance
+    accuracy = (
+        math.sqrt(max(motion[0], motion[6], motion[11])),
+        math.sqrt(max(variance[15], variance[18])),
+    )
+    faults = ", ".join([f"{one.name}: {one.fault}" for one in known.sensors if one.fault])
+    pose = known.innovation(Sensor.POSE.value, 6)
+    fix = known.innovation(Sensor.GNSS.value, 6)
+    return _ESTIMATOR.pack(
+        (
+            *(status, t_us, known.level_accuracy, known.vertical_accuracy),
+            *(ratios.heading, ratios.velocity, ratios.place, ratios.height, ratios.above_ground),
+            *(*accuracy, math.nan if known.unaided_us < 0 else 1e-6 * known.unaided_us),
+            *(known.pose_delay, known.resets & _U32, known.flags, faults.encode()),
+            *(innovations, t_us, *fix[3:], *fix[:3], *pose),
+            *known.innovation(Sensor.BAROMETER.value, 1),
+            *known.innovation(Sensor.RANGEFINDER.value, 1),
+            *known.innovation(Sensor.MAGNETOMETER.value, 1),
+            *(bias, t_us, *known.gyro_bias, *known.gyro_bias_variance),
+            *(*known.accel_bias, *known.accel_bias_variance),
         )
     )
 

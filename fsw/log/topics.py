@@ -332,6 +332,52 @@ OF_SAMPLES: Final[dict[type[Sample], Topic]] = {
     RangeSample: DISTANCE_SENSOR,
     JointSample: JOINT_ENCODERS,
 }
+_ESTIMATED: Final = "every planning cycle; none with exact sensors"
+ESTIMATOR_STATUS: Final = Topic(
+    "estimator_status",
+    "Accuracy, and innovations over their limits",
+    _ESTIMATED,
+    (
+        *_floats("pos_horiz_accuracy", "pos_vert_accuracy", note="m, standard deviation"),
+        *_floats("hdg_test_ratio", "vel_test_ratio", "pos_test_ratio", note="1: refused"),
+        *_floats("hgt_test_ratio", "hagl_test_ratio", note="1: refused"),
+        *_floats("vel_accuracy", note="m/s, standard deviation, largest axis"),
+        *_floats("tilt_accuracy", note="rad, standard deviation, the larger of roll and pitch"),
+        *_floats("unaided", note="s since a position was used last"),
+        *_floats("pose_delay", note="s"),
+        Field("reset_count", "uint32_t", note="jumps of the estimate"),
+        Field("solution_status_flags", "uint16_t", note="ESTIMATOR_STATUS_FLAGS"),
+        Field("faults", "char", 96, "sensors with something wrong, and what"),
+    ),
+)
+ESTIMATOR_INNOVATIONS: Final = Topic(
+    "estimator_innovations",
+    "Measured minus expected, of the last reading of each sensor; NaN: none",
+    _ESTIMATED,
+    (
+        _vector("gps_hvel", 2, "m/s"),
+        *_floats("gps_vvel", note="m/s"),
+        _vector("gps_hpos", 2, "m"),
+        *_floats("gps_vpos", note="m"),
+        _vector("ev_hpos", 2, "m"),
+        *_floats("ev_vpos", note="m"),
+        _vector("ev_attitude", 3, "rad, body"),
+        *_floats("baro_vpos", note="m"),
+        *_floats("rng_vpos", note="m"),
+        *_floats("heading", note="rad, of the magnetometer"),
+    ),
+)
+ESTIMATOR_SENSOR_BIAS: Final = Topic(
+    "estimator_sensor_bias",
+    "Biases of the inertial unit",
+    _ESTIMATED,
+    (
+        _vector("gyro_bias", 3, "rad/s, body"),
+        _vector("gyro_bias_variance", 3, "rad^2/s^2"),
+        _vector("accel_bias", 3, "m/s^2, body"),
+        _vector("accel_bias_variance", 3, "m^2/s^4"),
+    ),
+)
 TOPICS: Final = (
     SENSOR_FRAME,
     TICK_INPUT,
@@ -354,5 +400,8 @@ TOPICS: Final = (
     MPC_STATUS,
     LOOP_TIMING,
     *OF_SAMPLES.values(),
+    ESTIMATOR_STATUS,
+    ESTIMATOR_INNOVATIONS,
+    ESTIMATOR_SENSOR_BIAS,
 )
 """Everything the flight software writes; a topic's place is its number in the file."""

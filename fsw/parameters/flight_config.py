@@ -57,6 +57,16 @@ class FlightLimits:
     breach_action: int = 6  # of the safe set: 1 warn, 2 hold, 5 land, 6 retreat and hold
     owner_timeout_us: int = 10_000_000  # a silent owner may be replaced on the ground
     zone_timeout_us: int = 3_000_000  # a moving zone that is not announced for this long stands
+    # Loss of sensors. Hidden markers, 0.2 s, are none; a drift by a tenth of a metre is.
+    aiding_loss_us: int = 250_000  # without a position that the estimate could use
+    position_low: float = 0.1  # m, standard deviation in dead reckoning that is acted upon
+    position_low_action: int = 2  # how: 1 warn, 2 hold, 5 land
+    position_lost: float = 0.5  # m, the same: land
+    # rad, standard deviation of roll and pitch that ends the flight: there is no way back from it,
+    # and a pose that is hidden for 0.2 s while the IMU is frozen as well (0.37) comes back.
+    attitude_loss: float = 0.7
+    sensor_loss_us: int = 50_000  # without a use of the inertial unit, or of the encoders
+    sensor_loss_action: int = 2  # what then: 1 warn, 2 hold, 5 land
 
 
 @dataclass(frozen=True, slots=True)

@@ -89,10 +89,11 @@ def test_one_tick_of_nonsense_does_not_leave_the_vehicle_in_open_loop() -> None:
 def test_what_ended_the_flight_stays_on_show() -> None:
     def blinded(frame: SensorFrame) -> SensorFrame:
         late = frame.t_us >= 1_400_000
-        return replace(frame, p_WB=(math.nan, 0.0, 0.0)) if late else frame
+        lost = replace(frame, p_WB=(math.nan, 0.0, 0.0), gyro_B=(math.nan, 0.0, 0.0))
+        return lost if late else frame
 
     flight = Flight(hover(), spoil=blinded)
     flight.step(command(ARM, 1.0))
-    flight.run(0.6)
+    flight.run(1.15)
     assert flight.mode is Mode.FAULT
     assert flight.snapshot.failures

@@ -103,20 +103,31 @@ def lost_between(first: int, last: int) -> Callable[[SensorFrame], SensorFrame]:
     return spoil
 
 
-def test_an_estimate_lost_for_ten_milliseconds_ends_the_flight_for_good() -> None:
-    flight = Flight(load_scenario("workspace"), spoil=lost_between(300, 330))
+def all_lost_between(first: int, last: int) -> Callable[[SensorFrame], SensorFrame]:
+    """No reading is a number in steps first..last."""
+    nothing = (math.nan, math.nan, math.nan)
+
+    def spoil(frame: SensorFrame) -> SensorFrame:
+        step = (frame.t_us - START_US) // STEP_US
+        lost = replace(frame, p_WB=nothing, gyro_B=nothing, qd_arm=(math.nan, 0.0))
+        return lost if first <= step <= last else frame
+
+    return spoil
+
+
+def test_an_attitude_that_is_unknown_for_long_ends_the_flight_for_good() -> None:
+    flight = Flight(load_scenario("workspace"), spoil=all_lost_between(300, 1000))
     flight.follow()
-    for step in range(2, 400):
+    for step in range(2, 720):
         outputs = flight.step()
-        if step < 304:
-            assert flight.mode is Mode.TRAJECTORY
+        if step < 500:
             assert sum(outputs.actuators.rotor_thrust) > 10.0
-        else:
+        elif step > 660:
             assert flight.mode is Mode.FAULT
             assert outputs.actuators.rotor_thrust == (0.0, 0.0, 0.0, 0.0)
             assert outputs.actuators.joint_torque == (0.0, 0.0)
             assert not outputs.snapshot.armed
-    assert any(Condition.ESTIMATE_INVALID.value in text for text in flight.texts)
+    assert any(Condition.ATTITUDE_LOST.value in text for text in flight.texts)
     flight.step(command(ARM, 1.0))
     assert flight.mode is Mode.FAULT
 

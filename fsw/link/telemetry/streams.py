@@ -83,6 +83,8 @@ STREAMS: Final = (
         Stream(message_ids.LOOP_TIMING, 1, 1, PANDION, encode_dialect.loop_timing(group))
         for group in range(4)
     ),
+    # Behind the others, whose places decide when each is sent.
+    Stream(message_ids.GPS_RAW_INT, 1, 5, AUTOPILOT, encode_place.gps_raw),
 )
 
 # These leave at once when mode, arming, landing or health change.

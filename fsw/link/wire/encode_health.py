@@ -25,6 +25,11 @@ _SUSPECT: Final[dict[str, int]] = {
     Condition.PLAN_STALE.value: _POSITION | _HEIGHT,
     Condition.OUTPUT_NOT_FINITE.value: _MOTORS,
     Condition.ESTIMATE_INVALID.value: _SENSING,
+    Condition.ATTITUDE_LOST.value: _ATTITUDE | _RATE_CONTROL | _AHRS,
+    Condition.POSITION_LOST.value: _PLACE | _EXTERNAL_POSE | _POSITION | _HEIGHT,
+    Condition.POSITION_LOW.value: _PLACE | _EXTERNAL_POSE,
+    Condition.AIDING_LOST.value: _EXTERNAL_POSE,
+    Condition.SENSOR_LOST.value: _GYRO | _ACCELEROMETER,
     Condition.TILT_LOST.value: _ATTITUDE | _RATE_CONTROL,
 }
 # MAV_BATTERY_CHARGE_STATE: 0 is undefined, OK is 1.
@@ -92,9 +97,27 @@ def battery_status(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues:
 
 
 def estimator_status(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues:
-    """ESTIMATOR_STATUS: what is known. There is no filter, hence no innovation to report."""
-    invalid = Condition.ESTIMATE_INVALID.value in snapshot.failures
-    return (snapshot.t_us, *(math.nan,) * 8, 0 if invalid else _ESTIMATED)
+    """ESTIMATOR_STATUS: test ratios of the last readings, accuracy, and what is known.
+
+    With exact states there is no filter, hence no innovation to report.
+    """
+    known = snapshot.estimator
+    if known is None:
+        invalid = Condition.ESTIMATE_INVALID.value in snapshot.failures
+        return (snapshot.t_us, *(math.nan,) * 8, 0 if invalid else _ESTIMATED)
+    ratios = known.ratios
+    return (
+        known.t_us,
+        ratios.velocity,
+        ratios.place,
+        ratios.height,
+        ratios.heading,
+        ratios.above_ground,
+        math.nan,
+        known.level_accuracy,
+        known.vertical_accuracy,
+        known.flags,
+    )
 
 
 def vibration(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues:

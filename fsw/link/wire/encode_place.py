@@ -18,8 +18,12 @@ from fsw.signals import FlightSnapshot, Vec3
 _LOCAL_NED: Final = 1  # MAV_FRAME
 _BODY_FRD: Final = 12  # MAV_FRAME
 _MOCAP: Final = 4  # MAV_ESTIMATOR_TYPE
-_COVARIANCE_UNKNOWN: Final = (math.nan, *(0.0,) * 20)
+_COVARIANCE_UNKNOWN: Final[tuple[float, ...]] = (math.nan, *(0.0,) * 20)
 _I16: Final = 32767
+_AUTOPILOT: Final = 8  # MAV_ESTIMATOR_TYPE
+_FIX_3D, _RTK_FIXED = 3, 6  # GPS_FIX_TYPE
+_RTK_SIGMA: Final = 0.05  # m; a receiver without corrections does not promise it
+_UNKNOWN_U8, _UNKNOWN_U16, _U32 = 0xFF, 0xFFFF, 0xFFFFFFFF
 
 
 def global_position(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues:
@@ -68,7 +72,15 @@ def vfr_hud(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues:
 
 
 def odometry(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues:
-    """ODOMETRY: pose in local NED, velocity in the body; accuracy is not known."""
+    """ODOMETRY: pose in local NED, velocity in the body; exact states have no covariance.
+
+    Of the covariance, errors of the attitude are about the body's axes.
+    """
+    known = snapshot.estimator
+    pose, motion, resets, kind = _COVARIANCE_UNKNOWN, _COVARIANCE_UNKNOWN, 0, _MOCAP
+    if known is not None:
+        pose, motion = known.pose_covariance, known.velocity_covariance
+        resets, kind = known.resets & 0xFF, _AUTOPILOT
     estimate = snapshot.estimate
     r, v = estimate.R_WB, estimate.v_WB
     v_B = tuple(r[i] * v[0] + r[i + 3] * v[1] + r[i + 6] * v[2] for i in range(3))
@@ -78,12 +90,42 @@ def odometry(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues:
         *quaternion_from_matrix(r),
         *v_B,
         *estimate.w_WB_B,
-        *_COVARIANCE_UNKNOWN,
-        *_COVARIANCE_UNKNOWN,
+        *pose,
+        *motion,
         _LOCAL_NED,
         _BODY_FRD,
+        resets,
+        kind,
         0,
-        _MOCAP,
+    )
+
+
+def gps_raw(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues | None:
+    """GPS_RAW_INT: what the receiver said last; nothing where there is none."""
+    known = snapshot.estimator
+    fix = None if known is None else known.fix
+    if fix is None:
+        return None
+    latitude, longitude, altitude = _scaled(to_global(context.origin, fix.p))
+    north, east, _ = fix.v
+    level = max(fix.position_sigma[0], fix.position_sigma[1])
+    down = fix.position_sigma[2]
+    return (
+        fix.t_us,
+        latitude,
+        longitude,
+        altitude,
+        _UNKNOWN_U16,  # dilution of precision
+        _UNKNOWN_U16,
+        _at_most(100.0 * math.hypot(north, east), _UNKNOWN_U16 - 1),
+        round(100.0 * _degrees(math.atan2(east, north))) % 36000,
+        _RTK_FIXED if level < _RTK_SIGMA else _FIX_3D,
+        _UNKNOWN_U8,  # satellites
+        altitude,
+        _at_most(1e3 * level, _U32),
+        _at_most(1e3 * down, _U32),
+        _at_most(1e3 * fix.velocity_sigma, _U32),
+        0,  # heading
         0,
     )
 
@@ -100,6 +142,11 @@ def _above_home(snapshot: FlightSnapshot) -> float:
 
 def _degrees(yaw: float) -> float:
     return math.degrees(yaw) % 360.0
+
+
+def _at_most(value: float, most: int) -> int:
+    """A rounded number within a field; 0, which is unknown, for what is none."""
+    return min(round(value), most) if math.isfinite(value) else 0
 
 
 def _int16(value: float) -> int:

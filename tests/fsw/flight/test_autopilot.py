@@ -80,10 +80,11 @@ def test_before_the_first_estimate_nothing_moves_and_commands_are_put_off() -> N
 def test_an_invalid_frame_leaves_the_last_estimate_and_is_counted() -> None:
     state, _ = tick(FlightState(), 100_000)
     seen = state.estimate
+    assert seen is not None
     blind = frame(102_000, q_WB=(0.0, 0.0, 0.0, math.nan))
     for count in (1, 2, 3):
         state, _ = tick(state, 102_000, sensors=blind)
-        assert (state.invalid_ticks, state.estimate) == (count, seen)
+        assert (state.invalid_ticks, state.estimate) == (count, seen._replace(t_us=102_000))
     state, _ = tick(state, 104_000)
     assert state.invalid_ticks == 0
 

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from fsw.estimation.sensor_fault import Sensor, SensorFault
 from fsw.flight.failsafe import (
     FAILSAFES,
     FAULTS,
@@ -21,6 +22,8 @@ from fsw.flight.failsafe import (
     report,
 )
 from fsw.flight.state import (
+    AIDED,
+    Aiding,
     FlightState,
     MissionMemory,
     OffboardMemory,
@@ -55,6 +58,7 @@ class Evidence:
     battery: BatteryState = field(default_factory=BatteryState)
     silent_zones: int = 0
     safety: SafetyMemory = field(default_factory=SafetyMemory)
+    aiding: Aiding = AIDED
     config: FlightConfig = CONFIG
 
     def context(self) -> FailsafeContext:
@@ -68,6 +72,7 @@ class Evidence:
             battery=self.battery,
             mission=MissionMemory(silent_zones=self.silent_zones),
             safety=self.safety,
+            aiding=self.aiding,
         )
         level = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, self.up)
         estimate = random_estimate(np.random.default_rng(1))._replace(t_us=NOW_US, R_WB=level)
@@ -77,6 +82,14 @@ class Evidence:
 FINE = Evidence()
 OUTSIDE = SafetyMemory(breach_us=NOW_US, breach_by=0.0123)
 OFF_PLAN = SafetyMemory(off_plan_us=NOW_US, off_plan_by=0.0834)
+UNAIDED = Aiding(1_500_000, Sensor.POSE, SensorFault.STUCK)
+
+
+def replaced_sensor(for_us: int) -> Aiding:
+    """Something stands in for the IMU."""
+    return Aiding(sensor=Sensor.IMU, fault=SensorFault.STUCK, since_us=NOW_US - for_us)
+
+
 OFFBOARD = replace(FINE, mode=Mode.OFFBOARD, setpoint_age_us=500_000)
 
 
@@ -97,9 +110,9 @@ def test_every_condition_has_one_row() -> None:
     assert [row.condition for row in FAILSAFES] == list(Condition)
 
 
-def test_without_attitude_or_estimate_the_flight_is_ended_and_only_then() -> None:
+def test_without_attitude_the_flight_is_ended_and_only_then() -> None:
     ending = {row.condition for row in FAILSAFES if row.action(FINE.context()) is Action.TERMINATE}
-    assert ending == {Condition.ESTIMATE_INVALID, Condition.TILT_LOST}
+    assert ending == {Condition.ATTITUDE_LOST, Condition.TILT_LOST}
 
 
 def test_nothing_wrong_is_no_condition() -> None:
@@ -110,6 +123,11 @@ def test_nothing_wrong_is_no_condition() -> None:
     ("evidence", "condition"),
     [
         (replace(FINE, invalid_ticks=5), Condition.ESTIMATE_INVALID),
+        (replace(FINE, mode=Mode.DISARMED, invalid_ticks=5), Condition.ESTIMATE_INVALID),
+        (replace(FINE, aiding=Aiding(attitude_sigma=0.71)), Condition.ATTITUDE_LOST),
+        (replace(FINE, aiding=Aiding(attitude_sigma=math.nan)), Condition.ATTITUDE_LOST),
+        (replace(FINE, aiding=Aiding(250_000)), Condition.AIDING_LOST),
+        (replace(FINE, aiding=replaced_sensor(50_000)), Condition.SENSOR_LOST),
         (replace(FINE, up=MIN_UP), Condition.TILT_LOST),
         (replace(FINE, up=0.339), Condition.TILT_LOST),
         (replace(FINE, up=-1.0), Condition.TILT_LOST),
@@ -139,7 +157,10 @@ def test_each_evidence_is_its_condition(evidence: Evidence, condition: Condition
         replace(FINE, plan_age_us=3 * PERIOD_US),
         replace(FINE, landed=True, up=-1.0),  # carried about upside down
         replace(FINE, landed=True, plan_age_us=10**9),
-        replace(FINE, mode=Mode.DISARMED, landed=True, invalid_ticks=1000),  # sensors not yet on
+        replace(FINE, aiding=Aiding(unaided_us=249_999, position_sigma=9.0)),
+        replace(FINE, aiding=Aiding(position_sigma=9.0)),  # it was never known better
+        replace(FINE, aiding=replaced_sensor(49_999)),
+        replace(FINE, landed=True, aiding=Aiding(10**6, attitude_sigma=9.0, position_sigma=9.0)),
         replace(OFFBOARD, setpoint_age_us=499_999),
         replace(FINE, gcs_silent_us=9_999_999),
         replace(FINE, gcs_silent_us=-1),  # there never was one
@@ -249,6 +270,61 @@ def test_a_report_names_the_condition_its_number_and_what_is_done() -> None:
     (row,) = active(over)
     severity, text = report(row, over, Action.TERMINATE)
     assert (severity, text) == (Severity.EMERGENCY, "tilt beyond recovery: terminate")
+
+
+def lost_rows(evidence: Evidence) -> dict[Condition, Action]:
+    context = evidence.context()
+    return {row.condition: row.action(context) for row in active(context)}
+
+
+@pytest.mark.parametrize(
+    ("sigma", "expected"),
+    [
+        (0.1, {}),
+        (0.11, {Condition.POSITION_LOW: Action.HOLD}),
+        (0.51, {Condition.POSITION_LOST: Action.LAND, Condition.POSITION_LOW: Action.HOLD}),
+        (math.nan, {Condition.POSITION_LOST: Action.LAND, Condition.POSITION_LOW: Action.HOLD}),
+    ],
+)
+def test_in_dead_reckoning_it_holds_and_then_lands(
+    sigma: float, expected: dict[Condition, Action]
+) -> None:
+    trajectory = replace(FINE, mode=Mode.TRAJECTORY)
+    adrift = replace(trajectory, aiding=UNAIDED._replace(position_sigma=sigma))
+    assert lost_rows(adrift) == {**expected, Condition.AIDING_LOST: Action.DEAD_RECKON}
+    landing = lost_rows(replace(adrift, mode=Mode.LAND))
+    assert set(landing.values()) <= {Action.WARN, Action.DEAD_RECKON}, "it lands already"
+
+
+@pytest.mark.parametrize(
+    ("number", "expected"), [(1, Action.WARN), (2, Action.HOLD), (5, Action.LAND)]
+)
+def test_lost_sensors_are_acted_on_as_the_parameters_say(number: int, expected: Action) -> None:
+    limits = FlightLimits(position_low_action=number, sensor_loss_action=number)
+    fine = replace(FINE, mode=Mode.TRAJECTORY, limits=limits)
+    adrift = lost_rows(replace(fine, aiding=UNAIDED._replace(position_sigma=0.2)))
+    assert adrift[Condition.POSITION_LOW] is expected
+    assert action(replace(fine, aiding=replaced_sensor(60_000))) is expected
+
+
+def test_a_text_names_the_sensor_and_since_when() -> None:
+    for aiding, words in (
+        (
+            UNAIDED,
+            "no position is measured: pose is stuck at one reading, for 1.50 s: dead reckoning",
+        ),
+        (
+            replaced_sensor(60_000),
+            "failsafe: sensor lost: IMU is stuck at one reading, for 0.06 s, holding",
+        ),
+        (
+            Aiding(400_000, Sensor.POSE, SensorFault.NOT_FINITE, attitude_sigma=0.8),
+            "attitude unknown: pose says what is not a number, for 0.40 s: terminate",
+        ),
+    ):
+        context = replace(FINE, mode=Mode.TRAJECTORY, aiding=aiding).context()
+        row = active(context)[0]
+        assert report(row, context, row.action(context))[1] == words
 
 
 def test_a_fault_is_the_vehicles_own() -> None:

@@ -13,6 +13,7 @@ from fsw.signals import (
     ConstraintKind,
     ConstraintReport,
     EndEffectorTarget,
+    EstimatorReport,
     FlightSnapshot,
     Home,
     MissionProgress,
@@ -26,8 +27,11 @@ from fsw.signals import (
     PlanTimings,
     PredictionState,
     SafetyCounters,
+    SatelliteFix,
+    SensorReport,
     SolverStatus,
     StateEstimate,
+    TestRatios,
     TickOutputs,
 )
 
@@ -72,6 +76,22 @@ PLAN = Plan(
     solver_iterations=19,
     timings=PlanTimings(linearise_us=101.0, solve_us=502.0, total_us=703.0),
 )  # fmt: skip
+REPORT = EstimatorReport(
+    t_us=3_003_000,
+    pose_covariance=tuple(1e-4 * k for k in range(1, 22)),
+    velocity_covariance=tuple(1e-3 * k for k in range(1, 22)),
+    accel_bias=(0.01, 0.02, 0.03),
+    gyro_bias=(0.001, 0.002, 0.003),
+    accel_bias_variance=(1e-4, 2e-4, 3e-4),
+    gyro_bias_variance=(1e-6, 2e-6, 3e-6),
+    pose_delay=0.015,
+    sensors=(SensorReport("IMU", 0), SensorReport("GNSS", 90_000, "too old", (0.5, 0.25))),
+    ratios=TestRatios(0.1, 0.2, 0.3, 0.4, 0.5),
+    unaided_us=80_000,
+    resets=2,
+    flags=831,
+    fix=SatelliteFix(2_900_000, (0.0, 0.0, -3.0), (3.0, 4.0, 0.5), (0.012, 0.01, 0.02), 0.1),
+)
 SNAPSHOT = FlightSnapshot(
     t_us=3_004_000,
     mode=Mode.TRAJECTORY,
@@ -98,6 +118,7 @@ SNAPSHOT = FlightSnapshot(
     mission=MissionProgress(MissionState.PAUSED, 2, 5, 1, 2),
     orbit=Orbit((1.0, 2.0, -3.0), 2.5, 0.4, clockwise=False),
     accel_B=(0.1, 0.2, -9.7),
+    estimator=REPORT,
 )  # fmt: skip
 
 

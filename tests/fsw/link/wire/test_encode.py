@@ -77,7 +77,15 @@ TELLING: dict[int, dict[str, Any]] = {
         "voltages": [15_200, *[65_535] * 9], "current_battery": 1_830, "current_consumed": 1_900,
         "battery_remaining": 62, "charge_state": 1,
     },
-    ids.ESTIMATOR_STATUS: {"time_usec": 3_004_000, "flags": 63},
+    ids.ESTIMATOR_STATUS: {
+        "time_usec": 3_003_000, "flags": 831, "vel_ratio": 0.1, "pos_horiz_ratio": 0.2,
+        "pos_vert_ratio": 0.3, "mag_ratio": 0.4, "hagl_ratio": 0.5,
+        "pos_horiz_accuracy": math.sqrt(8e-4), "pos_vert_accuracy": math.sqrt(12e-4),
+    },
+    ids.GPS_RAW_INT: {
+        "time_usec": 2_900_000, "fix_type": 6, "vel": 500, "cog": 5313, "eph": 65535,
+        "satellites_visible": 255, "h_acc": 12, "v_acc": 20, "vel_acc": 100,
+    },
     ids.SYSTEM_TIME: {"time_boot_ms": 3004, "time_unix_usec": 1_750_000_003_004_000},
     ids.MISSION_CURRENT: {
         "seq": 2, "total": 5, "mission_state": 4, "mission_mode": 2,

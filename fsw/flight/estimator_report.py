@@ -1,0 +1,160 @@
+"""What telemetry and log say of the estimator, once a planning period."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+
+from fsw.estimation.error_state import BA, BG, TH, Array, P, V
+from fsw.estimation.sensor_checks import Health
+from fsw.estimation.sensor_fault import Sensor, SensorFault
+from fsw.estimation.sensor_fusion import FusionMemory
+from fsw.signals import (
+    EstimatorReport,
+    SatelliteFix,
+    SensorReport,
+    StateEstimate,
+    TestRatios,
+    Vec3,
+)
+
+# ESTIMATOR_STATUS_FLAGS of MAVLink
+ATTITUDE, LEVEL_VELOCITY, VERTICAL_VELOCITY = 1, 2, 4
+RELATIVE, ABSOLUTE, HEIGHT, ABOVE_GROUND = 8, 16, 32, 64
+PREDICTED_RELATIVE, PREDICTED_ABSOLUTE = 256, 512
+SATELLITES_DOUBTED, ACCELERATION_DOUBTED = 1024, 2048
+# What telemetry still calls known: standard deviations.
+_KNOWN_ANGLE: Final = 0.2  # rad
+_KNOWN_SPEED: Final = 0.5  # m/s
+_KNOWN_PLACE: Final = 0.5  # m, in dead reckoning
+_AIDS_PLACE: Final = (Sensor.POSE, Sensor.GNSS)
+_UPPER: Final = np.triu_indices(6)
+
+
+def unaided(memory: FusionMemory, now: float) -> float:
+    """Time [s] at ``now`` [s] since a position was used last; infinite: never."""
+    used = [one.fused[0] for one in memory.health if one.sensor in _AIDS_PLACE and one.fused]
+    return now - max(used) if used else math.inf
+
+
+def estimator_report(
+    memory: FusionMemory, covariance: Array, estimate: StateEstimate, now: float, stale: float
+) -> EstimatorReport:
+    """The report at ``now`` [s]; a sensor is silent after ``stale`` [s].
+
+    ``covariance`` (17, 17) [SI] is of the error of the ``estimate``.
+    """
+    x, M = memory.numbers, covariance
+    without = unaided(memory, now)
+    sensors = _sensors(memory, now, stale)
+    fix = memory.gnss
+    return EstimatorReport(
+        t_us=estimate.t_us,
+        pose_covariance=_pose(M),
+        velocity_covariance=_motion(M, estimate),
+        accel_bias=_three(x["accel_bias"][0]),
+        gyro_bias=_three(x["gyro_bias"][0]),
+        accel_bias_variance=_three(np.diagonal(M)[BA : BA + 3]),
+        gyro_bias_variance=_three(np.diagonal(M)[BG : BG + 3]),
+        pose_delay=float(x["pose_delay"][0]),
+        sensors=sensors,
+        ratios=_ratios(sensors),
+        unaided_us=round(1e6 * without) if without < math.inf else -1,
+        resets=memory.reset.number,
+        flags=_flags(M, sensors, aided=without <= stale),
+        fix=None
+        if fix is None
+        else SatelliteFix(
+            round(1e6 * fix.time),
+            fix.position,
+            fix.velocity,
+            _roots(fix.position_variance),
+            math.sqrt(max(fix.velocity_variance)),
+        ),
+    )
+
+
+def _sensors(memory: FusionMemory, now: float, stale: float) -> tuple[SensorReport, ...]:
+    found = [memory.of(Sensor.IMU), memory.of(Sensor.ENCODERS)]
+    found += [one for one in memory.health if one.sensor not in (Sensor.IMU, Sensor.ENCODERS)]
+    return tuple([_sensor(one, memory.came(one.sensor), now, stale) for one in found])
+
+
+def _sensor(health: Health, came: float, now: float, stale: float) -> SensorReport:
+    fault = health._replace(came=came).fault_now(now, stale)
+    return SensorReport(
+        health.sensor.value,
+        round(1e6 * (now - came)) if came >= 0.0 else -1,
+        "" if fault is SensorFault.NONE else fault.name.lower().replace("_", " "),
+        tuple([math.sqrt(one) for one in health.ratio]),
+        health.innovation,
+    )
+
+
+def _ratios(sensors: tuple[SensorReport, ...]) -> TestRatios:
+    of = {one.name: one.ratio for one in sensors if one.ratio}
+    pose, fix = of.get(Sensor.POSE.value, ()), of.get(Sensor.GNSS.value, ())
+    place = (*pose[:1], *fix[:1])
+    return TestRatios(
+        velocity=_largest(fix[1:]),
+        place=_largest(place),
+        height=_largest((*place, *of.get(Sensor.BAROMETER.value, ()))),
+        heading=_largest((*pose[1:], *of.get(Sensor.MAGNETOMETER.value, ()))),
+        above_ground=_largest(of.get(Sensor.RANGEFINDER.value, ())),
+    )
+
+
+def _largest(ratios: tuple[float, ...]) -> float:
+    return max(ratios, default=math.nan)
+
+
+def _flags(M: Array, sensors: tuple[SensorReport, ...], *, aided: bool) -> int:
+    """ESTIMATOR_STATUS_FLAGS: what is known, and what of the sensors is doubted."""
+    d = np.sqrt(np.diagonal(M)).tolist()
+    flags = 0
+    if max(d[TH : TH + 3]) < _KNOWN_ANGLE:
+        flags |= ATTITUDE
+    if max(d[V], d[V + 1]) < _KNOWN_SPEED:
+        flags |= LEVEL_VELOCITY
+    if d[V + 2] < _KNOWN_SPEED:
+        flags |= VERTICAL_VELOCITY
+    if max(d[P], d[P + 1]) < _KNOWN_PLACE:
+        flags |= RELATIVE | PREDICTED_RELATIVE
+        flags |= (ABSOLUTE | PREDICTED_ABSOLUTE) if aided else 0
+    if d[P + 2] < _KNOWN_PLACE:
+        flags |= HEIGHT
+    for one in sensors:
+        if one.name == Sensor.RANGEFINDER.value and not one.fault:
+            flags |= ABOVE_GROUND
+        elif one.name == Sensor.GNSS.value and one.fault:
+            flags |= SATELLITES_DOUBTED
+        elif one.name == Sensor.IMU.value and one.fault:
+            flags |= ACCELERATION_DOUBTED
+    return flags
+
+
+def _pose(M: Array) -> tuple[float, ...]:
+    rows = [P, P + 1, P + 2, TH, TH + 1, TH + 2]
+    return tuple(M[np.ix_(rows, rows)][_UPPER].tolist())
+
+
+def _motion(M: Array, estimate: StateEstimate) -> tuple[float, ...]:
+    """Velocity in body axes, and rates, of which the error is the gyro's bias."""
+    R = np.reshape(estimate.R_WB, (3, 3))
+    rows = [V, V + 1, V + 2, BG, BG + 1, BG + 2]
+    turn = np.eye(6)
+    turn[:3, :3] = R.T
+    return tuple((turn @ M[np.ix_(rows, rows)] @ turn.T)[_UPPER].tolist())
+
+
+def _three(row: Array) -> Vec3:
+    a, b, c = row.tolist()
+    return a, b, c
+
+
+def _roots(variance: Vec3) -> Vec3:
+    """Standard deviations; NaN where none is stated."""
+    a, b, c = [math.sqrt(one) if one >= 0.0 else math.nan for one in variance]
+    return a, b, c

@@ -1,0 +1,90 @@
+"""The estimate from frames of exact states; what is not believed is carried on from the last one.
+
+Nothing is filtered (docs/decisions/0006-estimate-without-filter.md). On the ground every whole
+frame is taken as it is: vehicles are carried about.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+from typing import Final
+
+from fsw.control.cascade import Cascade
+from fsw.estimation.dead_reckoning import moved_on
+from fsw.estimation.estimator import estimate_state
+from fsw.estimation.frame_trust import FrameTrust, believed
+from fsw.estimation.sensor_fault import Sensor
+from fsw.flight.jump import difference, jumped, told
+from fsw.flight.state import AIDED, Aiding, FlightState
+from fsw.signals import Severity, StateEstimate, StatusText, TickInputs
+
+_TOLD: Final = 0.02  # m, of a jump that the operator reads about
+
+
+class ExactState:
+    """Exact states as the tick of one configuration uses them."""
+
+    def __init__(self, cascade: Cascade) -> None:
+        self._cascade = cascade
+
+    def warm_up(self, estimate: StateEstimate, inputs: TickInputs) -> None:
+        """Compile every kernel."""
+        believed(FrameTrust(), inputs.sensors, estimate, lambda: (0.0, 0.0))
+
+    def estimate(
+        self, state: FlightState, inputs: TickInputs, texts: list[StatusText]
+    ) -> tuple[FlightState, StateEstimate | None]:
+        """The estimate of this tick, or the last one while there is none; appends to ``texts``."""
+        sensors, before = inputs.sensors, state.estimate
+        if before is not None and state.vehicle.flies and not inputs.stale_us:
+            return self._in_flight(state, before, inputs, texts)
+        if before is not None and state.trust.doubted and state.vehicle.flies:
+            return state, moved_on(before, 1e-6 * (sensors.t_us - before.t_us))._replace(
+                t_us=sensors.t_us
+            )
+        valid = estimate_state(sensors)
+        if valid is None:
+            # Telemetry goes by its time, and goes on.
+            last = None if before is None else before._replace(t_us=sensors.t_us)
+            return replace(state, invalid_ticks=state.invalid_ticks + 1), last
+        if inputs.stale_us:
+            valid = moved_on(valid, 1e-6 * inputs.stale_us)
+        elif state.trust.last is not None:
+            state = replace(state, trust=FrameTrust(), aiding=AIDED)
+        return (replace(state, invalid_ticks=0) if state.invalid_ticks else state), valid
+
+    def _in_flight(
+        self,
+        state: FlightState,
+        before: StateEstimate,
+        inputs: TickInputs,
+        texts: list[StatusText],
+    ) -> tuple[FlightState, StateEstimate]:
+        joints = partial(self._cascade.joint_acceleration, state.cascade, before)
+        trust, found = believed(state.trust, inputs.sensors, before, joints)
+        aiding = _aiding(trust, found.t_us) if trust.doubted else AIDED
+        if trust.returned_us:
+            dt = 1e-6 * (found.t_us - before.t_us)
+            reset = difference(found, moved_on(before, dt))
+            state = jumped(state, reset)
+            if max(map(abs, reset.position)) > _TOLD:
+                texts.append(StatusText(Severity.WARNING, told(reset)))
+        return replace(state, trust=trust, aiding=aiding, invalid_ticks=0), found
+
+
+def _aiding(trust: FrameTrust, now_us: int) -> Aiding:
+    """What is missing, as failsafes look at it."""
+    faults = trust.faults()
+    lost = [(name, part) for name, part in faults if name is not Sensor.POSE]
+    pose = trust.pose
+    return Aiding(
+        unaided_us=now_us - pose.since_us if pose.unused else 0,
+        pose=Sensor.POSE,
+        pose_fault=pose.fault,
+        position_sigma=trust.position_sigma(now_us),
+        attitude_sigma=trust.attitude_sigma(now_us),
+        sensor=lost[0][0] if lost else None,
+        fault=lost[0][1].fault if lost else faults[0][1].fault,
+        since_us=lost[0][1].since_us if lost else now_us,
+    )

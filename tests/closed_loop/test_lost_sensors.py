@@ -1,0 +1,162 @@
+"""Sensors that lie, freeze or fall silent in flight, with exact states and with a suite."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from fsw.flight.failsafe import Condition
+from fsw.measurements import ImuSample, JointSample, PoseSample
+from fsw.signals import Mode, SensorFrame
+from sitl.scenario_file import load_scenario
+from sitl.simulation import STEP_US
+from tests.closed_loop.harness import Flight
+from tests.closed_loop.test_real_sensors import Spoil, changed, frozen
+
+START_US = 1_000_000
+FIRST = 300  # step of the fault
+NAN = math.nan
+NOTHING = (NAN, NAN, NAN)
+POSE, INERTIAL = ("p_WB", "v_WB", "q_WB"), ("gyro_B", "accel_B")
+ENCODERS = ("q_arm", "qd_arm")
+
+
+def lies(steps: int, first: int = FIRST, **changes: Any) -> Callable[[SensorFrame], SensorFrame]:
+    """Readings as given, for a number of steps."""
+
+    def spoil(frame: SensorFrame) -> SensorFrame:
+        step = (frame.t_us - START_US) // STEP_US
+        return replace(frame, **changes) if first <= step < first + steps else frame
+
+    return spoil
+
+
+def freezes(steps: int, first: int, *names: str) -> Callable[[SensorFrame], SensorFrame]:
+    """Readings as they were when it began, for a number of steps."""
+    held: dict[str, Any] = {}
+
+    def spoil(frame: SensorFrame) -> SensorFrame:
+        step = (frame.t_us - START_US) // STEP_US
+        if not first <= step < first + steps:
+            return frame
+        for name in names:
+            held.setdefault(name, getattr(frame, name))
+        return replace(frame, **held)
+
+    return spoil
+
+
+def told(flight: Flight, *words: str) -> bool:
+    return any(all(word in text for word in words) for text in flight.texts)
+
+
+def off(flight: Flight) -> float:
+    """Distance of the estimate from the truth."""
+    return math.dist(flight.snapshot.estimate.p_WB, flight.sim.truth().p_WB)
+
+
+@pytest.mark.parametrize(
+    "spoil",
+    [
+        lies(30, p_WB=NOTHING),
+        lies(1, q_WB=(math.cos(0.79), math.sin(0.79), 0.0, 0.0)),  # beyond 90 degrees
+        lies(1, v_WB=(1e6, 0.0, 0.0)),
+        lies(1, v_WB=(0.0, 1e30, 0.0)),
+        lies(50, p_WB=(1.0, 1.0, -1.0)),
+        lies(25, p_WB=NOTHING, gyro_B=NOTHING, qd_arm=(NAN, NAN)),
+        freezes(100, FIRST, *POSE),
+    ],
+    ids=["no place", "over", "1e6 m/s", "1e30 m/s", "elsewhere", "nothing", "frozen"],
+)
+def test_what_lasts_a_moment_is_flown_through(
+    spoil: Callable[[SensorFrame], SensorFrame],
+) -> None:
+    flight = Flight(load_scenario("workspace"), spoil=spoil)
+    flight.follow()
+    while flight.sim.step < FIRST + 150:
+        flight.step()
+        assert flight.mode is Mode.TRAJECTORY
+        assert 10.0 < sum(flight.outputs.actuators.rotor_thrust) < 60.0
+        assert off(flight) < 0.02
+    assert not told(flight, "safe set by")
+
+
+def test_telemetry_goes_on_without_an_estimate_and_says_so() -> None:
+    flight = Flight(load_scenario("workspace"), spoil=lies(10**6, first=20, p_WB=NOTHING))
+    for _ in range(60):
+        flight.step()
+    assert flight.mode is Mode.DISARMED
+    snapshot = flight.snapshot
+    assert snapshot.t_us == START_US + 59 * STEP_US, "every stream goes by it"
+    assert snapshot.failures == (Condition.ESTIMATE_INVALID.value,)
+    assert snapshot.estimate.t_us == snapshot.t_us
+
+
+BESIDE = 4000  # at 8 s, on the way along the walls
+LONG = 1000  # steps, 2 s
+
+
+def without(kind: type) -> Spoil:
+    """A sensor is silent for two seconds."""
+    return changed(kind, 8.0, 10.0, lambda _: None)
+
+
+def stuck(kind: type) -> Spoil:
+    """A sensor says the same for two seconds, while time goes on."""
+    return changed(kind, 8.0, 10.0, frozen())
+
+
+def beside_walls(flight: Flight) -> None:
+    """Fly for 3.5 s from the fault on; the plant ends the run at a contact."""
+    flight.follow()
+    while flight.sim.step < BESIDE + LONG + 750:
+        flight.step()
+        assert flight.sim.ended is None, (flight.sim.ended, flight.texts)
+    assert flight.mode in (Mode.TRAJECTORY, Mode.HOLD)
+    assert min(flight.sim.truth().margins_m) > 0.0
+    assert off(flight) < 0.005, "all is known again"
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("spoil", "words"),
+    [
+        (without(PoseSample), ("no position is measured", "pose is silent", "for 0.")),
+        (stuck(PoseSample), ("no position is measured", "pose is stuck")),
+        (stuck(ImuSample), ("sensor lost: IMU is stuck", "for 0.")),
+        (without(ImuSample), ("sensor lost: IMU is silent",)),
+        (stuck(JointSample), ("sensor lost: joint encoders are stuck", "for 0.")),
+        (without(JointSample), ("sensor lost: joint encoders are silent",)),
+    ],
+    ids=["no pose", "pose stuck", "IMU stuck", "no IMU", "encoders stuck", "no encoders"],
+)
+def test_two_seconds_without_a_sensor_beside_walls_touch_nothing(
+    spoil: Spoil, words: tuple[str, ...]
+) -> None:
+    flight = Flight(load_scenario("walls", "mocap"), spoil_samples=spoil)
+    beside_walls(flight)
+    assert told(flight, *words), flight.texts
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("spoil", "words"),
+    [
+        (lies(LONG, BESIDE, p_WB=NOTHING), ("no position is measured", "pose", "for 0.25 s")),
+        (freezes(LONG, BESIDE, *POSE), ("no position is measured", "pose is stuck")),
+        (freezes(LONG, BESIDE, *INERTIAL), ("sensor lost: IMU is stuck", "for 0.05 s")),
+        (freezes(LONG, BESIDE, *ENCODERS), ("sensor lost: joint encoders are stuck",)),
+    ],
+    ids=["no pose", "pose stuck", "IMU stuck", "encoders stuck"],
+)
+def test_exact_states_that_fail_for_two_seconds_touch_nothing(
+    spoil: Callable[[SensorFrame], SensorFrame], words: tuple[str, ...]
+) -> None:
+    flight = Flight(load_scenario("walls"), spoil=spoil)
+    beside_walls(flight)
+    assert told(flight, *words), flight.texts
+    assert not told(flight, "safe set by")

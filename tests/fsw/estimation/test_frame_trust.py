@@ -1,0 +1,171 @@
+"""What of an exact frame is believed, and what stands in for the rest."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from fsw.estimation.estimator import estimate_state
+from fsw.estimation.frame_trust import FrameTrust, believed
+from fsw.estimation.sensor_fault import Sensor, SensorFault
+from fsw.signals import SensorFrame, StateEstimate, Vec3
+
+TICK = 0.002
+NAN = math.nan
+
+
+def frame(k: int, **changes: Any) -> SensorFrame:
+    """Tick k of a vehicle that turns about its vertical, drifts north and climbs ever faster."""
+    t = TICK * k
+    yaw = 0.4 * t
+    found = SensorFrame(
+        t_us=1_000_000 + 2_000 * k,
+        p_WB=(0.3 * t, 0.0, -1.0 - 0.25 * t * t),
+        v_WB=(0.3, 0.0, -0.5 * t),
+        q_WB=(math.cos(0.5 * yaw), 0.0, 0.0, math.sin(0.5 * yaw)),
+        gyro_B=(1e-7 * math.sin(50.0 * t), 0.0, 0.4),
+        accel_B=(0.0, 0.0, -9.80665 - 0.5),
+        q_arm=(0.1 * t, 0.2),
+        qd_arm=(0.1, 1e-7 * math.cos(50.0 * t)),
+    )
+    return replace(found, **changes)
+
+
+def flown(
+    ticks: int, spoil: Callable[[int, SensorFrame], SensorFrame]
+) -> tuple[FrameTrust, StateEstimate, list[FrameTrust]]:
+    estimate = estimate_state(frame(0))
+    assert estimate is not None
+    trust, history = FrameTrust(), []
+    for k in range(1, ticks):
+        trust, estimate = believed(trust, spoil(k, frame(k)), estimate, lambda: (0.0, 0.0))
+        history.append(trust)
+    return trust, estimate, history
+
+
+def apart(estimate: StateEstimate, k: int) -> float:
+    return math.dist(estimate.p_WB, frame(k).p_WB)
+
+
+def test_a_good_frame_is_taken_as_it_is() -> None:
+    trust, estimate, _ = flown(50, lambda _, s: s)
+    assert estimate == estimate_state(frame(49))
+    assert not trust.doubted
+
+
+NOTHING: Vec3 = (NAN, NAN, NAN)
+ONCE: list[tuple[dict[str, Any], Sensor, SensorFault]] = [
+    ({"v_WB": (1e6, 0.0, 0.0)}, Sensor.POSE, SensorFault.IMPLAUSIBLE),
+    ({"v_WB": (0.3, 1e30, 0.0)}, Sensor.POSE, SensorFault.IMPLAUSIBLE),
+    ({"v_WB": (0.3, 5.0, 0.0)}, Sensor.POSE, SensorFault.JUMP),
+    ({"p_WB": (0.5, 0.0, -1.0)}, Sensor.POSE, SensorFault.JUMP),
+    ({"p_WB": NOTHING}, Sensor.POSE, SensorFault.IMPLAUSIBLE),
+    ({"q_WB": (math.cos(0.7), math.sin(0.7), 0.0, 0.0)}, Sensor.POSE, SensorFault.JUMP),
+    ({"q_WB": (0.0, 0.0, 0.0, 0.0)}, Sensor.POSE, SensorFault.IMPLAUSIBLE),
+    ({"gyro_B": (20.0, 0.0, 0.0)}, Sensor.IMU, SensorFault.JUMP),
+    ({"gyro_B": (math.inf, 0.0, 0.0)}, Sensor.IMU, SensorFault.IMPLAUSIBLE),
+    ({"q_arm": (1.0, 0.2)}, Sensor.ENCODERS, SensorFault.JUMP),
+    ({"qd_arm": (NAN, 0.0)}, Sensor.ENCODERS, SensorFault.IMPLAUSIBLE),
+]
+
+
+@pytest.mark.parametrize(("lie", "sensor", "fault"), ONCE)
+def test_one_frame_that_lies_is_not_believed_and_named(
+    lie: dict[str, Any], sensor: Sensor, fault: SensorFault
+) -> None:
+    _, estimate, history = flown(23, lambda k, s: replace(s, **lie) if k == 20 else s)
+    ((named, part),) = history[19].faults()
+    assert (named, part.fault, part.unused) == (sensor, fault, 1)
+    assert part.since_us == frame(20).t_us
+    assert not history[20].doubted, "the next frame is believed"
+    assert estimate == estimate_state(frame(22))
+
+
+@pytest.mark.parametrize("lie", [{"p_WB": NOTHING}, "frozen"])
+def test_without_a_pose_the_inertial_unit_carries_on(lie: Any) -> None:
+    def spoil(k: int, s: SensorFrame) -> SensorFrame:
+        if k < 20:
+            return s
+        if lie == "frozen":
+            old = frame(20)
+            return replace(s, p_WB=old.p_WB, v_WB=old.v_WB, q_WB=old.q_WB)
+        return replace(s, **lie)
+
+    trust, estimate, _ = flown(520, spoil)
+    assert trust.faults()[0][0] is Sensor.POSE
+    assert apart(estimate, 519) < 0.002
+    assert estimate.yaw == pytest.approx(0.4 * TICK * 519, abs=1e-3)
+    now_us = frame(519).t_us
+    assert 0.05 < trust.position_sigma(now_us) < 0.2
+    assert trust.attitude_sigma(now_us) < 0.02
+
+
+def test_without_anything_the_attitude_is_soon_unknown() -> None:
+    def spoil(k: int, s: SensorFrame) -> SensorFrame:
+        return replace(s, p_WB=NOTHING, gyro_B=NOTHING) if k >= 20 else s
+
+    trust, estimate, _ = flown(220, spoil)
+    assert trust.attitude_sigma(frame(219).t_us) == pytest.approx(0.4, rel=0.05)
+    assert math.isfinite(sum(estimate.p_WB))
+    assert estimate.t_us == frame(219).t_us, "telemetry goes by it"
+
+
+@pytest.mark.parametrize("what", ["frozen", "lost"])
+def test_without_an_inertial_unit_rates_follow_from_the_pose(what: str) -> None:
+    old = frame(20)
+
+    def spoil(k: int, s: SensorFrame) -> SensorFrame:
+        if k < 20:
+            return s
+        if what == "lost":
+            return replace(s, gyro_B=NOTHING)
+        # As if it had stopped before the vehicle began to turn.
+        return replace(s, gyro_B=(0.0, 0.0, 0.0), accel_B=old.accel_B)
+
+    trust, estimate, _ = flown(300, spoil)
+    assert trust.faults()[0][0] is Sensor.IMU
+    assert estimate.w_WB_B[2] == pytest.approx(0.4, abs=0.01)
+    assert estimate.specific_force == pytest.approx(9.80665 + 0.5, abs=0.05)
+    assert apart(estimate, 299) == 0.0
+
+
+def test_a_vehicle_that_lies_still_is_no_stuck_sensor() -> None:
+    still = frame(3, qd_arm=(0.0, 0.0))
+    estimate = estimate_state(still)
+    assert estimate is not None
+    trust = FrameTrust()
+    for k in range(20):
+        again = replace(still, t_us=still.t_us + 2_000 * k)
+        trust, estimate = believed(trust, again, estimate, lambda: (0.0, 0.0))
+        assert not trust.doubted
+
+
+def test_a_pose_that_stays_where_it_jumped_to_is_the_truth_after_a_while() -> None:
+    def spoil(k: int, s: SensorFrame) -> SensorFrame:
+        x, y, z = s.p_WB
+        return replace(s, p_WB=(x, y + 0.4, z)) if k >= 20 else s
+
+    _, estimate, history = flown(140, spoil)
+    assert estimate.p_WB[1] == pytest.approx(0.4)
+    believed_at = next(k for k, one in enumerate(history, start=1) if k > 20 and not one.doubted)
+    assert believed_at == 120
+    assert history[believed_at - 1].returned_us == 200_000
+    assert history[believed_at].returned_us == 0
+
+
+def test_what_cannot_be_is_never_the_truth() -> None:
+    trust, _, _ = flown(400, lambda k, s: replace(s, v_WB=(1e3, 0.0, 0.0)) if k >= 20 else s)
+    assert trust.pose.unused == 380
+
+
+def test_frames_that_were_missing_are_no_jump() -> None:
+    estimate = estimate_state(frame(0))
+    assert estimate is not None
+    for gap in (50, 250):
+        trust, found = believed(FrameTrust(), frame(gap), estimate, lambda: (0.0, 0.0))
+        assert not trust.doubted
+        assert found == estimate_state(frame(gap))
