@@ -20,7 +20,7 @@ from pandion.display import Display
 if TYPE_CHECKING:
     from fsw.parameters.flight_config import FlightConfig
     from sitl.scenario import Scenario
-    from studies.falsify import Found, Outcome, Replayed
+    from studies.falsify import Found, Outcome, Replayed, WholeFound, WholeOutcome
 
 HOLDS, BROKEN = 0, 1  # exit codes
 _FORMAT: Final = "pandion-disturbance-1"
@@ -33,7 +33,10 @@ class FalsifyOptions:
 
     scenario: str = option("SCENARIO", "name or path of a .toml file", default="walls")
     evaluations: int = option(
-        "--evaluations N", "stretches of 5 s to fly", whole(1, 1_000_000), default=2000
+        "--evaluations N",
+        "stretches of 5 s to fly, a tenth of them with the whole stack",
+        whole(1, 1_000_000),
+        default=2000,
     )
     seed: int = option("--seed N", "root of the search's random numbers", whole(), default=0)
     amplitude: float = option(
@@ -91,7 +94,7 @@ def _config(scenario: Scenario) -> FlightConfig:
 
 
 def _search(options: FalsifyOptions, scenario: Scenario) -> int:
-    from studies.falsify import search
+    from studies.falsify import search_and_fly
 
     console = console_beside(options.json)
     display = Display(console)
@@ -102,7 +105,7 @@ def _search(options: FalsifyOptions, scenario: Scenario) -> int:
         f"±{options.amplitude:g} m/s² on each axis"
     )
     with display.progress():
-        outcome = search(
+        outcome, whole_stack = search_and_fly(
             scenario,
             _config(scenario),
             options.amplitude,
@@ -114,25 +117,54 @@ def _search(options: FalsifyOptions, scenario: Scenario) -> int:
         )
     kept = folder / "worst.json"
     kept.write_text(json.dumps(_as_file(scenario, outcome.worst)), encoding="utf-8")
-    for sentence in _sentences(outcome):
+    for sentence in _sentences(outcome, options.amplitude) + _of_whole_stack(whole_stack):
         display.say(sentence)
     display.say(f"worst disturbance {kept}; pandion falsify {options.scenario} --replay {kept}")
-    write_text(options.json, json.dumps(_as_json(options, outcome), indent=2) + "\n")
-    return HOLDS if outcome.holds else BROKEN
+    write_text(options.json, json.dumps(_as_json(options, outcome, whole_stack), indent=2) + "\n")
+    return HOLDS if outcome.holds and whole_stack.holds else BROKEN
 
 
-def _sentences(outcome: Outcome) -> list[str]:
+def _sentences(outcome: Outcome, amplitude: float) -> list[str]:
+    """Each claim: what was found, the bound, and whether it was tested and held."""
     bounds, least = outcome.bounds, outcome.least_margin
-    verdict = "holds" if outcome.holds else "BROKEN"
+    one, many = outcome.worst_of_one_axis, outcome.worst_of_all_axes
+    told = []
+    if one is not None:
+        told.append(
+            f"one axis   {_found(one)}, bound {bounds.one_axis * _MM:.0f} mm, vertically "
+            f"{bounds.one_up * _MM:.0f} mm: "
+            + _verdict(bounds.claims_one_axis, outcome.breaks_one_axis, one.share)
+        )
+    if many is not None:
+        verdict = _verdict(bounds.claims_all_axes, outcome.breaks_all_axes, many.share)
+        told.append(
+            f"all axes   {_found(many)}, bound {bounds.across * _MM:.0f} mm, vertically "
+            f"{bounds.up * _MM:.0f} mm: {verdict}"
+        )
+    if not bounds.claims_all_axes:
+        told.append(
+            f"           up to {bounds.all_axes_up_to:.2f} m/s² on all axes the rotors suffice; "
+            f"at {amplitude:g} they can saturate"
+        )
     margin = "" if math.isinf(least.margin_m) else f", least margin {least.margin_m * _MM:+.1f} mm"
+    told.append(f"along the recorded plan {outcome.evaluations} evaluations{margin}")
+    return told
+
+
+def _verdict(claimed: bool, broken: bool, share: float) -> str:
+    if not claimed:
+        return f"no claim at this amplitude, {share:.0%} of it"
+    return f"claim BROKEN, {share:.0%} of it" if broken else f"claim holds, {share:.0%} of it"
+
+
+def _of_whole_stack(outcome: WholeOutcome) -> list[str]:
+    closest, margin = outcome.closest.flown, outcome.closest.flown.margin_m
+    near = "" if math.isinf(margin) else f", least margin {margin * _MM:+.1f} mm"
+    verdict = "claim holds" if outcome.holds else f"claim BROKEN: {closest.contact}"
     return [
-        f"one axis   {_found(outcome.worst_of_one_axis)}, bound {bounds.one_axis * _MM:.0f} mm",
-        f"worst      {_found(outcome.worst)}, bound {bounds.across * _MM:.0f} mm on a horizontal "
-        f"axis, {bounds.up * _MM:.0f} mm vertically",
-        f"all axes   the bound holds up to {bounds.all_axes_up_to:.2f} m/s²; above it the rotors "
-        "can saturate",
-        f"bound {verdict} after {outcome.evaluations} evaluations: the worst reaches "
-        f"{outcome.worst.share:.0%} of it{margin}",
+        f"no contact {outcome.evaluations} stretches of the whole stack: {outcome.contacts} with "
+        f"contact, {outcome.breaches} beyond the safe set, {outcome.departures} out of the "
+        f"tube{near}: {verdict}"
     ]
 
 
@@ -142,24 +174,62 @@ def _found(found: Found) -> str:
     return f"{x:.0f}, {y:.0f}, {z:.0f} mm off the plan ({found.kind}, from {at:.1f} s)"
 
 
-def _as_json(options: FalsifyOptions, outcome: Outcome) -> dict[str, Any]:
+def _as_json(
+    options: FalsifyOptions, outcome: Outcome, whole_stack: WholeOutcome
+) -> dict[str, Any]:
     bounds = outcome.bounds
     return {
         "scenario": options.scenario,
         "seed": options.seed,
         "amplitude_m_s2": options.amplitude,
         "evaluations": outcome.evaluations,
-        "holds": outcome.holds,
+        "holds": outcome.holds and whole_stack.holds,
+        "claims": _claims(outcome, whole_stack),
         "bound_one_axis_m": bounds.one_axis,
+        "bound_one_axis_vertical_m": bounds.one_up,
         "bound_all_axes_up_to_m_s2": bounds.all_axes_up_to,
         "bound_all_axes_m": [bounds.across, bounds.across, bounds.up],
         "worst": _summary(outcome.worst),
         "worst_of_one_axis": _summary(outcome.worst_of_one_axis),
+        "worst_of_all_axes": _summary(outcome.worst_of_all_axes),
         "least_margin": _summary(outcome.least_margin),
+        "whole_stack": {
+            "evaluations": whole_stack.evaluations,
+            "contacts": whole_stack.contacts,
+            "beyond_the_safe_set": whole_stack.breaches,
+            "out_of_the_tube": whole_stack.departures,
+            "furthest": _whole(whole_stack.furthest),
+            "closest": _whole(whole_stack.closest),
+        },
     }
 
 
-def _summary(found: Found) -> dict[str, Any]:
+def _claims(outcome: Outcome, whole_stack: WholeOutcome) -> dict[str, bool | None]:
+    """Whether each claim held; None: nothing is claimed at this amplitude, or it was not tried."""
+    bounds = outcome.bounds
+    one = bounds.claims_one_axis and outcome.worst_of_one_axis is not None
+    many = bounds.claims_all_axes and outcome.worst_of_all_axes is not None
+    return {
+        "one_axis": not outcome.breaks_one_axis if one else None,
+        "all_axes": not outcome.breaks_all_axes if many else None,
+        "no_contact": whole_stack.holds,
+    }
+
+
+def _whole(found: WholeFound) -> dict[str, Any]:
+    flown = found.flown
+    return {
+        "off_plan_m": list(flown.off_m),
+        "margin_m": flown.margin_m if math.isfinite(flown.margin_m) else None,
+        "contact": flown.contact,
+        "kind": found.kind,
+        "first_step": found.start.step,
+    }
+
+
+def _summary(found: Found | None) -> dict[str, Any] | None:
+    if found is None:
+        return None
     return {
         "share_of_bound": found.share if math.isfinite(found.share) else None,
         "off_plan_m": list(found.off_m),
@@ -200,18 +270,22 @@ def _replay(options: FalsifyOptions, scenario: Scenario, path: Path) -> int:
             ),
         )
     bound = bounds(config, amplitude)
+    one = sum(any(push[axis] != 0.0 for push in pushes) for axis in range(3)) == 1
+    across, up = (bound.one_axis, bound.one_up) if one else (bound.across, bound.up)
+    claimed = bound.claims_one_axis if one else bound.claims_all_axes
     x, y, z = (value * _MM for value in flown.off_m)
+    share = max(flown.off_m[0] / across, flown.off_m[1] / across, flown.off_m[2] / up)
+    broken = claimed and not share <= 1.0
     display.say(
-        f"{x:.1f}, {y:.1f}, {z:.1f} mm off the plan; bound {bound.across * _MM:.0f} mm on a "
-        f"horizontal axis, {bound.up * _MM:.0f} mm vertically"
+        f"{x:.1f}, {y:.1f}, {z:.1f} mm off the plan; bound {across * _MM:.0f} mm on a "
+        f"horizontal axis, {up * _MM:.0f} mm vertically: {_verdict(claimed, broken, share)}"
     )
     if math.isfinite(flown.margin_m):
         display.say(f"least margin {flown.margin_m * _MM:+.1f} mm")
     if flown.ended is not None:
         display.say(flown.ended)
     write_text(options.json, json.dumps(_replayed(flown), indent=2) + "\n")
-    within = max(flown.off_m[:2]) <= bound.across and flown.off_m[2] <= bound.up
-    return HOLDS if within else BROKEN
+    return BROKEN if broken or flown.ended is not None else HOLDS
 
 
 def _replayed(flown: Replayed) -> dict[str, Any]:

@@ -108,11 +108,15 @@ class ClosedLoop(Generic[State]):
             return announced(scenario, self.simulation.t_us)
         return ()
 
-    def step(self, inputs: TickInputs) -> TickOutputs:
-        """Tick, plan, advance."""
+    def step(
+        self, inputs: TickInputs, before_advancing: Callable[[TickOutputs], None] | None = None
+    ) -> TickOutputs:
+        """Tick, plan, advance; ``before_advancing`` may set what pushes the plant meanwhile."""
         self.state, outputs = self.tick(self.state, inputs)
         if outputs.plan_request is not None:
             self.planner.submit(outputs.plan_request)
+        if before_advancing is not None:
+            before_advancing(outputs)
         self.simulation.advance(self._controls(outputs))
         return outputs
 

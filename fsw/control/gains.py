@@ -33,8 +33,9 @@ class TrackingTuning:
     vertical_input_weight: float = 1e-3  # on (m/s^2)^2
     disturbance_correlation: float = 0.05  # s, of the Ornstein-Uhlenbeck model
     vertical_disturbance_correlation: float = 0.3  # s
-    # Of the observed one, what thrust reacts to: at take-over the rotor model is off by more.
-    vertical_disturbance_limit: float = 1.0  # m/s^2
+    # Of the observed one, what thrust reacts to: at take-over the rotor model is off by more. Above
+    # what a disturbance of 0.8 m/s^2 looks like that turns after a part of it was taken for mass.
+    vertical_disturbance_limit: float = 1.7  # m/s^2
     observer_bandwidth: float = 130.0  # rad/s
     # Wind: what stays of the observed disturbance is cancelled whole. Slowly, because the mean of
     # a random one is not wind, and within a limit, because the estimate adds to a push that

@@ -18,7 +18,8 @@ same sum over the response of what meets a limit is the most that it can be aske
 ``limits_used`` tells exactly up to which disturbance of one axis the loop is linear.
 
 Pushed on all axes at once, the thrust that holds the height also accelerates sideways, as far as
-the vehicle leans. ``all_axes`` counts that as more disturbance.
+the vehicle leans, and turning while it leans takes from the lift. ``all_axes`` counts both as more
+disturbance, and ``all_axes_up_to`` says up to which disturbance the rotors give what that asks.
 
 Source: docs/equations.md T4.
 """
@@ -35,9 +36,11 @@ from scipy.linalg import expm
 from fsw.control.gains import TrackingGains, TrackingTuning
 from fsw.model.airframe import GRAVITY, Airframe
 from fsw.model.prediction import Array
-from fsw.model.rotors import hanging_arm
+from fsw.model.rotors import WEIGHING_TIME, hanging_arm
 
 _SETTLED_S = 6.0  # the slowest mode has decayed by e^-16 then
+# What the plan's own motion and the arm's move the height by, 0.7 mm measured in calm flights.
+CALM_HEIGHT = 1e-3  # m
 RARE = 3.7  # standard deviations
 
 
@@ -57,8 +60,10 @@ class Tube:
     wanted_acceleration: float  # m/s^2
     acceleration_error: float  # m/s^2, wanted less present
     jerk: float  # m/s^3, wanted
+    present_jerk: float  # m/s^3
     snap: float  # m/s^4, wanted
-    vertical_acceleration: float  # m/s^2
+    vertical_acceleration: float  # m/s^2, of the thrust
+    vertical_disturbance: float  # m/s^2, observed
 
 
 @lru_cache(maxsize=8)  # 4 ms; most changes of a tuning do not touch it
@@ -98,8 +103,10 @@ def tube(
         wanted_acceleration=_sum(wanted),
         acceleration_error=_sum(wanted - acceleration),
         jerk=k3 / k4 * _sum(wanted - acceleration),
+        present_jerk=_sum(states[:, 3]),
         snap=_sum(states @ _wanted_snap(gains)),
-        vertical_acceleration=_sum(climbs[:, 2]),
+        vertical_acceleration=_sum(climbs[:, 2] - climbs[:, 5]),
+        vertical_disturbance=_sum(climbs[:, 4]),
     )
 
 
@@ -109,7 +116,9 @@ def limits_used(
     """Share of every limit of the loop that the worst ``disturbance`` [m/s^2] of one axis uses."""
     stopping = 2.0 * tuning.stopping_snap * (disturbance * loop.acceleration_error + 0.15)
     return {
-        "vertical disturbance": disturbance / tuning.vertical_disturbance_limit,
+        "vertical disturbance": disturbance
+        * loop.vertical_disturbance
+        / tuning.vertical_disturbance_limit,
         "rotor torque": disturbance * loop.snap / _snap_in_hover(airframe),
         "position error": (disturbance * loop.base + loop.base_wind) / tuning.position_error_limit,
         "acceleration": (disturbance * loop.wanted_acceleration + tuning.wind_limit)
@@ -118,32 +127,45 @@ def limits_used(
     }
 
 
-def all_axes(loop: Tube, disturbance: float) -> tuple[float, float]:
+def all_axes(airframe: Airframe, loop: Tube, disturbance: float) -> tuple[float, float]:
     """Reach [m] on a horizontal axis and vertically under a ``disturbance`` [m/s^2] on every axis.
 
-    The change of thrust that holds the height accelerates sideways by as much times the lean. What
-    a lean takes from the height is found by measurement: less than its reach once more.
+    The change of thrust that holds the height accelerates sideways by as much times the lean. The
+    thrust is enlarged by what the lean takes from the lift, a rotor lag too late: by then the lift
+    has changed by g times lean times turning, of both horizontal axes.
     """
-    lean = disturbance * loop.acceleration / GRAVITY
+    lean, turning = (
+        disturbance * peak / GRAVITY for peak in (loop.acceleration, loop.present_jerk)
+    )
     aside = lean * disturbance * loop.vertical_acceleration
-    return (disturbance + aside) * loop.base + loop.base_wind, 2.0 * disturbance * loop.height
+    late = airframe.rotor_lag * GRAVITY * 2.0 * lean * turning
+    across = (disturbance + aside) * loop.base + loop.base_wind
+    return across, (disturbance + late) * loop.height + CALM_HEIGHT
 
 
 def all_axes_up_to(airframe: Airframe, loop: Tube, most: float) -> float:
     """Largest disturbance of all axes, up to ``most`` [m/s^2], that saturates no rotor [m/s^2].
 
-    At the worst heading both horizontal axes ask the same pair of rotors, root 2 times as much,
-    while the height takes thrust away, which shrinks both lever and headroom.
+    Half-way between the axes both ask the same pair of rotors, root 2 times as much; along the axes
+    each asks a pair of its own. With less thrust a turn makes less snap, and the pairs share less
+    of it; a pair can have what the other one leaves.
     """
     low, high = 0.0, most
     while high - low > 1e-3:
         middle = 0.5 * (low + high)
-        lean = middle * loop.acceleration / GRAVITY
-        pushed = middle + lean * middle * loop.vertical_acceleration
-        lift = max(1.0 - middle * loop.vertical_acceleration / GRAVITY, 0.0)
-        fits = math.sqrt(2.0) * pushed * loop.snap <= _snap_in_hover(airframe) * lift * lift
-        low, high = (middle, high) if fits else (low, middle)
-    return low
+        low, high = (middle, high) if _fits_all_axes(airframe, loop, middle) else (low, middle)
+    return high if _fits_all_axes(airframe, loop, high) else low
+
+
+def _fits_all_axes(airframe: Airframe, loop: Tube, disturbance: float) -> bool:
+    lean = disturbance * loop.acceleration / GRAVITY
+    pushed = disturbance + lean * disturbance * loop.vertical_acceleration
+    change = disturbance * loop.vertical_acceleration / GRAVITY  # of the thrust
+    lever = 1.0 - change
+    hover = airframe.mass * GRAVITY / 4.0
+    shared = 1.0 - change * hover / min(hover, airframe.rotor_thrust_max - hover)
+    used = pushed * loop.snap / _snap_in_hover(airframe)
+    return math.sqrt(2.0) * used <= lever and used <= lever * shared
 
 
 def _snap_in_hover(airframe: Airframe) -> float:
@@ -197,17 +219,25 @@ def impulse_responses(
 def _vertical_responses(
     airframe: Airframe, tuning: TrackingTuning, gains: TrackingGains, dt: float
 ) -> Array:
-    """States after a unit disturbance of one tick, a row per tick: p, v, a, the observer's v, d."""
+    """States after a unit disturbance of one tick, a row per tick.
+
+    p, v, the acceleration that the loop asks for, the observer's v and d, and what of the
+    disturbance is taken for mass: the accelerometer feels both alike. That is cancelled like wind,
+    and turned against the vehicle when the disturbance turns.
+    """
     k, bandwidth = gains.k_vertical, tuning.observer_bandwidth
-    a = np.zeros((5, 5))
+    a = np.zeros((6, 6))
     a[:2, 1:3] = np.eye(2)
-    wanted = np.array([-k[0], 0.0, -k[2], -k[1], -gains.k_vertical_disturbance])
+    wanted = np.array([-k[0], 0.0, -k[2], -k[1], -gains.k_vertical_disturbance, 0.0])
     a[2] = wanted / airframe.rotor_lag
     a[2, 2] -= 1.0 / airframe.rotor_lag
     gain_v, gain_d = 2.0 * bandwidth, bandwidth**2
-    a[3] = [0.0, gain_v, 1.0, -gain_v, 1.0]
-    a[4] = [0.0, gain_d, 0.0, -gain_d, 0.0]
-    return _after_a_push(a, np.array([0.0, 1.0, 0.0, 0.0, 0.0]), dt)
+    a[3] = [0.0, gain_v, 1.0, -gain_v, 1.0, 0.0]
+    a[4] = [0.0, gain_d, 0.0, -gain_d, 0.0, 0.0]
+    # The thrust follows a mass that changes with its lag, too.
+    weighing = 1.0 / WEIGHING_TIME
+    a[1, 5], a[2, 5], a[5, 5] = -1.0, a[2, 5] - weighing, -weighing
+    return _after_a_push(a, np.array([0.0, 1.0, weighing, 0.0, 0.0, weighing]), dt)
 
 
 def _after_a_push(a: Array, b: Array, dt: float) -> Array:

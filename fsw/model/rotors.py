@@ -22,7 +22,7 @@ from fsw.geometry.vectors import clamp
 from fsw.model.airframe import GRAVITY, Airframe
 from fsw.signals import StateEstimate, Vec2, Vec3, Vec4
 
-_WEIGHING_TIME = 1.0  # s
+WEIGHING_TIME = 1.0  # s
 _WEIGHING_THRUST = 5.0  # m/s^2
 
 
@@ -66,7 +66,7 @@ def estimate_mass(
     thrust = rotors[0] + rotors[1] + rotors[2] + rotors[3]
     if not (thrust > _WEIGHING_THRUST * airframe.mass and specific_force > _WEIGHING_THRUST):
         return mass  # hardly flying: a quotient of small numbers
-    moved = mass + seconds / _WEIGHING_TIME * (thrust / specific_force - mass)
+    moved = mass + seconds / WEIGHING_TIME * (thrust / specific_force - mass)
     return clamp(moved, 0.7 * airframe.mass, 1.3 * airframe.mass)
 
 

@@ -188,7 +188,7 @@ def _tube_of_all_axes(
     expected, room = config.surroundings.disturbance, stand_off(tuning)
     most = all_axes_up_to(config.airframe, loop, expected)
     whole = most > 0.99 * expected
-    across, up = all_axes(loop, most)
+    across, up = all_axes(config.airframe, loop, most)
     reach = _reach(safe_set, across, up)
     return _finding(
         "tube of all axes",

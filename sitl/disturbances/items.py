@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sitl.disturbances.sequence import Played
+from sitl.disturbances.sequence import Played, Steered
 from sitl.scenario import V3, Disturbance, Torque, Uniform, Wind
 from sitl.seeds import stream
 
@@ -77,7 +77,7 @@ class RandomImpulses:
         return self._held if step < self._until else STILL
 
 
-Push = Resampled | Constant | RandomImpulses | Played
+Push = Resampled | Constant | RandomImpulses | Played | Steered
 
 
 def push(item: Disturbance, seed: int, step_s: float) -> Push:

@@ -9,6 +9,19 @@ from sitl.scenario import V3
 _STILL: V3 = (0.0, 0.0, 0.0)
 
 
+class Steered:
+    """An acceleration [m/s², NED] that somebody else sets before each step."""
+
+    torque = False
+
+    def __init__(self) -> None:
+        self.value: V3 = _STILL
+
+    def sample(self, step: int) -> V3:
+        """See ``Push``."""
+        return self.value
+
+
 class Played:
     """Accelerations [m/s², NED], each held for ``every`` steps, from the step ``first`` on."""
 

@@ -1,13 +1,18 @@
-"""What ``pandion falsify`` refuses, each in one sentence."""
+"""What ``pandion falsify`` refuses, each in one sentence, and what its exit code says."""
 
 from __future__ import annotations
 
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from pandion.falsify import main
+from studies.falsify import Bounds, Found, Outcome, WholeFound, WholeOutcome
+from studies.plan_record import Start
+from studies.tracked_flight import Disturbance
+from studies.whole_flight import Flown
 
 GOOD = {
     "format": "pandion-disturbance-1",
@@ -55,3 +60,69 @@ def test_a_file_that_is_no_kept_disturbance_is_refused(
 def test_a_missing_file_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     missing = tmp_path / "none.json"
     assert "none.json" in _refusal(capsys, "workspace", "--replay", str(missing))
+
+
+START = Start(0, 700, np.zeros(21), None)  # type: ignore[arg-type]  # not flown here
+PUSHED = Disturbance(0.8, 50, np.zeros((0, 3)), np.eye(3))
+
+
+def _found(share: float, axes: int) -> Found:
+    return Found(
+        share=share,
+        off_m=(0.08, 0.0, 0.0),
+        margin_m=-0.01,
+        axes=axes,
+        start=START,
+        kind="adversary, held 100 ms",
+        filtered_ticks=0,
+        pushes=((0.8, 0.0, 0.0),),
+        disturbance=PUSHED,
+    )
+
+
+@pytest.mark.parametrize(
+    ("one", "many", "claims_many", "contact", "code", "said"),
+    [
+        (0.9, 0.9, True, None, 0, "claim holds"),
+        (0.9, 1.5, False, None, 0, "no claim at this amplitude"),
+        (0.9, 1.5, True, None, 1, "claim BROKEN"),
+        (1.1, 0.9, False, None, 1, "claim BROKEN"),
+        (0.9, 0.9, True, "the base hit the wall", 1, "the base hit the wall"),
+    ],
+)
+def test_the_exit_code_follows_what_is_claimed(
+    one: float,
+    many: float,
+    claims_many: bool,
+    contact: str | None,
+    code: int,
+    said: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    bounds = Bounds(
+        one_axis=0.07,
+        one_up=0.01,
+        across=0.09,
+        up=0.02,
+        all_axes_up_to=0.5,
+        claims_one_axis=True,
+        claims_all_axes=claims_many,
+    )
+    single, several = _found(one, 1), _found(many, 3)
+    outcome = Outcome(bounds, 9, several, single, several, several)
+    flown = Flown((0.1, 0.0, 0.0), -0.01, contact, 1, 1, ())
+    stretch = WholeFound(START, "adversary, held 100 ms", flown)
+    whole = WholeOutcome(1, int(contact is not None), 1, 1, stretch, stretch)
+    monkeypatch.setattr("studies.falsify.search_and_fly", lambda *_: (outcome, whole))
+    written = tmp_path / "result.json"
+    assert main(["walls", "--out", str(tmp_path), "--json", str(written)]) == code
+    assert said in capsys.readouterr().out
+    result = json.loads(written.read_text())
+    assert result["holds"] == (code == 0)
+    assert result["claims"] == {
+        "one_axis": one <= 1.0,
+        "all_axes": many <= 1.0 if claims_many else None,
+        "no_contact": contact is None,
+    }

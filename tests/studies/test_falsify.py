@@ -11,8 +11,10 @@ import pytest
 from fsw.parameters.flight_config import FlightConfig, flight_config
 from sitl.scenario_file import load_scenario
 from studies.closed_loop import simulate
-from studies.falsify import Outcome, Search, replay, search
+from studies.falsify import Outcome, Search, replay, search, search_and_fly
 from studies.plan_record import PlanRecord, record
+from studies.tracked_flight import Disturbance
+from studies.whole_flight import WholeFlight
 
 # Its kernel is compiled for ten seconds in each process.
 pytestmark = pytest.mark.long
@@ -60,8 +62,10 @@ def _chase(config: FlightConfig, amplitude: float, axes: tuple[int, int, int]) -
 @pytest.mark.parametrize("axes", [(1, 0, 0), (0, 1, 0)])
 def test_the_old_loop_breaks_its_bound_on_one_axis(axes: tuple[int, int, int]) -> None:
     outcome = _chase(_before(), 0.8, axes)
-    assert not outcome.holds
+    assert outcome.worst_of_one_axis is not None
     assert max(outcome.worst_of_one_axis.off_m) > 1.1 * outcome.bounds.one_axis
+    assert not outcome.bounds.claims_one_axis  # it would not be claimed today
+    assert replace(outcome, bounds=replace(outcome.bounds, claims_one_axis=True)).breaks_one_axis
 
 
 @pytest.mark.parametrize("amplitude", [0.1, 0.2, 0.4, 0.6, 0.8])
@@ -71,6 +75,9 @@ def test_the_loop_keeps_its_bound_at_every_amplitude(
 ) -> None:
     outcome = _chase(NOW, amplitude, axes)
     assert outcome.holds, outcome.worst
+    assert outcome.worst.share <= 1.0  # these adversaries do not break what is not claimed either
+    assert outcome.bounds.claims_one_axis
+    assert outcome.bounds.claims_all_axes == (amplitude < 0.48)
     if sum(axes) == 1 and axes[2] == 0:
         assert outcome.worst.axes == 1
         assert outcome.worst.share > 0.6  # the adversary comes near
@@ -80,6 +87,8 @@ def test_a_search_finds_nothing_beyond_the_bound_and_repeats_itself() -> None:
     outcome = _found()
     assert outcome.evaluations >= 120
     assert outcome.holds, outcome.worst
+    assert outcome.worst_of_one_axis is not None
+    assert outcome.worst_of_one_axis.axes == 1
     assert outcome.worst.share > 0.7
     again = search(SCENARIO, NOW, 0.8, 120, 3, _silent)
     assert again.worst.off_m == outcome.worst.off_m
@@ -101,6 +110,44 @@ def test_the_margins_of_a_full_body_are_those_of_the_referee(name: str) -> None:
     assert flown.off_m == pytest.approx(worst.off_m, abs=1e-4)
     assert flown.margin_m == pytest.approx(worst.margin_m, abs=1e-3)
     assert flown.margin_m < 3.0
+
+
+def test_the_whole_stack_flies_a_stretch_as_the_replay_does_and_forgets_it() -> None:
+    # A replay only reports a breach.
+    warned = replace(NOW, limits=replace(NOW.limits, breach_action=1))
+    flight = WholeFlight(SCENARIO, warned)
+    flight.go_to(700, lambda _, __: None)
+    chase = Disturbance(0.8, 50, np.zeros((0, 3)), np.outer((1, 1, 1), (0.0, 1.0, 0.0)))
+    first, again = flight.stretch(1500, chase), flight.stretch(1500, chase)
+    assert first == again
+    assert first.contact is None
+    assert max(first.off_m) > 0.05
+    flown = replay(SCENARIO, NOW, 700, first.pushes, _silent)
+    assert flown.off_m == pytest.approx(first.off_m, abs=1e-4)
+    assert flown.margin_m == pytest.approx(first.margin_m, abs=1e-4)
+
+
+def test_contact_of_the_whole_stack_is_a_broken_claim() -> None:
+    walls = replace(load_scenario("walls"), duration_s=9.0)
+    flight = WholeFlight(walls, NOW)
+    flight.go_to(800, lambda _, __: None)
+    north = Disturbance(6.0, 50, np.ones((1, 3)) * (1.0, 0.0, 0.0), np.zeros((3, 3)))
+    flown = flight.stretch(2500, north)
+    assert flown.contact is not None
+    assert "wall" in flown.contact
+    assert flown.margin_m < -0.05
+    assert flown.departures > 0
+    assert flown.breaches > 0
+
+
+@pytest.mark.long
+def test_a_search_flies_a_tenth_with_the_whole_stack() -> None:
+    outcome, whole = search_and_fly(SCENARIO, NOW, 0.8, 80, 3, _silent)
+    assert 72 <= outcome.evaluations < 90
+    assert 4 <= whole.evaluations <= 8
+    assert whole.holds
+    assert whole.furthest.flown.off_m
+    assert max(whole.furthest.flown.off_m) > 0.04
 
 
 def test_the_safety_filter_of_the_search_is_the_one_that_flies() -> None:

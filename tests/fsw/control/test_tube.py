@@ -10,10 +10,19 @@ from scipy.signal import fftconvolve
 
 from fsw.control.allocation import allocate
 from fsw.control.gains import TrackingGains, TrackingTuning, tracking_gains
-from fsw.control.tracking import AxisState, Observed, TrackingLaw, observe, snap_command
-from fsw.control.tube import Tube, all_axes, limits_used, tube
-from fsw.model.airframe import AIRFRAME, GRAVITY
+from fsw.control.tracking import (
+    AxisState,
+    Observed,
+    TrackingLaw,
+    observe,
+    snap_command,
+    vertical_acceleration,
+)
+from fsw.control.tube import CALM_HEIGHT, Tube, all_axes, all_axes_up_to, limits_used, tube
+from fsw.model.airframe import AIRFRAME, GRAVITY, Airframe
+from fsw.model.nominal import REST_INPUT, REST_STATE
 from fsw.model.prediction import Array
+from fsw.model.rotors import estimate_mass, hanging_arm
 
 DT = 0.002
 # Without limits, so that the loop under test is the linear one the bound is about.
@@ -226,7 +235,90 @@ def _chased(law: TrackingLaw, tuning: TrackingTuning, amplitude: float) -> float
 
 def test_the_reach_on_all_axes_is_more_and_grows_faster_than_the_disturbance() -> None:
     loop = _tube()
-    small, large = all_axes(loop, 0.2), all_axes(loop, 0.8)
+    small, large = all_axes(AIRFRAME, loop, 0.2), all_axes(AIRFRAME, loop, 0.8)
     assert 0.8 * loop.base + loop.base_wind < large[0]
     assert large[0] - loop.base_wind > 4.0 * (small[0] - loop.base_wind)
     assert 0.8 * loop.height < large[1]
+    assert large[1] - CALM_HEIGHT > 4.0 * (small[1] - CALM_HEIGHT)
+
+
+HEAVY = replace(AIRFRAME, rotor_thrust_max=0.4 * AIRFRAME.mass * GRAVITY)
+
+
+@pytest.mark.parametrize(("airframe", "sharp"), [(AIRFRAME, True), (HEAVY, False)])
+def test_up_to_the_disturbance_of_all_axes_the_mixer_gives_every_torque(
+    airframe: Airframe, sharp: bool
+) -> None:
+    """The oracle is the mixer itself, at every heading and thrust; a little more is too much.
+
+    With less than twice the weight in thrust the figure is on the safe side.
+    """
+    loop = _tube()
+    most = all_axes_up_to(airframe, loop, 2.0)
+    assert 0.2 < most < 1.0
+    assert _worst_shortfall(airframe, loop, most) < 1e-9
+    if sharp:
+        assert _worst_shortfall(airframe, loop, 1.02 * most) > 0.01
+    assert all_axes_up_to(airframe, loop, 0.1) == 0.1
+
+
+def _worst_shortfall(airframe: Airframe, loop: Tube, disturbance: float) -> float:
+    """Torque [N m] that the mixer withholds, over headings, corners and thrusts of all axes."""
+    lean = disturbance * loop.acceleration / GRAVITY
+    snap = (1.0 + lean * loop.vertical_acceleration) * disturbance * loop.snap
+    change = disturbance * loop.vertical_acceleration / GRAVITY
+    # With the arm hanging straight the roll inertia is the larger one.
+    inertia = hanging_arm(airframe, (0.0, 0.0)).roll_inertia
+    worst = 0.0
+    for heading in np.linspace(0.0, np.pi / 2.0, 37):
+        for lift in (1.0 - change, 1.0, 1.0 + change):
+            across = snap * (np.cos(heading) + np.sin(heading))
+            along = snap * (np.cos(heading) - np.sin(heading))
+            x, y = (inertia * value / (lift * GRAVITY) for value in (across, along))
+            thrust = lift * airframe.mass * GRAVITY
+            f = allocate(airframe, (float(x), float(y), 0.0), thrust, 0.0)
+            given = airframe.rotor_arm * (f[1] - f[3]), airframe.rotor_arm * (f[2] - f[0])
+            worst = max(worst, abs(x - given[0]), abs(y - given[1]), abs(sum(f) - thrust))
+    return worst
+
+
+def _height_under(disturbance: Array, tuning: TrackingTuning) -> Array:
+    """The vertical loop tick by tick, with the mass that is weighed in flight."""
+    law = TrackingLaw(AIRFRAME.attitude_lag, tuning, tracking_gains(tuning, AIRFRAME.rotor_lag, DT))
+    decay = np.exp(-DT / AIRFRAME.rotor_lag)
+    true = believed_mass = AIRFRAME.mass
+    thrust = true * GRAVITY
+    z = v = 0.0
+    seen = Observed((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    heights = []
+    for d in disturbance:
+        each = 0.25 * thrust
+        felt = thrust / true - d  # along -z
+        believed_mass = estimate_mass(AIRFRAME, believed_mass, (each,) * 4, felt, DT)
+        a = GRAVITY - thrust / believed_mass
+        seen = observe(seen, (0.0, 0.0, v), (0.0, 0.0, a), tuning, DT)
+        asked = vertical_acceleration(
+            law, (0.0, 0.0, z), seen.v, (0.0, 0.0, a), seen.d[2], REST_STATE, REST_INPUT
+        )
+        command = believed_mass * (GRAVITY - asked)
+        thrust = command + (thrust - command) * decay
+        z, v = z + DT * v, v + DT * (GRAVITY - thrust / true + d)
+        heights.append(z)
+    return np.array(heights)
+
+
+@pytest.mark.parametrize("amplitude", [0.1, 0.4, 0.8])
+def test_a_push_that_turns_once_it_is_taken_for_mass_needs_the_wider_height(
+    amplitude: float,
+) -> None:
+    loop = _tube()
+    push = amplitude * np.concatenate((np.ones(3000), -np.ones(500)))
+    reach = np.abs(_height_under(push, TrackingTuning())).max()
+    assert 0.7 * amplitude * loop.height < reach < 1.03 * amplitude * loop.height
+    # Without the memory the reach was 11.4 mm for 1 m/s^2.
+    assert reach > 0.0114 * amplitude
+    # The limit that was flown before cuts the disturbance that is seen then, from 0.6 m/s^2 on.
+    before = replace(TrackingTuning(), vertical_disturbance_limit=1.0)
+    assert limits_used(AIRFRAME, before, loop, 0.8)["vertical disturbance"] > 1.0
+    if amplitude == 0.8:
+        assert np.abs(_height_under(push, before)).max() > amplitude * loop.height
