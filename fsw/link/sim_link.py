@@ -1,5 +1,7 @@
 """The link to the simulator: one datagram in, one datagram out, per step.
 
+Only texts that have no room in the answer go ahead of it, in datagrams of their own.
+
 The simulator sends everything that belongs to step t_k with HIL_SENSOR last, as the barrier: either
 the true state, or what sensors have measured; its HEARTBEAT says which. The answer ends with
 exactly one HIL_ACTUATOR_CONTROLS of the same time stamp. In lockstep the simulator repeats a step
@@ -13,6 +15,7 @@ from enum import Enum
 from typing import Final, cast
 
 from fsw.link.inbox import Inbox
+from fsw.link.outbox import packed
 from fsw.link.udp_endpoint import Address
 from fsw.link.wire import decode, encode_replies, message_ids
 from fsw.link.wire.decode import Numbers
@@ -87,7 +90,7 @@ class SimLink:
         self._torque_scale = 1.0 / facts.joint_torque_max
         self._last_us = -1  # time of the newest step seen
         self._doubted_us = -1  # time of a step that was too far ahead
-        self._answer: tuple[int, bytes] = (-1, b"")
+        self._answer: tuple[int, list[bytes]] = (-1, [])
         self._acks: list[CommandAck] = []
         self._text_id = 0
         self._reported_us = -_REPORT_US
@@ -133,9 +136,10 @@ class SimLink:
         controls = self._writer.frame(message_ids.HIL_ACTUATOR_CONTROLS, *values)
         due = t_us - self._reported_us >= _REPORT_US
         if self._acks or outputs.texts or due or outputs.snapshot.mode is not self._reported_mode:
-            controls = self._mode(t_us, outputs.snapshot) + self._replies(outputs) + controls
-        self._answer = (t_us, controls)
-        self._endpoint.send(controls)
+            mode = self._mode(t_us, outputs.snapshot)
+            self._send((t_us, packed([mode, *self._replies(outputs), controls])))
+        else:
+            self._send((t_us, [controls]))
 
     def close(self) -> None:
         """Close the socket."""
@@ -223,10 +227,14 @@ class SimLink:
         return True
 
     def _repeat(self, t_us: int) -> None:
-        answered_us, answer = self._answer
-        if t_us == answered_us:
+        if t_us == self._answer[0]:
             self.retransmissions += 1
-            self._endpoint.send(answer)
+            self._send(self._answer)
+
+    def _send(self, answer: tuple[int, list[bytes]]) -> None:
+        self._answer = answer
+        for datagram in answer[1]:
+            self._endpoint.send(datagram)
 
     def _read_between_steps(self, frames: list[Frame]) -> None:
         """What ends the run, and measurements for which the next step has no room."""
@@ -244,14 +252,14 @@ class SimLink:
                     ack = CommandAck(_SHUTDOWN, _ACCEPTED, frame.system_id, frame.component_id)
                     self._endpoint.send(self._ack_frame(ack))
 
-    def _replies(self, outputs: TickOutputs) -> bytes:
+    def _replies(self, outputs: TickOutputs) -> list[bytes]:
         frames = [self._ack_frame(ack) for ack in self._acks]
         self._acks.clear()
         for text in outputs.texts:
             self._text_id = self._text_id % 0xFFFF + 1
             for values in encode_replies.status_texts(text, self._text_id):
                 frames.append(self._writer.frame(message_ids.STATUSTEXT, *values))
-        return b"".join(frames)
+        return frames
 
     def _mode(self, t_us: int, snapshot: FlightSnapshot) -> bytes:
         """HEARTBEAT: the simulator sees whether its trajectory is being flown."""
