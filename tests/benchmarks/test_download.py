@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import sys
 
+import pytest
+
 from benchmarks.download import MIN_MB_PER_S, Download, measure
 from pandion.display import Display
 
 
+@pytest.mark.long
 def test_a_log_comes_byte_for_byte_both_ways() -> None:
     fetched = measure(300_001, Display(sys.stderr))
     assert [(each.way, each.size, each.identical) for each in fetched.downloads] == [

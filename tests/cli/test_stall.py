@@ -90,6 +90,7 @@ def test_a_stall_of_a_half_ends_both_in_time_and_names_the_step(
     assert took_s <= PROMISED_S
 
 
+@pytest.mark.long
 def test_a_stall_shortly_before_the_end_is_no_pass(tmp_path: Path) -> None:
     """The simulator ends as planned, and the flight software has to be killed."""
     silent_s, reported = 0.0, ""

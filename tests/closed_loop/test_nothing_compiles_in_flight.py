@@ -62,7 +62,7 @@ FLIGHTS: dict[str, Callable[[], tuple[Flight, Callable[[Flight], None]]]] = {
         pytest.param("walls", marks=pytest.mark.long),
         pytest.param("workspace", marks=pytest.mark.long),
         "branches",  # walls and points
-        "setpoints",
+        pytest.param("setpoints", marks=pytest.mark.long),
     ],
 )
 def test_a_flight_finds_every_kernel_ready(name: str) -> None:

@@ -117,7 +117,13 @@ def test_a_point_beside_a_wall_that_is_in_the_way_is_in_the_ocp(seed: int) -> No
 
 
 @pytest.mark.parametrize("controller", ["hc", "sc", "blf"])
-@pytest.mark.parametrize("direction", [(1.0, 0.0, 0.0), (0.6, 0.8, 0.0), (0.0, 0.6, 0.8)])
+@pytest.mark.parametrize(
+    "direction",
+    [
+        (0.6, 0.8, 0.0),
+        *(pytest.param(v, marks=pytest.mark.long) for v in ((1.0, 0.0, 0.0), (0.0, 0.6, 0.8))),
+    ],
+)
 def test_at_rest_before_a_point_every_controller_is_held_by_it_as_written_a_second_time(
     controller: str, direction: Vec3
 ) -> None:
