@@ -24,7 +24,7 @@ class JointReferenceLimits:
     """What the joint loop needs of the joints' own limits to follow within them."""
 
     margin: float = 0.03  # rad, to the limits of the angles
-    rate: float = 4.0  # rad/s; a fifth of ``joint_rate_max`` is for the loop that follows
+    rate: float = 3.5  # rad/s; three tenths of ``joint_rate_max`` is for the loop that follows
 
 
 # 1/s. A link that is asked for no more than the rate of this many times its distance from its bound
