@@ -113,7 +113,7 @@ def joint_torques(
 
 
 # 1/s; somewhat quicker than the joint loop, which it overrules only where that would pass a limit.
-# From the rate of a reference, 3.5 rad/s, it brakes with 120 rad/s^2, for which the torques suffice.
+# From the rate of a reference, 3.5 rad/s, it brakes with 120 rad/s^2: for that torques suffice.
 _POLE = 30.0
 
 
