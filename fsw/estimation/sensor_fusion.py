@@ -80,6 +80,7 @@ class FusionMemory(NamedTuple):
     now: float = -1.0  # s, of the last tick; negative: there was none
     imu_came: float = -1.0  # s, when a reading came last; negative: never
     joints_came: float = -1.0
+    encoders: EncoderWatch = EncoderWatch()
     started: bool = False
     waiting: tuple[Waiting, ...] = ()
     arrivals: int = 0
@@ -89,7 +90,6 @@ class FusionMemory(NamedTuple):
     reset: Reset = Reset()
     gnss: GnssSample | None = None  # the newest one
     delay: float = 0.0  # s, that measurements have lately taken
-    encoders: EncoderWatch = EncoderWatch()
 
     def of(self, sensor: Sensor) -> Health:
         """What is known of a sensor."""
@@ -111,6 +111,11 @@ class FusionMemory(NamedTuple):
     def without(self, sensor: Sensor) -> list[Health]:
         """What is known of the other sensors."""
         return [one for one in self.health if one.sensor is not sensor]
+
+    def watching(self, encoders: EncoderWatch) -> FusionMemory:
+        """The memory with a newer watch of the encoders."""
+        came = self.imu_came, self.joints_came
+        return FusionMemory(self.numbers, self.now, *came, encoders, *self[5:])
 
     def jumped(
         self, position: Vec3 = _REST, velocity: Vec3 = _REST, turn: Vec4 = _NO_TURN

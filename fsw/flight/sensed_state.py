@@ -140,7 +140,7 @@ def _without_stuck(
             if watch.stuck and not before.stuck:
                 memory = _at_rest(memory, one.angles)
     if watch is not before:
-        memory = memory._replace(encoders=watch)
+        memory = memory.watching(watch)
     if watch.stuck:
         samples = tuple([one for one in samples if not isinstance(one, JointSample)])
     return memory, samples
@@ -163,7 +163,7 @@ def _watched(
         held = abs(first) > _HELD[0] or abs(second) > _HELD[1]
         moved = max(abs(asked[0] - watch.asked[0]), abs(asked[1] - watch.asked[1]))
         stuck = held and moved > _ASKED
-    return watch._replace(repeats=repeats, stuck=stuck)
+    return EncoderWatch(watch.angles, watch.asked, repeats, stuck)
 
 
 def _at_rest(memory: FusionMemory, angles: Vec2) -> FusionMemory:

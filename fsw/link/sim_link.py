@@ -214,15 +214,12 @@ class SimLink:
             return None
         self._inbox.accept_samples(samples)
         newest = samples[-1] if samples else None
+        rate, force = _NO_VECTOR, _NO_VECTOR
+        if type(newest) is ImuSample:
+            rate, force = newest.rate, newest.acceleration
+        # By position: it is made in every tick.
         return SensorFrame(
-            t_us,
-            p_WB=_NO_VECTOR,
-            v_WB=_NO_VECTOR,
-            q_WB=_NO_ATTITUDE,
-            gyro_B=newest.rate if isinstance(newest, ImuSample) else _NO_VECTOR,
-            accel_B=newest.acceleration if isinstance(newest, ImuSample) else _NO_VECTOR,
-            q_arm=_NO_JOINTS,
-            qd_arm=_NO_JOINTS,
+            t_us, _NO_VECTOR, _NO_VECTOR, _NO_ATTITUDE, rate, force, _NO_JOINTS, _NO_JOINTS
         )
 
     def _is_next(self, t_us: int) -> bool:

@@ -74,6 +74,10 @@ class Channel:
             if self._steady:
                 said = self._sensor.measure(exact, thrust, t_us + self._stamp_error_us, False)
                 if said is not None:
+                    if not self._latency_us and not under_way:
+                        out.append(said)
+                        self.next_us = self._due_us
+                        return
                     under_way.append((t_us + self._latency_us, said))
             else:
                 self._measure(exact, thrust)
