@@ -29,7 +29,10 @@ def complain(program: str, sentence: object) -> None:
 def json_text(value: Any, indent: int | None = None) -> str:
     """The value as JSON; what is not finite is null, for JSON knows no NaN."""
     separators = (",", ":") if indent is None else None
-    return json.dumps(_finite(value), indent=indent, separators=separators, allow_nan=False)
+    try:
+        return json.dumps(value, indent=indent, separators=separators, allow_nan=False)
+    except ValueError:
+        return json.dumps(_finite(value), indent=indent, separators=separators, allow_nan=False)
 
 
 def _finite(value: Any) -> Any:

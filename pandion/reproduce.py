@@ -107,7 +107,7 @@ def main(argv: list[str]) -> int:
 
 def _run(options: ReproduceOptions) -> int:
     from studies.campaign import Campaign
-    from studies.page import json_text, write
+    from studies.page import rows_text, write
 
     console = console_beside(options.json)
     settings = _settings(options)
@@ -128,7 +128,7 @@ def _run(options: ReproduceOptions) -> int:
     page = write(report, settings, _provenance(options), options.what, folder)
     _show(report, console)
     say(f"page {page}", console)
-    write_text(options.json, json_text(report))
+    write_text(options.json, rows_text(report))
     for error in report.errors:
         complain("pandion reproduce", error)
     return BROKEN if report.errors else DONE

@@ -244,8 +244,8 @@ def _number(value: Any, allowed: Range, path: str) -> float:
         raise ScenarioError(f"{path} = {_shown(value)}: must be a number ({allowed})")
     try:
         number = float(value)
-    except OverflowError:  # an integer beyond all floats
-        number = math.inf if value > 0 else -math.inf
+    except OverflowError:  # an integer beyond all floats; infinity may be allowed, and is not meant
+        number = math.nan
     if not allowed.contains(number):
         raise ScenarioError(f"{path} = {_shown(value)}: must be {allowed}")
     return number
