@@ -220,7 +220,7 @@ def _table_of_a_kind(kinds: list[Any], value: Any, path: str, key: str = "kind")
     if key not in value:
         raise ScenarioError(f'missing key "{path}.{key}": must be {_words(words)}')
     word = value[key]
-    if word not in words:
+    if not isinstance(word, str) or word not in words:
         raise ScenarioError(
             f"{path}.{key} = {_shown(word)}: must be {_words(words)}{_nearest(word, words)}"
         )

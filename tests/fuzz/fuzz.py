@@ -103,7 +103,9 @@ def _fuzz(name: str, words: list[str]) -> None:
     with ExitStack() as stack:
         attempt = SET_UPS[name](stack)
         limits = [f"-max_len={LONGEST}", f"-timeout={SLOWEST}", "-rss_limit_mb=2048"]
-        atheris.Setup(["fuzz", *words, f"-artifact_prefix={WORK / name}/", *limits], attempt)
+        # libFuzzer starts itself again by its first word to merge.
+        again = f"{sys.executable} -m tests.fuzz.fuzz {name} --here"
+        atheris.Setup([again, *words, f"-artifact_prefix={WORK / name}/", *limits], attempt)
         atheris.Fuzz()
 
 

@@ -101,6 +101,7 @@ def test_the_papers_cases_are_there() -> None:
         ("ramp_s = 2.0", "ramp = 2.0", ['"trajectory.ramp"', '"ramp_s"']),
         ("ramp_s = 2.0", "ramp_s = 6.0", ["trajectory.ramp_s = 6", "at most half"]),
         ('"airborne"', '"airbourne"', ["start.kind", '"airborne", "ground"', "did you mean"]),
+        ('"lissajous"', "[1.0]", ["trajectory.kind = [1.0]", '"lissajous"']),
         ('"lissajous"', '"lisajous"', ["trajectory.kind", "'lisajous'", '"lissajous"']),
         ("[0.1, 0.1, 0.1]", "[0.1, 0.1]", ["trajectory.amplitude_m", "array of 3 numbers"]),
         ("[0.1, 0.1, 0.1]", "[0.1, -1, 0.1]", ["trajectory.amplitude_m[1] = -1", "0 to 1000"]),
