@@ -49,9 +49,9 @@ SUITES, AIR, FAULTS, MODELS = (
     "Model errors and sensor errors",
 )
 
-# When the path of Case I has a second left to its nearest place to a wall: the front at 11, 51 and
-# 91 s, the right one at 16 and 76 s, the left one at 46 s.
-BESIDE_S: Final = (10.0, 15.0, 45.0, 50.0, 75.0, 90.0)
+# When the path of Case I has a second left to its nearest place to a wall: the front at 13, 53 and
+# 93 s, the right one at 18 and 78 s, the left one at 48 s.
+BESIDE_S: Final = (12.0, 17.0, 47.0, 52.0, 77.0, 92.0)
 _REST_S: Final = 5.0  # of the flight, after a fault that lasts no longer than two
 
 
@@ -147,7 +147,7 @@ def _real_air(wind_m_s: float, at_20_ft_m_s: float, *, disturbed: bool = True) -
         body_drag_m2=0.03,
         ground_effect=True,
         ceiling_effect=True,
-        wall_suction=0.02,
+        wall_suction=1.0 / 32.0,
     )
     actuators = ActuatorKeys(
         quadratic_thrust=True,

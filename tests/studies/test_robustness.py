@@ -10,8 +10,9 @@ import pytest
 from fsw.estimation.sensor_fault import Sensor, SensorFault, sentence
 from fsw.measurements import ImuSample, JointSample, PoseSample, Sample
 from fsw.signals import SensorFrame
+from sitl.mission_clock import MissionClock
 from sitl.scenario import AirKeys
-from sitl.scenario_file import scenario_names, suite_of
+from sitl.scenario_file import load_scenario, scenario_names, suite_of
 from sitl.sensors.keys import MeasuredSensors
 from sitl.simulation import START_US, STEP_US
 from studies import robustness
@@ -200,10 +201,27 @@ def test_the_seed_chooses_one_of_the_times() -> None:
     assert {every.start_s(seed) for seed in range(300, 320)} == set(robustness.BESIDE_S)
     (brief,) = chosen(Settings(suite="mocap", only="no pose for 2 s", duration_s=25.0))
     assert brief.fault is not None
-    assert brief.fault.begins_s == (10.0, 15.0)
+    assert brief.fault.begins_s == (12.0, 17.0)
     (briefer,) = chosen(Settings(suite="mocap", only="no pose for 2 s", duration_s=4.0))
     assert briefer.fault is not None
     assert briefer.fault.begins_s == (2.0,)
+
+
+def test_a_fault_begins_a_second_before_the_path_is_nearest_to_a_wall() -> None:
+    walls = load_scenario("walls")
+    clock = MissionClock(walls)
+
+    def room(time_s: float) -> float:
+        p = clock.target_at(time_s).p
+        return min(
+            sum(n * x for n, x in zip(wall.normal, p, strict=True)) - wall.offset_m
+            for wall in walls.walls
+        )
+
+    for begins in robustness.BESIDE_S:
+        nearest = room(begins + 1.0)
+        assert nearest < 0.08
+        assert nearest < min(room(begins + 0.5), room(begins + 1.5))
 
 
 def test_a_report_names_the_sensor_and_the_fault_by_the_time_that_it_is_over() -> None:
