@@ -114,8 +114,8 @@ class FusionMemory(NamedTuple):
 
     def watching(self, encoders: EncoderWatch) -> FusionMemory:
         """The memory with a newer watch of the encoders."""
-        came = self.imu_came, self.joints_came
-        return FusionMemory(self.numbers, self.now, *came, encoders, *self[5:])
+        x, now, imu_came, joints_came = self[:4]
+        return FusionMemory(x, now, imu_came, joints_came, encoders, *self[5:])
 
     def jumped(
         self, position: Vec3 = _REST, velocity: Vec3 = _REST, turn: Vec4 = _NO_TURN
