@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 PLAN_STALE_PERIODS: Final = 3
 INVALID_TICKS: Final = 5  # 10 ms without an estimate
+ROOM_LACKING: Final = 0.01  # m; a workspace has 1 mm to spare, motion capture asks for 2
 MIN_UP: Final = 0.34  # cosine of 70 degrees of tilt
 
 
@@ -64,6 +65,7 @@ class Condition(Enum):
     BREACH = "outside the safe set"
     POSITION_LOW = "position uncertain"
     SENSOR_LOST = "sensor lost"
+    ROOM_LACKING = "too little room for what the estimate is not sure of"
     TUBE_LEFT = "off the plan"
     FILTER_ACTIVE = "too fast towards a zone"
     PLAN_STALE = "no plan for three periods"
@@ -264,6 +266,13 @@ FAILSAFES: Final = (
         Severity.CRITICAL,
         _lost_sensor,
         of_vehicle=True,
+    ),
+    Failsafe(
+        Condition.ROOM_LACKING,
+        lambda c: c.state.kept.lacking > ROOM_LACKING and c.state.vehicle.flies,
+        _always(Action.WARN),
+        Severity.CRITICAL,
+        detail=lambda c: f": {1e3 * c.state.kept.lacking:.0f} mm less than SAFE_SIGMAS asks for",
     ),
     Failsafe(
         Condition.TUBE_LEFT,

@@ -46,8 +46,10 @@ class SensedState:
         estimate = self._fusion.warm_up()
         self._cascade.joint_acceleration(in_hover(AIRFRAME, estimate), estimate)
 
-    def covariance(self, memory: FusionMemory) -> Array:
-        """Covariance (17, 17) [SI] of the error of the last tick's estimate."""
+    def covariance(self, memory: FusionMemory | None) -> Array | None:
+        """Covariance (17, 17) [SI] of the error of the estimate of a memory; None before both."""
+        if memory is None or not memory.started:
+            return None
         return self._fusion.covariance(memory, memory.now)
 
     def estimate(
@@ -85,12 +87,18 @@ class SensedState:
         return state, memory, estimate
 
     def reported(
-        self, state: FlightState, memory: FusionMemory | None, estimate: StateEstimate
+        self,
+        state: FlightState,
+        memory: FusionMemory | None,
+        estimate: StateEstimate,
+        covariance: Array | None,
     ) -> FlightState:
-        """The state with what the estimator says about itself now; nothing before it started."""
-        if memory is None or not memory.started:
+        """The state with what the estimator says about itself now; nothing before it started.
+
+        ``covariance`` (17, 17) [SI] is of the error of the ``estimate``.
+        """
+        if memory is None or covariance is None:
             return state
-        covariance = self._fusion.covariance(memory, memory.now)
         report = estimator_report(memory, covariance, estimate, memory.now, self._stale)
         return replace(state, estimator=report, aiding=_aiding(state, memory, report))
 

@@ -15,6 +15,7 @@ from fsw.flight.failsafe import Condition
 from fsw.flight.mission_sequencer import MissionFlight
 from fsw.flight.offboard_setpoints import Tilt
 from fsw.flight.setpoint_generator import PositionGoal, ReferenceState
+from fsw.flight.uncertain_clearance import KeptSet
 from fsw.frozen import dataclass
 from fsw.model.airframe import AIRFRAME
 from fsw.signals import (
@@ -208,3 +209,4 @@ class FlightState:
     estimator: EstimatorReport | None = None  # what telemetry says of it, once a planning period
     aiding: Aiding = AIDED
     trust: FrameTrust = FrameTrust()  # where states are exact
+    kept: KeptSet = KeptSet()  # the safe set, with clearances for an estimate that is not sure

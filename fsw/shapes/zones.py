@@ -92,14 +92,21 @@ def surface(
     safe_set: SafeSet, zone: int, p: Vec3, t_us: int, target: EndEffectorTarget | None = None
 ) -> Surface | None:
     """``surfaces`` of one zone, by its number; None where that leaves it out; ``p`` [m, NED]."""
+    tried = planes(safe_set, zone, p, t_us, target)
+    return min(tried, key=lambda at: at.distance) if tried else None
+
+
+def planes(
+    safe_set: SafeSet, zone: int, p: Vec3, t_us: int, target: EndEffectorTarget | None = None
+) -> list[Surface]:
+    """All planes of a zone at ``p`` [m, NED]: several where it is to keep in; see ``surface``."""
     shift = shift_of(safe_set, zone, t_us, target)
     if shift is None:
-        return None
+        return []
     arrays = zone_arrays(safe_set)
     x, y, z = p[0] - shift[0], p[1] - shift[1], p[2] - shift[2]
-    planes = range(int(arrays[zone, PLANES]))
-    tried = [Surface(*_surface_at(arrays, zone, which, x, y, z)) for which in planes]
-    return min(tried, key=lambda at: at.distance)
+    which = range(int(arrays[zone, PLANES]))
+    return [Surface(*_surface_at(arrays, zone, one, x, y, z)) for one in which]
 
 
 def shift_of(
