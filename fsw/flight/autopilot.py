@@ -22,6 +22,7 @@ from fsw.control.cascade import (
 from fsw.control.safety_filter import NO_ZONES, moving_zones
 from fsw.control.safety_gate import gate
 from fsw.estimation.estimator import estimate_state
+from fsw.estimation.sensor_fusion import FusionMemory
 from fsw.flight.commander import Commander, acknowledgement
 from fsw.flight.exact_state import ExactState
 from fsw.flight.failsafe import FAULTS, Condition
@@ -150,7 +151,7 @@ class Autopilot:
             if mission is not state.mission:
                 state = replace(state, mission=mission)
             covariance = self._sensed.covariance(fusion)
-            state = self._keep_clear(state, estimate, covariance)
+            state = self._keep_clear(state, estimate, fusion, covariance)
             if flown and nominal is not None:
                 state, request, plan = self._request_plan(
                     state, estimate, nominal, plan, now_us, safety.replan
@@ -258,7 +259,11 @@ class Autopilot:
         return state, request, requested(plan, apply_us)
 
     def _keep_clear(
-        self, state: FlightState, estimate: StateEstimate, covariance: Array | None
+        self,
+        state: FlightState,
+        estimate: StateEstimate,
+        fusion: FusionMemory | None,
+        covariance: Array | None,
     ) -> FlightState:
         """The state with clearances that have grown by what the estimate is uncertain about now.
 
@@ -266,9 +271,10 @@ class Autopilot:
         are uncertain while they are doubted.
         """
         pose = None
-        if covariance is not None:
+        if covariance is not None and fusion is not None:
             pose = pose_covariance(covariance, estimate)
-        elif state.fusion is None and state.trust.doubted:
+            pose = pose + self._sensed.lasting_error(fusion, estimate)
+        elif fusion is None and state.trust.doubted:
             position, attitude = state.aiding.position_sigma, state.aiding.attitude_sigma
             pose = np.diag((position**2,) * 3 + (attitude**2,) * 3)
         kept = self._clearance.keep(state.kept, state.mission.safe_set, estimate, pose)

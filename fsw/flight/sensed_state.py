@@ -9,6 +9,7 @@ from fsw.control.cascade import Cascade, in_hover
 from fsw.estimation import kernels
 from fsw.estimation.dead_reckoning import moved_on
 from fsw.estimation.error_state import IMU_CAPACITY, Array
+from fsw.estimation.lasting_error import lasting_error
 from fsw.estimation.sensor_fault import Sensor, SensorFault, sentence
 from fsw.estimation.sensor_fusion import EncoderWatch, FusionMemory, SensorFusion, at_start
 from fsw.estimation.tuning import EstimatorTuning
@@ -39,6 +40,7 @@ class SensedState:
     def __init__(self, tuning: EstimatorTuning, cascade: Cascade) -> None:
         self._fusion = SensorFusion(tuning, cascade.law.dt)
         self._cascade = cascade
+        self._tuning = tuning
         self._stale = tuning.stale_time
 
     def warm_up(self) -> None:
@@ -51,6 +53,10 @@ class SensedState:
         if memory is None or not memory.started:
             return None
         return self._fusion.covariance(memory, memory.now)
+
+    def lasting_error(self, memory: FusionMemory, estimate: StateEstimate) -> Array:
+        """Covariance (6, 6) of position [m, NED] and attitude [rad, NED] besides the filter's."""
+        return lasting_error(memory, self._tuning, estimate)
 
     def estimate(
         self, state: FlightState, inputs: TickInputs, texts: list[StatusText]
