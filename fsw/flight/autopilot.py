@@ -23,6 +23,7 @@ from fsw.control.safety_filter import NO_ZONES, moving_zones
 from fsw.control.safety_gate import gate
 from fsw.estimation.estimator import estimate_state
 from fsw.estimation.sensor_fusion import FusionMemory
+from fsw.flight.accuracy_watch import AccuracyWatch
 from fsw.flight.commander import Commander, acknowledgement
 from fsw.flight.exact_state import ExactState
 from fsw.flight.failsafe import FAULTS, Condition
@@ -95,6 +96,7 @@ class Autopilot:
         )
         self._sensed = SensedState(config.estimator, self._cascade)
         self._exact = ExactState(self._cascade)
+        self._accuracy = AccuracyWatch(config, self._safe_sets.loop_tube)
         self._clearance = UncertainClearance(
             config.limits.clearance_sigmas,
             body_of(config.planner.body, config.airframe),
@@ -144,7 +146,9 @@ class Autopilot:
         flown = state.vehicle.flies and nominal is not None
         if flown and nominal is not None:
             nominal, plan, u = self._plans.follow(plan, nominal, inputs.plan, now_us, ticks)
-        safety = self._watch.off_plan(state.safety, estimate, nominal if flown else None)
+        safety = self._watch.off_plan(
+            state.safety, estimate, nominal if flown else None, state.accuracy.reach
+        )
         request = None
         if planning_due:
             mission = self._safe_sets.hold_silent_zones(state.mission, now_us)
@@ -159,6 +163,7 @@ class Autopilot:
                 safety = replace(safety, replan=False) if safety.replan else safety
             state = self._report_slowly(state, estimate, now_us)
             state = self._sensed.reported(state, fusion, estimate, covariance)
+            state = self._see_accuracy(state, covariance, texts)
             safety = self._watch.breach(safety, estimate, state.constraints, flies=flown)
         sent, memory, replaced, (pushed, margin) = self._actuate(state, estimate, nominal, u, ticks)
         if pushed or safety.filter_us >= 0:
@@ -190,6 +195,7 @@ class Autopilot:
             state.aiding,
             state.trust,
             state.kept,
+            state.accuracy,
         )
         snapshot = _snapshot(state, estimate, u, inputs)
         return state, TickOutputs(
@@ -257,6 +263,18 @@ class Autopilot:
             joint_targets=joints,
         )
         return state, request, requested(plan, apply_us)
+
+    def _see_accuracy(
+        self, state: FlightState, covariance: Array | None, texts: list[StatusText]
+    ) -> FlightState:
+        """Say what the sensors' errors add to the tube, once that is known."""
+        if covariance is None or state.accuracy.told:
+            return state
+        safe_set, source = state.kept.source, state.aiding.pose.value
+        sure = self._accuracy.see(
+            state.accuracy, state.t_us, safe_set, source, state.kept.sigma, covariance, texts
+        )
+        return replace(state, accuracy=sure)
 
     def _keep_clear(
         self,

@@ -13,6 +13,7 @@ from enum import Enum
 from typing import TYPE_CHECKING, Final
 
 from fsw.estimation.sensor_fault import sentence
+from fsw.flight.uncertain_clearance import LACKING
 from fsw.frozen import dataclass as value_dataclass
 from fsw.parameters.flight_config import FlightConfig, FlightLimits
 from fsw.signals import Charge, Mode, Severity, StateEstimate
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 
 PLAN_STALE_PERIODS: Final = 3
 INVALID_TICKS: Final = 5  # 10 ms without an estimate
-ROOM_LACKING: Final = 0.01  # m; a workspace has 1 mm to spare, motion capture asks for 2
+_LACKING_US: Final = 300_000  # without room enough; an estimate that starts in flight is unsure
 MIN_UP: Final = 0.34  # cosine of 70 degrees of tilt
 
 
@@ -153,6 +154,12 @@ def _on_datalink_lost(context: FailsafeContext) -> Action:
     return known.get(context.limits.station_loss_action, Action.NONE)
 
 
+def _lacks_room(context: FailsafeContext) -> bool:
+    kept = context.state.kept
+    lasts = context.estimate.t_us - kept.ample_us >= _LACKING_US
+    return kept.lacking > LACKING and lasts and context.state.vehicle.flies
+
+
 def _on_battery(context: FailsafeContext) -> Action:
     """COM_LOW_BAT_ACT: 0 warn, 2 land when critical, 3 return then and land in an emergency."""
     action = {
@@ -269,7 +276,7 @@ FAILSAFES: Final = (
     ),
     Failsafe(
         Condition.ROOM_LACKING,
-        lambda c: c.state.kept.lacking > ROOM_LACKING and c.state.vehicle.flies,
+        _lacks_room,
         _always(Action.WARN),
         Severity.CRITICAL,
         detail=lambda c: f": {1e3 * c.state.kept.lacking:.0f} mm less than SAFE_SIGMAS asks for",

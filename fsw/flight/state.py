@@ -10,6 +10,7 @@ from fsw.control.tracking import Observed
 from fsw.estimation.frame_trust import FrameTrust
 from fsw.estimation.sensor_fault import Sensor, SensorFault
 from fsw.estimation.sensor_fusion import FusionMemory
+from fsw.flight.accuracy_watch import AccuracyMemory
 from fsw.flight.command_dedup import AnsweredCommand
 from fsw.flight.failsafe import Condition
 from fsw.flight.mission_sequencer import MissionFlight
@@ -210,3 +211,4 @@ class FlightState:
     aiding: Aiding = AIDED
     trust: FrameTrust = FrameTrust()  # where states are exact
     kept: KeptSet = KeptSet()  # the safe set, with clearances for an estimate that is not sure
+    accuracy: AccuracyMemory = AccuracyMemory()  # of the estimate, until it is told

@@ -38,6 +38,7 @@ _STEP: Final = 1e-3  # m, by which clearances grow, so that most ticks have the 
 _SLACK: Final = 2e-3  # m, by which one must be too large before it shrinks
 _MOST: Final = 0.5  # m; a place that is lost altogether is none to plan from
 _AMPLE: Final = 0.01  # m; zones that grow by less are not searched for room
+LACKING: Final = 0.01  # m of room; a workspace has 1 mm to spare, motion capture asks for 3
 _NEAR: Final = 2.0  # m; zones farther off leave room enough
 _RIM: Final = 8  # places around a disc: an octagon around its rim, in which a convex function is
 _SHARES: Final = 6  # bisections of what there is room for
@@ -51,12 +52,17 @@ class KeptSet(NamedTuple):
     safe_set: SafeSet = SafeSet()  # kept; the same object where nothing was added
     added: tuple[float, ...] = ()  # m, to the clearance of each zone; empty: nothing
     lacking: float = 0.0  # m, what there is no room for, of the zone that lacks most
+    ample_us: int = -1  # when there was room enough last; -1: not known yet
+    sigma: float = 0.0  # m, standard deviation of the least certain part along its worst axis
 
     def of(self, safe_set: SafeSet) -> KeptSet:
         """The same for another safe set in force, until the next planning tick knows better."""
         if safe_set is self.source:
             return self
-        return _grown(safe_set, (max(self.added, default=0.0),) * len(safe_set.zones), self.lacking)
+        added = (max(self.added, default=0.0),) * len(safe_set.zones)
+        return _grown(safe_set, added)._replace(
+            lacking=self.lacking, ample_us=self.ample_us, sigma=self.sigma
+        )
 
 
 class UncertainClearance:
@@ -78,17 +84,25 @@ class UncertainClearance:
         ``pose`` (6, 6) [m, rad, NED] is the covariance of the estimate's position and attitude;
         None where states are exact.
         """
-        if pose is None or not self._sigmas > 0.0 or not safe_set.zones:
+        if pose is None or not safe_set.zones:
             return before if before.safe_set is safe_set else KeptSet(safe_set, safe_set)
         levers = self._levers(estimate)
-        wanted = self._wanted(safe_set, place_covariances(pose, levers))
+        covariances = place_covariances(pose, levers)
+        along_any = np.sqrt(np.maximum(np.linalg.eigvalsh(covariances)[:, -1], 0.0))
+        sigma = float(along_any.max())
+        if not self._sigmas > 0.0:
+            return KeptSet(safe_set, safe_set, sigma=sigma)
+        wanted = self._wanted(safe_set, covariances, along_any)
         if len(before.added) == len(wanted):
             wanted = tuple(map(_settled, wanted, before.added))
         granted = self._granted(safe_set, estimate, levers, wanted)
-        if safe_set is before.source and granted == before.added:
-            return before
         lacking = max(map(float.__sub__, wanted, granted))
-        return _grown(safe_set, granted, lacking)
+        kept = before
+        if safe_set is not before.source or granted != before.added:
+            kept = _grown(safe_set, granted)
+        lacks = lacking > LACKING and before.ample_us >= 0
+        ample_us = before.ample_us if lacks else estimate.t_us
+        return kept._replace(lacking=lacking, ample_us=ample_us, sigma=sigma)
 
     def _levers(self, estimate: StateEstimate) -> Array:
         """From the base to each place of the body (places, 3) [m, NED]."""
@@ -102,19 +116,18 @@ class UncertainClearance:
         levers: Array = np.concatenate((self._on_base, on_arm)) @ turn.T
         return levers
 
-    def _wanted(self, safe_set: SafeSet, covariances: Array) -> tuple[float, ...]:
+    def _wanted(self, safe_set: SafeSet, covariances: Array, along_any: Array) -> tuple[float, ...]:
         """k sigma at each zone [m], in steps; of the base alone where a zone keeps only that."""
-        along_any = np.linalg.eigvalsh(covariances)[:, -1]
         wanted = []
         for zone in safe_set.zones:
             kind = kind_of(zone.shape)
             if kind.flat:
                 n = np.array(zone.shape.numbers[:3])
-                most = float((covariances @ n @ n).max())
+                most = math.sqrt(max(float((covariances @ n @ n).max()), 0.0))
             else:
                 most = float(along_any[0] if kind.follows_target else along_any.max())
             # Not "min": what is not a number is lost.
-            more = self._sigmas * math.sqrt(max(most, 0.0))
+            more = self._sigmas * most
             wanted.append(_stepped(more) if more < _MOST else _MOST)
         return tuple(wanted)
 
@@ -143,14 +156,14 @@ class UncertainClearance:
         return tuple(granted)
 
 
-def _grown(safe_set: SafeSet, added: tuple[float, ...], lacking: float) -> KeptSet:
+def _grown(safe_set: SafeSet, added: tuple[float, ...]) -> KeptSet:
     if not max(added, default=0.0) > 0.0:
-        return KeptSet(safe_set, safe_set, added, lacking)
+        return KeptSet(safe_set, safe_set, added)
     zones = [
         replace(zone, clearance=zone.clearance + more)
         for zone, more in zip(safe_set.zones, added, strict=True)
     ]
-    return KeptSet(safe_set, SafeSet(tuple(zones)), added, lacking)
+    return KeptSet(safe_set, SafeSet(tuple(zones)), added)
 
 
 def _stepped(more: float) -> float:
