@@ -53,6 +53,8 @@ class KeptSet(NamedTuple):
     added: tuple[float, ...] = ()  # m, to the clearance of each zone; empty: nothing
     lacking: float = 0.0  # m, what there is no room for, of the zone that lacks most
     ample_us: int = -1  # when there was room enough last; -1: not known yet
+    spread: tuple[float, ...] = ()  # m, k sigma at each zone
+    t_us: int = 0  # at that time
     sigma: float = 0.0  # m, standard deviation of the least certain part along its worst axis
 
     def of(self, safe_set: SafeSet) -> KeptSet:
@@ -69,9 +71,19 @@ class UncertainClearance:
     """Grows the clearances of one configuration."""
 
     def __init__(
-        self, sigmas: float, body: Body, lengths: Vec2, tunings: tuple[BarrierTuning, BarrierTuning]
+        self,
+        sigmas: float,
+        body: Body,
+        lengths: Vec2,
+        tunings: tuple[BarrierTuning, BarrierTuning],
+        lag: float,
     ) -> None:
-        """Keep ``sigmas`` [1] standard deviations for a body with links of ``lengths`` [m]."""
+        """Keep ``sigmas`` [1] standard deviations for a body with links of ``lengths`` [m].
+
+        A plan takes effect after ``lag`` [s] on average.
+        """
+        # A plan keeps S(d) + n v: against a boundary that comes at r, d is less by r / k_S.
+        self._lead = 1.0 / tunings[0].slope + lag
         self._sigmas, self._lengths = sigmas, lengths
         self._on_base, self._on_links, self._radii = _places(body)
         self._stand_off, self._stand_off_inside = (stand_off(one) for one in tunings)
@@ -92,9 +104,8 @@ class UncertainClearance:
         sigma = float(along_any.max())
         if not self._sigmas > 0.0:
             return KeptSet(safe_set, safe_set, sigma=sigma)
-        wanted = self._wanted(safe_set, covariances, along_any)
-        if len(before.added) == len(wanted):
-            wanted = tuple(map(_settled, wanted, before.added))
+        spread = self._spread(safe_set, covariances, along_any)
+        wanted = self._ahead(before, spread, estimate.t_us)
         granted = self._granted(safe_set, estimate, levers, wanted)
         lacking = max(map(float.__sub__, wanted, granted))
         kept = before
@@ -102,7 +113,9 @@ class UncertainClearance:
             kept = _grown(safe_set, granted)
         lacks = lacking > LACKING and before.ample_us >= 0
         ample_us = before.ample_us if lacks else estimate.t_us
-        return kept._replace(lacking=lacking, ample_us=ample_us, sigma=sigma)
+        return kept._replace(
+            lacking=lacking, ample_us=ample_us, spread=spread, t_us=estimate.t_us, sigma=sigma
+        )
 
     def _levers(self, estimate: StateEstimate) -> Array:
         """From the base to each place of the body (places, 3) [m, NED]."""
@@ -116,9 +129,25 @@ class UncertainClearance:
         levers: Array = np.concatenate((self._on_base, on_arm)) @ turn.T
         return levers
 
-    def _wanted(self, safe_set: SafeSet, covariances: Array, along_any: Array) -> tuple[float, ...]:
-        """k sigma at each zone [m], in steps; of the base alone where a zone keeps only that."""
-        wanted = []
+    def _ahead(self, before: KeptSet, spread: tuple[float, ...], now_us: int) -> tuple[float, ...]:
+        """What clearances are to grow by [m], in steps: k sigma as it will be when plans can act.
+
+        A boundary that comes nearer is met by a plan that is on its way back from it.
+        """
+        elapsed = 1e-6 * (now_us - before.t_us)
+        wanted = list(spread)
+        if len(before.spread) == len(spread) and elapsed > 0.0:
+            for k, then in enumerate(before.spread):
+                wanted[k] += self._lead * max(spread[k] - then, 0.0) / elapsed
+        # Not "min": what is not a number is lost.
+        stepped = [_stepped(more) if more < _MOST else _MOST for more in wanted]
+        if len(before.added) == len(stepped):
+            return tuple(map(_settled, stepped, before.added))
+        return tuple(stepped)
+
+    def _spread(self, safe_set: SafeSet, covariances: Array, along_any: Array) -> tuple[float, ...]:
+        """k sigma at each zone [m]; of the base alone where a zone keeps only that."""
+        spread = []
         for zone in safe_set.zones:
             kind = kind_of(zone.shape)
             if kind.flat:
@@ -126,10 +155,8 @@ class UncertainClearance:
                 most = math.sqrt(max(float((covariances @ n @ n).max()), 0.0))
             else:
                 most = float(along_any[0] if kind.follows_target else along_any.max())
-            # Not "min": what is not a number is lost.
-            more = self._sigmas * most
-            wanted.append(_stepped(more) if more < _MOST else _MOST)
-        return tuple(wanted)
+            spread.append(self._sigmas * most)
+        return tuple(spread)
 
     def _granted(
         self, safe_set: SafeSet, estimate: StateEstimate, levers: Array, wanted: tuple[float, ...]
