@@ -102,8 +102,10 @@ class Autopilot:
             body_of(config.planner.body, config.airframe),
             config.airframe.link_length,
             config.planner.tunings,
-            # Half a period until one is asked for, and what it takes then.
-            0.5 * config.planner.period + config.plan_delay_ticks * tick,
+            # Half a period until one is asked for, what it takes then, and the loop's own lag.
+            0.5 * config.planner.period
+            + config.plan_delay_ticks * tick
+            + self._cascade.law.filter.lag,
         )
         self._zones: tuple[KeptSet, EndEffectorTarget | None, Array] = (KeptSet(), None, NO_ZONES)
         self._ticks_per_plan = config.mpc_period_us // config.tick_period_us

@@ -249,7 +249,7 @@ class SafeSetCheck:
     ) -> ConstraintReport:
         """Margins and barrier values of the vehicle in the safe set in force."""
         report = self._margins.report(kept.source, estimate, target)
-        return replace(report, added=kept.added) if kept.added else report
+        return replace(report, added=kept.added, lacking=kept.lacking) if kept.added else report
 
 
 def _is_repeated(announcement: SafeSetAnnouncement, refused: SafeSetAnnouncement | None) -> bool:

@@ -35,7 +35,7 @@ from fsw.shapes.zones import planes
 from fsw.signals import SafeSet, StateEstimate, Vec2
 
 _STEP: Final = 1e-3  # m, by which clearances grow, so that most ticks have the same ones
-_SLACK: Final = 2e-3  # m, by which one must be too large before it shrinks
+_SLACK: Final = 4e-3  # m, by which one must be too large before it shrinks
 _MOST: Final = 0.5  # m; a place that is lost altogether is none to plan from
 _AMPLE: Final = 0.01  # m; zones that grow by less are not searched for room
 LACKING: Final = 0.01  # m of room; a workspace has 1 mm to spare, motion capture asks for 3
@@ -43,6 +43,9 @@ _NEAR: Final = 2.0  # m; zones farther off leave room enough
 _RIM: Final = 8  # places around a disc: an octagon around its rim, in which a convex function is
 _SHARES: Final = 6  # bisections of what there is room for
 _PASSES: Final = 60  # over all planes; in a corner they have to settle
+
+
+_LOST: Final = np.eye(6)  # m^2, rad^2
 
 
 class KeptSet(NamedTuple):
@@ -80,7 +83,7 @@ class UncertainClearance:
     ) -> None:
         """Keep ``sigmas`` [1] standard deviations for a body with links of ``lengths`` [m].
 
-        A plan takes effect after ``lag`` [s] on average.
+        A plan takes effect, and the vehicle follows it, after ``lag`` [s] on average.
         """
         # A plan keeps S(d) + n v: against a boundary that comes at r, d is less by r / k_S.
         self._lead = 1.0 / tunings[0].slope + lag
@@ -98,6 +101,8 @@ class UncertainClearance:
         """
         if pose is None or not safe_set.zones:
             return before if before.safe_set is safe_set else KeptSet(safe_set, safe_set)
+        if not np.isfinite(pose).all():
+            pose = _LOST
         levers = self._levers(estimate)
         covariances = place_covariances(pose, levers)
         along_any = np.sqrt(np.maximum(np.linalg.eigvalsh(covariances)[:, -1], 0.0))
@@ -139,8 +144,7 @@ class UncertainClearance:
         if len(before.spread) == len(spread) and elapsed > 0.0:
             for k, then in enumerate(before.spread):
                 wanted[k] += self._lead * max(spread[k] - then, 0.0) / elapsed
-        # Not "min": what is not a number is lost.
-        stepped = [_stepped(more) if more < _MOST else _MOST for more in wanted]
+        stepped = [min(_stepped(more), _MOST) for more in wanted]
         if len(before.added) == len(stepped):
             return tuple(map(_settled, stepped, before.added))
         return tuple(stepped)
