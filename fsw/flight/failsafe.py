@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 PLAN_STALE_PERIODS: Final = 3
 INVALID_TICKS: Final = 5  # 10 ms without an estimate
-_LACKING_US: Final = 300_000  # without room enough; an estimate that starts in flight is unsure
+_LACKING_US: Final = 500_000  # without room enough; hidden markers, 0.2 s, are none
 MIN_UP: Final = 0.34  # cosine of 70 degrees of tilt
 
 
