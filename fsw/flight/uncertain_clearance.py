@@ -31,7 +31,7 @@ from fsw.model.body import ON_BASE, ON_LINK1, Body
 from fsw.model.kinematics import links
 from fsw.parameters.consistency import stand_off
 from fsw.shapes import kind_of
-from fsw.shapes.zones import planes
+from fsw.shapes.zones import all_planes
 from fsw.signals import SafeSet, StateEstimate, Vec2
 
 _STEP: Final = 1e-3  # m, by which clearances grow, so that most ticks have the same ones
@@ -167,21 +167,20 @@ class UncertainClearance:
     ) -> tuple[float, ...]:
         """What of the wanted growth [m] there is room for, with the stand-off of a plan at rest."""
         granted = list(wanted)
-        found: list[tuple[int, Array, float]] = []
         for k, zone in enumerate(safe_set.zones):
             if kind_of(zone.shape).follows_target:
                 room = zone.shape.numbers[-1] - zone.clearance - self._stand_off_inside
                 granted[k] = min(granted[k], max(math.floor(room / _STEP) * _STEP, 0.0))
-            elif max(wanted) > _AMPLE:
-                for at in planes(safe_set, k, estimate.p_WB, estimate.t_us):
-                    n = np.array(at.normal)
-                    room = at.distance + float((levers @ n - self._radii).min()) - self._stand_off
-                    if room < _NEAR:
-                        found.append((k, n, room))
-        if len(found) > 1:
-            growth = np.array([wanted[k] for k, _, _ in found])
-            rooms = _rooms(np.array([n for _, n, _ in found]), growth, [r for _, _, r in found])
-            for (k, _, _), room in zip(found, rooms, strict=True):
+        if not max(wanted) > _AMPLE:
+            return tuple(granted)
+        found = all_planes(safe_set, estimate.p_WB, estimate.t_us)
+        near = [(k, at) for k, at in found if at.distance < _NEAR]
+        if len(near) > 1:
+            normals = np.array([at.normal for _, at in near])
+            body = (levers @ normals.T - self._radii[:, None]).min(axis=0)
+            room_now = np.array([at.distance for _, at in near]) + body - self._stand_off
+            growth = np.array([wanted[k] for k, _ in near])
+            for (k, _), room in zip(near, _rooms(normals, growth, room_now), strict=True):
                 if room < granted[k]:
                     granted[k] = max(math.floor(room / _STEP) * _STEP, 0.0)
         return tuple(granted)
@@ -206,19 +205,18 @@ def _settled(wanted: float, before: float) -> float:
     return before if before - _SLACK <= wanted <= before else wanted
 
 
-def _rooms(normals: Array, growth: Array, room: list[float]) -> list[float]:
+def _rooms(normals: Array, growth: Array, there: Array) -> list[float]:
     """How much each plane (planes, 3) may grow by [m] so that some place keeps off them all.
 
-    ``growth`` (planes,) [m] is wanted, ``room`` [m] is there now. All are given the same share of
-    what they want, and those that are not in the way of others the rest.
+    ``growth`` (planes,) [m] is wanted, room is ``there`` (planes,) [m] now. All are given the same
+    share of what they want, and those that are not in the way of others the rest.
     """
-    there = np.array(room)
     shift = _kept_off(normals, there - growth)
     if shift is not None:
         return list(growth)
     low, high, best = 0.0, 1.0, _kept_off(normals, there)
     if best is None:
-        return [0.0] * len(room)  # there is none for a plan that is sure of its place, either
+        return [0.0] * len(there)  # there is none for a plan that is sure of its place, either
     for _ in range(_SHARES):
         share = 0.5 * (low + high)
         shift = _kept_off(normals, there - share * growth)

@@ -92,18 +92,23 @@ def surface(
     safe_set: SafeSet, zone: int, p: Vec3, t_us: int, target: EndEffectorTarget | None = None
 ) -> Surface | None:
     """``surfaces`` of one zone, by its number; None where that leaves it out; ``p`` [m, NED]."""
-    tried = planes(safe_set, zone, p, t_us, target)
-    return min(tried, key=lambda at: at.distance) if tried else None
-
-
-def planes(
-    safe_set: SafeSet, zone: int, p: Vec3, t_us: int, target: EndEffectorTarget | None = None
-) -> list[Surface]:
-    """All planes of a zone at ``p`` [m, NED]: several where it is to keep in; see ``surface``."""
     shift = shift_of(safe_set, zone, t_us, target)
     if shift is None:
-        return []
-    arrays = zone_arrays(safe_set)
+        return None
+    return min(_planes(zone_arrays(safe_set), zone, p, shift), key=lambda at: at.distance)
+
+
+def all_planes(safe_set: SafeSet, p: Vec3, t_us: int) -> list[tuple[int, Surface]]:
+    """``surfaces`` with every plane of a zone to keep in, and the zone's number; no target."""
+    arrays, found = zone_arrays(safe_set), []
+    for zone in range(len(safe_set.zones)):
+        shift = shift_of(safe_set, zone, t_us, None)
+        if shift is not None:
+            found += [(zone, at) for at in _planes(arrays, zone, p, shift)]
+    return found
+
+
+def _planes(arrays: Array, zone: int, p: Vec3, shift: Vec3) -> list[Surface]:
     x, y, z = p[0] - shift[0], p[1] - shift[1], p[2] - shift[2]
     which = range(int(arrays[zone, PLANES]))
     return [Surface(*_surface_at(arrays, zone, one, x, y, z)) for one in which]
