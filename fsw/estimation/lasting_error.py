@@ -2,7 +2,9 @@
 
 The filter takes the errors of its readings for white noise, and is soon surer of its place than one
 of them is. But markers are not where they were measured, satellites' errors wander within minutes,
-and odometry on board walks off with its frame. Who keeps a clearance must count with all of it.
+and odometry on board walks off with its frame. A clearance must count with all of it.
+
+Source: docs/equations.md T7.
 """
 
 from __future__ import annotations

@@ -3,6 +3,8 @@
 Which sensors there are shows only when they speak. So the start-up analysis of what their errors
 add to the tube follows a few seconds after the first position, on the ground as a rule, and is
 made of the covariance that the estimator has found by then.
+
+Source: docs/equations.md T5.
 """
 
 from __future__ import annotations

@@ -244,7 +244,7 @@ def _kept_off(normals: Array, room: Array) -> Array | None:
 def pose_covariance(covariance: Array, estimate: StateEstimate) -> Array:
     """Covariance (6, 6) of position [m, NED] and attitude [rad, NED].
 
-    From that of the filter's error (17, 17) [SI], whose attitude is about the body's axes.
+    From the filter's ``covariance`` (17, 17) [SI], whose attitude is about the body's axes.
     """
     turn = np.eye(6)
     turn[3:, 3:] = np.reshape(estimate.R_WB, (3, 3))

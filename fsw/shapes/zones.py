@@ -99,7 +99,10 @@ def surface(
 
 
 def all_planes(safe_set: SafeSet, p: Vec3, t_us: int) -> list[tuple[int, Surface]]:
-    """``surfaces`` with every plane of a zone to keep in, and the zone's number; no target."""
+    """Every plane of each zone near ``p`` [m, NED] at a time, with the zone's number.
+
+    Of a zone to keep in there are several. Zones that follow the target are left out.
+    """
     arrays, found = zone_arrays(safe_set), []
     for zone in range(len(safe_set.zones)):
         shift = shift_of(safe_set, zone, t_us, None)
