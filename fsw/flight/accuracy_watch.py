@@ -21,8 +21,8 @@ from fsw.parameters.flight_config import FlightConfig
 from fsw.signals import SafeSet, Severity, StatusText, Vec3
 
 _WINDOW_US: Final = 1_000_000  # of which the worst instant counts
-_LEAST, _MOST = 4, 30  # windows before it is told, and after which it is told as it is
-_SETTLED: Final = 0.1  # share by which velocity and tilt may differ from the window before
+_LEAST, _MOST = 6, 30  # windows before it is told, and after which it is told as it is
+_SETTLED: Final = 0.05  # share by which velocity and tilt may differ from the window before
 
 
 class AccuracyMemory(NamedTuple):

@@ -51,14 +51,14 @@ def test_a_vehicle_whose_pose_is_lost_draws_back_from_the_wall_and_returns(spoil
         flight.run(0.5)
         places.append(flight.sim.truth().p_WB[1])
         grown.append(max(flight.state.kept.added))
-        # As a plan at rest would of a wall that is known: the reserve for disturbances is whole.
-        assert min(flight.state.constraints.margins) > max(flight.state.kept.spread) + 0.05
+        # Three deviations are kept at every time, and some of the reserve for disturbances.
+        assert min(flight.state.constraints.margins) > max(flight.state.kept.spread) + 0.02
     assert grown == sorted(grown)
     assert grown[-1] > 0.1
     assert places[-1] < places[0] - 0.1, "away from the wall"
-    flight.run(2.0)
+    flight.run(3.0)
     assert max(flight.state.kept.added) < 0.01
-    assert abs(flight.sim.truth().p_WB[1] - places[0]) < 0.02
+    assert abs(flight.sim.truth().p_WB[1] - places[0]) < 0.03
     assert flight.mode is Mode.HOLD
 
 

@@ -34,7 +34,7 @@ def seen(seconds: int, velocity: list[float], safe_set: SafeSet = WALLS) -> list
 
 
 def test_it_is_told_once_when_velocity_and_tilt_have_settled() -> None:
-    assert seen(3, [0.01]) == []
+    assert seen(5, [0.01]) == []
     (text,) = seen(60, [0.01])
     assert text.severity is Severity.WARNING or "enough" not in text.text
     assert "estimate from pose, 3 sigma" in text.text
@@ -63,7 +63,7 @@ def test_more_than_the_plan_keeps_is_a_warning_that_says_what_is_enough() -> Non
 
 def test_what_the_estimate_adds_is_kept_for_the_watch_of_the_tube() -> None:
     memory = AccuracyMemory()
-    for k in range(60):
+    for k in range(100):
         memory = WATCH.see(memory, 100_000 * k, WALLS, "pose", 0.001, covariance(0.01, 1e-3), [])
     expected = estimate_reach(CONFIG, Accuracy("pose", 0.001, 0.01, 1e-3)).loop
     assert memory.told
