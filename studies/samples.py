@@ -46,7 +46,9 @@ def sample(said: Measurement) -> Sample:
             return JointSample(time, (first, second))
         case PoseMeasurement():
             p, q = said.position_variance, said.attitude_variance
-            return PoseSample(time, said.p_WB, said.q_WB, (p, p, p), (q, q, q), said.resets)
+            drifts = said.from_cameras_on_board
+            pose, variance = (said.p_WB, said.q_WB), ((p, p, p), (q, q, q))
+            return PoseSample(time, *pose, *variance, said.resets, drifts)
         case GnssMeasurement():
             level, down = said.horizontal_deviation**2, said.vertical_deviation**2
             speed = (_VELOCITY_VARIANCE,) * 3

@@ -89,6 +89,8 @@ class FusionMemory(NamedTuple):
     reset_counter: int | None = None  # of the last pose
     reset: Reset = Reset()
     gnss: GnssSample | None = None  # the newest one
+    pose: PoseSample | None = None  # the last one that the filter has reached
+    frame_since: float = 0.0  # s, when the pose's own frame jumped last, or began
     delay: float = 0.0  # s, that measurements have lately taken
 
     def of(self, sensor: Sensor) -> Health:
@@ -401,9 +403,13 @@ class SensorFusion:
         health = health._replace(ratio=ratio, fused=fused, innovation=shown)
         if max(ratio) > 1.0:
             health = health.with_fault(SensorFault.JUMP, now)
-        counted = sample.reset_counter if isinstance(sample, PoseSample) else memory.reset_counter
-        announced = memory.reset_counter is not None and counted != memory.reset_counter
-        memory = memory.noting(health)._replace(reset_counter=counted)
+        memory, announced = memory.noting(health), False
+        if isinstance(sample, PoseSample):
+            counted = sample.reset_counter
+            announced = counted != memory.reset_counter
+            since = now if announced else memory.frame_since
+            announced = announced and memory.reset_counter is not None
+            memory = memory._replace(reset_counter=counted, pose=sample, frame_since=since)
         long_refused = now - min(fused) > self.tuning.reset_time
         if max(ratio) > 1.0 and (announced or long_refused):
             memory = self._reset(memory, one, ratio)

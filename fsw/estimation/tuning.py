@@ -51,6 +51,10 @@ class EstimatorTuning:
     delay_decay: float = 0.01  # s/s, by which it is forgotten how long they took
     position_floor: float = 2e-4  # m, the least standard deviation that a sensor is believed
     attitude_floor: float = 1e-3  # rad
+    # What odometry on board walks off by. Delmerico and Scaramuzza (ICRA 2018): 0.05 m and
+    # 0.5 degrees after 100 s of flight.
+    frame_drift: float = 5e-3  # m/sqrt(s), an axis
+    frame_turn: float = 8.7e-4  # rad/sqrt(s), about the vertical
     mag_noise: float = 0.01  # Gauss
     declination: float = 0.0  # rad
     ground: float = 0.0  # m, NED z of what the rangefinder measures against

@@ -8,6 +8,7 @@ from dataclasses import replace
 from fsw.control.cascade import Cascade, in_hover
 from fsw.estimation import kernels
 from fsw.estimation.error_state import IMU_CAPACITY, Array
+from fsw.estimation.lasting_error import lasting_error
 from fsw.estimation.sensor_fault import Sensor, SensorFault, sentence
 from fsw.estimation.sensor_fusion import EncoderWatch, FusionMemory, SensorFusion, at_start
 from fsw.estimation.tuning import EstimatorTuning
@@ -36,6 +37,7 @@ class SensedState:
     def __init__(self, tuning: EstimatorTuning, cascade: Cascade) -> None:
         self._fusion = SensorFusion(tuning, cascade.law.dt)
         self._cascade = cascade
+        self._tuning = tuning
         self._stale = tuning.stale_time
 
     def warm_up(self) -> None:
@@ -43,9 +45,15 @@ class SensedState:
         estimate = self._fusion.warm_up()
         self._cascade.joint_acceleration(in_hover(self._cascade.law.airframe, estimate), estimate)
 
-    def covariance(self, memory: FusionMemory) -> Array:
-        """Covariance (17, 17) [SI] of the error of the last tick's estimate."""
+    def covariance(self, memory: FusionMemory | None) -> Array | None:
+        """Covariance (17, 17) [SI] of the error of the estimate of a memory; None before both."""
+        if memory is None or not memory.started:
+            return None
         return self._fusion.covariance(memory, memory.now)
+
+    def lasting_error(self, memory: FusionMemory, estimate: StateEstimate) -> Array:
+        """Covariance (6, 6) of position [m, NED] and attitude [rad, NED] besides the filter's."""
+        return lasting_error(memory, self._tuning, estimate)
 
     def estimate(
         self, state: FlightState, inputs: TickInputs, texts: list[StatusText]
@@ -85,12 +93,18 @@ class SensedState:
         return state, memory, estimate
 
     def reported(
-        self, state: FlightState, memory: FusionMemory | None, estimate: StateEstimate
+        self,
+        state: FlightState,
+        memory: FusionMemory | None,
+        estimate: StateEstimate,
+        covariance: Array | None,
     ) -> FlightState:
-        """The state with what the estimator says about itself now; nothing before it started."""
-        if memory is None or not memory.started:
+        """The state with what the estimator says about itself now; nothing before it started.
+
+        ``covariance`` (17, 17) [SI] is of the error of the ``estimate``.
+        """
+        if memory is None or covariance is None:
             return state
-        covariance = self._fusion.covariance(memory, memory.now)
         report = estimator_report(memory, covariance, estimate, memory.now, self._stale)
         return replace(state, estimator=report, aiding=_aiding(state, memory, report))
 
