@@ -128,7 +128,7 @@ def unbelievable(
     speed = max(abs(v[0]), abs(v[1]), abs(v[2]))
     finite = math.isfinite(p[0] + p[1] + p[2] + v[0] + v[1] + v[2] + norm2)
     if not (finite and 0.5 < norm2 < 2.0 and place < _PLACE_LIMIT and speed < _SPEED_LIMIT):
-        never |= 1
+        never |= POSE
     else:
         R = matrix_from_quaternion(q)
         trace = 0.0
@@ -143,23 +143,23 @@ def unbelievable(
         apart = 0.5 * (trace - 1.0) < math.cos(min(turn, math.pi))
         room = _PLACE_JUMP + 0.5 * _STRONGEST * dt * dt
         if jump > room or change > _SPEED_JUMP + _STRONGEST * dt or apart:
-            far |= 1
+            far |= POSE
     rate = max(abs(w[0]), abs(w[1]), abs(w[2]))
     finite = math.isfinite(w[0] + w[1] + w[2] + f[2])
     if not (finite and rate < _RATE_LIMIT and abs(f[2]) < _FORCE_LIMIT):
-        never |= 2
+        never |= INERTIAL
     else:
         change = max(abs(w[0] - w0[0]), abs(w[1] - w0[1]), abs(w[2] - w0[2]))
         if change > _RATE_JUMP + _QUICKEST * dt or abs(-f[2] - f0) > _FORCE_JUMP:
-            far |= 2
+            far |= INERTIAL
     finite = math.isfinite(arm[0] + arm[1] + rates[0] + rates[1])
     if not (finite and max(abs(rates[0]), abs(rates[1])) < _RATE_LIMIT):
-        never |= 4
+        never |= JOINTS
     else:
         jump = max(abs(arm[0] - arm0[0] - dt * rates0[0]), abs(arm[1] - arm0[1] - dt * rates0[1]))
         change = max(abs(rates[0] - rates0[0]), abs(rates[1] - rates0[1]))
         if jump > _JOINT_JUMP + 10.0 * dt or change > _JOINT_RATE_JUMP:
-            far |= 4
+            far |= JOINTS
     return never, far
 
 
