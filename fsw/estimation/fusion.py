@@ -18,8 +18,8 @@ from fsw.estimation.error_state import (
     BG,
     DELAY,
     ERRORS,
+    FRAME,
     TH,
-    Array,
     P,
     V,
     correct,
@@ -227,9 +227,12 @@ def fuse_range(x: Any, law: Any, time: float, measured: float, variance: float) 
 
 
 @compilable
-def forget(M: Array, first: int, variance: Vec3) -> None:
-    """Give three errors of the covariance ``M`` (17, 17) [SI] a ``variance`` [SI, of M] anew."""
+def forget(x: Any, first: int, variance: Vec3) -> None:
+    """Give three errors of a state ``x`` [SI] a ``variance`` [SI, of x] anew."""
+    M = x.covariance
     for i in range(3):
+        for j in range(FRAME):
+            x.shared[first + i, j] = 0.0
         for j in range(ERRORS):
             M[first + i, j] = 0.0
             M[j, first + i] = 0.0

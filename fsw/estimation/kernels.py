@@ -15,6 +15,7 @@ from fsw.estimation.error_state import (
     COLUMNS,
     DELAY,
     ERRORS,
+    FRAME,
     IMU_CAPACITY,
     LOST,
     TH,
@@ -25,9 +26,11 @@ from fsw.estimation.error_state import (
     V,
     add_noise,
     advance,
+    carry,
     integrated,
     present,
     propagate,
+    transition,
     vec3,
     vec4,
 )
@@ -58,12 +61,21 @@ def _begin_tick(old: Filter, new: Filter, dt: float, u: Vec2) -> None:
     for i in range(ERRORS):
         for j in range(ERRORS):
             b.covariance[i, j] = a.covariance[i, j]
+    _copy_frame(a, b)
     for k in range(a.first - 1, a.end):
         for i in range(COLUMNS):
             b.imu[k % IMU_CAPACITY, i] = a.imu[k % IMU_CAPACITY, i]
     for i in range(2):
         angle, rate, disturbance = a.joints[i, 0], a.joints[i, 1], a.joints[i, 2]
         _keep_joint(b.joints[i], predicted(JointState(angle, rate, disturbance), u[i], dt))
+
+
+@compilable
+def _copy_frame(a: Any, b: Any) -> None:
+    b.drifts = a.drifts
+    for i in range(ERRORS):
+        for j in range(FRAME):
+            b.shared[i, j] = a.shared[i, j]
 
 
 @compilable
@@ -193,7 +205,7 @@ def _set_place(x: Filter, law: Law, time: float, p: Vec3, variance: Vec3) -> Vec
     )
     for i in range(3):
         s.p[i] += jump[i]
-    fusion.forget(s.covariance, P, variance)
+    fusion.forget(s, P, variance)
     return jump
 
 
@@ -204,7 +216,7 @@ def _set_velocity(x: Filter, law: Law, v: Vec3, variance: Vec3) -> Vec3:
     jump = (v[0] - s.v[0], v[1] - s.v[1], v[2] - s.v[2])
     for i in range(3):
         s.v[i] = v[i]
-    fusion.forget(s.covariance, V, variance)
+    fusion.forget(s, V, variance)
     return jump
 
 
@@ -214,7 +226,7 @@ def _set_attitude(x: Filter, law: Law, q: Vec4, variance: Vec3) -> None:
     s = x[0]
     for i in range(4):
         s.q[i] = q[i]
-    fusion.forget(s.covariance, TH, variance)
+    fusion.forget(s, TH, variance)
 
 
 @kernel
@@ -259,12 +271,14 @@ def _fuse_range(x: Filter, law: Law, time: float, measured: float, variance: flo
 
 
 @kernel
-def _present_covariance(x: Filter, law: Law, now: float, M: Array) -> None:
-    """The covariance (17, 17) of what ``_end_tick`` returned."""
+def _present_covariance(x: Filter, law: Law, now: float, M: Array, X: Array) -> None:
+    """The covariance (17, 17) of what ``_end_tick`` returned, and with the frame (17, 4)."""
     s, t = x[0], law[0].tuning
     for i in range(ERRORS):
         for j in range(ERRORS):
             M[i, j] = s.covariance[i, j]
+        for j in range(FRAME):
+            X[i, j] = s.shared[i, j]
     q, time = vec4(s.q), s.time
     p, v = vec3(s.p, 0), vec3(s.v, 0)
     for k in range(s.first - 1, s.end):
@@ -278,7 +292,9 @@ def _present_covariance(x: Filter, law: Law, now: float, M: Array) -> None:
         w = (row[4] - s.gyro_bias[0], row[5] - s.gyro_bias[1], row[6] - s.gyro_bias[2])
         dt = end - time
         if dt > 0.0:
-            propagate(M, matrix_from_quaternion(q), f, w, dt)
+            blocks = transition(matrix_from_quaternion(q), f, w, dt)
+            propagate(M, blocks, dt)
+            carry(X, blocks, dt)
             add_noise(M, t, dt, int(row[LOST]))
             p, v, q, _ = integrated(p, v, q, f, w, dt)
             time = end

@@ -18,7 +18,8 @@ import numpy as np
 
 from fsw.compiled import packed
 from fsw.estimation import kernels
-from fsw.estimation.error_state import ERRORS, FILTER, IMU_CAPACITY, Array, Filter
+from fsw.estimation.drift import FrameDrift
+from fsw.estimation.error_state import ERRORS, FILTER, FRAME, IMU_CAPACITY, Array, Filter
 from fsw.estimation.imu import STUCK_READINGS, TIME_TOLERANCE
 from fsw.estimation.joint_filter import joint_gain
 from fsw.estimation.sensor_checks import SENSOR_OF, Aiding, Health, arrived, believable
@@ -81,6 +82,7 @@ class FusionMemory(NamedTuple):
     health: tuple[Health, ...] = ()  # of each sensor heard so far
     field: Vec3 | None = None  # Gauss, body, the last one
     reset_counter: int | None = None  # of the last pose
+    frame: FrameDrift = FrameDrift()  # of poses that drift
     reset: Reset = Reset()
     now: float = -1.0  # s, of the last tick; negative: there was none
     imu_came: float = -1.0  # s, when a reading came last; negative: never
@@ -185,9 +187,11 @@ class SensorFusion:
 
     def covariance(self, memory: FusionMemory, now: float) -> Array:
         """Covariance (17, 17) [SI] of the error of the state at ``now`` [s]."""
-        found = np.empty((ERRORS, ERRORS))
-        kernels.present_covariance(memory.numbers, self._law, now, found)
-        return found
+        found, shared = np.empty((ERRORS, ERRORS)), np.empty((ERRORS, FRAME))
+        kernels.present_covariance(memory.numbers, self._law, now, found, shared)
+        if not memory.numbers[0]["drifts"]:
+            return found
+        return memory.frame.in_world(found, shared, memory.numbers[0])
 
     def _copied(self, memory: FusionMemory, now: float, u: Vec2) -> FusionMemory:
         """The memory with a filter of its own, whose joints are moved on."""
@@ -303,6 +307,14 @@ class SensorFusion:
     def _fuse_one(self, memory: FusionMemory, one: Waiting, now: float) -> FusionMemory:
         sample = one.sample
         health = memory.of(SENSOR_OF[type(sample)])
+        announced, drifts = False, False
+        if isinstance(sample, PoseSample):
+            announced = memory.reset_counter not in (None, sample.reset_counter)
+            drifts = sample.drifts
+            memory = memory._replace(reset_counter=sample.reset_counter)
+            if drifts:
+                memory = self._with_frame(memory, sample, announced)
+        before = memory.numbers[0].copy() if announced and drifts else None
         ratio = self._fuse[type(sample)](memory, sample)
         fused = health.fused or (now,) * len(ratio)
         fused = tuple([now if r <= 1.0 else before for r, before in zip(ratio, fused, strict=True)])
@@ -311,29 +323,46 @@ class SensorFusion:
         health = health._replace(ratio=ratio, fused=fused, innovation=shown)
         if max(ratio) > 1.0:
             health = health.with_fault(SensorFault.JUMP, now)
-        counted = sample.reset_counter if isinstance(sample, PoseSample) else memory.reset_counter
-        announced = memory.reset_counter is not None and counted != memory.reset_counter
-        memory = memory.noting(health)._replace(reset_counter=counted)
+        memory = memory.noting(health)
         long_refused = now - min(fused) > self.tuning.reset_time
         if max(ratio) > 1.0 and (announced or long_refused):
             memory = self._reset(memory, one, ratio)
             memory = memory.noting(health._replace(fused=(now,) * len(ratio)))
+        elif before is not None:
+            memory = memory.jumped(*_jump(before, memory.numbers[0]))
         return memory
+
+    def _with_frame(
+        self, memory: FusionMemory, sample: PoseSample, announced: bool
+    ) -> FusionMemory:
+        """The memory after a frame that drifts has moved, to where a pose says it is."""
+        stated = (
+            believable(sample.position_variance, self._least_p),
+            believable(sample.attitude_variance, self._least_q),
+        )
+        return memory._replace(frame=memory.frame.moved(memory.numbers[0], stated, announced))
+
+    def _noise(self, memory: FusionMemory, sample: PoseSample) -> tuple[Vec3, Vec3]:
+        """Variances [m^2, NED] and [rad^2, FRD] of a pose in its own frame."""
+        if sample.drifts:
+            return memory.frame.place_noise, memory.frame.attitude_noise
+        return (
+            believable(sample.position_variance, self._least_p),
+            believable(sample.attitude_variance, self._least_q),
+        )
 
     def _reset(self, memory: FusionMemory, one: Waiting, ratio: tuple[float, ...]) -> FusionMemory:
         """Take what the gate refused for long as it is."""
         x, law, sample = memory.numbers, self._law, one.sample
         place, velocity, turn = _REST, _REST, _NO_TURN
         if isinstance(sample, PoseSample):
-            variance = believable(sample.position_variance, self._least_p)
+            variance, about = self._noise(memory, sample)
             if ratio[0] > 1.0:
                 place = kernels.set_place(x, law, one.time, sample.position, variance)
             if ratio[1] > 1.0:
-                before = _attitude(x)
+                before = _attitude(x[0])
                 after = normalised(sample.attitude)
-                kernels.set_attitude(
-                    x, law, after, believable(sample.attitude_variance, self._least_q)
-                )
+                kernels.set_attitude(x, law, after, about)
                 turn = multiply(after, conjugate(before))
         elif isinstance(sample, GnssSample):
             if ratio[0] > 1.0:
@@ -353,8 +382,7 @@ class SensorFusion:
             sample.time,
             sample.position,
             normalised(sample.attitude),
-            believable(sample.position_variance, self._least_p),
-            believable(sample.attitude_variance, self._least_q),
+            *self._noise(memory, sample),
         )
 
     def _fuse_gnss(self, memory: FusionMemory, sample: GnssSample) -> tuple[float, ...]:
@@ -386,9 +414,16 @@ class SensorFusion:
         )
 
 
-def _attitude(x: Filter) -> Vec4:
-    w, i, j, k = x["q"][0].tolist()
+def _attitude(x: Any) -> Vec4:
+    w, i, j, k = x["q"].tolist()
     return w, i, j, k
+
+
+def _jump(before: Any, after: Any) -> tuple[Vec3, Vec3, Vec4]:
+    """Position [m, NED], velocity [m/s, NED] and turn [1] from one state to another."""
+    px, py, pz = (after["p"] - before["p"]).tolist()
+    vx, vy, vz = (after["v"] - before["v"]).tolist()
+    return (px, py, pz), (vx, vy, vz), multiply(_attitude(after), conjugate(_attitude(before)))
 
 
 def _levelled(x: Filter, field: Vec3, declination: float) -> Vec4:

@@ -106,10 +106,15 @@ def test_the_filter_is_as_sure_as_it_may_be(suite: Suite, duration: float) -> No
     assert low < nees(suite, runs, duration) < high
 
 
-def test_a_few_runs_are_as_sure_as_they_may_be() -> None:
+assert VIO.pose is not None
+EARLY = replace(VIO, pose=replace(VIO.pose, drift=0.02, recognises=0.6))
+
+
+@pytest.mark.parametrize("suite", [MOCAP, EARLY], ids=["mocap", "vio"])
+def test_a_few_runs_are_as_sure_as_they_may_be(suite: Suite) -> None:
     runs = 8
     low, high = chi2.ppf([0.025, 0.975], 15 * runs) / runs
-    assert low < nees(MOCAP, runs, 1.0) < high
+    assert low < nees(suite, runs, 1.0) < high
 
 
 def innovations(suite: Suite, seed: int, duration: float) -> tuple[float, int]:
@@ -303,6 +308,31 @@ def test_a_pose_that_has_moved_for_good_is_taken_and_the_jump_reported() -> None
     assert reset.number == 1
     np.testing.assert_allclose(reset.position, (-0.3, 0.0, 0.0), atol=0.02)
     np.testing.assert_allclose(flown.error()[:3], (0.3, 0.0, 0.0), atol=5e-3)
+
+
+def test_a_frame_that_drifts_makes_the_place_uncertain_and_no_number_of_poses_helps() -> None:
+    flown = Flown(run(VIO, 3, 1.9))
+    sigma = np.sqrt(np.diag(flown.fusion.covariance(flown.memory, flown.now)))
+    # What the poses have stated about the frame's walk, and not much more.
+    assert 5e-3 * math.sqrt(1.8) < sigma[:3].min() <= sigma[:3].max() < 5e-3 * math.sqrt(2.5)
+    assert flown.worst < 4.0
+    still = Flown(run(replace(VIO, pose=replace(VIO.pose, drift=0.0)), 3, 1.9))  # type: ignore[type-var]
+    sure = np.sqrt(np.diag(still.fusion.covariance(still.memory, still.now)))
+    assert sure[:3].max() < 2e-3
+
+
+def test_a_place_recognised_again_is_taken_at_once_and_reported_as_a_jump() -> None:
+    """Within the gate of so uncertain a place: no reading is refused."""
+    pose = replace(VIO.pose, drift=0.05, recognises=1.0, recognised=(1e-3, 1e-3))  # type: ignore[type-var]
+    for seed in range(3):
+        flown = Flown(run(replace(VIO, pose=pose), seed, 1.2))
+        reset = flown.memory.reset
+        assert reset.number == 1
+        assert np.linalg.norm(reset.position) > 0.03
+        assert not flown.found
+        assert flown.in_sigmas().max() < 3.5
+        sigma = np.sqrt(np.diag(flown.fusion.covariance(flown.memory, flown.now)))
+        assert sigma[:3].max() < 0.025  # of 0.15 s, and not of 1.2 s
 
 
 def test_a_jump_that_the_sensor_announces_is_taken_at_once() -> None:
