@@ -239,7 +239,7 @@ def _fuse_pose(
     p_variance: Vec3,
     q_variance: Vec3,
 ) -> tuple[float, float]:
-    return fusion.fuse_pose(x[0], law[0].tuning, time, p, q, p_variance, q_variance)
+    return fusion.fuse_pose(x[0], law[0].tuning, law[0].gates, time, p, q, p_variance, q_variance)
 
 
 @kernel
@@ -252,22 +252,22 @@ def _fuse_gnss(
     p_variance: Vec3,
     v_variance: Vec3,
 ) -> tuple[float, float]:
-    return fusion.fuse_gnss(x[0], law[0].tuning, time, p, v, p_variance, v_variance)
+    return fusion.fuse_gnss(x[0], law[0].tuning, law[0].gates, time, p, v, p_variance, v_variance)
 
 
 @kernel
 def _fuse_pressure(x: Filter, law: Law, time: float, altitude: float, variance: float) -> float:
-    return fusion.fuse_pressure(x[0], law[0].tuning, time, altitude, variance)
+    return fusion.fuse_pressure(x[0], law[0].tuning, law[0].gates, time, altitude, variance)
 
 
 @kernel
 def _fuse_heading(x: Filter, law: Law, time: float, field: Vec3) -> float:
-    return fusion.fuse_heading(x[0], law[0].tuning, time, field)
+    return fusion.fuse_heading(x[0], law[0].tuning, law[0].gates, time, field)
 
 
 @kernel
 def _fuse_range(x: Filter, law: Law, time: float, measured: float, variance: float) -> float:
-    return fusion.fuse_range(x[0], law[0].tuning, time, measured, variance)
+    return fusion.fuse_range(x[0], law[0].tuning, law[0].gates, time, measured, variance)
 
 
 @kernel

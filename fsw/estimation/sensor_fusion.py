@@ -19,7 +19,7 @@ import numpy as np
 from fsw.compiled import packed
 from fsw.estimation import kernels
 from fsw.estimation.drift import FrameDrift
-from fsw.estimation.error_state import ERRORS, FILTER, FRAME, IMU_CAPACITY, Array, Filter
+from fsw.estimation.error_state import DELAY, ERRORS, FILTER, FRAME, IMU_CAPACITY, Array, Filter
 from fsw.estimation.imu import STUCK_READINGS, TIME_TOLERANCE
 from fsw.estimation.joint_filter import joint_gain
 from fsw.estimation.sensor_checks import SENSOR_OF, Aiding, Health, arrived, believable
@@ -89,6 +89,7 @@ class FusionMemory(NamedTuple):
     joints_came: float = -1.0
     gnss: GnssSample | None = None  # the newest one
     delay: float = 0.0  # s, that measurements have lately taken
+    delay_sigma: float = 0.0  # s, with which the estimate of the pose's own delay began
     encoders: EncoderWatch = EncoderWatch()
 
     def of(self, sensor: Sensor) -> Health:
@@ -130,9 +131,10 @@ class SensorFusion:
     def __init__(self, tuning: EstimatorTuning, tick: float) -> None:
         """Design the joints' filter for a ``tick`` [s]."""
         self.tuning = tuning
-        self._law = packed(EstimatorLaw(tuning, joint_gain(tuning, tick)))
+        self._law = packed(EstimatorLaw(tuning, tuning.gates, joint_gain(tuning, tick)))
         self._least_p = tuning.position_floor**2
         self._least_q = tuning.attitude_floor**2
+        self._least_gnss = tuning.gnss_position_floor**2, tuning.gnss_velocity_floor**2
         self._fuse: dict[type, Callable[[FusionMemory, Any], tuple[float, ...]]] = {
             PoseSample: self._fuse_pose,
             GnssSample: self._fuse_gnss,
@@ -227,7 +229,10 @@ class SensorFusion:
         health, fault = arrived(before, sample, now, self.tuning, still=still)
         time = sample.time
         if isinstance(sample, PoseSample):
+            memory = self._with_delay_known(memory)
             time -= float(x["pose_delay"][0]) if memory.started else self.tuning.pose_delay
+        elif isinstance(sample, GnssSample):
+            time -= self.tuning.gnss_delay
         if not fault and memory.started and time < x["time"][0] - LATE:
             fault = SensorFault.TOO_OLD
             health = health.with_fault(fault, now)
@@ -242,6 +247,18 @@ class SensorFusion:
         if len(waiting) > 1 and waiting[-2].time > time:
             waiting = tuple(sorted(waiting))
         return memory._replace(waiting=waiting, arrivals=memory.arrivals + 1)
+
+    def _with_delay_known(self, memory: FusionMemory) -> FusionMemory:
+        """The memory after the parameters of the pose's delay may have changed in flight."""
+        x, sigma = memory.numbers[0], self.tuning.pose_delay_sigma
+        if not sigma:
+            x["pose_delay"] = self.tuning.pose_delay
+        if sigma == memory.delay_sigma or not memory.started:
+            return memory
+        M = x["covariance"]
+        M[DELAY], M[:, DELAY], x["shared"][DELAY] = 0.0, 0.0, 0.0
+        M[DELAY, DELAY] = sigma**2
+        return memory._replace(delay_sigma=sigma)
 
     def _with_delay(self, memory: FusionMemory, delay: float, apart: float) -> FusionMemory:
         """The memory after a measurement took so long, ``apart`` [s] from its sensor's last one."""
@@ -272,16 +289,16 @@ class SensorFusion:
                 tilt = self.tuning.tilt**2
                 self._begin(
                     memory,
-                    sample.time,
+                    sample.time - self.tuning.gnss_delay,
                     (sample.position, sample.velocity, level),
-                    believable(sample.position_variance, self._least_p),
-                    (tilt, tilt, self.tuning.heading**2),
+                    believable(sample.position_variance, self._least_gnss[0]),
+                    (tilt, tilt, self.tuning.start_heading**2),
                 )
                 kernels.couple_level(memory.numbers, self._law)
                 break
         else:
             return memory._replace(waiting=())
-        return memory._replace(started=True, waiting=())
+        return memory._replace(started=True, waiting=(), delay_sigma=self.tuning.pose_delay_sigma)
 
     def _begin(
         self,
@@ -366,10 +383,10 @@ class SensorFusion:
                 turn = multiply(after, conjugate(before))
         elif isinstance(sample, GnssSample):
             if ratio[0] > 1.0:
-                variance = believable(sample.position_variance, self._least_p)
+                variance = believable(sample.position_variance, self._least_gnss[0])
                 place = kernels.set_place(x, law, one.time, sample.position, variance)
             if ratio[1] > 1.0:
-                variance = believable(sample.velocity_variance, self._least_p)
+                variance = believable(sample.velocity_variance, self._least_gnss[1])
                 velocity = kernels.set_velocity(x, law, sample.velocity, variance)
         else:
             return memory
@@ -389,15 +406,15 @@ class SensorFusion:
         return kernels.fuse_gnss(
             memory.numbers,
             self._law,
-            sample.time,
+            sample.time - self.tuning.gnss_delay,
             sample.position,
             sample.velocity,
-            believable(sample.position_variance, self._least_p),
-            believable(sample.velocity_variance, self._least_p),
+            believable(sample.position_variance, self._least_gnss[0]),
+            believable(sample.velocity_variance, self._least_gnss[1]),
         )
 
     def _fuse_pressure(self, memory: FusionMemory, sample: PressureSample) -> tuple[float, ...]:
-        variance = max(sample.variance, self._least_p)
+        variance = max(sample.variance, self.tuning.pressure_floor**2)
         return (
             kernels.fuse_pressure(
                 memory.numbers, self._law, sample.time, sample.altitude, variance
@@ -408,7 +425,7 @@ class SensorFusion:
         return (kernels.fuse_heading(memory.numbers, self._law, sample.time, sample.field),)
 
     def _fuse_range(self, memory: FusionMemory, sample: RangeSample) -> tuple[float, ...]:
-        variance = max(sample.variance, self._least_p)
+        variance = max(sample.variance, self.tuning.range_floor**2)
         return (
             kernels.fuse_range(memory.numbers, self._law, sample.time, sample.distance, variance),
         )

@@ -13,6 +13,7 @@ from scipy.stats import chi2
 
 from fsw.estimation.sensor_fault import Sensor, SensorFault
 from fsw.estimation.sensor_fusion import FusionMemory, SensorFusion, at_start
+from fsw.estimation.tuning import chi_square
 from fsw.geometry.rotation import quaternion_from_matrix
 from fsw.measurements import GnssSample, ImuSample, PoseSample, Sample
 from fsw.signals import StateEstimate
@@ -382,3 +383,58 @@ def test_a_pose_later_than_all_delays_is_named() -> None:
     assert pose is not None
     flown = Flown(run(replace(MOCAP, pose=replace(pose, latency=0.3)), 3, 0.6))
     assert (Sensor.POSE, SensorFault.TOO_OLD) in flown.found
+
+
+@pytest.mark.parametrize(("known", "estimated"), [(0.012, 0.0), (0.0, 0.01)])
+def test_the_delay_of_the_pose_can_be_set_and_estimated_from_one_tick_to_the_next(
+    known: float, estimated: float
+) -> None:
+    """As a parameter that a ground station changes: another estimator, the same memory."""
+    assert MOCAP.pose is not None
+    suite = replace(MOCAP, pose=replace(MOCAP.pose, hidden_delay=0.012))
+    flown = run(suite, 0, 4.0)
+    before = SensorFusion(MOCAP.tuning, TICK)
+    tuning = replace(MOCAP.tuning, pose_delay=known, pose_delay_sigma=estimated)
+    after, memory, estimate = SensorFusion(tuning, TICK), at_start(), None
+    for now, samples in flown:
+        fusion = before if now < START + 1.0 else after
+        memory, estimate = fusion.step(memory, samples, now)
+    assert estimate is not None
+    assert memory.numbers[0]["pose_delay"] == pytest.approx(0.012, abs=2e-3)
+    sigma = np.sqrt(np.diag(after.covariance(memory, now)))[:9]
+    assert (abs(errors(estimate, flown, now)) / sigma).max() < 4.0
+
+
+def test_a_delay_of_satellites_that_is_known_is_taken_out() -> None:
+    assert RTK.gnss is not None
+    late = replace(RTK, tuning=replace(RTK.tuning, gnss_delay=0.06))
+
+    def stamped_late(now: float, sample: Sample) -> Sample:
+        return (
+            replace(sample, time=sample.time + 0.06) if isinstance(sample, GnssSample) else sample
+        )
+
+    run_as_known = Flown(replace_suite(run(RTK, 2, 3.0), late), stamped_late)
+    right = Flown(run(RTK, 2, 3.0))
+    np.testing.assert_allclose(run_as_known.error(), right.error(), atol=1e-6)
+
+
+def replace_suite(flown: Run, suite: Suite) -> Run:
+    """The same readings, for an estimator that takes its sensors for another suite."""
+    return replace(flown, suite=suite)
+
+
+def test_a_wider_gate_lets_a_farther_reading_in() -> None:
+    aside = at(1.2, lambda s: replace(s, position=(s.position[0] + 0.01, *s.position[1:])))
+    wide = replace(MOCAP, tuning=replace(MOCAP.tuning, pose_gate=20.0))
+    narrow = Flown(run(MOCAP, 4, 1.5), aside)
+    assert narrow.found == {(Sensor.POSE, SensorFault.JUMP)}
+    assert not Flown(replace_suite(run(MOCAP, 4, 1.5), wide), aside).found
+
+
+@pytest.mark.parametrize("readings", [1, 3])
+def test_gates_are_as_rare_as_so_many_deviations_of_one_reading(readings: int) -> None:
+    for sigmas in (1.0, 3.0, 5.0):
+        assert chi2.sf(chi_square(sigmas, readings), readings) == pytest.approx(
+            chi2.sf(sigmas**2, 1), rel=1e-6
+        )
