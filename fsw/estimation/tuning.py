@@ -58,7 +58,7 @@ class EstimatorTuning:
     pressure_floor: float = 0.2  # m: noise of a small barometer, 0.1 m, and gusts
     range_floor: float = 0.01  # m
     mag_noise: float = 0.01  # Gauss
-    declination: float = 0.0  # rad
+    declination: float = math.radians(2.9)  # rad, at the default origin (World Magnetic Model 2020)
     ground: float = 0.0  # m, NED z of what the rangefinder measures against
 
     # Readings farther from what is expected are not fused [standard deviations].

@@ -181,6 +181,7 @@ RTK = Suite(
         accel_bias=0.05,
         gyro_bias=0.005,
         baro_bias=1.0,
+        declination=0.0,
     ),
     gnss=GnssSensor(10.0, 0.12, 0.014, 0.05),
     baro=0.1,
