@@ -276,13 +276,13 @@ class SensorFusion:
         for one in reversed(memory.waiting):
             sample = one.sample
             if isinstance(sample, PoseSample):
-                self._begin(
-                    memory,
-                    sample.time,
-                    (sample.position, _REST, normalised(sample.attitude)),
+                stated = (
                     believable(sample.position_variance, self._least_p),
                     believable(sample.attitude_variance, self._least_q),
                 )
+                place = sample.position, _REST, normalised(sample.attitude)
+                self._begin(memory, sample.time, place, *stated)
+                memory = memory._replace(frame=FrameDrift(*stated))
                 break
             if isinstance(sample, GnssSample) and memory.field is not None:
                 level = _levelled(memory.numbers, memory.field, self.tuning.declination)

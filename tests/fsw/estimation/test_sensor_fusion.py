@@ -99,10 +99,11 @@ def nees(suite: Suite, runs: int, duration: float) -> float:
 
 @pytest.mark.long
 @pytest.mark.parametrize(
-    ("suite", "duration"), [(MOCAP, 2.0), (VIO, 3.0), (RTK, 5.0)], ids=["mocap", "vio", "rtk"]
+    ("suite", "duration", "runs"),
+    [(MOCAP, 2.0, 100), (VIO, 3.0, 300), (RTK, 5.0, 100)],
+    ids=["mocap", "vio", "rtk"],
 )
-def test_the_filter_is_as_sure_as_it_may_be(suite: Suite, duration: float) -> None:
-    runs = 100
+def test_the_filter_is_as_sure_as_it_may_be(suite: Suite, duration: float, runs: int) -> None:
     low, high = chi2.ppf([0.025, 0.975], 15 * runs) / runs
     assert low < nees(suite, runs, duration) < high
 
@@ -124,7 +125,7 @@ def innovations(suite: Suite, seed: int, duration: float) -> tuple[float, int]:
     fusion, memory = SensorFusion(suite.tuning, TICK), at_start()
     total, dimension = 0.0, 0
     size = {Sensor.POSE: 3, Sensor.GNSS: 3, Sensor.BAROMETER: 1, Sensor.MAGNETOMETER: 1}
-    gate = {3: 32.1, 1: 25.0}
+    gate = {n: chi_square(5.0, n) for n in (1, 3)}
     for now, samples in flown:
         before = {h.sensor: h for h in memory.health}
         memory, _ = fusion.step(memory, samples, now)
