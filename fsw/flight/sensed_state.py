@@ -12,7 +12,7 @@ from fsw.estimation.lasting_error import lasting_error
 from fsw.estimation.sensor_fault import Sensor, SensorFault, sentence
 from fsw.estimation.sensor_fusion import EncoderWatch, FusionMemory, SensorFusion, at_start
 from fsw.estimation.tuning import EstimatorTuning
-from fsw.flight.estimator_report import estimator_report, unaided
+from fsw.flight.estimator_report import AIDS_PLACE, estimator_report, unaided
 from fsw.flight.jump import jumped, returned, told
 from fsw.flight.state import Aiding, FlightState
 from fsw.measurements import ImuSample, JointSample, Sample
@@ -27,7 +27,7 @@ _REPEATS = 6  # of encoders; a resting arm's 12 bits are the same for longer
 _HELD = (35.0, 70.0)
 _ASKED = 0.1  # rad that joints were asked to move meanwhile; friction has held one for half of it
 _LATELY = 0.02  # s, in which a fault is one of now
-_AWAY = 0.1  # s without a position, after which its return is a jump
+_AWAY = 0.1  # s that a position is overdue, after which its return is a jump
 _QUIET = 10.0  # s without a fault until the same one is reported again
 
 
@@ -85,7 +85,7 @@ class SensedState:
             last = state.estimate
             # Telemetry goes by its time, and goes on.
             return state, memory, None if last is None else last._replace(t_us=inputs.sensors.t_us)
-        away = news and unaided(before, now) > _AWAY > unaided(memory, now)
+        away = news and _overdue(before, now) > _AWAY > _overdue(memory, now)
         if state.estimate is not None and away and not moved:
             state = returned(state, estimate, state.estimate, texts)
         if state.invalid_ticks:
@@ -197,7 +197,7 @@ def _aiding(state: FlightState, memory: FusionMemory, report: EstimatorReport) -
     P = report.pose_covariance
     since_us = before.since_us if sensor is before.sensor else report.t_us
     return Aiding(
-        unaided_us=max(report.unaided_us, 0),
+        unaided_us=max(round(1e6 * _overdue(memory, now)), 0) if report.unaided_us > 0 else 0,
         pose=aid.sensor,
         pose_fault=aid.fault if now - aid.fault_at < _LATELY else SensorFault.STALE,
         position_sigma=math.sqrt(max(P[0], P[6], P[11])),
@@ -206,6 +206,11 @@ def _aiding(state: FlightState, memory: FusionMemory, report: EstimatorReport) -
         fault=fault,
         since_us=since_us,
     )
+
+
+def _overdue(memory: FusionMemory, now: float) -> float:
+    """Time [s] at ``now`` [s] since the next position after the last used one was due."""
+    return unaided(memory, now) - max(memory.of(one).apart for one in AIDS_PLACE)
 
 
 def _lost(memory: FusionMemory) -> tuple[Sensor | None, SensorFault]:

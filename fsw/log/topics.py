@@ -287,7 +287,7 @@ VEHICLE_VISUAL_ODOMETRY: Final = Topic(
         doubles("position_variance", 3, "m^2"),
         doubles("orientation_variance", 3, "rad^2"),
         Field("reset_counter", "uint32_t"),
-        Field("drifts", "bool", note="odometry on board: its frame walks off"),
+        Field("drifts", "bool", note="its frame does, as the variances say"),
     ),
 )
 GNSS_LOCAL: Final = Topic(
