@@ -21,6 +21,7 @@ from fsw.control.safety_filter import NO_ZONES, moving_zones
 from fsw.control.safety_gate import gate
 from fsw.estimation.estimator import estimate_state
 from fsw.flight.commander import Commander, acknowledgement
+from fsw.flight.descent import Descent
 from fsw.flight.exact_state import ExactState
 from fsw.flight.failsafe import FAULTS, Condition
 from fsw.flight.modes.mission import with_update
@@ -30,7 +31,7 @@ from fsw.flight.reference_horizon import ReferenceHorizon
 from fsw.flight.safe_set import SafeSetCheck
 from fsw.flight.safety_watch import SafetyWatch
 from fsw.flight.sensed_state import SensedState
-from fsw.flight.state import FlightState, PlanMemory
+from fsw.flight.state import FlightState, PlanMemory, SafetyMemory
 from fsw.flight.uncertain_clearance import widened
 from fsw.model.battery import drained
 from fsw.model.body import body_of
@@ -49,6 +50,8 @@ from fsw.signals import (
     EndEffectorTarget,
     FlightSnapshot,
     Mode,
+    Plan,
+    PlanFailure,
     PlanInput,
     PlanRequest,
     PredictionState,
@@ -93,7 +96,9 @@ class Autopilot:
         self._sensed = SensedState(config.estimator, self._cascade)
         self._exact = ExactState(self._cascade)
         self._zones: tuple[SafeSet, EndEffectorTarget | None, Array] = (SafeSet(), None, NO_ZONES)
+        self._descent = Descent(config)
         self._ticks_per_plan = config.mpc_period_us // config.tick_period_us
+        self._most_us = config.catch_up_ticks * config.tick_period_us
 
     def warm_up(self) -> None:
         """Compile every kernel of the tick, before anything flies."""
@@ -125,6 +130,7 @@ class Autopilot:
         acks: list[CommandAck] = []
         if inputs.commands:
             state, acks = self._commander.handle_commands(state, estimate, inputs.commands, texts)
+        state = self._with_evidence(state, estimate)
         state = self._commander.check_failsafes(state, estimate, texts)
         state = self._commander.check_mode_completion(state, estimate, texts)
 
@@ -134,7 +140,7 @@ class Autopilot:
         nominal, plan, u = state.nominal, state.plan, REST_INPUT
         flown = state.vehicle.flies and nominal is not None
         if flown and nominal is not None:
-            nominal, plan, u = self._plans.follow(plan, nominal, inputs.plan, now_us, ticks)
+            nominal, plan, u = self._follow(state, estimate, nominal, inputs.plan, ticks)
         safety = self._watch.off_plan(state.safety, estimate, nominal if flown else None)
         request = None
         if planning_due:
@@ -152,8 +158,8 @@ class Autopilot:
         sent, memory, replaced, (pushed, margin) = self._actuate(state, estimate, nominal, u, ticks)
         if pushed or safety.filter_us >= 0:
             safety = self._watch.filtered(safety, now_us, pushed=pushed)
-        if not margin >= 0.0:
-            safety = self._watch.margin(safety, now_us, margin)
+        if safety.breach_us >= 0 or not margin >= 0.0:
+            safety = self._breached(state, safety, estimate, margin)
         # By position, as the snapshot: both are made in every tick, and names cost a microsecond.
         state = FlightState(
             index,
@@ -178,6 +184,8 @@ class Autopilot:
             state.estimator,
             state.aiding,
             state.trust,
+            state.host,
+            state.damage,
         )
         snapshot = _snapshot(state, estimate, u, inputs)
         return state, TickOutputs(
@@ -187,6 +195,45 @@ class Autopilot:
             acks=tuple(acks),
             texts=tuple(texts),
         )
+
+    def _with_evidence(self, state: FlightState, estimate: StateEstimate) -> FlightState:
+        """What the failsafe table looks at and what is not kept up to date elsewhere."""
+        safety, watch = state.safety, self._watch
+        tilted = safety.rolled_us >= 0 or safety.pitched_us >= 0
+        if tilted or not estimate.R_WB[8] > watch.upright:
+            safety = watch.attitude(safety, estimate, flies=state.vehicle.flies)
+        if state.index >= 0 and not 0 < estimate.t_us - state.t_us <= self._most_us:
+            safety = watch.jumped(safety, estimate.t_us, state.t_us)
+        return state if safety is state.safety else replace(state, safety=safety)
+
+    def _follow(
+        self,
+        state: FlightState,
+        estimate: StateEstimate,
+        nominal: PredictionState,
+        answer: Plan | PlanFailure | None,
+        ticks: int,
+    ) -> tuple[PredictionState, PlanMemory, PlanInput]:
+        """The plan's state now; in Descend it is none of a plan, though plans are asked for."""
+        now_us = estimate.t_us
+        followed = self._plans.follow(state.plan, nominal, answer, now_us, ticks)
+        if state.vehicle.mode is not Mode.DESCEND:
+            return followed
+        down, u = self._descent.step(nominal, estimate, state.aiding, ticks)
+        return down, followed[1], u
+
+    def _breached(
+        self, state: FlightState, safety: SafetyMemory, estimate: StateEstimate, margin: float
+    ) -> SafetyMemory:
+        """The memory of a breach with the ``margin`` [m] seen now; at its begin, of what it is."""
+        if not margin >= 0.0:
+            safety = self._watch.margin(safety, estimate.t_us, margin)
+        if state.safety.breach_us >= 0:
+            return safety
+        mission, target = state.mission, state.reference
+        report = self._safe_sets.margins(mission.safe_set, estimate, target)
+        of_fence = self._watch.of_fence(report, len(mission.announced.zones))
+        return replace(safety, breach_of_fence=of_fence)
 
     def _receive(
         self, state: FlightState, inputs: TickInputs, texts: list[StatusText]
@@ -205,6 +252,8 @@ class Autopilot:
             state = replace(state, mission=mission)
             if inputs.mission is not None:
                 state = with_update(state, inputs.mission, self.config, now_us)
+        if inputs.host is not None:
+            state = replace(state, host=inputs.host)
         if inputs.ground_station_heard:
             state = replace(state, vehicle=replace(state.vehicle, gcs_heard_us=now_us))
         heard = (inputs.motion, inputs.attitude, inputs.joints) != (None, None, None)
@@ -362,6 +411,7 @@ def _snapshot(
         inputs.sensors.accel_B,
         state.safety.counters,
         state.estimator,
+        state.host.log_failure,
     )
 
 

@@ -69,6 +69,7 @@ class Decision:
     mode: Mode | None = None  # to switch to
     intended_mode: Mode | None = None  # what arming is to lead to
     stop: bool = False  # holding already, but perhaps on the way to a place
+    report_arming: bool = False  # the checks are to be reported again
     climb: float | None = None  # m, of a takeoff; None: the usual one
     goal: PositionGoal | None = None
     joints: Vec2 | None = None  # rad
@@ -133,6 +134,8 @@ def _switch_mode(action: SwitchMode, context: CommandContext, modes: Modes) -> D
 def _switch(wanted: Mode, context: CommandContext, modes: Modes) -> Decision:
     """Change the mode if everything that the new one needs is there."""
     mode = modes[wanted]
+    if context.blocked:
+        return Decision(LATER, f"no {wanted.value}: {context.blocked}")
     denial = mode.denial(context)
     if denial is not None:
         return Decision(DENIED, denial)
@@ -311,7 +314,7 @@ def _continue_mission(context: CommandContext, modes: Modes) -> Decision:
 def _check_arming(context: CommandContext, modes: Modes) -> Decision:
     if _is_armed(context):
         return Decision(LATER, "no checks: the vehicle is armed")
-    return Decision(ACCEPTED, arming.refusal(context) or "ready to arm")
+    return Decision(ACCEPTED, arming.refusal(context) or "ready to arm", report_arming=True)
 
 
 def _nothing(context: CommandContext, modes: Modes) -> Decision:
