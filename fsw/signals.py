@@ -600,12 +600,22 @@ class Severity(IntEnum):
     INFO = 6
 
 
+class FailsafeEvent(NamedTuple):
+    """A condition of the failsafe table that began or ended, for programs."""
+
+    condition: str  # its name
+    action: str  # what is done about it
+    severity: Severity
+    over: bool = False  # it has ended
+
+
 @dataclass(frozen=True, slots=True)
 class StatusText:
     """A sentence for the operator."""
 
     severity: Severity
     text: str
+    event: FailsafeEvent | None = None  # that it is about
 
 
 @dataclass(frozen=True, slots=True)
@@ -759,6 +769,13 @@ class EstimatorReport:
 
 
 @dataclass(frozen=True, slots=True)
+class ArmingReport:
+    """The arming checks that fail, by their places in the table; none while armed."""
+
+    failed: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class FlightSnapshot:
     """The vehicle as telemetry shows it after a tick; what follows from it, encoders compute."""
 
@@ -788,6 +805,7 @@ class FlightSnapshot:
     safety: SafetyCounters = SafetyCounters()
     estimator: EstimatorReport | None = None  # None: states are exact
     log_failure: str = ""  # why the flight log is not written as it should be
+    arming: ArmingReport = ArmingReport()
 
 
 @dataclass(frozen=True, slots=True)

@@ -34,6 +34,7 @@ class ArmingCheck:
     """One row: empty where the check passes."""
 
     subject: Subject
+    summary: str  # what is wrong, in words that never change
     refusal: Callable[[CommandContext], str]
     permanent: bool = False  # waiting does not help
 
@@ -87,34 +88,52 @@ def _storage(context: CommandContext) -> str:
 
 
 CHECKS: Final = (
-    ArmingCheck(Subject.ESTIMATOR, _estimate),
-    ArmingCheck(Subject.ESTIMATOR, lambda c: c.health.estimator),
-    ArmingCheck(Subject.ATTITUDE, _attitude),
-    ArmingCheck(Subject.SENSORS, lambda c: c.health.sensor),
-    ArmingCheck(Subject.STANDING, _standing),
-    ArmingCheck(Subject.BATTERY, _battery),
-    ArmingCheck(Subject.PARAMETERS, lambda c: c.health.parameters, permanent=True),
-    ArmingCheck(Subject.SAFE_SET, lambda c: c.inconsistent, permanent=True),
-    ArmingCheck(Subject.SAFE_SET, _outside),
-    ArmingCheck(Subject.JOINTS, _joints),
-    ArmingCheck(Subject.ACTUATORS, lambda c: c.health.damage),
-    ArmingCheck(Subject.STORAGE, _storage, permanent=True),
+    ArmingCheck(Subject.ESTIMATOR, "The state estimate is invalid", _estimate),
+    ArmingCheck(
+        Subject.ESTIMATOR,
+        "The position is not measured, or the attitude not known",
+        lambda c: c.health.estimator,
+    ),
+    ArmingCheck(Subject.ATTITUDE, "The vehicle is tilted", _attitude),
+    ArmingCheck(Subject.SENSORS, "A sensor fails", lambda c: c.health.sensor),
+    ArmingCheck(
+        Subject.STANDING, "The vehicle is neither on the ground nor clearly in the air", _standing
+    ),
+    ArmingCheck(Subject.BATTERY, "The battery is nearly empty", _battery),
+    ArmingCheck(
+        Subject.PARAMETERS,
+        "Parameters contradict each other",
+        lambda c: c.health.parameters,
+        permanent=True,
+    ),
+    ArmingCheck(
+        Subject.SAFE_SET, "The safe set cannot be kept", lambda c: c.inconsistent, permanent=True
+    ),
+    ArmingCheck(Subject.SAFE_SET, "The vehicle is outside its safe set", _outside),
+    ArmingCheck(Subject.JOINTS, "The arm swings, or is beyond its limits", _joints),
+    ArmingCheck(Subject.ACTUATORS, "A rotor or a joint has failed", lambda c: c.health.damage),
+    ArmingCheck(Subject.STORAGE, "The flight log is not written", _storage, permanent=True),
 )
 
-Failed = tuple[tuple[Subject, str], ...]
-"""What speaks against arming, a sentence each."""
+Failed = tuple[tuple[int, str], ...]
+"""What speaks against arming: the check's place in the table, and a sentence."""
 
 
 def failed(context: CommandContext) -> Failed:
     """The checks that fail; behind an invalid estimate nothing is worth a look."""
-    found: list[tuple[Subject, str]] = []
-    for check in CHECKS:
+    found: list[tuple[int, str]] = []
+    for number, check in enumerate(CHECKS):
         sentence = check.refusal(context)
         if sentence:
-            found.append((check.subject, sentence))
+            found.append((number, sentence))
             if not context.estimate_valid:
                 break
     return tuple(found)
+
+
+def joined(found: Failed) -> str:
+    """All that speaks against arming, as the operator reads it."""
+    return "not armed: " + "; ".join(sentence for _, sentence in found)
 
 
 def refusal(context: CommandContext, *, force: bool = False) -> str | None:
@@ -122,7 +141,7 @@ def refusal(context: CommandContext, *, force: bool = False) -> str | None:
     if force and context.estimate_valid:
         return None
     found = failed(context)
-    return "not armed: " + "; ".join(sentence for _, sentence in found) if found else None
+    return joined(found) if found else None
 
 
 def is_permanent(context: CommandContext) -> bool:

@@ -179,6 +179,7 @@ class Autopilot:
             state.offboard,
             state.battery,
             state.arming_refusal,
+            state.arming,
             safety,
             fusion,
             state.estimator,
@@ -307,11 +308,13 @@ class Autopilot:
     ) -> FlightState:
         """Reference, margins, arming checks and battery, once a planning period."""
         target = self._commander.mode(state).target(state, now_us)
+        refusal, arming = self._commander.arming_report(state, estimate)
         return replace(
             state,
             constraints=self._safe_sets.margins(state.mission.safe_set, estimate, target),
             reference=target if state.vehicle.flies else None,
-            arming_refusal=self._commander.arming_refusal(state, estimate),
+            arming_refusal=refusal,
+            arming=arming,
             battery=self._battery(state),
         )
 
@@ -412,6 +415,7 @@ def _snapshot(
         state.safety.counters,
         state.estimator,
         state.host.log_failure,
+        state.arming,
     )
 
 

@@ -69,7 +69,6 @@ class Decision:
     mode: Mode | None = None  # to switch to
     intended_mode: Mode | None = None  # what arming is to lead to
     stop: bool = False  # holding already, but perhaps on the way to a place
-    report_arming: bool = False  # the checks are to be reported again
     climb: float | None = None  # m, of a takeoff; None: the usual one
     goal: PositionGoal | None = None
     joints: Vec2 | None = None  # rad
@@ -314,7 +313,7 @@ def _continue_mission(context: CommandContext, modes: Modes) -> Decision:
 def _check_arming(context: CommandContext, modes: Modes) -> Decision:
     if _is_armed(context):
         return Decision(LATER, "no checks: the vehicle is armed")
-    return Decision(ACCEPTED, arming.refusal(context) or "ready to arm", report_arming=True)
+    return Decision(ACCEPTED, arming.refusal(context) or "ready to arm")
 
 
 def _nothing(context: CommandContext, modes: Modes) -> Decision:

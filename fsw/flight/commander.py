@@ -32,6 +32,7 @@ from fsw.parameters.consistency import base_reach, loop_tube, stand_off
 from fsw.parameters.contradictions import contradictions
 from fsw.parameters.flight_config import FlightConfig
 from fsw.signals import (
+    ArmingReport,
     Command,
     CommandAck,
     CommandResult,
@@ -44,6 +45,8 @@ from fsw.signals import (
     StatusText,
     Vec2,
 )
+
+_ARMED = ArmingReport()  # nothing to check
 
 
 class Commander:
@@ -118,13 +121,21 @@ class Commander:
             acceleration=setpoint_limits.acceleration,
         )
 
-    def arming_refusal(self, state: FlightState, estimate: StateEstimate) -> str:
-        """Why the vehicle cannot be armed now, for telemetry; empty if it could be, or is."""
+    def arming_report(
+        self, state: FlightState, estimate: StateEstimate
+    ) -> tuple[str, ArmingReport]:
+        """Why the vehicle cannot be armed now, and which checks fail, for telemetry.
+
+        Empty if it could be armed, or is.
+        """
         if state.vehicle.armed:
-            return ""
+            return "", _ARMED
         if state.vehicle.mode is Mode.FAULT:
-            return "terminated: restart the flight software"
-        return arming.refusal(self.context(state, estimate)) or ""
+            return "terminated: restart the flight software", _ARMED
+        found = arming.failed(self.context(state, estimate))
+        report = ArmingReport(tuple([number for number, _ in found]))
+        sentence = arming.joined(found) if found else ""
+        return sentence, state.arming if report == state.arming else report
 
     def check_failsafes(
         self, state: FlightState, estimate: StateEstimate, texts: list[StatusText]
@@ -143,7 +154,7 @@ class Commander:
         if now == before and not slowly:
             return state
         response = failsafe.respond(context, rows)
-        texts += [StatusText(*told) for told in response.reports]
+        texts += response.reports
         if now != before or response.memory != vehicle.failsafe:
             vehicle = replace(vehicle, conditions=now, failsafe=response.memory)
             state = replace(state, vehicle=vehicle)

@@ -18,7 +18,15 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 from fsw.estimation.sensor_fault import sentence
 from fsw.frozen import dataclass as value_dataclass
 from fsw.parameters.flight_config import FlightConfig, FlightLimits
-from fsw.signals import Charge, Mode, Severity, SolverStatus, StateEstimate
+from fsw.signals import (
+    Charge,
+    FailsafeEvent,
+    Mode,
+    Severity,
+    SolverStatus,
+    StateEstimate,
+    StatusText,
+)
 
 if TYPE_CHECKING:
     from fsw.flight.state import FlightState  # which keeps the active conditions
@@ -809,7 +817,7 @@ class Response:
     """What follows from the active conditions now."""
 
     memory: FailsafeMemory
-    reports: tuple[tuple[Severity, str], ...] = ()
+    reports: tuple[StatusText, ...] = ()
     action: Action = Action.NONE  # to be begun now: one that switches to a mode, or none
 
 
@@ -844,7 +852,9 @@ def respond(context: FailsafeContext, rows: tuple[Failsafe, ...]) -> Response:
         told = actions[row.condition] if actions[row.condition].mode is None else told
         if told is not Action.NONE:
             delay_us = memory.due_us - now_us if acts and waits else 0
-            reports.append(report(row, context, told, delay_us))
+            severity, text = report(row, context, told, delay_us)
+            event = FailsafeEvent(row.condition.value, told.value, severity)
+            reports.append(StatusText(severity, text, event))
     if vehicle.armed:
         reports += _ended(before, known, now, now_us)
     since = tuple([known.get(condition, now_us) for condition in now])
@@ -899,13 +909,15 @@ def _ended(
     since: dict[Condition, int],
     now: tuple[Condition, ...],
     now_us: int,
-) -> list[tuple[Severity, str]]:
+) -> list[StatusText]:
     """What is over, where it lasted for a second: once."""
     reports = []
     for condition in before:
         seconds = 1e-6 * (now_us - since.get(condition, now_us))
         if condition not in now and seconds >= _SHORT:
-            reports.append((Severity.INFO, f"over: {condition.value}, after {seconds:.1f} s"))
+            event = FailsafeEvent(condition.value, Action.NONE.value, Severity.INFO, over=True)
+            text = f"over: {condition.value}, after {seconds:.1f} s"
+            reports.append(StatusText(Severity.INFO, text, event))
     return reports
 
 

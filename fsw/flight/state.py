@@ -19,6 +19,7 @@ from fsw.frozen import dataclass
 from fsw.model.airframe import AIRFRAME
 from fsw.signals import (
     STOPPED,
+    ArmingReport,
     AttitudeSetpoint,
     BatteryState,
     ConstraintReport,
@@ -220,6 +221,7 @@ class FlightState:
     offboard: OffboardMemory = field(default_factory=OffboardMemory)
     battery: BatteryState = field(default_factory=BatteryState)
     arming_refusal: str = ""
+    arming: ArmingReport = field(default_factory=ArmingReport)
     safety: SafetyMemory = field(default_factory=SafetyMemory)
     fusion: FusionMemory | None = None  # where sensors have times of their own
     estimator: EstimatorReport | None = None  # what telemetry says of it, once a planning period

@@ -110,6 +110,7 @@ class SimLoop(Generic[State]):
         self._tick_us = program.facts.tick_period_us
         self._parameters = program.parameters
         self._missions = program.missions
+        self._happened = program.events
         self._tick = TickRunner(program.tick, program.first_state)
         self._sim = sim
         self._ground = ground
@@ -225,6 +226,7 @@ class SimLoop(Generic[State]):
     def _run_tick(self, cycle: Cycle) -> None:
         cycle.outputs = self._tick(cycle.inputs)
         self._missions.observe(cycle.outputs.snapshot)
+        self._happened.observe(cycle.inputs, cycle.outputs)
         if cycle.inputs.tuning is not None:
             self._parameters.settle(cycle.outputs.tuning_taken)
 

@@ -55,8 +55,8 @@ def unwell(**changes: Any) -> arming.CommandContext:
 def test_each_reason_is_a_sentence_and_force_overrides_all_but_a_missing_estimate(
     context: arming.CommandContext, subject: Subject, words: str
 ) -> None:
-    ((found, sentence),) = arming.failed(context)
-    assert found is subject
+    ((number, sentence),) = arming.failed(context)
+    assert arming.CHECKS[number].subject is subject
     assert words in sentence
     assert arming.refusal(context) == f"not armed: {sentence}"
     forced = arming.refusal(context, force=True)

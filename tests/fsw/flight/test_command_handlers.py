@@ -511,7 +511,6 @@ def test_a_mission_is_paused_by_holding(mode: Mode, stops: bool) -> None:
 
 def test_arming_checks_are_made_on_the_ground_and_answered_in_words() -> None:
     assert decided(Order.CHECK_ARMING, STANDING).reason == "ready to arm"
-    assert decided(Order.CHECK_ARMING, STANDING).report_arming
     nearly_empty = replace(STANDING, health=ArmingHealth(remaining=0.0))
     assert "battery" in decided(Order.CHECK_ARMING, nearly_empty).reason
     assert decided(Order.CHECK_ARMING).result == TEMPORARILY_REJECTED

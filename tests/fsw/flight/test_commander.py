@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from fsw.flight.arming import CHECKS, Subject
 from fsw.flight.commander import Commander
 from fsw.flight.failsafe import Condition
 from fsw.flight.modes.land import Land
@@ -18,6 +19,7 @@ from fsw.model.kinematics import point_in_flight
 from fsw.mpc.reference import still_at
 from fsw.signals import (
     Arm,
+    ArmingReport,
     BatteryState,
     ChangeSpeed,
     Command,
@@ -123,10 +125,16 @@ def test_what_a_decision_depends_on_is_the_vehicle_s() -> None:
 
 
 def test_why_arming_is_refused_is_shown_while_it_matters() -> None:
-    assert COMMANDER.arming_refusal(DISARMED, STANDING) == ""
-    assert "height" in COMMANDER.arming_refusal(DISARMED, vehicle_at((0.0, 0.0, GROUND_Z - 0.2)))
-    assert COMMANDER.arming_refusal(flying(), vehicle_at((0.0, 0.0, GROUND_Z - 0.2))) == ""
-    assert "restart" in COMMANDER.arming_refusal(flying(Mode.FAULT), STANDING)
+    low = vehicle_at((0.0, 0.0, GROUND_Z - 0.2))
+    assert COMMANDER.arming_report(DISARMED, STANDING) == ("", ArmingReport())
+    sentence, report = COMMANDER.arming_report(DISARMED, low)
+    assert "height" in sentence
+    (number,) = report.failed
+    assert CHECKS[number].subject is Subject.STANDING
+    again = COMMANDER.arming_report(replace(DISARMED, arming=report), low)[1]
+    assert again is report, "what has not changed is the same value"
+    assert COMMANDER.arming_report(flying(), low) == ("", ArmingReport())
+    assert "restart" in COMMANDER.arming_report(flying(Mode.FAULT), STANDING)[0]
 
 
 # ---------------------------------------------------------------- commands
