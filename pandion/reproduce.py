@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import argparse
 import os
-import sys
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
 from command_line.options import json_file, option, read
-from command_line.output import console_beside, write_text
+from command_line.output import complain, console_beside, say, write_text
 from command_line.parser import COULD_NOT_START
 from command_line.values import number, one_of, whole
 from command_line.version import version
 from fsw.log.run_directory import new_run_directory
 from fsw.parameters.control_choice import KNOWN
 from pandion.display import Display
+from sitl.scenario_file import SUITE_NAMES
 from studies.catalogue import STUDIES, study
 
 if TYPE_CHECKING:
@@ -75,6 +75,14 @@ class ReproduceOptions:
         default="lqr",
         old="--inner",
     )
+    suite: str | None = option(
+        "--suite NAME",
+        "robustness: only the rows flown with this suite of sensors",
+        one_of("suite", *SUITE_NAMES),
+    )
+    only: str | None = option(
+        "--only TEXT", "robustness: only the rows with this in their section, case or name"
+    )
     workers: int = option(
         "--workers N",
         "processes; 0 flies in this one (default one a core)",
@@ -98,22 +106,25 @@ def main(argv: list[str]) -> int:
 
     pin_numerics_to_one_thread()  # before NumPy loads
     from studies.drawing import NoMatplotlibError
+    from studies.settings import NoCellError
 
     try:
+        if options.what != "robustness" and (options.suite or options.only):
+            raise NoCellError(f"{options.what} has no rows to choose by --suite or --only")
         return _run(options)
-    except (NoMatplotlibError, OSError) as error:
-        print(f"pandion reproduce: {error}", file=sys.stderr)
+    except (NoMatplotlibError, NoCellError, OSError) as error:
+        complain("pandion reproduce", error)
         return COULD_NOT_START
 
 
 def _run(options: ReproduceOptions) -> int:
     from studies.campaign import Campaign
-    from studies.page import json_text, write
+    from studies.page import rows_text, write
 
     console = console_beside(options.json)
     settings = _settings(options)
     folder = options.out or new_run_directory(Path("runs"), options.what)
-    print(f"Pandion {version()}: {options.what}, written to {folder}", file=console, flush=True)
+    say(f"Pandion {version()}: {options.what}, written to {folder}", console)
     if settings.tuned_on:
         print("these seeds were used for tuning; report others", file=console, flush=True)
     try:
@@ -124,14 +135,14 @@ def _run(options: ReproduceOptions) -> int:
             )
             report = study(options.what)(settings, campaign)
     except KeyboardInterrupt:
-        print(f"pandion reproduce: interrupted; --out {folder} resumes", file=sys.stderr)
+        complain("pandion reproduce", f"interrupted; --out {folder} resumes")
         return BROKEN
     page = write(report, settings, _provenance(options), options.what, folder)
     _show(report, console)
-    print(f"page {page}", file=console)
-    write_text(options.json, json_text(report))
+    say(f"page {page}", console)
+    write_text(options.json, rows_text(report))
     for error in report.errors:
-        print(f"pandion reproduce: {error}", file=sys.stderr)
+        complain("pandion reproduce", error)
     return BROKEN if report.errors else DONE
 
 
@@ -143,6 +154,8 @@ def _settings(options: ReproduceOptions) -> Settings:
         seeds=options.seeds,
         duration_s=options.duration_s,
         inner="pid" if options.tracking == "pid" else "tracking",
+        suite=options.suite,
+        only=options.only,
     )
 
 
@@ -153,6 +166,10 @@ def _provenance(options: ReproduceOptions) -> tuple[str, ...]:
     command += f" --seeds {options.seeds.start}:{options.seeds.stop}"
     if options.duration_s is not None:
         command += f" --duration {options.duration_s:g}"
+    if options.suite is not None:
+        command += f" --suite {options.suite}"
+    if options.only is not None:
+        command += f" --only '{options.only}'"
     if options.tracking != "lqr":
         command += f" --tracking {options.tracking}"
     return (f"Command: {command}", f"Pandion {version()}, code {sources()[:12]}")
