@@ -354,8 +354,14 @@ class Autopilot:
         return sent, memory.after_sending(sent), replaced, guarded
 
     def _zones_now(self, state: FlightState) -> Array:
-        """The zones for the safety filter; made anew where they or their target changed."""
+        """The zones for the safety filter; made anew where they or their target changed.
+
+        None where the vehicle descends because it does not know where it is.
+        """
         safe_set, target = state.mission.safe_set, state.reference
+        blind = state.aiding.unaided_us >= self.config.limits.aiding_loss_us
+        if blind and state.vehicle.mode is Mode.DESCEND:
+            return NO_ZONES
         known, known_target, zones = self._zones
         if safe_set is not known or target is not known_target:
             if safe_set is not known or safe_set.kind is ConstraintKind.WORKSPACE:

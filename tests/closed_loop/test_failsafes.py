@@ -66,3 +66,4 @@ def test_a_vehicle_that_drifts_feels_the_ground_though_its_height_has_drifted() 
     flight.follow()
     assert to_the_ground(flight) < 0.6
     assert math.dist(flight.snapshot.estimate.p_WB, flight.sim.truth().p_WB) > 0.3
+    assert not any("pushed off" in text for text in flight.texts), "zones are not where they seem"

@@ -29,21 +29,22 @@ class EventLog:
     def __init__(self) -> None:
         self.newest = 0  # sequence number of the last event
         self._kept: deque[NumberedEvent] = deque(maxlen=_KEPT)
-        self._reported = ArmingReport()  # the last one that was sent
+        self._reported: ArmingReport | None = None  # the last one that was sent
         self._reported_us: int | None = None
 
     def observe(self, inputs: TickInputs, outputs: TickOutputs) -> None:
         """Take in what a tick heard and says."""
         snapshot = outputs.snapshot
+        report, last_us = snapshot.arming, self._reported_us
+        if report is self._reported and not outputs.texts and not inputs.commands:
+            return  # as on almost every tick
         for text in outputs.texts:
             if text.event is not None:
                 self._add(failsafe_event(text.event), snapshot.t_us)
-        report, last_us = snapshot.arming, self._reported_us
         asked = any(one.action is Order.CHECK_ARMING for one in inputs.commands)
-        if last_us is not None and not asked:
-            waits = snapshot.t_us - last_us < _BETWEEN_US
-            if report is self._reported or waits or report == self._reported:
-                return
+        waits = last_us is not None and snapshot.t_us - last_us < _BETWEEN_US
+        if not asked and (waits or report == self._reported):
+            return
         self._reported, self._reported_us = report, snapshot.t_us
         for event in arming_events(report):
             self._add(event, snapshot.t_us)
