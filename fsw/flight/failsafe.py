@@ -824,7 +824,7 @@ class Response:
 def respond(context: FailsafeContext, rows: tuple[Failsafe, ...]) -> Response:
     """The strongest action of the active ``rows``, and what the operator is told.
 
-    It is taken where it is stronger than the one that was taken last. So what a condition asks for
+    It is taken where it is stronger than the one in force. So what a condition asks for
     is taken up as soon as a mode that was exempt from it is left, and a vehicle that returns or
     lands is not sent back by a milder condition. Where a row is delayed the vehicle holds first.
     Conditions that a command of the pilot put aside do not act until they have ended.
@@ -839,7 +839,10 @@ def respond(context: FailsafeContext, rows: tuple[Failsafe, ...]) -> Response:
     actions = {}
     for row in rows:
         action = actions[row.condition] = allowed(row.action(context), vehicle.mode, vehicle.flies)
-        if row.condition not in overridden and action.strength > wanted.strength:
+        if action.mode is None or row.condition in overridden:
+            continue
+        in_force = _in_force(memory, vehicle.mode, begins=row.condition not in before)
+        if action.strength > max(in_force.strength, wanted.strength):
             wanted, chosen = action, row
     begun, memory = _begun(context, memory, wanted, chosen)
     waits = memory.pending is not Action.NONE
@@ -875,12 +878,32 @@ def allowed(action: Action, mode: Mode, flies: bool) -> Action:
     return Action.WARN if least is not None and action.strength <= least.strength else action
 
 
+_OF_MODES: Final = {
+    Mode.HOLD: Action.HOLD,
+    Mode.RETURN: Action.RETURN,
+    Mode.LAND: Action.LAND,
+    Mode.DESCEND: Action.DESCEND,
+}
+
+
+def _in_force(memory: FailsafeMemory, mode: Mode, *, begins: bool) -> Action:
+    """The action that another one must be stronger than.
+
+    A condition that lasts has been acted upon, even if that is done: a vehicle that has returned
+    and holds does not return again. One that ``begins`` is held against what is flown now.
+    """
+    if not begins or memory.action is Action.NONE:
+        return memory.action
+    flown = _OF_MODES.get(mode, Action.NONE)
+    return flown if flown.strength < memory.action.strength else memory.action
+
+
 def _begun(
     context: FailsafeContext, memory: FailsafeMemory, wanted: Action, chosen: Failsafe | None
 ) -> tuple[Action, FailsafeMemory]:
     """The action to begin now, and the memory with it."""
     now_us = context.estimate.t_us
-    if chosen is None or wanted.mode is None or wanted.strength <= memory.action.strength:
+    if chosen is None:
         if memory.pending is Action.NONE:
             return Action.NONE, memory
         # What was waited for has ended: the vehicle stays in hold.
@@ -889,19 +912,17 @@ def _begun(
     if chosen.delayed and wanted in (Action.RETURN, Action.LAND):
         if memory.pending is not Action.NONE and now_us < memory.due_us:
             return Action.NONE, memory._replace(pending=wanted)
-        if memory.pending is Action.NONE and delay_us and memory.action.strength <= _HELD:
-            held = memory._replace(
+        held = memory.action is Action.NONE or context.state.vehicle.mode is Mode.HOLD
+        if memory.pending is Action.NONE and delay_us and held:
+            waiting = memory._replace(
                 action=Action.HOLD,
                 cause=chosen.condition,
                 pending=wanted,
                 due_us=now_us + delay_us,
             )
-            return Action.HOLD, held
+            return Action.HOLD, waiting
     acting = memory._replace(action=wanted, cause=chosen.condition, pending=Action.NONE, due_us=0)
     return wanted, acting
-
-
-_HELD: Final = Action.HOLD.strength
 
 
 def _ended(

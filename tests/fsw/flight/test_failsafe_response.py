@@ -8,10 +8,13 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
+from fsw.estimation.sensor_fault import Sensor
 from fsw.flight.commander import Commander
-from fsw.flight.failsafe import FAILSAFES, Action, Condition, FailsafeContext, allowed
-from fsw.flight.state import Aiding, FlightState, OffboardMemory, PlanMemory
+from fsw.flight.failsafe import FAILSAFES, ROWS, Action, Condition, FailsafeContext, allowed
+from fsw.flight.state import Aiding, Damage, FlightState, OffboardMemory, PlanMemory, SafetyMemory
 from fsw.parameters.flight_config import FlightConfig
 from fsw.signals import (
     BatteryState,
@@ -21,6 +24,7 @@ from fsw.signals import (
     CommandRequest,
     CommandResult,
     GoTo,
+    HostHealth,
     Mode,
     Place,
     StatusText,
@@ -91,6 +95,9 @@ class Watched:
     @property
     def flown(self) -> tuple[Mode, Mode | None]:
         return mode_of(self.state)
+
+
+COMMANDER = Commander(CONFIG)
 
 
 def charge(level: Charge) -> BatteryState:
@@ -198,6 +205,64 @@ def test_without_a_position_no_mode_is_accepted_until_there_is_one_again() -> No
     assert watched.flown == (Mode.HOLD, None)
 
 
+OUTSIDE = SafetyMemory(breach_us=0, breach_by=0.01)
+
+
+def test_a_vehicle_that_is_pushed_out_again_retreats_again() -> None:
+    watched = Watched().until(1.0, safety=OUTSIDE)
+    assert watched.flown == (Mode.HOLD, Mode.MISSION)
+    watched.until(2.0, safety=SafetyMemory()).until(3.0, safety=OUTSIDE)
+    assert sum("retreating" in text for text in watched.texts) == 2
+
+
+def test_a_vehicle_that_has_returned_and_holds_does_not_return_again_but_acts_on_what_is_new() -> (
+    None
+):
+    watched = Watched(AT_ONCE).until(12.0)
+    assert watched.flown == (Mode.RETURN, Mode.MISSION)
+    watched.mode(Mode.HOLD).until(60.0)
+    assert watched.flown == (Mode.HOLD, Mode.MISSION), "it is home, and the station still lost"
+    watched.until(61.0, safety=OUTSIDE)
+    assert "failsafe: outside the safe set by 10 mm, retreating" in watched.texts
+    watched.until(62.0, battery=charge(Charge.CRITICAL))
+    assert watched.flown == (Mode.RETURN, Mode.MISSION)
+
+
+@given(
+    st.lists(
+        st.tuples(
+            st.sampled_from([Charge.OK, Charge.LOW, Charge.CRITICAL, Charge.EMERGENCY]),
+            st.booleans(),
+            st.booleans(),
+            st.booleans(),
+        ),
+        max_size=8,
+    )
+)
+@settings(max_examples=25, deadline=None)
+def test_without_a_pilot_a_vehicle_never_goes_on_with_what_a_failsafe_ended(
+    happens: list[tuple[Charge, bool, bool, bool]],
+) -> None:
+    """Whatever begins and ends: what was flown is left once and not taken up again."""
+    watched, left = Watched(limits(failsafe_delay_us=200_000)), False
+    last = Mode.MISSION
+    for second, (level, heard, lost, outside) in enumerate(happens, start=1):
+        if heard:
+            watched.heard()
+        watched.until(
+            6.0 * second,
+            battery=charge(level),
+            aiding=ADRIFT if lost else Aiding(),
+            safety=OUTSIDE if outside else SafetyMemory(),
+        )
+        mode = watched.flown[0]
+        left = left or mode is not Mode.MISSION
+        assert not (left and mode is Mode.MISSION)
+        order = [Mode.MISSION, Mode.HOLD, Mode.RETURN, Mode.LAND, Mode.DESCEND]
+        assert order.index(mode) >= order.index(last), "nothing milder takes over"
+        last = mode
+
+
 def test_a_landing_goes_on_but_for_what_cannot_be_landed_with() -> None:
     lost = Watched(AT_ONCE, flying(Mode.LAND, gcs_heard_us=0)).until(20.0)
     assert lost.flown == (Mode.LAND, None)
@@ -243,6 +308,47 @@ def test_landing_or_disarming_ends_a_failsafe() -> None:
         estimate = estimate._replace(t_us=estimate.t_us + SECOND)
     assert mode_of(state) == (Mode.DISARMED, None)
     assert state.vehicle.failsafe.action is Action.NONE
+
+
+HAPPENS: dict[Condition, dict[str, Any]] = {
+    Condition.ATTITUDE_LOST: {"aiding": Aiding(attitude_sigma=0.8)},
+    Condition.TILT_LOST: {"safety": SafetyMemory(rolled_us=0)},
+    Condition.POSITION_LOST: {"aiding": ADRIFT},
+    Condition.BREACH: {"safety": OUTSIDE},
+    Condition.FENCE_BREACH: {"safety": replace(OUTSIDE, breach_of_fence=True)},
+    Condition.ROTOR_FAILED: {"damage": Damage(rotor="rotor 2")},
+    Condition.JOINT_FAILED: {"damage": Damage(joint="joint 1")},
+    Condition.POSITION_LOW: {"aiding": ADRIFT},
+    Condition.SENSOR_LOST: {"aiding": Aiding(sensor=Sensor.IMU)},
+    Condition.TUBE_LEFT: {"safety": SafetyMemory(off_plan_us=0)},
+    Condition.FILTER_ACTIVE: {"safety": SafetyMemory(filter_us=0)},
+    Condition.AIDING_LOST: {"aiding": ADRIFT},
+    Condition.ESTIMATE_INVALID: {"invalid_ticks": 5},
+    Condition.OUTPUT_NOT_FINITE: {"output_replaced": True},
+    Condition.LOOP_OVERRUN: {"host": HostHealth(missed_ticks=100)},
+    Condition.CLOCK_JUMPED: {"host": HostHealth(clock_jump_us=10**6)},
+    Condition.LINK_FLOODED: {"host": HostHealth(datagrams=10**4)},
+    Condition.LOG_STOPPED: {"host": HostHealth(log_failure="flight.ulg ends early")},
+    Condition.DISK_FULL: {"host": HostHealth(disk_left_us=0)},
+    Condition.BATTERY_LOW: {"battery": charge(Charge.LOW)},
+    Condition.BATTERY_CRITICAL: {"battery": charge(Charge.CRITICAL)},
+    Condition.BATTERY_EMERGENCY: {"battery": charge(Charge.EMERGENCY)},
+    Condition.FLIGHT_TIME_LOW: {"battery": BatteryState(time_left=1.0)},
+}
+
+
+@pytest.mark.parametrize("condition", HAPPENS, ids=lambda condition: condition.name)
+def test_a_condition_is_told_within_the_time_of_its_row(condition: Condition) -> None:
+    begin_us = 10 * SECOND + 2_000  # just after a planning period has begun
+    state = replace(flying(Mode.MISSION), t_us=begin_us - 2_000, **HAPPENS[condition])
+    state = replace(state, plan=PlanMemory(since_us=begin_us))
+    for t_us in range(begin_us, begin_us + SECOND, 2_000):
+        said: list[StatusText] = []
+        state = COMMANDER.check_failsafes(state, vehicle_at(HERE, t_us=t_us), said)
+        state = replace(state, t_us=t_us, plan=PlanMemory(since_us=t_us))
+        if any(text.text.removeprefix("failsafe: ").startswith(condition.value) for text in said):
+            break
+    assert t_us - begin_us <= ROWS[condition].within_us
 
 
 def test_no_row_is_silent_in_flight() -> None:
