@@ -48,7 +48,7 @@ def arming_health(
         tilt=math.acos(min(max(upright, -1.0), 1.0)) if upright == upright else math.pi,
         most_tilt=limits.arm_tilt,
         estimator=estimator,
-        sensor="" if aiding.sensor is None else sentence(aiding.sensor, aiding.fault),
+        sensor=_failing_sensor(state, estimate.t_us - limits.sensor_loss_us),
         remaining=state.battery.remaining,
         least_remaining=least,
         parameters=contradiction,
@@ -60,4 +60,16 @@ def arming_health(
     )
 
 
+def _failing_sensor(state: FlightState, since_us: int) -> str:
+    """The first sensor that has been of no use ``since_us``, or was there and is silent."""
+    aiding = state.aiding
+    if aiding.sensor is not None and aiding.since_us <= since_us:
+        return sentence(aiding.sensor, aiding.fault)
+    for one in state.estimator.sensors if state.estimator is not None else ():
+        if one.silent_us > _SILENT_US:
+            return f"{one.name} has been silent for {1e-6 * one.silent_us:.0f} s"
+    return ""
+
+
 _DENIES = 2  # of COM_ARM_SDCARD
+_SILENT_US = 1_000_000

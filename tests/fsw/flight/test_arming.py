@@ -16,15 +16,17 @@ from fsw.flight.arming import Subject
 from fsw.flight.arming_health import ArmingHealth, arming_health
 from fsw.flight.state import Aiding, Damage, FlightState
 from fsw.parameters.flight_config import FlightConfig
-from fsw.signals import BatteryState, ConstraintReport, HostHealth
+from fsw.signals import BatteryState, ConstraintReport, HostHealth, SensorReport
 from tests.fsw.flight.contexts import STANDING
 from tests.fsw.flight.in_flight import CONFIG, limits
+from tests.fsw.link.snapshots import REPORT
 from tests.fsw.random_states import estimate_of, random_estimate
 
 BLIND = replace(STANDING, estimate_valid=False)
 UNCLEAR = replace(STANDING, standing_unclear=True)
 INCONSISTENT = replace(STANDING, inconsistent="the sphere is too small")
-LEVEL = estimate_of(Rotation.identity())
+NOW_US = 7_000_000
+LEVEL = estimate_of(Rotation.identity())._replace(t_us=NOW_US)
 
 
 def unwell(**changes: Any) -> arming.CommandContext:
@@ -91,7 +93,7 @@ def healthy(config: FlightConfig = CONFIG, estimate: Any = LEVEL, **state: Any) 
     return arming_health(config, replace(FlightState(), **state), estimate, "")
 
 
-@pytest.mark.parametrize("degrees", [0.0, 30.0, 90.0, 180.0])
+@pytest.mark.parametrize("degrees", [0.0, 30.0, 89.0, 180.0])
 def test_the_tilt_is_that_of_the_estimate(degrees: float) -> None:
     tilted = estimate_of(Rotation.from_euler("y", degrees, degrees=True))
     assert healthy(estimate=tilted).tilt == pytest.approx(math.radians(degrees), abs=1e-6)
@@ -120,8 +122,12 @@ def test_an_estimate_that_is_not_aided_or_not_known_is_no_estimate(
 
 
 def test_sensors_margins_damage_and_the_log_are_looked_at() -> None:
-    lost = Aiding(sensor=Sensor.ENCODERS, fault=SensorFault.STUCK)
+    lost = Aiding(sensor=Sensor.ENCODERS, fault=SensorFault.STUCK, since_us=NOW_US - 50_000)
     assert "encoders are stuck" in healthy(aiding=lost).sensor
+    assert healthy(aiding=lost._replace(since_us=NOW_US - 49_999)).sensor == "", "for a moment"
+    for silent_us, words in ((2_400_000, "barometer has been silent for 2 s"), (10**6, "")):
+        report = replace(REPORT, sensors=(SensorReport("barometer", silent_us),))
+        assert healthy(estimator=report).sensor == words
     assert healthy(constraints=ConstraintReport(margins=(0.2, -0.1))).least_margin == -0.1
     assert healthy(damage=Damage(joint="joint 1 is stuck")).damage == "joint 1 is stuck"
     full = HostHealth(log_failure="flight.ulg ends early: No space left on device")
