@@ -284,8 +284,14 @@ def _on_setpoints_lost(context: FailsafeContext) -> Action:
     return known.get(context.limits.setpoint_loss_action, Action.HOLD)
 
 
-# Bits of COM_DLL_EXCEPT, PX4's.
-_EXCEPTIONS: Final = {Mode.MISSION: 1, Mode.HOLD: 2, Mode.TAKEOFF: 2, Mode.OFFBOARD: 4}
+# Bits of COM_DLL_EXCEPT, PX4's; that of external modes is the one of its COM_RCL_EXCEPT.
+_EXCEPTIONS: Final = {
+    Mode.MISSION: 1,
+    Mode.HOLD: 2,
+    Mode.TAKEOFF: 2,
+    Mode.OFFBOARD: 4,
+    Mode.TRAJECTORY: 8,
+}
 
 
 def _on_datalink_lost(context: FailsafeContext) -> Action:

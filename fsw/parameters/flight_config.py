@@ -49,7 +49,9 @@ class FlightLimits:
     fence_clearance: float = 0.1  # m, kept from the walls of an uploaded fence
     station_timeout_us: int = 10_000_000  # without a ground station its loss is acted upon
     station_loss_action: int = 2  # how: 0 not at all, 1 hold, 2 return, 3 land, 5 terminate
-    station_loss_exceptions: int = 0  # where it is not: 1 in a mission, 2 in hold, 4 offboard
+    station_loss_exceptions: int = (
+        0  # where it is not: 1 in a mission, 2 in hold, 4 offboard, 8 on a trajectory
+    )
     failsafe_delay_us: int = 5_000_000  # in hold, before the vehicle returns or lands
     battery_low: float = 0.2  # share of the capacity
     battery_critical: float = 0.1

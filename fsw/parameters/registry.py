@@ -277,7 +277,7 @@ _ROWS: Final[dict[str, list[_Row]]] = {
          "Ground station heartbeat timeout", _IN_MICROSECONDS),
         ("NAV_DLL_ACT", "limits.station_loss_action", "", 0.0, 5.0,
          "Ground station loss action, in every flight mode but those of COM_DLL_EXCEPT"),
-        ("COM_DLL_EXCEPT", "limits.station_loss_exceptions", "", 0.0, 7.0,
+        ("COM_DLL_EXCEPT", "limits.station_loss_exceptions", "", 0.0, 15.0,
          "Modes in which the loss of the ground station is ignored"),
         ("COM_FAIL_ACT_T", "limits.failsafe_delay_us", "s", 0.0, 25.0,
          "Time in Hold before a lost ground station or a battery lets the vehicle return or land",
@@ -380,7 +380,11 @@ _ROWS: Final[dict[str, list[_Row]]] = {
 
 def _exceptions(bits: int) -> str:
     """Modes of COM_DLL_EXCEPT, as a choice."""
-    modes = [mode for k, mode in enumerate(("Mission", "Hold", "Offboard")) if bits >> k & 1]
+    modes = [
+        mode
+        for k, mode in enumerate(("Mission", "Hold", "Offboard", "Trajectory"))
+        if bits >> k & 1
+    ]
     return " and ".join(modes) or "None"
 
 
@@ -392,7 +396,7 @@ _CHOICES: Final[dict[str, Choices]] = {
     ),
     "COM_OBL_RC_ACT": ((3, "Return"), (4, "Land"), (5, "Hold"), (6, "Terminate")),
     "NAV_DLL_ACT": ((0, "Disabled"), (1, "Hold"), (2, "Return"), (3, "Land"), (5, "Terminate")),
-    "COM_DLL_EXCEPT": tuple((bits, _exceptions(bits)) for bits in range(8)),
+    "COM_DLL_EXCEPT": tuple((bits, _exceptions(bits)) for bits in range(16)),
     "COM_FLTT_LOW_ACT": ((0, "None"), (1, "Warning"), (3, "Return")),
     "COM_ACT_FAIL_ACT": (
         (0, "Warning"),

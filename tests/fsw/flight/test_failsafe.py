@@ -247,6 +247,7 @@ def test_a_lost_station_is_acted_on_as_the_parameter_says(number: int, expected:
         (2, {Mode.HOLD, Mode.TAKEOFF}),
         (4, {Mode.OFFBOARD}),
         (7, {Mode.MISSION, Mode.HOLD, Mode.TAKEOFF, Mode.OFFBOARD}),
+        (8, {Mode.TRAJECTORY}),
     ],
 )
 def test_a_lost_station_is_ignored_in_the_modes_of_the_parameter_alone(
