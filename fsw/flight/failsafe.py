@@ -16,6 +16,7 @@ from enum import Enum
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from fsw.estimation.sensor_fault import sentence
+from fsw.flight.uncertain_clearance import LACKING
 from fsw.frozen import dataclass as value_dataclass
 from fsw.parameters.flight_config import FlightConfig, FlightLimits
 from fsw.signals import (
@@ -40,6 +41,7 @@ BREAKER: Final = 121212  # of CBRK_FLIGHTTERM, PX4's number
 AT_ONCE_US: Final = 2_000  # a tick
 SLOW_US: Final = 100_000  # a planning period, after which the other rows are looked at again
 SECOND_US: Final = 1_100_000  # the loop looks at its machine once a second
+_LACKING_US: Final = 500_000  # without room enough; hidden markers, 0.2 s, are none
 
 
 class Action(Enum):
@@ -93,6 +95,7 @@ class Condition(Enum):
     JOINT_FAILED = "joint failed"
     POSITION_LOW = "position uncertain"
     SENSOR_LOST = "sensor lost"
+    ROOM_LACKING = "too little room for what the estimate is not sure of"
     TUBE_LEFT = "off the plan"
     FILTER_ACTIVE = "too fast towards a zone"
     PLAN_STALE = "no plan for three periods"
@@ -217,6 +220,12 @@ def _datalink_is_lost(context: FailsafeContext) -> bool:
     if context.state.vehicle.gcs_heard_us < 0:
         return False  # there never was one
     return context.gcs_silent_us >= context.limits.station_timeout_us
+
+
+def _lacks_room(context: FailsafeContext) -> bool:
+    kept = context.state.kept
+    lasts = context.estimate.t_us - kept.ample_us >= _LACKING_US
+    return kept.lacking > LACKING and lasts and context.state.vehicle.flies
 
 
 def _is_unaided(context: FailsafeContext) -> bool:
@@ -540,6 +549,19 @@ FAILSAFES: Final = (
         parameters=("COM_SENS_LOSS_T", "COM_SENS_ACT"),
     ),
     Failsafe(
+        Condition.ROOM_LACKING,
+        _lacks_room,
+        _always(Action.WARN),
+        Severity.CRITICAL,
+        detail=lambda c: f": {1e3 * c.state.kept.lacking:.0f} mm less than SAFE_SIGMAS asks for",
+        slow=True,
+        detected="in flight, for 0.5 s, walls leave 10 mm less than clearances should grow by "
+        "([barriers](../concepts/barriers.md#an-uncertain-place))",
+        within_us=_SLOWLY,
+        parameters=("SAFE_SIGMAS",),
+        does="critical text; they grow as far as a plan at rest still has a place",
+    ),
+    Failsafe(
         Condition.TUBE_LEFT,
         lambda c: c.state.safety.off_plan_us >= 0,
         _always(Action.REPLAN),
@@ -547,7 +569,8 @@ FAILSAFES: Final = (
         detail=lambda c: _by_mm(c.state.safety.off_plan_by),
         of_vehicle=True,
         detected="in flight, the base is further from the running plan's state, on any axis, than "
-        "the start-up analysis bounds it, and 10 mm for noise",
+        "the start-up analysis bounds it, and 10 mm for noise, or what the analysis of the "
+        "estimate finds if that is more",
         within_us=2 * AT_ONCE_US,
         does="the next plan, within a planning period, starts from the measurement",
         ends="the vehicle has been within half of that for 0.5 s",

@@ -15,6 +15,7 @@ from fsw.flight.failsafe import Condition
 from fsw.flight.plan_exchange import nominal_at_rest
 from fsw.flight.safe_set import joined
 from fsw.flight.state import FlightState, MissionMemory
+from fsw.flight.uncertain_clearance import KeptSet
 from fsw.shapes.half_space import wall
 from fsw.signals import (
     STOPPED,
@@ -150,7 +151,8 @@ def test_a_breach_of_an_uploaded_fence_is_one_of_its_own(uploaded: bool) -> None
     outside = frame(1_000_000, p_WB=(60.0, 0.0, -5.0))
     seen = estimate_state(outside)
     assert seen is not None
-    state = replace(flying(), mission=mission, nominal=nominal_at_rest(seen))
+    kept = KeptSet().of(mission.safe_set)
+    state = replace(flying(), mission=mission, kept=kept, nominal=nominal_at_rest(seen))
     for t_us in (1_000_000, 1_002_000):
         state, outputs = tick(state, t_us, sensors=replace(outside, t_us=t_us))
     words = "outside the fence" if uploaded else "outside the safe set"
