@@ -400,8 +400,8 @@ def _no_plan(context: FailsafeContext) -> str:
 
 
 def _refused_plan(context: FailsafeContext) -> str:
-    why = _PLANNER_FAILS.get(context.state.plan.status, "failing")
-    return f": {why}, last plan {1e-6 * _plan_age_us(context):.2f} s ago"
+    """Without a number: it may come and go ten times a second, and is then told once in a while."""
+    return f": {_PLANNER_FAILS.get(context.state.plan.status, 'failing')}"
 
 
 def _jumped(context: FailsafeContext) -> str:
@@ -637,7 +637,6 @@ FAILSAFES: Final = (
         Condition.PLAN_LATE,
         lambda c: c.state.plan.awaited_missed and _plans(c),
         _always(Action.WARN),
-        detail=lambda c: f": last plan {1e-6 * _plan_age_us(c):.2f} s ago",
         slow=True,
         detected="in flight, a plan has not come at its time",
         within_us=_SLOWLY,

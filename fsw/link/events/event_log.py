@@ -7,10 +7,11 @@ from dataclasses import dataclass
 from typing import Final
 
 from fsw.link.events.event_table import Event, arming_events, failsafe_event
-from fsw.signals import ArmingReport, Order, TickInputs, TickOutputs
+from fsw.signals import ArmingReport, Order, Severity, TickInputs, TickOutputs
 
 _KEPT: Final = 64  # events; a client that missed more is told so
 _BETWEEN_US: Final = 2_000_000  # two reports of the arming checks that nobody asked for
+_AGAIN_US: Final = 5_000_000  # as the texts of a link
 _SEQUENCE: Final = 0x10000
 
 
@@ -31,6 +32,7 @@ class EventLog:
         self._kept: deque[NumberedEvent] = deque(maxlen=_KEPT)
         self._reported: ArmingReport | None = None  # the last one that was sent
         self._reported_us: int | None = None
+        self._lately: dict[Event, int] = {}  # when each was; there are as many as conditions
 
     def observe(self, inputs: TickInputs, outputs: TickOutputs) -> None:
         """Take in what a tick heard and says."""
@@ -40,7 +42,7 @@ class EventLog:
             return  # as on almost every tick
         for text in outputs.texts:
             if text.event is not None:
-                self._add(failsafe_event(text.event), snapshot.t_us)
+                self._add_failsafe(failsafe_event(text.event), snapshot.t_us)
         asked = any(one.action is Order.CHECK_ARMING for one in inputs.commands)
         waits = last_us is not None and snapshot.t_us - last_us < _BETWEEN_US
         if not asked and (waits or report == self._reported):
@@ -65,6 +67,15 @@ class EventLog:
     def oldest(self) -> int:
         """Sequence number of the oldest event that is kept."""
         return self._kept[0].sequence if self._kept else self.newest
+
+    def _add_failsafe(self, event: Event, t_us: int) -> None:
+        """Add it unless it is of no weight and has just been: some conditions come and go."""
+        last_us = self._lately.get(event)
+        if event.severity > Severity.CRITICAL:
+            if last_us is not None and t_us - last_us < _AGAIN_US:
+                return
+            self._lately[event] = t_us
+        self._add(event, t_us)
 
     def _add(self, event: Event, t_us: int) -> None:
         self.newest = (self.newest + 1) % _SEQUENCE

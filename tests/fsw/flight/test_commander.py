@@ -337,7 +337,7 @@ def test_a_condition_is_reported_once_for_as_long_as_it_lasts() -> None:
 def test_another_condition_is_reported_alone() -> None:
     state, _ = watched(SHAKY)
     state, texts = watched(replace(state, plan=replace(state.plan, refused=True)))
-    assert texts == ["last plan refused: failing, last plan 0.00 s ago: warn"]
+    assert texts == ["last plan refused: failing: warn"]
     assert len(state.vehicle.conditions) == 2
 
 

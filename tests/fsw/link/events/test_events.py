@@ -165,6 +165,20 @@ def test_a_text_with_an_event_is_one() -> None:
     assert read(first.event) == "no ground station: returning"
 
 
+def test_a_condition_that_comes_and_goes_is_an_event_once_in_a_while() -> None:
+    log = EventLog()
+    late = FailsafeEvent(Condition.PLAN_LATE.value, Action.WARN.value, Severity.WARNING)
+    for t_us in (0, SECOND, 4 * SECOND):
+        ticked(log, t_us, ArmingReport(), event=late)
+    assert log.newest == 1 + 2, "and two summaries"
+    ticked(log, 5 * SECOND, ArmingReport(), event=late)
+    ticked(log, 5 * SECOND, ArmingReport(), event=late._replace(over=True))
+    assert log.newest == 3 + 2
+    for _ in range(3):
+        ticked(log, 6 * SECOND, ArmingReport(), event=LOST)
+    assert log.newest == 5 + 3, "what changes the mode always is"
+
+
 def sequences(messages: Any, message_id: int = message_ids.EVENT) -> list[int]:
     place = {message_ids.EVENT: 2}.get(message_id, 0)
     return [int(one.values[place]) for one in messages if one.message_id == message_id]
