@@ -37,6 +37,7 @@ STEP_US = 2000  # one exchange with the flight software
 START_US = 1_000_000  # so that no stamp is 0
 SETTLED_STEPS = 250  # for which the vehicle's sensors have run when the flight begins
 SETTLED_KEPT = 20  # of these, whose measurements the flight software still gets
+SETTLED_NEWEST = 2  # of each sensor, however long ago they came
 SUBSTEPS = 2  # plant steps per exchange
 SAMPLE_STEPS = 50  # tracking error at 10 Hz, as the paper's TE
 
@@ -195,15 +196,20 @@ class Simulation:
     def _settled(self, suite: SensorSuite, thrust: V4) -> list[Measurement]:
         """What came before the first step, in which a flight software cannot wait for sensors.
 
-        The vehicle has been where it starts for a while: the newest of each sensor, and all of the
-        last few steps.
+        The vehicle has been where it starts for a while: the newest few of each sensor, and all of
+        the last few steps.
         """
         exact, arrived = self.sense(), list[tuple[int, Measurement]]()
         for k in range(-SETTLED_STEPS, 0):
             earlier = exact._replace(t_us=exact.t_us + k * STEP_US)
             arrived += [(k, one) for one in suite.step(earlier, thrust)]
-        newest = {type(one): one for _, one in arrived}
-        return [one for k, one in arrived if k >= -SETTLED_KEPT or newest[type(one)] is one]
+        kinds = [type(one) for _, one in arrived]
+        later = [kinds[i:].count(kind) for i, kind in enumerate(kinds)]
+        return [
+            one
+            for (k, one), rank in zip(arrived, later, strict=True)
+            if k >= -SETTLED_KEPT or rank <= SETTLED_NEWEST
+        ]
 
     def advance(self, controls: Controls) -> None:
         """Integrate one step with ``controls`` held, judging every plant step.
