@@ -18,7 +18,8 @@ import numpy as np
 
 from fsw.compiled import packed
 from fsw.estimation import kernels
-from fsw.estimation.error_state import ERRORS, FILTER, IMU_CAPACITY, Array, Filter
+from fsw.estimation.drift import FrameDrift
+from fsw.estimation.error_state import DELAY, ERRORS, FILTER, FRAME, IMU_CAPACITY, Array, Filter
 from fsw.estimation.imu import STUCK_READINGS, TIME_TOLERANCE
 from fsw.estimation.joint_filter import joint_gain
 from fsw.estimation.sensor_checks import SENSOR_OF, Aiding, Health, arrived, believable
@@ -41,6 +42,7 @@ from fsw.signals import StateEstimate, Vec2, Vec3, Vec4
 LATE: Final = 0.01  # s behind the filter, where a measurement is still fused as it stands
 _MARGIN: Final = 0.003  # s, by which a measurement may take longer than lately
 _LONGEST_STEP: Final = 0.05  # s, by which joints are predicted at once
+_FLOATS: Final = FILTER.itemsize // 8  # that a filter has room for
 _REST: Vec3 = (0.0, 0.0, 0.0)
 _NO_TURN: Vec4 = (1.0, 0.0, 0.0, 0.0)
 
@@ -74,20 +76,24 @@ class EncoderWatch(NamedTuple):
 class FusionMemory(NamedTuple):
     """What the estimator carries from tick to tick."""
 
+    # What every tick renews; the rest is as it was in most of them.
     numbers: Filter
+    now: float = -1.0  # s, of the last tick; negative: there was none
+    imu_came: float = -1.0  # s, when a reading came last; negative: never
+    joints_came: float = -1.0
+    encoders: EncoderWatch = EncoderWatch()
     started: bool = False
     waiting: tuple[Waiting, ...] = ()
     arrivals: int = 0
     health: tuple[Health, ...] = ()  # of each sensor heard so far
     field: Vec3 | None = None  # Gauss, body, the last one
     reset_counter: int | None = None  # of the last pose
+    frame: FrameDrift = FrameDrift()  # of poses that drift
     reset: Reset = Reset()
-    now: float = -1.0  # s, of the last tick; negative: there was none
-    imu_came: float = -1.0  # s, when a reading came last; negative: never
-    joints_came: float = -1.0
     gnss: GnssSample | None = None  # the newest one
+    pose: PoseSample | None = None  # the last one that the filter has reached
     delay: float = 0.0  # s, that measurements have lately taken
-    encoders: EncoderWatch = EncoderWatch()
+    delay_sigma: float = 0.0  # s, with which the estimate of the pose's own delay began
 
     def of(self, sensor: Sensor) -> Health:
         """What is known of a sensor."""
@@ -104,8 +110,16 @@ class FusionMemory(NamedTuple):
 
     def noting(self, health: Health) -> FusionMemory:
         """The memory with the health of one sensor renewed."""
-        others = [one for one in self.health if one.sensor is not health.sensor]
-        return self._replace(health=(*others, health))
+        return self._replace(health=(*self.without(health.sensor), health))
+
+    def without(self, sensor: Sensor) -> list[Health]:
+        """What is known of the other sensors."""
+        return [one for one in self.health if one.sensor is not sensor]
+
+    def watching(self, encoders: EncoderWatch) -> FusionMemory:
+        """The memory with a newer watch of the encoders."""
+        x, now, imu_came, joints_came = self[:4]
+        return FusionMemory(x, now, imu_came, joints_came, encoders, *self[5:])
 
     def jumped(
         self, position: Vec3 = _REST, velocity: Vec3 = _REST, turn: Vec4 = _NO_TURN
@@ -122,15 +136,113 @@ def at_start() -> FusionMemory:
     return FusionMemory(np.zeros(1, dtype=FILTER))
 
 
+class _Tick:
+    """One tick of the filter; what is asked of it is done at once, in one call where it can be."""
+
+    __slots__ = (
+        "_dt",
+        "_encoders",
+        "_force",
+        "_fusion",
+        "_now",
+        "_parts",
+        "_rate",
+        "_time",
+        "_u",
+        "_x",
+        "imu_came",
+        "joints_came",
+        "memory",
+    )
+
+    def __init__(self, fusion: SensorFusion, memory: FusionMemory, now: float, u: Vec2) -> None:
+        self.memory = memory
+        self.imu_came, self.joints_came = memory.imu_came, memory.joints_came
+        self._fusion, self._now, self._u = fusion, now, u
+        self._dt = min(max(now - memory.now, 0.0), _LONGEST_STEP) if memory.now >= 0.0 else 0.0
+        # Eight times as fast as an empty array of records.
+        self._x = np.ndarray(1, FILTER, np.empty(_FLOATS))
+        self._parts = kernels.COPY
+        self._encoders = self._force = self._rate = _REST
+        self._time = 0.0
+
+    def take_imu(self, sample: ImuSample) -> None:
+        """Take in a reading of the IMU."""
+        if self._parts & kernels.READING:
+            self.run()
+        self._parts |= kernels.READING
+        self._time, self._force, self._rate = sample.time, sample.acceleration, sample.rate
+        self.imu_came = self._now
+
+    def take_joints(self, sample: JointSample) -> None:
+        """Take in a reading of the encoders."""
+        (first, second), now = sample.angles, self._now
+        if not (max(abs(first), abs(second)) < math.pi and sample.time <= now + TIME_TOLERANCE):
+            health = self.memory.of(Sensor.ENCODERS).with_fault(SensorFault.IMPLAUSIBLE, now)
+            self.memory = self.memory.noting(health)
+        elif self.joints_came < 0.0:
+            kernels.set_joints(self.run().numbers, sample.angles)
+            self.joints_came = now
+        else:
+            if self._parts & kernels.JOINTS:
+                self.run()
+            self._parts |= kernels.JOINTS
+            self._encoders = first, second, now - sample.time
+            self.joints_came = now
+
+    def take(self, sample: Aiding) -> None:
+        """Take in any other sample."""
+        if self._parts & kernels.READING:
+            self.run()
+        self.memory = self._fusion.take(self.memory, sample, self._now)
+
+    def run(self) -> FusionMemory:
+        """Do what was asked for; the memory then has a filter of its own."""
+        if self._parts:
+            self._call(0, self._now)
+            self.memory = self.memory._replace(numbers=self._x)
+        return self.memory
+
+    def end(self, until: float) -> kernels.Present:
+        """Predict the filter up to ``until`` [s] and from there the present."""
+        return self._call(kernels.END, until)
+
+    def memory_after(self) -> FusionMemory:
+        """The memory after the tick."""
+        self.run()
+        return FusionMemory(self._x, self._now, self.imu_came, self.joints_came, *self.memory[4:])
+
+    def _call(self, more: int, until: float) -> kernels.Present:
+        parts, self._parts = self._parts | more, 0
+        x = self._x
+        fault, known = kernels.tick(
+            self.memory.numbers if parts & kernels.COPY else x,
+            x,
+            self._fusion.law,
+            parts,
+            (self._now, self._dt, until),
+            self._u,
+            self._encoders,
+            self._time,
+            self._force,
+            self._rate,
+        )
+        if fault:
+            health = self.memory.of(Sensor.IMU).with_fault(SensorFault(fault), self._now)
+            self.memory = self.memory.noting(health)
+        return known
+
+
 class SensorFusion:
     """The estimator of one configuration; holds only what never changes in flight."""
 
     def __init__(self, tuning: EstimatorTuning, tick: float) -> None:
         """Design the joints' filter for a ``tick`` [s]."""
         self.tuning = tuning
-        self._law = packed(EstimatorLaw(tuning, joint_gain(tuning, tick)))
+        self.law = packed(EstimatorLaw(tuning, tuning.gates, joint_gain(tuning, tick)))
         self._least_p = tuning.position_floor**2
         self._least_q = tuning.attitude_floor**2
+        self._least_gnss = tuning.gnss_position_floor**2, tuning.gnss_velocity_floor**2
         self._fuse: dict[type, Callable[[FusionMemory, Any], tuple[float, ...]]] = {
             PoseSample: self._fuse_pose,
             GnssSample: self._fuse_gnss,
@@ -164,59 +276,36 @@ class SensorFusion:
         ``joint_acceleration`` [rad/s^2, joints] is what the torques make of the arm. None before
         there was a pose, or a position and a heading, to start from, and a reading of the arm.
         """
-        memory = self._copied(memory, now, joint_acceleration)
+        tick = _Tick(self, memory, now, joint_acceleration)
         for sample in samples:
             kind = type(sample)
             if kind is ImuSample:
-                memory = self._take_imu(memory, sample, now)  # type: ignore[arg-type]
+                tick.take_imu(sample)  # type: ignore[arg-type]
             elif kind is JointSample:
-                memory = self._take_joints(memory, sample, now)  # type: ignore[arg-type]
+                tick.take_joints(sample)  # type: ignore[arg-type]
             else:
-                memory = self._take(memory, sample, now)  # type: ignore[arg-type]
-        until = now - memory.delay - _MARGIN
+                tick.take(sample)  # type: ignore[arg-type]
+        memory = tick.memory
         if not memory.started:
-            memory = self._start(memory)
-        if not memory.started or memory.joints_came < 0.0:
-            return memory, None
+            memory = tick.memory = self._start(tick.run())
+        if not memory.started or tick.joints_came < 0.0:
+            return tick.memory_after(), None
+        until = now - memory.delay - _MARGIN
         if memory.waiting and memory.waiting[0].time <= until:
-            memory = self._fuse_due(memory, until, now)
-        known = kernels.end_tick(memory.numbers, self._law, until, now)
-        return memory, StateEstimate(round(1e6 * now), *known)
+            tick.memory = self._fuse_due(tick.run(), until, now)
+        known = tick.end(until)
+        return tick.memory_after(), StateEstimate(round(1e6 * now), *known)
 
     def covariance(self, memory: FusionMemory, now: float) -> Array:
         """Covariance (17, 17) [SI] of the error of the state at ``now`` [s]."""
-        found = np.empty((ERRORS, ERRORS))
-        kernels.present_covariance(memory.numbers, self._law, now, found)
-        return found
+        found, shared = np.empty((ERRORS, ERRORS)), np.empty((ERRORS, FRAME))
+        kernels.present_covariance(memory.numbers, self.law, now, found, shared)
+        if not memory.numbers[0]["drifts"]:
+            return found
+        return memory.frame.in_world(found, shared, memory.numbers[0])
 
-    def _copied(self, memory: FusionMemory, now: float, u: Vec2) -> FusionMemory:
-        """The memory with a filter of its own, whose joints are moved on."""
-        x = np.empty(1, dtype=FILTER)
-        dt = min(max(now - memory.now, 0.0), _LONGEST_STEP) if memory.now >= 0.0 else 0.0
-        kernels.begin_tick(memory.numbers, x, dt, u)
-        return memory._replace(numbers=x, now=now)
-
-    def _take_imu(self, memory: FusionMemory, sample: ImuSample, now: float) -> FusionMemory:
-        reading = sample.time, sample.acceleration, sample.rate
-        fault = kernels.add_imu(memory.numbers, self._law, now, *reading)
-        if fault:
-            health = memory.of(Sensor.IMU).with_fault(SensorFault(fault), now)
-            memory = memory.noting(health)
-        return memory._replace(imu_came=now)
-
-    def _take_joints(self, memory: FusionMemory, sample: JointSample, now: float) -> FusionMemory:
-        farthest = max(abs(sample.angles[0]), abs(sample.angles[1]))
-        if not (farthest < math.pi and sample.time <= now + TIME_TOLERANCE):
-            health = memory.of(Sensor.ENCODERS).with_fault(SensorFault.IMPLAUSIBLE, now)
-            return memory.noting(health)
-        if memory.joints_came < 0.0:
-            kernels.set_joints(memory.numbers, sample.angles)
-        else:
-            kernels.read_joints(memory.numbers, self._law, sample.angles, now - sample.time)
-        return memory._replace(joints_came=now)
-
-    def _take(self, memory: FusionMemory, sample: Aiding, now: float) -> FusionMemory:
-        """Check a sample and let it wait for its time."""
+    def take(self, memory: FusionMemory, sample: Aiding, now: float) -> FusionMemory:
+        """Check a ``sample`` that came at ``now`` [s] and let it wait for its time."""
         x = memory.numbers
         still = bool(x["same"][0] >= STUCK_READINGS)
         before = memory.of(SENSOR_OF[type(sample)])
@@ -224,25 +313,47 @@ class SensorFusion:
         time = sample.time
         if isinstance(sample, PoseSample):
             time -= float(x["pose_delay"][0]) if memory.started else self.tuning.pose_delay
+        elif isinstance(sample, GnssSample):
+            time -= self.tuning.gnss_delay
         if not fault and memory.started and time < x["time"][0] - LATE:
             fault = SensorFault.TOO_OLD
             health = health.with_fault(fault, now)
+        delay = memory.delay
         if fault in (SensorFault.NONE, SensorFault.TOO_OLD):
-            memory = self._with_delay(memory, now - time, now - before.came)
-        memory = memory.noting(health)
+            delay = self._delay(delay, now - time, now - before.came)
+        others = memory.without(health.sensor)
         if fault:
-            return memory
-        if isinstance(sample, GnssSample):
-            memory = memory._replace(gnss=sample)
+            return memory._replace(health=(*others, health), delay=delay)
         waiting = (*memory.waiting, Waiting(time, memory.arrivals, sample))
         if len(waiting) > 1 and waiting[-2].time > time:
             waiting = tuple(sorted(waiting))
-        return memory._replace(waiting=waiting, arrivals=memory.arrivals + 1)
+        return memory._replace(
+            health=(*others, health),
+            delay=delay,
+            gnss=sample if isinstance(sample, GnssSample) else memory.gnss,
+            waiting=waiting,
+            arrivals=memory.arrivals + 1,
+        )
 
-    def _with_delay(self, memory: FusionMemory, delay: float, apart: float) -> FusionMemory:
-        """The memory after a measurement took so long, ``apart`` [s] from its sensor's last one."""
-        faded = memory.delay - self.tuning.delay_decay * min(apart, 1.0)
-        return memory._replace(delay=min(max(delay, faded), self.tuning.longest_delay))
+    def _with_delay_known(self, memory: FusionMemory) -> FusionMemory:
+        """The memory after the parameters of the pose's delay may have changed in flight."""
+        x, sigma = memory.numbers[0], self.tuning.pose_delay_sigma
+        if not sigma:
+            x["pose_delay"] = self.tuning.pose_delay
+        if sigma == memory.delay_sigma or not memory.started:
+            return memory
+        M = x["covariance"]
+        M[DELAY], M[:, DELAY], x["shared"][DELAY] = 0.0, 0.0, 0.0
+        M[DELAY, DELAY] = sigma**2
+        return memory._replace(delay_sigma=sigma)
+
+    def _delay(self, before: float, delay: float, apart: float) -> float:
+        """How long measurements take, after one did so, ``apart`` [s] from its sensor's last one.
+
+        ``before`` [s] and ``delay`` [s].
+        """
+        faded = before - self.tuning.delay_decay * min(apart, 1.0)
+        return min(max(delay, faded), self.tuning.longest_delay)
 
     def _start(self, memory: FusionMemory) -> FusionMemory:
         """Start from the newest pose; else from a GNSS position, gravity and the compass."""
@@ -255,29 +366,29 @@ class SensorFusion:
         for one in reversed(memory.waiting):
             sample = one.sample
             if isinstance(sample, PoseSample):
-                self._begin(
-                    memory,
-                    sample.time,
-                    (sample.position, _REST, normalised(sample.attitude)),
+                stated = (
                     believable(sample.position_variance, self._least_p),
                     believable(sample.attitude_variance, self._least_q),
                 )
+                place = sample.position, _REST, normalised(sample.attitude)
+                self._begin(memory, sample.time, place, *stated)
+                memory = memory._replace(frame=FrameDrift(*stated))
                 break
             if isinstance(sample, GnssSample) and memory.field is not None:
                 level = _levelled(memory.numbers, memory.field, self.tuning.declination)
                 tilt = self.tuning.tilt**2
                 self._begin(
                     memory,
-                    sample.time,
+                    sample.time - self.tuning.gnss_delay,
                     (sample.position, sample.velocity, level),
-                    believable(sample.position_variance, self._least_p),
-                    (tilt, tilt, self.tuning.heading**2),
+                    believable(sample.position_variance, self._least_gnss[0]),
+                    (tilt, tilt, self.tuning.start_heading**2),
                 )
-                kernels.couple_level(memory.numbers, self._law)
+                kernels.couple_level(memory.numbers, self.law)
                 break
         else:
             return memory._replace(waiting=())
-        return memory._replace(started=True, waiting=())
+        return memory._replace(started=True, waiting=(), delay_sigma=self.tuning.pose_delay_sigma)
 
     def _begin(
         self,
@@ -289,20 +400,29 @@ class SensorFusion:
     ) -> None:
         slow = self.tuning.velocity**2
         variances = p_variance, (slow, slow, slow), q_variance
-        kernels.begin(memory.numbers, self._law, time, *state, *variances)
+        kernels.begin(memory.numbers, self.law, time, *state, *variances)
 
     def _fuse_due(self, memory: FusionMemory, until: float, now: float) -> FusionMemory:
         """Fuse every waiting sample that the filter has reached."""
         waiting = memory.waiting
         while waiting and waiting[0].time <= until:
             one, waiting = waiting[0], waiting[1:]
-            kernels.advance_to(memory.numbers, self._law, one.time)
+            kernels.advance_to(memory.numbers, self.law, one.time)
             memory = self._fuse_one(memory, one, now)
         return memory._replace(waiting=waiting)
 
     def _fuse_one(self, memory: FusionMemory, one: Waiting, now: float) -> FusionMemory:
         sample = one.sample
         health = memory.of(SENSOR_OF[type(sample)])
+        announced, drifts = False, False
+        if isinstance(sample, PoseSample):
+            memory = self._with_delay_known(memory)
+            announced = memory.reset_counter not in (None, sample.reset_counter)
+            drifts = sample.drifts
+            memory = memory._replace(reset_counter=sample.reset_counter)
+            if drifts:
+                memory = self._with_frame(memory, sample, announced)
+        before = memory.numbers[0].copy() if announced and drifts else None
         ratio = self._fuse[type(sample)](memory, sample)
         fused = health.fused or (now,) * len(ratio)
         fused = tuple([now if r <= 1.0 else before for r, before in zip(ratio, fused, strict=True)])
@@ -311,36 +431,55 @@ class SensorFusion:
         health = health._replace(ratio=ratio, fused=fused, innovation=shown)
         if max(ratio) > 1.0:
             health = health.with_fault(SensorFault.JUMP, now)
-        counted = sample.reset_counter if isinstance(sample, PoseSample) else memory.reset_counter
-        announced = memory.reset_counter is not None and counted != memory.reset_counter
-        memory = memory.noting(health)._replace(reset_counter=counted)
+        memory = memory.noting(health)
+        if isinstance(sample, PoseSample):
+            memory = memory._replace(pose=sample)
         long_refused = now - min(fused) > self.tuning.reset_time
         if max(ratio) > 1.0 and (announced or long_refused):
             memory = self._reset(memory, one, ratio)
             memory = memory.noting(health._replace(fused=(now,) * len(ratio)))
+        elif before is not None:
+            memory = memory.jumped(*_jump(before, memory.numbers[0]))
         return memory
+
+    def _with_frame(
+        self, memory: FusionMemory, sample: PoseSample, announced: bool
+    ) -> FusionMemory:
+        """The memory after a frame that drifts has moved, to where a pose says it is."""
+        stated = (
+            believable(sample.position_variance, self._least_p),
+            believable(sample.attitude_variance, self._least_q),
+        )
+        return memory._replace(frame=memory.frame.moved(memory.numbers[0], stated, announced))
+
+    def _noise(self, memory: FusionMemory, sample: PoseSample) -> tuple[Vec3, Vec3]:
+        """Variances [m^2, NED] and [rad^2, FRD] of a pose in its own frame."""
+        if sample.drifts:
+            return memory.frame.place_noise, memory.frame.attitude_noise
+        return (
+            believable(sample.position_variance, self._least_p),
+            believable(sample.attitude_variance, self._least_q),
+        )
 
     def _reset(self, memory: FusionMemory, one: Waiting, ratio: tuple[float, ...]) -> FusionMemory:
         """Take what the gate refused for long as it is."""
-        x, law, sample = memory.numbers, self._law, one.sample
+        x, law, sample = memory.numbers, self.law, one.sample
         place, velocity, turn = _REST, _REST, _NO_TURN
         if isinstance(sample, PoseSample):
-            variance = believable(sample.position_variance, self._least_p)
+            variance, about = self._noise(memory, sample)
             if ratio[0] > 1.0:
                 place = kernels.set_place(x, law, one.time, sample.position, variance)
             if ratio[1] > 1.0:
-                before = _attitude(x)
+                before = _attitude(x[0])
                 after = normalised(sample.attitude)
-                kernels.set_attitude(
-                    x, law, after, believable(sample.attitude_variance, self._least_q)
-                )
+                kernels.set_attitude(x, law, after, about)
                 turn = multiply(after, conjugate(before))
         elif isinstance(sample, GnssSample):
             if ratio[0] > 1.0:
-                variance = believable(sample.position_variance, self._least_p)
+                variance = believable(sample.position_variance, self._least_gnss[0])
                 place = kernels.set_place(x, law, one.time, sample.position, variance)
             if ratio[1] > 1.0:
-                variance = believable(sample.velocity_variance, self._least_p)
+                variance = believable(sample.velocity_variance, self._least_gnss[1])
                 velocity = kernels.set_velocity(x, law, sample.velocity, variance)
         else:
             return memory
@@ -349,46 +488,50 @@ class SensorFusion:
     def _fuse_pose(self, memory: FusionMemory, sample: PoseSample) -> tuple[float, ...]:
         return kernels.fuse_pose(
             memory.numbers,
-            self._law,
+            self.law,
             sample.time,
             sample.position,
             normalised(sample.attitude),
-            believable(sample.position_variance, self._least_p),
-            believable(sample.attitude_variance, self._least_q),
+            *self._noise(memory, sample),
         )
 
     def _fuse_gnss(self, memory: FusionMemory, sample: GnssSample) -> tuple[float, ...]:
         return kernels.fuse_gnss(
             memory.numbers,
-            self._law,
-            sample.time,
+            self.law,
+            sample.time - self.tuning.gnss_delay,
             sample.position,
             sample.velocity,
-            believable(sample.position_variance, self._least_p),
-            believable(sample.velocity_variance, self._least_p),
+            believable(sample.position_variance, self._least_gnss[0]),
+            believable(sample.velocity_variance, self._least_gnss[1]),
         )
 
     def _fuse_pressure(self, memory: FusionMemory, sample: PressureSample) -> tuple[float, ...]:
-        variance = max(sample.variance, self._least_p)
+        variance = max(sample.variance, self.tuning.pressure_floor**2)
         return (
-            kernels.fuse_pressure(
-                memory.numbers, self._law, sample.time, sample.altitude, variance
-            ),
+            kernels.fuse_pressure(memory.numbers, self.law, sample.time, sample.altitude, variance),
         )
 
     def _fuse_heading(self, memory: FusionMemory, sample: MagneticSample) -> tuple[float, ...]:
-        return (kernels.fuse_heading(memory.numbers, self._law, sample.time, sample.field),)
+        return (kernels.fuse_heading(memory.numbers, self.law, sample.time, sample.field),)
 
     def _fuse_range(self, memory: FusionMemory, sample: RangeSample) -> tuple[float, ...]:
-        variance = max(sample.variance, self._least_p)
+        variance = max(sample.variance, self.tuning.range_floor**2)
         return (
-            kernels.fuse_range(memory.numbers, self._law, sample.time, sample.distance, variance),
+            kernels.fuse_range(memory.numbers, self.law, sample.time, sample.distance, variance),
         )
 
 
-def _attitude(x: Filter) -> Vec4:
-    w, i, j, k = x["q"][0].tolist()
+def _attitude(x: Any) -> Vec4:
+    w, i, j, k = x["q"].tolist()
     return w, i, j, k
+
+
+def _jump(before: Any, after: Any) -> tuple[Vec3, Vec3, Vec4]:
+    """Position [m, NED], velocity [m/s, NED] and turn [1] from one state to another."""
+    px, py, pz = (after["p"] - before["p"]).tolist()
+    vx, vy, vz = (after["v"] - before["v"]).tolist()
+    return (px, py, pz), (vx, vy, vz), multiply(_attitude(after), conjugate(_attitude(before)))
 
 
 def _levelled(x: Filter, field: Vec3, declination: float) -> Vec4:

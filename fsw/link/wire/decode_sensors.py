@@ -34,7 +34,9 @@ _MAGNETIC: Final = 0x1C0
 _PRESSURE: Final = 0x200
 _RESET: Final = 0x80000000
 
+ODOMETRY_VALUES: Final = 61  # all of them
 _LOCAL_NED: Final = 1  # MAV_FRAME
+_DRIFTING: Final = (2, 3, 7)  # MAV_ESTIMATOR_TYPE: vision, visual-inertial, lidar
 _DOWNWARD: Final = 25  # MAV_SENSOR_ORIENTATION
 _UNKNOWN_EPH: Final = 0xFFFF
 _LEVEL_FIX: Final = 2  # GPS_FIX_TYPE; those above it have a height
@@ -123,6 +125,7 @@ def pose_sample(values: Numbers) -> PoseSample | None:
         (covariance[0], covariance[6], covariance[11]),
         (covariance[15], covariance[18], covariance[20]),
         int(values[58]),
+        drifts=values[59] in _DRIFTING,
     )
 
 
