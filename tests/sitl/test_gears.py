@@ -34,13 +34,12 @@ class Arm:
     def __init__(self, vehicle: Vehicle, start: Array) -> None:
         self.plants = np.array([plant(vehicle)])
         self.state = start.copy()
+        self.judged = np.empty((1, len(start)))
 
     @property
     def plant(self) -> Plant:
         now: Plant = self.plants[0]
         return now
-
-        self.judged = np.empty((1, len(start)))
 
     def step(self, torque: tuple[float, float] = (0.0, 0.0)) -> None:
         inputs = Inputs(np.zeros(4), np.array(torque), np.zeros(3), np.zeros(3))
