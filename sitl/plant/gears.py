@@ -51,7 +51,7 @@ def gears(inertia: float, gap: float, joints: int) -> Gears:
 def part_teeth(gears: Gears, torque: Array, acceleration: Array, rates: Array) -> bool:
     """Let go of every motor whose teeth would have to pull; whether there was one.
 
-    ``torque`` [N·m] drives motors, and their joints turn at ``rates`` [rad/s]; the whole
+    ``torque`` (j,) [N·m] drives motors, and their joints turn at ``rates`` (j,) [rad/s]; the whole
     ``acceleration`` (6 + j,) [SI] is what follows if the teeth hold.
     """
     parted = False
@@ -69,8 +69,8 @@ def part_teeth(gears: Gears, torque: Array, acceleration: Array, rates: Array) -
 def move_free(gears: Gears, torque: Array, moved: Array, rates: Array, step: float) -> bool:
     """Move the motors within their gaps for a ``step`` [s]; whether teeth have met.
 
-    Their joints ``moved`` [rad] and now turn at ``rates`` [rad/s]; ``torque`` [N·m] drives them.
-    Then ``moved`` holds the momentum [N·m·s] with which motors meet their joints.
+    Their joints ``moved`` (j,) [rad] and now turn at ``rates`` (j,) [rad/s]; ``torque`` (j,) [N·m]
+    drives them. Then ``moved`` holds the momentum [N·m·s] with which motors meet their joints.
     """
     half, met = 0.5 * gears.gap, False
     for i in range(torque.shape[0]):
@@ -92,7 +92,7 @@ def move_free(gears: Gears, torque: Array, moved: Array, rates: Array, step: flo
 
 @kernel
 def servo_rates_into(gears: Gears, rates: Array) -> None:
-    """Rates (j,) [rad/s] of the joints, replaced by those of motors that are within their gaps."""
+    """Joints' ``rates`` (j,) [rad/s], replaced by those of motors that are within their gaps."""
     for i in range(rates.shape[0]):
         if gears.side[i] == 0.0:
             rates[i] = gears.speed[i]

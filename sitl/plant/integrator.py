@@ -87,7 +87,10 @@ def geared_step(
     slopes: Slopes,
     moved: Array,
 ) -> None:
-    """``rk4_step`` with the gaps of the gears; moved (j,) [rad] is memory."""
+    """``rk4_step`` of ``step`` [s] with the gaps of the gears; ``moved`` (j,) [rad] is memory.
+
+    The ``state`` (17 + 2j,) [SI] is advanced in place.
+    """
     joints = moved.shape[0]
     acceleration_into(plant, state, inputs, work)
     part_teeth(plant.gears, inputs.torque, work.load, state[ARM + joints :])
