@@ -1,10 +1,7 @@
-"""Real actuators between the command and the plant: dead time, battery, backlash."""
+"""Real rotors between the command and the plant: dead time and battery."""
 
 from __future__ import annotations
 
-import math
-
-from sitl.plant.backlash import Backlash
 from sitl.plant.battery import Battery, hover_power
 from sitl.plant.esc import DeadTime
 from sitl.plant.parameters import Vehicle
@@ -12,12 +9,10 @@ from sitl.plant.vector import V4
 from sitl.scenario import ActuatorKeys
 
 _MERIT = 0.5  # figure of merit 0.65, motor and controller 0.8
-# kg·m², of a joint's motor behind its gear: some 2e-8 of a small coreless one, and 353 to 1.
-_MOTOR_INERTIA = 0.0025
 
 
 class Drives:
-    """The actuators of one flight."""
+    """What drives the rotors of one flight."""
 
     def __init__(self, keys: ActuatorKeys, vehicle: Vehicle, first: V4, step_s: float) -> None:
         """Commands come every ``step_s`` [s]; before the first the rotors gave ``first`` [N]."""
@@ -29,9 +24,6 @@ class Drives:
         self.battery = (
             Battery(keys.battery_a_h, keys.battery_ohm) if keys.battery_a_h > 0.0 else None
         )
-        gap = math.radians(keys.backlash_deg)
-        joints = len(vehicle.links) if gap > 0.0 else 0
-        self._gears = [Backlash(gap, _MOTOR_INERTIA) for _ in range(joints)]
 
     def rotors(self, command: V4, thrust: V4) -> V4:
         """What of a ``command`` [N] takes effect now [N]; the rotors give ``thrust`` [N]."""
@@ -45,16 +37,3 @@ class Drives:
             a, b, c, d = command
             command = (share * a, share * b, share * c, share * d)
         return command
-
-    def joints(self, torques: tuple[float, ...], rates: tuple[float, ...]) -> tuple[float, ...]:
-        """What of ``torques`` [N·m] reaches links that turn at ``rates`` [rad/s]."""
-        if not self._gears:
-            return torques
-        parts = zip(self._gears, torques, rates, strict=True)
-        return tuple([gear.step(torque, rate, self._step_s) for gear, torque, rate in parts])
-
-    def motor_angles(self, angles: tuple[float, ...]) -> tuple[float, ...]:
-        """Where the motors stand, which the encoders measure, for ``angles`` of the links [rad]."""
-        if not self._gears:
-            return angles
-        return tuple([a + gear.position for a, gear in zip(angles, self._gears, strict=True)])

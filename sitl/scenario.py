@@ -234,6 +234,8 @@ class ActuatorKeys:
     dead_time_ms: Annotated[float, Range(0.0, 100.0, step=2.0)] = 0.0  # of the motor controllers
     battery_a_h: Annotated[float, Range(0.0, 100.0)] = 0.0  # 0: a source that never sags
     battery_ohm: Annotated[float, Range(0.0, 1.0)] = 0.02
+    # Of each joint's motor, as the joint feels it: times the square of the gear's ratio.
+    motor_inertia_kg_m2: Annotated[float, Range(0.0, 0.1)] = 0.0
     backlash_deg: Annotated[float, Range(0.0, 5.0)] = 0.0  # of each joint's gear
 
 

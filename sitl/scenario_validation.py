@@ -6,10 +6,11 @@ import itertools
 import math
 
 from sitl.limits import BOTH_JOINTS_DEG, FIRST_JOINT_DEG
-from sitl.scenario import Lissajous, Scenario, Start
+from sitl.scenario import ActuatorKeys, Lissajous, Scenario, Start
 from sitl.scenario_file import ScenarioError
 
 ZONES_MAX = 64  # in a set of OBSTACLE_SHAPE
+_LEAST_INERTIA = 1e-4  # kg·m²; a lighter motor crosses its gap within a step of the plant
 
 
 def check(scenario: Scenario) -> None:
@@ -22,6 +23,7 @@ def check(scenario: Scenario) -> None:
     _check_walls(scenario)
     _check_zones(scenario)
     _check_names(scenario)
+    _check_gears(scenario.actuators)
     curve = scenario.trajectory
     if isinstance(curve, Lissajous) and not (2.0 * curve.ramp_s <= curve.duration_s):
         raise ScenarioError(
@@ -53,6 +55,14 @@ def _check_start(start: Start) -> None:
         raise ScenarioError(
             f"start.arm_deg = {list(start.arm_deg)}: must be within ±{FIRST_JOINT_DEG:g} for the "
             f"first joint and ±{BOTH_JOINTS_DEG:g} for the sum"
+        )
+
+
+def _check_gears(keys: ActuatorKeys) -> None:
+    if keys.backlash_deg > 0.0 and not (keys.motor_inertia_kg_m2 >= _LEAST_INERTIA):
+        raise ScenarioError(
+            f"actuators.backlash_deg = {keys.backlash_deg:g}: needs the inertia of a motor that "
+            f"crosses the gap, actuators.motor_inertia_kg_m2 of at least {_LEAST_INERTIA:g}"
         )
 
 

@@ -23,7 +23,7 @@ from sitl.plant.parameters import Vehicle
 from sitl.plant.state import ARM, P_WB, Q_WB, THRUST, V_WB, W_WB_B
 from sitl.plant.vector import Array
 from sitl.result import EndKind, EndReason, TruthResult
-from sitl.scenario import V3, ActuatorKeys, Scenario, Sensors
+from sitl.scenario import V3, Scenario, Sensors
 from sitl.scenario_file import ScenarioError
 from sitl.scenario_validation import check
 from sitl.sensors.exact import V4, ExactSensors, SensorReadings
@@ -37,6 +37,7 @@ STEP_US = 2000  # one exchange with the flight software
 START_US = 1_000_000  # so that no stamp is 0
 SETTLED_STEPS = 250  # for which the vehicle's sensors have run when the flight begins
 SETTLED_KEPT = 20  # of these, whose measurements the flight software still gets
+SETTLED_NEWEST = 2  # of each sensor, however long ago they came
 SUBSTEPS = 2  # plant steps per exchange
 SAMPLE_STEPS = 50  # tracking error at 10 Hz, as the paper's TE
 
@@ -100,8 +101,12 @@ class Simulation:
         self._thrust, self._torque = trim.thrust, trim.torque
         step_s = 1e-6 * STEP_US
         self._drives: Drives | None = None
-        if scenario.actuators != ActuatorKeys(quadratic_thrust=self.vehicle.rotors.quadratic):
+        if scenario.actuators.dead_time_ms > 0.0 or scenario.actuators.battery_a_h > 0.0:
             self._drives = Drives(scenario.actuators, self.vehicle, trim.thrust, step_s)
+        self._play: Array | None = None  # rad, of motors against their links
+        if self.vehicle.motors.backlash > 0.0:
+            gears = cast(Array, self._plants)["gears"]  # type: ignore[call-overload]
+            self._play = gears["position"][0]
         self._wind: tuple[WindField, Array] | None = None
         if self.vehicle.air.active:
             moving = cast(Array, self._plants)["air"]["wind"][0]  # type: ignore[call-overload]
@@ -186,8 +191,9 @@ class Simulation:
         if self._measured[0] != self.step:
             thrust = _four(self._state[THRUST:ARM].tolist())
             exact = self.sense()
-            if self._drives is not None:
-                exact = exact._replace(q_arm=self._drives.motor_angles(exact.q_arm))
+            if self._play is not None:  # encoders are on the motors' side
+                angles = np.array(exact.q_arm) + self._play
+                exact = exact._replace(q_arm=tuple(angles.tolist()))
             before = self._settled(self._suite, thrust) if self.step == 0 else []
             self._measured = (self.step, (*before, *self._suite.step(exact, thrust)))
         return self._measured[1]
@@ -195,15 +201,20 @@ class Simulation:
     def _settled(self, suite: SensorSuite, thrust: V4) -> list[Measurement]:
         """What came before the first step, in which a flight software cannot wait for sensors.
 
-        The vehicle has been where it starts for a while: the newest of each sensor, and all of the
-        last few steps.
+        The vehicle has been where it starts for a while: the newest few of each sensor, and all of
+        the last few steps.
         """
         exact, arrived = self.sense(), list[tuple[int, Measurement]]()
         for k in range(-SETTLED_STEPS, 0):
             earlier = exact._replace(t_us=exact.t_us + k * STEP_US)
             arrived += [(k, one) for one in suite.step(earlier, thrust)]
-        newest = {type(one): one for _, one in arrived}
-        return [one for k, one in arrived if k >= -SETTLED_KEPT or newest[type(one)] is one]
+        kinds = [type(one) for _, one in arrived]
+        later = [kinds[i:].count(kind) for i, kind in enumerate(kinds)]
+        return [
+            one
+            for (k, one), rank in zip(arrived, later, strict=True)
+            if k >= -SETTLED_KEPT or rank <= SETTLED_NEWEST
+        ]
 
     def advance(self, controls: Controls) -> None:
         """Integrate one step with ``controls`` held, judging every plant step.
@@ -297,10 +308,8 @@ class Simulation:
 
     def _drive(self, drives: Drives) -> None:
         """What of the command takes effect in this step."""
-        x: list[float] = self._state.tolist()
-        rates = tuple(x[ARM + len(self._torque) :])
-        self._thrust = drives.rotors(self._thrust, _four(x[THRUST:ARM]))
-        self._torque = drives.joints(self._torque, rates)
+        thrust = _four(self._state[THRUST:ARM].tolist())
+        self._thrust = drives.rotors(self._thrust, thrust)
 
     def _disturbance(self) -> tuple[V3, V3]:
         """Force on the base [N, W] and torque [N·m, B] during this step."""

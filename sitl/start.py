@@ -6,7 +6,7 @@ import math
 from dataclasses import replace
 
 from sitl.air.load import SURFACES
-from sitl.plant.parameters import AirModel, Vehicle, level_reach
+from sitl.plant.parameters import AirModel, Motors, Vehicle, level_reach
 from sitl.plant.state import ARM, P_WB, Q_WB, THRUST, V_WB, W_WB_B, at_rest
 from sitl.plant.trim import NoTrimError, Trim, level_hover, standing_height
 from sitl.plant.vector import Array
@@ -30,6 +30,10 @@ def flown_vehicle(scenario: Scenario) -> Vehicle:
             joints,
             viscous=scale.joint_friction * joints.viscous,
             coulomb=scale.joint_friction * joints.coulomb,
+        ),
+        motors=Motors(
+            inertia=scenario.actuators.motor_inertia_kg_m2,
+            backlash=math.radians(scenario.actuators.backlash_deg),
         ),
         air=air_model(scenario),
     )

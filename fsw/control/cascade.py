@@ -392,7 +392,8 @@ def _joint_acceleration(
     arm = StateEstimate(0, _NONE, _NONE, _LEVEL, rate, 0.0, q_arm, qd_arm, specific_force)
     # The accelerometer knows of gusts, and of the ground.
     dynamics = arm_dynamics(airframe, arm, (0.0, specific_force))
-    first, second = accelerations_of(dynamics, torque)
+    carried = airframe.joint_armature * pitching
+    first, second = accelerations_of(dynamics, (torque[0] + carried, torque[1]))
     return first - pitching, second
 
 

@@ -45,7 +45,7 @@ class JointMemory(NamedTuple):
 class ArmDynamics(NamedTuple):
     """Of the planar two-link arm in one state; link 1 against the inertial frame, then joint 2."""
 
-    inertia: Vec3  # kg m^2, m11, m12, m22
+    inertia: Vec3  # kg m^2, m11, m12, m22; with what the joints' motors add
     bias: Vec2  # N m, which velocities and the field take up
     momentum: Vec2  # N m s
     drift: Vec2  # N m, what changes the momentum besides the torques
@@ -104,6 +104,7 @@ def joint_torques(
         airframe, estimate.q_arm, estimate.qd_arm, (wanted1 + qdd_ref[0], wanted2 + qdd_ref[1])
     )
     torque1, torque2 = torques_for(arm, (qdd1 + pitch_acceleration, qdd2))
+    torque1 -= airframe.joint_armature * pitch_acceleration  # the motor turns with the base
     bound = airframe.joint_torque_max
     torques = (
         clamp_magnitude(torque1 - memory.disturbance[0], bound),
@@ -184,12 +185,14 @@ def arm_dynamics(airframe: Airframe, estimate: StateEstimate, field: Vec2) -> Ar
     m22 = i2 + m2 * c2 * c2
     m12 = m22 + coupling * cos2
     m11 = i1 + m1 * c1 * c1 + m2 * l1 * l1 + m12 + coupling * cos2
+    # Motors feel how their joints turn, not how the base does.
+    spin1, spin2 = airframe.joint_armature * estimate.qd_arm[0], airframe.joint_armature * w2
     centrifugal = coupling * sin2
     lever2 = m2 * c2 * across12
     lever1 = (m1 * c1 + m2 * l1) * across1 + lever2
     return ArmDynamics(
-        (m11, m12, m22),
+        (m11 + airframe.joint_armature, m12, m22 + airframe.joint_armature),
         (lever1 - centrifugal * (2.0 * w1 + w2) * w2, lever2 + centrifugal * w1 * w1),
-        (m11 * w1 + m12 * w2, m12 * w1 + m22 * w2),
+        (m11 * w1 + m12 * w2 + spin1, m12 * w1 + m22 * w2 + spin2),
         (-lever1, -lever2 - centrifugal * w1 * (w1 + w2)),
     )

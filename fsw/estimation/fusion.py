@@ -32,6 +32,7 @@ from fsw.geometry.rotation import matrix_from_quaternion, rotate, wrap_angle
 from fsw.signals import Vec3, Vec4
 
 _LEAST_FIELD = 0.02  # Gauss across the vertical; less says nothing about the heading
+_KNOWN_VELOCITY = 0.05  # m/s, a standard deviation
 
 
 @compilable
@@ -107,6 +108,11 @@ def fuse_pose(
     ``attitude_variance`` [rad^2, FRD].
     """
     delayed = 1.0 if law.pose_delay_sigma > 0.0 else 0.0
+    for i in range(V, V + 3):
+        # A delay is seen by the velocity that it is multiplied with. While that is not known, the
+        # two explain each other's errors, and run away together.
+        if x.covariance[i, i] > _KNOWN_VELOCITY * _KNOWN_VELOCITY:
+            delayed = 0.0
     dt = time - x.pose_delay - x.time
     position_rows(x, position, position_variance, dt, delayed)
     first = _judged(x, 3, gates.pose)

@@ -25,7 +25,7 @@ from fsw.estimation.joint_filter import joint_gain
 from fsw.estimation.sensor_checks import SENSOR_OF, Aiding, Health, arrived, believable
 from fsw.estimation.sensor_fault import Sensor, SensorFault
 from fsw.estimation.tuning import EstimatorLaw, EstimatorTuning
-from fsw.geometry.quaternion import conjugate, multiply, normalised
+from fsw.geometry.quaternion import conjugate, multiply, normalised, rotation_vector
 from fsw.geometry.rotation import quaternion_from_matrix
 from fsw.measurements import (
     GnssSample,
@@ -42,6 +42,9 @@ from fsw.signals import StateEstimate, Vec2, Vec3, Vec4
 LATE: Final = 0.01  # s behind the filter, where a measurement is still fused as it stands
 _MARGIN: Final = 0.003  # s, by which a measurement may take longer than lately
 _LONGEST_STEP: Final = 0.05  # s, by which joints are predicted at once
+_WAITING_AT_START: Final = 16  # samples that are looked at
+_SPEED_AT_START: Final = 2.0  # m/s and rad/s, with which a vehicle moves between two poses
+_RATE_AT_START: Final = 2.0
 _FLOATS: Final = FILTER.itemsize // 8  # that a filter has room for
 _REST: Vec3 = (0.0, 0.0, 0.0)
 _NO_TURN: Vec4 = (1.0, 0.0, 0.0, 0.0)
@@ -357,7 +360,10 @@ class SensorFusion:
         return min(max(delay, faded), self.tuning.longest_delay)
 
     def _start(self, memory: FusionMemory) -> FusionMemory:
-        """Start from the newest pose; else from a GNSS position, gravity and the compass."""
+        """Start from the newest pose that another one agrees with, for a first one may be wrong.
+
+        Without poses start from a GNSS position, gravity and the compass.
+        """
         if not memory.numbers["end"][0]:
             return memory._replace(waiting=())
         for one in reversed(memory.waiting):
@@ -367,6 +373,8 @@ class SensorFusion:
         for one in reversed(memory.waiting):
             sample = one.sample
             if isinstance(sample, PoseSample):
+                if not self._is_agreed_with(sample, memory.waiting):
+                    continue
                 stated = (
                     believable(sample.position_variance, self._least_p),
                     believable(sample.attitude_variance, self._least_q),
@@ -388,8 +396,28 @@ class SensorFusion:
                 kernels.couple_level(memory.numbers, self.law)
                 break
         else:
-            return memory._replace(waiting=())
+            return memory._replace(waiting=memory.waiting[-_WAITING_AT_START:])
         return memory._replace(started=True, waiting=(), delay_sigma=self.tuning.pose_delay_sigma)
+
+    def _is_agreed_with(self, pose: PoseSample, waiting: tuple[Waiting, ...]) -> bool:
+        """Whether another pose says the same, but for noise and what a vehicle moves meanwhile."""
+        for one in waiting:
+            other = one.sample
+            if not isinstance(other, PoseSample) or other is pose:
+                continue
+            apart = abs(other.time - pose.time)
+            place = sum(believable(pose.position_variance, self._least_p))
+            about = sum(believable(pose.attitude_variance, self._least_q))
+            turn = rotation_vector(
+                multiply(conjugate(normalised(other.attitude)), normalised(pose.attitude))
+            )
+            gate = self.tuning.pose_gate * math.sqrt(2.0)
+            near = math.dist(other.position, pose.position) <= (
+                gate * math.sqrt(place) + _SPEED_AT_START * apart
+            )
+            if near and math.hypot(*turn) <= gate * math.sqrt(about) + _RATE_AT_START * apart:
+                return True
+        return False
 
     def _begin(
         self,

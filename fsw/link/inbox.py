@@ -22,6 +22,7 @@ from fsw.signals import (
     Command,
     CommandRequest,
     EndEffectorTarget,
+    HostHealth,
     JointSetpoint,
     MessageSource,
     MissionUpdate,
@@ -133,6 +134,7 @@ class Inbox:
         tuning: Tuning | None,
         mission: MissionUpdate | None,
         stale_us: int = 0,
+        host: HostHealth | None = None,
     ) -> TickInputs:
         """Everything since the last tick, and what did not come from the ground.
 
@@ -155,6 +157,7 @@ class Inbox:
             tuning,
             stale_us,
             tuple(came.samples),
+            host,
         )
 
     def _command(self, read: Callable[[Frame], CommandRequest | None], frame: Frame) -> None:

@@ -54,6 +54,8 @@ class Airframe:
     link_com: Vec2 = (0.075, 0.075)  # m from the link's joint
     link_inertia: Vec2 = (4.256e-5, 8.321e-5)  # kg m^2 about +y at the link's centre of mass
     joint_torque_max: float = 2.0  # N m, our choice
+    # kg m^2 of each joint's motor, times the square of its gear's ratio; the paper has none.
+    joint_armature: float = 0.0
     joint1_limit: float = math.pi / 3.0  # rad, |th1|
     joint12_limit: float = math.pi / 2.0  # rad, |th1 + th2|
     # A servo of 2.5 N m stall torque and 5.8 rad/s without load, common in this class, still turns

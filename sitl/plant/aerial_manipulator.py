@@ -14,6 +14,7 @@ from sitl.compiled import compiled, kernel
 from sitl.plant.actuators import joint_torque, rotor_torque, stop_torque, thrust_rate
 from sitl.plant.bodies import Chain, Posture, empty_posture, posture_into
 from sitl.plant.contact import Feet, ground_wrench
+from sitl.plant.gears import Gears, gears
 from sitl.plant.mass_matrix import mass_matrix_into, solve_in_place
 from sitl.plant.newton_euler import wrench_needed_into
 from sitl.plant.packing import pack_params
@@ -49,6 +50,7 @@ class Plant(NamedTuple):
     rotors: Rotors
     joints: Joints
     stops: Stops
+    gears: Gears
     air: Air
     gravity: float  # m/s²
 
@@ -94,6 +96,7 @@ def plant(vehicle: Vehicle) -> Plant:
         rotors=vehicle.rotors,
         joints=vehicle.joints,
         stops=Stops(stop_angle, stops.stiffness, stops.damping),
+        gears=gears(vehicle.motors.inertia, vehicle.motors.backlash, len(vehicle.links)),
         air=_air(vehicle),
         gravity=vehicle.gravity,
     )
@@ -170,8 +173,10 @@ def load_into(plant: Plant, state: Array, inputs: Inputs, work: Workspace) -> No
     joints, drive, stops = work.still.shape[0], plant.joints, plant.stops
     for i in range(joints):
         rate = state[ARM + joints + i]
+        # Within the gap of its gear the motor drives no link.
+        driven = plant.gears.gap == 0.0 or plant.gears.side[i] != 0.0
         load[6 + i] = joint_torque(
-            inputs.torque[i],
+            inputs.torque[i] if driven else 0.0,
             rate,
             drive.torque_max,
             drive.viscous,
@@ -208,6 +213,8 @@ def acceleration_into(plant: Plant, state: Array, inputs: Inputs, work: Workspac
     for i in range(6 + joints):
         load[i] -= bias[i]
     mass_matrix_into(plant.chain, work.posture, work.mass)
+    for i in range(joints):
+        work.mass[6 + i, 6 + i] += plant.gears.carried[i]
     solve_in_place(work.mass, load)
 
 

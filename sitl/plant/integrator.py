@@ -17,9 +17,12 @@ from sitl.plant.aerial_manipulator import (
     empty_workspace,
     gravity_in_body,
 )
+from sitl.plant.bodies import posture_into
+from sitl.plant.gears import move_free, part_teeth, servo_rates_into
 from sitl.plant.kinematics import place_into, touch_down_speed
-from sitl.plant.state import ARM, Q_WB
-from sitl.plant.vector import V3, V4, Array, sub, triple
+from sitl.plant.mass_matrix import mass_matrix_into, solve_in_place
+from sitl.plant.state import ARM, Q_WB, V_WB, W_WB_B
+from sitl.plant.vector import V3, V4, Array, add, put, rotation_into, sub, times, triple
 
 STEP_S = 0.001  # 1e-9 error after a second of tumbling (tests/sitl/test_conservation.py)
 
@@ -74,6 +77,51 @@ def rk4_step(
         state[i] /= np.sqrt(length)
 
 
+@kernel
+def geared_step(
+    plant: Plant,
+    state: Array,
+    inputs: Inputs,
+    step: float,
+    work: Workspace,
+    slopes: Slopes,
+    moved: Array,
+) -> None:
+    """``rk4_step`` of ``step`` [s] with the gaps of the gears; ``moved`` (j,) [rad] is memory.
+
+    The ``state`` (17 + 2j,) [SI] is advanced in place.
+    """
+    joints = moved.shape[0]
+    acceleration_into(plant, state, inputs, work)
+    part_teeth(plant.gears, inputs.torque, work.load, state[ARM + joints :])
+    for i in range(joints):
+        moved[i] = -state[ARM + i]
+    rk4_step(plant, state, inputs, step, work, slopes)
+    for i in range(joints):
+        moved[i] += state[ARM + i]
+    if move_free(plant.gears, inputs.torque, moved, state[ARM + joints :], step):
+        strike(plant, state, moved, work)
+
+
+@kernel
+def strike(plant: Plant, state: Array, momentum: Array, work: Workspace) -> None:
+    """Let motors strike joints with a ``momentum`` (j,) [N·m·s]; state (17 + 2j,) [SI]."""
+    joints = momentum.shape[0]
+    rotation_into(state, Q_WB, work.rotation)
+    posture_into(plant.chain, state[ARM : ARM + joints], work.posture)
+    mass_matrix_into(plant.chain, work.posture, work.mass)
+    for i in range(6):
+        work.load[i] = 0.0
+    for i in range(joints):
+        work.mass[6 + i, 6 + i] += plant.gears.carried[i]
+        work.load[6 + i] = momentum[i]
+    solve_in_place(work.mass, work.load)
+    put(state, V_WB, add(triple(state, V_WB), times(work.rotation, triple(work.load, 0))))
+    put(state, W_WB_B, add(triple(state, W_WB_B), triple(work.load, 3)))
+    for i in range(joints):
+        state[ARM + joints + i] += work.load[6 + i]
+
+
 @compiled
 def integrate(
     plant: Plant, state: Array, inputs: Inputs, step: float, places: Array, states: Array
@@ -84,17 +132,24 @@ def integrate(
     costs as much as two steps. The inputs are held over all steps.
 
     Base origin and origin of every DH frame go to places (steps, 2 + j, 3) [m, NED], after each
-    step, and the state itself to ``states`` (steps, 17 + 2j) [SI]; without rows the state stays as
-    it is.
+    step, and the state itself to ``states`` (steps, 17 + 2j) [SI], but with the rates of the
+    joints' servos, which limits are about; without rows the state stays as it is.
     """
     n = state.shape[0]
     work = empty_workspace((n - ARM) // 2)
     slopes = Slopes(np.empty(n), np.empty(n), np.empty(n))
+    moved = np.empty((n - ARM) // 2)
     fastest = 0.0
     for k in range(places.shape[0]):
-        rk4_step(plant, state, inputs, step, work, slopes)
+        loose = plant.gears.gap > 0.0
+        if loose:
+            geared_step(plant, state, inputs, step, work, slopes, moved)
+        else:
+            rk4_step(plant, state, inputs, step, work, slopes)
         place_into(plant, state, work, k, places)
         states[k] = state
+        if loose:
+            servo_rates_into(plant.gears, states[k, n - len(moved) :])
         fastest = max(fastest, touch_down_speed(plant, state, work))
     return Arrival(fastest, specific_force(plant, state, inputs, work))
 

@@ -61,6 +61,14 @@ class Joints:
 
 
 @dataclass(frozen=True, slots=True)
+class Motors:
+    """Of the joints, behind their gears; without inertia or gap by default."""
+
+    inertia: float = 0.0  # kg·m², as the joint feels it
+    backlash: float = 0.0  # rad, from one tooth to the other; needs an inertia
+
+
+@dataclass(frozen=True, slots=True)
 class EndStops:
     """Springs and dampers that push a link back and never pull it.
 
@@ -139,6 +147,7 @@ class Vehicle:
     mount: V3 = (0.0, 0.0, 0.0)  # m, joint 1 in B
     rotors: Rotors = Rotors()
     joints: Joints = Joints()
+    motors: Motors = Motors()
     stops: EndStops = EndStops()
     legs: Legs = Legs()
     size: Size = Size()

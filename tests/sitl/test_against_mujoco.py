@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import mujoco
 import numpy as np
+import pytest
 
-from sitl.plant.parameters import GRAVITY, Vehicle
+from sitl.plant.parameters import GRAVITY, Motors, Vehicle
 from tests.sitl.free_motion import flown, frictionless, tumbling
 from tests.sitl.state_view import StateView
 
@@ -35,10 +38,10 @@ def _mjcf(vehicle: Vehicle) -> str:
           <freejoint/>
           {inertial(vehicle.base_mass, 0.0, vehicle.base_inertia)}
           <body name="link1">
-            <joint type="hinge" axis="0 1 0"/>
+            <joint type="hinge" axis="0 1 0" armature="{vehicle.motors.inertia}"/>
             {inertial(first.mass, 0.5 * first.a, (across1, across1, along1))}
             <body name="link2" pos="0 0 {first.a}">
-              <joint type="hinge" axis="0 1 0"/>
+              <joint type="hinge" axis="0 1 0" armature="{vehicle.motors.inertia}"/>
               {inertial(second.mass, 0.5 * second.a, (across2, across2, along2))}
             </body>
           </body>
@@ -47,8 +50,9 @@ def _mjcf(vehicle: Vehicle) -> str:
     </mujoco>"""
 
 
-def test_two_seconds_of_free_motion_agree() -> None:
-    vehicle = frictionless(GRAVITY)
+@pytest.mark.parametrize("motors", [0.0, 0.0025])
+def test_two_seconds_of_free_motion_agree(motors: float) -> None:
+    vehicle = replace(frictionless(GRAVITY), motors=Motors(inertia=motors))
     model = mujoco.MjModel.from_xml_string(_mjcf(vehicle))
     data = mujoco.MjData(model)
     start = StateView(tumbling())

@@ -1,4 +1,4 @@
-"""Battery, backlash, dead time and rotor speed by themselves."""
+"""Battery, dead time and rotor speed by themselves."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import math
 
 import pytest
 
-from sitl.plant.backlash import Backlash
 from sitl.plant.battery import FULL_V, Battery, hover_power, open_circuit
 from sitl.plant.esc import DeadTime
 from sitl.plant.rotor_speed import quadratic_thrust_rate
@@ -44,35 +43,6 @@ def test_an_empty_battery_gives_little_and_no_nonsense() -> None:
     assert [open_circuit(k / 10) for k in range(11)] == sorted(
         open_circuit(k / 10) for k in range(11)
     )
-
-
-def test_a_motor_crosses_the_gap_in_the_time_that_its_inertia_takes() -> None:
-    gear = Backlash(gap=0.02, inertia=0.0025, position=-0.01)
-    # √(2 · 0.02 rad · 0.0025 kg m² / 0.4 N m) = 15.8 ms.
-    torques = [gear.step(0.4, 0.0, 0.002) for _ in range(10)]
-    assert torques[:7] == [0.0] * 7
-    assert 0.0 < torques[7] < 0.4  # of the rest of the step in which the teeth meet
-    assert torques[8:] == [0.4, 0.4]
-    assert gear.position == pytest.approx(0.01)
-    assert gear.step(-0.4, 0.0, 0.002) == 0.0  # back across the gap
-
-
-def test_a_link_is_free_within_the_gap_and_the_encoder_sees_the_motor() -> None:
-    gear = Backlash(gap=0.02, inertia=0.0025)
-    for _ in range(3):
-        assert gear.step(0.0, 1.0, 0.002) == 0.0
-    assert gear.position == pytest.approx(-0.006)  # the link has moved, the motor has not
-    for _ in range(10):
-        gear.step(0.0, 1.0, 0.002)
-    assert gear.position == -0.01  # the other tooth takes it along
-    assert gear.speed == 1.0
-
-
-def test_teeth_that_push_stay_together_whatever_the_link_does() -> None:
-    gear = Backlash(gap=0.02, inertia=0.0025, position=0.01)
-    for rate in (0.0, 3.0, -3.0, 5.0):
-        assert gear.step(0.1, rate, 0.002) == 0.1
-        assert gear.position == 0.01
 
 
 def test_a_dead_time_delays_by_whole_exchanges() -> None:

@@ -9,6 +9,7 @@ import pytest
 
 from fsw.estimation.sensor_fault import Sensor, SensorFault, sentence
 from fsw.measurements import ImuSample, JointSample, PoseSample, Sample
+from fsw.parameters.consistency import base_reach, loop_tube, stand_off
 from fsw.signals import SensorFrame
 from sitl.mission_clock import MissionClock
 from sitl.scenario import AirKeys
@@ -130,6 +131,11 @@ def test_real_air_has_every_effect() -> None:
     actuators = row.flown.actuators
     assert actuators.quadratic_thrust
     assert min(actuators.dead_time_ms, actuators.battery_a_h, actuators.backlash_deg) > 0.0
+    config = config_of(row, Settings())
+    assert config.airframe.joint_armature == actuators.motor_inertia_kg_m2 > 0.0
+    room = stand_off(config.planner.walls)
+    reach = base_reach(loop_tube(config), config.surroundings)
+    assert room - 0.005 < reach < room, "all the wind that the tube has room for, and no more"
     assert Job("full", replace(row.flown, disturbances=()), config_of(row, Settings()), 1).random
 
 

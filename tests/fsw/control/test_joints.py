@@ -247,6 +247,36 @@ def test_the_errors_of_both_joints_obey_their_own_pid_whatever_the_arm_does() ->
         np.testing.assert_allclose(got, qdd + pid, atol=1e-6)
 
 
+def test_motors_behind_gears_are_moved_along_and_known_to_the_momentum() -> None:
+    """With what each motor adds, I times how its joint turns, the same PID errors come out."""
+    inertia = 0.0025
+    alone = replace(
+        AIRFRAME, joint_torque_max=1e3, joint_rate_max=1e3, joint1_limit=1e3, joint12_limit=1e3
+    )
+    motors = replace(alone, joint_armature=inertia)
+    model, random = planar_arm(motors), np.random.default_rng(8)
+    data, gains = model.createData(), replace(GAINS, ki=0.0, limit=1e9)
+    for _ in range(20):
+        pitch_rate = float(random.uniform(-2.0, 2.0))
+        estimate = moving(random, pitch_rate)
+        pitch_acceleration, qdd = 5.0, pair(random.uniform(-5.0, 5.0, 2))
+        arm = arm_dynamics(motors, estimate, FIELD)
+        reference = (estimate.q_arm, estimate.qd_arm, qdd)
+        memory = JointMemory((0.0, 0.0), (0.0, 0.0))
+        torque, _ = joint_torques(
+            motors, gains, memory, estimate, reference, arm, pitch_acceleration, DT
+        )
+        q, qd = np.array(estimate.q_arm), np.array(estimate.qd_arm)
+        inertial = qd + [pitch_rate, 0.0]
+        links = pin.rnea(model, data, q, inertial, np.array(qdd) + [pitch_acceleration, 0.0])
+        np.testing.assert_allclose(torque, links + inertia * np.array(qdd), atol=1e-9)
+        without = arm_dynamics(alone, estimate, FIELD)
+        np.testing.assert_allclose(
+            np.subtract(arm.momentum, without.momentum), inertia * qd, atol=1e-12
+        )
+        assert arm.drift == without.drift
+
+
 def pair(values: Any) -> Vec2:
     return float(values[0]), float(values[1])
 

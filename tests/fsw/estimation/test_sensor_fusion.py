@@ -161,6 +161,24 @@ def test_a_hidden_delay_of_the_pose_is_found_within_2_ms() -> None:
         assert max(flown.in_sigmas()) < 4.0
 
 
+@pytest.mark.parametrize("bad", ["far", "upside_down", "tilted"])
+def test_the_filter_does_not_start_from_a_pose_that_no_other_agrees_with(bad: str) -> None:
+    lie = {"far": far, "upside_down": upside_down, "tilted": tilted}[bad]
+    seen = 0
+
+    def first_lies(now: float, sample: Sample) -> Sample:
+        nonlocal seen
+        if isinstance(sample, PoseSample):
+            seen += 1
+            return lie(sample) if seen == 1 else sample
+        return sample
+
+    flown = Flown(run(MOCAP, 3, 0.5), first_lies)
+    assert flown.memory.started
+    assert flown.memory.reset.number == 0
+    assert max(flown.in_sigmas()) < 4.0
+
+
 def at(t: float, change: Callable[[PoseSample], Sample | None], duration: float = 0.0) -> Change:
     """A change of poses that are measured within an interval after the start."""
     first, last = START + t, START + t + duration + 1.0 / 120.0

@@ -130,14 +130,15 @@ def test_a_flight_with_everything_is_the_same_twice() -> None:
             body_drag_m2=0.03, ground_effect=True, ceiling_effect=True, wall_suction=0.02,
         ),
         actuators=ActuatorKeys(
-            quadratic_thrust=True, dead_time_ms=4.0, battery_a_h=5.0, backlash_deg=0.5
+            quadratic_thrust=True, dead_time_ms=4.0, battery_a_h=5.0,
+            motor_inertia_kg_m2=0.0025, backlash_deg=0.5,
         ),
     )  # fmt: skip
     assert flown(everything, 100).state_bytes() == flown(everything, 100).state_bytes()
 
 
 def test_backlash_keeps_the_torque_from_a_link_until_the_gap_is_crossed() -> None:
-    loose = replace(AIRBORNE, actuators=ActuatorKeys(backlash_deg=1.0))
+    loose = replace(AIRBORNE, actuators=ActuatorKeys(backlash_deg=1.0, motor_inertia_kg_m2=0.0025))
     rates = []
     for scenario in (AIRBORNE, loose):
         simulation = Simulation(scenario, 0)
