@@ -50,6 +50,7 @@ class Plant(NamedTuple):
     joints: Joints
     stops: Stops
     air: Air
+    locked: Array  # (j,) 1 for a joint that cannot move, which is then at rest; else 0
     gravity: float  # m/s²
 
 
@@ -95,6 +96,7 @@ def plant(vehicle: Vehicle) -> Plant:
         joints=vehicle.joints,
         stops=Stops(stop_angle, stops.stiffness, stops.damping),
         air=_air(vehicle),
+        locked=np.zeros(len(vehicle.links)),
         gravity=vehicle.gravity,
     )
     return pack_params(numbers)
@@ -208,7 +210,24 @@ def acceleration_into(plant: Plant, state: Array, inputs: Inputs, work: Workspac
     for i in range(6 + joints):
         load[i] -= bias[i]
     mass_matrix_into(plant.chain, work.posture, work.mass)
+    for i in range(joints):
+        if plant.locked[i] > 0.0:
+            hold_joint(work.mass, load, 6 + i)
     solve_in_place(work.mass, load)
+
+
+@kernel
+def hold_joint(mass: Array, load: Array, row: int) -> None:
+    """Replace one row of mass (n, n) [any unit] x = load (n,) [any unit] by x[row] = 0.
+
+    The torque that this takes acts between two links and does no work.
+    """
+    for k in range(row):
+        mass[row, k] = 0.0
+    for k in range(row + 1, load.shape[0]):
+        mass[k, row] = 0.0
+    mass[row, row] = 1.0
+    load[row] = 0.0
 
 
 @kernel
