@@ -249,6 +249,7 @@ class CommandResult(IntEnum):
     DENIED = 2
     UNSUPPORTED = 3
     FAILED = 4
+    IN_PROGRESS = 5  # another one answers
 
 
 @dataclass(frozen=True, slots=True)
@@ -354,6 +355,15 @@ class SetMissionStep:
     reset: bool = False
 
 
+@dataclass(frozen=True, slots=True)
+class InjectFailure:
+    """Let a unit of the simulated vehicle fail, or work again; the simulator knows which."""
+
+    unit: int  # FAILURE_UNIT
+    kind: int  # FAILURE_TYPE
+    instance: int  # 0: all
+
+
 class Order(Enum):
     """Commands without parameters."""
 
@@ -385,6 +395,7 @@ CommandAction = (
     | SetHome
     | StartMission
     | SetMissionStep
+    | InjectFailure
     | Order
     | Rejected
 )

@@ -299,6 +299,8 @@ _ROWS: Final[dict[str, list[_Row]]] = {
          _IN_MICROSECONDS),
         ("COM_SENS_ACT", "limits.sensor_loss_action", "", 1.0, 5.0,
          "Action when inertial unit or joint encoders are lost"),
+        ("SYS_FAILURE_EN", "limits.failure_injection", "", 0.0, 1.0,
+         "Command INJECT_FAILURE in simulation"),
     ],
     "Safe set": [
         ("SAFE_OWNER", "limits.safe_set_owner", "", 0.0, 255.0,
@@ -355,6 +357,7 @@ _CHOICES: Final[dict[str, Choices]] = {
         (5, "Land"),
         (6, "Retreat along the normal, then hold"),
     ),
+    "SYS_FAILURE_EN": ((0, "Refused"), (1, "Passed on to the simulator")),
     "COM_POS_LOW_ACT": ((1, "Warning"), (2, "Hold"), (5, "Land")),
     "COM_SENS_ACT": ((1, "Warning"), (2, "Hold"), (5, "Land")),
     "COM_LOW_BAT_ACT": (

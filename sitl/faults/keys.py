@@ -76,6 +76,11 @@ class Fault:
         """Whether the motor or joint of an index from 0 fails."""
         return self.number in (0, index + 1)
 
+    @property
+    def of_real_time(self) -> bool:
+        """Whether it means nothing in lockstep, where nobody is late and the planner is inline."""
+        return self.unit == "planner" or (self.unit in LINKS and self.kind == "delayed")
+
     def __str__(self) -> str:
         """As an operator reads it."""
         which = f" {self.number}" if self.number else ""
@@ -117,9 +122,14 @@ _INSTANCES: Final = {"motor": 4, "joint": 2, "encoder": 2}
 EXACT: Final = ("gyro", "accel", "gps", "vio", "encoder")
 
 
+def instances(unit: Unit) -> int:
+    """How many of a unit can fail each for itself; 0 where it is one."""
+    return _INSTANCES.get(unit, 0)
+
+
 def problem(fault: Fault, aboard: tuple[str, ...]) -> str | None:
     """Key, value and what is allowed, where a fault contradicts itself or what is ``aboard``."""
-    kinds, most = KINDS[fault.unit], _INSTANCES.get(fault.unit, 0)
+    kinds, most = KINDS[fault.unit], instances(fault.unit)
     if fault.kind not in kinds:
         allowed = ", ".join(f'"{kind}"' for kind in kinds)
         return f'kind = "{fault.kind}": a {fault.unit} can be {allowed}'

@@ -1,4 +1,4 @@
-"""Motors, joints and battery that fail: what is left of a command, and what a seized joint costs."""
+"""Motors, joints and battery that fail: what is left of a command; what a seized joint does."""
 
 from __future__ import annotations
 
@@ -10,12 +10,14 @@ import pytest
 
 from sitl.faults.active import Faults
 from sitl.faults.keys import KINDS, Fault, Kind
+from sitl.plant.aerial_manipulator import Inputs, plant
+from sitl.plant.integrator import integrate
 from sitl.plant.lock import seize
 from sitl.plant.parameters import Vehicle
 from sitl.scenario import Scenario
 from sitl.scenario_file import load_scenario
 from sitl.simulation import Simulation
-from tests.sitl.free_motion import tumbling
+from tests.sitl.free_motion import frictionless, tumbling
 from tests.sitl.test_conservation import weigh
 from tests.sitl.test_simulation import _trimmed
 
@@ -109,10 +111,6 @@ def test_a_joint_that_seizes_keeps_momentum_and_gains_no_energy(locked: tuple[bo
 
 def test_a_flight_with_a_stuck_joint_keeps_energy_and_momentum() -> None:
     """The lock holds by a constraint, which does no work, not by a brake, which would."""
-    from sitl.plant.integrator import Inputs, integrate
-    from sitl.plant.aerial_manipulator import plant
-    from tests.sitl.free_motion import frictionless
-
     vehicle = frictionless(0.0)
     numbers = np.array([plant(vehicle)])
     numbers["locked"][0] = (1.0, 0.0)

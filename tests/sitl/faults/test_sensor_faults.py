@@ -193,9 +193,7 @@ def test_one_encoder_fails_and_the_other_does_not() -> None:
 
 
 def test_faults_add_up_and_each_ends_for_itself() -> None:
-    flight = faults(
-        Fault("gyro", "off", 0.2, 0.2), Fault("gps", "wrong", 0.3, 0.4), exact=True
-    )
+    flight = faults(Fault("gyro", "off", 0.2, 0.2), Fault("gps", "wrong", 0.3, 0.4), exact=True)
     seen = []
     for step in (0, 120, 160, 260, 400):
         flight.at(step)
