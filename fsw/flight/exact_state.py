@@ -8,18 +8,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
-from typing import Final
 
 from fsw.control.cascade import Cascade
 from fsw.estimation.dead_reckoning import moved_on
 from fsw.estimation.estimator import estimate_state
 from fsw.estimation.frame_trust import FrameTrust, believed
 from fsw.estimation.sensor_fault import Sensor
-from fsw.flight.jump import difference, jumped, told
+from fsw.flight.jump import returned
 from fsw.flight.state import AIDED, Aiding, FlightState
-from fsw.signals import Severity, StateEstimate, StatusText, TickInputs
-
-_TOLD: Final = 0.02  # m, of a jump that the operator reads about
+from fsw.signals import StateEstimate, StatusText, TickInputs
 
 
 class ExactState:
@@ -65,11 +62,7 @@ class ExactState:
         trust, found = believed(state.trust, inputs.sensors, before, joints)
         aiding = _aiding(trust, found.t_us) if trust.doubted else AIDED
         if trust.returned_us:
-            dt = 1e-6 * (found.t_us - before.t_us)
-            reset = difference(found, moved_on(before, dt))
-            state = jumped(state, reset)
-            if max(map(abs, reset.position)) > _TOLD:
-                texts.append(StatusText(Severity.WARNING, told(reset)))
+            state = returned(state, found, before, texts)
         return replace(state, trust=trust, aiding=aiding, invalid_ticks=0), found
 
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Final
 
+from fsw.estimation.dead_reckoning import moved_on
 from fsw.estimation.sensor_fusion import Reset
 from fsw.flight.state import FlightState
 from fsw.geometry.quaternion import conjugate, multiply
@@ -14,7 +16,9 @@ from fsw.geometry.rotation import (
     yaw_of,
 )
 from fsw.geometry.vectors import add_scaled, norm
-from fsw.signals import StateEstimate
+from fsw.signals import Severity, StateEstimate, StatusText
+
+_TOLD: Final = 0.02  # m, of a jump that the operator reads about
 
 
 def difference(found: StateEstimate, expected: StateEstimate, number: int = 1) -> Reset:
@@ -47,3 +51,17 @@ def jumped(state: FlightState, reset: Reset) -> FlightState:
     observed = state.cascade.observed
     observed = observed._replace(v=add_scaled(observed.v, reset.velocity, 1.0))
     return replace(state, nominal=nominal, cascade=state.cascade._replace(observed=observed))
+
+
+def returned(
+    state: FlightState, found: StateEstimate, before: StateEstimate, texts: list[StatusText]
+) -> FlightState:
+    """The state when positions are there again; appends to ``texts``.
+
+    The plan moves along with what was found instead of what had been carried on from ``before``.
+    """
+    expected = moved_on(before, 1e-6 * (found.t_us - before.t_us))
+    reset = difference(found, expected)
+    if max(map(abs, reset.position)) > _TOLD:
+        texts.append(StatusText(Severity.WARNING, told(reset)))
+    return jumped(state, reset)

@@ -7,16 +7,14 @@ from dataclasses import replace
 
 from fsw.control.cascade import Cascade, in_hover
 from fsw.estimation import kernels
-from fsw.estimation.dead_reckoning import moved_on
 from fsw.estimation.error_state import IMU_CAPACITY, Array
 from fsw.estimation.sensor_fault import Sensor, SensorFault, sentence
 from fsw.estimation.sensor_fusion import EncoderWatch, FusionMemory, SensorFusion, at_start
 from fsw.estimation.tuning import EstimatorTuning
 from fsw.flight.estimator_report import estimator_report, unaided
-from fsw.flight.jump import difference, jumped, told
+from fsw.flight.jump import jumped, returned, told
 from fsw.flight.state import Aiding, FlightState
 from fsw.measurements import ImuSample, JointSample, Sample
-from fsw.model.airframe import AIRFRAME
 from fsw.signals import EstimatorReport, Severity, StateEstimate, StatusText, TickInputs, Vec2
 
 _CHECKED_US = 100_000  # between checks for silent sensors
@@ -29,7 +27,6 @@ _HELD = (35.0, 70.0)
 _ASKED = 0.1  # rad that joints were asked to move meanwhile; friction has held one for half of it
 _LATELY = 0.02  # s, in which a fault is one of now
 _AWAY = 0.1  # s without a position, after which its return is a jump
-_TOLD = 0.02  # m, of a jump that the operator reads about
 _QUIET = 10.0  # s without a fault until the same one is reported again
 
 
@@ -44,7 +41,7 @@ class SensedState:
     def warm_up(self) -> None:
         """Compile every kernel."""
         estimate = self._fusion.warm_up()
-        self._cascade.joint_acceleration(in_hover(AIRFRAME, estimate), estimate)
+        self._cascade.joint_acceleration(in_hover(self._cascade.law.airframe, estimate), estimate)
 
     def covariance(self, memory: FusionMemory) -> Array:
         """Covariance (17, 17) [SI] of the error of the last tick's estimate."""
@@ -68,7 +65,8 @@ class SensedState:
             _report(before, memory, now, texts)
         if inputs.sensors.t_us // _CHECKED_US != state.t_us // _CHECKED_US:
             self._report_silence(memory, now, texts)
-        if memory.reset.number != before.reset.number:
+        moved = memory.reset.number != before.reset.number
+        if moved:
             texts.append(StatusText(Severity.WARNING, told(memory.reset)))
             state = jumped(state, memory.reset)
         if estimate is None:
@@ -76,10 +74,9 @@ class SensedState:
             last = state.estimate
             # Telemetry goes by its time, and goes on.
             return state, memory, None if last is None else last._replace(t_us=inputs.sensors.t_us)
-        moved = memory.reset.number != before.reset.number
         away = unaided(before, now) > _AWAY > unaided(memory, now)
         if state.estimate is not None and away and not moved:
-            state = _returned(state, estimate, texts)
+            state = returned(state, estimate, state.estimate, texts)
         if state.invalid_ticks:
             state = replace(state, invalid_ticks=0)
         return state, memory, estimate
@@ -113,17 +110,6 @@ def _report(
         again = old.fault is not new.fault or now - old.fault_at > _QUIET
         if new.fault_at == now and again:
             texts.append(StatusText(Severity.WARNING, sentence(new.sensor, new.fault)))
-
-
-def _returned(state: FlightState, estimate: StateEstimate, texts: list[StatusText]) -> FlightState:
-    """The state when positions are there again: the plan moves along with the estimate."""
-    last = state.estimate
-    assert last is not None
-    expected = moved_on(last, 1e-6 * (estimate.t_us - last.t_us))
-    reset = difference(estimate, expected)
-    if max(map(abs, reset.position)) > _TOLD:
-        texts.append(StatusText(Severity.WARNING, told(reset)))
-    return jumped(state, reset)
 
 
 def _last_reading_again(

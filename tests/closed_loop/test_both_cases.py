@@ -37,6 +37,16 @@ def test_every_margin_stays_positive_and_every_limit_is_kept_between_samples_too
     assert counters.plans >= 10.0 * seconds - 1
 
 
+@pytest.mark.long
+def test_joints_are_asked_for_so_little_that_none_turns_faster_than_table_1_allows() -> None:
+    flight = Flight(load_scenario("branches"), seed=509)  # which asks most of joint 2
+    flight.follow()
+    while flight.sim.ended is None:
+        flight.step()
+    uses = flight.sim.result().limits
+    assert all(use.kept for use in uses.values()), uses
+
+
 def test_a_point_among_walls_is_kept_with_them() -> None:
     tip = Obstacle("tip", (0.82, 0.52, -1.03), 0.1)  # 50 mm from the path
     flight = Flight(replace(load_scenario("walls"), obstacles=(tip,)), seed=11)

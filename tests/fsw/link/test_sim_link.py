@@ -13,7 +13,16 @@ import pytest
 from fsw.link.inbox import Inbox
 from fsw.link.sim_link import Pacing, SimLink
 from fsw.link.wire import message_ids as ids
-from fsw.signals import CommandAck, CommandRequest, MessageSource, Mode, SafeSet, Shape
+from fsw.signals import (
+    CommandAck,
+    CommandRequest,
+    MessageSource,
+    Mode,
+    SafeSet,
+    Severity,
+    Shape,
+    StatusText,
+)
 from messages.frames import FrameWriter, split
 from sitl.link.decode import read_reply
 from sitl.link.encode import StepEncoder
@@ -214,6 +223,34 @@ def test_acknowledgements_come_before_the_actuators_and_are_repeated_with_them(w
     wire.send(step)
     wire.link.wait_for_step()
     assert wire.hear() == answer
+
+
+def test_texts_without_room_in_the_answer_come_ahead_of_it_and_again_when_it_is_repeated(
+    wire: Wire,
+) -> None:
+    texts = tuple(StatusText(Severity.WARNING, f"text {k:02d} {'.' * 180}") for k in range(20))
+    step = StepEncoder(lockstep=True).datagram(readings(1_002_000), ())
+    wire.send(step)
+    wire.link.wait_for_step()
+    wire.link.send_actuators(1_002_000, replace(outputs_at(1_002_000), texts=texts))
+
+    def answer() -> list[bytes]:
+        datagrams = [wire.hear()]
+        while list(split(datagrams[-1]))[-1].message_id != ids.HIL_ACTUATOR_CONTROLS:
+            datagrams.append(wire.hear())
+        return datagrams
+
+    first = answer()
+    assert len(first) > 3
+    assert max(map(len, first)) <= 1400
+    frames = [frame for datagram in first for frame in split(datagram)]
+    said = "".join(
+        str(frame.payload_values[1]) for frame in frames if frame.message_id == ids.STATUSTEXT
+    )
+    assert [f"text {k:02d}" in said for k in range(20)] == [True] * 20
+    wire.send(step)
+    wire.link.wait_for_step()
+    assert answer() == first
 
 
 def test_the_simulator_is_told_the_mode_when_it_changes_and_once_a_second(wire: Wire) -> None:
