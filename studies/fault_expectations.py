@@ -49,7 +49,7 @@ class Expectation:
     why: str = ""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Expected:
     """One fault as it is flown, and what must follow in each mode."""
 

@@ -49,7 +49,7 @@ body = "full"
 [start]
 kind = "{kind}"
 [pilot]
-plan = "none"
+plan = "{plan}"
 [trajectory]
 kind = "hold"
 position_m = [0.0, 0.0, -1.2]
@@ -87,8 +87,13 @@ class Situation:
     body: str = "full"
 
 
+def beside_the_wall_text(kind: str, plan: str) -> str:
+    """The scenario in TOML, with a start of this kind and a pilot with this plan."""
+    return _WALL.format(kind=kind, plan=plan)
+
+
 def _beside_the_wall(kind: str) -> Callable[[str], Scenario]:
-    return lambda suite: parse_scenario(_WALL.format(kind=kind), "wall", suite)
+    return lambda suite: parse_scenario(beside_the_wall_text(kind, "none"), "wall", suite)
 
 
 def _packaged(name: str) -> Callable[[str], Scenario]:

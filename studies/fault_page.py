@@ -15,7 +15,7 @@ td, th { vertical-align: top; text-align: left !important; font-size: 12px; }
 
 
 def page(rows: Sequence[Judged], provenance: Sequence[str]) -> str:
-    """Faults down, modes across; a cell says when it was told, what followed and the least margin."""
+    """Faults down, modes across; a cell says when it was told, what followed, the margin."""
     modes = list(dict.fromkeys(row.cell.mode for row in rows))
     faults = list(dict.fromkeys(row.cell.expected.name for row in rows))
     cells = {(row.cell.expected.name, row.cell.mode): row for row in rows}
