@@ -676,7 +676,7 @@ class Charge(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class BatteryState:
-    """What a model of the battery says, for there is no sensor."""
+    """What a model of the battery says, corrected by what is measured of it, if anything is."""
 
     voltage: float = 16.8  # V
     current: float = 0.0  # A
@@ -798,6 +798,14 @@ class FlightSnapshot:
 
 
 @dataclass(frozen=True, slots=True)
+class BatteryReading:
+    """What a battery's sensor says."""
+
+    voltage: float  # V, under load
+    remaining: float  # share of the capacity
+
+
+@dataclass(frozen=True, slots=True)
 class TickInputs:
     """Everything one tick may look at."""
 
@@ -817,6 +825,7 @@ class TickInputs:
     stale_us: int = 0  # how much older the sensors' readings are, where no newer ones had come
     # What sensors with times of their own measured; with any, the frame gives the time alone.
     samples: tuple[Sample, ...] = ()
+    battery: BatteryReading | None = None  # newly measured
 
 
 @dataclass(frozen=True, slots=True)

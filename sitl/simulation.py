@@ -19,6 +19,7 @@ from sitl.faults.keys import Fault, problem
 from sitl.flight_evaluator import FlightEvaluator, critical
 from sitl.mission_clock import MissionClock
 from sitl.plant.aerial_manipulator import Plant, plant
+from sitl.plant.battery import open_circuit
 from sitl.plant.integrator import STEP_S, step
 from sitl.plant.kinematics import places as places_into
 from sitl.plant.lock import seize
@@ -41,6 +42,7 @@ START_US = 1_000_000  # so that no stamp is 0
 SETTLED_STEPS = 250  # for which the vehicle's sensors have run when the flight begins
 SETTLED_KEPT = 20  # of these, whose measurements the flight software still gets
 SUBSTEPS = 2  # plant steps per exchange
+BATTERY_STEPS = 50  # between two readings of the battery
 SAMPLE_STEPS = 50  # tracking error at 10 Hz, as the paper's TE
 
 
@@ -216,6 +218,19 @@ class Simulation:
                 arrived = self.faults.suite(self.t_us, arrived)
             self._measured = (self.step, arrived)
         return self._measured[1]
+
+    def battery(self) -> tuple[float, float] | None:
+        """Voltage [V] and share of the charge [1] that the battery says in this step, if anything.
+
+        Ten times a second where one is simulated, or has failed.
+        """
+        own = None if self._drives is None else self._drives.battery
+        if self.step % BATTERY_STEPS or (own is None and not self.faults.of_battery):
+            return None
+        charge = min(1.0 if own is None else own.charge, self.faults.charge)
+        if own is not None and charge == own.charge:
+            return own.voltage, charge
+        return open_circuit(charge), charge
 
     def _settled(self, suite: SensorSuite, thrust: V4) -> list[Measurement]:
         """What came before the first step, in which a flight software cannot wait for sensors.

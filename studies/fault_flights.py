@@ -297,6 +297,7 @@ def _inputs(situation: Situation, loop: ClosedLoop[FlightState]) -> TickInputs:
         sensors=sensors,
         plan=loop.planner.take(sensors.t_us),
         samples=loop.samples(),
+        battery=loop.battery(),
     )
     if simulation.faults.pilot_silent(simulation.t_us):
         return inputs

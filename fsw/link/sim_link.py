@@ -19,7 +19,12 @@ from fsw.link.outbox import packed
 from fsw.link.udp_endpoint import Address
 from fsw.link.wire import decode, encode_replies, message_ids
 from fsw.link.wire.decode import Numbers
-from fsw.link.wire.decode_sensors import SampleDecoder, inertial_sample, joint_sample
+from fsw.link.wire.decode_sensors import (
+    SampleDecoder,
+    battery_reading,
+    inertial_sample,
+    joint_sample,
+)
 from fsw.link.wire.message_ids import AUTOPILOT, SIMULATOR, SYSTEM_ID
 from fsw.link.wire.px4_mode import custom_mode
 from fsw.measurements import ImuSample, Sample
@@ -193,6 +198,10 @@ class SimLink:
         if sensors is not None:
             if message_ids.COMMAND_ACK in payloads:
                 self._note_answers(frames)
+            battery = payloads.get(message_ids.BATTERY_STATUS)
+            reading = None if battery is None else battery_reading(battery)
+            if reading is not None:
+                self._inbox.accept_battery(reading)
             for frame in frames:
                 if frame.message_id != message_ids.HEARTBEAT:
                     self._inbox.accept(frame, _source(frame))

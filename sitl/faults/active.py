@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from sitl.faults.actuators import MotorFault, battery_share
+from sitl.faults.actuators import MotorFault, battery_charge, thrust_share
 from sitl.faults.keys import PROCESSES, SENSORS, Fault
 from sitl.faults.sensors import FrameFault, SuiteFault
 from sitl.faults.signal import Windows
@@ -59,7 +59,9 @@ class Faults:
         self._suites: list[SuiteFault] = []
         self._motors: list[MotorFault] = []
         self._silences: list[Windows] = []  # of the data link
-        self.battery = 1.0  # share of the thrust that is left
+        self.charge = 1.0  # of the battery, at most
+        self.of_battery = False  # whether it has failed, now or before
+        self._share = 1.0  # of the thrust that the battery leaves
         self.clock_us = 0  # by which the vehicle's clock is ahead
         for fault in faults:
             self._add(fault, round(1e6 * fault.start_s / step_us))
@@ -109,9 +111,9 @@ class Faults:
         """What takes effect at ``t_us`` [us] of a ``command`` [N]; to be called once a step."""
         for one in self._motors:
             command = one.through(command, t_us)
-        if self.battery < 1.0:
+        if self._share < 1.0:
             a, b, c, d = command
-            share = self.battery
+            share = self._share
             command = (share * a, share * b, share * c, share * d)
         return command
 
@@ -145,7 +147,10 @@ class Faults:
         self._suites = [one for one in applied if isinstance(one, SuiteFault)]
         self._motors = [one for one in applied if isinstance(one, MotorFault)]
         self._silences = [one for one in applied if isinstance(one, Windows)]
-        self.battery = min([battery_share(f) for f in self.active if f.unit == "battery"] or [1.0])
+        charges = [battery_charge(one) for one in self.active if one.unit == "battery"]
+        self.charge = min(charges, default=1.0)
+        self.of_battery = self.of_battery or bool(charges)
+        self._share = thrust_share(self.charge) if charges else 1.0
         jumps = [one.jump_s for one in self.active if one.unit == "clock"]
         self.clock_us = round(1e6 * sum(jumps))
         self.locked, self.limp = self._of_joints("stuck"), self._of_joints("off")

@@ -64,9 +64,13 @@ class MotorFault:
         return self._kept
 
 
-def battery_share(fault: Fault) -> float:
-    """Thrust at the same command over that of a full battery [1], of one that fails."""
-    charge = 0.0 if fault.kind == "off" else fault.share
+def battery_charge(fault: Fault) -> float:
+    """Charge [1] of a battery that fails."""
+    return 0.0 if fault.kind == "off" else fault.share
+
+
+def thrust_share(charge: float) -> float:
+    """Thrust at the same command over that of a full battery [1], at a ``charge`` [1]."""
     return (open_circuit(charge) / FULL_V) ** 2
 
 

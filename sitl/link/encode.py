@@ -32,6 +32,8 @@ _NO_AUTOPILOT: Final = 8  # MAV_AUTOPILOT
 _HIL: Final = 32  # MAV_MODE_FLAG
 _ACTIVE: Final = 4  # MAV_STATE
 _MAVLINK_VERSION: Final = 3
+_UNKNOWN_CELL, _UNKNOWN_WARMTH = 0xFFFF, 0x7FFF  # of BATTERY_STATUS
+_FOR_EVERYTHING, _LIPO = 1, 1  # MAV_BATTERY_FUNCTION, MAV_BATTERY_TYPE
 _WARNING: Final = 4  # MAV_SEVERITY
 _TEXT_SIZE: Final = 50  # bytes in one STATUSTEXT
 # An unknown covariance is a NaN in its first entry.
@@ -120,6 +122,13 @@ class StepEncoder:
             for at in range(0, len(text), _TEXT_SIZE)
         ]
         return self._sensors.frame(message_ids.COMMAND_ACK, *ack) + b"".join(pieces)
+
+    def battery(self, volts: float, share: float) -> bytes:
+        """BATTERY_STATUS of a pack at ``volts`` [V] with a ``share`` [1] of its charge."""
+        cells = (round(1000.0 * volts), *(_UNKNOWN_CELL,) * 9)
+        about = (-1, 0, _FOR_EVERYTHING, _LIPO, round(100.0 * share))
+        values = (-1, -1, _UNKNOWN_WARMTH, *cells, *about, 0, 0, *(0,) * 4, 0, 0)
+        return self._sensors.frame(message_ids.BATTERY_STATUS, *values)
 
     def command(self, message: SendCommand) -> bytes:
         """One COMMAND_LONG of the pilot."""

@@ -141,6 +141,9 @@ def _datagram(
     """The datagram of this step; what has no room in it is sent ahead."""
     heartbeat = encoder.heartbeat() if simulation.step % _HEARTBEAT_STEPS == 0 else b""
     opening = heartbeat + answered
+    battery = simulation.battery()
+    if battery is not None:
+        opening += encoder.battery(*battery)
     measured = simulation.measurements()
     if measured is None:
         return opening + encoder.datagram(simulation.sense(), messages)

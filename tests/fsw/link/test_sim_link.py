@@ -14,6 +14,7 @@ from fsw.link.inbox import Inbox
 from fsw.link.sim_link import Pacing, SimLink
 from fsw.link.wire import message_ids as ids
 from fsw.signals import (
+    BatteryReading,
     CommandAck,
     CommandRequest,
     MessageSource,
@@ -357,3 +358,20 @@ def test_the_simulator_says_why_it_lets_nothing_fail(
     answer = carry_out(simulation, Injection(*numbers, system=1, component=1))
     assert answer.result == result
     assert answer.sentence.startswith(sentence)
+
+
+@pytest.mark.parametrize("measured", [False, True])
+def test_the_battery_is_measured_where_the_simulator_says_so(wire: Wire, measured: bool) -> None:
+    encoder = StepEncoder(lockstep=True, measured=measured)
+    step = (
+        encoder.measured_datagrams(1_002_000, (), ())[1]
+        if measured
+        else encoder.datagram(readings(1_002_000), ())
+    )
+    wire.send(encoder.heartbeat() + encoder.battery(14.2, 0.08) + step)
+    assert wire.link.wait_for_step() is not None
+    assert wire.inbox.take().battery == BatteryReading(pytest.approx(14.2), pytest.approx(0.08))
+    ground = FrameWriter(255, 190).frame(ids.BATTERY_STATUS, *(0,) * 26)
+    for frame in split(ground):
+        wire.inbox.accept(frame)
+    assert wire.inbox.take().battery is None, "a ground station is no sensor"

@@ -130,3 +130,16 @@ def test_a_flight_with_a_stuck_joint_keeps_energy_and_momentum() -> None:
 def test_without_a_fault_nothing_is_changed() -> None:
     later = flown(hovering(Fault("motor", "off", 60.0), Fault("gyro", "off", 60.0)), 100)
     assert later.state_bytes() == flown(hovering(), 100).state_bytes()
+
+
+def test_a_battery_that_failed_says_its_charge_and_a_perfect_one_says_nothing() -> None:
+    assert hovering().battery() is None
+    failing = hovering(Fault("battery", "weak", 0.0, 0.15, share=0.08))
+    said = []
+    for _ in range(3):
+        failing.sense()
+        said.append(failing.battery())
+        flown(failing, 50)
+    assert [one and one[1] for one in said] == [0.08, 0.08, 1.0]
+    assert said[0] is not None
+    assert 13.2 < said[0][0] < 15.0
