@@ -19,7 +19,7 @@ unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
 .PHONY: help setup run test test-long faults code-checks tests-of-processes tests-of-the-rest \
-	fsw-kernels sitl-kernels mutate interop lock docs docs-test pictures pages clean
+	fsw-kernels sitl-kernels mutate fuzz interop lock docs docs-test pictures pages clean
 
 help: ## show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-9s %s\n", $$1, $$2 }' Makefile
@@ -76,6 +76,18 @@ MUTATION := tests/mutation
 mutate: setup .mutation/ready ## change fsw a little, see if a test notices: SAMPLE=40 SEED=1 FILES=fsw/mpc JSON=1
 	@PYTHONPATH=. .mutation/tool/bin/python -m tests.mutation.mutate $(FILES) --seed $(or $(SEED),1) \
 		$(if $(SAMPLE),--sample $(SAMPLE)) $(if $(BUDGET),--budget $(BUDGET)) $(if $(JSON),--json)
+
+# libFuzzer for Python, in a folder of its own; the readers are those of .venv. TARGETS are names of
+# tests/fuzz/fuzz.py, SECONDS for each of them; KEEP=1 keeps inputs that reach something new.
+FUZZ := tests/fuzz
+.fuzz/ready: $(FUZZ)/tool.lock | $(READY)
+	@.boot/uv venv --quiet --allow-existing --no-project --python .venv/bin/python .fuzz
+	@$(UV) pip sync --quiet --python .fuzz --require-hashes --only-binary :all: $<
+	@touch $@
+
+fuzz: setup .fuzz/ready ## new inputs for every reader of files and datagrams: TARGETS=scenario SECONDS=600 KEEP=1
+	@PYTHONPATH=.:$$(echo .fuzz/lib/python*/site-packages) $(BIN)/python -m tests.fuzz.fuzz $(TARGETS) \
+		--seconds $(or $(SECONDS),60) $(if $(KEEP),--keep)
 
 # Of other people's clients; each has a lock of its own, and none is needed to fly or to test.
 EXTERNAL := tests/interop/external
@@ -156,10 +168,11 @@ lock: .boot/uv ## renew requirements.lock (to fly) and requirements-dev.lock (to
 	@$(COMPILE) --group mavproxy --no-deps --output-file $(EXTERNAL)/mavproxy.lock
 	@$(COMPILE) --group docs --constraints requirements-dev.lock --output-file requirements-docs.lock
 	@$(COMPILE) --group mutation --no-deps --output-file $(MUTATION)/tool.lock
+	@$(COMPILE) --group fuzz --no-deps --output-file $(FUZZ)/tool.lock
 	@git diff --stat -- requirements.lock requirements-dev.lock requirements-docs.lock \
-		$(EXTERNAL)/mavproxy.lock $(MUTATION)
+		$(EXTERNAL)/mavproxy.lock $(MUTATION) $(FUZZ)
 
 clean: ## remove the environment, generated files and caches
-	rm -rf .venv .boot .docs .interop .mutation build dist messages/dialect.py .mypy_cache .ruff_cache .pytest_cache \
+	rm -rf .venv .boot .docs .interop .mutation .fuzz build dist messages/dialect.py .mypy_cache .ruff_cache .pytest_cache \
 		.hypothesis .import_linter_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

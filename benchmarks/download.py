@@ -18,7 +18,7 @@ from typing import Any, Final
 from benchmarks.download_client import DownloadClient, NothingCame
 from benchmarks.machine_watch import version_and_machine
 from command_line.options import json_file, option, read
-from command_line.output import console_beside, write_text
+from command_line.output import console_beside, json_text, write_text
 from command_line.values import number
 from pandion.display import Display
 from pandion.supervisor import ProcessFailed, Supervisor
@@ -99,7 +99,7 @@ def main(argv: list[str]) -> int:
         f"wake-up p99 {fetched.inner['lateness_p99_us']:.0f} us",
         file=console,
     )
-    write_text(options.json, json.dumps(_facts(fetched), indent=1) + "\n")
+    write_text(options.json, json_text(_facts(fetched), 1) + "\n")
     return PASSED if fetched.passed else NOT_PASSED
 
 

@@ -20,7 +20,7 @@ from benchmarks.flood_monitor import Heard, Monitor
 from benchmarks.flood_traffic import SYSTEM
 from benchmarks.machine_watch import version_and_machine
 from command_line.options import json_file, option, read
-from command_line.output import console_beside, write_text
+from command_line.output import console_beside, json_text, write_text
 from command_line.values import seconds
 from fsw.link.telemetry.streams import STREAMS
 from pandion.display import Display
@@ -246,7 +246,7 @@ def _write(target: str | None, rows: list[Requirement], calm: Flight, flooded: F
         "without": _facts(calm),
         "with": _facts(flooded),
     }
-    write_text(target, json.dumps(figures, indent=1) + "\n")
+    write_text(target, json_text(figures, 1) + "\n")
 
 
 def _facts(flight: Flight) -> dict[str, Any]:

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, Final, TextIO
 
 from command_line.options import json_file, option, read
-from command_line.output import console_beside, write_text
+from command_line.output import console_beside, json_text, write_text
 from command_line.parser import COULD_NOT_START
 from command_line.values import number, whole
 from command_line.version import version
@@ -58,7 +58,7 @@ def main(argv: list[str]) -> int:
     except (ProcessFailed, OSError) as error:
         print(f"python -m benchmarks lockstep: {error}", file=sys.stderr)
         return COULD_NOT_START
-    write_text(options.json, json.dumps(found, indent=1, allow_nan=False) + "\n")
+    write_text(options.json, json_text(found, 1) + "\n")
     print("\n".join(_lines(found)), file=console)
     return DONE if found["real_time_factor_best"] >= TARGET else SLOW
 

@@ -19,7 +19,7 @@ from benchmarks.budgets import BudgetRow, Budgets, judge, load_budgets, result
 from benchmarks.machine_watch import Watch
 from benchmarks.values import several
 from command_line.options import json_file, option, read
-from command_line.output import console_beside, write_text
+from command_line.output import console_beside, json_text, write_text
 from command_line.values import seconds, whole
 from command_line.version import version
 from pandion.display import Display
@@ -72,7 +72,7 @@ def main(argv: list[str]) -> int:
     for measured in flown:
         print("\n".join(_lines(measured)), file=console)
     figures = {"machine": machine, "flights": [_as_json(one) for one in flown]}
-    write_text(options.json, json.dumps(figures, indent=2) + "\n")
+    write_text(options.json, json_text(figures, 2) + "\n")
     return PASSED if all(one.result == "pass" for one in flown) else NOT_PASSED
 
 

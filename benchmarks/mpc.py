@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import sys
 from dataclasses import dataclass
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from benchmarks.values import several
 from command_line.options import json_file, option, read, switch
-from command_line.output import console_beside, write_text
+from command_line.output import console_beside, json_text, write_text
 from command_line.parser import COULD_NOT_START
 from command_line.values import whole
 from command_line.version import version
@@ -86,8 +85,8 @@ def _run(options: MpcOptions) -> int:
 def _write(target: str | None, measured: list[Samples], facts: dict[str, object]) -> None:
     from benchmarks.optimiser.report import details
 
-    rows = json.dumps([samples.row() for samples in measured], indent=1, allow_nan=False) + "\n"
+    rows = json_text([samples.row() for samples in measured], 1) + "\n"
     write_text(target, rows)
     if target not in (None, "-"):
-        beside = json.dumps({"machine": facts, "details": details(measured)}, indent=1)
+        beside = json_text({"machine": facts, "details": details(measured)}, 1)
         Path(f"{target}.machine.json").write_text(beside + "\n", encoding="utf-8")

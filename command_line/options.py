@@ -13,11 +13,11 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
-import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
+from command_line.output import complain
 from command_line.parser import Parser
 from command_line.values import one_of, output_file
 
@@ -130,10 +130,10 @@ class Option:
             def __call__(
                 self, parser: Any, namespace: Any, values: Any, option_string: str | None = None
             ) -> None:
-                print(
-                    f"{parser.prog}: {option_string} is now {new}; "
+                complain(
+                    parser.prog,
+                    f"{option_string} is now {new}; "
                     "the old name will be removed in the next release",
-                    file=sys.stderr,
                 )
                 setattr(namespace, name, True if self.nargs == 0 else values)
 

@@ -1,15 +1,48 @@
-"""Where results go."""
+"""Where results and complaints go."""
 
 from __future__ import annotations
 
+import json
+import math
 import sys
 from pathlib import Path
-from typing import TextIO
+from typing import Any, TextIO
+
+from command_line.printable import printable
 
 
 def console_beside(target: str | None) -> TextIO:
     """Where sentences go: standard error if standard output is the JSON's."""
     return sys.stderr if target == "-" else sys.stdout
+
+
+def say(sentence: str, stream: TextIO | None = None) -> None:
+    """Print one line that may hold text from outside; on standard output unless told otherwise."""
+    print(printable(sentence), file=stream or sys.stdout, flush=True)
+
+
+def complain(program: str, sentence: object) -> None:
+    """Print what is wrong in one line on standard error."""
+    say(f"{program}: {sentence}", sys.stderr)
+
+
+def json_text(value: Any, indent: int | None = None) -> str:
+    """The value as JSON; what is not finite is null, for JSON knows no NaN."""
+    separators = (",", ":") if indent is None else None
+    try:
+        return json.dumps(value, indent=indent, separators=separators, allow_nan=False)
+    except ValueError:
+        return json.dumps(_finite(value), indent=indent, separators=separators, allow_nan=False)
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, dict):
+        return {key: _finite(part) for key, part in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(part) for part in value]
+    return value
 
 
 def write_text(target: str | None, text: str) -> None:

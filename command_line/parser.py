@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import argparse
 import difflib
-import sys
 from collections.abc import Iterable
 from typing import NoReturn
+
+from command_line.output import complain
 
 COULD_NOT_START = 2  # exit code
 
@@ -27,7 +28,7 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Say what is wrong in one sentence and exit with code 2."""
-        print(f"{self.prog}: {message.removeprefix('argument ')}", file=sys.stderr)
+        complain(self.prog, message.removeprefix("argument "))
         raise SystemExit(COULD_NOT_START)
 
     def _option_names(self) -> list[str]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import signal
 import sys
 import traceback
@@ -10,6 +9,7 @@ from collections.abc import Callable
 from types import FrameType
 from typing import Final, Protocol
 
+from command_line.output import json_text, say
 from command_line.parser import COULD_NOT_START
 
 NOT_COMPLETED: Final = 1  # exit code
@@ -40,7 +40,7 @@ class TextEvents:
         """See :class:`Events`."""
         if sentence:
             wrong = event in ("error", "unwritten")
-            print(sentence, file=sys.stderr if wrong else self._out, flush=True)
+            say(sentence, sys.stderr if wrong else self._out)
 
 
 class JsonEvents:
@@ -48,7 +48,7 @@ class JsonEvents:
 
     def report(self, event: str, sentence: str, **details: object) -> None:
         """See :class:`Events`."""
-        print(json.dumps({"event": event, "message": sentence, **details}), flush=True)
+        print(json_text({"event": event, "message": sentence, **details}), flush=True)
 
 
 def events_of(how: str, *, to_stderr: bool = False) -> Events:

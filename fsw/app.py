@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from command_line.output import unwritten
+from command_line.output import json_text, unwritten
 from command_line.process import (
     NOT_COMPLETED,
     CouldNotStart,
@@ -129,7 +128,7 @@ class _Session:
         result["inbox_refused"] = inbox.refused
         result["links"] = {link.name: link.as_json() for link in ground.links}
         result["files"] = files.as_json()
-        lost = unwritten(directory / "fsw.json", json.dumps(result, indent=2) + "\n")
+        lost = unwritten(directory / "fsw.json", json_text(result, 2) + "\n")
         sentence = f"fsw: {end.sentence}"
         self._events.report("ended", sentence, ending=end.ending.value, result=result)
         for what in lost:

@@ -8,6 +8,7 @@ import sys
 from importlib import import_module
 from typing import Final
 
+from command_line.output import complain
 from command_line.parser import COULD_NOT_START, unknown_name
 
 # Module, and what the verb does; without that it is not in the list.
@@ -77,9 +78,9 @@ def main(argv: list[str] | None = None) -> int:
         if error.errno not in (errno.ENOSPC, errno.EDQUOT):
             raise
         _silence_stdout()
-        print(f"pandion: cannot write {error.filename or 'output'}: disk full", file=sys.stderr)
+        complain("pandion", f"cannot write {error.filename or 'output'}: disk full")
     except KeyboardInterrupt:
-        print("pandion: interrupted", file=sys.stderr)
+        complain("pandion", "interrupted")
     return _INTERRUPTED
 
 
@@ -101,7 +102,7 @@ def _run(words: list[str]) -> int:
     if name not in VERBS:
         what = "option" if name.startswith("-") else "verb"
         known = ("--help", "--version") if what == "option" else VERBS
-        print(f"pandion: {unknown_name(what, name, known)}", file=sys.stderr)
+        complain("pandion", unknown_name(what, name, known))
         return COULD_NOT_START
     module, _ = VERBS[name]
     entry = import_module(module).main

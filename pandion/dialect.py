@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import os
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
 from command_line.options import option, read, switch
+from command_line.output import complain
 from command_line.parser import COULD_NOT_START
 from command_line.values import one_of
 from messages import export
@@ -53,7 +53,7 @@ def main(argv: list[str]) -> int:
     try:
         print(install(options.to), end="")
     except (GenerationError, OSError) as error:
-        print(f"pandion dialect: {_reason(error)}", file=sys.stderr)
+        complain("pandion dialect", f"{_reason(error)}")
         return COULD_NOT_START
     return 0
 

@@ -7,6 +7,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, TextIO
 
+from command_line.output import say
+from command_line.printable import printable
+
 if TYPE_CHECKING:
     from rich.progress import Progress
 
@@ -29,9 +32,11 @@ class Display:
     def say(self, sentence: str) -> None:
         """Print one line, above the bar if there is one."""
         if self._bar is not None:
-            self._bar.console.print(sentence, highlight=False, markup=False, soft_wrap=True)
+            self._bar.console.print(
+                printable(sentence), highlight=False, markup=False, soft_wrap=True
+            )
         else:
-            print(sentence, file=self._stream, flush=True)
+            say(sentence, self._stream)
 
     @contextmanager
     def progress(self) -> Iterator[None]:
@@ -99,18 +104,19 @@ class Display:
         """Print the table and PASS or FAIL."""
         from rich.console import Console
         from rich.table import Table
+        from rich.text import Text
 
         console = Console(file=self._stream, highlight=False)
         table = Table(show_header=False, title=None)
         table.add_column("what")
         table.add_column("value", justify="right")
         for name, value in rows:
-            table.add_row(name, value)
+            table.add_row(Text(printable(name)), Text(printable(value)))
         console.print(table)
         passed = result["completed"]
         style = "bold green" if passed else "bold red"
         console.print("PASS" if passed else "FAIL", style=style, end=" ")
-        console.print(result["end_reason"], markup=False, soft_wrap=True)
+        console.print(printable(result["end_reason"]), markup=False, soft_wrap=True)
         for name, path in result["logs"].items():
-            console.print(f"{name:12} {path}", markup=False, soft_wrap=True)
+            console.print(printable(f"{name:12} {path}"), markup=False, soft_wrap=True)
         self._stream.flush()  # what follows may go to another stream

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from command_line.options import OneOf, option, read
+from command_line.output import complain, say
 from command_line.parser import COULD_NOT_START
 from pandion.display import Display
 
@@ -55,15 +56,12 @@ def main(argv: list[str]) -> int:
         if count == 0:
             raise UlogError(f"{path} holds no record")
     except (UlogError, ValueError, OSError) as error:
-        print(f"pandion export: {error}", file=sys.stderr)
+        complain("pandion export", error)
         return COULD_NOT_START
     except ModuleNotFoundError as error:
-        print(
-            f"pandion export: --mcap needs the package {error.name}; install pandion[mcap]",
-            file=sys.stderr,
-        )
+        complain("pandion export", f"--mcap needs the package {error.name}; install pandion[mcap]")
         return COULD_NOT_START
-    print(f"{count} records of {path} in {options.csv or options.mcap}")
+    say(f"{count} records of {path} in {options.csv or options.mcap}")
     return DONE
 
 

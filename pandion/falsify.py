@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import json
 import math
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from command_line.options import json_file, option, read
-from command_line.output import console_beside, write_text
+from command_line.output import complain, console_beside, json_text, write_text
 from command_line.parser import COULD_NOT_START
 from command_line.values import number, whole
 from command_line.version import version
@@ -75,7 +74,7 @@ def main(argv: list[str]) -> int:
             return _replay(options, scenario, options.replay)
         return _search(options, scenario)
     except (ScenarioError, RefusedError, UnusableError, OSError) as error:
-        print(f"pandion falsify: {error}", file=sys.stderr)
+        complain("pandion falsify", error)
         return COULD_NOT_START
 
 
@@ -116,11 +115,11 @@ def _search(options: FalsifyOptions, scenario: Scenario) -> int:
             ),
         )
     kept = folder / "worst.json"
-    kept.write_text(json.dumps(_as_file(scenario, outcome.worst)), encoding="utf-8")
+    kept.write_text(json_text(_as_file(scenario, outcome.worst)), encoding="utf-8")
     for sentence in _sentences(outcome, options.amplitude) + _of_whole_stack(whole_stack):
         display.say(sentence)
     display.say(f"worst disturbance {kept}; pandion falsify {options.scenario} --replay {kept}")
-    write_text(options.json, json.dumps(_as_json(options, outcome, whole_stack), indent=2) + "\n")
+    write_text(options.json, json_text(_as_json(options, outcome, whole_stack), 2) + "\n")
     return HOLDS if outcome.holds and whole_stack.holds else BROKEN
 
 
@@ -284,7 +283,7 @@ def _replay(options: FalsifyOptions, scenario: Scenario, path: Path) -> int:
         display.say(f"least margin {flown.margin_m * _MM:+.1f} mm")
     if flown.ended is not None:
         display.say(flown.ended)
-    write_text(options.json, json.dumps(_replayed(flown), indent=2) + "\n")
+    write_text(options.json, json_text(_replayed(flown), 2) + "\n")
     return BROKEN if broken or flown.ended is not None else HOLDS
 
 

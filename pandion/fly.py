@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import math
 import sys
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
 from command_line.options import as_words, declared, group, json_file, read
-from command_line.output import unwritten
+from command_line.output import complain, json_text, unwritten
 from command_line.parser import COULD_NOT_START
 from command_line.version import version
 from fsw.arguments import OUT, PARAMS, FswOptions
@@ -68,7 +67,7 @@ def main(argv: list[str]) -> int:
     try:
         flight = planned(options)
     except (ScenarioError, LinkError, OSError) as error:
-        print(f"pandion fly: {error}", file=sys.stderr)
+        complain("pandion fly", error)
         return COULD_NOT_START
     display = Display(sys.stderr if options.json == "-" else sys.stdout)
     _banner(flight, display)
@@ -78,7 +77,7 @@ def main(argv: list[str]) -> int:
             as_words(_sitl_options(flight)), lambda port: as_words(_fsw_options(flight, port))
         )
     except ProcessFailed as error:
-        print(f"pandion fly: {error}", file=sys.stderr)
+        complain("pandion fly", error)
         return error.exit_code
     return _judge(flight, display, flown)
 
@@ -178,12 +177,12 @@ def _judge(flight: PlannedFlight, display: Display, flown: Flown) -> int:
         },
     )
     result = as_json(reports)
-    text = json.dumps(result, indent=2) + "\n"
+    text = json_text(result, 2) + "\n"
     lost = unwritten(out / "result.json", text)
     display.result(result, table_rows(result, (flown.sitl or {}).get("tracking_error_max_m")))
     lost = [*flown.unwritten, *lost, *unwritten(options.json, text)]
     if lost:
-        print(f"pandion fly: results could not be written: {'; '.join(lost)}", file=sys.stderr)
+        complain("pandion fly", f"results could not be written: {'; '.join(lost)}")
     if flown.sitl is not None and flown.sitl.get("end_kind") == "refused":
         return COULD_NOT_START
     return COMPLETED if result["completed"] and not lost else NOT_COMPLETED

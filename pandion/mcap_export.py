@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import math
 import re
 from pathlib import Path
 from typing import Any
 
 from mcap.writer import Writer
+
+from command_line.output import json_text
 
 _TYPES = {bool: "boolean", int: "integer", float: "number", str: "string"}
 _LAST_US = ((1 << 64) - 1) // 1000  # it counts nanoseconds
@@ -39,12 +40,12 @@ class McapSink(contextlib.ExitStack):
             ValueError: MCAP cannot hold the time.
         """
         if topic not in self._channels:
-            schema = json.dumps(_schema(topic, names, values)).encode()
+            schema = json_text(_schema(topic, names, values)).encode()
             number = self._writer.register_schema(topic, "jsonschema", schema)
             self._channels[topic] = self._writer.register_channel(topic, "json", number)
         if t_us > _LAST_US:
             raise ValueError(f"{topic} has the time {t_us} us, which MCAP cannot hold")
-        data = json.dumps(_object(names, values), separators=(",", ":")).encode()
+        data = json_text(_object(names, values)).encode()
         self._writer.add_message(self._channels[topic], 1000 * t_us, data, 1000 * t_us)
 
 

@@ -7,6 +7,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Final
 
+from command_line.output import complain
 from command_line.parser import COULD_NOT_START
 
 CHECKOUT: Final = Path(__file__).parents[1]
@@ -22,6 +23,6 @@ def main(argv: list[str]) -> int:
         )
         return COULD_NOT_START
     command = " ".join(["python -m benchmarks", *argv[:1]])
-    print(f"pandion bench: this command has moved; use `{command}`", file=sys.stderr)
+    complain("pandion bench", f"this command has moved; use `{command}`")
     # By name: the shipped package may not depend on the folder.
     return int(import_module("benchmarks.__main__").main(argv))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import fnmatch
-import json
 import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -11,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 from command_line.options import OneOf, option, read, switch
+from command_line.output import complain, json_text, say
 from command_line.parser import COULD_NOT_START, unknown_name
 from fsw.link.udp_endpoint import LinkError, parse_address
 
@@ -127,7 +127,7 @@ def main(argv: list[str]) -> int:
         return DONE
     action = ACTIONS.get(argv[0])
     if action is None:
-        print(f"pandion param: {unknown_name('action', argv[0], ACTIONS)}", file=sys.stderr)
+        complain("pandion param", f"{unknown_name('action', argv[0], ACTIONS)}")
         return COULD_NOT_START
     kind, act, what = action
     options = read(kind, f"pandion param {argv[0]}", what, argv[1:])
@@ -139,10 +139,10 @@ def main(argv: list[str]) -> int:
         with ParameterClient(parse_address(options.vehicle)) as vehicle:
             return act(options, vehicle)
     except (LinkError, NoAnswer, OSError) as error:
-        print(f"pandion param: {error}", file=sys.stderr)
+        complain("pandion param", error)
         return COULD_NOT_START
     except ParameterRefused as error:
-        print(f"pandion param: {error}", file=sys.stderr)
+        complain("pandion param", error)
         return REFUSED
     except KeyboardInterrupt:
         print("pandion param: interrupted", file=sys.stderr)
@@ -175,7 +175,7 @@ def _get(options: _Get, values: Values) -> int:
 
 def _set(options: _Set, values: Values) -> int:
     values.write(options.name, options.value)
-    print(f"{options.name} is {_number(options.value)}")
+    say(f"{options.name} is {_number(options.value)}")
     return DONE
 
 
@@ -191,7 +191,7 @@ def _import(options: _File, values: Values) -> int:
             values.write(name, value)
             changed += 1
         except ParameterRefused as error:
-            print(f"pandion param: {error}", file=sys.stderr)
+            complain("pandion param", error)
             refused += 1
     print(f"{len(wanted)} parameters read, {changed} changed, {refused} refused")
     return REFUSED if refused else DONE
@@ -202,7 +202,7 @@ def _export(options: _File, values: Values) -> int:
 
     known = values.read_all()
     save(options.path, known)
-    print(f"{len(known)} parameters written to {options.path}")
+    say(f"{len(known)} parameters written to {options.path}")
     return DONE
 
 
@@ -212,19 +212,19 @@ def _read_file(path: Path) -> dict[str, float]:
 
     loaded = load(path)
     for complaint in loaded.complaints:
-        print(f"pandion param: {path}, {complaint}", file=sys.stderr)
+        complain("pandion param", f"{path}, {complaint}")
     return loaded.values
 
 
 def _show(values: Mapping[str, float], *, as_json: bool) -> None:
     if as_json:
-        print(json.dumps([_described(name, value) for name, value in values.items()], indent=2))
+        print(json_text([_described(name, value) for name, value in values.items()], 2))
         return
     for name, value in values.items():
         entry = _described(name, value)
         star = " " if value == entry.get("default", value) else "*"
         unit, meaning = entry.get("unit", ""), entry.get("meaning", "")
-        print(f"{name:<16} {star}{_number(value):>10} {unit:<9} {meaning}".rstrip())
+        say(f"{name:<16} {star}{_number(value):>10} {unit:<9} {meaning}".rstrip())
 
 
 def _described(name: str, value: float) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import re
 import socket
 import time
 from collections.abc import Iterator
@@ -20,11 +21,13 @@ _NO_INDEX: Final = 0xFFFF
 _REAL32: Final = 9
 _GCS, _NO_AUTOPILOT, _ACTIVE, _VERSION = 6, 8, 4, 3
 _TRIES: Final = 3
+_NAME: Final = re.compile(r"[A-Za-z0-9_]{1,16}")
+_MOST: Final = 4096  # parameters; PX4 has some 1,500
 _QUIET_S: Final = 0.3  # a list that pauses this long has lost something
 
 
 class NoAnswer(Exception):
-    """The vehicle is silent, in one sentence."""
+    """The vehicle is silent or answers nonsense, in one sentence."""
 
 
 class ParameterRefused(Exception):
@@ -52,7 +55,7 @@ class ParameterClient:
         """Every parameter, by name.
 
         Raises:
-            NoAnswer: Nothing came, or not all of it.
+            NoAnswer: Nothing came, not all of it, or no list of parameters.
         """
         values: dict[int, tuple[str, float]] = {}
         count = 1
@@ -69,6 +72,7 @@ class ParameterClient:
                 )
                 if index == _NO_INDEX:
                     continue  # a checksum of them all, which PX4 and Pandion send first
+                self._check(count, index, _text(name))
                 values[index] = (_text(name), nearest_decimal(value))
                 patience_s = _QUIET_S
             if len(values) == count:
@@ -108,6 +112,19 @@ class ParameterClient:
                 elif _text(cast(bytes, frame.payload_values[3])) == name and not said:
                     raise ParameterRefused(f"the vehicle has no parameter {name}")
         raise NoAnswer(f"no answer from the vehicle at {self._where}")
+
+    def _check(self, count: int, index: int, name: str) -> None:
+        """Refuse a list that is none: its names go to terminals and into files."""
+        if not index < count <= _MOST:
+            raise NoAnswer(
+                f"the vehicle at {self._where} announces parameter {index} of {count}: "
+                f"there must be at most {_MOST}"
+            )
+        if not _NAME.fullmatch(name):
+            raise NoAnswer(
+                f"the vehicle at {self._where} names a parameter {name!r}: "
+                "must be 1 to 16 letters, digits or _"
+            )
 
     @property
     def _where(self) -> str:

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-import json
-import sys
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from command_line.options import json_file, option, read, switch
-from command_line.output import console_beside, write_text
+from command_line.output import complain, console_beside, json_text, say, write_text
 from command_line.parser import COULD_NOT_START
 from fsw.signals import Origin
 from pandion.display import Display
@@ -48,7 +46,7 @@ def main(argv: list[str]) -> int:
         log = open_flight(options.log)
         return _verify(options, log) if options.verify else _summarise(options, log)
     except (UlogError, ValueError, OSError) as error:
-        print(f"pandion replay: {error}", file=sys.stderr)
+        complain("pandion replay", error)
         return COULD_NOT_START
 
 
@@ -59,17 +57,17 @@ def _verify(options: ReplayOptions, log: UlogFile) -> int:
     program = _program(log)
     notes = other_numbers(log, program)
     for note in notes[:_NOTES_SHOWN]:
-        print(f"note: {note}", file=console)
+        say(f"note: {note}", console)
     if len(notes) > _NOTES_SHOWN:
         print(f"note: {len(notes) - _NOTES_SHOWN} more numbers differ", file=console)
     display = Display(console, lines=0)
     with display.progress():
         found = replay(log, program, partial(display.share, "replaying"))
     same = found.difference is None and not found.lost_ms
-    print(_sentence(found, log), file=console)
+    say(_sentence(found, log), console)
     figures = {"log": str(log.path), "same": same, **dataclasses.asdict(found)}
     figures |= {"whole": log.whole, "other_numbers": list(notes)}
-    write_text(options.json, json.dumps(figures, indent=2) + "\n")
+    write_text(options.json, json_text(figures, 2) + "\n")
     return SAME if same else DIFFERS
 
 
@@ -124,10 +122,10 @@ def _summarise(options: ReplayOptions, log: UlogFile) -> int:
         result = summary(log, partial(display.share, "reading"))
     for name, value in result.items():
         if name not in ("topics", "texts"):
-            print(f"{name:15} {value}", file=console)
+            say(f"{name:15} {value}", console)
     for name, count in result["topics"].items():
-        print(f"  {name:34} {count:8d}", file=console)
+        say(f"  {name:34} {count:8d}", console)
     for text in result["texts"]:
-        print(f"  {text}", file=console)
-    write_text(options.json, json.dumps(result, indent=2) + "\n")
+        say(f"  {text}", console)
+    write_text(options.json, json_text(result, 2) + "\n")
     return SAME

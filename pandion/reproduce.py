@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import argparse
 import os
-import sys
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
 from command_line.options import json_file, option, read
-from command_line.output import console_beside, write_text
+from command_line.output import complain, console_beside, say, write_text
 from command_line.parser import COULD_NOT_START
 from command_line.values import number, one_of, whole
 from command_line.version import version
@@ -102,18 +101,18 @@ def main(argv: list[str]) -> int:
     try:
         return _run(options)
     except (NoMatplotlibError, OSError) as error:
-        print(f"pandion reproduce: {error}", file=sys.stderr)
+        complain("pandion reproduce", error)
         return COULD_NOT_START
 
 
 def _run(options: ReproduceOptions) -> int:
     from studies.campaign import Campaign
-    from studies.page import json_text, write
+    from studies.page import rows_text, write
 
     console = console_beside(options.json)
     settings = _settings(options)
     folder = options.out or new_run_directory(Path("runs"), options.what)
-    print(f"Pandion {version()}: {options.what}, written to {folder}", file=console, flush=True)
+    say(f"Pandion {version()}: {options.what}, written to {folder}", console)
     if settings.tuned_on:
         print("these seeds were used for tuning; report others", file=console, flush=True)
     try:
@@ -124,14 +123,14 @@ def _run(options: ReproduceOptions) -> int:
             )
             report = study(options.what)(settings, campaign)
     except KeyboardInterrupt:
-        print(f"pandion reproduce: interrupted; --out {folder} resumes", file=sys.stderr)
+        complain("pandion reproduce", f"interrupted; --out {folder} resumes")
         return BROKEN
     page = write(report, settings, _provenance(options), options.what, folder)
     _show(report, console)
-    print(f"page {page}", file=console)
-    write_text(options.json, json_text(report))
+    say(f"page {page}", console)
+    write_text(options.json, rows_text(report))
     for error in report.errors:
-        print(f"pandion reproduce: {error}", file=sys.stderr)
+        complain("pandion reproduce", error)
     return BROKEN if report.errors else DONE
 
 

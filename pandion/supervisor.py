@@ -152,7 +152,9 @@ class Supervisor:
         elif kind == "error":
             flown.errors[child.name] = event["message"]
         elif kind == "listening":
-            flown.port, flown.duration_s = event["port"], event["duration_s"]
+            endless = event["duration_s"] is None  # JSON knows no infinity
+            flown.port = event["port"]
+            flown.duration_s = math.inf if endless else event["duration_s"]
         elif kind == "flying":
             flown.started = True
         elif kind == "ended":

@@ -5,12 +5,11 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import gc
-import json
 import os
 from collections.abc import Callable
 from typing import Final
 
-from command_line.output import unwritten
+from command_line.output import json_text, unwritten
 from command_line.parser import COULD_NOT_START
 from command_line.process import NOT_COMPLETED, Events, StopRequest
 from sitl.arguments import SitlOptions
@@ -74,7 +73,7 @@ class Flight:
         self._report_pauses(exchange.counts)
         result = simulation.result()
         described = self._as_json(result, timing, exchange.counts)
-        text = json.dumps(described, indent=2) + "\n"
+        text = json_text(described, 2) + "\n"
         in_directory = None if options.out is None else options.out / "sitl.json"
         lost = [*unwritten(options.json, text), *unwritten(in_directory, text)]
         sentence = f"sitl: {_summary(result, timing)}"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import difflib
 import hashlib
+import math
 import tomllib
 import types
 import typing
@@ -16,6 +17,8 @@ from sitl.scenario import Range, Scenario, ScenarioZone, Sensors
 from sitl.sensors.keys import MeasuredSensors, SuiteName
 
 _DIGITS = 12
+_MOST_BYTES = 256 * 1024  # of a file: 64 zones with their way points are a tenth of it
+_SHOWN = 80  # characters of a value in a sentence
 PACKAGED = Path(__file__).parent / "scenarios"
 SUITES = Path(__file__).parent / "sensors" / "suites"
 PERFECT = "perfect"
@@ -84,9 +87,13 @@ def _path(name_or_path: str) -> Path:
 
 def _content(path: Path) -> bytes:
     try:
-        return path.read_bytes()
+        with path.open("rb") as file:
+            content = file.read(_MOST_BYTES + 1)  # of a device or a pipe no more either
     except OSError as error:
         raise ScenarioError(f"cannot read scenario {path}: {error.strerror}") from error
+    if len(content) > _MOST_BYTES:
+        raise ScenarioError(f"scenario {path} is too long: must be at most {_MOST_BYTES} bytes")
+    return content
 
 
 def parse_scenario(text: str, name: str, suite: str | None = None) -> Scenario:
@@ -98,8 +105,15 @@ def parse_scenario(text: str, name: str, suite: str | None = None) -> Scenario:
         ScenarioError: Not TOML, unknown key or impossible value.
     """
     try:
+        return _parsed(text, name, suite)
+    except RecursionError:
+        raise ScenarioError(f"scenario {name} is nested too deeply") from None
+
+
+def _parsed(text: str, name: str, suite: str | None) -> Scenario:
+    try:
         table = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    except ValueError as error:  # TOMLDecodeError, or an integer of thousands of digits
         raise ScenarioError(f"scenario {name} is not TOML: {error}") from error
     if "name" in table:
         raise ScenarioError('unknown key "name": a scenario is named by its file')
@@ -112,20 +126,29 @@ def parse_scenario(text: str, name: str, suite: str | None = None) -> Scenario:
 
 
 def _nearest(word: object, known: Iterable[str]) -> str:
-    match = difflib.get_close_matches(str(word), list(known), n=1, cutoff=0.4)
+    match = difflib.get_close_matches(str(word)[:_SHOWN], list(known), n=1, cutoff=0.4)
     return f', did you mean "{match[0]}"?' if match else ""
+
+
+def _shown(value: object) -> str:
+    """A value as sentences quote it, in part if it is long."""
+    try:
+        text = repr(value)
+    except ValueError:  # an integer of thousands of digits
+        return "a number too long to show"
+    return text if len(text) <= _SHOWN else f"{text[:_SHOWN]}…"
 
 
 def _build(kind: Any, table: Any, path: str) -> Any:
     """An instance of the dataclass ``kind`` from a TOML table."""
     if not isinstance(table, dict):
-        raise ScenarioError(f"{path} = {table!r}: must be a table")
+        raise ScenarioError(f"{path} = {_shown(table)}: must be a table")
     hints = typing.get_type_hints(kind, include_extras=True)
     prefix = f"{path}." if path else ""
     for key in table:
         if key not in hints:
             raise ScenarioError(
-                f'unknown key "{prefix}{key}" = {table[key]!r}{_nearest(key, hints)}'
+                f'unknown key "{prefix}{key[:_SHOWN]}" = {_shown(table[key])}{_nearest(key, hints)}'
                 f" (known here: {', '.join(name for name in hints if name != 'name' or path)})"
             )
     for field in dataclasses.fields(kind):
@@ -153,11 +176,13 @@ def _value(hint: Any, value: Any, path: str) -> Any:
         return _build(hint, value, path)
     if origin is tuple:
         if not isinstance(value, list):
-            raise ScenarioError(f"{path} = {value!r}: must be an array of tables ([[{path}]])")
+            raise ScenarioError(
+                f"{path} = {_shown(value)}: must be an array of tables ([[{path}]])"
+            )
         return tuple(_value(parts[0], item, f"{path}[{i}]") for i, item in enumerate(value))
     if hint is bool:
         if not isinstance(value, bool):
-            raise ScenarioError(f"{path} = {value!r}: must be true or false")
+            raise ScenarioError(f"{path} = {_shown(value)}: must be true or false")
         return value
     return _word(hint, value, path)
 
@@ -165,7 +190,7 @@ def _value(hint: Any, value: Any, path: str) -> Any:
 def _sensors(value: Any, path: str) -> Sensors | MeasuredSensors:
     """The numbers of a suite, with those of the scenario in their place where it has any."""
     if not isinstance(value, dict):
-        raise ScenarioError(f"{path} = {value!r}: must be a table")
+        raise ScenarioError(f"{path} = {_shown(value)}: must be a table")
     own = {key: part for key, part in value.items() if key != "suite"}
     suite = _word(SuiteName, value.get("suite", PERFECT), f"{path}.suite")
     if suite == PERFECT:
@@ -179,7 +204,7 @@ def _sensors(value: Any, path: str) -> Sensors | MeasuredSensors:
                 f"{_nearest(key, tables)} (known here: suite, {', '.join(tables)})"
             )
         if not isinstance(part, dict):
-            raise ScenarioError(f"{path}.{key} = {part!r}: must be a table")
+            raise ScenarioError(f"{path}.{key} = {_shown(part)}: must be a table")
         tables[key] = {**tables[key], **part}
     measured: MeasuredSensors = _build(MeasuredSensors, {**tables, "suite": suite}, path)
     return measured
@@ -189,9 +214,10 @@ def _word(hint: Any, value: Any, path: str) -> str:
     """A text, or one of several."""
     parts = get_args(hint)
     if not isinstance(value, str):
-        raise ScenarioError(f"{path} = {value!r}: must be a text{_allowed(hint)}")
+        raise ScenarioError(f"{path} = {_shown(value)}: must be a text{_allowed(hint)}")
     if get_origin(hint) is Literal and value not in parts:
-        raise ScenarioError(f'{path} = "{value}": must be {_words(parts)}{_nearest(value, parts)}')
+        hint = _nearest(value, parts)
+        raise ScenarioError(f'{path} = "{value[:_SHOWN]}": must be {_words(parts)}{hint}')
     return value
 
 
@@ -201,13 +227,13 @@ def _table_of_a_kind(kinds: list[Any], value: Any, path: str, key: str = "kind")
         return _build(kinds[0], value, path)
     words = {get_args(typing.get_type_hints(kind)[key])[0]: kind for kind in kinds}
     if not isinstance(value, dict):
-        raise ScenarioError(f"{path} = {value!r}: must be a table")
+        raise ScenarioError(f"{path} = {_shown(value)}: must be a table")
     if key not in value:
         raise ScenarioError(f'missing key "{path}.{key}": must be {_words(words)}')
     word = value[key]
-    if word not in words:
+    if not isinstance(word, str) or word not in words:
         raise ScenarioError(
-            f"{path}.{key} = {word!r}: must be {_words(words)}{_nearest(word, words)}"
+            f"{path}.{key} = {_shown(word)}: must be {_words(words)}{_nearest(word, words)}"
         )
     return _build(words[word], value, path)
 
@@ -218,7 +244,7 @@ def _numbers(hint: Any, allowed: Range, value: Any, path: str) -> float | tuple[
         size = len(get_args(hint))
         if not isinstance(value, list) or len(value) != size:
             raise ScenarioError(
-                f"{path} = {value!r}: must be an array of {size} numbers ({allowed})"
+                f"{path} = {_shown(value)}: must be an array of {size} numbers ({allowed})"
             )
         return tuple(_number(item, allowed, f"{path}[{i}]") for i, item in enumerate(value))
     return _number(value, allowed, path)
@@ -226,10 +252,14 @@ def _numbers(hint: Any, allowed: Range, value: Any, path: str) -> float | tuple[
 
 def _number(value: Any, allowed: Range, path: str) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ScenarioError(f"{path} = {value!r}: must be a number ({allowed})")
-    if not allowed.contains(float(value)):
-        raise ScenarioError(f"{path} = {value!r}: must be {allowed}")
-    return float(value)
+        raise ScenarioError(f"{path} = {_shown(value)}: must be a number ({allowed})")
+    try:
+        number = float(value)
+    except OverflowError:  # an integer beyond all floats; infinity may be allowed, and is not meant
+        number = math.nan
+    if not allowed.contains(number):
+        raise ScenarioError(f"{path} = {_shown(value)}: must be {allowed}")
+    return number
 
 
 def _words(words: Iterable[str]) -> str:

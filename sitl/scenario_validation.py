@@ -103,12 +103,12 @@ def _check_names(scenario: Scenario) -> None:
         ("disturbances", [], [item.name for item in scenario.disturbances]),
     ):
         for i, name in enumerate(names):
+            if not name or len(name) > 24 or "/" in name or not name.isprintable():
+                raise ScenarioError(
+                    f'{key}[{i}].name = {name!r}: must be 1 to 24 printable characters without "/"'
+                )
             if name in (*others, *names[:i]):
                 raise ScenarioError(f'{key}[{i}].name = "{name}": must differ from the others')
-            if not name or len(name) > 24 or "/" in name:
-                raise ScenarioError(
-                    f'{key}[{i}].name = "{name}": must be 1 to 24 characters without "/"'
-                )
 
 
 def _check_faults(scenario: Scenario) -> None:

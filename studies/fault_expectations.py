@@ -20,6 +20,7 @@ Contact = Literal["none", "ground", "any"]
 _CONTACTS: Final[tuple[str, ...]] = typing.get_args(Contact)
 _UNITS: Final[tuple[str, ...]] = typing.get_args(Unit)
 _KINDS: Final[tuple[str, ...]] = typing.get_args(Kind)
+_MOST_BYTES: Final = 1 << 20
 _NUMBERS: Final = ("duration_s", "share", "size", "delay_ms", "rate_hz", "jump_s")
 _EXPECTED: Final = ("told_within_s", "then", "contact", "why")
 _KNOWN: Final = (
@@ -67,9 +68,17 @@ def expectations(path: Path = EXPECTATIONS) -> dict[str, Expected]:
         ExpectationError: It cannot be read, or a table is wrong.
     """
     try:
-        tables = tomllib.loads(path.read_text(encoding="utf-8")).get("faults", [])
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise ExpectationError(f"{path}: {error}") from error
+        with path.open("rb") as file:
+            content = file.read(_MOST_BYTES + 1)
+        if len(content) > _MOST_BYTES:
+            raise ExpectationError(f"{path} is too long: must be at most {_MOST_BYTES} bytes")
+        tables = tomllib.loads(content.decode("utf-8")).get("faults", [])
+    except OSError as error:
+        raise ExpectationError(f"cannot read {path}: {error.strerror}") from error
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise ExpectationError(f"{path} is not TOML: {error}") from error
+    except RecursionError:
+        raise ExpectationError(f"{path} is nested too deeply") from None
     found: dict[str, Expected] = {}
     if not isinstance(tables, list):
         raise ExpectationError(f"{path}: faults must be an array of tables ([[faults]])")

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import html
-import json
 from pathlib import Path
 
+from command_line.output import json_text
 from studies.settings import Figure, Report, Settings, Table
 
 _STYLE = Path(__file__).with_suffix(".css")
@@ -18,17 +18,17 @@ def write(
     folder.mkdir(parents=True, exist_ok=True)
     written = folder / f"{name}.html"
     written.write_text(page(report, settings, provenance), encoding="utf-8")
-    (folder / f"{name}-rows.json").write_text(json_text(report), encoding="utf-8")
+    (folder / f"{name}-rows.json").write_text(rows_text(report), encoding="utf-8")
     for figure in report.figures:
         (folder / f"{figure.name}.svg").write_text(figure.svg, encoding="utf-8")
-        arrays = json.dumps(figure.arrays, separators=(",", ":"))
+        arrays = json_text(figure.arrays)
         (folder / f"{figure.name}.json").write_text(arrays + "\n", encoding="utf-8")
     return written
 
 
-def json_text(report: Report) -> str:
+def rows_text(report: Report) -> str:
     """The rows as JSON text; a number that does not exist is null."""
-    return json.dumps(report.rows, indent=1, allow_nan=False) + "\n"
+    return json_text(report.rows, 1) + "\n"
 
 
 def page(report: Report, settings: Settings, provenance: tuple[str, ...]) -> str:

@@ -195,11 +195,12 @@ class GcsLink:
         self.accepted += 1
         if self._record is not None:
             self._record(t_us, raw)
-        if trust is FrameTrust.TRUSTED:
-            self._peers.heard(sender, self._clock(), version_1=is_version_1(raw))
-            self.talks = True
-            if len(self._speakers) < _MAX_SPEAKERS:
-                self._speakers.add((frame.system_id, frame.component_id))
+        if trust is FrameTrust.EXEMPT:
+            return  # no sign of life either: anybody could start or stop a failsafe with it
+        self._peers.heard(sender, self._clock(), version_1=is_version_1(raw))
+        self.talks = True
+        if len(self._speakers) < _MAX_SPEAKERS:
+            self._speakers.add((frame.system_id, frame.component_id))
         if frame.message_id == message_ids.SETUP_SIGNING:
             armed = self._snapshot is not None and self._snapshot.armed
             text = set_up_signing(self.signing, frame, sender, armed)
@@ -207,9 +208,8 @@ class GcsLink:
                 self.outbox.add_text(text, t_us)
             return
         host, port = sender
-        signed = self.signing.active and trust is FrameTrust.TRUSTED
         source = MessageSource(
-            frame.system_id, frame.component_id, self.name, f"{host}:{port}", signed
+            frame.system_id, frame.component_id, self.name, f"{host}:{port}", self.signing.active
         )
         answer = self._commands.handle(frame, t_us, self._snapshot)
         if answer is None:

@@ -102,6 +102,7 @@ def test_the_papers_cases_are_there() -> None:
         ("ramp_s = 2.0", "ramp = 2.0", ['"trajectory.ramp"', '"ramp_s"']),
         ("ramp_s = 2.0", "ramp_s = 6.0", ["trajectory.ramp_s = 6", "at most half"]),
         ('"airborne"', '"airbourne"', ["start.kind", '"airborne", "ground"', "did you mean"]),
+        ('"lissajous"', "[1.0]", ["trajectory.kind = [1.0]", '"lissajous"']),
         ('"lissajous"', '"lisajous"', ["trajectory.kind", "'lisajous'", '"lissajous"']),
         ("[0.1, 0.1, 0.1]", "[0.1, 0.1]", ["trajectory.amplitude_m", "array of 3 numbers"]),
         ("[0.1, 0.1, 0.1]", "[0.1, -1, 0.1]", ["trajectory.amplitude_m[1] = -1", "0 to 1000"]),
@@ -158,6 +159,50 @@ def test_a_wrong_addition_is_refused(extra: str, reported: list[str]) -> None:
     with pytest.raises(ScenarioError) as refusal:
         Simulation(parse_scenario(text, "test"), 0)
     assert all(part in str(refusal.value) for part in reported), str(refusal.value)
+
+
+DEEP = 2_000
+
+
+@pytest.mark.parametrize(
+    ("text", "reported"),
+    [
+        ("a = " + "[" * DEEP + "]" * DEEP, "nested too deeply"),
+        ("a = " + "{b = " * DEEP + "1" + "}" * DEEP, "nested too deeply"),
+        ("a" + ".a" * DEEP + " = 1\n" + BASE, "nested too deeply"),
+        (f"duration_s = 1{'0' * 400}\n", "must be 0.1 to 86400"),
+        (f"duration_s = -1{'0' * 400}\n", "must be 0.1 to 86400"),
+        (f"duration_s = 0x1{'0' * 5000}\n", "number too long to show: must be 0.1 to 86400"),
+        (f"duration_s = 1{'0' * 5000}\n", "is not TOML"),
+        (f"duration_s = {1 << 64}\n", "must be 0.1 to 86400"),
+        (f"duration_s = {[0] * 50_000}\n", "must be a number"),
+        (f"{'x' * 200_000} = 1\n", "unknown key"),
+        ('"\\u001b[2Jname" = 1\n', "unknown key"),
+    ],
+)
+def test_a_damaged_scenario_is_refused_in_one_short_sentence(text: str, reported: str) -> None:
+    text = text if BASE in text else text + BASE.replace("duration_s = 10.0", "", 1)
+    with pytest.raises(ScenarioError, match=reported) as refusal:
+        parse_scenario(text, "damaged")
+    assert len(str(refusal.value)) < 1_000
+
+
+def test_a_name_that_a_terminal_would_obey_is_refused() -> None:
+    for name in ("a\\u001b[2J", "a\\nPASS", "a\\u202e"):
+        with pytest.raises(ScenarioError, match=r"walls\[0\].name = .*printable") as refusal:
+            check(parse_scenario(BASE + WALL.replace("front", name), "test"))
+        assert str(refusal.value).isprintable()
+
+
+def test_a_file_of_any_length_is_refused_at_once(tmp_path: Path) -> None:
+    path = tmp_path / "long.toml"
+    path.write_text(BASE + "".join(WALL.replace("front", f"w{k}") for k in range(100_000)))
+    with pytest.raises(ScenarioError, match="too long: must be at most"):
+        load_scenario(str(path))
+    endless = tmp_path / "endless.toml"
+    endless.symlink_to("/dev/zero")
+    with pytest.raises(ScenarioError, match="too long"):
+        load_scenario(str(endless))
 
 
 def test_an_unknown_scenario_names_the_nearest_and_all() -> None:

@@ -7,7 +7,6 @@ its true sender out. Source: https://mavlink.io/en/guide/message_signing.html
 
 from __future__ import annotations
 
-import contextlib
 import hmac
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -113,23 +112,22 @@ class Signing:
             OSError: The key cannot be stored; nothing has changed.
         """
         new = key if any(key) else b""
+        newest = max(self._senders.values(), default=self._oldest)
         if self._file is not None:
             if new:
-                self._file.write(SigningKey(new, self._oldest))
+                self._file.write(SigningKey(new, newest))
             else:
                 self._file.remove()
+        if new != self._key:  # frames under the same key must not be played again
+            self._senders.clear()
         self._key = new
-        self._senders.clear()
         if initial_time <= self._now() + _TOLERANCE:
             self._sent = max(self._sent, initial_time)
 
     def close(self) -> None:
-        """Keep the newest time that was accepted."""
-        newest = max(self._senders.values(), default=0)
-        if self._file is not None and self._key and newest > self._oldest:
-            # Without it the next flight only trusts what is not older than a minute.
-            with contextlib.suppress(OSError):
-                self._file.write(SigningKey(self._key, newest))
+        """Release the key's file."""
+        if self._file is not None:
+            self._file.close()
 
     def _in_time(self, sender: tuple[int, int, int], time: int) -> bool:
         now = self._now()
@@ -140,6 +138,9 @@ class Signing:
             last = max(self._oldest, now - _TOLERANCE)
         if not last < time <= now + _TOLERANCE:
             return False
+        # Kept before the frame does anything: a process that is killed leaves it to the next one.
+        if self._file is not None and time > max(self._senders.values(), default=self._oldest):
+            self._file.keep(time)
         self._senders[sender] = time
         return True
 

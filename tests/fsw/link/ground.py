@@ -6,15 +6,27 @@ import socket
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
+from fsw.link.files.flight_logs import FlightLogs
+from fsw.link.files.ftp_service import FtpService
+from fsw.link.files.log_service import LogService
+from fsw.link.files.vehicle_files import vehicle_files
 from fsw.link.gcs_link import GcsLink, LinkSetup
 from fsw.link.ground_links import GroundLinks
 from fsw.link.inbox import Inbox
+from fsw.link.services.mission_service import MissionService
+from fsw.link.services.mission_store import MissionStore, Site
+from fsw.link.services.parameter_service import ParameterService
 from fsw.link.services.service import LinkService
+from fsw.link.services.time_service import TimeService
 from fsw.link.signing.key_file import KeyFile
 from fsw.link.signing.signing import Signing
 from fsw.link.telemetry.streams import API_RATES, GROUND_RATES
+from fsw.parameters.flight_config import FlightConfig
+from fsw.parameters.store import ParameterStore
+from fsw.signals import SafeSet, Vec3
 from messages.frames import Frame, split
 from tests.fsw.link.snapshots import CONTEXT, outputs_at
 
@@ -115,3 +127,30 @@ def ground_station(
     finally:
         links.close()
         station.close()
+
+
+@contextmanager
+def whole_vehicle(folder: Path) -> Iterator[Ground]:
+    """A link with everything that listens on one, disarmed; its flight's files are in a folder."""
+    run = folder / "run-1"
+    run.mkdir()
+    (run / "flight.tlog").write_bytes(bytes(2000))
+    logs = FlightLogs(run)
+    services = (
+        ParameterService(ParameterStore(FlightConfig(), lambda tuning: None)),
+        MissionService(MissionStore(Site(_nowhere, _as_it_is, lambda: 0.1))),
+        LogService(logs),
+        FtpService(vehicle_files(logs)),
+        TimeService(),
+    )
+    with ground_station(services=services) as ground:
+        ground.fly(5, armed=False)
+        yield ground
+
+
+def _nowhere(latitude: float, longitude: float, altitude: float) -> Vec3:
+    return latitude, longitude, -altitude
+
+
+def _as_it_is(safe_set: SafeSet) -> tuple[str, ...]:
+    return ()

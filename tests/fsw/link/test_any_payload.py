@@ -11,21 +11,10 @@ import fastcrc
 import pytest
 
 from docs.pages.messages import heard
-from fsw.link.files.flight_logs import FlightLogs
-from fsw.link.files.ftp_service import FtpService
-from fsw.link.files.log_service import LogService
-from fsw.link.files.vehicle_files import vehicle_files
-from fsw.link.services.mission_service import MissionService
-from fsw.link.services.mission_store import MissionStore, Site
-from fsw.link.services.parameter_service import ParameterService
-from fsw.link.services.time_service import TimeService
 from fsw.link.wire import message_ids as ids
-from fsw.parameters.flight_config import FlightConfig
-from fsw.parameters.store import ParameterStore
-from fsw.signals import SafeSet, Vec3
 from messages import dialect
 from messages.frames import as_version_1
-from tests.fsw.link.ground import Ground, ground_station
+from tests.fsw.link.ground import Ground, whole_vehicle
 
 # Bytes that make NaN, infinities, extremes and our own address more likely than chance would.
 _LIKELY = (
@@ -69,30 +58,9 @@ def _codes(message: object) -> list[str]:
     return codes
 
 
-def nowhere(latitude: float, longitude: float, altitude: float) -> Vec3:
-    return latitude, longitude, -altitude
-
-
-def judge(safe_set: SafeSet) -> tuple[str, ...]:
-    return ()
-
-
 @pytest.fixture
 def vehicle(tmp_path: Path) -> Iterator[Ground]:
-    """A link with everything that listens on one."""
-    run = tmp_path / "run-1"
-    run.mkdir()
-    (run / "flight.tlog").write_bytes(bytes(2000))
-    logs = FlightLogs(run)
-    services = (
-        ParameterService(ParameterStore(FlightConfig(), lambda tuning: None)),
-        MissionService(MissionStore(Site(nowhere, judge, lambda: 0.1))),
-        LogService(logs),
-        FtpService(vehicle_files(logs)),
-        TimeService(),
-    )
-    with ground_station(services=services) as ground:
-        ground.fly(5, armed=False)
+    with whole_vehicle(tmp_path) as ground:
         yield ground
 
 

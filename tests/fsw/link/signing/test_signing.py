@@ -46,6 +46,9 @@ class Client:
         message = dialect.MAVLink_command_long_message(1, 1, 400, 0, 1, 0, 0, 0, 0, 0, 0)
         return bytes(message.pack(self.mav))
 
+    def beat(self) -> bytes:
+        return bytes(dialect.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3).pack(self.mav))
+
     def set_up(self, key: bytes) -> bytes:
         message = dialect.MAVLink_setup_signing_message(1, 1, list(key), self.now())
         return bytes(message.pack(self.mav))
@@ -129,6 +132,16 @@ def test_presence_needs_no_signature_but_teaches_no_peer(ground: Ground) -> None
     stranger.close()
 
 
+def test_only_a_signed_heartbeat_is_a_sign_of_life(ground: Ground) -> None:
+    """Anybody could keep a lost station alive otherwise, or have a failsafe wait for a silence."""
+    ground.inbox.take()
+    ground.polled(unsigned(ids.HEARTBEAT, 6, 8, 0, 0, 4, 3), station_socket())
+    ground.polled(unsigned(ids.HEARTBEAT, 0, 6, 8, 0, 4, 3), station_socket())
+    assert not ground.inbox.take().station_heard
+    ground.polled(Client(ground).beat())
+    assert ground.inbox.take().station_heard
+
+
 def test_a_tampered_frame_does_nothing_and_locks_nobody_out(ground: Ground) -> None:
     """Stock pymavlink believes a forged time before it has checked the hash."""
     client = Client(ground)
@@ -196,6 +209,30 @@ def test_the_key_is_for_its_owners_eyes_and_outlives_the_process(
         assert commands(restarted) == 0
         restarted.polled(Client(restarted).at(Client(restarted).now() + 5).arm())
         assert commands(restarted) == 1
+
+
+def test_a_process_that_is_killed_leaves_the_newest_time_to_the_next_one(
+    ground: Ground, file: Path
+) -> None:
+    old = Client(ground).arm()
+    ground.polled(old)  # and nothing is closed
+    ground.clock.pass_s(19.6)
+    with ground_station(key_file=KeyFile(file)) as restarted:
+        restarted.fly(5)
+        restarted.polled(old)
+        assert commands(restarted) == 0
+        assert restarted.link.signing.counters.wrong_time == 1
+        restarted.polled(Client(restarted).at(Client(restarted).now() + 5).arm())
+        assert commands(restarted) == 1
+
+
+def test_a_key_that_is_set_again_forgets_no_time(ground: Ground) -> None:
+    client = Client(ground)
+    old = client.arm()
+    ground.polled(old)
+    ground.polled(client.set_up(KEY))
+    ground.polled(old)
+    assert commands(ground) == 1
 
 
 @pytest.mark.parametrize("content", ["", "{}", '{"key": "00", "newest": 1}', "[]", "\xff"])

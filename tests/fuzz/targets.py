@@ -1,0 +1,173 @@
+"""Every reader of files and of datagrams, as a function of bytes that raises on a finding only.
+
+A reader's own refusal is no finding; any other exception is one.
+"""
+
+from __future__ import annotations
+
+import struct
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, suppress
+from pathlib import Path
+
+import fastcrc
+
+from docs.pages.messages import heard
+from fsw.link.inbox import Inbox
+from fsw.link.signing.key_file import KeyFile
+from fsw.link.sim_link import SimLink
+from fsw.link.udp_endpoint import LinkError
+from fsw.link.wire import message_ids as ids
+from fsw.parameters import storage
+from fsw.parameters.registry import PARAMETERS
+from messages import dialect
+from messages.frames import cut
+from messages.ulog_reader import UlogError, open_log
+from pandion.log_summary import summary
+from sitl.scenario_file import PACKAGED, ScenarioError, parse_scenario
+from sitl.scenario_validation import check
+from tests.fsw.link.ground import station_socket, whole_vehicle
+from tests.fsw.link.snapshots import FACTS
+from tests.messages.test_ulog import written
+
+Try = Callable[[bytes], None]
+_MOST_FRAMES = 8
+
+
+def _scenario(stack: ExitStack) -> Try:
+    def attempt(data: bytes) -> None:
+        with suppress(ScenarioError, UnicodeDecodeError):  # the latter is told by ``load_scenario``
+            check(parse_scenario(data.decode("utf-8"), "fuzzed"))
+
+    return attempt
+
+
+def _parameters(stack: ExitStack) -> Try:
+    def attempt(data: bytes) -> None:
+        loaded = storage.parse(data.decode("utf-8", "replace"))
+        again = storage.parse(storage.as_params(loaded.values))
+        assert again.values == loaded.values
+        assert not again.complaints
+
+    return attempt
+
+
+def _key(stack: ExitStack) -> Try:
+    path = Path(stack.enter_context(tempfile.TemporaryDirectory())) / "key.json"
+
+    def attempt(data: bytes) -> None:
+        path.write_bytes(data)
+        path.chmod(0o600)
+        file = KeyFile(path)
+        with suppress(LinkError):
+            file.read()
+        file.close()
+
+    return attempt
+
+
+def _flight_log(stack: ExitStack) -> Try:
+    path = Path(stack.enter_context(tempfile.TemporaryDirectory())) / "flight.ulg"
+
+    def attempt(data: bytes) -> None:
+        path.write_bytes(data)
+        with suppress(UlogError):
+            summary(open_log(path), lambda done, total: None)
+
+    return attempt
+
+
+def _datagrams(stack: ExitStack) -> Try:
+    def attempt(data: bytes) -> None:
+        for frame, raw in cut(data):
+            assert raw in data
+            assert frame.message_id in dialect.mavlink_map
+
+    return attempt
+
+
+def _valid_frames(data: bytes, listened: tuple[int, ...]) -> Iterator[bytes]:
+    """Frames with right checksums: an index into ``listened``, a length, a payload, and so on."""
+    at = 0
+    for sequence in range(_MOST_FRAMES):
+        if at + 2 > len(data):
+            return
+        message_id, size = listened[data[at] % len(listened)], data[at + 1]
+        message = dialect.mavlink_map[message_id]
+        payload = data[at + 2 : at + 2 + min(size, message.unpacker.size)] or b"\0"
+        at += 2 + len(payload)
+        body = struct.pack("<BBBBBB", len(payload), 0, 0, sequence, 255, 190)
+        body += message_id.to_bytes(3, "little") + payload
+        checksum = fastcrc.crc16.mcrf4xx(body + bytes([message.crc_extra]))
+        yield b"\xfd" + body + checksum.to_bytes(2, "little")
+
+
+def _ground_link(stack: ExitStack) -> Try:
+    vehicle = stack.enter_context(
+        whole_vehicle(Path(stack.enter_context(tempfile.TemporaryDirectory())))
+    )
+    listened = tuple(sorted(heard() - {ids.SETUP_SIGNING}))  # a key would shut everything out
+    tries = 0
+
+    def attempt(data: bytes) -> None:
+        nonlocal tries
+        for frame in _valid_frames(data, listened):
+            vehicle.polled(frame)
+        tries += 1
+        if tries % 20 == 0:
+            vehicle.fly(1)
+        vehicle.inbox.take()
+        vehicle.recorded.clear()
+        assert vehicle.link.dispatch.failures == 0
+        assert vehicle.link.outbox.encode_failures == 0
+
+    return attempt
+
+
+def _simulator_link(stack: ExitStack) -> Try:
+    simulator = stack.enter_context(station_socket())
+    inbox = Inbox()
+    link = SimLink(simulator.getsockname(), inbox, FACTS)
+    stack.callback(link.close)
+    link.announce()
+    _, vehicle = simulator.recvfrom(2048)
+    listened = (
+        *(ids.HEARTBEAT, ids.HIL_SENSOR, ids.HIL_GPS, ids.ODOMETRY, ids.DISTANCE_SENSOR),
+        *(ids.ARM_JOINT_STATE, ids.JOINT_ENCODERS, ids.COMMAND_LONG),
+    )
+
+    def attempt(data: bytes) -> None:
+        simulator.sendto(b"".join(_valid_frames(data, listened)) or data, vehicle)
+        link.newest()
+        inbox.take()
+        link.notices.clear()
+
+    return attempt
+
+
+SET_UPS: dict[str, Callable[[ExitStack], Try]] = {
+    "scenario": _scenario,
+    "parameters": _parameters,
+    "key": _key,
+    "flight-log": _flight_log,
+    "datagrams": _datagrams,
+    "ground-link": _ground_link,
+    "simulator-link": _simulator_link,
+}
+
+
+def seeds(name: str) -> list[bytes]:
+    """Inputs that a reader likes, to begin with where nothing was kept yet."""
+    if name == "scenario":
+        return [path.read_bytes() for path in sorted(PACKAGED.glob("*.toml"))]
+    if name == "parameters":
+        values = {parameter.name: parameter.default for parameter in PARAMETERS[:20]}
+        return [storage.as_params(values).encode(), storage.as_parm(values).encode()]
+    if name == "key":
+        return [b'{"key": "%s", "newest": 5}' % (b"0a" * 32)]
+    if name == "flight-log":
+        return [written()]
+    if name == "datagrams":
+        return list(_valid_frames(bytes(range(1, 255)), tuple(dialect.mavlink_map)))
+    return [bytes([k, 40, *range(40)]) for k in range(80)]
