@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import dataclasses
+import math
 import tomllib
 import typing
 from dataclasses import dataclass
@@ -155,10 +155,11 @@ def _expectation(keys: dict[str, Any]) -> Expectation:
         raise ExpectationError(f"contact = {contact!r}: must be one of {', '.join(_CONTACTS)}")
     if contact != "none" and not keys.get("why"):
         raise ExpectationError(f'contact = "{contact}" needs a reason: why')
-    told = keys.get("told_within_s")
-    if told is not None and not (isinstance(told, int | float) and 0.0 < told <= 60.0):
-        raise ExpectationError(f"told_within_s = {told!r}: must be a number from 0 to 60")
-    return Expectation(then, None if told is None else float(told), contact, keys.get("why", ""))
+    told = keys.get("told_within_s", math.inf)
+    if isinstance(told, bool) or not isinstance(told, int | float) or not told > 0.0:
+        raise ExpectationError(f"told_within_s = {told!r}: must be a time above 0, in seconds")
+    within_s = float(told) if told < math.inf else None
+    return Expectation(then, within_s, contact, keys.get("why", ""))
 
 
 def _words(
@@ -197,8 +198,3 @@ def _allowed(mode: str, action: str, then: tuple[str, ...]) -> bool:
     """Whether an action is one of those; a vehicle that holds or lands already goes on."""
     same = {"hold": ("hold",), "land": ("hold", "land")}.get(mode, ())
     return action in then or (action == "goes on" and any(one in then for one in same))
-
-
-def as_dict(expected: Expectation) -> dict[str, Any]:
-    """For JSON."""
-    return dataclasses.asdict(expected)
