@@ -27,8 +27,8 @@ help: ## show this list
 setup: $(READY) messages/dialect.py ## create .venv with everything in it (nothing to do if nothing changed)
 	@echo "setup: .venv is ready"
 
-run: setup ## set up, then fly the three-wall scenario
-	$(BIN)/pandion fly walls
+run: setup ## set up, then fly the three-wall scenario with motion capture
+	$(BIN)/pandion fly walls --sensors mocap
 
 # One line for a check that passes, all of its output for one that does not.
 define check

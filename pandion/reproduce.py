@@ -17,6 +17,7 @@ from command_line.version import version
 from fsw.log.run_directory import new_run_directory
 from fsw.parameters.control_choice import KNOWN
 from pandion.display import Display
+from sitl.scenario_file import SUITE_NAMES
 from studies.catalogue import STUDIES, study
 
 if TYPE_CHECKING:
@@ -74,6 +75,14 @@ class ReproduceOptions:
         default="lqr",
         old="--inner",
     )
+    suite: str | None = option(
+        "--suite NAME",
+        "robustness: only the rows flown with this suite of sensors",
+        one_of("suite", *SUITE_NAMES),
+    )
+    only: str | None = option(
+        "--only TEXT", "robustness: only the rows with this in their section, case or name"
+    )
     workers: int = option(
         "--workers N",
         "processes; 0 flies in this one (default one a core)",
@@ -97,10 +106,13 @@ def main(argv: list[str]) -> int:
 
     pin_numerics_to_one_thread()  # before NumPy loads
     from studies.drawing import NoMatplotlibError
+    from studies.settings import NoCellError
 
     try:
+        if options.what != "robustness" and (options.suite or options.only):
+            raise NoCellError(f"{options.what} has no rows to choose by --suite or --only")
         return _run(options)
-    except (NoMatplotlibError, OSError) as error:
+    except (NoMatplotlibError, NoCellError, OSError) as error:
         complain("pandion reproduce", error)
         return COULD_NOT_START
 
@@ -142,6 +154,8 @@ def _settings(options: ReproduceOptions) -> Settings:
         seeds=options.seeds,
         duration_s=options.duration_s,
         inner="pid" if options.tracking == "pid" else "tracking",
+        suite=options.suite,
+        only=options.only,
     )
 
 
@@ -152,6 +166,10 @@ def _provenance(options: ReproduceOptions) -> tuple[str, ...]:
     command += f" --seeds {options.seeds.start}:{options.seeds.stop}"
     if options.duration_s is not None:
         command += f" --duration {options.duration_s:g}"
+    if options.suite is not None:
+        command += f" --suite {options.suite}"
+    if options.only is not None:
+        command += f" --only '{options.only}'"
     if options.tracking != "lqr":
         command += f" --tracking {options.tracking}"
     return (f"Command: {command}", f"Pandion {version()}, code {sources()[:12]}")

@@ -80,6 +80,7 @@ def table_rows(result: dict[str, Any], tracking_max_m: float | None) -> Rows:
     """What a flight comes down to, as text; ``tracking_max_m`` is not in the JSON."""
     return [
         ("flown", f"{result['duration_s']:.1f} s"),
+        ("sensors", result["sensors"] or "unknown"),
         *[(f"margin {name}", _mm(value)) for name, value in _shown(result["margins_m"]).items()],
         ("minimum margin", _mm(result["min_margin_m"])),
         *[(f"limit {name.replace('_', ' ')}", _use(use)) for name, use in result["limits"].items()],

@@ -36,13 +36,15 @@ from fsw.signals import (
     TickOutputs,
 )
 from sitl.scenario import Scenario
-from sitl.simulation import STEP_US, Controls, Simulation
+from sitl.simulation import START_US, STEP_US, Controls, Simulation
+from studies.faults import Fault, FaultySensors
 from studies.flight_result import (
     TRACE_STEPS,
     FlightRecorder,
     FlightResult,
     TracePoint,
     processor_time_us,
+    touched,
 )
 from studies.mission import announced, moves, target
 from studies.samples import only_the_time, sample
@@ -164,13 +166,14 @@ def simulate(
     seed: int,
     config: FlightConfig,
     *,
+    fault: Fault | None = None,
     traced: bool = False,
     asked: Callable[[PlanRequest], None] | None = None,
 ) -> FlightResult:
     """Fly a scenario that starts in the air, with a trajectory plan, to its end.
 
-    ``traced`` keeps the truth every TRACE_STEPS steps; ``asked`` receives every request to the
-    planner.
+    A ``fault`` is one of a sensor; ``traced`` keeps the truth every TRACE_STEPS steps; ``asked``
+    receives every request to the planner.
 
     Raises:
         RefusedError: The vehicle refused to arm or to follow.
@@ -179,8 +182,12 @@ def simulate(
     planner = InlinePlanner(Planner(config.planner, config.airframe, processor_time_us))
     loop = ClosedLoop(simulation, Autopilot(config).tick, FlightState(), planner, config.airframe)
     steps_per_plan = config.mpc_period_us // config.tick_period_us
+    faulty, mode = FaultySensors(fault, seed), Mode.TRAJECTORY
     while simulation.ended is None:
-        step, sensors = simulation.step, loop.sense()
+        step, samples = simulation.step, faulty.samples(loop.samples())
+        sensors = loop.sense()
+        exact = simulation.measurements() is None
+        sensors = faulty.frame(sensors) if exact else only_the_time(sensors.t_us, samples)
         answer = planner.take(sensors.t_us)
         if answer is not None:
             recorder.planned(answer)
@@ -190,18 +197,25 @@ def simulate(
             commands=FIRST_COMMANDS[step] if step < len(FIRST_COMMANDS) else (),
             targets=loop.targets(),
             announced=loop.announced(),
-            samples=loop.samples(),
+            samples=samples,
         )
         if traced and step % TRACE_STEPS == 0:
             recorder.trace.append(_trace_point(simulation))
         outputs = loop.step(inputs)
         _insist(outputs)
+        recorder.texts += [(1e-6 * (sensors.t_us - START_US), one.text) for one in outputs.texts]
+        if outputs.snapshot.mode is not mode and step >= len(FIRST_COMMANDS):
+            mode = outputs.snapshot.mode
+            recorder.modes.append(mode.value)
+            # As the scenario's pilot would, who looks on.
+            why = f"the vehicle left the trajectory for {mode.value}"
+            simulation.leave_trajectory(sensors.t_us, why)
         applied = outputs.snapshot.plan_input
         if step % steps_per_plan == 0 and applied is not None:
             recorder.metrics.add(applied)
         if outputs.plan_request is not None and asked is not None:
             asked(outputs.plan_request)
-    return FlightResult(simulation.result(), recorder)
+    return FlightResult(simulation.result(), recorder, touched(simulation.ended))
 
 
 def _trace_point(simulation: Simulation) -> TracePoint:

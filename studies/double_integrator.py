@@ -36,6 +36,7 @@ from studies.flight_result import (
     FlightResult,
     TracePoint,
     processor_time_us,
+    touched,
 )
 from studies.mission import safe_set, target
 
@@ -170,7 +171,7 @@ def simulate(
                 recorder.trace.append(_trace_point(plant))
             if plant.ended is None:
                 plant.advance(u)
-    return FlightResult(plant.result(), recorder)
+    return FlightResult(plant.result(), recorder, touched(plant.ended))
 
 
 def _first_state(scenario: Scenario, p_target: V3) -> PredictionState:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from fsw.control.control_metrics import ControlMetrics
 from fsw.signals import Plan, PlanFailure
-from sitl.result import TruthResult
+from sitl.result import EndKind, EndReason, TruthResult
 from sitl.scenario import V3
 
 TRACE_STEPS = 20  # 40 ms between points of a trace
@@ -16,6 +16,11 @@ TRACE_STEPS = 20  # 40 ms between points of a trace
 def processor_time_us() -> float:
     """Times planning steps: a campaign shares its cores, and that must not show [us]."""
     return time.thread_time() * 1e6
+
+
+def touched(end: EndReason | None) -> bool:
+    """Whether a flight ended at a wall or on the ground."""
+    return end is not None and end.kind in (EndKind.COLLISION, EndKind.CRASH)
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +43,8 @@ class FlightRecorder:
     plans: int = 0
     failures: int = 0  # planning steps without a plan
     trace: list[TracePoint] = field(default_factory=list)  # empty unless asked for
+    texts: list[tuple[float, str]] = field(default_factory=list)  # s, what an operator reads
+    modes: list[str] = field(default_factory=list)  # that the vehicle changed to by itself
 
     def planned(self, answer: Plan | PlanFailure) -> None:
         """Account for one planning step."""
@@ -54,3 +61,4 @@ class FlightResult:
 
     truth: TruthResult
     planner: FlightRecorder
+    contact: bool  # with a wall or the ground

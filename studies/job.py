@@ -17,7 +17,8 @@ from fsw.parameters.flight_config import FlightConfig
 from sitl.result import TruthResult
 from sitl.scenario import EncoderErrors, ImuErrors, PoseErrors, Scenario
 from sitl.sensors.keys import MeasuredSensors
-from studies import closed_loop, double_integrator, mission
+from studies import closed_loop, double_integrator, faults, mission, samples
+from studies.faults import Fault
 from studies.flight_result import FlightResult
 
 PlantName = Literal["double-integrator", "full"]
@@ -31,11 +32,14 @@ class Job:
     scenario: Scenario
     config: FlightConfig
     seed: int
+    fault: Fault | None = None  # of a sensor; of the full plant only
 
     @property
     def random(self) -> bool:
         """Whether the seed changes anything: calm air and exact sensors draw no number."""
         sensors = self.scenario.sensors
+        if self.fault is not None:
+            return True  # the seed chooses when
         if isinstance(sensors, MeasuredSensors):
             return True
         punctual = (
@@ -44,7 +48,8 @@ class Job:
             replace(sensors.encoders, latency_ms=0.0),
         )
         noisy = punctual != (ImuErrors(), PoseErrors(), EncoderErrors())
-        return noisy or any(item.kind != "wind" for item in self.scenario.disturbances)
+        gusts = self.scenario.air.turbulence_m_s > 0.0
+        return noisy or gusts or any(it.kind != "wind" for it in self.scenario.disturbances)
 
     def key(self) -> str:
         """Name of the flight: same flight, same name, in any process, while the code is the same.
@@ -76,19 +81,23 @@ class Outcome:
     tc_p99_us: float = 0.0
     plans: int = 0
     failures: int = 0  # planning steps without a plan
+    contact: bool = False  # with a wall or the ground
+    modes: str = ""  # that the vehicle changed to by itself, in their order
+    reported: str = ""  # the text that names the sensor at fault; empty if there was none
     error: bool = False  # the flight itself broke, not the vehicle
 
 
 def fly_job(job: Job, *, traced: bool = False) -> FlightResult:
     """Fly one job here and now."""
-    plants = {"full": closed_loop.simulate, "double-integrator": double_integrator.simulate}
-    return plants[job.plant](job.scenario, job.seed, job.config, traced=traced)
+    if job.plant == "double-integrator":
+        return double_integrator.simulate(job.scenario, job.seed, job.config, traced=traced)
+    return closed_loop.simulate(job.scenario, job.seed, job.config, fault=job.fault, traced=traced)
 
 
 def outcome(job: Job) -> Outcome:
     """Fly one job; an exception becomes a row with the error."""
     try:
-        return score(job.seed, fly_job(job))
+        return score(job, fly_job(job))
     except Exception as error:
         return broken(job, f"{type(error).__name__}: {error}")
 
@@ -98,13 +107,14 @@ def broken(job: Job, reason: str) -> Outcome:
     return Outcome(job.seed, completed=False, reason=reason, error=True)
 
 
-def score(seed: int, result: FlightResult) -> Outcome:
+def score(job: Job, result: FlightResult) -> Outcome:
     """The row of a flight."""
+    fault = job.fault
     truth, planner = result.truth, result.planner
     steps, totals = np.array(planner.step_us or (0.0,)), planner.metrics.as_json()
     smoothness, effort = totals["control_smoothness"], totals["control_effort"]
     return Outcome(
-        seed=seed,
+        seed=job.seed,
         completed=truth.completed,
         reason=truth.end_reason,
         duration_s=truth.duration_s,
@@ -121,6 +131,9 @@ def score(seed: int, result: FlightResult) -> Outcome:
         tc_p99_us=float(np.quantile(steps, 0.99)),
         plans=planner.plans,
         failures=planner.failures,
+        contact=result.contact,
+        modes=", ".join(planner.modes),
+        reported="" if fault is None else fault.reported(planner.texts, job.seed),
     )
 
 
@@ -133,7 +146,8 @@ def sources() -> str:
     """Digest of the code that decides how a flight goes."""
     folders = [Path(str(package.__file__)).parent for package in (fsw, sitl)]
     files = [path for folder in folders for path in sorted(folder.rglob("*.py"))]
-    files += [Path(str(shell.__file__)) for shell in (closed_loop, double_integrator, mission)]
+    shells = (closed_loop, double_integrator, faults, mission, samples)
+    files += [Path(str(shell.__file__)) for shell in shells]
     digest = hashlib.sha256()
     for path in files:
         digest.update(path.read_bytes())

@@ -19,6 +19,7 @@ def write(
     written = folder / f"{name}.html"
     written.write_text(page(report, settings, provenance), encoding="utf-8")
     (folder / f"{name}-rows.json").write_text(rows_text(report), encoding="utf-8")
+    (folder / f"{name}.md").write_text(markdown(report), encoding="utf-8")
     for figure in report.figures:
         (folder / f"{figure.name}.svg").write_text(figure.svg, encoding="utf-8")
         arrays = json_text(figure.arrays)
@@ -29,6 +30,24 @@ def write(
 def rows_text(report: Report) -> str:
     """The rows as JSON text; a number that does not exist is null."""
     return json_text(report.rows, 1) + "\n"
+
+
+def markdown(report: Report) -> str:
+    """The tables as Markdown, for the documentation."""
+    return "\n".join(
+        "\n".join(
+            (
+                f"### {table.caption}\n",
+                *(
+                    f"| {' | '.join(row)} |"
+                    for row in (table.headers, ("---",) * len(table.headers))
+                ),
+                *(f"| {' | '.join(row)} |" for row in table.rows),
+                "",
+            )
+        )
+        for table in report.tables
+    )
 
 
 def page(report: Report, settings: Settings, provenance: tuple[str, ...]) -> str:

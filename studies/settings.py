@@ -10,6 +10,10 @@ from studies.cases import REPORTING_FROM, TUNING_SEEDS
 from studies.job import PlantName
 
 
+class NoCellError(ValueError):
+    """Nothing of a study has the suite and the name that were asked for."""
+
+
 @dataclass(frozen=True, slots=True)
 class Settings:
     """Which flights a study consists of."""
@@ -18,6 +22,9 @@ class Settings:
     seeds: range = range(REPORTING_FROM, REPORTING_FROM + 20)
     duration_s: float | None = None  # None: as long as the scenario
     inner: Inner = "tracking"
+    # Cells of the study of robustness; None: all.
+    suite: str | None = None  # flown with this one
+    only: str | None = None  # with this in their name
 
     @property
     def tuned_on(self) -> tuple[int, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -39,16 +40,29 @@ class Summary:
     wilson_low: float  # of the distinct flights
     wilson_high: float
     planning_failures: int
+    contacts: int  # flights that ended at a wall or on the ground
+    reported: int  # flights in which a text named the sensor at fault
+    text: str  # the most frequent such text
+    modes: dict[str, int]  # that vehicles changed to by themselves, with the flights that did
 
 
 def fly_cells(
     campaign: Campaign, settings: Settings, cells: Sequence[tuple[Scenario, FlightConfig]]
 ) -> tuple[list[Summary], tuple[str, ...]]:
     """Fly all cells of a table, one job a seed; the second value names flights that broke."""
-    jobs = [
-        [Job(settings.plant, flown, config, seed) for seed in settings.seeds]
-        for flown, config in cells
-    ]
+    return fly_jobs(
+        campaign,
+        [
+            [Job(settings.plant, flown, config, seed) for seed in settings.seeds]
+            for flown, config in cells
+        ],
+    )
+
+
+def fly_jobs(
+    campaign: Campaign, jobs: Sequence[Sequence[Job]]
+) -> tuple[list[Summary], tuple[str, ...]]:
+    """Fly the jobs of each cell; the second value names flights that broke."""
     outcomes = campaign.run([job for cell in jobs for job in cell])
     rows = iter(outcomes)
     summaries = [summarise(cell, [next(rows) for _ in cell]) for cell in jobs]
@@ -66,6 +80,7 @@ def summarise(jobs: Sequence[Job], outcomes: Sequence[Outcome]) -> Summary:
     whole = [row for row in outcomes if not row.error]
     errors = [row.te_m for row in whole if row.te_m is not None]
     margins = [row.margin_m for row in whole if row.margin_m is not None]
+    texts = [row.reported for row in whole if row.reported]
 
     def mean(field: Callable[[Outcome], float]) -> float:
         return float(np.mean([field(row) for row in whole])) if whole else 0.0
@@ -89,6 +104,10 @@ def summarise(jobs: Sequence[Job], outcomes: Sequence[Outcome]) -> Summary:
         wilson_low=float(low),
         wilson_high=float(high),
         planning_failures=sum(row.failures for row in whole),
+        contacts=sum(row.contact for row in whole),
+        reported=len(texts),
+        text=max(texts, key=texts.count, default=""),
+        modes=dict(Counter(row.modes for row in whole if row.modes)),
     )
 
 

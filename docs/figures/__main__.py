@@ -18,9 +18,15 @@ from docs.figures.flight import draw_flight, recorded
 from docs.figures.frames import draw_frames
 
 IMAGES = Path(__file__).parents[1] / "images"
-PICTURED = {"walls": "flight.svg", "branches": "branches.svg"}
+# Scenario and suite of sensors; the first is the flight of `make run`.
+PICTURED = {("walls", "mocap"): "flight.svg", ("branches", "perfect"): "branches.svg"}
 # The flights of the table in README.md; of each, seed 0 and the whole duration.
-FLOWN = ("walls", "walls-calm", "workspace", "workspace-calm", "branches")
+FLOWN = (
+    ("walls", "mocap"),
+    ("workspace", "mocap"),
+    *((name, "perfect") for name in ("walls", "walls-calm", "workspace", "workspace-calm")),
+    ("branches", "perfect"),
+)
 STYLE = {
     "font.family": ["DejaVu Sans", "sans-serif"],
     "font.size": 9.0,
@@ -31,15 +37,14 @@ STYLE = {
 }
 
 
-def fly(scenario: str, directory: Path) -> Path:
-    """Fly a scenario, unless it has been; return the flight's directory."""
-    out = directory / scenario
+def fly(scenario: str, suite: str, directory: Path) -> Path:
+    """Fly a scenario with a suite, unless it has been; return the flight's directory."""
+    out = directory / f"{scenario}-{suite}"
     if not (out / "result.json").exists():
         program = Path(sys.executable).parent / "pandion"
-        print(f"flying {scenario}", flush=True)
-        subprocess.run(
-            [program, "fly", scenario, "--out", out], check=True, stdout=subprocess.DEVNULL
-        )
+        print(f"flying {scenario}, {suite}", flush=True)
+        line = [program, "fly", scenario, "--sensors", suite, "--out", out]
+        subprocess.run(line, check=True, stdout=subprocess.DEVNULL)
     return out
 
 
@@ -49,9 +54,9 @@ def draw_all(flights: Path) -> None:
         draw_architecture(IMAGES / "architecture.svg")
         draw_timing(IMAGES / "timing.svg")
         draw_frames(IMAGES / "frames.svg")
-        for scenario, name in PICTURED.items():
-            draw_flight(fly(scenario, flights), IMAGES / name)
-    numbers = {scenario: recorded(fly(scenario, flights)) for scenario in FLOWN}
+        for flown, name in PICTURED.items():
+            draw_flight(fly(*flown, flights), IMAGES / name)
+    numbers = [recorded(fly(*flown, flights)) for flown in FLOWN]
     text = json.dumps(numbers, indent=2)
     (IMAGES / "flights.json").write_text(f"{text}\n", encoding="utf-8")
 

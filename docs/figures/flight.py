@@ -25,6 +25,8 @@ def recorded(directory: Path) -> dict[str, Any]:
     """The numbers of a flight that pages and pictures print."""
     result = json.loads((directory / "result.json").read_text(encoding="utf-8"))
     return {
+        "scenario": result["scenario"],
+        "sensors": result["sensors"],
         "seed": result["seed"],
         "duration_s": result["duration_s"],
         "completed": result["completed"],
@@ -36,14 +38,15 @@ def recorded(directory: Path) -> dict[str, Any]:
 def draw_flight(directory: Path, target: Path) -> None:
     """Draw the flight of a run directory."""
     numbers = recorded(directory)
-    name = json.loads((directory / "result.json").read_text(encoding="utf-8"))["scenario"]
+    name = numbers["scenario"]
     log = ULog(str(directory / "flight.ulg"))
     figure, (above, over_time) = plt.subplots(
         1, 2, figsize=(10.0, 4.6), width_ratios=(1.0, 1.15), layout="constrained"
     )
     done = "completed" if numbers["completed"] else "not completed"
     figure.suptitle(
-        f"pandion fly {name} --seed {numbers['seed']}: {done}, {numbers['duration_s']:.0f} s, "
+        f"pandion fly {name} --sensors {numbers['sensors']} --seed {numbers['seed']}: {done}, "
+        f"{numbers['duration_s']:.0f} s, "
         f"tracking error {numbers['tracking_error_rms_mm']:.1f} mm RMS, "
         f"minimum margin {numbers['min_margin_mm']:.1f} mm",
         fontsize=10.0,

@@ -17,7 +17,7 @@ from fsw.compiled import compilable, compiled, machine_code
 from fsw.estimation.estimator import estimate_state
 from fsw.estimation.sensor_fault import Sensor, SensorFault
 from fsw.geometry.quaternion import conjugate, multiply, normalised, rotation_vector, turned
-from fsw.geometry.rotation import matrix_from_quaternion, quaternion_from_matrix, rotate
+from fsw.geometry.rotation import matrix_from_quaternion, quaternion_from_matrix, rotate, yaw_of
 from fsw.model.airframe import GRAVITY
 from fsw.signals import Mat3, SensorFrame, StateEstimate, Vec2, Vec3, Vec4
 
@@ -114,23 +114,24 @@ def unbelievable(
     arm0: Vec2,
     rates0: Vec2,
     dt: float,
-) -> tuple[int, int]:
+) -> tuple[int, int, Mat3, float]:
     """Parts that cannot be, and those that are too far from the last estimate, ``dt`` [s] older.
+
+    Beside them the attitude's rotation [1, body to NED] and its yaw [rad].
 
     Readings ``p`` [m, NED], ``v`` [m/s, NED], ``q`` [1], ``w`` [rad/s, FRD], ``f`` [m/s^2, FRD],
     ``arm`` [rad], ``rates`` [rad/s]; of the estimate ``p0`` [m, NED], ``v0`` [m/s, NED], ``R0`` [1,
     body to NED], ``w0`` [rad/s, FRD], ``f0`` [m/s^2, along -z of the body], ``arm0`` [rad] and
     ``rates0`` [rad/s].
     """  # fmt: skip
-    never, far = 0, 0
+    never, far, R = 0, 0, matrix_from_quaternion(q)
     norm2 = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]
     place = max(abs(p[0]), abs(p[1]), abs(p[2]))
     speed = max(abs(v[0]), abs(v[1]), abs(v[2]))
     finite = math.isfinite(p[0] + p[1] + p[2] + v[0] + v[1] + v[2] + norm2)
     if not (finite and 0.5 < norm2 < 2.0 and place < _PLACE_LIMIT and speed < _SPEED_LIMIT):
-        never |= 1
+        never |= POSE
     else:
-        R = matrix_from_quaternion(q)
         trace = 0.0
         for i in range(9):
             trace += R[i] * R0[i]
@@ -143,31 +144,31 @@ def unbelievable(
         apart = 0.5 * (trace - 1.0) < math.cos(min(turn, math.pi))
         room = _PLACE_JUMP + 0.5 * _STRONGEST * dt * dt
         if jump > room or change > _SPEED_JUMP + _STRONGEST * dt or apart:
-            far |= 1
+            far |= POSE
     rate = max(abs(w[0]), abs(w[1]), abs(w[2]))
     finite = math.isfinite(w[0] + w[1] + w[2] + f[2])
     if not (finite and rate < _RATE_LIMIT and abs(f[2]) < _FORCE_LIMIT):
-        never |= 2
+        never |= INERTIAL
     else:
         change = max(abs(w[0] - w0[0]), abs(w[1] - w0[1]), abs(w[2] - w0[2]))
         if change > _RATE_JUMP + _QUICKEST * dt or abs(-f[2] - f0) > _FORCE_JUMP:
-            far |= 2
+            far |= INERTIAL
     finite = math.isfinite(arm[0] + arm[1] + rates[0] + rates[1])
     if not (finite and max(abs(rates[0]), abs(rates[1])) < _RATE_LIMIT):
-        never |= 4
+        never |= JOINTS
     else:
         jump = max(abs(arm[0] - arm0[0] - dt * rates0[0]), abs(arm[1] - arm0[1] - dt * rates0[1]))
         change = max(abs(rates[0] - rates0[0]), abs(rates[1] - rates0[1]))
         if jump > _JOINT_JUMP + 10.0 * dt or change > _JOINT_RATE_JUMP:
-            far |= 4
-    return never, far
+            far |= JOINTS
+    return never, far, R, yaw_of(R)
 
 
 _unbelievable = compiled(unbelievable)
 
 
 @cache
-def _machine_code() -> Callable[..., tuple[int, int]]:
+def _machine_code() -> Callable[..., tuple[int, int, Mat3, float]]:
     """``unbelievable``, compiled when it is first wanted."""
     none, arm, level = (0.0, 0.0, 0.0), (0.0, 0.0), (1.0, 0.0, 0.0, 0.0)
     R = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
@@ -183,17 +184,15 @@ def believed(
     ``arm_acceleration`` tells what the torques make of the joints [rad/s^2], where it is needed.
     """
     dt = min(max(1e-6 * (s.t_us - x.t_us), 0.0), _LONGEST)
-    read = s.p_WB, s.v_WB, s.q_WB, s.gyro_B, s.accel_B, s.q_arm, s.qd_arm
-    last = x.p_WB, x.v_WB, x.R_WB, x.w_WB_B, x.specific_force, x.q_arm, x.qd_arm
-    never, far = _machine_code()(*read, *last, dt)
+    p, v, w, q, qd, force = s.p_WB, s.v_WB, s.gyro_B, s.q_arm, s.qd_arm, s.accel_B
+    _, p0, v0, R0, w0, _, q0, qd0, force0 = x
+    never, far, R, yaw = _machine_code()(
+        p, v, s.q_WB, w, force, q, qd, p0, v0, R0, w0, force0, q0, qd0, dt
+    )
     known = trust.last
-    stuck = 0
-    if known is not None:
-        stuck = _repeating(s, known)
-    if not (never or far or stuck or trust.doubted or trust.returned_us):
-        found = estimate_state(s)
-        assert found is not None
-        return FrameTrust(s), found
+    stuck = 0 if known is None else _repeating(s, known)
+    if not (never or far or stuck or trust.returned_us or trust.doubted):
+        return FrameTrust(s), StateEstimate(s.t_us, p, v, R, w, yaw, q, qd, -force[2])
     olds = trust.pose, trust.inertial, trust.joints
     pose, inertial, joints = [
         _part(old, s.t_us, bool(never & bit), bool(far & bit), bool(stuck & bit), k)

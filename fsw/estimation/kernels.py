@@ -41,10 +41,59 @@ Present = tuple[Vec3, Vec3, Mat3, Vec3, float, Vec2, Vec2, float]
 """All of a StateEstimate but its time, in its order."""
 
 
+# What ``tick`` does, in this order.
+COPY, JOINTS, READING, END = 1, 2, 4, 8
+
+
 @kernel
-def _begin_tick(old: Filter, new: Filter, dt: float, u: Vec2) -> None:
-    """Copy the filter, so that a tick leaves its inputs as they were, and move its joints on."""
-    a, b = old[0], new[0]
+def _tick(
+    old: Filter,
+    new: Filter,
+    law: Law,
+    parts: int,
+    times: Vec3,
+    u: Vec2,
+    encoders: Vec3,
+    time: float,
+    f: Vec3,
+    w: Vec3,
+) -> tuple[int, Present]:
+    """Those ``parts`` of a tick that are due; what is wrong with the reading, and the present.
+
+    ``COPY`` the filter, so that a tick leaves its inputs as they were, and move its joints on;
+    take in ``encoders``, two angles and their age; take in a reading of the IMU, of its ``time``;
+    predict up to the horizon and from there the present. ``times``: now, the tick's length, and the
+    horizon.
+    """
+    now, dt, until = times
+    if parts & COPY:
+        _copy(old[0], new[0])
+        for i in range(2):
+            row = new[0].joints[i]
+            _keep_joint(row, predicted(JointState(row[0], row[1], row[2]), u[i], dt))
+    if parts & JOINTS:
+        g = law[0].joint_gain
+        for i in range(2):
+            row = new[0].joints[i]
+            joint = JointState(row[0], row[1], row[2])
+            _keep_joint(row, corrected(joint, encoders[i], encoders[2], (g[0], g[1], g[2])))
+    fault = 0
+    if parts & READING:
+        fault = imu.add_imu(new[0], law[0].tuning, now, time, f, w)
+    arm = new[0].joints
+    if parts & END:
+        advance(new[0], law[0].tuning, until)
+        p, v, q, rate, force = present(new[0], now)
+    else:
+        none = (0.0, 0.0, 0.0)
+        p, v, q, rate, force = none, none, (1.0, 0.0, 0.0, 0.0), none, none
+    R = matrix_from_quaternion(q)
+    angles, rates = (arm[0, 0], arm[1, 0]), (arm[0, 1], arm[1, 1])
+    return fault, (p, v, R, rate, yaw_of(R), angles, rates, -force[2])
+
+
+@compilable
+def _copy(a: Any, b: Any) -> None:
     b.time, b.baro_bias, b.pose_delay = a.time, a.baro_bias, a.pose_delay
     b.first, b.end, b.same, b.unlike, b.lost = a.first, a.end, a.same, a.unlike, a.lost
     for i in range(3):
@@ -62,23 +111,13 @@ def _begin_tick(old: Filter, new: Filter, dt: float, u: Vec2) -> None:
         for i in range(COLUMNS):
             b.imu[k % IMU_CAPACITY, i] = a.imu[k % IMU_CAPACITY, i]
     for i in range(2):
-        angle, rate, disturbance = a.joints[i, 0], a.joints[i, 1], a.joints[i, 2]
-        _keep_joint(b.joints[i], predicted(JointState(angle, rate, disturbance), u[i], dt))
+        for j in range(3):
+            b.joints[i, j] = a.joints[i, j]
 
 
 @compilable
 def _keep_joint(row: Array, joint: JointState) -> None:
     row[0], row[1], row[2] = joint.angle, joint.rate, joint.disturbance
-
-
-@kernel
-def _read_joints(x: Filter, law: Law, angles: Vec2, age: float) -> None:
-    """Take in a reading of the encoders."""
-    g = law[0].joint_gain
-    for i in range(2):
-        row = x[0].joints[i]
-        joint = JointState(row[0], row[1], row[2])
-        _keep_joint(row, corrected(joint, angles[i], age, (g[0], g[1], g[2])))
 
 
 @kernel
@@ -89,34 +128,10 @@ def _set_joints(x: Filter, angles: Vec2) -> None:
 
 
 @kernel
-def _add_imu(x: Filter, law: Law, now: float, time: float, f: Vec3, w: Vec3) -> int:
-    return imu.add_imu(x[0], law[0].tuning, now, time, f, w)
-
-
-@kernel
 def _advance(x: Filter, law: Law, until: float) -> float:
     """Predict up to ``until``; returns the state's time."""
     advance(x[0], law[0].tuning, until)
     return float(x[0].time)
-
-
-@kernel
-def _end_tick(x: Filter, law: Law, until: float, now: float) -> Present:
-    """Predict the filter up to ``until`` and from there the present."""
-    advance(x[0], law[0].tuning, until)
-    p, v, q, w, f = present(x[0], now)
-    R = matrix_from_quaternion(q)
-    arm = x[0].joints
-    return (
-        p,
-        v,
-        R,
-        w,
-        yaw_of(R),
-        (arm[0, 0], arm[1, 0]),
-        (arm[0, 1], arm[1, 1]),
-        -f[2],
-    )
 
 
 @kernel
@@ -260,7 +275,7 @@ def _fuse_range(x: Filter, law: Law, time: float, measured: float, variance: flo
 
 @kernel
 def _present_covariance(x: Filter, law: Law, now: float, M: Array) -> None:
-    """The covariance (17, 17) of what ``_end_tick`` returned."""
+    """The covariance (17, 17) of the present that ``_tick`` returned."""
     s, t = x[0], law[0].tuning
     for i in range(ERRORS):
         for j in range(ERRORS):
@@ -284,12 +299,9 @@ def _present_covariance(x: Filter, law: Law, now: float, M: Array) -> None:
             time = end
 
 
-begin_tick = of_fixed_types(_begin_tick)
-read_joints = of_fixed_types(_read_joints)
+tick = of_fixed_types(_tick)
 set_joints = of_fixed_types(_set_joints)
-add_imu = of_fixed_types(_add_imu)
 advance_to = of_fixed_types(_advance)
-end_tick = of_fixed_types(_end_tick)
 begin = of_fixed_types(_begin)
 couple_level = of_fixed_types(_couple_level)
 set_place = of_fixed_types(_set_place)

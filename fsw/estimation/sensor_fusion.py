@@ -41,6 +41,7 @@ from fsw.signals import StateEstimate, Vec2, Vec3, Vec4
 LATE: Final = 0.01  # s behind the filter, where a measurement is still fused as it stands
 _MARGIN: Final = 0.003  # s, by which a measurement may take longer than lately
 _LONGEST_STEP: Final = 0.05  # s, by which joints are predicted at once
+_FLOATS: Final = FILTER.itemsize // 8  # that a filter has room for
 _REST: Vec3 = (0.0, 0.0, 0.0)
 _NO_TURN: Vec4 = (1.0, 0.0, 0.0, 0.0)
 
@@ -74,7 +75,12 @@ class EncoderWatch(NamedTuple):
 class FusionMemory(NamedTuple):
     """What the estimator carries from tick to tick."""
 
+    # What every tick renews; the rest is as it was in most of them.
     numbers: Filter
+    now: float = -1.0  # s, of the last tick; negative: there was none
+    imu_came: float = -1.0  # s, when a reading came last; negative: never
+    joints_came: float = -1.0
+    encoders: EncoderWatch = EncoderWatch()
     started: bool = False
     waiting: tuple[Waiting, ...] = ()
     arrivals: int = 0
@@ -82,12 +88,8 @@ class FusionMemory(NamedTuple):
     field: Vec3 | None = None  # Gauss, body, the last one
     reset_counter: int | None = None  # of the last pose
     reset: Reset = Reset()
-    now: float = -1.0  # s, of the last tick; negative: there was none
-    imu_came: float = -1.0  # s, when a reading came last; negative: never
-    joints_came: float = -1.0
     gnss: GnssSample | None = None  # the newest one
     delay: float = 0.0  # s, that measurements have lately taken
-    encoders: EncoderWatch = EncoderWatch()
 
     def of(self, sensor: Sensor) -> Health:
         """What is known of a sensor."""
@@ -104,8 +106,16 @@ class FusionMemory(NamedTuple):
 
     def noting(self, health: Health) -> FusionMemory:
         """The memory with the health of one sensor renewed."""
-        others = [one for one in self.health if one.sensor is not health.sensor]
-        return self._replace(health=(*others, health))
+        return self._replace(health=(*self.without(health.sensor), health))
+
+    def without(self, sensor: Sensor) -> list[Health]:
+        """What is known of the other sensors."""
+        return [one for one in self.health if one.sensor is not sensor]
+
+    def watching(self, encoders: EncoderWatch) -> FusionMemory:
+        """The memory with a newer watch of the encoders."""
+        x, now, imu_came, joints_came = self[:4]
+        return FusionMemory(x, now, imu_came, joints_came, encoders, *self[5:])
 
     def jumped(
         self, position: Vec3 = _REST, velocity: Vec3 = _REST, turn: Vec4 = _NO_TURN
@@ -122,13 +132,110 @@ def at_start() -> FusionMemory:
     return FusionMemory(np.zeros(1, dtype=FILTER))
 
 
+class _Tick:
+    """One tick of the filter; what is asked of it is done at once, in one call where it can be."""
+
+    __slots__ = (
+        "_dt",
+        "_encoders",
+        "_force",
+        "_fusion",
+        "_now",
+        "_parts",
+        "_rate",
+        "_time",
+        "_u",
+        "_x",
+        "imu_came",
+        "joints_came",
+        "memory",
+    )
+
+    def __init__(self, fusion: SensorFusion, memory: FusionMemory, now: float, u: Vec2) -> None:
+        self.memory = memory
+        self.imu_came, self.joints_came = memory.imu_came, memory.joints_came
+        self._fusion, self._now, self._u = fusion, now, u
+        self._dt = min(max(now - memory.now, 0.0), _LONGEST_STEP) if memory.now >= 0.0 else 0.0
+        # Eight times as fast as an empty array of records.
+        self._x = np.ndarray(1, FILTER, np.empty(_FLOATS))
+        self._parts = kernels.COPY
+        self._encoders = self._force = self._rate = _REST
+        self._time = 0.0
+
+    def take_imu(self, sample: ImuSample) -> None:
+        """Take in a reading of the IMU."""
+        if self._parts & kernels.READING:
+            self.run()
+        self._parts |= kernels.READING
+        self._time, self._force, self._rate = sample.time, sample.acceleration, sample.rate
+        self.imu_came = self._now
+
+    def take_joints(self, sample: JointSample) -> None:
+        """Take in a reading of the encoders."""
+        (first, second), now = sample.angles, self._now
+        if not (max(abs(first), abs(second)) < math.pi and sample.time <= now + TIME_TOLERANCE):
+            health = self.memory.of(Sensor.ENCODERS).with_fault(SensorFault.IMPLAUSIBLE, now)
+            self.memory = self.memory.noting(health)
+        elif self.joints_came < 0.0:
+            kernels.set_joints(self.run().numbers, sample.angles)
+            self.joints_came = now
+        else:
+            if self._parts & kernels.JOINTS:
+                self.run()
+            self._parts |= kernels.JOINTS
+            self._encoders = first, second, now - sample.time
+            self.joints_came = now
+
+    def take(self, sample: Aiding) -> None:
+        """Take in any other sample."""
+        if self._parts & kernels.READING:
+            self.run()
+        self.memory = self._fusion.take(self.memory, sample, self._now)
+
+    def run(self) -> FusionMemory:
+        """Do what was asked for; the memory then has a filter of its own."""
+        if self._parts:
+            self._call(0, self._now)
+            self.memory = self.memory._replace(numbers=self._x)
+        return self.memory
+
+    def end(self, until: float) -> kernels.Present:
+        """Predict the filter up to ``until`` [s] and from there the present."""
+        return self._call(kernels.END, until)
+
+    def memory_after(self) -> FusionMemory:
+        """The memory after the tick."""
+        self.run()
+        return FusionMemory(self._x, self._now, self.imu_came, self.joints_came, *self.memory[4:])
+
+    def _call(self, more: int, until: float) -> kernels.Present:
+        parts, self._parts = self._parts | more, 0
+        x = self._x
+        fault, known = kernels.tick(
+            self.memory.numbers if parts & kernels.COPY else x,
+            x,
+            self._fusion.law,
+            parts,
+            (self._now, self._dt, until),
+            self._u,
+            self._encoders,
+            self._time,
+            self._force,
+            self._rate,
+        )
+        if fault:
+            health = self.memory.of(Sensor.IMU).with_fault(SensorFault(fault), self._now)
+            self.memory = self.memory.noting(health)
+        return known
+
+
 class SensorFusion:
     """The estimator of one configuration; holds only what never changes in flight."""
 
     def __init__(self, tuning: EstimatorTuning, tick: float) -> None:
         """Design the joints' filter for a ``tick`` [s]."""
         self.tuning = tuning
-        self._law = packed(EstimatorLaw(tuning, joint_gain(tuning, tick)))
+        self.law = packed(EstimatorLaw(tuning, joint_gain(tuning, tick)))
         self._least_p = tuning.position_floor**2
         self._least_q = tuning.attitude_floor**2
         self._fuse: dict[type, Callable[[FusionMemory, Any], tuple[float, ...]]] = {
@@ -164,59 +271,34 @@ class SensorFusion:
         ``joint_acceleration`` [rad/s^2, joints] is what the torques make of the arm. None before
         there was a pose, or a position and a heading, to start from, and a reading of the arm.
         """
-        memory = self._copied(memory, now, joint_acceleration)
+        tick = _Tick(self, memory, now, joint_acceleration)
         for sample in samples:
             kind = type(sample)
             if kind is ImuSample:
-                memory = self._take_imu(memory, sample, now)  # type: ignore[arg-type]
+                tick.take_imu(sample)  # type: ignore[arg-type]
             elif kind is JointSample:
-                memory = self._take_joints(memory, sample, now)  # type: ignore[arg-type]
+                tick.take_joints(sample)  # type: ignore[arg-type]
             else:
-                memory = self._take(memory, sample, now)  # type: ignore[arg-type]
-        until = now - memory.delay - _MARGIN
+                tick.take(sample)  # type: ignore[arg-type]
+        memory = tick.memory
         if not memory.started:
-            memory = self._start(memory)
-        if not memory.started or memory.joints_came < 0.0:
-            return memory, None
+            memory = tick.memory = self._start(tick.run())
+        if not memory.started or tick.joints_came < 0.0:
+            return tick.memory_after(), None
+        until = now - memory.delay - _MARGIN
         if memory.waiting and memory.waiting[0].time <= until:
-            memory = self._fuse_due(memory, until, now)
-        known = kernels.end_tick(memory.numbers, self._law, until, now)
-        return memory, StateEstimate(round(1e6 * now), *known)
+            tick.memory = self._fuse_due(tick.run(), until, now)
+        known = tick.end(until)
+        return tick.memory_after(), StateEstimate(round(1e6 * now), *known)
 
     def covariance(self, memory: FusionMemory, now: float) -> Array:
         """Covariance (17, 17) [SI] of the error of the state at ``now`` [s]."""
         found = np.empty((ERRORS, ERRORS))
-        kernels.present_covariance(memory.numbers, self._law, now, found)
+        kernels.present_covariance(memory.numbers, self.law, now, found)
         return found
 
-    def _copied(self, memory: FusionMemory, now: float, u: Vec2) -> FusionMemory:
-        """The memory with a filter of its own, whose joints are moved on."""
-        x = np.empty(1, dtype=FILTER)
-        dt = min(max(now - memory.now, 0.0), _LONGEST_STEP) if memory.now >= 0.0 else 0.0
-        kernels.begin_tick(memory.numbers, x, dt, u)
-        return memory._replace(numbers=x, now=now)
-
-    def _take_imu(self, memory: FusionMemory, sample: ImuSample, now: float) -> FusionMemory:
-        reading = sample.time, sample.acceleration, sample.rate
-        fault = kernels.add_imu(memory.numbers, self._law, now, *reading)
-        if fault:
-            health = memory.of(Sensor.IMU).with_fault(SensorFault(fault), now)
-            memory = memory.noting(health)
-        return memory._replace(imu_came=now)
-
-    def _take_joints(self, memory: FusionMemory, sample: JointSample, now: float) -> FusionMemory:
-        farthest = max(abs(sample.angles[0]), abs(sample.angles[1]))
-        if not (farthest < math.pi and sample.time <= now + TIME_TOLERANCE):
-            health = memory.of(Sensor.ENCODERS).with_fault(SensorFault.IMPLAUSIBLE, now)
-            return memory.noting(health)
-        if memory.joints_came < 0.0:
-            kernels.set_joints(memory.numbers, sample.angles)
-        else:
-            kernels.read_joints(memory.numbers, self._law, sample.angles, now - sample.time)
-        return memory._replace(joints_came=now)
-
-    def _take(self, memory: FusionMemory, sample: Aiding, now: float) -> FusionMemory:
-        """Check a sample and let it wait for its time."""
+    def take(self, memory: FusionMemory, sample: Aiding, now: float) -> FusionMemory:
+        """Check a ``sample`` that came at ``now`` [s] and let it wait for its time."""
         x = memory.numbers
         still = bool(x["same"][0] >= STUCK_READINGS)
         before = memory.of(SENSOR_OF[type(sample)])
@@ -227,22 +309,30 @@ class SensorFusion:
         if not fault and memory.started and time < x["time"][0] - LATE:
             fault = SensorFault.TOO_OLD
             health = health.with_fault(fault, now)
+        delay = memory.delay
         if fault in (SensorFault.NONE, SensorFault.TOO_OLD):
-            memory = self._with_delay(memory, now - time, now - before.came)
-        memory = memory.noting(health)
+            delay = self._delay(delay, now - time, now - before.came)
+        others = memory.without(health.sensor)
         if fault:
-            return memory
-        if isinstance(sample, GnssSample):
-            memory = memory._replace(gnss=sample)
+            return memory._replace(health=(*others, health), delay=delay)
         waiting = (*memory.waiting, Waiting(time, memory.arrivals, sample))
         if len(waiting) > 1 and waiting[-2].time > time:
             waiting = tuple(sorted(waiting))
-        return memory._replace(waiting=waiting, arrivals=memory.arrivals + 1)
+        return memory._replace(
+            health=(*others, health),
+            delay=delay,
+            gnss=sample if isinstance(sample, GnssSample) else memory.gnss,
+            waiting=waiting,
+            arrivals=memory.arrivals + 1,
+        )
 
-    def _with_delay(self, memory: FusionMemory, delay: float, apart: float) -> FusionMemory:
-        """The memory after a measurement took so long, ``apart`` [s] from its sensor's last one."""
-        faded = memory.delay - self.tuning.delay_decay * min(apart, 1.0)
-        return memory._replace(delay=min(max(delay, faded), self.tuning.longest_delay))
+    def _delay(self, before: float, delay: float, apart: float) -> float:
+        """How long measurements take, after one did so, ``apart`` [s] from its sensor's last one.
+
+        ``before`` [s] and ``delay`` [s].
+        """
+        faded = before - self.tuning.delay_decay * min(apart, 1.0)
+        return min(max(delay, faded), self.tuning.longest_delay)
 
     def _start(self, memory: FusionMemory) -> FusionMemory:
         """Start from the newest pose; else from a GNSS position, gravity and the compass."""
@@ -273,7 +363,7 @@ class SensorFusion:
                     believable(sample.position_variance, self._least_p),
                     (tilt, tilt, self.tuning.heading**2),
                 )
-                kernels.couple_level(memory.numbers, self._law)
+                kernels.couple_level(memory.numbers, self.law)
                 break
         else:
             return memory._replace(waiting=())
@@ -289,14 +379,14 @@ class SensorFusion:
     ) -> None:
         slow = self.tuning.velocity**2
         variances = p_variance, (slow, slow, slow), q_variance
-        kernels.begin(memory.numbers, self._law, time, *state, *variances)
+        kernels.begin(memory.numbers, self.law, time, *state, *variances)
 
     def _fuse_due(self, memory: FusionMemory, until: float, now: float) -> FusionMemory:
         """Fuse every waiting sample that the filter has reached."""
         waiting = memory.waiting
         while waiting and waiting[0].time <= until:
             one, waiting = waiting[0], waiting[1:]
-            kernels.advance_to(memory.numbers, self._law, one.time)
+            kernels.advance_to(memory.numbers, self.law, one.time)
             memory = self._fuse_one(memory, one, now)
         return memory._replace(waiting=waiting)
 
@@ -322,7 +412,7 @@ class SensorFusion:
 
     def _reset(self, memory: FusionMemory, one: Waiting, ratio: tuple[float, ...]) -> FusionMemory:
         """Take what the gate refused for long as it is."""
-        x, law, sample = memory.numbers, self._law, one.sample
+        x, law, sample = memory.numbers, self.law, one.sample
         place, velocity, turn = _REST, _REST, _NO_TURN
         if isinstance(sample, PoseSample):
             variance = believable(sample.position_variance, self._least_p)
@@ -349,7 +439,7 @@ class SensorFusion:
     def _fuse_pose(self, memory: FusionMemory, sample: PoseSample) -> tuple[float, ...]:
         return kernels.fuse_pose(
             memory.numbers,
-            self._law,
+            self.law,
             sample.time,
             sample.position,
             normalised(sample.attitude),
@@ -360,7 +450,7 @@ class SensorFusion:
     def _fuse_gnss(self, memory: FusionMemory, sample: GnssSample) -> tuple[float, ...]:
         return kernels.fuse_gnss(
             memory.numbers,
-            self._law,
+            self.law,
             sample.time,
             sample.position,
             sample.velocity,
@@ -371,18 +461,16 @@ class SensorFusion:
     def _fuse_pressure(self, memory: FusionMemory, sample: PressureSample) -> tuple[float, ...]:
         variance = max(sample.variance, self._least_p)
         return (
-            kernels.fuse_pressure(
-                memory.numbers, self._law, sample.time, sample.altitude, variance
-            ),
+            kernels.fuse_pressure(memory.numbers, self.law, sample.time, sample.altitude, variance),
         )
 
     def _fuse_heading(self, memory: FusionMemory, sample: MagneticSample) -> tuple[float, ...]:
-        return (kernels.fuse_heading(memory.numbers, self._law, sample.time, sample.field),)
+        return (kernels.fuse_heading(memory.numbers, self.law, sample.time, sample.field),)
 
     def _fuse_range(self, memory: FusionMemory, sample: RangeSample) -> tuple[float, ...]:
         variance = max(sample.variance, self._least_p)
         return (
-            kernels.fuse_range(memory.numbers, self._law, sample.time, sample.distance, variance),
+            kernels.fuse_range(memory.numbers, self.law, sample.time, sample.distance, variance),
         )
 
 

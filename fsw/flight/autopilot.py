@@ -113,11 +113,11 @@ class Autopilot:
         """Everything the vehicle does at one instant: the next state, and everything it says."""
         now_us = inputs.sensors.t_us
         texts: list[StatusText] = []
-        fusion = state.fusion
+        fusion, trust = state.fusion, state.trust
         if inputs.samples or fusion is not None:
             state, fusion, estimate = self._sensed.estimate(state, inputs, texts)
         else:
-            state, estimate = self._exact.estimate(state, inputs, texts)
+            state, trust, estimate = self._exact.estimate(state, inputs, texts)
         state = self._receive(state, inputs, texts)
         if estimate is None:
             return state, _blind(inputs, texts)
@@ -177,7 +177,7 @@ class Autopilot:
             fusion,
             state.estimator,
             state.aiding,
-            state.trust,
+            trust,
         )
         snapshot = _snapshot(state, estimate, u, inputs)
         return state, TickOutputs(

@@ -31,6 +31,10 @@ _KNOWN_SPEED: Final = 0.5  # m/s
 _KNOWN_PLACE: Final = 0.5  # m, in dead reckoning
 _AIDS_PLACE: Final = (Sensor.POSE, Sensor.GNSS)
 _UPPER: Final = np.triu_indices(6)
+_POSE: Final = np.ix_([P, P + 1, P + 2, TH, TH + 1, TH + 2], [P, P + 1, P + 2, TH, TH + 1, TH + 2])
+_MOTION: Final = np.ix_(
+    [V, V + 1, V + 2, BG, BG + 1, BG + 2], [V, V + 1, V + 2, BG, BG + 1, BG + 2]
+)
 
 
 def unaided(memory: FusionMemory, now: float) -> float:
@@ -136,17 +140,15 @@ def _flags(M: Array, sensors: tuple[SensorReport, ...], *, aided: bool) -> int:
 
 
 def _pose(M: Array) -> tuple[float, ...]:
-    rows = [P, P + 1, P + 2, TH, TH + 1, TH + 2]
-    return tuple(M[np.ix_(rows, rows)][_UPPER].tolist())
+    return tuple(M[_POSE][_UPPER].tolist())
 
 
 def _motion(M: Array, estimate: StateEstimate) -> tuple[float, ...]:
     """Velocity in body axes, and rates, of which the error is the gyro's bias."""
     R = np.reshape(estimate.R_WB, (3, 3))
-    rows = [V, V + 1, V + 2, BG, BG + 1, BG + 2]
     turn = np.eye(6)
     turn[:3, :3] = R.T
-    return tuple((turn @ M[np.ix_(rows, rows)] @ turn.T)[_UPPER].tolist())
+    return tuple((turn @ M[_MOTION] @ turn.T)[_UPPER].tolist())
 
 
 def _three(row: Array) -> Vec3:

@@ -31,25 +31,29 @@ class ExactState:
 
     def estimate(
         self, state: FlightState, inputs: TickInputs, texts: list[StatusText]
-    ) -> tuple[FlightState, StateEstimate | None]:
-        """The estimate of this tick, or the last one while there is none; appends to ``texts``."""
-        sensors, before = inputs.sensors, state.estimate
+    ) -> tuple[FlightState, FrameTrust, StateEstimate | None]:
+        """The estimate of this tick, or the last one while there is none; appends to ``texts``.
+
+        What is believed from now on is not in the state yet, but beside it: to put it there would
+        take as long as all of this.
+        """
+        sensors, before, trust = inputs.sensors, state.estimate, state.trust
         if before is not None and state.vehicle.flies and not inputs.stale_us:
             return self._in_flight(state, before, inputs, texts)
-        if before is not None and state.trust.doubted and state.vehicle.flies:
-            return state, moved_on(before, 1e-6 * (sensors.t_us - before.t_us))._replace(
-                t_us=sensors.t_us
-            )
+        if before is not None and trust.doubted and state.vehicle.flies:
+            moved = moved_on(before, 1e-6 * (sensors.t_us - before.t_us))
+            return state, trust, moved._replace(t_us=sensors.t_us)
         valid = estimate_state(sensors)
         if valid is None:
             # Telemetry goes by its time, and goes on.
             last = None if before is None else before._replace(t_us=sensors.t_us)
-            return replace(state, invalid_ticks=state.invalid_ticks + 1), last
+            return replace(state, invalid_ticks=state.invalid_ticks + 1), trust, last
         if inputs.stale_us:
             valid = moved_on(valid, 1e-6 * inputs.stale_us)
-        elif state.trust.last is not None:
-            state = replace(state, trust=FrameTrust(), aiding=AIDED)
-        return (replace(state, invalid_ticks=0) if state.invalid_ticks else state), valid
+        elif trust.last is not None:
+            trust = FrameTrust()
+            state = replace(state, aiding=AIDED)
+        return (replace(state, invalid_ticks=0) if state.invalid_ticks else state), trust, valid
 
     def _in_flight(
         self,
@@ -57,13 +61,15 @@ class ExactState:
         before: StateEstimate,
         inputs: TickInputs,
         texts: list[StatusText],
-    ) -> tuple[FlightState, StateEstimate]:
+    ) -> tuple[FlightState, FrameTrust, StateEstimate]:
         joints = partial(self._cascade.joint_acceleration, state.cascade, before)
         trust, found = believed(state.trust, inputs.sensors, before, joints)
         aiding = _aiding(trust, found.t_us) if trust.doubted else AIDED
         if trust.returned_us:
             state = returned(state, found, before, texts)
-        return replace(state, trust=trust, aiding=aiding, invalid_ticks=0), found
+        if aiding is not state.aiding or state.invalid_ticks:
+            state = replace(state, aiding=aiding, trust=trust, invalid_ticks=0)
+        return state, trust, found
 
 
 def _aiding(trust: FrameTrust, now_us: int) -> Aiding:

@@ -56,12 +56,15 @@ class SensedState:
         pushed = (0.0, 0.0)
         if state.estimate is not None:
             pushed = self._cascade.joint_acceleration(state.cascade, state.estimate)
-        again = _last_reading_again(before, now, inputs.samples)
         started, samples = _without_stuck(state, before, inputs.samples)
+        again: tuple[Sample, ...] = ()
+        if 0.0 <= before.imu_came < now - _IMU_SILENT:
+            again = _last_reading_again(before, now, inputs.samples)
         memory, estimate = self._fusion.step(started, (*samples, *again), now, pushed)
         if again:
             memory = memory._replace(imu_came=before.imu_came)
-        if memory.health is not before.health:
+        news = memory.health is not before.health
+        if news:
             _report(before, memory, now, texts)
         if inputs.sensors.t_us // _CHECKED_US != state.t_us // _CHECKED_US:
             self._report_silence(memory, now, texts)
@@ -74,7 +77,7 @@ class SensedState:
             last = state.estimate
             # Telemetry goes by its time, and goes on.
             return state, memory, None if last is None else last._replace(t_us=inputs.sensors.t_us)
-        away = unaided(before, now) > _AWAY > unaided(memory, now)
+        away = news and unaided(before, now) > _AWAY > unaided(memory, now)
         if state.estimate is not None and away and not moved:
             state = returned(state, estimate, state.estimate, texts)
         if state.invalid_ticks:
@@ -115,12 +118,11 @@ def _report(
 def _last_reading_again(
     memory: FusionMemory, now: float, samples: tuple[Sample, ...]
 ) -> tuple[Sample, ...]:
-    """The last reading of an IMU that is silent; nothing while it is not.
+    """The last reading of an IMU that has been silent; nothing if a new one is among the samples.
 
     The filter goes from one reading to the next, and knows what to do about one that repeats.
     """
-    silent = 0.0 <= memory.imu_came < now - _IMU_SILENT
-    if not silent or any(isinstance(one, ImuSample) for one in samples):
+    if any(isinstance(one, ImuSample) for one in samples):
         return ()
     x = memory.numbers
     row = x["imu"][0][(int(x["end"][0]) - 1) % IMU_CAPACITY].tolist()
@@ -133,12 +135,12 @@ def _without_stuck(
     """The samples without those of encoders that are stuck: joints then follow from torques."""
     before = watch = memory.encoders
     for one in samples:
-        if isinstance(one, JointSample):
+        if type(one) is JointSample:
             watch = _watched(watch, memory, one.angles, state)
             if watch.stuck and not before.stuck:
                 memory = _at_rest(memory, one.angles)
     if watch is not before:
-        memory = memory._replace(encoders=watch)
+        memory = memory.watching(watch)
     if watch.stuck:
         samples = tuple([one for one in samples if not isinstance(one, JointSample)])
     return memory, samples
@@ -161,7 +163,7 @@ def _watched(
         held = abs(first) > _HELD[0] or abs(second) > _HELD[1]
         moved = max(abs(asked[0] - watch.asked[0]), abs(asked[1] - watch.asked[1]))
         stuck = held and moved > _ASKED
-    return watch._replace(repeats=repeats, stuck=stuck)
+    return EncoderWatch(watch.angles, watch.asked, repeats, stuck)
 
 
 def _at_rest(memory: FusionMemory, angles: Vec2) -> FusionMemory:

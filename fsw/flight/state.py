@@ -43,6 +43,7 @@ from fsw.signals import (
 from fsw.tuning import Tuning
 
 _NOWHERE: Vec3 = (0.0, 0.0, 0.0)
+_DISARMED, _FAULT = Mode.DISARMED, Mode.FAULT
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,12 +70,13 @@ class VehicleMemory:
     @property
     def armed(self) -> bool:
         """Whether actuators may move."""
-        return self.mode is not Mode.DISARMED and self.mode is not Mode.FAULT
+        return self.mode is not _DISARMED and self.mode is not _FAULT
 
     @property
     def flies(self) -> bool:
         """Whether the loops are closed."""
-        return self.armed and not self.landed
+        # Not by ``armed``: asked some ten times a tick.
+        return not self.landed and self.mode is not _DISARMED and self.mode is not _FAULT
 
 
 @dataclass(frozen=True, slots=True)

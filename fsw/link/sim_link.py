@@ -20,10 +20,12 @@ from fsw.link.udp_endpoint import Address
 from fsw.link.wire import decode, encode_replies, message_ids
 from fsw.link.wire.decode import Numbers
 from fsw.link.wire.decode_sensors import (
+    ODOMETRY_VALUES,
     SampleDecoder,
     battery_reading,
     inertial_sample,
     joint_sample,
+    pose_sample,
 )
 from fsw.link.wire.message_ids import AUTOPILOT, SIMULATOR, SYSTEM_ID
 from fsw.link.wire.px4_mode import custom_mode
@@ -61,6 +63,11 @@ _STEP: Final = LockstepReader(
 # The same of a vehicle with sensors, if its HIL_SENSOR is the inertial unit's: then the flags are
 # the last byte before the checksum, because zeros at the end are not sent.
 _MEASURED_STEP: Final = LockstepReader((message_ids.JOINT_ENCODERS, 3), (message_ids.HIL_SENSOR, 7))
+_STEP_WITH_POSE: Final = LockstepReader(
+    (message_ids.ODOMETRY, ODOMETRY_VALUES),
+    (message_ids.JOINT_ENCODERS, 3),
+    (message_ids.HIL_SENSOR, 7),
+)
 _FLAGS_AT: Final = -3
 _INERTIAL: Final = 0x3F
 _SENSOR_AT: Final = 15  # place of HIL_SENSOR's id; the step's clock has 0
@@ -171,10 +178,12 @@ class SimLink:
             if step is not None:
                 return self._new(*step)
         else:
-            measured = _MEASURED_STEP.read(datagram)
+            measured = _MEASURED_STEP.read(datagram) or _STEP_WITH_POSE.read(datagram)
             if measured is not None and datagram[_FLAGS_AT] == _INERTIAL:
-                joints, inertial = measured
+                *pose, joints, inertial = measured
                 samples: list[Sample] = [joint_sample(joints), inertial_sample(inertial)]
+                if pose and (seen := pose_sample(pose[0])) is not None:
+                    samples.insert(0, seen)
                 return self._new_measured(int(inertial[0]), samples)
         return self._read_frames(list(split(datagram)))
 
@@ -235,15 +244,12 @@ class SimLink:
             return None
         self._inbox.accept_samples(samples)
         newest = samples[-1] if samples else None
+        rate, force = _NO_VECTOR, _NO_VECTOR
+        if type(newest) is ImuSample:
+            rate, force = newest.rate, newest.acceleration
+        # By position: it is made in every tick.
         return SensorFrame(
-            t_us,
-            p_WB=_NO_VECTOR,
-            v_WB=_NO_VECTOR,
-            q_WB=_NO_ATTITUDE,
-            gyro_B=newest.rate if isinstance(newest, ImuSample) else _NO_VECTOR,
-            accel_B=newest.acceleration if isinstance(newest, ImuSample) else _NO_VECTOR,
-            q_arm=_NO_JOINTS,
-            qd_arm=_NO_JOINTS,
+            t_us, _NO_VECTOR, _NO_VECTOR, _NO_ATTITUDE, rate, force, _NO_JOINTS, _NO_JOINTS
         )
 
     def _is_next(self, t_us: int) -> bool:

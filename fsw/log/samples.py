@@ -8,7 +8,7 @@ from struct import Struct
 from typing import Any, Final
 
 from fsw.log import topics
-from fsw.measurements import Sample
+from fsw.measurements import ImuSample, JointSample, Sample
 from messages.ulog import Topic, data_head
 from messages.ulog_reader import unpacker
 
@@ -24,11 +24,21 @@ class _Codec:
         self._names = tuple(field.name for field in dataclasses.fields(kind))
         self._sizes = tuple(field.count for field in topic.fields)  # 0: a number by itself
         self._head = data_head(self.number, topic)
-        self._record = Struct("<5s" + topic.codes)
+        self._pack = Struct("<5s" + topic.codes).pack
         self._unpack: Callable[[bytes], Values] = unpacker(topic).unpack
 
     def write(self, t_us: int, sample: Sample) -> bytes:
         """The record of a sample that arrived for the tick of ``t_us``."""
+        match sample:  # those of every tick
+            case ImuSample():
+                values: Values = (sample.time, *sample.acceleration, *sample.rate)
+            case JointSample():
+                values = (sample.time, *sample.angles)
+            case _:
+                values = self._values(sample)
+        return self._pack(self._head, t_us, *values)
+
+    def _values(self, sample: Sample) -> Values:
         values: list[float] = []
         for name, size in zip(self._names, self._sizes, strict=True):
             value = getattr(sample, name)
@@ -36,7 +46,7 @@ class _Codec:
                 values += value
             else:
                 values.append(value)
-        return self._record.pack(self._head, t_us, *values)
+        return tuple(values)
 
     def read(self, body: bytes) -> Sample:
         """The sample again."""

@@ -91,6 +91,10 @@ class StepEncoder:
         once at the start of a flight. Each datagram begins with ``opening``.
         """
         frames = self._measured.frames(t_us, measurements)
+        if not messages:
+            datagram = opening + b"".join(frames)
+            if len(datagram) <= _MAX_DATAGRAM:  # almost always
+                return [], datagram
         step = [opening, self._spoken(messages)] if messages else [opening]
         size = sum(map(len, step)) + len(frames[-1])
         first = len(frames) - 1

@@ -53,6 +53,8 @@ class SensorEncoder:
         self._origin = origin
         tail = (*(0.0,) * 7, INERTIAL, 0)
         self._barrier = LockstepFrame(writer, message_ids.HIL_SENSOR, *tail)
+        self._about_pose: object = None
+        self._pose: LockstepFrame | None = None
         self._joints = {
             count: LockstepFrame(
                 writer, message_ids.JOINT_ENCODERS, *(0.0,) * (_MOST_JOINTS - count), count
@@ -82,7 +84,7 @@ class SensorEncoder:
         t_us = max(one.t_us, 0)
         match one:
             case PoseMeasurement():
-                return self._writer.frame(message_ids.ODOMETRY, t_us, *_odometry(one))
+                return self._odometry(t_us, one)
             case GnssMeasurement():
                 return self._writer.frame(message_ids.HIL_GPS, t_us, *self._gps(one))
             case RangeMeasurement():
@@ -101,6 +103,18 @@ class SensorEncoder:
 
     def _hil_sensor(self, t_us: int, fields: tuple[float, ...], updated: int, sensor: int) -> bytes:
         return self._writer.frame(message_ids.HIL_SENSOR, t_us, *fields, updated, sensor)
+
+    def _odometry(self, t_us: int, one: PoseMeasurement) -> bytes:
+        """ODOMETRY; what has been the same in the last two is not packed again."""
+        about = one[3:]
+        if about == self._about_pose:
+            self._pose = self._pose or LockstepFrame(
+                self._writer, message_ids.ODOMETRY, *_about(one)
+            )
+            return self._pose(t_us, *one.p_WB, *one.q_WB)
+        self._about_pose, self._pose = about, None
+        values = (t_us, *one.p_WB, *one.q_WB, *_about(one))
+        return self._writer.frame(message_ids.ODOMETRY, *values)
 
     def _gps(self, one: GnssMeasurement) -> tuple[float, ...]:
         place = place_of(self._origin, one.p_WB)
@@ -122,7 +136,8 @@ class SensorEncoder:
         )
 
 
-def _odometry(one: PoseMeasurement) -> tuple[float, ...]:
+def _about(one: PoseMeasurement) -> tuple[float, ...]:
+    """All of ODOMETRY behind its pose."""
     p, q = one.position_variance, one.attitude_variance
     # The upper triangle, row by row.
     covariance = (
@@ -135,7 +150,7 @@ def _odometry(one: PoseMeasurement) -> tuple[float, ...]:
     )
     kind = _VIO if one.from_cameras_on_board else _MOTION_CAPTURE
     tail = (_LOCAL_NED, _BODY_FRD, one.resets, kind, _ALL_WELL)
-    return (*one.p_WB, *one.q_WB, *_NO_RATES, *covariance, *_UNKNOWN, *tail)
+    return (*_NO_RATES, *covariance, *_UNKNOWN, *tail)
 
 
 def _distance(one: RangeMeasurement) -> tuple[float | bytes, ...]:

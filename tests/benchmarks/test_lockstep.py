@@ -40,6 +40,7 @@ def test_the_peer_packs_the_very_bytes() -> None:
         (["--duration", "nan"], "--duration"),
         (["--rounds", "0"], "--rounds"),
         (["--round", "1"], "--round"),
+        (["--sensors", "eyes"], "eyes"),
         (["--json", "/nowhere/at/all.json"], "/nowhere/at/all.json"),
     ],
 )
@@ -78,8 +79,24 @@ def test_factor_ratio_and_stages_come_from_both_halves(
     reported = capsys.readouterr().out
     assert "median 27.0, best 30.0" in reported
     assert "3.00 times as fast as with pymavlink's packing" in reported
-    assert "simulator                   30.0 us" in reported
-    assert "mpc, share of a step        14.0 us" in reported
+    assert "simulator                   30.0       30.0 us" in reported
+    assert "mpc, share of a step        14.0       14.0 us" in reported
+
+
+@pytest.mark.parametrize(("slower", "code"), [(0.86, 0), (0.84, 1)])
+def test_a_suite_is_compared_with_exact_states(
+    slower: float, code: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    flown = []
+
+    def measure(_: object, kind: Any) -> dict[str, Any]:
+        flown.append(kind.sensors)
+        return _flown(20.0 * slower if kind.sensors == "mocap" else 20.0)
+
+    monkeypatch.setattr(lockstep, "_measure_one", measure)
+    assert lockstep.main(["--sensors", "mocap", "--rounds", "2"]) == code
+    assert flown == ["mocap", "perfect"] * 2
+    assert f"{slower:.2f} times as fast as with exact states" in capsys.readouterr().out
 
 
 def test_too_slow_is_an_exit_code(monkeypatch: pytest.MonkeyPatch) -> None:

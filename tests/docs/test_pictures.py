@@ -12,13 +12,17 @@ from typing import Any
 
 import pytest
 
+from docs.figures.__main__ import FLOWN, PICTURED
 from docs.figures.diagrams import draw_architecture, draw_timing
 from docs.figures.flight import draw_flight, recorded
 from docs.figures.frames import draw_frames
 from tests.docs.fences import DOCS, ROOT
 
 IMAGES = DOCS / "images"
-NUMBERS: dict[str, dict[str, Any]] = json.loads((IMAGES / "flights.json").read_text("utf-8"))
+NUMBERS: dict[tuple[str, str], dict[str, Any]] = {
+    (flown["scenario"], flown["sensors"]): flown
+    for flown in json.loads((IMAGES / "flights.json").read_text("utf-8"))
+}
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -34,25 +38,36 @@ def words(picture: Path) -> list[str]:
     return ["".join(text.itertext()) for text in found]
 
 
-@pytest.mark.parametrize(("scenario", "name"), [("walls", "flight"), ("branches", "branches")])
-def test_a_picture_prints_the_recorded_numbers_of_its_flight(scenario: str, name: str) -> None:
-    numbers = NUMBERS[scenario]
-    title = next(text for text in words(IMAGES / f"{name}.svg") if "--seed" in text)
+@pytest.mark.parametrize(("flown", "picture"), PICTURED.items())
+def test_a_picture_prints_the_recorded_numbers_of_its_flight(
+    flown: tuple[str, str], picture: str
+) -> None:
+    numbers = NUMBERS[flown]
+    title = next(text for text in words(IMAGES / picture) if "--seed" in text)
+    assert "pandion fly {} --sensors {} ".format(*flown) in title
     assert f"{numbers['tracking_error_rms_mm']:.1f} mm RMS" in title
     assert f"minimum margin {numbers['min_margin_mm']:.1f} mm" in title
 
 
 def test_the_table_of_the_readme_has_the_recorded_numbers() -> None:
     text = (ROOT / "README.md").read_text(encoding="utf-8")
-    rows = re.findall(r"^\| `([\w-]+)` \| ([\d.]+) mm \| ([\d.]+) mm \| (\w+) \|$", text, re.M)
-    assert {row[0]: row[1:] for row in rows} == {
-        scenario: (
+    name, length = r"`([\w-]+)`", r"([\d.]+) mm"
+    row = rf"^\| {name} \| {name} \| {length} \| {length} \| (\w+) \|$"
+    assert {found[:2]: found[2:] for found in re.findall(row, text, re.M)} == {
+        flown: (
             f"{numbers['tracking_error_rms_mm']:.1f}",
             f"{numbers['min_margin_mm']:.1f}",
             "yes" if numbers["completed"] else "no",
         )
-        for scenario, numbers in NUMBERS.items()
+        for flown, numbers in NUMBERS.items()
     }
+    assert set(NUMBERS) == set(FLOWN)
+
+
+def test_the_first_picture_is_of_the_flight_of_make_run() -> None:
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    scenario, suite = next(iter(PICTURED))
+    assert f"$(BIN)/pandion fly {scenario} --sensors {suite}\n" in makefile
 
 
 @pytest.mark.parametrize(
@@ -70,11 +85,22 @@ def test_a_diagram_says_what_its_script_draws(draw: Any, name: str, tmp_path: Pa
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("scenario", ["walls", "branches"])
-def test_today_s_flight_has_the_recorded_numbers(scenario: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("flown", PICTURED, ids="-".join)
+def test_today_s_flight_has_the_recorded_numbers(flown: tuple[str, str], tmp_path: Path) -> None:
     program, out = Path(sys.executable).parent / "pandion", tmp_path / "flown"
-    line = ["fly", scenario, "--gcs", "udp:127.0.0.1:9", "--api", "none", "--out", out]
+    line = [
+        "fly",
+        flown[0],
+        "--sensors",
+        flown[1],
+        "--gcs",
+        "udp:127.0.0.1:9",
+        "--api",
+        "none",
+        "--out",
+        out,
+    ]
     subprocess.run([program, *line], check=True, capture_output=True, timeout=300.0)
-    assert recorded(out) == NUMBERS[scenario], "run make pictures"
+    assert recorded(out) == NUMBERS[flown], "run make pictures"
     draw_flight(out, tmp_path / "drawn.svg")
     assert any("minimum margin" in text for text in words(tmp_path / "drawn.svg"))

@@ -134,6 +134,7 @@ def test_default_seeds_are_fresh() -> None:
         (["table4", "--seeds=-3:5"], "A:B"),
         (["table4", "--duration", "nan"], "duration"),
         (["table4", "--workers=-1"], "from 0 to 1024"),
+        (["robustness", "--suite", "mokap"], "did you mean mocap"),
         (["table4", "--sedes", "1:2"], "did you mean --seeds"),
     ],
 )
@@ -160,6 +161,8 @@ def test_the_command_writes_rows_page_and_a_verdict_on_the_seeds(
     found = json.loads(rows.read_text())
     assert [row["radius_m"] for row in found][:2] == [0.075, 0.070]
     assert (out / "smallest-sphere.html").exists()
+    lines = (out / "smallest-sphere.md").read_text().splitlines()
+    assert len([line for line in lines if line.startswith("| 0.")]) == len(found)
     assert (out / "journal.jsonl").exists()
 
 

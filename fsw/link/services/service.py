@@ -57,7 +57,7 @@ class Dispatch:
     ) -> None:
         self.failures = 0  # answers that ended in an exception
         self._send = send
-        self._polled = tuple(services)
+        self._polls = tuple(service.poll for service in services)
         self._bulky = tuple(service for service in services if isinstance(service, BulkService))
         self._sourced = tuple(one for one in services if isinstance(one, SourcedService))
         self._wanting: dict[int, tuple[LinkService, ...]] = {}
@@ -74,8 +74,12 @@ class Dispatch:
 
     def poll(self, t_us: int) -> None:
         """Let every service go on with what it is sending."""
-        for service in self._polled:
-            self._answer(t_us, service.poll, t_us)
+        for poll in self._polls:
+            try:
+                for outgoing in poll(t_us):
+                    self._send(outgoing, t_us)
+            except Exception:
+                self._note_failure()
 
     def bulk(self, t_us: int) -> bool:
         """Let services send a datagram each of what clients wait for; whether any did."""
@@ -94,7 +98,10 @@ class Dispatch:
                 self._send(outgoing, t_us)
                 sent = True
         except Exception:
-            if self.failures == 0:
-                traceback.print_exc()
-            self.failures += 1
+            self._note_failure()
         return sent
+
+    def _note_failure(self) -> None:
+        if self.failures == 0:
+            traceback.print_exc()
+        self.failures += 1

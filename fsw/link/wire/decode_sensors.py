@@ -35,6 +35,7 @@ _MAGNETIC: Final = 0x1C0
 _PRESSURE: Final = 0x200
 _RESET: Final = 0x80000000
 
+ODOMETRY_VALUES: Final = 61  # all of them
 _LOCAL_NED: Final = 1  # MAV_FRAME
 _DOWNWARD: Final = 25  # MAV_SENSOR_ORIENTATION
 _UNKNOWN_EPH: Final = 0xFFFF
