@@ -1,4 +1,4 @@
-"""What must happen when something fails: the tables of ``faults.toml``, or of another file."""
+"""What must happen when something fails: the tables of ``fault_expectations.toml``."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from sitl.faults.keys import Fault, Kind, Unit
 from sitl.scenario_file import SUITE_NAMES
 from studies.fault_flights import SITUATIONS
 
-EXPECTATIONS: Final = Path(__file__).with_name("faults.toml")
+EXPECTATIONS: Final = Path(__file__).with_suffix(".toml")
 ACTIONS: Final = ("goes on", "hold", "return", "land", "terminate", "ended")
 
 Contact = Literal["none", "ground", "any"]
