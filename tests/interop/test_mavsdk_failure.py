@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import pytest
 from mavsdk import System
+from mavsdk.plugins.action import Action
 from mavsdk.plugins.failure import Failure, FailureError, FailureType, FailureUnit
 from mavsdk.plugins.param import Param
 from mavsdk.plugins.telemetry import Telemetry
@@ -44,4 +45,26 @@ def test_a_failure_is_injected_seen_and_ended(system: System) -> None:
     with pytest.raises(FailureError):
         failure.inject(FailureUnit.SYSTEM_RC_SIGNAL, FailureType.OFF, 0)
     assert eventually(lambda: any("no unit 104" in text for text in texts)), texts
+    Param(system).set_param_float("SYS_FAILURE_EN", 0.0)
+
+
+@pytest.mark.long
+def test_a_vehicle_that_lost_its_pose_acts_and_is_recovered(system: System) -> None:
+    telemetry, action, failure = Telemetry(system), Action(system), Failure(system)
+    Param(system).set_param_float("SYS_FAILURE_EN", 1.0)
+    action.set_takeoff_altitude(3.0)
+    action.arm()
+    action.takeoff()
+    assert eventually(lambda: telemetry.position_velocity_ned().position.down_m < -3.0, 20.0)
+    assert eventually(lambda: telemetry.flight_mode().name == "HOLD")
+    failure.inject(FailureUnit.SENSOR_VIO, FailureType.OFF, 0)
+    assert eventually(lambda: telemetry.flight_mode().name == "LAND")
+    failure.inject(FailureUnit.SENSOR_VIO, FailureType.OK, 0)
+    assert eventually(telemetry.health_all_ok), telemetry.health()
+    assert telemetry.in_air()
+    action.hold()
+    assert eventually(lambda: telemetry.flight_mode().name == "HOLD")
+    action.land()
+    assert eventually(lambda: telemetry.landed_state().name == "ON_GROUND", 40.0)
+    assert eventually(lambda: not telemetry.armed())
     Param(system).set_param_float("SYS_FAILURE_EN", 0.0)
