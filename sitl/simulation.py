@@ -118,6 +118,7 @@ class Simulation:
             thrust_max=self.vehicle.rotors.thrust_max,
             joints=len(self.vehicle.links),
             exact=self._suite is None,
+            sags=self._drives is not None and self._drives.battery is not None,
         )
         self._locked = self.faults.locked
         self._sent = (0.0, 0.0)  # largest torque and thrust commanded, before any saturation
@@ -227,9 +228,9 @@ class Simulation:
         own = None if self._drives is None else self._drives.battery
         if self.step % BATTERY_STEPS or (own is None and not self.faults.of_battery):
             return None
-        charge = min(1.0 if own is None else own.charge, self.faults.charge)
-        if own is not None and charge == own.charge:
-            return own.voltage, charge
+        charge = self.faults.charge
+        if own is not None:
+            return own.voltage, min(own.charge, charge)
         return open_circuit(charge), charge
 
     def _settled(self, suite: SensorSuite, thrust: V4) -> list[Measurement]:
@@ -259,9 +260,10 @@ class Simulation:
             ValueError: A control is not finite or their number is wrong.
         """
         self._command(controls)
+        fails = self.faults.at(self.step)
         if self._drives is not None:
             self._drive(self._drives)
-        if self.faults.at(self.step) or any(self._locked):
+        if fails or any(self._locked):
             self._fail()
         if self._wind is not None:
             field, moving = self._wind
@@ -346,6 +348,8 @@ class Simulation:
 
     def _drive(self, drives: Drives) -> None:
         """What of the command takes effect in this step."""
+        if drives.battery is not None:
+            drives.battery.at_most = self.faults.charge
         x: list[float] = self._state.tolist()
         rates = tuple(x[ARM + len(self._torque) :])
         self._thrust = drives.rotors(self._thrust, _four(x[THRUST:ARM]))

@@ -41,8 +41,13 @@ class Faults:
         thrust_max: float,
         joints: int,
         exact: bool,
+        sags: bool = False,
     ) -> None:
-        """Rotors give up to ``thrust_max`` [N]; the states are ``exact`` or a suite's."""
+        """Rotors give up to ``thrust_max`` [N]; the states are ``exact`` or a suite's.
+
+        A battery that ``sags`` is simulated, and takes thrust by itself.
+        """
+        self._sags = sags
         self._seed = seed
         self._step_us = step_us
         self._thrust_max = thrust_max
@@ -150,7 +155,7 @@ class Faults:
         charges = [battery_charge(one) for one in self.active if one.unit == "battery"]
         self.charge = min(charges, default=1.0)
         self.of_battery = self.of_battery or bool(charges)
-        self._share = thrust_share(self.charge) if charges else 1.0
+        self._share = thrust_share(self.charge) if charges and not self._sags else 1.0
         jumps = [one.jump_s for one in self.active if one.unit == "clock"]
         self.clock_us = round(1e6 * sum(jumps))
         self.locked, self.limp = self._of_joints("stuck"), self._of_joints("off")

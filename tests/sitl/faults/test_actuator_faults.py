@@ -14,7 +14,7 @@ from sitl.plant.aerial_manipulator import Inputs, plant
 from sitl.plant.integrator import integrate
 from sitl.plant.lock import seize
 from sitl.plant.parameters import Vehicle
-from sitl.scenario import Scenario
+from sitl.scenario import ActuatorKeys, Scenario
 from sitl.scenario_file import load_scenario
 from sitl.simulation import Simulation
 from tests.sitl.free_motion import frictionless, tumbling
@@ -143,3 +143,24 @@ def test_a_battery_that_failed_says_its_charge_and_a_perfect_one_says_nothing() 
     assert [one and one[1] for one in said] == [0.08, 0.08, 1.0]
     assert said[0] is not None
     assert 13.2 < said[0][0] < 15.0
+
+
+def test_a_simulated_battery_that_drops_sags_by_itself_and_recovers() -> None:
+    scenario = replace(
+        load_scenario("walls-calm"),
+        actuators=ActuatorKeys(battery_a_h=5.0),
+        faults=(Fault("battery", "weak", 0.1, 0.1, share=0.1),),
+    )
+    simulation = Simulation(scenario, 0)
+    said = [simulation.battery()]
+    for _ in range(2):
+        flown(simulation, 50)
+        simulation.sense()
+        said.append(simulation.battery())
+    flown(simulation, 50)
+    said.append(simulation.battery())
+    shares = [one[1] for one in said if one is not None]
+    assert shares == pytest.approx([1.0, 0.1, 1.0, 1.0], abs=1e-3)
+    volts = [one[0] for one in said if one is not None]
+    assert volts[2] < volts[1] - 1.0, "it sagged while it failed"
+    assert volts[3] > volts[2] + 1.0
