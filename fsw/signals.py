@@ -644,6 +644,9 @@ class ConstraintReport:
     margins: tuple[float, ...] = ()  # m, of each zone and part of the body, zone by zone
     barrier: tuple[float, ...] = ()  # h, m/s, same order
     per_zone: tuple[int, ...] = ()  # how many of them belong to each zone
+    # m, kept from each zone beyond its clearance because the estimate is not sure; empty: nothing
+    added: tuple[float, ...] = ()
+    lacking: float = 0.0  # m, what there is no room for of that, of the zone that lacks most
 
     def shown(self, most: int) -> tuple[tuple[float, ...], tuple[float, ...], int | None]:
         """Margins [m] and barrier values [m/s] for a record with room for ``most``, and the least.

@@ -93,10 +93,10 @@ class _ZonesSeen:
 
     def add(self, state: FlightState) -> None:
         """Take those of a tick."""
-        safe_set, target = state.mission.safe_set, state.reference
-        if safe_set is not self._of[0] or target is not self._of[1]:
-            self._of = (safe_set, target)
-            zones = moving_zones(safe_set, target)
+        kept, target = state.kept, state.reference
+        if kept is not self._of[0] or target is not self._of[1]:
+            self._of = (kept, target)
+            zones = moving_zones(kept.safe_set, target, kept.added)
             if not np.array_equal(zones, self._kept[-1]):
                 self._kept.append(zones)
                 self._end += len(zones)

@@ -45,8 +45,15 @@ def sample(said: Measurement) -> Sample:
             first, second = said.angles
             return JointSample(time, (first, second))
         case PoseMeasurement():
-            p, q = said.position_variance, said.attitude_variance
-            return PoseSample(time, said.p_WB, said.q_WB, (p, p, p), (q, q, q), said.resets)
+            return PoseSample(
+                time,
+                said.p_WB,
+                said.q_WB,
+                said.position_variance,
+                said.attitude_variance,
+                said.resets,
+                said.from_cameras_on_board,
+            )
         case GnssMeasurement():
             level, down = said.horizontal_deviation**2, said.vertical_deviation**2
             speed = (_VELOCITY_VARIANCE,) * 3

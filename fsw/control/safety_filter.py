@@ -17,6 +17,9 @@ are taken to move as its origin does. Parts on the arm count for the margin that
 is reported and not for the acceleration: to push a swinging arm off by the base would first swing
 it on, and the arm compensates by itself.
 
+The zones are those that are kept: clearances have grown by what the estimate is not sure of. The
+margin is that of the safe set in force.
+
 The planner's own bound is :math:`h \ge \lambda`; this law has none, so in flights that go as
 planned it changes no bit. Its command can be no more than the loops stand.
 """
@@ -41,7 +44,8 @@ from fsw.signals import EndEffectorTarget, SafeSet, StateEstimate, Vec2, Vec3
 
 _PASSES = 4  # over all zones
 _MOVE = FIRST + NUMBERS  # columns of a zone's movement: velocity, where it is at a time, that time
-_COLUMNS = _MOVE + 7
+_ADDED = _MOVE + 7  # m, in its clearance for an uncertain estimate
+_COLUMNS = _ADDED + 1
 
 NO_ZONES: NDArray[np.float64] = np.zeros((0, _COLUMNS))
 
@@ -97,12 +101,19 @@ def filter_probes(body: Body) -> NDArray[np.float64]:
     return nearest
 
 
-def moving_zones(safe_set: SafeSet, target: EndEffectorTarget | None) -> NDArray[np.float64]:
-    """The zones and how they move, (zones, columns) [SI]; of no target, without what follows it."""
+def moving_zones(
+    safe_set: SafeSet, target: EndEffectorTarget | None, added: tuple[float, ...] = ()
+) -> NDArray[np.float64]:
+    """The zones and how they move, (zones, columns) [SI]; of no target, without what follows it.
+
+    ``added`` [m] of each zone's clearance is for an uncertain estimate, and no margin.
+    """
     if not safe_set.zones:
         return NO_ZONES
     rows = np.zeros((len(safe_set.zones), _COLUMNS))
     rows[:, :_MOVE] = zone_arrays(safe_set)
+    if added:
+        rows[:, _ADDED] = added
     for row, zone in zip(rows, safe_set.zones, strict=True):
         row[_MOVE : _MOVE + 3], row[_MOVE + 6] = zone.velocity, zone.t_us
         if row[FOLLOWS] > 0.0 and target is not None:
@@ -177,7 +188,7 @@ def _kept_off(
         n, distance = (at.nx, at.ny, at.nz), at.distance
         if not follows:
             distance -= probes[j, RADIUS]
-        margin = min(margin, distance)
+        margin = min(margin, distance + zones[zone, _ADDED])
         if probes[j, ON] == ON_BASE:
             lacking = _needed(law, follows, distance, dot(n, relative), dot(n, a)) - dot(n, wanted)
             if lacking > 0.0:

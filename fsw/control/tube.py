@@ -13,6 +13,10 @@ near; ``expected_peak`` is 3.7 standard deviations, about one in five thousand.
 The memory of wind is not linear, because it is limited. It acts on the loop as a second
 disturbance within that limit, and the worst that both can do together bounds what they do.
 
+An estimate that is wrong pushes as well. A position, velocity or acceleration that is wrong by up
+to e, however it changes, moves the base by at most e times the same sum, over the response to that
+error (``estimate_tube``).
+
 All of this is true only while no limit on the way from the error to the rotors is reached. The
 same sum over the response of what meets a limit is the most that it can be asked for, so
 ``limits_used`` tells exactly up to which disturbance of one axis the loop is linear.
@@ -110,6 +114,44 @@ def tube(
     )
 
 
+@dataclass(frozen=True, slots=True)
+class EstimateTube:
+    """Reach of an error of the estimate, at most, on one horizontal axis."""
+
+    position: float  # m per m: 1 if the error does not change
+    velocity: float  # m per m/s
+    acceleration: float  # m per m/s^2; an attitude that is wrong by an angle is wrong by g times it
+    jerk: float  # m per m/s^3 of white noise, a value a tick: one standard deviation
+
+
+@lru_cache(maxsize=4)
+def estimate_tube(
+    airframe: Airframe, tuning: TrackingTuning, gains: TrackingGains, dt: float
+) -> EstimateTube:
+    """How far the base is moved by an estimate that is wrong, with a tick of ``dt`` [s]."""
+    a = _loop(airframe, tuning, gains)
+    k, lag = gains.k, airframe.rotor_lag
+    gain_v, gain_d = 2.0 * tuning.observer_bandwidth, tuning.observer_bandwidth**2
+    # Into the snap and the observer's two states; the observer alone uses the velocity.
+    enters = {
+        "position": (-k[0] / lag, 0.0, 0.0),
+        "velocity": (0.0, gain_v, gain_d),
+        "acceleration": (-k[2] / lag, 1.0, 0.0),
+        "jerk": (-k[3] / lag, 0.0, 0.0),
+    }
+    moved = {}
+    for name, entries in enters.items():
+        b = np.zeros(len(a))
+        b[4:] = entries
+        moved[name] = _after_a_push(a, b, dt)[:, 0]
+    return EstimateTube(
+        position=_sum(moved["position"]),
+        velocity=_sum(moved["velocity"]),
+        acceleration=_sum(moved["acceleration"]),
+        jerk=float(np.linalg.norm(moved["jerk"])),
+    )
+
+
 def limits_used(
     airframe: Airframe, tuning: TrackingTuning, loop: Tube, disturbance: float
 ) -> dict[str, float]:
@@ -198,22 +240,25 @@ def impulse_responses(
 
     A row (7,) [SI] a tick. The push is a disturbance, or a memory of wind where there is none.
     """
-    k, kd, bandwidth = gains.k, gains.k_disturbance, tuning.observer_bandwidth
-    # p, v, a, j, s and the observer's velocity and disturbance; the plan stands still at 0.
-    n = 7
-    a = np.zeros((n, n))
-    a[:4, 1:5] = np.eye(4)
-    a[4] = _wanted_snap(gains) / airframe.rotor_lag
-    a[4, 4] -= 1.0 / airframe.rotor_lag
-    gain_v, gain_d = 2.0 * bandwidth, bandwidth**2
-    a[5] = [0.0, gain_v, 1.0, 0.0, 0.0, -gain_v, 1.0]
-    a[6] = [0.0, gain_d, 0.0, 0.0, 0.0, -gain_d, 0.0]
-    b = np.zeros(n)
+    a = _loop(airframe, tuning, gains)
+    b = np.zeros(len(a))
     if wind:
-        b[4] = (kd - k[2]) / airframe.rotor_lag
+        b[4] = (gains.k_disturbance - gains.k[2]) / airframe.rotor_lag
     else:
         b[1] = 1.0
     return _after_a_push(a, b, dt)
+
+
+def _loop(airframe: Airframe, tuning: TrackingTuning, gains: TrackingGains) -> Array:
+    """x' = A x of p, v, a, j, s and the observer's velocity and disturbance; the plan is 0."""
+    a = np.zeros((7, 7))
+    a[:4, 1:5] = np.eye(4)
+    a[4] = _wanted_snap(gains) / airframe.rotor_lag
+    a[4, 4] -= 1.0 / airframe.rotor_lag
+    gain_v, gain_d = 2.0 * tuning.observer_bandwidth, tuning.observer_bandwidth**2
+    a[5] = [0.0, gain_v, 1.0, 0.0, 0.0, -gain_v, 1.0]
+    a[6] = [0.0, gain_d, 0.0, 0.0, 0.0, -gain_d, 0.0]
+    return a
 
 
 def _vertical_responses(

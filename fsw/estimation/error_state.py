@@ -34,6 +34,7 @@ Array = NDArray[np.float64]
 # Entries of the error.
 P, V, TH, BA, BG, BARO, DELAY = 0, 3, 6, 9, 12, 15, 16
 ERRORS: Final = 17
+FRAME: Final = 4  # errors of an odometry's frame: north, east, down [m], heading [rad]
 ROWS: Final = 3  # of a measurement, at most
 IMU_CAPACITY: Final = 256  # readings since the filter's time
 # Columns of a reading: time [s], specific force [m/s^2] and rate [rad/s] in body axes, and whether
@@ -71,6 +72,10 @@ FILTER: Final = np.dtype(
         ("gain", float, (ERRORS, ROWS)),
         ("factor", float, (ROWS, ROWS)),
         ("error", float, (ERRORS,)),
+        # Of an odometry's frame (drift.py): whether it drifts, and its covariance with the error.
+        ("drifts", np.int64),
+        ("shared", float, (ERRORS, FRAME)),
+        ("innovated", float, (ROWS,)),
     ],
     align=True,
 )
@@ -116,8 +121,8 @@ def integrated(
 
 
 @compilable
-def propagate(M: Array, R: Mat3, f: Vec3, w: Vec3, dt: float) -> None:
-    """Replace the covariance ``M`` (17, 17) [SI] by F M F^T, ``dt`` [s] later. Solà, eq 270.
+def transition(R: Mat3, f: Vec3, w: Vec3, dt: float) -> tuple[Mat3, Mat3, Mat3]:
+    """Blocks of F, ``dt`` [s] long: velocity over attitude and bias, and attitude over attitude.
 
     ``R`` [1, body to NED] and the means ``f`` [m/s^2, FRD] and ``w`` [rad/s, FRD] are of the step.
     """
@@ -134,7 +139,20 @@ def propagate(M: Array, R: Mat3, f: Vec3, w: Vec3, dt: float) -> None:
     e00, e01, e02 = 1.0 - 0.5 * (y * y + z * z), z + 0.5 * x * y, -y + 0.5 * x * z
     e10, e11, e12 = -z + 0.5 * x * y, 1.0 - 0.5 * (x * x + z * z), x + 0.5 * y * z
     e20, e21, e22 = y + 0.5 * x * z, -x + 0.5 * y * z, 1.0 - 0.5 * (x * x + y * y)
-    for j in range(ERRORS):
+    return (
+        (a00, a01, a02, a10, a11, a12, a20, a21, a22),
+        (r00, r01, r02, r10, r11, r12, r20, r21, r22),
+        (e00, e01, e02, e10, e11, e12, e20, e21, e22),
+    )
+
+
+@compilable
+def carry(M: Array, blocks: tuple[Mat3, Mat3, Mat3], dt: float) -> None:
+    """Replace ``M`` (17, n) [SI] by F M, with the ``blocks`` of F [SI], ``dt`` [s] later."""
+    a00, a01, a02, a10, a11, a12, a20, a21, a22 = blocks[0]
+    r00, r01, r02, r10, r11, r12, r20, r21, r22 = blocks[1]
+    e00, e01, e02, e10, e11, e12, e20, e21, e22 = blocks[2]
+    for j in range(M.shape[1]):
         t0, t1, t2 = M[6, j], M[7, j], M[8, j]
         b0, b1, b2 = M[9, j], M[10, j], M[11, j]
         M[0, j] += dt * M[3, j]
@@ -146,6 +164,18 @@ def propagate(M: Array, R: Mat3, f: Vec3, w: Vec3, dt: float) -> None:
         M[6, j] = e00 * t0 + e01 * t1 + e02 * t2 - dt * M[12, j]
         M[7, j] = e10 * t0 + e11 * t1 + e12 * t2 - dt * M[13, j]
         M[8, j] = e20 * t0 + e21 * t1 + e22 * t2 - dt * M[14, j]
+
+
+@compilable
+def propagate(M: Array, blocks: tuple[Mat3, Mat3, Mat3], dt: float) -> None:
+    """Replace the covariance ``M`` (17, 17) [SI] by F M F^T, ``dt`` [s] later. Solà, eq 270.
+
+    The ``blocks`` of F [SI] are those of ``transition``.
+    """
+    carry(M, blocks, dt)
+    a00, a01, a02, a10, a11, a12, a20, a21, a22 = blocks[0]
+    r00, r01, r02, r10, r11, r12, r20, r21, r22 = blocks[1]
+    e00, e01, e02, e10, e11, e12, e20, e21, e22 = blocks[2]
     for i in range(ERRORS):
         t0, t1, t2 = M[i, 6], M[i, 7], M[i, 8]
         b0, b1, b2 = M[i, 9], M[i, 10], M[i, 11]
@@ -203,8 +233,11 @@ def step_to(x: Any, law: Any, row: Array, before: Array, M: Array) -> None:
     for _ in range(steps):
         R = matrix_from_quaternion(q)
         p, v, q, a = integrated(p, v, q, f, w, dt)
-        propagate(M, R, f, w, dt)
+        blocks = transition(R, f, w, dt)
+        propagate(M, blocks, dt)
         add_noise(M, law, dt, lost)
+        if x.drifts:
+            carry(x.shared, blocks, dt)
     for i in range(3):
         x.p[i], x.v[i], x.acceleration[i] = p[i], v[i], a[i]
         x.rate[i] = row[RATE + i] - x.gyro_bias[i]
@@ -228,6 +261,8 @@ def _watch_biases(x: Any, M: Array, lost: int) -> None:
             for j in range(ERRORS):
                 M[k, j] = 0.0
                 M[j, k] = 0.0
+            for j in range(FRAME):
+                x.shared[k, j] = 0.0
             M[k, k] = x.kept_variance[i]
 
 
@@ -321,6 +356,8 @@ def correct(x: Any, rows: int) -> None:
             W[i, k] = total / L[k, k]
             error += W[i, k] * x.residual[k]
         x.error[i] = error
+    if x.drifts:
+        _correct_shared(x, rows)
     for i in range(ERRORS):
         for j in range(ERRORS):
             total = 0.0
@@ -330,6 +367,23 @@ def correct(x: Any, rows: int) -> None:
         # Rounding must not make a variance negative.
         M[i, i] = max(M[i, i], 0.0)
     inject(x)
+
+
+@compilable
+def _correct_shared(x: Any, rows: int) -> None:
+    """Multiply the covariance with the frame by I - K H, where K is W L^-1."""
+    X, H, L, W = x.shared, x.H, x.factor, x.gain
+    for c in range(FRAME):
+        for k in range(rows):
+            total = 0.0
+            for j in range(ERRORS):
+                total += H[k, j] * X[j, c]
+            for j in range(k):
+                total -= L[k, j] * x.innovated[j]
+            x.innovated[k] = total / L[k, k]
+        for i in range(ERRORS):
+            for k in range(rows):
+                X[i, c] -= W[i, k] * x.innovated[k]
 
 
 @compilable

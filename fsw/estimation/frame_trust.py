@@ -15,7 +15,7 @@ from typing import Final, NamedTuple
 
 from fsw.compiled import compilable, compiled, machine_code
 from fsw.estimation.estimator import estimate_state
-from fsw.estimation.sensor_fault import Sensor, SensorFault
+from fsw.estimation.sensor_fault import Sensor, SensorFault, sentence
 from fsw.geometry.quaternion import conjugate, multiply, normalised, rotation_vector, turned
 from fsw.geometry.rotation import matrix_from_quaternion, quaternion_from_matrix, rotate, yaw_of
 from fsw.model.airframe import GRAVITY
@@ -42,6 +42,8 @@ _RATE_LIMIT: Final = 100.0  # rad/s, of body and joints
 _FORCE_LIMIT: Final = 1000.0  # m/s^2
 _RATE_SHARE: Final = 0.3  # of the newest rate from two poses
 _LONGEST: Final = 1.0  # s, moved on at once
+_QUIET_US: Final = 10_000_000  # without a bad frame, until one is worth a sentence again
+_NEVER_US: Final = -_QUIET_US
 # What a vehicle does while frames are missing.
 _STRONGEST: Final = 50.0  # m/s^2
 _QUICKEST: Final = 50.0  # rad/s^2, of the body
@@ -61,6 +63,9 @@ class PartTrust(NamedTuple):
     fault: SensorFault = SensorFault.NONE
 
 
+_GOOD: Final = PartTrust()
+
+
 class FrameTrust(NamedTuple):
     """What is carried from frame to frame."""
 
@@ -69,6 +74,7 @@ class FrameTrust(NamedTuple):
     inertial: PartTrust = PartTrust()
     joints: PartTrust = PartTrust()
     returned_us: int = 0  # how long the pose was away that has just come back; 0: it has not
+    bad_us: tuple[int, int, int] = (_NEVER_US,) * 3  # when a bad frame of each part came last
 
     @property
     def doubted(self) -> bool:
@@ -80,6 +86,21 @@ class FrameTrust(NamedTuple):
         parts = (self.pose, self.inertial, self.joints)
         named = zip((name for _, name in _NAMES), parts, strict=True)
         return tuple([(name, part) for name, part in named if part.unused])
+
+    def reported(self, now_us: int) -> tuple[FrameTrust, tuple[str, ...]]:
+        """Sentences about frames that cannot be or have jumped, and the trust that knows of them.
+
+        A first such frame is worth a sentence, whatever stands in for it; the next one is after a
+        while. What repeats itself is a matter of time, and of the failsafe table.
+        """
+        parts, times, sentences = (self.pose, self.inertial, self.joints), [], []
+        for (_, sensor), part, last_us in zip(_NAMES, parts, self.bad_us, strict=True):
+            now = part.unused > 0 and part.fault is not SensorFault.STUCK
+            if now and now_us - last_us >= _QUIET_US:
+                sentences.append(sentence(sensor, part.fault))
+            times.append(now_us if now else last_us)
+        first, second, third = times
+        return self._replace(bad_us=(first, second, third)), tuple(sentences)
 
     def position_sigma(self, now_us: int) -> float:
         """Of the estimate at ``now_us`` [us], a standard deviation [m]."""
@@ -192,14 +213,15 @@ def believed(
     known = trust.last
     stuck = 0 if known is None else _repeating(s, known)
     if not (never or far or stuck or trust.returned_us or trust.doubted):
-        return FrameTrust(s), StateEstimate(s.t_us, p, v, R, w, yaw, q, qd, -force[2])
+        after = FrameTrust(s, _GOOD, _GOOD, _GOOD, 0, trust.bad_us)
+        return after, StateEstimate(s.t_us, p, v, R, w, yaw, q, qd, -force[2])
     olds = trust.pose, trust.inertial, trust.joints
     pose, inertial, joints = [
         _part(old, s.t_us, bool(never & bit), bool(far & bit), bool(stuck & bit), k)
         for k, ((bit, _), old) in enumerate(zip(_NAMES, olds, strict=True))
     ]
     away = s.t_us - trust.pose.since_us if trust.pose.unused and not pose.unused else 0
-    after = FrameTrust(s, pose, inertial, joints, away)
+    after = FrameTrust(s, pose, inertial, joints, away, trust.bad_us)
     return after, _filled(after, s, x, dt, arm_acceleration)
 
 

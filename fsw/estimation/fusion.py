@@ -2,7 +2,7 @@ r"""Measurements of the error-state filter: residual, slope over the error, and 
 
 A measurement lies up to one period of the IMU beside the filter's time: the state is moved there by
 its own velocity, acceleration and rate. One whose chi-square is beyond its gate
-(``tuning.GATES``) is not fused. Each function returns chi-square over gate: fused if 1 or less.
+(``tuning.Gates``) is not fused. Each function returns chi-square over gate: fused if 1 or less.
 
 Source: J. Solà, Quaternion kinematics for the error-state Kalman filter, 2017, section 6.1.
 """
@@ -18,8 +18,8 @@ from fsw.estimation.error_state import (
     BG,
     DELAY,
     ERRORS,
+    FRAME,
     TH,
-    Array,
     P,
     V,
     correct,
@@ -27,7 +27,6 @@ from fsw.estimation.error_state import (
     vec3,
     vec4,
 )
-from fsw.estimation.tuning import GATES
 from fsw.geometry.quaternion import conjugate, multiply, rotation_vector, turned
 from fsw.geometry.rotation import matrix_from_quaternion, rotate, wrap_angle
 from fsw.signals import Vec3, Vec4
@@ -43,11 +42,11 @@ def _cleared(x: Any, rows: int) -> None:
 
 
 @compilable
-def _judged(x: Any, rows: int, part: int = 0) -> float:
+def _judged(x: Any, rows: int, gate: float, part: int = 0) -> float:
     """Chi-square over gate of a part of a measurement; fuses what is within it."""
     for k in range(rows):
         x.innovation[part, k] = x.residual[k]
-    ratio = distance(x, rows) / GATES[rows - 1]
+    ratio = distance(x, rows) / gate
     if ratio <= 1.0:
         correct(x, rows)
     return ratio
@@ -95,6 +94,7 @@ def attitude_rows(x: Any, z: Vec4, variance: Vec3, dt: float, delayed: float) ->
 def fuse_pose(
     x: Any,
     law: Any,
+    gates: Any,
     time: float,
     position: Vec3,
     attitude: Vec4,
@@ -109,10 +109,10 @@ def fuse_pose(
     delayed = 1.0 if law.pose_delay_sigma > 0.0 else 0.0
     dt = time - x.pose_delay - x.time
     position_rows(x, position, position_variance, dt, delayed)
-    first = _judged(x, 3)
+    first = _judged(x, 3, gates.pose)
     dt = time - x.pose_delay - x.time
     attitude_rows(x, attitude, attitude_variance, dt, delayed)
-    return first, _judged(x, 3, 1)
+    return first, _judged(x, 3, gates.pose, 1)
 
 
 @compilable
@@ -129,6 +129,7 @@ def velocity_rows(x: Any, z: Vec3, variance: Vec3, dt: float) -> None:
 def fuse_gnss(
     x: Any,
     law: Any,
+    gates: Any,
     time: float,
     position: Vec3,
     velocity: Vec3,
@@ -142,9 +143,9 @@ def fuse_gnss(
     """
     dt = time - x.time
     position_rows(x, position, position_variance, dt, 0.0)
-    first = _judged(x, 3)
+    first = _judged(x, 3, gates.gnss_position)
     velocity_rows(x, velocity, velocity_variance, dt)
-    return first, _judged(x, 3, 1)
+    return first, _judged(x, 3, gates.gnss_velocity, 1)
 
 
 @compilable
@@ -159,10 +160,12 @@ def pressure_rows(x: Any, altitude: float, variance: float, dt: float) -> None:
 
 
 @compilable
-def fuse_pressure(x: Any, law: Any, time: float, altitude: float, variance: float) -> float:
+def fuse_pressure(
+    x: Any, law: Any, gates: Any, time: float, altitude: float, variance: float
+) -> float:
     """Fuse an ``altitude`` [m, up] of ``time`` [s] with ``variance`` [m^2]."""
     pressure_rows(x, altitude, variance, time - x.time)
-    return _judged(x, 1)
+    return _judged(x, 1, gates.pressure)
 
 
 @compilable
@@ -190,11 +193,11 @@ def heading_rows(x: Any, law: Any, field: Vec3, dt: float) -> bool:
 
 
 @compilable
-def fuse_heading(x: Any, law: Any, time: float, field: Vec3) -> float:
+def fuse_heading(x: Any, law: Any, gates: Any, time: float, field: Vec3) -> float:
     """Fuse the heading of a magnetic ``field`` [Gauss, FRD] of ``time`` [s]."""
     if not heading_rows(x, law, field, time - x.time):
         return math.inf
-    return _judged(x, 1)
+    return _judged(x, 1, gates.heading)
 
 
 @compilable
@@ -219,17 +222,22 @@ def range_rows(x: Any, law: Any, measured: float, variance: float, dt: float) ->
 
 
 @compilable
-def fuse_range(x: Any, law: Any, time: float, measured: float, variance: float) -> float:
+def fuse_range(
+    x: Any, law: Any, gates: Any, time: float, measured: float, variance: float
+) -> float:
     """Fuse a ``measured`` [m] distance to level ground of ``time`` [s] and ``variance`` [m^2]."""
     if not range_rows(x, law, measured, variance, time - x.time):
         return math.inf
-    return _judged(x, 1)
+    return _judged(x, 1, gates.range)
 
 
 @compilable
-def forget(M: Array, first: int, variance: Vec3) -> None:
-    """Give three errors of the covariance ``M`` (17, 17) [SI] a ``variance`` [SI, of M] anew."""
+def forget(x: Any, first: int, variance: Vec3) -> None:
+    """Give three errors of a state ``x`` [SI] a ``variance`` [SI, of x] anew."""
+    M = x.covariance
     for i in range(3):
+        for j in range(FRAME):
+            x.shared[first + i, j] = 0.0
         for j in range(ERRORS):
             M[first + i, j] = 0.0
             M[j, first + i] = 0.0

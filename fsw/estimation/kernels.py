@@ -15,6 +15,7 @@ from fsw.estimation.error_state import (
     COLUMNS,
     DELAY,
     ERRORS,
+    FRAME,
     IMU_CAPACITY,
     LOST,
     TH,
@@ -25,9 +26,11 @@ from fsw.estimation.error_state import (
     V,
     add_noise,
     advance,
+    carry,
     integrated,
     present,
     propagate,
+    transition,
     vec3,
     vec4,
 )
@@ -107,12 +110,21 @@ def _copy(a: Any, b: Any) -> None:
     for i in range(ERRORS):
         for j in range(ERRORS):
             b.covariance[i, j] = a.covariance[i, j]
+    _copy_frame(a, b)
     for k in range(a.first - 1, a.end):
         for i in range(COLUMNS):
             b.imu[k % IMU_CAPACITY, i] = a.imu[k % IMU_CAPACITY, i]
     for i in range(2):
         for j in range(3):
             b.joints[i, j] = a.joints[i, j]
+
+
+@compilable
+def _copy_frame(a: Any, b: Any) -> None:
+    b.drifts = a.drifts
+    for i in range(ERRORS):
+        for j in range(FRAME):
+            b.shared[i, j] = a.shared[i, j]
 
 
 @compilable
@@ -208,7 +220,7 @@ def _set_place(x: Filter, law: Law, time: float, p: Vec3, variance: Vec3) -> Vec
     )
     for i in range(3):
         s.p[i] += jump[i]
-    fusion.forget(s.covariance, P, variance)
+    fusion.forget(s, P, variance)
     return jump
 
 
@@ -219,7 +231,7 @@ def _set_velocity(x: Filter, law: Law, v: Vec3, variance: Vec3) -> Vec3:
     jump = (v[0] - s.v[0], v[1] - s.v[1], v[2] - s.v[2])
     for i in range(3):
         s.v[i] = v[i]
-    fusion.forget(s.covariance, V, variance)
+    fusion.forget(s, V, variance)
     return jump
 
 
@@ -229,7 +241,7 @@ def _set_attitude(x: Filter, law: Law, q: Vec4, variance: Vec3) -> None:
     s = x[0]
     for i in range(4):
         s.q[i] = q[i]
-    fusion.forget(s.covariance, TH, variance)
+    fusion.forget(s, TH, variance)
 
 
 @kernel
@@ -242,7 +254,7 @@ def _fuse_pose(
     p_variance: Vec3,
     q_variance: Vec3,
 ) -> tuple[float, float]:
-    return fusion.fuse_pose(x[0], law[0].tuning, time, p, q, p_variance, q_variance)
+    return fusion.fuse_pose(x[0], law[0].tuning, law[0].gates, time, p, q, p_variance, q_variance)
 
 
 @kernel
@@ -255,31 +267,33 @@ def _fuse_gnss(
     p_variance: Vec3,
     v_variance: Vec3,
 ) -> tuple[float, float]:
-    return fusion.fuse_gnss(x[0], law[0].tuning, time, p, v, p_variance, v_variance)
+    return fusion.fuse_gnss(x[0], law[0].tuning, law[0].gates, time, p, v, p_variance, v_variance)
 
 
 @kernel
 def _fuse_pressure(x: Filter, law: Law, time: float, altitude: float, variance: float) -> float:
-    return fusion.fuse_pressure(x[0], law[0].tuning, time, altitude, variance)
+    return fusion.fuse_pressure(x[0], law[0].tuning, law[0].gates, time, altitude, variance)
 
 
 @kernel
 def _fuse_heading(x: Filter, law: Law, time: float, field: Vec3) -> float:
-    return fusion.fuse_heading(x[0], law[0].tuning, time, field)
+    return fusion.fuse_heading(x[0], law[0].tuning, law[0].gates, time, field)
 
 
 @kernel
 def _fuse_range(x: Filter, law: Law, time: float, measured: float, variance: float) -> float:
-    return fusion.fuse_range(x[0], law[0].tuning, time, measured, variance)
+    return fusion.fuse_range(x[0], law[0].tuning, law[0].gates, time, measured, variance)
 
 
 @kernel
-def _present_covariance(x: Filter, law: Law, now: float, M: Array) -> None:
-    """The covariance (17, 17) of the present that ``_tick`` returned."""
+def _present_covariance(x: Filter, law: Law, now: float, M: Array, X: Array) -> None:
+    """The covariance (17, 17) of what ``_tick`` returned, and that with the frame (17, 4)."""
     s, t = x[0], law[0].tuning
     for i in range(ERRORS):
         for j in range(ERRORS):
             M[i, j] = s.covariance[i, j]
+        for j in range(FRAME):
+            X[i, j] = s.shared[i, j]
     q, time = vec4(s.q), s.time
     p, v = vec3(s.p, 0), vec3(s.v, 0)
     for k in range(s.first - 1, s.end):
@@ -293,7 +307,9 @@ def _present_covariance(x: Filter, law: Law, now: float, M: Array) -> None:
         w = (row[4] - s.gyro_bias[0], row[5] - s.gyro_bias[1], row[6] - s.gyro_bias[2])
         dt = end - time
         if dt > 0.0:
-            propagate(M, matrix_from_quaternion(q), f, w, dt)
+            blocks = transition(matrix_from_quaternion(q), f, w, dt)
+            propagate(M, blocks, dt)
+            carry(X, blocks, dt)
             add_noise(M, t, dt, int(row[LOST]))
             p, v, q, _ = integrated(p, v, q, f, w, dt)
             time = end

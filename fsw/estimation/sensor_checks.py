@@ -30,6 +30,7 @@ SENSOR_OF: Final[dict[type, Sensor]] = {
 # resolution. Barometers and rangefinders do repeat themselves.
 _NEVER_REPEAT: Final = (PoseSample, GnssSample)
 _SHOWN: Final = 1.0  # s, for which a fault counts after it was seen
+_LONGEST_APART: Final = 0.25  # s; farther apart, readings were lost
 _FARTHEST_RANGE: Final = 200.0  # m
 _STRONGEST_FIELD: Final = 5.0  # Gauss, ten times the Earth's
 
@@ -40,6 +41,7 @@ class Health(NamedTuple):
     sensor: Sensor
     time: float = -math.inf  # s, newest time stamp of a sample
     came: float = -1.0  # s, when that came; negative: never
+    apart: float = 0.0  # s, of its time stamp from the one before
     numbers: tuple[float, ...] = ()  # of that sample
     fused: tuple[float, ...] = ()  # s, when each part of it was fused last
     ratio: tuple[float, ...] = ()  # chi-square over gate, of each part
@@ -84,7 +86,8 @@ def arrived(
         fault = SensorFault.STUCK
     else:
         fault = SensorFault.NONE
-    health = health._replace(time=sample.time, came=now, numbers=numbers)
+    apart = min(sample.time - health.time, _LONGEST_APART)
+    health = health._replace(time=sample.time, came=now, apart=apart, numbers=numbers)
     return (health.with_fault(fault, now) if fault else health), fault
 
 

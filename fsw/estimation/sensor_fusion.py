@@ -18,7 +18,8 @@ import numpy as np
 
 from fsw.compiled import packed
 from fsw.estimation import kernels
-from fsw.estimation.error_state import ERRORS, FILTER, IMU_CAPACITY, Array, Filter
+from fsw.estimation.drift import FrameDrift
+from fsw.estimation.error_state import DELAY, ERRORS, FILTER, FRAME, IMU_CAPACITY, Array, Filter
 from fsw.estimation.imu import STUCK_READINGS, TIME_TOLERANCE
 from fsw.estimation.joint_filter import joint_gain
 from fsw.estimation.sensor_checks import SENSOR_OF, Aiding, Health, arrived, believable
@@ -87,9 +88,12 @@ class FusionMemory(NamedTuple):
     health: tuple[Health, ...] = ()  # of each sensor heard so far
     field: Vec3 | None = None  # Gauss, body, the last one
     reset_counter: int | None = None  # of the last pose
+    frame: FrameDrift = FrameDrift()  # of poses that drift
     reset: Reset = Reset()
     gnss: GnssSample | None = None  # the newest one
+    pose: PoseSample | None = None  # the last one that the filter has reached
     delay: float = 0.0  # s, that measurements have lately taken
+    delay_sigma: float = 0.0  # s, with which the estimate of the pose's own delay began
 
     def of(self, sensor: Sensor) -> Health:
         """What is known of a sensor."""
@@ -235,9 +239,10 @@ class SensorFusion:
     def __init__(self, tuning: EstimatorTuning, tick: float) -> None:
         """Design the joints' filter for a ``tick`` [s]."""
         self.tuning = tuning
-        self.law = packed(EstimatorLaw(tuning, joint_gain(tuning, tick)))
+        self.law = packed(EstimatorLaw(tuning, tuning.gates, joint_gain(tuning, tick)))
         self._least_p = tuning.position_floor**2
         self._least_q = tuning.attitude_floor**2
+        self._least_gnss = tuning.gnss_position_floor**2, tuning.gnss_velocity_floor**2
         self._fuse: dict[type, Callable[[FusionMemory, Any], tuple[float, ...]]] = {
             PoseSample: self._fuse_pose,
             GnssSample: self._fuse_gnss,
@@ -293,9 +298,11 @@ class SensorFusion:
 
     def covariance(self, memory: FusionMemory, now: float) -> Array:
         """Covariance (17, 17) [SI] of the error of the state at ``now`` [s]."""
-        found = np.empty((ERRORS, ERRORS))
-        kernels.present_covariance(memory.numbers, self.law, now, found)
-        return found
+        found, shared = np.empty((ERRORS, ERRORS)), np.empty((ERRORS, FRAME))
+        kernels.present_covariance(memory.numbers, self.law, now, found, shared)
+        if not memory.numbers[0]["drifts"]:
+            return found
+        return memory.frame.in_world(found, shared, memory.numbers[0])
 
     def take(self, memory: FusionMemory, sample: Aiding, now: float) -> FusionMemory:
         """Check a ``sample`` that came at ``now`` [s] and let it wait for its time."""
@@ -306,6 +313,8 @@ class SensorFusion:
         time = sample.time
         if isinstance(sample, PoseSample):
             time -= float(x["pose_delay"][0]) if memory.started else self.tuning.pose_delay
+        elif isinstance(sample, GnssSample):
+            time -= self.tuning.gnss_delay
         if not fault and memory.started and time < x["time"][0] - LATE:
             fault = SensorFault.TOO_OLD
             health = health.with_fault(fault, now)
@@ -326,6 +335,18 @@ class SensorFusion:
             arrivals=memory.arrivals + 1,
         )
 
+    def _with_delay_known(self, memory: FusionMemory) -> FusionMemory:
+        """The memory after the parameters of the pose's delay may have changed in flight."""
+        x, sigma = memory.numbers[0], self.tuning.pose_delay_sigma
+        if not sigma:
+            x["pose_delay"] = self.tuning.pose_delay
+        if sigma == memory.delay_sigma or not memory.started:
+            return memory
+        M = x["covariance"]
+        M[DELAY], M[:, DELAY], x["shared"][DELAY] = 0.0, 0.0, 0.0
+        M[DELAY, DELAY] = sigma**2
+        return memory._replace(delay_sigma=sigma)
+
     def _delay(self, before: float, delay: float, apart: float) -> float:
         """How long measurements take, after one did so, ``apart`` [s] from its sensor's last one.
 
@@ -345,29 +366,29 @@ class SensorFusion:
         for one in reversed(memory.waiting):
             sample = one.sample
             if isinstance(sample, PoseSample):
-                self._begin(
-                    memory,
-                    sample.time,
-                    (sample.position, _REST, normalised(sample.attitude)),
+                stated = (
                     believable(sample.position_variance, self._least_p),
                     believable(sample.attitude_variance, self._least_q),
                 )
+                place = sample.position, _REST, normalised(sample.attitude)
+                self._begin(memory, sample.time, place, *stated)
+                memory = memory._replace(frame=FrameDrift(*stated))
                 break
             if isinstance(sample, GnssSample) and memory.field is not None:
                 level = _levelled(memory.numbers, memory.field, self.tuning.declination)
                 tilt = self.tuning.tilt**2
                 self._begin(
                     memory,
-                    sample.time,
+                    sample.time - self.tuning.gnss_delay,
                     (sample.position, sample.velocity, level),
-                    believable(sample.position_variance, self._least_p),
-                    (tilt, tilt, self.tuning.heading**2),
+                    believable(sample.position_variance, self._least_gnss[0]),
+                    (tilt, tilt, self.tuning.start_heading**2),
                 )
                 kernels.couple_level(memory.numbers, self.law)
                 break
         else:
             return memory._replace(waiting=())
-        return memory._replace(started=True, waiting=())
+        return memory._replace(started=True, waiting=(), delay_sigma=self.tuning.pose_delay_sigma)
 
     def _begin(
         self,
@@ -393,6 +414,15 @@ class SensorFusion:
     def _fuse_one(self, memory: FusionMemory, one: Waiting, now: float) -> FusionMemory:
         sample = one.sample
         health = memory.of(SENSOR_OF[type(sample)])
+        announced, drifts = False, False
+        if isinstance(sample, PoseSample):
+            memory = self._with_delay_known(memory)
+            announced = memory.reset_counter not in (None, sample.reset_counter)
+            drifts = sample.drifts
+            memory = memory._replace(reset_counter=sample.reset_counter)
+            if drifts:
+                memory = self._with_frame(memory, sample, announced)
+        before = memory.numbers[0].copy() if announced and drifts else None
         ratio = self._fuse[type(sample)](memory, sample)
         fused = health.fused or (now,) * len(ratio)
         fused = tuple([now if r <= 1.0 else before for r, before in zip(ratio, fused, strict=True)])
@@ -401,36 +431,55 @@ class SensorFusion:
         health = health._replace(ratio=ratio, fused=fused, innovation=shown)
         if max(ratio) > 1.0:
             health = health.with_fault(SensorFault.JUMP, now)
-        counted = sample.reset_counter if isinstance(sample, PoseSample) else memory.reset_counter
-        announced = memory.reset_counter is not None and counted != memory.reset_counter
-        memory = memory.noting(health)._replace(reset_counter=counted)
+        memory = memory.noting(health)
+        if isinstance(sample, PoseSample):
+            memory = memory._replace(pose=sample)
         long_refused = now - min(fused) > self.tuning.reset_time
         if max(ratio) > 1.0 and (announced or long_refused):
             memory = self._reset(memory, one, ratio)
             memory = memory.noting(health._replace(fused=(now,) * len(ratio)))
+        elif before is not None:
+            memory = memory.jumped(*_jump(before, memory.numbers[0]))
         return memory
+
+    def _with_frame(
+        self, memory: FusionMemory, sample: PoseSample, announced: bool
+    ) -> FusionMemory:
+        """The memory after a frame that drifts has moved, to where a pose says it is."""
+        stated = (
+            believable(sample.position_variance, self._least_p),
+            believable(sample.attitude_variance, self._least_q),
+        )
+        return memory._replace(frame=memory.frame.moved(memory.numbers[0], stated, announced))
+
+    def _noise(self, memory: FusionMemory, sample: PoseSample) -> tuple[Vec3, Vec3]:
+        """Variances [m^2, NED] and [rad^2, FRD] of a pose in its own frame."""
+        if sample.drifts:
+            return memory.frame.place_noise, memory.frame.attitude_noise
+        return (
+            believable(sample.position_variance, self._least_p),
+            believable(sample.attitude_variance, self._least_q),
+        )
 
     def _reset(self, memory: FusionMemory, one: Waiting, ratio: tuple[float, ...]) -> FusionMemory:
         """Take what the gate refused for long as it is."""
         x, law, sample = memory.numbers, self.law, one.sample
         place, velocity, turn = _REST, _REST, _NO_TURN
         if isinstance(sample, PoseSample):
-            variance = believable(sample.position_variance, self._least_p)
+            variance, about = self._noise(memory, sample)
             if ratio[0] > 1.0:
                 place = kernels.set_place(x, law, one.time, sample.position, variance)
             if ratio[1] > 1.0:
-                before = _attitude(x)
+                before = _attitude(x[0])
                 after = normalised(sample.attitude)
-                kernels.set_attitude(
-                    x, law, after, believable(sample.attitude_variance, self._least_q)
-                )
+                kernels.set_attitude(x, law, after, about)
                 turn = multiply(after, conjugate(before))
         elif isinstance(sample, GnssSample):
             if ratio[0] > 1.0:
-                variance = believable(sample.position_variance, self._least_p)
+                variance = believable(sample.position_variance, self._least_gnss[0])
                 place = kernels.set_place(x, law, one.time, sample.position, variance)
             if ratio[1] > 1.0:
-                variance = believable(sample.velocity_variance, self._least_p)
+                variance = believable(sample.velocity_variance, self._least_gnss[1])
                 velocity = kernels.set_velocity(x, law, sample.velocity, variance)
         else:
             return memory
@@ -443,23 +492,22 @@ class SensorFusion:
             sample.time,
             sample.position,
             normalised(sample.attitude),
-            believable(sample.position_variance, self._least_p),
-            believable(sample.attitude_variance, self._least_q),
+            *self._noise(memory, sample),
         )
 
     def _fuse_gnss(self, memory: FusionMemory, sample: GnssSample) -> tuple[float, ...]:
         return kernels.fuse_gnss(
             memory.numbers,
             self.law,
-            sample.time,
+            sample.time - self.tuning.gnss_delay,
             sample.position,
             sample.velocity,
-            believable(sample.position_variance, self._least_p),
-            believable(sample.velocity_variance, self._least_p),
+            believable(sample.position_variance, self._least_gnss[0]),
+            believable(sample.velocity_variance, self._least_gnss[1]),
         )
 
     def _fuse_pressure(self, memory: FusionMemory, sample: PressureSample) -> tuple[float, ...]:
-        variance = max(sample.variance, self._least_p)
+        variance = max(sample.variance, self.tuning.pressure_floor**2)
         return (
             kernels.fuse_pressure(memory.numbers, self.law, sample.time, sample.altitude, variance),
         )
@@ -468,15 +516,22 @@ class SensorFusion:
         return (kernels.fuse_heading(memory.numbers, self.law, sample.time, sample.field),)
 
     def _fuse_range(self, memory: FusionMemory, sample: RangeSample) -> tuple[float, ...]:
-        variance = max(sample.variance, self._least_p)
+        variance = max(sample.variance, self.tuning.range_floor**2)
         return (
             kernels.fuse_range(memory.numbers, self.law, sample.time, sample.distance, variance),
         )
 
 
-def _attitude(x: Filter) -> Vec4:
-    w, i, j, k = x["q"][0].tolist()
+def _attitude(x: Any) -> Vec4:
+    w, i, j, k = x["q"].tolist()
     return w, i, j, k
+
+
+def _jump(before: Any, after: Any) -> tuple[Vec3, Vec3, Vec4]:
+    """Position [m, NED], velocity [m/s, NED] and turn [1] from one state to another."""
+    px, py, pz = (after["p"] - before["p"]).tolist()
+    vx, vy, vz = (after["v"] - before["v"]).tolist()
+    return (px, py, pz), (vx, vy, vz), multiply(_attitude(after), conjugate(_attitude(before)))
 
 
 def _levelled(x: Filter, field: Vec3, declination: float) -> Vec4:

@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
-from typing import Final
+
+from scipy.special import gammainccinv
 
 from fsw.signals import Vec3
-
-GATES: Final = (25.0, 28.7, 32.1)  # chi-square of 1, 2, 3 readings that one in 1.7 million exceeds
 
 
 @dataclass(frozen=True, slots=True)
 class EstimatorTuning:
-    """Densities are of white noise, one sided, as data sheets and PX4 give them."""
+    """Densities are of white noise, one sided, as data sheets give them."""
 
     # IMU. More than a data sheet's: what rotors shake, and errors of scale, are in it.
     accel_noise: float = 0.03  # m/s^2/sqrt(Hz)
     gyro_noise: float = 1.5e-3  # rad/s/sqrt(Hz)
-    accel_bias_walk: float = 3e-3  # m/s^3/sqrt(Hz), PX4's EKF2_ACC_B_NOISE
+    accel_bias_walk: float = 3e-3  # m/s^3/sqrt(Hz)
     gyro_bias_walk: float = 2e-4  # rad/s^2/sqrt(Hz)
     accel_range: float = 160.0  # m/s^2; beyond it, a reading is none
     gyro_range: float = 35.0  # rad/s
@@ -36,11 +36,12 @@ class EstimatorTuning:
     gyro_bias: float = 0.03  # rad/s
     velocity: float = 0.5  # m/s
     tilt: float = 0.02  # rad, where the accelerometer gives it, besides its bias
-    heading: float = 0.1  # rad, where the magnetometer gives it
+    start_heading: float = 0.1  # rad, where the magnetometer gives it
     baro_bias: float = 3.0  # m
     baro_bias_walk: float = 0.03  # m/s/sqrt(Hz)
 
-    # How much longer than its time stamp says a pose takes: PX4's EKF2_EV_DELAY.
+    # How much longer than its time stamp says a reading takes.
+    gnss_delay: float = 0.0  # s
     pose_delay: float = 0.0  # s
     pose_delay_sigma: float = 0.0  # s, known so well at the start; 0: not estimated in flight
     pose_delay_walk: float = 1e-4  # s/sqrt(s)
@@ -49,11 +50,24 @@ class EstimatorTuning:
     # this; older ones are of no use.
     longest_delay: float = 0.25  # s
     delay_decay: float = 0.01  # s/s, by which it is forgotten how long they took
-    position_floor: float = 2e-4  # m, the least standard deviation that a sensor is believed
+    # The least standard deviations that sensors are believed, or theirs where they state none.
+    position_floor: float = 2e-4  # m, of a pose
     attitude_floor: float = 1e-3  # rad
+    gnss_position_floor: float = 0.01  # m
+    gnss_velocity_floor: float = 0.1  # m/s
+    pressure_floor: float = 0.2  # m: noise of a small barometer, 0.1 m, and gusts
+    range_floor: float = 0.01  # m
     mag_noise: float = 0.01  # Gauss
-    declination: float = 0.0  # rad
+    declination: float = math.radians(2.9)  # rad, at the default origin (World Magnetic Model 2020)
     ground: float = 0.0  # m, NED z of what the rangefinder measures against
+
+    # Readings farther from what is expected are not fused [standard deviations].
+    pose_gate: float = 5.0
+    gnss_position_gate: float = 5.0
+    gnss_velocity_gate: float = 5.0
+    pressure_gate: float = 5.0
+    heading_gate: float = 5.0
+    range_gate: float = 5.0
 
     encoder_noise: float = 4.4e-4  # rad; 12 bit a turn are 1.5 mrad
     joint_disturbance_walk: float = 50.0  # rad/s^3/sqrt(Hz): 135 rad/s of bandwidth
@@ -63,10 +77,40 @@ class EstimatorTuning:
     speed_limit: float = 50.0  # m/s
     place_limit: float = 1000.0  # m from the origin
 
+    @property
+    def gates(self) -> Gates:
+        """Chi-square of each kind of measurement, at its gate."""
+        return Gates(
+            pose=chi_square(self.pose_gate, 3),
+            gnss_position=chi_square(self.gnss_position_gate, 3),
+            gnss_velocity=chi_square(self.gnss_velocity_gate, 3),
+            pressure=chi_square(self.pressure_gate, 1),
+            heading=chi_square(self.heading_gate, 1),
+            range=chi_square(self.range_gate, 1),
+        )
+
+
+def chi_square(sigmas: float, readings: int) -> float:
+    """Chi-square of so many ``readings`` exceeded as seldom as ``sigmas`` [1] are by one."""
+    return 2.0 * float(gammainccinv(0.5 * readings, math.erfc(sigmas / math.sqrt(2.0))))
+
+
+@dataclass(frozen=True, slots=True)
+class Gates:
+    """Chi-square beyond which a measurement is not fused."""
+
+    pose: float  # of position, and of attitude
+    gnss_position: float
+    gnss_velocity: float
+    pressure: float
+    heading: float
+    range: float
+
 
 @dataclass(frozen=True, slots=True)
 class EstimatorLaw:
     """Everything the kernels need that does not change in flight."""
 
     tuning: EstimatorTuning
+    gates: Gates
     joint_gain: Vec3  # of angle [1], rate [1/s] and disturbance [1/s^2], a reading

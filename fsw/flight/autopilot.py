@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
 from fsw.control.cascade import (
     UNGUARDED,
     Cascade,
@@ -20,6 +22,8 @@ from fsw.control.cascade import (
 from fsw.control.safety_filter import NO_ZONES, moving_zones
 from fsw.control.safety_gate import gate
 from fsw.estimation.estimator import estimate_state
+from fsw.estimation.sensor_fusion import FusionMemory
+from fsw.flight.accuracy_watch import AccuracyWatch
 from fsw.flight.commander import Commander, acknowledgement
 from fsw.flight.exact_state import ExactState
 from fsw.flight.failsafe import FAULTS, Condition
@@ -31,7 +35,7 @@ from fsw.flight.safe_set import SafeSetCheck
 from fsw.flight.safety_watch import SafetyWatch
 from fsw.flight.sensed_state import SensedState
 from fsw.flight.state import FlightState, PlanMemory
-from fsw.flight.uncertain_clearance import widened
+from fsw.flight.uncertain_clearance import KeptSet, UncertainClearance, pose_covariance
 from fsw.model.battery import Levels, corrected, drained
 from fsw.model.body import body_of
 from fsw.model.nominal import REST_INPUT
@@ -92,7 +96,18 @@ class Autopilot:
         )
         self._sensed = SensedState(config.estimator, self._cascade)
         self._exact = ExactState(self._cascade)
-        self._zones: tuple[SafeSet, EndEffectorTarget | None, Array] = (SafeSet(), None, NO_ZONES)
+        self._accuracy = AccuracyWatch(config, self._safe_sets.loop_tube)
+        self._clearance = UncertainClearance(
+            config.limits.clearance_sigmas,
+            body_of(config.planner.body, config.airframe),
+            config.airframe.link_length,
+            config.planner.tunings,
+            # Half a period until one is asked for, what it takes then, and the loop's own lag.
+            0.5 * config.planner.period
+            + config.plan_delay_ticks * tick
+            + self._cascade.law.filter.lag,
+        )
+        self._zones: tuple[KeptSet, EndEffectorTarget | None, Array] = (KeptSet(), None, NO_ZONES)
         self._ticks_per_plan = config.mpc_period_us // config.tick_period_us
 
     def warm_up(self) -> None:
@@ -135,19 +150,24 @@ class Autopilot:
         flown = state.vehicle.flies and nominal is not None
         if flown and nominal is not None:
             nominal, plan, u = self._plans.follow(plan, nominal, inputs.plan, now_us, ticks)
-        safety = self._watch.off_plan(state.safety, estimate, nominal if flown else None)
+        safety = self._watch.off_plan(
+            state.safety, estimate, nominal if flown else None, state.accuracy.reach
+        )
         request = None
         if planning_due:
             mission = self._safe_sets.hold_silent_zones(state.mission, now_us)
             if mission is not state.mission:
                 state = replace(state, mission=mission)
+            covariance = self._sensed.covariance(fusion)
+            state = self._keep_clear(state, estimate, fusion, covariance)
             if flown and nominal is not None:
                 state, request, plan = self._request_plan(
                     state, estimate, nominal, plan, now_us, safety.replan
                 )
                 safety = replace(safety, replan=False) if safety.replan else safety
             state = self._report_slowly(state, estimate, now_us)
-            state = self._sensed.reported(state, fusion, estimate)
+            state = self._sensed.reported(state, fusion, estimate, covariance)
+            state = self._see_accuracy(state, covariance, texts)
             safety = self._watch.breach(safety, estimate, state.constraints, flies=flown)
         sent, memory, replaced, (pushed, margin) = self._actuate(state, estimate, nominal, u, ticks)
         if pushed or safety.filter_us >= 0:
@@ -178,6 +198,8 @@ class Autopilot:
             state.estimator,
             state.aiding,
             trust,
+            state.kept,
+            state.accuracy,
         )
         snapshot = _snapshot(state, estimate, u, inputs)
         return state, TickOutputs(
@@ -203,6 +225,8 @@ class Autopilot:
                 flies=state.vehicle.flies,
             )
             state = replace(state, mission=mission)
+            if mission.safe_set is not state.kept.source:
+                state = replace(state, kept=state.kept.of(mission.safe_set))
             if inputs.mission is not None:
                 state = with_update(state, inputs.mission, self.config, now_us)
         if inputs.battery is not None:
@@ -242,20 +266,45 @@ class Autopilot:
             t_apply_us=apply_us,
             start=start,
             targets=targets,
-            safe_set=self._kept_clear(state, estimate),
+            safe_set=state.kept.safe_set,
             from_nominal=from_nominal,
             joint_targets=joints,
         )
         return state, request, requested(plan, apply_us)
 
-    def _kept_clear(self, state: FlightState, estimate: StateEstimate) -> SafeSet:
-        """The safe set in force; its clearances grow with what the estimator does not know."""
-        safe_set, sigmas = state.mission.safe_set, self.config.limits.clearance_sigmas
-        if state.fusion is None or not safe_set.zones or not sigmas > 0.0:
-            return safe_set
-        covariance = self._sensed.covariance(state.fusion)
-        links = self.config.airframe.link_length
-        return widened(safe_set, estimate, covariance, sigmas, links)
+    def _see_accuracy(
+        self, state: FlightState, covariance: Array | None, texts: list[StatusText]
+    ) -> FlightState:
+        """Say what the sensors' errors add to the tube, once that is known."""
+        if covariance is None or state.accuracy.told:
+            return state
+        safe_set, source = state.kept.source, state.aiding.pose.value
+        sure = self._accuracy.see(
+            state.accuracy, state.t_us, safe_set, source, state.kept.sigma, covariance, texts
+        )
+        return replace(state, accuracy=sure)
+
+    def _keep_clear(
+        self,
+        state: FlightState,
+        estimate: StateEstimate,
+        fusion: FusionMemory | None,
+        covariance: Array | None,
+    ) -> FlightState:
+        """The state with clearances that have grown by what the estimate is uncertain about now.
+
+        ``covariance`` (17, 17) [SI] is that of the filter, if there is one; without, exact states
+        are uncertain while they are doubted.
+        """
+        pose = None
+        if covariance is not None and fusion is not None:
+            pose = pose_covariance(covariance, estimate)
+            pose = pose + self._sensed.lasting_error(fusion, estimate)
+        elif fusion is None and state.trust.doubted:
+            position, attitude = state.aiding.position_sigma, state.aiding.attitude_sigma
+            pose = np.diag((position**2,) * 3 + (attitude**2,) * 3)
+        kept = self._clearance.keep(state.kept, state.mission.safe_set, estimate, pose)
+        return state if kept is state.kept else replace(state, kept=kept)
 
     def _report_slowly(
         self, state: FlightState, estimate: StateEstimate, now_us: int
@@ -264,7 +313,7 @@ class Autopilot:
         target = self._commander.mode(state).target(state, now_us)
         return replace(
             state,
-            constraints=self._safe_sets.margins(state.mission.safe_set, estimate, target),
+            constraints=self._safe_sets.margins(state.kept, estimate, target),
             reference=target if state.vehicle.flies else None,
             arming_refusal=self._commander.arming_refusal(state, estimate),
             battery=self._battery(state),
@@ -311,12 +360,12 @@ class Autopilot:
 
     def _zones_now(self, state: FlightState) -> Array:
         """The zones for the safety filter; made anew where they or their target changed."""
-        safe_set, target = state.mission.safe_set, state.reference
+        kept, target = state.kept, state.reference
         known, known_target, zones = self._zones
-        if safe_set is not known or target is not known_target:
-            if safe_set is not known or safe_set.kind is ConstraintKind.WORKSPACE:
-                zones = moving_zones(safe_set, target)
-            self._zones = (safe_set, target, zones)
+        if kept is not known or target is not known_target:
+            if kept is not known or kept.safe_set.kind is ConstraintKind.WORKSPACE:
+                zones = moving_zones(kept.safe_set, target, kept.added)
+            self._zones = (kept, target, zones)
         return zones
 
 

@@ -170,7 +170,7 @@ class Commander:
         config = self._config
         room = stand_off(config.planner.walls) + self._tube_radius
         place = retreat_place(
-            state.mission.safe_set, estimate, self._body, config.airframe.link_length, room
+            state.kept.safe_set, estimate, self._body, config.airframe.link_length, room
         )
         return self._towards(state, PositionGoal(MotionSetpoint(False, place)), estimate)
 

@@ -29,7 +29,7 @@ SATELLITES_DOUBTED, ACCELERATION_DOUBTED = 1024, 2048
 _KNOWN_ANGLE: Final = 0.2  # rad
 _KNOWN_SPEED: Final = 0.5  # m/s
 _KNOWN_PLACE: Final = 0.5  # m, in dead reckoning
-_AIDS_PLACE: Final = (Sensor.POSE, Sensor.GNSS)
+AIDS_PLACE: Final = (Sensor.POSE, Sensor.GNSS)
 _UPPER: Final = np.triu_indices(6)
 _POSE: Final = np.ix_([P, P + 1, P + 2, TH, TH + 1, TH + 2], [P, P + 1, P + 2, TH, TH + 1, TH + 2])
 _MOTION: Final = np.ix_(
@@ -39,7 +39,7 @@ _MOTION: Final = np.ix_(
 
 def unaided(memory: FusionMemory, now: float) -> float:
     """Time [s] at ``now`` [s] since a position was used last; infinite: never."""
-    used = [one.fused[0] for one in memory.health if one.sensor in _AIDS_PLACE and one.fused]
+    used = [one.fused[0] for one in memory.health if one.sensor in AIDS_PLACE and one.fused]
     return now - max(used) if used else math.inf
 
 

@@ -16,7 +16,7 @@ from fsw.estimation.frame_trust import FrameTrust, believed
 from fsw.estimation.sensor_fault import Sensor
 from fsw.flight.jump import returned
 from fsw.flight.state import AIDED, Aiding, FlightState
-from fsw.signals import StateEstimate, StatusText, TickInputs
+from fsw.signals import Severity, StateEstimate, StatusText, TickInputs
 
 
 class ExactState:
@@ -64,7 +64,11 @@ class ExactState:
     ) -> tuple[FlightState, FrameTrust, StateEstimate]:
         joints = partial(self._cascade.joint_acceleration, state.cascade, before)
         trust, found = believed(state.trust, inputs.sensors, before, joints)
-        aiding = _aiding(trust, found.t_us) if trust.doubted else AIDED
+        aiding = AIDED
+        if trust.doubted:
+            aiding = _aiding(trust, found.t_us)
+            trust, sentences = trust.reported(found.t_us)
+            texts.extend(StatusText(Severity.WARNING, text) for text in sentences)
         if trust.returned_us:
             state = returned(state, found, before, texts)
         if aiding is not state.aiding or state.invalid_ticks:

@@ -13,6 +13,7 @@ from enum import Enum
 from typing import TYPE_CHECKING, Final
 
 from fsw.estimation.sensor_fault import sentence
+from fsw.flight.uncertain_clearance import LACKING
 from fsw.frozen import dataclass as value_dataclass
 from fsw.parameters.flight_config import FlightConfig, FlightLimits
 from fsw.signals import Charge, Mode, Severity, StateEstimate
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 
 PLAN_STALE_PERIODS: Final = 3
 INVALID_TICKS: Final = 5  # 10 ms without an estimate
+_LACKING_US: Final = 500_000  # without room enough; hidden markers, 0.2 s, are none
 MIN_UP: Final = 0.34  # cosine of 70 degrees of tilt
 
 
@@ -64,6 +66,7 @@ class Condition(Enum):
     BREACH = "outside the safe set"
     POSITION_LOW = "position uncertain"
     SENSOR_LOST = "sensor lost"
+    ROOM_LACKING = "too little room for what the estimate is not sure of"
     TUBE_LEFT = "off the plan"
     FILTER_ACTIVE = "too fast towards a zone"
     PLAN_STALE = "no plan for three periods"
@@ -149,6 +152,12 @@ def _on_datalink_lost(context: FailsafeContext) -> Action:
         return Action.NONE
     known = {1: Action.HOLD, 2: Action.RETURN, 3: Action.LAND}
     return known.get(context.limits.station_loss_action, Action.NONE)
+
+
+def _lacks_room(context: FailsafeContext) -> bool:
+    kept = context.state.kept
+    lasts = context.estimate.t_us - kept.ample_us >= _LACKING_US
+    return kept.lacking > LACKING and lasts and context.state.vehicle.flies
 
 
 def _on_battery(context: FailsafeContext) -> Action:
@@ -264,6 +273,13 @@ FAILSAFES: Final = (
         Severity.CRITICAL,
         _lost_sensor,
         of_vehicle=True,
+    ),
+    Failsafe(
+        Condition.ROOM_LACKING,
+        _lacks_room,
+        _always(Action.WARN),
+        Severity.CRITICAL,
+        detail=lambda c: f": {1e3 * c.state.kept.lacking:.0f} mm less than SAFE_SIGMAS asks for",
     ),
     Failsafe(
         Condition.TUBE_LEFT,

@@ -42,7 +42,7 @@ class ReferenceHorizon:
             if not mode.external_reference:
                 return state, (targets, joints)
         p_WE, v_WE = point_in_flight(estimate, self._config.airframe.link_length)
-        safe_set = state.mission.safe_set
+        safe_set = state.kept.safe_set
         return state, (self._governor.limit_horizon(targets, p_WE, v_WE, safe_set), joints)
 
     def _generated(
@@ -54,7 +54,7 @@ class ReferenceHorizon:
         estimate: StateEstimate,
         t_us: int,
     ) -> tuple[FlightState, Horizon]:
-        safe_set, waypoints, kept = state.mission.safe_set, state.setpoint.waypoints, goal
+        safe_set, waypoints, kept = state.kept.safe_set, state.setpoint.waypoints, goal
         if self._is_off_plan(state, estimate):
             still = MotionSetpoint(reference.of_end_effector, v=(0.0, 0.0, 0.0))
             goal = replace(goal, motion=still, orbit=None)

@@ -14,6 +14,7 @@ from dataclasses import replace
 from fsw.barriers.margins import Margins
 from fsw.flight.safe_set_change import growth, is_moving, is_update, summary
 from fsw.flight.state import MissionMemory
+from fsw.flight.uncertain_clearance import KeptSet
 from fsw.model.body import body_of
 from fsw.mpc.reference import still_at
 from fsw.parameters.consistency import Finding, analyse, loop_tube, part_tube, refusals, warnings
@@ -154,7 +155,7 @@ class SafeSetCheck:
             whose = "no source owns" if mission.owner is None else f"{mission.owner} owns"
             return f"{grown}, which {whose}"
         if flies and estimate is not None:
-            margins = self.margins(safe_set, estimate, None).margins
+            margins = self._margins.report(safe_set, estimate, None).margins
             if not min(margins, default=0.0) >= 0.0:
                 return "the vehicle is not inside it, and another source owns the safe set"
         return ""
@@ -241,13 +242,14 @@ class SafeSetCheck:
         """Compile every kernel of distances and margins, before anything flies."""
         walled = SafeSet((wall((0.0, 0.0, -1.0), 0.0, 0.0),))
         surfaces(walled, estimate.p_WB, estimate.t_us)
-        self.margins(walled, estimate, still_at(estimate.p_WB))
+        self._margins.report(walled, estimate, still_at(estimate.p_WB))
 
     def margins(
-        self, safe_set: SafeSet, estimate: StateEstimate, target: EndEffectorTarget | None
+        self, kept: KeptSet, estimate: StateEstimate, target: EndEffectorTarget | None
     ) -> ConstraintReport:
-        """Margins and barrier values of the vehicle in the safe set."""
-        return self._margins.report(safe_set, estimate, target)
+        """Margins and barrier values of the vehicle in the safe set in force."""
+        report = self._margins.report(kept.source, estimate, target)
+        return replace(report, added=kept.added, lacking=kept.lacking) if kept.added else report
 
 
 def _is_repeated(announcement: SafeSetAnnouncement, refused: SafeSetAnnouncement | None) -> bool:

@@ -40,13 +40,21 @@ class SafetyWatch:
         self._back = _BACK * self.radius
 
     def off_plan(
-        self, memory: SafetyMemory, estimate: StateEstimate, nominal: PredictionState | None
+        self,
+        memory: SafetyMemory,
+        estimate: StateEstimate,
+        nominal: PredictionState | None,
+        unsure: float = 0.0,
     ) -> SafetyMemory:
-        """Compare the base with where the running plan has it now; None: nothing is flown."""
+        """Compare the base with where the running plan has it now; None: nothing is flown.
+
+        ``unsure`` [m] is what the estimate's errors add to the tube; some room is left for them.
+        """
         if nominal is None:
             return memory if memory.off_plan_us < 0 else replace(memory, off_plan_us=-1)
         (x, y, z), (px, py, pz) = estimate.p_WB, nominal.p
-        dx, dy, dz, most = x - px, y - py, z - pz, self.radius
+        dx, dy, dz = x - px, y - py, z - pz
+        most = self.radius + max(unsure - NOISE_ROOM, 0.0)
         if (
             memory.off_plan_us < 0
             and -most <= dx <= most

@@ -8,10 +8,11 @@ from dataclasses import replace
 from fsw.control.cascade import Cascade, in_hover
 from fsw.estimation import kernels
 from fsw.estimation.error_state import IMU_CAPACITY, Array
+from fsw.estimation.lasting_error import lasting_error
 from fsw.estimation.sensor_fault import Sensor, SensorFault, sentence
 from fsw.estimation.sensor_fusion import EncoderWatch, FusionMemory, SensorFusion, at_start
 from fsw.estimation.tuning import EstimatorTuning
-from fsw.flight.estimator_report import estimator_report, unaided
+from fsw.flight.estimator_report import AIDS_PLACE, estimator_report, unaided
 from fsw.flight.jump import jumped, returned, told
 from fsw.flight.state import Aiding, FlightState
 from fsw.measurements import ImuSample, JointSample, Sample
@@ -26,7 +27,7 @@ _REPEATS = 6  # of encoders; a resting arm's 12 bits are the same for longer
 _HELD = (35.0, 70.0)
 _ASKED = 0.1  # rad that joints were asked to move meanwhile; friction has held one for half of it
 _LATELY = 0.02  # s, in which a fault is one of now
-_AWAY = 0.1  # s without a position, after which its return is a jump
+_AWAY = 0.1  # s that a position is overdue, after which its return is a jump
 _QUIET = 10.0  # s without a fault until the same one is reported again
 
 
@@ -36,6 +37,7 @@ class SensedState:
     def __init__(self, tuning: EstimatorTuning, cascade: Cascade) -> None:
         self._fusion = SensorFusion(tuning, cascade.law.dt)
         self._cascade = cascade
+        self._tuning = tuning
         self._stale = tuning.stale_time
 
     def warm_up(self) -> None:
@@ -43,9 +45,15 @@ class SensedState:
         estimate = self._fusion.warm_up()
         self._cascade.joint_acceleration(in_hover(self._cascade.law.airframe, estimate), estimate)
 
-    def covariance(self, memory: FusionMemory) -> Array:
-        """Covariance (17, 17) [SI] of the error of the last tick's estimate."""
+    def covariance(self, memory: FusionMemory | None) -> Array | None:
+        """Covariance (17, 17) [SI] of the error of the estimate of a memory; None before both."""
+        if memory is None or not memory.started:
+            return None
         return self._fusion.covariance(memory, memory.now)
+
+    def lasting_error(self, memory: FusionMemory, estimate: StateEstimate) -> Array:
+        """Covariance (6, 6) of position [m, NED] and attitude [rad, NED] besides the filter's."""
+        return lasting_error(memory, self._tuning, estimate)
 
     def estimate(
         self, state: FlightState, inputs: TickInputs, texts: list[StatusText]
@@ -77,7 +85,7 @@ class SensedState:
             last = state.estimate
             # Telemetry goes by its time, and goes on.
             return state, memory, None if last is None else last._replace(t_us=inputs.sensors.t_us)
-        away = news and unaided(before, now) > _AWAY > unaided(memory, now)
+        away = news and _overdue(before, now) > _AWAY > _overdue(memory, now)
         if state.estimate is not None and away and not moved:
             state = returned(state, estimate, state.estimate, texts)
         if state.invalid_ticks:
@@ -85,12 +93,18 @@ class SensedState:
         return state, memory, estimate
 
     def reported(
-        self, state: FlightState, memory: FusionMemory | None, estimate: StateEstimate
+        self,
+        state: FlightState,
+        memory: FusionMemory | None,
+        estimate: StateEstimate,
+        covariance: Array | None,
     ) -> FlightState:
-        """The state with what the estimator says about itself now; nothing before it started."""
-        if memory is None or not memory.started:
+        """The state with what the estimator says about itself now; nothing before it started.
+
+        ``covariance`` (17, 17) [SI] is of the error of the ``estimate``.
+        """
+        if memory is None or covariance is None:
             return state
-        covariance = self._fusion.covariance(memory, memory.now)
         report = estimator_report(memory, covariance, estimate, memory.now, self._stale)
         return replace(state, estimator=report, aiding=_aiding(state, memory, report))
 
@@ -183,7 +197,7 @@ def _aiding(state: FlightState, memory: FusionMemory, report: EstimatorReport) -
     P = report.pose_covariance
     since_us = before.since_us if sensor is before.sensor else report.t_us
     return Aiding(
-        unaided_us=max(report.unaided_us, 0),
+        unaided_us=max(round(1e6 * _overdue(memory, now)), 0) if report.unaided_us > 0 else 0,
         pose=aid.sensor,
         pose_fault=aid.fault if now - aid.fault_at < _LATELY else SensorFault.STALE,
         position_sigma=math.sqrt(max(P[0], P[6], P[11])),
@@ -192,6 +206,11 @@ def _aiding(state: FlightState, memory: FusionMemory, report: EstimatorReport) -
         fault=fault,
         since_us=since_us,
     )
+
+
+def _overdue(memory: FusionMemory, now: float) -> float:
+    """Time [s] at ``now`` [s] since the next position after the last used one was due."""
+    return unaided(memory, now) - max(memory.of(one).apart for one in AIDS_PLACE)
 
 
 def _lost(memory: FusionMemory) -> tuple[Sensor | None, SensorFault]:

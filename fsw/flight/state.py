@@ -10,11 +10,13 @@ from fsw.control.tracking import Observed
 from fsw.estimation.frame_trust import FrameTrust
 from fsw.estimation.sensor_fault import Sensor, SensorFault
 from fsw.estimation.sensor_fusion import FusionMemory
+from fsw.flight.accuracy_watch import AccuracyMemory
 from fsw.flight.command_dedup import AnsweredCommand
 from fsw.flight.failsafe import Condition
 from fsw.flight.mission_sequencer import MissionFlight
 from fsw.flight.offboard_setpoints import Tilt
 from fsw.flight.setpoint_generator import PositionGoal, ReferenceState
+from fsw.flight.uncertain_clearance import KeptSet
 from fsw.frozen import dataclass
 from fsw.model.airframe import AIRFRAME
 from fsw.signals import (
@@ -210,3 +212,5 @@ class FlightState:
     estimator: EstimatorReport | None = None  # what telemetry says of it, once a planning period
     aiding: Aiding = AIDED
     trust: FrameTrust = FrameTrust()  # where states are exact
+    kept: KeptSet = KeptSet()  # the safe set, with clearances for an estimate that is not sure
+    accuracy: AccuracyMemory = AccuracyMemory()  # of the estimate, until it is told

@@ -138,6 +138,13 @@ BARRIER_MARGIN: Final = Topic(
         Field("breaches", "uint32_t", note="times the safe set was left in flight"),
         Field("departures", "uint32_t", note="times the vehicle left the tube around its plan"),
         Field("interventions", "uint32_t", note="times the safety filter engaged"),
+        _vector(
+            "added",
+            MARGINS,
+            "m, kept from each zone beyond its clearance because the estimate is not sure; NaN: no "
+            "such zone, or exact states",
+        ),
+        *_floats("lacking", note="m, what the zone with the least room for that lacks"),
     ),
 )
 END_EFFECTOR: Final = Topic(
@@ -280,6 +287,7 @@ VEHICLE_VISUAL_ODOMETRY: Final = Topic(
         doubles("position_variance", 3, "m^2"),
         doubles("orientation_variance", 3, "rad^2"),
         Field("reset_counter", "uint32_t"),
+        Field("drifts", "bool", note="its frame does, as the variances say"),
     ),
 )
 GNSS_LOCAL: Final = Topic(

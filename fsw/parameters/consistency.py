@@ -16,12 +16,22 @@ from dataclasses import dataclass
 from fsw.barriers.safe_approach import BarrierTuning
 from fsw.control.gains import tracking_gains
 from fsw.control.part_tube import LoopOfParts, PartReach, part_reaches, towards
-from fsw.control.tube import Tube, all_axes, all_axes_up_to, limits_used, tube
+from fsw.control.tube import (
+    EstimateTube,
+    Tube,
+    all_axes,
+    all_axes_up_to,
+    estimate_tube,
+    limits_used,
+    tube,
+)
 from fsw.model.airframe import GRAVITY
 from fsw.model.body import body_of
 from fsw.parameters.flight_config import FlightConfig, Surroundings
 from fsw.shapes import kind_of
 from fsw.signals import SafeSet, Zone
+
+_SIGMAS = 3.0  # that count where clearances do not grow
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +42,24 @@ class Finding:
     holds: bool
     statement: str  # with numbers, and what is enough where it does not hold
     refuses: bool = True  # a finding that only warns says False
+
+
+@dataclass(frozen=True, slots=True)
+class Accuracy:
+    """Standard deviations of an estimate, each of its worst axis."""
+
+    source: str  # of positions
+    position: float  # m, of the part of the body that is least certain
+    velocity: float  # m/s
+    tilt: float  # rad
+
+
+@dataclass(frozen=True, slots=True)
+class EstimateReach:
+    """What an estimate that is not exact adds to the tube, and to clearances [m]."""
+
+    loop: float  # the base's way off its plan, besides the position's own error
+    clearance: float  # the position's error, by which clearances grow
 
 
 def analyse(config: FlightConfig, safe_set: SafeSet, loop: Tube) -> tuple[Finding, ...]:
@@ -94,6 +122,74 @@ def loop_tube(config: FlightConfig) -> Tube:
     gains = tracking_gains(tracking, config.airframe.rotor_lag, dt)
     return tube(
         config.airframe, tracking, gains, surroundings.hanging, surroundings.disturbance_hold, dt
+    )
+
+
+def estimate_reach(config: FlightConfig, accuracy: Accuracy) -> EstimateReach:
+    """How far an estimate of an accuracy leads the vehicle, at as many sigma as clearances grow by.
+
+    Errors of position, velocity and tilt are bounded however they change; what the gyro's noise
+    does is known by its spectrum.
+    """
+    dt, airframe, tracking = config.tick_period_us * 1e-6, config.airframe, config.tuning.tracking
+    gains = tracking_gains(tracking, airframe.rotor_lag, dt)
+    moved: EstimateTube = estimate_tube(airframe, tracking, gains, dt)
+    sigmas = config.limits.clearance_sigmas or _SIGMAS
+    noise = GRAVITY * config.estimator.gyro_noise / math.sqrt(dt)
+    loop = (
+        (moved.position - 1.0) * accuracy.position
+        + moved.velocity * accuracy.velocity
+        + moved.acceleration * GRAVITY * accuracy.tilt
+        + moved.jerk * noise
+    )
+    return EstimateReach(sigmas * loop, sigmas * accuracy.position)
+
+
+def estimate_findings(
+    config: FlightConfig, safe_set: SafeSet, loop: Tube, accuracy: Accuracy
+) -> tuple[Finding, ...]:
+    """Whether what a plan keeps is enough for an estimate of an accuracy as well.
+
+    The loop is ``loop_tube(config)``. Nothing without barriers, or of a loop that follows no state.
+    """
+    if config.controller != "blf" or config.inner != "tracking":
+        return ()
+    planner, follows = config.planner, [kind_of(z.shape).follows_target for z in safe_set.zones]
+    findings = []
+    if any(follows):
+        findings.append(_estimate(config, planner.workspace, loop, accuracy, inside=True))
+    if not all(follows):
+        findings.append(_estimate(config, planner.walls, loop, accuracy, inside=False))
+    return tuple(findings)
+
+
+def _estimate(
+    config: FlightConfig, tuning: BarrierTuning, loop: Tube, accuracy: Accuracy, *, inside: bool
+) -> Finding:
+    reach, room = estimate_reach(config, accuracy), stand_off(tuning)
+    sigmas = config.limits.clearance_sigmas or _SIGMAS
+    pushed = base_reach(loop, config.surroundings)
+    # The sphere that follows the target has no room to spare: it is hardly made smaller.
+    grows = config.limits.clearance_sigmas > 0.0 and not inside
+    needed = pushed + reach.loop + (0.0 if grows else reach.clearance)
+    more = 1e3 * (needed - room)
+    remedy = (
+        f"lambda >= {needed * tuning.slope:.3f} m/s and a radius {more:.0f} mm larger"
+        if inside
+        else f"a clearance {math.ceil(more):.0f} mm larger"
+    )
+    place = "for which clearances grow" if grows else "for which the zone does not shrink"
+    return _finding(
+        "estimate",
+        room >= needed,
+        f"estimate from {accuracy.source}, {sigmas:g} sigma: a place off by "
+        f"{1e3 * reach.clearance:.0f} mm, {place}; a velocity off by "
+        f"{1e3 * sigmas * accuracy.velocity:.0f} mm/s and a tilt off by "
+        f"{1e3 * sigmas * accuracy.tilt:.1f} mrad, which move the base by "
+        f"{1e3 * reach.loop:.0f} mm at most; with the tube {1e3 * needed:.0f} mm of the "
+        f"{1e3 * room:.0f} mm that the plan keeps",
+        f"{remedy} is enough",
+        refuses=False,
     )
 
 

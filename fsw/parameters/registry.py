@@ -20,6 +20,9 @@ from fsw.tuning import number_at
 
 _DEGREE: Final = math.pi / 180.0
 _MICRO: Final = 1e-6
+_MILLI: Final = 1e-3
+# PX4 multiplies these by the step of its filter, 10 ms: densities of white noise times its root.
+_PX4_STEP: Final = 0.1  # sqrt(s)
 _IN_MICROSECONDS: Final = 1e6
 
 
@@ -101,6 +104,7 @@ def _barrier(name: str, path: str, what: str) -> list[_Row]:
 _TRACKING = "tuning.tracking"
 _WEIGHTS = "planner.weights"
 _SOFT = "planner.soft"
+_EST = "estimator"
 _ROWS: Final[dict[str, list[_Row]]] = {
     "Tracking loop": [
         ("TRK_EFFORT", f"{_TRACKING}.input_weight", "1e-6 s^8", 0.05, 100.0,
@@ -228,6 +232,55 @@ _ROWS: Final[dict[str, list[_Row]]] = {
          "SC controller: terminal sphere weight w_s5"),
         ("SC_W_CENTRE", f"{_SOFT}.centring", "", 0.0, 10000.0,
          "Naive controller with centring: weight of the distance to the sphere's centre"),
+    ],
+    "Estimator": [
+        ("EKF2_EV_DELAY", f"{_EST}.pose_delay", "ms", 0.0, 200.0,
+         "Pose: delay beyond what its time stamp says", _MILLI),
+        ("EST_EV_DELAY_SD", f"{_EST}.pose_delay_sigma", "ms", 0.0, 100.0,
+         "Pose: standard deviation of EKF2_EV_DELAY, which is then estimated in flight; 0: exact",
+         _MILLI),
+        ("EKF2_EVP_NOISE", f"{_EST}.position_floor", "m", 0.0001, 10.0,
+         "Pose: least standard deviation of the position"),
+        ("EKF2_EVA_NOISE", f"{_EST}.attitude_floor", "rad", 0.0001, 1.0,
+         "Pose: least standard deviation of the attitude"),
+        ("EKF2_EVP_GATE", f"{_EST}.pose_gate", "SD", 1.0, 20.0,
+         "Pose: gate of position and attitude"),
+        ("EKF2_GPS_DELAY", f"{_EST}.gnss_delay", "ms", 0.0, 200.0,
+         "GNSS: delay beyond what its time stamp says", _MILLI),
+        ("EKF2_GPS_P_NOISE", f"{_EST}.gnss_position_floor", "m", 0.001, 10.0,
+         "GNSS: least standard deviation of the position"),
+        ("EKF2_GPS_V_NOISE", f"{_EST}.gnss_velocity_floor", "m/s", 0.01, 5.0,
+         "GNSS: least standard deviation of the velocity"),
+        ("EKF2_GPS_P_GATE", f"{_EST}.gnss_position_gate", "SD", 1.0, 20.0,
+         "GNSS: gate of the position"),
+        ("EKF2_GPS_V_GATE", f"{_EST}.gnss_velocity_gate", "SD", 1.0, 20.0,
+         "GNSS: gate of the velocity"),
+        ("EKF2_BARO_NOISE", f"{_EST}.pressure_floor", "m", 0.01, 15.0,
+         "Barometer: least standard deviation of the height"),
+        ("EKF2_BARO_GATE", f"{_EST}.pressure_gate", "SD", 1.0, 20.0, "Barometer: gate"),
+        ("EKF2_MAG_NOISE", f"{_EST}.mag_noise", "gauss", 0.001, 1.0,
+         "Magnetometer: standard deviation of each axis"),
+        ("EKF2_HDG_GATE", f"{_EST}.heading_gate", "SD", 1.0, 20.0,
+         "Magnetometer: gate of the heading"),
+        ("EKF2_MAG_DECL", f"{_EST}.declination", "deg", -180.0, 180.0,
+         "Magnetic declination, east positive", _DEGREE),
+        ("EKF2_RNG_NOISE", f"{_EST}.range_floor", "m", 0.01, 10.0,
+         "Rangefinder: least standard deviation"),
+        ("EKF2_RNG_GATE", f"{_EST}.range_gate", "SD", 1.0, 20.0, "Rangefinder: gate"),
+        ("EKF2_GYR_NOISE", f"{_EST}.gyro_noise", "rad/s", 0.0001, 0.1,
+         "Gyro: noise, in PX4's steps of 10 ms", _PX4_STEP),
+        ("EKF2_ACC_NOISE", f"{_EST}.accel_noise", "m/s^2", 0.01, 1.0,
+         "Accelerometer: noise, in PX4's steps of 10 ms", _PX4_STEP),
+        ("EKF2_GYR_B_NOISE", f"{_EST}.gyro_bias_walk", "rad/s^2", 0.0, 0.01,
+         "Gyro: random walk of the bias, in PX4's steps of 10 ms", _PX4_STEP),
+        ("EKF2_ACC_B_NOISE", f"{_EST}.accel_bias_walk", "m/s^3", 0.0, 0.1,
+         "Accelerometer: random walk of the bias, in PX4's steps of 10 ms", _PX4_STEP),
+        ("EKF2_GBIAS_INIT", f"{_EST}.gyro_bias", "rad/s", 0.0, 0.2,
+         "Gyro: standard deviation of the bias at the start"),
+        ("EKF2_ABIAS_INIT", f"{_EST}.accel_bias", "m/s^2", 0.0, 0.5,
+         "Accelerometer: standard deviation of the bias at the start"),
+        ("EKF2_ANGERR_INIT", f"{_EST}.tilt", "rad", 0.0, 0.5,
+         "Standard deviation of the tilt at a start without a pose"),
     ],
     "Takeoff and landing": [
         ("MIS_TAKEOFF_ALT", "limits.takeoff_climb", "m", 0.3, 10.0,
@@ -370,7 +423,25 @@ _CHOICES: Final[dict[str, Choices]] = {
 # Numbers of FlightConfig that are no parameters, by the beginning of their path, and why.
 NO_PARAMETERS: Final[dict[str, str]] = {
     "battery.": "describes the vehicle",
-    "estimator.": "describes the sensors",
+    "estimator.accel_range": "range of the inertial unit",
+    "estimator.gyro_range": "range of the inertial unit",
+    "estimator.accel_jump": "what the airframe can do from one reading to the next",
+    "estimator.gyro_jump": "what the airframe can do from one reading to the next",
+    "estimator.imu_gap": "counted in ticks",
+    "estimator.lost_": "what the airframe does while the inertial unit is lost",
+    "estimator.velocity": "of use in the first second alone",
+    "estimator.start_heading": "of use in the first second alone",
+    "estimator.baro_bias": "the weather",
+    "estimator.pose_delay_walk": "of clocks",
+    "estimator.longest_delay": "size of the filter's buffer",
+    "estimator.delay_decay": "how the horizon follows the delays that are seen",
+    "estimator.ground": "the local frame's origin",
+    "estimator.encoder_noise": "describes the joints; the joint filter's gain follows from it",
+    "estimator.joint_disturbance_walk": "describes the joints",
+    "estimator.reset_time": "PX4 has no parameter for it either",
+    "estimator.stale_time": "when a sensor is called silent",
+    "estimator.speed_limit": "what no vehicle of this kind does",
+    "estimator.place_limit": "what no vehicle of this kind does",
     "origin.": "given at start: single precision is metres off in a latitude",
     "airframe.": "describes the vehicle; scales its actuators and telemetry, which must not change",
     "planner.horizon": "size of the program, which is laid out once",

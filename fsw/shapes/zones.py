@@ -95,11 +95,26 @@ def surface(
     shift = shift_of(safe_set, zone, t_us, target)
     if shift is None:
         return None
-    arrays = zone_arrays(safe_set)
+    return min(_planes(zone_arrays(safe_set), zone, p, shift), key=lambda at: at.distance)
+
+
+def all_planes(safe_set: SafeSet, p: Vec3, t_us: int) -> list[tuple[int, Surface]]:
+    """Every plane of each zone near ``p`` [m, NED] at a time, with the zone's number.
+
+    Of a zone to keep in there are several. Zones that follow the target are left out.
+    """
+    arrays, found = zone_arrays(safe_set), []
+    for zone in range(len(safe_set.zones)):
+        shift = shift_of(safe_set, zone, t_us, None)
+        if shift is not None:
+            found += [(zone, at) for at in _planes(arrays, zone, p, shift)]
+    return found
+
+
+def _planes(arrays: Array, zone: int, p: Vec3, shift: Vec3) -> list[Surface]:
     x, y, z = p[0] - shift[0], p[1] - shift[1], p[2] - shift[2]
-    planes = range(int(arrays[zone, PLANES]))
-    tried = [Surface(*_surface_at(arrays, zone, which, x, y, z)) for which in planes]
-    return min(tried, key=lambda at: at.distance)
+    which = range(int(arrays[zone, PLANES]))
+    return [Surface(*_surface_at(arrays, zone, one, x, y, z)) for one in which]
 
 
 def shift_of(

@@ -138,15 +138,16 @@ class SensorEncoder:
 
 def _about(one: PoseMeasurement) -> tuple[float, ...]:
     """All of ODOMETRY behind its pose."""
-    p, q = one.position_variance, one.attitude_variance
+    x, y, z = one.position_variance
+    roll, pitch, yaw = one.attitude_variance
     # The upper triangle, row by row.
     covariance = (
-        *(p, 0.0, 0.0, 0.0, 0.0, 0.0),
-        *(p, 0.0, 0.0, 0.0, 0.0),
-        *(p, 0.0, 0.0, 0.0),
-        *(q, 0.0, 0.0),
-        *(q, 0.0),
-        q,
+        *(x, 0.0, 0.0, 0.0, 0.0, 0.0),
+        *(y, 0.0, 0.0, 0.0, 0.0),
+        *(z, 0.0, 0.0, 0.0),
+        *(roll, 0.0, 0.0),
+        *(pitch, 0.0),
+        yaw,
     )
     kind = _VIO if one.from_cameras_on_board else _MOTION_CAPTURE
     tail = (_LOCAL_NED, _BODY_FRD, one.resets, kind, _ALL_WELL)

@@ -23,8 +23,8 @@ class PoseMeasurement(NamedTuple):
     t_us: int
     p_WB: V3  # m, NED
     q_WB: V4  # [w, x, y, z], maps B to W
-    position_variance: float  # m², of each axis, as the sensor states it
-    attitude_variance: float  # rad²
+    position_variance: V3  # m², as the sensor states it
+    attitude_variance: V3  # rad², roll, pitch, yaw
     resets: int  # how often the sensor's frame has jumped
     from_cameras_on_board: bool  # visual odometry, or motion capture
 

@@ -33,4 +33,4 @@ class MotionCaptureSensor:
             ox, oy, oz = anywhere(self._random, keys.outlier_m)
             p = (p[0] + ox, p[1] + oy, p[2] + oz)
             q = turned(q, anywhere(self._random, math.radians(keys.outlier_deg)))
-        return PoseMeasurement(stamp_us, p, q, size * size, turn * turn, 0, False)
+        return PoseMeasurement(stamp_us, p, q, (size * size,) * 3, (turn * turn,) * 3, 0, False)

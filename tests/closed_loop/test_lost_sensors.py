@@ -60,20 +60,21 @@ def off(flight: Flight) -> float:
 
 
 @pytest.mark.parametrize(
-    "spoil",
+    ("spoil", "text"),
     [
-        lies(30, p_WB=NOTHING),
-        lies(1, q_WB=(math.cos(0.79), math.sin(0.79), 0.0, 0.0)),  # beyond 90 degrees
-        lies(1, v_WB=(1e6, 0.0, 0.0)),
-        lies(1, v_WB=(0.0, 1e30, 0.0)),
-        lies(50, p_WB=(1.0, 1.0, -1.0)),
-        lies(25, p_WB=NOTHING, gyro_B=NOTHING, qd_arm=(NAN, NAN)),
-        freezes(100, FIRST, *POSE),
+        (lies(5, p_WB=NOTHING), "pose says what cannot be"),
+        (lies(30, p_WB=NOTHING), "pose says what cannot be"),
+        (lies(1, q_WB=(math.cos(0.79), math.sin(0.79), 0.0, 0.0)), "pose jumps"),  # beyond 90 deg
+        (lies(1, v_WB=(1e6, 0.0, 0.0)), "pose says what cannot be"),
+        (lies(1, v_WB=(0.0, 1e30, 0.0)), "pose says what cannot be"),
+        (lies(50, p_WB=(1.0, 1.0, -1.0)), "pose jumps"),
+        (lies(25, p_WB=NOTHING, gyro_B=NOTHING, qd_arm=(NAN, NAN)), "IMU says what cannot be"),
+        (freezes(100, FIRST, *POSE), ""),  # reported when it lasts
     ],
-    ids=["no place", "over", "1e6 m/s", "1e30 m/s", "elsewhere", "nothing", "frozen"],
+    ids=["10 ms", "no place", "over", "1e6 m/s", "1e30 m/s", "elsewhere", "nothing", "frozen"],
 )
-def test_what_lasts_a_moment_is_flown_through(
-    spoil: Callable[[SensorFrame], SensorFrame],
+def test_what_lasts_a_moment_is_flown_through_and_reported(
+    spoil: Callable[[SensorFrame], SensorFrame], text: str
 ) -> None:
     flight = Flight(load_scenario("workspace"), spoil=spoil)
     flight.follow()
@@ -83,6 +84,7 @@ def test_what_lasts_a_moment_is_flown_through(
         assert 10.0 < sum(flight.outputs.actuators.rotor_thrust) < 60.0
         assert off(flight) < 0.02
     assert not told(flight, "safe set by")
+    assert told(flight, text) or not text, flight.texts
 
 
 def test_telemetry_goes_on_without_an_estimate_and_says_so() -> None:

@@ -11,6 +11,7 @@ import pytest
 
 from fsw.estimation.sensor_fault import Sensor, SensorFault, sentence
 from fsw.measurements import ImuSample, JointSample, PoseSample, Sample
+from sitl.scenario import Hold
 from sitl.scenario_file import load_scenario
 from sitl.simulation import START_US
 from tests.closed_loop.harness import Flight
@@ -166,3 +167,30 @@ def test_a_sensor_that_fails_beside_walls_is_named_and_touches_nothing(
     assert worst < off
     assert min(flight.sim.result().surfaces_m.values()) > 0.0
     assert error(flight) < 0.02
+
+
+@pytest.mark.long
+def test_odometry_that_drifts_says_how_far_and_keeps_as_much_farther_from_walls() -> None:
+    flight = Flight(load_scenario("walls", "vio"), seed=900)
+    flight.follow()
+    worst, uncertain = 0.0, 0.0
+    for _ in range(80):
+        flight.run(0.5)
+        estimate, known = flight.state.estimate, flight.state.estimator
+        assert estimate is not None
+        assert known is not None
+        truth = flight.sim.truth().p_WB
+        sigma = [math.sqrt(known.pose_covariance[k]) for k in (0, 6)]
+        off = [abs(estimate.p_WB[k] - truth[k]) / sigma[k] for k in (0, 1)]
+        worst, uncertain = max(worst, *off), max(uncertain, *sigma)
+    assert uncertain > 0.02  # m
+    assert worst < 3.5
+    assert flight.sim.result().min_margin_m > 0.03
+
+
+def test_five_positions_a_second_are_not_taken_for_a_loss() -> None:
+    hold = Hold((0.0, 0.0, -3.6))
+    flight = Flight(replace(load_scenario("field", "gnss"), walls=(), trajectory=hold), seed=900)
+    flight.follow()
+    flight.run(1.5)
+    assert not [text for text in flight.texts if "no position" in text]

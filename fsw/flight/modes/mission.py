@@ -78,7 +78,7 @@ class Mission(FlightMode):
             p_WE=point_in_flight(estimate, config.airframe.link_length)[0],
             height=-estimate.p_WB[2],
             home_z=home_z,
-            safe_set=state.mission.safe_set,
+            safe_set=state.kept.safe_set,
             look_at=vehicle.look_at,
         )
         flown, event = sequencer.advance(flight, context, motion_limits(config))
@@ -96,7 +96,7 @@ class Mission(FlightMode):
         segment = state.mission.flight.segment
         if segment is None:
             return super().reference(state, t_us)
-        return project(segment.at(t_us), state.mission.safe_set)
+        return project(segment.at(t_us), state.kept.safe_set)
 
 
 def motion_limits(config: FlightConfig) -> MotionLimits:

@@ -37,6 +37,7 @@ _RESET: Final = 0x80000000
 
 ODOMETRY_VALUES: Final = 61  # all of them
 _LOCAL_NED: Final = 1  # MAV_FRAME
+_DRIFTING: Final = (2, 3, 7)  # MAV_ESTIMATOR_TYPE: vision, visual-inertial, lidar
 _DOWNWARD: Final = 25  # MAV_SENSOR_ORIENTATION
 _UNKNOWN_EPH: Final = 0xFFFF
 _UNKNOWN_VOLTAGE: Final = 0xFFFF
@@ -135,6 +136,7 @@ def pose_sample(values: Numbers) -> PoseSample | None:
         (covariance[0], covariance[6], covariance[11]),
         (covariance[15], covariance[18], covariance[20]),
         int(values[58]),
+        drifts=values[59] in _DRIFTING,
     )
 
 

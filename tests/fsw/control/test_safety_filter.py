@@ -236,3 +236,17 @@ def test_it_never_asks_for_more_than_the_loops_stand() -> None:
     result, _, _ = asked((floor,), (0.0, 0.0, -0.05), (0.0, 0.0, 3.0), ZERO)
     assert result == (0.0, 0.0, -3.0)
     assert np.isfinite(result).all()
+
+
+def test_what_clearances_have_grown_by_is_kept_and_is_no_margin() -> None:
+    grown = Zone(AHEAD.shape, AHEAD.clearance + 0.05)
+    place = (0.8, 0.0, 0.0)
+    here, v, wanted = at(place), (0.2, 0.0, 0.0), (1.0, 0.0, 0.0)
+    zones = moving_zones(SafeSet((grown,)), None, (0.05,))
+    found, changed, margin = filtered(LAW, POINTS, zones, here, v, ZERO, wanted)
+    same, _, nearer = asked((grown,), place, v, wanted)
+    assert changed
+    assert found == same, "it keeps off by all of it"
+    _, _, announced = asked((AHEAD,), place, v, wanted)
+    assert margin == pytest.approx(announced), "and reports the margin of the safe set"
+    assert nearer == pytest.approx(announced - 0.05)

@@ -18,7 +18,15 @@ from fsw.control.tracking import (
     snap_command,
     vertical_acceleration,
 )
-from fsw.control.tube import CALM_HEIGHT, Tube, all_axes, all_axes_up_to, limits_used, tube
+from fsw.control.tube import (
+    CALM_HEIGHT,
+    Tube,
+    all_axes,
+    all_axes_up_to,
+    estimate_tube,
+    limits_used,
+    tube,
+)
 from fsw.model.airframe import AIRFRAME, GRAVITY, Airframe
 from fsw.model.nominal import REST_INPUT, REST_STATE
 from fsw.model.prediction import Array
@@ -322,3 +330,48 @@ def test_a_push_that_turns_once_it_is_taken_for_mass_needs_the_wider_height(
     assert limits_used(AIRFRAME, before, loop, 0.8)["vertical disturbance"] > 1.0
     if amplitude == 0.8:
         assert np.abs(_height_under(push, before)).max() > amplitude * loop.height
+
+
+def _position_misled(entry: int, error: np.ndarray) -> np.ndarray:
+    """The base under an estimate that is wrong in p, v, a or j (0 to 3), the law tick by tick."""
+    law = TrackingLaw(AIRFRAME.attitude_lag, TUNING, _gains())
+    fine = 4
+    dt = DT / fine
+    decay = np.exp(-dt / AIRFRAME.rotor_lag)
+    x = np.zeros(5)
+    believed = Observed((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    positions = []
+    for wrong in error:
+        for _ in range(fine):
+            seen = x.copy()
+            seen[entry] += wrong
+            p, v, a, j, s = seen.tolist()
+            believed = observe(believed, (v, 0.0, 0.0), (a, 0.0, 0.0), TUNING, dt)
+            axis = AxisState(p, believed.v[0], a, j, s)
+            w = snap_command(law, axis, believed.d[0], 0.0, REST, 0.0)
+            x = x + dt * np.append(x[1:], 0.0)
+            x[4] = w + (x[4] - w) * decay
+        positions.append(x[0])
+    return np.array(positions)
+
+
+@pytest.mark.parametrize("entry", range(3))
+def test_the_worst_error_of_the_estimate_attains_its_bound_and_none_exceeds_it(entry: int) -> None:
+    tubes = estimate_tube(AIRFRAME, TUNING, _gains(), DT)
+    bound = (tubes.position, tubes.velocity, tubes.acceleration)[entry]
+    impulse = np.zeros(1000)
+    impulse[0] = 1.0
+    response = _position_misled(entry, impulse)
+    worst = _position_misled(entry, np.sign(response)[::-1])
+    assert worst[-1] == pytest.approx(bound, rel=0.05)
+    drawn = np.random.default_rng(3).choice((-1.0, 1.0), 1000)
+    assert np.abs(_position_misled(entry, np.repeat(drawn[::25], 25))).max() < bound
+    # One that lasts moves the base by nearly as much.
+    assert abs(_position_misled(entry, np.ones(1000))[-1]) > 0.9 * bound
+
+
+def test_noise_of_the_gyro_moves_the_base_by_what_its_spectrum_says() -> None:
+    tubes = estimate_tube(AIRFRAME, TUNING, _gains(), DT)
+    noise = np.random.default_rng(4).standard_normal(4000)
+    moved = _position_misled(3, noise)[500:]
+    assert moved.std() == pytest.approx(tubes.jerk, rel=0.25)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -132,6 +132,10 @@ class PoseSensor:
     position: float  # m
     attitude: float  # rad
     hidden_delay: float = 0.0  # s, of which its time stamp does not know
+    drift: float = 0.0  # m/sqrt(s), random walk of its frame on each axis
+    turn: float = 0.0  # rad/sqrt(s), of its frame's heading
+    recognises: float = 2.0  # s after the start; the frame is then right but for
+    recognised: tuple[float, float] = (5e-3, 1.7e-3)  # m, rad: standard deviations
 
 
 @dataclass(frozen=True)
@@ -166,7 +170,7 @@ VIO = Suite(
         accel_bias_walk=1e-3,
         gyro_bias_walk=5e-5,
     ),
-    pose=PoseSensor(30.0, 0.045, 5e-3, np.radians(0.5)),
+    pose=PoseSensor(30.0, 0.045, 3e-3, np.radians(0.5), drift=5e-3, turn=np.radians(0.05)),
 )
 RTK = Suite(
     EstimatorTuning(
@@ -177,6 +181,10 @@ RTK = Suite(
         accel_bias=0.05,
         gyro_bias=0.005,
         baro_bias=1.0,
+        declination=0.0,
+        gnss_position_floor=1e-3,
+        gnss_velocity_floor=0.01,
+        pressure_floor=0.01,
     ),
     gnss=GnssSensor(10.0, 0.12, 0.014, 0.05),
     baro=0.1,
@@ -253,6 +261,7 @@ def _poses(
 ) -> Iterator[tuple[float, Sample]]:
     grid = truth.t[1] - truth.t[0]
     first = truth.t[0] + random.uniform(0.0, 1.0 / sensor.rate)
+    frame = Frame(sensor, random)
     for ideal in np.arange(first, truth.t[-1], 1.0 / sensor.rate):
         time = truth.t[0] + round((ideal - truth.t[0]) / grid) * grid
         k = truth.at(time - sensor.hidden_delay)
@@ -261,15 +270,51 @@ def _poses(
         position = truth.p[k] + sensor.position * random.standard_normal(3)
         turn = sensor.attitude * random.standard_normal((1, 3))
         attitude = multiply(truth.q[k][None], exponential(turn))[0]
-        yield (
-            time + sensor.latency,
-            PoseSample(
-                float(time),
-                tuple(position.tolist()),
-                tuple(attitude.tolist()),
-                (sensor.position**2,) * 3,
-                (sensor.attitude**2,) * 3,
-            ),
+        sample = PoseSample(
+            float(time),
+            tuple(position.tolist()),
+            tuple(attitude.tolist()),
+            (sensor.position**2,) * 3,
+            (sensor.attitude**2,) * 3,
+        )
+        yield time + sensor.latency, frame.seen(sample) if sensor.drift else sample
+
+
+class Frame:
+    """The frame of an odometry: it walks away, and is put right once."""
+
+    def __init__(self, sensor: PoseSensor, random: np.random.Generator) -> None:
+        self.sensor, self.random = sensor, random
+        self.place, self.heading = np.zeros(3), 0.0
+        self.variance, self.turned = 0.0, 0.0  # m^2, rad^2, as it knows itself
+        self.jumps = 0
+        self.step = 0.0  # sqrt(s); the first pose is in the true frame
+
+    def seen(self, sample: PoseSample) -> PoseSample:
+        """The sample in the frame as it is one period later."""
+        sensor, step = self.sensor, self.step
+        self.step = np.sqrt(1.0 / sensor.rate)
+        self.place = self.place + sensor.drift * step * self.random.standard_normal(3)
+        self.heading += sensor.turn * step * self.random.standard_normal()
+        self.variance += (sensor.drift * step) ** 2
+        self.turned += (sensor.turn * step) ** 2
+        if not self.jumps and sample.time > START + sensor.recognises:
+            far, about = sensor.recognised
+            self.place = far * self.random.standard_normal(3)
+            self.heading = about * self.random.standard_normal()
+            self.variance, self.turned, self.jumps = far**2, about**2, 1
+        yaw = np.array([[0.0, 0.0, self.heading]])
+        x, y, _ = sample.position
+        place = rotations(exponential(yaw))[0] @ np.array(sample.position) + self.place
+        noise, about = sensor.position**2 + self.variance, sensor.attitude**2
+        return replace(
+            sample,
+            position=tuple(place.tolist()),
+            attitude=tuple(multiply(exponential(yaw), np.array([sample.attitude]))[0].tolist()),
+            position_variance=(noise + self.turned * y * y, noise + self.turned * x * x, noise),
+            attitude_variance=(about, about, about + self.turned),
+            reset_counter=self.jumps,
+            drifts=True,
         )
 
 

@@ -24,6 +24,7 @@ from fsw.estimation.error_state import (
     inject,
     integrated,
     propagate,
+    transition,
 )
 from fsw.estimation.tuning import EstimatorTuning
 from fsw.geometry.quaternion import conjugate, multiply, rotation_vector, turned
@@ -156,7 +157,7 @@ def test_the_covariance_moves_with_the_slopes_of_the_prediction() -> None:
         F[:9, k] = np.concatenate([p1 - p0, v1 - v0, turn]) / (2 * STEP)
     P = np.array(x["covariance"])
     expected = F @ P @ F.T
-    propagate(x["covariance"], R, FORCE, RATE, dt)
+    propagate(x["covariance"], transition(R, FORCE, RATE, dt), dt)
     np.testing.assert_allclose(x["covariance"], expected, atol=2e-5)
     assert abs(x["covariance"] - x["covariance"].T).max() < 1e-15
 

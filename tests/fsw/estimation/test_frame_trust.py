@@ -85,6 +85,19 @@ def test_one_frame_that_lies_is_not_believed_and_named(
     assert estimate == estimate_state(frame(22))
 
 
+def test_bad_frames_are_reported_once_and_again_after_ten_seconds() -> None:
+    estimate = estimate_state(frame(0))
+    assert estimate is not None
+    trust, said = FrameTrust(), []
+    for k in range(1, 5_300):
+        bad = k in (20, 40, 41, 5_100)
+        now = frame(k, gyro_B=NOTHING) if bad else frame(k)
+        trust, estimate = believed(trust, now, estimate, lambda: (0.0, 0.0))
+        trust, sentences = trust.reported(now.t_us)
+        said += [(k, text) for text in sentences]
+    assert said == [(20, "IMU says what cannot be"), (5_100, "IMU says what cannot be")]
+
+
 @pytest.mark.parametrize("lie", [{"p_WB": NOTHING}, "frozen"])
 def test_without_a_pose_the_inertial_unit_carries_on(lie: Any) -> None:
     def spoil(k: int, s: SensorFrame) -> SensorFrame:

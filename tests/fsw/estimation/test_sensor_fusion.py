@@ -13,6 +13,7 @@ from scipy.stats import chi2
 
 from fsw.estimation.sensor_fault import Sensor, SensorFault
 from fsw.estimation.sensor_fusion import FusionMemory, SensorFusion, at_start
+from fsw.estimation.tuning import chi_square
 from fsw.geometry.rotation import quaternion_from_matrix
 from fsw.measurements import GnssSample, ImuSample, PoseSample, Sample
 from fsw.signals import StateEstimate
@@ -98,18 +99,24 @@ def nees(suite: Suite, runs: int, duration: float) -> float:
 
 @pytest.mark.long
 @pytest.mark.parametrize(
-    ("suite", "duration"), [(MOCAP, 2.0), (VIO, 3.0), (RTK, 5.0)], ids=["mocap", "vio", "rtk"]
+    ("suite", "duration", "runs"),
+    [(MOCAP, 2.0, 100), (VIO, 3.0, 300), (RTK, 5.0, 100)],
+    ids=["mocap", "vio", "rtk"],
 )
-def test_the_filter_is_as_sure_as_it_may_be(suite: Suite, duration: float) -> None:
-    runs = 100
+def test_the_filter_is_as_sure_as_it_may_be(suite: Suite, duration: float, runs: int) -> None:
     low, high = chi2.ppf([0.025, 0.975], 15 * runs) / runs
     assert low < nees(suite, runs, duration) < high
 
 
-def test_a_few_runs_are_as_sure_as_they_may_be() -> None:
+assert VIO.pose is not None
+EARLY = replace(VIO, pose=replace(VIO.pose, drift=0.02, recognises=0.6))
+
+
+@pytest.mark.parametrize("suite", [MOCAP, EARLY], ids=["mocap", "vio"])
+def test_a_few_runs_are_as_sure_as_they_may_be(suite: Suite) -> None:
     runs = 8
     low, high = chi2.ppf([0.025, 0.975], 15 * runs) / runs
-    assert low < nees(MOCAP, runs, 1.0) < high
+    assert low < nees(suite, runs, 1.0) < high
 
 
 def innovations(suite: Suite, seed: int, duration: float) -> tuple[float, int]:
@@ -118,7 +125,7 @@ def innovations(suite: Suite, seed: int, duration: float) -> tuple[float, int]:
     fusion, memory = SensorFusion(suite.tuning, TICK), at_start()
     total, dimension = 0.0, 0
     size = {Sensor.POSE: 3, Sensor.GNSS: 3, Sensor.BAROMETER: 1, Sensor.MAGNETOMETER: 1}
-    gate = {3: 32.1, 1: 25.0}
+    gate = {n: chi_square(5.0, n) for n in (1, 3)}
     for now, samples in flown:
         before = {h.sensor: h for h in memory.health}
         memory, _ = fusion.step(memory, samples, now)
@@ -305,6 +312,31 @@ def test_a_pose_that_has_moved_for_good_is_taken_and_the_jump_reported() -> None
     np.testing.assert_allclose(flown.error()[:3], (0.3, 0.0, 0.0), atol=5e-3)
 
 
+def test_a_frame_that_drifts_makes_the_place_uncertain_and_no_number_of_poses_helps() -> None:
+    flown = Flown(run(VIO, 3, 1.9))
+    sigma = np.sqrt(np.diag(flown.fusion.covariance(flown.memory, flown.now)))
+    # What the poses have stated about the frame's walk, and not much more.
+    assert 5e-3 * math.sqrt(1.8) < sigma[:3].min() <= sigma[:3].max() < 5e-3 * math.sqrt(2.5)
+    assert flown.worst < 4.0
+    still = Flown(run(replace(VIO, pose=replace(VIO.pose, drift=0.0)), 3, 1.9))  # type: ignore[type-var]
+    sure = np.sqrt(np.diag(still.fusion.covariance(still.memory, still.now)))
+    assert sure[:3].max() < 2e-3
+
+
+def test_a_place_recognised_again_is_taken_at_once_and_reported_as_a_jump() -> None:
+    """Within the gate of so uncertain a place: no reading is refused."""
+    pose = replace(VIO.pose, drift=0.05, recognises=1.0, recognised=(1e-3, 1e-3))  # type: ignore[type-var]
+    for seed in range(3):
+        flown = Flown(run(replace(VIO, pose=pose), seed, 1.2))
+        reset = flown.memory.reset
+        assert reset.number == 1
+        assert np.linalg.norm(reset.position) > 0.03
+        assert not flown.found
+        assert flown.in_sigmas().max() < 3.5
+        sigma = np.sqrt(np.diag(flown.fusion.covariance(flown.memory, flown.now)))
+        assert sigma[:3].max() < 0.025  # of 0.15 s, and not of 1.2 s
+
+
 def test_a_jump_that_the_sensor_announces_is_taken_at_once() -> None:
     def change(now: float, sample: Sample) -> Sample:
         if isinstance(sample, PoseSample) and sample.time > START + 1.0:
@@ -352,3 +384,58 @@ def test_a_pose_later_than_all_delays_is_named() -> None:
     assert pose is not None
     flown = Flown(run(replace(MOCAP, pose=replace(pose, latency=0.3)), 3, 0.6))
     assert (Sensor.POSE, SensorFault.TOO_OLD) in flown.found
+
+
+@pytest.mark.parametrize(("known", "estimated"), [(0.012, 0.0), (0.0, 0.01)])
+def test_the_delay_of_the_pose_can_be_set_and_estimated_from_one_tick_to_the_next(
+    known: float, estimated: float
+) -> None:
+    """As a parameter that a ground station changes: another estimator, the same memory."""
+    assert MOCAP.pose is not None
+    suite = replace(MOCAP, pose=replace(MOCAP.pose, hidden_delay=0.012))
+    flown = run(suite, 0, 4.0)
+    before = SensorFusion(MOCAP.tuning, TICK)
+    tuning = replace(MOCAP.tuning, pose_delay=known, pose_delay_sigma=estimated)
+    after, memory, estimate = SensorFusion(tuning, TICK), at_start(), None
+    for now, samples in flown:
+        fusion = before if now < START + 1.0 else after
+        memory, estimate = fusion.step(memory, samples, now)
+    assert estimate is not None
+    assert memory.numbers[0]["pose_delay"] == pytest.approx(0.012, abs=2e-3)
+    sigma = np.sqrt(np.diag(after.covariance(memory, now)))[:9]
+    assert (abs(errors(estimate, flown, now)) / sigma).max() < 4.0
+
+
+def test_a_delay_of_satellites_that_is_known_is_taken_out() -> None:
+    assert RTK.gnss is not None
+    late = replace(RTK, tuning=replace(RTK.tuning, gnss_delay=0.06))
+
+    def stamped_late(now: float, sample: Sample) -> Sample:
+        return (
+            replace(sample, time=sample.time + 0.06) if isinstance(sample, GnssSample) else sample
+        )
+
+    run_as_known = Flown(replace_suite(run(RTK, 2, 3.0), late), stamped_late)
+    right = Flown(run(RTK, 2, 3.0))
+    np.testing.assert_allclose(run_as_known.error(), right.error(), atol=1e-6)
+
+
+def replace_suite(flown: Run, suite: Suite) -> Run:
+    """The same readings, for an estimator that takes its sensors for another suite."""
+    return replace(flown, suite=suite)
+
+
+def test_a_wider_gate_lets_a_farther_reading_in() -> None:
+    aside = at(1.2, lambda s: replace(s, position=(s.position[0] + 0.01, *s.position[1:])))
+    wide = replace(MOCAP, tuning=replace(MOCAP.tuning, pose_gate=20.0))
+    narrow = Flown(run(MOCAP, 4, 1.5), aside)
+    assert narrow.found == {(Sensor.POSE, SensorFault.JUMP)}
+    assert not Flown(replace_suite(run(MOCAP, 4, 1.5), wide), aside).found
+
+
+@pytest.mark.parametrize("readings", [1, 3])
+def test_gates_are_as_rare_as_so_many_deviations_of_one_reading(readings: int) -> None:
+    for sigmas in (1.0, 3.0, 5.0):
+        assert chi2.sf(chi_square(sigmas, readings), readings) == pytest.approx(
+            chi2.sf(sigmas**2, 1), rel=1e-6
+        )

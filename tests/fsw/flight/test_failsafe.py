@@ -31,6 +31,7 @@ from fsw.flight.state import (
     SafetyMemory,
     VehicleMemory,
 )
+from fsw.flight.uncertain_clearance import KeptSet
 from fsw.parameters.flight_config import FlightConfig, FlightLimits, flight_config
 from fsw.signals import BatteryState, Charge, Mode, Severity
 from tests.fsw.random_states import random_estimate
@@ -38,6 +39,7 @@ from tests.fsw.random_states import random_estimate
 PERIOD_US = 100_000
 NOW_US = 10**9
 CONFIG = flight_config(body="points")
+AMPLE = KeptSet(ample_us=NOW_US)
 MANUAL = frozenset({Mode.HOLD, Mode.OFFBOARD})
 
 
@@ -59,6 +61,7 @@ class Evidence:
     silent_zones: int = 0
     safety: SafetyMemory = field(default_factory=SafetyMemory)
     aiding: Aiding = AIDED
+    kept: KeptSet = AMPLE
     config: FlightConfig = CONFIG
 
     def context(self) -> FailsafeContext:
@@ -73,6 +76,7 @@ class Evidence:
             mission=MissionMemory(silent_zones=self.silent_zones),
             safety=self.safety,
             aiding=self.aiding,
+            kept=self.kept,
         )
         level = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, self.up)
         estimate = random_estimate(np.random.default_rng(1))._replace(t_us=NOW_US, R_WB=level)
@@ -81,6 +85,7 @@ class Evidence:
 
 FINE = Evidence()
 OUTSIDE = SafetyMemory(breach_us=NOW_US, breach_by=0.0123)
+CRAMPED = KeptSet(lacking=0.0234, ample_us=NOW_US - 500_000)
 OFF_PLAN = SafetyMemory(off_plan_us=NOW_US, off_plan_by=0.0834)
 UNAIDED = Aiding(1_500_000, Sensor.POSE, SensorFault.STUCK)
 
@@ -137,6 +142,7 @@ def test_nothing_wrong_is_no_condition() -> None:
         (replace(FINE, output_replaced=True), Condition.OUTPUT_NOT_FINITE),
         (replace(FINE, safety=OUTSIDE), Condition.BREACH),
         (replace(FINE, safety=OFF_PLAN), Condition.TUBE_LEFT),
+        (replace(FINE, kept=CRAMPED), Condition.ROOM_LACKING),
         (OFFBOARD, Condition.SETPOINTS_LOST),
         (replace(FINE, silent_zones=1), Condition.ZONES_SILENT),
         (replace(FINE, gcs_silent_us=10_000_000), Condition.DATALINK_LOST),
@@ -329,7 +335,7 @@ def test_a_text_names_the_sensor_and_since_when() -> None:
 
 def test_a_fault_is_the_vehicles_own() -> None:
     others = {Condition.SETPOINTS_LOST, Condition.DATALINK_LOST, Condition.BATTERY_LOW}
-    others |= {Condition.ZONES_SILENT}
+    others |= {Condition.ZONES_SILENT, Condition.ROOM_LACKING}
     others |= {Condition.BATTERY_CRITICAL, Condition.BATTERY_EMERGENCY}
     assert set(Condition) - others == FAULTS
 
@@ -340,3 +346,18 @@ def test_what_is_left_of_the_battery_is_told_in_percent(share: float) -> None:
     context = replace(FINE, battery=battery).context()
     (row,) = active(context)
     assert report(row, context, Action.WARN)[1] == f"battery low: {round(100 * share)} % left"
+
+
+def test_room_is_lacking_in_flight_only_for_a_while_and_by_more_than_a_workspace_does() -> None:
+    for evidence in (
+        replace(FINE, kept=CRAMPED, landed=True),
+        replace(FINE, kept=CRAMPED._replace(ample_us=NOW_US - 499_999)),
+        replace(FINE, kept=CRAMPED._replace(lacking=0.01)),
+    ):
+        assert conditions(evidence) == ()
+    cramped = replace(FINE, kept=CRAMPED)
+    assert action(cramped) is Action.WARN
+    (row,) = active(cramped.context())
+    severity, text = report(row, cramped.context(), Action.WARN)
+    assert severity is Severity.CRITICAL
+    assert text.endswith("23 mm less than SAFE_SIGMAS asks for")

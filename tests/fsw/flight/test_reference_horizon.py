@@ -16,6 +16,7 @@ from fsw.flight.plan_exchange import nominal_at_rest
 from fsw.flight.reference_horizon import ReferenceHorizon
 from fsw.flight.setpoint_generator import PositionGoal, ReferenceState
 from fsw.flight.state import FlightState, SetpointMemory
+from fsw.flight.uncertain_clearance import KeptSet
 from fsw.model.kinematics import point_in_flight
 from fsw.mpc.reference import still_at
 from fsw.shapes.half_space import wall
@@ -130,7 +131,7 @@ def test_a_reference_from_outside_is_governed_and_one_of_the_vehicles_own_is_not
     p_WE, _ = point_in_flight(estimate, CONFIG.airframe.link_length)
     walled = flying()
     ahead = SafeSet((wall((-1.0, 0.0, 0.0), -0.2, 0.1),))
-    walled = replace(walled, mission=replace(walled.mission, safe_set=ahead))
+    walled = replace(walled, kept=KeptSet().of(ahead))
     _, (own, _) = HORIZON(Elsewhere(CONFIG), flying(), estimate, 400_000)
     assert [target.t_us for target in own] == [
         400_000 + node * CONFIG.mpc_period_us for node in range(CONFIG.planner.horizon + 1)

@@ -13,6 +13,7 @@ from fsw.flight.retreat import retreat_place
 from fsw.flight.safe_set import SafeSetCheck
 from fsw.flight.safety_watch import SafetyWatch
 from fsw.flight.state import FlightState
+from fsw.flight.uncertain_clearance import KeptSet
 from fsw.model.body import body_of
 from fsw.parameters.consistency import stand_off
 from fsw.shapes.ball import ball
@@ -82,8 +83,9 @@ def test_there_nothing_of_the_vehicle_is_too_close(
     if math.dist(place, start) > 0.999:
         return
     there = vehicle_at(place)._replace(q_arm=q_arm)
-    margins = CHECK.margins(SafeSet(zones), there, None).margins
+    found = CHECK.margins(KeptSet().of(SafeSet(zones)), there, None)
+    margins = found.margins
     assert min(margins) >= ROOM - 2e-3
     assert FlightState().safety == SafetyWatch(CONFIG, CHECK.loop_tube).breach(
-        FlightState().safety, there, CHECK.margins(SafeSet(zones), there, None), flies=True
+        FlightState().safety, there, found, flies=True
     )

@@ -46,7 +46,13 @@ HIGH = earth.Place(47.397742, 8.545594, 488.0)
 IMU = ImuMeasurement(NOW, (0.1, -0.2, 0.3), (0.5, -0.4, -9.7))
 JOINTS = JointMeasurement(NOW - 2000, (-0.7, 1.4))
 POSE = PoseMeasurement(
-    NOW - 16_000, (1.0, -2.0, -1.2), (0.5, 0.5, -0.5, 0.5), 0.0005**2, 0.0035**2, 3, False
+    NOW - 16_000,
+    (1.0, -2.0, -1.2),
+    (0.5, 0.5, -0.5, 0.5),
+    (0.0005**2,) * 3,
+    (1e-5, 2e-5, 3e-5),
+    3,
+    False,
 )
 
 
@@ -71,8 +77,12 @@ def test_a_pose_has_the_time_of_its_measurement_its_variance_and_its_resets() ->
     assert sample.position == close((1.0, -2.0, -1.2))
     assert sample.attitude == (0.5, 0.5, -0.5, 0.5)
     assert sample.position_variance == close((0.0005**2,) * 3)
-    assert sample.attitude_variance == close((0.0035**2,) * 3)
+    assert sample.attitude_variance == close((1e-5, 2e-5, 3e-5))
     assert sample.reset_counter == 3
+    assert not sample.drifts
+    (sample,) = decoded(POSE._replace(from_cameras_on_board=True))
+    assert isinstance(sample, PoseSample)
+    assert sample.drifts
 
 
 def test_odometry_says_where_it_comes_from_and_that_it_knows_no_velocity() -> None:

@@ -83,7 +83,8 @@ def test_the_topic_of_each_kind_of_sample_has_its_fields_in_their_order() -> Non
         hints = typing.get_type_hints(kind)
         sizes = [len(typing.get_args(hint)) for hint in hints.values()]
         assert [field.count for field in topic.fields] == sizes
-        types = ["uint32_t" if hint is int else "double" for hint in hints.values()]
+        known = {int: "uint32_t", bool: "bool"}
+        types = [known.get(hint, "double") for hint in hints.values()]
         assert [field.type for field in topic.fields] == types
     assert typing.get_type_hints(TickInputs)[SAMPLES] == tuple[Sample, ...]
 

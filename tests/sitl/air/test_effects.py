@@ -12,7 +12,7 @@ from sitl.air.ceiling_effect import ceiling_effect
 from sitl.air.ground_effect import ground_effect
 from sitl.air.load import SURFACES, Air, drag_force, rotor_gain, wall_force
 from sitl.air.rotor_drag import rotor_drag
-from sitl.air.wall_effect import wall_pull
+from sitl.air.wall_effect import IDEAL, wall_pull
 
 R, ARM = 0.165, 0.3
 FAR = 1e9  # m, of an arm that leaves a rotor alone
@@ -122,6 +122,19 @@ def test_a_ceiling_is_a_wall_whose_free_side_is_below() -> None:
     assert rotor_gain(numbers, (0.0, 0.0, -1.8), LEVEL, 0) == pytest.approx(expected)
     off = air(GROUND, roof)
     assert rotor_gain(off, (0.0, 0.0, -1.8), LEVEL, 0) == 1.0
+
+
+@pytest.mark.parametrize("d_over_r", [1.0, 1.5, 3.0])
+def test_a_wall_pulls_as_the_suction_upon_it_does(d_over_r: float) -> None:
+    """From the other side: the pressure on the wall of the rotor's source and its image."""
+    rho, v_i, d = 1.225, 6.0, d_over_r * R
+    area = math.pi * R * R
+    thrust, source = 2.0 * rho * area * v_i**2, area * v_i
+    r = np.linspace(0.0, 300.0 * d, 400_000)
+    along = 2.0 * source / (4.0 * math.pi) * r / (r * r + d * d) ** 1.5
+    suction = 0.5 * rho * along**2 * 2.0 * math.pi * r
+    pull = float(np.sum(0.5 * (suction[1:] + suction[:-1]) * np.diff(r)))
+    assert wall_pull(IDEAL, R, d, thrust) == pytest.approx(pull, rel=1e-3)
 
 
 def test_a_wall_pulls_and_pulls_more_at_half_the_distance() -> None:

@@ -51,8 +51,8 @@ def test_motion_capture_is_off_by_the_stated_deviations_and_states_them() -> Non
     assert math.sqrt(float(np.mean(turn * turn)) / 3.0) == pytest.approx(
         math.radians(0.2), rel=0.05
     )
-    assert said[0].position_variance == pytest.approx(0.0005**2)
-    assert said[0].attitude_variance == pytest.approx(math.radians(0.2) ** 2)
+    assert said[0].position_variance == pytest.approx((0.0005**2,) * 3)
+    assert said[0].attitude_variance == pytest.approx((math.radians(0.2) ** 2,) * 3)
     assert said[0].t_us == 5
 
 
@@ -105,6 +105,18 @@ def test_visual_odometry_jumps_back_to_near_the_truth_and_says_so() -> None:
     assert off[after].max() < 0.01
     assert off[after - 1].max() > 0.1
     assert said[0].from_cameras_on_board
+
+
+def test_visual_odometry_states_how_far_it_may_have_drifted() -> None:
+    keys = {"drift_m": 0.01, "drift_deg": 0.3, "recognises_every_s": 8.0, "recognised_m": 0.002}
+    ends = [drifted(seed, 10.0, position_m=0.001, **keys)[-1] for seed in range(300)]
+    off = np.array([one.p_WB for one in ends]) - EXACT.p_WB
+    stated = np.array([one.position_variance for one in ends])
+    # Each axis, the far one of a turned frame included: normalised squares are 1 on average.
+    assert (off**2 / stated).mean(axis=0) == pytest.approx([1.0] * 3, abs=0.25)
+    begin, later = drifted(1, 5.0, drift_deg=0.3)[0], drifted(1, 5.0, drift_deg=0.3)[-1]
+    assert later.attitude_variance[:2] == begin.attitude_variance[:2] == (0.0, 0.0)
+    assert later.attitude_variance[2] == pytest.approx(149.0 / 30.0 * math.radians(0.3) ** 2)
 
 
 def test_satellites_wander_slowly_and_scatter_at_once() -> None:

@@ -12,6 +12,7 @@ from fsw.flight.mission_sequencer import Stage
 from fsw.flight.modes.base import Handover
 from fsw.flight.modes.mission import Mission, left, motion_limits, with_update
 from fsw.flight.state import FlightState
+from fsw.flight.uncertain_clearance import KeptSet
 from fsw.mpc.reference import still_at
 from fsw.shapes.half_space import wall
 from fsw.signals import (
@@ -109,7 +110,7 @@ def test_the_reference_keeps_the_safe_set() -> None:
     late = 10**9
     assert MISSION.reference(state, late).p_WE == pytest.approx((1.0, 0.0, -2.0))
     fenced = SafeSet((wall((-1.0, 0.0, 0.0), -0.6, 0.1),))
-    state = replace(state, mission=replace(state.mission, safe_set=fenced))
+    state = replace(state, kept=KeptSet().of(fenced))
     assert MISSION.reference(state, late).p_WE == pytest.approx((0.5, 0.0, -2.0))
 
 

@@ -116,7 +116,8 @@ TELLING: dict[int, dict[str, Any]] = {
     ids.BARRIER_MARGIN: {
         "margin_min": 0.2, "margin_min_index": 1, "count": 3, "constraint_kind": 1,
         "active_mask": 0b010, "slack_max": 0.25,
-        "breaches": 3, "departures": 5, "interventions": 7,
+        "breaches": 3, "departures": 5, "interventions": 7, "lacking": 0.0625,
+        "added": [0.125, 0.25, *[0.0] * 14],
     },
     ids.MPC_STATUS: {
         "plan_id": 7, "total_us": 703, "linearise_us": 101, "solve_us": 502, "budget_us": 10_000,
