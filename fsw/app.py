@@ -19,6 +19,7 @@ from command_line.process import (
 from fsw.arguments import FswOptions
 from fsw.control.control_metrics import ControlMetrics
 from fsw.link.build_links import build_links
+from fsw.link.events.event_service import EventService
 from fsw.link.files.flight_logs import FlightLogs
 from fsw.link.files.ftp_service import FtpService
 from fsw.link.files.log_service import LogService
@@ -156,7 +157,8 @@ class _Session:
 
         parameters = ParameterService(program.parameters)
         missions = MissionService(program.missions)
-        return parameters, missions, LogService(logs), FtpService(vehicle_files(logs))
+        events = EventService(program.events)
+        return parameters, missions, events, LogService(logs), FtpService(vehicle_files(logs))
 
     def _keep_parameters(self, program: FlightProgram[Any], directory: Path) -> ParameterFile:
         """Take over the parameters of the vehicle's file, and say what of it is of no use.

@@ -39,6 +39,7 @@ class Mode(Enum):
     OFFBOARD = "offboard"
     ORBIT = "orbit"
     TRAJECTORY = "trajectory"
+    DESCEND = "descend"
     FAULT = "fault"
 
 
@@ -610,12 +611,22 @@ class Severity(IntEnum):
     INFO = 6
 
 
+class FailsafeEvent(NamedTuple):
+    """A condition of the failsafe table that began or ended, for programs."""
+
+    condition: str  # its name
+    action: str  # what is done about it
+    severity: Severity
+    over: bool = False  # it has ended
+
+
 @dataclass(frozen=True, slots=True)
 class StatusText:
     """A sentence for the operator."""
 
     severity: Severity
     text: str
+    event: FailsafeEvent | None = None  # that it is about
 
 
 @dataclass(frozen=True, slots=True)
@@ -686,6 +697,8 @@ class BatteryState:
     consumed: float = 0.0  # A h
     remaining: float = 1.0  # share of the capacity
     charge: Charge = Charge.OK
+    usual_current: float = 0.0  # A, of late
+    time_left: float = math.inf  # s, at the usual current
 
 
 @dataclass(frozen=True, slots=True)
@@ -770,6 +783,13 @@ class EstimatorReport:
 
 
 @dataclass(frozen=True, slots=True)
+class ArmingReport:
+    """The arming checks that fail, by their places in the table; none while armed."""
+
+    failed: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class FlightSnapshot:
     """The vehicle as telemetry shows it after a tick; what follows from it, encoders compute."""
 
@@ -798,6 +818,19 @@ class FlightSnapshot:
     accel_B: Vec3 = (0.0, 0.0, -9.81)  # m/s^2, specific force as measured
     safety: SafetyCounters = SafetyCounters()
     estimator: EstimatorReport | None = None  # None: states are exact
+    log_failure: str = ""  # why the flight log is not written as it should be
+    arming: ArmingReport = ArmingReport()
+
+
+@dataclass(frozen=True, slots=True)
+class HostHealth:
+    """What the loop around the tick found out about its machine, of the last second."""
+
+    missed_ticks: int = 0  # late, skipped, or without readings of their own
+    log_failure: str = ""  # why the flight log is not written as it should be; empty: it is
+    disk_left_us: int = -1  # how long the disk will take the log; -1: long enough
+    datagrams: int = 0  # from the ground, read or dropped
+    clock_jump_us: int = 0  # of the wall clock against the monotonic one
 
 
 @dataclass(frozen=True, slots=True)
@@ -829,6 +862,7 @@ class TickInputs:
     # What sensors with times of their own measured; with any, the frame gives the time alone.
     samples: tuple[Sample, ...] = ()
     battery: BatteryReading | None = None  # newly measured
+    host: HostHealth | None = None  # where it differs from the last one
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,7 +14,7 @@ from sitl.scenario_file import SUITE_NAMES
 from studies.fault_flights import SITUATIONS
 
 EXPECTATIONS: Final = Path(__file__).with_suffix(".toml")
-ACTIONS: Final = ("goes on", "hold", "return", "land", "terminate", "ended")
+ACTIONS: Final = ("goes on", "hold", "return", "land", "descend", "terminate", "ended")
 
 Contact = Literal["none", "ground", "any"]
 _CONTACTS: Final[tuple[str, ...]] = typing.get_args(Contact)

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Final
 from xml.etree import ElementTree as ET
 
+from fsw.link.events.event_service import EventService
 from fsw.link.files.ftp_service import FtpService
 from fsw.link.files.log_service import LogService
 from fsw.link.inbox import Inbox
@@ -48,7 +49,8 @@ ANSWERS: Final = (
     ids.PING, ids.PARAM_VALUE, ids.PARAM_ERROR, ids.MISSION_CURRENT, ids.MISSION_COUNT,
     ids.MISSION_ITEM_INT, ids.MISSION_ITEM, ids.MISSION_REQUEST_INT, ids.MISSION_ITEM_REACHED,
     ids.MISSION_ACK, ids.COMMAND_ACK, ids.FILE_TRANSFER_PROTOCOL, ids.TIMESYNC, ids.LOG_ENTRY,
-    ids.LOG_DATA, ids.MESSAGE_INTERVAL, ids.STATUSTEXT, *ON_REQUEST,
+    ids.LOG_DATA, ids.MESSAGE_INTERVAL, ids.STATUSTEXT, ids.EVENT, ids.CURRENT_EVENT_SEQUENCE,
+    ids.RESPONSE_EVENT_ERROR, *ON_REQUEST,
 )  # fmt: skip
 _OF_THE_LINK: Final = (ids.HEARTBEAT, ids.RADIO_STATUS, ids.SETUP_SIGNING)
 # What the mission service hears; it exists with a mission only.
@@ -161,7 +163,7 @@ def _description(element: ET.Element) -> str:
 
 def heard() -> frozenset[int]:
     """Every message that the vehicle does something with."""
-    services = (ParameterService, LogService, FtpService, TimeService)
+    services = (ParameterService, LogService, FtpService, TimeService, EventService)
     return frozenset(_OF_THE_LINK).union(
         Inbox().message_ids,
         OF_MISSIONS,

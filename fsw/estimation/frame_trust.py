@@ -108,6 +108,11 @@ class FrameTrust(NamedTuple):
         blind = min(t, _seconds(self.inertial, now_us))
         return 0.5 * (_FORCE_ERROR * t * t + _BLIND_FORCE * blind * blind)
 
+    def velocity_sigma(self, now_us: int) -> float:
+        """Of the estimate at ``now_us`` [us], a standard deviation [m/s]."""
+        t = _seconds(self.pose, now_us)
+        return _FORCE_ERROR * t + _BLIND_FORCE * min(t, _seconds(self.inertial, now_us))
+
     def attitude_sigma(self, now_us: int) -> float:
         """Of the estimate at ``now_us`` [us], a standard deviation [rad]."""
         t = _seconds(self.pose, now_us)

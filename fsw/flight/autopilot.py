@@ -25,6 +25,7 @@ from fsw.estimation.estimator import estimate_state
 from fsw.estimation.sensor_fusion import FusionMemory
 from fsw.flight.accuracy_watch import AccuracyWatch
 from fsw.flight.commander import Commander, acknowledgement
+from fsw.flight.descent import Descent
 from fsw.flight.exact_state import ExactState
 from fsw.flight.failsafe import FAULTS, Condition
 from fsw.flight.modes.mission import with_update
@@ -34,7 +35,7 @@ from fsw.flight.reference_horizon import ReferenceHorizon
 from fsw.flight.safe_set import SafeSetCheck
 from fsw.flight.safety_watch import SafetyWatch
 from fsw.flight.sensed_state import SensedState
-from fsw.flight.state import FlightState, PlanMemory
+from fsw.flight.state import FlightState, PlanMemory, SafetyMemory
 from fsw.flight.uncertain_clearance import KeptSet, UncertainClearance, pose_covariance
 from fsw.model.battery import Levels, corrected, drained
 from fsw.model.body import body_of
@@ -53,6 +54,8 @@ from fsw.signals import (
     EndEffectorTarget,
     FlightSnapshot,
     Mode,
+    Plan,
+    PlanFailure,
     PlanInput,
     PlanRequest,
     PredictionState,
@@ -96,6 +99,7 @@ class Autopilot:
         )
         self._sensed = SensedState(config.estimator, self._cascade)
         self._exact = ExactState(self._cascade)
+        self._descent = Descent(config)
         self._accuracy = AccuracyWatch(config, self._safe_sets.loop_tube)
         self._clearance = UncertainClearance(
             config.limits.clearance_sigmas,
@@ -109,6 +113,7 @@ class Autopilot:
         )
         self._zones: tuple[KeptSet, EndEffectorTarget | None, Array] = (KeptSet(), None, NO_ZONES)
         self._ticks_per_plan = config.mpc_period_us // config.tick_period_us
+        self._most_us = config.catch_up_ticks * config.tick_period_us
 
     def warm_up(self) -> None:
         """Compile every kernel of the tick, before anything flies."""
@@ -140,6 +145,7 @@ class Autopilot:
         acks: list[CommandAck] = []
         if inputs.commands:
             state, acks = self._commander.handle_commands(state, estimate, inputs.commands, texts)
+        state = self._with_evidence(state, estimate)
         state = self._commander.check_failsafes(state, estimate, texts)
         state = self._commander.check_mode_completion(state, estimate, texts)
 
@@ -149,7 +155,7 @@ class Autopilot:
         nominal, plan, u = state.nominal, state.plan, REST_INPUT
         flown = state.vehicle.flies and nominal is not None
         if flown and nominal is not None:
-            nominal, plan, u = self._plans.follow(plan, nominal, inputs.plan, now_us, ticks)
+            nominal, plan, u = self._follow(state, estimate, nominal, inputs.plan, ticks)
         safety = self._watch.off_plan(
             state.safety, estimate, nominal if flown else None, state.accuracy.reach
         )
@@ -172,8 +178,8 @@ class Autopilot:
         sent, memory, replaced, (pushed, margin) = self._actuate(state, estimate, nominal, u, ticks)
         if pushed or safety.filter_us >= 0:
             safety = self._watch.filtered(safety, now_us, pushed=pushed)
-        if not margin >= 0.0:
-            safety = self._watch.margin(safety, now_us, margin)
+        if safety.breach_us >= 0 or not margin >= 0.0:
+            safety = self._breached(state, safety, estimate, margin)
         # By position, as the snapshot: both are made in every tick, and names cost a microsecond.
         state = FlightState(
             index,
@@ -193,6 +199,7 @@ class Autopilot:
             state.offboard,
             state.battery,
             state.arming_refusal,
+            state.arming,
             safety,
             fusion,
             state.estimator,
@@ -200,6 +207,8 @@ class Autopilot:
             trust,
             state.kept,
             state.accuracy,
+            state.host,
+            state.damage,
         )
         snapshot = _snapshot(state, estimate, u, inputs)
         return state, TickOutputs(
@@ -209,6 +218,44 @@ class Autopilot:
             acks=tuple(acks),
             texts=tuple(texts),
         )
+
+    def _with_evidence(self, state: FlightState, estimate: StateEstimate) -> FlightState:
+        """What the failsafe table looks at and what is not kept up to date elsewhere."""
+        safety, watch = state.safety, self._watch
+        tilted = safety.rolled_us >= 0 or safety.pitched_us >= 0
+        if tilted or not estimate.R_WB[8] > watch.upright:
+            safety = watch.attitude(safety, estimate, flies=state.vehicle.flies)
+        if state.index >= 0 and not 0 < estimate.t_us - state.t_us <= self._most_us:
+            safety = watch.jumped(safety, estimate.t_us, state.t_us)
+        return state if safety is state.safety else replace(state, safety=safety)
+
+    def _follow(
+        self,
+        state: FlightState,
+        estimate: StateEstimate,
+        nominal: PredictionState,
+        answer: Plan | PlanFailure | None,
+        ticks: int,
+    ) -> tuple[PredictionState, PlanMemory, PlanInput]:
+        """The plan's state now; in Descend it is none of a plan, though plans are asked for."""
+        now_us = estimate.t_us
+        followed = self._plans.follow(state.plan, nominal, answer, now_us, ticks)
+        if state.vehicle.mode is not Mode.DESCEND:
+            return followed
+        down, u = self._descent.step(nominal, estimate, state.aiding, ticks)
+        return down, followed[1], u
+
+    def _breached(
+        self, state: FlightState, safety: SafetyMemory, estimate: StateEstimate, margin: float
+    ) -> SafetyMemory:
+        """The memory of a breach with the ``margin`` [m] seen now; at its begin, of what it is."""
+        if not margin >= 0.0:
+            safety = self._watch.margin(safety, estimate.t_us, margin)
+        if state.safety.breach_us >= 0:
+            return safety
+        report = self._safe_sets.margins(state.kept, estimate, state.reference)
+        of_fence = self._watch.of_fence(report, len(state.mission.announced.zones))
+        return replace(safety, breach_of_fence=of_fence)
 
     def _receive(
         self, state: FlightState, inputs: TickInputs, texts: list[StatusText]
@@ -233,6 +280,8 @@ class Autopilot:
             levels = self._battery_levels
             battery = corrected(self.config.battery, levels, state.battery, inputs.battery)
             state = replace(state, battery=battery)
+        if inputs.host is not None:
+            state = replace(state, host=inputs.host)
         if inputs.ground_station_heard:
             state = replace(state, vehicle=replace(state.vehicle, gcs_heard_us=now_us))
         heard = (inputs.motion, inputs.attitude, inputs.joints) != (None, None, None)
@@ -311,11 +360,13 @@ class Autopilot:
     ) -> FlightState:
         """Reference, margins, arming checks and battery, once a planning period."""
         target = self._commander.mode(state).target(state, now_us)
+        refusal, arming = self._commander.arming_report(state, estimate)
         return replace(
             state,
             constraints=self._safe_sets.margins(state.kept, estimate, target),
             reference=target if state.vehicle.flies else None,
-            arming_refusal=self._commander.arming_refusal(state, estimate),
+            arming_refusal=refusal,
+            arming=arming,
             battery=self._battery(state),
         )
 
@@ -359,8 +410,14 @@ class Autopilot:
         return sent, memory.after_sending(sent), replaced, guarded
 
     def _zones_now(self, state: FlightState) -> Array:
-        """The zones for the safety filter; made anew where they or their target changed."""
+        """The zones for the safety filter; made anew where they or their target changed.
+
+        None where the vehicle descends because it does not know where it is.
+        """
         kept, target = state.kept, state.reference
+        blind = state.aiding.unaided_us >= self.config.limits.aiding_loss_us
+        if blind and state.vehicle.mode is Mode.DESCEND:
+            return NO_ZONES
         known, known_target, zones = self._zones
         if kept is not known or target is not known_target:
             if kept is not known or kept.safe_set.kind is ConstraintKind.WORKSPACE:
@@ -419,6 +476,8 @@ def _snapshot(
         inputs.sensors.accel_B,
         state.safety.counters,
         state.estimator,
+        state.host.log_failure,
+        state.arming,
     )
 
 

@@ -134,6 +134,8 @@ def _switch_mode(action: SwitchMode, context: CommandContext, modes: Modes) -> D
 def _switch(wanted: Mode, context: CommandContext, modes: Modes) -> Decision:
     """Change the mode if everything that the new one needs is there."""
     mode = modes[wanted]
+    if context.blocked:
+        return Decision(LATER, f"no {wanted.value}: {context.blocked}")
     denial = mode.denial(context)
     if denial is not None:
         return Decision(DENIED, denial)

@@ -9,6 +9,7 @@ from dataclasses import replace
 
 from fsw.control.cascade import at_rest, in_hover
 from fsw.flight import arming, failsafe
+from fsw.flight.arming_health import arming_health
 from fsw.flight.command_dedup import answered_before, remember
 from fsw.flight.command_handlers import Decision, decide
 from fsw.flight.failsafe import FailsafeContext
@@ -23,13 +24,15 @@ from fsw.flight.modes.offboard import is_fresh
 from fsw.flight.plan_exchange import nominal_at_rest
 from fsw.flight.retreat import retreat_place
 from fsw.flight.setpoint_generator import PositionGoal, SetpointGenerator
-from fsw.flight.state import FlightState, PlanMemory, SetpointMemory
+from fsw.flight.state import FlightState, PlanMemory, SetpointMemory, VehicleMemory
 from fsw.model.body import body_of
 from fsw.model.kinematics import point_in_flight
 from fsw.mpc.reference import still_at
 from fsw.parameters.consistency import base_reach, loop_tube, stand_off
+from fsw.parameters.contradictions import contradictions
 from fsw.parameters.flight_config import FlightConfig
 from fsw.signals import (
+    ArmingReport,
     Command,
     CommandAck,
     CommandResult,
@@ -43,6 +46,8 @@ from fsw.signals import (
     Vec2,
 )
 
+_ARMED = ArmingReport()  # nothing to check
+
 
 class Commander:
     """Moves the vehicle of one configuration between modes."""
@@ -53,7 +58,7 @@ class Commander:
         self._body = body_of(config.planner.body, config.airframe)
         self._generator = SetpointGenerator(config)
         self._modes: dict[Mode, FlightMode] = {mode: kind(config) for mode, kind in MODES.items()}
-        self._manual_modes = frozenset(mode for mode, kind in MODES.items() if kind.manual)
+        self._contradiction = "; ".join(contradictions(config))
         self._no_mode = FlightMode(config)  # disarmed or terminated
 
     def mode(self, state: FlightState) -> FlightMode:
@@ -108,7 +113,8 @@ class Commander:
             now_us=estimate.t_us,
             climb_range=(limits.airborne_height, limits.takeoff_climb_most),
             airframe=self._config.airframe,
-            charge=state.battery.charge,
+            health=arming_health(self._config, state, estimate, self._contradiction),
+            blocked=_blocked(vehicle),
             speed=vehicle.speed or setpoint_limits.cruise_speed,
             max_speed=setpoint_limits.speed,
             yaw_rate=setpoint_limits.yaw_rate,
@@ -116,40 +122,47 @@ class Commander:
             failures_allowed=limits.failure_injection == 1,
         )
 
-    def arming_refusal(self, state: FlightState, estimate: StateEstimate) -> str:
-        """Why the vehicle cannot be armed now, for telemetry; empty if it could be, or is."""
+    def arming_report(
+        self, state: FlightState, estimate: StateEstimate
+    ) -> tuple[str, ArmingReport]:
+        """Why the vehicle cannot be armed now, and which checks fail, for telemetry.
+
+        Empty if it could be armed, or is.
+        """
         if state.vehicle.armed:
-            return ""
+            return "", _ARMED
         if state.vehicle.mode is Mode.FAULT:
-            return "terminated: restart the flight software"
-        return arming.refusal(self.context(state, estimate)) or ""
+            return "terminated: restart the flight software", _ARMED
+        found = arming.failed(self.context(state, estimate))
+        report = ArmingReport(tuple([number for number, _ in found]))
+        sentence = arming.joined(found) if found else ""
+        return sentence, state.arming if report == state.arming else report
 
     def check_failsafes(
         self, state: FlightState, estimate: StateEstimate, texts: list[StatusText]
     ) -> FlightState:
         """Report each condition once, when it becomes active, and take its action."""
-        before = state.vehicle.conditions
-        if state.vehicle.mode is Mode.FAULT:
+        vehicle = state.vehicle
+        if vehicle.mode is Mode.FAULT:
             return state  # what ended the flight stays on show
-        config, manual = self._config, self._manual_modes
-        rows = failsafe.active(FailsafeContext(state, estimate, config, manual))
+        context = FailsafeContext(state, estimate, self._config)
+        slowly = estimate.t_us // failsafe.SLOW_US != state.t_us // failsafe.SLOW_US
+        rows = failsafe.active(context) if slowly else failsafe.quickly_active(context)
+        before = vehicle.conditions
         if not rows and not before:
             return state
         now = tuple([row.condition for row in rows])
-        if now == before:
+        if now == before and not slowly:
             return state
-        state = replace(state, vehicle=replace(state.vehicle, conditions=now))
-        for row in rows:
-            if row.condition in before or state.vehicle.mode is Mode.FAULT:
-                continue
-            context = FailsafeContext(state, estimate, config, manual)
-            action = row.action(context)
-            if action is not failsafe.Action.NONE:
-                texts.append(StatusText(*failsafe.report(row, context, action)))
-            if action.mode is not None:
-                state = self._fail_safe(state, action.mode, estimate, texts)
-            if action is failsafe.Action.RETREAT:
-                state = replace(state, setpoint=self._retreating(state, estimate))
+        response = failsafe.respond(context, rows)
+        texts += response.reports
+        if now != before or response.memory != vehicle.failsafe:
+            vehicle = replace(vehicle, conditions=now, failsafe=response.memory)
+            state = replace(state, vehicle=vehicle)
+        if response.action.mode is not None:
+            state = self._fail_safe(state, response.action.mode, estimate, texts)
+        if response.action is failsafe.Action.RETREAT:
+            state = replace(state, setpoint=self._retreating(state, estimate))
         return state
 
     def _fail_safe(
@@ -225,7 +238,23 @@ class Commander:
             state = replace(state, setpoint=self._towards(state, decision.goal, estimate))
         if decision.joints is not None:
             state = replace(state, setpoint=self._with_joints(state, decision.joints, estimate))
-        return state
+        return self._taken_over(state, decision, texts)
+
+    def _taken_over(
+        self, state: FlightState, decision: Decision, texts: list[StatusText]
+    ) -> FlightState:
+        """The state after a command of the pilot: it ends a failsafe whose mode it changes."""
+        vehicle, action = state.vehicle, state.vehicle.failsafe.action
+        commands = decision.mode is not None or decision.stop or decision.goal is not None
+        if action is failsafe.Action.NONE or not commands or not vehicle.armed:
+            return state
+        cause = vehicle.failsafe.cause
+        if cause in vehicle.conditions:
+            assert cause is not None
+            text = f"failsafe overridden: {cause.value}"
+            texts.append(StatusText(Severity.WARNING, text))
+        memory = failsafe.overridden(vehicle.failsafe, vehicle.conditions)
+        return replace(state, vehicle=replace(vehicle, failsafe=memory, failsafe_from=None))
 
     def _remember(
         self, state: FlightState, decision: Decision, estimate: StateEstimate
@@ -302,7 +331,8 @@ class Commander:
             look_at=None,
             speed=None,
             intended_mode=Mode.HOLD,
-            conditions=tuple(c for c in state.vehicle.conditions if c not in failsafe.BATTERY),
+            conditions=(),  # what is so is told again, and acted upon
+            failsafe=failsafe.NOTHING_DONE,
         )
         state = replace(
             _without_plan(state, estimate),
@@ -350,6 +380,8 @@ class Commander:
             failsafe_from=vehicle.failsafe_from if completed else None,
         )
         if not vehicle.armed:
+            memory = failsafe.overridden(vehicle.failsafe, ())
+            vehicle = replace(vehicle, failsafe_from=None, failsafe=memory)
             # On the ground another source may own the safe set from now on.
             state = replace(state, mission=replace(state.mission, owner_heard_us=-1))
         return replace(state, vehicle=vehicle)
@@ -359,6 +391,14 @@ def acknowledgement(command: Command, result: int) -> CommandAck:
     """The answer to its sender."""
     request = command.request
     return CommandAck(request.command, result, request.source_system, request.source_component)
+
+
+def _blocked(vehicle: VehicleMemory) -> str:
+    """Why nothing but Descend can be flown now; empty: other modes can be."""
+    if not vehicle.flies or vehicle.mode is not Mode.DESCEND:
+        return ""
+    reasons = [c.value for c in vehicle.conditions if c in failsafe.BLOCKING]
+    return f"{reasons[0]}; the vehicle descends" if reasons else ""
 
 
 def _lift_off(state: FlightState, estimate: StateEstimate) -> FlightState:

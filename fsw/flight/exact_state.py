@@ -86,6 +86,7 @@ def _aiding(trust: FrameTrust, now_us: int) -> Aiding:
         pose=Sensor.POSE,
         pose_fault=pose.fault,
         position_sigma=trust.position_sigma(now_us),
+        velocity_sigma=trust.velocity_sigma(now_us),
         attitude_sigma=trust.attitude_sigma(now_us),
         sensor=lost[0][0] if lost else None,
         fault=lost[0][1].fault if lost else faults[0][1].fault,

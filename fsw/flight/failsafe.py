@@ -1,30 +1,47 @@
 """The failsafe table: what can go wrong in flight, and what the vehicle does about it.
 
 Each row names a condition, when it is active and the action on it. A condition is reported once,
-when it becomes active, and its action is taken then. Some actions are parameters, in PX4's names
-and numbers. To act on another condition, name it and add a row.
+when it becomes active. The strongest action that any active condition asks for is taken, for as
+long as no command of the pilot overrides it (``respond``). Some actions are parameters, in PX4's
+names and numbers. To act on another condition, name it and add a row; docs/reference/failsafes.md
+is made from the rows.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from fsw.estimation.sensor_fault import sentence
 from fsw.flight.uncertain_clearance import LACKING
 from fsw.frozen import dataclass as value_dataclass
 from fsw.parameters.flight_config import FlightConfig, FlightLimits
-from fsw.signals import Charge, Mode, Severity, StateEstimate
+from fsw.signals import (
+    Charge,
+    FailsafeEvent,
+    Mode,
+    Severity,
+    SolverStatus,
+    StateEstimate,
+    StatusText,
+)
 
 if TYPE_CHECKING:
     from fsw.flight.state import FlightState  # which keeps the active conditions
 
 PLAN_STALE_PERIODS: Final = 3
 INVALID_TICKS: Final = 5  # 10 ms without an estimate
+MISSED_TICKS: Final = 25  # of the 500 of a second, that are too many
+JUMP_SHOWN_US: Final = 1_000_000  # for which a jump of time is a condition
+JUMP_US: Final = 500_000  # of the wall clock in a second, that is no slewing
+BREAKER: Final = 121212  # of CBRK_FLIGHTTERM, PX4's number
+AT_ONCE_US: Final = 2_000  # a tick
+SLOW_US: Final = 100_000  # a planning period, after which the other rows are looked at again
+SECOND_US: Final = 1_100_000  # the loop looks at its machine once a second
 _LACKING_US: Final = 500_000  # without room enough; hidden markers, 0.2 s, are none
-MIN_UP: Final = 0.34  # cosine of 70 degrees of tilt
 
 
 class Action(Enum):
@@ -40,6 +57,7 @@ class Action(Enum):
     RETREAT = "retreating"  # off the zones that are too close, then hold
     RETURN = "returning"
     LAND = "landing"
+    DESCEND = "descending"  # where it is, without a plan and, if need be, without a position
     TERMINATE = "terminate"
 
     @property
@@ -47,14 +65,21 @@ class Action(Enum):
         """The mode that the action switches to."""
         return _MODES.get(self)
 
+    @property
+    def strength(self) -> int:
+        """Place in the order of actions; the stronger one wins."""
+        return _STRENGTHS[self]
+
 
 _MODES: Final = {
     Action.HOLD: Mode.HOLD,
     Action.RETREAT: Mode.HOLD,
     Action.RETURN: Mode.RETURN,
     Action.LAND: Mode.LAND,
+    Action.DESCEND: Mode.DESCEND,
     Action.TERMINATE: Mode.FAULT,
 }
+_STRENGTHS: Final = {action: place for place, action in enumerate(Action)}
 
 
 class Condition(Enum):
@@ -63,7 +88,11 @@ class Condition(Enum):
     ATTITUDE_LOST = "attitude unknown"
     TILT_LOST = "tilt beyond recovery"
     POSITION_LOST = "position unknown"
+    PLANNER_LOST = "planner lost"
     BREACH = "outside the safe set"
+    FENCE_BREACH = "outside the fence"
+    ROTOR_FAILED = "rotor failed"
+    JOINT_FAILED = "joint failed"
     POSITION_LOW = "position uncertain"
     SENSOR_LOST = "sensor lost"
     ROOM_LACKING = "too little room for what the estimate is not sure of"
@@ -74,12 +103,34 @@ class Condition(Enum):
     ESTIMATE_INVALID = "state estimate invalid"
     OUTPUT_NOT_FINITE = "actuator command not finite"
     PLAN_REFUSED = "last plan refused"
+    PLAN_LATE = "plan late"
+    TIME_JUMPED = "time jumped"
+    LOOP_OVERRUN = "ticks missed"
+    CLOCK_JUMPED = "wall clock jumped"
+    LINK_FLOODED = "link flooded"
+    LOG_STOPPED = "flight log damaged"
+    DISK_FULL = "disk nearly full"
     SETPOINTS_LOST = "offboard setpoints stopped"
     ZONES_SILENT = "moving zones not announced any more"
     DATALINK_LOST = "no ground station"
+    FLIGHT_TIME_LOW = "flight time short"
     BATTERY_LOW = "battery low"
     BATTERY_CRITICAL = "battery critical"
     BATTERY_EMERGENCY = "battery nearly empty"
+
+
+class FailsafeMemory(NamedTuple):
+    """What is being done about the active conditions."""
+
+    since_us: tuple[int, ...] = ()  # when each of them became active, in their order
+    action: Action = Action.NONE  # the strongest that was taken since the pilot commanded a mode
+    cause: Condition | None = None  # of that
+    pending: Action = Action.NONE  # what follows the hold that gives the pilot time
+    due_us: int = 0  # when
+    overridden: tuple[Condition, ...] = ()  # whose actions a command of the pilot has put aside
+
+
+NOTHING_DONE: Final = FailsafeMemory()
 
 
 @value_dataclass(frozen=True, slots=True)
@@ -89,7 +140,6 @@ class FailsafeContext:
     state: FlightState
     estimate: StateEstimate
     config: FlightConfig
-    manual_modes: frozenset[Mode]  # that an operator flies
 
     @property
     def limits(self) -> FlightLimits:
@@ -102,35 +152,68 @@ class FailsafeContext:
         return self.estimate.t_us - self.state.vehicle.gcs_heard_us
 
 
+Evidence = Callable[[FailsafeContext], bool]
+
+
 @dataclass(frozen=True, slots=True)
 class Failsafe:
     """One row of the table."""
 
     condition: Condition
-    active: Callable[[FailsafeContext], bool]
+    active: Evidence
     action: Callable[[FailsafeContext], Action]
     severity: Severity = Severity.WARNING  # of a report without a change of mode
     detail: Callable[[FailsafeContext], str] = lambda _: ""  # behind the condition's name
     of_vehicle: bool = False  # a fault of the vehicle, shown by telemetry for as long as it lasts
+    slow: bool = False  # looked at once a planning period, not every tick
+    delayed: bool = False  # holds for COM_FAIL_ACT_T before it returns or lands
+    # For the page of the table: what is looked at, how long it takes until the condition is
+    # reported, beyond the time of a parameter, and the parameters that belong to it.
+    detected: str = ""
+    within_us: int = AT_ONCE_US
+    parameters: tuple[str, ...] = ()
+    does: str = ""  # the action in words where no parameter chooses it
+    ends: str = ""  # when, where that is not simply when it is not so any more
 
 
 def _always(action: Action) -> Callable[[FailsafeContext], Action]:
     return lambda _: action
 
 
+# ---------------------------------------------------------------- what is so
+
+
+def _plan_age_us(context: FailsafeContext) -> int:
+    """Since the running plan began, or the vehicle was taken over."""
+    return context.estimate.t_us - context.state.plan.since_us
+
+
+def _plans(context: FailsafeContext) -> bool:
+    """Whether a plan is being flown, or should be."""
+    vehicle = context.state.vehicle
+    return vehicle.flies and vehicle.mode is not Mode.DESCEND
+
+
 def _plan_is_stale(context: FailsafeContext) -> bool:
     """In flight, the running plan (or taking over) began more than three periods ago."""
-    age_us = context.estimate.t_us - context.state.plan.since_us
     stale_us = PLAN_STALE_PERIODS * context.config.planner.period_us
-    return age_us > stale_us and context.state.vehicle.flies
+    return _plan_age_us(context) > stale_us and _plans(context)
+
+
+def _planner_is_lost(context: FailsafeContext) -> bool:
+    vehicle = context.state.vehicle
+    return _plan_age_us(context) > context.limits.planner_loss_us and vehicle.flies
 
 
 def _setpoints_are_lost(context: FailsafeContext) -> bool:
-    state = context.state
-    if state.vehicle.mode is not Mode.OFFBOARD:
+    vehicle = context.state.vehicle
+    if Mode.OFFBOARD is not vehicle.mode and (
+        Mode.OFFBOARD is not vehicle.failsafe_from
+        or Condition.SETPOINTS_LOST not in vehicle.conditions
+    ):
         return False
     timeout_us = context.limits.setpoint_timeout_us
-    return not state.offboard.is_fresh(context.estimate.t_us, timeout_us)
+    return not context.state.offboard.is_fresh(context.estimate.t_us, timeout_us)
 
 
 def _datalink_is_lost(context: FailsafeContext) -> bool:
@@ -139,47 +222,10 @@ def _datalink_is_lost(context: FailsafeContext) -> bool:
     return context.gcs_silent_us >= context.limits.station_timeout_us
 
 
-def _on_setpoints_lost(context: FailsafeContext) -> Action:
-    """COM_OBL_RC_ACT; the mode cannot continue."""
-    known = {3: Action.RETURN, 4: Action.LAND, 5: Action.HOLD}
-    return known.get(context.limits.setpoint_loss_action, Action.HOLD)
-
-
-def _on_datalink_lost(context: FailsafeContext) -> Action:
-    """NAV_DLL_ACT, where an operator flies; the other modes fly by themselves and go on."""
-    vehicle = context.state.vehicle
-    if not (vehicle.flies and vehicle.mode in context.manual_modes):
-        return Action.NONE
-    known = {1: Action.HOLD, 2: Action.RETURN, 3: Action.LAND}
-    return known.get(context.limits.station_loss_action, Action.NONE)
-
-
 def _lacks_room(context: FailsafeContext) -> bool:
     kept = context.state.kept
     lasts = context.estimate.t_us - kept.ample_us >= _LACKING_US
     return kept.lacking > LACKING and lasts and context.state.vehicle.flies
-
-
-def _on_battery(context: FailsafeContext) -> Action:
-    """COM_LOW_BAT_ACT: 0 warn, 2 land when critical, 3 return then and land in an emergency."""
-    action = {
-        (2, Charge.CRITICAL): Action.LAND,
-        (2, Charge.EMERGENCY): Action.LAND,
-        (3, Charge.CRITICAL): Action.RETURN,
-        (3, Charge.EMERGENCY): Action.LAND,
-    }.get((context.limits.low_battery_action, context.state.battery.charge), Action.WARN)
-    vehicle = context.state.vehicle
-    under_way = vehicle.mode is Mode.LAND or vehicle.mode is action.mode
-    return Action.WARN if under_way or not vehicle.flies else action
-
-
-def _on_breach(context: FailsafeContext) -> Action:
-    """SAFE_BREACH_ACT, where the controller has barriers that promise not to get there."""
-    config, vehicle = context.config, context.state.vehicle
-    if config.controller != "blf" or config.soft or vehicle.mode is Mode.LAND:
-        return Action.WARN
-    known = {2: Action.HOLD, 5: Action.LAND, 6: Action.RETREAT}
-    return known.get(context.limits.breach_action, Action.WARN)
 
 
 def _is_unaided(context: FailsafeContext) -> bool:
@@ -198,11 +244,106 @@ def _sensor_is_lost(context: FailsafeContext) -> bool:
     return aiding.sensor is not None and flies and lost_us >= context.limits.sensor_loss_us
 
 
-def _unless_landing(context: FailsafeContext, number: int) -> Action:
-    """1 warn, 2 hold, 5 land; a landing goes on."""
-    wanted = {2: Action.HOLD, 5: Action.LAND}.get(number, Action.WARN)
-    under_way = context.state.vehicle.mode in (Mode.LAND, wanted.mode)
-    return Action.WARN if under_way else wanted
+def _tilt_is_lost(context: FailsafeContext) -> bool:
+    safety = context.state.safety
+    if safety.rolled_us < 0 and safety.pitched_us < 0:
+        return False
+    limits, now_us = context.limits, context.estimate.t_us
+    over = 0 <= safety.rolled_us <= now_us - limits.roll_failure_us
+    return over or 0 <= safety.pitched_us <= now_us - limits.pitch_failure_us
+
+
+def way_home_s(context: FailsafeContext) -> float:
+    """Time to return and land from here [s], with RTL_TIME_FACTOR and RTL_TIME_MARGIN."""
+    home, limits = context.state.vehicle.home, context.limits
+    if home is None:
+        return 0.0
+    (x, y, z), (hx, hy, hz) = context.estimate.p_WB, home.p
+    cruise = context.config.steering.cruise_speed
+    top = min(z, hz - limits.return_height)
+    wait = max(limits.return_wait, 0.0)
+    seconds = (math.hypot(x - hx, y - hy) + z - top) / cruise + wait
+    seconds += max(hz - top, 0.0) / limits.land_speed
+    return limits.return_time_factor * seconds + limits.return_time_margin
+
+
+def _flight_time_is_short(context: FailsafeContext) -> bool:
+    left = context.state.battery.time_left
+    return context.state.vehicle.flies and left < way_home_s(context)
+
+
+# ---------------------------------------------------------------- what is done
+
+
+def _by_number(number: int) -> Action:
+    """PX4's actions of GF_ACTION, COM_POS_LOW_ACT and their like; 6 is Pandion's own."""
+    return {
+        0: Action.NONE,
+        2: Action.HOLD,
+        3: Action.RETURN,
+        4: Action.TERMINATE,
+        5: Action.LAND,
+        6: Action.RETREAT,
+    }.get(number, Action.WARN)
+
+
+def _on_setpoints_lost(context: FailsafeContext) -> Action:
+    """COM_OBL_RC_ACT; the mode cannot continue."""
+    known = {3: Action.RETURN, 4: Action.LAND, 5: Action.HOLD, 6: Action.TERMINATE}
+    return known.get(context.limits.setpoint_loss_action, Action.HOLD)
+
+
+# Bits of COM_DLL_EXCEPT, PX4's; that of external modes is the one of its COM_RCL_EXCEPT.
+_EXCEPTIONS: Final = {
+    Mode.MISSION: 1,
+    Mode.HOLD: 2,
+    Mode.TAKEOFF: 2,
+    Mode.OFFBOARD: 4,
+    Mode.TRAJECTORY: 8,
+}
+
+
+def _on_datalink_lost(context: FailsafeContext) -> Action:
+    """NAV_DLL_ACT, but for the modes of COM_DLL_EXCEPT."""
+    vehicle, limits = context.state.vehicle, context.limits
+    flown = vehicle.failsafe_from or vehicle.mode  # the hold of a failsafe is no hold of a pilot's
+    excepted = _EXCEPTIONS.get(flown, 0) & limits.station_loss_exceptions
+    if not vehicle.flies or excepted:
+        return Action.NONE
+    known = {1: Action.HOLD, 2: Action.RETURN, 3: Action.LAND, 5: Action.TERMINATE}
+    return known.get(limits.station_loss_action, Action.WARN)
+
+
+def _on_battery(context: FailsafeContext) -> Action:
+    """COM_LOW_BAT_ACT: 0 warn, 2 land when critical, 3 return then and land in an emergency."""
+    return {
+        (2, Charge.CRITICAL): Action.LAND,
+        (2, Charge.EMERGENCY): Action.LAND,
+        (3, Charge.CRITICAL): Action.RETURN,
+        (3, Charge.EMERGENCY): Action.LAND,
+    }.get((context.limits.low_battery_action, context.state.battery.charge), Action.WARN)
+
+
+def _on_breach(context: FailsafeContext, number: int) -> Action:
+    """The action where the controller has barriers that promise not to get there."""
+    config = context.config
+    if config.controller != "blf" or config.soft:
+        return Action.WARN
+    return _by_number(number)
+
+
+def _on_tilt_lost(context: FailsafeContext) -> Action:
+    broken = context.limits.termination_breaker == BREAKER
+    return Action.WARN if broken else Action.TERMINATE
+
+
+def _on_actuator_failure(context: FailsafeContext) -> Action:
+    """COM_ACT_FAIL_ACT, in numbers of its own."""
+    known = {1: Action.HOLD, 2: Action.LAND, 3: Action.RETURN, 4: Action.TERMINATE}
+    return known.get(context.limits.actuator_failure_action, Action.WARN)
+
+
+# ---------------------------------------------------------------- what is said of it
 
 
 def _uncertain(context: FailsafeContext) -> str:
@@ -226,6 +367,57 @@ def _charge_left(context: FailsafeContext) -> str:
     return f": {100.0 * context.state.battery.remaining:.0f} % left"
 
 
+def _time_left(context: FailsafeContext) -> str:
+    left = context.state.battery.time_left
+    return f": {left:.0f} s left, {way_home_s(context):.0f} s needed for the way home"
+
+
+def _tilted(context: FailsafeContext) -> str:
+    safety, limits = context.state.safety, context.limits
+    rolled = safety.rolled_us >= 0
+    since_us = safety.rolled_us if rolled else safety.pitched_us
+    angle = limits.roll_failure if rolled else limits.pitch_failure
+    seconds = 1e-6 * (context.estimate.t_us - since_us)
+    return (
+        f": {'roll' if rolled else 'pitch'} above {math.degrees(angle):.0f} deg for {seconds:.2f} s"
+    )
+
+
+_PLANNER_FAILS: Final = {
+    SolverStatus.INFEASIBLE: "infeasible",
+    SolverStatus.TIME_LIMIT: "out of time",
+    SolverStatus.NUMERICAL_ERROR: "numerical error",
+    SolverStatus.INPUT_REFUSED: "input refused",
+}
+
+
+def _no_plan(context: FailsafeContext) -> str:
+    """What the planner does instead of planning, and since when."""
+    plan = context.state.plan
+    why = "silent" if plan.awaited_missed or not plan.refused else ""
+    why = why or _PLANNER_FAILS.get(plan.status, "failing")
+    return f": planner {why}, last plan {1e-6 * _plan_age_us(context):.2f} s ago"
+
+
+def _refused_plan(context: FailsafeContext) -> str:
+    """Without a number: it may come and go ten times a second, and is then told once in a while."""
+    return f": {_PLANNER_FAILS.get(context.state.plan.status, 'failing')}"
+
+
+def _jumped(context: FailsafeContext) -> str:
+    return f" by {1e-6 * context.state.safety.jump_us:.2f} s"
+
+
+def _by_mm(length: float) -> str:
+    return f" by {1e3 * length:.0f} mm"
+
+
+def _for(context: FailsafeContext, since_us: int) -> str:
+    return f", for {1e-6 * (context.estimate.t_us - since_us):.2f} s"
+
+
+_SLOWLY: Final = SLOW_US + AT_ONCE_US
+
 FAILSAFES: Final = (
     Failsafe(
         Condition.ATTITUDE_LOST,
@@ -233,46 +425,128 @@ FAILSAFES: Final = (
             not c.state.aiding.attitude_sigma <= c.limits.attitude_loss and c.state.vehicle.flies
         ),
         _always(Action.TERMINATE),
-        detail=_unaided,
+        Severity.EMERGENCY,
+        _unaided,
         of_vehicle=True,
+        detected="in flight, the standard deviation of roll or pitch is above `COM_ATT_LOSS`",
+        within_us=_SLOWLY,
+        parameters=("COM_ATT_LOSS",),
+        does="terminate: rotors and joints off",
     ),
     Failsafe(
         Condition.TILT_LOST,
-        lambda c: not c.estimate.R_WB[8] > MIN_UP and c.state.vehicle.flies,
-        _always(Action.TERMINATE),
+        _tilt_is_lost,
+        _on_tilt_lost,
+        Severity.EMERGENCY,
+        _tilted,
         of_vehicle=True,
+        detected="in flight, roll has been above `FD_FAIL_R` for `FD_FAIL_R_TTRI`, or pitch above "
+        "`FD_FAIL_P` for `FD_FAIL_P_TTRI`",
+        parameters=(
+            *("FD_FAIL_R", "FD_FAIL_R_TTRI", "FD_FAIL_P", "FD_FAIL_P_TTRI"),
+            "CBRK_FLIGHTTERM",
+        ),
+        does="terminate: rotors and joints off; with `CBRK_FLIGHTTERM` 121212 warn",
     ),
     Failsafe(
         Condition.POSITION_LOST,
         lambda c: _position_is_off(c, c.limits.position_lost),
-        lambda c: _unless_landing(c, 5),
+        _always(Action.DESCEND),
         Severity.CRITICAL,
         _uncertain,
         of_vehicle=True,
+        detected="in flight, no position could be used for `COM_AID_LOSS_T`, and the standard "
+        "deviation of the position is above `COM_POS_FS_EPH`",
+        within_us=_SLOWLY,
+        parameters=("COM_AID_LOSS_T", "COM_POS_FS_EPH"),
+        does="descend where it is, by attitude and height",
+    ),
+    Failsafe(
+        Condition.PLANNER_LOST,
+        _planner_is_lost,
+        _always(Action.DESCEND),
+        Severity.CRITICAL,
+        _no_plan,
+        of_vehicle=True,
+        slow=True,
+        detected="in flight, no plan has begun for `COM_PLN_LOSS_T`: the planner is dead, silent "
+        "or finds none",
+        within_us=_SLOWLY,
+        parameters=("COM_PLN_LOSS_T",),
+        does="descend where it is, without plans",
     ),
     Failsafe(
         Condition.BREACH,
-        lambda c: c.state.safety.breach_us >= 0,
-        _on_breach,
+        lambda c: c.state.safety.breach_us >= 0 and not c.state.safety.breach_of_fence,
+        lambda c: _on_breach(c, c.limits.breach_action),
         Severity.CRITICAL,
-        detail=lambda c: f" by {1e3 * c.state.safety.breach_by:.0f} mm",
+        detail=lambda c: _by_mm(c.state.safety.breach_by),
         of_vehicle=True,
+        detected="in flight, a margin of a part of the vehicle is negative by its own estimate: "
+        "each tick for hull, rotors, feet and arm ends near a zone, each planning period for "
+        "everything",
+        within_us=_SLOWLY,
+        parameters=("SAFE_BREACH_ACT",),
+        ends="every margin has been above 10 mm for 0.5 s",
+    ),
+    Failsafe(
+        Condition.FENCE_BREACH,
+        lambda c: c.state.safety.breach_us >= 0 and c.state.safety.breach_of_fence,
+        lambda c: _on_breach(c, c.limits.fence_action),
+        Severity.CRITICAL,
+        detail=lambda c: _by_mm(c.state.safety.breach_by),
+        of_vehicle=True,
+        detected="the same, and the zone that is breached most is of an uploaded fence",
+        within_us=_SLOWLY,
+        parameters=("GF_ACTION",),
+        ends="every margin has been above 10 mm for 0.5 s",
+    ),
+    Failsafe(
+        Condition.ROTOR_FAILED,
+        lambda c: bool(c.state.damage.rotor) and c.state.vehicle.flies,
+        _on_actuator_failure,
+        Severity.CRITICAL,
+        detail=lambda c: f": {c.state.damage.rotor}{_for(c, c.state.damage.rotor_us)}",
+        of_vehicle=True,
+        slow=True,
+        detected="in flight, `FlightState.damage` names a rotor; nothing estimates it yet",
+        within_us=_SLOWLY,
+        parameters=("COM_ACT_FAIL_ACT",),
+    ),
+    Failsafe(
+        Condition.JOINT_FAILED,
+        lambda c: bool(c.state.damage.joint) and c.state.vehicle.flies,
+        _on_actuator_failure,
+        Severity.CRITICAL,
+        detail=lambda c: f": {c.state.damage.joint}{_for(c, c.state.damage.joint_us)}",
+        of_vehicle=True,
+        slow=True,
+        detected="in flight, `FlightState.damage` names a joint; nothing estimates it yet",
+        within_us=_SLOWLY,
+        parameters=("COM_ACT_FAIL_ACT",),
     ),
     Failsafe(
         Condition.POSITION_LOW,
         lambda c: _position_is_off(c, c.limits.position_low),
-        lambda c: _unless_landing(c, c.limits.position_low_action),
+        lambda c: _by_number(c.limits.position_low_action),
         Severity.CRITICAL,
         _uncertain,
         of_vehicle=True,
+        detected="in flight, no position could be used for `COM_AID_LOSS_T`, and the standard "
+        "deviation of the position is above `COM_POS_LOW_EPH`",
+        within_us=_SLOWLY,
+        parameters=("COM_AID_LOSS_T", "COM_POS_LOW_EPH", "COM_POS_LOW_ACT"),
     ),
     Failsafe(
         Condition.SENSOR_LOST,
         _sensor_is_lost,
-        lambda c: _unless_landing(c, c.limits.sensor_loss_action),
+        lambda c: _by_number(c.limits.sensor_loss_action),
         Severity.CRITICAL,
         _lost_sensor,
         of_vehicle=True,
+        detected="in flight, inertial unit or joint encoders were of no use for `COM_SENS_LOSS_T`",
+        within_us=_SLOWLY,
+        parameters=("COM_SENS_LOSS_T", "COM_SENS_ACT"),
     ),
     Failsafe(
         Condition.ROOM_LACKING,
@@ -280,14 +554,26 @@ FAILSAFES: Final = (
         _always(Action.WARN),
         Severity.CRITICAL,
         detail=lambda c: f": {1e3 * c.state.kept.lacking:.0f} mm less than SAFE_SIGMAS asks for",
+        slow=True,
+        detected="in flight, for 0.5 s, walls leave 10 mm less than clearances should grow by "
+        "([barriers](../concepts/barriers.md#an-uncertain-place))",
+        within_us=_SLOWLY,
+        parameters=("SAFE_SIGMAS",),
+        does="critical text; they grow as far as a plan at rest still has a place",
     ),
     Failsafe(
         Condition.TUBE_LEFT,
         lambda c: c.state.safety.off_plan_us >= 0,
         _always(Action.REPLAN),
         Severity.CRITICAL,
-        detail=lambda c: f" by {1e3 * c.state.safety.off_plan_by:.0f} mm",
+        detail=lambda c: _by_mm(c.state.safety.off_plan_by),
         of_vehicle=True,
+        detected="in flight, the base is further from the running plan's state, on any axis, than "
+        "the start-up analysis bounds it, and 10 mm for noise, or what the analysis of the "
+        "estimate finds if that is more",
+        within_us=2 * AT_ONCE_US,
+        does="the next plan, within a planning period, starts from the measurement",
+        ends="the vehicle has been within half of that for 0.5 s",
     ),
     Failsafe(
         Condition.FILTER_ACTIVE,
@@ -295,12 +581,19 @@ FAILSAFES: Final = (
         _always(Action.PUSH),
         Severity.CRITICAL,
         of_vehicle=True,
+        detected="the safety filter changed the acceleration that the loops were about to realise",
+        within_us=2 * AT_ONCE_US,
+        does="the filter works in every tick that needs it",
+        ends="it has changed nothing for 1 s",
     ),
     Failsafe(
         Condition.PLAN_STALE,
         _plan_is_stale,
         _always(Action.BRAKE),
+        detail=_no_plan,
         of_vehicle=True,
+        detected="in flight, the running plan is older than 0.3 s",
+        does="brake to rest and hold, while the planner is asked again",
     ),
     Failsafe(
         Condition.AIDING_LOST,
@@ -308,29 +601,126 @@ FAILSAFES: Final = (
         _always(Action.DEAD_RECKON),
         detail=_unaided,
         of_vehicle=True,
+        detected="in flight, the estimate could use no position for `COM_AID_LOSS_T`",
+        within_us=_SLOWLY,
+        parameters=("COM_AID_LOSS_T",),
+        does="dead reckoning",
     ),
     Failsafe(
         Condition.ESTIMATE_INVALID,
         lambda c: c.state.invalid_ticks >= INVALID_TICKS,
         _always(Action.WARN),
         of_vehicle=True,
+        detected="on the ground, no valid sensor frame for 5 ticks (10 ms)",
+        does="warning; no arming. Telemetry goes on and shows it",
     ),
     Failsafe(
         Condition.OUTPUT_NOT_FINITE,
         lambda c: c.state.output_replaced,
         _always(Action.WARN),
         of_vehicle=True,
+        detected="the safety gate found NaN or infinity in what the loops command",
+        within_us=2 * AT_ONCE_US,
+        does="warning; the last finite command is repeated",
     ),
     Failsafe(
         Condition.PLAN_REFUSED,
         lambda c: c.state.plan.refused,
         _always(Action.WARN),
+        detail=_refused_plan,
         of_vehicle=True,
+        detected="the planner answered that it has no plan",
+        within_us=2 * AT_ONCE_US,
+        does="warning; the previous plan continues",
+    ),
+    Failsafe(
+        Condition.PLAN_LATE,
+        lambda c: c.state.plan.awaited_missed and _plans(c),
+        _always(Action.WARN),
+        slow=True,
+        detected="in flight, a plan has not come at its time",
+        within_us=_SLOWLY,
+        does="warning; the previous plan continues",
+    ),
+    Failsafe(
+        Condition.TIME_JUMPED,
+        lambda c: (
+            c.state.safety.jumped_us >= 0
+            and c.estimate.t_us - c.state.safety.jumped_us < JUMP_SHOWN_US
+        ),
+        _always(Action.WARN),
+        Severity.CRITICAL,
+        _jumped,
+        slow=True,
+        detected="the time stamp of the sensors went on by more ticks at once than are made up for "
+        "(25, 50 ms)",
+        within_us=_SLOWLY,
+        does="critical text; the flight goes on from the new time",
+        ends="a second later",
+    ),
+    Failsafe(
+        Condition.LOOP_OVERRUN,
+        lambda c: c.state.host.missed_ticks >= MISSED_TICKS,
+        _always(Action.WARN),
+        detail=lambda c: f": {c.state.host.missed_ticks} in the last second",
+        slow=True,
+        detected="25 of a second's 500 ticks were late, skipped or without readings of their own",
+        within_us=SECOND_US,
+        does="warning; plans and estimate carry over missed ticks",
+    ),
+    Failsafe(
+        Condition.CLOCK_JUMPED,
+        lambda c: abs(c.state.host.clock_jump_us) >= JUMP_US,
+        _always(Action.WARN),
+        detail=lambda c: f" by {1e-6 * c.state.host.clock_jump_us:+.1f} s",
+        slow=True,
+        detected="within a second, the machine's wall clock moved by 0.5 s against its monotonic "
+        "clock",
+        within_us=SECOND_US,
+        does="warning; nothing that flies uses the wall clock",
+    ),
+    Failsafe(
+        Condition.LINK_FLOODED,
+        lambda c: c.state.host.datagrams > c.limits.flood_rate,
+        _always(Action.WARN),
+        Severity.CRITICAL,
+        detail=lambda c: f": {c.state.host.datagrams} datagrams in the last second",
+        slow=True,
+        detected="more than `COM_FLOOD_RATE` datagrams a second came from the ground",
+        within_us=SECOND_US,
+        parameters=("COM_FLOOD_RATE",),
+        does="critical text; what is read of a link in a tick is bounded, the rest is dropped",
+    ),
+    Failsafe(
+        Condition.LOG_STOPPED,
+        lambda c: bool(c.state.host.log_failure),
+        _always(Action.WARN),
+        Severity.CRITICAL,
+        detail=lambda c: f": {c.state.host.log_failure}",
+        slow=True,
+        detected="a file of the flight log could not be written, or has gaps",
+        within_us=SECOND_US,
+        parameters=("COM_ARM_SDCARD",),
+        does="critical text; the flight goes on, and the next arming is denied",
+    ),
+    Failsafe(
+        Condition.DISK_FULL,
+        lambda c: c.state.host.disk_left_us >= 0,
+        _always(Action.WARN),
+        Severity.CRITICAL,
+        detail=lambda c: f": room for {1e-6 * c.state.host.disk_left_us:.0f} s of the flight log",
+        slow=True,
+        detected="the disk has room for less than a minute of the flight log",
+        within_us=SECOND_US,
+        does="critical text",
     ),
     Failsafe(
         Condition.SETPOINTS_LOST,
         _setpoints_are_lost,
         _on_setpoints_lost,
+        detected="in Offboard, no setpoint for `COM_OF_LOSS_T`",
+        parameters=("COM_OF_LOSS_T", "COM_OBL_RC_ACT"),
+        ends="setpoints come again, or the pilot commands a mode",
     ),
     Failsafe(
         Condition.ZONES_SILENT,
@@ -338,18 +728,54 @@ FAILSAFES: Final = (
         _always(Action.WARN),  # a place to go to is not known: nothing is known of the zone
         Severity.CRITICAL,
         detail=lambda c: f": {c.state.mission.silent_zones} held where predicted",
+        slow=True,
+        detected="a zone that moves was not announced for `SAFE_MOVE_T`",
+        within_us=_SLOWLY,
+        parameters=("SAFE_MOVE_T",),
+        does="critical text; the zone stands where it is predicted then",
+        ends="it is announced again",
     ),
     Failsafe(
         Condition.DATALINK_LOST,
         _datalink_is_lost,
         _on_datalink_lost,
         detail=lambda c: f" for {c.gcs_silent_us * 1e-6:.0f} s",
+        slow=True,
+        delayed=True,
+        detected="a HEARTBEAT of a ground station (MAV_TYPE_GCS) was received, then none for "
+        "`COM_DL_LOSS_T`; acted upon in every flight mode, in a mission too, but for the modes of "
+        "`COM_DLL_EXCEPT`, and as soon as such a mode is left",
+        within_us=_SLOWLY,
+        parameters=("COM_DL_LOSS_T", "NAV_DLL_ACT", "COM_DLL_EXCEPT", "COM_FAIL_ACT_T"),
+        ends="a HEARTBEAT is received",
+    ),
+    Failsafe(
+        Condition.FLIGHT_TIME_LOW,
+        _flight_time_is_short,
+        lambda c: _by_number(c.limits.flight_time_action),
+        detail=_time_left,
+        slow=True,
+        delayed=True,
+        detected="in flight, what is left of the battery lasts, at the current of the last half "
+        "minute, no longer than the way home takes: `RTL_TIME_FACTOR` times the time of it, and "
+        "`RTL_TIME_MARGIN`",
+        within_us=_SLOWLY,
+        parameters=(
+            *("RTL_TIME_FACTOR", "RTL_TIME_MARGIN", "COM_FLTT_LOW_ACT"),
+            "COM_FAIL_ACT_T",
+        ),
     ),
     Failsafe(
         Condition.BATTERY_LOW,
         lambda c: c.state.battery.charge is Charge.LOW,
         _on_battery,
         detail=_charge_left,
+        slow=True,
+        detected="the charge is below `BAT_LOW_THR`",
+        within_us=_SLOWLY,
+        parameters=("BAT_LOW_THR",),
+        does="warning",
+        ends="the next level",
     ),
     Failsafe(
         Condition.BATTERY_CRITICAL,
@@ -357,6 +783,12 @@ FAILSAFES: Final = (
         _on_battery,
         Severity.CRITICAL,
         _charge_left,
+        slow=True,
+        delayed=True,
+        detected="the charge is below `BAT_CRIT_THR`",
+        within_us=_SLOWLY,
+        parameters=("BAT_CRIT_THR", "COM_LOW_BAT_ACT", "COM_FAIL_ACT_T"),
+        ends="the next level",
     ),
     Failsafe(
         Condition.BATTERY_EMERGENCY,
@@ -364,18 +796,27 @@ FAILSAFES: Final = (
         _on_battery,
         Severity.EMERGENCY,
         _charge_left,
+        slow=True,
+        delayed=True,
+        detected="the charge is below `BAT_EMERGEN_THR`",
+        within_us=_SLOWLY,
+        parameters=("BAT_EMERGEN_THR", "COM_LOW_BAT_ACT", "COM_FAIL_ACT_T"),
+        ends="never in a flight",
     ),
 )
 
-_TESTS: Final = tuple((row.active, row) for row in FAILSAFES)
+ROWS: Final = {row.condition: row for row in FAILSAFES}
 FAULTS: Final = frozenset(row.condition for row in FAILSAFES if row.of_vehicle)
-BATTERY: Final = frozenset(
-    (Condition.BATTERY_LOW, Condition.BATTERY_CRITICAL, Condition.BATTERY_EMERGENCY)
-)
+BLOCKING: Final = frozenset((Condition.POSITION_LOST, Condition.PLANNER_LOST))
+"""While one of these is active nothing but Descend can be flown."""
+
+_TESTS: Final = tuple((row.active, row) for row in FAILSAFES)
+_QUICK: Final = tuple((row.active, row) for row in FAILSAFES if not row.slow)
+_SLOW: Final = frozenset(row.condition for row in FAILSAFES if row.slow)
 
 
 def active(context: FailsafeContext) -> tuple[Failsafe, ...]:
-    """Rows whose condition is active, strongest action first; almost always none."""
+    """Rows whose condition is active, in the order of the table; almost always none."""
     found: tuple[Failsafe, ...] = ()
     for is_active, row in _TESTS:
         if is_active(context):
@@ -383,11 +824,170 @@ def active(context: FailsafeContext) -> tuple[Failsafe, ...]:
     return found
 
 
-def report(row: Failsafe, context: FailsafeContext, action: Action) -> tuple[Severity, str]:
-    """What the operator reads when a condition becomes active."""
+def quickly_active(context: FailsafeContext) -> tuple[Failsafe, ...]:
+    """The same between two planning periods: the slow rows are as they were found last."""
+    found: tuple[Failsafe, ...] = ()
+    for is_active, row in _QUICK:
+        if is_active(context):
+            found = (*found, row)
+    before = context.state.vehicle.conditions
+    if before and not _SLOW.isdisjoint(before):
+        known = {row.condition for row in found} | _SLOW.intersection(before)
+        found = tuple([row for row in FAILSAFES if row.condition in known])
+    return found
+
+
+# ---------------------------------------------------------------- the response
+
+
+@dataclass(frozen=True, slots=True)
+class Response:
+    """What follows from the active conditions now."""
+
+    memory: FailsafeMemory
+    reports: tuple[StatusText, ...] = ()
+    action: Action = Action.NONE  # to be begun now: one that switches to a mode, or none
+
+
+def respond(context: FailsafeContext, rows: tuple[Failsafe, ...]) -> Response:
+    """The strongest action of the active ``rows``, and what the operator is told.
+
+    It is taken where it is stronger than the one in force. So what a condition asks for
+    is taken up as soon as a mode that was exempt from it is left, and a vehicle that returns or
+    lands is not sent back by a milder condition. Where a row is delayed the vehicle holds first.
+    Conditions that a command of the pilot put aside do not act until they have ended.
+    """
+    state, now_us = context.state, context.estimate.t_us
+    vehicle, memory = state.vehicle, state.vehicle.failsafe
+    before = vehicle.conditions
+    now = tuple([row.condition for row in rows])
+    known = dict(zip(before, memory.since_us, strict=False))
+    overridden = tuple([c for c in memory.overridden if c in now])
+    wanted, chosen = Action.NONE, None
+    actions = {}
+    for row in rows:
+        action = actions[row.condition] = allowed(row.action(context), vehicle.mode, vehicle.flies)
+        if action.mode is None or row.condition in overridden:
+            continue
+        in_force = _in_force(memory, vehicle.mode, begins=row.condition not in before)
+        if action.strength > max(in_force.strength, wanted.strength):
+            wanted, chosen = action, row
+    begun, memory = _begun(context, memory, wanted, chosen)
+    waits = memory.pending is not Action.NONE
+    reports = []
+    for row in rows:
+        acts = row is chosen and begun is not Action.NONE
+        if row.condition in before and not acts:
+            continue
+        told = wanted if acts else Action.WARN
+        told = actions[row.condition] if actions[row.condition].mode is None else told
+        if told is not Action.NONE:
+            delay_us = memory.due_us - now_us if acts and waits else 0
+            severity, text = report(row, context, told, delay_us)
+            event = FailsafeEvent(row.condition.value, told.value, severity)
+            reports.append(StatusText(severity, text, event))
+    if vehicle.armed:
+        reports += _ended(before, known, now, now_us)
+    since = tuple([known.get(condition, now_us) for condition in now])
+    after = memory._replace(since_us=since, overridden=overridden)
+    return Response(after, tuple(reports), begun)
+
+
+def allowed(action: Action, mode: Mode, flies: bool) -> Action:
+    """The action in a mode: what lands already is not sent elsewhere, what stands stays."""
+    if action.mode is None:
+        return action
+    if not flies:
+        return Action.WARN
+    under_way = {Mode.RETURN: Action.RETURN, Mode.LAND: Action.LAND, Mode.DESCEND: Action.DESCEND}
+    least = under_way.get(mode)
+    if mode is Mode.RETURN:
+        return Action.WARN if action is least else action
+    return Action.WARN if least is not None and action.strength <= least.strength else action
+
+
+_OF_MODES: Final = {
+    Mode.HOLD: Action.HOLD,
+    Mode.RETURN: Action.RETURN,
+    Mode.LAND: Action.LAND,
+    Mode.DESCEND: Action.DESCEND,
+}
+
+
+def _in_force(memory: FailsafeMemory, mode: Mode, *, begins: bool) -> Action:
+    """The action that another one must be stronger than.
+
+    A condition that lasts has been acted upon, even if that is done: a vehicle that has returned
+    and holds does not return again. One that ``begins`` is held against what is flown now.
+    """
+    if not begins or memory.action is Action.NONE:
+        return memory.action
+    flown = _OF_MODES.get(mode, Action.NONE)
+    return flown if flown.strength < memory.action.strength else memory.action
+
+
+def _begun(
+    context: FailsafeContext, memory: FailsafeMemory, wanted: Action, chosen: Failsafe | None
+) -> tuple[Action, FailsafeMemory]:
+    """The action to begin now, and the memory with it."""
+    now_us = context.estimate.t_us
+    if chosen is None:
+        if memory.pending is Action.NONE:
+            return Action.NONE, memory
+        # What was waited for has ended: the vehicle stays in hold.
+        return Action.NONE, memory._replace(pending=Action.NONE, due_us=0)
+    delay_us = context.limits.failsafe_delay_us
+    if chosen.delayed and wanted in (Action.RETURN, Action.LAND):
+        if memory.pending is not Action.NONE and now_us < memory.due_us:
+            return Action.NONE, memory._replace(pending=wanted)
+        held = memory.action is Action.NONE or context.state.vehicle.mode is Mode.HOLD
+        if memory.pending is Action.NONE and delay_us and held:
+            waiting = memory._replace(
+                action=Action.HOLD,
+                cause=chosen.condition,
+                pending=wanted,
+                due_us=now_us + delay_us,
+            )
+            return Action.HOLD, waiting
+    acting = memory._replace(action=wanted, cause=chosen.condition, pending=Action.NONE, due_us=0)
+    return wanted, acting
+
+
+def _ended(
+    before: tuple[Condition, ...],
+    since: dict[Condition, int],
+    now: tuple[Condition, ...],
+    now_us: int,
+) -> list[StatusText]:
+    """What is over, where it lasted for a second: once."""
+    reports = []
+    for condition in before:
+        seconds = 1e-6 * (now_us - since.get(condition, now_us))
+        if condition not in now and seconds >= _SHORT:
+            event = FailsafeEvent(condition.value, Action.NONE.value, Severity.INFO, over=True)
+            text = f"over: {condition.value}, after {seconds:.1f} s"
+            reports.append(StatusText(Severity.INFO, text, event))
+    return reports
+
+
+_SHORT: Final = 1.0  # s
+
+
+def overridden(memory: FailsafeMemory, conditions: tuple[Condition, ...]) -> FailsafeMemory:
+    """The memory after the pilot has commanded a mode: active conditions do not act any more."""
+    return memory._replace(
+        action=Action.NONE, cause=None, pending=Action.NONE, due_us=0, overridden=conditions
+    )
+
+
+def report(
+    row: Failsafe, context: FailsafeContext, action: Action, delay_us: int = 0
+) -> tuple[Severity, str]:
+    """What the operator reads when a condition becomes active; it acts after ``delay_us`` [us]."""
     text = f"{row.condition.value}{row.detail(context)}"
     if action is Action.TERMINATE:
         return Severity.EMERGENCY, f"{text}: {action.value}"
     if action.mode is not None:
-        return Severity.CRITICAL, f"failsafe: {text}, {action.value}"
+        later = f" in {1e-6 * delay_us:.0f} s" if delay_us else ""
+        return Severity.CRITICAL, f"failsafe: {text}, {action.value}{later}"
     return row.severity, f"{text}: {action.value}" if row.of_vehicle else text

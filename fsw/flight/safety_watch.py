@@ -38,6 +38,23 @@ class SafetyWatch:
         # The other loop follows no state: only an upset takes it off its plan.
         self.radius = max(reach, _LEAST_TUBE) if follows_state else config.upset_distance
         self._back = _BACK * self.radius
+        # More upright than this, neither roll nor pitch is beyond its limit.
+        beyond = [a for a in (config.limits.roll_failure, config.limits.pitch_failure) if a > 0.0]
+        self.upright = math.cos(min([*beyond, 0.5 * math.pi])) if beyond else -2.0
+
+    def attitude(
+        self, memory: SafetyMemory, estimate: StateEstimate, *, flies: bool
+    ) -> SafetyMemory:
+        """Note since when roll or pitch are beyond the limits from which there is no way back."""
+        limits, R = self._config.limits, estimate.R_WB
+        roll, pitch = math.atan2(R[7], R[8]), math.asin(min(max(-R[6], -1.0), 1.0))
+        rolled = flies and limits.roll_failure > 0.0 and not abs(roll) <= limits.roll_failure
+        pitched = flies and limits.pitch_failure > 0.0 and not abs(pitch) <= limits.pitch_failure
+        return replace(
+            memory,
+            rolled_us=_since(memory.rolled_us, estimate.t_us, so=rolled),
+            pitched_us=_since(memory.pitched_us, estimate.t_us, so=pitched),
+        )
 
     def off_plan(
         self,
@@ -106,6 +123,17 @@ class SafetyWatch:
         ended = now_us - memory.breach_us >= _CLEAR_US
         return replace(memory, breach_us=-1) if ended else memory
 
+    def of_fence(self, report: ConstraintReport, announced: int) -> bool:
+        """Whether the least margin is of a zone behind those that were ``announced`` [1]."""
+        if len(report.per_zone) <= announced:
+            return False
+        fence = report.margins[sum(report.per_zone[:announced]) :]
+        return min(fence) <= min(report.margins)
+
+    def jumped(self, memory: SafetyMemory, now_us: int, since_us: int) -> SafetyMemory:
+        """Note that ``since_us`` [us] was the tick before this one, which is too long ago."""
+        return replace(memory, jump_us=now_us - since_us, jumped_us=now_us)
+
     def filtered(self, memory: SafetyMemory, now_us: int, *, pushed: bool) -> SafetyMemory:
         """Note whether the safety filter changed the acceleration of this tick."""
         if pushed:
@@ -121,3 +149,10 @@ class SafetyWatch:
         """On the ground, where the plan may well be lower than the vehicle can be."""
         config = self._config
         return height_above_ground(config, estimate) < config.limits.airborne_height
+
+
+def _since(since_us: int, now_us: int, *, so: bool) -> int:
+    """Since when it is ``so``; -1: it is not."""
+    if not so:
+        return -1
+    return since_us if since_us >= 0 else now_us

@@ -194,13 +194,14 @@ def _aiding(state: FlightState, memory: FusionMemory, report: EstimatorReport) -
     if aid.came < 0.0:
         aid = memory.of(Sensor.GNSS)
     sensor, fault = _lost(memory)
-    P = report.pose_covariance
+    P, V = report.pose_covariance, report.velocity_covariance
     since_us = before.since_us if sensor is before.sensor else report.t_us
     return Aiding(
         unaided_us=max(round(1e6 * _overdue(memory, now)), 0) if report.unaided_us > 0 else 0,
         pose=aid.sensor,
         pose_fault=aid.fault if now - aid.fault_at < _LATELY else SensorFault.STALE,
         position_sigma=math.sqrt(max(P[0], P[6], P[11])),
+        velocity_sigma=math.sqrt(max(V[0], V[6], V[11])),
         attitude_sigma=math.sqrt(max(P[15], P[18])),
         sensor=sensor,
         fault=fault,

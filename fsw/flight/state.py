@@ -12,7 +12,7 @@ from fsw.estimation.sensor_fault import Sensor, SensorFault
 from fsw.estimation.sensor_fusion import FusionMemory
 from fsw.flight.accuracy_watch import AccuracyMemory
 from fsw.flight.command_dedup import AnsweredCommand
-from fsw.flight.failsafe import Condition
+from fsw.flight.failsafe import Condition, FailsafeMemory
 from fsw.flight.mission_sequencer import MissionFlight
 from fsw.flight.offboard_setpoints import Tilt
 from fsw.flight.setpoint_generator import PositionGoal, ReferenceState
@@ -21,12 +21,14 @@ from fsw.frozen import dataclass
 from fsw.model.airframe import AIRFRAME
 from fsw.signals import (
     STOPPED,
+    ArmingReport,
     AttitudeSetpoint,
     BatteryState,
     ConstraintReport,
     EndEffectorTarget,
     EstimatorReport,
     Home,
+    HostHealth,
     JointSetpoint,
     MessageSource,
     Mode,
@@ -60,6 +62,7 @@ class VehicleMemory:
     mode_begin_us: int = 0
     climb: float = 0.0  # m, of a takeoff
     conditions: tuple[Condition, ...] = ()  # that are active
+    failsafe: FailsafeMemory = FailsafeMemory()  # what is being done about them
     home: Home | None = None
     gcs_heard_us: int = -1  # when a ground station was last heard; -1: never
     answered: tuple[AnsweredCommand, ...] = ()  # each sender's last command
@@ -161,8 +164,22 @@ class SafetyMemory:
     replan: bool = False  # from the measurement, next time
     breach_us: int = -1
     breach_by: float = 0.0  # m, when it began
+    breach_of_fence: bool = False  # what is outside is outside an uploaded fence
     filter_us: int = -1  # when the safety filter changed an acceleration last
+    rolled_us: int = -1  # since when the roll has been beyond its limit; -1: it is not
+    pitched_us: int = -1  # the same of the pitch
+    jump_us: int = 0  # how far time jumped from one tick to the next, lately
+    jumped_us: int = -1  # when
     counters: SafetyCounters = field(default_factory=SafetyCounters)
+
+
+class Damage(NamedTuple):
+    """Parts that have failed; what detects it sets it, and the failsafe table acts on it."""
+
+    rotor: str = ""  # which one and how, for the operator; empty: none has
+    rotor_us: int = 0  # since when
+    joint: str = ""
+    joint_us: int = 0
 
 
 class Aiding(NamedTuple):
@@ -172,6 +189,7 @@ class Aiding(NamedTuple):
     pose: Sensor = Sensor.POSE  # that gives positions
     pose_fault: SensorFault = SensorFault.STALE
     position_sigma: float = 0.0  # m, of the worst axis
+    velocity_sigma: float = 0.0  # m/s, the same
     attitude_sigma: float = 0.0  # rad, of roll and pitch
     sensor: Sensor | None = None  # another one that is of no use
     fault: SensorFault = SensorFault.NONE  # of that
@@ -207,6 +225,7 @@ class FlightState:
     offboard: OffboardMemory = field(default_factory=OffboardMemory)
     battery: BatteryState = field(default_factory=BatteryState)
     arming_refusal: str = ""
+    arming: ArmingReport = field(default_factory=ArmingReport)
     safety: SafetyMemory = field(default_factory=SafetyMemory)
     fusion: FusionMemory | None = None  # where sensors have times of their own
     estimator: EstimatorReport | None = None  # what telemetry says of it, once a planning period
@@ -214,3 +233,5 @@ class FlightState:
     trust: FrameTrust = FrameTrust()  # where states are exact
     kept: KeptSet = KeptSet()  # the safe set, with clearances for an estimate that is not sure
     accuracy: AccuracyMemory = AccuracyMemory()  # of the estimate, until it is told
+    host: HostHealth = field(default_factory=HostHealth)
+    damage: Damage = Damage()

@@ -11,6 +11,7 @@ from dataclasses import replace
 from fsw.flight.autopilot import Autopilot
 from fsw.flight.state import FlightState
 from fsw.parameters.consistency import Finding, refusals
+from fsw.parameters.contradictions import contradictions
 from fsw.parameters.flight_config import FlightConfig
 from fsw.signals import SafeSet, Severity, StatusText, TickInputs, TickOutputs
 from fsw.tuning import Tuning, part, tuned
@@ -34,7 +35,11 @@ class TunedAutopilot:
         Raises:
             ValueError: The numbers contradict each other.
         """
-        self._prepared = (tuning, Autopilot(tuned(self._config, tuning)))
+        config = tuned(self._config, tuning)
+        against = contradictions(config)
+        if against:
+            raise ValueError("; ".join(against))
+        self._prepared = (tuning, Autopilot(config))
 
     @property
     def config(self) -> FlightConfig:

@@ -70,6 +70,7 @@ class GcsLink:
         self.outbox = Outbox(signing)
         self.dispatch = Dispatch(services, self.outbox.add_output)
         self.accepted = 0  # frames
+        self._read = 0  # datagrams
         self.rates = StreamRates(STREAMS, setup.rates_hz, context.facts.tick_period_us)
         self.talks = setup.unheard  # whether more than a heartbeat is sent
         self._unheard = setup.unheard
@@ -95,6 +96,11 @@ class GcsLink:
         return self._endpoint.dropped
 
     @property
+    def received(self) -> int:
+        """Datagrams that came since the start, those that the kernel dropped too."""
+        return self._read + (self.dropped or 0)
+
+    @property
     def peers(self) -> tuple[Address, ...]:
         """All receivers of telemetry."""
         return self._peers.all
@@ -118,6 +124,7 @@ class GcsLink:
             if received is None:
                 break
             datagram, sender = received
+            self._read += 1
             budget -= max(len(datagram), _LEAST_COST)
             for frame, raw in cut(datagram, self.losses):
                 if not self.outbox.is_own(frame.system_id, frame.component_id):

@@ -37,6 +37,11 @@ class GroundLinks:
         self._t_us = 0  # of the last tick
         self._attends = False
 
+    @property
+    def received(self) -> int:
+        """Datagrams that came over all links since the start, dropped ones too."""
+        return sum(link.received for link in self.links)
+
     def poll(self, t_us: int) -> None:
         """Read what arrived, in lockstep; call it once a tick, after :meth:`publish`."""
         if self._attends or self._tick % self._slot_ticks:

@@ -23,6 +23,7 @@ from fsw.signals import (
     Command,
     CommandRequest,
     EndEffectorTarget,
+    HostHealth,
     JointSetpoint,
     MessageSource,
     MissionUpdate,
@@ -139,6 +140,7 @@ class Inbox:
         tuning: Tuning | None,
         mission: MissionUpdate | None,
         stale_us: int = 0,
+        host: HostHealth | None = None,
     ) -> TickInputs:
         """Everything since the last tick, and what did not come from the ground.
 
@@ -162,6 +164,7 @@ class Inbox:
             stale_us,
             tuple(came.samples),
             came.battery,
+            host,
         )
 
     def _command(self, read: Callable[[Frame], CommandRequest | None], frame: Frame) -> None:

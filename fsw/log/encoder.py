@@ -59,6 +59,7 @@ NAV_STATES: Final[dict[str, int]] = {
     "mission": 3,
     "return": 5,
     "land": 18,
+    "descend": 12,
     "fault": 13,  # termination
 }
 

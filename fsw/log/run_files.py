@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -29,6 +30,7 @@ class RunFiles:
         self.tlog = TlogWriter(directory / "flight.tlog", start_unix_us)
         self._warn = warn
         self._reported: set[str] = set()
+        self._dropped = 0  # blocks, when it was last asked for
 
     def check(self) -> None:
         """Report what went wrong since the last call; cheap."""
@@ -37,6 +39,24 @@ class RunFiles:
                 self._report(f"{file.path.name} ends early: {file.failure}")
             elif file.dropped:
                 self._report(f"{file.path.name} has gaps: the disk does not keep up")
+
+    def failure(self) -> str:
+        """What is wrong with the files now, in a sentence; empty: they are written."""
+        for file in self._files():
+            if file.failure is not None:
+                return f"{file.path.name} ends early: {file.failure}"
+        before, self._dropped = self._dropped, sum(file.dropped for file in self._files())
+        return "the log has gaps: the disk does not keep up" if self._dropped > before else ""
+
+    @property
+    def size(self) -> int:
+        """Bytes written of both files."""
+        return sum(file.size for file in self._files())
+
+    def room(self) -> int:
+        """Bytes that the disk will take."""
+        disk = os.statvfs(self.ulog.file.path.parent)
+        return disk.f_bavail * disk.f_frsize
 
     def close(self) -> None:
         """Write what is left; safe to call twice."""

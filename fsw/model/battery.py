@@ -16,6 +16,8 @@ from fsw.signals import BatteryReading, BatteryState, Charge, Vec4
 
 _AIR_DENSITY = 1.225  # kg/m^3
 _AS_PER_AH = 3600.0
+# s, in which the current of late forgets: a climb of some seconds is not how it goes on.
+_USUAL_TIME = 30.0
 
 
 Levels = tuple[float, float, float]
@@ -54,6 +56,9 @@ def drained(
             f * math.sqrt(max(f, 0.0) / (2.0 * _AIR_DENSITY * model.disc_area)) / (model.efficiency)
         )
     current = power / max(state.voltage, 1.0)
+    share = min(dt / _USUAL_TIME, 1.0)
+    usual = state.usual_current or current
+    usual += share * (current - usual)
     consumed = state.consumed + current * dt / _AS_PER_AH
     remaining = max(1.0 - consumed / model.capacity, 0.0)
     at_rest = model.empty + (model.full - model.empty) * remaining
@@ -64,6 +69,8 @@ def drained(
         consumed=consumed,
         remaining=remaining,
         charge=charge_of(remaining, levels),
+        usual_current=usual,
+        time_left=_AS_PER_AH * remaining * model.capacity / max(usual, 1e-3),
     )
 
 

@@ -136,12 +136,6 @@ _FACTS: Final = [
         unit="V",
     ),
     Fact("BAT1_CAPACITY", "Battery capacity", "of the model", 1000.0 * _BATTERY.capacity, "mAh"),
-    Fact(
-        "GF_ACTION",
-        "Geofence breach action",
-        "a fence is a barrier that the vehicle does not cross",
-        choices=((0, "None: barriers hold"),),
-    ),
     Fact("GF_MAX_HOR_DIST", "Geofence radius", "no fence but the uploaded one", unit="m"),
     Fact("GF_MAX_VER_DIST", "Geofence height", "no fence but the uploaded one", unit="m"),
     Fact(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 from typing import cast
 
@@ -41,33 +42,55 @@ class FlightLimits:
     return_descent: float = 2.0  # m above home, where a return waits before it lands
     return_wait: float = 0.0  # s, there; negative: it stays
     setpoint_timeout_us: int = 500_000  # without a setpoint offboard ends
-    setpoint_loss_action: int = 5  # what then: 3 return, 4 land, 5 hold
+    setpoint_loss_action: int = 5  # what then: 3 return, 4 land, 5 hold, 6 terminate
     mission_speed: float = 0.3  # m/s, where the mission names none
     mission_turn_rate: float = 0.3  # rad/s
     mission_turn_acceleration: float = 0.05  # rad/s^2; the plan's limit is 0.1
     fence_clearance: float = 0.1  # m, kept from the walls of an uploaded fence
     station_timeout_us: int = 10_000_000  # without a ground station its loss is acted upon
-    station_loss_action: int = 2  # how: 0 not at all, 1 hold, 2 return, 3 land
+    station_loss_action: int = 2  # how: 0 not at all, 1 hold, 2 return, 3 land, 5 terminate
+    station_loss_exceptions: int = (
+        0  # where it is not: 1 in a mission, 2 in hold, 4 offboard, 8 on a trajectory
+    )
+    failsafe_delay_us: int = 5_000_000  # in hold, before the vehicle returns or lands
     battery_low: float = 0.2  # share of the capacity
     battery_critical: float = 0.1
     battery_emergency: float = 0.05
-    low_battery_action: int = 0  # 0 warn; 2 land when critical; 3 return then, land in emergency
+    low_battery_action: int = 3  # 0 warn; 2 land when critical; 3 return then, land in emergency
+    # What is left must do for the way home: this often the time of it, and this much beside.
+    return_time_factor: float = 1.1
+    return_time_margin: float = 30.0  # s
+    flight_time_action: int = 3  # where it does not: 0 nothing, 1 warn, 3 return
     safe_set_owner: int = 0  # MAVLink system that owns the safe set; 0: the first to announce one
     clearance_sigmas: float = 3.0  # standard deviations of a point, kept from zones besides
     breach_action: int = 6  # of the safe set: 1 warn, 2 hold, 5 land, 6 retreat and hold
+    fence_action: int = 6  # of an uploaded fence: the same, and 0 nothing, 3 return, 4 terminate
     owner_timeout_us: int = 10_000_000  # a silent owner may be replaced on the ground
     zone_timeout_us: int = 3_000_000  # a moving zone that is not announced for this long stands
     # Loss of sensors. Hidden markers, 0.2 s, are none; a drift by a tenth of a metre is.
     aiding_loss_us: int = 250_000  # without a position that the estimate could use
     position_low: float = 0.1  # m, standard deviation in dead reckoning that is acted upon
     position_low_action: int = 2  # how: 1 warn, 2 hold, 5 land
-    position_lost: float = 0.5  # m, the same: land
+    position_lost: float = 0.5  # m, the same: descend
     # rad, standard deviation of roll and pitch that ends the flight: there is no way back from it,
     # and a pose that is hidden for 0.2 s while the IMU is frozen as well (0.37) comes back.
     attitude_loss: float = 0.7
     sensor_loss_us: int = 50_000  # without a use of the inertial unit, or of the encoders
     sensor_loss_action: int = 2  # what then: 1 warn, 2 hold, 5 land
     failure_injection: int = 0  # whether commands may let units of a simulated vehicle fail
+    # Roll or pitch from which there is no way back, and for how long.
+    roll_failure: float = math.radians(60.0)  # rad; 0: never
+    pitch_failure: float = math.radians(60.0)  # rad
+    roll_failure_us: int = 300_000
+    pitch_failure_us: int = 300_000
+    termination_breaker: int = 0  # 121212: an attitude failure does not stop the rotors
+    planner_loss_us: int = 5_000_000  # without a new plan the vehicle descends
+    actuator_failure_action: int = 2  # 0 warn, 1 hold, 2 land, 3 return, 4 terminate
+    flood_rate: float = 2000.0  # datagrams/s from the ground that are too many
+    # Arming
+    arm_battery: float = -1.0  # share of the capacity; negative: ``battery_critical``
+    arm_tilt: float = math.radians(15.0)  # rad, at most
+    arm_without_log: int = 2  # 0 and 1: may be armed, 2: not
 
 
 @dataclass(frozen=True, slots=True)

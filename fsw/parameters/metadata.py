@@ -17,6 +17,7 @@ from fsw.parameters.registry import PARAMETERS, Choices, Parameter
 
 _VERSION: Final = 1
 _PARAMETER_TYPE: Final = 1  # COMP_METADATA_TYPE_PARAMETER
+_EVENT_TYPE: Final = 4  # COMP_METADATA_TYPE_EVENTS
 
 
 def parameter_document() -> bytes:
@@ -26,23 +27,26 @@ def parameter_document() -> bytes:
     return _encoded({"version": _VERSION, "parameters": every})
 
 
-def general_document(parameter_uri: str, firmware_version: str) -> bytes:
+def general_document(parameter_uri: str, events: tuple[str, bytes], firmware_version: str) -> bytes:
     """The document that says where the others are, as JSON.
 
-    The parameters' is at an address ``mftp://...``; the version is three numbers with dots.
+    The parameters' is at an address ``mftp://...``, as that of the ``events`` is, which comes with
+    its content; the version is three numbers with dots.
     """
     parameters = {
         "type": _PARAMETER_TYPE,
         "uri": parameter_uri,
         "fileCrc": metadata_crc(parameter_document()),
     }
+    event_uri, document = events
+    explained = {"type": _EVENT_TYPE, "uri": event_uri, "fileCrc": metadata_crc(document)}
     return _encoded(
         {
             "version": _VERSION,
             "vendorName": "Pandion",
             "modelName": "aerial manipulator",
             "firmwareVersion": firmware_version,
-            "metadataTypes": [parameters],
+            "metadataTypes": [parameters, explained],
         }
     )
 

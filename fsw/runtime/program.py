@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Generic, TypeVar
 
+from fsw.link.events.event_log import EventLog
 from fsw.link.services.mission_store import MissionStore
 from fsw.ports import PlanningCycle, VehicleFacts
 from fsw.signals import TickInputs, TickOutputs
@@ -27,4 +28,5 @@ class FlightProgram(Generic[State]):
     planner: PlanningCycle
     parameters: ParameterStore
     missions: MissionStore
+    events: EventLog = field(default_factory=EventLog)
     numbers: Mapping[str, float] = field(default_factory=dict)  # of the configuration, by name

@@ -20,7 +20,9 @@ from fsw.link.sim_link import Pacing, SimLink
 from fsw.link.wire.message_ids import PATH_PLANNER, SYSTEM_ID
 from fsw.log.run_files import RunFiles
 from fsw.ports import Clock, LoopHealth, PlanService
+from fsw.runtime.clock import unix_us
 from fsw.runtime.deadline_monitor import DeadlineMonitor
+from fsw.runtime.host_watch import HostWatch
 from fsw.runtime.link_watchdog import LinkWatchdog
 from fsw.runtime.planner_service import PlannerRecord
 from fsw.runtime.program import FlightProgram, State
@@ -33,6 +35,7 @@ from fsw.signals import (
     Command,
     CommandAck,
     CommandResult,
+    HostHealth,
     OffboardReport,
     PlannerCounters,
     SafetyCounters,
@@ -105,10 +108,12 @@ class SimLoop(Generic[State]):
         stop: StopRequest,
         files: RunFiles,
         sleep: Callable[[float], None] | None = None,
+        wall_clock: Clock = unix_us,
     ) -> None:
         self._tick_us = program.facts.tick_period_us
         self._parameters = program.parameters
         self._missions = program.missions
+        self._happened = program.events
         self._tick = TickRunner(program.tick, program.first_state)
         self._sim = sim
         self._ground = ground
@@ -119,6 +124,8 @@ class SimLoop(Generic[State]):
         self._files = files
         self._sleep = sleep or ground.attend  # spare time reads the ground links
         self._notices: list[StatusText] = []
+        self._host = HostWatch(files, ground, clock, wall_clock)
+        self._host_news: HostHealth | None = None  # for the next tick
         self._vibration = VibrationMeter()
         self._releases: StepReleases | ScheduledReleases
         methods: dict[Member, Callable[[Cycle], None]] = {
@@ -130,7 +137,7 @@ class SimLoop(Generic[State]):
             Member.LOG: self._log,
             Member.SUMMARISE: self._summarise,
             Member.WARN: self._warn,
-            Member.CHECK_FILES: lambda _: files.check(),
+            Member.CHECK_FILES: self._check_host,
         }
         self._groups = tuple(RateGroupRunner(group, methods, clock) for group in RATE_GROUPS)
         for runner in self._groups:
@@ -215,11 +222,14 @@ class SimLoop(Generic[State]):
             self._parameters.take_tuning(),
             self._missions.take_update(),
             cycle.release.stale_us,
+            self._host_news,
         )
+        self._host_news = None
 
     def _run_tick(self, cycle: Cycle) -> None:
         cycle.outputs = self._tick(cycle.inputs)
         self._missions.observe(cycle.outputs.snapshot)
+        self._happened.observe(cycle.inputs, cycle.outputs)
         if cycle.inputs.tuning is not None:
             self._parameters.settle(cycle.outputs.tuning_taken)
 
@@ -304,6 +314,14 @@ class SimLoop(Generic[State]):
         )
         if sentence is not None:
             self._notices.append(StatusText(Severity.WARNING, sentence))
+
+    def _check_host(self, _: Cycle) -> None:
+        """The files, and what else the next tick should know about the machine."""
+        self._files.check()
+        inner, missed = self._record.groups[INNER.name], 0
+        if self._sim.pacing is not Pacing.LOCKSTEP:  # which has no deadlines
+            missed = inner.late + inner.skipped + self._record.stale
+        self._host_news = self._host.look(missed)
 
     def _step_number(self, t_us: int) -> int:
         return (t_us - _START_US) // self._tick_us

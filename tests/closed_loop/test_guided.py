@@ -263,7 +263,7 @@ def test_a_return_that_is_not_to_land_holds_over_home() -> None:
     ("action", "mode"), [(0, Mode.HOLD), (1, Mode.HOLD), (2, Mode.RETURN), (3, Mode.LAND)]
 )
 def test_a_lost_ground_station_is_acted_upon_as_the_parameter_says(action: int, mode: Mode) -> None:
-    config = limits(station_timeout_us=3_000_000, station_loss_action=action)
+    config = limits(station_timeout_us=3_000_000, station_loss_action=action, failsafe_delay_us=0)
     flight = hovering(config=config)
     flight.streamed = {"ground_station_heard": True}
     flight.run(0.5)
@@ -303,7 +303,8 @@ def test_lost_set_points_are_acted_upon_as_the_parameter_says(action: int, mode:
 def test_a_battery_that_runs_low_is_told_once_a_level_and_acted_upon(
     action: int, remaining: float, mode: Mode
 ) -> None:
-    flight = hovering(config=limits(low_battery_action=action))
+    config = limits(low_battery_action=action, failsafe_delay_us=0, flight_time_action=1)
+    flight = hovering(config=config)
     flight.state = replace(flight.state, battery=BatteryState(14.0, 20.0, 9.0, remaining))
     # The model counts what was consumed: 10 A h less that.
     drawn = replace(flight.state.battery, consumed=10.0 * (1.0 - remaining))

@@ -120,7 +120,8 @@ def test_a_takeoff_to_a_height_in_its_frame() -> None:
 
 def test_a_ground_station_that_falls_silent_brings_the_vehicle_home() -> None:
     config = flight_config(body="points")
-    config = replace(config, limits=replace(config.limits, station_timeout_us=3_000_000))
+    limits = replace(config.limits, station_timeout_us=3_000_000, failsafe_delay_us=1_000_000)
+    config = replace(config, limits=limits)
     flight = Flight(hover(), config=config)
     flight.step(command(ARM, 1.0))
     flight.run(4.0)
@@ -130,20 +131,28 @@ def test_a_ground_station_that_falls_silent_brings_the_vehicle_home() -> None:
     assert flight.mode is Mode.HOLD
     flight.streamed = {}
     flight.run(3.1)
+    assert flight.mode is Mode.HOLD
+    flight.run(1.1)
     assert flight.mode is Mode.RETURN
     assert any("no ground station" in text for text in flight.texts)
 
 
-def test_a_trajectory_goes_on_without_the_ground_station() -> None:
+@pytest.mark.parametrize(("exceptions", "mode"), [(0, Mode.HOLD), (8, Mode.TRAJECTORY)])
+def test_a_trajectory_goes_on_without_the_ground_station_where_that_is_excepted(
+    exceptions: int, mode: Mode
+) -> None:
     config = flight_config(body="points")
-    config = replace(config, limits=replace(config.limits, station_timeout_us=3_000_000))
+    limits = replace(
+        config.limits, station_timeout_us=3_000_000, station_loss_exceptions=exceptions
+    )
+    config = replace(config, limits=limits)
     flight = Flight(load_scenario("workspace-calm"), config=config)
     flight.streamed = {"ground_station_heard": True}
     flight.follow()
     flight.run(0.2)
     flight.streamed = {}
     flight.run(4.0)
-    assert flight.mode is Mode.TRAJECTORY
+    assert flight.mode is mode
 
 
 def test_a_safe_set_that_contradicts_itself_is_refused_in_flight_and_the_old_one_kept() -> None:

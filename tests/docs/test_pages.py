@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from docs.pages.failsafes import reference as failsafe_reference
 from docs.pages.messages import OF_MISSIONS, reference, traffic
 from docs.pages.parameters import reference as parameter_reference
 from docs.pages.sensors import TABLES
@@ -103,6 +104,11 @@ def test_the_reference_of_parameters_is_not_stale() -> None:
     page = REFERENCE / "parameters.md"
     expected = parameter_reference()
     assert page.read_text(encoding="utf-8") == expected, "run make pages"
+
+
+def test_the_failsafe_table_on_the_page_is_the_one_that_is_flown() -> None:
+    page = (REFERENCE / "failsafes.md").read_text(encoding="utf-8")
+    assert page == failsafe_reference(), "run make pages"
 
 
 def test_the_reference_of_messages_names_all_that_is_sent_and_heard() -> None:

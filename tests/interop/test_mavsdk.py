@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 from mavsdk import System
 from mavsdk.plugins.component_metadata import ComponentMetadata
+from mavsdk.plugins.events import Events, EventsError
 from mavsdk.plugins.ftp import Ftp, FtpError
 from mavsdk.plugins.info import Info
 from mavsdk.plugins.log_files import LogFiles
@@ -139,6 +140,24 @@ def test_the_metadata_of_the_parameters_are_found(system: System) -> None:
     assert done.wait(10.0)
     document = metadata.get_metadata(1, PARAMETER_METADATA).json_metadata
     assert json.loads(document) == json.loads(parameter_document())
+
+
+def test_the_arming_checks_are_read_from_events_and_their_document(system: System) -> None:
+    events = Events(system)
+
+    def reported() -> bool:
+        try:
+            report = events.get_health_and_arming_checks_report()
+        except EventsError:
+            return False
+        names = {component.name for component in report.health_components}
+        return {"battery", "attitude_estimate", "storage"} <= names
+
+    assert eventually(reported)
+    report = events.get_health_and_arming_checks_report()
+    assert report.current_mode_intention.can_arm_or_run
+    assert report.all_problems == []
+    assert all(component.is_present for component in report.health_components)
 
 
 @pytest.mark.parametrize("name", ["ARM_JOINT_STATE", "LOOP_TIMING"])

@@ -12,6 +12,7 @@ from mavsdk.plugins.geofence import Geofence
 from mavsdk.plugins.mission import Mission, MissionItem, MissionPlan
 from mavsdk.plugins.mission_raw import MissionItem as RawItem
 from mavsdk.plugins.mission_raw import MissionRaw, MissionRawError
+from mavsdk.plugins.param import Param
 from mavsdk.plugins.telemetry import Telemetry
 
 from tests.interop.mavsdk_client import connected, eventually
@@ -24,7 +25,10 @@ METRE = 360.0 / (2.0 * math.pi * 6_371_000.0)  # degrees of latitude
 @pytest.fixture(scope="module")
 def system(vehicle: Vehicle) -> Iterator[System]:
     with connected(vehicle.api_port) as system:
+        # MAVSDK sends a heartbeat a second, and the vehicle's seconds are faster than that.
+        Param(system).set_param_float("NAV_DLL_ACT", 0.0)
         yield system
+        Param(system).set_param_float("NAV_DLL_ACT", 2.0)
 
 
 def waypoint(system: System, north: float, height: float, **more: object) -> MissionItem:

@@ -18,7 +18,8 @@ from typing import Any
 
 import pytest
 
-from fsw.parameters.metadata import parameter_document
+from fsw.link.events.event_table import event_document
+from fsw.parameters.metadata import metadata_crc, parameter_document
 from fsw.parameters.registry import PARAMETERS
 from messages import dialect
 from tests.interop.station import PATIENCE_S, Station
@@ -90,8 +91,25 @@ def test_its_component_metadata(station: Station) -> None:
     metadata = station.request(dialect.MAVLINK_MSG_ID_COMPONENT_METADATA)
     scheme, _, path = metadata.uri.partition("://")
     assert scheme == "mftp"
-    (parameters,) = json.loads(download(station, path))["metadataTypes"]
+    parameters, events = json.loads(download(station, path))["metadataTypes"]
     assert download(station, parameters["uri"].partition("://")[2]) == parameter_document()
+    document = download(station, events["uri"].partition("://")[2])
+    assert document == event_document()
+    assert (events["type"], events["fileCrc"]) == (4, metadata_crc(document))
+
+
+def test_the_arming_checks_as_events_and_those_that_were_lost(station: Station) -> None:
+    newest = station.hear(lambda m: m.get_type() == "CURRENT_EVENT_SEQUENCE", 5.0).sequence
+    assert station.command(401) == 0
+    first = station.hear(lambda m: m.get_type() == "EVENT")
+    assert (first.sequence, first.id) == (newest + 1, 1 << 24 | 1), "the summary of the checks"
+    station.mav.request_event_send(1, 1, first.sequence, first.sequence)
+    again = station.hear(lambda m: m.get_type() == "EVENT" and m.sequence == first.sequence)
+    assert bytes(again.arguments) == bytes(first.arguments)
+    lost = (first.sequence + 1000) & 0xFFFF
+    station.mav.request_event_send(1, 1, lost, lost)
+    error = station.hear(lambda m: m.get_type() == "RESPONSE_EVENT_ERROR")
+    assert (error.sequence, error.target_system, error.target_component) == (lost, 255, 190)
 
 
 def test_its_parameters(station: Station) -> None:

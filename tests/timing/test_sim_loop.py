@@ -33,6 +33,7 @@ from fsw.signals import (
     CommandAck,
     CommandRequest,
     CommandResult,
+    HostHealth,
     PlannerCounters,
     PlanRequest,
     SensorFrame,
@@ -108,6 +109,7 @@ class Ground:
     takes: Callable[[], None]
     texts: list[str] = field(default_factory=list)
     acks: list[CommandAck] = field(default_factory=list)
+    received: int = 0
 
     def poll(self, t_us: int) -> None:
         self.done.append("ground")
@@ -141,8 +143,17 @@ class Log(Null):
 class NoFiles(Null):
     """Nothing is written."""
 
+    size = 0
+
     def __init__(self) -> None:
         self.ulog = Log()
+        self.failed = ""
+
+    def failure(self) -> str:
+        return self.failed
+
+    def room(self) -> int:
+        return 10**12
 
 
 class Bench:
@@ -164,7 +175,7 @@ class Bench:
         program = FlightProgram(FACTS, first, tick, null, null, null)
         self.loop = SimLoop(
             program, cast(Any, self.sim), cast(Any, self.ground), self.inbox, self.record,
-            self.time.clock, self.stop, cast(Any, self.files), self._sleep,
+            self.time.clock, self.stop, cast(Any, self.files), self._sleep, self.time.clock,
         )  # fmt: skip
         self.until_us = 0
 
@@ -273,6 +284,26 @@ def test_what_was_missed_in_the_last_second_is_counted() -> None:
     bench.asleep = lambda: bench.time.work(7_000) if len(bench.sim.answers) == 700 else None
     bench.run(1.8)
     assert bench.timer(INNER.name).skipped == 3
+
+
+def test_a_log_that_fails_is_an_input_of_the_tick_within_a_second_and_once() -> None:
+    told: list[tuple[int, HostHealth]] = []
+
+    def noting(state: int, inputs: TickInputs) -> tuple[int, TickOutputs]:
+        if inputs.host is not None:
+            told.append((inputs.sensors.t_us, inputs.host))
+        return standing(state, inputs)
+
+    def fails() -> None:
+        if len(bench.sim.answers) >= 700:
+            bench.files.failed = "flight.ulg ends early: No space left on device"
+
+    bench = Bench(noting)
+    bench.asleep = fails
+    bench.run(4.0)
+    ((t_us, health),) = told
+    assert health == HostHealth(log_failure="flight.ulg ends early: No space left on device")
+    assert t_us - FIRST_US <= 700 * PERIOD_US + 1_100_000
 
 
 def test_a_planner_that_died_is_reported_at_once_and_logged() -> None:

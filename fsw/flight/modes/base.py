@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
+from fsw.flight.arming_health import ArmingHealth
 from fsw.flight.setpoint_generator import PositionGoal, SetpointGenerator
 from fsw.flight.state import FlightState, SetpointMemory
 from fsw.model.airframe import Airframe
@@ -16,7 +17,6 @@ from fsw.model.body import Body
 from fsw.mpc.reference import still_at
 from fsw.parameters.flight_config import FlightConfig
 from fsw.signals import (
-    Charge,
     EndEffectorTarget,
     Home,
     MissionProgress,
@@ -38,6 +38,7 @@ class Px4Mode:
     standard: int = 0  # MAV_STANDARD_MODE as announced; 0: none
     also_standard: int = 0  # MAV_STANDARD_MODE that is understood though not announced
     selectable: bool = True  # offered to the operator; else entered by a command of its own
+    offered: bool = True  # announced at all; else no command enters it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,7 +63,8 @@ class CommandContext:
     now_us: int
     climb_range: Vec2  # m, of a takeoff
     airframe: Airframe
-    charge: Charge
+    health: ArmingHealth
+    blocked: str  # why nothing but Descend can be flown now; empty: other modes can be
     speed: float  # m/s, on the way to places
     max_speed: float  # m/s, that can be asked for
     yaw_rate: float  # rad/s, at most

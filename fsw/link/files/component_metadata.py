@@ -1,4 +1,4 @@
-"""Component metadata: documents over FTP with the units, ranges and meanings of parameters.
+"""Component metadata: documents over FTP with the meanings of parameters and events.
 
 Source: https://mavlink.io/en/services/component_information.html
 """
@@ -10,6 +10,7 @@ from functools import cache
 from typing import Final
 
 from command_line.version import version
+from fsw.link.events.event_table import event_document
 from fsw.link.files.ftp_tree import Node
 from fsw.link.files.served_file import MemoryFile
 from fsw.link.wire import message_ids
@@ -19,12 +20,17 @@ from fsw.signals import FlightSnapshot
 
 _GENERAL: Final = "general.json"
 _PARAMETERS: Final = "parameters.json"
+_EVENTS: Final = "events.json"
 
 
 def metadata_files() -> dict[str, Node]:
     """The documents, by their names in the root of the tree."""
     _general()  # made now, so that no tick has to
-    return {_GENERAL: MemoryFile(lambda: _general()[0]), _PARAMETERS: MemoryFile(_parameters)}
+    return {
+        _GENERAL: MemoryFile(lambda: _general()[0]),
+        _PARAMETERS: MemoryFile(_parameters),
+        _EVENTS: MemoryFile(event_document),
+    }
 
 
 def component_metadata(
@@ -54,5 +60,6 @@ def _general() -> tuple[bytes, int]:
     """The general document and its checksum."""
     from fsw.parameters.metadata import general_document, metadata_crc
 
-    document = general_document(_uri(_PARAMETERS), version())
+    events = (_uri(_EVENTS), event_document())
+    document = general_document(_uri(_PARAMETERS), events, version())
     return document, metadata_crc(document)

@@ -74,7 +74,9 @@ def _arm_or_disarm(request: CommandRequest, _: Locate) -> CommandAction:
 
 
 def _terminate(request: CommandRequest, _: Locate) -> CommandAction:
-    return Order.TERMINATE if request.params[0] > 0.5 else Order.NOTHING
+    if request.params[0] > 0.5:
+        return Order.TERMINATE
+    raise _InvalidError("not terminated: param1 must be above 0.5; it cannot be taken back")
 
 
 def _set_mode(request: CommandRequest, _: Locate) -> CommandAction:

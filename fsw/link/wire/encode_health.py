@@ -16,9 +16,10 @@ from fsw.signals import BatteryState, Charge, FlightSnapshot
 _GYRO, _ACCELEROMETER, _HEADING, _PLACE, _EXTERNAL_POSE = 0x1, 0x2, 0x4, 0x20, 0x80
 _RATE_CONTROL, _ATTITUDE, _YAW, _HEIGHT, _POSITION = 0x400, 0x800, 0x1000, 0x2000, 0x4000
 _MOTORS, _FENCE, _AHRS, _BATTERY, _PREARM = 0x8000, 0x100000, 0x200000, 0x2000000, 0x10000000
+_LOGGING: Final = 0x1000000
 _SENSING: Final = _GYRO | _ACCELEROMETER | _HEADING | _PLACE | _EXTERNAL_POSE | _AHRS
 _CONTROL: Final = _RATE_CONTROL | _ATTITUDE | _YAW | _HEIGHT | _POSITION
-_PRESENT: Final = _SENSING | _CONTROL | _MOTORS | _FENCE | _BATTERY | _PREARM
+_PRESENT: Final = _SENSING | _CONTROL | _MOTORS | _FENCE | _BATTERY | _LOGGING | _PREARM
 # Which subsystem an operator should look at; any fault also forbids arming.
 _SUSPECT: Final[dict[str, int]] = {
     Condition.PLAN_REFUSED.value: 0,
@@ -31,6 +32,10 @@ _SUSPECT: Final[dict[str, int]] = {
     Condition.AIDING_LOST.value: _EXTERNAL_POSE,
     Condition.SENSOR_LOST.value: _GYRO | _ACCELEROMETER,
     Condition.TILT_LOST.value: _ATTITUDE | _RATE_CONTROL,
+    Condition.PLANNER_LOST.value: _POSITION | _HEIGHT,
+    Condition.FENCE_BREACH.value: _FENCE,
+    Condition.ROTOR_FAILED.value: _MOTORS,
+    Condition.JOINT_FAILED.value: _MOTORS,
 }
 # MAV_BATTERY_CHARGE_STATE: 0 is undefined, OK is 1.
 _CHARGE_STATES: Final = {charge: int(charge) + 1 for charge in Charge}
@@ -52,6 +57,8 @@ def sys_status(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValue
         health &= ~_PREARM
     if battery.charge >= Charge.CRITICAL:
         health &= ~_BATTERY
+    if snapshot.log_failure:
+        health &= ~_LOGGING
     margins = snapshot.constraints.margins
     if margins and not min(margins) >= 0.0:
         health &= ~_FENCE
@@ -88,7 +95,7 @@ def battery_status(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues:
         _FOR_EVERYTHING,
         _LIPO,
         _percent(battery),
-        0,
+        _seconds_left(battery),
         _CHARGE_STATES[battery.charge],
         *(0, 0, 0, 0),
         0,
@@ -132,6 +139,11 @@ def _millivolts(battery: BatteryState) -> int:
 
 def _centiamperes(battery: BatteryState) -> int:
     return round(100.0 * battery.current)
+
+
+def _seconds_left(battery: BatteryState) -> int:
+    """Flight time that is left [s] as MAVLink counts it: 0 where it is not known."""
+    return round(battery.time_left) if battery.time_left < 1e6 else 0
 
 
 def _percent(battery: BatteryState) -> int:

@@ -31,6 +31,11 @@ _LOCAL_NED: Final = 1  # MAV_FRAME
 _GLOBAL: Final = 0  # MAV_FRAME
 _ACCEL_AND_GYRO: Final = 0x3F  # HIGHRES_IMU_UPDATED_FLAGS
 _ON_GROUND, _IN_AIR, _TAKEOFF, _LANDING = 1, 2, 3, 4  # MAV_LANDED_STATE
+_LANDED_STATES: Final = {
+    Mode.TAKEOFF: _TAKEOFF,
+    Mode.LAND: _LANDING,
+    Mode.DESCEND: _LANDING,
+}
 _BODY_NED: Final = 8
 _IGNORE_ALL: Final = 0xDFF  # POSITION_TARGET_TYPEMASK, all but the flag of forces
 _RATES_IGNORED: Final = 0x07  # ATTITUDE_TARGET_TYPEMASK
@@ -45,12 +50,11 @@ def heartbeat(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues
     base_mode = _BASE_MODES.get(shown, _BY_ITSELF) | (_ARMED if snapshot.armed else 0)
     if snapshot.mode is Mode.FAULT:
         status = _TERMINATED
-    elif snapshot.failures or snapshot.failsafe_from is not None:
-        status = _CRITICAL
     elif snapshot.armed:
-        status = _ACTIVE
+        acts = snapshot.failures or snapshot.failsafe_from is not None
+        status = _CRITICAL if acts else _ACTIVE
     else:
-        status = _UNINIT if snapshot.arming_refusal else _STANDBY
+        status = _UNINIT if snapshot.arming_refusal or snapshot.failures else _STANDBY
     return (
         custom_mode(shown),
         _QUADROTOR,
@@ -65,7 +69,7 @@ def extended_sys_state(snapshot: FlightSnapshot, _: TelemetryContext) -> WireVal
     """EXTENDED_SYS_STATE: no VTOL, on the ground or what the mode is doing."""
     if snapshot.landed or not snapshot.armed:
         return (0, _ON_GROUND)
-    return (0, {Mode.TAKEOFF: _TAKEOFF, Mode.LAND: _LANDING}.get(snapshot.mode, _IN_AIR))
+    return (0, _LANDED_STATES.get(snapshot.mode, _IN_AIR))
 
 
 def system_time(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues:

@@ -13,7 +13,9 @@ _NOT_SELECTABLE: Final = 2  # MAV_MODE_PROPERTY: entered by a command of its own
 # rotors off: PX4 has no mode for it; system_status says that it is an emergency.
 _SHOWN_AS: Final = {Mode.DISARMED: Mode.HOLD, Mode.FAULT: Mode.LAND}
 
-MODE_BY_PX4: Final = {(float(m.px4.main), float(m.px4.sub)): mode for mode, m in MODES.items()}
+MODE_BY_PX4: Final = {
+    (float(m.px4.main), float(m.px4.sub)): mode for mode, m in MODES.items() if m.px4.offered
+}
 MODE_BY_STANDARD: Final = {
     float(m.px4.standard or m.px4.also_standard): mode
     for mode, m in MODES.items()
@@ -51,4 +53,5 @@ AVAILABLE_MODES: Final = tuple(
         0 if kind.px4.selectable else _NOT_SELECTABLE,
     )
     for mode, kind in MODES.items()
+    if kind.px4.offered
 )

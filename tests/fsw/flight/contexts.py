@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+from fsw.flight.arming_health import ArmingHealth
 from fsw.flight.modes.base import CommandContext
 from fsw.model.airframe import AIRFRAME
 from fsw.model.body import body_of
-from fsw.signals import Charge, MissionProgress, Mode, SafeSet
+from fsw.signals import MissionProgress, Mode, SafeSet
 
 STANDING = CommandContext(
     mode=Mode.DISARMED,
@@ -29,7 +30,8 @@ STANDING = CommandContext(
     now_us=0,
     climb_range=(0.3, 50.0),
     airframe=AIRFRAME,
-    charge=Charge.OK,
+    health=ArmingHealth(),
+    blocked="",
     speed=1.0,
     max_speed=1.5,
     yaw_rate=0.3,

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from fsw.flight.arming_health import ArmingHealth
 from fsw.flight.command_handlers import Decision, NewHeading, decide
 from fsw.flight.modes.base import CommandContext
 from fsw.shapes.ball import point
@@ -17,7 +18,6 @@ from fsw.shapes.vertical_cylinder import column
 from fsw.signals import (
     MAX_DISTANCE,
     ChangeSpeed,
-    Charge,
     Command,
     CommandAction,
     CommandRequest,
@@ -37,6 +37,7 @@ from fsw.signals import (
     SetHome,
     SetMissionStep,
     StartMission,
+    SwitchMode,
     TakeOff,
     Zone,
 )
@@ -207,19 +208,34 @@ def test_starting_a_mission_arms_where_arming_is_possible() -> None:
     assert (without.result, without.mode) == (TEMPORARILY_REJECTED, None)
 
 
-@pytest.mark.parametrize("charge", [Charge.CRITICAL, Charge.EMERGENCY])
-def test_an_empty_battery_forbids_arming(charge: Charge) -> None:
-    decision = ask(replace(STANDING, charge=charge), ARM, 1.0)
+@pytest.mark.parametrize("remaining", [0.0, 0.09])
+def test_an_empty_battery_forbids_arming(remaining: float) -> None:
+    decision = ask(replace(STANDING, health=ArmingHealth(remaining=remaining)), ARM, 1.0)
     assert decision.result == TEMPORARILY_REJECTED
     assert "battery" in decision.reason
-    assert ask(replace(STANDING, charge=Charge.LOW), ARM, 1.0).arm
+    assert ask(replace(STANDING, health=ArmingHealth(remaining=0.1)), ARM, 1.0).arm
+
+
+@pytest.mark.parametrize("wanted", [Mode.HOLD, Mode.RETURN, Mode.LAND, Mode.OFFBOARD])
+def test_while_nothing_else_can_be_flown_every_mode_is_refused(wanted: Mode) -> None:
+    blocked = replace(
+        HOLDING,
+        mode=Mode.DESCEND,
+        setpoint_fresh=True,
+        blocked="position unknown; the vehicle descends",
+    )
+    decision = decided(SwitchMode(wanted), blocked)
+    assert decision.result == TEMPORARILY_REJECTED
+    assert decision.reason == f"no {wanted.value}: position unknown; the vehicle descends"
+    assert decided(SwitchMode(wanted), replace(blocked, blocked="")).mode is wanted
+    assert ask(blocked, 185, 1.0).mode is Mode.FAULT
 
 
 def test_termination_is_for_an_armed_vehicle() -> None:
     decision = ask(HOLDING, 185, 1.0)
     assert (decision.result, decision.mode, decision.alarming) == (ACCEPTED, Mode.FAULT, True)
     assert ask(STANDING, 185, 1.0).result == DENIED
-    assert ask(HOLDING, 185, 0.0) == Decision(ACCEPTED)
+    assert ask(HOLDING, 185, 0.5).result == DENIED, "as PX4: it cannot be taken back"
 
 
 @pytest.mark.parametrize("command", [310, 209])
@@ -495,7 +511,7 @@ def test_a_mission_is_paused_by_holding(mode: Mode, stops: bool) -> None:
 
 def test_arming_checks_are_made_on_the_ground_and_answered_in_words() -> None:
     assert decided(Order.CHECK_ARMING, STANDING).reason == "ready to arm"
-    nearly_empty = replace(STANDING, charge=Charge.CRITICAL)
+    nearly_empty = replace(STANDING, health=ArmingHealth(remaining=0.0))
     assert "battery" in decided(Order.CHECK_ARMING, nearly_empty).reason
     assert decided(Order.CHECK_ARMING).result == TEMPORARILY_REJECTED
 

@@ -9,18 +9,19 @@ from typing import Any
 
 import pytest
 
+from fsw.flight.arming import CHECKS, Subject
 from fsw.flight.commander import Commander
 from fsw.flight.failsafe import Condition
 from fsw.flight.modes.land import Land
 from fsw.flight.setpoint_generator import PositionGoal, ReferenceState
-from fsw.flight.state import FlightState, PlanMemory, SetpointMemory
+from fsw.flight.state import FlightState, PlanMemory, SafetyMemory, SetpointMemory
 from fsw.model.kinematics import point_in_flight
 from fsw.mpc.reference import still_at
 from fsw.signals import (
     Arm,
+    ArmingReport,
     BatteryState,
     ChangeSpeed,
-    Charge,
     Command,
     CommandAction,
     CommandRequest,
@@ -114,20 +115,26 @@ def test_joints_are_those_asked_for_or_else_those_measured() -> None:
 
 def test_what_a_decision_depends_on_is_the_vehicle_s() -> None:
     state = flying(speed=0.4)
-    state = replace(state, battery=BatteryState(charge=Charge.LOW), invalid_ticks=1)
+    state = replace(state, battery=BatteryState(remaining=0.3), invalid_ticks=1)
     context = COMMANDER.context(state, HOVERING)
     assert (context.position, context.yaw, context.home) == (HERE, 0.5, HOME)
-    assert (context.speed, context.charge) == (0.4, Charge.LOW)
+    assert (context.speed, context.health.remaining) == (0.4, 0.3)
     assert not context.estimate_valid
     usual = COMMANDER.context(flying(), HOVERING)
     assert (usual.speed, usual.estimate_valid) == (CONFIG.steering.cruise_speed, True)
 
 
 def test_why_arming_is_refused_is_shown_while_it_matters() -> None:
-    assert COMMANDER.arming_refusal(DISARMED, STANDING) == ""
-    assert "height" in COMMANDER.arming_refusal(DISARMED, vehicle_at((0.0, 0.0, GROUND_Z - 0.2)))
-    assert COMMANDER.arming_refusal(flying(), vehicle_at((0.0, 0.0, GROUND_Z - 0.2))) == ""
-    assert "restart" in COMMANDER.arming_refusal(flying(Mode.FAULT), STANDING)
+    low = vehicle_at((0.0, 0.0, GROUND_Z - 0.2))
+    assert COMMANDER.arming_report(DISARMED, STANDING) == ("", ArmingReport())
+    sentence, report = COMMANDER.arming_report(DISARMED, low)
+    assert "height" in sentence
+    (number,) = report.failed
+    assert CHECKS[number].subject is Subject.STANDING
+    again = COMMANDER.arming_report(replace(DISARMED, arming=report), low)[1]
+    assert again is report, "what has not changed is the same value"
+    assert COMMANDER.arming_report(flying(), low) == ("", ArmingReport())
+    assert "restart" in COMMANDER.arming_report(flying(Mode.FAULT), STANDING)[0]
 
 
 # ---------------------------------------------------------------- commands
@@ -183,7 +190,7 @@ def test_arming_on_the_ground_begins_in_hold_with_home_here_and_all_wishes_forgo
     assert (vehicle.mode, vehicle.landed, vehicle.flies) == (Mode.HOLD, True, False)
     assert vehicle.home == Home(STANDING.p_WB, STANDING.yaw)
     assert (vehicle.look_at, vehicle.speed) == (None, None)
-    assert vehicle.conditions == (Condition.DATALINK_LOST,), "a battery is reported anew"
+    assert vehicle.conditions == (), "what is so is reported anew, and acted upon"
     assert state.setpoint == SetpointMemory()
     assert state.plan == PlanMemory(since_us=NOW_US, next_id=7, counters=PlannerCounters(plans=5))
     assert state.cascade.commanded.rotor_thrust == (0.0,) * 4
@@ -330,7 +337,7 @@ def test_a_condition_is_reported_once_for_as_long_as_it_lasts() -> None:
 def test_another_condition_is_reported_alone() -> None:
     state, _ = watched(SHAKY)
     state, texts = watched(replace(state, plan=replace(state.plan, refused=True)))
-    assert texts == ["last plan refused: warn"]
+    assert texts == ["last plan refused: failing: warn"]
     assert len(state.vehicle.conditions) == 2
 
 
@@ -351,19 +358,30 @@ def test_a_second_failsafe_remembers_what_the_pilot_flew() -> None:
     state = replace(state, vehicle=replace(state.vehicle, gcs_heard_us=0))
     late = HOVERING._replace(t_us=20_000_000)
     state = replace(state, plan=PlanMemory(since_us=late.t_us))
-    state, _ = watched(state, late)
+    state, texts = watched(state, late)
+    assert "failsafe: no ground station for 20 s, returning in 5 s" in texts
+    assert (state.vehicle.mode, state.vehicle.failsafe_from) == (Mode.HOLD, Mode.OFFBOARD)
+    later = HOVERING._replace(t_us=25_000_000)
+    state = replace(state, plan=PlanMemory(since_us=later.t_us))
+    state, texts = watched(state, later)
+    assert "failsafe: no ground station for 25 s, returning" in texts
     assert (state.vehicle.mode, state.vehicle.failsafe_from) == (Mode.RETURN, Mode.OFFBOARD)
     taken_back = after(state, SwitchMode(Mode.HOLD))
     assert taken_back.vehicle.failsafe_from is None
 
 
 def test_after_the_end_of_the_flight_nothing_else_is_looked_at() -> None:
-    upside_down = HOVERING._replace(R_WB=(1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, -1.0))
-    lost = replace(offboard_lost(), output_replaced=True)
-    state, texts = watched(lost, upside_down)
+    over = SafetyMemory(rolled_us=NOW_US - 400_000)
+    lost = replace(offboard_lost(), output_replaced=True, safety=over)
+    state, texts = watched(lost)
     assert state.vehicle.mode is Mode.FAULT
     assert state.vehicle.failsafe_from is None
-    assert texts == ["tilt beyond recovery: terminate", "offboard to fault: terminate"]
+    assert texts == [
+        "tilt beyond recovery: roll above 60 deg for 0.40 s: terminate",
+        "actuator command not finite: warn",
+        "offboard setpoints stopped",
+        "offboard to fault: terminate",
+    ]
     again, texts = watched(replace(state, output_replaced=False))
     assert again.vehicle.conditions == state.vehicle.conditions, "what ended it stays on show"
     assert texts == []

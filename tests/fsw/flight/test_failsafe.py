@@ -7,23 +7,24 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from fsw.estimation.sensor_fault import Sensor, SensorFault
 from fsw.flight.failsafe import (
     FAILSAFES,
     FAULTS,
-    MIN_UP,
+    ROWS,
     Action,
     Condition,
     FailsafeContext,
     active,
+    quickly_active,
     report,
+    way_home_s,
 )
 from fsw.flight.state import (
     AIDED,
     Aiding,
+    Damage,
     FlightState,
     MissionMemory,
     OffboardMemory,
@@ -33,14 +34,22 @@ from fsw.flight.state import (
 )
 from fsw.flight.uncertain_clearance import KeptSet
 from fsw.parameters.flight_config import FlightConfig, FlightLimits, flight_config
-from fsw.signals import BatteryState, Charge, Mode, Severity
+from fsw.parameters.registry import BY_NAME
+from fsw.signals import (
+    BatteryState,
+    Charge,
+    Home,
+    HostHealth,
+    Mode,
+    Severity,
+    SolverStatus,
+)
 from tests.fsw.random_states import random_estimate
 
 PERIOD_US = 100_000
 NOW_US = 10**9
 CONFIG = flight_config(body="points")
 AMPLE = KeptSet(ample_us=NOW_US)
-MANUAL = frozenset({Mode.HOLD, Mode.OFFBOARD})
 
 
 @dataclass(frozen=True)
@@ -51,10 +60,11 @@ class Evidence:
     mode: Mode = Mode.HOLD
     landed: bool = False
     invalid_ticks: int = 0
-    up: float = 1.0
     plan_age_us: int = PERIOD_US
     plan_refused: bool = False
     output_replaced: bool = False
+    failsafe_from: Mode | None = None
+    known: tuple[Condition, ...] = ()  # that were active before
     setpoint_age_us: int = 0
     gcs_silent_us: int = 0
     battery: BatteryState = field(default_factory=BatteryState)
@@ -63,28 +73,40 @@ class Evidence:
     aiding: Aiding = AIDED
     kept: KeptSet = AMPLE
     config: FlightConfig = CONFIG
+    host: HostHealth = field(default_factory=HostHealth)
+    damage: Damage = field(default_factory=Damage)
+    plan: PlanMemory = field(default_factory=PlanMemory)
 
     def context(self) -> FailsafeContext:
         heard_us = NOW_US - self.gcs_silent_us if self.gcs_silent_us >= 0 else -1
         state = FlightState(
             invalid_ticks=self.invalid_ticks,
             output_replaced=self.output_replaced,
-            vehicle=VehicleMemory(mode=self.mode, landed=self.landed, gcs_heard_us=heard_us),
-            plan=PlanMemory(since_us=NOW_US - self.plan_age_us, refused=self.plan_refused),
+            vehicle=VehicleMemory(
+                mode=self.mode,
+                landed=self.landed,
+                gcs_heard_us=heard_us,
+                failsafe_from=self.failsafe_from,
+                conditions=self.known,
+                home=Home((0.0, 0.0, 0.0), 0.0),
+            ),
+            plan=replace(self.plan, since_us=NOW_US - self.plan_age_us, refused=self.plan_refused),
             offboard=OffboardMemory(motion_us=NOW_US - self.setpoint_age_us),
             battery=self.battery,
             mission=MissionMemory(silent_zones=self.silent_zones),
             safety=self.safety,
             aiding=self.aiding,
+            host=self.host,
+            damage=self.damage,
             kept=self.kept,
         )
-        level = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, self.up)
-        estimate = random_estimate(np.random.default_rng(1))._replace(t_us=NOW_US, R_WB=level)
-        return FailsafeContext(state, estimate, replace(self.config, limits=self.limits), MANUAL)
+        estimate = random_estimate(np.random.default_rng(1))._replace(t_us=NOW_US)
+        return FailsafeContext(state, estimate, replace(self.config, limits=self.limits))
 
 
 FINE = Evidence()
 OUTSIDE = SafetyMemory(breach_us=NOW_US, breach_by=0.0123)
+OVER_THE_FENCE = SafetyMemory(breach_us=NOW_US, breach_by=0.0123, breach_of_fence=True)
 CRAMPED = KeptSet(lacking=0.0234, ample_us=NOW_US - 500_000)
 OFF_PLAN = SafetyMemory(off_plan_us=NOW_US, off_plan_by=0.0834)
 UNAIDED = Aiding(1_500_000, Sensor.POSE, SensorFault.STUCK)
@@ -133,10 +155,22 @@ def test_nothing_wrong_is_no_condition() -> None:
         (replace(FINE, aiding=Aiding(attitude_sigma=math.nan)), Condition.ATTITUDE_LOST),
         (replace(FINE, aiding=Aiding(250_000)), Condition.AIDING_LOST),
         (replace(FINE, aiding=replaced_sensor(50_000)), Condition.SENSOR_LOST),
-        (replace(FINE, up=MIN_UP), Condition.TILT_LOST),
-        (replace(FINE, up=0.339), Condition.TILT_LOST),
-        (replace(FINE, up=-1.0), Condition.TILT_LOST),
-        (replace(FINE, up=math.nan), Condition.TILT_LOST),
+        (replace(FINE, safety=SafetyMemory(rolled_us=NOW_US - 300_000)), Condition.TILT_LOST),
+        (replace(FINE, safety=SafetyMemory(pitched_us=NOW_US - 300_000)), Condition.TILT_LOST),
+        (replace(FINE, safety=OVER_THE_FENCE), Condition.FENCE_BREACH),
+        (replace(FINE, damage=Damage(rotor="rotor 2")), Condition.ROTOR_FAILED),
+        (replace(FINE, damage=Damage(joint="joint 1")), Condition.JOINT_FAILED),
+        (replace(FINE, plan=PlanMemory(awaited_missed=True)), Condition.PLAN_LATE),
+        (
+            replace(FINE, safety=SafetyMemory(jump_us=60_000, jumped_us=NOW_US - 999_999)),
+            Condition.TIME_JUMPED,
+        ),
+        (replace(FINE, host=HostHealth(missed_ticks=25)), Condition.LOOP_OVERRUN),
+        (replace(FINE, host=HostHealth(clock_jump_us=-500_000)), Condition.CLOCK_JUMPED),
+        (replace(FINE, host=HostHealth(datagrams=2001)), Condition.LINK_FLOODED),
+        (replace(FINE, host=HostHealth(log_failure="flight.ulg")), Condition.LOG_STOPPED),
+        (replace(FINE, host=HostHealth(disk_left_us=0)), Condition.DISK_FULL),
+        (replace(FINE, battery=BatteryState(time_left=20.0)), Condition.FLIGHT_TIME_LOW),
         (replace(FINE, plan_age_us=3 * PERIOD_US + 1), Condition.PLAN_STALE),
         (replace(FINE, plan_refused=True), Condition.PLAN_REFUSED),
         (replace(FINE, output_replaced=True), Condition.OUTPUT_NOT_FINITE),
@@ -159,9 +193,13 @@ def test_each_evidence_is_its_condition(evidence: Evidence, condition: Condition
     "evidence",
     [
         replace(FINE, invalid_ticks=4),  # a lost frame or two are flown through
-        replace(FINE, up=0.341),  # just short of 70 degrees
+        replace(FINE, safety=SafetyMemory(rolled_us=NOW_US - 299_999, pitched_us=NOW_US)),
+        replace(FINE, safety=SafetyMemory(jump_us=60_000, jumped_us=NOW_US - 1_000_000)),
+        replace(FINE, host=HostHealth(missed_ticks=24, clock_jump_us=499_999, datagrams=2000)),
+        replace(FINE, landed=True, damage=Damage("rotor 1", joint="joint 2")),
+        replace(FINE, landed=True, battery=BatteryState(time_left=1.0)),
+        replace(FINE, landed=True, plan=PlanMemory(awaited_missed=True)),
         replace(FINE, plan_age_us=3 * PERIOD_US),
-        replace(FINE, landed=True, up=-1.0),  # carried about upside down
         replace(FINE, landed=True, plan_age_us=10**9),
         replace(FINE, aiding=Aiding(unaided_us=249_999, position_sigma=9.0)),
         replace(FINE, aiding=Aiding(position_sigma=9.0)),  # it was never known better
@@ -176,20 +214,15 @@ def test_what_can_be_lived_with_is_no_condition(evidence: Evidence) -> None:
     assert active(evidence.context()) == ()
 
 
-@given(st.integers(0, 5), st.floats(allow_nan=True), st.integers(0, 10**6), st.booleans())
-def test_the_strongest_action_comes_first(
-    invalid: int, up: float, age_us: int, refused: bool
-) -> None:
-    evidence = replace(FINE, invalid_ticks=invalid, up=up, plan_age_us=age_us, plan_refused=refused)
-    context = evidence.context()
-    order = list(Action)
-    strengths = [order.index(row.action(context)) for row in active(context)]
-    assert strengths == sorted(strengths, reverse=True)
-
-
 @pytest.mark.parametrize(
     ("number", "expected"),
-    [(0, Action.HOLD), (3, Action.RETURN), (4, Action.LAND), (5, Action.HOLD)],
+    [
+        (0, Action.HOLD),
+        (3, Action.RETURN),
+        (4, Action.LAND),
+        (5, Action.HOLD),
+        (6, Action.TERMINATE),
+    ],
 )
 def test_lost_setpoints_are_acted_on_as_the_parameter_says(number: int, expected: Action) -> None:
     assert action(replace(OFFBOARD, limits=FlightLimits(setpoint_loss_action=number))) is expected
@@ -197,15 +230,42 @@ def test_lost_setpoints_are_acted_on_as_the_parameter_says(number: int, expected
 
 @pytest.mark.parametrize(
     ("number", "expected"),
-    [(0, Action.NONE), (1, Action.HOLD), (2, Action.RETURN), (3, Action.LAND)],
+    [
+        (0, Action.WARN),
+        (1, Action.HOLD),
+        (2, Action.RETURN),
+        (3, Action.LAND),
+        (5, Action.TERMINATE),
+    ],
 )
 def test_a_lost_station_is_acted_on_as_the_parameter_says(number: int, expected: Action) -> None:
     lost = replace(FINE, gcs_silent_us=10_000_000, limits=FlightLimits(station_loss_action=number))
-    assert action(lost) is expected
-    assert action(replace(lost, mode=Mode.MISSION)) is Action.NONE, (
-        "it flies by itself, and goes on"
-    )
+    for mode in (Mode.HOLD, Mode.MISSION, Mode.TRAJECTORY, Mode.OFFBOARD, Mode.ORBIT):
+        assert action(replace(lost, mode=mode, setpoint_age_us=0)) is expected
     assert action(replace(lost, landed=True)) is Action.NONE
+
+
+@pytest.mark.parametrize(
+    ("bits", "excepted"),
+    [
+        (0, set()),
+        (1, {Mode.MISSION}),
+        (2, {Mode.HOLD, Mode.TAKEOFF}),
+        (4, {Mode.OFFBOARD}),
+        (7, {Mode.MISSION, Mode.HOLD, Mode.TAKEOFF, Mode.OFFBOARD}),
+        (8, {Mode.TRAJECTORY}),
+    ],
+)
+def test_a_lost_station_is_ignored_in_the_modes_of_the_parameter_alone(
+    bits: int, excepted: set[Mode]
+) -> None:
+    limits = FlightLimits(station_loss_exceptions=bits)
+    lost = replace(FINE, gcs_silent_us=10_000_000, limits=limits)
+    flown = set(Mode) - {Mode.DISARMED, Mode.FAULT}
+    ignored = {mode for mode in flown if action(replace(lost, mode=mode)) is Action.NONE}
+    assert ignored == excepted
+    held = replace(lost, mode=Mode.HOLD, failsafe_from=Mode.RETURN)
+    assert action(held) is Action.RETURN, "the hold of a failsafe is none of the pilot's"
 
 
 @pytest.mark.parametrize(
@@ -226,10 +286,77 @@ def test_a_low_battery_is_acted_on_as_the_parameter_says(
 ) -> None:
     context = replace(FINE, battery=charged(charge), limits=FlightLimits(low_battery_action=number))
     assert action(context) is expected
-    assert action(replace(context, landed=True)) is Action.WARN
-    assert action(replace(context, mode=Mode.LAND)) is Action.WARN, "it lands already"
-    returning = action(replace(context, mode=Mode.RETURN))
-    assert returning is (Action.WARN if expected is Action.RETURN else expected)
+
+
+def test_a_battery_that_is_critical_returns_and_one_nearly_empty_lands_by_default() -> None:
+    assert action(replace(FINE, battery=charged(Charge.LOW))) is Action.WARN
+    assert action(replace(FINE, battery=charged(Charge.CRITICAL))) is Action.RETURN
+    assert action(replace(FINE, battery=charged(Charge.EMERGENCY))) is Action.LAND
+
+
+@pytest.mark.parametrize(
+    ("number", "expected"), [(0, Action.NONE), (1, Action.WARN), (3, Action.RETURN)]
+)
+def test_a_short_flight_time_is_acted_on_as_the_parameter_says(
+    number: int, expected: Action
+) -> None:
+    short = replace(FINE, battery=BatteryState(time_left=20.0))
+    assert action(replace(short, limits=FlightLimits(flight_time_action=number))) is expected
+    (row,) = active(short.context())
+    needed = way_home_s(short.context())
+    text = report(row, short.context(), Action.RETURN)[1]
+    assert f"20 s left, {needed:.0f} s needed for the way home" in text
+
+
+def test_the_way_home_is_across_up_and_down_with_a_factor_and_a_margin() -> None:
+    limits = FlightLimits(return_time_factor=2.0, return_time_margin=7.0, return_wait=3.0)
+    context = replace(FINE, limits=limits).context()
+    there = context.estimate._replace(p_WB=(30.0, -40.0, -1.5))
+    # 50 m across, 0.5 m up at 1 m/s; 3 s there; 2 m down at 0.25 m/s
+    assert way_home_s(replace(context, estimate=there)) == pytest.approx(2.0 * 61.5 + 7.0)
+
+
+@pytest.mark.parametrize(
+    ("number", "expected"),
+    [
+        (0, Action.NONE),
+        (1, Action.WARN),
+        (2, Action.HOLD),
+        (3, Action.RETURN),
+        (4, Action.TERMINATE),
+        (5, Action.LAND),
+        (6, Action.RETREAT),
+    ],
+)
+def test_a_fence_is_acted_on_as_the_parameter_says(number: int, expected: Action) -> None:
+    outside = replace(FINE, safety=OVER_THE_FENCE, limits=FlightLimits(fence_action=number))
+    assert action(outside) is expected
+    inside = replace(FINE, safety=OUTSIDE, limits=FlightLimits(fence_action=number))
+    assert action(inside) is Action.RETREAT, "what is announced has a parameter of its own"
+
+
+@pytest.mark.parametrize(
+    ("number", "expected"),
+    [
+        (0, Action.WARN),
+        (1, Action.HOLD),
+        (2, Action.LAND),
+        (3, Action.RETURN),
+        (4, Action.TERMINATE),
+    ],
+)
+def test_an_actuator_that_fails_is_acted_on_as_the_parameter_says(
+    number: int, expected: Action
+) -> None:
+    limits = FlightLimits(actuator_failure_action=number)
+    for damage in (Damage(rotor="rotor 1"), Damage(joint="joint 2")):
+        assert action(replace(FINE, damage=damage, limits=limits)) is expected
+
+
+def test_the_circuit_breaker_makes_a_warning_of_an_attitude_failure() -> None:
+    over = replace(FINE, safety=SafetyMemory(rolled_us=NOW_US - 500_000))
+    assert action(over) is Action.TERMINATE
+    assert action(replace(over, limits=FlightLimits(termination_breaker=121212))) is Action.WARN
 
 
 @pytest.mark.parametrize(
@@ -239,7 +366,6 @@ def test_a_low_battery_is_acted_on_as_the_parameter_says(
 def test_a_breach_is_acted_on_as_the_parameter_says(number: int, expected: Action) -> None:
     outside = replace(FINE, safety=OUTSIDE, limits=FlightLimits(breach_action=number))
     assert action(outside) is expected
-    assert action(replace(outside, mode=Mode.LAND)) is Action.WARN, "it lands already"
     soft = replace(outside, config=replace(CONFIG, soft=True))
     assert action(soft) is Action.WARN, "it was to be flown all the same"
     naive = replace(outside, config=replace(CONFIG, controller="naive"))
@@ -269,13 +395,73 @@ def test_a_report_names_the_condition_its_number_and_what_is_done() -> None:
         Severity.CRITICAL,
         "failsafe: no ground station for 12 s, returning",
     )
+    assert report(row, lost, Action.RETURN, 5_000_000)[1].endswith("12 s, returning in 5 s")
     low = replace(FINE, battery=charged(Charge.CRITICAL)).context()
     (row,) = active(low)
     assert report(row, low, Action.WARN) == (Severity.CRITICAL, "battery critical: 7 % left")
-    over = replace(FINE, up=0.0).context()
+    over = replace(FINE, safety=SafetyMemory(pitched_us=NOW_US - 310_000)).context()
     (row,) = active(over)
-    severity, text = report(row, over, Action.TERMINATE)
-    assert (severity, text) == (Severity.EMERGENCY, "tilt beyond recovery: terminate")
+    assert report(row, over, Action.TERMINATE) == (
+        Severity.EMERGENCY,
+        "tilt beyond recovery: pitch above 60 deg for 0.31 s: terminate",
+    )
+
+
+@pytest.mark.parametrize(
+    ("plan", "words"),
+    [
+        (PlanMemory(awaited_missed=True), "planner silent, last plan 0.40 s ago"),
+        (PlanMemory(status=SolverStatus.INFEASIBLE), "planner infeasible, last plan 0.40 s ago"),
+        (PlanMemory(status=SolverStatus.TIME_LIMIT), "planner out of time, last plan 0.40 s ago"),
+    ],
+)
+def test_a_planner_that_does_not_plan_is_told_with_why_and_since_when(
+    plan: PlanMemory, words: str
+) -> None:
+    refused = not plan.awaited_missed
+    stale = replace(FINE, plan=plan, plan_refused=refused, plan_age_us=400_000).context()
+    row = ROWS[Condition.PLAN_STALE]
+    assert row in active(stale)
+    assert report(row, stale, Action.BRAKE)[1] == f"no plan for three periods: {words}: brake"
+
+
+def test_a_planner_that_is_lost_for_long_lets_the_vehicle_descend() -> None:
+    lost = replace(FINE, plan_age_us=5_000_001)
+    assert conditions(lost) == (Condition.PLANNER_LOST, Condition.PLAN_STALE)
+    assert ROWS[Condition.PLANNER_LOST].action(lost.context()) is Action.DESCEND
+    descending = replace(lost, mode=Mode.DESCEND)
+    assert conditions(descending) == (Condition.PLANNER_LOST,), "nothing brakes"
+    assert conditions(replace(lost, landed=True)) == ()
+
+
+def test_setpoints_stay_lost_until_they_come_again_or_the_pilot_takes_over() -> None:
+    held = replace(OFFBOARD, mode=Mode.HOLD, failsafe_from=Mode.OFFBOARD)
+    lost = replace(held, known=(Condition.SETPOINTS_LOST,))
+    assert conditions(lost) == (Condition.SETPOINTS_LOST,)
+    for over in (replace(lost, setpoint_age_us=0), replace(lost, failsafe_from=None), held):
+        assert conditions(over) == ()
+
+
+def test_between_two_planning_periods_slow_rows_are_as_they_were_found_last() -> None:
+    evidence = replace(
+        FINE,
+        output_replaced=True,
+        battery=charged(Charge.LOW),
+        known=(Condition.ZONES_SILENT, Condition.TUBE_LEFT),
+    )
+    found = [row.condition for row in quickly_active(evidence.context())]
+    assert found == [Condition.OUTPUT_NOT_FINITE, Condition.ZONES_SILENT]
+    assert quickly_active(FINE.context()) == ()
+
+
+def test_the_rows_name_parameters_that_exist_and_say_how_a_condition_is_found() -> None:
+    for row in FAILSAFES:
+        assert set(row.parameters) <= set(BY_NAME), row.condition
+        assert row.detected, row.condition
+        acts = {name for name in row.parameters if name.endswith("_ACT") or name == "GF_ACTION"}
+        assert row.does or acts, f"nothing says what is done about {row.condition.value}"
+        assert row.within_us <= 1_100_000
+        assert (row.within_us >= 100_000) if row.slow else True
 
 
 def lost_rows(evidence: Evidence) -> dict[Condition, Action]:
@@ -288,18 +474,16 @@ def lost_rows(evidence: Evidence) -> dict[Condition, Action]:
     [
         (0.1, {}),
         (0.11, {Condition.POSITION_LOW: Action.HOLD}),
-        (0.51, {Condition.POSITION_LOST: Action.LAND, Condition.POSITION_LOW: Action.HOLD}),
-        (math.nan, {Condition.POSITION_LOST: Action.LAND, Condition.POSITION_LOW: Action.HOLD}),
+        (0.51, {Condition.POSITION_LOST: Action.DESCEND, Condition.POSITION_LOW: Action.HOLD}),
+        (math.nan, {Condition.POSITION_LOST: Action.DESCEND, Condition.POSITION_LOW: Action.HOLD}),
     ],
 )
-def test_in_dead_reckoning_it_holds_and_then_lands(
+def test_in_dead_reckoning_it_holds_and_then_descends(
     sigma: float, expected: dict[Condition, Action]
 ) -> None:
     trajectory = replace(FINE, mode=Mode.TRAJECTORY)
     adrift = replace(trajectory, aiding=UNAIDED._replace(position_sigma=sigma))
     assert lost_rows(adrift) == {**expected, Condition.AIDING_LOST: Action.DEAD_RECKON}
-    landing = lost_rows(replace(adrift, mode=Mode.LAND))
-    assert set(landing.values()) <= {Action.WARN, Action.DEAD_RECKON}, "it lands already"
 
 
 @pytest.mark.parametrize(
@@ -335,7 +519,10 @@ def test_a_text_names_the_sensor_and_since_when() -> None:
 
 def test_a_fault_is_the_vehicles_own() -> None:
     others = {Condition.SETPOINTS_LOST, Condition.DATALINK_LOST, Condition.BATTERY_LOW}
-    others |= {Condition.ZONES_SILENT, Condition.ROOM_LACKING}
+    others |= {Condition.ZONES_SILENT, Condition.FLIGHT_TIME_LOW, Condition.PLAN_LATE}
+    others |= {Condition.TIME_JUMPED, Condition.LOOP_OVERRUN, Condition.CLOCK_JUMPED}
+    others |= {Condition.LINK_FLOODED, Condition.LOG_STOPPED, Condition.DISK_FULL}
+    others |= {Condition.ROOM_LACKING}
     others |= {Condition.BATTERY_CRITICAL, Condition.BATTERY_EMERGENCY}
     assert set(Condition) - others == FAULTS
 

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 from fsw.flight.plan_exchange import nominal_at_rest
 from fsw.flight.safety_watch import NOISE_ROOM, SafetyWatch
 from fsw.flight.state import SafetyMemory
 from fsw.parameters.consistency import base_reach, loop_tube
 from fsw.parameters.flight_config import flight_config
-from fsw.signals import ConstraintReport, SafetyCounters, Vec3
+from fsw.signals import ConstraintReport, SafetyCounters, StateEstimate, Vec3
 from tests.fsw.flight.in_flight import CONFIG, GROUND_Z, vehicle_at
+from tests.fsw.random_states import estimate_of
 
 TUBE = loop_tube(CONFIG)
 WATCH = SafetyWatch(CONFIG, TUBE)
@@ -118,3 +123,67 @@ def test_on_the_ground_or_without_zones_there_is_no_breach(
     assert WATCH.breach(CALM, vehicle_at(HERE), constraints, flies=flies) is CALM
     outside = margins(CALM, -0.1)
     assert WATCH.breach(outside, vehicle_at(HERE), constraints, flies=flies).breach_us == -1
+
+
+# ---------------------------------------------------------------- attitude, fences, time
+
+
+def rolled(degrees: float, axis: str = "x", t_us: int = 0) -> StateEstimate:
+    return estimate_of(Rotation.from_euler(axis, degrees, degrees=True))._replace(t_us=t_us)
+
+
+@pytest.mark.parametrize("degrees", [-179.0, -61.0, 61.0, 90.0, 179.0])
+def test_a_roll_beyond_its_limit_is_noted_since_when_and_forgotten_when_it_is_over(
+    degrees: float,
+) -> None:
+    memory = WATCH.attitude(SafetyMemory(), rolled(degrees, t_us=5), flies=True)
+    assert (memory.rolled_us, memory.pitched_us) == (5, -1)
+    memory = WATCH.attitude(memory, rolled(degrees, t_us=9), flies=True)
+    assert memory.rolled_us == 5
+    assert WATCH.attitude(memory, rolled(59.0, t_us=11), flies=True).rolled_us == -1
+    assert WATCH.attitude(memory, rolled(degrees, t_us=11), flies=False).rolled_us == -1
+
+
+@pytest.mark.parametrize("degrees", [-61.0, 61.0, 89.0])
+def test_a_pitch_beyond_its_limit_is_one_of_its_own(degrees: float) -> None:
+    memory = WATCH.attitude(SafetyMemory(), rolled(degrees, "y", t_us=5), flies=True)
+    assert (memory.rolled_us, memory.pitched_us) == (-1, 5)
+
+
+def test_an_attitude_that_is_no_number_is_beyond_both_limits() -> None:
+    lost = rolled(0.0, t_us=5)._replace(R_WB=(math.nan,) * 9)
+    memory = WATCH.attitude(SafetyMemory(), lost, flies=True)
+    assert (memory.rolled_us, memory.pitched_us) == (5, 5)
+
+
+@given(st.floats(-math.pi, math.pi), st.floats(-1.57, 1.57), st.floats(0.02, math.pi))
+def test_what_is_upright_needs_no_look(roll: float, pitch: float, limit: float) -> None:
+    config = replace(CONFIG, limits=replace(CONFIG.limits, roll_failure=limit))
+    watch = SafetyWatch(config, TUBE)
+    tilted = estimate_of(Rotation.from_euler("ZYX", (0.3, pitch, roll)))
+    memory = watch.attitude(SafetyMemory(), tilted, flies=True)
+    if tilted.R_WB[8] > watch.upright:
+        assert (memory.rolled_us, memory.pitched_us) == (-1, -1)
+
+
+def test_a_limit_of_zero_is_no_check() -> None:
+    config = replace(CONFIG, limits=replace(CONFIG.limits, roll_failure=0.0, pitch_failure=0.0))
+    watch = SafetyWatch(config, loop_tube(config))
+    assert watch.attitude(SafetyMemory(), rolled(180.0), flies=True) == SafetyMemory()
+
+
+def test_a_breach_is_one_of_the_fence_where_its_zone_is_breached_most() -> None:
+    # Two announced zones and one of the fence, two parts each.
+    for margins, of_fence in (
+        ((0.1, 0.2, 0.3, -0.1, 0.1, 0.1), False),
+        ((0.1, 0.2, 0.3, 0.1, 0.1, -0.1), True),
+        ((-0.2, 0.2, 0.3, 0.1, 0.1, -0.1), False),
+    ):
+        report = ConstraintReport(margins=margins, per_zone=(2, 2, 2))
+        assert WATCH.of_fence(report, announced=2) is of_fence
+    assert not WATCH.of_fence(ConstraintReport(margins=(-0.1,), per_zone=(1,)), announced=1)
+
+
+def test_a_jump_of_time_is_noted_with_its_length() -> None:
+    memory = WATCH.jumped(SafetyMemory(), 700_000, 100_000)
+    assert (memory.jump_us, memory.jumped_us) == (600_000, 700_000)

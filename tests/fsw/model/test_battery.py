@@ -114,3 +114,21 @@ def test_a_measurement_corrects_the_model_which_goes_on_from_there() -> None:
     later = drained(model, LEVELS, now, HOVER, 1.0)
     assert 0.14 < later.remaining < 0.15
     assert corrected(model, LEVELS, later, BatteryReading(16.8, 1.0)).charge is Charge.OK
+
+
+def test_the_flight_time_that_is_left_is_that_at_the_current_of_late() -> None:
+    model, state = BatteryModel(), FULL
+    for _ in range(1000):  # 100 s
+        state = drained(model, LEVELS, state, HOVER, 0.1)
+    assert state.usual_current == pytest.approx(state.current, rel=0.02)
+    amperes = state.usual_current
+    assert state.time_left == pytest.approx(3600.0 * 10.0 * state.remaining / amperes)
+    assert 600.0 < state.time_left + 100.0 < 1200.0, "about a quarter of an hour"
+    climb = drained(model, LEVELS, state, (2.0 * HOVER[0],) * 4, 0.1)
+    assert climb.time_left > 0.98 * state.time_left, "a moment is not how it goes on"
+
+
+def test_a_battery_that_nothing_has_drawn_on_begins_at_its_first_current() -> None:
+    state = drained(BatteryModel(), LEVELS, FULL, HOVER, 0.1)
+    assert state.usual_current == state.current
+    assert BatteryState().time_left == math.inf

@@ -66,10 +66,12 @@ def test_the_description_says_what_the_table_says() -> None:
 
 
 def test_the_general_document_leads_to_the_parameters_and_vouches_for_them() -> None:
-    general = json.loads(general_document("mftp:///parameters.json", "0.1.0"))
+    events = ("mftp:///events.json", b"{}")
+    general = json.loads(general_document("mftp:///parameters.json", events, "0.1.0"))
     assert general["version"] == 1
     assert re.fullmatch(r"\d+\.\d+\.\d+(\.\d+)?", general["firmwareVersion"])
-    (entry,) = general["metadataTypes"]
+    entry, other = general["metadataTypes"]
+    assert other == {"type": 4, "uri": "mftp:///events.json", "fileCrc": metadata_crc(b"{}")}
     assert entry == {
         "type": 1,
         "uri": "mftp:///parameters.json",

@@ -56,7 +56,7 @@ def test_the_standard_mode_that_is_announced_is_mavlinks(mode: Mode) -> None:
     assert px4.standard == STANDARD.get(mode, 0)
     recovery = dialect.MAV_STANDARD_MODE_SAFE_RECOVERY
     assert px4.also_standard == (recovery if mode is Mode.RETURN else 0)
-    assert px4.selectable is (mode is not Mode.ORBIT)
+    assert px4.selectable is (mode not in (Mode.ORBIT, Mode.DESCEND))
 
 
 @pytest.mark.parametrize("flag", FLAGS)

@@ -185,6 +185,29 @@ def test_a_fault_takes_the_prearm_bit_and_the_suspect_away() -> None:
     assert read_back(stream_of(ids.HEARTBEAT), broken).system_status == 5
 
 
+def test_a_log_that_fails_takes_its_bit_away() -> None:
+    broken = replace(SNAPSHOT, log_failure="flight.ulg ends early")
+    status = read_back(stream_of(ids.SYS_STATUS), broken)
+    lost = status.onboard_control_sensors_present & ~status.onboard_control_sensors_health
+    assert lost == 0x1000000  # MAV_SYS_STATUS_LOGGING
+
+
+@pytest.mark.parametrize(("left", "told"), [(123.4, 123), (math.inf, 0), (0.2, 0)])
+def test_the_flight_time_that_is_left_is_in_seconds_and_0_where_it_is_not_known(
+    left: float, told: int
+) -> None:
+    battery = replace(SNAPSHOT.battery, time_left=left)
+    status = read_back(stream_of(ids.BATTERY_STATUS), replace(SNAPSHOT, battery=battery))
+    assert status.time_remaining == told
+
+
+def test_a_descent_is_a_landing_for_a_ground_station() -> None:
+    down = replace(SNAPSHOT, mode=Mode.DESCEND)
+    assert read_back(stream_of(ids.EXTENDED_SYS_STATE), down).landed_state == 4
+    landing = read_back(stream_of(ids.HEARTBEAT), replace(SNAPSHOT, mode=Mode.LAND))
+    assert read_back(stream_of(ids.HEARTBEAT), down).custom_mode == landing.custom_mode
+
+
 def test_the_fence_is_enabled_where_there_is_one_and_healthy_until_it_is_left() -> None:
     fence = 0x100000
     for margins, enabled, healthy in (((), 0, fence), ((0.1,), fence, fence), ((-0.1,), fence, 0)):
@@ -305,7 +328,9 @@ def test_without_a_home_there_is_no_home_position() -> None:
         ({"mode": Mode.DISARMED, "armed": False}, 29, 3),
         ({"mode": Mode.DISARMED, "armed": False, "arming_refusal": "not armed: why"}, 29, 0),
         ({"mode": Mode.DISARMED, "armed": False, "intended_mode": Mode.OFFBOARD}, 17, 3),
+        ({"mode": Mode.DISARMED, "armed": False, "failures": ("x",)}, 29, 0),
         ({"mode": Mode.HOLD}, 157, 4),
+        ({"mode": Mode.DESCEND, "failsafe_from": Mode.HOLD}, 157, 5),
         ({"mode": Mode.ORBIT}, 157, 4),
         ({"mode": Mode.OFFBOARD}, 145, 4),
         ({"mode": Mode.HOLD, "failsafe_from": Mode.OFFBOARD}, 157, 5),

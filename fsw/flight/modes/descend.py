@@ -1,0 +1,52 @@
+"""Descend: straight down without plans, where nothing else can be flown, until touch-down."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from fsw.flight.land_detector import is_low
+from fsw.flight.modes.base import CONTINUE, FlightMode, ModeResult, Px4Mode, moved
+from fsw.flight.state import FlightState
+from fsw.mpc.reference import still_at
+from fsw.signals import EndEffectorTarget, Mode, StateEstimate
+
+_PRESSING = 0.15  # m that the plan is below the vehicle: more than the loops leave in the air
+_CARRIED = 3.0  # m/s^2 that the accelerometer feels beyond what the rotors give; wind makes 1
+
+
+class Descend(FlightMode):
+    """PX4's DESCEND, which it shows as AUTO.LAND; no command begins it."""
+
+    mode = Mode.DESCEND
+    px4 = Px4Mode(4, 6, selectable=False, offered=False)
+
+    def update(self, state: FlightState, estimate: StateEstimate) -> tuple[FlightState, ModeResult]:
+        """Touch-down: for a while, the ground carries, or the plan sinks and the vehicle does not.
+
+        The height is asked only while it is measured; without, the speed drifts as well.
+        """
+        limits = self.config.limits
+        measured = state.aiding.unaided_us < limits.aiding_loss_us
+        low = is_low(self.config, estimate) or not measured
+        if not (low and (_carried(state, estimate) or self._presses(state, estimate))):
+            return moved(state, estimate), CONTINUE
+        if estimate.t_us - state.vehicle.moved_us < limits.landed_time_us:
+            return state, CONTINUE
+        state = replace(state, vehicle=replace(state.vehicle, landed=True))
+        return state, ModeResult(Mode.DISARMED, "touched down")
+
+    def _presses(self, state: FlightState, estimate: StateEstimate) -> bool:
+        nominal = state.nominal
+        sinks = abs(estimate.v_WB[2]) > 0.5 * self.config.limits.land_speed
+        return not sinks and nominal is not None and nominal.p[2] - estimate.p_WB[2] > _PRESSING
+
+    def reference(self, state: FlightState, t_us: int) -> EndEffectorTarget:
+        """Where it began: the planner, if there is one, is asked for the day it is needed again."""
+        vehicle = state.vehicle
+        return still_at(vehicle.mode_origin, t_us, vehicle.mode_yaw)
+
+
+def _carried(state: FlightState, estimate: StateEstimate) -> bool:
+    """Whether something holds the vehicle up that is not its rotors."""
+    cascade = state.cascade
+    return estimate.specific_force - sum(cascade.rotors) / cascade.mass > _CARRIED

@@ -1,0 +1,1 @@
+"""MAVLink's events interface: what happens, in numbers that a document explains."""

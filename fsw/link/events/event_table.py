@@ -1,0 +1,209 @@
+"""The events of this vehicle, and the document from which a ground station learns what they mean.
+
+An event is a number and the bytes of its arguments. The arming checks follow MAVLink's protocol of
+health and arming checks: a summary, an event for each check that fails, and a summary of health.
+Bits and numbers of health components and modes are PX4's, as clients know them.
+
+Source: https://mavlink.io/en/services/events.html
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+from dataclasses import dataclass
+from functools import cache
+from typing import Any, Final
+
+from fsw.flight.arming import CHECKS, Subject
+from fsw.flight.failsafe import ROWS, Action, Condition
+from fsw.link.wire.px4_mode import custom_mode
+from fsw.signals import ArmingReport, FailsafeEvent, Mode, Severity
+
+ARGUMENTS: Final = 40  # bytes of an event
+_COMPONENT: Final = 1  # of the ids: the autopilot
+_VERSION: Final = 2  # of the document
+_PROTOCOL: Final = 8  # log level of what is for programs and not for people
+_EVERY_MODE: Final = 0xFFFFFFFF
+_SUMMARY, _HEALTH, _BEGUN, _ENDED, _CHECK = 1, 2, 10, 11, 100  # the last: from there on
+
+# PX4's health_component_t: bits, names and what people read.
+_COMPONENTS: Final = {
+    5: ("vision_position", "Pose"),
+    8: ("motors_escs", "Rotors and joints"),
+    11: ("battery", "Battery"),
+    16: ("attitude_estimate", "Attitude"),
+    17: ("local_position_estimate", "Position"),
+    20: ("system", "System"),
+    25: ("storage", "Flight log"),
+    28: ("accel", "Inertial unit and encoders"),
+}
+_BITS: Final = {
+    Subject.ESTIMATOR: 17,
+    Subject.ATTITUDE: 16,
+    Subject.SENSORS: 28,
+    Subject.STANDING: 17,
+    Subject.BATTERY: 11,
+    Subject.PARAMETERS: 20,
+    Subject.SAFE_SET: 20,
+    Subject.JOINTS: 8,
+    Subject.ACTUATORS: 8,
+    Subject.STORAGE: 25,
+}
+_PRESENT: Final = sum(1 << bit for bit in _COMPONENTS)
+# PX4's navigation_mode_group_t: the bit is its number of the mode.
+_MODE_GROUPS: Final = {
+    Mode.MISSION: (3, "mission"),
+    Mode.HOLD: (4, "loiter"),
+    Mode.RETURN: (5, "rtl"),
+    Mode.OFFBOARD: (14, "offboard"),
+    Mode.TAKEOFF: (17, "takeoff"),
+    Mode.LAND: (18, "land"),
+    Mode.ORBIT: (21, "orbit"),
+    Mode.TRAJECTORY: (23, "external1"),
+}
+# PX4's failsafe_action_t; behind its ten, ours.
+_ACTIONS: Final = {
+    Action.NONE: 0,
+    Action.WARN: 1,
+    Action.HOLD: 5,
+    Action.RETURN: 6,
+    Action.LAND: 7,
+    Action.DESCEND: 8,
+    Action.TERMINATE: 10,
+    **{
+        action: 20 + k
+        for k, action in enumerate(
+            (Action.REPLAN, Action.PUSH, Action.DEAD_RECKON, Action.BRAKE, Action.RETREAT)
+        )
+    },
+}
+_CONDITIONS: Final = {condition: number for number, condition in enumerate(Condition)}
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """One event as it goes out."""
+
+    id: int
+    severity: int  # log level for people
+    arguments: bytes  # at most ARGUMENTS
+
+
+def arming_events(report: ArmingReport) -> tuple[Event, ...]:
+    """The arming checks and the health: a summary, the checks that fail, and another summary."""
+    errors = 0
+    for number in report.failed:
+        errors |= 1 << _BITS[CHECKS[number].subject]
+    can_arm = 0 if report.failed else _EVERY_MODE
+    summary = struct.pack("<BIIII", 0, errors, 0, can_arm, _EVERY_MODE)
+    checks = [
+        _event(
+            _CHECK + number,
+            Severity.CRITICAL,
+            struct.pack("<IB", _EVERY_MODE, _BITS[CHECKS[number].subject]),
+        )
+        for number in report.failed
+    ]
+    health = struct.pack("<BIII", 0, _PRESENT, errors, 0)
+    return (_event(_SUMMARY, _PROTOCOL, summary), *checks, _event(_HEALTH, _PROTOCOL, health))
+
+
+def failsafe_event(event: FailsafeEvent) -> Event:
+    """A condition that has begun, with what is done about it, or one that is over."""
+    condition = _CONDITIONS[Condition(event.condition)]
+    if event.over:
+        return _event(_ENDED, event.severity, struct.pack("<B", condition))
+    action = _ACTIONS[Action(event.action)]
+    return _event(_BEGUN, event.severity, struct.pack("<BB", condition, action))
+
+
+def _event(number: int, severity: int, arguments: bytes) -> Event:
+    return Event(_COMPONENT << 24 | number, int(severity), arguments)
+
+
+@cache
+def event_document() -> bytes:
+    """The document about all events, as JSON."""
+    modes = _argument("uint32_t", "modes", enum="navigation_mode_group_t")
+    component = _argument("uint8_t", "component")
+    health = "health_component_t"
+    checks = {
+        str(_CHECK + number): {
+            "name": f"check_{number}_{check.subject.name.lower()}",
+            "message": check.summary,
+            "arguments": [modes, component],
+        }
+        for number, check in enumerate(CHECKS)
+    }
+    arming = {
+        "name": "arming_check_summary",
+        "message": "Arming checks",
+        "type": "summary",
+        "arguments": [
+            _argument("uint8_t", "chunk_idx"),
+            *(_argument("", name, enum=health) for name in ("error", "warning")),
+            *(
+                _argument("", name, enum="navigation_mode_group_t")
+                for name in ("can_arm", "can_run")
+            ),
+        ],
+    }
+    healthy = {
+        "name": "health_summary",
+        "message": "Health",
+        "type": "summary",
+        "arguments": [
+            _argument("uint8_t", "chunk_idx"),
+            *(_argument("", name, enum=health) for name in ("is_present", "error", "warning")),
+        ],
+    }
+    condition = _argument("", "condition", enum="condition_t")
+    begun = {
+        "name": "failsafe",
+        "message": "{1}: {2}",
+        "arguments": [condition, _argument("", "action", enum="failsafe_action_t")],
+    }
+    over = {"name": "failsafe_over", "message": "Over: {1}", "arguments": [condition]}
+    described = {
+        "namespace": "pandion",
+        "enums": _enumerations(),
+        "event_groups": {
+            "arming_check": {"events": {str(_SUMMARY): arming, **checks}},
+            "health": {"events": {str(_HEALTH): healthy}},
+            "default": {"events": {str(_BEGUN): begun, str(_ENDED): over}},
+        },
+        "supported_protocols": ["health_and_arming_check"],
+        "navigation_mode_groups": {
+            "groups": {str(bit): [custom_mode(mode)] for mode, (bit, _) in _MODE_GROUPS.items()}
+        },
+    }
+    document = {"version": _VERSION, "components": {str(_COMPONENT): described}}
+    return json.dumps(document, separators=(",", ":")).encode()
+
+
+def _argument(kind: str, name: str, enum: str = "") -> dict[str, str]:
+    return {"type": enum or kind, "name": name}
+
+
+def _enumerations() -> dict[str, Any]:
+    conditions = {_CONDITIONS[row]: (row.name.lower(), row.value) for row in ROWS}
+    actions = {number: (action.name.lower(), action.value) for action, number in _ACTIONS.items()}
+    groups = {1 << bit: (name, name) for bit, name in _MODE_GROUPS.values()}
+    components = {1 << bit: names for bit, names in _COMPONENTS.items()}
+    return {
+        "health_component_t": _enumeration("uint32_t", components, bitfield=True),
+        "navigation_mode_group_t": _enumeration("uint32_t", groups, bitfield=True),
+        "condition_t": _enumeration("uint8_t", conditions),
+        "failsafe_action_t": _enumeration("uint8_t", actions),
+    }
+
+
+def _enumeration(
+    kind: str, entries: dict[int, tuple[str, str]], *, bitfield: bool = False
+) -> dict[str, Any]:
+    described = {
+        str(number): {"name": name, "description": text}
+        for number, (name, text) in sorted(entries.items())
+    }
+    return {"type": kind, "is_bitfield": bitfield, "entries": described}

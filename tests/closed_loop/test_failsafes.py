@@ -1,0 +1,69 @@
+"""Flights that end in a failsafe: without a planner, and without a position."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from fsw.measurements import PoseSample
+from fsw.parameters.flight_config import flight_config
+from fsw.signals import Mode
+from sitl.scenario_file import load_scenario
+from tests.closed_loop.harness import ARM, SET_MODE, Flight, command, hover, real_planner
+from tests.closed_loop.test_lost_sensors import NOTHING, lies
+from tests.closed_loop.test_real_sensors import changed
+from tests.closed_loop.test_when_things_go_wrong import FailsFrom
+
+FOR_GOOD = 10**6
+LONGEST_S = 40
+
+
+def to_the_ground(flight: Flight) -> float:
+    """Fly until the vehicle has disarmed itself; how fast it was on the way down [m/s]."""
+    fastest = 0.0
+    while flight.mode is not Mode.DISARMED or flight.sim.step < 10:
+        flight.step()
+        assert flight.sim.ended is None, flight.sim.ended
+        assert flight.sim.step < LONGEST_S * 500, flight.texts
+        if flight.mode is Mode.DESCEND:
+            fastest = max(fastest, flight.sim.truth().v_WB[2])
+    assert flight.modes[-2:] == [Mode.DESCEND, Mode.DISARMED]
+    assert flight.texts[-1] == "descend to disarmed: touched down"
+    return fastest
+
+
+@pytest.mark.long
+def test_a_vehicle_whose_planner_is_lost_descends_where_it_is() -> None:
+    config = flight_config(body="points")
+    flight = Flight(hover(), config=config, planner=FailsFrom(real_planner(config), 20))
+    flight.step(command(ARM, 1.0))
+    flight.run(8.0)
+    assert flight.mode is Mode.DESCEND
+    here = flight.sim.truth().p_WB
+    flight.step(command(SET_MODE, 1.0, 4.0, 3.0))
+    assert flight.texts[-1] == "no hold: planner lost; the vehicle descends"
+    assert to_the_ground(flight) < 0.35
+    assert math.dist(flight.sim.truth().p_WB[:2], here[:2]) < 0.02
+    assert sum("planner lost" in text and "descending" in text for text in flight.texts) == 1
+
+
+@pytest.mark.long
+def test_a_vehicle_without_a_position_descends_where_it_is() -> None:
+    flight = Flight(hover(), spoil=lies(FOR_GOOD, 500, p_WB=NOTHING))
+    flight.step(command(ARM, 1.0))
+    assert to_the_ground(flight) < 0.35
+    assert math.hypot(*flight.sim.truth().p_WB[:2]) < 0.3
+    assert any("position unknown" in text and "descending" in text for text in flight.texts)
+
+
+@pytest.mark.long
+def test_a_vehicle_that_drifts_feels_the_ground_though_its_height_has_drifted() -> None:
+    spoil = changed(PoseSample, 3.0, 999.0, lambda _: None)
+    scenario = replace(load_scenario("walls", "mocap"), duration_s=60.0)
+    flight = Flight(scenario, spoil_samples=spoil)
+    flight.follow()
+    assert to_the_ground(flight) < 0.6
+    assert math.dist(flight.snapshot.estimate.p_WB, flight.sim.truth().p_WB) > 0.3
+    assert not any("pushed off" in text for text in flight.texts), "zones are not where they seem"

@@ -1,0 +1,112 @@
+"""A descent needs neither plan nor position, and ends where the ground carries."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from fsw.flight.descent import Descent
+from fsw.flight.modes.descend import Descend
+from fsw.flight.plan_exchange import nominal_at_rest
+from fsw.flight.state import Aiding, FlightState
+from fsw.signals import Mode, StateEstimate, Vec3
+from tests.fsw.flight.in_flight import CONFIG, GROUND_Z, flying, vehicle_at
+
+DESCENT, MODE = Descent(CONFIG), Descend(CONFIG)
+HIGH: Vec3 = (1.0, 2.0, -5.0)
+HERE = vehicle_at(HIGH)
+AIDED = Aiding()
+BLIND = Aiding(unaided_us=10**6, velocity_sigma=0.5)
+LOST = BLIND._replace(velocity_sigma=1.1)
+LIMITS = CONFIG.limits
+
+
+def descended(seconds: float, aiding: Aiding, v: Vec3, estimate: StateEstimate) -> Vec3:
+    """The velocity of the plan's state after some seconds from ``v``."""
+    nominal = nominal_at_rest(estimate)._replace(v=v)
+    for _ in range(round(seconds / 0.002)):
+        nominal, _ = DESCENT.step(nominal, estimate, aiding, 1)
+    return nominal.v
+
+
+@pytest.mark.parametrize("aiding", [AIDED, BLIND])
+def test_it_brakes_across_and_sinks_at_the_speed_of_landing(aiding: Aiding) -> None:
+    vx, vy, vz = descended(4.0, aiding, (0.5, -0.3, -0.2), HERE)
+    assert math.hypot(vx, vy) < 0.01
+    assert vz == pytest.approx(LIMITS.land_speed, abs=1e-3)
+
+
+def test_a_place_that_is_measured_is_held_and_one_that_is_not_is_not() -> None:
+    nominal = nominal_at_rest(HERE)
+    adrift = vehicle_at((1.3, 1.9, -5.0), (0.2, 0.0, 0.0))
+    held, _ = DESCENT.step(nominal, adrift, AIDED, 1)
+    assert held.p[:2] == (1.0, 2.0)
+    free, _ = DESCENT.step(nominal, adrift, BLIND, 1)
+    assert free.p[:2] == (1.3, 1.9)
+    assert free.v[:2] == (0.0, 0.0), "it brakes"
+    level, u = DESCENT.step(nominal, adrift, LOST, 1)
+    assert (level.v[:2], level.a[:2]) == ((0.2, 0.0), (0.0, 0.0)), "nothing pulls it"
+    assert max(map(abs, u.a[:2])) < 5.0
+
+
+def test_missed_ticks_are_made_up_for() -> None:
+    nominal = nominal_at_rest(HERE)
+    three, _ = DESCENT.step(nominal, HERE, AIDED, 3)
+    for _ in range(3):
+        nominal, _ = DESCENT.step(nominal, HERE, AIDED, 1)
+    assert nominal.p == pytest.approx(three.p)
+
+
+# ---------------------------------------------------------------- touch-down
+
+THERE = (0.0, 0.0, GROUND_Z)
+WEIGHT = 9.81
+
+
+def touching(
+    height: float = 0.0,
+    speed: float = 0.0,
+    lead: float = 0.0,
+    thrust: float = WEIGHT,
+    aiding: Aiding = AIDED,
+) -> tuple[FlightState, StateEstimate]:
+    """Low, with the plan ``lead`` [m] below and rotors that give ``thrust`` [m/s^2]."""
+    estimate = vehicle_at((0.0, 0.0, GROUND_Z - height), (0.0, 0.0, speed))
+    state = replace(flying(Mode.DESCEND), aiding=aiding)
+    nominal = nominal_at_rest(estimate)._replace(p=(0.0, 0.0, estimate.p_WB[2] + lead))
+    mass = state.cascade.mass
+    cascade = state.cascade._replace(rotors=(0.25 * thrust * mass,) * 4)
+    return replace(state, nominal=nominal, cascade=cascade), estimate
+
+
+def ends(state: FlightState, estimate: StateEstimate) -> bool:
+    """Whether it is over after the time that a touch-down takes, and not before."""
+    for t_us in (1000, 1000 + LIMITS.landed_time_us - 1):
+        state, result = MODE.update(state, estimate._replace(t_us=t_us))
+        if result.next_mode is not None:
+            return False
+    later = estimate._replace(t_us=1000 + 2 * LIMITS.landed_time_us)
+    state, result = MODE.update(state, later)
+    return result.next_mode is Mode.DISARMED and state.vehicle.landed
+
+
+@pytest.mark.parametrize(
+    ("about", "touches"),
+    [
+        ({}, False),  # a hover
+        ({"lead": 0.16}, True),
+        ({"lead": 0.16, "speed": 0.2}, False),  # it sinks
+        ({"lead": 0.14}, False),
+        ({"thrust": 6.0}, True),  # the ground carries
+        ({"thrust": 7.0}, False),  # so does a gust
+        ({"thrust": 6.0, "height": 2.0}, False),  # not as high as this
+        ({"thrust": 6.0, "height": 2.0, "speed": -0.5, "aiding": BLIND}, True),  # heights drift
+        ({"lead": 0.16, "height": 2.0, "aiding": BLIND}, True),
+    ],
+)
+def test_a_touch_down_is_felt(about: dict[str, float], touches: bool) -> None:
+    state, estimate = touching(**about)  # type: ignore[arg-type]
+    moving = replace(state, vehicle=replace(state.vehicle, moved_us=1000))
+    assert ends(moving, estimate) is touches

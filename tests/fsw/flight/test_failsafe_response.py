@@ -1,0 +1,359 @@
+"""The strongest action wins, once; a pilot's command puts it aside; what ends is told."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fsw.estimation.sensor_fault import Sensor
+from fsw.flight.commander import Commander
+from fsw.flight.failsafe import FAILSAFES, ROWS, Action, Condition, FailsafeContext, allowed
+from fsw.flight.state import Aiding, Damage, FlightState, OffboardMemory, PlanMemory, SafetyMemory
+from fsw.parameters.flight_config import FlightConfig
+from fsw.signals import (
+    BatteryState,
+    Charge,
+    Command,
+    CommandAction,
+    CommandRequest,
+    CommandResult,
+    GoTo,
+    HostHealth,
+    Mode,
+    Place,
+    StatusText,
+    SwitchMode,
+    Vec3,
+)
+from tests.fsw.flight.in_flight import CONFIG, flying, limits, vehicle_at
+
+NUMBERS = itertools.count()
+HERE: Vec3 = (1.0, 2.0, -3.0)
+SECOND = 1_000_000
+ADRIFT = Aiding(unaided_us=2 * SECOND, position_sigma=0.6)
+ONLY_HOLD = limits(station_loss_action=1)
+AT_ONCE = limits(failsafe_delay_us=0)
+
+
+def mode_of(state: FlightState) -> tuple[Mode, Mode | None]:
+    return state.vehicle.mode, state.vehicle.failsafe_from
+
+
+@dataclass
+class Watched:
+    """A vehicle in the air that nothing moves, watched once a planning period."""
+
+    config: FlightConfig = CONFIG
+    state: FlightState = field(default_factory=lambda: flying(Mode.MISSION, gcs_heard_us=0))
+    now_us: int = 0
+    texts: list[str] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.commander = Commander(self.config)
+
+    def until(self, seconds: float, **changes: Any) -> Watched:
+        """Watch until a time, with changes of the state from now on."""
+        self.state = replace(self.state, **changes)
+        while self.now_us < seconds * SECOND:
+            self.now_us += 100_000
+            estimate = vehicle_at(HERE, t_us=self.now_us)
+            self.state = replace(self.state, plan=PlanMemory(since_us=self.now_us))
+            said: list[StatusText] = []
+            self.state = self.commander.check_failsafes(self.state, estimate, said)
+            self.state = replace(self.state, t_us=self.now_us)
+            self.texts += [text.text for text in said]
+        return self
+
+    def heard(self) -> Watched:
+        """A ground station is there again."""
+        vehicle = replace(self.state.vehicle, gcs_heard_us=self.now_us)
+        self.state = replace(self.state, vehicle=vehicle)
+        return self
+
+    def told(self, action: CommandAction) -> CommandResult:
+        """A command of the pilot."""
+        said: list[StatusText] = []
+        request = CommandRequest(next(NUMBERS), (math.nan,) * 7, 255, 190)
+        estimate = vehicle_at(HERE, t_us=self.now_us)
+        self.state, acks = self.commander.handle_commands(
+            self.state, estimate, (Command(action, request),), said
+        )
+        self.texts += [text.text for text in said]
+        return CommandResult(acks[0].result)
+
+    def mode(self, mode: Mode) -> Watched:
+        """Fly in a mode, as if the last one were done."""
+        self.state = replace(self.state, vehicle=replace(self.state.vehicle, mode=mode))
+        return self
+
+    @property
+    def flown(self) -> tuple[Mode, Mode | None]:
+        return mode_of(self.state)
+
+
+COMMANDER = Commander(CONFIG)
+
+
+def charge(level: Charge) -> BatteryState:
+    return BatteryState(remaining=0.04, charge=level)
+
+
+def test_a_station_lost_in_a_mission_holds_for_a_while_and_returns_and_is_told_twice() -> None:
+    watched = Watched().until(9.9)
+    assert watched.flown == (Mode.MISSION, None)
+    assert watched.until(10.0).flown == (Mode.HOLD, Mode.MISSION)
+    assert watched.until(14.9).flown == (Mode.HOLD, Mode.MISSION)
+    assert watched.until(15.0).flown == (Mode.RETURN, Mode.MISSION)
+    watched.until(100.0)
+    assert watched.texts == [
+        "failsafe: no ground station for 10 s, returning in 5 s",
+        "mission to hold: failsafe",
+        "failsafe: no ground station for 15 s, returning",
+        "hold to return: failsafe",
+    ]
+
+
+def test_a_station_lost_in_a_mission_that_is_exempt_is_acted_on_when_the_mission_ends() -> None:
+    exempt = limits(station_loss_exceptions=1, failsafe_delay_us=0)
+    watched = Watched(exempt).until(30.0)
+    assert watched.flown == (Mode.MISSION, None)
+    assert watched.mode(Mode.HOLD).until(30.1).flown == (Mode.RETURN, Mode.HOLD)
+
+
+def test_a_station_that_comes_back_within_the_delay_leaves_the_vehicle_in_hold() -> None:
+    watched = Watched().until(12.0).heard().until(14.0)
+    assert watched.texts[-1] == "over: no ground station, after 2.1 s"
+    assert watched.heard().until(20.0).flown == (Mode.HOLD, Mode.MISSION)
+    assert watched.until(24.0).flown == (Mode.HOLD, Mode.MISSION), "lost anew: the delay is anew"
+    assert watched.until(29.0).flown == (Mode.RETURN, Mode.MISSION)
+
+
+def test_what_ended_is_told_once_and_the_mode_stays() -> None:
+    watched = Watched(AT_ONCE).until(12.0)
+    assert watched.flown == (Mode.RETURN, Mode.MISSION)
+    watched.heard().until(13.0)
+    assert watched.texts[-1] == "over: no ground station, after 2.1 s"
+    count = len(watched.texts)
+    assert watched.until(21.0).flown == (Mode.RETURN, Mode.MISSION)
+    assert len(watched.texts) == count
+
+
+def test_the_strongest_wins_and_a_milder_one_never_takes_over() -> None:
+    watched = Watched(AT_ONCE).until(11.0, battery=charge(Charge.EMERGENCY))
+    assert watched.flown == (Mode.LAND, Mode.MISSION)
+    assert any("battery nearly empty: 4 % left, landing" in text for text in watched.texts)
+    assert "no ground station for 10 s" in watched.texts, "told, and not acted upon"
+    watched = Watched(AT_ONCE).until(11.0)
+    assert watched.until(12.0, battery=charge(Charge.CRITICAL)).flown[0] is Mode.RETURN
+    assert watched.until(13.0, battery=charge(Charge.EMERGENCY)).flown[0] is Mode.LAND
+
+
+def test_a_stronger_condition_shortens_no_delay_but_one_that_cannot_wait_does() -> None:
+    watched = Watched().until(12.0)
+    watched.until(13.0, battery=charge(Charge.EMERGENCY))
+    assert watched.flown == (Mode.HOLD, Mode.MISSION)
+    assert watched.until(15.0).flown == (Mode.LAND, Mode.MISSION)
+    watched = Watched().until(12.0).until(12.1, aiding=ADRIFT)
+    assert watched.flown == (Mode.DESCEND, Mode.MISSION)
+
+
+def test_an_action_that_holds_waits_for_nothing() -> None:
+    assert Watched(ONLY_HOLD).until(10.0).flown == (Mode.HOLD, Mode.MISSION)
+    assert Watched(ONLY_HOLD).until(100.0).texts == [
+        "failsafe: no ground station for 10 s, holding",
+        "mission to hold: failsafe",
+    ]
+
+
+@pytest.mark.parametrize("config", [CONFIG, AT_ONCE])
+def test_a_pilot_takes_over_and_the_condition_acts_again_only_after_it_has_ended(
+    config: FlightConfig,
+) -> None:
+    watched = Watched(config).until(12.0)
+    assert watched.told(SwitchMode(Mode.HOLD)) == CommandResult.ACCEPTED
+    assert "failsafe overridden: no ground station" in watched.texts
+    assert watched.flown == (Mode.HOLD, None)
+    assert watched.until(40.0).flown == (Mode.HOLD, None)
+    assert watched.until(41.0, battery=charge(Charge.CRITICAL)).flown[1] is Mode.HOLD, "another one"
+    assert watched.told(SwitchMode(Mode.HOLD)) == CommandResult.ACCEPTED
+    watched.heard().until(42.0)
+    assert watched.until(60.0).flown == (Mode.RETURN, Mode.HOLD)
+
+
+def test_a_place_to_go_to_is_a_command_as_well() -> None:
+    watched = Watched().until(12.0)
+    there = GoTo(Place((3.0, 3.0), 3.0))
+    assert watched.told(there) == CommandResult.ACCEPTED
+    assert watched.until(30.0).flown == (Mode.HOLD, None)
+
+
+def test_without_a_position_no_mode_is_accepted_until_there_is_one_again() -> None:
+    watched = Watched().until(1.0, aiding=ADRIFT)
+    assert watched.flown == (Mode.DESCEND, Mode.MISSION)
+    for mode in (Mode.HOLD, Mode.LAND, Mode.RETURN):
+        assert watched.told(SwitchMode(mode)) == CommandResult.TEMPORARILY_REJECTED
+        assert watched.texts[-1] == f"no {mode.value}: position unknown; the vehicle descends"
+    watched.until(2.0, aiding=Aiding())
+    assert watched.flown == (Mode.DESCEND, Mode.MISSION), "it is the pilot's to change"
+    assert watched.told(SwitchMode(Mode.HOLD)) == CommandResult.ACCEPTED
+    assert watched.flown == (Mode.HOLD, None)
+
+
+OUTSIDE = SafetyMemory(breach_us=0, breach_by=0.01)
+
+
+def test_a_vehicle_that_is_pushed_out_again_retreats_again() -> None:
+    watched = Watched().until(1.0, safety=OUTSIDE)
+    assert watched.flown == (Mode.HOLD, Mode.MISSION)
+    watched.until(2.0, safety=SafetyMemory()).until(3.0, safety=OUTSIDE)
+    assert sum("retreating" in text for text in watched.texts) == 2
+
+
+def test_a_vehicle_that_has_returned_and_holds_does_not_return_again_but_acts_on_what_is_new() -> (
+    None
+):
+    watched = Watched(AT_ONCE).until(12.0)
+    assert watched.flown == (Mode.RETURN, Mode.MISSION)
+    watched.mode(Mode.HOLD).until(60.0)
+    assert watched.flown == (Mode.HOLD, Mode.MISSION), "it is home, and the station still lost"
+    watched.until(61.0, safety=OUTSIDE)
+    assert "failsafe: outside the safe set by 10 mm, retreating" in watched.texts
+    watched.until(62.0, battery=charge(Charge.CRITICAL))
+    assert watched.flown == (Mode.RETURN, Mode.MISSION)
+
+
+@given(
+    st.lists(
+        st.tuples(
+            st.sampled_from([Charge.OK, Charge.LOW, Charge.CRITICAL, Charge.EMERGENCY]),
+            st.booleans(),
+            st.booleans(),
+            st.booleans(),
+        ),
+        max_size=8,
+    )
+)
+@settings(max_examples=25, deadline=None)
+def test_without_a_pilot_a_vehicle_never_goes_on_with_what_a_failsafe_ended(
+    happens: list[tuple[Charge, bool, bool, bool]],
+) -> None:
+    """Whatever begins and ends: what was flown is left once and not taken up again."""
+    watched, left = Watched(limits(failsafe_delay_us=200_000)), False
+    last = Mode.MISSION
+    for second, (level, heard, lost, outside) in enumerate(happens, start=1):
+        if heard:
+            watched.heard()
+        watched.until(
+            6.0 * second,
+            battery=charge(level),
+            aiding=ADRIFT if lost else Aiding(),
+            safety=OUTSIDE if outside else SafetyMemory(),
+        )
+        mode = watched.flown[0]
+        left = left or mode is not Mode.MISSION
+        assert not (left and mode is Mode.MISSION)
+        order = [Mode.MISSION, Mode.HOLD, Mode.RETURN, Mode.LAND, Mode.DESCEND]
+        assert order.index(mode) >= order.index(last), "nothing milder takes over"
+        last = mode
+
+
+def test_a_landing_goes_on_but_for_what_cannot_be_landed_with() -> None:
+    lost = Watched(AT_ONCE, flying(Mode.LAND, gcs_heard_us=0)).until(20.0)
+    assert lost.flown == (Mode.LAND, None)
+    assert lost.until(21.0, aiding=ADRIFT).flown == (Mode.DESCEND, Mode.LAND)
+
+
+@pytest.mark.parametrize("mode", [Mode.HOLD, Mode.RETURN, Mode.LAND, Mode.DESCEND])
+@pytest.mark.parametrize("action", Action)
+def test_what_is_under_way_is_not_begun_again_and_nothing_begins_on_the_ground(
+    action: Action, mode: Mode
+) -> None:
+    done = {
+        Mode.HOLD: set(),
+        Mode.RETURN: {Action.RETURN},
+        Mode.LAND: {Action.HOLD, Action.RETREAT, Action.RETURN, Action.LAND},
+        Mode.DESCEND: {Action.HOLD, Action.RETREAT, Action.RETURN, Action.LAND, Action.DESCEND},
+    }
+    expected = Action.WARN if action in done[mode] else action
+    assert allowed(action, mode, flies=True) is expected
+    on_the_ground = allowed(action, mode, flies=False)
+    assert on_the_ground is (Action.WARN if action.mode is not None else action)
+
+
+def test_setpoints_that_stop_hold_at_once_and_are_told_when_they_come_again() -> None:
+    watched = Watched(state=flying(Mode.OFFBOARD))
+    watched.until(3.0)
+    assert watched.flown == (Mode.HOLD, Mode.OFFBOARD)
+    vehicle_holds = Condition.SETPOINTS_LOST in watched.state.vehicle.conditions
+    assert vehicle_holds, "it stays lost"
+    watched.until(4.0, offboard=OffboardMemory(motion_us=10 * SECOND))
+    assert watched.texts[-1] == "over: offboard setpoints stopped, after 3.0 s"
+    assert watched.flown == (Mode.HOLD, Mode.OFFBOARD)
+
+
+def test_landing_or_disarming_ends_a_failsafe() -> None:
+    watched = Watched(AT_ONCE).until(11.0)
+    assert watched.state.vehicle.failsafe.action is Action.RETURN
+    vehicle = replace(watched.state.vehicle, mode=Mode.LAND, landed=True)
+    state = replace(watched.state, vehicle=vehicle, nominal=None)
+    estimate = vehicle_at((0.0, 0.0, -CONFIG.airframe.leg_length), t_us=watched.now_us)
+    for _ in range(2):
+        state = watched.commander.check_mode_completion(state, estimate, [])
+        estimate = estimate._replace(t_us=estimate.t_us + SECOND)
+    assert mode_of(state) == (Mode.DISARMED, None)
+    assert state.vehicle.failsafe.action is Action.NONE
+
+
+HAPPENS: dict[Condition, dict[str, Any]] = {
+    Condition.ATTITUDE_LOST: {"aiding": Aiding(attitude_sigma=0.8)},
+    Condition.TILT_LOST: {"safety": SafetyMemory(rolled_us=0)},
+    Condition.POSITION_LOST: {"aiding": ADRIFT},
+    Condition.BREACH: {"safety": OUTSIDE},
+    Condition.FENCE_BREACH: {"safety": replace(OUTSIDE, breach_of_fence=True)},
+    Condition.ROTOR_FAILED: {"damage": Damage(rotor="rotor 2")},
+    Condition.JOINT_FAILED: {"damage": Damage(joint="joint 1")},
+    Condition.POSITION_LOW: {"aiding": ADRIFT},
+    Condition.SENSOR_LOST: {"aiding": Aiding(sensor=Sensor.IMU)},
+    Condition.TUBE_LEFT: {"safety": SafetyMemory(off_plan_us=0)},
+    Condition.FILTER_ACTIVE: {"safety": SafetyMemory(filter_us=0)},
+    Condition.AIDING_LOST: {"aiding": ADRIFT},
+    Condition.ESTIMATE_INVALID: {"invalid_ticks": 5},
+    Condition.OUTPUT_NOT_FINITE: {"output_replaced": True},
+    Condition.LOOP_OVERRUN: {"host": HostHealth(missed_ticks=100)},
+    Condition.CLOCK_JUMPED: {"host": HostHealth(clock_jump_us=10**6)},
+    Condition.LINK_FLOODED: {"host": HostHealth(datagrams=10**4)},
+    Condition.LOG_STOPPED: {"host": HostHealth(log_failure="flight.ulg ends early")},
+    Condition.DISK_FULL: {"host": HostHealth(disk_left_us=0)},
+    Condition.BATTERY_LOW: {"battery": charge(Charge.LOW)},
+    Condition.BATTERY_CRITICAL: {"battery": charge(Charge.CRITICAL)},
+    Condition.BATTERY_EMERGENCY: {"battery": charge(Charge.EMERGENCY)},
+    Condition.FLIGHT_TIME_LOW: {"battery": BatteryState(time_left=1.0)},
+}
+
+
+@pytest.mark.parametrize("condition", HAPPENS, ids=lambda condition: condition.name)
+def test_a_condition_is_told_within_the_time_of_its_row(condition: Condition) -> None:
+    begin_us = 10 * SECOND + 2_000  # just after a planning period has begun
+    state = replace(flying(Mode.MISSION), t_us=begin_us - 2_000, **HAPPENS[condition])
+    state = replace(state, plan=PlanMemory(since_us=begin_us))
+    for t_us in range(begin_us, begin_us + SECOND, 2_000):
+        said: list[StatusText] = []
+        state = COMMANDER.check_failsafes(state, vehicle_at(HERE, t_us=t_us), said)
+        state = replace(state, t_us=t_us, plan=PlanMemory(since_us=t_us))
+        if any(text.text.removeprefix("failsafe: ").startswith(condition.value) for text in said):
+            break
+    assert t_us - begin_us <= ROWS[condition].within_us
+
+
+def test_no_row_is_silent_in_flight() -> None:
+    """What is not acted upon is told at least: no default is a quiet one."""
+    estimate = vehicle_at(HERE, t_us=20 * SECOND)
+    context = FailsafeContext(flying(Mode.MISSION, gcs_heard_us=0), estimate, CONFIG)
+    for row in FAILSAFES:
+        assert row.action(context) is not Action.NONE, row.condition

@@ -1,0 +1,39 @@
+"""Pairs of parameters that contradict each other are named, and refused before they fly."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from fsw.flight.tuned_autopilot import TunedAutopilot
+from fsw.parameters.contradictions import contradictions
+from fsw.parameters.flight_config import FlightConfig, flight_config
+
+CONFIG = flight_config(body="points")
+
+
+def test_the_defaults_do_not_contradict_each_other() -> None:
+    assert contradictions(FlightConfig()) == ()
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"battery_low": 0.09}, "BAT_CRIT_THR 0.1 is to be below BAT_LOW_THR, 0.09"),
+        ({"battery_low": 0.1}, "BAT_CRIT_THR 0.1 is to be below BAT_LOW_THR, 0.1"),
+        ({"battery_emergency": 0.1}, "BAT_EMERGEN_THR 0.1 is to be below BAT_CRIT_THR, 0.1"),
+        ({"position_low": 0.6}, "COM_POS_LOW_EPH 0.6 is to be at most COM_POS_FS_EPH, 0.5"),
+        ({"takeoff_climb_most": 0.9}, "MIS_TAKEOFF_ALT 1 is to be at most TKO_CLIMB_MAX, 0.9"),
+        ({"landed_height": 0.4}, "LND_HEIGHT 0.4 is to be at most LND_AIRBORNE, 0.3"),
+    ],
+)
+def test_a_contradiction_is_a_sentence_with_both_names(
+    changes: dict[str, float], words: str
+) -> None:
+    config = replace(CONFIG, limits=replace(CONFIG.limits, **changes))  # type: ignore[arg-type]
+    assert contradictions(config) == (words,)
+    tuning = tuple((f"limits.{name}", value) for name, value in changes.items())
+    with pytest.raises(ValueError, match=words):
+        TunedAutopilot(CONFIG).prepare(tuning)
+    assert contradictions(replace(config, limits=replace(CONFIG.limits, position_low=0.5))) == ()
