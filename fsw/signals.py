@@ -250,6 +250,7 @@ class CommandResult(IntEnum):
     DENIED = 2
     UNSUPPORTED = 3
     FAILED = 4
+    IN_PROGRESS = 5  # another one answers
 
 
 @dataclass(frozen=True, slots=True)
@@ -355,6 +356,15 @@ class SetMissionStep:
     reset: bool = False
 
 
+@dataclass(frozen=True, slots=True)
+class InjectFailure:
+    """Let a unit of the simulated vehicle fail, or work again; the simulator knows which."""
+
+    unit: int  # FAILURE_UNIT
+    kind: int  # FAILURE_TYPE
+    instance: int  # 0: all
+
+
 class Order(Enum):
     """Commands without parameters."""
 
@@ -386,6 +396,7 @@ CommandAction = (
     | SetHome
     | StartMission
     | SetMissionStep
+    | InjectFailure
     | Order
     | Rejected
 )
@@ -679,7 +690,7 @@ class Charge(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class BatteryState:
-    """What a model of the battery says, for there is no sensor."""
+    """What a model of the battery says, corrected by what is measured of it, if anything is."""
 
     voltage: float = 16.8  # V
     current: float = 0.0  # A
@@ -823,6 +834,14 @@ class HostHealth:
 
 
 @dataclass(frozen=True, slots=True)
+class BatteryReading:
+    """What a battery's sensor says."""
+
+    voltage: float  # V, under load
+    remaining: float  # share of the capacity
+
+
+@dataclass(frozen=True, slots=True)
 class TickInputs:
     """Everything one tick may look at."""
 
@@ -842,6 +861,7 @@ class TickInputs:
     stale_us: int = 0  # how much older the sensors' readings are, where no newer ones had come
     # What sensors with times of their own measured; with any, the frame gives the time alone.
     samples: tuple[Sample, ...] = ()
+    battery: BatteryReading | None = None  # newly measured
     host: HostHealth | None = None  # where it differs from the last one
 
 

@@ -24,6 +24,10 @@ VERBS: Final[dict[str, tuple[str, str]]] = {
         "pandion.falsify",
         "search for the disturbance that pushes the vehicle furthest off its plan",
     ),
+    "faults": (
+        "pandion.faults",
+        "let something fail in flight, in one mode or in all, and compare with what must happen",
+    ),
     "param": (
         "pandion.param",
         "list, set, import and export the parameters of a vehicle or a file",

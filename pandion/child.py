@@ -77,6 +77,11 @@ class Child:
         return [event for line in lines if (event := _event(line)) is not None]
 
     @property
+    def pid(self) -> int:
+        """Its number, which stays its own until it has been waited for."""
+        return self._process.pid
+
+    @property
     def exit_code(self) -> int | None:
         """None while it runs; negative if a signal ended it."""
         return self._process.poll()

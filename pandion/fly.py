@@ -23,7 +23,13 @@ from pandion.result import FlightReports, as_json, table_rows
 from pandion.supervisor import Flown, ProcessFailed, Supervisor
 from sitl.arguments import RunOptions, SitlOptions
 from sitl.earth import Place
-from sitl.scenario_file import ScenarioError, load_scenario, scenario_digest, suite_of
+from sitl.scenario_file import (
+    ScenarioError,
+    check_pacing,
+    load_scenario,
+    scenario_digest,
+    suite_of,
+)
 
 COMPLETED, NOT_COMPLETED = 0, 1  # exit codes
 # The flight software compiles when it is started for the first time; the supervisor ends the wait
@@ -85,6 +91,7 @@ def planned(options: FlyOptions) -> PlannedFlight:
         OSError: The directory for the logs cannot be made.
     """
     scenario = load_scenario(options.scenario, options.sensors)
+    check_pacing(scenario, realtime=options.realtime)
     addresses(options.links)
     if options.realtime and options.speed not in (None, 1.0):
         raise ScenarioError("--realtime flies at speed 1; --speed needs --lockstep")

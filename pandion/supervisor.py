@@ -15,6 +15,7 @@ from typing import Any, Final
 from command_line.parser import COULD_NOT_START
 from pandion.child import GRACE_S, Child, Event
 from pandion.display import Display
+from pandion.process_faults import ProcessFaults
 from pandion.processor import ANYWHERE, Places
 
 _LISTEN_S: Final = 30.0  # until sitl has bound its port
@@ -76,6 +77,7 @@ class Supervisor:
         self._out = out
         self._flown = Flown()
         self._children: list[Child] = []
+        self._faults = ProcessFaults()
         self._selector = selectors.DefaultSelector()
 
     def run(self, sitl: list[str], fsw: Callable[[int], list[str]]) -> Flown:
@@ -96,6 +98,7 @@ class Supervisor:
                 with self._display.progress():
                     self._watch(lambda: False)
         finally:
+            self._faults.end()
             for child in self._children:
                 child.interrupt()
             for child in self._children:
@@ -127,13 +130,15 @@ class Supervisor:
                     self._note_exit(child)
                 for event in events or ():
                     self._handle(child, event)
+            self._faults.go_on()
             for child in self._children:
                 child.escalate()
 
     def _timeout_s(self) -> float:
         """Until the next process is due to end [s]."""
         due_s = [child.due_s for child in self._children if child.due_s is not None]
-        return min(max(min(due_s, default=math.inf) - time.monotonic(), 0.0), 0.1)
+        until_s = max(min(due_s, default=math.inf) - time.monotonic(), 0.0)
+        return min(until_s, self._faults.patience_s, 0.1)
 
     def _others(self, child: Child) -> list[Child]:
         return [other for other in self._children if other is not child]
@@ -156,7 +161,9 @@ class Supervisor:
             self._note_result(child, event)
         elif kind == "unwritten":
             flown.unwritten.append(event["what"])
-        if kind in ("listening", "preparing", "warning", "parameters"):
+        elif kind == "fault":
+            self._faults.begin(event, self._children)
+        if kind in ("listening", "preparing", "warning", "parameters", "fault"):
             self._display.say(event["message"])
 
     def _note_result(self, child: Child, event: Event) -> None:

@@ -14,7 +14,7 @@ from command_line.process import (
 )
 from sitl.arguments import SitlOptions
 from sitl.link.udp_endpoint import RESEND_S, LinkError, PeerSocket, parse_address
-from sitl.scenario_file import ScenarioError, load_scenario
+from sitl.scenario_file import ScenarioError, check_pacing, load_scenario
 
 
 def run(options: SitlOptions) -> int:
@@ -28,6 +28,7 @@ def _run(options: SitlOptions, events: Events) -> int:
     if options.realtime and options.speed not in (None, 1.0):
         raise CouldNotStart("--realtime flies at speed 1; --speed needs --lockstep")
     scenario = load_scenario(options.scenario, options.sensors)
+    check_pacing(scenario, realtime=options.realtime)
     if options.duration_s is not None:
         scenario = dataclasses.replace(scenario, duration_s=options.duration_s)
     _check_outputs(options)

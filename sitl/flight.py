@@ -13,8 +13,10 @@ from command_line.output import json_text, unwritten
 from command_line.parser import COULD_NOT_START
 from command_line.process import NOT_COMPLETED, Events, StopRequest
 from sitl.arguments import SitlOptions
+from sitl.faults.keys import LINKS, Fault
 from sitl.link.encode import StepEncoder
 from sitl.link.exchange import Exchange, ExchangeCounts, Lockstep, RealTime
+from sitl.link.faulty_endpoint import Endpoint, FaultyEndpoint
 from sitl.link.pilot import flight_plan
 from sitl.link.server import RunTiming, serve, shut_down
 from sitl.link.udp_endpoint import PeerSocket
@@ -61,7 +63,9 @@ class Flight:
         exchange = self._exchange(stop)
         with contextlib.ExitStack() as files:
             truth = self._truth(files)
-            timing = serve(simulation, plan, exchange, encoder, stop, self._progress, truth)
+            timing = serve(
+                simulation, plan, exchange, encoder, stop, self._progress, truth, self._begun
+            )
         silent_since = exchange.silent_since
         if silent_since is not None:
             simulation.note_silence(silent_since)
@@ -121,14 +125,28 @@ class Flight:
         values = {"t_s": time_s, "min_margin_m": margin_m, "real_time_factor": real_time_factor}
         self._events.report("progress", "", **values)
 
+    def _begun(self, fault: Fault) -> None:
+        simulation = self._simulation
+        sentence = f"sitl: fault at {simulation.time_s:.1f} s: {fault}"
+        self._events.report("fault", sentence, **dataclasses.asdict(fault))
+
     def _exchange(self, stop: StopRequest) -> Exchange:
+        endpoint = self._link()
         joints = len(self._simulation.vehicle.links)
         period_s = 1e-6 * STEP_US
         if self._options.realtime:
-            return RealTime(self._endpoint, joints, period_s, stop)
+            return RealTime(endpoint, joints, period_s, stop)
         speed = self._options.speed
         paced_s = None if speed is None else period_s / speed
-        return Lockstep(self._endpoint, joints, paced_s, stop)
+        return Lockstep(endpoint, joints, paced_s, stop)
+
+    def _link(self) -> Endpoint:
+        """The way to the vehicle, with a network in between that fails if the scenario has one."""
+        simulation = self._simulation
+        if not any(fault.unit in LINKS for fault in simulation.scenario.faults):
+            return self._endpoint
+        faults = simulation.faults
+        return FaultyEndpoint(self._endpoint, lambda: faults.active, self._options.seed)
 
     def _settle(self) -> None:
         """Stop the garbage collector: sweeping numba's objects takes tens of milliseconds."""

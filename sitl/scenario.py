@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, Literal, TypeAlias
 
+from sitl.faults.keys import Fault
 from sitl.ranges import V2 as V2
 from sitl.ranges import V3 as V3
 from sitl.ranges import WORLD_M as WORLD_M
@@ -260,3 +261,4 @@ class Scenario:
     vehicle_scale: VehicleScale = VehicleScale()
     air: AirKeys = AirKeys()
     actuators: ActuatorKeys = ActuatorKeys()
+    faults: tuple[Fault, ...] = ()

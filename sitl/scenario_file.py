@@ -47,6 +47,17 @@ def load_scenario(name_or_path: str, suite: str | None = None) -> Scenario:
         raise ScenarioError(f"scenario {path} is not TOML: it is not UTF-8") from error
 
 
+def check_pacing(scenario: Scenario, *, realtime: bool) -> None:
+    """Refuse faults that a flight in lockstep cannot have.
+
+    Raises:
+        ScenarioError: With the key and what to do.
+    """
+    for i, fault in enumerate(scenario.faults):
+        if fault.of_real_time and not realtime:
+            raise ScenarioError(f"faults[{i}]: {fault} needs real time; add --realtime")
+
+
 def suite_of(scenario: Scenario) -> str:
     """Name of the suite of sensors that a scenario is flown with."""
     sensors = scenario.sensors

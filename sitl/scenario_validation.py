@@ -5,9 +5,11 @@ from __future__ import annotations
 import itertools
 import math
 
+from sitl.faults.keys import EXACT, problem
 from sitl.limits import BOTH_JOINTS_DEG, FIRST_JOINT_DEG
 from sitl.scenario import ActuatorKeys, Lissajous, Scenario, Start
 from sitl.scenario_file import ScenarioError
+from sitl.sensors.keys import MeasuredSensors
 
 ZONES_MAX = 64  # in a set of OBSTACLE_SHAPE
 _LEAST_INERTIA = 1e-4  # kg·m²; a lighter motor crosses its gap within a step of the plant
@@ -24,6 +26,7 @@ def check(scenario: Scenario) -> None:
     _check_zones(scenario)
     _check_names(scenario)
     _check_gears(scenario.actuators)
+    _check_faults(scenario)
     curve = scenario.trajectory
     if isinstance(curve, Lissajous) and not (2.0 * curve.ramp_s <= curve.duration_s):
         raise ScenarioError(
@@ -116,6 +119,28 @@ def _check_names(scenario: Scenario) -> None:
                 )
             if name in (*others, *names[:i]):
                 raise ScenarioError(f'{key}[{i}].name = "{name}": must differ from the others')
+
+
+def _check_faults(scenario: Scenario) -> None:
+    for i, fault in enumerate(scenario.faults):
+        found = problem(fault, units_aboard(scenario))
+        if found is not None:
+            raise ScenarioError(f"faults[{i}].{found}")
+
+
+def units_aboard(scenario: Scenario) -> tuple[str, ...]:
+    """Sensors of a scenario that can fail; cameras of either kind are ``vio``."""
+    sensors = scenario.sensors
+    if not isinstance(sensors, MeasuredSensors):
+        return EXACT
+    there = {
+        "vio": sensors.motion_capture is not None or sensors.visual_odometry is not None,
+        "gps": sensors.gnss is not None,
+        "baro": sensors.barometer is not None,
+        "mag": sensors.magnetometer is not None,
+        "distance": sensors.rangefinder is not None,
+    }
+    return ("gyro", "accel", *(unit for unit, has in there.items() if has), "encoder")
 
 
 def check_start(keys: tuple[str, ...], margins: tuple[float, ...]) -> None:

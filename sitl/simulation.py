@@ -14,18 +14,22 @@ from sitl.compiled import machine_code
 from sitl.disturbances.items import Push, push
 from sitl.drives import Drives
 from sitl.earth import DEFAULT_ORIGIN, Place
+from sitl.faults.active import Faults
+from sitl.faults.keys import Fault, problem
 from sitl.flight_evaluator import FlightEvaluator, critical
 from sitl.mission_clock import MissionClock
 from sitl.plant.aerial_manipulator import Plant, plant
+from sitl.plant.battery import open_circuit
 from sitl.plant.integrator import STEP_S, step
 from sitl.plant.kinematics import places as places_into
+from sitl.plant.lock import seize
 from sitl.plant.parameters import Vehicle
 from sitl.plant.state import ARM, P_WB, Q_WB, THRUST, V_WB, W_WB_B
 from sitl.plant.vector import Array
 from sitl.result import EndKind, EndReason, TruthResult
 from sitl.scenario import V3, Scenario, Sensors
 from sitl.scenario_file import ScenarioError
-from sitl.scenario_validation import check
+from sitl.scenario_validation import check, units_aboard
 from sitl.sensors.exact import V4, ExactSensors, SensorReadings
 from sitl.sensors.keys import MeasuredSensors
 from sitl.sensors.measurements import Measurement
@@ -39,6 +43,7 @@ SETTLED_STEPS = 250  # for which the vehicle's sensors have run when the flight 
 SETTLED_KEPT = 20  # of these, whose measurements the flight software still gets
 SETTLED_NEWEST = 2  # of each sensor, however long ago they came
 SUBSTEPS = 2  # plant steps per exchange
+BATTERY_STEPS = 50  # between two readings of the battery
 SAMPLE_STEPS = 50  # tracking error at 10 Hz, as the paper's TE
 
 
@@ -111,6 +116,16 @@ class Simulation:
         if self.vehicle.air.active:
             moving = cast(Array, self._plants)["air"]["wind"][0]  # type: ignore[call-overload]
             self._wind = (WindField(scenario.air, seed, step_s), moving)
+        self.faults = Faults(
+            scenario.faults,
+            seed,
+            step_us=STEP_US,
+            thrust_max=self.vehicle.rotors.thrust_max,
+            joints=len(self.vehicle.links),
+            exact=self._suite is None,
+            sags=self._drives is not None and self._drives.battery is not None,
+        )
+        self._locked = self.faults.locked
         self._sent = (0.0, 0.0)  # largest torque and thrust commanded, before any saturation
         axes = 3 if scenario.body == "full" else 0
         self._places = np.empty((SUBSTEPS, 2 + len(self.vehicle.links) + axes, 3))
@@ -122,6 +137,7 @@ class Simulation:
         self._step = machine_code(step, self._plants, self._state, *example)
         self._felt = self._step(self._plants, self._state, *example).felt
         self._reading: SensorReadings | None = None
+        self._said: tuple[int, SensorReadings] | None = None
         self._measured: tuple[int, tuple[Measurement, ...]] = (-1, ())
         self._evaluator = FlightEvaluator(scenario, self.clock, self._places_now())
 
@@ -175,8 +191,17 @@ class Simulation:
     def sense(self) -> SensorReadings:
         """The suite ``perfect``'s readings of the current state, exact with any other suite.
 
-        Asking twice in a step gives the same ones.
+        Asking twice in a step gives the same ones; no step may be left out while a sensor fails.
         """
+        healthy = self.healthy()
+        if not self.faults.at(self.step):
+            return healthy
+        if self._said is None or self._said[0] != self.step:
+            self._said = (self.step, self.faults.frame(healthy))
+        return self._said[1]
+
+    def healthy(self) -> SensorReadings:
+        """What :meth:`sense` would say if no sensor failed."""
         if self._reading is None or self._reading.t_us != self.t_us:
             self._reading = self._exact_sensors.measure(self._exact_reading())
         return self._reading
@@ -190,13 +215,29 @@ class Simulation:
             return None
         if self._measured[0] != self.step:
             thrust = _four(self._state[THRUST:ARM].tolist())
-            exact = self.sense()
+            exact = self.healthy()
             if self._play is not None:  # encoders are on the motors' side
                 angles = np.array(exact.q_arm) + self._play
                 exact = exact._replace(q_arm=tuple(angles.tolist()))
             before = self._settled(self._suite, thrust) if self.step == 0 else []
-            self._measured = (self.step, (*before, *self._suite.step(exact, thrust)))
+            arrived = (*before, *self._suite.step(exact, thrust))
+            if self.faults.at(self.step):
+                arrived = self.faults.suite(self.t_us, arrived)
+            self._measured = (self.step, arrived)
         return self._measured[1]
+
+    def battery(self) -> tuple[float, float] | None:
+        """Voltage [V] and share of the charge [1] that the battery says in this step, if anything.
+
+        Ten times a second where one is simulated, or has failed.
+        """
+        own = None if self._drives is None else self._drives.battery
+        if self.step % BATTERY_STEPS or (own is None and not self.faults.of_battery):
+            return None
+        charge = self.faults.charge
+        if own is not None:
+            return own.voltage, min(own.charge, charge)
+        return open_circuit(charge), charge
 
     def _settled(self, suite: SensorSuite, thrust: V4) -> list[Measurement]:
         """What came before the first step, in which a flight software cannot wait for sensors.
@@ -204,7 +245,7 @@ class Simulation:
         The vehicle has been where it starts for a while: the newest few of each sensor, and all of
         the last few steps.
         """
-        exact, arrived = self.sense(), list[tuple[int, Measurement]]()
+        exact, arrived = self.healthy(), list[tuple[int, Measurement]]()
         for k in range(-SETTLED_STEPS, 0):
             earlier = exact._replace(t_us=exact.t_us + k * STEP_US)
             arrived += [(k, one) for one in suite.step(earlier, thrust)]
@@ -216,6 +257,13 @@ class Simulation:
             if k >= -SETTLED_KEPT or rank <= SETTLED_NEWEST
         ]
 
+    def inject(self, fault: Fault) -> str | None:
+        """Let a fault begin with the next step; returns why it cannot, None if it can."""
+        refusal = problem(fault, units_aboard(self.scenario))
+        if refusal is None:
+            self.faults.inject(fault, self.step + 1)
+        return refusal
+
     def advance(self, controls: Controls) -> None:
         """Integrate one step with ``controls`` held, judging every plant step.
 
@@ -223,8 +271,11 @@ class Simulation:
             ValueError: A control is not finite or their number is wrong.
         """
         self._command(controls)
+        fails = self.faults.at(self.step)
         if self._drives is not None:
             self._drive(self._drives)
+        if fails or any(self._locked):
+            self._fail()
         if self._wind is not None:
             field, moving = self._wind
             moving[0], moving[1], moving[2] = field.step()
@@ -308,8 +359,22 @@ class Simulation:
 
     def _drive(self, drives: Drives) -> None:
         """What of the command takes effect in this step."""
+        if drives.battery is not None:
+            drives.battery.at_most = self.faults.charge
         thrust = _four(self._state[THRUST:ARM].tolist())
         self._thrust = drives.rotors(self._thrust, thrust)
+
+    def _fail(self) -> None:
+        """What of the command takes effect, and which joints move, while something fails."""
+        faults, locked = self.faults, self.faults.locked
+        self._thrust = faults.motors(self._thrust, self.t_us)
+        self._torque = faults.drives(self._torque)
+        if locked != self._locked:
+            newly = tuple(now and not was for now, was in zip(locked, self._locked, strict=True))
+            self._locked = locked
+            cast(Array, self._plants)["locked"][0] = locked  # type: ignore[call-overload]
+            if any(newly):
+                seize(self.vehicle, self._state, newly)
 
     def _disturbance(self) -> tuple[V3, V3]:
         """Force on the base [N, W] and torque [N·m, B] during this step."""

@@ -21,6 +21,7 @@ from fsw.parameters.flight_config import FlightConfig
 from fsw.ports import PlanningCycle, PlanService
 from fsw.signals import (
     Arm,
+    BatteryReading,
     Command,
     CommandRequest,
     EndEffectorTarget,
@@ -90,6 +91,11 @@ class ClosedLoop(Generic[State]):
     def samples(self) -> tuple[Sample, ...]:
         """What arrived from the suite of sensors in this step."""
         return tuple([sample(said) for said in self.simulation.measurements() or ()])
+
+    def battery(self) -> BatteryReading | None:
+        """What the battery says in this step, if anything."""
+        said = self.simulation.battery()
+        return None if said is None else BatteryReading(*said)
 
     def targets(self) -> tuple[EndEffectorTarget, ...]:
         """What the scenario's pilot streams: twenty points at once, then one every 0.1 s."""

@@ -37,7 +37,7 @@ from fsw.flight.safety_watch import SafetyWatch
 from fsw.flight.sensed_state import SensedState
 from fsw.flight.state import FlightState, PlanMemory, SafetyMemory
 from fsw.flight.uncertain_clearance import KeptSet, UncertainClearance, pose_covariance
-from fsw.model.battery import drained
+from fsw.model.battery import Levels, corrected, drained
 from fsw.model.body import body_of
 from fsw.model.nominal import REST_INPUT
 from fsw.mpc.reference import merge
@@ -276,6 +276,10 @@ class Autopilot:
                 state = replace(state, kept=state.kept.of(mission.safe_set))
             if inputs.mission is not None:
                 state = with_update(state, inputs.mission, self.config, now_us)
+        if inputs.battery is not None:
+            levels = self._battery_levels
+            battery = corrected(self.config.battery, levels, state.battery, inputs.battery)
+            state = replace(state, battery=battery)
         if inputs.host is not None:
             state = replace(state, host=inputs.host)
         if inputs.ground_station_heard:
@@ -369,9 +373,13 @@ class Autopilot:
     def _battery(self, state: FlightState) -> BatteryState:
         thrust = state.cascade.commanded.rotor_thrust
         period = 1e-6 * self.config.mpc_period_us
-        limits = self.config.limits
-        levels = (limits.battery_low, limits.battery_critical, limits.battery_emergency)
+        levels = self._battery_levels
         return drained(self.config.battery, levels, state.battery, thrust, period)
+
+    @property
+    def _battery_levels(self) -> Levels:
+        limits = self.config.limits
+        return limits.battery_low, limits.battery_critical, limits.battery_emergency
 
     def _actuate(
         self,

@@ -27,6 +27,7 @@ from fsw.signals import (
     FlyOrbit,
     GoTo,
     Home,
+    InjectFailure,
     LookAt,
     Mode,
     MotionSetpoint,
@@ -286,6 +287,13 @@ def _set_mission_step(action: SetMissionStep, context: CommandContext, modes: Mo
     return Decision(ACCEPTED, mission_step=int(number))
 
 
+def _inject_failure(action: InjectFailure, context: CommandContext, modes: Modes) -> Decision:
+    """The simulator answers; a vehicle without one never does."""
+    if not context.failures_allowed:
+        return Decision(DENIED, "no failure injected: SYS_FAILURE_EN is 0; set it to 1 to allow it")
+    return Decision(CommandResult.IN_PROGRESS)
+
+
 def _order(action: Order, context: CommandContext, modes: Modes) -> Decision:
     return _ORDERS[action](context, modes)
 
@@ -342,6 +350,7 @@ COMMAND_HANDLERS: Final[dict[type[CommandAction], _Handler]] = {
     SetHome: _set_home,
     StartMission: _start_mission,
     SetMissionStep: _set_mission_step,
+    InjectFailure: _inject_failure,
     Order: _order,
     Rejected: _reject,
 }

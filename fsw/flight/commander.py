@@ -119,6 +119,7 @@ class Commander:
             max_speed=setpoint_limits.speed,
             yaw_rate=setpoint_limits.yaw_rate,
             acceleration=setpoint_limits.acceleration,
+            failures_allowed=limits.failure_injection == 1,
         )
 
     def arming_report(

@@ -19,6 +19,7 @@ from fsw.link.wire.decode_setpoints import (
 from fsw.measurements import Sample
 from fsw.signals import (
     AttitudeSetpoint,
+    BatteryReading,
     Command,
     CommandRequest,
     EndEffectorTarget,
@@ -63,6 +64,7 @@ class Received:
     refused_setpoints: int = 0  # that were of no use
     station_heard: bool = False  # a ground station's heartbeat
     samples: list[Sample] = field(default_factory=list)  # of sensors, in order of arrival
+    battery: BatteryReading | None = None  # the newest
 
 
 @dataclass(slots=True)
@@ -122,6 +124,10 @@ class Inbox:
             self.refused += len(kept) - _MAX_SAMPLES
             del kept[:-_MAX_SAMPLES]
 
+    def accept_battery(self, reading: BatteryReading) -> None:
+        """Keep what the battery's sensor has measured last."""
+        self._received.battery = reading
+
     def take(self) -> Received:
         """Hand over what came."""
         taken, self._received = self._received, Received()
@@ -157,6 +163,7 @@ class Inbox:
             tuning,
             stale_us,
             tuple(came.samples),
+            came.battery,
             host,
         )
 

@@ -22,22 +22,25 @@ from fsw.link.wire.decode import Numbers
 from fsw.link.wire.decode_sensors import (
     ODOMETRY_VALUES,
     SampleDecoder,
+    battery_reading,
     inertial_sample,
     joint_sample,
     pose_sample,
 )
-from fsw.link.wire.message_ids import AUTOPILOT, SYSTEM_ID
+from fsw.link.wire.message_ids import AUTOPILOT, SIMULATOR, SYSTEM_ID
 from fsw.link.wire.px4_mode import custom_mode
 from fsw.measurements import ImuSample, Sample
 from fsw.ports import VehicleFacts
 from fsw.signals import (
     CommandAck,
+    CommandRequest,
     FlightSnapshot,
     MessageSource,
     Mode,
     SensorFrame,
     TickOutputs,
 )
+from messages import status_text
 from messages.frames import Frame, FrameWriter, split
 from messages.lockstep_codec import LockstepReader
 from messages.udp import PeerSocket
@@ -93,6 +96,7 @@ class SimLink:
         self.shutdown = False  # the simulator has ended the run
         self.retransmissions = 0
         self.notices: list[str] = []  # what was odd, for the operator; the loop empties it
+        self.routed_acks: list[CommandAck] = []  # of the simulator to what was routed; the same
         self._endpoint = PeerSocket.connected(simulator, PATIENCE_S)
         self._inbox = inbox
         self._decoder = SampleDecoder(inbox.locate)
@@ -103,6 +107,7 @@ class SimLink:
         self._doubted_us = -1  # time of a step that was too far ahead
         self._answer: tuple[int, list[bytes]] = (-1, [])
         self._acks: list[CommandAck] = []
+        self._routed: list[bytes] = []
         self._text_id = 0
         self._reported_us = -_REPORT_US
         self._reported_mode: Mode | None = None
@@ -135,6 +140,12 @@ class SimLink:
         """Send an acknowledgement with the next answer."""
         self._acks.append(ack)
 
+    def route(self, request: CommandRequest) -> None:
+        """Send a command on with the next answer, in the name of who sent it, as a router does."""
+        writer = FrameWriter(request.source_system, request.source_component)
+        values = (*request.params, request.command, SYSTEM_ID, SIMULATOR, request.confirmation)
+        self._routed.append(writer.frame(message_ids.COMMAND_LONG, *values))
+
     def send_actuators(self, t_us: int, outputs: TickOutputs) -> None:
         """Send the actuator command that belongs to the step of ``t_us``."""
         values = encode_replies.hil_actuator_controls(
@@ -146,9 +157,13 @@ class SimLink:
         )
         controls = self._writer.frame(message_ids.HIL_ACTUATOR_CONTROLS, *values)
         due = t_us - self._reported_us >= _REPORT_US
-        if self._acks or outputs.texts or due or outputs.snapshot.mode is not self._reported_mode:
+        changed = due or outputs.snapshot.mode is not self._reported_mode
+        if self._acks or outputs.texts or changed or self._routed:
             mode = self._mode(t_us, outputs.snapshot)
-            self._send((t_us, packed([mode, *self._replies(outputs), controls])))
+            # Last, in the datagram of the controls: texts without room in it are of no use there.
+            routed = b"".join(self._routed)
+            self._routed.clear()
+            self._send((t_us, packed([mode, *self._replies(outputs), routed + controls])))
         else:
             self._send((t_us, [controls]))
 
@@ -190,10 +205,25 @@ class SimLink:
             arm = payloads.get(message_ids.ARM_JOINT_STATE)
             sensors = self._new(odometry, arm, barrier)
         if sensors is not None:
+            if message_ids.COMMAND_ACK in payloads:
+                self._note_answers(frames)
+            battery = payloads.get(message_ids.BATTERY_STATUS)
+            reading = None if battery is None else battery_reading(battery)
+            if reading is not None:
+                self._inbox.accept_battery(reading)
             for frame in frames:
                 if frame.message_id != message_ids.HEARTBEAT:
                     self._inbox.accept(frame, _source(frame))
         return sensors
+
+    def _note_answers(self, frames: list[Frame]) -> None:
+        """What the simulator says about commands that were routed to it."""
+        self.notices += status_text.joined(frames)
+        for frame in frames:
+            if frame.message_id == message_ids.COMMAND_ACK:
+                command, result, _, _, system, component = cast(Numbers, frame.payload_values)
+                ack = CommandAck(int(command), int(result), int(system), int(component))
+                self.routed_acks.append(ack)
 
     def _note_pacing(self, custom_mode: int) -> None:
         self.pacing = Pacing(custom_mode & _LOCKSTEP_BIT)

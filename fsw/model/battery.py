@@ -1,4 +1,4 @@
-r"""What the battery must be like by now: a model, for there is no sensor.
+r"""What the battery must be like by now: a model, which a sensor corrects where there is one.
 
 A rotor that hovers needs the induced power of actuator-disc theory over its figure of merit,
 
@@ -10,9 +10,9 @@ and the voltage is a straight line over the charge, less the drop at the inner r
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from fsw.signals import BatteryState, Charge, Vec4
+from fsw.signals import BatteryReading, BatteryState, Charge, Vec4
 
 _AIR_DENSITY = 1.225  # kg/m^3
 _AS_PER_AH = 3600.0
@@ -71,4 +71,17 @@ def drained(
         charge=charge_of(remaining, levels),
         usual_current=usual,
         time_left=_AS_PER_AH * remaining * model.capacity / max(usual, 1e-3),
+    )
+
+
+def corrected(
+    model: BatteryModel, levels: Levels, state: BatteryState, reading: BatteryReading
+) -> BatteryState:
+    """The battery as it has been measured; the model goes on from there."""
+    return replace(
+        state,
+        voltage=reading.voltage,
+        consumed=(1.0 - reading.remaining) * model.capacity,
+        remaining=reading.remaining,
+        charge=charge_of(reading.remaining, levels),
     )

@@ -77,6 +77,7 @@ class FlightLimits:
     attitude_loss: float = 0.7
     sensor_loss_us: int = 50_000  # without a use of the inertial unit, or of the encoders
     sensor_loss_action: int = 2  # what then: 1 warn, 2 hold, 5 land
+    failure_injection: int = 0  # whether commands may let units of a simulated vehicle fail
     # Roll or pitch from which there is no way back, and for how long.
     roll_failure: float = math.radians(60.0)  # rad; 0: never
     pitch_failure: float = math.radians(60.0)  # rad

@@ -381,6 +381,8 @@ _ROWS: Final[dict[str, list[_Row]]] = {
          _IN_MICROSECONDS),
         ("COM_SENS_ACT", "limits.sensor_loss_action", "", 1.0, 5.0,
          "Action when inertial unit or joint encoders are lost"),
+        ("SYS_FAILURE_EN", "limits.failure_injection", "", 0.0, 1.0,
+         "Command INJECT_FAILURE in simulation"),
     ],
     "Arming": [
         ("COM_ARM_BAT_MIN", "limits.arm_battery", "norm", -1.0, 0.9,
@@ -478,6 +480,7 @@ _CHOICES: Final[dict[str, Choices]] = {
         (5, "Land"),
         (6, "Retreat along the normal, then hold"),
     ),
+    "SYS_FAILURE_EN": ((0, "Refused"), (1, "Passed on to the simulator")),
     "COM_POS_LOW_ACT": ((1, "Warning"), (2, "Hold"), (5, "Land")),
     "COM_SENS_ACT": ((1, "Warning"), (2, "Hold"), (5, "Land")),
     "COM_LOW_BAT_ACT": (

@@ -32,6 +32,9 @@ from fsw.runtime.releases import Release, ScheduledReleases, StepReleases
 from fsw.runtime.tick_runner import TickRunner
 from fsw.runtime.timing import GroupTimer, Histogram
 from fsw.signals import (
+    Command,
+    CommandAck,
+    CommandResult,
     HostHealth,
     OffboardReport,
     PlannerCounters,
@@ -232,12 +235,25 @@ class SimLoop(Generic[State]):
 
     def _actuate(self, cycle: Cycle) -> None:
         t_us, outputs = cycle.release.sensors.t_us, cycle.outputs
+        if self._sim.routed_acks:
+            for ack in self._sim.routed_acks:
+                self._ground.acknowledge(t_us, ack)
+            self._sim.routed_acks.clear()
         for ack in outputs.acks:
-            if (ack.target_system, ack.target_component) == (SYSTEM_ID, PATH_PLANNER):
+            if ack.result == CommandResult.IN_PROGRESS:
+                self._route(ack, cycle.inputs.commands)
+            elif (ack.target_system, ack.target_component) == (SYSTEM_ID, PATH_PLANNER):
                 self._sim.queue_ack(ack)
             else:
                 self._ground.acknowledge(t_us, ack)
         self._sim.send_actuators(t_us, outputs)
+
+    def _route(self, ack: CommandAck, commands: tuple[Command, ...]) -> None:
+        """Hand a command on to the simulator, whose acknowledgement its sender gets."""
+        asked = (ack.command, ack.target_system, ack.target_component)
+        for request in (command.request for command in commands):
+            if asked == (request.command, request.source_system, request.source_component):
+                self._sim.route(request)
 
     def _request_plan(self, cycle: Cycle) -> None:
         request, applied = cycle.outputs.plan_request, cycle.outputs.snapshot.plan_input

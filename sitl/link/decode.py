@@ -8,6 +8,7 @@ from messages import status_text
 from messages.frames import Frame, split
 from messages.lockstep_codec import LockstepReader
 from sitl.link import message_ids
+from sitl.link.failures import Injection
 from sitl.link.message_ids import PATH_PLANNER
 from sitl.link.pilot_messages import Ack
 from sitl.simulation import Controls
@@ -25,6 +26,7 @@ class VehicleReply(NamedTuple):
     acks: tuple[Ack, ...] = ()
     texts: tuple[str, ...] = ()
     custom_mode: int | None = None  # of the vehicle's HEARTBEAT, where there is one
+    injections: tuple[Injection, ...] = ()  # that a ground station asked the vehicle for
 
 
 def read_reply(datagram: bytes, joints: int) -> VehicleReply | None:
@@ -43,6 +45,7 @@ def read_reply(datagram: bytes, joints: int) -> VehicleReply | None:
         acks=acknowledgements(frames),
         texts=status_text.joined(frames),
         custom_mode=_custom_mode(frames),
+        injections=_injections(frames),
     )
 
 
@@ -63,6 +66,19 @@ def acknowledgements(frames: list[Frame]) -> tuple[Ack, ...]:
         if frame.message_id == message_ids.COMMAND_ACK
         and frame.payload_values[5] in (0, PATH_PLANNER)
     )
+
+
+def _injections(frames: list[Frame]) -> tuple[Injection, ...]:
+    """MAV_CMD_INJECT_FAILURE, which the vehicle routes here in the name of who sent it."""
+    found = []
+    for frame in frames:
+        if frame.message_id == message_ids.COMMAND_LONG:
+            *params, command, _, _, _ = cast("tuple[float, ...]", frame.payload_values)
+            if command == message_ids.CMD_INJECT_FAILURE:
+                unit, kind, instance = (int(value) for value in params[:3])
+                asked = Injection(unit, kind, instance, frame.system_id, frame.component_id)
+                found.append(asked)
+    return tuple(found)
 
 
 def _custom_mode(frames: list[Frame]) -> int | None:

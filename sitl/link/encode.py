@@ -10,6 +10,7 @@ from messages.lockstep_codec import LockstepFrame
 from sitl.earth import DEFAULT_ORIGIN, Place
 from sitl.link import message_ids
 from sitl.link.encode_sensors import SensorEncoder
+from sitl.link.failures import Answer, Injection
 from sitl.link.message_ids import PATH_PLANNER, SENSORS, SYSTEM_ID
 from sitl.link.pilot_messages import (
     PilotMessage,
@@ -31,6 +32,10 @@ _NO_AUTOPILOT: Final = 8  # MAV_AUTOPILOT
 _HIL: Final = 32  # MAV_MODE_FLAG
 _ACTIVE: Final = 4  # MAV_STATE
 _MAVLINK_VERSION: Final = 3
+_UNKNOWN_CELL, _UNKNOWN_WARMTH = 0xFFFF, 0x7FFF  # of BATTERY_STATUS
+_FOR_EVERYTHING, _LIPO = 1, 1  # MAV_BATTERY_FUNCTION, MAV_BATTERY_TYPE
+_WARNING: Final = 4  # MAV_SEVERITY
+_TEXT_SIZE: Final = 50  # bytes in one STATUSTEXT
 # An unknown covariance is a NaN in its first entry.
 _NO_COVARIANCE: Final = (math.nan, *(0.0,) * 20)
 _ODOMETRY_TAIL: Final = (
@@ -51,6 +56,7 @@ class StepEncoder:
         """Send the true state, or what sensors have ``measured``; the frame is at ``origin``."""
         self._sensors = FrameWriter(SYSTEM_ID, SENSORS)
         self._pilot = FrameWriter(SYSTEM_ID, PATH_PLANNER)
+        self._text_id = 0
         self._mode = (1 if lockstep else 0) | (2 if measured else 0)
         self._measured = SensorEncoder(self._sensors, origin)
         self._odometry = LockstepFrame(self._sensors, message_ids.ODOMETRY, *_ODOMETRY_TAIL)
@@ -106,6 +112,27 @@ class StepEncoder:
         """HEARTBEAT; in its custom_mode bit 0 is set in lockstep and bit 1 with sensors."""
         values = (self._mode, _GENERIC, _NO_AUTOPILOT, _HIL, _ACTIVE, _MAVLINK_VERSION)
         return self._sensors.frame(message_ids.HEARTBEAT, *values)
+
+    def answer(self, asked: Injection, answer: Answer) -> bytes:
+        """COMMAND_ACK for who asked for a fault, and the sentence for the operator."""
+        ack = (message_ids.CMD_INJECT_FAILURE, answer.result, 0, 0, asked.system, asked.component)
+        text = answer.sentence.encode("utf-8")[: 3 * _TEXT_SIZE]
+        self._text_id = self._text_id % 0xFFFF + 1
+        pieces = [
+            self._sensors.frame(
+                message_ids.STATUSTEXT,
+                *(_WARNING, text[at : at + _TEXT_SIZE], self._text_id, at // _TEXT_SIZE),
+            )
+            for at in range(0, len(text), _TEXT_SIZE)
+        ]
+        return self._sensors.frame(message_ids.COMMAND_ACK, *ack) + b"".join(pieces)
+
+    def battery(self, volts: float, share: float) -> bytes:
+        """BATTERY_STATUS of a pack at ``volts`` [V] with a ``share`` [1] of its charge."""
+        cells = (round(1000.0 * volts), *(_UNKNOWN_CELL,) * 9)
+        about = (-1, 0, _FOR_EVERYTHING, _LIPO, round(100.0 * share))
+        values = (-1, -1, _UNKNOWN_WARMTH, *cells, *about, 0, 0, *(0,) * 4, 0, 0)
+        return self._sensors.frame(message_ids.BATTERY_STATUS, *values)
 
     def command(self, message: SendCommand) -> bytes:
         """One COMMAND_LONG of the pilot."""

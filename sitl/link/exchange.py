@@ -10,8 +10,9 @@ from typing import Final
 from command_line.process import StopRequest
 from sitl.link import decode
 from sitl.link.decode import VehicleReply
+from sitl.link.faulty_endpoint import Endpoint
 from sitl.link.step_grid import StepGrid
-from sitl.link.udp_endpoint import RESEND_S, PeerSocket
+from sitl.link.udp_endpoint import RESEND_S
 from sitl.simulation import Controls
 
 STALL_S: Final = 1.2  # so that 2 s after a stall both processes have ended; a pause of 1 s passes
@@ -40,7 +41,7 @@ class Lockstep:
     """Waits for the answer of every step, and repeats a step whose answer does not come."""
 
     def __init__(
-        self, endpoint: PeerSocket, joints: int, period_s: float | None, stop: StopRequest
+        self, endpoint: Endpoint, joints: int, period_s: float | None, stop: StopRequest
     ) -> None:
         """Steps begin ``period_s`` of wall time apart, or as soon as possible.
 
@@ -118,7 +119,7 @@ class RealTime:
 
     def __init__(
         self,
-        endpoint: PeerSocket,
+        endpoint: Endpoint,
         joints: int,
         period_s: float,
         stop: StopRequest,
@@ -177,6 +178,7 @@ class RealTime:
             custom_mode=next(
                 (a.custom_mode for a in reversed(answers) if a.custom_mode is not None), None
             ),
+            injections=tuple(one for answer in answers for one in answer.injections),
         )
 
     def _first_step(

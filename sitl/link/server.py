@@ -10,10 +10,12 @@ from typing import Final
 
 from command_line.process import StopRequest
 from messages.frames import split
+from sitl.faults.keys import Fault
 from sitl.link import decode, pilot
 from sitl.link.decode import VehicleReply
 from sitl.link.encode import StepEncoder
 from sitl.link.exchange import Exchange, SimulatorError
+from sitl.link.failures import carry_out
 from sitl.link.message_ids import ACCEPTED, CMD_REBOOT_SHUTDOWN
 from sitl.link.pilot import FlightPlan, PilotState
 from sitl.link.pilot_messages import Heard, PilotMessage, SendCommand
@@ -63,37 +65,37 @@ def serve(
     stop: StopRequest,
     progress: Progress,
     truth: Callable[[Simulation], None],
+    begun: Callable[[Fault], None] = lambda _: None,
 ) -> RunTiming:
     """Step until the simulation, the pilot, a signal or silence ends the run.
 
-    The reason is in ``simulation.ended``.
+    ``begun`` takes each fault when it begins. The reason for the end is in ``simulation.ended``.
     """
+    answered = b""  # to those who asked for a fault
     state = PilotState(plan.first_phase)
     begin_s = reported_s = time.perf_counter()
     while simulation.ended is None:
-        readings = simulation.sense()
+        readings, seen = simulation.sense(), simulation.healthy()
         state, messages = pilot.speak(plan, state, readings.t_us)
-        datagram = _datagram(simulation, encoder, messages, exchange)
+        if simulation.faults.active:
+            messages = _heard_of(simulation, messages, begun)
+        datagram = _datagram(simulation, encoder, messages, exchange, answered)
         try:
             answer = exchange.step(
                 simulation.step, readings.t_us, datagram, lambda: truth(simulation)
             )
             if simulation.step == 0:  # the vehicle may take its time for the first answer
                 begin_s = time.perf_counter()
+            answered = _injected(simulation, encoder, answer)
             _advance(simulation, answer)
         except SimulatorError as error:
             kind = EndKind.INTERRUPTED if stop.requested else EndKind.STOPPED
             simulation.end(kind, str(error))
             break
-        state = pilot.listen(plan, state, _heard(answer, readings), readings.t_us)
+        state = pilot.listen(plan, state, _heard(answer, seen), readings.t_us)
         if state.left is not None:
             simulation.leave_trajectory(readings.t_us, state.left)
-        if state.refusal is not None:
-            simulation.end(EndKind.REFUSED, state.refusal)
-        elif state.done:
-            simulation.end(EndKind.MISSION, f"landed and disarmed after {simulation.time_s:.1f} s")
-        elif stop.requested:
-            simulation.end(EndKind.INTERRUPTED, f"interrupted at step {simulation.step}")
+        _end_if_over(simulation, state, stop)
         if simulation.step % _PROGRESS_STEPS == 0:
             now_s = time.perf_counter()
             if now_s - reported_s >= _PROGRESS_S:
@@ -104,19 +106,49 @@ def serve(
     return RunTiming(simulation.step, wall_s, simulation.time_s / max(wall_s, 1e-9))
 
 
+def _end_if_over(simulation: Simulation, state: PilotState, stop: StopRequest) -> None:
+    if state.refusal is not None:
+        simulation.end(EndKind.REFUSED, state.refusal)
+    elif state.done:
+        simulation.end(EndKind.MISSION, f"landed and disarmed after {simulation.time_s:.1f} s")
+    elif stop.requested:
+        simulation.end(EndKind.INTERRUPTED, f"interrupted at step {simulation.step}")
+
+
+def _heard_of(
+    simulation: Simulation, messages: tuple[PilotMessage, ...], begun: Callable[[Fault], None]
+) -> tuple[PilotMessage, ...]:
+    """What comes through of the pilot's ``messages`` while something fails."""
+    faults = simulation.faults
+    for fault in faults.take_begun():
+        begun(fault)
+    return () if faults.pilot_silent(simulation.t_us) else messages
+
+
+def _injected(simulation: Simulation, encoder: StepEncoder, answer: VehicleReply) -> bytes:
+    """Begin and end the faults that were asked for; returns what their senders are told."""
+    asked = answer.injections
+    return b"".join(encoder.answer(one, carry_out(simulation, one)) for one in asked)
+
+
 def _datagram(
     simulation: Simulation,
     encoder: StepEncoder,
     messages: tuple[PilotMessage, ...],
     exchange: Exchange,
+    answered: bytes,
 ) -> bytes:
     """The datagram of this step; what has no room in it is sent ahead."""
     heartbeat = encoder.heartbeat() if simulation.step % _HEARTBEAT_STEPS == 0 else b""
+    opening = heartbeat + answered
+    battery = simulation.battery()
+    if battery is not None:
+        opening += encoder.battery(*battery)
     measured = simulation.measurements()
     if measured is None:
-        return heartbeat + encoder.datagram(simulation.sense(), messages)
-    t_us = simulation.t_us
-    ahead, datagram = encoder.measured_datagrams(t_us, measured, messages, heartbeat)
+        return opening + encoder.datagram(simulation.sense(), messages)
+    t_us = simulation.sense().t_us
+    ahead, datagram = encoder.measured_datagrams(t_us, measured, messages, opening)
     for one in ahead:
         exchange.send_ahead(one)
     return datagram

@@ -52,6 +52,7 @@ class Plant(NamedTuple):
     stops: Stops
     gears: Gears
     air: Air
+    locked: Array  # (j,) 1 for a joint that cannot move, which is then at rest; else 0
     gravity: float  # m/s²
 
 
@@ -98,6 +99,7 @@ def plant(vehicle: Vehicle) -> Plant:
         stops=Stops(stop_angle, stops.stiffness, stops.damping),
         gears=gears(vehicle.motors.inertia, vehicle.motors.backlash, len(vehicle.links)),
         air=_air(vehicle),
+        locked=np.zeros(len(vehicle.links)),
         gravity=vehicle.gravity,
     )
     return pack_params(numbers)
@@ -215,7 +217,23 @@ def acceleration_into(plant: Plant, state: Array, inputs: Inputs, work: Workspac
     mass_matrix_into(plant.chain, work.posture, work.mass)
     for i in range(joints):
         work.mass[6 + i, 6 + i] += plant.gears.carried[i]
+        if plant.locked[i] > 0.0:
+            hold_joint(work.mass, load, 6 + i)
     solve_in_place(work.mass, load)
+
+
+@kernel
+def hold_joint(mass: Array, load: Array, row: int) -> None:
+    """Replace one row of mass (n, n) [any unit] x = load (n,) [any unit] by x[row] = 0.
+
+    The torque that this takes acts between two links and does no work.
+    """
+    for k in range(row):
+        mass[row, k] = 0.0
+    for k in range(row + 1, load.shape[0]):
+        mass[k, row] = 0.0
+    mass[row, row] = 1.0
+    load[row] = 0.0
 
 
 @kernel

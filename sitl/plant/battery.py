@@ -47,13 +47,14 @@ class Battery:
     resistance: float  # Ω, of all cells and leads
     charge: float = 1.0  # share of the capacity that is left
     voltage: float = FULL_V  # V, under load
+    at_most: float = 1.0  # charge, while it fails
 
     def draw(self, power: float, seconds: float) -> None:
         """Give a ``power`` [W] for ``seconds`` [s]; the voltage is that under this load.
 
         With the current i the power is (U₀ − R i) i; beyond its maximum the voltage is half of U₀.
         """
-        source = open_circuit(self.charge)
+        source = open_circuit(min(self.charge, self.at_most))
         root = math.sqrt(max(source * source - 4.0 * self.resistance * power, 0.0))
         self.voltage = 0.5 * (source + root)
         current = power / self.voltage

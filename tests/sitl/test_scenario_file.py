@@ -11,6 +11,7 @@ from sitl.scenario import Lissajous, Uniform
 from sitl.scenario_file import (
     PACKAGED,
     ScenarioError,
+    check_pacing,
     load_scenario,
     parse_scenario,
     scenario_digest,
@@ -294,3 +295,43 @@ def test_any_mixture_of_zones_walls_points_and_workspace_is_judged_together() ->
     assert zones.count("shelf") == 13
     points = World(parse_scenario('body = "points"\n' + text, "test"))
     assert len(points.keys) == 3 + 3 + 3 + 1
+
+
+FAULT = '[[faults]]\nunit = "{}"\nkind = "{}"\n{}\n'
+
+
+@pytest.mark.parametrize(
+    ("unit", "kind", "more", "sentence"),
+    [
+        ("gyros", "off", "", 'faults[0].unit = "gyros": must be one of "gyro"'),
+        ("gyro", "of", "", 'faults[0].kind = "of": must be one of "off"'),
+        ("gyro", "full", "", 'faults[0].kind = "full": a gyro can be "off", "stuck"'),
+        ("mag", "off", "", 'faults[0].unit = "mag": not on board; the sensors are gyro, accel'),
+        ("motor", "off", "instance = 5", "faults[0].instance = 5: must be 0 to 4"),
+        ("joint", "off", "instance = 3", "faults[0].instance = 3: must be 0 (all) to 2"),
+        ("gps", "off", "instance = 1", "faults[0].instance = 1: must be 0, because"),
+        ("gyro", "off", "start_s = -1", "faults[0].start_s = -1: must be 0 to 86400"),
+        ("gyro", "off", "duration = 1", 'unknown key "faults[0].duration" = 1, did you mean'),
+    ],
+)
+def test_a_fault_that_cannot_be_is_refused_in_a_sentence(
+    unit: str, kind: str, more: str, sentence: str
+) -> None:
+    with pytest.raises(ScenarioError) as refused:
+        check(parse_scenario(BASE + FAULT.format(unit, kind, more), "one"))
+    assert str(refused.value).startswith(sentence)
+    assert "\n" not in str(refused.value)
+
+
+def test_a_fault_that_means_nothing_in_lockstep_is_refused_there() -> None:
+    late = parse_scenario(BASE + FAULT.format("to vehicle", "delayed", ""), "one")
+    check_pacing(late, realtime=True)
+    with pytest.raises(ScenarioError, match=r"faults\[0\]: to vehicle delayed needs real time"):
+        check_pacing(late, realtime=False)
+
+
+def test_a_fault_of_a_sensor_needs_the_sensor_in_the_suite_that_is_flown() -> None:
+    text = BASE + FAULT.format("mag", "stuck", "")
+    check(parse_scenario(text, "one", "gnss"))
+    with pytest.raises(ScenarioError, match="not on board"):
+        check(parse_scenario(text, "one", "mocap"))

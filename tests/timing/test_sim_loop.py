@@ -30,6 +30,9 @@ from fsw.runtime.rate_groups import HOUSEKEEPING, INNER, MPC, RATE_GROUPS, TELEM
 from fsw.runtime.sim_loop import Ending, FlightRecord, SimLoop
 from fsw.runtime.timing import GroupTimer
 from fsw.signals import (
+    CommandAck,
+    CommandRequest,
+    CommandResult,
     HostHealth,
     PlannerCounters,
     PlanRequest,
@@ -57,6 +60,14 @@ class Sim(VirtualSensors):
     done: list[str] = field(default_factory=list)  # shared by all parts
     answers: list[tuple[int, TickOutputs]] = field(default_factory=list)  # at, what
     notices: list[str] = field(default_factory=list)
+    routed_acks: list[CommandAck] = field(default_factory=list)
+    routed: list[CommandRequest] = field(default_factory=list)
+
+    def route(self, request: CommandRequest) -> None:
+        """The simulator does as it is asked, and says so with a later step."""
+        self.routed.append(request)
+        ack = CommandAck(request.command, 0, request.source_system, request.source_component)
+        self.routed_acks.append(ack)
 
     def newest(self) -> SensorFrame | None:
         self.done.append("sensors")
@@ -97,6 +108,7 @@ class Ground:
     done: list[str]
     takes: Callable[[], None]
     texts: list[str] = field(default_factory=list)
+    acks: list[CommandAck] = field(default_factory=list)
     received: int = 0
 
     def poll(self, t_us: int) -> None:
@@ -107,8 +119,8 @@ class Ground:
         self.texts += [text.text for text in outputs.texts]
         self.takes()
 
-    def acknowledge(self, t_us: int, ack: object) -> None:
-        pass
+    def acknowledge(self, t_us: int, ack: CommandAck) -> None:
+        self.acks.append(ack)
 
 
 class Null:
@@ -172,9 +184,9 @@ class Bench:
         end = self.loop.fly(frame(FIRST_US), StubPlanner(self.sim.done))
         assert end.ending is Ending.STOPPED
 
-    def command(self, *parameters: float) -> None:
-        """COMPONENT_ARM_DISARM arrives from a ground station."""
-        values = (*parameters, *(0.0,) * (7 - len(parameters)), 400, 1, 1, 0)
+    def command(self, *parameters: float, number: int = 400) -> None:
+        """COMPONENT_ARM_DISARM, or another command, arrives from a ground station."""
+        values = (*parameters, *(0.0,) * (7 - len(parameters)), number, 1, 1, 0)
         for one in split(FrameWriter(255, 190).frame(message_ids.COMMAND_LONG, *values)):
             self.inbox.accept(one)
 
@@ -325,6 +337,22 @@ def test_a_command_acts_on_the_actuators_within_one_tick_of_its_arrival(moment_u
     stopped = [at for at, total in thrust if total == 0.0]
     assert len(running) >= 199
     assert max(running) < arrived[0] < min(stopped) <= arrived[0] + PERIOD_US
+
+
+def test_a_command_to_the_simulator_is_routed_once_and_its_sender_gets_the_answer() -> None:
+    def tick(state: int, inputs: TickInputs) -> tuple[int, TickOutputs]:
+        state, outputs = standing(state, inputs)
+        later = CommandResult.IN_PROGRESS
+        return state, replace(
+            outputs, acks=tuple(CommandAck(420, later, 255, 190) for _ in inputs.commands)
+        )
+
+    bench = Bench(tick)
+    bench.command(0.0, 1.0, number=420)
+    bench.run(0.1)
+    (routed,) = bench.sim.routed
+    assert routed.params[:3] == (0.0, 1.0, 0.0)
+    assert bench.ground.acks == [CommandAck(420, 0, 255, 190)]
 
 
 def test_a_disk_that_does_not_answer_delays_no_tick_and_loses_only_log(tmp_path: Path) -> None:

@@ -69,6 +69,7 @@ class CommandContext:
     max_speed: float  # m/s, that can be asked for
     yaw_rate: float  # rad/s, at most
     acceleration: float  # m/s^2, of a generated setpoint
+    failures_allowed: bool = False  # to be injected
 
 
 @dataclass(frozen=True, slots=True)

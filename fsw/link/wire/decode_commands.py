@@ -24,6 +24,7 @@ from fsw.signals import (
     Facing,
     FlyOrbit,
     GoTo,
+    InjectFailure,
     LookAt,
     Mode,
     MoveJoints,
@@ -221,6 +222,15 @@ def _test_actuator(request: CommandRequest, _: Locate) -> CommandAction:
     raise _InvalidError(f"no actuator test: {reason}")
 
 
+def _inject_failure(request: CommandRequest, _: Locate) -> CommandAction:
+    """Unit, failure and instance; which of them there are is the simulator's to say."""
+    unit, kind, instance = (0.0 if math.isnan(value) else value for value in request.params[:3])
+    if not all(0.0 <= value < 256.0 and value == int(value) for value in (unit, kind, instance)):
+        numbers = f"{unit:g}, {kind:g} and {instance:g}"
+        raise _InvalidError(f"no failure injected: {numbers} must be whole, 0 to 255")
+    return InjectFailure(int(unit), int(kind), int(instance))
+
+
 def _to(mode: Mode) -> Callable[[CommandRequest, Locate], CommandAction]:
     return lambda *_: SwitchMode(mode)
 
@@ -293,4 +303,5 @@ _READERS: Final[dict[int, Callable[[CommandRequest, Locate], CommandAction]]] = 
     310: _test_actuator,  # ACTUATOR_TEST
     400: _arm_or_disarm,  # COMPONENT_ARM_DISARM
     401: _check_arming,  # RUN_PREARM_CHECKS
+    420: _inject_failure,  # INJECT_FAILURE
 }

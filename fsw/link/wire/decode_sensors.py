@@ -23,6 +23,7 @@ from fsw.measurements import (
     Vec3,
     Vec4,
 )
+from fsw.signals import BatteryReading
 from messages.frames import Frame
 
 Locate = Callable[[float, float, float], Vec3]
@@ -39,6 +40,8 @@ _LOCAL_NED: Final = 1  # MAV_FRAME
 _DRIFTING: Final = (2, 3, 7)  # MAV_ESTIMATOR_TYPE: vision, visual-inertial, lidar
 _DOWNWARD: Final = 25  # MAV_SENSOR_ORIENTATION
 _UNKNOWN_EPH: Final = 0xFFFF
+_UNKNOWN_VOLTAGE: Final = 0xFFFF
+_VOLTAGE_AT, _REMAINING_AT = 3, 17  # of BATTERY_STATUS: voltages[0] is the pack's
 _LEVEL_FIX: Final = 2  # GPS_FIX_TYPE; those above it have a height
 # HIL_SENSOR and HIL_GPS do not state these.
 _PRESSURE_VARIANCE: Final = 0.2**2  # m^2: noise of a small barometer, 0.1 m, and gusts
@@ -100,6 +103,14 @@ class SampleDecoder:
             (level, level, _stated(epv)),
             (speed, speed, speed),
         )
+
+
+def battery_reading(values: Numbers) -> BatteryReading | None:
+    """Voltage and charge of a BATTERY_STATUS; None if it does not know them."""
+    millivolts, percent = values[_VOLTAGE_AT], values[_REMAINING_AT]
+    if millivolts == _UNKNOWN_VOLTAGE or not 0 <= percent <= 100:
+        return None
+    return BatteryReading(1e-3 * millivolts, 1e-2 * percent)
 
 
 def inertial_sample(values: Numbers) -> ImuSample:

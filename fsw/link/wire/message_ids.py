@@ -91,3 +91,4 @@ SYSTEM_ID: Final = 1  # the vehicle
 AUTOPILOT: Final = 1  # MAV_COMP_ID_AUTOPILOT1: speaks common.xml
 PANDION: Final = 191  # MAV_COMP_ID_ONBOARD_COMPUTER: speaks the dialect, with its own sequence
 PATH_PLANNER: Final = 195  # MAV_COMP_ID_PATHPLANNER: the scenario's pilot, on the simulator link
+SIMULATOR: Final = 200  # component of the simulated sensors, which also lets them fail

@@ -529,3 +529,16 @@ def test_home_needs_an_estimate_and_keeps_the_heading() -> None:
     assert decided(SetHome(None), replace(HIGH, yaw=0.7)).home == Home(HIGH.position, 0.7)
     lost = decided(SetHome(None), replace(HIGH, estimate_valid=False))
     assert (lost.result, lost.home) == (TEMPORARILY_REJECTED, None)
+
+
+@pytest.mark.parametrize("situation", [STANDING, HIGH])
+def test_a_failure_is_injected_only_where_the_parameter_allows_it(
+    situation: CommandContext,
+) -> None:
+    refused = ask(situation, 420, 0.0, 1.0, 0.0)
+    assert refused.result == DENIED
+    assert "SYS_FAILURE_EN" in refused.reason
+    allowed = replace(situation, failures_allowed=True)
+    assert ask(allowed, 420, 0.0, 1.0, NAN) == Decision(CommandResult.IN_PROGRESS)
+    assert ask(allowed, 420, 0.5, 1.0, 0.0).result == DENIED
+    assert ask(allowed, 420, math.inf, 1.0, 0.0).result == DENIED

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import socket
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -12,9 +13,21 @@ import pytest
 from fsw.link.inbox import Inbox
 from fsw.link.sim_link import Pacing, SimLink
 from fsw.link.wire import message_ids as ids
-from fsw.signals import CommandAck, MessageSource, Mode, SafeSet, Severity, Shape, StatusText
+from fsw.signals import (
+    BatteryReading,
+    CommandAck,
+    CommandRequest,
+    MessageSource,
+    Mode,
+    SafeSet,
+    Severity,
+    Shape,
+    StatusText,
+)
 from messages.frames import FrameWriter, split
+from sitl.link.decode import read_reply
 from sitl.link.encode import StepEncoder
+from sitl.link.failures import Injection, carry_out
 from sitl.link.pilot import Phase, PilotState, flight_plan, speak
 from sitl.link.pilot_messages import SendCommand
 from sitl.mission_clock import MissionClock
@@ -22,6 +35,7 @@ from sitl.scenario import Scenario, Workspace
 from sitl.scenario_file import load_scenario
 from sitl.sensors.exact import SensorReadings
 from sitl.shapes.box import Box
+from sitl.simulation import Controls, Simulation
 from studies.mission import safe_set as safe_set_of
 from tests.fsw.link.snapshots import FACTS, outputs_at
 
@@ -300,3 +314,64 @@ def test_garbage_releases_no_tick(wire: Wire) -> None:
     for datagram in (b"", b"\xfd" * 300, FrameWriter(1, 200).frame(ids.HEARTBEAT, *(0,) * 6)):
         wire.send(datagram)
         assert wire.link.wait_for_step() is None
+
+
+INJECT = CommandRequest(420, (0.0, 1.0, 0.0, NAN, NAN, NAN, NAN), 245, 190, confirmation=1)
+
+
+def test_a_fault_is_asked_for_in_the_name_of_its_sender_and_the_answer_comes_back(
+    wire: Wire,
+) -> None:
+    encoder = StepEncoder(lockstep=True)
+    simulation = Simulation(load_scenario("walls-calm"), 0)
+    wire.link.route(INJECT)
+    wire.link.send_actuators(1_002_000, outputs_at(1_002_000))
+    reply = read_reply(wire.hear(), 2)
+    assert reply is not None
+    (asked,) = reply.injections
+    assert asked == Injection(unit=0, kind=1, instance=0, system=245, component=190)
+    answer = encoder.answer(asked, carry_out(simulation, asked))
+    wire.send(answer + encoder.datagram(readings(1_004_000), ()))
+    assert wire.link.wait_for_step() is not None
+    assert wire.link.routed_acks == [CommandAck(420, 0, 245, 190)]
+    assert wire.link.notices == ["fault injected: gyro off"]
+    simulation.advance(Controls((0.5, 0.5, 0.5, 0.5), (0.0, 0.0), armed=True))
+    assert math.isnan(simulation.sense().gyro_B[0])
+
+
+@pytest.mark.parametrize(
+    ("numbers", "result", "sentence"),
+    [
+        ((2, 1, 0), 3, 'no fault: unit = "mag": not on board'),
+        ((104, 1, 0), 3, "no fault: the vehicle has no unit 104"),
+        ((0, 9, 0), 3, "no fault: kind 9 is not one of 0 to 7"),
+        ((101, 1, 5), 2, "no fault: motor 5 is not one of 4"),
+        ((102, 3, 1), 3, 'no fault: kind = "garbage": a joint can be "off", "stuck"'),
+        ((101, 1, 2), 0, "fault injected: motor 2 off"),
+        ((0, 0, 1), 0, "fault ended: gyro"),
+    ],
+)
+def test_the_simulator_says_why_it_lets_nothing_fail(
+    numbers: tuple[int, int, int], result: int, sentence: str
+) -> None:
+    simulation = Simulation(load_scenario("walls-calm"), 0)
+    answer = carry_out(simulation, Injection(*numbers, system=1, component=1))
+    assert answer.result == result
+    assert answer.sentence.startswith(sentence)
+
+
+@pytest.mark.parametrize("measured", [False, True])
+def test_the_battery_is_measured_where_the_simulator_says_so(wire: Wire, measured: bool) -> None:
+    encoder = StepEncoder(lockstep=True, measured=measured)
+    step = (
+        encoder.measured_datagrams(1_002_000, (), ())[1]
+        if measured
+        else encoder.datagram(readings(1_002_000), ())
+    )
+    wire.send(encoder.heartbeat() + encoder.battery(14.2, 0.08) + step)
+    assert wire.link.wait_for_step() is not None
+    assert wire.inbox.take().battery == BatteryReading(pytest.approx(14.2), pytest.approx(0.08))
+    ground = FrameWriter(255, 190).frame(ids.BATTERY_STATUS, *(0,) * 26)
+    for frame in split(ground):
+        wire.inbox.accept(frame)
+    assert wire.inbox.take().battery is None, "a ground station is no sensor"

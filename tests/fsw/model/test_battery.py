@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fsw.model.airframe import AIRFRAME, GRAVITY
-from fsw.model.battery import BatteryModel, charge_of, drained
-from fsw.signals import BatteryState, Charge, Vec4
+from fsw.model.battery import BatteryModel, charge_of, corrected, drained
+from fsw.signals import BatteryReading, BatteryState, Charge, Vec4
 
 LEVELS = (0.3, 0.2, 0.1)
 FULL = BatteryState(16.8, 0.0, 0.0, 1.0, Charge.OK)
@@ -104,6 +104,16 @@ def test_a_full_battery_at_rest_shows_four_full_lithium_cells() -> None:
     model = BatteryModel()
     assert model.full == pytest.approx(4 * 4.2)
     assert model.empty == pytest.approx(4 * 3.4)
+
+
+def test_a_measurement_corrects_the_model_which_goes_on_from_there() -> None:
+    model = BatteryModel()
+    drawn = drained(model, LEVELS, FULL, HOVER, 1.0)
+    now = corrected(model, LEVELS, drawn, BatteryReading(14.2, 0.15))
+    assert (now.voltage, now.remaining, now.charge) == (14.2, 0.15, Charge.CRITICAL)
+    later = drained(model, LEVELS, now, HOVER, 1.0)
+    assert 0.14 < later.remaining < 0.15
+    assert corrected(model, LEVELS, later, BatteryReading(16.8, 1.0)).charge is Charge.OK
 
 
 def test_the_flight_time_that_is_left_is_that_at_the_current_of_late() -> None:

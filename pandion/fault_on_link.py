@@ -1,0 +1,160 @@
+"""A cell of the matrix with both processes in real time: processes and datagrams fail."""
+
+from __future__ import annotations
+
+import io
+import time
+from dataclasses import asdict
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, Final
+
+from command_line.options import as_words
+from fsw.arguments import FswOptions
+from fsw.link.link_choice import NO_LINK, LinkChoice
+from fsw.parameters.control_choice import ControlChoice
+from fsw.signals import Mode, Severity
+from pandion.display import Display
+from pandion.fault_station import Noted, Station
+from pandion.supervisor import Flown, ProcessFailed, Supervisor
+from sitl.arguments import SitlOptions
+from sitl.faults.keys import Fault
+from sitl.scenario_file import PACKAGED
+from studies.fault_flights import SITUATIONS, FaultFlight, Said, beside_the_wall_text
+from studies.fault_matrix import Cell, Judged, broken, judge
+
+_TOUCHED: Final = ("collision", "crash", "diverged")
+_WAIT_S: Final = 600.0
+_PACKAGED: Final = {"trajectory": "walls-calm", "workspace": "workspace-calm"}
+
+
+class _Watch(Display):
+    """Prints nothing and notes when the simulator said that the fault began."""
+
+    def __init__(self) -> None:
+        super().__init__(io.StringIO())
+        self.begun_s: float | None = None
+
+    def say(self, sentence: str) -> None:
+        """See :class:`Display`."""
+        if sentence.startswith("sitl: fault") and self.begun_s is None:
+            self.begun_s = time.monotonic()
+
+
+def fly_cell(cell: Cell) -> Judged:
+    """Fly one cell; what could not be flown is a cell that differs."""
+    with TemporaryDirectory() as folder:
+        return judge(cell, _flown(cell, Path(folder)))
+
+
+def _flown(cell: Cell, folder: Path) -> FaultFlight:
+    situation, fault = SITUATIONS[cell.mode], cell.expected.fault
+    assert fault is not None
+    scenario = folder / "cell.toml"
+    scenario.write_text(_scenario(cell.mode, fault, situation.fault_s), encoding="utf-8")
+    station, watch = Station(cell.mode), _Watch()
+    station.start()
+    try:
+        flown = Supervisor(watch, folder).run(
+            as_words(_sitl(scenario, cell, situation.ends_s, folder)),
+            lambda port: as_words(_fsw(port, station.port, situation.body, folder)),
+        )
+    except ProcessFailed as error:
+        return broken(str(error))
+    finally:
+        station.close()
+    if watch.begun_s is None:
+        return broken(f"the fault did not begin: {flown.failure or 'the flight was over'}")
+    return _seen(cell.mode, flown, station.noted, watch.begun_s, time.monotonic())
+
+
+def _scenario(mode: str, fault: Fault, start_s: float) -> str:
+    if mode in _PACKAGED:
+        text = (PACKAGED / f"{_PACKAGED[mode]}.toml").read_text(encoding="utf-8")
+    else:
+        text = beside_the_wall_text(
+            "ground" if mode == "takeoff" else "airborne",
+            "none" if mode == "takeoff" else "trajectory",
+        )
+    keys = asdict(fault) | {"start_s": start_s}
+    lines = [f"{k} = {v!r}" if isinstance(v, float) else f'{k} = "{v}"' for k, v in keys.items()]
+    return "\n".join([text, "[[faults]]", *lines, ""])
+
+
+def _sitl(scenario: Path, cell: Cell, ends_s: float, out: Path) -> SitlOptions:
+    return SitlOptions(
+        scenario=str(scenario),
+        seed=cell.seed,
+        duration_s=ends_s,
+        sensors=cell.expected.suite,
+        realtime=True,
+        listen="udp:127.0.0.1:0",
+        wait_s=_WAIT_S,
+        out=out,
+    )
+
+
+def _fsw(port: int, station: int, body: str, out: Path) -> FswOptions:
+    return FswOptions(
+        sim=f"udp:127.0.0.1:{port}",
+        links=LinkChoice(gcs=f"udp:127.0.0.1:{station}", api=NO_LINK),
+        control=ControlChoice(body=body),
+        out=out,
+        wait_s=_WAIT_S,
+    )
+
+
+def _seen(
+    mode: str, flown: Flown, noted: list[Noted], begun_s: float, ended_s: float
+) -> FaultFlight:
+    """What of a flight counts: what the station has heard from the fault on, and the end."""
+    situation = SITUATIONS[mode]
+    before = [one.mode for one in noted if one.mode is not None and one.at_s < begun_s]
+    problem = ""
+    if not before or before[-1] is not situation.mode:
+        problem = f"in {before[-1].value if before else 'no mode'} when the fault began"
+    texts = [
+        Said(round(one.at_s - begun_s, 3), one.severity, one.text)
+        for one in noted
+        if one.text and one.at_s >= begun_s
+    ]
+    actions = _actions([one for one in noted if not one.text and one.at_s >= begun_s], mode)
+    result: dict[str, Any] = flown.sitl or {}
+    kind = str(result.get("end_kind"))
+    failure = flown.failure or (str(result.get("end_reason")) if kind == "stopped" else "")
+    if failure:
+        actions.append("ended")
+        texts.append(Said(round(ended_s - begun_s, 3), int(Severity.CRITICAL), failure))
+    for lost in flown.unwritten:
+        texts.append(Said(round(ended_s - begun_s, 3), int(Severity.WARNING), lost))
+    warnings = [one for one in texts if one.severity <= Severity.WARNING]
+    reason = str(result.get("end_reason", ""))
+    contact = ""
+    if kind in _TOUCHED:
+        contact = "ground" if "hit the ground" in reason else "wall"
+    return FaultFlight(
+        told_s=warnings[0].after_s if warnings else None,
+        told=warnings[0].text if warnings else "",
+        actions=tuple(actions),
+        contact=contact,
+        ended=reason if contact or failure else "",
+        least_m=result.get("min_margin_m"),
+        texts=tuple(texts),
+        problem=problem,
+    )
+
+
+def _actions(changes: list[Noted], mode: str) -> list[str]:
+    """Modes that no completion explains."""
+    nominal = SITUATIONS[mode].nominal
+    found: list[str] = []
+    for one in changes:
+        if one.terminated:
+            action = "terminate"
+        elif one.mode is None or one.mode in nominal or one.mode is Mode.DISARMED:
+            continue
+        else:
+            action = one.mode.value
+        if not found or found[-1] != action:
+            found.append(action)
+    return found

@@ -1,0 +1,156 @@
+"""A ground station that brings a vehicle into a mode and notes what it says, over the link."""
+
+from __future__ import annotations
+
+import socket
+import threading
+import time
+from dataclasses import dataclass
+from typing import Any, Final
+
+from fsw.link.wire.px4_mode import MODE_BY_PX4
+from fsw.signals import Mode
+from messages import dialect
+
+_BEAT_S: Final = 0.5
+_SETPOINT_S: Final = 0.05
+_ASKS_AT_S: Final = 1.0  # after the first heartbeat
+_LOCAL_NED: Final = 1
+_POSITION_ONLY: Final = 0x0DF8  # type mask of SET_POSITION_TARGET_LOCAL_NED
+_HEIGHT: Final = 1.425  # m, of the base
+_NAN: Final = float("nan")
+_MODES: Final = {(int(main), int(sub)): mode for (main, sub), mode in MODE_BY_PX4.items()}
+_MISSION: Final = ((0.0, 0.8), (0.0, -0.8), (0.0, 0.8))  # m, north and east
+
+
+@dataclass(frozen=True, slots=True)
+class Noted:
+    """A text, or a mode that began."""
+
+    at_s: float  # on the monotonic clock
+    severity: int = 99
+    text: str = ""
+    mode: Mode | None = None
+    terminated: bool = False
+    failsafe: bool = False
+
+
+class Station(threading.Thread):
+    """Speaks to one vehicle until it is closed."""
+
+    def __init__(self, mode: str) -> None:
+        """Ask for a mode of the matrix a second after the vehicle is there."""
+        super().__init__(daemon=True)
+        self.noted: list[Noted] = []
+        self._wanted = mode
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.bind(("127.0.0.1", 0))
+        self._socket.settimeout(0.02)
+        self._link: Any = dialect.MAVLink(None, srcSystem=255, srcComponent=190)
+        self._link.robust_parsing = True
+        self._vehicle: tuple[str, int] | None = None
+        self._first_s: float | None = None
+        self._asked = 0
+        self._mode: tuple[Mode | None, bool, bool] = (None, False, False)
+        self._ended = False
+
+    @property
+    def port(self) -> int:
+        """Where the vehicle finds it."""
+        return int(self._socket.getsockname()[1])
+
+    def close(self) -> None:
+        """Hang up."""
+        self._ended = True
+        self.join()
+        self._socket.close()
+
+    def run(self) -> None:
+        """See :class:`Station`."""
+        beat_s = setpoint_s = 0.0
+        while not self._ended:
+            self._hear()
+            now_s = time.monotonic()
+            if self._vehicle is None or self._first_s is None:
+                continue
+            if now_s - beat_s >= _BEAT_S:
+                beat_s = now_s
+                self._send(self._link.heartbeat_encode(6, 8, 0, 0, 4))
+                self._ask(now_s - self._first_s)
+            if self._wanted == "offboard" and now_s - setpoint_s >= _SETPOINT_S:
+                setpoint_s = now_s
+                self._send(
+                    self._link.set_position_target_local_ned_encode(
+                        0, 1, 1, _LOCAL_NED, _POSITION_ONLY, 0.0, 0.5, -_HEIGHT, *(0.0,) * 8
+                    )
+                )
+
+    def _hear(self) -> None:
+        try:
+            datagram, self._vehicle = self._socket.recvfrom(2048)
+        except (TimeoutError, ConnectionRefusedError):
+            return
+        for message in self._link.parse_buffer(datagram) or []:
+            name = message.get_type()
+            now_s = time.monotonic()
+            if name == "HEARTBEAT" and message.get_srcComponent() == 1:
+                self._first_s = now_s if self._first_s is None else self._first_s
+                self._note_mode(now_s, message)
+            elif name == "STATUSTEXT":
+                self.noted.append(Noted(now_s, int(message.severity), message.text))
+            elif name in ("MISSION_REQUEST_INT", "MISSION_REQUEST"):
+                self._send(self._item(message.seq))
+
+    def _note_mode(self, now_s: float, beat: Any) -> None:
+        main, sub = beat.custom_mode >> 16 & 0xFF, beat.custom_mode >> 24
+        terminated = beat.system_status == 8
+        now = (_MODES.get((main, sub)), terminated, beat.system_status == 5)
+        if now != self._mode:
+            self._mode = now
+            mode, _, failsafe = now
+            one = Noted(now_s, mode=mode, terminated=terminated, failsafe=failsafe)
+            self.noted.append(one)
+
+    def _ask(self, since_s: float) -> None:
+        """Ask for the mode, twice in case that a datagram is lost."""
+        if since_s < _ASKS_AT_S or self._asked >= 2:
+            return
+        self._asked += 1
+        for number, params in _COMMANDS[self._wanted]:
+            self._send(self._link.command_int_encode(1, 1, _LOCAL_NED, number, 0, 0, *params))
+        if self._wanted == "mission" and self._asked == 1:
+            self._send(self._link.mission_count_encode(1, 1, len(_MISSION), 0))
+
+    def _item(self, number: int) -> Any:
+        north, east = (round(1e4 * value) for value in _MISSION[number])
+        return self._link.mission_item_int_encode(
+            1, 1, number, _LOCAL_NED, 16, 0, 1, 0.0, 0.0, 0.0, _NAN, north, east, -1.2, 0
+        )
+
+    def _send(self, message: Any) -> None:
+        assert self._vehicle is not None
+        self._socket.sendto(message.pack(self._link), self._vehicle)
+
+
+_SET_MODE, _ARM, _HOME = 176, 400, 179
+
+
+def _mode(main: int, sub: int = 0) -> tuple[int, tuple[Any, ...]]:
+    return (_SET_MODE, (1.0, float(main), float(sub), 0.0, 0, 0, 0.0))
+
+
+# MAV_CMD and the seven parameters of a COMMAND_INT; positions in 1e-4 m.
+_COMMANDS: Final[dict[str, list[tuple[int, tuple[Any, ...]]]]] = {
+    "hold": [_mode(4, 3)],
+    "trajectory": [],
+    "workspace": [],
+    "offboard": [_mode(6)],
+    "mission": [(300, (0.0, 0.0, 0.0, 0.0, 0, 0, 0.0))],
+    "orbit": [(34, (0.6, 0.4, _NAN, _NAN, -6000, 0, -_HEIGHT))],
+    "takeoff": [
+        (_ARM, (1.0, 0.0, 0.0, 0.0, 0, 0, 0.0)),
+        (22, (0.0, 0.0, 0.0, _NAN, 0, 0, -1.6)),
+    ],
+    "land": [_mode(4, 6)],
+    "return": [(_HOME, (0.0, 0.0, 0.0, 0.0, 0, 10000, -0.32)), _mode(4, 5)],
+}

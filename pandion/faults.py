@@ -1,0 +1,148 @@
+"""``pandion faults``: let things fail in flight, and compare with what must happen."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+from command_line.options import json_file, option, read, switch
+from command_line.output import console_beside, unwritten
+from command_line.parser import COULD_NOT_START, unknown_name
+from command_line.values import output_file, whole
+from command_line.version import version
+from pandion.display import Display
+
+if TYPE_CHECKING:
+    from studies.fault_expectations import Expected
+    from studies.fault_matrix import Cell, Judged
+
+AS_EXPECTED, DIFFERS = 0, 1  # exit codes
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FaultsOptions:
+    """One cell, or the matrix."""
+
+    mode: str | None = option("MODE", "fly this mode alone")
+    fault: str | None = option("FAULT", "with this fault")
+    matrix: bool = switch("--matrix", "every mode with every fault")
+    only: str | None = option("--only TEXT", "of the matrix: faults and modes with this text")
+    seed: int = option("--seed N", "root of all randomness", whole(), default=0)
+    workers: int = option(
+        "--workers N",
+        "processes; 0 flies in this one (default one a core)",
+        whole(0, 1024),
+        default=os.cpu_count() or 1,
+    )
+    expect: Path | None = option("--expect FILE", "what must happen (default the packaged)", Path)
+    json: str | None = json_file("the cells")
+    html: str | None = option("--html FILE", "write the matrix as a page", output_file)
+
+
+class UnknownError(ValueError):
+    """A mode or a fault that there is not."""
+
+
+_NEITHER: Final = "give MODE and FAULT, or --matrix"
+
+
+def main(argv: list[str]) -> int:
+    """Fly and compare; returns the exit code."""
+    what = "Let something fail in flight and compare with what must happen."
+    options = read(FaultsOptions, "pandion faults", what, argv)
+    from fsw.runtime.process import pin_numerics_to_one_thread
+
+    pin_numerics_to_one_thread()  # before NumPy loads
+    from studies.fault_expectations import EXPECTATIONS, ExpectationError, expectations
+
+    try:
+        known = expectations(options.expect or EXPECTATIONS)
+        return _run(options, _chosen(options, known))
+    except (ExpectationError, UnknownError, OSError) as error:
+        print(f"pandion faults: {error}", file=sys.stderr)
+        return COULD_NOT_START
+
+
+def _chosen(options: FaultsOptions, known: dict[str, Expected]) -> list[Cell]:
+    from studies.fault_flights import SITUATIONS
+    from studies.fault_matrix import Cell
+
+    if options.matrix == (options.mode is not None):
+        raise UnknownError(_NEITHER)
+    if options.matrix:
+        every = [
+            Cell(mode, one, options.seed)
+            for one in known.values()
+            for mode in SITUATIONS
+            if options.only is None or options.only in f"{mode} {one.name}"
+        ]
+        if not every:
+            raise UnknownError(f"no fault and no mode contains {options.only!r}")
+        return every
+    if options.mode not in SITUATIONS:
+        raise UnknownError(_unknown("mode", options.mode, tuple(SITUATIONS)))
+    if options.fault not in known:
+        raise UnknownError(_unknown("fault", options.fault, tuple(known)))
+    return [Cell(options.mode, known[options.fault], options.seed)]
+
+
+def _unknown(what: str, name: str | None, known: tuple[str, ...]) -> str:
+    if name is None:
+        return _NEITHER
+    hint = unknown_name(what, name, known)
+    return hint if "did you mean" in hint else f"{hint} (known: {', '.join(known)})"
+
+
+def _run(options: FaultsOptions, cells: list[Cell]) -> int:
+    from studies.fault_page import page, summary
+
+    display = Display(console_beside(options.json))
+    display.say(f"Pandion {version()}: {len(cells)} flights, seed {options.seed}")
+    workers = 0 if len(cells) == 1 else options.workers
+    with display.progress():
+        rows = _flown(cells, workers, display)
+    for row in rows:
+        if row.differs or len(rows) == 1:
+            _say(display, row, summary(row))
+    if len(rows) == 1:
+        for said in rows[0].flight.texts:
+            display.say(f"  {said.after_s:8.3f} s  {said.text}")
+    wrong = sum(1 for row in rows if row.differs)
+    display.say(f"{len(rows) - wrong} of {len(rows)} as they must be")
+    text = json.dumps([row.as_json() for row in rows], indent=1, allow_nan=False) + "\n"
+    lost = unwritten(options.json, text)
+    if options.html is not None:
+        lost += unwritten(options.html, page(rows, (f"Pandion {version()}, seed {options.seed}",)))
+    for what in lost:
+        print(f"pandion faults: cannot write {what}", file=sys.stderr)
+    return DIFFERS if wrong or lost else AS_EXPECTED
+
+
+def _flown(cells: list[Cell], workers: int, display: Display) -> list[Judged]:
+    """Flights in process on all workers, then those in real time, one after the other."""
+    from studies.fault_matrix import run
+
+    inside = [cell for cell in cells if not cell.expected.link]
+    found = dict(
+        zip(
+            inside,
+            run(inside, workers, lambda done, _: display.report("flown", done, len(cells))),
+            strict=True,
+        )
+    )
+    for cell in cells:
+        if cell.expected.link:
+            from pandion.fault_on_link import fly_cell
+
+            found[cell] = fly_cell(cell)
+            display.report("flown", len(found), len(cells))
+    return [found[cell] for cell in cells]
+
+
+def _say(display: Display, row: Judged, summary: str) -> None:
+    verdict = "; ".join(row.differs) or row.flight.ended or "as it must be"
+    display.say(f"{row.cell.mode:10} {row.cell.expected.name:24} {summary}: {verdict}")

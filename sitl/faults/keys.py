@@ -1,0 +1,141 @@
+"""What may stand in a table of ``[[faults]]``: a unit, how it fails, and when.
+
+Units and kinds are those of MAVLink's FAILURE_UNIT and FAILURE_TYPE where it has them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, Final, Literal, TypeAlias
+
+from sitl.ranges import Range
+
+Unit: TypeAlias = Literal[
+    "gyro",
+    "accel",
+    "mag",
+    "baro",
+    "gps",
+    "optical flow",
+    "vio",
+    "distance",
+    "encoder",
+    "battery",
+    "motor",
+    "joint",
+    "mavlink",
+    "to vehicle",
+    "to simulator",
+    "simulator",
+    "flight software",
+    "planner",
+    "disk",
+    "clock",
+]
+Kind: TypeAlias = Literal[
+    "off",
+    "stuck",
+    "garbage",
+    "wrong",
+    "slow",
+    "delayed",
+    "intermittent",
+    "weak",
+    "duplicated",
+    "reordered",
+    "stopped",
+    "killed",
+    "full",
+    "jump",
+]
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """One unit that fails in one way for a while."""
+
+    unit: Unit
+    kind: Kind
+    start_s: Annotated[float, Range(0.0, 86400.0)] = 0.0  # since the start of the simulation
+    duration_s: Annotated[float, Range(0.0, 86400.0)] = 0.0  # 0: to the end of the flight
+    instance: Annotated[float, Range(0.0, 4.0, step=1.0)] = 0.0  # of motors and joints; 0: all
+    # weak: of the thrust that is left, or of the battery's charge; intermittent, duplicated,
+    # reordered: of the time, or of the datagrams.
+    share: Annotated[float, Range(0.0, 1.0)] = 0.5
+    size: Annotated[float, Range(0.0, 1000.0)] = 1.0  # wrong: times what is usual for the unit
+    delay_ms: Annotated[float, Range(0.0, 10000.0, step=2.0)] = 200.0  # delayed; slow: of a motor
+    rate_hz: Annotated[float, Range(0.1, 500.0)] = 5.0  # slow: of a sensor
+    jump_s: Annotated[float, Range(-3600.0, 3600.0)] = 0.5  # of the clock
+
+    @property
+    def number(self) -> int:
+        """Which motor or joint, from 1; 0: all."""
+        return round(self.instance)
+
+    def hits(self, index: int) -> bool:
+        """Whether the motor or joint of an index from 0 fails."""
+        return self.number in (0, index + 1)
+
+    @property
+    def of_real_time(self) -> bool:
+        """Whether it means nothing in lockstep, where nobody is late and the planner is inline."""
+        return self.unit == "planner" or (self.unit in LINKS and self.kind == "delayed")
+
+    def __str__(self) -> str:
+        """As an operator reads it."""
+        which = f" {self.number}" if self.number else ""
+        return f"{self.unit}{which} {self.kind}"
+
+
+SENSORS: Final = (
+    "gyro",
+    "accel",
+    "mag",
+    "baro",
+    "gps",
+    "optical flow",
+    "vio",
+    "distance",
+    "encoder",
+)
+LINKS: Final = ("to vehicle", "to simulator")
+PROCESSES: Final = ("simulator", "flight software", "planner", "disk")
+
+_SIGNAL: Final = ("off", "stuck", "garbage", "wrong", "slow", "delayed", "intermittent")
+_LINK: Final = ("off", "delayed", "intermittent", "duplicated", "reordered")
+_PROCESS: Final = ("stopped", "killed")
+KINDS: Final[dict[str, tuple[str, ...]]] = {
+    **dict.fromkeys(SENSORS, _SIGNAL),
+    "battery": ("off", "weak"),
+    "motor": (*_SIGNAL, "weak"),
+    "joint": ("off", "stuck"),
+    "mavlink": ("off", "intermittent"),
+    **dict.fromkeys(LINKS, _LINK),
+    **dict.fromkeys(("simulator", "flight software", "planner"), _PROCESS),
+    "disk": ("full",),
+    "clock": ("jump",),
+}
+"""How each unit can fail."""
+
+_INSTANCES: Final = {"motor": 4, "joint": 2, "encoder": 2}
+# Units that the exact states stand for: the pose is of satellites and of cameras.
+EXACT: Final = ("gyro", "accel", "gps", "vio", "encoder")
+
+
+def instances(unit: Unit) -> int:
+    """How many of a unit can fail each for itself; 0 where it is one."""
+    return _INSTANCES.get(unit, 0)
+
+
+def problem(fault: Fault, aboard: tuple[str, ...]) -> str | None:
+    """Key, value and what is allowed, where a fault contradicts itself or what is ``aboard``."""
+    kinds, most = KINDS[fault.unit], instances(fault.unit)
+    if fault.kind not in kinds:
+        allowed = ", ".join(f'"{kind}"' for kind in kinds)
+        return f'kind = "{fault.kind}": a {fault.unit} can be {allowed}'
+    if fault.unit in SENSORS and fault.unit not in aboard:
+        return f'unit = "{fault.unit}": not on board; the sensors are {", ".join(aboard)}'
+    if fault.number > most:
+        allowed = f"0 (all) to {most}" if most else f"0, because there is one {fault.unit}"
+        return f"instance = {fault.number}: must be {allowed}"
+    return None

@@ -1,0 +1,75 @@
+"""MAV_CMD_INJECT_FAILURE: the numbers of units and failures as faults of the simulation."""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+from sitl.faults.keys import Fault, Kind, Unit, instances
+from sitl.link.message_ids import ACCEPTED, DENIED, UNSUPPORTED
+from sitl.simulation import Simulation
+
+# FAILURE_UNIT; the joints are its servos. It has no number for the encoders.
+_UNITS: Final[dict[int, Unit]] = {
+    0: "gyro",
+    1: "accel",
+    2: "mag",
+    3: "baro",
+    4: "gps",
+    5: "optical flow",
+    6: "vio",
+    7: "distance",
+    100: "battery",
+    101: "motor",
+    102: "joint",
+    105: "mavlink",
+}
+# FAILURE_TYPE; 0 ends a failure.
+_KINDS: Final[dict[int, Kind]] = {
+    1: "off",
+    2: "stuck",
+    3: "garbage",
+    4: "wrong",
+    5: "slow",
+    6: "delayed",
+    7: "intermittent",
+}
+_WORKS: Final = 0
+
+
+class Injection(NamedTuple):
+    """What somebody asks to fail, or to work again."""
+
+    unit: int  # FAILURE_UNIT
+    kind: int  # FAILURE_TYPE
+    instance: int  # from 1; 0: all
+    system: int  # who asked
+    component: int
+
+
+class Answer(NamedTuple):
+    """What became of it."""
+
+    result: int  # MAV_RESULT
+    sentence: str
+
+
+def carry_out(simulation: Simulation, asked: Injection) -> Answer:
+    """Begin or end a fault from the next step on."""
+    unit = _UNITS.get(asked.unit)
+    if unit is None:
+        return Answer(UNSUPPORTED, f"no fault: the vehicle has no unit {asked.unit}")
+    most = instances(unit)
+    if asked.instance > max(most, 1):
+        return Answer(DENIED, f"no fault: {unit} {asked.instance} is not one of {max(most, 1)}")
+    number = asked.instance if most > 1 else 0
+    if asked.kind == _WORKS:
+        simulation.faults.clear(unit, number, simulation.step + 1)
+        return Answer(ACCEPTED, f"fault ended: {unit}")
+    kind = _KINDS.get(asked.kind)
+    if kind is None:
+        return Answer(UNSUPPORTED, f"no fault: kind {asked.kind} is not one of 0 to 7")
+    fault = Fault(unit, kind, instance=float(number))
+    refusal = simulation.inject(fault)
+    if refusal is not None:
+        return Answer(UNSUPPORTED, f"no fault: {refusal}")
+    return Answer(ACCEPTED, f"fault injected: {fault}")

@@ -1,0 +1,70 @@
+"""MAVSDK lets a unit of the vehicle fail, sees it, and lets it work again."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+from mavsdk import System
+from mavsdk.plugins.action import Action
+from mavsdk.plugins.failure import Failure, FailureError, FailureType, FailureUnit
+from mavsdk.plugins.param import Param
+from mavsdk.plugins.telemetry import Telemetry
+
+from tests.interop.mavsdk_client import connected, eventually
+from tests.interop.vehicle import FAST, Vehicle
+
+PACING = FAST
+
+
+@pytest.fixture(scope="module")
+def system(vehicle: Vehicle) -> Iterator[System]:
+    with connected(vehicle.api_port) as system:
+        assert eventually(Telemetry(system).health_all_ok)
+        yield system
+
+
+def test_a_failure_needs_the_parameter(system: System) -> None:
+    Param(system).set_param_float("SYS_FAILURE_EN", 0.0)
+    with pytest.raises(FailureError) as refused:
+        Failure(system).inject(FailureUnit.SENSOR_GYRO, FailureType.OFF, 0)
+    assert "DENIED" in str(refused.value)
+
+
+def test_a_failure_is_injected_seen_and_ended(system: System) -> None:
+    texts: list[str] = []
+    telemetry, failure = Telemetry(system), Failure(system)
+    telemetry.subscribe_status_text(lambda text, _: texts.append(text.text))
+    Param(system).set_param_float("SYS_FAILURE_EN", 1.0)
+    failure.inject(FailureUnit.SENSOR_GYRO, FailureType.OFF, 0)
+    assert eventually(lambda: "fault injected: gyro off" in texts), texts
+    assert eventually(lambda: any("invalid" in text for text in texts)), texts
+    failure.inject(FailureUnit.SENSOR_GYRO, FailureType.OK, 0)
+    assert eventually(lambda: "fault ended: gyro" in texts), texts
+    assert eventually(telemetry.health_all_ok), telemetry.health()
+    with pytest.raises(FailureError):
+        failure.inject(FailureUnit.SYSTEM_RC_SIGNAL, FailureType.OFF, 0)
+    assert eventually(lambda: any("no unit 104" in text for text in texts)), texts
+    Param(system).set_param_float("SYS_FAILURE_EN", 0.0)
+
+
+@pytest.mark.long
+def test_a_vehicle_that_lost_its_pose_acts_and_is_recovered(system: System) -> None:
+    telemetry, action, failure = Telemetry(system), Action(system), Failure(system)
+    Param(system).set_param_float("SYS_FAILURE_EN", 1.0)
+    action.set_takeoff_altitude(3.0)
+    action.arm()
+    action.takeoff()
+    assert eventually(lambda: telemetry.position_velocity_ned().position.down_m < -3.0, 20.0)
+    assert eventually(lambda: telemetry.flight_mode().name == "HOLD")
+    failure.inject(FailureUnit.SENSOR_VIO, FailureType.OFF, 0)
+    assert eventually(lambda: telemetry.flight_mode().name == "LAND")
+    failure.inject(FailureUnit.SENSOR_VIO, FailureType.OK, 0)
+    assert eventually(telemetry.health_all_ok), telemetry.health()
+    assert telemetry.in_air()
+    action.hold()
+    assert eventually(lambda: telemetry.flight_mode().name == "HOLD")
+    action.land()
+    assert eventually(lambda: telemetry.landed_state().name == "ON_GROUND", 40.0)
+    assert eventually(lambda: not telemetry.armed())
+    Param(system).set_param_float("SYS_FAILURE_EN", 0.0)
