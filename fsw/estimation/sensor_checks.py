@@ -109,7 +109,8 @@ def _numbers(sample: Aiding) -> tuple[float, ...]:
 def _plausible(sample: Aiding, tuning: EstimatorTuning) -> bool:
     match sample:
         case PoseSample():
-            squared = sum([c * c for c in sample.attitude])
+            w, x, y, z = sample.attitude
+            squared = w * w + x * x + y * y + z * z
             return 0.8 < squared < 1.25 and norm(sample.position) < tuning.place_limit
         case GnssSample():
             slow = norm(sample.velocity) < tuning.speed_limit

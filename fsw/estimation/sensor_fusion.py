@@ -119,11 +119,6 @@ class FusionMemory(NamedTuple):
         """What is known of the other sensors."""
         return [one for one in self.health if one.sensor is not sensor]
 
-    def watching(self, encoders: EncoderWatch) -> FusionMemory:
-        """The memory with a newer watch of the encoders."""
-        x, now, imu_came, joints_came = self[:4]
-        return FusionMemory(x, now, imu_came, joints_came, encoders, *self[5:])
-
     def jumped(
         self, position: Vec3 = _REST, velocity: Vec3 = _REST, turn: Vec4 = _NO_TURN
     ) -> FusionMemory:
@@ -210,10 +205,14 @@ class _Tick:
         """Predict the filter up to ``until`` [s] and from there the present."""
         return self._call(kernels.END, until)
 
-    def memory_after(self) -> FusionMemory:
-        """The memory after the tick."""
-        self.run()
-        return FusionMemory(self._x, self._now, self.imu_came, self.joints_came, *self.memory[4:])
+    def memory_after(self, watch: EncoderWatch | None) -> FusionMemory:
+        """The memory after the tick, with a newer ``watch`` of the encoders if there is one."""
+        if self._parts:
+            self.run()
+        before = self.memory
+        encoders = before.encoders if watch is None else watch
+        rest = before[5:]
+        return FusionMemory(self._x, self._now, self.imu_came, self.joints_came, encoders, *rest)
 
     def _call(self, more: int, until: float) -> kernels.Present:
         parts, self._parts = self._parts | more, 0
@@ -273,11 +272,13 @@ class SensorFusion:
         samples: Iterable[Sample],
         now: float,
         joint_acceleration: Vec2 = (0.0, 0.0),
+        watch: EncoderWatch | None = None,
     ) -> tuple[FusionMemory, StateEstimate | None]:
         """Take in the ``samples`` that came since the last tick; the state at ``now`` [s].
 
-        ``joint_acceleration`` [rad/s^2, joints] is what the torques make of the arm. None before
-        there was a pose, or a position and a heading, to start from, and a reading of the arm.
+        ``joint_acceleration`` [rad/s^2, joints] is what the torques make of the arm; a ``watch`` of
+        its encoders is kept in the memory. None before there was a pose, or a position and a
+        heading, to start from, and a reading of the arm.
         """
         tick = _Tick(self, memory, now, joint_acceleration)
         for sample in samples:
@@ -292,12 +293,12 @@ class SensorFusion:
         if not memory.started:
             memory = tick.memory = self._start(tick.run())
         if not memory.started or tick.joints_came < 0.0:
-            return tick.memory_after(), None
+            return tick.memory_after(watch), None
         until = now - memory.delay - _MARGIN
         if memory.waiting and memory.waiting[0].time <= until:
             tick.memory = self._fuse_due(tick.run(), until, now)
         known = tick.end(until)
-        return tick.memory_after(), StateEstimate(round(1e6 * now), *known)
+        return tick.memory_after(watch), StateEstimate(round(1e6 * now), *known)
 
     def covariance(self, memory: FusionMemory, now: float) -> Array:
         """Covariance (17, 17) [SI] of the error of the state at ``now`` [s]."""
@@ -432,38 +433,43 @@ class SensorFusion:
 
     def _fuse_due(self, memory: FusionMemory, until: float, now: float) -> FusionMemory:
         """Fuse every waiting sample that the filter has reached."""
-        waiting = memory.waiting
-        while waiting and waiting[0].time <= until:
-            one, waiting = waiting[0], waiting[1:]
-            kernels.advance_to(memory.numbers, self.law, one.time)
-            memory = self._fuse_one(memory, one, now)
-        return memory._replace(waiting=waiting)
+        while memory.waiting and memory.waiting[0].time <= until:
+            kernels.advance_to(memory.numbers, self.law, memory.waiting[0].time)
+            memory = self._fuse_first(memory, now)
+        return memory
 
-    def _fuse_one(self, memory: FusionMemory, one: Waiting, now: float) -> FusionMemory:
+    def _fuse_first(self, memory: FusionMemory, now: float) -> FusionMemory:
+        """Fuse the first of the waiting samples, whose time the filter has."""
+        one = memory.waiting[0]
         sample = one.sample
         health = memory.of(SENSOR_OF[type(sample)])
         announced, drifts = False, False
+        pose, counter = memory.pose, memory.reset_counter
         if isinstance(sample, PoseSample):
             memory = self._with_delay_known(memory)
-            announced = memory.reset_counter not in (None, sample.reset_counter)
-            drifts = sample.drifts
-            memory = memory._replace(reset_counter=sample.reset_counter)
+            announced = counter not in (None, sample.reset_counter)
+            pose, counter, drifts = sample, sample.reset_counter, sample.drifts
             if drifts:
                 memory = self._with_frame(memory, sample, announced)
         before = memory.numbers[0].copy() if announced and drifts else None
         ratio = self._fuse[type(sample)](memory, sample)
         fused = health.fused or (now,) * len(ratio)
         fused = tuple([now if r <= 1.0 else before for r, before in zip(ratio, fused, strict=True)])
-        innovation = memory.numbers["innovation"][0].ravel().tolist()
+        innovation = memory.numbers["innovation"].ravel().tolist()
         shown = tuple(innovation if len(ratio) > 1 else innovation[:1])
         health = health._replace(ratio=ratio, fused=fused, innovation=shown)
-        if max(ratio) > 1.0:
+        refused = max(ratio) > 1.0
+        if refused:
             health = health.with_fault(SensorFault.JUMP, now)
-        memory = memory.noting(health)
-        if isinstance(sample, PoseSample):
-            memory = memory._replace(pose=sample)
+        # All at once: each renewal of the memory takes a microsecond.
+        memory = memory._replace(
+            health=(*memory.without(health.sensor), health),
+            waiting=memory.waiting[1:],
+            pose=pose,
+            reset_counter=counter,
+        )
         long_refused = now - min(fused) > self.tuning.reset_time
-        if max(ratio) > 1.0 and (announced or long_refused):
+        if refused and (announced or long_refused):
             memory = self._reset(memory, one, ratio)
             memory = memory.noting(health._replace(fused=(now,) * len(ratio)))
         elif before is not None:

@@ -64,11 +64,12 @@ class SensedState:
         pushed = (0.0, 0.0)
         if state.estimate is not None:
             pushed = self._cascade.joint_acceleration(state.cascade, state.estimate)
-        started, samples = _without_stuck(state, before, inputs.samples)
+        started, watch, samples = _without_stuck(state, before, inputs.samples)
         again: tuple[Sample, ...] = ()
         if 0.0 <= before.imu_came < now - _IMU_SILENT:
             again = _last_reading_again(before, now, inputs.samples)
-        memory, estimate = self._fusion.step(started, (*samples, *again), now, pushed)
+            samples += again
+        memory, estimate = self._fusion.step(started, samples, now, pushed, watch)
         if again:
             memory = memory._replace(imu_came=before.imu_came)
         news = memory.health is not before.health
@@ -85,8 +86,8 @@ class SensedState:
             last = state.estimate
             # Telemetry goes by its time, and goes on.
             return state, memory, None if last is None else last._replace(t_us=inputs.sensors.t_us)
-        away = news and _overdue(before, now) > _AWAY > _overdue(memory, now)
-        if state.estimate is not None and away and not moved:
+        back = news and _is_back(before, memory, now)
+        if state.estimate is not None and back and not moved:
             state = returned(state, estimate, state.estimate, texts)
         if state.invalid_ticks:
             state = replace(state, invalid_ticks=0)
@@ -123,9 +124,10 @@ def _report(
 ) -> None:
     """Report each fault once, and again after it was gone for a while."""
     for new in memory.health:
+        if new.fault_at != now:
+            continue
         old = before.of(new.sensor)
-        again = old.fault is not new.fault or now - old.fault_at > _QUIET
-        if new.fault_at == now and again:
+        if old.fault is not new.fault or now - old.fault_at > _QUIET:
             texts.append(StatusText(Severity.WARNING, sentence(new.sensor, new.fault)))
 
 
@@ -145,7 +147,7 @@ def _last_reading_again(
 
 def _without_stuck(
     state: FlightState, memory: FusionMemory, samples: tuple[Sample, ...]
-) -> tuple[FusionMemory, tuple[Sample, ...]]:
+) -> tuple[FusionMemory, EncoderWatch, tuple[Sample, ...]]:
     """The samples without those of encoders that are stuck: joints then follow from torques."""
     before = watch = memory.encoders
     for one in samples:
@@ -153,11 +155,9 @@ def _without_stuck(
             watch = _watched(watch, memory, one.angles, state)
             if watch.stuck and not before.stuck:
                 memory = _at_rest(memory, one.angles)
-    if watch is not before:
-        memory = memory.watching(watch)
     if watch.stuck:
         samples = tuple([one for one in samples if not isinstance(one, JointSample)])
-    return memory, samples
+    return memory, watch, samples
 
 
 def _watched(
@@ -207,6 +207,13 @@ def _aiding(state: FlightState, memory: FusionMemory, report: EstimatorReport) -
         fault=fault,
         since_us=since_us,
     )
+
+
+def _is_back(before: FusionMemory, memory: FusionMemory, now: float) -> bool:
+    """Whether a position is used at ``now`` [s] that was overdue for long."""
+    if unaided(before, now) <= _AWAY:  # the usual case, known at less cost
+        return False
+    return _overdue(before, now) > _AWAY > _overdue(memory, now)
 
 
 def _overdue(memory: FusionMemory, now: float) -> float:

@@ -8,11 +8,32 @@ from struct import Struct
 from typing import Any, Final
 
 from fsw.log import topics
-from fsw.measurements import ImuSample, JointSample, Sample
+from fsw.measurements import ImuSample, JointSample, PoseSample, Sample
 from messages.ulog import Topic, data_head
 from messages.ulog_reader import unpacker
 
 Values = tuple[Any, ...]
+
+
+def _of_imu(one: ImuSample) -> Values:
+    return (one.time, *one.acceleration, *one.rate)
+
+
+def _of_joints(one: JointSample) -> Values:
+    return (one.time, *one.angles)
+
+
+def _of_pose(one: PoseSample) -> Values:
+    place = (one.time, *one.position, *one.attitude, *one.position_variance)
+    return (*place, *one.attitude_variance, one.reset_counter, one.drifts)
+
+
+# The frequent ones; :class:`_Codec` finds the values of any other by the names of its fields.
+_VALUES: Final[dict[type, Callable[[Any], Values]]] = {
+    ImuSample: _of_imu,
+    JointSample: _of_joints,
+    PoseSample: _of_pose,
+}
 
 
 class _Codec:
@@ -25,20 +46,14 @@ class _Codec:
         self._sizes = tuple(field.count for field in topic.fields)  # 0: a number by itself
         self._head = data_head(self.number, topic)
         self._pack = Struct("<5s" + topic.codes).pack
+        self._values = _VALUES.get(kind, self._any_values)
         self._unpack: Callable[[bytes], Values] = unpacker(topic).unpack
 
     def write(self, t_us: int, sample: Sample) -> bytes:
         """The record of a sample that arrived for the tick of ``t_us``."""
-        match sample:  # those of every tick
-            case ImuSample():
-                values: Values = (sample.time, *sample.acceleration, *sample.rate)
-            case JointSample():
-                values = (sample.time, *sample.angles)
-            case _:
-                values = self._values(sample)
-        return self._pack(self._head, t_us, *values)
+        return self._pack(self._head, t_us, *self._values(sample))
 
-    def _values(self, sample: Sample) -> Values:
+    def _any_values(self, sample: Sample) -> Values:
         values: list[float] = []
         for name, size in zip(self._names, self._sizes, strict=True):
             value = getattr(sample, name)

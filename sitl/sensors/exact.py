@@ -56,11 +56,12 @@ class GaussianNoise:
 
 def turned(q: V4, small: tuple[float, ...]) -> V4:
     """Attitude ``q`` followed by the rotation vector ``small`` [rad, B]."""
-    angle = math.sqrt(sum(c * c for c in small))
+    x, y, z = small
+    angle = math.sqrt(x * x + y * y + z * z)
     if angle == 0.0:
         return q
     s = math.sin(0.5 * angle) / angle
-    a, b, c, d = math.cos(0.5 * angle), s * small[0], s * small[1], s * small[2]
+    a, b, c, d = math.cos(0.5 * angle), s * x, s * y, s * z
     w, x, y, z = q
     return (
         w * a - x * b - y * c - z * d,

@@ -138,7 +138,7 @@ class ImuSensor:
         """Bias and noise of the samples to come."""
         noise = self._random.standard_normal((_BLOCK, 6)) * self._white
         bias = self._turn_on + (self._gyro_bias.step() + self._accel_bias.step())
-        return [cast(V6, tuple(row)) for row in (noise + bias).tolist()]
+        return cast(list[V6], list(map(tuple, (noise + bias).tolist())))
 
 
 def _distorted(random: np.random.Generator, scale: float, turn: float) -> Array:
