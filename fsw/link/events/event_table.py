@@ -179,7 +179,7 @@ def event_document() -> bytes:
         },
     }
     document = {"version": _VERSION, "components": {str(_COMPONENT): described}}
-    return json.dumps(document, separators=(",", ":")).encode()
+    return json.dumps(document, separators=(",", ":"), allow_nan=False).encode()
 
 
 def _argument(kind: str, name: str, enum: str = "") -> dict[str, str]:
