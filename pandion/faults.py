@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import os
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from command_line.options import json_file, option, read, switch
-from command_line.output import console_beside, unwritten
+from command_line.output import complain, console_beside, json_text, unwritten
 from command_line.parser import COULD_NOT_START, unknown_name
 from command_line.values import output_file, whole
 from command_line.version import version
@@ -63,7 +61,7 @@ def main(argv: list[str]) -> int:
         known = expectations(options.expect or EXPECTATIONS)
         return _run(options, _chosen(options, known))
     except (ExpectationError, UnknownError, OSError) as error:
-        print(f"pandion faults: {error}", file=sys.stderr)
+        complain("pandion faults", error)
         return COULD_NOT_START
 
 
@@ -113,12 +111,12 @@ def _run(options: FaultsOptions, cells: list[Cell]) -> int:
             display.say(f"  {said.after_s:8.3f} s  {said.text}")
     wrong = sum(1 for row in rows if row.differs)
     display.say(f"{len(rows) - wrong} of {len(rows)} as they must be")
-    text = json.dumps([row.as_json() for row in rows], indent=1, allow_nan=False) + "\n"
+    text = json_text([row.as_json() for row in rows], 1) + "\n"
     lost = unwritten(options.json, text)
     if options.html is not None:
         lost += unwritten(options.html, page(rows, (f"Pandion {version()}, seed {options.seed}",)))
     for what in lost:
-        print(f"pandion faults: cannot write {what}", file=sys.stderr)
+        complain("pandion faults", f"cannot write {what}")
     return DIFFERS if wrong or lost else AS_EXPECTED
 
 

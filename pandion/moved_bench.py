@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from importlib import import_module
 from pathlib import Path
 from typing import Final
@@ -16,10 +15,10 @@ CHECKOUT: Final = Path(__file__).parents[1]
 def main(argv: list[str]) -> int:
     """Name the new command and run it; returns its exit code."""
     if not (CHECKOUT / "benchmarks" / "__main__.py").exists():
-        print(
-            "pandion bench: the benchmarks are not part of the installed package; "
+        complain(
+            "pandion bench",
+            "the benchmarks are not part of the installed package; "
             "run `python -m benchmarks` in a checkout of the repository",
-            file=sys.stderr,
         )
         return COULD_NOT_START
     command = " ".join(["python -m benchmarks", *argv[:1]])

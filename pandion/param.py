@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import fnmatch
-import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -145,7 +144,7 @@ def main(argv: list[str]) -> int:
         complain("pandion param", error)
         return REFUSED
     except KeyboardInterrupt:
-        print("pandion param: interrupted", file=sys.stderr)
+        complain("pandion param", "interrupted")
         return REFUSED
 
 

@@ -16,6 +16,7 @@ from fsw.estimation.sensor_fault import Sensor
 from fsw.parameters.flight_config import FlightConfig
 from fsw.parameters.registry import BY_NAME
 from fsw.tuning import tuned
+from sitl.air.wall_effect import IDEAL
 from sitl.scenario import (
     ActuatorKeys,
     AirKeys,
@@ -152,7 +153,7 @@ def _real_air(wind_m_s: float, at_20_ft_m_s: float, *, disturbed: bool = True) -
         body_drag_m2=0.03,
         ground_effect=True,
         ceiling_effect=True,
-        wall_suction=1.0 / 32.0,
+        wall_suction=IDEAL,
     )
     actuators = ActuatorKeys(
         quadratic_thrust=True,

@@ -10,6 +10,8 @@ from fsw.frozen import dataclass
 from fsw.parameters.flight_config import FlightConfig
 from fsw.signals import StateEstimate, Vec2
 
+_DENIES = 2  # of COM_ARM_SDCARD
+_SILENT_US = 1_000_000
 _KNOWN_ANGLE = 0.2  # rad, standard deviation of roll and pitch that telemetry calls known
 
 
@@ -69,7 +71,3 @@ def _failing_sensor(state: FlightState, since_us: int) -> str:
         if one.silent_us > _SILENT_US:
             return f"{one.name} has been silent for {1e-6 * one.silent_us:.0f} s"
     return ""
-
-
-_DENIES = 2  # of COM_ARM_SDCARD
-_SILENT_US = 1_000_000

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from sitl.faults.actuators import MotorFault, battery_charge, thrust_share
-from sitl.faults.keys import PROCESSES, SENSORS, Fault
+from sitl.faults.keys import SENSORS, Fault
 from sitl.faults.sensors import FrameFault, SuiteFault
 from sitl.faults.signal import Windows
 from sitl.plant.vector import V4
@@ -175,8 +175,3 @@ class Faults:
         if fault.unit == "mavlink":
             return Windows(1.0 if fault.kind == "off" else fault.share, random)
         return True
-
-
-def of_processes(faults: tuple[Fault, ...]) -> tuple[Fault, ...]:
-    """Those that whatever started the processes must cause."""
-    return tuple(one for one in faults if one.unit in PROCESSES)

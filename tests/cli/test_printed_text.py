@@ -109,6 +109,21 @@ def test_no_program_writes_json_that_may_hold_nan() -> None:
     assert wild == KNOWN
 
 
+def test_every_complaint_is_made_printable() -> None:
+    """``complain`` and ``say`` are the one way to standard error."""
+    root = Path(__file__).parents[2]
+    raw = [
+        str(path.relative_to(root))
+        for folder in ("fsw", "sitl", "pandion", "studies", "command_line")
+        for path in (root / folder).rglob("*.py")
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Call)
+        and ast.unparse(node.func) == "print"
+        and any(ast.unparse(keyword.value) == "sys.stderr" for keyword in node.keywords)
+    ]
+    assert raw == []
+
+
 # Of a key, of names, or of numbers for a reader of our own.
 KNOWN = {
     "benchmarks/bare_loop.py",
