@@ -6,6 +6,7 @@ import sys
 from importlib import import_module
 from typing import Final
 
+from command_line.output import complain
 from command_line.parser import COULD_NOT_START, unknown_name
 
 _INTERRUPTED: Final = 1  # exit code
@@ -39,12 +40,12 @@ def main(argv: list[str] | None = None) -> int:
     name, *options = words
     if name not in BENCHMARKS:
         sentence = unknown_name("benchmark", name, BENCHMARKS)
-        print(f"python -m benchmarks: {sentence}", file=sys.stderr)
+        complain("python -m benchmarks", sentence)
         return COULD_NOT_START
     try:
         return int(import_module(f"benchmarks.{name}").main(options))
     except KeyboardInterrupt:
-        print(f"python -m benchmarks {name}: interrupted", file=sys.stderr)
+        complain(f"python -m benchmarks {name}", "interrupted")
         return _INTERRUPTED
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import random
-import sys
 import tempfile
 import threading
 import time
@@ -18,7 +17,7 @@ from typing import Any, Final
 from benchmarks.download_client import DownloadClient, NothingCame
 from benchmarks.machine_watch import version_and_machine
 from command_line.options import json_file, option, read
-from command_line.output import console_beside, json_text, write_text
+from command_line.output import complain, console_beside, json_text, write_text
 from command_line.values import number
 from pandion.display import Display
 from pandion.supervisor import ProcessFailed, Supervisor
@@ -82,7 +81,7 @@ def main(argv: list[str]) -> int:
     try:
         fetched = measure(int(options.size_mb * _MB), Display(console))
     except (ProcessFailed, NothingCame) as error:
-        print(f"python -m benchmarks download: {error}", file=sys.stderr)
+        complain("python -m benchmarks download", error)
         return error.exit_code if isinstance(error, ProcessFailed) else NOT_PASSED
     for each in fetched.downloads:
         same = "identical" if each.identical else "NOT identical"

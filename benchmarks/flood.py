@@ -20,7 +20,7 @@ from benchmarks.flood_monitor import Heard, Monitor
 from benchmarks.flood_traffic import SYSTEM
 from benchmarks.machine_watch import version_and_machine
 from command_line.options import json_file, option, read
-from command_line.output import console_beside, json_text, write_text
+from command_line.output import complain, console_beside, json_text, write_text
 from command_line.values import seconds
 from fsw.link.telemetry.streams import STREAMS
 from pandion.display import Display
@@ -84,7 +84,7 @@ def main(argv: list[str]) -> int:
         calm = measure(options.duration_s, flooded=False, display=Display(console))
         flooded = measure(options.duration_s, flooded=True, display=Display(console))
     except ProcessFailed as error:
-        print(f"python -m benchmarks flood: {error}", file=sys.stderr)
+        complain("python -m benchmarks flood", error)
         return error.exit_code
     rows = [*correctness(flooded), *timing(flooded, calm)]
     for row in rows:

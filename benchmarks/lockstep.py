@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any, Final, TextIO
 
 from command_line.options import json_file, option, read
-from command_line.output import console_beside, json_text, write_text
+from command_line.output import complain, console_beside, json_text, write_text
 from command_line.parser import COULD_NOT_START
 from command_line.values import number, one_of, whole
 from command_line.version import version
@@ -66,7 +66,7 @@ def main(argv: list[str]) -> int:
     try:
         found = _measure(options, console)
     except (ProcessFailed, OSError) as error:
-        print(f"python -m benchmarks lockstep: {error}", file=sys.stderr)
+        complain("python -m benchmarks lockstep", error)
         return COULD_NOT_START
     write_text(options.json, json_text(found, 1) + "\n")
     print("\n".join(_lines(found)), file=console)

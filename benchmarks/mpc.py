@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import os
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from benchmarks.values import several
 from command_line.options import json_file, option, read, switch
-from command_line.output import console_beside, json_text, write_text
+from command_line.output import complain, console_beside, json_text, write_text
 from command_line.parser import COULD_NOT_START
 from command_line.values import whole
 from command_line.version import version
@@ -49,7 +48,7 @@ def main(argv: list[str]) -> int:
     try:
         return _run(options)
     except OSError as error:
-        print(f"{_PROGRAM}: {error}", file=sys.stderr)
+        complain(_PROGRAM, error)
         return COULD_NOT_START
 
 

@@ -53,7 +53,7 @@ def main(argv: list[str]) -> int:
     try:
         print(install(options.to), end="")
     except (GenerationError, OSError) as error:
-        complain("pandion dialect", f"{_reason(error)}")
+        complain("pandion dialect", _reason(error))
         return COULD_NOT_START
     return 0
 

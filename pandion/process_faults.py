@@ -44,7 +44,7 @@ class ProcessFaults:
         child = next((one for one in children if one.name == name), None)
         if child is None or child.exit_code is not None:
             return
-        cause, undo = _of(fault["unit"], fault["kind"], child.pid)
+        cause, undo = _of(fault["unit"], fault["kind"], child)
         cause()
         for_s = fault["duration_s"] or float("inf")
         self._lasting.append(_Lasting(cause, undo, self._clock() + for_s))
@@ -73,24 +73,29 @@ def planners(flight_software: int) -> list[int]:
     return [worker for server in _children(flight_software) for worker in _children(server)]
 
 
-def _of(unit: str, kind: str, process: int) -> tuple[Callable[[], None], Callable[[], None]]:
-    """What causes a fault of a process, and what undoes it."""
+def _of(unit: str, kind: str, child: Child) -> tuple[Callable[[], None], Callable[[], None]]:
+    """What causes a fault of a process, and what undoes it.
+
+    Neither does anything once the process has ended: its number may be another's by then.
+    """
     if unit == "disk":
-        before = resource.prlimit(process, resource.RLIMIT_FSIZE)
+        before = resource.prlimit(child.pid, resource.RLIMIT_FSIZE)
         full = (0, before[1])
-        return lambda: _limit(process, full), lambda: _limit(process, before)
+        return lambda: _limit(child, full), lambda: _limit(child, before)
 
     def send(number: signal.Signals) -> None:
-        _signal(planners(process) if unit == "planner" else [process], number)
+        if child.exit_code is None:
+            _signal(planners(child.pid) if unit == "planner" else [child.pid], number)
 
     if kind == "killed":
         return lambda: send(signal.SIGKILL), lambda: None
     return lambda: send(signal.SIGSTOP), lambda: send(signal.SIGCONT)
 
 
-def _limit(process: int, limits: tuple[int, int]) -> None:
-    with contextlib.suppress(ProcessLookupError):
-        resource.prlimit(process, resource.RLIMIT_FSIZE, limits)
+def _limit(child: Child, limits: tuple[int, int]) -> None:
+    if child.exit_code is None:
+        with contextlib.suppress(ProcessLookupError):
+            resource.prlimit(child.pid, resource.RLIMIT_FSIZE, limits)
 
 
 def _signal(processes: Iterable[int], number: signal.Signals) -> None:

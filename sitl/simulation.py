@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, cast
@@ -249,13 +250,12 @@ class Simulation:
         for k in range(-SETTLED_STEPS, 0):
             earlier = exact._replace(t_us=exact.t_us + k * STEP_US)
             arrived += [(k, one) for one in suite.step(earlier, thrust)]
-        kinds = [type(one) for _, one in arrived]
-        later = [kinds[i:].count(kind) for i, kind in enumerate(kinds)]
-        return [
-            one
-            for (k, one), rank in zip(arrived, later, strict=True)
-            if k >= -SETTLED_KEPT or rank <= SETTLED_NEWEST
-        ]
+        seen, kept = Counter[type](), list[Measurement]()
+        for k, one in reversed(arrived):
+            seen[type(one)] += 1
+            if k >= -SETTLED_KEPT or seen[type(one)] <= SETTLED_NEWEST:
+                kept.append(one)
+        return kept[::-1]
 
     def inject(self, fault: Fault) -> str | None:
         """Let a fault begin with the next step; returns why it cannot, None if it can."""

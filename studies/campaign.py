@@ -71,7 +71,7 @@ class Campaign:
         self, waiting: deque[_Named]
     ) -> Generator[tuple[str, Outcome], None, tuple[_Named, ...]]:
         """Fly what waits; returns early, with the flights that were out, if a process dies."""
-        pool = _pool(self.workers)
+        pool = pool_of(self.workers)
         out: dict[Future[Outcome], _Named] = {}
         try:
             while waiting or out:
@@ -101,7 +101,8 @@ class Campaign:
                 lines.write("\n" + json.dumps({"key": key, **asdict(row)}) + "\n")
 
 
-def _pool(workers: int) -> ProcessPoolExecutor:
+def pool_of(workers: int) -> ProcessPoolExecutor:
+    """Processes that fly jobs; SIGINT is for the one that started them."""
     pin_numerics_to_one_thread()  # inherited by the processes, before they load their libraries
     spawn = multiprocessing.get_context("spawn")
     ignored = (signal.SIGINT, signal.SIG_IGN)  # the campaign ends its processes
@@ -110,7 +111,7 @@ def _pool(workers: int) -> ProcessPoolExecutor:
 
 def _alone(job: Job) -> Outcome:
     """Fly one job in a process that nothing else depends on."""
-    with _pool(1) as pool:
+    with pool_of(1) as pool:
         try:
             return pool.submit(outcome, job).result()
         except BrokenProcessPool:

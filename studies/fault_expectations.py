@@ -67,30 +67,36 @@ def expectations(path: Path = EXPECTATIONS) -> dict[str, Expected]:
     Raises:
         ExpectationError: It cannot be read, or a table is wrong.
     """
-    try:
-        with path.open("rb") as file:
-            content = file.read(_MOST_BYTES + 1)
-        if len(content) > _MOST_BYTES:
-            raise ExpectationError(f"{path} is too long: must be at most {_MOST_BYTES} bytes")
-        tables = tomllib.loads(content.decode("utf-8")).get("faults", [])
-    except OSError as error:
-        raise ExpectationError(f"cannot read {path}: {error.strerror}") from error
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise ExpectationError(f"{path} is not TOML: {error}") from error
-    except RecursionError:
-        raise ExpectationError(f"{path} is nested too deeply") from None
+    tables = _tables(path)
     found: dict[str, Expected] = {}
-    if not isinstance(tables, list):
-        raise ExpectationError(f"{path}: faults must be an array of tables ([[faults]])")
     for number, table in enumerate(tables):
         try:
             for one in _read(table):
                 if one.name in found:
                     raise ExpectationError(f'"{one.name}" is there twice; give one of them a name')
                 found[one.name] = one
-        except ExpectationError as error:
+        except (TypeError, ValueError, OverflowError) as error:
             raise ExpectationError(f"{path}: faults[{number}]: {error}") from None
     return found
+
+
+def _tables(path: Path) -> list[Any]:
+    try:
+        with path.open("rb") as file:
+            content = file.read(_MOST_BYTES + 1)
+    except OSError as error:
+        raise ExpectationError(f"cannot read {path}: {error.strerror}") from error
+    if len(content) > _MOST_BYTES:
+        raise ExpectationError(f"{path} is too long: must be at most {_MOST_BYTES} bytes")
+    try:
+        tables = tomllib.loads(content.decode("utf-8")).get("faults", [])
+    except ValueError as error:  # no UTF-8, no TOML, or an integer of thousands of digits
+        raise ExpectationError(f"{path} is not TOML: {error}") from error
+    except RecursionError:
+        raise ExpectationError(f"{path} is nested too deeply") from None
+    if not isinstance(tables, list):
+        raise ExpectationError(f"{path}: faults must be an array of tables ([[faults]])")
+    return tables
 
 
 def _read(table: Any) -> list[Expected]:

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import multiprocessing
-import signal
 from collections.abc import Callable, Iterator
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import as_completed
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import asdict, dataclass, replace
 from functools import cache
 from typing import Any
 
-from fsw.runtime.process import pin_numerics_to_one_thread
 from fsw.signals import Severity
 from sitl.scenario_file import PERFECT
+from studies.campaign import pool_of
 from studies.fault_expectations import Expected, differences
 from studies.fault_flights import FaultFlight, fly
 
@@ -116,7 +115,7 @@ def _flown(cells: list[Cell], workers: int) -> Iterator[tuple[int, Judged]]:
         for number, cell in enumerate(cells):
             yield number, fly_cell(cell)
         return
-    with _pool(workers) as pool:
+    with pool_of(workers) as pool:
         try:
             out = {pool.submit(fly_cell, cell): k for k, cell in enumerate(cells)}
             for future in as_completed(out):
@@ -130,10 +129,3 @@ def _flown(cells: list[Cell], workers: int) -> Iterator[tuple[int, Judged]]:
                 process.kill()  # or leaving would wait for flights that are no longer wanted
             pool.shutdown(wait=False, cancel_futures=True)
             raise
-
-
-def _pool(workers: int) -> ProcessPoolExecutor:
-    pin_numerics_to_one_thread()  # inherited by the processes, before they load their libraries
-    spawn = multiprocessing.get_context("spawn")
-    ignored = (signal.SIGINT, signal.SIG_IGN)
-    return ProcessPoolExecutor(workers, spawn, initializer=signal.signal, initargs=ignored)

@@ -158,15 +158,23 @@ def limits_used(
     """Share of every limit of the loop that the worst ``disturbance`` [m/s^2] of one axis uses."""
     stopping = 2.0 * tuning.stopping_snap * (disturbance * loop.acceleration_error + 0.15)
     return {
-        "vertical disturbance": disturbance
-        * loop.vertical_disturbance
-        / tuning.vertical_disturbance_limit,
-        "rotor torque": disturbance * loop.snap / _snap_in_hover(airframe),
-        "position error": (disturbance * loop.base + loop.base_wind) / tuning.position_error_limit,
-        "acceleration": (disturbance * loop.wanted_acceleration + tuning.wind_limit)
-        / tuning.acceleration_limit,
-        "jerk": disturbance * loop.jerk / min(tuning.jerk_limit, math.sqrt(stopping)),
+        "vertical disturbance": _share(
+            disturbance * loop.vertical_disturbance, tuning.vertical_disturbance_limit
+        ),
+        "rotor torque": _share(disturbance * loop.snap, _snap_in_hover(airframe)),
+        "position error": _share(
+            disturbance * loop.base + loop.base_wind, tuning.position_error_limit
+        ),
+        "acceleration": _share(
+            disturbance * loop.wanted_acceleration + tuning.wind_limit, tuning.acceleration_limit
+        ),
+        "jerk": _share(disturbance * loop.jerk, min(tuning.jerk_limit, math.sqrt(stopping))),
     }
+
+
+def _share(used: float, limit: float) -> float:
+    """Of a limit of zero, which switches its part of the loop off, any use is too much."""
+    return used / limit if limit > 0.0 else math.inf
 
 
 def all_axes(airframe: Airframe, loop: Tube, disturbance: float) -> tuple[float, float]:

@@ -86,6 +86,9 @@ def test_contact_with_the_ground_is_not_contact_with_a_wall() -> None:
         ('[[faults]]\nthen = ["hold"]\nin.hover.then = ["hold"]', '"in.hover": a mode is one of'),
         ('[[faults]]\nthen = ["hold"]\n[[faults]]\nthen = ["hold"]', '"none" is there twice'),
         ("faults = 3", "must be an array of tables"),
+        ('[[faults]]\nthen = ["hold"]\ntold_within_s = [1]', "faults[0]: "),
+        ("[[faults]]\nthen = 3", "faults[0]: "),
+        ('[[faults]]\nthen = ["hold"]\nfault = {unit = [1], kind = 2}', "faults[0]: "),
         ("[[", "faults.toml"),
     ],
 )

@@ -332,6 +332,13 @@ def test_a_push_that_turns_once_it_is_taken_for_mass_needs_the_wider_height(
         assert np.abs(_height_under(push, before)).max() > amplitude * loop.height
 
 
+def test_a_part_of_the_loop_that_is_switched_off_has_no_room_at_all() -> None:
+    off = replace(TrackingTuning(), vertical_disturbance_limit=0.0)
+    used = limits_used(AIRFRAME, off, _tube(), 0.1)
+    assert used["vertical disturbance"] == np.inf
+    assert max(share for name, share in used.items() if name != "vertical disturbance") < 1.0
+
+
 def _position_misled(entry: int, error: np.ndarray) -> np.ndarray:
     """The base under an estimate that is wrong in p, v, a or j (0 to 3), the law tick by tick."""
     law = TrackingLaw(AIRFRAME.attitude_lag, TUNING, _gains())
