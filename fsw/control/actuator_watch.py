@@ -54,13 +54,13 @@ LOST_TIME: Final = 0.15  # s
 LOST_FROM: Final = 4.0  # N commanded; with less it is not seen
 QUIET: Final = 0.75  # N; a rotor below that gives what it is commanded again
 QUIET_TIME: Final = 3.0  # s
-ASTRAY: Final = 1.5  # N root mean square, of what a weak rotor's effectiveness does not explain
-ASTRAY_AFTER: Final = 0.5  # s, when its effectiveness is known
-SMOOTHED: Final = 0.2  # s, of what a rotor gives that does not obey
+ASTRAY: Final = 1.2  # N, root mean square of what no effectiveness explains
+ASTRAY_AFTER: Final = 0.3  # s, when the means have forgotten how a weak rotor became weak
+SMOOTHED: Final = 0.05  # s, of what a rotor gives that does not obey
 LEAST_EFFECTIVE: Final = 0.25  # the command grows by four at most
 EFFECT_RATE: Final = 2.0  # 1/s, by which allocation follows
 # Joints.
-UNDONE: Final = 0.18  # N m, root mean square of what undoes the torque
+UNDONE: Final = 0.12  # N m, root mean square of what undoes the torque
 UNDOING: Final = 0.5  # share of the torque that it undoes
 BEHIND: Final = 0.03  # rad, from the reference
 JOINT_TIME: Final = 0.1  # s
@@ -87,7 +87,10 @@ WATCH: Final = np.dtype(
         ("failed", np.int64),  # rotor, or NONE
         ("for_s", float),  # since it has failed
         ("effect", float),  # thrust over command, of the failed rotor, as allocation takes it
-        ("astray2", float),  # N^2, mean square of what that does not explain
+        ("failed2", float),  # N^2, mean square of what it gives beside its command, by what turns
+        ("failed_by_thrust", float),  # N^2, mean of that and the thrust
+        ("failed_thrust2", float),  # N^2, of the thrust
+        ("failed_more2", float),  # N^2, mean square of what it gives too much
         ("gives", float),  # N, of the failed rotor
         ("lost_for", float),  # s
         ("lost", np.int64),
@@ -212,11 +215,16 @@ def _observe_base(
     for i in range(3):
         s.rate[i] = rate[i]
     if s.failed >= 0:
+        # Which one is known: what turns the base says how much, and pushes do not.
         k = s.failed
-        s.gives += min(dt / SMOOTHED, 1.0) * (g[k] + extra[k] - s.gives)
-        off = extra[k] - (s.effect - 1.0) * g[k]
-        s.astray2 += forget * (off * off - s.astray2)
-        gives_nothing = g[k] > LOST_FROM and extra[k] < (LOST - 1.0) * g[k]
+        turns = (-y, x, y, -x)
+        off, thrust = turns[k], g[k]
+        s.gives += min(dt / SMOOTHED, 1.0) * (thrust + off - s.gives)
+        s.failed2 += forget * (off * off - s.failed2)
+        s.failed_by_thrust += forget * (off * thrust - s.failed_by_thrust)
+        s.failed_thrust2 += forget * (thrust * thrust - s.failed_thrust2)
+        s.failed_more2 += forget * (max(off, 0.0) * max(off, 0.0) - s.failed_more2)
+        gives_nothing = thrust > LOST_FROM and off < (LOST - 1.0) * thrust
         s.lost_for = s.lost_for + dt if gives_nothing else 0.0
 
 
@@ -255,30 +263,34 @@ def _judge_rotors(s: Any, dt: float, settled: bool) -> None:
     s.suspected = s.suspected + dt if found == s.suspect else 0.0
     s.suspect = found
     if s.suspected >= (STRONG_TIME if most > STRONG * STRONG else WEAK_TIME):
-        s.failed, s.for_s, s.effect, s.astray2, s.quiet_for = found, 0.0, 1.0, 0.0, 0.0
-        s.gives = s.thrust[found]
+        s.failed, s.for_s, s.effect, s.quiet_for = found, 0.0, 1.0, 0.0
+        s.gives = s.thrust[found] + s.extra[found]
+        s.failed2, s.failed_by_thrust = most, s.by_thrust[found]
+        s.failed_thrust2, s.failed_more2 = s.thrust2[found], 0.0
 
 
 @compilable
 def effect_seen(s: Any) -> float:
     """Thrust over command of the failed rotor [1], by the means of a tenth of a second."""
-    extra = float(s.by_thrust[s.failed]) / max(float(s.thrust2[s.failed]), 1e-6)
-    return clamp(1.0 + extra, 0.0, 1.0)
+    return clamp(1.0 + float(s.failed_by_thrust) / max(float(s.failed_thrust2), 1e-6), 0.0, 1.0)
 
 
 @compilable
 def _follow_failed(s: Any, dt: float) -> None:
     """What of the failed rotor is left, and whether it is back."""
     s.for_s += dt
-    most = EFFECT_RATE * dt
-    towards = max(effect_seen(s), LEAST_EFFECTIVE) - s.effect
-    if not s.disobeys:
-        s.effect += min(max(towards, -most), most)
+    by_effect = s.failed_by_thrust * s.failed_by_thrust / max(s.failed_thrust2, 1e-6)
+    explained = s.failed2 - by_effect < ASTRAY * ASTRAY
+    # A rotor that comes and goes is no weak one, and flies better as a sound one. One that gives
+    # too much at times does not obey.
+    if explained and not s.disobeys:
+        towards = max(effect_seen(s), LEAST_EFFECTIVE) - s.effect
+        s.effect += clamp(towards, -EFFECT_RATE * dt, EFFECT_RATE * dt)
     if s.lost_for > LOST_TIME:
         s.lost = 1
-    if s.for_s > ASTRAY_AFTER and s.astray2 > ASTRAY * ASTRAY:
+    if s.for_s > ASTRAY_AFTER and not explained and s.failed_more2 > ASTRAY * ASTRAY:
         s.disobeys = 1
-    quiet = mean_square(s, s.failed) < QUIET * QUIET and not s.lost and not s.disobeys
+    quiet = s.failed2 < QUIET * QUIET and not s.lost and not s.disobeys
     s.quiet_for = s.quiet_for + dt if quiet else 0.0
     if s.quiet_for > QUIET_TIME:
         s.failed, s.effect, s.suspect, s.suspected = NONE, 1.0, NONE, 0.0

@@ -20,6 +20,7 @@ from fsw.signals import ActuatorReport, StateEstimate, Vec2, Vec4
 
 ROTORS: Final = ("1 (rear)", "2 (left)", "3 (front)", "4 (right)")
 _HOWS: Final = {STUCK: "does not move", LIMP: "gives no torque"}
+_WEAK_AT_MOST: Final = 0.9  # of what is commanded; a weak rotor that is found gives less
 _LEAST_GIVEN: Final = 0.1  # N, of a rotor that does not obey
 
 
@@ -146,4 +147,6 @@ def _sentence(s: Any, found: ActuatorReport) -> str:
         return f"{name} does not obey"
     # As it is at the moment: means of a tenth of a second are behind when a rotor has just failed.
     share = 1.0 + float(s["extra"][k]) / max(float(s["thrust"][k]), 1.0)
-    return f"{name} gives {100.0 * min(max(share, 0.0), 1.0):.0f} % of what is commanded"
+    if share > _WEAK_AT_MOST:
+        return f"{name} gives another thrust than is commanded"
+    return f"{name} gives {100.0 * max(share, 0.0):.0f} % of what is commanded"

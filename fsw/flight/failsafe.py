@@ -554,7 +554,7 @@ FAILSAFES: Final = (
         of_vehicle=True,
         slow=True,
         detected="in flight, for 0.1 s, torque has no effect on a joint that does not follow its "
-        "reference: 0.18 N m, and half of what is asked for",
+        "reference: 0.12 N m, and half of what is asked for",
         within_us=_SLOWLY + 300_000,
         parameters=("FD_ACT_EN", "COM_ACT_FAIL_ACT"),
         ends="never in a flight",
