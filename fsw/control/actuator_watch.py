@@ -55,7 +55,6 @@ LOST_FROM: Final = 4.0  # N commanded; with less it is not seen
 QUIET: Final = 0.75  # N; a rotor below that gives what it is commanded again
 QUIET_TIME: Final = 3.0  # s
 ASTRAY: Final = 1.2  # N, root mean square of what no effectiveness explains
-ASTRAY_AFTER: Final = 0.3  # s, when the means have forgotten how a weak rotor became weak
 SMOOTHED: Final = 0.05  # s, of what a rotor gives that does not obey
 LEAST_EFFECTIVE: Final = 0.25  # the command grows by four at most
 EFFECT_RATE: Final = 2.0  # 1/s, by which allocation follows
@@ -85,7 +84,6 @@ WATCH: Final = np.dtype(
         ("suspect", np.int64),  # rotor, or NONE
         ("suspected", float),  # s, for how long
         ("failed", np.int64),  # rotor, or NONE
-        ("for_s", float),  # since it has failed
         ("effect", float),  # thrust over command, of the failed rotor, as allocation takes it
         ("failed2", float),  # N^2, mean square of what it gives beside its command, by what turns
         ("failed_by_thrust", float),  # N^2, mean of that and the thrust
@@ -263,10 +261,11 @@ def _judge_rotors(s: Any, dt: float, settled: bool) -> None:
     s.suspected = s.suspected + dt if found == s.suspect else 0.0
     s.suspect = found
     if s.suspected >= (STRONG_TIME if most > STRONG * STRONG else WEAK_TIME):
-        s.failed, s.for_s, s.effect, s.quiet_for = found, 0.0, 1.0, 0.0
+        s.failed, s.effect, s.quiet_for = found, 1.0, 0.0
         s.gives = s.thrust[found] + s.extra[found]
         s.failed2, s.failed_by_thrust = most, s.by_thrust[found]
-        s.failed_thrust2, s.failed_more2 = s.thrust2[found], 0.0
+        more = max(s.extra[found], 0.0)
+        s.failed_thrust2, s.failed_more2 = s.thrust2[found], more * more
 
 
 @compilable
@@ -278,7 +277,6 @@ def effect_seen(s: Any) -> float:
 @compilable
 def _follow_failed(s: Any, dt: float) -> None:
     """What of the failed rotor is left, and whether it is back."""
-    s.for_s += dt
     by_effect = s.failed_by_thrust * s.failed_by_thrust / max(s.failed_thrust2, 1e-6)
     explained = s.failed2 - by_effect < ASTRAY * ASTRAY
     # A rotor that comes and goes is no weak one, and flies better as a sound one. One that gives
@@ -288,7 +286,7 @@ def _follow_failed(s: Any, dt: float) -> None:
         s.effect += clamp(towards, -EFFECT_RATE * dt, EFFECT_RATE * dt)
     if s.lost_for > LOST_TIME:
         s.lost = 1
-    if s.for_s > ASTRAY_AFTER and not explained and s.failed_more2 > ASTRAY * ASTRAY:
+    if not explained and s.failed_more2 > ASTRAY * ASTRAY:
         s.disobeys = 1
     quiet = s.failed2 < QUIET * QUIET and not s.lost and not s.disobeys
     s.quiet_for = s.quiet_for + dt if quiet else 0.0

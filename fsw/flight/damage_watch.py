@@ -73,14 +73,16 @@ class DamageWatch:
             estimate.specific_force,
         )
         if failed or damage.rotor:
-            damage = self._of_rotors(damage, after[0], estimate.t_us)
+            back = memory is not None and memory[0]["failed"] != NONE and after[0]["failed"] == NONE
+            damage = self._of_rotors(damage, after[0], estimate.t_us, back=bool(back))
             damage = _of_joints(damage, after[0], estimate.t_us)
         return damage, after
 
-    def _of_rotors(self, before: Damage, s: Any, now_us: int) -> Damage:
+    def _of_rotors(self, before: Damage, s: Any, now_us: int, *, back: bool) -> Damage:
+        """What is known of rotors; the one that had failed is ``back``, or not seen any more."""
         k, known = int(s["failed"]), before.report
         if k == NONE:
-            if not before.rotor or known.lost or known.disobeys:
+            if not back:
                 return before
             joints = before.health.joints
             health = ActuatorHealth(joints=joints) if any(joints) else HEALTHY
