@@ -61,7 +61,8 @@ test-long: setup ## the tests that make test leaves out for its four minutes
 
 faults: setup ## fly every mode with every fault, write build/faults.html (long): ONLY=motor SEED=1
 	@mkdir -p build
-	$(BIN)/pandion faults --matrix --journal build/faults.jsonl --json build/faults.json --html build/faults.html \
+	$(BIN)/pandion faults --matrix --journal build/faults.jsonl \
+		--json build/faults.json --html build/faults.html \
 		$(if $(ONLY),--only "$(ONLY)") $(if $(SEED),--seed $(SEED))
 
 # cosmic-ray in an environment of its own; the tests run in .venv, on a copy of the checkout. FILES are
