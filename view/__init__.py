@@ -1,0 +1,1 @@
+"""Shows flights: live, and from their logs."""
