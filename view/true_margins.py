@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +10,7 @@ from numpy.typing import NDArray
 from sitl.mission_clock import MissionClock
 from sitl.scenario import Scenario
 from sitl.scenario_file import ScenarioError, load_scenario, scenario_digest
-from view.recording import Recording
+from view.flight_data import FlightData, Table
 
 Array = NDArray[np.float64]
 _TRUTH = "sim_ground_truth"
@@ -23,7 +22,7 @@ class TrueMargins:
     """Margins at the logged samples of the true state."""
 
     keys: tuple[str, ...]  # zone/part, as in result.json
-    t_s: Array  # (samples,) since the start
+    t: Array  # (samples,) s, sensor time
     values: Array  # (samples, keys) m; infinite while a zone does not apply
     places: Array  # (samples, 4, 3) m, NED: base, joint 1, joint 2, end-effector
 
@@ -38,42 +37,41 @@ class TrueMargins:
     @property
     def least(self) -> Array:
         """The least of all (samples,) [m]; infinite without zones."""
-        if not self.keys:
-            return np.full(len(self.t_s), np.inf)
-        return np.asarray(self.values.min(axis=1), dtype=np.float64)
+        return np.asarray(self.values.min(axis=1, initial=np.inf), dtype=np.float64)
 
 
-def scenario_of(recording: Recording) -> Scenario | None:
+def scenario_of(flight: FlightData) -> Scenario | None:
     """The scenario that was flown, None where it is not among those of this build."""
-    name = str(recording.facts.get("scenario", ""))
+    name = str(flight.information.get("scenario", ""))
     try:
-        if scenario_digest(name) != recording.facts.get("scenario_digest"):
+        if scenario_digest(name) != flight.information.get("scenario_digest"):
             return None
         return load_scenario(name)
     except ScenarioError:
         return None
 
 
-def true_margins(recording: Recording, scenario: Scenario) -> TrueMargins | None:
+def true_margins(flight: FlightData, scenario: Scenario) -> TrueMargins | None:
     """Margins of a flight; None for a log without truth.
 
     The samples are 20 ms apart (2 ms with ``LOG_PROFILE`` 1), those of ``result.json`` 1 ms.
     """
-    truth = recording.topic(_TRUTH)
-    if not len(truth):
+    truth = flight.tables.get(_TRUTH)
+    if truth is None:
         return None
     from sitl.world import World  # here, because it loads the kernels
 
     world, clock = World(scenario), MissionClock(scenario)
-    t_s, placed = recording.seconds(_TRUTH), _placed(truth)
-    values = np.empty((len(t_s), len(world.keys)))
-    for row, time_s, places in zip(values, t_s.tolist(), placed, strict=True):
+    placed = _placed(truth)
+    values = np.empty((len(truth), len(world.keys)))
+    since = truth.t - flight.begin  # the simulation's time
+    for row, time_s, places in zip(values, since.tolist(), placed, strict=True):
         target = clock.target_at(time_s).p if world.follows and clock.counts(time_s) else None
         row[:] = world.margins(places, time_s, target)
-    return TrueMargins(world.keys, t_s, values, placed[:, :4])
+    return TrueMargins(world.keys, truth.t, values, placed[:, :4])
 
 
-def _placed(truth: Any) -> Array:
+def _placed(truth: Table) -> Array:
     """Base, joints, end-effector and the base's axes of each record, (records, 7, 3)."""
     from sitl.plant.aerial_manipulator import plant
     from sitl.plant.kinematics import places
