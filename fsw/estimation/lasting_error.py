@@ -25,6 +25,7 @@ def lasting_error(memory: FusionMemory, tuning: EstimatorTuning, estimate: State
     A whole reading's of the position's source.
     """
     found = np.zeros((6, 6))
+    axes = found.ravel()[:15:7]  # the position's variances
     pose, fix = memory.pose, memory.gnss
     if pose is not None:
         place, attitude = pose.position_variance, pose.attitude_variance
@@ -33,7 +34,7 @@ def lasting_error(memory: FusionMemory, tuning: EstimatorTuning, estimate: State
         turn = np.reshape(estimate.R_WB, (3, 3))
         sides = believable(attitude, tuning.attitude_floor**2)
         found[3:, 3:] = (turn * sides) @ turn.T
-        found[range(3), range(3)] = believable(place, tuning.position_floor**2)
+        axes[:] = believable(place, tuning.position_floor**2)
     elif fix is not None:
-        found[range(3), range(3)] = believable(fix.position_variance, tuning.gnss_position_floor**2)
+        axes[:] = believable(fix.position_variance, tuning.gnss_position_floor**2)
     return found

@@ -31,7 +31,8 @@ _KNOWN_SPEED: Final = 0.5  # m/s
 _KNOWN_PLACE: Final = 0.5  # m, in dead reckoning
 AIDS_PLACE: Final = (Sensor.POSE, Sensor.GNSS)
 _UPPER: Final = np.triu_indices(6)
-_POSE: Final = np.ix_([P, P + 1, P + 2, TH, TH + 1, TH + 2], [P, P + 1, P + 2, TH, TH + 1, TH + 2])
+_OF_POSE: Final = np.array([P, P + 1, P + 2, TH, TH + 1, TH + 2])
+_POSE: Final = _OF_POSE[_UPPER[0]], _OF_POSE[_UPPER[1]]
 _MOTION: Final = np.ix_(
     [V, V + 1, V + 2, BG, BG + 1, BG + 2], [V, V + 1, V + 2, BG, BG + 1, BG + 2]
 )
@@ -50,7 +51,8 @@ def estimator_report(
 
     ``covariance`` (17, 17) [SI] is of the error of the ``estimate``.
     """
-    x, M = memory.numbers, covariance
+    x, M = memory.numbers[0], covariance
+    variances = np.diagonal(M)
     without = unaided(memory, now)
     sensors = _sensors(memory, now, stale)
     fix = memory.gnss
@@ -58,11 +60,11 @@ def estimator_report(
         t_us=estimate.t_us,
         pose_covariance=_pose(M),
         velocity_covariance=_motion(M, estimate),
-        accel_bias=_three(x["accel_bias"][0]),
-        gyro_bias=_three(x["gyro_bias"][0]),
-        accel_bias_variance=_three(np.diagonal(M)[BA : BA + 3]),
-        gyro_bias_variance=_three(np.diagonal(M)[BG : BG + 3]),
-        pose_delay=float(x["pose_delay"][0]),
+        accel_bias=_three(x["accel_bias"]),
+        gyro_bias=_three(x["gyro_bias"]),
+        accel_bias_variance=_three(variances[BA : BA + 3]),
+        gyro_bias_variance=_three(variances[BG : BG + 3]),
+        pose_delay=float(x["pose_delay"]),
         sensors=sensors,
         ratios=_ratios(sensors),
         unaided_us=round(1e6 * without) if without < math.inf else -1,
@@ -140,7 +142,7 @@ def _flags(M: Array, sensors: tuple[SensorReport, ...], *, aided: bool) -> int:
 
 
 def _pose(M: Array) -> tuple[float, ...]:
-    return tuple(M[_POSE][_UPPER].tolist())
+    return tuple(M[_POSE].tolist())
 
 
 def _motion(M: Array, estimate: StateEstimate) -> tuple[float, ...]:

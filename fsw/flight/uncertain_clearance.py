@@ -46,6 +46,7 @@ _PASSES: Final = 60  # over all planes; in a corner they have to settle
 
 
 _LOST: Final = np.eye(6)  # m^2, rad^2
+_POSE: Final = np.ix_([P, P + 1, P + 2, TH, TH + 1, TH + 2], [P, P + 1, P + 2, TH, TH + 1, TH + 2])
 
 
 class KeptSet(NamedTuple):
@@ -58,16 +59,13 @@ class KeptSet(NamedTuple):
     ample_us: int = -1  # when there was room enough last; -1: not known yet
     spread: tuple[float, ...] = ()  # m, k sigma at each zone
     t_us: int = 0  # at that time
-    sigma: float = 0.0  # m, standard deviation of the least certain part along its worst axis
 
     def of(self, safe_set: SafeSet) -> KeptSet:
         """The same for another safe set in force, until the next planning tick knows better."""
         if safe_set is self.source:
             return self
         added = (max(self.added, default=0.0),) * len(safe_set.zones)
-        return _grown(safe_set, added)._replace(
-            lacking=self.lacking, ample_us=self.ample_us, sigma=self.sigma
-        )
+        return _grown(safe_set, added)._replace(lacking=self.lacking, ample_us=self.ample_us)
 
 
 class UncertainClearance:
@@ -88,7 +86,7 @@ class UncertainClearance:
         # A plan keeps S(d) + n v: against a boundary that comes at r, d is less by r / k_S.
         self._lead = 1.0 / tunings[0].slope + lag
         self._sigmas, self._lengths = sigmas, lengths
-        self._on_base, self._on_links, self._radii = _places(body)
+        self._places, self._radii = _places(body, lengths[0])
         self._stand_off, self._stand_off_inside = (stand_off(one) for one in tunings)
 
     def keep(
@@ -99,39 +97,34 @@ class UncertainClearance:
         ``pose`` (6, 6) [m, rad, NED] is the covariance of the estimate's position and attitude;
         None where states are exact.
         """
-        if pose is None or not safe_set.zones:
+        if pose is None or not safe_set.zones or not self._sigmas > 0.0:
             return before if before.safe_set is safe_set else KeptSet(safe_set, safe_set)
-        if not np.isfinite(pose).all():
-            pose = _LOST
         levers = self._levers(estimate)
-        covariances = place_covariances(pose, levers)
-        along_any = np.sqrt(np.maximum(np.linalg.eigvalsh(covariances)[:, -1], 0.0))
-        sigma = float(along_any.max())
-        if not self._sigmas > 0.0:
-            return KeptSet(safe_set, safe_set, sigma=sigma)
-        spread = self._spread(safe_set, covariances, along_any)
+        spread = self._spread(safe_set, _finite(pose), levers)
         wanted = self._ahead(before, spread, estimate.t_us)
         granted = self._granted(safe_set, estimate, levers, wanted)
         lacking = max(map(float.__sub__, wanted, granted))
         kept = before
         if safe_set is not before.source or granted != before.added:
             kept = _grown(safe_set, granted)
-        lacks = lacking > LACKING and before.ample_us >= 0
-        ample_us = before.ample_us if lacks else estimate.t_us
-        return kept._replace(
-            lacking=lacking, ample_us=ample_us, spread=spread, t_us=estimate.t_us, sigma=sigma
-        )
+        t_us, lacks = estimate.t_us, lacking > LACKING and before.ample_us >= 0
+        ample_us = before.ample_us if lacks else t_us
+        return KeptSet(kept.source, kept.safe_set, kept.added, lacking, ample_us, spread, t_us)
+
+    def deviation(self, estimate: StateEstimate, pose: Array) -> float:
+        """Standard deviation [m] of the least certain part of the body, along its worst axis.
+
+        ``pose`` (6, 6) [m, rad, NED] as for ``keep``.
+        """
+        return float(_along_any(_finite(pose), self._levers(estimate)).max())
 
     def _levers(self, estimate: StateEstimate) -> Array:
         """From the base to each place of the body (places, 3) [m, NED]."""
         th1, th2 = estimate.q_arm
-        (x1, z1), (x2, z2) = links(self._lengths, th1, th1 + th2)
-        l1, l2 = self._lengths
-        first, second = np.array((x1, 0.0, z1)) / l1, np.array((x2, 0.0, z2)) / l2
-        on_link, along = self._on_links[:, 0], self._on_links[:, 1:]
-        on_arm = np.where(on_link[:, None] == ON_LINK1, first * along, first * l1 + second * along)
-        turn = np.reshape(estimate.R_WB, (3, 3))
-        levers: Array = np.concatenate((self._on_base, on_arm)) @ turn.T
+        (x1, z1), (x2, z2) = links((1.0, 1.0), th1, th1 + th2)
+        turn = np.reshape(estimate.R_WB, (3, 3)).T
+        axes = np.concatenate((turn, np.array(((x1, 0.0, z1), (x2, 0.0, z2))) @ turn))
+        levers: Array = self._places @ axes
         return levers
 
     def _ahead(self, before: KeptSet, spread: tuple[float, ...], now_us: int) -> tuple[float, ...]:
@@ -149,18 +142,19 @@ class UncertainClearance:
             return tuple(map(_settled, stepped, before.added))
         return tuple(stepped)
 
-    def _spread(self, safe_set: SafeSet, covariances: Array, along_any: Array) -> tuple[float, ...]:
+    def _spread(self, safe_set: SafeSet, pose: Array, levers: Array) -> tuple[float, ...]:
         """k sigma at each zone [m]; of the base alone where a zone keeps only that."""
-        spread = []
-        for zone in safe_set.zones:
-            kind = kind_of(zone.shape)
-            if kind.flat:
-                n = np.array(zone.shape.numbers[:3])
-                most = math.sqrt(max(float((covariances @ n @ n).max()), 0.0))
-            else:
-                most = float(along_any[0] if kind.follows_target else along_any.max())
-            spread.append(self._sigmas * most)
-        return tuple(spread)
+        kinds = [kind_of(zone.shape) for zone in safe_set.zones]
+        flat = [zone for zone, kind in zip(safe_set.zones, kinds, strict=True) if kind.flat]
+        normals = np.array([zone.shape.numbers[:3] for zone in flat]).reshape(-1, 3)
+        along = iter(_along(pose, levers, normals).tolist())
+        if len(flat) == len(kinds):  # the usual case, without a search for axes
+            return tuple([self._sigmas * one for one in along])
+        along_any = _along_any(pose, levers)
+        of_base, of_all = float(along_any[0]), float(along_any.max())
+        round_ = [of_base if kind.follows_target else of_all for kind in kinds]
+        most = [next(along) if kind.flat else one for kind, one in zip(kinds, round_, strict=True)]
+        return tuple([self._sigmas * one for one in most])
 
     def _granted(
         self, safe_set: SafeSet, estimate: StateEstimate, levers: Array, wanted: tuple[float, ...]
@@ -248,8 +242,36 @@ def pose_covariance(covariance: Array, estimate: StateEstimate) -> Array:
     """
     turn = np.eye(6)
     turn[3:, 3:] = np.reshape(estimate.R_WB, (3, 3))
-    kept = [P, P + 1, P + 2, TH, TH + 1, TH + 2]
-    found: Array = turn @ covariance[np.ix_(kept, kept)] @ turn.T
+    found: Array = turn @ covariance[_POSE] @ turn.T
+    return found
+
+
+def _finite(pose: Array) -> Array:
+    return pose if np.isfinite(pose).all() else _LOST
+
+
+def _along(pose: Array, levers: Array, normals: Array) -> Array:
+    """Deviation of the least certain of all places along each normal (planes,) [m].
+
+    n (I, -[l]x) is linear in l: (l, 1) times a matrix (4, 6) of the normal alone.
+    """
+    slopes = np.zeros((len(normals), 4, 6))
+    slopes[:, 3, :3] = normals
+    x, y, z = normals.T
+    slopes[:, 1, 3], slopes[:, 2, 3] = z, -y
+    slopes[:, 2, 4], slopes[:, 0, 4] = x, -z
+    slopes[:, 0, 5], slopes[:, 1, 5] = y, -x
+    place = np.ones((len(levers), 4))
+    place[:, :3] = levers
+    squares = (place @ (slopes @ pose @ slopes.transpose(0, 2, 1)) * place).sum(axis=2)
+    found: Array = np.sqrt(np.maximum(squares.max(axis=1), 0.0))
+    return found
+
+
+def _along_any(pose: Array, levers: Array) -> Array:
+    """Deviation of each place along its worst axis (places,) [m]."""
+    covariances = place_covariances(pose, levers)
+    found: Array = np.sqrt(np.maximum(np.linalg.eigvalsh(covariances)[:, -1], 0.0))
     return found
 
 
@@ -269,27 +291,28 @@ def place_covariances(pose: Array, levers: Array) -> Array:
     return found
 
 
-def _places(body: Body) -> tuple[Array, Array, Array]:
-    """Places on the base (n, 3) [m, body], on links (m, 2) [which, m], and radii (n + m,) [m].
+def _places(body: Body, length: float) -> tuple[Array, Array]:
+    """Places (places, 5) [m], and their radii (places,) [m]; link 1 has a ``length`` [m].
 
-    The deviation is a convex function of the place, so the ends of a part are its most uncertain
-    places. The first one is the base.
+    A place is its coordinates along the body's axes and along both links. The deviation is a convex
+    function of it, so the ends of a part are its most uncertain places. The first is the base.
     """
-    base: list[tuple[tuple[float, float, float], float]] = []
-    arm: list[tuple[tuple[int, float], float]] = []
+    base: list[tuple[tuple[float, ...], float]] = []
+    arm: list[tuple[tuple[float, ...], float]] = []
     for part in body.parts:
+        x, y, z = part.begin
         if part.on != ON_BASE:
-            arm.append(((part.on, part.begin[2]), part.radius))
+            along = (z, 0.0) if part.on == ON_LINK1 else (length, z)
+            arm.append(((0.0, 0.0, 0.0, *along), part.radius))
             continue
         if not part.rim > 0.0:
-            base.append((part.begin, part.radius))  # a capsule's ends are parts of their own
+            # A capsule's ends are parts of their own.
+            base.append(((x, y, z, 0.0, 0.0), part.radius))
             continue
         around = part.rim / math.cos(math.pi / _RIM)
         for k in range(_RIM):
             angle = 2.0 * math.pi * k / _RIM
-            x, y, z = part.begin
-            place = (x + around * math.cos(angle), y + around * math.sin(angle), z)
-            base.append((place, part.radius))
-    on_arm = np.array([place for place, _ in arm], dtype=np.float64).reshape(-1, 2)
-    radii = np.array([radius for _, radius in (*base, *arm)])
-    return np.array([place for place, _ in base]), on_arm, radii
+            rim = (x + around * math.cos(angle), y + around * math.sin(angle), z, 0.0, 0.0)
+            base.append((rim, part.radius))
+    places, radii = zip(*base, *arm, strict=True)
+    return np.array(places), np.array(radii)
