@@ -72,7 +72,8 @@ def _definitions() -> bytes:
         "sys_name": "Pandion", "ver_sw": "abc", "scenario": "walls", "seed": 3,
         "scenario_digest": scenario_digest("walls"), "controller": "blf", "inner": "tracking",
         "robustness": "consistent", "solver": "clarabel", "body": "points", "soft": 0,
-        "pacing": "realtime", "profile": 0, "numbers": json.dumps(flat(flight_config(body="points"))),
+        "pacing": "realtime", "profile": 0,
+        "numbers": json.dumps(flat(flight_config(body="points"))),
     }  # fmt: skip
     parts = [ulog.opening(BEGIN_US), *(ulog.information(*fact) for fact in facts.items())]
     parts += [ulog.format_of(topic) for topic in (*topics.TOPICS, *TRUTH_TOPICS)]
