@@ -43,8 +43,8 @@ class TopApp(App[None]):
     ENABLE_COMMAND_PALETTE = False
     CSS = """
     #headline { height: 1; background: $primary; color: $text; padding: 0 1; text-style: bold; }
-    #streams { width: 52; } #fields { width: 1fr; }
-    #lower { height: 12; } #margins { width: 52; height: 12; } #texts { width: 1fr; height: 12; }
+    #streams { width: 60; } #fields { width: 1fr; }
+    #lower { height: 12; } #margins { width: 60; height: 12; } #texts { width: 1fr; height: 12; }
     #filter { display: none; height: 3; } #filter.shown { display: block; }
     DataTable, RichLog { border: round $primary-muted; }
     """
@@ -79,13 +79,16 @@ class TopApp(App[None]):
 
     def on_mount(self) -> None:
         """Lay the tables out and begin to listen."""
-        columns = ("message", "comp", "Hz", "count", "age")
-        self._by_name = self.query_one("#streams", DataTable).add_columns(*columns)[0]
+        streams = self.query_one("#streams", DataTable)
+        self._by_name = streams.add_column("message", width=26)
+        for label, width in (("comp", 4), ("Hz", 5), ("count", 6), ("age", 5)):
+            streams.add_column(label, width=width)
         self.query_one("#fields", DataTable).add_columns("field", "value", "unit", "meaning")
-        self.query_one("#margins", DataTable).add_columns("#", "mm", "h", "")
+        for label, width in (("#", 3), ("mm", 6), ("h", 6), ("", _BAR)):
+            self.query_one("#margins", DataTable).add_column(label, width=width)
         for name in ("streams", "fields", "margins", "texts"):
             self.query_one(f"#{name}").border_title = name
-        self.query_one("#streams", DataTable).focus()
+        streams.focus()
         self.set_interval(_PERIOD_S, self.refresh_all)
 
     def on_unmount(self) -> None:
