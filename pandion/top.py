@@ -31,8 +31,8 @@ def main(argv: list[str]) -> int:
     options = read(TopOptions, "pandion top", what, argv)
     try:
         vehicle = parse_address(options.vehicle)
-        from view.telemetry import TelemetryPeer
         from view.top.app import TopApp
+        from view.top.peer import TelemetryPeer
     except LinkError as error:
         complain("pandion top", error)
         return COULD_NOT_START

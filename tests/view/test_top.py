@@ -13,9 +13,9 @@ from fsw.link.udp_endpoint import OpenEndpoint
 from messages.frames import FrameWriter, split, wire_fields
 from pandion.top import main
 from tests.waiting import wait_for
-from view.telemetry import Message, TelemetryPeer, meaning, messages, unit
 from view.top.app import TopApp, shown_value
 from view.top.inspector import Inspector
+from view.top.peer import Message, TelemetryPeer, meaning, messages, unit
 
 HEARTBEAT, LOCAL_POSITION_NED, STATUSTEXT = 0, 32, 253
 BARRIER_MARGIN, MPC_STATUS = 60203, 60204

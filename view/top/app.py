@@ -14,8 +14,8 @@ from textual.coordinate import Coordinate
 from textual.widgets import DataTable, Footer, Input, RichLog, Static
 
 from command_line.printable import printable
-from view.telemetry import Message, Value, meaning, unit
 from view.top.inspector import Inspector, Stream
+from view.top.peer import Message, Value, meaning, unit
 
 _PERIOD_S: Final = 0.2
 _BAR: Final = 20  # characters

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from fsw.link.wire.px4_mode import AVAILABLE_MODES
 from messages import dialect
-from view.telemetry import Message, Value
+from view.top.peer import Message, Value
 
 _WINDOW_S: Final = 3.0  # over which a rate is counted
 _SILENT_S: Final = 2.0  # without a heartbeat the vehicle is lost
