@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Sequence
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fsw.signals import TARGET_SPHERE, Vec3, Zone
+from fsw.signals import Vec3, Zone
+from view.flight_data import UlogError
 from view.report.chart import COLOURS, LIMIT, REFERENCE, Chart, Trace
 from view.report.reported import Reported
-from view.zone_mesh import Mesh, Scene, mesh
+from view.zone_meshes import Mesh, zone_mesh
 
 Array = NDArray[Any]
 
 _MOST: Final = 1500  # points of a path
 _AROUND_M: Final = 0.35  # of the paths that a wall is drawn
 _BODY_OPACITY, _CLEARANCE_OPACITY = 0.45, 0.12
+_MOST_TRIANGLES: Final = 30_000  # of all zones: half a megabyte of the page
 
 
 def paths(flights: Sequence[Reported]) -> Chart:
@@ -39,7 +42,7 @@ def paths(flights: Sequence[Reported]) -> Chart:
     if seen:
         every = np.concatenate(seen)
         low, high = np.nanmin(every, axis=0) - _AROUND_M, np.nanmax(every, axis=0) + _AROUND_M
-        traces += _zones(flights[0], Scene(_triple(low), _triple(np.minimum(high, 0.0))))
+        traces += _zones(flights[0], (_triple(low), _triple(high)))
     layout = {
         "height": 560,
         "scene": {
@@ -104,37 +107,43 @@ def _worst(flight: Reported, name: str) -> list[Trace]:
     }]  # fmt: skip
 
 
-def _zones(flight: Reported, scene: Scene) -> list[Trace]:
-    """Each zone that was announced last, and the same with its clearance."""
-    traces = []
-    for k, zone in enumerate(announced_zones(flight)):
-        target = _target_at_worst(flight) if zone.shape.kind == TARGET_SPHERE else (0.0, 0.0, 0.0)
-        if not zone.keep_in:
-            traces.append(_surface(mesh(zone.shape, scene), _BODY_OPACITY, f"zone {k + 1}"))
-        inwards = -zone.clearance if zone.keep_in else zone.clearance
-        grown = mesh(zone.shape, scene, inwards, target)
-        traces.append(_surface(grown, _CLEARANCE_OPACITY, f"zone {k + 1} with its clearance"))
+def _zones(flight: Reported, region: tuple[Vec3, Vec3]) -> list[Trace]:
+    """Each zone that was announced first, and where its clearance ends."""
+    traces, triangles = [], 0
+    target = _target_at_worst(flight)
+    for k, zone in enumerate(announced_zones(flight), start=1):
+        shown = zone_mesh(zone, region, target)
+        if shown is None:
+            continue
+        meshes = [(shown.surface, _CLEARANCE_OPACITY if zone.keep_in else _BODY_OPACITY, "")]
+        if shown.shell is not None:
+            meshes.append((shown.shell, _CLEARANCE_OPACITY, " with its clearance"))
+        triangles += sum(len(part.faces) for part, _, _ in meshes)
+        if triangles > _MOST_TRIANGLES:
+            break
+        traces += [_surface(part, opacity, f"zone {k}{more}") for part, opacity, more in meshes]
     return traces
 
 
 def announced_zones(flight: Reported) -> tuple[Zone, ...]:
-    """The zones of the first safe set that was announced."""
-    for _, announced in flight.data.decoded("announced"):
-        if announced and announced[0].safe_set.zones:
-            zones: tuple[Zone, ...] = announced[0].safe_set.zones
-            return zones
+    """The zones of the first safe set that was announced; none in a log of another build."""
+    with contextlib.suppress(UlogError):
+        for _, announced in flight.data.decoded("announced"):
+            if announced and announced[0].safe_set.zones:
+                zones: tuple[Zone, ...] = announced[0].safe_set.zones
+                return zones
     return ()
 
 
-def _target_at_worst(flight: Reported) -> Vec3:
+def _target_at_worst(flight: Reported) -> Vec3 | None:
     tracked, worst = flight.table("sim_tracking"), flight.worst
     if tracked is None or worst is None:
-        return (0.0, 0.0, 0.0)
+        return None
     return _triple(tracked["target"][int(np.abs(flight.since(tracked.t) - worst.t).argmin())])
 
 
 def _surface(shown: Mesh, opacity: float, name: str) -> Trace:
-    i, j, k = shown.triangles.T.tolist()
+    i, j, k = shown.faces.T.tolist()
     return {
         "type": "mesh3d", **_enu(shown.vertices), "i": i, "j": j, "k": k, "color": LIMIT,
         "opacity": opacity, "name": name, "hoverinfo": "name", "flatshading": True,
