@@ -123,6 +123,7 @@ class Autopilot:
         self._cascade.step(in_hover(self.config.airframe, estimate), estimate, nominal, REST_INPUT)
         self._safe_sets.warm_up(estimate)
         self._sensed.warm_up()
+        self._clearance.warm_up(estimate)
         self._exact.warm_up(estimate, TickInputs(_STILL))
 
     def analyse(self, safe_set: SafeSet) -> tuple[Finding, ...]:
@@ -360,8 +361,7 @@ class Autopilot:
         are uncertain while they are doubted. None: certain.
         """
         if covariance is not None and fusion is not None:
-            pose = pose_covariance(covariance, estimate)
-            return pose + self._sensed.lasting_error(fusion, estimate)
+            return pose_covariance(covariance, estimate, self._sensed.lasting_error(fusion))
         if fusion is None and state.trust.doubted:
             position, attitude = state.aiding.position_sigma, state.aiding.attitude_sigma
             return np.diag((position**2,) * 3 + (attitude**2,) * 3)

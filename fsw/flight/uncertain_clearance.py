@@ -26,13 +26,16 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from fsw.barriers.safe_approach import BarrierTuning
-from fsw.estimation.error_state import TH, Array, P
+from fsw.compiled import kernel
+from fsw.estimation.error_state import ERRORS, TH, Array, P
+from fsw.estimation.turned_covariance import SAME_AXES, Vec6, turned_covariance
+from fsw.geometry.rotation import rotate
 from fsw.model.body import ON_BASE, ON_LINK1, Body
 from fsw.model.kinematics import links
 from fsw.parameters.consistency import stand_off
 from fsw.shapes import kind_of
 from fsw.shapes.zones import all_planes
-from fsw.signals import SafeSet, StateEstimate, Vec2
+from fsw.signals import Mat3, SafeSet, StateEstimate, Vec2, Vec4
 
 _STEP: Final = 1e-3  # m, by which clearances grow, so that most ticks have the same ones
 _SLACK: Final = 4e-3  # m, by which one must be too large before it shrinks
@@ -46,7 +49,8 @@ _PASSES: Final = 60  # over all planes; in a corner they have to settle
 
 
 _LOST: Final = np.eye(6)  # m^2, rad^2
-_POSE: Final = np.ix_([P, P + 1, P + 2, TH, TH + 1, TH + 2], [P, P + 1, P + 2, TH, TH + 1, TH + 2])
+_NO_NORMALS: Final = np.empty((0, 3))
+_NOTHING: Final[Vec6] = (0.0,) * 6
 
 
 class KeptSet(NamedTuple):
@@ -89,6 +93,10 @@ class UncertainClearance:
         self._places, self._radii = _places(body, lengths[0])
         self._stand_off, self._stand_off_inside = (stand_off(one) for one in tunings)
 
+    def warm_up(self, estimate: StateEstimate) -> None:
+        """Compile every kernel."""
+        self.deviation(estimate, pose_covariance(np.zeros((ERRORS, ERRORS)), estimate))
+
     def keep(
         self, before: KeptSet, safe_set: SafeSet, estimate: StateEstimate, pose: Array | None
     ) -> KeptSet:
@@ -99,8 +107,7 @@ class UncertainClearance:
         """
         if pose is None or not safe_set.zones or not self._sigmas > 0.0:
             return before if before.safe_set is safe_set else KeptSet(safe_set, safe_set)
-        levers = self._levers(estimate)
-        spread = self._spread(safe_set, _finite(pose), levers)
+        spread, levers = self._spread(safe_set, estimate, _finite(pose))
         wanted = self._ahead(before, spread, estimate.t_us)
         granted = self._granted(safe_set, estimate, levers, wanted)
         lacking = max(map(float.__sub__, wanted, granted))
@@ -116,16 +123,19 @@ class UncertainClearance:
 
         ``pose`` (6, 6) [m, rad, NED] as for ``keep``.
         """
-        return float(_along_any(_finite(pose), self._levers(estimate)).max())
+        pose = _finite(pose)
+        return float(_along_any(pose, self._look(estimate, pose)[0]).max())
 
-    def _levers(self, estimate: StateEstimate) -> Array:
-        """From the base to each place of the body (places, 3) [m, NED]."""
+    def _look(
+        self, estimate: StateEstimate, pose: Array, normals: Array = _NO_NORMALS
+    ) -> tuple[Array, list[float]]:
+        """From the base to each place of the body (places, 3) [m, NED], and see ``_look``."""
         th1, th2 = estimate.q_arm
-        (x1, z1), (x2, z2) = links((1.0, 1.0), th1, th1 + th2)
-        turn = np.reshape(estimate.R_WB, (3, 3)).T
-        axes = np.concatenate((turn, np.array(((x1, 0.0, z1), (x2, 0.0, z2))) @ turn))
-        levers: Array = self._places @ axes
-        return levers
+        first, second = links((1.0, 1.0), th1, th1 + th2)
+        levers, most = np.empty((len(self._places), 3)), np.empty(len(normals))
+        arm = (*first, *second)
+        _look(pose, estimate.R_WB, arm, self._places, normals, levers, most)
+        return levers, most.tolist()
 
     def _ahead(self, before: KeptSet, spread: tuple[float, ...], now_us: int) -> tuple[float, ...]:
         """What clearances are to grow by [m], in steps: k sigma as it will be when plans can act.
@@ -142,19 +152,25 @@ class UncertainClearance:
             return tuple(map(_settled, stepped, before.added))
         return tuple(stepped)
 
-    def _spread(self, safe_set: SafeSet, pose: Array, levers: Array) -> tuple[float, ...]:
-        """k sigma at each zone [m]; of the base alone where a zone keeps only that."""
+    def _spread(
+        self, safe_set: SafeSet, estimate: StateEstimate, pose: Array
+    ) -> tuple[tuple[float, ...], Array]:
+        """k sigma at each zone [m], and the levers of ``_look``."""
         kinds = [kind_of(zone.shape) for zone in safe_set.zones]
         flat = [zone for zone, kind in zip(safe_set.zones, kinds, strict=True) if kind.flat]
-        normals = np.array([zone.shape.numbers[:3] for zone in flat]).reshape(-1, 3)
-        along = iter(_along(pose, levers, normals).tolist())
-        if len(flat) == len(kinds):  # the usual case, without a search for axes
-            return tuple([self._sigmas * one for one in along])
-        along_any = _along_any(pose, levers)
-        of_base, of_all = float(along_any[0]), float(along_any.max())
-        round_ = [of_base if kind.follows_target else of_all for kind in kinds]
-        most = [next(along) if kind.flat else one for kind, one in zip(kinds, round_, strict=True)]
-        return tuple([self._sigmas * one for one in most])
+        normals = _NO_NORMALS
+        if flat:
+            normals = np.array([zone.shape.numbers[:3] for zone in flat])
+        levers, most = self._look(estimate, pose, normals)
+        if len(flat) < len(kinds):
+            along_any, along = _along_any(pose, levers), iter(most)
+            base, worst = float(along_any[0]), float(along_any.max())
+            # Of the base alone where a zone keeps only that.
+            round_ = [base if kind.follows_target else worst for kind in kinds]
+            most = [
+                next(along) if kind.flat else one for kind, one in zip(kinds, round_, strict=True)
+            ]
+        return tuple([self._sigmas * one for one in most]), levers
 
     def _granted(
         self, safe_set: SafeSet, estimate: StateEstimate, levers: Array, wanted: tuple[float, ...]
@@ -235,37 +251,43 @@ def _kept_off(normals: Array, room: Array) -> Array | None:
     return None
 
 
-def pose_covariance(covariance: Array, estimate: StateEstimate) -> Array:
+def pose_covariance(covariance: Array, estimate: StateEstimate, besides: Vec6 = _NOTHING) -> Array:
     """Covariance (6, 6) of position [m, NED] and attitude [rad, NED].
 
-    From the filter's ``covariance`` (17, 17) [SI], whose attitude is about the body's axes.
+    From the filter's ``covariance`` (17, 17) [SI], whose attitude is about the body's axes, and
+    variances ``besides`` [m^2, NED] [rad^2, FRD].
     """
-    turn = np.eye(6)
-    turn[3:, 3:] = np.reshape(estimate.R_WB, (3, 3))
-    found: Array = turn @ covariance[_POSE] @ turn.T
-    return found
+    return turned_covariance(covariance, (P, TH), (SAME_AXES, estimate.R_WB), besides)
 
 
 def _finite(pose: Array) -> Array:
-    return pose if np.isfinite(pose).all() else _LOST
+    return pose if math.isfinite(pose.sum()) else _LOST
 
 
-def _along(pose: Array, levers: Array, normals: Array) -> Array:
-    """Deviation of the least certain of all places along each normal (planes,) [m].
+@kernel
+def _look(
+    pose: Array, turn: Mat3, arm: Vec4, places: Array, normals: Array, levers: Array, most: Array
+) -> None:
+    """Each place's lever (places, 3) [m, NED], and the most uncertain one's along each normal.
 
-    n (I, -[l]x) is linear in l: (l, 1) times a matrix (4, 6) of the normal alone.
+    That is the deviation ``most`` (planes,) [m] along ``normals`` (planes, 3) [NED] of all places.
     """
-    slopes = np.zeros((len(normals), 4, 6))
-    slopes[:, 3, :3] = normals
-    x, y, z = normals.T
-    slopes[:, 1, 3], slopes[:, 2, 3] = z, -y
-    slopes[:, 2, 4], slopes[:, 0, 4] = x, -z
-    slopes[:, 0, 5], slopes[:, 1, 5] = y, -x
-    place = np.ones((len(levers), 4))
-    place[:, :3] = levers
-    squares = (place @ (slopes @ pose @ slopes.transpose(0, 2, 1)) * place).sum(axis=2)
-    found: Array = np.sqrt(np.maximum(squares.max(axis=1), 0.0))
-    return found
+    x1, z1, x2, z2 = arm
+    for i in range(places.shape[0]):
+        x, y, z, first, second = places[i]
+        at = rotate(turn, (x + first * x1 + second * x2, y, z + first * z1 + second * z2))
+        levers[i, 0], levers[i, 1], levers[i, 2] = at
+    for k in range(normals.shape[0]):
+        n, variance = (normals[k, 0], normals[k, 1], normals[k, 2]), 0.0
+        for i in range(places.shape[0]):
+            x, y, z = levers[i]
+            slope = (*n, y * n[2] - z * n[1], z * n[0] - x * n[2], x * n[1] - y * n[0])
+            total = 0.0
+            for a in range(6):
+                for b in range(6):
+                    total += slope[a] * pose[a, b] * slope[b]
+            variance = max(variance, total)
+        most[k] = math.sqrt(variance)
 
 
 def _along_any(pose: Array, levers: Array) -> Array:
