@@ -18,7 +18,6 @@ from fsw.measurements import (
 )
 from fsw.signals import Vec3
 
-Parts = tuple[float, ...]  # a number or more of each part of a sample
 Aiding = PoseSample | GnssSample | PressureSample | MagneticSample | RangeSample
 SENSOR_OF: Final[dict[type, Sensor]] = {
     PoseSample: Sensor.POSE,
@@ -43,10 +42,10 @@ class Health(NamedTuple):
     time: float = -math.inf  # s, newest time stamp of a sample
     came: float = -1.0  # s, when that came; negative: never
     apart: float = 0.0  # s, of its time stamp from the one before
-    numbers: Parts = ()  # of that sample
-    fused: Parts = ()  # s, when each part of it was fused last
-    ratio: Parts = ()  # chi-square over gate, of each part
-    innovation: Parts = ()  # of each part: m, m/s, rad
+    numbers: tuple[float, ...] = ()  # of that sample
+    fused: tuple[float, ...] = ()  # s, when each part of it was fused last
+    ratio: tuple[float, ...] = ()  # chi-square over gate, of each part
+    innovation: tuple[float, ...] = ()  # of each part: m, m/s, rad
     fault: SensorFault = SensorFault.NONE  # the last one
     fault_at: float = -math.inf  # s
 
@@ -55,10 +54,6 @@ class Health(NamedTuple):
         if now - self.came > stale:
             return SensorFault.STALE
         return self.fault if now - self.fault_at <= _SHOWN else SensorFault.NONE
-
-    def judged(self, fused: Parts, ratio: Parts, innovation: Parts) -> Health:
-        """The same sensor, after a sample: see the fields [s] [1] [m, m/s, rad]."""
-        return Health(*self[:5], fused, ratio, innovation, *self[8:])
 
     def with_fault(self, fault: SensorFault, now: float) -> Health:
         """The same sensor, with a ``fault`` that was seen at ``now`` [s]."""
@@ -92,8 +87,7 @@ def arrived(
     else:
         fault = SensorFault.NONE
     apart = min(sample.time - health.time, _LONGEST_APART)
-    # Not by name: that takes three times as long, and there are 120 a second.
-    health = Health(health.sensor, sample.time, now, apart, numbers, *health[5:])
+    health = health._replace(time=sample.time, came=now, apart=apart, numbers=numbers)
     return (health.with_fault(fault, now) if fault else health), fault
 
 

@@ -310,20 +310,20 @@ class SensorFusion:
 
     def take(self, memory: FusionMemory, sample: Aiding, now: float) -> FusionMemory:
         """Check a ``sample`` that came at ``now`` [s] and let it wait for its time."""
-        x = memory.numbers[0]
-        still = bool(x["same"] >= STUCK_READINGS)
+        x = memory.numbers
+        still = bool(x["same"][0] >= STUCK_READINGS)
         before = memory.of(SENSOR_OF[type(sample)])
         health, fault = arrived(before, sample, now, self.tuning, still=still)
         time = sample.time
         if isinstance(sample, PoseSample):
-            time -= float(x["pose_delay"]) if memory.started else self.tuning.pose_delay
+            time -= float(x["pose_delay"][0]) if memory.started else self.tuning.pose_delay
         elif isinstance(sample, GnssSample):
             time -= self.tuning.gnss_delay
-        if not fault and memory.started and time < x["time"] - LATE:
+        if not fault and memory.started and time < x["time"][0] - LATE:
             fault = SensorFault.TOO_OLD
             health = health.with_fault(fault, now)
         delay = memory.delay
-        if not fault or fault is SensorFault.TOO_OLD:
+        if fault in (SensorFault.NONE, SensorFault.TOO_OLD):
             delay = self._delay(delay, now - time, now - before.came)
         others = memory.without(health.sensor)
         if fault:
@@ -457,7 +457,7 @@ class SensorFusion:
         fused = tuple([now if r <= 1.0 else before for r, before in zip(ratio, fused, strict=True)])
         innovation = memory.numbers["innovation"].ravel().tolist()
         shown = tuple(innovation if len(ratio) > 1 else innovation[:1])
-        health = health.judged(fused, ratio, shown)
+        health = health._replace(ratio=ratio, fused=fused, innovation=shown)
         refused = max(ratio) > 1.0
         if refused:
             health = health.with_fault(SensorFault.JUMP, now)
