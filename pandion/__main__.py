@@ -37,7 +37,7 @@ VERBS: Final[dict[str, tuple[str, str]]] = {
         "pandion.replay",
         "feed a flight log through the flight software again and compare",
     ),
-    "export": ("pandion.export", "write a flight log as CSV or MCAP"),
+    "export": ("pandion.export", "write a flight log as CSV or MCAP, or layouts that show it"),
     "top": ("pandion.top", "inspect a running vehicle in the terminal: rates, fields, margins"),
     "report": ("pandion.report", "write one or several flights as a self-contained HTML page"),
     "doctor": ("pandion.doctor", "check this machine: privileges, ports, versions, disk, clock"),

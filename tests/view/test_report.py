@@ -83,6 +83,21 @@ def test_margins_over_time_are_distances_to_the_walls(drawn: dict[str, Any]) -> 
     np.testing.assert_allclose(own["y"], 200.0, atol=1e-2)
 
 
+def test_the_path_is_drawn_east_north_up_between_the_zones(drawn: dict[str, Any]) -> None:
+    base, tip = trace(drawn["path"], "base"), trace(drawn["path"], "end-effector")
+    assert max(base["y"]) == pytest.approx(north(3.0), abs=1e-3)
+    assert set(base["z"]) == {-flights.HEIGHT}
+    np.testing.assert_allclose(tip["z"], -flights.HEIGHT - 0.3, atol=1e-6)
+    worst = trace(drawn["path"], "smallest margin")
+    assert worst["z"] == [pytest.approx(-flights.HEIGHT - 0.3)]
+    walls = [one for one in drawn["path"]["data"] if one["type"] == "mesh3d"]
+    assert [one["name"] for one in walls] == [
+        "zone 1", "zone 1 with its clearance", "zone 2", "zone 2 with its clearance",
+    ]  # fmt: skip
+    np.testing.assert_allclose(walls[0]["y"], 1.0)
+    np.testing.assert_allclose(walls[1]["y"], 0.9)
+
+
 def test_bars_are_the_margins_and_limits_of_the_result(drawn: dict[str, Any]) -> None:
     (bars,) = drawn["parts"]["data"]
     assert dict(zip(bars["y"], bars["x"], strict=True)) == {
