@@ -37,6 +37,7 @@ VERBS: Final[dict[str, tuple[str, str]]] = {
         "pandion.replay",
         "feed a flight log through the flight software again and compare",
     ),
+    "view": ("pandion.view", "show a flight in the browser, from its log or live"),
     "export": ("pandion.export", "write a flight log as CSV or MCAP"),
     "bench": ("pandion.moved_bench", ""),
 }

@@ -73,7 +73,7 @@ class FlightData:
     lost_ms: int  # of data, where the disk was too slow
     whole: bool  # False where the end is cut
     beside: Mapping[str, Any] = field(default_factory=dict)
-    """``result.json`` and ``sitl.json`` of the same directory, by their stems, where there are."""
+    """``result.json``, ``sitl.json`` and ``fsw.json`` beside it, by their stems, where there are."""
 
     @property
     def begin(self) -> float:
@@ -173,7 +173,7 @@ def _inputs(table: Table) -> tuple[InputChange, ...]:
 def _beside(path: Path) -> dict[str, Any]:
     """What else the flight's directory says, as far as it can be read."""
     found = {}
-    for stem in ("result", "sitl"):
+    for stem in ("result", "sitl", "fsw"):
         try:
             read = json.loads((path.parent / f"{stem}.json").read_text(encoding="utf-8"))
         except (OSError, ValueError):
