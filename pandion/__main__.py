@@ -39,6 +39,8 @@ VERBS: Final[dict[str, tuple[str, str]]] = {
     ),
     "view": ("pandion.view", "show a flight in the browser, from its log or live"),
     "export": ("pandion.export", "write a flight log as CSV or MCAP"),
+    "report": ("pandion.report", "write one or several flights as a self-contained HTML page"),
+    "doctor": ("pandion.doctor", "check this machine: privileges, ports, versions, disk, clock"),
     "bench": ("pandion.moved_bench", ""),
 }
 

@@ -73,7 +73,7 @@ class FlightData:
     lost_ms: int  # of data, where the disk was too slow
     whole: bool  # False where the end is cut
     beside: Mapping[str, Any] = field(default_factory=dict)
-    """``result.json``, ``sitl.json`` and ``fsw.json`` beside it, by their stems, where there are."""
+    """``result.json``, ``sitl.json`` and ``fsw.json`` beside it, by stem, where there are."""
 
     @property
     def begin(self) -> float:
