@@ -24,6 +24,7 @@ from fsw.signals import (
 )
 from view.flight import Curve, Trail
 from view.flight_data import FlightData, Table, UlogError, read_flight
+from view.flight_events import events
 from view.scene import (
     Event,
     Horizon,
@@ -46,7 +47,6 @@ _FACTS: Final = (
 _POINTS: Final = ("base", "joint2", "end_effector")
 _CURVE_POINTS: Final = 1500
 _NO_TABLE: Final = Table("", np.empty(0), {})
-_TEXTS_OF_STEPS: Final = " to "
 
 
 class LogFlight:
@@ -386,30 +386,7 @@ class LogFlight:
 
 
 def _events(data: FlightData) -> tuple[Event, ...]:
-    found: list[Event] = []
-    for one in data.texts:
-        kind = "mode" if _is_mode_change(one.text) else "text"
-        found.append(Event(one.t, kind, one.text, one.severity))
-    status = data.tables.get("vehicle_status", _NO_TABLE)
-    before = ""
-    for k in range(len(status)):
-        now = _text(status["failures"][k])
-        if now != before:
-            text = f"failsafe: {now}" if now else f"over: {before}"
-            found.append(Event(float(status.t[k]), "failsafe", text, 3 if now else 6))
-            before = now
-    asked = data.tables.get("vehicle_command", _NO_TABLE)
-    found += [
-        Event(float(asked.t[k]), "command", f"command {int(asked['command'][k])}")
-        for k in range(len(asked))
-    ]
-    return tuple(sorted(found, key=lambda one: one.t))
-
-
-def _is_mode_change(text: str) -> bool:
-    """As the commander says it: FROM to TO: WHY."""
-    change, _, why = text.partition(": ")
-    return bool(why) and _TEXTS_OF_STEPS in change and len(change.split()) == 3
+    return tuple(Event(one.t, one.kind.value, one.text) for one in events(data))
 
 
 def _worst(data: FlightData, name_of: Any) -> Worst | None:

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import threading
 import time
+from dataclasses import replace
 from typing import Any, Final
 
 import viser
 
 from view import panels
 from view.flight import Flight
+from view.flight_events import EventKind
 from view.page import Server
 from view.plots import Plot
-from view.scene import EVENT_KINDS
 from view.stage import Stage
 from view.timeline import Timeline
 
@@ -89,7 +90,9 @@ class LogPage:
             self._slider.on_update(self._slid)
             buttons = gui.add_button_group("", (_BACK, _PLAY, _ON, _WORST))
             buttons.on_click(lambda event: self._press(event.target.value))
-            kinds = gui.add_dropdown("event ◀ ▶", (_ANY, *EVENT_KINDS), initial_value=_ANY)
+            kinds = gui.add_dropdown(
+                "event ◀ ▶", (_ANY, *(kind.value for kind in EventKind)), initial_value=_ANY
+            )
             kinds.on_update(lambda _: self._choose(kinds.value))
             speed = gui.add_dropdown("speed", tuple(_SPEEDS), initial_value="1 ×")
             speed.on_update(lambda _: self._set_speed(_SPEEDS[speed.value]))
@@ -114,8 +117,6 @@ class LogPage:
         self._kind = "" if kind == _ANY else kind
 
     def _set_speed(self, speed: float) -> None:
-        from dataclasses import replace
-
         self._change(lambda at: replace(at, speed=speed))
 
     def _show_truth(self, wanted: bool) -> None:

@@ -16,7 +16,7 @@ from view.vehicle import tilt
 PLANNING_LIMIT: Final = 0.1  # s, a planning cycle must be over by then
 _SOON: Final = 0.05  # m; a margin below it is shown as close
 _ROTORS: Final = ("rear", "left", "front", "right")
-_SEVERITY: Final = {0: "EMERG", 1: "ALERT", 2: "CRIT", 3: "ERROR", 4: "WARN", 5: "NOTE", 6: "info"}
+_INKS: Final = {"fault": colours.RED, "warning": colours.ORANGE, "text": colours.GREY}
 _BOX: Final = "font:12px/1.45 ui-sans-serif,system-ui,sans-serif;padding:0 0.9em 0.3em"
 _NUMBER: Final = "font-variant-numeric:tabular-nums;white-space:nowrap;text-align:right"
 
@@ -58,12 +58,12 @@ def events_html(events: Sequence[Event], t: float, begin: float, most: int = 60)
     for k, one in enumerate(events[first : first + most], start=first):
         mark = "background:rgba(9,105,218,.13);" if k == last else ""
         pale = "opacity:.5;" if k > last else ""
-        colour = css(_severity_colour(one))
+        colour = css(_INKS.get(one.kind, colours.BLUE))
         rows.append(
             f'<tr style="vertical-align:top;{mark}{pale}">'
             f'<td style="{_NUMBER};padding-right:.6em">{one.t - begin:.2f}</td>'
             f'<td style="color:{colour};padding-right:.5em">'
-            f"{_SEVERITY.get(one.severity, '') if one.kind == 'text' else one.kind}</td>"
+            f"{escape(one.kind)}</td>"
             f'<td style="overflow-wrap:anywhere">{escape(one.text)}</td></tr>'
         )
     empty = "" if rows else "none yet"
@@ -249,12 +249,4 @@ def _badge(text: str, colour: Rgb) -> str:
     return (
         f'<span style="background:{css(colour)};color:#fff;border-radius:4px;padding:.1em .5em;'
         f'font-weight:600">{escape(text)}</span>'
-    )
-
-
-def _severity_colour(one: Event) -> Rgb:
-    if one.kind in ("mode", "command"):
-        return colours.BLUE
-    return (
-        colours.RED if one.severity <= 3 else colours.ORANGE if one.severity == 4 else colours.GREY
     )

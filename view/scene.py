@@ -117,12 +117,8 @@ class Event(NamedTuple):
     """Something to jump to."""
 
     t: float  # s, sensor time
-    kind: str  # one of EVENT_KINDS
+    kind: str  # a value of view.flight_events.EventKind
     text: str
-    severity: int = 6  # MAV_SEVERITY: 0 the worst
-
-
-EVENT_KINDS = ("mode", "failsafe", "text", "command")
 
 
 class Worst(NamedTuple):
@@ -132,11 +128,3 @@ class Worst(NamedTuple):
     margin: float  # m
     name: str  # of zone and part
     source: str  # who says so
-
-
-class Strip(NamedTuple):
-    """Curves over time: ``values`` has a row (n,) for each name."""
-
-    title: str
-    names: tuple[str, ...]
-    lines: tuple[float, ...]  # limits, drawn across
