@@ -291,7 +291,7 @@ class LogFlight:
         if row is None:
             return None
         return Solver(
-            status=_status_name(int(row["status"])),
+            status=status_name(int(row["status"])),
             total=1e-6 * float(row["total_us"]),
             solve=1e-6 * float(row["solve_us"]),
             iterations=int(row["solver_iterations"]),
@@ -422,7 +422,8 @@ def _curve(
     return Curve(title, np.repeat(t[ends], 2), tuple(names), tuple(thin), limits)
 
 
-def _status_name(number: int) -> str:
+def status_name(number: int) -> str:
+    """Of a PANDION_SOLVER_STATUS."""
     known = number in list(SolverStatus)
     return SolverStatus(number).name.lower().replace("_", " ") if known else f"status {number}"
 

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import contextlib
 import io
+import re
 import socket
+from collections.abc import Iterator
+from functools import partial
 from typing import Final
 
 import viser
+import websockets.asyncio.server
 
 LOCAL: Final = ("127.0.0.1", "localhost", "::1")
 
@@ -40,7 +44,8 @@ def open_server(host: str, port: int, title: str) -> Server:
                 f"cannot serve at {host}:{port}: {reason.lower()}; choose another --port"
             ) from None
         port = int(probe.getsockname()[1])
-    with contextlib.redirect_stdout(io.StringIO()):  # it prints its address in a box
+    # It prints its address in a box.
+    with contextlib.redirect_stdout(io.StringIO()), _own_pages_only(host, port):
         server = Server(host=host, port=port, label=title, verbose=False)
     server.gui.configure_theme(
         show_logo=False, show_share_button=False, control_width="large", brand_color=(9, 105, 218)
@@ -48,6 +53,24 @@ def open_server(host: str, port: int, title: str) -> Server:
     server.gui.main_panel.dock_right()
     server.gui.main_panel.set_width(430)
     return server
+
+
+@contextlib.contextmanager
+def _own_pages_only(host: str, port: int) -> Iterator[None]:
+    """Let a server that starts meanwhile refuse browsers that show a page of another site.
+
+    Any site's page may open a socket to this machine, and could command the vehicle. viser has no
+    option for that; websockets has.
+    """
+    local = r"http://(127\.0\.0\.1|localhost|\[::1\])(:\d+)?"
+    other = rf"http://[^/]+:{port}" if host not in LOCAL else local
+    usual = websockets.asyncio.server.serve
+    origins = [None, re.compile(local), re.compile(other)]
+    try:
+        websockets.asyncio.server.serve = partial(usual, origins=origins)
+        yield
+    finally:
+        websockets.asyncio.server.serve = usual
 
 
 def address(server: Server) -> str:
