@@ -36,9 +36,9 @@ _LOCAL_NED: Final = 1
 _SHAPE_NUMBERS: Final = 16
 _BALL: Final = 1  # PANDION_SHAPE
 _NAN: Final = math.nan
-_STREAMS: Final = ((ids.OBSTACLE_SHAPE, 100_000), (60205, 200_000))
-"""What is not sent by itself, and how often it is wanted [us]."""
-_SET_INTERVAL: Final = 511
+_PLAN_US: Final = 200_000.0  # between two plans
+_SET_INTERVAL, _REQUEST_MESSAGE = 511, 512
+_ASK_S: Final = 2.0  # between two requests of what is not sent by itself
 
 ARM, TAKE_OFF, LAND, RETURN, HOLD, SET_MODE = 400, 22, 21, 20, 17, 176  # MAV_CMD
 TRAJECTORY: Final = (1.0, 4.0, 11.0)
@@ -85,7 +85,7 @@ class VehicleLink(threading.Thread):
 
     def run(self) -> None:
         """See :class:`VehicleLink`."""
-        beat_s = setpoint_s = streams_s = -1e9
+        beat_s = setpoint_s = asked_s = -1e9
         while not self._ended:
             select.select((self._socket,), (), (), 0.02)
             self._hear()
@@ -93,10 +93,10 @@ class VehicleLink(threading.Thread):
             if now_s - beat_s >= _BEAT_S:
                 beat_s = now_s
                 self._beat()
-            if now_s - streams_s >= 5.0 * _BEAT_S:
-                streams_s = now_s
-                for message_id, interval_us in _STREAMS:
-                    self._command(_SET_INTERVAL, (float(message_id), float(interval_us)))
+            if now_s - asked_s >= _ASK_S:
+                asked_s = now_s
+                self._command(_SET_INTERVAL, (ids.MPC_HORIZON, _PLAN_US))
+                self._command(_REQUEST_MESSAGE, (ids.OBSTACLE_SHAPE,))
             if self._setpoint is not None and now_s - setpoint_s >= _SETPOINT_S:
                 setpoint_s = now_s
                 self._send_setpoint(self._setpoint)

@@ -260,7 +260,9 @@ class LogFlight:
         place = bisect_right(self._plan_times, t + 1e-9) - 1
         if place != self._horizon[0]:
             plan = self._plans[place][1] if place >= 0 else None
-            shown = None if plan is None else horizon(plan, self.airframe)
+            shown = None
+            if plan is not None:
+                shown = horizon(plan.start, plan.inputs, 1e-6 * plan.period_us, self.airframe)
             self._horizon = (place, shown)
         fresh = place >= 0 and t - self._plan_times[place] < 0.5
         return self._horizon[1] if fresh else None

@@ -13,7 +13,7 @@ from fsw.link.wire import message_ids as ids
 from fsw.link.wire.px4_mode import AVAILABLE_MODES
 from fsw.model.airframe import AIRFRAME, Airframe
 from fsw.parameters.float32 import nearest_decimal
-from fsw.signals import CommandResult, SafeSet, Vec3, Vec4, Zone
+from fsw.signals import CommandResult, PlanInput, PredictionState, SafeSet, Vec3, Vec4, Zone
 from messages import dialect
 from messages.frames import Frame, wire_fields
 from view.flight_events import EventKind
@@ -29,13 +29,14 @@ from view.scene import (
     Solver,
     Timing,
 )
+from view.vehicle import horizon
 
 _EVENTS: Final = 500
 _IGNORE_POSITION: Final = 0x7
 _ARMED, _FAILSAFE, _TERMINATED = 128, 5, 8
 _ON_GROUND: Final = 1
-_HORIZON: Final = 60205
-_NODES: Final = 8  # most places in an MPC_HORIZON
+_STEPS: Final = 6  # most of an MPC_HORIZON
+_REQUESTS: Final = (511, 512)  # of messages; their answers are of no interest
 _UNTIMED: Final = 0xFFFFFFFF
 _SHORT_S: Final = 1.0  # what was said longer ago is not so any more
 _AVERAGE: Final = 0.2  # weight of the newest interval in a rate
@@ -93,6 +94,8 @@ class Telemetry:
     _safe_set: SafeSet | None = None
     _pieces: dict[int, bytes] = field(default_factory=dict)
     _mode: str = ""
+    _plan: tuple[Any, ...] | None = None  # of which the horizon is known
+    _led: Horizon | None = None
 
     def take(self, frame: Frame, at: float) -> None:
         """Take in a frame that came ``at`` [s, on the listener's clock]."""
@@ -172,12 +175,15 @@ class Telemetry:
         return _vec3(values[1:4])
 
     def _horizon(self) -> Horizon | None:
-        values = self._newest(_HORIZON, lasts=_SHORT_S)
-        if values is None:
+        values = self._newest(ids.MPC_HORIZON, lasts=_SHORT_S)
+        if values is None or not 0 < values[58] <= _STEPS or not values[57]:
             return None
-        count = min(int(values[-1]), _NODES)
-        base, tip = values[1 : 1 + 3 * _NODES], values[1 + 3 * _NODES : 1 + 6 * _NODES]
-        return Horizon(_path(base, count), _path(tip, count))
+        plan = values[1:57] if all(map(math.isfinite, values[1:56])) else None
+        if plan != self._plan:
+            self._plan = plan
+            known = plan is not None
+            self._led = horizon(*_planned(values), self.airframe) if known else None
+        return self._led
 
     def _margins(self) -> tuple[tuple[Margin, ...], float, float, Safety]:
         values = self._newest(ids.BARRIER_MARGIN, lasts=2.0 * _SHORT_S)
@@ -213,6 +219,9 @@ class Telemetry:
 
     def read_zone(self, values: tuple[Any, ...]) -> None:
         """Take one shape of the safe set; the set changes when it is whole."""
+        if values[24] == 0:
+            self._zones, self._safe_set = {}, SafeSet()
+            return
         indexed = decode.obstacle_shape(cast("tuple[float, ...]", values))
         if indexed is None:
             return
@@ -248,6 +257,8 @@ class Telemetry:
     def read_answer(self, values: tuple[Any, ...]) -> None:
         """Take a COMMAND_ACK."""
         command, result = int(values[0]), int(values[1])
+        if command in _REQUESTS:
+            return
         self.answers.append((command, result))
         self.note(EventKind.COMMAND, f"{command_name(command)}: {result_name(result)}")
 
@@ -334,8 +345,15 @@ def _vec3(values: tuple[Any, ...]) -> Vec3:
     return float(x), float(y), float(z)
 
 
-def _path(values: tuple[float, ...], count: int) -> tuple[Vec3, ...]:
-    return tuple(_vec3(values[3 * k : 3 * k + 3]) for k in range(count))
+def _planned(values: tuple[Any, ...]) -> tuple[PredictionState, tuple[PlanInput, ...], float]:
+    """Start, inputs and period [s] of an MPC_HORIZON."""
+    x, u = values[1:20], values[20:56]
+    start = PredictionState(
+        x[0:3], x[3:6], x[6:9], x[9:11], x[11:13], x[13], x[14], x[15:17], x[17:19]
+    )
+    steps = (u[6 * k : 6 * k + 6] for k in range(values[58]))
+    inputs = tuple(PlanInput(one[0:3], one[3], one[4:6]) for one in steps)
+    return start, inputs, 1e-6 * values[57]
 
 
 def _text(padded: bytes) -> str:
@@ -375,5 +393,5 @@ _READERS: Final[dict[int, Callable[[Telemetry, tuple[Any, ...]], None]]] = {
     ids.MPC_STATUS: _nothing,
     ids.LOOP_TIMING: Telemetry.read_timing,
     ids.OBSTACLE_SHAPE: Telemetry.read_zone,
-    _HORIZON: _nothing,
+    ids.MPC_HORIZON: _nothing,
 }

@@ -15,7 +15,7 @@ from fsw.geometry.rotation import euler_zyx, matrix_from_quaternion
 from fsw.model.airframe import AIRFRAME, Airframe
 from fsw.model.kinematics import arm_points, point_in_flight
 from fsw.model.prediction import P, condense, to_vector
-from fsw.signals import Plan, StateEstimate, Vec3
+from fsw.signals import PlanInput, PredictionState, StateEstimate, Vec3
 from view.scene import Horizon, Posture
 
 _STILL: Vec3 = (0.0, 0.0, 0.0)
@@ -53,11 +53,19 @@ def tilt(posture: Posture) -> float:
     return float(np.arccos(np.clip(R[8], -1.0, 1.0)))
 
 
-def horizon(plan: Plan, airframe: Airframe = AIRFRAME) -> Horizon:
-    """Where a plan leads: the base and the end-effector at each node [m, NED]."""
-    model = condense_once(airframe, len(plan.inputs), 1e-6 * plan.period_us)
-    u = np.array([(*one.a, one.yaw_acc, *one.qdd_arm) for one in plan.inputs]).ravel()
-    nodes = model.phi @ to_vector(plan.start) + model.gamma @ u
+def horizon(
+    start: PredictionState,
+    inputs: tuple[PlanInput, ...],
+    period: float,
+    airframe: Airframe = AIRFRAME,
+) -> Horizon:
+    """Where a plan leads: the base and the end-effector at each node [m, NED].
+
+    It begins at ``start`` [SI, NED] and has ``inputs`` [SI, NED] for a ``period`` [s] each.
+    """
+    model = condense_once(airframe, len(inputs), period)
+    u = np.array([(*one.a, one.yaw_acc, *one.qdd_arm) for one in inputs]).ravel()
+    nodes = model.phi @ to_vector(start) + model.gamma @ u
     l1, l2 = airframe.link_length
     points = np.empty((2, 2, 3))
     base, tip = [], []
