@@ -45,13 +45,14 @@ def _cell(row: Judged | None) -> str:
         return "<td></td>"
     lines = [summary(row), *row.differs]
     text = "<br>".join(html.escape(line) for line in lines if line)
-    title = html.escape(row.flight.told, quote=True)
+    warning = row.flight.warning
+    title = "" if warning is None else html.escape(warning.text, quote=True)
     return f'<td class="{"bad" if row.differs else "good"}" title="{title}">{text}</td>'
 
 
 def summary(row: Judged) -> str:
     """When it was told, what was done, and the least margin."""
     flight = row.flight
-    told = "silent" if flight.told_s is None else f"{flight.told_s:.2f} s"
+    told = "silent" if flight.warning is None else f"{flight.warning.after_s:.2f} s"
     margin = "" if flight.least_m is None else f", {1000.0 * flight.least_m:.0f} mm"
     return f"{told}, {', then '.join(flight.actions) or 'goes on'}{margin}"

@@ -24,9 +24,8 @@ from fsw.signals import (
     OffboardReport,
     SetpointKind,
     Severity,
-    StatusText,
 )
-from messages import dialect
+from messages import dialect, status_text
 from messages.frames import FrameWriter
 from tests.fsw.link.snapshots import ACTUATORS, CONTEXT, SNAPSHOT
 
@@ -260,14 +259,11 @@ def test_a_long_text_is_cut_into_numbered_pieces() -> None:
     sentence = "arming refused: " + "ä" * 60
     pieces = [
         decoded(FrameWriter(1, 1).frame(ids.STATUSTEXT, *values))
-        for values in encode_replies.status_texts(StatusText(Severity.WARNING, sentence), 9)
+        for values in status_text.pieces(sentence, Severity.WARNING, 9)
     ]
     assert [piece.chunk_seq for piece in pieces] == list(range(len(pieces)))
     assert {piece.id for piece in pieces} == {9}
-    whole = b"".join(
-        values[1]
-        for values in encode_replies.status_texts(StatusText(Severity.WARNING, sentence), 9)
-    )
+    whole = b"".join(values[1] for values in status_text.pieces(sentence, Severity.WARNING, 9))
     assert whole.decode() == sentence
 
 
