@@ -25,7 +25,7 @@ class Plot:
 
 TABS: Final[dict[str, tuple[Plot, ...]]] = {
     "margins": (
-        Plot("least margin [m]", ("barrier_margin/minimum",)),
+        Plot("minimum margin [m]", ("barrier_margin/minimum",)),
         Plot("breaches, departures, interventions",
              ("barrier_margin/breaches", "barrier_margin/departures",
               "barrier_margin/interventions")),
