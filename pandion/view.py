@@ -11,12 +11,12 @@ from command_line.options import option, read, switch
 from command_line.output import complain, say
 from command_line.parser import COULD_NOT_START
 from command_line.values import whole
+from pandion.view_beside import PORT
 
 if TYPE_CHECKING:
     from view.flight import Flight
 
 DONE: Final = 0  # exit code
-PORT: Final = 8042
 VEHICLE: Final = "udp:127.0.0.1:18570"
 
 

@@ -19,6 +19,7 @@ from typing import Any, Final, cast
 
 _NAMES: Final = ("chromium", "chromium-browser", "google-chrome")
 _START_S: Final = 30.0
+_ANSWER_S: Final = 120.0  # drawing in software, on a busy machine
 
 
 class NoBrowser(Exception):
@@ -46,7 +47,7 @@ class Page:
         request = {"id": self._number, "method": method, "params": parameters}
         self._socket.send(json.dumps(request, allow_nan=False))
         while True:
-            message = json.loads(self._socket.recv(timeout=_START_S))
+            message = json.loads(self._socket.recv(timeout=_ANSWER_S))
             if message.get("id") == self._number:
                 if "error" in message:
                     raise NoBrowser(f"{method}: {message['error']['message']}")
