@@ -37,6 +37,7 @@ def assert_within(q: Vec2, qd: Vec2) -> None:
     assert LIMITS.rate < AIRFRAME.joint_rate_max
 
 
+@pytest.mark.requirement("REQ-ACT-8")
 @given(ANGLES, ANGLES, RATES)
 @settings(max_examples=500)
 def test_no_wish_leads_out_of_the_limits_in_angle_or_rate(last: Vec2, q: Vec2, qd: Vec2) -> None:
