@@ -42,11 +42,14 @@ def hovering(**changes: Any) -> FlightState:
     """Half a metre from a wall, on its plan."""
     seen = estimate_state(IN_THE_AIR)
     assert seen is not None
-    given = {"mission": MissionMemory(safe_set=AHEAD, announced=AHEAD), **changes}
+    given = {
+        "mission": MissionMemory(safe_set=AHEAD, announced=AHEAD),
+        "nominal": nominal_at_rest(seen),
+        "plan": PlanMemory(since_us=BEGIN_US),
+        **changes,
+    }
     kept = KeptSet().of(given["mission"].safe_set)
-    begun = PlanMemory(since_us=BEGIN_US)
-    state = replace(flying(), index=0, t_us=BEGIN_US - 2_000, plan=begun, kept=kept)
-    return replace(state, nominal=nominal_at_rest(seen), **given)
+    return replace(flying(), index=0, t_us=BEGIN_US - 2_000, kept=kept, **given)
 
 
 def told_after_us(
