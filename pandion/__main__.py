@@ -38,6 +38,9 @@ VERBS: Final[dict[str, tuple[str, str]]] = {
         "feed a flight log through the flight software again and compare",
     ),
     "export": ("pandion.export", "write a flight log as CSV or MCAP"),
+    "top": ("pandion.top", "inspect a running vehicle in the terminal: rates, fields, margins"),
+    "report": ("pandion.report", "write one or several flights as a self-contained HTML page"),
+    "doctor": ("pandion.doctor", "check this machine: privileges, ports, versions, disk, clock"),
     "bench": ("pandion.moved_bench", ""),
 }
 

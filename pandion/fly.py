@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+import shlex
 import sys
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
-from command_line.options import as_words, declared, group, json_file, read
+from command_line.options import as_words, declared, group, json_file, read, switch
 from command_line.output import complain, json_text, unwritten
 from command_line.parser import COULD_NOT_START
 from command_line.version import version
@@ -46,6 +47,7 @@ class FlyOptions(RunOptions):
     links: LinkChoice = group(LinkChoice)
     out: Path | None = declared(OUT)
     json: str | None = json_file("the result")
+    report: bool = switch("--report", "write the flight's report.html beside its log")
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,8 +183,26 @@ def _judge(flight: PlannedFlight, display: Display, flown: Flown) -> int:
     lost = unwritten(out / "result.json", text)
     display.result(result, table_rows(result, (flown.sitl or {}).get("tracking_error_max_m")))
     lost = [*flown.unwritten, *lost, *unwritten(options.json, text)]
+    lost += _report(flight, display)
     if lost:
         complain("pandion fly", f"results could not be written: {'; '.join(lost)}")
     if flown.sitl is not None and flown.sitl.get("end_kind") == "refused":
         return COULD_NOT_START
     return COMPLETED if result["completed"] and not lost else NOT_COMPLETED
+
+
+def _report(flight: PlannedFlight, display: Display) -> list[str]:
+    """Write the page, or say how to; returns what could not be written, and why."""
+    if not flight.options.report:
+        display.say(f"to see it: pandion report {shlex.quote(str(flight.out))}")
+        return []
+    from messages.ulog_reader import UlogError
+    from pandion.report import write_report
+
+    try:
+        display.say(f"{'report':12} {write_report([flight.out])}")
+    except (UlogError, OSError) as error:
+        return [f"report: {error}"]
+    except ModuleNotFoundError as error:
+        return [f"report: the package {error.name} is missing; install pandion[report]"]
+    return []

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import html
 from collections.abc import Sequence
-from pathlib import Path
 
+from command_line.html_page import document, items
 from studies.fault_matrix import Judged
 
 _STYLE = """
@@ -29,14 +29,14 @@ def page(rows: Sequence[Judged], provenance: Sequence[str]) -> str:
         for fault in faults
     )
     sentences = (*provenance, f"{len(rows)} cells, {wrong} not as they must be.")
-    items = "".join(f"<li>{html.escape(line)}</li>" for line in sentences)
-    css = Path(__file__).with_name("page.css").read_text(encoding="utf-8")
-    return (
-        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-        f"<title>{title}</title>\n<style>\n{css}{_STYLE}</style>\n</head>\n<body>\n"
-        f"<h1>{title}</h1>\n<ul>{items}</ul>\n"
-        f"<table><thead><tr><th>fault</th>{head}</tr></thead>\n<tbody>{body}</tbody></table>\n"
-        "</body>\n</html>\n"
+    return document(
+        title,
+        (
+            f"<h1>{title}</h1>",
+            items(sentences),
+            f"<table><thead><tr><th>fault</th>{head}</tr></thead>\n<tbody>{body}</tbody></table>",
+        ),
+        _STYLE,
     )
 
 

@@ -107,7 +107,7 @@ _ACTIONS: Final = frozenset(
 
 def _reverse(manual: Manual) -> str:
     rows = [
-        (row.condition.value, f"`{row.condition.name}`",
+        (row.condition.value, f"`Condition.{row.condition.name}`",
          _ids(one for one in manual.requirements if row.condition.name in one.conditions))
         for row in ROWS.values()
     ]  # fmt: skip

@@ -189,6 +189,7 @@ def test_a_place_is_looked_at_on_the_way_and_left_again() -> None:
     assert flight.snapshot.estimate.yaw == pytest.approx(expected, abs=0.06), "and stays"
 
 
+@pytest.mark.long
 def test_a_mission_looks_at_a_place_until_it_is_told_not_to() -> None:
     flight = Flight(hover())
     flight.upload = uploaded(

@@ -37,7 +37,7 @@ def test_the_page_has_each_condition_with_its_time_and_each_test() -> None:
     tables = reference(load(), shown_by_tests())
     for condition in Condition:
         assert f"{condition.value} ({seconds(ROWS[condition].within_us)})" in tables
-        assert f"| {condition.value} | `{condition.name}` | REQ-" in tables
+        assert f"| {condition.value} | `Condition.{condition.name}` | REQ-" in tables
     for tests in shown_by_tests().values():
         for test in tests:
             assert f"`{test.file}`" in tables
