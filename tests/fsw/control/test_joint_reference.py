@@ -57,6 +57,7 @@ def assert_within(last: Reference, now: Reference, limits: JointReferenceLimits,
     assert np.subtract(q, last[0]) / dt == pytest.approx(np.array(qd), abs=1e-6)
 
 
+@pytest.mark.requirement("REQ-ACT-8")
 @given(ANGLES, WISHES, st.floats(20.0, 200.0), st.floats(0.5, 5.0), st.sampled_from((1, 1, 1, 5)))
 @settings(max_examples=60)
 def test_no_wish_leads_out_of_the_limits_in_angle_rate_or_acceleration(
