@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,7 +20,11 @@ from docs.pages.requirements import (
     shown_by_tests,
 )
 from docs.pages.safety_manual import inserted, reference
+from fsw.control.tube import all_axes, all_axes_up_to
 from fsw.flight.failsafe import ROWS, Condition
+from fsw.parameters.consistency import loop_tube
+from fsw.parameters.flight_config import flight_config
+from fsw.parameters.registry import BY_NAME
 from tests.docs.fences import DOCS
 
 PAGE = (DOCS / "reference" / "safety-manual.md").read_text(encoding="utf-8")
@@ -155,3 +160,33 @@ def test_files_without_a_marker_show_nothing(tmp_path: Path) -> None:
     assert shown_by_tests(tests) == {
         "REQ-BAT-1": (ShowingTest("tests/test_b.py", "test_b", False),)
     }
+
+
+def test_numbers_in_sentences_and_limits_are_those_that_are_flown() -> None:
+    config = flight_config()
+    body, loop = config.airframe, loop_tube(config)
+    sentences = {row.id: row.shall for row in load().requirements}
+    one = 1e3 * (0.8 * loop.base + loop.base_wind)
+    most = all_axes_up_to(body, loop, 0.8)
+    every = 1e3 * all_axes(body, loop, most)[0]
+    assert f"{one:.0f} mm on a horizontal axis for 0.8 m/s²" in sentences["REQ-SAFE-2"]
+    assert f"{every:.0f} mm for {most:.2f} m/s² on all axes" in sentences["REQ-SAFE-2"]
+    thrust, torque = body.rotor_thrust_max, body.joint_torque_max
+    assert f"within 0 to {thrust:.1f} N and {torque:g} N·m" in sentences["REQ-ACT-7"]
+    first, both, tilt = (
+        round(math.degrees(limit))
+        for limit in (body.joint1_limit, body.joint12_limit, body.tilt_max)
+    )
+    rate, (turn, yaw) = body.joint_rate_max, body.body_rate_max
+    of_joints = f"joints ({first} and {both} deg, {rate:g} rad/s), its tilt ({tilt} deg)"
+    assert f"{of_joints} and its body rates ({turn:g} and {yaw:g} rad/s)" in sentences["REQ-ACT-8"]
+    for limit in (
+        f"joint 1, link 2 | {first} deg, {both} deg",
+        f"rate of a joint | {rate:g} rad/s",
+        f"{BY_NAME['PLN_TILT_MAX'].default:g} deg (`PLN_TILT_MAX`), {tilt} deg",
+        f"roll and pitch rate, yaw rate | {turn:g} rad/s, {yaw:g} rad/s",
+        f"{BY_NAME['STR_V_MAX'].default:g} m/s (`STR_V_MAX`), "
+        f"{BY_NAME['MSN_SPEED'].default:g} m/s (`MSN_SPEED`)",
+        f"{BY_NAME['TKO_CLIMB_MAX'].default:g} m (`TKO_CLIMB_MAX`)",
+    ):
+        assert limit in PAGE
