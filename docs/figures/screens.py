@@ -10,10 +10,9 @@ from typing import Final
 from PIL import Image
 
 from docs.figures.browser import page
-from messages.frames import split
+from messages.frames import Frame, split
 from pandion.report import write_report
 from view.top.app import TopApp
-from view.top.peer import Message, messages
 
 REPORT_PX: Final = (1200, 1640)
 INSPECTOR_PX: Final = (1300, 800)
@@ -65,8 +64,9 @@ async def _inspected(tlog: Path) -> str:
     app = TopApp(flight, lambda: flight.now)
     async with app.run_test(size=_CELLS) as pilot:
         while flight.now < _SHOWN_S:
-            flight.now += 0.5
-            app.refresh_all()
+            flight.now += 0.02
+            app.take()
+        app.refresh_all()
         for _ in range(4):
             await pilot.press("down")
         await pilot.pause()
@@ -78,36 +78,24 @@ class _Recorded:
 
     def __init__(self, tlog: Path) -> None:
         self.now = 0.0
-        self._frames = iter(_recorded(tlog))
-        self._waiting: list[Message] = []
+        self._data = tlog.read_bytes()
+        self._begin = int.from_bytes(self._data[:_STAMP], "big")
+        self._at = 0
 
-    def poll(self, now: float) -> list[Message]:
-        """What was sent until ``now`` [s since the start]."""
-        for message in self._frames:
-            self._waiting.append(message)
-            if message.t > now:
+    def poll(self, now: float) -> list[Frame]:
+        """What the vehicle sent until ``now`` [s since the start]."""
+        found: list[Frame] = []
+        while self._at + _STAMP < len(self._data):
+            head = self._at + _STAMP
+            stamp = int.from_bytes(self._data[self._at : head], "big")
+            if 1e-6 * (stamp - self._begin) > now:
                 break
-        ready = [message for message in self._waiting if message.t <= now]
-        self._waiting = self._waiting[len(ready) :]
-        return ready
+            self._at = head + _length(self._data, head)
+            found += (one for one in split(self._data[head : self._at]) if one.system_id == 1)
+        return found
 
     def close(self) -> None:
         """Nothing is open."""
-
-
-def _recorded(tlog: Path) -> list[Message]:
-    """Every message of the vehicle in a telemetry log, at its time since the start [s]."""
-    data, at, begin = tlog.read_bytes(), 0, 0
-    found: list[Message] = []
-    while at + _STAMP < len(data):
-        stamp = int.from_bytes(data[at : at + _STAMP], "big")
-        begin = begin or stamp
-        end = at + _STAMP + _length(data, at + _STAMP)
-        frame = data[at + _STAMP : end]
-        if any(one.system_id == 1 for one in split(frame)):
-            found += messages(frame, 1e-6 * (stamp - begin))
-        at = end
-    return found
 
 
 def _length(data: bytes, at: int) -> int:

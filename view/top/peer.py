@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from functools import cache
 from typing import Any, Final
 
 from fsw.link.udp_endpoint import Address, OpenEndpoint
 from messages import dialect
-from messages.frames import FrameWriter, split, wire_fields
+from messages.frames import Frame, FrameWriter, split, wire_fields
 
-VEHICLE: Final = "udp:127.0.0.1:18570"  # where a vehicle listens for ground stations
 _SYSTEM, _COMPONENT = 253, 191  # of no ground station in use
 _HEARTBEAT: Final = 0
 # Not a ground station: its loss is a failsafe, and a watcher may leave when it likes.
@@ -21,17 +19,6 @@ _AT_ONCE: Final = 500  # datagrams: more than come in a second
 _ELEMENT: Final = re.compile(r"(\w+)\[\d+\]")
 
 Value = float | int | str | tuple[float, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class Message:
-    """One message of the vehicle."""
-
-    name: str
-    message_id: int
-    component: int
-    t: float  # s, of its arrival on the caller's clock
-    fields: dict[str, Value]  # in the dialect's units
 
 
 class TelemetryPeer:
@@ -44,39 +31,25 @@ class TelemetryPeer:
         self._writer = FrameWriter(_SYSTEM, _COMPONENT)
         self._last_beat: float | None = None
 
-    def poll(self, now: float) -> list[Message]:
+    def poll(self, now: float) -> list[Frame]:
         """Everything that has come, without waiting; ``now`` [s] is the time on any clock."""
         if self._last_beat is None or now - self._last_beat >= _BEAT_S:
             self._last_beat = now
             beat = (0, _ONBOARD_CONTROLLER, _NO_AUTOPILOT, 0, _ACTIVE, _VERSION)
             self._endpoint.send(self._writer.frame(_HEARTBEAT, *beat), self._vehicle)
-        found: list[Message] = []
+        found: list[Frame] = []
         for _ in range(_AT_ONCE):
             came = self._endpoint.receive_waiting()
             if came is None:
                 break
             datagram, sender = came
             if sender == self._vehicle:
-                found += messages(datagram, now)
+                found += split(datagram)
         return found
 
     def close(self) -> None:
         """Give the port back; the vehicle forgets this peer after a while."""
         self._endpoint.close()
-
-
-def messages(datagram: bytes, now: float) -> list[Message]:
-    """What a datagram that came at ``now`` [s] holds."""
-    return [
-        Message(
-            name=_kind(frame.message_id).msgname,
-            message_id=frame.message_id,
-            component=frame.component_id,
-            t=now,
-            fields=_fields(frame.message_id, frame.payload_values),
-        )
-        for frame in split(datagram)
-    ]
 
 
 def unit(message_id: int, field: str) -> str:
@@ -114,7 +87,8 @@ def _places(message_id: int) -> tuple[tuple[str, slice | int], ...]:
     return tuple((name, places[name]) for name in _kind(message_id).fieldnames)
 
 
-def _fields(message_id: int, values: tuple[Any, ...]) -> dict[str, Value]:
+def fields(message_id: int, values: tuple[Any, ...]) -> dict[str, Value]:
+    """The values of a frame by the names of their fields, in the dialect's order and units."""
     found: dict[str, Value] = {}
     for name, place in _places(message_id):
         value = values[place]
