@@ -79,8 +79,8 @@ def margins(flights: Sequence[Reported]) -> Chart:
         "margins",
         "Margins",
         "Distance beyond the required clearance, minimum of each zone, by the true state. The "
-        "circle is the minimum in the result, which the simulator checks every millisecond; the lines are "
-        "the samples in the log.",
+        "circle is the minimum in the result, which the simulator checks every millisecond; the "
+        "lines are the samples in the log.",
         [Row("margin [mm]", traces, (0.0,), (min(-20.0, 1.2 * lowest), _SHOWN_MM))],
         _marks(flights),
     )
