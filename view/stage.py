@@ -236,7 +236,7 @@ class Stage:
             self._trail.pop(0).remove()
 
     def draw_reference(self, points: Array) -> None:
-        """Draw where the end-effector should go, (n, 3) [m, NED]; NaN: not there."""
+        """Draw where the end-effector should go: ``points`` (n, 3) [m, NED]; NaN: not there."""
         if len(points) > 1:
             segments = _segments(points)
             segments = segments[np.isfinite(segments).all(axis=(1, 2))]
