@@ -22,6 +22,7 @@ from pandion.join_truth import join_truth
 from pandion.processor import ANYWHERE, lockstep_places
 from pandion.result import FlightReports, as_json, table_rows
 from pandion.supervisor import Flown, ProcessFailed, Supervisor
+from pandion.view_beside import ViewBeside
 from sitl.arguments import RunOptions, SitlOptions
 from sitl.earth import Place
 from sitl.scenario_file import (
@@ -47,6 +48,7 @@ class FlyOptions(RunOptions):
     links: LinkChoice = group(LinkChoice)
     out: Path | None = declared(OUT)
     json: str | None = json_file("the result")
+    view: bool = switch("--view", "show the flight live in the browser")
     report: bool = switch("--report", "write the flight's report.html beside its log")
 
 
@@ -73,14 +75,18 @@ def main(argv: list[str]) -> int:
         return COULD_NOT_START
     display = Display(sys.stderr if options.json == "-" else sys.stdout)
     _banner(flight, display)
+    view = ViewBeside(display, flight.out)
     try:
         places = ANYWHERE if options.realtime else lockstep_places()
-        flown = Supervisor(display, flight.out, places).run(
+        found = view.start if options.view else None
+        flown = Supervisor(display, flight.out, places, found=found).run(
             as_words(_sitl_options(flight)), lambda port: as_words(_fsw_options(flight, port))
         )
     except ProcessFailed as error:
         complain("pandion fly", error)
         return error.exit_code
+    finally:
+        view.close()
     return _judge(flight, display, flown)
 
 
@@ -194,7 +200,8 @@ def _judge(flight: PlannedFlight, display: Display, flown: Flown) -> int:
 def _report(flight: PlannedFlight, display: Display) -> list[str]:
     """Write the page, or say how to; returns what could not be written, and why."""
     if not flight.options.report:
-        display.say(f"to see it: pandion report {shlex.quote(str(flight.out))}")
+        where = shlex.quote(str(flight.out))
+        display.say(f"to see it: pandion view {where}, or pandion report {where}")
         return []
     from messages.ulog_reader import UlogError
     from pandion.report import write_report

@@ -14,6 +14,7 @@ from fsw.signals import Shape, Vec3, Zone
 
 Array = NDArray[Any]
 
+_THIN = 0.02  # m, radius that a point or a line is drawn with
 _ROUND = 32  # corners of a circle
 _TURNS = np.linspace(0.0, 2.0 * math.pi, _ROUND, endpoint=False)
 
@@ -42,12 +43,12 @@ def zone_mesh(zone: Zone, region: tuple[Vec3, Vec3], target: Vec3 | None) -> Zon
     if shape.kind == "half-space":
         shell = _plane(shape, region, clearance) if clearance > 0.0 else None
         return ZoneMesh(_plane(shape, region, 0.0), shell)
-    corners = _corners(shape, target)
+    corners = _corners(shape, region, target)
     if corners is None:
         return None
     points, radius = corners
     inwards = -1.0 if zone.keep_in else 1.0
-    surface = _hull(points, radius) if radius > 0.0 or len(points) > 1 else _hull(points, 0.02)
+    surface = _hull(points, radius) if radius > 0.0 or len(points) > 1 else _hull(points, _THIN)
     if clearance <= 0.0:
         return ZoneMesh(surface, None)
     if zone.keep_in and radius <= clearance:
@@ -76,15 +77,22 @@ def _plane(shape: Shape, region: tuple[Vec3, Vec3], shift: float) -> Mesh:
     return Mesh(corners, np.array(((0, 1, 2), (0, 2, 3))))
 
 
-def _corners(shape: Shape, target: Vec3 | None) -> tuple[Array, float] | None:
-    """Points, and a radius about each of them, whose hull is the shape [m, NED]."""
+def _corners(
+    shape: Shape, region: tuple[Vec3, Vec3], target: Vec3 | None
+) -> tuple[Array, float] | None:
+    """Points, and a radius about each of them, whose hull is the shape [m, NED].
+
+    What is upright and without end is drawn within the region.
+    """
     n = np.array(shape.numbers)
     if shape.kind == "ball":
         return n[None, :3], float(n[3])
     if shape.kind == "target sphere":
         return None if target is None else ((n[:3] + target)[None], float(n[3]))
     if shape.kind == "vertical cylinder":
-        return _cylinder(np.array((*n[:2], n[2])), np.array((*n[:2], n[3])), float(n[4])), 0.0
+        top, bottom = max(float(n[2]), region[0][2]), min(float(n[3]), region[1][2])
+        radius = max(float(n[4]), _THIN)
+        return _cylinder(np.array((*n[:2], top)), np.array((*n[:2], bottom)), radius), 0.0
     if shape.kind == "cylinder":
         return _cylinder(n[:3], n[3:6], float(n[6])), 0.0
     if shape.kind == "box":

@@ -13,9 +13,11 @@ from pathlib import Path
 
 import matplotlib as mpl
 
+from docs.figures.browser import NoBrowser
 from docs.figures.diagrams import draw_architecture, draw_timing
 from docs.figures.flight import draw_flight, recorded
 from docs.figures.frames import draw_frames
+from docs.figures.screens import draw_inspector, draw_report
 
 IMAGES = Path(__file__).parents[1] / "images"
 # Scenario and suite of sensors; the first is the flight of `make run`.
@@ -56,6 +58,12 @@ def draw_all(flights: Path) -> None:
         draw_frames(IMAGES / "frames.svg")
         for flown, name in PICTURED.items():
             draw_flight(fly(*flown, flights), IMAGES / name)
+    pictured = fly(*next(iter(PICTURED)), flights)
+    try:
+        draw_report(pictured, IMAGES / "report.png")
+        draw_inspector(pictured, IMAGES / "top.png")
+    except NoBrowser as missing:
+        print(f"the pictures of pages stay as they are: {missing}")
     numbers = [recorded(fly(*flown, flights)) for flown in FLOWN]
     text = json.dumps(numbers, indent=2)
     (IMAGES / "flights.json").write_text(f"{text}\n", encoding="utf-8")

@@ -490,6 +490,7 @@ def _snapshot(
         state.estimator,
         state.host.log_failure,
         state.arming,
+        state.mission.safe_set,
     )
 
 

@@ -9,7 +9,11 @@ from pathlib import Path
 from typing import Any
 
 from fsw.log import topics
+from fsw.log.json_codec import JsonCodec
 from fsw.parameters.flight_config import flight_config
+from fsw.shapes.ball import ball
+from fsw.shapes.half_space import wall
+from fsw.signals import MessageSource, SafeSet, SafeSetAnnouncement, TickInputs, Zone
 from fsw.tuning import flat
 from messages import ulog
 from messages.ground_truth import FIRST_NUMBER, SIM_GROUND_TRUTH, SIM_TRACKING, TRUTH_TOPICS
@@ -24,6 +28,7 @@ WORST_S, WORST_M = 3.013, 0.0123  # between two samples of the log
 ERROR_M = (0.003, 0.004, 0.0)  # of the end-effector
 OFFSET_M = (0.001, -0.002, 0.0005)  # of the estimate
 CYCLES_US = (400.0, 900.0, 300.0, 2000.0)
+BALL = Zone(ball((0.3, 0.8, -1.5), 0.05), 0.1)
 TEXT = 'it\'s "</script><b>wet</b>"'
 NUMBERS = {topic.name: k for k, topic in enumerate(topics.TOPICS)} | {
     topic.name: FIRST_NUMBER + k for k, topic in enumerate(TRUTH_TOPICS)
@@ -90,12 +95,25 @@ def _records() -> list[bytes]:
         _status(2.75, b"trajectory", b"no plan"), _status(3.5, b"trajectory", b""),
         record(topics.VEHICLE_COMMAND_ACK, 0.5, 176, 0, 255, 190),
     ]  # fmt: skip
+    found += _announced(0.0, (wall((-1.0, 0.0, 0.0), -1.0, 0.1), BALL))
     found += [_actuators(0.002 * k) for k in range(500 * SECONDS)]
     for k in range(50 * SECONDS):
         found += _fast(0.02 * k)
     for k in range(10 * SECONDS):
         found += _slow(0.1 * k, k)
     return found
+
+
+def _announced(t: float, zones: tuple[Zone, ...]) -> list[bytes]:
+    """A safe set as the log has it: JSON, in pieces."""
+    said = (SafeSetAnnouncement(MessageSource(1, 195, "simulator"), SafeSet(zones)),)
+    text = JsonCodec(TickInputs).encode("announced", said)
+    size = topics.TEXT_SIZE
+    pieces = [text[at : at + size] for at in range(0, len(text), size)]
+    return [
+        record(topics.TICK_INPUT, t, b"announced", k, len(pieces), piece)
+        for k, piece in enumerate(pieces)
+    ]
 
 
 def _status(t: float, mode: bytes, faults: bytes) -> bytes:

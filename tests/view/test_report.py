@@ -6,8 +6,6 @@ import base64
 import gzip
 import json
 import re
-import shutil
-import subprocess
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -15,6 +13,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from docs.figures.browser import chromium
+from docs.figures.browser import page as browser_page
 from pandion.report import labels, main, write_report
 from tests.view import flights
 from tests.view.flights import (
@@ -79,8 +79,23 @@ def test_margins_over_time_are_distances_to_the_walls(drawn: dict[str, Any]) -> 
     np.testing.assert_allclose(shown["y"], expected, atol=2e-3)
     beside = trace(drawn["margins"], "left")
     np.testing.assert_allclose(beside["y"], 900.0, atol=1e-3)
-    own = trace(drawn["margins"], "least, by the vehicle's estimate")
+    own = trace(drawn["margins"], "minimum, by the vehicle's estimate")
     np.testing.assert_allclose(own["y"], 200.0, atol=1e-2)
+
+
+def test_the_path_is_drawn_east_north_up_between_the_zones(drawn: dict[str, Any]) -> None:
+    base, tip = trace(drawn["path"], "base"), trace(drawn["path"], "end-effector")
+    assert max(base["y"]) == pytest.approx(north(3.0), abs=1e-3)
+    assert set(base["z"]) == {-flights.HEIGHT}
+    np.testing.assert_allclose(tip["z"], -flights.HEIGHT - 0.3, atol=1e-6)
+    worst = trace(drawn["path"], "smallest margin")
+    assert worst["z"] == [pytest.approx(-flights.HEIGHT - 0.3)]
+    walls = [one for one in drawn["path"]["data"] if one["type"] == "mesh3d"]
+    assert [one["name"] for one in walls] == [
+        "zone 1", "zone 1 with its clearance", "zone 2", "zone 2 with its clearance",
+    ]  # fmt: skip
+    np.testing.assert_allclose(walls[0]["y"], 1.0)
+    np.testing.assert_allclose(walls[1]["y"], 0.9)
 
 
 def test_bars_are_the_margins_and_limits_of_the_result(drawn: dict[str, Any]) -> None:
@@ -236,17 +251,16 @@ def test_what_is_no_log_is_refused_in_one_sentence(tmp_path: Path, capsys: Any) 
 
 
 @pytest.mark.long
-@pytest.mark.skipif(shutil.which("chromium") is None, reason="chromium is not installed")
-def test_a_browser_draws_every_figure(flight: Path, drawn: dict[str, Any], tmp_path: Path) -> None:
-    done = subprocess.run(
-        ["chromium", "--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--use-gl=angle",
-         "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--enable-logging=stderr",
-         f"--user-data-dir={tmp_path}", "--virtual-time-budget=30000", "--dump-dom",
-         (flight / "report.html").as_uri()],
-        capture_output=True, text=True, check=True, timeout=120.0,
-    )  # fmt: skip
-    assert f'data-drawn="{len(drawn)}"' in done.stdout
-    assert done.stdout.count('class="main-svg"') >= len(drawn)
-    assert "CONSOLE" not in "".join(
-        line for line in done.stderr.splitlines() if "willReadFrequently" not in line
-    )
+@pytest.mark.skipif(chromium() is None, reason="no chromium on PATH")
+def test_a_browser_draws_every_figure_and_asks_nobody(flight: Path, drawn: dict[str, Any]) -> None:
+    with browser_page(1200, 900) as opened:
+        opened.open((flight / "report.html").as_uri())
+        opened.wait_for("document.body && document.body.dataset.drawn", 60.0)
+        assert opened.value("document.body.dataset.drawn") == str(len(drawn))
+        assert opened.value("document.querySelectorAll('.chart .main-svg').length") >= len(drawn)
+        assert opened.value("document.querySelectorAll('#path canvas').length") > 0
+        opened.value("Plotly.relayout('margins', {'xaxis.range': [1, 2]})")
+        opened.wait_for("document.getElementById('tracking').layout.xaxis.range[0] === 1")
+        assert opened.value("document.getElementById('worst_second').layout.xaxis.range[0] > 2")
+        assert opened.complaints == []
+        assert {one.partition(":")[0] for one in opened.requests} <= {"file", "blob", "data"}

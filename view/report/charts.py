@@ -78,9 +78,9 @@ def margins(flights: Sequence[Reported]) -> Chart:
     return over_time(
         "margins",
         "Margins",
-        "Distance beyond the required clearance, least of each zone. The circle is the minimum in "
-        "the result, checked every millisecond by the simulator's true state; the lines are the "
-        "samples in the log.",
+        "Distance beyond the required clearance, minimum of each zone, by the true state. The "
+        "circle is the minimum in the result, which the simulator checks every millisecond; the "
+        "lines are the samples in the log.",
         [Row("margin [mm]", traces, (0.0,), (min(-20.0, 1.2 * lowest), _SHOWN_MM))],
         _marks(flights),
     )
@@ -99,7 +99,7 @@ def _margin_lines(flight: Reported, colour: str, *, alone: bool) -> list[Trace]:
     if own is not None and (alone or truth is None):
         look = {"dash": "dot"} if truth is not None else {}
         shade = ESTIMATE if alone else colour
-        name = "least, by the vehicle's estimate" if alone else flight.label
+        name = "minimum, by the vehicle's estimate" if alone else flight.label
         lines.append(line(name, flight.since(own.t), _MM * own["minimum"], shade, line=look))
     return lines
 
@@ -120,12 +120,12 @@ def parts(flights: Sequence[Reported]) -> Chart:
     traces = [trace for trace in traces if trace["y"]]
     layout = {
         "height": 18 * height + 110,
-        "xaxis": {"title": {"text": "least margin [mm]"}, "rangemode": "tozero"},
+        "xaxis": {"title": {"text": "minimum margin [mm]"}, "rangemode": "tozero"},
         "yaxis": {"automargin": True},
         "bargap": 0.25,
     }
     note = "Minimum over the flight of each zone and part of the vehicle, as in result.json."
-    return Chart("parts", "Least margin of each part", note, traces, layout)
+    return Chart("parts", "Minimum margin of each part", note, traces, layout)
 
 
 def tracking(flights: Sequence[Reported]) -> Chart:

@@ -19,7 +19,7 @@ Array = NDArray[Any]
 
 _MOST: Final = 1500  # points of a path
 _AROUND_M: Final = 0.35  # of the paths that a wall is drawn
-_BODY_OPACITY, _CLEARANCE_OPACITY = 0.45, 0.12
+_BODY_OPACITY, _CLEARANCE_OPACITY = 0.3, 0.1
 _MOST_TRIANGLES: Final = 30_000  # of all zones: half a megabyte of the page
 
 

@@ -40,7 +40,7 @@ def provenance(flights: Sequence[Reported]) -> str:
     rows.append(
         ["parameters changed", *("; ".join(changed(flight)) or "none" for flight in flights)]
     )
-    rows.append(["log", *(str(flight.data.path) for flight in flights)])
+    rows.append(["log", *("/".join(flight.data.path.parts[-2:]) for flight in flights)])
     rows.append(["to repeat it", *(command(flight) for flight in flights)])
     heads = ["", *(flight.label if len(flights) > 1 else "" for flight in flights)]
     return table(heads, rows, "Provenance")

@@ -34,8 +34,8 @@ function link(figures) {
   for (const one of linked)
     one.on("plotly_relayout", async (change) => {
       if (busy) return;
-      const range = change["xaxis.range[0]"] === undefined ? null
-        : [change["xaxis.range[0]"], change["xaxis.range[1]"]];
+      const range = change["xaxis.range"] ?? (change["xaxis.range[0]"] === undefined ? null
+        : [change["xaxis.range[0]"], change["xaxis.range[1]"]]);
       if (!range && !change["xaxis.autorange"]) return;
       busy = true;
       const update = range ? { "xaxis.range": range } : { "xaxis.autorange": true };

@@ -43,10 +43,10 @@ class TopApp(App[None]):
     ENABLE_COMMAND_PALETTE = False
     CSS = """
     #headline { height: 1; background: $primary; color: $text; padding: 0 1; text-style: bold; }
-    #streams { width: 60; } #fields { width: 1fr; }
+    #streams { width: 60; height: 1fr; } #fields { width: 1fr; height: 1fr; }
     #lower { height: 12; } #margins { width: 60; height: 12; } #texts { width: 1fr; height: 12; }
     #filter { display: none; height: 3; } #filter.shown { display: block; }
-    DataTable, RichLog { border: round $primary-muted; }
+    DataTable, RichLog { border: round $primary; }
     """
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("q", "quit", "quit"),
@@ -74,7 +74,7 @@ class TopApp(App[None]):
             yield DataTable(id="fields", cursor_type="row", zebra_stripes=True)
         with Horizontal(id="lower"):
             yield DataTable(id="margins", cursor_type="none", show_cursor=False)
-            yield RichLog(id="texts", wrap=True, markup=False)
+            yield RichLog(id="texts", wrap=True, markup=False, min_width=20)
         yield Footer()
 
     def on_mount(self) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections import deque
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -28,6 +27,7 @@ class Stream:
     message_id: int
     component: int
     count: int = 0
+    at: float = 0.0  # s, when the last one came
     last: dict[str, Value] = field(default_factory=dict)
     arrivals: deque[float] = field(default_factory=deque)  # s, of the last seconds
 
@@ -39,7 +39,7 @@ class Stream:
 
     def age(self, now: float) -> float:
         """Time [s] since the last one, at ``now`` [s]."""
-        return now - self.arrivals[-1] if self.arrivals else math.inf
+        return now - self.at
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,6 +80,7 @@ class Inspector:
                 self.streams[key] = stream
             stream.count += 1
             stream.last = message.fields
+            stream.at = message.t
             stream.arrivals.append(message.t)
             if message.name == "STATUSTEXT":
                 self._listen(message)

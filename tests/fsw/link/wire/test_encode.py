@@ -123,6 +123,10 @@ TELLING: dict[int, dict[str, Any]] = {
         "missed_deadlines": 1, "fallbacks": 2, "cost": 12.5, "horizon": 5, "rate_hz": 10,
         "sqp_iterations": 2, "solver_iterations": 19, "solver_status": 4,
     },
+    ids.MPC_HORIZON: {
+        "time_usec": 3_000_000, "start": [0.0, 0.0, -1.0, *[0.0] * 16], "inputs": [0.0] * 36,
+        "plan_id": 7, "period_us": 100_000, "steps": 0,
+    },
     ids.LOOP_TIMING: {"ticks": 5000, "late_ticks": 3, "skipped_ticks": 1, "lateness_p99_us": 90.0},
 }  # fmt: skip
 
@@ -237,6 +241,7 @@ def test_there_is_nothing_to_say_before_the_first_plan() -> None:
         ids.ARM_JOINT_SETPOINT,
         ids.END_EFFECTOR_TARGET,
         ids.MPC_STATUS,
+        ids.MPC_HORIZON,
     ):
         assert stream_of(message_id).encode(idle, CONTEXT) is None
 
