@@ -18,7 +18,7 @@ UV = UV_DEFAULT_INDEX="$${UV_DEFAULT_INDEX:-$(PIP_INDEX)}" .boot/uv
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: help setup run test test-long faults code-checks tests-of-processes tests-of-the-rest \
+.PHONY: help setup run test test-long faults soak code-checks tests-of-processes tests-of-the-rest \
 	fsw-kernels sitl-kernels mutate fuzz interop lock docs docs-test pictures pages clean
 
 help: ## show this list
@@ -61,8 +61,14 @@ test-long: setup ## the tests that make test leaves out for its four minutes
 
 faults: setup ## fly every mode with every fault, write build/faults.html (long): ONLY=motor SEED=1
 	@mkdir -p build
-	$(BIN)/pandion faults --matrix --json build/faults.json --html build/faults.html \
+	$(BIN)/pandion faults --matrix --journal build/faults.jsonl \
+		--json build/faults.json --html build/faults.html \
 		$(if $(ONLY),--only "$(ONLY)") $(if $(SEED),--seed $(SEED))
+
+soak: setup ## an hour in real time with random failures and a busy client: MINUTES=60 SEED=1
+	@mkdir -p build
+	$(BIN)/python -m benchmarks soak --minutes $(or $(MINUTES),60) --seed $(or $(SEED),0) \
+		--json build/soak.json
 
 # cosmic-ray in an environment of its own; the tests run in .venv, on a copy of the checkout. FILES are
 # files and folders, SAMPLE mutants of each file, drawn with SEED, BUDGET the seconds that the tests of

@@ -16,6 +16,7 @@ BENCHMARKS: Final = {
     "loop": "a flight in real time: lateness, stage times, memory, against budgets",
     "lockstep": "a whole flight as fast as it goes, and where its time goes",
     "flood": "a flight in real time under 5000 useless datagrams a second",
+    "soak": "an hour in real time with failures and a busy client",
     "download": "how fast a flight log comes over the link during a flight",
     "plant": "one step of the simulator's plant",
     "estimator": "a tick with real sensors beside one with exact states",

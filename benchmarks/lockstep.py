@@ -25,13 +25,12 @@ from pandion.child import Event
 from pandion.display import Display
 from pandion.processor import Places, lockstep_places
 from pandion.supervisor import ProcessFailed, Supervisor
-from sitl.scenario_file import SUITE_NAMES
+from sitl.scenario_file import PERFECT, SUITE_NAMES
 
 DONE, SLOW = 0, 1  # exit codes
 TARGET: Final = 25.0  # times real time, at 500 Hz
 PEER: Final = "benchmarks.pymavlink_process"
 LEAST_RATIO: Final = 0.85  # of a suite of sensors, to the speed with exact states
-_EXACT: Final = "perfect"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,9 +41,9 @@ class LockstepOptions:
     scenario: str = option("--scenario NAME", "what to fly", default="walls")
     sensors: str = option(
         "--sensors SUITE",
-        f"of the vehicle: {', '.join(SUITE_NAMES)}; any other is compared with {_EXACT}",
+        f"of the vehicle: {', '.join(SUITE_NAMES)}; any other is compared with {PERFECT}",
         one_of("suite", *SUITE_NAMES),
-        default=_EXACT,
+        default=PERFECT,
     )
     duration_s: float = option(
         "--duration S", "of a flight, in seconds", number(1.0, 600.0, "s"), default=60.0
@@ -74,7 +73,7 @@ def main(argv: list[str]) -> int:
 
 
 def _met(found: dict[str, Any]) -> bool:
-    if found["sensors"] == _EXACT:
+    if found["sensors"] == PERFECT:
         return bool(found["real_time_factor_best"] >= TARGET)
     return bool(found["ratio"] >= LEAST_RATIO)
 
@@ -89,9 +88,9 @@ class _Kind:
 
 
 def _kinds(sensors: str) -> tuple[_Kind, _Kind]:
-    if sensors == _EXACT:
-        return _Kind("pandion", _EXACT), _Kind("pymavlink", _EXACT, PEER)
-    return _Kind(sensors, sensors), _Kind(_EXACT, _EXACT)
+    if sensors == PERFECT:
+        return _Kind("pandion", PERFECT), _Kind("pymavlink", PERFECT, PEER)
+    return _Kind(sensors, sensors), _Kind(PERFECT, PERFECT)
 
 
 def _measure(options: LockstepOptions, console: TextIO) -> dict[str, Any]:
@@ -213,7 +212,7 @@ def _lines(found: dict[str, Any]) -> list[str]:
     ]
     met = "met" if _met(found) else "missed"
     factor = f"median {found['real_time_factor']:.1f}, best {found['real_time_factor_best']:.1f}"
-    if found["sensors"] == _EXACT:
+    if found["sensors"] == PERFECT:
         last = [
             f"{factor} times real time (target {TARGET:g}: {met})",
             f"{found['ratio']:.2f} times as fast as with pymavlink's packing",

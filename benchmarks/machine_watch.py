@@ -79,24 +79,24 @@ class Watch:
                 self.resident.append((seconds, pages * _PAGE))
                 if self.children_bytes == 0 and seconds >= _SETTLED_S:
                     # Once only: it walks all pages of the process it asks about.
-                    self.children_bytes = sum(_private(child) for child in _descendants(process))
+                    self.children_bytes = sum(_private(child) for child in descendants(process))
 
     def _find(self, root: int) -> int | None:
         wanted = f"\0-m\0{self.module}\0".encode()
-        for process in _descendants(root):
+        for process in descendants(root):
             with contextlib.suppress(OSError):
                 if wanted in Path(f"/proc/{process}/cmdline").read_bytes():
                     return process
         return None
 
 
-def _descendants(root: int) -> list[int]:
-    """Children first, then theirs."""
+def descendants(root: int) -> list[int]:
+    """Processes below a process: children first, then theirs."""
     found: list[int] = []
     with contextlib.suppress(OSError):
         for task in Path(f"/proc/{root}/task").iterdir():
             found += [int(number) for number in (task / "children").read_text().split()]
-    return found + [below for child in found for below in _descendants(child)]
+    return found + [below for child in found for below in descendants(child)]
 
 
 def _private(process: int) -> int:

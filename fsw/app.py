@@ -118,6 +118,8 @@ class _Session:
             files.tlog.add,
             lambda: self._services(program, logs),
         )
+        # For a view beside it: the usual port may have been taken.
+        self._events.report("links", "", ports={link.name: link.port for link in ground.links})
         loop = SimLoop(program, sim, ground, inbox, record, clock.now_us, self._stop, files)
         try:
             end = self._fly(loop, sim, program.planner, planner, record)

@@ -830,6 +830,7 @@ class FlightSnapshot:
     estimator: EstimatorReport | None = None  # None: states are exact
     log_failure: str = ""  # why the flight log is not written as it should be
     arming: ArmingReport = ArmingReport()
+    safe_set: SafeSet = SafeSet()  # in force: announced and fence together
     actuators_found: ActuatorReport = ActuatorReport()
 
 

@@ -1,4 +1,4 @@
-"""Sentences that came as STATUSTEXT."""
+"""Sentences in STATUSTEXT messages: cut into pieces, and joined again."""
 
 from __future__ import annotations
 
@@ -8,11 +8,25 @@ from typing import cast
 from messages.frames import Frame
 
 STATUSTEXT = 253  # the message's id
+_SIZE = 50  # bytes of text in one message
+_MOST_PIECES = 255
+
+
+def pieces(sentence: str, severity: int, text_id: int) -> list[tuple[int, bytes, int, int]]:
+    """Values of the STATUSTEXT messages for one sentence, in wire order.
+
+    The id, 1..65535, is the same for all pieces of a long one, so that the receiver joins them.
+    """
+    whole = sentence.encode("utf-8")
+    if len(whole) <= _SIZE:
+        return [(severity, whole, 0, 0)]
+    starts = range(0, min(len(whole), _MOST_PIECES * _SIZE), _SIZE)
+    return [(severity, whole[at : at + _SIZE], text_id, n) for n, at in enumerate(starts)]
 
 
 def joined(frames: Iterable[Frame]) -> tuple[str, ...]:
     """The sentences in these frames, the pieces of a long one joined; whole ones come first."""
-    pieces: dict[int, bytes] = {}
+    cut: dict[int, bytes] = {}
     whole: list[bytes] = []
     for frame in frames:
         if frame.message_id != STATUSTEXT:
@@ -22,5 +36,5 @@ def joined(frames: Iterable[Frame]) -> tuple[str, ...]:
         if text_id == 0:
             whole.append(text)
         else:
-            pieces[text_id] = pieces.get(text_id, b"") + text
-    return tuple(text.decode("utf-8", "replace") for text in (*whole, *pieces.values()))
+            cut[text_id] = cut.get(text_id, b"") + text
+    return tuple(text.decode("utf-8", "replace") for text in (*whole, *cut.values()))

@@ -37,7 +37,11 @@ VERBS: Final[dict[str, tuple[str, str]]] = {
         "pandion.replay",
         "feed a flight log through the flight software again and compare",
     ),
-    "export": ("pandion.export", "write a flight log as CSV or MCAP"),
+    "view": ("pandion.view", "show a flight in the browser, from its log or live"),
+    "top": ("pandion.top", "inspect a running vehicle in the terminal: rates, fields, margins"),
+    "report": ("pandion.report", "write one or several flights as a self-contained HTML page"),
+    "export": ("pandion.export", "write a flight log as CSV or MCAP, or layouts that show it"),
+    "doctor": ("pandion.doctor", "check this machine: privileges, ports, versions, disk, clock"),
     "bench": ("pandion.moved_bench", ""),
 }
 

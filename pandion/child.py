@@ -55,7 +55,7 @@ class Child:
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.PIPE,
                 stderr=errors,
-                preexec_fn=_die_with(os.getpid(), processor),
+                preexec_fn=die_with(os.getpid(), processor),
             )
         assert self._process.stdout is not None
         self._pipe = self._process.stdout.fileno()
@@ -139,7 +139,7 @@ def _event(line: bytes) -> Event | None:
     return event if isinstance(event, dict) and "event" in event else None
 
 
-def _die_with(parent: int, processor: int | None) -> Callable[[], None] | None:
+def die_with(parent: int, processor: int | None) -> Callable[[], None] | None:
     """What a new child runs before exec, so that it ends with its parent (Linux only)."""
     if sys.platform != "linux":
         return None

@@ -1,4 +1,4 @@
-"""``pandion export``: a flight log as CSV, one file a topic, or as one MCAP file."""
+"""``pandion export``: a flight log as CSV or MCAP, and layouts that show it."""
 
 from __future__ import annotations
 
@@ -37,7 +37,12 @@ class ExportOptions:
 
     log: Path = option("LOG", "flight.ulg, or its directory", Path, required=True)
     csv: Path | None = option("--csv DIR", "one file a topic, into DIR", Path, one_of=_TARGET)
-    mcap: Path | None = option("--mcap FILE", "one file, messages as JSON", Path, one_of=_TARGET)
+    mcap: Path | None = option(
+        "--mcap FILE", "one file, messages as JSON and what Foxglove draws", Path, one_of=_TARGET
+    )
+    layouts: Path | None = option(
+        "--layouts DIR", "layouts for PlotJuggler and Foxglove, into DIR", Path, one_of=_TARGET
+    )
 
 
 def main(argv: list[str]) -> int:
@@ -45,6 +50,8 @@ def main(argv: list[str]) -> int:
     options = read(ExportOptions, "pandion export", "Write a flight log in another format.", argv)
     from messages.ulog_reader import UlogError, open_log
 
+    if options.layouts is not None:
+        return _write_layouts(options.layouts)
     path: Path = options.log / "flight.ulg" if options.log.is_dir() else options.log
     try:
         log = open_log(path)
@@ -53,6 +60,8 @@ def main(argv: list[str]) -> int:
             display = Display(sys.stdout, lines=0)
             stack.enter_context(display.progress())
             count = _export(log, sink, display)
+            if options.mcap is not None:
+                _draw(path, sink)
         if count == 0:
             raise UlogError(f"{path} holds no record")
     except (UlogError, ValueError, OSError) as error:
@@ -63,6 +72,34 @@ def main(argv: list[str]) -> int:
         return COULD_NOT_START
     say(f"{count} records of {path} in {options.csv or options.mcap}")
     return DONE
+
+
+def _write_layouts(folder: Path) -> int:
+    """Write both layouts; returns the exit code."""
+    from view.layouts import foxglove_layout, plotjuggler_layout
+
+    made = {
+        "pandion.plotjuggler.xml": plotjuggler_layout(),
+        "pandion.foxglove.json": foxglove_layout(),
+    }
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, text in made.items():
+            (folder / name).write_text(text, encoding="utf-8")
+    except OSError as error:
+        complain("pandion export", error)
+        return COULD_NOT_START
+    say(f"{', '.join(made)} in {folder}")
+    return DONE
+
+
+def _draw(path: Path, sink: Any) -> None:
+    """Add what Foxglove's panels draw."""
+    from view.flight_data import read_flight
+    from view.foxglove import foxglove_messages
+
+    for shown in foxglove_messages(read_flight(path)):
+        sink.add_drawn(shown.topic, shown.schema, round(1e6 * shown.t), shown.value)
 
 
 def _sink(csv: Path | None, mcap: Path | None, log: UlogFile, stack: contextlib.ExitStack) -> Sink:

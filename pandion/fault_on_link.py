@@ -14,16 +14,24 @@ from fsw.arguments import FswOptions
 from fsw.link.link_choice import NO_LINK, LinkChoice
 from fsw.parameters.control_choice import ControlChoice
 from fsw.signals import Mode, Severity
+from pandion import child, fault_station, supervisor
 from pandion.display import Display
 from pandion.fault_station import Noted, Station
 from pandion.supervisor import Flown, ProcessFailed, Supervisor
 from sitl.arguments import SitlOptions
 from sitl.faults.keys import Fault
+from sitl.result import EndKind
 from sitl.scenario_file import PACKAGED
-from studies.fault_flights import SITUATIONS, FaultFlight, Said, beside_the_wall_text
-from studies.fault_matrix import Cell, Judged, broken, judge
+from studies.fault_flights import (
+    SITUATIONS,
+    FaultFlight,
+    Said,
+    beside_the_wall_text,
+    contact_of,
+)
+from studies.fault_matrix import Cell
+from studies.job import sources
 
-_TOUCHED: Final = ("collision", "crash", "diverged")
 _WAIT_S: Final = 600.0
 _PACKAGED: Final = {"trajectory": "walls-calm", "workspace": "workspace-calm"}
 
@@ -41,10 +49,19 @@ class _Watch(Display):
             self.begun_s = time.monotonic()
 
 
-def fly_cell(cell: Cell) -> Judged:
-    """Fly one cell; what could not be flown is a cell that differs."""
-    with TemporaryDirectory() as folder:
-        return judge(cell, _flown(cell, Path(folder)))
+class LinkCell(Cell):
+    """A cell whose two halves are processes."""
+
+    __slots__ = ()
+
+    def key(self) -> str:
+        """See :class:`studies.campaign.Flight`."""
+        return "link " + super().key() + sources(fault_station, supervisor, child)[:16]
+
+    def row(self) -> FaultFlight:
+        """See :class:`studies.campaign.Flight`."""
+        with TemporaryDirectory() as folder:
+            return _flown(self, Path(folder))
 
 
 def _flown(cell: Cell, folder: Path) -> FaultFlight:
@@ -60,11 +77,11 @@ def _flown(cell: Cell, folder: Path) -> FaultFlight:
             lambda port: as_words(_fsw(port, station.port, situation.body, folder)),
         )
     except ProcessFailed as error:
-        return broken(str(error))
+        return cell.broken(str(error))
     finally:
         station.close()
     if watch.begun_s is None:
-        return broken(f"the fault did not begin: {flown.failure or 'the flight was over'}")
+        return cell.broken(f"the fault did not begin: {flown.failure or 'the flight was over'}")
     return _seen(cell.mode, flown, station.noted, watch.begun_s, time.monotonic())
 
 
@@ -127,19 +144,15 @@ def _seen(
         texts.append(Said(round(ended_s - begun_s, 3), int(Severity.CRITICAL), failure))
     for lost in flown.unwritten:
         texts.append(Said(round(ended_s - begun_s, 3), int(Severity.WARNING), lost))
-    warnings = [one for one in texts if one.severity <= Severity.WARNING]
+    ends = {one.value: one for one in EndKind}
     reason = str(result.get("end_reason", ""))
-    contact = ""
-    if kind in _TOUCHED:
-        contact = "ground" if "hit the ground" in reason else "wall"
+    contact = contact_of(ends.get(kind), reason)
     return FaultFlight(
-        told_s=warnings[0].after_s if warnings else None,
-        told=warnings[0].text if warnings else "",
+        texts=tuple(texts),
         actions=tuple(actions),
         contact=contact,
         ended=reason if contact or failure else "",
         least_m=result.get("min_margin_m"),
-        texts=tuple(texts),
         problem=problem,
     )
 

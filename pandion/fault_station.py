@@ -1,4 +1,4 @@
-"""A ground station that brings a vehicle into a mode and notes what it says, over the link."""
+"""A ground station for one flight of the matrix: it asks for a mode and notes texts and modes."""
 
 from __future__ import annotations
 
@@ -15,11 +15,15 @@ from messages import dialect
 _BEAT_S: Final = 0.5
 _SETPOINT_S: Final = 0.05
 _ASKS_AT_S: Final = 1.0  # after the first heartbeat
-_LOCAL_NED: Final = 1
+_GCS: Final = dialect.MAV_TYPE_GCS
+_NO_AUTOPILOT: Final = dialect.MAV_AUTOPILOT_INVALID
+_TERMINATED: Final = dialect.MAV_STATE_FLIGHT_TERMINATION
+_LOCAL_NED: Final = dialect.MAV_FRAME_LOCAL_NED
 _POSITION_ONLY: Final = 0x0DF8  # type mask of SET_POSITION_TARGET_LOCAL_NED
 _HEIGHT: Final = 1.425  # m, of the base
 _NAN: Final = float("nan")
 _MODES: Final = {(int(main), int(sub)): mode for (main, sub), mode in MODE_BY_PX4.items()}
+_WAYPOINT: Final = dialect.MAV_CMD_NAV_WAYPOINT
 _MISSION: Final = ((0.0, 0.8), (0.0, -0.8), (0.0, 0.8))  # m, north and east
 
 
@@ -32,14 +36,13 @@ class Noted:
     text: str = ""
     mode: Mode | None = None
     terminated: bool = False
-    failsafe: bool = False
 
 
 class Station(threading.Thread):
-    """Speaks to one vehicle until it is closed."""
+    """Talks to one vehicle until it is closed."""
 
     def __init__(self, mode: str) -> None:
-        """Ask for a mode of the matrix a second after the vehicle is there."""
+        """Ask for a mode of the matrix one second after the vehicle's first heartbeat."""
         super().__init__(daemon=True)
         self.noted: list[Noted] = []
         self._wanted = mode
@@ -51,16 +54,16 @@ class Station(threading.Thread):
         self._vehicle: tuple[str, int] | None = None
         self._first_s: float | None = None
         self._asked = 0
-        self._mode: tuple[Mode | None, bool, bool] = (None, False, False)
+        self._mode: tuple[Mode | None, bool] = (None, False)
         self._ended = False
 
     @property
     def port(self) -> int:
-        """Where the vehicle finds it."""
+        """UDP port of the station."""
         return int(self._socket.getsockname()[1])
 
     def close(self) -> None:
-        """Hang up."""
+        """Stop and release the port."""
         self._ended = True
         self.join()
         self._socket.close()
@@ -75,7 +78,7 @@ class Station(threading.Thread):
                 continue
             if now_s - beat_s >= _BEAT_S:
                 beat_s = now_s
-                self._send(self._link.heartbeat_encode(6, 8, 0, 0, 4))
+                self._send(self._link.heartbeat_encode(_GCS, _NO_AUTOPILOT, 0, 0, 0))
                 self._ask(now_s - self._first_s)
             if self._wanted == "offboard" and now_s - setpoint_s >= _SETPOINT_S:
                 setpoint_s = now_s
@@ -103,13 +106,10 @@ class Station(threading.Thread):
 
     def _note_mode(self, now_s: float, beat: Any) -> None:
         main, sub = beat.custom_mode >> 16 & 0xFF, beat.custom_mode >> 24
-        terminated = beat.system_status == 8
-        now = (_MODES.get((main, sub)), terminated, beat.system_status == 5)
+        mode, terminated = now = _MODES.get((main, sub)), beat.system_status == _TERMINATED
         if now != self._mode:
             self._mode = now
-            mode, _, failsafe = now
-            one = Noted(now_s, mode=mode, terminated=terminated, failsafe=failsafe)
-            self.noted.append(one)
+            self.noted.append(Noted(now_s, mode=mode, terminated=terminated))
 
     def _ask(self, since_s: float) -> None:
         """Ask for the mode, twice in case that a datagram is lost."""
@@ -124,7 +124,7 @@ class Station(threading.Thread):
     def _item(self, number: int) -> Any:
         north, east = (round(1e4 * value) for value in _MISSION[number])
         return self._link.mission_item_int_encode(
-            1, 1, number, _LOCAL_NED, 16, 0, 1, 0.0, 0.0, 0.0, _NAN, north, east, -1.2, 0
+            1, 1, number, _LOCAL_NED, _WAYPOINT, 0, 1, 0.0, 0.0, 0.0, _NAN, north, east, -1.2, 0
         )
 
     def _send(self, message: Any) -> None:
@@ -132,7 +132,12 @@ class Station(threading.Thread):
         self._socket.sendto(message.pack(self._link), self._vehicle)
 
 
-_SET_MODE, _ARM, _HOME = 176, 400, 179
+_SET_MODE: Final = dialect.MAV_CMD_DO_SET_MODE
+_ARM: Final = dialect.MAV_CMD_COMPONENT_ARM_DISARM
+_HOME: Final = dialect.MAV_CMD_DO_SET_HOME
+_START: Final = dialect.MAV_CMD_MISSION_START
+_ORBIT: Final = dialect.MAV_CMD_DO_ORBIT
+_TAKEOFF: Final = dialect.MAV_CMD_NAV_TAKEOFF
 
 
 def _mode(main: int, sub: int = 0) -> tuple[int, tuple[Any, ...]]:
@@ -145,11 +150,11 @@ _COMMANDS: Final[dict[str, list[tuple[int, tuple[Any, ...]]]]] = {
     "trajectory": [],
     "workspace": [],
     "offboard": [_mode(6)],
-    "mission": [(300, (0.0, 0.0, 0.0, 0.0, 0, 0, 0.0))],
-    "orbit": [(34, (0.6, 0.4, _NAN, _NAN, -6000, 0, -_HEIGHT))],
+    "mission": [(_START, (0.0, 0.0, 0.0, 0.0, 0, 0, 0.0))],
+    "orbit": [(_ORBIT, (0.6, 0.4, _NAN, _NAN, -6000, 0, -_HEIGHT))],
     "takeoff": [
         (_ARM, (1.0, 0.0, 0.0, 0.0, 0, 0, 0.0)),
-        (22, (0.0, 0.0, 0.0, _NAN, 0, 0, -1.6)),
+        (_TAKEOFF, (0.0, 0.0, 0.0, _NAN, 0, 0, -1.6)),
     ],
     "land": [_mode(4, 6)],
     "return": [(_HOME, (0.0, 0.0, 0.0, 0.0, 0, 10000, -0.32)), _mode(4, 5)],

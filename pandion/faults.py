@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -37,6 +38,9 @@ class FaultsOptions:
         default=os.cpu_count() or 1,
     )
     expect: Path | None = option("--expect FILE", "what must happen (default the packaged)", Path)
+    journal: Path | None = option(
+        "--journal FILE", "keep each flight here; one that is here is not flown again", Path
+    )
     json: str | None = json_file("the cells")
     html: str | None = option("--html FILE", "write the matrix as a page", output_file)
 
@@ -67,13 +71,14 @@ def main(argv: list[str]) -> int:
 
 def _chosen(options: FaultsOptions, known: dict[str, Expected]) -> list[Cell]:
     from studies.fault_flights import SITUATIONS
-    from studies.fault_matrix import Cell
 
     if options.matrix == (options.mode is not None):
         raise UnknownError(_NEITHER)
+    if options.only is not None and not options.matrix:
+        raise UnknownError("--only chooses cells of the matrix: give --matrix with it")
     if options.matrix:
         every = [
-            Cell(mode, one, options.seed)
+            _cell(mode, one, options.seed)
             for one in known.values()
             for mode in SITUATIONS
             if options.only is None or options.only in f"{mode} {one.name}"
@@ -85,7 +90,14 @@ def _chosen(options: FaultsOptions, known: dict[str, Expected]) -> list[Cell]:
         raise UnknownError(_unknown("mode", options.mode, tuple(SITUATIONS)))
     if options.fault not in known:
         raise UnknownError(_unknown("fault", options.fault, tuple(known)))
-    return [Cell(options.mode, known[options.fault], options.seed)]
+    return [_cell(options.mode, known[options.fault], options.seed)]
+
+
+def _cell(mode: str, expected: Expected, seed: int) -> Cell:
+    from pandion.fault_on_link import LinkCell
+    from studies.fault_matrix import Cell
+
+    return LinkCell(mode, expected, seed) if expected.link else Cell(mode, expected, seed)
 
 
 def _unknown(what: str, name: str | None, known: tuple[str, ...]) -> str:
@@ -100,9 +112,13 @@ def _run(options: FaultsOptions, cells: list[Cell]) -> int:
 
     display = Display(console_beside(options.json))
     display.say(f"Pandion {version()}: {len(cells)} flights, seed {options.seed}")
-    workers = 0 if len(cells) == 1 else options.workers
-    with display.progress():
-        rows = _flown(cells, workers, display)
+    try:
+        with display.progress():
+            rows = _flown(cells, options, display)
+    except KeyboardInterrupt:
+        kept = "is lost" if options.journal is None else f"is in {options.journal}"
+        complain("pandion faults", f"interrupted; what was flown {kept}")
+        return COULD_NOT_START
     for row in rows:
         if row.differs or len(rows) == 1:
             _say(display, row, summary(row))
@@ -120,25 +136,24 @@ def _run(options: FaultsOptions, cells: list[Cell]) -> int:
     return DIFFERS if wrong or lost else AS_EXPECTED
 
 
-def _flown(cells: list[Cell], workers: int, display: Display) -> list[Judged]:
+def _flown(cells: list[Cell], options: FaultsOptions, display: Display) -> list[Judged]:
     """Flights in process on all workers, then those in real time, one after the other."""
-    from studies.fault_matrix import run
+    from studies.campaign import Campaign
+    from studies.fault_flights import FaultFlight
+    from studies.fault_matrix import judge
 
     inside = [cell for cell in cells if not cell.expected.link]
-    found = dict(
-        zip(
-            inside,
-            run(inside, workers, lambda done, _: display.report("flown", done, len(cells))),
-            strict=True,
-        )
-    )
-    for cell in cells:
-        if cell.expected.link:
-            from pandion.fault_on_link import fly_cell
+    linked = [cell for cell in cells if cell.expected.link]
+    workers = 0 if len(inside) == 1 else options.workers
 
-            found[cell] = fly_cell(cell)
-            display.report("flown", len(found), len(cells))
-    return [found[cell] for cell in cells]
+    def report(before: int, done: int, _: int) -> None:
+        display.report("flown", before + done, len(cells))
+
+    of_processes = Campaign[FaultFlight](workers, options.journal, partial(report, 0))
+    one_by_one = Campaign[FaultFlight](0, options.journal, partial(report, len(inside)))
+    found = of_processes.run(inside) + one_by_one.run(linked)
+    flights = dict(zip((*inside, *linked), found, strict=True))
+    return [judge(cell, flights[cell]) for cell in cells]
 
 
 def _say(display: Display, row: Judged, summary: str) -> None:

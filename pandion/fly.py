@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+import shlex
 import sys
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
-from command_line.options import as_words, declared, group, json_file, read
+from command_line.options import as_words, declared, group, json_file, read, switch
 from command_line.output import complain, json_text, unwritten
 from command_line.parser import COULD_NOT_START
 from command_line.version import version
@@ -21,6 +22,7 @@ from pandion.join_truth import join_truth
 from pandion.processor import ANYWHERE, lockstep_places
 from pandion.result import FlightReports, as_json, table_rows
 from pandion.supervisor import Flown, ProcessFailed, Supervisor
+from pandion.view_beside import ViewBeside
 from sitl.arguments import RunOptions, SitlOptions
 from sitl.earth import Place
 from sitl.scenario_file import (
@@ -46,6 +48,8 @@ class FlyOptions(RunOptions):
     links: LinkChoice = group(LinkChoice)
     out: Path | None = declared(OUT)
     json: str | None = json_file("the result")
+    view: bool = switch("--view", "show the flight live in the browser")
+    report: bool = switch("--report", "write the flight's report.html beside its log")
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,14 +75,18 @@ def main(argv: list[str]) -> int:
         return COULD_NOT_START
     display = Display(sys.stderr if options.json == "-" else sys.stdout)
     _banner(flight, display)
+    view = ViewBeside(display, flight.out)
     try:
         places = ANYWHERE if options.realtime else lockstep_places()
-        flown = Supervisor(display, flight.out, places).run(
+        found = view.start if options.view else None
+        flown = Supervisor(display, flight.out, places, found=found).run(
             as_words(_sitl_options(flight)), lambda port: as_words(_fsw_options(flight, port))
         )
     except ProcessFailed as error:
         complain("pandion fly", error)
         return error.exit_code
+    finally:
+        view.close()
     return _judge(flight, display, flown)
 
 
@@ -181,8 +189,27 @@ def _judge(flight: PlannedFlight, display: Display, flown: Flown) -> int:
     lost = unwritten(out / "result.json", text)
     display.result(result, table_rows(result, (flown.sitl or {}).get("tracking_error_max_m")))
     lost = [*flown.unwritten, *lost, *unwritten(options.json, text)]
+    lost += _report(flight, display)
     if lost:
         complain("pandion fly", f"results could not be written: {'; '.join(lost)}")
     if flown.sitl is not None and flown.sitl.get("end_kind") == "refused":
         return COULD_NOT_START
     return COMPLETED if result["completed"] and not lost else NOT_COMPLETED
+
+
+def _report(flight: PlannedFlight, display: Display) -> list[str]:
+    """Write the page, or say how to; returns what could not be written, and why."""
+    if not flight.options.report:
+        where = shlex.quote(str(flight.out))
+        display.say(f"to see it: pandion view {where}, or pandion report {where}")
+        return []
+    from messages.ulog_reader import UlogError
+    from pandion.report import write_report
+
+    try:
+        display.say(f"{'report':12} {write_report([flight.out])}")
+    except (UlogError, OSError) as error:
+        return [f"report: {error}"]
+    except ModuleNotFoundError as error:
+        return [f"report: the package {error.name} is missing; install pandion[report]"]
+    return []

@@ -1,4 +1,4 @@
-"""One MCAP file: a channel a topic, messages as JSON with a schema, as Foxglove reads them."""
+"""One MCAP file: a channel a topic, messages as JSON with a schema, and what Foxglove draws."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from typing import Any
 from mcap.writer import Writer
 
 from command_line.output import json_text
+from view.foxglove import schema_text
 
 _TYPES = {bool: "boolean", int: "integer", float: "number", str: "string"}
 _LAST_US = ((1 << 64) - 1) // 1000  # it counts nanoseconds
@@ -32,6 +33,7 @@ class McapSink(contextlib.ExitStack):
         self._writer.add_metadata("flight", facts)
         self.callback(self._writer.finish)
         self._channels: dict[str, int] = {}
+        self._schemas: dict[str, int] = {}
 
     def add(self, topic: str, t_us: int, names: tuple[str, ...], values: tuple[Any, ...]) -> None:
         """Append a message, and its channel before the first.
@@ -40,12 +42,30 @@ class McapSink(contextlib.ExitStack):
             ValueError: MCAP cannot hold the time.
         """
         if topic not in self._channels:
-            schema = json_text(_schema(topic, names, values)).encode()
-            number = self._writer.register_schema(topic, "jsonschema", schema)
-            self._channels[topic] = self._writer.register_channel(topic, "json", number)
+            self._open(topic, topic, _schema(topic, names, values))
+        self._write(topic, t_us, _object(names, values))
+
+    def add_drawn(self, topic: str, schema: str, t_us: int, value: dict[str, Any]) -> None:
+        """Append a message of one of Foxglove's own types, and its channel before the first.
+
+        Raises:
+            ValueError: MCAP cannot hold the time.
+        """
+        if topic not in self._channels:
+            self._open(topic, schema, schema_text(schema))
+        self._write(topic, t_us, value)
+
+    def _open(self, topic: str, name: str, schema: dict[str, Any]) -> None:
+        if name not in self._schemas:
+            data = json_text(schema).encode()
+            self._schemas[name] = self._writer.register_schema(name, "jsonschema", data)
+        number = self._writer.register_channel(topic, "json", self._schemas[name])
+        self._channels[topic] = number
+
+    def _write(self, topic: str, t_us: int, value: dict[str, Any]) -> None:
         if t_us > _LAST_US:
             raise ValueError(f"{topic} has the time {t_us} us, which MCAP cannot hold")
-        data = json_text(_object(names, values)).encode()
+        data = json_text(value).encode()
         self._writer.add_message(self._channels[topic], 1000 * t_us, data, 1000 * t_us)
 
 

@@ -1,4 +1,4 @@
-"""Faults of a scenario that only whoever started the processes can cause: signals, a full disk.
+"""Faults of a scenario that only the parent of the processes can cause: signals, a full disk.
 
 The simulator says when each begins. How long it lasts is counted in wall time, because the
 simulator may be what is stopped.

@@ -119,6 +119,7 @@ def main(argv: list[str]) -> int:
 
 def _run(options: ReproduceOptions) -> int:
     from studies.campaign import Campaign
+    from studies.job import Outcome
     from studies.page import rows_text, write
 
     console = console_beside(options.json)
@@ -130,7 +131,7 @@ def _run(options: ReproduceOptions) -> int:
     try:
         display = Display(console)
         with display.progress():
-            campaign = Campaign(
+            campaign: Campaign[Outcome] = Campaign(
                 options.workers, folder / "journal.jsonl", partial(display.report, "flown")
             )
             report = study(options.what)(settings, campaign)

@@ -69,8 +69,15 @@ class Supervisor:
     """Starts sitl, then fsw, and waits for both to end."""
 
     def __init__(
-        self, display: Display, out: Path, places: Places = ANYWHERE, runner: str | None = None
+        self,
+        display: Display,
+        out: Path,
+        places: Places = ANYWHERE,
+        runner: str | None = None,
+        found: Callable[[int], None] | None = None,
     ) -> None:
+        """``found`` is told the port at which the flight software hears ground stations."""
+        self._found = found
         self._display = display
         self._places = places
         self._runner = runner
@@ -163,6 +170,8 @@ class Supervisor:
             flown.unwritten.append(event["what"])
         elif kind == "fault":
             self._faults.begin(event, self._children)
+        elif kind == "links" and self._found is not None:
+            self._found(event["ports"]["gcs"])
         if kind in ("listening", "preparing", "warning", "parameters", "fault"):
             self._display.say(event["message"])
 

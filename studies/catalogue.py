@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from studies.campaign import Campaign
+    from studies.job import Outcome
     from studies.settings import Report, Settings
 
 # Module of each; what makes the study has the name ``run``, or that of the study.
@@ -23,8 +24,10 @@ STUDIES = {
 }
 
 
-def study(name: str) -> Callable[[Settings, Campaign], Report]:
+def study(name: str) -> Callable[[Settings, Campaign[Outcome]], Report]:
     """The study of this name."""
     module = import_module(f"studies.{STUDIES[name]}")
-    found: Callable[[Settings, Campaign], Report] = getattr(module, name, None) or module.run
+    found: Callable[[Settings, Campaign[Outcome]], Report] = (
+        getattr(module, name, None) or module.run
+    )
     return found

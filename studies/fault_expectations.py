@@ -11,7 +11,7 @@ from typing import Any, Final, Literal
 
 from sitl.faults.keys import Fault, Kind, Unit
 from sitl.scenario_file import SUITE_NAMES
-from studies.fault_flights import SITUATIONS
+from studies.fault_flights import SITUATIONS, FaultFlight
 
 EXPECTATIONS: Final = Path(__file__).with_suffix(".toml")
 ACTIONS: Final = ("goes on", "hold", "return", "land", "descend", "terminate", "ended")
@@ -180,23 +180,22 @@ def _words(
     return tuple(words)
 
 
-def differences(mode: str, expected: Expectation, seen: dict[str, Any]) -> tuple[str, ...]:
-    """What of a cell is not as it must be, in words; ``seen`` are the fields of a FaultFlight."""
+def differences(mode: str, expected: Expectation, seen: FaultFlight) -> tuple[str, ...]:
+    """What of a cell is not as it must be, in words."""
     found = []
-    if seen["problem"]:
-        return (seen["problem"],)
-    told_s, within_s = seen["told_s"], expected.told_within_s
-    if within_s is not None and told_s is None:
+    if seen.problem:
+        return (seen.problem,)
+    warning, within_s = seen.warning, expected.told_within_s
+    if within_s is not None and warning is None:
         found.append("silent")
-    elif within_s is not None and not told_s <= within_s:
-        found.append(f"told after {told_s:.2f} s, not within {within_s:g} s")
-    actions = tuple(seen["actions"]) or ("goes on",)
+    elif within_s is not None and warning is not None and warning.after_s > within_s:
+        found.append(f"told after {warning.after_s:.2f} s, not within {within_s:g} s")
+    actions = seen.actions or ("goes on",)
     wrong = [action for action in actions if not _allowed(mode, action, expected.then)]
     if wrong:
         found.append(f"{', then '.join(actions)}; must be {' or '.join(expected.then)}")
-    contact = seen["contact"]
-    if contact and expected.contact != "any" and contact != expected.contact:
-        found.append(seen["ended"])
+    if seen.contact and expected.contact not in ("any", seen.contact):
+        found.append(seen.ended)
     return tuple(found)
 
 

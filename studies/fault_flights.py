@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import Final
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, replace
+from typing import Any, Final
 
 from fsw.flight.autopilot import Autopilot
 from fsw.flight.state import FlightState
@@ -198,14 +198,39 @@ class Said:
 class FaultFlight:
     """What became of one flight."""
 
-    told_s: float | None  # from the fault to the first warning; None: silence
-    told: str  # that warning
-    actions: tuple[str, ...]  # of failsafes, in their order; empty: it went on
-    contact: str  # "", "ground" or "wall"
-    ended: str  # why before its time; empty if it was flown to its end
-    least_m: float | None  # margin to the safe set, of any part, in the whole flight
-    texts: tuple[Said, ...]
+    texts: tuple[Said, ...] = ()  # from the fault on
+    actions: tuple[str, ...] = ()  # of failsafes, in their order; empty: it went on
+    contact: str = ""  # "", "ground" or "wall"
+    ended: str = ""  # why before its time; empty if it was flown to its end
+    least_m: float | None = None  # margin to the safe set, of any part, in the whole flight
     problem: str = ""  # the flight was none: refused, or not in the mode when the fault began
+    error: bool = False  # it could not be flown at all
+
+    @property
+    def warning(self) -> Said | None:
+        """The first text that an operator must act on; None: silence."""
+        return next((said for said in self.texts if said.severity <= Severity.WARNING), None)
+
+    def as_line(self) -> dict[str, Any]:
+        """The flight for a journal; see :meth:`from_line`."""
+        return asdict(self)
+
+    @classmethod
+    def from_line(cls, line: Mapping[str, Any]) -> FaultFlight:
+        """The flight that :meth:`as_line` has described, after JSON.
+
+        Raises:
+            KeyError, TypeError: Another version has described it.
+        """
+        texts = tuple(Said(**said) for said in line["texts"])
+        return cls(**{**line, "texts": texts, "actions": tuple(line["actions"])})
+
+
+def contact_of(kind: EndKind | None, sentence: str) -> str:
+    """What a flight that ended so has touched: "", "ground" or "wall"."""
+    if kind not in (EndKind.COLLISION, EndKind.CRASH, EndKind.DIVERGED):
+        return ""
+    return "ground" if "hit the ground" in sentence else "wall"
 
 
 class _Planner(InlinePlanner):
@@ -323,17 +348,12 @@ def _command(number: int, action: CommandAction) -> Command:
 
 
 def _judged(simulation: Simulation, seen: _Observer) -> FaultFlight:
-    warnings = [said for said in seen.texts if said.severity <= Severity.WARNING]
-    end, contact = simulation.ended, ""
-    if end is not None and end.kind in (EndKind.COLLISION, EndKind.CRASH, EndKind.DIVERGED):
-        contact = "ground" if "hit the ground" in end.sentence else "wall"
+    end = simulation.ended
     return FaultFlight(
-        told_s=warnings[0].after_s if warnings else None,
-        told=warnings[0].text if warnings else "",
+        texts=tuple(seen.texts),
         actions=tuple(seen.actions),
-        contact=contact,
+        contact="" if end is None else contact_of(end.kind, end.sentence),
         ended="" if end is None else end.sentence,
         least_m=simulation.result().min_margin_m,
-        texts=tuple(seen.texts),
         problem=seen.problem,
     )

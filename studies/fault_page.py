@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import html
 from collections.abc import Sequence
-from pathlib import Path
 
+from command_line.html_page import document, items
 from studies.fault_matrix import Judged
 
 _STYLE = """
@@ -29,14 +29,14 @@ def page(rows: Sequence[Judged], provenance: Sequence[str]) -> str:
         for fault in faults
     )
     sentences = (*provenance, f"{len(rows)} cells, {wrong} not as they must be.")
-    items = "".join(f"<li>{html.escape(line)}</li>" for line in sentences)
-    css = Path(__file__).with_name("page.css").read_text(encoding="utf-8")
-    return (
-        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-        f"<title>{title}</title>\n<style>\n{css}{_STYLE}</style>\n</head>\n<body>\n"
-        f"<h1>{title}</h1>\n<ul>{items}</ul>\n"
-        f"<table><thead><tr><th>fault</th>{head}</tr></thead>\n<tbody>{body}</tbody></table>\n"
-        "</body>\n</html>\n"
+    return document(
+        title,
+        (
+            f"<h1>{title}</h1>",
+            items(sentences),
+            f"<table><thead><tr><th>fault</th>{head}</tr></thead>\n<tbody>{body}</tbody></table>",
+        ),
+        _STYLE,
     )
 
 
@@ -45,13 +45,14 @@ def _cell(row: Judged | None) -> str:
         return "<td></td>"
     lines = [summary(row), *row.differs]
     text = "<br>".join(html.escape(line) for line in lines if line)
-    title = html.escape(row.flight.told, quote=True)
+    warning = row.flight.warning
+    title = "" if warning is None else html.escape(warning.text, quote=True)
     return f'<td class="{"bad" if row.differs else "good"}" title="{title}">{text}</td>'
 
 
 def summary(row: Judged) -> str:
     """When it was told, what was done, and the least margin."""
     flight = row.flight
-    told = "silent" if flight.told_s is None else f"{flight.told_s:.2f} s"
+    told = "silent" if flight.warning is None else f"{flight.warning.after_s:.2f} s"
     margin = "" if flight.least_m is None else f", {1000.0 * flight.least_m:.0f} mm"
     return f"{told}, {', then '.join(flight.actions) or 'goes on'}{margin}"

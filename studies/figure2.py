@@ -8,6 +8,7 @@ from studies.campaign import Campaign
 from studies.deviations import deviations
 from studies.drawing import BASE, BOUND, END_EFFECTOR, TARGET, Sheet, sheet
 from studies.inverse_workspace import BOTH_ELBOWS, Array, Inscribed, InverseWorkspace
+from studies.job import Outcome
 from studies.settings import Figure, Report, Settings, Table
 
 PAPER = Inscribed(0.0, 0.225, 0.075)  # d_iw of Table II; r from the same set
@@ -16,7 +17,7 @@ _ELBOWS: dict[str, tuple[int, ...]] = {"both elbows": BOTH_ELBOWS, "one elbow": 
 _GRID_M = 0.002
 
 
-def run(settings: Settings, campaign: Campaign) -> Report:
+def run(settings: Settings, campaign: Campaign[Outcome]) -> Report:
     """Compute and draw the set, which depends on no setting."""
     sets = {name: InverseWorkspace(elbows=elbows) for name, elbows in _ELBOWS.items()}
     spheres = {name: _spheres(workspace) for name, workspace in sets.items()}

@@ -13,7 +13,7 @@ from studies.cases import Case, Entrant, entrants, scenario
 from studies.deviations import deviations
 from studies.drawing import BASE, BOUND, END_EFFECTOR, TARGET, WALL, Sheet, sheet
 from studies.flight_result import FlightResult
-from studies.job import Job, fly_job
+from studies.job import Job, Outcome, fly_job
 from studies.settings import Figure, Report, Settings, Table
 from studies.summary import metres, millimetres
 
@@ -28,19 +28,19 @@ Arrays = dict[str, dict[str, list[float]]]  # controller -> quantity -> values
 Draw = Callable[[Arrays, Scenario], Sheet]
 
 
-def fig6(settings: Settings, campaign: Campaign) -> Report:
+def fig6(settings: Settings, campaign: Campaign[Outcome]) -> Report:
     """Position against time in Case II."""
     caption = "Case II with disturbance: desired (green), UAV (blue), end-effector (orange)"
     return _report("fig6", caption, "II", settings, campaign, _over_time)
 
 
-def fig7(settings: Settings, campaign: Campaign) -> Report:
+def fig7(settings: Settings, campaign: Campaign[Outcome]) -> Report:
     """The base relative to the workspace sphere in Case II."""
     caption = "Case II with disturbance: UAV relative to the workspace sphere, in mm"
     return _report("fig7", caption, "II", settings, campaign, _in_sphere)
 
 
-def fig8(settings: Settings, campaign: Campaign) -> Report:
+def fig8(settings: Settings, campaign: Campaign[Outcome]) -> Report:
     """Position towards the front wall in Case I."""
     caption = "Case I with disturbance: x of the desired path (green), UAV (blue) and "
     caption += "end-effector (orange); wall (red), its safety zone (dashed), collision (dot)"
@@ -48,7 +48,7 @@ def fig8(settings: Settings, campaign: Campaign) -> Report:
 
 
 def _report(
-    name: str, caption: str, case: Case, settings: Settings, campaign: Campaign, draw: Draw
+    name: str, caption: str, case: Case, settings: Settings, campaign: Campaign[Outcome], draw: Draw
 ) -> Report:
     flown = scenario(case, disturbed=True, duration_s=settings.duration_s)
     flights = _fly(case, flown, settings, campaign)
@@ -62,7 +62,7 @@ def _report(
     )
 
 
-def _fly(case: Case, flown: Scenario, settings: Settings, campaign: Campaign) -> Flights:
+def _fly(case: Case, flown: Scenario, settings: Settings, campaign: Campaign[Outcome]) -> Flights:
     chosen: list[Entrant] = [
         entrant
         for entrant in entrants(case, settings.plant, settings.inner)

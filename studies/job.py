@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import hashlib
 import math
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
 from functools import cache
 from pathlib import Path
-from typing import Literal
+from types import ModuleType
+from typing import Any, Final, Literal
 
 import numpy as np
 
@@ -59,6 +61,21 @@ class Job:
         distinct = self if self.random else replace(self, seed=0)
         return hashlib.sha256((repr(distinct) + sources()).encode()).hexdigest()[:32]
 
+    def row(self) -> Outcome:
+        """See :class:`studies.campaign.Flight`."""
+        try:
+            return score(self, fly_job(self))
+        except Exception as error:
+            return self.broken(f"{type(error).__name__}: {error}")
+
+    def broken(self, reason: str) -> Outcome:
+        """See :class:`studies.campaign.Flight`."""
+        return Outcome(self.seed, completed=False, reason=reason, error=True)
+
+    def from_line(self, line: Mapping[str, Any]) -> Outcome:
+        """See :class:`studies.campaign.Flight`."""
+        return Outcome(**line)
+
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
@@ -86,25 +103,16 @@ class Outcome:
     reported: str = ""  # the text that names the sensor at fault; empty if there was none
     error: bool = False  # the flight itself broke, not the vehicle
 
+    def as_line(self) -> dict[str, Any]:
+        """See :class:`studies.campaign.Row`."""
+        return asdict(self)
+
 
 def fly_job(job: Job, *, traced: bool = False) -> FlightResult:
     """Fly one job here and now."""
     if job.plant == "double-integrator":
         return double_integrator.simulate(job.scenario, job.seed, job.config, traced=traced)
     return closed_loop.simulate(job.scenario, job.seed, job.config, fault=job.fault, traced=traced)
-
-
-def outcome(job: Job) -> Outcome:
-    """Fly one job; an exception becomes a row with the error."""
-    try:
-        return score(job, fly_job(job))
-    except Exception as error:
-        return broken(job, f"{type(error).__name__}: {error}")
-
-
-def broken(job: Job, reason: str) -> Outcome:
-    """The row of a flight that could not be flown."""
-    return Outcome(job.seed, completed=False, reason=reason, error=True)
 
 
 def score(job: Job, result: FlightResult) -> Outcome:
@@ -142,13 +150,15 @@ def _largest_deg(truth: TruthResult, angle: str) -> float | None:
 
 
 @cache
-def sources() -> str:
-    """Digest of the code that decides how a flight goes."""
+def sources(*shells: ModuleType) -> str:
+    """Digest of the code that decides how a flight goes: the stack, and what flies it."""
     folders = [Path(str(package.__file__)).parent for package in (fsw, sitl)]
     files = [path for folder in folders for path in sorted(folder.rglob("*.py"))]
-    shells = (closed_loop, double_integrator, faults, mission, samples)
-    files += [Path(str(shell.__file__)) for shell in shells]
+    files += [Path(str(shell.__file__)) for shell in shells or _SHELLS]
     digest = hashlib.sha256()
     for path in files:
         digest.update(path.read_bytes())
     return digest.hexdigest()
+
+
+_SHELLS: Final = (closed_loop, double_integrator, faults, mission, samples)

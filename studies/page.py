@@ -5,10 +5,9 @@ from __future__ import annotations
 import html
 from pathlib import Path
 
+from command_line.html_page import document, items, table
 from command_line.output import json_text
-from studies.settings import Figure, Report, Settings, Table
-
-_STYLE = Path(__file__).with_suffix(".css")
+from studies.settings import Figure, Report, Settings
 
 
 def write(
@@ -52,20 +51,14 @@ def markdown(report: Report) -> str:
 
 def page(report: Report, settings: Settings, provenance: tuple[str, ...]) -> str:
     """The page of one study; provenance says in sentences how to get the same again."""
-    parts = [f"<h1>{html.escape(report.title)}</h1>", _items(provenance), _seeds(settings)]
-    parts += [_table(table) for table in report.tables]
+    parts = [f"<h1>{html.escape(report.title)}</h1>", items(provenance), _seeds(settings)]
+    parts += [table(one.headers, one.rows, one.caption) for one in report.tables]
     parts += [_figure(figure) for figure in report.figures]
     if report.errors:
-        parts.append('<h2 class="warning">Flights that broke</h2>' + _items(report.errors))
+        parts.append('<h2 class="warning">Flights that broke</h2>' + items(report.errors))
     if report.deviations:
-        parts.append("<h2>Deviations from the paper</h2>" + _items(report.deviations))
-    body = "\n".join(parts)
-    return (
-        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-        f"<title>{html.escape(report.title)}</title>\n"
-        f"<style>\n{_STYLE.read_text(encoding='utf-8')}</style>\n</head>\n"
-        f"<body>\n{body}\n</body>\n</html>\n"
-    )
+        parts.append("<h2>Deviations from the paper</h2>" + items(report.deviations))
+    return document(report.title, parts)
 
 
 def _seeds(settings: Settings) -> str:
@@ -79,21 +72,7 @@ def _seeds(settings: Settings) -> str:
     )
 
 
-def _table(table: Table) -> str:
-    head = "".join(f"<th>{html.escape(name)}</th>" for name in table.headers)
-    rows = "\n".join(
-        "<tr>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in row) + "</tr>"
-        for row in table.rows
-    )
-    caption = f"<caption>{html.escape(table.caption)}</caption>"
-    return f"<table>{caption}<thead><tr>{head}</tr></thead>\n<tbody>{rows}</tbody></table>"
-
-
 def _figure(figure: Figure) -> str:
     drawing = figure.svg[figure.svg.index("<svg") :]  # no XML declaration inside HTML
     caption = f"{figure.caption} (numbers: {figure.name}.json)"
     return f"<figure>{drawing}<figcaption>{html.escape(caption)}</figcaption></figure>"
-
-
-def _items(sentences: tuple[str, ...]) -> str:
-    return "<ul>" + "".join(f"<li>{html.escape(line)}</li>" for line in sentences) + "</ul>"

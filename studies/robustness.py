@@ -36,7 +36,7 @@ from studies.campaign import Campaign
 from studies.cases import configuration, grazing
 from studies.deviations import deviations
 from studies.faults import Fault, FaultKind
-from studies.job import Job
+from studies.job import Job, Outcome
 from studies.settings import NoCellError, Report, Settings, Table
 from studies.summary import Summary, fly_jobs
 
@@ -302,7 +302,7 @@ def config_of(cell: Cell, settings: Settings) -> FlightConfig:
     return tuned(config, tuple((BY_NAME[name].path, value) for name, value in known.items()))
 
 
-def run(settings: Settings, campaign: Campaign) -> Report:
+def run(settings: Settings, campaign: Campaign[Outcome]) -> Report:
     """Fly every row; always the full plant, the other has nothing to change."""
     rows = chosen(settings)
     jobs = [

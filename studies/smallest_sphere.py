@@ -8,13 +8,14 @@ from studies import summary
 from studies.campaign import Campaign
 from studies.cases import configuration, scenario
 from studies.deviations import deviations
+from studies.job import Outcome
 from studies.settings import Report, Settings, Table
 from studies.summary import Summary, fly_cells
 
 RADII_M = (0.075, 0.070, 0.065, 0.060, 0.055, 0.050, 0.045, 0.040, 0.035, 0.030)
 
 
-def run(settings: Settings, campaign: Campaign) -> Report:
+def run(settings: Settings, campaign: Campaign[Outcome]) -> Report:
     """Shrink the sphere until a seed fails."""
     config = configuration(settings.plant, "blf", settings.inner)
     flown = scenario("II", disturbed=True, duration_s=settings.duration_s)

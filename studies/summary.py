@@ -47,7 +47,7 @@ class Summary:
 
 
 def fly_cells(
-    campaign: Campaign, settings: Settings, cells: Sequence[tuple[Scenario, FlightConfig]]
+    campaign: Campaign[Outcome], settings: Settings, cells: Sequence[tuple[Scenario, FlightConfig]]
 ) -> tuple[list[Summary], tuple[str, ...]]:
     """Fly all cells of a table, one job a seed; the second value names flights that broke."""
     return fly_jobs(
@@ -60,7 +60,7 @@ def fly_cells(
 
 
 def fly_jobs(
-    campaign: Campaign, jobs: Sequence[Sequence[Job]]
+    campaign: Campaign[Outcome], jobs: Sequence[Sequence[Job]]
 ) -> tuple[list[Summary], tuple[str, ...]]:
     """Fly the jobs of each cell; the second value names flights that broke."""
     outcomes = campaign.run([job for cell in jobs for job in cell])

@@ -8,6 +8,7 @@ from studies import paper, summary
 from studies.campaign import Campaign
 from studies.cases import configuration, scenario, with_horizon, with_lambda
 from studies.deviations import deviations
+from studies.job import Outcome
 from studies.settings import Report, Settings, Table
 from studies.summary import Summary, fly_cells
 
@@ -17,7 +18,7 @@ PAPER_LAMBDAS = (1.0, 5.0)
 _HEADERS = ("n", "λ", *summary.HEADERS, "c_s", "c_e", "T_C ms", *paper.HEADERS, "paper T_C ms")
 
 
-def run(settings: Settings, campaign: Campaign) -> Report:
+def run(settings: Settings, campaign: Campaign[Outcome]) -> Report:
     """Fly the table."""
     flown = scenario("II", disturbed=True, duration_s=settings.duration_s)
     ours = configuration(settings.plant, "blf", settings.inner)

@@ -10,6 +10,7 @@ from studies import paper, summary
 from studies.campaign import Campaign
 from studies.cases import CASES, Case, Entrant, entrants, reference_floor_m, scenario
 from studies.deviations import deviations
+from studies.job import Outcome
 from studies.settings import Report, Settings, Table
 from studies.summary import Summary, fly_cells, metres
 
@@ -29,7 +30,7 @@ class _Entry:
         return paper.TABLE_4.get((self.entrant.name, self.case, self.disturbed))
 
 
-def run(settings: Settings, campaign: Campaign) -> Report:
+def run(settings: Settings, campaign: Campaign[Outcome]) -> Report:
     """Fly the table."""
     entries = [
         _Entry(

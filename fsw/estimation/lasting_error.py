@@ -10,30 +10,28 @@ Source: docs/equations.md T7.
 
 from __future__ import annotations
 
-import numpy as np
-
-from fsw.estimation.error_state import Array
 from fsw.estimation.sensor_checks import believable
 from fsw.estimation.sensor_fusion import FusionMemory
 from fsw.estimation.tuning import EstimatorTuning
-from fsw.signals import StateEstimate
+from fsw.estimation.turned_covariance import Vec6
+
+_NONE: Vec6 = (0.0,) * 6
 
 
-def lasting_error(memory: FusionMemory, tuning: EstimatorTuning, estimate: StateEstimate) -> Array:
-    """Covariance (6, 6) of position [m, NED] and attitude [rad, NED] besides the filter's.
+def lasting_error(memory: FusionMemory, tuning: EstimatorTuning) -> Vec6:
+    """Variances of position [m^2, NED] and attitude [rad^2, FRD] besides the filter's.
 
-    A whole reading's of the position's source.
+    Those of a whole reading of the position's source.
     """
-    found = np.zeros((6, 6))
     pose, fix = memory.pose, memory.gnss
     if pose is not None:
         place, attitude = pose.position_variance, pose.attitude_variance
         if pose.drifts:
             place, attitude = memory.frame.place_noise, memory.frame.attitude_noise
-        turn = np.reshape(estimate.R_WB, (3, 3))
-        sides = believable(attitude, tuning.attitude_floor**2)
-        found[3:, 3:] = (turn * sides) @ turn.T
-        found[range(3), range(3)] = believable(place, tuning.position_floor**2)
-    elif fix is not None:
-        found[range(3), range(3)] = believable(fix.position_variance, tuning.gnss_position_floor**2)
-    return found
+        return (
+            *believable(place, tuning.position_floor**2),
+            *believable(attitude, tuning.attitude_floor**2),
+        )
+    if fix is not None:
+        return *believable(fix.position_variance, tuning.gnss_position_floor**2), 0.0, 0.0, 0.0
+    return _NONE

@@ -129,6 +129,7 @@ class Autopilot:
         self._cascade.step(in_hover(self.config.airframe, estimate), estimate, nominal, REST_INPUT)
         self._safe_sets.warm_up(estimate)
         self._sensed.warm_up()
+        self._clearance.warm_up(estimate)
         self._exact.warm_up(estimate, TickInputs(_STILL))
 
     def analyse(self, safe_set: SafeSet) -> tuple[Finding, ...]:
@@ -171,7 +172,8 @@ class Autopilot:
             if mission is not state.mission:
                 state = replace(state, mission=mission)
             covariance = self._sensed.covariance(fusion)
-            state = self._keep_clear(state, estimate, fusion, covariance)
+            pose = self._pose_error(state, estimate, fusion, covariance)
+            state = self._keep_clear(state, estimate, pose)
             if flown and nominal is not None:
                 state, request, plan = self._request_plan(
                     state, estimate, nominal, plan, now_us, safety.replan
@@ -179,7 +181,7 @@ class Autopilot:
                 safety = replace(safety, replan=False) if safety.replan else safety
             state = self._report_slowly(state, estimate, now_us)
             state = self._sensed.reported(state, fusion, estimate, covariance)
-            state = self._see_accuracy(state, covariance, texts)
+            state = self._see_accuracy(state, estimate, covariance, pose, texts)
             safety = self._watch.breach(safety, estimate, state.constraints, flies=flown)
         sent, memory, replaced, (pushed, margin) = self._actuate(state, estimate, nominal, u, ticks)
         if pushed or safety.filter_us >= 0:
@@ -333,38 +335,48 @@ class Autopilot:
         return state, request, requested(plan, apply_us)
 
     def _see_accuracy(
-        self, state: FlightState, covariance: Array | None, texts: list[StatusText]
+        self,
+        state: FlightState,
+        estimate: StateEstimate,
+        covariance: Array | None,
+        pose: Array | None,
+        texts: list[StatusText],
     ) -> FlightState:
         """Say what the sensors' errors add to the tube, once that is known."""
-        if covariance is None or state.accuracy.told:
+        if covariance is None or pose is None or state.accuracy.told:
             return state
         safe_set, source = state.kept.source, state.aiding.pose.value
+        position = self._clearance.deviation(estimate, pose) if safe_set.zones else 0.0
         sure = self._accuracy.see(
-            state.accuracy, state.t_us, safe_set, source, state.kept.sigma, covariance, texts
+            state.accuracy, state.t_us, safe_set, source, position, covariance, texts
         )
         return replace(state, accuracy=sure)
 
     def _keep_clear(
+        self, state: FlightState, estimate: StateEstimate, pose: Array | None
+    ) -> FlightState:
+        """The state with clearances that have grown by what the estimate is uncertain about now."""
+        kept = self._clearance.keep(state.kept, state.mission.safe_set, estimate, pose)
+        return state if kept is state.kept else replace(state, kept=kept)
+
+    def _pose_error(
         self,
         state: FlightState,
         estimate: StateEstimate,
         fusion: FusionMemory | None,
         covariance: Array | None,
-    ) -> FlightState:
-        """The state with clearances that have grown by what the estimate is uncertain about now.
+    ) -> Array | None:
+        """Covariance (6, 6) of position [m, NED] and attitude [rad, NED], as clearances grow by it.
 
         ``covariance`` (17, 17) [SI] is that of the filter, if there is one; without, exact states
-        are uncertain while they are doubted.
+        are uncertain while they are doubted. None: certain.
         """
-        pose = None
         if covariance is not None and fusion is not None:
-            pose = pose_covariance(covariance, estimate)
-            pose = pose + self._sensed.lasting_error(fusion, estimate)
-        elif fusion is None and state.trust.doubted:
+            return pose_covariance(covariance, estimate, self._sensed.lasting_error(fusion))
+        if fusion is None and state.trust.doubted:
             position, attitude = state.aiding.position_sigma, state.aiding.attitude_sigma
-            pose = np.diag((position**2,) * 3 + (attitude**2,) * 3)
-        kept = self._clearance.keep(state.kept, state.mission.safe_set, estimate, pose)
-        return state if kept is state.kept else replace(state, kept=kept)
+            return np.diag((position**2,) * 3 + (attitude**2,) * 3)
+        return None
 
     def _report_slowly(
         self, state: FlightState, estimate: StateEstimate, now_us: int
@@ -507,6 +519,7 @@ def _snapshot(
         state.estimator,
         state.host.log_failure,
         state.arming,
+        state.mission.safe_set,
         state.damage.report,
     )
 

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
+from operator import itemgetter
 from typing import Final
 
-import numpy as np
-
-from fsw.estimation.error_state import BA, BG, TH, Array, P, V
+from fsw.estimation.error_state import BA, BG, ERRORS, TH, Array, P, V
 from fsw.estimation.sensor_checks import Health
 from fsw.estimation.sensor_fault import Sensor, SensorFault
 from fsw.estimation.sensor_fusion import FusionMemory
+from fsw.estimation.turned_covariance import SAME_AXES, turned_covariance
 from fsw.signals import (
     EstimatorReport,
     SatelliteFix,
@@ -30,11 +30,10 @@ _KNOWN_ANGLE: Final = 0.2  # rad
 _KNOWN_SPEED: Final = 0.5  # m/s
 _KNOWN_PLACE: Final = 0.5  # m, in dead reckoning
 AIDS_PLACE: Final = (Sensor.POSE, Sensor.GNSS)
-_UPPER: Final = np.triu_indices(6)
-_POSE: Final = np.ix_([P, P + 1, P + 2, TH, TH + 1, TH + 2], [P, P + 1, P + 2, TH, TH + 1, TH + 2])
-_MOTION: Final = np.ix_(
-    [V, V + 1, V + 2, BG, BG + 1, BG + 2], [V, V + 1, V + 2, BG, BG + 1, BG + 2]
-)
+_UPPER: Final = tuple((i, j) for i in range(6) for j in range(i, 6))
+_OF_POSE: Final = (P, P + 1, P + 2, TH, TH + 1, TH + 2)
+_pose: Final = itemgetter(*[ERRORS * _OF_POSE[i] + _OF_POSE[j] for i, j in _UPPER])
+_upper: Final = itemgetter(*[6 * i + j for i, j in _UPPER])
 
 
 def unaided(memory: FusionMemory, now: float) -> float:
@@ -50,24 +49,25 @@ def estimator_report(
 
     ``covariance`` (17, 17) [SI] is of the error of the ``estimate``.
     """
-    x, M = memory.numbers, covariance
+    x, entries = memory.numbers[0], covariance.ravel().tolist()
+    variances = entries[:: ERRORS + 1]
     without = unaided(memory, now)
     sensors = _sensors(memory, now, stale)
     fix = memory.gnss
     return EstimatorReport(
         t_us=estimate.t_us,
-        pose_covariance=_pose(M),
-        velocity_covariance=_motion(M, estimate),
-        accel_bias=_three(x["accel_bias"][0]),
-        gyro_bias=_three(x["gyro_bias"][0]),
-        accel_bias_variance=_three(np.diagonal(M)[BA : BA + 3]),
-        gyro_bias_variance=_three(np.diagonal(M)[BG : BG + 3]),
-        pose_delay=float(x["pose_delay"][0]),
+        pose_covariance=_pose(entries),
+        velocity_covariance=_motion(covariance, estimate),
+        accel_bias=_three(x["accel_bias"].tolist()),
+        gyro_bias=_three(x["gyro_bias"].tolist()),
+        accel_bias_variance=_three(variances[BA : BA + 3]),
+        gyro_bias_variance=_three(variances[BG : BG + 3]),
+        pose_delay=float(x["pose_delay"]),
         sensors=sensors,
         ratios=_ratios(sensors),
         unaided_us=round(1e6 * without) if without < math.inf else -1,
         resets=memory.reset.number,
-        flags=_flags(M, sensors, aided=without <= stale),
+        flags=_flags(variances, sensors, aided=without <= stale),
         fix=None
         if fix is None
         else SatelliteFix(
@@ -114,20 +114,20 @@ def _largest(ratios: tuple[float, ...]) -> float:
     return max(ratios, default=math.nan)
 
 
-def _flags(M: Array, sensors: tuple[SensorReport, ...], *, aided: bool) -> int:
+def _flags(variances: list[float], sensors: tuple[SensorReport, ...], *, aided: bool) -> int:
     """ESTIMATOR_STATUS_FLAGS: what is known, and what of the sensors is doubted."""
-    d = np.sqrt(np.diagonal(M)).tolist()
+    d = variances
     flags = 0
-    if max(d[TH : TH + 3]) < _KNOWN_ANGLE:
+    if max(d[TH : TH + 3]) < _KNOWN_ANGLE**2:
         flags |= ATTITUDE
-    if max(d[V], d[V + 1]) < _KNOWN_SPEED:
+    if max(d[V], d[V + 1]) < _KNOWN_SPEED**2:
         flags |= LEVEL_VELOCITY
-    if d[V + 2] < _KNOWN_SPEED:
+    if d[V + 2] < _KNOWN_SPEED**2:
         flags |= VERTICAL_VELOCITY
-    if max(d[P], d[P + 1]) < _KNOWN_PLACE:
+    if max(d[P], d[P + 1]) < _KNOWN_PLACE**2:
         flags |= RELATIVE | PREDICTED_RELATIVE
         flags |= (ABSOLUTE | PREDICTED_ABSOLUTE) if aided else 0
-    if d[P + 2] < _KNOWN_PLACE:
+    if d[P + 2] < _KNOWN_PLACE**2:
         flags |= HEIGHT
     for one in sensors:
         if one.name == Sensor.RANGEFINDER.value and not one.fault:
@@ -139,20 +139,17 @@ def _flags(M: Array, sensors: tuple[SensorReport, ...], *, aided: bool) -> int:
     return flags
 
 
-def _pose(M: Array) -> tuple[float, ...]:
-    return tuple(M[_POSE][_UPPER].tolist())
-
-
-def _motion(M: Array, estimate: StateEstimate) -> tuple[float, ...]:
+def _motion(covariance: Array, estimate: StateEstimate) -> tuple[float, ...]:
     """Velocity in body axes, and rates, of which the error is the gyro's bias."""
-    R = np.reshape(estimate.R_WB, (3, 3))
-    turn = np.eye(6)
-    turn[:3, :3] = R.T
-    return tuple((turn @ M[_MOTION] @ turn.T)[_UPPER].tolist())
+    r11, r12, r13, r21, r22, r23, r31, r32, r33 = estimate.R_WB
+    back = (r11, r21, r31, r12, r22, r32, r13, r23, r33)
+    found = turned_covariance(covariance, (V, BG), (back, SAME_AXES))
+    upper: tuple[float, ...] = _upper(found.ravel().tolist())
+    return upper
 
 
-def _three(row: Array) -> Vec3:
-    a, b, c = row.tolist()
+def _three(values: list[float]) -> Vec3:
+    a, b, c = values
     return a, b, c
 
 

@@ -12,6 +12,7 @@ from fsw.estimation.lasting_error import lasting_error
 from fsw.estimation.sensor_fault import Sensor, SensorFault, sentence
 from fsw.estimation.sensor_fusion import EncoderWatch, FusionMemory, SensorFusion, at_start
 from fsw.estimation.tuning import EstimatorTuning
+from fsw.estimation.turned_covariance import Vec6
 from fsw.flight.estimator_report import AIDS_PLACE, estimator_report, unaided
 from fsw.flight.jump import jumped, returned, told
 from fsw.flight.state import Aiding, FlightState
@@ -51,9 +52,9 @@ class SensedState:
             return None
         return self._fusion.covariance(memory, memory.now)
 
-    def lasting_error(self, memory: FusionMemory, estimate: StateEstimate) -> Array:
-        """Covariance (6, 6) of position [m, NED] and attitude [rad, NED] besides the filter's."""
-        return lasting_error(memory, self._tuning, estimate)
+    def lasting_error(self, memory: FusionMemory) -> Vec6:
+        """Variances of position [m^2, NED] and attitude [rad^2, FRD] besides the filter's."""
+        return lasting_error(memory, self._tuning)
 
     def estimate(
         self, state: FlightState, inputs: TickInputs, texts: list[StatusText]

@@ -26,13 +26,16 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from fsw.barriers.safe_approach import BarrierTuning
-from fsw.estimation.error_state import TH, Array, P
+from fsw.compiled import kernel
+from fsw.estimation.error_state import ERRORS, TH, Array, P
+from fsw.estimation.turned_covariance import SAME_AXES, Vec6, turned_covariance
+from fsw.geometry.rotation import rotate
 from fsw.model.body import ON_BASE, ON_LINK1, Body
 from fsw.model.kinematics import links
 from fsw.parameters.consistency import stand_off
 from fsw.shapes import kind_of
 from fsw.shapes.zones import all_planes
-from fsw.signals import SafeSet, StateEstimate, Vec2
+from fsw.signals import Mat3, SafeSet, StateEstimate, Vec2, Vec4
 
 _STEP: Final = 1e-3  # m, by which clearances grow, so that most ticks have the same ones
 _SLACK: Final = 4e-3  # m, by which one must be too large before it shrinks
@@ -46,6 +49,8 @@ _PASSES: Final = 60  # over all planes; in a corner they have to settle
 
 
 _LOST: Final = np.eye(6)  # m^2, rad^2
+_NO_NORMALS: Final = np.empty((0, 3))
+_NOTHING: Final[Vec6] = (0.0,) * 6
 
 
 class KeptSet(NamedTuple):
@@ -58,16 +63,13 @@ class KeptSet(NamedTuple):
     ample_us: int = -1  # when there was room enough last; -1: not known yet
     spread: tuple[float, ...] = ()  # m, k sigma at each zone
     t_us: int = 0  # at that time
-    sigma: float = 0.0  # m, standard deviation of the least certain part along its worst axis
 
     def of(self, safe_set: SafeSet) -> KeptSet:
         """The same for another safe set in force, until the next planning tick knows better."""
         if safe_set is self.source:
             return self
         added = (max(self.added, default=0.0),) * len(safe_set.zones)
-        return _grown(safe_set, added)._replace(
-            lacking=self.lacking, ample_us=self.ample_us, sigma=self.sigma
-        )
+        return _grown(safe_set, added)._replace(lacking=self.lacking, ample_us=self.ample_us)
 
 
 class UncertainClearance:
@@ -88,8 +90,12 @@ class UncertainClearance:
         # A plan keeps S(d) + n v: against a boundary that comes at r, d is less by r / k_S.
         self._lead = 1.0 / tunings[0].slope + lag
         self._sigmas, self._lengths = sigmas, lengths
-        self._on_base, self._on_links, self._radii = _places(body)
+        self._places, self._radii = _places(body, lengths[0])
         self._stand_off, self._stand_off_inside = (stand_off(one) for one in tunings)
+
+    def warm_up(self, estimate: StateEstimate) -> None:
+        """Compile every kernel."""
+        self.deviation(estimate, pose_covariance(np.zeros((ERRORS, ERRORS)), estimate))
 
     def keep(
         self, before: KeptSet, safe_set: SafeSet, estimate: StateEstimate, pose: Array | None
@@ -99,40 +105,37 @@ class UncertainClearance:
         ``pose`` (6, 6) [m, rad, NED] is the covariance of the estimate's position and attitude;
         None where states are exact.
         """
-        if pose is None or not safe_set.zones:
+        if pose is None or not safe_set.zones or not self._sigmas > 0.0:
             return before if before.safe_set is safe_set else KeptSet(safe_set, safe_set)
-        if not np.isfinite(pose).all():
-            pose = _LOST
-        levers = self._levers(estimate)
-        covariances = place_covariances(pose, levers)
-        along_any = np.sqrt(np.maximum(np.linalg.eigvalsh(covariances)[:, -1], 0.0))
-        sigma = float(along_any.max())
-        if not self._sigmas > 0.0:
-            return KeptSet(safe_set, safe_set, sigma=sigma)
-        spread = self._spread(safe_set, covariances, along_any)
+        spread, levers = self._spread(safe_set, estimate, _finite(pose))
         wanted = self._ahead(before, spread, estimate.t_us)
         granted = self._granted(safe_set, estimate, levers, wanted)
         lacking = max(map(float.__sub__, wanted, granted))
         kept = before
         if safe_set is not before.source or granted != before.added:
             kept = _grown(safe_set, granted)
-        lacks = lacking > LACKING and before.ample_us >= 0
-        ample_us = before.ample_us if lacks else estimate.t_us
-        return kept._replace(
-            lacking=lacking, ample_us=ample_us, spread=spread, t_us=estimate.t_us, sigma=sigma
-        )
+        t_us, lacks = estimate.t_us, lacking > LACKING and before.ample_us >= 0
+        ample_us = before.ample_us if lacks else t_us
+        return KeptSet(kept.source, kept.safe_set, kept.added, lacking, ample_us, spread, t_us)
 
-    def _levers(self, estimate: StateEstimate) -> Array:
-        """From the base to each place of the body (places, 3) [m, NED]."""
+    def deviation(self, estimate: StateEstimate, pose: Array) -> float:
+        """Standard deviation [m] of the least certain part of the body, along its worst axis.
+
+        ``pose`` (6, 6) [m, rad, NED] as for ``keep``.
+        """
+        pose = _finite(pose)
+        return float(_along_any(pose, self._look(estimate, pose)[0]).max())
+
+    def _look(
+        self, estimate: StateEstimate, pose: Array, normals: Array = _NO_NORMALS
+    ) -> tuple[Array, list[float]]:
+        """From the base to each place of the body (places, 3) [m, NED], and see ``_look``."""
         th1, th2 = estimate.q_arm
-        (x1, z1), (x2, z2) = links(self._lengths, th1, th1 + th2)
-        l1, l2 = self._lengths
-        first, second = np.array((x1, 0.0, z1)) / l1, np.array((x2, 0.0, z2)) / l2
-        on_link, along = self._on_links[:, 0], self._on_links[:, 1:]
-        on_arm = np.where(on_link[:, None] == ON_LINK1, first * along, first * l1 + second * along)
-        turn = np.reshape(estimate.R_WB, (3, 3))
-        levers: Array = np.concatenate((self._on_base, on_arm)) @ turn.T
-        return levers
+        first, second = links((1.0, 1.0), th1, th1 + th2)
+        levers, most = np.empty((len(self._places), 3)), np.empty(len(normals))
+        arm = (*first, *second)
+        _look(pose, estimate.R_WB, arm, self._places, normals, levers, most)
+        return levers, most.tolist()
 
     def _ahead(self, before: KeptSet, spread: tuple[float, ...], now_us: int) -> tuple[float, ...]:
         """What clearances are to grow by [m], in steps: k sigma as it will be when plans can act.
@@ -149,18 +152,25 @@ class UncertainClearance:
             return tuple(map(_settled, stepped, before.added))
         return tuple(stepped)
 
-    def _spread(self, safe_set: SafeSet, covariances: Array, along_any: Array) -> tuple[float, ...]:
-        """k sigma at each zone [m]; of the base alone where a zone keeps only that."""
-        spread = []
-        for zone in safe_set.zones:
-            kind = kind_of(zone.shape)
-            if kind.flat:
-                n = np.array(zone.shape.numbers[:3])
-                most = math.sqrt(max(float((covariances @ n @ n).max()), 0.0))
-            else:
-                most = float(along_any[0] if kind.follows_target else along_any.max())
-            spread.append(self._sigmas * most)
-        return tuple(spread)
+    def _spread(
+        self, safe_set: SafeSet, estimate: StateEstimate, pose: Array
+    ) -> tuple[tuple[float, ...], Array]:
+        """k sigma at each zone [m], and the levers of ``_look``."""
+        kinds = [kind_of(zone.shape) for zone in safe_set.zones]
+        flat = [zone for zone, kind in zip(safe_set.zones, kinds, strict=True) if kind.flat]
+        normals = _NO_NORMALS
+        if flat:
+            normals = np.array([zone.shape.numbers[:3] for zone in flat])
+        levers, most = self._look(estimate, pose, normals)
+        if len(flat) < len(kinds):
+            along_any, along = _along_any(pose, levers), iter(most)
+            base, worst = float(along_any[0]), float(along_any.max())
+            # Of the base alone where a zone keeps only that.
+            round_ = [base if kind.follows_target else worst for kind in kinds]
+            most = [
+                next(along) if kind.flat else one for kind, one in zip(kinds, round_, strict=True)
+            ]
+        return tuple([self._sigmas * one for one in most]), levers
 
     def _granted(
         self, safe_set: SafeSet, estimate: StateEstimate, levers: Array, wanted: tuple[float, ...]
@@ -241,15 +251,49 @@ def _kept_off(normals: Array, room: Array) -> Array | None:
     return None
 
 
-def pose_covariance(covariance: Array, estimate: StateEstimate) -> Array:
+def pose_covariance(covariance: Array, estimate: StateEstimate, besides: Vec6 = _NOTHING) -> Array:
     """Covariance (6, 6) of position [m, NED] and attitude [rad, NED].
 
-    From the filter's ``covariance`` (17, 17) [SI], whose attitude is about the body's axes.
+    From the filter's ``covariance`` (17, 17) [SI], whose attitude is about the body's axes, and
+    variances ``besides`` [m^2, NED] [rad^2, FRD].
     """
-    turn = np.eye(6)
-    turn[3:, 3:] = np.reshape(estimate.R_WB, (3, 3))
-    kept = [P, P + 1, P + 2, TH, TH + 1, TH + 2]
-    found: Array = turn @ covariance[np.ix_(kept, kept)] @ turn.T
+    return turned_covariance(covariance, (P, TH), (SAME_AXES, estimate.R_WB), besides)
+
+
+def _finite(pose: Array) -> Array:
+    return pose if math.isfinite(pose.sum()) else _LOST
+
+
+@kernel
+def _look(
+    pose: Array, turn: Mat3, arm: Vec4, places: Array, normals: Array, levers: Array, most: Array
+) -> None:
+    """Each place's lever (places, 3) [m, NED], and the most uncertain one's along each normal.
+
+    That is the deviation ``most`` (planes,) [m] along ``normals`` (planes, 3) [NED] of all places.
+    """
+    x1, z1, x2, z2 = arm
+    for i in range(places.shape[0]):
+        x, y, z, first, second = places[i]
+        at = rotate(turn, (x + first * x1 + second * x2, y, z + first * z1 + second * z2))
+        levers[i, 0], levers[i, 1], levers[i, 2] = at
+    for k in range(normals.shape[0]):
+        n, variance = (normals[k, 0], normals[k, 1], normals[k, 2]), 0.0
+        for i in range(places.shape[0]):
+            x, y, z = levers[i]
+            slope = (*n, y * n[2] - z * n[1], z * n[0] - x * n[2], x * n[1] - y * n[0])
+            total = 0.0
+            for a in range(6):
+                for b in range(6):
+                    total += slope[a] * pose[a, b] * slope[b]
+            variance = max(variance, total)
+        most[k] = math.sqrt(variance)
+
+
+def _along_any(pose: Array, levers: Array) -> Array:
+    """Deviation of each place along its worst axis (places,) [m]."""
+    covariances = place_covariances(pose, levers)
+    found: Array = np.sqrt(np.maximum(np.linalg.eigvalsh(covariances)[:, -1], 0.0))
     return found
 
 
@@ -269,27 +313,28 @@ def place_covariances(pose: Array, levers: Array) -> Array:
     return found
 
 
-def _places(body: Body) -> tuple[Array, Array, Array]:
-    """Places on the base (n, 3) [m, body], on links (m, 2) [which, m], and radii (n + m,) [m].
+def _places(body: Body, length: float) -> tuple[Array, Array]:
+    """Places (places, 5) [m], and their radii (places,) [m]; link 1 has a ``length`` [m].
 
-    The deviation is a convex function of the place, so the ends of a part are its most uncertain
-    places. The first one is the base.
+    A place is its coordinates along the body's axes and along both links. The deviation is a convex
+    function of it, so the ends of a part are its most uncertain places. The first is the base.
     """
-    base: list[tuple[tuple[float, float, float], float]] = []
-    arm: list[tuple[tuple[int, float], float]] = []
+    base: list[tuple[tuple[float, ...], float]] = []
+    arm: list[tuple[tuple[float, ...], float]] = []
     for part in body.parts:
+        x, y, z = part.begin
         if part.on != ON_BASE:
-            arm.append(((part.on, part.begin[2]), part.radius))
+            along = (z, 0.0) if part.on == ON_LINK1 else (length, z)
+            arm.append(((0.0, 0.0, 0.0, *along), part.radius))
             continue
         if not part.rim > 0.0:
-            base.append((part.begin, part.radius))  # a capsule's ends are parts of their own
+            # A capsule's ends are parts of their own.
+            base.append(((x, y, z, 0.0, 0.0), part.radius))
             continue
         around = part.rim / math.cos(math.pi / _RIM)
         for k in range(_RIM):
             angle = 2.0 * math.pi * k / _RIM
-            x, y, z = part.begin
-            place = (x + around * math.cos(angle), y + around * math.sin(angle), z)
-            base.append((place, part.radius))
-    on_arm = np.array([place for place, _ in arm], dtype=np.float64).reshape(-1, 2)
-    radii = np.array([radius for _, radius in (*base, *arm)])
-    return np.array([place for place, _ in base]), on_arm, radii
+            rim = (x + around * math.cos(angle), y + around * math.sin(angle), z, 0.0, 0.0)
+            base.append((rim, part.radius))
+    places, radii = zip(*base, *arm, strict=True)
+    return np.array(places), np.array(radii)

@@ -7,10 +7,11 @@ from typing import Final
 
 from fsw.link.signing.signing import Signing
 from fsw.link.text_limiter import TextLimiter
-from fsw.link.wire import encode_replies, message_ids
+from fsw.link.wire import message_ids
 from fsw.link.wire.message_ids import AUTOPILOT, PANDION, SYSTEM_ID
 from fsw.link.wire.outgoing import Outgoing, ServiceOutput, WireValues
 from fsw.signals import StatusText
+from messages import status_text
 from messages.frames import FrameWriter
 
 _MAX_DATAGRAM: Final = 1400  # bytes, fits an Ethernet packet
@@ -82,7 +83,7 @@ class Outbox:
     def _add_text(self, text: StatusText) -> None:
         """In as many STATUSTEXT as it needs."""
         self._text_id = self._text_id % 0xFFFF + 1
-        for values in encode_replies.status_texts(text, self._text_id):
+        for values in status_text.pieces(text.text, text.severity, self._text_id):
             self.add(AUTOPILOT, message_ids.STATUSTEXT, values)
 
     def is_own(self, system: int, component: int) -> bool:

@@ -297,7 +297,7 @@ class SimLink:
         self._acks.clear()
         for text in outputs.texts:
             self._text_id = self._text_id % 0xFFFF + 1
-            for values in encode_replies.status_texts(text, self._text_id):
+            for values in status_text.pieces(text.text, text.severity, self._text_id):
                 frames.append(self._writer.frame(message_ids.STATUSTEXT, *values))
         return frames
 

@@ -36,7 +36,7 @@ class RunFiles:
         """Report what went wrong since the last call; cheap."""
         for file in self._files():
             if file.failure is not None:
-                self._report(f"{file.path.name} ends early: {file.failure}")
+                self._report(_ends_early(file))
             elif file.dropped:
                 self._report(f"{file.path.name} has gaps: the disk does not keep up")
 
@@ -44,7 +44,7 @@ class RunFiles:
         """What is wrong with the files now, in a sentence; empty: they are written."""
         for file in self._files():
             if file.failure is not None:
-                return f"{file.path.name} ends early: {file.failure}"
+                return _ends_early(file)
         before, self._dropped = self._dropped, sum(file.dropped for file in self._files())
         return "the log has gaps: the disk does not keep up" if self._dropped > before else ""
 
@@ -87,3 +87,7 @@ class RunFiles:
         if sentence not in self._reported:
             self._reported.add(sentence)
             self._warn(sentence)
+
+
+def _ends_early(file: BlockFile) -> str:
+    return f"{file.path.name} ends early: {file.failure}"

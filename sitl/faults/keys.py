@@ -78,7 +78,7 @@ class Fault:
 
     @property
     def of_real_time(self) -> bool:
-        """Whether it means nothing in lockstep, where nobody is late and the planner is inline."""
+        """Whether it means nothing in lockstep: no datagram is late, and the planner is inline."""
         return self.unit == "planner" or (self.unit in LINKS and self.kind == "delayed")
 
     def __str__(self) -> str:

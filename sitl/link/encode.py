@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from messages import status_text
 from messages.frames import FrameWriter
 from messages.lockstep_codec import LockstepFrame
 from sitl.earth import DEFAULT_ORIGIN, Place
@@ -35,7 +36,6 @@ _MAVLINK_VERSION: Final = 3
 _UNKNOWN_CELL, _UNKNOWN_WARMTH = 0xFFFF, 0x7FFF  # of BATTERY_STATUS
 _FOR_EVERYTHING, _LIPO = 1, 1  # MAV_BATTERY_FUNCTION, MAV_BATTERY_TYPE
 _WARNING: Final = 4  # MAV_SEVERITY
-_TEXT_SIZE: Final = 50  # bytes in one STATUSTEXT
 # An unknown covariance is a NaN in its first entry.
 _NO_COVARIANCE: Final = (math.nan, *(0.0,) * 20)
 _ODOMETRY_TAIL: Final = (
@@ -114,18 +114,12 @@ class StepEncoder:
         return self._sensors.frame(message_ids.HEARTBEAT, *values)
 
     def answer(self, asked: Injection, answer: Answer) -> bytes:
-        """COMMAND_ACK for who asked for a fault, and the sentence for the operator."""
+        """COMMAND_ACK to the one that asked for a fault, and the sentence for the operator."""
         ack = (message_ids.CMD_INJECT_FAILURE, answer.result, 0, 0, asked.system, asked.component)
-        text = answer.sentence.encode("utf-8")[: 3 * _TEXT_SIZE]
         self._text_id = self._text_id % 0xFFFF + 1
-        pieces = [
-            self._sensors.frame(
-                message_ids.STATUSTEXT,
-                *(_WARNING, text[at : at + _TEXT_SIZE], self._text_id, at // _TEXT_SIZE),
-            )
-            for at in range(0, len(text), _TEXT_SIZE)
-        ]
-        return self._sensors.frame(message_ids.COMMAND_ACK, *ack) + b"".join(pieces)
+        texts = status_text.pieces(answer.sentence, _WARNING, self._text_id)
+        frames = (self._sensors.frame(message_ids.STATUSTEXT, *values) for values in texts)
+        return self._sensors.frame(message_ids.COMMAND_ACK, *ack) + b"".join(frames)
 
     def battery(self, volts: float, share: float) -> bytes:
         """BATTERY_STATUS of a pack at ``volts`` [V] with a ``share`` [1] of its charge."""

@@ -20,7 +20,16 @@ _SPEC.loader.exec_module(rules)
 
 _FILES = sorted(
     path
-    for top in ("benchmarks", "command_line", "fsw", "messages", "pandion", "sitl", "studies")
+    for top in (
+        "benchmarks",
+        "command_line",
+        "fsw",
+        "messages",
+        "pandion",
+        "sitl",
+        "studies",
+        "view",
+    )
     for path in (_ROOT / top).rglob("*.py")
     if path.name != "dialect.py"
 )

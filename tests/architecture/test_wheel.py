@@ -8,7 +8,7 @@ from zipfile import ZipFile
 import pytest
 
 ROOT = Path(__file__).parents[2]
-PACKAGES = ("pandion", "fsw", "sitl", "messages", "command_line", "studies")
+PACKAGES = ("pandion", "fsw", "sitl", "messages", "command_line", "studies", "view")
 
 
 @pytest.fixture(scope="module")

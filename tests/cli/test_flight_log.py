@@ -141,6 +141,7 @@ def test_without_verify_replay_shows_what_is_there(log: Path, tmp_path: Path) ->
         assert word in done.stdout
 
 
+@pytest.mark.long
 def test_a_flight_killed_in_real_time_is_readable_and_replays(tmp_path: Path) -> None:
     gcs = f"--gcs=udp:127.0.0.1:{free_port()}"
     flight = start(

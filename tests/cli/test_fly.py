@@ -131,7 +131,7 @@ def test_the_verdict_is_told_and_the_files_are_there(lockstep: Flight) -> None:
     assert json.loads((lockstep.directory / "result.json").read_text()) == lockstep.result
 
 
-@pytest.mark.parametrize("mode", ["lockstep", "realtime"])
+@pytest.mark.parametrize("mode", ["lockstep", pytest.param("realtime", marks=pytest.mark.long)])
 def test_a_listener_hears_every_stream_at_its_rate(
     mode: str, request: pytest.FixtureRequest
 ) -> None:

@@ -14,6 +14,7 @@ PINNED = {
     "END_EFFECTOR_TARGET": (60202, 57, 239),
     "BARRIER_MARGIN": (60203, 223, 183),
     "MPC_STATUS": (60204, 53, 216),
+    "MPC_HORIZON": (60205, 237, 234),
     "LOOP_TIMING": (60206, 49, 31),
     "OBSTACLE_WALL": (60207, 24, 28),
     "WORKSPACE_SPHERE": (60208, 18, 197),
@@ -122,7 +123,8 @@ def test_every_field_with_a_dimension_states_its_unit():
         *("missed_deadlines", "fallbacks", "cost", "slack_max", "sqp_iterations"),
         *("solver_iterations", "ticks", "late_ticks", "skipped_ticks"),
         *("target_system", "target_component", "accepted", "refused", "numbers"),
-        *("breaches", "departures", "interventions"),
+        *("breaches", "departures", "interventions", "steps"),
+        *("start", "inputs"),  # of several dimensions, each with its unit in the description
     }
     for message in ET.parse(DEFINITION).iter("message"):
         for field in message.iter("field"):

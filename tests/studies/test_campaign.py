@@ -15,7 +15,6 @@ from typing import Any, cast
 import pytest
 
 from fsw.parameters.flight_config import FlightConfig
-from studies import campaign as campaign_module
 from studies.campaign import Campaign
 from studies.cases import configuration, scenario
 from studies.job import Job, Outcome
@@ -32,7 +31,7 @@ def test_equal_jobs_are_flown_once_and_answered_each(monkeypatch: pytest.MonkeyP
         flown.append(job.seed)
         return Outcome(job.seed, completed=True, reason="")
 
-    monkeypatch.setattr(campaign_module, "outcome", count)
+    monkeypatch.setattr(Job, "row", count)
     received: list[tuple[int, int]] = []
     rows = Campaign(0, report=lambda done, total: received.append((done, total))).run(JOBS)
     assert flown == [1, 2]
@@ -53,7 +52,7 @@ def test_a_journal_resumes_and_survives_a_line_cut_short(
         flown.append(job.seed)
         return Outcome(job.seed, completed=False, reason="")
 
-    monkeypatch.setattr(campaign_module, "outcome", count)
+    monkeypatch.setattr(Job, "row", count)
     rows = Campaign(0, journal).run(JOBS)
     assert flown == [2]
     assert rows[0] == first[0]

@@ -12,7 +12,7 @@ from fsw.parameters.flight_config import flight_config
 from fsw.signals import PlanInput
 from studies import closed_loop
 from studies.cases import configuration, scenario
-from studies.job import Job, fly_job, outcome
+from studies.job import Job, fly_job
 
 BRIEF = 2.0  # s
 
@@ -87,7 +87,7 @@ def test_a_flight_that_cannot_start_is_a_row() -> None:
     flown = scenario("II", disturbed=True, duration_s=1.0)
     assert flown.workspace is not None
     impossible = replace(flown, workspace=replace(flown.workspace, d_iw_m=1.0))
-    row = outcome(Job("double-integrator", impossible, configuration("double-integrator"), 7))
+    row = Job("double-integrator", impossible, configuration("double-integrator"), 7).row()
     assert row.error
     assert not row.completed
     assert row.seed == 7

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from fsw.flight.modes import MODES
-from fsw.signals import Mode
+from fsw.signals import Mode, Severity
 from pandion.faults import main
 from sitl.faults.keys import KINDS
 from studies.fault_expectations import (
@@ -18,11 +18,13 @@ from studies.fault_expectations import (
     differences,
     expectations,
 )
-from studies.fault_flights import SITUATIONS, FaultFlight, fly
-from studies.fault_matrix import Cell, fly_cell, judge
+from studies.fault_flights import SITUATIONS, FaultFlight, Said, fly
+from studies.fault_matrix import Cell, judge
 from studies.fault_page import page
 
-FINE = FaultFlight(0.2, "told", ("land",), "", "", 0.1, ())
+TOLD = Said(0.2, int(Severity.WARNING), "told")
+LATE = replace(TOLD, after_s=0.6)
+FINE = FaultFlight((TOLD,), ("land",), least_m=0.1)
 LAND_SOON = Expectation(then=("land",), told_within_s=0.5)
 
 
@@ -45,20 +47,23 @@ def test_contact_is_never_allowed_without_a_reason() -> None:
     ("flight", "differs"),
     [
         (FINE, ()),
-        (replace(FINE, told_s=None), ("silent",)),
-        (replace(FINE, told_s=0.6), ("told after 0.60 s, not within 0.5 s",)),
+        (replace(FINE, texts=()), ("silent",)),
+        (
+            replace(FINE, texts=(LATE,)),
+            ("told after 0.60 s, not within 0.5 s",),
+        ),
         (replace(FINE, actions=()), ("goes on; must be land",)),
         (replace(FINE, actions=("hold", "land")), ("hold, then land; must be land",)),
         (replace(FINE, contact="ground", ended="it fell"), ("it fell",)),
-        (replace(FINE, problem="no flight", told_s=None), ("no flight",)),
+        (replace(FINE, problem="no flight", texts=()), ("no flight",)),
     ],
 )
 def test_what_is_not_as_it_must_be_is_named(flight: FaultFlight, differs: tuple[str, ...]) -> None:
-    assert differences("orbit", LAND_SOON, asdict(flight)) == differs
+    assert differences("orbit", LAND_SOON, flight) == differs
 
 
 def test_a_vehicle_that_holds_or_lands_already_goes_on() -> None:
-    going_on = asdict(replace(FINE, actions=()))
+    going_on = replace(FINE, actions=())
     hold = replace(LAND_SOON, then=("hold",))
     assert not differences("hold", hold, going_on)
     assert not differences("land", LAND_SOON, going_on)
@@ -67,8 +72,8 @@ def test_a_vehicle_that_holds_or_lands_already_goes_on() -> None:
 
 def test_contact_with_the_ground_is_not_contact_with_a_wall() -> None:
     falls = replace(LAND_SOON, contact="ground", why="it cannot be helped at all")
-    assert not differences("orbit", falls, asdict(replace(FINE, contact="ground", ended="fell")))
-    assert differences("orbit", falls, asdict(replace(FINE, contact="wall", ended="hit")))
+    assert not differences("orbit", falls, replace(FINE, contact="ground", ended="fell"))
+    assert differences("orbit", falls, replace(FINE, contact="wall", ended="hit"))
 
 
 @pytest.mark.parametrize(
@@ -105,13 +110,14 @@ def test_a_file_that_says_something_else_is_refused(
 
 def test_a_cell_is_flown_judged_and_written_down() -> None:
     cell = Cell("land", expectations()["vio-off"], 0)
-    judged = fly_cell(cell)
+    judged = judge(cell, cell.row())
+    warning = judged.flight.warning
     assert judged.flight.problem == ""
-    assert judged.flight.told_s is not None
-    assert judged.flight.told_s < 0.5
+    assert warning is not None
+    assert warning.after_s < 0.5
     row = json.loads(json.dumps(judged.as_json(), allow_nan=False))
-    assert (row["fault"], row["mode"], row["told_s"]) == ("vio-off", "land", judged.flight.told_s)
-    written = page([judged, judge(cell, replace(FINE, told_s=None))], ("seed 0",))
+    assert (row["fault"], row["mode"], row["told_s"]) == ("vio-off", "land", warning.after_s)
+    written = page([judged, judge(cell, replace(FINE, texts=()))], ("seed 0",))
     assert "vio-off" in written
     assert "silent" in written
 
@@ -120,7 +126,7 @@ def test_a_cell_is_flown_judged_and_written_down() -> None:
 @pytest.mark.parametrize("mode", SITUATIONS)
 def test_without_a_fault_nothing_is_told_and_nothing_done(mode: str) -> None:
     flight = fly(mode, None)
-    assert (flight.told_s, flight.actions, flight.contact, flight.problem) == (None, (), "", "")
+    assert (flight.warning, flight.actions, flight.contact, flight.problem) == (None, (), "", "")
     assert flight.least_m is not None
     assert flight.least_m > 0.0
 
@@ -141,6 +147,7 @@ def test_a_fault_over_the_real_link_is_seen_by_the_station(tmp_path: Path) -> No
         (["hold", "vio-of"], "did you mean vio-off"),
         (["hold"], "give MODE and FAULT, or --matrix"),
         ([], "give MODE and FAULT, or --matrix"),
+        (["hold", "vio-off", "--only", "vio"], "--only chooses cells of the matrix"),
         (["--matrix", "--only", "nothing like it"], "no fault and no mode contains"),
         (["hold", "vio-off", "--expect", "no/such.toml"], "no/such.toml"),
     ],
@@ -152,3 +159,26 @@ def test_what_cannot_be_flown_is_refused_in_a_sentence(
     said = capsys.readouterr().err
     assert sentence in said
     assert said.count("\n") == 1
+
+
+def test_a_matrix_is_resumed_from_its_journal_and_judged_anew(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    flown = []
+
+    def count(cell: Cell) -> FaultFlight:
+        flown.append(cell.mode)
+        return FINE
+
+    monkeypatch.setattr(Cell, "row", count)
+    journal, found = str(tmp_path / "flown.jsonl"), tmp_path / "cells.json"
+    words = ["land", "vio-off", "--journal", journal, "--json", str(found)]
+    assert main(words) == 0
+    first = json.loads(found.read_text())
+    assert main(words) == 0
+    assert (flown, json.loads(found.read_text())) == (["land"], first)
+    strict = tmp_path / "strict.toml"
+    strict.write_text('[[faults]]\nunits = ["vio"]\nkinds = ["off"]\nthen = ["terminate"]\n')
+    assert main([*words, "--expect", str(strict)]) == 1
+    assert "land; must be terminate" in capsys.readouterr().out
+    assert flown == ["land"]

@@ -19,7 +19,7 @@ from sitl.simulation import START_US, STEP_US
 from studies import robustness
 from studies.campaign import Campaign
 from studies.faults import Fault, FaultKind, FaultySensors
-from studies.job import Job, Outcome, outcome
+from studies.job import Job, Outcome
 from studies.robustness import CHANGES, SCENARIOS, cells, chosen, config_of
 from studies.settings import NoCellError, Settings
 
@@ -297,7 +297,7 @@ def test_rows_are_chosen_by_suite_and_by_name() -> None:
 def test_a_frozen_imu_is_flown_named_and_ends_the_trajectory() -> None:
     settings = Settings(suite="mocap", only="IMU frozen", seeds=range(30, 31), duration_s=6.0)
     (cell,) = chosen(settings)
-    row = outcome(Job("full", cell.flown, config_of(cell, settings), 30, cell.fault))
+    row = Job("full", cell.flown, config_of(cell, settings), 30, cell.fault).row()
     assert not row.error
     assert (row.contact, row.completed, row.modes) == (False, False, "hold")
     assert "left the trajectory for hold" in row.reason

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from typing import Final
 
 from fsw.link.events.event_table import Event, arming_events, failsafe_event
+from fsw.link.text_limiter import REPEAT_US
 from fsw.signals import ArmingReport, Order, Severity, TickInputs, TickOutputs
 
 _KEPT: Final = 64  # events; a client that missed more is told so
-_BETWEEN_US: Final = 2_000_000  # two reports of the arming checks that nobody asked for
-_AGAIN_US: Final = 5_000_000  # as the texts of a link
+_BETWEEN_US: Final = 2_000_000  # two reports of the arming checks that no client asked for
 _SEQUENCE: Final = 0x10000
 
 
@@ -69,10 +69,10 @@ class EventLog:
         return self._kept[0].sequence if self._kept else self.newest
 
     def _add_failsafe(self, event: Event, t_us: int) -> None:
-        """Add it unless it is of no weight and has just been: some conditions come and go."""
+        """Add it, a minor one once in a while only: some conditions come and go."""
         last_us = self._lately.get(event)
         if event.severity > Severity.CRITICAL:
-            if last_us is not None and t_us - last_us < _AGAIN_US:
+            if last_us is not None and t_us - last_us < REPEAT_US:
                 return
             self._lately[event] = t_us
         self._add(event, t_us)

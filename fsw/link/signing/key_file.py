@@ -87,7 +87,10 @@ class KeyFile:
         self._open = (handle, len(text))
 
     def keep(self, newest: int) -> None:
-        """Keep the ``newest`` signing time [10 us] of the key that was read or written last."""
+        """Keep the ``newest`` signing time [10 us] in the file, in place; a disk error is ignored.
+
+        The file must stay open since it was read or written: a tick may call this.
+        """
         if self._open is not None:
             handle, end = self._open
             with contextlib.suppress(OSError):

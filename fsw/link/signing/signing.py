@@ -112,10 +112,9 @@ class Signing:
             OSError: The key cannot be stored; nothing has changed.
         """
         new = key if any(key) else b""
-        newest = max(self._senders.values(), default=self._oldest)
         if self._file is not None:
             if new:
-                self._file.write(SigningKey(new, newest))
+                self._file.write(SigningKey(new, self._newest()))
             else:
                 self._file.remove()
         if new != self._key:  # frames under the same key must not be played again
@@ -139,10 +138,13 @@ class Signing:
         if not last < time <= now + _TOLERANCE:
             return False
         # Kept before the frame does anything: a process that is killed leaves it to the next one.
-        if self._file is not None and time > max(self._senders.values(), default=self._oldest):
+        if self._file is not None and time > self._newest():
             self._file.keep(time)
         self._senders[sender] = time
         return True
+
+    def _newest(self) -> int:
+        return max(self._senders.values(), default=self._oldest)
 
     def _hash(self, covered: bytes) -> bytes:
         return sha256(self._key + covered).digest()[:_HASH_SIZE]

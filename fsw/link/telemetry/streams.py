@@ -85,6 +85,7 @@ STREAMS: Final = (
     ),
     # Behind the others, whose places decide when each is sent.
     Stream(message_ids.GPS_RAW_INT, 1, 5, AUTOPILOT, encode_place.gps_raw),
+    Stream(message_ids.MPC_HORIZON, 0, 0, PANDION, encode_dialect.mpc_horizon),
 )
 
 # These leave at once when mode, arming, landing or health change.
@@ -94,6 +95,7 @@ AT_ONCE: Final = (HEARTBEAT, _CURRENT_MODE, _EXTENDED_STATE)
 ON_REQUEST: Final[dict[int, Answerer]] = {
     message_ids.AVAILABLE_MODES: encode_identity.available_modes,
     message_ids.COMPONENT_METADATA: component_metadata,
+    message_ids.OBSTACLE_SHAPE: encode_dialect.safe_set_shapes,
 }
 
 GROUND_RATES: Final = tuple(stream.ground_hz for stream in STREAMS)

@@ -10,17 +10,21 @@ import math
 from collections.abc import Callable
 from typing import Final
 
+from fsw.link.wire import message_ids
 from fsw.link.wire.encode_standard import as_asked
-from fsw.link.wire.outgoing import WireValues
+from fsw.link.wire.outgoing import Outgoing, WireValues
 from fsw.link.wire.telemetry_context import TelemetryContext
 from fsw.model.kinematics import point_in_flight
 from fsw.ports import GroupTiming
+from fsw.shapes import kind_of
 from fsw.signals import FlightSnapshot, SetpointKind, Vec2, Vec4
 
 _LOCAL_NED: Final = 1  # MAV_FRAME
 _MAX_CONSTRAINTS: Final = 16
 _U16: Final = 0xFFFF
 _U32: Final = 0xFFFFFFFF
+_HORIZON_STEPS: Final = 6  # of an MPC_HORIZON
+_SHAPE_NUMBERS: Final = 16  # of an OBSTACLE_SHAPE
 _RATE_GROUPS: Final = ("inner", "mpc", "telemetry", "housekeeping")  # of LoopHealth
 
 
@@ -125,6 +129,40 @@ def mpc_status(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValue
         plan.solver_iterations & 0xFF,
         int(snapshot.plan_status),
     )
+
+
+def mpc_horizon(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues | None:
+    """MPC_HORIZON of the plan in use; of a long one the first steps."""
+    plan = snapshot.plan
+    if plan is None or snapshot.plan_state is None:
+        return None
+    x, steps = plan.start, plan.inputs[:_HORIZON_STEPS]
+    start = (*x.p, *x.v, *x.a, *x.j, *x.s, x.yaw, x.yaw_rate, *x.q_arm, *x.qd_arm)
+    inputs = tuple(value for u in steps for value in (*u.a, u.yaw_acc, *u.qdd_arm))
+    filled = _padded(inputs, 6 * _HORIZON_STEPS)
+    return (plan.t_us, *start, *filled, plan.plan_id & _U32, plan.period_us, len(steps))
+
+
+def safe_set_shapes(which: float, snapshot: FlightSnapshot, _: TelemetryContext) -> list[Outgoing]:
+    """OBSTACLE_SHAPE of the safe set in force: all, or the one of number ``which`` [1], from 1."""
+    zones = snapshot.safe_set.zones
+    if not zones:
+        nothing = (0, *(0.0,) * (4 + _SHAPE_NUMBERS), 0, 0, 0, 0, 0, 0)
+        return [Outgoing(message_ids.OBSTACLE_SHAPE, nothing, message_ids.PANDION)]
+    every = not which >= 1.0  # NaN and 0 ask for all
+    return [
+        Outgoing(
+            message_ids.OBSTACLE_SHAPE,
+            (
+                *(zone.t_us, zone.clearance, *zone.velocity),
+                *_padded(zone.shape.numbers, _SHAPE_NUMBERS),
+                *(0, 0, index, len(zones), kind_of(zone.shape).number, int(zone.keep_in)),
+            ),
+            message_ids.PANDION,
+        )
+        for index, zone in enumerate(zones)
+        if every or index + 1 == which
+    ]
 
 
 def loop_timing(group: int) -> Callable[[FlightSnapshot, TelemetryContext], WireValues]:

@@ -5,32 +5,16 @@ from __future__ import annotations
 from typing import Final
 
 from fsw.link.wire.outgoing import WireValues
-from fsw.signals import ActuatorCommand, CommandAck, StatusText
+from fsw.signals import ActuatorCommand, CommandAck
 
 _ARMED: Final = 128  # MAV_MODE_FLAG
 _CUSTOM_MODE: Final = 1
 _LOCKSTEP: Final = 1  # HIL_ACTUATOR_CONTROLS_FLAGS
-_TEXT_SIZE: Final = 50  # bytes in one STATUSTEXT
 
 
 def command_ack(ack: CommandAck) -> WireValues:
     """COMMAND_ACK: no progress, no detail."""
     return (ack.command, ack.result, 0, 0, ack.target_system, ack.target_component)
-
-
-def status_texts(text: StatusText, text_id: int) -> list[WireValues]:
-    """STATUSTEXT messages for one sentence, cut into pieces of 50 bytes.
-
-    The id, 1..65535, is the same for all pieces, so that the receiver joins them.
-    """
-    whole = text.text.encode("utf-8")
-    if len(whole) <= _TEXT_SIZE:
-        return [(text.severity, whole, 0, 0)]
-    starts = range(0, min(len(whole), 255 * _TEXT_SIZE), _TEXT_SIZE)
-    return [
-        (text.severity, whole[start : start + _TEXT_SIZE], text_id, number)
-        for number, start in enumerate(starts)
-    ]
 
 
 def hil_actuator_controls(

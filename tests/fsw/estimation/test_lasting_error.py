@@ -9,11 +9,13 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from fsw.estimation.drift import FrameDrift
+from fsw.estimation.error_state import ERRORS
 from fsw.estimation.lasting_error import lasting_error
 from fsw.estimation.sensor_fusion import FusionMemory, at_start
 from fsw.estimation.tuning import EstimatorTuning
+from fsw.estimation.turned_covariance import Vec6
+from fsw.flight.uncertain_clearance import pose_covariance
 from fsw.measurements import GnssSample, PoseSample
-from fsw.signals import StateEstimate, Vec3
 from tests.fsw.random_states import estimate_of
 
 TUNING = EstimatorTuning()
@@ -26,34 +28,31 @@ def memory(*, drifts: bool = False) -> FusionMemory:
     return at_start()._replace(pose=pose)
 
 
-def at(p: Vec3, turn: Rotation | None = None) -> StateEstimate:
-    return estimate_of(turn or Rotation.identity(), p_WB=p)
-
-
-def deviations(found: np.ndarray) -> list[float]:
-    return [math.sqrt(value) for value in np.diag(found)]
+def deviations(found: Vec6) -> list[float]:
+    return [math.sqrt(value) for value in found]
 
 
 def test_a_whole_readings_error_lasts() -> None:
-    found = lasting_error(memory(), TUNING, at((1.0, 2.0, -1.0)))
+    found = lasting_error(memory(), TUNING)
     assert deviations(found) == pytest.approx([0.003, 0.004, 0.005, 0.01, 0.02, 0.03])
 
 
 def test_the_attitudes_error_is_turned_from_the_bodys_axes() -> None:
-    quarter = Rotation.from_euler("z", 90.0, degrees=True)
-    found = lasting_error(memory(), TUNING, at((0.0, 0.0, 0.0), quarter))
-    assert deviations(found)[3:] == pytest.approx([0.02, 0.01, 0.03])
+    quarter = estimate_of(Rotation.from_euler("z", 90.0, degrees=True))
+    none = np.zeros((ERRORS, ERRORS))
+    found = pose_covariance(none, quarter, lasting_error(memory(), TUNING))
+    assert np.sqrt(np.diag(found))[3:] == pytest.approx([0.02, 0.01, 0.03])
 
 
 def test_of_odometry_only_its_noise_counts_for_its_drift_is_in_the_covariance() -> None:
     noise = FrameDrift(place_noise=(1e-6, 4e-6, 9e-6), attitude_noise=(16e-6, 25e-6, 36e-6))
-    found = lasting_error(memory(drifts=True)._replace(frame=noise), TUNING, at((1.0, 2.0, -1.0)))
+    found = lasting_error(memory(drifts=True)._replace(frame=noise), TUNING)
     assert deviations(found) == pytest.approx([0.001, 0.002, 0.003, 0.004, 0.005, 0.006])
 
 
 def test_without_a_pose_satellites_count_and_without_both_nothing() -> None:
     fix = GnssSample(1.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (1e-5, 1e-5, 0.05**2), FINE)
-    found = lasting_error(at_start()._replace(gnss=fix), TUNING, at((0.0, 0.0, 0.0)))
+    found = lasting_error(at_start()._replace(gnss=fix), TUNING)
     least = TUNING.gnss_position_floor
     assert deviations(found) == pytest.approx([least, least, 0.05, 0.0, 0.0, 0.0])
-    assert not lasting_error(at_start(), TUNING, at((0.0, 0.0, 0.0))).any()
+    assert not any(lasting_error(at_start(), TUNING))

@@ -24,9 +24,8 @@ from fsw.signals import (
     OffboardReport,
     SetpointKind,
     Severity,
-    StatusText,
 )
-from messages import dialect
+from messages import dialect, status_text
 from messages.frames import FrameWriter
 from tests.fsw.link.snapshots import ACTUATORS, CONTEXT, SNAPSHOT
 
@@ -123,6 +122,10 @@ TELLING: dict[int, dict[str, Any]] = {
         "plan_id": 7, "total_us": 703, "linearise_us": 101, "solve_us": 502, "budget_us": 10_000,
         "missed_deadlines": 1, "fallbacks": 2, "cost": 12.5, "horizon": 5, "rate_hz": 10,
         "sqp_iterations": 2, "solver_iterations": 19, "solver_status": 4,
+    },
+    ids.MPC_HORIZON: {
+        "time_usec": 3_000_000, "start": [0.0, 0.0, -1.0, *[0.0] * 16], "inputs": [0.0] * 36,
+        "plan_id": 7, "period_us": 100_000, "steps": 0,
     },
     ids.LOOP_TIMING: {"ticks": 5000, "late_ticks": 3, "skipped_ticks": 1, "lateness_p99_us": 90.0},
 }  # fmt: skip
@@ -238,6 +241,7 @@ def test_there_is_nothing_to_say_before_the_first_plan() -> None:
         ids.ARM_JOINT_SETPOINT,
         ids.END_EFFECTOR_TARGET,
         ids.MPC_STATUS,
+        ids.MPC_HORIZON,
     ):
         assert stream_of(message_id).encode(idle, CONTEXT) is None
 
@@ -255,14 +259,11 @@ def test_a_long_text_is_cut_into_numbered_pieces() -> None:
     sentence = "arming refused: " + "ä" * 60
     pieces = [
         decoded(FrameWriter(1, 1).frame(ids.STATUSTEXT, *values))
-        for values in encode_replies.status_texts(StatusText(Severity.WARNING, sentence), 9)
+        for values in status_text.pieces(sentence, Severity.WARNING, 9)
     ]
     assert [piece.chunk_seq for piece in pieces] == list(range(len(pieces)))
     assert {piece.id for piece in pieces} == {9}
-    whole = b"".join(
-        values[1]
-        for values in encode_replies.status_texts(StatusText(Severity.WARNING, sentence), 9)
-    )
+    whole = b"".join(values[1] for values in status_text.pieces(sentence, Severity.WARNING, 9))
     assert whole.decode() == sentence
 
 

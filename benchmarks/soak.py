@@ -1,0 +1,237 @@
+"""``python -m benchmarks soak``: an hour in real time with random failures and a busy client.
+
+Memory, handles and threads of every process must stay what they were, and every command must be
+answered in time. Where a failure ends the flight, the next one begins, and the end is reported.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import tempfile
+import threading
+import time
+from collections import defaultdict
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from pymavlink import mavutil
+
+from benchmarks.flood import Requirement
+from benchmarks.machine_watch import descendants, version_and_machine
+from benchmarks.soak_client import ANSWER_S, COMPONENT, SYSTEM, Client
+from command_line.options import json_file, option, read
+from command_line.output import complain, console_beside, json_text, write_text
+from command_line.values import number, whole
+from pandion.display import Display
+from pandion.supervisor import Flown, ProcessFailed, Supervisor
+
+PASSED, NOT_PASSED = 0, 1  # exit codes
+_GLANCE_S: Final = 5.0
+_SETTLED_S: Final = 120.0  # from here on nothing may grow
+_LEAST_GLANCES: Final = 24  # two minutes, to say anything
+_MOST_GROWTH_MB_H: Final = 10.0
+_MOST_FLIGHTS: Final = 3  # an hour: what is injected should not end them
+_RECORDED: Final = ["COMMAND_LONG", "COMMAND_INT", "COMMAND_ACK"]
+_PARAMETERS: Final = "# Pandion\n1\t1\tSYS_FAILURE_EN\t1\t6\n"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SoakOptions:
+    """One measurement."""
+
+    json: str | None = json_file("the figures")
+    minutes: float = option("--minutes M", "of flight", number(0.2, 10_000.0, "min"), default=60.0)
+    seed: int = option("--seed N", "root of all choices", whole(), default=0)
+    sensors: str = option("--sensors SUITE", "of the vehicle", default="mocap")
+
+
+class Glance(NamedTuple):
+    """What a process uses at one moment."""
+
+    at_s: float
+    resident_mb: float
+    handles: int
+    threads: int
+
+
+@dataclass
+class Used:
+    """What the processes of one flight have used, by process and time."""
+
+    glances: dict[str, list[Glance]] = field(default_factory=dict)
+    _done: threading.Event = field(default_factory=threading.Event)
+
+    def watch(self, root: int) -> None:
+        """Look at all processes below ``root`` until :meth:`stop`."""
+        begin_s = time.monotonic()
+        while not self._done.wait(_GLANCE_S):
+            for process in descendants(root):
+                with contextlib.suppress(OSError, ValueError, IndexError):
+                    name, glance = _glance(process, time.monotonic() - begin_s)
+                    self.glances.setdefault(f"{name} {process}", []).append(glance)
+
+    def stop(self) -> None:
+        """End :meth:`watch`."""
+        self._done.set()
+
+
+@dataclass(frozen=True, slots=True)
+class Soaked:
+    """One flight: what the client heard, what the vehicle recorded, what was used."""
+
+    heard: dict[str, Any]
+    dropped: int  # datagrams at the client's own socket
+    read: int  # commands of the client that the vehicle recorded
+    written: int  # its answers to them
+    glances: dict[str, list[Glance]]
+    ended: str
+    flown_s: float
+
+
+def main(argv: list[str]) -> int:
+    """Measure and judge; returns the exit code."""
+    what = "Fly for an hour in real time with random failures and a busy client."
+    options = read(SoakOptions, "python -m benchmarks soak", what, argv)
+    console = console_beside(options.json)
+    print(version_and_machine(), file=console)
+    display = Display(console)
+    flights: list[Soaked] = []
+    ends_s = time.monotonic() + 60.0 * options.minutes
+    try:
+        while (left_s := ends_s - time.monotonic()) > _GLANCE_S:
+            one = fly(options, len(flights), left_s, display)
+            flights.append(one)
+            display.say(f"flight {len(flights)}: {one.flown_s:.0f} s, {one.ended}")
+    except ProcessFailed as error:
+        complain("python -m benchmarks soak", error)
+        return error.exit_code
+    rows = judge(flights)
+    for row in rows:
+        mark = "pass" if row.passed else "FAIL"
+        text = f"{row.name:44} {row.measured:10.4g} <= {row.bound:<8.4g} {row.unit:4} {mark}"
+        print(text, file=console)
+    figures = {
+        "rows": [asdict(row) | {"pass": row.passed} for row in rows],
+        "flights": [asdict(one) for one in flights],
+    }
+    write_text(options.json, json_text(figures, 1) + "\n")
+    return PASSED if all(row.passed for row in rows) else NOT_PASSED
+
+
+def fly(options: SoakOptions, flight: int, left_s: float, display: Display) -> Soaked:
+    """One flight, until the time is over or the vehicle is.
+
+    Raises:
+        ProcessFailed: There was no flight.
+    """
+    with tempfile.TemporaryDirectory(prefix="pandion-soak-") as folder:
+        out, client, used = Path(folder), Client(1000 * options.seed + flight), Used()
+        parameters = out / "soak.params"
+        parameters.write_text(_PARAMETERS, encoding="ascii")
+        watch = threading.Thread(target=used.watch, args=(os.getpid(),), daemon=True)
+        watch.start()
+        client.start()
+        sitl = ["ground", "--realtime", f"--duration={left_s!r}", f"--seed={flight}"]
+        sitl += [f"--sensors={options.sensors}", "--listen=udp:127.0.0.1:0", "--wait=600"]
+        try:
+            flown = Supervisor(display, out).run(
+                [*sitl, f"--out={out}"],
+                lambda port: [
+                    f"--sim=udp:127.0.0.1:{port}",
+                    *(f"--gcs=udp:127.0.0.1:{client.port}", "--api=none", f"--keys={out}"),
+                    *("--wait=600", f"--params={parameters}", "--body=full", f"--out={out}"),
+                ],
+            )
+        finally:
+            used.stop()
+            dropped = client.dropped
+            client.close()
+            watch.join()
+        if flown.interrupted or flown.sitl is None:
+            raise ProcessFailed(flown.failure or "interrupted", exit_code=NOT_PASSED)
+        asked, answered = recorded(out / "flight.tlog")
+    return Soaked(
+        heard=asdict(client.heard),
+        dropped=dropped or 0,
+        read=asked,
+        written=answered,
+        glances=used.glances,
+        ended=_ended(flown),
+        flown_s=float(flown.sitl["duration_s"]),
+    )
+
+
+def judge(flights: list[Soaked]) -> list[Requirement]:
+    """What must hold after all flights."""
+    answers = [wait for one in flights for wait in one.heard["answered_s"]]
+    unanswered = sum(len(one.heard["unanswered"]) for one in flights)
+    lost = sum(one.read - one.written for one in flights)
+    growth: defaultdict[str, float] = defaultdict(float)
+    for one in flights:
+        for name, glances in one.glances.items():
+            for what, value in grown(glances).items():
+                kind = f"{name.split()[0]}: {what}"
+                growth[kind] = max(growth[kind], value)
+    hours = sum(one.flown_s for one in flights) / 3600.0
+    rows = [
+        Requirement("commands without an answer within 1 s", unanswered, 0, ""),
+        Requirement("command to answer, longest", max(answers, default=9.9), ANSWER_S, "s"),
+        Requirement("commands that were read and not answered", lost, 0, ""),
+        Requirement(
+            "parameters without an answer",
+            sum(one.heard["parameters_missing"] for one in flights),
+            0,
+            "",
+        ),
+        Requirement("flights an hour", len(flights) / max(hours, 1.0), _MOST_FLIGHTS, ""),
+    ]
+    for name, value in sorted(growth.items()):
+        most, unit = (_MOST_GROWTH_MB_H, "MB/h") if name.endswith("memory") else (0, "")
+        rows.append(Requirement(f"{name}, growth", value, most, unit))
+    return rows
+
+
+def grown(glances: list[Glance]) -> dict[str, float]:
+    """By what a process has grown since it had settled: memory [MB/h] by a line through it."""
+    settled = [one for one in glances if one.at_s >= glances[0].at_s + _SETTLED_S]
+    if len(settled) < _LEAST_GLANCES:
+        return {}
+    quarter = max(len(settled) // 4, 1)
+    first, last = settled[:quarter], settled[-quarter:]
+    slope = np.polyfit([one.at_s for one in settled], [one.resident_mb for one in settled], 1)[0]
+    return {
+        "memory": 3600.0 * float(slope),
+        "handles": max(one.handles for one in last) - max(one.handles for one in first),
+        "threads": max(one.threads for one in last) - max(one.threads for one in first),
+    }
+
+
+def recorded(tlog: Path) -> tuple[int, int]:
+    """Commands of the client, and answers to it, that the vehicle's own record has."""
+    record: Any = mavutil.mavlogfile(str(tlog))
+    asked = answered = 0
+    while (message := record.recv_match(type=_RECORDED)) is not None:
+        if message.get_type() == "COMMAND_ACK":
+            answered += (message.target_system, message.target_component) == (SYSTEM, COMPONENT)
+        else:
+            asked += (message.get_srcSystem(), message.get_srcComponent()) == (SYSTEM, COMPONENT)
+    return asked, answered
+
+
+def _glance(process: int, at_s: float) -> tuple[str, Glance]:
+    home = Path(f"/proc/{process}")
+    words = (home / "cmdline").read_bytes().split(b"\0")
+    name = next((w.decode() for w in words if w in (b"fsw", b"sitl")), "planner")
+    lines = (line.split(":", 1) for line in (home / "status").read_text().splitlines())
+    status = {one[0]: one[1] for one in lines if len(one) == 2}
+    resident = int(status["VmRSS"].split()[0]) / 1024.0
+    handles = len(list((home / "fd").iterdir()))
+    return name, Glance(round(at_s, 1), round(resident, 2), handles, int(status["Threads"]))
+
+
+def _ended(flown: Flown) -> str:
+    assert flown.sitl is not None
+    return flown.failure or str(flown.sitl["end_reason"])

@@ -1,0 +1,36 @@
+"""A self-contained HTML page: what every page of ours is set in."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Final
+
+_STYLE: Final = Path(__file__).with_suffix(".css")
+
+
+def document(title: str, parts: Iterable[str], style: str = "", head: str = "") -> str:
+    """The page: its title in plain text, its parts and what else its head holds as HTML."""
+    css = _STYLE.read_text(encoding="utf-8") + style
+    body = "\n".join(parts)
+    return (
+        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        f"{head}<title>{html.escape(title)}</title>\n<style>\n{css}</style>\n</head>\n"
+        f"<body>\n{body}\n</body>\n</html>\n"
+    )
+
+
+def items(sentences: Iterable[str]) -> str:
+    """A list of sentences in plain text."""
+    return "<ul>" + "".join(f"<li>{html.escape(line)}</li>" for line in sentences) + "</ul>"
+
+
+def table(headers: Sequence[str], rows: Iterable[Sequence[str]], caption: str = "") -> str:
+    """A table of plain text; ``headers`` may be empty."""
+    named = f"<caption>{html.escape(caption)}</caption>" if caption else ""
+    head = "".join(f"<th>{html.escape(name)}</th>" for name in headers)
+    body = "\n".join(
+        "<tr>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in row) + "</tr>" for row in rows
+    )
+    return f"<table>{named}<thead><tr>{head}</tr></thead>\n<tbody>{body}</tbody></table>"

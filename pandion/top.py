@@ -1,0 +1,46 @@
+"""``pandion top``: a running vehicle's messages, margins and texts in a terminal."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from typing import Final
+
+from command_line.options import option, read
+from command_line.output import complain
+from command_line.parser import COULD_NOT_START
+from fsw.link.udp_endpoint import LinkError, parse_address
+
+LEFT: Final = 0  # exit code
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TopOptions:
+    """One inspector."""
+
+    vehicle: str = option(
+        "--vehicle udp:HOST:PORT",
+        "address on which the vehicle listens",
+        default="udp:127.0.0.1:18570",
+    )
+
+
+def main(argv: list[str]) -> int:
+    """Watch until the user leaves; returns the exit code."""
+    what = "Inspect a running vehicle: rates and fields of its messages, margins, texts."
+    options = read(TopOptions, "pandion top", what, argv)
+    try:
+        vehicle = parse_address(options.vehicle)
+        from view.top.app import TopApp
+        from view.top.peer import TelemetryPeer
+    except LinkError as error:
+        complain("pandion top", error)
+        return COULD_NOT_START
+    except ModuleNotFoundError as error:
+        complain("pandion top", f"the package {error.name} is missing; install pandion[top]")
+        return COULD_NOT_START
+    if not sys.stdout.isatty():
+        complain("pandion top", "needs a terminal; over SSH: ssh -t HOST pandion top")
+        return COULD_NOT_START
+    TopApp(TelemetryPeer(vehicle)).run()
+    return LEFT

@@ -1,0 +1,122 @@
+"""``pandion view``: a flight as a page in a browser, from its log or live."""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+from command_line.options import option, read, switch
+from command_line.output import complain, say
+from command_line.parser import COULD_NOT_START
+from command_line.values import whole
+from pandion.view_beside import PORT
+
+if TYPE_CHECKING:
+    from view.flight import Flight
+
+DONE: Final = 0  # exit code
+VEHICLE: Final = "udp:127.0.0.1:18570"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ViewOptions:
+    """What to show, and where."""
+
+    log: Path | None = option(
+        "LOG", "flight.ulg, flight.tlog or the flight's directory; none: a running vehicle", Path
+    )
+    vehicle: str = option(
+        "--vehicle udp:HOST:PORT", "a running vehicle's link to the ground", default=VEHICLE
+    )
+    port: int = option(
+        "--port N", "of the page; 0: any that is free", whole(0, 65535), default=PORT
+    )
+    host: str = option(
+        "--host ADDRESS", "to serve the page at; 0.0.0.0: to other machines", default="127.0.0.1"
+    )
+    allow_commands: bool = switch(
+        "--allow-commands", "command the vehicle from other machines as well"
+    )
+
+
+def main(argv: list[str]) -> int:
+    """Show until interrupted; returns the exit code."""
+    what = "Show a flight in the browser: a log, or without one a running vehicle."
+    options = read(ViewOptions, "pandion view", what, argv)
+    try:
+        return _show_live(options) if options.log is None else _show_log(options, options.log)
+    except ModuleNotFoundError as error:
+        complain("pandion view", f"needs the package {error.name}; install pandion[view]")
+        return COULD_NOT_START
+
+
+def _show_log(options: ViewOptions, log: Path) -> int:
+    from view.flight_data import UlogError
+
+    try:
+        flight = _opened(log)
+    except UlogError as error:
+        complain("pandion view", error)
+        return COULD_NOT_START
+    from view.log_page import LogPage
+    from view.page import PageError, address, open_server
+
+    try:
+        server = open_server(options.host, options.port, flight.title)
+    except PageError as error:
+        complain("pandion view", error)
+        return COULD_NOT_START
+    page = LogPage(server, flight)
+    say(f"{flight.title}: open {address(server)}; Ctrl-C ends")
+    try:
+        _wait()
+    finally:
+        page.close()
+        server.stop()
+    return DONE
+
+
+def _show_live(options: ViewOptions) -> int:
+    from fsw.link.udp_endpoint import LinkError, parse_address
+    from view.live_link import VehicleLink
+    from view.live_page import LivePage
+    from view.page import LOCAL, PageError, address, open_server
+
+    try:
+        vehicle = parse_address(options.vehicle)
+        server = open_server(options.host, options.port, f"vehicle at {options.vehicle}")
+    except (LinkError, PageError) as error:
+        complain("pandion view", error)
+        return COULD_NOT_START
+    commands = options.host in LOCAL or options.allow_commands
+    link = VehicleLink(vehicle, commands=commands)
+    link.start()
+    page = LivePage(server, link)
+    can = "" if commands else ", read only"
+    say(f"vehicle at {options.vehicle}{can}: open {address(server)}; Ctrl-C ends")
+    try:
+        _wait()
+    finally:
+        page.close()
+        link.close()
+        server.stop()
+    return DONE
+
+
+def _wait() -> None:
+    """Until Ctrl-C."""
+    with contextlib.suppress(KeyboardInterrupt):
+        threading.Event().wait()
+
+
+def _opened(path: Path) -> Flight:
+    if path.suffix == ".tlog":
+        from view.tlog_flight import TlogFlight
+
+        return TlogFlight(path)
+    from view.log_flight import LogFlight
+
+    return LogFlight(path)

@@ -1,0 +1,88 @@
+"""The soak sees what grows and what is not answered."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from benchmarks.soak import Glance, Soaked, grown, judge, main, recorded
+from fsw.log.tlog import TlogWriter
+from messages import dialect
+from messages.frames import FrameWriter
+
+STEADY = [Glance(5.0 * k, 100.0, 8, 4) for k in range(100)]
+FINE = Soaked(
+    heard={"answered_s": [0.01], "unanswered": [], "parameters_missing": 0},
+    dropped=0,
+    read=1,
+    written=1,
+    glances={"fsw 1": STEADY},
+    ended="flew 500 s",
+    flown_s=500.0,
+)
+
+
+def test_a_steady_process_has_not_grown_and_a_short_one_says_nothing() -> None:
+    assert grown(STEADY) == pytest.approx({"memory": 0.0, "handles": 0.0, "threads": 0.0})
+    assert grown(STEADY[:30]) == {}
+
+
+def test_a_leak_of_memory_and_of_handles_is_seen() -> None:
+    leaks = [
+        one._replace(resident_mb=100.0 + 0.01 * one.at_s, handles=8 + int(one.at_s / 100.0))
+        for one in STEADY
+    ]
+    assert grown(leaks)["memory"] == pytest.approx(36.0)
+    assert grown(leaks)["handles"] >= 2
+
+
+@pytest.mark.parametrize(
+    ("flown", "fails"),
+    [
+        (FINE, set()),
+        (replace(FINE, written=0), {"commands that were read and not answered"}),
+        (
+            replace(FINE, heard=FINE.heard | {"unanswered": [(3.0, 400)]}),
+            {"commands without an answer within 1 s"},
+        ),
+        (
+            replace(FINE, glances={"sitl 2": [g._replace(threads=int(g.at_s)) for g in STEADY]}),
+            {"sitl: threads, growth"},
+        ),
+    ],
+)
+def test_what_went_wrong_fails(flown: Soaked, fails: set[str]) -> None:
+    assert {row.name for row in judge([flown]) if not row.passed} == fails
+
+
+def test_the_record_counts_the_clients_commands_and_the_answers_to_it(tmp_path: Path) -> None:
+    writer = TlogWriter(tmp_path / "flight.tlog", 1_700_000_000_000_000)
+    client, other, vehicle = FrameWriter(255, 190), FrameWriter(254, 1), FrameWriter(1, 1)
+    asked = (0.0,) * 7 + (dialect.MAV_CMD_RUN_PREARM_CHECKS, 1, 1, 0)
+    for t_us, frame in enumerate(
+        [
+            client.frame(dialect.MAVLINK_MSG_ID_COMMAND_LONG, *asked),
+            other.frame(dialect.MAVLINK_MSG_ID_COMMAND_LONG, *asked),
+            client.frame(dialect.MAVLINK_MSG_ID_COMMAND_LONG, *asked),
+            vehicle.frame(dialect.MAVLINK_MSG_ID_COMMAND_ACK, 401, 0, 0, 0, 255, 190),
+            vehicle.frame(dialect.MAVLINK_MSG_ID_COMMAND_ACK, 401, 0, 0, 0, 254, 1),
+        ]
+    ):
+        writer.add(t_us, frame)
+    writer.close()
+    assert recorded(tmp_path / "flight.tlog") == (2, 1)
+
+
+@pytest.mark.long
+def test_half_a_minute_with_failures_is_answered(tmp_path: Path) -> None:
+    found = tmp_path / "soak.json"
+    main(["--minutes", "0.6", "--json", str(found)])
+    rows = {row["name"]: row for row in json.loads(found.read_text())["rows"]}
+    assert rows["commands without an answer within 1 s"]["pass"]
+    assert rows["commands that were read and not answered"]["pass"]
+    flights = json.loads(found.read_text())["flights"]
+    assert sum(one["read"] for one in flights) > 50
+    assert sum(one["heard"]["faults"] for one in flights) > 0

@@ -1,0 +1,266 @@
+"""The numbers in the report are those of the log and of result.json."""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import json
+import re
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from docs.figures.browser import chromium
+from docs.figures.browser import page as browser_page
+from pandion.report import labels, main, write_report
+from tests.view import flights
+from tests.view.flights import (
+    CYCLES_US,
+    ERROR_M,
+    OFFSET_M,
+    SPIKE_N,
+    SPIKE_S,
+    TEXT,
+    WORST_M,
+    WORST_S,
+    north,
+    write_flight,
+)
+from view.report.chart import thinned
+
+TIME_AXES = ("margins", "tracking", "inputs", "plan_inputs", "motion", "loop_timing", "estimator",
+             "worst_second")  # fmt: skip
+
+
+def figures(page: str) -> dict[str, Any]:
+    """What the page draws, by name."""
+    found = re.search(r'<script type="application/json" id="figures">(.*?)</script>', page, re.S)
+    assert found is not None
+    return {figure["name"]: figure for figure in json.loads(found[1])}
+
+
+def trace(figure: dict[str, Any], name: str) -> dict[str, Any]:
+    (found,) = [one for one in figure["data"] if one["name"] == name]
+    return dict(found)
+
+
+@pytest.fixture(scope="module")
+def flight(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_flight(tmp_path_factory.mktemp("one") / "flown")
+
+
+@pytest.fixture(scope="module")
+def page(flight: Path) -> str:
+    written = write_report([flight])
+    assert written == flight / "report.html"
+    return written.read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="module")
+def drawn(page: str) -> dict[str, Any]:
+    return figures(page)
+
+
+def test_the_smallest_margin_is_the_results_to_the_last_digit(drawn: dict[str, Any]) -> None:
+    mark = trace(drawn["margins"], "minimum")
+    assert (mark["x"], mark["y"]) == ([WORST_S], [1e3 * WORST_M])
+    assert trace(drawn["worst_second"], "minimum")["x"] == [WORST_S]
+
+
+def test_margins_over_time_are_distances_to_the_walls(drawn: dict[str, Any]) -> None:
+    """Level, with the arm straight down: base, joint and end-effector are equally far away."""
+    wall, clearance = 1.0, 0.1
+    shown = trace(drawn["margins"], "front")
+    expected = [1e3 * (wall - north(t) - clearance) for t in shown["x"]]
+    assert len(shown["x"]) == 50 * flights.SECONDS
+    np.testing.assert_allclose(shown["y"], expected, atol=2e-3)
+    beside = trace(drawn["margins"], "left")
+    np.testing.assert_allclose(beside["y"], 900.0, atol=1e-3)
+    own = trace(drawn["margins"], "minimum, by the vehicle's estimate")
+    np.testing.assert_allclose(own["y"], 200.0, atol=1e-2)
+
+
+def test_the_path_is_drawn_east_north_up_between_the_zones(drawn: dict[str, Any]) -> None:
+    base, tip = trace(drawn["path"], "base"), trace(drawn["path"], "end-effector")
+    assert max(base["y"]) == pytest.approx(north(3.0), abs=1e-3)
+    assert set(base["z"]) == {-flights.HEIGHT}
+    np.testing.assert_allclose(tip["z"], -flights.HEIGHT - 0.3, atol=1e-6)
+    worst = trace(drawn["path"], "smallest margin")
+    assert worst["z"] == [pytest.approx(-flights.HEIGHT - 0.3)]
+    walls = [one for one in drawn["path"]["data"] if one["type"] == "mesh3d"]
+    assert [one["name"] for one in walls] == [
+        "zone 1", "zone 1 with its clearance", "zone 2", "zone 2 with its clearance",
+    ]  # fmt: skip
+    np.testing.assert_allclose(walls[0]["y"], 1.0)
+    np.testing.assert_allclose(walls[1]["y"], 0.9)
+
+
+def test_bars_are_the_margins_and_limits_of_the_result(drawn: dict[str, Any]) -> None:
+    (bars,) = drawn["parts"]["data"]
+    assert dict(zip(bars["y"], bars["x"], strict=True)) == {
+        "front/end_effector": 1e3 * WORST_M, "front/base": 50.0,
+    }  # fmt: skip
+    (used,) = drawn["limits"]["data"]
+    assert (used["x"], used["y"]) == (["tilt"], [25.0])
+
+
+def test_the_tracking_error_is_the_distance_to_the_reference(drawn: dict[str, Any]) -> None:
+    np.testing.assert_allclose(trace(drawn["tracking"], "distance")["y"], 5.0, rtol=1e-4)
+    np.testing.assert_allclose(trace(drawn["tracking"], "east")["y"], 1e3 * ERROR_M[1], rtol=1e-4)
+
+
+def test_a_spike_of_one_tick_is_in_the_thinned_line(drawn: dict[str, Any]) -> None:
+    rear = trace(drawn["inputs"], "rotor rear")
+    at = rear["y"].index(SPIKE_N)
+    assert rear["x"][at] == SPIKE_S
+    assert [shape["y0"] for shape in drawn["inputs"]["layout"]["shapes"] if "x0" in shape][:2] == [
+        0.0, 17.1675,
+    ]  # fmt: skip
+
+
+def test_thinning_keeps_the_extremes_and_the_number() -> None:
+    t = np.arange(10_000) * 0.002
+    y = np.sin(t)
+    y[1234], y[8765] = 7.0, -7.0
+    kept, values = thinned(t, y, 200)
+    assert len(kept) <= 200
+    assert {7.0, -7.0} <= set(values.tolist())
+    assert np.all(np.diff(kept) > 0.0)
+    gap = np.where(t < 10.0, np.nan, y)
+    assert np.isnan(thinned(t, gap, 200)[1]).any()
+
+
+def test_the_distribution_counts_every_planning_cycle(drawn: dict[str, Any]) -> None:
+    took = drawn["solver"]["data"][0]
+    share = dict(zip(took["x"], took["y"], strict=True))
+    every = sorted(1e-3 * one for one in CYCLES_US)
+    assert share[every[0]] == pytest.approx(0.25)
+    assert share[every[-1]] == 1.0
+
+
+def test_the_estimators_error_is_estimate_minus_truth(drawn: dict[str, Any]) -> None:
+    for name, offset in zip(("north", "east", "down"), OFFSET_M, strict=True):
+        shown = trace(drawn["estimator"], name)
+        np.testing.assert_allclose(shown["y"], 1e3 * offset, atol=1e-3)
+    high = [one for one in drawn["estimator"]["data"] if one["name"] == "3 σ"]
+    assert high[0]["y"][0] == pytest.approx(6.0)
+
+
+def test_the_loop_and_its_stages_are_those_that_were_measured(drawn: dict[str, Any]) -> None:
+    assert trace(drawn["loop_timing"], "execution p99")["y"] == [90.0] * flights.SECONDS
+    assert trace(drawn["stages"], "maximum")["x"] == [200]
+
+
+def test_every_axis_of_time_has_every_event(drawn: dict[str, Any]) -> None:
+    for name in TIME_AXES:
+        shapes = drawn[name]["layout"]["shapes"]
+        upright = {shape["x0"] for shape in shapes if shape["x0"] == shape["x1"]}
+        assert upright == {0.5, 2.5, 2.75, 3.5}, name
+
+
+def test_the_events_are_in_a_table_in_order(page: str) -> None:
+    rows = re.findall(r"<tr><td>(\d+)</td><td>([\d.]+)</td><td>(\w+)</td>", page)
+    assert [int(number) for number, _, _ in rows] == list(range(1, len(rows) + 1))
+    times = [float(t) for _, t, _ in rows]
+    assert times == sorted(times)
+    assert {"mode", "fault", "warning", "command", "arming"} <= {kind for _, _, kind in rows}
+    assert "DO_SET_MODE: accepted" in page
+    assert "no plan" in page
+
+
+def test_the_worst_second_is_what_is_about_it(drawn: dict[str, Any]) -> None:
+    figure = drawn["worst_second"]
+    assert figure["layout"]["xaxis"]["range"] == [WORST_S - 0.5, WORST_S + 0.5]
+    rotor = trace(figure, "rotor 1")
+    assert len(rotor["x"]) == 500
+    assert min(rotor["x"]) >= WORST_S - 0.5
+
+
+def test_text_of_a_flight_cannot_leave_its_place(page: str) -> None:
+    assert TEXT not in page
+    assert "&lt;/script&gt;&lt;b&gt;wet" in page
+    assert page.count("<script") == page.count("</script>") == 3
+
+
+def test_the_page_needs_nothing_else_and_is_small_enough(page: str) -> None:
+    assert len(page.encode()) < 5e6
+    before = page.partition('id="plotly"')[0]
+    assert not re.findall(r'\b(?:src|href)="(?!#)', before)
+    assert "default-src 'none'" in before
+    packed = re.search(r'id="plotly">([^<]*)<', page)
+    assert packed is not None
+    source = files("plotly").joinpath("package_data", "plotly.min.js").read_bytes()
+    assert gzip.decompress(base64.b64decode(packed[1])) == source
+
+
+def test_verdict_and_provenance_are_said(page: str) -> None:
+    for words in (
+        "PASS", "Flew 4.0 s.",
+        "At 3.013 s the end effector kept 12.3 mm more than the clearance from front (112.3 mm",
+        "pandion fly walls --seed=3 --sensors=mocap --duration=4 --realtime --body=points",
+        "PLN_TILT_MAX 17",
+    ):  # fmt: skip
+        assert words in page, words
+
+
+def test_two_flights_stand_side_by_side(flight: Path, tmp_path: Path) -> None:
+    other = write_flight(tmp_path / "other", completed=False, end_reason="left", min_margin_m=-0.01)
+    page = write_report([flight, other], tmp_path / "both.html").read_text(encoding="utf-8")
+    drawn = figures(page)
+    assert {"flown", "other"} <= {one["name"] for one in drawn["margins"]["data"]}
+    assert trace(drawn["margins"], "other: minimum")["y"] == [-10.0]
+    assert "inputs" not in drawn  # those are compared by their limits
+    assert [one["name"] for one in drawn["limits"]["data"]] == ["flown", "other"]
+    assert "<th>flown</th><th>other</th>" in page
+    assert page.count("badge pass") == page.count("badge fail") == 1
+    assert "kept 10.0 mm less than the clearance" in page
+
+
+def test_a_flight_that_was_killed_is_drawn_by_its_own_estimate(tmp_path: Path) -> None:
+    killed = write_flight(tmp_path / "killed")
+    for name in ("result.json", "sitl.json", "fsw.json"):
+        (killed / name).unlink()
+    data = (killed / "flight.ulg").read_bytes()
+    (killed / "flight.ulg").write_bytes(data[: len(data) // 2 + 7])
+    page = write_report([killed]).read_text(encoding="utf-8")
+    assert "NO RESULT" in page
+    assert "The log was cut." in page
+    assert "inputs" in figures(page)
+
+
+def test_labels_tell_flights_apart(tmp_path: Path) -> None:
+    for name in ("a/run", "b/run", "c"):
+        (tmp_path / name).mkdir(parents=True)
+    found = [tmp_path / "a" / "run", tmp_path / "b" / "run" / "flight.ulg", tmp_path / "c"]
+    assert labels(found[::2]) == ["run", "c"]
+    assert [label.split("/")[-2:] for label in labels(found[:2])] == [["a", "run"], ["b", "run"]]
+    assert len(set(labels([found[2], found[2]]))) == 2
+
+
+def test_what_is_no_log_is_refused_in_one_sentence(tmp_path: Path, capsys: Any) -> None:
+    (tmp_path / "flight.ulg").write_text("no log at all")
+    assert main([str(tmp_path)]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert "is not a ULog file" in said
+    assert main([str(tmp_path)] * 8) == 2
+    assert "at most 7" in capsys.readouterr().err
+
+
+@pytest.mark.long
+@pytest.mark.skipif(chromium() is None, reason="no chromium on PATH")
+def test_a_browser_draws_every_figure_and_asks_nobody(flight: Path, drawn: dict[str, Any]) -> None:
+    with browser_page(1200, 900) as opened:
+        opened.open((flight / "report.html").as_uri())
+        opened.wait_for("document.body && document.body.dataset.drawn", 60.0)
+        assert opened.value("document.body.dataset.drawn") == str(len(drawn))
+        assert opened.value("document.querySelectorAll('.chart .main-svg').length") >= len(drawn)
+        assert opened.value("document.querySelectorAll('#path canvas').length") > 0
+        opened.value("Plotly.relayout('margins', {'xaxis.range': [1, 2]})")
+        opened.wait_for("document.getElementById('tracking').layout.xaxis.range[0] === 1")
+        assert opened.value("document.getElementById('worst_second').layout.xaxis.range[0] > 2")
+        assert opened.complaints == []
+        assert {one.partition(":")[0] for one in opened.requests} <= {"file", "blob", "data"}

@@ -1,0 +1,163 @@
+"""Tests of what is made of a vehicle's messages."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from fsw.link.telemetry.streams import STREAMS, messages_now
+from fsw.link.wire import message_ids as ids
+from fsw.link.wire.outgoing import Outgoing
+from fsw.shapes.ball import ball
+from fsw.shapes.half_space import wall
+from fsw.signals import Mode, PlanInput, SafeSet, Zone
+from messages.frames import FrameWriter, split
+from tests.fsw.link.snapshots import CONTEXT, SNAPSHOT
+from view.flight_data import UlogError
+from view.telemetry import Telemetry
+from view.tlog_flight import TlogFlight
+
+WALLS = SafeSet((wall((-1.0, 0.0, 0.0), -1.0, 0.125), Zone(ball((1.0, 2.0, -1.0), 0.5), 0.25)))
+STEP = PlanInput((0.5, 0.0, 0.0), 0.0, (0.0, 0.0))
+FLYING = replace(
+    SNAPSHOT, safe_set=WALLS, mode=Mode.HOLD, plan=replace(SNAPSHOT.plan, inputs=(STEP,) * 5)
+)
+WRITERS = {component: FrameWriter(1, component) for component in (1, 191)}
+
+
+def take(telemetry: Telemetry, *sent: Outgoing, at: float = 0.0) -> None:
+    for one in sent:
+        for frame in split(WRITERS[one.component].frame(one.message_id, *one.values)):
+            telemetry.take(frame, at)
+
+
+def everything(snapshot=FLYING) -> list[Outgoing]:
+    sent = []
+    for message_id in dict.fromkeys([*(s.message_id for s in STREAMS), ids.OBSTACLE_SHAPE]):
+        sent += messages_now(message_id, 0.0, snapshot, CONTEXT) or ()
+    return sent
+
+
+def test_the_scene_is_the_snapshot_that_was_sent() -> None:
+    telemetry = Telemetry()
+    take(telemetry, *everything())
+    scene = telemetry.scene(0.0)
+    assert scene.t == pytest.approx(3.004)
+    assert scene.estimate is not None
+    assert scene.estimate.p == (1.0, 2.0, -3.0)
+    assert scene.estimate.q == pytest.approx((math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5)), abs=1e-6)
+    assert scene.estimate.q_arm == pytest.approx((0.7, 0.8))
+    assert scene.thrust is not None
+    assert scene.thrust[3] > scene.thrust[1]
+    assert scene.target == pytest.approx((1.6, 2.6, -2.6))
+    assert scene.base_target == pytest.approx((1.1, 2.1, -3.1))
+    assert scene.minimum == pytest.approx(0.2)
+    assert [one.margin for one in scene.margins] == pytest.approx([0.3, 0.2, 0.4])
+    assert scene.safety == (3, 5, 7)
+    assert scene.solver is not None
+    assert (scene.solver.status, scene.solver.total) == ("time limit", pytest.approx(703e-6))
+    assert (scene.mode, scene.armed) == ("hold", True)
+    assert scene.battery is not None
+    assert scene.battery.remaining == pytest.approx(0.62)
+    assert scene.safe_set == WALLS
+    assert {one.name for one in scene.timing} == {"inner", "mpc", "telemetry", "housekeeping"}
+
+
+def test_the_horizon_begins_where_the_plan_does_and_is_pushed_by_its_inputs() -> None:
+    telemetry = Telemetry()
+    take(telemetry, *everything())
+    horizon = telemetry.scene(0.0).horizon
+    assert horizon is not None
+    assert horizon.base[0] == (0.0, 0.0, -1.0)
+    assert horizon.tip[0] == pytest.approx((0.0, 0.0, -0.7))
+    assert len(horizon.tip) == 6
+    assert horizon.base[-1][0] > 0.005
+
+
+def test_a_safe_set_that_is_gone_is_not_shown() -> None:
+    telemetry = Telemetry()
+    take(telemetry, *everything())
+    take(telemetry, *(messages_now(ids.OBSTACLE_SHAPE, 0.0, SNAPSHOT, CONTEXT) or ()))
+    assert telemetry.scene(0.0).safe_set == SafeSet()
+
+
+def test_half_a_safe_set_does_not_replace_a_whole_one() -> None:
+    telemetry = Telemetry()
+    take(telemetry, *everything())
+    other = replace(FLYING, safe_set=SafeSet((*WALLS.zones, Zone(ball((0.0,) * 3, 1.0), 0.5))))
+    first, second, third = messages_now(ids.OBSTACLE_SHAPE, 0.0, other, CONTEXT) or ()
+    take(telemetry, first)
+    assert telemetry.scene(0.0).safe_set == WALLS
+    take(telemetry, second, third)
+    assert telemetry.scene(0.0).safe_set == other.safe_set
+
+
+def test_what_stopped_coming_is_shown_no_longer() -> None:
+    telemetry = Telemetry()
+    take(telemetry, *everything())
+    later = replace(FLYING, t_us=9_000_000, estimate=FLYING.estimate._replace(t_us=9_000_000))
+    take(telemetry, *(messages_now(ids.LOCAL_POSITION_NED, 0.0, later, CONTEXT) or ()))
+    scene = telemetry.scene(1.5)
+    assert scene.target is None
+    assert scene.horizon is None
+    assert scene.margins == ()
+    assert scene.link_age == 1.5
+
+
+def test_a_long_text_is_one_event_and_a_critical_one_a_reason() -> None:
+    telemetry = Telemetry()
+    text = b"arming refused: " + b"x" * 60
+    take(
+        telemetry,
+        Outgoing(ids.STATUSTEXT, (2, text[:50], 7, 0)),
+        Outgoing(ids.STATUSTEXT, (2, text[50:].ljust(50, b"\0"), 7, 1)),
+    )
+    assert [one.text for one in telemetry.events] == [text.decode()]
+    assert list(telemetry.refusals) == [text.decode()]
+
+
+def test_rates_are_measured_and_fall_to_zero() -> None:
+    telemetry = Telemetry()
+    (sent,) = messages_now(ids.ATTITUDE, 0.0, FLYING, CONTEXT) or ()
+    for k in range(50):
+        take(telemetry, sent, at=0.02 * k)
+    (heard,) = telemetry.heard.values()
+    assert heard.rate(0.98) == pytest.approx(50.0, rel=0.01)
+    assert heard.rate(9.0) == 0.0
+    assert "yaw 1.5708" in heard.fields()
+
+
+def test_memory_is_bounded() -> None:
+    telemetry = Telemetry()
+    for k in range(2000):
+        take(telemetry, Outgoing(ids.STATUSTEXT, (6, b"text %d" % k, 0, 0)))
+    assert len(telemetry.events) == 500
+    assert telemetry.events[-1].text == "text 1999"
+
+
+def test_a_telemetry_log_is_a_flight(tmp_path: Path) -> None:
+    log = bytearray()
+    for k in range(50):
+        t_us = 3_000_000 + 20_000 * k
+        now = replace(FLYING, t_us=t_us, estimate=FLYING.estimate._replace(t_us=t_us))
+        for one in everything(now):
+            frame = WRITERS[one.component].frame(one.message_id, *one.values)
+            log += (1_700_000_000_000_000 + t_us).to_bytes(8, "big") + frame
+    path = tmp_path / "flight.tlog"
+    path.write_bytes(log)
+    flight = TlogFlight(path)
+    assert (flight.begin, flight.end) == pytest.approx((3.0, 3.96), abs=0.05)
+    assert flight.worst is not None
+    assert flight.worst.margin == pytest.approx(0.2)
+    assert flight.scene(3.5).mode == "hold"
+    assert len(flight.trail().points) > 20
+
+
+def test_what_is_no_telemetry_log_is_refused_in_a_sentence(tmp_path: Path) -> None:
+    path = tmp_path / "flight.tlog"
+    path.write_bytes(b"no log at all")
+    with pytest.raises(UlogError, match="no telemetry log with positions"):
+        TlogFlight(path)

@@ -1,0 +1,70 @@
+"""Tests of the triangles that zones are drawn as."""
+
+import numpy as np
+import pytest
+
+from fsw.shapes.ball import ball
+from fsw.shapes.box import box
+from fsw.shapes.cylinder import cylinder
+from fsw.shapes.half_space import half_space
+from fsw.shapes.target_sphere import target_sphere
+from fsw.shapes.vertical_cylinder import column, vertical_cylinder
+from fsw.shapes.zones import all_planes
+from fsw.signals import SafeSet, Shape, Zone
+from view.zone_meshes import moved, zone_mesh
+
+REGION = ((-2.0, -2.0, -3.0), (2.0, 2.0, 0.0))
+SHAPES = [
+    half_space((0.6, 0.0, 0.8), 0.5),
+    ball((1.0, 2.0, -1.0), 0.3),
+    box((0.5, 0.0, -1.0), (0.2, 0.3, 0.4), (0.8, 0.6, 0.0, 0.0)),
+    cylinder((0.0, 0.0, -1.0), (1.0, 1.0, -1.5), 0.2),
+    vertical_cylinder((1.0, 0.5), 0.25, -2.0, -0.5),
+]
+
+
+@pytest.mark.parametrize("shape", SHAPES, ids=lambda shape: shape.kind)
+def test_surface_and_shell_are_where_the_flight_software_has_them(shape: Shape) -> None:
+    zone = Zone(shape, clearance=0.15)
+    mesh = zone_mesh(zone, REGION, None)
+    assert mesh is not None
+    assert mesh.shell is not None
+    for part, away in ((mesh.surface, 0.0), (mesh.shell, 0.15)):
+        distances = [
+            all_planes(SafeSet((Zone(shape, 0.0),)), tuple(vertex), 0)[0][1].distance
+            for vertex in part.vertices[::7].tolist()
+        ]
+        np.testing.assert_allclose(distances, away, atol=0.01)
+
+
+@pytest.mark.parametrize("shape", SHAPES[1:], ids=lambda shape: shape.kind)
+def test_triangles_face_outwards_and_close_the_surface(shape: Shape) -> None:
+    mesh = zone_mesh(Zone(shape, 0.0), REGION, None)
+    assert mesh is not None
+    corners = mesh.surface.vertices[mesh.surface.faces]
+    volume = np.einsum("ij,ij->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6.0
+    assert volume > 0.0
+    edges = np.sort(mesh.surface.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    _, count = np.unique(edges, axis=0, return_counts=True)
+    assert (count == 2).all()
+
+
+def test_a_column_without_end_is_drawn_where_the_flight_was() -> None:
+    mesh = zone_mesh(column((1.0, 0.5), 0.2), REGION, None)
+    assert mesh is not None
+    assert mesh.shell is not None
+    assert mesh.surface.vertices[:, 2].min() == pytest.approx(-3.0)
+    assert mesh.surface.vertices[:, 2].max() == pytest.approx(0.0)
+
+
+def test_the_sphere_rides_on_the_target() -> None:
+    zone = target_sphere((0.0, 0.0, -0.2), 0.5)
+    assert zone_mesh(zone, REGION, None) is None
+    mesh = zone_mesh(zone, REGION, (1.0, 1.0, -1.0))
+    assert mesh is not None
+    np.testing.assert_allclose(mesh.surface.vertices.mean(axis=0), (1.0, 1.0, -1.2), atol=0.01)
+
+
+def test_a_moving_zone_is_where_it_has_got_to() -> None:
+    zone = Zone(ball((0.0, 0.0, 0.0), 0.1), 0.1, velocity=(1.0, 0.0, -0.5), t_us=2_000_000)
+    assert moved(zone, 4.0) == (2.0, 0.0, -1.0)

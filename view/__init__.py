@@ -1,0 +1,1 @@
+"""What a person looks at: a flight from its log or live from its telemetry, as a page."""

@@ -1,0 +1,201 @@
+"""A peer of a running vehicle: listens, and asks for what a person at the page wants."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import select
+import socket
+import threading
+import time
+from collections.abc import Callable
+from typing import Any, Final, TypeVar
+
+from fsw.link.wire import message_ids as ids
+from fsw.signals import SafeSet, Vec3
+from messages.frames import FrameWriter, split
+from view.scene import Scene
+from view.telemetry import Telemetry, command_name, result_name
+
+Answer = TypeVar("Answer")
+Address = tuple[str, int]
+
+SYSTEM, COMPONENT = 253, 190  # of no other station in use; MAV_COMP_ID_MISSIONPLANNER
+_LOOKS, _COMMANDS = 18, 6  # MAV_TYPE: an onboard controller, a ground station
+_NO_AUTOPILOT, _ACTIVE, _VERSION = 8, 4, 3
+_BEAT_S: Final = 1.0
+_SETPOINT_S: Final = 0.05
+_ANSWER_S: Final = 0.7
+_REASON_S: Final = 0.15  # the text with the reason follows the answer
+_TRIES: Final = 3
+_ACCEPTED, _IN_PROGRESS = 0, 5
+_MAX_DATAGRAM: Final = 2048
+_RECEIVE_BUFFER: Final = 1 << 20  # bytes
+_POSITION_ONLY: Final = 0x0DF8  # type mask: position, no heading
+_LOCAL_NED: Final = 1
+_SHAPE_NUMBERS: Final = 16
+_BALL: Final = 1  # PANDION_SHAPE
+_NAN: Final = math.nan
+_PLAN_US: Final = 200_000.0  # between two plans
+_SET_INTERVAL, _REQUEST_MESSAGE = 511, 512
+_ASK_S: Final = 2.0  # between two requests of what is not sent by itself
+
+ARM, TAKE_OFF, LAND, RETURN, HOLD, SET_MODE = 400, 22, 21, 20, 17, 176  # MAV_CMD
+TRAJECTORY: Final = (1.0, 4.0, 11.0)
+OFFBOARD: Final = (1.0, 6.0, 0.0)
+
+
+class VehicleLink(threading.Thread):
+    """Speaks to one vehicle until it is closed. A vehicle that is not there yet may come."""
+
+    def __init__(self, vehicle: Address, *, commands: bool) -> None:
+        """Open a socket of its own towards ``vehicle``; without ``commands`` it only looks.
+
+        One that only looks is no ground station to the vehicle: it must not hide that the link to
+        the one that commands is lost.
+        """
+        super().__init__(daemon=True)
+        self.commands = commands
+        self.watched = False  # whether a person sees the page
+        self._vehicle = vehicle
+        self._telemetry = Telemetry()
+        self._writer = FrameWriter(SYSTEM, COMPONENT)
+        self._heard = threading.Condition()
+        self._setpoint: Vec3 | None = None
+        self._ended = False
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _RECEIVE_BUFFER)
+        self._socket.connect(vehicle)
+        self._socket.setblocking(False)
+
+    def close(self) -> None:
+        """Hang up."""
+        self._ended = True
+        self.join()
+        self._socket.close()
+
+    def scene(self) -> Scene:
+        """What is known now."""
+        return self.read(lambda telemetry: telemetry.scene(time.monotonic()))
+
+    def read(self, how: Callable[[Telemetry], Answer]) -> Answer:
+        """Look at the telemetry while nothing new is taken in."""
+        with self._heard:
+            return how(self._telemetry)
+
+    def run(self) -> None:
+        """See :class:`VehicleLink`."""
+        beat_s = setpoint_s = asked_s = -1e9
+        while not self._ended:
+            select.select((self._socket,), (), (), 0.02)
+            self._hear()
+            now_s = time.monotonic()
+            if now_s - beat_s >= _BEAT_S:
+                beat_s = now_s
+                self._beat()
+            if now_s - asked_s >= _ASK_S:
+                asked_s = now_s
+                self._command(_SET_INTERVAL, (ids.MPC_HORIZON, _PLAN_US))
+                self._command(_REQUEST_MESSAGE, (ids.OBSTACLE_SHAPE,))
+            if self._setpoint is not None and now_s - setpoint_s >= _SETPOINT_S:
+                setpoint_s = now_s
+                self._send_setpoint(self._setpoint)
+
+    def ask(self, command: int, params: tuple[float, ...] = ()) -> tuple[bool, str]:
+        """Send a command until it is answered: whether it was accepted, and a sentence.
+
+        ``params`` are its parameters [the command's units]; what is left out is NaN or 0.
+        """
+        name = command_name(command)
+        with self._heard:
+            telemetry = self._telemetry
+            telemetry.answers.clear()
+            telemetry.refusals.clear()
+            for confirmation in range(_TRIES):
+                self._command(command, params, confirmation)
+                self._heard.wait_for(lambda: self._answer(command) is not None, _ANSWER_S)
+                result = self._answer(command)
+                if result is None:
+                    continue
+                if result in (_ACCEPTED, _IN_PROGRESS):
+                    return True, f"{name}: {result_name(result)}"
+                self._heard.wait_for(lambda: bool(telemetry.refusals), _REASON_S)
+                reason = "; ".join(telemetry.refusals) or "no reason was given"
+                return False, f"{name} {result_name(result)}: {reason}"
+        return False, f"{name}: no answer from {self.where}"
+
+    def aim(self, target: Vec3 | None) -> None:
+        """Send ``target`` [m, NED] of the end-effector as setpoint from now on; None: no more."""
+        self._setpoint = target
+
+    def announce(self, safe_set: SafeSet | None, centre: Vec3, radius: float) -> None:
+        """Announce the known safe set and a ball about ``centre`` [m, NED] of ``radius`` [m]."""
+        from fsw.shapes import kind_of
+
+        known = safe_set.zones if safe_set is not None else ()
+        count = len(known) + 1
+        for index, zone in enumerate(known):
+            numbers = zone.shape.numbers
+            self._shape(
+                index, count, kind_of(zone.shape).number, numbers, zone.clearance,
+                keep_in=zone.keep_in, velocity=zone.velocity, t_us=zone.t_us,
+            )  # fmt: skip
+        self._shape(len(known), count, _BALL, (*centre, radius), 0.1)
+
+    def ask_for_parameters(self) -> None:
+        """Ask for all of them."""
+        self._send(ids.PARAM_REQUEST_LIST, 1, 1)
+
+    @property
+    def where(self) -> str:
+        """The vehicle's address."""
+        return f"udp:{self._vehicle[0]}:{self._vehicle[1]}"
+
+    def _answer(self, command: int) -> int | None:
+        answers = [result for asked, result in self._telemetry.answers if asked == command]
+        return answers[-1] if answers else None
+
+    def _hear(self) -> None:
+        while True:
+            try:
+                datagram = self._socket.recv(_MAX_DATAGRAM)
+            except OSError:  # nothing there; or nothing listens yet: the vehicle may start
+                return
+            with self._heard:
+                now_s = time.monotonic()
+                for frame in split(datagram):
+                    self._telemetry.take(frame, now_s)
+                self._heard.notify_all()
+
+    def _beat(self) -> None:
+        kind = _COMMANDS if self.commands and self.watched else _LOOKS
+        self._send(ids.HEARTBEAT, 0, kind, _NO_AUTOPILOT, 0, _ACTIVE, _VERSION)
+
+    def _command(self, command: int, params: tuple[float, ...], confirmation: int = 0) -> None:
+        filled = (*params, *(0.0 for _ in range(7 - len(params))))
+        self._send(ids.COMMAND_LONG, *filled, command, 1, 1, confirmation)
+
+    def _send_setpoint(self, p: Vec3) -> None:
+        still = (0.0,) * 6
+        mask = _POSITION_ONLY
+        self._send(ids.END_EFFECTOR_TARGET, 0, *p, *still, 0.0, 0.0, mask, 1, 0, _LOCAL_NED)
+
+    def _shape(
+        self,
+        index: int,
+        count: int,
+        kind: int,
+        numbers: tuple[float, ...],
+        clearance: float,
+        *,
+        keep_in: bool = False,
+        velocity: Vec3 = (0.0, 0.0, 0.0),
+        t_us: int = 0,
+    ) -> None:
+        filled = (*numbers, *(0.0 for _ in range(_SHAPE_NUMBERS - len(numbers))))
+        place = (1, 0, index, count, kind, int(keep_in))
+        self._send(ids.OBSTACLE_SHAPE, t_us, clearance, *velocity, *filled, *place)
+
+    def _send(self, message_id: int, *values: Any) -> None:
+        with contextlib.suppress(OSError):
+            self._socket.send(self._writer.frame(message_id, *values))

@@ -1,0 +1,1 @@
+"""``pandion report``: one or several flights as one self-contained HTML page."""

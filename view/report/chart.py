@@ -1,0 +1,147 @@
+"""Figures as Plotly takes them: JSON of traces and a layout, made without Plotly's Python."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[Any]
+Trace = dict[str, Any]
+
+COLOURS: Final = ("#0969da", "#bc4c00", "#1a7f37", "#8250df", "#bf3989", "#9a6700", "#57606a")
+LIMIT: Final = "#cf222e"
+TRUTH, ESTIMATE, REFERENCE = "#0969da", "#8c959f", "#1a7f37"
+_DIGITS: Final = 5  # of a number in the page
+_GAP: Final = 0.06  # between two rows, share of the height
+_ROW_PX: Final = 200
+_FRAME_PX: Final = 110
+
+
+@dataclass(frozen=True, slots=True)
+class Chart:
+    """One figure of the page."""
+
+    name: str  # of the numbers, and of the element
+    title: str
+    note: str  # what is seen, in a sentence or two
+    data: list[Trace]
+    layout: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One pair of axes of a figure over time."""
+
+    unit: str  # title of the axis
+    traces: list[Trace]
+    limits: tuple[float, ...] = ()  # drawn across, in the axis' unit
+    span: tuple[float, float] | None = None  # shown at first
+
+
+def rounded(values: Array) -> list[float | None]:
+    """``values`` (n,) [any unit] with five digits; what is not finite is null, a gap in a line."""
+    return [float(f"{v:.{_DIGITS}g}") if np.isfinite(v) else None for v in np.asarray(values, "f8")]
+
+
+def thinned(t: Array, y: Array, most: int) -> tuple[Array, Array]:
+    """At most ``most`` samples that keep every extreme: the least and the most of each piece.
+
+    ``t`` (n,) [s], ``y`` (n,) [any unit].
+    """
+    if len(t) <= most:
+        return t, y
+    kept = []
+    for piece in np.array_split(np.arange(len(t)), most // 2):
+        values = y[piece]
+        if np.isfinite(values).any():
+            kept += sorted((piece[np.nanargmin(values)], piece[np.nanargmax(values)]))
+        else:
+            kept.append(piece[0])
+    places = np.unique(kept)
+    return t[places], y[places]
+
+
+def line(
+    name: str, t: Array, y: Array, colour: str, *, most: int = 2000, width: float = 1.2, **more: Any
+) -> Trace:
+    """A line over time ``t`` (n,) [s] of ``y`` (n,) [the axis' unit], ``width`` [px]."""
+    t, y = thinned(np.asarray(t, "f8"), np.asarray(y, "f8"), most)
+    times = [round(float(one), 3) for one in t]
+    look = {"color": colour, "width": width, **more.pop("line", {})}
+    return {
+        "type": "scatter", "mode": "lines", "name": name, "x": times, "y": rounded(y),
+        "line": look, **more,
+    }  # fmt: skip
+
+
+def mark(name: str, x: float, y: float, colour: str, text: str) -> Trace:
+    """A point at ``x`` and ``y`` [units of the axes], exactly, with what is said at it."""
+    return {
+        "type": "scatter", "mode": "markers", "name": name, "x": [x], "y": [y],
+        "marker": {"color": colour, "size": 9, "symbol": "circle-open", "line": {"width": 2}},
+        "hovertext": [text],
+    }  # fmt: skip
+
+
+def over_time(
+    name: str,
+    title: str,
+    note: str,
+    rows: Sequence[Row],
+    marks: Iterable[tuple[float, str]] = (),
+    span: tuple[float, float] | None = None,
+) -> Chart:
+    """Rows over one axis of time, with a line at each of ``marks`` (time [s], its number)."""
+    height = 1.0 / len(rows)
+    layout: dict[str, Any] = {
+        "height": _ROW_PX * len(rows) + _FRAME_PX,
+        "xaxis": {"title": {"text": "time since the start [s]"}, "anchor": f"y{_n(len(rows))}"},
+        "shapes": [],
+        "annotations": [],
+        "hovermode": "x unified" if len(rows) == 1 else "x",
+    }
+    if span is not None:
+        layout["xaxis"]["range"] = list(span)
+    data = []
+    for k, row in enumerate(rows, start=1):
+        top = 1.0 - (k - 1) * height
+        bottom = top - height + (_GAP if k < len(rows) else 0.0)
+        axis: dict[str, Any] = {"title": {"text": row.unit}, "domain": [max(bottom, 0.0), top]}
+        if row.span is not None:
+            axis["range"] = list(row.span)
+        layout[f"yaxis{_n(k)}"] = axis
+        data += [{**trace, "yaxis": f"y{_n(k)}"} for trace in row.traces]
+        layout["shapes"] += [_across(limit, f"y{_n(k)}") for limit in row.limits]
+    for t, number in marks:
+        layout["shapes"].append(_upright(t))
+        layout["annotations"].append(_number(t, number))
+    return Chart(name, title, note, data, layout)
+
+
+def _n(k: int) -> str:
+    return "" if k == 1 else str(k)
+
+
+def _across(value: float, axis: str) -> dict[str, Any]:
+    return {
+        "type": "line", "xref": "paper", "x0": 0, "x1": 1, "yref": axis, "y0": value, "y1": value,
+        "line": {"color": LIMIT, "width": 1, "dash": "dash"},
+    }  # fmt: skip
+
+
+def _upright(t: float) -> dict[str, Any]:
+    return {
+        "type": "line", "yref": "paper", "y0": 0, "y1": 1, "x0": t, "x1": t, "layer": "below",
+        "line": {"color": "#afb8c1", "width": 1},
+    }  # fmt: skip
+
+
+def _number(t: float, text: str) -> dict[str, Any]:
+    return {
+        "x": t, "yref": "paper", "y": 1, "yanchor": "bottom", "text": text, "showarrow": False,
+        "font": {"size": 9, "color": "#57606a"},
+    }  # fmt: skip

@@ -1,0 +1,590 @@
+"""What the report draws: each function makes one figure of one or several flights."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from view.flight_data import Table
+from view.flight_events import EventKind
+from view.report.chart import (
+    COLOURS,
+    ESTIMATE,
+    LIMIT,
+    TRUTH,
+    Chart,
+    Row,
+    Trace,
+    line,
+    mark,
+    over_time,
+    rounded,
+)
+from view.report.reported import Reported
+
+Array = NDArray[Any]
+
+_MM: Final = 1e3
+_DEG: Final = 180.0 / math.pi
+_SHOWN_MM: Final = 400.0  # of the margins at first; all of it can be zoomed out to
+_DETAIL_S: Final = 0.5  # before and behind the worst moment
+_MARKED: Final = (EventKind.MODE, EventKind.FAULT, EventKind.WARNING, EventKind.COMMAND)
+_DEADLINE_MS: Final = 20.0  # a plan that comes later is not flown
+_PERIOD_MS: Final = 100.0
+_INNER: Final = 0  # PANDION_RATE_GROUP
+_STAGES: Final = (("p50_us", "median", "circle"), ("p99_us", "p99", "diamond"),
+                  ("max_us", "maximum", "line-ns-open"))  # fmt: skip
+
+
+def charts(flights: Sequence[Reported]) -> list[Chart]:
+    """Every figure that these flights have the numbers for."""
+    from view.report.paths import paths
+
+    made = (
+        paths(flights), margins(flights), parts(flights), tracking(flights), inputs(flights),
+        plan_inputs(flights), motion(flights), limits(flights), solver(flights), stages(flights),
+        loop_timing(flights), estimator(flights), worst_second(flights),
+    )  # fmt: skip
+    return [chart for chart in made if chart is not None and chart.data]
+
+
+def event_marks(flight: Reported) -> list[tuple[float, str]]:
+    """Time since the start [s] and number in the table of the events that axes show."""
+    numbered = enumerate(flight.events, start=1)
+    marks: dict[float, str] = {}
+    for k, event in numbered:
+        t = round(event.t - flight.data.begin, 3)
+        if event.kind in _MARKED and t > 0.0:
+            marks[t] = f"{marks[t]},{k}" if t in marks else str(k)
+    return list(marks.items())
+
+
+def margins(flights: Sequence[Reported]) -> Chart:
+    """Margins over time, by the truth and by the vehicle's own estimate."""
+    traces, lowest = [], 0.0
+    for k, flight in enumerate(flights):
+        traces += _margin_lines(flight, COLOURS[k % len(COLOURS)], alone=len(flights) == 1)
+        worst = flight.worst
+        if worst is not None:
+            lowest = min(lowest, _MM * worst.margin)
+            said = f"{worst.key}: {_MM * worst.margin:.1f} mm"
+            colour = LIMIT if len(flights) == 1 else COLOURS[k % len(COLOURS)]
+            traces.append(mark(_named(flight, flights, "minimum"), worst.t, _MM * worst.margin,
+                               colour, said))  # fmt: skip
+    return over_time(
+        "margins",
+        "Margins",
+        "Distance beyond the required clearance, minimum of each zone, by the true state. The "
+        "circle is the minimum in the result, which the simulator checks every millisecond; the "
+        "lines are the samples in the log.",
+        [Row("margin [mm]", traces, (0.0,), (min(-20.0, 1.2 * lowest), _SHOWN_MM))],
+        _marks(flights),
+    )
+
+
+def _margin_lines(flight: Reported, colour: str, *, alone: bool) -> list[Trace]:
+    lines = []
+    truth, own = flight.margins, flight.table("barrier_margin")
+    if truth is not None:
+        t = flight.since(truth.t)
+        if alone:
+            for k, (zone, values) in enumerate(truth.of_zones().items()):
+                lines.append(line(zone, t, _MM * _finite(values), COLOURS[k % len(COLOURS)]))
+        elif truth.keys:
+            lines.append(line(flight.label, t, _MM * _finite(truth.least), colour))
+    if own is not None and (alone or truth is None):
+        look = {"dash": "dot"} if truth is not None else {}
+        shade = ESTIMATE if alone else colour
+        name = "minimum, by the vehicle's estimate" if alone else flight.label
+        lines.append(line(name, flight.since(own.t), _MM * own["minimum"], shade, line=look))
+    return lines
+
+
+def parts(flights: Sequence[Reported]) -> Chart:
+    """The least margin of every zone and part, as in the result."""
+    traces = []
+    height = 0
+    for k, flight in enumerate(flights):
+        found = flight.result.get("margins_m", {})
+        keys = sorted(found, key=lambda key: -found[key])[-24:]
+        height = max(height, len(keys) * len(flights))
+        traces.append({
+            "type": "bar", "orientation": "h", "name": flight.label, "y": keys,
+            "x": [_MM * found[key] for key in keys],
+            "marker": {"color": COLOURS[k % len(COLOURS)]},
+        })  # fmt: skip
+    traces = [trace for trace in traces if trace["y"]]
+    layout = {
+        "height": 18 * height + 110,
+        "xaxis": {"title": {"text": "minimum margin [mm]"}, "rangemode": "tozero"},
+        "yaxis": {"automargin": True},
+        "bargap": 0.25,
+    }
+    note = "Minimum over the flight of each zone and part of the vehicle, as in result.json."
+    return Chart("parts", "Minimum margin of each part", note, traces, layout)
+
+
+def tracking(flights: Sequence[Reported]) -> Chart:
+    """Distance of the end-effector from its reference."""
+    traces, means = [], []
+    for k, flight in enumerate(flights):
+        truth, own = flight.table("sim_tracking"), flight.table("end_effector")
+        if truth is not None:
+            t, error = flight.since(truth.t), truth["p_WE"] - truth["target"]
+        elif own is not None:
+            t, error = flight.since(own.t), own["p"].astype("f8") - own["p_ref"]
+        else:
+            continue
+        colour = COLOURS[k % len(COLOURS)]
+        size = _MM * np.linalg.norm(error, axis=1)
+        traces.append(line("distance" if len(flights) == 1 else flight.label, t, size, colour))
+        if len(flights) == 1:
+            for axis, shade in zip(range(3), COLOURS[1:], strict=False):
+                name = ("north", "east", "down")[axis]
+                traces.append(line(name, t, _MM * error[:, axis], shade, width=0.8))
+        rms = flight.result.get("tracking_error_rms_m")
+        if rms is not None:
+            means.append(f"{_MM * rms:.1f} mm RMS" + f" ({flight.label})" * (len(flights) > 1))
+    return over_time(
+        "tracking",
+        "Tracking",
+        "Distance of the end-effector from its reference, 10 Hz, true state. "
+        + ("The whole flight: " + ", ".join(means) + "." if means else ""),
+        [Row("error [mm]", traces)],
+        _marks(flights),
+    )
+
+
+def inputs(flights: Sequence[Reported]) -> Chart | None:
+    """Thrusts and torques as sent, with their limits."""
+    if len(flights) > 1:
+        return None  # `limits` compares
+    (flight,) = flights
+    sent = flight.table("actuator_command")
+    if sent is None:
+        return None
+    t = flight.since(sent.t)
+    most, torque = (
+        flight.number(f"airframe.{name}_max") for name in ("rotor_thrust", "joint_torque")
+    )
+    names = ("rear", "left", "front", "right")
+    thrusts = [
+        line(f"rotor {name}", t, sent["rotor_thrust"][:, k], COLOURS[k], width=0.8)
+        for k, name in enumerate(names)
+    ]
+    torques = [
+        line(f"joint {k + 1}", t, sent["joint_torque"][:, k], COLOURS[k + 4], width=0.8)
+        for k in range(2)
+    ]
+    return over_time(
+        "inputs",
+        "Inputs against their limits",
+        "Commanded 500 times a second; the thinned lines keep every extreme. Dashed: limits.",
+        [
+            Row("thrust [N]", thrusts, (0.0, most), (-0.5, 1.08 * most)),
+            Row("torque [N m]", torques, (-torque, torque)),
+        ],
+        _marks(flights),
+    )
+
+
+def plan_inputs(flights: Sequence[Reported]) -> Chart | None:
+    """The planner's u with its box."""
+    if len(flights) > 1:
+        return None
+    (flight,) = flights
+    table, arm = flight.table("plan_input"), flight.table("arm_joint_setpoint")
+    if table is None or arm is None:
+        return None
+    t, most = flight.since(table.t), flight.number("planner.limits.vertical")
+    joint = flight.number("planner.limits.joint_acc")
+    flat = 9.81 * math.tan(flight.number("planner.limits.tilt"))
+    shown = [line(f"a {name}", t, table["a"][:, k], COLOURS[k], width=0.9)
+             for k, name in enumerate(("north", "east", "down"))]  # fmt: skip
+    joints = [line(f"joint {k + 1} acc.", flight.since(arm.t), arm["qdd"][:, k], COLOURS[k + 4],
+                   width=0.9) for k in range(2)]  # fmt: skip
+    return over_time(
+        "plan_inputs",
+        "The planner's inputs",
+        f"u of the plan in force. Limits: ±{most:g} m/s² vertically and ±{joint:g} rad/s² at the "
+        f"joints; horizontally the tilt allows {flat:.2f} m/s².",
+        [
+            Row("acceleration [m/s²]", shown, (-most, most), _about_zero(table["a"], most)),
+            Row("joints [rad/s²]", joints, (-joint, joint), _about_zero(arm["qdd"], joint)),
+        ],
+        _marks(flights),
+    )
+
+
+def motion(flights: Sequence[Reported]) -> Chart | None:
+    """Tilt, joints and their rates with their limits, by the best that the log has."""
+    if len(flights) > 1:
+        return None
+    (flight,) = flights
+    truth = flight.table("sim_ground_truth")
+    state, attitude = flight.table("arm_joint_state"), flight.table("vehicle_attitude")
+    if truth is not None:
+        t, q = flight.since(truth.t), truth["q_WB"]
+        t_arm, angles, rates = t, truth["q_arm"], truth["qd_arm"]
+    elif state is not None and attitude is not None:
+        t, q = flight.since(attitude.t), attitude["q"]
+        t_arm, angles, rates = flight.since(state.t), state["q"], state["qd"]
+    else:
+        return None
+    first, both = (_DEG * flight.number(f"airframe.joint{n}_limit") for n in ("1", "12"))
+    fastest = flight.number("airframe.joint_rate_max")
+    tilt_max = _DEG * flight.number("airframe.tilt_max")
+    summed = angles[:, 0] + angles[:, 1]
+    return over_time(
+        "motion",
+        "Tilt and joints against their limits",
+        f"By the {'true' if truth is not None else 'estimated'} state. Dashed: tilt {tilt_max:.0f} "
+        f"deg, joint 1 ±{first:.0f} deg, joint 1 + 2 ±{both:.0f} deg, ±{fastest:g} rad/s.",
+        [
+            Row("tilt [deg]", [line("tilt", t, tilt_deg(q), COLOURS[0])], (tilt_max,),
+                (0.0, 1.08 * tilt_max)),
+            Row("angles [deg]", [
+                line("joint 1", t_arm, _DEG * angles[:, 0], COLOURS[4]),
+                line("joint 1 + 2", t_arm, _DEG * summed, COLOURS[5]),
+            ], (-both, -first, first, both)),
+            Row("rates [rad/s]", [
+                line(f"joint {k + 1} rate", t_arm, rates[:, k], COLOURS[k + 4], width=0.9)
+                for k in range(2)
+            ], (-fastest, fastest)),
+        ],
+        _marks(flights),
+    )  # fmt: skip
+
+
+def _about_zero(values: Array, most: float) -> tuple[float, float]:
+    """The span [their unit] that shows ``values`` well, up to a limit of ``most`` [same]."""
+    reach = min(1.05 * most, max(1.4 * float(np.nanmax(np.abs(values), initial=0.0)), 0.1 * most))
+    return -reach, reach
+
+
+def tilt_deg(q: Array) -> Array:
+    """Angle [deg] between the body's z axis and the vertical, of quaternions ``q`` (n, 4) [1]."""
+    x, y = np.asarray(q[:, 1], "f8"), np.asarray(q[:, 2], "f8")
+    return np.asarray(_DEG * np.arccos(np.clip(1.0 - 2.0 * (x * x + y * y), -1.0, 1.0)))
+
+
+def limits(flights: Sequence[Reported]) -> Chart:
+    """How much of each limit was used."""
+    traces = []
+    for k, flight in enumerate(flights):
+        uses = flight.result.get("limits", {})
+        if uses:
+            traces.append({
+                "type": "bar", "name": flight.label, "x": [name.replace("_", " ") for name in uses],
+                "y": [100.0 * use["largest"] / use["most"] for use in uses.values()],
+                "hovertext": [
+                    f"{use['largest']:.3g} of {use['most']:.3g} {use['unit']}, {use['at_s']:.2f} s"
+                    for use in uses.values()
+                ],
+                "marker": {"color": COLOURS[k % len(COLOURS)]},
+            })  # fmt: skip
+    layout = {
+        "height": 300,
+        "yaxis": {"title": {"text": "largest use [%]"}, "rangemode": "tozero"},
+        "xaxis": {"automargin": True},
+        "shapes": [{
+            "type": "line", "xref": "paper", "x0": 0, "x1": 1, "y0": 100, "y1": 100,
+            "line": {"color": LIMIT, "width": 1, "dash": "dash"},
+        }],
+    }  # fmt: skip
+    note = "Largest value over the whole flight, true state, 1 kHz, as in result.json."
+    return Chart("limits", "Use of each limit", note, traces, layout)
+
+
+def solver(flights: Sequence[Reported]) -> Chart:
+    """Distribution of the planning cycle's time, and of the optimiser's iterations."""
+    traces: list[Trace] = []
+    measured = []
+    for k, flight in enumerate(flights):
+        status = flight.table("mpc_status")
+        if status is None:
+            continue
+        colour = COLOURS[k % len(COLOURS)]
+        took = 1e-3 * status["total_us"][np.isfinite(status["total_us"])]
+        if len(took):
+            measured.append(flight.label)
+            traces.append(_cdf(flight.label, took, colour))
+        else:
+            traces += _quantiles(flight, colour)
+        traces.append({
+            **_cdf(flight.label, status["solver_iterations"][1:], colour),
+            "xaxis": "x2", "showlegend": False,
+        })  # fmt: skip
+    layout = {
+        "height": 330,
+        "xaxis": {"title": {"text": "complete cycle [ms]"}, "type": "log", "domain": [0.0, 0.6],
+                  "range": [-1, 2.2]},
+        "xaxis2": {"title": {"text": "iterations of the optimiser"}, "domain": [0.66, 1.0]},
+        "yaxis": {"title": {"text": "share of cycles"}, "range": [0, 1.02]},
+        "shapes": [
+            {"type": "line", "yref": "paper", "y0": 0, "y1": 1, "x0": at, "x1": at,
+             "line": {"color": LIMIT, "width": 1, "dash": "dash"}}
+            for at in (_DEADLINE_MS, _PERIOD_MS)
+        ],
+    }  # fmt: skip
+    note = (
+        f"Dashed: {_DEADLINE_MS:g} ms, when the plan takes effect, and the period of "
+        f"{_PERIOD_MS:g} ms. "
+    )
+    if len(measured) < len(flights):
+        note += (
+            "A log in lockstep holds no wall time: median, 99 % and maximum are those that the "
+            "flight software counted."
+        )
+    return Chart("solver", "Time to solve", note, traces, layout)
+
+
+def _cdf(name: str, values: Array, colour: str) -> Trace:
+    """Share of values at or below each."""
+    ordered = np.sort(np.asarray(values, "f8"))
+    places = np.unique(np.linspace(0, len(ordered) - 1, min(len(ordered), 500)).astype(int))
+    return {
+        "type": "scatter", "mode": "lines", "name": name, "x": rounded(ordered[places]),
+        "y": rounded((places + 1) / len(ordered)), "line": {"color": colour, "shape": "hv"},
+    }  # fmt: skip
+
+
+def _quantiles(flight: Reported, colour: str) -> list[Trace]:
+    mpc = flight.data.beside.get("fsw", {}).get("mpc", {})
+    if mpc.get("p50_us") is None:
+        return []
+    return [{
+        "type": "scatter", "mode": "markers+lines", "name": flight.label,
+        "x": [1e-3 * mpc[key] for key in ("p50_us", "p99_us", "max_us")], "y": [0.5, 0.99, 1.0],
+        "line": {"color": colour, "dash": "dot"}, "marker": {"color": colour, "size": 8},
+    }]  # fmt: skip
+
+
+def stages(flights: Sequence[Reported]) -> Chart:
+    """What a tick is spent on."""
+    traces = []
+    for k, flight in enumerate(flights):
+        found = flight.data.beside.get("fsw", {}).get("stages", {})
+        for key, what, symbol in _STAGES:
+            if not found:
+                continue
+            traces.append({
+                "type": "scatter", "mode": "markers",
+                "name": f"{flight.label}, {what}" if len(flights) > 1 else what,
+                "y": list(found), "x": [part[key] for part in found.values()],
+                "marker": {"color": COLOURS[k % len(COLOURS)], "symbol": symbol, "size": 10,
+                           "line": {"width": 1, "color": COLOURS[k % len(COLOURS)]}},
+            })  # fmt: skip
+    layout = {
+        "height": 330,
+        "xaxis": {"title": {"text": "time [µs]"}, "type": "log"},
+        "yaxis": {"automargin": True, "autorange": "reversed"},
+    }
+    note = "Each part of a 500 Hz tick and of what follows it, on the machine of the flight."
+    return Chart("stages", "Timing of the tick", note, traces, layout)
+
+
+def loop_timing(flights: Sequence[Reported]) -> Chart | None:
+    """Execution and lateness of the fast tick, of each second; in real time only."""
+    rows: tuple[list[Trace], list[Trace]] = ([], [])
+    for k, flight in enumerate(flights):
+        table = flight.table("loop_timing")
+        if table is None or str(flight.data.information.get("pacing")) != "realtime":
+            continue
+        inner = (table["group"] == _INNER) & (table["ticks"] > 1)
+        t = flight.since(table.t)[inner]
+        for row, what in zip(rows, ("execution", "lateness"), strict=True):
+            for part, dash in (("p50", "solid"), ("p99", "dash"), ("max", "dot")):
+                row.append(line(
+                    _named(flight, flights, f"{what} {part}"), t, table[f"{what}_{part}_us"][inner],
+                    COLOURS[k % len(COLOURS)], line={"dash": dash},
+                ))  # fmt: skip
+    if not rows[0]:
+        return None
+    return over_time(
+        "loop_timing",
+        "The 500 Hz loop in real time",
+        "Of each second: time of a tick, and how late it was released. Dashed: the period.",
+        [Row("tick [µs]", rows[0], (2000.0,)), Row("late [µs]", rows[1])],
+        _marks(flights),
+    )
+
+
+def estimator(flights: Sequence[Reported]) -> Chart | None:
+    """The estimate's error, with the accuracy that the vehicle believes in."""
+    (flight,) = flights if len(flights) == 1 else (None,)
+    if flight is None:
+        return _estimates(flights)
+    found = _errors(flight)
+    if found is None:
+        return None
+    t, error = found
+    rows = []
+    status = flight.table("estimator_status")
+    for k, name in enumerate(("north", "east", "down")):
+        traces = [line(name, t, _MM * error[:, k], COLOURS[k])]
+        if status is not None:
+            sigma = status["pos_vert_accuracy" if k == 2 else "pos_horiz_accuracy"].astype("f8")
+            t_own, look = flight.since(status.t), {"dash": "dot"}
+            for s, named in ((3.0, k == 0), (-3.0, False)):
+                traces.append(line("3 σ", t_own, s * _MM * sigma, ESTIMATE, line=look,
+                                   showlegend=named))  # fmt: skip
+        seen = np.nanmax(np.abs(error[len(error) // 20 :, k]), initial=0.0)
+        reach = _MM * 1.3 * max(seen, 3.0 * float(np.median(sigma)) if status is not None else 0.0)
+        rows.append(Row(f"{name} [mm]", traces, (), (-reach, reach) if reach > 0.0 else None))
+    if status is not None:
+        shown = [
+            line(name, flight.since(status.t), status[f"{field}_test_ratio"], COLOURS[k], width=0.9)
+            for k, (field, name) in enumerate(_RATIOS)
+            if np.isfinite(status[f"{field}_test_ratio"]).any()
+        ]
+        rows.append(Row("innovation / limit", shown, (1.0,)))
+    exact = "" if status is not None else " The sensors of this flight are exact."
+    return over_time(
+        "estimator",
+        "Estimator",
+        f"Estimated minus true position of the body, with three standard deviations.{exact}",
+        rows,
+        _marks(flights),
+    )
+
+
+_RATIOS: Final = (("pos", "position"), ("hgt", "height"), ("vel", "velocity"), ("hdg", "heading"),
+                  ("hagl", "range"))  # fmt: skip
+
+
+def _estimates(flights: Sequence[Reported]) -> Chart:
+    traces = []
+    for k, flight in enumerate(flights):
+        found = _errors(flight)
+        if found is not None:
+            t, error = found
+            size = _MM * np.linalg.norm(error, axis=1)
+            traces.append(line(flight.label, t, size, COLOURS[k % len(COLOURS)]))
+    note = "Distance between the estimated and the true position of the body."
+    return over_time("estimator", "Estimator", note, [Row("error [mm]", traces)])
+
+
+def _errors(flight: Reported) -> tuple[Array, Array] | None:
+    """Times since the start [s] (n,) and estimated minus true position (n, 3) [m]."""
+    own, truth = flight.table("vehicle_local_position"), flight.table("sim_ground_truth")
+    if own is None or truth is None:
+        return None
+    _, mine, its = np.intersect1d(own.t, truth.t, return_indices=True)
+    estimated = np.stack([own[name][mine] for name in ("x", "y", "z")], axis=1).astype("f8")
+    return flight.since(own.t)[mine], estimated - truth["p_WB"][its]
+
+
+def worst_second(flights: Sequence[Reported]) -> Chart | None:
+    """What happened about the smallest margin, as finely as the log has it."""
+    rows: tuple[list[Trace], ...] = ([], [], [], [])
+    said = []
+    for k, flight in enumerate(flights):
+        worst = flight.worst
+        if worst is None:
+            continue
+        alone = len(flights) == 1
+        zero = 0.0 if alone else worst.t
+        colour = COLOURS[k % len(COLOURS)]
+        said.append(f"{_named(flight, flights, worst_sentence(flight))}")
+        _worst_margins(flight, rows[0], zero, None if alone else colour)
+        rows[0].append(mark(_named(flight, flights, "minimum"), worst.t - zero,
+                            _MM * worst.margin, LIMIT if alone else colour, worst.key))  # fmt: skip
+        for row, (name, t, y) in zip(rows[1:], _about(flight), strict=True):
+            inside = np.abs(t - worst.t) <= _DETAIL_S
+            if y.ndim == 1:
+                y = y[:, None]
+            for j in range(y.shape[1]):
+                shown = f"{name} {j + 1}" if y.shape[1] > 1 else name
+                shade = COLOURS[j] if alone else colour
+                row.append(line(_named(flight, flights, shown), t[inside] - zero, y[inside, j],
+                                shade, width=1.0, showlegend=alone or j == 0))  # fmt: skip
+    if not said:
+        return None
+    (single,) = flights if len(flights) == 1 else (None,)
+    worst = single.worst if single is not None else None
+    middle = worst.t if worst is not None else 0.0
+    units = ("margin [mm]", "thrust [N]", "error [mm]", "tilt [deg]")
+    made = over_time(
+        "worst_second",
+        "The worst second",
+        " ".join(said),
+        [Row(unit, row, (0.0,) if k == 0 else ()) for k, (unit, row) in
+         enumerate(zip(units, rows, strict=True)) if row],
+        _marks(flights),
+        (middle - _DETAIL_S, middle + _DETAIL_S),
+    )  # fmt: skip
+    if single is None:
+        made.layout["xaxis"]["title"]["text"] = "time from the smallest margin [s]"
+    return made
+
+
+def worst_sentence(flight: Reported) -> str:
+    """The smallest margin in words."""
+    worst = flight.worst
+    if worst is None:
+        return "No margin was recorded."
+    if not worst.key:
+        return (
+            f"By the vehicle's own estimate the smallest margin was {_MM * worst.margin:.1f} mm, "
+            f"at {worst.t:.2f} s."
+        )
+    zone, _, part = worst.key.partition("/")
+    surface = flight.result.get("surfaces_m", {}).get(worst.key)
+    behind = "" if surface is None else f" ({_MM * surface:.1f} mm from its surface)"
+    more = "more" if worst.margin >= 0.0 else "less"
+    return (
+        f"At {worst.t:.3f} s the {part.replace('_', ' ')} kept {_MM * abs(worst.margin):.1f} mm "
+        f"{more} than the clearance from {zone}{behind}: the smallest margin of the flight."
+    )
+
+
+def _worst_margins(flight: Reported, row: list[Trace], zero: float, colour: str | None) -> None:
+    """The parts nearest to anything in that second."""
+    worst, truth = flight.worst, flight.margins
+    if worst is None or truth is None:
+        return
+    t = flight.since(truth.t)
+    inside = np.abs(t - worst.t) <= _DETAIL_S
+    nearest = np.argsort(truth.values[inside].min(axis=0))[: 1 if colour else 4]
+    for k, key in enumerate(nearest.tolist()):
+        name = f"{flight.label} {truth.keys[key]}" if colour else truth.keys[key]
+        values = _MM * _finite(truth.values[inside, key])
+        row.append(line(name, t[inside] - zero, values, colour or COLOURS[k]))
+
+
+def _about(flight: Reported) -> list[tuple[str, Array, Array]]:
+    """Name, times since the start [s] and values of what is shown beside the margins."""
+    sent, tracked = flight.table("actuator_command"), flight.table("sim_tracking")
+    none: tuple[str, Array, Array] = ("", np.empty(0), np.empty(0))
+    truth: Table | None = flight.table("sim_ground_truth") or flight.table("vehicle_attitude")
+    found = [none, none, none]
+    if sent is not None:
+        found[0] = ("rotor", flight.since(sent.t), sent["rotor_thrust"])
+    if tracked is not None:
+        size = _MM * np.linalg.norm(tracked["p_WE"] - tracked["target"], axis=1)
+        found[1] = ("tracking error", flight.since(tracked.t), size)
+    if truth is not None:
+        q = truth["q_WB"] if "q_WB" in truth.columns else truth["q"]
+        found[2] = ("tilt", flight.since(truth.t), tilt_deg(q))
+    return found
+
+
+def _finite(values: Array) -> Array:
+    return np.where(np.isfinite(values), values, np.nan)
+
+
+def _named(flight: Reported, flights: Sequence[Reported], name: str) -> str:
+    return name if len(flights) == 1 else f"{flight.label}: {name}"
+
+
+def _marks(flights: Sequence[Reported]) -> list[tuple[float, str]]:
+    """Events of a single flight; those of several would not be told apart."""
+    return event_marks(flights[0]) if len(flights) == 1 else []
+
+
+__all__ = ["TRUTH", "charts", "event_marks", "worst_sentence"]

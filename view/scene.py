@@ -1,0 +1,130 @@
+"""What is shown of a flight at one instant, wherever it comes from."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from fsw.signals import SafeSet, Vec2, Vec3, Vec4
+
+NOWHERE: Vec3 = (math.nan, math.nan, math.nan)
+
+
+class Posture(NamedTuple):
+    """A vehicle with an arm in space."""
+
+    p: Vec3  # m, NED, body origin
+    q: Vec4  # [w, x, y, z], body to NED
+    q_arm: Vec2  # rad: th1 from straight down, th2 relative to link 1
+
+
+class Horizon(NamedTuple):
+    """A plan, from its start to its end: one place a node."""
+
+    base: tuple[Vec3, ...]  # m, NED
+    tip: tuple[Vec3, ...]  # m, NED; the end-effector
+
+
+class Margin(NamedTuple):
+    """One zone and part of the body."""
+
+    name: str
+    margin: float  # m beyond the clearance; negative is a violation
+    barrier: float  # m/s, h; the barrier acts at or below 0
+
+
+class Rotor(NamedTuple):
+    """What one rotor was told."""
+
+    thrust: float  # N
+    most: float  # N
+
+
+class Battery(NamedTuple):
+    """What is left."""
+
+    voltage: float  # V
+    remaining: float  # share
+
+
+class Solver(NamedTuple):
+    """The last planning cycle."""
+
+    status: str
+    total: float  # s; NaN where it was not measured
+    solve: float  # s; NaN where it was not measured
+    iterations: int  # of the interior-point or the dual solver
+    slack: float  # m/s
+    missed: int  # deadlines, since the start
+    fallbacks: int  # plans that were refused, since the start
+
+
+class Timing(NamedTuple):
+    """One rate group over its last second; NaN in lockstep."""
+
+    name: str
+    period: float  # s
+    execution_p50: float  # s
+    execution_p99: float  # s
+    lateness_p99: float  # s
+    late: int  # ticks, since the start
+    skipped: int  # ticks, since the start
+
+
+class Safety(NamedTuple):
+    """Episodes since the start."""
+
+    breaches: int = 0
+    departures: int = 0
+    interventions: int = 0
+
+
+_SAFE = Safety()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scene:
+    """What is shown; None, NaN or empty where the source does not say it."""
+
+    t: float  # s, sensor time
+    estimate: Posture | None = None
+    truth: Posture | None = None
+    velocity: Vec3 | None = None  # m/s, NED, estimated
+    thrust: Vec4 | None = None  # N, commanded: rear, left, front, right
+    torque: Vec2 | None = None  # N m, commanded
+    joint_rates: Vec2 | None = None  # rad/s
+    target: Vec3 | None = None  # m, NED: where the end-effector should be now
+    base_target: Vec3 | None = None  # m, NED: where the running plan has the base now
+    horizon: Horizon | None = None
+    safe_set: SafeSet | None = None
+    margins: tuple[Margin, ...] = ()
+    minimum: float = math.nan  # m, of all margins
+    added: float = math.nan  # m, kept beyond the clearances because the estimate is not sure
+    sigma: Vec3 | None = None  # m, standard deviation of the estimated place, NED
+    mode: str = ""
+    armed: bool = False
+    landed: bool = False
+    failures: str = ""  # names of the active failsafes
+    battery: Battery | None = None
+    link_age: float = math.nan  # s since something came; NaN for a log
+    solver: Solver | None = None
+    timing: tuple[Timing, ...] = ()
+    safety: Safety = _SAFE
+
+
+class Event(NamedTuple):
+    """Something to jump to."""
+
+    t: float  # s, sensor time
+    kind: str  # a value of view.flight_events.EventKind
+    text: str
+
+
+class Worst(NamedTuple):
+    """The smallest margin of a flight."""
+
+    t: float  # s, sensor time
+    margin: float  # m
+    name: str  # of zone and part
+    source: str  # who says so

@@ -1,0 +1,353 @@
+"""The three-dimensional part of the page. Everything is in the local frame: NED, metres."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Final
+
+import numpy as np
+import viser
+from numpy.typing import NDArray
+
+from fsw.geometry.rotation import quaternion_from_matrix
+from fsw.model.airframe import Airframe
+from fsw.signals import SafeSet, Vec3, Vec4
+from view import colours
+from view.colours import Rgb
+from view.flight import Trail
+from view.scene import Margin, Posture, Scene
+from view.vehicle import places, rotor_hubs
+from view.zone_meshes import Mesh, moved, zone_mesh
+
+Array = NDArray[Any]
+
+_UP: Final[Vec4] = (0.0, 1.0, 0.0, 0.0)  # z of a part points up: half a turn about x
+_STRAIGHT: Final[Vec4] = (1.0, 0.0, 0.0, 0.0)
+_ARROW: Final = 0.32  # m, of a rotor's full thrust
+_SIGMAS: Final = 3.0
+_EDGE: Final[Rgb] = (232, 150, 156)
+_PARTS: Final = ("base", "joint2", "end_effector")
+
+
+class VehicleFigure:
+    """Hull, rotors, legs, links and tool."""
+
+    def __init__(
+        self, scene: viser.SceneApi, name: str, airframe: Airframe, ghost: Rgb | None = None
+    ) -> None:
+        """Draw it invisible; a ``ghost`` is pale, of one colour and without thrusts."""
+        self._name, self._airframe = name, airframe
+        self._scene = scene
+        self._tone: dict[str, Any] = {"cast_shadow": ghost is None, "receive_shadow": False}
+        if ghost is not None:
+            self._tone["opacity"] = 0.3
+        self._ghost = ghost
+        self._body = scene.add_frame(name, show_axes=False, visible=False)
+        self._arrows: list[viser.MeshHandle] = []
+        self._add_hull()
+        for k, hub in enumerate(rotor_hubs(airframe)):
+            self._add_rotor(k, hub)
+        self._add_legs()
+        size = airframe.size
+        self._links = [
+            scene.add_cylinder(
+                f"{name}-link{k}",
+                radius=0.7 * size.link,
+                height=length,
+                color=ghost or colours.DARK,
+                visible=False,
+                **self._tone,
+            )
+            for k, length in enumerate(airframe.link_length, start=1)
+        ]
+        self._joint = scene.add_icosphere(
+            f"{name}-joint2", radius=size.link, color=ghost or colours.GREY, visible=False,
+            **self._tone,
+        )  # fmt: skip
+        self._tool = scene.add_icosphere(
+            f"{name}-tool", radius=size.tool, color=ghost or colours.ORANGE, visible=False,
+            **self._tone,
+        )  # fmt: skip
+        self._shown = False
+        self._colours: dict[str, Rgb] = {}
+
+    def show(self, posture: Posture | None, thrust: Vec4 | None = None) -> None:
+        """Move it to a ``posture``; without one it is not visible. ``thrust`` [N] of each rotor."""
+        if (posture is not None) != self._shown:
+            self._shown = posture is not None
+            for part in (self._body, *self._links, self._joint, self._tool):
+                part.visible = self._shown
+        if posture is None:
+            return
+        self._body.position, self._body.wxyz = posture.p, posture.q
+        base, joint2, tip = places(posture, self._airframe)
+        for link, begin, end in zip(self._links, (base, joint2), (joint2, tip), strict=True):
+            link.position, link.wxyz = _between(begin, end)
+        self._joint.position, self._tool.position = joint2, tip
+        for arrow, newtons in zip(self._arrows, thrust or (), strict=False):
+            arrow.scale = (1.0, 1.0, max(newtons / self._airframe.rotor_thrust_max, 0.01))
+
+    def colour(self, margins: tuple[Margin, ...]) -> None:
+        """Give the parts that are kept clear the colour of their least margin."""
+        least = dict.fromkeys(_PARTS, math.nan)
+        for one in margins:
+            part = one.name.rpartition("/")[2]
+            if part in least:
+                least[part] = float(np.fmin(least[part], one.margin))
+        for part, handle in zip(_PARTS, (self._hull, self._joint, self._tool), strict=True):
+            colour = colours.of_margin(least[part])
+            if self._colours.get(part) != colour:
+                self._colours[part] = colour
+                handle.color = colour
+
+    def _add_hull(self) -> None:
+        size = self._airframe.size
+        self._hull = self._scene.add_icosphere(
+            f"{self._name}/hull", radius=0.6 * size.hull, color=self._ghost or colours.GREY,
+            scale=(1.25, 1.25, 0.62), **self._tone,
+        )  # fmt: skip
+        if self._ghost is None:  # where the nose is
+            self._scene.add_box(
+                f"{self._name}/nose", color=colours.BLUE, dimensions=(0.05, 0.025, 0.015),
+                position=(0.085, 0.0, 0.0), **self._tone,
+            )  # fmt: skip
+
+    def _add_rotor(self, k: int, hub: Vec3) -> None:
+        name, size, tone = f"{self._name}/rotor{k}", self._airframe.size, self._tone
+        middle, turn = _between((0.0, 0.0, 0.0), hub)
+        self._scene.add_cylinder(
+            f"{name}/arm", radius=0.011, height=self._airframe.rotor_arm,
+            color=self._ghost or colours.DARK, position=middle, wxyz=turn, **tone,
+        )  # fmt: skip
+        front = self._ghost or (colours.BLUE if k == 2 else colours.GREY)
+        self._scene.add_cylinder(
+            f"{name}/disc", radius=size.blade, height=0.008, color=front,
+            position=(hub[0], hub[1], -0.035), **{**tone, "opacity": 0.15 if self._ghost else 0.35},
+        )  # fmt: skip
+        if self._ghost is None:
+            self._scene.add_cylinder(
+                f"{name}/motor", radius=0.02, height=0.04, color=colours.DARK,
+                position=(hub[0], hub[1], -0.015), **tone,
+            )  # fmt: skip
+            vertices, faces = _arrow()
+            self._arrows.append(
+                self._scene.add_mesh_simple(
+                    f"{name}/thrust", vertices=vertices, faces=faces, color=colours.VIOLET,
+                    position=(hub[0], hub[1], -0.04), wxyz=_UP, side="double", cast_shadow=False,
+                )
+            )  # fmt: skip
+
+    def _add_legs(self) -> None:
+        size, length = self._airframe.size, self._airframe.leg_length
+        hips = 0.35 * size.feet_spread
+        for k, (north, east) in enumerate(((1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0))):
+            foot = (north * size.feet_spread, east * size.feet_spread, length - size.leg)
+            hip = (north * hips, east * hips, 0.02)
+            middle, turn = _between(hip, foot)
+            self._scene.add_cylinder(
+                f"{self._name}/leg{k}", radius=0.006, height=math.dist(hip, foot),
+                color=self._ghost or colours.GREY, position=middle, wxyz=turn, **self._tone,
+            )  # fmt: skip
+
+
+class Stage:
+    """Everything that is drawn in space."""
+
+    def __init__(self, server: viser.ViserServer, airframe: Airframe) -> None:
+        self._scene = scene = server.scene
+        scene.set_up_direction("-z")
+        # Its light comes with viser; nothing is fetched.
+        scene.configure_environment_map("studio", environment_intensity=0.3)
+        self._vehicle = VehicleFigure(scene, "/vehicle", airframe)
+        self._truth = VehicleFigure(scene, "/truth", airframe, ghost=colours.ORANGE)
+        self._target = scene.add_icosphere(
+            "/target", radius=0.022, color=colours.GREEN, opacity=0.85, visible=False,
+            cast_shadow=False,
+        )  # fmt: skip
+        self._spread = scene.add_icosphere(
+            "/estimate spread", radius=1.0, color=colours.BLUE, opacity=0.18, visible=False,
+            cast_shadow=False, receive_shadow=False,
+        )  # fmt: skip
+        nothing = np.zeros((1, 2, 3), np.float32)
+        self._plan_base = scene.add_line_segments(
+            "/plan/base", nothing, colours.BLUE, thickness=0.008, visible=False
+        )
+        self._plan_tip = scene.add_line_segments(
+            "/plan/end-effector", nothing, colours.CYAN, thickness=0.014, visible=False
+        )
+        self._region: tuple[Vec3, Vec3] = ((-2.0, -2.0, -2.5), (2.0, 2.0, 0.0))
+        self._safe_set: SafeSet | None = None
+        self._zones: list[viser.FrameHandle] = []
+        self._rides: tuple[Vec3 | None, bool] = (None, False)
+        self._visible: dict[int, bool] = {}
+        self._trail: list[viser.LineSegmentsHandle] = []
+        self.show_truth = True
+
+    def frame(self, server: viser.ViserServer, region: tuple[Vec3, Vec3]) -> None:
+        """Choose floor, walls and the first view for a ``region`` [m, NED]."""
+        self._region = region
+        low, high = np.array(region[0]), np.array(region[1])
+        middle, span = 0.5 * (low + high), float(np.max(high - low))
+        self._scene.add_grid(
+            "/ground", infinite_grid=True, plane="xy", cell_size=0.25, section_size=1.0,
+            cell_color=(228, 231, 235), section_color=(200, 206, 213), shadow_opacity=0.25,
+            fade_distance=4.0 * span,
+            position=(round(float(middle[0])), round(float(middle[1])), 0.0), wxyz=_UP,
+        )  # fmt: skip
+        away = 0.46 * span * np.array((-1.25, 0.95, -0.8))
+        camera = server.initial_camera
+        camera.up = (0.0, 0.0, -1.0)
+        # Below the middle: the timeline covers the lower part of the window.
+        camera.look_at = tuple(middle + np.array((0.0, 0.0, 0.3 * (high - low)[2])))
+        camera.position = tuple(middle + away)
+        self._safe_set = None
+
+    def show(self, now: Scene) -> None:
+        """Draw one instant."""
+        self._vehicle.show(now.estimate, now.thrust)
+        self._vehicle.colour(now.margins)
+        self._truth.show(now.truth if self.show_truth and _apart(now) else None)
+        self._place(self._target, now.target)
+        self._place(
+            self._spread, None if now.estimate is None or now.sigma is None else now.estimate.p
+        )
+        if now.sigma is not None:
+            x, y, z = (max(_SIGMAS * one, 1e-4) for one in now.sigma)
+            self._spread.scale = (x, y, z)
+        for handle, path in (
+            (self._plan_base, now.horizon.base if now.horizon else ()),
+            (self._plan_tip, now.horizon.tip if now.horizon else ()),
+        ):
+            self._see(handle, len(path) > 1)
+            if len(path) > 1:
+                handle.points = _segments(np.array(path))
+        self._show_zones(now)
+
+    def draw_trail(self, trail: Trail) -> None:
+        """Draw a path in the colours of its margins."""
+        if len(trail.points) > 1:
+            self._add_trail("/trail", trail)
+
+    def extend_trail(self, number: int, trail: Trail, most: int) -> None:
+        """Add a piece of path; of ``most`` pieces the oldest is removed."""
+        if len(trail.points) > 1:
+            self._trail.append(self._add_trail(f"/trail/{number}", trail))
+        while len(self._trail) > most:
+            self._trail.pop(0).remove()
+
+    def draw_reference(self, points: Array) -> None:
+        """Draw where the end-effector should go: ``points`` (n, 3) [m, NED]; NaN: not there."""
+        if len(points) > 1:
+            segments = _segments(points)
+            segments = segments[np.isfinite(segments).all(axis=(1, 2))]
+            if len(segments):
+                self._scene.add_line_segments(
+                    "/reference", segments, (150, 200, 165), thickness=0.006
+                )
+
+    def _add_trail(self, name: str, trail: Trail) -> viser.LineSegmentsHandle:
+        paint = colours.of_margins(trail.margins)
+        pairs = np.stack((paint[:-1], paint[1:]), axis=1)
+        segments = _segments(trail.points)
+        kept = np.isfinite(segments).all(axis=(1, 2))
+        return self._scene.add_line_segments(name, segments[kept], pairs[kept], thickness=0.01)
+
+    def _show_zones(self, now: Scene) -> None:
+        zones = now.safe_set.zones if now.safe_set else ()
+        rides = any(zone.shape.kind == "target sphere" for zone in zones)
+        known = (now.target is not None, rides)
+        if now.safe_set != self._safe_set or known != (self._rides[0] is not None, self._rides[1]):
+            self._safe_set, self._rides = now.safe_set, (now.target, rides)
+            self._draw_zones(now)
+        for frame, zone in zip(self._zones, zones, strict=True):
+            if any(zone.velocity):
+                frame.position = moved(zone, now.t)
+            elif zone.shape.kind == "target sphere" and now.target is not None:
+                frame.position = now.target
+
+    def _draw_zones(self, now: Scene) -> None:
+        for old in self._zones:
+            old.remove()
+        self._zones = []
+        for k, zone in enumerate(now.safe_set.zones if now.safe_set else ()):
+            name = f"/zones/{k}"
+            frame = self._scene.add_frame(name, show_axes=False)
+            self._zones.append(frame)
+            at = (0.0, 0.0, 0.0) if now.target is not None else None
+            mesh = zone_mesh(zone, self._region, at)
+            if mesh is None:
+                continue
+            if zone.keep_in:
+                self._add_mesh(f"{name}/inside", mesh.surface, colours.BLUE, 0.1)
+            else:
+                solid = zone.shape.kind != "half-space"
+                self._add_mesh(
+                    f"{name}/surface", mesh.surface, colours.RED, 0.75 if solid else 0.11
+                )
+                if not solid:
+                    outline = _segments(mesh.surface.vertices[[0, 1, 2, 3, 0]])
+                    self._scene.add_line_segments(f"{name}/edge", outline, _EDGE, thickness=0.004)
+            if mesh.shell is not None:
+                pale = 0.07 if zone.shape.kind == "half-space" else 0.16
+                self._add_mesh(f"{name}/shell", mesh.shell, colours.ORANGE, pale)
+
+    def _add_mesh(self, name: str, mesh: Mesh, colour: Rgb, opacity: float) -> None:
+        self._scene.add_mesh_simple(
+            name, vertices=mesh.vertices, faces=mesh.faces, color=colour, opacity=opacity,
+            side="double", cast_shadow=False, receive_shadow=False,
+        )  # fmt: skip
+
+    def _place(self, handle: Any, p: Vec3 | None) -> None:
+        self._see(handle, p is not None)
+        if p is not None:
+            handle.position = p
+
+    def _see(self, handle: Any, visible: bool) -> None:
+        """Say it only where it changes."""
+        if self._visible.get(id(handle)) != visible:
+            self._visible[id(handle)] = visible
+            handle.visible = visible
+
+
+def _apart(now: Scene) -> bool:
+    """Whether truth and estimate can be told apart on a screen."""
+    if now.truth is None or now.estimate is None:
+        return False
+    return math.dist(now.truth.p, now.estimate.p) > 0.01
+
+
+def _segments(path: Array) -> Array:
+    """A path (n, 3) as n - 1 segments (n - 1, 2, 3)."""
+    return np.stack((path[:-1], path[1:]), axis=1).astype(np.float32)
+
+
+def _between(begin: Vec3, end: Vec3) -> tuple[Vec3, Vec4]:
+    """Middle [m] and attitude of a cylinder, whose axis is z, from one place to another [m]."""
+    a, b = np.array(begin), np.array(end)
+    z = (b - a) / max(float(np.linalg.norm(b - a)), 1e-9)
+    x = np.cross((0.0, 1.0, 0.0) if abs(z[1]) < 0.9 else (1.0, 0.0, 0.0), z)
+    x /= np.linalg.norm(x)
+    y = np.cross(z, x)
+    rows = (x[0], y[0], z[0], x[1], y[1], z[1], x[2], y[2], z[2])
+    mx, my, mz = (0.5 * (a + b)).tolist()
+    m = [float(one) for one in rows]
+    return (mx, my, mz), quaternion_from_matrix((*m[:3], *m[3:6], *m[6:]))  # type: ignore[arg-type]
+
+
+def _arrow() -> tuple[Array, Array]:
+    """An arrow along z of length 1 m times what full thrust is drawn as."""
+    turns = np.linspace(0.0, 2.0 * math.pi, 12, endpoint=False)
+    ring = np.stack((np.cos(turns), np.sin(turns)), axis=1)
+    outline = ((0.0, 0.0), (0.009, 0.0), (0.009, 0.78), (0.024, 0.78), (0.0, 1.0))
+    rows = [np.column_stack((r * ring, np.full(len(ring), _ARROW * h))) for r, h in outline]
+    n = len(ring)
+    faces = [
+        (n * row + k, n * row + (k + 1) % n, n * (row + 1) + k)
+        for row in range(len(outline) - 1)
+        for k in range(n)
+    ] + [
+        (n * row + (k + 1) % n, n * (row + 1) + (k + 1) % n, n * (row + 1) + k)
+        for row in range(len(outline) - 1)
+        for k in range(n)
+    ]
+    return np.concatenate(rows), np.array(faces)

@@ -1,0 +1,1 @@
+"""``pandion top``: a vehicle's messages, margins and texts in a terminal."""

@@ -1,0 +1,84 @@
+"""Margins over time by the simulator's true state, computed by what made ``result.json``."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sitl.mission_clock import MissionClock
+from sitl.scenario import Scenario
+from sitl.scenario_file import ScenarioError, load_scenario, scenario_digest
+from view.flight_data import FlightData, Table
+
+Array = NDArray[np.float64]
+_TRUTH = "sim_ground_truth"
+_STATE = ("p_WB", "v_WB", "q_WB", "w_WB_B", "thrust", "q_arm", "qd_arm")
+
+
+@dataclass(frozen=True, slots=True)
+class TrueMargins:
+    """Margins at the logged samples of the true state."""
+
+    keys: tuple[str, ...]  # zone/part, as in result.json
+    t: Array  # (samples,) s, sensor time
+    values: Array  # (samples, keys) m; infinite while a zone does not apply
+    places: Array  # (samples, 4, 3) m, NED: base, joint 1, joint 2, end-effector
+
+    def of_zones(self) -> dict[str, Array]:
+        """The least over the parts of each zone (samples,) [m], by zone."""
+        zones = [key.partition("/")[0] for key in self.keys]
+        return {
+            zone: self.values[:, [name == zone for name in zones]].min(axis=1)
+            for zone in dict.fromkeys(zones)
+        }
+
+    @property
+    def least(self) -> Array:
+        """The least of all (samples,) [m]; infinite without zones."""
+        return np.asarray(self.values.min(axis=1, initial=np.inf), dtype=np.float64)
+
+
+def scenario_of(flight: FlightData) -> Scenario | None:
+    """The scenario that was flown, None where it is not among those of this build."""
+    name = str(flight.information.get("scenario", ""))
+    try:
+        if scenario_digest(name) != flight.information.get("scenario_digest"):
+            return None
+        return load_scenario(name)
+    except ScenarioError:
+        return None
+
+
+def true_margins(flight: FlightData, scenario: Scenario) -> TrueMargins | None:
+    """Margins of a flight; None for a log without truth.
+
+    The samples are 20 ms apart (2 ms with ``LOG_PROFILE`` 1), those of ``result.json`` 1 ms.
+    """
+    truth = flight.tables.get(_TRUTH)
+    if truth is None:
+        return None
+    from sitl.world import World  # here, because it loads the kernels
+
+    world, clock = World(scenario), MissionClock(scenario)
+    placed = _placed(truth)
+    values = np.empty((len(truth), len(world.keys)))
+    since = truth.t - flight.begin  # the simulation's time
+    for row, time_s, places in zip(values, since.tolist(), placed, strict=True):
+        target = clock.target_at(time_s).p if world.follows and clock.counts(time_s) else None
+        row[:] = world.margins(places, time_s, target)
+    return TrueMargins(world.keys, truth.t, values, placed[:, :4])
+
+
+def _placed(truth: Table) -> Array:
+    """Base, joints, end-effector and the base's axes of each record, (records, 7, 3)."""
+    from sitl.plant.aerial_manipulator import plant
+    from sitl.plant.kinematics import places
+    from sitl.plant.parameters import Vehicle
+
+    numbers, out = plant(Vehicle()), np.empty((len(truth), 7, 3))
+    states = np.concatenate([truth[name] for name in _STATE], axis=1)
+    for k, state in enumerate(states):
+        places(numbers, state, out[k : k + 1])
+    return out
