@@ -61,7 +61,7 @@ EFFECT_RATE: Final = 2.0  # 1/s, by which allocation follows
 # Joints.
 UNDONE: Final = 0.12  # N m, root mean square of what undoes the torque
 UNDOING: Final = 0.5  # share of the torque that it undoes
-BEHIND: Final = 0.03  # rad, from the reference
+BEHIND: Final = 0.02  # rad, root mean square of the distance from the reference
 JOINT_TIME: Final = 0.1  # s
 STANDING: Final = 0.2  # rad/s, root mean square of the rate of a joint that stands
 MOVED: Final = 0.05  # rad; a joint that has moved so far is not stuck
@@ -102,7 +102,7 @@ WATCH: Final = np.dtype(
         ("asked2", float, (2,)),
         ("undoing", float, (2,)),
         ("rate2", float, (2,)),  # rad^2/s^2
-        ("behind", float, (2,)),  # rad, mean distance from the reference
+        ("behind2", float, (2,)),  # rad^2, mean square of the distance from the reference
         ("joint_for", float, (2,)),  # s, for how long it has been suspected
         ("joint", float, (2,)),  # SOUND, STUCK or LIMP
         ("stood_at", float, (2,)),  # rad, where it was found stuck
@@ -323,7 +323,8 @@ def _observe_arm(
         s.asked2[k] += forget * (s.asked[k] * s.asked[k] - s.asked2[k])
         s.undoing[k] += forget * (s.undone[k] * s.asked[k] - s.undoing[k])
         s.rate2[k] += forget * (qd_arm[k] * qd_arm[k] - s.rate2[k])
-        s.behind[k] += forget * (reference[k] - q_arm[k] - s.behind[k])
+        behind = reference[k] - q_arm[k]
+        s.behind2[k] += forget * (behind * behind - s.behind2[k])
 
 
 @compilable
@@ -333,9 +334,8 @@ def _judge_joint(s: Any, k: int, dt: float, settled: bool, angle: float) -> None
     if s.joint[k] != SOUND:
         return
     undone = s.undone2[k] > UNDONE * UNDONE and s.undoing[k] < -UNDOING * s.asked2[k]
-    s.joint_for[k] = (
-        s.joint_for[k] + dt if settled and undone and abs(s.behind[k]) > BEHIND else 0.0
-    )
+    behind = s.behind2[k] > BEHIND * BEHIND
+    s.joint_for[k] = s.joint_for[k] + dt if settled and undone and behind else 0.0
     if s.joint_for[k] > JOINT_TIME:
         s.joint[k] = STUCK if s.rate2[k] < STANDING * STANDING else LIMP
         s.stood_at[k] = angle

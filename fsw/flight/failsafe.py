@@ -523,9 +523,8 @@ FAILSAFES: Final = (
         Severity.EMERGENCY,
         detail=lambda c: f": {c.state.damage.rotor}{_for(c, c.state.damage.rotor_us)}",
         of_vehicle=True,
-        detected="in flight, a rotor has given less than a fifth of its command for 0.15 s: 0.35 s "
+        detected="in flight, a rotor has given less than a fifth of its command for 0.15 s: 0.28 s "
         "after it was lost",
-        within_us=350_000,
         parameters=("FD_ACT_EN", "CBRK_FLIGHTTERM"),
         does="terminate: the others cannot hold the vehicle upright "
         "([what is left](../concepts/failsafes.md#a-rotor-that-is-lost)); with `CBRK_FLIGHTTERM` "
@@ -541,8 +540,8 @@ FAILSAFES: Final = (
         of_vehicle=True,
         slow=True,
         detected="in flight, a rotor gives another thrust than it is commanded, by 1.5 N for "
-        "0.15 s, or by 4 N for 0.03 s",
-        within_us=_SLOWLY + 400_000,
+        "0.15 s, or by 4 N for 0.03 s: 0.1 s after it was lost, 0.3 s after it gives 70 %",
+        within_us=_SLOWLY,
         parameters=("FD_ACT_EN", "COM_ACT_FAIL_ACT", "CA_FAILURE_MODE"),
         ends="a weak rotor gives what it is commanded for 3 s; another failure never ends",
     ),
@@ -556,7 +555,7 @@ FAILSAFES: Final = (
         slow=True,
         detected="in flight, for 0.1 s, torque has no effect on a joint that does not follow its "
         "reference: 0.12 N m, and half of what is asked for",
-        within_us=_SLOWLY + 300_000,
+        within_us=_SLOWLY,
         parameters=("FD_ACT_EN", "COM_ACT_FAIL_ACT"),
         ends="never in a flight",
     ),

@@ -36,6 +36,7 @@ def told(flight: Flight) -> list[str]:
     return [text for text in flight.texts if "failed" in text]
 
 
+@pytest.mark.requirement("REQ-ACT-1")
 def test_a_weak_rotor_is_named_once_and_the_vehicle_lands_with_it() -> None:
     flight = flown(hover(), Fault("motor", "weak", instance=2.0, share=0.6), 1.2)
     (text,) = told(flight)
@@ -52,6 +53,7 @@ def test_a_weak_rotor_is_named_once_and_the_vehicle_lands_with_it() -> None:
     assert sent[1] / sent[3] == pytest.approx(1.0 / 0.6, rel=0.15)
 
 
+@pytest.mark.requirement("REQ-ACT-2")
 def test_a_limp_joint_is_named_once_and_asked_for_nothing_more() -> None:
     flight = flown(hover((-30.0, 80.0)), Fault("joint", "off", instance=2.0), 0.6)
     (text,) = told(flight)
@@ -63,6 +65,7 @@ def test_a_limp_joint_is_named_once_and_asked_for_nothing_more() -> None:
     assert flight.state.nominal.q_arm[1] == flight.state.estimate.q_arm[1]
 
 
+@pytest.mark.requirement("REQ-ACT-1", "REQ-ACT-3")
 def test_a_lost_rotor_ends_the_flight_before_it_tilts() -> None:
     flight = Flight(
         replace(hover(), faults=(Fault("motor", "off", start_s=FAULT_S, instance=3.0),))
@@ -76,6 +79,7 @@ def test_a_lost_rotor_ends_the_flight_before_it_tilts() -> None:
     assert math.degrees(math.acos(estimate.R_WB[8])) < 15.0
 
 
+@pytest.mark.requirement("REQ-ACT-1", "REQ-ACT-3")
 @pytest.mark.long
 @pytest.mark.parametrize("suite", ["perfect", "mocap"])
 @pytest.mark.parametrize("mode", ["hold", "trajectory"])
@@ -86,13 +90,14 @@ def test_each_rotor_is_named_in_time(
 ) -> None:
     fault = Fault("motor", "weak", instance=rotor + 1.0, share=share)
     seen = fly(mode, fault, suite)
-    assert NAMES[rotor] in seen.told
-    assert seen.told_s is not None
-    assert seen.told_s <= within_s
+    assert seen.warning is not None
+    assert NAMES[rotor] in seen.warning.text
+    assert seen.warning.after_s <= within_s
     assert seen.contact == ("ground" if share == 0.0 else "")
     assert seen.actions == (("land", "terminate") if share == 0.0 else ("land",))
 
 
+@pytest.mark.requirement("REQ-ACT-2", "REQ-ACT-4")
 @pytest.mark.long
 @pytest.mark.parametrize("suite", ["perfect", "mocap"])
 @pytest.mark.parametrize("kind", ["off", "stuck"])
@@ -100,7 +105,8 @@ def test_each_rotor_is_named_in_time(
 def test_each_joint_is_named_beside_walls(joint: int, kind: str, suite: str) -> None:
     fault = Fault("joint", kind, instance=float(joint))  # type: ignore[arg-type]
     seen = fly("trajectory", fault, suite)
-    assert f"joint {joint}" in seen.told
+    assert seen.warning is not None
+    assert f"joint {joint}" in seen.warning.text
     assert not seen.contact
     assert seen.least_m is not None
     assert seen.least_m > 0.0
@@ -111,7 +117,8 @@ def test_each_joint_is_named_beside_walls(joint: int, kind: str, suite: str) -> 
 def test_a_rotor_that_does_not_obey_is_flown_with_beside_walls(kind: str) -> None:
     fault = Fault("motor", kind, instance=2.0)  # type: ignore[arg-type]
     seen = fly("trajectory", fault, "mocap")
-    assert "rotor 2" in seen.told
+    assert seen.warning is not None
+    assert "rotor 2" in seen.warning.text
     assert not seen.contact
 
 
