@@ -231,6 +231,17 @@ def test_a_flight_that_was_killed_is_drawn_by_its_own_estimate(tmp_path: Path) -
     assert "inputs" in figures(page)
 
 
+def test_a_result_of_an_older_build_is_shown_as_far_as_it_goes(tmp_path: Path) -> None:
+    older = write_flight(tmp_path / "older")
+    written = json.loads((older / "result.json").read_text())
+    for key in ("sensors", "limits", "safety", "beyond_s"):
+        del written[key]
+    (older / "result.json").write_text(json.dumps(written))
+    page = write_report([older]).read_text(encoding="utf-8")
+    assert "badge pass" in page
+    assert "<td>sensors</td><td>unknown</td>" in page
+
+
 def test_labels_tell_flights_apart(tmp_path: Path) -> None:
     for name in ("a/run", "b/run", "c"):
         (tmp_path / name).mkdir(parents=True)
@@ -246,6 +257,9 @@ def test_what_is_no_log_is_refused_in_one_sentence(tmp_path: Path, capsys: Any) 
     said = capsys.readouterr().err
     assert said.count("\n") == 1
     assert "is not a ULog file" in said
+    other = write_flight(tmp_path / "other", limits={"tilt": {}})
+    assert main([str(other)]) == 2
+    assert "of another build: KeyError('largest')" in capsys.readouterr().err
     assert main([str(tmp_path)] * 8) == 2
     assert "at most 7" in capsys.readouterr().err
 
