@@ -50,14 +50,15 @@ def _cells(row: Failsafe) -> tuple[str, ...]:
     return (
         row.condition.value + (" (fault)" if row.of_vehicle else ""),
         row.detected,
-        _seconds(row.within_us),
+        seconds(row.within_us),
         _action(row),
         row.severity.name.lower(),
         row.ends,
     )
 
 
-def _seconds(time_us: int) -> str:
+def seconds(time_us: int) -> str:
+    """A time [us] as readers write it."""
     return f"{time_us // 1000} ms" if time_us < 1_000_000 else f"{1e-6 * time_us:g} s"
 
 

@@ -270,9 +270,8 @@ def close_loops(
         wanted = compensated_joints(
             airframe, tuning.compensation, tuning.joint_limits, off_plan, estimate, plan
         )
-    q_ref, qd_ref = joint_reference(
-        airframe, tuning.joint_limits, memory.joints.reference, wanted, dt * ticks
-    )
+    last = memory.joints.reference, memory.joints.reference_rate
+    q_ref, qd_ref = joint_reference(airframe, tuning.joint_limits, last, wanted, dt * ticks)
     dynamics = arm_dynamics(airframe, estimate, _field(estimate, motion.thrust / mass, observed.d))
     arm_memory = memory.joints
     for _ in range(ticks):
@@ -351,7 +350,7 @@ def _close_loops(
     tuple[Vec3, Vec3, Vec2],
     float,
     tuple[Vec3, float],
-    tuple[Vec2, Vec2, Vec2, Vec2],
+    tuple[Vec2, Vec2, Vec2, Vec2, Vec2],
     float,
     Guarded,
 ]:
@@ -368,6 +367,7 @@ def _close_loops(
             kept.joints.momentum,
             kept.joints.disturbance,
             kept.joints.integral,
+            kept.joints.reference_rate,
         ),
         kept.off_plan,
         guarded,

@@ -40,6 +40,7 @@ class JointMemory(NamedTuple):
     momentum: Vec2  # N m s, as the observer believes
     disturbance: Vec2 = (0.0, 0.0)  # N m, as the observer believes
     integral: Vec2 = (0.0, 0.0)  # rad s, of the errors
+    reference_rate: Vec2 = (0.0, 0.0)  # rad/s, of the last tick
 
 
 class ArmDynamics(NamedTuple):
@@ -63,7 +64,13 @@ def observe_disturbance(
     """The memory ``dt`` [s] later, ``torque`` [N m] having been sent meanwhile."""
     p1, d1 = _observed(memory.momentum[0], memory.disturbance[0], torque[0], arm, 0, dt)
     p2, d2 = _observed(memory.momentum[1], memory.disturbance[1], torque[1], arm, 1, dt)
-    return JointMemory(memory.reference, (p1, p2), (d1, d2), memory.integral)
+    return JointMemory(
+        reference=memory.reference,
+        momentum=(p1, p2),
+        disturbance=(d1, d2),
+        integral=memory.integral,
+        reference_rate=memory.reference_rate,
+    )
 
 
 @compilable
@@ -110,7 +117,14 @@ def joint_torques(
         clamp_magnitude(torque1 - memory.disturbance[0], bound),
         clamp_magnitude(torque2 - memory.disturbance[1], bound),
     )
-    return torques, JointMemory(q_ref, memory.momentum, memory.disturbance, (kept1, kept2))
+    kept = JointMemory(
+        reference=q_ref,
+        momentum=memory.momentum,
+        disturbance=memory.disturbance,
+        integral=(kept1, kept2),
+        reference_rate=qd_ref,
+    )
+    return torques, kept
 
 
 # 1/s; somewhat quicker than the joint loop, which it overrules only where that would pass a limit.

@@ -198,7 +198,7 @@ class _Tick:
         """Do what was asked for; the memory then has a filter of its own."""
         if self._parts:
             self._call(0, self._now)
-            self.memory = self.memory._replace(numbers=self._x)
+            self.memory = FusionMemory(self._x, *self.memory[1:])
         return self.memory
 
     def end(self, until: float) -> kernels.Present:

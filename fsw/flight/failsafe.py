@@ -417,6 +417,7 @@ def _for(context: FailsafeContext, since_us: int) -> str:
 
 
 _SLOWLY: Final = SLOW_US + AT_ONCE_US
+_TWICE: Final = 2 * SLOW_US + AT_ONCE_US  # found in a planning tick, looked at up to a period later
 
 FAILSAFES: Final = (
     Failsafe(
@@ -557,7 +558,7 @@ FAILSAFES: Final = (
         slow=True,
         detected="in flight, for 0.5 s, walls leave 10 mm less than clearances should grow by "
         "([barriers](../concepts/barriers.md#an-uncertain-place))",
-        within_us=_SLOWLY,
+        within_us=_TWICE,
         parameters=("SAFE_SIGMAS",),
         does="critical text; they grow as far as a plan at rest still has a place",
     ),
@@ -635,11 +636,11 @@ FAILSAFES: Final = (
     ),
     Failsafe(
         Condition.PLAN_LATE,
+        # In every tick: a plan may come before the next look, and would have been late in silence.
         lambda c: c.state.plan.awaited_missed and _plans(c),
         _always(Action.WARN),
-        slow=True,
         detected="in flight, a plan has not come at its time",
-        within_us=_SLOWLY,
+        within_us=2 * AT_ONCE_US,
         does="warning; the previous plan continues",
     ),
     Failsafe(
@@ -730,7 +731,7 @@ FAILSAFES: Final = (
         detail=lambda c: f": {c.state.mission.silent_zones} held where predicted",
         slow=True,
         detected="a zone that moves was not announced for `SAFE_MOVE_T`",
-        within_us=_SLOWLY,
+        within_us=_TWICE,
         parameters=("SAFE_MOVE_T",),
         does="critical text; the zone stands where it is predicted then",
         ends="it is announced again",
@@ -759,7 +760,7 @@ FAILSAFES: Final = (
         detected="in flight, what is left of the battery lasts, at the current of the last half "
         "minute, no longer than the way home takes: `RTL_TIME_FACTOR` times the time of it, and "
         "`RTL_TIME_MARGIN`",
-        within_us=_SLOWLY,
+        within_us=_TWICE,
         parameters=(
             *("RTL_TIME_FACTOR", "RTL_TIME_MARGIN", "COM_FLTT_LOW_ACT"),
             "COM_FAIL_ACT_T",
@@ -772,7 +773,7 @@ FAILSAFES: Final = (
         detail=_charge_left,
         slow=True,
         detected="the charge is below `BAT_LOW_THR`",
-        within_us=_SLOWLY,
+        within_us=_TWICE,
         parameters=("BAT_LOW_THR",),
         does="warning",
         ends="the next level",
@@ -786,7 +787,7 @@ FAILSAFES: Final = (
         slow=True,
         delayed=True,
         detected="the charge is below `BAT_CRIT_THR`",
-        within_us=_SLOWLY,
+        within_us=_TWICE,
         parameters=("BAT_CRIT_THR", "COM_LOW_BAT_ACT", "COM_FAIL_ACT_T"),
         ends="the next level",
     ),
@@ -799,7 +800,7 @@ FAILSAFES: Final = (
         slow=True,
         delayed=True,
         detected="the charge is below `BAT_EMERGEN_THR`",
-        within_us=_SLOWLY,
+        within_us=_TWICE,
         parameters=("BAT_EMERGEN_THR", "COM_LOW_BAT_ACT", "COM_FAIL_ACT_T"),
         ends="never in a flight",
     ),

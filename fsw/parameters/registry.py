@@ -147,6 +147,8 @@ _ROWS: Final[dict[str, list[_Row]]] = {
          "Joint references: margin to the joint limits"),
         ("JNT_RATE", "tuning.joint_limits.rate", "rad/s", 0.1, 5.0,
          "Joint references: maximum rate"),
+        ("JNT_ACC", "tuning.joint_limits.acceleration", "rad/s^2", 20.0, 500.0,
+         "Joint references: maximum acceleration of either link"),
         ("JNT_ARMATURE", "airframe.joint_armature", "kg m^2", 0.0, 0.1,
          "Inertia of each joint's motor behind its gear"),
         ("YAW_THR_MAX", "tuning.yaw_thrust_limit", "N", 0.0, 8.0,

@@ -147,8 +147,7 @@ def _datagram(
     measured = simulation.measurements()
     if measured is None:
         return opening + encoder.datagram(simulation.sense(), messages)
-    t_us = simulation.sense().t_us
-    ahead, datagram = encoder.measured_datagrams(t_us, measured, messages, opening)
+    ahead, datagram = encoder.measured_datagrams(simulation.t_us, measured, messages, opening)
     for one in ahead:
         exchange.send_ahead(one)
     return datagram

@@ -21,7 +21,8 @@ from sitl.sensors.noise import GaussMarkov, normal
 
 V6: TypeAlias = tuple[float, float, float, float, float, float]
 
-_BLOCK = 25  # samples whose noise is drawn at once, and for which a bias is held
+_BLOCK = 25  # samples for which a bias is held
+_BLOCKS = 10  # drawn at once, in the order in which one by one would be
 _SPIKE = 1e9  # rad/s or m/s², beyond every range
 
 
@@ -136,9 +137,15 @@ class ImuSensor:
 
     def _drawn(self) -> list[V6]:
         """Bias and noise of the samples to come."""
-        noise = self._random.standard_normal((_BLOCK, 6)) * self._white
-        bias = self._turn_on + (self._gyro_bias.step() + self._accel_bias.step())
-        return cast(list[V6], list(map(tuple, (noise + bias).tolist())))
+        white, gyro = 6 * _BLOCK, self._gyro_bias.draws
+        drawn = self._random.standard_normal((_BLOCKS, white + gyro + self._accel_bias.draws))
+        offsets = drawn[:, :white].reshape(_BLOCKS, _BLOCK, 6) * self._white
+        for block, fresh in zip(offsets, drawn[:, white:], strict=True):
+            bias = self._gyro_bias.moved(fresh[:gyro]) + self._accel_bias.moved(fresh[gyro:])
+            block += self._turn_on + bias
+        # The last one is taken first, block by block.
+        turned = offsets[::-1].reshape(-1, 6)
+        return cast(list[V6], list(map(tuple, turned.tolist())))
 
 
 def _distorted(random: np.random.Generator, scale: float, turn: float) -> Array:

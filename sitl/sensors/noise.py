@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from sitl.plant.vector import Array
 from sitl.ranges import V3
 
 
@@ -25,14 +26,17 @@ class GaussMarkov:
         self._keeps = math.exp(-step_s / time_s)
         fresh = math.sqrt(1.0 - self._keeps * self._keeps)
         self._fresh = np.array([fresh * sigma for sigma in sigmas])
-        self._still = not any(sigmas)
+        self.draws = len(sigmas) if any(sigmas) else 0  # of a step
         self._values = np.array(sigmas) * random.standard_normal(len(sigmas))
 
     def step(self) -> list[float]:
         """The values one step later."""
-        if not self._still:
-            fresh = self._fresh * self._random.standard_normal(len(self._fresh))
-            self._values = self._keeps * self._values + fresh
+        return self.moved(self._random.standard_normal(self.draws))
+
+    def moved(self, drawn: Array) -> list[float]:
+        """The values one step later, with so many ``drawn`` (draws,) [1] of the generator."""
+        if self.draws:
+            self._values = self._keeps * self._values + self._fresh * drawn
         values: list[float] = self._values.tolist()
         return values
 

@@ -48,6 +48,7 @@ def test_sentences_and_tables_show_escapes_as_text(capsys: pytest.CaptureFixture
         assert "\nPASS" not in printed
 
 
+@pytest.mark.requirement("REQ-LINK-9")
 @pytest.mark.parametrize(
     "words",
     [
@@ -109,6 +110,7 @@ def test_no_program_writes_json_that_may_hold_nan() -> None:
     assert wild == KNOWN
 
 
+@pytest.mark.requirement("REQ-LINK-9")
 def test_every_complaint_is_made_printable() -> None:
     """``complain`` and ``say`` are the one way to standard error."""
     root = Path(__file__).parents[2]

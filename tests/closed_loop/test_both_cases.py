@@ -14,6 +14,7 @@ from sitl.scenario_file import load_scenario
 from tests.closed_loop.harness import Flight
 
 
+@pytest.mark.requirement("REQ-SAFE-1", "REQ-ACT-8")
 @pytest.mark.parametrize(
     ("name", "seconds"), [("walls", 20.0), ("workspace", 15.0), ("branches", 13.0)]
 )
@@ -37,6 +38,7 @@ def test_every_margin_stays_positive_and_every_limit_is_kept_between_samples_too
     assert counters.plans >= 10.0 * seconds - 1
 
 
+@pytest.mark.requirement("REQ-ACT-8")
 @pytest.mark.long
 def test_joints_are_asked_for_so_little_that_none_turns_faster_than_table_1_allows() -> None:
     flight = Flight(load_scenario("branches"), seed=509)  # which asks most of joint 2
@@ -47,6 +49,7 @@ def test_joints_are_asked_for_so_little_that_none_turns_faster_than_table_1_allo
     assert all(use.kept for use in uses.values()), uses
 
 
+@pytest.mark.requirement("REQ-SAFE-1")
 def test_a_point_among_walls_is_kept_with_them() -> None:
     tip = Obstacle("tip", (0.82, 0.52, -1.03), 0.1)  # 50 mm from the path
     flight = Flight(replace(load_scenario("walls"), obstacles=(tip,)), seed=11)
@@ -70,6 +73,7 @@ def test_without_the_barrier_the_path_leads_too_close_to_a_branch() -> None:
     assert flight.sim.ended is None  # a point cannot be hit, only come too close to
 
 
+@pytest.mark.requirement("REQ-SAFE-1")
 @pytest.mark.parametrize("yaw_deg", [-135.0, 180.0])
 def test_the_heading_makes_no_difference_to_safety(yaw_deg: float) -> None:
     scenario = replace(load_scenario("workspace"), start=Start("airborne", yaw_deg=yaw_deg))

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import copy
 
+import pytest
+
 from sitl.scenario_file import load_scenario
 from tests.closed_loop.harness import Flight
 
@@ -22,6 +24,7 @@ def test_the_same_seed_gives_the_same_actuators_to_the_bit() -> None:
     assert one.sent != other.sent
 
 
+@pytest.mark.requirement("REQ-TIME-8")
 def test_a_tick_depends_on_nothing_but_its_arguments_and_changes_neither() -> None:
     flight = Flight(load_scenario("workspace"), seed=3)
     flight.follow()

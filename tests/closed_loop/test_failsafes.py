@@ -34,6 +34,7 @@ def to_the_ground(flight: Flight) -> float:
     return fastest
 
 
+@pytest.mark.requirement("REQ-MODE-5", "REQ-PLAN-3")
 @pytest.mark.long
 def test_a_vehicle_whose_planner_is_lost_descends_where_it_is() -> None:
     config = flight_config(body="points")
@@ -49,6 +50,7 @@ def test_a_vehicle_whose_planner_is_lost_descends_where_it_is() -> None:
     assert sum("planner lost" in text and "descending" in text for text in flight.texts) == 1
 
 
+@pytest.mark.requirement("REQ-EST-5")
 @pytest.mark.long
 def test_a_vehicle_without_a_position_descends_where_it_is() -> None:
     flight = Flight(hover(), spoil=lies(FOR_GOOD, 500, p_WB=NOTHING))
@@ -58,6 +60,7 @@ def test_a_vehicle_without_a_position_descends_where_it_is() -> None:
     assert any("position unknown" in text and "descending" in text for text in flight.texts)
 
 
+@pytest.mark.requirement("REQ-MODE-9")
 @pytest.mark.long
 def test_a_vehicle_that_drifts_feels_the_ground_though_its_height_has_drifted() -> None:
     spoil = changed(PoseSample, 3.0, 999.0, lambda _: None)

@@ -316,6 +316,7 @@ def test_a_battery_that_runs_low_is_told_once_a_level_and_acted_upon(
     assert flight.snapshot.battery.charge is charge_of(remaining, (0.2, 0.1, 0.05))
 
 
+@pytest.mark.requirement("REQ-BAT-1")
 def test_the_levels_of_the_battery() -> None:
     levels = (0.2, 0.1, 0.05)
     found = [charge_of(share, levels) for share in (1.0, 0.2, 0.19, 0.1, 0.09, 0.05, 0.04, NAN)]
@@ -326,6 +327,7 @@ def test_the_levels_of_the_battery() -> None:
     assert FlightLimits().battery_low > FlightLimits().battery_critical
 
 
+@pytest.mark.requirement("REQ-SAFE-6")
 def test_a_goto_beyond_an_exclusion_stops_before_it() -> None:
     flight = hovering()
     cylinder = column((1.5, 0.0), 0.5)

@@ -59,6 +59,7 @@ def off(flight: Flight) -> float:
     return math.dist(flight.snapshot.estimate.p_WB, flight.sim.truth().p_WB)
 
 
+@pytest.mark.requirement("REQ-EST-1")
 @pytest.mark.parametrize(
     ("spoil", "text"),
     [
@@ -87,6 +88,7 @@ def test_what_lasts_a_moment_is_flown_through_and_reported(
     assert told(flight, text) or not text, flight.texts
 
 
+@pytest.mark.requirement("REQ-ARM-1")
 def test_telemetry_goes_on_without_an_estimate_and_says_so() -> None:
     flight = Flight(load_scenario("workspace"), spoil=lies(10**6, first=20, p_WB=NOTHING))
     for _ in range(60):
@@ -123,6 +125,7 @@ def beside_walls(flight: Flight) -> None:
     assert off(flight) < 0.005, "all is known again"
 
 
+@pytest.mark.requirement("REQ-EST-7")
 @pytest.mark.long
 @pytest.mark.parametrize(
     ("spoil", "words"),
@@ -144,6 +147,7 @@ def test_two_seconds_without_a_sensor_beside_walls_touch_nothing(
     assert told(flight, *words), flight.texts
 
 
+@pytest.mark.requirement("REQ-EST-7")
 @pytest.mark.long
 @pytest.mark.parametrize(
     ("spoil", "words"),

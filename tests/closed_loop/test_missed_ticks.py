@@ -70,6 +70,7 @@ def fly(lost: set[int], ticks: int) -> tuple[FlightState, list[PlanRequest]]:
     return state, asked
 
 
+@pytest.mark.requirement("REQ-TIME-3")
 @pytest.mark.parametrize("lost", [{30}, {30, 31, 32}, set(range(20, 40))])
 def test_the_plan_s_state_is_where_it_would_be_without_the_loss(lost: set[int]) -> None:
     whole, _ = fly(set(), 140)

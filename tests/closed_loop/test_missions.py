@@ -6,6 +6,8 @@ import itertools
 import math
 from dataclasses import replace
 
+import pytest
+
 from fsw.link.wire.fence_items import CIRCLE_INCLUSION, POLYGON_INCLUSION, read_fence
 from fsw.link.wire.mission_items import MissionItem
 from fsw.signals import (
@@ -103,6 +105,7 @@ def test_a_mission_from_the_ground_to_the_ground() -> None:
     assert flight.snapshot.intended_mode is Mode.HOLD
 
 
+@pytest.mark.requirement("REQ-SAFE-6")
 def test_waypoints_beyond_the_walls_of_an_uploaded_fence_are_flown_up_to_it() -> None:
     flight = among_walls(seed=3)
     reported(

@@ -95,6 +95,7 @@ ATTACKS = {
 }
 
 
+@pytest.mark.requirement("REQ-SAFE-6")
 @pytest.mark.parametrize("attack", ATTACKS)
 def test_no_set_point_flies_the_arm_into_a_wall(attack: str) -> None:
     flight = offboard(walls(AFAR, disturbed=True), **ATTACKS[attack])
@@ -116,6 +117,7 @@ def among_branches() -> Scenario:
     return replace(walls(AFAR, disturbed=True), walls=(), obstacles=obstacles)
 
 
+@pytest.mark.requirement("REQ-SAFE-6")
 @pytest.mark.parametrize(
     "attack", ["the end-effector behind the wall", "5 m/s at the wall", "nose down"]
 )
@@ -214,6 +216,7 @@ def test_without_a_set_point_in_the_last_half_second_it_does_not_begin() -> None
     assert flight.mode is Mode.HOLD
 
 
+@pytest.mark.requirement("REQ-LINK-2")
 def test_silence_for_half_a_second_ends_it_in_hold_with_a_text() -> None:
     flight = offboard(hover(), **body(v=(1.0, 0.0, 0.0)))
     flight.run(2.0)
@@ -273,6 +276,7 @@ def test_from_the_ground_and_back_by_set_points_alone() -> None:
     assert flight.mode is Mode.DISARMED
 
 
+@pytest.mark.requirement("REQ-SAFE-6")
 @pytest.mark.parametrize("speed", [1.0, 3.0])
 def test_a_streamed_trajectory_through_the_wall_is_not_flown_there(speed: float) -> None:
     flight = ThroughTheWall(walls(AFAR, disturbed=True), speed=speed)
@@ -312,6 +316,7 @@ def any_setpoint(chance: random.Random) -> dict[str, Any]:
     return {**chance.choice(kinds), **(joints if chance.random() < 0.4 else {})}
 
 
+@pytest.mark.requirement("REQ-SAFE-6")
 @pytest.mark.parametrize("seed", range(4))
 def test_wild_set_points_in_quick_succession_keep_the_walls(seed: int) -> None:
     chance = random.Random(seed)

@@ -101,6 +101,7 @@ ONE_FRAME: list[tuple[str, type, Callable[[Any], Any], Sensor, SensorFault]] = [
 ]
 
 
+@pytest.mark.requirement("REQ-EST-1")
 @pytest.mark.parametrize(
     ("kind", "change", "sensor", "fault"),
     [row[1:] for row in ONE_FRAME],
@@ -147,6 +148,7 @@ FAILURES: list[tuple[str, Spoil, Sensor, SensorFault, float]] = [
 ]
 
 
+@pytest.mark.requirement("REQ-EST-7")
 @pytest.mark.long
 @pytest.mark.parametrize(
     ("spoil", "sensor", "fault", "off"),

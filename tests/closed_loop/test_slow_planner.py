@@ -65,6 +65,7 @@ class SlowFlight(Flight):
         self.closed.planner = OneAtATime(self)
 
 
+@pytest.mark.requirement("REQ-PLAN-1", "REQ-PLAN-2")
 @pytest.mark.parametrize(
     ("takes_ms", "missed", "given_up", "brakes"),
     [(19, 0, 0, False), (40, 20, 0, False), (99, 20, 0, False), (101, 20, 20, True),
@@ -89,6 +90,7 @@ def test_a_slow_planner_has_its_response(
     assert flight.sim.min_margin_m > 0.0
 
 
+@pytest.mark.requirement("REQ-PLAN-2")
 @pytest.mark.parametrize(
     ("name", "gone_s"),
     [("walls", 3.1), ("walls", 9.4), ("walls", 14.0), ("branches", 7.9), ("branches", 11.3)],

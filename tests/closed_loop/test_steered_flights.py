@@ -81,6 +81,7 @@ def test_the_joints_move_and_the_body_stays() -> None:
     assert math.dist(flight.sim.truth().p_WB, before) < 0.05
 
 
+@pytest.mark.requirement("REQ-SAFE-6")
 def test_a_goto_towards_a_wall_stops_before_it() -> None:
     walls = load_scenario("walls").walls
     flight = Flight(replace(hover(), walls=walls, body="points"))
@@ -118,6 +119,7 @@ def test_a_takeoff_to_a_height_in_its_frame() -> None:
     assert home.p[2] - flight.sim.truth().p_WB[2] == pytest.approx(1.2, abs=0.05)
 
 
+@pytest.mark.requirement("REQ-LINK-1")
 def test_a_ground_station_that_falls_silent_brings_the_vehicle_home() -> None:
     config = flight_config(body="points")
     limits = replace(config.limits, station_timeout_us=3_000_000, failsafe_delay_us=1_000_000)
@@ -155,6 +157,7 @@ def test_a_trajectory_goes_on_without_the_ground_station_where_that_is_excepted(
     assert flight.mode is mode
 
 
+@pytest.mark.requirement("REQ-SAFE-7")
 def test_a_safe_set_that_contradicts_itself_is_refused_in_flight_and_the_old_one_kept() -> None:
     scenario = load_scenario("walls-calm")
     flight = Flight(scenario)

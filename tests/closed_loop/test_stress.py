@@ -74,6 +74,7 @@ def test_what_the_loop_can_take_is_flown_to_the_end_inside_the_safe_set(
         assert name.replace("_", " ") in result.end_reason
 
 
+@pytest.mark.requirement("REQ-SAFE-4")
 @pytest.mark.long
 @pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize("change", LOST.values(), ids=LOST.keys())

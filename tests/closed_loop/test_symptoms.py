@@ -34,6 +34,7 @@ def test_arming_where_the_ground_is_not_at_zero_does_not_start_the_rotors() -> N
     assert max(flight.sent[-1].rotor_thrust) < 1.0
 
 
+@pytest.mark.requirement("REQ-ARM-5")
 def test_a_vehicle_that_neither_stands_nor_flies_is_not_armed() -> None:
     def raised(frame: SensorFrame) -> SensorFrame:
         x, y, z = frame.p_WB
@@ -72,6 +73,7 @@ def test_left_alone_the_vehicle_keeps_its_heading(yaw_deg: float) -> None:
     assert abs((turned + 180.0) % 360.0 - 180.0) < 2.0
 
 
+@pytest.mark.requirement("REQ-ACT-7")
 def test_one_tick_of_nonsense_does_not_leave_the_vehicle_in_open_loop() -> None:
     flight = Flight(hover())
     flight.step(command(ARM, 1.0))

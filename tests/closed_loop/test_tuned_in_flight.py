@@ -48,6 +48,7 @@ def test_a_change_acts_on_exactly_the_tick_it_is_given_to(tuning: Tuning) -> Non
     assert flight.sent[-1] != other.sent[-1]
 
 
+@pytest.mark.requirement("REQ-ARM-8")
 def test_no_tick_mixes_old_and_new() -> None:
     """A tick after a change is that of a vehicle which has never had another tuning."""
     flight = beside_walls()
@@ -121,6 +122,7 @@ def test_a_planner_asked_without_a_tuning_again_is_the_old_planner() -> None:
     assert back.cost == pytest.approx(first.cost, rel=1e-3)
 
 
+@pytest.mark.requirement("REQ-SAFE-7")
 def test_in_the_air_what_breaks_an_inequality_is_refused_with_it() -> None:
     flight = beside_walls()
     outputs = flight.step(tuning=TOO_LITTLE_KEPT)
@@ -134,6 +136,7 @@ def test_in_the_air_what_breaks_an_inequality_is_refused_with_it() -> None:
     assert flight.mode is Mode.TRAJECTORY
 
 
+@pytest.mark.requirement("REQ-SAFE-7")
 def test_on_the_ground_it_is_taken_and_keeps_the_vehicle_there() -> None:
     walls = load_scenario("walls").walls
     flight = Flight(replace(on_the_ground(), walls=walls))

@@ -39,6 +39,7 @@ def east(flight: Flight) -> float:
     return flight.state.estimate.p_WB[1]
 
 
+@pytest.mark.requirement("REQ-SAFE-11")
 @pytest.mark.parametrize(
     "spoil",
     [LOST, changed(PoseSample, LOST_S, BACK_S, frozen())],
@@ -69,6 +70,7 @@ def test_it_stays_where_clearances_do_not_grow() -> None:
     assert abs(east(flight) - begin) < 0.02
 
 
+@pytest.mark.requirement("REQ-SAFE-11")
 def test_between_two_walls_it_stays_in_their_middle_and_says_what_room_is_lacking() -> None:
     flight = beside(LEFT, RIGHT)
     flight.run(2.0)

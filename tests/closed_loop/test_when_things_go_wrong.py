@@ -45,6 +45,7 @@ class FailsFrom:
         return PlanFailure(request.plan_id, SolverStatus.INFEASIBLE, "as told", nothing)
 
 
+@pytest.mark.requirement("REQ-PLAN-1")
 def test_a_late_plan_is_counted_and_flown() -> None:
     flight = Flight(load_scenario("workspace"), late_ticks=lambda plan: 3 if plan == 5 else 0)
     flight.follow()
@@ -74,6 +75,7 @@ def test_a_plan_that_never_comes_is_counted_given_up_and_survived() -> None:
     assert flight.snapshot.failures == ()
 
 
+@pytest.mark.requirement("REQ-PLAN-2")
 @pytest.mark.parametrize("first_failure", [0, 30], ids=["from the start", "in motion"])
 def test_without_plans_the_vehicle_brakes_and_stays_put(first_failure: int) -> None:
     config = flight_config(body="points")
@@ -116,6 +118,7 @@ def all_lost_between(first: int, last: int) -> Callable[[SensorFrame], SensorFra
     return spoil
 
 
+@pytest.mark.requirement("REQ-EST-8")
 def test_an_attitude_that_is_unknown_for_long_ends_the_flight_for_good() -> None:
     flight = Flight(load_scenario("workspace"), spoil=all_lost_between(300, 1000))
     flight.follow()
@@ -156,6 +159,7 @@ class OnePush:
         return self.value if self.first <= step <= self.last else (0.0, 0.0, 0.0)
 
 
+@pytest.mark.requirement("REQ-ACT-10")
 @pytest.mark.parametrize(
     ("value", "torque", "felt"),
     [
@@ -185,6 +189,7 @@ def test_a_hard_push_is_recovered_from(
     assert math.dist(flight.sim.truth().p_WE, held) < 0.02
 
 
+@pytest.mark.requirement("REQ-SAFE-10")
 def test_a_person_who_is_announced_no_longer_is_told_of_once_and_stands_until_heard_again() -> None:
     config = flight_config(body="points")
     config = replace(config, limits=replace(config.limits, zone_timeout_us=500_000))

@@ -24,6 +24,7 @@ def system(vehicle: Vehicle) -> Iterator[System]:
         yield system
 
 
+@pytest.mark.requirement("REQ-ARM-9")
 def test_a_failure_needs_the_parameter(system: System) -> None:
     Param(system).set_param_float("SYS_FAILURE_EN", 0.0)
     with pytest.raises(FailureError) as refused:

@@ -24,6 +24,7 @@ def no_long_files() -> None:
     resource.setrlimit(resource.RLIMIT_FSIZE, (MOST, MOST))
 
 
+@pytest.mark.requirement("REQ-LOG-1")
 @pytest.mark.long
 def test_a_flight_whose_log_ends_early_says_so_to_the_station(tmp_path: Path) -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as station:

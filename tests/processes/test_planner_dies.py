@@ -60,6 +60,7 @@ def fly_until(t_s: float, sitl: SystemProcess) -> None:
         pass
 
 
+@pytest.mark.requirement("REQ-PLAN-4")
 @pytest.mark.long
 def test_killing_the_planner_costs_no_barrier(tmp_path: Path) -> None:
     """The worker first, which the fork server replaces; later the fork server with its worker."""

@@ -43,6 +43,7 @@ def replayed(path: Path, config: FlightConfig | None = None) -> Replayed:
     return replay(open_flight(path), program, lambda done, total: None)
 
 
+@pytest.mark.requirement("REQ-TIME-8")
 @pytest.mark.parametrize("lockstep", [True, False], ids=["lockstep", "realtime"])
 def test_the_same_code_does_the_same(
     lockstep: bool, flown: list[tuple[TickInputs, TickOutputs]], tmp_path: Path

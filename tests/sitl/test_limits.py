@@ -46,6 +46,7 @@ def state_with(key: str, value: float) -> tuple[Array, tuple[float, float]]:
     return state, (torque, thrust)
 
 
+@pytest.mark.requirement("REQ-ACT-9")
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
 @pytest.mark.parametrize("key", KEYS)
 def test_each_limit_is_recorded_alone_timed_and_broken_beyond_its_tolerance(
@@ -84,6 +85,7 @@ def test_what_is_not_a_number_breaks_its_limit() -> None:
     assert record.uses()["tilt"].kept
 
 
+@pytest.mark.requirement("REQ-ACT-9")
 def test_a_run_in_which_a_joint_leaves_its_limit_is_not_completed() -> None:
     """Full torque on the first joint throws it against its stop."""
     simulation = Simulation(load_scenario("walls-calm"), 0)

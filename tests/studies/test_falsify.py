@@ -68,6 +68,7 @@ def test_the_old_loop_breaks_its_bound_on_one_axis(axes: tuple[int, int, int]) -
     assert replace(outcome, bounds=replace(outcome.bounds, claims_one_axis=True)).breaks_one_axis
 
 
+@pytest.mark.requirement("REQ-SAFE-2")
 @pytest.mark.parametrize("amplitude", [0.1, 0.2, 0.4, 0.6, 0.8])
 @pytest.mark.parametrize("axes", [(1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 1)])
 def test_the_loop_keeps_its_bound_at_every_amplitude(
@@ -83,6 +84,7 @@ def test_the_loop_keeps_its_bound_at_every_amplitude(
         assert outcome.worst.share > 0.6  # the adversary comes near
 
 
+@pytest.mark.requirement("REQ-SAFE-2")
 def test_a_search_finds_nothing_beyond_the_bound_and_repeats_itself() -> None:
     outcome = _found()
     assert outcome.evaluations >= 120

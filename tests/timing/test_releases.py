@@ -64,6 +64,7 @@ def test_every_frame_has_its_tick_on_the_grid(time: VirtualTime) -> None:
     assert (loop.releases.skipped, loop.releases.stale, loop.nothing) == (0, 0, 0)
 
 
+@pytest.mark.requirement("REQ-TIME-1")
 @pytest.mark.parametrize("late_us", [LEAD_US + 100, 1_900])
 def test_a_late_frame_does_not_stop_the_tick_which_gets_its_age(
     time: VirtualTime, late_us: int
@@ -82,6 +83,7 @@ def test_a_frame_that_is_less_late_than_the_lead_changes_nothing(time: VirtualTi
     assert loop.releases.stale == 0
 
 
+@pytest.mark.requirement("REQ-TIME-1")
 @pytest.mark.parametrize("lost", [1, 2, MAX_STALE_TICKS])
 def test_lost_frames_are_flown_through_on_the_last_readings(time: VirtualTime, lost: int) -> None:
     loop = Loop(VirtualSensors(time, lambda step: None if 100 <= step < 100 + lost else 0))
@@ -92,6 +94,7 @@ def test_lost_frames_are_flown_through_on_the_last_readings(time: VirtualTime, l
     assert loop.releases.skipped == 0
 
 
+@pytest.mark.requirement("REQ-TIME-2")
 def test_after_ten_milliseconds_without_sensors_nothing_is_commanded(time: VirtualTime) -> None:
     silent = range(100, 150)
     loop = Loop(VirtualSensors(time, lambda step: None if step in silent else 0))
@@ -158,6 +161,7 @@ def test_a_frame_that_comes_early_costs_its_predecessor_and_nothing_more(
     assert loop.releases.skipped + loop.releases.stale <= 2
 
 
+@pytest.mark.requirement("REQ-TIME-6")
 def test_a_clock_that_jumps_ahead_skips_and_keeps_the_grid(time: VirtualTime) -> None:
     """The machine was suspended: wall time has passed, and no sensor frame came meanwhile."""
     sensors = VirtualSensors(time)
@@ -170,6 +174,7 @@ def test_a_clock_that_jumps_ahead_skips_and_keeps_the_grid(time: VirtualTime) ->
     assert ticks[-1].stale_us == 0
 
 
+@pytest.mark.requirement("REQ-TIME-6")
 @pytest.mark.parametrize("back_us", [700, 50_000, 1_000_000])
 def test_a_clock_that_jumps_back_is_waited_for_and_repeats_no_release(
     time: VirtualTime, back_us: int

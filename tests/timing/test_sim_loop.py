@@ -286,6 +286,7 @@ def test_what_was_missed_in_the_last_second_is_counted() -> None:
     assert bench.timer(INNER.name).skipped == 3
 
 
+@pytest.mark.requirement("REQ-LOG-1")
 def test_a_log_that_fails_is_an_input_of_the_tick_within_a_second_and_once() -> None:
     told: list[tuple[int, HostHealth]] = []
 
@@ -318,6 +319,7 @@ def test_a_planner_that_died_is_reported_at_once_and_logged() -> None:
     assert bench.files.ulog.notices == bench.ground.texts
 
 
+@pytest.mark.requirement("REQ-MODE-6")
 @pytest.mark.parametrize("moment_us", [100, 900, 1_700])
 def test_a_command_acts_on_the_actuators_within_one_tick_of_its_arrival(moment_us: int) -> None:
     bench = Bench(Autopilot(flight_config(body="points")).tick, FlightState())
@@ -355,6 +357,7 @@ def test_a_command_to_the_simulator_is_routed_once_and_its_sender_gets_the_answe
     assert bench.ground.acks == [CommandAck(420, 0, 255, 190)]
 
 
+@pytest.mark.requirement("REQ-LOG-3")
 def test_a_disk_that_does_not_answer_delays_no_tick_and_loses_only_log(tmp_path: Path) -> None:
     disk_is_back, waited_in_vain = threading.Event(), threading.Event()
 

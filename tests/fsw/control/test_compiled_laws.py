@@ -50,7 +50,7 @@ def memory(random: np.random.Generator) -> CascadeMemory:
         float(random.uniform(2.5, 4.5)),
         vec3(random.uniform(-0.2, 0.2, 3)),
         float(random.uniform(-0.2, 0.2)),
-        JointMemory(*(two(random, most) for most in (1.0, 0.01, 0.1, 0.1))),
+        JointMemory(*(two(random, most) for most in (1.0, 0.01, 0.1, 0.1, 2.0))),
     )
 
 

@@ -185,6 +185,7 @@ def test_a_steady_torque_that_nothing_told_of_is_taken_off_within_two_tenths_of_
 LIMIT1, LIMIT12 = AIRFRAME.joint1_limit, AIRFRAME.joint12_limit
 
 
+@pytest.mark.requirement("REQ-ACT-8")
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
 @pytest.mark.parametrize("far", [(2.0, -2.0), (0.2, 3.0), (2.0, 2.0)])
 def test_no_reference_takes_the_arm_past_a_limit_of_an_angle_or_a_rate(

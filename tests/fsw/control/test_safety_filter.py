@@ -87,6 +87,7 @@ def test_without_zones_or_far_from_them_nothing_is_changed() -> None:
     assert moving_zones(SafeSet(), None) is NO_ZONES
 
 
+@pytest.mark.requirement("REQ-SAFE-5")
 def test_what_keeps_the_condition_passes_bit_for_bit() -> None:
     wanted = (-0.1234567891234, 0.3, 1.0)
     result, changed, margin = asked((AHEAD,), (0.6, 0.0, -1.0), (0.1, 0.4, 0.0), wanted)
@@ -94,6 +95,7 @@ def test_what_keeps_the_condition_passes_bit_for_bit() -> None:
     assert margin == pytest.approx(0.3)
 
 
+@pytest.mark.requirement("REQ-SAFE-5")
 @given(st.floats(0.5, 1.0), st.floats(-0.5, 1.0), st.floats(-2.5, 2.5), st.floats(-2.0, 2.0))
 def test_towards_a_wall_it_is_the_nearest_that_keeps_the_condition(
     x: float, vx: float, ax: float, along: float
@@ -107,6 +109,7 @@ def test_towards_a_wall_it_is_the_nearest_that_keeps_the_condition(
     assert -result[0] == pytest.approx(min(max(-ax, needed), 2.5) if changed else -ax)
 
 
+@pytest.mark.requirement("REQ-SAFE-5")
 @given(
     st.tuples(*[st.floats(-0.25, 0.25)] * 3),
     st.tuples(*[st.floats(-0.3, 0.3)] * 3),
@@ -123,6 +126,7 @@ def test_several_zones_are_kept_at_once(p: Vec3, v: Vec3, wanted: Vec3) -> None:
             assert dot(n, result) >= needed - 1e-3  # type: ignore[arg-type]
 
 
+@pytest.mark.requirement("REQ-SAFE-5")
 @pytest.mark.parametrize("speed", [0.0, 0.2, 0.5, 0.9])
 @pytest.mark.parametrize("eager", [0.0, 1.0, 2.5])
 def test_a_vehicle_that_is_driven_at_a_wall_stops_in_front_of_it(

@@ -25,6 +25,7 @@ allowed = st.builds(
 )
 
 
+@pytest.mark.requirement("REQ-ACT-7")
 @given(commands, allowed, st.booleans())
 def test_what_is_sent_is_finite_and_within_limits(
     wanted: ActuatorCommand, last: ActuatorCommand, armed: bool
@@ -34,6 +35,7 @@ def test_what_is_sent_is_finite_and_within_limits(
     assert all(abs(t) <= AIRFRAME.joint_torque_max for t in sent.joint_torque)
 
 
+@pytest.mark.requirement("REQ-ACT-7")
 @given(commands, allowed)
 def test_disarmed_everything_stands_still(wanted: ActuatorCommand, last: ActuatorCommand) -> None:
     assert gate(AIRFRAME, wanted, last, armed=False) == (STOPPED, False)
@@ -49,6 +51,7 @@ def test_an_allowed_command_passes_unchanged(
 LAST = ActuatorCommand((1.0, 2.0, 3.0, 4.0), (0.1, 0.2))
 
 
+@pytest.mark.requirement("REQ-ACT-7")
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
 @pytest.mark.parametrize("place", range(6))
 def test_a_wish_that_is_no_number_repeats_the_last_and_is_reported(

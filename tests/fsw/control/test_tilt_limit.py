@@ -35,6 +35,7 @@ def flown(wanted: list[Vec3], lag: float, seconds: float = 1.5) -> tuple[float, 
     return float(largest[0]), float(largest[1]), float(largest[2])
 
 
+@pytest.mark.requirement("REQ-ACT-8")
 @pytest.mark.parametrize("direction", np.linspace(0.0, 2.0 * math.pi, 8, endpoint=False))
 @pytest.mark.parametrize("hard", [6.0, 17.0])
 def test_a_loop_that_always_wants_more_tilt_gets_no_more_than_the_limit(
@@ -46,6 +47,7 @@ def test_a_loop_that_always_wants_more_tilt_gets_no_more_than_the_limit(
     assert rate < AIRFRAME.body_rate_max[0] + 0.1
 
 
+@pytest.mark.requirement("REQ-ACT-8")
 def test_body_rates_keep_their_limits_where_there_is_room_to_tilt() -> None:
     roomy = replace(AIRFRAME, tilt_max=3.0)
     w, estimate = np.zeros(3), estimate_of(Rotation.identity())

@@ -69,6 +69,7 @@ def _position_under(disturbance: np.ndarray, tuning: TrackingTuning = TUNING) ->
     return np.array(positions)
 
 
+@pytest.mark.requirement("REQ-SAFE-2")
 def test_no_random_disturbance_leaves_the_tube() -> None:
     rng = np.random.default_rng(5)
     steps = np.repeat(rng.uniform(-0.8, 0.8, 150), 50)
@@ -90,6 +91,7 @@ def test_wind_within_the_limit_ends_without_an_offset() -> None:
     assert believed[-1] == pytest.approx(forgetful[-1], abs=1e-5)
 
 
+@pytest.mark.requirement("REQ-SAFE-2")
 def test_a_push_that_turns_once_it_is_taken_for_wind_needs_the_wider_tube() -> None:
     """The memory of one push is added to the opposite one."""
     push = np.concatenate((np.full(10_000, -0.8), np.full(1000, 0.8)))
@@ -188,6 +190,7 @@ def _worst_push(ticks: int) -> Array:
     return np.asarray(np.sign(_position_under(once, calm)[::-1]))
 
 
+@pytest.mark.requirement("REQ-SAFE-2")
 @pytest.mark.parametrize("amplitude", [0.1, 0.4, 0.8])
 def test_the_worst_push_attains_the_bound_through_every_limit_that_is_flown(
     amplitude: float,
@@ -253,6 +256,7 @@ def test_the_reach_on_all_axes_is_more_and_grows_faster_than_the_disturbance() -
 HEAVY = replace(AIRFRAME, rotor_thrust_max=0.4 * AIRFRAME.mass * GRAVITY)
 
 
+@pytest.mark.requirement("REQ-SAFE-2")
 @pytest.mark.parametrize(("airframe", "sharp"), [(AIRFRAME, True), (HEAVY, False)])
 def test_up_to_the_disturbance_of_all_axes_the_mixer_gives_every_torque(
     airframe: Airframe, sharp: bool
@@ -315,6 +319,7 @@ def _height_under(disturbance: Array, tuning: TrackingTuning) -> Array:
     return np.array(heights)
 
 
+@pytest.mark.requirement("REQ-SAFE-2")
 @pytest.mark.parametrize("amplitude", [0.1, 0.4, 0.8])
 def test_a_push_that_turns_once_it_is_taken_for_mass_needs_the_wider_height(
     amplitude: float,

@@ -73,6 +73,7 @@ ONCE: list[tuple[dict[str, Any], Sensor, SensorFault]] = [
 ]
 
 
+@pytest.mark.requirement("REQ-EST-1")
 @pytest.mark.parametrize(("lie", "sensor", "fault"), ONCE)
 def test_one_frame_that_lies_is_not_believed_and_named(
     lie: dict[str, Any], sensor: Sensor, fault: SensorFault
@@ -98,6 +99,7 @@ def test_bad_frames_are_reported_once_and_again_after_ten_seconds() -> None:
     assert said == [(20, "IMU says what cannot be"), (5_100, "IMU says what cannot be")]
 
 
+@pytest.mark.requirement("REQ-EST-3")
 @pytest.mark.parametrize("lie", [{"p_WB": NOTHING}, "frozen"])
 def test_without_a_pose_the_inertial_unit_carries_on(lie: Any) -> None:
     def spoil(k: int, s: SensorFrame) -> SensorFrame:
@@ -170,6 +172,7 @@ def test_a_pose_that_stays_where_it_jumped_to_is_the_truth_after_a_while() -> No
     assert history[believed_at].returned_us == 0
 
 
+@pytest.mark.requirement("REQ-EST-1")
 def test_what_cannot_be_is_never_the_truth() -> None:
     trust, _, _ = flown(400, lambda k, s: replace(s, v_WB=(1e3, 0.0, 0.0)) if k >= 20 else s)
     assert trust.pose.unused == 380

@@ -97,6 +97,7 @@ def nees(suite: Suite, runs: int, duration: float) -> float:
     return total / runs
 
 
+@pytest.mark.requirement("REQ-EST-2")
 @pytest.mark.long
 @pytest.mark.parametrize(
     ("suite", "duration", "runs"),
@@ -112,6 +113,7 @@ assert VIO.pose is not None
 EARLY = replace(VIO, pose=replace(VIO.pose, drift=0.02, recognises=0.6))
 
 
+@pytest.mark.requirement("REQ-EST-2")
 @pytest.mark.parametrize("suite", [MOCAP, EARLY], ids=["mocap", "vio"])
 def test_a_few_runs_are_as_sure_as_they_may_be(suite: Suite) -> None:
     runs = 8
@@ -141,6 +143,7 @@ def innovations(suite: Suite, seed: int, duration: float) -> tuple[float, int]:
     return total, dimension
 
 
+@pytest.mark.requirement("REQ-EST-2")
 @pytest.mark.long
 @pytest.mark.parametrize("suite", [MOCAP, VIO, RTK], ids=["mocap", "vio", "rtk"])
 def test_innovations_are_as_large_as_expected(suite: Suite) -> None:
@@ -161,6 +164,7 @@ def test_a_hidden_delay_of_the_pose_is_found_within_2_ms() -> None:
         assert max(flown.in_sigmas()) < 4.0
 
 
+@pytest.mark.requirement("REQ-EST-1")
 @pytest.mark.parametrize("bad", ["far", "upside_down", "tilted"])
 def test_the_filter_does_not_start_from_a_pose_that_no_other_agrees_with(bad: str) -> None:
     lie = {"far": far, "upside_down": upside_down, "tilted": tilted}[bad]
@@ -232,6 +236,7 @@ FAULTS: list[tuple[str, Change, SensorFault]] = [
 ]
 
 
+@pytest.mark.requirement("REQ-EST-1")
 @pytest.mark.parametrize(("name", "change", "fault"), FAULTS, ids=[fault[0] for fault in FAULTS])
 def test_a_bad_pose_leaves_the_estimate_within_3_sigma(
     name: str, change: Change, fault: SensorFault
@@ -256,6 +261,7 @@ def test_a_pose_frozen_for_300_ms_leaves_the_estimate_within_3_sigma() -> None:
     assert (Sensor.POSE, SensorFault.STUCK) in flown.found
 
 
+@pytest.mark.requirement("REQ-EST-1")
 def test_a_pose_with_a_frozen_time_stamp_is_not_fused() -> None:
     held: list[PoseSample] = []
 
@@ -268,6 +274,7 @@ def test_a_pose_with_a_frozen_time_stamp_is_not_fused() -> None:
     assert (Sensor.POSE, SensorFault.REPEATED) in flown.found
 
 
+@pytest.mark.requirement("REQ-EST-1")
 def test_a_velocity_of_a_million_is_not_believed() -> None:
     def change(now: float, sample: Sample) -> Sample:
         if isinstance(sample, GnssSample) and abs(sample.time - START - 2.0) < 0.01:
@@ -279,6 +286,7 @@ def test_a_velocity_of_a_million_is_not_believed() -> None:
     assert (Sensor.GNSS, SensorFault.IMPLAUSIBLE) in flown.found
 
 
+@pytest.mark.requirement("REQ-EST-1")
 @pytest.mark.parametrize(
     ("force", "rate", "fault"),
     [
@@ -301,6 +309,7 @@ def test_one_bad_reading_of_the_imu_is_not_integrated(
     assert flown.worst < 3.5
 
 
+@pytest.mark.requirement("REQ-EST-6")
 def test_a_stuck_imu_is_found_and_the_pose_carries_on() -> None:
     held: list[ImuSample] = []
 

@@ -33,6 +33,9 @@ def unwell(**changes: Any) -> arming.CommandContext:
     return replace(STANDING, health=ArmingHealth(**changes))
 
 
+@pytest.mark.requirement(
+    "REQ-SAFE-8", "REQ-ARM-1", "REQ-ARM-2", "REQ-ARM-6", "REQ-ARM-7", "REQ-ACT-6", "REQ-BAT-5"
+)
 @pytest.mark.parametrize(
     ("context", "subject", "words"),
     [
@@ -69,6 +72,7 @@ def test_every_subject_has_a_check() -> None:
     assert {check.subject for check in arming.CHECKS} == set(Subject)
 
 
+@pytest.mark.requirement("REQ-ARM-2")
 def test_a_vehicle_that_stands_and_is_well_arms_and_all_that_is_not_well_is_said() -> None:
     assert arming.refusal(STANDING) is None
     several = replace(INCONSISTENT, health=ArmingHealth(remaining=0.0, tilt=1.0))
@@ -93,17 +97,20 @@ def healthy(config: FlightConfig = CONFIG, estimate: Any = LEVEL, **state: Any) 
     return arming_health(config, replace(FlightState(), **state), estimate, "")
 
 
+@pytest.mark.requirement("REQ-ARM-3")
 @pytest.mark.parametrize("degrees", [0.0, 30.0, 89.0, 180.0])
 def test_the_tilt_is_that_of_the_estimate(degrees: float) -> None:
     tilted = estimate_of(Rotation.from_euler("y", degrees, degrees=True))
     assert healthy(estimate=tilted).tilt == pytest.approx(math.radians(degrees), abs=1e-6)
 
 
+@pytest.mark.requirement("REQ-ARM-3")
 def test_an_attitude_that_is_no_number_is_upside_down() -> None:
     lost = random_estimate(np.random.default_rng(2))._replace(R_WB=(math.nan,) * 9)
     assert healthy(estimate=lost).tilt == math.pi
 
 
+@pytest.mark.requirement("REQ-ARM-4")
 @pytest.mark.parametrize(
     ("aiding", "words"),
     [
@@ -121,6 +128,7 @@ def test_an_estimate_that_is_not_aided_or_not_known_is_no_estimate(
     assert bool(found) is bool(words)
 
 
+@pytest.mark.requirement("REQ-SAFE-8", "REQ-ARM-4", "REQ-ACT-6")
 def test_sensors_margins_damage_and_the_log_are_looked_at() -> None:
     lost = Aiding(sensor=Sensor.ENCODERS, fault=SensorFault.STUCK, since_us=NOW_US - 50_000)
     assert "encoders are stuck" in healthy(aiding=lost).sensor
@@ -135,6 +143,7 @@ def test_sensors_margins_damage_and_the_log_are_looked_at() -> None:
     assert healthy(limits(arm_without_log=1), host=full).storage == ""
 
 
+@pytest.mark.requirement("REQ-BAT-5")
 @pytest.mark.parametrize(("least", "needed"), [(-1.0, 0.1), (0.0, 0.0), (0.4, 0.4)])
 def test_the_least_charge_is_a_parameter_and_by_default_the_critical_one(
     least: float, needed: float

@@ -60,6 +60,7 @@ def tick(state: FlightState, t_us: int, **inputs: Any) -> tuple[FlightState, Tic
     return AUTOPILOT.tick(state, TickInputs(sensors, **inputs))
 
 
+@pytest.mark.requirement("REQ-ARM-1")
 def test_before_the_first_estimate_nothing_moves_and_commands_are_put_off() -> None:
     blind = frame(5000, p_WB=(math.nan, 0.0, 0.0))
     asked = (command(ARM, 1.0),)
@@ -110,6 +111,7 @@ def test_a_first_tick_is_the_first_however_late_and_time_that_stands_still_is_a_
     assert again.index == 1
 
 
+@pytest.mark.requirement("REQ-TIME-1")
 def test_a_frame_that_was_late_is_moved_on_to_now() -> None:
     moving = frame(100_000, p_WB=(0.0, 0.0, -3.0), v_WB=(1.0, 2.0, 0.5), gyro_B=(0.1, 0.0, 0.2))
     measured = estimate_state(moving)
@@ -120,6 +122,7 @@ def test_a_frame_that_was_late_is_moved_on_to_now() -> None:
     assert fresh.estimate == measured
 
 
+@pytest.mark.requirement("REQ-ARM-3")
 @pytest.mark.parametrize("degrees", [16.0, 30.0, 60.0, 180.0])
 def test_a_vehicle_that_lies_on_its_side_or_its_back_is_not_armed(degrees: float) -> None:
     half = 0.5 * math.radians(degrees)
@@ -134,6 +137,7 @@ def test_a_vehicle_that_lies_on_its_side_or_its_back_is_not_armed(degrees: float
     assert len(outputs.snapshot.arming.failed) == 1
 
 
+@pytest.mark.requirement("REQ-BAT-5")
 def test_an_empty_battery_is_not_armed() -> None:
     empty = replace(FlightState(), battery=BatteryState(consumed=10.0, remaining=0.0))
     state, _ = tick(empty, 100_000)
@@ -142,6 +146,7 @@ def test_an_empty_battery_is_not_armed() -> None:
     assert "0 % left" in outputs.texts[-1].text
 
 
+@pytest.mark.requirement("REQ-SAFE-4")
 @pytest.mark.parametrize("uploaded", [True, False])
 def test_a_breach_of_an_uploaded_fence_is_one_of_its_own(uploaded: bool) -> None:
     """Both walls are left; the one that is left by more says whose breach it is."""
@@ -161,6 +166,7 @@ def test_a_breach_of_an_uploaded_fence_is_one_of_its_own(uploaded: bool) -> None
     assert state.safety.breach_of_fence is uploaded
 
 
+@pytest.mark.requirement("REQ-LOG-1")
 def test_a_log_that_fails_is_told_once_shown_and_arms_nothing() -> None:
     full = HostHealth(log_failure="flight.ulg ends early: No space left on device")
     state, _ = tick(FlightState(), 100_000)

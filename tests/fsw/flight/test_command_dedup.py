@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import pytest
+
 from fsw.flight.command_dedup import answered_before, remember
 from fsw.signals import CommandRequest
 
@@ -16,6 +18,7 @@ def asked(
     return CommandRequest(command, (first, *(NAN,) * 6), sender, 190, again)  # type: ignore[arg-type]
 
 
+@pytest.mark.requirement("REQ-MODE-10")
 def test_the_same_words_within_half_a_second_are_the_same_command() -> None:
     memory = remember((), asked(), 0, 1_000_000)
     unused = CommandRequest(22, (float("nan"),) * 7, 255, 190)  # type: ignore[arg-type]
@@ -25,6 +28,7 @@ def test_the_same_words_within_half_a_second_are_the_same_command() -> None:
     assert answered_before(memory, asked(), 1_500_000) is None
 
 
+@pytest.mark.requirement("REQ-MODE-10")
 def test_one_that_says_it_is_a_repetition_is_known_for_three_seconds() -> None:
     memory = remember((), asked(), 0, 1_000_000)
     assert answered_before(memory, asked(again=3), 3_999_999) is not None

@@ -82,6 +82,7 @@ def test_a_disarm_in_the_air_needs_force_and_is_told_loudly() -> None:
     assert "255/190" in decision.reason
 
 
+@pytest.mark.requirement("REQ-ARM-1")
 def test_arming_by_force_says_what_it_ignores_and_never_ignores_the_estimate() -> None:
     broken = replace(STANDING, inconsistent="the sphere is too small", standing_unclear=True)
     decision = ask(broken, ARM, 1.0, 21196.0)
@@ -216,6 +217,7 @@ def test_an_empty_battery_forbids_arming(remaining: float) -> None:
     assert ask(replace(STANDING, health=ArmingHealth(remaining=0.1)), ARM, 1.0).arm
 
 
+@pytest.mark.requirement("REQ-MODE-5")
 @pytest.mark.parametrize("wanted", [Mode.HOLD, Mode.RETURN, Mode.LAND, Mode.OFFBOARD])
 def test_while_nothing_else_can_be_flown_every_mode_is_refused(wanted: Mode) -> None:
     blocked = replace(
@@ -288,6 +290,7 @@ def test_whatever_arrives_is_answered_and_a_mode_can_always_follow(
         assert decision.reason
 
 
+@pytest.mark.requirement("REQ-MODE-8")
 @given(situations)
 def test_a_vehicle_in_the_air_is_not_disarmed_unless_forced(situation: CommandContext) -> None:
     decision = ask(replace(situation, landed=False), ARM, 0.0)
@@ -531,6 +534,7 @@ def test_home_needs_an_estimate_and_keeps_the_heading() -> None:
     assert (lost.result, lost.home) == (TEMPORARILY_REJECTED, None)
 
 
+@pytest.mark.requirement("REQ-ARM-9")
 @pytest.mark.parametrize("situation", [STANDING, HIGH])
 def test_a_failure_is_injected_only_where_the_parameter_allows_it(
     situation: CommandContext,

@@ -140,6 +140,7 @@ def test_why_arming_is_refused_is_shown_while_it_matters() -> None:
 # ---------------------------------------------------------------- commands
 
 
+@pytest.mark.requirement("REQ-MODE-10")
 def test_a_repeated_command_is_answered_again_and_not_carried_out_again() -> None:
     request = CommandRequest(1, (math.nan,) * 7, 255, 190)
     commands = (Command(SwitchMode(Mode.LAND), request),) * 2
@@ -322,6 +323,7 @@ def test_a_place_to_look_at_leaves_a_setpoint_under_way() -> None:
 SHAKY = replace(flying(), output_replaced=True, plan=PlanMemory(since_us=NOW_US))
 
 
+@pytest.mark.requirement("REQ-MODE-1")
 def test_a_condition_is_reported_once_for_as_long_as_it_lasts() -> None:
     state, texts = watched(SHAKY)
     assert texts == ["actuator command not finite: warn"]
@@ -334,6 +336,7 @@ def test_a_condition_is_reported_once_for_as_long_as_it_lasts() -> None:
     assert watched(replace(over, output_replaced=True))[1] != []
 
 
+@pytest.mark.requirement("REQ-MODE-1")
 def test_another_condition_is_reported_alone() -> None:
     state, _ = watched(SHAKY)
     state, texts = watched(replace(state, plan=replace(state.plan, refused=True)))
@@ -370,6 +373,7 @@ def test_a_second_failsafe_remembers_what_the_pilot_flew() -> None:
     assert taken_back.vehicle.failsafe_from is None
 
 
+@pytest.mark.requirement("REQ-MODE-7", "REQ-EST-9")
 def test_after_the_end_of_the_flight_nothing_else_is_looked_at() -> None:
     over = SafetyMemory(rolled_us=NOW_US - 400_000)
     lost = replace(offboard_lost(), output_replaced=True, safety=over)

@@ -31,6 +31,7 @@ def descended(seconds: float, aiding: Aiding, v: Vec3, estimate: StateEstimate) 
     return nominal.v
 
 
+@pytest.mark.requirement("REQ-MODE-9")
 @pytest.mark.parametrize("aiding", [AIDED, BLIND])
 def test_it_brakes_across_and_sinks_at_the_speed_of_landing(aiding: Aiding) -> None:
     vx, vy, vz = descended(4.0, aiding, (0.5, -0.3, -0.2), HERE)
@@ -38,6 +39,7 @@ def test_it_brakes_across_and_sinks_at_the_speed_of_landing(aiding: Aiding) -> N
     assert vz == pytest.approx(LIMITS.land_speed, abs=1e-3)
 
 
+@pytest.mark.requirement("REQ-EST-5")
 def test_a_place_that_is_measured_is_held_and_one_that_is_not_is_not() -> None:
     nominal = nominal_at_rest(HERE)
     adrift = vehicle_at((1.3, 1.9, -5.0), (0.2, 0.0, 0.0))
@@ -92,6 +94,7 @@ def ends(state: FlightState, estimate: StateEstimate) -> bool:
     return result.next_mode is Mode.DISARMED and state.vehicle.landed
 
 
+@pytest.mark.requirement("REQ-MODE-9")
 @pytest.mark.parametrize(
     ("about", "touches"),
     [

@@ -137,6 +137,7 @@ def test_every_condition_has_one_row() -> None:
     assert [row.condition for row in FAILSAFES] == list(Condition)
 
 
+@pytest.mark.requirement("REQ-EST-8")
 def test_without_attitude_the_flight_is_ended_and_only_then() -> None:
     ending = {row.condition for row in FAILSAFES if row.action(FINE.context()) is Action.TERMINATE}
     assert ending == {Condition.ATTITUDE_LOST, Condition.TILT_LOST}
@@ -146,6 +147,17 @@ def test_nothing_wrong_is_no_condition() -> None:
     assert active(FINE.context()) == ()
 
 
+@pytest.mark.requirement(
+    "REQ-ARM-1",
+    "REQ-EST-3",
+    "REQ-EST-8",
+    "REQ-EST-9",
+    "REQ-TIME-3",
+    "REQ-TIME-5",
+    "REQ-LINK-5",
+    "REQ-BAT-1",
+    "REQ-LOG-2",
+)
 @pytest.mark.parametrize(
     ("evidence", "condition"),
     [
@@ -189,6 +201,7 @@ def test_each_evidence_is_its_condition(evidence: Evidence, condition: Condition
     assert conditions(evidence) == (condition,)
 
 
+@pytest.mark.requirement("REQ-EST-9")
 @pytest.mark.parametrize(
     "evidence",
     [
@@ -214,6 +227,7 @@ def test_what_can_be_lived_with_is_no_condition(evidence: Evidence) -> None:
     assert active(evidence.context()) == ()
 
 
+@pytest.mark.requirement("REQ-LINK-2")
 @pytest.mark.parametrize(
     ("number", "expected"),
     [
@@ -228,6 +242,7 @@ def test_lost_setpoints_are_acted_on_as_the_parameter_says(number: int, expected
     assert action(replace(OFFBOARD, limits=FlightLimits(setpoint_loss_action=number))) is expected
 
 
+@pytest.mark.requirement("REQ-LINK-1")
 @pytest.mark.parametrize(
     ("number", "expected"),
     [
@@ -288,12 +303,14 @@ def test_a_low_battery_is_acted_on_as_the_parameter_says(
     assert action(context) is expected
 
 
+@pytest.mark.requirement("REQ-BAT-2", "REQ-BAT-3")
 def test_a_battery_that_is_critical_returns_and_one_nearly_empty_lands_by_default() -> None:
     assert action(replace(FINE, battery=charged(Charge.LOW))) is Action.WARN
     assert action(replace(FINE, battery=charged(Charge.CRITICAL))) is Action.RETURN
     assert action(replace(FINE, battery=charged(Charge.EMERGENCY))) is Action.LAND
 
 
+@pytest.mark.requirement("REQ-BAT-4")
 @pytest.mark.parametrize(
     ("number", "expected"), [(0, Action.NONE), (1, Action.WARN), (3, Action.RETURN)]
 )
@@ -308,6 +325,7 @@ def test_a_short_flight_time_is_acted_on_as_the_parameter_says(
     assert f"20 s left, {needed:.0f} s needed for the way home" in text
 
 
+@pytest.mark.requirement("REQ-BAT-4")
 def test_the_way_home_is_across_up_and_down_with_a_factor_and_a_margin() -> None:
     limits = FlightLimits(return_time_factor=2.0, return_time_margin=7.0, return_wait=3.0)
     context = replace(FINE, limits=limits).context()
@@ -316,6 +334,7 @@ def test_the_way_home_is_across_up_and_down_with_a_factor_and_a_margin() -> None
     assert way_home_s(replace(context, estimate=there)) == pytest.approx(2.0 * 61.5 + 7.0)
 
 
+@pytest.mark.requirement("REQ-SAFE-4")
 @pytest.mark.parametrize(
     ("number", "expected"),
     [
@@ -335,6 +354,7 @@ def test_a_fence_is_acted_on_as_the_parameter_says(number: int, expected: Action
     assert action(inside) is Action.RETREAT, "what is announced has a parameter of its own"
 
 
+@pytest.mark.requirement("REQ-ACT-5")
 @pytest.mark.parametrize(
     ("number", "expected"),
     [
@@ -353,12 +373,14 @@ def test_an_actuator_that_fails_is_acted_on_as_the_parameter_says(
         assert action(replace(FINE, damage=damage, limits=limits)) is expected
 
 
+@pytest.mark.requirement("REQ-EST-9")
 def test_the_circuit_breaker_makes_a_warning_of_an_attitude_failure() -> None:
     over = replace(FINE, safety=SafetyMemory(rolled_us=NOW_US - 500_000))
     assert action(over) is Action.TERMINATE
     assert action(replace(over, limits=FlightLimits(termination_breaker=121212))) is Action.WARN
 
 
+@pytest.mark.requirement("REQ-SAFE-4")
 @pytest.mark.parametrize(
     ("number", "expected"),
     [(1, Action.WARN), (2, Action.HOLD), (5, Action.LAND), (6, Action.RETREAT)],
@@ -407,6 +429,7 @@ def test_a_report_names_the_condition_its_number_and_what_is_done() -> None:
     )
 
 
+@pytest.mark.requirement("REQ-PLAN-2")
 @pytest.mark.parametrize(
     ("plan", "words"),
     [
@@ -425,6 +448,7 @@ def test_a_planner_that_does_not_plan_is_told_with_why_and_since_when(
     assert report(row, stale, Action.BRAKE)[1] == f"no plan for three periods: {words}: brake"
 
 
+@pytest.mark.requirement("REQ-PLAN-3")
 def test_a_planner_that_is_lost_for_long_lets_the_vehicle_descend() -> None:
     lost = replace(FINE, plan_age_us=5_000_001)
     assert conditions(lost) == (Condition.PLANNER_LOST, Condition.PLAN_STALE)
@@ -469,6 +493,7 @@ def lost_rows(evidence: Evidence) -> dict[Condition, Action]:
     return {row.condition: row.action(context) for row in active(context)}
 
 
+@pytest.mark.requirement("REQ-EST-4", "REQ-EST-5")
 @pytest.mark.parametrize(
     ("sigma", "expected"),
     [
@@ -486,6 +511,7 @@ def test_in_dead_reckoning_it_holds_and_then_descends(
     assert lost_rows(adrift) == {**expected, Condition.AIDING_LOST: Action.DEAD_RECKON}
 
 
+@pytest.mark.requirement("REQ-EST-4", "REQ-EST-6")
 @pytest.mark.parametrize(
     ("number", "expected"), [(1, Action.WARN), (2, Action.HOLD), (5, Action.LAND)]
 )
@@ -497,6 +523,7 @@ def test_lost_sensors_are_acted_on_as_the_parameters_say(number: int, expected: 
     assert action(replace(fine, aiding=replaced_sensor(60_000))) is expected
 
 
+@pytest.mark.requirement("REQ-EST-3", "REQ-EST-6")
 def test_a_text_names_the_sensor_and_since_when() -> None:
     for aiding, words in (
         (
@@ -535,6 +562,7 @@ def test_what_is_left_of_the_battery_is_told_in_percent(share: float) -> None:
     assert report(row, context, Action.WARN)[1] == f"battery low: {round(100 * share)} % left"
 
 
+@pytest.mark.requirement("REQ-SAFE-11")
 def test_room_is_lacking_in_flight_only_for_a_while_and_by_more_than_a_workspace_does() -> None:
     for evidence in (
         replace(FINE, kept=CRAMPED, landed=True),

@@ -104,6 +104,7 @@ def charge(level: Charge) -> BatteryState:
     return BatteryState(remaining=0.04, charge=level)
 
 
+@pytest.mark.requirement("REQ-LINK-1")
 def test_a_station_lost_in_a_mission_holds_for_a_while_and_returns_and_is_told_twice() -> None:
     watched = Watched().until(9.9)
     assert watched.flown == (Mode.MISSION, None)
@@ -134,6 +135,7 @@ def test_a_station_that_comes_back_within_the_delay_leaves_the_vehicle_in_hold()
     assert watched.until(29.0).flown == (Mode.RETURN, Mode.MISSION)
 
 
+@pytest.mark.requirement("REQ-MODE-3")
 def test_what_ended_is_told_once_and_the_mode_stays() -> None:
     watched = Watched(AT_ONCE).until(12.0)
     assert watched.flown == (Mode.RETURN, Mode.MISSION)
@@ -144,6 +146,7 @@ def test_what_ended_is_told_once_and_the_mode_stays() -> None:
     assert len(watched.texts) == count
 
 
+@pytest.mark.requirement("REQ-MODE-2")
 def test_the_strongest_wins_and_a_milder_one_never_takes_over() -> None:
     watched = Watched(AT_ONCE).until(11.0, battery=charge(Charge.EMERGENCY))
     assert watched.flown == (Mode.LAND, Mode.MISSION)
@@ -171,6 +174,7 @@ def test_an_action_that_holds_waits_for_nothing() -> None:
     ]
 
 
+@pytest.mark.requirement("REQ-MODE-4")
 @pytest.mark.parametrize("config", [CONFIG, AT_ONCE])
 def test_a_pilot_takes_over_and_the_condition_acts_again_only_after_it_has_ended(
     config: FlightConfig,
@@ -186,6 +190,7 @@ def test_a_pilot_takes_over_and_the_condition_acts_again_only_after_it_has_ended
     assert watched.until(60.0).flown == (Mode.RETURN, Mode.HOLD)
 
 
+@pytest.mark.requirement("REQ-MODE-4")
 def test_a_place_to_go_to_is_a_command_as_well() -> None:
     watched = Watched().until(12.0)
     there = GoTo(Place((3.0, 3.0), 3.0))
@@ -193,6 +198,7 @@ def test_a_place_to_go_to_is_a_command_as_well() -> None:
     assert watched.until(30.0).flown == (Mode.HOLD, None)
 
 
+@pytest.mark.requirement("REQ-MODE-5")
 def test_without_a_position_no_mode_is_accepted_until_there_is_one_again() -> None:
     watched = Watched().until(1.0, aiding=ADRIFT)
     assert watched.flown == (Mode.DESCEND, Mode.MISSION)
@@ -208,6 +214,7 @@ def test_without_a_position_no_mode_is_accepted_until_there_is_one_again() -> No
 OUTSIDE = SafetyMemory(breach_us=0, breach_by=0.01)
 
 
+@pytest.mark.requirement("REQ-SAFE-4")
 def test_a_vehicle_that_is_pushed_out_again_retreats_again() -> None:
     watched = Watched().until(1.0, safety=OUTSIDE)
     assert watched.flown == (Mode.HOLD, Mode.MISSION)
@@ -228,6 +235,7 @@ def test_a_vehicle_that_has_returned_and_holds_does_not_return_again_but_acts_on
     assert watched.flown == (Mode.RETURN, Mode.MISSION)
 
 
+@pytest.mark.requirement("REQ-MODE-3")
 @given(
     st.lists(
         st.tuples(
@@ -269,6 +277,7 @@ def test_a_landing_goes_on_but_for_what_cannot_be_landed_with() -> None:
     assert lost.until(21.0, aiding=ADRIFT).flown == (Mode.DESCEND, Mode.LAND)
 
 
+@pytest.mark.requirement("REQ-MODE-2")
 @pytest.mark.parametrize("mode", [Mode.HOLD, Mode.RETURN, Mode.LAND, Mode.DESCEND])
 @pytest.mark.parametrize("action", Action)
 def test_what_is_under_way_is_not_begun_again_and_nothing_begins_on_the_ground(
@@ -286,6 +295,7 @@ def test_what_is_under_way_is_not_begun_again_and_nothing_begins_on_the_ground(
     assert on_the_ground is (Action.WARN if action.mode is not None else action)
 
 
+@pytest.mark.requirement("REQ-LINK-2")
 def test_setpoints_that_stop_hold_at_once_and_are_told_when_they_come_again() -> None:
     watched = Watched(state=flying(Mode.OFFBOARD))
     watched.until(3.0)
@@ -337,6 +347,17 @@ HAPPENS: dict[Condition, dict[str, Any]] = {
 }
 
 
+@pytest.mark.requirement(
+    "REQ-SAFE-4",
+    "REQ-MODE-1",
+    "REQ-EST-3",
+    "REQ-EST-4",
+    "REQ-EST-5",
+    "REQ-EST-6",
+    "REQ-EST-8",
+    "REQ-ACT-5",
+    "REQ-ACT-7",
+)
 @pytest.mark.parametrize("condition", HAPPENS, ids=lambda condition: condition.name)
 def test_a_condition_is_told_within_the_time_of_its_row(condition: Condition) -> None:
     begin_us = 10 * SECOND + 2_000  # just after a planning period has begun
@@ -351,6 +372,7 @@ def test_a_condition_is_told_within_the_time_of_its_row(condition: Condition) ->
     assert t_us - begin_us <= ROWS[condition].within_us
 
 
+@pytest.mark.requirement("REQ-MODE-1")
 def test_no_row_is_silent_in_flight() -> None:
     """What is not acted upon is told at least: no default is a quiet one."""
     estimate = vehicle_at(HERE, t_us=20 * SECOND)

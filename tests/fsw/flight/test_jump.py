@@ -60,6 +60,7 @@ def turned_and_moved(
     )
 
 
+@pytest.mark.requirement("REQ-EST-10")
 @pytest.mark.parametrize("seed", range(20))
 def test_plan_and_observer_come_along_when_positions_return(seed: int) -> None:
     random = np.random.default_rng(seed)
@@ -72,6 +73,7 @@ def test_plan_and_observer_come_along_when_positions_return(seed: int) -> None:
     assert errors(after, found) == pytest.approx(errors(state, carried), abs=SEEN)
 
 
+@pytest.mark.requirement("REQ-EST-10")
 @pytest.mark.parametrize(("place", "texts"), [(0.019, 0), (0.021, 1)])
 def test_a_jump_of_more_than_20_mm_is_reported(place: float, texts: int) -> None:
     state, before = moving(np.random.default_rng(1))

@@ -22,6 +22,7 @@ def at(height: float, v: Vec3 = STILL) -> tuple[bool, bool, bool]:
     return is_low(CONFIG, estimate), stands(CONFIG, estimate), standing_unclear(CONFIG, estimate)
 
 
+@pytest.mark.requirement("REQ-ARM-5")
 @pytest.mark.parametrize(
     ("height", "low", "standing", "unclear"),
     [
@@ -40,6 +41,7 @@ def test_at_rest_the_height_decides(
     assert at(height) == (low, standing, unclear)
 
 
+@pytest.mark.requirement("REQ-ARM-5")
 @given(st.tuples(*[st.floats(-0.2, 0.2)] * 3))
 def test_low_and_moving_is_unclear_whatever_the_direction(v: Vec3) -> None:
     slow = v[0] ** 2 + v[1] ** 2 + v[2] ** 2 < 0.05**2

@@ -46,12 +46,14 @@ def test_holding_and_landing_are_always_possible_in_flight(mode: Mode, wanted: M
     assert decision.mode is (None if mode is wanted else wanted)
 
 
+@pytest.mark.requirement("REQ-MODE-6")
 @pytest.mark.parametrize("mode", FLYING)
 def test_disarming_by_force_and_terminating_are_always_possible_in_flight(mode: Mode) -> None:
     assert ask(flying(mode=mode), ARM_DISARM, 0.0, 21196.0).mode is Mode.DISARMED
     assert ask(flying(mode=mode), TERMINATE, 1.0).mode is Mode.FAULT
 
 
+@pytest.mark.requirement("REQ-MODE-7")
 @pytest.mark.parametrize("wanted", FLYING)
 def test_nothing_leaves_a_terminated_vehicle(wanted: Mode) -> None:
     decision = ask(flying(mode=Mode.FAULT), SET_MODE, *custom(wanted))

@@ -80,6 +80,7 @@ def test_the_input_in_use_is_that_of_the_plans_age(age_us: int) -> None:
     assert u.a[0] == age_us // PERIOD_US
 
 
+@pytest.mark.requirement("REQ-PLAN-2")
 @pytest.mark.parametrize("age_us", [-1, 3 * PERIOD_US, 10**9])
 def test_outside_three_periods_a_plan_is_braked(age_us: int) -> None:
     assert plan_input(plan(), moving((1.0, 0.0, 0.0)), START_US + age_us, BRAKE).a[0] < 0.0
@@ -94,6 +95,7 @@ def test_a_plan_on_time_starts_where_it_says() -> None:
     assert exchange.follow(WAITING, moving(), plan(), START_US, 1)[0] == new.start
 
 
+@pytest.mark.requirement("REQ-PLAN-1")
 def test_a_late_plan_is_missed_once_and_starts_where_it_would_be_by_now() -> None:
     memory = WAITING
     for late in range(3):
@@ -114,6 +116,7 @@ def test_before_its_time_nothing_is_missed() -> None:
     assert take_answer(WAITING, None, START_US - TICK_US) == (WAITING, None)
 
 
+@pytest.mark.requirement("REQ-PLAN-1")
 def test_a_refusal_is_counted_and_the_running_plan_goes_on() -> None:
     running = plan(2)
     memory, new = take_answer(

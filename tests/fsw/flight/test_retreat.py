@@ -34,6 +34,7 @@ def retreated(zones: tuple[Zone, ...], p: Vec3, q_arm: Vec2 = (0.0, 0.0)) -> Vec
     return retreat_place(SafeSet(zones), vehicle_at(p)._replace(q_arm=q_arm), POINTS, LINKS, ROOM)
 
 
+@pytest.mark.requirement("REQ-SAFE-4")
 def test_off_a_wall_it_goes_straight_along_the_normal() -> None:
     x, y, z = retreated((AHEAD,), (0.92, 0.3, -1.0))
     assert (x, y, z) == pytest.approx((0.9 - ROOM, 0.3, -1.0))
@@ -63,6 +64,7 @@ def test_between_walls_too_close_it_goes_to_their_middle() -> None:
     assert abs(x - 0.85) <= 0.5 * ROOM + 1e-3
 
 
+@pytest.mark.requirement("REQ-SAFE-4")
 @given(
     st.tuples(*[st.floats(-0.4, 0.4)] * 3),
     st.tuples(st.floats(-1.0, 1.0), st.floats(-0.5, 0.5)),

@@ -102,6 +102,7 @@ def test_a_sphere_is_kept_beside_anything_else(beside: tuple[Zone, ...]) -> None
     assert [text for text in texts if text.severity is Severity.WARNING] == []
 
 
+@pytest.mark.requirement("REQ-SAFE-7")
 def test_in_flight_one_that_cannot_be_kept_is_refused_once_and_the_old_one_kept() -> None:
     start, _ = received(MissionMemory(), SafeSet((NORTH,)))
     memory, texts = received(start, TINY, rally=((3.0, 4.0),))
@@ -115,6 +116,7 @@ def test_in_flight_one_that_cannot_be_kept_is_refused_once_and_the_old_one_kept(
     assert (again.safe_set, texts) == (SafeSet((NORTH,)), [])
 
 
+@pytest.mark.requirement("REQ-SAFE-7")
 def test_on_the_ground_it_is_taken_and_stands_against_arming() -> None:
     memory, texts = received(MissionMemory(), TINY, flies=False)
     assert memory.safe_set == TINY
@@ -180,6 +182,7 @@ def test_a_moving_set_that_cannot_be_kept_is_refused_once_and_stays_refused() ->
     assert second == []
 
 
+@pytest.mark.requirement("REQ-SAFE-9")
 def test_a_stranger_in_flight_may_shrink_what_is_announced_and_is_named() -> None:
     memory, texts = received(MissionMemory(), walled(5.0, 5.0))
     assert told(texts) == ["safe set of 1/195 (simulator): 2 half-spaces; it owns the safe set now"]
@@ -189,6 +192,7 @@ def test_a_stranger_in_flight_may_shrink_what_is_announced_and_is_named() -> Non
     assert told(texts) == ["safe set of 1/195 (api 127.0.0.1:40001): 2 half-spaces"]
 
 
+@pytest.mark.requirement("REQ-SAFE-9")
 @pytest.mark.parametrize("flies", [True, False])
 @pytest.mark.parametrize(
     ("wanted", "why"),
@@ -246,6 +250,7 @@ def walker(t_us: int, north: float = 0.0) -> Zone:
     return Zone(at, 0.3, velocity=(0.5, -0.1, 0.0), t_us=t_us)
 
 
+@pytest.mark.requirement("REQ-SAFE-10")
 def test_a_moving_zone_that_is_silent_too_long_is_held_where_it_is_predicted_then() -> None:
     announced = SafeSet((NORTH, walker(1_000_000)))
     memory, _ = received(MissionMemory(), announced, fence=SafeSet((SOUTH,)))
@@ -345,6 +350,7 @@ def test_one_sender_has_one_address_unless_signatures_vouch_for_it() -> None:
     assert not here.is_same(replace(here, signed=True))
 
 
+@pytest.mark.requirement("REQ-SAFE-9")
 def test_in_flight_a_fence_is_grown_by_its_uploader_only() -> None:
     theirs = {"source": OWNER, "fence_source": STRANGER}
     memory, _ = received(MissionMemory(), fence=walled(5.0, 5.0), fence_source=OWNER)

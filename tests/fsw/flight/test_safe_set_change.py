@@ -93,6 +93,7 @@ BALL = point((1.0, 0.0, -1.0), 0.3)
 POST = column((1.0, 0.0), 0.3)
 
 
+@pytest.mark.requirement("REQ-SAFE-9")
 @given(changes(), st.lists(_PLACES, min_size=1, max_size=20))
 @example((SafeSet((BALL,)), SafeSet((wall((-1.0, 0.0, 0.0), -0.7, 0.0),))), [(1.0, 0.0, -1.0)])
 @example((SafeSet((POST,)), SafeSet((BALL,))), [(1.0, 0.0, 5.0)])

@@ -39,6 +39,7 @@ def margins(memory: SafetyMemory, least: float, t_s: float = 1.0) -> SafetyMemor
     return WATCH.breach(memory, vehicle_at(HERE, t_us=round(1e6 * t_s)), report, flies=True)
 
 
+@pytest.mark.requirement("REQ-SAFE-3")
 def test_the_tube_is_the_one_that_the_analysis_prints_and_room_for_noise() -> None:
     assert pytest.approx(base_reach(TUBE, CONFIG.surroundings) + NOISE_ROOM) == R
     # Closer to a wall than the plan may come, replanning would be of no use.
@@ -49,6 +50,7 @@ def test_the_tube_is_the_one_that_the_analysis_prints_and_room_for_noise() -> No
     assert SafetyWatch(pid, TUBE).radius == pid.upset_distance
 
 
+@pytest.mark.requirement("REQ-SAFE-3")
 @pytest.mark.parametrize("axis", range(3))
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
 def test_it_has_left_the_tube_beyond_its_radius_on_any_axis(axis: int, sign: float) -> None:
@@ -86,6 +88,7 @@ def test_an_episode_is_one_until_it_has_been_on_its_plan_for_a_while() -> None:
     assert away(memory, (1.1 * R, 0.0, 0.0), 3.0).counters.departures == 2
 
 
+@pytest.mark.requirement("REQ-SAFE-3")
 def test_each_time_it_is_out_it_plans_anew() -> None:
     memory = replace(away(CALM, (1.1 * R, 0.0, 0.0), 1.0), replan=False)
     assert not away(memory, (0.9 * R, 0.0, 0.0), 1.1).replan
@@ -98,6 +101,7 @@ def test_without_a_plan_there_is_nothing_to_leave() -> None:
     assert WATCH.off_plan(left, vehicle_at(HERE), None).off_plan_us == -1
 
 
+@pytest.mark.requirement("REQ-SAFE-4")
 def test_a_negative_margin_is_a_breach_and_counted_once() -> None:
     assert margins(CALM, 0.0) is CALM
     memory = margins(CALM, -0.003)
@@ -132,6 +136,7 @@ def rolled(degrees: float, axis: str = "x", t_us: int = 0) -> StateEstimate:
     return estimate_of(Rotation.from_euler(axis, degrees, degrees=True))._replace(t_us=t_us)
 
 
+@pytest.mark.requirement("REQ-EST-9")
 @pytest.mark.parametrize("degrees", [-179.0, -61.0, 61.0, 90.0, 179.0])
 def test_a_roll_beyond_its_limit_is_noted_since_when_and_forgotten_when_it_is_over(
     degrees: float,
@@ -144,6 +149,7 @@ def test_a_roll_beyond_its_limit_is_noted_since_when_and_forgotten_when_it_is_ov
     assert WATCH.attitude(memory, rolled(degrees, t_us=11), flies=False).rolled_us == -1
 
 
+@pytest.mark.requirement("REQ-EST-9")
 @pytest.mark.parametrize("degrees", [-61.0, 61.0, 89.0])
 def test_a_pitch_beyond_its_limit_is_one_of_its_own(degrees: float) -> None:
     memory = WATCH.attitude(SafetyMemory(), rolled(degrees, "y", t_us=5), flies=True)

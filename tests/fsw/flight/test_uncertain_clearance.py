@@ -69,6 +69,7 @@ def certain(**deviations: float) -> Array:
     return np.diag([deviations.get(name, 0.0) ** 2 for name in names])
 
 
+@pytest.mark.requirement("REQ-SAFE-11")
 def test_each_clearance_grows_by_the_deviation_along_its_normal() -> None:
     kept = clearance().keep(KeptSet(), BOTH, vehicle(), certain(x=0.01, y=0.02))
     assert kept.added == pytest.approx((0.03, 0.06), abs=STEP)
@@ -124,6 +125,7 @@ def places(estimate: StateEstimate, seed: int) -> Array:
     return turned
 
 
+@pytest.mark.requirement("REQ-SAFE-11")
 @given(seed=st.integers(0, 2**32 - 1), full=st.booleans())
 def test_no_part_of_the_body_is_less_certain_than_its_clearance(seed: int, full: bool) -> None:
     random = np.random.default_rng(seed)
@@ -183,6 +185,7 @@ def corridor(left: float, right: float) -> SafeSet:
     return SafeSet((wall((0.0, 1.0, 0.0), -left, 0.0), wall((0.0, -1.0, 0.0), -right, 0.0)))
 
 
+@pytest.mark.requirement("REQ-SAFE-11")
 def test_walls_are_given_what_room_there_is_and_the_lack_of_it_is_said() -> None:
     narrow = corridor(0.2, 0.3)
     kept = clearance().keep(KeptSet(), narrow, vehicle(), certain(y=0.1))

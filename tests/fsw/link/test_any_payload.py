@@ -64,6 +64,7 @@ def vehicle(tmp_path: Path) -> Iterator[Ground]:
         yield ground
 
 
+@pytest.mark.requirement("REQ-LINK-6")
 def test_no_payload_of_a_valid_frame_raises_or_breaks_a_service(vehicle: Ground) -> None:
     chance, inbox = random.Random(7), vehicle.inbox
     # A random key would shut the test out.

@@ -97,6 +97,7 @@ def test_no_estimate_however_wild_ends_the_flight(ground: Ground, number: float)
     assert ids.HEARTBEAT in reported
 
 
+@pytest.mark.requirement("REQ-LINK-6")
 def test_garbage_does_not_raise_and_nothing_is_learnt_from_it(ground: Ground) -> None:
     chance = random.Random(4)
     stranger = station_socket()
@@ -217,6 +218,7 @@ def test_our_own_frames_sent_back_are_ignored(ground: Ground) -> None:
     echo.close()
 
 
+@pytest.mark.requirement("REQ-LINK-5")
 def test_a_flood_is_read_within_a_budget(ground: Ground) -> None:
     heartbeat = FrameWriter(255, 190).frame(ids.HEARTBEAT, *HEARTBEAT)
     for _ in range(500):

@@ -110,6 +110,7 @@ def vehicle() -> Iterator[Vehicle]:
         simulator.close()
 
 
+@pytest.mark.requirement("REQ-SAFE-9")
 @pytest.mark.parametrize("ids_of", [(255, 190), (1, 195)], ids=["its own", "the owner's"])
 def test_a_stranger_cannot_move_a_wall_outwards(vehicle: Vehicle, ids_of: tuple[int, int]) -> None:
     vehicle.announce(TRUE_WALL)

@@ -53,6 +53,7 @@ def test_a_flood_of_different_sentences_is_bounded_and_told() -> None:
 FAILSAFE = StatusText(Severity.CRITICAL, "failsafe: battery critical, returning")
 
 
+@pytest.mark.requirement("REQ-LINK-7")
 @pytest.mark.parametrize("severity", list(Severity))
 def test_no_flood_keeps_a_failsafe_or_an_emergency_from_being_sent(severity: Severity) -> None:
     """Whatever a client provokes in one tick: more refusals than a budget has, of any kind."""

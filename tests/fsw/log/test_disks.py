@@ -49,6 +49,7 @@ def small_disk() -> Iterator[None]:
     signal.signal(signal.SIGXFSZ, handler)
 
 
+@pytest.mark.requirement("REQ-LOG-1")
 @pytest.mark.parametrize(
     "lockstep",
     [pytest.param(True, id="lockstep", marks=pytest.mark.long), pytest.param(False, id="realtime")],
@@ -82,6 +83,7 @@ def test_a_full_disk_ends_the_files_and_is_told_once_a_file(
     assert log.whole
 
 
+@pytest.mark.requirement("REQ-LOG-3")
 def test_a_slow_disk_delays_no_tick_and_leaves_a_marked_gap(tmp_path: Path) -> None:
     disk_is_back = threading.Event()
 
@@ -132,6 +134,7 @@ def ticks_in(path: Path) -> int:
     return sum(isinstance(tick, LoggedTick) for tick in ticks(open_flight(path)))
 
 
+@pytest.mark.requirement("REQ-LOG-4")
 @pytest.mark.long
 def test_a_killed_process_leaves_readable_logs(tmp_path: Path) -> None:
     paths = (tmp_path / "lockstep", tmp_path / "realtime")

@@ -37,6 +37,7 @@ def test_the_default_configuration_is_consistent(safe_set: SafeSet) -> None:
     assert refusals(analyse(config, safe_set, loop_tube(config))) == ()
 
 
+@pytest.mark.requirement("REQ-SAFE-7")
 @pytest.mark.parametrize("preset", ["paper-1", "paper-5"])
 @pytest.mark.parametrize("safe_set", [WALLS, POINT, SPHERE])
 def test_the_papers_lambda_is_refused_with_a_value_that_would_do(
@@ -66,6 +67,7 @@ def test_at_the_stand_off_a_vehicle_at_rest_meets_lambda(robustness: float) -> N
     )
 
 
+@pytest.mark.requirement("REQ-SAFE-7")
 def test_the_tube_finding_turns_where_the_stand_off_equals_the_reach() -> None:
     config = flight_config()
     tuning = config.planner.walls

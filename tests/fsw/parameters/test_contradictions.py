@@ -17,6 +17,7 @@ def test_the_defaults_do_not_contradict_each_other() -> None:
     assert contradictions(FlightConfig()) == ()
 
 
+@pytest.mark.requirement("REQ-ARM-7")
 @pytest.mark.parametrize(
     ("changes", "words"),
     [

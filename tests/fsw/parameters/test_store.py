@@ -94,6 +94,7 @@ def test_nobody_is_told_until_both_threads_are_done(kept: Kept) -> None:
     assert list(asker.changed) == ["PID_YAW_P"]
 
 
+@pytest.mark.requirement("REQ-ARM-8")
 def test_each_tuning_is_whole(store: ParameterStore) -> None:
     asker = store.listen()
     store.change("TRK_EFFORT", 0.3, asker)
@@ -114,6 +115,7 @@ def test_a_client_s_single_precision_is_the_number_it_meant(store: ParameterStor
     assert ticks(store) == [(("planner.walls.lambda_", 0.33),)]
 
 
+@pytest.mark.requirement("REQ-ARM-8")
 def test_what_is_out_of_range_never_comes_near_a_tick(store: ParameterStore, kept: Kept) -> None:
     asker = store.listen()
     for value in (math.nan, math.inf, -1.0, 1e30):

@@ -49,12 +49,14 @@ class Machine:
         return self.watch.look(self.missed)
 
 
+@pytest.mark.requirement("REQ-TIME-3", "REQ-TIME-5")
 def test_a_machine_that_is_well_is_no_news() -> None:
     machine = Machine()
     for _ in range(5):
         assert machine.second(missed=24, received=49, jump=499_999, written=10**5) is None
 
 
+@pytest.mark.requirement("REQ-TIME-3", "REQ-TIME-5", "REQ-LINK-5")
 @pytest.mark.parametrize(
     ("changes", "health"),
     [
@@ -80,6 +82,7 @@ def test_a_log_that_ends_is_told_once() -> None:
     assert machine.second() is None
 
 
+@pytest.mark.requirement("REQ-LOG-2")
 def test_a_disk_that_will_be_full_within_a_minute_is_told_in_steps() -> None:
     machine = Machine(free=10**12)
     assert machine.second(written=10**6) is None

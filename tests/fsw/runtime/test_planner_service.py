@@ -170,6 +170,7 @@ def test_the_process_s_answer_waits_for_its_tick_too(
     assert service.take(ALWAYS_US) is None
 
 
+@pytest.mark.requirement("REQ-PLAN-4")
 def test_submit_and_take_never_wait_and_the_newest_request_is_next(
     gated: ProcessPlanner, record: PlannerRecord, gate: Path
 ) -> None:
@@ -192,6 +193,7 @@ def test_an_answer_that_comes_behind_another_request_does_not_hide_the_next(
         given.append(answer(gated).plan_id)
 
 
+@pytest.mark.requirement("REQ-PLAN-4")
 def test_a_worker_that_dies_is_replaced_and_reported(
     service: ProcessPlanner, record: PlannerRecord
 ) -> None:
@@ -216,6 +218,7 @@ def test_a_request_that_kills_its_worker_is_lost_and_the_next_is_answered(
     assert record.events == ["planner process died (-11), restart 1"]
 
 
+@pytest.mark.requirement("REQ-PLAN-4")
 def test_a_fork_server_that_dies_takes_its_worker_along_and_both_are_replaced(
     service: ProcessPlanner, record: PlannerRecord
 ) -> None:
@@ -229,6 +232,7 @@ def test_a_fork_server_that_dies_takes_its_worker_along_and_both_are_replaced(
     assert record.restarts == 1
 
 
+@pytest.mark.requirement("REQ-PLAN-4")
 def test_a_worker_that_hangs_is_replaced(
     service: ProcessPlanner, record: PlannerRecord, clock: SharedClock
 ) -> None:
@@ -245,6 +249,7 @@ def test_a_worker_that_hangs_is_replaced(
     assert service.fork_server == server
 
 
+@pytest.mark.requirement("REQ-PLAN-4")
 def test_a_fork_server_that_hangs_is_replaced_with_its_worker(
     service: ProcessPlanner, record: PlannerRecord, clock: SharedClock
 ) -> None:

@@ -30,6 +30,7 @@ class Raising:
         return state + 1, outputs_at(state, acks=(CommandAck(400, 0, 1, 195),))
 
 
+@pytest.mark.requirement("REQ-TIME-7")
 def test_a_tick_that_fails_repeats_the_last_command_and_says_so() -> None:
     tick = TickRunner(Raising({2}), 0)
     tick(INPUTS)
@@ -41,6 +42,7 @@ def test_a_tick_that_fails_repeats_the_last_command_and_says_so() -> None:
     assert tick(INPUTS).snapshot.t_us == 1
 
 
+@pytest.mark.requirement("REQ-TIME-7")
 def test_an_error_that_stays_is_raised() -> None:
     tick = TickRunner(Raising(set(range(2, 100))), 0)
     tick(INPUTS)

@@ -73,6 +73,7 @@ def read(event: Event) -> str:
     return text
 
 
+@pytest.mark.requirement("REQ-MODE-1")
 @pytest.mark.parametrize("action", Action)
 def test_a_condition_and_what_is_done_about_it_are_read_as_in_the_texts(action: Action) -> None:
     for condition in Condition:
@@ -156,6 +157,7 @@ def test_the_checks_are_reported_at_first_when_they_change_and_when_somebody_ask
     assert log.newest == 11
 
 
+@pytest.mark.requirement("REQ-MODE-1")
 def test_a_text_with_an_event_is_one() -> None:
     log = EventLog()
     ticked(log, 0, ArmingReport(), event=LOST)

@@ -111,6 +111,7 @@ def test_we_believe_what_pymavlink_signs(ground: Ground) -> None:
     assert commands(ground) == 3
 
 
+@pytest.mark.requirement("REQ-LINK-3")
 def test_unsigned_commands_do_nothing(ground: Ground) -> None:
     stranger = station_socket()
     ground.polled(unsigned(ids.COMMAND_LONG, *ARM), stranger)
@@ -132,6 +133,7 @@ def test_presence_needs_no_signature_but_teaches_no_peer(ground: Ground) -> None
     stranger.close()
 
 
+@pytest.mark.requirement("REQ-LINK-4")
 def test_only_a_signed_heartbeat_is_a_sign_of_life(ground: Ground) -> None:
     """Anybody could keep a lost station alive otherwise, or have a failsafe wait for a silence."""
     ground.inbox.take()
@@ -142,6 +144,7 @@ def test_only_a_signed_heartbeat_is_a_sign_of_life(ground: Ground) -> None:
     assert ground.inbox.take().station_heard
 
 
+@pytest.mark.requirement("REQ-LINK-3")
 def test_a_tampered_frame_does_nothing_and_locks_nobody_out(ground: Ground) -> None:
     """Stock pymavlink believes a forged time before it has checked the hash."""
     client = Client(ground)
@@ -159,12 +162,14 @@ def test_a_tampered_frame_does_nothing_and_locks_nobody_out(ground: Ground) -> N
     assert commands(ground) == 1
 
 
+@pytest.mark.requirement("REQ-LINK-3")
 def test_a_wrong_key_is_refused(ground: Ground) -> None:
     ground.polled(Client(ground, OTHER_KEY).arm())
     assert commands(ground) == 0
     assert ground.link.signing.counters.wrong_hash == 1
 
 
+@pytest.mark.requirement("REQ-LINK-3")
 def test_a_replayed_frame_is_refused(ground: Ground) -> None:
     client = Client(ground)
     first, second = client.arm(), client.arm()
@@ -211,6 +216,7 @@ def test_the_key_is_for_its_owners_eyes_and_outlives_the_process(
         assert commands(restarted) == 1
 
 
+@pytest.mark.requirement("REQ-LINK-3")
 def test_a_process_that_is_killed_leaves_the_newest_time_to_the_next_one(
     ground: Ground, file: Path
 ) -> None:
