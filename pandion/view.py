@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import threading
 from dataclasses import dataclass
 from pathlib import Path
@@ -54,13 +55,18 @@ def main(argv: list[str]) -> int:
 
 def _show_log(options: ViewOptions, log: Path) -> int:
     from view.flight_data import UlogError
+
+    try:
+        flight = _opened(log)
+    except UlogError as error:
+        complain("pandion view", error)
+        return COULD_NOT_START
     from view.log_page import LogPage
     from view.page import PageError, address, open_server
 
     try:
-        flight = _opened(log)
         server = open_server(options.host, options.port, flight.title)
-    except (UlogError, PageError) as error:
+    except PageError as error:
         complain("pandion view", error)
         return COULD_NOT_START
     page = LogPage(server, flight)
@@ -102,8 +108,6 @@ def _show_live(options: ViewOptions) -> int:
 
 def _wait() -> None:
     """Until Ctrl-C."""
-    import contextlib
-
     with contextlib.suppress(KeyboardInterrupt):
         threading.Event().wait()
 

@@ -125,7 +125,7 @@ class VehicleLink(threading.Thread):
         return False, f"{name}: no answer from {self.where}"
 
     def aim(self, target: Vec3 | None) -> None:
-        """Send this place of the end-effector [m, NED] as setpoint from now on; None: no more."""
+        """Send ``target`` [m, NED] of the end-effector as setpoint from now on; None: no more."""
         self._setpoint = target
 
     def announce(self, safe_set: SafeSet | None, centre: Vec3, radius: float) -> None:

@@ -24,8 +24,13 @@ class Server(viser.ViserServer):
     """viser's, without the tunnel to another host that a browser could ask it for."""
 
     def request_share_url(self, verbose: bool = True) -> str | None:
-        """Refuse: whoever had the address could command the vehicle."""
+        """Refuse: anyone with the address could command the vehicle."""
         return None
+
+    def stop(self) -> None:
+        """Stop serving, without a word."""
+        with contextlib.redirect_stdout(io.StringIO()):
+            super().stop()
 
 
 def open_server(host: str, port: int, title: str) -> Server:

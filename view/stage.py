@@ -157,7 +157,7 @@ class Stage:
         self._scene = scene = server.scene
         scene.set_up_direction("-z")
         # Its light comes with viser; nothing is fetched.
-        scene.configure_environment_map("studio", environment_intensity=0.6)
+        scene.configure_environment_map("studio", environment_intensity=0.3)
         self._vehicle = VehicleFigure(scene, "/vehicle", airframe)
         self._truth = VehicleFigure(scene, "/truth", airframe, ghost=colours.ORANGE)
         self._target = scene.add_icosphere(
@@ -236,7 +236,7 @@ class Stage:
             self._trail.pop(0).remove()
 
     def draw_reference(self, points: Array) -> None:
-        """Draw where the end-effector should go, (n, 3) [m, NED]; NaN: not there."""
+        """Draw where the end-effector should go: ``points`` (n, 3) [m, NED]; NaN: not there."""
         if len(points) > 1:
             segments = _segments(points)
             segments = segments[np.isfinite(segments).all(axis=(1, 2))]
@@ -288,7 +288,8 @@ class Stage:
                     outline = _segments(mesh.surface.vertices[[0, 1, 2, 3, 0]])
                     self._scene.add_line_segments(f"{name}/edge", outline, _EDGE, thickness=0.004)
             if mesh.shell is not None:
-                self._add_mesh(f"{name}/shell", mesh.shell, colours.ORANGE, 0.07)
+                pale = 0.07 if zone.shape.kind == "half-space" else 0.16
+                self._add_mesh(f"{name}/shell", mesh.shell, colours.ORANGE, pale)
 
     def _add_mesh(self, name: str, mesh: Mesh, colour: Rgb, opacity: float) -> None:
         self._scene.add_mesh_simple(

@@ -213,7 +213,7 @@ class Telemetry:
         self.events.append(Event(self.t, kind.value, text))
 
     def read_clock(self, t: float) -> None:
-        """Take the vehicle's time [s]; it does not go back, unless the vehicle starts again."""
+        """Take the vehicle's time ``t`` [s]; it goes back only if the vehicle starts again."""
         if not t <= self.t or t < self.t - 5.0:
             self.t = t
 

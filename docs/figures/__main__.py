@@ -18,10 +18,12 @@ from docs.figures.diagrams import draw_architecture, draw_timing
 from docs.figures.flight import draw_flight, recorded
 from docs.figures.frames import draw_frames
 from docs.figures.screens import draw_inspector, draw_report
+from docs.figures.view import draw_view
 
 IMAGES = Path(__file__).parents[1] / "images"
 # Scenario and suite of sensors; the first is the flight of `make run`.
 PICTURED = {("walls", "mocap"): "flight.svg", ("branches", "perfect"): "branches.svg"}
+SHOWN = ("branches", "perfect")  # on the page of pandion view
 # The flights of the table in README.md; of each, seed 0 and the whole duration.
 FLOWN = (
     ("walls", "mocap"),
@@ -60,6 +62,7 @@ def draw_all(flights: Path) -> None:
             draw_flight(fly(*flown, flights), IMAGES / name)
     pictured = fly(*next(iter(PICTURED)), flights)
     try:
+        draw_view(fly(*SHOWN, flights), IMAGES / "view.png")
         draw_report(pictured, IMAGES / "report.png")
         draw_inspector(pictured, IMAGES / "top.png")
     except NoBrowser as missing:

@@ -99,8 +99,12 @@ class Page:
         Raises:
             NoBrowser: Nothing does.
         """
-        x, y = self.wait_for(_PLACE % json.dumps(text))
-        self.press(x, y)
+        where = _PLACE % json.dumps(text)
+        before, place = None, self.wait_for(where)
+        while place != before:  # the page is still arranging itself
+            time.sleep(0.3)
+            before, place = place, self.wait_for(where)
+        self.press(*place)
 
     def screenshot(self, path: Path) -> None:
         """Write what is seen as PNG."""

@@ -1,0 +1,44 @@
+"""The page of a flight at its worst moment, as a browser shows it."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+from PIL import Image
+
+from docs.figures.browser import page
+from view.log_flight import LogFlight
+from view.log_page import LogPage
+from view.page import address, open_server
+
+SIZE = (1440, 900)
+_TIME = "document.querySelector('[data-pandion=time]')?.textContent"
+# viser warns that it draws without a graphics card.
+_CLOSE = "document.querySelectorAll('.mantine-Notification-closeButton').forEach(b => b.click())"
+
+
+def draw_view(directory: Path, target: Path) -> None:
+    """Take a picture of a flight's page.
+
+    Raises:
+        NoBrowser: There is no Chromium.
+    """
+    with page(*SIZE) as browser:
+        flight = LogFlight(directory)
+        server = open_server("127.0.0.1", 0, flight.title)
+        shown = LogPage(server, flight)
+        browser.open(address(server))
+        browser.wait_for(_TIME, 60.0)
+        browser.value(_CLOSE)
+        browser.press_on("worst margin")
+        assert flight.worst is not None
+        browser.wait_for(f"{_TIME} === '{flight.worst.t - flight.begin:.2f} s'", 60.0)
+        time.sleep(3.0)  # until all is drawn
+        browser.screenshot(target)
+        shown.close()
+        server.stop()
+    # A quarter of the size, and looks the same.
+    with Image.open(target) as whole:
+        palette = whole.convert("RGB").quantize(256, dither=Image.Dither.NONE)
+    palette.save(target, optimize=True)
