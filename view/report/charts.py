@@ -75,14 +75,22 @@ def margins(flights: Sequence[Reported]) -> Chart:
             colour = LIMIT if len(flights) == 1 else COLOURS[k % len(COLOURS)]
             traces.append(mark(_named(flight, flights, "minimum"), worst.t, _MM * worst.margin,
                                colour, said))  # fmt: skip
-    return over_time(
-        "margins",
-        "Margins",
+    tops = [max((v for v in one["y"] if v is not None), default=0.0) for one in traces]
+    top = min(_SHOWN_MM, 1.2 * max(tops, default=_SHOWN_MM))
+    note = (
         "Distance beyond the required clearance, minimum of each zone, by the true state. The "
         "circle is the minimum in the result, which the simulator checks every millisecond; the "
-        "lines are the samples in the log.",
-        [Row("margin [mm]", traces, (0.0,), (min(-20.0, 1.2 * lowest), _SHOWN_MM))],
-        _marks(flights),
+        "lines are the samples in the log."
+    )
+    if any(flight.margins is None for flight in flights):
+        note = (
+            "Distance beyond the required clearance, by the vehicle's own estimate: the scenario "
+            "is none of this build's, or the log has no true state. The circle is the minimum in "
+            "the result, by the true state."
+        )
+    span = (min(-20.0, 1.2 * lowest), max(top, 50.0))
+    return over_time(
+        "margins", "Margins", note, [Row("margin [mm]", traces, (0.0,), span)], _marks(flights)
     )
 
 
