@@ -135,8 +135,8 @@ class LogEncoder:
         """Append the records of one tick; the sensors' are the first."""
         snapshot = outputs.snapshot
         out += self._every_tick(inputs, snapshot)
-        if inputs.samples:
-            out += samples.records(inputs.sensors.t_us, inputs.samples)
+        for sample in inputs.samples:
+            out += samples.record(inputs.sensors.t_us, sample)
         interval = snapshot.t_us // self._detail_us
         if interval != self._detailed:
             self._detailed = interval

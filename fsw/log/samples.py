@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Iterator
-from functools import lru_cache
 from struct import Struct
 from typing import Any, Final
 
@@ -46,13 +45,13 @@ class _Codec:
         self._names = tuple(field.name for field in dataclasses.fields(kind))
         self._sizes = tuple(field.count for field in topic.fields)  # 0: a number by itself
         self._head = data_head(self.number, topic)
-        self.codes = "5s" + topic.codes
+        self._pack = Struct("<5s" + topic.codes).pack
         self._values = _VALUES.get(kind, self._any_values)
         self._unpack: Callable[[bytes], Values] = unpacker(topic).unpack
 
-    def values(self, t_us: int, sample: Sample) -> Values:
-        """All of the record of a sample that arrived for the tick of ``t_us``."""
-        return (self._head, t_us, *self._values(sample))
+    def write(self, t_us: int, sample: Sample) -> bytes:
+        """The record of a sample that arrived for the tick of ``t_us``."""
+        return self._pack(self._head, t_us, *self._values(sample))
 
     def _any_values(self, sample: Sample) -> Values:
         values: list[float] = []
@@ -80,17 +79,9 @@ _BY_NUMBER: Final = {codec.number: codec for codec in _CODECS.values()}
 TOPIC_NUMBERS: Final = frozenset(_BY_NUMBER)
 
 
-def records(t_us: int, arrived: tuple[Sample, ...]) -> bytes:
-    """The records of the samples that arrived for the tick of ``t_us``, packed in one call."""
-    values: list[Any] = []
-    for sample in arrived:
-        values += _CODECS[type(sample)].values(t_us, sample)
-    return _packer(tuple(map(type, arrived)))(*values)
-
-
-@lru_cache(maxsize=64)  # most ticks have the same kinds
-def _packer(kinds: tuple[type[Sample], ...]) -> Callable[..., bytes]:
-    return Struct("<" + "".join(_CODECS[kind].codes for kind in kinds)).pack
+def record(t_us: int, sample: Sample) -> bytes:
+    """The record of a sample that arrived for the tick of ``t_us``."""
+    return _CODECS[type(sample)].write(t_us, sample)
 
 
 def sample_of(number: int, body: bytes) -> Sample:

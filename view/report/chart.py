@@ -43,7 +43,7 @@ class Row:
 
 
 def rounded(values: Array) -> list[float | None]:
-    """Numbers with five digits; what is not finite is null, a gap in a line."""
+    """``values`` (n,) [any unit] with five digits; what is not finite is null, a gap in a line."""
     return [float(f"{v:.{_DIGITS}g}") if np.isfinite(v) else None for v in np.asarray(values, "f8")]
 
 
@@ -68,7 +68,7 @@ def thinned(t: Array, y: Array, most: int) -> tuple[Array, Array]:
 def line(
     name: str, t: Array, y: Array, colour: str, *, most: int = 2000, width: float = 1.2, **more: Any
 ) -> Trace:
-    """A line over time ``t`` (n,) [s] of ``y`` (n,) [the axis' unit]."""
+    """A line over time ``t`` (n,) [s] of ``y`` (n,) [the axis' unit], ``width`` [px]."""
     t, y = thinned(np.asarray(t, "f8"), np.asarray(y, "f8"), most)
     times = [round(float(one), 3) for one in t]
     look = {"color": colour, "width": width, **more.pop("line", {})}

@@ -275,7 +275,7 @@ def _about_zero(values: Array, most: float) -> tuple[float, float]:
 
 
 def tilt_deg(q: Array) -> Array:
-    """Angle [deg] between the body's z axis and the vertical, of quaternions (n, 4)."""
+    """Angle [deg] between the body's z axis and the vertical, of quaternions ``q`` (n, 4) [1]."""
     x, y = np.asarray(q[:, 1], "f8"), np.asarray(q[:, 2], "f8")
     return np.asarray(_DEG * np.arccos(np.clip(1.0 - 2.0 * (x * x + y * y), -1.0, 1.0)))
 

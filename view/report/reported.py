@@ -62,7 +62,7 @@ class Reported:
         return self.data.tables.get(name)
 
     def since(self, t: Array) -> Array:
-        """Sensor times [s] as times since the start [s]."""
+        """Sensor times ``t`` (n,) [s] as times since the start [s]."""
         return t - self.data.begin
 
     def number(self, name: str) -> float:
