@@ -29,7 +29,11 @@ from tests.view.flights import (
     north,
     write_flight,
 )
+from view.flight_data import FlightData, Table
+from view.flight_events import EventKind, FlightEvent
 from view.report.chart import thinned
+from view.report.charts import event_marks
+from view.report.reported import Reported
 
 TIME_AXES = ("margins", "tracking", "inputs", "plan_inputs", "motion", "loop_timing", "estimator",
              "worst_second")  # fmt: skip
@@ -159,6 +163,16 @@ def test_every_axis_of_time_has_every_event(drawn: dict[str, Any]) -> None:
         shapes = drawn[name]["layout"]["shapes"]
         upright = {shape["x0"] for shape in shapes if shape["x0"] == shape["x1"]}
         assert upright == {0.5, 2.5, 2.75, 3.5}, name
+
+
+def test_of_many_events_the_axes_show_the_failsafes_first() -> None:
+    begin = 1e-6 * flights.BEGIN_US
+    found = [FlightEvent(begin + k + 1.0, EventKind.WARNING, "windy") for k in range(200)]
+    found += [FlightEvent(begin + 500.0, EventKind.FAULT, "no plan")]
+    data = FlightData(Path(), {}, {}, {"any": Table("any", np.array([begin]), {})}, (), (), 0, True)
+    marks = event_marks(Reported(label="", data=data, margins=None, events=tuple(found)))
+    assert len(marks) == 60
+    assert marks[-1] == (500.0, "201")
 
 
 def test_the_events_are_in_a_table_in_order(page: str) -> None:

@@ -32,7 +32,10 @@ _MM: Final = 1e3
 _DEG: Final = 180.0 / math.pi
 _SHOWN_MM: Final = 400.0  # of the margins at first; all of it can be zoomed out to
 _DETAIL_S: Final = 0.5  # before and behind the worst moment
-_MARKED: Final = (EventKind.MODE, EventKind.FAULT, EventKind.WARNING, EventKind.COMMAND)
+# What axes show, the first kinds first where there is much of it.
+_MARKED: Final = (EventKind.FAULT, EventKind.MODE, EventKind.WARNING, EventKind.COMMAND)
+_MOST_MARKS: Final = 60
+_MOST_ZONES: Final = 8  # whose margins are drawn: the nearest
 _DEADLINE_MS: Final = 20.0  # a plan that comes later is not flown
 _PERIOD_MS: Final = 100.0
 _INNER: Final = 0  # PANDION_RATE_GROUP
@@ -54,11 +57,12 @@ def charts(flights: Sequence[Reported]) -> list[Chart]:
 
 def event_marks(flight: Reported) -> list[tuple[float, str]]:
     """Time since the start [s] and number in the table of the events that axes show."""
-    numbered = enumerate(flight.events, start=1)
+    found = [(k, event) for k, event in enumerate(flight.events, 1) if event.kind in _MARKED]
+    shown = sorted(found, key=lambda pair: _MARKED.index(pair[1].kind))[:_MOST_MARKS]
     marks: dict[float, str] = {}
-    for k, event in numbered:
+    for k, event in sorted(shown, key=lambda pair: pair[0]):
         t = round(event.t - flight.data.begin, 3)
-        if event.kind in _MARKED and t > 0.0:
+        if t > 0.0:
             marks[t] = f"{marks[t]},{k}" if t in marks else str(k)
     return list(marks.items())
 
@@ -82,6 +86,8 @@ def margins(flights: Sequence[Reported]) -> Chart:
         "circle is the minimum in the result, which the simulator checks every millisecond; the "
         "lines are the samples in the log."
     )
+    if any(len(flight.margins.of_zones()) > _MOST_ZONES for flight in flights if flight.margins):
+        note += f" Of more zones the {_MOST_ZONES} nearest are drawn."
     if any(flight.margins is None for flight in flights):
         note = (
             "Distance beyond the required clearance, by the vehicle's own estimate: the scenario "
@@ -100,7 +106,8 @@ def _margin_lines(flight: Reported, colour: str, *, alone: bool) -> list[Trace]:
     if truth is not None:
         t = flight.since(truth.t)
         if alone:
-            for k, (zone, values) in enumerate(truth.of_zones().items()):
+            nearest = sorted(truth.of_zones().items(), key=lambda pair: float(pair[1].min()))
+            for k, (zone, values) in enumerate(nearest[:_MOST_ZONES]):
                 lines.append(line(zone, t, _MM * _finite(values), COLOURS[k % len(COLOURS)]))
         elif truth.keys:
             lines.append(line(flight.label, t, _MM * _finite(truth.least), colour))
