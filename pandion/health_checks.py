@@ -33,7 +33,7 @@ _PORTS: Final = (  # number, who binds it, and what to do where it is taken
     (18570, "the vehicle, for ground stations", _OTHER_PORT),
 )
 _EXTRAS: Final = {
-    "matplotlib": "report", "plotly": "report", "mcap": "mcap", "textual": "top",
+    "matplotlib": "report", "plotly": "report", "mcap": "mcap", "textual": "top", "viser": "view",
 }  # fmt: skip
 _REQUIREMENT: Final = re.compile(r"([\w.-]+)\s*>=\s*([\d.]+)$")
 # In a process of its own, because what it asks for changes the process.
@@ -177,7 +177,7 @@ def extras() -> Check:
 
     missing = sorted({extra for name, extra in _EXTRAS.items() if find_spec(name) is None})
     if not missing:
-        return Check("extras", OK, "report, top and mcap can be used")
+        return Check("extras", OK, "view, report, top and mcap can be used")
     remedy = f"pip install 'pandion[{','.join(missing)}]' where they are wanted"
     return Check("extras", OK, f"not installed: {', '.join(missing)}", remedy)
 

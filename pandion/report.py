@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 from command_line.options import option, read
 from command_line.output import complain, say
 from command_line.parser import COULD_NOT_START
-from pandion.result import table_rows
+from pandion.result import FlightReports, as_json, table_rows
 
 if TYPE_CHECKING:
     from view.report.reported import Reported
@@ -50,7 +50,7 @@ def write_report(logs: list[Path], out: Path | None = None) -> Path:
 
     Raises:
         UlogError: A log cannot be read.
-        ValueError: There are too many flights to tell apart.
+        ValueError: There are too many flights to tell apart, or a result is of another build.
         OSError: The page cannot be written.
         ModuleNotFoundError: The library that draws is not installed.
     """
@@ -60,7 +60,10 @@ def write_report(logs: list[Path], out: Path | None = None) -> Path:
     from view.report.reported import reported
 
     flights = [reported(path, label) for path, label in zip(logs, labels(logs), strict=True)]
-    text = page(flights, {flight.label: _rows(flight) for flight in flights})
+    try:
+        text = page(flights, {flight.label: _rows(flight) for flight in flights})
+    except (KeyError, TypeError, AttributeError) as problem:
+        raise ValueError(f"a result beside the logs is of another build: {problem!r}") from problem
     first = flights[0].data.path
     written = out if out is not None else first.with_name(NAME)
     written.write_text(text, encoding="utf-8")
@@ -86,7 +89,11 @@ def labels(logs: list[Path]) -> list[str]:
 
 
 def _rows(flight: Reported) -> list[tuple[str, str]]:
-    result: dict[str, Any] = flight.result
-    if not result:
+    """The table of the result; what an older build did not write is as after no flight."""
+    if not flight.result:
         return []
+    result: dict[str, Any] = as_json(FlightReports("", 0, "", None, None, None, {}))
+    for key, value in flight.result.items():
+        both = isinstance(value, dict) and isinstance(result.get(key), dict)
+        result[key] = {**result[key], **value} if both else value
     return table_rows(result, flight.data.beside.get("sitl", {}).get("tracking_error_max_m"))

@@ -15,7 +15,7 @@ from pandion.report import write_report
 from view.top.app import TopApp
 
 REPORT_PX: Final = (1200, 1640)
-INSPECTOR_PX: Final = (1300, 800)
+INSPECTOR_PX: Final = (1300, 826)
 _CELLS: Final = (132, 40)  # columns and rows of the terminal
 _SHOWN_S: Final = 60.0  # of the flight
 _COLOURS: Final = 128

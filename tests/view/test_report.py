@@ -29,7 +29,11 @@ from tests.view.flights import (
     north,
     write_flight,
 )
+from view.flight_data import FlightData, Table
+from view.flight_events import EventKind, FlightEvent
 from view.report.chart import thinned
+from view.report.charts import event_marks
+from view.report.reported import Reported
 
 TIME_AXES = ("margins", "tracking", "inputs", "plan_inputs", "motion", "loop_timing", "estimator",
              "worst_second")  # fmt: skip
@@ -161,6 +165,16 @@ def test_every_axis_of_time_has_every_event(drawn: dict[str, Any]) -> None:
         assert upright == {0.5, 2.5, 2.75, 3.5}, name
 
 
+def test_of_many_events_the_axes_show_the_failsafes_first() -> None:
+    begin = 1e-6 * flights.BEGIN_US
+    found = [FlightEvent(begin + k + 1.0, EventKind.WARNING, "windy") for k in range(200)]
+    found += [FlightEvent(begin + 500.0, EventKind.FAULT, "no plan")]
+    data = FlightData(Path(), {}, {}, {"any": Table("any", np.array([begin]), {})}, (), (), 0, True)
+    marks = event_marks(Reported(label="", data=data, margins=None, events=tuple(found)))
+    assert len(marks) == 60
+    assert marks[-1] == (500.0, "201")
+
+
 def test_the_events_are_in_a_table_in_order(page: str) -> None:
     rows = re.findall(r"<tr><td>(\d+)</td><td>([\d.]+)</td><td>(\w+)</td>", page)
     assert [int(number) for number, _, _ in rows] == list(range(1, len(rows) + 1))
@@ -199,7 +213,7 @@ def test_the_page_needs_nothing_else_and_is_small_enough(page: str) -> None:
 def test_verdict_and_provenance_are_said(page: str) -> None:
     for words in (
         "PASS", "Flew 4.0 s.",
-        "At 3.013 s the end effector kept 12.3 mm more than the clearance from front (112.3 mm",
+        "At 3.013 s the end-effector kept 12.3 mm more than the clearance from front (112.3 mm",
         "pandion fly walls --seed=3 --sensors=mocap --duration=4 --realtime --body=points",
         "PLN_TILT_MAX 17",
     ):  # fmt: skip
@@ -231,6 +245,17 @@ def test_a_flight_that_was_killed_is_drawn_by_its_own_estimate(tmp_path: Path) -
     assert "inputs" in figures(page)
 
 
+def test_a_result_of_an_older_build_is_shown_as_far_as_it_goes(tmp_path: Path) -> None:
+    older = write_flight(tmp_path / "older")
+    written = json.loads((older / "result.json").read_text())
+    for key in ("sensors", "limits", "safety", "beyond_s"):
+        del written[key]
+    (older / "result.json").write_text(json.dumps(written))
+    page = write_report([older]).read_text(encoding="utf-8")
+    assert "badge pass" in page
+    assert "<td>sensors</td><td>unknown</td>" in page
+
+
 def test_labels_tell_flights_apart(tmp_path: Path) -> None:
     for name in ("a/run", "b/run", "c"):
         (tmp_path / name).mkdir(parents=True)
@@ -246,6 +271,9 @@ def test_what_is_no_log_is_refused_in_one_sentence(tmp_path: Path, capsys: Any) 
     said = capsys.readouterr().err
     assert said.count("\n") == 1
     assert "is not a ULog file" in said
+    other = write_flight(tmp_path / "other", limits={"tilt": {}})
+    assert main([str(other)]) == 2
+    assert "of another build: KeyError('largest')" in capsys.readouterr().err
     assert main([str(tmp_path)] * 8) == 2
     assert "at most 7" in capsys.readouterr().err
 

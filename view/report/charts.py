@@ -9,6 +9,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from sitl.body import spoken
 from view.flight_data import Table
 from view.flight_events import EventKind
 from view.report.chart import (
@@ -32,7 +33,10 @@ _MM: Final = 1e3
 _DEG: Final = 180.0 / math.pi
 _SHOWN_MM: Final = 400.0  # of the margins at first; all of it can be zoomed out to
 _DETAIL_S: Final = 0.5  # before and behind the worst moment
-_MARKED: Final = (EventKind.MODE, EventKind.FAULT, EventKind.WARNING, EventKind.COMMAND)
+# What axes show, the first kinds first where there is much of it.
+_MARKED: Final = (EventKind.FAULT, EventKind.MODE, EventKind.WARNING, EventKind.COMMAND)
+_MOST_MARKS: Final = 60
+_MOST_ZONES: Final = 8  # whose margins are drawn: the nearest
 _DEADLINE_MS: Final = 20.0  # a plan that comes later is not flown
 _PERIOD_MS: Final = 100.0
 _INNER: Final = 0  # PANDION_RATE_GROUP
@@ -54,35 +58,46 @@ def charts(flights: Sequence[Reported]) -> list[Chart]:
 
 def event_marks(flight: Reported) -> list[tuple[float, str]]:
     """Time since the start [s] and number in the table of the events that axes show."""
-    numbered = enumerate(flight.events, start=1)
+    found = [(k, event) for k, event in enumerate(flight.events, 1) if event.kind in _MARKED]
+    shown = sorted(found, key=lambda pair: _MARKED.index(pair[1].kind))[:_MOST_MARKS]
     marks: dict[float, str] = {}
-    for k, event in numbered:
+    for k, event in sorted(shown, key=lambda pair: pair[0]):
         t = round(event.t - flight.data.begin, 3)
-        if event.kind in _MARKED and t > 0.0:
+        if t > 0.0:
             marks[t] = f"{marks[t]},{k}" if t in marks else str(k)
     return list(marks.items())
 
 
 def margins(flights: Sequence[Reported]) -> Chart:
     """Margins over time, by the truth and by the vehicle's own estimate."""
-    traces, lowest = [], 0.0
+    traces, lowest, least = [], 0.0, 0.0
     for k, flight in enumerate(flights):
         traces += _margin_lines(flight, COLOURS[k % len(COLOURS)], alone=len(flights) == 1)
         worst = flight.worst
         if worst is not None:
-            lowest = min(lowest, _MM * worst.margin)
+            lowest, least = min(lowest, _MM * worst.margin), max(least, _MM * worst.margin)
             said = f"{worst.key}: {_MM * worst.margin:.1f} mm"
             colour = LIMIT if len(flights) == 1 else COLOURS[k % len(COLOURS)]
             traces.append(mark(_named(flight, flights, "minimum"), worst.t, _MM * worst.margin,
                                colour, said))  # fmt: skip
-    return over_time(
-        "margins",
-        "Margins",
+    tops = [max((v for v in one["y"] if v is not None), default=0.0) for one in traces]
+    top = min(max(_SHOWN_MM, 2.0 * least), 1.2 * max(tops, default=_SHOWN_MM))
+    note = (
         "Distance beyond the required clearance, minimum of each zone, by the true state. The "
         "circle is the minimum in the result, which the simulator checks every millisecond; the "
-        "lines are the samples in the log.",
-        [Row("margin [mm]", traces, (0.0,), (min(-20.0, 1.2 * lowest), _SHOWN_MM))],
-        _marks(flights),
+        "lines are the samples in the log."
+    )
+    if any(len(flight.margins.of_zones()) > _MOST_ZONES for flight in flights if flight.margins):
+        note += f" Of more zones the {_MOST_ZONES} nearest are drawn."
+    if any(flight.margins is None for flight in flights):
+        note = (
+            "Distance beyond the required clearance, by the vehicle's own estimate: the scenario "
+            "is none of this build's, or the log has no true state. The circle is the minimum in "
+            "the result, by the true state."
+        )
+    span = (min(-20.0, 1.2 * lowest), max(top, 50.0))
+    return over_time(
+        "margins", "Margins", note, [Row("margin [mm]", traces, (0.0,), span)], _marks(flights)
     )
 
 
@@ -92,7 +107,8 @@ def _margin_lines(flight: Reported, colour: str, *, alone: bool) -> list[Trace]:
     if truth is not None:
         t = flight.since(truth.t)
         if alone:
-            for k, (zone, values) in enumerate(truth.of_zones().items()):
+            nearest = sorted(truth.of_zones().items(), key=lambda pair: float(pair[1].min()))
+            for k, (zone, values) in enumerate(nearest[:_MOST_ZONES]):
                 lines.append(line(zone, t, _MM * _finite(values), COLOURS[k % len(COLOURS)]))
         elif truth.keys:
             lines.append(line(flight.label, t, _MM * _finite(truth.least), colour))
@@ -538,7 +554,7 @@ def worst_sentence(flight: Reported) -> str:
     behind = "" if surface is None else f" ({_MM * surface:.1f} mm from its surface)"
     more = "more" if worst.margin >= 0.0 else "less"
     return (
-        f"At {worst.t:.3f} s the {part.replace('_', ' ')} kept {_MM * abs(worst.margin):.1f} mm "
+        f"At {worst.t:.3f} s {spoken(part)} kept {_MM * abs(worst.margin):.1f} mm "
         f"{more} than the clearance from {zone}{behind}: the smallest margin of the flight."
     )
 

@@ -23,7 +23,7 @@ from view.top.peer import Value, fields, meaning, unit
 
 _PERIOD_S: Final = 0.2  # of the picture
 _POLL_S: Final = 0.02  # rates are measured between arrivals
-_BAR: Final = 20  # characters
+_BAR: Final = 14  # characters
 _BAR_M: Final = 0.5  # margin that fills it
 _STALE_S: Final = 3.0
 _LOST_S: Final = 2.0
@@ -212,7 +212,9 @@ class TopApp(App[None]):
         known = [k for k, event in enumerate(every) if event is self._shown]
         for event in every[known[0] + 1 if known else 0 :]:
             style = "bold red" if event.kind in _ALARMING else ""
-            log.write(Text(f"{event.t:8.1f} s  {printable(event.text)}", style=style))
+            # Its time is unknown before the clock of the vehicle is.
+            at = "" if math.isnan(event.t) else f"{event.t:.1f} s"
+            log.write(Text(f"{at:>10}  {printable(event.text)}", style=style))
             self._shown = event
 
 
