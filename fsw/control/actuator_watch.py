@@ -14,7 +14,8 @@ along z, a mass or a battery that is not as believed, an arm that is heavier, a 
 another pattern, however strong it is. What lasts along z is learned as long as nothing turns the
 vehicle.
 
-A joint has failed when torque is observed that undoes what is asked of its drive.
+A joint has failed when torque is observed that undoes what is asked of its drive, and the base does
+not feel it either.
 
 Source: A. De Luca, R. Mattone, Actuator failure detection and isolation using generalized momenta,
 ICRA 2003, for the joints; docs/decisions/0033-actuators-that-fail.md.
@@ -61,6 +62,8 @@ EFFECT_RATE: Final = 2.0  # 1/s, by which allocation follows
 # Joints.
 UNDONE: Final = 0.12  # N m, root mean square of what undoes the torque
 UNDOING: Final = 0.5  # share of the torque that it undoes
+ODD: Final = 0.2  # N m, root mean square of what base and arm do not feel of each other
+ODD_SHARE: Final = 0.5  # of what undoes the torque, the same
 BEHIND: Final = 0.02  # rad, root mean square of the distance from the reference
 JOINT_TIME: Final = 0.1  # s
 STANDING: Final = 0.2  # rad/s, root mean square of the rate of a joint that stands
@@ -98,6 +101,7 @@ WATCH: Final = np.dtype(
         ("momentum", float, (2,)),  # N m s
         ("undone", float, (2,)),  # N m, observed beside the model
         ("asked", float, (2,)),  # N m, as late as that
+        ("odd2", float),  # N^2 m^2, mean square of what base and arm do not feel of each other
         ("undone2", float, (2,)),  # means of squares, and of the product
         ("asked2", float, (2,)),
         ("undoing", float, (2,)),
@@ -325,6 +329,10 @@ def _observe_arm(
         s.rate2[k] += forget * (qd_arm[k] * qd_arm[k] - s.rate2[k])
         behind = reference[k] - q_arm[k]
         s.behind2[k] += forget * (behind * behind - s.behind2[k])
+    # What a drive does not give to the arm it does not take from the base. A contact, and a gyro
+    # that is wrong, are felt on one side alone.
+    odd = s.torque[1] + s.undone[0]
+    s.odd2 += forget * (odd * odd - s.odd2)
 
 
 @compilable
@@ -335,6 +343,7 @@ def _judge_joint(s: Any, k: int, dt: float, settled: bool, angle: float) -> None
         return
     undone = s.undone2[k] > UNDONE * UNDONE and s.undoing[k] < -UNDOING * s.asked2[k]
     behind = s.behind2[k] > BEHIND * BEHIND
+    undone = undone and s.odd2 < ODD * ODD + ODD_SHARE * ODD_SHARE * s.undone2[k]
     s.joint_for[k] = s.joint_for[k] + dt if settled and undone and behind else 0.0
     if s.joint_for[k] > JOINT_TIME:
         s.joint[k] = STUCK if s.rate2[k] < STANDING * STANDING else LIMP
