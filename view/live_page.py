@@ -141,8 +141,10 @@ class LivePage:
 
     def _switch_gizmo(self) -> None:
         if not self._drag.value:
+            dragged = self._gizmo is not None
             self._end_dragging()
-            self._ask(live_link.HOLD, ())
+            if dragged:
+                self._ask(live_link.HOLD, ())
             return
         now = self._link.scene()
         if now.estimate is None:
@@ -186,6 +188,8 @@ class LivePage:
             scene = self._link.scene()
             self._remember(scene, now_s)
             if not self._link.watched:
+                if self._gizmo is not None and self._drag.value:
+                    self._drag.value = False  # as if it was cleared
                 continue
             if scene.t != self._drawn_t:
                 self._drawn_t = scene.t

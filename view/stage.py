@@ -180,7 +180,6 @@ class Stage:
         self._zones: list[viser.FrameHandle] = []
         self._rides: tuple[Vec3 | None, bool] = (None, False)
         self._visible: dict[int, bool] = {}
-        self._trail: list[viser.LineSegmentsHandle] = []
         self.show_truth = True
 
     def frame(self, server: viser.ViserServer, region: tuple[Vec3, Vec3]) -> None:
@@ -229,11 +228,12 @@ class Stage:
             self._add_trail("/trail", trail)
 
     def extend_trail(self, number: int, trail: Trail, most: int) -> None:
-        """Add a piece of path; of ``most`` pieces the oldest is removed."""
+        """Add a piece of path; of ``most`` pieces the oldest is replaced.
+
+        Under its name: of every name that was removed viser keeps a note.
+        """
         if len(trail.points) > 1:
-            self._trail.append(self._add_trail(f"/trail/{number}", trail))
-        while len(self._trail) > most:
-            self._trail.pop(0).remove()
+            self._add_trail(f"/trail/{number % most}", trail)
 
     def draw_reference(self, points: Array) -> None:
         """Draw where the end-effector should go: ``points`` (n, 3) [m, NED]; NaN: not there."""
@@ -245,12 +245,12 @@ class Stage:
                     "/reference", segments, (150, 200, 165), thickness=0.006
                 )
 
-    def _add_trail(self, name: str, trail: Trail) -> viser.LineSegmentsHandle:
+    def _add_trail(self, name: str, trail: Trail) -> None:
         paint = colours.of_margins(trail.margins)
         pairs = np.stack((paint[:-1], paint[1:]), axis=1)
         segments = _segments(trail.points)
         kept = np.isfinite(segments).all(axis=(1, 2))
-        return self._scene.add_line_segments(name, segments[kept], pairs[kept], thickness=0.01)
+        self._scene.add_line_segments(name, segments[kept], pairs[kept], thickness=0.01)
 
     def _show_zones(self, now: Scene) -> None:
         zones = now.safe_set.zones if now.safe_set else ()

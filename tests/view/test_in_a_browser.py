@@ -183,6 +183,16 @@ def test_dragging_the_gizmo_moves_the_target(live: tuple[Page, Server, VehicleLi
     assert abs(target[1] - before[1]) > 0.05, "the arrow to the east moves it east or west"
 
 
+def test_an_obstacle_that_is_added_is_kept_and_shown(
+    live: tuple[Page, Server, VehicleLink],
+) -> None:
+    browser, _, link = live
+    browser.press_on("Add a ball")
+    safe_set = eventually(lambda: link.scene().safe_set)
+    (zone,) = eventually(lambda: (now := link.scene().safe_set) is not None and now.zones)
+    assert (zone.shape.kind, zone.shape.numbers[0]) == ("ball", 1.0), safe_set
+
+
 ARROW = (np.array((0.0, 0.25, 0.0)), np.array((0.0, 0.65, 0.0)))  # m: on it, and where to
 
 
