@@ -789,6 +789,16 @@ class ArmingReport:
     failed: tuple[int, ...] = ()
 
 
+class ActuatorReport(NamedTuple):
+    """What has been found out about rotors and joints in flight."""
+
+    rotor: int = 0  # that has failed, from 1; 0: none
+    effect: float = 1.0  # thrust over command of that rotor, as allocation takes it
+    lost: bool = False  # it gives nothing
+    disobeys: bool = False  # it gives something else than is commanded
+    joints: Vec2 = (0.0, 0.0)  # 0 sound, 1 stuck, 2 limp
+
+
 @dataclass(frozen=True, slots=True)
 class FlightSnapshot:
     """The vehicle as telemetry shows it after a tick; what follows from it, encoders compute."""
@@ -821,6 +831,7 @@ class FlightSnapshot:
     log_failure: str = ""  # why the flight log is not written as it should be
     arming: ArmingReport = ArmingReport()
     safe_set: SafeSet = SafeSet()  # in force: announced and fence together
+    actuators_found: ActuatorReport = ActuatorReport()
 
 
 @dataclass(frozen=True, slots=True)

@@ -24,6 +24,7 @@ from fsw.control.joints import (
     joint_torques,
     joints_at_rest,
     observe_disturbance,
+    torques_of_failed,
 )
 from fsw.control.pid import PidGains
 from fsw.control.safety_filter import (
@@ -45,6 +46,13 @@ from fsw.control.tracking import (
 )
 from fsw.geometry.rotation import rotate_back, wrap_angle
 from fsw.geometry.vectors import add_scaled, clamp_magnitude, subtract
+from fsw.model.actuator_health import (
+    HEALTHY,
+    SOUND,
+    ActuatorHealth,
+    commanded_for,
+    given,
+)
 from fsw.model.airframe import GRAVITY, Airframe
 from fsw.model.body import Body, body_of
 from fsw.model.nominal import REST_INPUT, REST_STATE
@@ -89,6 +97,7 @@ class CascadeMemory(NamedTuple):
     height: float = 0.0  # m s, integral
     joints: JointMemory = JointMemory((0.0, 0.0), (0.0, 0.0))
     off_plan: float = 0.0  # m, largest deviation of late
+    health: ActuatorHealth = HEALTHY  # what has been found out about rotors and joints
 
     def after_sending(self, sent: ActuatorCommand) -> CascadeMemory:
         """The memory for the next tick, once the safety gate has decided."""
@@ -183,7 +192,7 @@ class Cascade:
 
     def motion(self, memory: CascadeMemory, estimate: StateEstimate) -> MotionState:
         """Acceleration to snap right now, from the rotor model."""
-        rotors = lag_rotors(memory.rotors, memory.commanded.rotor_thrust, self.law.rotor_decay)
+        rotors = lag_rotors(memory.rotors, _settling_at(memory), self.law.rotor_decay)
         return motion_state(
             self.law.airframe, memory.mass, estimate, rotors, memory.commanded.joint_torque[0]
         )
@@ -193,7 +202,7 @@ class Cascade:
         return self._joint_acceleration(
             self._packed,
             memory.rotors,
-            memory.commanded.rotor_thrust,
+            _settling_at(memory),
             memory.commanded.joint_torque,
             estimate.w_WB_B,
             estimate.q_arm,
@@ -215,9 +224,8 @@ class Cascade:
             self._packed, memory, estimate, plan, u, ticks, zones, self.probes
         )
         command = ActuatorCommand(*sent)
-        kept = CascadeMemory(
-            rotors, command, Observed(*believed), mass, *integrals, JointMemory(*joints), off_plan
-        )
+        moved = Observed(*believed), mass, *integrals, JointMemory(*joints), off_plan
+        kept = CascadeMemory(rotors, command, *moved, memory.health)
         return command, kept, guarded
 
 
@@ -239,9 +247,11 @@ def close_loops(
     (probes, 12) [SI] of ``filter_probes``.
     """
     airframe, tuning, dt = law.airframe, law.tuning, law.dt
-    rotors, observed = memory.rotors, memory.observed
+    rotors, observed, health = memory.rotors, memory.observed, memory.health
+    settling_at = given(health, memory.commanded.rotor_thrust)
+    sound = health.joints[0] == SOUND and health.joints[1] == SOUND
     for _ in range(ticks):
-        rotors = lag_rotors(rotors, memory.commanded.rotor_thrust, law.rotor_decay)
+        rotors = lag_rotors(rotors, settling_at, law.rotor_decay)
     mass = estimate_mass(airframe, memory.mass, rotors, estimate.specific_force, dt * ticks)
     motion = motion_state(airframe, mass, estimate, rotors, memory.commanded.joint_torque[0])
     arm = hanging_arm(airframe, estimate.q_arm)
@@ -265,7 +275,7 @@ def close_loops(
         thrust, height = height_pid(airframe, tuning.height, height, estimate, plan, u, dt)
     wdx, wdy, wdz = limited_turn(airframe, estimate, motion.turning, (wdx, wdy, wdz))
     wanted, off_plan = (plan.q_arm, plan.qd_arm), memory.off_plan
-    if law.follows_plan and tuning.compensate:
+    if law.follows_plan and tuning.compensate and sound:
         off_plan = lately_off_plan(tuning.compensation, off_plan, estimate, plan, dt * ticks)
         wanted = compensated_joints(
             airframe, tuning.compensation, tuning.joint_limits, off_plan, estimate, plan
@@ -286,10 +296,14 @@ def close_loops(
         motion.turning[1],  # not what is commanded: the rotors take 40 ms to give it
         dt,
     )
+    if not sound:
+        joints = torques_of_failed(airframe, health.joints, joints, dynamics, motion.turning[1])
     torque = _body_torque(airframe, roll_inertia, estimate, (wdx, wdy, wdz), joints[0])
-    rotor_thrust = allocate(airframe, torque, thrust, tuning.yaw_thrust_limit)
-    command = ActuatorCommand(rotor_thrust, joints)
-    memory = CascadeMemory(rotors, command, observed, mass, attitude, height, arm_memory, off_plan)
+    thrusts = allocate(airframe, torque, thrust, tuning.yaw_thrust_limit, health)
+    command = ActuatorCommand(commanded_for(health, thrusts), joints)
+    memory = CascadeMemory(
+        rotors, command, observed, mass, attitude, height, arm_memory, off_plan, health
+    )
     return command, memory, guarded
 
 
@@ -395,6 +409,12 @@ def _joint_acceleration(
     carried = airframe.joint_armature * pitching
     first, second = accelerations_of(dynamics, (torque[0] + carried, torque[1]))
     return first - pitching, second
+
+
+def _settling_at(memory: CascadeMemory) -> Vec4:
+    """Thrust [N] of each rotor that the command sent last leads to."""
+    commanded = memory.commanded.rotor_thrust
+    return commanded if memory.health is HEALTHY else given(memory.health, commanded)
 
 
 @compilable

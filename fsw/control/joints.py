@@ -26,6 +26,7 @@ from typing import NamedTuple
 from fsw.compiled import compilable
 from fsw.control.pid import PidGains, pid_step
 from fsw.geometry.vectors import clamp, clamp_magnitude
+from fsw.model.actuator_health import SOUND, STUCK
 from fsw.model.airframe import Airframe
 from fsw.signals import StateEstimate, Vec2, Vec3
 
@@ -125,6 +126,26 @@ def joint_torques(
         reference_rate=qd_ref,
     )
     return torques, kept
+
+
+@compilable
+def torques_of_failed(
+    airframe: Airframe, kinds: Vec2, torques: Vec2, arm: ArmDynamics, pitch_acceleration: float
+) -> Vec2:
+    """``torques`` [N m] of joints of which one at least has failed in one of the ``kinds`` [1].
+
+    A limp drive is asked for nothing. What keeps a stuck joint in its place acts on the base as
+    well, so that is what it is asked for. ``pitch_acceleration`` [rad/s^2] is the base's.
+    """
+    held1, held2 = torques_for(arm, (pitch_acceleration, 0.0))
+    held1 -= airframe.joint_armature * pitch_acceleration
+    bound = airframe.joint_torque_max
+    first, second = torques
+    if kinds[0] != SOUND:
+        first = clamp_magnitude(held1, bound) if kinds[0] == STUCK else 0.0
+    if kinds[1] != SOUND:
+        second = clamp_magnitude(held2, bound) if kinds[1] == STUCK else 0.0
+    return first, second
 
 
 # 1/s; somewhat quicker than the joint loop, which it overrules only where that would pass a limit.

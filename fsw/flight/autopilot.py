@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from fsw.control.actuator_watch import Watch
 from fsw.control.cascade import (
     UNGUARDED,
     Cascade,
@@ -25,6 +26,7 @@ from fsw.estimation.estimator import estimate_state
 from fsw.estimation.sensor_fusion import FusionMemory
 from fsw.flight.accuracy_watch import AccuracyWatch
 from fsw.flight.commander import Commander, acknowledgement
+from fsw.flight.damage_watch import DamageWatch
 from fsw.flight.descent import Descent
 from fsw.flight.exact_state import ExactState
 from fsw.flight.failsafe import FAULTS, Condition
@@ -35,8 +37,9 @@ from fsw.flight.reference_horizon import ReferenceHorizon
 from fsw.flight.safe_set import SafeSetCheck
 from fsw.flight.safety_watch import SafetyWatch
 from fsw.flight.sensed_state import SensedState
-from fsw.flight.state import FlightState, PlanMemory, SafetyMemory
+from fsw.flight.state import Damage, FlightState, PlanMemory, SafetyMemory
 from fsw.flight.uncertain_clearance import KeptSet, UncertainClearance, pose_covariance
+from fsw.model.actuator_health import SOUND
 from fsw.model.battery import Levels, corrected, drained
 from fsw.model.body import body_of
 from fsw.model.nominal import REST_INPUT
@@ -100,6 +103,9 @@ class Autopilot:
         self._sensed = SensedState(config.estimator, self._cascade)
         self._exact = ExactState(self._cascade)
         self._descent = Descent(config)
+        reallocates = bool(config.limits.failed_rotor_mode)
+        self._damage = DamageWatch(config.airframe, tick, reallocates=reallocates)
+        self._watches = bool(config.limits.watches_actuators)
         self._accuracy = AccuracyWatch(config, self._safe_sets.loop_tube)
         self._clearance = UncertainClearance(
             config.limits.clearance_sigmas,
@@ -182,6 +188,9 @@ class Autopilot:
             safety = self._watch.filtered(safety, now_us, pushed=pushed)
         if safety.breach_us >= 0 or not margin >= 0.0:
             safety = self._breached(state, safety, estimate, margin)
+        damage, watch = self._see_damage(
+            state, memory, estimate, ticks, flown and not trust.doubted
+        )
         # By position, as the snapshot: both are made in every tick, and names cost a microsecond.
         state = FlightState(
             index,
@@ -210,7 +219,8 @@ class Autopilot:
             state.kept,
             state.accuracy,
             state.host,
-            state.damage,
+            damage,
+            watch,
         )
         snapshot = _snapshot(state, estimate, u, inputs)
         return state, TickOutputs(
@@ -241,11 +251,12 @@ class Autopilot:
     ) -> tuple[PredictionState, PlanMemory, PlanInput]:
         """The plan's state now; in Descend it is none of a plan, though plans are asked for."""
         now_us = estimate.t_us
-        followed = self._plans.follow(state.plan, nominal, answer, now_us, ticks)
-        if state.vehicle.mode is not Mode.DESCEND:
-            return followed
-        down, u = self._descent.step(nominal, estimate, state.aiding, ticks)
-        return down, followed[1], u
+        planned, plan, u = self._plans.follow(state.plan, nominal, answer, now_us, ticks)
+        if state.vehicle.mode is Mode.DESCEND:
+            planned, u = self._descent.step(nominal, estimate, state.aiding, ticks)
+        if state.damage.joint:
+            planned, u = frozen_arm(planned, u, estimate, state.damage.report.joints)
+        return planned, plan, u
 
     def _breached(
         self, state: FlightState, safety: SafetyMemory, estimate: StateEstimate, margin: float
@@ -406,6 +417,8 @@ class Autopilot:
         Also says whether the gate replaced the command, and what the safety filter found.
         """
         memory, wanted, guarded = state.cascade, STOPPED, UNGUARDED
+        if memory.health is not state.damage.health:
+            memory = memory._replace(health=state.damage.health)
         if state.vehicle.flies and nominal is not None:
             zones = self._zones_now(state)
             wanted, memory, guarded = self._cascade.step(memory, estimate, nominal, u, ticks, zones)
@@ -420,6 +433,22 @@ class Autopilot:
             # The NaN is in the loops' new memory as well: discard that.
             memory = state.cascade
         return sent, memory.after_sending(sent), replaced, guarded
+
+    def _see_damage(
+        self,
+        state: FlightState,
+        memory: CascadeMemory,
+        estimate: StateEstimate,
+        ticks: int,
+        known: bool,
+    ) -> tuple[Damage, Watch | None]:
+        """What is known of the actuators; ``memory`` is the loops' for the next tick.
+
+        Where the estimate is not ``known`` from every sensor, how the vehicle moves shows nothing.
+        """
+        if not (known and self._watches and state.aiding.sensor is None):
+            return state.damage, None
+        return self._damage.see(state.damage, state.watch, state.cascade, memory, estimate, ticks)
 
     def _zones_now(self, state: FlightState) -> Array:
         """The zones for the safety filter; made anew where they or their target changed.
@@ -491,7 +520,27 @@ def _snapshot(
         state.host.log_failure,
         state.arming,
         state.mission.safe_set,
+        state.damage.report,
     )
+
+
+def frozen_arm(
+    nominal: PredictionState, u: PlanInput, estimate: StateEstimate, kinds: Vec2
+) -> tuple[PredictionState, PlanInput]:
+    """The plan's state and input with the failed joints, by their ``kinds`` [1], as they are."""
+    failed = kinds[0] != SOUND, kinds[1] != SOUND
+
+    def kept(planned: Vec2, measured: Vec2) -> Vec2:
+        return (
+            measured[0] if failed[0] else planned[0],
+            measured[1] if failed[1] else planned[1],
+        )
+
+    still = (0.0, 0.0)
+    frozen = nominal._replace(
+        q_arm=kept(nominal.q_arm, estimate.q_arm), qd_arm=kept(nominal.qd_arm, still)
+    )
+    return frozen, u._replace(qdd_arm=kept(u.qdd_arm, still))
 
 
 def _faults(conditions: tuple[Condition, ...]) -> tuple[str, ...]:

@@ -91,6 +91,7 @@ class Condition(Enum):
     PLANNER_LOST = "planner lost"
     BREACH = "outside the safe set"
     FENCE_BREACH = "outside the fence"
+    ROTOR_LOST = "rotor lost"
     ROTOR_FAILED = "rotor failed"
     JOINT_FAILED = "joint failed"
     POSITION_LOW = "position uncertain"
@@ -337,8 +338,21 @@ def _on_tilt_lost(context: FailsafeContext) -> Action:
     return Action.WARN if broken else Action.TERMINATE
 
 
+def _on_rotor_lost(context: FailsafeContext) -> Action:
+    broken = context.limits.termination_breaker == BREAKER
+    return Action.LAND if broken else Action.TERMINATE
+
+
+def _on_rotor_failed(context: FailsafeContext) -> Action:
+    """COM_ACT_FAIL_ACT, and land at least where the heading cannot be held."""
+    action = _on_actuator_failure(context)
+    if action is Action.WARN or not context.state.damage.severe:
+        return action
+    return action if action.strength > Action.LAND.strength else Action.LAND
+
+
 def _on_actuator_failure(context: FailsafeContext) -> Action:
-    """COM_ACT_FAIL_ACT, in numbers of its own."""
+    """COM_ACT_FAIL_ACT, PX4's numbers."""
     known = {1: Action.HOLD, 2: Action.LAND, 3: Action.RETURN, 4: Action.TERMINATE}
     return known.get(context.limits.actuator_failure_action, Action.WARN)
 
@@ -503,16 +517,33 @@ FAILSAFES: Final = (
         ends="every margin has been above 10 mm for 0.5 s",
     ),
     Failsafe(
+        Condition.ROTOR_LOST,
+        lambda c: c.state.damage.report.lost and c.state.vehicle.flies,
+        _on_rotor_lost,
+        Severity.EMERGENCY,
+        detail=lambda c: f": {c.state.damage.rotor}{_for(c, c.state.damage.rotor_us)}",
+        of_vehicle=True,
+        detected="in flight, a rotor has given less than a fifth of its command for 0.15 s: 0.28 s "
+        "after it was lost",
+        parameters=("FD_ACT_EN", "CBRK_FLIGHTTERM"),
+        does="terminate: the others cannot hold the vehicle upright "
+        "([what is left](../concepts/failsafes.md#a-rotor-that-is-lost)); with `CBRK_FLIGHTTERM` "
+        "121212 land",
+        ends="never in a flight",
+    ),
+    Failsafe(
         Condition.ROTOR_FAILED,
         lambda c: bool(c.state.damage.rotor) and c.state.vehicle.flies,
-        _on_actuator_failure,
+        _on_rotor_failed,
         Severity.CRITICAL,
         detail=lambda c: f": {c.state.damage.rotor}{_for(c, c.state.damage.rotor_us)}",
         of_vehicle=True,
         slow=True,
-        detected="in flight, `FlightState.damage` names a rotor; nothing estimates it yet",
+        detected="in flight, a rotor gives another thrust than it is commanded, by 1.5 N for "
+        "0.15 s, or by 4 N for 0.03 s: 0.1 s after it was lost, 0.3 s after it gives 70 %",
         within_us=_SLOWLY,
-        parameters=("COM_ACT_FAIL_ACT",),
+        parameters=("FD_ACT_EN", "COM_ACT_FAIL_ACT", "CA_FAILURE_MODE"),
+        ends="a weak rotor gives what it is commanded for 3 s; another failure never ends",
     ),
     Failsafe(
         Condition.JOINT_FAILED,
@@ -522,9 +553,11 @@ FAILSAFES: Final = (
         detail=lambda c: f": {c.state.damage.joint}{_for(c, c.state.damage.joint_us)}",
         of_vehicle=True,
         slow=True,
-        detected="in flight, `FlightState.damage` names a joint; nothing estimates it yet",
+        detected="in flight, for 0.1 s, torque has no effect on a joint that does not follow its "
+        "reference: 0.12 N m, and half of what is asked for",
         within_us=_SLOWLY,
-        parameters=("COM_ACT_FAIL_ACT",),
+        parameters=("FD_ACT_EN", "COM_ACT_FAIL_ACT"),
+        ends="never in a flight",
     ),
     Failsafe(
         Condition.POSITION_LOW,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import field
 from typing import Final, NamedTuple
 
+from fsw.control.actuator_watch import Watch
 from fsw.control.cascade import CascadeMemory
 from fsw.control.tracking import Observed
 from fsw.estimation.frame_trust import FrameTrust
@@ -18,9 +19,11 @@ from fsw.flight.offboard_setpoints import Tilt
 from fsw.flight.setpoint_generator import PositionGoal, ReferenceState
 from fsw.flight.uncertain_clearance import KeptSet
 from fsw.frozen import dataclass
+from fsw.model.actuator_health import HEALTHY, ActuatorHealth
 from fsw.model.airframe import AIRFRAME
 from fsw.signals import (
     STOPPED,
+    ActuatorReport,
     ArmingReport,
     AttitudeSetpoint,
     BatteryState,
@@ -173,6 +176,9 @@ class SafetyMemory:
     counters: SafetyCounters = field(default_factory=SafetyCounters)
 
 
+_HEADING_KEPT: Final = 0.5  # of the thrust of a rotor; hover needs half of its command
+
+
 class Damage(NamedTuple):
     """Parts that have failed; what detects it sets it, and the failsafe table acts on it."""
 
@@ -180,6 +186,13 @@ class Damage(NamedTuple):
     rotor_us: int = 0  # since when
     joint: str = ""
     joint_us: int = 0
+    report: ActuatorReport = ActuatorReport()
+    health: ActuatorHealth = HEALTHY  # what loops reckon with
+
+    @property
+    def severe(self) -> bool:
+        """Whether the rotor that has failed leaves no control of the heading."""
+        return self.report.disobeys or self.report.effect < _HEADING_KEPT
 
 
 class Aiding(NamedTuple):
@@ -235,3 +248,4 @@ class FlightState:
     accuracy: AccuracyMemory = AccuracyMemory()  # of the estimate, until it is told
     host: HostHealth = field(default_factory=HostHealth)
     damage: Damage = Damage()
+    watch: Watch | None = None  # over the actuators, in flight

@@ -99,7 +99,9 @@ _PLANNING: Final = _Packed(topics.BARRIER_MARGIN, topics.END_EFFECTOR)
 _BARRIER, _END_EFFECTOR = _PLANNING.heads
 _MPC: Final = _Packed(topics.MPC_STATUS)
 _REQUEST: Final = _Packed(topics.MPC_REQUEST)
-_STATUS: Final = _Packed(topics.VEHICLE_STATUS, topics.VEHICLE_LAND_DETECTED)
+_STATUS: Final = _Packed(
+    topics.VEHICLE_STATUS, topics.VEHICLE_LAND_DETECTED, topics.FAILURE_DETECTOR_STATUS
+)
 _ASKED: Final = _Packed(topics.VEHICLE_COMMAND)
 _ANSWERED: Final = _Packed(topics.VEHICLE_COMMAND_ACK)
 _INPUT: Final = _Packed(topics.TICK_INPUT)
@@ -287,12 +289,16 @@ def _status_changed(now: FlightSnapshot, last: FlightSnapshot) -> bool:
 
 def _status(snapshot: FlightSnapshot) -> bytes:
     mode: Mode = snapshot.mode
-    head, landing = _STATUS.heads
+    head, landing, found = _STATUS.heads
+    known = snapshot.actuators_found
+    rotors = 1 << known.rotor >> 1  # from 1; 0: none
     return _STATUS.pack(
         (
             *(head, snapshot.t_us, 2 if snapshot.armed else 1, NAV_STATES.get(mode.value, _LOITER)),
             *(bool(snapshot.failures), mode.value.encode(), ",".join(snapshot.failures).encode()),
             *(landing, snapshot.t_us, snapshot.landed),
+            *(found, snapshot.t_us, rotors != 0, rotors, known.effect, known.lost),
+            *(known.disobeys, *(round(kind) for kind in known.joints)),
         )
     )
 

@@ -209,6 +209,19 @@ VEHICLE_STATUS: Final = Topic(
         Field("failures", "char", 96, "names of the active faults"),
     ),
 )
+FAILURE_DETECTOR_STATUS: Final = Topic(
+    "failure_detector_status",
+    "Rotor and joints that have failed",
+    "on change of a fault and every second",
+    (
+        Field("fd_motor", "bool", note="a rotor has failed"),
+        Field("motor_failure_mask", "uint16_t", note="bit 0: rear, left, front, right"),
+        *_floats("motor_effectiveness", note="thrust over command of that rotor, as allocated"),
+        Field("motor_lost", "bool", note="it gives nothing"),
+        Field("motor_disobeys", "bool", note="it gives something else than is commanded"),
+        Field("joint_state", "uint8_t", 2, "0 sound, 1 stuck, 2 limp"),
+    ),
+)
 VEHICLE_LAND_DETECTED: Final = Topic(
     "vehicle_land_detected", "Landed or not", "on change and every second",
     (Field("landed", "bool"),),
@@ -396,6 +409,7 @@ TOPICS: Final = (
     VEHICLE_LOCAL_POSITION,
     VEHICLE_LOCAL_POSITION_SETPOINT,
     VEHICLE_STATUS,
+    FAILURE_DETECTOR_STATUS,
     VEHICLE_LAND_DETECTED,
     ACTUATOR_COMMAND,
     ACTUATOR_MOTORS,

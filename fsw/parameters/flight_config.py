@@ -85,6 +85,8 @@ class FlightLimits:
     pitch_failure_us: int = 300_000
     termination_breaker: int = 0  # 121212: an attitude failure does not stop the rotors
     planner_loss_us: int = 5_000_000  # without a new plan the vehicle descends
+    watches_actuators: int = 1  # whether rotors and joints that fail are looked for
+    failed_rotor_mode: int = 1  # 0: allocation goes on as if it were sound; 1: it is reweighted
     actuator_failure_action: int = 2  # 0 warn, 1 hold, 2 land, 3 return, 4 terminate
     flood_rate: float = 2000.0  # datagrams/s from the ground that are too many
     # Arming

@@ -213,7 +213,7 @@ def test_the_page_needs_nothing_else_and_is_small_enough(page: str) -> None:
 def test_verdict_and_provenance_are_said(page: str) -> None:
     for words in (
         "PASS", "Flew 4.0 s.",
-        "At 3.013 s the end effector kept 12.3 mm more than the clearance from front (112.3 mm",
+        "At 3.013 s the end-effector kept 12.3 mm more than the clearance from front (112.3 mm",
         "pandion fly walls --seed=3 --sensors=mocap --duration=4 --realtime --body=points",
         "PLN_TILT_MAX 17",
     ):  # fmt: skip

@@ -9,6 +9,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from sitl.body import spoken
 from view.flight_data import Table
 from view.flight_events import EventKind
 from view.report.chart import (
@@ -69,18 +70,18 @@ def event_marks(flight: Reported) -> list[tuple[float, str]]:
 
 def margins(flights: Sequence[Reported]) -> Chart:
     """Margins over time, by the truth and by the vehicle's own estimate."""
-    traces, lowest = [], 0.0
+    traces, lowest, least = [], 0.0, 0.0
     for k, flight in enumerate(flights):
         traces += _margin_lines(flight, COLOURS[k % len(COLOURS)], alone=len(flights) == 1)
         worst = flight.worst
         if worst is not None:
-            lowest = min(lowest, _MM * worst.margin)
+            lowest, least = min(lowest, _MM * worst.margin), max(least, _MM * worst.margin)
             said = f"{worst.key}: {_MM * worst.margin:.1f} mm"
             colour = LIMIT if len(flights) == 1 else COLOURS[k % len(COLOURS)]
             traces.append(mark(_named(flight, flights, "minimum"), worst.t, _MM * worst.margin,
                                colour, said))  # fmt: skip
     tops = [max((v for v in one["y"] if v is not None), default=0.0) for one in traces]
-    top = min(_SHOWN_MM, 1.2 * max(tops, default=_SHOWN_MM))
+    top = min(max(_SHOWN_MM, 2.0 * least), 1.2 * max(tops, default=_SHOWN_MM))
     note = (
         "Distance beyond the required clearance, minimum of each zone, by the true state. The "
         "circle is the minimum in the result, which the simulator checks every millisecond; the "
@@ -553,7 +554,7 @@ def worst_sentence(flight: Reported) -> str:
     behind = "" if surface is None else f" ({_MM * surface:.1f} mm from its surface)"
     more = "more" if worst.margin >= 0.0 else "less"
     return (
-        f"At {worst.t:.3f} s the {part.replace('_', ' ')} kept {_MM * abs(worst.margin):.1f} mm "
+        f"At {worst.t:.3f} s {spoken(part)} kept {_MM * abs(worst.margin):.1f} mm "
         f"{more} than the clearance from {zone}{behind}: the smallest margin of the flight."
     )
 

@@ -20,6 +20,8 @@ Array = NDArray[Any]
 _MOST: Final = 1500  # points of a path
 _AROUND_M: Final = 0.35  # of the paths that a wall is drawn
 _BODY_OPACITY, _CLEARANCE_OPACITY = 0.3, 0.1
+# Row of the places at which a part is marked; rotors and legs at the base.
+_NEAR: Final = {"link1": 2, "joint2": 2, "link2": 3, "end_effector": 3}
 _MOST_TRIANGLES: Final = 30_000  # of all zones: half a megabyte of the page
 
 
@@ -98,7 +100,7 @@ def _worst(flight: Reported, name: str) -> list[Trace]:
     if worst is None or flight.margins is None:
         return []
     k = int(np.abs(flight.since(flight.margins.t) - worst.t).argmin())
-    row = {"base": 0, "joint2": 2}.get(worst.key.partition("/")[2], 3)
+    row = _NEAR.get(worst.key.partition("/")[2], 0)
     return [{
         "type": "scatter3d", "mode": "markers", "name": name,
         **_enu(flight.margins.places[k, row][None]),

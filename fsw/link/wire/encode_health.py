@@ -34,6 +34,7 @@ _SUSPECT: Final[dict[str, int]] = {
     Condition.TILT_LOST.value: _ATTITUDE | _RATE_CONTROL,
     Condition.PLANNER_LOST.value: _POSITION | _HEIGHT,
     Condition.FENCE_BREACH.value: _FENCE,
+    Condition.ROTOR_LOST.value: _MOTORS,
     Condition.ROTOR_FAILED.value: _MOTORS,
     Condition.JOINT_FAILED.value: _MOTORS,
 }

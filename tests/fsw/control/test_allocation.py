@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from fsw.control.allocation import allocate
+from fsw.model.actuator_health import HEALTHY, ActuatorHealth, commanded_for
+from fsw.model.actuator_health import given as given_by
 from fsw.model.airframe import AIRFRAME
 from fsw.model.prediction import Array
 from fsw.signals import Vec4
@@ -112,3 +116,43 @@ def test_yaw_takes_the_whole_of_what_roll_pitch_and_thrust_leave(
     lowest, highest = max(own, half - (TOP - other)), min(TOP - own, half - other)
     along = max(lowest, min(highest, 0.5 * half + wish))
     assert got[2] == pytest.approx(0.016 * 2.0 * (2.0 * along - half), abs=1e-9)
+
+
+@given(
+    st.integers(0, 3),
+    st.floats(0.3, 0.9),
+    st.floats(-0.5, 0.5),
+    st.floats(-0.5, 0.5),
+    st.floats(20, 34),
+)
+def test_a_weak_rotor_stays_below_what_it_can_and_roll_and_pitch_are_kept(
+    rotor: int, share: float, roll: float, pitch: float, thrust: float
+) -> None:
+    effect = tuple(share if k == rotor else 1.0 for k in range(4))
+    health = ActuatorHealth(effectiveness=effect)  # type: ignore[arg-type]
+    rotors = allocate(AIRFRAME, (roll, pitch, 0.0), thrust, YAW_LIMIT, health)
+    assert max(np.array(rotors) / np.array(effect)) <= TOP + 1e-9
+    np.testing.assert_allclose(wrench(rotors)[:2], [roll, pitch], atol=1e-9)
+    assert wrench(rotors)[3] == pytest.approx(thrust)
+
+
+@pytest.mark.parametrize("rotor", range(4))
+def test_a_rotor_that_does_not_obey_is_left_where_it_is_and_yaw_is_given_up(rotor: int) -> None:
+    gives = 6.0
+    fixed = tuple(gives if k == rotor else 0.0 for k in range(4))
+    most = tuple(gives if k == rotor else math.inf for k in range(4))
+    health = ActuatorHealth(least=fixed, most=most)  # type: ignore[arg-type]
+    rotors = allocate(AIRFRAME, (0.4, -0.5, 0.0), HOVER, YAW_LIMIT, health)
+    assert rotors[rotor] == pytest.approx(gives)
+    got = wrench(rotors)
+    np.testing.assert_allclose([got[0], got[1], got[3]], [0.4, -0.5, HOVER], atol=1e-9)
+    assert abs(got[2]) > 0.01
+
+
+def test_of_sound_rotors_nothing_changes_to_the_last_bit() -> None:
+    random = np.random.default_rng(5)
+    for roll, pitch, yaw, thrust in random.uniform(-3.0, 40.0, (200, 4)):
+        torque = (float(roll), float(pitch), float(yaw))
+        sound = allocate(AIRFRAME, torque, float(thrust), YAW_LIMIT)
+        assert commanded_for(HEALTHY, sound) == sound
+        assert given_by(HEALTHY, sound) == sound

@@ -36,6 +36,7 @@ from fsw.flight.uncertain_clearance import KeptSet
 from fsw.parameters.flight_config import FlightConfig, FlightLimits, flight_config
 from fsw.parameters.registry import BY_NAME
 from fsw.signals import (
+    ActuatorReport,
     BatteryState,
     Charge,
     Home,
@@ -140,7 +141,7 @@ def test_every_condition_has_one_row() -> None:
 @pytest.mark.requirement("REQ-EST-8")
 def test_without_attitude_the_flight_is_ended_and_only_then() -> None:
     ending = {row.condition for row in FAILSAFES if row.action(FINE.context()) is Action.TERMINATE}
-    assert ending == {Condition.ATTITUDE_LOST, Condition.TILT_LOST}
+    assert ending == {Condition.ATTITUDE_LOST, Condition.TILT_LOST, Condition.ROTOR_LOST}
 
 
 def test_nothing_wrong_is_no_condition() -> None:
@@ -371,6 +372,30 @@ def test_an_actuator_that_fails_is_acted_on_as_the_parameter_says(
     limits = FlightLimits(actuator_failure_action=number)
     for damage in (Damage(rotor="rotor 1"), Damage(joint="joint 2")):
         assert action(replace(FINE, damage=damage, limits=limits)) is expected
+
+
+LOST = Damage(rotor="rotor 1", report=ActuatorReport(rotor=1, lost=True))
+
+
+def test_a_lost_rotor_terminates_and_with_the_circuit_breaker_the_vehicle_lands() -> None:
+    assert conditions(replace(FINE, damage=LOST)) == (Condition.ROTOR_LOST, Condition.ROTOR_FAILED)
+    assert conditions(replace(FINE, landed=True, damage=LOST)) == ()
+    for breaker, expected in ((0, Action.TERMINATE), (121212, Action.LAND)):
+        limits = FlightLimits(termination_breaker=breaker)
+        context = replace(FINE, damage=LOST, limits=limits).context()
+        assert ROWS[Condition.ROTOR_LOST].action(context) is expected
+
+
+@pytest.mark.parametrize("report", [ActuatorReport(1, 0.49), ActuatorReport(1, disobeys=True)])
+@pytest.mark.parametrize(
+    ("number", "expected"),
+    [(0, Action.WARN), (1, Action.LAND), (3, Action.LAND), (4, Action.TERMINATE)],
+)
+def test_without_control_of_the_heading_the_vehicle_lands_at_least(
+    report: ActuatorReport, number: int, expected: Action
+) -> None:
+    limits = FlightLimits(actuator_failure_action=number)
+    assert action(replace(FINE, damage=Damage("rotor 1", report=report), limits=limits)) is expected
 
 
 @pytest.mark.requirement("REQ-EST-9")

@@ -17,6 +17,7 @@ from fsw.flight.failsafe import FAILSAFES, ROWS, Action, Condition, FailsafeCont
 from fsw.flight.state import Aiding, Damage, FlightState, OffboardMemory, PlanMemory, SafetyMemory
 from fsw.parameters.flight_config import FlightConfig
 from fsw.signals import (
+    ActuatorReport,
     BatteryState,
     Charge,
     Command,
@@ -326,6 +327,7 @@ HAPPENS: dict[Condition, dict[str, Any]] = {
     Condition.POSITION_LOST: {"aiding": ADRIFT},
     Condition.BREACH: {"safety": OUTSIDE},
     Condition.FENCE_BREACH: {"safety": replace(OUTSIDE, breach_of_fence=True)},
+    Condition.ROTOR_LOST: {"damage": Damage("rotor 2", report=ActuatorReport(2, lost=True))},
     Condition.ROTOR_FAILED: {"damage": Damage(rotor="rotor 2")},
     Condition.JOINT_FAILED: {"damage": Damage(joint="joint 1")},
     Condition.POSITION_LOW: {"aiding": ADRIFT},

@@ -1,0 +1,341 @@
+r"""Which rotor or joint does not give what it is commanded, from how the vehicle moves.
+
+What acts on the vehicle beside the model is observed from its momentum, which needs no
+acceleration: for roll and pitch, with the torque of the commanded thrusts through their lag,
+
+.. math:: \dot{\hat r} = K (I \dot\omega - \tau - \hat r),
+
+for the thrust from the accelerometer, and for each joint from the arm's generalised momentum.
+
+A rotor that gives x more than commanded leaves a pattern: its arm times x about one axis and x
+along z. For each rotor x is the projection of what is observed onto its pattern. One has failed
+when the mean square of x is large *and* the pattern explains nearly all of what is observed. A push
+along z, a mass or a battery that is not as believed, an arm that is heavier, a contact: each leaves
+another pattern, however strong it is. What lasts along z is learned as long as nothing turns the
+vehicle.
+
+A joint has failed when torque is observed that undoes what is asked of its drive.
+
+Source: A. De Luca, R. Mattone, Actuator failure detection and isolation using generalized momenta,
+ICRA 2003, for the joints; docs/decisions/0033-actuators-that-fail.md.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fsw.compiled import compilable, kernel
+from fsw.control.joints import arm_dynamics
+from fsw.geometry.vectors import clamp
+from fsw.model.actuator_health import LIMP, SOUND, STUCK
+from fsw.model.airframe import GRAVITY, Airframe
+from fsw.model.rotors import hanging_arm, lag_rotors
+from fsw.signals import StateEstimate, Vec2, Vec3, Vec4
+
+OBSERVER: Final = 30.0  # 1/s; the gyro's noise in a laboratory's suite is 0.5 N of a rotor then
+MEMORY: Final = 0.1  # s, of mean squares
+LEARNING: Final = 2.0  # s, of what lasts along z
+LEARNING_BELOW: Final = 1.0  # N of a rotor about roll and pitch
+SETTLING: Final = 1.0  # s, before anything is found
+AIRBORNE: Final = 0.5  # of the weight; with less thrust nothing is found
+CONTACT: Final = 3.0  # m/s^2 more than the rotors give: the ground carries
+# Healthy flights in all suites, in real air, with another mass, lag, inertia or friction, have
+# less, or not for so long (docs/decisions/0033-actuators-that-fail.md).
+WEAK: Final = 1.5  # N, root mean square
+WEAK_TIME: Final = 0.15  # s
+STRONG: Final = 4.0  # N, with which less time is needed
+STRONG_TIME: Final = 0.03  # s
+EXPLAINED: Final = 0.9  # share of all that is observed
+LOST: Final = 0.2  # of what is commanded; a rotor that gives less is lost
+LOST_TIME: Final = 0.15  # s
+LOST_FROM: Final = 4.0  # N commanded; with less it is not seen
+QUIET: Final = 0.75  # N; a rotor below that gives what it is commanded again
+QUIET_TIME: Final = 3.0  # s
+ASTRAY: Final = 1.2  # N, root mean square of what no effectiveness explains
+SMOOTHED: Final = 0.05  # s, of what a rotor gives that does not obey
+LEAST_EFFECTIVE: Final = 0.25  # the command grows by four at most
+EFFECT_RATE: Final = 2.0  # 1/s, by which allocation follows
+# Joints.
+UNDONE: Final = 0.12  # N m, root mean square of what undoes the torque
+UNDOING: Final = 0.5  # share of the torque that it undoes
+BEHIND: Final = 0.02  # rad, root mean square of the distance from the reference
+JOINT_TIME: Final = 0.1  # s
+STANDING: Final = 0.2  # rad/s, root mean square of the rate of a joint that stands
+MOVED: Final = 0.05  # rad; a joint that has moved so far is not stuck
+
+NONE: Final = -1
+
+WATCH: Final = np.dtype(
+    [
+        ("running", float),  # s, since it began
+        ("thrust", float, (4,)),  # N, of rotors that give what is commanded
+        ("rate", float, (3,)),  # rad/s, of the last tick
+        ("torque", float, (2,)),  # N m about x and y, observed beside the model
+        ("lift", float),  # N, observed the same, beside what lasts
+        ("lasting", float),  # share of the thrust that lasts along z
+        # Means of products of what is observed, in newtons of a rotor: xx, yy, zz, xz, yz.
+        ("products", float, (5,)),
+        ("extra", float, (4,)),  # N, of each rotor beside its command, by its pattern
+        ("by_thrust", float, (4,)),  # N^2, of x and the thrust
+        ("thrust2", float, (4,)),  # N^2, of the thrust
+        ("suspect", np.int64),  # rotor, or NONE
+        ("suspected", float),  # s, for how long
+        ("failed", np.int64),  # rotor, or NONE
+        ("effect", float),  # thrust over command, of the failed rotor, as allocation takes it
+        ("failed2", float),  # N^2, mean square of what it gives beside its command, by what turns
+        ("failed_by_thrust", float),  # N^2, mean of that and the thrust
+        ("failed_thrust2", float),  # N^2, of the thrust
+        ("failed_more2", float),  # N^2, mean square of what it gives too much
+        ("gives", float),  # N, of the failed rotor
+        ("lost_for", float),  # s
+        ("lost", np.int64),
+        ("disobeys", np.int64),
+        ("quiet_for", float),  # s
+        # Joints.
+        ("momentum", float, (2,)),  # N m s
+        ("undone", float, (2,)),  # N m, observed beside the model
+        ("asked", float, (2,)),  # N m, as late as that
+        ("undone2", float, (2,)),  # means of squares, and of the product
+        ("asked2", float, (2,)),
+        ("undoing", float, (2,)),
+        ("rate2", float, (2,)),  # rad^2/s^2
+        ("behind2", float, (2,)),  # rad^2, mean square of the distance from the reference
+        ("joint_for", float, (2,)),  # s, for how long it has been suspected
+        ("joint", float, (2,)),  # SOUND, STUCK or LIMP
+        ("stood_at", float, (2,)),  # rad, where it was found stuck
+    ],
+    align=True,
+)
+Watch = NDArray[Any]  # (1,) of WATCH
+Law = NDArray[Any]
+_FLOATS: Final = WATCH.itemsize // 8
+
+
+def at_start() -> Watch:
+    """Memory before the first tick."""
+    memory = np.zeros(1, dtype=WATCH)
+    memory["suspect"] = memory["failed"] = NONE
+    memory["effect"] = 1.0
+    return memory
+
+
+def blank() -> Watch:
+    """Room for a memory; eight times as fast as an empty array of records."""
+    return np.ndarray(1, WATCH, np.empty(_FLOATS))
+
+
+@kernel
+def watch(
+    before: Watch,
+    after: Watch,
+    laws: Law,
+    decay: float,
+    dt: float,
+    thrust: Vec4,
+    torque: Vec2,
+    reference: Vec2,
+    rate: Vec3,
+    q_arm: Vec2,
+    qd_arm: Vec2,
+    specific_force: float,
+) -> bool:
+    """Bring the memory ``dt`` [s] on, into ``after``; whether anything has failed by now.
+
+    Commanded meanwhile were ``thrust`` [N] and ``torque`` [N m]; the joints' ``reference`` [rad].
+    Body ``rate`` [rad/s], joints ``q_arm`` [rad], ``qd_arm`` [rad/s], ``specific_force`` [m/s^2]
+    along -z; a rotor's error shrinks by ``decay`` [1].
+    """
+    airframe = laws[0]
+    after[0] = before[0]
+    s = after[0]
+    if s.running == 0.0:
+        for i in range(4):
+            s.thrust[i] = thrust[i]
+    _observe_base(s, airframe, decay, dt, thrust, torque[0], rate, q_arm, specific_force)
+    _observe_arm(s, airframe, dt, torque, reference, rate, q_arm, qd_arm, specific_force)
+    total = s.thrust[0] + s.thrust[1] + s.thrust[2] + s.thrust[3]
+    weight = airframe.mass * GRAVITY
+    if not total > AIRBORNE * weight or s.lift > CONTACT * airframe.mass:
+        s.running = 0.0  # on the ground, or about to be
+    s.running += dt
+    settled = s.running > SETTLING
+    _judge_rotors(s, dt, settled)
+    for k in range(2):
+        _judge_joint(s, k, dt, settled, q_arm[k])
+    return bool(s.failed >= 0 or s.joint[0] != SOUND or s.joint[1] != SOUND)
+
+
+@compilable
+def _observe_base(
+    s: Any,
+    airframe: Airframe,
+    decay: float,
+    dt: float,
+    commanded: Vec4,
+    joint1_torque: float,
+    rate: Vec3,
+    q_arm: Vec2,
+    specific_force: float,
+) -> None:
+    """What turns and lifts the base beside the model, and the means of its products."""
+    f = (s.thrust[0], s.thrust[1], s.thrust[2], s.thrust[3])
+    g = lag_rotors(f, commanded, decay)
+    m = (0.5 * (f[0] + g[0]), 0.5 * (f[1] + g[1]), 0.5 * (f[2] + g[2]), 0.5 * (f[3] + g[3]))
+    arm, inertia = airframe.rotor_arm, airframe.inertia
+    roll_inertia = hanging_arm(airframe, q_arm).roll_inertia
+    wx, wy, wz = rate
+    modelled_x = arm * (m[1] - m[3]) - (inertia[2] - inertia[1]) * wy * wz
+    modelled_y = arm * (m[2] - m[0]) - joint1_torque - (inertia[0] - inertia[2]) * wz * wx
+    gained_x, gained_y = wx - s.rate[0], wy - s.rate[1]
+    if s.running == 0.0:
+        gained_x, gained_y = modelled_x * dt / roll_inertia, modelled_y * dt / inertia[1]
+    share = min(OBSERVER * dt, 1.0)
+    s.torque[0] += OBSERVER * (roll_inertia * gained_x - dt * (modelled_x + s.torque[0]))
+    s.torque[1] += OBSERVER * (inertia[1] * gained_y - dt * (modelled_y + s.torque[1]))
+    total = m[0] + m[1] + m[2] + m[3]
+    lift = airframe.mass * specific_force - (1.0 + s.lasting) * total
+    s.lift += share * (lift - s.lift)
+    x, y, z = s.torque[0] / arm, s.torque[1] / arm, s.lift
+    if s.failed < 0 and max(abs(x), abs(y)) < LEARNING_BELOW and total > 0.0:
+        s.lasting += dt / LEARNING * lift / total
+    forget = min(dt / MEMORY, 1.0)
+    products = (x * x, y * y, z * z, x * z, y * z)
+    for i in range(5):
+        s.products[i] += forget * (products[i] - s.products[i])
+    extra = (0.5 * (z - y), 0.5 * (z + x), 0.5 * (z + y), 0.5 * (z - x))
+    for i in range(4):
+        s.thrust[i], s.extra[i] = g[i], extra[i]
+        s.by_thrust[i] += forget * (extra[i] * g[i] - s.by_thrust[i])
+        s.thrust2[i] += forget * (g[i] * g[i] - s.thrust2[i])
+    for i in range(3):
+        s.rate[i] = rate[i]
+    if s.failed >= 0:
+        # Which one is known: what turns the base says how much, and pushes do not.
+        k = s.failed
+        turns = (-y, x, y, -x)
+        off, thrust = turns[k], g[k]
+        s.gives += min(dt / SMOOTHED, 1.0) * (thrust + off - s.gives)
+        s.failed2 += forget * (off * off - s.failed2)
+        s.failed_by_thrust += forget * (off * thrust - s.failed_by_thrust)
+        s.failed_thrust2 += forget * (thrust * thrust - s.failed_thrust2)
+        s.failed_more2 += forget * (max(off, 0.0) * max(off, 0.0) - s.failed_more2)
+        gives_nothing = thrust > LOST_FROM and off < (LOST - 1.0) * thrust
+        s.lost_for = s.lost_for + dt if gives_nothing else 0.0
+
+
+@compilable
+def mean_square(s: Any, rotor: int) -> float:
+    """Mean square [N^2] of what a rotor gives beside its command, by its pattern (0 to 3)."""
+    xx, yy, zz, xz, yz = s.products[0], s.products[1], s.products[2], s.products[3], s.products[4]
+    if rotor == 0:
+        fourfold = zz + yy - 2.0 * yz
+    elif rotor == 1:
+        fourfold = zz + xx + 2.0 * xz
+    elif rotor == 2:
+        fourfold = zz + yy + 2.0 * yz
+    else:
+        fourfold = zz + xx - 2.0 * xz
+    return 0.25 * float(fourfold)
+
+
+@compilable
+def _judge_rotors(s: Any, dt: float, settled: bool) -> None:
+    if s.failed >= 0:
+        _follow_failed(s, dt)
+        return
+    found, most = NONE, 0.0
+    for i in range(4):
+        size = mean_square(s, i)
+        if size > most:
+            found, most = i, size
+    observed = s.products[0] + s.products[1] + s.products[2]
+    alike = most > WEAK * WEAK and 2.0 * most > EXPLAINED * observed
+    # A drive of joint 1 that is dead turns the base as well.
+    mistaken = (found == 0 or found == 2) and s.undone2[0] > UNDONE * UNDONE
+    if not (settled and alike and not mistaken):
+        s.suspect, s.suspected = NONE, 0.0
+        return
+    s.suspected = s.suspected + dt if found == s.suspect else 0.0
+    s.suspect = found
+    if s.suspected >= (STRONG_TIME if most > STRONG * STRONG else WEAK_TIME):
+        s.failed, s.effect, s.quiet_for = found, 1.0, 0.0
+        s.gives = s.thrust[found] + s.extra[found]
+        s.failed2, s.failed_by_thrust = most, s.by_thrust[found]
+        more = max(s.extra[found], 0.0)
+        s.failed_thrust2, s.failed_more2 = s.thrust2[found], more * more
+
+
+@compilable
+def effect_seen(s: Any) -> float:
+    """Thrust over command of the failed rotor [1], by the means of a tenth of a second."""
+    return clamp(1.0 + float(s.failed_by_thrust) / max(float(s.failed_thrust2), 1e-6), 0.0, 1.0)
+
+
+@compilable
+def _follow_failed(s: Any, dt: float) -> None:
+    """What of the failed rotor is left, and whether it is back."""
+    by_effect = s.failed_by_thrust * s.failed_by_thrust / max(s.failed_thrust2, 1e-6)
+    explained = s.failed2 - by_effect < ASTRAY * ASTRAY
+    # A rotor that comes and goes is no weak one, and flies better as a sound one. One that gives
+    # too much at times does not obey.
+    if explained and not s.disobeys:
+        towards = max(effect_seen(s), LEAST_EFFECTIVE) - s.effect
+        s.effect += clamp(towards, -EFFECT_RATE * dt, EFFECT_RATE * dt)
+    if s.lost_for > LOST_TIME:
+        s.lost = 1
+    if not explained and s.failed_more2 > ASTRAY * ASTRAY:
+        s.disobeys = 1
+    quiet = s.failed2 < QUIET * QUIET and not s.lost and not s.disobeys
+    s.quiet_for = s.quiet_for + dt if quiet else 0.0
+    if s.quiet_for > QUIET_TIME:
+        s.failed, s.effect, s.suspect, s.suspected = NONE, 1.0, NONE, 0.0
+
+
+@compilable
+def _observe_arm(
+    s: Any,
+    airframe: Airframe,
+    dt: float,
+    torque: Vec2,
+    reference: Vec2,
+    rate: Vec3,
+    q_arm: Vec2,
+    qd_arm: Vec2,
+    specific_force: float,
+) -> None:
+    """What acts on the arm beside gravity, its own motion and the torques."""
+    none = (0.0, 0.0, 0.0)
+    level = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+    moving = StateEstimate(0, none, none, level, rate, 0.0, q_arm, qd_arm, specific_force)
+    arm = arm_dynamics(airframe, moving, (0.0, specific_force))
+    share, forget = min(OBSERVER * dt, 1.0), min(dt / MEMORY, 1.0)
+    for k in range(2):
+        gained = arm.momentum[k] - s.momentum[k]
+        if s.running == 0.0:
+            gained = dt * (torque[k] + arm.drift[k])
+        s.momentum[k] = arm.momentum[k]
+        s.undone[k] += OBSERVER * (gained - dt * (torque[k] + arm.drift[k] + s.undone[k]))
+        s.asked[k] += share * (torque[k] - s.asked[k])
+        s.undone2[k] += forget * (s.undone[k] * s.undone[k] - s.undone2[k])
+        s.asked2[k] += forget * (s.asked[k] * s.asked[k] - s.asked2[k])
+        s.undoing[k] += forget * (s.undone[k] * s.asked[k] - s.undoing[k])
+        s.rate2[k] += forget * (qd_arm[k] * qd_arm[k] - s.rate2[k])
+        behind = reference[k] - q_arm[k]
+        s.behind2[k] += forget * (behind * behind - s.behind2[k])
+
+
+@compilable
+def _judge_joint(s: Any, k: int, dt: float, settled: bool, angle: float) -> None:
+    if s.joint[k] == STUCK and abs(angle - s.stood_at[k]) > MOVED:
+        s.joint[k] = LIMP
+    if s.joint[k] != SOUND:
+        return
+    undone = s.undone2[k] > UNDONE * UNDONE and s.undoing[k] < -UNDOING * s.asked2[k]
+    behind = s.behind2[k] > BEHIND * BEHIND
+    s.joint_for[k] = s.joint_for[k] + dt if settled and undone and behind else 0.0
+    if s.joint_for[k] > JOINT_TIME:
+        s.joint[k] = STUCK if s.rate2[k] < STANDING * STANDING else LIMP
+        s.stood_at[k] = angle

@@ -1,0 +1,154 @@
+"""Failed rotors and joints as the flight software knows them: sentences, and what loops count on.
+
+``fsw/control/actuator_watch.py`` finds them; the failsafe table acts on them. What has failed stays
+so until the flight software is restarted, but for a weak rotor that gives what it is commanded
+again.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+from fsw.compiled import machine_code, packed
+from fsw.control.actuator_watch import NONE, Watch, at_start, blank, watch
+from fsw.control.cascade import CascadeMemory
+from fsw.flight.state import Damage
+from fsw.model.actuator_health import HEALTHY, LIMP, SOUND, STUCK, ActuatorHealth
+from fsw.model.airframe import GRAVITY, Airframe
+from fsw.model.rotors import rotor_decay
+from fsw.signals import ActuatorReport, StateEstimate, Vec2, Vec4
+
+ROTORS: Final = ("1 (rear)", "2 (left)", "3 (front)", "4 (right)")
+_HOWS: Final = {STUCK: "does not move", LIMP: "gives no torque"}
+_WEAK_AT_MOST: Final = 0.9  # of what is commanded; a weak rotor that is found gives less
+_LEAST_GIVEN: Final = 0.1  # N, of a rotor that does not obey
+
+
+class DamageWatch:
+    """The watch over the actuators of one configuration."""
+
+    def __init__(self, airframe: Airframe, tick: float, *, reallocates: bool) -> None:
+        """Watch in ticks of ``tick`` [s]; loops reckon with what is found if it ``reallocates``."""
+        self._law = packed(airframe)
+        self._top = airframe.rotor_thrust_max
+        self._hover = 0.25 * airframe.mass * GRAVITY
+        self._tick = tick
+        self._decay = rotor_decay(airframe, tick)
+        self._reallocates = reallocates
+        self._start = at_start()
+        none4, none3, none2 = (0.0,) * 4, (0.0,) * 3, (0.0,) * 2
+        rest: tuple[Any, ...] = (none4, none2, none2, none3, none2, none2, 1.0)
+        self._watch = machine_code(watch, self._start, blank(), self._law, 1.0, 1.0, *rest)
+
+    def see(
+        self,
+        damage: Damage,
+        memory: Watch | None,
+        sent: CascadeMemory,
+        now: CascadeMemory,
+        estimate: StateEstimate,
+        ticks: int,
+    ) -> tuple[Damage, Watch]:
+        """What is known of actuators a tick, or some ``ticks``, later, and the memory for the next.
+
+        The loops' memory ``sent`` holds what was commanded meanwhile, ``now`` their references.
+        """
+        after = blank()
+        thrust, torque = sent.commanded
+        dt, decay = self._tick, self._decay
+        if ticks != 1:
+            dt, decay = ticks * dt, decay**ticks
+        failed = self._watch(
+            self._start if memory is None else memory,
+            after,
+            self._law,
+            decay,
+            dt,
+            thrust,
+            torque,
+            now.joints.reference,
+            estimate.w_WB_B,
+            estimate.q_arm,
+            estimate.qd_arm,
+            estimate.specific_force,
+        )
+        if failed or damage.rotor:
+            back = memory is not None and memory[0]["failed"] != NONE and after[0]["failed"] == NONE
+            damage = self._of_rotors(damage, after[0], estimate.t_us, back=bool(back))
+            damage = _of_joints(damage, after[0], estimate.t_us)
+        return damage, after
+
+    def _of_rotors(self, before: Damage, s: Any, now_us: int, *, back: bool) -> Damage:
+        """What is known of rotors; the one that had failed is ``back``, or not seen any more."""
+        k, known = int(s["failed"]), before.report
+        if k == NONE:
+            if not back:
+                return before
+            joints = before.health.joints
+            health = ActuatorHealth(joints=joints) if any(joints) else HEALTHY
+            report = known._replace(rotor=0, effect=1.0)
+            return before._replace(rotor="", report=report, health=health)
+        found = known._replace(
+            rotor=k + 1,
+            effect=float(s["effect"]),
+            lost=bool(s["lost"]),
+            disobeys=bool(s["disobeys"]),
+        )
+        after, health = before, before.health
+        if found._replace(effect=known.effect) != known:
+            since_us = before.rotor_us
+            if found.rotor != known.rotor:
+                since_us = now_us - round(1e6 * float(s["suspected"]))
+            after = before._replace(rotor=_sentence(s, found), rotor_us=since_us)
+        if self._reallocates:
+            health = self._health(s, k, found, before.health.joints)
+        return after._replace(report=found, health=health)
+
+    def _health(self, s: Any, k: int, found: ActuatorReport, joints: Vec2) -> ActuatorHealth:
+        """What loops reckon with for rotor ``k`` (from 0)."""
+        if not found.disobeys:
+            return ActuatorHealth(_with(HEALTHY.effectiveness, k, found.effect), joints=joints)
+        # It is commanded what it gives in hover, and reckoned with as what it really gives.
+        gives = min(max(float(s["gives"]), _LEAST_GIVEN), self._top)
+        return ActuatorHealth(
+            _with(HEALTHY.effectiveness, k, gives / self._hover),
+            _with(HEALTHY.least, k, gives),
+            _with(HEALTHY.most, k, gives),
+            joints,
+        )
+
+
+def _of_joints(before: Damage, s: Any, now_us: int) -> Damage:
+    kinds = (
+        float(s["joint"][0]) or before.report.joints[0],
+        float(s["joint"][1]) or before.report.joints[1],
+    )
+    if kinds == before.report.joints:
+        return before
+    after = before
+    if not before.joint:
+        k = 0 if kinds[0] != SOUND else 1
+        since_us = now_us - round(1e6 * float(s["joint_for"][k]))
+        after = before._replace(joint=f"joint {k + 1} {_HOWS[kinds[k]]}", joint_us=since_us)
+    report = before.report._replace(joints=kinds)
+    return after._replace(report=report, health=before.health._replace(joints=kinds))
+
+
+def _with(values: Vec4, k: int, value: float) -> Vec4:
+    a, b, c, d = (value if i == k else one for i, one in enumerate(values))
+    return a, b, c, d
+
+
+def _sentence(s: Any, found: ActuatorReport) -> str:
+    """What is wrong with a rotor."""
+    k = found.rotor - 1
+    name = f"rotor {ROTORS[k]}"
+    if found.lost:
+        return f"{name} gives nothing"
+    if found.disobeys:
+        return f"{name} does not obey"
+    # As it is at the moment: means of a tenth of a second are behind when a rotor has just failed.
+    share = 1.0 + float(s["extra"][k]) / max(float(s["thrust"][k]), 1.0)
+    if share > _WEAK_AT_MOST:
+        return f"{name} gives another thrust than is commanded"
+    return f"{name} gives {100.0 * max(share, 0.0):.0f} % of what is commanded"

@@ -1,0 +1,155 @@
+"""Which rotor is named for how a vehicle moves; its motion is written out here, without a model."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from fsw.control.actuator_watch import Watch
+from fsw.control.cascade import CascadeMemory, in_hover
+from fsw.flight.damage_watch import DamageWatch
+from fsw.flight.state import Damage
+from fsw.model.actuator_health import HEALTHY
+from fsw.model.airframe import AIRFRAME
+from fsw.signals import StateEstimate
+
+DT = 0.002
+FAULT_S = 1.5
+EACH = 3.5 * 9.81 / 4.0
+LEVEL = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+HANGING = (0.0, 0.0)
+
+Given = Callable[[float, int], float]  # thrust over command of a rotor (0 to 3) at a time [s]
+WATCHER = DamageWatch(AIRFRAME, DT, reallocates=True)
+
+
+def estimate(t_s: float, rate: tuple[float, float, float], specific_force: float) -> StateEstimate:
+    still = (0.0, 0.0, 0.0)
+    t_us = round(1e6 * t_s)
+    return StateEstimate(
+        t_us, still, still, LEVEL, rate, 0.0, HANGING, (0.0, 0.0), specific_force=specific_force
+    )
+
+
+class Motion:
+    """Four rotors that are commanded to hover, and what the base does."""
+
+    def __init__(self, given: Given, watcher: DamageWatch = WATCHER) -> None:
+        self.given = given
+        self.watcher = watcher
+        self.damage, self.memory = Damage(), None
+        self.told_s = math.inf
+        self.loops: CascadeMemory = in_hover(AIRFRAME, estimate(0.0, (0.0, 0.0, 0.0), 9.81))
+
+    def run(
+        self, seconds: float, push: Callable[[float], float] = lambda _: 0.0, mass: float = 3.5
+    ) -> Damage:
+        """Move for a while; ``push`` [m/s^2] along body -z."""
+        thrust, wx, wy = [EACH] * 4, 0.0, 0.0
+        memory: Watch | None = None
+        for k in range(round(seconds / DT)):
+            t = k * DT
+            for i in range(4):
+                thrust[i] += DT / 0.04 * (self.given(t, i) * EACH - thrust[i])
+            rear, left, front, right = thrust
+            # The body turns up to 1 rad/s in these tests: products of rates are left out.
+            wx += DT * 0.3 * (left - right) / 0.307
+            wy += DT * 0.3 * (front - rear) / 0.3
+            felt = sum(thrust) / mass + push(t)
+            now = estimate(1.0 + t, (wx, wy, 0.0), felt)
+            self.damage, memory = self.watcher.see(
+                self.damage, memory, self.loops, self.loops, now, 1
+            )
+            if self.damage.rotor and self.told_s == math.inf:
+                self.told_s = t - FAULT_S
+        return self.damage
+
+
+def weak(rotor: int, share: float) -> Given:
+    return lambda t, i: share if i == rotor and t >= FAULT_S else 1.0
+
+
+NAMES = ("rotor 1 (rear)", "rotor 2 (left)", "rotor 3 (front)", "rotor 4 (right)")
+
+
+@pytest.mark.parametrize("rotor", range(4))
+@pytest.mark.parametrize(("share", "within_s"), [(0.7, 0.35), (0.5, 0.25), (0.3, 0.2)])
+def test_the_weak_rotor_is_named_with_what_it_gives(
+    rotor: int, share: float, within_s: float
+) -> None:
+    motion = Motion(weak(rotor, share))
+    damage = motion.run(FAULT_S + 1.0)
+    assert damage.rotor.startswith(NAMES[rotor])
+    assert 0.0 < motion.told_s <= within_s
+    assert damage.report.effect == pytest.approx(share, abs=0.05)
+    assert damage.health.effectiveness[rotor] == damage.report.effect
+    assert not damage.report.lost
+    assert not damage.report.disobeys
+
+
+def test_it_is_said_since_when() -> None:
+    motion = Motion(weak(1, 0.6))
+    damage = motion.run(FAULT_S + 0.6)
+    begin_s = 1e-6 * damage.rotor_us - 1.0
+    assert FAULT_S < begin_s < FAULT_S + motion.told_s
+
+
+@pytest.mark.parametrize("rotor", range(4))
+def test_a_rotor_that_gives_nothing_is_lost(rotor: int) -> None:
+    damage = Motion(weak(rotor, 0.0)).run(FAULT_S + 0.4)
+    assert damage.report.lost
+    assert damage.rotor == f"{NAMES[rotor]} gives nothing"
+
+
+def test_a_rotor_that_is_gone_for_a_moment_is_not_lost() -> None:
+    gone = Motion(lambda t, i: 0.0 if i == 2 and FAULT_S <= t < FAULT_S + 0.2 else 1.0)
+    damage = gone.run(FAULT_S + 1.0)
+    assert damage.rotor.startswith("rotor 3")
+    assert not damage.report.lost
+
+
+def test_a_rotor_that_gives_too_much_does_not_obey_and_is_counted_on_as_it_is() -> None:
+    def stuck(t: float, i: int) -> float:
+        return 1.0 + 0.6 * math.sin(9.0 * t) if i == 0 and t >= FAULT_S else 1.0
+
+    damage = Motion(stuck).run(FAULT_S + 1.0)
+    assert damage.report.disobeys
+    assert damage.rotor == "rotor 1 (rear) does not obey"
+    assert damage.health.least[0] == damage.health.most[0] > 0.0
+    assert damage.severe
+
+
+def test_a_weak_rotor_that_is_well_again_is_forgotten() -> None:
+    motion = Motion(lambda t, i: 0.7 if i == 3 and FAULT_S <= t < FAULT_S + 0.6 else 1.0)
+    assert motion.run(FAULT_S + 0.6).rotor
+    motion = Motion(motion.given)
+    damage = motion.run(FAULT_S + 5.0)
+    assert not damage.rotor
+    assert damage.health is HEALTHY
+
+
+@pytest.mark.parametrize("mass", [2.8, 3.5, 4.2])
+def test_pushes_and_another_mass_name_no_rotor(mass: float) -> None:
+    random = np.random.default_rng(3).uniform(-0.8, 0.8, 100)
+    healthy = Motion(lambda _t, _i: 1.0)
+    assert healthy.run(6.0, lambda t: float(random[int(10.0 * t)]), mass) == Damage()
+
+
+def test_a_battery_that_sags_names_no_rotor() -> None:
+    assert Motion(lambda t, _i: 1.0 - 0.05 * t).run(6.0) == Damage()
+
+
+def test_two_rotors_that_change_together_are_no_single_one() -> None:
+    """As a gust that turns the body, or an arm that is pulled: a torque without a lift."""
+    turned = Motion(lambda t, i: {1: 0.8, 3: 1.2}.get(i, 1.0) if t >= FAULT_S else 1.0)
+    assert not turned.run(FAULT_S + 0.5).rotor
+
+
+def test_allocation_is_left_alone_where_that_is_asked_for() -> None:
+    ignoring = DamageWatch(AIRFRAME, DT, reallocates=False)
+    damage = Motion(weak(1, 0.6), ignoring).run(FAULT_S + 0.6)
+    assert damage.rotor
+    assert damage.health is HEALTHY
