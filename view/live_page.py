@@ -24,7 +24,7 @@ from view.stage import Stage
 from view.tlog_flight import curves_of
 from view.vehicle import places
 
-_FRAME_S: Final = 1.0 / 25.0
+_FRAME_S: Final = 1.0 / 30.0  # a frame takes some milliseconds more
 _TEXT_S: Final = 0.25
 _PLOT_S: Final = 1.0
 _KEPT_S: Final = 0.2  # between two scenes that the curves are drawn from

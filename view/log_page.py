@@ -20,6 +20,8 @@ from view.timeline import Timeline
 _FRAME_S: Final = 1.0 / 30.0
 _TEXT_S: Final = 0.12  # between two texts, which a browser lays out anew
 _PLOT_S: Final = 0.3
+_MARKED: Final = (EventKind.MODE.value, EventKind.FAULT.value)
+_MARKS: Final = 60  # most of the slider
 _ANY: Final = "all events"
 _PLAY, _WORST, _BACK, _ON = "▶ play / pause", "worst margin", "◀ event", "event ▶"
 _SPEEDS: Final = {"0.1 ×": 0.1, "0.25 ×": 0.25, "0.5 ×": 0.5, "1 ×": 1.0, "2 ×": 2.0, "5 ×": 5.0}
@@ -86,7 +88,9 @@ class LogPage:
                 for curve in margins
             ]  # fmt: skip
             length = max(flight.end - flight.begin, 1e-3)
-            self._slider: Any = gui.add_slider("time [s]", 0.0, length, 0.01, 0.0)
+            self._slider: Any = gui.add_slider(
+                "time [s]", 0.0, length, 0.01, 0.0, marks=_marks(flight, length)
+            )
             self._slider.on_update(self._slid)
             buttons = gui.add_button_group("", (_BACK, _PLAY, _ON, _WORST))
             buttons.on_click(lambda event: self._press(event.target.value))
@@ -158,3 +162,10 @@ class LogPage:
             self._plots_s = now_s
             for plot in self._plots:
                 plot.point_to(at.t)
+
+
+def _marks(flight: Flight, length: float) -> tuple[float | tuple[float, str], ...]:
+    """Both ends of a flight that is ``length`` [s] long, and where modes and faults changed."""
+    changes = [one.t - flight.begin for one in flight.events if one.kind in _MARKED]
+    within = [round(t, 2) for t in changes if 0.0 < t < length]
+    return ((0.0, "0"), *dict.fromkeys(within[:_MARKS]), (length, f"{length:.0f}"))

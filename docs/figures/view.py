@@ -40,5 +40,5 @@ def draw_view(directory: Path, target: Path) -> None:
         server.stop()
     # A quarter of the size, and looks the same.
     with Image.open(target) as whole:
-        palette = whole.convert("RGB").quantize(256, dither=Image.Dither.NONE)
+        palette = whole.convert("RGB").quantize(256, Image.Quantize.MAXCOVERAGE, kmeans=2)
     palette.save(target, optimize=True)
