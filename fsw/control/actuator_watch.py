@@ -145,8 +145,8 @@ def watch(
     """Bring the memory ``dt`` [s] on, into ``after``; whether anything has failed by now.
 
     Commanded meanwhile were ``thrust`` [N] and ``torque`` [N m]; the joints' ``reference`` [rad].
-    Body ``rate`` [rad/s], joints ``q_arm`` [rad], ``qd_arm`` [rad/s], ``specific_force`` [m/s^2]
-    along -z; a rotor's error shrinks by ``decay`` [1].
+    Body ``rate`` [rad/s, FRD], joints ``q_arm`` [rad], ``qd_arm`` [rad/s], ``specific_force``
+    [m/s^2] along -z; a rotor's error shrinks by ``decay`` [1].
     """
     airframe = laws[0]
     after[0] = before[0]

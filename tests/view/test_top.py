@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 from typing import Any
 
+import pytest
 from textual.widgets import DataTable, Input, RichLog
 
 from fsw.link.udp_endpoint import OpenEndpoint
@@ -122,6 +123,7 @@ def cells(table: DataTable[Any], row: int) -> list[str]:
     return [str(cell) for cell in table.get_row_at(row)]
 
 
+@pytest.mark.long
 def test_what_is_shown_and_what_keys_do() -> None:
     asyncio.run(drive())
 
