@@ -37,9 +37,11 @@ ERRORS: Final = 17
 FRAME: Final = 4  # errors of an odometry's frame: north, east, down [m], heading [rad]
 ROWS: Final = 3  # of a measurement, at most
 IMU_CAPACITY: Final = 256  # readings since the filter's time
-# Columns of a reading: time [s], specific force [m/s^2] and rate [rad/s] in body axes, and whether
-# it is the sensor's own (0), an older one's (1).
+# Columns of a reading: time [s], specific force [m/s^2] and rate [rad/s] in body axes, and which of
+# both are of no use: an older reading's, or one that repeats itself.
 TIME, FORCE, RATE, LOST, COLUMNS = 0, 1, 4, 7, 8
+NO_FORCE, NO_RATE, NOTHING = 1, 2, 3  # of LOST
+PUSHES: Final = 160  # ticks that the joints' state may lie behind
 
 FILTER: Final = np.dtype(
     [
@@ -57,10 +59,25 @@ FILTER: Final = np.dtype(
         ("imu", float, (IMU_CAPACITY, COLUMNS)),  # ring
         ("first", np.int64),  # of the readings after the state's time, counted from the start
         ("end", np.int64),  # behind the newest reading
-        ("same", np.int64),  # how often the newest reading came in a row
-        ("unlike", np.int64),  # how often in a row readings were too far from the last good one
-        ("lost", np.int64),  # whether the state's own reading is an older one's
+        # Of accelerometer and gyro, in this order (imu.py).
+        ("newest", float, (6,)),  # m/s^2 and rad/s, as they came, believed or not
+        ("same", np.int64, (2,)),  # how often the newest reading came in a row
+        ("steady", np.int64, (2,)),  # how many in a row were near the one before
+        ("calm", np.int64, (2,)),  # how many in a row were believed
+        ("doubted", np.int64, (2,)),  # how many steady ones it takes to be believed; 0: it is
+        ("lost", np.int64),  # which halves of the state's own reading are of no use
+        # Joints, at a time of their own (joint_filter.py), and what torques made of them since.
         ("joints", float, (2, 3)),  # angle [rad], rate [rad/s] and disturbance [rad/s^2] of each
+        ("joint_variance", float, (3, 3)),  # [SI], of either
+        ("joint_time", float),  # s
+        ("pushes", float, (PUSHES, 3)),  # ring: up to a time [s], accelerations [rad/s^2]
+        ("pushed", np.int64),  # the first of them after the joints' time, counted from the start
+        ("pushes_end", np.int64),  # behind the last one
+        # Encoders: the newest reading [rad] and its time [s], and as above.
+        ("encoders", float, (3,)),
+        ("encoder_steady", np.int64),
+        ("encoder_calm", np.int64),
+        ("encoder_doubted", np.int64),
         # What is known of the biases while the readings are of no use.
         ("kept_bias", float, (6,)),
         ("kept_variance", float, (6,)),
@@ -192,11 +209,14 @@ def propagate(M: Array, blocks: tuple[Mat3, Mat3, Mat3], dt: float) -> None:
 
 @compilable
 def add_noise(M: Array, law: Any, dt: float, lost: int) -> None:
-    """Add to the covariance ``M`` (17, 17) [SI] what ``dt`` [s] of noise add. Solà, eq 261-265."""
+    """Add to the covariance ``M`` (17, 17) [SI] what ``dt`` [s] of noise add. Solà, eq 261-265.
+
+    Of what is ``lost`` [NO_FORCE, NO_RATE] the bias may be anything soon.
+    """
     force = law.accel_noise * law.accel_noise * dt
     turn = law.gyro_noise * law.gyro_noise * dt
-    accel_walk = law.lost_accel_walk if lost else law.accel_bias_walk
-    gyro_walk = law.lost_gyro_walk if lost else law.gyro_bias_walk
+    accel_walk = law.lost_accel_walk if lost & NO_FORCE else law.accel_bias_walk
+    gyro_walk = law.lost_gyro_walk if lost & NO_RATE else law.gyro_bias_walk
     for i in range(3):
         M[V + i, V + i] += force
         M[TH + i, TH + i] += turn
@@ -214,7 +234,7 @@ def step_to(x: Any, law: Any, row: Array, before: Array, M: Array) -> None:
     Covariance ``M`` (17, 17) [SI]. Where readings are missing, in steps short enough.
     """
     gap = max(row[TIME] - x.time, 0.0)
-    lost = 1 if row[LOST] > 0.0 or gap > law.imu_gap else 0
+    lost = NOTHING if gap > law.imu_gap else int(row[LOST])
     _watch_biases(x, M, lost)
     f = (
         0.5 * (row[1] + before[1]) - x.accel_bias[0],
@@ -249,12 +269,16 @@ def step_to(x: Any, law: Any, row: Array, before: Array, M: Array) -> None:
 @compilable
 def _watch_biases(x: Any, M: Array, lost: int) -> None:
     """Keep the biases when readings are lost, and take them up again when they are back."""
-    if lost == x.lost:
+    changed = lost ^ x.lost
+    if not changed:
         return
     x.lost = lost
     for i in range(6):
         k, bias = BA + i, x.accel_bias if i < 3 else x.gyro_bias
-        if lost:
+        half = NO_FORCE if i < 3 else NO_RATE
+        if not changed & half:
+            continue
+        if lost & half:
             x.kept_bias[i], x.kept_variance[i] = bias[i % 3], M[k, k]
         else:
             bias[i % 3] = x.kept_bias[i]

@@ -14,6 +14,7 @@ from typing import Any
 
 from fsw.compiled import compilable
 from fsw.estimation.error_state import (
+    BA,
     BARO,
     BG,
     DELAY,
@@ -33,6 +34,10 @@ from fsw.signals import Vec3, Vec4
 
 _LEAST_FIELD = 0.02  # Gauss across the vertical; less says nothing about the heading
 _KNOWN_VELOCITY = 0.05  # m/s, a standard deviation
+# What is not known of a state that poses contradict: standard deviations.
+_DOUBTED_SPEED = 0.5  # m/s
+_DOUBTED_FORCE = 3.0  # m/s^2
+_DOUBTED_RATE = 0.5  # rad/s
 
 
 @compilable
@@ -202,6 +207,7 @@ def heading_rows(x: Any, law: Any, field: Vec3, dt: float) -> bool:
 def fuse_heading(x: Any, law: Any, gates: Any, time: float, field: Vec3) -> float:
     """Fuse the heading of a magnetic ``field`` [Gauss, FRD] of ``time`` [s]."""
     if not heading_rows(x, law, field, time - x.time):
+        x.innovation[0, 0] = 0.0
         return math.inf
     return _judged(x, 1, gates.heading)
 
@@ -233,6 +239,7 @@ def fuse_range(
 ) -> float:
     """Fuse a ``measured`` [m] distance to level ground of ``time`` [s] and ``variance`` [m^2]."""
     if not range_rows(x, law, measured, variance, time - x.time):
+        x.innovation[0, 0] = 0.0
         return math.inf
     return _judged(x, 1, gates.range)
 
@@ -249,3 +256,19 @@ def forget(x: Any, first: int, variance: Vec3) -> None:
             M[j, first + i] = 0.0
     for i in range(3):
         M[first + i, first + i] = variance[i]
+
+
+@compilable
+def doubt(x: Any, law: Any, place: float, turn: float) -> None:
+    """Know little more of a state that poses contradict by a ``place`` [m] and a ``turn`` [rad].
+
+    An inertial unit that lies shows so: its biases may be anything, and velocity and attitude are
+    what they have made of them.
+    """
+    M = x.covariance
+    for i in range(3):
+        M[P + i, P + i] += place * place
+        M[V + i, V + i] += _DOUBTED_SPEED * _DOUBTED_SPEED
+        M[TH + i, TH + i] += turn * turn
+        M[BA + i, BA + i] += _DOUBTED_FORCE * _DOUBTED_FORCE
+        M[BG + i, BG + i] += _DOUBTED_RATE * _DOUBTED_RATE

@@ -1,4 +1,9 @@
-"""Readings of the IMU on their way into the filter: what is wrong with one, and what stands in."""
+"""Readings of the IMU on their way into the filter: what is wrong with one, and what stands in.
+
+Accelerometer and gyro are judged each for itself. A reading far from the last good one is not
+believed. What jumps once is believed again as soon as it is back, or stays where it jumped to; what
+jumps again soon must be steady for longer.
+"""
 
 from __future__ import annotations
 
@@ -6,13 +11,26 @@ import math
 from typing import Any, Final
 
 from fsw.compiled import compilable
-from fsw.estimation.error_state import COLUMNS, FORCE, IMU_CAPACITY, LOST, RATE, TIME
+from fsw.estimation.error_state import (
+    COLUMNS,
+    FORCE,
+    IMU_CAPACITY,
+    LOST,
+    NO_FORCE,
+    NO_RATE,
+    RATE,
+    TIME,
+)
 from fsw.estimation.sensor_fault import SensorFault
 from fsw.signals import Vec3
 
 TIME_TOLERANCE: Final = 0.002  # s, by which a reading may be ahead of the tick
+IMU_TOO_OLD: Final = 0.03  # s; what the vehicle did so long ago says nothing about its rates now
 STUCK_READINGS: Final = 5  # equal to the last bit, in a row: noise never is
-_UNLIKE_READINGS: Final = 3  # far from the last one, in a row, that are not believed
+# Steady readings in a row until what has jumped is the truth: of one that was calm, and of others.
+STAYS: Final = 3
+STAYS_LONG: Final = 25
+CALM: Final = 250  # readings that were believed, in a row
 # Plain numbers: kernels return them.
 _NONE: Final = SensorFault.NONE.value
 _NOT_FINITE: Final = SensorFault.NOT_FINITE.value
@@ -27,23 +45,26 @@ _JUMP: Final = SensorFault.JUMP.value
 def add_imu(x: Any, law: Any, now: float, time: float, f: Vec3, w: Vec3) -> int:
     """Keep a reading of ``time`` [s] that came at ``now`` [s]; returns what is wrong with it.
 
-    ``f`` [m/s^2, FRD] and ``w`` [rad/s, FRD]. In place of a reading that is none, the last good one
-    is kept; one whose time is of no use is not kept at all. Numbers of ``SensorFault``.
+    ``f`` [m/s^2, FRD] and ``w`` [rad/s, FRD]. In place of what is of no use, the last good one is
+    kept; a reading whose time is of no use is not kept at all. Numbers of ``SensorFault``.
     """
     last = x.imu[(x.end - 1) % IMU_CAPACITY]
     if not time <= now + TIME_TOLERANCE:
         return _FUTURE
     if x.end > 0 and time <= last[TIME]:
         return _REPEATED
-    fault = _fault(x, law, f, w)
-    kept = fault in (_NONE, _STUCK)
-    if x.end == 0 and not kept:
+    of_force = _fault(x, 0, f, law.accel_range, law.accel_jump)
+    of_rate = _fault(x, 1, w, law.gyro_range, law.gyro_jump)
+    keep_force, keep_rate = of_force in (_NONE, _STUCK), of_rate in (_NONE, _STUCK)
+    fault = of_force if of_force != _NONE else of_rate
+    if x.end == 0 and not (keep_force and keep_rate):
         return fault
     row = x.imu[x.end % IMU_CAPACITY]
-    row[TIME], row[LOST] = time, 0.0 if fault == _NONE else 1.0
+    lost = (0 if of_force == _NONE else NO_FORCE) | (0 if of_rate == _NONE else NO_RATE)
+    row[TIME], row[LOST] = time, float(lost)
     for i in range(3):
-        row[FORCE + i] = f[i] if kept else last[FORCE + i]
-        row[RATE + i] = w[i] if kept else last[RATE + i]
+        row[FORCE + i] = f[i] if keep_force else last[FORCE + i]
+        row[RATE + i] = w[i] if keep_rate else last[RATE + i]
     if x.end == 0:
         for i in range(COLUMNS):  # what goes before the first reading
             last[i] = row[i]
@@ -54,25 +75,44 @@ def add_imu(x: Any, law: Any, now: float, time: float, f: Vec3, w: Vec3) -> int:
 
 
 @compilable
-def _fault(x: Any, law: Any, f: Vec3, w: Vec3) -> int:
-    """What is wrong with the numbers of a reading; counts what comes in a row."""
-    if not math.isfinite(f[0] + f[1] + f[2] + w[0] + w[1] + w[2]):
+def _fault(x: Any, half: int, reading: Vec3, most: float, jump: float) -> int:
+    """What is wrong with one half of a reading; counts what comes in a row."""
+    last, at = x.imu[(x.end - 1) % IMU_CAPACITY], 3 * half
+    if not math.isfinite(reading[0] + reading[1] + reading[2]):
+        x.steady[half] = 0
         return _NOT_FINITE
-    force = max(abs(f[0]), abs(f[1]), abs(f[2]))
-    rate = max(abs(w[0]), abs(w[1]), abs(w[2]))
-    if force > law.accel_range or rate > law.gyro_range:
+    size, change, stray = 0.0, 0.0, 0.0
+    for i in range(3):
+        size = max(size, abs(reading[i]))
+        change = max(change, abs(reading[i] - x.newest[at + i]))
+        stray = max(stray, abs(reading[i] - last[FORCE + at + i]))
+        x.newest[at + i] = reading[i]
+    if size > most:
+        x.steady[half] = 0
         return _IMPLAUSIBLE
     if x.end == 0:
         return _NONE
-    last = x.imu[(x.end - 1) % IMU_CAPACITY]
-    force, rate = 0.0, 0.0
-    for i in range(3):
-        force = max(force, abs(f[i] - last[FORCE + i]))
-        rate = max(rate, abs(w[i] - last[RATE + i]))
-    x.same = x.same + 1 if force == 0.0 and rate == 0.0 else 0
-    # One that stays where it jumped to is the truth, or all there is.
-    far = force > law.accel_jump or rate > law.gyro_jump
-    x.unlike = x.unlike + 1 if far else 0
-    if far and x.unlike <= _UNLIKE_READINGS:
+    x.same[half] = x.same[half] + 1 if change == 0.0 else 0
+    x.steady[half] = x.steady[half] + 1 if change <= jump else 0
+    x.doubted[half], x.calm[half] = doubt(
+        x.doubted[half], x.steady[half], x.calm[half], stray > jump
+    )
+    if x.doubted[half] > 0:
         return _JUMP
-    return _STUCK if x.same >= STUCK_READINGS else _NONE
+    return _STUCK if x.same[half] >= STUCK_READINGS else _NONE
+
+
+@compilable
+def doubt(doubted: int, steady: int, calm: int, far: bool) -> tuple[int, int]:
+    """How many ``steady`` readings in a row it takes to be believed (0: it is), and new ``calm``.
+
+    ``doubted`` is that of the last reading, ``calm`` how many were believed since one was not, and
+    ``far`` whether this one is too far from what is believed.
+    """
+    if doubted > 0:
+        if steady >= doubted or (doubted == STAYS and not far):
+            return 0, 0
+        return doubted, calm
+    if far:
+        return (STAYS if calm >= CALM else STAYS_LONG), 0
+    return 0, min(calm + 1, CALM)

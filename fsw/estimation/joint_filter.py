@@ -5,22 +5,37 @@ by 0.7 rad/s. For each joint a Kalman filter of angle, rate and a disturbing acc
 
 .. math:: \ddot\theta = u + d, \quad \dot d = w,
 
-whose input u is the acceleration that the model of the arm gives for the torques. Readings come at
-every tick, so that the gain is the stationary one, found before flight. One reading more or less
-makes no difference to it.
+whose input u is the acceleration that the model of the arm gives for the torques. Both joints have
+the same covariance, because they are read together.
+
+A reading tells of the past. The state stays at the time of the newest one, and a ring keeps what
+torques have made of the joints since; the present follows from both. So readings may be late, or
+few. One that is far from what is expected is not believed (``imu.doubt``).
 """
 
 from __future__ import annotations
 
-from functools import lru_cache
-from typing import NamedTuple
-
-import numpy as np
-from scipy.linalg import solve_discrete_are
+import math
+from typing import Any, Final, NamedTuple
 
 from fsw.compiled import compilable
-from fsw.estimation.tuning import EstimatorTuning
-from fsw.signals import Vec3
+from fsw.estimation.error_state import PUSHES
+from fsw.estimation.imu import doubt
+from fsw.estimation.sensor_fault import SensorFault
+from fsw.signals import Vec2
+
+_RATE_AT_START: Final = 1.0  # rad/s, standard deviation
+_DISTURBANCE_AT_START: Final = 30.0  # rad/s^2
+# How far a reading may be from what is expected, besides this many standard deviations; friction
+# has held a joint for 0.05 rad.
+_FAR: Final = 0.1  # rad
+_SIGMAS: Final = 6.0
+_MOST_SIGMA: Final = 0.03  # rad; of a wider one garbage would pass
+_FASTEST: Final = 10.0  # rad/s, from one reading to the next
+_NONE: Final = SensorFault.NONE.value
+_REPEATED: Final = SensorFault.REPEATED.value
+_TOO_OLD: Final = SensorFault.TOO_OLD.value
+_JUMP: Final = SensorFault.JUMP.value
 
 
 class JointState(NamedTuple):
@@ -29,28 +44,6 @@ class JointState(NamedTuple):
     angle: float  # rad
     rate: float = 0.0  # rad/s
     disturbance: float = 0.0  # rad/s^2
-
-
-@lru_cache(maxsize=8)
-def joint_gain(tuning: EstimatorTuning, dt: float) -> Vec3:
-    """Share of a reading's surprise in angle [1], rate [1/s] and disturbance [1/s^2], per reading.
-
-    Readings come every ``dt`` [s].
-    """
-    move = np.array([[1.0, dt, 0.5 * dt * dt], [0.0, 1.0, dt], [0.0, 0.0, 1.0]])
-    walk = tuning.joint_disturbance_walk**2
-    noise = walk * np.array(
-        [
-            [dt**5 / 20.0, dt**4 / 8.0, dt**3 / 6.0],
-            [dt**4 / 8.0, dt**3 / 3.0, dt**2 / 2.0],
-            [dt**3 / 6.0, dt**2 / 2.0, dt],
-        ]
-    )
-    seen = np.array([[1.0, 0.0, 0.0]])
-    variance = tuning.encoder_noise**2
-    P = solve_discrete_are(move.T, seen.T, noise, np.array([[variance]]))
-    angle, rate, disturbance = (P @ seen.T / (seen @ P @ seen.T + variance)).ravel().tolist()
-    return angle, rate, disturbance
 
 
 @compilable
@@ -63,11 +56,135 @@ def predicted(joint: JointState, u: float, dt: float) -> JointState:
 
 
 @compilable
-def corrected(joint: JointState, reading: float, age: float, gain: Vec3) -> JointState:
-    """A joint after a ``reading`` [rad] that is ``age`` [s] old; ``gain`` [SI, joint]."""
-    surprise = reading - (joint.angle - age * joint.rate)
-    return JointState(
-        joint.angle + gain[0] * surprise,
-        joint.rate + gain[1] * surprise,
-        joint.disturbance + gain[2] * surprise,
+def push(x: Any, law: Any, now: float, dt: float, u: Vec2) -> None:
+    """Note that joints of ``x`` were accelerated by ``u`` [rad/s^2] for ``dt`` [s], up to now."""
+    last = x.pushes[(x.pushes_end - 1) % PUSHES, 0] if x.pushes_end > 0 else x.joint_time
+    # What was missed is as if it had not been.
+    x.joint_time += max(now - last - dt, 0.0)
+    if x.pushes_end - x.pushed >= PUSHES - 1:
+        _advance(x, law, x.pushes[x.pushed % PUSHES, 0])
+    row = x.pushes[x.pushes_end % PUSHES]
+    row[0], row[1], row[2] = now, u[0], u[1]
+    x.pushes_end += 1
+
+
+@compilable
+def read(x: Any, law: Any, now: float, angles: Vec2, age: float) -> int:
+    """Take in ``angles`` [rad] that are ``age`` [s] old ``now`` [s]; returns what is wrong."""
+    time, before = now - age, x.encoders[2]
+    if not time > before:
+        return _REPEATED
+    apart = min(time - before, 1.0)
+    first, second = angles
+    change = max(abs(first - x.encoders[0]), abs(second - x.encoders[1]))
+    x.encoders[0], x.encoders[1], x.encoders[2] = first, second, time
+    steady = change <= _FAR + _FASTEST * apart
+    x.encoder_steady = x.encoder_steady + 1 if steady else 0
+    if time < x.joint_time:  # older than what the ring reaches back to
+        return _TOO_OLD
+    _advance(x, law, time)
+    stray = max(abs(first - x.joints[0, 0]), abs(second - x.joints[1, 0]))
+    sigma = min(math.sqrt(x.joint_variance[0, 0]), _MOST_SIGMA)
+    far, before_it = stray > _FAR + _SIGMAS * sigma, x.encoder_doubted
+    x.encoder_doubted, x.encoder_calm = doubt(
+        x.encoder_doubted, x.encoder_steady, x.encoder_calm, far
     )
+    if x.encoder_doubted > 0:
+        return _JUMP
+    if before_it > 0 and far:
+        begin(x, law, time, angles)
+        return _NONE
+    _correct(x, law, angles)
+    return _NONE
+
+
+@compilable
+def begin(x: Any, law: Any, time: float, angles: Vec2) -> None:
+    """Start at ``time`` [s] from an arm at ``angles`` [rad] that hardly moves."""
+    x.joint_time = time
+    while x.pushed < x.pushes_end and x.pushes[x.pushed % PUSHES, 0] <= time:
+        x.pushed += 1
+    C = x.joint_variance
+    for i in range(3):
+        for j in range(3):
+            C[i, j] = 0.0
+    C[0, 0] = law.encoder_noise * law.encoder_noise
+    C[1, 1] = _RATE_AT_START * _RATE_AT_START
+    C[2, 2] = _DISTURBANCE_AT_START * _DISTURBANCE_AT_START
+    for i in range(2):
+        x.joints[i, 0], x.joints[i, 1], x.joints[i, 2] = angles[i], 0.0, 0.0
+
+
+@compilable
+def present_joints(x: Any, now: float) -> tuple[Vec2, Vec2]:
+    """Angles [rad] and rates [rad/s] of the joints at ``now`` [s]."""
+    a = JointState(x.joints[0, 0], x.joints[0, 1], x.joints[0, 2])
+    b = JointState(x.joints[1, 0], x.joints[1, 1], x.joints[1, 2])
+    t = x.joint_time
+    for k in range(x.pushed, x.pushes_end):
+        row = x.pushes[k % PUSHES]
+        dt = row[0] - t
+        if dt > 0.0:
+            a, b, t = predicted(a, row[1], dt), predicted(b, row[2], dt), row[0]
+    return (a.angle, b.angle), (a.rate, b.rate)
+
+
+@compilable
+def _advance(x: Any, law: Any, until: float) -> None:
+    """Move the joints' state on, not beyond the last push."""
+    while x.pushed < x.pushes_end:
+        row = x.pushes[x.pushed % PUSHES]
+        _move(x, law, row[1], row[2], min(row[0], until) - x.joint_time)
+        if row[0] > until:
+            return
+        x.pushed += 1
+
+
+@compilable
+def _move(x: Any, law: Any, u1: float, u2: float, dt: float) -> None:
+    if not dt > 0.0:
+        return
+    for i in range(2):
+        u = u1 if i == 0 else u2
+        joint = JointState(x.joints[i, 0], x.joints[i, 1], x.joints[i, 2])
+        after = predicted(joint, u, dt)
+        x.joints[i, 0], x.joints[i, 1] = after.angle, after.rate
+    x.joint_time += dt
+    C, h, q = x.joint_variance, 0.5 * dt * dt, law.joint_disturbance_walk
+    # F C F^T + Q, with C symmetrical.
+    for i in range(3):
+        C[0, i] += dt * C[1, i] + h * C[2, i]
+        C[1, i] += dt * C[2, i]
+    for i in range(3):
+        C[i, 0] += dt * C[i, 1] + h * C[i, 2]
+        C[i, 1] += dt * C[i, 2]
+    q *= q * dt
+    C[0, 0] += q * h * h / 5.0
+    C[0, 1] += q * h * dt / 4.0
+    C[1, 0] = C[0, 1]
+    C[0, 2] += q * h / 3.0
+    C[2, 0] = C[0, 2]
+    C[1, 1] += q * dt * dt / 3.0
+    C[1, 2] += q * dt / 2.0
+    C[2, 1] = C[1, 2]
+    C[2, 2] += q
+
+
+@compilable
+def _correct(x: Any, law: Any, angles: Vec2) -> None:
+    C = x.joint_variance
+    total = C[0, 0] + law.encoder_noise * law.encoder_noise
+    g0, g1, g2 = C[0, 0] / total, C[1, 0] / total, C[2, 0] / total
+    for i in range(2):
+        surprise = angles[i] - x.joints[i, 0]
+        x.joints[i, 0] += g0 * surprise
+        x.joints[i, 1] += g1 * surprise
+        x.joints[i, 2] += g2 * surprise
+    c0, c1, c2 = C[0, 0], C[0, 1], C[0, 2]
+    C[0, 0] -= g0 * c0
+    C[0, 1] -= g0 * c1
+    C[0, 2] -= g0 * c2
+    C[1, 1] -= g1 * c1
+    C[1, 2] -= g1 * c2
+    C[2, 2] -= g2 * c2
+    C[1, 0], C[2, 0], C[2, 1] = C[0, 1], C[0, 2], C[1, 2]

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from numpy.typing import NDArray
 
 from fsw.compiled import compilable, kernel, of_fixed_types
-from fsw.estimation import fusion, imu
+from fsw.estimation import fusion, imu, joint_filter
 from fsw.estimation.error_state import (
     BA,
     BARO,
@@ -18,6 +19,7 @@ from fsw.estimation.error_state import (
     FRAME,
     IMU_CAPACITY,
     LOST,
+    PUSHES,
     TH,
     TIME,
     Array,
@@ -34,7 +36,6 @@ from fsw.estimation.error_state import (
     vec3,
     vec4,
 )
-from fsw.estimation.joint_filter import JointState, corrected, predicted
 from fsw.geometry.rotation import matrix_from_quaternion, yaw_of
 from fsw.model.airframe import GRAVITY
 from fsw.signals import Mat3, Vec2, Vec3, Vec4
@@ -60,45 +61,42 @@ def _tick(
     time: float,
     f: Vec3,
     w: Vec3,
-) -> tuple[int, Present]:
-    """Those ``parts`` of a tick that are due; what is wrong with the reading, and the present.
+) -> tuple[int, int, bool, Present]:
+    """Those ``parts`` of a tick that are due; what is wrong with IMU and encoders, and the present.
 
-    ``COPY`` the filter, so that a tick leaves its inputs as they were, and move its joints on;
-    take in ``encoders``, two angles and their age; take in a reading of the IMU, of its ``time``;
-    predict up to the horizon and from there the present. ``times``: now, the tick's length, and the
-    horizon.
+    ``COPY`` the filter, so that a tick leaves its inputs as they were, and note what torques made
+    of the joints; take in ``encoders``, two angles and their age; take in a reading of the IMU, of
+    its ``time``; predict up to the horizon and from there the present, which may be no number.
+    ``times``: now, the tick's length, and the horizon.
     """
     now, dt, until = times
     if parts & COPY:
         _copy(old[0], new[0])
-        for i in range(2):
-            row = new[0].joints[i]
-            _keep_joint(row, predicted(JointState(row[0], row[1], row[2]), u[i], dt))
+        joint_filter.push(new[0], law[0].tuning, now, dt, u)
+    of_encoders, fault = 0, 0
     if parts & JOINTS:
-        g = law[0].joint_gain
-        for i in range(2):
-            row = new[0].joints[i]
-            joint = JointState(row[0], row[1], row[2])
-            _keep_joint(row, corrected(joint, encoders[i], encoders[2], (g[0], g[1], g[2])))
-    fault = 0
+        angles = (encoders[0], encoders[1])
+        of_encoders = joint_filter.read(new[0], law[0].tuning, now, angles, encoders[2])
     if parts & READING:
         fault = imu.add_imu(new[0], law[0].tuning, now, time, f, w)
-    arm = new[0].joints
     if parts & END:
         advance(new[0], law[0].tuning, until)
         p, v, q, rate, force = present(new[0], now)
+        angles, rates = joint_filter.present_joints(new[0], now)
     else:
-        none = (0.0, 0.0, 0.0)
+        none, still = (0.0, 0.0, 0.0), (0.0, 0.0)
         p, v, q, rate, force = none, none, (1.0, 0.0, 0.0, 0.0), none, none
+        angles, rates = still, still
     R = matrix_from_quaternion(q)
-    angles, rates = (arm[0, 0], arm[1, 0]), (arm[0, 1], arm[1, 1])
-    return fault, (p, v, R, rate, yaw_of(R), angles, rates, -force[2])
+    total = p[0] + p[1] + p[2] + v[0] + v[1] + v[2] + R[0] + rate[0] + rate[1] + rate[2] + force[2]
+    finite = math.isfinite(total + angles[0] + angles[1] + rates[0] + rates[1])
+    return fault, of_encoders, finite, (p, v, R, rate, yaw_of(R), angles, rates, -force[2])
 
 
 @compilable
 def _copy(a: Any, b: Any) -> None:
     b.time, b.baro_bias, b.pose_delay = a.time, a.baro_bias, a.pose_delay
-    b.first, b.end, b.same, b.unlike, b.lost = a.first, a.end, a.same, a.unlike, a.lost
+    b.first, b.end, b.lost = a.first, a.end, a.lost
     for i in range(3):
         b.p[i], b.v[i] = a.p[i], a.v[i]
         b.accel_bias[i], b.gyro_bias[i] = a.accel_bias[i], a.gyro_bias[i]
@@ -114,9 +112,29 @@ def _copy(a: Any, b: Any) -> None:
     for k in range(a.first - 1, a.end):
         for i in range(COLUMNS):
             b.imu[k % IMU_CAPACITY, i] = a.imu[k % IMU_CAPACITY, i]
+    for i in range(6):
+        b.newest[i] = a.newest[i]
+    for i in range(2):
+        b.same[i], b.steady[i] = a.same[i], a.steady[i]
+        b.calm[i], b.doubted[i] = a.calm[i], a.doubted[i]
+    _copy_joints(a, b)
+
+
+@compilable
+def _copy_joints(a: Any, b: Any) -> None:
+    b.joint_time, b.pushed, b.pushes_end = a.joint_time, a.pushed, a.pushes_end
+    b.encoder_steady, b.encoder_calm = a.encoder_steady, a.encoder_calm
+    b.encoder_doubted = a.encoder_doubted
+    for i in range(3):
+        b.encoders[i] = a.encoders[i]
+        for j in range(3):
+            b.joint_variance[i, j] = a.joint_variance[i, j]
     for i in range(2):
         for j in range(3):
             b.joints[i, j] = a.joints[i, j]
+    for k in range(max(a.pushed - 1, 0), a.pushes_end):
+        for i in range(3):
+            b.pushes[k % PUSHES, i] = a.pushes[k % PUSHES, i]
 
 
 @compilable
@@ -127,16 +145,10 @@ def _copy_frame(a: Any, b: Any) -> None:
             b.shared[i, j] = a.shared[i, j]
 
 
-@compilable
-def _keep_joint(row: Array, joint: JointState) -> None:
-    row[0], row[1], row[2] = joint.angle, joint.rate, joint.disturbance
-
-
 @kernel
-def _set_joints(x: Filter, angles: Vec2) -> None:
+def _set_joints(x: Filter, law: Law, time: float, angles: Vec2) -> None:
     """Start from an arm that stands still."""
-    for i in range(2):
-        _keep_joint(x[0].joints[i], JointState(angles[i], 0.0, 0.0))
+    joint_filter.begin(x[0], law[0].tuning, time, angles)
 
 
 @kernel
@@ -245,6 +257,25 @@ def _set_attitude(x: Filter, law: Law, q: Vec4, variance: Vec3) -> None:
 
 
 @kernel
+def _set_pressure(x: Filter, law: Law, time: float, altitude: float, variance: float) -> None:
+    """Take the barometer's bias from an altitude as it is."""
+    s = x[0]
+    s.baro_bias = altitude + s.p[2] + (time - s.time) * s.v[2]
+    for j in range(FRAME):
+        s.shared[BARO, j] = 0.0
+    for j in range(ERRORS):  # what is wrong with the height is in it
+        s.covariance[BARO, j] = s.covariance[P + 2, j]
+        s.covariance[j, BARO] = s.covariance[j, P + 2]
+    s.covariance[BARO, BARO] = s.covariance[P + 2, P + 2] + variance
+
+
+@kernel
+def _doubt(x: Filter, law: Law, place: float, turn: float) -> None:
+    """Of a state that poses contradict by a ``place`` [m] and a ``turn`` [rad] know little more."""
+    fusion.doubt(x[0], law[0].tuning, place, turn)
+
+
+@kernel
 def _fuse_pose(
     x: Filter,
     law: Law,
@@ -323,6 +354,8 @@ couple_level = of_fixed_types(_couple_level)
 set_place = of_fixed_types(_set_place)
 set_velocity = of_fixed_types(_set_velocity)
 set_attitude = of_fixed_types(_set_attitude)
+set_pressure = of_fixed_types(_set_pressure)
+doubt = of_fixed_types(_doubt)
 fuse_pose = of_fixed_types(_fuse_pose)
 fuse_gnss = of_fixed_types(_fuse_gnss)
 fuse_pressure = of_fixed_types(_fuse_pressure)

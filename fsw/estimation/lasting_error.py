@@ -10,7 +10,10 @@ Source: docs/equations.md T7.
 
 from __future__ import annotations
 
+import math
+
 from fsw.estimation.sensor_checks import believable
+from fsw.estimation.sensor_fault import Sensor
 from fsw.estimation.sensor_fusion import FusionMemory
 from fsw.estimation.tuning import EstimatorTuning
 from fsw.estimation.turned_covariance import Vec6
@@ -24,6 +27,10 @@ def lasting_error(memory: FusionMemory, tuning: EstimatorTuning) -> Vec6:
     Those of a whole reading of the position's source.
     """
     pose, fix = memory.pose, memory.gnss
+    if fix is not None and (
+        pose is None or _used(memory, Sensor.GNSS) > _used(memory, Sensor.POSE)
+    ):
+        return *believable(fix.position_variance, tuning.gnss_position_floor**2), 0.0, 0.0, 0.0
     if pose is not None:
         place, attitude = pose.position_variance, pose.attitude_variance
         if pose.drifts:
@@ -32,6 +39,10 @@ def lasting_error(memory: FusionMemory, tuning: EstimatorTuning) -> Vec6:
             *believable(place, tuning.position_floor**2),
             *believable(attitude, tuning.attitude_floor**2),
         )
-    if fix is not None:
-        return *believable(fix.position_variance, tuning.gnss_position_floor**2), 0.0, 0.0, 0.0
     return _NONE
+
+
+def _used(memory: FusionMemory, sensor: Sensor) -> float:
+    """When a position of a sensor was used last [s]."""
+    fused = memory.of(sensor).fused
+    return fused[0] if fused else -math.inf

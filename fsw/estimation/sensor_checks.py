@@ -26,9 +26,15 @@ SENSOR_OF: Final[dict[type, Sensor]] = {
     MagneticSample: Sensor.MAGNETOMETER,
     RangeSample: Sensor.RANGEFINDER,
 }
-# Of these, a reading equal to the last one to the last bit is none: their noise is far above their
-# resolution. Barometers and rangefinders do repeat themselves.
-_NEVER_REPEAT: Final = (PoseSample, GnssSample)
+# How many readings in a row may be equal to the last bit. Of poses and satellites none: their noise
+# is far above their resolution. Barometers and rangefinders do repeat themselves.
+_REPEATS: Final[dict[type, int]] = {
+    PoseSample: 0,
+    GnssSample: 0,
+    MagneticSample: 10,
+    PressureSample: 40,
+    RangeSample: 40,
+}
 _SHOWN: Final = 1.0  # s, for which a fault counts after it was seen
 _LONGEST_APART: Final = 0.25  # s; farther apart, readings were lost
 _FARTHEST_RANGE: Final = 200.0  # m
@@ -42,12 +48,16 @@ class Health(NamedTuple):
     time: float = -math.inf  # s, newest time stamp of a sample
     came: float = -1.0  # s, when that came; negative: never
     apart: float = 0.0  # s, of its time stamp from the one before
+    seen: int = 0  # samples so far
     numbers: tuple[float, ...] = ()  # of that sample
+    repeats: int = 0  # how often in a row they were the same
     fused: tuple[float, ...] = ()  # s, when each part of it was fused last
     ratio: tuple[float, ...] = ()  # chi-square over gate, of each part
     innovation: tuple[float, ...] = ()  # of each part: m, m/s, rad
     fault: SensorFault = SensorFault.NONE  # the last one
     fault_at: float = -math.inf  # s
+    # Every kind of fault so far, with the time before the last one of its kind [s].
+    known: tuple[tuple[SensorFault, float, float], ...] = ()
 
     def fault_now(self, now: float, stale: float) -> SensorFault:
         """What is wrong at ``now`` [s]; silence counts after ``stale`` [s]."""
@@ -55,9 +65,22 @@ class Health(NamedTuple):
             return SensorFault.STALE
         return self.fault if now - self.fault_at <= _SHOWN else SensorFault.NONE
 
+    def quiet(self) -> float:
+        """For how long the last fault had not been seen before [s]."""
+        for fault, at, before in self.known:
+            if fault is self.fault:
+                return at - before
+        return math.inf
+
     def with_fault(self, fault: SensorFault, now: float) -> Health:
         """The same sensor, with a ``fault`` that was seen at ``now`` [s]."""
-        return self._replace(fault=fault, fault_at=now)
+        others, last = [], -math.inf
+        for one in self.known:
+            if one[0] is fault:
+                last = one[1]
+            else:
+                others.append(one)
+        return self._replace(fault=fault, fault_at=now, known=(*others, (fault, now, last)))
 
 
 def arrived(
@@ -78,16 +101,24 @@ def arrived(
     if sample.time <= health.time:
         return health.with_fault(SensorFault.REPEATED, now), SensorFault.REPEATED
     numbers = _numbers(sample)
+    repeats = health.repeats + 1 if numbers == health.numbers and not still else 0
     if not math.isfinite(sum(numbers)):
         fault = SensorFault.NOT_FINITE
     elif not _plausible(sample, tuning):
         fault = SensorFault.IMPLAUSIBLE
-    elif numbers == health.numbers and not still and isinstance(sample, _NEVER_REPEAT):
+    elif repeats > _REPEATS[type(sample)]:
         fault = SensorFault.STUCK
     else:
         fault = SensorFault.NONE
     apart = min(sample.time - health.time, _LONGEST_APART)
-    health = health._replace(time=sample.time, came=now, apart=apart, numbers=numbers)
+    health = health._replace(
+        time=sample.time,
+        came=now,
+        apart=apart,
+        seen=health.seen + 1,
+        numbers=numbers,
+        repeats=repeats,
+    )
     return (health.with_fault(fault, now) if fault else health), fault
 
 

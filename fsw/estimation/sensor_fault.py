@@ -29,6 +29,8 @@ class SensorFault(IntEnum):
     STUCK = 6
     JUMP = 7
     STALE = 8
+    SELDOM = 9
+    DISAGREES = 10
 
 
 _SENTENCES = {
@@ -41,6 +43,8 @@ _SENTENCES = {
     SensorFault.STUCK: "is stuck at one reading",
     SensorFault.JUMP: "jumps, and is not believed",
     SensorFault.STALE: "is silent",
+    SensorFault.SELDOM: "comes less often than it did",
+    SensorFault.DISAGREES: "does not agree with the other sensors",
 }
 
 
@@ -49,4 +53,5 @@ def sentence(sensor: Sensor, fault: SensorFault) -> str:
     told = _SENTENCES[fault]
     if sensor is Sensor.ENCODERS:  # there are several
         told = told.replace("is ", "are ", 1).replace("says ", "say ", 1).replace("jumps", "jump")
+        told = told.replace("comes ", "come ", 1).replace("does ", "do ", 1)
     return f"{sensor.value} {told}"

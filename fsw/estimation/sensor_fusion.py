@@ -20,13 +20,14 @@ from fsw.compiled import packed
 from fsw.estimation import kernels
 from fsw.estimation.drift import FrameDrift
 from fsw.estimation.error_state import DELAY, ERRORS, FILTER, FRAME, IMU_CAPACITY, Array, Filter
-from fsw.estimation.imu import STUCK_READINGS, TIME_TOLERANCE
-from fsw.estimation.joint_filter import joint_gain
+from fsw.estimation.imu import IMU_TOO_OLD, STUCK_READINGS, TIME_TOLERANCE
+from fsw.estimation.pace import Pace
 from fsw.estimation.sensor_checks import SENSOR_OF, Aiding, Health, arrived, believable
 from fsw.estimation.sensor_fault import Sensor, SensorFault
 from fsw.estimation.tuning import EstimatorLaw, EstimatorTuning
 from fsw.geometry.quaternion import conjugate, multiply, normalised, rotation_vector
 from fsw.geometry.rotation import quaternion_from_matrix
+from fsw.geometry.vectors import norm
 from fsw.measurements import (
     GnssSample,
     ImuSample,
@@ -41,10 +42,16 @@ from fsw.signals import StateEstimate, Vec2, Vec3, Vec4
 
 LATE: Final = 0.01  # s behind the filter, where a measurement is still fused as it stands
 _MARGIN: Final = 0.003  # s, by which a measurement may take longer than lately
+ENCODERS_TOO_OLD: Final = 0.05  # s; what torques made of the joints since is too uncertain
 _LONGEST_STEP: Final = 0.05  # s, by which joints are predicted at once
 _WAITING_AT_START: Final = 16  # samples that are looked at
 _SPEED_AT_START: Final = 2.0  # m/s and rad/s, with which a vehicle moves between two poses
 _RATE_AT_START: Final = 2.0
+_STRONGEST: Final = 20.0  # m/s^2, with which it does so between two velocities
+_APART: Final = 0.25  # s; readings farther apart do not confirm each other
+# What poses contradict by no more, an inertial unit may have made; a frame that moves, moves more.
+_SMALL_STEP: Final = 0.05  # m
+_SMALL_TURN: Final = 0.1  # rad
 _FLOATS: Final = FILTER.itemsize // 8  # that a filter has room for
 _REST: Vec3 = (0.0, 0.0, 0.0)
 _NO_TURN: Vec4 = (1.0, 0.0, 0.0, 0.0)
@@ -95,8 +102,11 @@ class FusionMemory(NamedTuple):
     reset: Reset = Reset()
     gnss: GnssSample | None = None  # the newest one
     pose: PoseSample | None = None  # the last one that the filter has reached
+    refused: tuple[Aiding, ...] = ()  # of each kind the last one that was
     delay: float = 0.0  # s, that measurements have lately taken
     delay_sigma: float = 0.0  # s, with which the estimate of the pose's own delay began
+    paces: tuple[Pace, ...] = ()  # how often sensors are heard
+    restarts: int = 0  # how often the filter had to start anew, because it had no numbers any more
 
     def of(self, sensor: Sensor) -> Health:
         """What is known of a sensor."""
@@ -166,6 +176,9 @@ class _Tick:
 
     def take_imu(self, sample: ImuSample) -> None:
         """Take in a reading of the IMU."""
+        if sample.time < self._now - IMU_TOO_OLD and self.memory.started:
+            self._note(Sensor.IMU, SensorFault.TOO_OLD)
+            return
         if self._parts & kernels.READING:
             self.run()
         self._parts |= kernels.READING
@@ -175,13 +188,19 @@ class _Tick:
     def take_joints(self, sample: JointSample) -> None:
         """Take in a reading of the encoders."""
         (first, second), now = sample.angles, self._now
-        if not (max(abs(first), abs(second)) < math.pi and sample.time <= now + TIME_TOLERANCE):
-            health = self.memory.of(Sensor.ENCODERS).with_fault(SensorFault.IMPLAUSIBLE, now)
-            self.memory = self.memory.noting(health)
+        if not sample.time <= now + TIME_TOLERANCE:
+            self._note(Sensor.ENCODERS, SensorFault.FUTURE)
+        elif not max(abs(first), abs(second)) < math.pi:
+            self._note(Sensor.ENCODERS, SensorFault.IMPLAUSIBLE)
         elif self.joints_came < 0.0:
-            kernels.set_joints(self.run().numbers, sample.angles)
+            law = self._fusion.law
+            kernels.set_joints(self.run().numbers, law, sample.time, sample.angles)
             self.joints_came = now
+        elif sample.time < now - ENCODERS_TOO_OLD:
+            self._note(Sensor.ENCODERS, SensorFault.TOO_OLD)
         else:
+            if now - self.joints_came > ENCODERS_TOO_OLD:
+                self._note(Sensor.ENCODERS, SensorFault.SELDOM)
             if self._parts & kernels.JOINTS:
                 self.run()
             self._parts |= kernels.JOINTS
@@ -201,8 +220,8 @@ class _Tick:
             self.memory = FusionMemory(self._x, *self.memory[1:])
         return self.memory
 
-    def end(self, until: float) -> kernels.Present:
-        """Predict the filter up to ``until`` [s] and from there the present."""
+    def end(self, until: float) -> kernels.Present | None:
+        """Predict the filter up to ``until`` [s] and from there the present; None: no numbers."""
         return self._call(kernels.END, until)
 
     def memory_after(self, watch: EncoderWatch | None) -> FusionMemory:
@@ -211,13 +230,13 @@ class _Tick:
             self.run()
         before = self.memory
         encoders = before.encoders if watch is None else watch
-        rest = before[5:]
+        rest = before[5:]  # by position, because it is done in every tick: all fields after those
         return FusionMemory(self._x, self._now, self.imu_came, self.joints_came, encoders, *rest)
 
-    def _call(self, more: int, until: float) -> kernels.Present:
+    def _call(self, more: int, until: float) -> kernels.Present | None:
         parts, self._parts = self._parts | more, 0
         x = self._x
-        fault, known = kernels.tick(
+        of_imu, of_encoders, finite, known = kernels.tick(
             self.memory.numbers if parts & kernels.COPY else x,
             x,
             self._fusion.law,
@@ -229,19 +248,22 @@ class _Tick:
             self._force,
             self._rate,
         )
-        if fault:
-            health = self.memory.of(Sensor.IMU).with_fault(SensorFault(fault), self._now)
-            self.memory = self.memory.noting(health)
-        return known
+        if of_imu:
+            self._note(Sensor.IMU, SensorFault(of_imu))
+        if of_encoders:
+            self._note(Sensor.ENCODERS, SensorFault(of_encoders))
+        return known if finite else None
+
+    def _note(self, sensor: Sensor, fault: SensorFault) -> None:
+        self.memory = self.memory.noting(self.memory.of(sensor).with_fault(fault, self._now))
 
 
 class SensorFusion:
     """The estimator of one configuration; holds only what never changes in flight."""
 
-    def __init__(self, tuning: EstimatorTuning, tick: float) -> None:
-        """Design the joints' filter for a ``tick`` [s]."""
+    def __init__(self, tuning: EstimatorTuning) -> None:
         self.tuning = tuning
-        self.law = packed(EstimatorLaw(tuning, tuning.gates, joint_gain(tuning, tick)))
+        self.law = packed(EstimatorLaw(tuning, tuning.gates))
         self._least_p = tuning.position_floor**2
         self._least_q = tuning.attitude_floor**2
         self._least_gnss = tuning.gnss_position_floor**2, tuning.gnss_velocity_floor**2
@@ -261,8 +283,9 @@ class SensorFusion:
             memory, estimate = self.step(memory, _at_rest(t), t)
         assert estimate is not None
         for sample in _at_rest(t):
-            if isinstance(sample, PoseSample | GnssSample):
+            if isinstance(sample, PoseSample | GnssSample | PressureSample):
                 self._reset(memory, Waiting(t, 0, sample), (math.inf, math.inf))
+        kernels.doubt(memory.numbers, self.law, 0.0, 0.0)
         self.covariance(memory, t)
         return estimate
 
@@ -298,7 +321,10 @@ class SensorFusion:
         if memory.waiting and memory.waiting[0].time <= until:
             tick.memory = self._fuse_due(tick.run(), until, now)
         known = tick.end(until)
-        return tick.memory_after(watch), StateEstimate(round(1e6 * now), *known)
+        memory = tick.memory_after(watch)
+        if known is None:
+            return _anew(memory), None
+        return memory, StateEstimate(round(1e6 * now), *known)
 
     def covariance(self, memory: FusionMemory, now: float) -> Array:
         """Covariance (17, 17) [SI] of the error of the state at ``now`` [s]."""
@@ -311,7 +337,7 @@ class SensorFusion:
     def take(self, memory: FusionMemory, sample: Aiding, now: float) -> FusionMemory:
         """Check a ``sample`` that came at ``now`` [s] and let it wait for its time."""
         x = memory.numbers
-        still = bool(x["same"][0] >= STUCK_READINGS)
+        still = bool(x["same"][0].min() >= STUCK_READINGS)
         before = memory.of(SENSOR_OF[type(sample)])
         health, fault = arrived(before, sample, now, self.tuning, still=still)
         time = sample.time
@@ -375,10 +401,7 @@ class SensorFusion:
             if isinstance(sample, PoseSample):
                 if not self._is_agreed_with(sample, memory.waiting):
                     continue
-                stated = (
-                    believable(sample.position_variance, self._least_p),
-                    believable(sample.attitude_variance, self._least_q),
-                )
+                stated = self._stated(sample)
                 place = sample.position, _REST, normalised(sample.attitude)
                 self._begin(memory, sample.time, place, *stated)
                 memory = memory._replace(frame=FrameDrift(*stated))
@@ -401,23 +424,50 @@ class SensorFusion:
 
     def _is_agreed_with(self, pose: PoseSample, waiting: tuple[Waiting, ...]) -> bool:
         """Whether another pose says the same, but for noise and what a vehicle moves meanwhile."""
-        for one in waiting:
-            other = one.sample
-            if not isinstance(other, PoseSample) or other is pose:
+        others = [one.sample for one in waiting if isinstance(one.sample, PoseSample)]
+        return any(other is not pose and self._agree(other, pose) for other in others)
+
+    def _agree(self, one: PoseSample, other: PoseSample) -> bool:
+        place, about = self._stated(one)
+        apart = abs(one.time - other.time)
+        gate = self.tuning.pose_gate * math.sqrt(2.0)
+        turn = rotation_vector(
+            multiply(conjugate(normalised(one.attitude)), normalised(other.attitude))
+        )
+        step = gate * math.sqrt(sum(place)) + _SPEED_AT_START * apart
+        angle = gate * math.sqrt(sum(about)) + _RATE_AT_START * apart
+        return math.dist(one.position, other.position) <= step and norm(turn) <= angle
+
+    def _agreeing(self, one: GnssSample, other: GnssSample) -> bool:
+        place = believable(one.position_variance, self._least_gnss[0])
+        speed = believable(one.velocity_variance, self._least_gnss[1])
+        apart, gates = abs(one.time - other.time), self.tuning
+        step = gates.gnss_position_gate * math.sqrt(2.0 * sum(place)) + _SPEED_AT_START * apart
+        change = gates.gnss_velocity_gate * math.sqrt(2.0 * sum(speed)) + _STRONGEST * apart
+        near = math.dist(one.position, other.position) <= step
+        return near and math.dist(one.velocity, other.velocity) <= change
+
+    def _is_confirmed(self, memory: FusionMemory, sample: Aiding) -> bool:
+        """Whether the last one of its kind that was refused too says what a ``sample`` does."""
+        for one in memory.refused:
+            if sample.time - one.time > _APART:
                 continue
-            apart = abs(other.time - pose.time)
-            place = sum(believable(pose.position_variance, self._least_p))
-            about = sum(believable(pose.attitude_variance, self._least_q))
-            turn = rotation_vector(
-                multiply(conjugate(normalised(other.attitude)), normalised(pose.attitude))
-            )
-            gate = self.tuning.pose_gate * math.sqrt(2.0)
-            near = math.dist(other.position, pose.position) <= (
-                gate * math.sqrt(place) + _SPEED_AT_START * apart
-            )
-            if near and math.hypot(*turn) <= gate * math.sqrt(about) + _RATE_AT_START * apart:
-                return True
+            if isinstance(sample, PoseSample) and isinstance(one, PoseSample):
+                return self._agree(one, sample)
+            if isinstance(sample, GnssSample) and isinstance(one, GnssSample):
+                return self._agreeing(one, sample)
+            if isinstance(sample, PressureSample) and isinstance(one, PressureSample):
+                step = _SPEED_AT_START * (sample.time - one.time)
+                step += self.tuning.pressure_gate * math.sqrt(2.0 * self._pressure_variance(sample))
+                return abs(sample.altitude - one.altitude) <= step
         return False
+
+    def _set_pressure(self, memory: FusionMemory, time: float, sample: PressureSample) -> None:
+        variance = self._pressure_variance(sample)
+        kernels.set_pressure(memory.numbers, self.law, time, sample.altitude, variance)
+
+    def _pressure_variance(self, sample: PressureSample) -> float:
+        return max(sample.variance, self.tuning.pressure_floor**2)
 
     def _begin(
         self,
@@ -451,58 +501,73 @@ class SensorFusion:
             pose, counter, drifts = sample, sample.reset_counter, sample.drifts
             if drifts:
                 memory = self._with_frame(memory, sample, announced)
-        before = memory.numbers[0].copy() if announced and drifts else None
+        previous = memory.numbers[0].copy() if announced and drifts else None
         ratio = self._fuse[type(sample)](memory, sample)
-        fused = health.fused or (now,) * len(ratio)
-        fused = tuple([now if r <= 1.0 else before for r, before in zip(ratio, fused, strict=True)])
         innovation = memory.numbers["innovation"].ravel().tolist()
-        shown = tuple(innovation if len(ratio) > 1 else innovation[:1])
-        health = health._replace(ratio=ratio, fused=fused, innovation=shown)
-        refused = max(ratio) > 1.0
+        refused = 1.0 < max(ratio) < math.inf  # infinite: it says nothing here
+        if refused and isinstance(sample, PressureSample) and not health.fused:
+            # The weather is not known until the first reading.
+            refused, ratio = False, (1.0,)
+            self._set_pressure(memory, one.time, sample)
+        confirmed = refused and self._is_confirmed(memory, sample)
+        latest = memory.refused
         if refused:
             health = health.with_fault(SensorFault.JUMP, now)
+            latest = (*[one for one in latest if type(one) is not type(sample)], sample)
+            if confirmed and isinstance(sample, PoseSample) and _is_small(innovation):
+                kernels.doubt(memory.numbers, self.law, _SMALL_STEP, _SMALL_TURN)
+                ratio = self._fuse_pose(memory, sample)
+        fused = health.fused or (now,) * len(ratio)
+        fused = tuple([now if r <= 1.0 else before for r, before in zip(ratio, fused, strict=True)])
+        shown = tuple(innovation if len(ratio) > 1 else innovation[:1])
+        health = health._replace(ratio=ratio, fused=fused, innovation=shown)
         # All at once: each renewal of the memory takes a microsecond.
         memory = memory._replace(
             health=(*memory.without(health.sensor), health),
             waiting=memory.waiting[1:],
             pose=pose,
             reset_counter=counter,
+            refused=latest,
         )
-        long_refused = now - min(fused) > self.tuning.reset_time
-        if refused and (announced or long_refused):
+        long_refused = now - min(fused) > self.tuning.reset_time and confirmed
+        if max(ratio) > 1.0 and (announced or long_refused):
             memory = self._reset(memory, one, ratio)
+            if not announced and isinstance(sample, PoseSample):
+                # Either the frame has moved, or the inertial unit lies.
+                kernels.doubt(memory.numbers, self.law, 0.0, 0.0)
             memory = memory.noting(health._replace(fused=(now,) * len(ratio)))
-        elif before is not None:
-            memory = memory.jumped(*_jump(before, memory.numbers[0]))
+        elif previous is not None:
+            memory = memory.jumped(*_jump(previous, memory.numbers[0]))
         return memory
 
     def _with_frame(
         self, memory: FusionMemory, sample: PoseSample, announced: bool
     ) -> FusionMemory:
         """The memory after a frame that drifts has moved, to where a pose says it is."""
-        stated = (
+        moved = memory.frame.moved(memory.numbers[0], self._stated(sample), announced)
+        return memory._replace(frame=moved)
+
+    def _stated(self, sample: PoseSample) -> tuple[Vec3, Vec3]:
+        """Variances [m^2, NED] and [rad^2, FRD] that a pose states, as far as they are believed."""
+        return (
             believable(sample.position_variance, self._least_p),
             believable(sample.attitude_variance, self._least_q),
         )
-        return memory._replace(frame=memory.frame.moved(memory.numbers[0], stated, announced))
 
     def _noise(self, memory: FusionMemory, sample: PoseSample) -> tuple[Vec3, Vec3]:
         """Variances [m^2, NED] and [rad^2, FRD] of a pose in its own frame."""
         if sample.drifts:
             return memory.frame.place_noise, memory.frame.attitude_noise
-        return (
-            believable(sample.position_variance, self._least_p),
-            believable(sample.attitude_variance, self._least_q),
-        )
+        return self._stated(sample)
 
     def _reset(self, memory: FusionMemory, one: Waiting, ratio: tuple[float, ...]) -> FusionMemory:
         """Take what the gate refused for long as it is."""
         x, law, sample = memory.numbers, self.law, one.sample
         place, velocity, turn = _REST, _REST, _NO_TURN
         if isinstance(sample, PoseSample):
-            variance, about = self._noise(memory, sample)
+            stated, about = self._noise(memory, sample)
             if ratio[0] > 1.0:
-                place = kernels.set_place(x, law, one.time, sample.position, variance)
+                place = kernels.set_place(x, law, one.time, sample.position, stated)
             if ratio[1] > 1.0:
                 before = _attitude(x[0])
                 after = normalised(sample.attitude)
@@ -510,12 +575,14 @@ class SensorFusion:
                 turn = multiply(after, conjugate(before))
         elif isinstance(sample, GnssSample):
             if ratio[0] > 1.0:
-                variance = believable(sample.position_variance, self._least_gnss[0])
-                place = kernels.set_place(x, law, one.time, sample.position, variance)
+                about_place = believable(sample.position_variance, self._least_gnss[0])
+                place = kernels.set_place(x, law, one.time, sample.position, about_place)
             if ratio[1] > 1.0:
-                variance = believable(sample.velocity_variance, self._least_gnss[1])
-                velocity = kernels.set_velocity(x, law, sample.velocity, variance)
+                about_speed = believable(sample.velocity_variance, self._least_gnss[1])
+                velocity = kernels.set_velocity(x, law, sample.velocity, about_speed)
         else:
+            if isinstance(sample, PressureSample):  # its bias has moved, and not the vehicle
+                self._set_pressure(memory, one.time, sample)
             return memory
         return memory.jumped(place, velocity, turn)
 
@@ -541,10 +608,8 @@ class SensorFusion:
         )
 
     def _fuse_pressure(self, memory: FusionMemory, sample: PressureSample) -> tuple[float, ...]:
-        variance = max(sample.variance, self.tuning.pressure_floor**2)
-        return (
-            kernels.fuse_pressure(memory.numbers, self.law, sample.time, sample.altitude, variance),
-        )
+        x, variance = memory.numbers, self._pressure_variance(sample)
+        return (kernels.fuse_pressure(x, self.law, sample.time, sample.altitude, variance),)
 
     def _fuse_heading(self, memory: FusionMemory, sample: MagneticSample) -> tuple[float, ...]:
         return (kernels.fuse_heading(memory.numbers, self.law, sample.time, sample.field),)
@@ -554,6 +619,28 @@ class SensorFusion:
         return (
             kernels.fuse_range(memory.numbers, self.law, sample.time, sample.distance, variance),
         )
+
+
+def _anew(memory: FusionMemory) -> FusionMemory:
+    """The memory with a filter that starts from the next samples, because it is no number."""
+    return memory._replace(
+        numbers=at_start().numbers,
+        joints_came=-1.0,
+        imu_came=-1.0,
+        started=False,
+        waiting=(),
+        pose=None,
+        restarts=memory.restarts + 1,
+    )
+
+
+def _is_small(innovation: list[float]) -> bool:
+    return norm(_three(innovation[:3])) < _SMALL_STEP and norm(_three(innovation[3:])) < _SMALL_TURN
+
+
+def _three(numbers: list[float]) -> Vec3:
+    x, y, z = numbers
+    return x, y, z
 
 
 def _attitude(x: Any) -> Vec4:

@@ -7,8 +7,6 @@ from dataclasses import dataclass
 
 from scipy.special import gammainccinv
 
-from fsw.signals import Vec3
-
 
 @dataclass(frozen=True, slots=True)
 class EstimatorTuning:
@@ -23,7 +21,7 @@ class EstimatorTuning:
     gyro_range: float = 35.0  # rad/s
     # From one reading to the next. The rotors turn the body by 17 rad/s^2 and accelerate it by
     # 10 m/s^2 more than gravity; the rest is vibration.
-    accel_jump: float = 60.0  # m/s^2
+    accel_jump: float = 30.0  # m/s^2
     gyro_jump: float = 3.0  # rad/s
     imu_gap: float = 0.006  # s; longer without a reading, the IMU was lost meanwhile
     # While the IMU is stuck or silent, what it reads is taken for the truth plus a bias that moves
@@ -48,7 +46,7 @@ class EstimatorTuning:
 
     # How far the filter stays behind: as long as measurements have lately taken to come, at most
     # this; older ones are of no use.
-    longest_delay: float = 0.25  # s
+    longest_delay: float = 0.4  # s; a receiver whose solutions queue
     delay_decay: float = 0.01  # s/s, by which it is forgotten how long they took
     # The least standard deviations that sensors are believed, or theirs where they state none.
     position_floor: float = 2e-4  # m, of a pose
@@ -113,4 +111,3 @@ class EstimatorLaw:
 
     tuning: EstimatorTuning
     gates: Gates
-    joint_gain: Vec3  # of angle [1], rate [1/s] and disturbance [1/s^2], a reading

@@ -18,6 +18,9 @@ from fsw.signals import PlanInput, PredictionState, StateEstimate
 
 _RATE: Final = 4.0  # 1/s, of the speed down
 _MOST: Final = 1.0  # m/s^2
+# Times the speed of landing, where no position is measured: how far it is carried grows with the
+# square of the time. The legs stand four times as much.
+_BLIND: Final = 2.0
 _SPEED_KNOWN: Final = 1.0  # m/s, standard deviation; PX4's limit of a usable velocity
 
 
@@ -34,9 +37,11 @@ class Descent:
         self, nominal: PredictionState, estimate: StateEstimate, aiding: Aiding, ticks: int
     ) -> tuple[PredictionState, PlanInput]:
         """The plan's state ``ticks`` [1] later, and the input that leads on from it."""
+        blind = aiding.unaided_us >= self._unaided_us
+        speed = _BLIND * self._speed if blind else self._speed
         for _ in range(ticks):
-            nominal = self._model.step(nominal, self._input(nominal))
-        if aiding.unaided_us >= self._unaided_us:
+            nominal = self._model.step(nominal, self._input(nominal, speed))
+        if blind:
             (x, y, _), (_, _, z) = estimate.p_WB, nominal.p
             nominal = nominal._replace(p=(x, y, z))
             if not aiding.velocity_sigma <= _SPEED_KNOWN:
@@ -45,9 +50,9 @@ class Descent:
                 nominal = nominal._replace(
                     v=(vx, vy, vz), a=(0.0, 0.0, az), j=(0.0, 0.0), s=(0.0, 0.0)
                 )
-        return nominal, self._input(nominal)
+        return nominal, self._input(nominal, speed)
 
-    def _input(self, nominal: PredictionState) -> PlanInput:
+    def _input(self, nominal: PredictionState, speed: float) -> PlanInput:
         u = self._brake(nominal)
-        down = clamp_magnitude(_RATE * (self._speed - nominal.v[2]), _MOST)
+        down = clamp_magnitude(_RATE * (speed - nominal.v[2]), _MOST)
         return u._replace(a=(u.a[0], u.a[1], down))

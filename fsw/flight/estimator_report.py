@@ -75,7 +75,7 @@ def estimator_report(
             fix.position,
             fix.velocity,
             _roots(fix.position_variance),
-            math.sqrt(max(fix.velocity_variance)),
+            max(_roots(fix.velocity_variance)),
         ),
     )
 
@@ -155,5 +155,5 @@ def _three(values: list[float]) -> Vec3:
 
 def _roots(variance: Vec3) -> Vec3:
     """Standard deviations; NaN where none is stated."""
-    a, b, c = [math.sqrt(one) if one >= 0.0 else math.nan for one in variance]
+    a, b, c = [math.sqrt(one) if one > 0.0 else math.nan for one in variance]
     return a, b, c

@@ -7,8 +7,12 @@ from dataclasses import replace
 
 from fsw.control.cascade import Cascade, in_hover
 from fsw.estimation import kernels
+from fsw.estimation.dead_reckoning import moved_on
 from fsw.estimation.error_state import IMU_CAPACITY, Array
+from fsw.estimation.imu import IMU_TOO_OLD
+from fsw.estimation.kernels import Law
 from fsw.estimation.lasting_error import lasting_error
+from fsw.estimation.pace import looked
 from fsw.estimation.sensor_fault import Sensor, SensorFault, sentence
 from fsw.estimation.sensor_fusion import EncoderWatch, FusionMemory, SensorFusion, at_start
 from fsw.estimation.tuning import EstimatorTuning
@@ -27,8 +31,10 @@ _REPEATS = 6  # of encoders; a resting arm's 12 bits are the same for longer
 # most while readings repeat; 50 and 70 within 10 ms of stuck encoders.
 _HELD = (35.0, 70.0)
 _ASKED = 0.1  # rad that joints were asked to move meanwhile; friction has held one for half of it
+_IN_USE = (SensorFault.REPEATED, SensorFault.SELDOM)  # the sensor is, all the same
 _LATELY = 0.02  # s, in which a fault is one of now
 _AWAY = 0.1  # s that a position is overdue, after which its return is a jump
+_ANEW = "estimate is not a number: the filter starts anew"
 _QUIET = 10.0  # s without a fault until the same one is reported again
 
 
@@ -36,7 +42,7 @@ class SensedState:
     """The estimator of one configuration as the tick uses it."""
 
     def __init__(self, tuning: EstimatorTuning, cascade: Cascade) -> None:
-        self._fusion = SensorFusion(tuning, cascade.law.dt)
+        self._fusion = SensorFusion(tuning)
         self._cascade = cascade
         self._tuning = tuning
         self._stale = tuning.stale_time
@@ -65,29 +71,26 @@ class SensedState:
         pushed = (0.0, 0.0)
         if state.estimate is not None:
             pushed = self._cascade.joint_acceleration(state.cascade, state.estimate)
-        started, watch, samples = _without_stuck(state, before, inputs.samples)
-        again: tuple[Sample, ...] = ()
+        law = self._fusion.law
+        started, watch, samples = _without_stuck(state, before, inputs.samples, law)
+        came = 0.0
         if 0.0 <= before.imu_came < now - _IMU_SILENT:
-            again = _last_reading_again(before, now, inputs.samples)
-            samples += again
+            came, samples = _with_last_reading(before, now, samples)
         memory, estimate = self._fusion.step(started, samples, now, pushed, watch)
-        if again:
-            memory = memory._replace(imu_came=before.imu_came)
+        if came:
+            memory = memory._replace(imu_came=came)
+        due = inputs.sensors.t_us // _CHECKED_US != state.t_us // _CHECKED_US
         news = memory.health is not before.health
-        if news:
-            _report(before, memory, now, texts)
-        if inputs.sensors.t_us // _CHECKED_US != state.t_us // _CHECKED_US:
-            self._report_silence(memory, now, texts)
+        if due or news or estimate is None:
+            memory = self._told(before, memory, now, texts, due=due)
         moved = memory.reset.number != before.reset.number
         if moved:
             texts.append(StatusText(Severity.WARNING, told(memory.reset)))
             state = jumped(state, memory.reset)
         if estimate is None:
             state = replace(state, fusion=memory, invalid_ticks=state.invalid_ticks + 1)
-            last = state.estimate
-            # Telemetry goes by its time, and goes on.
-            return state, memory, None if last is None else last._replace(t_us=inputs.sensors.t_us)
-        back = news and _is_back(before, memory, now)
+            return state, memory, _carried_on(state, inputs.sensors.t_us)
+        back = (news and _is_back(before, memory, now)) or not before.started
         if state.estimate is not None and back and not moved:
             state = returned(state, estimate, state.estimate, texts)
         if state.invalid_ticks:
@@ -110,6 +113,24 @@ class SensedState:
         report = estimator_report(memory, covariance, estimate, memory.now, self._stale)
         return replace(state, estimator=report, aiding=_aiding(state, memory, report))
 
+    def _told(
+        self,
+        before: FusionMemory,
+        memory: FusionMemory,
+        now: float,
+        texts: list[StatusText],
+        *,
+        due: bool,
+    ) -> FusionMemory:
+        """Report what is new, and where a look at silent sensors is ``due`` what that finds."""
+        if memory.restarts != before.restarts:
+            texts.append(StatusText(Severity.CRITICAL, _ANEW))
+        _report(before, memory, now, texts)
+        if not due:
+            return memory
+        self._report_silence(memory, now, texts)
+        return _report_seldom(memory, now, texts)
+
     def _report_silence(self, memory: FusionMemory, now: float, texts: list[StatusText]) -> None:
         """Report sensors that have been silent for too long since the last check."""
         times = [(Sensor.IMU, memory.imu_came), (Sensor.ENCODERS, memory.joints_came)]
@@ -120,34 +141,58 @@ class SensedState:
                 texts.append(StatusText(Severity.WARNING, sentence(sensor, SensorFault.STALE)))
 
 
+def _carried_on(state: FlightState, now_us: int) -> StateEstimate | None:
+    """The last estimate, if any, while there is none; telemetry goes by its time, and goes on."""
+    last = state.estimate
+    if last is None:
+        return None
+    if state.vehicle.flies:
+        last = moved_on(last, 1e-6 * (now_us - last.t_us))
+    return last._replace(t_us=now_us)
+
+
 def _report(
     before: FusionMemory, memory: FusionMemory, now: float, texts: list[StatusText]
 ) -> None:
     """Report each fault once, and again after it was gone for a while."""
     for new in memory.health:
-        if new.fault_at != now:
+        if new.fault_at != now or before.of(new.sensor).fault_at == now:
             continue
-        old = before.of(new.sensor)
-        if old.fault is not new.fault or now - old.fault_at > _QUIET:
+        if new.quiet() > _QUIET:
             texts.append(StatusText(Severity.WARNING, sentence(new.sensor, new.fault)))
 
 
-def _last_reading_again(
-    memory: FusionMemory, now: float, samples: tuple[Sample, ...]
-) -> tuple[Sample, ...]:
-    """The last reading of an IMU that has been silent; nothing if a new one is among the samples.
+def _report_seldom(memory: FusionMemory, now: float, texts: list[StatusText]) -> FusionMemory:
+    """Report sensors that have begun to come less often than they did."""
+    paces, seldom = looked(memory.paces, memory.health, now)
+    memory = memory._replace(paces=paces)
+    for sensor in seldom:
+        memory = memory.noting(memory.of(sensor).with_fault(SensorFault.SELDOM, now))
+        texts.append(StatusText(Severity.WARNING, sentence(sensor, SensorFault.SELDOM)))
+    return memory
 
-    The filter goes from one reading to the next, and knows what to do about one that repeats.
+
+def _with_last_reading(
+    memory: FusionMemory, now: float, samples: tuple[Sample, ...]
+) -> tuple[float, tuple[Sample, ...]]:
+    """When an IMU that has been silent came last [s], and the samples with its last reading again.
+
+    0 and the samples as they are if it comes again soon. The filter goes from one reading to the
+    next, and knows what to do about one that repeats. After long the first new one is not used: an
+    IMU that says something now and then would be taken for one that is back each time.
     """
-    if any(isinstance(one, ImuSample) for one in samples):
-        return ()
+    new = [one for one in samples if isinstance(one, ImuSample) and one.time >= now - IMU_TOO_OLD]
+    if new and memory.imu_came >= now - _LATELY:
+        return 0.0, samples
     x = memory.numbers
     row = x["imu"][0][(int(x["end"][0]) - 1) % IMU_CAPACITY].tolist()
-    return (ImuSample(now, (row[1], row[2], row[3]), (row[4], row[5], row[6])),)
+    again = ImuSample(now, (row[1], row[2], row[3]), (row[4], row[5], row[6]))
+    others = tuple([one for one in samples if one not in new])
+    return now if new else memory.imu_came, (*others, again)
 
 
 def _without_stuck(
-    state: FlightState, memory: FusionMemory, samples: tuple[Sample, ...]
+    state: FlightState, memory: FusionMemory, samples: tuple[Sample, ...], law: Law
 ) -> tuple[FusionMemory, EncoderWatch, tuple[Sample, ...]]:
     """The samples without those of encoders that are stuck: joints then follow from torques."""
     before = watch = memory.encoders
@@ -155,7 +200,7 @@ def _without_stuck(
         if type(one) is JointSample:
             watch = _watched(watch, memory, one.angles, state)
             if watch.stuck and not before.stuck:
-                memory = _at_rest(memory, one.angles)
+                memory = _at_rest(memory, law, one)
     if watch.stuck:
         samples = tuple([one for one in samples if not isinstance(one, JointSample)])
     return memory, watch, samples
@@ -181,10 +226,10 @@ def _watched(
     return EncoderWatch(watch.angles, watch.asked, repeats, stuck)
 
 
-def _at_rest(memory: FusionMemory, angles: Vec2) -> FusionMemory:
-    """The memory with an arm that stands still at ``angles`` [rad], which nothing disturbs."""
+def _at_rest(memory: FusionMemory, law: Law, reading: JointSample) -> FusionMemory:
+    """The memory with an arm that stands still where a ``reading`` is, and nothing disturbs it."""
     numbers = memory.numbers.copy()
-    kernels.set_joints(numbers, angles)
+    kernels.set_joints(numbers, law, reading.time, reading.angles)
     return memory._replace(numbers=numbers)
 
 
@@ -231,6 +276,6 @@ def _lost(memory: FusionMemory) -> tuple[Sensor | None, SensorFault]:
         if now - memory.came(sensor) > _LATELY:
             return sensor, SensorFault.STALE
         health = memory.of(sensor)
-        if now - health.fault_at < _LATELY and health.fault is not SensorFault.REPEATED:
+        if now - health.fault_at < _LATELY and health.fault not in _IN_USE:
             return sensor, health.fault
     return None, SensorFault.NONE

@@ -39,7 +39,12 @@ from fsw.signals import Mat3, SafeSet, StateEstimate, Vec2, Vec4
 
 _STEP: Final = 1e-3  # m, by which clearances grow, so that most ticks have the same ones
 _SLACK: Final = 4e-3  # m, by which one must be too large before it shrinks
-_MOST: Final = 0.5  # m; a place that is lost altogether is none to plan from
+# m; a place that is lost altogether is none to plan from. With 0.5 m a vehicle without satellites
+# was at the wall before it had come down.
+_MOST: Final = 2.0
+# m/s; what grows faster is uncertain for a moment only, and a vehicle that flees from it flies into
+# the wall behind.
+_RISE: Final = 0.8
 _AMPLE: Final = 0.01  # m; zones that grow by less are not searched for room
 LACKING: Final = 0.01  # m of room; a workspace has 1 mm to spare, motion capture asks for 3
 _NEAR: Final = 2.0  # m; zones farther off leave room enough
@@ -149,7 +154,12 @@ class UncertainClearance:
                 wanted[k] += self._lead * max(spread[k] - then, 0.0) / elapsed
         stepped = [min(_stepped(more), _MOST) for more in wanted]
         if len(before.added) == len(stepped):
-            return tuple(map(_settled, stepped, before.added))
+            rise = _RISE * elapsed if elapsed > 0.0 else 0.0
+            bounded = [
+                min(more, _stepped(old + rise))
+                for more, old in zip(stepped, before.added, strict=True)
+            ]
+            return tuple(map(_settled, bounded, before.added))
         return tuple(stepped)
 
     def _spread(

@@ -74,6 +74,7 @@ _SENSOR_AT: Final = 15  # place of HIL_SENSOR's id; the step's clock has 0
 # A stamp farther ahead of the last one is believed only if the next step follows it: with a single
 # wrong one the vehicle would take all later steps for old ones. Such a silence ends the flight.
 _AHEAD_US: Final = 1_200_000
+_LAST_US: Final = 1 << 62  # a stamp beyond is none: no step could follow it
 _LOCKSTEP_BIT, _MEASURED_BIT = 1, 2  # of the custom_mode in the simulator's HEARTBEAT
 _NO_VECTOR: Final = (math.nan, math.nan, math.nan)
 _NO_ATTITUDE: Final = (math.nan, math.nan, math.nan, math.nan)
@@ -104,6 +105,7 @@ class SimLink:
         self._thrust_scale = 1.0 / facts.rotor_thrust_max
         self._torque_scale = 1.0 / facts.joint_torque_max
         self._last_us = -1  # time of the newest step seen
+        self._first = False  # that was the first one
         self._doubted_us = -1  # time of a step that was too far ahead
         self._answer: tuple[int, list[bytes]] = (-1, [])
         self._acks: list[CommandAck] = []
@@ -254,7 +256,14 @@ class SimLink:
 
     def _is_next(self, t_us: int) -> bool:
         """Whether a step is a new one, which it is only once; a known one is answered again."""
-        if t_us <= self._last_us:
+        if self._last_us < 0 and not t_us < _LAST_US:
+            self.notices.append("first step stamped beyond all times: ignored")
+            return False
+        if self._first and self._last_us - t_us > _AHEAD_US:
+            # The very first stamp was the wrong one: all steps would be older than it.
+            self.notices.append("first step stamped ahead of all others: forgotten")
+            self._last_us = -1
+        elif t_us <= self._last_us:
             self._repeat(t_us)
             return False
         ahead_us = t_us - self._last_us
@@ -263,6 +272,7 @@ class SimLink:
             self._doubted_us = t_us
             self.notices.append(f"step stamped {1e-6 * ahead_us:.1f} s ahead: ignored")
             return False
+        self._first = self._last_us < 0
         self._last_us, self._doubted_us = t_us, -1
         return True
 

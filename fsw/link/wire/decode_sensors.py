@@ -43,9 +43,7 @@ _UNKNOWN_EPH: Final = 0xFFFF
 _UNKNOWN_VOLTAGE: Final = 0xFFFF
 _VOLTAGE_AT, _REMAINING_AT = 3, 17  # of BATTERY_STATUS: voltages[0] is the pack's
 _LEVEL_FIX: Final = 2  # GPS_FIX_TYPE; those above it have a height
-# HIL_SENSOR and HIL_GPS do not state these.
-_PRESSURE_VARIANCE: Final = 0.2**2  # m^2: noise of a small barometer, 0.1 m, and gusts
-_VELOCITY_VARIANCE: Final = 0.1**2  # m^2/s^2: receivers promise 0.05 m/s
+_NOT_STATED: Final = 0.0  # a variance that the message has no field for
 _SEA_LEVEL_HPA: Final = 1013.25
 _SEA_LEVEL_K: Final = 288.15
 _LAPSE_K_M: Final = 0.0065
@@ -86,7 +84,7 @@ class SampleDecoder:
             found.append(MagneticSample(time, cast(Vec3, values[7:10])))
         if updated & _PRESSURE:
             altitude = pressure_altitude(values[10]) - self._origin_altitude
-            found.append(PressureSample(time, altitude, _PRESSURE_VARIANCE))
+            found.append(PressureSample(time, altitude, _NOT_STATED))
         return found
 
     def _gnss(self, values: Numbers) -> GnssSample | None:
@@ -95,13 +93,12 @@ class SampleDecoder:
         if fix <= _LEVEL_FIX:
             return None
         level = _stated(eph)
-        speed = _VELOCITY_VARIANCE
         return GnssSample(
             1e-6 * time_us,
             self._locate(1e-7 * latitude, 1e-7 * longitude, 1e-3 * altitude),
             (0.01 * north, 0.01 * east, 0.01 * down),
             (level, level, _stated(epv)),
-            (speed, speed, speed),
+            (_NOT_STATED, _NOT_STATED, _NOT_STATED),
         )
 
 

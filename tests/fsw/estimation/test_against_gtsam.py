@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from fsw.estimation.sensor_fusion import SensorFusion, at_start
 from fsw.measurements import ImuSample, PoseSample
-from tests.fsw.estimation.sensor_runs import TICK, VIO, PoseSensor, Run, rotations, run
+from tests.fsw.estimation.sensor_runs import VIO, PoseSensor, Run, rotations, run
 
 gtsam = pytest.importorskip("gtsam", exc_type=ImportError)
 Array = NDArray[np.float64]
@@ -94,7 +94,7 @@ def smoothed(flown: Run) -> tuple[float, Array, Array, Array, Array]:
 def test_the_filter_ends_where_a_batch_smoother_ends(seed: int) -> None:
     flown = run(replace(VIO, pose=SENSOR), seed, DURATION)
     time, p, v, R, sigma = smoothed(flown)
-    fusion, memory = SensorFusion(flown.suite.tuning, TICK), at_start()
+    fusion, memory = SensorFusion(flown.suite.tuning), at_start()
     estimate = None
     # The filter's own time is that of the newest pose, once that has come.
     for now, samples in flown:

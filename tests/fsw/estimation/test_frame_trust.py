@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from fsw.estimation.estimator import estimate_state
@@ -185,3 +186,116 @@ def test_frames_that_were_missing_are_no_jump() -> None:
         trust, found = believed(FrameTrust(), frame(gap), estimate, lambda: (0.0, 0.0))
         assert not trust.doubted
         assert found == estimate_state(frame(gap))
+
+
+def swaying(k: int, **changes: Any) -> SensorFrame:
+    """Tick k of a vehicle that sways east and rolls by it, one reading in the noise of the next."""
+    t, w, reach = TICK * k, 4.0, 0.1
+    a_y = -reach * w * w * math.sin(w * t)
+    roll = math.atan2(a_y, 9.81)
+    turning = (
+        math.atan2(-reach * w * w * math.sin(w * (t + 1e-4)), 9.81)
+        - math.atan2(-reach * w * w * math.sin(w * (t - 1e-4)), 9.81)
+    ) / 2e-4
+    found = SensorFrame(
+        t_us=1_000_000 + 2_000 * k,
+        p_WB=(0.0, reach * math.sin(w * t), -1.0),
+        v_WB=(0.0, reach * w * math.cos(w * t), 0.0),
+        q_WB=(math.cos(0.5 * roll), math.sin(0.5 * roll), 0.0, 0.0),
+        gyro_B=(turning, 0.0, 0.0),
+        accel_B=(0.0, 0.0, -math.hypot(a_y, 9.81)),
+        q_arm=(0.1 * t, 0.2),
+        qd_arm=(0.1, 1e-7 * math.cos(50.0 * t)),
+    )
+    return replace(found, **changes)
+
+
+def swayed(
+    ticks: int, spoil: Callable[[int, SensorFrame], SensorFrame]
+) -> tuple[list[FrameTrust], list[StateEstimate]]:
+    estimate = estimate_state(swaying(0))
+    assert estimate is not None
+    trust, history, estimates = FrameTrust(), [], []
+    for k in range(1, ticks):
+        trust, estimate = believed(trust, spoil(k, swaying(k)), estimate, lambda: (0.0, 0.0))
+        history.append(trust)
+        estimates.append(estimate)
+    return history, estimates
+
+
+def test_a_vehicle_that_sways_agrees_with_itself() -> None:
+    history, _ = swayed(500, lambda _, s: s)
+    assert not any(one.doubted for one in history)
+
+
+FROM = 250
+LIES: list[tuple[Callable[[int, SensorFrame], SensorFrame], SensorFault]] = [
+    (lambda k, s: replace(s, gyro_B=swaying(FROM).gyro_B), SensorFault.STUCK),
+    (lambda k, s: replace(s, accel_B=swaying(FROM).accel_B), SensorFault.STUCK),
+    (lambda k, s: replace(s, gyro_B=(s.gyro_B[0] + 0.5, -0.3, 0.2)), SensorFault.DISAGREES),
+    (lambda k, s: replace(s, accel_B=(1.0, -1.0, s.accel_B[2] + 2.0)), SensorFault.DISAGREES),
+]
+
+
+@pytest.mark.parametrize(("lie", "fault"), LIES, ids=["gyro", "force", "gyro off", "force off"])
+def test_half_an_inertial_unit_that_fails_is_found_and_the_pose_stands_in(
+    lie: Callable[[int, SensorFrame], SensorFrame], fault: SensorFault
+) -> None:
+    history, estimates = swayed(500, lambda k, s: lie(k, s) if k >= FROM else s)
+    found = next(k for k, one in enumerate(history, start=1) if one.doubted)
+    ((sensor, part),) = history[found - 1].faults()
+    assert (sensor, part.fault) == (Sensor.IMU, fault)
+    assert found - FROM < 100, "within 0.2 s"
+    assert history[-1].inertial.unused > 0
+    assert estimates[-1].w_WB_B[0] == pytest.approx(swaying(499).gyro_B[0], abs=0.1)
+
+
+@pytest.mark.parametrize("what", ["pose", "gyro", "arm"])
+def test_garbage_is_never_the_truth(what: str) -> None:
+    random = np.random.default_rng(2)
+
+    def garbage(k: int, s: SensorFrame) -> SensorFrame:
+        if k < FROM:
+            return s
+        a, b, c = random.uniform(-10.0, 10.0, 3).tolist()
+        if what == "pose":
+            return replace(s, p_WB=(10.0 * a, 10.0 * b, 10.0 * c))
+        return replace(s, gyro_B=(a, b, c)) if what == "gyro" else replace(s, q_arm=(0.3 * a, b))
+
+    history, estimates = swayed(1000, garbage)
+    place = {"pose": 0, "gyro": 1, "arm": 2}[what]
+    believed_again = [(one.pose, one.inertial, one.joints)[place] for one in history[FROM + 5 :]]
+    assert all(part.unused for part in believed_again)
+    assert math.dist(estimates[-1].p_WB, swaying(999).p_WB) < 0.05
+
+
+def test_a_pose_that_is_late_is_found_and_the_inertial_unit_leads_on() -> None:
+    """As a fault begins: it stops, and then goes on from there."""
+    late = 100
+
+    def spoil(k: int, s: SensorFrame) -> SensorFrame:
+        if k < FROM:
+            return s
+        old = swaying(max(FROM, k - late))
+        return replace(s, p_WB=old.p_WB, v_WB=old.v_WB, q_WB=old.q_WB)
+
+    history, estimates = swayed(900, spoil)
+    apart = [math.dist(one.p_WB, swaying(k).p_WB) for k, one in enumerate(estimates, start=1)]
+    doubted = [one.pose.fault is SensorFault.DISAGREES for one in history]
+    assert np.mean(doubted[FROM + 200 :]) > 0.2
+    led = [far for far, odd in zip(apart, doubted, strict=True) if odd]
+    assert max(led) < 0.07, "where it was late when it came back, and no farther"
+
+
+def test_a_pose_that_repeats_itself_for_long_is_worth_a_sentence() -> None:
+    estimate = estimate_state(swaying(0))
+    assert estimate is not None
+    trust, said, old = FrameTrust(), [], swaying(20)
+    for k in range(1, 200):
+        s = swaying(k)
+        if k > 20:
+            s = replace(s, p_WB=old.p_WB, v_WB=old.v_WB, q_WB=old.q_WB)
+        trust, estimate = believed(trust, s, estimate, lambda: (0.0, 0.0))
+        trust, sentences = trust.reported(s.t_us)
+        said += [(k, text) for text in sentences]
+    assert said == [(70, "pose is stuck at one reading")]

@@ -11,6 +11,8 @@ from scipy.spatial.transform import Rotation
 from fsw.estimation.drift import FrameDrift
 from fsw.estimation.error_state import ERRORS
 from fsw.estimation.lasting_error import lasting_error
+from fsw.estimation.sensor_checks import Health
+from fsw.estimation.sensor_fault import Sensor
 from fsw.estimation.sensor_fusion import FusionMemory, at_start
 from fsw.estimation.tuning import EstimatorTuning
 from fsw.estimation.turned_covariance import Vec6
@@ -38,16 +40,26 @@ def test_a_whole_readings_error_lasts() -> None:
 
 
 def test_the_attitudes_error_is_turned_from_the_bodys_axes() -> None:
-    quarter = estimate_of(Rotation.from_euler("z", 90.0, degrees=True))
-    none = np.zeros((ERRORS, ERRORS))
-    found = pose_covariance(none, quarter, lasting_error(memory(), TUNING))
-    assert np.sqrt(np.diag(found))[3:] == pytest.approx([0.02, 0.01, 0.03])
+    turn = Rotation.from_euler("zyx", (30.0, 20.0, -10.0), degrees=True)
+    none, R = np.zeros((ERRORS, ERRORS)), turn.as_matrix()
+    found = pose_covariance(none, estimate_of(turn), lasting_error(memory(), TUNING))
+    np.testing.assert_allclose(found[3:, 3:], R @ np.diag(TURN) @ R.T, atol=1e-12)
 
 
 def test_of_odometry_only_its_noise_counts_for_its_drift_is_in_the_covariance() -> None:
     noise = FrameDrift(place_noise=(1e-6, 4e-6, 9e-6), attitude_noise=(16e-6, 25e-6, 36e-6))
     found = lasting_error(memory(drifts=True)._replace(frame=noise), TUNING)
     assert deviations(found) == pytest.approx([0.001, 0.002, 0.003, 0.004, 0.005, 0.006])
+
+
+@pytest.mark.parametrize(("pose_at", "fix_at", "least"), [(2.0, 1.0, 0.003), (1.0, 2.0, 0.01)])
+def test_the_position_that_was_used_last_counts(
+    pose_at: float, fix_at: float, least: float
+) -> None:
+    fix = GnssSample(1.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (1e-5, 1e-5, 0.05**2), FINE)
+    health = (Health(Sensor.POSE, fused=(pose_at,) * 2), Health(Sensor.GNSS, fused=(fix_at,) * 2))
+    both = memory()._replace(gnss=fix, health=health)
+    assert deviations(lasting_error(both, TUNING))[0] == pytest.approx(least)
 
 
 def test_without_a_pose_satellites_count_and_without_both_nothing() -> None:

@@ -186,6 +186,19 @@ def test_one_stamp_far_ahead_does_not_make_the_vehicle_deaf(wire: Wire, wrong_us
     assert "ahead: ignored" in notice
 
 
+@pytest.mark.parametrize("wrong_us", [11_000_000, 2**62 - 1, 2**62, 2**64 - 1])
+def test_a_first_stamp_far_ahead_does_not_make_the_vehicle_deaf(wire: Wire, wrong_us: int) -> None:
+    encoder = StepEncoder(lockstep=True)
+    released = []
+    for t_us in (wrong_us, 1_002_000, 1_004_000, 1_006_000):
+        wire.send(encoder.datagram(readings(t_us), ()))
+        released.append(wire.link.wait_for_step())
+    first = wrong_us if wrong_us < 2**62 else None
+    assert [one and one.t_us for one in released] == [first, 1_002_000, 1_004_000, 1_006_000]
+    (notice,) = wire.link.notices
+    assert notice.startswith("first step stamped")
+
+
 def test_a_clock_that_goes_on_from_another_time_is_followed(wire: Wire) -> None:
     encoder = StepEncoder(lockstep=True)
     released = []

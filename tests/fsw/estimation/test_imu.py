@@ -1,0 +1,100 @@
+"""Which readings of the inertial unit are believed, each half for itself."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from fsw.compiled import packed
+from fsw.estimation.error_state import FILTER, FORCE, LOST, NO_FORCE, NO_RATE, NOTHING, RATE
+from fsw.estimation.imu import STAYS, STAYS_LONG, add_imu
+from fsw.estimation.sensor_fault import SensorFault
+from fsw.estimation.tuning import EstimatorTuning
+from fsw.signals import Vec3
+
+LAW = packed(EstimatorTuning()).view(np.recarray)[0]
+TICK = 0.002
+
+
+class Unit:
+    """Readings of one unit on their way into a filter."""
+
+    def __init__(self) -> None:
+        self.x: Any = np.zeros(1, FILTER).view(np.recarray)[0]
+        self.random = np.random.default_rng(1)
+        self.now = 1.0
+        for _ in range(300):
+            self.read()
+
+    def read(self, force: Vec3 | None = None, rate: Vec3 | None = None) -> SensorFault:
+        """A noisy reading, or what is said in place of it; what is wrong with it."""
+        self.now += TICK
+        f = (0.0, 0.0, -9.81) + 0.3 * self.random.standard_normal(3)
+        w = 0.01 * self.random.standard_normal(3)
+        said = tuple(f.tolist()) if force is None else force
+        turning = tuple(w.tolist()) if rate is None else rate
+        return SensorFault(add_imu(self.x, LAW, self.now, self.now, said, turning))  # type: ignore[arg-type]
+
+    @property
+    def last(self) -> Any:
+        return self.x.imu[(self.x.end - 1) % len(self.x.imu)]
+
+
+def test_half_a_unit_that_repeats_itself_is_lost_alone() -> None:
+    for half, said in (
+        (NO_RATE, {"rate": (0.1, 0.0, 0.0)}),
+        (NO_FORCE, {"force": (1.0, 0.0, -9.0)}),
+    ):
+        unit = Unit()
+        faults = [unit.read(**said) for _ in range(8)]  # type: ignore[arg-type]
+        assert faults[:5] == [SensorFault.NONE] * 5
+        assert faults[5:] == [SensorFault.STUCK] * 3
+        assert unit.last[LOST] == half
+        assert unit.read() is SensorFault.NONE
+        assert unit.last[LOST] == 0
+
+
+def test_garbage_is_never_believed_again_and_the_other_half_is() -> None:
+    for size, at, half in ((50.0, FORCE, NO_FORCE), (10.0, RATE, NO_RATE)):
+        unit = Unit()
+        believed = 0
+        for _ in range(500):
+            said: Vec3 = tuple(unit.random.uniform(-size, size, 3).tolist())  # type: ignore[assignment]
+            fault = unit.read(force=said) if half == NO_FORCE else unit.read(rate=said)
+            believed += fault is SensorFault.NONE
+            assert unit.last[LOST] in (0.0, half)
+        assert believed <= 5, "before it was found"
+        held = unit.last[at : at + 3].copy()
+        unit.read(**{"force" if half == NO_FORCE else "rate": (-size, size, -size)})  # type: ignore[arg-type]
+        np.testing.assert_array_equal(unit.last[at : at + 3], held)
+
+
+def test_a_jump_is_believed_when_it_is_back_or_stays_and_the_next_one_must_stay_longer() -> None:
+    unit, far = Unit(), (0.0, 8.0, 0.0)
+    assert unit.read(rate=far) is SensorFault.JUMP
+    assert unit.read() is SensorFault.NONE, "back"
+
+    def stays() -> int:
+        """How many readings it takes."""
+        for count in range(1, 100):
+            noise = 0.01 * unit.random.standard_normal(3)
+            said: Vec3 = tuple((far + noise).tolist())  # type: ignore[assignment]
+            if unit.read(rate=said) is SensorFault.NONE:
+                return count
+        return 0
+
+    assert stays() == STAYS_LONG + 1
+    unit = Unit()
+    assert stays() == STAYS + 1
+
+
+def test_what_is_no_number_loses_its_half_alone() -> None:
+    unit = Unit()
+    assert unit.read(force=(float("nan"), 0.0, 0.0)) is SensorFault.NOT_FINITE
+    assert unit.last[LOST] == NO_FORCE
+    assert (
+        unit.read(force=(0.0, 0.0, float("inf")), rate=(0.0, 99.0, 0.0)) is SensorFault.NOT_FINITE
+    )
+    assert unit.last[LOST] == NOTHING
+    assert np.isfinite(unit.x.imu).all()

@@ -1,0 +1,119 @@
+"""Joints of the present, from encoders that may be late, few or wrong."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.linalg import solve_discrete_are
+
+from fsw.compiled import packed
+from fsw.estimation.error_state import FILTER
+from fsw.estimation.joint_filter import begin, present_joints, push, read
+from fsw.estimation.sensor_fault import SensorFault
+from fsw.estimation.tuning import EstimatorTuning
+from fsw.signals import Vec2
+
+TUNING = EstimatorTuning()
+LAW = packed(TUNING).view(np.recarray)[0]
+TICK = 0.002
+STEP = 1.534e-3  # rad, of an encoder
+Spoil = Callable[[float, Vec2], Vec2 | None]
+
+
+def angle(t: float) -> float:
+    return 0.4 * math.sin(5.0 * t)
+
+
+def rate(t: float) -> float:
+    return 2.0 * math.cos(5.0 * t)
+
+
+def believed(t: float) -> float:
+    """What the torques would make of a joint [rad/s^2], which friction of 3 rad/s^2 holds back."""
+    return -10.0 * math.sin(5.0 * t) + 3.0
+
+
+class Arm:
+    """Two joints that swing, one against the other."""
+
+    def __init__(self, age: float = 0.0, every: int = 1, spoil: Spoil = lambda _, a: a) -> None:
+        self.x: Any = np.zeros(1, FILTER).view(np.recarray)[0]
+        begin(self.x, LAW, 0.0, (0.0, 0.0))
+        self.faults: set[SensorFault] = set()
+        self.error, self.off = 0.0, 0.0
+        for k in range(1, 1000):
+            now = TICK * k
+            u = believed(now - 0.5 * TICK)
+            push(self.x, LAW, now, TICK, (u, -u))
+            seen = round(angle(now - age) / STEP) * STEP
+            said = spoil(now, (seen, -seen))
+            if now > age and k % every == 0 and said is not None:
+                fault = SensorFault(read(self.x, LAW, now, said, age))
+                if fault:
+                    self.faults.add(fault)
+            (q1, q2), (w1, w2) = present_joints(self.x, now)
+            if now > 1.0:
+                self.error = max(self.error, abs(q1 - angle(now)), abs(q2 + angle(now)))
+                self.off = max(self.off, abs(w1 - rate(now)), abs(w2 + rate(now)))
+
+
+@pytest.mark.parametrize(
+    ("age", "error", "off"), [(0.0, 2e-3, 0.2), (0.014, 5e-3, 0.3), (0.04, 0.02, 0.8)]
+)
+def test_readings_that_are_late_are_brought_to_the_present(
+    age: float, error: float, off: float
+) -> None:
+    arm = Arm(age)
+    assert not arm.faults
+    assert arm.error < error
+    assert arm.off < off
+
+
+def test_readings_that_are_few_do_not_make_it_swing() -> None:
+    arm = Arm(every=25)
+    assert not arm.faults
+    assert arm.error < 0.1
+
+
+def test_the_covariance_settles_where_the_riccati_equation_says() -> None:
+    arm, h = Arm(), TICK
+    move = np.array([[1.0, h, 0.5 * h * h], [0.0, 1.0, h], [0.0, 0.0, 1.0]])
+    seen, noise = np.array([[1.0, 0.0, 0.0]]), TUNING.encoder_noise**2
+    rows = [
+        [h**5 / 20, h**4 / 8, h**3 / 6],
+        [h**4 / 8, h**3 / 3, h**2 / 2],
+        [h**3 / 6, h**2 / 2, h],
+    ]
+    walk = TUNING.joint_disturbance_walk**2 * np.array(rows)
+    P = solve_discrete_are(move.T, seen.T, walk, np.array([[noise]]))
+    after = P - P @ seen.T @ seen @ P / (P[0, 0] + noise)
+    np.testing.assert_allclose(arm.x.joint_variance, after, rtol=1e-6)
+
+
+def test_garbage_is_not_believed_and_the_torques_carry_on() -> None:
+    random = np.random.default_rng(3)
+
+    def garbage(now: float, _: Vec2) -> Vec2:
+        a, b = random.uniform(-math.pi, math.pi, 2).tolist()
+        return a, b
+
+    arm = Arm(spoil=lambda now, said: garbage(now, said) if now > 1.5 else said)
+    assert arm.faults == {SensorFault.JUMP}
+    assert arm.error < 0.15, "of friction that is not modelled, in half a second"
+
+
+def test_a_zero_that_has_moved_is_named_and_taken_after_a_while() -> None:
+    arm = Arm(spoil=lambda now, said: (said[0] + 0.3, said[1] + 0.3) if now > 1.5 else said)
+    assert arm.faults == {SensorFault.JUMP}
+    assert arm.error == pytest.approx(0.3, abs=0.02)
+
+
+def test_a_reading_again_and_one_older_than_the_state_are_named() -> None:
+    arm = Arm()
+    now = TICK * 1000
+    assert SensorFault(read(arm.x, LAW, now, (0.0, 0.0), TICK)) is SensorFault.REPEATED
+    assert all(np.isfinite(np.ravel(arm.x.joints)))

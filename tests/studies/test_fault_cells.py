@@ -1,0 +1,33 @@
+"""Cells of the fault matrix that were wrong: a wall, the ground, or silence."""
+
+from __future__ import annotations
+
+import pytest
+
+from studies.fault_expectations import expectations
+from studies.fault_matrix import Cell, judge
+
+CELLS = [
+    ("hold", "encoder-garbage-mocap"),
+    ("mission", "encoder-delayed-mocap"),
+    ("offboard", "encoder-slow-mocap"),
+    ("land", "accel-garbage-mocap"),
+    ("hold", "accel-wrong-mocap"),
+    ("mission", "gyro-stuck-mocap"),
+    ("hold", "gyro-delayed-mocap"),
+    ("hold", "vio-garbage-mocap"),
+    ("mission", "vio-garbage"),
+    ("mission", "vio-delayed"),
+    ("takeoff", "gyro-stuck"),
+    ("hold", "accel-stuck"),
+    ("hold", "gps-off-rtk"),
+    ("hold", "gps-delayed-rtk"),
+    ("hold", "baro-wrong-rtk"),
+]
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("mode", "fault"), CELLS, ids=["-".join(cell) for cell in CELLS])
+def test_a_failing_sensor_is_told_and_touches_nothing(mode: str, fault: str) -> None:
+    cell = Cell(mode, expectations()[fault], 0)
+    assert judge(cell, cell.row()).differs == ()
