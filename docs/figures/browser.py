@@ -85,12 +85,13 @@ class Page:
     def drag(self, begin: tuple[float, float], end: tuple[float, float], steps: int = 8) -> None:
         """Press at one place [px], move to another, and let go."""
         self._mouse("mouseMoved", *begin, buttons=0)
+        self._draw()  # what is drawn looks for the mouse when it is drawn
         self._mouse("mousePressed", *begin)
         for k in range(1, steps + 1):
             share = k / steps
             x, y = (a + share * (b - a) for a, b in zip(begin, end, strict=True))
             self._mouse("mouseMoved", x, y)
-            time.sleep(0.03)
+            self._draw()
         self._mouse("mouseReleased", *end)
 
     def press_on(self, text: str) -> None:
@@ -110,6 +111,10 @@ class Page:
         """Write what is seen as PNG."""
         shot = self.call("Page.captureScreenshot", format="png")
         path.write_bytes(base64.b64decode(shot["data"]))
+
+    def _draw(self) -> None:
+        """Wait until two more frames are drawn."""
+        self.call("Runtime.evaluate", expression=_TWO_FRAMES, awaitPromise=True)
 
     def _mouse(self, kind: str, x: float, y: float, buttons: int = 1) -> None:
         button = "left" if buttons else "none"
@@ -132,6 +137,9 @@ class Page:
             self.complaints.append(f"{said['entry']['text']} {said['entry'].get('url', '')}")
 
 
+_TWO_FRAMES: Final = (
+    "new Promise(done => requestAnimationFrame(() => requestAnimationFrame(() => done(1))))"
+)
 _PLACE: Final = """(() => {
   const wanted = %s;
   const found = [...document.querySelectorAll('button, label, [role=tab], span, b')].filter(
