@@ -13,6 +13,7 @@ from pathlib import Path
 
 import matplotlib as mpl
 
+from docs.figures.animation import draw_animation
 from docs.figures.browser import NoBrowser
 from docs.figures.diagrams import draw_architecture, draw_timing
 from docs.figures.flight import draw_flight, recorded
@@ -63,6 +64,7 @@ def draw_all(flights: Path) -> None:
     pictured = fly(*next(iter(PICTURED)), flights)
     try:
         draw_view(fly(*SHOWN, flights), IMAGES / "view.png")
+        draw_animation(pictured, IMAGES / "flight.webp")
         draw_report(pictured, IMAGES / "report.png")
         draw_inspector(pictured, IMAGES / "top.png")
     except NoBrowser as missing:
