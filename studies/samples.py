@@ -30,8 +30,7 @@ from sitl.sensors.measurements import (
     PressureMeasurement,
 )
 
-_PRESSURE_VARIANCE: Final = 0.2**2  # m^2
-_VELOCITY_VARIANCE: Final = 0.1**2  # m^2/s^2
+_NOT_STATED: Final = 0.0  # a variance that the message has no field for
 _NO_VECTOR: Final = (math.nan, math.nan, math.nan)
 
 
@@ -56,10 +55,10 @@ def sample(said: Measurement) -> Sample:
             )
         case GnssMeasurement():
             level, down = said.horizontal_deviation**2, said.vertical_deviation**2
-            speed = (_VELOCITY_VARIANCE,) * 3
+            speed = (_NOT_STATED,) * 3
             return GnssSample(time, said.p_WB, said.v_WB, (level, level, down), speed)
         case PressureMeasurement():
-            return PressureSample(time, standard_altitude(said.pressure_pa), _PRESSURE_VARIANCE)
+            return PressureSample(time, standard_altitude(said.pressure_pa), _NOT_STATED)
         case MagneticMeasurement():
             return MagneticSample(time, said.field_B)
     return RangeSample(time, said.distance, said.variance)
