@@ -319,10 +319,10 @@ def compared(
     """Parts of a frame that are far from those of the one before, ``dt`` [s] older.
 
     Beside them whether pose and inertial unit can be compared, and the sums ``turn`` [rad, FRD] and
-    ``speed`` [m/s, NED] of a window with this frame in it. Readings ``p`` [m, NED], ``v`` [m/s,
-    NED], ``q`` [1], ``w`` [rad/s, FRD], ``f`` [m/s^2, FRD], ``arm`` [rad]; of the frame before
-    ``p0`` [m, NED], ``v0`` [m/s, NED], ``q0`` [1], ``w0`` [rad/s, FRD], ``f0`` [m/s^2, FRD] and
-    ``arm0`` [rad].
+    ``speed`` [m/s, NED] of a window with this frame in it. Readings ``p`` [m, NED],
+    ``v`` [m/s, NED], ``q`` [1], ``w`` [rad/s, FRD], ``f`` [m/s^2, FRD], ``arm`` [rad]; of the frame
+    before ``p0`` [m, NED], ``v0`` [m/s, NED], ``q0`` [1], ``w0`` [rad/s, FRD], ``f0`` [m/s^2, FRD]
+    and ``arm0`` [rad].
     """  # fmt: skip
     rough = 0
     step, change, spin, push = 0.0, 0.0, 0.0, 0.0
