@@ -80,7 +80,7 @@ def _chosen(options: FaultsOptions, known: dict[str, Expected]) -> list[Cell]:
         every = [
             _cell(mode, one, options.seed)
             for one in known.values()
-            for mode in SITUATIONS
+            for mode in one.modes
             if options.only is None or options.only in f"{mode} {one.name}"
         ]
         if not every:
@@ -90,7 +90,10 @@ def _chosen(options: FaultsOptions, known: dict[str, Expected]) -> list[Cell]:
         raise UnknownError(_unknown("mode", options.mode, tuple(SITUATIONS)))
     if options.fault not in known:
         raise UnknownError(_unknown("fault", options.fault, tuple(known)))
-    return [_cell(options.mode, known[options.fault], options.seed)]
+    expected = known[options.fault]
+    if options.mode not in expected.modes:
+        raise UnknownError(f"{options.mode} is not flown with {expected.suite}: see not_flown")
+    return [_cell(options.mode, expected, options.seed)]
 
 
 def _cell(mode: str, expected: Expected, seed: int) -> Cell:

@@ -16,6 +16,7 @@ from studies.fault_flights import SITUATIONS, FaultFlight
 EXPECTATIONS: Final = Path(__file__).with_suffix(".toml")
 ACTIONS: Final = ("goes on", "hold", "return", "land", "descend", "terminate", "ended")
 
+NotFlown = dict[str, dict[str, str]]  # reasons by mode and suite
 Contact = Literal["none", "ground", "any"]
 _CONTACTS: Final[tuple[str, ...]] = typing.get_args(Contact)
 _UNITS: Final[tuple[str, ...]] = typing.get_args(Unit)
@@ -58,7 +59,7 @@ class Expected:
     fault: Fault | None
     suite: str
     link: bool  # needs both processes in real time
-    modes: dict[str, Expectation]
+    modes: dict[str, Expectation]  # those that are flown with the suite
 
 
 def expectations(path: Path = EXPECTATIONS) -> dict[str, Expected]:
@@ -67,11 +68,11 @@ def expectations(path: Path = EXPECTATIONS) -> dict[str, Expected]:
     Raises:
         ExpectationError: It cannot be read, or a table is wrong.
     """
-    tables = _tables(path)
+    tables, without = _tables(path)
     found: dict[str, Expected] = {}
     for number, table in enumerate(tables):
         try:
-            for one in _read(table):
+            for one in _read(table, without):
                 if one.name in found:
                     raise ExpectationError(f'"{one.name}" is there twice; give one of them a name')
                 found[one.name] = one
@@ -80,7 +81,7 @@ def expectations(path: Path = EXPECTATIONS) -> dict[str, Expected]:
     return found
 
 
-def _tables(path: Path) -> list[Any]:
+def _tables(path: Path) -> tuple[list[Any], NotFlown]:
     try:
         with path.open("rb") as file:
             content = file.read(_MOST_BYTES + 1)
@@ -89,17 +90,30 @@ def _tables(path: Path) -> list[Any]:
     if len(content) > _MOST_BYTES:
         raise ExpectationError(f"{path} is too long: must be at most {_MOST_BYTES} bytes")
     try:
-        tables = tomllib.loads(content.decode("utf-8")).get("faults", [])
+        read = tomllib.loads(content.decode("utf-8"))
     except ValueError as error:  # no UTF-8, no TOML, or an integer of thousands of digits
         raise ExpectationError(f"{path} is not TOML: {error}") from error
     except RecursionError:
         raise ExpectationError(f"{path} is nested too deeply") from None
+    tables, without = read.get("faults", []), read.get("not_flown", {})
     if not isinstance(tables, list):
         raise ExpectationError(f"{path}: faults must be an array of tables ([[faults]])")
-    return tables
+    if not isinstance(without, dict) or not all(_is_reason(*one) for one in without.items()):
+        raise ExpectationError(f"{path}: not_flown must give a reason for each MODE.SUITE")
+    return tables, without
 
 
-def _read(table: Any) -> list[Expected]:
+def _is_reason(mode: str, by_suite: Any) -> bool:
+    """Whether a table of ``not_flown`` has suites, and a sentence for each."""
+    return (
+        mode in SITUATIONS
+        and isinstance(by_suite, dict)
+        and by_suite.keys() <= set(SUITE_NAMES)
+        and all(isinstance(why, str) and why for why in by_suite.values())
+    )
+
+
+def _read(table: Any, without: NotFlown) -> list[Expected]:
     """The faults of one table: each unit in each way, each instance, with each suite."""
     if not isinstance(table, dict):
         raise ExpectationError("must be a table")
@@ -113,7 +127,8 @@ def _read(table: Any) -> list[Expected]:
     for fault, name in _faults(table):
         for suite in suites:
             full = name if suite == "perfect" else f"{name}-{suite}"
-            found.append(Expected(full, fault, suite, link, modes))
+            flown = {one: it for one, it in modes.items() if suite not in without.get(one, {})}
+            found.append(Expected(full, fault, suite, link, flown))
     return found
 
 

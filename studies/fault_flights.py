@@ -258,8 +258,9 @@ class _Observer:
 
     def __init__(self, situation: Situation) -> None:
         self._situation = situation
-        self._mode: Mode | None = None
+        self._mode: Mode | None = None  # of the tick before
         self._marked = False
+        self._begun = False
         self.actions: list[str] = []
         self.texts: list[Said] = []
         self.problem = ""
@@ -274,9 +275,11 @@ class _Observer:
                 if ack.result != 0:
                     why = "; ".join(text.text for text in outputs.texts)
                     self.problem = f"command {ack.command} was refused: {why}"
-        elif self._mode is None and mode is not self._situation.mode:
-            self.problem = self.problem or f"in {mode.value} when the fault began"
         else:
+            before = self._mode
+            if not self._begun and before is not None and before is not self._situation.mode:
+                self.problem = self.problem or f"in {before.value} when the fault began"
+            self._begun = True
             self.texts += [
                 Said(round(after_s, 3), int(text.severity), text.text) for text in outputs.texts
             ]
@@ -286,8 +289,7 @@ class _Observer:
                 self.actions.append("terminate")
             elif entered and not completed and (marked or mode not in self._situation.nominal):
                 self.actions.append(mode.value)
-        if after_s >= 0.0:
-            self._mode, self._marked = mode, marked
+        self._mode, self._marked = mode, marked
 
 
 def fly(mode: str, fault: Fault | None, suite: str = "perfect", seed: int = 0) -> FaultFlight:

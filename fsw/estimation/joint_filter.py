@@ -57,7 +57,7 @@ def predicted(joint: JointState, u: float, dt: float) -> JointState:
 
 @compilable
 def push(x: Any, law: Any, now: float, dt: float, u: Vec2) -> None:
-    """Note that joints of ``x`` were accelerated by ``u`` [rad/s^2] for ``dt`` [s] until ``now`` [s]."""
+    """Joints of ``x`` were accelerated by ``u`` [rad/s^2] for ``dt`` [s], until ``now`` [s]."""
     last = x.pushes[(x.pushes_end - 1) % PUSHES, 0] if x.pushes_end > 0 else x.joint_time
     # What was missed is as if it had not been.
     x.joint_time += max(now - last - dt, 0.0)

@@ -1,4 +1,4 @@
-"""Cells of the fault matrix that were wrong: a wall, the ground, or silence."""
+"""Cells of the fault matrix that were wrong: a wall, the ground, silence, or not flown."""
 
 from __future__ import annotations
 
@@ -23,6 +23,8 @@ CELLS = [
     ("hold", "gps-off-rtk"),
     ("hold", "gps-delayed-rtk"),
     ("hold", "baro-wrong-rtk"),
+    ("trajectory", "battery-weak"),
+    ("takeoff", "battery-off"),
 ]
 
 
