@@ -6,8 +6,6 @@ No clock, socket, thread or random number: real time, lockstep, replay and tests
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from fsw.control.actuator_watch import Watch
@@ -38,6 +36,7 @@ from fsw.flight.safety_watch import SafetyWatch
 from fsw.flight.sensed_state import SensedState
 from fsw.flight.state import Damage, FlightState, PlanMemory, SafetyMemory
 from fsw.flight.uncertain_clearance import KeptSet, UncertainClearance, pose_covariance
+from fsw.frozen import replace
 from fsw.model.actuator_health import SOUND
 from fsw.model.battery import Levels, corrected, drained
 from fsw.model.body import body_of
@@ -117,6 +116,7 @@ class Autopilot:
             + self._cascade.law.filter.lag,
         )
         self._zones: tuple[KeptSet, EndEffectorTarget | None, Array] = (KeptSet(), None, NO_ZONES)
+        self._tick_us = config.tick_period_us
         self._ticks_per_plan = config.mpc_period_us // config.tick_period_us
         self._most_us = config.catch_up_ticks * config.tick_period_us
 
@@ -223,13 +223,7 @@ class Autopilot:
             watch,
         )
         snapshot = _snapshot(state, estimate, u, inputs)
-        return state, TickOutputs(
-            actuators=sent,
-            snapshot=snapshot,
-            plan_request=request,
-            acks=tuple(acks),
-            texts=tuple(texts),
-        )
+        return state, TickOutputs(sent, snapshot, request, tuple(acks), tuple(texts))
 
     def _with_evidence(self, state: FlightState, estimate: StateEstimate) -> FlightState:
         """What the failsafe table looks at and what is not kept up to date elsewhere."""
@@ -297,15 +291,17 @@ class Autopilot:
             state = replace(state, host=inputs.host)
         if inputs.ground_station_heard:
             state = replace(state, vehicle=replace(state.vehicle, gcs_heard_us=now_us))
-        heard = (inputs.motion, inputs.attitude, inputs.joints) != (None, None, None)
-        if heard or inputs.refused_setpoints:
+        unheard = inputs.motion is None and inputs.attitude is None and inputs.joints is None
+        if not unheard or inputs.refused_setpoints:
             state = replace(state, offboard=accept_setpoints(state.offboard, inputs, self.config))
         return state
 
     def _elapsed_ticks(self, state: FlightState, now_us: int) -> int:
         """Ticks since the last one: more than one where sensor frames were missed."""
-        elapsed = (now_us - state.t_us) // self.config.tick_period_us
-        return min(max(elapsed, 1), self.config.catch_up_ticks) if state.index >= 0 else 1
+        elapsed = (now_us - state.t_us) // self._tick_us
+        if elapsed == 1 or state.index < 0:
+            return 1
+        return min(max(elapsed, 1), self.config.catch_up_ticks)
 
     def _request_plan(
         self,

@@ -5,8 +5,6 @@ Every function takes a state and returns one; almost every tick it is the same o
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from fsw.control.cascade import at_rest, in_hover
 from fsw.flight import arming, failsafe
 from fsw.flight.arming_health import arming_health
@@ -25,6 +23,7 @@ from fsw.flight.plan_exchange import nominal_at_rest
 from fsw.flight.retreat import retreat_place
 from fsw.flight.setpoint_generator import PositionGoal, SetpointGenerator
 from fsw.flight.state import FlightState, PlanMemory, SetpointMemory, VehicleMemory
+from fsw.frozen import replace
 from fsw.model.body import body_of
 from fsw.model.kinematics import point_in_flight
 from fsw.mpc.reference import still_at

@@ -20,11 +20,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
 from functools import cache, lru_cache
 
 from fsw.barriers.safe_approach import BarrierTuning, safe_approach_speed
 from fsw.compiled import compilable, kernel, machine_code
+from fsw.frozen import replace
 from fsw.geometry.vectors import add_scaled, dot, norm, subtract
 from fsw.model.body import Body, body_of, hull_reach
 from fsw.parameters.flight_config import FlightConfig

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 from fsw.flight.land_detector import height_above_ground
 from fsw.flight.modes.base import FlightMode
 from fsw.flight.reference_governor import ReferenceGovernor
 from fsw.flight.setpoint_generator import PositionGoal, ReferenceState, arrived
 from fsw.flight.state import FlightState, SetpointMemory
+from fsw.frozen import replace
 from fsw.model.kinematics import point_in_flight
 from fsw.mpc.reference import sample, still_at
 from fsw.parameters.flight_config import FlightConfig
