@@ -57,7 +57,7 @@ COPY, JOINTS, READING, END = 1, 2, 4, 8
 
 
 @kernel
-def _tick(
+def tick(
     old: Filter,
     law: Law,
     new: Filter,
@@ -82,7 +82,7 @@ def _tick(
 
 
 @kernel
-def _tick_with_pose(
+def tick_with_pose(
     old: Filter,
     law: Law,
     new: Filter,
@@ -385,7 +385,7 @@ def _fuse_range(x: Filter, law: Law, time: float, measured: float, variance: flo
 
 @kernel
 def _present_covariance(x: Filter, law: Law, now: float, M: Array, X: Array) -> None:
-    """The covariance (17, 17) of what ``_tick`` returned, and that with the frame (17, 4)."""
+    """The covariance (17, 17) of what ``tick`` returned, and that with the frame (17, 4)."""
     s, t = x[0], law[0].tuning
     for i in range(ERRORS):
         for j in range(ERRORS):
@@ -413,8 +413,6 @@ def _present_covariance(x: Filter, law: Law, now: float, M: Array, X: Array) -> 
             time = end
 
 
-tick = of_fixed_types(_tick)
-tick_with_pose = of_fixed_types(_tick_with_pose)
 set_joints = of_fixed_types(_set_joints)
 advance_to = of_fixed_types(_advance)
 begin = of_fixed_types(_begin)

@@ -16,7 +16,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from fsw.compiled import packed
+from fsw.compiled import machine_code, packed
 from fsw.estimation import kernels
 from fsw.estimation.drift import FrameDrift
 from fsw.estimation.error_state import DELAY, ERRORS, FILTER, FRAME, IMU_CAPACITY, Array, Filter
@@ -190,6 +190,13 @@ class SensorFusion:
         self._least_p = tuning.position_floor**2
         self._least_q = tuning.attitude_floor**2
         self._least_pose = self._least_p, self._least_q
+        x, none = at_start().numbers, (0.0, 0.0)
+        asked = Asked(x, kernels.COPY, _REST, none)
+        pose = (0.0, 0.0, _REST, _NO_TURN, _REST, _REST)
+        self._tick = machine_code(kernels.tick, x, self.law, *asked)
+        self._tick_with_pose = machine_code(
+            kernels.tick_with_pose, x, self.law, *asked, pose, self._least_pose
+        )
         self._least_gnss = tuning.gnss_position_floor**2, tuning.gnss_velocity_floor**2
         self._fuse: dict[type, Callable[[FusionMemory, Any], tuple[float, ...]]] = {
             PoseSample: self._fuse_pose,
@@ -294,7 +301,7 @@ class SensorFusion:
     ) -> tuple[FusionMemory, kernels.Present | None]:
         """Let the filter do what is asked of it; None: no present, or one without numbers."""
         old = memory.numbers if asked.parts & kernels.COPY else asked.x
-        of_imu, of_encoders, finite, known = kernels.tick(old, self.law, *asked)
+        of_imu, of_encoders, finite, known = self._tick(old, self.law, *asked)
         if of_imu or of_encoders:
             memory = memory.noting_faults(of_imu, of_encoders, asked.times[0])
         return memory, known if finite else None
@@ -346,7 +353,7 @@ class SensorFusion:
             *(sample.position_variance, sample.attitude_variance),
         )
         old = memory.numbers if asked.parts & kernels.COPY else asked.x
-        of_imu, of_encoders, finite, known, ratio, (place, turn) = kernels.tick_with_pose(
+        of_imu, of_encoders, finite, known, ratio, (place, turn) = self._tick_with_pose(
             old, self.law, *asked, pose, self._least_pose
         )
         now, memory = asked.times[0], FusionMemory(asked.x, *memory[1:])

@@ -457,7 +457,8 @@ class Autopilot:
             return NO_ZONES
         known, known_target, zones = self._zones
         if kept is not known or target is not known_target:
-            if kept is not known or kept.safe_set.kind is ConstraintKind.WORKSPACE:
+            same = kept.safe_set is known.safe_set and kept.added == known.added
+            if not same or kept.safe_set.kind is ConstraintKind.WORKSPACE:
                 zones = moving_zones(kept.safe_set, target, kept.added)
             self._zones = (kept, target, zones)
         return zones

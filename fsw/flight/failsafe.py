@@ -847,13 +847,14 @@ BLOCKING: Final = frozenset((Condition.POSITION_LOST, Condition.PLANNER_LOST))
 
 _TESTS: Final = tuple((row.active, row) for row in FAILSAFES)
 _QUICK: Final = tuple((row.active, row) for row in FAILSAFES if not row.slow)
+_SLOW_TESTS: Final = tuple((row.active, row) for row in FAILSAFES if row.slow)
 _SLOW: Final = frozenset(row.condition for row in FAILSAFES if row.slow)
 
 
 def active(context: FailsafeContext) -> tuple[Failsafe, ...]:
     """Rows whose condition is active, in the order of the table; almost always none."""
     found: tuple[Failsafe, ...] = ()
-    for is_active, row in _TESTS:
+    for is_active, row in _SLOW_TESTS if _all_is_well(context) else _TESTS:
         if is_active(context):
             found = (*found, row)
     return found

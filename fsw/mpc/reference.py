@@ -6,12 +6,14 @@ import math
 from bisect import bisect_right
 from collections.abc import Callable
 from functools import cache
+from operator import attrgetter
 
 from fsw.compiled import compilable, kernel, machine_code
 from fsw.geometry.rotation import wrap_angle
 from fsw.signals import EndEffectorTarget, Vec3
 
 _REST: Vec3 = (0.0, 0.0, 0.0)
+_time = attrgetter("t_us")
 KEPT_POINTS = 256  # 25 s of a 10 Hz stream; a flood must not grow the memory
 
 
@@ -32,11 +34,14 @@ def merge(
     """
     if not received:
         return stream
-    by_time = {point.t_us: point for point in stream}
-    by_time.update((point.t_us, point) for point in received if _is_finite(point))
-    points = [by_time[t] for t in sorted(by_time)]
-    due = bisect_right([point.t_us for point in points], now_us)
-    return tuple(points[max(due - 1, 0) :][:KEPT_POINTS])
+    new = tuple([point for point in received if _is_finite(point)])
+    if stream and len(new) == 1 and new[0].t_us > stream[-1].t_us:
+        points = stream + new  # the usual case, at a tenth of the cost
+    else:
+        by_time = {point.t_us: point for point in (*stream, *new)}
+        points = tuple([by_time[t] for t in sorted(by_time)])
+    due = bisect_right(points, now_us, key=_time)
+    return points[max(due - 1, 0) :][:KEPT_POINTS]
 
 
 def _is_finite(point: EndEffectorTarget) -> bool:
@@ -45,7 +50,7 @@ def _is_finite(point: EndEffectorTarget) -> bool:
 
 def sample(stream: tuple[EndEffectorTarget, ...], t_us: int) -> EndEffectorTarget:
     """The reference at ``t_us``: cubic between points, sorted by time, at rest beyond the ends."""
-    after = bisect_right(stream, t_us, key=lambda point: point.t_us)
+    after = bisect_right(stream, t_us, key=_time)
     if after == 0:
         return still_at(stream[0].p_WE, t_us, stream[0].yaw)
     before = stream[after - 1]
