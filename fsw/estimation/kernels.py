@@ -60,24 +60,26 @@ COPY, JOINTS, READING, END = 1, 2, 4, 8
 def tick(
     old: Filter,
     law: Law,
+    more: int,
+    until: float,
     new: Filter,
     parts: int,
-    times: Vec3,
+    times: Vec2,
     u: Vec2,
     encoders: Vec3,
     reading: Reading,
 ) -> tuple[int, int, bool, Present]:
-    """Those ``parts`` of a tick that are due; what is wrong with IMU and encoders, and the present.
+    """Do ``parts`` of a tick and ``more``; what is wrong with IMU and encoders, and the present.
 
     ``COPY`` the filter, so that a tick leaves its inputs as they were, and note what torques made
     of the joints; take in ``encoders``, two angles and their age; take in a ``reading`` of the IMU;
-    predict up to the horizon and from there the present, which may be no number. ``times``: now,
-    the tick's length, and the horizon.
+    predict ``until`` the horizon and from there the present, which may be no number. ``times``:
+    now, and the tick's length.
     """
     fault, of_encoders = _taken_in(old, law, new, parts, times, u, encoders, reading)
     finite, known = False, _nothing()
-    if parts & END:
-        finite, known = _predicted(new, law, times)
+    if more & END:
+        finite, known = _predicted(new, law, times[0], until)
     return fault, of_encoders, finite, known
 
 
@@ -85,9 +87,10 @@ def tick(
 def tick_with_pose(
     old: Filter,
     law: Law,
+    until: float,
     new: Filter,
     parts: int,
-    times: Vec3,
+    times: Vec2,
     u: Vec2,
     encoders: Vec3,
     reading: Reading,
@@ -110,7 +113,7 @@ def tick_with_pose(
     innovation = vec3(x.innovation[0], 0), vec3(x.innovation[1], 0)
     finite, known = False, _nothing()
     if ratio[0] <= 1.0 and ratio[1] <= 1.0:
-        finite, known = _predicted(new, law, times)
+        finite, known = _predicted(new, law, times[0], until)
     return fault, of_encoders, finite, known, ratio, innovation
 
 
@@ -120,13 +123,13 @@ def _taken_in(
     law: Law,
     new: Filter,
     parts: int,
-    times: Vec3,
+    times: Vec2,
     u: Vec2,
     encoders: Vec3,
     reading: Reading,
 ) -> tuple[int, int]:
     """All but the ``END``: what is wrong with the IMU and with the encoders."""
-    now, dt, _ = times
+    now, dt = times
     if parts & COPY:
         _copy(old[0], new[0])
         joint_filter.push(new[0], law[0].tuning, now, dt, u)
@@ -141,9 +144,8 @@ def _taken_in(
 
 
 @compilable
-def _predicted(x: Filter, law: Law, times: Vec3) -> tuple[bool, Present]:
+def _predicted(x: Filter, law: Law, now: float, until: float) -> tuple[bool, Present]:
     """The present, with the filter at its horizon; whether all of it are numbers."""
-    now, _, until = times
     advance(x[0], law[0].tuning, until)
     p, v, q, rate, force = present(x[0], now)
     angles, rates = joint_filter.present_joints(x[0], now)

@@ -74,6 +74,13 @@ class Health(NamedTuple):
                 return at - before
         return math.inf
 
+    def with_fused(
+        self, fused: tuple[float, ...], ratio: tuple[float, ...], innovation: tuple[float, ...]
+    ) -> Health:
+        """The same sensor after a sample, of which each part was ``fused`` [s] last so."""
+        # By position: the names of all fields cost as much as the rest.
+        return Health._make((*self[:7], fused, ratio, innovation, *self[10:]))
+
     def with_fault(self, fault: SensorFault, now: float) -> Health:
         """The same sensor, with a ``fault`` that was seen at ``now`` [s]."""
         others, last = [], -math.inf

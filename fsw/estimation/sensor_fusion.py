@@ -151,6 +151,15 @@ class FusionMemory(NamedTuple):
         """Whether a sample says what the last one of its sensor said, to the last bit."""
         return numbers_of(sample) == self.of(SENSOR_OF[type(sample)]).numbers
 
+    def after(self, one: Waiting, health: Health, refused: tuple[Aiding, ...]) -> FusionMemory:
+        """The memory after the first of the waiting samples was fused, or ``refused`` [SI]."""
+        sample, pose, counter = one.sample, self.pose, self.reset_counter
+        if isinstance(sample, PoseSample):
+            pose, counter = sample, sample.reset_counter
+        known = self.waiting[1:], (*self.without(health.sensor), health)
+        seen = pose, counter, refused
+        return FusionMemory._make((*self[:5], *known, *self[7:10], *seen, *self[13:]))
+
     def without(self, sensor: Sensor) -> list[Health]:
         """What is known of the other sensors."""
         return [one for one in self.health if one.sensor is not sensor]
@@ -175,7 +184,7 @@ class Asked(NamedTuple):
 
     x: Filter  # the new one
     parts: int
-    times: Vec3  # s: now, the tick's length, and the horizon
+    times: Vec2  # s: now, and the tick's length
     u: Vec2  # rad/s^2, of the joints
     encoders: Vec3 = _REST  # the same object: there was no reading
     reading: kernels.Reading = _NO_READING
@@ -191,11 +200,11 @@ class SensorFusion:
         self._least_q = tuning.attitude_floor**2
         self._least_pose = self._least_p, self._least_q
         x, none = at_start().numbers, (0.0, 0.0)
-        asked = Asked(x, kernels.COPY, _REST, none)
+        asked = Asked(x, kernels.COPY, none, none)
         pose = (0.0, 0.0, _REST, _NO_TURN, _REST, _REST)
-        self._tick = machine_code(kernels.tick, x, self.law, *asked)
+        self._tick = machine_code(kernels.tick, x, self.law, 0, 0.0, *asked)
         self._tick_with_pose = machine_code(
-            kernels.tick_with_pose, x, self.law, *asked, pose, self._least_pose
+            kernels.tick_with_pose, x, self.law, 0.0, *asked, pose, self._least_pose
         )
         self._least_gnss = tuning.gnss_position_floor**2, tuning.gnss_velocity_floor**2
         self._fuse: dict[type, Callable[[FusionMemory, Any], tuple[float, ...]]] = {
@@ -236,7 +245,7 @@ class SensorFusion:
         """
         dt = min(max(now - memory.now, 0.0), _LONGEST_STEP) if memory.now >= 0.0 else 0.0
         x = np.ndarray(1, FILTER, np.empty(_FLOATS))  # eight times as fast as an empty record
-        asked = Asked(x, kernels.COPY, (now, dt, 0.0), joint_acceleration)
+        asked = Asked(x, kernels.COPY, (now, dt), joint_acceleration)
         for sample in samples:
             if isinstance(sample, ImuSample):
                 memory, asked = self._take_imu(memory, asked, sample)
@@ -297,11 +306,14 @@ class SensorFusion:
         return memory, Asked(x, parts, times, u, (first, second, now - sample.time), reading)
 
     def _do(
-        self, memory: FusionMemory, asked: Asked
+        self, memory: FusionMemory, asked: Asked, more: int, until: float
     ) -> tuple[FusionMemory, kernels.Present | None]:
-        """Let the filter do what is asked of it; None: no present, or one without numbers."""
+        """Let the filter do what is asked of it, and ``more`` ``until`` [s].
+
+        None: no present, or one without numbers.
+        """
         old = memory.numbers if asked.parts & kernels.COPY else asked.x
-        of_imu, of_encoders, finite, known = self._tick(old, self.law, *asked)
+        of_imu, of_encoders, finite, known = self._tick(old, self.law, more, until, *asked)
         if of_imu or of_encoders:
             memory = memory.noting_faults(of_imu, of_encoders, asked.times[0])
         return memory, known if finite else None
@@ -310,27 +322,26 @@ class SensorFusion:
         """The memory of a filter that has done what was asked of it; nothing is any more."""
         if not asked.parts:
             return memory, asked
-        memory, _ = self._do(memory, asked)
+        memory, _ = self._do(memory, asked, 0, 0.0)
         return FusionMemory(asked.x, *memory[1:]), asked._replace(parts=0)
 
     def _predicted(
         self, memory: FusionMemory, asked: Asked, until: float
     ) -> tuple[FusionMemory, kernels.Present | None]:
         """Let the filter go on ``until`` [s], fuse what it reaches, and predict the present."""
-        x, parts, (now, dt, _), u, encoders, reading = asked
-        asked, waits = Asked(x, parts, (now, dt, until), u, encoders, reading), memory.waiting
+        waits = memory.waiting
         if waits and waits[0].time <= until:
             if (len(waits) == 1 or waits[1].time > until) and self._is_plain(memory, waits[0]):
-                memory, known, fused = self._do_with_pose(memory, asked, waits[0])
+                memory, known, fused = self._do_with_pose(memory, asked, waits[0], until)
                 if fused:
                     return memory, known
+                asked = asked._replace(parts=0)
             else:
-                memory, _ = self._done(memory, asked)
-            parts = 0
+                memory, asked = self._done(memory, asked)
             while memory.waiting and memory.waiting[0].time <= until:
-                kernels.advance_to(x, self.law, memory.waiting[0].time)
-                memory = self._fuse_first(memory, now)
-        return self._do(memory, Asked(x, parts | kernels.END, *asked[2:]))
+                kernels.advance_to(asked.x, self.law, memory.waiting[0].time)
+                memory = self._fuse_first(memory, asked.times[0])
+        return self._do(memory, asked, kernels.END, until)
 
     def _is_plain(self, memory: FusionMemory, one: Waiting) -> bool:
         """Whether a sample is a pose as most are: of a frame that stays, and has not jumped."""
@@ -343,10 +354,10 @@ class SensorFusion:
         )
 
     def _do_with_pose(
-        self, memory: FusionMemory, asked: Asked, one: Waiting
+        self, memory: FusionMemory, asked: Asked, one: Waiting, until: float
     ) -> tuple[FusionMemory, kernels.Present | None, bool]:
         """``_do`` with a plain pose to fuse, and whether it was; if not the filter stays there."""
-        sample = one.sample
+        sample, now = one.sample, asked.times[0]
         assert isinstance(sample, PoseSample)
         pose = (
             *(one.time, sample.time, sample.position, sample.attitude),
@@ -354,13 +365,18 @@ class SensorFusion:
         )
         old = memory.numbers if asked.parts & kernels.COPY else asked.x
         of_imu, of_encoders, finite, known, ratio, (place, turn) = self._tick_with_pose(
-            old, self.law, *asked, pose, self._least_pose
+            old, self.law, until, *asked, pose, self._least_pose
         )
-        now, memory = asked.times[0], FusionMemory(asked.x, *memory[1:])
+        memory = FusionMemory(asked.x, *memory[1:])
         if of_imu or of_encoders:
             memory = memory.noting_faults(of_imu, of_encoders, now)
-        memory = self._judged(memory, one, ratio, (*place, *turn), now)
-        return memory, known if finite else None, ratio[0] <= 1.0 and ratio[1] <= 1.0
+        innovation, fused = (*place, *turn), ratio[0] <= 1.0 and ratio[1] <= 1.0
+        if fused:
+            health = memory.of(Sensor.POSE).with_fused((now, now), ratio, innovation)
+            memory = memory.after(one, health, memory.refused)
+        else:
+            memory = self._judged(memory, one, ratio, innovation, now)
+        return memory, known if finite else None, fused
 
     def covariance(self, memory: FusionMemory, now: float) -> Array:
         """Covariance (17, 17) [SI] of the error of the state at ``now`` [s]."""
@@ -547,9 +563,7 @@ class SensorFusion:
         Chi-square over gate and innovation are of each of its parts. The frame of a pose may have
         jumped (``announced``), from the filter's ``previous`` state if it drifts.
         """
-        sample, pose, counter = one.sample, memory.pose, memory.reset_counter
-        if isinstance(sample, PoseSample):
-            pose, counter = sample, sample.reset_counter
+        sample = one.sample
         health = memory.of(SENSOR_OF[type(sample)])
         refused = 1.0 < max(ratio) < math.inf  # infinite: it says nothing here
         if refused and isinstance(sample, PressureSample) and not health.fused:
@@ -567,11 +581,8 @@ class SensorFusion:
         fused = health.fused or (now,) * len(ratio)
         fused = tuple([now if r <= 1.0 else before for r, before in zip(ratio, fused, strict=True)])
         shown = innovation if len(ratio) > 1 else innovation[:1]
-        # By position: the names of all fields cost as much as the rest.
-        health = Health(*health[:7], fused, ratio, shown, *health[10:])
-        known = (memory.waiting[1:], (*memory.without(health.sensor), health))
-        seen = (pose, counter, latest)
-        memory = FusionMemory._make((*memory[:5], *known, *memory[7:10], *seen, *memory[13:]))
+        health = health.with_fused(fused, ratio, shown)
+        memory = memory.after(one, health, latest)
         long_refused = now - min(fused) > self.tuning.reset_time and confirmed
         if max(ratio) > 1.0 and (announced or long_refused):
             memory = self._reset(memory, one, ratio)
