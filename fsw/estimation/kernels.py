@@ -72,9 +72,9 @@ def tick(
     """Do ``parts`` of a tick and ``more``; what is wrong with IMU and encoders, and the present.
 
     ``COPY`` the filter, so that a tick leaves its inputs as they were, and note what torques made
-    of the joints; take in ``encoders``, two angles and their age; take in a ``reading`` of the IMU;
-    predict ``until`` the horizon and from there the present, which may be no number. ``times``:
-    now, and the tick's length.
+    of the joints, accelerated by ``u`` [rad/s^2]; take in ``encoders`` [rad, rad, s], two angles
+    and their age; take in a ``reading`` of the IMU; predict ``until`` [s] the horizon and from
+    there the present, which may be no number. ``times`` [s]: now, and the tick's length.
     """
     fault, of_encoders = _taken_in(old, law, new, parts, times, u, encoders, reading)
     finite, known = False, _nothing()
@@ -100,7 +100,8 @@ def tick_with_pose(
     """The same with a ``pose`` that the filter reaches, of a frame that does not drift.
 
     Also chi-square over gate of its two halves, and their innovation. Where one is beyond its gate
-    the filter stays at the pose, and there is no present yet. Variances are ``least`` at least.
+    the filter stays at the pose, and there is no present yet. Its variances are at least ``least``
+    [m^2, rad^2]. ``until`` [s], ``times`` [s], ``u`` [rad/s^2], ``encoders`` [rad, rad, s].
     """
     fault, of_encoders = _taken_in(old, law, new, parts, times, u, encoders, reading)
     x, t = new[0], law[0].tuning
