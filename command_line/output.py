@@ -63,3 +63,8 @@ def unwritten(target: str | Path | None, text: str) -> list[str]:
     except OSError as error:
         return [f"{'standard output' if target == '-' else target}: {error.strerror}"]
     return []
+
+
+def without(error: ModuleNotFoundError, extra: str) -> str:
+    """What to install where an optional package is missing."""
+    return f"the package {error.name} is missing; install pandion[{extra}]"

@@ -9,7 +9,7 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
 from command_line.options import as_words, declared, group, json_file, read, switch
-from command_line.output import complain, json_text, unwritten
+from command_line.output import complain, json_text, unwritten, without
 from command_line.parser import COULD_NOT_START
 from command_line.version import version
 from fsw.arguments import OUT, PARAMS, FswOptions
@@ -211,5 +211,5 @@ def _report(flight: PlannedFlight, display: Display) -> list[str]:
     except (UlogError, OSError) as error:
         return [f"report: {error}"]
     except ModuleNotFoundError as error:
-        return [f"report: the package {error.name} is missing; install pandion[report]"]
+        return [f"report: {without(error, 'report')}"]
     return []
