@@ -18,7 +18,7 @@ from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wai
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Generic, Protocol, Self, TypeVar
 
 from fsw.runtime.process import die_with_parent, pin_numerics_to_one_thread
 
@@ -72,6 +72,15 @@ class Campaign(Generic[RowT]):
     def __post_init__(self) -> None:
         if self.journal is not None and self.journal.exists():
             self._kept.update(_lines(self.journal))
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """End the processes that fly."""
 
     def run(self, flights: Sequence[Flight[RowT]]) -> list[RowT]:
         """Rows in the order of the flights."""
