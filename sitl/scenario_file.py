@@ -180,15 +180,24 @@ def _value(hint: Any, value: Any, path: str) -> Any:
         return build_table(hint, value, path)
     if origin is tuple:
         if not isinstance(value, list):
-            tables = dataclasses.is_dataclass(parts[0]) or get_origin(parts[0]) is types.UnionType
-            what = f"tables ([[{path}]])" if tables else 'texts, such as ["a", "b"]'
-            raise ScenarioError(f"{path} = {_shown(value)}: must be an array of {what}")
+            raise ScenarioError(
+                f"{path} = {_shown(value)}: must be an array of {_entries(parts[0], path)}"
+            )
         return tuple(_value(parts[0], item, f"{path}[{i}]") for i, item in enumerate(value))
     if hint is bool:
         if not isinstance(value, bool):
             raise ScenarioError(f"{path} = {_shown(value)}: must be true or false")
         return value
     return _word(hint, value, path)
+
+
+def _entries(hint: Any, path: str) -> str:
+    """What an array consists of, as a sentence says it."""
+    if get_origin(hint) is Annotated:
+        return f"arrays of {len(get_args(get_args(hint)[0]))} numbers"
+    if dataclasses.is_dataclass(hint) or get_origin(hint) is types.UnionType:
+        return f"tables ([[{path}]])"
+    return 'texts, such as ["a", "b"]'
 
 
 def _sensors(value: Any, path: str) -> Sensors | MeasuredSensors:
