@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,10 +16,8 @@ from pandion.cluster_options import ClusterOptions, campaign_of
 from pandion.display import Display
 
 if TYPE_CHECKING:
-    from studies.campaign_flight import CampaignRow
     from studies.campaign_plan import CampaignPlan
-    from studies.campaign_store import CampaignResult
-    from studies.campaign_summary import Progress
+    from studies.job import Job
 
 FLOWN, BROKEN = 0, 1  # exit codes
 
@@ -129,6 +127,7 @@ def _written(options: CampaignOptions, folder: Path, display: Display) -> int:
     more: dict[str, Any] = {
         "flown": len(rows),
         "violations": sum(row.violated for row in rows),
+        "refused": sum(row.refused for row in rows),
         "errors": sum(row.error for row in rows),
         "configurations": [one.as_json() for one in cases],
         "worst": [row.compared() | {"again": again(row, folder)} for row in worst(rows)],
@@ -142,13 +141,69 @@ def _written(options: CampaignOptions, folder: Path, display: Display) -> int:
         least = one.margin_m.get("0")
         margin = "" if least is None else f", least margin {1e3 * least:+.1f} mm"
         name = ", ".join(x for x in (one.scenario, one.suite, one.controller, one.fault) if x)
-        display.say(f"{name}: {one.flights} flights, {one.violated} violations{margin}")
+        refused = f", {one.refused} refused by the vehicle" if one.refused else ""
+        broke = f", {one.errors} broke" if one.errors else ""
+        display.say(
+            f"{name}: {one.flights} flights, {one.violated} violations{refused}{broke}{margin}"
+        )
     display.say(f"page {folder / PAGE}")
     lost = unwritten(options.json, json_text(facts, 1) + "\n")
     for what in lost:
         complain("pandion campaign", f"cannot write {what}")
     for row in rows:
         if row.error:
-            complain("pandion campaign", f"flight {row.flight} was not flown: {row.reason}")
+            complain("pandion campaign", f"flight {row.flight} broke: {row.reason}")
             break
     return BROKEN if lost or more["errors"] else FLOWN
+
+
+def _again(options: CampaignOptions, plan: CampaignPlan) -> int:
+    """One flight in this process, its trace, and what flies it with both processes and a log."""
+    from fsw.parameters.registry import BY_NAME
+    from fsw.parameters.storage import save
+    from sitl.scenario_text import scenario_text
+    from studies.campaign_flight import CampaignFlight
+    from studies.job import fly_job
+
+    number = options.flight or 0
+    plan.check(number + 1)
+    flight = plan.flight(number)
+    job = flight.job
+    folder = options.out or new_run_directory(Path("runs"), f"{plan.name}-flight{number}")
+    folder.mkdir(parents=True, exist_ok=True)
+    row = CampaignFlight(plan, number).row()
+    console = console_beside(options.json)
+    say(f"flight {number}: {flight.case}, seed {flight.seed}", console)
+    for key, value in flight.values:
+        say(f"  {key} = {value:g}", console)
+    say(f"  {row.reason}", console)
+    traced: dict[str, Any] = {"row": row.compared()}
+    if not row.error:
+        result = fly_job(job, traced=True)
+        traced["texts"] = result.planner.texts
+        traced["trace"] = [asdict(point) for point in result.planner.trace]
+    stem = folder / f"flight-{number}"
+    trace, scenario, params = (stem.with_suffix(end) for end in (".json", ".toml", ".params"))
+    trace.write_text(json_text(traced) + "\n", encoding="utf-8")
+    comment = f"flight {number} of campaign {plan.name}: {flight.case}"
+    scenario.write_text(scenario_text(job.scenario, comment), encoding="utf-8")
+    changed = {name: one.read(job.config) for name, one in BY_NAME.items()}
+    save(params, {n: v for n, v in changed.items() if v != BY_NAME[n].default})
+    say(f"trace {trace}", console)
+    say(f"with its log: {_fly_words(flight.case.controller, job, scenario, params)}", console)
+    lost = unwritten(options.json, json_text(traced["row"], 1) + "\n")
+    for what in lost:
+        complain("pandion campaign", f"cannot write {what}")
+    return BROKEN if row.error or lost else FLOWN
+
+
+def _fly_words(controller: str, job: Job, scenario: Path, params: Path) -> str:
+    """The command that flies the same over the link: equal but for what the link rounds."""
+    words = ["pandion fly", str(scenario), f"--seed={job.seed}", f"--params={params}"]
+    if controller != "blf":
+        words.append(f"--controller={controller}")
+    if job.config.inner == "pid":
+        words.append("--tracking=pid")
+    if job.config.soft:
+        words.append("--allow-inconsistent")
+    return " ".join(words)

@@ -33,7 +33,7 @@ def page(result: CampaignResult, sentences: Sequence[str], where: Path) -> str:
     broken = [row for row in rows if row.error]
     if broken:
         texts = [f"flight {row.flight}: {row.reason}" for row in broken[:100]]
-        parts.append('<h2 class="warning">Flights that could not be flown</h2>' + items(texts))
+        parts.append('<h2 class="warning">Flights that broke</h2>' + items(texts))
     try:
         parts += _figures(result)
     except NoMatplotlibError as error:
@@ -58,7 +58,8 @@ def _cases(found: Sequence[CaseSummary]) -> str:
         "completed",
         "violations",
         "contacts",
-        "not flown",
+        "refused",
+        "broke",
         "least margin mm",
         "1 %",
         "median",
@@ -72,7 +73,7 @@ def _cases(found: Sequence[CaseSummary]) -> str:
             one.controller,
             one.fault or "–",
             *(str(n) for n in (one.flights, one.completed, one.violated, one.contacts)),
-            str(one.errors),
+            *(str(n) for n in (one.refused, one.errors)),
             *(millimetres(one.margin_m.get(share)) for share in ("0", "0.01", "0.5")),
             *(metres(one.te_m.get(share)) for share in ("0.5", "0.99")),
         )

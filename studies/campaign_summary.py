@@ -24,7 +24,7 @@ class Progress:
     total: int
     done: int = 0
     violated: int = 0  # the safe set was left, or something was touched
-    errors: int = 0  # flights that could not be flown
+    unflown: int = 0  # broken, or refused by the vehicle
     worst_m: float = math.inf
     _fresh: int = 0  # flown by this run
     _began_s: float = field(default_factory=time.monotonic)
@@ -32,7 +32,7 @@ class Progress:
     def add(self, row: CampaignRow, *, fresh: bool) -> None:
         """Take in a row that was flown now, or one of the journal."""
         self.done += 1
-        self.errors += row.error
+        self.unflown += row.error or row.refused
         self.violated += row.violated
         if row.margin_m is not None:
             self.worst_m = min(self.worst_m, row.margin_m)
@@ -54,8 +54,8 @@ class Progress:
             left_s = round((self.total - self.done) / rate)
             parts += [f"{rate:.2g} flights/s", f"{_clock(left_s)} left"]
         parts.append(f"{self.violated} violations")
-        if self.errors:
-            parts.append(f"{self.errors} not flown")
+        if self.unflown:
+            parts.append(f"{self.unflown} not flown")
         if math.isfinite(self.worst_m):
             parts.append(f"worst margin {1e3 * self.worst_m:+.1f} mm")
         return ", ".join(parts)
@@ -73,6 +73,7 @@ class CaseSummary:
     completed: int
     violated: int
     contacts: int
+    refused: int
     errors: int
     margin_m: dict[str, float]  # by share of the flights
     te_m: dict[str, float]
@@ -102,6 +103,7 @@ def _case(
         completed=sum(row.completed for row in rows),
         violated=sum(row.violated for row in rows),
         contacts=sum(row.contact for row in rows),
+        refused=sum(row.refused for row in rows),
         errors=sum(row.error for row in rows),
         margin_m=_quantiles(row.margin_m for row in rows),
         te_m=_quantiles(row.te_m for row in rows),
@@ -119,7 +121,7 @@ def _quantiles(values: Iterable[float | None]) -> dict[str, float]:
 
 
 def worst(rows: Sequence[CampaignRow], count: int = WORST) -> list[CampaignRow]:
-    """Flights that could not be flown, those that touched something, then the least margins."""
+    """Flights that broke, those that touched something, then the least margins."""
 
     def rank(row: CampaignRow) -> tuple[int, float, int]:
         first = 0 if row.error else 1 if row.contact else 2
