@@ -246,6 +246,6 @@ def test_a_worker_with_several_threads_of_algebra_flies_nothing(by_hand: DaskByH
 
 def test_a_scheduler_that_is_not_there_is_named() -> None:
     began_s = time.monotonic()
-    with pytest.raises(SchedulerGoneError, match="no scheduler answers at tcp://127.0.0.1:9"):
+    with pytest.raises(SchedulerGoneError, match=r"no scheduler answers at tcp://127\.0\.0\.1:9"):
         Campaign[StubRow](0, scheduler=Scheduler("tcp://127.0.0.1:9")).run([StubFlight(1)])
     assert time.monotonic() - began_s < 30.0
