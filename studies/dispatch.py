@@ -13,8 +13,8 @@ if TYPE_CHECKING:
 
 RowT = TypeVar("RowT", bound="Row")
 
-# A task costs the scheduler one or two milliseconds (python -m benchmarks scheduler): faster flights
-# go in batches.
+# A task costs the scheduler one or two milliseconds (python -m benchmarks scheduler): flights that
+# would be more go in batches.
 TASKS_A_SECOND: Final = 100.0
 _MOST_A_TASK: Final = 100
 AHEAD: Final = 2  # tasks out for each thread: one flies, one waits beside it
