@@ -141,7 +141,7 @@ def _written(options: CampaignOptions, folder: Path, display: Display) -> int:
         display.say("no rows.parquet: install pandion[parquet] for it; the journal has the rows")
     for one in cases:
         least = one.margin_m.get("0")
-        margin = "" if least is None else f", least margin {1e3 * least:+.1f} mm"
+        margin = "" if least is None else f", minimum margin {1e3 * least:+.1f} mm"
         name = ", ".join(x for x in (one.scenario, one.suite, one.controller, one.fault) if x)
         refused = f", {one.refused} refused by the vehicle" if one.refused else ""
         broke = f", {one.errors} broke" if one.errors else ""
