@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 import platform
 from dataclasses import dataclass
 from functools import cache
@@ -16,6 +17,7 @@ import sitl
 import studies
 
 _DIGITS: Final = 32
+_SHOWN: Final = 15
 _BESIDE: Final = ("llvmlite",)  # compiles the kernels; numba names it, we do not
 
 
@@ -25,14 +27,16 @@ class Identity:
 
     code: str
     packages: str
+    threads: str = "one thread"  # of its matrix products, on which their last bits depend
 
     def differs(self, other: Identity) -> str:
         """What of another machine is not as here, in words; empty if all is."""
         wrong = [
-            f"{what} {there[:8]} instead of {here[:8]}"
+            f"{what} {there[:_SHOWN]} instead of {here[:_SHOWN]}"
             for what, here, there in (
                 ("code", self.code, other.code),
                 ("packages", self.packages, other.packages),
+                ("linear algebra on", self.threads, other.threads),
             )
             if here != there
         ]
@@ -42,7 +46,8 @@ class Identity:
 @cache
 def identity() -> Identity:
     """Of this process."""
-    return Identity(_code(), packages())
+    one = "1" in (os.environ.get("OPENBLAS_NUM_THREADS"), os.environ.get("OMP_NUM_THREADS"))
+    return Identity(_code(), packages(), "one thread" if one else "several threads")
 
 
 def _code() -> str:
