@@ -138,7 +138,9 @@ def fit_tail(
 
 
 def anderson_darling(excess: Array, shape: float, scale: float) -> float:
-    """The Anderson-Darling statistic [1] of excesses under a law of ``shape`` and ``scale`` [1].
+    """The Anderson-Darling statistic [1] of the ``excess`` (n,) [any unit] under a law.
+
+    The law has a ``shape`` [1] and a ``scale`` [any unit].
 
     Source: Anderson, Darling: A test of goodness of fit, JASA 49, 1954.
     """
