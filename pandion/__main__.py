@@ -24,6 +24,10 @@ VERBS: Final[dict[str, tuple[str, str]]] = {
         "pandion.falsify",
         "search for the disturbance that pushes the vehicle furthest off its plan",
     ),
+    "certify": (
+        "pandion.certify",
+        "state what a campaign shows: exact bounds, margins, what was varied; or verify it",
+    ),
     "faults": (
         "pandion.faults",
         "let something fail in flight, in one mode or in all, and compare with what must happen",

@@ -27,6 +27,7 @@ from scipy.special import stdtrit
 from studies import binomial
 
 Array: TypeAlias = np.ndarray[Any, np.dtype[np.float64]]
+Flags: TypeAlias = np.ndarray[Any, np.dtype[np.bool_]]
 Score: TypeAlias = Callable[[Array], Array]
 """Scores (n,) of points (n, dimension); all points of a call may be evaluated at once."""
 
@@ -280,15 +281,15 @@ def _refill(
 
 def _moved(
     space: Space, points: Array, step: float, random: np.random.Generator
-) -> tuple[Array, Array]:
+) -> tuple[Array, Flags]:
     """Candidates, and which of them were moved a little instead of drawn anew in part."""
-    fresh = random.standard_normal(points.shape)
-    near = math.sqrt(1.0 - step * step) * points + step * fresh
+    fresh: Array = random.standard_normal(points.shape)
+    near: Array = points * math.sqrt(1.0 - step * step) + fresh * step
     first = space.dimension - space.redrawn
     if not space.redrawn:
         return near, np.ones(len(points), dtype=bool)
     share = 1.0 if first == 0 else _REDRAWS
-    anew = random.random(len(points)) < share
+    anew: Flags = np.asarray(random.random(len(points)) < share)
     candidates = points.copy()
     candidates[~anew, :first] = near[~anew, :first]
     candidates[anew, first:] = fresh[anew, first:]
