@@ -283,8 +283,8 @@ def _moved(
     space: Space, points: Array, step: float, random: np.random.Generator
 ) -> tuple[Array, Flags]:
     """Candidates, and which of them were moved a little instead of drawn anew in part."""
-    fresh: Array = random.standard_normal(points.shape)
-    near: Array = points * math.sqrt(1.0 - step * step) + fresh * step
+    fresh: Array = random.standard_normal((len(points), space.dimension))
+    near = math.sqrt(1.0 - step * step) * points + step * fresh
     first = space.dimension - space.redrawn
     if not space.redrawn:
         return near, np.ones(len(points), dtype=bool)
