@@ -91,6 +91,7 @@ class Campaign(Generic[RowT]):
     _lines: Journal | None = field(default=None, init=False)
     _cluster: Any = field(default=None, init=False)  # of studies.cluster, which loads Dask
     _kept_open: bool = field(default=False, init=False)
+    _past_journal: bool = field(default=False, init=False)
 
     def __enter__(self) -> Self:
         self._kept_open = True
@@ -108,6 +109,11 @@ class Campaign(Generic[RowT]):
             self._cluster.close(at_once=at_once)
         self._lines = self._cluster = None
 
+    @property
+    def flies(self) -> bool:
+        """Whether rows come from flights, not from the journal any more."""
+        return self._past_journal
+
     def run(self, flights: Sequence[Flight[RowT]]) -> list[RowT]:
         """Rows in the order of the flights."""
         keys = [flight.key() for flight in flights]
@@ -121,6 +127,7 @@ class Campaign(Generic[RowT]):
     def fly(self, flights: Sequence[Flight[RowT]]) -> Iterator[tuple[str, RowT]]:
         """Key and row of each distinct flight as they come; those of the journal first."""
         try:
+            self._past_journal = False
             if self.journal is not None and self._lines is None:
                 self._lines = Journal(self.journal)
             known = set()
@@ -129,6 +136,7 @@ class Campaign(Generic[RowT]):
                 if row is not None:
                     known.add(key)
                     yield key, row
+            self._past_journal = True
             missing = (pair for pair in _distinct(flights) if pair[0] not in known)
             yield from self._flown(missing)
         except BaseException:

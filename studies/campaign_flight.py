@@ -19,6 +19,7 @@ from studies import (
     samples,
 )
 from studies.campaign_plan import CampaignPlan
+from studies.closed_loop import RefusedError
 from studies.job import Outcome, fly_job, score, sources
 
 
@@ -45,6 +46,7 @@ class CampaignRow:
     completed: bool = False  # to its end, without violation
     reason: str = ""  # how it ended, in a sentence; why it could not be flown if ``error``
     error: bool = False  # the flight itself broke, not the vehicle
+    refused: bool = False  # the vehicle refused to arm or to follow: nothing was flown
     duration_s: float = 0.0
     margin_m: float | None = None  # least, to the safe set with its clearance, of any part
     margin_of: str | None = None  # zone and part
@@ -66,7 +68,10 @@ class CampaignRow:
 
     @property
     def violated(self) -> bool:
-        """Whether the safe set was left or something was touched; a broken flight is neither."""
+        """Whether the safe set was left or something was touched.
+
+        False as well of a flight that was not flown: see ``error`` and ``refused``.
+        """
         return self.contact or (self.margin_m is not None and self.margin_m < 0.0)
 
     def as_line(self) -> dict[str, Any]:
@@ -98,6 +103,8 @@ class CampaignFlight:
         try:
             result = fly_job(flight.job)
             found = score(flight.job, result)
+        except RefusedError as error:
+            return self._row(reason=f"refused: {error}", refused=True)
         except Exception as error:
             return self.broken(f"{type(error).__name__}: {error}")
         truth = result.truth

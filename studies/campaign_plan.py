@@ -12,7 +12,9 @@ from itertools import product
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal, TypeAlias, cast
 
+from fsw.parameters.contradictions import contradictions
 from fsw.parameters.flight_config import FlightConfig, flight_config
+from fsw.parameters.float32 import nearest_decimal
 from fsw.parameters.registry import BY_NAME
 from fsw.tuning import tuned
 from sitl.faults.keys import SENSORS, Fault
@@ -31,8 +33,8 @@ from studies.campaign_keys import (
     Flown,
     applied,
     nearest,
-    on_grid,
     range_of,
+    rounded,
 )
 from studies.campaign_values import (
     MOST_FLIGHTS,
@@ -140,6 +142,18 @@ class CampaignPlan:
         """How many flights the design has."""
         return self.count if self.design == "latin-hypercube" else MOST_FLIGHTS
 
+    def check(self, count: int) -> None:
+        """Refuse more flights than the design has.
+
+        Raises:
+            CampaignError: With what to do.
+        """
+        if count > self.most():
+            raise CampaignError(
+                f"a {self.design} of {self.most()} flights has no flight {self.most()}; write "
+                f"flights = {count} into the file, or choose another design"
+            )
+
     def flight(self, number: int) -> PlannedFlight:
         """Flight ``number``, from 0; the same whatever else is flown."""
         place, case = divmod(number, len(self.cases))
@@ -164,7 +178,7 @@ class CampaignPlan:
             raw = tuple(one.at(share) for one, share in zip(kinds, point, strict=True))
         base = self.bases[case]
         return tuple(
-            (one.key, on_grid(value, range_of(one.key, base)))
+            (one.key, rounded(one.key, value, range_of(one.key, base)))
             for one, value in zip(self.varied, raw, strict=True)
         )
 
@@ -287,7 +301,10 @@ def _config(
     config = flight_config(
         controller, _INNER[keys.tracking], body=flown.body, soft=keys.allow_inconsistent
     )
-    return tuned(config, fixed)
+    config = tuned(config, fixed)
+    for sentence in contradictions(config):
+        raise CampaignError(f"{PARAMETERS}: {sentence}")
+    return config
 
 
 def _parameters(table: Any) -> tuple[tuple[str, float], ...]:
@@ -301,7 +318,7 @@ def _parameters(table: Any) -> tuple[tuple[str, float], ...]:
         refusal = parameter.refusal(_number(value, f"{PARAMETERS}.{name}"))
         if refusal is not None:
             raise CampaignError(f"{PARAMETERS}: {refusal}")
-        found.append((parameter.path, parameter.scale * float(value)))
+        found.append((parameter.path, parameter.scale * nearest_decimal(float(value))))
     return tuple(found)
 
 
@@ -366,6 +383,7 @@ def _distribution(key: str, entry: dict[str, Any], ends: Range, design: Design) 
         if word not in known:
             raise CampaignError(f'unknown key "{path}.{word}"{nearest(word, known)}')
     numbers = _numbers(entry[kind], f"{path}.{kind}", 0 if kind == "choice" else 2)
+    _check_words(key, kind, numbers)
     points = _points(entry, path, design, kind)
     if kind == "normal":
         low, high = _numbers(entry.get("within", [ends.low, ends.high]), f"{path}.within", 2)
@@ -378,6 +396,19 @@ def _distribution(key: str, entry: dict[str, Any], ends: Range, design: Design) 
     if not numbers[0] < numbers[1]:
         raise CampaignError(f"{path}.uniform = {list(numbers)}: the first must be below the second")
     return Uniform(numbers[0], numbers[1], points)
+
+
+def _check_words(key: str, kind: str, numbers: tuple[float, ...]) -> None:
+    """A parameter of which only some values mean something takes a choice of them."""
+    parameter = BY_NAME.get(key.removeprefix(f"{PARAMETERS}."))
+    if parameter is None or not parameter.choices:
+        return
+    if kind != "choice":
+        raise CampaignError(f"vary.{key}: only some values mean something, so give a choice")
+    for value in numbers:
+        refusal = parameter.refusal(value)
+        if refusal is not None:
+            raise CampaignError(f"vary.{key}: {refusal}")
 
 
 def _normal(
