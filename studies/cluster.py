@@ -20,6 +20,7 @@ from distributed import Client, Future, KilledWorker, LocalCluster, Security
 
 from fsw.runtime.process import pin_numerics_to_one_thread
 from studies.campaign import Scheduler, SchedulerGoneError
+from studies.dispatch import Came
 from studies.identity import identity
 
 GIVE_UP_S: Final = 600.0  # without a scheduler
@@ -33,16 +34,6 @@ _SETTINGS: Final = {
     "distributed.diagnostics.nvml": False,
     "distributed.admin.event-loop": "tornado",
 }
-
-
-@dataclass(frozen=True, slots=True)
-class Came:
-    """What became of a task: rows, or why there are none; neither: it was lost."""
-
-    task: int
-    rows: tuple[Any, ...] = ()
-    took_s: float = 0.0  # all of them together, on their machine
-    broke: str = ""  # the process died, or could not read the task
 
 
 @dataclass
@@ -85,9 +76,7 @@ class Cluster:
     @property
     def dashboard(self) -> str:
         """Where Dask's pages of the cluster are; empty if its server is not there."""
-        services = self._client.scheduler_info().get("services", {})
-        there = _has_bokeh() if self._local is not None else "dashboard" in services
-        return str(self._client.dashboard_link) if there else ""
+        return str(self._client.dashboard_link) if _has_bokeh() else ""
 
     @property
     def threads(self) -> int:
@@ -178,8 +167,9 @@ class Cluster:
             if out.only and not out.only & set(self._workers)
         ]
         if found and any(one not in self._refused for one in self._workers):
+            futures = [self._out.pop(task).future for task in found]
             with contextlib.suppress(Exception):
-                self._client.cancel([self._out[task].future for task in found])
+                self._client.cancel(futures)
             return [Came(task) for task in found]
         return []
 

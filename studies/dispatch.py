@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Final, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Final, Generic, Protocol, TypeVar
 
 if TYPE_CHECKING:
     from studies.campaign import Flight, Row
-    from studies.cluster import Came, Cluster
 
 RowT = TypeVar("RowT", bound="Row")
 
@@ -20,6 +19,30 @@ TASKS_A_SECOND: Final = 200.0
 _MOST_A_TASK: Final = 100
 _AHEAD: Final = 2  # tasks out for each thread: one flies, one waits beside it
 _WAIT_S: Final = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class Came:
+    """What became of a task: rows, or why there are none; neither: it was lost."""
+
+    task: int
+    rows: tuple[Any, ...] = ()
+    took_s: float = 0.0  # all of them together, on their machine
+    broke: str = ""  # the process died, or could not read the task
+
+
+class Workers(Protocol):
+    """Where flights are flown: ``studies.cluster.Cluster``."""
+
+    @property
+    def threads(self) -> int:
+        """Flights that can be flown at once."""
+
+    def submit(self, flights: Sequence[Any], limit_s: float) -> int:
+        """Give flights to a worker; the number of the task."""
+
+    def came(self, wait_s: float) -> list[Came]:
+        """What came since, after at most ``wait_s``."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +58,7 @@ class Dispatch(Generic[RowT]):
 
     def __init__(
         self,
-        cluster: Cluster,
+        cluster: Workers,
         flights: Iterator[tuple[str, Flight[RowT]]],
         tries: int,
         limit_s: float,
@@ -58,9 +81,10 @@ class Dispatch(Generic[RowT]):
             rows: list[tuple[str, RowT]] = []
             for one in self._cluster.came(_WAIT_S):
                 waiting = self._out.pop(one.task, ())
+                alone = one.task == self._suspect_out and self._is_last(waiting[0])
                 if one.task == self._suspect_out:
                     self._suspect_out = None
-                rows += self._settled(waiting, one)
+                rows += self._settled(waiting, one, alone)
             if rows:
                 yield rows
 
@@ -71,12 +95,12 @@ class Dispatch(Generic[RowT]):
         cause because of another. Before it is given up it is flown while nothing else is out.
         """
         if self._suspects and self._suspect_out is None:
-            last = self._suspects[0].deaths >= self._tries - 1
+            last = self._is_last(self._suspects[0])
             if not last or not self._out:
                 self._suspect_out = self._give((self._suspects.popleft(),))
             if last:
                 return  # let all others come home
-        elif self._suspect_out is not None and self._last_try_is_out():
+        elif self._suspect_out is not None and self._is_last(self._out[self._suspect_out][0]):
             return
         while len(self._out) < max(_AHEAD * self._cluster.threads, 1):
             batch = self._next()
@@ -84,9 +108,9 @@ class Dispatch(Generic[RowT]):
                 return
             self._give(batch)
 
-    def _last_try_is_out(self) -> bool:
-        assert self._suspect_out is not None
-        return self._out[self._suspect_out][0].deaths >= self._tries - 1
+    def _is_last(self, suspect: _Waiting[RowT]) -> bool:
+        """Whether it is tried for the last time, and hence alone."""
+        return suspect.deaths >= self._tries - 1
 
     def _next(self) -> tuple[_Waiting[RowT], ...]:
         found: list[_Waiting[RowT]] = []
@@ -113,10 +137,17 @@ class Dispatch(Generic[RowT]):
         self._out[task] = batch
         return task
 
-    def _settled(self, waiting: tuple[_Waiting[RowT], ...], came: Came) -> list[tuple[str, RowT]]:
+    def _settled(
+        self, waiting: tuple[_Waiting[RowT], ...], came: Came, alone: bool
+    ) -> list[tuple[str, RowT]]:
         """Rows of a task that came back; what has none yet waits again."""
+        if came.broke and alone:
+            (one,) = waiting
+            return [(one.key, one.flight.broken(f"{came.broke}; tried {self._tries} times"))]
         if came.broke:
-            return self._died(waiting, came.broke)
+            most = self._tries - 1
+            self._suspects += [replace(one, deaths=min(one.deaths + 1, most)) for one in waiting]
+            return []
         if not came.rows:
             for one in waiting:
                 (self._suspects if one.deaths else self._again).append(one)
@@ -129,14 +160,4 @@ class Dispatch(Generic[RowT]):
                 self._again.append(replace(one, errors=one.errors + 1))
             else:
                 rows.append((one.key, row))
-        return rows
-
-    def _died(self, waiting: tuple[_Waiting[RowT], ...], why: str) -> list[tuple[str, RowT]]:
-        rows = []
-        for one in waiting:
-            last = one.deaths + 1 >= self._tries
-            if last and len(waiting) == 1:
-                rows.append((one.key, one.flight.broken(f"{why}, {self._tries} times")))
-            else:
-                self._suspects.append(one if last else replace(one, deaths=one.deaths + 1))
         return rows
