@@ -14,6 +14,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from sitl.ranges import Range
 from sitl.scenario import Sequence, Uniform
 from sitl.simulation import STEP_US
 from studies.campaign_keys import CampaignError, Flown, applied, range_of, rounded
@@ -51,6 +52,7 @@ class FlightSpace:
     case: Case
     flown: Flown
     varied: tuple[Varied, ...]
+    ranges: tuple[Range, ...]  # of their keys
     pushes: tuple[Pushes, ...]
     seed: int  # of what is not in the coordinates, unless another is given
 
@@ -88,10 +90,9 @@ class FlightSpace:
 
     def named(self, shares: Array) -> dict[str, float]:
         """The values at ``shares`` (values,) of the distributions [1], by key."""
-        pairs = zip(self.varied, shares, strict=True)
         return {
-            one.key: rounded(one.key, one.distribution.at(float(x)), range_of(one.key, self.flown))
-            for one, x in pairs
+            one.key: rounded(one.key, one.distribution.at(float(x)), allowed)
+            for one, allowed, x in zip(self.varied, self.ranges, shares, strict=True)
         }
 
 
@@ -102,7 +103,14 @@ def spaces(plan: CampaignPlan) -> tuple[FlightSpace, ...]:
         CampaignError: A disturbance that the file varies as well, or a flight without end.
     """
     return tuple(
-        FlightSpace(case, base, plan.varied, _pushes(base, plan.varied), plan.flight(k).seed)
+        FlightSpace(
+            case=case,
+            flown=base,
+            varied=plan.varied,
+            ranges=tuple(range_of(one.key, base) for one in plan.varied),
+            pushes=_pushes(base, plan.varied),
+            seed=plan.flight(k).seed,
+        )
         for k, (case, base) in enumerate(zip(plan.cases, plan.bases, strict=True))
     )
 
