@@ -47,8 +47,8 @@ class FalsifyOptions:
     )
     over: Path | None = option(
         "--over FILE.toml",
-        "search for the least margin over what a campaign file varies, in whole flights, instead "
-        "of along a recorded plan",
+        "search for the smallest margin over what a campaign file varies, in whole flights and not "
+        "along a recorded plan",
         Path,
     )
     keep: int = option("--keep N", "with --over: how many finds to keep", whole(1, 1000), default=5)

@@ -1,4 +1,4 @@
-"""``pandion falsify --over``: the least margin within the bounds of a campaign file."""
+"""``pandion falsify --over``: the minimum margin within the bounds of a campaign file."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def _search(options: FalsifyOptions, plan: CampaignPlan) -> int:
     )
 
     def report(done: int, least: float) -> None:
-        state = f"{done} flights, least margin {1e3 * least:+.1f} mm"
+        state = f"{done} flights, minimum margin {1e3 * least:+.1f} mm"
         display.report("flown", done, options.evaluations, state)
 
     with display.progress(), campaign:
@@ -98,12 +98,12 @@ def _kept(number: int, find: Find, folder: Path, display: Display) -> dict[str, 
     stem = folder / f"find-{number + 1}"
     margin = 1e3 * find.margin_m
     values = ", ".join(f"{key} {value:.4g}" for key, value in find.values.items())
-    comment = f"{find.flights.case}: least margin {margin:+.1f} mm, found by pandion falsify"
+    comment = f"{find.flights.case}: minimum margin {margin:+.1f} mm, found by pandion falsify"
     command = keep(find.job, find.flights.case.controller, stem, f"{comment}\n{values}".strip())
     again = flown_again(find.job, stem)
     same = again.margin_m == find.outcome.margin_m
     ending = f"; {find.outcome.reason}" if not find.outcome.completed else ""
-    display.say(f"{number + 1}. {find.flights.case}: least margin {margin:+.1f} mm{ending}")
+    display.say(f"{number + 1}. {find.flights.case}: minimum margin {margin:+.1f} mm{ending}")
     if values:
         display.say(f"   {values}")
     display.say(f"   {command}")

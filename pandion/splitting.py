@@ -31,7 +31,7 @@ class SplittingOptions:
     file: Path = option("FILE.toml", "a campaign file with one configuration", Path, required=True)
     threshold_mm: float = option(
         "--threshold MM",
-        "the event is a least margin below this, in millimetres",
+        "the event is a minimum margin below this, in millimetres",
         number(-1e5, 1e5, "mm"),
         default=0.0,
     )
@@ -47,7 +47,7 @@ class SplittingOptions:
     cluster: ClusterOptions = group(ClusterOptions)
     out: Path | None = option(
         "--out DIR",
-        "where journal and the flight with the least margin go; the same command goes on with a "
+        "where journal and the flight with the minimum margin go; the same command goes on with a "
         "journal that is there (default a new one in runs/)",
         Path,
     )
@@ -113,7 +113,7 @@ def _run(options: SplittingOptions, plan: CampaignPlan, effort: Effort) -> int:
 
 
 def _kept(score: FlightScore, found: Estimate, folder: Path) -> str:
-    """Write the flight with the least margin; the sentence that says how to see it."""
+    """Write the flight with the minimum margin; the sentence that says how to see it."""
     from studies.find import keep
 
     run = min(found.runs, key=lambda one: one.least)
@@ -122,6 +122,6 @@ def _kept(score: FlightScore, found: Estimate, folder: Path) -> str:
         score.job(run.point),
         score.flights.case.controller,
         folder / "least",
-        f"{score.flights.case}: least margin {margin:+.1f} mm, found by pandion splitting",
+        f"{score.flights.case}: minimum margin {margin:+.1f} mm, found by pandion splitting",
     )
-    return f"least margin {margin:+.1f} mm: {command}"
+    return f"minimum margin {margin:+.1f} mm: {command}"

@@ -186,7 +186,7 @@ def _configurations(result: CampaignResult, confidence: float) -> Iterator[dict[
             "flights": len(rows),
             "counted": counted,
             "at_most": bounds(counted[ANY], len(rows), confidence).upper,
-            "least_margin_m": min(margins) if margins else None,
+            "min_margin_m": min(margins) if margins else None,
         }
 
 
@@ -220,7 +220,7 @@ def _tail(
 ) -> dict[str, Any]:
     """A fit, or the sentence that says why there is none."""
     if not fitted:
-        return {"none": f"only the {_MOST_FITS} configurations with the least margins are fitted"}
+        return {"none": f"only the {_MOST_FITS} configurations with the minimum margins are fitted"}
     try:
         fit = fit_tail(margins, confidence, refits, seed)
     except NoFitError as error:

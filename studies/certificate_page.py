@@ -89,7 +89,7 @@ def page(stated: dict[str, Any], result: CampaignResult) -> str:
     parts = [f"<h1>{html.escape(title)}</h1>", f"<p><b>{html.escape(headline(stated))}</b></p>"]
     parts.append(_findings(stated))
     parts.append(f"<p>{html.escape(stated['assumed'])}</p>")
-    parts += [_configurations(stated), "<h2>Least margins</h2>"]
+    parts += [_configurations(stated), "<h2>Minimum margins</h2>"]
     for one in stated["margins"]:
         text = f"{one['name']}: {_margin_sentence(one)}. {tail_sentence(one['tail'])}."
         parts.append(f"<p>{html.escape(text)}</p>")
@@ -139,7 +139,7 @@ def _findings(stated: dict[str, Any]) -> str:
 
 
 def _configurations(stated: dict[str, Any]) -> str:
-    headers = ("configuration", "flights", *VIOLATIONS, "at most", "least margin")
+    headers = ("configuration", "flights", *VIOLATIONS, "at most", "minimum margin")
     return table(
         headers,
         [
@@ -148,7 +148,7 @@ def _configurations(stated: dict[str, Any]) -> str:
                 str(one["flights"]),
                 *(str(one["counted"][what]) for what in VIOLATIONS),
                 _probability(one["at_most"]),
-                _mm(one["least_margin_m"]),
+                _mm(one["min_margin_m"]),
             )
             for one in stated["configurations"]
         ],
@@ -193,7 +193,7 @@ def _histograms(stated: dict[str, Any], result: CampaignResult) -> str:
         ]
         ax.hist(margins, bins=50, color=BASE)
         ax.axvline(0.0, color=WALL, linewidth=1.0)
-        ax.set_title(f"{one['name']}: least margin [mm]", fontsize=8, loc="left")
+        ax.set_title(f"{one['name']}: minimum margin [mm]", fontsize=8, loc="left")
     svg = drawn.svg()
     return f"<figure>{svg[svg.index('<svg') :]}</figure>"
 

@@ -1,4 +1,4 @@
-"""The lower tail of the least margins: a generalised Pareto fit and how well it fits.
+"""The lower tail of the minimum margins: a generalised Pareto fit and how well it fits.
 
 Of flights that are alike, what lies below a low threshold is distributed by a generalised Pareto
 law (Pickands, 1975; Balkema and de Haan, 1974). A fit of it says how margins smaller than all that
@@ -22,8 +22,9 @@ _LEAST_TAIL: Final = 30
 _TAIL_SHARE: Final = 0.1
 _LEAST_DISTINCT: Final = 20
 REJECTED: Final = 0.05  # of goodness; below, the numbers are not to be used
-RARE: Final = (1e-2, 1e-3, 1e-4)  # shares of flights whose least margin is estimated
+RARE: Final = (1e-2, 1e-3, 1e-4)  # shares of flights whose minimum margin is estimated
 _STRAIGHT: Final = 1e-9  # a quotient of shape and scale below which the law is exponential
+_WORST: Final = 1e6
 _SPAN: Final = 12.0  # of the logarithm of how far the largest excess is from the end of the law
 
 
@@ -47,7 +48,7 @@ class TailFit:
     flights: int  # with a margin
     tail: int  # of them below the threshold
     threshold_m: float
-    shape: Estimate  # below 0: there is a least margin
+    shape: Estimate  # below 0: there is a minimum margin
     scale_m: Estimate
     anderson_darling: float
     goodness: float  # share of tails of the fitted law that fit no better [1]
@@ -181,7 +182,7 @@ def most_likely(excess: Array) -> tuple[float, float]:
         quotient = math.expm1(place) / most
         shape = float(np.log1p(quotient * excess).mean())
         if shape < -1.0:
-            return math.inf
+            return _WORST
         scale = shape / quotient if abs(quotient) * mean > _STRAIGHT else mean
         return math.log(scale) + shape
 

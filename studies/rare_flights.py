@@ -1,4 +1,4 @@
-"""How rare it is that a flight's least margin falls below a threshold, by splitting.
+"""How rare it is that a flight's minimum margin falls below a threshold, by splitting.
 
 The space of :mod:`studies.splitting` drives the flights of one case of a campaign file: a value
 that the file varies is where a normal number lies in its distribution, an entry of a disturbance's
@@ -31,7 +31,7 @@ _BELOW_ALL = -1e3  # m
 
 @dataclass
 class FlightScore:
-    """The least margin [m] above the threshold of each flight that points stand for."""
+    """The minimum margin [m] above the threshold of each flight that points stand for."""
 
     flights: FlightSpace
     campaign: Campaign[Outcome]
@@ -99,14 +99,14 @@ def sentences(found: Estimate, score: FlightScore) -> Iterator[str]:
     if found.reached < count:
         runs = "no run" if not found.reached else f"only {found.reached} of {count} runs"
         yield (
-            f"{runs} reached a least margin below {threshold}, so there is no interval; least "
+            f"{runs} reached a minimum margin below {threshold}, so there is no interval; smallest "
             f"{1e3 * (min(run.least for run in found.runs) + score.threshold_m):+.1f} mm "
             f"after {found.evaluations} flights"
         )
         yield from sorted({run.stuck for run in found.runs if run.stuck})
     else:
         yield (
-            f"probability of a least margin below {threshold} in a flight: "
+            f"probability of a minimum margin below {threshold} in a flight: "
             f"{found.probability:.3g}, {share} interval {low:.3g} to {high:.3g} (two-sided), from "
             f"{count} runs, {found.evaluations} flights"
         )
@@ -146,7 +146,7 @@ def as_json(found: Estimate, score: FlightScore) -> dict[str, Any]:
             {
                 "probability": run.probability,
                 "flights": run.evaluations,
-                "least_margin_m": run.least + score.threshold_m,
+                "min_margin_m": run.least + score.threshold_m,
                 "stuck": run.stuck,
                 "levels": [
                     {

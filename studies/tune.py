@@ -118,7 +118,7 @@ class Score:
     at_most: float  # probability of a violation, at the task's confidence
     feasible: bool
     cost: float  # infinite if no flight has one
-    least_margin_m: float | None
+    min_margin_m: float | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -370,14 +370,14 @@ def _score(task: Task, rows: Sequence[CampaignRow], units: dict[str, float]) -> 
         at_most=at_most,
         feasible=at_most <= task.probability and bool(costs),
         cost=float(np.mean(costs)) if costs else math.inf,
-        least_margin_m=min(margins) if margins else None,
+        min_margin_m=min(margins) if margins else None,
     )
 
 
 def _rank(score: Score) -> tuple[float, ...]:
     if score.feasible:
         return (0.0, score.cost)
-    least = -math.inf if score.least_margin_m is None else score.least_margin_m
+    least = -math.inf if score.min_margin_m is None else score.min_margin_m
     return (1.0, float(score.violations), -least)
 
 
@@ -463,8 +463,8 @@ def _nothing(found: Outcome, why: str) -> str:
 
 def _said(score: Score) -> str:
     verdict = "kept" if score.feasible else "not shown to be kept"
-    least = score.least_margin_m
-    margin = "" if least is None else f", least margin {1e3 * least:+.1f} mm"
+    least = score.min_margin_m
+    margin = "" if least is None else f", minimum margin {1e3 * least:+.1f} mm"
     return (
         f"cost {score.cost:.4f}, {score.violations} of {score.flights} violations (at most "
         f"{score.at_most:.3g}: constraint {verdict}){margin}"

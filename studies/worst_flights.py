@@ -1,4 +1,4 @@
-"""The search for the flight with the least margin, within the bounds of a campaign file.
+"""The search for the flight with the minimum margin, within the bounds of a campaign file.
 
 CMA-ES moves the values that the file varies and the tables of its uniform disturbances, all within
 their bounds, generation by generation through a campaign. A search that no longer moves begins
@@ -21,7 +21,7 @@ from studies.flight_space import FlightSpace
 from studies.job import Job, Outcome
 
 Array: TypeAlias = np.ndarray[Any, np.dtype[np.float64]]
-Report: TypeAlias = Callable[[int, float], None]  # flights so far, least margin [m]
+Report: TypeAlias = Callable[[int, float], None]  # flights so far, minimum margin [m]
 
 _MOST_CORRELATED: Final = 60  # numbers; above, their correlations would cost more than they tell
 _FIRST_STEP: Final = 0.5  # of half a range
@@ -43,7 +43,7 @@ class Find:
 
     @property
     def margin_m(self) -> float:
-        """Its least margin."""
+        """Its minimum margin."""
         return math.inf if self.outcome.margin_m is None else self.outcome.margin_m
 
     @property
@@ -157,10 +157,11 @@ def _optimiser(flights: FlightSpace, random: np.random.Generator, together: int)
     mean = np.concatenate([random.uniform(-0.8, 0.8, flights.values), *(_swing(flights, random))])
     seed = int(random.integers(2**31))
     more: dict[str, Any] = {"seed": seed, "population_size": _generation(flights, together)}
-    if len(mean) <= _MOST_CORRELATED:
-        bounds = np.tile((-1.0, 1.0), (len(mean), 1))
-        return CMA(np.clip(mean, -0.99, 0.99), _FIRST_STEP, bounds=bounds, **more)
-    return SepCMA(mean, _FIRST_STEP, **more)
+    if len(mean) > _MOST_CORRELATED:
+        return SepCMA(mean, _FIRST_STEP, **more)
+    if not flights.entries:
+        more["bounds"] = np.tile((-1.0, 1.0), (len(mean), 1))
+    return CMA(mean, _FIRST_STEP, **more)  # tables are cut off: the worst pushes are full ones
 
 
 def _generation(flights: FlightSpace, together: int) -> int:

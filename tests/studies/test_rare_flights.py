@@ -59,7 +59,7 @@ def test_uniform_pushes_keep_their_distribution_on_the_way_to_the_tail() -> None
     assert found.interval[0] < truth < found.interval[1]
     assert found.interval[1] / found.interval[0] < 60.0
     text = "\n".join(sentences(found, points))
-    assert "probability of a least margin below -3200 mm" in text
+    assert "probability of a minimum margin below -3200 mm" in text
     assert "only the scatter of the runs" in text
     assert as_json(found, points)["probability"] == found.probability
 
@@ -94,8 +94,8 @@ def test_what_is_never_reached_has_no_interval() -> None:
     points = score(CheapCampaign(lambda _: 0.2), 0.0)
     found = estimate(points, points.space, 0.0, EFFORT, 0.95, 1)
     text = list(sentences(found, points))
-    assert text[0].startswith("no run reached a least margin below 0 mm")
-    assert "least +200.0 mm" in text[0]
+    assert text[0].startswith("no run reached a minimum margin below 0 mm")
+    assert "smallest +200.0 mm" in text[0]
     assert as_json(found, points)["probability"] is None
 
 
@@ -125,6 +125,6 @@ def test_at_a_hundredth_flights_agree_with_plain_counting(
     low, high = json.loads(written.read_text())["interval"]
     assert low < 6 / 400 < high
     least = json.loads(written.read_text())["runs"]
-    assert min(run["least_margin_m"] for run in least) <= threshold
+    assert min(run["min_margin_m"] for run in least) <= threshold
     assert "pandion fly" in capsys.readouterr().out
     assert (tmp_path / "least.toml").exists()
