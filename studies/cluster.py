@@ -13,6 +13,7 @@ import signal
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, Final
 
 import dask
@@ -58,6 +59,7 @@ class Cluster:
         self._name = os.urandom(6).hex()  # of this client's tasks
         self._came: queue.SimpleQueue[tuple[int, Future]] = queue.SimpleQueue()
         self._out: dict[int, _Out] = {}
+        self._fly = _carrier()  # one object, which Dask serialises once
         self._refused: dict[str, str] = {}
         self._workers: dict[str, int] = {}
         self._looked_s, self._none_since_s = -1e9, time.monotonic()
@@ -83,25 +85,29 @@ class Cluster:
         """Flights that can be flown at once."""
         return sum(n for one, n in self._workers.items() if one not in self._refused)
 
-    def submit(self, flights: Sequence[Any], limit_s: float) -> int:
-        """Give flights to a worker; the number of the task."""
-        task = next(self._numbers)
+    def submit(self, batches: Sequence[Sequence[Any]], limit_s: float) -> list[int]:
+        """Give each batch of flights to a worker as a task; the numbers of the tasks."""
+        tasks = [next(self._numbers) for _ in batches]
         only = self._fit() if self._refused else frozenset()
         own = identity()
-        future = self._client.submit(
-            _carrier(),
-            own.code,
-            own.packages,
-            pickle.dumps(tuple(flights)),
-            limit_s,
-            key=f"flights-{self._name}-{task}",
+        futures = self._client.map(
+            self._fly,
+            [pickle.dumps(tuple(flights)) for flights in batches],
+            key=[f"flights-{self._name}-{task}" for task in tasks],
             pure=False,
             workers=sorted(only) or None,
             allow_other_workers=False,
+            code=own.code,
+            packages=own.packages,
+            limit_s=limit_s,
         )
-        self._out[task] = _Out(future, only)
-        future.add_done_callback(lambda done: self._came.put((task, done)))
-        return task
+        for task, future in zip(tasks, futures, strict=True):
+            self._out[task] = _Out(future, only)
+            future.add_done_callback(partial(self._put, task))
+        return tasks
+
+    def _put(self, task: int, future: Future) -> None:
+        self._came.put((task, future))
 
     def came(self, wait_s: float) -> list[Came]:
         """What came since, after at most ``wait_s`` [s]; a task that was lost is in it."""
@@ -292,7 +298,7 @@ def _why(future: Future) -> str:
 def _carrier() -> Callable[..., Any]:
     """A task that is sent as it is written: a worker may have other code, or none of ours."""
 
-    def fly(code: str, packages: str, packed: bytes, limit_s: float) -> Any:
+    def fly(packed: bytes, code: str, packages: str, limit_s: float) -> Any:
         from distributed import get_worker
 
         worker = get_worker().address
