@@ -106,7 +106,8 @@ def _config(scenario: Scenario) -> FlightConfig:
 
 
 def _search(options: FalsifyOptions, scenario: Scenario) -> int:
-    from studies.falsify import search_and_fly
+    from sitl.scenario_text import scenario_text
+    from studies.falsify import as_scenario, search_and_fly
 
     console = console_beside(options.json)
     display = Display(console)
@@ -129,9 +130,13 @@ def _search(options: FalsifyOptions, scenario: Scenario) -> int:
         )
     kept = folder / "worst.json"
     kept.write_text(json_text(_as_file(scenario, outcome.worst)), encoding="utf-8")
+    flown = folder / "worst.toml"
+    comment = f"found by pandion falsify {options.scenario}: {_found(outcome.worst)}"
+    flown.write_text(scenario_text(as_scenario(scenario, outcome.worst), comment), encoding="utf-8")
     for sentence in _sentences(outcome, options.amplitude) + _of_whole_stack(whole_stack):
         display.say(sentence)
     display.say(f"worst disturbance {kept}; pandion falsify {options.scenario} --replay {kept}")
+    display.say(f"as a scenario {flown}; pandion fly {flown}")
     write_text(options.json, json_text(_as_json(options, outcome, whole_stack), 2) + "\n")
     return HOLDS if outcome.holds and whole_stack.holds else BROKEN
 
