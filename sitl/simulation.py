@@ -148,6 +148,12 @@ class Simulation:
         return START_US + STEP_US * self.step
 
     @property
+    def vehicle_time_us(self) -> int:
+        """Time stamp of the current state by the vehicle's clock, which may fail [µs]."""
+        self.faults.at(self.step)
+        return self.t_us + self.faults.clock_us
+
+    @property
     def time_s(self) -> float:
         """Seconds since the start of the simulation."""
         return 1e-6 * STEP_US * self.step
