@@ -283,7 +283,7 @@ class Simulation:
         fails = self.faults.at(self.step)
         if self._drives is not None:
             self._drive(self._drives)
-        if fails or any(self._locked):
+        if fails or True in self._locked:
             self._fail()
         if self._wind is not None:
             field, moving = self._wind
@@ -334,17 +334,18 @@ class Simulation:
         x: list[float] = self._state.tolist()
         w = (x[W_WB_B], x[W_WB_B + 1], x[W_WB_B + 2])
         rates = ARM + len(self._torque)
+        # By position: keywords would take as long again.
         return SensorReadings(
             self.t_us,
-            p_WB=(x[P_WB], x[P_WB + 1], x[P_WB + 2]),
-            v_WB=(x[V_WB], x[V_WB + 1], x[V_WB + 2]),
-            q_WB=(x[Q_WB], x[Q_WB + 1], x[Q_WB + 2], x[Q_WB + 3]),
-            w_WB_B=w,
-            gyro_B=w,
-            accel_B=self._felt,
-            q_arm=tuple(x[ARM:rates]),
-            qd_arm=tuple(x[rates:]),
-            tau_arm=self._torque,
+            (x[P_WB], x[P_WB + 1], x[P_WB + 2]),
+            (x[V_WB], x[V_WB + 1], x[V_WB + 2]),
+            (x[Q_WB], x[Q_WB + 1], x[Q_WB + 2], x[Q_WB + 3]),
+            w,  # w_WB_B
+            w,  # gyro_B
+            self._felt,  # accel_B
+            tuple(x[ARM:rates]),
+            tuple(x[rates:]),
+            self._torque,
         )
 
     def _command(self, controls: Controls) -> None:
@@ -356,7 +357,8 @@ class Simulation:
             raise ValueError(f"{controls} at step {self.step}: every control must be finite")
         thrust = self.vehicle.rotors.thrust_max if armed else 0.0
         torque = self.vehicle.joints.torque_max if armed else 0.0
-        least, most, twist = min(wanted), max(wanted), max(map(abs, torques))
+        least, most = min(wanted), max(wanted)
+        twist = max(max(torques), -min(torques))
         # A thrust below zero is as far beyond its range as one that is as much too large.
         self._sent = (torque * twist, thrust * (most if least >= 0.0 else max(most, 1.0 - least)))
         if least < 0.0 or most > 1.0 or twist > 1.0:
