@@ -178,6 +178,7 @@ def _track(
             memory.height,
             memory.joints,
             memory.off_plan,
+            memory.health,
         )
         if k % every == 0:
             lift = (x[13] + x[14] + x[15] + x[16]) / mass
