@@ -43,6 +43,13 @@ class _Out:
     only: frozenset[str] = field(default_factory=frozenset)  # workers that may; empty: all
 
 
+class _Client(Client):  # type: ignore[misc]
+    """Is closed by its owner; one that could not connect does not wait for itself when it goes."""
+
+    def __del__(self) -> None:
+        pass
+
+
 class Cluster:
     """Takes tasks of pickled flights; what came of them waits until it is asked for."""
 
@@ -215,8 +222,8 @@ class Cluster:
         began_s = time.monotonic()
         while True:
             try:
-                return Client(**self._where(), timeout=_CONNECT_S, set_as_default=False)
-            except (OSError, TimeoutError, ValueError) as error:
+                return _Client(**self._where(), timeout=_CONNECT_S, set_as_default=False)
+            except Exception as error:  # whatever listens there may answer anything
                 if first or time.monotonic() > began_s + GIVE_UP_S:
                     raise SchedulerGoneError(self._no_answer(error)) from None
                 time.sleep(0.5)
@@ -241,7 +248,10 @@ class Cluster:
 
     def _no_answer(self, error: Exception) -> str:
         scheduler = self._scheduler
-        where = scheduler and (scheduler.address or scheduler.file)
+        assert scheduler is not None, error
+        where = scheduler.address or scheduler.file
+        if str(where).startswith("tls://") and scheduler.tls_ca_file is None:
+            return f"{where} needs --tls-ca-file, --tls-cert and --tls-key ({error})"
         return (
             f"no scheduler answers at {where} ({type(error).__name__}); start one with "
             "`dask scheduler`, or leave it out to fly on this machine"
