@@ -73,9 +73,9 @@ class FlightSpace:
         return self.job(middle, still).random
 
     def job(self, shares: Array, table: Array, seed: int | None = None) -> Job:
-        """The flight at ``shares`` (values,) of the distributions [1] and a ``table`` (entries,).
+        """The flight at ``shares`` (values,) [1] of the distributions and a ``table`` (entries,) [1].
 
-        The table has shares of the disturbances' amplitudes [1], from -1 to 1.
+        The table has shares of the disturbances' amplitudes, from -1 to 1.
         """
         changed = applied(self.flown, self.named(shares).items())
         scenario = changed.scenario
