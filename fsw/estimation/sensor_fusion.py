@@ -12,13 +12,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
+from functools import reduce
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from fsw.compiled import packed
 from fsw.estimation import kernels
-from fsw.estimation.drift import FrameDrift
+from fsw.estimation.drift import FrameDrift, least
 from fsw.estimation.error_state import DELAY, ERRORS, FILTER, FRAME, IMU_CAPACITY, Array, Filter
 from fsw.estimation.imu import IMU_TOO_OLD, STUCK_READINGS, TIME_TOLERANCE
 from fsw.estimation.pace import Pace
@@ -423,9 +424,12 @@ class SensorFusion:
                 if not self._is_agreed_with(sample, memory.waiting):
                     continue
                 stated = self._stated(sample)
+                noise = self._least_stated(memory.waiting) if sample.drifts else stated
                 place = sample.position, _REST, normalised(sample.attitude)
-                self._begin(memory, sample.time, place, *stated)
-                memory = memory._replace(frame=FrameDrift(*stated))
+                self._begin(memory, sample.time, place, *noise)
+                if sample.drifts:
+                    frame = FrameDrift.at_start(memory.numbers[0], noise, stated)
+                    memory = memory._replace(frame=frame)
                 break
             if isinstance(sample, GnssSample) and memory.field is not None:
                 level = _levelled(memory.numbers, memory.field, self.tuning.declination)
@@ -442,6 +446,11 @@ class SensorFusion:
         else:
             return memory._replace(waiting=memory.waiting[-_WAITING_AT_START:])
         return memory._replace(started=True, waiting=(), delay_sigma=self.tuning.pose_delay_sigma)
+
+    def _least_stated(self, waiting: tuple[Waiting, ...]) -> tuple[Vec3, Vec3]:
+        """The least variances of the poses so far: of a frame that drifts, the noise alone."""
+        poses = [one.sample for one in waiting if isinstance(one.sample, PoseSample)]
+        return reduce(least, (self._stated(pose) for pose in poses))
 
     def _is_agreed_with(self, pose: PoseSample, waiting: tuple[Waiting, ...]) -> bool:
         """Whether another pose says the same, but for noise and what a vehicle moves meanwhile."""

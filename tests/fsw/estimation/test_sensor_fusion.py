@@ -160,6 +160,14 @@ def test_innovations_are_as_large_as_expected(suite: Suite) -> None:
     assert low < total < high
 
 
+def test_what_odometry_drifts_before_the_filter_starts_is_no_noise() -> None:
+    assert VIO.pose is not None
+    far = replace(VIO, pose=replace(VIO.pose, drift=0.02))
+    frame = Flown(run(far, 0, 0.3)).memory.frame
+    assert frame.place_noise == pytest.approx((VIO.pose.position**2,) * 3, rel=1e-6)
+    assert frame.variance[2] == pytest.approx(0.02**2 * 0.2, rel=0.2)
+
+
 def test_a_hidden_delay_of_the_pose_is_found_within_2_ms() -> None:
     tuning = replace(MOCAP.tuning, pose_delay_sigma=0.01)
     pose = MOCAP.pose
