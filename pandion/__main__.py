@@ -20,9 +20,25 @@ VERBS: Final[dict[str, tuple[str, str]]] = {
     "sitl": ("sitl.__main__", "run the simulator alone"),
     "fsw": ("fsw.__main__", "run the flight software alone"),
     "reproduce": ("pandion.reproduce", "fly a table or a figure of the paper again"),
+    "campaign": (
+        "pandion.campaign",
+        "fly many flights from one file, here or on a cluster: margins, failures, the worst",
+    ),
     "falsify": (
         "pandion.falsify",
         "search for the disturbance that pushes the vehicle furthest off its plan",
+    ),
+    "certify": (
+        "pandion.certify",
+        "state what a campaign shows: exact bounds, margins, what was varied; or verify it",
+    ),
+    "splitting": (
+        "pandion.splitting",
+        "estimate how rare a small margin is, where plain flights never show one",
+    ),
+    "tune": (
+        "pandion.tune",
+        "improve parameters against a cost and a chance constraint, judged on other flights",
     ),
     "faults": (
         "pandion.faults",

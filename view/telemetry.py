@@ -8,6 +8,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, Final, cast
 
+from fsw.flight.failsafe import Condition
+from fsw.link.events.event_table import condition_of
 from fsw.link.wire import decode
 from fsw.link.wire import message_ids as ids
 from fsw.link.wire.px4_mode import AVAILABLE_MODES
@@ -38,6 +40,7 @@ _ON_GROUND: Final = 1
 _STEPS: Final = 6  # most of an MPC_HORIZON
 _REQUESTS: Final = (511, 512)  # of messages; their answers are of no interest
 _UNTIMED: Final = 0xFFFFFFFF
+_RESTARTED_S: Final = 5.0  # by which its clock goes back where a vehicle starts again
 _SHORT_S: Final = 1.0  # what was said longer ago is not so any more
 _AVERAGE: Final = 0.2  # weight of the newest interval in a rate
 MODE_NAMES: Final = {one.custom_mode: one.name.lower() for one in AVAILABLE_MODES}
@@ -92,8 +95,10 @@ class Telemetry:
     _timings: dict[int, Timing] = field(default_factory=dict)
     _zones: dict[int, Zone] = field(default_factory=dict)
     _safe_set: SafeSet | None = None
+    whole_sets: int = 0  # how often the safe set was sent to its end
     _pieces: dict[int, bytes] = field(default_factory=dict)
     _mode: str = ""
+    _conditions: list[Condition] = field(default_factory=list)  # of failsafes, that have begun
     _plan: tuple[Any, ...] | None = None  # of which the horizon is known
     _led: Horizon | None = None
 
@@ -141,13 +146,21 @@ class Telemetry:
             mode=self._mode,
             armed=beat is not None and bool(beat[3] & _ARMED),
             landed=state is not None and state[1] == _ON_GROUND,
-            failures=_condition(beat),
+            failures=self._failures(beat),
             battery=self._battery(),
             link_age=now - self.at,
             solver=None if solver is None else _solver(solver),
             timing=tuple(self._timings[group] for group in sorted(self._timings)),
             safety=safety,
         )
+
+    def _failures(self, beat: tuple[Any, ...] | None) -> str:
+        """By their names, which EVENT has; HEARTBEAT alone says only that there are any."""
+        state = None if beat is None else beat[4]
+        named = ", ".join(one.value for one in self._conditions)
+        if state == _TERMINATED:
+            return f"terminated: {named}" if named else "terminated"
+        return named or ("failsafe" if state == _FAILSAFE else "")
 
     def _newest(self, message_id: int, lasts: float = math.inf) -> tuple[Any, ...] | None:
         """The newest values of a message, unless they are older than ``lasts`` [s]."""
@@ -214,13 +227,22 @@ class Telemetry:
 
     def read_clock(self, t: float) -> None:
         """Take the vehicle's time ``t`` [s]; it goes back only if the vehicle starts again."""
-        if not t <= self.t or t < self.t - 5.0:
+        if t < self.t - _RESTARTED_S:
+            self._forget()
+        if not t <= self.t:
             self.t = t
+
+    def _forget(self) -> None:
+        """Know nothing any more of a flight that is over; its messages and events stay listed."""
+        self.t, self._safe_set, self._mode, self._plan, self._led = math.nan, None, "", None, None
+        for kept in (self._values, self._timings, self._zones, self._pieces, self._conditions):
+            kept.clear()
 
     def read_zone(self, values: tuple[Any, ...]) -> None:
         """Take one shape of the safe set; the set changes when it is whole."""
         if values[24] == 0:
             self._zones, self._safe_set = {}, SafeSet()
+            self.whole_sets += 1
             return
         indexed = decode.obstacle_shape(cast("tuple[float, ...]", values))
         if indexed is None:
@@ -230,6 +252,7 @@ class Telemetry:
         self._zones[indexed.index] = indexed.zone
         if len(self._zones) == indexed.count:
             self._safe_set = SafeSet(tuple(self._zones[k] for k in range(indexed.count)))
+            self.whole_sets += indexed.index == indexed.count - 1
 
     def read_beat(self, values: tuple[Any, ...]) -> None:
         """Take a HEARTBEAT."""
@@ -253,6 +276,17 @@ class Telemetry:
         if severity < _WARNING:
             self.refusals.append(sentence)
         self.note(EventKind.WARNING if severity <= _WARNING else EventKind.TEXT, sentence)
+
+    def read_event(self, values: tuple[Any, ...]) -> None:
+        """EVENT: a failsafe condition that has begun or is over."""
+        found = condition_of(int(values[0]), bytes(values[6:]))
+        if found is None:
+            return
+        condition, over = found
+        if condition in self._conditions:
+            self._conditions.remove(condition)
+        if not over:
+            self._conditions.append(condition)
 
     def read_answer(self, values: tuple[Any, ...]) -> None:
         """Take a COMMAND_ACK."""
@@ -334,12 +368,6 @@ def _solver(values: tuple[Any, ...]) -> Solver:
     )
 
 
-def _condition(beat: tuple[Any, ...] | None) -> str:
-    if beat is None:
-        return ""
-    return {_FAILSAFE: "failsafe", _TERMINATED: "terminated"}.get(beat[4], "")
-
-
 def _vec3(values: tuple[Any, ...]) -> Vec3:
     x, y, z = values
     return float(x), float(y), float(z)
@@ -386,6 +414,7 @@ _READERS: Final[dict[int, Callable[[Telemetry, tuple[Any, ...]], None]]] = {
     ids.POSITION_TARGET_LOCAL_NED: _nothing,
     ids.ESTIMATOR_STATUS: _nothing,
     ids.EXTENDED_SYS_STATE: _nothing,
+    ids.EVENT: Telemetry.read_event,
     ids.STATUSTEXT: Telemetry.read_text,
     ids.ARM_JOINT_STATE: _clock(us=True),
     ids.END_EFFECTOR_TARGET: _nothing,

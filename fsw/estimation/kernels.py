@@ -68,15 +68,17 @@ def tick(
     u: Vec2,
     encoders: Vec3,
     reading: Reading,
+    model: Vec3,
 ) -> tuple[int, int, bool, Present]:
     """Do ``parts`` of a tick and ``more``; what is wrong with IMU and encoders, and the present.
 
     ``COPY`` the filter, so that a tick leaves its inputs as they were, and note what torques made
     of the joints, accelerated by ``u`` [rad/s^2]; take in ``encoders`` [rad, rad, s], two angles
-    and their age; take in a ``reading`` of the IMU; predict ``until`` [s] the horizon and from
-    there the present, which may be no number. ``times`` [s]: now, and the tick's length.
+    and their age; take in a ``reading`` of the IMU, or what a ``model`` [SI, FRD] makes of it;
+    predict ``until`` [s] the horizon and from there the present, which may be no number.
+    ``times`` [s]: now, and the tick's length.
     """
-    fault, of_encoders = _taken_in(old, law, new, parts, times, u, encoders, reading)
+    fault, of_encoders = _taken_in(old, law, new, parts, times, u, encoders, reading, model)
     finite, known = False, _nothing()
     if more & END:
         finite, known = _predicted(new, law, times[0], until)
@@ -94,6 +96,7 @@ def tick_with_pose(
     u: Vec2,
     encoders: Vec3,
     reading: Reading,
+    model: Vec3,
     pose: Pose,
     least: Vec2,
 ) -> tuple[int, int, bool, Present, Vec2, tuple[Vec3, Vec3]]:
@@ -101,9 +104,10 @@ def tick_with_pose(
 
     Also chi-square over gate of its two halves, and their innovation. Where one is beyond its gate
     the filter stays at the pose, and there is no present yet. Its variances are at least ``least``
-    [m^2, rad^2]. ``until`` [s], ``times`` [s], ``u`` [rad/s^2], ``encoders`` [rad, rad, s].
+    [m^2, rad^2]. ``until`` [s], ``times`` [s], ``u`` [rad/s^2], ``encoders`` [rad, rad, s],
+    ``model`` [SI, FRD].
     """
-    fault, of_encoders = _taken_in(old, law, new, parts, times, u, encoders, reading)
+    fault, of_encoders = _taken_in(old, law, new, parts, times, u, encoders, reading, model)
     x, t = new[0], law[0].tuning
     reached, time, p, q, of_place, of_attitude = pose
     advance(x, t, reached)
@@ -128,6 +132,7 @@ def _taken_in(
     u: Vec2,
     encoders: Vec3,
     reading: Reading,
+    model: Vec3,
 ) -> tuple[int, int]:
     """All but the ``END``: what is wrong with the IMU and with the encoders."""
     now, dt = times
@@ -140,7 +145,7 @@ def _taken_in(
         of_encoders = joint_filter.read(new[0], law[0].tuning, now, angles, encoders[2])
     if parts & READING:
         time, f, w = reading
-        fault = imu.add_imu(new[0], law[0].tuning, now, time, f, w)
+        fault = imu.add_imu(new[0], law[0].tuning, now, time, f, w, model)
     return fault, of_encoders
 
 

@@ -12,13 +12,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
+from functools import reduce
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from fsw.compiled import machine_code, packed
 from fsw.estimation import kernels
-from fsw.estimation.drift import FrameDrift
+from fsw.estimation.drift import FrameDrift, least
 from fsw.estimation.error_state import DELAY, ERRORS, FILTER, FRAME, IMU_CAPACITY, Array, Filter
 from fsw.estimation.imu import IMU_TOO_OLD, STUCK_READINGS, TIME_TOLERANCE
 from fsw.estimation.pace import Pace
@@ -61,6 +62,8 @@ _SMALL_STEP: Final = 0.05  # m
 _SMALL_TURN: Final = 0.1  # rad
 _FLOATS: Final = FILTER.itemsize // 8  # that a filter has room for
 _REST: Vec3 = (0.0, 0.0, 0.0)
+UNKNOWN: Final[Vec3] = (0.0, 0.0, 0.0)  # what rotors make of the vehicle
+_LOST: Final[Vec3] = (math.nan, math.nan, math.nan)
 _NO_TURN: Vec4 = (1.0, 0.0, 0.0, 0.0)
 _NO_READING: kernels.Reading = (0.0, _REST, _REST)
 
@@ -188,6 +191,7 @@ class Asked(NamedTuple):
     u: Vec2  # rad/s^2, of the joints
     encoders: Vec3 = _REST  # the same object: there was no reading
     reading: kernels.Reading = _NO_READING
+    model: Vec3 = UNKNOWN  # SI, FRD: see ``imu.add_imu``
 
 
 class SensorFusion:
@@ -236,16 +240,21 @@ class SensorFusion:
         now: float,
         joint_acceleration: Vec2 = (0.0, 0.0),
         watch: EncoderWatch | None = None,
+        model: Vec3 = UNKNOWN,
+        *,
+        silent: bool = False,
     ) -> tuple[FusionMemory, StateEstimate | None]:
         """Take in the ``samples`` that came since the last tick; the state at ``now`` [s].
 
         ``joint_acceleration`` [rad/s^2, joints] is what the torques make of the arm; a ``watch`` of
-        its encoders is kept in the memory. None before there was a pose, or a position and a
-        heading, to start from, and a reading of the arm.
+        its encoders is kept in the memory. Where the IMU is of no use, a ``model`` [SI, FRD] tells
+        what the rotors make of the vehicle (``imu.add_imu``); it is ``silent`` if it has no reading
+        to go by. None before there was a pose, or a position and a heading, to start from, and a
+        reading of the arm.
         """
         dt = min(max(now - memory.now, 0.0), _LONGEST_STEP) if memory.now >= 0.0 else 0.0
         x = np.ndarray(1, FILTER, np.empty(_FLOATS))  # eight times as fast as an empty record
-        asked = Asked(x, kernels.COPY, (now, dt), joint_acceleration)
+        asked = Asked(x, kernels.COPY, (now, dt), joint_acceleration, model=model)
         for sample in samples:
             if isinstance(sample, ImuSample):
                 memory, asked = self._take_imu(memory, asked, sample)
@@ -255,10 +264,12 @@ class SensorFusion:
                 if asked.parts & kernels.READING and memory.repeats(sample):
                     memory, asked = self._done(memory, asked)
                 memory = self.take(memory, sample, now)
+        imu_came = memory.imu_came if asked.reading is _NO_READING else now
+        if silent:
+            memory, asked = self._take_no_imu(memory, asked)
         if not memory.started:
             memory, asked = self._done(memory, asked)
             memory = self._start(memory)
-        imu_came = memory.imu_came if asked.reading is _NO_READING else now
         joints_came = memory.joints_came if asked.encoders is _REST else now
         known, ready = None, memory.started and joints_came >= 0.0
         if ready:
@@ -280,9 +291,16 @@ class SensorFusion:
             return memory.noting_fault(Sensor.IMU, SensorFault.TOO_OLD, asked.times[0]), asked
         if asked.parts & kernels.READING:
             memory, asked = self._done(memory, asked)
-        x, parts, times, u, encoders, _ = asked
+        x, parts, times, u, encoders, _, model = asked
         reading = sample.time, sample.acceleration, sample.rate
-        return memory, Asked(x, parts | kernels.READING, times, u, encoders, reading)
+        return memory, Asked(x, parts | kernels.READING, times, u, encoders, reading, model)
+
+    def _take_no_imu(self, memory: FusionMemory, asked: Asked) -> tuple[FusionMemory, Asked]:
+        """In place of a reading of the IMU, ask for what the model makes of the last one."""
+        if asked.parts & kernels.READING:
+            memory, asked = self._done(memory, asked)
+        reading = asked.times[0], _LOST, _LOST
+        return memory, asked._replace(parts=asked.parts | kernels.READING, reading=reading)
 
     def _take_joints(
         self, memory: FusionMemory, asked: Asked, sample: JointSample
@@ -297,13 +315,14 @@ class SensorFusion:
                 return memory, asked
         if came < 0.0 or asked.parts & kernels.JOINTS:
             memory, asked = self._done(memory, asked)
-        x, parts, times, u, _, reading = asked
+        x, parts, times, u, _, reading, model = asked
         if came < 0.0:
             kernels.set_joints(x, self.law, sample.time, sample.angles)
         else:
             parts |= kernels.JOINTS
         first, second = sample.angles
-        return memory, Asked(x, parts, times, u, (first, second, now - sample.time), reading)
+        angles = first, second, now - sample.time
+        return memory, Asked(x, parts, times, u, angles, reading, model)
 
     def _do(
         self, memory: FusionMemory, asked: Asked, more: int, until: float
@@ -315,7 +334,7 @@ class SensorFusion:
         old = memory.numbers if asked.parts & kernels.COPY else asked.x
         of_imu, of_encoders, finite, known = self._tick(old, self.law, more, until, *asked)
         if of_imu or of_encoders:
-            memory = memory.noting_faults(of_imu, of_encoders, asked.times[0])
+            memory = memory.noting_faults(_of_reading(asked, of_imu), of_encoders, asked.times[0])
         return memory, known if finite else None
 
     def _done(self, memory: FusionMemory, asked: Asked) -> tuple[FusionMemory, Asked]:
@@ -369,7 +388,7 @@ class SensorFusion:
         )
         memory = FusionMemory(asked.x, *memory[1:])
         if of_imu or of_encoders:
-            memory = memory.noting_faults(of_imu, of_encoders, now)
+            memory = memory.noting_faults(_of_reading(asked, of_imu), of_encoders, now)
         innovation, fused = (*place, *turn), ratio[0] <= 1.0 and ratio[1] <= 1.0
         if fused:
             health = memory.of(Sensor.POSE).with_fused((now, now), ratio, innovation)
@@ -450,9 +469,12 @@ class SensorFusion:
                 if not self._is_agreed_with(sample, memory.waiting):
                     continue
                 stated = self._stated(sample)
+                noise = self._least_stated(memory.waiting) if sample.drifts else stated
                 place = sample.position, _REST, normalised(sample.attitude)
-                self._begin(memory, sample.time, place, *stated)
-                memory = memory._replace(frame=FrameDrift(*stated))
+                self._begin(memory, sample.time, place, *noise)
+                if sample.drifts:
+                    frame = FrameDrift.at_start(memory.numbers[0], noise, stated)
+                    memory = memory._replace(frame=frame)
                 break
             if isinstance(sample, GnssSample) and memory.field is not None:
                 level = _levelled(memory.numbers, memory.field, self.tuning.declination)
@@ -469,6 +491,11 @@ class SensorFusion:
         else:
             return memory._replace(waiting=memory.waiting[-_WAITING_AT_START:])
         return memory._replace(started=True, waiting=(), delay_sigma=self.tuning.pose_delay_sigma)
+
+    def _least_stated(self, waiting: tuple[Waiting, ...]) -> tuple[Vec3, Vec3]:
+        """The least variances of the poses so far: of a frame that drifts, the noise alone."""
+        poses = [one.sample for one in waiting if isinstance(one.sample, PoseSample)]
+        return reduce(least, (self._stated(pose) for pose in poses))
 
     def _is_agreed_with(self, pose: PoseSample, waiting: tuple[Waiting, ...]) -> bool:
         """Whether another pose says the same, but for noise and what a vehicle moves meanwhile."""
@@ -686,6 +713,11 @@ def _anew(memory: FusionMemory) -> FusionMemory:
         pose=None,
         restarts=memory.restarts + 1,
     )
+
+
+def _of_reading(asked: Asked, fault: int) -> int:
+    """The ``fault`` [SensorFault] of a reading of the IMU; 0 where there was none."""
+    return 0 if asked.reading[1] is _LOST else fault
 
 
 def _fault_of_encoders(sample: JointSample, now: float, came: float) -> SensorFault:
