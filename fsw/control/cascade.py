@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fsw.barriers.safe_approach import BarrierTuning
-from fsw.compiled import compilable, compiled, kernel, machine_code, of_fixed_types, packed
+from fsw.compiled import compilable, compiled, kernel, machine_code, packed
 from fsw.control.allocation import allocate
 from fsw.control.arm_compensation import compensated_joints, lately_off_plan
 from fsw.control.attitude import attitude_pid, attitude_reference
@@ -28,7 +28,6 @@ from fsw.control.joints import (
 )
 from fsw.control.pid import PidGains
 from fsw.control.safety_filter import (
-    NO_ZONES,
     FilterLaw,
     FilterTuning,
     filter_law,
@@ -64,6 +63,7 @@ from fsw.model.rotors import (
     motion_state,
     rotor_decay,
 )
+from fsw.shapes.zones import NO_ZONES
 from fsw.signals import (
     STOPPED,
     ActuatorCommand,
@@ -188,7 +188,9 @@ class Cascade:
         around = (NO_ZONES, self.probes)
         example = (self._packed, memory, _SOMEWHERE, REST_STATE, REST_INPUT, 1, *around)
         self._close_loops = machine_code(_close_loops, *example)
-        self._joint_acceleration = of_fixed_types(_joint_acceleration)
+        sent = memory.rotors, STOPPED.rotor_thrust, STOPPED.joint_torque
+        arm = _SOMEWHERE.w_WB_B, _SOMEWHERE.q_arm, _SOMEWHERE.qd_arm, _SOMEWHERE.specific_force
+        self._joint_acceleration = machine_code(_joint_acceleration, self._packed, *sent, *arm)
 
     def motion(self, memory: CascadeMemory, estimate: StateEstimate) -> MotionState:
         """Acceleration to snap right now, from the rotor model."""

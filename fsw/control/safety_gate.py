@@ -15,12 +15,17 @@ def gate(
     """What may be sent, and whether the last command replaces one that was not finite."""
     if not armed:
         return STOPPED, False
-    if not math.isfinite(sum(command.rotor_thrust) + sum(command.joint_torque)):
-        return last, True
-    rotors, joints = command
+    (f1, f2, f3, f4), (t1, t2) = command
     top, bound = airframe.rotor_thrust_max, airframe.joint_torque_max
-    if min(rotors) >= 0.0 and max(rotors) <= top and max(map(abs, joints)) <= bound:
+    # What is within limits is finite as well: no comparison with NaN is true.
+    if (
+        (0.0 <= f1 <= top and 0.0 <= f2 <= top and 0.0 <= f3 <= top and 0.0 <= f4 <= top)
+        and -bound <= t1 <= bound
+        and -bound <= t2 <= bound
+    ):
         return command, False
-    f1, f2, f3, f4 = (clamp(thrust, 0.0, top) for thrust in rotors)
-    t1, t2 = (clamp_magnitude(torque, bound) for torque in joints)
+    if not math.isfinite(f1 + f2 + f3 + f4 + t1 + t2):
+        return last, True
+    f1, f2, f3, f4 = (clamp(thrust, 0.0, top) for thrust in command.rotor_thrust)
+    t1, t2 = (clamp_magnitude(torque, bound) for torque in command.joint_torque)
     return ActuatorCommand((f1, f2, f3, f4), (t1, t2)), False

@@ -36,6 +36,8 @@ from fsw.estimation.error_state import (
     vec3,
     vec4,
 )
+from fsw.estimation.sensor_checks import believable
+from fsw.geometry.quaternion import normalised
 from fsw.geometry.rotation import matrix_from_quaternion, yaw_of
 from fsw.model.airframe import GRAVITY
 from fsw.signals import Mat3, Vec2, Vec3, Vec4
@@ -45,32 +47,95 @@ Present = tuple[Vec3, Vec3, Mat3, Vec3, float, Vec2, Vec2, float]
 """All of a StateEstimate but its time, in its order."""
 
 
+Reading = tuple[float, Vec3, Vec3]
+"""Time [s], specific force [m/s^2, FRD] and rate [rad/s, FRD] of the IMU."""
+Pose = tuple[float, float, Vec3, Vec4, Vec3, Vec3]
+"""When the filter reaches it [s], its own time [s], position, attitude and their variances."""
+
 # What ``tick`` does, in this order.
 COPY, JOINTS, READING, END = 1, 2, 4, 8
 
 
 @kernel
-def _tick(
+def tick(
     old: Filter,
-    new: Filter,
     law: Law,
+    more: int,
+    until: float,
+    new: Filter,
     parts: int,
-    times: Vec3,
+    times: Vec2,
     u: Vec2,
     encoders: Vec3,
-    time: float,
-    f: Vec3,
-    w: Vec3,
+    reading: Reading,
     model: Vec3,
 ) -> tuple[int, int, bool, Present]:
-    """Those ``parts`` of a tick that are due; what is wrong with IMU and encoders, and the present.
+    """Do ``parts`` of a tick and ``more``; what is wrong with IMU and encoders, and the present.
 
     ``COPY`` the filter, so that a tick leaves its inputs as they were, and note what torques made
-    of the joints; take in ``encoders``, two angles and their age; take in a reading of the IMU, of
-    its ``time``, or what a ``model`` makes of it; predict up to the horizon and from there the
-    present, which may be no number. ``times``: now, the tick's length, and the horizon.
+    of the joints, accelerated by ``u`` [rad/s^2]; take in ``encoders`` [rad, rad, s], two angles
+    and their age; take in a ``reading`` of the IMU, or what a ``model`` [SI, FRD] makes of it;
+    predict ``until`` [s] the horizon and from there the present, which may be no number.
+    ``times`` [s]: now, and the tick's length.
     """
-    now, dt, until = times
+    fault, of_encoders = _taken_in(old, law, new, parts, times, u, encoders, reading, model)
+    finite, known = False, _nothing()
+    if more & END:
+        finite, known = _predicted(new, law, times[0], until)
+    return fault, of_encoders, finite, known
+
+
+@kernel
+def tick_with_pose(
+    old: Filter,
+    law: Law,
+    until: float,
+    new: Filter,
+    parts: int,
+    times: Vec2,
+    u: Vec2,
+    encoders: Vec3,
+    reading: Reading,
+    model: Vec3,
+    pose: Pose,
+    least: Vec2,
+) -> tuple[int, int, bool, Present, Vec2, tuple[Vec3, Vec3]]:
+    """The same with a ``pose`` that the filter reaches, of a frame that does not drift.
+
+    Also chi-square over gate of its two halves, and their innovation. Where one is beyond its gate
+    the filter stays at the pose, and there is no present yet. Its variances are at least ``least``
+    [m^2, rad^2]. ``until`` [s], ``times`` [s], ``u`` [rad/s^2], ``encoders`` [rad, rad, s],
+    ``model`` [SI, FRD].
+    """
+    fault, of_encoders = _taken_in(old, law, new, parts, times, u, encoders, reading, model)
+    x, t = new[0], law[0].tuning
+    reached, time, p, q, of_place, of_attitude = pose
+    advance(x, t, reached)
+    if t.pose_delay_sigma == 0.0:
+        x.pose_delay = t.pose_delay
+    noise = believable(of_place, least[0]), believable(of_attitude, least[1])
+    ratio = fusion.fuse_pose(x, t, law[0].gates, time, p, normalised(q), *noise)
+    innovation = vec3(x.innovation[0], 0), vec3(x.innovation[1], 0)
+    finite, known = False, _nothing()
+    if ratio[0] <= 1.0 and ratio[1] <= 1.0:
+        finite, known = _predicted(new, law, times[0], until)
+    return fault, of_encoders, finite, known, ratio, innovation
+
+
+@compilable
+def _taken_in(
+    old: Filter,
+    law: Law,
+    new: Filter,
+    parts: int,
+    times: Vec2,
+    u: Vec2,
+    encoders: Vec3,
+    reading: Reading,
+    model: Vec3,
+) -> tuple[int, int]:
+    """All but the ``END``: what is wrong with the IMU and with the encoders."""
+    now, dt = times
     if parts & COPY:
         _copy(old[0], new[0])
         joint_filter.push(new[0], law[0].tuning, now, dt, u)
@@ -79,19 +144,28 @@ def _tick(
         angles = (encoders[0], encoders[1])
         of_encoders = joint_filter.read(new[0], law[0].tuning, now, angles, encoders[2])
     if parts & READING:
+        time, f, w = reading
         fault = imu.add_imu(new[0], law[0].tuning, now, time, f, w, model)
-    if parts & END:
-        advance(new[0], law[0].tuning, until)
-        p, v, q, rate, force = present(new[0], now)
-        angles, rates = joint_filter.present_joints(new[0], now)
-    else:
-        none, still = (0.0, 0.0, 0.0), (0.0, 0.0)
-        p, v, q, rate, force = none, none, (1.0, 0.0, 0.0, 0.0), none, none
-        angles, rates = still, still
+    return fault, of_encoders
+
+
+@compilable
+def _predicted(x: Filter, law: Law, now: float, until: float) -> tuple[bool, Present]:
+    """The present, with the filter at its horizon; whether all of it are numbers."""
+    advance(x[0], law[0].tuning, until)
+    p, v, q, rate, force = present(x[0], now)
+    angles, rates = joint_filter.present_joints(x[0], now)
     R = matrix_from_quaternion(q)
     total = p[0] + p[1] + p[2] + v[0] + v[1] + v[2] + R[0] + rate[0] + rate[1] + rate[2] + force[2]
     finite = math.isfinite(total + angles[0] + angles[1] + rates[0] + rates[1])
-    return fault, of_encoders, finite, (p, v, R, rate, yaw_of(R), angles, rates, -force[2])
+    return finite, (p, v, R, rate, yaw_of(R), angles, rates, -force[2])
+
+
+@compilable
+def _nothing() -> Present:
+    none, still = (0.0, 0.0, 0.0), (0.0, 0.0)
+    R = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+    return none, none, R, none, 0.0, still, still, 0.0
 
 
 @compilable
@@ -319,7 +393,7 @@ def _fuse_range(x: Filter, law: Law, time: float, measured: float, variance: flo
 
 @kernel
 def _present_covariance(x: Filter, law: Law, now: float, M: Array, X: Array) -> None:
-    """The covariance (17, 17) of what ``_tick`` returned, and that with the frame (17, 4)."""
+    """The covariance (17, 17) of what ``tick`` returned, and that with the frame (17, 4)."""
     s, t = x[0], law[0].tuning
     for i in range(ERRORS):
         for j in range(ERRORS):
@@ -347,7 +421,6 @@ def _present_covariance(x: Filter, law: Law, now: float, M: Array, X: Array) -> 
             time = end
 
 
-tick = of_fixed_types(_tick)
 set_joints = of_fixed_types(_set_joints)
 advance_to = of_fixed_types(_advance)
 begin = of_fixed_types(_begin)

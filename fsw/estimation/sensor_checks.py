@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Final, NamedTuple
 
+from fsw.compiled import compilable
 from fsw.estimation.imu import TIME_TOLERANCE
 from fsw.estimation.sensor_fault import Sensor, SensorFault
 from fsw.estimation.tuning import EstimatorTuning
@@ -72,6 +74,13 @@ class Health(NamedTuple):
                 return at - before
         return math.inf
 
+    def with_fused(
+        self, fused: tuple[float, ...], ratio: tuple[float, ...], innovation: tuple[float, ...]
+    ) -> Health:
+        """The same sensor after a sample, of which each part was ``fused`` [s] last so."""
+        # By position: the names of all fields cost as much as the rest.
+        return Health._make((*self[:7], fused, ratio, innovation, *self[10:]))
+
     def with_fault(self, fault: SensorFault, now: float) -> Health:
         """The same sensor, with a ``fault`` that was seen at ``now`` [s]."""
         others, last = [], -math.inf
@@ -88,20 +97,19 @@ def arrived(
     sample: Aiding,
     now: float,
     tuning: EstimatorTuning,
-    *,
-    still: bool,
+    still: Callable[[], bool],
 ) -> tuple[Health, SensorFault]:
     """A sensor's health after a ``sample`` that came at ``now`` [s], and what is wrong with it.
 
-    Where the IMU too repeats itself (``still``), a reading that does is no fault: all stands.
+    Where the IMU too repeats itself (``still`` says), a reading that does is no fault: all stands.
     """
     if not sample.time <= now + TIME_TOLERANCE:
         # Its time stamp is not kept: all that follow would seem to be old.
         return health.with_fault(SensorFault.FUTURE, now), SensorFault.FUTURE
     if sample.time <= health.time:
         return health.with_fault(SensorFault.REPEATED, now), SensorFault.REPEATED
-    numbers = _numbers(sample)
-    repeats = health.repeats + 1 if numbers == health.numbers and not still else 0
+    numbers = numbers_of(sample)
+    repeats = health.repeats + 1 if numbers == health.numbers and not still() else 0
     if not math.isfinite(sum(numbers)):
         fault = SensorFault.NOT_FINITE
     elif not _plausible(sample, tuning):
@@ -111,18 +119,13 @@ def arrived(
     else:
         fault = SensorFault.NONE
     apart = min(sample.time - health.time, _LONGEST_APART)
-    health = health._replace(
-        time=sample.time,
-        came=now,
-        apart=apart,
-        seen=health.seen + 1,
-        numbers=numbers,
-        repeats=repeats,
-    )
+    # By position: the names of all fields cost as much as the checks.
+    sensor, seen, rest = health.sensor, health.seen + 1, health[7:]
+    health = Health(sensor, sample.time, now, apart, seen, numbers, repeats, *rest)
     return (health.with_fault(fault, now) if fault else health), fault
 
 
-def _numbers(sample: Aiding) -> tuple[float, ...]:
+def numbers_of(sample: Aiding) -> tuple[float, ...]:
     """All that a sample measures, without its variance."""
     match sample:
         case PoseSample():
@@ -154,6 +157,7 @@ def _plausible(sample: Aiding, tuning: EstimatorTuning) -> bool:
             return 0.0 < sample.distance < _FARTHEST_RANGE
 
 
+@compilable
 def believable(variance: Vec3, least: float) -> Vec3:
     """A ``variance`` [any unit, any frame], at least ``least`` [same unit] where it is one."""
     x, y, z = variance

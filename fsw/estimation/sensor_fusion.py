@@ -17,13 +17,20 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from fsw.compiled import packed
+from fsw.compiled import machine_code, packed
 from fsw.estimation import kernels
 from fsw.estimation.drift import FrameDrift, least
 from fsw.estimation.error_state import DELAY, ERRORS, FILTER, FRAME, IMU_CAPACITY, Array, Filter
 from fsw.estimation.imu import IMU_TOO_OLD, STUCK_READINGS, TIME_TOLERANCE
 from fsw.estimation.pace import Pace
-from fsw.estimation.sensor_checks import SENSOR_OF, Aiding, Health, arrived, believable
+from fsw.estimation.sensor_checks import (
+    SENSOR_OF,
+    Aiding,
+    Health,
+    arrived,
+    believable,
+    numbers_of,
+)
 from fsw.estimation.sensor_fault import Sensor, SensorFault
 from fsw.estimation.tuning import EstimatorLaw, EstimatorTuning
 from fsw.geometry.quaternion import conjugate, multiply, normalised, rotation_vector
@@ -56,8 +63,9 @@ _SMALL_TURN: Final = 0.1  # rad
 _FLOATS: Final = FILTER.itemsize // 8  # that a filter has room for
 _REST: Vec3 = (0.0, 0.0, 0.0)
 UNKNOWN: Final[Vec3] = (0.0, 0.0, 0.0)  # what rotors make of the vehicle
-_NO_READING: Final[Vec3] = (math.nan, math.nan, math.nan)
+_LOST: Final[Vec3] = (math.nan, math.nan, math.nan)
 _NO_TURN: Vec4 = (1.0, 0.0, 0.0, 0.0)
+_NO_READING: kernels.Reading = (0.0, _REST, _REST)
 
 
 class Waiting(NamedTuple):
@@ -89,24 +97,25 @@ class EncoderWatch(NamedTuple):
 class FusionMemory(NamedTuple):
     """What the estimator carries from tick to tick."""
 
-    # What every tick renews; the rest is as it was in most of them.
+    # What every tick renews, what a sample does, what fusing one does, and the rest: in this order,
+    # because they are renewed by position. Names cost two microseconds.
     numbers: Filter
     now: float = -1.0  # s, of the last tick; negative: there was none
     imu_came: float = -1.0  # s, when a reading came last; negative: never
     joints_came: float = -1.0
     encoders: EncoderWatch = EncoderWatch()
-    started: bool = False
     waiting: tuple[Waiting, ...] = ()
-    arrivals: int = 0
     health: tuple[Health, ...] = ()  # of each sensor heard so far
-    field: Vec3 | None = None  # Gauss, body, the last one
-    reset_counter: int | None = None  # of the last pose
-    frame: FrameDrift = FrameDrift()  # of poses that drift
-    reset: Reset = Reset()
+    arrivals: int = 0
+    delay: float = 0.0  # s, that measurements have lately taken
     gnss: GnssSample | None = None  # the newest one
     pose: PoseSample | None = None  # the last one that the filter has reached
+    reset_counter: int | None = None  # of the last pose
     refused: tuple[Aiding, ...] = ()  # of each kind the last one that was
-    delay: float = 0.0  # s, that measurements have lately taken
+    started: bool = False
+    field: Vec3 | None = None  # Gauss, body, the last one
+    frame: FrameDrift = FrameDrift()  # of poses that drift
+    reset: Reset = Reset()
     delay_sigma: float = 0.0  # s, with which the estimate of the pose's own delay began
     paces: tuple[Pace, ...] = ()  # how often sensors are heard
     restarts: int = 0  # how often the filter had to start anew, because it had no numbers any more
@@ -128,6 +137,32 @@ class FusionMemory(NamedTuple):
         """The memory with the health of one sensor renewed."""
         return self._replace(health=(*self.without(health.sensor), health))
 
+    def noting_fault(self, sensor: Sensor, fault: SensorFault, now: float) -> FusionMemory:
+        """The memory with a ``fault`` of a sensor that was seen at ``now`` [s]."""
+        return self.noting(self.of(sensor).with_fault(fault, now))
+
+    def noting_faults(self, of_imu: int, of_encoders: int, now: float) -> FusionMemory:
+        """The memory with faults that the filter has seen at ``now`` [s]; 0: none."""
+        memory = self
+        if of_imu:
+            memory = memory.noting_fault(Sensor.IMU, SensorFault(of_imu), now)
+        if of_encoders:
+            memory = memory.noting_fault(Sensor.ENCODERS, SensorFault(of_encoders), now)
+        return memory
+
+    def repeats(self, sample: Aiding) -> bool:
+        """Whether a sample says what the last one of its sensor said, to the last bit."""
+        return numbers_of(sample) == self.of(SENSOR_OF[type(sample)]).numbers
+
+    def after(self, one: Waiting, health: Health, refused: tuple[Aiding, ...]) -> FusionMemory:
+        """The memory after the first of the waiting samples was fused, or ``refused`` [SI]."""
+        sample, pose, counter = one.sample, self.pose, self.reset_counter
+        if isinstance(sample, PoseSample):
+            pose, counter = sample, sample.reset_counter
+        known = self.waiting[1:], (*self.without(health.sensor), health)
+        seen = pose, counter, refused
+        return FusionMemory._make((*self[:5], *known, *self[7:10], *seen, *self[13:]))
+
     def without(self, sensor: Sensor) -> list[Health]:
         """What is known of the other sensors."""
         return [one for one in self.health if one.sensor is not sensor]
@@ -147,130 +182,16 @@ def at_start() -> FusionMemory:
     return FusionMemory(np.zeros(1, dtype=FILTER))
 
 
-class _Tick:
-    """One tick of the filter; what is asked of it is done at once, in one call where it can be."""
+class Asked(NamedTuple):
+    """What the filter is asked to do in one call: arguments of ``kernels.tick``, in its order."""
 
-    __slots__ = (
-        "_dt",
-        "_encoders",
-        "_force",
-        "_fusion",
-        "_model",
-        "_now",
-        "_parts",
-        "_rate",
-        "_time",
-        "_u",
-        "_x",
-        "imu_came",
-        "joints_came",
-        "memory",
-    )
-
-    def __init__(
-        self, fusion: SensorFusion, memory: FusionMemory, now: float, u: Vec2, model: Vec3
-    ) -> None:
-        self.memory = memory
-        self._model = model
-        self.imu_came, self.joints_came = memory.imu_came, memory.joints_came
-        self._fusion, self._now, self._u = fusion, now, u
-        self._dt = min(max(now - memory.now, 0.0), _LONGEST_STEP) if memory.now >= 0.0 else 0.0
-        # Eight times as fast as an empty array of records.
-        self._x = np.ndarray(1, FILTER, np.empty(_FLOATS))
-        self._parts = kernels.COPY
-        self._encoders = self._force = self._rate = _REST
-        self._time = 0.0
-
-    def take_imu(self, sample: ImuSample) -> None:
-        """Take in a reading of the IMU."""
-        if sample.time < self._now - IMU_TOO_OLD and self.memory.started:
-            self._note(Sensor.IMU, SensorFault.TOO_OLD)
-            return
-        if self._parts & kernels.READING:
-            self.run()
-        self._parts |= kernels.READING
-        self._time, self._force, self._rate = sample.time, sample.acceleration, sample.rate
-        self.imu_came = self._now
-
-    def go_on_without_imu(self) -> None:
-        """In place of a reading of the IMU, take what the model makes of the last one."""
-        if self._parts & kernels.READING:
-            self.run()
-        self._parts |= kernels.READING
-        self._time, self._force, self._rate = self._now, _NO_READING, _NO_READING
-
-    def take_joints(self, sample: JointSample) -> None:
-        """Take in a reading of the encoders."""
-        (first, second), now = sample.angles, self._now
-        if not sample.time <= now + TIME_TOLERANCE:
-            self._note(Sensor.ENCODERS, SensorFault.FUTURE)
-        elif not (abs(first) < math.pi and abs(second) < math.pi):  # no NaN is
-            self._note(Sensor.ENCODERS, SensorFault.IMPLAUSIBLE)
-        elif self.joints_came < 0.0:
-            law = self._fusion.law
-            kernels.set_joints(self.run().numbers, law, sample.time, sample.angles)
-            self.joints_came = now
-        elif sample.time < now - ENCODERS_TOO_OLD:
-            self._note(Sensor.ENCODERS, SensorFault.TOO_OLD)
-        else:
-            if now - self.joints_came > ENCODERS_TOO_OLD:
-                self._note(Sensor.ENCODERS, SensorFault.SELDOM)
-            if self._parts & kernels.JOINTS:
-                self.run()
-            self._parts |= kernels.JOINTS
-            self._encoders = first, second, now - sample.time
-            self.joints_came = now
-
-    def take(self, sample: Aiding) -> None:
-        """Take in any other sample."""
-        if self._parts & kernels.READING:
-            self.run()
-        self.memory = self._fusion.take(self.memory, sample, self._now)
-
-    def run(self) -> FusionMemory:
-        """Do what was asked for; the memory then has a filter of its own."""
-        if self._parts:
-            self._call(0, self._now)
-            self.memory = FusionMemory(self._x, *self.memory[1:])
-        return self.memory
-
-    def end(self, until: float) -> kernels.Present | None:
-        """Predict the filter up to ``until`` [s] and from there the present; None: no numbers."""
-        return self._call(kernels.END, until)
-
-    def memory_after(self, watch: EncoderWatch | None) -> FusionMemory:
-        """The memory after the tick, with a newer ``watch`` of the encoders if there is one."""
-        if self._parts:
-            self.run()
-        before = self.memory
-        encoders = before.encoders if watch is None else watch
-        rest = before[5:]  # by position, because it is done in every tick: all fields after those
-        return FusionMemory(self._x, self._now, self.imu_came, self.joints_came, encoders, *rest)
-
-    def _call(self, more: int, until: float) -> kernels.Present | None:
-        parts, self._parts = self._parts | more, 0
-        x = self._x
-        of_imu, of_encoders, finite, known = kernels.tick(
-            self.memory.numbers if parts & kernels.COPY else x,
-            x,
-            self._fusion.law,
-            parts,
-            (self._now, self._dt, until),
-            self._u,
-            self._encoders,
-            self._time,
-            self._force,
-            self._rate,
-            self._model,
-        )
-        if of_imu and self._force is not _NO_READING:
-            self._note(Sensor.IMU, SensorFault(of_imu))
-        if of_encoders:
-            self._note(Sensor.ENCODERS, SensorFault(of_encoders))
-        return known if finite else None
-
-    def _note(self, sensor: Sensor, fault: SensorFault) -> None:
-        self.memory = self.memory.noting(self.memory.of(sensor).with_fault(fault, self._now))
+    x: Filter  # the new one
+    parts: int
+    times: Vec2  # s: now, and the tick's length
+    u: Vec2  # rad/s^2, of the joints
+    encoders: Vec3 = _REST  # the same object: there was no reading
+    reading: kernels.Reading = _NO_READING
+    model: Vec3 = UNKNOWN  # SI, FRD: see ``imu.add_imu``
 
 
 class SensorFusion:
@@ -281,6 +202,14 @@ class SensorFusion:
         self.law = packed(EstimatorLaw(tuning, tuning.gates))
         self._least_p = tuning.position_floor**2
         self._least_q = tuning.attitude_floor**2
+        self._least_pose = self._least_p, self._least_q
+        x, none = at_start().numbers, (0.0, 0.0)
+        asked = Asked(x, kernels.COPY, none, none)
+        pose = (0.0, 0.0, _REST, _NO_TURN, _REST, _REST)
+        self._tick = machine_code(kernels.tick, x, self.law, 0, 0.0, *asked)
+        self._tick_with_pose = machine_code(
+            kernels.tick_with_pose, x, self.law, 0.0, *asked, pose, self._least_pose
+        )
         self._least_gnss = tuning.gnss_position_floor**2, tuning.gnss_velocity_floor**2
         self._fuse: dict[type, Callable[[FusionMemory, Any], tuple[float, ...]]] = {
             PoseSample: self._fuse_pose,
@@ -323,30 +252,150 @@ class SensorFusion:
         to go by. None before there was a pose, or a position and a heading, to start from, and a
         reading of the arm.
         """
-        tick = _Tick(self, memory, now, joint_acceleration, model)
+        dt = min(max(now - memory.now, 0.0), _LONGEST_STEP) if memory.now >= 0.0 else 0.0
+        x = np.ndarray(1, FILTER, np.empty(_FLOATS))  # eight times as fast as an empty record
+        asked = Asked(x, kernels.COPY, (now, dt), joint_acceleration, model=model)
         for sample in samples:
-            kind = type(sample)
-            if kind is ImuSample:
-                tick.take_imu(sample)  # type: ignore[arg-type]
-            elif kind is JointSample:
-                tick.take_joints(sample)  # type: ignore[arg-type]
+            if isinstance(sample, ImuSample):
+                memory, asked = self._take_imu(memory, asked, sample)
+            elif isinstance(sample, JointSample):
+                memory, asked = self._take_joints(memory, asked, sample)
             else:
-                tick.take(sample)  # type: ignore[arg-type]
+                if asked.parts & kernels.READING and memory.repeats(sample):
+                    memory, asked = self._done(memory, asked)
+                memory = self.take(memory, sample, now)
+        imu_came = memory.imu_came if asked.reading is _NO_READING else now
         if silent:
-            tick.go_on_without_imu()
-        memory = tick.memory
+            memory, asked = self._take_no_imu(memory, asked)
         if not memory.started:
-            memory = tick.memory = self._start(tick.run())
-        if not memory.started or tick.joints_came < 0.0:
-            return tick.memory_after(watch), None
-        until = now - memory.delay - _MARGIN
-        if memory.waiting and memory.waiting[0].time <= until:
-            tick.memory = self._fuse_due(tick.run(), until, now)
-        known = tick.end(until)
-        memory = tick.memory_after(watch)
+            memory, asked = self._done(memory, asked)
+            memory = self._start(memory)
+        joints_came = memory.joints_came if asked.encoders is _REST else now
+        known, ready = None, memory.started and joints_came >= 0.0
+        if ready:
+            memory, known = self._predicted(memory, asked, now - memory.delay - _MARGIN)
+        else:
+            memory, _ = self._done(memory, asked)
+        # By position, because it is done in every tick: what every tick renews, and the rest.
+        watched = memory.encoders if watch is None else watch
+        memory = FusionMemory(x, now, imu_came, joints_came, watched, *memory[5:])
         if known is None:
-            return _anew(memory), None
+            return (_anew(memory) if ready else memory), None
         return memory, StateEstimate(round(1e6 * now), *known)
+
+    def _take_imu(
+        self, memory: FusionMemory, asked: Asked, sample: ImuSample
+    ) -> tuple[FusionMemory, Asked]:
+        """Ask the filter to take in a reading of the IMU."""
+        if sample.time < asked.times[0] - IMU_TOO_OLD and memory.started:
+            return memory.noting_fault(Sensor.IMU, SensorFault.TOO_OLD, asked.times[0]), asked
+        if asked.parts & kernels.READING:
+            memory, asked = self._done(memory, asked)
+        x, parts, times, u, encoders, _, model = asked
+        reading = sample.time, sample.acceleration, sample.rate
+        return memory, Asked(x, parts | kernels.READING, times, u, encoders, reading, model)
+
+    def _take_no_imu(self, memory: FusionMemory, asked: Asked) -> tuple[FusionMemory, Asked]:
+        """In place of a reading of the IMU, ask for what the model makes of the last one."""
+        if asked.parts & kernels.READING:
+            memory, asked = self._done(memory, asked)
+        reading = asked.times[0], _LOST, _LOST
+        return memory, asked._replace(parts=asked.parts | kernels.READING, reading=reading)
+
+    def _take_joints(
+        self, memory: FusionMemory, asked: Asked, sample: JointSample
+    ) -> tuple[FusionMemory, Asked]:
+        """Ask the filter to take in a reading of the encoders."""
+        now = asked.times[0]
+        came = memory.joints_came if asked.encoders is _REST else now
+        fault = _fault_of_encoders(sample, now, came)
+        if fault:
+            memory = memory.noting_fault(Sensor.ENCODERS, fault, now)
+            if fault is not SensorFault.SELDOM:
+                return memory, asked
+        if came < 0.0 or asked.parts & kernels.JOINTS:
+            memory, asked = self._done(memory, asked)
+        x, parts, times, u, _, reading, model = asked
+        if came < 0.0:
+            kernels.set_joints(x, self.law, sample.time, sample.angles)
+        else:
+            parts |= kernels.JOINTS
+        first, second = sample.angles
+        angles = first, second, now - sample.time
+        return memory, Asked(x, parts, times, u, angles, reading, model)
+
+    def _do(
+        self, memory: FusionMemory, asked: Asked, more: int, until: float
+    ) -> tuple[FusionMemory, kernels.Present | None]:
+        """Let the filter do what is asked of it, and ``more`` ``until`` [s].
+
+        None: no present, or one without numbers.
+        """
+        old = memory.numbers if asked.parts & kernels.COPY else asked.x
+        of_imu, of_encoders, finite, known = self._tick(old, self.law, more, until, *asked)
+        if of_imu or of_encoders:
+            memory = memory.noting_faults(_of_reading(asked, of_imu), of_encoders, asked.times[0])
+        return memory, known if finite else None
+
+    def _done(self, memory: FusionMemory, asked: Asked) -> tuple[FusionMemory, Asked]:
+        """The memory of a filter that has done what was asked of it; nothing is any more."""
+        if not asked.parts:
+            return memory, asked
+        memory, _ = self._do(memory, asked, 0, 0.0)
+        return FusionMemory(asked.x, *memory[1:]), asked._replace(parts=0)
+
+    def _predicted(
+        self, memory: FusionMemory, asked: Asked, until: float
+    ) -> tuple[FusionMemory, kernels.Present | None]:
+        """Let the filter go on ``until`` [s], fuse what it reaches, and predict the present."""
+        waits = memory.waiting
+        if waits and waits[0].time <= until:
+            if (len(waits) == 1 or waits[1].time > until) and self._is_plain(memory, waits[0]):
+                memory, known, fused = self._do_with_pose(memory, asked, waits[0], until)
+                if fused:
+                    return memory, known
+                asked = asked._replace(parts=0)
+            else:
+                memory, asked = self._done(memory, asked)
+            while memory.waiting and memory.waiting[0].time <= until:
+                kernels.advance_to(asked.x, self.law, memory.waiting[0].time)
+                memory = self._fuse_first(memory, asked.times[0])
+        return self._do(memory, asked, kernels.END, until)
+
+    def _is_plain(self, memory: FusionMemory, one: Waiting) -> bool:
+        """Whether a sample is a pose as most are: of a frame that stays, and has not jumped."""
+        sample = one.sample
+        return (
+            isinstance(sample, PoseSample)
+            and not sample.drifts
+            and memory.reset_counter in (None, sample.reset_counter)
+            and memory.delay_sigma == self.tuning.pose_delay_sigma
+        )
+
+    def _do_with_pose(
+        self, memory: FusionMemory, asked: Asked, one: Waiting, until: float
+    ) -> tuple[FusionMemory, kernels.Present | None, bool]:
+        """``_do`` with a plain pose to fuse, and whether it was; if not the filter stays there."""
+        sample, now = one.sample, asked.times[0]
+        assert isinstance(sample, PoseSample)
+        pose = (
+            *(one.time, sample.time, sample.position, sample.attitude),
+            *(sample.position_variance, sample.attitude_variance),
+        )
+        old = memory.numbers if asked.parts & kernels.COPY else asked.x
+        of_imu, of_encoders, finite, known, ratio, (place, turn) = self._tick_with_pose(
+            old, self.law, until, *asked, pose, self._least_pose
+        )
+        memory = FusionMemory(asked.x, *memory[1:])
+        if of_imu or of_encoders:
+            memory = memory.noting_faults(_of_reading(asked, of_imu), of_encoders, now)
+        innovation, fused = (*place, *turn), ratio[0] <= 1.0 and ratio[1] <= 1.0
+        if fused:
+            health = memory.of(Sensor.POSE).with_fused((now, now), ratio, innovation)
+            memory = memory.after(one, health, memory.refused)
+        else:
+            memory = self._judged(memory, one, ratio, innovation, now)
+        return memory, known if finite else None, fused
 
     def covariance(self, memory: FusionMemory, now: float) -> Array:
         """Covariance (17, 17) [SI] of the error of the state at ``now`` [s]."""
@@ -358,10 +407,10 @@ class SensorFusion:
 
     def take(self, memory: FusionMemory, sample: Aiding, now: float) -> FusionMemory:
         """Check a ``sample`` that came at ``now`` [s] and let it wait for its time."""
-        x = memory.numbers
-        still = bool(x["same"][0].min() >= STUCK_READINGS)
-        before = memory.of(SENSOR_OF[type(sample)])
-        health, fault = arrived(before, sample, now, self.tuning, still=still)
+        x, before = memory.numbers, memory.of(SENSOR_OF[type(sample)])
+        health, fault = arrived(
+            before, sample, now, self.tuning, lambda: bool(x["same"][0].min() >= STUCK_READINGS)
+        )
         time = sample.time
         if isinstance(sample, PoseSample):
             time -= float(x["pose_delay"][0]) if memory.started else self.tuning.pose_delay
@@ -379,13 +428,9 @@ class SensorFusion:
         waiting = (*memory.waiting, Waiting(time, memory.arrivals, sample))
         if len(waiting) > 1 and waiting[-2].time > time:
             waiting = tuple(sorted(waiting))
-        return memory._replace(
-            health=(*others, health),
-            delay=delay,
-            gnss=sample if isinstance(sample, GnssSample) else memory.gnss,
-            waiting=waiting,
-            arrivals=memory.arrivals + 1,
-        )
+        gnss = sample if isinstance(sample, GnssSample) else memory.gnss
+        known = (waiting, (*others, health), memory.arrivals + 1, delay, gnss)
+        return FusionMemory._make((*memory[:5], *known, *memory[10:]))
 
     def _with_delay_known(self, memory: FusionMemory) -> FusionMemory:
         """The memory after the parameters of the pose's delay may have changed in flight."""
@@ -511,29 +556,42 @@ class SensorFusion:
         variances = p_variance, (slow, slow, slow), q_variance
         kernels.begin(memory.numbers, self.law, time, *state, *variances)
 
-    def _fuse_due(self, memory: FusionMemory, until: float, now: float) -> FusionMemory:
-        """Fuse every waiting sample that the filter has reached."""
-        while memory.waiting and memory.waiting[0].time <= until:
-            kernels.advance_to(memory.numbers, self.law, memory.waiting[0].time)
-            memory = self._fuse_first(memory, now)
-        return memory
-
     def _fuse_first(self, memory: FusionMemory, now: float) -> FusionMemory:
         """Fuse the first of the waiting samples, whose time the filter has."""
         one = memory.waiting[0]
         sample = one.sample
-        health = memory.of(SENSOR_OF[type(sample)])
         announced, drifts = False, False
-        pose, counter = memory.pose, memory.reset_counter
         if isinstance(sample, PoseSample):
             memory = self._with_delay_known(memory)
-            announced = counter not in (None, sample.reset_counter)
-            pose, counter, drifts = sample, sample.reset_counter, sample.drifts
+            announced = memory.reset_counter not in (None, sample.reset_counter)
+            drifts = sample.drifts
             if drifts:
                 memory = self._with_frame(memory, sample, announced)
         previous = memory.numbers[0].copy() if announced and drifts else None
         ratio = self._fuse[type(sample)](memory, sample)
-        innovation = memory.numbers["innovation"].ravel().tolist()
+        innovation = tuple(memory.numbers["innovation"].ravel().tolist())
+        return self._judged(
+            memory, one, ratio, innovation, now, announced=announced, previous=previous
+        )
+
+    def _judged(
+        self,
+        memory: FusionMemory,
+        one: Waiting,
+        ratio: tuple[float, ...],
+        innovation: tuple[float, ...],
+        now: float,
+        *,
+        announced: bool = False,
+        previous: Any = None,
+    ) -> FusionMemory:
+        """The memory after the first of the waiting samples was fused, or refused.
+
+        Chi-square over gate and innovation are of each of its parts. The frame of a pose may have
+        jumped (``announced``), from the filter's ``previous`` state if it drifts.
+        """
+        sample = one.sample
+        health = memory.of(SENSOR_OF[type(sample)])
         refused = 1.0 < max(ratio) < math.inf  # infinite: it says nothing here
         if refused and isinstance(sample, PressureSample) and not health.fused:
             # The weather is not known until the first reading.
@@ -549,16 +607,9 @@ class SensorFusion:
                 ratio = self._fuse_pose(memory, sample)
         fused = health.fused or (now,) * len(ratio)
         fused = tuple([now if r <= 1.0 else before for r, before in zip(ratio, fused, strict=True)])
-        shown = tuple(innovation if len(ratio) > 1 else innovation[:1])
-        health = health._replace(ratio=ratio, fused=fused, innovation=shown)
-        # All at once: each renewal of the memory takes a microsecond.
-        memory = memory._replace(
-            health=(*memory.without(health.sensor), health),
-            waiting=memory.waiting[1:],
-            pose=pose,
-            reset_counter=counter,
-            refused=latest,
-        )
+        shown = innovation if len(ratio) > 1 else innovation[:1]
+        health = health.with_fused(fused, ratio, shown)
+        memory = memory.after(one, health, latest)
         long_refused = now - min(fused) > self.tuning.reset_time and confirmed
         if max(ratio) > 1.0 and (announced or long_refused):
             memory = self._reset(memory, one, ratio)
@@ -664,13 +715,28 @@ def _anew(memory: FusionMemory) -> FusionMemory:
     )
 
 
-def _is_small(innovation: list[float]) -> bool:
-    return norm(_three(innovation[:3])) < _SMALL_STEP and norm(_three(innovation[3:])) < _SMALL_TURN
+def _of_reading(asked: Asked, fault: int) -> int:
+    """The ``fault`` [SensorFault] of a reading of the IMU; 0 where there was none."""
+    return 0 if asked.reading[1] is _LOST else fault
 
 
-def _three(numbers: list[float]) -> Vec3:
-    x, y, z = numbers
-    return x, y, z
+def _fault_of_encoders(sample: JointSample, now: float, came: float) -> SensorFault:
+    """What is wrong with a reading of the encoders at ``now`` [s]; ``came`` [s] the last one."""
+    first, second = sample.angles
+    if not sample.time <= now + TIME_TOLERANCE:
+        return SensorFault.FUTURE
+    if not (abs(first) < math.pi and abs(second) < math.pi):
+        return SensorFault.IMPLAUSIBLE
+    if came < 0.0:
+        return SensorFault.NONE
+    if sample.time < now - ENCODERS_TOO_OLD:
+        return SensorFault.TOO_OLD
+    return SensorFault.SELDOM if now - came > ENCODERS_TOO_OLD else SensorFault.NONE
+
+
+def _is_small(innovation: tuple[float, ...]) -> bool:
+    x, y, z, a, b, c = innovation
+    return norm((x, y, z)) < _SMALL_STEP and norm((a, b, c)) < _SMALL_TURN
 
 
 def _attitude(x: Any) -> Vec4:

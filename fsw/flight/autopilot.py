@@ -6,8 +6,6 @@ No clock, socket, thread or random number: real time, lockstep, replay and tests
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from fsw.control.actuator_watch import Watch
@@ -20,7 +18,6 @@ from fsw.control.cascade import (
     at_rest,
     in_hover,
 )
-from fsw.control.safety_filter import NO_ZONES, moving_zones
 from fsw.control.safety_gate import gate
 from fsw.estimation.estimator import estimate_state
 from fsw.estimation.sensor_fusion import FusionMemory
@@ -39,6 +36,7 @@ from fsw.flight.safety_watch import SafetyWatch
 from fsw.flight.sensed_state import SensedState
 from fsw.flight.state import Damage, FlightState, PlanMemory, SafetyMemory
 from fsw.flight.uncertain_clearance import KeptSet, UncertainClearance, pose_covariance
+from fsw.frozen import replace
 from fsw.model.actuator_health import SOUND
 from fsw.model.battery import Levels, corrected, drained
 from fsw.model.body import body_of
@@ -46,7 +44,7 @@ from fsw.model.nominal import REST_INPUT
 from fsw.mpc.reference import merge
 from fsw.parameters.consistency import Finding
 from fsw.parameters.flight_config import FlightConfig
-from fsw.shapes.zones import Array
+from fsw.shapes.zones import NO_ZONES, Array, moving_zones
 from fsw.signals import (
     STOPPED,
     ActuatorCommand,
@@ -118,6 +116,7 @@ class Autopilot:
             + self._cascade.law.filter.lag,
         )
         self._zones: tuple[KeptSet, EndEffectorTarget | None, Array] = (KeptSet(), None, NO_ZONES)
+        self._tick_us = config.tick_period_us
         self._ticks_per_plan = config.mpc_period_us // config.tick_period_us
         self._most_us = config.catch_up_ticks * config.tick_period_us
 
@@ -128,6 +127,7 @@ class Autopilot:
         nominal = self._plans.step(nominal_at_rest(estimate), REST_INPUT)
         self._cascade.step(in_hover(self.config.airframe, estimate), estimate, nominal, REST_INPUT)
         self._safe_sets.warm_up(estimate)
+        self._horizon.warm_up(estimate)
         self._sensed.warm_up()
         self._clearance.warm_up(estimate)
         self._exact.warm_up(estimate, TickInputs(_STILL))
@@ -223,13 +223,7 @@ class Autopilot:
             watch,
         )
         snapshot = _snapshot(state, estimate, u, inputs)
-        return state, TickOutputs(
-            actuators=sent,
-            snapshot=snapshot,
-            plan_request=request,
-            acks=tuple(acks),
-            texts=tuple(texts),
-        )
+        return state, TickOutputs(sent, snapshot, request, tuple(acks), tuple(texts))
 
     def _with_evidence(self, state: FlightState, estimate: StateEstimate) -> FlightState:
         """What the failsafe table looks at and what is not kept up to date elsewhere."""
@@ -297,15 +291,17 @@ class Autopilot:
             state = replace(state, host=inputs.host)
         if inputs.ground_station_heard:
             state = replace(state, vehicle=replace(state.vehicle, gcs_heard_us=now_us))
-        heard = (inputs.motion, inputs.attitude, inputs.joints) != (None, None, None)
-        if heard or inputs.refused_setpoints:
+        unheard = inputs.motion is None and inputs.attitude is None and inputs.joints is None
+        if not unheard or inputs.refused_setpoints:
             state = replace(state, offboard=accept_setpoints(state.offboard, inputs, self.config))
         return state
 
     def _elapsed_ticks(self, state: FlightState, now_us: int) -> int:
         """Ticks since the last one: more than one where sensor frames were missed."""
-        elapsed = (now_us - state.t_us) // self.config.tick_period_us
-        return min(max(elapsed, 1), self.config.catch_up_ticks) if state.index >= 0 else 1
+        elapsed = (now_us - state.t_us) // self._tick_us
+        if elapsed == 1 or state.index < 0:
+            return 1
+        return min(max(elapsed, 1), self.config.catch_up_ticks)
 
     def _request_plan(
         self,
@@ -461,7 +457,8 @@ class Autopilot:
             return NO_ZONES
         known, known_target, zones = self._zones
         if kept is not known or target is not known_target:
-            if kept is not known or kept.safe_set.kind is ConstraintKind.WORKSPACE:
+            same = kept.safe_set is known.safe_set and kept.added == known.added
+            if not same or kept.safe_set.kind is ConstraintKind.WORKSPACE:
                 zones = moving_zones(kept.safe_set, target, kept.added)
             self._zones = (kept, target, zones)
         return zones

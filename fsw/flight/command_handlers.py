@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Final
 
 from scipy.optimize import minimize_scalar
@@ -14,6 +14,7 @@ from fsw.flight.modes.base import CommandContext, FlightMode
 from fsw.flight.offboard_setpoints import joints_refusal
 from fsw.flight.orbit_path import max_orbit_speed
 from fsw.flight.setpoint_generator import PositionGoal
+from fsw.frozen import replace
 from fsw.model.body import hull_reach
 from fsw.shapes.zones import surface, surfaces
 from fsw.signals import (

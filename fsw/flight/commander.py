@@ -5,14 +5,12 @@ Every function takes a state and returns one; almost every tick it is the same o
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from fsw.control.cascade import at_rest, in_hover
 from fsw.flight import arming, failsafe
 from fsw.flight.arming_health import arming_health
 from fsw.flight.command_dedup import answered_before, remember
 from fsw.flight.command_handlers import Decision, decide
-from fsw.flight.failsafe import FailsafeContext
+from fsw.flight.failsafe import SLOW_US, FailsafeContext
 from fsw.flight.land_detector import standing_unclear, stands
 from fsw.flight.mission_sequencer import refusal as mission_refusal
 from fsw.flight.modes import MODES
@@ -25,6 +23,7 @@ from fsw.flight.plan_exchange import nominal_at_rest
 from fsw.flight.retreat import retreat_place
 from fsw.flight.setpoint_generator import PositionGoal, SetpointGenerator
 from fsw.flight.state import FlightState, PlanMemory, SetpointMemory, VehicleMemory
+from fsw.frozen import replace
 from fsw.model.body import body_of
 from fsw.model.kinematics import point_in_flight
 from fsw.mpc.reference import still_at
@@ -146,7 +145,7 @@ class Commander:
         if vehicle.mode is Mode.FAULT:
             return state  # what ended the flight stays on show
         context = FailsafeContext(state, estimate, self._config)
-        slowly = estimate.t_us // failsafe.SLOW_US != state.t_us // failsafe.SLOW_US
+        slowly = estimate.t_us // SLOW_US != state.t_us // SLOW_US
         rows = failsafe.active(context) if slowly else failsafe.quickly_active(context)
         before = vehicle.conditions
         if not rows and not before:

@@ -6,7 +6,6 @@ frame is taken as it is: vehicles are carried about.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import partial
 
 from fsw.control.cascade import Cascade
@@ -16,6 +15,7 @@ from fsw.estimation.frame_trust import FrameTrust, believed
 from fsw.estimation.sensor_fault import Sensor
 from fsw.flight.jump import returned
 from fsw.flight.state import AIDED, Aiding, FlightState
+from fsw.frozen import replace
 from fsw.signals import Severity, StateEstimate, StatusText, TickInputs
 
 

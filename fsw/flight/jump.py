@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Final
 
 from fsw.estimation.dead_reckoning import moved_on
 from fsw.estimation.sensor_fusion import Reset
 from fsw.flight.state import FlightState
+from fsw.frozen import replace
 from fsw.geometry.quaternion import conjugate, multiply
 from fsw.geometry.rotation import (
     matrix_from_quaternion,

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
 
 from fsw.control.braking import Brake
 from fsw.flight.failsafe import PLAN_STALE_PERIODS
 from fsw.flight.state import PlanMemory
+from fsw.frozen import replace
 from fsw.geometry.rotation import wrap_angle
 from fsw.geometry.vectors import clamp_magnitude
 from fsw.model.airframe import Airframe

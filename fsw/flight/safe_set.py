@@ -9,12 +9,11 @@ is not announced any more is not predicted for ever: it is held where it is afte
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from fsw.barriers.margins import Margins
 from fsw.flight.safe_set_change import growth, is_moving, is_update, summary
 from fsw.flight.state import MissionMemory
 from fsw.flight.uncertain_clearance import KeptSet
+from fsw.frozen import replace
 from fsw.model.body import body_of
 from fsw.mpc.reference import still_at
 from fsw.parameters.consistency import Finding, analyse, loop_tube, part_tube, refusals, warnings

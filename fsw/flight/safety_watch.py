@@ -8,11 +8,11 @@ is a breach. Both are episodes with hysteresis, so that each is told and acted o
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 from fsw.control.tube import Tube
 from fsw.flight.land_detector import height_above_ground
 from fsw.flight.state import SafetyMemory
+from fsw.frozen import replace
 from fsw.parameters.consistency import base_reach
 from fsw.parameters.flight_config import FlightConfig
 from fsw.signals import ConstraintReport, PredictionState, StateEstimate

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 from fsw.control.cascade import Cascade, in_hover
 from fsw.estimation import kernels
@@ -26,6 +25,7 @@ from fsw.estimation.turned_covariance import Vec6
 from fsw.flight.estimator_report import AIDS_PLACE, estimator_report, unaided
 from fsw.flight.jump import jumped, returned, told
 from fsw.flight.state import Aiding, FlightState
+from fsw.frozen import replace
 from fsw.measurements import ImuSample, JointSample, Sample
 from fsw.signals import EstimatorReport, Severity, StateEstimate, StatusText, TickInputs, Vec2, Vec3
 

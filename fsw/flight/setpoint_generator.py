@@ -13,11 +13,12 @@ keeps it near the vehicle and off walls and ground. Source: decision 0010 in doc
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from fsw.barriers.safe_approach import safe_approach_speed
 from fsw.flight.orbit_path import looking_at, on_orbit
 from fsw.flight.reference_governor import SETTLE_RATE, ReferenceGovernor
+from fsw.frozen import replace
 from fsw.geometry.rotation import wrap_angle
 from fsw.geometry.vectors import add_scaled, clamp_magnitude, limit_norm, norm, subtract
 from fsw.model.kinematics import end_effector_when_level, point_in_flight

@@ -6,10 +6,9 @@ mix two. Which one flies is part of the state: the same inputs fly the same flig
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from fsw.flight.autopilot import Autopilot
 from fsw.flight.state import FlightState
+from fsw.frozen import replace
 from fsw.parameters.consistency import Finding, refusals
 from fsw.parameters.contradictions import contradictions
 from fsw.parameters.flight_config import FlightConfig

@@ -20,7 +20,6 @@ Source: docs/equations.md T7; docs/decisions/0031-barriers-that-know-the-uncerta
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -29,6 +28,7 @@ from fsw.barriers.safe_approach import BarrierTuning
 from fsw.compiled import kernel
 from fsw.estimation.error_state import ERRORS, TH, Array, P
 from fsw.estimation.turned_covariance import SAME_AXES, Vec6, turned_covariance
+from fsw.frozen import replace
 from fsw.geometry.rotation import rotate
 from fsw.model.body import ON_BASE, ON_LINK1, Body
 from fsw.model.kinematics import links

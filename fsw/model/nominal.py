@@ -57,7 +57,7 @@ class NominalModel:
 
     def step(self, x: PredictionState, u: PlanInput) -> PredictionState:
         """The state one tick later."""
-        return self.advance(x, u, 1)
+        return PredictionState(*self._advance(self._packed, x, u, 1))
 
     def advance(self, x: PredictionState, u: PlanInput, ticks: int) -> PredictionState:
         """The state some ticks later under one input."""

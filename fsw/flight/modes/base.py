@@ -6,12 +6,13 @@ A flight mode is one file in this folder: a subclass of ``FlightMode`` and a nam
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import ClassVar
 
 from fsw.flight.arming_health import ArmingHealth
 from fsw.flight.setpoint_generator import PositionGoal, SetpointGenerator
 from fsw.flight.state import FlightState, SetpointMemory
+from fsw.frozen import replace
 from fsw.model.airframe import Airframe
 from fsw.model.body import Body
 from fsw.mpc.reference import still_at

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 from fsw.flight.modes.base import FlightMode, Handover, Px4Mode
 from fsw.flight.setpoint_generator import PositionGoal, SetpointGenerator
 from fsw.flight.state import FlightState, SetpointMemory
+from fsw.frozen import replace
 from fsw.signals import Mode, MotionSetpoint, StateEstimate
 
 _AT_REST = 0.1  # m/s; faster, a hold brakes first

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from fsw.flight.land_detector import is_low
 from fsw.flight.modes.base import CONTINUE, FlightMode, ModeResult, Px4Mode, moved
 from fsw.flight.state import FlightState
+from fsw.frozen import replace
 from fsw.mpc.reference import still_at, vertical_ramp
 from fsw.signals import EndEffectorTarget, Mode, StateEstimate
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 from fsw.flight import mission_sequencer as sequencer
 from fsw.flight.mission_sequencer import MissionContext, Stage
@@ -18,6 +17,7 @@ from fsw.flight.modes.base import (
 from fsw.flight.reference_governor import project
 from fsw.flight.state import FlightState, SetpointMemory
 from fsw.flight.trajectory_segment import MotionLimits
+from fsw.frozen import replace
 from fsw.model.kinematics import point_in_flight
 from fsw.mpc.reference import still_at
 from fsw.parameters.flight_config import FlightConfig

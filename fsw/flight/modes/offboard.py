@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from fsw.flight.land_detector import stands
 from fsw.flight.modes.base import CONTINUE, CommandContext, FlightMode, ModeResult, Px4Mode, moved
 from fsw.flight.offboard_setpoints import (
@@ -16,6 +14,7 @@ from fsw.flight.offboard_setpoints import (
 )
 from fsw.flight.setpoint_generator import PositionGoal
 from fsw.flight.state import FlightState, OffboardMemory, SetpointMemory, is_young
+from fsw.frozen import replace
 from fsw.geometry.vectors import add_scaled
 from fsw.parameters.flight_config import FlightConfig
 from fsw.signals import (

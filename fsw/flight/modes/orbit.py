@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from fsw.flight.modes.base import FlightMode, Handover, Px4Mode
 from fsw.flight.state import FlightState, SetpointMemory
+from fsw.frozen import replace
 from fsw.signals import Mode, StateEstimate
 
 

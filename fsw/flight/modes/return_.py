@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from fsw.flight.mission_sequencer import nearest
 from fsw.flight.modes.base import (
     CONTINUE,
@@ -16,6 +14,7 @@ from fsw.flight.modes.base import (
 )
 from fsw.flight.setpoint_generator import PositionGoal, arrived
 from fsw.flight.state import FlightState, SetpointMemory
+from fsw.frozen import replace
 from fsw.signals import Home, Mode, MotionSetpoint, StateEstimate, Vec3
 
 
