@@ -19,6 +19,7 @@ from typing import Any, Final
 from benchmarks.flood_monitor import Heard, Monitor
 from benchmarks.flood_traffic import SYSTEM
 from benchmarks.machine_watch import version_and_machine
+from benchmarks.requirement import Requirement, print_requirements
 from command_line.options import json_file, option, read
 from command_line.output import complain, console_beside, json_text, write_text
 from command_line.values import seconds
@@ -59,21 +60,6 @@ class Flight:
     sent_valid: int
 
 
-@dataclass(frozen=True, slots=True)
-class Requirement:
-    """One requirement."""
-
-    name: str
-    measured: float
-    bound: float
-    unit: str
-
-    @property
-    def passed(self) -> bool:
-        """A bound is a most; NaN is beyond it."""
-        return self.measured <= self.bound
-
-
 def main(argv: list[str]) -> int:
     """Measure and judge; returns the exit code."""
     what = "Fly in real time under a flood of useless datagrams."
@@ -87,12 +73,7 @@ def main(argv: list[str]) -> int:
         complain("python -m benchmarks flood", error)
         return error.exit_code
     rows = [*correctness(flooded), *timing(flooded, calm)]
-    for row in rows:
-        mark = "pass" if row.passed else "FAIL"
-        print(
-            f"{row.name:44} {row.measured:10.4g} <= {row.bound:<8.4g} {row.unit:4} {mark}",
-            file=console,
-        )
+    print_requirements(rows, console)
     _write(options.json, rows, calm, flooded)
     return PASSED if all(row.passed for row in rows) else NOT_PASSED
 
@@ -229,16 +210,7 @@ def _write(target: str | None, rows: list[Requirement], calm: Flight, flooded: F
     if target is None:
         return
     figures = {
-        "rows": [
-            {
-                "name": r.name,
-                "measured": r.measured,
-                "bound": r.bound,
-                "unit": r.unit,
-                "pass": r.passed,
-            }
-            for r in rows
-        ],
+        "rows": [row.as_json() for row in rows],
         "datagrams_sent": flooded.sent,
         "valid_frames_sent": flooded.sent_valid,
         "cores": os.cpu_count(),

@@ -19,8 +19,8 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from pymavlink import mavutil
 
-from benchmarks.flood import Requirement
 from benchmarks.machine_watch import descendants, version_and_machine
+from benchmarks.requirement import Requirement, print_requirements
 from benchmarks.soak_client import ANSWER_S, COMPONENT, SYSTEM, Client
 from command_line.options import json_file, option, read
 from command_line.output import complain, console_beside, json_text, write_text
@@ -109,12 +109,9 @@ def main(argv: list[str]) -> int:
         complain("python -m benchmarks soak", error)
         return error.exit_code
     rows = judge(flights)
-    for row in rows:
-        mark = "pass" if row.passed else "FAIL"
-        text = f"{row.name:44} {row.measured:10.4g} <= {row.bound:<8.4g} {row.unit:4} {mark}"
-        print(text, file=console)
+    print_requirements(rows, console)
     figures = {
-        "rows": [asdict(row) | {"pass": row.passed} for row in rows],
+        "rows": [row.as_json() for row in rows],
         "flights": [asdict(one) for one in flights],
     }
     write_text(options.json, json_text(figures, 1) + "\n")
@@ -224,7 +221,7 @@ def recorded(tlog: Path) -> tuple[int, int]:
 def _glance(process: int, at_s: float) -> tuple[str, Glance]:
     home = Path(f"/proc/{process}")
     words = (home / "cmdline").read_bytes().split(b"\0")
-    name = next((w.decode() for w in words if w in (b"fsw", b"sitl")), "planner")
+    name = next((w.decode() for w in words if w in (b"fsw", b"sitl")), "other")
     lines = (line.split(":", 1) for line in (home / "status").read_text().splitlines())
     status = {one[0]: one[1] for one in lines if len(one) == 2}
     resident = int(status["VmRSS"].split()[0]) / 1024.0

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import json
 import math
+import os
+import shlex
+import shutil
 import sys
 from pathlib import Path
 from typing import Any, TextIO
@@ -24,6 +27,15 @@ def say(sentence: str, stream: TextIO | None = None) -> None:
 def complain(program: str, sentence: object) -> None:
     """Print what is wrong in one line on standard error."""
     say(f"{program}: {sentence}", sys.stderr)
+
+
+def typed(program: str = "pandion") -> str:
+    """How this program is typed in the shell that started it: by its path where PATH has it not."""
+    started = Path(sys.argv[0]) if sys.argv else Path()
+    found = shutil.which(program)
+    if started.name != program or (found is not None and Path(found).samefile(started)):
+        return program
+    return shlex.quote(os.path.relpath(started))
 
 
 def json_text(value: Any, indent: int | None = None) -> str:
@@ -63,3 +75,8 @@ def unwritten(target: str | Path | None, text: str) -> list[str]:
     except OSError as error:
         return [f"{'standard output' if target == '-' else target}: {error.strerror}"]
     return []
+
+
+def without(error: ModuleNotFoundError, extra: str) -> str:
+    """What to install where an optional package is missing."""
+    return f"the package {error.name} is missing; install pandion[{extra}]"

@@ -20,6 +20,10 @@ VERBS: Final[dict[str, tuple[str, str]]] = {
     "sitl": ("sitl.__main__", "run the simulator alone"),
     "fsw": ("fsw.__main__", "run the flight software alone"),
     "reproduce": ("pandion.reproduce", "fly a table or a figure of the paper again"),
+    "campaign": (
+        "pandion.campaign",
+        "fly many flights from one file, here or on a cluster: margins, failures, the worst",
+    ),
     "falsify": (
         "pandion.falsify",
         "search for the disturbance that pushes the vehicle furthest off its plan",

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from command_line.options import OneOf, option, read
-from command_line.output import complain, say
+from command_line.output import complain, say, without
 from command_line.parser import COULD_NOT_START
 from pandion.display import Display
 
@@ -68,7 +68,7 @@ def main(argv: list[str]) -> int:
         complain("pandion export", error)
         return COULD_NOT_START
     except ModuleNotFoundError as error:
-        complain("pandion export", f"--mcap needs the package {error.name}; install pandion[mcap]")
+        complain("pandion export", f"--mcap: {without(error, 'mcap')}")
         return COULD_NOT_START
     say(f"{count} records of {path} in {options.csv or options.mcap}")
     return DONE

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from command_line.options import json_file, option, read, switch
+from command_line.options import group, json_file, option, read, switch
 from command_line.output import complain, console_beside, json_text, unwritten
 from command_line.parser import COULD_NOT_START, unknown_name
 from command_line.values import output_file, whole
 from command_line.version import version
+from pandion.cluster_options import ClusterOptions, campaign_of
 from pandion.display import Display
 
 if TYPE_CHECKING:
@@ -31,12 +31,7 @@ class FaultsOptions:
     matrix: bool = switch("--matrix", "every mode with every fault")
     only: str | None = option("--only TEXT", "of the matrix: faults and modes with this text")
     seed: int = option("--seed N", "root of all randomness", whole(), default=0)
-    workers: int = option(
-        "--workers N",
-        "processes; 0 flies in this one (default one a core)",
-        whole(0, 1024),
-        default=os.cpu_count() or 1,
-    )
+    cluster: ClusterOptions = group(ClusterOptions)
     expect: Path | None = option("--expect FILE", "what must happen (default the packaged)", Path)
     journal: Path | None = option(
         "--journal FILE", "keep each flight here; one that is here is not flown again", Path
@@ -59,12 +54,13 @@ def main(argv: list[str]) -> int:
     from fsw.runtime.process import pin_numerics_to_one_thread
 
     pin_numerics_to_one_thread()  # before NumPy loads
+    from studies.campaign import SchedulerGoneError
     from studies.fault_expectations import EXPECTATIONS, ExpectationError, expectations
 
     try:
         known = expectations(options.expect or EXPECTATIONS)
         return _run(options, _chosen(options, known))
-    except (ExpectationError, UnknownError, OSError) as error:
+    except (ExpectationError, UnknownError, SchedulerGoneError, OSError) as error:
         complain("pandion faults", error)
         return COULD_NOT_START
 
@@ -141,19 +137,18 @@ def _run(options: FaultsOptions, cells: list[Cell]) -> int:
 
 def _flown(cells: list[Cell], options: FaultsOptions, display: Display) -> list[Judged]:
     """Flights in process on all workers, then those in real time, one after the other."""
-    from studies.campaign import Campaign
-    from studies.fault_flights import FaultFlight
     from studies.fault_matrix import judge
 
     inside = [cell for cell in cells if not cell.expected.link]
     linked = [cell for cell in cells if cell.expected.link]
-    workers = 0 if len(inside) == 1 else options.workers
+    here = ClusterOptions(workers=0)
 
     def report(before: int, done: int, _: int) -> None:
         display.report("flown", before + done, len(cells))
 
-    of_processes = Campaign[FaultFlight](workers, options.journal, partial(report, 0))
-    one_by_one = Campaign[FaultFlight](0, options.journal, partial(report, len(inside)))
+    where = here if len(inside) == 1 else options.cluster
+    of_processes = campaign_of(where, options.journal, partial(report, 0), display.say)
+    one_by_one = campaign_of(here, options.journal, partial(report, len(inside)))
     found = of_processes.run(inside) + one_by_one.run(linked)
     flights = dict(zip((*inside, *linked), found, strict=True))
     return [judge(cell, flights[cell]) for cell in cells]

@@ -9,7 +9,7 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
 from command_line.options import as_words, declared, group, json_file, read, switch
-from command_line.output import complain, json_text, unwritten
+from command_line.output import complain, json_text, typed, unwritten, without
 from command_line.parser import COULD_NOT_START
 from command_line.version import version
 from fsw.arguments import OUT, PARAMS, FswOptions
@@ -201,7 +201,9 @@ def _report(flight: PlannedFlight, display: Display) -> list[str]:
     """Write the page, or say how to; returns what could not be written, and why."""
     if not flight.options.report:
         where = shlex.quote(str(flight.out))
-        display.say(f"to see it: pandion view {where}, or pandion report {where}")
+        display.say(
+            f"to see it: {typed()} view {where}; as a file to send: {typed()} report {where}"
+        )
         return []
     from messages.ulog_reader import UlogError
     from pandion.report import write_report
@@ -211,5 +213,5 @@ def _report(flight: PlannedFlight, display: Display) -> list[str]:
     except (UlogError, OSError) as error:
         return [f"report: {error}"]
     except ModuleNotFoundError as error:
-        return [f"report: the package {error.name} is missing; install pandion[report]"]
+        return [f"report: {without(error, 'report')}"]
     return []

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import argparse
-import os
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
-from command_line.options import json_file, option, read
+from command_line.options import group, json_file, option, read
 from command_line.output import complain, console_beside, say, write_text
 from command_line.parser import COULD_NOT_START
-from command_line.values import number, one_of, whole
+from command_line.values import number, one_of
 from command_line.version import version
 from fsw.log.run_directory import new_run_directory
 from fsw.parameters.control_choice import KNOWN
+from pandion.cluster_options import ClusterOptions, campaign_of
 from pandion.display import Display
 from sitl.scenario_file import SUITE_NAMES
 from studies.catalogue import STUDIES, study
@@ -83,12 +83,7 @@ class ReproduceOptions:
     only: str | None = option(
         "--only TEXT", "robustness: only the rows with this in their section, case or name"
     )
-    workers: int = option(
-        "--workers N",
-        "processes; 0 flies in this one (default one a core)",
-        whole(0, 1024),
-        default=os.cpu_count() or 1,
-    )
+    cluster: ClusterOptions = group(ClusterOptions)
     json: str | None = json_file("the rows")
     out: Path | None = option(
         "--out DIR",
@@ -105,6 +100,7 @@ def main(argv: list[str]) -> int:
     from fsw.runtime.process import pin_numerics_to_one_thread
 
     pin_numerics_to_one_thread()  # before NumPy loads
+    from studies.campaign import SchedulerGoneError
     from studies.drawing import NoMatplotlibError
     from studies.settings import NoCellError
 
@@ -112,14 +108,12 @@ def main(argv: list[str]) -> int:
         if options.what != "robustness" and (options.suite or options.only):
             raise NoCellError(f"{options.what} has no rows to choose by --suite or --only")
         return _run(options)
-    except (NoMatplotlibError, NoCellError, OSError) as error:
+    except (NoMatplotlibError, NoCellError, SchedulerGoneError, OSError) as error:
         complain("pandion reproduce", error)
         return COULD_NOT_START
 
 
 def _run(options: ReproduceOptions) -> int:
-    from studies.campaign import Campaign
-    from studies.job import Outcome
     from studies.page import rows_text, write
 
     console = console_beside(options.json)
@@ -131,20 +125,20 @@ def _run(options: ReproduceOptions) -> int:
     try:
         display = Display(console)
         with display.progress():
-            campaign: Campaign[Outcome] = Campaign(
-                options.workers, folder / "journal.jsonl", partial(display.report, "flown")
-            )
-            report = study(options.what)(settings, campaign)
+            report = partial(display.report, "flown")
+            journal = folder / "journal.jsonl"
+            with campaign_of(options.cluster, journal, report, display.say) as campaign:
+                found = study(options.what)(settings, campaign)
     except KeyboardInterrupt:
         complain("pandion reproduce", f"interrupted; --out {folder} resumes")
         return BROKEN
-    page = write(report, settings, _provenance(options), options.what, folder)
-    _show(report, console)
+    page = write(found, settings, _provenance(options), options.what, folder)
+    _show(found, console)
     say(f"page {page}", console)
-    write_text(options.json, rows_text(report))
-    for error in report.errors:
+    write_text(options.json, rows_text(found))
+    for error in found.errors:
         complain("pandion reproduce", error)
-    return BROKEN if report.errors else DONE
+    return BROKEN if found.errors else DONE
 
 
 def _settings(options: ReproduceOptions) -> Settings:

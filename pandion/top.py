@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from command_line.options import option, read
-from command_line.output import complain
+from command_line.output import complain, without
 from command_line.parser import COULD_NOT_START
 from fsw.link.udp_endpoint import LinkError, parse_address
 
@@ -37,7 +37,7 @@ def main(argv: list[str]) -> int:
         complain("pandion top", error)
         return COULD_NOT_START
     except ModuleNotFoundError as error:
-        complain("pandion top", f"the package {error.name} is missing; install pandion[top]")
+        complain("pandion top", without(error, "top"))
         return COULD_NOT_START
     if not sys.stdout.isatty():
         complain("pandion top", "needs a terminal; over SSH: ssh -t HOST pandion top")

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from command_line.options import option, read, switch
-from command_line.output import complain, say
+from command_line.output import complain, say, without
 from command_line.parser import COULD_NOT_START
 from command_line.values import whole
 from pandion.view_beside import PORT
@@ -49,7 +49,7 @@ def main(argv: list[str]) -> int:
     try:
         return _show_live(options) if options.log is None else _show_log(options, options.log)
     except ModuleNotFoundError as error:
-        complain("pandion view", f"needs the package {error.name}; install pandion[view]")
+        complain("pandion view", without(error, "view"))
         return COULD_NOT_START
 
 

@@ -161,7 +161,18 @@ class Torque:
     kind: Literal["torque"] = "torque"
 
 
-Disturbance: TypeAlias = Uniform | Wind | Impulses | Torque
+@dataclass(frozen=True, slots=True)
+class Sequence:
+    """Accelerations written down one after the other, NED; nothing before and after them."""
+
+    acceleration_m_s2: tuple[Annotated[V3, Range(-50.0, 50.0)], ...]
+    period_s: Annotated[float, Range(0.002, 3600.0, step=0.002)] = 0.1  # for which each holds
+    starts_s: Annotated[float, Range(0.0, 86400.0, step=0.002)] = 0.0  # since the simulation's
+    name: str = "sequence"
+    kind: Literal["sequence"] = "sequence"
+
+
+Disturbance: TypeAlias = Uniform | Wind | Impulses | Torque | Sequence
 
 
 @dataclass(frozen=True, slots=True)

@@ -121,7 +121,7 @@ def _parsed(text: str, name: str, suite: str | None) -> Scenario:
         given = table.get("sensors", {})
         same = isinstance(given, dict) and given.get("suite", PERFECT) == suite
         table["sensors"] = {**(given if same else {}), "suite": suite}
-    scenario: Scenario = _build(Scenario, {**table, "name": name}, "")
+    scenario: Scenario = build_table(Scenario, {**table, "name": name}, "")
     return scenario
 
 
@@ -139,8 +139,12 @@ def _shown(value: object) -> str:
     return text if len(text) <= _SHOWN else f"{text[:_SHOWN]}…"
 
 
-def _build(kind: Any, table: Any, path: str) -> Any:
-    """An instance of the dataclass ``kind`` from a TOML table."""
+def build_table(kind: Any, table: Any, path: str) -> Any:
+    """An instance of the dataclass ``kind`` from a TOML ``table`` that stands at ``path``.
+
+    Raises:
+        ScenarioError: An unknown or missing key, or an impossible value.
+    """
     if not isinstance(table, dict):
         raise ScenarioError(f"{path} = {_shown(table)}: must be a table")
     hints = typing.get_type_hints(kind, include_extras=True)
@@ -173,11 +177,11 @@ def _value(hint: Any, value: Any, path: str) -> Any:
 
         return _table_of_a_kind(list(TABLES), value, path, "shape")
     if dataclasses.is_dataclass(hint):
-        return _build(hint, value, path)
+        return build_table(hint, value, path)
     if origin is tuple:
         if not isinstance(value, list):
             raise ScenarioError(
-                f"{path} = {_shown(value)}: must be an array of tables ([[{path}]])"
+                f"{path} = {_shown(value)}: must be an array of {_entries(parts[0], path)}"
             )
         return tuple(_value(parts[0], item, f"{path}[{i}]") for i, item in enumerate(value))
     if hint is bool:
@@ -187,6 +191,15 @@ def _value(hint: Any, value: Any, path: str) -> Any:
     return _word(hint, value, path)
 
 
+def _entries(hint: Any, path: str) -> str:
+    """What an array consists of, as a sentence says it."""
+    if get_origin(hint) is Annotated:
+        return f"arrays of {len(get_args(get_args(hint)[0]))} numbers"
+    if dataclasses.is_dataclass(hint) or get_origin(hint) is types.UnionType:
+        return f"tables ([[{path}]])"
+    return 'texts, such as ["a", "b"]'
+
+
 def _sensors(value: Any, path: str) -> Sensors | MeasuredSensors:
     """The numbers of a suite, with those of the scenario in their place where it has any."""
     if not isinstance(value, dict):
@@ -194,7 +207,7 @@ def _sensors(value: Any, path: str) -> Sensors | MeasuredSensors:
     own = {key: part for key, part in value.items() if key != "suite"}
     suite = _word(SuiteName, value.get("suite", PERFECT), f"{path}.suite")
     if suite == PERFECT:
-        exact: Sensors = _build(Sensors, own, path)
+        exact: Sensors = build_table(Sensors, own, path)
         return exact
     tables = tomllib.loads((SUITES / f"{suite}.toml").read_text(encoding="utf-8"))
     for key, part in own.items():
@@ -206,7 +219,7 @@ def _sensors(value: Any, path: str) -> Sensors | MeasuredSensors:
         if not isinstance(part, dict):
             raise ScenarioError(f"{path}.{key} = {_shown(part)}: must be a table")
         tables[key] = {**tables[key], **part}
-    measured: MeasuredSensors = _build(MeasuredSensors, {**tables, "suite": suite}, path)
+    measured: MeasuredSensors = build_table(MeasuredSensors, {**tables, "suite": suite}, path)
     return measured
 
 
@@ -224,7 +237,7 @@ def _word(hint: Any, value: Any, path: str) -> str:
 def _table_of_a_kind(kinds: list[Any], value: Any, path: str, key: str = "kind") -> Any:
     """A table with a ``key`` that names its type, where there are several."""
     if len(kinds) == 1:
-        return _build(kinds[0], value, path)
+        return build_table(kinds[0], value, path)
     words = {get_args(typing.get_type_hints(kind)[key])[0]: kind for kind in kinds}
     if not isinstance(value, dict):
         raise ScenarioError(f"{path} = {_shown(value)}: must be a table")
@@ -235,7 +248,7 @@ def _table_of_a_kind(kinds: list[Any], value: Any, path: str, key: str = "kind")
         raise ScenarioError(
             f"{path}.{key} = {_shown(word)}: must be {_words(words)}{_nearest(word, words)}"
         )
-    return _build(words[word], value, path)
+    return build_table(words[word], value, path)
 
 
 def _numbers(hint: Any, allowed: Range, value: Any, path: str) -> float | tuple[float, ...]:

@@ -1,26 +1,20 @@
-"""Many flights: a pool of processes, a journal to resume from, progress while it runs.
+"""Many flights: on the cores of this machine or of others, resumable, with progress.
 
-Each process computes with one thread, so that as many run as there are cores. A flight that
-raises is a row. A process that dies takes its pool with it: the flights that were out are then
-flown one by one, each in a process of its own, and the one that kills it again is a row as well.
+A flight is flown by one thread of one process, so that as many are out as there are cores. One
+that raises, hangs or kills its process is tried again a stated number of times; then its row says
+why. Rows do not depend on order, process or machine: workers with other code are refused.
 """
 
 from __future__ import annotations
 
 import contextlib
-import json
-import multiprocessing
-import os
-import signal
-from collections import deque
-from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Generic, Protocol, Self, TypeVar
 
-from fsw.runtime.process import die_with_parent, pin_numerics_to_one_thread
+from studies.flying import TIME_LIMIT_S, fly_one
+from studies.journal import Journal
 
 ProgressReport = Callable[[int, int], None]  # flights done, flights in all
 
@@ -41,7 +35,7 @@ RowT_co = TypeVar("RowT_co", bound=Row, covariant=True)
 
 
 class Flight(Protocol[RowT_co]):
-    """What is flown."""
+    """What is flown; it and its row can be pickled."""
 
     def key(self) -> str:
         """Its name: same flight, same name, in any process, while the code is the same."""
@@ -56,115 +50,152 @@ class Flight(Protocol[RowT_co]):
         """Its row as it was kept; a TypeError or KeyError if another version kept it."""
 
 
+@dataclass(frozen=True, slots=True)
+class Scheduler:
+    """A running scheduler of Dask; files of TLS as Dask's own options have them."""
+
+    address: str | None = None
+    file: Path | None = None
+    tls_ca_file: Path | None = None
+    tls_cert: Path | None = None
+    tls_key: Path | None = None
+
+
+class SchedulerGoneError(Exception):
+    """No scheduler answers, in one sentence; what was flown is kept."""
+
+
 def silent(done: int, total: int) -> None:
     """Report nothing."""
 
 
+def mute(sentence: str) -> None:
+    """Say nothing."""
+
+
 @dataclass
 class Campaign(Generic[RowT]):
-    """Flies flights, each distinct one once."""
+    """Flies flights, each distinct one once.
 
-    workers: int = 1  # 0: in this process
+    As a context manager it keeps its processes from one run to the next; without, each run starts
+    and ends its own.
+    """
+
+    workers: int = 1  # processes on this machine; 0: in this one
     journal: Path | None = None  # JSON lines; what is in it is not flown again
     report: ProgressReport = silent
-    _kept: dict[str, Mapping[str, Any]] = field(default_factory=dict)
+    scheduler: Scheduler | None = None  # in place of processes on this machine
+    time_limit_s: float = TIME_LIMIT_S  # that a flight may take on its machine
+    tries: int = 3  # of a flight that breaks
+    say: Callable[[str], None] = mute  # what goes on with workers
+    _lines: Journal | None = field(default=None, init=False)
+    _cluster: Any = field(default=None, init=False)  # of studies.cluster, which loads Dask
+    _kept_open: bool = field(default=False, init=False)
+    _past_journal: bool = field(default=False, init=False)
 
-    def __post_init__(self) -> None:
-        if self.journal is not None and self.journal.exists():
-            self._kept.update(_lines(self.journal))
+    def __enter__(self) -> Self:
+        self._kept_open = True
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        self._kept_open = False
+        self.close(at_once=kind is not None)
+
+    def close(self, *, at_once: bool = False) -> None:
+        """End the processes that fly; ``at_once`` in the middle of a flight."""
+        if self._lines is not None:
+            self._lines.close()
+        if self._cluster is not None:
+            self._cluster.close(at_once=at_once)
+        self._lines = self._cluster = None
+
+    @property
+    def flies(self) -> bool:
+        """Whether rows come from flights, not from the journal any more."""
+        return self._past_journal
 
     def run(self, flights: Sequence[Flight[RowT]]) -> list[RowT]:
         """Rows in the order of the flights."""
         keys = [flight.key() for flight in flights]
-        distinct = dict(zip(keys, flights, strict=True))
-        known = self._known(distinct)
-        self.report(len(known), len(distinct))
-        missing = {key: flight for key, flight in distinct.items() if key not in known}
-        for key, row in self._flown(missing):
-            known[key] = row
-            self._keep(key, row)
-            self.report(len(known), len(distinct))
-        return [known[key] for key in keys]
+        total, found = len(set(keys)), {}
+        self.report(0, total)
+        for key, row in self.fly(flights):
+            found[key] = row
+            self.report(len(found), total)
+        return [found[key] for key in keys]
 
-    def _known(self, flights: Mapping[str, Flight[RowT]]) -> dict[str, RowT]:
-        known = {}
-        for key in flights.keys() & self._kept.keys():
-            with contextlib.suppress(TypeError, KeyError):
-                known[key] = flights[key].from_line(self._kept[key])
-        return known
-
-    def _flown(self, flights: Mapping[str, Flight[RowT]]) -> Iterator[tuple[str, RowT]]:
-        if self.workers == 0:
-            for key, flight in flights.items():
-                yield key, flight.row()
-            return
-        waiting = deque(flights.items())
-        while waiting:
-            suspects = yield from self._pooled(waiting)
-            for key, flight in suspects:
-                yield key, _alone(flight)
-
-    def _pooled(
-        self, waiting: deque[tuple[str, Flight[RowT]]]
-    ) -> Generator[tuple[str, RowT], None, tuple[tuple[str, Flight[RowT]], ...]]:
-        """Fly what waits; returns early, with the flights that were out, if a process dies."""
-        pool = pool_of(self.workers)
-        out: dict[Future[RowT], tuple[str, Flight[RowT]]] = {}
+    def fly(self, flights: Sequence[Flight[RowT]]) -> Iterator[tuple[str, RowT]]:
+        """Key and row of each distinct flight as they come; those of the journal first."""
         try:
-            while waiting or out:
-                while waiting and len(out) < self.workers:
-                    out[pool.submit(waiting[0][1].row)] = waiting[0]
-                    waiting.popleft()
-                for future in wait(out, return_when=FIRST_COMPLETED).done:
-                    row = future.result()
-                    key, _ = out.pop(future)
+            self._past_journal = False
+            if self.journal is not None and self._lines is None:
+                self._lines = Journal(self.journal)
+            known = set()
+            for key, flight in _distinct(flights):
+                row = self._from_journal(key, flight)
+                if row is not None:
+                    known.add(key)
                     yield key, row
-        except BrokenProcessPool:
-            return tuple(out.values())
+            self._past_journal = True
+            missing = (pair for pair in _distinct(flights) if pair[0] not in known)
+            yield from self._flown(missing)
         except BaseException:
-            for process in multiprocessing.active_children():
-                process.kill()  # or leaving would wait for flights that are no longer wanted
+            self.close(at_once=True)
             raise
         finally:
-            pool.shutdown(wait=True, cancel_futures=True)
-        return ()
+            if not self._kept_open:
+                self.close()
 
-    def _keep(self, key: str, row: RowT) -> None:
-        if self.journal is None or row.error:
-            return
-        self._kept[key] = row.as_line()
-        self.journal.parent.mkdir(parents=True, exist_ok=True)
-        with self.journal.open("a", encoding="utf-8") as lines:
-            # A line of its own even after one that an interrupt cut short.
-            lines.write("\n" + json.dumps({"key": key, **self._kept[key]}) + "\n")
+    def _from_journal(self, key: str, flight: Flight[RowT]) -> RowT | None:
+        line = None if self._lines is None else self._lines.get(key)
+        if line is not None:
+            with contextlib.suppress(TypeError, KeyError):
+                return flight.from_line(line)
+        return None
+
+    def _flown(self, flights: Iterator[tuple[str, Flight[RowT]]]) -> Iterator[tuple[str, RowT]]:
+        """Rows as they come; each is in the journal before it is given on."""
+        for rows in self._here(flights) if self._serial else self._elsewhere(flights):
+            if self._lines is not None:
+                self._lines.append((key, row.as_line()) for key, row in rows)
+            yield from rows
+
+    @property
+    def _serial(self) -> bool:
+        return self.workers == 0 and self.scheduler is None
+
+    def _here(
+        self, flights: Iterable[tuple[str, Flight[RowT]]]
+    ) -> Iterator[list[tuple[str, RowT]]]:
+        for key, flight in flights:
+            for _ in range(self.tries):
+                row = fly_one(flight, self.time_limit_s, hard=False)
+                if not row.error:
+                    break
+            yield [(key, row)]
+
+    def _elsewhere(
+        self, flights: Iterator[tuple[str, Flight[RowT]]]
+    ) -> Iterator[list[tuple[str, RowT]]]:
+        first = next(flights, None)
+        if first is None:
+            return  # no reason to start any process
+        from itertools import chain
+
+        from studies.cluster import Cluster
+        from studies.dispatch import Dispatch
+
+        if self._cluster is None:
+            self._cluster = Cluster(self.workers, self.scheduler, self.say)
+        yield from Dispatch[RowT](
+            self._cluster, chain((first,), flights), self.tries, self.time_limit_s
+        ).rows()
 
 
-def pool_of(workers: int) -> ProcessPoolExecutor:
-    """Processes that fly; SIGINT is for the one that started them, and they end with it."""
-    pin_numerics_to_one_thread()  # inherited by the processes, before they load their libraries
-    spawn = multiprocessing.get_context("spawn")
-    return ProcessPoolExecutor(workers, spawn, initializer=_begin, initargs=(os.getpid(),))
-
-
-def _begin(parent: int) -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the campaign ends its processes
-    die_with_parent(parent)
-
-
-def _alone(flight: Flight[RowT]) -> RowT:
-    """Fly in a process that nothing else depends on."""
-    with pool_of(1) as pool:
-        try:
-            return pool.submit(flight.row).result()
-        except BrokenProcessPool:
-            return flight.broken("the process that flew it died")
-
-
-def _lines(journal: Path) -> dict[str, dict[str, Any]]:
-    """What a journal keeps, by key; lines cut short by an interrupt are dropped."""
-    kept = {}
-    for line in journal.read_text(encoding="utf-8").splitlines():
-        with contextlib.suppress(json.JSONDecodeError, TypeError, KeyError):
-            content = json.loads(line)
-            kept[content.pop("key")] = content
-    return kept
+def _distinct(flights: Iterable[Flight[RowT]]) -> Iterator[tuple[str, Flight[RowT]]]:
+    seen: set[str] = set()
+    for flight in flights:
+        key = flight.key()
+        if key not in seen:
+            seen.add(key)
+            yield key, flight

@@ -8,6 +8,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, Final, cast
 
+from fsw.flight.failsafe import Condition
+from fsw.link.events.event_table import condition_of
 from fsw.link.wire import decode
 from fsw.link.wire import message_ids as ids
 from fsw.link.wire.px4_mode import AVAILABLE_MODES
@@ -94,6 +96,7 @@ class Telemetry:
     _safe_set: SafeSet | None = None
     _pieces: dict[int, bytes] = field(default_factory=dict)
     _mode: str = ""
+    _conditions: list[Condition] = field(default_factory=list)  # of failsafes, that have begun
     _plan: tuple[Any, ...] | None = None  # of which the horizon is known
     _led: Horizon | None = None
 
@@ -141,13 +144,21 @@ class Telemetry:
             mode=self._mode,
             armed=beat is not None and bool(beat[3] & _ARMED),
             landed=state is not None and state[1] == _ON_GROUND,
-            failures=_condition(beat),
+            failures=self._failures(beat),
             battery=self._battery(),
             link_age=now - self.at,
             solver=None if solver is None else _solver(solver),
             timing=tuple(self._timings[group] for group in sorted(self._timings)),
             safety=safety,
         )
+
+    def _failures(self, beat: tuple[Any, ...] | None) -> str:
+        """By their names, which EVENT has; HEARTBEAT alone says only that there are any."""
+        state = None if beat is None else beat[4]
+        named = ", ".join(one.value for one in self._conditions)
+        if state == _TERMINATED:
+            return f"terminated: {named}" if named else "terminated"
+        return named or ("failsafe" if state == _FAILSAFE else "")
 
     def _newest(self, message_id: int, lasts: float = math.inf) -> tuple[Any, ...] | None:
         """The newest values of a message, unless they are older than ``lasts`` [s]."""
@@ -254,6 +265,17 @@ class Telemetry:
             self.refusals.append(sentence)
         self.note(EventKind.WARNING if severity <= _WARNING else EventKind.TEXT, sentence)
 
+    def read_event(self, values: tuple[Any, ...]) -> None:
+        """EVENT: a failsafe condition that has begun or is over."""
+        found = condition_of(int(values[0]), bytes(values[6:]))
+        if found is None:
+            return
+        condition, over = found
+        if condition in self._conditions:
+            self._conditions.remove(condition)
+        if not over:
+            self._conditions.append(condition)
+
     def read_answer(self, values: tuple[Any, ...]) -> None:
         """Take a COMMAND_ACK."""
         command, result = int(values[0]), int(values[1])
@@ -334,12 +356,6 @@ def _solver(values: tuple[Any, ...]) -> Solver:
     )
 
 
-def _condition(beat: tuple[Any, ...] | None) -> str:
-    if beat is None:
-        return ""
-    return {_FAILSAFE: "failsafe", _TERMINATED: "terminated"}.get(beat[4], "")
-
-
 def _vec3(values: tuple[Any, ...]) -> Vec3:
     x, y, z = values
     return float(x), float(y), float(z)
@@ -386,6 +402,7 @@ _READERS: Final[dict[int, Callable[[Telemetry, tuple[Any, ...]], None]]] = {
     ids.POSITION_TARGET_LOCAL_NED: _nothing,
     ids.ESTIMATOR_STATUS: _nothing,
     ids.EXTENDED_SYS_STATE: _nothing,
+    ids.EVENT: Telemetry.read_event,
     ids.STATUSTEXT: Telemetry.read_text,
     ids.ARM_JOINT_STATE: _clock(us=True),
     ids.END_EFFECTOR_TARGET: _nothing,

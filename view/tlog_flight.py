@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from fsw.model.airframe import AIRFRAME
 from fsw.signals import Vec3
-from messages.frames import split
+from messages.tlog_reader import tlog_frames
 from view.flight import Curve, Trail
 from view.flight_data import UlogError
 from view.scene import Scene, Worst
@@ -21,9 +21,7 @@ from view.vehicle import places, tilt
 
 Array = NDArray[Any]
 
-_STAMP: Final = 8  # bytes before each frame
 _SCENE_S: Final = 0.04  # between two scenes that are kept
-_SIGNATURE: Final = 13
 
 
 class TlogFlight:
@@ -42,7 +40,7 @@ class TlogFlight:
             log = path.read_bytes()
         except OSError as error:
             raise UlogError(f"cannot read {path}: {error.strerror}") from None
-        for at, frame in _frames(log):
+        for at, frame in tlog_frames(log):
             telemetry.take(frame, at)
             last = self._scenes[-1].t if self._scenes else -math.inf
             if telemetry.t >= last + _SCENE_S:
@@ -112,19 +110,3 @@ def curves_of(scenes: list[Scene], airframe: Any) -> tuple[Curve, ...]:
         ),
         Curve("tilt [deg]", t, ("tilt",), (np.array(lean),), (math.degrees(airframe.tilt_max),)),
     )
-
-
-def _frames(log: bytes) -> Any:
-    """Every frame with its time [s]."""
-    at = 0
-    while at + _STAMP + 2 <= len(log):
-        if log[at + _STAMP] == 0xFD:
-            size = 12 + log[at + 9] + _SIGNATURE * (log[at + 10] & 1)
-        elif log[at + _STAMP] == 0xFE:
-            size = 8 + log[at + 9]
-        else:
-            return
-        stamp = 1e-6 * int.from_bytes(log[at : at + _STAMP], "big")
-        for frame in split(log[at + _STAMP : at + _STAMP + size]):
-            yield stamp, frame
-        at += _STAMP + size

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import asyncio
 import tempfile
+from collections import deque
 from pathlib import Path
 from typing import Final
 
 from PIL import Image
 
 from docs.figures.browser import page
-from messages.frames import Frame, split
+from messages.frames import Frame
+from messages.tlog_reader import tlog_frames
 from pandion.report import write_report
 from view.top.app import TopApp
 
@@ -19,7 +21,6 @@ INSPECTOR_PX: Final = (1300, 826)
 _CELLS: Final = (132, 40)  # columns and rows of the terminal
 _SHOWN_S: Final = 60.0  # of the flight
 _COLOURS: Final = 128
-_STAMP: Final = 8  # bytes before each frame of a telemetry log
 
 
 def draw_report(directory: Path, target: Path) -> None:
@@ -78,30 +79,20 @@ class _Recorded:
 
     def __init__(self, tlog: Path) -> None:
         self.now = 0.0
-        self._data = tlog.read_bytes()
-        self._begin = int.from_bytes(self._data[:_STAMP], "big")
-        self._at = 0
+        self._coming = deque(tlog_frames(tlog.read_bytes()))
+        self._begin = self._coming[0][0]
 
     def poll(self, now: float) -> list[Frame]:
         """What the vehicle sent until ``now`` [s since the start]."""
         found: list[Frame] = []
-        while self._at + _STAMP < len(self._data):
-            head = self._at + _STAMP
-            stamp = int.from_bytes(self._data[self._at : head], "big")
-            if 1e-6 * (stamp - self._begin) > now:
-                break
-            self._at = head + _length(self._data, head)
-            found += (one for one in split(self._data[head : self._at]) if one.system_id == 1)
+        while self._coming and self._coming[0][0] - self._begin <= now:
+            _, frame = self._coming.popleft()
+            if frame.system_id == 1:
+                found.append(frame)
         return found
 
     def close(self) -> None:
         """Nothing is open."""
-
-
-def _length(data: bytes, at: int) -> int:
-    """Bytes of the frame that begins at ``at``."""
-    signed = data[at] == 0xFD and data[at + 2] & 1
-    return data[at + 1] + (12 + 13 * bool(signed) if data[at] == 0xFD else 8)
 
 
 def _shrink(picture: Path) -> None:

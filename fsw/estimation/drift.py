@@ -42,17 +42,24 @@ class FrameDrift(NamedTuple):
     attitude_noise: Vec3 = _NEVER  # rad^2, roll, pitch, yaw
     variance: Array = _STILL  # (4,) D: m^2, NED, and rad^2 of the heading; never changed in place
 
+    @classmethod
+    def at_start(cls, x: Any, noise: tuple[Vec3, Vec3], stated: tuple[Vec3, Vec3]) -> FrameDrift:
+        """The frame in which a filter ``x`` has just begun, at a pose.
+
+        Its variances ``stated`` are [m^2, NED] and [rad^2, FRD]; what is more than ``noise`` [as
+        they] is the frame's, of which the filter knows nothing yet.
+        """
+        x["drifts"] = 1
+        return cls(*noise, _of_frame(noise, stated, _levers(x)))
+
     def moved(self, x: Any, stated: tuple[Vec3, Vec3], jumped: bool) -> FrameDrift:
         """The frame at the next pose; lets the covariances of the filter ``x`` grow.
 
         The pose's variances ``stated`` are [m^2, NED] and [rad^2, FRD].
         """
-        place, attitude = stated
-        noise, about = _least(self.place_noise, place), _least(self.attitude_noise, attitude)
-        levers, heading = _levers(x), attitude[2] - about[2]
-        variance = np.array([*np.subtract(place, noise), heading])
-        # What is stated holds at this place, and the turned frame has a share in it.
-        variance[:3] = np.maximum(variance[:3] - heading * levers[P : P + 3, 3] ** 2, 0.0)
+        noise = least((self.place_noise, self.attitude_noise), stated)
+        levers = _levers(x)
+        variance = _of_frame(noise, stated, levers)
         M, shared = x["covariance"], x["shared"]
         if jumped:
             M[:] = self.in_world(M, shared, x)
@@ -68,7 +75,7 @@ class FrameDrift(NamedTuple):
         M += (levers * grown) @ levers.T
         shared += levers * grown
         x["drifts"] = 1
-        return FrameDrift(noise, about, variance)
+        return FrameDrift(*noise, variance)
 
     def in_world(self, covariance: Array, shared: Array, x: Any) -> Array:
         """A ``covariance`` (17, 17) [SI] and the ``shared`` one (17, 4) [SI] as one in the world.
@@ -90,6 +97,20 @@ def _levers(x: Any) -> Array:
     w, i, j, k = x["q"].tolist()
     levers[TH : TH + 3, 3] = matrix_from_quaternion((w, i, j, k))[6:]
     return levers
+
+
+def _of_frame(noise: tuple[Vec3, Vec3], stated: tuple[Vec3, Vec3], levers: Array) -> Array:
+    """D (4,) of variances that are stated at a place with these ``levers``, without their noise."""
+    heading = stated[1][2] - noise[1][2]
+    variance = np.array([*np.subtract(stated[0], noise[0]), heading])
+    # What is stated holds at this place, and the turned frame has a share in it.
+    variance[:3] = np.maximum(variance[:3] - heading * levers[P : P + 3, 3] ** 2, 0.0)
+    return variance
+
+
+def least(a: tuple[Vec3, Vec3], b: tuple[Vec3, Vec3]) -> tuple[Vec3, Vec3]:
+    """The smaller ones of two poses' variances, [m^2, NED] and [rad^2, FRD]."""
+    return _least(a[0], b[0]), _least(a[1], b[1])
 
 
 def _least(a: Vec3, b: Vec3) -> Vec3:

@@ -12,13 +12,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
+from functools import reduce
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from fsw.compiled import packed
 from fsw.estimation import kernels
-from fsw.estimation.drift import FrameDrift
+from fsw.estimation.drift import FrameDrift, least
 from fsw.estimation.error_state import DELAY, ERRORS, FILTER, FRAME, IMU_CAPACITY, Array, Filter
 from fsw.estimation.imu import IMU_TOO_OLD, STUCK_READINGS, TIME_TOLERANCE
 from fsw.estimation.pace import Pace
@@ -54,6 +55,8 @@ _SMALL_STEP: Final = 0.05  # m
 _SMALL_TURN: Final = 0.1  # rad
 _FLOATS: Final = FILTER.itemsize // 8  # that a filter has room for
 _REST: Vec3 = (0.0, 0.0, 0.0)
+UNKNOWN: Final[Vec3] = (0.0, 0.0, 0.0)  # what rotors make of the vehicle
+_NO_READING: Final[Vec3] = (math.nan, math.nan, math.nan)
 _NO_TURN: Vec4 = (1.0, 0.0, 0.0, 0.0)
 
 
@@ -152,6 +155,7 @@ class _Tick:
         "_encoders",
         "_force",
         "_fusion",
+        "_model",
         "_now",
         "_parts",
         "_rate",
@@ -163,8 +167,11 @@ class _Tick:
         "memory",
     )
 
-    def __init__(self, fusion: SensorFusion, memory: FusionMemory, now: float, u: Vec2) -> None:
+    def __init__(
+        self, fusion: SensorFusion, memory: FusionMemory, now: float, u: Vec2, model: Vec3
+    ) -> None:
         self.memory = memory
+        self._model = model
         self.imu_came, self.joints_came = memory.imu_came, memory.joints_came
         self._fusion, self._now, self._u = fusion, now, u
         self._dt = min(max(now - memory.now, 0.0), _LONGEST_STEP) if memory.now >= 0.0 else 0.0
@@ -185,12 +192,17 @@ class _Tick:
         self._time, self._force, self._rate = sample.time, sample.acceleration, sample.rate
         self.imu_came = self._now
 
+    def go_on_without_imu(self) -> None:
+        """In place of a reading of the IMU, take what the model makes of the last one."""
+        self._parts |= kernels.READING
+        self._time, self._force, self._rate = self._now, _NO_READING, _NO_READING
+
     def take_joints(self, sample: JointSample) -> None:
         """Take in a reading of the encoders."""
         (first, second), now = sample.angles, self._now
         if not sample.time <= now + TIME_TOLERANCE:
             self._note(Sensor.ENCODERS, SensorFault.FUTURE)
-        elif not max(abs(first), abs(second)) < math.pi:
+        elif not (abs(first) < math.pi and abs(second) < math.pi):  # no NaN is
             self._note(Sensor.ENCODERS, SensorFault.IMPLAUSIBLE)
         elif self.joints_came < 0.0:
             law = self._fusion.law
@@ -247,8 +259,9 @@ class _Tick:
             self._time,
             self._force,
             self._rate,
+            self._model,
         )
-        if of_imu:
+        if of_imu and self._force is not _NO_READING:
             self._note(Sensor.IMU, SensorFault(of_imu))
         if of_encoders:
             self._note(Sensor.ENCODERS, SensorFault(of_encoders))
@@ -296,14 +309,19 @@ class SensorFusion:
         now: float,
         joint_acceleration: Vec2 = (0.0, 0.0),
         watch: EncoderWatch | None = None,
+        model: Vec3 = UNKNOWN,
+        *,
+        silent: bool = False,
     ) -> tuple[FusionMemory, StateEstimate | None]:
         """Take in the ``samples`` that came since the last tick; the state at ``now`` [s].
 
         ``joint_acceleration`` [rad/s^2, joints] is what the torques make of the arm; a ``watch`` of
-        its encoders is kept in the memory. None before there was a pose, or a position and a
-        heading, to start from, and a reading of the arm.
+        its encoders is kept in the memory. Where the IMU is of no use, a ``model`` [SI, FRD] tells
+        what the rotors make of the vehicle (``imu.add_imu``); it is ``silent`` if it has no reading
+        to go by. None before there was a pose, or a position and a heading, to start from, and a
+        reading of the arm.
         """
-        tick = _Tick(self, memory, now, joint_acceleration)
+        tick = _Tick(self, memory, now, joint_acceleration, model)
         for sample in samples:
             kind = type(sample)
             if kind is ImuSample:
@@ -312,6 +330,8 @@ class SensorFusion:
                 tick.take_joints(sample)  # type: ignore[arg-type]
             else:
                 tick.take(sample)  # type: ignore[arg-type]
+        if silent:
+            tick.go_on_without_imu()
         memory = tick.memory
         if not memory.started:
             memory = tick.memory = self._start(tick.run())
@@ -402,9 +422,12 @@ class SensorFusion:
                 if not self._is_agreed_with(sample, memory.waiting):
                     continue
                 stated = self._stated(sample)
+                noise = self._least_stated(memory.waiting) if sample.drifts else stated
                 place = sample.position, _REST, normalised(sample.attitude)
-                self._begin(memory, sample.time, place, *stated)
-                memory = memory._replace(frame=FrameDrift(*stated))
+                self._begin(memory, sample.time, place, *noise)
+                if sample.drifts:
+                    frame = FrameDrift.at_start(memory.numbers[0], noise, stated)
+                    memory = memory._replace(frame=frame)
                 break
             if isinstance(sample, GnssSample) and memory.field is not None:
                 level = _levelled(memory.numbers, memory.field, self.tuning.declination)
@@ -421,6 +444,11 @@ class SensorFusion:
         else:
             return memory._replace(waiting=memory.waiting[-_WAITING_AT_START:])
         return memory._replace(started=True, waiting=(), delay_sigma=self.tuning.pose_delay_sigma)
+
+    def _least_stated(self, waiting: tuple[Waiting, ...]) -> tuple[Vec3, Vec3]:
+        """The least variances of the poses so far: of a frame that drifts, the noise alone."""
+        poses = [one.sample for one in waiting if isinstance(one.sample, PoseSample)]
+        return reduce(least, (self._stated(pose) for pose in poses))
 
     def _is_agreed_with(self, pose: PoseSample, waiting: tuple[Waiting, ...]) -> bool:
         """Whether another pose says the same, but for noise and what a vehicle moves meanwhile."""

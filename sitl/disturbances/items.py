@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sitl.disturbances.sequence import Played, Steered
-from sitl.scenario import V3, Disturbance, Torque, Uniform, Wind
+from sitl.scenario import V3, Disturbance, Sequence, Torque, Uniform, Wind
 from sitl.seeds import stream
 
 STILL: V3 = (0.0, 0.0, 0.0)
@@ -97,6 +97,9 @@ def push(item: Disturbance, seed: int, step_s: float) -> Push:
     """The running form of one scenario item."""
     if isinstance(item, Wind):
         return Constant(item.acceleration_m_s2)
+    if isinstance(item, Sequence):
+        first, every = round(item.starts_s / step_s), max(1, round(item.period_s / step_s))
+        return Played(item.acceleration_m_s2, first, every)
     random = stream(seed, "disturbance", item.kind, item.name)
     if isinstance(item, Uniform):
         return Resampled(item.amplitude_m_s2, round(item.period_s / step_s), False, random)

@@ -15,7 +15,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from command_line.output import complain, json_text
+from command_line.output import complain, json_text, typed
 from command_line.printable import printable
 from fsw.link.wire import message_ids as ids
 from messages.frames import FrameWriter
@@ -162,3 +162,20 @@ def test_a_vehicle_that_lists_nonsense_is_one_sentence(
         client.read_all()
     vehicle.close()
     assert re.search(sentence, str(refusal.value))
+
+
+def test_a_printed_command_can_be_typed_where_it_was_printed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    program = tmp_path / "bin" / "pandion"
+    program.parent.mkdir()
+    program.write_text("#!/bin/sh\n")
+    program.chmod(0o755)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("sys.argv", [str(program)])
+    monkeypatch.setenv("PATH", "/nowhere")
+    assert typed() == "bin/pandion"
+    monkeypatch.setenv("PATH", str(program.parent))
+    assert typed() == "pandion"
+    monkeypatch.setattr("sys.argv", ["pytest"])
+    assert typed() == "pandion"

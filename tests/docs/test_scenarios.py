@@ -36,6 +36,7 @@ TABLES = (
     scenario.Wind,
     scenario.Impulses,
     scenario.Torque,
+    scenario.Sequence,
     scenario.ImuErrors,
     scenario.PoseErrors,
     scenario.EncoderErrors,
@@ -59,6 +60,8 @@ def allowed(hint: Any) -> str:
         plain, permitted = typing.get_args(hint)
         count = len(typing.get_args(plain))
         return f"{count} numbers, {permitted}" if count else str(permitted)
+    if typing.get_origin(hint) is tuple:
+        return f"arrays of {allowed(typing.get_args(hint)[0])}"
     return ", ".join(f"`{word}`" for word in typing.get_args(hint)) or "text"
 
 
@@ -85,7 +88,8 @@ def expected(kind: Any) -> set[tuple[str, str, str]]:
         if kind in SHAPES and common.get(field.name, NOT_COMMON) is field.default:
             continue
         hint = hints(kind)[field.name]
-        plain = typing.get_origin(hint) in (Annotated, Literal) or hint in (str, bool)
+        entry = typing.get_args(hint)[0] if typing.get_origin(hint) is tuple else hint
+        plain = typing.get_origin(entry) in (Annotated, Literal) or hint in (str, bool)
         named_by_file = kind is scenario.Scenario and field.name == "name"
         if plain and not named_by_file:
             rows.add((f"`{field.name}`", allowed(hint), default(field)))

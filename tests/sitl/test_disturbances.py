@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from sitl.disturbances.items import push
-from sitl.scenario import V3, Disturbance, Impulses, Torque, Uniform, Wind
+from sitl.scenario import V3, Disturbance, Impulses, Sequence, Torque, Uniform, Wind
 
 STEP_S = 0.002
 
@@ -59,3 +59,15 @@ def test_items_of_one_kind_draw_independently_by_name() -> None:
 def test_a_torque_item_is_marked_as_torque() -> None:
     assert push(Torque(0.1), 0, STEP_S).torque
     assert not push(Uniform(0.1), 0, STEP_S).torque
+
+
+def test_a_sequence_plays_each_value_for_its_period_and_nothing_outside() -> None:
+    item = Sequence(((1.0, 0.0, 0.0), (0.0, -2.0, 0.5)), period_s=0.01, starts_s=0.004)
+    still, first, second = (0.0, 0.0, 0.0), *item.acceleration_m_s2
+    assert _drawn(item, 7, 14) == [still] * 2 + [first] * 5 + [second] * 5 + [still] * 2
+
+
+def test_a_uniform_disturbance_written_down_is_the_same_disturbance() -> None:
+    drawn = _drawn(Uniform(0.8), 3, 500)
+    written = Sequence(tuple(drawn[::50]))
+    assert _drawn(written, 99, 500) == drawn

@@ -8,12 +8,14 @@ from pathlib import Path
 
 import pytest
 
+from fsw.flight.failsafe import Action, Condition
+from fsw.link.events.event_table import ARGUMENTS, failsafe_event
 from fsw.link.telemetry.streams import STREAMS, messages_now
 from fsw.link.wire import message_ids as ids
 from fsw.link.wire.outgoing import Outgoing
 from fsw.shapes.ball import ball
 from fsw.shapes.half_space import wall
-from fsw.signals import Mode, PlanInput, SafeSet, Zone
+from fsw.signals import FailsafeEvent, Mode, PlanInput, SafeSet, Severity, Zone
 from messages.frames import FrameWriter, split
 from tests.fsw.link.snapshots import CONTEXT, SNAPSHOT
 from view.flight_data import UlogError
@@ -39,6 +41,27 @@ def everything(snapshot=FLYING) -> list[Outgoing]:
     for message_id in dict.fromkeys([*(s.message_id for s in STREAMS), ids.OBSTACLE_SHAPE]):
         sent += messages_now(message_id, 0.0, snapshot, CONTEXT) or ()
     return sent
+
+
+def test_failsafes_are_named_as_long_as_they_last() -> None:
+    telemetry = Telemetry()
+    beat = next(one for one in everything() if one.message_id == ids.HEARTBEAT)
+    take(telemetry, replace(beat, values=(*beat.values[:4], 5, *beat.values[5:])))
+    assert telemetry.scene(0.0).failures == "failsafe"
+    for number, (condition, over, shown) in enumerate(
+        [
+            (Condition.BREACH, False, "outside the safe set"),
+            (Condition.POSITION_LOST, False, "outside the safe set, position unknown"),
+            (Condition.BREACH, True, "position unknown"),
+            (Condition.POSITION_LOST, True, "failsafe"),
+        ]
+    ):
+        said = failsafe_event(
+            FailsafeEvent(condition.value, Action.HOLD.value, Severity.CRITICAL, over)
+        )
+        arguments = said.arguments.ljust(ARGUMENTS, b"\0")
+        take(telemetry, Outgoing(ids.EVENT, (said.id, 0, number, 0, 0, 0x44, *arguments)))
+        assert telemetry.scene(0.0).failures == shown
 
 
 def test_the_scene_is_the_snapshot_that_was_sent() -> None:

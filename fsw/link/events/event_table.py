@@ -118,6 +118,14 @@ def failsafe_event(event: FailsafeEvent) -> Event:
     return _event(_BEGUN, event.severity, struct.pack("<BB", condition, action))
 
 
+def condition_of(id: int, arguments: bytes) -> tuple[Condition, bool] | None:
+    """The failsafe condition that an event is about, and whether it is over; None: about none."""
+    number = id - (_COMPONENT << 24)
+    if number not in (_BEGUN, _ENDED) or not arguments or arguments[0] >= len(_CONDITIONS):
+        return None
+    return list(Condition)[arguments[0]], number == _ENDED
+
+
 def _event(number: int, severity: int, arguments: bytes) -> Event:
     return Event(_COMPONENT << 24 | number, int(severity), arguments)
 

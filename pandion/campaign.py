@@ -1,0 +1,209 @@
+"""``pandion campaign``: many flights from one file, on this machine or on a cluster."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from command_line.options import group, json_file, option, read, switch
+from command_line.output import complain, console_beside, json_text, say, unwritten
+from command_line.parser import COULD_NOT_START
+from command_line.values import whole
+from command_line.version import version
+from fsw.log.run_directory import new_run_directory
+from pandion.cluster_options import ClusterOptions, campaign_of
+from pandion.display import Display
+
+if TYPE_CHECKING:
+    from studies.campaign_plan import CampaignPlan
+    from studies.job import Job
+
+FLOWN, BROKEN = 0, 1  # exit codes
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CampaignOptions:
+    """One campaign, or one flight of it."""
+
+    file: Path | None = option("FILE.toml", "what is flown", Path)
+    example: bool = switch("--example", "print a campaign file to begin with")
+    flights: int | None = option(
+        "--flights N", "how many, from the first (default as the file says)", whole(1, 10_000_000)
+    )
+    flight: int | None = option(
+        "--flight K",
+        "fly flight K alone, here, and write its trace and its scenario for pandion fly",
+        whole(0, 10_000_000),
+    )
+    cluster: ClusterOptions = group(ClusterOptions)
+    out: Path | None = option(
+        "--out DIR",
+        "where journal, rows and page go; a directory with a journal of the same campaign is "
+        "resumed (default a new one in runs/)",
+        Path,
+    )
+    json: str | None = json_file("the summary")
+
+
+def main(argv: list[str]) -> int:
+    """Fly; returns the exit code."""
+    what = "Fly many flights from one file, and write down what became of them."
+    options = read(CampaignOptions, "pandion campaign", what, argv)
+    from fsw.runtime.process import pin_numerics_to_one_thread
+
+    pin_numerics_to_one_thread()  # before NumPy loads
+    from studies.campaign import SchedulerGoneError
+    from studies.campaign_keys import CampaignError
+    from studies.campaign_plan import EXAMPLE, load_plan
+
+    if options.example:
+        print(EXAMPLE.read_text(encoding="utf-8"), end="")
+        return FLOWN
+    try:
+        if options.file is None:
+            raise CampaignError("give a campaign file; `pandion campaign --example` prints one")
+        plan = load_plan(options.file)
+        if options.flight is not None:
+            return _again(options, plan)
+        return _fly(options, options.file, plan)
+    except (CampaignError, SchedulerGoneError, OSError) as error:
+        complain("pandion campaign", error)
+        return COULD_NOT_START
+
+
+def _fly(options: CampaignOptions, file: Path, plan: CampaignPlan) -> int:
+    from studies.campaign import SchedulerGoneError
+    from studies.campaign_store import begin
+
+    asked = options.flights or plan.count
+    plan.check(asked)
+    folder = options.out or new_run_directory(Path("runs"), plan.name)
+    begin(folder, file, plan, asked)
+    display = Display(console_beside(options.json))
+    display.say(
+        f"Pandion {version()}: {plan.name}, {asked} flights, {options.cluster.words}, "
+        f"written to {folder}"
+    )
+    try:
+        with display.progress():
+            _all(options, plan, asked, folder, display)
+    except KeyboardInterrupt:
+        command = f"pandion campaign {file} --out {folder}"
+        complain("pandion campaign", f"interrupted; what was flown is kept, go on with: {command}")
+        return BROKEN
+    except SchedulerGoneError as error:
+        complain("pandion campaign", f"{error}; what was flown is in {folder}")
+        return BROKEN
+    return _written(options, folder, display)
+
+
+def _all(
+    options: CampaignOptions, plan: CampaignPlan, asked: int, folder: Path, display: Display
+) -> None:
+    from studies.campaign_flight import CampaignFlights
+    from studies.campaign_store import JOURNAL
+    from studies.campaign_summary import Progress
+
+    campaign = campaign_of(
+        options.cluster, folder / JOURNAL, say=display.say, time_limit_s=plan.time_limit_s
+    )
+    progress = Progress(asked)
+    with campaign:
+        for _, row in campaign.fly(CampaignFlights(plan, asked)):
+            progress.add(row, fresh=campaign.flies)
+            display.report("flown", progress.done, asked, str(progress))
+
+
+def _written(options: CampaignOptions, folder: Path, display: Display) -> int:
+    """Page, table and summary of what is in the journal now."""
+    from studies.campaign_page import again, page
+    from studies.campaign_store import PAGE, read, write_facts, write_table
+    from studies.campaign_summary import summaries, worst
+
+    result = read(folder)
+    rows = result.rows
+    cases = summaries(rows)
+    more: dict[str, Any] = {
+        "flown": len(rows),
+        "violations": sum(row.violated for row in rows),
+        "refused": sum(row.refused for row in rows),
+        "errors": sum(row.error for row in rows),
+        "configurations": [one.as_json() for one in cases],
+        "worst": [row.compared() | {"again": again(row, folder)} for row in worst(rows)],
+    }
+    facts = write_facts(folder, result.plan, result.asked, more)
+    sentences = (f"Pandion {version()}", f"Command: pandion campaign {folder / 'campaign.toml'}")
+    (folder / PAGE).write_text(page(result, sentences, folder), encoding="utf-8")
+    if write_table(folder, rows) is None:
+        display.say("no rows.parquet: install pandion[parquet] for it; the journal has the rows")
+    for one in cases:
+        least = one.margin_m.get("0")
+        margin = "" if least is None else f", least margin {1e3 * least:+.1f} mm"
+        name = ", ".join(x for x in (one.scenario, one.suite, one.controller, one.fault) if x)
+        refused = f", {one.refused} refused by the vehicle" if one.refused else ""
+        broke = f", {one.errors} broke" if one.errors else ""
+        display.say(
+            f"{name}: {one.flights} flights, {one.violated} violations{refused}{broke}{margin}"
+        )
+    display.say(f"page {folder / PAGE}")
+    lost = unwritten(options.json, json_text(facts, 1) + "\n")
+    for what in lost:
+        complain("pandion campaign", f"cannot write {what}")
+    for row in rows:
+        if row.error:
+            complain("pandion campaign", f"flight {row.flight} broke: {row.reason}")
+            break
+    return BROKEN if lost or more["errors"] else FLOWN
+
+
+def _again(options: CampaignOptions, plan: CampaignPlan) -> int:
+    """One flight in this process, its trace, and what flies it with both processes and a log."""
+    from fsw.parameters.registry import BY_NAME
+    from fsw.parameters.storage import save
+    from sitl.scenario_text import scenario_text
+    from studies.campaign_flight import CampaignFlight
+    from studies.job import fly_job
+
+    number = options.flight or 0
+    plan.check(number + 1)
+    flight = plan.flight(number)
+    job = flight.job
+    folder = options.out or new_run_directory(Path("runs"), f"{plan.name}-flight{number}")
+    folder.mkdir(parents=True, exist_ok=True)
+    row = CampaignFlight(plan, number).row()
+    console = console_beside(options.json)
+    say(f"flight {number}: {flight.case}, seed {flight.seed}", console)
+    for key, value in flight.values:
+        say(f"  {key} = {value:g}", console)
+    say(f"  {row.reason}", console)
+    traced: dict[str, Any] = {"row": row.compared()}
+    if not row.error:
+        result = fly_job(job, traced=True)
+        traced["texts"] = result.planner.texts
+        traced["trace"] = [asdict(point) for point in result.planner.trace]
+    stem = folder / f"flight-{number}"
+    trace, scenario, params = (stem.with_suffix(end) for end in (".json", ".toml", ".params"))
+    trace.write_text(json_text(traced) + "\n", encoding="utf-8")
+    comment = f"flight {number} of campaign {plan.name}: {flight.case}"
+    scenario.write_text(scenario_text(job.scenario, comment), encoding="utf-8")
+    changed = {name: one.read(job.config) for name, one in BY_NAME.items()}
+    save(params, {n: v for n, v in changed.items() if v != BY_NAME[n].default})
+    say(f"trace {trace}", console)
+    say(f"with its log: {_fly_words(flight.case.controller, job, scenario, params)}", console)
+    lost = unwritten(options.json, json_text(traced["row"], 1) + "\n")
+    for what in lost:
+        complain("pandion campaign", f"cannot write {what}")
+    return BROKEN if row.error or lost else FLOWN
+
+
+def _fly_words(controller: str, job: Job, scenario: Path, params: Path) -> str:
+    """The command that flies the same over the link: equal but for what the link rounds."""
+    words = ["pandion fly", str(scenario), f"--seed={job.seed}", f"--params={params}"]
+    if controller != "blf":
+        words.append(f"--controller={controller}")
+    if job.config.inner == "pid":
+        words.append("--tracking=pid")
+    if job.config.soft:
+        words.append("--allow-inconsistent")
+    return " ".join(words)

@@ -1,0 +1,79 @@
+"""Where many flights are flown: options that several verbs share."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from command_line.options import OneOf, option
+from command_line.values import whole
+
+if TYPE_CHECKING:
+    from studies.campaign import Campaign, ProgressReport
+
+_WHERE: Final = OneOf()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ClusterOptions:
+    """Processes of this machine, or the workers of a running scheduler of Dask."""
+
+    workers: int = option(
+        "--workers N",
+        "processes on this machine; 0 flies in this one (default one a core)",
+        whole(0, 1024),
+        default=os.cpu_count() or 1,
+        one_of=_WHERE,
+    )
+    scheduler: str | None = option(
+        "--scheduler ADDR",
+        "fly on the workers of this Dask scheduler, tcp://HOST:PORT or tls://HOST:PORT",
+        one_of=_WHERE,
+    )
+    scheduler_file: Path | None = option(
+        "--scheduler-file FILE",
+        "fly on the workers of the Dask scheduler that wrote this file",
+        Path,
+        one_of=_WHERE,
+    )
+    tls_ca_file: Path | None = option("--tls-ca-file FILE", "CA of the scheduler, PEM", Path)
+    tls_cert: Path | None = option("--tls-cert FILE", "own certificate for TLS, PEM", Path)
+    tls_key: Path | None = option("--tls-key FILE", "its key, PEM", Path)
+
+    @property
+    def words(self) -> str:
+        """How a sentence says where."""
+        if self.scheduler is not None or self.scheduler_file is not None:
+            return f"scheduler {self.scheduler or self.scheduler_file}"
+        return f"{self.workers} workers" if self.workers != 1 else "1 worker"
+
+
+def campaign_of(
+    options: ClusterOptions,
+    journal: Path | None,
+    report: ProgressReport | None = None,
+    say: Callable[[str], None] | None = None,
+    **more: Any,
+) -> Campaign[Any]:
+    """What flies where the options say; ``more`` are fields of ``Campaign``."""
+    from studies.campaign import Campaign, Scheduler, mute, silent
+
+    running = options.scheduler is not None or options.scheduler_file is not None
+    scheduler = Scheduler(
+        address=options.scheduler,
+        file=options.scheduler_file,
+        tls_ca_file=options.tls_ca_file,
+        tls_cert=options.tls_cert,
+        tls_key=options.tls_key,
+    )
+    return Campaign(
+        workers=options.workers,
+        journal=journal,
+        report=report or silent,
+        scheduler=scheduler if running else None,
+        say=say or mute,
+        **more,
+    )

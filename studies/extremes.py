@@ -1,0 +1,169 @@
+"""The lower tail of the least margins: a generalised Pareto fit and how well it fits.
+
+Of flights that are alike, what lies below a low threshold is distributed by a generalised Pareto
+law (Pickands, 1975; Balkema and de Haan, 1974). A fit of it says how margins smaller than all that
+were flown thin out. It extrapolates: it is no bound, and no substitute for one.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Final, TypeAlias
+
+import numpy as np
+from scipy.special import ndtr, ndtri
+
+Array: TypeAlias = np.ndarray[Any, np.dtype[np.float64]]
+
+LEAST_FLIGHTS: Final = 100
+_LEAST_TAIL: Final = 30
+_TAIL_SHARE: Final = 0.1
+_LEAST_DISTINCT: Final = 20
+REJECTED: Final = 0.05  # of goodness; below, the numbers are not to be used
+RARE: Final = (1e-2, 1e-3, 1e-4)  # shares of flights whose least margin is estimated
+REGULAR: Final = -0.5  # below this shape maximum likelihood has no known accuracy
+
+
+class NoFitError(ValueError):
+    """Margins that no tail can be fitted to, in one sentence."""
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """A number and its interval from refits of simulated tails."""
+
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TailFit:
+    """A generalised Pareto law of margins below a threshold."""
+
+    flights: int  # with a margin
+    tail: int  # of them below the threshold
+    threshold_m: float
+    shape: Estimate  # below 0: there is a least margin
+    scale_m: Estimate
+    anderson_darling: float
+    goodness: float  # share of tails of the fitted law that fit no better [1]
+    refits: int
+    confidence: float  # of all intervals here
+    below_zero: Estimate | None  # probability of a margin below 0; None: 0 is above the threshold
+    margins_m: tuple[tuple[float, Estimate], ...]  # that a share of flights stays below
+    end_m: Estimate | None  # least possible margin; None: the law has none
+
+    @property
+    def fits(self) -> bool:
+        """Whether the law is not rejected."""
+        return self.goodness >= REJECTED
+
+
+def fit_tail(
+    margins: Sequence[float], confidence: float, refits: int = 399, seed: int = 0
+) -> TailFit:
+    """Fit the lower tail of least ``margins`` [m], intervals at a ``confidence`` [1].
+
+    Goodness is a parametric bootstrap of the Anderson-Darling statistic: ``refits`` tails of the
+    fitted law, each fitted anew. The intervals are percentiles of the same refits, corrected for
+    the bias of the fit (Efron, 1981).
+
+    Raises:
+        NoFitError: Too few flights, or margins that do not vary.
+    """
+    from scipy.stats import genpareto
+
+    ordered = np.sort(np.asarray(margins, dtype=np.float64))
+    total, tail = len(ordered), max(_LEAST_TAIL, math.ceil(_TAIL_SHARE * len(ordered)))
+    if total < LEAST_FLIGHTS:
+        raise NoFitError(
+            f"{total} flights have a margin: a tail needs at least {LEAST_FLIGHTS}, so no "
+            "extreme-value law is fitted"
+        )
+    if not np.isfinite(ordered).all():
+        raise NoFitError("a margin is not finite, so no extreme-value law is fitted")
+    threshold = float(ordered[tail])
+    excess = threshold - ordered[:tail]
+    distinct = len(np.unique(excess[excess > 0.0]))
+    if distinct < _LEAST_DISTINCT:
+        raise NoFitError(
+            f"only {distinct} different margins are below the threshold of "
+            f"{1e3 * threshold:.1f} mm: flights that are too much alike have no tail, so no "
+            "extreme-value law is fitted"
+        )
+    # Scaled: the search for the maximum knows no millimetres.
+    unit = float(excess.mean())
+    shape, scale = _fitted(excess / unit)
+    statistic = anderson_darling(excess / unit, shape, scale)
+    random = np.random.default_rng(seed)
+    simulated = genpareto.rvs(shape, scale=scale, size=(refits, tail), random_state=random)
+    again = [(one, *_fitted(one)) for one in simulated]
+    worse = sum(anderson_darling(*one) >= statistic for one in again)
+    laws = [(shape, unit * scale), *((a, unit * b) for _, a, b in again)]
+    share = tail / total
+
+    def estimate(values: list[float]) -> Estimate:
+        return _estimate(values[0], np.array(values[1:]), confidence)
+
+    rare = [one for one in RARE if one < share]
+    return TailFit(
+        flights=total,
+        tail=tail,
+        threshold_m=threshold,
+        shape=estimate([a for a, _ in laws]),
+        scale_m=estimate([b for _, b in laws]),
+        anderson_darling=statistic,
+        goodness=(1 + worse) / (1 + refits),
+        refits=refits,
+        confidence=confidence,
+        below_zero=estimate([share * float(genpareto.sf(threshold, a, scale=b)) for a, b in laws])
+        if threshold > 0.0
+        else None,
+        margins_m=tuple(
+            (
+                one,
+                estimate(
+                    [threshold - float(genpareto.isf(one / share, a, scale=b)) for a, b in laws]
+                ),
+            )
+            for one in rare
+        ),
+        end_m=estimate([threshold + (b / a if a < 0.0 else -math.inf) for a, b in laws])
+        if shape < 0.0
+        else None,
+    )
+
+
+def anderson_darling(excess: Array, shape: float, scale: float) -> float:
+    """The Anderson-Darling statistic [1] of excesses under a law of ``shape`` and ``scale`` [1].
+
+    Source: Anderson, Darling: A test of goodness of fit, JASA 49, 1954.
+    """
+    from scipy.stats import genpareto
+
+    ordered = np.sort(excess)
+    count = len(ordered)
+    weights = 2.0 * np.arange(1, count + 1) - 1.0
+    below = genpareto.logcdf(ordered, shape, scale=scale)
+    above = genpareto.logsf(ordered[::-1], shape, scale=scale)
+    return float(-count - (weights * (below + above)).sum() / count)
+
+
+def _estimate(value: float, refits: Array, confidence: float) -> Estimate:
+    """The bias-corrected percentiles of refits around a value, all of one unit [any unit]."""
+    below = float(np.mean(refits < value) + 0.5 * np.mean(refits == value))
+    shift = 2.0 * float(ndtri(min(max(below, 0.5 / len(refits)), 1.0 - 0.5 / len(refits))))
+    ends = [float(ndtr(shift + side * ndtri(0.5 + 0.5 * confidence))) for side in (-1.0, 1.0)]
+    low, high = np.quantile(refits, ends, method="inverted_cdf")  # between infinities is nothing
+    return Estimate(value, float(low), float(high))
+
+
+def _fitted(excess: Array) -> tuple[float, float]:
+    """Shape and scale of the most likely law."""
+    from scipy.stats import genpareto
+
+    shape, _, scale = genpareto.fit(excess, floc=0.0)
+    return float(shape), float(scale)

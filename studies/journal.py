@@ -1,0 +1,80 @@
+"""An append-only journal: one JSON object a line, on disk before anything else goes on."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+
+class Journal:
+    """Lines with a ``key``; of each key the last line without an ``error`` can be read again."""
+
+    def __init__(self, path: Path) -> None:
+        """Open or make it.
+
+        Raises:
+            OSError: It cannot be written.
+        """
+        path.parent.mkdir(parents=True, exist_ok=True)
+        self._file = path.open("a+b")
+        self._place: dict[str, int] = {}  # in the file; rows themselves would fill the memory
+        self._file.seek(0)
+        end, whole = 0, True
+        for line in self._file:
+            self._index(_object(line), end)
+            end += len(line)
+            whole = line.endswith(b"\n")
+        if not whole:
+            self._file.write(b"\n")  # after a line that a crash cut short
+
+    def get(self, key: str) -> dict[str, Any] | None:
+        """What was kept under a key; None if nothing was."""
+        place = self._place.get(key)
+        if place is None:
+            return None
+        self._file.seek(place)
+        content = _object(self._file.readline())
+        assert content is not None
+        content.pop("key")
+        return content
+
+    def append(self, contents: Iterable[tuple[str, Mapping[str, Any]]]) -> None:
+        """Add lines under their keys; they are on the disk when this returns."""
+        place = self._file.seek(0, os.SEEK_END)
+        for key, content in contents:
+            line = json.dumps({"key": key, **content}).encode() + b"\n"
+            self._file.write(line)
+            self._index({"key": key, **content}, place)
+            place += len(line)
+        self._file.flush()
+        os.fsync(self._file.fileno())
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+    def _index(self, content: Mapping[str, Any] | None, place: int) -> None:
+        if content is not None and "key" in content and content.get("error") is not True:
+            self._place[content["key"]] = place
+
+
+def lines(path: Path) -> Iterator[dict[str, Any]]:
+    """The lines of a journal, oldest first; one that a crash cut short is left out."""
+    if not path.exists():
+        return
+    with path.open("rb") as file:
+        for line in file:
+            content = _object(line)
+            if content is not None:
+                yield content
+
+
+def _object(line: bytes) -> dict[str, Any] | None:
+    try:
+        content = json.loads(line)
+    except ValueError:
+        return None
+    return content if isinstance(content, dict) else None

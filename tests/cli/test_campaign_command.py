@@ -1,0 +1,147 @@
+"""``pandion campaign``: from a file to journal, table and page; resumed, refused, flown again."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from pandion.campaign import main
+from sitl.scenario_file import load_scenario
+from studies.campaign_plan import load_plan
+from studies.campaign_store import read
+
+TINY = """
+flights = 3
+duration_s = 0.3
+scenarios = ["walls-calm", "own.toml"]
+[vary]
+vehicle_scale.mass = { uniform = [0.95, 1.05] }
+wind_m_s2 = { choice = [0.1] }
+"""
+
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """File and directory of a campaign that was flown in this process."""
+    folder = tmp_path_factory.mktemp("campaign")
+    file, out = folder / "tiny.toml", folder / "out"
+    text = Path(__file__).parents[2] / "sitl" / "scenarios" / "workspace-calm.toml"
+    (folder / "own.toml").write_text(text.read_text())
+    file.write_text(TINY)
+    assert main([str(file), "--workers=0", f"--out={out}"]) == 0
+    return file, out
+
+
+def test_the_example_can_be_flown(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--example"]) == 0
+    assert tomllib.loads(capsys.readouterr().out)["flights"] == 200
+
+
+def test_the_directory_holds_everything(campaign: tuple[Path, Path]) -> None:
+    _, out = campaign
+    result = read(out)
+    assert result.complete
+    assert [row.flight for row in result.rows] == [0, 1, 2]
+    assert result.rows[1].scenario == "own.toml"
+    assert all(row.completed for row in result.rows)
+    facts = json.loads((out / "campaign.json").read_text())
+    assert facts["flown"] == 3
+    assert len(facts["worst"]) == 3
+    assert facts["worst"][0]["margin_m"] == min(row.margin_m or 9.0 for row in result.rows)
+    page = (out / "campaign.html").read_text()
+    assert f"pandion campaign {out}/campaign.toml --flight 1" in page
+    assert "<svg" in page
+    assert "http://" not in page.replace("http://www.w3.org", "")
+    # The copy is a campaign of its own.
+    assert load_plan(out / "campaign.toml").digest == result.plan.digest
+
+
+def test_the_table_has_the_rows_without_what_is_of_the_machine(
+    campaign: tuple[Path, Path],
+) -> None:
+    parquet = pytest.importorskip("pyarrow.parquet")
+    _, out = campaign
+    table = parquet.read_table(out / "rows.parquet").to_pydict()
+    rows = read(out).rows
+    assert table["margin_m"] == [row.margin_m for row in rows]
+    assert table["vary.vehicle_scale.mass"] == [row.values["vehicle_scale.mass"] for row in rows]
+    assert not {"took_s", "tc_p50_us"} & set(table)
+
+
+def test_more_flights_are_added_and_none_is_flown_twice(
+    campaign: tuple[Path, Path],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("studies.campaign_page._figures", lambda _: [])  # they cost the most
+    file, out = campaign
+    before = (out / "journal.jsonl").read_text()
+    target = tmp_path / "summary.json"
+    words = [str(file), "--workers=0", f"--out={out}", "--flights=4", f"--json={target}"]
+    assert main(words) == 0
+    after = (out / "journal.jsonl").read_text()
+    assert after.startswith(before)
+    assert len(after.splitlines()) == 4
+    assert json.loads(target.read_text())["flown"] == 4
+    assert main([str(file), "--workers=0", f"--out={out}"]) == 0  # as before, for other tests
+    assert "3 of 3" in capsys.readouterr().out
+
+
+def test_a_flight_is_flown_again_with_what_pandion_fly_needs(
+    campaign: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    _, out = campaign
+    assert main([str(out / "campaign.toml"), "--flight=1", f"--out={tmp_path}"]) == 0
+    traced: dict[str, Any] = json.loads((tmp_path / "flight-1.json").read_text())
+    row = read(out).rows[1]
+    assert traced["row"] == json.loads(json.dumps(row.compared()))
+    assert len(traced["trace"]) > 3
+    flown = load_scenario(str(tmp_path / "flight-1.toml"))
+    assert flown.vehicle_scale.mass == row.values["vehicle_scale.mass"]
+    said = capsys.readouterr().out
+    assert f"pandion fly {tmp_path / 'flight-1.toml'} --seed={row.seed}" in said
+
+
+def test_flights_of_another_campaign_are_not_mixed_in(
+    campaign: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file, out = campaign
+    other = file.with_name("other.toml")
+    other.write_text(TINY.replace("0.95", "0.9"))
+    assert main([str(other), "--workers=0", f"--out={out}"]) == 2
+    assert "flights of another campaign" in capsys.readouterr().err
+    changed = tmp_path / "changed"
+    changed.mkdir()
+    for one in ("campaign.toml", "own.toml", "journal.jsonl"):
+        (changed / one).write_text((out / one).read_text())
+    facts = json.loads((out / "campaign.json").read_text())
+    facts["digests"]["code"] = "0" * 32
+    (changed / "campaign.json").write_text(json.dumps(facts))
+    assert main([str(file), "--workers=0", f"--out={changed}"]) == 2
+    assert "flights of other code" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        ([], "--example"),
+        (["nowhere.toml"], "cannot read campaign nowhere.toml"),
+        (["x.toml", "--workers=1", "--scheduler=tcp://a:1"], "not allowed with"),
+    ],
+)
+def test_what_cannot_be_flown_is_refused_in_a_sentence(
+    words: list[str], sentence: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    try:
+        code = main(words)
+    except SystemExit as error:
+        code = int(str(error.code))
+    said = capsys.readouterr().err
+    assert code == 2
+    assert sentence in said
+    assert len(said.strip().splitlines()) == 1
