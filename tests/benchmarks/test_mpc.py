@@ -79,7 +79,7 @@ def test_everyone_reaches_the_converged_cost(measured: list[Samples]) -> None:
 
 
 def test_what_is_not_installed_has_an_empty_row_and_is_named() -> None:
-    missing = Samples(5, Entry("casadi-fatrop", None, None))
+    missing = Samples(5, Entry("casadi-fatrop", None, None, "functions in C"))
     row = missing.row()
     assert set(row) == KEYS
     assert row["median_us"] is None
