@@ -58,13 +58,12 @@ class LinkCell(Cell):
         """See :class:`studies.campaign.Flight`."""
         return "link " + super().key() + sources(fault_station, supervisor, child)[:16]
 
-    def row(self) -> FaultFlight:
-        """See :class:`studies.campaign.Flight`."""
+    def _flown(self) -> FaultFlight:
         with TemporaryDirectory() as folder:
-            return _flown(self, Path(folder))
+            return _fly(self, Path(folder))
 
 
-def _flown(cell: Cell, folder: Path) -> FaultFlight:
+def _fly(cell: Cell, folder: Path) -> FaultFlight:
     situation, fault = SITUATIONS[cell.mode], cell.expected.fault
     assert fault is not None
     scenario = folder / "cell.toml"

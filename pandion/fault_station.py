@@ -17,6 +17,7 @@ _SETPOINT_S: Final = 0.05
 _ASKS_AT_S: Final = 1.0  # after the first heartbeat
 _GCS: Final = dialect.MAV_TYPE_GCS
 _NO_AUTOPILOT: Final = dialect.MAV_AUTOPILOT_INVALID
+_ARMED: Final = dialect.MAV_MODE_FLAG_SAFETY_ARMED
 _TERMINATED: Final = dialect.MAV_STATE_FLIGHT_TERMINATION
 _LOCAL_NED: Final = dialect.MAV_FRAME_LOCAL_NED
 _POSITION_ONLY: Final = 0x0DF8  # type mask of SET_POSITION_TARGET_LOCAL_NED
@@ -106,7 +107,10 @@ class Station(threading.Thread):
 
     def _note_mode(self, now_s: float, beat: Any) -> None:
         main, sub = beat.custom_mode >> 16 & 0xFF, beat.custom_mode >> 24
-        mode, terminated = now = _MODES.get((main, sub)), beat.system_status == _TERMINATED
+        armed = beat.base_mode & _ARMED
+        mode = _MODES.get((main, sub)) if armed else Mode.DISARMED  # which PX4 has no number for
+        terminated = beat.system_status == _TERMINATED
+        now = mode, terminated
         if now != self._mode:
             self._mode = now
             self.noted.append(Noted(now_s, mode=mode, terminated=terminated))

@@ -253,7 +253,7 @@ class _Planner(InlinePlanner):
         return None if self._fails() else super().take(t_us)
 
 
-class _Observer:
+class Observer:
     """What is seen of the vehicle from the fault on."""
 
     def __init__(self, situation: Situation) -> None:
@@ -284,7 +284,9 @@ class _Observer:
                 Said(round(after_s, 3), int(text.severity), text.text) for text in outputs.texts
             ]
             entered = mode is not self._mode or (marked and not self._marked)
-            completed = mode is Mode.DISARMED or (self._mode, mode) == _LANDS
+            # A failsafe that lands out of a return is an action; the landing of a return is none.
+            by_itself = (self._mode, mode) == _LANDS and marked == self._marked
+            completed = mode is Mode.DISARMED or by_itself
             if mode is Mode.FAULT and self._mode is not Mode.FAULT:
                 self.actions.append("terminate")
             elif entered and not completed and (marked or mode not in self._situation.nominal):
@@ -305,7 +307,7 @@ def fly(mode: str, fault: Fault | None, suite: str = "perfect", seed: int = 0) -
     planner: PlanService = _Planner(config, simulation)
     autopilot = Autopilot(config)
     loop = ClosedLoop(simulation, autopilot.tick, FlightState(), planner, config.airframe)
-    seen = _Observer(situation)
+    seen = Observer(situation)
     steps = round(1e6 * situation.ends_s / STEP_US)
     while simulation.ended is None and simulation.step < steps and not seen.problem:
         time_s = simulation.time_s
@@ -349,7 +351,7 @@ def _command(number: int, action: CommandAction) -> Command:
     return Command(action, CommandRequest(10_000 + number, (0.0,) * 7, *_STATION))
 
 
-def _judged(simulation: Simulation, seen: _Observer) -> FaultFlight:
+def _judged(simulation: Simulation, seen: Observer) -> FaultFlight:
     end = simulation.ended
     return FaultFlight(
         texts=tuple(seen.texts),

@@ -34,13 +34,16 @@ class Cell:
 
     def row(self) -> FaultFlight:
         """See :class:`studies.campaign.Flight`."""
-        fault, suite = self.expected.fault, self.expected.suite
         try:
-            flight = fly(self.mode, fault, suite, self.seed)
-            if fault is not None and suite != PERFECT:
-                flight = _without_natural(flight, _natural(self.mode, suite, self.seed))
+            return self._flown()
         except Exception as error:
-            flight = self.broken(f"{type(error).__name__}: {error}")
+            return self.broken(f"{type(error).__name__}: {error}")
+
+    def _flown(self) -> FaultFlight:
+        fault, suite = self.expected.fault, self.expected.suite
+        flight = fly(self.mode, fault, suite, self.seed)
+        if fault is not None and suite != PERFECT:
+            flight = _without_natural(flight, _natural(self.mode, suite, self.seed))
         return flight
 
     def broken(self, reason: str) -> FaultFlight:

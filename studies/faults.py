@@ -1,4 +1,9 @@
-"""A sensor that fails in a flight in process: what stands between it and the flight software."""
+"""A sensor that fails in a flight in process: what stands between it and the flight software.
+
+Faults of scenarios (``sitl.faults``) begin when a message arrives and last. Here they go by the
+time that was measured, which decides which readings the filter has, and some are a single message
+or a wrong time stamp, which no scenario can ask for.
+"""
 
 from __future__ import annotations
 

@@ -65,6 +65,10 @@ UNDOING: Final = 0.5  # share of the torque that it undoes
 ODD: Final = 0.2  # N m, root mean square of what base and arm do not feel of each other
 ODD_SHARE: Final = 0.5  # of what undoes the torque, the same
 BEHIND: Final = 0.02  # rad, root mean square of the distance from the reference
+# With so much undone the joint may be where it should be: friction holds a limp one that hardly
+# has to move. Friction of three times what the drives have undoes 0.1 N m.
+PLAINLY: Final = 0.15  # N m, root mean square
+PLAIN_SHARE: Final = 0.7
 JOINT_TIME: Final = 0.1  # s
 STANDING: Final = 0.2  # rad/s, root mean square of the rate of a joint that stands
 MOVED: Final = 0.05  # rad; a joint that has moved so far is not stuck
@@ -342,7 +346,8 @@ def _judge_joint(s: Any, k: int, dt: float, settled: bool, angle: float) -> None
     if s.joint[k] != SOUND:
         return
     undone = s.undone2[k] > UNDONE * UNDONE and s.undoing[k] < -UNDOING * s.asked2[k]
-    behind = s.behind2[k] > BEHIND * BEHIND
+    plainly = s.undone2[k] > PLAINLY * PLAINLY and s.undoing[k] < -PLAIN_SHARE * s.asked2[k]
+    behind = s.behind2[k] > BEHIND * BEHIND or plainly
     undone = undone and s.odd2 < ODD * ODD + ODD_SHARE * ODD_SHARE * s.undone2[k]
     s.joint_for[k] = s.joint_for[k] + dt if settled and undone and behind else 0.0
     if s.joint_for[k] > JOINT_TIME:

@@ -41,6 +41,7 @@ IMU_CAPACITY: Final = 256  # readings since the filter's time
 # both are of no use: an older reading's, or one that repeats itself.
 TIME, FORCE, RATE, LOST, COLUMNS = 0, 1, 4, 7, 8
 NO_FORCE, NO_RATE, NOTHING = 1, 2, 3  # of LOST
+MODELLED = 4  # of LOST: where nothing is measured, it is what rotors make of the vehicle
 PUSHES: Final = 160  # ticks that the joints' state may lie behind
 
 FILTER: Final = np.dtype(
@@ -215,8 +216,11 @@ def add_noise(M: Array, law: Any, dt: float, lost: int) -> None:
     """
     force = law.accel_noise * law.accel_noise * dt
     turn = law.gyro_noise * law.gyro_noise * dt
-    accel_walk = law.lost_accel_walk if lost & NO_FORCE else law.accel_bias_walk
-    gyro_walk = law.lost_gyro_walk if lost & NO_RATE else law.gyro_bias_walk
+    lost_accel_walk, lost_gyro_walk = law.lost_accel_walk, law.lost_gyro_walk
+    if lost & MODELLED:
+        lost_accel_walk, lost_gyro_walk = law.modelled_accel_walk, law.modelled_gyro_walk
+    accel_walk = lost_accel_walk if lost & NO_FORCE else law.accel_bias_walk
+    gyro_walk = lost_gyro_walk if lost & NO_RATE else law.gyro_bias_walk
     for i in range(3):
         M[V + i, V + i] += force
         M[TH + i, TH + i] += turn

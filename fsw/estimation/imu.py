@@ -16,6 +16,7 @@ from fsw.estimation.error_state import (
     FORCE,
     IMU_CAPACITY,
     LOST,
+    MODELLED,
     NO_FORCE,
     NO_RATE,
     RATE,
@@ -42,11 +43,13 @@ _JUMP: Final = SensorFault.JUMP.value
 
 
 @compilable
-def add_imu(x: Any, law: Any, now: float, time: float, f: Vec3, w: Vec3) -> int:
+def add_imu(x: Any, law: Any, now: float, time: float, f: Vec3, w: Vec3, model: Vec3) -> int:
     """Keep a reading of ``time`` [s] that came at ``now`` [s]; returns what is wrong with it.
 
     ``f`` [m/s^2, FRD] and ``w`` [rad/s, FRD]. In place of what is of no use, the last good one is
-    kept; a reading whose time is of no use is not kept at all. Numbers of ``SensorFault``.
+    kept, or it goes on as the rotors make it: of the ``model`` [SI, FRD], angular accelerations
+    about x and y, and the specific force along -z, which is 0 where it is not known. A reading
+    whose time is of no use is not kept at all. Numbers of ``SensorFault``.
     """
     last = x.imu[(x.end - 1) % IMU_CAPACITY]
     if not time <= now + TIME_TOLERANCE:
@@ -61,10 +64,13 @@ def add_imu(x: Any, law: Any, now: float, time: float, f: Vec3, w: Vec3) -> int:
         return fault
     row = x.imu[x.end % IMU_CAPACITY]
     lost = (0 if of_force == _NONE else NO_FORCE) | (0 if of_rate == _NONE else NO_RATE)
-    row[TIME], row[LOST] = time, float(lost)
+    modelled = lost != 0 and model[2] > 0.0 and x.end > 0
+    row[TIME], row[LOST] = time, float(lost | MODELLED if modelled else lost)
     for i in range(3):
         row[FORCE + i] = f[i] if keep_force else last[FORCE + i]
         row[RATE + i] = w[i] if keep_rate else last[RATE + i]
+    if modelled:
+        _model_what_is_lost(row, last, lost, model)
     if x.end == 0:
         for i in range(COLUMNS):  # what goes before the first reading
             last[i] = row[i]
@@ -72,6 +78,18 @@ def add_imu(x: Any, law: Any, now: float, time: float, f: Vec3, w: Vec3) -> int:
     if x.end - x.first >= IMU_CAPACITY:  # the filter has not begun
         x.first += 1
     return fault
+
+
+@compilable
+def _model_what_is_lost(row: Any, last: Any, lost: int, model: Vec3) -> None:
+    """What rotors make of the reading before, in place of those halves that are ``lost``."""
+    if lost & NO_FORCE:
+        row[FORCE], row[FORCE + 1], row[FORCE + 2] = 0.0, 0.0, -model[2]
+    if lost & NO_RATE:
+        dt = row[TIME] - last[TIME]
+        row[RATE] = last[RATE] + dt * model[0]
+        row[RATE + 1] = last[RATE + 1] + dt * model[1]
+        row[RATE + 2] = last[RATE + 2]
 
 
 @compilable

@@ -61,13 +61,14 @@ def _tick(
     time: float,
     f: Vec3,
     w: Vec3,
+    model: Vec3,
 ) -> tuple[int, int, bool, Present]:
     """Those ``parts`` of a tick that are due; what is wrong with IMU and encoders, and the present.
 
     ``COPY`` the filter, so that a tick leaves its inputs as they were, and note what torques made
     of the joints; take in ``encoders``, two angles and their age; take in a reading of the IMU, of
-    its ``time``; predict up to the horizon and from there the present, which may be no number.
-    ``times``: now, the tick's length, and the horizon.
+    its ``time``, or what a ``model`` makes of it; predict up to the horizon and from there the
+    present, which may be no number. ``times``: now, the tick's length, and the horizon.
     """
     now, dt, until = times
     if parts & COPY:
@@ -78,7 +79,7 @@ def _tick(
         angles = (encoders[0], encoders[1])
         of_encoders = joint_filter.read(new[0], law[0].tuning, now, angles, encoders[2])
     if parts & READING:
-        fault = imu.add_imu(new[0], law[0].tuning, now, time, f, w)
+        fault = imu.add_imu(new[0], law[0].tuning, now, time, f, w, model)
     if parts & END:
         advance(new[0], law[0].tuning, until)
         p, v, q, rate, force = present(new[0], now)

@@ -55,6 +55,8 @@ _SMALL_STEP: Final = 0.05  # m
 _SMALL_TURN: Final = 0.1  # rad
 _FLOATS: Final = FILTER.itemsize // 8  # that a filter has room for
 _REST: Vec3 = (0.0, 0.0, 0.0)
+UNKNOWN: Final[Vec3] = (0.0, 0.0, 0.0)  # what rotors make of the vehicle
+_NO_READING: Final[Vec3] = (math.nan, math.nan, math.nan)
 _NO_TURN: Vec4 = (1.0, 0.0, 0.0, 0.0)
 
 
@@ -153,6 +155,7 @@ class _Tick:
         "_encoders",
         "_force",
         "_fusion",
+        "_model",
         "_now",
         "_parts",
         "_rate",
@@ -164,8 +167,11 @@ class _Tick:
         "memory",
     )
 
-    def __init__(self, fusion: SensorFusion, memory: FusionMemory, now: float, u: Vec2) -> None:
+    def __init__(
+        self, fusion: SensorFusion, memory: FusionMemory, now: float, u: Vec2, model: Vec3
+    ) -> None:
         self.memory = memory
+        self._model = model
         self.imu_came, self.joints_came = memory.imu_came, memory.joints_came
         self._fusion, self._now, self._u = fusion, now, u
         self._dt = min(max(now - memory.now, 0.0), _LONGEST_STEP) if memory.now >= 0.0 else 0.0
@@ -186,12 +192,17 @@ class _Tick:
         self._time, self._force, self._rate = sample.time, sample.acceleration, sample.rate
         self.imu_came = self._now
 
+    def go_on_without_imu(self) -> None:
+        """In place of a reading of the IMU, take what the model makes of the last one."""
+        self._parts |= kernels.READING
+        self._time, self._force, self._rate = self._now, _NO_READING, _NO_READING
+
     def take_joints(self, sample: JointSample) -> None:
         """Take in a reading of the encoders."""
         (first, second), now = sample.angles, self._now
         if not sample.time <= now + TIME_TOLERANCE:
             self._note(Sensor.ENCODERS, SensorFault.FUTURE)
-        elif not max(abs(first), abs(second)) < math.pi:
+        elif not (abs(first) < math.pi and abs(second) < math.pi):  # no NaN is
             self._note(Sensor.ENCODERS, SensorFault.IMPLAUSIBLE)
         elif self.joints_came < 0.0:
             law = self._fusion.law
@@ -248,8 +259,9 @@ class _Tick:
             self._time,
             self._force,
             self._rate,
+            self._model,
         )
-        if of_imu:
+        if of_imu and self._force is not _NO_READING:
             self._note(Sensor.IMU, SensorFault(of_imu))
         if of_encoders:
             self._note(Sensor.ENCODERS, SensorFault(of_encoders))
@@ -297,14 +309,19 @@ class SensorFusion:
         now: float,
         joint_acceleration: Vec2 = (0.0, 0.0),
         watch: EncoderWatch | None = None,
+        model: Vec3 = UNKNOWN,
+        *,
+        silent: bool = False,
     ) -> tuple[FusionMemory, StateEstimate | None]:
         """Take in the ``samples`` that came since the last tick; the state at ``now`` [s].
 
         ``joint_acceleration`` [rad/s^2, joints] is what the torques make of the arm; a ``watch`` of
-        its encoders is kept in the memory. None before there was a pose, or a position and a
-        heading, to start from, and a reading of the arm.
+        its encoders is kept in the memory. Where the IMU is of no use, a ``model`` [SI, FRD] tells
+        what the rotors make of the vehicle (``imu.add_imu``); it is ``silent`` if it has no reading
+        to go by. None before there was a pose, or a position and a heading, to start from, and a
+        reading of the arm.
         """
-        tick = _Tick(self, memory, now, joint_acceleration)
+        tick = _Tick(self, memory, now, joint_acceleration, model)
         for sample in samples:
             kind = type(sample)
             if kind is ImuSample:
@@ -313,6 +330,8 @@ class SensorFusion:
                 tick.take_joints(sample)  # type: ignore[arg-type]
             else:
                 tick.take(sample)  # type: ignore[arg-type]
+        if silent:
+            tick.go_on_without_imu()
         memory = tick.memory
         if not memory.started:
             memory = tick.memory = self._start(tick.run())

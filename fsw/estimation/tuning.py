@@ -28,6 +28,9 @@ class EstimatorTuning:
     # as quickly as the vehicle does: the pose then gives acceleration and rate.
     lost_accel_walk: float = 10.0  # m/s^3/sqrt(Hz)
     lost_gyro_walk: float = 6.0  # rad/s^2/sqrt(Hz)
+    # The same where it goes on as the rotors' commands make it: gusts and errors of the model only.
+    modelled_accel_walk: float = 3.0  # m/s^3/sqrt(Hz)
+    modelled_gyro_walk: float = 1.5  # rad/s^2/sqrt(Hz)
 
     # What is not known when the filter starts.
     accel_bias: float = 0.3  # m/s^2

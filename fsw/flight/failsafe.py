@@ -34,7 +34,10 @@ if TYPE_CHECKING:
 
 PLAN_STALE_PERIODS: Final = 3
 INVALID_TICKS: Final = 5  # 10 ms without an estimate
-MISSED_TICKS: Final = 25  # of the 500 of a second, that are too many
+BLIND_TICKS: Final = 125  # 0.25 s: a filter that starts anew has poses that agree long before
+# Of the 500 of a second, that are too many. A gap of 50 ms, in which the rotors hold their last
+# command, is 25, of which at least 12 are in the same second.
+MISSED_TICKS: Final = 10
 JUMP_SHOWN_US: Final = 1_000_000  # for which a jump of time is a condition
 JUMP_US: Final = 500_000  # of the wall clock in a second, that is no slewing
 BREAKER: Final = 121212  # of CBRK_FLIGHTTERM, PX4's number
@@ -232,6 +235,16 @@ def _lacks_room(context: FailsafeContext) -> bool:
 def _is_unaided(context: FailsafeContext) -> bool:
     aiding = context.state.aiding
     return aiding.unaided_us >= context.limits.aiding_loss_us and context.state.vehicle.flies
+
+
+def _is_blind(context: FailsafeContext) -> bool:
+    """Nothing is known but what was known: sensors say what is not a number, for example."""
+    return context.state.invalid_ticks >= BLIND_TICKS
+
+
+def _attitude_is_lost(context: FailsafeContext) -> bool:
+    known = context.state.aiding.attitude_sigma <= context.limits.attitude_loss
+    return (not known or _is_blind(context)) and context.state.vehicle.flies
 
 
 def _position_is_off(context: FailsafeContext, most: float) -> bool:
@@ -436,14 +449,13 @@ _TWICE: Final = 2 * SLOW_US + AT_ONCE_US  # found in a planning tick, looked at 
 FAILSAFES: Final = (
     Failsafe(
         Condition.ATTITUDE_LOST,
-        lambda c: (
-            not c.state.aiding.attitude_sigma <= c.limits.attitude_loss and c.state.vehicle.flies
-        ),
+        _attitude_is_lost,
         _always(Action.TERMINATE),
         Severity.EMERGENCY,
-        _unaided,
+        lambda c: ": no estimate for 0.25 s" if _is_blind(c) else _unaided(c),
         of_vehicle=True,
-        detected="in flight, the standard deviation of roll or pitch is above `COM_ATT_LOSS`",
+        detected="in flight, the standard deviation of roll or pitch is above `COM_ATT_LOSS`, or "
+        "there has been no estimate at all for 125 ticks (0.25 s)",
         within_us=_SLOWLY,
         parameters=("COM_ATT_LOSS",),
         does="terminate: rotors and joints off",
@@ -698,7 +710,7 @@ FAILSAFES: Final = (
         _always(Action.WARN),
         detail=lambda c: f": {c.state.host.missed_ticks} in the last second",
         slow=True,
-        detected="25 of a second's 500 ticks were late, skipped or without readings of their own",
+        detected="10 of a second's 500 ticks were late, skipped or without readings of their own",
         within_us=SECOND_US,
         does="warning; plans and estimate carry over missed ticks",
     ),
@@ -851,23 +863,26 @@ _SLOW: Final = frozenset(row.condition for row in FAILSAFES if row.slow)
 
 def active(context: FailsafeContext) -> tuple[Failsafe, ...]:
     """Rows whose condition is active, in the order of the table; almost always none."""
-    found: tuple[Failsafe, ...] = ()
-    for is_active, row in _TESTS:
-        if is_active(context):
-            found = (*found, row)
-    return found
+    return _found(context, _TESTS)
 
 
 def quickly_active(context: FailsafeContext) -> tuple[Failsafe, ...]:
     """The same between two planning periods: the slow rows are as they were found last."""
-    found: tuple[Failsafe, ...] = ()
-    for is_active, row in _QUICK:
-        if is_active(context):
-            found = (*found, row)
+    found = _found(context, _QUICK)
     before = context.state.vehicle.conditions
     if before and not _SLOW.isdisjoint(before):
         known = {row.condition for row in found} | _SLOW.intersection(before)
         found = tuple([row for row in FAILSAFES if row.condition in known])
+    return found
+
+
+def _found(
+    context: FailsafeContext, tests: tuple[tuple[Evidence, Failsafe], ...]
+) -> tuple[Failsafe, ...]:
+    found: tuple[Failsafe, ...] = ()
+    for is_active, row in tests:
+        if is_active(context):
+            found = (*found, row)
     return found
 
 
@@ -933,11 +948,10 @@ def allowed(action: Action, mode: Mode, flies: bool) -> Action:
         return action
     if not flies:
         return Action.WARN
-    under_way = {Mode.RETURN: Action.RETURN, Mode.LAND: Action.LAND, Mode.DESCEND: Action.DESCEND}
-    least = under_way.get(mode)
     if mode is Mode.RETURN:
-        return Action.WARN if action is least else action
-    return Action.WARN if least is not None and action.strength <= least.strength else action
+        return Action.WARN if action is Action.RETURN else action
+    comes_down = mode in (Mode.LAND, Mode.DESCEND)
+    return Action.WARN if comes_down and action.strength <= _OF_MODES[mode].strength else action
 
 
 _OF_MODES: Final = {

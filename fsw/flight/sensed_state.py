@@ -8,20 +8,26 @@ from dataclasses import replace
 from fsw.control.cascade import Cascade, in_hover
 from fsw.estimation import kernels
 from fsw.estimation.dead_reckoning import moved_on
-from fsw.estimation.error_state import IMU_CAPACITY, Array
+from fsw.estimation.error_state import Array
 from fsw.estimation.imu import IMU_TOO_OLD
 from fsw.estimation.kernels import Law
 from fsw.estimation.lasting_error import lasting_error
 from fsw.estimation.pace import looked
 from fsw.estimation.sensor_fault import Sensor, SensorFault, sentence
-from fsw.estimation.sensor_fusion import EncoderWatch, FusionMemory, SensorFusion, at_start
+from fsw.estimation.sensor_fusion import (
+    UNKNOWN,
+    EncoderWatch,
+    FusionMemory,
+    SensorFusion,
+    at_start,
+)
 from fsw.estimation.tuning import EstimatorTuning
 from fsw.estimation.turned_covariance import Vec6
 from fsw.flight.estimator_report import AIDS_PLACE, estimator_report, unaided
 from fsw.flight.jump import jumped, returned, told
 from fsw.flight.state import Aiding, FlightState
 from fsw.measurements import ImuSample, JointSample, Sample
-from fsw.signals import EstimatorReport, Severity, StateEstimate, StatusText, TickInputs, Vec2
+from fsw.signals import EstimatorReport, Severity, StateEstimate, StatusText, TickInputs, Vec2, Vec3
 
 _CHECKED_US = 100_000  # between checks for silent sensors
 _EVERY_TICK = (Sensor.IMU, Sensor.ENCODERS)
@@ -73,10 +79,14 @@ class SensedState:
             pushed = self._cascade.joint_acceleration(state.cascade, state.estimate)
         law = self._fusion.law
         started, watch, samples = _without_stuck(state, before, inputs.samples, law)
-        came = 0.0
+        came, model = 0.0, UNKNOWN
         if 0.0 <= before.imu_came < now - _IMU_SILENT:
-            came, samples = _with_last_reading(before, now, samples)
-        memory, estimate = self._fusion.step(started, samples, now, pushed, watch)
+            came, samples = _without_late_imu(before, now, samples)
+        if came or now - before.of(Sensor.IMU).fault_at < _LATELY:
+            model = self._model(state)
+        memory, estimate = self._fusion.step(
+            started, samples, now, pushed, watch, model, silent=came > 0.0
+        )
         if came:
             memory = memory._replace(imu_came=came)
         due = inputs.sensors.t_us // _CHECKED_US != state.t_us // _CHECKED_US
@@ -112,6 +122,14 @@ class SensedState:
             return state
         report = estimator_report(memory, covariance, estimate, memory.now, self._stale)
         return replace(state, estimator=report, aiding=_aiding(state, memory, report))
+
+    def _model(self, state: FlightState) -> Vec3:
+        """What the rotors make of the vehicle, where that is known: see ``imu.add_imu``."""
+        if state.estimate is None or not state.vehicle.flies:
+            return UNKNOWN
+        motion = self._cascade.motion(state.cascade, state.estimate)
+        roll, pitch = motion.turning
+        return roll, pitch, motion.thrust / state.cascade.mass
 
     def _told(
         self,
@@ -172,23 +190,19 @@ def _report_seldom(memory: FusionMemory, now: float, texts: list[StatusText]) ->
     return memory
 
 
-def _with_last_reading(
+def _without_late_imu(
     memory: FusionMemory, now: float, samples: tuple[Sample, ...]
 ) -> tuple[float, tuple[Sample, ...]]:
-    """When an IMU that has been silent came last [s], and the samples with its last reading again.
+    """When an IMU that has been silent came last [s], and the samples without its new readings.
 
-    0 and the samples as they are if it comes again soon. The filter goes from one reading to the
-    next, and knows what to do about one that repeats. After long the first new one is not used: an
-    IMU that says something now and then would be taken for one that is back each time.
+    0 and the samples as they are if it comes again soon. After long the first new one is not used:
+    an IMU that says something now and then would be taken for one that is back each time.
     """
     new = [one for one in samples if isinstance(one, ImuSample) and one.time >= now - IMU_TOO_OLD]
     if new and memory.imu_came >= now - _LATELY:
         return 0.0, samples
-    x = memory.numbers
-    row = x["imu"][0][(int(x["end"][0]) - 1) % IMU_CAPACITY].tolist()
-    again = ImuSample(now, (row[1], row[2], row[3]), (row[4], row[5], row[6]))
     others = tuple([one for one in samples if one not in new])
-    return now if new else memory.imu_came, (*others, again)
+    return now if new else memory.imu_came, others
 
 
 def _without_stuck(

@@ -38,7 +38,10 @@ class Direction:
         self._overtaken: list[bytes] = []
 
     def through(self, datagram: bytes, faults: list[Fault], now_s: float) -> list[bytes]:
-        """What arrives now, instead of a datagram that was sent at ``now_s``."""
+        """Datagrams that arrive at ``now_s`` [s], when one is sent: none, it, or others as well.
+
+        What is late comes out of :meth:`due`.
+        """
         arrive = [datagram]
         for fault in faults:
             hit = self._random.random() < fault.share

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import pytest
 from mavsdk import System
 from mavsdk.plugins.action import Action
+from mavsdk.plugins.events import Events
 from mavsdk.plugins.failure import Failure, FailureError, FailureType, FailureUnit
 from mavsdk.plugins.param import Param
 from mavsdk.plugins.telemetry import Telemetry
@@ -52,6 +53,8 @@ def test_a_failure_is_injected_seen_and_ended(system: System) -> None:
 @pytest.mark.long
 def test_a_vehicle_that_lost_its_pose_acts_and_is_recovered(system: System) -> None:
     telemetry, action, failure = Telemetry(system), Action(system), Failure(system)
+    announced, events = [], Events(system)  # their texts, as MAVSDK reads them in our document
+    told = events.subscribe_events(lambda event, _: announced.append(event.message))
     Param(system).set_param_float("SYS_FAILURE_EN", 1.0)
     action.set_takeoff_altitude(3.0)
     action.arm()
@@ -60,7 +63,10 @@ def test_a_vehicle_that_lost_its_pose_acts_and_is_recovered(system: System) -> N
     assert eventually(lambda: telemetry.flight_mode().name == "HOLD")
     failure.inject(FailureUnit.SENSOR_VIO, FailureType.OFF, 0)
     assert eventually(lambda: telemetry.flight_mode().name == "LAND")
+    assert eventually(lambda: "no position is measured: dead reckoning" in announced), announced
+    assert eventually(lambda: "position unknown: descending" in announced), announced
     failure.inject(FailureUnit.SENSOR_VIO, FailureType.OK, 0)
+    assert eventually(lambda: "Over: no position is measured" in announced), announced
     assert eventually(telemetry.health_all_ok), telemetry.health()
     assert telemetry.in_air()
     action.hold()
@@ -68,4 +74,5 @@ def test_a_vehicle_that_lost_its_pose_acts_and_is_recovered(system: System) -> N
     action.land()
     assert eventually(lambda: telemetry.landed_state().name == "ON_GROUND", 40.0)
     assert eventually(lambda: not telemetry.armed())
+    events.unsubscribe_events(told)
     Param(system).set_param_float("SYS_FAILURE_EN", 0.0)

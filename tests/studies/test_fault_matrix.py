@@ -18,9 +18,10 @@ from studies.fault_expectations import (
     differences,
     expectations,
 )
-from studies.fault_flights import SITUATIONS, FaultFlight, Said, fly
+from studies.fault_flights import SITUATIONS, FaultFlight, Observer, Said, fly
 from studies.fault_matrix import Cell, judge
 from studies.fault_page import page
+from tests.fsw.link.snapshots import outputs_at
 
 TOLD = Said(0.2, int(Severity.WARNING), "told")
 LATE = replace(TOLD, after_s=0.6)
@@ -184,3 +185,16 @@ def test_a_matrix_is_resumed_from_its_journal_and_judged_anew(
     assert main([*words, "--expect", str(strict)]) == 1
     assert "land; must be terminate" in capsys.readouterr().out
     assert flown == ["land"]
+
+
+@pytest.mark.parametrize(("failsafe", "actions"), [(True, ["land"]), (False, [])])
+def test_a_return_that_a_failsafe_lands_has_not_just_gone_on(
+    failsafe: bool, actions: list[str]
+) -> None:
+    seen = Observer(SITUATIONS["return"])
+    for k, mode in enumerate((Mode.RETURN, Mode.LAND, Mode.DISARMED)):
+        was = Mode.RETURN if failsafe and mode is Mode.LAND else None
+        outputs = outputs_at(10**6 * k)
+        snapshot = replace(outputs.snapshot, mode=mode, failsafe_from=was)
+        seen.see(4.0 + k, replace(outputs, snapshot=snapshot))
+    assert seen.actions == actions

@@ -7,7 +7,16 @@ from typing import Any
 import numpy as np
 
 from fsw.compiled import packed
-from fsw.estimation.error_state import FILTER, FORCE, LOST, NO_FORCE, NO_RATE, NOTHING, RATE
+from fsw.estimation.error_state import (
+    FILTER,
+    FORCE,
+    LOST,
+    MODELLED,
+    NO_FORCE,
+    NO_RATE,
+    NOTHING,
+    RATE,
+)
 from fsw.estimation.imu import STAYS, STAYS_LONG, add_imu
 from fsw.estimation.sensor_fault import SensorFault
 from fsw.estimation.tuning import EstimatorTuning
@@ -27,14 +36,16 @@ class Unit:
         for _ in range(300):
             self.read()
 
-    def read(self, force: Vec3 | None = None, rate: Vec3 | None = None) -> SensorFault:
+    def read(
+        self, force: Vec3 | None = None, rate: Vec3 | None = None, model: Vec3 = (0.0, 0.0, 0.0)
+    ) -> SensorFault:
         """A noisy reading, or what is said in place of it; what is wrong with it."""
         self.now += TICK
         f = (0.0, 0.0, -9.81) + 0.3 * self.random.standard_normal(3)
         w = 0.01 * self.random.standard_normal(3)
         said = tuple(f.tolist()) if force is None else force
         turning = tuple(w.tolist()) if rate is None else rate
-        return SensorFault(add_imu(self.x, LAW, self.now, self.now, said, turning))  # type: ignore[arg-type]
+        return SensorFault(add_imu(self.x, LAW, self.now, self.now, said, turning, model))  # type: ignore[arg-type]
 
     @property
     def last(self) -> Any:
@@ -98,3 +109,21 @@ def test_what_is_no_number_loses_its_half_alone() -> None:
     )
     assert unit.last[LOST] == NOTHING
     assert np.isfinite(unit.x.imu).all()
+
+
+def test_a_model_stands_in_for_the_half_that_is_lost_alone() -> None:
+    unit, none, model = Unit(), (float("nan"),) * 3, (3.0, -4.0, 9.5)
+    before = unit.last.copy()
+    assert unit.read(rate=none, model=model) is SensorFault.NOT_FINITE
+    assert unit.last[LOST] == NO_RATE + MODELLED
+    expected = before[RATE : RATE + 3] + TICK * np.array([3.0, -4.0, 0.0])
+    np.testing.assert_allclose(unit.last[RATE : RATE + 3], expected, rtol=0.0, atol=1e-15)
+    assert unit.last[FORCE + 2] != -9.5, "the accelerometer is believed"
+    unit.read(force=none, model=model)
+    np.testing.assert_array_equal(unit.last[FORCE : FORCE + 3], (0.0, 0.0, -9.5))
+    held = unit.last[FORCE : FORCE + 3].copy()
+    unit.read(force=none)
+    assert unit.last[LOST] == NO_FORCE, "nothing is known of the rotors"
+    np.testing.assert_array_equal(unit.last[FORCE : FORCE + 3], held)
+    assert unit.read(model=model) is SensorFault.NONE
+    assert unit.last[LOST] == 0

@@ -15,7 +15,14 @@ from fsw.estimation.sensor_fault import Sensor, SensorFault
 from fsw.estimation.sensor_fusion import FusionMemory, SensorFusion, at_start
 from fsw.estimation.tuning import chi_square
 from fsw.geometry.rotation import quaternion_from_matrix
-from fsw.measurements import GnssSample, ImuSample, PoseSample, PressureSample, Sample
+from fsw.measurements import (
+    GnssSample,
+    ImuSample,
+    JointSample,
+    PoseSample,
+    PressureSample,
+    Sample,
+)
 from fsw.signals import StateEstimate
 from tests.fsw.estimation.sensor_runs import (
     MOCAP,
@@ -528,6 +535,40 @@ def test_readings_of_the_imu_that_are_late_are_none() -> None:
     flown = Flown(run(MOCAP, 8, 1.4), late)
     assert (Sensor.IMU, SensorFault.TOO_OLD) in flown.found
     assert flown.memory.imu_came < START + 1.01, "as if there were none"
+
+
+@pytest.mark.requirement("REQ-EST-1")
+@pytest.mark.parametrize("angles", [(math.nan, 0.1), (0.1, math.nan)])
+def test_one_encoder_that_says_no_number_is_not_used_and_named(
+    angles: tuple[float, float],
+) -> None:
+    def spoilt(now: float, sample: Sample) -> Sample:
+        if isinstance(sample, JointSample) and now - START > 0.5:
+            return replace(sample, angles=angles)
+        return sample
+
+    flown = Flown(run(MOCAP, 8, 0.8), spoilt)
+    assert flown.memory.restarts == 0
+    assert (Sensor.ENCODERS, SensorFault.IMPLAUSIBLE) in flown.found
+    assert flown.memory.joints_came < START + 0.51, "as if there were none"
+
+
+@pytest.mark.requirement("REQ-EST-12")
+def test_without_imu_and_pose_the_rate_goes_on_as_the_rotors_make_it() -> None:
+    flown = Flown(run(MOCAP, 8, 0.6))
+    assert flown.estimate is not None
+    before, memory, now = flown.estimate, flown.memory, flown.now
+    for _ in range(50):  # 0.1 s
+        now += TICK
+        memory, estimate = flown.fusion.step(memory, (), now, model=(1.0, -2.0, 9.9), silent=True)
+    assert estimate is not None
+    turned = [after - rate for after, rate in zip(estimate.w_WB_B, before.w_WB_B, strict=True)]
+    assert turned == pytest.approx([0.1, -0.2, 0.0], abs=0.03)
+    assert estimate.specific_force == pytest.approx(9.9, abs=0.2)
+    assert not memory.of(Sensor.IMU).fault, "it is silent, and says nothing wrong"
+    _, held = flown.fusion.step(flown.memory, (), now, silent=True)
+    assert held is not None
+    assert held.w_WB_B == pytest.approx(before.w_WB_B, abs=0.03), "not known: as it was"
 
 
 def test_a_filter_without_numbers_starts_anew() -> None:

@@ -166,6 +166,7 @@ def test_nothing_wrong_is_no_condition() -> None:
         (replace(FINE, mode=Mode.DISARMED, invalid_ticks=5), Condition.ESTIMATE_INVALID),
         (replace(FINE, aiding=Aiding(attitude_sigma=0.71)), Condition.ATTITUDE_LOST),
         (replace(FINE, aiding=Aiding(attitude_sigma=math.nan)), Condition.ATTITUDE_LOST),
+        (replace(FINE, mode=Mode.DISARMED, invalid_ticks=10**6), Condition.ESTIMATE_INVALID),
         (replace(FINE, aiding=Aiding(250_000)), Condition.AIDING_LOST),
         (replace(FINE, aiding=replaced_sensor(50_000)), Condition.SENSOR_LOST),
         (replace(FINE, safety=SafetyMemory(rolled_us=NOW_US - 300_000)), Condition.TILT_LOST),
@@ -178,7 +179,7 @@ def test_nothing_wrong_is_no_condition() -> None:
             replace(FINE, safety=SafetyMemory(jump_us=60_000, jumped_us=NOW_US - 999_999)),
             Condition.TIME_JUMPED,
         ),
-        (replace(FINE, host=HostHealth(missed_ticks=25)), Condition.LOOP_OVERRUN),
+        (replace(FINE, host=HostHealth(missed_ticks=10)), Condition.LOOP_OVERRUN),
         (replace(FINE, host=HostHealth(clock_jump_us=-500_000)), Condition.CLOCK_JUMPED),
         (replace(FINE, host=HostHealth(datagrams=2001)), Condition.LINK_FLOODED),
         (replace(FINE, host=HostHealth(log_failure="flight.ulg")), Condition.LOG_STOPPED),
@@ -209,7 +210,7 @@ def test_each_evidence_is_its_condition(evidence: Evidence, condition: Condition
         replace(FINE, invalid_ticks=4),  # a lost frame or two are flown through
         replace(FINE, safety=SafetyMemory(rolled_us=NOW_US - 299_999, pitched_us=NOW_US)),
         replace(FINE, safety=SafetyMemory(jump_us=60_000, jumped_us=NOW_US - 1_000_000)),
-        replace(FINE, host=HostHealth(missed_ticks=24, clock_jump_us=499_999, datagrams=2000)),
+        replace(FINE, host=HostHealth(missed_ticks=9, clock_jump_us=499_999, datagrams=2000)),
         replace(FINE, landed=True, damage=Damage("rotor 1", joint="joint 2")),
         replace(FINE, landed=True, battery=BatteryState(time_left=1.0)),
         replace(FINE, landed=True, plan=PlanMemory(awaited_missed=True)),
@@ -226,6 +227,16 @@ def test_each_evidence_is_its_condition(evidence: Evidence, condition: Condition
 )
 def test_what_can_be_lived_with_is_no_condition(evidence: Evidence) -> None:
     assert active(evidence.context()) == ()
+
+
+@pytest.mark.requirement("REQ-EST-8")
+def test_a_vehicle_that_knows_nothing_for_a_quarter_of_a_second_terminates() -> None:
+    assert conditions(replace(FINE, invalid_ticks=124)) == (Condition.ESTIMATE_INVALID,)
+    blind = replace(FINE, invalid_ticks=125)
+    assert conditions(blind) == (Condition.ATTITUDE_LOST, Condition.ESTIMATE_INVALID)
+    row = active(blind.context())[0]
+    assert row.action(blind.context()) is Action.TERMINATE
+    assert row.detail(blind.context()) == ": no estimate for 0.25 s"
 
 
 @pytest.mark.requirement("REQ-LINK-2")
