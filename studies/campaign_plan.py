@@ -107,13 +107,19 @@ class Varied:
 
 
 @dataclass(frozen=True, slots=True)
-class PlannedFlight:
-    """What flight ``number`` consists of."""
+class Drawn:
+    """What distinguishes flight ``number`` from others."""
 
     number: int
     case: Case
     values: Values
     seed: int
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedFlight(Drawn):
+    """What flight ``number`` consists of."""
+
     job: Job
 
 
@@ -155,13 +161,22 @@ class CampaignPlan:
             )
 
     def flight(self, number: int) -> PlannedFlight:
-        """Flight ``number``, from 0; the same whatever else is flown."""
+        """Flight ``number``, from 0; the same whatever else is flown.
+
+        Raises:
+            ValueError: Its values contradict each other.
+        """
+        one = self.draw(number)
+        flown = applied(self.bases[number % len(self.cases)], one.values)
+        check(flown.scenario)
+        job = Job("full", flown.scenario, flown.config, one.seed)
+        return PlannedFlight(number, one.case, one.values, one.seed, job)
+
+    def draw(self, number: int) -> Drawn:
+        """Case, values and seed of flight ``number``."""
         place, case = divmod(number, len(self.cases))
         values = self._values(number, case, place)
-        seed = seed_of(self.seed, number)
-        flown = applied(self.bases[case], values)
-        job = Job("full", flown.scenario, flown.config, seed)
-        return PlannedFlight(number, self.cases[case], values, seed, job)
+        return Drawn(number, self.cases[case], values, seed_of(self.seed, number))
 
     def _values(self, number: int, case: int, place: int) -> Values:
         kinds = tuple(one.distribution for one in self.varied)
