@@ -14,12 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fsw.control.cascade import CascadeMemory
-from fsw.control.safety_filter import NO_ZONES, moving_zones
 from fsw.flight.autopilot import Autopilot
 from fsw.flight.state import FlightState
 from fsw.model.prediction import Array
 from fsw.mpc.planner import Planner
 from fsw.parameters.flight_config import FlightConfig
+from fsw.shapes.zones import NO_ZONES, moving_zones
 from fsw.signals import PlanInput, PredictionState, TickInputs, TickOutputs
 from sitl.disturbances.items import Push
 from sitl.scenario import Scenario

@@ -6,12 +6,22 @@ import numpy as np
 
 from fsw.barriers.safe_approach import BarrierTuning
 from fsw.barriers.zone_rows import fill_starts, settings
-from fsw.compiled import of_fixed_types
+from fsw.compiled import kernel, machine_code, of_fixed_types
 from fsw.model.body import Body
-from fsw.model.linearisation import FRAME, put_arm
+from fsw.model.linearisation import FRAME, put_arm, put_pose, put_turning
 from fsw.model.prediction import Array
 from fsw.shapes.zones import FOLLOWS, shifts, zone_arrays
-from fsw.signals import ConstraintReport, EndEffectorTarget, SafeSet, StateEstimate, Vec2
+from fsw.signals import (
+    ConstraintReport,
+    EndEffectorTarget,
+    Mat3,
+    SafeSet,
+    StateEstimate,
+    Vec2,
+    Vec3,
+)
+
+_REST: Vec3 = (0.0, 0.0, 0.0)
 
 
 class Margins:
@@ -32,6 +42,9 @@ class Margins:
         self._probes, self._links = body.probes, links
         self._settings = settings(tunings, period)
         self._fill = of_fixed_types(fill_starts)
+        level, arm = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0), (0.0, 0.0)
+        vehicle = np.zeros(FRAME), links, _REST, _REST, level, _REST, arm, arm
+        self._put_vehicle = machine_code(_put_vehicle, *vehicle)
 
     def report(
         self, safe_set: SafeSet, estimate: StateEstimate, target: EndEffectorTarget | None
@@ -42,15 +55,18 @@ class Margins:
         single one, and none while there is no target.
         """
         zones = zone_arrays(safe_set)
-        following = zones[:, FOLLOWS] > 0.0
-        if not safe_set.zones or (target is None and following.any()):
+        follows = [zone[FOLLOWS] > 0.0 for zone in zones.tolist()]
+        if not follows or (target is None and any(follows)):
             return ConstraintReport(safe_set.kind)
-        p_target, v_target = np.zeros((1, 3)), np.zeros((1, 3))
-        if target is not None:
-            p_target[0], v_target[0] = target.p_WE, target.v_WE
-        shift, speed = shifts(safe_set, np.array([estimate.t_us]), p_target, v_target)
-        vehicle = frame_of(estimate, self._links)
-        per_zone = tuple(1 if follows else len(self.parts) for follows in following)
+        p, v = (_REST, _REST) if target is None else (target.p_WE, target.v_WE)
+        of_target = np.array((p, v), dtype=np.float64)
+        shift, speed = shifts(safe_set, np.array([estimate.t_us]), of_target[:1], of_target[1:])
+        vehicle = np.zeros(FRAME)
+        self._put_vehicle(
+            *(vehicle, self._links, estimate.p_WB, estimate.v_WB, estimate.R_WB),
+            *(estimate.w_WB_B, estimate.q_arm, estimate.qd_arm),
+        )
+        per_zone = tuple([1 if rides else len(self.parts) for rides in follows])
         size = sum(per_zone)
         margins, values = np.empty(size), np.empty(size)
         how = (zones, shift[0], speed[0], self._probes, vehicle, self._settings)
@@ -61,12 +77,11 @@ class Margins:
         )
 
 
-def frame_of(estimate: StateEstimate, links: Vec2) -> Array:
-    """The vehicle itself as a frame of ``fsw.model.linearisation`` (FRAME,); ``links`` [m]."""
-    frame = np.zeros(FRAME)
-    rotation = np.array(estimate.R_WB).reshape(3, 3)
-    wx, wy, wz = estimate.w_WB_B
-    turning = rotation @ np.array(((0.0, -wz, wy), (wz, 0.0, -wx), (-wy, wx, 0.0)))
-    frame[:24] = *estimate.p_WB, *estimate.v_WB, *estimate.R_WB, *turning.ravel()
-    put_arm(frame, estimate.q_arm, estimate.qd_arm, links)
-    return frame
+@kernel
+def _put_vehicle(
+    frame: Array, links: Vec2, p: Vec3, v: Vec3, R: Mat3, w: Vec3, q_arm: Vec2, qd_arm: Vec2
+) -> None:
+    """The vehicle itself as a frame of ``fsw.model.linearisation``."""
+    put_pose(frame, p, R)
+    put_turning(frame, v, w)
+    put_arm(frame, q_arm, qd_arm, links)

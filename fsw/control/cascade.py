@@ -28,7 +28,6 @@ from fsw.control.joints import (
 )
 from fsw.control.pid import PidGains
 from fsw.control.safety_filter import (
-    NO_ZONES,
     FilterLaw,
     FilterTuning,
     filter_law,
@@ -64,6 +63,7 @@ from fsw.model.rotors import (
     motion_state,
     rotor_decay,
 )
+from fsw.shapes.zones import NO_ZONES
 from fsw.signals import (
     STOPPED,
     ActuatorCommand,

@@ -38,16 +38,19 @@ from fsw.compiled import compilable
 from fsw.geometry.vectors import add_scaled, clamp, dot, subtract
 from fsw.model.body import CAPSULE, FORM, ON, ON_BASE, RADIUS, TURN, Body
 from fsw.model.linearisation import FRAME, put_arm, put_pose
-from fsw.shapes.kind import NUMBERS
-from fsw.shapes.zones import FIRST, FLAT, FOLLOWS, KEEP_IN, PLANES, surface_at, zone_arrays
-from fsw.signals import EndEffectorTarget, SafeSet, StateEstimate, Vec2, Vec3
+from fsw.shapes.zones import (
+    ADDED,
+    FLAT,
+    FOLLOWS,
+    KEEP_IN,
+    PLANES,
+    moved_by,
+    surface_at,
+    velocity_of,
+)
+from fsw.signals import StateEstimate, Vec2, Vec3
 
 _PASSES = 4  # over all zones
-_MOVE = FIRST + NUMBERS  # columns of a zone's movement: velocity, where it is at a time, that time
-_ADDED = _MOVE + 7  # m, in its clearance for an uncertain estimate
-_COLUMNS = _ADDED + 1
-
-NO_ZONES: NDArray[np.float64] = np.zeros((0, _COLUMNS))
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,27 +104,6 @@ def filter_probes(body: Body) -> NDArray[np.float64]:
     return nearest
 
 
-def moving_zones(
-    safe_set: SafeSet, target: EndEffectorTarget | None, added: tuple[float, ...] = ()
-) -> NDArray[np.float64]:
-    """The zones and how they move, (zones, columns) [SI]; of no target, without what follows it.
-
-    ``added`` [m] of each zone's clearance is for an uncertain estimate, and no margin.
-    """
-    if not safe_set.zones:
-        return NO_ZONES
-    rows = np.zeros((len(safe_set.zones), _COLUMNS))
-    rows[:, :_MOVE] = zone_arrays(safe_set)
-    if added:
-        rows[:, _ADDED] = added
-    for row, zone in zip(rows, safe_set.zones, strict=True):
-        row[_MOVE : _MOVE + 3], row[_MOVE + 6] = zone.velocity, zone.t_us
-        if row[FOLLOWS] > 0.0 and target is not None:
-            row[_MOVE : _MOVE + 3], row[_MOVE + 3 : _MOVE + 6] = target.v_WE, target.p_WE
-            row[_MOVE + 6] = target.t_us
-    return rows if target is not None else rows[rows[:, FOLLOWS] == 0.0]
-
-
 @compilable
 def filtered(
     law: FilterLaw,
@@ -143,9 +125,9 @@ def filtered(
     put_pose(frame, estimate.p_WB, estimate.R_WB)
     put_arm(frame, estimate.q_arm, estimate.qd_arm, (law.links[0], law.links[1]))
     for k in range(zones.shape[0]):
-        elapsed = 1e-6 * (estimate.t_us - zones[k, _MOVE + 6])
+        moved = moved_by(zones, k, estimate.t_us)
         for axis in range(3):
-            shift[k, axis] = zones[k, _MOVE + 3 + axis] + elapsed * zones[k, _MOVE + axis]
+            shift[k, axis] = moved[axis]
     changed, margin = False, math.inf
     for _ in range(_PASSES):
         again = False
@@ -177,8 +159,7 @@ def _kept_off(
     wanted: Vec3,
 ) -> tuple[Vec3, bool, float]:
     """``filtered`` for one plane of one zone, once."""
-    drift = (zones[zone, _MOVE], zones[zone, _MOVE + 1], zones[zone, _MOVE + 2])
-    relative, follows = subtract(v, drift), zones[zone, FOLLOWS] > 0.0
+    relative, follows = subtract(v, velocity_of(zones, zone)), zones[zone, FOLLOWS] > 0.0
     lacked, margin = False, math.inf
     ends_do = zones[zone, FLAT] > 0.0 or zones[zone, KEEP_IN] > 0.0  # which are spheres
     for j in range(1 if follows else probes.shape[0]):
@@ -188,7 +169,7 @@ def _kept_off(
         n, distance = (at.nx, at.ny, at.nz), at.distance
         if not follows:
             distance -= probes[j, RADIUS]
-        margin = min(margin, distance + zones[zone, _ADDED])
+        margin = min(margin, distance + zones[zone, ADDED])
         if probes[j, ON] == ON_BASE:
             lacking = _needed(law, follows, distance, dot(n, relative), dot(n, a)) - dot(n, wanted)
             if lacking > 0.0:

@@ -13,9 +13,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from functools import cache
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
-from fsw.compiled import compilable, compiled, machine_code
+from fsw.compiled import compilable, kernel, machine_code
 from fsw.estimation.estimator import estimate_state
 from fsw.estimation.sensor_fault import Sensor, SensorFault, sentence
 from fsw.geometry.quaternion import conjugate, multiply, normalised, rotation_vector, turned
@@ -356,24 +356,80 @@ def compared(
     return rough, comparable, turn, speed
 
 
-_unbelievable, _compared = compiled(unbelievable), compiled(compared)
+Reading = tuple[Vec3, Vec3, Vec4, Vec3, Vec3, Vec2, Vec2]
+"""A frame without its time: place, velocity, attitude, gyro, accelerometer, joints and rates."""
+
+
+@compilable
+def repeating(new: Reading, last: Reading) -> int:
+    """Parts of a ``new`` [SI] reading that are the ``last`` [SI] one's, while others are not.
+
+    To the last bit.
+    """
+    pose = new[0] == last[0] and new[1] == last[1] and new[2] == last[2]
+    inertial = new[3] == last[3] and new[4] == last[4]
+    if pose and inertial:
+        return 0  # a frame that came twice, or a vehicle that lies still
+    moving = new[6] != (0.0, 0.0)
+    joints = moving and new[5] == last[5] and new[6] == last[6]
+    return (POSE if pose else 0) | (INERTIAL if inertial else 0) | (JOINTS if joints else 0)
+
+
+@compilable
+def next_window(window: Window, new: Reading, last: Reading, apart: float) -> tuple[int, Window]:
+    """Parts that are far from the last frame's, and the window with the new frame in it.
+
+    Readings ``new`` [SI] and ``last`` [SI], that many seconds ``apart`` [s].
+    """
+    if not 0.0 < apart <= _STEADY_DT:
+        return 0, Window(0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0, 0)
+    p, v, q, w, f, arm, _ = new
+    p0, v0, q0, w0, f0, arm0, _ = last
+    rough, comparable, turn, speed = compared(
+        p, v, q, w, f, arm, p0, v0, q0, w0, f0, arm0, apart, window.turn, window.speed
+    )
+    # A pose that repeats itself says nothing about the others.
+    if not comparable or v == v0:
+        return rough, Window(0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0, 0)
+    same_rate = window.same_rate + 1 if w == w0 else 0
+    same_force = window.same_force + 1 if f == f0 else 0
+    return rough, Window(window.frames + 1, turn, speed, same_rate, same_force)
+
+
+@kernel
+def _looked_at(
+    new: Reading,
+    last: Reading,
+    apart: float,
+    window: Window,
+    p0: Vec3,
+    v0: Vec3,
+    R0: Mat3,
+    w0: Vec3,
+    f0: float,
+    arm0: Vec2,
+    rates0: Vec2,
+    dt: float,
+    sigma: float,
+) -> tuple[int, int, Mat3, float, int, int, tuple[int, Vec3, Vec3, int, int]]:
+    """``unbelievable``, ``repeating`` and ``next_window`` in one call."""
+    p, v, q, w, f, arm, rates = new
+    never, far, R, yaw = unbelievable(
+        p, v, q, w, f, arm, rates, p0, v0, R0, w0, f0, arm0, rates0, dt, sigma
+    )
+    rough, after = next_window(window, new, last, apart)
+    sums = (after.frames, after.turn, after.speed, after.same_rate, after.same_force)
+    return never, far, R, yaw, repeating(new, last), rough, sums
 
 
 @cache
-def _machine_code() -> Callable[..., tuple[int, int, Mat3, float]]:
-    """``unbelievable``, compiled when it is first wanted."""
+def _machine_code() -> Callable[..., Any]:
+    """``_looked_at``, compiled when it is first wanted."""
     none, arm, level = (0.0, 0.0, 0.0), (0.0, 0.0), (1.0, 0.0, 0.0, 0.0)
     R = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
     read = none, none, level, none, none, arm, arm
-    return machine_code(_unbelievable, *read, none, none, R, none, 9.81, arm, arm, 0.002, 0.0)
-
-
-@cache
-def _comparing() -> Callable[..., tuple[int, bool, Vec3, Vec3]]:
-    """``compared``, compiled when it is first wanted."""
-    none, arm, level = (0.0, 0.0, 0.0), (0.0, 0.0), (1.0, 0.0, 0.0, 0.0)
-    read = none, none, level, none, none, arm
-    return machine_code(_compared, *read, *read, 0.002, none, none)
+    estimate = none, none, R, none, 9.81, arm, arm
+    return machine_code(_looked_at, read, read, 0.002, _EMPTY, *estimate, 0.002, 0.0)
 
 
 def believed(
@@ -387,18 +443,20 @@ def believed(
     p, v, w, q, qd, force = s.p_WB, s.v_WB, s.gyro_B, s.q_arm, s.qd_arm, s.accel_B
     _, p0, v0, R0, w0, _, q0, qd0, force0 = x
     sigma = trust.position_sigma(s.t_us) if trust.pose.unused else 0.0
-    never, far, R, yaw = _machine_code()(
-        p, v, s.q_WB, w, force, q, qd, p0, v0, R0, w0, force0, q0, qd0, dt, sigma
+    new, known = (p, v, s.q_WB, w, force, q, qd), trust.last
+    last, apart = new, 0.0  # a first frame repeats nothing, and opens no window
+    if known is not None:
+        last = (known.p_WB, known.v_WB, known.q_WB, known.gyro_B, known.accel_B,
+                known.q_arm, known.qd_arm)  # fmt: skip
+        apart = 1e-6 * (s.t_us - known.t_us)
+    never, far, R, yaw, stuck, rough, sums = _machine_code()(
+        new, last, apart, trust.window, p0, v0, R0, w0, force0, q0, qd0, dt, sigma
     )
-    known = trust.last
-    stuck = 0 if known is None else _repeating(s, known)
-    rough, window = _window(trust.window, s, known)
-    agreement = trust.agreement
+    window, agreement = Window(*sums), trust.agreement
     if window.frames >= _WINDOW:
         agreement, window = agreement.after(window), _EMPTY
     odd = agreement.doubted
-    quiet = not (never or far or stuck or trust.returned_us or trust.doubted or odd)
-    if quiet and trust.shadow is None:
+    if not (never or far or stuck or trust.returned_us or trust.doubted or odd or trust.shadow):
         after = FrameTrust(s, _GOOD, _GOOD, _GOOD, 0, trust.bad_us, window, agreement)
         return after, StateEstimate(s.t_us, p, v, R, w, yaw, q, qd, -force[2])
     olds = trust.pose, trust.inertial, trust.joints
@@ -466,35 +524,6 @@ def _integrated(
     p = (px + dt * (vx + 0.5 * dt * ax), py + dt * (vy + 0.5 * dt * ay),
          pz + dt * (vz + 0.5 * dt * az))  # fmt: skip
     return p, (vx + dt * ax, vy + dt * ay, vz + dt * az), turn
-
-
-def _window(window: Window, s: SensorFrame, last: SensorFrame | None) -> tuple[int, Window]:
-    """Parts that are far from those of the last frame, and the window with the new frame in it."""
-    dt = 0.0 if last is None else 1e-6 * (s.t_us - last.t_us)
-    if last is None or not 0.0 < dt <= _STEADY_DT:
-        return 0, _EMPTY
-    rough, comparable, turn, speed = _comparing()(
-        s.p_WB, s.v_WB, s.q_WB, s.gyro_B, s.accel_B, s.q_arm,
-        last.p_WB, last.v_WB, last.q_WB, last.gyro_B, last.accel_B, last.q_arm,
-        dt, window.turn, window.speed,
-    )  # fmt: skip
-    # A pose that repeats itself says nothing about the others.
-    if not comparable or s.v_WB == last.v_WB:
-        return rough, _EMPTY
-    same_rate = window.same_rate + 1 if s.gyro_B == last.gyro_B else 0
-    same_force = window.same_force + 1 if s.accel_B == last.accel_B else 0
-    return rough, Window(window.frames + 1, turn, speed, same_rate, same_force)
-
-
-def _repeating(s: SensorFrame, last: SensorFrame) -> int:
-    """Parts that are the last frame's to the last bit, while others are not."""
-    pose = s.p_WB == last.p_WB and s.v_WB == last.v_WB and s.q_WB == last.q_WB
-    inertial = s.gyro_B == last.gyro_B and s.accel_B == last.accel_B
-    if pose and inertial:
-        return 0  # a frame that came twice, or a vehicle that lies still
-    moving = s.qd_arm != (0.0, 0.0)
-    joints = moving and s.q_arm == last.q_arm and s.qd_arm == last.qd_arm
-    return (POSE if pose else 0) | (INERTIAL if inertial else 0) | (JOINTS if joints else 0)
 
 
 def _part(

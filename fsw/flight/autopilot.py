@@ -20,7 +20,6 @@ from fsw.control.cascade import (
     at_rest,
     in_hover,
 )
-from fsw.control.safety_filter import NO_ZONES, moving_zones
 from fsw.control.safety_gate import gate
 from fsw.estimation.estimator import estimate_state
 from fsw.estimation.sensor_fusion import FusionMemory
@@ -46,7 +45,7 @@ from fsw.model.nominal import REST_INPUT
 from fsw.mpc.reference import merge
 from fsw.parameters.consistency import Finding
 from fsw.parameters.flight_config import FlightConfig
-from fsw.shapes.zones import Array
+from fsw.shapes.zones import NO_ZONES, Array, moving_zones
 from fsw.signals import (
     STOPPED,
     ActuatorCommand,
@@ -128,6 +127,7 @@ class Autopilot:
         nominal = self._plans.step(nominal_at_rest(estimate), REST_INPUT)
         self._cascade.step(in_hover(self.config.airframe, estimate), estimate, nominal, REST_INPUT)
         self._safe_sets.warm_up(estimate)
+        self._horizon.warm_up(estimate)
         self._sensed.warm_up()
         self._clearance.warm_up(estimate)
         self._exact.warm_up(estimate, TickInputs(_STILL))

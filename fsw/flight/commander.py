@@ -12,7 +12,7 @@ from fsw.flight import arming, failsafe
 from fsw.flight.arming_health import arming_health
 from fsw.flight.command_dedup import answered_before, remember
 from fsw.flight.command_handlers import Decision, decide
-from fsw.flight.failsafe import FailsafeContext
+from fsw.flight.failsafe import SLOW_US, FailsafeContext
 from fsw.flight.land_detector import standing_unclear, stands
 from fsw.flight.mission_sequencer import refusal as mission_refusal
 from fsw.flight.modes import MODES
@@ -146,7 +146,7 @@ class Commander:
         if vehicle.mode is Mode.FAULT:
             return state  # what ended the flight stays on show
         context = FailsafeContext(state, estimate, self._config)
-        slowly = estimate.t_us // failsafe.SLOW_US != state.t_us // failsafe.SLOW_US
+        slowly = estimate.t_us // SLOW_US != state.t_us // SLOW_US
         rows = failsafe.active(context) if slowly else failsafe.quickly_active(context)
         before = vehicle.conditions
         if not rows and not before:

@@ -41,6 +41,7 @@ MISSED_TICKS: Final = 10
 JUMP_SHOWN_US: Final = 1_000_000  # for which a jump of time is a condition
 JUMP_US: Final = 500_000  # of the wall clock in a second, that is no slewing
 BREAKER: Final = 121212  # of CBRK_FLIGHTTERM, PX4's number
+_OFFBOARD: Final = Mode.OFFBOARD
 AT_ONCE_US: Final = 2_000  # a tick
 SLOW_US: Final = 100_000  # a planning period, after which the other rows are looked at again
 SECOND_US: Final = 1_100_000  # the loop looks at its machine once a second
@@ -868,7 +869,7 @@ def active(context: FailsafeContext) -> tuple[Failsafe, ...]:
 
 def quickly_active(context: FailsafeContext) -> tuple[Failsafe, ...]:
     """The same between two planning periods: the slow rows are as they were found last."""
-    found = _found(context, _QUICK)
+    found = () if _all_is_well(context) else _found(context, _QUICK)
     before = context.state.vehicle.conditions
     if before and not _SLOW.isdisjoint(before):
         known = {row.condition for row in found} | _SLOW.intersection(before)
@@ -884,6 +885,35 @@ def _found(
         if is_active(context):
             found = (*found, row)
     return found
+
+
+def _all_is_well(context: FailsafeContext) -> bool:
+    """Whether no quick row can be active, as in nearly every tick; then none needs to be asked.
+
+    False says nothing: the rows decide. Tests hold it against each of them.
+    """
+    state, config = context.state, context.config
+    vehicle, limits, aiding = state.vehicle, config.limits, state.aiding
+    safety, plan = state.safety, state.plan
+    plan_age_us = context.estimate.t_us - plan.since_us
+    return (
+        aiding.unaided_us < limits.aiding_loss_us
+        and aiding.sensor is None
+        and aiding.attitude_sigma <= limits.attitude_loss
+        and safety.rolled_us < 0
+        and safety.pitched_us < 0
+        and safety.breach_us < 0
+        and safety.off_plan_us < 0
+        and safety.filter_us < 0
+        and not state.damage.report.lost
+        and plan_age_us <= PLAN_STALE_PERIODS * config.planner.period_us
+        and not plan.refused
+        and not plan.awaited_missed
+        and state.invalid_ticks < INVALID_TICKS
+        and not state.output_replaced
+        and vehicle.mode is not _OFFBOARD
+        and vehicle.failsafe_from is not _OFFBOARD
+    )
 
 
 # ---------------------------------------------------------------- the response

@@ -19,14 +19,17 @@ Source: docs/decisions/0010-setpoints-through-the-planner.md.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
+from functools import cache, lru_cache
 
 from fsw.barriers.safe_approach import BarrierTuning, safe_approach_speed
+from fsw.compiled import compilable, kernel, machine_code
 from fsw.geometry.vectors import add_scaled, dot, norm, subtract
 from fsw.model.body import Body, body_of, hull_reach
 from fsw.parameters.flight_config import FlightConfig
 from fsw.shapes.kind import Surface
-from fsw.shapes.zones import surface, surfaces
+from fsw.shapes.zones import NO_ZONES, Array, moving_zones, nearest_plane, surface
 from fsw.signals import EndEffectorTarget, SafeSet, Vec3
 
 SETTLE_RATE = 2.0  # 1/s, of the last bit of the way
@@ -43,6 +46,7 @@ _TOLERANCE = 1e-4  # m
 _HERE: Vec3 = (0.0, 0.0, 0.0)
 
 
+@compilable
 def limit_lead(p: Vec3, vehicle: Vec3, max_lead_distance: float) -> Vec3:
     """``p`` [m, NED] brought to within ``max_lead_distance`` [m] of ``vehicle`` [m, NED]."""
     away = subtract(p, vehicle)
@@ -79,6 +83,7 @@ def limit_approach(
     return p, v
 
 
+@compilable
 def _slowed(v: Vec3, n: Vec3, most: float) -> Vec3:
     """A velocity that approaches against a normal no faster than ``most``."""
     approach = -dot(n, v)
@@ -115,28 +120,60 @@ def limit_reference(
     What is asked for near the motion of the end-effector, ``p_WE`` [m] and ``v_WE`` [m/s], and not
     far behind a wall passes as it is: the paper's own path enters the safety zone.
     """
-    begin_us, limited = targets[0].t_us, []
-    approached = [(at.normal, _fastest(at, barrier)) for at in surfaces(safe_set, p_WE, begin_us)]
+    zones, begin_us, limited = _moving_zones(safe_set), targets[0].t_us, []
     for target in targets:
-        ahead = 1e-6 * (target.t_us - begin_us)
-        led = add_scaled(p_WE, v_WE, ahead)
-        p = limit_lead(target.p_WE, led, _MAX_LEAD_DISTANCE + _LEAD_GROWTH * ahead)
-        v = limit_lead(target.v_WE, v_WE, _MAX_VELOCITY_ERROR)
-        for zone in range(len(safe_set.zones)):
-            at = surface(safe_set, zone, p, target.t_us)
-            if at is not None and -at.distance > _MAX_DEPTH:
-                p = add_scaled(p, at.normal, -at.distance - _MAX_DEPTH)
-        for n, most in approached:
-            v = _slowed(v, n, most)
+        p, v = _limit_target()(
+            *(zones, begin_us, target.t_us, target.p_WE, target.v_WE),
+            *(p_WE, v_WE, barrier.alpha, barrier.slope),
+        )
         limited.append(EndEffectorTarget(target.t_us, p, v, target.a_WE, target.yaw))
     result = tuple(limited)
     return targets if result == targets else result
 
 
-def _fastest(at: Surface, barrier: BarrierTuning) -> float:
+@kernel
+def _limited(
+    zones: Array,
+    begin_us: int,
+    t_us: int,
+    p: Vec3,
+    v: Vec3,
+    p_WE: Vec3,
+    v_WE: Vec3,
+    alpha: float,
+    slope: float,
+) -> tuple[Vec3, Vec3]:
+    """``limit_reference`` for place and velocity of one target, of ``t_us``."""
+    ahead = 1e-6 * (t_us - begin_us)
+    led = add_scaled(p_WE, v_WE, ahead)
+    p = limit_lead(p, led, _MAX_LEAD_DISTANCE + _LEAD_GROWTH * ahead)
+    v = limit_lead(v, v_WE, _MAX_VELOCITY_ERROR)
+    for zone in range(len(zones)):
+        at = nearest_plane(zones, zone, p, t_us)
+        if -at.distance > _MAX_DEPTH:
+            p = add_scaled(p, (at.nx, at.ny, at.nz), -at.distance - _MAX_DEPTH)
+    for zone in range(len(zones)):
+        at = nearest_plane(zones, zone, p_WE, begin_us)
+        v = _slowed(v, (at.nx, at.ny, at.nz), _fastest(at, alpha, slope))
+    return p, v
+
+
+@cache
+def _limit_target() -> Callable[..., tuple[Vec3, Vec3]]:
+    """``_limited``, compiled when it is first wanted."""
+    return machine_code(_limited, NO_ZONES, 0, 0, _HERE, _HERE, _HERE, _HERE, 1.0, 1.0)
+
+
+@lru_cache(maxsize=16)
+def _moving_zones(safe_set: SafeSet) -> Array:
+    """The zones that a reference keeps off: a sphere rides on it."""
+    return moving_zones(safe_set, None)
+
+
+@compilable
+def _fastest(at: Surface, alpha: float, slope: float) -> float:
     """How fast to approach a zone [m/s]."""
-    room = max(at.distance, 0.0)
-    return max(safe_approach_speed(room, barrier.alpha, barrier.slope), _ALWAYS)
+    return max(safe_approach_speed(max(at.distance, 0.0), alpha, slope), _ALWAYS)
 
 
 def project_to_safe_set(p: Vec3, safe_set: SafeSet, t_us: int) -> Vec3:

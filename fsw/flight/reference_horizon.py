@@ -11,8 +11,9 @@ from fsw.flight.reference_governor import ReferenceGovernor
 from fsw.flight.setpoint_generator import PositionGoal, ReferenceState, arrived
 from fsw.flight.state import FlightState, SetpointMemory
 from fsw.model.kinematics import point_in_flight
+from fsw.mpc.reference import sample, still_at
 from fsw.parameters.flight_config import FlightConfig
-from fsw.signals import EndEffectorTarget, MotionSetpoint, StateEstimate, Vec2
+from fsw.signals import EndEffectorTarget, MotionSetpoint, SafeSet, StateEstimate, Vec2
 
 _OFF_PLAN = 0.05  # m; beyond what a disturbance alone does nearly always
 
@@ -26,6 +27,12 @@ class ReferenceHorizon:
     def __init__(self, config: FlightConfig) -> None:
         self._config = config
         self._governor = ReferenceGovernor(config)
+
+    def warm_up(self, estimate: StateEstimate) -> None:
+        """Compile every kernel."""
+        stream = still_at(estimate.p_WB), still_at(estimate.p_WB, 100_000)
+        between = sample(stream, 50_000)
+        self._governor.limit_horizon((between,), between.p_WE, between.v_WE, SafeSet())
 
     def __call__(
         self, mode: FlightMode, state: FlightState, estimate: StateEstimate, t_us: int

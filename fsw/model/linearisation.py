@@ -188,7 +188,25 @@ def put_pose(frame: Array, p: Vec3, R: Mat3) -> None:
         frame[_AT_R + k] = R[k]
 
 
-@compiled
+@kernel
+def put_turning(frame: Array, v: Vec3, w: Vec3) -> None:
+    """The base of a ``frame`` (FRAME,) [SI] moves with ``v`` [m/s, NED], turns with w [rad/s, FRD].
+
+    Its attitude is in it.
+    """
+    for k in range(3):
+        frame[_AT_V + k] = v[k]
+    wx, wy, wz = w
+    for row in range(3):
+        at = 3 * row
+        x, y, z = frame[_AT_R + at], frame[_AT_R + at + 1], frame[_AT_R + at + 2]
+        # R times the cross product with w.
+        frame[_AT_TURNING + at] = y * wz - z * wy
+        frame[_AT_TURNING + at + 1] = z * wx - x * wz
+        frame[_AT_TURNING + at + 2] = x * wy - y * wx
+
+
+@kernel
 def put_arm(frame: Array, q_arm: Vec2, qd_arm: Vec2, lengths: Vec2) -> None:
     """The arm in a ``frame`` (FRAME,) [SI]: ``q_arm`` [rad], ``qd_arm`` [rad/s], lengths [m]."""
     angle, rate = 0.0, 0.0

@@ -8,7 +8,7 @@ import numpy as np
 from numba import literal_unroll
 from numpy.typing import NDArray
 
-from fsw.compiled import kernel, of_fixed_types
+from fsw.compiled import compilable, kernel, of_fixed_types
 from fsw.shapes import BY_NAME, KINDS
 from fsw.shapes.kind import NUMBERS, Surface
 from fsw.signals import EndEffectorTarget, SafeSet, Vec3
@@ -23,6 +23,11 @@ _INDEX = {kind.name: k for k, kind in enumerate(KINDS)}
 KIND, KEEP_IN, CLEARANCE, PLANES, FLAT, FOLLOWS, FIRST = range(7)
 """Which of KINDS; whether to keep in; clearance [m]; how many planes each place has; whether they
 are the same everywhere; whether it rides on the target and keeps the base alone; its numbers."""
+_MOVE = FIRST + NUMBERS  # behind them its velocity, where it is at a time, that time
+ADDED = _MOVE + 7  # m, in its clearance for an uncertain estimate
+_COLUMNS = ADDED + 1
+
+NO_ZONES: Array = np.zeros((0, _COLUMNS))
 
 
 @lru_cache(maxsize=16)
@@ -55,6 +60,60 @@ def surface_at(zones: Array, zone: int, which: int, x: float, y: float, z: float
     return Surface(at.distance - zones[zone, CLEARANCE], at.nx, at.ny, at.nz)
 
 
+def moving_zones(
+    safe_set: SafeSet, target: EndEffectorTarget | None, added: tuple[float, ...] = ()
+) -> Array:
+    """The zones and how they move, (zones, columns) [SI]; of no target, without what follows it.
+
+    ``added`` [m] of each zone's clearance is for an uncertain estimate, and no margin.
+    """
+    if not safe_set.zones:
+        return NO_ZONES
+    rows = np.zeros((len(safe_set.zones), _COLUMNS))
+    rows[:, :_MOVE] = zone_arrays(safe_set)
+    if added:
+        rows[:, ADDED] = added
+    for row, zone in zip(rows, safe_set.zones, strict=True):
+        row[_MOVE : _MOVE + 3], row[_MOVE + 6] = zone.velocity, zone.t_us
+        if row[FOLLOWS] > 0.0 and target is not None:
+            row[_MOVE : _MOVE + 3], row[_MOVE + 3 : _MOVE + 6] = target.v_WE, target.p_WE
+            row[_MOVE + 6] = target.t_us
+    return rows if target is not None else rows[rows[:, FOLLOWS] == 0.0]
+
+
+@compilable
+def velocity_of(zones: Array, zone: int) -> Vec3:
+    """Velocity [m/s, NED] of one of the ``zones`` (zones, columns) [SI] of ``moving_zones``."""
+    return zones[zone, _MOVE], zones[zone, _MOVE + 1], zones[zone, _MOVE + 2]
+
+
+@compilable
+def moved_by(zones: Array, zone: int, t_us: int) -> Vec3:
+    """How far one of the ``zones`` (zones, columns) [SI] of ``moving_zones`` is at a time [m]."""
+    elapsed = 1e-6 * (t_us - zones[zone, _MOVE + 6])
+    return (
+        zones[zone, _MOVE + 3] + elapsed * zones[zone, _MOVE],
+        zones[zone, _MOVE + 4] + elapsed * zones[zone, _MOVE + 1],
+        zones[zone, _MOVE + 5] + elapsed * zones[zone, _MOVE + 2],
+    )
+
+
+@compilable
+def nearest_plane(zones: Array, zone: int, p: Vec3, t_us: int) -> Surface:
+    """The plane of a zone that is nearest to ``p`` [m, NED] at a time, its clearance taken off.
+
+    ``zones`` (zones, columns) [SI] are those of ``moving_zones``.
+    """
+    shift = moved_by(zones, zone, t_us)
+    x, y, z = p[0] - shift[0], p[1] - shift[1], p[2] - shift[2]
+    nearest = surface_at(zones, zone, 0, x, y, z)
+    for which in range(1, int(zones[zone, PLANES])):
+        at = surface_at(zones, zone, which, x, y, z)
+        if at.distance < nearest.distance:
+            nearest = at
+    return nearest
+
+
 def shifts(
     safe_set: SafeSet, times_us: NDArray[np.int64], p_target: Array, v_target: Array
 ) -> tuple[Array, Array]:
@@ -62,19 +121,40 @@ def shifts(
 
     ``p_target`` (times, 3) [m, NED] and ``v_target`` (times, 3) [m/s, NED] are those of the target.
     """
-    zones = safe_set.zones
-    velocity = np.array([zone.velocity for zone in zones]).reshape(-1, 3)
-    begin_us = np.array([zone.t_us for zone in zones], dtype=np.int64)
-    elapsed = 1e-6 * (times_us[:, None] - begin_us)
-    moved = elapsed[:, :, None] * velocity
-    velocities = np.broadcast_to(velocity, moved.shape).copy()
-    for k, zone in enumerate(zones):
-        if BY_NAME[zone.shape.kind].follows_target:
-            moved[:, k], velocities[:, k] = p_target, v_target
+    zones = _all_moving_zones(safe_set)
+    moved = np.empty((len(times_us), len(zones), 3))
+    velocities = np.empty_like(moved)
+    _fill_shifts(zones, times_us, p_target, v_target, moved, velocities)
     return moved, velocities
 
 
-_surface_at = of_fixed_types(surface_at)
+@lru_cache(maxsize=16)
+def _all_moving_zones(safe_set: SafeSet) -> Array:
+    """Those of ``moving_zones``, with the zones that follow the target, wherever it is."""
+    return moving_zones(safe_set, _NO_TARGET)
+
+
+@kernel
+def _shifts(
+    zones: Array,
+    times_us: NDArray[np.int64],
+    p_target: Array,
+    v_target: Array,
+    moved: Array,
+    velocities: Array,
+) -> None:
+    for i in range(len(times_us)):
+        for k in range(len(zones)):
+            follows = zones[k, FOLLOWS] > 0.0
+            shift, velocity = moved_by(zones, k, times_us[i]), velocity_of(zones, k)
+            for axis in range(3):
+                moved[i, k, axis] = p_target[i, axis] if follows else shift[axis]
+                velocities[i, k, axis] = v_target[i, axis] if follows else velocity[axis]
+
+
+_surface_at, _fill_shifts = of_fixed_types(surface_at), of_fixed_types(_shifts)
+_REST: Vec3 = (0.0, 0.0, 0.0)
+_NO_TARGET = EndEffectorTarget(0, _REST, _REST, _REST)
 
 
 def surfaces(

@@ -13,13 +13,13 @@ import pytest
 from fsw.control.cascade import Cascade, CascadeMemory, Inner, close_loops
 from fsw.control.gains import LoopGains
 from fsw.control.joints import JointMemory
-from fsw.control.safety_filter import moving_zones
 from fsw.control.tracking import Observed
 from fsw.estimation.estimator import attitude, estimate_state
 from fsw.model.airframe import AIRFRAME, AttitudeLag
 from fsw.model.nominal import NominalModel, advance
 from fsw.shapes.ball import point
 from fsw.shapes.half_space import wall
+from fsw.shapes.zones import moving_zones
 from fsw.signals import ActuatorCommand, PlanInput, SafeSet, SensorFrame, Vec2, Vec4
 from tests.fsw.random_states import as_state, prediction_vector, random_estimate, vec3
 

@@ -13,13 +13,11 @@ from scipy.spatial.transform import Rotation
 
 from fsw.barriers.safe_approach import BarrierTuning
 from fsw.control.safety_filter import (
-    NO_ZONES,
     FilterLaw,
     FilterTuning,
     filter_law,
     filter_probes,
     filtered,
-    moving_zones,
 )
 from fsw.geometry.vectors import dot
 from fsw.model.airframe import AIRFRAME
@@ -30,6 +28,7 @@ from fsw.shapes.ball import ball
 from fsw.shapes.box import box
 from fsw.shapes.half_space import wall
 from fsw.shapes.target_sphere import target_sphere
+from fsw.shapes.zones import NO_ZONES, moving_zones
 from fsw.signals import EndEffectorTarget, SafeSet, Shape, StateEstimate, Vec3, Zone
 from sitl.distance import along_segment, farthest_of_rotor, nearest, of_rotor
 from sitl.shapes import KINDS as REFEREE_KINDS

@@ -514,6 +514,40 @@ def test_between_two_planning_periods_slow_rows_are_as_they_were_found_last() ->
     assert quickly_active(FINE.context()) == ()
 
 
+QUICK = {row.condition for row in FAILSAFES if not row.slow}
+ALARMING = (
+    replace(FINE, invalid_ticks=5, output_replaced=True),
+    replace(FINE, mode=Mode.DISARMED, invalid_ticks=5),
+    replace(FINE, output_replaced=True),
+    replace(FINE, aiding=Aiding(attitude_sigma=math.nan)),
+    replace(FINE, aiding=Aiding(250_000, position_sigma=math.nan)),
+    replace(FINE, aiding=replaced_sensor(50_000)),
+    replace(FINE, safety=SafetyMemory(rolled_us=NOW_US - 300_000)),
+    replace(FINE, safety=SafetyMemory(pitched_us=NOW_US - 300_000)),
+    replace(FINE, safety=OUTSIDE),
+    replace(FINE, safety=OVER_THE_FENCE),
+    replace(FINE, safety=OFF_PLAN),
+    replace(FINE, safety=SafetyMemory(filter_us=0)),
+    replace(FINE, damage=Damage("rotor 1", report=ActuatorReport(1, lost=True))),
+    replace(FINE, plan_age_us=3 * PERIOD_US + 1),
+    replace(FINE, plan_refused=True),
+    replace(FINE, plan=PlanMemory(awaited_missed=True)),
+    OFFBOARD,
+    replace(OFFBOARD, mode=Mode.HOLD, failsafe_from=Mode.OFFBOARD, known=(*QUICK,)),
+)
+
+
+def test_where_all_is_well_no_quick_row_is_active() -> None:
+    seen: set[Condition] = set()
+    for evidence in ALARMING:
+        context = evidence.context()
+        alone = [row for row in FAILSAFES if not row.slow and row.active(context)]
+        assert alone
+        assert list(quickly_active(context)) == alone
+        seen |= {row.condition for row in alone}
+    assert seen == QUICK, "every quick row has evidence"
+
+
 def test_the_rows_name_parameters_that_exist_and_say_how_a_condition_is_found() -> None:
     for row in FAILSAFES:
         assert set(row.parameters) <= set(BY_NAME), row.condition

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from fsw.shapes.ball import ball, point
+from fsw.shapes.box import box
 from fsw.shapes.half_space import wall
 from fsw.shapes.target_sphere import target_sphere
-from fsw.shapes.zones import shifts, surfaces
+from fsw.shapes.zones import moved_by, moving_zones, nearest_plane, shifts, surfaces, velocity_of
 from fsw.signals import EndEffectorTarget, SafeSet, Vec3, Zone
 
 MOVING = Zone(ball((0.0, 0.0, 0.0), 0.5), 0.1, velocity=(1.0, -2.0, 0.5), t_us=2_000_000)
@@ -44,3 +45,14 @@ def test_shifts_of_each_zone_at_each_time() -> None:
     np.testing.assert_allclose(moved[:, 1], [[0.0, 0.0, 0.0], [0.1, -0.2, 0.05]], atol=1e-15)
     np.testing.assert_array_equal(moved[:, 2], p_target)
     np.testing.assert_array_equal(velocities[0], [[0.0] * 3, [1.0, -2.0, 0.5], [1.0] * 3])
+
+
+def test_the_nearest_plane_for_kernels_is_that_of_the_surface() -> None:
+    room = Zone(box((0.0, 0.0, 0.0), (1.0, 2.0, 3.0)), 0.1, keep_in=True)
+    zones = SafeSet((MOVING, SPHERE, room))
+    rows = moving_zones(zones, None)
+    p: Vec3 = (0.3, -0.4, 0.2)
+    found = tuple(nearest_plane(rows, k, p, 2_500_000) for k in range(len(rows)))
+    assert found == surfaces(zones, p, 2_500_000)
+    assert moved_by(rows, 0, 2_500_000) == (0.5, -1.0, 0.25)
+    assert velocity_of(rows, 0) == MOVING.velocity
