@@ -250,6 +250,24 @@ def test_half_an_inertial_unit_that_fails_is_found_and_the_pose_stands_in(
     assert estimates[-1].w_WB_B[0] == pytest.approx(swaying(499).gyro_B[0], abs=0.1)
 
 
+@pytest.mark.parametrize(
+    ("quiet", "blamed"), [(3000, Sensor.IMU), (100, Sensor.POSE)], ids=["long ago", "lately"]
+)
+def test_a_pose_that_failed_once_is_blamed_for_some_seconds_and_no_longer(
+    quiet: int, blamed: Sensor
+) -> None:
+    """It is no number for one frame, and a gyro is wrong after so many ``quiet`` ones."""
+
+    def spoil(k: int, s: SensorFrame) -> SensorFrame:
+        if k == 20:
+            return replace(s, v_WB=(NAN, 0.0, 0.0))
+        return replace(s, gyro_B=(s.gyro_B[0] + 0.5, -0.3, 0.2)) if k > 20 + quiet else s
+
+    history, _ = swayed(20 + quiet + 120, spoil)
+    assert not any(one.doubted for one in history[20 : 20 + quiet])
+    assert history[-1].faults()[0][0] is blamed
+
+
 @pytest.mark.parametrize("what", ["pose", "gyro", "arm"])
 def test_garbage_is_never_the_truth(what: str) -> None:
     random = np.random.default_rng(2)
