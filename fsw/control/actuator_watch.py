@@ -74,6 +74,20 @@ STANDING: Final = 0.2  # rad/s, root mean square of the rate of a joint that sta
 MOVED: Final = 0.05  # rad; a joint that has moved so far is not stuck
 
 NONE: Final = -1
+# What is known of parts that have failed, which lasts while nothing can be observed.
+_OF_FAILED: Final = (
+    "failed",
+    "effect",
+    "failed2",
+    "failed_by_thrust",
+    "failed_thrust2",
+    "failed_more2",
+    "gives",
+    "lost",
+    "disobeys",
+    "joint",
+    "stood_at",
+)
 
 WATCH: Final = np.dtype(
     [
@@ -133,6 +147,16 @@ def at_start() -> Watch:
 def blank() -> Watch:
     """Room for a memory; eight times as fast as an empty array of records."""
     return np.ndarray(1, WATCH, np.empty(_FLOATS))
+
+
+def paused(memory: Watch | None) -> Watch | None:
+    """The memory while nothing can be observed: what has failed, or None if nothing has."""
+    if memory is None or (memory[0]["failed"] == NONE and not memory[0]["joint"].any()):
+        return None
+    kept = at_start()
+    for name in _OF_FAILED:
+        kept[name] = memory[name]
+    return kept
 
 
 @kernel

@@ -131,7 +131,7 @@ class Agreement(NamedTuple):
         if still or held:
             return after._doubting(Sensor.IMU, SensorFault.STUCK)
         if max(turns, speeds) >= _BAD:
-            lately = 0 <= self.pose_failed_us and now_us - self.pose_failed_us <= _PROBATION_US
+            lately = self.pose_failed_us >= 0 and now_us - self.pose_failed_us <= _PROBATION_US
             of_pose = lately or min(turns, speeds) >= _BAD
             sensor = Sensor.POSE if of_pose else Sensor.IMU
             return after._doubting(sensor, SensorFault.DISAGREES)

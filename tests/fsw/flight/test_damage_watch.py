@@ -8,11 +8,11 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from fsw.control.actuator_watch import Watch
+from fsw.control.actuator_watch import Watch, at_start, paused
 from fsw.control.cascade import CascadeMemory, in_hover
 from fsw.flight.damage_watch import DamageWatch
 from fsw.flight.state import Damage
-from fsw.model.actuator_health import HEALTHY
+from fsw.model.actuator_health import HEALTHY, LIMP, SOUND
 from fsw.model.airframe import AIRFRAME
 from fsw.signals import StateEstimate
 
@@ -42,12 +42,17 @@ class Motion:
         self.watcher = watcher
         self.damage, self.memory = Damage(), None
         self.told_s = math.inf
+        self.history: list[Damage] = []
         self.loops: CascadeMemory = in_hover(AIRFRAME, estimate(0.0, (0.0, 0.0, 0.0), 9.81))
 
     def run(
-        self, seconds: float, push: Callable[[float], float] = lambda _: 0.0, mass: float = 3.5
+        self,
+        seconds: float,
+        push: Callable[[float], float] = lambda _: 0.0,
+        mass: float = 3.5,
+        doubted: Callable[[float], bool] = lambda _: False,
     ) -> Damage:
-        """Move for a while; ``push`` [m/s^2] along body -z."""
+        """Move for a while; ``push`` [m/s^2] along body -z. Nothing is seen while ``doubted``."""
         thrust, wx, wy = [EACH] * 4, 0.0, 0.0
         memory: Watch | None = None
         for k in range(round(seconds / DT)):
@@ -60,9 +65,13 @@ class Motion:
             wy += DT * 0.3 * (front - rear) / 0.3
             felt = sum(thrust) / mass + push(t)
             now = estimate(1.0 + t, (wx, wy, 0.0), felt)
-            self.damage, memory = self.watcher.see(
-                self.damage, memory, self.loops, self.loops, now, 1
-            )
+            if doubted(t):
+                memory = paused(memory)
+            else:
+                self.damage, memory = self.watcher.see(
+                    self.damage, memory, self.loops, self.loops, now, 1
+                )
+            self.history.append(self.damage)
             if self.damage.rotor and self.told_s == math.inf:
                 self.told_s = t - FAULT_S
         return self.damage
@@ -109,6 +118,42 @@ def test_a_rotor_that_is_gone_for_a_moment_is_not_lost() -> None:
     damage = gone.run(FAULT_S + 1.0)
     assert damage.rotor.startswith("rotor 3")
     assert not damage.report.lost
+
+
+@pytest.mark.parametrize(
+    ("given", "wrong"),
+    [
+        (weak(2, 0.5), ("effect", 0.5)),
+        (weak(2, 0.0), ("lost", True)),
+        (lambda t, i: 1.0 + 0.6 * math.sin(9.0 * t) if i == 2 and t >= FAULT_S else 1.0,
+         ("disobeys", True)),
+    ],
+    ids=["weak", "lost", "disobeys"],
+)  # fmt: skip
+def test_a_rotor_that_is_known_to_be_bad_stays_so_while_sensors_are_doubted(
+    given: Given, wrong: tuple[str, float]
+) -> None:
+    found_s = FAULT_S + 1.0
+    motion = Motion(given)
+    motion.run(found_s + 1.5, doubted=lambda t: found_s - 0.02 <= t < found_s)
+    name, value = wrong
+    for damage in motion.history[round(found_s / DT) :]:
+        assert damage.rotor.startswith(NAMES[2])
+        assert getattr(damage.report, name) == pytest.approx(value, abs=0.15)
+
+
+def test_while_nothing_has_failed_the_watch_starts_anew_after_a_doubt() -> None:
+    motion = Motion(lambda _t, _i: 1.0)
+    assert motion.run(0.2) == Damage()
+    assert paused(None) is None
+    assert paused(at_start()) is None
+    limp = at_start()
+    limp["joint"][0, 1], limp["running"], limp["torque"] = LIMP, 5.0, 1.0
+    kept = paused(limp)
+    assert kept is not None
+    assert kept[0]["joint"].tolist() == [SOUND, LIMP]
+    assert kept[0]["running"] == 0.0
+    assert not kept[0]["torque"].any()
 
 
 def test_a_rotor_that_gives_too_much_does_not_obey_and_is_counted_on_as_it_is() -> None:
