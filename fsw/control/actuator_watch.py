@@ -53,6 +53,7 @@ EXPLAINED: Final = 0.9  # share of all that is observed
 LOST: Final = 0.2  # of what is commanded; a rotor that gives less is lost
 LOST_TIME: Final = 0.15  # s
 LOST_FROM: Final = 4.0  # N commanded; with less it is not seen
+UNLIKE: Final = 0.5  # share of what a second rotor lacks that along z may differ
 QUIET: Final = 0.75  # N; a rotor below that gives what it is commanded again
 QUIET_TIME: Final = 3.0  # s
 ASTRAY: Final = 1.2  # N, root mean square of what no effectiveness explains
@@ -112,6 +113,7 @@ WATCH: Final = np.dtype(
         ("failed_more2", float),  # N^2, mean square of what it gives too much
         ("gives", float),  # N, of the failed rotor
         ("lost_for", float),  # s
+        ("others_lost_for", float, (4,)),  # s, of each rotor beside the failed one
         ("lost", np.int64),
         ("disobeys", np.int64),
         ("quiet_for", float),  # s
@@ -246,16 +248,24 @@ def _observe_base(
         s.rate[i] = rate[i]
     if s.failed >= 0:
         # Which one is known: what turns the base says how much, and pushes do not.
-        k = s.failed
+        k, opposite = s.failed, (s.failed + 2) % 4
         turns = (-y, x, y, -x)
         off, thrust = turns[k], g[k]
+        # Of both about that axis: with what is lacking along z the opposite one turns the base.
+        lacking = min(0.5 * (z - off), 0.0)
+        more = max(off, 0.0) if lacking > -UNLIKE * off else 0.0
         s.gives += min(dt / SMOOTHED, 1.0) * (thrust + off - s.gives)
         s.failed2 += forget * (off * off - s.failed2)
         s.failed_by_thrust += forget * (off * thrust - s.failed_by_thrust)
         s.failed_thrust2 += forget * (thrust * thrust - s.failed_thrust2)
-        s.failed_more2 += forget * (max(off, 0.0) * max(off, 0.0) - s.failed_more2)
+        s.failed_more2 += forget * (more * more - s.failed_more2)
         gives_nothing = thrust > LOST_FROM and off < (LOST - 1.0) * thrust
         s.lost_for = s.lost_for + dt if gives_nothing else 0.0
+        for i in range(4):
+            other = 0.5 * (z - off) if i == opposite else turns[i]
+            unlike = 0.0 if i == opposite else abs(z - off - other)
+            gone = g[i] > LOST_FROM and other < (LOST - 1.0) * g[i] and unlike < -UNLIKE * other
+            s.others_lost_for[i] = s.others_lost_for[i] + dt if gone and i != k else 0.0
 
 
 @compilable
@@ -277,6 +287,8 @@ def mean_square(s: Any, rotor: int) -> float:
 def _judge_rotors(s: Any, dt: float, settled: bool) -> None:
     if s.failed >= 0:
         _follow_failed(s, dt)
+        if settled and not s.lost:
+            _judge_others(s)
         return
     found, most = NONE, 0.0
     for i in range(4):
@@ -293,11 +305,28 @@ def _judge_rotors(s: Any, dt: float, settled: bool) -> None:
     s.suspected = s.suspected + dt if found == s.suspect else 0.0
     s.suspect = found
     if s.suspected >= (STRONG_TIME if most > STRONG * STRONG else WEAK_TIME):
-        s.failed, s.effect, s.quiet_for = found, 1.0, 0.0
-        s.gives = s.thrust[found] + s.extra[found]
-        s.failed2, s.failed_by_thrust = most, s.by_thrust[found]
-        more = max(s.extra[found], 0.0)
-        s.failed_thrust2, s.failed_more2 = s.thrust2[found], more * more
+        _name(s, found, most)
+
+
+@compilable
+def _name(s: Any, found: int, size: float) -> None:
+    """Follow a failed rotor from now on; ``size`` [N^2] is the mean square by its pattern."""
+    s.failed, s.effect, s.quiet_for = found, 1.0, 0.0
+    s.gives = s.thrust[found] + s.extra[found]
+    s.failed2, s.failed_by_thrust = size, s.by_thrust[found]
+    more = max(s.extra[found], 0.0)
+    s.failed_thrust2, s.failed_more2 = s.thrust2[found], more * more
+
+
+@compilable
+def _judge_others(s: Any) -> None:
+    """Whether a second rotor is lost; then it is the failed one."""
+    for i in range(4):
+        if s.others_lost_for[i] > LOST_TIME:
+            s.suspect, s.suspected = i, s.others_lost_for[i]
+            _name(s, i, mean_square(s, i))
+            s.lost, s.disobeys = 1, 0
+            return
 
 
 @compilable

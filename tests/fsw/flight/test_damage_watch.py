@@ -156,6 +156,35 @@ def test_while_nothing_has_failed_the_watch_starts_anew_after_a_doubt() -> None:
     assert not kept[0]["torque"].any()
 
 
+@pytest.mark.parametrize(
+    ("first", "second"), [(0, 2), (0, 1), (3, 1), (3, 2)], ids=lambda k: NAMES[k][6:]
+)
+def test_a_second_rotor_that_gives_nothing_is_lost(first: int, second: int) -> None:
+    lost_s = FAULT_S + 1.0
+
+    def given(t: float, i: int) -> float:
+        if i == second:
+            return 0.0 if t >= lost_s else 1.0
+        return 0.7 if i == first and t >= FAULT_S else 1.0
+
+    motion = Motion(given)
+    damage = motion.run(lost_s + 0.4)
+    assert motion.history[round(lost_s / DT)].rotor.startswith(NAMES[first])
+    assert damage.rotor == f"{NAMES[second]} gives nothing"
+    assert damage.report.lost
+    assert 1e-6 * damage.rotor_us - 1.0 == pytest.approx(lost_s, abs=0.15)
+    assert not any(one.report.disobeys for one in motion.history)
+
+
+@pytest.mark.parametrize("share", [1.0, 0.6])
+def test_beside_a_weak_rotor_pushes_and_another_weak_one_lose_nothing(share: float) -> None:
+    random = np.random.default_rng(3).uniform(-0.8, 0.8, 100)
+    motion = Motion(lambda t, i: {0: 0.7, 2: share}.get(i, 1.0) if t >= FAULT_S + i else 1.0)
+    motion.run(FAULT_S + 3.0, lambda t: float(random[int(10.0 * t)]))
+    assert motion.history[round((FAULT_S + 1.0) / DT)].rotor.startswith(NAMES[0])
+    assert not any(one.report.lost or one.report.disobeys for one in motion.history)
+
+
 def test_a_rotor_that_gives_too_much_does_not_obey_and_is_counted_on_as_it_is() -> None:
     def stuck(t: float, i: int) -> float:
         return 1.0 + 0.6 * math.sin(9.0 * t) if i == 0 and t >= FAULT_S else 1.0
