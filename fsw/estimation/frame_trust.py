@@ -539,7 +539,7 @@ def _part(
     place: int,
 ) -> PartTrust:
     repeats = old.repeats + 1 if stuck else 0
-    steady = old.steady + 1 if old.unused and not rough else 0
+    steady = old.steady + 1 if old.unused and not (rough or never) else 0
     if never:
         fault = SensorFault.IMPLAUSIBLE
     elif repeats >= _REPEATS[place]:

@@ -287,6 +287,22 @@ def test_garbage_is_never_the_truth(what: str) -> None:
     assert math.dist(estimates[-1].p_WB, swaying(999).p_WB) < 0.05
 
 
+def test_after_places_that_are_no_numbers_one_far_off_is_not_believed_at_once() -> None:
+    """The rest of the frame is good, and steady; the place comes back 30 m away."""
+
+    def spoil(k: int, s: SensorFrame) -> SensorFrame:
+        x, y, z = s.p_WB
+        if FROM <= k < FROM + 110:
+            return replace(s, p_WB=(NAN, y, z))
+        return replace(s, p_WB=(x + 30.0, y, z)) if k >= FROM + 110 else s
+
+    history, estimates = swayed(FROM + 300, spoil)
+    back = FROM + 109  # the first place that is a number
+    assert all(one.pose.unused for one in history[back : back + 99])
+    assert all(math.dist(one.p_WB, (0.0, 0.0, -1.0)) < 0.5 for one in estimates[: back + 99])
+    assert not history[back + 99].pose.unused, "what stays is the truth, after a while"
+
+
 def test_a_pose_that_is_late_is_found_and_the_inertial_unit_leads_on() -> None:
     """As a fault begins: it stops, and then goes on from there."""
     late = 100
