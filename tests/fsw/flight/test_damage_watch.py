@@ -12,7 +12,7 @@ from fsw.control.actuator_watch import Watch, at_start, paused
 from fsw.control.cascade import CascadeMemory, in_hover
 from fsw.flight.damage_watch import DamageWatch
 from fsw.flight.state import Damage
-from fsw.model.actuator_health import HEALTHY, LIMP, SOUND
+from fsw.model.actuator_health import HEALTHY, LIMP, SOUND, STUCK
 from fsw.model.airframe import AIRFRAME
 from fsw.signals import StateEstimate
 
@@ -220,6 +220,24 @@ def test_two_rotors_that_change_together_are_no_single_one() -> None:
     """As a gust that turns the body, or an arm that is pulled: a torque without a lift."""
     turned = Motion(lambda t, i: {1: 0.8, 3: 1.2}.get(i, 1.0) if t >= FAULT_S else 1.0)
     assert not turned.run(FAULT_S + 0.5).rotor
+
+
+def test_a_second_joint_that_fails_is_named_beside_the_first() -> None:
+    damage, memory = Damage(), at_start()
+    loops: CascadeMemory = in_hover(AIRFRAME, estimate(0.0, (0.0, 0.0, 0.0), 9.81))
+    said = []
+    for k, kinds in enumerate([(STUCK, SOUND), (STUCK, LIMP), (LIMP, LIMP)]):
+        memory["joint"], memory["joint_for"] = kinds, 0.1
+        now = estimate(5.0 + k, (0.0, 0.0, 0.0), 9.81)
+        damage, _ = WATCHER.see(damage, memory, loops, loops, now, 1)
+        said.append(damage.joint)
+        assert damage.report.joints == damage.health.joints == kinds
+    assert said == [
+        "joint 1 does not move",
+        "joint 1 does not move and joint 2 gives no torque",
+        "joint 1 gives no torque and joint 2 gives no torque",
+    ]
+    assert damage.joint_us == 4_900_000, "when the first one failed"
 
 
 def test_allocation_is_left_alone_where_that_is_asked_for() -> None:
