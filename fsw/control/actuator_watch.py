@@ -233,7 +233,9 @@ def _observe_base(
     lift = airframe.mass * specific_force - (1.0 + s.lasting) * total
     s.lift += share * (lift - s.lift)
     x, y, z = s.torque[0] / arm, s.torque[1] / arm, s.lift
-    if s.failed < 0 and max(abs(x), abs(y)) < LEARNING_BELOW and total > 0.0:
+    # What the ground carries does not last.
+    flies = total > AIRBORNE * airframe.mass * GRAVITY and z <= CONTACT * airframe.mass
+    if flies and s.failed < 0 and max(abs(x), abs(y)) < LEARNING_BELOW:
         s.lasting += dt / LEARNING * lift / total
     forget = min(dt / MEMORY, 1.0)
     products = (x * x, y * y, z * z, x * z, y * z)

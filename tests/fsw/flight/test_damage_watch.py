@@ -14,7 +14,7 @@ from fsw.flight.damage_watch import DamageWatch
 from fsw.flight.state import Damage
 from fsw.model.actuator_health import HEALTHY, LIMP, SOUND, STUCK
 from fsw.model.airframe import AIRFRAME
-from fsw.signals import StateEstimate
+from fsw.signals import ActuatorCommand, StateEstimate
 
 DT = 0.002
 FAULT_S = 1.5
@@ -37,7 +37,11 @@ def estimate(t_s: float, rate: tuple[float, float, float], specific_force: float
 class Motion:
     """Four rotors that are commanded to hover, and what the base does."""
 
-    def __init__(self, given: Given, watcher: DamageWatch = WATCHER) -> None:
+    def __init__(
+        self, given: Given, watcher: DamageWatch = WATCHER, takeoff_s: float = 0.0
+    ) -> None:
+        """For the first ``takeoff_s`` [s] thrust rises from none, and the ground carries."""
+        self.takeoff_s = takeoff_s
         self.given = given
         self.watcher = watcher
         self.damage, self.memory = Damage(), None
@@ -57,20 +61,22 @@ class Motion:
         memory: Watch | None = None
         for k in range(round(seconds / DT)):
             t = k * DT
+            share = min(t / self.takeoff_s, 1.0) if self.takeoff_s else 1.0
+            each, loops = share * EACH, self.loops
+            if share < 1.0:
+                loops = loops.after_sending(ActuatorCommand((each,) * 4, HANGING))
             for i in range(4):
-                thrust[i] += DT / 0.04 * (self.given(t, i) * EACH - thrust[i])
+                thrust[i] += DT / 0.04 * (self.given(t, i) * each - thrust[i])
             rear, left, front, right = thrust
             # The body turns up to 1 rad/s in these tests: products of rates are left out.
             wx += DT * 0.3 * (left - right) / 0.307
             wy += DT * 0.3 * (front - rear) / 0.3
-            felt = sum(thrust) / mass + push(t)
+            felt = (9.81 if share < 1.0 else sum(thrust) / mass) + push(t)
             now = estimate(1.0 + t, (wx, wy, 0.0), felt)
             if doubted(t):
                 memory = paused(memory)
             else:
-                self.damage, memory = self.watcher.see(
-                    self.damage, memory, self.loops, self.loops, now, 1
-                )
+                self.damage, memory = self.watcher.see(self.damage, memory, loops, loops, now, 1)
             self.history.append(self.damage)
             if self.damage.rotor and self.told_s == math.inf:
                 self.told_s = t - FAULT_S
@@ -220,6 +226,16 @@ def test_two_rotors_that_change_together_are_no_single_one() -> None:
     """As a gust that turns the body, or an arm that is pulled: a torque without a lift."""
     turned = Motion(lambda t, i: {1: 0.8, 3: 1.2}.get(i, 1.0) if t >= FAULT_S else 1.0)
     assert not turned.run(FAULT_S + 0.5).rotor
+
+
+@pytest.mark.parametrize("rise_s", [1.0, 3.0])
+def test_after_a_slow_take_off_a_lost_rotor_is_named_as_soon(rise_s: float) -> None:
+    """What the ground carries while thrust rises is no error of the thrust that lasts."""
+    lost_s = rise_s + 1.5
+    motion = Motion(lambda t, i: 0.0 if i == 2 and t >= lost_s else 1.0, takeoff_s=rise_s)
+    motion.run(lost_s + 0.3)
+    assert not motion.history[round(lost_s / DT)].rotor
+    assert motion.damage.rotor.startswith(NAMES[2])
 
 
 def test_a_second_joint_that_fails_is_named_beside_the_first() -> None:
