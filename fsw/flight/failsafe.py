@@ -133,6 +133,7 @@ class FailsafeMemory(NamedTuple):
     pending: Action = Action.NONE  # what follows the hold that gives the pilot time
     due_us: int = 0  # when
     overridden: tuple[Condition, ...] = ()  # whose actions a command of the pilot has put aside
+    joint: str = ""  # which joints have failed, as it was looked at last
 
 
 NOTHING_DONE: Final = FailsafeMemory()
@@ -954,10 +955,12 @@ def respond(context: FailsafeContext, rows: tuple[Failsafe, ...]) -> Response:
             wanted, chosen = action, row
     begun, memory = _begun(context, memory, wanted, chosen)
     waits = memory.pending is not Action.NONE
-    reports = []
+    joint, reports = state.damage.joint, []
     for row in rows:
         acts = row is chosen and begun is not Action.NONE
-        if row.condition in before and not acts:
+        # A second joint that fails is the same condition, and news.
+        anew = row.condition is Condition.JOINT_FAILED and joint != memory.joint
+        if row.condition in before and not (acts or anew):
             continue
         told = wanted if acts else Action.WARN
         told = actions[row.condition] if actions[row.condition].mode is None else told
@@ -969,7 +972,7 @@ def respond(context: FailsafeContext, rows: tuple[Failsafe, ...]) -> Response:
     if vehicle.armed:
         reports += _ended(before, known, now, now_us)
     since = tuple([known.get(condition, now_us) for condition in now])
-    after = memory._replace(since_us=since, overridden=overridden)
+    after = memory._replace(since_us=since, overridden=overridden, joint=joint)
     return Response(after, tuple(reports), begun)
 
 
