@@ -16,7 +16,7 @@ from sitl.disturbances.items import Push, push
 from sitl.drives import Drives
 from sitl.earth import DEFAULT_ORIGIN, Place
 from sitl.faults.active import Faults
-from sitl.faults.keys import Fault, problem
+from sitl.faults.keys import Fault
 from sitl.flight_evaluator import NO_AIM, FlightEvaluator, critical
 from sitl.judged_step import ALL_JUDGED, LIMITS_JUDGED, NOT_JUDGED, judged_step
 from sitl.mission_clock import MissionClock
@@ -31,7 +31,7 @@ from sitl.plant.vector import Array
 from sitl.result import EndKind, EndReason, TruthResult
 from sitl.scenario import V3, Scenario, Sensors
 from sitl.scenario_file import ScenarioError
-from sitl.scenario_validation import check, units_aboard
+from sitl.scenario_validation import check, fault_problem
 from sitl.sensors.exact import V4, ExactSensors, SensorReadings
 from sitl.sensors.keys import MeasuredSensors
 from sitl.sensors.measurements import Measurement
@@ -268,7 +268,7 @@ class Simulation:
 
     def inject(self, fault: Fault) -> str | None:
         """Let a fault begin with the next step; returns why it cannot, None if it can."""
-        refusal = problem(fault, units_aboard(self.scenario))
+        refusal = fault_problem(fault, self.scenario)
         if refusal is None:
             self.faults.inject(fault, self.step + 1)
         return refusal
