@@ -204,6 +204,15 @@ def load_plan(path: Path) -> CampaignPlan:
     Raises:
         CampaignError: It cannot be read, an unknown key, or an impossible value.
     """
+    return load_tables(path, ())[0]
+
+
+def load_tables(path: Path, own: tuple[str, ...]) -> tuple[CampaignPlan, dict[str, Any]]:
+    """Read a campaign file that has tables of its reader's ``own`` beside the campaign.
+
+    Raises:
+        CampaignError: As of ``load_plan``.
+    """
     try:
         content = path.read_bytes()[: _MOST_BYTES + 1]
     except OSError as error:
@@ -211,11 +220,11 @@ def load_plan(path: Path) -> CampaignPlan:
     if len(content) > _MOST_BYTES:
         raise CampaignError(f"campaign {path} is too long: must be at most {_MOST_BYTES} bytes")
     try:
-        text = content.decode("utf-8")
+        table = _table(content.decode("utf-8"))
+        found = {key: table.pop(key) for key in own if key in table}
+        return plan_of(table, path.stem, path.parent), found
     except UnicodeDecodeError:
         raise CampaignError(f"campaign {path} is not TOML: it is not UTF-8") from None
-    try:
-        return parse_plan(text, path.stem, path.parent)
     except CampaignError as error:
         raise CampaignError(f"{path}: {error}") from None
 
@@ -226,17 +235,28 @@ def parse_plan(text: str, name: str, folder: Path) -> CampaignPlan:
     Raises:
         CampaignError: Not TOML, an unknown key, or an impossible value.
     """
+    return plan_of(_table(text), name, folder)
+
+
+def plan_of(table: dict[str, Any], name: str, folder: Path) -> CampaignPlan:
+    """The plan that a table describes, as of ``parse_plan``."""
     try:
-        table = tomllib.loads(text)
         vary, parameters, faults = (table.pop(key, {}) for key in ("vary", PARAMETERS, "faults"))
         keys: _Keys = build_table(_Keys, table, "")
         return _plan(keys, name, folder, vary, parameters, faults or [])
-    except tomllib.TOMLDecodeError as error:
-        raise CampaignError(f"not TOML: {error}") from None
     except RecursionError:
         raise CampaignError("nested too deeply") from None
     except ScenarioError as error:
         raise CampaignError(str(error)) from None
+
+
+def _table(text: str) -> dict[str, Any]:
+    try:
+        return tomllib.loads(text)
+    except ValueError as error:  # TOMLDecodeError, or an integer of thousands of digits
+        raise CampaignError(f"not TOML: {error}") from None
+    except RecursionError:
+        raise CampaignError("nested too deeply") from None
 
 
 def _plan(
