@@ -18,6 +18,7 @@ BENCHMARKS: Final = {
     "flood": "a flight in real time under 5000 useless datagrams a second",
     "soak": "an hour in real time with failures and a busy client",
     "download": "how fast a flight log comes over the link during a flight",
+    "scheduler": "what a campaign's scheduler costs a task, and what more cores would do",
     "plant": "one step of the simulator's plant",
     "estimator": "a tick with real sensors beside one with exact states",
 }

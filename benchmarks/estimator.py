@@ -47,7 +47,7 @@ class _Flight:
     def step(self) -> None:
         """One tick."""
         loop, step = self._loop, self._loop.simulation.step
-        sensors, samples = loop.sense(), loop.samples()
+        sensors, samples = loop.observe()
         self.samples.append(samples)
         loop.step(
             TickInputs(

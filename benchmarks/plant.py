@@ -9,7 +9,7 @@ import numpy as np
 
 from command_line.parser import Parser
 from sitl.plant.aerial_manipulator import Inputs, plant
-from sitl.plant.integrator import STEP_S, integrate
+from sitl.plant.integrator import STEP_S, held, integrate
 from sitl.plant.parameters import Vehicle
 from sitl.plant.state import ARM, P_WB, THRUST, W_WB_B, at_rest
 from sitl.scenario_file import load_scenario
@@ -30,12 +30,13 @@ def plant_step_us() -> list[float]:
     inputs = Inputs(np.full(4, 8.6), np.zeros(2), np.zeros(3), np.zeros(3))
     places = np.empty((STEPS, 4, 3))
     states = np.empty((STEPS, len(start)))
-    integrate(numbers, start.copy(), inputs, STEP_S, places, states)
+    blocks = held(2)
+    integrate(numbers, start.copy(), inputs, STEP_S, places, states, blocks)
     out = []
     for _ in range(ROUNDS):
         state = start.copy()
         began = time.perf_counter()
-        integrate(numbers, state, inputs, STEP_S, places, states)
+        integrate(numbers, state, inputs, STEP_S, places, states, blocks)
         out.append(1e6 * (time.perf_counter() - began) / STEPS)
     return out
 

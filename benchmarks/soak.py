@@ -185,6 +185,9 @@ def judge(flights: list[Soaked]) -> list[Requirement]:
         ),
         Requirement("flights an hour", len(flights) / max(hours, 1.0), _MOST_FLIGHTS, ""),
     ]
+    # What did not live for long enough is not judged, and says nothing.
+    unjudged = sum(f"{name}: memory" not in growth for name in ("fsw", "sitl"))
+    rows.append(Requirement("processes that were not seen for long enough", unjudged, 0, ""))
     for name, value in sorted(growth.items()):
         most, unit = (_MOST_GROWTH_MB_H, "MB/h") if name.endswith("memory") else (0, "")
         rows.append(Requirement(f"{name}, growth", value, most, unit))

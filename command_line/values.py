@@ -68,6 +68,13 @@ def output_file(text: str) -> str:
     return text
 
 
+def existing_file(text: str) -> Path:
+    """A file that is there."""
+    if not Path(text).is_file():
+        raise ArgumentTypeError(f"there is no file {text}")
+    return Path(text)
+
+
 def _float(text: str) -> float:
     try:
         return float(text)

@@ -28,6 +28,18 @@ VERBS: Final[dict[str, tuple[str, str]]] = {
         "pandion.falsify",
         "search for the disturbance that pushes the vehicle furthest off its plan",
     ),
+    "certify": (
+        "pandion.certify",
+        "state what a campaign shows: exact bounds, margins, what was varied; or verify it",
+    ),
+    "splitting": (
+        "pandion.splitting",
+        "estimate how rare a small margin is, where plain flights never show one",
+    ),
+    "tune": (
+        "pandion.tune",
+        "improve parameters against a cost and a chance constraint, judged on other flights",
+    ),
     "faults": (
         "pandion.faults",
         "let something fail in flight, in one mode or in all, and compare with what must happen",

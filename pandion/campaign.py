@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from command_line.options import group, json_file, option, read, switch
-from command_line.output import complain, console_beside, json_text, say, unwritten
+from command_line.output import complain, console_beside, json_text, say, typed, unwritten
 from command_line.parser import COULD_NOT_START
 from command_line.values import whole
 from command_line.version import version
@@ -74,7 +74,7 @@ def main(argv: list[str]) -> int:
 
 def _fly(options: CampaignOptions, file: Path, plan: CampaignPlan) -> int:
     from studies.campaign import SchedulerGoneError
-    from studies.campaign_store import begin
+    from studies.campaign_store import JOURNAL, begin
 
     asked = options.flights or plan.count
     plan.check(asked)
@@ -89,10 +89,12 @@ def _fly(options: CampaignOptions, file: Path, plan: CampaignPlan) -> int:
         with display.progress():
             _all(options, plan, asked, folder, display)
     except KeyboardInterrupt:
-        command = f"pandion campaign {file} --out {folder}"
+        command = f"{typed()} campaign {file} --out {folder}"
         complain("pandion campaign", f"interrupted; what was flown is kept, go on with: {command}")
         return BROKEN
     except SchedulerGoneError as error:
+        if not (folder / JOURNAL).stat().st_size:
+            raise
         complain("pandion campaign", f"{error}; what was flown is in {folder}")
         return BROKEN
     return _written(options, folder, display)
@@ -139,7 +141,7 @@ def _written(options: CampaignOptions, folder: Path, display: Display) -> int:
         display.say("no rows.parquet: install pandion[parquet] for it; the journal has the rows")
     for one in cases:
         least = one.margin_m.get("0")
-        margin = "" if least is None else f", least margin {1e3 * least:+.1f} mm"
+        margin = "" if least is None else f", minimum margin {1e3 * least:+.1f} mm"
         name = ", ".join(x for x in (one.scenario, one.suite, one.controller, one.fault) if x)
         refused = f", {one.refused} refused by the vehicle" if one.refused else ""
         broke = f", {one.errors} broke" if one.errors else ""
@@ -199,7 +201,7 @@ def _again(options: CampaignOptions, plan: CampaignPlan) -> int:
 
 def _fly_words(controller: str, job: Job, scenario: Path, params: Path) -> str:
     """The command that flies the same over the link: equal but for what the link rounds."""
-    words = ["pandion fly", str(scenario), f"--seed={job.seed}", f"--params={params}"]
+    words = [typed(), "fly", str(scenario), f"--seed={job.seed}", f"--params={params}"]
     if controller != "blf":
         words.append(f"--controller={controller}")
     if job.config.inner == "pid":

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from command_line.options import OneOf, option
-from command_line.values import whole
+from command_line.values import existing_file, whole
 
 if TYPE_CHECKING:
     from studies.campaign import Campaign, ProgressReport
@@ -36,12 +36,12 @@ class ClusterOptions:
     scheduler_file: Path | None = option(
         "--scheduler-file FILE",
         "fly on the workers of the Dask scheduler that wrote this file",
-        Path,
+        existing_file,
         one_of=_WHERE,
     )
-    tls_ca_file: Path | None = option("--tls-ca-file FILE", "CA of the scheduler, PEM", Path)
-    tls_cert: Path | None = option("--tls-cert FILE", "own certificate for TLS, PEM", Path)
-    tls_key: Path | None = option("--tls-key FILE", "its key, PEM", Path)
+    tls_ca_file: Path | None = option("--tls-ca-file FILE", "the CA for TLS, PEM", existing_file)
+    tls_cert: Path | None = option("--tls-cert FILE", "own certificate for TLS, PEM", existing_file)
+    tls_key: Path | None = option("--tls-key FILE", "its key, PEM", existing_file)
 
     @property
     def words(self) -> str:

@@ -8,12 +8,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from command_line.options import json_file, option, read
+from command_line.options import group, json_file, option, read
 from command_line.output import complain, console_beside, json_text, write_text
 from command_line.parser import COULD_NOT_START
 from command_line.values import number, whole
 from command_line.version import version
 from fsw.log.run_directory import new_run_directory
+from pandion.cluster_options import ClusterOptions
 from pandion.display import Display
 
 if TYPE_CHECKING:
@@ -33,7 +34,7 @@ class FalsifyOptions:
     scenario: str = option("SCENARIO", "name or path of a .toml file", default="walls")
     evaluations: int = option(
         "--evaluations N",
-        "stretches of 5 s to fly, a tenth of them with the whole stack",
+        "stretches of 5 s to fly, a tenth of them with the whole stack; with --over whole flights",
         whole(1, 1_000_000),
         default=2000,
     )
@@ -44,12 +45,20 @@ class FalsifyOptions:
         number(0.001, 50.0, "m/s^2"),
         default=0.8,
     )
+    over: Path | None = option(
+        "--over FILE.toml",
+        "search for the smallest margin over what a campaign file varies, in whole flights and not "
+        "along a recorded plan",
+        Path,
+    )
+    keep: int = option("--keep N", "with --over: how many finds to keep", whole(1, 1000), default=5)
+    cluster: ClusterOptions = group(ClusterOptions)
     replay: Path | None = option(
         "--replay FILE", "fly a worst.json of an earlier search with planner and referee", Path
     )
     json: str | None = json_file("the result")
     out: Path | None = option(
-        "--out DIR", "where worst.json goes (default a new directory in runs/)", Path
+        "--out DIR", "where what was found goes (default a new directory in runs/)", Path
     )
 
 
@@ -64,6 +73,10 @@ def main(argv: list[str]) -> int:
     from fsw.runtime.process import pin_numerics_to_one_thread
 
     pin_numerics_to_one_thread()  # before NumPy loads
+    if options.over is not None:
+        from pandion.falsify_over import main as search_over
+
+        return search_over(options, options.over)
     from sitl.scenario_file import ScenarioError, load_scenario
     from studies.closed_loop import RefusedError
 
@@ -93,7 +106,8 @@ def _config(scenario: Scenario) -> FlightConfig:
 
 
 def _search(options: FalsifyOptions, scenario: Scenario) -> int:
-    from studies.falsify import search_and_fly
+    from sitl.scenario_text import scenario_text
+    from studies.falsify import as_scenario, search_and_fly
 
     console = console_beside(options.json)
     display = Display(console)
@@ -116,9 +130,13 @@ def _search(options: FalsifyOptions, scenario: Scenario) -> int:
         )
     kept = folder / "worst.json"
     kept.write_text(json_text(_as_file(scenario, outcome.worst)), encoding="utf-8")
+    flown = folder / "worst.toml"
+    comment = f"found by pandion falsify {options.scenario}: {_found(outcome.worst)}"
+    flown.write_text(scenario_text(as_scenario(scenario, outcome.worst), comment), encoding="utf-8")
     for sentence in _sentences(outcome, options.amplitude) + _of_whole_stack(whole_stack):
         display.say(sentence)
     display.say(f"worst disturbance {kept}; pandion falsify {options.scenario} --replay {kept}")
+    display.say(f"as a scenario {flown}; pandion fly {flown}")
     write_text(options.json, json_text(_as_json(options, outcome, whole_stack), 2) + "\n")
     return HOLDS if outcome.holds and whole_stack.holds else BROKEN
 

@@ -48,7 +48,9 @@ class FlyOptions(RunOptions):
     links: LinkChoice = group(LinkChoice)
     out: Path | None = declared(OUT)
     json: str | None = json_file("the result")
-    view: bool = switch("--view", "show the flight live in the browser")
+    view: bool = switch(
+        "--view", "show the flight live in the browser; at speed 1 if none is given"
+    )
     report: bool = switch("--report", "write the flight's report.html beside its log")
 
 
@@ -103,6 +105,9 @@ def planned(options: FlyOptions) -> PlannedFlight:
     addresses(options.links)
     if options.realtime and options.speed not in (None, 1.0):
         raise ScenarioError("--realtime flies at speed 1; --speed needs --lockstep")
+    if options.view and not options.realtime and options.speed is None:
+        # Faster than anyone can look; and a station's heartbeats would come too seldom.
+        options = replace(options, speed=1.0)
     return PlannedFlight(
         options=options,
         name=scenario.name,

@@ -86,13 +86,12 @@ def _show_live(options: ViewOptions) -> int:
     from view.page import LOCAL, PageError, address, open_server
 
     try:
-        vehicle = parse_address(options.vehicle)
+        commands = options.host in LOCAL or options.allow_commands
+        link = VehicleLink(parse_address(options.vehicle), commands=commands)
         server = open_server(options.host, options.port, f"vehicle at {options.vehicle}")
     except (LinkError, PageError) as error:
         complain("pandion view", error)
         return COULD_NOT_START
-    commands = options.host in LOCAL or options.allow_commands
-    link = VehicleLink(vehicle, commands=commands)
     link.start()
     page = LivePage(server, link)
     can = "" if commands else ", read only"

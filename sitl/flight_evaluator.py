@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from sitl.body import BASE, END_EFFECTOR, JOINT2, Parts
-from sitl.compiled import machine_code
+from sitl.body import BASE, END_EFFECTOR, JOINT2
+from sitl.judged_step import Judge
 from sitl.limits import LimitRecord
 from sitl.mission_clock import MissionClock
 from sitl.plant.vector import Array
@@ -16,12 +16,12 @@ from sitl.result import EndKind, EndReason, MarginRecord, TrackingError, TruthRe
 from sitl.scenario import V3, Scenario
 from sitl.scenario_validation import check_start
 from sitl.start import flown_vehicle
-from sitl.world import World, ZoneTable, record_if_clear
+from sitl.world import World, headroom
 
 TOUCH_DOWN_MAX = 2.0  # m/s; a drop from 0.2 m
 Points = tuple[V3, V3, V3]  # base, joint 2, end-effector [m, NED]
 
-_NO_CURVE = np.empty(0)
+NO_AIM = (np.empty(0), 0.0)
 
 
 class FlightEvaluator:
@@ -48,10 +48,9 @@ class FlightEvaluator:
         self._error = TrackingError()
         self._duration_s = scenario.duration_s
         self._whole = _whole(scenario)
-        # Without steps nothing is recorded: only its machine code is wanted, the cheapest to call.
-        self._record_if_clear = machine_code(
-            record_if_clear, *self._recorded((_NO_CURVE, 0.0), places[None][:0], (0.0, 0.0))
-        )
+        table, parts = self.world.table, self.world.parts
+        room = headroom(table, len(self.world.keys), len(places))
+        self.quick = Judge(table, parts, *self.record.arrays, room, *self.limits.arrays)
         margins = self.margins(places, 0.0)
         check_start(self.world.keys, margins)
         self.record.add(margins, 0.0)
@@ -81,42 +80,24 @@ class FlightEvaluator:
         if touched is not None:
             self.end(EndKind.COLLISION, f"{touched} at {time_s:.2f} s", time_s)
 
-    def judge_all(self, places: Array, before_s: float, step_s: float) -> None:
-        """Look at every plant step, ``step_s`` long, of an exchange that began at ``before_s``.
+    def aim(self, until_s: float) -> tuple[Array, float] | None:
+        """What ``record_if_clear`` aims at up to ``until_s``; None if it cannot judge till then."""
+        if self.ended is not None:
+            return None
+        if not self.world.follows:
+            return NO_AIM
+        clock = self._clock
+        if clock.starts_s is None or not clock.counts(until_s):
+            return None
+        return clock.curve, clock.starts_s
+
+    def judge_each(self, places: Array, before_s: float, step_s: float) -> None:
+        """Judge the plant steps, ``step_s`` long, of an exchange that began at ``before_s``.
 
         ``places`` (steps, rows, 3) [m, NED] are from ``sitl.plant.integrator.integrate``.
         """
-        if self.ended is None and self._all_clear(places, before_s, step_s):
-            return
         for k, now in enumerate(places, start=1):
             self.judge(now, before_s + k * step_s, step_s)
-
-    def _all_clear(self, places: Array, before_s: float, step_s: float) -> bool:
-        """Record the margins of steps without any incident; False, and nothing done, otherwise."""
-        curve, starts_s = _NO_CURVE, 0.0
-        if self.world.follows:
-            clock, last_s = self._clock, before_s + len(places) * step_s
-            if clock.starts_s is None or not clock.counts(last_s):
-                return False
-            curve, starts_s = clock.curve, clock.starts_s
-        how = self._recorded((curve, starts_s), places, (before_s, step_s))
-        return self._record_if_clear(*how)
-
-    def _recorded(
-        self, aim: tuple[Array, float], places: Array, instants: tuple[float, float]
-    ) -> tuple[ZoneTable, Parts, tuple[Array, float], Array, tuple[float, float], Array, Array]:
-        """Arguments of ``record_if_clear``."""
-        return (self.world.table, self.world.parts, aim, places, instants, *self.record.arrays)
-
-    def judge_limits(
-        self, states: Array, sent: tuple[float, float], before_s: float, step_s: float
-    ) -> None:
-        """Take the plant steps of an exchange, ``states`` (steps, 17 + 2j) [SI], into the limits.
-
-        ``sent`` are the largest torque [N·m] and thrust [N] commanded.
-        """
-        if self.ended is None:
-            self.limits.add(states, sent, before_s, step_s)
 
     def judge_landing(self, speed: float, time_s: float) -> None:
         """Evaluate the landing speed [m/s] of the fastest foot on the ground."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -65,6 +66,15 @@ def limits(vehicle: Vehicle) -> tuple[Limit, ...]:
     )
 
 
+class Use(NamedTuple):
+    """A record for kernels, an entry a limit."""
+
+    largest: Array  # (limits,) magnitudes in the unit of each
+    when_s: Array  # (limits,) s, when that was
+    beyond_s: Array  # (limits,) s, spent beyond the limit
+    steps: Array  # (1,) how many have been recorded
+
+
 class LimitRecord:
     """The largest use of every limit, when it was, and how long each was exceeded."""
 
@@ -74,29 +84,16 @@ class LimitRecord:
         self._largest = np.zeros(len(self.limits))
         self._when_s = np.zeros(len(self.limits))
         self._beyond_s = np.zeros(len(self.limits))
-        self._seen = False
+        self._steps = np.zeros(1)
 
-    def add(self, states: Array, sent: tuple[float, float], before_s: float, step_s: float) -> None:
-        """Take the plant's steps of one exchange.
-
-        Args:
-            states: (steps, 17 + 2j) [SI], see ``sitl.plant.state``.
-            sent: Largest magnitudes commanded during them, torque [N·m] and thrust [N].
-            before_s: Time one step before the first [s].
-            step_s: Between two steps [s].
-        """
-        self._seen = True
-        record_use(
-            states,
-            sent,
-            self._most,
-            (before_s, step_s),
-            (self._largest, self._when_s, self._beyond_s),
-        )
+    @property
+    def arrays(self) -> tuple[Array, Use]:
+        """The limits and the memory behind the record, for ``record_use``."""
+        return self._most, Use(self._largest, self._when_s, self._beyond_s, self._steps)
 
     def uses(self) -> dict[str, LimitUse]:
         """By the limit's key; empty before the first step."""
-        if not self._seen:
+        if not self._steps[0]:
             return {}
         return {
             limit.key: LimitUse(
@@ -133,7 +130,7 @@ def record_use(
     sent: tuple[float, float],
     most: Array,
     instants: tuple[float, float],
-    record: tuple[Array, Array, Array],
+    record: Use,
 ) -> None:
     """Take plant steps into a record.
 
@@ -142,9 +139,10 @@ def record_use(
         sent: Largest magnitudes commanded during them, torque [N·m] and thrust [N].
         most: (limits,) [unit of each], the limits.
         instants: Time one step before the first, and between two steps [s].
-        record: Largest magnitudes (limits,) [unit of each], when, and time beyond [s]; overwritten.
+        record: Overwritten.
     """
-    largest, when_s, beyond_s = record
+    largest, when_s, beyond_s = record.largest, record.when_s, record.beyond_s
+    record.steps[0] += states.shape[0]
     before_s, step_s = instants
     used = np.empty(most.shape[0])
     for k in range(states.shape[0]):

@@ -60,7 +60,7 @@ def _word(value: Any) -> str:
         return "true" if value else "false"
     if isinstance(value, str):
         # DEL is the one character that JSON writes as it is and TOML does not allow.
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+        return json.dumps(value, ensure_ascii=False, allow_nan=False).replace("\x7f", "\\u007f")
     if isinstance(value, tuple):
         if value and isinstance(value[0], tuple):
             return "[\n" + "".join(f"  {_word(one)},\n" for one in value) + "]"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 
-from sitl.faults.keys import EXACT, problem
+from sitl.faults.keys import EXACT, Fault, problem
 from sitl.limits import BOTH_JOINTS_DEG, FIRST_JOINT_DEG
 from sitl.scenario import ActuatorKeys, Lissajous, Scenario, Start
 from sitl.scenario_file import ScenarioError
@@ -123,9 +123,15 @@ def _check_names(scenario: Scenario) -> None:
 
 def _check_faults(scenario: Scenario) -> None:
     for i, fault in enumerate(scenario.faults):
-        found = problem(fault, units_aboard(scenario))
+        found = fault_problem(fault, scenario)
         if found is not None:
             raise ScenarioError(f"faults[{i}].{found}")
+
+
+def fault_problem(fault: Fault, scenario: Scenario) -> str | None:
+    """Why a fault cannot be flown in a scenario; None if it can."""
+    exact = not isinstance(scenario.sensors, MeasuredSensors)
+    return problem(fault, units_aboard(scenario), exact=exact)
 
 
 def units_aboard(scenario: Scenario) -> tuple[str, ...]:

@@ -6,7 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
@@ -16,12 +16,13 @@ from sitl.disturbances.items import Push, push
 from sitl.drives import Drives
 from sitl.earth import DEFAULT_ORIGIN, Place
 from sitl.faults.active import Faults
-from sitl.faults.keys import Fault, problem
-from sitl.flight_evaluator import FlightEvaluator, critical
+from sitl.faults.keys import Fault
+from sitl.flight_evaluator import NO_AIM, FlightEvaluator, critical
+from sitl.judged_step import ALL_JUDGED, LIMITS_JUDGED, NOT_JUDGED, judged_step
 from sitl.mission_clock import MissionClock
 from sitl.plant.aerial_manipulator import Plant, plant
 from sitl.plant.battery import open_circuit
-from sitl.plant.integrator import STEP_S, step
+from sitl.plant.integrator import STEP_S, held
 from sitl.plant.kinematics import places as places_into
 from sitl.plant.lock import seize
 from sitl.plant.parameters import Vehicle
@@ -30,7 +31,7 @@ from sitl.plant.vector import Array
 from sitl.result import EndKind, EndReason, TruthResult
 from sitl.scenario import V3, Scenario, Sensors
 from sitl.scenario_file import ScenarioError
-from sitl.scenario_validation import check, units_aboard
+from sitl.scenario_validation import check, fault_problem
 from sitl.sensors.exact import V4, ExactSensors, SensorReadings
 from sitl.sensors.keys import MeasuredSensors
 from sitl.sensors.measurements import Measurement
@@ -45,6 +46,7 @@ SETTLED_KEPT = 20  # of these, whose measurements the flight software still gets
 SETTLED_NEWEST = 2  # of each sensor, however long ago they came
 SUBSTEPS = 2  # plant steps per exchange
 BATTERY_STEPS = 50  # between two readings of the battery
+_NONE: V3 = (0.0, 0.0, 0.0)
 SAMPLE_STEPS = 50  # tracking error at 10 Hz, as the paper's TE
 
 
@@ -103,6 +105,8 @@ class Simulation:
         self._exact_sensors, self._suite = _sensors(scenario, self.vehicle, seed, origin)
         self._pushes = [push(item, seed, 1e-6 * STEP_US) for item in scenario.disturbances]
         self._pushes += more
+        self._pushed: tuple[V3, V3] = (_NONE, _NONE)  # N, NED; N·m, B
+        self._pushed_until = 0.0  # step
         self._state, trim = first_state(self.vehicle, scenario, self.clock.target_at(0.0).p)
         self._thrust, self._torque = trim.thrust, trim.torque
         step_s = 1e-6 * STEP_US
@@ -131,21 +135,26 @@ class Simulation:
         axes = 3 if scenario.body == "full" else 0
         self._places = np.empty((SUBSTEPS, 2 + len(self.vehicle.links) + axes, 3))
         self._states = np.empty((SUBSTEPS, len(self._state)))
-        still = (0.0, 0.0, 0.0)
-        # No steps: only what the accelerometer feels at the start.
-        none = (self._places[:0], self._states[:0])
-        example = (self._thrust, self._torque, still, still, STEP_S, *none)
-        self._step = machine_code(step, self._plants, self._state, *example)
-        self._felt = self._step(self._plants, self._state, *example).felt
         self._reading: SensorReadings | None = None
         self._said: tuple[int, SensorReadings] | None = None
         self._measured: tuple[int, tuple[Measurement, ...]] = (-1, ())
         self._evaluator = FlightEvaluator(scenario, self.clock, self._places_now())
+        self._held = held(len(self.vehicle.links))
+        # No steps: only what the accelerometer feels at the start.
+        example = self._arguments(self._places[:0], self._states[:0], None)
+        self._step = machine_code(judged_step, *example)
+        _, self._felt, _ = self._step(*example)
 
     @property
     def t_us(self) -> int:
         """Time stamp of the current state [µs]."""
         return START_US + STEP_US * self.step
+
+    @property
+    def vehicle_time_us(self) -> int:
+        """Time stamp of the current state by the vehicle's clock, which may fail [µs]."""
+        self.faults.at(self.step)
+        return self.t_us + self.faults.clock_us
 
     @property
     def time_s(self) -> float:
@@ -259,7 +268,7 @@ class Simulation:
 
     def inject(self, fault: Fault) -> str | None:
         """Let a fault begin with the next step; returns why it cannot, None if it can."""
-        refusal = problem(fault, units_aboard(self.scenario))
+        refusal = fault_problem(fault, self.scenario)
         if refusal is None:
             self.faults.inject(fault, self.step + 1)
         return refusal
@@ -274,25 +283,25 @@ class Simulation:
         fails = self.faults.at(self.step)
         if self._drives is not None:
             self._drive(self._drives)
-        if fails or any(self._locked):
+        if fails or True in self._locked:
             self._fail()
         if self._wind is not None:
             field, moving = self._wind
             moving[0], moving[1], moving[2] = field.step()
-        arrival = self._step(
-            self._plants,
-            self._state,
-            self._thrust,
-            self._torque,
-            *self._disturbance(),
-            STEP_S,
-            self._places,
-            self._states,
-        )
-        self._felt = arrival.felt
-        before = self.time_s
+        if self.step >= self._pushed_until:
+            self._push()
+        evaluator, before_s = self._evaluator, self.time_s
+        aim = evaluator.aim(before_s + SUBSTEPS * STEP_S)
+        arguments = self._arguments(self._places, self._states, aim)
+        speed, self._felt, clear = self._step(*arguments)
         self.step += 1
-        self._judge(before, arrival.landing_speed)
+        if not clear:
+            evaluator.judge_each(self._places, before_s, STEP_S)
+        time_s = self.time_s
+        if self.step % SAMPLE_STEPS == 0:
+            evaluator.sample_error(critical(self._places[-1]), time_s)
+        evaluator.judge_landing(speed, time_s)
+        evaluator.judge_time(time_s)
 
     def truth(self) -> Truth:
         """The true state now."""
@@ -325,17 +334,18 @@ class Simulation:
         x: list[float] = self._state.tolist()
         w = (x[W_WB_B], x[W_WB_B + 1], x[W_WB_B + 2])
         rates = ARM + len(self._torque)
+        # By position: keywords would take as long again.
         return SensorReadings(
             self.t_us,
-            p_WB=(x[P_WB], x[P_WB + 1], x[P_WB + 2]),
-            v_WB=(x[V_WB], x[V_WB + 1], x[V_WB + 2]),
-            q_WB=(x[Q_WB], x[Q_WB + 1], x[Q_WB + 2], x[Q_WB + 3]),
-            w_WB_B=w,
-            gyro_B=w,
-            accel_B=self._felt,
-            q_arm=tuple(x[ARM:rates]),
-            qd_arm=tuple(x[rates:]),
-            tau_arm=self._torque,
+            (x[P_WB], x[P_WB + 1], x[P_WB + 2]),
+            (x[V_WB], x[V_WB + 1], x[V_WB + 2]),
+            (x[Q_WB], x[Q_WB + 1], x[Q_WB + 2], x[Q_WB + 3]),
+            w,  # w_WB_B
+            w,  # gyro_B
+            self._felt,  # accel_B
+            tuple(x[ARM:rates]),
+            tuple(x[rates:]),
+            self._torque,
         )
 
     def _command(self, controls: Controls) -> None:
@@ -347,7 +357,8 @@ class Simulation:
             raise ValueError(f"{controls} at step {self.step}: every control must be finite")
         thrust = self.vehicle.rotors.thrust_max if armed else 0.0
         torque = self.vehicle.joints.torque_max if armed else 0.0
-        least, most, twist = min(wanted), max(wanted), max(map(abs, torques))
+        least, most = min(wanted), max(wanted)
+        twist = max(max(torques), -min(torques))
         # A thrust below zero is as far beyond its range as one that is as much too large.
         self._sent = (torque * twist, thrust * (most if least >= 0.0 else max(most, 1.0 - least)))
         if least < 0.0 or most > 1.0 or twist > 1.0:
@@ -376,26 +387,40 @@ class Simulation:
             if any(newly):
                 seize(self.vehicle, self._state, newly)
 
-    def _disturbance(self) -> tuple[V3, V3]:
-        """Force on the base [N, W] and torque [N·m, B] during this step."""
+    def _arguments(
+        self, places: Array, states: Array, aim: tuple[Array, float] | None
+    ) -> tuple[Any, ...]:
+        """Those of ``judged_step`` for this step."""
+        evaluator = self._evaluator
+        judged = ALL_JUDGED if aim is not None else LIMITS_JUDGED
+        return (
+            self._plants,
+            self._held,
+            self._state,
+            self._thrust,
+            self._torque,
+            *self._pushed,
+            places,
+            states,
+            evaluator.quick,
+            self._sent,
+            aim or NO_AIM,
+            (self.time_s, STEP_S),
+            judged if evaluator.ended is None else NOT_JUDGED,
+        )
+
+    def _push(self) -> None:
+        """Force on the base [N, W] and torque [N·m, B], and until when both are held."""
+        step, mass, until = self.step, self._mass, math.inf
         force = torque = (0.0, 0.0, 0.0)
         for item in self._pushes:
-            x, y, z = item.sample(self.step)
+            x, y, z = item.sample(step)
             if item.torque:
                 torque = (torque[0] + x, torque[1] + y, torque[2] + z)
             else:
-                m = self._mass
-                force = (force[0] + m * x, force[1] + m * y, force[2] + m * z)
-        return force, torque
-
-    def _judge(self, before_s: float, landing_speed: float) -> None:
-        """Judge every plant step of the exchange that began at ``before_s``."""
-        self._evaluator.judge_limits(self._states, self._sent, before_s, STEP_S)
-        self._evaluator.judge_all(self._places, before_s, STEP_S)
-        if self.step % SAMPLE_STEPS == 0:
-            self._evaluator.sample_error(critical(self._places[-1]), self.time_s)
-        self._evaluator.judge_landing(landing_speed, self.time_s)
-        self._evaluator.judge_time(self.time_s)
+                force = (force[0] + mass * x, force[1] + mass * y, force[2] + mass * z)
+            until = min(until, item.held_until(step))
+        self._pushed, self._pushed_until = (force, torque), until
 
     def _places_now(self) -> Array:
         out = np.empty((1, *self._places.shape[1:]))

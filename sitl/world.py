@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sitl.body import (
+    AXES,
     BALL,
     BASE,
     CRITICAL_POINTS,
@@ -22,10 +23,10 @@ from sitl.body import (
     parts_of,
     spoken,
 )
-from sitl.compiled import compiled
+from sitl.compiled import compiled, kernel
 from sitl.distance import nearest, part_bound, part_distance
 from sitl.plant.parameters import Vehicle
-from sitl.plant.vector import V3, Array
+from sitl.plant.vector import V3, Array, dot, put_row, row, sub
 from sitl.scenario import Scenario
 from sitl.shapes import KINDS
 from sitl.shapes.kind import NUMBERS
@@ -33,6 +34,9 @@ from sitl.trajectory import place_on_curve
 from sitl.zones import Zone, zones_of
 
 _NOWHERE = (math.nan, math.nan, math.nan)
+_ROUNDING = 1e-5  # m; distances are searched to 1e-6
+_WORTH = 0.01  # m; where a bound leaves less to travel, the distance itself is worked out
+_FAR = 1e9  # m
 
 
 class ZoneTable(NamedTuple):
@@ -85,8 +89,8 @@ class World:
         for (zone, part), margin in zip(self._kept, margins, strict=True):
             if not zone.table.keep_in and not (margin + zone.table.clearance_m > 0.0):
                 return f"{spoken(part)} hit the {zone.table.name}{zone.kind.noun}"
-        for name, row in zip(CRITICAL_POINTS, (BASE, JOINT2, END_EFFECTOR), strict=True):
-            if not (places[row, 2] < 0.0):
+        for name, k in zip(CRITICAL_POINTS, (BASE, JOINT2, END_EFFECTOR), strict=True):
+            if not (places[k, 2] < 0.0):
                 return f"{spoken(name)} hit the ground"
         return None
 
@@ -94,9 +98,9 @@ class World:
 def zone_table(zones: tuple[Zone, ...]) -> ZoneTable:
     """The zones for kernels."""
     numbers = np.zeros((len(zones), NUMBERS))
-    for row, zone in zip(numbers, zones, strict=True):
+    for place, zone in zip(numbers, zones, strict=True):
         begun = zone.table.numbers((0.0, 0.0, 0.0))
-        row[: len(begun)] = begun
+        place[: len(begun)] = begun
     legs = [(leg.begins_s, *leg.moved, *leg.velocity) for zone in zones for leg in zone.legs]
     return ZoneTable(
         kind=np.array([KINDS.index(zone.kind) for zone in zones], dtype=np.int64),
@@ -150,6 +154,24 @@ def _origin_margin(table: ZoneTable, z: int, shift: V3, places: Array) -> float:
     return float((-d if table.keep_in[z] else d) - table.clearance[z])
 
 
+class Headroom(NamedTuple):
+    """How far the vehicle can travel before a margin may be smaller than its record.
+
+    No distance changes by more than the part and the surface travel, so that until then nothing
+    of it has to be worked out. Overwritten by ``record_if_clear``.
+    """
+
+    left: Array  # (margins,) m
+    shift: Array  # (zones, 3) m, NED, by which each zone had moved
+    places: Array  # (rows, 3) m, NED, and 1 the base's axes: where the vehicle was
+
+
+def headroom(table: ZoneTable, margins: int, rows: int) -> Headroom:
+    """Before the first step, with so many ``margins`` and places in ``rows``: none."""
+    nowhere = np.full((len(table.kind), 3), math.nan)
+    return Headroom(np.zeros(margins), nowhere, np.full((rows, 3), math.nan))
+
+
 @compiled
 def record_if_clear(
     table: ZoneTable,
@@ -159,6 +181,7 @@ def record_if_clear(
     instants: tuple[float, float],
     lowest: Array,
     when_s: Array,
+    room: Headroom,
 ) -> bool:
     """``World.margins`` of plant steps without any incident, into the record of the smallest.
 
@@ -169,10 +192,11 @@ def record_if_clear(
         parts: Parts of a World.
         aim: The end-effector's ``curve_row`` and when it begins [s]; an empty row where no zone
             rides on the target.
-        places: (steps, rows, 3) [m, NED], as ``sitl.plant.kinematics.place_into`` has them.
+        places: (steps, rows, 3) [m, NED], as ``sitl.plant.kinematics.places_of_bodies`` has them.
         instants: Time one step before the first, and between two steps [s].
         lowest: (margins,) [m], smallest so far.
         when_s: (margins,) [s], when that was.
+        room: Of the steps so far.
 
     Returns:
         True; or False, with nothing recorded, if any point is not clearly above ground or any part
@@ -186,7 +210,7 @@ def record_if_clear(
         target = (0.0, 0.0, 0.0)
         if curve.shape[0]:
             target = place_on_curve(curve, time_s - starts_s)
-        if not _is_clear(table, parts, places[k], time_s, target, lowest, margins[k]):
+        if not _is_clear(table, parts, places[k], time_s, target, lowest, margins[k], room):
             return False
     for k in range(places.shape[0]):
         for i in range(lowest.shape[0]):
@@ -196,7 +220,7 @@ def record_if_clear(
     return True
 
 
-@compiled
+@kernel
 def _is_clear(
     table: ZoneTable,
     parts: Parts,
@@ -205,51 +229,87 @@ def _is_clear(
     target: V3,
     lowest: Array,
     margins: Array,
+    room: Headroom,
 ) -> bool:
     """Whether one step had no incident; the margins that may be below the lowest go to margins."""
     if not (places[BASE, 2] < 0.0 and places[JOINT2, 2] < 0.0 and places[END_EFFECTOR, 2] < 0.0):
         return False
+    path = travelled(room.places, places, parts.reach)
     i = 0
     for z in range(len(table.kind)):
         shift = moved(table, z, time_s, target)
-        of_origin = _origin_margin(table, z, shift, places)
-        if table.follows[z]:
-            margins[i] = of_origin
+        by = sub(shift, row(room.shift, z))
+        put_row(room.shift, z, shift)
+        away = path + math.sqrt(dot(by, by))
+        for b in range(1 if table.follows[z] else len(parts.form)):
+            room.left[i] -= away
+            if not room.left[i] > 0.0:
+                room.left[i] = _look(table, z, shift, parts, b, places, lowest[i], margins, i)
+                if room.left[i] == -math.inf:
+                    return False
             i += 1
-            if not of_origin > 0.0:
-                return False
-            continue
-        count = len(parts.form)
-        # No part is nearer than the base's origin less its reach.
-        bound = of_origin - parts.reach
-        far = bound > 0.0
-        for b in range(count):
-            far = far and lowest[i + b] <= bound
-        if not far and not _parts_clear(table, z, shift, parts, places, lowest, margins, i):
-            return False
-        i += count
     return True
 
 
-@compiled
-def _parts_clear(
+@kernel
+def travelled(before: Array, places: Array, reach: float) -> float:
+    """No place of any part has moved farther [m] from ``before`` to places, which is kept there.
+
+    Both are (rows, 3) [m, NED], the base's axes [1, NED] below. No part is farther from the base's
+    origin than ``reach`` [m].
+    """
+    most, turn = 0.0, 0.0
+    for r in range(places.shape[0]):
+        by = sub(row(places, r), row(before, r))
+        put_row(before, r, row(places, r))
+        square = dot(by, by)
+        if r >= AXES:
+            turn += square
+        elif not (square <= most):  # written so that what is not a number remains
+            most = square
+    return math.sqrt(most) + reach * math.sqrt(turn)
+
+
+@kernel
+def _look(
     table: ZoneTable,
     z: int,
     shift: V3,
     parts: Parts,
+    b: int,
     places: Array,
-    lowest: Array,
+    lowest: float,
     margins: Array,
-    first: int,
-) -> bool:
-    for b in range(len(parts.form)):
-        how = (table.kind[z], table.numbers[z], table.keep_in[z], shift, parts, b, places)
-        margin = part_bound(*how) - table.clearance[z]
-        if parts.form[b] == BALL:  # whose bound is the distance
-            margins[first + b] = margin
-        elif not (margin > 0.0 and lowest[first + b] <= margin):
-            margin = part_distance(*how) - table.clearance[z]
-            margins[first + b] = margin
-        if not margin > 0.0:
-            return False
-    return True
+    i: int,
+) -> float:
+    """Work out a margin, into entry ``i`` of margins if it may be below its ``lowest`` [m].
+
+    Returns how far all may travel until it may be so again [m]; minus infinity where the part is
+    not within the margin.
+    """
+    if table.follows[z]:
+        margins[i] = _origin_margin(table, z, shift, places)
+        return _left(margins[i], lowest)
+    how = (table.kind[z], table.numbers[z], table.keep_in[z], shift, parts, b, places)
+    lower = part_bound(*how) - table.clearance[z]
+    left = _left(lower, lowest)
+    if parts.form[b] == BALL:  # whose bound is the distance
+        margins[i] = lower
+    elif not left > _WORTH:
+        margin = part_distance(*how) - table.clearance[z]
+        left = _left(margin, lowest)
+        if not (lower > 0.0 and lowest <= lower):
+            margins[i] = margin
+    return left
+
+
+@kernel
+def _left(margin: float, lowest: float) -> float:
+    """How far a part with at least this margin [m] may travel before it can be a record [m].
+
+    Or before there is none left; minus infinity if there is none now.
+    """
+    if not margin > 0.0:
+        return -math.inf
+    # A record that is none yet is far away.
+    return margin - min(max(lowest, 0.0), _FAR) - _ROUNDING

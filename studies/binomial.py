@@ -7,6 +7,7 @@ confidence says; no approximation is in them, and nothing is assumed about what 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import ceil, log, log1p
 
 from scipy.special import betaincinv
 
@@ -48,17 +49,15 @@ def bounds(count: int, total: int, confidence: float) -> Bounds:
 
 
 def upper(count: int, total: int, beyond: float) -> float:
-    """The probability [1] with which ``count`` or fewer of ``total`` come once in 1/``beyond``."""
+    """Probability [1] at which ``count`` or fewer of ``total`` have the share ``beyond`` [1]."""
     return 1.0 if count == total else float(betaincinv(count + 1, total - count, 1.0 - beyond))
 
 
 def lower(count: int, total: int, beyond: float) -> float:
-    """The probability [1] with which ``count`` or more of ``total`` come once in 1/``beyond``."""
+    """Probability [1] at which ``count`` or more of ``total`` have the share ``beyond`` [1]."""
     return 0.0 if count == 0 else float(betaincinv(count, total - count + 1, beyond))
 
 
 def flights_for(probability: float, confidence: float) -> int:
     """How many flights without a violation show a ``probability`` [1] at a ``confidence`` [1]."""
-    from math import ceil, log, log1p
-
     return ceil(log(1.0 - confidence) / log1p(-probability))

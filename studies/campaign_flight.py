@@ -99,10 +99,10 @@ class CampaignFlight:
     def row(self) -> CampaignRow:
         """See :class:`studies.campaign.Flight`."""
         began_s = time.thread_time()
-        flight = self.plan.flight(self.number)
         try:
-            result = fly_job(flight.job)
-            found = score(flight.job, result)
+            planned = self.plan.flight(self.number).job
+            result = fly_job(planned)
+            found = score(planned, result)
         except RefusedError as error:
             return self._row(reason=f"refused: {error}", refused=True)
         except Exception as error:
@@ -125,7 +125,7 @@ class CampaignFlight:
         return CampaignRow(**line)
 
     def _row(self, **more: Any) -> CampaignRow:
-        flight = self.plan.flight(self.number)
+        flight = self.plan.draw(self.number)
         return CampaignRow(
             flight=self.number,
             scenario=flight.case.scenario,

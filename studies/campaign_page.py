@@ -47,7 +47,8 @@ def _facts(result: CampaignResult, sentences: Sequence[str]) -> list[str]:
         f"{len(result.rows)} of {result.asked} flights, {plan.design} design, root seed "
         f"{plan.seed}",
         *sentences,
-        f"digests: plan {digests.plan}, code {digests.code}, packages {digests.packages}",
+        f"digests: plan {digests.plan[:12]}, code {digests.code[:12]}, packages "
+        f"{digests.packages[:12]}; whole in campaign.json",
     ]
 
 
@@ -60,7 +61,7 @@ def _cases(found: Sequence[CaseSummary]) -> str:
         "contacts",
         "refused",
         "broke",
-        "least margin mm",
+        "minimum margin mm",
         "1 %",
         "median",
         "TE m, median",
@@ -83,24 +84,25 @@ def _cases(found: Sequence[CaseSummary]) -> str:
 
 
 def _worst(rows: Sequence[CampaignRow], where: Path) -> str:
-    headers = ("flight", *_CASE, "margin mm", "of", "at s", "TE m", "varied", "again")
+    headers = ("flight", "configuration", "margin mm", "of", "at s", "TE m", "varied")
     lines = [
         (
             str(row.flight),
-            row.scenario,
-            row.suite,
-            row.controller,
-            row.fault or "–",
+            ", ".join(x for x in (row.scenario, row.suite, row.controller, row.fault) if x),
             millimetres(row.margin_m),
             row.margin_of or "–",
             "–" if row.margin_time_s is None else f"{row.margin_time_s:.2f}",
             metres(row.te_m),
             ", ".join(f"{key} {value:.4g}" for key, value in row.values.items()) or "–",
-            again(row, where),
         )
         for row in rows
     ]
-    return table(headers, lines, f"The worst {len(rows)} flights")
+    words = html.escape("\n".join(again(row, where) for row in rows))
+    return (
+        table(headers, lines, f"The worst {len(rows)} flights")
+        + "<p>Each is flown again, with its trace and what shows it in <code>pandion view</code>, "
+        f"by:</p><pre>{words}</pre>"
+    )
 
 
 def again(row: CampaignRow, where: Path) -> str:
@@ -111,7 +113,7 @@ def again(row: CampaignRow, where: Path) -> str:
 def _figures(result: CampaignResult) -> list[str]:
     flown = [row for row in result.rows if not row.error]
     return [
-        _figure(_distributions(flown, result), "Least margin [mm] and tracking error TE [m]"),
+        _figure(_distributions(flown, result), "Minimum margin [mm] and tracking error TE [m]"),
         *_maps(flown, result),
     ]
 
@@ -159,7 +161,7 @@ def _maps(rows: Sequence[CampaignRow], result: CampaignResult) -> list[str]:
         ax.set_ylabel("margin mm", fontsize=8)
     for ax in axes[len(keys) :]:
         ax.set_visible(False)
-    caption = f"Least margin over what varied; {len(bad)} violations in red"
+    caption = f"Minimum margin over what varied; {len(bad)} violations in red"
     return [_figure(drawn.svg(), caption), *_failures(rows, result, keys)]
 
 

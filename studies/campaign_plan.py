@@ -107,13 +107,19 @@ class Varied:
 
 
 @dataclass(frozen=True, slots=True)
-class PlannedFlight:
-    """What flight ``number`` consists of."""
+class Drawn:
+    """What distinguishes flight ``number`` from others."""
 
     number: int
     case: Case
     values: Values
     seed: int
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedFlight(Drawn):
+    """What flight ``number`` consists of."""
+
     job: Job
 
 
@@ -155,13 +161,22 @@ class CampaignPlan:
             )
 
     def flight(self, number: int) -> PlannedFlight:
-        """Flight ``number``, from 0; the same whatever else is flown."""
+        """Flight ``number``, from 0; the same whatever else is flown.
+
+        Raises:
+            ValueError: Its values contradict each other.
+        """
+        one = self.draw(number)
+        flown = applied(self.bases[number % len(self.cases)], one.values)
+        check(flown.scenario)
+        job = Job("full", flown.scenario, flown.config, one.seed)
+        return PlannedFlight(number, one.case, one.values, one.seed, job)
+
+    def draw(self, number: int) -> Drawn:
+        """Case, values and seed of flight ``number``."""
         place, case = divmod(number, len(self.cases))
         values = self._values(number, case, place)
-        seed = seed_of(self.seed, number)
-        flown = applied(self.bases[case], values)
-        job = Job("full", flown.scenario, flown.config, seed)
-        return PlannedFlight(number, self.cases[case], values, seed, job)
+        return Drawn(number, self.cases[case], values, seed_of(self.seed, number))
 
     def _values(self, number: int, case: int, place: int) -> Values:
         kinds = tuple(one.distribution for one in self.varied)
@@ -189,6 +204,15 @@ def load_plan(path: Path) -> CampaignPlan:
     Raises:
         CampaignError: It cannot be read, an unknown key, or an impossible value.
     """
+    return load_tables(path, ())[0]
+
+
+def load_tables(path: Path, own: tuple[str, ...]) -> tuple[CampaignPlan, dict[str, Any]]:
+    """Read a campaign file that has tables of its reader's ``own`` beside the campaign.
+
+    Raises:
+        CampaignError: As of ``load_plan``.
+    """
     try:
         content = path.read_bytes()[: _MOST_BYTES + 1]
     except OSError as error:
@@ -196,11 +220,11 @@ def load_plan(path: Path) -> CampaignPlan:
     if len(content) > _MOST_BYTES:
         raise CampaignError(f"campaign {path} is too long: must be at most {_MOST_BYTES} bytes")
     try:
-        text = content.decode("utf-8")
+        table = _table(content.decode("utf-8"))
+        found = {key: table.pop(key) for key in own if key in table}
+        return plan_of(table, path.stem, path.parent), found
     except UnicodeDecodeError:
         raise CampaignError(f"campaign {path} is not TOML: it is not UTF-8") from None
-    try:
-        return parse_plan(text, path.stem, path.parent)
     except CampaignError as error:
         raise CampaignError(f"{path}: {error}") from None
 
@@ -211,17 +235,28 @@ def parse_plan(text: str, name: str, folder: Path) -> CampaignPlan:
     Raises:
         CampaignError: Not TOML, an unknown key, or an impossible value.
     """
+    return plan_of(_table(text), name, folder)
+
+
+def plan_of(table: dict[str, Any], name: str, folder: Path) -> CampaignPlan:
+    """The plan that a table describes, as of ``parse_plan``."""
     try:
-        table = tomllib.loads(text)
         vary, parameters, faults = (table.pop(key, {}) for key in ("vary", PARAMETERS, "faults"))
         keys: _Keys = build_table(_Keys, table, "")
         return _plan(keys, name, folder, vary, parameters, faults or [])
-    except tomllib.TOMLDecodeError as error:
-        raise CampaignError(f"not TOML: {error}") from None
     except RecursionError:
         raise CampaignError("nested too deeply") from None
     except ScenarioError as error:
         raise CampaignError(str(error)) from None
+
+
+def _table(text: str) -> dict[str, Any]:
+    try:
+        return tomllib.loads(text)
+    except ValueError as error:  # TOMLDecodeError, or an integer of thousands of digits
+        raise CampaignError(f"not TOML: {error}") from None
+    except RecursionError:
+        raise CampaignError("nested too deeply") from None
 
 
 def _plan(

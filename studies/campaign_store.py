@@ -12,7 +12,7 @@ from __future__ import annotations
 import json
 import shutil
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -72,7 +72,7 @@ def read(directory: Path) -> CampaignResult:
             f"{directory} is no directory of a campaign: {FACTS} is not there or of another "
             "version; give what `pandion campaign --out` was given"
         ) from None
-    plan = load_plan(directory / PLAN)
+    plan = replace(load_plan(directory / PLAN), name=str(facts.get("name", directory.name)))
     if plan.digest != digests.plan:
         raise CampaignError(f"{directory / PLAN} was changed after it was flown; fly it again")
     return CampaignResult(plan, _rows(directory / JOURNAL, asked), asked, digests, facts)

@@ -37,6 +37,7 @@ from fsw.signals import (
 )
 from sitl.scenario import Scenario
 from sitl.simulation import START_US, STEP_US, Controls, Simulation
+from studies.collector import collector_off
 from studies.faults import Fault, FaultySensors
 from studies.flight_result import (
     TRACE_STEPS,
@@ -51,6 +52,7 @@ from studies.samples import only_the_time, sample
 
 TARGET_US = 100_000  # between points of the reference, as the pilot sends them
 _TARGETS_AHEAD = 20
+_TARGET_STEPS = TARGET_US // STEP_US
 _PILOT = (1, 195)
 _ARM = Command(Arm(), CommandRequest(400, (1.0, *(0.0,) * 6), *_PILOT))
 _FOLLOW = Command(
@@ -71,26 +73,31 @@ class ClosedLoop(Generic[State]):
     planner: PlanService
     airframe: Airframe
 
-    def sense(self) -> SensorFrame:
-        """Sensor readings of this step; with a suite of sensors its time alone."""
-        now = self.simulation.sense()
-        if self.simulation.measurements() is not None:
-            return only_the_time(now.t_us, self.samples())
+    def observe(self) -> tuple[SensorFrame, tuple[Sample, ...]]:
+        """Sensor readings of this step, and what arrived from a suite of sensors.
+
+        With a suite the readings are little more than the time.
+        """
+        simulation = self.simulation
+        arrived = simulation.measurements()
+        if arrived is not None:
+            samples = tuple([sample(one) for one in arrived])
+            return only_the_time(simulation.vehicle_time_us, samples), samples
+        now = simulation.sense()
         (q1, q2), (qd1, qd2) = now.q_arm, now.qd_arm
-        return SensorFrame(
-            t_us=now.t_us,
-            p_WB=now.p_WB,
-            v_WB=now.v_WB,
-            q_WB=now.q_WB,
-            gyro_B=now.gyro_B,
-            accel_B=now.accel_B,
-            q_arm=(q1, q2),
-            qd_arm=(qd1, qd2),
+        # By position: keywords take a third longer, in every step.
+        frame = SensorFrame(
+            now.t_us, now.p_WB, now.v_WB, now.q_WB, now.gyro_B, now.accel_B, (q1, q2), (qd1, qd2)
         )
+        return frame, ()
+
+    def sense(self) -> SensorFrame:
+        """The first part of :meth:`observe`."""
+        return self.observe()[0]
 
     def samples(self) -> tuple[Sample, ...]:
-        """What arrived from the suite of sensors in this step."""
-        return tuple([sample(said) for said in self.simulation.measurements() or ()])
+        """The second part of :meth:`observe`."""
+        return self.observe()[1]
 
     def battery(self) -> BatteryReading | None:
         """What the battery says in this step, if anything."""
@@ -100,11 +107,13 @@ class ClosedLoop(Generic[State]):
     def targets(self) -> tuple[EndEffectorTarget, ...]:
         """What the scenario's pilot streams: twenty points at once, then one every 0.1 s."""
         simulation = self.simulation
-        start_us, step = simulation.trajectory_start_us, simulation.step
-        every = TARGET_US // STEP_US
-        if start_us is None or step % every != 0:
+        step = simulation.step
+        if step % _TARGET_STEPS != 0:
             return ()
-        newest = _TARGETS_AHEAD - 1 + step // every
+        start_us = simulation.trajectory_start_us
+        if start_us is None:
+            return ()
+        newest = _TARGETS_AHEAD - 1 + step // _TARGET_STEPS
         first = 0 if step == 0 else newest
         clock = simulation.clock
         return tuple(target(clock, start_us + TARGET_US * k) for k in range(first, newest + 1))
@@ -112,9 +121,9 @@ class ClosedLoop(Generic[State]):
     def announced(self) -> tuple[SafeSetAnnouncement, ...]:
         """What the scenario's pilot announces at this step: ten times a second where zones move."""
         step, scenario = self.simulation.step, self.simulation.scenario
-        if step == 0 or (step % (TARGET_US // STEP_US) == 0 and moves(scenario)):
-            return announced(scenario, self.simulation.t_us)
-        return ()
+        if step % _TARGET_STEPS != 0 or (step and not moves(scenario)):
+            return ()
+        return announced(scenario, self.simulation.t_us)
 
     def step(
         self, inputs: TickInputs, before_advancing: Callable[[TickOutputs], None] | None = None
@@ -129,10 +138,11 @@ class ClosedLoop(Generic[State]):
         return outputs
 
     def _controls(self, outputs: TickOutputs) -> Controls:
-        sent, airframe = outputs.actuators, self.airframe
-        f1, f2, f3, f4 = (thrust / airframe.rotor_thrust_max for thrust in sent.rotor_thrust)
-        torque = tuple(value / airframe.joint_torque_max for value in sent.joint_torque)
-        return Controls((f1, f2, f3, f4), torque, outputs.snapshot.armed)
+        # Written out: each generator would take longer than all of this.
+        (f1, f2, f3, f4), (t1, t2) = outputs.actuators
+        force, torque = self.airframe.rotor_thrust_max, self.airframe.joint_torque_max
+        thrust = (f1 / force, f2 / force, f3 / force, f4 / force)
+        return Controls(thrust, (t1 / torque, t2 / torque), outputs.snapshot.armed)
 
 
 class RefusedError(RuntimeError):
@@ -161,6 +171,7 @@ class InlinePlanner:
         """Nothing to stop."""
 
 
+@collector_off()
 def simulate(
     scenario: Scenario,
     seed: int,
@@ -184,10 +195,12 @@ def simulate(
     steps_per_plan = config.mpc_period_us // config.tick_period_us
     faulty, mode = FaultySensors(fault, seed), Mode.TRAJECTORY
     while simulation.ended is None:
-        step, samples = simulation.step, faulty.samples(loop.samples())
-        sensors = loop.sense()
-        exact = simulation.measurements() is None
-        sensors = faulty.frame(sensors) if exact else only_the_time(sensors.t_us, samples)
+        step = simulation.step
+        sensors, samples = loop.observe()
+        if fault is not None:
+            samples = faulty.samples(samples)
+            exact = simulation.measurements() is None
+            sensors = faulty.frame(sensors) if exact else only_the_time(sensors.t_us, samples)
         answer = planner.take(sensors.t_us)
         if answer is not None:
             recorder.planned(answer)
@@ -202,17 +215,19 @@ def simulate(
         if traced and step % TRACE_STEPS == 0:
             recorder.trace.append(_trace_point(simulation))
         outputs = loop.step(inputs)
-        _insist(outputs)
-        recorder.texts += [(1e-6 * (sensors.t_us - START_US), one.text) for one in outputs.texts]
+        if outputs.acks:
+            _insist(outputs)
+        if outputs.texts:
+            time_s = 1e-6 * (sensors.t_us - START_US)
+            recorder.texts += [(time_s, one.text) for one in outputs.texts]
         if outputs.snapshot.mode is not mode and step >= len(FIRST_COMMANDS):
             mode = outputs.snapshot.mode
             recorder.modes.append(mode.value)
             # As the scenario's pilot would, who looks on.
             why = f"the vehicle left the trajectory for {mode.value}"
             simulation.leave_trajectory(sensors.t_us, why)
-        applied = outputs.snapshot.plan_input
-        if step % steps_per_plan == 0 and applied is not None:
-            recorder.metrics.add(applied)
+        if step % steps_per_plan == 0 and outputs.snapshot.plan_input is not None:
+            recorder.metrics.add(outputs.snapshot.plan_input)
         if outputs.plan_request is not None and asked is not None:
             asked(outputs.plan_request)
     return FlightResult(simulation.result(), recorder, touched(simulation.ended))

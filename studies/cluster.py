@@ -13,6 +13,7 @@ import signal
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, Final
 
 import dask
@@ -42,6 +43,13 @@ class _Out:
     only: frozenset[str] = field(default_factory=frozenset)  # workers that may; empty: all
 
 
+class _Client(Client):  # type: ignore[misc]
+    """Is closed by its owner; one that could not connect does not wait for itself when it goes."""
+
+    def __del__(self) -> None:
+        pass
+
+
 class Cluster:
     """Takes tasks of pickled flights; what came of them waits until it is asked for."""
 
@@ -58,6 +66,7 @@ class Cluster:
         self._name = os.urandom(6).hex()  # of this client's tasks
         self._came: queue.SimpleQueue[tuple[int, Future]] = queue.SimpleQueue()
         self._out: dict[int, _Out] = {}
+        self._fly = _carrier()  # one object, which Dask serialises once
         self._refused: dict[str, str] = {}
         self._workers: dict[str, int] = {}
         self._looked_s, self._none_since_s = -1e9, time.monotonic()
@@ -83,25 +92,29 @@ class Cluster:
         """Flights that can be flown at once."""
         return sum(n for one, n in self._workers.items() if one not in self._refused)
 
-    def submit(self, flights: Sequence[Any], limit_s: float) -> int:
-        """Give flights to a worker; the number of the task."""
-        task = next(self._numbers)
+    def submit(self, batches: Sequence[Sequence[Any]], limit_s: float) -> list[int]:
+        """Give each batch of flights to a worker as a task; the numbers of the tasks."""
+        tasks = [next(self._numbers) for _ in batches]
         only = self._fit() if self._refused else frozenset()
         own = identity()
-        future = self._client.submit(
-            _carrier(),
-            own.code,
-            own.packages,
-            pickle.dumps(tuple(flights)),
-            limit_s,
-            key=f"flights-{self._name}-{task}",
+        futures = self._client.map(
+            self._fly,
+            [pickle.dumps(tuple(flights)) for flights in batches],
+            key=[f"flights-{self._name}-{task}" for task in tasks],
             pure=False,
             workers=sorted(only) or None,
             allow_other_workers=False,
+            code=own.code,
+            packages=own.packages,
+            limit_s=limit_s,
         )
-        self._out[task] = _Out(future, only)
-        future.add_done_callback(lambda done: self._came.put((task, done)))
-        return task
+        for task, future in zip(tasks, futures, strict=True):
+            self._out[task] = _Out(future, only)
+            future.add_done_callback(partial(self._put, task))
+        return tasks
+
+    def _put(self, task: int, future: Future) -> None:
+        self._came.put((task, future))
 
     def came(self, wait_s: float) -> list[Came]:
         """What came since, after at most ``wait_s`` [s]; a task that was lost is in it."""
@@ -209,8 +222,8 @@ class Cluster:
         began_s = time.monotonic()
         while True:
             try:
-                return Client(**self._where(), timeout=_CONNECT_S, set_as_default=False)
-            except (OSError, TimeoutError, ValueError) as error:
+                return _Client(**self._where(), timeout=_CONNECT_S, set_as_default=False)
+            except Exception as error:  # whatever listens there may answer anything
                 if first or time.monotonic() > began_s + GIVE_UP_S:
                     raise SchedulerGoneError(self._no_answer(error)) from None
                 time.sleep(0.5)
@@ -235,7 +248,10 @@ class Cluster:
 
     def _no_answer(self, error: Exception) -> str:
         scheduler = self._scheduler
-        where = scheduler and (scheduler.address or scheduler.file)
+        assert scheduler is not None, error
+        where = scheduler.address or scheduler.file
+        if str(where).startswith("tls://") and scheduler.tls_ca_file is None:
+            return f"{where} needs --tls-ca-file, --tls-cert and --tls-key ({error})"
         return (
             f"no scheduler answers at {where} ({type(error).__name__}); start one with "
             "`dask scheduler`, or leave it out to fly on this machine"
@@ -292,7 +308,7 @@ def _why(future: Future) -> str:
 def _carrier() -> Callable[..., Any]:
     """A task that is sent as it is written: a worker may have other code, or none of ours."""
 
-    def fly(code: str, packages: str, packed: bytes, limit_s: float) -> Any:
+    def fly(packed: bytes, code: str, packages: str, limit_s: float) -> Any:
         from distributed import get_worker
 
         worker = get_worker().address

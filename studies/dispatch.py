@@ -13,11 +13,11 @@ if TYPE_CHECKING:
 
 RowT = TypeVar("RowT", bound="Row")
 
-# More tasks than this a second would keep the scheduler busy (python -m benchmarks scheduler);
-# faster flights go in batches.
-TASKS_A_SECOND: Final = 200.0
+# A task costs the scheduler one or two milliseconds (python -m benchmarks scheduler): flights that
+# would be more go in batches.
+TASKS_A_SECOND: Final = 100.0
 _MOST_A_TASK: Final = 100
-_AHEAD: Final = 2  # tasks out for each thread: one flies, one waits beside it
+AHEAD: Final = 2  # tasks out for each thread: one flies, one waits beside it
 _WAIT_S: Final = 0.5
 
 
@@ -38,8 +38,8 @@ class Workers(Protocol):
     def threads(self) -> int:
         """Flights that can be flown at once."""
 
-    def submit(self, flights: Sequence[Any], limit_s: float) -> int:
-        """Give flights to a worker; the number of the task."""
+    def submit(self, batches: Sequence[Sequence[Any]], limit_s: float) -> list[int]:
+        """Give each batch of flights to a worker as a task; the numbers of the tasks."""
 
     def came(self, wait_s: float) -> list[Came]:
         """What came since, after at most ``wait_s``."""
@@ -62,10 +62,17 @@ class Dispatch(Generic[RowT]):
         flights: Iterator[tuple[str, Flight[RowT]]],
         tries: int,
         limit_s: float,
+        tasks_a_second: float = TASKS_A_SECOND,
+        ahead: int = AHEAD,
     ) -> None:
-        """Take flights as they are needed; each may take ``limit_s`` of its machine's time [s]."""
+        """Take flights as they are needed; each may take ``limit_s`` of its machine's time [s].
+
+        Where there would be more than ``tasks_a_second`` [1/s], flights go in batches; ``ahead``
+        tasks are out for each thread.
+        """
         self._cluster, self._flights = cluster, flights
-        self._tries, self._limit_s = tries, limit_s
+        self._tries, self._limit_s, self._rate = tries, limit_s, tasks_a_second
+        self._ahead = ahead
         self._again: deque[_Waiting[RowT]] = deque()  # lost without having broken
         self._suspects: deque[_Waiting[RowT]] = deque()  # a process died with them
         self._out: dict[int, tuple[_Waiting[RowT], ...]] = {}
@@ -97,16 +104,17 @@ class Dispatch(Generic[RowT]):
         if self._suspects and self._suspect_out is None:
             last = self._is_last(self._suspects[0])
             if not last or not self._out:
-                self._suspect_out = self._give((self._suspects.popleft(),))
+                (self._suspect_out,) = self._give([(self._suspects.popleft(),)])
             if last:
                 return  # let all others come home
         elif self._suspect_out is not None and self._is_last(self._out[self._suspect_out][0]):
             return
-        while len(self._out) < max(_AHEAD * self._cluster.threads, 1):
-            batch = self._next()
-            if not batch:
-                return
-            self._give(batch)
+        room = max(self._ahead * self._cluster.threads, 1) - len(self._out)
+        batches: list[tuple[_Waiting[RowT], ...]] = []
+        while len(batches) < room and (batch := self._next()):
+            batches.append(batch)
+        if batches:
+            self._give(batches)
 
     def _is_last(self, suspect: _Waiting[RowT]) -> bool:
         """Whether it is tried for the last time, and hence alone."""
@@ -129,13 +137,14 @@ class Dispatch(Generic[RowT]):
         if self._flown == 0:
             return 1
         flight_s = max(self._took_s / self._flown, 1e-6)
-        asked = math.ceil(self._cluster.threads / (TASKS_A_SECOND * flight_s))
+        asked = math.ceil(self._cluster.threads / (self._rate * flight_s))
         return min(max(asked, 1), _MOST_A_TASK)
 
-    def _give(self, batch: tuple[_Waiting[RowT], ...]) -> int:
-        task = self._cluster.submit([one.flight for one in batch], self._limit_s)
-        self._out[task] = batch
-        return task
+    def _give(self, batches: list[tuple[_Waiting[RowT], ...]]) -> list[int]:
+        flights = [[one.flight for one in batch] for batch in batches]
+        tasks = self._cluster.submit(flights, self._limit_s)
+        self._out.update(zip(tasks, batches, strict=True))
+        return tasks
 
     def _settled(
         self, waiting: tuple[_Waiting[RowT], ...], came: Came, alone: bool

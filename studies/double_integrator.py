@@ -30,6 +30,7 @@ from sitl.result import EndReason, TruthResult
 from sitl.scenario import V3, Scenario
 from sitl.scenario_validation import check
 from sitl.simulation import SAMPLE_STEPS, START_US, STEP_US
+from studies.collector import collector_off
 from studies.flight_result import (
     TRACE_STEPS,
     FlightRecorder,
@@ -131,6 +132,7 @@ class DoubleIntegrator:
         return x, y, z
 
 
+@collector_off()
 def simulate(
     scenario: Scenario, seed: int, config: FlightConfig, *, traced: bool = False
 ) -> FlightResult:

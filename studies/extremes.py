@@ -1,4 +1,4 @@
-"""The lower tail of the least margins: a generalised Pareto fit and how well it fits.
+"""The lower tail of the minimum margins: a generalised Pareto fit and how well it fits.
 
 Of flights that are alike, what lies below a low threshold is distributed by a generalised Pareto
 law (Pickands, 1975; Balkema and de Haan, 1974). A fit of it says how margins smaller than all that
@@ -22,8 +22,10 @@ _LEAST_TAIL: Final = 30
 _TAIL_SHARE: Final = 0.1
 _LEAST_DISTINCT: Final = 20
 REJECTED: Final = 0.05  # of goodness; below, the numbers are not to be used
-RARE: Final = (1e-2, 1e-3, 1e-4)  # shares of flights whose least margin is estimated
-REGULAR: Final = -0.5  # below this shape maximum likelihood has no known accuracy
+RARE: Final = (1e-2, 1e-3, 1e-4)  # shares of flights whose minimum margin is estimated
+_STRAIGHT: Final = 1e-9  # a quotient of shape and scale below which the law is exponential
+_WORST: Final = 1e6
+_SPAN: Final = 12.0  # of the logarithm of how far the largest excess is from the end of the law
 
 
 class NoFitError(ValueError):
@@ -46,7 +48,7 @@ class TailFit:
     flights: int  # with a margin
     tail: int  # of them below the threshold
     threshold_m: float
-    shape: Estimate  # below 0: there is a least margin
+    shape: Estimate  # below 0: there is a minimum margin
     scale_m: Estimate
     anderson_darling: float
     goodness: float  # share of tails of the fitted law that fit no better [1]
@@ -96,11 +98,11 @@ def fit_tail(
         )
     # Scaled: the search for the maximum knows no millimetres.
     unit = float(excess.mean())
-    shape, scale = _fitted(excess / unit)
+    shape, scale = most_likely(excess / unit)
     statistic = anderson_darling(excess / unit, shape, scale)
     random = np.random.default_rng(seed)
     simulated = genpareto.rvs(shape, scale=scale, size=(refits, tail), random_state=random)
-    again = [(one, *_fitted(one)) for one in simulated]
+    again = [(one, *most_likely(one)) for one in simulated]
     worse = sum(anderson_darling(*one) >= statistic for one in again)
     laws = [(shape, unit * scale), *((a, unit * b) for _, a, b in again)]
     share = tail / total
@@ -138,7 +140,9 @@ def fit_tail(
 
 
 def anderson_darling(excess: Array, shape: float, scale: float) -> float:
-    """The Anderson-Darling statistic [1] of excesses under a law of ``shape`` and ``scale`` [1].
+    """The Anderson-Darling statistic [1] of the ``excess`` (n,) [any unit] under a law.
+
+    The law has a ``shape`` [1] and a ``scale`` [any unit].
 
     Source: Anderson, Darling: A test of goodness of fit, JASA 49, 1954.
     """
@@ -161,9 +165,31 @@ def _estimate(value: float, refits: Array, confidence: float) -> Estimate:
     return Estimate(value, float(low), float(high))
 
 
-def _fitted(excess: Array) -> tuple[float, float]:
-    """Shape and scale of the most likely law."""
-    from scipy.stats import genpareto
+def most_likely(excess: Array) -> tuple[float, float]:
+    """Shape [1] and scale [excess] of the most likely law of the ``excess`` (n,) [any unit].
 
-    shape, _, scale = genpareto.fit(excess, floc=0.0)
-    return float(shape), float(scale)
+    For a given quotient of the two, shape and likelihood are closed expressions, so the maximum is
+    one of a single number. Shapes below -1 have no maximum and are left out.
+
+    Source: Grimshaw: Computing maximum likelihood estimates for the generalized Pareto
+    distribution, Technometrics 35, 1993.
+    """
+    from scipy.optimize import minimize_scalar
+
+    most, mean = float(excess.max()), float(excess.mean())
+
+    def cost(place: float) -> float:
+        quotient = math.expm1(place) / most
+        shape = float(np.log1p(quotient * excess).mean())
+        if shape < -1.0:
+            return _WORST
+        scale = shape / quotient if abs(quotient) * mean > _STRAIGHT else mean
+        return math.log(scale) + shape
+
+    grid = np.linspace(-_SPAN, _SPAN, 49)
+    best = int(np.argmin([cost(float(place)) for place in grid]))
+    ends = (grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)])
+    place = minimize_scalar(cost, bounds=ends, method="bounded", options={"xatol": 1e-7}).x
+    quotient = math.expm1(float(place)) / most
+    shape = float(np.log1p(quotient * excess).mean())
+    return shape, shape / quotient if abs(quotient) * mean > _STRAIGHT else mean

@@ -29,7 +29,7 @@ from fsw.parameters.flight_config import FlightConfig
 from fsw.signals import TickOutputs
 from sitl.disturbances.sequence import Played
 from sitl.result import EndKind
-from sitl.scenario import V3, Scenario
+from sitl.scenario import V3, Scenario, Sequence
 from sitl.simulation import STEP_US, Simulation
 from studies.plan_record import PlanRecord, Start, fly, record
 from studies.tracked_flight import FEATURES, FILTERED, OFF, PUSH, Disturbance, TrackedFlight
@@ -432,6 +432,15 @@ def _improve(
             told()
         done += len(tried)
         optimiser.tell(tried)
+
+
+def as_scenario(scenario: Scenario, found: Found) -> Scenario:
+    """The scenario calm up to the stretch that was found, which ends it."""
+    first, every = found.start.step, found.disturbance.every
+    step_s = 1e-6 * STEP_US
+    pushes = Sequence(found.pushes[::every], every * step_s, first * step_s, name="worst")
+    ends_s = min(scenario.duration_s, (first + len(found.pushes)) * step_s)
+    return replace(scenario, disturbances=(pushes,), duration_s=ends_s)
 
 
 @dataclass(frozen=True, slots=True)

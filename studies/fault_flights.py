@@ -40,6 +40,7 @@ from sitl.scenario import Scenario
 from sitl.scenario_file import load_scenario, parse_scenario
 from sitl.simulation import STEP_US, Simulation
 from studies.closed_loop import ClosedLoop, InlinePlanner
+from studies.collector import collector_off
 from studies.flight_result import processor_time_us
 
 # A wall whose clearance begins 0.24 m off the blades' tips.
@@ -294,6 +295,7 @@ class Observer:
         self._mode, self._marked = mode, marked
 
 
+@collector_off()
 def fly(mode: str, fault: Fault | None, suite: str = "perfect", seed: int = 0) -> FaultFlight:
     """Fly one situation, with a fault that begins at its time, if any."""
     situation = SITUATIONS[mode]
@@ -321,11 +323,12 @@ def fly(mode: str, fault: Fault | None, suite: str = "perfect", seed: int = 0) -
 def _inputs(situation: Situation, loop: ClosedLoop[FlightState]) -> TickInputs:
     """What sensors, planner, scenario and ground station bring to one tick."""
     simulation = loop.simulation
-    step, sensors = simulation.step, loop.sense()
+    step = simulation.step
+    sensors, samples = loop.observe()
     inputs = TickInputs(
         sensors=sensors,
         plan=loop.planner.take(sensors.t_us),
-        samples=loop.samples(),
+        samples=samples,
         battery=loop.battery(),
     )
     if simulation.faults.pilot_silent(simulation.t_us):

@@ -51,7 +51,11 @@ class Job:
         )
         noisy = punctual != (ImuErrors(), PoseErrors(), EncoderErrors())
         gusts = self.scenario.air.turbulence_m_s > 0.0
-        return noisy or gusts or any(it.kind != "wind" for it in self.scenario.disturbances)
+        return (
+            noisy
+            or gusts
+            or any(it.kind not in ("wind", "sequence") for it in self.scenario.disturbances)
+        )
 
     def key(self) -> str:
         """Name of the flight: same flight, same name, in any process, while the code is the same.

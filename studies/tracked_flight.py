@@ -6,7 +6,7 @@ values or an adversary that sees, on each axis, how far and how fast the vehicle
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, cast
 
@@ -24,13 +24,13 @@ from fsw.signals import ActuatorCommand, PlanInput, PredictionState, StateEstima
 from sitl.body import Parts
 from sitl.mission_clock import MissionClock
 from sitl.plant.aerial_manipulator import Inputs, Plant, plant
-from sitl.plant.integrator import STEP_S, integrate
+from sitl.plant.integrator import STEP_S, Held, held, integrate
 from sitl.plant.parameters import GRAVITY
 from sitl.scenario import Scenario
 from sitl.simulation import START_US, STEP_US, SUBSTEPS
 from sitl.start import flown_vehicle
 from sitl.trajectory import place_on_curve
-from sitl.world import World, ZoneTable, fill_margins, record_if_clear
+from sitl.world import Headroom, World, ZoneTable, fill_margins, headroom, record_if_clear
 from studies.plan_record import PlanRecord, Start
 
 # A row of what is kept: deviation and disturbance, each (3,), and whether the safety filter acted.
@@ -97,6 +97,8 @@ class TrackedFlight:
             self._aim,
             places,
             lowest,
+            headroom(self._world.table, len(lowest), places.shape[1]),
+            held(2),
         )
         return kept[:flown], float(lowest.min(initial=np.inf))
 
@@ -127,6 +129,8 @@ def _track(
     aim: tuple[Array, float],
     places: Array,
     lowest: Array,
+    room: Headroom,
+    blocks: Sequence[Held],
 ) -> int:
     law: CascadeLaw = laws[0]
     body: Plant = plants[0]
@@ -178,6 +182,7 @@ def _track(
             memory.height,
             memory.joints,
             memory.off_plan,
+            memory.health,
         )
         if k % every == 0:
             lift = (x[13] + x[14] + x[15] + x[16]) / mass
@@ -196,9 +201,9 @@ def _track(
         inputs = Inputs(
             np.array(sent.rotor_thrust), np.array(sent.joint_torque), mass * push, np.zeros(3)
         )
-        felt = integrate(body, x, inputs, STEP_S, places, states).felt
+        felt = integrate(body, x, inputs, STEP_S, places, states, blocks).felt
         before_s = 1e-6 * STEP_US * step
-        _judge(table_of_zones, parts, aim, places, before_s, lowest, when_s, margins)
+        _judge(table_of_zones, parts, aim, places, before_s, lowest, when_s, margins, room)
         for axis in range(3):
             kept[k, OFF + axis] = x[axis] - ahead[axis]
             kept[k, PUSH + axis] = push[axis]
@@ -218,9 +223,10 @@ def _judge(
     lowest: Array,
     when_s: Array,
     margins: Array,
+    room: Headroom,
 ) -> None:
     """Take the margins of a tick into the lowest, as the simulator's judge does."""
-    if record_if_clear(table, parts, aim, places, (before_s, STEP_S), lowest, when_s):
+    if record_if_clear(table, parts, aim, places, (before_s, STEP_S), lowest, when_s, room):
         return
     curve, starts_s = aim
     for k in range(places.shape[0]):

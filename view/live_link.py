@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable
 from typing import Any, Final, TypeVar
 
+from fsw.link.udp_endpoint import LinkError
 from fsw.link.wire import message_ids as ids
 from fsw.signals import SafeSet, Vec3
 from messages.frames import FrameWriter, split
@@ -53,6 +54,9 @@ class VehicleLink(threading.Thread):
 
         One that only looks is no ground station to the vehicle: it must not hide that the link to
         the one that commands is lost.
+
+        Raises:
+            LinkError: There is no way to that address.
         """
         super().__init__(daemon=True)
         self.commands = commands
@@ -65,7 +69,11 @@ class VehicleLink(threading.Thread):
         self._ended = False
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _RECEIVE_BUFFER)
-        self._socket.connect(vehicle)
+        try:
+            self._socket.connect(vehicle)
+        except OSError as error:
+            self._socket.close()
+            raise LinkError(f"cannot reach {self.where}: {error.strerror or error}") from None
         self._socket.setblocking(False)
 
     def close(self) -> None:
@@ -128,11 +136,20 @@ class VehicleLink(threading.Thread):
         """Send ``target`` [m, NED] of the end-effector as setpoint from now on; None: no more."""
         self._setpoint = target
 
-    def announce(self, safe_set: SafeSet | None, centre: Vec3, radius: float) -> None:
-        """Announce the known safe set and a ball about ``centre`` [m, NED] of ``radius`` [m]."""
+    def announce(self, centre: Vec3, radius: float) -> str | None:
+        """Announce the safe set and a ball about ``centre`` [m, NED] of ``radius`` [m].
+
+        The vehicle is asked for the set first, because what is announced replaces it. Returns why
+        nothing was announced, None if it was.
+        """
         from fsw.shapes import kind_of
 
-        known = safe_set.zones if safe_set is not None else ()
+        safe_set = self._whole_set()
+        if safe_set is None:
+            return f"no obstacle: {self.where} does not say which safe set it keeps"
+        known = safe_set.zones
+        if any(any(zone.velocity) for zone in known):
+            return "no obstacle: zones move, and who announces them would take it away again"
         count = len(known) + 1
         for index, zone in enumerate(known):
             numbers = zone.shape.numbers
@@ -141,6 +158,18 @@ class VehicleLink(threading.Thread):
                 keep_in=zone.keep_in, velocity=zone.velocity, t_us=zone.t_us,
             )  # fmt: skip
         self._shape(len(known), count, _BALL, (*centre, radius), 0.1)
+        return None
+
+    def _whole_set(self) -> SafeSet | None:
+        """The safe set as the vehicle keeps it now; None if it does not answer."""
+        with self._heard:
+            telemetry = self._telemetry
+            before = telemetry.whole_sets
+            for _ in range(_TRIES):
+                self._command(_REQUEST_MESSAGE, (ids.OBSTACLE_SHAPE,))
+                if self._heard.wait_for(lambda: telemetry.whole_sets > before, _ANSWER_S):
+                    return telemetry.scene(time.monotonic()).safe_set
+        return None
 
     def ask_for_parameters(self) -> None:
         """Ask for all of them."""

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import threading
 import time
 from collections import deque
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any, Final
 
 import numpy as np
@@ -43,6 +45,7 @@ class LivePage:
     def __init__(self, server: Server, link: VehicleLink) -> None:
         self._server, self._link = server, link
         self._ended = threading.Event()
+        self._asked = ThreadPoolExecutor(1)
         self._framed = False
         self._recent: deque[Scene] = deque(maxlen=_CURVE_SCENES)
         self._trail: list[tuple[Vec3, float]] = []
@@ -61,6 +64,7 @@ class LivePage:
     def close(self) -> None:
         """Stop drawing."""
         self._ended.set()
+        self._asked.shutdown(wait=False, cancel_futures=True)
         self._thread.join()
 
     def _build(self) -> None:
@@ -112,7 +116,7 @@ class LivePage:
             centre = gui.add_vector3("centre, NED [m]", (1.0, 0.0, -1.4), step=0.05)
             radius = gui.add_number("radius [m]", 0.1, min=0.01, max=5.0, step=0.01)
             gui.add_button("Add a ball").on_click(
-                lambda _: self._announce(centre.value, radius.value)
+                lambda _: self._later(lambda: self._announce(centre.value, radius.value))
             )
 
     def _search(self, what: str, hint: str) -> None:
@@ -125,8 +129,9 @@ class LivePage:
         return lambda _: self._later(lambda: self._ask(command, params))
 
     def _later(self, what: Callable[[], Any]) -> None:
-        """Answers take time; viser's threads are few."""
-        threading.Thread(target=what, daemon=True).start()
+        """Do it after what was asked for before: answers take time, and viser's threads are few."""
+        with contextlib.suppress(RuntimeError):  # the page is being closed
+            self._asked.submit(what)
 
     def _ask(self, command: int, params: tuple[float, ...]) -> bool:
         good, sentence = self._link.ask(command, params)
@@ -158,7 +163,9 @@ class LivePage:
         self._gizmo.on_update(lambda _: self._aim())
         self._link.aim(tip)
         time.sleep(0.3)  # the vehicle changes to offboard only while setpoints come
-        if not self._ask(live_link.SET_MODE, live_link.OFFBOARD):
+        if not self._drag.value:
+            self._end_dragging()  # it was cleared meanwhile
+        elif not self._ask(live_link.SET_MODE, live_link.OFFBOARD):
             self._end_dragging()
             self._drag.value = False
 
@@ -175,11 +182,9 @@ class LivePage:
             self._gizmo = None
 
     def _announce(self, centre: tuple[float, float, float], radius: float) -> None:
-        known = self._link.scene().safe_set
-        self._link.announce(known, centre, float(radius))
-        self._answer.content = panels.refusal_html(
-            "obstacle announced; the vehicle says below events whether it keeps it", good=True
-        )
+        refusal = self._link.announce(centre, float(radius))
+        announced = "obstacle announced; the vehicle says below events whether it keeps it"
+        self._answer.content = panels.refusal_html(refusal or announced, good=refusal is None)
 
     def _run(self) -> None:
         while not self._ended.wait(_FRAME_S):
@@ -193,8 +198,11 @@ class LivePage:
                 continue
             if scene.t != self._drawn_t:
                 self._drawn_t = scene.t
-                with self._server.atomic():
-                    self.stage.show(scene)
+                try:
+                    with self._server.atomic():
+                        self.stage.show(scene)
+                except ValueError as error:  # of numbers that cannot be drawn; the next may be
+                    self._answer.content = panels.refusal_html(f"not drawn: {error}", good=False)
                 self._frames += 1
             if self._is_due("text", now_s, _TEXT_S):
                 self._write(scene)
@@ -210,6 +218,9 @@ class LivePage:
             self._frame(scene.estimate.p)
         if self._recent and scene.t < self._recent[-1].t:
             self._recent.clear()  # another flight
+            self._trail.clear()
+            self._piece = 0
+            self.stage.drop_trail(_PIECES)
         if self._is_due("kept", now_s, _KEPT_S):
             self._recent.append(scene)
         if self._is_due("trail", now_s, _TRAIL_S):

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import contextlib
+import http
+import inspect
 import io
-import re
+import ipaddress
 import socket
-from collections.abc import Iterator
-from functools import partial
-from typing import Final
+from collections.abc import Iterator, Sequence
+from typing import Any, Final
+from urllib.parse import urlsplit
 
 import viser
 import websockets.asyncio.server
 
-LOCAL: Final = ("127.0.0.1", "localhost", "::1")
+LOCAL: Final = ("127.0.0.1", "localhost")
 
 
 class PageError(Exception):
@@ -50,7 +52,7 @@ def open_server(host: str, port: int, title: str) -> Server:
             ) from None
         port = int(probe.getsockname()[1])
     # It prints its address in a box.
-    with contextlib.redirect_stdout(io.StringIO()), _own_pages_only(host, port):
+    with contextlib.redirect_stdout(io.StringIO()), _own_pages_only():
         server = Server(host=host, port=port, label=title, verbose=False)
     server.gui.configure_theme(
         show_logo=False, show_share_button=False, control_width="large", brand_color=(9, 105, 218)
@@ -61,21 +63,51 @@ def open_server(host: str, port: int, title: str) -> Server:
 
 
 @contextlib.contextmanager
-def _own_pages_only(host: str, port: int) -> Iterator[None]:
+def _own_pages_only() -> Iterator[None]:
     """Let a server that starts meanwhile refuse browsers that show a page of another site.
 
     Any site's page may open a socket to this machine, and could command the vehicle. viser has no
-    option for that; websockets has.
+    option for that; websockets lets a request be looked at first.
     """
-    local = r"http://(127\.0\.0\.1|localhost|\[::1\])(:\d+)?"
-    other = rf"http://[^/]+:{port}" if host not in LOCAL else local
-    usual = websockets.asyncio.server.serve
-    origins = [None, re.compile(local), re.compile(other)]
+    module: Any = websockets.asyncio.server
+    usual = module.serve
+
+    def guarded(*args: Any, process_request: Any, **more: Any) -> Any:
+        async def look(connection: Any, request: Any) -> Any:
+            origins, hosts = request.headers.get_all("Origin"), request.headers.get_all("Host")
+            if not is_own(origins, hosts):
+                return connection.respond(http.HTTPStatus.FORBIDDEN, "a page of another site\n")
+            found = process_request(connection, request)
+            return await found if inspect.isawaitable(found) else found
+
+        return usual(*args, process_request=look, **more)
+
     try:
-        websockets.asyncio.server.serve = partial(usual, origins=origins)
+        module.serve = guarded
         yield
     finally:
-        websockets.asyncio.server.serve = usual
+        module.serve = usual
+
+
+def is_own(origins: Sequence[str], hosts: Sequence[str]) -> bool:
+    """Whether a request comes from the page that it asks for, or from no browser at all.
+
+    The page's name must be a number or this machine's own: a name of another site may be made to
+    lead here once its page is open.
+    """
+    if not origins:
+        return True
+    if len(origins) > 1 or len(hosts) != 1:
+        return False
+    origin = urlsplit(origins[0])
+    name = origin.hostname or ""
+    if origin.scheme != "http" or origin.netloc.removesuffix(":80") != hosts[0].removesuffix(":80"):
+        return False
+    try:
+        ipaddress.ip_address(name)
+    except ValueError:
+        return name in ("localhost", socket.gethostname().lower(), socket.getfqdn().lower())
+    return True
 
 
 def address(server: Server) -> str:

@@ -235,6 +235,12 @@ class Stage:
         if len(trail.points) > 1:
             self._add_trail(f"/trail/{number % most}", trail)
 
+    def drop_trail(self, most: int) -> None:
+        """Draw nothing of any of ``most`` pieces of path any more."""
+        nowhere = Trail(np.full((2, 3), math.nan), np.zeros(2))
+        for number in range(most):
+            self._add_trail(f"/trail/{number}", nowhere)
+
     def draw_reference(self, points: Array) -> None:
         """Draw where the end-effector should go: ``points`` (n, 3) [m, NED]; NaN: not there."""
         if len(points) > 1:

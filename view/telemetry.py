@@ -40,6 +40,7 @@ _ON_GROUND: Final = 1
 _STEPS: Final = 6  # most of an MPC_HORIZON
 _REQUESTS: Final = (511, 512)  # of messages; their answers are of no interest
 _UNTIMED: Final = 0xFFFFFFFF
+_RESTARTED_S: Final = 5.0  # by which its clock goes back where a vehicle starts again
 _SHORT_S: Final = 1.0  # what was said longer ago is not so any more
 _AVERAGE: Final = 0.2  # weight of the newest interval in a rate
 MODE_NAMES: Final = {one.custom_mode: one.name.lower() for one in AVAILABLE_MODES}
@@ -94,6 +95,7 @@ class Telemetry:
     _timings: dict[int, Timing] = field(default_factory=dict)
     _zones: dict[int, Zone] = field(default_factory=dict)
     _safe_set: SafeSet | None = None
+    whole_sets: int = 0  # how often the safe set was sent to its end
     _pieces: dict[int, bytes] = field(default_factory=dict)
     _mode: str = ""
     _conditions: list[Condition] = field(default_factory=list)  # of failsafes, that have begun
@@ -225,13 +227,22 @@ class Telemetry:
 
     def read_clock(self, t: float) -> None:
         """Take the vehicle's time ``t`` [s]; it goes back only if the vehicle starts again."""
-        if not t <= self.t or t < self.t - 5.0:
+        if t < self.t - _RESTARTED_S:
+            self._forget()
+        if not t <= self.t:
             self.t = t
+
+    def _forget(self) -> None:
+        """Know nothing any more of a flight that is over; its messages and events stay listed."""
+        self.t, self._safe_set, self._mode, self._plan, self._led = math.nan, None, "", None, None
+        for kept in (self._values, self._timings, self._zones, self._pieces, self._conditions):
+            kept.clear()
 
     def read_zone(self, values: tuple[Any, ...]) -> None:
         """Take one shape of the safe set; the set changes when it is whole."""
         if values[24] == 0:
             self._zones, self._safe_set = {}, SafeSet()
+            self.whole_sets += 1
             return
         indexed = decode.obstacle_shape(cast("tuple[float, ...]", values))
         if indexed is None:
@@ -241,6 +252,7 @@ class Telemetry:
         self._zones[indexed.index] = indexed.zone
         if len(self._zones) == indexed.count:
             self._safe_set = SafeSet(tuple(self._zones[k] for k in range(indexed.count)))
+            self.whole_sets += indexed.index == indexed.count - 1
 
     def read_beat(self, values: tuple[Any, ...]) -> None:
         """Take a HEARTBEAT."""

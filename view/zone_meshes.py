@@ -90,7 +90,10 @@ def _corners(
     if shape.kind == "target sphere":
         return None if target is None else ((n[:3] + target)[None], float(n[3]))
     if shape.kind == "vertical cylinder":
-        top, bottom = max(float(n[2]), region[0][2]), min(float(n[3]), region[1][2])
+        # Within the region, but no end of its own is moved beyond the other: it may lie outside.
+        top, bottom = float(n[2]), float(n[3])
+        top = min(max(top, region[0][2]), max(bottom - _THIN, top))
+        bottom = max(min(bottom, region[1][2]), top + _THIN)
         radius = max(float(n[4]), _THIN)
         return _cylinder(np.array((*n[:2], top)), np.array((*n[:2], bottom)), radius), 0.0
     if shape.kind == "cylinder":

@@ -195,6 +195,8 @@ class _Tick:
 
     def go_on_without_imu(self) -> None:
         """In place of a reading of the IMU, take what the model makes of the last one."""
+        if self._parts & kernels.READING:
+            self.run()
         self._parts |= kernels.READING
         self._time, self._force, self._rate = self._now, _NO_READING, _NO_READING
 

@@ -359,7 +359,8 @@ ESTIMATOR_STATUS: Final = Topic(
     "Accuracy, and innovations over their limits",
     _ESTIMATED,
     (
-        *_floats("pos_horiz_accuracy", "pos_vert_accuracy", note="m, standard deviation"),
+        *_floats("pos_horiz_accuracy", note="m, of north and east together"),
+        *_floats("pos_vert_accuracy", note="m, standard deviation"),
         *_floats("hdg_test_ratio", "vel_test_ratio", "pos_test_ratio", note="1: refused"),
         *_floats("hgt_test_ratio", "hagl_test_ratio", note="1: refused"),
         *_floats("vel_accuracy", note="m/s, standard deviation, largest axis"),

@@ -1,11 +1,12 @@
-"""One class per kind of disturbance; each is sampled once per step, in increasing order.
+"""One class per kind of disturbance; each is sampled in increasing order of steps.
 
-A sample is held over its step: a torque [N·m, B] if ``torque`` is set, else an acceleration
-[m/s², W].
+A sample is held over its step, and until the step that ``held_until`` names, before which none has
+to be taken: a torque [N·m, B] if ``torque`` is set, else an acceleration [m/s², W].
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,6 +35,10 @@ class Resampled:
             self._held = (float(x), float(y), float(z))
         return self._held
 
+    def held_until(self, step: int) -> float:
+        """The step at which it may have another value than at ``step``, the last one sampled."""
+        return (step // self.every + 1) * self.every
+
 
 @dataclass
 class Constant:
@@ -45,6 +50,10 @@ class Constant:
     def sample(self, step: int) -> V3:
         """The value held over step ``step``."""
         return self.acceleration
+
+    def held_until(self, step: int) -> float:
+        """See :meth:`Resampled.held_until`."""
+        return math.inf
 
 
 class RandomImpulses:
@@ -75,6 +84,10 @@ class RandomImpulses:
             self._until = step + self._length
             self._from = self._until + self._pause()
         return self._held if step < self._until else STILL
+
+    def held_until(self, step: int) -> float:
+        """See :meth:`Resampled.held_until`."""
+        return self._until if step < self._until else self._from
 
 
 Push = Resampled | Constant | RandomImpulses | Played | Steered

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from sitl.scenario import V3
@@ -21,6 +22,10 @@ class Steered:
         """See ``Push``."""
         return self.value
 
+    def held_until(self, step: int) -> float:
+        """See ``Push``: it may be set in every step."""
+        return step + 1
+
 
 class Played:
     """Accelerations [m/s², NED], each held for ``every`` steps, from the step ``first`` on."""
@@ -36,3 +41,8 @@ class Played:
         """See ``Push``; nothing before the first and after the last."""
         index = (step - self._first) // self._every
         return self._values[index] if 0 <= index < len(self._values) else _STILL
+
+    def held_until(self, step: int) -> float:
+        """See ``Push``."""
+        index = max((step - self._first) // self._every, -1)
+        return self._first + (index + 1) * self._every if index < len(self._values) else math.inf

@@ -82,13 +82,19 @@ class Faults:
         if not any(one.fault == fault and one.first <= step < one.end for one in self._entries):
             self._add(fault, step)
 
-    def clear(self, unit: str, number: int, step: int) -> None:
-        """End at this step all faults of a unit, or of one motor or joint of it."""
+    def clear(self, unit: str, number: int, step: int) -> tuple[Fault, ...]:
+        """End at this step all faults of a unit, or of one motor or joint of it; which they were.
+
+        One that all motors share ends for all of them or for none.
+        """
+        ended = []
         for one in self._entries:
             same = one.fault.unit == unit and number in (0, one.fault.number)
             if same and one.first <= step < one.end:
                 one.end = step
                 self._change = step
+                ended.append(one.fault)
+        return tuple(ended)
 
     def take_begun(self) -> list[Fault]:
         """Faults that began since the last call."""

@@ -102,6 +102,7 @@ LINKS: Final = ("to vehicle", "to simulator")
 PROCESSES: Final = ("simulator", "flight software", "planner", "disk")
 
 _SIGNAL: Final = ("off", "stuck", "garbage", "wrong", "slow", "delayed", "intermittent")
+_OF_MESSAGES: Final = ("off", "slow", "delayed", "intermittent")  # of sensors
 _LINK: Final = ("off", "delayed", "intermittent", "duplicated", "reordered")
 _PROCESS: Final = ("stopped", "killed")
 KINDS: Final[dict[str, tuple[str, ...]]] = {
@@ -127,8 +128,11 @@ def instances(unit: Unit) -> int:
     return _INSTANCES.get(unit, 0)
 
 
-def problem(fault: Fault, aboard: tuple[str, ...]) -> str | None:
-    """Key, value and what is allowed, where a fault contradicts itself or what is ``aboard``."""
+def problem(fault: Fault, aboard: tuple[str, ...], *, exact: bool) -> str | None:
+    """Key, value and what is allowed, where a fault contradicts itself or what is ``aboard``.
+
+    The states are ``exact`` or a suite's.
+    """
     kinds, most = KINDS[fault.unit], instances(fault.unit)
     if fault.kind not in kinds:
         allowed = ", ".join(f'"{kind}"' for kind in kinds)
@@ -138,4 +142,11 @@ def problem(fault: Fault, aboard: tuple[str, ...]) -> str | None:
     if fault.number > most:
         allowed = f"0 (all) to {most}" if most else f"0, because there is one {fault.unit}"
         return f"instance = {fault.number}: must be {allowed}"
+    if fault.unit == "clock" and fault.jump_s < -fault.start_s:
+        return f"jump_s = {fault.jump_s:g}: must be at least {-fault.start_s:g}, the clock's start"
+    if fault.unit == "encoder" and fault.number and not exact and fault.kind in _OF_MESSAGES:
+        return (
+            f"instance = {fault.number}: must be 0 (all): both encoders share a message, and "
+            f'"{fault.kind}" is of the message'
+        )
     return None

@@ -63,8 +63,15 @@ def carry_out(simulation: Simulation, asked: Injection) -> Answer:
         return Answer(DENIED, f"no fault: {unit} {asked.instance} is not one of {max(most, 1)}")
     number = asked.instance if most > 1 else 0
     if asked.kind == _WORKS:
-        simulation.faults.clear(unit, number, simulation.step + 1)
-        return Answer(ACCEPTED, f"fault ended: {unit}")
+        ended = simulation.faults.clear(unit, number, simulation.step + 1)
+        which = f"{unit} {number}" if number else unit
+        lasting = [one for one in simulation.faults.active if one.unit == unit]
+        if not ended and lasting:
+            other = lasting[0]
+            return Answer(DENIED, f"no fault of {which} alone to end: what lasts is {other}")
+        if not ended:
+            return Answer(ACCEPTED, f"{which} works: there was no fault to end")
+        return Answer(ACCEPTED, f"fault ended: {', '.join(str(one) for one in ended)}")
     kind = _KINDS.get(asked.kind)
     if kind is None:
         return Answer(UNSUPPORTED, f"no fault: kind {asked.kind} is not one of 0 to 7")

@@ -196,17 +196,30 @@ def load_into(plant: Plant, state: Array, inputs: Inputs, work: Workspace) -> No
 
 
 @kernel
+def place_bodies(plant: Plant, state: Array, work: Workspace) -> None:
+    """Rotation and posture of a state (17 + 2j,) [SI] into ``work``."""
+    joints = work.still.shape[0]
+    rotation_into(state, Q_WB, work.rotation)
+    posture_into(plant.chain, state[ARM : ARM + joints], work.posture)
+
+
+@kernel
 def acceleration_into(plant: Plant, state: Array, inputs: Inputs, work: Workspace) -> None:
+    """``placed_acceleration_into`` for any state (17 + 2j,) [SI]."""
+    place_bodies(plant, state, work)
+    placed_acceleration_into(plant, state, inputs, work)
+
+
+@kernel
+def placed_acceleration_into(plant: Plant, state: Array, inputs: Inputs, work: Workspace) -> None:
     """Solve M x = load − bias into ``work.load``: base linear and angular, joint accelerations.
 
-    Taken at a state (17 + 2j,) [SI], see ``sitl.plant.state``.
+    Taken at a state (17 + 2j,) [SI], see ``sitl.plant.state``, whose bodies ``work`` has placed.
 
     The linear part is the acceleration of the base origin written in B (not the rate of the
     velocity's components in B).
     """
     joints, load, bias = work.still.shape[0], work.load, work.bias
-    rotation_into(state, Q_WB, work.rotation)
-    posture_into(plant.chain, state[ARM : ARM + joints], work.posture)
     lift = scale(-1.0, gravity_in_body(work.rotation, plant.gravity))
     w, still = triple(state, W_WB_B), (0.0, 0.0, 0.0)
     rates = state[ARM + joints :]
@@ -240,8 +253,11 @@ def hold_joint(mass: Array, load: Array, row: int) -> None:
 def derivative_into(
     plant: Plant, state: Array, inputs: Inputs, work: Workspace, out: Array
 ) -> None:
-    """Time derivative into out (17 + 2j,) [SI/s] at a state (17 + 2j,) [SI]."""
-    acceleration_into(plant, state, inputs, work)
+    """Time derivative into out (17 + 2j,) [SI/s] at a state (17 + 2j,) [SI].
+
+    ``work`` has placed the bodies.
+    """
+    placed_acceleration_into(plant, state, inputs, work)
     put(out, P_WB, triple(state, V_WB))
     put(out, V_WB, times(work.rotation, triple(work.load, 0)))
     put(out, W_WB_B, triple(work.load, 3))

@@ -19,7 +19,7 @@ class Chain(NamedTuple):
 
     mount_R: Array  # (3, 3) columns x0, y0, z0 of DH frame 0, written in B
     mount_p: Array  # (3,) m, origin of DH frame 0 in B
-    dh: Array  # (j, 4): a m, alpha rad, d m, theta offset rad
+    dh: Array  # (j, 5): a m, cosine and sine of alpha, d m, theta offset rad
     mass: Array  # (j+1,) kg
     com: Array  # (j+1, 3) m, centre of mass in the body's own frame
     inertia: Array  # (j+1, 3, 3) kg·m², about the centre of mass, in the body's own frame
@@ -68,9 +68,9 @@ def _place(chain: Chain, i: int, out: Posture) -> None:
 @kernel
 def _turn(chain: Chain, i: int, angle: float, out: Posture) -> None:
     """DH frame ``i`` from frame i − 1 and the angle of joint ``i``."""
-    a, alpha, d = chain.dh[i - 1, 0], chain.dh[i - 1, 1], chain.dh[i - 1, 2]
-    theta = angle + chain.dh[i - 1, 3]
-    c, s, ca, sa = np.cos(theta), np.sin(theta), np.cos(alpha), np.sin(alpha)
+    a, ca, sa = chain.dh[i - 1, 0], chain.dh[i - 1, 1], chain.dh[i - 1, 2]
+    d, theta = chain.dh[i - 1, 3], angle + chain.dh[i - 1, 4]
+    c, s = np.cos(theta), np.sin(theta)
     axes = out.axes
     for r in range(3):
         z = axes[i - 1, r, 2]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 
@@ -12,15 +12,17 @@ from sitl.plant.aerial_manipulator import (
     Inputs,
     Plant,
     Workspace,
-    acceleration_into,
     derivative_into,
     empty_workspace,
     gravity_in_body,
+    place_bodies,
+    placed_acceleration_into,
 )
 from sitl.plant.bodies import posture_into
 from sitl.plant.gears import move_free, part_teeth, servo_rates_into
-from sitl.plant.kinematics import place_into, touch_down_speed
+from sitl.plant.kinematics import places_of_bodies, touch_down_speed
 from sitl.plant.mass_matrix import mass_matrix_into, solve_in_place
+from sitl.plant.packing import pack_params
 from sitl.plant.state import ARM, Q_WB, V_WB, W_WB_B
 from sitl.plant.vector import V3, V4, Array, add, put, rotation_into, sub, times, triple
 
@@ -35,6 +37,14 @@ class Slopes(NamedTuple):
     middle: Array
 
 
+class Memory(NamedTuple):
+    """All that a run of steps writes beside its results."""
+
+    work: Workspace
+    slopes: Slopes
+    moved: Array  # (j,)
+
+
 class Arrival(NamedTuple):
     """What a run of steps ended with, besides the state."""
 
@@ -44,8 +54,11 @@ class Arrival(NamedTuple):
 
 @kernel
 def specific_force(plant: Plant, state: Array, inputs: Inputs, work: Workspace) -> V3:
-    """Acceleration minus gravity at the base origin [m/s², B] in a state (17 + 2j,) [SI]."""
-    acceleration_into(plant, state, inputs, work)
+    """Acceleration minus gravity at the base origin [m/s², B] in a state (17 + 2j,) [SI].
+
+    ``work`` has placed the bodies.
+    """
+    placed_acceleration_into(plant, state, inputs, work)
     return sub(triple(work.load, 0), gravity_in_body(work.rotation, plant.gravity))
 
 
@@ -53,23 +66,29 @@ def specific_force(plant: Plant, state: Array, inputs: Inputs, work: Workspace) 
 def rk4_step(
     plant: Plant, state: Array, inputs: Inputs, step: float, work: Workspace, slopes: Slopes
 ) -> None:
-    """Advance a state (17 + 2j,) [SI] in place by ``step`` [s]; the attitude gets unit length."""
+    """Advance a state (17 + 2j,) [SI] in place by ``step`` [s]; the attitude gets unit length.
+
+    ``work`` has placed the bodies of the state before.
+    """
     n = state.shape[0]
     one, total, middle = slopes.one, slopes.total, slopes.middle
-    derivative_into(plant, state, inputs, work, total)
     for i in range(n):
-        middle[i] = state[i] + 0.5 * step * total[i]
-    derivative_into(plant, middle, inputs, work, one)
+        middle[i] = state[i]
+    for stage in range(4):
+        if stage > 0:
+            place_bodies(plant, middle, work)
+        derivative_into(plant, middle, inputs, work, one)
+        ahead = step if stage == 2 else 0.5 * step
+        for i in range(n):
+            if stage == 0:
+                total[i] = one[i]
+            elif stage < 3:
+                total[i] += 2.0 * one[i]
+            else:
+                total[i] += one[i]
+            middle[i] = state[i] + ahead * one[i]
     for i in range(n):
-        total[i] += 2.0 * one[i]
-        middle[i] = state[i] + 0.5 * step * one[i]
-    derivative_into(plant, middle, inputs, work, one)
-    for i in range(n):
-        total[i] += 2.0 * one[i]
-        middle[i] = state[i] + step * one[i]
-    derivative_into(plant, middle, inputs, work, one)
-    for i in range(n):
-        state[i] += step / 6.0 * (total[i] + one[i])
+        state[i] += step / 6.0 * total[i]
     length = 0.0
     for i in range(Q_WB, Q_WB + 4):
         length += state[i] * state[i]
@@ -89,10 +108,10 @@ def geared_step(
 ) -> None:
     """``rk4_step`` of ``step`` [s] with the gaps of the gears; ``moved`` (j,) [rad] is memory.
 
-    The ``state`` (17 + 2j,) [SI] is advanced in place.
+    The ``state`` (17 + 2j,) [SI] is advanced in place; ``work`` has placed its bodies.
     """
     joints = moved.shape[0]
-    acceleration_into(plant, state, inputs, work)
+    placed_acceleration_into(plant, state, inputs, work)
     part_teeth(plant.gears, inputs.torque, work.load, state[ARM + joints :])
     for i in range(joints):
         moved[i] = -state[ARM + i]
@@ -122,41 +141,77 @@ def strike(plant: Plant, state: Array, momentum: Array, work: Workspace) -> None
         state[ARM + joints + i] += work.load[6 + i]
 
 
-@compiled
-def integrate(
-    plant: Plant, state: Array, inputs: Inputs, step: float, places: Array, states: Array
+@kernel
+def run_steps(
+    plant: Plant,
+    state: Array,
+    inputs: Inputs,
+    step: float,
+    places: Array,
+    states: Array,
+    memory: Memory,
 ) -> Arrival:
-    """Advance ``state`` (17 + 2j,) [SI] in place by one ``step`` [s] per row of ``places``.
-
-    One call does all that an exchange needs, because handing the plant's arrays to compiled code
-    costs as much as two steps. The inputs are held over all steps.
-
-    Base origin and origin of every DH frame go to places (steps, 2 + j, 3) [m, NED], after each
-    step, and the state itself to ``states`` (steps, 17 + 2j) [SI], but with the rates of the
-    joints' servos, which limits are about; without rows the state stays as it is.
-    """
-    n = state.shape[0]
-    work = empty_workspace((n - ARM) // 2)
-    slopes = Slopes(np.empty(n), np.empty(n), np.empty(n))
-    moved = np.empty((n - ARM) // 2)
+    """``integrate`` with ``memory`` to write to."""
+    n, moved, work = state.shape[0], memory.moved, memory.work
     fastest = 0.0
+    place_bodies(plant, state, work)
     for k in range(places.shape[0]):
         loose = plant.gears.gap > 0.0
         if loose:
-            geared_step(plant, state, inputs, step, work, slopes, moved)
+            geared_step(plant, state, inputs, step, work, memory.slopes, moved)
         else:
-            rk4_step(plant, state, inputs, step, work, slopes)
-        place_into(plant, state, work, k, places)
-        states[k] = state
+            rk4_step(plant, state, inputs, step, work, memory.slopes)
+        place_bodies(plant, state, work)
+        places_of_bodies(state, work, k, places)
+        for i in range(n):
+            states[k, i] = state[i]
         if loose:
             servo_rates_into(plant.gears, states[k, n - len(moved) :])
         fastest = max(fastest, touch_down_speed(plant, state, work))
     return Arrival(fastest, specific_force(plant, state, inputs, work))
 
 
+class Held(NamedTuple):
+    """Inputs of a step and all memory that it writes, in one block."""
+
+    inputs: Inputs
+    memory: Memory
+
+
+def held(joints: int) -> Sequence[Held]:
+    """A block for ``step`` and a vehicle with ``joints`` joints, in an array of one."""
+    n = ARM + 2 * joints
+    inputs = Inputs(np.zeros(4), np.zeros(joints), np.zeros(3), np.zeros(3))
+    slopes = Slopes(np.zeros(n), np.zeros(n), np.zeros(n))
+    memory = Memory(empty_workspace(joints), slopes, np.zeros(joints))
+    return cast(Sequence[Held], np.array([pack_params(Held(inputs, memory))]))
+
+
+@compiled
+def integrate(
+    plant: Plant,
+    state: Array,
+    inputs: Inputs,
+    step: float,
+    places: Array,
+    states: Array,
+    blocks: Sequence[Held],
+) -> Arrival:
+    """Advance ``state`` (17 + 2j,) [SI] in place by one ``step`` [s] per row of ``places``.
+
+    The inputs are held over all steps; ``blocks`` is one, for memory.
+
+    Base origin and origin of every DH frame go to places (steps, 2 + j, 3) [m, NED], after each
+    step, and the state itself to ``states`` (steps, 17 + 2j) [SI], but with the rates of the
+    joints' servos, which limits are about; without rows the state stays as it is.
+    """
+    return run_steps(plant, state, inputs, step, places, states, blocks[0].memory)
+
+
 @compiled
 def step(
     plants: Sequence[Plant],
+    blocks: Sequence[Held],
     state: Array,
     thrust: V4,
     torque: tuple[float, ...],
@@ -165,8 +220,11 @@ def step(
     step_s: float,
     places: Array,
     states: Array,
-) -> Arrival:
-    """``integrate`` with the plant in an array of one and inputs in tuples: the cheapest to call.
+) -> tuple[float, V3]:
+    """``integrate`` with plant and memory in arrays of one, inputs in tuples: the cheapest to call.
+
+    One call does all that an exchange needs, because handing the plant's arrays to compiled code
+    one by one costs as much as two steps.
 
     ``thrust`` [N] and ``torque`` [N·m] are commanded, rotors 1 to 4 and joints;
     ``force_W`` [N, NED] and ``torque_B`` [N·m, B] disturb the base.
@@ -174,5 +232,12 @@ def step(
     Overwritten are state (17 + 2j,) [SI], places (steps, 2 + j, 3) [m, NED] and ``states``
     (steps, 17 + 2j) [SI].
     """
-    inputs = Inputs(np.array(thrust), np.array(torque), np.array(force_W), np.array(torque_B))
-    return integrate(plants[0], state, inputs, step_s, places, states)
+    inputs = blocks[0].inputs
+    for i in range(4):
+        inputs.thrust[i] = thrust[i]
+    for i in range(len(torque)):
+        inputs.torque[i] = torque[i]
+    put(inputs.force_W, 0, force_W)
+    put(inputs.torque_B, 0, torque_B)
+    arrival = run_steps(plants[0], state, inputs, step_s, places, states, blocks[0].memory)
+    return arrival.landing_speed, arrival.felt

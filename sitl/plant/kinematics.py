@@ -3,23 +3,20 @@
 from __future__ import annotations
 
 from sitl.compiled import compiled, kernel
-from sitl.plant.aerial_manipulator import Plant, Workspace, empty_workspace
-from sitl.plant.bodies import posture_into
-from sitl.plant.state import ARM, P_WB, Q_WB, V_WB, W_WB_B
-from sitl.plant.vector import V3, Array, add, cross, rotation_into, row, times, triple
+from sitl.plant.aerial_manipulator import Plant, Workspace, empty_workspace, place_bodies
+from sitl.plant.state import ARM, P_WB, V_WB, W_WB_B
+from sitl.plant.vector import V3, Array, add, cross, row, times, triple
 
 
 @kernel
-def place_into(plant: Plant, state: Array, work: Workspace, k: int, out: Array) -> None:
-    """Positions in W of base origin and DH frames for a state (17 + 2j,) [SI], into entry k.
+def places_of_bodies(state: Array, work: Workspace, k: int, out: Array) -> None:
+    """Positions in W of base origin and DH frames of a state (17 + 2j,) [SI], into entry k.
 
     Entries of out (n, 2 + j, 3) [m, NED] are base, DH frame 0 (joint 1), …, DH frame j
-    (end-effector); where there is room for three more, the base's axes [1, NED]. ``work`` is left
-    with rotation and posture of the state.
+    (end-effector); where there is room for three more, the base's axes [1, NED]. ``work`` has
+    placed the bodies.
     """
     joints = work.still.shape[0]
-    rotation_into(state, Q_WB, work.rotation)
-    posture_into(plant.chain, state[ARM : ARM + joints], work.posture)
     base = triple(state, P_WB)
     _put(out, k, 0, base)
     for i in range(joints + 1):
@@ -37,8 +34,10 @@ def _put(out: Array, k: int, i: int, p: V3) -> None:
 
 @compiled
 def places(plant: Plant, state: Array, out: Array) -> None:
-    """``place_into`` for one state (17 + 2j,) [SI], into out (1, 2 + j, 3) [m, NED]."""
-    place_into(plant, state, empty_workspace((state.shape[0] - ARM) // 2), 0, out)
+    """``places_of_bodies`` for one state (17 + 2j,) [SI], into out (1, 2 + j, 3) [m, NED]."""
+    work = empty_workspace((state.shape[0] - ARM) // 2)
+    place_bodies(plant, state, work)
+    places_of_bodies(state, work, 0, out)
 
 
 @kernel

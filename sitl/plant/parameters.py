@@ -186,7 +186,9 @@ def chain(vehicle: Vehicle) -> Chain:
     return Chain(
         mount_R=np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]),
         mount_p=np.array(vehicle.mount),
-        dh=np.array([(k.a, k.alpha, k.d, k.theta_offset) for k in links]).reshape(-1, 4),
+        dh=np.array(
+            [(k.a, math.cos(k.alpha), math.sin(k.alpha), k.d, k.theta_offset) for k in links]
+        ).reshape(-1, 5),
         mass=np.array([vehicle.base_mass, *(link.mass for link in links)]),
         com=np.array([vehicle.base_com, *(link.com for link in links)]),
         inertia=np.array([np.diag(diagonal) for diagonal in diagonals]),

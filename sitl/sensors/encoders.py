@@ -18,28 +18,36 @@ class EncoderSensor:
     def __init__(self, keys: Encoders, random: np.random.Generator, joints: int) -> None:
         self._keys = keys
         self._random = random
-        self._offset = normal(random, keys.offset_rad, joints)
-        self._draws: list[float] = []
+        self._offset = tuple(normal(random, keys.offset_rad, joints))
+        self._rest: list[float] = []  # of the numbers drawn, too few for all joints
+        # With the noise, of the samples to come, the next one last.
+        self._offsets: list[tuple[float, ...]] = []
 
     def measure(
         self, exact: SensorReadings, thrust: V4, stamp_us: int, outlier: bool
     ) -> JointMeasurement:
         """All angles; an outlier has a wrong bit, in the first joint."""
-        keys = self._keys
         offset = self._offset
-        if keys.noise_rad > 0.0:
-            offset = [zero + self._noise() for zero in offset]
+        if self._keys.noise_rad > 0.0:
+            if not self._offsets:
+                self._offsets = self._drawn()
+            offset = self._offsets.pop()
         if outlier:
-            offset = [offset[0] + keys.outlier_rad, *offset[1:]]
-        grid = keys.resolution_rad
+            offset = (offset[0] + self._keys.outlier_rad, *offset[1:])
+        grid = self._keys.resolution_rad
+        pairs = zip(exact.q_arm, offset, strict=True)
         if grid > 0.0:
-            pairs = zip(exact.q_arm, offset, strict=True)
-            angles = tuple([grid * round((angle + more) / grid) for angle, more in pairs])
-        else:
-            angles = tuple([a + more for a, more in zip(exact.q_arm, offset, strict=True)])
-        return JointMeasurement(stamp_us, angles)
+            return JointMeasurement(
+                stamp_us, tuple([grid * round((a + b) / grid) for a, b in pairs])
+            )
+        return JointMeasurement(stamp_us, tuple([angle + more for angle, more in pairs]))
 
-    def _noise(self) -> float:
-        if not self._draws:
-            self._draws = normal(self._random, self._keys.noise_rad, _BLOCK)
-        return self._draws.pop()
+    def _drawn(self) -> list[tuple[float, ...]]:
+        """Offset and noise of the samples to come: as many numbers as fill them, joint by joint."""
+        joints = len(self._offset)
+        # The last number of a block is taken first.
+        drawn = self._rest + normal(self._random, self._keys.noise_rad, _BLOCK)[::-1]
+        filled = len(drawn) // joints * joints
+        self._rest = drawn[filled:]
+        samples = np.reshape(drawn[:filled], (-1, joints)) + self._offset
+        return list(map(tuple, samples[::-1].tolist()))

@@ -19,7 +19,7 @@ FINE = Soaked(
     dropped=0,
     read=1,
     written=1,
-    glances={"fsw 1": STEADY},
+    glances={"fsw 1": STEADY, "sitl 2": STEADY},
     ended="flew 500 s",
     flown_s=500.0,
 )
@@ -49,8 +49,18 @@ def test_a_leak_of_memory_and_of_handles_is_seen() -> None:
             {"commands without an answer within 1 s"},
         ),
         (
-            replace(FINE, glances={"sitl 2": [g._replace(threads=int(g.at_s)) for g in STEADY]}),
+            replace(
+                FINE,
+                glances={
+                    "fsw 1": STEADY,
+                    "sitl 2": [g._replace(threads=int(g.at_s)) for g in STEADY],
+                },
+            ),
             {"sitl: threads, growth"},
+        ),
+        (
+            replace(FINE, glances={"fsw 1": STEADY, "sitl 2": STEADY[:30]}),
+            {"processes that were not seen for long enough"},
         ),
     ],
 )

@@ -139,7 +139,8 @@ class Flight:
 
     def step(self, *commands: Command, tuning: Tuning | None = None) -> TickOutputs:
         """Sense, tick, plan, advance."""
-        sensors = self.spoil(self.closed.sense())
+        sensors, samples = self.closed.observe()
+        sensors = self.spoil(sensors)
         self.inputs = TickInputs(
             sensors,
             self.closed.planner.take(sensors.t_us),
@@ -148,7 +149,7 @@ class Flight:
             announced(self.scenario) if self.announces and self.sim.step == 0 else (),
             tuning=tuning,
             mission=self.upload,
-            samples=self.spoil_samples(self.closed.samples()),
+            samples=self.spoil_samples(samples),
         )
         self.upload = None
         if self.streamed and self.sim.step % STREAM_STEPS == 0:

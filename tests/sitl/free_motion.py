@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from sitl.plant.aerial_manipulator import Inputs, plant
-from sitl.plant.integrator import integrate
+from sitl.plant.integrator import held, integrate
 from sitl.plant.parameters import EndStops, Vehicle
 from sitl.plant.state import at_rest
 from sitl.plant.vector import Array
@@ -42,5 +42,5 @@ def flown(vehicle: Vehicle, start: Array, seconds: float, step: float) -> Array:
     inputs = Inputs(np.zeros(4), np.zeros(joints), np.zeros(3), np.zeros(3))
     places = np.empty((round(seconds / step), 2 + joints, 3))
     states = np.empty((len(places), len(state)))
-    integrate(plant(vehicle), state, inputs, step, places, states)
+    integrate(plant(vehicle), state, inputs, step, places, states, held(joints))
     return state

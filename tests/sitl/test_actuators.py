@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from sitl.plant.actuators import joint_torque, thrust_rate
 from sitl.plant.aerial_manipulator import Inputs, acceleration_into, empty_workspace, plant
-from sitl.plant.integrator import integrate
+from sitl.plant.integrator import held, integrate
 from sitl.plant.parameters import EndStops, Vehicle
 from sitl.plant.state import at_rest
 from sitl.plant.trim import NoTrimError, level_hover
@@ -24,7 +24,8 @@ def test_a_rotor_reaches_63_percent_of_a_step_after_its_lag() -> None:
     view = StateView(state)
     view.p_WB[2] = -50.0
     inputs = Inputs(np.array([5.0, 0.0, 99.0, -3.0]), np.zeros(2), np.zeros(3), np.zeros(3))
-    integrate(plant(vehicle), state, inputs, 0.001, np.empty((40, 4, 3)), np.empty((40, 21)))
+    room = (np.empty((40, 4, 3)), np.empty((40, 21)), held(2))
+    integrate(plant(vehicle), state, inputs, 0.001, *room)
     grown = 1.0 - math.exp(-1.0)
     # Commands beyond the rotor's range act like the limit they exceed.
     expected = [5.0 * grown, 0.0, vehicle.rotors.thrust_max * grown, 0.0]

@@ -10,7 +10,7 @@ import pytest
 
 from sitl.plant.actuators import stop_torque
 from sitl.plant.aerial_manipulator import Inputs, plant
-from sitl.plant.integrator import STEP_S, integrate
+from sitl.plant.integrator import STEP_S, held, integrate
 from sitl.plant.parameters import GRAVITY, EndStops, Vehicle
 from sitl.plant.state import ARM, at_rest
 from sitl.plant.vector import Array
@@ -36,7 +36,8 @@ def driven(vehicle: Vehicle, start: Array, torque: tuple[float, float], steps: i
     """Every state under constant joint torques."""
     inputs = Inputs(np.full(4, 8.6), np.array(torque), np.zeros(3), np.zeros(3))
     states = np.empty((steps, len(start)))
-    integrate(plant(vehicle), start.copy(), inputs, STEP_S, np.empty((steps, 4, 3)), states)
+    room = (np.empty((steps, 4, 3)), states, held(2))
+    integrate(plant(vehicle), start.copy(), inputs, STEP_S, *room)
     return states
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from sitl.plant.aerial_manipulator import Inputs, Plant, plant
-from sitl.plant.integrator import integrate
+from sitl.plant.integrator import held, integrate
 from sitl.plant.parameters import Motors, Vehicle
 from sitl.plant.state import ARM, at_rest
 from sitl.plant.vector import Array
@@ -44,7 +44,7 @@ class Arm:
     def step(self, torque: tuple[float, float] = (0.0, 0.0)) -> None:
         inputs = Inputs(np.zeros(4), np.array(torque), np.zeros(3), np.zeros(3))
         room = np.empty((1, 4, 3)), self.judged
-        integrate(self.plant, self.state, inputs, STEP_S, *room)
+        integrate(self.plant, self.state, inputs, STEP_S, *room, held(2))
 
     def speeds(self) -> Array:
         """Of the motors [rad/s], whether free or not."""

@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from fsw.model.airframe import AIRFRAME
-from sitl.limits import LimitRecord, limits
+from sitl.limits import LimitRecord, limits, record_use
 from sitl.plant.parameters import EndStops, Vehicle
 from sitl.plant.state import at_rest
 from sitl.plant.vector import Array
@@ -46,6 +46,14 @@ def state_with(key: str, value: float) -> tuple[Array, tuple[float, float]]:
     return state, (torque, thrust)
 
 
+def add(
+    record: LimitRecord, states: list[Array], sent: tuple[float, float], before_s: float
+) -> None:
+    """Take steps that followed ``before_s``."""
+    most, use = record.arrays
+    record_use(np.array(states), sent, most, (before_s, STEP_S), use)
+
+
 @pytest.mark.requirement("REQ-ACT-9")
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
 @pytest.mark.parametrize("key", KEYS)
@@ -61,9 +69,9 @@ def test_each_limit_is_recorded_alone_timed_and_broken_beyond_its_tolerance(
         record = LimitRecord(Vehicle())
         quiet, sent = state_with(key, 0.2 * sign * limit.most)
         loud, much = state_with(key, sign * value)
-        record.add(np.array([quiet, quiet]), sent, 0.0, STEP_S)
-        record.add(np.array([loud, loud]), much, 0.002, STEP_S)
-        record.add(np.array([quiet, quiet]), sent, 0.004, STEP_S)
+        add(record, [quiet, quiet], sent, 0.0)
+        add(record, [loud, loud], much, 0.002)
+        add(record, [quiet, quiet], sent, 0.004)
         uses = record.uses()
         assert uses[key].largest == pytest.approx(value, rel=1e-9)
         assert uses[key].at_s == pytest.approx(0.003)
@@ -80,7 +88,8 @@ def test_what_is_not_a_number_breaks_its_limit() -> None:
     state = at_rest(2)
     StateView(state).q_arm[0] = math.nan
     record = LimitRecord(Vehicle())
-    record.add(np.array([state]), (0.0, 0.0), 0.0, STEP_S)
+    assert not record.uses()
+    add(record, [state], (0.0, 0.0), 0.0)
     assert not record.uses()["joint_1_angle"].kept
     assert record.uses()["tilt"].kept
 

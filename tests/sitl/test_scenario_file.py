@@ -310,6 +310,12 @@ FAULT = '[[faults]]\nunit = "{}"\nkind = "{}"\n{}\n'
         ("motor", "off", "instance = 5", "faults[0].instance = 5: must be 0 to 4"),
         ("joint", "off", "instance = 3", "faults[0].instance = 3: must be 0 (all) to 2"),
         ("gps", "off", "instance = 1", "faults[0].instance = 1: must be 0, because"),
+        (
+            "clock",
+            "jump",
+            "jump_s = -2.0\nstart_s = 1.0",
+            "faults[0].jump_s = -2: must be at least -1",
+        ),
         ("gyro", "off", "start_s = -1", "faults[0].start_s = -1: must be 0 to 86400"),
         ("gyro", "off", "duration = 1", 'unknown key "faults[0].duration" = 1, did you mean'),
     ],
@@ -328,6 +334,13 @@ def test_a_fault_that_means_nothing_in_lockstep_is_refused_there() -> None:
     check_pacing(late, realtime=True)
     with pytest.raises(ScenarioError, match=r"faults\[0\]: to vehicle delayed needs real time"):
         check_pacing(late, realtime=False)
+
+
+def test_encoders_of_a_suite_share_a_message_and_lose_it_together() -> None:
+    text = BASE + FAULT.format("encoder", "off", "instance = 1")
+    check(parse_scenario(text, "one"))
+    with pytest.raises(ScenarioError, match=r"instance = 1: must be 0 \(all\)"):
+        check(parse_scenario(text, "one", "mocap"))
 
 
 def test_a_fault_of_a_sensor_needs_the_sensor_in_the_suite_that_is_flown() -> None:

@@ -58,7 +58,7 @@ def test_no_violation_gives_the_closed_form() -> None:
     assert bounds(0, 2995, 0.95).upper <= 1e-3 < bounds(0, 2994, 0.95).upper
 
 
-@pytest.mark.parametrize(("total", "p"), product([20, 150], [0.005, 0.03, 0.4]))
+@pytest.mark.parametrize(("total", "p"), list(product([20, 150], [0.005, 0.03, 0.4])))
 def test_the_bounds_cover_the_truth_at_least_as_often_as_promised(total: int, p: float) -> None:
     shares = binom.pmf(np.arange(total + 1), total, p)
     for beyond in (0.05, 0.01):

@@ -133,6 +133,15 @@ def test_a_scenario_beside_the_file_is_found_and_named_as_it_is(tmp_path: Path) 
     assert plan.files == ("own.toml",)
 
 
+def test_values_that_contradict_each_other_are_a_row_with_the_reason() -> None:
+    text = HEAD + "[vary]\ntrajectory.ramp_s = { choice = [600.0] }\n"
+    row = CampaignFlights(plan_of(text), 3)[2].row()
+    assert row.error
+    assert row.flight == 2
+    assert row.values == {"trajectory.ramp_s": 600.0}
+    assert "must be at most half" in row.reason
+
+
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import genpareto, goodness_of_fit
 
-from studies.extremes import Array, NoFitError, TailFit, anderson_darling, fit_tail
+from studies.extremes import Array, NoFitError, TailFit, anderson_darling, fit_tail, most_likely
 
 
 def margins(shape: float, count: int, seed: int) -> Array:
@@ -52,6 +52,19 @@ def test_the_statistic_is_that_of_another_implementation() -> None:
     )
     law = other.fit_result.params
     assert anderson_darling(excess, law.c, law.scale) == pytest.approx(other.statistic, rel=1e-9)
+
+
+@pytest.mark.parametrize("shape", [-0.6, -0.2, 0.0, 0.4])
+def test_no_other_search_finds_a_likelier_law(shape: float) -> None:
+    for seed in range(3):
+        random = np.random.default_rng(seed)
+        excess = genpareto.rvs(shape, scale=2.0, size=80, random_state=random)
+        other, _, scale = genpareto.fit(excess, floc=0.0)
+        mine = genpareto.logpdf(excess, most_likely(excess)[0], scale=most_likely(excess)[1]).sum()
+        theirs = genpareto.logpdf(excess, other, scale=scale).sum()
+        assert mine >= theirs - 1e-6
+        if other > -1.0:
+            assert most_likely(excess) == pytest.approx((other, scale), abs=2e-3)
 
 
 def refusal(values: list[float]) -> str:

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from fsw.parameters.flight_config import FlightConfig, flight_config
-from sitl.scenario_file import load_scenario
+from sitl.scenario_file import load_scenario, parse_scenario
+from sitl.scenario_text import scenario_text
 from studies.closed_loop import simulate
-from studies.falsify import Outcome, Search, replay, search, search_and_fly
+from studies.falsify import Outcome, Search, as_scenario, replay, search, search_and_fly
 from studies.plan_record import PlanRecord, record
 from studies.tracked_flight import Disturbance
 from studies.whole_flight import WholeFlight
@@ -101,6 +102,18 @@ def test_what_was_found_flies_the_same_with_planner_and_referee() -> None:
     flown = replay(SCENARIO, NOW, worst.start.step, worst.pushes, _silent)
     assert flown.off_m == pytest.approx(worst.off_m, abs=1e-4)
     assert flown.margin_m == pytest.approx(worst.margin_m, abs=1e-3)
+
+
+def test_what_was_found_is_a_scenario_that_reproduces_the_margin() -> None:
+    worst = _found().worst
+    text = scenario_text(as_scenario(SCENARIO, worst))
+    warned = replace(NOW, limits=replace(NOW.limits, breach_action=1))  # as the search flies
+    truth = simulate(parse_scenario(text, "worst"), 0, warned).truth
+    calm = simulate(replace(SCENARIO, disturbances=()), 0, warned).truth
+    assert truth.min_margin_m is not None
+    assert calm.min_margin_m is not None
+    assert truth.min_margin_m == pytest.approx(min(worst.margin_m, calm.min_margin_m), abs=1e-3)
+    assert truth.min_margin_m < calm.min_margin_m - 0.01
 
 
 @pytest.mark.parametrize("name", ["shelf", "crossing"])

@@ -90,3 +90,6 @@ def test_a_page_of_another_site_cannot_reach_it(log_page: tuple[Page, Server]) -
     where = address(server).replace("http", "ws")
     with pytest.raises(websockets.exceptions.InvalidStatus, match="403"):
         connect(where, origin="http://elsewhere.example", subprotocols=["viser-v0.0.0"])
+    port = where.rsplit(":", 1)[1]
+    with pytest.raises(websockets.exceptions.InvalidStatus, match="403"):
+        connect(where, origin=f"http://elsewhere.example:{port}", subprotocols=["viser-v0.0.0"])

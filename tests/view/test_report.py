@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import gzip
 import json
+import math
 import re
 from importlib.resources import files
 from pathlib import Path
@@ -150,7 +151,8 @@ def test_the_estimators_error_is_estimate_minus_truth(drawn: dict[str, Any]) -> 
         shown = trace(drawn["estimator"], name)
         np.testing.assert_allclose(shown["y"], 1e3 * offset, atol=1e-3)
     high = [one for one in drawn["estimator"]["data"] if one["name"] == "3 σ"]
-    assert high[0]["y"][0] == pytest.approx(6.0)
+    # 2 mm are stated of north and east together.
+    assert high[0]["y"][0] == pytest.approx(6.0 / math.sqrt(2.0), rel=1e-4)
 
 
 def test_the_loop_and_its_stages_are_those_that_were_measured(drawn: dict[str, Any]) -> None:

@@ -64,6 +64,21 @@ def test_failsafes_are_named_as_long_as_they_last() -> None:
         assert telemetry.scene(0.0).failures == shown
 
 
+def test_a_vehicle_that_starts_again_has_none_of_the_last_flight() -> None:
+    telemetry = Telemetry()
+    take(telemetry, *everything())
+    said = failsafe_event(
+        FailsafeEvent(Condition.BREACH.value, Action.HOLD.value, Severity.CRITICAL)
+    )
+    arguments = said.arguments.ljust(ARGUMENTS, b"\0")
+    take(telemetry, Outgoing(ids.EVENT, (said.id, 0, 0, 0, 0, 0x44, *arguments)))
+    for t in (100.0, 0.5):
+        telemetry.read_clock(t)
+    scene = telemetry.scene(0.0)
+    assert scene.t == 0.5
+    assert (scene.failures, scene.target, scene.safe_set, scene.margins) == ("", None, None, ())
+
+
 def test_the_scene_is_the_snapshot_that_was_sent() -> None:
     telemetry = Telemetry()
     take(telemetry, *everything())

@@ -37,6 +37,17 @@ def test_surface_and_shell_are_where_the_flight_software_has_them(shape: Shape) 
         np.testing.assert_allclose(distances, away, atol=0.01)
 
 
+@pytest.mark.parametrize(
+    ("top", "bottom"), [(-0.3, 0.0), (-0.3, 9.0), (-9.0, -4.0), (-9.0, -3.0), (0.0, 1.0)]
+)
+def test_a_cylinder_outside_the_region_is_drawn_where_it_ends(top: float, bottom: float) -> None:
+    low = ((-2.0, -2.0, -3.0), (2.0, 2.0, -1.0))
+    mesh = zone_mesh(Zone(vertical_cylinder((0.0, 0.0), 0.25, top, bottom), 0.0), low, None)
+    assert mesh is not None
+    heights = mesh.surface.vertices[:, 2]
+    assert top - 0.03 <= heights.min() < heights.max() <= bottom + 0.03
+
+
 @pytest.mark.parametrize("shape", SHAPES[1:], ids=lambda shape: shape.kind)
 def test_triangles_face_outwards_and_close_the_surface(shape: Shape) -> None:
     mesh = zone_mesh(Zone(shape, 0.0), REGION, None)

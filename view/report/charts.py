@@ -89,11 +89,12 @@ def margins(flights: Sequence[Reported]) -> Chart:
     )
     if any(len(flight.margins.of_zones()) > _MOST_ZONES for flight in flights if flight.margins):
         note += f" Of more zones the {_MOST_ZONES} nearest are drawn."
-    if any(flight.margins is None for flight in flights):
-        note = (
-            "Distance beyond the required clearance, by the vehicle's own estimate: the scenario "
-            "is none of this build's, or the log has no true state. The circle is the minimum in "
-            "the result, by the true state."
+    own = [flight.label for flight in flights if flight.margins is None]
+    if own:
+        whose = "" if len(own) == len(flights) else f" of {', '.join(own)}"
+        note += (
+            f" The lines{whose} are the vehicle's own estimate: the scenario is none of this "
+            "build's, or the log has no true state."
         )
     span = (min(-20.0, 1.2 * lowest), max(top, 50.0))
     return over_time(
@@ -147,6 +148,7 @@ def parts(flights: Sequence[Reported]) -> Chart:
 def tracking(flights: Sequence[Reported]) -> Chart:
     """Distance of the end-effector from its reference."""
     traces, means = [], []
+    own_only: list[str] = []
     for k, flight in enumerate(flights):
         truth, own = flight.table("sim_tracking"), flight.table("end_effector")
         if truth is not None:
@@ -157,6 +159,8 @@ def tracking(flights: Sequence[Reported]) -> Chart:
             continue
         colour = COLOURS[k % len(COLOURS)]
         size = _MM * np.linalg.norm(error, axis=1)
+        if truth is None:
+            own_only.append(flight.label)
         traces.append(line("distance" if len(flights) == 1 else flight.label, t, size, colour))
         if len(flights) == 1:
             for axis, shade in zip(range(3), COLOURS[1:], strict=False):
@@ -168,11 +172,21 @@ def tracking(flights: Sequence[Reported]) -> Chart:
     return over_time(
         "tracking",
         "Tracking",
-        "Distance of the end-effector from its reference, 10 Hz, true state. "
+        f"Distance of the end-effector from its reference, 10 Hz, {_whose(own_only, flights)}. "
         + ("The whole flight: " + ", ".join(means) + "." if means else ""),
         [Row("error [mm]", traces)],
         _marks(flights),
     )
+
+
+def _whose(own_only: Sequence[str], flights: Sequence[Reported]) -> str:
+    """Whose state is drawn, of flights of which some have no true one."""
+    if not own_only:
+        return "true state"
+    estimated = "the vehicle's own estimate"
+    if len(own_only) == len(flights):
+        return estimated
+    return f"true state; of {', '.join(own_only)} {estimated}"
 
 
 def inputs(flights: Sequence[Reported]) -> Chart | None:
@@ -444,7 +458,9 @@ def estimator(flights: Sequence[Reported]) -> Chart | None:
     for k, name in enumerate(("north", "east", "down")):
         traces = [line(name, t, _MM * error[:, k], COLOURS[k])]
         if status is not None:
+            # The horizontal accuracy is of both axes together.
             sigma = status["pos_vert_accuracy" if k == 2 else "pos_horiz_accuracy"].astype("f8")
+            sigma = sigma if k == 2 else sigma / math.sqrt(2.0)
             t_own, look = flight.since(status.t), {"dash": "dot"}
             for s, named in ((3.0, k == 0), (-3.0, False)):
                 traces.append(line("3 σ", t_own, s * _MM * sigma, ESTIMATE, line=look,

@@ -21,6 +21,7 @@ from view.scene import Event, Scene
 from view.telemetry import Heard, Telemetry
 from view.top.peer import Value, fields, meaning, unit
 
+_LINES: Final = 2000  # of events
 _PERIOD_S: Final = 0.2  # of the picture
 _POLL_S: Final = 0.02  # rates are measured between arrivals
 _BAR: Final = 14  # characters
@@ -80,7 +81,7 @@ class TopApp(App[None]):
             yield DataTable(id="fields", cursor_type="row", zebra_stripes=True)
         with Horizontal(id="lower"):
             yield DataTable(id="margins", cursor_type="none", show_cursor=False)
-            yield RichLog(id="events", wrap=True, markup=False, min_width=20)
+            yield RichLog(id="events", wrap=True, markup=False, min_width=20, max_lines=_LINES)
         yield Footer()
 
     def on_mount(self) -> None:

@@ -361,7 +361,7 @@ def test_a_fault_is_asked_for_in_the_name_of_its_sender_and_the_answer_comes_bac
         ((101, 1, 5), 2, "no fault: motor 5 is not one of 4"),
         ((102, 3, 1), 3, 'no fault: kind = "garbage": a joint can be "off", "stuck"'),
         ((101, 1, 2), 0, "fault injected: motor 2 off"),
-        ((0, 0, 1), 0, "fault ended: gyro"),
+        ((0, 0, 1), 0, "gyro works: there was no fault to end"),
     ],
 )
 def test_the_simulator_says_why_it_lets_nothing_fail(
@@ -371,6 +371,23 @@ def test_the_simulator_says_why_it_lets_nothing_fail(
     answer = carry_out(simulation, Injection(*numbers, system=1, component=1))
     assert answer.result == result
     assert answer.sentence.startswith(sentence)
+
+
+def test_a_fault_ends_for_whom_it_began() -> None:
+    simulation = Simulation(load_scenario("walls-calm"), 0)
+
+    def asked(unit: int, kind: int, instance: int) -> tuple[int, str]:
+        answer = carry_out(simulation, Injection(unit, kind, instance, 1, 1))
+        for _ in range(2):
+            simulation.sense()
+            simulation.advance(Controls((0.5, 0.5, 0.5, 0.5), (0.0, 0.0), armed=True))
+        return answer.result, answer.sentence
+
+    asked(101, 1, 0)
+    assert asked(101, 0, 2) == (2, "no fault of motor 2 alone to end: what lasts is motor off")
+    assert asked(101, 0, 0) == (0, "fault ended: motor off")
+    asked(101, 1, 2)
+    assert asked(101, 0, 2) == (0, "fault ended: motor 2 off")
 
 
 @pytest.mark.parametrize("measured", [False, True])

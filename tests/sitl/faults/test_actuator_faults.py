@@ -11,7 +11,7 @@ import pytest
 from sitl.faults.active import Faults
 from sitl.faults.keys import KINDS, Fault, Kind
 from sitl.plant.aerial_manipulator import Inputs, plant
-from sitl.plant.integrator import integrate
+from sitl.plant.integrator import held, integrate
 from sitl.plant.lock import seize
 from sitl.plant.parameters import Vehicle
 from sitl.scenario import ActuatorKeys, Scenario
@@ -120,7 +120,7 @@ def test_a_flight_with_a_stuck_joint_keeps_energy_and_momentum() -> None:
     zeros = Inputs(np.zeros(4), np.zeros(2), np.zeros(3), np.zeros(3))
     steps = 500
     places, states = np.empty((steps, 4, 3)), np.empty((steps, len(state)))
-    integrate(numbers[0], state, zeros, 0.001, places, states)
+    integrate(numbers[0], state, zeros, 0.001, places, states, held(2))
     after, kept = weigh(vehicle, state)
     assert abs(after - energy) <= 1e-7 * energy
     assert np.abs(kept - momentum)[3:].max() <= 1e-7 * np.linalg.norm(momentum[3:])

@@ -1,0 +1,119 @@
+"""``pandion certify``: what a campaign shows, with exact bounds, as a page that can be checked."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from command_line.options import json_file, option, read
+from command_line.output import complain, console_beside, json_text, unwritten
+from command_line.parser import COULD_NOT_START
+from command_line.values import number
+from pandion.display import Display
+
+if TYPE_CHECKING:
+    from studies.campaign_store import CampaignResult
+
+CERTIFIED, DIFFERS = 0, 1  # exit codes
+PAGE = "certificate.html"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CertifyOptions:
+    """One campaign."""
+
+    campaign: Path = option(
+        "CAMPAIGN_DIR", "directory that `pandion campaign` has written", Path, required=True
+    )
+    confidence: float = option(
+        "--confidence P", "of every bound and interval", number(0.5, 0.999999, ""), default=0.95
+    )
+    verify: Path | None = option(
+        "--verify FILE",
+        "compute a certificate, .html or .json, again from the directory and say what differs",
+        Path,
+    )
+    json: str | None = json_file("the statement")
+    out: Path | None = option(
+        "--out FILE.html", f"where the page goes (default {PAGE} in the directory)", Path
+    )
+
+
+class NoCertificateError(ValueError):
+    """A file that holds no certificate of this version."""
+
+
+def main(argv: list[str]) -> int:
+    """Certify, or verify; returns the exit code."""
+    what = "State what a campaign shows: exact bounds, margins, what was varied and what was not."
+    options = read(CertifyOptions, "pandion certify", what, argv)
+    from fsw.runtime.process import pin_numerics_to_one_thread
+
+    pin_numerics_to_one_thread()  # before NumPy loads
+    from studies.campaign_keys import CampaignError
+    from studies.campaign_store import read as read_campaign
+
+    try:
+        result = read_campaign(options.campaign)
+        if options.verify is not None:
+            return _verify(options, result, options.verify)
+        return _certify(options, result)
+    except (CampaignError, NoCertificateError, OSError) as error:
+        complain("pandion certify", error)
+        return COULD_NOT_START
+
+
+def _certify(options: CertifyOptions, result: CampaignResult) -> int:
+    from studies.certificate import certificate
+    from studies.certificate_page import page, sentences
+
+    stated = certificate(result, options.campaign, options.confidence)
+    display = Display(console_beside(options.json))
+    for sentence in sentences(stated):
+        display.say(sentence)
+    written = options.out or options.campaign / PAGE
+    lost = unwritten(options.json, json_text(stated, 1) + "\n")
+    lost += unwritten(written, page(stated, result))
+    display.say(f"page {written}; {stated['commands'][0]} --verify {written}")
+    for what in lost:
+        complain("pandion certify", f"cannot write {what}")
+    return DIFFERS if lost else CERTIFIED
+
+
+def _verify(options: CertifyOptions, result: CampaignResult, path: Path) -> int:
+    from studies.certificate import certificate, differences, tampered
+
+    stated = _statement(path)
+    display = Display(console_beside(options.json))
+    found = certificate(result, options.campaign, stated["confidence"], stated["refits"])
+    wrong = differences(stated, found)
+    if tampered(stated):
+        wrong.insert(0, "the certificate was changed: its digest is not that of its statement")
+    for line in wrong:
+        display.say(line)
+    if not wrong:
+        display.say(f"{path} is what {options.campaign} shows, digest {stated['digest']}")
+    text = json_text({"same": not wrong, "differences": wrong}, 1) + "\n"
+    for what in unwritten(options.json, text):
+        complain("pandion certify", f"cannot write {what}")
+    return DIFFERS if wrong else CERTIFIED
+
+
+def _statement(path: Path) -> dict[str, Any]:
+    from studies.certificate import FORMAT
+    from studies.certificate_page import statement_in
+
+    try:
+        stated = statement_in(path.read_text(encoding="utf-8"))
+    except UnicodeDecodeError:
+        stated = None
+    if stated is None or stated.get("format") != FORMAT:
+        raise NoCertificateError(
+            f"{path} holds no certificate of this version; give what `pandion certify` has written"
+        )
+    confidence, refits = stated.get("confidence"), stated.get("refits")
+    known = isinstance(confidence, float) and 0.0 < confidence < 1.0
+    if not known or not isinstance(refits, int) or not 1 <= refits <= 100_000:
+        raise NoCertificateError(f"{path}: confidence or refits is no number that can be used")
+    return stated

@@ -1,0 +1,127 @@
+"""``pandion splitting``: the probability of a margin that plain flights never fall below."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from command_line.options import group, json_file, option, read
+from command_line.output import complain, console_beside, json_text, unwritten
+from command_line.parser import COULD_NOT_START
+from command_line.values import number, whole
+from command_line.version import version
+from fsw.log.run_directory import new_run_directory
+from pandion.cluster_options import ClusterOptions, campaign_of
+from pandion.display import Display
+
+if TYPE_CHECKING:
+    from studies.campaign_plan import CampaignPlan
+    from studies.rare_flights import FlightScore
+    from studies.splitting import Effort, Estimate
+
+FOUND, NOT_FOUND = 0, 1  # exit codes
+JOURNAL = "journal.jsonl"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SplittingOptions:
+    """One probability."""
+
+    file: Path = option("FILE.toml", "a campaign file with one configuration", Path, required=True)
+    threshold_mm: float = option(
+        "--threshold MM",
+        "the event is a minimum margin below this, in millimetres",
+        number(-1e5, 1e5, "mm"),
+        default=0.0,
+    )
+    particles: int = option(
+        "--particles N", "flights a level, in each run", whole(50, 1_000_000), default=600
+    )
+    runs: int = option("--runs N", "independent runs", whole(2, 1000), default=5)
+    levels: int = option("--levels N", "at most, each a factor of ten", whole(1, 100), default=12)
+    confidence: float = option(
+        "--confidence P", "of the interval", number(0.5, 0.999, ""), default=0.95
+    )
+    seed: int = option("--seed N", "root of all randomness", whole(), default=0)
+    cluster: ClusterOptions = group(ClusterOptions)
+    out: Path | None = option(
+        "--out DIR",
+        "where journal and the flight with the minimum margin go; the same command goes on with a "
+        "journal that is there (default a new one in runs/)",
+        Path,
+    )
+    json: str | None = json_file("probability, runs and levels")
+
+
+def main(argv: list[str]) -> int:
+    """Estimate; returns the exit code."""
+    what = "Estimate how rare a small margin is, by splitting the way to it into levels."
+    options = read(SplittingOptions, "pandion splitting", what, argv)
+    from fsw.runtime.process import pin_numerics_to_one_thread
+
+    pin_numerics_to_one_thread()  # before NumPy loads
+    from studies.campaign import SchedulerGoneError
+    from studies.campaign_keys import CampaignError
+    from studies.campaign_plan import load_plan
+    from studies.splitting import Effort
+
+    try:
+        plan = load_plan(options.file)
+        effort = Effort(particles=options.particles, runs=options.runs, levels=options.levels)
+        return _run(options, plan, effort)
+    except KeyboardInterrupt:
+        complain("pandion splitting", "interrupted; the same command with --out goes on")
+        return NOT_FOUND
+    except (CampaignError, SchedulerGoneError, OSError) as error:
+        complain("pandion splitting", error)
+        return COULD_NOT_START
+
+
+def _run(options: SplittingOptions, plan: CampaignPlan, effort: Effort) -> int:
+    from studies.rare_flights import FlightScore, as_json, only_case, sentences
+    from studies.splitting import estimate
+
+    flights = only_case(plan)
+    folder = options.out or new_run_directory(Path("runs"), f"splitting-{plan.name}")
+    folder.mkdir(parents=True, exist_ok=True)
+    display = Display(console_beside(options.json))
+    display.say(
+        f"Pandion {version()}: {plan.name}, {effort.runs} runs of {effort.particles} flights a "
+        f"level, {options.cluster.words}, written to {folder}"
+    )
+    campaign = campaign_of(
+        options.cluster, folder / JOURNAL, say=display.say, time_limit_s=plan.time_limit_s
+    )
+    score = FlightScore(flights, campaign, 1e-3 * options.threshold_mm)
+    # About: each level refills nine tenths.
+    most = effort.runs * effort.particles * (1.0 + 0.9 * effort.levels)
+
+    def report(done: int, middle: float) -> None:
+        margin = 1e3 * (middle + score.threshold_m)
+        display.report("flown", done, most, f"{done} flights, middle of the last {margin:+.1f} mm")
+
+    with display.progress(), campaign:
+        found = estimate(score, score.space, 0.0, effort, options.confidence, options.seed, report)
+    for sentence in sentences(found, score):
+        display.say(sentence)
+    display.say(_kept(score, found, folder))
+    lost = unwritten(options.json, json_text(as_json(found, score), 1) + "\n")
+    for what in lost:
+        complain("pandion splitting", f"cannot write {what}")
+    return NOT_FOUND if lost or found.reached < len(found.runs) else FOUND
+
+
+def _kept(score: FlightScore, found: Estimate, folder: Path) -> str:
+    """Write the flight with the minimum margin; the sentence that says how to see it."""
+    from studies.find import keep
+
+    run = min(found.runs, key=lambda one: one.least)
+    margin = 1e3 * (run.least + score.threshold_m)
+    command = keep(
+        score.job(run.point),
+        score.flights.case.controller,
+        folder / "least",
+        f"{score.flights.case}: minimum margin {margin:+.1f} mm, found by pandion splitting",
+    )
+    return f"minimum margin {margin:+.1f} mm: {command}"
