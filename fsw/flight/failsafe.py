@@ -878,16 +878,6 @@ def quickly_active(context: FailsafeContext) -> tuple[Failsafe, ...]:
     return found
 
 
-def _found(
-    context: FailsafeContext, tests: tuple[tuple[Evidence, Failsafe], ...]
-) -> tuple[Failsafe, ...]:
-    found: tuple[Failsafe, ...] = ()
-    for is_active, row in tests:
-        if is_active(context):
-            found = (*found, row)
-    return found
-
-
 def _all_is_well(context: FailsafeContext) -> bool:
     """Whether no quick row can be active, as in nearly every tick; then none needs to be asked.
 
@@ -915,6 +905,16 @@ def _all_is_well(context: FailsafeContext) -> bool:
         and vehicle.mode is not _OFFBOARD
         and vehicle.failsafe_from is not _OFFBOARD
     )
+
+
+def _found(
+    context: FailsafeContext, tests: tuple[tuple[Evidence, Failsafe], ...]
+) -> tuple[Failsafe, ...]:
+    found: tuple[Failsafe, ...] = ()
+    for is_active, row in tests:
+        if is_active(context):
+            found = (*found, row)
+    return found
 
 
 # ---------------------------------------------------------------- the response
