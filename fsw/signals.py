@@ -699,6 +699,7 @@ class BatteryState:
     charge: Charge = Charge.OK
     usual_current: float = 0.0  # A, of late
     time_left: float = math.inf  # s, at the usual current
+    voltage_error: float = 0.0  # V, measured minus modelled, when it was measured last
 
 
 @dataclass(frozen=True, slots=True)

@@ -253,10 +253,10 @@ def _is_clear(
 
 @kernel
 def travelled(before: Array, places: Array, reach: float) -> float:
-    """No place of any part has moved farther [m] from ``before`` to places, which is kept there.
+    """No place of any part has moved farther [m] from ``before`` to ``places``, kept there.
 
-    Both are (rows, 3) [m, NED], the base's axes [1, NED] below. No part is farther from the base's
-    origin than ``reach`` [m].
+    ``before`` and ``places`` are (rows, 3) [m, NED], the base's axes [1, NED] below. No part is
+    farther from the base's origin than ``reach`` [m].
     """
     most, turn = 0.0, 0.0
     for r in range(places.shape[0]):

@@ -295,7 +295,7 @@ def _plan(
         cases=tuple(cases),
         bases=tuple(bases),
         varied=varied,
-        time_limit_s=keys.time_limit_s or 300.0 + 10.0 * longest,
+        time_limit_s=keys.time_limit_s or 900.0 + 10.0 * longest,
         files=tuple(one for one in keys.scenarios if one.endswith(".toml")),
     )
 

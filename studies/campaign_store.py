@@ -74,6 +74,12 @@ def read(directory: Path) -> CampaignResult:
         ) from None
     plan = replace(load_plan(directory / PLAN), name=str(facts.get("name", directory.name)))
     if plan.digest != digests.plan:
+        if digests.code != code():
+            raise CampaignError(
+                f"{directory} was flown by other code ({digests.code[:8]}, here {code()[:8]}), "
+                "which has other defaults: read it with Pandion "
+                f"{facts.get('version', 'of that day')}"
+            )
         raise CampaignError(f"{directory / PLAN} was changed after it was flown; fly it again")
     return CampaignResult(plan, _rows(directory / JOURNAL, asked), asked, digests, facts)
 

@@ -157,7 +157,7 @@ def _signed(statement: dict[str, Any]) -> dict[str, Any]:
 
 
 def _short(value: Any) -> str:
-    text = json.dumps(value)
+    text = json.dumps(value, allow_nan=False)
     return text if len(text) <= 80 else f"{text[:80]}…"
 
 

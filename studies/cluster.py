@@ -33,6 +33,8 @@ _CLOSE_S: Final = 5.0
 _SETTINGS: Final = {
     "distributed.worker.profile.enabled": False,  # it stops a flight a hundred times a second
     "distributed.diagnostics.nvml": False,
+    # A worker that takes longer than this to start again is given up; on a busy machine, 15 s pass.
+    "distributed.deploy.lost-worker-timeout": "24h",
     "distributed.admin.event-loop": "tornado",
 }
 

@@ -73,7 +73,7 @@ class FlightSpace:
         return self.job(middle, still).random
 
     def job(self, shares: Array, table: Array, seed: int | None = None) -> Job:
-        """The flight at ``shares`` (values,) [1] of the distributions and a ``table`` (entries,) [1].
+        """The flight at ``shares`` (values,) [1] of distributions and a ``table`` (entries,) [1].
 
         The table has shares of the disturbances' amplitudes, from -1 to 1.
         """

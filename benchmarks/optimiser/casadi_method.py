@@ -1,12 +1,16 @@
 """CasADi with IPOPT and FATROP on the planner's problem: for comparison only, never flown.
 
 Neither is needed anywhere else; without the optional dependency `bench` they are reported as
-not installed.
+not installed. CasADi writes its functions in C, which are compiled where there is a C compiler;
+elsewhere its virtual machine runs them.
 """
 
 from __future__ import annotations
 
+import contextlib
 import importlib.util
+import shutil
+import tempfile
 from typing import Any
 
 import numpy as np
@@ -25,6 +29,22 @@ from fsw.signals import PlanRequest, SafeSet
 
 SOLVERS = ("ipopt", "fatrop")
 _TOLERANCE = 1e-6  # as Clarabel's
+_COMPILERS = ("cc", "gcc", "clang")
+# What is compiled has no loop and no call in it; higher levels take minutes for it.
+_FLAGS = ("-O1", "-march=native")
+
+
+def compiler() -> str | None:
+    """The C compiler of this machine, if there is one."""
+    return next((name for name in _COMPILERS if shutil.which(name)), None)
+
+
+def given() -> str:
+    """In what form CasADi's functions run here."""
+    name = compiler()
+    if name is None:
+        return "functions run by CasADi's virtual machine: no C compiler (cc, gcc or clang) here"
+    return f"functions in C, compiled by {name} {' '.join(_FLAGS)}"
 
 
 def installed(solver: str) -> bool:
@@ -37,7 +57,7 @@ def installed(solver: str) -> bool:
 
 
 class CasadiMethod:
-    """One compiled-graph program for one horizon and safe set."""
+    """One program for one horizon and safe set, its functions compiled where that is possible."""
 
     def __init__(self, config: PlannerConfig, safe_set: SafeSet, solver: str) -> None:
         import casadi
@@ -57,19 +77,18 @@ class CasadiMethod:
             "ubg": program.row_upper,
         }
         equality = [upper == 0.0 for upper in program.row_upper]
-        self._solve = casadi.nlpsol(
-            "planner",
-            solver,
-            {
-                "x": casadi.vertcat(*program.unknowns),
-                "f": program.cost,
-                "g": casadi.vertcat(*program.rows),
-                "p": parameters,
-            },
-            _options(
-                solver, config.horizon, program.path_rows, self._states, self._controls, equality
-            ),
+        functions = {
+            "x": casadi.vertcat(*program.unknowns),
+            "f": program.cost,
+            "g": casadi.vertcat(*program.rows),
+            "p": parameters,
+        }
+        options = _options(
+            solver, config.horizon, program.path_rows, self._states, self._controls, equality
         )
+        # CasADi writes the C files into the working directory and loads what becomes of them.
+        with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
+            self._solve = casadi.nlpsol("planner", solver, functions, options | _compiled())
 
     def solve(self, instance: Instance, guess: Array, optimum: Array) -> Solved:
         """See ``Method``; ``guess`` and ``optimum`` (6 n,) [m/s^2, rad/s^2]."""
@@ -148,6 +167,16 @@ class CasadiMethod:
         return np.array(
             [cbf_lower_bound(h, i, tuning.numbers(self._config.period)) for h in h_start]
         )
+
+
+def _compiled() -> dict[str, Any]:
+    """Options that compile the functions; none without a compiler."""
+    name = compiler()
+    if name is None:
+        return {}
+    # The linker too, which would otherwise be another compiler.
+    shell = {"compiler": name, "linker": name, "flags": list(_FLAGS)}
+    return {"jit": True, "compiler": "shell", "jit_options": shell}
 
 
 def _options(

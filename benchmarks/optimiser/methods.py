@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from benchmarks.optimiser.casadi_method import SOLVERS, CasadiMethod, installed
+from benchmarks.optimiser.casadi_method import SOLVERS, CasadiMethod, given, installed
 from benchmarks.optimiser.converged import target_points
 from benchmarks.optimiser.instances import Instance
 from benchmarks.optimiser.slopes import slopes_of
@@ -49,6 +49,7 @@ class Entry:
     name: str
     sqp_iterations: int | None  # None: until it converges
     build: Build | None
+    given: str  # what it begins from, and in what form it computes
 
 
 class PlannerMethod:
@@ -110,12 +111,15 @@ def entries() -> tuple[Entry, ...]:
     def casadi(solver: str) -> Build:
         return lambda config, safe_set: CasadiMethod(config, safe_set, solver)
 
+    ours = "as it flies: the last plan moved on, functions compiled by numba"
+    paper = "no inputs, as in the paper; our functions, compiled by numba; slopes"
+    theirs = f"the last plan moved on and the states that follow; {given()}"
     return (
-        *(Entry("clarabel", count, planner("clarabel", count)) for count in _ITERATIONS),
-        Entry("slsqp-numeric", None, slsqp(analytic=False)),
-        Entry("slsqp-analytic", None, slsqp(analytic=True)),
+        *(Entry("clarabel", count, planner("clarabel", count), ours) for count in _ITERATIONS),
+        Entry("slsqp-numeric", None, slsqp(analytic=False), f"{paper} by differences"),
+        Entry("slsqp-analytic", None, slsqp(analytic=True), f"{paper} exact"),
         *(
-            Entry(f"casadi-{name}", None, casadi(name) if installed(name) else None)
+            Entry(f"casadi-{name}", None, casadi(name) if installed(name) else None, theirs)
             for name in SOLVERS
         ),
     )

@@ -27,7 +27,8 @@ _PACKAGES = ("numpy", "scipy", "clarabel", "numba", "casadi")
 
 def lines(all_samples: list[Samples]) -> list[str]:
     """The whole report, a line each."""
-    return [*_table(all_samples), "", *_stages(all_samples), "", *_results(all_samples)]
+    parts = (_table, _given, _stages, _results)
+    return [line for part in parts for line in ("", *part(all_samples))][1:]
 
 
 def _table(all_samples: list[Samples]) -> list[str]:
@@ -48,6 +49,15 @@ def _table(all_samples: list[Samples]) -> list[str]:
         excess = row["suboptimality_p50"]
         shown = "" if excess is None else f"{100.0 * float(excess):.3f} %"
         found.append(f"{start} {times} {shown:>11} {len(samples.answers):>9} {samples.failed:>6}")
+    return found
+
+
+def _given(all_samples: list[Samples]) -> list[str]:
+    """What each method begins from and in what form it computes."""
+    by_name = {s.entry.name: s.entry for s in all_samples}
+    found = ["what was given to each:"]
+    for name, entry in by_name.items():
+        found.append(f"  {name:<15} {'not installed' if entry.build is None else entry.given}")
     return found
 
 
@@ -128,6 +138,7 @@ def details(all_samples: list[Samples]) -> list[dict[str, Any]]:
             "instances": len(samples.answers),
             "failed": samples.failed,
             "installed": samples.entry.build is not None,
+            "given": samples.entry.given,
             "cpu_median_us": samples.cpu_median_us(),
             "stages_us": samples.stages(),
         }

@@ -53,6 +53,7 @@ EXPLAINED: Final = 0.9  # share of all that is observed
 LOST: Final = 0.2  # of what is commanded; a rotor that gives less is lost
 LOST_TIME: Final = 0.15  # s
 LOST_FROM: Final = 4.0  # N commanded; with less it is not seen
+UNLIKE: Final = 0.5  # share of what a second rotor lacks that along z may differ
 QUIET: Final = 0.75  # N; a rotor below that gives what it is commanded again
 QUIET_TIME: Final = 3.0  # s
 ASTRAY: Final = 1.2  # N, root mean square of what no effectiveness explains
@@ -74,6 +75,20 @@ STANDING: Final = 0.2  # rad/s, root mean square of the rate of a joint that sta
 MOVED: Final = 0.05  # rad; a joint that has moved so far is not stuck
 
 NONE: Final = -1
+# What is known of parts that have failed, which lasts while nothing can be observed.
+_OF_FAILED: Final = (
+    "failed",
+    "effect",
+    "failed2",
+    "failed_by_thrust",
+    "failed_thrust2",
+    "failed_more2",
+    "gives",
+    "lost",
+    "disobeys",
+    "joint",
+    "stood_at",
+)
 
 WATCH: Final = np.dtype(
     [
@@ -98,6 +113,7 @@ WATCH: Final = np.dtype(
         ("failed_more2", float),  # N^2, mean square of what it gives too much
         ("gives", float),  # N, of the failed rotor
         ("lost_for", float),  # s
+        ("others_lost_for", float, (4,)),  # s, of each rotor beside the failed one
         ("lost", np.int64),
         ("disobeys", np.int64),
         ("quiet_for", float),  # s
@@ -133,6 +149,16 @@ def at_start() -> Watch:
 def blank() -> Watch:
     """Room for a memory; eight times as fast as an empty array of records."""
     return np.ndarray(1, WATCH, np.empty(_FLOATS))
+
+
+def paused(memory: Watch | None) -> Watch | None:
+    """The memory while nothing can be observed: what has failed, or None if nothing has."""
+    if memory is None or (memory[0]["failed"] == NONE and not memory[0]["joint"].any()):
+        return None
+    kept = at_start()
+    for name in _OF_FAILED:
+        kept[name] = memory[name]
+    return kept
 
 
 @kernel
@@ -207,7 +233,9 @@ def _observe_base(
     lift = airframe.mass * specific_force - (1.0 + s.lasting) * total
     s.lift += share * (lift - s.lift)
     x, y, z = s.torque[0] / arm, s.torque[1] / arm, s.lift
-    if s.failed < 0 and max(abs(x), abs(y)) < LEARNING_BELOW and total > 0.0:
+    # What the ground carries does not last.
+    flies = total > AIRBORNE * airframe.mass * GRAVITY and z <= CONTACT * airframe.mass
+    if flies and s.failed < 0 and max(abs(x), abs(y)) < LEARNING_BELOW:
         s.lasting += dt / LEARNING * lift / total
     forget = min(dt / MEMORY, 1.0)
     products = (x * x, y * y, z * z, x * z, y * z)
@@ -222,16 +250,24 @@ def _observe_base(
         s.rate[i] = rate[i]
     if s.failed >= 0:
         # Which one is known: what turns the base says how much, and pushes do not.
-        k = s.failed
+        k, opposite = s.failed, (s.failed + 2) % 4
         turns = (-y, x, y, -x)
         off, thrust = turns[k], g[k]
+        # Of both about that axis: with what is lacking along z the opposite one turns the base.
+        lacking = min(0.5 * (z - off), 0.0)
+        more = max(off, 0.0) if lacking > -UNLIKE * off else 0.0
         s.gives += min(dt / SMOOTHED, 1.0) * (thrust + off - s.gives)
         s.failed2 += forget * (off * off - s.failed2)
         s.failed_by_thrust += forget * (off * thrust - s.failed_by_thrust)
         s.failed_thrust2 += forget * (thrust * thrust - s.failed_thrust2)
-        s.failed_more2 += forget * (max(off, 0.0) * max(off, 0.0) - s.failed_more2)
+        s.failed_more2 += forget * (more * more - s.failed_more2)
         gives_nothing = thrust > LOST_FROM and off < (LOST - 1.0) * thrust
         s.lost_for = s.lost_for + dt if gives_nothing else 0.0
+        for i in range(4):
+            other = 0.5 * (z - off) if i == opposite else turns[i]
+            unlike = 0.0 if i == opposite else abs(z - off - other)
+            gone = g[i] > LOST_FROM and other < (LOST - 1.0) * g[i] and unlike < -UNLIKE * other
+            s.others_lost_for[i] = s.others_lost_for[i] + dt if gone and i != k else 0.0
 
 
 @compilable
@@ -253,6 +289,8 @@ def mean_square(s: Any, rotor: int) -> float:
 def _judge_rotors(s: Any, dt: float, settled: bool) -> None:
     if s.failed >= 0:
         _follow_failed(s, dt)
+        if settled and not s.lost:
+            _judge_others(s)
         return
     found, most = NONE, 0.0
     for i in range(4):
@@ -269,11 +307,28 @@ def _judge_rotors(s: Any, dt: float, settled: bool) -> None:
     s.suspected = s.suspected + dt if found == s.suspect else 0.0
     s.suspect = found
     if s.suspected >= (STRONG_TIME if most > STRONG * STRONG else WEAK_TIME):
-        s.failed, s.effect, s.quiet_for = found, 1.0, 0.0
-        s.gives = s.thrust[found] + s.extra[found]
-        s.failed2, s.failed_by_thrust = most, s.by_thrust[found]
-        more = max(s.extra[found], 0.0)
-        s.failed_thrust2, s.failed_more2 = s.thrust2[found], more * more
+        _name(s, found, most)
+
+
+@compilable
+def _name(s: Any, found: int, size: float) -> None:
+    """Follow a failed rotor from now on; ``size`` [N^2] is the mean square by its pattern."""
+    s.failed, s.effect, s.quiet_for = found, 1.0, 0.0
+    s.gives = s.thrust[found] + s.extra[found]
+    s.failed2, s.failed_by_thrust = size, s.by_thrust[found]
+    more = max(s.extra[found], 0.0)
+    s.failed_thrust2, s.failed_more2 = s.thrust2[found], more * more
+
+
+@compilable
+def _judge_others(s: Any) -> None:
+    """Whether a second rotor is lost; then it is the failed one."""
+    for i in range(4):
+        if s.others_lost_for[i] > LOST_TIME:
+            s.suspect, s.suspected = i, s.others_lost_for[i]
+            _name(s, i, mean_square(s, i))
+            s.lost, s.disobeys = 1, 0
+            return
 
 
 @compilable

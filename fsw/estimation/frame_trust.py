@@ -34,7 +34,7 @@ _CALM: Final = 5  # frames in a row near each other, after some that were not
 # From one frame to the next, beside what the last estimate predicts. Rotors turn the body by
 # 17 rad/s^2; the rest is noise, and what hits the vehicle.
 _PLACE_JUMP: Final = 0.1  # m
-_PROBATION_US: Final = 5_000_000  # of a pose that was away for
+_PROBATION_US: Final = 5_000_000  # of a pose that was not used, or was away for
 _LONG_AWAY_US: Final = 100_000
 _PLACE_BACK: Final = 0.02  # m, from where the inertial unit has carried the pose on to
 _SPEED_JUMP: Final = 1.5  # m/s
@@ -114,11 +114,12 @@ class Agreement(NamedTuple):
     doubted: Sensor | None = None
     fault: SensorFault = SensorFault.NONE
     again: int = _GOOD_AGAIN  # good windows that it takes to be believed
-    pose_failed: bool = False  # it, and not the inertial unit, was the last that was not used
+    # When the pose was not used last; -1: never, or the inertial unit failed since.
+    pose_failed_us: int = -1
     last: Window | None = None
 
-    def after(self, window: Window) -> Agreement:
-        """The judgement after a whole window."""
+    def after(self, window: Window, now_us: int) -> Agreement:
+        """The judgement after a whole window, at ``now_us`` [us]."""
         turn, speed = norm(window.turn), norm(window.speed)
         last = window if self.last is None else self.last
         still = window.same_rate >= _WINDOW and math.dist(window.turn, last.turn) > _TURN_SEEN
@@ -130,12 +131,13 @@ class Agreement(NamedTuple):
         if still or held:
             return after._doubting(Sensor.IMU, SensorFault.STUCK)
         if max(turns, speeds) >= _BAD:
-            of_pose = self.pose_failed or min(turns, speeds) >= _BAD
+            lately = self.pose_failed_us >= 0 and now_us - self.pose_failed_us <= _PROBATION_US
+            of_pose = lately or min(turns, speeds) >= _BAD
             sensor = Sensor.POSE if of_pose else Sensor.IMU
             return after._doubting(sensor, SensorFault.DISAGREES)
         if self.doubted is not None and good >= self.again:
             again = min(2 * self.again, _MOST_GOOD)
-            return Agreement(again=again, pose_failed=self.pose_failed, last=window)
+            return Agreement(again=again, pose_failed_us=self.pose_failed_us, last=window)
         return after
 
     def without_pose(self) -> Agreement:
@@ -454,7 +456,7 @@ def believed(
     )
     window, agreement = Window(*sums), trust.agreement
     if window.frames >= _WINDOW:
-        agreement, window = agreement.after(window), _EMPTY
+        agreement, window = agreement.after(window, s.t_us), _EMPTY
     odd = agreement.doubted
     if not (never or far or stuck or trust.returned_us or trust.doubted or odd or trust.shadow):
         after = FrameTrust(s, _GOOD, _GOOD, _GOOD, 0, trust.bad_us, window, agreement)
@@ -474,7 +476,7 @@ def believed(
         for k, ((bit, sensor), old) in enumerate(zip(_NAMES, olds, strict=True))
     ]
     if pose.unused or inertial.unused:
-        agreement = agreement._replace(pose_failed=not inertial.unused)
+        agreement = agreement._replace(pose_failed_us=-1 if inertial.unused else s.t_us)
     away = s.t_us - trust.pose.since_us if trust.pose.unused and not pose.unused else 0
     shadow = None if inertial.unused else trust.shadow
     if shadow is not None:
@@ -537,7 +539,7 @@ def _part(
     place: int,
 ) -> PartTrust:
     repeats = old.repeats + 1 if stuck else 0
-    steady = old.steady + 1 if old.unused and not rough else 0
+    steady = old.steady + 1 if old.unused and not (rough or never) else 0
     if never:
         fault = SensorFault.IMPLAUSIBLE
     elif repeats >= _REPEATS[place]:

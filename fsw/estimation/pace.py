@@ -1,7 +1,8 @@
 """How often sensors are heard: one that comes less often than it did is told.
 
 A sensor that is silent is another matter. What is usual is learned in the first second, and
-follows slowly: a sensor may be set to another rate.
+follows slowly: a sensor may be set to another rate. A lower rate is told, and is the usual one some
+ten seconds later.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ _LOOKS: Final = 10  # of 0.1 s, over which samples are counted
 _SELDOM: Final = 0.7  # of what is usual; markers that are hidden once leave 0.8
 _AGAIN: Final = 0.85
 _FOLLOWS: Final = 0.02  # share of the newest count in what is usual
+_LEAST_USUAL: Final = 4.0  # samples in so many looks; of fewer one is missing now and then
 _SILENT: Final = 0.15  # s
 
 
@@ -48,12 +50,13 @@ def looked(
 def _after(pace: Pace, health: Health, now: float) -> Pace:
     counts = (*pace.counts, health.seen - pace.seen)[-_LOOKS:]
     usual, seldom, total = pace.usual, pace.seldom, sum(counts)
+    silent = now - health.came > _SILENT
     if len(counts) == _LOOKS:
         if not usual:
             usual = float(total)
-        elif total > _SELDOM * usual:
+        elif total > _SELDOM * usual or (seldom and not silent):
             usual += _FOLLOWS * (total - usual)
             seldom = seldom and total < _AGAIN * usual
-        elif now - health.came <= _SILENT:
+        elif not silent and usual >= _LEAST_USUAL:
             seldom = True
     return Pace(pace.sensor, health.seen, counts, usual, seldom)

@@ -57,6 +57,7 @@ _SPEED_AT_START: Final = 2.0  # m/s and rad/s, with which a vehicle moves betwee
 _RATE_AT_START: Final = 2.0
 _STRONGEST: Final = 20.0  # m/s^2, with which it does so between two velocities
 _APART: Final = 0.25  # s; readings farther apart do not confirm each other
+_SELDOM_APART: Final = 1.25  # s; the same of a sensor whose readings come farther apart than that
 # What poses contradict by no more, an inertial unit may have made; a frame that moves, moves more.
 _SMALL_STEP: Final = 0.05  # m
 _SMALL_TURN: Final = 0.1  # rad
@@ -524,8 +525,9 @@ class SensorFusion:
 
     def _is_confirmed(self, memory: FusionMemory, sample: Aiding) -> bool:
         """Whether the last one of its kind that was refused too says what a ``sample`` does."""
+        seldom = memory.of(SENSOR_OF[type(sample)]).apart >= _APART
         for one in memory.refused:
-            if sample.time - one.time > _APART:
+            if sample.time - one.time > (_SELDOM_APART if seldom else _APART):
                 continue
             if isinstance(sample, PoseSample) and isinstance(one, PoseSample):
                 return self._agree(one, sample)

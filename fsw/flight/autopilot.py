@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fsw.control.actuator_watch import Watch
+from fsw.control.actuator_watch import Watch, paused
 from fsw.control.cascade import (
     UNGUARDED,
     Cascade,
@@ -443,7 +443,7 @@ class Autopilot:
         Where the estimate is not ``known`` from every sensor, how the vehicle moves shows nothing.
         """
         if not (known and self._watches and state.aiding.sensor is None):
-            return state.damage, None
+            return state.damage, paused(state.watch)
         return self._damage.see(state.damage, state.watch, state.cascade, memory, estimate, ticks)
 
     def _zones_now(self, state: FlightState) -> Array:

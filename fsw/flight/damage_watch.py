@@ -125,13 +125,13 @@ def _of_joints(before: Damage, s: Any, now_us: int) -> Damage:
     )
     if kinds == before.report.joints:
         return before
-    after = before
+    failed = [k for k in range(2) if kinds[k] != SOUND]
+    text = " and ".join([f"joint {k + 1} {_HOWS[kinds[k]]}" for k in failed])
+    since_us = before.joint_us
     if not before.joint:
-        k = 0 if kinds[0] != SOUND else 1
-        since_us = now_us - round(1e6 * float(s["joint_for"][k]))
-        after = before._replace(joint=f"joint {k + 1} {_HOWS[kinds[k]]}", joint_us=since_us)
-    report = before.report._replace(joints=kinds)
-    return after._replace(report=report, health=before.health._replace(joints=kinds))
+        since_us = now_us - round(1e6 * float(s["joint_for"][failed[0]]))
+    report, health = before.report._replace(joints=kinds), before.health._replace(joints=kinds)
+    return before._replace(joint=text, joint_us=since_us, report=report, health=health)
 
 
 def _with(values: Vec4, k: int, value: float) -> Vec4:

@@ -133,6 +133,7 @@ class FailsafeMemory(NamedTuple):
     pending: Action = Action.NONE  # what follows the hold that gives the pilot time
     due_us: int = 0  # when
     overridden: tuple[Condition, ...] = ()  # whose actions a command of the pilot has put aside
+    joint: str = ""  # which joints have failed, as it was looked at last
 
 
 NOTHING_DONE: Final = FailsafeMemory()
@@ -859,18 +860,41 @@ BLOCKING: Final = frozenset((Condition.POSITION_LOST, Condition.PLANNER_LOST))
 
 _TESTS: Final = tuple((row.active, row) for row in FAILSAFES)
 _QUICK: Final = tuple((row.active, row) for row in FAILSAFES if not row.slow)
-_SLOW_TESTS: Final = tuple((row.active, row) for row in FAILSAFES if row.slow)
+# What ``_all_is_well`` rules out. A row that is not here is asked in every tick.
+_RULED_OUT: Final = frozenset(
+    {
+        Condition.ATTITUDE_LOST,
+        Condition.TILT_LOST,
+        Condition.POSITION_LOST,
+        Condition.BREACH,
+        Condition.FENCE_BREACH,
+        Condition.ROTOR_LOST,
+        Condition.POSITION_LOW,
+        Condition.SENSOR_LOST,
+        Condition.TUBE_LEFT,
+        Condition.FILTER_ACTIVE,
+        Condition.PLAN_STALE,
+        Condition.AIDING_LOST,
+        Condition.ESTIMATE_INVALID,
+        Condition.OUTPUT_NOT_FINITE,
+        Condition.PLAN_REFUSED,
+        Condition.PLAN_LATE,
+        Condition.SETPOINTS_LOST,
+    }
+)
+_OTHERS: Final = tuple(one for one in _TESTS if one[1].condition not in _RULED_OUT)
+_QUICK_OTHERS: Final = tuple(one for one in _QUICK if one[1].condition not in _RULED_OUT)
 _SLOW: Final = frozenset(row.condition for row in FAILSAFES if row.slow)
 
 
 def active(context: FailsafeContext) -> tuple[Failsafe, ...]:
     """Rows whose condition is active, in the order of the table; almost always none."""
-    return _found(context, _SLOW_TESTS if _all_is_well(context) else _TESTS)
+    return _found(context, _OTHERS if _all_is_well(context) else _TESTS)
 
 
 def quickly_active(context: FailsafeContext) -> tuple[Failsafe, ...]:
     """The same between two planning periods: the slow rows are as they were found last."""
-    found = () if _all_is_well(context) else _found(context, _QUICK)
+    found = _found(context, _QUICK_OTHERS if _all_is_well(context) else _QUICK)
     before = context.state.vehicle.conditions
     if before and not _SLOW.isdisjoint(before):
         known = {row.condition for row in found} | _SLOW.intersection(before)
@@ -879,7 +903,7 @@ def quickly_active(context: FailsafeContext) -> tuple[Failsafe, ...]:
 
 
 def _all_is_well(context: FailsafeContext) -> bool:
-    """Whether no quick row can be active, as in nearly every tick; then none needs to be asked.
+    """Whether no condition of ``_RULED_OUT`` can be active, as in nearly every tick.
 
     False says nothing: the rows decide. Tests hold it against each of them.
     """
@@ -954,10 +978,12 @@ def respond(context: FailsafeContext, rows: tuple[Failsafe, ...]) -> Response:
             wanted, chosen = action, row
     begun, memory = _begun(context, memory, wanted, chosen)
     waits = memory.pending is not Action.NONE
-    reports = []
+    joint, reports = state.damage.joint, []
     for row in rows:
         acts = row is chosen and begun is not Action.NONE
-        if row.condition in before and not acts:
+        # A second joint that fails is the same condition, and news.
+        anew = row.condition is Condition.JOINT_FAILED and joint != memory.joint
+        if row.condition in before and not (acts or anew):
             continue
         told = wanted if acts else Action.WARN
         told = actions[row.condition] if actions[row.condition].mode is None else told
@@ -969,7 +995,7 @@ def respond(context: FailsafeContext, rows: tuple[Failsafe, ...]) -> Response:
     if vehicle.armed:
         reports += _ended(before, known, now, now_us)
     since = tuple([known.get(condition, now_us) for condition in now])
-    after = memory._replace(since_us=since, overridden=overridden)
+    after = memory._replace(since_us=since, overridden=overridden, joint=joint)
     return Response(after, tuple(reports), begun)
 
 

@@ -72,8 +72,8 @@ class SensedState:
         self, state: FlightState, inputs: TickInputs, texts: list[StatusText]
     ) -> tuple[FlightState, FusionMemory, StateEstimate | None]:
         """The estimate of this tick, or the last one while there is none; appends to ``texts``."""
-        before = state.fusion or at_start()
         now = 1e-6 * inputs.sensors.t_us
+        before = _memory(state, now)
         pushed = (0.0, 0.0)
         if state.estimate is not None:
             pushed = self._cascade.joint_acceleration(state.cascade, state.estimate)
@@ -267,6 +267,15 @@ def _aiding(state: FlightState, memory: FusionMemory, report: EstimatorReport) -
         fault=fault,
         since_us=since_us,
     )
+
+
+def _memory(state: FlightState, now: float) -> FusionMemory:
+    """The filter's memory at ``now`` [s].
+
+    After a first stamp that was ahead of all others every reading is older than what it left.
+    """
+    before = state.fusion
+    return at_start() if before is None or now < before.now else before
 
 
 def _is_back(before: FusionMemory, memory: FusionMemory, now: float) -> bool:

@@ -74,7 +74,15 @@ class KeptSet(NamedTuple):
         if safe_set is self.source:
             return self
         added = (max(self.added, default=0.0),) * len(safe_set.zones)
-        return _grown(safe_set, added)._replace(lacking=self.lacking, ample_us=self.ample_us)
+        alike = [zone.shape.kind for zone in safe_set.zones] == [
+            zone.shape.kind for zone in self.source.zones
+        ]
+        return _grown(safe_set, added)._replace(
+            lacking=self.lacking,
+            ample_us=self.ample_us,
+            spread=self.spread if alike else (),
+            t_us=self.t_us,
+        )
 
 
 class UncertainClearance:

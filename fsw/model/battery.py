@@ -18,7 +18,10 @@ _AIR_DENSITY = 1.225  # kg/m^3
 _AS_PER_AH = 3600.0
 # s, in which the current of late forgets: a climb of some seconds is not how it goes on.
 _USUAL_TIME = 30.0
-
+# Readings are whole per cent. As they are they would undo what the model knows to be used since,
+# and a level would come and go.
+_ROUNDING = 0.005
+_ROSE = 0.02  # above a level's limit, where it is over: another battery, or a model that was wrong
 
 Levels = tuple[float, float, float]
 """Shares of the capacity below which the charge is low, critical, and an emergency."""
@@ -31,6 +34,12 @@ def charge_of(remaining: float, levels: Levels) -> Charge:
     if remaining >= levels[1]:
         return Charge.LOW
     return Charge.CRITICAL if remaining >= levels[2] else Charge.EMERGENCY
+
+
+def _level(before: Charge, remaining: float, levels: Levels) -> Charge:
+    """The level after ``before``: the next one at once, the last one with some charge to spare."""
+    now = charge_of(remaining, levels)
+    return now if now >= before else min(before, charge_of(remaining - _ROSE, levels))
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,27 +70,38 @@ def drained(
     usual += share * (current - usual)
     consumed = state.consumed + current * dt / _AS_PER_AH
     remaining = max(1.0 - consumed / model.capacity, 0.0)
-    at_rest = model.empty + (model.full - model.empty) * remaining
-    voltage = at_rest - model.resistance * current
     return BatteryState(
-        voltage=voltage,
+        voltage=_voltage(model, remaining, current) + state.voltage_error,
         current=current,
         consumed=consumed,
         remaining=remaining,
-        charge=charge_of(remaining, levels),
+        charge=_level(state.charge, remaining, levels),
         usual_current=usual,
         time_left=_AS_PER_AH * remaining * model.capacity / max(usual, 1e-3),
+        voltage_error=state.voltage_error,
     )
 
 
 def corrected(
     model: BatteryModel, levels: Levels, state: BatteryState, reading: BatteryReading
 ) -> BatteryState:
-    """The battery as it has been measured; the model goes on from there."""
+    """The battery as it has been measured; the model goes on from there.
+
+    Of all that is rounded to the reading, what is nearest to the model.
+    """
+    low, high = reading.remaining - _ROUNDING, reading.remaining + _ROUNDING
+    remaining = max(low, min(state.remaining, high, 1.0), 0.0)
     return replace(
         state,
         voltage=reading.voltage,
-        consumed=(1.0 - reading.remaining) * model.capacity,
-        remaining=reading.remaining,
-        charge=charge_of(reading.remaining, levels),
+        consumed=(1.0 - remaining) * model.capacity,
+        remaining=remaining,
+        charge=_level(state.charge, remaining, levels),
+        voltage_error=reading.voltage - _voltage(model, remaining, state.current),
     )
+
+
+def _voltage(model: BatteryModel, remaining: float, current: float) -> float:
+    """Voltage [V] at a ``remaining`` share [1] and a ``current`` [A]."""
+    at_rest = model.empty + (model.full - model.empty) * remaining
+    return at_rest - model.resistance * current

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import clarabel
 import numpy as np
 
@@ -27,30 +29,36 @@ _TOLERANCE = 1e-6
 MAX_ITERATIONS = 50
 
 
+@cache
+def _settings() -> clarabel.DefaultSettings:
+    """Those of every program."""
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    settings.max_iter = MAX_ITERATIONS
+    settings.direct_solve_method = "qdldl"  # of one thread
+    # The program is small, dense and scaled by its author; these stages cost more than
+    # they give here (docs/decisions/0004-clarabel-settings.md) and presolve would
+    # forbid updates in place.
+    settings.equilibrate_enable = False
+    settings.iterative_refinement_enable = False
+    settings.presolve_enable = False
+    settings.chordal_decomposition_enable = False
+    settings.input_sparse_dropzeros = False
+    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = _TOLERANCE
+    return settings
+
+
 class ClarabelSolver:
     """Solves one program again and again with new P, q and b; A stays as it is."""
 
     def __init__(self, program: QuadraticProgram) -> None:
-        settings = clarabel.DefaultSettings()
-        settings.verbose = False
-        settings.max_iter = MAX_ITERATIONS
-        settings.direct_solve_method = "qdldl"  # of one thread
-        # The program is small, dense and scaled by its author; these stages cost more than
-        # they give here (docs/decisions/0004-clarabel-settings.md) and presolve would
-        # forbid updates in place.
-        settings.equilibrate_enable = False
-        settings.iterative_refinement_enable = False
-        settings.presolve_enable = False
-        settings.chordal_decomposition_enable = False
-        settings.input_sparse_dropzeros = False
-        settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = _TOLERANCE
         cones = [
             clarabel.NonnegativeConeT(program.nonnegative_rows),
             *[clarabel.SecondOrderConeT(3)] * program.cones,
         ]
         self._program = program
         self._solver = clarabel.DefaultSolver(
-            program.p, program.q, program.a, program.b, cones, settings
+            program.p, program.q, program.a, program.b, cones, _settings()
         )
 
     def solve(self) -> Solution:

@@ -68,7 +68,8 @@ class Rows:
 class QuadraticProgram:
     """Clarabel's form: minimise ``1/2 x' P x + q' x`` where ``b - A x`` lies in the cones.
 
-    The data of P, q and b may change; patterns and A may not.
+    The data of P, q and b may change; patterns and A may not. P and A may be anything that has the
+    members of SciPy's class which Clarabel reads.
     """
 
     p: sparse.csc_matrix  # upper triangle

@@ -34,6 +34,7 @@ from fsw.runtime.timing import GroupTimer, Histogram
 from fsw.signals import (
     Command,
     CommandAck,
+    CommandRequest,
     CommandResult,
     HostHealth,
     OffboardReport,
@@ -48,6 +49,18 @@ from fsw.signals import (
 
 LINK_TIMEOUT_S: Final = 1.2  # silence that ends the flight; both processes end within 2 s
 _START_US: Final = 1_000_000  # time stamp of the simulator's step 0
+
+
+def to_route(commands: tuple[Command, ...], acks: tuple[CommandAck, ...]) -> list[CommandRequest]:
+    """Commands that go on to the simulator, whose acknowledgement their senders get.
+
+    A tick answers each of its commands in their order.
+    """
+    return [
+        command.request
+        for command, ack in zip(commands, acks, strict=False)
+        if ack.result == CommandResult.IN_PROGRESS
+    ]
 
 
 class Ending(enum.Enum):
@@ -239,21 +252,16 @@ class SimLoop(Generic[State]):
             for ack in self._sim.routed_acks:
                 self._ground.acknowledge(t_us, ack)
             self._sim.routed_acks.clear()
+        for request in to_route(cycle.inputs.commands, outputs.acks):
+            self._sim.route(request)
         for ack in outputs.acks:
             if ack.result == CommandResult.IN_PROGRESS:
-                self._route(ack, cycle.inputs.commands)
-            elif (ack.target_system, ack.target_component) == (SYSTEM_ID, PATH_PLANNER):
+                continue
+            if (ack.target_system, ack.target_component) == (SYSTEM_ID, PATH_PLANNER):
                 self._sim.queue_ack(ack)
             else:
                 self._ground.acknowledge(t_us, ack)
         self._sim.send_actuators(t_us, outputs)
-
-    def _route(self, ack: CommandAck, commands: tuple[Command, ...]) -> None:
-        """Hand a command on to the simulator, whose acknowledgement its sender gets."""
-        asked = (ack.command, ack.target_system, ack.target_component)
-        for request in (command.request for command in commands):
-            if asked == (request.command, request.source_system, request.source_component):
-                self._sim.route(request)
 
     def _request_plan(self, cycle: Cycle) -> None:
         request, applied = cycle.outputs.plan_request, cycle.outputs.snapshot.plan_input

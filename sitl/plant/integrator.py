@@ -151,7 +151,11 @@ def run_steps(
     states: Array,
     memory: Memory,
 ) -> Arrival:
-    """``integrate`` with ``memory`` to write to."""
+    """``integrate`` with ``memory`` to write to.
+
+    The ``state`` (17 + 2j,) [SI] is advanced in place by as many steps of ``step`` [s] as
+    ``places`` (steps, rows, 3) [m, NED] has room for; ``states`` (steps, 17 + 2j) [SI] follow it.
+    """
     n, moved, work = state.shape[0], memory.moved, memory.work
     fastest = 0.0
     place_bodies(plant, state, work)

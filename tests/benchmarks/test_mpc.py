@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -79,7 +80,7 @@ def test_everyone_reaches_the_converged_cost(measured: list[Samples]) -> None:
 
 
 def test_what_is_not_installed_has_an_empty_row_and_is_named() -> None:
-    missing = Samples(5, Entry("casadi-fatrop", None, None))
+    missing = Samples(5, Entry("casadi-fatrop", None, None, "functions in C"))
     row = missing.row()
     assert set(row) == KEYS
     assert row["median_us"] is None
@@ -90,6 +91,21 @@ def test_what_is_not_installed_has_an_empty_row_and_is_named() -> None:
 def test_without_casadi_nobody_fails(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(casadi_method.importlib.util, "find_spec", lambda name: None)
     assert not any(casadi_method.installed(solver) for solver in SOLVERS)
+
+
+@pytest.mark.parametrize(
+    ("found", "said"), [("clang", "compiled by clang"), (None, "no C compiler")]
+)
+def test_the_table_says_in_what_form_casadi_computes(
+    found: str | None, said: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(
+        casadi_method.shutil, "which", lambda name: found if name == found else None
+    )
+    method = Entry("casadi-fatrop", None, None, casadi_method.given())
+    assert said in method.given
+    built = replace(method, build=lambda config, safe_set: pytest.fail("is not built"))
+    assert method.given in "\n".join(lines([Samples(5, built)]))
 
 
 @pytest.mark.parametrize("solver", SOLVERS)

@@ -158,6 +158,9 @@ class OnePush:
     def sample(self, step: int) -> tuple[float, float, float]:
         return self.value if self.first <= step <= self.last else (0.0, 0.0, 0.0)
 
+    def held_until(self, step: int) -> float:
+        return step + 1
+
 
 @pytest.mark.requirement("REQ-ACT-10")
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ from studies.binomial import bounds
 from studies.campaign_flight import CampaignFlight, CampaignRow
 from studies.campaign_keys import CampaignError
 from studies.campaign_plan import CampaignPlan, load_plan
-from studies.campaign_store import JOURNAL, begin, read
+from studies.campaign_store import FACTS, JOURNAL, begin, read
 from studies.certificate import ANY, certificate
 from studies.certificate_page import statement_in
 from studies.journal import Journal
@@ -176,3 +176,14 @@ def test_what_is_no_certificate_is_refused_in_a_sentence(
     assert "holds no certificate of this version" in capsys.readouterr().err
     assert main([str(tmp_path)]) == 2
     assert "is no directory of a campaign" in capsys.readouterr().err
+
+
+def test_a_campaign_of_other_code_is_not_taken_for_a_changed_file(tmp_path: Path) -> None:
+    directory = flown(tmp_path, {}, flights=2)
+    facts = json.loads((directory / FACTS).read_text())
+    facts["digests"] |= {"plan": "0" * 32, "code": "f" * 32}
+    (directory / FACTS).write_text(json.dumps(facts))
+    with pytest.raises(
+        CampaignError, match=r"flown by other code \(ffffffff.*read it with Pandion"
+    ):
+        read(directory)

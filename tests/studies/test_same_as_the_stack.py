@@ -10,10 +10,20 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from pyulog import ULog
 
 from sitl.scenario_file import load_scenario
+from sitl.simulation import START_US
 from studies.cases import configuration
 from studies.job import Job, fly_job
+
+
+def read(log: Path) -> dict[int, tuple[float, float, float]]:
+    """True positions of the base in a log [m, NED], by their stamps [us]."""
+    (topic,) = ULog(str(log), ["sim_ground_truth"]).data_list
+    p = [topic.data[f"p_WB[{axis}]"].tolist() for axis in range(3)]
+    return dict(zip(topic.data["timestamp"].tolist(), zip(*p, strict=True), strict=True))
+
 
 DURATION_S = 2.0
 SEED = 100
@@ -35,9 +45,21 @@ def test_in_process_and_over_the_wire_are_one_flight(suite: str, tmp_path: Path)
         subprocess.run(command, check=True, capture_output=True, timeout=300)
     wire = json.loads(result.read_text())
     flown = replace(load_scenario("workspace", suite), duration_s=DURATION_S)
-    here = fly_job(Job("full", flown, replace(configuration("full"), soft=False), SEED))
-    # The wire rounds to single precision: 1e-7 of a metre or so, and feedback keeps it there.
+    job = Job("full", flown, replace(configuration("full"), soft=False), SEED)
+    here = fly_job(job, traced=True)
     truth = here.truth
+    # To the last bit: where it begins, when and why it ends, how often it planned.
+    path = read(tmp_path / "out" / "flight.ulg")
+    first, *later = here.planner.trace
+    assert path[START_US] == first.p_WB
+    assert wire["duration_s"] == truth.duration_s
+    assert wire["end_reason"] == truth.end_reason
+    # The wire rounds to single precision, some 1e-7 m, and feedback keeps it there.
+    both = [(point.p_WB, path.get(START_US + round(1e6 * point.t_s))) for point in later]
+    seen = [(ours, theirs) for ours, theirs in both if theirs is not None]
+    assert len(seen) >= 0.4 * len(later)
+    for ours, theirs in seen:
+        assert theirs == pytest.approx(ours, abs=1e-5)
     assert wire["min_margin_m"] == pytest.approx(truth.min_margin_m, abs=1e-5)
     assert wire["tracking_error_rms_m"] == pytest.approx(truth.tracking_error_rms_m, abs=1e-5)
     assert wire["control_effort"]["sum"] == pytest.approx(here.planner.metrics.effort, rel=1e-3)

@@ -250,6 +250,24 @@ def test_half_an_inertial_unit_that_fails_is_found_and_the_pose_stands_in(
     assert estimates[-1].w_WB_B[0] == pytest.approx(swaying(499).gyro_B[0], abs=0.1)
 
 
+@pytest.mark.parametrize(
+    ("quiet", "blamed"), [(3000, Sensor.IMU), (100, Sensor.POSE)], ids=["long ago", "lately"]
+)
+def test_a_pose_that_failed_once_is_blamed_for_some_seconds_and_no_longer(
+    quiet: int, blamed: Sensor
+) -> None:
+    """It is no number for one frame, and a gyro is wrong after so many ``quiet`` ones."""
+
+    def spoil(k: int, s: SensorFrame) -> SensorFrame:
+        if k == 20:
+            return replace(s, v_WB=(NAN, 0.0, 0.0))
+        return replace(s, gyro_B=(s.gyro_B[0] + 0.5, -0.3, 0.2)) if k > 20 + quiet else s
+
+    history, _ = swayed(20 + quiet + 120, spoil)
+    assert not any(one.doubted for one in history[20 : 20 + quiet])
+    assert history[-1].faults()[0][0] is blamed
+
+
 @pytest.mark.parametrize("what", ["pose", "gyro", "arm"])
 def test_garbage_is_never_the_truth(what: str) -> None:
     random = np.random.default_rng(2)
@@ -267,6 +285,22 @@ def test_garbage_is_never_the_truth(what: str) -> None:
     believed_again = [(one.pose, one.inertial, one.joints)[place] for one in history[FROM + 5 :]]
     assert all(part.unused for part in believed_again)
     assert math.dist(estimates[-1].p_WB, swaying(999).p_WB) < 0.05
+
+
+def test_after_places_that_are_no_numbers_one_far_off_is_not_believed_at_once() -> None:
+    """The rest of the frame is good, and steady; the place comes back 30 m away."""
+
+    def spoil(k: int, s: SensorFrame) -> SensorFrame:
+        x, y, z = s.p_WB
+        if FROM <= k < FROM + 110:
+            return replace(s, p_WB=(NAN, y, z))
+        return replace(s, p_WB=(x + 30.0, y, z)) if k >= FROM + 110 else s
+
+    history, estimates = swayed(FROM + 300, spoil)
+    back = FROM + 109  # the first place that is a number
+    assert all(one.pose.unused for one in history[back : back + 99])
+    assert all(math.dist(one.p_WB, (0.0, 0.0, -1.0)) < 0.5 for one in estimates[: back + 99])
+    assert not history[back + 99].pose.unused, "what stays is the truth, after a while"
 
 
 def test_a_pose_that_is_late_is_found_and_the_inertial_unit_leads_on() -> None:

@@ -37,5 +37,17 @@ def test_jitter_one_gap_and_silence_are_not() -> None:
     assert told(lambda k: 12 if k < 30 else 0, 80) == [], "silence is another matter"
 
 
+def test_a_lower_rate_is_usual_some_seconds_after_it_has_been_told() -> None:
+    """12, then 6 and 3 samples in each look: each is told once, and each was usual before."""
+    first, second = told(lambda k: 12 if k < 30 else 6 if k < 180 else 3, 400)
+    assert 30 < first < 40
+    assert 180 < second < 190
+
+
+def test_of_few_samples_one_less_is_not_told() -> None:
+    """Three in a second, and two for a while."""
+    assert told(lambda k: k % 10 in ((0, 3, 6) if k < 30 else (0, 5)), 80) == []
+
+
 def test_another_rate_is_usual_after_a_while_and_then_told_again() -> None:
     assert len(told(lambda k: 12 if k % 40 < 20 else 6, 80)) == 2

@@ -616,3 +616,20 @@ def test_satellites_that_came_once_too_seldom_do_not_confirm_each_other() -> Non
     flown = Flown(run(RTK, 2, 4.0), spoofed)
     assert (Sensor.GNSS, SensorFault.JUMP) in flown.found
     assert flown.memory.reset.number == 0
+
+
+def test_satellites_that_come_twice_a_second_are_taken_back_after_a_jump() -> None:
+    seen: list[float] = []
+
+    def seldom_and_moved(now: float, sample: Sample) -> Sample | None:
+        if not isinstance(sample, GnssSample):
+            return sample
+        if seen and sample.time - seen[-1] < 0.49:
+            return None
+        seen.append(sample.time)
+        x, y, z = sample.position
+        return replace(sample, position=(x, y + 8.0, z)) if now - START > 2.0 else sample
+
+    flown = Flown(run(RTK, 2, 3.6), seldom_and_moved)
+    assert flown.memory.reset.number == 1
+    np.testing.assert_allclose(flown.memory.reset.position[:2], (0.0, 8.0), atol=0.3)

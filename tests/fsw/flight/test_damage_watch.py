@@ -8,13 +8,13 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from fsw.control.actuator_watch import Watch
+from fsw.control.actuator_watch import Watch, at_start, paused
 from fsw.control.cascade import CascadeMemory, in_hover
 from fsw.flight.damage_watch import DamageWatch
 from fsw.flight.state import Damage
-from fsw.model.actuator_health import HEALTHY
+from fsw.model.actuator_health import HEALTHY, LIMP, SOUND, STUCK
 from fsw.model.airframe import AIRFRAME
-from fsw.signals import StateEstimate
+from fsw.signals import ActuatorCommand, StateEstimate
 
 DT = 0.002
 FAULT_S = 1.5
@@ -37,32 +37,47 @@ def estimate(t_s: float, rate: tuple[float, float, float], specific_force: float
 class Motion:
     """Four rotors that are commanded to hover, and what the base does."""
 
-    def __init__(self, given: Given, watcher: DamageWatch = WATCHER) -> None:
+    def __init__(
+        self, given: Given, watcher: DamageWatch = WATCHER, takeoff_s: float = 0.0
+    ) -> None:
+        """For the first ``takeoff_s`` [s] thrust rises from none, and the ground carries."""
+        self.takeoff_s = takeoff_s
         self.given = given
         self.watcher = watcher
         self.damage, self.memory = Damage(), None
         self.told_s = math.inf
+        self.history: list[Damage] = []
         self.loops: CascadeMemory = in_hover(AIRFRAME, estimate(0.0, (0.0, 0.0, 0.0), 9.81))
 
     def run(
-        self, seconds: float, push: Callable[[float], float] = lambda _: 0.0, mass: float = 3.5
+        self,
+        seconds: float,
+        push: Callable[[float], float] = lambda _: 0.0,
+        mass: float = 3.5,
+        doubted: Callable[[float], bool] = lambda _: False,
     ) -> Damage:
-        """Move for a while; ``push`` [m/s^2] along body -z."""
+        """Move for a while; ``push`` [m/s^2] along body -z. Nothing is seen while ``doubted``."""
         thrust, wx, wy = [EACH] * 4, 0.0, 0.0
         memory: Watch | None = None
         for k in range(round(seconds / DT)):
             t = k * DT
+            share = min(t / self.takeoff_s, 1.0) if self.takeoff_s else 1.0
+            each, loops = share * EACH, self.loops
+            if share < 1.0:
+                loops = loops.after_sending(ActuatorCommand((each,) * 4, HANGING))
             for i in range(4):
-                thrust[i] += DT / 0.04 * (self.given(t, i) * EACH - thrust[i])
+                thrust[i] += DT / 0.04 * (self.given(t, i) * each - thrust[i])
             rear, left, front, right = thrust
             # The body turns up to 1 rad/s in these tests: products of rates are left out.
             wx += DT * 0.3 * (left - right) / 0.307
             wy += DT * 0.3 * (front - rear) / 0.3
-            felt = sum(thrust) / mass + push(t)
+            felt = (9.81 if share < 1.0 else sum(thrust) / mass) + push(t)
             now = estimate(1.0 + t, (wx, wy, 0.0), felt)
-            self.damage, memory = self.watcher.see(
-                self.damage, memory, self.loops, self.loops, now, 1
-            )
+            if doubted(t):
+                memory = paused(memory)
+            else:
+                self.damage, memory = self.watcher.see(self.damage, memory, loops, loops, now, 1)
+            self.history.append(self.damage)
             if self.damage.rotor and self.told_s == math.inf:
                 self.told_s = t - FAULT_S
         return self.damage
@@ -111,6 +126,71 @@ def test_a_rotor_that_is_gone_for_a_moment_is_not_lost() -> None:
     assert not damage.report.lost
 
 
+@pytest.mark.parametrize(
+    ("given", "wrong"),
+    [
+        (weak(2, 0.5), ("effect", 0.5)),
+        (weak(2, 0.0), ("lost", True)),
+        (lambda t, i: 1.0 + 0.6 * math.sin(9.0 * t) if i == 2 and t >= FAULT_S else 1.0,
+         ("disobeys", True)),
+    ],
+    ids=["weak", "lost", "disobeys"],
+)  # fmt: skip
+def test_a_rotor_that_is_known_to_be_bad_stays_so_while_sensors_are_doubted(
+    given: Given, wrong: tuple[str, float]
+) -> None:
+    found_s = FAULT_S + 1.0
+    motion = Motion(given)
+    motion.run(found_s + 1.5, doubted=lambda t: found_s - 0.02 <= t < found_s)
+    name, value = wrong
+    for damage in motion.history[round(found_s / DT) :]:
+        assert damage.rotor.startswith(NAMES[2])
+        assert getattr(damage.report, name) == pytest.approx(value, abs=0.15)
+
+
+def test_while_nothing_has_failed_the_watch_starts_anew_after_a_doubt() -> None:
+    motion = Motion(lambda _t, _i: 1.0)
+    assert motion.run(0.2) == Damage()
+    assert paused(None) is None
+    assert paused(at_start()) is None
+    limp = at_start()
+    limp["joint"][0, 1], limp["running"], limp["torque"] = LIMP, 5.0, 1.0
+    kept = paused(limp)
+    assert kept is not None
+    assert kept[0]["joint"].tolist() == [SOUND, LIMP]
+    assert kept[0]["running"] == 0.0
+    assert not kept[0]["torque"].any()
+
+
+@pytest.mark.parametrize(
+    ("first", "second"), [(0, 2), (0, 1), (3, 1), (3, 2)], ids=lambda k: NAMES[k][6:]
+)
+def test_a_second_rotor_that_gives_nothing_is_lost(first: int, second: int) -> None:
+    lost_s = FAULT_S + 1.0
+
+    def given(t: float, i: int) -> float:
+        if i == second:
+            return 0.0 if t >= lost_s else 1.0
+        return 0.7 if i == first and t >= FAULT_S else 1.0
+
+    motion = Motion(given)
+    damage = motion.run(lost_s + 0.4)
+    assert motion.history[round(lost_s / DT)].rotor.startswith(NAMES[first])
+    assert damage.rotor == f"{NAMES[second]} gives nothing"
+    assert damage.report.lost
+    assert 1e-6 * damage.rotor_us - 1.0 == pytest.approx(lost_s, abs=0.15)
+    assert not any(one.report.disobeys for one in motion.history)
+
+
+@pytest.mark.parametrize("share", [1.0, 0.6])
+def test_beside_a_weak_rotor_pushes_and_another_weak_one_lose_nothing(share: float) -> None:
+    random = np.random.default_rng(3).uniform(-0.8, 0.8, 100)
+    motion = Motion(lambda t, i: {0: 0.7, 2: share}.get(i, 1.0) if t >= FAULT_S + i else 1.0)
+    motion.run(FAULT_S + 3.0, lambda t: float(random[int(10.0 * t)]))
+    assert motion.history[round((FAULT_S + 1.0) / DT)].rotor.startswith(NAMES[0])
+    assert not any(one.report.lost or one.report.disobeys for one in motion.history)
+
+
 def test_a_rotor_that_gives_too_much_does_not_obey_and_is_counted_on_as_it_is() -> None:
     def stuck(t: float, i: int) -> float:
         return 1.0 + 0.6 * math.sin(9.0 * t) if i == 0 and t >= FAULT_S else 1.0
@@ -146,6 +226,34 @@ def test_two_rotors_that_change_together_are_no_single_one() -> None:
     """As a gust that turns the body, or an arm that is pulled: a torque without a lift."""
     turned = Motion(lambda t, i: {1: 0.8, 3: 1.2}.get(i, 1.0) if t >= FAULT_S else 1.0)
     assert not turned.run(FAULT_S + 0.5).rotor
+
+
+@pytest.mark.parametrize("rise_s", [1.0, 3.0])
+def test_after_a_slow_take_off_a_lost_rotor_is_named_as_soon(rise_s: float) -> None:
+    """What the ground carries while thrust rises is no error of the thrust that lasts."""
+    lost_s = rise_s + 1.5
+    motion = Motion(lambda t, i: 0.0 if i == 2 and t >= lost_s else 1.0, takeoff_s=rise_s)
+    motion.run(lost_s + 0.3)
+    assert not motion.history[round(lost_s / DT)].rotor
+    assert motion.damage.rotor.startswith(NAMES[2])
+
+
+def test_a_second_joint_that_fails_is_named_beside_the_first() -> None:
+    damage, memory = Damage(), at_start()
+    loops: CascadeMemory = in_hover(AIRFRAME, estimate(0.0, (0.0, 0.0, 0.0), 9.81))
+    said = []
+    for k, kinds in enumerate([(STUCK, SOUND), (STUCK, LIMP), (LIMP, LIMP)]):
+        memory["joint"], memory["joint_for"] = kinds, 0.1
+        now = estimate(5.0 + k, (0.0, 0.0, 0.0), 9.81)
+        damage, _ = WATCHER.see(damage, memory, loops, loops, now, 1)
+        said.append(damage.joint)
+        assert damage.report.joints == damage.health.joints == kinds
+    assert said == [
+        "joint 1 does not move",
+        "joint 1 does not move and joint 2 gives no torque",
+        "joint 1 gives no torque and joint 2 gives no torque",
+    ]
+    assert damage.joint_us == 4_900_000, "when the first one failed"
 
 
 def test_allocation_is_left_alone_where_that_is_asked_for() -> None:

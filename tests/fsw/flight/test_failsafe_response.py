@@ -308,6 +308,18 @@ def test_setpoints_that_stop_hold_at_once_and_are_told_when_they_come_again() ->
     assert watched.flown == (Mode.HOLD, Mode.OFFBOARD)
 
 
+def test_a_second_joint_that_fails_is_told_and_changes_no_action() -> None:
+    watched = Watched().until(0.5, damage=Damage(joint="joint 1 does not move"))
+    flown, first = watched.flown, list(watched.texts)
+    assert flown[0] is not Mode.MISSION
+    watched.until(1.0)
+    assert watched.texts == first
+    watched.until(3.0, damage=Damage(joint="joint 1 does not move and joint 2 gives no torque"))
+    (text,) = watched.texts[len(first) :]
+    assert "joint 2 gives no torque" in text
+    assert watched.flown == flown
+
+
 def test_landing_or_disarming_ends_a_failsafe() -> None:
     watched = Watched(AT_ONCE).until(11.0)
     assert watched.state.vehicle.failsafe.action is Action.RETURN

@@ -192,6 +192,33 @@ def test_a_safe_set_that_comes_between_planning_ticks_grows_as_much() -> None:
     assert KeptSet().of(BOTH).safe_set is BOTH
 
 
+@pytest.mark.parametrize("pose", [certain(x=0.3), certain(x=0.02)], ids=["doubt", "drift"])
+def test_a_safe_set_that_is_renewed_grows_no_faster_and_no_slower(pose: Array) -> None:
+    """As zones that move are, ten times a second; the other set is always the same."""
+    body, histories = clearance(), []
+    for renewed in (False, True):
+        kept, history = body.keep(KeptSet(), SafeSet((NORTH,)), vehicle(), certain(x=0.01)), []
+        for k in range(1, 6):
+            if renewed:
+                kept = kept.of(SafeSet((wall((-1.0, 0.0, 0.0), -5.0 - 1e-3 * k, 0.1),)))
+            now = vehicle(1_000_000 + 100_000 * k)
+            kept = body.keep(kept, kept.source, now, 0.2 * k * pose)
+            history.append(kept.added[0])
+        histories.append(history)
+    same, moving = histories
+    assert moving == pytest.approx(same, abs=STEP)
+    steps = np.diff([0.03, *moving])
+    assert max(steps) < 0.08 + 2.0 * STEP, "0.8 m/s at most"
+    assert moving[-1] > 0.05
+
+
+def test_other_zones_of_other_kinds_have_no_deviation_to_compare_with_but_the_bound() -> None:
+    kept = clearance().keep(KeptSet(), SafeSet((NORTH,)), vehicle(), certain(x=0.01))
+    other = kept.of(SafeSet((Zone(ball((9.0, 0.0, 0.0), 0.3), 0.1),)))
+    assert (other.spread, other.t_us) == ((), kept.t_us)
+    assert kept.of(SafeSet((EAST,))).spread == kept.spread
+
+
 def corridor(left: float, right: float) -> SafeSet:
     """Walls so far to both sides of the vehicle, clearance included."""
     return SafeSet((wall((0.0, 1.0, 0.0), -left, 0.0), wall((0.0, -1.0, 0.0), -right, 0.0)))

@@ -110,9 +110,11 @@ def test_a_measurement_corrects_the_model_which_goes_on_from_there() -> None:
     model = BatteryModel()
     drawn = drained(model, LEVELS, FULL, HOVER, 1.0)
     now = corrected(model, LEVELS, drawn, BatteryReading(14.2, 0.15))
-    assert (now.voltage, now.remaining, now.charge) == (14.2, 0.15, Charge.CRITICAL)
+    assert (now.voltage, now.charge) == (14.2, Charge.CRITICAL)
+    assert now.remaining == pytest.approx(0.15, abs=0.0051), "what is rounded to 15 %"
     later = drained(model, LEVELS, now, HOVER, 1.0)
-    assert 0.14 < later.remaining < 0.15
+    assert 0.14 < later.remaining < now.remaining
+    assert later.voltage == pytest.approx(14.2, abs=0.2), "not the model's own"
     assert corrected(model, LEVELS, later, BatteryReading(16.8, 1.0)).charge is Charge.OK
 
 
@@ -132,3 +134,35 @@ def test_a_battery_that_nothing_has_drawn_on_begins_at_its_first_current() -> No
     state = drained(BatteryModel(), LEVELS, FULL, HOVER, 0.1)
     assert state.usual_current == state.current
     assert BatteryState().time_left == math.inf
+
+
+@pytest.mark.parametrize("flow", [0.7, 1.6])
+@pytest.mark.parametrize("floor", [False, True], ids=["rounded", "cut off"])
+def test_readings_of_whole_per_cent_undo_nothing_that_has_been_used(
+    flow: float, floor: bool
+) -> None:
+    """A reading each second, and a model that uses more or less: each level begins once."""
+    thrust = (2.0 * HOVER[0],) * 4
+    model, truth, state, seen = BatteryModel(), FULL, FULL, [Charge.OK]
+    for k in range(1, 6000):
+        truth = drained(replace(model, capacity=10.0 / flow), LEVELS, truth, thrust, 0.1)
+        before, state = state.remaining, drained(model, LEVELS, state, thrust, 0.1)
+        if k % 10 == 0:
+            per_cent = 100.0 * truth.remaining
+            reading = (math.floor(per_cent) if floor else round(per_cent)) / 100.0
+            state = corrected(model, LEVELS, state, BatteryReading(truth.voltage, reading))
+            assert state.remaining - before < 4e-3, "what the model used since, at most"
+            assert state.remaining == pytest.approx(truth.remaining, abs=0.016)
+        if state.charge is not seen[-1]:
+            seen.append(state.charge)
+    assert seen == [Charge.OK, Charge.LOW, Charge.CRITICAL, Charge.EMERGENCY]
+
+
+def test_a_level_is_over_only_with_charge_to_spare() -> None:
+    def charge(remaining: float) -> Charge:
+        low = replace(FULL, remaining=0.15, charge=Charge.CRITICAL)
+        return corrected(BatteryModel(), LEVELS, low, BatteryReading(15.0, remaining)).charge
+
+    assert [charge(one) for one in (0.21, 0.24, 0.31, 0.34, 0.05)] == [
+        *(Charge.CRITICAL, Charge.LOW, Charge.LOW, Charge.OK, Charge.EMERGENCY)
+    ]
