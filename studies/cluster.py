@@ -142,8 +142,11 @@ class Cluster:
         if now_s < self._looked_s + _LOOK_S:
             return
         self._looked_s = now_s
+        before = set(self._workers)
         with contextlib.suppress(OSError, TimeoutError):
             self._workers = dict(self._client.nthreads())
+        for gone in sorted(before - set(self._workers)):
+            self._say(f"worker {gone} is gone; the flights that it had are flown again")
         if self.threads:
             self._none_since_s = now_s
         elif now_s > self._none_since_s + _PATIENCE_S:

@@ -158,7 +158,9 @@ def test_an_interrupted_campaign_with_a_killed_worker_goes_on(tmp_path: Path) ->
 
 def test_a_flight_that_kills_its_process_is_a_row_and_the_others_are_flown() -> None:
     flights = [StubFlight(number, "kills" if number == 7 else "flies") for number in range(20)]
-    rows = Campaign[StubRow](2).run(flights)
+    said: list[str] = []
+    rows = Campaign[StubRow](2, say=said.append).run(flights)
+    assert any("is gone; the flights that it had are flown again" in one for one in said)
     assert [row.number for row in rows] == list(range(20))
     assert [(row.number, row.reason) for row in rows if row.error] == [
         (7, "the process that flew it died; tried 3 times")
