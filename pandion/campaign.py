@@ -17,7 +17,6 @@ from pandion.display import Display
 
 if TYPE_CHECKING:
     from studies.campaign_plan import CampaignPlan
-    from studies.job import Job
 
 FLOWN, BROKEN = 0, 1  # exit codes
 
@@ -161,10 +160,10 @@ def _written(options: CampaignOptions, folder: Path, display: Display) -> int:
 
 def _again(options: CampaignOptions, plan: CampaignPlan) -> int:
     """One flight in this process, its trace, and what flies it with both processes and a log."""
-    from fsw.parameters.registry import BY_NAME
     from fsw.parameters.storage import save
     from sitl.scenario_text import scenario_text
     from studies.campaign_flight import CampaignFlight
+    from studies.find import changed_parameters, fly_command
     from studies.job import fly_job
 
     number = options.flight or 0
@@ -189,23 +188,11 @@ def _again(options: CampaignOptions, plan: CampaignPlan) -> int:
     trace.write_text(json_text(traced) + "\n", encoding="utf-8")
     comment = f"flight {number} of campaign {plan.name}: {flight.case}"
     scenario.write_text(scenario_text(job.scenario, comment), encoding="utf-8")
-    changed = {name: one.read(job.config) for name, one in BY_NAME.items()}
-    save(params, {n: v for n, v in changed.items() if v != BY_NAME[n].default})
+    save(params, changed_parameters(job))
     say(f"trace {trace}", console)
-    say(f"with its log: {_fly_words(flight.case.controller, job, scenario, params)}", console)
+    command = fly_command(typed(), job, flight.case.controller, scenario, params)
+    say(f"with its log: {command}", console)
     lost = unwritten(options.json, json_text(traced["row"], 1) + "\n")
     for what in lost:
         complain("pandion campaign", f"cannot write {what}")
     return BROKEN if row.error or lost else FLOWN
-
-
-def _fly_words(controller: str, job: Job, scenario: Path, params: Path) -> str:
-    """The command that flies the same over the link: equal but for what the link rounds."""
-    words = [typed(), "fly", str(scenario), f"--seed={job.seed}", f"--params={params}"]
-    if controller != "blf":
-        words.append(f"--controller={controller}")
-    if job.config.inner == "pid":
-        words.append("--tracking=pid")
-    if job.config.soft:
-        words.append("--allow-inconsistent")
-    return " ".join(words)

@@ -16,14 +16,27 @@ def keep(job: Job, controller: str, stem: Path, comment: str) -> str:
     """Write ``stem``.toml, and .params where parameters differ; the command that flies it."""
     scenario, params = stem.with_suffix(".toml"), stem.with_suffix(".params")
     scenario.write_text(scenario_text(job.scenario, comment), encoding="utf-8")
-    words = ["pandion fly", str(scenario), f"--seed={job.seed}"]
-    changed = {
+    changed = changed_parameters(job)
+    if changed:
+        save(params, changed)
+    return fly_command("pandion", job, controller, scenario, params if changed else None)
+
+
+def changed_parameters(job: Job) -> dict[str, float]:
+    """Parameters of a flight that are not the default."""
+    return {
         name: value
         for name, one in BY_NAME.items()
         if (value := one.read(job.config)) != one.default
     }
-    if changed:
-        save(params, changed)
+
+
+def fly_command(
+    program: str, job: Job, controller: str, scenario: Path, params: Path | None
+) -> str:
+    """The command that flies the same over the link: equal but for what the link rounds."""
+    words = [program, "fly", str(scenario), f"--seed={job.seed}"]
+    if params is not None:
         words.append(f"--params={params}")
     if controller != "blf":
         words.append(f"--controller={controller}")
