@@ -20,6 +20,7 @@ from fsw.estimation.error_state import (
     IMU_CAPACITY,
     LOST,
     PUSHES,
+    RATE,
     TH,
     TIME,
     Array,
@@ -245,7 +246,12 @@ def _begin(
     v_variance: Vec3,
     q_variance: Vec3,
 ) -> None:
-    """Start the filter from a known state; readings of the IMU before it are passed over."""
+    """Start the filter from a known state; readings of the IMU before it are passed over.
+
+    Where the first reading came later than the state, the filter begins with that reading: until
+    then the vehicle moved as it did, but for what is not known of its velocity and its turning. To
+    take the first reading, with all its vibration, for those before it would make up a velocity.
+    """
     s, t = x[0], law[0].tuning
     M = s.covariance
     for i in range(ERRORS):
@@ -272,6 +278,15 @@ def _begin(
     before = s.imu[(s.first - 1) % IMU_CAPACITY]
     for i in range(3):
         s.rate[i] = before[4 + i]
+    missed = before[TIME] - s.time
+    if missed > t.imu_gap:
+        s.time = before[TIME]
+        for i in range(3):
+            s.p[i] += missed * v[i]
+            M[P + i, V + i] = M[V + i, P + i] = missed * v_variance[i]
+            M[P + i, P + i] += missed * missed * v_variance[i]
+            turned = missed * before[RATE + i]
+            M[TH + i, TH + i] += turned * turned
 
 
 @kernel

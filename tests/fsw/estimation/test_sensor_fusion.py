@@ -180,6 +180,28 @@ def test_a_hidden_delay_of_the_pose_is_found_within_2_ms() -> None:
 
 
 @pytest.mark.requirement("REQ-EST-1")
+def test_a_filter_that_starts_from_poses_older_than_its_imu_makes_up_no_velocity() -> None:
+    def reading(time: float, shake: float) -> ImuSample:
+        return ImuSample(time, (0.0, shake, -9.81), (0.0, 0.0, 0.0))
+
+    fusion, memory = SensorFusion(MOCAP.tuning), at_start()
+    level, place, noise = (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, -1.0), ((1e-6,) * 3, (1e-5,) * 3)
+    poses = [
+        PoseSample(0.784, (3e-4, 0.0, -1.0), level, *noise),
+        PoseSample(0.792, place, level, *noise),
+    ]
+    shaken = [reading(0.956 + TICK * k, 1.5 if k == 0 else 0.0) for k in range(21)]
+    joints = [JointSample(0.956 + TICK * k, (0.1, 0.2)) for k in range(21)]
+    memory, _ = fusion.step(memory, [*poses, *shaken, *joints], 0.996)
+    memory, estimate = fusion.step(memory, [reading(0.998, 0.0)], 0.998)
+    assert estimate is not None
+    assert np.linalg.norm(estimate.v_WB) < 0.01  # 0.25 with the first reading for all before it
+    assert np.linalg.norm(np.subtract(estimate.p_WB, place)) < 0.002
+    M = fusion.covariance(memory, 0.998)
+    assert M[0, 0] > (0.5 * MOCAP.tuning.velocity * 0.2) ** 2, "and does not know how it moved"
+
+
+@pytest.mark.requirement("REQ-EST-1")
 @pytest.mark.parametrize("bad", ["far", "upside_down", "tilted"])
 def test_the_filter_does_not_start_from_a_pose_that_no_other_agrees_with(bad: str) -> None:
     lie = {"far": far, "upside_down": upside_down, "tilted": tilted}[bad]
