@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import TYPE_CHECKING, Any, Final, TextIO
 
 from command_line.output import say
 from command_line.printable import printable
@@ -13,21 +14,33 @@ from command_line.printable import printable
 if TYPE_CHECKING:
     from rich.progress import Progress
 
+_SILENT_S: Final = 60.0  # without a terminal, at most this long between two lines
+
 
 class Display:
     """Progress and sentences of a long operation, on one stream."""
 
-    def __init__(self, stream: TextIO, *, lines: int = 10, threaded: bool = True) -> None:
+    def __init__(
+        self,
+        stream: TextIO,
+        *,
+        lines: int = 10,
+        threaded: bool = True,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
         """Draw nothing yet.
 
-        ``lines`` report on one thing where there is no terminal. ``threaded`` draws between steps
-        too, from a thread, which would be measured with them.
+        Where there is no terminal ``lines`` report on one thing, and more if it takes more minutes
+        by the ``clock`` [s]. ``threaded`` draws between steps too, from a thread, which would be
+        measured with them.
         """
         self._stream = stream
         self._lines = lines
         self._threaded = threaded
         self._bar: Progress | None = None
         self._shown = ("", 0)
+        self._clock = clock
+        self._shown_s = clock()
 
     def say(self, sentence: str) -> None:
         """Print one line, above the bar if there is one."""
@@ -79,8 +92,11 @@ class Display:
             )
             return
         shown = (what, int(self._lines * done / max(total, 1e-9)))
-        if shown != self._shown and (counted or shown[1] > 0):
+        now_s = self._clock()
+        overdue = shown == self._shown and now_s - self._shown_s >= _SILENT_S
+        if overdue or (shown != self._shown and (counted or shown[1] > 0)):
             self.say(f"{what} {state}")
+            self._shown_s = now_s
         self._shown = shown
 
     def share(self, what: str, done: int, total: int) -> None:
