@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import signal
 import sys
 from importlib import import_module
 from typing import Final
@@ -132,5 +133,11 @@ def _run(words: list[str]) -> int:
     )
 
 
+def program() -> int:
+    """``main`` as a program of its own, which a batch system ends as Ctrl-C does."""
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    return main()
+
+
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(program())

@@ -87,7 +87,10 @@ def test_flights_are_flown_by_other_processes_here(tmp_path: Path) -> None:
 
 
 @pytest.mark.long
-def test_an_interrupt_ends_the_campaign_and_its_processes_at_once(tmp_path: Path) -> None:
+@pytest.mark.parametrize("ending", ["Ctrl-C", "a batch system's SIGTERM"])
+def test_an_interrupt_ends_the_campaign_and_its_processes_at_once(
+    ending: str, tmp_path: Path
+) -> None:
     words = ["table4", "--plant=double-integrator", "--workers=1", f"--out={tmp_path}"]
     process = subprocess.Popen(
         [sys.executable, "-m", "pandion", "reproduce", *words],
@@ -101,10 +104,14 @@ def test_an_interrupt_ends_the_campaign_and_its_processes_at_once(tmp_path: Path
         while "flown 0" not in process.stdout.readline():
             assert process.poll() is None
         time.sleep(1.0)
-        os.killpg(process.pid, signal.SIGINT)
+        if ending == "Ctrl-C":
+            os.killpg(process.pid, signal.SIGINT)  # to all processes, as a terminal does
+        else:
+            process.terminate()
         reported, _ = process.communicate(timeout=20.0)
     finally:
         with contextlib.suppress(ProcessLookupError):
             os.killpg(process.pid, signal.SIGKILL)
     assert process.returncode == 1
     assert f"--out {tmp_path} resumes" in reported
+    assert "resource_tracker" not in reported
