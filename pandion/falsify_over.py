@@ -14,8 +14,8 @@ from pandion.display import Display
 
 if TYPE_CHECKING:
     from pandion.falsify import FalsifyOptions
-    from studies.campaign_plan import CampaignPlan
-    from studies.worst_flights import Find, Searched
+    from studies.campaign.plan import CampaignPlan
+    from studies.search.worst_flights import Find, Searched
 
 HOLDS, BROKEN = 0, 1  # exit codes
 JOURNAL: Final = "journal.jsonl"
@@ -24,9 +24,9 @@ FINDS: Final = "finds.json"
 
 def main(options: FalsifyOptions, file: Path) -> int:
     """Search and keep; returns the exit code."""
-    from studies.campaign import SchedulerGoneError
-    from studies.campaign_keys import CampaignError
-    from studies.campaign_plan import load_plan
+    from studies.campaign.campaign import SchedulerGoneError
+    from studies.campaign.keys import CampaignError
+    from studies.campaign.plan import load_plan
 
     try:
         if options.replay is not None:
@@ -43,8 +43,8 @@ def main(options: FalsifyOptions, file: Path) -> int:
 
 
 def _search(options: FalsifyOptions, plan: CampaignPlan) -> int:
-    from studies.flight_space import spaces
-    from studies.worst_flights import search
+    from studies.campaign.flight_space import spaces
+    from studies.search.worst_flights import search
 
     folder = options.out or new_run_directory(Path("runs"), f"falsify-{plan.name}")
     folder.mkdir(parents=True, exist_ok=True)
@@ -93,7 +93,7 @@ def _search(options: FalsifyOptions, plan: CampaignPlan) -> int:
 
 def _kept(number: int, find: Find, folder: Path, display: Display) -> dict[str, Any]:
     """Write one find and say it; it was flown again from its file."""
-    from studies.find import flown_again, keep
+    from studies.flight.fly_again import flown_again, keep
 
     stem = folder / f"find-{number + 1}"
     margin = 1e3 * find.margin_m

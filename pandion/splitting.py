@@ -16,9 +16,9 @@ from pandion.cluster_options import ClusterOptions, campaign_of
 from pandion.display import Display
 
 if TYPE_CHECKING:
-    from studies.campaign_plan import CampaignPlan
-    from studies.rare_flights import FlightScore
-    from studies.splitting import Effort, Estimate
+    from studies.campaign.plan import CampaignPlan
+    from studies.statistics.rare_flights import FlightScore
+    from studies.statistics.splitting import Effort, Estimate
 
 FOUND, NOT_FOUND = 0, 1  # exit codes
 JOURNAL = "journal.jsonl"
@@ -61,10 +61,10 @@ def main(argv: list[str]) -> int:
     from fsw.runtime.process import pin_numerics_to_one_thread
 
     pin_numerics_to_one_thread()  # before NumPy loads
-    from studies.campaign import SchedulerGoneError
-    from studies.campaign_keys import CampaignError
-    from studies.campaign_plan import load_plan
-    from studies.splitting import Effort
+    from studies.campaign.campaign import SchedulerGoneError
+    from studies.campaign.keys import CampaignError
+    from studies.campaign.plan import load_plan
+    from studies.statistics.splitting import Effort
 
     try:
         plan = load_plan(options.file)
@@ -79,8 +79,8 @@ def main(argv: list[str]) -> int:
 
 
 def _run(options: SplittingOptions, plan: CampaignPlan, effort: Effort) -> int:
-    from studies.rare_flights import FlightScore, as_json, only_case, sentences
-    from studies.splitting import estimate
+    from studies.statistics.rare_flights import FlightScore, as_json, only_case, sentences
+    from studies.statistics.splitting import estimate
 
     flights = only_case(plan)
     folder = options.out or new_run_directory(Path("runs"), f"splitting-{plan.name}")
@@ -114,7 +114,7 @@ def _run(options: SplittingOptions, plan: CampaignPlan, effort: Effort) -> int:
 
 def _kept(score: FlightScore, found: Estimate, folder: Path) -> str:
     """Write the flight with the minimum margin; the sentence that says how to see it."""
-    from studies.find import keep
+    from studies.flight.fly_again import keep
 
     run = min(found.runs, key=lambda one: one.least)
     margin = 1e3 * (run.least + score.threshold_m)

@@ -16,7 +16,7 @@ from pandion.cluster_options import ClusterOptions, campaign_of
 from pandion.display import Display
 
 if TYPE_CHECKING:
-    from studies.tune import Outcome, Task
+    from studies.search.tune import Outcome, Task
 
 BETTER, NOTHING = 0, 1  # exit codes
 JOURNAL, PARAMS = "journal.jsonl", "tuned.params"
@@ -46,9 +46,9 @@ def main(argv: list[str]) -> int:
     from fsw.runtime.process import pin_numerics_to_one_thread
 
     pin_numerics_to_one_thread()  # before NumPy loads
-    from studies.campaign import SchedulerGoneError
-    from studies.campaign_keys import CampaignError
-    from studies.tune import EXAMPLE, load_task
+    from studies.campaign.campaign import SchedulerGoneError
+    from studies.campaign.keys import CampaignError
+    from studies.search.tune import EXAMPLE, load_task
 
     if options.example:
         print(EXAMPLE.read_text(encoding="utf-8"), end="")
@@ -66,7 +66,7 @@ def main(argv: list[str]) -> int:
 
 
 def _tune(options: TuneOptions, task: Task) -> int:
-    from studies.tune import as_json, sentences, tune
+    from studies.search.tune import as_json, sentences, tune
 
     folder = options.out or new_run_directory(Path("runs"), f"tune-{task.plan.name}")
     folder.mkdir(parents=True, exist_ok=True)

@@ -11,8 +11,8 @@ import pytest
 
 from pandion.campaign import main
 from sitl.scenario_file import load_scenario
-from studies.campaign_plan import load_plan
-from studies.campaign_store import read
+from studies.campaign.plan import load_plan
+from studies.campaign.store import read
 
 TINY = """
 flights = 3
@@ -78,7 +78,7 @@ def test_more_flights_are_added_and_none_is_flown_twice(
     capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("studies.campaign_page._figures", lambda _: [])  # they cost the most
+    monkeypatch.setattr("studies.campaign.page._figures", lambda _: [])  # they cost the most
     file, out = campaign
     before = (out / "journal.jsonl").read_text()
     target = tmp_path / "summary.json"
