@@ -164,7 +164,6 @@ def _again(options: CampaignOptions, plan: CampaignPlan) -> int:
     from sitl.scenario_text import scenario_text
     from studies.campaign.flight import CampaignFlight
     from studies.flight.fly_again import changed_parameters, fly_command
-    from studies.flight.job import fly_job
 
     number = options.flight or 0
     plan.check(number + 1)
@@ -172,15 +171,14 @@ def _again(options: CampaignOptions, plan: CampaignPlan) -> int:
     job = flight.job
     folder = options.out or new_run_directory(Path("runs"), f"{plan.name}-flight{number}")
     folder.mkdir(parents=True, exist_ok=True)
-    row = CampaignFlight(plan, number).row()
+    row, result = CampaignFlight(plan, number).flown(traced=True)
     console = console_beside(options.json)
     say(f"flight {number}: {flight.case}, seed {flight.seed}", console)
     for key, value in flight.values:
         say(f"  {key} = {value:g}", console)
     say(f"  {row.reason}", console)
     traced: dict[str, Any] = {"row": row.compared()}
-    if not row.error:
-        result = fly_job(job, traced=True)
+    if result is not None:
         traced["texts"] = result.planner.texts
         traced["trace"] = [asdict(point) for point in result.planner.trace]
     stem = folder / f"flight-{number}"

@@ -13,6 +13,7 @@ from studies.campaign.plan import CampaignPlan
 from studies.flight import closed_loop, job, mission, samples, sensor_faults
 from studies.flight.closed_loop import RefusedError
 from studies.flight.job import Outcome, fly_job, score, sources
+from studies.flight.result import FlightResult
 
 
 def code() -> str:
@@ -90,23 +91,29 @@ class CampaignFlight:
 
     def row(self) -> CampaignRow:
         """See :class:`studies.campaign.campaign.Flight`."""
+        row, _ = self.flown()
+        return row
+
+    def flown(self, *, traced: bool = False) -> tuple[CampaignRow, FlightResult | None]:
+        """The row and all that the flight left; None if nothing was flown to its end."""
         began_s = time.thread_time()
         try:
             planned = self.plan.flight(self.number).job
-            result = fly_job(planned)
+            result = fly_job(planned, traced=traced)
             found = score(planned, result)
         except RefusedError as error:
-            return self._row(reason=f"refused: {error}", refused=True)
+            return self._row(reason=f"refused: {error}", refused=True), None
         except Exception as error:
-            return self.broken(f"{type(error).__name__}: {error}")
+            return self.broken(f"{type(error).__name__}: {error}"), None
         truth = result.truth
-        return self._row(
+        row = self._row(
             **_same(found),
             margin_of=truth.min_margin_key,
             margin_time_s=truth.min_margin_time_s,
             te_max_m=truth.tracking_error_max_m,
             took_s=time.thread_time() - began_s,
         )
+        return row, result
 
     def broken(self, reason: str) -> CampaignRow:
         """See :class:`studies.campaign.campaign.Flight`."""

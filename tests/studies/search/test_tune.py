@@ -168,7 +168,7 @@ def test_the_command_writes_parameters_only_if_they_are_better(
         def __exit__(self, *_: object) -> None: ...
 
     def of(law: Law) -> None:
-        monkeypatch.setattr(command, "campaign_of", lambda *_, **__: Opened(law))
+        monkeypatch.setattr("pandion.campaign_run.campaign_of", lambda *_, **__: Opened(law))
 
     of(kept_today)
     assert command.main([str(file), f"--out={tmp_path / 'good'}", "--workers=0"]) == 0
