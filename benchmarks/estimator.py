@@ -17,8 +17,8 @@ from fsw.parameters.flight_config import flight_config
 from fsw.signals import TickInputs, TickOutputs
 from sitl.scenario_file import load_scenario
 from sitl.simulation import STEP_US, Simulation
-from studies.closed_loop import FIRST_COMMANDS, ClosedLoop, InlinePlanner
-from studies.flight_result import processor_time_us
+from studies.flight.closed_loop import FIRST_COMMANDS, ClosedLoop, InlinePlanner
+from studies.flight.result import processor_time_us
 
 SCENARIO: Final = "walls"
 SUITES: Final = ("perfect", "mocap", "vio", "rtk")

@@ -52,7 +52,7 @@ class EmptyRow:
     error: bool = False
 
     def as_line(self) -> dict[str, Any]:
-        """See :class:`studies.campaign.Row`."""
+        """See :class:`studies.campaign.campaign.Row`."""
         return asdict(self)
 
 
@@ -63,19 +63,19 @@ class EmptyFlight:
     number: int
 
     def key(self) -> str:
-        """See :class:`studies.campaign.Flight`."""
+        """See :class:`studies.campaign.campaign.Flight`."""
         return str(self.number)
 
     def row(self) -> EmptyRow:
-        """See :class:`studies.campaign.Flight`."""
+        """See :class:`studies.campaign.campaign.Flight`."""
         return EmptyRow(self.number)
 
     def broken(self, reason: str) -> EmptyRow:
-        """See :class:`studies.campaign.Flight`."""
+        """See :class:`studies.campaign.campaign.Flight`."""
         return EmptyRow(self.number, error=True)
 
     def from_line(self, line: Mapping[str, Any]) -> EmptyRow:
-        """See :class:`studies.campaign.Flight`."""
+        """See :class:`studies.campaign.campaign.Flight`."""
         return EmptyRow(**line)
 
 
@@ -93,9 +93,9 @@ def main(argv: list[str]) -> int:
 
 
 def _empty(options: SchedulerOptions) -> dict[str, Any]:
-    from studies.campaign import mute
-    from studies.cluster import Cluster
-    from studies.dispatch import AHEAD, TASKS_A_SECOND, Dispatch
+    from studies.campaign.campaign import mute
+    from studies.campaign.cluster import Cluster
+    from studies.campaign.dispatch import AHEAD, TASKS_A_SECOND, Dispatch
 
     cluster = Cluster(options.workers, None, mute)
     found: dict[str, Any] = {"tasks": options.tasks, "workers": options.workers}
@@ -119,9 +119,9 @@ def _real(options: SchedulerOptions) -> dict[str, Any]:
     """Rate of real flights by one worker and by all, after each has flown once."""
     if not options.flights:
         return {}
-    from studies.campaign import Campaign
-    from studies.campaign_flight import CampaignFlight, CampaignRow
-    from studies.campaign_plan import parse_plan
+    from studies.campaign.campaign import Campaign
+    from studies.campaign.flight import CampaignFlight, CampaignRow
+    from studies.campaign.plan import parse_plan
 
     plan = parse_plan(
         f'flights = 1\nduration_s = {options.duration_s}\nscenarios = ["walls"]\n', "bench", _HERE

@@ -16,7 +16,7 @@ from pandion.cluster_options import ClusterOptions, campaign_of
 from pandion.display import Display
 
 if TYPE_CHECKING:
-    from studies.campaign_plan import CampaignPlan
+    from studies.campaign.plan import CampaignPlan
 
 FLOWN, BROKEN = 0, 1  # exit codes
 
@@ -52,9 +52,9 @@ def main(argv: list[str]) -> int:
     from fsw.runtime.process import pin_numerics_to_one_thread
 
     pin_numerics_to_one_thread()  # before NumPy loads
-    from studies.campaign import SchedulerGoneError
-    from studies.campaign_keys import CampaignError
-    from studies.campaign_plan import EXAMPLE, load_plan
+    from studies.campaign.campaign import SchedulerGoneError
+    from studies.campaign.keys import CampaignError
+    from studies.campaign.plan import EXAMPLE, load_plan
 
     if options.example:
         print(EXAMPLE.read_text(encoding="utf-8"), end="")
@@ -72,8 +72,8 @@ def main(argv: list[str]) -> int:
 
 
 def _fly(options: CampaignOptions, file: Path, plan: CampaignPlan) -> int:
-    from studies.campaign import SchedulerGoneError
-    from studies.campaign_store import JOURNAL, begin
+    from studies.campaign.campaign import SchedulerGoneError
+    from studies.campaign.store import JOURNAL, begin
 
     asked = options.flights or plan.count
     plan.check(asked)
@@ -102,9 +102,9 @@ def _fly(options: CampaignOptions, file: Path, plan: CampaignPlan) -> int:
 def _all(
     options: CampaignOptions, plan: CampaignPlan, asked: int, folder: Path, display: Display
 ) -> None:
-    from studies.campaign_flight import CampaignFlights
-    from studies.campaign_store import JOURNAL
-    from studies.campaign_summary import Progress
+    from studies.campaign.flight import CampaignFlights
+    from studies.campaign.store import JOURNAL
+    from studies.campaign.summary import Progress
 
     campaign = campaign_of(
         options.cluster, folder / JOURNAL, say=display.say, time_limit_s=plan.time_limit_s
@@ -118,9 +118,9 @@ def _all(
 
 def _written(options: CampaignOptions, folder: Path, display: Display) -> int:
     """Page, table and summary of what is in the journal now."""
-    from studies.campaign_page import again, page
-    from studies.campaign_store import PAGE, read, write_facts, write_table
-    from studies.campaign_summary import summaries, worst
+    from studies.campaign.page import again, page
+    from studies.campaign.store import PAGE, read, write_facts, write_table
+    from studies.campaign.summary import summaries, worst
 
     result = read(folder)
     rows = result.rows
@@ -162,9 +162,8 @@ def _again(options: CampaignOptions, plan: CampaignPlan) -> int:
     """One flight in this process, its trace, and what flies it with both processes and a log."""
     from fsw.parameters.storage import save
     from sitl.scenario_text import scenario_text
-    from studies.campaign_flight import CampaignFlight
-    from studies.find import changed_parameters, fly_command
-    from studies.job import fly_job
+    from studies.campaign.flight import CampaignFlight
+    from studies.flight.fly_again import changed_parameters, fly_command
 
     number = options.flight or 0
     plan.check(number + 1)
@@ -172,15 +171,14 @@ def _again(options: CampaignOptions, plan: CampaignPlan) -> int:
     job = flight.job
     folder = options.out or new_run_directory(Path("runs"), f"{plan.name}-flight{number}")
     folder.mkdir(parents=True, exist_ok=True)
-    row = CampaignFlight(plan, number).row()
+    row, result = CampaignFlight(plan, number).flown(traced=True)
     console = console_beside(options.json)
     say(f"flight {number}: {flight.case}, seed {flight.seed}", console)
     for key, value in flight.values:
         say(f"  {key} = {value:g}", console)
     say(f"  {row.reason}", console)
     traced: dict[str, Any] = {"row": row.compared()}
-    if not row.error:
-        result = fly_job(job, traced=True)
+    if result is not None:
         traced["texts"] = result.planner.texts
         traced["trace"] = [asdict(point) for point in result.planner.trace]
     stem = folder / f"flight-{number}"

@@ -13,7 +13,7 @@ from command_line.values import number
 from pandion.display import Display
 
 if TYPE_CHECKING:
-    from studies.campaign_store import CampaignResult
+    from studies.campaign.store import CampaignResult
 
 CERTIFIED, DIFFERS = 0, 1  # exit codes
 PAGE = "certificate.html"
@@ -51,8 +51,8 @@ def main(argv: list[str]) -> int:
     from fsw.runtime.process import pin_numerics_to_one_thread
 
     pin_numerics_to_one_thread()  # before NumPy loads
-    from studies.campaign_keys import CampaignError
-    from studies.campaign_store import read as read_campaign
+    from studies.campaign.keys import CampaignError
+    from studies.campaign.store import read as read_campaign
 
     try:
         result = read_campaign(options.campaign)
@@ -65,8 +65,8 @@ def main(argv: list[str]) -> int:
 
 
 def _certify(options: CertifyOptions, result: CampaignResult) -> int:
-    from studies.certificate import certificate
-    from studies.certificate_page import page, sentences
+    from studies.statistics.certificate import certificate
+    from studies.statistics.certificate_page import page, sentences
 
     stated = certificate(result, options.campaign, options.confidence)
     display = Display(console_beside(options.json))
@@ -82,7 +82,7 @@ def _certify(options: CertifyOptions, result: CampaignResult) -> int:
 
 
 def _verify(options: CertifyOptions, result: CampaignResult, path: Path) -> int:
-    from studies.certificate import certificate, differences, tampered
+    from studies.statistics.certificate import certificate, differences, tampered
 
     stated = _statement(path)
     display = Display(console_beside(options.json))
@@ -101,8 +101,8 @@ def _verify(options: CertifyOptions, result: CampaignResult, path: Path) -> int:
 
 
 def _statement(path: Path) -> dict[str, Any]:
-    from studies.certificate import FORMAT
-    from studies.certificate_page import statement_in
+    from studies.statistics.certificate import FORMAT
+    from studies.statistics.certificate_page import statement_in
 
     try:
         stated = statement_in(path.read_text(encoding="utf-8"))

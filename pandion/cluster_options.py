@@ -12,7 +12,7 @@ from command_line.options import OneOf, option
 from command_line.values import existing_file, whole
 
 if TYPE_CHECKING:
-    from studies.campaign import Campaign, ProgressReport
+    from studies.campaign.campaign import Campaign, ProgressReport
 
 _WHERE: Final = OneOf()
 
@@ -59,7 +59,7 @@ def campaign_of(
     **more: Any,
 ) -> Campaign[Any]:
     """What flies where the options say; ``more`` are fields of ``Campaign``."""
-    from studies.campaign import Campaign, Scheduler, mute, silent
+    from studies.campaign.campaign import Campaign, Scheduler, mute, silent
 
     running = options.scheduler is not None or options.scheduler_file is not None
     scheduler = Scheduler(

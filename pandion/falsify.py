@@ -20,7 +20,7 @@ from pandion.display import Display
 if TYPE_CHECKING:
     from fsw.parameters.flight_config import FlightConfig
     from sitl.scenario import Scenario
-    from studies.falsify import Found, Outcome, Replayed, WholeFound, WholeOutcome
+    from studies.search.falsify import Found, Outcome, Replayed, WholeFound, WholeOutcome
 
 HOLDS, BROKEN = 0, 1  # exit codes
 _FORMAT: Final = "pandion-disturbance-1"
@@ -78,7 +78,7 @@ def main(argv: list[str]) -> int:
 
         return search_over(options, options.over)
     from sitl.scenario_file import ScenarioError, load_scenario
-    from studies.closed_loop import RefusedError
+    from studies.flight.closed_loop import RefusedError
 
     try:
         scenario = load_scenario(options.scenario)
@@ -107,7 +107,7 @@ def _config(scenario: Scenario) -> FlightConfig:
 
 def _search(options: FalsifyOptions, scenario: Scenario) -> int:
     from sitl.scenario_text import scenario_text
-    from studies.falsify import as_scenario, search_and_fly
+    from studies.search.falsify import as_scenario, search_and_fly
 
     console = console_beside(options.json)
     display = Display(console)
@@ -269,7 +269,7 @@ def _as_file(scenario: Scenario, found: Found) -> dict[str, Any]:
 
 
 def _replay(options: FalsifyOptions, scenario: Scenario, path: Path) -> int:
-    from studies.falsify import bounds, replay
+    from studies.search.falsify import bounds, replay
 
     first_step, pushes = _read(path, scenario)
     config = _config(scenario)

@@ -5,63 +5,41 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from command_line.output import complain, console_beside, json_text, unwritten
+from command_line.output import complain, json_text
 from command_line.parser import COULD_NOT_START
-from command_line.version import version
-from fsw.log.run_directory import new_run_directory
-from pandion.cluster_options import campaign_of
+from pandion.campaign_run import begin, exit_code
 from pandion.display import Display
 
 if TYPE_CHECKING:
     from pandion.falsify import FalsifyOptions
-    from studies.campaign_plan import CampaignPlan
-    from studies.worst_flights import Find, Searched
+    from studies.search.worst_flights import Find, Searched
 
 HOLDS, BROKEN = 0, 1  # exit codes
-JOURNAL: Final = "journal.jsonl"
 FINDS: Final = "finds.json"
 
 
 def main(options: FalsifyOptions, file: Path) -> int:
     """Search and keep; returns the exit code."""
-    from studies.campaign import SchedulerGoneError
-    from studies.campaign_keys import CampaignError
-    from studies.campaign_plan import load_plan
-
-    try:
-        if options.replay is not None:
-            raise CampaignError(
-                "--replay flies a worst.json; what --over finds flies with pandion fly"
-            )
-        return _search(options, load_plan(file))
-    except KeyboardInterrupt:
-        complain("pandion falsify", "interrupted; the same command with --out goes on")
-        return BROKEN
-    except (CampaignError, SchedulerGoneError, OSError) as error:
-        complain("pandion falsify", error)
-        return COULD_NOT_START
+    return exit_code("falsify", lambda: _search(options, file))
 
 
-def _search(options: FalsifyOptions, plan: CampaignPlan) -> int:
-    from studies.flight_space import spaces
-    from studies.worst_flights import search
+def _search(options: FalsifyOptions, file: Path) -> int:
+    from studies.campaign.flight_space import spaces
+    from studies.campaign.keys import CampaignError
+    from studies.campaign.plan import load_plan
+    from studies.search.worst_flights import search
 
-    folder = options.out or new_run_directory(Path("runs"), f"falsify-{plan.name}")
-    folder.mkdir(parents=True, exist_ok=True)
-    display = Display(console_beside(options.json))
-    display.say(
-        f"Pandion {version()}: {plan.name}, {options.evaluations} flights, "
-        f"{options.cluster.words}, written to {folder}"
-    )
-    campaign = campaign_of(
-        options.cluster, folder / JOURNAL, say=display.say, time_limit_s=plan.time_limit_s
-    )
+    if options.replay is not None:
+        raise CampaignError("--replay flies a worst.json; what --over finds flies with pandion fly")
+    plan = load_plan(file)
+    run = begin("falsify", options, plan, f"{options.evaluations} flights")
+    folder, display = run.folder, run.display
 
     def report(done: int, least: float) -> None:
         state = f"{done} flights, minimum margin {1e3 * least:+.1f} mm"
         display.report("flown", done, options.evaluations, state)
 
-    with display.progress(), campaign:
+    with run.flying() as campaign:
         found = search(
             spaces(plan),
             campaign,
@@ -86,14 +64,13 @@ def _search(options: FalsifyOptions, plan: CampaignPlan) -> int:
     )
     text = json_text(_as_json(options, found, finds), 1) + "\n"
     (folder / FINDS).write_text(text, encoding="utf-8")
-    for what in unwritten(options.json, text):
-        complain("pandion falsify", f"cannot write {what}")
+    run.written(text)
     return BROKEN if broken else HOLDS
 
 
 def _kept(number: int, find: Find, folder: Path, display: Display) -> dict[str, Any]:
     """Write one find and say it; it was flown again from its file."""
-    from studies.find import flown_again, keep
+    from studies.flight.fly_again import flown_again, keep
 
     stem = folder / f"find-{number + 1}"
     margin = 1e3 * find.margin_m

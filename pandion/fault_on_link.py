@@ -22,15 +22,15 @@ from sitl.arguments import SitlOptions
 from sitl.faults.keys import Fault
 from sitl.result import EndKind
 from sitl.scenario_file import PACKAGED
-from studies.fault_flights import (
+from studies.fault_matrix.flights import (
     SITUATIONS,
     FaultFlight,
     Said,
     beside_the_wall_text,
     contact_of,
 )
-from studies.fault_matrix import Cell
-from studies.job import sources
+from studies.fault_matrix.matrix import Cell
+from studies.flight.job import sources
 
 _WAIT_S: Final = 600.0
 _PACKAGED: Final = {"trajectory": "walls-calm", "workspace": "workspace-calm"}
@@ -55,7 +55,7 @@ class LinkCell(Cell):
     __slots__ = ()
 
     def key(self) -> str:
-        """See :class:`studies.campaign.Flight`."""
+        """See :class:`studies.campaign.campaign.Flight`."""
         return "link " + super().key() + sources(fault_station, supervisor, child)[:16]
 
     def _flown(self) -> FaultFlight:

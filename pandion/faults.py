@@ -16,8 +16,8 @@ from pandion.cluster_options import ClusterOptions, campaign_of
 from pandion.display import Display
 
 if TYPE_CHECKING:
-    from studies.fault_expectations import Expected
-    from studies.fault_matrix import Cell, Judged
+    from studies.fault_matrix.expectations import Expected
+    from studies.fault_matrix.matrix import Cell, Judged
 
 AS_EXPECTED, DIFFERS = 0, 1  # exit codes
 
@@ -54,8 +54,8 @@ def main(argv: list[str]) -> int:
     from fsw.runtime.process import pin_numerics_to_one_thread
 
     pin_numerics_to_one_thread()  # before NumPy loads
-    from studies.campaign import SchedulerGoneError
-    from studies.fault_expectations import EXPECTATIONS, ExpectationError, expectations
+    from studies.campaign.campaign import SchedulerGoneError
+    from studies.fault_matrix.expectations import EXPECTATIONS, ExpectationError, expectations
 
     try:
         known = expectations(options.expect or EXPECTATIONS)
@@ -66,7 +66,7 @@ def main(argv: list[str]) -> int:
 
 
 def _chosen(options: FaultsOptions, known: dict[str, Expected]) -> list[Cell]:
-    from studies.fault_flights import SITUATIONS
+    from studies.fault_matrix.flights import SITUATIONS
 
     if options.matrix == (options.mode is not None):
         raise UnknownError(_NEITHER)
@@ -94,7 +94,7 @@ def _chosen(options: FaultsOptions, known: dict[str, Expected]) -> list[Cell]:
 
 def _cell(mode: str, expected: Expected, seed: int) -> Cell:
     from pandion.fault_on_link import LinkCell
-    from studies.fault_matrix import Cell
+    from studies.fault_matrix.matrix import Cell
 
     return LinkCell(mode, expected, seed) if expected.link else Cell(mode, expected, seed)
 
@@ -107,7 +107,7 @@ def _unknown(what: str, name: str | None, known: tuple[str, ...]) -> str:
 
 
 def _run(options: FaultsOptions, cells: list[Cell]) -> int:
-    from studies.fault_page import page, summary
+    from studies.fault_matrix.page import page, summary
 
     display = Display(console_beside(options.json))
     display.say(f"Pandion {version()}: {len(cells)} flights, seed {options.seed}")
@@ -137,7 +137,7 @@ def _run(options: FaultsOptions, cells: list[Cell]) -> int:
 
 def _flown(cells: list[Cell], options: FaultsOptions, display: Display) -> list[Judged]:
     """Flights in process on all workers, then those in real time, one after the other."""
-    from studies.fault_matrix import judge
+    from studies.fault_matrix.matrix import judge
 
     inside = [cell for cell in cells if not cell.expected.link]
     linked = [cell for cell in cells if cell.expected.link]

@@ -18,10 +18,10 @@ from fsw.parameters.control_choice import KNOWN
 from pandion.cluster_options import ClusterOptions, campaign_of
 from pandion.display import Display
 from sitl.scenario_file import SUITE_NAMES
-from studies.catalogue import STUDIES, study
+from studies.paper.catalogue import STUDIES, study
 
 if TYPE_CHECKING:
-    from studies.settings import Report, Settings
+    from studies.paper.settings import Report, Settings
 
 PLANTS = ("double-integrator", "full")
 TRACKING = KNOWN["tracking"]
@@ -100,9 +100,9 @@ def main(argv: list[str]) -> int:
     from fsw.runtime.process import pin_numerics_to_one_thread
 
     pin_numerics_to_one_thread()  # before NumPy loads
-    from studies.campaign import SchedulerGoneError
+    from studies.campaign.campaign import SchedulerGoneError
     from studies.drawing import NoMatplotlibError
-    from studies.settings import NoCellError
+    from studies.paper.settings import NoCellError
 
     try:
         if options.what != "robustness" and (options.suite or options.only):
@@ -114,7 +114,7 @@ def main(argv: list[str]) -> int:
 
 
 def _run(options: ReproduceOptions) -> int:
-    from studies.page import rows_text, write
+    from studies.paper.page import rows_text, write
 
     console = console_beside(options.json)
     settings = _settings(options)
@@ -142,7 +142,7 @@ def _run(options: ReproduceOptions) -> int:
 
 
 def _settings(options: ReproduceOptions) -> Settings:
-    from studies.settings import Settings
+    from studies.paper.settings import Settings
 
     return Settings(
         plant="full" if options.plant == "full" else "double-integrator",
@@ -155,7 +155,7 @@ def _settings(options: ReproduceOptions) -> Settings:
 
 
 def _provenance(options: ReproduceOptions) -> tuple[str, ...]:
-    from studies.job import sources
+    from studies.flight.job import sources
 
     command = f"pandion reproduce {options.what} --plant {options.plant}"
     command += f" --seeds {options.seeds.start}:{options.seeds.stop}"

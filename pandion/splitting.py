@@ -7,21 +7,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from command_line.options import group, json_file, option, read
-from command_line.output import complain, console_beside, json_text, unwritten
-from command_line.parser import COULD_NOT_START
+from command_line.output import json_text
 from command_line.values import number, whole
-from command_line.version import version
-from fsw.log.run_directory import new_run_directory
-from pandion.cluster_options import ClusterOptions, campaign_of
-from pandion.display import Display
+from pandion.campaign_run import begin, exit_code
+from pandion.cluster_options import ClusterOptions
 
 if TYPE_CHECKING:
-    from studies.campaign_plan import CampaignPlan
-    from studies.rare_flights import FlightScore
-    from studies.splitting import Effort, Estimate
+    from studies.statistics.rare_flights import FlightScore
+    from studies.statistics.splitting import Estimate
 
 FOUND, NOT_FOUND = 0, 1  # exit codes
-JOURNAL = "journal.jsonl"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,60 +56,40 @@ def main(argv: list[str]) -> int:
     from fsw.runtime.process import pin_numerics_to_one_thread
 
     pin_numerics_to_one_thread()  # before NumPy loads
-    from studies.campaign import SchedulerGoneError
-    from studies.campaign_keys import CampaignError
-    from studies.campaign_plan import load_plan
-    from studies.splitting import Effort
-
-    try:
-        plan = load_plan(options.file)
-        effort = Effort(particles=options.particles, runs=options.runs, levels=options.levels)
-        return _run(options, plan, effort)
-    except KeyboardInterrupt:
-        complain("pandion splitting", "interrupted; the same command with --out goes on")
-        return NOT_FOUND
-    except (CampaignError, SchedulerGoneError, OSError) as error:
-        complain("pandion splitting", error)
-        return COULD_NOT_START
+    return exit_code("splitting", lambda: _estimate(options))
 
 
-def _run(options: SplittingOptions, plan: CampaignPlan, effort: Effort) -> int:
-    from studies.rare_flights import FlightScore, as_json, only_case, sentences
-    from studies.splitting import estimate
+def _estimate(options: SplittingOptions) -> int:
+    from studies.campaign.plan import load_plan
+    from studies.statistics.rare_flights import FlightScore, as_json, only_case, sentences
+    from studies.statistics.splitting import Effort, estimate
 
+    plan = load_plan(options.file)
+    effort = Effort(particles=options.particles, runs=options.runs, levels=options.levels)
     flights = only_case(plan)
-    folder = options.out or new_run_directory(Path("runs"), f"splitting-{plan.name}")
-    folder.mkdir(parents=True, exist_ok=True)
-    display = Display(console_beside(options.json))
-    display.say(
-        f"Pandion {version()}: {plan.name}, {effort.runs} runs of {effort.particles} flights a "
-        f"level, {options.cluster.words}, written to {folder}"
-    )
-    campaign = campaign_of(
-        options.cluster, folder / JOURNAL, say=display.say, time_limit_s=plan.time_limit_s
-    )
-    score = FlightScore(flights, campaign, 1e-3 * options.threshold_mm)
+    work = f"{effort.runs} runs of {effort.particles} flights a level"
+    run = begin("splitting", options, plan, work)
+    score = FlightScore(flights, run.campaign, 1e-3 * options.threshold_mm)
     # About: each level refills nine tenths.
     most = effort.runs * effort.particles * (1.0 + 0.9 * effort.levels)
 
     def report(done: int, middle: float) -> None:
         margin = 1e3 * (middle + score.threshold_m)
-        display.report("flown", done, most, f"{done} flights, middle of the last {margin:+.1f} mm")
+        state = f"{done} flights, middle of the last {margin:+.1f} mm"
+        run.display.report("flown", done, most, state)
 
-    with display.progress(), campaign:
+    with run.flying():
         found = estimate(score, score.space, 0.0, effort, options.confidence, options.seed, report)
     for sentence in sentences(found, score):
-        display.say(sentence)
-    display.say(_kept(score, found, folder))
-    lost = unwritten(options.json, json_text(as_json(found, score), 1) + "\n")
-    for what in lost:
-        complain("pandion splitting", f"cannot write {what}")
-    return NOT_FOUND if lost or found.reached < len(found.runs) else FOUND
+        run.display.say(sentence)
+    run.display.say(_kept(score, found, run.folder))
+    written = run.written(json_text(as_json(found, score), 1) + "\n")
+    return FOUND if written and found.reached == len(found.runs) else NOT_FOUND
 
 
 def _kept(score: FlightScore, found: Estimate, folder: Path) -> str:
     """Write the flight with the minimum margin; the sentence that says how to see it."""
-    from studies.find import keep
+    from studies.flight.fly_again import keep
 
     run = min(found.runs, key=lambda one: one.least)
     margin = 1e3 * (run.least + score.threshold_m)

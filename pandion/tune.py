@@ -7,19 +7,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from command_line.options import group, json_file, option, read, switch
-from command_line.output import complain, console_beside, json_text, unwritten
-from command_line.parser import COULD_NOT_START
+from command_line.output import json_text
 from command_line.values import whole
-from command_line.version import version
-from fsw.log.run_directory import new_run_directory
-from pandion.cluster_options import ClusterOptions, campaign_of
-from pandion.display import Display
+from pandion.campaign_run import begin, exit_code
+from pandion.cluster_options import ClusterOptions
 
 if TYPE_CHECKING:
-    from studies.tune import Outcome, Task
+    from studies.search.tune import Outcome
 
 BETTER, NOTHING = 0, 1  # exit codes
-JOURNAL, PARAMS = "journal.jsonl", "tuned.params"
+PARAMS = "tuned.params"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,56 +43,36 @@ def main(argv: list[str]) -> int:
     from fsw.runtime.process import pin_numerics_to_one_thread
 
     pin_numerics_to_one_thread()  # before NumPy loads
-    from studies.campaign import SchedulerGoneError
-    from studies.campaign_keys import CampaignError
-    from studies.tune import EXAMPLE, load_task
+    from studies.search.tune import EXAMPLE
 
     if options.example:
         print(EXAMPLE.read_text(encoding="utf-8"), end="")
         return BETTER
-    try:
-        if options.file is None:
-            raise CampaignError("give a file; `pandion tune --example` prints one")
-        return _tune(options, load_task(options.file))
-    except KeyboardInterrupt:
-        complain("pandion tune", "interrupted; the same command with --out goes on")
-        return NOTHING
-    except (CampaignError, SchedulerGoneError, OSError) as error:
-        complain("pandion tune", error)
-        return COULD_NOT_START
+    return exit_code("tune", lambda: _tune(options))
 
 
-def _tune(options: TuneOptions, task: Task) -> int:
-    from studies.tune import as_json, sentences, tune
+def _tune(options: TuneOptions) -> int:
+    from studies.campaign.keys import CampaignError
+    from studies.search.tune import as_json, load_task, sentences, tune
 
-    folder = options.out or new_run_directory(Path("runs"), f"tune-{task.plan.name}")
-    folder.mkdir(parents=True, exist_ok=True)
-    display = Display(console_beside(options.json))
-    display.say(
-        f"Pandion {version()}: {task.plan.name}, {task.candidates} candidates of "
-        f"{task.plan.count} flights, {options.cluster.words}, written to {folder}"
-    )
-    campaign = campaign_of(
-        options.cluster,
-        folder / JOURNAL,
-        say=display.say,
-        time_limit_s=task.plan.time_limit_s,
-    )
+    if options.file is None:
+        raise CampaignError("give a file; `pandion tune --example` prints one")
+    task = load_task(options.file)
+    work = f"{task.candidates} candidates of {task.plan.count} flights"
+    run = begin("tune", options, task.plan, work)
 
     def report(done: int, least: float) -> None:
         state = f"{done} candidates, least cost {least:.4f} of {sum(w for _, w in task.cost):g}"
-        display.report("tuned", done, task.candidates, state)
+        run.display.report("tuned", done, task.candidates, state)
 
-    with display.progress(), campaign:
+    with run.flying() as campaign:
         found = tune(task, campaign, options.seed, report)
     for sentence in sentences(found):
-        display.say(sentence)
-    lost = unwritten(options.json, json_text(as_json(found), 1) + "\n")
+        run.display.say(sentence)
     if found.better:
-        display.say(_written(found, folder / PARAMS))
-    for what in lost:
-        complain("pandion tune", f"cannot write {what}")
-    return BETTER if found.better and not lost else NOTHING
+        run.display.say(_written(found, run.folder / PARAMS))
+    written = run.written(json_text(as_json(found), 1) + "\n")
+    return BETTER if found.better and written else NOTHING
 
 
 def _written(found: Outcome, path: Path) -> str:

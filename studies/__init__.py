@@ -1,1 +1,1 @@
-"""Experiments that regenerate the paper's tables and figures, without sockets."""
+"""Studies: many flights in process, without sockets, and what is made of them."""

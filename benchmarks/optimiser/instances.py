@@ -8,8 +8,8 @@ import numpy as np
 
 from fsw.parameters.flight_config import FlightConfig
 from fsw.signals import PlanRequest
-from studies.cases import CASES, Case, configuration, scenario, with_horizon
-from studies.closed_loop import simulate
+from studies.flight.closed_loop import simulate
+from studies.paper.cases import CASES, Case, configuration, scenario, with_horizon
 
 SEED = 100  # never used for tuning
 # 0.1 s ahead the lagging vehicle can hardly be moved: with n = 1 it hits the first wall. Shorter

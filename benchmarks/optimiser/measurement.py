@@ -20,7 +20,7 @@ from benchmarks.optimiser.solved import Solved, stopwatch_us
 from fsw.model.airframe import AIRFRAME
 from fsw.model.prediction import Array
 from fsw.mpc.planner import Planner
-from studies.cases import Case
+from studies.paper.cases import Case
 
 HORIZONS = (1, 5, 10, 20)
 

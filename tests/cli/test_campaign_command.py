@@ -11,8 +11,11 @@ import pytest
 
 from pandion.campaign import main
 from sitl.scenario_file import load_scenario
-from studies.campaign_plan import load_plan
-from studies.campaign_store import read
+from studies.campaign.plan import load_plan
+from studies.campaign.store import read
+from studies.flight.closed_loop import RefusedError
+from studies.flight.job import Job, fly_job
+from studies.flight.result import FlightResult
 
 TINY = """
 flights = 3
@@ -78,7 +81,7 @@ def test_more_flights_are_added_and_none_is_flown_twice(
     capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("studies.campaign_page._figures", lambda _: [])  # they cost the most
+    monkeypatch.setattr("studies.campaign.page._figures", lambda _: [])  # they cost the most
     file, out = campaign
     before = (out / "journal.jsonl").read_text()
     target = tmp_path / "summary.json"
@@ -93,10 +96,21 @@ def test_more_flights_are_added_and_none_is_flown_twice(
 
 
 def test_a_flight_is_flown_again_with_what_pandion_fly_needs(
-    campaign: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    campaign: tuple[Path, Path],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     _, out = campaign
+    flights: list[Job] = []
+
+    def counted(job: Job, *, traced: bool = False) -> FlightResult:
+        flights.append(job)
+        return fly_job(job, traced=traced)
+
+    monkeypatch.setattr("studies.campaign.flight.fly_job", counted)
     assert main([str(out / "campaign.toml"), "--flight=1", f"--out={tmp_path}"]) == 0
+    assert flights == [load_plan(out / "campaign.toml").flight(1).job]
     traced: dict[str, Any] = json.loads((tmp_path / "flight-1.json").read_text())
     row = read(out).rows[1]
     assert traced["row"] == json.loads(json.dumps(row.compared()))
@@ -105,6 +119,22 @@ def test_a_flight_is_flown_again_with_what_pandion_fly_needs(
     assert flown.vehicle_scale.mass == row.values["vehicle_scale.mass"]
     said = capsys.readouterr().out
     assert f"pandion fly {tmp_path / 'flight-1.toml'} --seed={row.seed}" in said
+
+
+def test_a_flight_that_is_refused_leaves_its_row_and_no_trace(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refused(job: Job, *, traced: bool = False) -> FlightResult:
+        raise RefusedError("it will not arm")
+
+    monkeypatch.setattr("studies.campaign.flight.fly_job", refused)
+    file = tmp_path / "one.toml"
+    file.write_text(TINY.replace(', "own.toml"', ""))
+    assert main([str(file), "--flight=2", f"--out={tmp_path}"]) == 0
+    assert "refused: it will not arm" in capsys.readouterr().out
+    written = json.loads((tmp_path / "flight-2.json").read_text())
+    assert written["row"]["refused"]
+    assert "trace" not in written
 
 
 def test_flights_of_another_campaign_are_not_mixed_in(

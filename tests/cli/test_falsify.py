@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from pandion.falsify import main
-from studies.falsify import Bounds, Found, Outcome, WholeFound, WholeOutcome
-from studies.plan_record import Start
-from studies.tracked_flight import Disturbance
-from studies.whole_flight import Flown
+from studies.search.falsify import Bounds, Found, Outcome, WholeFound, WholeOutcome
+from studies.search.plan_record import Start
+from studies.search.tracked_flight import Disturbance
+from studies.search.whole_flight import Flown
 
 GOOD = {
     "format": "pandion-disturbance-1",
@@ -115,7 +115,7 @@ def test_the_exit_code_follows_what_is_claimed(
     flown = Flown((0.1, 0.0, 0.0), -0.01, contact, 1, 1, ())
     stretch = WholeFound(START, "adversary, held 100 ms", flown)
     whole = WholeOutcome(1, int(contact is not None), 1, 1, stretch, stretch)
-    monkeypatch.setattr("studies.falsify.search_and_fly", lambda *_: (outcome, whole))
+    monkeypatch.setattr("studies.search.falsify.search_and_fly", lambda *_: (outcome, whole))
     written = tmp_path / "result.json"
     assert main(["walls", "--out", str(tmp_path), "--json", str(written)]) == code
     assert said in capsys.readouterr().out

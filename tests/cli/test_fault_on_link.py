@@ -13,7 +13,7 @@ from messages import dialect
 from pandion import fault_on_link
 from pandion.fault_on_link import LinkCell
 from pandion.fault_station import Station
-from studies.fault_expectations import expectations
+from studies.fault_matrix.expectations import expectations
 from tests.waiting import becomes
 
 ARMED = dialect.MAV_MODE_FLAG_SAFETY_ARMED

@@ -33,8 +33,8 @@ from fsw.signals import (
 from fsw.tuning import Tuning
 from sitl.scenario import Hold, Pilot, Scenario, Start
 from sitl.simulation import STEP_US, Simulation
-from studies.closed_loop import ClosedLoop, InlinePlanner
-from studies.mission import announced
+from studies.flight.closed_loop import ClosedLoop, InlinePlanner
+from studies.flight.mission import announced
 
 ARM, TAKEOFF, LAND, SET_MODE = 400, 22, 21, 176
 STREAM_STEPS = 25

@@ -11,10 +11,10 @@ from fsw.signals import Mode
 from sitl.faults.keys import Fault
 from sitl.scenario import Scenario
 from sitl.scenario_file import load_scenario
-from studies import robustness
-from studies.closed_loop import simulate
-from studies.fault_flights import fly
-from studies.settings import Settings
+from studies.fault_matrix.flights import fly
+from studies.flight.closed_loop import simulate
+from studies.paper import robustness
+from studies.paper.settings import Settings
 from tests.closed_loop.harness import ARM, Flight, command, hover
 
 FAULT_S = 1.6

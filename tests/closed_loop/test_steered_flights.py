@@ -12,7 +12,7 @@ from fsw.parameters.flight_config import flight_config
 from fsw.shapes.target_sphere import target_sphere
 from fsw.signals import Command, Mode, SafeSet, SafeSetAnnouncement, SensorFrame
 from sitl.scenario_file import load_scenario
-from studies.mission import SIMULATOR, safe_set
+from studies.flight.mission import SIMULATOR, safe_set
 from tests.closed_loop.harness import (
     ARM,
     LAND,

@@ -24,7 +24,7 @@ from sitl.link.encode import StepEncoder
 from sitl.scenario_file import load_scenario, parse_scenario, scenario_names
 from sitl.scenario_validation import check
 from sitl.simulation import Simulation
-from studies.catalogue import STUDIES
+from studies.paper.catalogue import STUDIES
 from tests.docs.fences import PAGES, ROOT, Fence, commands, fences, named
 
 BLOCKS = [fence for page in PAGES for fence in fences(page)]

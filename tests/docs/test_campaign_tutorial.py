@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from pandion.__main__ import main
-from studies.campaign_plan import parse_plan
-from studies.campaign_store import read
+from studies.campaign.plan import parse_plan
+from studies.campaign.store import read
 from tests.docs.fences import DOCS, commands, fences
 
 TUTORIAL = DOCS / "tutorials" / "fly-a-campaign.md"

@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from pandion.__main__ import main
-from studies.campaign_plan import load_plan
-from studies.flight_space import spaces
-from studies.tune import load_task
+from studies.campaign.flight_space import spaces
+from studies.campaign.plan import load_plan
+from studies.search.tune import load_task
 from tests.docs.fences import DOCS, commands, fences
 
 FALSIFY, TUNE = DOCS / "how-to" / "falsify.md", DOCS / "how-to" / "tune.md"

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from studies.job import Job, Outcome
+from studies.flight.job import Job, Outcome
 
 
 @dataclass
 class CheapCampaign:
-    """Stands for ``studies.campaign.Campaign``: the least margin [m] of a job is a function."""
+    """Stands for a campaign: the least margin [m] of a job is a function."""
 
     margin: Callable[[Job], float | None]
     broken: Callable[[Job], bool] = lambda _: False

@@ -36,7 +36,7 @@ from sitl.scenario_file import load_scenario
 from sitl.sensors.exact import SensorReadings
 from sitl.shapes.box import Box
 from sitl.simulation import Controls, Simulation
-from studies.mission import safe_set as safe_set_of
+from studies.flight.mission import safe_set as safe_set_of
 from tests.fsw.link.snapshots import FACTS, outputs_at
 
 NAN = float("nan")

@@ -1,0 +1,92 @@
+"""What verbs that ask a campaign one question have in common, from the banner to ``--json``."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, Protocol
+
+from command_line.output import complain, console_beside, unwritten
+from command_line.parser import COULD_NOT_START
+from command_line.version import version
+from fsw.log.run_directory import new_run_directory
+from pandion.cluster_options import ClusterOptions, campaign_of
+from pandion.display import Display
+
+if TYPE_CHECKING:
+    from studies.campaign.campaign import Campaign
+    from studies.campaign.plan import CampaignPlan
+
+JOURNAL: Final = "journal.jsonl"
+_INTERRUPTED: Final = 1  # exit code
+
+
+class CampaignRunOptions(Protocol):
+    """The options that these verbs share."""
+
+    @property
+    def cluster(self) -> ClusterOptions:
+        """Where is flown."""
+
+    @property
+    def out(self) -> Path | None:
+        """Where files go; None: to a new directory."""
+
+    @property
+    def json(self) -> str | None:
+        """Where the answer goes as well."""
+
+
+@dataclass(frozen=True, slots=True)
+class CampaignRun:
+    """One question: where its flights are flown, and where its answer is written."""
+
+    verb: str
+    folder: Path
+    display: Display
+    campaign: Campaign[Any]
+    json: str | None
+
+    @contextmanager
+    def flying(self) -> Iterator[Campaign[Any]]:
+        """The campaign with its workers, and a bar, while the context lasts."""
+        with self.display.progress(), self.campaign:
+            yield self.campaign
+
+    def written(self, text: str) -> bool:
+        """Write what ``--json`` asks for; False, and a sentence, if that cannot be done."""
+        lost = unwritten(self.json, text)
+        for what in lost:
+            complain(f"pandion {self.verb}", f"cannot write {what}")
+        return not lost
+
+
+def begin(verb: str, options: CampaignRunOptions, plan: CampaignPlan, work: str) -> CampaignRun:
+    """Make the directory and say what is flown, ``work`` being how many flights, in words."""
+    folder = options.out or new_run_directory(Path("runs"), f"{verb}-{plan.name}")
+    folder.mkdir(parents=True, exist_ok=True)
+    display = Display(console_beside(options.json))
+    display.say(
+        f"Pandion {version()}: {plan.name}, {work}, {options.cluster.words}, written to {folder}"
+    )
+    campaign = campaign_of(
+        options.cluster, folder / JOURNAL, say=display.say, time_limit_s=plan.time_limit_s
+    )
+    return CampaignRun(verb, folder, display, campaign, options.json)
+
+
+def exit_code(verb: str, answer: Callable[[], int]) -> int:
+    """The exit code of ``answer``; what stops it becomes a sentence."""
+    from studies.campaign.campaign import SchedulerGoneError
+    from studies.campaign.keys import CampaignError
+
+    try:
+        return answer()
+    except KeyboardInterrupt:
+        complain(f"pandion {verb}", "interrupted; the same command with --out goes on")
+        return _INTERRUPTED
+    except (CampaignError, SchedulerGoneError, OSError) as error:
+        complain(f"pandion {verb}", error)
+        return COULD_NOT_START

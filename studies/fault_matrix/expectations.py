@@ -1,0 +1,220 @@
+"""What must happen when something fails: the tables of ``expectations.toml``."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+import typing
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final, Literal
+
+from sitl.faults.keys import Fault, Kind, Unit
+from sitl.scenario_file import SUITE_NAMES
+from studies.fault_matrix.flights import SITUATIONS, FaultFlight
+
+EXPECTATIONS: Final = Path(__file__).with_suffix(".toml")
+ACTIONS: Final = ("goes on", "hold", "return", "land", "descend", "terminate", "ended")
+
+NotFlown = dict[str, dict[str, str]]  # reasons by mode and suite
+Contact = Literal["none", "ground", "any"]
+_CONTACTS: Final[tuple[str, ...]] = typing.get_args(Contact)
+_UNITS: Final[tuple[str, ...]] = typing.get_args(Unit)
+_KINDS: Final[tuple[str, ...]] = typing.get_args(Kind)
+_MOST_BYTES: Final = 1 << 20
+_NUMBERS: Final = ("duration_s", "share", "size", "delay_ms", "rate_hz", "jump_s")
+_EXPECTED: Final = ("told_within_s", "then", "contact", "why")
+_KNOWN: Final = (
+    "name",
+    "units",
+    "kinds",
+    "instances",
+    "suites",
+    "link",
+    "in",
+    *_NUMBERS,
+    *_EXPECTED,
+)
+
+
+class ExpectationError(ValueError):
+    """A file of expectations that cannot be used, in one sentence."""
+
+
+@dataclass(frozen=True, slots=True)
+class Expectation:
+    """What must follow a fault."""
+
+    then: tuple[str, ...]
+    told_within_s: float | None = None  # None: it may be silent
+    contact: Contact = "none"  # that cannot be helped
+    why: str = ""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Expected:
+    """One fault as it is flown, and what must follow in each mode."""
+
+    name: str
+    fault: Fault | None
+    suite: str
+    link: bool  # needs both processes in real time
+    modes: dict[str, Expectation]  # those that are flown with the suite
+
+
+def expectations(path: Path = EXPECTATIONS) -> dict[str, Expected]:
+    """All faults of a file by name.
+
+    Raises:
+        ExpectationError: It cannot be read, or a table is wrong.
+    """
+    tables, without = _tables(path)
+    found: dict[str, Expected] = {}
+    for number, table in enumerate(tables):
+        try:
+            for one in _read(table, without):
+                if one.name in found:
+                    raise ExpectationError(f'"{one.name}" is there twice; give one of them a name')
+                found[one.name] = one
+        except (TypeError, ValueError, OverflowError) as error:
+            raise ExpectationError(f"{path}: faults[{number}]: {error}") from None
+    return found
+
+
+def _tables(path: Path) -> tuple[list[Any], NotFlown]:
+    try:
+        with path.open("rb") as file:
+            content = file.read(_MOST_BYTES + 1)
+    except OSError as error:
+        raise ExpectationError(f"cannot read {path}: {error.strerror}") from error
+    if len(content) > _MOST_BYTES:
+        raise ExpectationError(f"{path} is too long: must be at most {_MOST_BYTES} bytes")
+    try:
+        read = tomllib.loads(content.decode("utf-8"))
+    except ValueError as error:  # no UTF-8, no TOML, or an integer of thousands of digits
+        raise ExpectationError(f"{path} is not TOML: {error}") from error
+    except RecursionError:
+        raise ExpectationError(f"{path} is nested too deeply") from None
+    tables, without = read.get("faults", []), read.get("not_flown", {})
+    if not isinstance(tables, list):
+        raise ExpectationError(f"{path}: faults must be an array of tables ([[faults]])")
+    if not isinstance(without, dict) or not all(_is_reason(*one) for one in without.items()):
+        raise ExpectationError(f"{path}: not_flown must give a reason for each MODE.SUITE")
+    return tables, without
+
+
+def _is_reason(mode: str, by_suite: Any) -> bool:
+    """Whether a table of ``not_flown`` has suites, and a sentence for each."""
+    return (
+        mode in SITUATIONS
+        and isinstance(by_suite, dict)
+        and by_suite.keys() <= set(SUITE_NAMES)
+        and all(isinstance(why, str) and why for why in by_suite.values())
+    )
+
+
+def _read(table: Any, without: NotFlown) -> list[Expected]:
+    """The faults of one table: each unit in each way, each instance, with each suite."""
+    if not isinstance(table, dict):
+        raise ExpectationError("must be a table")
+    for key in table:
+        if key not in _KNOWN:
+            raise ExpectationError(f'unknown key "{key}" (known: {", ".join(_KNOWN)})')
+    suites = _words(table, "suites", SUITE_NAMES, ("perfect",))
+    modes = _modes(table)
+    link = bool(table.get("link", False))
+    found = []
+    for fault, name in _faults(table):
+        for suite in suites:
+            full = name if suite == "perfect" else f"{name}-{suite}"
+            flown = {one: it for one, it in modes.items() if suite not in without.get(one, {})}
+            found.append(Expected(full, fault, suite, link, flown))
+    return found
+
+
+def _faults(table: dict[str, Any]) -> list[tuple[Fault | None, str]]:
+    units = _words(table, "units", _UNITS, ())
+    kinds = _words(table, "kinds", _KINDS, ())
+    instances = table.get("instances", [0])
+    numbers = {key: float(table[key]) for key in _NUMBERS if key in table}
+    if not units:
+        return [(None, str(table.get("name", "none")))]
+    found: list[tuple[Fault | None, str]] = []
+    for unit in units:
+        for kind in kinds:
+            for instance in instances:
+                fault = Fault(
+                    typing.cast(Unit, unit),
+                    typing.cast(Kind, kind),
+                    instance=float(instance),
+                    **numbers,
+                )
+                name = f"{unit}-{kind}" + (f"-{instance}" if instance else "")
+                found.append((fault, str(table.get("name", name)).replace(" ", "-")))
+    return found
+
+
+def _modes(table: dict[str, Any]) -> dict[str, Expectation]:
+    common: dict[str, Any] = {key: table[key] for key in _EXPECTED if key in table}
+    differs = table.get("in", {})
+    if not isinstance(differs, dict):
+        raise ExpectationError("in must be a table of modes")
+    for mode, keys in differs.items():
+        if mode not in SITUATIONS:
+            raise ExpectationError(f'"in.{mode}": a mode is one of {", ".join(SITUATIONS)}')
+        if not isinstance(keys, dict) or not set(keys) <= set(_EXPECTED):
+            raise ExpectationError(f'"in.{mode}" may have {", ".join(_EXPECTED)}')
+    return {mode: _expectation({**common, **differs.get(mode, {})}) for mode in SITUATIONS}
+
+
+def _expectation(keys: dict[str, Any]) -> Expectation:
+    then = _words(keys, "then", ACTIONS, ())
+    contact = keys.get("contact", "none")
+    if not then:
+        raise ExpectationError(f"then must name at least one of {', '.join(ACTIONS)}")
+    if contact not in _CONTACTS:
+        raise ExpectationError(f"contact = {contact!r}: must be one of {', '.join(_CONTACTS)}")
+    if contact != "none" and not keys.get("why"):
+        raise ExpectationError(f'contact = "{contact}" needs a reason: why')
+    told = keys.get("told_within_s", math.inf)
+    if isinstance(told, bool) or not isinstance(told, int | float) or not told > 0.0:
+        raise ExpectationError(f"told_within_s = {told!r}: must be a time above 0, in seconds")
+    within_s = float(told) if told < math.inf else None
+    return Expectation(then, within_s, contact, keys.get("why", ""))
+
+
+def _words(
+    table: dict[str, Any], key: str, known: tuple[str, ...], default: tuple[str, ...]
+) -> tuple[str, ...]:
+    words = table.get(key, list(default))
+    if not isinstance(words, list):
+        raise ExpectationError(f"{key} = {words!r}: must be an array")
+    for word in words:
+        if word not in known:
+            raise ExpectationError(f"{key}: {word!r} is not one of {', '.join(known)}")
+    return tuple(words)
+
+
+def differences(mode: str, expected: Expectation, seen: FaultFlight) -> tuple[str, ...]:
+    """What of a cell is not as it must be, in words."""
+    found = []
+    if seen.problem:
+        return (seen.problem,)
+    warning, within_s = seen.warning, expected.told_within_s
+    if within_s is not None and warning is None:
+        found.append("silent")
+    elif within_s is not None and warning is not None and warning.after_s > within_s:
+        found.append(f"told after {warning.after_s:.2f} s, not within {within_s:g} s")
+    actions = seen.actions or ("goes on",)
+    wrong = [action for action in actions if not _allowed(mode, action, expected.then)]
+    if wrong:
+        found.append(f"{', then '.join(actions)}; must be {' or '.join(expected.then)}")
+    if seen.contact and expected.contact not in ("any", seen.contact):
+        found.append(seen.ended)
+    return tuple(found)
+
+
+def _allowed(mode: str, action: str, then: tuple[str, ...]) -> bool:
+    """Whether an action is one of those; a vehicle that holds or lands already goes on."""
+    same = {"hold": ("hold",), "land": ("hold", "land")}.get(mode, ())
+    return action in then or (action == "goes on" and any(one in then for one in same))

@@ -1,0 +1,366 @@
+"""One flight in one mode beside a wall, in which one thing fails, and what the vehicle does."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, replace
+from typing import Any, Final
+
+from fsw.flight.autopilot import Autopilot
+from fsw.flight.state import FlightState
+from fsw.mpc.planner import Planner
+from fsw.parameters.flight_config import FlightConfig, flight_config
+from fsw.ports import PlanService
+from fsw.signals import (
+    Arm,
+    Command,
+    CommandAction,
+    CommandRequest,
+    FlyOrbit,
+    MissionAction,
+    MissionStep,
+    MissionUpdate,
+    Mode,
+    MotionSetpoint,
+    Place,
+    Plan,
+    PlanFailure,
+    PlanRequest,
+    SetHome,
+    Severity,
+    StartMission,
+    SwitchMode,
+    TakeOff,
+    TickInputs,
+    TickOutputs,
+)
+from sitl.faults.keys import Fault
+from sitl.result import EndKind
+from sitl.scenario import Scenario
+from sitl.scenario_file import load_scenario, parse_scenario
+from sitl.simulation import STEP_US, Simulation
+from studies.flight.closed_loop import ClosedLoop, InlinePlanner
+from studies.flight.collector import collector_off
+from studies.flight.result import processor_time_us
+
+# A wall whose clearance begins 0.24 m off the blades' tips.
+_WALL: Final = """
+duration_s = 600.0
+body = "full"
+[start]
+kind = "{kind}"
+[pilot]
+plan = "{plan}"
+[trajectory]
+kind = "hold"
+position_m = [0.0, 0.0, -1.2]
+[[walls]]
+name = "front"
+normal = [-1.0, 0.0, 0.0]
+offset_m = -0.8
+clearance_m = 0.1
+"""
+_HEIGHT: Final = 1.425  # m, of the base above the origin at the start in the air
+_STATION: Final = (255, 190)
+_HEARTBEAT_STEPS: Final = 500
+_SETPOINT_STEPS: Final = 25
+_STATION_TIMEOUT_US: Final = 3_000_000  # the least that COM_DL_LOSS_T allows, for short flights
+
+_LANDS: Final = (Mode.RETURN, Mode.LAND)  # a return that is complete
+
+_FOLLOWS_S: Final = 0.1  # after that, a vehicle that is not in Trajectory has left it
+
+Spoken = tuple[float, CommandAction]  # at a time [s], and what is commanded
+
+
+@dataclass(frozen=True, slots=True)
+class Situation:
+    """A mode, how the vehicle gets into it, and when something fails."""
+
+    mode: Mode
+    scenario: Callable[[str], Scenario]  # by suite of sensors
+    commands: tuple[Spoken, ...]
+    fault_s: float  # when it begins
+    ends_s: float
+    nominal: frozenset[Mode]  # modes that follow without a failsafe
+    upload: MissionUpdate | None = None
+    motion: MotionSetpoint | None = None  # streamed
+    body: str = "full"
+
+
+def beside_the_wall_text(kind: str, plan: str) -> str:
+    """The scenario in TOML, with a start of this kind and a pilot with this plan."""
+    return _WALL.format(kind=kind, plan=plan)
+
+
+def _beside_the_wall(kind: str) -> Callable[[str], Scenario]:
+    return lambda suite: parse_scenario(beside_the_wall_text(kind, "none"), "wall", suite)
+
+
+def _packaged(name: str) -> Callable[[str], Scenario]:
+    return lambda suite: load_scenario(name, suite)
+
+
+_AIR, _GROUND = _beside_the_wall("airborne"), _beside_the_wall("ground")
+_ARM: Final[Spoken] = (0.0, Arm())  # at once: until then the vehicle falls
+
+
+def _to(mode: Mode) -> SwitchMode:
+    return SwitchMode(mode)
+
+
+def _go(north: float, east: float) -> MissionStep:
+    return MissionStep(MissionAction.GO, (north, east, -1.2), hold_s=0.0)
+
+
+def _in_the_air(
+    mode: Mode, *commands: Spoken, then: tuple[Mode, ...] = (), **more: object
+) -> Situation:
+    return Situation(
+        mode,
+        _AIR,
+        (_ARM, *commands),
+        4.0,
+        16.0,
+        frozenset((mode, *then)),
+        **more,  # type: ignore[arg-type]
+    )
+
+
+_LANDED = (Mode.LAND, Mode.DISARMED)
+SITUATIONS: Final[dict[str, Situation]] = {
+    "hold": _in_the_air(Mode.HOLD),
+    "trajectory": Situation(
+        Mode.TRAJECTORY,
+        _packaged("walls-calm"),
+        (_ARM, (0.01, _to(Mode.TRAJECTORY))),
+        4.0,
+        16.0,
+        frozenset((Mode.TRAJECTORY,)),
+        body="points",
+    ),
+    "workspace": Situation(
+        Mode.TRAJECTORY,
+        _packaged("workspace-calm"),
+        (_ARM, (0.01, _to(Mode.TRAJECTORY))),
+        4.0,
+        16.0,
+        frozenset((Mode.TRAJECTORY,)),
+        body="points",
+    ),
+    "offboard": _in_the_air(
+        Mode.OFFBOARD,
+        (0.5, _to(Mode.OFFBOARD)),
+        motion=MotionSetpoint(False, (0.0, 0.5, -_HEIGHT)),
+    ),
+    "mission": _in_the_air(
+        Mode.MISSION,
+        (0.5, StartMission()),
+        then=(Mode.HOLD,),
+        upload=MissionUpdate(steps=(_go(0.0, 0.8), _go(0.0, -0.8), _go(0.0, 0.8)), current=0),
+    ),
+    "orbit": _in_the_air(Mode.ORBIT, (0.5, FlyOrbit(Place((-0.6, 0.0), _HEIGHT), 0.6, speed=0.4))),
+    "takeoff": Situation(
+        Mode.TAKEOFF,
+        _GROUND,
+        (_ARM, (0.4, TakeOff(Place(height=1.6)))),
+        2.5,
+        14.5,
+        frozenset((Mode.TAKEOFF, Mode.HOLD)),
+    ),
+    "land": Situation(
+        Mode.LAND,
+        _AIR,
+        (_ARM, (1.0, _to(Mode.LAND))),
+        2.5,
+        14.5,
+        frozenset(_LANDED),
+    ),
+    "return": _in_the_air(
+        Mode.RETURN,
+        (0.5, SetHome(Place((0.0, 1.0), 0.32))),
+        (1.0, _to(Mode.RETURN)),
+        then=_LANDED,
+    ),
+}
+"""By the name of the mode; both safe sets of the paper are flown in Trajectory."""
+
+
+@dataclass(frozen=True, slots=True)
+class Said:
+    """A text for the operator."""
+
+    after_s: float  # since the fault
+    severity: int
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class FaultFlight:
+    """What became of one flight."""
+
+    texts: tuple[Said, ...] = ()  # from the fault on
+    actions: tuple[str, ...] = ()  # of failsafes, in their order; empty: it went on
+    contact: str = ""  # "", "ground" or "wall"
+    ended: str = ""  # why before its time; empty if it was flown to its end
+    least_m: float | None = None  # margin to the safe set, of any part, in the whole flight
+    problem: str = ""  # the flight was none: refused, or not in the mode when the fault began
+    error: bool = False  # it could not be flown at all
+
+    @property
+    def warning(self) -> Said | None:
+        """The first text that an operator must act on; None: silence."""
+        return next((said for said in self.texts if said.severity <= Severity.WARNING), None)
+
+    def as_line(self) -> dict[str, Any]:
+        """The flight for a journal; see :meth:`from_line`."""
+        return asdict(self)
+
+    @classmethod
+    def from_line(cls, line: Mapping[str, Any]) -> FaultFlight:
+        """The flight that :meth:`as_line` has described, after JSON.
+
+        Raises:
+            KeyError, TypeError: Another version has described it.
+        """
+        texts = tuple(Said(**said) for said in line["texts"])
+        return cls(**{**line, "texts": texts, "actions": tuple(line["actions"])})
+
+
+def contact_of(kind: EndKind | None, sentence: str) -> str:
+    """What a flight that ended so has touched: "", "ground" or "wall"."""
+    if kind not in (EndKind.COLLISION, EndKind.CRASH, EndKind.DIVERGED):
+        return ""
+    return "ground" if "hit the ground" in sentence else "wall"
+
+
+class _Planner(InlinePlanner):
+    """A planner that is silent while its process is stopped or dead."""
+
+    def __init__(self, config: FlightConfig, simulation: Simulation) -> None:
+        super().__init__(Planner(config.planner, config.airframe, processor_time_us))
+        self._simulation = simulation
+
+    def _fails(self) -> bool:
+        return any(fault.unit == "planner" for fault in self._simulation.faults.active)
+
+    def submit(self, request: PlanRequest) -> None:
+        """See ``PlanService``."""
+        if not self._fails():
+            super().submit(request)
+
+    def take(self, t_us: int) -> Plan | PlanFailure | None:
+        """See ``PlanService``."""
+        return None if self._fails() else super().take(t_us)
+
+
+class Observer:
+    """What is seen of the vehicle from the fault on."""
+
+    def __init__(self, situation: Situation) -> None:
+        self._situation = situation
+        self._mode: Mode | None = None  # of the tick before
+        self._marked = False
+        self._begun = False
+        self.actions: list[str] = []
+        self.texts: list[Said] = []
+        self.problem = ""
+
+    def see(self, time_s: float, outputs: TickOutputs) -> None:
+        """Take in a tick."""
+        after_s = time_s - self._situation.fault_s
+        snapshot = outputs.snapshot
+        mode, marked = snapshot.mode, snapshot.failsafe_from is not None
+        if after_s < 0.0:
+            for ack in outputs.acks:
+                if ack.result != 0:
+                    why = "; ".join(text.text for text in outputs.texts)
+                    self.problem = f"command {ack.command} was refused: {why}"
+        else:
+            before = self._mode
+            if not self._begun and before is not None and before is not self._situation.mode:
+                self.problem = self.problem or f"in {before.value} when the fault began"
+            self._begun = True
+            self.texts += [
+                Said(round(after_s, 3), int(text.severity), text.text) for text in outputs.texts
+            ]
+            entered = mode is not self._mode or (marked and not self._marked)
+            # A failsafe that lands out of a return is an action; the landing of a return is none.
+            by_itself = (self._mode, mode) == _LANDS and marked == self._marked
+            completed = mode is Mode.DISARMED or by_itself
+            if mode is Mode.FAULT and self._mode is not Mode.FAULT:
+                self.actions.append("terminate")
+            elif entered and not completed and (marked or mode not in self._situation.nominal):
+                self.actions.append(mode.value)
+        self._mode, self._marked = mode, marked
+
+
+@collector_off()
+def fly(mode: str, fault: Fault | None, suite: str = "perfect", seed: int = 0) -> FaultFlight:
+    """Fly one situation, with a fault that begins at its time, if any."""
+    situation = SITUATIONS[mode]
+    scenario = situation.scenario(suite)
+    if fault is not None:
+        scenario = replace(scenario, faults=(replace(fault, start_s=situation.fault_s),))
+    simulation = Simulation(scenario, seed)
+    config = flight_config(body=situation.body)
+    limits = replace(config.limits, station_timeout_us=_STATION_TIMEOUT_US)
+    config = replace(config, limits=limits)
+    planner: PlanService = _Planner(config, simulation)
+    autopilot = Autopilot(config)
+    loop = ClosedLoop(simulation, autopilot.tick, FlightState(), planner, config.airframe)
+    seen = Observer(situation)
+    steps = round(1e6 * situation.ends_s / STEP_US)
+    while simulation.ended is None and simulation.step < steps and not seen.problem:
+        time_s = simulation.time_s
+        outputs = loop.step(_inputs(situation, loop))
+        seen.see(time_s, outputs)
+        if outputs.snapshot.mode is not Mode.TRAJECTORY and time_s > _FOLLOWS_S:
+            simulation.leave_trajectory(simulation.t_us, outputs.snapshot.mode.value)
+    return _judged(simulation, seen)
+
+
+def _inputs(situation: Situation, loop: ClosedLoop[FlightState]) -> TickInputs:
+    """What sensors, planner, scenario and ground station bring to one tick."""
+    simulation = loop.simulation
+    step = simulation.step
+    sensors, samples = loop.observe()
+    inputs = TickInputs(
+        sensors=sensors,
+        plan=loop.planner.take(sensors.t_us),
+        samples=samples,
+        battery=loop.battery(),
+    )
+    if simulation.faults.pilot_silent(simulation.t_us):
+        return inputs
+    streams = simulation.scenario.pilot.plan == "trajectory"
+    return replace(
+        inputs,
+        commands=tuple(
+            _command(k, action)
+            for k, (at_s, action) in enumerate(situation.commands)
+            if step == round(1e6 * at_s / STEP_US)
+        ),
+        targets=loop.targets() if streams else (),
+        announced=loop.announced(),
+        motion=situation.motion if step % _SETPOINT_STEPS == 0 else None,
+        ground_station_heard=step % _HEARTBEAT_STEPS == 0,
+        mission=situation.upload if step == 0 else None,
+    )
+
+
+def _command(number: int, action: CommandAction) -> Command:
+    """A command of the ground station; a number of its own tells it from the one before."""
+    return Command(action, CommandRequest(10_000 + number, (0.0,) * 7, *_STATION))
+
+
+def _judged(simulation: Simulation, seen: Observer) -> FaultFlight:
+    end = simulation.ended
+    return FaultFlight(
+        texts=tuple(seen.texts),
+        actions=tuple(seen.actions),
+        contact="" if end is None else contact_of(end.kind, end.sentence),
+        ended="" if end is None else end.sentence,
+        least_m=simulation.result().min_margin_m,
+        problem=seen.problem,
+    )

@@ -1,0 +1,110 @@
+"""Every mode and every fault: flown as a campaign, compared with what must happen."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from functools import cache
+from typing import Any
+
+from fsw.signals import Severity
+from sitl.scenario_file import PERFECT
+from studies.fault_matrix import flights
+from studies.fault_matrix.expectations import Expected, differences
+from studies.fault_matrix.flights import FaultFlight, fly
+from studies.flight import closed_loop
+from studies.flight.job import sources
+
+_NATURAL_S = 0.1  # a warning that comes as early or late without the fault is not about it
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """One mode with one fault, flown in process; a flight of a campaign."""
+
+    mode: str
+    expected: Expected
+    seed: int
+
+    def key(self) -> str:
+        """See :class:`studies.campaign.campaign.Flight`; what must happen is not part of it."""
+        one = (self.mode, self.expected.fault, self.expected.suite, self.seed)
+        code = sources(closed_loop, flights)
+        return hashlib.sha256((repr(one) + code).encode()).hexdigest()[:32]
+
+    def row(self) -> FaultFlight:
+        """See :class:`studies.campaign.campaign.Flight`."""
+        try:
+            return self._flown()
+        except Exception as error:
+            return self.broken(f"{type(error).__name__}: {error}")
+
+    def _flown(self) -> FaultFlight:
+        fault, suite = self.expected.fault, self.expected.suite
+        flight = fly(self.mode, fault, suite, self.seed)
+        if fault is not None and suite != PERFECT:
+            flight = _without_natural(flight, _natural(self.mode, suite, self.seed))
+        return flight
+
+    def broken(self, reason: str) -> FaultFlight:
+        """See :class:`studies.campaign.campaign.Flight`."""
+        return FaultFlight(problem=reason, error=True)
+
+    def from_line(self, line: Mapping[str, Any]) -> FaultFlight:
+        """See :class:`studies.campaign.campaign.Flight`."""
+        return FaultFlight.from_line(line)
+
+
+@dataclass(frozen=True, slots=True)
+class Judged:
+    """What became of a cell, and what of it is not as it must be."""
+
+    cell: Cell
+    flight: FaultFlight
+    differs: tuple[str, ...]
+
+    def as_json(self) -> dict[str, Any]:
+        """The row of the cell."""
+        cell, flight, warning = self.cell, self.flight, self.flight.warning
+        return {
+            "mode": cell.mode,
+            "fault": cell.expected.name,
+            "sensors": cell.expected.suite,
+            "seed": cell.seed,
+            "told_s": None if warning is None else warning.after_s,
+            "told": "" if warning is None else warning.text,
+            "actions": list(flight.actions),
+            "contact": flight.contact,
+            "ended": flight.ended,
+            "min_margin_m": flight.least_m,
+            "as_expected": not self.differs,
+            "differs": list(self.differs),
+            "expected": asdict(cell.expected.modes[cell.mode]),
+        }
+
+
+def judge(cell: Cell, flight: FaultFlight) -> Judged:
+    """Compare a flight with what must happen."""
+    expected = cell.expected.modes[cell.mode]
+    return Judged(cell, flight, differences(cell.mode, expected, flight))
+
+
+@cache
+def _natural(mode: str, suite: str, seed: int) -> FaultFlight:
+    """The same flight without a fault: its sensors have outliers of their own."""
+    return fly(mode, None, suite, seed)
+
+
+def _without_natural(flight: FaultFlight, natural: FaultFlight) -> FaultFlight:
+    """The flight without warnings that come without the fault as well."""
+    kept = [
+        said
+        for said in flight.texts
+        if said.severity > Severity.WARNING
+        or not any(
+            said.text == one.text and abs(said.after_s - one.after_s) <= _NATURAL_S
+            for one in natural.texts
+        )
+    ]
+    return replace(flight, texts=tuple(kept))

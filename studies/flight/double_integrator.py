@@ -1,0 +1,195 @@
+"""The paper's own prediction model as the plant: six double integrators (eq 16).
+
+The commanded acceleration is reached at once and the disturbance adds to it; the body stays
+level. The same trajectories, safe sets, disturbances and evaluator as in the full plant, so
+that only the plant differs. Motion between disturbance changes is a parabola and is judged
+every exchange of 2 ms.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from fsw.control.braking import Brake
+from fsw.flight.plan_exchange import plan_input
+from fsw.geometry.vectors import add_scaled, subtract
+from fsw.model.airframe import AIRFRAME
+from fsw.model.kinematics import end_effector_when_level
+from fsw.model.nominal import REST_STATE
+from fsw.mpc.planner import Planner
+from fsw.parameters.flight_config import FlightConfig
+from fsw.signals import Plan, PlanInput, PlanRequest, PredictionState
+from sitl.disturbances.items import push
+from sitl.flight_evaluator import FlightEvaluator, Points
+from sitl.mission_clock import MissionClock
+from sitl.plant.vector import Array
+from sitl.result import EndReason, TruthResult
+from sitl.scenario import V3, Scenario
+from sitl.scenario_validation import check
+from sitl.simulation import SAMPLE_STEPS, START_US, STEP_US
+from studies.flight.collector import collector_off
+from studies.flight.mission import safe_set, target
+from studies.flight.result import (
+    TRACE_STEPS,
+    FlightRecorder,
+    FlightResult,
+    TracePoint,
+    processor_time_us,
+    touched,
+)
+
+_STEP_S = 1e-6 * STEP_US
+
+
+def after(state: PredictionState, u: PlanInput, push_W: V3, dt: float) -> PredictionState:
+    """The state ``dt`` [s] later, under a constant input and disturbance, exactly.
+
+    ``push_W`` [m/s^2] disturbs; acceleration, jerk and snap are none of this plant's states and
+    stay.
+    """
+    a = (u.a[0] + push_W[0], u.a[1] + push_W[1], u.a[2] + push_W[2])
+    p, v, half = state.p, state.v, 0.5 * dt * dt
+    (q1, q2), (qd1, qd2), (qdd1, qdd2) = state.q_arm, state.qd_arm, u.qdd_arm
+    return state._replace(
+        p=(
+            p[0] + dt * v[0] + half * a[0],
+            p[1] + dt * v[1] + half * a[1],
+            p[2] + dt * v[2] + half * a[2],
+        ),
+        v=(v[0] + dt * a[0], v[1] + dt * a[1], v[2] + dt * a[2]),
+        yaw=state.yaw + dt * state.yaw_rate + half * u.yaw_acc,
+        yaw_rate=state.yaw_rate + dt * u.yaw_acc,
+        q_arm=(q1 + dt * qd1 + half * qdd1, q2 + dt * qd2 + half * qdd2),
+        qd_arm=(qd1 + dt * qdd1, qd2 + dt * qdd2),
+    )
+
+
+def points(state: PredictionState) -> Points:
+    """Base, joint 2 and end-effector of the level body [m, NED]."""
+    l1, l2 = AIRFRAME.link_length
+    joint2, end_effector = (
+        end_effector_when_level(lengths, state.q_arm, state.yaw)
+        for lengths in ((l1, 0.0), (l1, l2))
+    )
+    return state.p, add_scaled(state.p, joint2, 1.0), add_scaled(state.p, end_effector, 1.0)
+
+
+class DoubleIntegrator:
+    """The plant in its scenario; mirrors ``sitl.simulation.Simulation``.
+
+    Raises:
+        ScenarioError: The scenario contradicts itself or starts outside its safe set.
+    """
+
+    def __init__(self, scenario: Scenario, seed: int) -> None:
+        check(scenario)
+        self.clock = MissionClock(scenario)
+        self.step = 0
+        self.state = _first_state(scenario, self.clock.target_at(0.0).p)
+        self._pushes = [push(item, seed, _STEP_S) for item in scenario.disturbances]
+        scenario = replace(scenario, body="points")  # there is no attitude that a body could have
+        self.evaluator = FlightEvaluator(scenario, self.clock, _places(points(self.state)))
+
+    @property
+    def time_s(self) -> float:
+        """Seconds since the start."""
+        return _STEP_S * self.step
+
+    @property
+    def t_us(self) -> int:
+        """Time stamp of the current state [us]."""
+        return START_US + STEP_US * self.step
+
+    @property
+    def ended(self) -> EndReason | None:
+        """Why the run is over, None while it is not."""
+        return self.evaluator.ended
+
+    def advance(self, u: PlanInput) -> None:
+        """One exchange of 2 ms under an input, judged at its end."""
+        push_W = self._push()
+        self.state = after(self.state, u, push_W, _STEP_S)
+        self.step += 1
+        now = points(self.state)
+        self.evaluator.judge(_places(now), self.time_s, _STEP_S)
+        if self.step % SAMPLE_STEPS == 0:
+            self.evaluator.sample_error(now, self.time_s)
+        self.evaluator.judge_time(self.time_s)
+
+    def result(self) -> TruthResult:
+        """The score so far."""
+        return self.evaluator.result(self.time_s)
+
+    def _push(self) -> V3:
+        x = y = z = 0.0
+        for item in self._pushes:
+            dx, dy, dz = item.sample(self.step)
+            if not item.torque:  # a point has no attitude to disturb
+                x, y, z = x + dx, y + dy, z + dz
+        return x, y, z
+
+
+@collector_off()
+def simulate(
+    scenario: Scenario, seed: int, config: FlightConfig, *, traced: bool = False
+) -> FlightResult:
+    """Fly the planner alone on the double integrators: measured start, no delay, no fast loop.
+
+    The scenario's trajectory starts in the air; the planner's airframe is to be one with
+    ``AttitudeLag(at_once=True)``. ``traced`` keeps the truth for figures.
+    """
+    plant = DoubleIntegrator(scenario, seed)
+    planner = Planner(config.planner, config.airframe, processor_time_us)
+    brake = Brake(config.airframe, config.planner.limits.tilt)
+    recorder = FlightRecorder()
+    held, running = safe_set(scenario), None
+    steps = config.mpc_period_us // STEP_US
+    while plant.ended is None:
+        start, t_us = plant.state, plant.t_us
+        targets = tuple(
+            target(plant.clock, t_us + node * config.mpc_period_us)
+            for node in range(config.planner.horizon + 1)
+        )
+        answer = planner.plan(
+            PlanRequest(
+                plan_id=len(recorder.step_us),
+                t_apply_us=t_us,
+                start=start,
+                targets=targets,
+                safe_set=held,
+                from_nominal=False,
+            )
+        )
+        recorder.planned(answer)
+        running = answer if isinstance(answer, Plan) else running
+        # As in flight: without an answer the running plan goes on, then the vehicle brakes.
+        u = plan_input(running, start, t_us, brake)
+        recorder.metrics.add(u)
+        for _ in range(steps):
+            if traced and plant.step % TRACE_STEPS == 0:
+                recorder.trace.append(_trace_point(plant))
+            if plant.ended is None:
+                plant.advance(u)
+    return FlightResult(plant.result(), recorder, touched(plant.ended))
+
+
+def _first_state(scenario: Scenario, p_target: V3) -> PredictionState:
+    th1, th2 = (math.radians(angle) for angle in scenario.start.arm_deg)
+    at_origin = REST_STATE._replace(yaw=math.radians(scenario.start.yaw_deg), q_arm=(th1, th2))
+    return at_origin._replace(p=subtract(p_target, points(at_origin)[2]))
+
+
+def _places(now: Points) -> Array:
+    """Base, joint 1 at its origin, joint 2 and end-effector, as the full plant places them."""
+    base, joint2, end_effector = now
+    return np.array((base, base, joint2, end_effector))
+
+
+def _trace_point(plant: DoubleIntegrator) -> TracePoint:
+    p_WB, joint2, p_WE = points(plant.state)
+    margins = plant.evaluator.margins(_places((p_WB, joint2, p_WE)), plant.time_s)
+    aim = plant.clock.target_at(plant.time_s).p
+    return TracePoint(t_s=plant.time_s, p_WB=p_WB, p_WE=p_WE, p_target=aim, margin_m=min(margins))

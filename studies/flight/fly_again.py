@@ -1,0 +1,53 @@
+"""A flight that was found, kept as files that fly it again."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from fsw.parameters.registry import BY_NAME
+from fsw.parameters.storage import save
+from sitl.scenario_file import load_scenario
+from sitl.scenario_text import scenario_text
+from studies.flight.job import Job, Outcome
+
+
+def keep(job: Job, controller: str, stem: Path, comment: str) -> str:
+    """Write ``stem``.toml, and .params where parameters differ; the command that flies it."""
+    scenario, params = stem.with_suffix(".toml"), stem.with_suffix(".params")
+    scenario.write_text(scenario_text(job.scenario, comment), encoding="utf-8")
+    changed = changed_parameters(job)
+    if changed:
+        save(params, changed)
+    return fly_command("pandion", job, controller, scenario, params if changed else None)
+
+
+def changed_parameters(job: Job) -> dict[str, float]:
+    """Parameters of a flight that are not the default."""
+    return {
+        name: value
+        for name, one in BY_NAME.items()
+        if (value := one.read(job.config)) != one.default
+    }
+
+
+def fly_command(
+    program: str, job: Job, controller: str, scenario: Path, params: Path | None
+) -> str:
+    """The command that flies the same over the link: equal but for what the link rounds."""
+    words = [program, "fly", str(scenario), f"--seed={job.seed}"]
+    if params is not None:
+        words.append(f"--params={params}")
+    if controller != "blf":
+        words.append(f"--controller={controller}")
+    if job.config.inner == "pid":
+        words.append("--tracking=pid")
+    if job.config.soft:
+        words.append("--allow-inconsistent")
+    return " ".join(words)
+
+
+def flown_again(job: Job, stem: Path) -> Outcome:
+    """The row of a kept flight, from its file."""
+    scenario = load_scenario(str(stem.with_suffix(".toml")))
+    return replace(job, scenario=replace(scenario, name=job.scenario.name)).row()

@@ -1,0 +1,486 @@
+"""The search for the disturbance that pushes the base furthest off its plan.
+
+Three kinds of disturbance, all of full amplitude on the axes they push: adversaries that chase the
+vehicle, from a list; adversaries whose weights CMA-ES improves; and sequences of signs, held for
+0.1 s, that CMA-ES improves. Each is tried from instants all over the flight, on the fast loops
+along the recorded plan. What counts is the deviation as a share of the bound that the start-up
+analysis prints: of the bound for one axis where one axis is pushed, of the bound for all of them
+otherwise.
+
+The worst of every kind and instant then flies again with everything that flies, and CMA-ES goes on
+from the worst of these. That decides about contact.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from cmaes import CMA
+
+from fsw.control.tube import CALM_HEIGHT, all_axes, all_axes_up_to, limits_used
+from fsw.flight.state import FlightState
+from fsw.model.prediction import Array
+from fsw.parameters.consistency import loop_tube
+from fsw.parameters.flight_config import FlightConfig
+from fsw.signals import TickOutputs
+from sitl.disturbances.sequence import Played
+from sitl.result import EndKind
+from sitl.scenario import V3, Scenario, Sequence
+from sitl.simulation import STEP_US, Simulation
+from studies.search.plan_record import PlanRecord, Start, fly, record
+from studies.search.tracked_flight import FEATURES, FILTERED, OFF, PUSH, Disturbance, TrackedFlight
+from studies.search.whole_flight import Flown, WholeFlight
+
+STRETCH_TICKS = 2500  # 5 s: the loop has forgotten what was before 3 s
+SETTLED_TICKS = 750  # the vehicle is taken over in the air a few millimetres off its plan
+HELD_TICKS = 50  # as the paper's disturbance
+_SWITCHED = (1, 25, HELD_TICKS)  # ticks between two decisions of an adversary
+_AXES = ((1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 0), (1, 1, 1))
+_LEADS = ((0.0, 1.0, 0.0), (3.0, 1.0, 0.05), (-3.0, 1.0, 0.0), (1.0, 1.0, 0.25), (0.0, 1.0, -0.1))
+_STARTS = 24  # instants of the flight
+WHOLE_SHARE = 0.1  # of the evaluations, that are stretches of the whole stack
+# Weights that matter alike: a position counts three times a velocity, an acceleration a tenth.
+_SCALE = np.tile((3.0, 1.0, 0.1), (3, 1))
+_NO_TABLE = np.zeros((0, 3))
+_NO_WEIGHTS = np.zeros((3, FEATURES))
+
+Report = Callable[[str, float, float], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Bounds:
+    """What the start-up analysis prints [m]."""
+
+    one_axis: float
+    one_up: float  # vertically, that axis pushed
+    across: float  # a horizontal axis, all axes pushed
+    up: float  # vertically, all axes pushed
+    all_axes_up_to: float  # m/s²; above it the rotors can saturate and across and up are no claim
+    claims_one_axis: bool  # for this amplitude: no limit of the loop is reached
+    claims_all_axes: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """One stretch, judged."""
+
+    share: float  # of the bound
+    off_m: V3  # largest deviation of each axis
+    margin_m: float  # smallest to the safe set, infinite without one
+    axes: int  # pushed
+    start: Start
+    kind: str
+    filtered_ticks: int  # in which the safety filter acted
+    pushes: tuple[V3, ...]  # m/s², one a tick
+    disturbance: Disturbance
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What a search on the recorded plan found."""
+
+    bounds: Bounds
+    evaluations: int
+    worst: Found
+    worst_of_one_axis: Found | None  # None: no such disturbance was tried
+    worst_of_all_axes: Found | None  # more than one
+    least_margin: Found
+
+    @property
+    def breaks_one_axis(self) -> bool:
+        """A deviation beyond the bound for one axis, for an amplitude at which there is one."""
+        found = self.worst_of_one_axis
+        return self.bounds.claims_one_axis and found is not None and found.share > 1.0
+
+    @property
+    def breaks_all_axes(self) -> bool:
+        """A deviation beyond the bounds for all axes, for an amplitude at which there are some."""
+        found = self.worst_of_all_axes
+        return self.bounds.claims_all_axes and found is not None and found.share > 1.0
+
+    @property
+    def holds(self) -> bool:
+        """No deviation beyond a bound that is claimed for this amplitude."""
+        return not (self.breaks_one_axis or self.breaks_all_axes)
+
+
+@dataclass(frozen=True, slots=True)
+class WholeFound:
+    """One stretch of the whole stack."""
+
+    start: Start
+    kind: str
+    flown: Flown
+
+
+@dataclass(frozen=True, slots=True)
+class WholeOutcome:
+    """What the whole stack made of the worst disturbances."""
+
+    evaluations: int
+    contacts: int
+    departures: int  # stretches in which the tube was left
+    breaches: int  # stretches in which the safe set was left and the stack noticed
+    furthest: WholeFound  # off the plan in force
+    closest: WholeFound  # least margin; of those with contact, if there are any
+
+    @property
+    def holds(self) -> bool:
+        """Nothing was touched."""
+        return self.contacts == 0
+
+
+def bounds(config: FlightConfig, disturbance: float) -> Bounds:
+    """The bounds for a ``disturbance`` [m/s²] an axis."""
+    loop, airframe = loop_tube(config), config.airframe
+    across, up = all_axes(airframe, loop, disturbance)
+    used = limits_used(airframe, config.tuning.tracking, loop, disturbance)
+    return Bounds(
+        one_axis=disturbance * loop.base + loop.base_wind,
+        one_up=disturbance * loop.height + CALM_HEIGHT,
+        across=across,
+        up=up,
+        all_axes_up_to=all_axes_up_to(airframe, loop, config.surroundings.disturbance),
+        claims_one_axis=max(used.values()) <= 1.0,
+        claims_all_axes=all_axes_up_to(airframe, loop, disturbance) >= disturbance,
+    )
+
+
+class Search:
+    """Evaluates disturbances of one flight and keeps the worst."""
+
+    def __init__(
+        self, scenario: Scenario, config: FlightConfig, flown: PlanRecord, amplitude: float
+    ) -> None:
+        self.bounds = bounds(config, amplitude)
+        self.evaluations = 0
+        self._flight = TrackedFlight(scenario, config, flown)
+        self._amplitude = amplitude
+        last = len(flown.rows) - STRETCH_TICKS - 1
+        usable = [start for start in flown.starts if start.row <= max(last, 0)]
+        usable = [start for start in usable if start.row >= SETTLED_TICKS] or usable[-1:]
+        chosen = np.linspace(0, len(usable) - 1, min(_STARTS, len(usable))).astype(int)
+        self.starts = [usable[k] for k in chosen]
+        self._kept: dict[str, Found] = {}
+        self._telling: dict[tuple[str, int, str, int], Found] = {}
+
+    def adversary(self, start: Start, every: int, weights: Array) -> float:
+        """Fly against an adversary of ``weights`` (3, FEATURES) [SI]; its share of the bound."""
+        return self._judge(start, Disturbance(self._amplitude, every, _NO_TABLE, weights))
+
+    def sequence(self, start: Start, table: Array) -> float:
+        """Fly under ``table`` (n, 3) [1, NED], -1 to 1, each held for 0.1 s; as ``adversary``."""
+        return self._judge(start, Disturbance(self._amplitude, HELD_TICKS, table, _NO_WEIGHTS))
+
+    def outcome(self) -> Outcome:
+        """The worst so far."""
+        return Outcome(
+            self.bounds,
+            self.evaluations,
+            self._kept["share"],
+            self._kept.get("one axis"),
+            self._kept.get("all axes"),
+            self._kept["margin"],
+        )
+
+    def telling(self, most: int) -> list[Found]:
+        """Up to ``most`` finds: least margins and worst deviations of kinds and instants."""
+        found = sorted(
+            self._telling.items(),
+            key=lambda item: item[1].margin_m if item[0][0] == "margin" else -item[1].share,
+        )
+        margins = [one for key, one in found if key[0] == "margin"]
+        shares = [one for key, one in found if key[0] != "margin"]
+        mixed = itertools.chain.from_iterable(itertools.zip_longest(margins, shares))
+        unique = {id(one): one for one in mixed if one is not None}
+        return list(unique.values())[:most]
+
+    def _judge(self, start: Start, disturbance: Disturbance) -> float:
+        kept, margin = self._flight.fly(start, STRETCH_TICKS, disturbance)
+        self.evaluations += 1
+        off = np.abs(kept[:, OFF : OFF + 3]).max(axis=0)
+        pushed = int(np.count_nonzero(np.abs(kept[:, PUSH : PUSH + 3]).max(axis=0)))
+        one = pushed == 1
+        across = self.bounds.one_axis if one else self.bounds.across
+        up = self.bounds.one_up if one else self.bounds.up
+        share = float(max(off[0] / across, off[1] / across, off[2] / up))
+        if not math.isfinite(share):
+            share = math.inf
+        found = Found(
+            share=share,
+            off_m=(float(off[0]), float(off[1]), float(off[2])),
+            margin_m=margin,
+            axes=pushed,
+            start=start,
+            kind=_kind(disturbance),
+            filtered_ticks=int(kept[:, FILTERED].sum()),
+            pushes=(),
+            disturbance=disturbance,
+        )
+        axes = "one axis" if one else "all axes"
+        for name in ("share", axes, "margin"):
+            best = self._kept.get(name)
+            if best is None or _rank(name, found) > _rank(name, best):
+                pushes = tuple((float(x), float(y), float(z)) for x, y, z in kept[:, PUSH:FILTERED])
+                self._kept[name] = replace(found, pushes=pushes)
+        for name in (axes, "margin"):
+            key = (name, start.step, found.kind, pushed)
+            rival = self._telling.get(key)
+            if rival is None or _rank(name, found) > _rank(name, rival):
+                self._telling[key] = found
+        return share
+
+
+def _rank(name: str, found: Found) -> float:
+    return -found.margin_m if name == "margin" else found.share
+
+
+def _kind(disturbance: Disturbance) -> str:
+    kind = "sequence" if len(disturbance.table) else "adversary"
+    return f"{kind}, held {disturbance.every * 2} ms"
+
+
+def search(
+    scenario: Scenario,
+    config: FlightConfig,
+    amplitude: float,
+    evaluations: int,
+    seed: int,
+    report: Report,
+) -> Outcome:
+    """Look for the worst disturbance within ``amplitude`` [m/s²]; ``report`` shows progress."""
+    return _searched(scenario, config, amplitude, evaluations, seed, report).outcome()
+
+
+def search_and_fly(
+    scenario: Scenario,
+    config: FlightConfig,
+    amplitude: float,
+    evaluations: int,
+    seed: int,
+    report: Report,
+) -> tuple[Outcome, WholeOutcome]:
+    """As ``search`` within ``amplitude`` [m/s²], but a tenth are stretches of the whole stack."""
+    whole = max(round(WHOLE_SHARE * evaluations), 1)
+    tracked = max(evaluations - whole, 1)
+    hunt = _searched(scenario, config, amplitude, tracked, seed, report)
+    return hunt.outcome(), _fly_whole(scenario, config, hunt, whole, seed, report)
+
+
+def _searched(
+    scenario: Scenario,
+    config: FlightConfig,
+    amplitude: float,
+    evaluations: int,
+    seed: int,
+    report: Report,
+) -> Search:
+    flown = record(scenario, config, lambda done, total: report("calm flight", done, total))
+    hunt = Search(scenario, config, flown, amplitude)
+    random = np.random.default_rng(seed)
+
+    def told() -> None:
+        report("searched", hunt.evaluations, evaluations)
+
+    listed = list(_listed(hunt.starts))
+    if len(listed) > 0.4 * evaluations:
+        chosen = random.permutation(len(listed))[: max(round(0.4 * evaluations), 1)]
+        listed = [listed[k] for k in sorted(chosen)]
+    for start, every, weights in listed:
+        hunt.adversary(start, every, weights)
+        told()
+    while hunt.evaluations < evaluations:
+        budget = min(evaluations - hunt.evaluations, 150)
+        start = hunt.starts[int(random.integers(len(hunt.starts)))]
+        axes = np.array(_AXES[int(random.integers(len(_AXES)))])
+        if random.random() < 0.5:
+            every = int(random.choice(_SWITCHED))
+            _improve_adversary(hunt, start, axes, every, budget, int(random.integers(2**31)), told)
+        else:
+            _improve_sequence(hunt, start, axes, budget, int(random.integers(2**31)), told)
+    return hunt
+
+
+def _fly_whole(
+    scenario: Scenario,
+    config: FlightConfig,
+    hunt: Search,
+    evaluations: int,
+    seed: int,
+    report: Report,
+) -> WholeOutcome:
+    """Fly the worst finds again with the whole stack; improve the worst of each kind there."""
+    telling = hunt.telling(math.ceil(0.5 * evaluations))
+    improved: dict[str, Found] = {}
+    for found in telling:
+        kind = found.kind.partition(",")[0]
+        if kind not in improved or found.margin_m < improved[kind].margin_m:
+            improved[kind] = found
+    each = (evaluations - len(telling)) // max(len(improved), 1)
+    flight, flown = WholeFlight(scenario, config), list[WholeFound]()
+
+    def value(start: Start, disturbance: Disturbance) -> float:
+        one = WholeFound(start, _kind(disturbance), flight.stretch(STRETCH_TICKS, disturbance))
+        flown.append(one)
+        report("flown whole", len(flown), evaluations)
+        margin = one.flown.margin_m if math.isfinite(one.flown.margin_m) else 0.0
+        return max(one.flown.off_m) - margin + (0.0 if one.flown.contact is None else 1.0)
+
+    for step, here in itertools.groupby(
+        sorted(telling, key=lambda found: found.start.step), key=lambda found: found.start.step
+    ):
+        flight.go_to(step, lambda done, total: report("calm flight of the stack", done, total))
+        for found in here:
+            value(found.start, found.disturbance)
+            if any(found is one for one in improved.values()):
+                _improve_whole(found, each, seed, value)
+    touching = [one for one in flown if one.flown.contact is not None]
+    return WholeOutcome(
+        evaluations=len(flown),
+        contacts=len(touching),
+        departures=sum(one.flown.departures > 0 for one in flown),
+        breaches=sum(one.flown.breaches > 0 for one in flown),
+        furthest=max(flown, key=lambda one: max(one.flown.off_m)),
+        closest=min(touching or flown, key=lambda one: one.flown.margin_m),
+    )
+
+
+def _improve_whole(
+    found: Found, budget: int, seed: int, value: Callable[[Start, Disturbance], float]
+) -> None:
+    """Improve one find by at most ``budget`` stretches of the whole stack."""
+    before = found.disturbance
+    table = len(before.table) > 0
+    mean = 0.5 * before.table if table else before.weights / _SCALE
+    size = max(float(np.abs(mean).max()), 1e-9)
+    optimiser = CMA(mean=mean.ravel() / size, sigma=0.4, seed=seed % 2**31, population_size=8)
+    for _ in range(budget // optimiser.population_size):
+        tried = []
+        for _ in range(optimiser.population_size):
+            z = optimiser.ask()
+            shaped = z.reshape(-1, 3)
+            if table:
+                acting = np.abs(before.table).max(axis=0)
+                changed = replace(before, table=np.where(shaped >= 0.0, 1.0, -1.0) * acting)
+            else:
+                acting = np.abs(before.weights).max(axis=1, keepdims=True) > 0.0
+                changed = replace(before, weights=shaped * _SCALE * acting)
+            tried.append((z, -value(found.start, changed)))
+        optimiser.tell(tried)
+
+
+def _listed(starts: list[Start]) -> Iterator[tuple[Start, int, Array]]:
+    """The adversaries of the list, most telling first."""
+    for lead, axes, every in itertools.product(_LEADS, _AXES, _SWITCHED):
+        for start in starts[:: max(len(starts) // 8, 1)]:
+            yield start, every, np.outer(axes, lead)
+
+
+def _improve_adversary(
+    hunt: Search,
+    start: Start,
+    axes: Array,
+    every: int,
+    budget: int,
+    seed: int,
+    told: Callable[[], None],
+) -> None:
+    mean = np.tile((0.0, 1.0, 0.0), (3, 1)).ravel()
+    optimiser = CMA(mean=mean, sigma=0.7, seed=seed % 2**31)
+    _improve(
+        optimiser,
+        budget,
+        lambda z: hunt.adversary(start, every, z.reshape(3, -1) * _SCALE * axes[:, None]),
+        told,
+    )
+
+
+def _improve_sequence(
+    hunt: Search,
+    start: Start,
+    axes: Array,
+    budget: int,
+    seed: int,
+    told: Callable[[], None],
+) -> None:
+    values = 3 * STRETCH_TICKS // HELD_TICKS
+    random = np.random.default_rng(seed)
+    swing = np.sign(np.sin(2.0 * np.pi * random.uniform(0.3, 1.2) * np.arange(values // 3) * 0.1))
+    mean = (swing[:, None] * random.choice((-1.0, 1.0), 3)).ravel()
+    optimiser = CMA(mean=mean, sigma=0.7, seed=seed % 2**31)
+    _improve(
+        optimiser,
+        budget,
+        lambda z: hunt.sequence(start, axes * np.where(z.reshape(-1, 3) >= 0.0, 1.0, -1.0)),
+        told,
+    )
+
+
+def _improve(
+    optimiser: CMA, budget: int, value: Callable[[Array], float], told: Callable[[], None]
+) -> None:
+    done = 0
+    while done < budget:
+        tried = []
+        for _ in range(optimiser.population_size):
+            z = optimiser.ask()
+            tried.append((z, -min(value(z), 1e6)))
+            told()
+        done += len(tried)
+        optimiser.tell(tried)
+
+
+def as_scenario(scenario: Scenario, found: Found) -> Scenario:
+    """The scenario calm up to the stretch that was found, which ends it."""
+    first, every = found.start.step, found.disturbance.every
+    step_s = 1e-6 * STEP_US
+    pushes = Sequence(found.pushes[::every], every * step_s, first * step_s, name="worst")
+    ends_s = min(scenario.duration_s, (first + len(found.pushes)) * step_s)
+    return replace(scenario, disturbances=(pushes,), duration_s=ends_s)
+
+
+@dataclass(frozen=True, slots=True)
+class Replayed:
+    """A disturbance that was found, flown again with planner and referee."""
+
+    off_m: V3
+    margin_m: float  # smallest of the stretch, infinite without zones
+    ended: str | None  # what was touched, or that the flight diverged
+
+
+def replay(
+    scenario: Scenario,
+    config: FlightConfig,
+    first_step: int,
+    pushes: tuple[V3, ...],
+    report: Report,
+) -> Replayed:
+    """Fly the whole stack, calm up to ``first_step``, then pushed by one value [m/s²] a step."""
+    worst, last = np.zeros(3), first_step + len(pushes) - 1
+    arrived: list[Array] = []
+    least = [math.inf]
+
+    def see(simulation: Simulation, _: FlightState, outputs: TickOutputs) -> None:
+        plan = outputs.snapshot.plan_state
+        if plan is not None and arrived:
+            np.maximum(worst, np.abs(arrived[0] - np.array(plan.p)), out=worst)
+        arrived.clear()
+        if simulation.step > first_step:
+            truth = simulation.truth()
+            arrived.append(np.array(truth.p_WB))
+            least[0] = min(least[0], *truth.margins_m, math.inf)
+        if simulation.step % 500 == 0:
+            report("flown", simulation.time_s, last * 1e-6 * STEP_US)
+
+    calm = replace(scenario, disturbances=())
+    simulation = fly(calm, config, (Played(pushes, first_step, 1),), see, last_step=last + 1)
+    ended = simulation.ended
+    return Replayed(
+        (float(worst[0]), float(worst[1]), float(worst[2])),
+        least[0],
+        None if ended is None or ended.kind is EndKind.DURATION else ended.sentence,
+    )

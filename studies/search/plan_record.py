@@ -1,0 +1,148 @@
+"""A calm flight kept tick by tick: what a search for the worst disturbance starts from.
+
+While the fast loop holds the vehicle, a plan follows from the plan before it and not from where
+the disturbance has pushed the vehicle. So the plans of a calm flight are those of a disturbed one,
+and a disturbed stretch can be flown again from any instant without the planner.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fsw.control.cascade import CascadeMemory
+from fsw.flight.autopilot import Autopilot
+from fsw.flight.state import FlightState
+from fsw.model.prediction import Array
+from fsw.mpc.planner import Planner
+from fsw.parameters.flight_config import FlightConfig
+from fsw.shapes.zones import NO_ZONES, moving_zones
+from fsw.signals import PlanInput, PredictionState, TickInputs, TickOutputs
+from sitl.disturbances.items import Push
+from sitl.scenario import Scenario
+from sitl.simulation import Simulation
+from studies.flight.closed_loop import FIRST_COMMANDS, ClosedLoop, InlinePlanner
+from studies.flight.result import processor_time_us
+
+STATE, INPUT = 19, 6  # numbers of a plan's state and input in a row
+_EVERY = 50  # ticks between two starts
+_WARN = 1  # of SAFE_BREACH_ACT
+_Seen = Callable[[Simulation, FlightState, TickOutputs], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Start:
+    """Where a stretch can begin."""
+
+    row: int  # of the plan
+    step: int  # of the simulation
+    state: Array  # (17 + 2j,) [SI] of the plant
+    memory: CascadeMemory
+
+
+@dataclass(frozen=True, slots=True)
+class PlanRecord:
+    """The plan of a calm flight."""
+
+    rows: Array  # (ticks, STATE + INPUT) [SI]
+    zones: Array  # (rows, columns) [SI] of the safety filter, all that it had in the flight
+    spans: NDArray[np.int64]  # (ticks, 2) which of them it had: first, and one after the last
+    starts: tuple[Start, ...]
+
+
+def record(
+    scenario: Scenario, config: FlightConfig, report: Callable[[float, float], None]
+) -> PlanRecord:
+    """Fly a scenario without its disturbances; ``report`` receives seconds flown and in all."""
+    rows: list[tuple[float, ...]] = []
+    zones = _ZonesSeen()
+    starts: list[Start] = []
+    before: list[tuple[Array, CascadeMemory]] = []
+
+    def sense(simulation: Simulation, state: FlightState) -> None:
+        if len(rows) % _EVERY == 0:
+            now = np.frombuffer(simulation.state_bytes()).copy()
+            before[:] = [(now, state.cascade)]
+
+    def see(simulation: Simulation, state: FlightState, outputs: TickOutputs) -> None:
+        plan, u = outputs.snapshot.plan_state, outputs.snapshot.plan_input
+        if plan is None or u is None:
+            return
+        if len(rows) % _EVERY == 0:
+            starts.append(Start(len(rows), simulation.step - 1, *before[0]))
+        rows.append(row(plan, u))
+        zones.add(state)
+        if len(rows) % 500 == 0:
+            report(simulation.time_s, scenario.duration_s)
+
+    fly(replace(scenario, disturbances=()), config, (), see, sense=sense)
+    return PlanRecord(np.array(rows), *zones.arrays(), tuple(starts))
+
+
+class _ZonesSeen:
+    """The zones that the safety filter was given, tick by tick; equal ones are kept once."""
+
+    def __init__(self) -> None:
+        self._kept = [NO_ZONES]
+        self._spans: list[tuple[int, int]] = []
+        self._of: tuple[object, object] = (None, None)
+        self._end = 0
+
+    def add(self, state: FlightState) -> None:
+        """Take those of a tick."""
+        kept, target = state.kept, state.reference
+        if kept is not self._of[0] or target is not self._of[1]:
+            self._of = (kept, target)
+            zones = moving_zones(kept.safe_set, target, kept.added)
+            if not np.array_equal(zones, self._kept[-1]):
+                self._kept.append(zones)
+                self._end += len(zones)
+        self._spans.append((self._end - len(self._kept[-1]), self._end))
+
+    def arrays(self) -> tuple[Array, NDArray[np.int64]]:
+        """All zones, and which of them each tick had."""
+        return np.concatenate(self._kept), np.array(self._spans, dtype=np.int64)
+
+
+def row(plan: PredictionState, u: PlanInput) -> tuple[float, ...]:
+    """A plan's state and input as one row."""
+    heading = (plan.yaw, plan.yaw_rate)
+    state = (*plan.p, *plan.v, *plan.a, *plan.j, *plan.s, *heading, *plan.q_arm, *plan.qd_arm)
+    return (*state, *u.a, u.yaw_acc, *u.qdd_arm)
+
+
+def fly(
+    scenario: Scenario,
+    config: FlightConfig,
+    more: tuple[Push, ...],
+    see: _Seen,
+    *,
+    sense: Callable[[Simulation, FlightState], None] | None = None,
+    last_step: int | None = None,
+) -> Simulation:
+    """Fly the whole stack in one process; ``see`` receives each tick's outputs, ``sense`` precedes.
+
+    ``more`` pushes come on top of the scenario's. It ends after ``last_step``, if that is given.
+    A breach of the safe set is only reported: a retreat would fly another plan than the recorded.
+    """
+    config = replace(config, limits=replace(config.limits, breach_action=_WARN))
+    simulation = Simulation(scenario, 0, more)
+    planner = InlinePlanner(Planner(config.planner, config.airframe, processor_time_us))
+    loop = ClosedLoop(simulation, Autopilot(config).tick, FlightState(), planner, config.airframe)
+    while simulation.ended is None and (last_step is None or simulation.step <= last_step):
+        step, sensors = simulation.step, loop.sense()
+        if sense is not None:
+            sense(simulation, loop.state)
+        inputs = TickInputs(
+            sensors=sensors,
+            plan=planner.take(sensors.t_us),
+            commands=FIRST_COMMANDS[step] if step < len(FIRST_COMMANDS) else (),
+            targets=loop.targets(),
+            announced=loop.announced(),
+        )
+        outputs = loop.step(inputs)
+        see(simulation, loop.state, outputs)
+    return simulation

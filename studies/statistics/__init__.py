@@ -1,0 +1,1 @@
+"""What flights show: certificates, bounds of probabilities, tails, and events too rare to count."""

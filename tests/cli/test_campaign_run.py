@@ -1,0 +1,73 @@
+"""What stops a verb that asks a campaign, and an answer that cannot be written, are sentences."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from pandion.campaign_run import begin, exit_code
+from pandion.tune import TuneOptions
+from studies.campaign.campaign import SchedulerGoneError
+from studies.campaign.keys import CampaignError
+from studies.campaign.plan import parse_plan
+
+PLAN = """
+flights = 2
+duration_s = 0.3
+scenarios = ["walls-calm"]
+"""
+
+
+@pytest.mark.parametrize(
+    ("stopped", "code", "sentence"),
+    [
+        (CampaignError("no such key"), 2, "no such key"),
+        (SchedulerGoneError("it is gone"), 2, "it is gone"),
+        (PermissionError(13, "Permission denied", "runs"), 2, "Permission denied"),
+        (KeyboardInterrupt(), 1, "interrupted; the same command with --out goes on"),
+    ],
+)
+def test_what_stops_a_verb_is_a_sentence(
+    stopped: BaseException, code: int, sentence: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def answer() -> int:
+        raise stopped
+
+    assert exit_code("tune", answer) == code
+    said = capsys.readouterr().err
+    assert said.startswith("pandion tune: ")
+    assert sentence in said
+    assert "Traceback" not in said
+
+
+def test_what_is_wrong_in_the_program_is_no_sentence() -> None:
+    def answer() -> int:
+        raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        exit_code("tune", answer)
+
+
+def test_a_directory_of_that_name_is_made_where_none_is_given(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    run = begin("tune", TuneOptions(), parse_plan(PLAN, "tiny", tmp_path), "2 flights")
+    assert run.folder.is_dir()
+    assert run.folder.parent == Path("runs")
+    assert "tune-tiny" in run.folder.name
+    assert f"tiny, 2 flights, {TuneOptions().cluster.words}" in capsys.readouterr().out
+
+
+def test_an_answer_that_cannot_be_written_is_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    plan = parse_plan(PLAN, "tiny", tmp_path)
+    target = tmp_path / "there.json"
+    options = TuneOptions(out=tmp_path / "out", json=str(target))
+    assert begin("tune", options, plan, "2 flights").written("{}")
+    assert target.read_text() == "{}"
+    options = TuneOptions(out=tmp_path / "out", json=str(tmp_path / "none" / "there.json"))
+    assert not begin("tune", options, plan, "2 flights").written("{}")
+    assert "pandion tune: cannot write" in capsys.readouterr().err

@@ -1,0 +1,59 @@
+"""The journal: on disk at once, whole after a crash, the last good line of each key."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from studies.campaign.journal import Journal, lines
+
+
+def test_what_was_appended_is_read_again_by_its_key(tmp_path: Path) -> None:
+    path = tmp_path / "deep" / "journal.jsonl"
+    journal = Journal(path)
+    journal.append([("a", {"x": 1}), ("b", {"x": 2})])
+    assert journal.get("b") == {"x": 2}
+    journal.append([("a", {"x": 3})])
+    journal.close()
+    again = Journal(path)
+    assert again.get("a") == {"x": 3}
+    assert again.get("c") is None
+    assert [line["x"] for line in lines(path)] == [1, 2, 3]
+
+
+def test_a_line_cut_short_costs_that_line_alone(tmp_path: Path) -> None:
+    path = tmp_path / "journal.jsonl"
+    Journal(path).append([("a", {"x": 1})])
+    with path.open("ab") as file:
+        file.write(b'{"key": "b", "x"')
+    journal = Journal(path)
+    journal.append([("c", {"x": 3})])
+    assert journal.get("a") == {"x": 1}
+    assert journal.get("b") is None
+    assert journal.get("c") == {"x": 3}
+    journal.close()
+    assert Journal(path).get("c") == {"x": 3}
+    assert [line["key"] for line in lines(path)] == ["a", "c"]
+
+
+def test_a_row_with_an_error_is_kept_but_not_taken_for_the_flight(tmp_path: Path) -> None:
+    journal = Journal(tmp_path / "journal.jsonl")
+    journal.append([("a", {"error": True, "reason": "it died"})])
+    assert journal.get("a") is None
+    assert len(list(lines(tmp_path / "journal.jsonl"))) == 1
+    journal.append([("a", {"error": False, "x": 1})])
+    assert journal.get("a") == {"error": False, "x": 1}
+
+
+def test_lines_are_synchronised_with_the_disk(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    synchronised: list[int] = []
+    path = tmp_path / "journal.jsonl"
+    monkeypatch.setattr(
+        "studies.campaign.journal.os.fsync", lambda _: synchronised.append(path.stat().st_size)
+    )
+    journal = Journal(path)
+    journal.append([("a", {"x": 1}), ("b", {"x": 2})])
+    assert synchronised == [path.stat().st_size]

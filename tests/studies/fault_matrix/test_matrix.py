@@ -1,0 +1,200 @@
+"""The matrix of modes and faults: whole, read strictly, and compared without mercy."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from fsw.flight.modes import MODES
+from fsw.signals import Mode, Severity
+from pandion.faults import main
+from sitl.faults.keys import KINDS
+from studies.fault_matrix.expectations import (
+    Expectation,
+    ExpectationError,
+    differences,
+    expectations,
+)
+from studies.fault_matrix.flights import SITUATIONS, FaultFlight, Observer, Said, fly
+from studies.fault_matrix.matrix import Cell, judge
+from studies.fault_matrix.page import page
+from tests.fsw.link.snapshots import outputs_at
+
+TOLD = Said(0.2, int(Severity.WARNING), "told")
+LATE = replace(TOLD, after_s=0.6)
+FINE = FaultFlight((TOLD,), ("land",), least_m=0.1)
+LAND_SOON = Expectation(then=("land",), told_within_s=0.5)
+
+
+def test_every_mode_and_every_way_to_fail_is_flown() -> None:
+    # Descend is what a failsafe does; no command begins it.
+    assert {one.mode for one in SITUATIONS.values()} == set(MODES) - {Mode.DESCEND}
+    flown = {(one.fault.unit, one.fault.kind) for one in expectations().values() if one.fault}
+    there = {(unit, kind) for unit, kinds in KINDS.items() for kind in kinds}
+    # No suite has a camera for it.
+    assert there - flown == {("optical flow", kind) for kind in KINDS["optical flow"]}
+
+
+def test_contact_is_never_allowed_without_a_reason() -> None:
+    for one in expectations().values():
+        for expected in one.modes.values():
+            assert expected.contact == "none" or len(expected.why) > 20, one.name
+
+
+@pytest.mark.parametrize(
+    ("flight", "differs"),
+    [
+        (FINE, ()),
+        (replace(FINE, texts=()), ("silent",)),
+        (
+            replace(FINE, texts=(LATE,)),
+            ("told after 0.60 s, not within 0.5 s",),
+        ),
+        (replace(FINE, actions=()), ("goes on; must be land",)),
+        (replace(FINE, actions=("hold", "land")), ("hold, then land; must be land",)),
+        (replace(FINE, contact="ground", ended="it fell"), ("it fell",)),
+        (replace(FINE, problem="no flight", texts=()), ("no flight",)),
+    ],
+)
+def test_what_is_not_as_it_must_be_is_named(flight: FaultFlight, differs: tuple[str, ...]) -> None:
+    assert differences("orbit", LAND_SOON, flight) == differs
+
+
+def test_a_vehicle_that_holds_or_lands_already_goes_on() -> None:
+    going_on = replace(FINE, actions=())
+    hold = replace(LAND_SOON, then=("hold",))
+    assert not differences("hold", hold, going_on)
+    assert not differences("land", LAND_SOON, going_on)
+    assert differences("return", hold, going_on)
+
+
+def test_contact_with_the_ground_is_not_contact_with_a_wall() -> None:
+    falls = replace(LAND_SOON, contact="ground", why="it cannot be helped at all")
+    assert not differences("orbit", falls, replace(FINE, contact="ground", ended="fell"))
+    assert differences("orbit", falls, replace(FINE, contact="wall", ended="hit"))
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        (
+            '[[faults]]\nunits = ["gyros"]\nkinds = ["off"]\nthen = ["hold"]',
+            "units: 'gyros' is not",
+        ),
+        ('[[faults]]\nunit = ["gyro"]', 'unknown key "unit"'),
+        ('[[faults]]\nthen = ["stop"]', "then: 'stop' is not one of goes on"),
+        ("[[faults]]", "then must name at least one"),
+        ('[[faults]]\nthen = ["hold"]\ncontact = "ground"', "needs a reason"),
+        ('[[faults]]\nthen = ["hold"]\ntold_within_s = -1', "told_within_s = -1"),
+        ('[[faults]]\nthen = ["hold"]\nin.hover.then = ["hold"]', '"in.hover": a mode is one of'),
+        ('[[faults]]\nthen = ["hold"]\n[[faults]]\nthen = ["hold"]', '"none" is there twice'),
+        ("faults = 3", "must be an array of tables"),
+        ("not_flown.hold.rtk = 3", "not_flown must give a reason"),
+        ('[[faults]]\nthen = ["hold"]\ntold_within_s = [1]', "faults[0]: "),
+        ("[[faults]]\nthen = 3", "faults[0]: "),
+        ('[[faults]]\nthen = ["hold"]\nfault = {unit = [1], kind = 2}', "faults[0]: "),
+        ("[[", "faults.toml"),
+    ],
+)
+def test_a_file_that_says_something_else_is_refused(
+    text: str, sentence: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "faults.toml"
+    path.write_text(text)
+    with pytest.raises(ExpectationError) as refused:
+        expectations(path)
+    assert sentence in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+def test_a_cell_is_flown_judged_and_written_down() -> None:
+    cell = Cell("land", expectations()["vio-off"], 0)
+    judged = judge(cell, cell.row())
+    warning = judged.flight.warning
+    assert judged.flight.problem == ""
+    assert warning is not None
+    assert warning.after_s < 0.5
+    row = json.loads(json.dumps(judged.as_json(), allow_nan=False))
+    assert (row["fault"], row["mode"], row["told_s"]) == ("vio-off", "land", warning.after_s)
+    written = page([judged, judge(cell, replace(FINE, texts=()))], ("seed 0",))
+    assert "vio-off" in written
+    assert "silent" in written
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("mode", SITUATIONS)
+def test_without_a_fault_nothing_is_told_and_nothing_done(mode: str) -> None:
+    flight = fly(mode, None)
+    assert (flight.warning, flight.actions, flight.contact, flight.problem) == (None, (), "", "")
+    assert flight.least_m is not None
+    assert flight.least_m > 0.0
+
+
+@pytest.mark.long
+def test_a_fault_over_the_real_link_is_seen_by_the_station(tmp_path: Path) -> None:
+    found = tmp_path / "cells.json"
+    main(["hold", "simulator-killed", "--json", str(found)])
+    (row,) = json.loads(found.read_text())
+    assert row["actions"] == ["ended"]
+    assert row["told"].startswith("sitl ended with code -9")
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (["hover", "vio-off"], "unknown mode hover"),
+        (["hold", "vio-of"], "did you mean vio-off"),
+        (["hold"], "give MODE and FAULT, or --matrix"),
+        (["workspace", "gps-off-rtk"], "workspace is not flown with rtk"),
+        ([], "give MODE and FAULT, or --matrix"),
+        (["hold", "vio-off", "--only", "vio"], "--only chooses cells of the matrix"),
+        (["--matrix", "--only", "nothing like it"], "no fault and no mode contains"),
+        (["hold", "vio-off", "--expect", "no/such.toml"], "no/such.toml"),
+    ],
+)
+def test_what_cannot_be_flown_is_refused_in_a_sentence(
+    words: list[str], sentence: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(words) == 2
+    said = capsys.readouterr().err
+    assert sentence in said
+    assert said.count("\n") == 1
+
+
+def test_a_matrix_is_resumed_from_its_journal_and_judged_anew(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    flown = []
+
+    def count(cell: Cell) -> FaultFlight:
+        flown.append(cell.mode)
+        return FINE
+
+    monkeypatch.setattr(Cell, "row", count)
+    journal, found = str(tmp_path / "flown.jsonl"), tmp_path / "cells.json"
+    words = ["land", "vio-off", "--journal", journal, "--json", str(found)]
+    assert main(words) == 0
+    first = json.loads(found.read_text())
+    assert main(words) == 0
+    assert (flown, json.loads(found.read_text())) == (["land"], first)
+    strict = tmp_path / "strict.toml"
+    strict.write_text('[[faults]]\nunits = ["vio"]\nkinds = ["off"]\nthen = ["terminate"]\n')
+    assert main([*words, "--expect", str(strict)]) == 1
+    assert "land; must be terminate" in capsys.readouterr().out
+    assert flown == ["land"]
+
+
+@pytest.mark.parametrize(("failsafe", "actions"), [(True, ["land"]), (False, [])])
+def test_a_return_that_a_failsafe_lands_has_not_just_gone_on(
+    failsafe: bool, actions: list[str]
+) -> None:
+    seen = Observer(SITUATIONS["return"])
+    for k, mode in enumerate((Mode.RETURN, Mode.LAND, Mode.DISARMED)):
+        was = Mode.RETURN if failsafe and mode is Mode.LAND else None
+        outputs = outputs_at(10**6 * k)
+        snapshot = replace(outputs.snapshot, mode=mode, failsafe_from=was)
+        seen.see(4.0 + k, replace(outputs, snapshot=snapshot))
+    assert seen.actions == actions

@@ -1,0 +1,183 @@
+"""The search finds the defect that was flown once, and nothing beyond the bound that is printed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from fsw.parameters.flight_config import FlightConfig, flight_config
+from sitl.scenario_file import load_scenario, parse_scenario
+from sitl.scenario_text import scenario_text
+from studies.flight.closed_loop import simulate
+from studies.search.falsify import Outcome, Search, as_scenario, replay, search, search_and_fly
+from studies.search.plan_record import PlanRecord, record
+from studies.search.tracked_flight import Disturbance
+from studies.search.whole_flight import WholeFlight
+
+# Its kernel is compiled for ten seconds in each process.
+pytestmark = pytest.mark.long
+
+SCENARIO = replace(load_scenario("workspace"), duration_s=9.0)
+NOW = flight_config(body="points")
+
+
+def _silent(_: str, __: float, ___: float) -> None:
+    """No progress."""
+
+
+def _before() -> FlightConfig:
+    """The loop of the day on which 94 mm were measured for a bound of 69."""
+    tracking = replace(
+        NOW.tuning.tracking,
+        input_weight=1.2e-7,
+        vertical_input_weight=1e-6,
+        vertical_disturbance_limit=0.0,
+        stopping_snap=30.0,
+        wind_limit=0.15,
+        position_error_limit=0.07,
+    )
+    return replace(NOW, tuning=replace(NOW.tuning, tracking=tracking))
+
+
+@cache
+def _flown() -> PlanRecord:
+    return record(SCENARIO, NOW, lambda _, __: None)
+
+
+@cache
+def _found() -> Outcome:
+    return search(SCENARIO, NOW, 0.8, 120, 3, _silent)
+
+
+def _chase(config: FlightConfig, amplitude: float, axes: tuple[int, int, int]) -> Outcome:
+    hunt = Search(SCENARIO, config, _flown(), amplitude)
+    for lead in ((0.0, 1.0, 0.0), (3.0, 1.0, 0.05)):
+        for every in (1, 50):
+            hunt.adversary(hunt.starts[-1], every, np.outer(axes, lead))
+    return hunt.outcome()
+
+
+@pytest.mark.parametrize("axes", [(1, 0, 0), (0, 1, 0)])
+def test_the_old_loop_breaks_its_bound_on_one_axis(axes: tuple[int, int, int]) -> None:
+    outcome = _chase(_before(), 0.8, axes)
+    assert outcome.worst_of_one_axis is not None
+    assert max(outcome.worst_of_one_axis.off_m) > 1.03 * outcome.bounds.one_axis
+    assert not outcome.bounds.claims_one_axis  # it would not be claimed today
+    assert replace(outcome, bounds=replace(outcome.bounds, claims_one_axis=True)).breaks_one_axis
+
+
+@pytest.mark.requirement("REQ-SAFE-2")
+@pytest.mark.parametrize("amplitude", [0.1, 0.2, 0.4, 0.6, 0.8])
+@pytest.mark.parametrize("axes", [(1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 1)])
+def test_the_loop_keeps_its_bound_at_every_amplitude(
+    amplitude: float, axes: tuple[int, int, int]
+) -> None:
+    outcome = _chase(NOW, amplitude, axes)
+    assert outcome.holds, outcome.worst
+    assert outcome.worst.share <= 1.0  # these adversaries do not break what is not claimed either
+    assert outcome.bounds.claims_one_axis
+    assert outcome.bounds.claims_all_axes == (amplitude < 0.48)
+    if sum(axes) == 1 and axes[2] == 0:
+        assert outcome.worst.axes == 1
+        assert outcome.worst.share > 0.6  # the adversary comes near
+
+
+@pytest.mark.requirement("REQ-SAFE-2")
+def test_a_search_finds_nothing_beyond_the_bound_and_repeats_itself() -> None:
+    outcome = _found()
+    assert outcome.evaluations >= 120
+    assert outcome.holds, outcome.worst
+    assert outcome.worst_of_one_axis is not None
+    assert outcome.worst_of_one_axis.axes == 1
+    assert outcome.worst.share > 0.7
+    again = search(SCENARIO, NOW, 0.8, 120, 3, _silent)
+    assert again.worst.off_m == outcome.worst.off_m
+
+
+def test_what_was_found_flies_the_same_with_planner_and_referee() -> None:
+    worst = _found().worst
+    flown = replay(SCENARIO, NOW, worst.start.step, worst.pushes, _silent)
+    assert flown.off_m == pytest.approx(worst.off_m, abs=1e-4)
+    assert flown.margin_m == pytest.approx(worst.margin_m, abs=1e-3)
+
+
+def test_what_was_found_is_a_scenario_that_reproduces_the_margin() -> None:
+    worst = _found().worst
+    text = scenario_text(as_scenario(SCENARIO, worst))
+    warned = replace(NOW, limits=replace(NOW.limits, breach_action=1))  # as the search flies
+    truth = simulate(parse_scenario(text, "worst"), 0, warned).truth
+    calm = simulate(replace(SCENARIO, disturbances=()), 0, warned).truth
+    assert truth.min_margin_m is not None
+    assert calm.min_margin_m is not None
+    assert truth.min_margin_m == pytest.approx(min(worst.margin_m, calm.min_margin_m), abs=1e-3)
+    assert truth.min_margin_m < calm.min_margin_m - 0.01
+
+
+@pytest.mark.parametrize("name", ["shelf", "crossing"])
+def test_the_margins_of_a_full_body_are_those_of_the_referee(name: str) -> None:
+    scenario = replace(load_scenario(name), duration_s=7.0)
+    config = flight_config(body=scenario.body)
+    worst = search(scenario, config, 0.8, 8, 1, _silent).least_margin
+    flown = replay(scenario, config, worst.start.step, worst.pushes, _silent)
+    assert flown.off_m == pytest.approx(worst.off_m, abs=1e-4)
+    assert flown.margin_m == pytest.approx(worst.margin_m, abs=1e-3)
+    assert flown.margin_m < 3.0
+
+
+def test_the_whole_stack_flies_a_stretch_as_the_replay_does_and_forgets_it() -> None:
+    # A replay only reports a breach.
+    warned = replace(NOW, limits=replace(NOW.limits, breach_action=1))
+    flight = WholeFlight(SCENARIO, warned)
+    flight.go_to(700, lambda _, __: None)
+    chase = Disturbance(0.8, 50, np.zeros((0, 3)), np.outer((1, 1, 1), (0.0, 1.0, 0.0)))
+    first, again = flight.stretch(1500, chase), flight.stretch(1500, chase)
+    assert first == again
+    assert first.contact is None
+    assert max(first.off_m) > 0.05
+    flown = replay(SCENARIO, NOW, 700, first.pushes, _silent)
+    assert flown.off_m == pytest.approx(first.off_m, abs=1e-4)
+    assert flown.margin_m == pytest.approx(first.margin_m, abs=1e-4)
+
+
+def test_contact_of_the_whole_stack_is_a_broken_claim() -> None:
+    walls = replace(load_scenario("walls"), duration_s=9.0)
+    flight = WholeFlight(walls, NOW)
+    flight.go_to(800, lambda _, __: None)
+    north = Disturbance(6.0, 50, np.ones((1, 3)) * (1.0, 0.0, 0.0), np.zeros((3, 3)))
+    flown = flight.stretch(2500, north)
+    assert flown.contact is not None
+    assert "wall" in flown.contact
+    assert flown.margin_m < -0.05
+    assert flown.departures > 0
+    assert flown.breaches > 0
+
+
+@pytest.mark.long
+def test_a_search_flies_a_tenth_with_the_whole_stack() -> None:
+    outcome, whole = search_and_fly(SCENARIO, NOW, 0.8, 80, 3, _silent)
+    assert 72 <= outcome.evaluations < 90
+    assert 4 <= whole.evaluations <= 8
+    assert whole.holds
+    assert whole.furthest.flown.off_m
+    assert max(whole.furthest.flown.off_m) > 0.04
+
+
+def test_the_safety_filter_of_the_search_is_the_one_that_flies() -> None:
+    # It acts in every swing, instead of hardly ever.
+    eager = replace(NOW, safety_filter=replace(NOW.safety_filter, allowance=0.5))
+    hunt = Search(SCENARIO, eager, _flown(), 0.8)
+    hunt.adversary(hunt.starts[-1], 50, np.outer((1, 0, 0), (0.0, 1.0, 0.0)))
+    found = hunt.outcome().worst
+    assert found.filtered_ticks > 10
+    flown = replay(SCENARIO, eager, found.start.step, found.pushes, _silent)
+    assert flown.off_m == pytest.approx(found.off_m, abs=1e-4)
+
+
+def test_a_process_flies_both_bodies_alike() -> None:
+    scenario = replace(load_scenario("shelf"), duration_s=1.0)
+    for body in ("points", "full"):
+        truth = simulate(scenario, 0, flight_config(body=body)).truth
+        assert truth.completed, truth.end_reason
