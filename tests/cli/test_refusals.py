@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from pandion.__main__ import main
 from tests.cli.command import one_sentence, pandion
 
 
@@ -19,24 +20,55 @@ def taken_port() -> Iterator[int]:
         yield int(taken.getsockname()[1])
 
 
+# In this process: starting Python takes longer than refusing a word. Some more are below.
+OF_FLY = [
+    (["fly", "walls", "--sed", "3"], ["unknown option --sed", "--seed"]),
+    (["fly", "walls", "--seed", "1.5"], ["--seed", "1.5"]),
+    (["fly", "walls", "--duration", "nan"], ["--duration", "nan"]),
+    (["fly", "walls", "--duration", "0"], ["--duration", "0"]),
+    (["fly", "walls", "--speed", "nan"], ["--speed", "nan"]),
+    (["fly", "walls", "--realtime", "--speed", "3"], ["--realtime", "--speed"]),
+    (["fly", "walls", "--realtime", "--lockstep"], ["--lockstep", "--realtime"]),
+    (["fly", "walls", "--gcs", "localhost"], ["localhost", "udp:HOST:PORT"]),
+    (["fly", "walls", "--gcs", "udp:127.0.0.1:70000"], ["70000"]),
+    (["fly", "walls", "--gcs", "udp:127.0.0.1:14550", "more"], ["more"]),
+    (["fly", "walls", "--json", "no/such/result.json"], ["no/such/result.json"]),
+]
+
+
+@pytest.mark.parametrize(("arguments", "words"), OF_FLY)
+def test_a_wrong_word_of_a_flight_is_named_with_what_was_meant(
+    arguments: list[str],
+    words: list[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert exit_code(arguments) == 2
+    done = capsys.readouterr()
+    assert one_sentence(done.err), done.err
+    assert done.out == ""
+    for word in words:
+        assert word in done.err
+    assert list(tmp_path.iterdir()) == []
+
+
+def exit_code(arguments: list[str]) -> object:
+    """Of the command in this process."""
+    try:
+        return main(arguments)
+    except SystemExit as end:
+        return end.code
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
         (["flyy"], ["unknown verb flyy", "fly"]),
         (["--versio"], ["unknown option", "--version"]),
         (["fly", "wals"], ["unknown scenario", "walls"]),
-        (["fly", "walls", "--sed", "3"], ["unknown option --sed", "--seed"]),
         (["fly", "walls", "--seed", "-1"], ["--seed", "-1"]),
-        (["fly", "walls", "--seed", "1.5"], ["--seed", "1.5"]),
-        (["fly", "walls", "--duration", "nan"], ["--duration", "nan"]),
-        (["fly", "walls", "--duration", "0"], ["--duration", "0"]),
-        (["fly", "walls", "--speed", "nan"], ["--speed", "nan"]),
-        (["fly", "walls", "--realtime", "--speed", "3"], ["--realtime", "--speed"]),
-        (["fly", "walls", "--realtime", "--lockstep"], ["--lockstep", "--realtime"]),
-        (["fly", "walls", "--gcs", "localhost"], ["localhost", "udp:HOST:PORT"]),
-        (["fly", "walls", "--gcs", "udp:127.0.0.1:70000"], ["70000"]),
-        (["fly", "walls", "--gcs", "udp:127.0.0.1:14550", "more"], ["more"]),
-        (["fly", "walls", "--json", "no/such/result.json"], ["no/such/result.json"]),
         (["sitl", "--json", "no/such/result.json"], ["no/such/result.json"]),
         (["sitl", "wals"], ["unknown scenario", "walls"]),
         (["sitl", "--listen", "tcp:1"], ["tcp:1", "udp:HOST:PORT"]),
@@ -121,15 +153,16 @@ def test_a_directory_with_a_flight_is_not_written_over(tmp_path: Path) -> None:
     [["--help"], ["fly", "--help"], ["sitl", "--help"], ["fsw", "--help"], ["--version"]],
 )
 def test_help_and_version_answer_at_once(arguments: list[str], tmp_path: Path) -> None:
-    times = []
+    # Processor time, and the best of three: a busy machine must not fail a test about imports.
     for _ in range(3):
         begin = _spent_by_children_s()
         done = pandion(*arguments, cwd=tmp_path)
-        times.append(_spent_by_children_s() - begin)
+        took_s = _spent_by_children_s() - begin
         assert done.returncode == 0
         assert done.stdout
-    # Processor time, and the best of three: a busy machine must not fail a test about imports.
-    assert min(times) < 0.5
+        if took_s < 0.5:
+            break
+    assert took_s < 0.5
 
 
 def _spent_by_children_s() -> float:

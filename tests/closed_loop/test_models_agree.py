@@ -89,7 +89,7 @@ def at_rest(estimate: StateEstimate) -> PredictionState:
 
 
 @pytest.mark.parametrize("a", DIRECTIONS.values(), ids=DIRECTIONS.keys())
-@pytest.mark.parametrize("yaw_deg", [0.0, 120.0])
+@pytest.mark.parametrize("yaw_deg", [pytest.param(0.0, marks=pytest.mark.long), 120.0])
 def test_the_papers_attitude_loop_alone_moves_the_plant_as_predicted(
     a: Vec3, yaw_deg: float
 ) -> None:

@@ -93,10 +93,24 @@ ATTACKS = {
         "joints": JointSetpoint((1.0, 0.5)),
     },
 }
+# Of each kind one is in the quick tests, here or among branches.
+LONG_AT_WALLS = {
+    "a place behind the wall",
+    "the end-effector behind the wall",
+    "5 m/s at the wall",
+    "5 m/s into the corner",
+    "nose down",
+}
 
 
 @pytest.mark.requirement("REQ-SAFE-6")
-@pytest.mark.parametrize("attack", ATTACKS)
+@pytest.mark.parametrize(
+    "attack",
+    [
+        pytest.param(attack, marks=pytest.mark.long) if attack in LONG_AT_WALLS else attack
+        for attack in ATTACKS
+    ],
+)
 def test_no_set_point_flies_the_arm_into_a_wall(attack: str) -> None:
     flight = offboard(walls(AFAR, disturbed=True), **ATTACKS[attack])
     fastest = 0.0

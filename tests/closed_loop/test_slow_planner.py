@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import partial
 
 import pytest
 
@@ -18,6 +19,8 @@ from fsw.parameters.flight_config import flight_config
 from fsw.signals import Mode, Plan, PlanFailure, PlanRequest
 from sitl.scenario_file import load_scenario
 from tests.closed_loop.harness import ARM, Flight, command, hover
+
+in_long = partial(pytest.param, marks=pytest.mark.long)
 
 SLOW_FROM_S, SLOW_TO_S, END_S = 2.0, 4.0, 6.0
 
@@ -68,9 +71,14 @@ class SlowFlight(Flight):
 @pytest.mark.requirement("REQ-PLAN-1", "REQ-PLAN-2")
 @pytest.mark.parametrize(
     ("takes_ms", "missed", "given_up", "brakes"),
-    [(19, 0, 0, False), (40, 20, 0, False), (99, 20, 0, False), (101, 20, 20, True),
-     (250, 20, 20, True)],
-)  # fmt: skip
+    [
+        (19, 0, 0, False),
+        in_long(40, 20, 0, False),
+        (99, 20, 0, False),
+        (101, 20, 20, True),
+        in_long(250, 20, 20, True),
+    ],
+)
 def test_a_slow_planner_has_its_response(
     takes_ms: int, missed: int, given_up: int, brakes: bool
 ) -> None:
@@ -93,7 +101,13 @@ def test_a_slow_planner_has_its_response(
 @pytest.mark.requirement("REQ-PLAN-2")
 @pytest.mark.parametrize(
     ("name", "gone_s"),
-    [("walls", 3.1), ("walls", 9.4), ("walls", 14.0), ("branches", 7.9), ("branches", 11.3)],
+    [
+        ("walls", 3.1),
+        in_long("walls", 9.4),
+        in_long("walls", 14.0),
+        ("branches", 7.9),
+        in_long("branches", 11.3),
+    ],
 )
 def test_a_planner_that_is_gone_costs_no_barrier(name: str, gone_s: float) -> None:
     last = round(10 * gone_s)

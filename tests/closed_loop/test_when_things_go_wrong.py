@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import pytest
@@ -29,6 +30,8 @@ from fsw.signals import (
 from sitl.scenario_file import load_scenario
 from sitl.simulation import START_US, STEP_US
 from tests.closed_loop.harness import ARM, Flight, command, hover, real_planner
+
+in_long = partial(pytest.param, marks=pytest.mark.long)
 
 
 class FailsFrom:
@@ -166,10 +169,10 @@ class OnePush:
 @pytest.mark.parametrize(
     ("value", "torque", "felt"),
     [
-        ((12.0, 0.0, 0.0), False, 0.1),
-        ((0.0, -12.0, 0.0), False, 0.1),
+        in_long((12.0, 0.0, 0.0), False, 0.1),
+        in_long((0.0, -12.0, 0.0), False, 0.1),
         ((6.0, 6.0, -9.0), False, 0.1),
-        ((3.0, 0.0, 0.0), True, 0.01),
+        in_long((3.0, 0.0, 0.0), True, 0.01),
         ((0.0, -3.0, 0.0), True, 0.002),
     ],
 )

@@ -13,6 +13,7 @@ from sitl.scenario_file import load_scenario, scenario_names
 from sitl.trajectory import curve_row, place_on_curve, reference, warped
 
 STEP = 1e-4
+COMPILED = njit(place_on_curve)  # once for all scenarios: it takes longer than their points
 
 
 @pytest.mark.parametrize("name", scenario_names())
@@ -42,11 +43,10 @@ def test_a_trajectory_starts_and_stops_at_rest(name: str) -> None:
 def test_compiled_code_sees_the_same_curve(name: str) -> None:
     trajectory = load_scenario(name).trajectory
     row, curve = np.array(curve_row(trajectory)), reference(trajectory)
-    compiled = njit(place_on_curve)
     for t in np.linspace(-1.0, 121.0, 300):
         at = float(t)
         assert place_on_curve(row, at) == curve.at(at).p
-        assert compiled(row, at) == pytest.approx(curve.at(at).p, abs=1e-12)
+        assert COMPILED(row, at) == pytest.approx(curve.at(at).p, abs=1e-12)
 
 
 def test_the_warp_runs_at_full_speed_between_its_ramps() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 
 import numpy as np
 import pytest
@@ -39,27 +40,38 @@ def test_the_reach_of_a_place_at_or_below_the_origin_is_the_tube_of_base_or_end_
     assert below.expected == pytest.approx(PUSH * loop.end_effector_expected)
 
 
-def moved(at: Vec3, p: float, a: float) -> Array:
-    """Where a place of a vehicle goes that is ``p`` off along x and tilts for ``a`` there."""
+SHARE = 1e-4  # of a push: a small tilt, where turning is linear
+
+
+def turned(a: float) -> Array:
+    """The rotation of a vehicle that tilts for an acceleration ``a`` along x."""
     axes = np.empty((4, 3))
     state = np.zeros(19)
     state[6] = a
     body_axes(state, axes)
-    turned = np.stack((axes[0], np.cross(axes[1], axes[0]), axes[1]), axis=1)
-    return np.array((p, 0.0, 0.0)) + turned @ at - at
+    return np.stack((axes[0], np.cross(axes[1], axes[0]), axes[1]), axis=1)
+
+
+@cache
+def after_a_push(wind: bool) -> tuple[Array, Array]:
+    """How far it is off along x in every tick after a small push, and how it is turned."""
+    states = SHARE * impulse_responses(AIRFRAME, TUNING, GAINS, DT, wind=wind)[:, [0, 2]]
+    off = np.zeros((len(states), 3))
+    off[:, 0] = states[:, 0]
+    return off, np.array([turned(a) for a in states[:, 1]])
 
 
 @pytest.mark.parametrize("at", [(0.3, 0.0, 0.2), (-0.2, 0.0, 0.3), (0.46, 0.0, 0.0)])
 @pytest.mark.parametrize("angle_deg", [0.0, 22.5, 60.0, 90.0])
 def test_a_part_moves_as_the_tilted_body_carries_it(at: Vec3, angle_deg: float) -> None:
     """By rotating the body; turned round, the part is on the other side."""
-    angle, share = math.radians(angle_deg), 1e-4  # a small tilt, where turning is linear
+    angle = math.radians(angle_deg)
     normal = np.array((math.cos(angle), 0.0, -math.sin(angle)))
 
     def worst(place: Vec3, *, wind: bool) -> float:
-        states = impulse_responses(AIRFRAME, TUNING, GAINS, DT, wind=wind)[:, [0, 2]]
-        along = [moved(place, share * p, share * a) @ normal for p, a in states]
-        return float(np.abs(along).sum()) / share
+        off, rotations = after_a_push(wind)
+        moved = off + rotations @ place - place
+        return float(np.abs(moved @ normal).sum()) / SHARE
 
     most = max(
         PUSH * worst(place, wind=False) + TUNING.wind_limit * worst(place, wind=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -35,6 +36,8 @@ from sitl.shapes import KINDS as REFEREE_KINDS
 from tests.fsw.random_states import estimate_of, random_estimate, vec3
 from tests.fsw.shapes import by_coal
 from tests.fsw.vehicle_places import placed
+
+in_long = partial(pytest.param, marks=pytest.mark.long)
 
 ZERO: Vec3 = (0.0, 0.0, 0.0)
 LAG = 0.11
@@ -126,8 +129,14 @@ def test_several_zones_are_kept_at_once(p: Vec3, v: Vec3, wanted: Vec3) -> None:
 
 
 @pytest.mark.requirement("REQ-SAFE-5")
-@pytest.mark.parametrize("speed", [0.0, 0.2, 0.5, 0.9])
-@pytest.mark.parametrize("eager", [0.0, 1.0, 2.5])
+@pytest.mark.parametrize(
+    ("speed", "eager"),
+    [
+        *((0.0, 0.0), (0.0, 2.5), (0.5, 1.0), (0.9, 0.0), (0.9, 2.5)),
+        *(in_long(0.0, 1.0), in_long(0.5, 0.0), in_long(0.5, 2.5), in_long(0.9, 1.0)),
+        *(in_long(0.2, eager) for eager in (0.0, 1.0, 2.5)),
+    ],
+)
 def test_a_vehicle_that_is_driven_at_a_wall_stops_in_front_of_it(
     speed: float, eager: float
 ) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -264,22 +265,40 @@ def test_a_terminated_vehicle_is_disarmed_already() -> None:
     assert ask(replace(HOLDING, mode=Mode.FAULT), ARM, 0.0) == Decision(ACCEPTED)
 
 
-situations = st.builds(
-    CommandContext,
-    mode=st.sampled_from(Mode),
-    landed=st.booleans(),
-    estimate_valid=st.booleans(),
-    targets_ahead=st.booleans(),
-)
+def drawn(**vehicle: Any) -> st.SearchStrategy[CommandContext]:
+    return st.builds(
+        CommandContext,
+        mode=st.sampled_from(Mode),
+        landed=st.booleans(),
+        estimate_valid=st.booleans(),
+        targets_ahead=st.booleans(),
+        **vehicle,
+    )
+
+
+# One vehicle, which is many numbers and takes most of the time to draw; any in the long tests.
+situations = drawn(body=st.just(HOLDING.body), airframe=st.just(HOLDING.airframe))
+commands = st.sampled_from([ARM, TAKEOFF, LAND, SET_MODE, SHUTDOWN, 1, 999])
+Seven = tuple[float, float, float, float, float, float, float]
 params = st.tuples(*[st.floats(allow_nan=True, allow_infinity=True)] * 7)
 
 
-@given(st.sampled_from([ARM, TAKEOFF, LAND, SET_MODE, SHUTDOWN, 1, 999]), params, situations)
+@given(commands, params, situations)
 def test_whatever_arrives_is_answered_and_a_mode_can_always_follow(
-    command: int,
-    values: tuple[float, float, float, float, float, float, float],
-    situation: CommandContext,
+    command: int, values: Seven, situation: CommandContext
 ) -> None:
+    check_answer(command, values, situation)
+
+
+@pytest.mark.long
+@given(commands, params, drawn())
+def test_whatever_arrives_is_answered_by_any_vehicle(
+    command: int, values: Seven, situation: CommandContext
+) -> None:
+    check_answer(command, values, situation)
+
+
+def check_answer(command: int, values: Seven, situation: CommandContext) -> None:
     decision = ask(situation, command, *values)
     if decision.mode in FLIGHT_MODES:
         assert decision.result == ACCEPTED

@@ -99,7 +99,9 @@ def test_the_plan_is_the_optimum_of_the_problem_written_a_second_time(
     assert answer.slack_max == pytest.approx(worst, abs=tolerance)
 
 
-@pytest.mark.parametrize("seed", [31, 32, 33, 34])
+@pytest.mark.parametrize(
+    "seed", [31, 32, *(pytest.param(k, marks=pytest.mark.long) for k in (33, 34))]
+)
 def test_a_point_beside_a_wall_that_is_in_the_way_is_in_the_ocp(seed: int) -> None:
     random = np.random.default_rng(seed)
     start, asked = question(random, SafeSet())
