@@ -183,14 +183,14 @@ class Cascade:
             dt,
         )
         self.probes = filter_probes(clear.body)
-        self._packed = packed(self.law)
+        self.packed = packed(self.law)
         memory = CascadeMemory(STOPPED.rotor_thrust, STOPPED, Observed(_NONE, _NONE), 1.0)
         around = (NO_ZONES, self.probes)
-        example = (self._packed, memory, _SOMEWHERE, REST_STATE, REST_INPUT, 1, *around)
+        example = (self.packed, memory, _SOMEWHERE, REST_STATE, REST_INPUT, 1, *around)
         self._close_loops = machine_code(_close_loops, *example)
         sent = memory.rotors, STOPPED.rotor_thrust, STOPPED.joint_torque
         arm = _SOMEWHERE.w_WB_B, _SOMEWHERE.q_arm, _SOMEWHERE.qd_arm, _SOMEWHERE.specific_force
-        self._joint_acceleration = machine_code(_joint_acceleration, self._packed, *sent, *arm)
+        self._joint_acceleration = machine_code(_joint_acceleration, self.packed, *sent, *arm)
 
     def motion(self, memory: CascadeMemory, estimate: StateEstimate) -> MotionState:
         """Acceleration to snap right now, from the rotor model."""
@@ -202,7 +202,7 @@ class Cascade:
     def joint_acceleration(self, memory: CascadeMemory, estimate: StateEstimate) -> Vec2:
         """Accelerations [rad/s^2] of the joints under the torques sent last, by the model."""
         return self._joint_acceleration(
-            self._packed,
+            self.packed,
             memory.rotors,
             _settling_at(memory),
             memory.commanded.joint_torque,
@@ -223,7 +223,7 @@ class Cascade:
     ) -> tuple[ActuatorCommand, CascadeMemory, Guarded]:
         """See ``close_loops``, of which this is the machine code; ``zones`` (zones, k) [SI]."""
         sent, rotors, believed, mass, integrals, joints, off_plan, guarded = self._close_loops(
-            self._packed, memory, estimate, plan, u, ticks, zones, self.probes
+            self.packed, memory, estimate, plan, u, ticks, zones, self.probes
         )
         command = ActuatorCommand(*sent)
         moved = Observed(*believed), mass, *integrals, JointMemory(*joints), off_plan

@@ -49,7 +49,7 @@ _RATE_LIMIT: Final = 100.0  # rad/s, of body and joints
 _FORCE_LIMIT: Final = 1000.0  # m/s^2
 # Changes of the pose are compared with the inertial unit over so many frames. Poses that are noisy
 # by 5 mrad and 20 mm/s are still within this.
-_WINDOW: Final = 25
+WINDOW_FRAMES: Final = 25
 _TURN_APART: Final = 0.02  # rad
 _SPEED_APART: Final = 0.07  # m/s
 # What is constant to the last bit, and the pose shows a change from one window to the next.
@@ -122,8 +122,10 @@ class Agreement(NamedTuple):
         """The judgement after a whole window, at ``now_us`` [us]."""
         turn, speed = norm(window.turn), norm(window.speed)
         last = window if self.last is None else self.last
-        still = window.same_rate >= _WINDOW and math.dist(window.turn, last.turn) > _TURN_SEEN
-        held = window.same_force >= _WINDOW and math.dist(window.speed, last.speed) > _SPEED_SEEN
+        still = window.same_rate >= WINDOW_FRAMES and math.dist(window.turn, last.turn) > _TURN_SEEN
+        held = (
+            window.same_force >= WINDOW_FRAMES and math.dist(window.speed, last.speed) > _SPEED_SEEN
+        )
         turns = self.turn + 1 if still or not turn < _TURN_APART else 0
         speeds = self.speed + 1 if held or not speed < _SPEED_APART else 0
         good = 0 if turns or speeds else self.good + 1
@@ -139,6 +141,10 @@ class Agreement(NamedTuple):
             again = min(2 * self.again, _MOST_GOOD)
             return Agreement(again=again, pose_failed_us=self.pose_failed_us, last=window)
         return after
+
+    def after_calm(self, windows: int, last: Window) -> Agreement:
+        """``after`` some ``windows`` of which ``is_calm`` is true, the ``last`` of them given."""
+        return self._replace(turn=0, speed=0, good=self.good + windows, last=last)
 
     def without_pose(self) -> Agreement:
         """The judgement after a pose has been found to be late."""
@@ -378,6 +384,16 @@ def repeating(new: Reading, last: Reading) -> int:
 
 
 @compilable
+def is_calm(frames: int, turn: Vec3, speed: Vec3, same_rate: int, same_force: int) -> bool:
+    """Whether neither sensor disagrees in a window of these sums, nor could be stuck.
+
+    ``turn`` [rad, FRD], ``speed`` [m/s, NED].
+    """
+    near = norm(turn) < _TURN_APART and norm(speed) < _SPEED_APART
+    return near and same_rate < frames and same_force < frames
+
+
+@compilable
 def next_window(window: Window, new: Reading, last: Reading, apart: float) -> tuple[int, Window]:
     """Parts that are far from the last frame's, and the window with the new frame in it.
 
@@ -399,7 +415,7 @@ def next_window(window: Window, new: Reading, last: Reading, apart: float) -> tu
 
 
 @kernel
-def _looked_at(
+def looked_at(
     new: Reading,
     last: Reading,
     apart: float,
@@ -426,12 +442,12 @@ def _looked_at(
 
 @cache
 def _machine_code() -> Callable[..., Any]:
-    """``_looked_at``, compiled when it is first wanted."""
+    """``looked_at``, compiled when it is first wanted."""
     none, arm, level = (0.0, 0.0, 0.0), (0.0, 0.0), (1.0, 0.0, 0.0, 0.0)
     R = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
     read = none, none, level, none, none, arm, arm
     estimate = none, none, R, none, 9.81, arm, arm
-    return machine_code(_looked_at, read, read, 0.002, _EMPTY, *estimate, 0.002, 0.0)
+    return machine_code(looked_at, read, read, 0.002, _EMPTY, *estimate, 0.002, 0.0)
 
 
 def believed(
@@ -455,7 +471,7 @@ def believed(
         new, last, apart, trust.window, p0, v0, R0, w0, force0, q0, qd0, dt, sigma
     )
     window, agreement = Window(*sums), trust.agreement
-    if window.frames >= _WINDOW:
+    if window.frames >= WINDOW_FRAMES:
         agreement, window = agreement.after(window, s.t_us), _EMPTY
     odd = agreement.doubted
     if not (never or far or stuck or trust.returned_us or trust.doubted or odd or trust.shadow):

@@ -30,6 +30,7 @@ from fsw.flight.failsafe import FAULTS, Condition
 from fsw.flight.modes.mission import with_update
 from fsw.flight.modes.offboard import accept_setpoints, report
 from fsw.flight.plan_exchange import PlanExchange, measured_state, nominal_at_rest, requested
+from fsw.flight.quiet_ticks import QuietTicks
 from fsw.flight.reference_horizon import ReferenceHorizon
 from fsw.flight.safe_set import SafeSetCheck
 from fsw.flight.safety_watch import SafetyWatch
@@ -131,6 +132,18 @@ class Autopilot:
         self._sensed.warm_up()
         self._clearance.warm_up(estimate)
         self._exact.warm_up(estimate, TickInputs(_STILL))
+
+    def quiet_ticks(self) -> QuietTicks:
+        """What flies ticks of this configuration in which nothing happens."""
+        return QuietTicks(
+            self.config,
+            self._cascade,
+            self._plans.model,
+            self._damage.law,
+            self._damage.decay,
+            self._watch.upright,
+            self._watch.radius,
+        )
 
     def analyse(self, safe_set: SafeSet) -> tuple[Finding, ...]:
         """Findings on whether this configuration can keep a safe set."""
@@ -416,7 +429,7 @@ class Autopilot:
         if memory.health is not state.damage.health:
             memory = memory._replace(health=state.damage.health)
         if state.vehicle.flies and nominal is not None:
-            zones = self._zones_now(state)
+            zones = self.zones_now(state)
             wanted, memory, guarded = self._cascade.step(memory, estimate, nominal, u, ticks, zones)
         elif state.vehicle.armed:
             idle = self.config.limits.idle_thrust
@@ -446,9 +459,10 @@ class Autopilot:
             return state.damage, paused(state.watch)
         return self._damage.see(state.damage, state.watch, state.cascade, memory, estimate, ticks)
 
-    def _zones_now(self, state: FlightState) -> Array:
-        """The zones for the safety filter; made anew where they or their target changed.
+    def zones_now(self, state: FlightState) -> Array:
+        """The zones (zones, k) [SI] for the safety filter.
 
+        Made anew where they or their target changed.
         None where the vehicle descends because it does not know where it is.
         """
         kept, target = state.kept, state.reference

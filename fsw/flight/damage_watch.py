@@ -29,16 +29,16 @@ class DamageWatch:
 
     def __init__(self, airframe: Airframe, tick: float, *, reallocates: bool) -> None:
         """Watch in ticks of ``tick`` [s]; loops reckon with what is found if it ``reallocates``."""
-        self._law = packed(airframe)
+        self.law = packed(airframe)
         self._top = airframe.rotor_thrust_max
         self._hover = 0.25 * airframe.mass * GRAVITY
         self._tick = tick
-        self._decay = rotor_decay(airframe, tick)
+        self.decay = rotor_decay(airframe, tick)
         self._reallocates = reallocates
         self._start = at_start()
         none4, none3, none2 = (0.0,) * 4, (0.0,) * 3, (0.0,) * 2
         rest: tuple[Any, ...] = (none4, none2, none2, none3, none2, none2, 1.0)
-        self._watch = machine_code(watch, self._start, blank(), self._law, 1.0, 1.0, *rest)
+        self._watch = machine_code(watch, self._start, blank(), self.law, 1.0, 1.0, *rest)
 
     def see(
         self,
@@ -55,13 +55,13 @@ class DamageWatch:
         """
         after = blank()
         thrust, torque = sent.commanded
-        dt, decay = self._tick, self._decay
+        dt, decay = self._tick, self.decay
         if ticks != 1:
             dt, decay = ticks * dt, decay**ticks
         failed = self._watch(
             self._start if memory is None else memory,
             after,
-            self._law,
+            self.law,
             decay,
             dt,
             thrust,

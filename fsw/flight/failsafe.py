@@ -860,7 +860,7 @@ BLOCKING: Final = frozenset((Condition.POSITION_LOST, Condition.PLANNER_LOST))
 
 _TESTS: Final = tuple((row.active, row) for row in FAILSAFES)
 _QUICK: Final = tuple((row.active, row) for row in FAILSAFES if not row.slow)
-# What ``_all_is_well`` rules out. A row that is not here is asked in every tick.
+# What ``all_is_well`` rules out. A row that is not here is asked in every tick.
 _RULED_OUT: Final = frozenset(
     {
         Condition.ATTITUDE_LOST,
@@ -889,12 +889,12 @@ _SLOW: Final = frozenset(row.condition for row in FAILSAFES if row.slow)
 
 def active(context: FailsafeContext) -> tuple[Failsafe, ...]:
     """Rows whose condition is active, in the order of the table; almost always none."""
-    return _found(context, _OTHERS if _all_is_well(context) else _TESTS)
+    return _found(context, _OTHERS if all_is_well(context) else _TESTS)
 
 
 def quickly_active(context: FailsafeContext) -> tuple[Failsafe, ...]:
     """The same between two planning periods: the slow rows are as they were found last."""
-    found = _found(context, _QUICK_OTHERS if _all_is_well(context) else _QUICK)
+    found = _found(context, _QUICK_OTHERS if all_is_well(context) else _QUICK)
     before = context.state.vehicle.conditions
     if before and not _SLOW.isdisjoint(before):
         known = {row.condition for row in found} | _SLOW.intersection(before)
@@ -902,7 +902,7 @@ def quickly_active(context: FailsafeContext) -> tuple[Failsafe, ...]:
     return found
 
 
-def _all_is_well(context: FailsafeContext) -> bool:
+def all_is_well(context: FailsafeContext) -> bool:
     """Whether no condition of ``_RULED_OUT`` can be active, as in nearly every tick.
 
     False says nothing: the rows decide. Tests hold it against each of them.

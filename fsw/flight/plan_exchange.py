@@ -96,13 +96,16 @@ def _each(value: Callable[[int], float]) -> Vec3:
     return value(0), value(1), value(2)
 
 
+def planned_input(plan: Plan, now_us: int) -> PlanInput | None:
+    """A plan's input at its age; None where it is not young enough."""
+    step = (now_us - plan.t_us) // plan.period_us
+    return plan.inputs[step] if 0 <= step < min(PLAN_STALE_PERIODS, len(plan.inputs)) else None
+
+
 def plan_input(plan: Plan | None, nominal: PredictionState, now_us: int, brake: Brake) -> PlanInput:
     """The running plan's input at its age; braking where there is none young enough."""
-    if plan is not None:
-        step = (now_us - plan.t_us) // plan.period_us
-        if 0 <= step < min(PLAN_STALE_PERIODS, len(plan.inputs)):
-            return plan.inputs[step]
-    return brake(nominal)
+    planned = None if plan is None else planned_input(plan, now_us)
+    return brake(nominal) if planned is None else planned
 
 
 def take_answer(
@@ -143,7 +146,7 @@ class PlanExchange:
 
     def __init__(self, config: FlightConfig) -> None:
         self._config = config
-        self._model = NominalModel(config.airframe, config.tick_period_us * 1e-6)
+        self.model = NominalModel(config.airframe, config.tick_period_us * 1e-6)
         self._brake = Brake(config.airframe, config.planner.limits.tilt)
 
     def follow(
@@ -163,16 +166,16 @@ class PlanExchange:
         memory, new_plan = take_answer(memory, answer, now_us)
         if new_plan is not None:
             late = max(now_us - new_plan.t_us, 0) // tick_us
-            nominal = self._model.advance(new_plan.start, new_plan.inputs[0], late)
+            nominal = self.model.advance(new_plan.start, new_plan.inputs[0], late)
         elif now_us > memory.since_us:
             for ago in range(ticks, 0, -1):
                 u = plan_input(running, nominal, now_us - ago * tick_us, self._brake)
-                nominal = self._model.step(nominal, u)
+                nominal = self.model.step(nominal, u)
         return nominal, memory, plan_input(memory.running, nominal, now_us, self._brake)
 
     def step(self, nominal: PredictionState, u: PlanInput) -> PredictionState:
         """The plan's state one tick later."""
-        return self._model.step(nominal, u)
+        return self.model.step(nominal, u)
 
     def start(
         self,
@@ -198,7 +201,7 @@ class PlanExchange:
         )
         if from_nominal:
             u = plan_input(memory.running, nominal, now_us, self._brake)
-            return self._model.advance(nominal, u, delay), True
+            return self.model.advance(nominal, u, delay), True
         settled = with_arm_in_bounds(measured, config.airframe, config.planner.limits)
         return coast(settled, delay * config.tick_period_us * 1e-6), False
 

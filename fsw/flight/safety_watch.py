@@ -71,7 +71,7 @@ class SafetyWatch:
             return memory if memory.off_plan_us < 0 else replace(memory, off_plan_us=-1)
         (x, y, z), (px, py, pz) = estimate.p_WB, nominal.p
         dx, dy, dz = x - px, y - py, z - pz
-        most = self.radius + max(unsure - NOISE_ROOM, 0.0)
+        most = off_plan_bound(self.radius, unsure)
         if (
             memory.off_plan_us < 0
             and -most <= dx <= most
@@ -149,6 +149,14 @@ class SafetyWatch:
         """On the ground, where the plan may well be lower than the vehicle can be."""
         config = self._config
         return height_above_ground(config, estimate) < config.limits.airborne_height
+
+
+def off_plan_bound(radius: float, unsure: float) -> float:
+    """How far [m] the base may be off its plan on an axis, of a tube's ``radius`` [m].
+
+    ``unsure`` [m] is what the estimate's errors add; the radius has room for some of it.
+    """
+    return radius + max(unsure - NOISE_ROOM, 0.0)
 
 
 def _since(since_us: int, now_us: int, *, so: bool) -> int:

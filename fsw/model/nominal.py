@@ -52,16 +52,16 @@ class NominalModel:
             tuple((*a[row, horizontal].tolist(), float(b[row, 0])) for row in horizontal),
             tuple((*a[row, vertical].tolist(), float(b[row, 2])) for row in vertical),
         )
-        self._packed = packed(self.model)
-        self._advance = machine_code(_advance, self._packed, REST_STATE, REST_INPUT, 1)
+        self.packed = packed(self.model)
+        self._advance = machine_code(_advance, self.packed, REST_STATE, REST_INPUT, 1)
 
     def step(self, x: PredictionState, u: PlanInput) -> PredictionState:
         """The state one tick later."""
-        return PredictionState(*self._advance(self._packed, x, u, 1))
+        return PredictionState(*self._advance(self.packed, x, u, 1))
 
     def advance(self, x: PredictionState, u: PlanInput, ticks: int) -> PredictionState:
         """The state some ticks later under one input."""
-        return PredictionState(*self._advance(self._packed, x, u, ticks))
+        return PredictionState(*self._advance(self.packed, x, u, ticks))
 
 
 @compilable

@@ -71,6 +71,11 @@ class Faults:
         for fault in faults:
             self._add(fault, round(1e6 * fault.start_s / step_us))
 
+    @property
+    def none(self) -> bool:
+        """Whether there has been no fault, and none is to come."""
+        return not self._entries
+
     def at(self, step: int) -> bool:
         """Bring it to a step; whether any fault is active."""
         if step >= self._change:

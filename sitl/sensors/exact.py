@@ -84,7 +84,7 @@ class ExactSensors:
             DelayLine[SensorReadings](round(1000.0 * errors.latency_ms / step_us))
             for errors in (sensors.imu, sensors.pose, sensors.encoders)
         )
-        self._exact = sensors == Sensors()
+        self.exact = sensors == Sensors()
         self._noise = {
             name: GaussianNoise(seed, name)
             for name in ("gyro", "accel", "p", "v", "q", "w", "angle", "rate", "torque")
@@ -92,7 +92,7 @@ class ExactSensors:
 
     def measure(self, exact: SensorReadings) -> SensorReadings:
         """The readings delivered at ``exact.t_us``."""
-        if self._exact:
+        if self.exact:
             return exact
         imu = self._imu.through(exact)
         pose = self._pose.through(exact)

@@ -12,7 +12,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
+import numpy as np
+
 from fsw.flight.autopilot import Autopilot
+from fsw.flight.quiet_ticks import READINGS, QuietTicks
 from fsw.flight.state import FlightState
 from fsw.measurements import Sample
 from fsw.model.airframe import Airframe
@@ -145,6 +148,43 @@ class ClosedLoop(Generic[State]):
         return Controls(thrust, (t1 / torque, t2 / torque), outputs.snapshot.armed)
 
 
+class QuietStretch:
+    """Flies the ticks of a loop in which nothing happens, without what only others need of a tick.
+
+    For studies of exact states: see ``fsw.flight.quiet_ticks``.
+    """
+
+    def __init__(
+        self, loop: ClosedLoop[FlightState], autopilot: Autopilot, *, allowed: bool
+    ) -> None:
+        """Fly none unless it is ``allowed``."""
+        self._loop, self._autopilot = loop, autopilot
+        self._ticks: QuietTicks | None = None
+        if allowed and loop.simulation.tells_its_state:
+            self._ticks = autopilot.quiet_ticks()
+        self._reading = np.empty(READINGS)
+
+    def fly(self) -> bool:
+        """Go on as far as nothing happens, often not at all; whether the run is not over then."""
+        loop, ticks = self._loop, self._ticks
+        simulation, before = loop.simulation, loop.state
+        if ticks is None or simulation.t_us != before.t_us + STEP_US:
+            return simulation.ended is None
+        reading, force = self._reading, loop.airframe.rotor_thrust_max
+        torque = loop.airframe.joint_torque_max
+        for _ in range(ticks.begin(before, self._autopilot.zones_now(before))):
+            simulation.exact_state(reading)
+            quiet, (f1, f2, f3, f4), (t1, t2) = ticks.tick(reading)
+            if not quiet:
+                break
+            thrust = (f1 / force, f2 / force, f3 / force, f4 / force)
+            simulation.advance(Controls(thrust, (t1 / torque, t2 / torque), True))
+            if simulation.ended is not None:
+                break
+        loop.state = ticks.end(before)
+        return simulation.ended is None
+
+
 class RefusedError(RuntimeError):
     """The flight software denied a command of the study's pilot."""
 
@@ -191,10 +231,13 @@ def simulate(
     """
     simulation, recorder = Simulation(scenario, seed), FlightRecorder()
     planner = InlinePlanner(Planner(config.planner, config.airframe, processor_time_us))
-    loop = ClosedLoop(simulation, Autopilot(config).tick, FlightState(), planner, config.airframe)
+    autopilot = Autopilot(config)
+    loop = ClosedLoop(simulation, autopilot.tick, FlightState(), planner, config.airframe)
+    # A trace is of every so many ticks, and a fault of a sensor may be in each.
+    stretch = QuietStretch(loop, autopilot, allowed=fault is None and not traced)
     steps_per_plan = config.mpc_period_us // config.tick_period_us
     faulty, mode = FaultySensors(fault, seed), Mode.TRAJECTORY
-    while simulation.ended is None:
+    while stretch.fly():
         step = simulation.step
         sensors, samples = loop.observe()
         if fault is not None:
