@@ -13,10 +13,13 @@ YOUNG = 100_000
 def compile_kernels(half: str) -> None:
     """Build what flies, or what simulates; either compiles all that it calls."""
     if half == "fsw":
+        from fsw.flight.autopilot import Autopilot
         from fsw.parameters.control_choice import ControlChoice
+        from fsw.parameters.flight_config import flight_config
         from fsw.runtime.assembly import flight_software
 
         flight_software(ControlChoice())
+        Autopilot(flight_config()).quiet_ticks()  # of studies alone
     else:
         from sitl.scenario_file import load_scenario
         from sitl.simulation import Simulation

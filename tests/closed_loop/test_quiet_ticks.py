@@ -22,14 +22,14 @@ from sitl.disturbances.items import Uniform
 from sitl.faults.keys import Fault
 from sitl.scenario_file import load_scenario
 from sitl.simulation import Controls, Simulation
-from studies.closed_loop import (
+from studies.flight.closed_loop import (
     FIRST_COMMANDS,
     ClosedLoop,
     InlinePlanner,
     QuietStretch,
     simulate,
 )
-from studies.flight_result import FlightResult
+from studies.flight.result import FlightResult
 
 Sent = list[Controls]
 
