@@ -44,9 +44,11 @@ def main(options: FalsifyOptions, file: Path) -> int:
 
 def _search(options: FalsifyOptions, plan: CampaignPlan) -> int:
     from studies.campaign.flight_space import spaces
+    from studies.campaign.store import refuse_campaign
     from studies.search.worst_flights import search
 
     folder = options.out or new_run_directory(Path("runs"), f"falsify-{plan.name}")
+    refuse_campaign(folder)
     folder.mkdir(parents=True, exist_ok=True)
     display = Display(console_beside(options.json))
     display.say(

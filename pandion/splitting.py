@@ -79,11 +79,13 @@ def main(argv: list[str]) -> int:
 
 
 def _run(options: SplittingOptions, plan: CampaignPlan, effort: Effort) -> int:
+    from studies.campaign.store import refuse_campaign
     from studies.statistics.rare_flights import FlightScore, as_json, only_case, sentences
     from studies.statistics.splitting import estimate
 
     flights = only_case(plan)
     folder = options.out or new_run_directory(Path("runs"), f"splitting-{plan.name}")
+    refuse_campaign(folder)
     folder.mkdir(parents=True, exist_ok=True)
     display = Display(console_beside(options.json))
     display.say(

@@ -66,9 +66,11 @@ def main(argv: list[str]) -> int:
 
 
 def _tune(options: TuneOptions, task: Task) -> int:
+    from studies.campaign.store import refuse_campaign
     from studies.search.tune import as_json, sentences, tune
 
     folder = options.out or new_run_directory(Path("runs"), f"tune-{task.plan.name}")
+    refuse_campaign(folder)
     folder.mkdir(parents=True, exist_ok=True)
     display = Display(console_beside(options.json))
     display.say(

@@ -20,6 +20,7 @@ from sitl.result import TruthResult
 from sitl.scenario import EncoderErrors, ImuErrors, PoseErrors, Scenario
 from sitl.sensors.keys import MeasuredSensors
 from studies.flight import closed_loop, double_integrator, mission, samples, sensor_faults
+from studies.flight.kept_row import kept_row
 from studies.flight.result import FlightResult
 from studies.flight.sensor_faults import Fault
 
@@ -78,7 +79,7 @@ class Job:
 
     def from_line(self, line: Mapping[str, Any]) -> Outcome:
         """See :class:`studies.campaign.campaign.Flight`."""
-        return Outcome(**line)
+        return kept_row(Outcome, line)
 
 
 @dataclass(frozen=True, slots=True)
