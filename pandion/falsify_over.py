@@ -69,7 +69,7 @@ def _search(options: FalsifyOptions, plan: CampaignPlan) -> int:
             campaign,
             options.evaluations,
             options.seed,
-            together=max(options.cluster.workers, 1),
+            together=options.generation,
             report=report,
         )
     if not found.finds:
