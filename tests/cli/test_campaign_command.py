@@ -138,6 +138,11 @@ def test_flights_of_another_campaign_are_not_mixed_in(
         ([], "--example"),
         (["nowhere.toml"], "cannot read campaign nowhere.toml"),
         (["x.toml", "--workers=1", "--scheduler=tcp://a:1"], "not allowed with"),
+        (["x.toml", f"--tls-ca-file={__file__}"], "are for a scheduler"),
+        (
+            ["x.toml", "--scheduler=tls://a:1", f"--tls-cert={__file__}", f"--tls-key={__file__}"],
+            "need each other and --tls-ca-file",
+        ),
     ],
 )
 def test_what_cannot_be_flown_is_refused_in_a_sentence(
