@@ -6,6 +6,7 @@ import json
 import os
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -13,6 +14,7 @@ import pytest
 from command_line.output import complain
 from pandion.certify import main
 from studies.campaign.store import read
+from studies.search.tune import EXAMPLE
 from studies.statistics.certificate import certificate, digest
 from tests.studies.campaign.test_store import begun, put
 
@@ -49,6 +51,27 @@ def test_rows_of_another_command_are_named_and_change_nothing(
     assert certificate(read(directory), directory, 0.95) == before
     assert main([str(directory)]) == 0
     assert "4 lines of journal.jsonl are not counted" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("verb", "words"),
+    [
+        ("pandion.tune", ["{example}"]),
+        ("pandion.splitting", ["{file}"]),
+        ("pandion.falsify", ["--over={file}"]),
+        ("pandion.reproduce", ["table3"]),
+    ],
+)
+def test_other_commands_leave_the_directory_of_a_campaign_alone(
+    verb: str, words: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file, directory, plan = begun(tmp_path)
+    put(directory, plan, range(4))
+    before = {path.name: path.read_bytes() for path in directory.iterdir()}
+    told = [word.format(example=EXAMPLE, file=file) for word in words]
+    assert import_module(verb).main([*told, f"--out={directory}", "--workers=0"]) == 2
+    assert "is the directory of a campaign; give another --out" in capsys.readouterr().err
+    assert {path.name: path.read_bytes() for path in directory.iterdir()} == before
 
 
 @pytest.mark.parametrize("number", ["NaN", "1e999", "-Infinity"])
