@@ -24,6 +24,10 @@ from command_line.values import one_of, output_file
 Kind = TypeVar("Kind")
 
 
+class ContradictionError(ValueError):
+    """Options that do not go together, in one sentence; a dataclass of options raises it."""
+
+
 class OneOf:
     """Options of which only one may be given; a declaration names this object."""
 
@@ -185,7 +189,11 @@ def read(kind: type[Kind], prog: str, description: str, argv: list[str] | None) 
     groups: dict[OneOf, Any] = {}
     for name, one in _options(kind):
         one.declare(name, parser, groups)
-    return _build(kind, vars(parser.read(argv)))
+    values = vars(parser.read(argv))
+    try:
+        return _build(kind, values)
+    except ContradictionError as error:
+        parser.error(str(error))
 
 
 def as_words(value: Any) -> list[str]:

@@ -25,7 +25,14 @@ def say(sentence: str, stream: TextIO | None = None) -> None:
 
 
 def complain(program: str, sentence: object) -> None:
-    """Print what is wrong in one line on standard error."""
+    """Print what is wrong in one line on standard error.
+
+    Raises:
+        BrokenPipeError: It is what is wrong: the reader of the output has left, as `head` does,
+            which is nothing to complain of. The program ends on it.
+    """
+    if isinstance(sentence, BrokenPipeError):
+        raise sentence
     say(f"{program}: {sentence}", sys.stderr)
 
 

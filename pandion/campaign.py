@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+import shlex
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from command_line.options import group, json_file, option, read, switch
+from command_line.options import as_words, group, json_file, option, read, switch
 from command_line.output import complain, console_beside, json_text, say, typed, unwritten
 from command_line.parser import COULD_NOT_START
 from command_line.values import whole
@@ -75,10 +76,9 @@ def _fly(options: CampaignOptions, file: Path, plan: CampaignPlan) -> int:
     from studies.campaign.campaign import SchedulerGoneError
     from studies.campaign.store import JOURNAL, begin
 
-    asked = options.flights or plan.count
-    plan.check(asked)
+    plan.check(options.flights or plan.count)
     folder = options.out or new_run_directory(Path("runs"), plan.name)
-    begin(folder, file, plan, asked)
+    asked = begin(folder, file, plan, options.flights)
     display = Display(console_beside(options.json))
     display.say(
         f"Pandion {version()}: {plan.name}, {asked} flights, {options.cluster.words}, "
@@ -88,7 +88,7 @@ def _fly(options: CampaignOptions, file: Path, plan: CampaignPlan) -> int:
         with display.progress():
             _all(options, plan, asked, folder, display)
     except KeyboardInterrupt:
-        command = f"{typed()} campaign {file} --out {folder}"
+        command = _resumed(options, file, folder)
         complain("pandion campaign", f"interrupted; what was flown is kept, go on with: {command}")
         return BROKEN
     except SchedulerGoneError as error:
@@ -97,6 +97,13 @@ def _fly(options: CampaignOptions, file: Path, plan: CampaignPlan) -> int:
         complain("pandion campaign", f"{error}; what was flown is in {folder}")
         return BROKEN
     return _written(options, folder, display)
+
+
+def _resumed(options: CampaignOptions, file: Path, folder: Path) -> str:
+    """The command that goes on: as it was given, into the same directory."""
+    words = as_words(replace(options, file=None, out=None))
+    command = ["campaign", str(file), *words, "--out", str(folder)]
+    return f"{typed()} {shlex.join(command)}"
 
 
 def _all(
@@ -119,7 +126,7 @@ def _all(
 def _written(options: CampaignOptions, folder: Path, display: Display) -> int:
     """Page, table and summary of what is in the journal now."""
     from studies.campaign.page import again, page
-    from studies.campaign.store import PAGE, read, write_facts, write_table
+    from studies.campaign.store import PAGE, left_out, read, write_facts, write_table
     from studies.campaign.summary import summaries, worst
 
     result = read(folder)
@@ -147,6 +154,8 @@ def _written(options: CampaignOptions, folder: Path, display: Display) -> int:
         display.say(
             f"{name}: {one.flights} flights, {one.violated} violations{refused}{broke}{margin}"
         )
+    if result.left_out:
+        display.say(left_out(result.left_out))
     display.say(f"page {folder / PAGE}")
     lost = unwritten(options.json, json_text(facts, 1) + "\n")
     for what in lost:
@@ -163,11 +172,15 @@ def _again(options: CampaignOptions, plan: CampaignPlan) -> int:
     from fsw.parameters.storage import save
     from sitl.scenario_text import scenario_text
     from studies.campaign.flight import CampaignFlight
+    from studies.campaign.keys import CampaignError
     from studies.flight.fly_again import changed_parameters, fly_command
 
     number = options.flight or 0
     plan.check(number + 1)
-    flight = plan.flight(number)
+    try:
+        flight = plan.flight(number)
+    except ValueError as error:
+        raise CampaignError(f"flight {number} cannot be flown: {error}") from None
     job = flight.job
     folder = options.out or new_run_directory(Path("runs"), f"{plan.name}-flight{number}")
     folder.mkdir(parents=True, exist_ok=True)

@@ -64,8 +64,15 @@ class CampaignRun:
 
 
 def begin(verb: str, options: CampaignRunOptions, plan: CampaignPlan, work: str) -> CampaignRun:
-    """Make the directory and say what is flown, ``work`` being how many flights, in words."""
+    """Make the directory and say what is flown, ``work`` being how many flights, in words.
+
+    Raises:
+        CampaignError: The directory is that of a campaign, whose rows would be mixed with these.
+    """
+    from studies.campaign.store import refuse_campaign
+
     folder = options.out or new_run_directory(Path("runs"), f"{verb}-{plan.name}")
+    refuse_campaign(folder)
     folder.mkdir(parents=True, exist_ok=True)
     display = Display(console_beside(options.json))
     display.say(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -65,6 +66,7 @@ def main(argv: list[str]) -> int:
 
 
 def _certify(options: CertifyOptions, result: CampaignResult) -> int:
+    from studies.campaign.store import left_out
     from studies.statistics.certificate import certificate
     from studies.statistics.certificate_page import page, sentences
 
@@ -72,6 +74,8 @@ def _certify(options: CertifyOptions, result: CampaignResult) -> int:
     display = Display(console_beside(options.json))
     for sentence in sentences(stated):
         display.say(sentence)
+    if result.left_out:
+        display.say(left_out(result.left_out))
     written = options.out or options.campaign / PAGE
     lost = unwritten(options.json, json_text(stated, 1) + "\n")
     lost += unwritten(written, page(stated, result))
@@ -112,8 +116,20 @@ def _statement(path: Path) -> dict[str, Any]:
         raise NoCertificateError(
             f"{path} holds no certificate of this version; give what `pandion certify` has written"
         )
+    if not _finite(stated):
+        raise NoCertificateError(
+            f"{path} holds no certificate: a number is not finite, and no certificate has such"
+        )
     confidence, refits = stated.get("confidence"), stated.get("refits")
     known = isinstance(confidence, float) and 0.0 < confidence < 1.0
     if not known or not isinstance(refits, int) or not 1 <= refits <= 100_000:
         raise NoCertificateError(f"{path}: confidence or refits is no number that can be used")
     return stated
+
+
+def _finite(stated: dict[str, Any]) -> bool:
+    try:
+        json.dumps(stated, allow_nan=False)
+    except (ValueError, RecursionError):
+        return False
+    return True

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from command_line.options import OneOf, option
+from command_line.options import ContradictionError, OneOf, option
 from command_line.values import existing_file, whole
 
 if TYPE_CHECKING:
@@ -43,10 +43,30 @@ class ClusterOptions:
     tls_cert: Path | None = option("--tls-cert FILE", "own certificate for TLS, PEM", existing_file)
     tls_key: Path | None = option("--tls-key FILE", "its key, PEM", existing_file)
 
+    def __post_init__(self) -> None:
+        """Refuse files of TLS that would not be used.
+
+        Raises:
+            ContradictionError: There is no connection for them, or one file is missing.
+        """
+        files = (self.tls_ca_file, self.tls_cert, self.tls_key)
+        if any(files) and not self.running:
+            raise ContradictionError(
+                "--tls-ca-file, --tls-cert and --tls-key are for a scheduler: give --scheduler "
+                "or --scheduler-file with them"
+            )
+        if (self.tls_cert or self.tls_key) and not all(files):
+            raise ContradictionError("--tls-cert and --tls-key need each other and --tls-ca-file")
+
+    @property
+    def running(self) -> bool:
+        """Whether a scheduler that runs already is named."""
+        return self.scheduler is not None or self.scheduler_file is not None
+
     @property
     def words(self) -> str:
         """How a sentence says where."""
-        if self.scheduler is not None or self.scheduler_file is not None:
+        if self.running:
             return f"scheduler {self.scheduler or self.scheduler_file}"
         return f"{self.workers} workers" if self.workers != 1 else "1 worker"
 
@@ -61,7 +81,6 @@ def campaign_of(
     """What flies where the options say; ``more`` are fields of ``Campaign``."""
     from studies.campaign.campaign import Campaign, Scheduler, mute, silent
 
-    running = options.scheduler is not None or options.scheduler_file is not None
     scheduler = Scheduler(
         address=options.scheduler,
         file=options.scheduler_file,
@@ -73,7 +92,7 @@ def campaign_of(
         workers=options.workers,
         journal=journal,
         report=report or silent,
-        scheduler=scheduler if running else None,
+        scheduler=scheduler if options.running else None,
         say=say or mute,
         **more,
     )

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 HOLDS, BROKEN = 0, 1  # exit codes
 _FORMAT: Final = "pandion-disturbance-1"
 _MM: Final = 1e3
+_STEPS_A_SECOND: Final = 500
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,6 +53,13 @@ class FalsifyOptions:
         Path,
     )
     keep: int = option("--keep N", "with --over: how many finds to keep", whole(1, 1000), default=5)
+    generation: int = option(
+        "--generation N",
+        "with --over: flights of a generation, at least; as many can be flown at once, and the "
+        "result depends on it (default by the numbers searched: 7 of three, 19 of two hundred)",
+        whole(1, 100_000),
+        default=1,
+    )
     cluster: ClusterOptions = group(ClusterOptions)
     replay: Path | None = option(
         "--replay FILE", "fly a worst.json of an earlier search with planner and referee", Path
@@ -79,6 +87,7 @@ def main(argv: list[str]) -> int:
         return search_over(options, options.over)
     from sitl.scenario_file import ScenarioError, load_scenario
     from studies.flight.closed_loop import RefusedError
+    from studies.search.falsify import TooShortError
 
     try:
         scenario = load_scenario(options.scenario)
@@ -86,7 +95,7 @@ def main(argv: list[str]) -> int:
         if options.replay is not None:
             return _replay(options, scenario, options.replay)
         return _search(options, scenario)
-    except (ScenarioError, RefusedError, UnusableError, OSError) as error:
+    except (ScenarioError, RefusedError, TooShortError, UnusableError, OSError) as error:
         complain("pandion falsify", error)
         return COULD_NOT_START
 
@@ -319,7 +328,9 @@ def _read(path: Path, scenario: Scenario) -> tuple[int, tuple[tuple[float, float
         kept = json.loads(path.read_text(encoding="utf-8"))
         if kept["format"] != _FORMAT:
             raise KeyError("format")
-        first = int(kept["first_step"])
+        first = kept["first_step"]
+        if isinstance(first, bool) or not isinstance(first, int):
+            raise TypeError("first_step")
         pushes = tuple((float(x), float(y), float(z)) for x, y, z in kept["acceleration_m_s2"])
     except (UnicodeDecodeError, RecursionError, KeyError, TypeError, ValueError):
         raise UnusableError(f"{path} is no disturbance that pandion falsify has kept") from None
@@ -328,4 +339,6 @@ def _read(path: Path, scenario: Scenario) -> tuple[int, tuple[tuple[float, float
         raise UnusableError(f"{path}: every value must be within ±50 m/s^2, and there must be some")
     if kept.get("scenario") != scenario.name:
         raise UnusableError(f"{path} was found in {kept.get('scenario')}, not in {scenario.name}")
+    if first >= scenario.duration_s * _STEPS_A_SECOND:
+        raise UnusableError(f"{path}: first_step is after the end, {scenario.duration_s:g} s")
     return first, pushes

@@ -45,7 +45,7 @@ def _search(options: FalsifyOptions, file: Path) -> int:
             campaign,
             options.evaluations,
             options.seed,
-            together=max(options.cluster.workers, 1),
+            together=options.generation,
             report=report,
         )
     if not found.finds:

@@ -101,6 +101,7 @@ def main(argv: list[str]) -> int:
 
     pin_numerics_to_one_thread()  # before NumPy loads
     from studies.campaign.campaign import SchedulerGoneError
+    from studies.campaign.keys import CampaignError
     from studies.drawing import NoMatplotlibError
     from studies.paper.settings import NoCellError
 
@@ -108,17 +109,19 @@ def main(argv: list[str]) -> int:
         if options.what != "robustness" and (options.suite or options.only):
             raise NoCellError(f"{options.what} has no rows to choose by --suite or --only")
         return _run(options)
-    except (NoMatplotlibError, NoCellError, SchedulerGoneError, OSError) as error:
+    except (NoMatplotlibError, NoCellError, CampaignError, SchedulerGoneError, OSError) as error:
         complain("pandion reproduce", error)
         return COULD_NOT_START
 
 
 def _run(options: ReproduceOptions) -> int:
+    from studies.campaign.store import refuse_campaign
     from studies.paper.page import rows_text, write
 
     console = console_beside(options.json)
     settings = _settings(options)
     folder = options.out or new_run_directory(Path("runs"), options.what)
+    refuse_campaign(folder)
     say(f"Pandion {version()}: {options.what}, written to {folder}", console)
     if settings.tuned_on:
         print("these seeds were used for tuning; report others", file=console, flush=True)

@@ -103,11 +103,14 @@ class Campaign(Generic[RowT]):
 
     def close(self, *, at_once: bool = False) -> None:
         """End the processes that fly; ``at_once`` in the middle of a flight."""
-        if self._lines is not None:
-            self._lines.close()
-        if self._cluster is not None:
-            self._cluster.close(at_once=at_once)
+        lines, cluster = self._lines, self._cluster
         self._lines = self._cluster = None
+        try:
+            if lines is not None:
+                lines.close()  # on a full disk it cannot write what it still holds
+        finally:
+            if cluster is not None:
+                cluster.close(at_once=at_once)
 
     @property
     def flies(self) -> bool:

@@ -13,6 +13,7 @@ from studies.campaign.plan import CampaignPlan
 from studies.flight import closed_loop, job, mission, samples, sensor_faults
 from studies.flight.closed_loop import RefusedError
 from studies.flight.job import Outcome, fly_job, score, sources
+from studies.flight.kept_row import kept_row
 from studies.flight.result import FlightResult
 
 
@@ -20,6 +21,12 @@ def code() -> str:
     """Digest of everything but the packages that decides how a flight of a plan goes."""
     shells = (keys, plan, values, closed_loop, sensor_faults, job, mission, samples)
     return sources(*shells)
+
+
+def row_key(plan_digest: str, number: int, code_digest: str) -> str:
+    """Under which a journal keeps the row of a flight of a plan that a state of the code flew."""
+    text = f"{plan_digest} {number} {code_digest}"
+    return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -86,8 +93,7 @@ class CampaignFlight:
 
     def key(self) -> str:
         """See :class:`studies.campaign.campaign.Flight`."""
-        text = f"{self.plan.digest} {self.number} {code()}"
-        return hashlib.sha256(text.encode()).hexdigest()[:32]
+        return row_key(self.plan.digest, self.number, code())
 
     def row(self) -> CampaignRow:
         """See :class:`studies.campaign.campaign.Flight`."""
@@ -121,7 +127,7 @@ class CampaignFlight:
 
     def from_line(self, line: Mapping[str, Any]) -> CampaignRow:
         """See :class:`studies.campaign.campaign.Flight`."""
-        return CampaignRow(**line)
+        return kept_row(CampaignRow, line)
 
     def _row(self, **more: Any) -> CampaignRow:
         flight = self.plan.draw(self.number)

@@ -109,7 +109,7 @@ def spaces(plan: CampaignPlan) -> tuple[FlightSpace, ...]:
             varied=plan.varied,
             ranges=tuple(range_of(one.key, base) for one in plan.varied),
             pushes=_pushes(base, plan.varied),
-            seed=plan.flight(k).seed,
+            seed=plan.draw(k).seed,
         )
         for k, (case, base) in enumerate(zip(plan.cases, plan.bases, strict=True))
     )

@@ -2,24 +2,38 @@
 
 from __future__ import annotations
 
+import errno
+import fcntl
 import json
 import os
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO, Final
+
+_NO_LOCKS: Final = (errno.ENOLCK, errno.ENOTSUP, errno.ENOSYS)  # of a file system
+
+
+class JournalInUseError(OSError):
+    """Another process, or another part of this one, writes to it; in one sentence."""
 
 
 class Journal:
     """Lines with a ``key``; of each key the last line without an ``error`` can be read again."""
 
     def __init__(self, path: Path) -> None:
-        """Open or make it.
+        """Open or make it; nobody else can until it is closed.
 
         Raises:
+            JournalInUseError: Somebody else has it open.
             OSError: It cannot be written.
         """
         path.parent.mkdir(parents=True, exist_ok=True)
         self._file = path.open("a+b")
+        try:
+            _lock(self._file, path)
+        except BaseException:
+            self._file.close()
+            raise
         self._place: dict[str, int] = {}  # in the file; rows themselves would fill the memory
         self._file.seek(0)
         end, whole = 0, True
@@ -37,8 +51,8 @@ class Journal:
             return None
         self._file.seek(place)
         content = _object(self._file.readline())
-        assert content is not None
-        content.pop("key")
+        if content is None or content.pop("key", None) != key:
+            return None  # the file was changed by something that asks for no lock
         return content
 
     def append(self, contents: Iterable[tuple[str, Mapping[str, Any]]]) -> None:
@@ -57,8 +71,11 @@ class Journal:
         self._file.close()
 
     def _index(self, content: Mapping[str, Any] | None, place: int) -> None:
-        if content is not None and "key" in content and content.get("error") is not True:
-            self._place[content["key"]] = place
+        if content is None or content.get("error") is True:
+            return
+        key = content.get("key")
+        if isinstance(key, str):
+            self._place[key] = place
 
 
 def lines(path: Path) -> Iterator[dict[str, Any]]:
@@ -72,9 +89,23 @@ def lines(path: Path) -> Iterator[dict[str, Any]]:
                 yield content
 
 
+def _lock(file: BinaryIO, path: Path) -> None:
+    """Keep others out until the file is closed, or this process ends in whatever way."""
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        if error.errno in _NO_LOCKS:
+            return  # it is still right for one writer
+        if error.errno not in (errno.EAGAIN, errno.EACCES):
+            raise
+        raise JournalInUseError(
+            f"{path} is being written by another process: wait for its end, or give another place"
+        ) from None
+
+
 def _object(line: bytes) -> dict[str, Any] | None:
     try:
         content = json.loads(line)
-    except ValueError:
+    except (ValueError, RecursionError):
         return None
     return content if isinstance(content, dict) else None

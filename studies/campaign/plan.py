@@ -42,6 +42,7 @@ from studies.campaign.values import (
     Design,
     Distribution,
     Normal,
+    Turn,
     Uniform,
     design_point,
     drawn,
@@ -154,6 +155,8 @@ class CampaignPlan:
         Raises:
             CampaignError: With what to do.
         """
+        if count > MOST_FLIGHTS:
+            raise CampaignError(f"{count} flights are too many: a campaign has {MOST_FLIGHTS}")
         if count > self.most():
             raise CampaignError(
                 f"a {self.design} of {self.most()} flights has no flight {self.most()}; write "
@@ -284,6 +287,11 @@ def _plan(
         if keys.design != "grid":
             raise CampaignError('missing key "flights" (how many there are to be, such as 200)')
         count = len(cases) * grid_size(tuple(one.distribution for one in varied))
+        if count > MOST_FLIGHTS:
+            raise CampaignError(
+                f"the grid has {count} flights, and a campaign at most {MOST_FLIGHTS}: give fewer "
+                'points, or the key "flights" to fly the first of them'
+            )
     longest = max(base.scenario.duration_s for base in bases)
     if math.isinf(longest):
         raise CampaignError('missing key "duration_s": the scenario has no end of its own')
@@ -389,7 +397,15 @@ def _varied(table: Any, bases: Sequence[Flown], design: Design) -> tuple[Varied,
     keys = [one.key for one in found]
     if (PUSH in keys or AIR in keys) and DIRECTION not in keys:
         found.append(Varied(DIRECTION, Uniform(0.0, 360.0, points=8)))
-    return tuple(found)
+    return tuple(_turned(one) if design == "grid" else one for one in found)
+
+
+def _turned(varied: Varied) -> Varied:
+    """A key of a grid; north is there once, where directions go all the way round."""
+    all_ = varied.distribution
+    if varied.key == DIRECTION and isinstance(all_, Uniform) and all_.high - all_.low == 360.0:
+        return Varied(DIRECTION, Turn(all_.low, all_.high, all_.points))
+    return varied
 
 
 def _leaves(table: Any, prefix: str) -> Iterator[tuple[str, dict[str, Any]]]:

@@ -10,19 +10,23 @@ campaign.html   the page
 from __future__ import annotations
 
 import json
+import os
 import shutil
 from collections.abc import Iterable
+from contextlib import closing
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from command_line.output import json_text
 from command_line.version import version
-from studies.campaign.flight import CampaignRow, code
+from studies.campaign.flight import CampaignRow, code, row_key
 from studies.campaign.identity import packages
-from studies.campaign.journal import lines
+from studies.campaign.journal import Journal, lines
 from studies.campaign.keys import CampaignError
 from studies.campaign.plan import CampaignPlan, load_plan
+from studies.campaign.values import MOST_FLIGHTS
+from studies.flight.kept_row import kept_row
 
 PLAN, JOURNAL, FACTS, TABLE, PAGE = (
     "campaign.toml",
@@ -51,6 +55,7 @@ class CampaignResult:
     asked: int  # how many flights there are to be
     digests: Digests
     facts: dict[str, Any]  # campaign.json
+    left_out: int = 0  # lines of the journal that are no rows of these flights
 
     @property
     def complete(self) -> bool:
@@ -61,17 +66,21 @@ class CampaignResult:
 def read(directory: Path) -> CampaignResult:
     """A campaign from its directory, whole or interrupted.
 
+    A line of the journal is a row of it if its key is that of the flight, for the plan and the
+    state of the code that flew it, which may be another than this one. No row is left out because
+    fewer flights were asked for.
+
     Raises:
         CampaignError: It is none, or one of another version.
     """
-    try:
-        facts = json.loads((directory / FACTS).read_text(encoding="utf-8"))
-        digests, asked = Digests(**facts["digests"]), int(facts["flights"])
-    except (OSError, ValueError, TypeError, KeyError):
+    kept = _facts(directory)
+    if kept is None:
         raise CampaignError(
-            f"{directory} is no directory of a campaign: {FACTS} is not there or of another "
-            "version; give what `pandion campaign --out` was given"
-        ) from None
+            f"{directory} is no directory of a campaign: {FACTS} is not there, is damaged or of "
+            "another version; give what `pandion campaign --out` was given, or mend it with that "
+            "command"
+        )
+    facts, digests, asked = kept
     plan = replace(load_plan(directory / PLAN), name=str(facts.get("name", directory.name)))
     if plan.digest != digests.plan:
         if digests.code != code():
@@ -81,35 +90,104 @@ def read(directory: Path) -> CampaignResult:
                 f"{facts.get('version', 'of that day')}"
             )
         raise CampaignError(f"{directory / PLAN} was changed after it was flown; fly it again")
-    return CampaignResult(plan, _rows(directory / JOURNAL, asked), asked, digests, facts)
+    rows, left_out = _rows(directory / JOURNAL, digests)
+    asked = max([asked, *(row.flight + 1 for row in rows[-1:])])
+    return CampaignResult(plan, rows, asked, digests, facts, left_out)
 
 
-def begin(directory: Path, source: Path, plan: CampaignPlan, asked: int) -> None:
+def _facts(directory: Path) -> tuple[dict[str, Any], Digests, int] | None:
+    """What campaign.json says, its digests and flights; None if it cannot be read or used."""
+    try:
+        facts = json.loads((directory / FACTS).read_text(encoding="utf-8"))
+        digests, asked = Digests(**facts["digests"]), facts["flights"]
+    except (OSError, ValueError, TypeError, KeyError, RecursionError):
+        return None
+    known = all(isinstance(one, str) for one in asdict(digests).values())
+    if isinstance(asked, bool) or not isinstance(asked, int) or not 1 <= asked <= MOST_FLIGHTS:
+        return None
+    return (facts, digests, asked) if known else None
+
+
+def begin(directory: Path, source: Path, plan: CampaignPlan, flights: int | None = None) -> int:
     """Make the directory of a campaign, or go on with one of the same flights.
 
+    Returns how many ``flights`` there are to be: without a number those of the file, or as many as
+    the directory has if it has more. They are never fewer than before, because a certificate of
+    the first of them could stop before one that went wrong.
+
     Raises:
-        CampaignError: Something else lies there, or flights of other code.
+        CampaignError: Something else lies there, flights of other code, or more than are asked for.
+        JournalInUseError: They are being flown.
         OSError: It cannot be written.
     """
-    own = Digests(plan.digest, code(), packages())
-    if (directory / FACTS).exists():
-        _check_same(directory, read(directory), own)
-    elif (directory / JOURNAL).exists():
-        raise CampaignError(f"{directory} has a journal of something else; give another --out")
+    asked = flights or plan.count
+    there = _there(directory, plan)
+    if flights is not None and flights < there:
+        raise CampaignError(
+            f"{directory} has a campaign of {there} flights, and none may be left out: leave out "
+            f"--flights, or give at least {there} or another --out"
+        )
+    asked = max(asked, there)
     directory.mkdir(parents=True, exist_ok=True)
-    for name in plan.files:
-        if (source.parent / name).resolve() != (directory / name).resolve():
-            (directory / name).parent.mkdir(parents=True, exist_ok=True)
-            shutil.copyfile(source.parent / name, directory / name)
-    if source.resolve() != (directory / PLAN).resolve():
-        shutil.copyfile(source, directory / PLAN)
-    write_facts(directory, plan, asked)
+    with closing(Journal(directory / JOURNAL)):
+        for name in plan.files:
+            if (source.parent / name).resolve() != (directory / name).resolve():
+                (directory / name).parent.mkdir(parents=True, exist_ok=True)
+                shutil.copyfile(source.parent / name, directory / name)
+        if source.resolve() != (directory / PLAN).resolve():
+            shutil.copyfile(source, directory / PLAN)
+        write_facts(directory, plan, asked)
+    return asked
+
+
+def left_out(lines: int) -> str:
+    """The sentence about ``lines`` of a journal that are no rows of its campaign."""
+    return (
+        f"{lines} lines of {JOURNAL} are not counted: they are damaged, or rows of another plan or "
+        "another command"
+    )
+
+
+def refuse_campaign(directory: Path) -> None:
+    """Refuse a directory that a campaign has, before another command writes to its journal.
+
+    Raises:
+        CampaignError: A campaign lies there.
+    """
+    if (directory / FACTS).exists():
+        raise CampaignError(f"{directory} is the directory of a campaign; give another --out")
+
+
+def _there(directory: Path, plan: CampaignPlan) -> int:
+    """How many flights of a plan a directory is to have already; 0: none is begun there.
+
+    Raises:
+        CampaignError: Something else lies there.
+    """
+    if not (directory / FACTS).exists() and not (directory / JOURNAL).exists():
+        return 0
+    own = Digests(plan.digest, code(), packages())
+    if _facts(directory) is not None:
+        found = read(directory)
+        _check_same(directory, found, own)
+        return found.asked
+    # A crash or a full disk left no facts. They follow from the file and the rows, if both are
+    # those of this plan and this code.
+    rows, _ = _rows(directory / JOURNAL, own)
+    if not rows and any(lines(directory / JOURNAL)):
+        raise CampaignError(f"{directory} has a journal of something else; give another --out")
+    if rows and (not (directory / PLAN).exists() or load_plan(directory / PLAN).digest != own.plan):
+        raise CampaignError(
+            f"{directory} has rows, but not the campaign file that they were flown from; give "
+            "another --out"
+        )
+    return rows[-1].flight + 1 if rows else 0
 
 
 def write_facts(
     directory: Path, plan: CampaignPlan, asked: int, more: dict[str, Any] | None = None
 ) -> dict[str, Any]:
-    """Write what was flown with what, in one step; returns it."""
+    """Write what was flown with what, in one step that outlives a crash; returns it."""
     facts = {
         "name": plan.name,
         "flights": asked,
@@ -122,8 +200,16 @@ def write_facts(
         **(more or {}),
     }
     unfinished = directory / f"{FACTS}.new"
-    unfinished.write_text(json_text(facts, 1) + "\n", encoding="utf-8")
+    with unfinished.open("w", encoding="utf-8") as file:
+        file.write(json_text(facts, 1) + "\n")
+        file.flush()
+        os.fsync(file.fileno())  # or the name could be on the disk before what it names
     unfinished.replace(directory / FACTS)
+    folder = os.open(directory, os.O_RDONLY)
+    try:
+        os.fsync(folder)
+    finally:
+        os.close(folder)
     return facts
 
 
@@ -140,17 +226,22 @@ def _check_same(directory: Path, there: CampaignResult, own: Digests) -> None:
             )
 
 
-def _rows(journal: Path, asked: int) -> tuple[CampaignRow, ...]:
-    """One row a flight, the last that was written, in the order of the flights."""
+def _rows(journal: Path, digests: Digests) -> tuple[tuple[CampaignRow, ...], int]:
+    """One row a flight, the last that was written, in their order; how many lines are none."""
     found: dict[int, CampaignRow] = {}
+    left_out = 0
     for line in lines(journal):
-        line.pop("key", None)
+        key = line.pop("key", None)
         try:
-            row = CampaignRow(**line)
+            row = kept_row(CampaignRow, line)
         except TypeError:
-            continue  # cut short
-        found[row.flight] = row
-    return tuple(found[number] for number in sorted(found) if number < asked)
+            left_out += 1
+            continue
+        if key == row_key(digests.plan, row.flight, digests.code):
+            found[row.flight] = row
+        else:
+            left_out += 1
+    return tuple(found[number] for number in sorted(found)), left_out
 
 
 def write_table(directory: Path, rows: Iterable[CampaignRow]) -> Path | None:

@@ -44,6 +44,19 @@ class Uniform:
 
 
 @dataclass(frozen=True, slots=True)
+class Turn(Uniform):
+    """A full circle on a grid, whose two ends are the same direction: the second is left out."""
+
+    def grid(self) -> tuple[float, ...]:
+        """See :class:`Uniform`."""
+        ends = np.linspace(self.low, self.high, self.points, endpoint=False)
+        return tuple(float(one) for one in ends)
+
+    def __str__(self) -> str:
+        return f"a full circle from {self.low:g} to {self.high:g}"
+
+
+@dataclass(frozen=True, slots=True)
 class Normal:
     """The normal distribution, cut off at two ends."""
 

@@ -20,6 +20,7 @@ from sitl.result import TruthResult
 from sitl.scenario import EncoderErrors, ImuErrors, PoseErrors, Scenario
 from sitl.sensors.keys import MeasuredSensors
 from studies.flight import closed_loop, double_integrator, mission, samples, sensor_faults
+from studies.flight.kept_row import kept_row
 from studies.flight.result import FlightResult
 from studies.flight.sensor_faults import Fault
 
@@ -38,7 +39,10 @@ class Job:
 
     @property
     def random(self) -> bool:
-        """Whether the seed changes anything: calm air and exact sensors draw no number."""
+        """Whether the seed changes anything: calm air and exact sensors draw no number.
+
+        Nor does a fault, unless it is one of chance.
+        """
         sensors = self.scenario.sensors
         if self.fault is not None:
             return True  # the seed chooses when
@@ -54,6 +58,7 @@ class Job:
         return (
             noisy
             or gusts
+            or any(one.random for one in self.scenario.faults)
             or any(it.kind not in ("wind", "sequence") for it in self.scenario.disturbances)
         )
 
@@ -78,7 +83,7 @@ class Job:
 
     def from_line(self, line: Mapping[str, Any]) -> Outcome:
         """See :class:`studies.campaign.campaign.Flight`."""
-        return Outcome(**line)
+        return kept_row(Outcome, line)
 
 
 @dataclass(frozen=True, slots=True)

@@ -51,6 +51,10 @@ _NO_WEIGHTS = np.zeros((3, FEATURES))
 Report = Callable[[str, float, float], None]
 
 
+class TooShortError(ValueError):
+    """A flight that ends before there is a plan, in one sentence with what to do."""
+
+
 @dataclass(frozen=True, slots=True)
 class Bounds:
     """What the start-up analysis prints [m]."""
@@ -252,7 +256,11 @@ def search(
     seed: int,
     report: Report,
 ) -> Outcome:
-    """Look for the worst disturbance within ``amplitude`` [m/s²]; ``report`` shows progress."""
+    """Look for the worst disturbance within ``amplitude`` [m/s²]; ``report`` shows progress.
+
+    Raises:
+        TooShortError: There is no plan to push the vehicle off.
+    """
     return _searched(scenario, config, amplitude, evaluations, seed, report).outcome()
 
 
@@ -280,6 +288,11 @@ def _searched(
     report: Report,
 ) -> Search:
     flown = record(scenario, config, lambda done, total: report("calm flight", done, total))
+    if not flown.starts:
+        raise TooShortError(
+            f"{scenario.name} ends after {scenario.duration_s:g} s, before the vehicle has a plan: "
+            "there is nothing to push it off; give it a longer duration_s"
+        )
     hunt = Search(scenario, config, flown, amplitude)
     random = np.random.default_rng(seed)
 

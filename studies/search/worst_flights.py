@@ -74,7 +74,8 @@ def search(
     """Fly about ``evaluations`` flights, as many of each case; at least ``together`` at a time.
 
     Raises:
-        CampaignError: Nothing can be searched, or the flights have no margin.
+        CampaignError: Nothing can be searched, a case would get no flight, or the flights have no
+            margin.
     """
     for case in cases:
         if not case.values + case.entries:
@@ -82,6 +83,11 @@ def search(
                 f"{case.case}: nothing to search; vary something, or take a scenario with a "
                 "uniform disturbance"
             )
+    if evaluations < len(cases):
+        raise CampaignError(
+            f"{evaluations} flights are fewer than the {len(cases)} combinations of scenario, "
+            "suite, controller and fault that are named: each is searched; fly more or name fewer"
+        )
     hunt = _Hunt(campaign, report)
     for k, case in enumerate(cases):
         budget = evaluations // len(cases) + (k < evaluations % len(cases))

@@ -146,8 +146,11 @@ def tampered(stated: dict[str, Any]) -> bool:
 
 
 def digest(value: Any) -> str:
-    """SHA-256 of a value's canonical JSON: keys sorted, no spaces, floats to the last bit."""
-    text = json.dumps(value, sort_keys=True, separators=(",", ":"), allow_nan=False)
+    """SHA-256 of a value's canonical JSON: keys sorted, no spaces, floats to the last bit.
+
+    A number that is not finite, such as the margin of a flight that diverged, is NaN or Infinity.
+    """
+    text = json.dumps(value, sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode()).hexdigest()
 
 
@@ -157,7 +160,7 @@ def _signed(statement: dict[str, Any]) -> dict[str, Any]:
 
 
 def _short(value: Any) -> str:
-    text = json.dumps(value, allow_nan=False)
+    text = json.dumps(value)
     return text if len(text) <= 80 else f"{text[:80]}…"
 
 

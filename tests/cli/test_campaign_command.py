@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -82,7 +83,9 @@ def test_more_flights_are_added_and_none_is_flown_twice(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr("studies.campaign.page._figures", lambda _: [])  # they cost the most
-    file, out = campaign
+    file, flown = campaign
+    out = tmp_path / "out"
+    shutil.copytree(flown, out)
     before = (out / "journal.jsonl").read_text()
     target = tmp_path / "summary.json"
     words = [str(file), "--workers=0", f"--out={out}", "--flights=4", f"--json={target}"]
@@ -91,8 +94,11 @@ def test_more_flights_are_added_and_none_is_flown_twice(
     assert after.startswith(before)
     assert len(after.splitlines()) == 4
     assert json.loads(target.read_text())["flown"] == 4
-    assert main([str(file), "--workers=0", f"--out={out}"]) == 0  # as before, for other tests
-    assert "3 of 3" in capsys.readouterr().out
+    # Fewer than there are would leave some out, which could be those that went wrong.
+    assert main([str(file), "--workers=0", f"--out={out}", "--flights=2"]) == 2
+    assert "a campaign of 4 flights, and none may be left out" in capsys.readouterr().err
+    assert main([str(file), "--workers=0", f"--out={out}"]) == 0
+    assert "4 of 4" in capsys.readouterr().out
 
 
 def test_a_flight_is_flown_again_with_what_pandion_fly_needs(
@@ -162,6 +168,11 @@ def test_flights_of_another_campaign_are_not_mixed_in(
         ([], "--example"),
         (["nowhere.toml"], "cannot read campaign nowhere.toml"),
         (["x.toml", "--workers=1", "--scheduler=tcp://a:1"], "not allowed with"),
+        (["x.toml", f"--tls-ca-file={__file__}"], "are for a scheduler"),
+        (
+            ["x.toml", "--scheduler=tls://a:1", f"--tls-cert={__file__}", f"--tls-key={__file__}"],
+            "need each other and --tls-ca-file",
+        ),
     ],
 )
 def test_what_cannot_be_flown_is_refused_in_a_sentence(
@@ -174,4 +185,32 @@ def test_what_cannot_be_flown_is_refused_in_a_sentence(
     said = capsys.readouterr().err
     assert code == 2
     assert sentence in said
+    assert len(said.strip().splitlines()) == 1
+
+
+def test_the_command_that_goes_on_flies_what_was_asked_where_it_was_asked(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(*_: Any) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("pandion.campaign._all", interrupted)
+    file, out = tmp_path / "a b.toml", tmp_path / "out"
+    file.write_text(TINY.replace(', "own.toml"', ""))
+    words = ["--flights=2", "--scheduler=tcp://a:1"]
+    assert main([str(file), *words, f"--out={out}"]) == 1
+    said = capsys.readouterr().err
+    assert f"campaign '{file}' --flights=2 --scheduler=tcp://a:1 --out {out}" in said
+
+
+def test_a_flight_that_cannot_be_flown_is_refused_in_a_sentence(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "far.toml"
+    file.write_text(
+        'flights = 3\nscenarios = ["walls"]\n[vary]\nstart.position_m.0 = { choice = [90.0] }\n'
+    )
+    assert main([str(file), "--flight=1", f"--out={tmp_path / 'out'}"]) == 2
+    said = capsys.readouterr().err
+    assert "flight 1 cannot be flown" in said
     assert len(said.strip().splitlines()) == 1

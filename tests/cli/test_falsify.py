@@ -10,7 +10,7 @@ import pytest
 
 from pandion.falsify import main
 from studies.search.falsify import Bounds, Found, Outcome, WholeFound, WholeOutcome
-from studies.search.plan_record import Start
+from studies.search.plan_record import PlanRecord, Start
 from studies.search.tracked_flight import Disturbance
 from studies.search.whole_flight import Flown
 
@@ -46,6 +46,9 @@ def test_a_flight_that_does_not_start_on_a_trajectory_is_refused(
         ({"acceleration_m_s2": [[1e9, 0.0, 0.0]]}, "within ±50"),
         ({"acceleration_m_s2": [[float("nan"), 0.0, 0.0]]}, "within ±50"),
         ({"first_step": -1}, "there must be some"),
+        ({"first_step": float("inf")}, "is no disturbance"),
+        ({"first_step": 700.5}, "is no disturbance"),
+        ({"first_step": 10**400}, "first_step is after the end"),
         ({"scenario": "walls"}, "was found in walls"),
     ],
 )
@@ -60,6 +63,15 @@ def test_a_file_that_is_no_kept_disturbance_is_refused(
 def test_a_missing_file_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     missing = tmp_path / "none.json"
     assert "none.json" in _refusal(capsys, "workspace", "--replay", str(missing))
+
+
+def test_a_flight_that_ends_before_there_is_a_plan_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    nothing = PlanRecord(np.zeros((0, 25)), np.zeros((0, 1)), np.zeros((0, 2), dtype=np.int64), ())
+    monkeypatch.setattr("studies.search.falsify.record", lambda *_: nothing)
+    assert main(["workspace", f"--out={tmp_path}", "--evaluations=20"]) == 2
+    assert "before the vehicle has a plan" in capsys.readouterr().err
 
 
 START = Start(0, 700, np.zeros(21), None)  # type: ignore[arg-type]  # not flown here

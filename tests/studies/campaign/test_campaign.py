@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import signal
 import subprocess
@@ -84,6 +85,25 @@ def test_flights_are_flown_by_other_processes_here(tmp_path: Path) -> None:
         [one.key() for one in flights[:30]] + ["raises 30"] * 6 + ["flies 31"]
     )
     assert len(journal.read_text().splitlines()) == 33
+
+
+def test_a_disk_that_is_full_does_not_keep_processes_running(tmp_path: Path) -> None:
+    closed: list[bool] = []
+
+    class Cluster:
+        def close(self, *, at_once: bool) -> None:
+            closed.append(at_once)
+
+    class FullDisk:
+        def close(self) -> None:
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+    campaign = Campaign[StubRow](1, tmp_path / "journal.jsonl")
+    campaign._cluster, campaign._lines = Cluster(), FullDisk()  # type: ignore[assignment]
+    with pytest.raises(OSError, match="No space left"):
+        campaign.close(at_once=True)
+    assert closed == [True]
+    campaign.close()
 
 
 @pytest.mark.long

@@ -61,6 +61,32 @@ def test_noise_stays_with_the_seed() -> None:
     assert one.job(np.zeros(2), np.zeros(30)).seed == one.seed
 
 
+@pytest.mark.parametrize(
+    ("fault", "random"),
+    [
+        ('unit = "gyro"\nkind = "garbage"', True),
+        ('unit = "gyro"\nkind = "intermittent"', True),
+        ('unit = "motor"\nkind = "intermittent"\ninstance = 1', True),
+        ('unit = "motor"\nkind = "weak"\ninstance = 1', False),
+        ('unit = "gyro"\nkind = "stuck"', False),
+    ],
+)
+def test_what_a_fault_draws_stays_with_the_seed(fault: str, random: bool) -> None:
+    one = space(f"without_fault = false\n[[faults]]\n{fault}\nstart_s = 0.5")
+    point = np.full(2, 0.5), np.zeros(30)
+    assert one.seeded == random
+    # Two flights of other seeds are two flights, in a journal too.
+    assert (one.job(*point, seed=1).key() != one.job(*point, seed=2).key()) == random
+
+
+def test_a_space_needs_no_flight_that_can_start() -> None:
+    text = FILE.format(more="").replace("[vary]", "[vary]\nstart.position_m.0 = { choice = [9.0] }")
+    plan = parse_plan(text, "small", Path())
+    with pytest.raises(ValueError, match="position_m"):
+        plan.flight(0)
+    assert spaces(plan)[0].seed == plan.draw(0).seed
+
+
 def test_every_case_has_a_space() -> None:
     plan = parse_plan(FILE.format(more="").replace('["walls"]', '["walls", "gate"]'), "x", Path())
     assert [one.case.scenario for one in spaces(plan)] == ["walls", "gate"]

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from studies.campaign.journal import Journal, lines
+from studies.campaign.journal import Journal, JournalInUseError, lines
 
 
 def test_what_was_appended_is_read_again_by_its_key(tmp_path: Path) -> None:
@@ -57,3 +57,32 @@ def test_lines_are_synchronised_with_the_disk(
     journal = Journal(path)
     journal.append([("a", {"x": 1}), ("b", {"x": 2})])
     assert synchronised == [path.stat().st_size]
+
+
+def test_only_one_writer_has_a_journal(tmp_path: Path) -> None:
+    path = tmp_path / "journal.jsonl"
+    first = Journal(path)
+    with pytest.raises(JournalInUseError, match="is being written by another process"):
+        Journal(path)
+    first.append([("a", {"x": 1})])
+    assert [line["key"] for line in lines(path)] == ["a"]  # to read it needs no leave
+    first.close()
+    Journal(path).close()
+
+
+def test_a_line_that_was_changed_beneath_is_not_taken_for_another_key(tmp_path: Path) -> None:
+    path = tmp_path / "journal.jsonl"
+    journal = Journal(path)
+    journal.append([("a", {"x": 1}), ("b", {"x": 2})])
+    path.write_bytes(path.read_bytes().replace(b'"a"', b'"c"')[:25])
+    assert journal.get("a") is None
+    assert journal.get("b") is None
+    journal.close()
+
+
+def test_a_line_with_a_key_that_is_no_text_is_left_out(tmp_path: Path) -> None:
+    path = tmp_path / "journal.jsonl"
+    path.write_text('{"key": [1]}\n{"key": "a", "x": 1}\n' + "[" * 100_000 + "\n")
+    journal = Journal(path)
+    assert journal.get("a") == {"x": 1}
+    journal.close()

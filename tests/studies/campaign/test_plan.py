@@ -35,6 +35,9 @@ def plan_of(text: str) -> CampaignPlan:
     return parse_plan(text, "test", Path())
 
 
+GRID = 'design = "grid"\nduration_s = 1.0\nscenarios = ["walls-calm"]\n[vary]\n'
+
+
 def test_the_example_is_a_campaign() -> None:
     plan = load_plan(EXAMPLE)
     assert plan.count == 200
@@ -111,6 +114,40 @@ def test_a_grid_counts_its_flights_itself() -> None:
     assert plan.count == 40
     found = {(f.case, f.values) for f in (plan.flight(k) for k in range(40))}
     assert len(found) == 40
+
+
+def test_a_grid_has_each_direction_once() -> None:
+    text = GRID + "wind_m_s2 = {{ choice = [0.1] }}\n{more}"
+    for more, first in (
+        ("", 0.0),
+        ("wind_direction_deg = { uniform = [-180.0, 180.0], points = 8 }", -180.0),
+    ):
+        plan = parse_plan(text.format(more=more), "grid", Path())
+        directions = [dict(plan.draw(k).values)["wind_direction_deg"] for k in range(plan.count)]
+        assert directions == [first + 45.0 * k for k in range(8)]
+        assert "full circle" in str(plan.varied[-1])
+    part = "wind_direction_deg = { uniform = [0.0, 90.0], points = 3 }"
+    plan = parse_plan(text.format(more=part), "grid", Path())
+    assert [dict(plan.draw(k).values)["wind_direction_deg"] for k in range(3)] == [0.0, 45.0, 90.0]
+
+
+def test_a_direction_of_other_designs_has_the_digest_that_it_had() -> None:
+    text = GRID.replace('"grid"', '"random"\nflights = 3') + "wind_m_s2 = { choice = [0.1] }\n"
+    plan = parse_plan(text, "random", Path())
+    assert repr(plan.varied[-1].distribution) == "Uniform(low=0.0, high=360.0, points=8)"
+
+
+def test_a_grid_that_is_too_large_says_what_can_be_done() -> None:
+    keys = ("mass", "inertia")
+    text = GRID + "".join(
+        f"vehicle_scale.{key} = {{ uniform = [0.9, 1.1], points = 10000 }}\n" for key in keys
+    )
+    with pytest.raises(CampaignError, match=r'the grid has 100000000 flights.*the key "flights"'):
+        parse_plan(text, "grid", Path())
+    plan = parse_plan("flights = 100\n" + text, "grid", Path())
+    assert plan.count == 100
+    with pytest.raises(CampaignError, match="a campaign has 10000000"):
+        plan.check(10_000_001)
 
 
 def test_faults_are_cases_and_their_numbers_can_vary() -> None:

@@ -102,6 +102,31 @@ def test_flights_that_cannot_be_flown_are_counted_and_are_no_finds() -> None:
     assert search(cases(), nothing, 30, 1).finds == ()
 
 
+def test_a_case_that_would_get_no_flight_is_refused() -> None:
+    campaign: Any = CheapCampaign(lambda _: 0.1)
+    with pytest.raises(CampaignError, match="1 flights are fewer than the 2 combinations"):
+        search(cases('["walls", "gate"]'), campaign, 1, 1)
+    assert campaign.flown == []
+
+
+@pytest.mark.parametrize(("words", "together"), [([], 1), (["--generation=12"], 12)])
+def test_what_is_found_does_not_depend_on_the_workers(
+    words: list[str], together: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[int] = []
+
+    def seen(*_: Any, together: int, **__: Any) -> None:
+        asked.append(together)
+        raise CampaignError("enough")
+
+    monkeypatch.setattr("studies.search.worst_flights.search", seen)
+    file = tmp_path / "small.toml"
+    file.write_text(FILE.format(scenarios='["walls"]', duration=1.0))
+    for workers in ("--workers=1", "--workers=64"):
+        assert main([f"--over={file}", f"--out={tmp_path}", workers, *words]) == 2
+    assert asked == [together, together]
+
+
 def test_the_same_seed_searches_the_same_and_more_at_once_makes_larger_generations() -> None:
     first: Any = CheapCampaign(bowl)
     again: Any = CheapCampaign(bowl)

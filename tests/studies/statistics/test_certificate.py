@@ -38,6 +38,11 @@ def row(plan: CampaignPlan, number: int, **changed: Any) -> CampaignRow:
     return replace(flown, **(good | changed))
 
 
+def key(plan: CampaignPlan, one: CampaignRow) -> str:
+    """Under which the journal has the row."""
+    return CampaignFlight(plan, one.flight).key()
+
+
 def flown(
     folder: Path, changed: dict[int, dict[str, Any]], flights: int = 40, more: str = ""
 ) -> Path:
@@ -49,7 +54,7 @@ def flown(
     begin(directory, source, plan, flights)
     journal = Journal(directory / JOURNAL)
     rows = [row(plan, k, **changed.get(k, {})) for k in range(flights)]
-    journal.append((f"{one.flight}", one.as_line()) for one in rows if one.reason != "lost")
+    journal.append((key(plan, one), one.as_line()) for one in rows if one.reason != "lost")
     journal.close()
     return directory
 
@@ -117,9 +122,10 @@ def test_a_tail_is_fitted_and_the_same_again(tmp_path: Path) -> None:
 
 def changed(directory: Path, number: int, **fields: Any) -> None:
     """Append another row of a flight, as a repeated flight would."""
-    old = next(one for one in read(directory).rows if one.flight == number)
+    result = read(directory)
+    old = next(one for one in result.rows if one.flight == number)
     journal = Journal(directory / JOURNAL)
-    journal.append([(f"{number} again", replace(old, **fields).as_line())])
+    journal.append([(key(result.plan, old), replace(old, **fields).as_line())])
     journal.close()
 
 
