@@ -81,6 +81,11 @@ class Fault:
         """Whether it means nothing in lockstep: no datagram is late, and the planner is inline."""
         return self.unit == "planner" or (self.unit in LINKS and self.kind == "delayed")
 
+    @property
+    def random(self) -> bool:
+        """Whether it draws numbers, so that the seed of a flight decides how it goes."""
+        return self.kind in _RANDOM
+
     def __str__(self) -> str:
         """As an operator reads it."""
         which = f" {self.number}" if self.number else ""
@@ -101,6 +106,7 @@ SENSORS: Final = (
 LINKS: Final = ("to vehicle", "to simulator")
 PROCESSES: Final = ("simulator", "flight software", "planner", "disk")
 
+_RANDOM: Final = ("garbage", "intermittent", "duplicated", "reordered")
 _SIGNAL: Final = ("off", "stuck", "garbage", "wrong", "slow", "delayed", "intermittent")
 _OF_MESSAGES: Final = ("off", "slow", "delayed", "intermittent")  # of sensors
 _LINK: Final = ("off", "delayed", "intermittent", "duplicated", "reordered")

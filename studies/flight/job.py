@@ -38,7 +38,10 @@ class Job:
 
     @property
     def random(self) -> bool:
-        """Whether the seed changes anything: calm air and exact sensors draw no number."""
+        """Whether the seed changes anything: calm air and exact sensors draw no number.
+
+        Nor does a fault, unless it is one of chance.
+        """
         sensors = self.scenario.sensors
         if self.fault is not None:
             return True  # the seed chooses when
@@ -54,6 +57,7 @@ class Job:
         return (
             noisy
             or gusts
+            or any(one.random for one in self.scenario.faults)
             or any(it.kind not in ("wind", "sequence") for it in self.scenario.disturbances)
         )
 
