@@ -72,7 +72,12 @@ class CampaignRow:
 
         False as well of a flight that was not flown: see ``error`` and ``refused``.
         """
-        return self.contact or (self.margin_m is not None and self.margin_m < 0.0)
+        return self.contact or self.beyond
+
+    @property
+    def beyond(self) -> bool:
+        """Whether the margin is below 0; a margin that is no number is."""
+        return self.margin_m is not None and not self.margin_m >= 0.0
 
     def as_line(self) -> dict[str, Any]:
         """See :class:`studies.campaign.campaign.Row`."""

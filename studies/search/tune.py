@@ -17,7 +17,7 @@ from typing import Annotated, Any, Final, TypeAlias
 
 import numpy as np
 from cmaes import CMA
-from scipy.special import stdtrit
+from scipy.special import bdtrc, stdtrit
 
 from fsw.parameters.float32 import nearest_decimal
 from fsw.parameters.registry import BY_NAME, Parameter
@@ -28,6 +28,7 @@ from studies.campaign.campaign import Campaign
 from studies.campaign.flight import CampaignFlight, CampaignRow
 from studies.campaign.keys import PARAMETERS, CampaignError, Flown, nearest
 from studies.campaign.plan import CampaignPlan, load_tables
+from studies.campaign.randomness import seeded, spread
 from studies.statistics.binomial import bounds, flights_for
 
 Array: TypeAlias = np.ndarray[Any, np.dtype[np.float64]]
@@ -135,14 +136,22 @@ class Judged:
 
     today: Score
     found: Score
-    difference: float  # of the costs, mean over flights that both have flown; below 0: cheaper
+    difference: float  # of the costs, mean over flights that both completed; below 0: cheaper
     interval: tuple[float, float]  # of it, at the task's confidence
     pairs: int
+    only_today: int  # flights that violate with today's values and not with the candidate's
+    only_found: int  # the other way round
+    safer: bool  # beyond doubt, by these two, at the task's confidence
+
+    @property
+    def cheaper(self) -> bool:
+        """Beyond doubt."""
+        return self.interval[1] < 0.0
 
     @property
     def better(self) -> bool:
-        """Cheaper beyond doubt and feasible; or feasible where today's values are not."""
-        return self.found.feasible and (self.interval[1] < 0.0 or not self.today.feasible)
+        """Feasible, and cheaper; or safer than today's values that are not shown to be feasible."""
+        return self.found.feasible and (self.cheaper or (self.safer and not self.today.feasible))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -198,6 +207,17 @@ def _task(plan: CampaignPlan, table: Any) -> Task:
                 f"{key} = {count}: even without a violation that does not show a probability of "
                 f"{task.probability:g} at a confidence of {task.confidence:g}; must be at least "
                 f"{needed}"
+            )
+    if plan.design != "random":
+        raise CampaignError(
+            f'design = "{plan.design}": the bounds that candidates are held to are of independent '
+            'flights; must be "random"'
+        )
+    for case, base in zip(plan.cases, plan.bases, strict=True):
+        if not seeded(base) and not spread(plan.varied, base):
+            raise CampaignError(
+                f"{case}: nothing is random, so all its flights are one flight, and their number "
+                "shows nothing; add [vary], or sensors or air that draw numbers"
             )
     plan.check(plan.count + task.judge_flights)
     return task
@@ -336,24 +356,31 @@ def _taken(task: Task, values: tuple[float, ...]) -> CampaignPlan | None:
 
 
 def _units(task: Task, rows: Sequence[CampaignRow]) -> dict[str, float]:
-    """The mean of each cost as it is today."""
+    """The mean of each cost as it is today, of flights that were completed."""
     found = {}
     for name, _ in task.cost:
-        known = [getattr(row, name) for row in rows if not row.error and getattr(row, name)]
-        if not known:
+        values = [getattr(row, name) for row in rows if _whole(row)]
+        known = [value for value in values if value is not None and math.isfinite(value)]
+        mean = float(np.mean(known)) if known else 0.0
+        if not (0.0 < mean < math.inf):
             reasons = {row.reason for row in rows}
             raise CampaignError(
-                f"today's values fly no flight with a {name}, so nothing can be compared: "
+                f"today's values complete no flight with a {name}, so nothing can be compared: "
                 f"{sorted(reasons)[0]}"
             )
-        found[name] = float(np.mean(known))
+        found[name] = mean
     return found
 
 
+def _whole(row: CampaignRow) -> bool:
+    """Whether a flight has a cost: one that ended early has a smaller one, or none, for nothing."""
+    return row.completed and not row.error and not row.refused
+
+
 def _cost_of(task: Task, row: CampaignRow, units: dict[str, float]) -> float | None:
-    """The cost of one flight, in today's; None if it has none."""
+    """The cost of one flight, in today's; None if it has none, or was not completed."""
     values = [getattr(row, name) for name, _ in task.cost]
-    if row.error or any(value is None or not math.isfinite(value) for value in values):
+    if not _whole(row) or any(value is None or not math.isfinite(value) for value in values):
         return None
     parts = zip(task.cost, values, strict=True)
     return math.fsum(weight * value / units[name] for (name, weight), value in parts)
@@ -403,13 +430,29 @@ def _judged(
         and (theirs := _cost_of(task, other, units)) is not None
     ]
     difference, interval = _paired(pairs, task.confidence)
+    violations = [
+        (task.violates(one), task.violates(other)) for one, other in zip(today, found, strict=True)
+    ]
+    only_today, only_found = violations.count((True, False)), violations.count((False, True))
     return Judged(
         today=_score(task, today, units),
         found=_score(task, found, units),
         difference=difference,
         interval=interval,
         pairs=len(pairs),
+        only_today=only_today,
+        only_found=only_found,
+        safer=_by_chance(only_today, only_found) <= 0.5 * (1.0 - task.confidence),
     )
+
+
+def _by_chance(fewer: int, more: int) -> float:
+    """How likely so many flights for one side, and so few for the other, are of equal vehicles [1].
+
+    Source: McNemar: Note on the sampling error of the difference between correlated proportions or
+    percentages, Psychometrika 12, 1947; exact, one-sided.
+    """
+    return float(bdtrc(fewer - 1, fewer + more, 0.5)) if fewer else 1.0
 
 
 def _paired(pairs: Sequence[float], confidence: float) -> tuple[float, tuple[float, float]]:
@@ -431,7 +474,7 @@ def sentences(found: Outcome) -> Iterator[str]:
     )
     yield f"today, on the tuning flights: {_said(found.today)}"
     if found.best is None:
-        yield _nothing(found, "no candidate keeps the constraint on the tuning flights")
+        yield _nothing(found, "no candidate is shown to keep the constraint on the tuning flights")
         return
     for one, value, before in zip(task.parameters, found.best.values, task.today, strict=True):
         yield f"  {one.parameter.name} = {value:g} {one.parameter.unit} (today {before:g})"
@@ -448,13 +491,28 @@ def sentences(found: Outcome) -> Iterator[str]:
         f"{low:+.4f} to {high:+.4f} ({judged.pairs} pairs of flights)"
     )
     yield change
+    if judged.only_today or judged.only_found:
+        yield (
+            f"{judged.only_today} flights violate with today's values only, {judged.only_found} "
+            f"with the candidate's only: fewer beyond doubt: {'yes' if judged.safer else 'no'}"
+        )
+    shown = "" if judged.today.feasible else "; today's values are not shown to keep the constraint"
     if judged.better:
-        why = "" if judged.today.feasible else "; today's values do not keep the constraint"
-        yield f"better than today's values on flights that no candidate had flown{why}"
+        why = "costs less" if judged.cheaper else "violates less often"
+        yield (
+            f"better than today's values on flights that no candidate had flown: {why} beyond "
+            f"doubt{shown}"
+        )
     elif not judged.found.feasible:
-        yield _nothing(found, "the best candidate does not keep the constraint on other flights")
+        yield _nothing(
+            found, "the best candidate is not shown to keep the constraint on other flights"
+        )
     else:
-        yield _nothing(found, "on other flights the best candidate does not cost less beyond doubt")
+        also = "" if judged.today.feasible else ", nor violates less often"
+        yield _nothing(
+            found,
+            f"on other flights the best candidate does not cost less beyond doubt{also}{shown}",
+        )
 
 
 def _nothing(found: Outcome, why: str) -> str:

@@ -49,7 +49,7 @@ class Find:
     @property
     def violates(self) -> bool:
         """Whether the safe set was left or something was touched."""
-        return self.outcome.contact or self.margin_m < 0.0
+        return self.outcome.contact or not self.margin_m >= 0.0
 
 
 @dataclass(frozen=True, slots=True)

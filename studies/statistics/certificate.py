@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -18,35 +19,41 @@ import numpy as np
 
 from command_line.version import version
 from fsw.tuning import flat
-from sitl.scenario import Scenario, Uniform
-from sitl.sensors.keys import MeasuredSensors
 from studies.campaign.flight import CampaignRow
-from studies.campaign.keys import PARAMETERS, CampaignError
+from studies.campaign.keys import (
+    AIR,
+    FAULT,
+    LATENCY,
+    PARAMETERS,
+    PUSH,
+    CampaignError,
+    Flown,
+    applied,
+)
+from studies.campaign.randomness import drawn, seeded, spread
 from studies.campaign.store import PLAN, CampaignResult
+from studies.campaign.values import grid_size
 from studies.statistics.binomial import bounds
 from studies.statistics.extremes import NoFitError, fit_tail
 
-FORMAT: Final = "pandion-certificate-1"
+FORMAT: Final = "pandion-certificate-2"
 ANY: Final = "any of these"
 _DIGITS: Final = 10  # of what is computed, so that the last bits of another machine do not count
 _QUANTILES: Final = (0.0, 0.001, 0.01, 0.1, 0.5, 0.9, 1.0)
 _MOST_FITS: Final = 8
+_MOST_POINTS: Final = 20  # of a grid that are listed, for each key
+_FIRST_FLIGHTS: Final = 20  # of a configuration, that are looked at for random numbers
+_CUT_S: Final = 0.01  # by which a flight may end before its time
 
 # A flight that could not be flown counts in each: nothing is known of it that would clear it.
-VIOLATIONS: Final[dict[str, Callable[[CampaignRow], bool]]] = {
-    "contact": lambda row: row.error or row.contact,
-    "margin below 0": lambda row: row.error or (row.margin_m is not None and row.margin_m < 0.0),
-    "a limit broken": lambda row: row.error or not row.limits_kept,
-    "not completed": lambda row: row.error or not row.completed,
-    "not flown": lambda row: row.error,
-    ANY: lambda row: (
-        row.error
-        or row.contact
-        or (row.margin_m is not None and row.margin_m < 0.0)
-        or not row.limits_kept
-        or not row.completed
-    ),
+_UNFLOWN: Final = "not flown"
+_OBSERVED: Final[dict[str, Callable[[CampaignRow], bool]]] = {
+    "contact": lambda row: row.contact,
+    "margin below 0": lambda row: row.beyond,
+    "a limit broken": lambda row: not row.limits_kept,
+    "not completed": lambda row: not row.completed,
 }
+VIOLATIONS: Final = (*_OBSERVED, _UNFLOWN, ANY)
 
 _ASSUMED: Final = {
     "random": (
@@ -62,8 +69,7 @@ _ASSUMED: Final = {
         'that they are, are no proof here. Fly design = "random" for one.'
     ),
     "grid": (
-        "The flights are the points of a grid, each with random numbers of its own: a bound is one "
-        "of the mean over these points, and says nothing of what lies between them."
+        "A bound is one of the mean over these points, and says nothing of what lies between them."
     ),
 }
 
@@ -91,12 +97,12 @@ def certificate(
         "refits": refits,
         "seed": result.plan.seed,
         "design": result.plan.design,
-        "assumed": _ASSUMED[result.plan.design],
+        "assumed": _assumed(result),
         "findings": _findings(result.rows, confidence),
         "configurations": list(_configurations(result, confidence)),
         "margins": _margins(result, confidence, refits, int(rows_digest[:8], 16)),
-        "varied": [str(one) for one in result.plan.varied],
-        "random": sorted({what for base in result.plan.bases for what in drawn(base.scenario)}),
+        "varied": list(_varied(result)),
+        "random": sorted(_drawn(result)),
         "not_varied": list(_not_varied(result)),
         "versions": {
             "flown": result.facts.get("version", "unknown"),
@@ -166,10 +172,21 @@ def _short(value: Any) -> str:
 
 def _findings(rows: Sequence[CampaignRow], confidence: float) -> dict[str, Any]:
     total = len(rows)
-    return {
-        name: asdict(bounds(sum(map(violated, rows)), total, confidence))
-        for name, violated in VIOLATIONS.items()
-    }
+    counted = _counted(rows)
+    return {name: asdict(bounds(counted[name], total, confidence)) for name in VIOLATIONS}
+
+
+def violates(row: CampaignRow, name: str) -> bool:
+    """Whether a flight counts as a violation of a name; one that was not flown always does."""
+    if row.error or row.refused:
+        return True
+    if name == ANY:
+        return any(test(row) for test in _OBSERVED.values())
+    return name in _OBSERVED and _OBSERVED[name](row)
+
+
+def _counted(rows: Sequence[CampaignRow]) -> dict[str, int]:
+    return {name: sum(violates(row, name) for row in rows) for name in VIOLATIONS}
 
 
 def _of_cases(result: CampaignResult) -> Iterator[tuple[str, list[CampaignRow]]]:
@@ -182,7 +199,7 @@ def _of_cases(result: CampaignResult) -> Iterator[tuple[str, list[CampaignRow]]]
 
 def _configurations(result: CampaignResult, confidence: float) -> Iterator[dict[str, Any]]:
     for name, rows in _of_cases(result):
-        counted = {what: sum(map(test, rows)) for what, test in VIOLATIONS.items()}
+        counted = _counted(rows)
         margins = [row.margin_m for row in rows if row.margin_m is not None]
         yield {
             "name": name,
@@ -211,19 +228,39 @@ def _margins(
                 "name": name,
                 "flights": len(margins),
                 "ended_at_contact": sum(row.contact for row in rows),
+                "cut_short": sum(
+                    row.margin_m is not None
+                    and (row.contact or bool(row.modes) or _early(result, row))
+                    for row in rows
+                ),
                 "quantiles_m": dict(zip(map(str, _QUANTILES), quantiles, strict=False)),
-                "tail": _tail(margins, confidence, refits, seed, fitted=k < _MOST_FITS),
+                "tail": _no_tail(result, k) or _tail(margins, confidence, refits, seed),
             }
         )
     return found
 
 
-def _tail(
-    margins: list[float], confidence: float, refits: int, seed: int, *, fitted: bool
-) -> dict[str, Any]:
-    """A fit, or the sentence that says why there is none."""
-    if not fitted:
+def _early(result: CampaignResult, row: CampaignRow) -> bool:
+    """Whether a flight ended before its time."""
+    base = result.plan.bases[row.flight % len(result.plan.cases)]
+    wanted_s = row.values.get("duration_s", base.scenario.duration_s)
+    return not row.duration_s >= wanted_s - _CUT_S
+
+
+def _no_tail(result: CampaignResult, place: int) -> dict[str, Any]:
+    """Why no tail is looked for; empty if one is."""
+    if result.plan.design != "random":
+        return {
+            "none": f"the flights are of design {result.plan.design}, not drawn independently, as "
+            "a fitted tail assumes, so no extreme-value law is fitted"
+        }
+    if place >= _MOST_FITS:
         return {"none": f"only the {_MOST_FITS} configurations with the minimum margins are fitted"}
+    return {}
+
+
+def _tail(margins: list[float], confidence: float, refits: int, seed: int) -> dict[str, Any]:
+    """A fit, or the sentence that says why there is none."""
     try:
         fit = fit_tail(margins, confidence, refits, seed)
     except NoFitError as error:
@@ -231,40 +268,113 @@ def _tail(
     return {**asdict(fit), "fits": fit.fits}
 
 
-def drawn(scenario: Scenario) -> Iterator[str]:
-    """What of a scenario the seed of a flight decides."""
-    for item in scenario.disturbances:
-        if isinstance(item, Uniform):
-            yield f"disturbance {item.name}: uniform within ±{item.amplitude_m_s2:g} m/s² an axis"
-        elif item.kind not in ("wind", "sequence"):
-            yield f"disturbance {item.name}: {item.kind}"
-    if isinstance(scenario.sensors, MeasuredSensors):
-        yield f"errors of the sensors of suite {scenario.sensors.suite}"
-    elif any(value for key, value in flat(scenario.sensors).items() if "latency" not in key):
-        yield "errors of the exact sensors"
-    if scenario.air.turbulence_m_s > 0.0:
-        yield f"turbulence, {scenario.air.turbulence_m_s:g} m/s at 20 ft"
-    if scenario.faults:
-        yield "what a fault draws"
-
-
 def _not_varied(result: CampaignResult) -> Iterator[str]:
     """The numbers that a campaign can vary and this one did not, and their values."""
     varied = {one.key for one in result.plan.varied}
-    for group in ("vehicle_scale", "start", "trajectory", "air", "actuators"):
-        held: dict[str, list[str]] = {}
-        for base in result.plan.bases:
-            for key, value in flat(getattr(base.scenario, group)).items():
-                if f"{group}.{key}" not in varied:
-                    values = held.setdefault(key, [])
-                    values += [text for text in (f"{value:g}",) if text not in values]
-        if held:
-            texts = (f"{key} = {' or '.join(values)}" for key, values in held.items())
-            yield f"{group}: {', '.join(texts)}"
+    held: dict[str, dict[str, list[str]]] = {}
+    for base in result.plan.bases:
+        for key, value in flat(base.scenario).items():
+            if not _moved(key, varied):
+                group, _, rest = key.partition(".")
+                values = held.setdefault(group, {}).setdefault(rest, [])
+                values += [text for text in (f"{value:g}",) if text not in values]
+    for group, keys in held.items():
+        texts = (f"{key} = {' or '.join(values)}".strip(" =") for key, values in keys.items())
+        yield f"{group}: {', '.join(texts)}"
+    for key, what in ((LATENCY, "added latency"), (PUSH, "added constant acceleration")):
+        if key not in varied:
+            yield f"{key}: no {what}"
+    if not any(base.scenario.disturbances for base in result.plan.bases):
+        yield "disturbances: none"
     if not any(base.scenario.faults for base in result.plan.bases):
         yield "faults: none"
     tuned = sorted(key for key in varied if key.startswith(f"{PARAMETERS}."))
     yield f"parameters of the flight software: all but {', '.join(tuned) or 'none'}"
+
+
+def _moved(key: str, varied: set[str]) -> bool:
+    """Whether a number of a scenario is varied, by its own key or by one of the campaign's own."""
+    if key in varied:
+        return True
+    if LATENCY in varied and key.startswith("sensors.") and key.endswith(".latency_ms"):
+        return True
+    if key.startswith("faults.") and f"{FAULT}.{key.split('.', 2)[2]}" in varied:
+        return True
+    return AIR in varied and key.startswith(f"air.{AIR}.")
+
+
+def _varied(result: CampaignResult) -> Iterator[str]:
+    """What was varied, and how; of a grid, the values that were flown."""
+    for one in result.plan.varied:
+        if result.plan.design != "grid":
+            yield str(one)
+            continue
+        values = sorted({row.values[one.key] for row in result.rows if one.key in row.values})
+        count = len(one.distribution.grid())
+        shown = ", ".join(f"{value:g}" for value in values[:_MOST_POINTS])
+        more = f", ... {values[-1]:g}" if len(values) > _MOST_POINTS else ""
+        yield f"{one.key}: {len(values)} of {count} values of a grid: {shown}{more}"
+
+
+def _assumed(result: CampaignResult) -> str:
+    """What the bounds assume of these flights, and whether it is so."""
+    plan = result.plan
+    random = [_random(result, k) for k in range(len(plan.cases))]
+    if plan.design != "grid":
+        same = sum(
+            not (mine or spread(plan.varied, base))
+            for mine, base in zip(random, plan.bases, strict=True)
+        )
+        if not same:
+            return _ASSUMED[plan.design]
+        return (
+            f"In {same} of {len(random)} configurations nothing is varied and nothing random: all "
+            "their flights are one flight, so bounds, which count them as many, are no proof there."
+        )
+    size = grid_size(tuple(one.distribution for one in plan.varied))
+    places = Counter(
+        (row.flight % len(random), row.flight // len(random) % size) for row in result.rows
+    )
+    least, most = min(places.values()), max(places.values())
+    times = f"{least}" if least == most else f"{least} to {most}"
+    over = f" over {len(random)} configurations" if len(random) > 1 else ""
+    flown = (
+        f"The flights are {len(places)} of the {size * len(random)} points of a grid{over}; "
+        f"a point was flown this often: {times}"
+    )
+    if all(random):
+        return f"{flown}, with other random numbers each time. {_ASSUMED['grid']}"
+    where = "nothing" if not any(random) else f"in {random.count(False)} configurations nothing"
+    return (
+        f"{flown}; {where} is random, so flights of a point are one flight, and bounds, which "
+        "count them as many, are no proof there."
+    )
+
+
+def _random(result: CampaignResult, case: int) -> bool:
+    """Whether the seed decides anything in the flights of a configuration."""
+    return any(map(seeded, _flown(result, case)))
+
+
+def _drawn(result: CampaignResult) -> set[str]:
+    """What the seed decides, in any configuration."""
+    found = set[str]()
+    for case in range(len(result.plan.cases)):
+        for flown in _flown(result, case):
+            mine = set(drawn(flown.scenario))
+            found |= mine
+            if mine:
+                break
+    return found
+
+
+def _flown(result: CampaignResult, case: int) -> Iterator[Flown]:
+    """A configuration as the file names it, then as its first flights have it."""
+    base = result.plan.bases[case]
+    yield base
+    for row in result.rows[case :: len(result.plan.cases)][:_FIRST_FLIGHTS]:
+        if not row.error:  # it may have values that contradict each other
+            yield applied(base, row.values.items())
 
 
 def _rounded(value: Any) -> Any:

@@ -24,7 +24,8 @@ MEANING: Final = (
     "confidence it is within the interval. Both are not to be had together at this confidence.",
     "The bounds assume that the number of flights was fixed before: not to be extended until a "
     "number pleases.",
-    "A flight that could not be flown counts as a violation of every kind, until it is flown.",
+    "A flight that could not be flown, or that the vehicle refused, counts as a violation of every "
+    "kind.",
     "A bound of one configuration is for it alone; that all hold together is less certain.",
     "The probability is one in the simulator, with the vehicle, disturbances and sensors that are "
     "named here. How far the simulator is from a vehicle is not in any number.",
@@ -173,9 +174,11 @@ def _margin_sentence(one: dict[str, Any]) -> str:
         return "no flight has a margin"
     shown = ((quantiles["0.0"], "least"), (quantiles["0.01"], "1 %"), (quantiles["0.5"], "median"))
     texts = ", ".join(f"{name} {_mm(value)}" for value, name in shown)
-    ended = one["ended_at_contact"]
     cut = (
-        f"; {ended} ended at contact, where the margin would have gone on falling" if ended else ""
+        f"; {one['cut_short']} ended early or left their trajectory "
+        f"({one['ended_at_contact']} by contact), so their margins are of a part of it"
+        if one["cut_short"]
+        else ""
     )
     return f"margins of {one['flights']} flights: {texts}{cut}"
 

@@ -13,7 +13,8 @@ from dataclasses import dataclass
 from typing import Any, Final, TypeAlias
 
 import numpy as np
-from scipy.special import ndtr, ndtri
+
+from studies.statistics.pareto_intervals import END, SCALE, SHAPE, Intervals, beyond, depth
 
 Array: TypeAlias = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -22,6 +23,7 @@ _LEAST_TAIL: Final = 30
 _TAIL_SHARE: Final = 0.1
 _LEAST_DISTINCT: Final = 20
 REJECTED: Final = 0.05  # of goodness; below, the numbers are not to be used
+_MOST_SCALED: Final = 99  # refits that the intervals are scaled with
 RARE: Final = (1e-2, 1e-3, 1e-4)  # shares of flights whose minimum margin is estimated
 _STRAIGHT: Final = 1e-9  # a quotient of shape and scale below which the law is exponential
 _WORST: Final = 1e6
@@ -34,7 +36,7 @@ class NoFitError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class Estimate:
-    """A number and its interval from refits of simulated tails."""
+    """A number and its interval."""
 
     value: float
     low: float
@@ -70,8 +72,7 @@ def fit_tail(
     """Fit the lower tail of least ``margins`` [m], intervals at a ``confidence`` [1].
 
     Goodness is a parametric bootstrap of the Anderson-Darling statistic: ``refits`` tails of the
-    fitted law, each fitted anew. The intervals are percentiles of the same refits, corrected for
-    the bias of the fit (Efron, 1981).
+    fitted law, each fitted anew. The intervals are profile likelihoods, see ``pareto_intervals``.
 
     Raises:
         NoFitError: Too few flights, or margins that do not vary.
@@ -98,44 +99,36 @@ def fit_tail(
         )
     # Scaled: the search for the maximum knows no millimetres.
     unit = float(excess.mean())
-    shape, scale = most_likely(excess / unit)
-    statistic = anderson_darling(excess / unit, shape, scale)
+    excess = excess / unit
+    shape, scale = law = most_likely(excess)
+    statistic = anderson_darling(excess, *law)
     random = np.random.default_rng(seed)
     simulated = genpareto.rvs(shape, scale=scale, size=(refits, tail), random_state=random)
-    again = [(one, *most_likely(one)) for one in simulated]
-    worse = sum(anderson_darling(*one) >= statistic for one in again)
-    laws = [(shape, unit * scale), *((a, unit * b) for _, a, b in again)]
-    share = tail / total
+    worse = sum(anderson_darling(one, *most_likely(one)) >= statistic for one in simulated)
+    intervals = Intervals(excess, total, law, confidence, simulated[:_MOST_SCALED], random)
 
-    def estimate(values: list[float]) -> Estimate:
-        return _estimate(values[0], np.array(values[1:]), confidence)
+    def length(ends: tuple[float, float, float]) -> Estimate:
+        return Estimate(*(unit * one for one in ends))
 
-    rare = [one for one in RARE if one < share]
+    def margin(ends: tuple[float, float, float]) -> Estimate:
+        value, low, high = (threshold - unit * one for one in ends)
+        return Estimate(value, high, low)
+
     return TailFit(
         flights=total,
         tail=tail,
         threshold_m=threshold,
-        shape=estimate([a for a, _ in laws]),
-        scale_m=estimate([b for _, b in laws]),
+        shape=Estimate(*intervals.of(SHAPE)),
+        scale_m=length(intervals.of(SCALE)),
         anderson_darling=statistic,
         goodness=(1 + worse) / (1 + refits),
         refits=refits,
         confidence=confidence,
-        below_zero=estimate([share * float(genpareto.sf(threshold, a, scale=b)) for a, b in laws])
-        if threshold > 0.0
-        else None,
+        below_zero=Estimate(*intervals.of(beyond(threshold / unit))) if threshold > 0.0 else None,
         margins_m=tuple(
-            (
-                one,
-                estimate(
-                    [threshold - float(genpareto.isf(one / share, a, scale=b)) for a, b in laws]
-                ),
-            )
-            for one in rare
+            (rare, margin(intervals.of(depth(rare)))) for rare in RARE if rare < tail / total
         ),
-        end_m=estimate([threshold + (b / a if a < 0.0 else -math.inf) for a, b in laws])
-        if shape < 0.0
-        else None,
+        end_m=margin(intervals.of(END)) if shape < 0.0 else None,
     )
 
 
@@ -154,15 +147,6 @@ def anderson_darling(excess: Array, shape: float, scale: float) -> float:
     below = genpareto.logcdf(ordered, shape, scale=scale)
     above = genpareto.logsf(ordered[::-1], shape, scale=scale)
     return float(-count - (weights * (below + above)).sum() / count)
-
-
-def _estimate(value: float, refits: Array, confidence: float) -> Estimate:
-    """The bias-corrected percentiles of refits around a value, all of one unit [any unit]."""
-    below = float(np.mean(refits < value) + 0.5 * np.mean(refits == value))
-    shift = 2.0 * float(ndtri(min(max(below, 0.5 / len(refits)), 1.0 - 0.5 / len(refits))))
-    ends = [float(ndtr(shift + side * ndtri(0.5 + 0.5 * confidence))) for side in (-1.0, 1.0)]
-    low, high = np.quantile(refits, ends, method="inverted_cdf")  # between infinities is nothing
-    return Estimate(value, float(low), float(high))
 
 
 def most_likely(excess: Array) -> tuple[float, float]:

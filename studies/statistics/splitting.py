@@ -195,7 +195,9 @@ def mean_of_lognormal(values: Array, confidence: float) -> tuple[tuple[float, fl
     middle = mean + 0.5 * variance
     student = float(stdtrit(count - 1, 0.5 + 0.5 * confidence))
     half = student * math.sqrt(variance / count + variance**2 / (2.0 * (count - 1)))
-    return (math.exp(middle - half), min(math.exp(middle + half), 1.0)), math.sqrt(variance)
+    # Cut before exp: few runs that differ much have ends whose exponential is no float.
+    low, high = (math.exp(min(middle + side * half, 0.0)) for side in (-1.0, 1.0))
+    return (low, high), math.sqrt(variance)
 
 
 def _run(

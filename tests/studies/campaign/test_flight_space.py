@@ -3,15 +3,26 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
 
+from sitl.faults.actuators import MotorFault
+from sitl.faults.keys import KINDS
+from sitl.faults.signal import SignalFault
 from sitl.scenario import Sequence, Uniform
 from sitl.sensors.keys import MeasuredSensors
 from studies.campaign.flight_space import FlightSpace, spaces
 from studies.campaign.keys import CampaignError
 from studies.campaign.plan import parse_plan
+
+
+class Gyro(NamedTuple):
+    """The part of a reading that a faulty gyro changes."""
+
+    gyro_B: tuple[float, float, float]
+
 
 FILE = """\
 flights = 4
@@ -105,3 +116,32 @@ def test_what_flies_is_the_scenarios_own_disturbance_in_other_words() -> None:
     assert isinstance(played, Sequence)
     assert played.name == own.name
     assert np.abs(played.acceleration_m_s2).max() == own.amplitude_m_s2
+
+
+FAULTY = """\
+without_fault = false
+[[faults]]
+unit = "{unit}"
+kind = "{kind}"
+start_s = 0.1
+"""
+
+
+@pytest.mark.parametrize("unit", ["gyro", "motor"])
+@pytest.mark.parametrize("kind", KINDS["motor"])
+def test_the_seed_counts_where_a_fault_draws_and_only_there(unit: str, kind: str) -> None:
+    if kind not in KINDS[unit]:
+        return
+    one = space(FAULTY.format(unit=unit, kind=kind))
+    shares, table = np.full(one.values, 0.5), np.zeros(one.entries)
+    (fault,) = one.job(shares, table).scenario.faults
+    random = np.random.default_rng(1)
+    before = random.bit_generator.state
+    if unit == "motor":
+        MotorFault(fault, random, 10.0, 2000).through((1.0, 1.0, 1.0, 1.0), 0)
+    else:
+        SignalFault[Any](fault, random).read(0, Gyro((0.0, 0.0, 0.0)))
+    draws = random.bit_generator.state != before
+    assert one.seeded == draws
+    keys = {one.job(shares, table, seed).key() for seed in (1, 2)}
+    assert len(keys) == 1 + draws

@@ -174,3 +174,8 @@ def test_the_command_keeps_finds_that_fly_to_the_same_margin(
     (job,) = [one.job(np.full(3, 0.5), np.zeros(one.entries)) for one in cases(duration=1.0)]
     assert find["margin_m"] < (job.row().margin_m or 0.0)
     assert flown_again(job, tmp_path / "out" / "find-1").margin_m is not None
+
+
+def test_a_margin_that_is_no_number_is_a_violation() -> None:
+    campaign: Any = CheapCampaign(lambda _: math.nan)
+    assert search(cases(duration=0.2), campaign, 40, 1).finds[0].violates

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import sitl
 from pandion.certify import main
 from studies.campaign.flight import CampaignFlight, CampaignRow
 from studies.campaign.journal import Journal
@@ -17,24 +18,33 @@ from studies.campaign.keys import CampaignError
 from studies.campaign.plan import CampaignPlan, load_plan
 from studies.campaign.store import FACTS, JOURNAL, begin, read
 from studies.statistics.binomial import bounds
-from studies.statistics.certificate import ANY, certificate
-from studies.statistics.certificate_page import statement_in
+from studies.statistics.certificate import ANY, certificate, violates
+from studies.statistics.certificate_page import sentences, statement_in
 
 FILE = """\
 flights = {flights}
 duration_s = 2.0
-scenarios = ["walls"]
+scenarios = ["{scenario}"]
 {more}
 [vary]
-vehicle_scale.mass = {{ uniform = [0.95, 1.05] }}
+{vary}
 """
+MASS = "vehicle_scale.mass = { uniform = [0.95, 1.05] }"
+GRID = 'design = "grid"'
+MASSES = "vehicle_scale.mass = { uniform = [0.95, 1.05], points = 3 }"
 
 
 def row(plan: CampaignPlan, number: int, **changed: Any) -> CampaignRow:
     """A row as the flight would leave it, without flying; good unless changed."""
     margin = 0.05 + 0.01 * float(np.random.default_rng(number).exponential())
     flown = CampaignFlight(plan, number).broken("")
-    good = {"completed": True, "error": False, "margin_m": margin, "reason": "flown to the end"}
+    good = {
+        "completed": True,
+        "error": False,
+        "margin_m": margin,
+        "reason": "flown to the end",
+        "duration_s": 2.0,
+    }
     return replace(flown, **(good | changed))
 
 
@@ -44,12 +54,18 @@ def key(plan: CampaignPlan, one: CampaignRow) -> str:
 
 
 def flown(
-    folder: Path, changed: dict[int, dict[str, Any]], flights: int = 40, more: str = ""
+    folder: Path,
+    changed: dict[int, dict[str, Any]],
+    flights: int = 40,
+    more: str = "",
+    vary: str = MASS,
+    scenario: str = "walls",
 ) -> Path:
     """The directory of a campaign, some of whose rows are changed; None leaves one out."""
     source, directory = folder / "small.toml", folder / "out"
     folder.mkdir(exist_ok=True)
-    source.write_text(FILE.format(flights=flights, more=more), encoding="utf-8")
+    text = FILE.format(flights=flights, more=more, vary=vary, scenario=scenario)
+    source.write_text(text, encoding="utf-8")
     plan = load_plan(source)
     begin(directory, source, plan, flights)
     journal = Journal(directory / JOURNAL)
@@ -102,6 +118,93 @@ def test_it_says_what_was_varied_and_what_was_not(tmp_path: Path) -> None:
     assert "independently" in stated["assumed"]
     sobol = flown(tmp_path / "sobol", {}, more='design = "sobol"')
     assert "no proof" in certificate(read(sobol), sobol, 0.95)["assumed"]
+
+
+def test_flights_that_were_refused_clear_nothing(tmp_path: Path) -> None:
+    refused = {"refused": True, "completed": False, "margin_m": None, "reason": "refused: arming"}
+    directory = flown(tmp_path, dict.fromkeys(range(4), refused), flights=4)
+    stated = certificate(read(directory), directory, 0.95)
+    assert {found["count"] for found in stated["findings"].values()} == {4}
+    assert {found["upper"] for found in stated["findings"].values()} == {1.0}
+
+
+def test_a_margin_that_is_no_number_is_below_0(tmp_path: Path) -> None:
+    directory = flown(tmp_path, {}, flights=1)
+    (good,) = read(directory).rows
+    lost = replace(good, margin_m=float("nan"))
+    assert not violates(good, "margin below 0")
+    assert lost.violated
+    assert violates(lost, "margin below 0")
+    assert violates(lost, ANY)
+
+
+def test_a_grid_says_which_of_its_points_were_flown_and_whether_anything_is_random(
+    tmp_path: Path,
+) -> None:
+    def stated(name: str, flights: int, scenario: str) -> dict[str, Any]:
+        directory = flown(tmp_path / name, {}, flights, more=GRID, vary=MASSES, scenario=scenario)
+        return certificate(read(directory), directory, 0.95)
+
+    calm = stated("calm", 5, "walls-calm")
+    assert calm["varied"] == ["vehicle_scale.mass: 3 of 3 values of a grid: 0.95, 1, 1.05"]
+    assert "3 of the 3 points of a grid; a point was flown this often: 1 to 2" in calm["assumed"]
+    assert "nothing is random" in calm["assumed"]
+    assert calm["random"] == []
+    part = stated("part", 1, "walls")
+    assert part["varied"] == ["vehicle_scale.mass: 1 of 3 values of a grid: 0.95"]
+    assert "1 of the 3 points" in part["assumed"]
+    assert "with other random numbers" in part["assumed"]
+    assert part["random"]
+
+
+def test_flights_that_are_all_one_flight_are_no_sample(tmp_path: Path) -> None:
+    directory = flown(tmp_path, {}, vary="", scenario="walls-calm")
+    assert (
+        "all their flights are one flight"
+        in certificate(read(directory), directory, 0.9)["assumed"]
+    )
+
+
+def test_what_another_key_moves_was_varied_and_all_the_rest_is_listed(tmp_path: Path) -> None:
+    vary = "wind_m_s = { uniform = [0.0, 1.0] }\nlatency_ms = { choice = [0.0, 2.0] }"
+    walls = Path(str(sitl.__file__)).parent / "scenarios" / "walls.toml"
+    windy = walls.read_text(encoding="utf-8") + "\n[air]\nbody_drag_m2 = 0.1\n"
+    (tmp_path / "windy.toml").write_text(windy, encoding="utf-8")
+    more = 'suites = ["mocap"]'
+    directory = flown(tmp_path, {}, 2, vary=vary, scenario="windy.toml", more=more)
+    held = "\n".join(certificate(read(directory), directory, 0.95)["not_varied"])
+    assert "air: turbulence_m_s" in held
+    assert "wind_m_s.0" not in held
+    assert "latency_ms" not in held
+    assert "sensors: " in held
+    assert "imu.rate_hz = 500" in held
+    other = flown(tmp_path / "other", {}, 2)
+    held = "\n".join(certificate(read(other), other, 0.95)["not_varied"])
+    assert "wind_m_s.0 = 0" in held
+    assert "imu.latency_ms = 0" in held
+    assert "latency_ms: no added latency" in held
+    assert "disturbances: 0.amplitude_m_s2 = 0.8" in held
+
+
+def test_margins_of_a_part_of_the_flight_are_counted(tmp_path: Path) -> None:
+    cut = {
+        1: {"contact": True, "completed": False, "margin_m": -0.1, "duration_s": 1.2},
+        2: {"completed": False, "modes": "land"},
+        3: {"completed": False, "duration_s": 0.5},
+        4: {"error": True, "completed": False, "margin_m": None, "duration_s": 0.0},
+    }
+    directory = flown(tmp_path, cut)
+    stated = certificate(read(directory), directory, 0.95)
+    (margins,) = stated["margins"]
+    assert (margins["ended_at_contact"], margins["cut_short"]) == (1, 3)
+    assert "3 ended early or left their trajectory (1 by contact)" in "\n".join(sentences(stated))
+
+
+@pytest.mark.parametrize("design", ["sobol", "latin-hypercube", "grid"])
+def test_no_tail_is_fitted_to_flights_that_are_not_independent(tmp_path: Path, design: str) -> None:
+    directory = flown(tmp_path, {}, 150, more=f'design = "{design}"', vary=MASSES)
+    (margins,) = certificate(read(directory), directory, 0.95, refits=3)["margins"]
+    assert f"of design {design}, not drawn independently" in margins["tail"]["none"]
 
 
 def test_flights_without_a_row_are_not_left_out(tmp_path: Path) -> None:

@@ -27,7 +27,7 @@ def margins(shape: float, count: int, seed: int) -> Array:
 
 @pytest.mark.parametrize("shape", [-0.25, pytest.param(0.15, marks=pytest.mark.long)])
 def test_the_law_of_a_tail_is_within_its_interval(shape: float) -> None:
-    found = fit_tail(margins(shape, 2000, 4).tolist(), 0.95, refits=39)
+    found = fit_tail(margins(shape, 2000, 4).tolist(), 0.99, refits=39)
     assert found.tail == 200
     assert found.threshold_m == pytest.approx(0.1, abs=2e-4)
     assert found.shape.low <= shape <= found.shape.high

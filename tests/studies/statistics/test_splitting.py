@@ -171,3 +171,23 @@ def test_the_interval_of_a_lognormal_mean_covers_it() -> None:
 def test_an_effort_that_cannot_work_is_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(ValueError, match=r"must be at least 50|needs 2 runs"):
         Effort(**wrong)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("values", [(1e-3, 6e-3), (1e-9, 0.5), (1e-300, 1e-3)])
+@pytest.mark.parametrize("confidence", [0.5, 0.999])
+def test_an_interval_too_wide_for_a_float_ends_at_1(
+    values: tuple[float, float], confidence: float
+) -> None:
+    (low, high), deviation = mean_of_lognormal(np.array(values), confidence)
+    assert 0.0 <= low <= high <= 1.0
+    assert deviation == pytest.approx(np.log(values).std(ddof=1))
+
+
+def test_the_interval_of_five_runs_holds_as_often_as_the_page_says() -> None:
+    random = np.random.default_rng(1)
+    for scatter, share in ((0.3, 0.94), (0.8, 0.94), (1.5, 0.91)):
+        logs = -20.0 + scatter * random.standard_normal((1000, 5))
+        truth = math.exp(-20.0 + 0.5 * scatter**2)
+        ends = [mean_of_lognormal(np.exp(one), 0.95)[0] for one in logs]
+        held = np.mean([low <= truth <= high for low, high in ends])
+        assert held == pytest.approx(share, abs=0.025)
