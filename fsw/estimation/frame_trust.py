@@ -430,7 +430,13 @@ def looked_at(
     dt: float,
     sigma: float,
 ) -> tuple[int, int, Mat3, float, int, int, tuple[int, Vec3, Vec3, int, int]]:
-    """``unbelievable``, ``repeating`` and ``next_window`` in one call."""
+    """``unbelievable``, ``repeating`` and ``next_window`` in one call.
+
+    Readings ``new`` and ``last`` [SI], ``apart`` [s]; of the estimate, which is ``dt`` [s] old and
+    whose place is known to ``sigma`` [m], ``p0`` [m, NED], ``v0`` [m/s, NED], ``R0`` [1, body to
+    NED], ``w0`` [rad/s, FRD], ``f0`` [m/s^2, along -z of the body], ``arm0`` [rad] and ``rates0``
+    [rad/s].
+    """
     p, v, q, w, f, arm, rates = new
     never, far, R, yaw = unbelievable(
         p, v, q, w, f, arm, rates, p0, v0, R0, w0, f0, arm0, rates0, dt, sigma

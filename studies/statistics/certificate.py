@@ -156,7 +156,8 @@ def digest(value: Any) -> str:
 
     A number that is not finite, such as the margin of a flight that diverged, is NaN or Infinity.
     """
-    text = json.dumps(value, sort_keys=True, separators=(",", ":"))
+    # It is hashed, not written.
+    text = json.dumps(value, sort_keys=True, separators=(",", ":"), allow_nan=True)
     return hashlib.sha256(text.encode()).hexdigest()
 
 
@@ -166,7 +167,7 @@ def _signed(statement: dict[str, Any]) -> dict[str, Any]:
 
 
 def _short(value: Any) -> str:
-    text = json.dumps(value)
+    text = json.dumps(value, allow_nan=True)  # for a sentence
     return text if len(text) <= 80 else f"{text[:80]}…"
 
 

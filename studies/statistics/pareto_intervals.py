@@ -158,7 +158,7 @@ class Likelihood:
         self._places, self._coarse = places, ridge
 
     def fall(self, quantity: Quantity, value: float) -> float:
-        """By how much twice the logarithm of the likelihood falls if a ``value`` is true."""
+        """By how much twice the logarithm of the likelihood falls if a ``value`` [1] is true."""
         quotients, shares = self._grid(_WIDE, _ROUGH)
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
             shape = quantity.shape(value, quotients, shares)
@@ -180,7 +180,7 @@ class Likelihood:
         )
 
     def interval(self, quantity: Quantity, fall: float) -> tuple[float, float]:
-        """The values of the laws whose likelihood falls by no more than ``fall``."""
+        """The values of the laws whose likelihood falls by no more than ``fall`` [1]."""
         quotients, shares = self._grid(fall, _FINE)
         mean = self._means(quotients[:, 0])[:, None]
         spare = self._ridge_of(quotients[:, 0], mean[:, 0])[:, None] - self.most + 0.5 * fall
@@ -195,7 +195,7 @@ class Likelihood:
         return float(np.nanmin(ends)), float(np.nanmax(ends))
 
     def interval_of_end(self, fall: float) -> tuple[float, float]:
-        """The same of the excess where the law ends; infinite where it does not."""
+        """The same of the excess where the law ends, for a ``fall`` [1]; infinite where it does not."""
         low, high = self._quotients(np.array(self._ends(fall)))
         return -1.0 / float(low), math.inf if high >= 0.0 else -1.0 / float(high)
 
