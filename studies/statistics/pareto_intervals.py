@@ -195,7 +195,7 @@ class Likelihood:
         return float(np.nanmin(ends)), float(np.nanmax(ends))
 
     def interval_of_end(self, fall: float) -> tuple[float, float]:
-        """The same of the excess where the law ends, for a ``fall`` [1]; infinite where it does not."""
+        """The same, for a ``fall`` [1], of the excess where the law ends; infinite: it does not."""
         low, high = self._quotients(np.array(self._ends(fall)))
         return -1.0 / float(low), math.inf if high >= 0.0 else -1.0 / float(high)
 
