@@ -102,6 +102,7 @@ def _tick(
     zones: Array,
     probes: Array,
     bounds: Bounds,
+    now_us: int,
     reading: Array,
     before: Quiet,
     after: Quiet,
@@ -113,7 +114,7 @@ def _tick(
     False, and nothing to rely on in either, if something happens. ``reading`` (READINGS,) [SI];
     ``law``, ``model`` and ``airframe`` as cascade, plan's model and watch have them packed,
     ``zones`` (zones, k) [SI] and ``probes`` (probes, 12) [SI] as ``close_loops`` takes them. Also
-    the command, rotors [N] and joints [N m].
+    the command, rotors [N] and joints [N m]. Zones are where they are at ``now_us``.
     """
     b, a = before[0], after[0]
     nothing = (0.0, 0.0, 0.0, 0.0), (0.0, 0.0)
@@ -160,7 +161,7 @@ def _tick(
         b.off_plan,
         HEALTHY,
     )
-    estimate = StateEstimate(0, p, v, R, w, yaw, q_arm, qd_arm, -f[2])
+    estimate = StateEstimate(now_us, p, v, R, w, yaw, q_arm, qd_arm, -f[2])
     command, kept, guarded = close_loops(law[0], memory, estimate, plan, u, 1, zones, probes)
     if guarded[0] or not guarded[1] >= 0.0 or not _within(law[0].airframe, command):
         return False, nothing[0], nothing[1]
@@ -306,8 +307,8 @@ class QuietTicks:
         self._before, self._after = np.zeros(1, QUIET), np.zeros(1, QUIET)
         self._watched, self._watching = at_start(), blank()
         self._zones = NO_ZONES
-        self._flown = 0
-        example = (self._bounds, np.zeros(READINGS), self._before, self._after)
+        self._flown, self._since_us = 0, 0
+        example = (self._bounds, 0, np.zeros(READINGS), self._before, self._after)
         self._code: Callable[..., tuple[bool, Vec4, Vec2]] = machine_code(
             _tick, *self._laws, NO_ZONES, self._probes, *example, self._watched, self._watching
         )
@@ -330,7 +331,7 @@ class QuietTicks:
         now = planned_input(plan, state.t_us + self._tick_us)
         if u is None or u is not now:
             return 0  # a tick is flown with two inputs
-        self._zones = zones
+        self._zones, self._since_us = zones, state.t_us
         self._bounds = self._bounds._replace(off_plan=self._most_off_plan(state))
         _take(self._before, state, last, x, nominal, u)
         self._watched = at_start() if state.watch is None else state.watch
@@ -347,6 +348,7 @@ class QuietTicks:
             self._zones,
             self._probes,
             self._bounds,
+            self._since_us + (self._flown + 1) * self._tick_us,
             reading,
             self._before,
             self._after,

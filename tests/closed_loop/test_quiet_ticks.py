@@ -68,9 +68,10 @@ def flown(
     ("name", "seconds", "push", "most_whole"),
     [
         ("walls", 4.0, 0.0, 0.12),
-        ("workspace", 3.0, 0.0, 0.4),
-        ("branches", 3.0, 0.0, 0.4),
+        ("workspace", 3.0, 0.0, 0.12),
+        ("branches", 3.0, 0.0, 0.12),
         ("walls-calm", 3.0, 0.0, 0.08),
+        ("crossing", 3.0, 0.0, 1.0),
         # Pushed off its plan, filtered, saturated, replanned, and retreating in the end.
         ("walls", 4.0, 3.0, 1.0),
         ("workspace", 3.0, 3.0, 1.0),
