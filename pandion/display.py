@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final, TextIO
 
 from command_line.output import say
@@ -39,6 +40,7 @@ class Display:
         self._threaded = threaded
         self._bar: Progress | None = None
         self._shown = ("", 0)
+        self._flying = False
         self._clock = clock
         self._shown_s = clock()
 
@@ -107,6 +109,10 @@ class Display:
         self, time_s: float, duration_s: float, margin_m: float | None, real_time_factor: float
     ) -> None:
         """Show how far a flight is; ``real_time_factor`` [1]."""
+        if not self._flying:
+            self._flying = True
+            # While others fly: it takes 0.2 s, which a stall's end has not.
+            import_module("rich.table")
         if math.isinf(duration_s) and self._bar is None:
             if not self._shown[0]:
                 self.say("flying until interrupted, by Ctrl-C or SIGINT")
