@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from studies.campaign.campaign import Campaign
     from studies.campaign.plan import CampaignPlan
 
-JOURNAL: Final = "journal.jsonl"
 _INTERRUPTED: Final = 1  # exit code
 
 
@@ -69,7 +68,7 @@ def begin(verb: str, options: CampaignRunOptions, plan: CampaignPlan, work: str)
     Raises:
         CampaignError: The directory is that of a campaign, whose rows would be mixed with these.
     """
-    from studies.campaign.store import refuse_campaign
+    from studies.campaign.store import JOURNAL, refuse_campaign
 
     folder = options.out or new_run_directory(Path("runs"), f"{verb}-{plan.name}")
     refuse_campaign(folder)

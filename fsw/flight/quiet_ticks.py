@@ -31,7 +31,7 @@ from fsw.flight.safety_watch import off_plan_bound
 from fsw.flight.state import AIDED, FlightState
 from fsw.frozen import replace
 from fsw.model.actuator_health import HEALTHY
-from fsw.model.nominal import NominalModel, advance
+from fsw.model.nominal import NominalModel, advance, state_of
 from fsw.parameters.flight_config import FlightConfig
 from fsw.shapes.zones import NO_ZONES, Array
 from fsw.signals import (
@@ -117,7 +117,7 @@ def _tick(
     the command, rotors [N] and joints [N m]. Zones are where they are at ``now_us``.
     """
     b, a = before[0], after[0]
-    nothing = (0.0, 0.0, 0.0, 0.0), (0.0, 0.0)
+    no_thrust, no_torque = (0.0, 0.0, 0.0, 0.0), (0.0, 0.0)
     new, old = _frame(reading), _frame(b.reading)
     p, v, _, w, f, q_arm, qd_arm = new
     p0, v0, _, w0, f0, q0, qd0 = old
@@ -128,43 +128,31 @@ def _tick(
         new, old, bounds.tick, window, p0, v0, R0, w0, -f0[2], q0, qd0, bounds.tick, 0.0
     )
     if never or far or stuck or not R[8] > bounds.upright:
-        return False, nothing[0], nothing[1]
+        return False, no_thrust, no_torque
     if sums[0] >= WINDOW_FRAMES and not is_calm(sums[0], sums[1], sums[2], sums[3], sums[4]):
-        return False, nothing[0], nothing[1]
-    n, k = b.nominal, b.joints
+        return False, no_thrust, no_torque
     u = PlanInput(_three(b.u, 0), b.u[3], (b.u[4], b.u[5]))
-    plan = PredictionState(
-        _three(n, 0),
-        _three(n, 3),
-        _three(n, 6),
-        (n[9], n[10]),
-        (n[11], n[12]),
-        n[13],
-        n[14],
-        (n[15], n[16]),
-        (n[17], n[18]),
-    )
-    plan = advance(model[0], plan, u, 1)
+    plan = advance(model[0], state_of(b.nominal), u, 1)
     most = bounds.off_plan
     for i in range(3):
         if not -most <= p[i] - plan.p[i] <= most:
-            return False, nothing[0], nothing[1]
+            return False, no_thrust, no_torque
     sent = ActuatorCommand(_four(b.thrust), (b.torque[0], b.torque[1]))
     memory = CascadeMemory(
         _four(b.rotors),
         sent,
-        Observed(_three(b.observed, 0), _three(b.observed, 3), (b.observed[6], b.observed[7])),
+        _observed(b.observed),
         b.mass,
         _three(b.attitude, 0),
         b.height,
-        JointMemory((k[0], k[1]), (k[2], k[3]), (k[4], k[5]), (k[6], k[7]), (k[8], k[9])),
+        _joints(b.joints),
         b.off_plan,
         HEALTHY,
     )
     estimate = StateEstimate(now_us, p, v, R, w, yaw, q_arm, qd_arm, -f[2])
     command, kept, guarded = close_loops(law[0], memory, estimate, plan, u, 1, zones, probes)
     if guarded[0] or not guarded[1] >= 0.0 or not _within(law[0].airframe, command):
-        return False, nothing[0], nothing[1]
+        return False, no_thrust, no_torque
     failed = watch(
         watched,
         watching,
@@ -180,7 +168,7 @@ def _tick(
         -f[2],
     )
     if failed:
-        return False, nothing[0], nothing[1]
+        return False, no_thrust, no_torque
     _note_frame(a, reading, R, yaw)
     _note_window(a, b, sums)
     _note_plan(a, plan, u)
@@ -209,6 +197,16 @@ def _three(x: Array, k: int) -> Vec3:
 @compilable
 def _four(x: Array) -> Vec4:
     return x[0], x[1], x[2], x[3]
+
+
+@compilable
+def _observed(x: Any) -> Observed:
+    return Observed((x[0], x[1], x[2]), (x[3], x[4], x[5]), (x[6], x[7]))
+
+
+@compilable
+def _joints(x: Any) -> JointMemory:
+    return JointMemory((x[0], x[1]), (x[2], x[3]), (x[4], x[5]), (x[6], x[7]), (x[8], x[9]))
 
 
 @compilable
@@ -332,7 +330,9 @@ class QuietTicks:
         if u is None or u is not now:
             return 0  # a tick is flown with two inputs
         self._zones, self._since_us = zones, state.t_us
-        self._bounds = self._bounds._replace(off_plan=self._most_off_plan(state))
+        self._bounds = self._bounds._replace(
+            off_plan=off_plan_bound(self._radius, state.accuracy.reach)
+        )
         _take(self._before, state, last, x, nominal, u)
         self._watched = at_start() if state.watch is None else state.watch
         self._watching = blank()
@@ -378,7 +378,7 @@ class QuietTicks:
         trust, agreement = state.trust, state.trust.agreement
         if windows:
             agreement = agreement.after_calm(int(windows), last)
-        nominal = _planned(numbers.take(19))
+        nominal = state_of(numbers.take(19))
         numbers.take(6)  # the plan still has its input
         return replace(
             state,
@@ -416,9 +416,6 @@ class QuietTicks:
             (min(ends_us) - now_us - 1) // self._tick_us,
             self._per_plan - 1 - state.index % self._per_plan,
         )
-
-    def _most_off_plan(self, state: FlightState) -> float:
-        return off_plan_bound(self._radius, state.accuracy.reach)
 
 
 def _is_quiet(state: FlightState, config: FlightConfig) -> bool:
@@ -494,36 +491,22 @@ def _window(x: list[float]) -> Window:
     return Window(int(x[0]), (x[1], x[2], x[3]), (x[4], x[5], x[6]), int(x[7]), int(x[8]))
 
 
-def _planned(n: list[float]) -> PredictionState:
-    return PredictionState(
-        (n[0], n[1], n[2]),
-        (n[3], n[4], n[5]),
-        (n[6], n[7], n[8]),
-        (n[9], n[10]),
-        (n[11], n[12]),
-        n[13],
-        n[14],
-        (n[15], n[16]),
-        (n[17], n[18]),
-    )
-
-
 def _memory(numbers: _Numbers, before: CascadeMemory) -> CascadeMemory:
     f1, f2, f3, f4 = numbers.take(4)
     sent1, sent2, sent3, sent4 = numbers.take(4)
     t1, t2 = numbers.take(2)
-    a, b, c, d, e, f, g, h = numbers.take(8)
+    observed = _observed(numbers.take(8))
     (mass,), (x, y, z), (height,) = numbers.take(1), numbers.take(3), numbers.take(1)
-    k = numbers.take(10)
+    joints = _joints(numbers.take(10))
     (off_plan,) = numbers.take(1)
     return CascadeMemory(
         (f1, f2, f3, f4),
         ActuatorCommand((sent1, sent2, sent3, sent4), (t1, t2)),
-        Observed((a, b, c), (d, e, f), (g, h)),
+        observed,
         mass,
         (x, y, z),
         height,
-        JointMemory((k[0], k[1]), (k[2], k[3]), (k[4], k[5]), (k[6], k[7]), (k[8], k[9])),
+        joints,
         off_plan,
         before.health,
     )

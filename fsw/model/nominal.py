@@ -65,6 +65,22 @@ class NominalModel:
 
 
 @compilable
+def state_of(n: Any) -> PredictionState:
+    """The state whose nineteen numbers, SI in the order of its fields, ``n`` begins with."""
+    return PredictionState(
+        (n[0], n[1], n[2]),
+        (n[3], n[4], n[5]),
+        (n[6], n[7], n[8]),
+        (n[9], n[10]),
+        (n[11], n[12]),
+        n[13],
+        n[14],
+        (n[15], n[16]),
+        (n[17], n[18]),
+    )
+
+
+@compilable
 def advance(model: TickModel, x: PredictionState, u: PlanInput, ticks: int) -> PredictionState:
     """The state some ticks later under one input."""
     for _ in range(ticks):

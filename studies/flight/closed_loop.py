@@ -17,7 +17,7 @@ import numpy as np
 from fsw.flight.autopilot import Autopilot
 from fsw.flight.quiet_ticks import READINGS, QuietTicks
 from fsw.flight.state import FlightState
-from fsw.measurements import Sample
+from fsw.measurements import Sample, Vec2, Vec4
 from fsw.model.airframe import Airframe
 from fsw.mpc.planner import Planner
 from fsw.parameters.flight_config import FlightConfig
@@ -137,15 +137,16 @@ class ClosedLoop(Generic[State]):
             self.planner.submit(outputs.plan_request)
         if before_advancing is not None:
             before_advancing(outputs)
-        self.simulation.advance(self._controls(outputs))
+        self.simulation.advance(self.controls(outputs.actuators, armed=outputs.snapshot.armed))
         return outputs
 
-    def _controls(self, outputs: TickOutputs) -> Controls:
+    def controls(self, command: tuple[Vec4, Vec2], *, armed: bool) -> Controls:
+        """The shares of full thrust and torque that a ``command`` [N, N m] is."""
         # Written out: each generator would take longer than all of this.
-        (f1, f2, f3, f4), (t1, t2) = outputs.actuators
+        (f1, f2, f3, f4), (t1, t2) = command
         force, torque = self.airframe.rotor_thrust_max, self.airframe.joint_torque_max
         thrust = (f1 / force, f2 / force, f3 / force, f4 / force)
-        return Controls(thrust, (t1 / torque, t2 / torque), outputs.snapshot.armed)
+        return Controls(thrust, (t1 / torque, t2 / torque), armed)
 
 
 class QuietStretch:
@@ -170,15 +171,13 @@ class QuietStretch:
         simulation, before = loop.simulation, loop.state
         if ticks is None or simulation.t_us != before.t_us + STEP_US:
             return simulation.ended is None
-        reading, force = self._reading, loop.airframe.rotor_thrust_max
-        torque = loop.airframe.joint_torque_max
+        reading = self._reading
         for _ in range(ticks.begin(before, self._autopilot.zones_now(before))):
             simulation.exact_state(reading)
-            quiet, (f1, f2, f3, f4), (t1, t2) = ticks.tick(reading)
+            quiet, thrust, torque = ticks.tick(reading)
             if not quiet:
                 break
-            thrust = (f1 / force, f2 / force, f3 / force, f4 / force)
-            simulation.advance(Controls(thrust, (t1 / torque, t2 / torque), True))
+            simulation.advance(loop.controls((thrust, torque), armed=True))
             if simulation.ended is not None:
                 break
         loop.state = ticks.end(before)

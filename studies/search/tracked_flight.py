@@ -18,9 +18,10 @@ from fsw.compiled import compilable, packed
 from fsw.control.cascade import Cascade, CascadeLaw, CascadeMemory, close_loops
 from fsw.estimation.estimator import attitude
 from fsw.flight.autopilot import keep_clear
+from fsw.model.nominal import state_of
 from fsw.model.prediction import Array
 from fsw.parameters.flight_config import FlightConfig
-from fsw.signals import ActuatorCommand, PlanInput, PredictionState, StateEstimate
+from fsw.signals import ActuatorCommand, PlanInput, StateEstimate
 from sitl.body import Parts
 from sitl.mission_clock import MissionClock
 from sitl.plant.aerial_manipulator import Inputs, Plant, plant
@@ -142,17 +143,7 @@ def _track(
     top, drive = law.airframe.rotor_thrust_max, law.airframe.joint_torque_max
     for k in range(kept.shape[0]):
         r, ahead = rows[k], rows[k + 1]
-        nominal = PredictionState(
-            (r[0], r[1], r[2]),
-            (r[3], r[4], r[5]),
-            (r[6], r[7], r[8]),
-            (r[9], r[10]),
-            (r[11], r[12]),
-            r[13],
-            r[14],
-            (r[15], r[16]),
-            (r[17], r[18]),
-        )
+        nominal = state_of(r)
         u = PlanInput((r[19], r[20], r[21]), r[22], (r[23], r[24]))
         p, v, w = (x[0], x[1], x[2]), (x[3], x[4], x[5]), (x[10], x[11], x[12])
         q_arm, qd_arm = (x[17], x[18]), (x[19], x[20])
