@@ -457,7 +457,15 @@ class Autopilot:
         """
         if not (known and self._watches and state.aiding.sensor is None):
             return state.damage, paused(state.watch)
-        return self._damage.see(state.damage, state.watch, state.cascade, memory, estimate, ticks)
+        return self._damage.see(
+            state.damage,
+            state.watch,
+            state.cascade,
+            memory,
+            estimate,
+            ticks,
+            angles_repeat=state.fusion is not None and state.fusion.encoders.repeating,
+        )
 
     def zones_now(self, state: FlightState) -> Array:
         """The zones (zones, k) [SI] for the safety filter.

@@ -12,6 +12,7 @@ from typing import Any, Final
 from fsw.compiled import machine_code, packed
 from fsw.control.actuator_watch import NONE, Watch, at_start, blank, watch
 from fsw.control.cascade import CascadeMemory
+from fsw.estimation.sensor_fault import Sensor, SensorFault, sentence
 from fsw.flight.state import Damage
 from fsw.model.actuator_health import HEALTHY, LIMP, SOUND, STUCK, ActuatorHealth
 from fsw.model.airframe import GRAVITY, Airframe
@@ -48,10 +49,13 @@ class DamageWatch:
         now: CascadeMemory,
         estimate: StateEstimate,
         ticks: int,
+        *,
+        angles_repeat: bool = False,
     ) -> tuple[Damage, Watch]:
         """What is known of actuators a tick, or some ``ticks``, later, and the memory for the next.
 
         The loops' memory ``sent`` holds what was commanded meanwhile, ``now`` their references.
+        Where the encoders' ``angles_repeat``, a joint without torque may be one that is not seen.
         """
         after = blank()
         thrust, torque = sent.commanded
@@ -75,7 +79,7 @@ class DamageWatch:
         if failed or damage.rotor:
             back = memory is not None and memory[0]["failed"] != NONE and after[0]["failed"] == NONE
             damage = self._of_rotors(damage, after[0], estimate.t_us, back=bool(back))
-            damage = _of_joints(damage, after[0], estimate.t_us)
+            damage = _of_joints(damage, after[0], estimate.t_us, angles_repeat)
         return damage, after
 
     def _of_rotors(self, before: Damage, s: Any, now_us: int, *, back: bool) -> Damage:
@@ -118,7 +122,7 @@ class DamageWatch:
         )
 
 
-def _of_joints(before: Damage, s: Any, now_us: int) -> Damage:
+def _of_joints(before: Damage, s: Any, now_us: int, angles_repeat: bool) -> Damage:
     kinds = (
         float(s["joint"][0]) or before.report.joints[0],
         float(s["joint"][1]) or before.report.joints[1],
@@ -127,6 +131,8 @@ def _of_joints(before: Damage, s: Any, now_us: int) -> Damage:
         return before
     failed = [k for k in range(2) if kinds[k] != SOUND]
     text = " and ".join([f"joint {k + 1} {_HOWS[kinds[k]]}" for k in failed])
+    if angles_repeat and LIMP in kinds:  # one that hangs loose hardly ever stands so still
+        text += f", or {sentence(Sensor.ENCODERS, SensorFault.STUCK)}"
     since_us = before.joint_us
     if not before.joint:
         since_us = now_us - round(1e6 * float(s["joint_for"][failed[0]]))

@@ -32,7 +32,6 @@ from fsw.signals import EstimatorReport, Severity, StateEstimate, StatusText, Ti
 _CHECKED_US = 100_000  # between checks for silent sensors
 _EVERY_TICK = (Sensor.IMU, Sensor.ENCODERS)
 _IMU_SILENT = 0.008  # s; longer than the filter takes for jitter
-_REPEATS = 6  # of encoders; a resting arm's 12 bits are the same for longer
 # rad/s^2 of each joint that torques should have made of it and did not. In flight 15 and 35 at
 # most while readings repeat; 50 and 70 within 10 ms of stuck encoders.
 _HELD = (35.0, 70.0)
@@ -231,13 +230,14 @@ def _watched(
     asked = state.cascade.joints.reference
     if angles != watch.angles or not state.vehicle.flies:
         return EncoderWatch(angles, asked)
-    repeats, stuck = watch.repeats + 1, watch.stuck
-    if repeats >= _REPEATS and not stuck:
+    stuck = watch.stuck
+    watch = watch._replace(repeats=watch.repeats + 1)
+    if watch.repeating and not stuck:
         first, second = memory.numbers["joints"][0][:, 2].tolist()
         held = abs(first) > _HELD[0] or abs(second) > _HELD[1]
         moved = max(abs(asked[0] - watch.asked[0]), abs(asked[1] - watch.asked[1]))
         stuck = held and moved > _ASKED
-    return EncoderWatch(watch.angles, watch.asked, repeats, stuck)
+    return watch._replace(stuck=stuck)
 
 
 def _at_rest(memory: FusionMemory, law: Law, reading: JointSample) -> FusionMemory:

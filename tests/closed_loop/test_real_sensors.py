@@ -171,6 +171,18 @@ def test_a_sensor_that_fails_beside_walls_is_named_and_touches_nothing(
     assert error(flight) < 0.02
 
 
+@pytest.mark.requirement("REQ-EST-7")
+@pytest.mark.long
+def test_encoders_that_freeze_are_named_where_a_joint_seems_to_have_failed() -> None:
+    """A joint that is not seen to move looks like one whose drive is dead."""
+    spoil = changed(JointSample, 12.0, 14.0, frozen())
+    flight = Flight(load_scenario("walls", "mocap"), seed=1008, spoil_samples=spoil)
+    flight.follow()
+    flight.run(13.0)
+    stuck = sentence(Sensor.ENCODERS, SensorFault.STUCK)
+    assert [text for text in flight.texts if "joint failed" in text and stuck in text]
+
+
 @pytest.mark.long
 def test_odometry_that_drifts_says_how_far_and_keeps_as_much_farther_from_walls() -> None:
     flight = Flight(load_scenario("walls", "vio"), seed=900)

@@ -253,6 +253,19 @@ def test_a_second_joint_that_fails_is_named_beside_the_first() -> None:
         "joint 1 does not move and joint 2 gives no torque",
         "joint 1 gives no torque and joint 2 gives no torque",
     ]
+
+
+@pytest.mark.parametrize(("kind", "doubted"), [(LIMP, True), (STUCK, False)])
+def test_a_joint_that_hangs_loose_and_stands_still_may_be_one_that_is_not_seen(
+    kind: float, doubted: bool
+) -> None:
+    memory, loops = at_start(), in_hover(AIRFRAME, estimate(0.0, (0.0, 0.0, 0.0), 9.81))
+    memory["joint"], memory["joint_for"] = (SOUND, kind), 0.1
+    now = estimate(5.0, (0.0, 0.0, 0.0), 9.81)
+    for repeat in (True, False):
+        damage, _ = WATCHER.see(Damage(), memory, loops, loops, now, 1, angles_repeat=repeat)
+        assert damage.joint.startswith("joint 2 ")
+        assert ("joint encoders are stuck" in damage.joint) is (doubted and repeat)
     assert damage.joint_us == 4_900_000, "when the first one failed"
 
 
