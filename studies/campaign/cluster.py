@@ -134,12 +134,14 @@ class Cluster:
         found += self._answers(done)
         for one in found:
             self._out.pop(one.task, None)
+        if any(one.broke for one in found):
+            self.look(now=True)  # a campaign that ends within the second says it too
         return found
 
-    def look(self) -> None:
-        """See which workers there are, once a second."""
+    def look(self, *, now: bool = False) -> None:
+        """See which workers there are: once a second, or ``now``."""
         now_s = time.monotonic()
-        if now_s < self._looked_s + _LOOK_S:
+        if not now and now_s < self._looked_s + _LOOK_S:
             return
         self._looked_s = now_s
         before = set(self._workers)

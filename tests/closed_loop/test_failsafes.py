@@ -55,7 +55,7 @@ def test_a_vehicle_whose_planner_is_lost_descends_where_it_is() -> None:
 def test_a_vehicle_without_a_position_descends_where_it_is() -> None:
     flight = Flight(hover(), spoil=lies(FOR_GOOD, 500, p_WB=NOTHING))
     flight.step(command(ARM, 1.0))
-    assert to_the_ground(flight) < 0.35
+    assert to_the_ground(flight) < 0.55  # twice the speed of landing, 0.25 m/s
     assert math.hypot(*flight.sim.truth().p_WB[:2]) < 0.3
     assert any("position unknown" in text and "descending" in text for text in flight.texts)
 
@@ -67,6 +67,6 @@ def test_a_vehicle_that_drifts_feels_the_ground_though_its_height_has_drifted() 
     scenario = replace(load_scenario("walls", "mocap"), duration_s=60.0)
     flight = Flight(scenario, spoil_samples=spoil)
     flight.follow()
-    assert to_the_ground(flight) < 0.6
+    assert to_the_ground(flight) < 0.7  # twice the speed of landing, and what it drifts
     assert math.dist(flight.snapshot.estimate.p_WB, flight.sim.truth().p_WB) > 0.3
     assert not any("pushed off" in text for text in flight.texts), "zones are not where they seem"

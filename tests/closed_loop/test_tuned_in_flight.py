@@ -8,6 +8,7 @@ import pytest
 
 from fsw.flight.autopilot import Autopilot
 from fsw.flight.tuned_autopilot import TunedAutopilot
+from fsw.parameters.contradictions import contradictions
 from fsw.parameters.flight_config import flight_config
 from fsw.parameters.registry import PARAMETERS
 from fsw.signals import Mode, Plan
@@ -199,12 +200,17 @@ def test_walls_are_kept_whatever_harmless_is_changed_in_flight() -> None:
 @pytest.mark.parametrize("end", ["least", "most"])
 def test_no_end_of_a_range_makes_a_tick_fail(end: str) -> None:
     """Not to be flown, but to be survived: one tick at each end of each range."""
-    flight = Flight(hover())
+    config = flight_config(body="points")
+    flight = Flight(hover(), config=config)
     flight.step(command(ARM, 1.0))
     flight.step(command(SET_MODE, 1.0, 4.0, 3.0))
     assert flight.inputs is not None
     for parameter in PARAMETERS:
         value = getattr(parameter, end) * parameter.scale
+        if contradictions(tuned(config, ((parameter.path, value),))):
+            with pytest.raises(ValueError, match=parameter.name):
+                flight.loop.prepare(((parameter.path, value),))
+            continue
         flight.loop.prepare(((parameter.path, value),))
         inputs = replace(flight.inputs, tuning=((parameter.path, value),))
         state, outputs = flight.loop.tick(flight.state, inputs)

@@ -29,8 +29,13 @@ DURATION_S = 2.0
 SEED = 100
 
 
-@pytest.mark.parametrize("suite", ["perfect", pytest.param("mocap", marks=pytest.mark.long)])
-def test_in_process_and_over_the_wire_are_one_flight(suite: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("suite", "apart"),
+    [("perfect", 1e-5), pytest.param("mocap", 3e-5, marks=pytest.mark.long)],
+)
+def test_in_process_and_over_the_wire_are_one_flight(
+    suite: str, apart: float, tmp_path: Path
+) -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as ground:
         ground.bind(("127.0.0.1", 0))
         result = tmp_path / "result.json"
@@ -54,14 +59,15 @@ def test_in_process_and_over_the_wire_are_one_flight(suite: str, tmp_path: Path)
     assert path[START_US] == first.p_WB
     assert wire["duration_s"] == truth.duration_s
     assert wire["end_reason"] == truth.end_reason
-    # The wire rounds to single precision, some 1e-7 m, and feedback keeps it there.
+    # The wire rounds to single precision, some 1e-7 m, and feedback keeps it there; an estimate
+    # from rounded readings of an inertial unit wanders farther.
     both = [(point.p_WB, path.get(START_US + round(1e6 * point.t_s))) for point in later]
     seen = [(ours, theirs) for ours, theirs in both if theirs is not None]
     assert len(seen) >= 0.4 * len(later)
     for ours, theirs in seen:
-        assert theirs == pytest.approx(ours, abs=1e-5)
-    assert wire["min_margin_m"] == pytest.approx(truth.min_margin_m, abs=1e-5)
-    assert wire["tracking_error_rms_m"] == pytest.approx(truth.tracking_error_rms_m, abs=1e-5)
+        assert theirs == pytest.approx(ours, abs=apart)
+    assert wire["min_margin_m"] == pytest.approx(truth.min_margin_m, abs=apart)
+    assert wire["tracking_error_rms_m"] == pytest.approx(truth.tracking_error_rms_m, abs=apart)
     assert wire["control_effort"]["sum"] == pytest.approx(here.planner.metrics.effort, rel=1e-3)
     assert wire["control_smoothness"]["sum"] == pytest.approx(
         here.planner.metrics.smoothness, rel=1e-3
