@@ -12,9 +12,9 @@ along z. For each rotor x is the projection of what is observed onto its pattern
 when the mean square of x is large *and* the pattern explains nearly all of what is observed. A push
 along z, a mass or a battery that is not as believed, an arm that is heavier, a contact: each leaves
 another pattern, however strong it is. What lasts along z is learned as long as nothing turns the
-vehicle. Rotors that are all slower than believed make the vehicle swing, and half a swing looks like
-a single one: what rotors twice as slow would leave is computed as well, and where that much explains
-what is observed none has failed.
+vehicle. Rotors that are all slower than believed make the vehicle swing, and half a swing looks
+like a single one: what rotors twice as slow would leave is computed as well, and where that much
+explains what is observed none has failed.
 
 A joint has failed when torque is observed that undoes what is asked of its drive, and the base does
 not feel it either.
