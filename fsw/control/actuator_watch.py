@@ -52,9 +52,9 @@ WEAK_TIME: Final = 0.15  # s
 STRONG: Final = 4.0  # N, with which less time is needed
 STRONG_TIME: Final = 0.03  # s
 EXPLAINED: Final = 0.9  # share of all that is observed
-# All rotors are slow, and none has failed: times what rotors twice as slow would leave, which they
-# are up to, and share of all that is observed which that explains. Measured beside walls: 1.05 to
-# 1.26 and 0.74 to 0.88.
+# All rotors are slow, and none has failed, where what is observed is up to SLOW times what rotors
+# twice as slow would leave, and that explains SLOW_SHARE of it. Measured beside walls with rotors
+# that are twice as slow: 1.05 to 1.26 times, and 0.74 to 0.88.
 SLOW: Final = 1.5
 SLOW_SHARE: Final = 0.7
 LOST: Final = 0.2  # of what is commanded; a rotor that gives less is lost

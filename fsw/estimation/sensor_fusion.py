@@ -51,7 +51,7 @@ from fsw.signals import StateEstimate, Vec2, Vec3, Vec4
 LATE: Final = 0.01  # s behind the filter, where a measurement is still fused as it stands
 _MARGIN: Final = 0.003  # s, by which a measurement may take longer than lately
 ENCODERS_TOO_OLD: Final = 0.05  # s; what torques made of the joints since is too uncertain
-_REPEATS = 6  # of encoders; a resting arm's 12 bits are the same for longer
+_REPEATS: Final = 6  # of encoders; a resting arm's 12 bits are the same for longer
 _LONGEST_STEP: Final = 0.05  # s, by which joints are predicted at once
 _WAITING_AT_START: Final = 16  # samples that are looked at
 _SPEED_AT_START: Final = 2.0  # m/s and rad/s, with which a vehicle moves between two poses
