@@ -22,6 +22,7 @@ from pymavlink import mavutil
 from benchmarks.machine_watch import descendants, version_and_machine
 from benchmarks.requirement import Requirement, print_requirements
 from benchmarks.soak_client import ANSWER_S, COMPONENT, SYSTEM, Client
+from benchmarks.soak_faults import scenario
 from command_line.options import json_file, option, read
 from command_line.output import complain, console_beside, json_text, write_text
 from command_line.values import number, whole
@@ -131,7 +132,9 @@ def fly(options: SoakOptions, flight: int, left_s: float, display: Display) -> S
         watch = threading.Thread(target=used.watch, args=(os.getpid(),), daemon=True)
         watch.start()
         client.start()
-        sitl = ["ground", "--realtime", f"--duration={left_s!r}", f"--seed={flight}"]
+        failing = out / "failing.toml"
+        failing.write_text(scenario(1000 * options.seed + flight, left_s), encoding="ascii")
+        sitl = [str(failing), "--realtime", f"--duration={left_s!r}", f"--seed={flight}"]
         sitl += [f"--sensors={options.sensors}", "--listen=udp:127.0.0.1:0", "--wait=600"]
         try:
             flown = Supervisor(display, out).run(
