@@ -5,8 +5,9 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
+from command_line.bounded_file import read_bounded
 from command_line.options import json_file, option, read
 from command_line.output import complain, console_beside, json_text, unwritten
 from command_line.parser import COULD_NOT_START
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 
 CERTIFIED, DIFFERS = 0, 1  # exit codes
 PAGE = "certificate.html"
+_MOST_BYTES: Final = 64 * 1024 * 1024  # of a page that is read
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -109,7 +111,7 @@ def _statement(path: Path) -> dict[str, Any]:
     from studies.statistics.certificate_page import statement_in
 
     try:
-        stated = statement_in(path.read_text(encoding="utf-8"))
+        stated = statement_in(read_bounded(path, _MOST_BYTES).decode("utf-8"))
     except UnicodeDecodeError:
         stated = None
     if stated is None or stated.get("format") != FORMAT:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from command_line.bounded_file import read_bounded
 from command_line.options import group, json_file, option, read
 from command_line.output import complain, console_beside, json_text, write_text
 from command_line.parser import COULD_NOT_START
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 HOLDS, BROKEN = 0, 1  # exit codes
 _FORMAT: Final = "pandion-disturbance-1"
 _MM: Final = 1e3
+_MOST_BYTES: Final = 64 * 1024 * 1024  # of a file that is read
 _STEPS_A_SECOND: Final = 500
 
 
@@ -325,7 +327,7 @@ def _replayed(flown: Replayed) -> dict[str, Any]:
 def _read(path: Path, scenario: Scenario) -> tuple[int, tuple[tuple[float, float, float], ...]]:
     """The first step and the values of a kept disturbance."""
     try:
-        kept = json.loads(path.read_text(encoding="utf-8"))
+        kept = json.loads(read_bounded(path, _MOST_BYTES))
         if kept["format"] != _FORMAT:
             raise KeyError("format")
         first = kept["first_step"]

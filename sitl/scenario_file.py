@@ -13,6 +13,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_args, get_origin
 
+from command_line.bounded_file import read_bounded
 from sitl.scenario import Range, Scenario, ScenarioZone, Sensors
 from sitl.sensors.keys import MeasuredSensors, SuiteName
 
@@ -87,13 +88,9 @@ def _path(name_or_path: str) -> Path:
 
 def _content(path: Path) -> bytes:
     try:
-        with path.open("rb") as file:
-            content = file.read(_MOST_BYTES + 1)  # of a device or a pipe no more either
+        return read_bounded(path, _MOST_BYTES)
     except OSError as error:
         raise ScenarioError(f"cannot read scenario {path}: {error.strerror}") from error
-    if len(content) > _MOST_BYTES:
-        raise ScenarioError(f"scenario {path} is too long: must be at most {_MOST_BYTES} bytes")
-    return content
 
 
 def parse_scenario(text: str, name: str, suite: str | None = None) -> Scenario:

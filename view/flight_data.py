@@ -11,6 +11,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from command_line.bounded_file import read_bounded
 from fsw.log.json_codec import JsonCodec
 from fsw.signals import TickInputs
 from messages import ulog
@@ -27,6 +28,7 @@ _NUMPY: Final = {
     "bool": "?",
 }  # fmt: skip
 _INPUTS: Final = "tick_input"
+_MOST_BYTES: Final = 16 * 1024 * 1024  # of a result
 
 
 class Text(NamedTuple):
@@ -175,7 +177,7 @@ def _beside(path: Path) -> dict[str, Any]:
     found = {}
     for stem in ("result", "sitl", "fsw"):
         try:
-            read = json.loads((path.parent / f"{stem}.json").read_text(encoding="utf-8"))
+            read = json.loads(read_bounded(path.parent / f"{stem}.json", _MOST_BYTES))
         except (OSError, ValueError):
             continue
         if isinstance(read, dict):

@@ -34,6 +34,10 @@ from view.scene import (
 from view.vehicle import horizon
 
 _EVENTS: Final = 500
+# Of a vehicle and all that speak beside it; what is beyond somebody makes up.
+_MOST_HEARD: Final = 4096  # kinds of messages
+_MOST_PARAMETERS: Final = 4096
+_MOST_TEXT: Final = 255 * 50  # bytes of one sentence, as STATUSTEXT numbers its pieces
 _IGNORE_POSITION: Final = 0x7
 _ARMED, _FAILSAFE, _TERMINATED = 128, 5, 8
 _ON_GROUND: Final = 1
@@ -107,6 +111,8 @@ class Telemetry:
         key = (frame.system_id, frame.component_id, frame.message_id)
         one = self.heard.get(key)
         if one is None:
+            if len(self.heard) >= _MOST_HEARD:
+                return  # no vehicle says so much; somebody makes it up
             self.heard[key] = one = Heard(*key)
         if one.count:
             since = at - one.at
@@ -174,6 +180,8 @@ class Telemetry:
         if position is None or attitude is None:
             return None
         q_arm = (0.0, 0.0) if arm is None else (arm[1], arm[2])
+        if not all(map(math.isfinite, (*position[1:4], *attitude[1:4], *q_arm))):
+            return None  # an estimate that is lost, or somebody's frame
         return Posture(_vec3(position[1:4]), quaternion(*attitude[1:4]), q_arm)
 
     def _thrust(self, servos: tuple[Any, ...]) -> Vec4:
@@ -269,7 +277,8 @@ class Telemetry:
         text = raw.rstrip(b"\0")
         if number:
             text = (self._pieces.get(number, b"") if piece else b"") + text
-            self._pieces = {number: text} if len(raw.rstrip(b"\0")) == len(raw) else {}
+            goes_on = len(raw.rstrip(b"\0")) == len(raw) and len(text) < _MOST_TEXT
+            self._pieces = {number: text} if goes_on else {}
             if self._pieces:
                 return
         sentence = text.decode("utf-8", "replace")
@@ -301,7 +310,9 @@ class Telemetry:
         value, count, index, name, _ = values
         if index < count:
             self.parameter_count = count
-        self.parameters[_text(name)] = nearest_decimal(value)
+        known = _text(name)
+        if known in self.parameters or len(self.parameters) < _MOST_PARAMETERS:
+            self.parameters[known] = nearest_decimal(value)
 
     def read_timing(self, values: tuple[Any, ...]) -> None:
         """Take a LOOP_TIMING."""

@@ -10,6 +10,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from command_line.bounded_file import read_bounded
 from fsw.model.airframe import AIRFRAME
 from fsw.signals import Vec3
 from messages.tlog_reader import tlog_frames
@@ -22,6 +23,8 @@ from view.vehicle import places, tilt
 Array = NDArray[Any]
 
 _SCENE_S: Final = 0.04  # between two scenes that are kept
+_MOST_BYTES: Final = 128 * 1024 * 1024  # an hour of a vehicle's telemetry has 40 MB
+_MOST_SCENES: Final = 360_000
 
 
 class TlogFlight:
@@ -37,7 +40,7 @@ class TlogFlight:
         telemetry = Telemetry()
         self._scenes: list[Scene] = []
         try:
-            log = path.read_bytes()
+            log = read_bounded(path, _MOST_BYTES)
         except OSError as error:
             raise UlogError(f"cannot read {path}: {error.strerror}") from None
         for at, frame in tlog_frames(log):
@@ -47,6 +50,9 @@ class TlogFlight:
                 scene = telemetry.scene(at)
                 if scene.estimate is not None:
                     self._scenes.append(scene)
+                if len(self._scenes) > _MOST_SCENES:
+                    longest = _MOST_SCENES * _SCENE_S / 3600.0
+                    raise UlogError(f"{path} is too long: at most {longest:.0f} h can be shown")
         if not self._scenes:
             raise UlogError(f"{path} is no telemetry log with positions of a vehicle")
         self._times = [scene.t for scene in self._scenes]

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from command_line.bounded_file import read_bounded
 from fsw.parameters.facts import FACT_BY_NAME
 from fsw.parameters.float32 import as_text, nearest_decimal
 from fsw.parameters.registry import BY_NAME
@@ -22,6 +23,9 @@ from fsw.parameters.registry import BY_NAME
 VEHICLE: Final = 1  # MAVLink system of the vehicle
 COMPONENT: Final = 1  # and its autopilot's component
 REAL32: Final = 9  # MAV_PARAM_TYPE
+
+_MOST_BYTES: Final = 1024 * 1024  # a file of all parameters has 12 kB
+_MOST_COMPLAINTS: Final = 20  # sentences; of the rest the number
 
 _HEAD: Final = """\
 # Onboard parameters for Vehicle 1
@@ -38,13 +42,13 @@ class Loaded:
     """What a file says."""
 
     values: dict[str, float]  # by name, each within its range
-    complaints: tuple[str, ...]  # a sentence for each line that is of no use
+    complaints: tuple[str, ...]  # a sentence for each line of no use, of many for the first ones
 
 
 def parse(text: str) -> Loaded:
     """Read either format; a later line for the same parameter wins."""
     values: dict[str, float] = {}
-    complaints = []
+    complaints, unusable = list[str](), 0
     for number, line in enumerate(text.splitlines(), start=1):
         words = line.partition("#")[0].replace(",", " ").split()
         if not words:
@@ -52,10 +56,14 @@ def parse(text: str) -> Loaded:
         try:
             name, value = _entry(words)
         except ValueError as error:
-            complaints.append(f"line {number} is passed over: {error}")
+            unusable += 1
+            if unusable <= _MOST_COMPLAINTS:
+                complaints.append(f"line {number} is passed over: {error}")
         else:
             if name not in FACT_BY_NAME:
                 values[name] = value
+    if unusable > _MOST_COMPLAINTS:
+        complaints.append(f"{unusable - _MOST_COMPLAINTS} more lines are passed over")
     return Loaded(values, tuple(complaints))
 
 
@@ -63,10 +71,10 @@ def load(path: Path) -> Loaded:
     """Read a file.
 
     Raises:
-        OSError: It cannot be read.
+        OSError: It cannot be read, or is no file of parameters by its length.
     """
     # What is no UTF-8 shows as lines of no use, not as an error.
-    return parse(path.read_text(encoding="utf-8", errors="replace"))
+    return parse(read_bounded(path, _MOST_BYTES).decode("utf-8", "replace"))
 
 
 def as_params(values: Mapping[str, float]) -> str:

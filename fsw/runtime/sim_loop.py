@@ -37,6 +37,7 @@ from fsw.signals import (
     CommandRequest,
     CommandResult,
     HostHealth,
+    InjectFailure,
     OffboardReport,
     PlannerCounters,
     SafetyCounters,
@@ -54,13 +55,20 @@ _START_US: Final = 1_000_000  # time stamp of the simulator's step 0
 def to_route(commands: tuple[Command, ...], acks: tuple[CommandAck, ...]) -> list[CommandRequest]:
     """Commands that go on to the simulator, whose acknowledgement their senders get.
 
-    A tick answers each of its commands in their order.
+    A tick answers each of its commands in their order. The simulator gets the numbers that were
+    understood: MAVLink leaves a parameter out as NaN.
     """
     return [
-        command.request
+        replace(command.request, params=_understood(command.action))
         for command, ack in zip(commands, acks, strict=False)
-        if ack.result == CommandResult.IN_PROGRESS
+        if ack.result == CommandResult.IN_PROGRESS and isinstance(command.action, InjectFailure)
     ]
+
+
+def _understood(
+    asked: InjectFailure,
+) -> tuple[float, float, float, float, float, float, float]:
+    return float(asked.unit), float(asked.kind), float(asked.instance), 0.0, 0.0, 0.0, 0.0
 
 
 class Ending(enum.Enum):

@@ -15,6 +15,7 @@ from sitl.simulation import Controls
 
 _ARMED: Final = 128  # MAV_MODE_FLAG in the mode of HIL_ACTUATOR_CONTROLS
 _JOINTS_AT: Final = 6  # wire index of controls[4]
+_WHOLE: Final = range(256)  # numbers of units, kinds and instances
 _CONTROLS_ALONE: Final = LockstepReader((message_ids.HIL_ACTUATOR_CONTROLS, 19))
 
 
@@ -69,12 +70,17 @@ def acknowledgements(frames: list[Frame]) -> tuple[Ack, ...]:
 
 
 def _injections(frames: list[Frame]) -> tuple[Injection, ...]:
-    """MAV_CMD_INJECT_FAILURE, which the vehicle routes here in the name of who sent it."""
+    """MAV_CMD_INJECT_FAILURE, which the vehicle routes here in the name of who sent it.
+
+    The vehicle has refused what is not whole; from anything else it is passed over.
+    """
     found = []
     for frame in frames:
         if frame.message_id == message_ids.COMMAND_LONG:
             *params, command, _, _, _ = cast("tuple[float, ...]", frame.payload_values)
             if command == message_ids.CMD_INJECT_FAILURE:
+                if not all(value in _WHOLE for value in params[:3]):
+                    continue
                 unit, kind, instance = (int(value) for value in params[:3])
                 asked = Injection(unit, kind, instance, frame.system_id, frame.component_id)
                 found.append(asked)

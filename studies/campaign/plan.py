@@ -12,6 +12,7 @@ from itertools import product
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal, TypeAlias, cast
 
+from command_line.bounded_file import read_bounded
 from fsw.parameters.contradictions import contradictions
 from fsw.parameters.flight_config import FlightConfig, flight_config
 from fsw.parameters.float32 import nearest_decimal
@@ -217,11 +218,9 @@ def load_tables(path: Path, own: tuple[str, ...]) -> tuple[CampaignPlan, dict[st
         CampaignError: As of ``load_plan``.
     """
     try:
-        content = path.read_bytes()[: _MOST_BYTES + 1]
+        content = read_bounded(path, _MOST_BYTES)
     except OSError as error:
         raise CampaignError(f"cannot read campaign {path}: {error.strerror}") from None
-    if len(content) > _MOST_BYTES:
-        raise CampaignError(f"campaign {path} is too long: must be at most {_MOST_BYTES} bytes")
     try:
         table = _table(content.decode("utf-8"))
         found = {key: table.pop(key) for key in own if key in table}

@@ -16,8 +16,9 @@ from collections.abc import Iterable
 from contextlib import closing
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
+from command_line.bounded_file import read_bounded
 from command_line.output import json_text
 from command_line.version import version
 from studies.campaign.flight import CampaignRow, code, row_key
@@ -35,6 +36,7 @@ PLAN, JOURNAL, FACTS, TABLE, PAGE = (
     "rows.parquet",
     "campaign.html",
 )
+_MOST_BYTES: Final = 16 * 1024 * 1024  # of the facts
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,7 +100,7 @@ def read(directory: Path) -> CampaignResult:
 def _facts(directory: Path) -> tuple[dict[str, Any], Digests, int] | None:
     """What campaign.json says, its digests and flights; None if it cannot be read or used."""
     try:
-        facts = json.loads((directory / FACTS).read_text(encoding="utf-8"))
+        facts = json.loads(read_bounded(directory / FACTS, _MOST_BYTES))
         digests, asked = Digests(**facts["digests"]), facts["flights"]
     except (OSError, ValueError, TypeError, KeyError, RecursionError):
         return None

@@ -14,6 +14,7 @@ import subprocess
 import sys
 import zipfile
 from contextlib import ExitStack
+from importlib import import_module
 from pathlib import Path
 
 CORPUS = Path(__file__).parent / "corpus"
@@ -28,7 +29,11 @@ PACKAGES = {  # of each target: in which an input may reach something new
     "datagrams": ["messages.frames"],
     "ground-link": ["fsw.link"],
     "simulator-link": ["fsw.link.sim_link", "fsw.link.wire"],
+    "vehicle-replies": ["sitl.link", "messages.status_text", "messages.lockstep_codec"],
+    "tlog": ["view", "messages.tlog_reader", "fsw.link.wire.decode"],
 }
+# Imported as they are: what compiles kernels cannot be traced.
+PLAIN = {"tlog": ["view.vehicle"]}
 
 
 def kept(name: str) -> list[bytes]:
@@ -94,6 +99,8 @@ def _fuzz(name: str, words: list[str]) -> None:
     """Fuzz one target in this process, which libFuzzer ends."""
     import atheris
 
+    for plain in PLAIN.get(name, ()):
+        import_module(plain)
     with atheris.instrument_imports(include=PACKAGES[name], enable_loader_override=False):
         from tests.fuzz.targets import SET_UPS, seeds
     corpus = WORK / name / "corpus"

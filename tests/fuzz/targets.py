@@ -17,22 +17,32 @@ from docs.pages.messages import heard
 from fsw.link.inbox import Inbox
 from fsw.link.signing.key_file import KeyFile
 from fsw.link.sim_link import SimLink
+from fsw.link.telemetry.streams import STREAMS
 from fsw.link.udp_endpoint import LinkError
 from fsw.link.wire import message_ids as ids
+from fsw.link.wire.message_ids import SYSTEM_ID
 from fsw.parameters import storage
 from fsw.parameters.registry import PARAMETERS
 from messages import dialect
 from messages.frames import cut
 from messages.ulog_reader import UlogError, open_log
 from pandion.log_summary import summary
+from sitl.link.decode import read_reply
+from sitl.link.encode import StepEncoder
+from sitl.link.failures import Answer
 from sitl.scenario_file import PACKAGED, ScenarioError, parse_scenario
 from sitl.scenario_validation import check
 from tests.fsw.link.ground import station_socket, whole_vehicle
 from tests.fsw.link.snapshots import FACTS
 from tests.messages.test_ulog import written
+from tests.view.test_telemetry import a_log
+from view.tlog_flight import TlogFlight
 
 Try = Callable[[bytes], None]
 _MOST_FRAMES = 8
+_STATION = 255  # MAVLink system
+# What a simulator reads of a vehicle; the controls come last in a datagram.
+_REPLIES = (ids.COMMAND_LONG, ids.COMMAND_ACK, ids.STATUSTEXT, ids.HEARTBEAT, 93)
 
 
 def _scenario(stack: ExitStack) -> Try:
@@ -87,7 +97,9 @@ def _datagrams(stack: ExitStack) -> Try:
     return attempt
 
 
-def _valid_frames(data: bytes, listened: tuple[int, ...]) -> Iterator[bytes]:
+def _valid_frames(
+    data: bytes, listened: tuple[int, ...], sender: int = _STATION
+) -> Iterator[bytes]:
     """Frames with right checksums: an index into ``listened``, a length, a payload, and so on."""
     at = 0
     for sequence in range(_MOST_FRAMES):
@@ -97,7 +109,7 @@ def _valid_frames(data: bytes, listened: tuple[int, ...]) -> Iterator[bytes]:
         message = dialect.mavlink_map[message_id]
         payload = data[at + 2 : at + 2 + min(size, message.unpacker.size)] or b"\0"
         at += 2 + len(payload)
-        body = struct.pack("<BBBBBB", len(payload), 0, 0, sequence, 255, 190)
+        body = struct.pack("<BBBBBB", len(payload), 0, 0, sequence, sender, 190)
         body += message_id.to_bytes(3, "little") + payload
         checksum = fastcrc.crc16.mcrf4xx(body + bytes([message.crc_extra]))
         yield b"\xfd" + body + checksum.to_bytes(2, "little")
@@ -146,6 +158,34 @@ def _simulator_link(stack: ExitStack) -> Try:
     return attempt
 
 
+def _vehicle_replies(stack: ExitStack) -> Try:
+    encoder, done = StepEncoder(lockstep=True), Answer(0, "fault injected")
+
+    def attempt(data: bytes) -> None:
+        reply = read_reply(b"".join(_valid_frames(data, _REPLIES)) or data, 2)
+        for one in () if reply is None else reply.injections:
+            encoder.answer(one, done)
+
+    return attempt
+
+
+def _tlog(stack: ExitStack) -> Try:
+    path = Path(stack.enter_context(tempfile.TemporaryDirectory())) / "flight.tlog"
+    told = tuple(sorted({stream.message_id for stream in STREAMS} | {ids.OBSTACLE_SHAPE}))
+
+    def attempt(data: bytes) -> None:
+        frames = list(_valid_frames(data, told, SYSTEM_ID))
+        path.write_bytes(b"".join(bytes(8) + frame for frame in frames) or data)
+        with suppress(UlogError):
+            flight = TlogFlight(path)
+            flight.scene(flight.end)
+            flight.region()
+            flight.curves()
+            flight.reference()
+
+    return attempt
+
+
 SET_UPS: dict[str, Callable[[ExitStack], Try]] = {
     "scenario": _scenario,
     "parameters": _parameters,
@@ -154,6 +194,8 @@ SET_UPS: dict[str, Callable[[ExitStack], Try]] = {
     "datagrams": _datagrams,
     "ground-link": _ground_link,
     "simulator-link": _simulator_link,
+    "vehicle-replies": _vehicle_replies,
+    "tlog": _tlog,
 }
 
 
@@ -170,4 +212,6 @@ def seeds(name: str) -> list[bytes]:
         return [written()]
     if name == "datagrams":
         return list(_valid_frames(bytes(range(1, 255)), tuple(dialect.mavlink_map)))
+    if name == "tlog":
+        return [a_log(2)]
     return [bytes([k, 40, *range(40)]) for k in range(80)]

@@ -18,6 +18,7 @@ from fsw.shapes.half_space import wall
 from fsw.signals import FailsafeEvent, Mode, PlanInput, SafeSet, Severity, Zone
 from messages.frames import FrameWriter, split
 from tests.fsw.link.snapshots import CONTEXT, SNAPSHOT
+from view import tlog_flight
 from view.flight_data import UlogError
 from view.telemetry import Telemetry
 from view.tlog_flight import TlogFlight
@@ -176,16 +177,64 @@ def test_memory_is_bounded() -> None:
     assert telemetry.events[-1].text == "text 1999"
 
 
-def test_a_telemetry_log_is_a_flight(tmp_path: Path) -> None:
+def test_somebody_who_makes_up_messages_does_not_fill_the_memory() -> None:
+    telemetry = Telemetry()
+    take(telemetry, *everything())
+    known = set(telemetry.heard)
+    for system in range(1, 40):
+        for component in range(1, 255):
+            frame = FrameWriter(system, component).frame(ids.HEARTBEAT, 0, 2, 3, 0, 4, 3)
+            for one in split(frame):
+                telemetry.take(one, 0.0)
+    for k in range(6000):
+        take(telemetry, Outgoing(ids.PARAM_VALUE, (1.0, 9, 0, b"P%d" % k, 9)))
+        take(telemetry, Outgoing(ids.STATUSTEXT, (6, b"x" * 50, 7, 1 + k % 250)))
+    assert len(telemetry.heard) <= 4096
+    assert known <= set(telemetry.heard)
+    assert len(telemetry.parameters) <= 4096
+    assert max(len(one.text) for one in telemetry.events) <= 255 * 50
+
+
+@pytest.mark.parametrize("wrong", [math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize("message_id", [ids.ATTITUDE, ids.LOCAL_POSITION_NED, ids.ARM_JOINT_STATE])
+def test_an_estimate_that_is_no_number_is_no_place(message_id: int, wrong: float) -> None:
+    telemetry = Telemetry()
+    take(telemetry, *everything())
+    assert telemetry.scene().estimate is not None
+    (sent,) = messages_now(message_id, 0.0, FLYING, CONTEXT) or ()
+    take(telemetry, replace(sent, values=(sent.values[0], wrong, *sent.values[2:])))
+    assert telemetry.scene().estimate is None
+
+
+@pytest.mark.parametrize("what", ["bytes", "hours"])
+def test_a_telemetry_log_of_any_length_is_refused(
+    what: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "flight.tlog"
+    if what == "bytes":
+        path.symlink_to("/dev/zero")
+    else:
+        monkeypatch.setattr(tlog_flight, "_MOST_SCENES", 20)
+        path.write_bytes(a_log(50))
+    with pytest.raises(UlogError, match=r"too long: (must be )?at most"):
+        TlogFlight(path)
+
+
+def a_log(steps: int) -> bytes:
+    """Everything that is sent, 50 times a second."""
     log = bytearray()
-    for k in range(50):
+    for k in range(steps):
         t_us = 3_000_000 + 20_000 * k
         now = replace(FLYING, t_us=t_us, estimate=FLYING.estimate._replace(t_us=t_us))
         for one in everything(now):
             frame = WRITERS[one.component].frame(one.message_id, *one.values)
             log += (1_700_000_000_000_000 + t_us).to_bytes(8, "big") + frame
+    return bytes(log)
+
+
+def test_a_telemetry_log_is_a_flight(tmp_path: Path) -> None:
     path = tmp_path / "flight.tlog"
-    path.write_bytes(log)
+    path.write_bytes(a_log(50))
     flight = TlogFlight(path)
     assert (flight.begin, flight.end) == pytest.approx((3.0, 3.96), abs=0.05)
     assert flight.worst is not None

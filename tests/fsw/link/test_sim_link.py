@@ -352,6 +352,20 @@ def test_a_fault_is_asked_for_in_the_name_of_its_sender_and_the_answer_comes_bac
     assert math.isnan(simulation.sense().gyro_B[0])
 
 
+@pytest.mark.parametrize("number", [NAN, math.inf, -1.0, 0.5, 256.0, 1e30])
+@pytest.mark.parametrize("place", range(3))
+def test_the_simulator_passes_over_a_fault_of_no_number(
+    wire: Wire, number: float, place: int
+) -> None:
+    params = [1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+    params[place] = number
+    wire.link.route(replace(INJECT, params=tuple(params)))
+    wire.link.send_actuators(1_002_000, outputs_at(1_002_000))
+    reply = read_reply(wire.hear(), 2)
+    assert reply is not None
+    assert reply.injections == ()
+
+
 @pytest.mark.parametrize(
     ("numbers", "result", "sentence"),
     [

@@ -185,3 +185,18 @@ def test_what_could_not_be_used_is_not_lost_when_the_file_is_written(tmp_path: P
 def test_a_file_that_cannot_be_written_is_noticed_before_the_flight(tmp_path: Path) -> None:
     with pytest.raises(OSError, match="nowhere"):
         keeping(tmp_path / "nowhere" / "vehicle.params", tmp_path)
+
+
+def test_a_file_of_any_length_is_refused_at_once(tmp_path: Path) -> None:
+    endless = tmp_path / "endless.params"
+    endless.symlink_to("/dev/zero")
+    with pytest.raises(OSError, match="too long: must be at most 1048576 bytes"):
+        load(endless)
+
+
+def test_of_many_lines_of_no_use_the_first_are_named_and_the_rest_counted() -> None:
+    complaints = parse("nothing\n" * 50_000).complaints
+    assert len(complaints) == 21
+    assert complaints[0].startswith("line 1 is passed over")
+    assert complaints[-1] == "49980 more lines are passed over"
+    assert len(parse("nothing\n" * 20).complaints) == 20

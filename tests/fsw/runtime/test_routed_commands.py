@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from fsw.runtime.sim_loop import to_route
 from fsw.signals import (
     Command,
@@ -18,9 +20,11 @@ INJECT_FAILURE = 420
 GOES_ON, DENIED = CommandResult.IN_PROGRESS, CommandResult.DENIED
 
 
-def asked(unit: float, action: CommandAction, number: int = INJECT_FAILURE) -> Command:
+def asked(
+    unit: float, action: CommandAction, number: int = INJECT_FAILURE, unused: float = 0.0
+) -> Command:
     """A command of the same sender as all others here."""
-    return Command(action, CommandRequest(number, (unit, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0), 255, 190))
+    return Command(action, CommandRequest(number, (unit, 1.0, *(unused,) * 5), 255, 190))
 
 
 def answer(result: CommandResult, number: int = INJECT_FAILURE) -> CommandAck:
@@ -38,3 +42,9 @@ def test_what_was_denied_does_not_go_on_beside_what_was_not() -> None:
     acks = (answer(DENIED), answer(CommandResult.ACCEPTED, 176), answer(GOES_ON))
     assert to_route((first, hold, second), acks) == [second.request]
     assert to_route((), ()) == []
+
+
+def test_what_mavlink_leaves_out_as_nan_goes_on_as_what_was_understood() -> None:
+    action = InjectFailure(1, 1, 0)
+    (sent,) = to_route((asked(1.0, action, unused=math.nan),), (answer(GOES_ON),))
+    assert sent == asked(1.0, action).request
