@@ -21,6 +21,7 @@ from fsw.link.udp_endpoint import LinkError
 from fsw.link.wire import message_ids as ids
 from fsw.parameters import storage
 from fsw.parameters.registry import PARAMETERS
+from fsw.runtime.clock import now_us
 from messages import dialect
 from messages.frames import cut
 from messages.ulog_reader import UlogError, open_log
@@ -128,7 +129,7 @@ def _ground_link(stack: ExitStack) -> Try:
 def _simulator_link(stack: ExitStack) -> Try:
     simulator = stack.enter_context(station_socket())
     inbox = Inbox()
-    link = SimLink(simulator.getsockname(), inbox, FACTS)
+    link = SimLink(simulator.getsockname(), inbox, FACTS, now_us)
     stack.callback(link.close)
     link.announce()
     _, vehicle = simulator.recvfrom(2048)
