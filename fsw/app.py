@@ -98,7 +98,7 @@ class _Session:
         inbox = Inbox(options.links.origin)
         start_us = clock.unix_us()
         files = self._files(directory, start_us, program)
-        sim = SimLink(simulator, inbox, facts)
+        sim = SimLink(simulator, inbox, facts, clock.now_us)
         autopilot = AUTOPILOTS[options.links.autopilot]
         context = TelemetryContext(
             facts,

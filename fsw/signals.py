@@ -876,6 +876,8 @@ class TickInputs:
     samples: tuple[Sample, ...] = ()
     battery: BatteryReading | None = None  # newly measured
     host: HostHealth | None = None  # where it differs from the last one
+    # By how much the sensors' clock has jumped. The times in here are the vehicle's: none has.
+    clock_jump_us: int = 0
 
 
 @dataclass(frozen=True, slots=True)

@@ -151,8 +151,8 @@ class Simulation:
         return START_US + STEP_US * self.step
 
     @property
-    def vehicle_time_us(self) -> int:
-        """Time stamp of the current state by the vehicle's clock, which may fail [µs]."""
+    def sensor_time_us(self) -> int:
+        """Time stamp of the current state by the sensors' clock, which may fail [µs]."""
         self.faults.at(self.step)
         return self.t_us + self.faults.clock_us
 

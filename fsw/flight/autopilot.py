@@ -245,7 +245,7 @@ class Autopilot:
         if tilted or not estimate.R_WB[8] > watch.upright:
             safety = watch.attitude(safety, estimate, flies=state.vehicle.flies)
         if state.index >= 0 and not 0 < estimate.t_us - state.t_us <= self._most_us:
-            safety = watch.jumped(safety, estimate.t_us, state.t_us)
+            safety = watch.jumped(safety, estimate.t_us, estimate.t_us - state.t_us)
         return state if safety is state.safety else replace(state, safety=safety)
 
     def _follow(
@@ -302,6 +302,9 @@ class Autopilot:
             state = replace(state, battery=battery)
         if inputs.host is not None:
             state = replace(state, host=inputs.host)
+        if inputs.clock_jump_us:
+            safety = self._watch.jumped(state.safety, now_us, inputs.clock_jump_us)
+            state = replace(state, safety=safety)
         if inputs.ground_station_heard:
             state = replace(state, vehicle=replace(state.vehicle, gcs_heard_us=now_us))
         unheard = inputs.motion is None and inputs.attitude is None and inputs.joints is None

@@ -434,7 +434,7 @@ def _refused_plan(context: FailsafeContext) -> str:
 
 
 def _jumped(context: FailsafeContext) -> str:
-    return f" by {1e-6 * context.state.safety.jump_us:.2f} s"
+    return f" by {1e-6 * context.state.safety.jump_us:+.2f} s"
 
 
 def _by_mm(length: float) -> str:
@@ -700,10 +700,10 @@ FAILSAFES: Final = (
         Severity.CRITICAL,
         _jumped,
         slow=True,
-        detected="the time stamp of the sensors went on by more ticks at once than are made up for "
-        "(25, 50 ms)",
+        detected="the sensors' clock went back, or the time stamp of the sensors went on by more "
+        "ticks at once than are made up for (25, 50 ms)",
         within_us=_SLOWLY,
-        does="critical text; the flight goes on from the new time",
+        does="critical text; where the clock alone jumped, the vehicle's time goes on evenly",
         ends="a second later",
     ),
     Failsafe(

@@ -130,9 +130,9 @@ class SafetyWatch:
         fence = report.margins[sum(report.per_zone[:announced]) :]
         return min(fence) <= min(report.margins)
 
-    def jumped(self, memory: SafetyMemory, now_us: int, since_us: int) -> SafetyMemory:
-        """Note that ``since_us`` [us] was the tick before this one, which is too long ago."""
-        return replace(memory, jump_us=now_us - since_us, jumped_us=now_us)
+    def jumped(self, memory: SafetyMemory, now_us: int, jump_us: int) -> SafetyMemory:
+        """Note a jump of time, from one tick to the next or of the sensors' clock alone."""
+        return replace(memory, jump_us=jump_us, jumped_us=now_us)
 
     def filtered(self, memory: SafetyMemory, now_us: int, *, pushed: bool) -> SafetyMemory:
         """Note whether the safety filter changed the acceleration of this tick."""

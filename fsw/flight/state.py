@@ -171,7 +171,7 @@ class SafetyMemory:
     filter_us: int = -1  # when the safety filter changed an acceleration last
     rolled_us: int = -1  # since when the roll has been beyond its limit; -1: it is not
     pitched_us: int = -1  # the same of the pitch
-    jump_us: int = 0  # how far time jumped from one tick to the next, lately
+    jump_us: int = 0  # how far time or the sensors' clock jumped from one tick to the next, lately
     jumped_us: int = -1  # when
     counters: SafetyCounters = field(default_factory=SafetyCounters)
 

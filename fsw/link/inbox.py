@@ -44,7 +44,7 @@ _MAX_COMMANDS: Final = 16  # a tick; a client sends one at a time and repeats it
 _MAX_TARGETS: Final = 64  # a tick
 _MAX_ANNOUNCEMENTS: Final = 4  # a tick
 _MAX_ANNOUNCERS: Final = 8  # whose safe sets may be incomplete at the same time
-_MAX_SAMPLES: Final = 512  # a tick; a second of a suite has some 1300
+MAX_SAMPLES: Final = 512  # a tick; a second of a suite has some 1300
 _GROUND_STATION: Final = 6  # MAV_TYPE
 UNKNOWN_SOURCE: Final = MessageSource(0, 0, "unknown")
 
@@ -65,6 +65,7 @@ class Received:
     station_heard: bool = False  # a ground station's heartbeat
     samples: list[Sample] = field(default_factory=list)  # of sensors, in order of arrival
     battery: BatteryReading | None = None  # the newest
+    clock_jump_us: int = 0  # of the sensors' clock
 
 
 @dataclass(slots=True)
@@ -120,13 +121,17 @@ class Inbox:
         """Keep what sensors have measured; the oldest go where a tick has taken none for long."""
         kept = self._received.samples
         kept += samples
-        if len(kept) > _MAX_SAMPLES:
-            self.refused += len(kept) - _MAX_SAMPLES
-            del kept[:-_MAX_SAMPLES]
+        if len(kept) > MAX_SAMPLES:
+            self.refused += len(kept) - MAX_SAMPLES
+            del kept[:-MAX_SAMPLES]
 
     def accept_battery(self, reading: BatteryReading) -> None:
         """Keep what the battery's sensor has measured last."""
         self._received.battery = reading
+
+    def accept_clock_jump(self, jump_us: int) -> None:
+        """Keep by how much [us] the sensors' clock has jumped against the vehicle's time."""
+        self._received.clock_jump_us += jump_us
 
     def take(self) -> Received:
         """Hand over what came."""
@@ -165,6 +170,7 @@ class Inbox:
             tuple(came.samples),
             came.battery,
             host,
+            came.clock_jump_us,
         )
 
     def _command(self, read: Callable[[Frame], CommandRequest | None], frame: Frame) -> None:

@@ -6,6 +6,9 @@ The simulator sends everything that belongs to step t_k with HIL_SENSOR last, as
 the true state, or what sensors have measured; its HEARTBEAT says which. The answer ends with
 exactly one HIL_ACTUATOR_CONTROLS of the same time stamp. In lockstep the simulator repeats a step
 whose answer got lost: the same answer is sent again and no tick runs.
+
+Stamps on the wire are of the sensors' clock, all others of the vehicle's time: see
+``sensor_clock.py``.
 """
 
 from __future__ import annotations
@@ -14,8 +17,10 @@ import math
 from enum import Enum
 from typing import Final, cast
 
-from fsw.link.inbox import Inbox
+from fsw.frozen import replace
+from fsw.link.inbox import MAX_SAMPLES, Inbox
 from fsw.link.outbox import packed
+from fsw.link.sensor_clock import SensorClock
 from fsw.link.udp_endpoint import Address
 from fsw.link.wire import decode, encode_replies, message_ids
 from fsw.link.wire.decode import Numbers
@@ -30,7 +35,7 @@ from fsw.link.wire.decode_sensors import (
 from fsw.link.wire.message_ids import AUTOPILOT, SIMULATOR, SYSTEM_ID
 from fsw.link.wire.px4_mode import custom_mode
 from fsw.measurements import ImuSample, Sample
-from fsw.ports import VehicleFacts
+from fsw.ports import Clock, VehicleFacts
 from fsw.signals import (
     CommandAck,
     CommandRequest,
@@ -71,10 +76,6 @@ _STEP_WITH_POSE: Final = LockstepReader(
 _FLAGS_AT: Final = -3
 _INERTIAL: Final = 0x3F
 _SENSOR_AT: Final = 15  # place of HIL_SENSOR's id; the step's clock has 0
-# A stamp farther ahead of the last one is believed only if the next step follows it: with a single
-# wrong one the vehicle would take all later steps for old ones. Such a silence ends the flight.
-_AHEAD_US: Final = 1_200_000
-_LAST_US: Final = 1 << 62  # a stamp beyond is none: no step could follow it
 _LOCKSTEP_BIT, _MEASURED_BIT = 1, 2  # of the custom_mode in the simulator's HEARTBEAT
 _NO_VECTOR: Final = (math.nan, math.nan, math.nan)
 _NO_ATTITUDE: Final = (math.nan, math.nan, math.nan, math.nan)
@@ -91,7 +92,7 @@ class Pacing(Enum):
 class SimLink:
     """Sensors in, actuators out, over one UDP connection."""
 
-    def __init__(self, simulator: Address, inbox: Inbox, facts: VehicleFacts) -> None:
+    def __init__(self, simulator: Address, inbox: Inbox, facts: VehicleFacts, clock: Clock) -> None:
         self.pacing: Pacing | None = None  # known with the first step in lockstep
         self.measured = False  # what comes is measured by sensors, each at its own time
         self.shutdown = False  # the simulator has ended the run
@@ -104,10 +105,11 @@ class SimLink:
         self._writer = FrameWriter(SYSTEM_ID, AUTOPILOT)
         self._thrust_scale = 1.0 / facts.rotor_thrust_max
         self._torque_scale = 1.0 / facts.joint_torque_max
-        self._last_us = -1  # time of the newest step seen
-        self._first = False  # that was the first one
-        self._doubted_us = -1  # time of a step that was too far ahead
-        self._answer: tuple[int, list[bytes]] = (-1, [])
+        self._steps = SensorClock(
+            facts.tick_period_us, clock, self.notices.append, inbox.accept_clock_jump
+        )
+        self._early: list[Sample] = []  # of the next step, which had no room for them
+        self._answer: tuple[int, list[bytes]] = (-1, [])  # with the stamp of its step
         self._acks: list[CommandAck] = []
         self._routed: list[bytes] = []
         self._text_id = 0
@@ -125,13 +127,22 @@ class SimLink:
         None when nothing new came within the patience, or when the run is over.
         """
         datagram = self._endpoint.receive()
-        return None if datagram is None else self._read(datagram)
+        if datagram is None:
+            self._steps.silences += 1
+            return None
+        step = self._read(datagram)
+        if step is None and self.pacing is not Pacing.LOCKSTEP:
+            self._steps.looks += 1  # in lockstep no other step comes before the answer
+        return step
 
     def newest(self) -> SensorFrame | None:
         """The newest of the steps that are there; what came with all of them is in the inbox."""
         newest = None
         while (datagram := self._endpoint.receive_waiting()) is not None:
             newest = self._read(datagram) or newest
+        self._steps.looks += 1
+        if newest is not None:
+            self._steps.note_time()
         return newest
 
     def wait(self, wait_s: float) -> bool:
@@ -150,8 +161,9 @@ class SimLink:
 
     def send_actuators(self, t_us: int, outputs: TickOutputs) -> None:
         """Send the actuator command that belongs to the step of ``t_us``."""
+        stamp_us = t_us + self._steps.ahead_us
         values = encode_replies.hil_actuator_controls(
-            t_us,
+            stamp_us,
             outputs.actuators,
             outputs.snapshot.armed,
             self._thrust_scale,
@@ -165,9 +177,9 @@ class SimLink:
             # Last, in the datagram of the controls: texts without room in it are of no use there.
             routed = b"".join(self._routed)
             self._routed.clear()
-            self._send((t_us, packed([mode, *self._replies(outputs), routed + controls])))
+            self._send((stamp_us, packed([mode, *self._replies(outputs), routed + controls])))
         else:
-            self._send((t_us, [controls]))
+            self._send((stamp_us, [controls]))
 
     def close(self) -> None:
         """Close the socket."""
@@ -238,12 +250,18 @@ class SimLink:
         t_us = int(barrier[0])
         if odometry is None or arm is None or not self._is_next(t_us):
             return None
-        return decode.sensor_frame(odometry, arm, barrier)
+        frame = decode.sensor_frame(odometry, arm, barrier)
+        ahead_us = self._steps.ahead_us
+        return frame if not ahead_us else replace(frame, t_us=t_us - ahead_us)
 
     def _new_measured(self, t_us: int, samples: list[Sample]) -> SensorFrame | None:
         """The time of a new step, whose samples are in the inbox; a known one is answered again."""
         if not self._is_next(t_us):
             return None
+        if self._early or self._steps.ahead_us:
+            samples = self._steps.in_vehicle_time([*self._early, *samples])
+            self._early.clear()
+            t_us -= self._steps.ahead_us
         self._inbox.accept_samples(samples)
         newest = samples[-1] if samples else None
         rate, force = _NO_VECTOR, _NO_VECTOR
@@ -256,25 +274,10 @@ class SimLink:
 
     def _is_next(self, t_us: int) -> bool:
         """Whether a step is a new one, which it is only once; a known one is answered again."""
-        if self._last_us < 0 and not t_us < _LAST_US:
-            self.notices.append("first step stamped beyond all times: ignored")
-            return False
-        if self._first and self._last_us - t_us > _AHEAD_US:
-            # The very first stamp was the wrong one: all steps would be older than it.
-            self.notices.append("first step stamped ahead of all others: forgotten")
-            self._last_us = -1
-        elif t_us <= self._last_us:
-            self._repeat(t_us)
-            return False
-        ahead_us = t_us - self._last_us
-        confirmed = 0 < t_us - self._doubted_us <= _AHEAD_US
-        if self._last_us >= 0 and ahead_us > _AHEAD_US and not confirmed:
-            self._doubted_us = t_us
-            self.notices.append(f"step stamped {1e-6 * ahead_us:.1f} s ahead: ignored")
-            return False
-        self._first = self._last_us < 0
-        self._last_us, self._doubted_us = t_us, -1
-        return True
+        if self._steps.follows(t_us):
+            return True
+        self._repeat(t_us)
+        return False
 
     def _repeat(self, t_us: int) -> None:
         if t_us == self._answer[0]:
@@ -290,7 +293,8 @@ class SimLink:
         """What ends the run, and measurements for which the next step has no room."""
         for frame in frames:
             if self.measured:
-                self._inbox.accept_samples(self._decoder.samples(frame))
+                self._early += self._decoder.samples(frame)
+                del self._early[:-MAX_SAMPLES]
             if frame.message_id == message_ids.COMMAND_LONG:
                 request = decode.command_long(frame)
                 if (

@@ -67,7 +67,7 @@ class Faults:
         self.charge = 1.0  # of the battery, at most
         self.of_battery = False  # whether it has failed, now or before
         self._share = 1.0  # of the thrust that the battery leaves
-        self.clock_us = 0  # by which the vehicle's clock is ahead
+        self.clock_us = 0  # by which the sensors' clock is ahead
         for fault in faults:
             self._add(fault, round(1e6 * fault.start_s / step_us))
 

@@ -75,15 +75,15 @@ def serve(
     state = PilotState(plan.first_phase)
     begin_s = reported_s = time.perf_counter()
     while simulation.ended is None:
-        readings, seen = simulation.sense(), simulation.healthy()
-        state, messages = pilot.speak(plan, state, readings.t_us)
+        stamp_us = simulation.sensor_time_us
+        # The pilot has a clock of its own, which does not fail with the sensors'.
+        t_us, seen = simulation.t_us, simulation.healthy()
+        state, messages = pilot.speak(plan, state, t_us)
         if simulation.faults.active:
             messages = _heard_of(simulation, messages, begun)
         datagram = _datagram(simulation, encoder, messages, exchange, answered)
         try:
-            answer = exchange.step(
-                simulation.step, readings.t_us, datagram, lambda: truth(simulation)
-            )
+            answer = exchange.step(simulation.step, stamp_us, datagram, lambda: truth(simulation))
             if simulation.step == 0:  # the vehicle may take its time for the first answer
                 begin_s = time.perf_counter()
             answered = _injected(simulation, encoder, answer)
@@ -92,9 +92,9 @@ def serve(
             kind = EndKind.INTERRUPTED if stop.requested else EndKind.STOPPED
             simulation.end(kind, str(error))
             break
-        state = pilot.listen(plan, state, _heard(answer, seen), readings.t_us)
+        state = pilot.listen(plan, state, _heard(answer, seen), t_us)
         if state.left is not None:
-            simulation.leave_trajectory(readings.t_us, state.left)
+            simulation.leave_trajectory(t_us, state.left)
         _end_if_over(simulation, state, stop)
         if simulation.step % _PROGRESS_STEPS == 0:
             now_s = time.perf_counter()
@@ -147,7 +147,8 @@ def _datagram(
     measured = simulation.measurements()
     if measured is None:
         return opening + encoder.datagram(simulation.sense(), messages)
-    ahead, datagram = encoder.measured_datagrams(simulation.t_us, measured, messages, opening)
+    t_us = simulation.sensor_time_us
+    ahead, datagram = encoder.measured_datagrams(t_us, measured, messages, opening)
     for one in ahead:
         exchange.send_ahead(one)
     return datagram

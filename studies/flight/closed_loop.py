@@ -85,7 +85,7 @@ class ClosedLoop(Generic[State]):
         arrived = simulation.measurements()
         if arrived is not None:
             samples = tuple([sample(one) for one in arrived])
-            return only_the_time(simulation.vehicle_time_us, samples), samples
+            return only_the_time(simulation.sensor_time_us, samples), samples
         now = simulation.sense()
         (q1, q2), (qd1, qd2) = now.q_arm, now.qd_arm
         # By position: keywords take a third longer, in every step.

@@ -23,6 +23,7 @@ from fsw.link.wire import message_ids as ids
 from fsw.link.wire.message_ids import SYSTEM_ID
 from fsw.parameters import storage
 from fsw.parameters.registry import PARAMETERS
+from fsw.runtime.clock import now_us
 from messages import dialect
 from messages.frames import cut
 from messages.ulog_reader import UlogError, open_log
@@ -140,7 +141,7 @@ def _ground_link(stack: ExitStack) -> Try:
 def _simulator_link(stack: ExitStack) -> Try:
     simulator = stack.enter_context(station_socket())
     inbox = Inbox()
-    link = SimLink(simulator.getsockname(), inbox, FACTS)
+    link = SimLink(simulator.getsockname(), inbox, FACTS, now_us)
     stack.callback(link.close)
     link.announce()
     _, vehicle = simulator.recvfrom(2048)

@@ -76,11 +76,15 @@ def jumped(by_us: int) -> Inputs:
     return lambda t_us: {"sensors": replace(IN_THE_AIR, t_us=t_us + by_us)}
 
 
+def clock_jumped(t_us: int) -> dict[str, Any]:
+    return {"clock_jump_us": -500_000} if t_us == BEGIN_US else {}
+
+
 def nothing(_: int) -> dict[str, Any]:
     return {}
 
 
-@pytest.mark.requirement("REQ-SAFE-5", "REQ-PLAN-1", "REQ-TIME-4", "REQ-MODE-1")
+@pytest.mark.requirement("REQ-SAFE-5", "REQ-PLAN-1", "REQ-MODE-1")
 @pytest.mark.parametrize(
     ("condition", "state", "inputs"),
     [
@@ -89,8 +93,9 @@ def nothing(_: int) -> dict[str, Any]:
         (Condition.PLAN_REFUSED, hovering(plan=ASKED), refused_once),
         (Condition.TIME_JUMPED, hovering(), jumped(50_000)),
         (Condition.TIME_JUMPED, hovering(), jumped(-4_000)),
+        (Condition.TIME_JUMPED, hovering(), clock_jumped),
     ],
-    ids=["too fast", "late", "refused", "ahead", "back"],
+    ids=["too fast", "late", "refused", "ahead", "back", "clock"],
 )
 def test_what_a_tick_is_given_is_reported_within_the_time_of_its_row(
     condition: Condition, state: FlightState, inputs: Inputs

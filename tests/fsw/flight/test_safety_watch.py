@@ -191,5 +191,5 @@ def test_a_breach_is_one_of_the_fence_where_its_zone_is_breached_most() -> None:
 
 
 def test_a_jump_of_time_is_noted_with_its_length() -> None:
-    memory = WATCH.jumped(SafetyMemory(), 700_000, 100_000)
-    assert (memory.jump_us, memory.jumped_us) == (600_000, 700_000)
+    memory = WATCH.jumped(SafetyMemory(), 700_000, -600_000)
+    assert (memory.jump_us, memory.jumped_us) == (-600_000, 700_000)

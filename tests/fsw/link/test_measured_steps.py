@@ -23,6 +23,7 @@ from fsw.measurements import (
     RangeSample,
     Sample,
 )
+from fsw.runtime.clock import now_us
 from fsw.signals import Origin, SensorFrame
 from messages.frames import FrameWriter, split
 from sitl import earth
@@ -168,11 +169,11 @@ class Wire:
         self.socket.bind(("127.0.0.1", 0))
         self.socket.settimeout(0.5)
         self.inbox = Inbox()
-        self.link = SimLink(self.socket.getsockname(), self.inbox, FACTS)
+        self.link = SimLink(self.socket.getsockname(), self.inbox, FACTS, now_us)
         self.link.announce()
         self.socket.connect(self.socket.recvfrom(2048)[1])
         self.encoder = StepEncoder(lockstep=True, measured=True)
-        self.socket.send(self.encoder.heartbeat() + self.datagram(NOW - 100_000, ()))
+        self.socket.send(self.encoder.heartbeat() + self.datagram(NOW - 2000, ()))
         assert self.link.wait_for_step() is not None
         self.inbox.take()
 

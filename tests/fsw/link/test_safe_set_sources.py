@@ -14,6 +14,7 @@ from fsw.link.inbox import Inbox
 from fsw.link.sim_link import SimLink
 from fsw.link.wire import message_ids as ids
 from fsw.parameters.flight_config import flight_config
+from fsw.runtime.clock import now_us
 from fsw.signals import MessageSource, SensorFrame, Severity, TickOutputs
 from messages.frames import FrameWriter
 from sitl.link.encode import StepEncoder
@@ -43,6 +44,7 @@ class Vehicle:
     ground: Ground
     state: FlightState = field(default_factory=FlightState)
     t_us: int = 1_000_000
+    step_us: int = 1_000_000  # of the simulator, which sends a step only where it announces
 
     def __post_init__(self) -> None:
         self._loop, self._encoder = TunedAutopilot(flight_config()), StepEncoder(lockstep=True)
@@ -61,8 +63,8 @@ class Vehicle:
             Announce(0, (-1.0, 0.0, 0.0, offset), still, CLEARANCE, False, 0, k, len(offsets))
             for k, offset in enumerate(offsets)
         ]
-        self.t_us += 2_000
-        self.simulator.send(self._encoder.datagram(readings(self.t_us), tuple(whole)))
+        self.step_us += 2_000
+        self.simulator.send(self._encoder.datagram(readings(self.step_us), tuple(whole)))
         assert self.sim.wait_for_step() is not None
         return self.tick()
 
@@ -102,7 +104,7 @@ def vehicle() -> Iterator[Vehicle]:
     simulator.bind(("127.0.0.1", 0))
     simulator.settimeout(0.5)
     with ground_station() as ground:
-        sim = SimLink(simulator.getsockname(), ground.inbox, FACTS)
+        sim = SimLink(simulator.getsockname(), ground.inbox, FACTS, now_us)
         sim.announce()
         simulator.connect(simulator.recvfrom(2048)[1])
         yield Vehicle(simulator, sim, ground)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import socket
+import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
@@ -13,6 +15,8 @@ import pytest
 from fsw.link.inbox import Inbox
 from fsw.link.sim_link import Pacing, SimLink
 from fsw.link.wire import message_ids as ids
+from fsw.measurements import ImuSample, JointSample, PressureSample
+from fsw.runtime.clock import now_us
 from fsw.signals import (
     BatteryReading,
     CommandAck,
@@ -25,8 +29,10 @@ from fsw.signals import (
     StatusText,
 )
 from messages.frames import FrameWriter, split
+from sitl.earth import DEFAULT_ORIGIN
 from sitl.link.decode import read_reply
 from sitl.link.encode import StepEncoder
+from sitl.link.encode_sensors import SensorEncoder
 from sitl.link.failures import Injection, carry_out
 from sitl.link.pilot import Phase, PilotState, flight_plan, speak
 from sitl.link.pilot_messages import SendCommand
@@ -34,6 +40,7 @@ from sitl.mission_clock import MissionClock
 from sitl.scenario import Scenario, Workspace
 from sitl.scenario_file import load_scenario
 from sitl.sensors.exact import SensorReadings
+from sitl.sensors.measurements import ImuMeasurement, JointMeasurement, PressureMeasurement
 from sitl.shapes.box import Box
 from sitl.simulation import Controls, Simulation
 from studies.flight.mission import safe_set as safe_set_of
@@ -79,7 +86,7 @@ def wire() -> Iterator[Wire]:
     simulator.bind(("127.0.0.1", 0))
     simulator.settimeout(0.5)
     inbox = Inbox()
-    link = SimLink(simulator.getsockname(), inbox, FACTS)
+    link = SimLink(simulator.getsockname(), inbox, FACTS, now_us)
     link.announce()
     hello, vehicle = simulator.recvfrom(2048)
     assert [frame.message_id for frame in split(hello)] == [ids.HEARTBEAT]
@@ -199,13 +206,165 @@ def test_a_first_stamp_far_ahead_does_not_make_the_vehicle_deaf(wire: Wire, wron
     assert notice.startswith("first step stamped")
 
 
-def test_a_clock_that_goes_on_from_another_time_is_followed(wire: Wire) -> None:
-    encoder = StepEncoder(lockstep=True)
-    released = []
-    for t_us in (1_002_000, 9_004_000, 9_006_000, 9_008_000):
-        wire.send(encoder.datagram(readings(t_us), ()))
-        released.append(wire.link.wait_for_step())
-    assert [one and one.t_us for one in released] == [1_002_000, None, 9_006_000, 9_008_000]
+class Flight:
+    """Steps that the vehicle answers at once."""
+
+    def __init__(self, wire: Wire, *, lockstep: bool, measured: bool = False) -> None:
+        self.wire = wire
+        self.encoder = StepEncoder(lockstep=lockstep, measured=measured)
+        self.lockstep = lockstep
+        self.measured = measured
+        wire.send(self.encoder.heartbeat() + self.datagram(1_002_000))
+        self.taken = [self.take()]
+
+    def datagram(self, t_us: int) -> bytes:
+        if not self.measured:
+            return self.encoder.datagram(readings(t_us), ())
+        inertial = ImuMeasurement(t_us, (0.4, 0.5, 0.6), (0.0, 0.1, -9.81))
+        measured = (JointMeasurement(t_us, (-0.7, 1.4)), inertial)
+        return self.encoder.measured_datagrams(t_us, measured, ())[1]
+
+    def take(self) -> int | None:
+        """The vehicle's time of the step that came; it is answered."""
+        link = self.wire.link
+        in_real_time = link.pacing is Pacing.REALTIME
+        sensors = link.newest() if in_real_time else link.wait_for_step()
+        if sensors is None:
+            return None
+        link.send_actuators(sensors.t_us, outputs_at(sensors.t_us))
+        return sensors.t_us
+
+    def step(self, *stamps: int) -> int | None:
+        """What the vehicle takes of these, which are there at once."""
+        for t_us in stamps:
+            self.wire.send(self.datagram(t_us))
+        found = self.take()
+        self.taken.append(found)
+        return found
+
+    def answered(self) -> list[int]:
+        """Stamps of the answers."""
+        self.wire.simulator.settimeout(0.05)
+        stamps = []
+        with contextlib.suppress(TimeoutError):
+            while True:
+                reply = read_reply(self.wire.hear(), 2)
+                assert reply is not None
+                stamps.append(reply.t_us)
+        return stamps
+
+    def jumps(self) -> int:
+        """By how much the tick is told that the clock has jumped [us]."""
+        return self.wire.inbox.take().clock_jump_us
+
+
+AHEAD, BACK = (500_000, 6_000_000), (-10_000, -100_000, -500_000)
+
+
+@pytest.mark.requirement("REQ-TIME-4")
+@pytest.mark.parametrize("measured", [False, True], ids=["exact", "measured"])
+@pytest.mark.parametrize("jump_us", [-500_000, 6_000_000])
+def test_in_lockstep_a_step_of_another_time_is_answered_when_it_is_repeated(
+    wire: Wire, jump_us: int, measured: bool
+) -> None:
+    flight = Flight(wire, lockstep=True, measured=measured)
+    flight.step(1_004_000)
+    flight.answered()
+    flight.jumps()
+    first_us = 1_006_000 + jump_us
+    assert flight.step(first_us) is None
+    assert flight.step() is None  # the simulator waits in vain
+    assert flight.step(first_us) == 1_006_000
+    assert flight.jumps() == jump_us
+    assert flight.step(first_us + 2_000) == 1_008_000
+    assert flight.answered() == [first_us, first_us + 2_000]
+    assert flight.step(first_us + 2_000) is None  # known: the same answer again
+    assert flight.answered() == [first_us + 2_000]
+    assert (flight.jumps(), wire.link.notices) == (0, [])
+
+
+@pytest.mark.requirement("REQ-TIME-4")
+@pytest.mark.parametrize("measured", [False, True], ids=["exact", "measured"])
+@pytest.mark.parametrize("jump_us", [*BACK, *AHEAD])
+def test_in_real_time_steps_of_another_time_are_followed_before_readings_are_too_old(
+    wire: Wire, jump_us: int, measured: bool
+) -> None:
+    flight = Flight(wire, lockstep=False, measured=measured)
+    flight.step(1_004_000)
+    flight.jumps()
+    for k in range(6):
+        flight.step(1_006_000 + jump_us + 2_000 * k)
+    taken = flight.taken[2:]
+    ignored = taken.index(next(one for one in taken if one is not None))
+    assert ignored == (3 if jump_us < 0 else 1)
+    assert taken[ignored:] == [1_006_000 + 2_000 * k for k in range(ignored, 6)]
+    stamps = flight.answered()[2:]
+    assert stamps == [1_006_000 + jump_us + 2_000 * k for k in range(ignored, 6)]
+    assert (flight.jumps(), wire.link.notices) == (jump_us, [])
+
+
+def test_a_clock_may_jump_before_there_is_a_schedule(wire: Wire) -> None:
+    """The first ticks of real time wait for their steps."""
+    encoder = StepEncoder(lockstep=False)
+    wire.send(encoder.heartbeat() + encoder.datagram(readings(1_500_000), ()))
+    assert wire.link.wait_for_step() is not None
+    taken = []
+    for k in range(6):
+        wire.send(encoder.datagram(readings(1_002_000 + 2_000 * k), ()))
+        sensors = wire.link.wait_for_step()
+        taken.append(sensors and sensors.t_us)
+    assert taken == [None, None, None, 1_508_000, 1_510_000, 1_512_000]
+
+
+def test_what_sensors_measured_is_at_the_vehicle_s_time_too(wire: Wire) -> None:
+    flight = Flight(wire, lockstep=False, measured=True)
+    flight.step(1_004_000)
+    encoder, jump_us = SensorEncoder(FrameWriter(1, 200), DEFAULT_ORIGIN), -500_000
+    for k in range(3):
+        flight.step(1_006_000 + jump_us + 2_000 * k)
+    wire.inbox.take()
+    # What has no room in a step goes ahead of it, and is of its clock.
+    early = PressureMeasurement(1_012_000 + jump_us, 101_325.0)
+    wire.send(encoder.frames(0, (early,))[0])
+    assert flight.step(1_012_000 + jump_us) == 1_012_000
+    taken = wire.inbox.take()
+    times = [sample.time for sample in taken.samples]
+    assert [type(one) for one in taken.samples] == [PressureSample, JointSample, ImuSample]
+    assert times == [1e-6 * 1_012_000] * 3
+    assert taken.clock_jump_us == jump_us
+
+
+@pytest.mark.parametrize("lockstep", [True, False], ids=["lockstep", "real time"])
+def test_a_step_of_before_is_no_jump_however_late_and_often_it_comes(
+    wire: Wire, lockstep: bool
+) -> None:
+    flight = Flight(wire, lockstep=lockstep)
+    stamps = [1_004_000 + 2_000 * k for k in range(40)]
+    for t_us in stamps:
+        assert flight.step(t_us) == t_us
+        for old_us in (t_us - 8_000, t_us - 8_000, t_us - 6_000, t_us - 4_000):
+            assert flight.step(old_us) is None
+    assert flight.answered() == [1_002_000, *stamps]
+    assert (flight.jumps(), wire.link.notices) == (0, [])
+
+
+def test_a_burst_of_old_steps_in_their_order_is_no_jump(wire: Wire) -> None:
+    flight = Flight(wire, lockstep=False)
+    burst = [1_004_000 + 2_000 * k for k in range(20)]
+    assert flight.step(1_044_000, *burst) == 1_044_000
+    assert flight.step(*burst) is None
+    assert flight.step(*burst) is None
+    assert flight.step(1_046_000) == 1_046_000
+    assert flight.jumps() == 0
+
+
+def test_frames_that_were_missing_for_long_are_no_jump(wire: Wire) -> None:
+    flight = Flight(wire, lockstep=False)
+    flight.step(1_004_000)
+    flight.step(1_006_000)
+    time.sleep(0.25)
+    assert flight.step(1_206_000) == 1_206_000
+    assert (flight.jumps(), wire.link.notices) == (0, [])
 
 
 def test_a_step_without_its_barrier_releases_no_tick(wire: Wire) -> None:

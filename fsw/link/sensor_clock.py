@@ -1,0 +1,167 @@
+"""The sensors' clock, and the vehicle's time, which goes on evenly where that clock jumps.
+
+Steps are stamped by the sensors' clock. All that flies counts the vehicle's time: no plan, timeout
+or measurement changes its age when the sensors' clock is set. A stamp that neither follows the last
+step nor fits the time since is doubted at first. It may be wrong once, and datagrams come late,
+twice and in another order.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+from fsw.frozen import replace
+from fsw.measurements import Sample
+from fsw.ports import Clock
+
+_GAP_US: Final = 50_000  # in which steps may be missing, as many as a tick makes up for
+# So many steps in a row make another time. Those behind the last one may be old ones that come
+# late, but then newer ones come in between. The last of four is there before readings are too old.
+# Where old ones have come before, some newer ones may be lost as well; 40 ms can be made up for.
+_STEPS_AHEAD, _STEPS_BACK, _STEPS_BACK_OR_LATE = 2, 4, 20
+# If the second stamp is farther behind the first one, the first one was wrong.
+_FORGOTTEN_US: Final = 1_200_000
+_LAST_US: Final = 1 << 62  # a stamp beyond is none: no step could follow it
+
+
+@dataclass(slots=True)
+class _Doubt:
+    """Steps that follow each other, but not the last one that was believed."""
+
+    first_us: int
+    after_us: int  # from the last one that was believed to the first of these
+    newest_us: int
+    look: int  # in which the newest came
+    silence: int  # how many there had been
+    needed: int
+    steps: int = 1
+
+
+class SensorClock:
+    """Says which steps are new, and what time it is for the vehicle."""
+
+    def __init__(
+        self,
+        period_us: int,
+        clock: Clock,
+        say: Callable[[str], None],
+        jumped: Callable[[int], None],
+    ) -> None:
+        """Begin before the first step; steps are ``period_us`` apart.
+
+        ``say`` takes what was odd, and ``jumped`` by how much the sensors' clock did [us].
+        """
+        self.newest_us = -1  # stamp of the newest step, by the sensors' clock; -1: none yet
+        self.ahead_us = 0  # of the sensors' clock before the vehicle's time
+        self.looks = 0  # at what had come; steps of one look may be a burst of old ones
+        self.silences = 0  # in which a simulator that waits for an answer repeats its step
+        self._period_us = period_us
+        self._clock = clock
+        self._say = say
+        self._jumped = jumped
+        self._usual_us = 0  # how far a step may be ahead without a second thought
+        self._first = False  # the newest step is the first one
+        self._needed_back = _STEPS_BACK
+        self._doubt: _Doubt | None = None
+        self._heard_us = -1  # when a step was heard last, monotonic; -1: steps wait for answers
+        self._heard_stamp_us = -1  # its stamp
+
+    def follows(self, t_us: int) -> bool:
+        """Whether a stamp [us] is of a new step, which it is only once."""
+        if 0 < t_us - self.newest_us <= self._usual_us:
+            self.newest_us = t_us
+            return True
+        return self._examine(t_us)
+
+    def note_time(self) -> None:
+        """Note that the newest step came now; what was silent for long may be far ahead then."""
+        self._heard_us, self._heard_stamp_us = self._clock(), self.newest_us
+
+    def in_vehicle_time(self, samples: list[Sample]) -> list[Sample]:
+        """The samples at the vehicle's time."""
+        ahead_us = self.ahead_us
+        if not ahead_us:
+            return samples
+        # From whole microseconds, as they are read: no sample is behind its step by a rounding.
+        return [replace(one, time=1e-6 * (round(1e6 * one.time) - ahead_us)) for one in samples]
+
+    def _examine(self, t_us: int) -> bool:
+        """What :meth:`follows` says, where it takes a second thought."""
+        if self.newest_us < 0:
+            return self._begin(t_us)
+        gap_us = t_us - self.newest_us
+        if self._first and gap_us < -_FORGOTTEN_US:
+            # All steps would be older than the first one.
+            self._say("first step stamped ahead of all others: forgotten")
+            return self._begin(t_us)
+        if gap_us == 0:
+            return False
+        if 0 < gap_us <= _GAP_US or (gap_us > 0 and self._was_silent(t_us)):
+            self._forget_doubt()
+        elif self._is_another_time(t_us):
+            self._jump()
+        else:
+            return False
+        self.newest_us, self._usual_us, self._first = t_us, _GAP_US, False
+        return True
+
+    def _begin(self, t_us: int) -> bool:
+        if not t_us < _LAST_US:
+            self._say("first step stamped beyond all times: ignored")
+            return False
+        self.newest_us, self._first = t_us, True
+        return True
+
+    def _was_silent(self, t_us: int) -> bool:
+        """Whether so much time has passed since the last step; in lockstep none is missing."""
+        if self._heard_us < 0:
+            return False
+        return t_us - self._heard_stamp_us <= self._clock() - self._heard_us + _GAP_US
+
+    def _forget_doubt(self) -> None:
+        doubt, self._doubt = self._doubt, None
+        if doubt is None:
+            return
+        ahead_us = doubt.first_us - self.newest_us
+        if ahead_us > 0:
+            self._say(f"step stamped {1e-6 * ahead_us:.1f} s ahead: ignored")
+        else:
+            self._needed_back = _STEPS_BACK_OR_LATE
+
+    def _is_another_time(self, t_us: int) -> bool:
+        """Whether this step confirms those that were doubted."""
+        doubt = self._doubt
+        gap_us = _GAP_US + 1 if doubt is None else t_us - doubt.newest_us
+        if doubt is None or not -_GAP_US <= gap_us <= _GAP_US or not t_us < _LAST_US:
+            needed = _STEPS_AHEAD if t_us > self.newest_us else self._needed_back
+            after_us = self._since_newest()
+            self._doubt = _Doubt(t_us, after_us, t_us, self.looks, self.silences, needed)
+            self._usual_us = 0
+            return False
+        if gap_us < 0:
+            return False  # one of these, late or twice
+        if gap_us == 0:
+            return self.silences != doubt.silence
+        doubt.newest_us = t_us
+        if self.looks != doubt.look:
+            doubt.look = self.looks
+            doubt.steps += 1
+        return doubt.steps >= doubt.needed
+
+    def _since_newest(self) -> int:
+        """Whole periods [us] that have begun since the newest step came, at least one."""
+        if self._heard_us < 0:
+            return self._period_us
+        since_us = self._heard_stamp_us + self._clock() - self._heard_us - self.newest_us
+        return max(round(since_us / self._period_us), 1) * self._period_us
+
+    def _jump(self) -> None:
+        """Let the vehicle's time go on from the last step that was believed."""
+        doubt, self._doubt = self._doubt, None
+        assert doubt is not None
+        jump_us = doubt.first_us - self.newest_us - doubt.after_us
+        self.ahead_us += jump_us
+        self._heard_stamp_us += jump_us
+        self._jumped(jump_us)
