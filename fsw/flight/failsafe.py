@@ -958,8 +958,9 @@ def respond(context: FailsafeContext, rows: tuple[Failsafe, ...]) -> Response:
 
     It is taken where it is stronger than the one in force. So what a condition asks for
     is taken up as soon as a mode that was exempt from it is left, and a vehicle that returns or
-    lands is not sent back by a milder condition. Where a row is delayed the vehicle holds first.
-    Conditions that a command of the pilot put aside do not act until they have ended.
+    lands is not sent back by a milder condition. Where a row is delayed the vehicle holds first,
+    or does what the rows ask for that are not. Conditions that a command of the pilot put aside do
+    not act until they have ended.
     """
     state, now_us = context.state, context.estimate.t_us
     vehicle, memory = state.vehicle, state.vehicle.failsafe
@@ -967,28 +968,29 @@ def respond(context: FailsafeContext, rows: tuple[Failsafe, ...]) -> Response:
     now = tuple([row.condition for row in rows])
     known = dict(zip(before, memory.since_us, strict=False))
     overridden = tuple([c for c in memory.overridden if c in now])
-    wanted, chosen = Action.NONE, None
-    actions = {}
-    for row in rows:
-        action = actions[row.condition] = allowed(row.action(context), vehicle.mode, vehicle.flies)
-        if action.mode is None or row.condition in overridden:
-            continue
-        in_force = _in_force(memory, vehicle.mode, begins=row.condition not in before)
-        if action.strength > max(in_force.strength, wanted.strength):
-            wanted, chosen = action, row
-    begun, memory = _begun(context, memory, wanted, chosen)
+    actions = {
+        row.condition: allowed(row.action(context), vehicle.mode, vehicle.flies) for row in rows
+    }
+    free = [row for row in rows if row.condition not in overridden]
+    chosen = _strongest(context, free, actions)
+    at_once = _strongest(
+        context, [row for row in free if not _is_delayed(row, actions[row.condition])], actions
+    )
+    begun, acting, memory = _begun(context, memory, chosen, at_once)
     waits = memory.pending is not Action.NONE
     joint, reports = state.damage.joint, []
     for row in rows:
-        acts = row is chosen and begun is not Action.NONE
+        acts = row in acting
         # A second joint that fails is the same condition, and news.
         anew = row.condition is Condition.JOINT_FAILED and joint != memory.joint
         if row.condition in before and not (acts or anew):
             continue
-        told = wanted if acts else Action.WARN
-        told = actions[row.condition] if actions[row.condition].mode is None else told
+        later = waits and row is chosen.row
+        told = actions[row.condition]
+        if told.mode is not None and not (acts or later):
+            told = Action.WARN
         if told is not Action.NONE:
-            delay_us = memory.due_us - now_us if acts and waits else 0
+            delay_us = memory.due_us - now_us if later else 0
             severity, text = report(row, context, told, delay_us)
             event = FailsafeEvent(row.condition.value, told.value, severity)
             reports.append(StatusText(severity, text, event))
@@ -1031,31 +1033,69 @@ def _in_force(memory: FailsafeMemory, mode: Mode, *, begins: bool) -> Action:
     return flown if flown.strength < memory.action.strength else memory.action
 
 
+class _Choice(NamedTuple):
+    """The strongest action that is stronger than the one in force, and its row."""
+
+    action: Action
+    row: Failsafe | None
+
+
+_NOTHING: Final = _Choice(Action.NONE, None)
+
+
+def _is_delayed(row: Failsafe, action: Action) -> bool:
+    return row.delayed and action in (Action.RETURN, Action.LAND)
+
+
+def _strongest(
+    context: FailsafeContext, rows: list[Failsafe], actions: dict[Condition, Action]
+) -> _Choice:
+    """Of the ``actions`` of these rows; none, where what is in force is as strong."""
+    vehicle, found = context.state.vehicle, _NOTHING
+    for row in rows:
+        action = actions[row.condition]
+        begins = row.condition not in vehicle.conditions
+        in_force = _in_force(vehicle.failsafe, vehicle.mode, begins=begins)
+        if action.mode and action.strength > max(in_force.strength, found.action.strength):
+            found = _Choice(action, row)
+    return found
+
+
 def _begun(
-    context: FailsafeContext, memory: FailsafeMemory, wanted: Action, chosen: Failsafe | None
-) -> tuple[Action, FailsafeMemory]:
-    """The action to begin now, and the memory with it."""
-    now_us = context.estimate.t_us
-    if chosen is None:
-        if memory.pending is Action.NONE:
-            return Action.NONE, memory
-        # What was waited for has ended: the vehicle stays in hold.
-        return Action.NONE, memory._replace(pending=Action.NONE, due_us=0)
-    delay_us = context.limits.failsafe_delay_us
-    if chosen.delayed and wanted in (Action.RETURN, Action.LAND):
-        if memory.pending is not Action.NONE and now_us < memory.due_us:
-            return Action.NONE, memory._replace(pending=wanted)
+    context: FailsafeContext, memory: FailsafeMemory, chosen: _Choice, at_once: _Choice
+) -> tuple[Action, tuple[Failsafe | None, ...], FailsafeMemory]:
+    """The action to begin now, the rows that act by it, and the memory with it.
+
+    ``at_once`` is chosen of the rows that are not delayed.
+    """
+    now_us, wanted, row = context.estimate.t_us, chosen.action, chosen.row
+    if row is None:
+        # What was waited for, if anything, has ended: the vehicle stays in hold.
+        return Action.NONE, (), memory._replace(pending=Action.NONE, due_us=0)
+    if _is_delayed(row, wanted):
+        waits = memory.pending is not Action.NONE
+        if waits and now_us < memory.due_us:
+            return _meanwhile(memory._replace(pending=wanted), at_once, ())
+        delay_us = context.limits.failsafe_delay_us
         held = memory.action is Action.NONE or context.state.vehicle.mode is Mode.HOLD
-        if memory.pending is Action.NONE and delay_us and held:
-            waiting = memory._replace(
-                action=Action.HOLD,
-                cause=chosen.condition,
-                pending=wanted,
-                due_us=now_us + delay_us,
-            )
-            return Action.HOLD, waiting
-    acting = memory._replace(action=wanted, cause=chosen.condition, pending=Action.NONE, due_us=0)
-    return wanted, acting
+        if not waits and delay_us and held:
+            waiting = memory._replace(pending=wanted, due_us=now_us + delay_us)
+            hold = _Choice(Action.HOLD, row)
+            # A vehicle that draws back from a wall goes on with that.
+            first = _NOTHING if memory.action in (Action.HOLD, Action.RETREAT) else hold
+            return _meanwhile(waiting, first if at_once.row is None else at_once, (row,))
+    acting = memory._replace(action=wanted, cause=row.condition, pending=Action.NONE, due_us=0)
+    return wanted, (row,), acting
+
+
+def _meanwhile(
+    memory: FailsafeMemory, first: _Choice, rows: tuple[Failsafe | None, ...]
+) -> tuple[Action, tuple[Failsafe | None, ...], FailsafeMemory]:
+    """What is begun while a delayed action waits; ``rows`` tell of it as well."""
+    if first.row is None:
+        return Action.NONE, rows, memory
+    acting = memory._replace(action=first.action, cause=first.row.condition)
+    return first.action, (*rows, first.row), acting
 
 
 def _ended(

@@ -13,7 +13,16 @@ from hypothesis import strategies as st
 
 from fsw.estimation.sensor_fault import Sensor
 from fsw.flight.commander import Commander
-from fsw.flight.failsafe import FAILSAFES, ROWS, Action, Condition, FailsafeContext, allowed
+from fsw.flight.failsafe import (
+    FAILSAFES,
+    ROWS,
+    Action,
+    Condition,
+    Failsafe,
+    FailsafeContext,
+    allowed,
+    respond,
+)
 from fsw.flight.state import Aiding, Damage, FlightState, OffboardMemory, PlanMemory, SafetyMemory
 from fsw.parameters.flight_config import FlightConfig
 from fsw.signals import (
@@ -393,3 +402,69 @@ def test_no_row_is_silent_in_flight() -> None:
     context = FailsafeContext(flying(Mode.MISSION, gcs_heard_us=0), estimate, CONFIG)
     for row in FAILSAFES:
         assert row.action(context) is not Action.NONE, row.condition
+
+
+BOTH = (Condition.DATALINK_LOST, Condition.BREACH)  # any two, of which the first is delayed
+
+
+def two_rows(later: Action, at_once: Action) -> tuple[Failsafe, Failsafe]:
+    first, second = (ROWS[condition] for condition in BOTH)
+    return (
+        replace(first, action=lambda _: later, delayed=True),
+        replace(second, action=lambda _: at_once, delayed=False),
+    )
+
+
+@pytest.mark.requirement("REQ-MODE-2")
+@pytest.mark.parametrize("later", [Action.RETURN, Action.LAND])
+@pytest.mark.parametrize("at_once", [one for one in Action if one.mode is not None])
+@pytest.mark.parametrize("begins_s", [(1.0, 2.0), (2.0, 1.0), (1.0, 1.0)])
+def test_what_is_not_delayed_acts_while_something_else_waits(
+    later: Action, at_once: Action, begins_s: tuple[float, float]
+) -> None:
+    rows, state, told = two_rows(later, at_once), flying(Mode.MISSION), []
+    due_s = begins_s[0] + 1e-6 * CONFIG.limits.failsafe_delay_us
+    strongest = max(later, at_once, key=lambda action: action.strength)
+    flown = Action.NONE
+    for k in range(100):
+        now_s = 0.1 * k
+        active = tuple(row for row, at_s in zip(rows, begins_s, strict=True) if now_s >= at_s)
+        estimate = vehicle_at(HERE, t_us=round(now_s * SECOND))
+        found = respond(FailsafeContext(state, estimate, CONFIG), active)
+        mode = found.action.mode or state.vehicle.mode
+        conditions = tuple(row.condition for row in active)
+        vehicle = replace(state.vehicle, failsafe=found.memory, conditions=conditions, mode=mode)
+        state = replace(state, vehicle=vehicle)
+        told += [text.text for text in found.reports]
+        if found.action is not Action.NONE:
+            assert found.action.strength > flown.strength, "nothing gives way to a milder action"
+            flown = found.action
+        if now_s >= begins_s[1]:
+            assert flown.strength >= at_once.strength
+        if begins_s[0] <= now_s < min(due_s, 7.0) and begins_s[1] > now_s:
+            assert flown is Action.HOLD
+        if now_s > due_s + 0.05:
+            assert flown is strongest
+    if at_once is not Action.HOLD:  # which waiting may have begun
+        assert any(at_once.value in text for text in told)
+    returns_by_then = at_once is Action.RETURN and begins_s[1] < begins_s[0]
+    if later.strength > at_once.strength and not returns_by_then:
+        assert any(f"{later.value} in 5 s" in text for text in told)
+
+
+@pytest.mark.parametrize("breach_first", [True, False])
+def test_a_vehicle_goes_on_drawing_back_while_a_return_waits(breach_first: bool) -> None:
+    watched = Watched().heard()
+    outside = replace(watched.state.safety, breach_us=2 * SECOND, breach_by=0.05)
+    low = charge(Charge.CRITICAL)
+    first, second = ("safety", outside), ("battery", low)
+    if not breach_first:
+        first, second = second, first
+    watched.until(2.5, **{first[0]: first[1]}).until(3.0, **{second[0]: second[1]})
+    goal = watched.state.setpoint.goal
+    assert watched.state.vehicle.failsafe.action is Action.RETREAT
+    assert goal is not None
+    assert not goal.motion.of_end_effector, "a place for the base, not a stop"
+    assert watched.until(9.0).flown == (Mode.RETURN, Mode.MISSION)
+    assert sum("retreating" in text for text in watched.texts) == 1
+    assert sum("returning in 5 s" in text for text in watched.texts) == 1
