@@ -512,6 +512,7 @@ def _snapshot(
     state: FlightState, estimate: StateEstimate, u: PlanInput, inputs: TickInputs
 ) -> FlightSnapshot:
     vehicle, plan, goal = state.vehicle, state.plan, state.setpoint.goal
+    lost = state.aiding.sensor
     flies = vehicle.flies and state.nominal is not None
     return FlightSnapshot(
         estimate.t_us,
@@ -543,6 +544,7 @@ def _snapshot(
         state.arming,
         state.mission.safe_set,
         state.damage.report,
+        "" if lost is None else lost.value,
     )
 
 

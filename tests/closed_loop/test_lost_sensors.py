@@ -100,6 +100,20 @@ def test_telemetry_goes_on_without_an_estimate_and_says_so() -> None:
     assert snapshot.estimate.t_us == snapshot.t_us
 
 
+@pytest.mark.parametrize(
+    ("kind", "name"), [(ImuSample, "IMU"), (JointSample, "joint encoders")], ids=["IMU", "joints"]
+)
+def test_telemetry_knows_which_sensor_is_lost(kind: type, name: str) -> None:
+    flight = Flight(
+        load_scenario("walls", "mocap"), spoil_samples=changed(kind, 0.5, 2.0, lambda _: None)
+    )
+    flight.follow()
+    flight.run(0.4)
+    assert flight.snapshot.sensor_lost == ""
+    flight.run(0.4)
+    assert flight.snapshot.sensor_lost == name
+
+
 BESIDE = 4000  # at 8 s, on the way along the walls
 LONG = 1000  # steps, 2 s
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from fsw.estimation.sensor_fault import Sensor
 from fsw.flight.failsafe import Condition
 from fsw.link.wire.outgoing import WireValues
 from fsw.link.wire.telemetry_context import TelemetryContext
@@ -30,13 +31,18 @@ _SUSPECT: Final[dict[str, int]] = {
     Condition.POSITION_LOST.value: _PLACE | _EXTERNAL_POSE | _POSITION | _HEIGHT,
     Condition.POSITION_LOW.value: _PLACE | _EXTERNAL_POSE,
     Condition.AIDING_LOST.value: _EXTERNAL_POSE,
-    Condition.SENSOR_LOST.value: _GYRO | _ACCELEROMETER,
     Condition.TILT_LOST.value: _ATTITUDE | _RATE_CONTROL,
     Condition.PLANNER_LOST.value: _POSITION | _HEIGHT,
     Condition.FENCE_BREACH.value: _FENCE,
     Condition.ROTOR_LOST.value: _MOTORS,
     Condition.ROTOR_FAILED.value: _MOTORS,
     Condition.JOINT_FAILED.value: _MOTORS,
+}
+# The same of each sensor that is lost. MAVLink has no bit for encoders: what cannot work without
+# them are the drives of the joints.
+_LOST: Final[dict[str, int]] = {
+    Sensor.IMU.value: _GYRO | _ACCELEROMETER,
+    Sensor.ENCODERS.value: _MOTORS,
 }
 # MAV_BATTERY_CHARGE_STATE: 0 is undefined, OK is 1.
 _CHARGE_STATES: Final = {charge: int(charge) + 1 for charge in Charge}
@@ -54,6 +60,8 @@ def sys_status(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValue
     health = _PRESENT
     for failure in snapshot.failures:
         health &= ~(_SUSPECT.get(failure, 0) | _PREARM)
+    if Condition.SENSOR_LOST.value in snapshot.failures:
+        health &= ~_LOST.get(snapshot.sensor_lost, 0)
     if snapshot.arming_refusal:
         health &= ~_PREARM
     if battery.charge >= Charge.CRITICAL:

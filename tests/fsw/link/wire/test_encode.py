@@ -8,6 +8,8 @@ from typing import Any
 
 import pytest
 
+from fsw.estimation.sensor_fault import Sensor
+from fsw.flight.failsafe import Condition
 from fsw.link.telemetry.streams import STREAMS, Stream
 from fsw.link.wire import encode_replies, encode_standard
 from fsw.link.wire import message_ids as ids
@@ -193,6 +195,26 @@ def test_a_log_that_fails_takes_its_bit_away() -> None:
     status = read_back(stream_of(ids.SYS_STATUS), broken)
     lost = status.onboard_control_sensors_present & ~status.onboard_control_sensors_health
     assert lost == 0x1000000  # MAV_SYS_STATUS_LOGGING
+
+
+@pytest.mark.parametrize(
+    ("sensor", "bits"),
+    [
+        (
+            Sensor.IMU,
+            dialect.MAV_SYS_STATUS_SENSOR_3D_GYRO | dialect.MAV_SYS_STATUS_SENSOR_3D_ACCEL,
+        ),
+        (Sensor.ENCODERS, dialect.MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS),
+    ],
+)
+def test_the_sensor_that_is_lost_is_the_one_that_is_blamed(sensor: Sensor, bits: int) -> None:
+    healthy = read_back(stream_of(ids.SYS_STATUS))
+    lost = (Condition.SENSOR_LOST.value,)
+    status = read_back(
+        stream_of(ids.SYS_STATUS), replace(SNAPSHOT, failures=lost, sensor_lost=sensor.value)
+    )
+    blamed = healthy.onboard_control_sensors_health & ~status.onboard_control_sensors_health
+    assert blamed == bits | dialect.MAV_SYS_STATUS_PREARM_CHECK
 
 
 @pytest.mark.parametrize(("left", "told"), [(123.4, 123), (math.inf, 0), (0.2, 0)])
