@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+import re
 import tomllib
 import typing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, Literal
 
+from command_line.bounded_file import read_bounded
 from sitl.faults.keys import Fault, Kind, Unit
 from sitl.scenario_file import SUITE_NAMES
 from studies.fault_matrix.flights import SITUATIONS, FaultFlight
@@ -23,7 +25,7 @@ _UNITS: Final[tuple[str, ...]] = typing.get_args(Unit)
 _KINDS: Final[tuple[str, ...]] = typing.get_args(Kind)
 _MOST_BYTES: Final = 1 << 20
 _NUMBERS: Final = ("duration_s", "share", "size", "delay_ms", "rate_hz", "jump_s")
-_EXPECTED: Final = ("told_within_s", "then", "contact", "why")
+_EXPECTED: Final = ("told_within_s", "names", "then", "contact", "margin_mm", "why")
 _KNOWN: Final = (
     "name",
     "units",
@@ -47,7 +49,9 @@ class Expectation:
 
     then: tuple[str, ...]
     told_within_s: float | None = None  # None: it may be silent
+    names: str = ""  # what a text must name, a regular expression
     contact: Contact = "none"  # that cannot be helped
+    margin_mm: float = 0.0  # least margin to the safe set; where contact is allowed it is not asked
     why: str = ""
 
 
@@ -68,11 +72,11 @@ def expectations(path: Path = EXPECTATIONS) -> dict[str, Expected]:
     Raises:
         ExpectationError: It cannot be read, or a table is wrong.
     """
-    tables, without = _tables(path)
+    tables, without, names = _tables(path)
     found: dict[str, Expected] = {}
     for number, table in enumerate(tables):
         try:
-            for one in _read(table, without):
+            for one in _read(table, without, names):
                 if one.name in found:
                     raise ExpectationError(f'"{one.name}" is there twice; give one of them a name')
                 found[one.name] = one
@@ -81,14 +85,11 @@ def expectations(path: Path = EXPECTATIONS) -> dict[str, Expected]:
     return found
 
 
-def _tables(path: Path) -> tuple[list[Any], NotFlown]:
+def _tables(path: Path) -> tuple[list[Any], NotFlown, dict[str, str]]:
     try:
-        with path.open("rb") as file:
-            content = file.read(_MOST_BYTES + 1)
+        content = read_bounded(path, _MOST_BYTES)
     except OSError as error:
         raise ExpectationError(f"cannot read {path}: {error.strerror}") from error
-    if len(content) > _MOST_BYTES:
-        raise ExpectationError(f"{path} is too long: must be at most {_MOST_BYTES} bytes")
     try:
         read = tomllib.loads(content.decode("utf-8"))
     except ValueError as error:  # no UTF-8, no TOML, or an integer of thousands of digits
@@ -100,7 +101,10 @@ def _tables(path: Path) -> tuple[list[Any], NotFlown]:
         raise ExpectationError(f"{path}: faults must be an array of tables ([[faults]])")
     if not isinstance(without, dict) or not all(_is_reason(*one) for one in without.items()):
         raise ExpectationError(f"{path}: not_flown must give a reason for each MODE.SUITE")
-    return tables, without
+    names = read.get("names", {})
+    if not isinstance(names, dict) or not names.keys() <= set(_UNITS):
+        raise ExpectationError(f"{path}: names must give a regular expression for each unit")
+    return tables, without, names
 
 
 def _is_reason(mode: str, by_suite: Any) -> bool:
@@ -113,7 +117,7 @@ def _is_reason(mode: str, by_suite: Any) -> bool:
     )
 
 
-def _read(table: Any, without: NotFlown) -> list[Expected]:
+def _read(table: Any, without: NotFlown, names: dict[str, str]) -> list[Expected]:
     """The faults of one table: each unit in each way, each instance, with each suite."""
     if not isinstance(table, dict):
         raise ExpectationError("must be a table")
@@ -121,10 +125,10 @@ def _read(table: Any, without: NotFlown) -> list[Expected]:
         if key not in _KNOWN:
             raise ExpectationError(f'unknown key "{key}" (known: {", ".join(_KNOWN)})')
     suites = _words(table, "suites", SUITE_NAMES, ("perfect",))
-    modes = _modes(table)
     link = bool(table.get("link", False))
     found = []
     for fault, name in _faults(table):
+        modes = _modes(table, _names(fault, names))
         for suite in suites:
             full = name if suite == "perfect" else f"{name}-{suite}"
             flown = {one: it for one, it in modes.items() if suite not in without.get(one, {})}
@@ -154,8 +158,14 @@ def _faults(table: dict[str, Any]) -> list[tuple[Fault | None, str]]:
     return found
 
 
-def _modes(table: dict[str, Any]) -> dict[str, Expectation]:
-    common: dict[str, Any] = {key: table[key] for key in _EXPECTED if key in table}
+def _names(fault: Fault | None, names: dict[str, str]) -> str:
+    """What a text of a fault must name, where its table does not say: the unit and its number."""
+    return "" if fault is None else names.get(fault.unit, "").replace("#", str(fault.number))
+
+
+def _modes(table: dict[str, Any], names: str) -> dict[str, Expectation]:
+    common: dict[str, Any] = {"names": names}
+    common |= {key: table[key] for key in _EXPECTED if key in table}
     differs = table.get("in", {})
     if not isinstance(differs, dict):
         raise ExpectationError("in must be a table of modes")
@@ -176,11 +186,25 @@ def _expectation(keys: dict[str, Any]) -> Expectation:
         raise ExpectationError(f"contact = {contact!r}: must be one of {', '.join(_CONTACTS)}")
     if contact != "none" and not keys.get("why"):
         raise ExpectationError(f'contact = "{contact}" needs a reason: why')
+    margin = keys.get("margin_mm", 0.0)
+    if isinstance(margin, bool) or not isinstance(margin, int | float) or math.isnan(margin):
+        raise ExpectationError(f"margin_mm = {margin!r}: must be a length in mm")
+    if margin < 0.0 and not keys.get("why"):
+        raise ExpectationError(f"margin_mm = {margin:g} needs a reason: why")
     told = keys.get("told_within_s", math.inf)
     if isinstance(told, bool) or not isinstance(told, int | float) or not told > 0.0:
         raise ExpectationError(f"told_within_s = {told!r}: must be a time above 0, in seconds")
     within_s = float(told) if told < math.inf else None
-    return Expectation(then, within_s, contact, keys.get("why", ""))
+    names = keys["names"]
+    if not isinstance(names, str):
+        raise ExpectationError(f"names = {names!r}: must be a regular expression")
+    if within_s is not None and not names:
+        raise ExpectationError("what must be told needs names: what a text must name")
+    try:
+        re.compile(names)
+    except re.error as error:
+        raise ExpectationError(f"names = {names!r} is no regular expression: {error}") from None
+    return Expectation(then, within_s, names, contact, float(margin), keys.get("why", ""))
 
 
 def _words(
@@ -200,18 +224,31 @@ def differences(mode: str, expected: Expectation, seen: FaultFlight) -> tuple[st
     found = []
     if seen.problem:
         return (seen.problem,)
-    warning, within_s = seen.warning, expected.told_within_s
-    if within_s is not None and warning is None:
-        found.append("silent")
-    elif within_s is not None and warning is not None and warning.after_s > within_s:
-        found.append(f"told after {warning.after_s:.2f} s, not within {within_s:g} s")
+    within_s = expected.told_within_s
+    if within_s is not None:
+        found += _untold(seen, expected.names, within_s)
     actions = seen.actions or ("goes on",)
     wrong = [action for action in actions if not _allowed(mode, action, expected.then)]
     if wrong:
         found.append(f"{', then '.join(actions)}; must be {' or '.join(expected.then)}")
     if seen.contact and expected.contact not in ("any", seen.contact):
         found.append(seen.ended)
+    least_mm = math.inf if seen.least_m is None else 1e3 * seen.least_m
+    if expected.contact == "none" and least_mm < expected.margin_mm:
+        found.append(f"margin {least_mm:.1f} mm; must be {expected.margin_mm:g} mm")
     return tuple(found)
+
+
+def _untold(seen: FaultFlight, names: str, within_s: float) -> list[str]:
+    """What is wrong with what was told; another text than the one that ``names`` it is none."""
+    if seen.warning is None:
+        return ["silent"]
+    named = next((one for one in seen.warnings if re.search(names, one.text)), None)
+    if named is None:
+        return [f'no text names "{names}"']
+    if named.after_s > within_s:
+        return [f"told after {named.after_s:.2f} s, not within {within_s:g} s"]
+    return []
 
 
 def _allowed(mode: str, action: str, then: tuple[str, ...]) -> bool:

@@ -210,7 +210,12 @@ class FaultFlight:
     @property
     def warning(self) -> Said | None:
         """The first text that an operator must act on; None: silence."""
-        return next((said for said in self.texts if said.severity <= Severity.WARNING), None)
+        return next(iter(self.warnings), None)
+
+    @property
+    def warnings(self) -> tuple[Said, ...]:
+        """All such texts, in their order."""
+        return tuple(said for said in self.texts if said.severity <= Severity.WARNING)
 
     def as_line(self) -> dict[str, Any]:
         """The flight for a journal; see :meth:`from_line`."""

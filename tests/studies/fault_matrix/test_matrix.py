@@ -23,10 +23,12 @@ from studies.fault_matrix.matrix import Cell, judge
 from studies.fault_matrix.page import page
 from tests.fsw.link.snapshots import outputs_at
 
-TOLD = Said(0.2, int(Severity.WARNING), "told")
+TOLD = Said(0.2, int(Severity.WARNING), "pose is silent")
+OTHER = Said(0.1, int(Severity.CRITICAL), "IMU jumps")
+MILD = Said(0.1, int(Severity.INFO), "pose is back")
 LATE = replace(TOLD, after_s=0.6)
 FINE = FaultFlight((TOLD,), ("land",), least_m=0.1)
-LAND_SOON = Expectation(then=("land",), told_within_s=0.5)
+LAND_SOON = Expectation(then=("land",), told_within_s=0.5, names="pose|GNSS")
 
 
 def test_every_mode_and_every_way_to_fail_is_flown() -> None:
@@ -36,6 +38,14 @@ def test_every_mode_and_every_way_to_fail_is_flown() -> None:
     there = {(unit, kind) for unit, kinds in KINDS.items() for kind in kinds}
     # No suite has a camera for it.
     assert there - flown == {("optical flow", kind) for kind in KINDS["optical flow"]}
+
+
+def test_what_must_be_told_names_the_unit_and_its_number() -> None:
+    for one in expectations().values():
+        for expected in one.modes.values():
+            assert bool(expected.names) or expected.told_within_s is None, one.name
+    assert expectations()["motor-weak-3"].modes["hold"].names == "rotor 3 "
+    assert expectations()["gyro-off"].modes["hold"].names == "IMU"
 
 
 def test_contact_is_never_allowed_without_a_reason() -> None:
@@ -53,10 +63,16 @@ def test_contact_is_never_allowed_without_a_reason() -> None:
             replace(FINE, texts=(LATE,)),
             ("told after 0.60 s, not within 0.5 s",),
         ),
+        (replace(FINE, texts=(OTHER,)), ('no text names "pose|GNSS"',)),
+        (replace(FINE, texts=(OTHER, MILD)), ('no text names "pose|GNSS"',)),
+        (replace(FINE, texts=(OTHER, TOLD)), ()),
+        (replace(FINE, texts=(OTHER, LATE)), ("told after 0.60 s, not within 0.5 s",)),
         (replace(FINE, actions=()), ("goes on; must be land",)),
         (replace(FINE, actions=("hold", "land")), ("hold, then land; must be land",)),
         (replace(FINE, contact="ground", ended="it fell"), ("it fell",)),
         (replace(FINE, problem="no flight", texts=()), ("no flight",)),
+        (replace(FINE, least_m=-0.001), ("margin -1.0 mm; must be 0 mm",)),
+        (replace(FINE, least_m=None), ()),
     ],
 )
 def test_what_is_not_as_it_must_be_is_named(flight: FaultFlight, differs: tuple[str, ...]) -> None:
@@ -89,6 +105,13 @@ def test_contact_with_the_ground_is_not_contact_with_a_wall() -> None:
         ("[[faults]]", "then must name at least one"),
         ('[[faults]]\nthen = ["hold"]\ncontact = "ground"', "needs a reason"),
         ('[[faults]]\nthen = ["hold"]\ntold_within_s = -1', "told_within_s = -1"),
+        ('[[faults]]\nthen = ["hold"]\nnames = "("', "names = '(' is no regular expression"),
+        ('[[faults]]\nthen = ["hold"]\nnames = 3', "names = 3: must be a regular expression"),
+        ('[[faults]]\nthen = ["hold"]\ntold_within_s = 1', "what must be told needs names"),
+        ('[[faults]]\nthen = ["hold"]\nmargin_mm = -1', "margin_mm = -1 needs a reason"),
+        ('[[faults]]\nthen = ["hold"]\nmargin_mm = nan', "margin_mm = nan: must be a length"),
+        ("names = 3", "names must give a regular expression for each unit"),
+        ('names.gyros = "x"', "names must give a regular expression for each unit"),
         ('[[faults]]\nthen = ["hold"]\nin.hover.then = ["hold"]', '"in.hover": a mode is one of'),
         ('[[faults]]\nthen = ["hold"]\n[[faults]]\nthen = ["hold"]', '"none" is there twice'),
         ("faults = 3", "must be an array of tables"),
