@@ -878,7 +878,7 @@ class TickInputs:
     battery: BatteryReading | None = None  # newly measured
     host: HostHealth | None = None  # where it differs from the last one
     # By how much the sensors' clock has jumped. The times in here are the vehicle's: none has.
-    clock_jump_us: int = 0
+    sensor_clock_jump_us: int = 0
 
 
 @dataclass(frozen=True, slots=True)

@@ -302,8 +302,8 @@ class Autopilot:
             state = replace(state, battery=battery)
         if inputs.host is not None:
             state = replace(state, host=inputs.host)
-        if inputs.clock_jump_us:
-            safety = self._watch.jumped(state.safety, now_us, inputs.clock_jump_us)
+        if inputs.sensor_clock_jump_us:
+            safety = self._watch.jumped(state.safety, now_us, inputs.sensor_clock_jump_us)
             state = replace(state, safety=safety)
         if inputs.ground_station_heard:
             state = replace(state, vehicle=replace(state.vehicle, gcs_heard_us=now_us))

@@ -65,7 +65,7 @@ class Received:
     station_heard: bool = False  # a ground station's heartbeat
     samples: list[Sample] = field(default_factory=list)  # of sensors, in order of arrival
     battery: BatteryReading | None = None  # the newest
-    clock_jump_us: int = 0  # of the sensors' clock
+    sensor_clock_jump_us: int = 0
 
 
 @dataclass(slots=True)
@@ -131,7 +131,7 @@ class Inbox:
 
     def accept_clock_jump(self, jump_us: int) -> None:
         """Keep by how much [us] the sensors' clock has jumped against the vehicle's time."""
-        self._received.clock_jump_us += jump_us
+        self._received.sensor_clock_jump_us += jump_us
 
     def take(self) -> Received:
         """Hand over what came."""
@@ -170,7 +170,7 @@ class Inbox:
             tuple(came.samples),
             came.battery,
             host,
-            came.clock_jump_us,
+            came.sensor_clock_jump_us,
         )
 
     def _command(self, read: Callable[[Frame], CommandRequest | None], frame: Frame) -> None:

@@ -102,7 +102,8 @@ def _tables(path: Path) -> tuple[list[Any], NotFlown, dict[str, str]]:
     if not isinstance(without, dict) or not all(_is_reason(*one) for one in without.items()):
         raise ExpectationError(f"{path}: not_flown must give a reason for each MODE.SUITE")
     names = read.get("names", {})
-    if not isinstance(names, dict) or not names.keys() <= set(_UNITS):
+    texts = isinstance(names, dict) and all(isinstance(one, str) for one in names.values())
+    if not texts or not names.keys() <= set(_UNITS):
         raise ExpectationError(f"{path}: names must give a regular expression for each unit")
     return tables, without, names
 

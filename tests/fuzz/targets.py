@@ -43,7 +43,13 @@ Try = Callable[[bytes], None]
 _MOST_FRAMES = 8
 _STATION = 255  # MAVLink system
 # What a simulator reads of a vehicle; the controls come last in a datagram.
-_REPLIES = (ids.COMMAND_LONG, ids.COMMAND_ACK, ids.STATUSTEXT, ids.HEARTBEAT, 93)
+_REPLIES = (
+    ids.COMMAND_LONG,
+    ids.COMMAND_ACK,
+    ids.STATUSTEXT,
+    ids.HEARTBEAT,
+    ids.HIL_ACTUATOR_CONTROLS,
+)
 
 
 def _scenario(stack: ExitStack) -> Try:

@@ -77,7 +77,7 @@ def jumped(by_us: int) -> Inputs:
 
 
 def clock_jumped(t_us: int) -> dict[str, Any]:
-    return {"clock_jump_us": -500_000} if t_us == BEGIN_US else {}
+    return {"sensor_clock_jump_us": -500_000} if t_us == BEGIN_US else {}
 
 
 def nothing(_: int) -> dict[str, Any]:

@@ -255,7 +255,7 @@ class Flight:
 
     def jumps(self) -> int:
         """By how much the tick is told that the clock has jumped [us]."""
-        return self.wire.inbox.take().clock_jump_us
+        return self.wire.inbox.take().sensor_clock_jump_us
 
 
 AHEAD, BACK = (500_000, 6_000_000), (-10_000, -100_000, -500_000)
@@ -331,7 +331,7 @@ def test_what_sensors_measured_is_at_the_vehicle_s_time_too(wire: Wire) -> None:
     times = [sample.time for sample in taken.samples]
     assert [type(one) for one in taken.samples] == [PressureSample, JointSample, ImuSample]
     assert times == [1e-6 * 1_012_000] * 3
-    assert taken.clock_jump_us == jump_us
+    assert taken.sensor_clock_jump_us == jump_us
 
 
 @pytest.mark.parametrize("lockstep", [True, False], ids=["lockstep", "real time"])

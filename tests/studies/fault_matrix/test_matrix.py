@@ -112,6 +112,7 @@ def test_contact_with_the_ground_is_not_contact_with_a_wall() -> None:
         ('[[faults]]\nthen = ["hold"]\nmargin_mm = nan', "margin_mm = nan: must be a length"),
         ("names = 3", "names must give a regular expression for each unit"),
         ('names.gyros = "x"', "names must give a regular expression for each unit"),
+        ("names.gyro = 3", "names must give a regular expression for each unit"),
         ('[[faults]]\nthen = ["hold"]\nin.hover.then = ["hold"]', '"in.hover": a mode is one of'),
         ('[[faults]]\nthen = ["hold"]\n[[faults]]\nthen = ["hold"]', '"none" is there twice'),
         ("faults = 3", "must be an array of tables"),
