@@ -239,7 +239,6 @@ class SimLoop(Generic[State]):
 
     def _receive(self, cycle: Cycle) -> None:
         sensors = cycle.release.sensors
-        self._vibration.add(sensors.gyro_B, sensors.accel_B)
         cycle.inputs = self._inbox.take_inputs(
             sensors,
             cycle.planner.take(sensors.t_us),
@@ -272,6 +271,7 @@ class SimLoop(Generic[State]):
 
     def _conclude(self, cycle: Cycle) -> None:
         outputs = cycle.outputs = self._tick.conclude()
+        self._vibration.add(cycle.release.sensors.gyro_B, cycle.release.sensors.accel_B)
         if outputs.texts is not cycle.answer.texts:
             self._sim.queue_texts(outputs.texts[len(cycle.answer.texts) :])
         self._missions.observe(outputs.snapshot)
