@@ -47,7 +47,7 @@ from fsw.signals import (
 )
 from messages import status_text
 from messages.frames import Frame, FrameWriter, split
-from messages.lockstep_codec import LockstepReader
+from messages.lockstep_codec import LockstepFrame, LockstepReader
 from messages.udp import PeerSocket
 
 PATIENCE_S: Final = 0.2  # one wait for a datagram; also the interval of announcements
@@ -103,6 +103,14 @@ class SimLink:
         self._inbox = inbox
         self._decoder = SampleDecoder(inbox.locate)
         self._writer = FrameWriter(SYSTEM_ID, AUTOPILOT)
+        self._controls_frames = {
+            armed: LockstepFrame(
+                self._writer,
+                message_ids.HIL_ACTUATOR_CONTROLS,
+                *encode_replies.end_of_controls(armed=armed),
+            )
+            for armed in (False, True)
+        }
         self._thrust_scale = 1.0 / facts.rotor_thrust_max
         self._torque_scale = 1.0 / facts.joint_torque_max
         self._steps = SensorClock(
@@ -167,14 +175,7 @@ class SimLink:
     def send_actuators(self, t_us: int, answer: Answer) -> None:
         """Send the actuator command that belongs to the step of ``t_us``."""
         stamp_us = t_us + self._steps.ahead_us
-        values = encode_replies.hil_actuator_controls(
-            stamp_us,
-            answer.actuators,
-            answer.armed,
-            self._thrust_scale,
-            self._torque_scale,
-        )
-        controls = self._writer.frame(message_ids.HIL_ACTUATOR_CONTROLS, *values)
+        controls = self._controls(stamp_us, answer)
         due = t_us - self._reported_us >= _REPORT_US
         changed = due or answer.mode is not self._reported_mode
         texts = (*self._texts, *answer.texts) if self._texts else answer.texts
@@ -321,6 +322,13 @@ class SimLink:
             for values in status_text.pieces(text.text, text.severity, self._text_id):
                 frames.append(self._writer.frame(message_ids.STATUSTEXT, *values))
         return frames
+
+    def _controls(self, stamp_us: int, answer: Answer) -> bytes:
+        """HIL_ACTUATOR_CONTROLS of a step."""
+        values = encode_replies.hil_actuator_controls(
+            stamp_us, answer.actuators, self._thrust_scale, self._torque_scale
+        )
+        return self._controls_frames[answer.armed](*values)
 
     def _mode(self, t_us: int, answer: Answer) -> bytes:
         """HEARTBEAT: the simulator sees whether its trajectory is being flown."""

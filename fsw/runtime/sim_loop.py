@@ -258,16 +258,22 @@ class SimLoop(Generic[State]):
             for ack in self._sim.routed_acks:
                 self._ground.acknowledge(t_us, ack)
             self._sim.routed_acks.clear()
-        for request in to_route(cycle.inputs.commands, answer.acks):
+        if answer.acks:
+            self._acknowledge(t_us, cycle.inputs.commands, answer.acks)
+        self._sim.send_actuators(t_us, answer)
+
+    def _acknowledge(
+        self, t_us: int, commands: tuple[Command, ...], acks: tuple[CommandAck, ...]
+    ) -> None:
+        for request in to_route(commands, acks):
             self._sim.route(request)
-        for ack in answer.acks:
+        for ack in acks:
             if ack.result == CommandResult.IN_PROGRESS:
                 continue
             if (ack.target_system, ack.target_component) == (SYSTEM_ID, PATH_PLANNER):
                 self._sim.queue_ack(ack)
             else:
                 self._ground.acknowledge(t_us, ack)
-        self._sim.send_actuators(t_us, answer)
 
     def _conclude(self, cycle: Cycle) -> None:
         outputs = cycle.outputs = self._tick.conclude()
