@@ -14,7 +14,7 @@ from typing import Any, Final, NamedTuple
 
 from fsw.estimation.error_state import BA, BG, FORCE, IMU_CAPACITY, LOST, NO_FORCE
 from fsw.estimation.sensor_fault import Sensor
-from fsw.geometry.vectors import dot, norm
+from fsw.geometry.vectors import add_scaled, dot, norm, subtract
 from fsw.signals import Vec3
 
 _SETTLED: Final = 0.2  # s after the last pose that was refused, until biases are known anew
@@ -23,7 +23,7 @@ _HOLDS: Final = 2.0  # s after the last one, for which that is the answer to the
 _STEPPED: Final = 1.0  # s, for which a step of the gyro is remembered
 _SIGMAS: Final = 3.0  # of a bias, and
 _LEAST_RATE: Final = 0.03  # rad/s, that it has moved at least
-_LEAST_FORCE: Final = 0.1  # m/s^2
+_LEAST_FORCE: Final = 0.05  # m/s^2
 # What the witness must have seen: more than half of how the bias has moved, and more than this of
 # a force, because gusts, the arm and what is wrong with the mass make as much.
 _HALF: Final = 0.5
@@ -43,8 +43,9 @@ class Biases(NamedTuple):
 class Witness(NamedTuple):
     """By how much the readings have changed with nothing on the vehicle that explains it."""
 
-    force: Vec3  # m/s^2, FRD
-    rate: Vec3  # rad/s, FRD
+    force: Vec3 = _NONE  # m/s^2, FRD, the mean of some readings
+    rate: Vec3 = _NONE  # rad/s, FRD
+    readings: int = 0  # of the accelerometer
 
 
 class Dispute(NamedTuple):
@@ -92,22 +93,26 @@ def biases(x: Any) -> Biases:
     )
 
 
-def witness(x: Any, before: Biases, model: Vec3, now: float) -> Witness:
-    """What the third witness has seen, of the readings in a filter's record ``x`` [SI].
-
-    Biases ``before`` [SI] are those that nobody contradicted. The ``model`` [SI, FRD] is that of
-    ``imu.add_imu``: its last entry is thrust over mass, or 0 where it is not known. ``now`` [s].
-    """
-    first, end = int(x["first"]), int(x["end"])
-    rows = x["imu"][[k % IMU_CAPACITY for k in range(first, end)]]
-    good = rows[(rows[:, LOST].astype(int) & NO_FORCE) == 0]
-    force = _NONE
-    if model[2] > 0.0 and len(good):
-        f, g, h = good[:, FORCE : FORCE + 3].mean(axis=0).tolist()
-        a, b, c = before.force
-        force = f - a, g - b, h - c + model[2]
+def witness(x: Any, now: float) -> Witness:
+    """What is known when a dispute begins, of a filter's record ``x`` [SI] at ``now`` [s]."""
     recent = now - float(x["stepped"]) <= _STEPPED
-    return Witness(force, tuple(x["step"].tolist()) if recent else _NONE)
+    return Witness(rate=tuple(x["step"].tolist())) if recent else Witness()
+
+
+def felt(seen: Witness, x: Any, before: Biases, model: Vec3) -> Witness:
+    """What is ``seen`` [SI] with the newest reading in a filter's record ``x`` [SI].
+
+    A mean of many readings has less of gusts and of what rotors shake. Biases ``before`` [SI] are
+    those that nobody contradicted. The ``model`` [SI, FRD] is that of ``imu.add_imu``: its last
+    entry is thrust over mass, or 0 where it is not known.
+    """
+    row = x["imu"][(int(x["end"]) - 1) % IMU_CAPACITY].tolist()
+    if int(row[LOST]) & NO_FORCE or not model[2] > 0.0:
+        return seen
+    readings = seen.readings + 1
+    felt_now = row[FORCE], row[FORCE + 1], row[FORCE + 2] + model[2]
+    change = subtract(subtract(felt_now, before.force), seen.force)
+    return seen._replace(force=add_scaled(seen.force, change, 1.0 / readings), readings=readings)
 
 
 def wrong(dispute: Dispute, now: Biases) -> Sensor:
@@ -129,7 +134,7 @@ def wrong(dispute: Dispute, now: Biases) -> Sensor:
 
 def _explains(seen: Vec3, before: Vec3, now: Vec3, least_moved: float, least_seen: float) -> bool:
     """Whether what was ``seen`` is nearer to how a bias has moved than to nothing."""
-    moved = now[0] - before[0], now[1] - before[1], now[2] - before[2]
+    moved = subtract(now, before)
     size = norm(moved)
     if not size > least_moved:
         return False

@@ -35,7 +35,7 @@ CALM: Final = 250  # readings that were believed, in a row
 # A step of the gyro from one reading to the next. Rotors turn the body by 17 rad/s^2, which is
 # 0.034 rad/s; in flight it changes by 0.016 rad/s on average with what rotors shake.
 _STEP: Final = 0.06  # rad/s
-_STEP_SHAKEN: Final = 4.0  # times the usual change
+_STEP_SHAKEN: Final = 3.0  # times the usual change
 _SHAKEN_SHARE: Final = 0.01  # of the newest change, in the usual one
 STEPS_APART: Final = 0.5  # s; farther apart, steps are not of one kind
 # Plain numbers: kernels return them.

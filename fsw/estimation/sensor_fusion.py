@@ -63,6 +63,8 @@ _SELDOM_APART: Final = 1.25  # s; the same of a sensor whose readings come farth
 # What poses contradict by no more, an inertial unit may have made; a frame that moves, moves more.
 _SMALL_STEP: Final = 0.05  # m
 _SMALL_TURN: Final = 0.1  # rad
+_JUMPED: Final = 0.2  # s, for which poses are refused after a jump of the IMU that is believed
+_LATELY: Final = 0.02  # s, in which a fault is one of now
 _FLOATS: Final = FILTER.itemsize // 8  # that a filter has room for
 _REST: Vec3 = (0.0, 0.0, 0.0)
 UNKNOWN: Final[Vec3] = (0.0, 0.0, 0.0)  # what rotors make of the vehicle
@@ -262,9 +264,9 @@ class SensorFusion:
 
         ``joint_acceleration`` [rad/s^2, joints] is what the torques make of the arm; a ``watch`` of
         its encoders is kept in the memory. Where the IMU is of no use, or in dispute with the pose,
-        a ``model`` [SI, FRD] tells what the rotors make of the vehicle (``imu.add_imu``); it is ``silent`` if it has no reading
-        to go by. None before there was a pose, or a position and a heading, to start from, and a
-        reading of the arm.
+        a ``model`` [SI, FRD] tells what the rotors make of the vehicle (``imu.add_imu``); it is
+        ``silent`` if it has no reading to go by. None before there was a pose, or a position and a
+        heading, to start from, and a reading of the arm.
         """
         dt = min(max(now - memory.now, 0.0), _LONGEST_STEP) if memory.now >= 0.0 else 0.0
         x = np.ndarray(1, FILTER, np.empty(_FLOATS))  # eight times as fast as an empty record
@@ -616,15 +618,14 @@ class SensorFusion:
             self._set_pressure(memory, one.time, sample)
         confirmed = refused and self._is_confirmed(memory, sample)
         latest = memory.refused
-        disputed = refused and isinstance(sample, PoseSample) and _is_small(innovation)
-        if disputed and not announced:
-            turned = ratio[-1] > 1.0
-            memory = memory.in_dispute(now, turned=turned)
+        little = isinstance(sample, PoseSample) and _is_small(innovation)
+        if refused and not announced and (little or _has_jumped(memory, sample, now)):
+            memory = memory.in_dispute(now, turned=ratio[-1] > 1.0)
         elif refused:
             health = health.with_fault(SensorFault.JUMP, now)
         if refused:
             latest = (*[one for one in latest if type(one) is not type(sample)], sample)
-            if confirmed and disputed:
+            if confirmed and little and isinstance(sample, PoseSample):
                 kernels.doubt(memory.numbers, self.law, _SMALL_STEP, _SMALL_TURN)
                 ratio = self._fuse_pose(memory, sample)
         fused = health.fused or (now,) * len(ratio)
@@ -747,11 +748,9 @@ def _settled(memory: FusionMemory, dispute: Dispute, model: Vec3, now: float) ->
         return memory._replace(dispute=None)
     if dispute.wrong is None:
         x = memory.numbers[0]
-        if dispute.witness is None:
-            if now == dispute.since:
-                return memory  # asked with the next tick, which brings the model
-            seen = attribution.witness(x, dispute.before, model, now)
-            dispute = dispute._replace(witness=seen)
+        seen = dispute.witness or attribution.witness(x, now)
+        seen = attribution.felt(seen, x, dispute.before, model)
+        dispute = dispute._replace(witness=seen)
         if not dispute.is_due(now):
             return memory._replace(dispute=dispute)
         dispute = dispute._replace(wrong=attribution.wrong(dispute, attribution.biases(x)))
@@ -760,12 +759,22 @@ def _settled(memory: FusionMemory, dispute: Dispute, model: Vec3, now: float) ->
     return _blamed(memory._replace(dispute=dispute), now)
 
 
+def _has_jumped(memory: FusionMemory, sample: Aiding, now: float) -> bool:
+    """Whether what an IMU said that has jumped may be why a pose is refused at ``now`` [s]."""
+    imu = memory.of(Sensor.IMU)
+    jumped = imu.fault is SensorFault.JUMP and now - imu.fault_at <= _JUMPED
+    return jumped and isinstance(sample, PoseSample)
+
+
 def _blamed(memory: FusionMemory, now: float) -> FusionMemory:
     """The memory with the fault of who is wrong in its dispute, noted at ``now`` [s]."""
     assert memory.dispute is not None
-    if memory.dispute.wrong is Sensor.IMU:
-        return memory.noting_fault(Sensor.IMU, SensorFault.DISAGREES, now)
-    return memory.noting_fault(Sensor.POSE, SensorFault.JUMP, now)
+    if memory.dispute.wrong is not Sensor.IMU:
+        return memory.noting_fault(Sensor.POSE, SensorFault.JUMP, now)
+    imu = memory.of(Sensor.IMU)
+    if imu.fault is not SensorFault.DISAGREES and now - imu.fault_at <= _LATELY:
+        return memory  # it is known by what is worse
+    return memory.noting_fault(Sensor.IMU, SensorFault.DISAGREES, now)
 
 
 def _of_reading(asked: Asked, fault: int) -> int:
