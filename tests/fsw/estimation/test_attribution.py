@@ -214,7 +214,6 @@ _IMU = {(Sensor.IMU, SensorFault.DISAGREES)}
 _POSE = {(Sensor.POSE, SensorFault.JUMP)}
 
 
-@pytest.mark.requirement("REQ-EST-11")
 @pytest.mark.parametrize("size", [0.15, 0.6, 2.5])
 @pytest.mark.parametrize("axis", _AXES, ids=str)
 def test_a_gyro_off_by_a_constant_is_named_and_the_pose_is_not(axis: Vec3, size: float) -> None:
@@ -223,7 +222,6 @@ def test_a_gyro_off_by_a_constant_is_named_and_the_pose_is_not(axis: Vec3, size:
     assert first < 0.5
 
 
-@pytest.mark.requirement("REQ-EST-11")
 @pytest.mark.parametrize("size", [2.5, 8.0, 25.0])
 @pytest.mark.parametrize("axis", _AXES, ids=str)
 def test_an_accelerometer_off_by_a_constant_is_named_and_the_pose_is_not(
@@ -234,7 +232,6 @@ def test_an_accelerometer_off_by_a_constant_is_named_and_the_pose_is_not(
     assert first < 0.7
 
 
-@pytest.mark.requirement("REQ-EST-11")
 @pytest.mark.parametrize("axis", _AXES, ids=str)
 def test_poses_that_jump_or_run_away_are_named_and_the_unit_is_not(axis: Vec3) -> None:
     lies = [
