@@ -18,7 +18,8 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from fsw.compiled import machine_code, packed
-from fsw.estimation import kernels
+from fsw.estimation import attribution, kernels
+from fsw.estimation.attribution import Dispute
 from fsw.estimation.drift import FrameDrift, least
 from fsw.estimation.error_state import DELAY, ERRORS, FILTER, FRAME, IMU_CAPACITY, Array, Filter
 from fsw.estimation.imu import IMU_TOO_OLD, STUCK_READINGS, TIME_TOLERANCE
@@ -62,6 +63,8 @@ _SELDOM_APART: Final = 1.25  # s; the same of a sensor whose readings come farth
 # What poses contradict by no more, an inertial unit may have made; a frame that moves, moves more.
 _SMALL_STEP: Final = 0.05  # m
 _SMALL_TURN: Final = 0.1  # rad
+_JUMPED: Final = 0.2  # s, for which poses are refused after a jump of the IMU that is believed
+_LATELY: Final = 0.02  # s, in which a fault is one of now
 _FLOATS: Final = FILTER.itemsize // 8  # that a filter has room for
 _REST: Vec3 = (0.0, 0.0, 0.0)
 UNKNOWN: Final[Vec3] = (0.0, 0.0, 0.0)  # what rotors make of the vehicle
@@ -127,6 +130,7 @@ class FusionMemory(NamedTuple):
     delay_sigma: float = 0.0  # s, with which the estimate of the pose's own delay began
     paces: tuple[Pace, ...] = ()  # how often sensors are heard
     restarts: int = 0  # how often the filter had to start anew, because it had no numbers any more
+    dispute: Dispute | None = None  # between pose and IMU
 
     def of(self, sensor: Sensor) -> Health:
         """What is known of a sensor."""
@@ -157,6 +161,11 @@ class FusionMemory(NamedTuple):
         if of_encoders:
             memory = memory.noting_fault(Sensor.ENCODERS, SensorFault(of_encoders), now)
         return memory
+
+    def in_dispute(self, now: float, *, turned: bool) -> FusionMemory:
+        """The memory after a pose was refused by little at ``now`` [s]: see ``Dispute``."""
+        dispute = attribution.contradicted(self.dispute, now, self.numbers[0], turned=turned)
+        return self._replace(dispute=dispute)
 
     def repeats(self, sample: Aiding) -> bool:
         """Whether a sample says what the last one of its sensor said, to the last bit."""
@@ -255,10 +264,10 @@ class SensorFusion:
         """Take in the ``samples`` that came since the last tick; the state at ``now`` [s].
 
         ``joint_acceleration`` [rad/s^2, joints] is what the torques make of the arm; a ``watch`` of
-        its encoders is kept in the memory. Where the IMU is of no use, a ``model`` [SI, FRD] tells
-        what the rotors make of the vehicle (``imu.add_imu``); it is ``silent`` if it has no reading
-        to go by. None before there was a pose, or a position and a heading, to start from, and a
-        reading of the arm.
+        its encoders is kept in the memory. Where the IMU is of no use, or in dispute with the pose,
+        a ``model`` [SI, FRD] tells what the rotors make of the vehicle (``imu.add_imu``); it is
+        ``silent`` if it has no reading to go by. None before there was a pose, or a position and a
+        heading, to start from, and a reading of the arm.
         """
         dt = min(max(now - memory.now, 0.0), _LONGEST_STEP) if memory.now >= 0.0 else 0.0
         x = np.ndarray(1, FILTER, np.empty(_FLOATS))  # eight times as fast as an empty record
@@ -285,6 +294,8 @@ class SensorFusion:
         # By position, because it is done in every tick: what every tick renews, and the rest.
         watched = memory.encoders if watch is None else watch
         memory = FusionMemory(x, now, imu_came, joints_came, watched, *memory[5:])
+        if memory.dispute is not None:
+            memory = _settled(memory, memory.dispute, model, now)
         if known is None:
             return (_anew(memory) if ready else memory), None
         return memory, StateEstimate(round(1e6 * now), *known)
@@ -642,10 +653,14 @@ class SensorFusion:
             self._set_pressure(memory, one.time, sample)
         confirmed = refused and self._is_confirmed(memory, sample)
         latest = memory.refused
-        if refused:
+        little = isinstance(sample, PoseSample) and _is_small(innovation)
+        if refused and not announced and (little or _has_jumped(memory, sample, now)):
+            memory = memory.in_dispute(now, turned=ratio[-1] > 1.0)
+        elif refused:
             health = health.with_fault(SensorFault.JUMP, now)
+        if refused:
             latest = (*[one for one in latest if type(one) is not type(sample)], sample)
-            if confirmed and isinstance(sample, PoseSample) and _is_small(innovation):
+            if confirmed and little and isinstance(sample, PoseSample):
                 kernels.doubt(memory.numbers, self.law, _SMALL_STEP, _SMALL_TURN)
                 ratio = self._fuse_pose(memory, sample)
         fused = health.fused or (now,) * len(ratio)
@@ -755,7 +770,46 @@ def _anew(memory: FusionMemory) -> FusionMemory:
         waiting=(),
         pose=None,
         restarts=memory.restarts + 1,
+        dispute=None,
     )
+
+
+def _settled(memory: FusionMemory, dispute: Dispute, model: Vec3, now: float) -> FusionMemory:
+    """The memory after a ``dispute`` has gone on for a tick, and the fault of who is wrong in it.
+
+    Rotors and a ``model`` [SI, FRD] as in ``step``, at ``now`` [s].
+    """
+    if dispute.is_over(now):
+        return memory._replace(dispute=None)
+    if dispute.wrong is None:
+        x = memory.numbers[0]
+        seen = dispute.witness or attribution.witness(x, now)
+        seen = attribution.felt(seen, x, dispute.before, model)
+        dispute = dispute._replace(witness=seen)
+        if not dispute.is_due(now):
+            return memory._replace(dispute=dispute)
+        dispute = dispute._replace(wrong=attribution.wrong(dispute, attribution.biases(x)))
+    elif now != dispute.last:
+        return memory
+    return _blamed(memory._replace(dispute=dispute), now)
+
+
+def _has_jumped(memory: FusionMemory, sample: Aiding, now: float) -> bool:
+    """Whether what an IMU said that has jumped may be why a pose is refused at ``now`` [s]."""
+    imu = memory.of(Sensor.IMU)
+    jumped = imu.fault is SensorFault.JUMP and now - imu.fault_at <= _JUMPED
+    return jumped and isinstance(sample, PoseSample)
+
+
+def _blamed(memory: FusionMemory, now: float) -> FusionMemory:
+    """The memory with the fault of who is wrong in its dispute, noted at ``now`` [s]."""
+    assert memory.dispute is not None
+    if memory.dispute.wrong is not Sensor.IMU:
+        return memory.noting_fault(Sensor.POSE, SensorFault.JUMP, now)
+    imu = memory.of(Sensor.IMU)
+    if imu.fault is not SensorFault.DISAGREES and now - imu.fault_at <= _LATELY:
+        return memory  # it is known by what is worse
+    return memory.noting_fault(Sensor.IMU, SensorFault.DISAGREES, now)
 
 
 def _of_reading(asked: Asked, fault: int) -> int:
