@@ -46,7 +46,9 @@ def reference() -> str:
     table = "\n".join(rows) + "\n"
     checks = ["| subject | check fails where | waiting helps |", "|---" * 3 + "|"]
     checks += [_check(check) for check in CHECKS]
-    return "\n".join((_HEAD.format(actions=actions), table, _RULES.format(checks="\n".join(checks))))
+    return "\n".join(
+        (_HEAD.format(actions=actions), table, _RULES.format(checks="\n".join(checks)))
+    )
 
 
 def _check(check: ArmingCheck) -> str:

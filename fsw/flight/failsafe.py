@@ -869,7 +869,7 @@ FAILSAFES: Final = (
         slow=True,
         detected="two parameters contradict each other (`fsw/parameters/contradictions.py`), or "
         "the start-up analysis finds that with these parameters the safe set in force cannot be "
-        "kept; with `--allow-inconsistent` that is told when the safe set comes, and is no "
+        "kept; with `--allow-inconsistent` that is reported when the safe set comes, and is no "
         "condition",
         within_us=_SLOWLY,
         does="warning, again when it is another contradiction; no arming. A change that would "

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -61,6 +62,8 @@ def test_a_clock_that_jumps_is_told_once_and_the_flight_goes_on(
     assert (flown.sitl_exit, flown.fsw_exit) == (0, 0)
     assert flown.result["completed"]
     assert urgent_texts(flown) == [f"time jumped by {jump_s:+.2f} s"]
+    (told,) = [line for line in flown.warned if "jumped" in line]
+    assert re.fullmatch(rf"fsw: 0\.[67] s: time jumped by {re.escape(f'{jump_s:+.2f}')} s", told)
     answered_us = values_of(HIL_ACTUATOR_CONTROLS, flown.to_sitl)[-1][0]
     assert answered_us == pytest.approx(1e6 * (2.6 + jump_s), abs=10_000)
     # The pilot's clock has not jumped: it sends targets 2 s ahead.
