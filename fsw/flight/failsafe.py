@@ -444,7 +444,10 @@ def _refused_plan(context: FailsafeContext) -> str:
 
 
 def _jumped(context: FailsafeContext) -> str:
-    return f" by {1e-6 * context.state.safety.jump_us:+.2f} s"
+    jump_us = context.state.safety.jump_us
+    if abs(jump_us) < 100_000:
+        return f" by {1e-3 * jump_us:+g} ms"
+    return f" by {1e-6 * jump_us:+.2f} s"
 
 
 def _by_mm(length: float) -> str:
