@@ -882,6 +882,20 @@ class TickInputs:
 
 
 @dataclass(frozen=True, slots=True)
+class Answer:
+    """What of a tick goes to the actuators, and at once with it."""
+
+    actuators: ActuatorCommand
+    armed: bool
+    mode: Mode
+    acks: tuple[CommandAck, ...] = ()
+    texts: tuple[StatusText, ...] = ()
+    tuning_taken: bool | None = (
+        None  # whether the requested one is in use; None: none was requested
+    )
+
+
+@dataclass(frozen=True, slots=True)
 class TickOutputs:
     """Everything one tick says."""
 

@@ -11,7 +11,7 @@ makes of the filter.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Sequence
 from functools import reduce
 from typing import Any, Final, NamedTuple
 
@@ -67,6 +67,7 @@ _REST: Vec3 = (0.0, 0.0, 0.0)
 UNKNOWN: Final[Vec3] = (0.0, 0.0, 0.0)  # what rotors make of the vehicle
 _LOST: Final[Vec3] = (math.nan, math.nan, math.nan)
 _NO_TURN: Vec4 = (1.0, 0.0, 0.0, 0.0)
+_USUAL_PARTS: Final = kernels.COPY | kernels.JOINTS | kernels.READING
 _NO_READING: kernels.Reading = (0.0, _REST, _REST)
 
 
@@ -243,7 +244,7 @@ class SensorFusion:
     def step(
         self,
         memory: FusionMemory,
-        samples: Iterable[Sample],
+        samples: Sequence[Sample],
         now: float,
         joint_acceleration: Vec2 = (0.0, 0.0),
         watch: EncoderWatch | None = None,
@@ -261,16 +262,14 @@ class SensorFusion:
         """
         dt = min(max(now - memory.now, 0.0), _LONGEST_STEP) if memory.now >= 0.0 else 0.0
         x = np.ndarray(1, FILTER, np.empty(_FLOATS))  # eight times as fast as an empty record
-        asked = Asked(x, kernels.COPY, (now, dt), joint_acceleration, model=model)
-        for sample in samples:
-            if isinstance(sample, ImuSample):
-                memory, asked = self._take_imu(memory, asked, sample)
-            elif isinstance(sample, JointSample):
-                memory, asked = self._take_joints(memory, asked, sample)
-            else:
-                if asked.parts & kernels.READING and memory.repeats(sample):
-                    memory, asked = self._done(memory, asked)
-                memory = self.take(memory, sample, now)
+        usual = self._usual(memory, samples, now)
+        if usual is not None:
+            asked = Asked(x, _USUAL_PARTS, (now, dt), joint_acceleration, *usual, model)
+            if isinstance(samples[0], PoseSample):
+                memory = self.take(memory, samples[0], now)
+        else:
+            asked = Asked(x, kernels.COPY, (now, dt), joint_acceleration, model=model)
+            memory, asked = self._take_each(memory, asked, samples)
         imu_came = memory.imu_came if asked.reading is _NO_READING else now
         if silent:
             memory, asked = self._take_no_imu(memory, asked)
@@ -289,6 +288,42 @@ class SensorFusion:
         if known is None:
             return (_anew(memory) if ready else memory), None
         return memory, StateEstimate(round(1e6 * now), *known)
+
+    def _usual(
+        self, memory: FusionMemory, samples: Sequence[Sample], now: float
+    ) -> tuple[Vec3, kernels.Reading] | None:
+        """Encoders and reading of a tick in which each came once, behind a pose if any.
+
+        None: samples have to be taken one by one. Most ticks are so, and this takes half as long.
+        """
+        count = len(samples)
+        if not 2 <= count <= 3 or not memory.started:
+            return None
+        arm, unit = samples[-2:]
+        if type(arm) is not JointSample or type(unit) is not ImuSample:
+            return None
+        if count == 3 and type(samples[0]) is not PoseSample:
+            return None
+        came = memory.joints_came
+        if came < 0.0 or unit.time < now - IMU_TOO_OLD or _fault_of_encoders(arm, now, came):
+            return None
+        first, second = arm.angles
+        return (first, second, now - arm.time), (unit.time, unit.acceleration, unit.rate)
+
+    def _take_each(
+        self, memory: FusionMemory, asked: Asked, samples: Sequence[Sample]
+    ) -> tuple[FusionMemory, Asked]:
+        """Take samples in, one after the other, whatever they are."""
+        for sample in samples:
+            if isinstance(sample, ImuSample):
+                memory, asked = self._take_imu(memory, asked, sample)
+            elif isinstance(sample, JointSample):
+                memory, asked = self._take_joints(memory, asked, sample)
+            else:
+                if asked.parts & kernels.READING and memory.repeats(sample):
+                    memory, asked = self._done(memory, asked)
+                memory = self.take(memory, sample, asked.times[0])
+        return memory, asked
 
     def _take_imu(
         self, memory: FusionMemory, asked: Asked, sample: ImuSample

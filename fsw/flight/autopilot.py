@@ -6,6 +6,8 @@ No clock, socket, thread or random number: real time, lockstep, replay and tests
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from fsw.control.actuator_watch import Watch, paused
@@ -20,6 +22,7 @@ from fsw.control.cascade import (
 )
 from fsw.control.safety_gate import gate
 from fsw.estimation.estimator import estimate_state
+from fsw.estimation.frame_trust import FrameTrust
 from fsw.estimation.sensor_fusion import FusionMemory
 from fsw.flight.accuracy_watch import AccuracyWatch
 from fsw.flight.commander import Commander, acknowledgement
@@ -49,6 +52,7 @@ from fsw.shapes.zones import NO_ZONES, Array, moving_zones
 from fsw.signals import (
     STOPPED,
     ActuatorCommand,
+    Answer,
     BatteryState,
     CommandAck,
     CommandResult,
@@ -83,6 +87,25 @@ _STILL = SensorFrame(
 )
 # N m s/rad, about critical for the hanging arm: it is let down beside walls as well.
 _ARM_DAMPING: Vec2 = (0.15, 0.04)
+
+
+class Controlled(NamedTuple):
+    """A tick whose command is decided; ``Autopilot.conclude`` does the rest."""
+
+    answer: Answer
+    inputs: TickInputs
+    state: FlightState  # with what was received, commanded and decided
+    memory: CascadeMemory  # of the loops, for the next tick
+    estimate: StateEstimate | None = None  # None: there has been none yet
+    fusion: FusionMemory | None = None
+    trust: FrameTrust = FrameTrust()
+    flown: bool = False  # the loops are closed
+    nominal: PredictionState | None = None  # where the running plan wants the vehicle now
+    plan: PlanMemory = PlanMemory()
+    u: PlanInput = REST_INPUT
+    ticks: int = 1  # since the last one
+    replaced: bool = False  # the command, by the safety gate
+    guarded: Guarded = UNGUARDED
 
 
 class Autopilot:
@@ -151,6 +174,10 @@ class Autopilot:
 
     def tick(self, state: FlightState, inputs: TickInputs) -> tuple[FlightState, TickOutputs]:
         """Everything the vehicle does at one instant: the next state, and everything it says."""
+        return self.conclude(self.control(state, inputs))
+
+    def control(self, state: FlightState, inputs: TickInputs) -> Controlled:
+        """The part of a tick that the vehicle waits for: from the sensors to the actuators."""
         now_us = inputs.sensors.t_us
         texts: list[StatusText] = []
         fusion, trust = state.fusion, state.trust
@@ -160,7 +187,7 @@ class Autopilot:
             state, trust, estimate = self._exact.estimate(state, inputs, texts)
         state = self._receive(state, inputs, texts)
         if estimate is None:
-            return state, _blind(inputs, texts)
+            return _blind(state, inputs, texts)
 
         acks: list[CommandAck] = []
         if inputs.commands:
@@ -170,22 +197,53 @@ class Autopilot:
         state = self._commander.check_mode_completion(state, estimate, texts)
 
         ticks = self._elapsed_ticks(state, now_us)
-        index, per_plan = state.index + ticks, self._ticks_per_plan
-        planning_due = index // per_plan != state.index // per_plan
         nominal, plan, u = state.nominal, state.plan, REST_INPUT
         flown = state.vehicle.flies and nominal is not None
         if flown and nominal is not None:
             nominal, plan, u = self._follow(state, estimate, nominal, inputs.plan, ticks)
+        sent, memory, replaced, guarded = self._actuate(state, estimate, nominal, u, ticks)
+        vehicle = state.vehicle
+        answer = Answer(sent, vehicle.armed, vehicle.mode, tuple(acks), tuple(texts))
+        # By position, as what follows: each is made in every tick, and names cost a microsecond.
+        return Controlled(
+            answer,
+            inputs,
+            state,
+            memory,
+            estimate,
+            fusion,
+            trust,
+            flown,
+            nominal,
+            plan,
+            u,
+            ticks,
+            replaced,
+            guarded,
+        )
+
+    def conclude(self, controlled: Controlled) -> tuple[FlightState, TickOutputs]:
+        """The rest of the tick, for which the actuators need not wait.
+
+        What it finds out is acted upon in the next tick.
+        """
+        c = controlled
+        answer, inputs, state, memory, estimate = c[:5]
+        if estimate is None:
+            return state, _nothing_known(answer, inputs)
+        nominal, plan, flown, texts = c.nominal, c.plan, c.flown, answer.texts
+        now_us, per_plan = inputs.sensors.t_us, self._ticks_per_plan
+        index = state.index + c.ticks
         safety = self._watch.off_plan(
             state.safety, estimate, nominal if flown else None, state.accuracy.reach
         )
         request = None
-        if planning_due:
+        if index // per_plan != state.index // per_plan:
             mission = self._safe_sets.hold_silent_zones(state.mission, now_us)
             if mission is not state.mission:
                 state = replace(state, mission=mission)
-            covariance = self._sensed.covariance(fusion)
-            pose = self._pose_error(state, estimate, fusion, covariance)
+            covariance = self._sensed.covariance(c.fusion)
+            pose = self._pose_error(state, estimate, c.fusion, covariance)
             state = self._keep_clear(state, estimate, pose)
             if flown and nominal is not None:
                 state, request, plan = self._request_plan(
@@ -193,25 +251,25 @@ class Autopilot:
                 )
                 safety = replace(safety, replan=False) if safety.replan else safety
             state = self._report_slowly(state, estimate, now_us)
-            state = self._sensed.reported(state, fusion, estimate, covariance)
-            state = self._see_accuracy(state, estimate, covariance, pose, texts)
+            state = self._sensed.reported(state, c.fusion, estimate, covariance)
+            state, said = self._see_accuracy(state, estimate, covariance, pose)
+            texts = (*texts, *said)
             safety = self._watch.breach(safety, estimate, state.constraints, flies=flown)
-        sent, memory, replaced, (pushed, margin) = self._actuate(state, estimate, nominal, u, ticks)
+        pushed, margin = c.guarded
         if pushed or safety.filter_us >= 0:
             safety = self._watch.filtered(safety, now_us, pushed=pushed)
         if safety.breach_us >= 0 or not margin >= 0.0:
             safety = self._breached(state, safety, estimate, margin)
         damage, watch = self._see_damage(
-            state, memory, estimate, ticks, flown and not trust.doubted
+            state, memory, estimate, c.ticks, flown and not c.trust.doubted
         )
-        # By position, as the snapshot: both are made in every tick, and names cost a microsecond.
         state = FlightState(
             index,
             now_us,
             estimate,
             state.invalid_ticks,
             nominal,
-            replaced,
+            c.replaced,
             memory,
             state.vehicle,
             state.mission,
@@ -225,18 +283,19 @@ class Autopilot:
             state.arming_refusal,
             state.arming,
             safety,
-            fusion,
+            c.fusion,
             state.estimator,
             state.aiding,
-            trust,
+            c.trust,
             state.kept,
             state.accuracy,
             state.host,
             damage,
             watch,
         )
-        snapshot = _snapshot(state, estimate, u, inputs)
-        return state, TickOutputs(sent, snapshot, request, tuple(acks), tuple(texts))
+        snapshot = _snapshot(state, estimate, c.u, inputs)
+        taken = answer.tuning_taken
+        return state, TickOutputs(answer.actuators, snapshot, request, answer.acks, texts, taken)
 
     def _with_evidence(self, state: FlightState, estimate: StateEstimate) -> FlightState:
         """What the failsafe table looks at and what is not kept up to date elsewhere."""
@@ -356,17 +415,17 @@ class Autopilot:
         estimate: StateEstimate,
         covariance: Array | None,
         pose: Array | None,
-        texts: list[StatusText],
-    ) -> FlightState:
+    ) -> tuple[FlightState, list[StatusText]]:
         """Say what the sensors' errors add to the tube, once that is known."""
+        texts: list[StatusText] = []
         if covariance is None or pose is None or state.accuracy.told:
-            return state
+            return state, texts
         safe_set, source = state.kept.source, state.aiding.pose.value
         position = self._clearance.deviation(estimate, pose) if safe_set.zones else 0.0
         sure = self._accuracy.see(
             state.accuracy, state.t_us, safe_set, source, position, covariance, texts
         )
-        return replace(state, accuracy=sure)
+        return replace(state, accuracy=sure), texts
 
     def _keep_clear(
         self, state: FlightState, estimate: StateEstimate, pose: Array | None
@@ -578,8 +637,20 @@ def _faults(conditions: tuple[Condition, ...]) -> tuple[str, ...]:
     return tuple([c.value for c in conditions if c in FAULTS]) if conditions else ()
 
 
-def _blind(inputs: TickInputs, texts: list[StatusText]) -> TickOutputs:
-    """Outputs before the first valid sensor frame: actuators off, commands refused."""
+def _blind(state: FlightState, inputs: TickInputs, texts: list[StatusText]) -> Controlled:
+    """Before the first valid sensor frame: actuators off, commands refused."""
+    acks = [
+        acknowledgement(command, CommandResult.TEMPORARILY_REJECTED) for command in inputs.commands
+    ]
+    if acks:
+        reason = "command refused: there is no valid state estimate yet"
+        texts.append(StatusText(Severity.CRITICAL, reason))
+    answer = Answer(STOPPED, False, Mode.DISARMED, tuple(acks), tuple(texts))
+    return Controlled(answer, inputs, state, state.cascade)
+
+
+def _nothing_known(answer: Answer, inputs: TickInputs) -> TickOutputs:
+    """What a vehicle says that does not know its state yet."""
     zero = (0.0, 0.0, 0.0)
     level = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
     nowhere = StateEstimate(
@@ -595,29 +666,18 @@ def _blind(inputs: TickInputs, texts: list[StatusText]) -> TickOutputs:
     empty = FlightState()
     snapshot = FlightSnapshot(
         t_us=inputs.sensors.t_us,
-        mode=Mode.DISARMED,
-        armed=False,
+        mode=answer.mode,
+        armed=answer.armed,
         estimate=nowhere,
         reference=None,
         plan_state=None,
         plan_input=None,
-        actuators=STOPPED,
+        actuators=answer.actuators,
         plan=None,
         plan_status=empty.plan.status,
         counters=empty.plan.counters,
         constraints=empty.constraints,
         failures=(Condition.ESTIMATE_INVALID.value,),
     )
-    acks = [
-        acknowledgement(command, CommandResult.TEMPORARILY_REJECTED) for command in inputs.commands
-    ]
-    if acks:
-        reason = "command refused: there is no valid state estimate yet"
-        texts.append(StatusText(Severity.CRITICAL, reason))
-    return TickOutputs(
-        actuators=STOPPED,
-        snapshot=snapshot,
-        plan_request=None,
-        acks=tuple(acks),
-        texts=tuple(texts),
-    )
+    taken = answer.tuning_taken
+    return TickOutputs(answer.actuators, snapshot, None, answer.acks, answer.texts, taken)

@@ -6,7 +6,7 @@ mix two. Which one flies is part of the state: the same inputs fly the same flig
 
 from __future__ import annotations
 
-from fsw.flight.autopilot import Autopilot
+from fsw.flight.autopilot import Autopilot, Controlled
 from fsw.flight.state import FlightState
 from fsw.frozen import replace
 from fsw.parameters.consistency import Finding, refusals
@@ -50,17 +50,25 @@ class TunedAutopilot:
         return () if self._config.soft else refusals(self._in_use[1].analyse(safe_set))
 
     def tick(self, state: FlightState, inputs: TickInputs) -> tuple[FlightState, TickOutputs]:
-        """Apply a requested tuning if allowed, then do the tick; see Autopilot.
+        """Both parts of a tick."""
+        return self.conclude(self.control(state, inputs))
+
+    def control(self, state: FlightState, inputs: TickInputs) -> Controlled:
+        """Apply a requested tuning if allowed, then decide the command; see Autopilot.
 
         Raises:
             ValueError: The numbers of a tuning that was not prepared contradict each other.
         """
         if inputs.tuning is None:
-            state, outputs = self._loop(state.tuning).tick(state, inputs)
-        else:
-            state, taken, texts = self._retune(state, inputs.tuning)
-            state, outputs = self._loop(state.tuning).tick(state, inputs)
-            outputs = replace(outputs, texts=(*texts, *outputs.texts), tuning_taken=taken)
+            return self._loop(state.tuning).control(state, inputs)
+        state, taken, texts = self._retune(state, inputs.tuning)
+        begun = self._loop(state.tuning).control(state, inputs)
+        answer = replace(begun.answer, texts=(*texts, *begun.answer.texts), tuning_taken=taken)
+        return begun._replace(answer=answer)
+
+    def conclude(self, controlled: Controlled) -> tuple[FlightState, TickOutputs]:
+        """The rest of the tick; see Autopilot."""
+        state, outputs = self._loop(controlled.state.tuning).conclude(controlled)
         if state.tuning and outputs.plan_request is not None:
             request = replace(outputs.plan_request, tuning=part(state.tuning, "planner"))
             outputs = replace(outputs, plan_request=request)

@@ -37,13 +37,13 @@ from fsw.link.wire.px4_mode import custom_mode
 from fsw.measurements import ImuSample, Sample
 from fsw.ports import Clock, VehicleFacts
 from fsw.signals import (
+    Answer,
     CommandAck,
     CommandRequest,
-    FlightSnapshot,
     MessageSource,
     Mode,
     SensorFrame,
-    TickOutputs,
+    StatusText,
 )
 from messages import status_text
 from messages.frames import Frame, FrameWriter, split
@@ -112,6 +112,7 @@ class SimLink:
         self._early: list[Sample] = []  # of the next step, which had no room for them
         self._answer: tuple[int, list[bytes]] = (-1, [])  # with the stamp of its step
         self._acks: list[CommandAck] = []
+        self._texts: tuple[StatusText, ...] = ()  # of the last tick, after its answer
         self._routed: list[bytes] = []
         self._text_id = 0
         self._reported_us = -_REPORT_US
@@ -160,25 +161,30 @@ class SimLink:
         values = (*request.params, request.command, SYSTEM_ID, SIMULATOR, request.confirmation)
         self._routed.append(writer.frame(message_ids.COMMAND_LONG, *values))
 
-    def send_actuators(self, t_us: int, outputs: TickOutputs) -> None:
+    def queue_texts(self, texts: tuple[StatusText, ...]) -> None:
+        """Send texts with the next answer."""
+        self._texts += texts
+
+    def send_actuators(self, t_us: int, answer: Answer) -> None:
         """Send the actuator command that belongs to the step of ``t_us``."""
         stamp_us = t_us + self._steps.ahead_us
         values = encode_replies.hil_actuator_controls(
             stamp_us,
-            outputs.actuators,
-            outputs.snapshot.armed,
+            answer.actuators,
+            answer.armed,
             self._thrust_scale,
             self._torque_scale,
         )
         controls = self._writer.frame(message_ids.HIL_ACTUATOR_CONTROLS, *values)
         due = t_us - self._reported_us >= _REPORT_US
-        changed = due or outputs.snapshot.mode is not self._reported_mode
-        if self._acks or outputs.texts or changed or self._routed:
-            mode = self._mode(t_us, outputs.snapshot)
+        changed = due or answer.mode is not self._reported_mode
+        texts = (*self._texts, *answer.texts) if self._texts else answer.texts
+        if self._acks or texts or changed or self._routed:
+            mode = self._mode(t_us, answer)
             # Last, in the datagram of the controls: texts without room in it are of no use there.
             routed = b"".join(self._routed)
             self._routed.clear()
-            self._send((stamp_us, packed([mode, *self._replies(outputs), routed + controls])))
+            self._send((stamp_us, packed([mode, *self._replies(texts), routed + controls])))
         else:
             self._send((stamp_us, [controls]))
 
@@ -308,21 +314,22 @@ class SimLink:
                     ack = CommandAck(_SHUTDOWN, _ACCEPTED, frame.system_id, frame.component_id)
                     self._endpoint.send(self._ack_frame(ack))
 
-    def _replies(self, outputs: TickOutputs) -> list[bytes]:
+    def _replies(self, texts: tuple[StatusText, ...]) -> list[bytes]:
         frames = [self._ack_frame(ack) for ack in self._acks]
         self._acks.clear()
-        for text in outputs.texts:
+        self._texts = ()
+        for text in texts:
             self._text_id = self._text_id % 0xFFFF + 1
             for values in status_text.pieces(text.text, text.severity, self._text_id):
                 frames.append(self._writer.frame(message_ids.STATUSTEXT, *values))
         return frames
 
-    def _mode(self, t_us: int, snapshot: FlightSnapshot) -> bytes:
+    def _mode(self, t_us: int, answer: Answer) -> bytes:
         """HEARTBEAT: the simulator sees whether its trajectory is being flown."""
-        self._reported_us, self._reported_mode = t_us, snapshot.mode
-        base_mode = _CUSTOM_MODE | (_ARMED if snapshot.armed else 0)
-        status = _ACTIVE if snapshot.armed else _STANDBY
-        values = (custom_mode(snapshot.mode), _QUADROTOR, _PX4, base_mode, status, 3)
+        self._reported_us, self._reported_mode = t_us, answer.mode
+        base_mode = _CUSTOM_MODE | (_ARMED if answer.armed else 0)
+        status = _ACTIVE if answer.armed else _STANDBY
+        values = (custom_mode(answer.mode), _QUADROTOR, _PX4, base_mode, status, 3)
         return self._writer.frame(message_ids.HEARTBEAT, *values)
 
     def _ack_frame(self, ack: CommandAck) -> bytes:

@@ -57,7 +57,8 @@ def flight_software(
     return FlightProgram(
         facts=vehicle_facts(config),
         first_state=FlightState(),
-        tick=flight.tick,
+        control=flight.control,
+        conclude=flight.conclude,
         planner=planner,
         parameters=parameters,
         missions=missions,

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
 from fsw.link.events.event_log import EventLog
 from fsw.link.services.mission_store import MissionStore
 from fsw.ports import PlanningCycle, VehicleFacts
-from fsw.signals import TickInputs, TickOutputs
+from fsw.signals import Answer, TickInputs, TickOutputs
 
 if TYPE_CHECKING:
     # Its table of parameters imports everything that flies; a refusal need not wait for that.
@@ -18,13 +18,29 @@ if TYPE_CHECKING:
 State = TypeVar("State")
 
 
+class Answered(Protocol):
+    """A tick whose command is decided."""
+
+    @property
+    def answer(self) -> Answer:
+        """What the actuators get."""
+        ...
+
+
+Control = Callable[[State, TickInputs], Answered]
+"""A tick from a state and its inputs up to its answer."""
+Conclude = Callable[[Any], tuple[State, TickOutputs]]
+"""The rest of that tick: the next state, and everything the tick says."""
+
+
 @dataclass(frozen=True, slots=True)
 class FlightProgram(Generic[State]):
     """Everything that is pure, with its stores; the loop adds time, links and logs."""
 
     facts: VehicleFacts
     first_state: State
-    tick: Callable[[State, TickInputs], tuple[State, TickOutputs]]
+    control: Control[State]
+    conclude: Conclude[State]
     planner: PlanningCycle
     parameters: ParameterStore
     missions: MissionStore

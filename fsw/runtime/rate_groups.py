@@ -25,8 +25,9 @@ class Member(enum.Enum):
     """What a group does; the loop has one method for each."""
 
     RECEIVE = "receive"  # from the simulator and the planner, and what the ground had sent
-    TICK = "tick"  # estimate, modes, control, safety gate: the pure function
+    TICK = "tick"  # estimate, modes, control, safety gate: pure, up to the command
     ACTUATE = "actuate"  # answer the simulator; until here the vehicle waits
+    CONCLUDE = "conclude"  # the rest of the tick, as pure: watches, reference, reports
     PLAN = "plan"  # hand a request to the planner
     PUBLISH = "publish"  # telemetry to the ground, and read what it sends
     LOG = "log"  # the flight log
@@ -45,7 +46,9 @@ class RateGroup:
     members: tuple[Member, ...]
 
 
-INNER: Final = RateGroup("inner", 0, TICK_US, (Member.RECEIVE, Member.TICK, Member.ACTUATE))
+INNER: Final = RateGroup(
+    "inner", 0, TICK_US, (Member.RECEIVE, Member.TICK, Member.ACTUATE, Member.CONCLUDE)
+)
 MPC: Final = RateGroup("mpc", 1, PLANNING_US, (Member.PLAN,))
 # Every stream of messages has a rate of its own, in whole ticks: fsw/link/telemetry/streams.py.
 TELEMETRY: Final = RateGroup("telemetry", 2, TICK_US, (Member.PUBLISH, Member.LOG))

@@ -47,7 +47,7 @@ def replay(log: UlogFile, program: FlightProgram[Any], progress: Progress) -> Re
         link_length=facts.link_length,
         profile=int(profile),
     )
-    tick = TickRunner(program.tick, program.first_state, on_error=lambda: None)
+    tick = TickRunner(program.control, program.conclude, program.first_state, on_error=lambda: None)
     compared = 0
     for logged in ticks(log):
         if isinstance(logged, Gap):

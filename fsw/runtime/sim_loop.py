@@ -32,6 +32,7 @@ from fsw.runtime.releases import Release, ScheduledReleases, StepReleases
 from fsw.runtime.tick_runner import TickRunner
 from fsw.runtime.timing import GroupTimer, Histogram
 from fsw.signals import (
+    Answer,
     Command,
     CommandAck,
     CommandRequest,
@@ -112,7 +113,8 @@ class Cycle:
     release: Release
     planner: PlanService
     inputs: TickInputs = field(init=False)  # from RECEIVE on
-    outputs: TickOutputs = field(init=False)  # from TICK on
+    answer: Answer = field(init=False)  # from TICK on
+    outputs: TickOutputs = field(init=False)  # from CONCLUDE on
 
 
 class SimLoop(Generic[State]):
@@ -137,7 +139,7 @@ class SimLoop(Generic[State]):
         self._parameters = program.parameters
         self._missions = program.missions
         self._happened = program.events
-        self._tick = TickRunner(program.tick, program.first_state)
+        self._tick = TickRunner(program.control, program.conclude, program.first_state)
         self._sim = sim
         self._ground = ground
         self._inbox = inbox
@@ -154,8 +156,9 @@ class SimLoop(Generic[State]):
         self._releases: StepReleases | ScheduledReleases
         methods: dict[Member, Callable[[Cycle], None]] = {
             Member.RECEIVE: self._receive,
-            Member.TICK: self._run_tick,
+            Member.TICK: self._control,
             Member.ACTUATE: self._actuate,
+            Member.CONCLUDE: self._conclude,
             Member.PLAN: self._request_plan,
             Member.PUBLISH: self._publish,
             Member.LOG: self._log,
@@ -239,7 +242,6 @@ class SimLoop(Generic[State]):
 
     def _receive(self, cycle: Cycle) -> None:
         sensors = cycle.release.sensors
-        self._vibration.add(sensors.gyro_B, sensors.accel_B)
         cycle.inputs = self._inbox.take_inputs(
             sensors,
             cycle.planner.take(sensors.t_us),
@@ -250,29 +252,35 @@ class SimLoop(Generic[State]):
         )
         self._host_news = None
 
-    def _run_tick(self, cycle: Cycle) -> None:
-        cycle.outputs = self._tick(cycle.inputs)
-        self._missions.observe(cycle.outputs.snapshot)
-        self._happened.observe(cycle.inputs, cycle.outputs)
-        if cycle.inputs.tuning is not None:
-            self._parameters.settle(cycle.outputs.tuning_taken)
+    def _control(self, cycle: Cycle) -> None:
+        cycle.answer = self._tick.control(cycle.inputs)
 
     def _actuate(self, cycle: Cycle) -> None:
-        t_us, outputs = cycle.release.sensors.t_us, cycle.outputs
+        t_us, answer = cycle.release.sensors.t_us, cycle.answer
         if self._sim.routed_acks:
             for ack in self._sim.routed_acks:
                 self._ground.acknowledge(t_us, ack)
             self._sim.routed_acks.clear()
-        for request in to_route(cycle.inputs.commands, outputs.acks):
+        for request in to_route(cycle.inputs.commands, answer.acks):
             self._sim.route(request)
-        for ack in outputs.acks:
+        for ack in answer.acks:
             if ack.result == CommandResult.IN_PROGRESS:
                 continue
             if (ack.target_system, ack.target_component) == (SYSTEM_ID, PATH_PLANNER):
                 self._sim.queue_ack(ack)
             else:
                 self._ground.acknowledge(t_us, ack)
-        self._sim.send_actuators(t_us, outputs)
+        self._sim.send_actuators(t_us, answer)
+
+    def _conclude(self, cycle: Cycle) -> None:
+        outputs = cycle.outputs = self._tick.conclude()
+        self._vibration.add(cycle.release.sensors.gyro_B, cycle.release.sensors.accel_B)
+        if outputs.texts is not cycle.answer.texts:
+            self._sim.queue_texts(outputs.texts[len(cycle.answer.texts) :])
+        self._missions.observe(outputs.snapshot)
+        self._happened.observe(cycle.inputs, outputs)
+        if cycle.inputs.tuning is not None:
+            self._parameters.settle(outputs.tuning_taken)
 
     def _request_plan(self, cycle: Cycle) -> None:
         request, applied = cycle.outputs.plan_request, cycle.outputs.snapshot.plan_input

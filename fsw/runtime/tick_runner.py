@@ -7,8 +7,8 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Final, Generic
 
-from fsw.runtime.program import State
-from fsw.signals import Severity, StatusText, TickInputs, TickOutputs
+from fsw.runtime.program import Answered, Conclude, Control, State
+from fsw.signals import Answer, Severity, StatusText, TickInputs, TickOutputs
 
 MAX_FAILED_TICKS: Final = 5  # 10 ms, as long as the estimate may be missing
 
@@ -23,39 +23,78 @@ class TickRunner(Generic[State]):
 
     def __init__(
         self,
-        tick: Callable[[State, TickInputs], tuple[State, TickOutputs]],
+        control: Control[State],
+        conclude: Conclude[State],
         first_state: State,
         on_error: Callable[[], None] = traceback.print_exc,
     ) -> None:
         """Start before the first tick; a survived error calls ``on_error`` in its handler."""
-        self._tick = tick
+        self._control = control
+        self._conclude = conclude
         self._on_error = on_error
         self._state = first_state
+        self._begun: Answered | TickOutputs | None = None  # the outputs are of a tick that failed
         self._last: TickOutputs | None = None
         self._failed = 0  # in a row
 
     def __call__(self, inputs: TickInputs) -> TickOutputs:
-        """Run one tick.
+        """Run one tick, both parts of it.
+
+        Raises:
+            Exception: as of :meth:`control`.
+        """
+        self.control(inputs)
+        return self.conclude()
+
+    def control(self, inputs: TickInputs) -> Answer:
+        """Run a tick up to its answer.
 
         Raises:
             Exception: What the tick raised, if it is the first tick or ``MAX_FAILED_TICKS`` before
                 it failed.
         """
         try:
-            self._state, outputs = self._tick(self._state, inputs)
+            begun = self._control(self._state, inputs)
         except Exception as error:
-            self._failed += 1
-            if self._last is None or self._failed > MAX_FAILED_TICKS:
-                raise
-            self._on_error()
-            text = f"tick failed, {type(error).__name__}: last command repeated"
-            return replace(
-                self._last,
-                plan_request=None,
-                acks=(),
-                texts=(StatusText(Severity.CRITICAL, text),),
-                tuning_taken=None,
-            )
+            failed = self._begun = self._survived(error)
+            return _repeated(failed)
+        self._begun = begun
+        return begun.answer
+
+    def conclude(self) -> TickOutputs:
+        """Run the rest of the tick.
+
+        Raises:
+            Exception: as of :meth:`control`.
+        """
+        begun, self._begun = self._begun, None
+        assert begun is not None
+        if isinstance(begun, TickOutputs):
+            return begun
+        try:
+            self._state, outputs = self._conclude(begun)
+        except Exception as error:
+            return self._survived(error)
         self._failed = 0
         self._last = outputs
         return outputs
+
+    def _survived(self, error: Exception) -> TickOutputs:
+        """The outputs of a tick that failed; to be called in the handler of its ``error``."""
+        self._failed += 1
+        if self._last is None or self._failed > MAX_FAILED_TICKS:
+            raise error
+        self._on_error()
+        text = f"tick failed, {type(error).__name__}: last command repeated"
+        return replace(
+            self._last,
+            plan_request=None,
+            acks=(),
+            texts=(StatusText(Severity.CRITICAL, text),),
+            tuning_taken=None,
+        )
+
+
+def _repeated(outputs: TickOutputs) -> Answer:
+    snapshot = outputs.snapshot
+    return Answer(outputs.actuators, snapshot.armed, snapshot.mode, texts=outputs.texts)

@@ -128,6 +128,11 @@ def flight_plan(
     )
 
 
+def attends(state: PilotState) -> bool:
+    """Whether the pilot looks at the vehicle itself, and not only at what it says."""
+    return state.phase is Phase.HOVER or state.phase is Phase.DISARM
+
+
 def listen(plan: FlightPlan, state: PilotState, heard: Heard, t_us: int) -> PilotState:
     """Process the vehicle's answer to the step of ``t_us``."""
     if heard.texts:

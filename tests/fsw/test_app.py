@@ -26,6 +26,7 @@ from fsw.parameters.store import ParameterStore
 from fsw.runtime.program import FlightProgram
 from fsw.signals import Plan, PlanFailure, PlanRequest, TickInputs, TickOutputs
 from tests.fsw.link.snapshots import FACTS, outputs_at
+from tests.whole_tick import parts_of
 
 CHOICE = ControlChoice()
 
@@ -44,7 +45,7 @@ def standing(state: int, inputs: TickInputs) -> tuple[int, TickOutputs]:
 def load(options: FswOptions) -> FlightProgram[int]:
     parameters = ParameterStore(FlightConfig(), lambda tuning: None)
     site = Site(lambda *place: (0.0, 0.0, 0.0), lambda safe_set: (), lambda: 0.1)
-    return FlightProgram(FACTS, 0, standing, NoPlanner(), parameters, MissionStore(site))
+    return FlightProgram(FACTS, 0, *parts_of(standing), NoPlanner(), parameters, MissionStore(site))
 
 
 @pytest.fixture

@@ -39,7 +39,10 @@ def replayed(path: Path, config: FlightConfig | None = None) -> Replayed:
     """What a replay finds; with another configuration than the flight's, if one is given."""
     program = flight_software(CHOICE, to_plan=False)
     if config is not None:
-        program = replace(program, tick=Autopilot(config).tick, numbers=flat(config))
+        loop = Autopilot(config)
+        program = replace(
+            program, control=loop.control, conclude=loop.conclude, numbers=flat(config)
+        )
     return replay(open_flight(path), program, lambda done, total: None)
 
 
@@ -185,7 +188,7 @@ def test_a_tick_that_fails_now_is_a_difference(
         raise ArithmeticError("no such thing")
 
     path = written(tmp_path / "flight.ulg", flown)
-    program = replace(flight_software(CHOICE, to_plan=False), tick=failing)
+    program = replace(flight_software(CHOICE, to_plan=False), control=failing)
     found = replay(open_flight(path), program, lambda done, total: None).difference
     assert found is not None
     assert (found.tick, found.field) == (0, "the tick")

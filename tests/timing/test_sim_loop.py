@@ -30,6 +30,7 @@ from fsw.runtime.rate_groups import HOUSEKEEPING, INNER, MPC, RATE_GROUPS, TELEM
 from fsw.runtime.sim_loop import Ending, FlightRecord, SimLoop
 from fsw.runtime.timing import GroupTimer
 from fsw.signals import (
+    Answer,
     CommandAck,
     CommandRequest,
     CommandResult,
@@ -48,8 +49,8 @@ from messages.frames import FrameWriter, split
 from tests.fsw.link.snapshots import FACTS, outputs_at
 from tests.fsw.log.test_reader import SUBJECT
 from tests.timing.virtual_time import FIRST_US, PERIOD_US, VirtualSensors, VirtualTime, frame
+from tests.whole_tick import Tick, parts_of
 
-Tick = Callable[[Any, TickInputs], tuple[Any, TickOutputs]]
 ARM, KILL = (1.0, 0.0), (0.0, 21196.0)  # parameters of MAV_CMD_COMPONENT_ARM_DISARM
 
 
@@ -59,7 +60,7 @@ class Sim(VirtualSensors):
 
     pacing: Pacing = Pacing.REALTIME
     done: list[str] = field(default_factory=list)  # shared by all parts
-    answers: list[tuple[int, TickOutputs]] = field(default_factory=list)  # at, what
+    answers: list[tuple[int, Answer]] = field(default_factory=list)  # at, what
     notices: list[str] = field(default_factory=list)
     routed_acks: list[CommandAck] = field(default_factory=list)
     routed: list[CommandRequest] = field(default_factory=list)
@@ -74,9 +75,9 @@ class Sim(VirtualSensors):
         self.done.append("sensors")
         return super().newest()
 
-    def send_actuators(self, t_us: int, outputs: TickOutputs) -> None:
+    def send_actuators(self, t_us: int, answer: Answer) -> None:
         self.done.append("actuators")
-        self.answers.append((self.time.now_us, outputs))
+        self.answers.append((self.time.now_us, answer))
 
     def queue_ack(self, ack: object) -> None:
         pass
@@ -174,7 +175,7 @@ class Bench:
         self.files = NoFiles()
         self.told: list[tuple[int, str]] = []  # on the console
         null: Any = Null()
-        program = FlightProgram(FACTS, first, tick, null, null, null)
+        program = FlightProgram(FACTS, first, *parts_of(tick), null, null, null)
         self.loop = SimLoop(
             program, cast(Any, self.sim), cast(Any, self.ground), self.inbox, self.record,
             self.time.clock, self.stop, cast(Any, self.files), self._sleep, self.time.clock,

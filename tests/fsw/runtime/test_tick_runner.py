@@ -7,6 +7,7 @@ import pytest
 from fsw.runtime.tick_runner import MAX_FAILED_TICKS, TickRunner
 from fsw.signals import CommandAck, SensorFrame, TickInputs, TickOutputs
 from tests.fsw.link.snapshots import ACTUATORS, outputs_at
+from tests.whole_tick import parts_of
 
 INPUTS = TickInputs(
     SensorFrame(
@@ -32,7 +33,7 @@ class Raising:
 
 @pytest.mark.requirement("REQ-TIME-7")
 def test_a_tick_that_fails_repeats_the_last_command_and_says_so() -> None:
-    tick = TickRunner(Raising({2}), 0)
+    tick = TickRunner(*parts_of(Raising({2})), 0)
     tick(INPUTS)
     failed = tick(INPUTS)
     assert failed.actuators == ACTUATORS
@@ -44,7 +45,7 @@ def test_a_tick_that_fails_repeats_the_last_command_and_says_so() -> None:
 
 @pytest.mark.requirement("REQ-TIME-7")
 def test_an_error_that_stays_is_raised() -> None:
-    tick = TickRunner(Raising(set(range(2, 100))), 0)
+    tick = TickRunner(*parts_of(Raising(set(range(2, 100)))), 0)
     tick(INPUTS)
     for _ in range(MAX_FAILED_TICKS):
         tick(INPUTS)
@@ -53,11 +54,30 @@ def test_an_error_that_stays_is_raised() -> None:
 
 
 def test_errors_apart_from_each_other_do_not_add_up() -> None:
-    tick = TickRunner(Raising(set(range(2, 60, 2))), 0)
+    tick = TickRunner(*parts_of(Raising(set(range(2, 60, 2)))), 0)
     for _ in range(59):
         tick(INPUTS)
 
 
 def test_a_first_tick_that_fails_has_nothing_to_repeat() -> None:
     with pytest.raises(ZeroDivisionError):
-        TickRunner(Raising({1}), 0)(INPUTS)
+        TickRunner(*parts_of(Raising({1})), 0)(INPUTS)
+
+
+@pytest.mark.requirement("REQ-TIME-7")
+def test_a_tick_that_fails_behind_its_answer_keeps_the_state_as_well() -> None:
+    control, _ = parts_of(Raising(set()))
+    conclude = Raising({2})
+    tick = TickRunner(control, lambda begun: conclude(begun.result[0] - 1, INPUTS), 0)
+    tick(INPUTS)
+    answered = tick.control(INPUTS)
+    assert answered.acks
+    failed = tick.conclude()
+    assert failed.acks == ()
+    assert "ZeroDivisionError" in failed.texts[0].text
+    assert tick(INPUTS).snapshot.t_us == 1
+    conclude = Raising(set(range(1, 100)))
+    for _ in range(MAX_FAILED_TICKS):
+        tick(INPUTS)
+    with pytest.raises(ZeroDivisionError):
+        tick(INPUTS)
