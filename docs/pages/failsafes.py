@@ -31,8 +31,8 @@ _RULES = """\
 ## Arming checks
 
 Each check that fails is a sentence behind `not armed:`, and in the answer to
-RUN_PREARM_CHECKS. Forced arming overrides all but an invalid estimate. Subjects:
-{subjects}.
+RUN_PREARM_CHECKS. Forced arming overrides all but an invalid estimate
+and a flight that was terminated. Subjects: {subjects}.
 """
 
 

@@ -130,8 +130,6 @@ class Commander:
         """
         if state.vehicle.armed:
             return "", _ARMED
-        if state.vehicle.mode is Mode.FAULT:
-            return "terminated: restart the flight software", _ARMED
         found = arming.failed(self.context(state, estimate))
         report = ArmingReport(tuple([number for number, _ in found]))
         sentence = arming.joined(found) if found else ""

@@ -39,6 +39,7 @@ _COMPONENTS: Final = {
     28: ("accel", "Inertial unit and encoders"),
 }
 _BITS: Final = {
+    Subject.TERMINATION: 20,
     Subject.ESTIMATOR: 17,
     Subject.ATTITUDE: 16,
     Subject.SENSORS: 28,

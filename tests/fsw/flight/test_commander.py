@@ -134,7 +134,9 @@ def test_why_arming_is_refused_is_shown_while_it_matters() -> None:
     again = COMMANDER.arming_report(replace(DISARMED, arming=report), low)[1]
     assert again is report, "what has not changed is the same value"
     assert COMMANDER.arming_report(flying(), low) == ("", ArmingReport())
-    assert "restart" in COMMANDER.arming_report(flying(Mode.FAULT), STANDING)[0]
+    sentence, report = COMMANDER.arming_report(flying(Mode.FAULT), STANDING)
+    assert "terminated; restart" in sentence
+    assert [CHECKS[number].subject for number in report.failed] == [Subject.TERMINATION]
 
 
 # ---------------------------------------------------------------- commands
