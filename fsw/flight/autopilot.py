@@ -254,11 +254,12 @@ class Autopilot:
             state = self._sensed.reported(state, c.fusion, estimate, covariance)
             state, said = self._see_accuracy(state, estimate, covariance, pose)
             texts = (*texts, *said)
-            safety = self._watch.breach(safety, estimate, state.constraints, flies=flown)
+            announced = len(state.mission.announced.zones)
+            safety = self._watch.breach(safety, estimate, state.constraints, announced, flies=flown)
         pushed, margin = c.guarded
         if pushed or safety.filter_us >= 0:
             safety = self._watch.filtered(safety, now_us, pushed=pushed)
-        if safety.breach_us >= 0 or not margin >= 0.0:
+        if not margin >= 0.0:
             safety = self._breached(state, safety, estimate, margin)
         damage, watch = self._see_damage(
             state, memory, estimate, c.ticks, flown and not c.trust.doubted
@@ -327,14 +328,10 @@ class Autopilot:
     def _breached(
         self, state: FlightState, safety: SafetyMemory, estimate: StateEstimate, margin: float
     ) -> SafetyMemory:
-        """The memory of a breach with the ``margin`` [m] seen now; at its begin, of what it is."""
-        if not margin >= 0.0:
-            safety = self._watch.margin(safety, estimate.t_us, margin)
-        if state.safety.breach_us >= 0:
-            return safety
+        """The memory of a breach with the negative ``margin`` [m] that the safety filter sees."""
         report = self._safe_sets.margins(state.kept, estimate, state.reference)
-        of_fence = self._watch.of_fence(report, len(state.mission.announced.zones))
-        return replace(safety, breach_of_fence=of_fence)
+        announced = len(state.mission.announced.zones)
+        return self._watch.breach(safety, estimate, report, announced, flies=True, seen=margin)
 
     def _receive(
         self, state: FlightState, inputs: TickInputs, texts: list[StatusText]

@@ -506,29 +506,30 @@ FAILSAFES: Final = (
     ),
     Failsafe(
         Condition.BREACH,
-        lambda c: c.state.safety.breach_us >= 0 and not c.state.safety.breach_of_fence,
+        lambda c: c.state.safety.breach_us >= 0,
         lambda c: _on_breach(c, c.limits.breach_action),
         Severity.CRITICAL,
         detail=lambda c: _by_mm(c.state.safety.breach_by),
         of_vehicle=True,
-        detected="in flight, a margin of a part of the vehicle is negative by its own estimate: "
+        detected="in flight, a margin of a part of the vehicle to a zone that was announced is "
+        "negative by its own estimate: "
         "each tick for hull, rotors, feet and arm ends near a zone, each planning period for "
         "everything",
         within_us=_SLOWLY,
         parameters=("SAFE_BREACH_ACT",),
-        ends="every margin has been above 10 mm for 0.5 s",
+        ends="every such margin has been above 10 mm for 0.5 s",
     ),
     Failsafe(
         Condition.FENCE_BREACH,
-        lambda c: c.state.safety.breach_us >= 0 and c.state.safety.breach_of_fence,
+        lambda c: c.state.safety.fence_us >= 0,
         lambda c: _on_breach(c, c.limits.fence_action),
         Severity.CRITICAL,
-        detail=lambda c: _by_mm(c.state.safety.breach_by),
+        detail=lambda c: _by_mm(c.state.safety.fence_by),
         of_vehicle=True,
-        detected="the same, and the zone that is breached most is of an uploaded fence",
+        detected="the same to a zone of an uploaded fence",
         within_us=_SLOWLY,
         parameters=("GF_ACTION",),
-        ends="every margin has been above 10 mm for 0.5 s",
+        ends="every such margin has been above 10 mm for 0.5 s",
     ),
     Failsafe(
         Condition.ROTOR_LOST,
@@ -918,6 +919,7 @@ def all_is_well(context: FailsafeContext) -> bool:
         and safety.rolled_us < 0
         and safety.pitched_us < 0
         and safety.breach_us < 0
+        and safety.fence_us < 0
         and safety.off_plan_us < 0
         and safety.filter_us < 0
         and not state.damage.report.lost

@@ -147,23 +147,28 @@ def test_an_empty_battery_is_not_armed() -> None:
 
 
 @pytest.mark.requirement("REQ-SAFE-4")
-@pytest.mark.parametrize("uploaded", [True, False])
-def test_a_breach_of_an_uploaded_fence_is_one_of_its_own(uploaded: bool) -> None:
-    """Both walls are left; the one that is left by more says whose breach it is."""
-    near, far = (SafeSet((wall((-1.0, 0.0, 0.0), at, 0.1),)) for at in (-59.0, -50.0))
-    announced, fence = (near, far) if uploaded else (far, near)
+@pytest.mark.requirement("REQ-SAFE-4")
+@pytest.mark.parametrize("again_us", [2_000, 50_000])
+def test_outside_a_wall_and_the_fence_both_are_told_with_their_own_sizes(again_us: int) -> None:
+    """A tick later, and in a tick of a planning period: the filter and the report find the same."""
+    announced, fence = (SafeSet((wall((-1.0, 0.0, 0.0), at, 0.1),)) for at in (-50.0, -59.0))
     mission = MissionMemory(safe_set=joined(announced, fence), announced=announced, fence=fence)
     outside = frame(1_000_000, p_WB=(60.0, 0.0, -5.0))
     seen = estimate_state(outside)
     assert seen is not None
     kept = KeptSet().of(mission.safe_set)
     state = replace(flying(), mission=mission, kept=kept, nominal=nominal_at_rest(seen))
-    for t_us in (1_000_000, 1_002_000):
+    texts: list[str] = []
+    for t_us in (1_000_000, 1_000_000 + again_us):
         state, outputs = tick(state, t_us, sensors=replace(outside, t_us=t_us))
-    words = "outside the fence" if uploaded else "outside the safe set"
-    texts = [text.text for text in outputs.texts]
-    assert any(words in text and "retreating" in text for text in texts), texts
-    assert state.safety.breach_of_fence is uploaded
+        texts += [text.text for text in outputs.texts]
+    safety = state.safety
+    assert (safety.breach_us, safety.fence_us) == (t_us, t_us)
+    assert safety.breach_by == pytest.approx(safety.fence_by + 9.0)
+    # Both retreat: the first of the table acts for both.
+    by = f"{1e3 * safety.breach_by:.0f}", f"{1e3 * safety.fence_by:.0f}"
+    assert f"failsafe: outside the safe set by {by[0]} mm, retreating" in texts
+    assert f"outside the fence by {by[1]} mm: warn" in texts
 
 
 @pytest.mark.requirement("REQ-LOG-1")
