@@ -635,7 +635,7 @@ def _blind(state: FlightState, inputs: TickInputs, texts: list[StatusText]) -> C
     ]
     if acks:
         reason = "command refused: there is no valid state estimate yet"
-        texts.append(StatusText(Severity.CRITICAL, reason))
+        texts.append(StatusText(Severity.CRITICAL, reason, prompt=True))
     answer = Answer(STOPPED, False, Mode.DISARMED, tuple(acks), tuple(texts))
     return Controlled(answer, inputs, state, state.cascade)
 

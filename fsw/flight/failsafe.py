@@ -995,7 +995,11 @@ def respond(context: FailsafeContext, rows: tuple[Failsafe, ...]) -> Response:
             delay_us = memory.due_us - now_us if later else 0
             severity, text = report(row, context, told, delay_us)
             event = FailsafeEvent(row.condition.value, told.value, severity)
-            reports.append(StatusText(severity, text, event))
+            if later:
+                event = event._replace(
+                    action=Action.HOLD.value, later=told.value, delay_us=delay_us
+                )
+            reports.append(StatusText(severity, text, event, prompt=told.mode is not None))
     if vehicle.armed:
         reports += _ended(before, known, now, now_us)
     since = tuple([known.get(condition, now_us) for condition in now])

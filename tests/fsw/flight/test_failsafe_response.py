@@ -33,6 +33,7 @@ from fsw.signals import (
     CommandAction,
     CommandRequest,
     CommandResult,
+    FailsafeEvent,
     GoTo,
     HostHealth,
     Mode,
@@ -63,6 +64,7 @@ class Watched:
     state: FlightState = field(default_factory=lambda: flying(Mode.MISSION, gcs_heard_us=0))
     now_us: int = 0
     texts: list[str] = field(default_factory=list)
+    events: list[FailsafeEvent] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.commander = Commander(self.config)
@@ -78,6 +80,7 @@ class Watched:
             self.state = self.commander.check_failsafes(self.state, estimate, said)
             self.state = replace(self.state, t_us=self.now_us)
             self.texts += [text.text for text in said]
+            self.events += [text.event for text in said if text.event is not None]
         return self
 
     def heard(self) -> Watched:
@@ -128,6 +131,17 @@ def test_a_station_lost_in_a_mission_holds_for_a_while_and_returns_and_is_told_t
         "failsafe: no ground station for 15 s, returning",
         "hold to return: failsafe",
     ]
+
+
+@pytest.mark.requirement("REQ-MODE-1", "REQ-LINK-1")
+def test_the_event_of_a_delayed_action_says_hold_first_and_the_action_when_it_begins() -> None:
+    watched = Watched().until(100.0)
+    hold, back = watched.events
+    assert (hold.action, hold.later, hold.delay_us) == ("holding", "returning", 5 * SECOND)
+    assert (back.action, back.later, back.delay_us) == ("returning", "", 0)
+    assert hold.condition == back.condition == Condition.DATALINK_LOST.value
+    (at_once,) = Watched(AT_ONCE).until(100.0).events
+    assert (at_once.action, at_once.later) == ("returning", "")
 
 
 def test_a_station_lost_in_a_mission_that_is_exempt_is_acted_on_when_the_mission_ends() -> None:
