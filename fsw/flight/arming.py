@@ -11,6 +11,7 @@ from typing import Final
 from fsw.flight.modes.base import CommandContext
 from fsw.signals import Mode
 
+_INVALID: Final = "the state estimate is invalid"
 _SWINGING: Final = 2.0  # rad/s of a joint
 _BEYOND: Final = 0.1  # rad that a joint may be beyond its limit: it rests on its end stop
 
@@ -48,7 +49,7 @@ def _terminated(context: CommandContext) -> str:
 
 
 def _estimate(context: CommandContext) -> str:
-    return "" if context.estimate_valid else "the state estimate is invalid"
+    return "" if context.estimate_valid else _INVALID
 
 
 def _attitude(context: CommandContext) -> str:
@@ -128,6 +129,11 @@ CHECKS: Final = (
 
 Failed = tuple[tuple[int, str], ...]
 """What speaks against arming: the check's place in the table, and a sentence."""
+NO_ESTIMATE: Final = (
+    next(number for number, check in enumerate(CHECKS) if check.refusal is _estimate),
+    _INVALID,
+)
+"""What speaks against it before the first estimate, when nothing else can be looked at."""
 
 
 def failed(context: CommandContext) -> Failed:

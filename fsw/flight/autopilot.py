@@ -25,6 +25,7 @@ from fsw.estimation.estimator import estimate_state
 from fsw.estimation.frame_trust import FrameTrust
 from fsw.estimation.sensor_fusion import FusionMemory
 from fsw.flight.accuracy_watch import AccuracyWatch
+from fsw.flight.before_estimate import nothing_known, told
 from fsw.flight.commander import Commander, acknowledgement
 from fsw.flight.damage_watch import DamageWatch
 from fsw.flight.descent import Descent
@@ -187,7 +188,7 @@ class Autopilot:
             state, trust, estimate = self._exact.estimate(state, inputs, texts)
         state = self._receive(state, inputs, texts)
         if estimate is None:
-            return _blind(state, inputs, texts)
+            return self._blind(state, inputs, texts)
 
         acks: list[CommandAck] = []
         if inputs.commands:
@@ -230,7 +231,9 @@ class Autopilot:
         c = controlled
         answer, inputs, state, memory, estimate = c[:5]
         if estimate is None:
-            return state, _nothing_known(answer, inputs)
+            # Ticks are counted from the first estimate on; what looks now and then goes by time.
+            t_us = inputs.sensors.t_us
+            return replace(state, t_us=t_us), nothing_known(answer, state, t_us)
         nominal, plan, flown, texts = c.nominal, c.plan, c.flown, answer.texts
         now_us, per_plan = inputs.sensors.t_us, self._ticks_per_plan
         index = state.index + c.ticks
@@ -297,6 +300,19 @@ class Autopilot:
         snapshot = _snapshot(state, estimate, c.u, inputs)
         taken = answer.tuning_taken
         return state, TickOutputs(answer.actuators, snapshot, request, answer.acks, texts, taken)
+
+    def _blind(self, state: FlightState, inputs: TickInputs, texts: list[StatusText]) -> Controlled:
+        """Before the first estimate: actuators off, commands refused."""
+        acks = [
+            acknowledgement(command, CommandResult.TEMPORARILY_REJECTED)
+            for command in inputs.commands
+        ]
+        if acks:
+            reason = "command refused: there is no valid state estimate yet"
+            texts.append(StatusText(Severity.CRITICAL, reason, prompt=True))
+        texts += told(state, self._tick_us)
+        answer = Answer(STOPPED, False, Mode.DISARMED, tuple(acks), tuple(texts))
+        return Controlled(answer, inputs, state, state.cascade)
 
     def _with_evidence(self, state: FlightState, estimate: StateEstimate) -> FlightState:
         """What the failsafe table looks at and what is not kept up to date elsewhere."""
@@ -626,49 +642,3 @@ def frozen_arm(
 def _faults(conditions: tuple[Condition, ...]) -> tuple[str, ...]:
     """The vehicle's own faults among the active conditions."""
     return tuple([c.value for c in conditions if c in FAULTS]) if conditions else ()
-
-
-def _blind(state: FlightState, inputs: TickInputs, texts: list[StatusText]) -> Controlled:
-    """Before the first valid sensor frame: actuators off, commands refused."""
-    acks = [
-        acknowledgement(command, CommandResult.TEMPORARILY_REJECTED) for command in inputs.commands
-    ]
-    if acks:
-        reason = "command refused: there is no valid state estimate yet"
-        texts.append(StatusText(Severity.CRITICAL, reason, prompt=True))
-    answer = Answer(STOPPED, False, Mode.DISARMED, tuple(acks), tuple(texts))
-    return Controlled(answer, inputs, state, state.cascade)
-
-
-def _nothing_known(answer: Answer, inputs: TickInputs) -> TickOutputs:
-    """What a vehicle says that does not know its state yet."""
-    zero = (0.0, 0.0, 0.0)
-    level = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
-    nowhere = StateEstimate(
-        t_us=inputs.sensors.t_us,
-        p_WB=zero,
-        v_WB=zero,
-        R_WB=level,
-        w_WB_B=zero,
-        yaw=0.0,
-        q_arm=(0.0, 0.0),
-        qd_arm=(0.0, 0.0),
-    )
-    empty = FlightState()
-    snapshot = FlightSnapshot(
-        t_us=inputs.sensors.t_us,
-        mode=answer.mode,
-        armed=answer.armed,
-        estimate=nowhere,
-        reference=None,
-        plan_state=None,
-        plan_input=None,
-        actuators=answer.actuators,
-        plan=None,
-        plan_status=empty.plan.status,
-        counters=empty.plan.counters,
-        constraints=empty.constraints,
-        failures=(Condition.ESTIMATE_INVALID.value,),
-    )
-    taken = answer.tuning_taken
-    return TickOutputs(answer.actuators, snapshot, None, answer.acks, answer.texts, taken)

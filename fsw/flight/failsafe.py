@@ -660,8 +660,9 @@ FAILSAFES: Final = (
         lambda c: c.state.invalid_ticks >= INVALID_TICKS,
         _always(Action.WARN),
         of_vehicle=True,
-        detected="on the ground, no valid sensor frame for 5 ticks (10 ms)",
-        does="warning; no arming. Telemetry goes on and shows it",
+        detected="on the ground, no estimate for 5 ticks (10 ms), or for 1 s after the start",
+        does="warning, at the start with the sensors that have never come; no arming. Telemetry "
+        "goes on and shows it",
     ),
     Failsafe(
         Condition.OUTPUT_NOT_FINITE,

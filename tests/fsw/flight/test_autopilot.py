@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -10,12 +11,14 @@ import pytest
 
 from fsw.estimation.dead_reckoning import moved_on
 from fsw.estimation.estimator import estimate_state
+from fsw.flight.arming import CHECKS
 from fsw.flight.autopilot import Autopilot
 from fsw.flight.failsafe import Condition
 from fsw.flight.plan_exchange import nominal_at_rest
 from fsw.flight.safe_set import joined
 from fsw.flight.state import FlightState, MissionMemory
 from fsw.flight.uncertain_clearance import KeptSet
+from fsw.measurements import ImuSample, JointSample, Sample
 from fsw.shapes.half_space import wall
 from fsw.signals import (
     STOPPED,
@@ -27,6 +30,7 @@ from fsw.signals import (
     SafeSet,
     SafeSetAnnouncement,
     SensorFrame,
+    StatusText,
     TickInputs,
     TickOutputs,
     Vec3,
@@ -82,6 +86,68 @@ def test_before_the_first_estimate_nothing_moves_and_commands_are_put_off() -> N
     assert (state.invalid_ticks, state.estimate) == (1, None)
     _, outputs = tick(state, 7000, sensors=blind)
     assert (outputs.acks, outputs.texts) == ((), ())
+
+
+def started_blind(
+    samples: Callable[[float], tuple[Sample, ...]], seconds: float = 3.0
+) -> tuple[list[StatusText], list[TickOutputs]]:
+    """What a vehicle says whose sensors give ``samples`` of a time [s] from its start on."""
+    state, texts, outputs = FlightState(), [], []
+    for t_us in range(TICK_US, round(1e6 * seconds), TICK_US):
+        state, last = tick(state, t_us, samples=samples(1e-6 * t_us))
+        texts += last.texts
+        outputs.append(last)
+    assert state.estimate is None
+    return texts, outputs
+
+
+def imu(t: float) -> Sample:
+    return ImuSample(t, (0.0, 0.0, -9.81), STILL)
+
+
+def encoders(t: float) -> Sample:
+    return JointSample(t, (0.0, 0.0))
+
+
+@pytest.mark.requirement("REQ-ARM-1")
+@pytest.mark.parametrize(
+    ("samples", "never"),
+    [
+        (lambda t: (imu(t), encoders(t)), "pose or GNSS"),
+        (lambda t: (imu(t),), "joint encoders, pose or GNSS"),
+        (lambda t: (encoders(t),), "IMU, pose or GNSS"),
+    ],
+)
+def test_without_a_first_estimate_the_sensors_that_never_came_are_named_once(
+    samples: Callable[[float], tuple[Sample, ...]], never: str
+) -> None:
+    texts, outputs = started_blind(samples)
+    (text,) = [one for one in texts if "estimate" in one.text]
+    assert text.text == f"state estimate invalid for 1 s: nothing has ever come from {never}"
+    assert text in outputs[1_000_000 // TICK_US - 1].texts
+    assert text.event is not None
+    assert text.event.condition == Condition.ESTIMATE_INVALID.value
+    for one in (outputs[0], outputs[-1]):
+        snapshot = one.snapshot
+        assert snapshot.failures == (Condition.ESTIMATE_INVALID.value,)
+        assert snapshot.arming_refusal == "not armed: the state estimate is invalid"
+        (number,) = snapshot.arming.failed
+        assert CHECKS[number].summary == "The state estimate is invalid"
+    assert outputs[-1].snapshot.t_us > outputs[0].snapshot.t_us, "telemetry goes on"
+
+
+@pytest.mark.requirement("REQ-ARM-1")
+def test_without_one_valid_frame_of_exact_states_that_is_told_once() -> None:
+    state, texts = FlightState(), []
+    for t_us in range(TICK_US, 3_000_000, TICK_US):
+        state, outputs = tick(state, t_us, sensors=frame(t_us, p_WB=(math.nan, 0.0, 0.0)))
+        texts += [text.text for text in outputs.texts]
+    assert texts == ["state estimate invalid for 1 s: no valid sensor frame has come"]
+
+
+def test_sensors_that_fall_silent_before_the_first_estimate_are_told_once() -> None:
+    texts, _ = started_blind(lambda t: (imu(t), encoders(t)) if t < 0.5 else (), 2.0)
+    assert [one.text for one in texts].count("IMU is silent") == 1
 
 
 def test_an_invalid_frame_leaves_the_last_estimate_and_is_counted() -> None:
