@@ -58,8 +58,13 @@ def _reason(memory: FusionMemory | None) -> str:
     return "; ".join(faults) or "readings come, and none is good enough to begin with"
 
 
-def nothing_known(answer: Answer, state: FlightState, t_us: int) -> TickOutputs:
-    """The outputs at ``t_us``: telemetry goes on, and shows what is known all the same."""
+def nothing_known(
+    answer: Answer, state: FlightState, t_us: int, texts: tuple[StatusText, ...]
+) -> TickOutputs:
+    """The outputs at ``t_us``, with the ``texts`` of the whole tick.
+
+    Telemetry goes on, and shows what is known all the same.
+    """
     zero = (0.0, 0.0, 0.0)
     level = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
     nowhere = StateEstimate(
@@ -94,4 +99,4 @@ def nothing_known(answer: Answer, state: FlightState, t_us: int) -> TickOutputs:
         safe_set=state.mission.safe_set,
     )
     taken = answer.tuning_taken
-    return TickOutputs(answer.actuators, snapshot, None, answer.acks, answer.texts, taken)
+    return TickOutputs(answer.actuators, snapshot, None, answer.acks, texts, taken)
