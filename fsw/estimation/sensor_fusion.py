@@ -262,10 +262,10 @@ class SensorFusion:
 
         ``joint_acceleration`` [rad/s^2, joints] and ``model`` [SI, FRD] are theirs.
         """
-        memory, _ = self.take_in(
+        memory, estimate = self.take_in(
             memory, samples, now, joint_acceleration, watch, model, silent=silent
         )
-        return self.catch_up(memory, samples, now, model)
+        return self.catch_up(memory, samples, now, estimate, model)
 
     def take_in(
         self,
@@ -309,36 +309,27 @@ class SensorFusion:
             return (_anew(memory) if ready else memory), None
         return memory, StateEstimate(round(1e6 * now), *known)
 
-    def is_caught_up(self, memory: FusionMemory, samples: Sequence[Sample], now: float) -> bool:
-        """Whether ``catch_up`` at ``now`` [s] would change nothing that the next one would not.
-
-        So it is in half of the ticks with motion capture. The filter may stay where it is: the
-        state is made of the IMU's readings since.
-        """
-        for sample in samples:
-            if not isinstance(sample, _OF_EVERY_TICK):
-                return False
-        if not memory.started or memory.dispute is not None:
-            return False
-        waits = memory.waiting
-        if waits:
-            return waits[0].time > now - memory.delay - _MARGIN
-        return bool(now - memory.numbers[0]["time"] < _FARTHEST_BEHIND)
-
     def catch_up(
-        self, memory: FusionMemory, samples: Sequence[Sample], now: float, model: Vec3 = UNKNOWN
+        self,
+        memory: FusionMemory,
+        samples: Sequence[Sample],
+        now: float,
+        estimate: StateEstimate | None,
+        model: Vec3 = UNKNOWN,
     ) -> tuple[FusionMemory, StateEstimate | None]:
         """Check the other ``samples``, fuse what the filter reaches; the state at ``now`` [s].
 
         The loops need not wait for it: a pose is late anyway, and the next tick knows of it. Where
-        pose and IMU contradict each other, a ``model`` [SI, FRD] as in ``take_in`` says who is
-        wrong.
+        there is nothing to fuse the state is the ``estimate`` of ``take_in``. Where pose and IMU
+        contradict each other, a ``model`` [SI, FRD] as there says who is wrong.
         """
-        x = np.ndarray(1, FILTER, np.empty(_FLOATS))
-        asked = Asked(x, kernels.COPY, (now, 0.0), (0.0, 0.0))
         for sample in samples:
             if not isinstance(sample, _OF_EVERY_TICK):
                 memory = self.take(memory, sample, now)
+        if estimate is not None and _rests(memory, now):
+            return memory, estimate
+        x = np.ndarray(1, FILTER, np.empty(_FLOATS))
+        asked = Asked(x, kernels.COPY, (now, 0.0), (0.0, 0.0))
         if not memory.started:
             memory, asked = self._done(memory, asked)
             memory = self._start(memory)
@@ -808,6 +799,19 @@ class SensorFusion:
         return (
             kernels.fuse_range(memory.numbers, self.law, sample.time, sample.distance, variance),
         )
+
+
+def _rests(memory: FusionMemory, now: float) -> bool:
+    """Whether there is nothing to fuse at ``now`` [s].
+
+    Then the filter may stay where it is: the state is made of the IMU's readings since.
+    """
+    if not memory.started or memory.dispute is not None:
+        return False
+    waits = memory.waiting
+    if waits:
+        return waits[0].time > now - memory.delay - _MARGIN
+    return bool(now - memory.numbers[0]["time"] < _FARTHEST_BEHIND)
 
 
 def _anew(memory: FusionMemory) -> FusionMemory:

@@ -128,14 +128,11 @@ class SensedState:
         """
         now = memory.now
         before, texts = _memory(state, now), list[StatusText]()
-        due = inputs.sensors.t_us // _CHECKED_US != state.t_us // _CHECKED_US
-        news = memory.health is not before.health
-        if not (due or news or estimate is None) and self._fusion.is_caught_up(
-            memory, inputs.samples, now
-        ):
-            return CaughtUp(memory, estimate, None, ())
+        # A state that is carried on is none of this tick.
+        known = None if state.invalid_ticks else estimate
         model = UNKNOWN if memory.dispute is None else self._model(state)
-        memory, found = self._fusion.catch_up(memory, inputs.samples, now, model)
+        memory, found = self._fusion.catch_up(memory, inputs.samples, now, known, model)
+        due = inputs.sensors.t_us // _CHECKED_US != state.t_us // _CHECKED_US
         news = memory.health is not before.health
         if due or news or found is None:
             memory = self._told(before, memory, now, texts, due=due)
