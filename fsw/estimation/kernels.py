@@ -190,10 +190,18 @@ def _copy(a: Any, b: Any) -> None:
             b.imu[k % IMU_CAPACITY, i] = a.imu[k % IMU_CAPACITY, i]
     for i in range(6):
         b.newest[i] = a.newest[i]
+    _copy_halves(a, b)
+    _copy_joints(a, b)
+
+
+@compilable
+def _copy_halves(a: Any, b: Any) -> None:
     for i in range(2):
         b.same[i], b.steady[i] = a.same[i], a.steady[i]
         b.calm[i], b.doubted[i] = a.calm[i], a.doubted[i]
-    _copy_joints(a, b)
+    b.shaken, b.stepped = a.shaken, a.stepped
+    for i in range(3):
+        b.step[i] = a.step[i]
 
 
 @compilable

@@ -303,7 +303,7 @@ class Autopilot:
         tilted = safety.rolled_us >= 0 or safety.pitched_us >= 0
         if tilted or not estimate.R_WB[8] > watch.upright:
             safety = watch.attitude(safety, estimate, flies=state.vehicle.flies)
-        if state.index >= 0 and not 0 < estimate.t_us - state.t_us <= self._most_us:
+        if self._jumped(state, estimate.t_us):
             safety = watch.jumped(safety, estimate.t_us, estimate.t_us - state.t_us)
         return state if safety is state.safety else replace(state, safety=safety)
 
@@ -370,6 +370,10 @@ class Autopilot:
         if not unheard or inputs.refused_setpoints:
             state = replace(state, offboard=accept_setpoints(state.offboard, inputs, self.config))
         return state
+
+    def _jumped(self, state: FlightState, now_us: int) -> bool:
+        """Whether time did: on by more than is made up for, or not on at all."""
+        return state.index >= 0 and not 0 < now_us - state.t_us <= self._most_us
 
     def _elapsed_ticks(self, state: FlightState, now_us: int) -> int:
         """Ticks since the last one: more than one where sensor frames were missed."""
@@ -515,9 +519,11 @@ class Autopilot:
     ) -> tuple[Damage, Watch | None]:
         """What is known of the actuators; ``memory`` is the loops' for the next tick.
 
-        Where the estimate is not ``known`` from every sensor, how the vehicle moves shows nothing.
+        Where the estimate is not ``known`` from every sensor, how the vehicle moves shows nothing,
+        nor after a jump of time: what was commanded has not been done meanwhile.
         """
-        if not (known and self._watches and state.aiding.sensor is None):
+        jumped = self._jumped(state, estimate.t_us)
+        if jumped or not (known and self._watches and state.aiding.sensor is None):
             return state.damage, paused(state.watch)
         return self._damage.see(
             state.damage,

@@ -36,7 +36,8 @@ _IMU_SILENT = 0.008  # s; longer than the filter takes for jitter
 # most while readings repeat; 50 and 70 within 10 ms of stuck encoders.
 _HELD = (35.0, 70.0)
 _ASKED = 0.1  # rad that joints were asked to move meanwhile; friction has held one for half of it
-_IN_USE = (SensorFault.REPEATED, SensorFault.SELDOM)  # the sensor is, all the same
+# The sensor is, all the same; an IMU that disagrees with its new biases.
+_IN_USE = (SensorFault.REPEATED, SensorFault.SELDOM, SensorFault.DISAGREES)
 _LATELY = 0.02  # s, in which a fault is one of now
 _AWAY = 0.1  # s that a position is overdue, after which its return is a jump
 _ANEW = "estimate is not a number: the filter starts anew"
@@ -81,7 +82,8 @@ class SensedState:
         came, model = 0.0, UNKNOWN
         if 0.0 <= before.imu_came < now - _IMU_SILENT:
             came, samples = _without_late_imu(before, now, samples)
-        if came or now - before.of(Sensor.IMU).fault_at < _LATELY:
+        doubtful = before.dispute is not None or now - before.of(Sensor.IMU).fault_at < _LATELY
+        if came or doubtful:
             model = self._model(state)
         memory, estimate = self._fusion.step(
             started, samples, now, pushed, watch, model, silent=came > 0.0

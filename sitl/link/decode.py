@@ -29,6 +29,11 @@ class VehicleReply(NamedTuple):
     custom_mode: int | None = None  # of the vehicle's HEARTBEAT, where there is one
     injections: tuple[Injection, ...] = ()  # that a ground station asked the vehicle for
 
+    @property
+    def says_more(self) -> bool:
+        """Whether there is anything for a pilot beside the controls."""
+        return bool(self.acks or self.texts or self.custom_mode is not None)
+
 
 def read_reply(datagram: bytes, joints: int) -> VehicleReply | None:
     """Read an answer of a vehicle with so many joints; None without HIL_ACTUATOR_CONTROLS."""

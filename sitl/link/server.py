@@ -22,7 +22,7 @@ from sitl.link.pilot_messages import Heard, PilotMessage, SendCommand
 from sitl.link.udp_endpoint import PeerSocket
 from sitl.result import EndKind
 from sitl.sensors.exact import SensorReadings
-from sitl.simulation import Simulation
+from sitl.simulation import STEP_US, Simulation
 
 _HEARTBEAT_STEPS: Final = 500  # 1 Hz
 _PROGRESS_S: Final = 0.1  # wall time between two reports
@@ -73,29 +73,39 @@ def serve(
     """
     answered = b""  # to those who asked for a fault
     state = PilotState(plan.first_phase)
+    spoken = pilot.speak(plan, state, simulation.t_us)
     begin_s = reported_s = time.perf_counter()
+
+    def meanwhile() -> None:
+        """What need not wait for the answer, while the vehicle thinks."""
+        nonlocal spoken
+        truth(simulation)
+        simulation.compare()
+        spoken = pilot.speak(plan, state, simulation.t_us + STEP_US)
+
     while simulation.ended is None:
         stamp_us = simulation.sensor_time_us
         # The pilot has a clock of its own, which does not fail with the sensors'.
         t_us, seen = simulation.t_us, simulation.healthy()
-        state, messages = pilot.speak(plan, state, t_us)
+        state, messages = spoken
         if simulation.faults.active:
             messages = _heard_of(simulation, messages, begun)
         datagram = _datagram(simulation, encoder, messages, exchange, answered)
         try:
-            answer = exchange.step(simulation.step, stamp_us, datagram, lambda: truth(simulation))
+            answer = exchange.step(simulation.step, stamp_us, datagram, meanwhile)
             if simulation.step == 0:  # the vehicle may take its time for the first answer
                 begin_s = time.perf_counter()
-            answered = _injected(simulation, encoder, answer)
+            answered = _injected(simulation, encoder, answer) if answer.injections else b""
             _advance(simulation, answer)
         except SimulatorError as error:
             kind = EndKind.INTERRUPTED if stop.requested else EndKind.STOPPED
             simulation.end(kind, str(error))
             break
-        state = pilot.listen(plan, state, _heard(answer, seen), t_us)
-        if state.left is not None:
-            simulation.leave_trajectory(t_us, state.left)
-        _end_if_over(simulation, state, stop)
+        if pilot.attends(state) or answer.says_more:
+            heard = pilot.listen(plan, state, _heard(answer, seen), t_us)
+            if heard is not state:  # what was to be said is not any more
+                state, spoken = heard, pilot.speak(plan, heard, simulation.t_us)
+        _end_if_over(simulation, state, stop, t_us)
         if simulation.step % _PROGRESS_STEPS == 0:
             now_s = time.perf_counter()
             if now_s - reported_s >= _PROGRESS_S:
@@ -106,7 +116,9 @@ def serve(
     return RunTiming(simulation.step, wall_s, simulation.time_s / max(wall_s, 1e-9))
 
 
-def _end_if_over(simulation: Simulation, state: PilotState, stop: StopRequest) -> None:
+def _end_if_over(simulation: Simulation, state: PilotState, stop: StopRequest, t_us: int) -> None:
+    if state.left is not None:
+        simulation.leave_trajectory(t_us, state.left)
     if state.refusal is not None:
         simulation.end(EndKind.REFUSED, state.refusal)
     elif state.done:
