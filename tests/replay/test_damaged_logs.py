@@ -146,6 +146,7 @@ def test_what_is_wrong_is_named(
     assert one_sentence(sentence)
 
 
+@pytest.mark.requirement("REQ-LINK-9")
 @pytest.mark.parametrize(
     ("numbers", "said"),
     [

@@ -265,6 +265,7 @@ def test_a_result_of_an_older_build_is_shown_as_far_as_it_goes(tmp_path: Path) -
     assert "<td>sensors</td><td>unknown</td>" in page
 
 
+@pytest.mark.requirement("REQ-LINK-9")
 @pytest.mark.parametrize(
     ("name", "text", "said"),
     [

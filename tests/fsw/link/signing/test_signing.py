@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import stat
 from collections.abc import Iterator
 from pathlib import Path
@@ -360,6 +361,18 @@ def test_a_key_that_is_set_again_forgets_no_time(ground: Ground) -> None:
 def test_a_damaged_key_is_an_error_and_no_open_link(file: Path, content: str) -> None:
     file.parent.mkdir()
     file.write_text(content, encoding="latin-1")
+    file.chmod(0o600)
+    with pytest.raises(LinkError, match="no signing key"), ground_station(key_file=KeyFile(file)):
+        pass
+
+
+def test_a_key_that_is_a_pipe_or_nested_is_an_error_and_not_waited_for(file: Path) -> None:
+    file.parent.mkdir()
+    os.mkfifo(file, 0o600)
+    with pytest.raises(LinkError, match="no signing key"), ground_station(key_file=KeyFile(file)):
+        pass
+    file.unlink()
+    file.write_text("[" * 1000)
     file.chmod(0o600)
     with pytest.raises(LinkError, match="no signing key"), ground_station(key_file=KeyFile(file)):
         pass
