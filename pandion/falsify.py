@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from command_line.bounded_file import read_bounded
-from command_line.bounded_json import json_object
+from command_line.bounded_json import JsonError, json_object
 from command_line.options import group, json_file, option, read
 from command_line.output import complain, console_beside, json_text, write_text
 from command_line.parser import COULD_NOT_START
@@ -334,6 +334,8 @@ def _read(path: Path, scenario: Scenario) -> tuple[int, tuple[tuple[float, float
         if isinstance(first, bool) or not isinstance(first, int):
             raise TypeError("first_step")
         pushes = tuple((float(x), float(y), float(z)) for x, y, z in kept["acceleration_m_s2"])
+    except JsonError as problem:
+        raise UnusableError(f"{path} {problem}; it is no disturbance") from None
     except (KeyError, TypeError, ValueError):
         raise UnusableError(f"{path} is no disturbance that pandion falsify has kept") from None
     values = [value for push in pushes for value in push]
