@@ -30,7 +30,6 @@ from fsw.estimation.sensor_checks import (
     Health,
     arrived,
     believable,
-    numbers_of,
 )
 from fsw.estimation.sensor_fault import Sensor, SensorFault
 from fsw.estimation.tuning import EstimatorLaw, EstimatorTuning
@@ -70,7 +69,8 @@ _REST: Vec3 = (0.0, 0.0, 0.0)
 UNKNOWN: Final[Vec3] = (0.0, 0.0, 0.0)  # what rotors make of the vehicle
 _LOST: Final[Vec3] = (math.nan, math.nan, math.nan)
 _NO_TURN: Vec4 = (1.0, 0.0, 0.0, 0.0)
-_USUAL_PARTS: Final = kernels.COPY | kernels.JOINTS | kernels.READING
+_USUAL_PARTS: Final = kernels.COPY | kernels.PUSH | kernels.JOINTS | kernels.READING
+_OF_EVERY_TICK: Final = (ImuSample, JointSample)
 _NO_READING: kernels.Reading = (0.0, _REST, _REST)
 
 
@@ -167,10 +167,6 @@ class FusionMemory(NamedTuple):
         dispute = attribution.contradicted(self.dispute, now, self.numbers[0], turned=turned)
         return self._replace(dispute=dispute)
 
-    def repeats(self, sample: Aiding) -> bool:
-        """Whether a sample says what the last one of its sensor said, to the last bit."""
-        return numbers_of(sample) == self.of(SENSOR_OF[type(sample)]).numbers
-
     def after(self, one: Waiting, health: Health, refused: tuple[Aiding, ...]) -> FusionMemory:
         """The memory after the first of the waiting samples was fused, or ``refused`` [SI]."""
         sample, pose, counter = one.sample, self.pose, self.reset_counter
@@ -261,39 +257,77 @@ class SensorFusion:
         *,
         silent: bool = False,
     ) -> tuple[FusionMemory, StateEstimate | None]:
-        """Take in the ``samples`` that came since the last tick; the state at ``now`` [s].
+        """``take_in`` and ``catch_up``; the state at ``now`` [s] after both."""
+        memory, _ = self.take_in(
+            memory, samples, now, joint_acceleration, watch, model, silent=silent
+        )
+        return self.catch_up(memory, samples, now, model)
 
+    def take_in(
+        self,
+        memory: FusionMemory,
+        samples: Sequence[Sample],
+        now: float,
+        joint_acceleration: Vec2 = (0.0, 0.0),
+        watch: EncoderWatch | None = None,
+        model: Vec3 = UNKNOWN,
+        *,
+        silent: bool = False,
+    ) -> tuple[FusionMemory, StateEstimate | None]:
+        """Take in what IMU and encoders measured since the last tick; the state at ``now`` [s].
+
+        Of the other ``samples`` it knows what ``catch_up`` has fused so far.
         ``joint_acceleration`` [rad/s^2, joints] is what the torques make of the arm; a ``watch`` of
-        its encoders is kept in the memory. Where the IMU is of no use, or in dispute with the pose,
-        a ``model`` [SI, FRD] tells what the rotors make of the vehicle (``imu.add_imu``); it is
-        ``silent`` if it has no reading to go by. None before there was a pose, or a position and a
-        heading, to start from, and a reading of the arm.
+        its encoders is kept in the memory. Where the IMU is of no use, a ``model`` [SI, FRD] tells
+        what the rotors make of the vehicle (``imu.add_imu``); it is ``silent`` if it has no reading
+        to go by. None before there was a pose, or a position and a heading, to start from, and a
+        reading of the arm.
         """
         dt = min(max(now - memory.now, 0.0), _LONGEST_STEP) if memory.now >= 0.0 else 0.0
         x = np.ndarray(1, FILTER, np.empty(_FLOATS))  # eight times as fast as an empty record
         usual = self._usual(memory, samples, now)
         if usual is not None:
             asked = Asked(x, _USUAL_PARTS, (now, dt), joint_acceleration, *usual, model)
-            if isinstance(samples[0], PoseSample):
-                memory = self.take(memory, samples[0], now)
         else:
-            asked = Asked(x, kernels.COPY, (now, dt), joint_acceleration, model=model)
+            parts = kernels.COPY | kernels.PUSH
+            asked = Asked(x, parts, (now, dt), joint_acceleration, model=model)
             memory, asked = self._take_each(memory, asked, samples)
         imu_came = memory.imu_came if asked.reading is _NO_READING else now
         if silent:
             memory, asked = self._take_no_imu(memory, asked)
+        joints_came = memory.joints_came if asked.encoders is _REST else now
+        ready = memory.started and joints_came >= 0.0
+        memory, known = self._do(memory, asked, kernels.END if ready else 0, -math.inf)
+        # By position, because it is done in every tick: what every tick renews, and the rest.
+        watched = memory.encoders if watch is None else watch
+        memory = FusionMemory(x, now, imu_came, joints_came, watched, *memory[5:])
+        if known is None:
+            return (_anew(memory) if ready else memory), None
+        return memory, StateEstimate(round(1e6 * now), *known)
+
+    def catch_up(
+        self, memory: FusionMemory, samples: Sequence[Sample], now: float, model: Vec3 = UNKNOWN
+    ) -> tuple[FusionMemory, StateEstimate | None]:
+        """Check the other ``samples``, fuse what the filter reaches; the state at ``now`` [s].
+
+        The loops need not wait for it: a pose is late anyway, and the next tick knows of it. Where
+        pose and IMU contradict each other, a ``model`` [SI, FRD] as in ``take_in`` says who is
+        wrong.
+        """
+        x = np.ndarray(1, FILTER, np.empty(_FLOATS))
+        asked = Asked(x, kernels.COPY, (now, 0.0), (0.0, 0.0))
+        for sample in samples:
+            if not isinstance(sample, _OF_EVERY_TICK):
+                memory = self.take(memory, sample, now)
         if not memory.started:
             memory, asked = self._done(memory, asked)
             memory = self._start(memory)
-        joints_came = memory.joints_came if asked.encoders is _REST else now
-        known, ready = None, memory.started and joints_came >= 0.0
+        known, ready = None, memory.started and memory.joints_came >= 0.0
         if ready:
             memory, known = self._predicted(memory, asked, now - memory.delay - _MARGIN)
         else:
             memory, _ = self._done(memory, asked)
-        # By position, because it is done in every tick: what every tick renews, and the rest.
-        watched = memory.encoders if watch is None else watch
-        memory = FusionMemory(x, now, imu_came, joints_came, watched, *memory[5:])
+        memory = FusionMemory(x, *memory[1:])
         if memory.dispute is not None:
             memory = _settled(memory, memory.dispute, model, now)
         if known is None:
@@ -303,7 +337,7 @@ class SensorFusion:
     def _usual(
         self, memory: FusionMemory, samples: Sequence[Sample], now: float
     ) -> tuple[Vec3, kernels.Reading] | None:
-        """Encoders and reading of a tick in which each came once, behind a pose if any.
+        """Encoders and reading of a tick in which each came once, at the end.
 
         None: samples have to be taken one by one. Most ticks are so, and this takes half as long.
         """
@@ -313,7 +347,7 @@ class SensorFusion:
         arm, unit = samples[-2:]
         if type(arm) is not JointSample or type(unit) is not ImuSample:
             return None
-        if count == 3 and type(samples[0]) is not PoseSample:
+        if count == 3 and isinstance(samples[0], _OF_EVERY_TICK):
             return None
         came = memory.joints_came
         if came < 0.0 or unit.time < now - IMU_TOO_OLD or _fault_of_encoders(arm, now, came):
@@ -324,16 +358,12 @@ class SensorFusion:
     def _take_each(
         self, memory: FusionMemory, asked: Asked, samples: Sequence[Sample]
     ) -> tuple[FusionMemory, Asked]:
-        """Take samples in, one after the other, whatever they are."""
+        """Take in samples of IMU and encoders, one after the other."""
         for sample in samples:
             if isinstance(sample, ImuSample):
                 memory, asked = self._take_imu(memory, asked, sample)
             elif isinstance(sample, JointSample):
                 memory, asked = self._take_joints(memory, asked, sample)
-            else:
-                if asked.parts & kernels.READING and memory.repeats(sample):
-                    memory, asked = self._done(memory, asked)
-                memory = self.take(memory, sample, asked.times[0])
         return memory, asked
 
     def _take_imu(
