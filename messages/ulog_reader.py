@@ -11,6 +11,7 @@ from pathlib import Path
 from struct import Struct, unpack_from
 from typing import Final, NamedTuple
 
+from command_line.bounded_file import open_regular
 from messages import ulog
 from messages.ulog import Field, Topic
 
@@ -86,7 +87,7 @@ class UlogFile:
 
     def _check_rest(self, begin: int) -> None:
         """Distinguish a last message that was cut from one whose length is wrong."""
-        with self.path.open("rb") as file:
+        with open_regular(self.path) as file:
             file.seek(begin)
             rest = file.read(_HEADER.size + 2)
         if len(rest) == _HEADER.size + 2:
@@ -125,7 +126,10 @@ class UlogFile:
             self.information[declared.name] = value
 
     def _messages(self) -> Iterator[tuple[bytes, bytes]]:
-        with self.path.open("rb") as file, mmap.mmap(file.fileno(), 0, prot=mmap.PROT_READ) as data:
+        with (
+            open_regular(self.path) as file,
+            mmap.mmap(file.fileno(), 0, prot=mmap.PROT_READ) as data,
+        ):
             self.size = len(data)
             while self.at + _HEADER.size <= self.size:
                 length, kind = _HEADER.unpack_from(data, self.at)
@@ -144,7 +148,7 @@ def open_log(path: Path) -> UlogFile:
         UlogError: The file cannot be read or is no ULog.
     """
     try:
-        with path.open("rb") as file:
+        with open_regular(path) as file:
             head = file.read(16)
     except OSError as error:
         raise UlogError(f"cannot read {path}: {error.strerror}") from None

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from command_line.bounded_file import read_bounded
+from command_line.bounded_json import JsonError, json_object
 from command_line.options import group, json_file, option, read
 from command_line.output import complain, console_beside, json_text, write_text
 from command_line.parser import COULD_NOT_START
@@ -327,14 +327,16 @@ def _replayed(flown: Replayed) -> dict[str, Any]:
 def _read(path: Path, scenario: Scenario) -> tuple[int, tuple[tuple[float, float, float], ...]]:
     """The first step and the values of a kept disturbance."""
     try:
-        kept = json.loads(read_bounded(path, _MOST_BYTES))
+        kept = json_object(read_bounded(path, _MOST_BYTES))
         if kept["format"] != _FORMAT:
             raise KeyError("format")
         first = kept["first_step"]
         if isinstance(first, bool) or not isinstance(first, int):
             raise TypeError("first_step")
         pushes = tuple((float(x), float(y), float(z)) for x, y, z in kept["acceleration_m_s2"])
-    except (UnicodeDecodeError, RecursionError, KeyError, TypeError, ValueError):
+    except JsonError as problem:
+        raise UnusableError(f"{path} {problem}; it is no disturbance") from None
+    except (KeyError, TypeError, ValueError):
         raise UnusableError(f"{path} is no disturbance that pandion falsify has kept") from None
     values = [value for push in pushes for value in push]
     if not (pushes and first >= 0 and all(abs(value) <= 50.0 for value in values)):

@@ -49,8 +49,8 @@ def write_report(logs: list[Path], out: Path | None = None) -> Path:
     """Write the page of flights, beside the first log unless told otherwise; the page.
 
     Raises:
-        UlogError: A log cannot be read.
-        ValueError: There are too many flights to tell apart, or a result is of another build.
+        UlogError: A log cannot be read, or a result beside it cannot be used.
+        ValueError: There are too many flights to tell apart.
         OSError: The page cannot be written.
         ModuleNotFoundError: The library that draws is not installed.
     """
@@ -60,10 +60,7 @@ def write_report(logs: list[Path], out: Path | None = None) -> Path:
     from view.report.reported import reported
 
     flights = [reported(path, label) for path, label in zip(logs, labels(logs), strict=True)]
-    try:
-        text = page(flights, {flight.label: _rows(flight) for flight in flights})
-    except (KeyError, TypeError, AttributeError) as problem:
-        raise ValueError(f"a result beside the logs is of another build: {problem!r}") from problem
+    text = page(flights, {flight.label: _rows(flight) for flight in flights})
     first = flights[0].data.path
     written = out if out is not None else first.with_name(NAME)
     written.write_text(text, encoding="utf-8")

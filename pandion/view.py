@@ -69,6 +69,8 @@ def _show_log(options: ViewOptions, log: Path) -> int:
     except PageError as error:
         complain("pandion view", error)
         return COULD_NOT_START
+    for sentence in flight.unusable:
+        complain("pandion view", f"{sentence}; shown without it")
     page = LogPage(server, flight)
     say(f"{flight.title}: open {address(server)}; Ctrl-C ends")
     try:

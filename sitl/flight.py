@@ -47,7 +47,7 @@ class Flight:
         self._endpoint = endpoint
         self._events = events
         self._simulation = Simulation(scenario, options.seed, origin=options.origin)
-        _rehearse(Simulation(scenario, options.seed))
+        rehearse(Simulation(scenario, options.seed))
 
     def run(self, stop: StopRequest) -> int:
         """Fly to the end and report; returns the exit code."""
@@ -182,11 +182,16 @@ class Flight:
         }
 
 
-def _rehearse(simulation: Simulation) -> None:
-    """Take one step of a simulation that is thrown away, so that every kernel is compiled."""
-    simulation.sense()
-    joints = len(simulation.vehicle.links)
-    simulation.advance(Controls((0.5, 0.5, 0.5, 0.5), (0.0,) * joints, armed=True))
+def rehearse(simulation: Simulation) -> None:
+    """Take two steps of a simulation that is thrown away, so that every kernel is compiled.
+
+    In the second a joint seizes: no other fault needs kernels that a step without does not.
+    """
+    simulation.inject(Fault("joint", "stuck"))
+    controls = Controls((0.5, 0.5, 0.5, 0.5), (0.0,) * len(simulation.vehicle.links), armed=True)
+    for _ in range(2):
+        simulation.sense()
+        simulation.advance(controls)
     simulation.sense()
 
 

@@ -21,10 +21,11 @@ def compile_kernels(half: str) -> None:
         flight_software(ControlChoice())
         Autopilot(flight_config()).quiet_ticks()  # of studies alone
     else:
+        from sitl.flight import rehearse
         from sitl.scenario_file import load_scenario
         from sitl.simulation import Simulation
 
-        Simulation(load_scenario("walls"), 0)
+        rehearse(Simulation(load_scenario("walls", "mocap"), 0))
 
 
 if __name__ == "__main__":

@@ -38,6 +38,7 @@ class Flight(Protocol):
     end: float  # s, sensor time
     airframe: Airframe
     facts: tuple[tuple[str, str], ...]  # what is known about it
+    unusable: tuple[str, ...]  # a sentence about each file beside it that cannot be used
     events: tuple[Event, ...]  # in order of time
     worst: Worst | None
 

@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from command_line.bounded_file import read_bounded
 from fsw.log.json_codec import JsonCodec
+from fsw.log.topics import TOPICS
 from fsw.signals import TickInputs
 from messages import ulog
-from messages.ulog import Topic
+from messages.ground_truth import TRUTH_TOPICS
+from messages.ulog import Field, Topic
 from messages.ulog_reader import UlogError, UlogFile, open_log
+from view.results_beside import results_beside
 
 __all__ = ["FlightData", "InputChange", "Table", "Text", "UlogError", "read_flight"]
 
@@ -28,7 +30,10 @@ _NUMPY: Final = {
     "bool": "?",
 }  # fmt: skip
 _INPUTS: Final = "tick_input"
-_MOST_BYTES: Final = 16 * 1024 * 1024  # of a result
+_OURS: Final = {
+    topic.name: {one.name: one for one in topic.fields} for topic in (*TOPICS, *TRUTH_TOPICS)
+}
+_VECTOR: Final = 4  # elements of an array that is a vector or a quaternion, at most
 
 
 class Text(NamedTuple):
@@ -47,6 +52,15 @@ class InputChange(NamedTuple):
     json: bytes
 
 
+class Row(dict[str, Any]):
+    """One record: its fields by name; the value of an array is an array."""
+
+    topic = ""
+
+    def __missing__(self, name: str) -> Any:
+        raise _missing(self.topic, name)
+
+
 @dataclass(frozen=True, slots=True)
 class Table:
     """All records of one topic: ``t`` (n,) [s, sensor time] and a column of each field."""
@@ -56,10 +70,24 @@ class Table:
     columns: Mapping[str, Array]  # (n,), of an array (n, elements), of a text (n,) bytes
 
     def __getitem__(self, name: str) -> Array:
-        return self.columns[name]
+        """A column.
+
+        Raises:
+            UlogError: The log is of a build whose topic has no such field.
+        """
+        try:
+            return self.columns[name]
+        except KeyError:
+            raise _missing(self.name, name) from None
 
     def __len__(self) -> int:
         return len(self.t)
+
+    def row(self, place: int) -> Row:
+        """One record."""
+        found = Row({name: values[place] for name, values in self.columns.items()})
+        found.topic = self.name
+        return found
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,6 +104,7 @@ class FlightData:
     whole: bool  # False where the end is cut
     beside: Mapping[str, Any] = field(default_factory=dict)
     """``result.json``, ``sitl.json`` and ``fsw.json`` beside it, by stem, where there are."""
+    unusable: tuple[str, ...] = ()  # a sentence about each of these that cannot be used
 
     @property
     def begin(self) -> float:
@@ -93,7 +122,7 @@ class FlightData:
         Raises:
             UlogError: The log is of a build with other inputs.
         """
-        codec = JsonCodec(TickInputs)
+        codec = _codec()
         try:
             return [
                 (one.t, codec.decode(name, one.json)) for one in self.inputs if one.name == name
@@ -127,6 +156,7 @@ def read_flight(path: Path) -> FlightData:
         raise UlogError(f"{log.path} holds no record")
     inputs = _inputs(tables.pop(_INPUTS)) if _INPUTS in tables else ()
     texts.sort(key=lambda one: one.t)
+    beside, unusable = results_beside(log.path)
     return FlightData(
         path=log.path,
         information=log.information,
@@ -136,12 +166,23 @@ def read_flight(path: Path) -> FlightData:
         inputs=inputs,
         lost_ms=lost_ms,
         whole=log.whole,
-        beside=_beside(log.path),
+        beside=beside,
+        unusable=unusable,
     )
+
+
+@cache
+def _codec() -> JsonCodec:
+    return JsonCodec(TickInputs)
+
+
+def _missing(topic: str, name: str) -> UlogError:
+    return UlogError(f"the log is of another build: its topic {topic} has no {name}")
 
 
 def _table(log: UlogFile, number: int, bodies: list[bytes]) -> Table:
     topic = log.topics[number]
+    _check_fields(log, topic)
     records = np.frombuffer(b"".join(bodies), dtype=_dtype(topic))
     columns = {one.name: records[one.name] for one in topic.fields}
     t = 1e-6 * records["timestamp"].astype(np.float64)
@@ -149,6 +190,38 @@ def _table(log: UlogFile, number: int, bodies: list[bytes]) -> Table:
         order = np.argsort(t, kind="stable")
         t, columns = t[order], {name: column[order] for name, column in columns.items()}
     return Table(topic.name, t, columns)
+
+
+def _check_fields(log: UlogFile, topic: Topic) -> None:
+    """Refuse a topic of ours with a field of another shape; one may be missing, or be new.
+
+    Raises:
+        UlogError: A field is there twice, or is of another kind than in this build.
+    """
+    fields = {one.name: one for one in topic.all_fields}
+    if len(fields) != len(topic.all_fields):
+        raise UlogError(f"{log.path} is damaged: a field of topic {topic.name} is there twice")
+    for name, ours in _OURS.get(topic.name, {}).items():
+        if name in fields and not _is_like(fields[name], ours):
+            raise UlogError(
+                f"{log.path} is of another build: {name} of topic {topic.name} is "
+                f"{fields[name].declared.removesuffix(name).strip()} there and "
+                f"{ours.declared.removesuffix(name).strip()} here"
+            )
+
+
+def _is_like(one: Field, ours: Field) -> bool:
+    """Whether a field is a number or text as ours; an array of more than a few may have grown."""
+    if _kind(one) != _kind(ours):
+        return False
+    longer = min(one.count, ours.count) > _VECTOR or ours.type == "char"
+    return longer or one.count == ours.count
+
+
+def _kind(one: Field) -> str:
+    if one.type in ("float", "double"):
+        return "real"
+    return one.type if one.type in ("char", "bool") else "whole"
 
 
 def _dtype(topic: Topic) -> np.dtype[Any]:
@@ -170,16 +243,3 @@ def _inputs(table: Table) -> tuple[InputChange, ...]:
         if part + 1 == of:
             changes.append(InputChange(float(t), name.decode("ascii", "replace"), pieces))
     return tuple(changes)
-
-
-def _beside(path: Path) -> dict[str, Any]:
-    """What else the flight's directory says, as far as it can be read."""
-    found = {}
-    for stem in ("result", "sitl", "fsw"):
-        try:
-            read = json.loads(read_bounded(path.parent / f"{stem}.json", _MOST_BYTES))
-        except (OSError, ValueError):
-            continue
-        if isinstance(read, dict):
-            found[stem] = read
-    return found

@@ -63,6 +63,7 @@ class LogFlight:
             raise UlogError(f"{data.path} says nothing about where the vehicle was")
         self.airframe = airframe_of(data.information.get("numbers"))
         self.begin, self.end = data.begin, data.end
+        self.unusable = data.unusable
         info = data.information
         self.title = f"{info.get('scenario', data.path.stem)}, seed {info.get('seed', '?')}"
         self.facts = tuple((name, str(info[name])) for name in _FACTS if name in info)
@@ -240,7 +241,7 @@ class LogFlight:
         place = int(np.searchsorted(table.t, t + 1e-9, side="right")) - 1
         if place < 0 or t - table.t[place] > lasts:
             return None
-        return {column: values[place] for column, values in table.columns.items()}
+        return table.row(place)
 
     def _posture(
         self, t: float, p: tuple[str, str | None], q: tuple[str, str], arm: tuple[str, str]
@@ -307,7 +308,7 @@ class LogFlight:
         end = int(np.searchsorted(table.t, t + 1e-9, side="right"))
         found: dict[int, Timing] = {}
         for k in range(max(end - 2 * len(GROUPS), 0), end):
-            row = {name: values[k] for name, values in table.columns.items()}
+            row = table.row(k)
             group = int(row["group"])
             if group < len(GROUPS):
                 found[group] = Timing(

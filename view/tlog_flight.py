@@ -59,6 +59,7 @@ class TlogFlight:
         self.begin, self.end = self._times[0], self._times[-1]
         self.title = f"{path.parent.name}/{path.name}"
         heard = sum(one.count for one in telemetry.heard.values())
+        self.unusable: tuple[str, ...] = ()
         self.facts: tuple[tuple[str, str], ...] = (("file", str(path)), ("messages", f"{heard}"))
         self.events = tuple(
             one if math.isfinite(one.t) else one._replace(t=self.begin) for one in telemetry.events

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass, replace
 from functools import lru_cache
@@ -11,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from command_line.bounded_json import json_numbers
 from fsw.geometry.rotation import euler_zyx, matrix_from_quaternion
 from fsw.model.airframe import AIRFRAME, Airframe
 from fsw.model.kinematics import arm_points, point_in_flight
@@ -85,8 +85,7 @@ def condense_once(airframe: Airframe, nodes: int, period: float) -> Any:
 def airframe_of(numbers: str | int | None) -> Airframe:
     """The airframe that a log was flown with, from its information ``numbers``; else the usual."""
     try:
-        known: Mapping[str, Any] = json.loads(str(numbers))
-        airframe: Airframe = _filled(AIRFRAME, "airframe", known)
+        airframe: Airframe = _filled(AIRFRAME, "airframe", json_numbers(str(numbers)))
     except (ValueError, TypeError, AttributeError):
         return AIRFRAME
     return airframe

@@ -12,6 +12,7 @@ from fsw.link.link_choice import LinkChoice, addresses, default_keys
 from fsw.link.services.service import LinkService
 from fsw.link.services.time_service import TimeService
 from fsw.link.signing.key_file import KeyFile
+from fsw.link.signing.signed_times import SignedTimes
 from fsw.link.signing.signing import Signing
 from fsw.link.telemetry.streams import API_RATES, GROUND_RATES
 from fsw.link.wire.telemetry_context import TelemetryContext
@@ -62,12 +63,13 @@ def build_links(
                 remote=choice.allow_remote,
             )
         )
+    times = SignedTimes()
     links = [
         GcsLink(
             setup,
             inbox,
             context,
-            Signing(number, unix_us, KeyFile(keys / f"signing-{setup.name}.json")),
+            Signing(number, unix_us, KeyFile(keys / f"signing-{setup.name}.json"), times),
             now_us,
             record if number == 0 else None,
             (TimeService(), *services()),

@@ -65,6 +65,8 @@ class JsonCodec:
             return self._codecs[name].read(json.loads(text))
         except (TypeError, LookupError, AttributeError, ArithmeticError, ValueError) as error:
             raise ValueError(f"input {name} cannot be read: {error}") from None
+        except RecursionError:
+            raise ValueError(f"input {name} cannot be read: nested too deeply") from None
 
 
 def _codec(hint: Any, instead: dict[type, Any]) -> _Codec:

@@ -5,11 +5,11 @@ The planner does not run: its answers are inputs of the tick, and as such in the
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from command_line.bounded_json import JsonError, json_numbers
 from fsw.log.compare import Difference, first_difference
 from fsw.log.encoder import FULL, THIN, LogEncoder
 from fsw.log.reader import Gap, LoggedTick, UlogError, UlogFile, ticks
@@ -80,9 +80,9 @@ def logged_numbers(log: UlogFile) -> dict[str, float]:
         UlogError: It cannot be read.
     """
     try:
-        return dict[str, float](json.loads(fact(log, "numbers")))
-    except (ValueError, TypeError) as error:
-        raise UlogError(f"{log.path} is damaged in its numbers: {error}") from None
+        return json_numbers(fact(log, "numbers"))
+    except JsonError as error:
+        raise UlogError(f"{log.path} is damaged: its information numbers {error}") from None
 
 
 def _difference(

@@ -6,7 +6,9 @@ from typing import Final, NamedTuple
 
 from sitl.faults.keys import Fault, Kind, Unit, instances
 from sitl.link.message_ids import ACCEPTED, DENIED, UNSUPPORTED
+from sitl.scenario import Scenario
 from sitl.simulation import Simulation
+from sitl.zones import zones_of
 
 # FAILURE_UNIT; the joints are its servos. It has no number for the encoders.
 _UNITS: Final[dict[int, Unit]] = {
@@ -34,6 +36,9 @@ _KINDS: Final[dict[int, Kind]] = {
     7: "intermittent",
 }
 _WORKS: Final = 0
+_NO_PILOT: Final = (
+    "no fault: mavlink is the link of the scenario's pilot, and this scenario has none"
+)
 
 
 class Injection(NamedTuple):
@@ -75,8 +80,15 @@ def carry_out(simulation: Simulation, asked: Injection) -> Answer:
     kind = _KINDS.get(asked.kind)
     if kind is None:
         return Answer(UNSUPPORTED, f"no fault: kind {asked.kind} is not one of 0 to 7")
+    if unit == "mavlink" and not _has_pilot(simulation.scenario):
+        return Answer(UNSUPPORTED, _NO_PILOT)
     fault = Fault(unit, kind, instance=float(number))
     refusal = simulation.inject(fault)
     if refusal is not None:
         return Answer(UNSUPPORTED, f"no fault: {refusal}")
     return Answer(ACCEPTED, f"fault injected: {fault}")
+
+
+def _has_pilot(scenario: Scenario) -> bool:
+    """Whether a pilot says anything: commands, targets, or the safe set alone."""
+    return scenario.pilot.plan != "none" or bool(zones_of(scenario))

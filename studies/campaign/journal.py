@@ -10,6 +10,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, BinaryIO, Final
 
+from command_line.bounded_file import open_regular
+
 _NO_LOCKS: Final = (errno.ENOLCK, errno.ENOTSUP, errno.ENOSYS)  # of a file system
 
 
@@ -28,7 +30,7 @@ class Journal:
             OSError: It cannot be written.
         """
         path.parent.mkdir(parents=True, exist_ok=True)
-        self._file = path.open("a+b")
+        self._file = open_regular(path, append=True)
         try:
             _lock(self._file, path)
         except BaseException:
@@ -82,7 +84,7 @@ def lines(path: Path) -> Iterator[dict[str, Any]]:
     """The lines of a journal, oldest first; one that a crash cut short is left out."""
     if not path.exists():
         return
-    with path.open("rb") as file:
+    with open_regular(path) as file:
         for line in file:
             content = _object(line)
             if content is not None:

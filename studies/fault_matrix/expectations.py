@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any, Final, Literal
 
 from command_line.bounded_file import read_bounded
-from sitl.faults.keys import Fault, Kind, Unit
-from sitl.scenario_file import SUITE_NAMES
+from sitl.faults.keys import Fault, Kind, Unit, instances
+from sitl.scenario_file import SUITE_NAMES, build_table
 from studies.fault_matrix.flights import SITUATIONS, FaultFlight
 
 EXPECTATIONS: Final = Path(__file__).with_suffix(".toml")
@@ -24,6 +24,9 @@ _CONTACTS: Final[tuple[str, ...]] = typing.get_args(Contact)
 _UNITS: Final[tuple[str, ...]] = typing.get_args(Unit)
 _KINDS: Final[tuple[str, ...]] = typing.get_args(Kind)
 _MOST_BYTES: Final = 1 << 20
+_SHOWN: Final = 60  # characters of a wrong value
+_MOST_MM: Final = 1e6  # of a margin
+_MOST_S: Final = 86400.0  # of a time
 _NUMBERS: Final = ("duration_s", "share", "size", "delay_ms", "rate_hz", "jump_s")
 _EXPECTED: Final = ("told_within_s", "names", "then", "last", "contact", "margin_mm", "why")
 _KNOWN: Final = (
@@ -127,7 +130,9 @@ def _read(table: Any, without: NotFlown, names: dict[str, str]) -> list[Expected
         if key not in _KNOWN:
             raise ExpectationError(f'unknown key "{key}" (known: {", ".join(_KNOWN)})')
     suites = _words(table, "suites", SUITE_NAMES, ("perfect",))
-    link = bool(table.get("link", False))
+    link = table.get("link", False)
+    if not isinstance(link, bool):
+        raise ExpectationError(f"link = {_shown(link)}: must be true or false")
     found = []
     for fault, name in _faults(table):
         modes = _modes(table, _names(fault, names))
@@ -141,23 +146,44 @@ def _read(table: Any, without: NotFlown, names: dict[str, str]) -> list[Expected
 def _faults(table: dict[str, Any]) -> list[tuple[Fault | None, str]]:
     units = _words(table, "units", _UNITS, ())
     kinds = _words(table, "kinds", _KINDS, ())
-    instances = table.get("instances", [0])
-    numbers = {key: float(table[key]) for key in _NUMBERS if key in table}
+    numbers: dict[str, Any] = {key: table[key] for key in _NUMBERS if key in table}
+    given = table.get("name")
+    if given is not None and not (isinstance(given, str) and given):
+        raise ExpectationError(f"name = {_shown(given)}: must be a text")
     if not units:
-        return [(None, str(table.get("name", "none")))]
+        return [(None, given or "none")]
     found: list[tuple[Fault | None, str]] = []
     for unit in units:
+        instances = _instances(table, typing.cast(Unit, unit))
         for kind in kinds:
             for instance in instances:
-                fault = Fault(
-                    typing.cast(Unit, unit),
-                    typing.cast(Kind, kind),
-                    instance=float(instance),
-                    **numbers,
-                )
+                keys: dict[str, Any] = {"unit": unit, "kind": kind, "instance": instance, **numbers}
+                fault: Fault = build_table(Fault, keys, "")
                 name = f"{unit}-{kind}" + (f"-{instance}" if instance else "")
-                found.append((fault, str(table.get("name", name)).replace(" ", "-")))
+                found.append((fault, (given or name).replace(" ", "-")))
     return found
+
+
+def _instances(table: dict[str, Any], unit: Unit) -> list[int]:
+    """Which of a unit fail, each in a flight of its own."""
+    found, most = table.get("instances", [0]), instances(unit)
+    allowed = f"whole numbers from 0 (all) to {most}" if most else "0 alone: there is one"
+    if not isinstance(found, list):
+        raise ExpectationError(
+            f"instances = {_shown(found)}: must be an array; of a {unit} {allowed}"
+        )
+    for k, one in enumerate(found):
+        if isinstance(one, bool) or not isinstance(one, int) or not 0 <= one <= most:
+            raise ExpectationError(
+                f"instances[{k}] = {_shown(one)}: must be, of a {unit}, {allowed}"
+            )
+    return found
+
+
+def _shown(value: Any) -> str:
+    """A value of the file as far as a sentence has room for it."""
+    text = repr(value)
+    return text if len(text) <= _SHOWN else f"{text[:_SHOWN]}…"
 
 
 def _names(fault: Fault | None, names: dict[str, str]) -> str:
@@ -183,28 +209,51 @@ def _expectation(keys: dict[str, Any]) -> Expectation:
     then, last = _actions(keys)
     contact = keys.get("contact", "none")
     if contact not in _CONTACTS:
-        raise ExpectationError(f"contact = {contact!r}: must be one of {', '.join(_CONTACTS)}")
+        raise ExpectationError(
+            f"contact = {_shown(contact)}: must be one of {', '.join(_CONTACTS)}"
+        )
     if contact != "none" and not keys.get("why"):
         raise ExpectationError(f'contact = "{contact}" needs a reason: why')
-    margin = keys.get("margin_mm", 0.0)
-    if isinstance(margin, bool) or not isinstance(margin, int | float) or math.isnan(margin):
-        raise ExpectationError(f"margin_mm = {margin!r}: must be a length in mm")
-    if margin < 0.0 and not keys.get("why"):
-        raise ExpectationError(f"margin_mm = {margin:g} needs a reason: why")
-    told = keys.get("told_within_s", math.inf)
-    if isinstance(told, bool) or not isinstance(told, int | float) or not told > 0.0:
-        raise ExpectationError(f"told_within_s = {told!r}: must be a time above 0, in seconds")
-    within_s = float(told) if told < math.inf else None
+    margin_mm, within_s = _margin_mm(keys), _told_within_s(keys)
     names = keys["names"]
     if not isinstance(names, str):
-        raise ExpectationError(f"names = {names!r}: must be a regular expression")
+        raise ExpectationError(f"names = {_shown(names)}: must be a regular expression")
+    why = keys.get("why", "")
+    if not isinstance(why, str):
+        raise ExpectationError(f"why = {_shown(why)}: must be a text")
     if within_s is not None and not names:
         raise ExpectationError("what must be told needs names: what a text must name")
     try:
         re.compile(names)
     except re.error as error:
         raise ExpectationError(f"names = {names!r} is no regular expression: {error}") from None
-    return Expectation(then, within_s, names, contact, float(margin), keys.get("why", ""), last)
+    return Expectation(then, within_s, names, contact, margin_mm, why, last)
+
+
+def _margin_mm(keys: dict[str, Any]) -> float:
+    margin = keys.get("margin_mm", 0.0)
+    if not _is_number(margin) or not -_MOST_MM <= margin <= _MOST_MM:
+        raise ExpectationError(
+            f"margin_mm = {_shown(margin)}: must be a length in mm, from {-_MOST_MM:g} to "
+            f"{_MOST_MM:g}"
+        )
+    if margin < 0.0 and not keys.get("why"):
+        raise ExpectationError(f"margin_mm = {margin:g} needs a reason: why")
+    return float(margin)
+
+
+def _told_within_s(keys: dict[str, Any]) -> float | None:
+    told = keys.get("told_within_s", math.inf)
+    if not _is_number(told) or not (0.0 < told <= _MOST_S or told == math.inf):
+        raise ExpectationError(
+            f"told_within_s = {_shown(told)}: must be a time above 0, in seconds, up to {_MOST_S:g}"
+            " or inf"
+        )
+    return float(told) if told < math.inf else None
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def _actions(keys: dict[str, Any]) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -222,10 +271,10 @@ def _words(
 ) -> tuple[str, ...]:
     words = table.get(key, list(default))
     if not isinstance(words, list):
-        raise ExpectationError(f"{key} = {words!r}: must be an array")
+        raise ExpectationError(f"{key} = {_shown(words)}: must be an array, of {', '.join(known)}")
     for word in words:
         if word not in known:
-            raise ExpectationError(f"{key}: {word!r} is not one of {', '.join(known)}")
+            raise ExpectationError(f"{key}: {_shown(word)} is not one of {', '.join(known)}")
     return tuple(words)
 
 

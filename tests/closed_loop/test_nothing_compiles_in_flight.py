@@ -11,6 +11,8 @@ import json
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from dataclasses import replace
+from typing import Any
 
 import pytest
 from numba.core.dispatcher import Dispatcher
@@ -18,7 +20,11 @@ from numba.core.dispatcher import Dispatcher
 from fsw.parameters.control_choice import ControlChoice
 from fsw.runtime.assembly import flight_software
 from fsw.signals import AttitudeSetpoint, JointSetpoint, Mode, MotionSetpoint
-from sitl.scenario_file import load_scenario
+from sitl.faults.keys import KINDS, Fault
+from sitl.flight import rehearse
+from sitl.scenario import ActuatorKeys, AirKeys, Scenario, Wind
+from sitl.scenario_file import SUITE_NAMES, load_scenario
+from sitl.simulation import Controls, Simulation
 from tests.closed_loop.harness import ARM, SET_MODE, Flight, command, hover
 
 _WORKING_SET_KERNELS = ("_add_near", "_numbered", "_add_violated")
@@ -74,14 +80,76 @@ def test_a_flight_finds_every_kernel_ready(name: str) -> None:
     assert json.loads(flown.stdout) == []
 
 
+# Everything of the air and of the actuators that a scenario can ask for.
+_REAL: dict[str, Any] = {
+    "air": AirKeys(
+        wind_m_s=(3.0, 1.0, 0.0), turbulence_m_s=5.0, rotor_drag_1_s=(0.3, 0.3, 0.0),
+        body_drag_m2=0.02, ground_effect=True, ceiling_effect=True, wall_suction=0.02,
+    ),
+    "actuators": ActuatorKeys(
+        quadratic_thrust=True, dead_time_ms=4.0, battery_a_h=2.0, motor_inertia_kg_m2=0.001,
+        backlash_deg=1.0,
+    ),
+    "disturbances": (Wind((0.5, 0.0, 0.0)),),
+}  # fmt: skip
+SIMULATIONS: dict[str, Callable[[str], Scenario]] = {
+    "walls and faults": lambda suite: load_scenario("walls", suite),
+    "workspace and faults": lambda suite: load_scenario("workspace", suite),
+    "moving zones and faults": lambda suite: load_scenario("gate", suite),
+    "ground and faults": lambda suite: load_scenario("ground", suite),
+    "air and faults": lambda suite: replace(load_scenario("walls", suite), **_REAL),
+}
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param("walls and faults", marks=pytest.mark.long),
+        pytest.param("workspace and faults", marks=pytest.mark.long),
+        pytest.param("moving zones and faults", marks=pytest.mark.long),
+        "ground and faults",  # where no trim has been computed
+        "air and faults",
+    ],
+)
+def test_no_fault_of_a_simulation_finds_a_kernel_that_is_not_ready(name: str) -> None:
+    test_a_flight_finds_every_kernel_ready(name)
+
+
+def _fail(name: str) -> list[str]:
+    """Let everything fail in each way with each suite; kernels that were not ready for it."""
+    unready: list[str] = []
+    for suite in SUITE_NAMES:
+        simulation = Simulation(SIMULATIONS[name](suite), 0)
+        rehearse(Simulation(simulation.scenario, 0))
+        simulation.measurements()
+        ready = _variants()
+        for unit, kinds in KINDS.items():
+            for kind in kinds:
+                if simulation.inject(Fault(unit, kind)) is None:
+                    _step(simulation)
+                    simulation.faults.clear(unit, 0, simulation.step + 1)
+        assert {Fault("joint", "stuck"), Fault("motor", "off")} <= {*simulation.faults.take_begun()}
+        simulation.result()
+        unready += [kernel for kernel, count in _variants().items() if count != ready.get(kernel)]
+    return unready
+
+
+def _step(simulation: Simulation) -> None:
+    joints = len(simulation.vehicle.links)
+    for _ in range(4):
+        simulation.advance(Controls((0.5, 0.5, 0.5, 0.5), (0.1,) * joints, armed=True))
+        simulation.sense(), simulation.measurements(), simulation.battery()
+    simulation.truth()
+
+
 def _variants() -> dict[str, int]:
-    """How many types each kernel of the flight software is ready for."""
+    """How many types each kernel of both processes is ready for."""
     return {name: len(kernel.signatures) for name, kernel in _kernels()}
 
 
 def _kernels() -> Iterator[tuple[str, Dispatcher]]:
     for name, module in list(sys.modules.items()):
-        if name.startswith("fsw."):
+        if name.startswith(("fsw.", "sitl.")):
             for key, value in vars(module).items():
                 if isinstance(value, Dispatcher):
                     yield f"{name}.{key}", value
@@ -90,6 +158,7 @@ def _kernels() -> Iterator[tuple[str, Dispatcher]]:
 def _fly(name: str) -> list[str]:
     flight, fly = FLIGHTS[name]()
     flight_software(ControlChoice())
+    rehearse(Simulation(flight.scenario, 0))
     ready = _variants()
     assert all(ready[f"fsw.mpc.dual_solver.{kernel}"] for kernel in _WORKING_SET_KERNELS)
     assert ready["fsw.control.cascade._close_loops"] > 0
@@ -98,4 +167,4 @@ def _fly(name: str) -> list[str]:
 
 
 if __name__ == "__main__":
-    print(json.dumps(_fly(sys.argv[1])))
+    print(json.dumps((_fail if sys.argv[1] in SIMULATIONS else _fly)(sys.argv[1])))

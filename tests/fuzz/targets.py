@@ -5,6 +5,7 @@ A reader's own refusal is no finding; any other exception is one.
 
 from __future__ import annotations
 
+import json
 import struct
 import tempfile
 from collections.abc import Callable, Iterator
@@ -21,13 +22,18 @@ from fsw.link.telemetry.streams import STREAMS
 from fsw.link.udp_endpoint import LinkError
 from fsw.link.wire import message_ids as ids
 from fsw.link.wire.message_ids import SYSTEM_ID
+from fsw.log.reader import open_flight
 from fsw.parameters import storage
+from fsw.parameters.control_choice import choice_of
 from fsw.parameters.registry import PARAMETERS
+from fsw.runtime.assembly import flight_software
 from fsw.runtime.clock import now_us
-from messages import dialect
+from fsw.runtime.replay import fact, other_numbers, replay
+from messages import dialect, ulog
 from messages.frames import cut
 from messages.ulog_reader import UlogError, open_log
 from pandion.log_summary import summary
+from pandion.report import write_report
 from sitl.link.decode import read_reply
 from sitl.link.encode import StepEncoder
 from sitl.link.failures import Answer
@@ -36,11 +42,15 @@ from sitl.scenario_validation import check
 from tests.fsw.link.ground import station_socket, whole_vehicle
 from tests.fsw.link.snapshots import FACTS
 from tests.messages.test_ulog import written
+from tests.replay import recorded
+from tests.view import flights
 from tests.view.test_telemetry import a_log
+from view.log_flight import LogFlight
 from view.tlog_flight import TlogFlight
 
 Try = Callable[[bytes], None]
 _MOST_FRAMES = 8
+_INPUT = struct.pack("<H", flights.NUMBERS["tick_input"])  # begins each of its records
 _STATION = 255  # MAVLink system
 # What a simulator reads of a vehicle; the controls come last in a datagram.
 _REPLIES = (
@@ -193,6 +203,146 @@ def _tlog(stack: ExitStack) -> Try:
     return attempt
 
 
+def _messages(log: bytes) -> list[tuple[bytes, bytes]]:
+    """Kind and body of each message behind the header of a log."""
+    found, at = [], 16
+    while at < len(log):
+        length, kind = struct.unpack_from("<Hc", log, at)
+        found.append((kind, log[at + 3 : at + 3 + length]))
+        at += 3 + length
+    return found
+
+
+def _edited(log: bytes, data: bytes) -> bytes:
+    """A log with one of its definitions, or a record, as the data say, and records after it.
+
+    Of a log whose every byte may change, hardly any that changes is still read beyond its head.
+    """
+    if len(data) < 2:
+        return log
+    messages = _messages(log)
+    named = [k for k, (kind, _) in enumerate(messages) if kind in (ulog.INFO, ulog.FORMAT)]
+    records = [k for k, (kind, _) in enumerate(messages) if kind == ulog.DATA]
+    what, which, rest = data[0] % 4, data[1], data[2:]
+    if what == 0:  # the value of an information, or the fields of a topic
+        at = named[which % len(named)]
+        kind, body = messages[at]
+        if kind == ulog.FORMAT:
+            messages[at] = kind, body.partition(b":")[0] + b":uint64_t timestamp;" + rest
+        else:
+            name = body[1 : 1 + body[0]].decode("ascii").partition(" ")[2]
+            key = f"char[{len(rest)}] {name}".encode("ascii")
+            messages[at] = kind, bytes([len(key)]) + key + rest
+    elif what == 1:  # the value of an input, in one piece
+        inputs = [k for k in records if messages[k][1][:2] == _INPUT]
+        at = inputs[which % len(inputs)]
+        kind, body = messages[at]
+        size = flights.topics.TEXT_SIZE
+        messages[at] = kind, body[: -size - 2] + b"\x00\x01" + rest[:size].ljust(size, b"\0")
+    elif what == 2:  # bytes of a record
+        at = records[which % len(records)]
+        kind, body = messages[at]
+        messages[at] = kind, body[:2] + (rest + body[2 + len(rest) :])[: len(body) - 2]
+    else:
+        return log + (rest if which % 2 else ulog.message(ulog.SUBSCRIPTION, rest))
+    return log[:16] + b"".join(ulog.message(*one) for one in messages)
+
+
+def _replay(stack: ExitStack) -> Try:
+    directory = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+    log = recorded.written(directory / "whole.ulg", recorded.flight(0.02)).read_bytes()
+    program = flight_software(recorded.CHOICE, to_plan=False)
+    path = directory / "flight.ulg"
+
+    def attempt(data: bytes) -> None:
+        path.write_bytes(_edited(log, data))
+        with suppress(UlogError):
+            read = open_flight(path)
+            with suppress(ValueError):  # a controller that this build does not have
+                choice_of(lambda name: fact(read, name))
+            other_numbers(read, program)
+            replay(read, program, lambda done, total: None)
+
+    return attempt
+
+
+def _log_pages(stack: ExitStack) -> Try:
+    directory = Path(stack.enter_context(tempfile.TemporaryDirectory())) / "flight"
+    path = flights.write_flight(directory, seconds=1) / "flight.ulg"
+    log = path.read_bytes()
+
+    def attempt(data: bytes) -> None:
+        path.write_bytes(_edited(log, data))
+        with suppress(UlogError):
+            flight = LogFlight(path)
+            flight.scene(flight.end)
+            flight.region()
+            flight.curves()
+            flight.reference()
+        with suppress(UlogError):
+            write_report([path])
+
+    return attempt
+
+
+_VALUES: tuple[str, ...] = (
+    *("null", "true", "0", "-1", "1e308", "NaN", "1e999", "9" * 30, '""', '"walls"', "[]", "{}"),
+    *("[1, 2]", '{"a": 1}', '{"a": null}', "0.5", '"\\ud800"', "[" * 40 + "]" * 40),
+)
+
+
+def _places(value: object, above: tuple[str, ...] = ()) -> list[tuple[str, ...]]:
+    """Of every value in objects in each other."""
+    if not isinstance(value, dict):
+        return [above] if above else []
+    inner = [place for key, part in value.items() for place in _places(part, (*above, key))]
+    return [*([above] if above else []), *inner]
+
+
+def _with_values(text: str, data: bytes) -> str:
+    """An object with values replaced: the place of each, and the value; or without the place."""
+    for at in range(0, len(data) - 1, 2):
+        value = json.loads(text)
+        places = _places(value)
+        if not places:
+            return text
+        *above, last = places[data[at] % len(places)]
+        table = value
+        for key in above:
+            table = table[key]
+        if data[at + 1] % (len(_VALUES) + 1) == len(_VALUES):
+            del table[last]
+        else:
+            table[last] = "(here)"
+        other = _VALUES[data[at + 1] % (len(_VALUES) + 1) - 1]
+        text = json.dumps(value).replace('"(here)"', other)
+        if "ud800" in other or other in ("NaN", "1e999"):
+            return text  # what Python reads, but would not write again
+    return text
+
+
+def _results(stack: ExitStack) -> Try:
+    directory = Path(stack.enter_context(tempfile.TemporaryDirectory())) / "flight"
+    flights.write_flight(directory, seconds=1)
+    whole = {name: (directory / f"{name}.json").read_text() for name in ("result", "sitl", "fsw")}
+
+    def attempt(data: bytes) -> None:
+        for name, text in whole.items():
+            (directory / f"{name}.json").write_text(text)
+        if len(data) < 2:
+            return
+        name = list(whole)[data[0] % 3]
+        if data[0] & 128:
+            (directory / f"{name}.json").write_bytes(data[1:])
+        else:
+            (directory / f"{name}.json").write_text(_with_values(whole[name], data[1:]))
+        LogFlight(directory)
+        with suppress(UlogError):
+            write_report([directory])
+
+    return attempt
+
+
 SET_UPS: dict[str, Callable[[ExitStack], Try]] = {
     "scenario": _scenario,
     "parameters": _parameters,
@@ -203,6 +353,9 @@ SET_UPS: dict[str, Callable[[ExitStack], Try]] = {
     "simulator-link": _simulator_link,
     "vehicle-replies": _vehicle_replies,
     "tlog": _tlog,
+    "replay": _replay,
+    "log-pages": _log_pages,
+    "results": _results,
 }
 
 
@@ -219,6 +372,19 @@ def seeds(name: str) -> list[bytes]:
         return [written()]
     if name == "datagrams":
         return list(_valid_frames(bytes(range(1, 255)), tuple(dialect.mavlink_map)))
+    if name in ("replay", "log-pages"):
+        return [bytes([what, which, *b'{"a": [1.5]}']) for what in range(4) for which in range(40)]
+    if name == "results":
+        return [
+            *(
+                bytes([k, place, value])
+                for k in range(3)
+                for place in range(9)
+                for value in (0, 11)
+            ),
+            *(bytes([128 + k]) + b"[" * 2000 for k in range(3)),
+            b"\x80[1, 2]",
+        ]
     if name == "tlog":
         return [a_log(2)]
     return [bytes([k, 40, *range(40)]) for k in range(80)]

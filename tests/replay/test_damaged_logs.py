@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import json
 import random
+import re
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
+from fsw.log.json_codec import JsonCodec
 from fsw.log.topics import SENSOR_FRAME, TOPICS
+from fsw.signals import TickInputs
 from messages import ulog
 from messages.ulog_reader import open_log
 from pandion import export, replay
@@ -141,6 +144,36 @@ def test_what_is_wrong_is_named(
     sentence = capsys.readouterr().err
     assert reported in sentence
     assert one_sentence(sentence)
+
+
+@pytest.mark.requirement("REQ-LINK-9")
+@pytest.mark.parametrize(
+    ("numbers", "said"),
+    [
+        ("[" * 7679, "its information numbers is nested too deeply"),
+        ("[]", "its information numbers must be a JSON object"),
+        ('{"a": "b"}', "a must be a number"),
+        ('{"a": NaN}', "holds NaN"),
+    ],
+)
+def test_numbers_that_are_none_are_refused(
+    numbers: str, said: str, whole: bytes, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    key = re.search(rb"char\[\d+\] numbers", whole)
+    assert key is not None
+    head = key.start() - 4  # length, kind and the key's own length
+    end = head + 3 + int.from_bytes(whole[head : head + 2], "little")
+    log = tmp_path / "flight.ulg"
+    log.write_bytes(whole[:head] + ulog.information("numbers", numbers) + whole[end:])
+    assert COMMANDS["verify"](log) == 2
+    sentence = capsys.readouterr().err
+    assert said in sentence
+    assert one_sentence(sentence)
+
+
+def test_an_input_that_is_nested_deeply_is_refused() -> None:
+    with pytest.raises(ValueError, match="input announced cannot be read: nested too deeply"):
+        JsonCodec(TickInputs).decode("announced", b"[" * 50_000)
 
 
 def test_an_unknown_type_is_refused_where_it_is_used(

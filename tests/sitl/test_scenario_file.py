@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import typing
 from pathlib import Path
 
@@ -201,8 +202,15 @@ def test_a_file_of_any_length_is_refused_at_once(tmp_path: Path) -> None:
         load_scenario(str(path))
     endless = tmp_path / "endless.toml"
     endless.symlink_to("/dev/zero")
-    with pytest.raises(ScenarioError, match="too long"):
+    with pytest.raises(ScenarioError, match="it is not a regular file"):
         load_scenario(str(endless))
+    endless.unlink()
+    os.mkfifo(endless)  # whose writer never comes
+    with pytest.raises(ScenarioError, match="it is not a regular file"):
+        load_scenario(str(endless))
+    os.truncate(path, 1 << 40)  # as long as a disk, and empty
+    with pytest.raises(ScenarioError, match="too long"):
+        load_scenario(str(path))
 
 
 def test_an_unknown_scenario_names_the_nearest_and_all() -> None:

@@ -45,10 +45,10 @@ def record(topic: Topic, t_s: float, *values: Any) -> bytes:
     return head + struct.pack("<" + topic.codes, BEGIN_US + round(1e6 * t_s), *values)
 
 
-def write_flight(directory: Path, **result: Any) -> Path:
+def write_flight(directory: Path, seconds: int = SECONDS, **result: Any) -> Path:
     """The directory of a flight of ``walls``; ``result`` replaces keys of result.json."""
     directory.mkdir(parents=True)
-    data = _definitions() + b"".join(_records())
+    data = _definitions() + b"".join(_records(seconds))
     (directory / "flight.ulg").write_bytes(data)
     limits = {"tilt": {"unit": "rad", "most": 0.4, "largest": 0.1, "at_s": 1.0, "beyond_s": 0.0,
                        "kept": True}}  # fmt: skip
@@ -88,7 +88,7 @@ def _definitions() -> bytes:
     return b"".join(parts)
 
 
-def _records() -> list[bytes]:
+def _records(seconds: int) -> list[bytes]:
     found = [
         _status(0.0, b"hold", b""), _status(0.5, b"trajectory", b""),
         ulog.logged_text(3, BEGIN_US + 2_500_000, TEXT),
@@ -96,10 +96,10 @@ def _records() -> list[bytes]:
         record(topics.VEHICLE_COMMAND_ACK, 0.5, 176, 0, 255, 190),
     ]  # fmt: skip
     found += _announced(0.0, (wall((-1.0, 0.0, 0.0), -1.0, 0.1), BALL))
-    found += [_actuators(0.002 * k) for k in range(500 * SECONDS)]
-    for k in range(50 * SECONDS):
+    found += [_actuators(0.002 * k) for k in range(500 * seconds)]
+    for k in range(50 * seconds):
         found += _fast(0.02 * k)
-    for k in range(10 * SECONDS):
+    for k in range(10 * seconds):
         found += _slow(0.1 * k, k)
     return found
 

@@ -6,6 +6,7 @@ import base64
 import gzip
 import json
 import math
+import os
 import re
 from importlib.resources import files
 from pathlib import Path
@@ -16,7 +17,10 @@ import pytest
 
 from docs.figures.browser import chromium
 from docs.figures.browser import page as browser_page
+from fsw.model.airframe import AIRFRAME
+from messages import ulog
 from pandion.report import labels, main, write_report
+from tests.cli.command import one_sentence
 from tests.view import flights
 from tests.view.flights import (
     CYCLES_US,
@@ -32,6 +36,7 @@ from tests.view.flights import (
 )
 from view.flight_data import FlightData, Table
 from view.flight_events import EventKind, FlightEvent
+from view.log_flight import LogFlight
 from view.report.chart import thinned
 from view.report.charts import event_marks
 from view.report.reported import Reported
@@ -172,7 +177,9 @@ def test_of_many_events_the_axes_show_the_failsafes_first() -> None:
     found = [FlightEvent(begin + k + 1.0, EventKind.WARNING, "windy") for k in range(200)]
     found += [FlightEvent(begin + 500.0, EventKind.FAULT, "no plan")]
     data = FlightData(Path(), {}, {}, {"any": Table("any", np.array([begin]), {})}, (), (), 0, True)
-    marks = event_marks(Reported(label="", data=data, margins=None, events=tuple(found)))
+    marks = event_marks(
+        Reported(label="", data=data, margins=None, events=tuple(found), numbers={})
+    )
     assert len(marks) == 60
     assert marks[-1] == (500.0, "201")
 
@@ -258,6 +265,76 @@ def test_a_result_of_an_older_build_is_shown_as_far_as_it_goes(tmp_path: Path) -
     assert "<td>sensors</td><td>unknown</td>" in page
 
 
+@pytest.mark.requirement("REQ-LINK-9")
+@pytest.mark.parametrize(
+    ("name", "text", "said"),
+    [
+        ("result", "[" * 200_000, "result.json is nested too deeply"),
+        ("result", "[1, 2]", "result.json must be a JSON object"),
+        ("result", "{", "result.json is not JSON"),
+        ("result", '{"min_margin_m": NaN}', "result.json holds NaN: every number must be finite"),
+        ("result", '{"min_margin_m": 1e999}', "holds 1e999: every number must be finite"),
+        ("result", '{"duration_s": %s}' % ("9" * 400), "must have at most 64 bits"),
+        ("result", '{"margins_m": [1, 2]}', "a wrong value: margins_m must be an object"),
+        ("result", '{"margins_m": {"a": "b"}}', "a wrong value: margins_m.a must be a number"),
+        ("result", '{"completed": "yes"}', "a wrong value: completed must be true or false"),
+        ("result", '{"sensors": 1}', "a wrong value: sensors must be a text or null"),
+        ("result", '{"end_reason": "\\ud800"}', "result.json has a text that is not Unicode"),
+        ("sitl", '{"min_margin_m": 0.1}', "sitl.json has no min_margin_time_s"),
+        ("fsw", '{"stages": {"tick": {"p50_us": 1}}}', "fsw.json has no stages.tick.p99_us"),
+        ("fsw", '{"mpc": {"p50_us": 1.0}}', "fsw.json has no mpc.p99_us"),
+    ],
+)  # fmt: skip
+def test_a_hostile_result_is_refused_in_one_sentence_that_names_what_is_wrong(
+    name: str, text: str, said: str, tmp_path: Path, capsys: Any
+) -> None:
+    directory = write_flight(tmp_path / "flight")
+    (directory / f"{name}.json").write_text(text)
+    assert main([str(directory)]) == 2
+    sentence = capsys.readouterr().err
+    assert one_sentence(sentence)
+    assert said in sentence
+    flight = LogFlight(directory)  # which is shown without it
+    assert len(flight.unusable) == 1
+    assert flight.scene(flight.end).estimate is not None
+
+
+def test_a_result_that_is_a_pipe_is_refused_and_not_waited_for(tmp_path: Path, capsys: Any) -> None:
+    directory = write_flight(tmp_path / "flight")
+    (directory / "result.json").unlink()
+    os.mkfifo(directory / "result.json")
+    assert main([str(directory)]) == 2
+    assert "result.json cannot be read: it is not a regular file" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("numbers", ["[" * 7679, "[]", '{"airframe.tilt_max": [1]}', "", "NaN"])
+def test_numbers_in_a_log_that_are_none_are_refused_or_passed_over(
+    numbers: str, tmp_path: Path, capsys: Any
+) -> None:
+    directory = write_flight(tmp_path / "flight")
+    data = (directory / "flight.ulg").read_bytes()
+    key = re.search(rb"char\[\d+\] numbers", data)
+    assert key is not None
+    head = key.start() - 4  # length, kind and the key's own length
+    end = head + 3 + int.from_bytes(data[head : head + 2], "little")
+    (directory / "flight.ulg").write_bytes(
+        data[:head] + ulog.information("numbers", numbers) + data[end:]
+    )
+    assert main([str(directory)]) == 2
+    sentence = capsys.readouterr().err
+    assert one_sentence(sentence)
+    assert "is damaged: its information numbers " in sentence
+    assert LogFlight(directory).airframe == AIRFRAME
+
+
+def test_a_log_that_ends_before_the_smallest_margin_is_shown_without_that_second(
+    tmp_path: Path,
+) -> None:
+    assert "worst_second" in figures(
+        write_report([write_flight(tmp_path / "short", seconds=1)]).read_text(encoding="utf-8")
+    )
+
+
 def test_labels_tell_flights_apart(tmp_path: Path) -> None:
     for name in ("a/run", "b/run", "c"):
         (tmp_path / name).mkdir(parents=True)
@@ -275,7 +352,7 @@ def test_what_is_no_log_is_refused_in_one_sentence(tmp_path: Path, capsys: Any) 
     assert "is not a ULog file" in said
     other = write_flight(tmp_path / "other", limits={"tilt": {}})
     assert main([str(other)]) == 2
-    assert "of another build: KeyError('largest')" in capsys.readouterr().err
+    assert "result.json has no limits.tilt.unit: it is of another build" in capsys.readouterr().err
     assert main([str(tmp_path)] * 8) == 2
     assert "at most 7" in capsys.readouterr().err
 

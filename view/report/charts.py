@@ -310,7 +310,7 @@ def limits(flights: Sequence[Reported]) -> Chart:
         if uses:
             traces.append({
                 "type": "bar", "name": flight.label, "x": [name.replace("_", " ") for name in uses],
-                "y": [100.0 * use["largest"] / use["most"] for use in uses.values()],
+                "y": [_percent(use["largest"], use["most"]) for use in uses.values()],
                 "hovertext": [
                     f"{use['largest']:.3g} of {use['most']:.3g} {use['unit']}, {use['at_s']:.2f} s"
                     for use in uses.values()
@@ -328,6 +328,10 @@ def limits(flights: Sequence[Reported]) -> Chart:
     }  # fmt: skip
     note = "Largest value over the whole flight, true state, 1 kHz, as in result.json."
     return Chart("limits", "Use of each limit", note, traces, layout)
+
+
+def _percent(largest: float, most: float) -> float | None:
+    return 100.0 * largest / most if most else None
 
 
 def solver(flights: Sequence[Reported]) -> Chart:
@@ -582,6 +586,8 @@ def _worst_margins(flight: Reported, row: list[Trace], zero: float, colour: str 
         return
     t = flight.since(truth.t)
     inside = np.abs(t - worst.t) <= _DETAIL_S
+    if not inside.any():  # the log was cut before
+        return
     nearest = np.argsort(truth.values[inside].min(axis=0))[: 1 if colour else 4]
     for k, key in enumerate(nearest.tolist()):
         name = f"{flight.label} {truth.keys[key]}" if colour else truth.keys[key]

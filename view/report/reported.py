@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from view.flight_data import FlightData, Table, read_flight
+from command_line.bounded_json import JsonError, json_numbers
+from view.flight_data import FlightData, Table, UlogError, read_flight
 from view.flight_events import FlightEvent, events
 from view.true_margins import TrueMargins, scenario_of, true_margins
 
@@ -34,6 +35,7 @@ class Reported:
     data: FlightData
     margins: TrueMargins | None  # None without the scenario or without truth
     events: tuple[FlightEvent, ...]
+    numbers: Mapping[str, float]  # of the configuration, exactly, by dotted name
 
     @property
     def result(self) -> dict[str, Any]:
@@ -67,25 +69,27 @@ class Reported:
 
     def number(self, name: str) -> float:
         """A limit or setting [its own unit] by its dotted name; NaN where the log has none."""
-        return float(self._numbers().get(name, np.nan))
-
-    def _numbers(self) -> dict[str, float]:
-        """Every number of the configuration, exactly."""
-        found: dict[str, float] = json.loads(str(self.data.information.get("numbers", "{}")))
-        return found
+        return float(self.numbers.get(name, np.nan))
 
 
 def reported(path: Path, label: str) -> Reported:
     """Read a flight, by its directory or its log.
 
     Raises:
-        UlogError: The log cannot be read.
+        UlogError: The log cannot be read, or a result beside it cannot be used.
     """
     data = read_flight(path)
+    for sentence in data.unusable:
+        raise UlogError(f"{sentence}; the log alone can be reported without this file")
+    try:
+        numbers = json_numbers(str(data.information.get("numbers", "{}")))
+    except JsonError as problem:
+        raise UlogError(f"{data.path} is damaged: its information numbers {problem}") from None
     scenario = scenario_of(data)
     return Reported(
         label=label,
         data=data,
         margins=None if scenario is None else true_margins(data, scenario),
         events=events(data),
+        numbers=numbers,
     )

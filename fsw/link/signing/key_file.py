@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from command_line.bounded_json import read_json
 from fsw.link.udp_endpoint import LinkError
 
 _MODE: Final = 0o600
@@ -47,14 +48,13 @@ class KeyFile:
         try:
             if stat.S_IMODE(self._path.stat().st_mode) & 0o077:
                 raise LinkError(f"{self._path} may be read by others; chmod 600 it")
-            with self._path.open(encoding="ascii") as file:
-                content = json.loads(file.read(_MOST_BYTES))
+            content = read_json(self._path, _MOST_BYTES)
             key, newest = bytes.fromhex(content["key"]), content["newest"]
             if len(key) != _KEY_SIZE or type(newest) is not int or not 0 <= newest < 1 << 48:
                 raise ValueError
         except FileNotFoundError:
             return None
-        except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        except (OSError, ValueError, KeyError, TypeError):
             raise LinkError(
                 f"{self._path} holds no signing key; remove it to fly unsigned"
             ) from None

@@ -1,8 +1,8 @@
 """MAVLink 2 signing of one link.
 
-A frame is accepted if its hash is right and then its time: newer than the last of its sender,
-not further ahead than a minute. In this order, because a time taken from a forged frame would lock
-its true sender out. Source: https://mavlink.io/en/guide/message_signing.html
+A frame is accepted if its hash is right and then its time: newer than the last of its sender on any
+link with the same key, not further ahead than a minute. In this order, because a time taken from a
+forged frame would lock its true sender out. Source: https://mavlink.io/en/guide/message_signing.html
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from hashlib import sha256
 from typing import Final, cast
 
 from fsw.link.signing.key_file import KeyFile, SigningKey
+from fsw.link.signing.signed_times import TOLERANCE, SignedTimes
 from fsw.link.udp_endpoint import Address, is_loopback
 from fsw.link.wire.decode import Numbers, for_this_vehicle
 from fsw.link.wire.message_ids import HEARTBEAT, RADIO_STATUS
@@ -25,8 +26,6 @@ _HASH_SIZE: Final = 6  # bytes, the first of SHA-256
 _SIGNATURE_SIZE: Final = 13  # bytes: link, time (6), hash (6)
 _EPOCH_UNIX_S: Final = 1_420_070_400  # 2015-01-01 UTC, where signing time begins
 _UNIT_US: Final = 10  # of signing time
-_TOLERANCE: Final = 6_000_000  # one minute, in units
-_MAX_SENDERS: Final = 64  # that are remembered; only holders of the key can add one
 # A radio that puts its own status on the link has no key, and presence asks for nothing. MAVLink 1
 # cannot be signed, so nothing of it passes.
 _EXEMPT: Final = frozenset({HEARTBEAT, RADIO_STATUS})
@@ -50,12 +49,19 @@ class SigningCounters:
 
 
 class Signing:
-    """The key of one link and the times of its senders; without a key everything passes."""
+    """The key of one link; without a key everything passes."""
 
-    def __init__(self, link_id: int, unix_us: Callable[[], int], file: KeyFile | None) -> None:
+    def __init__(
+        self,
+        link_id: int,
+        unix_us: Callable[[], int],
+        file: KeyFile | None,
+        times: SignedTimes | None = None,
+    ) -> None:
         """Take up the key that an earlier flight left; without a file it ends with the process.
 
-        ``link_id``, 0..255, distinguishes our links in our own signatures.
+        ``link_id``, 0..255, distinguishes our links in our own signatures. All links of a vehicle
+        share their ``times``, so that no frame of one can be played to another.
 
         Raises:
             LinkError: The file is there and cannot be trusted or read.
@@ -64,12 +70,14 @@ class Signing:
         self._link_id = link_id
         self._unix_us = unix_us
         self._file = file
+        self._times = SignedTimes() if times is None else times
         stored = None if file is None else file.read()
         self._key = b"" if stored is None else stored.key
-        # Frames of a flight before this one must not be played to this one.
-        self._oldest = 0 if stored is None else stored.newest
-        self._sent = self._oldest
-        self._senders: dict[tuple[int, int, int], int] = {}
+        self._sent = 0
+        if stored is not None:
+            # Frames of a flight before this one must not be played to this one.
+            self._times.of(stored.key).join(file, stored.newest)
+            self._sent = stored.newest
 
     @property
     def active(self) -> bool:
@@ -97,7 +105,8 @@ class Signing:
             return FrameTrust.REFUSED
         link_id = raw[-_SIGNATURE_SIZE]
         time = int.from_bytes(raw[1 - _SIGNATURE_SIZE : -_HASH_SIZE], "little")
-        if not self._in_time((frame.system_id, frame.component_id, link_id), time):
+        sender = frame.system_id, frame.component_id, link_id
+        if not self._times.of(self._key).accept(sender, time, self._now()):
             self.counters.wrong_time += 1
             return FrameTrust.REFUSED
         return FrameTrust.TRUSTED
@@ -112,39 +121,27 @@ class Signing:
             OSError: The key cannot be stored; nothing has changed.
         """
         new = key if any(key) else b""
+        old_times = self._times.of(self._key) if self._key else None
+        new_times = self._times.of(new) if new else None
         if self._file is not None:
-            if new:
-                self._file.write(SigningKey(new, self._newest()))
+            if new_times is not None:
+                known = 0 if old_times is None else old_times.newest
+                self._file.write(SigningKey(new, max(new_times.newest, known)))
             else:
                 self._file.remove()
-        if new != self._key:  # frames under the same key must not be played again
-            self._senders.clear()
+        if new != self._key:
+            if old_times is not None:
+                old_times.leave(self._file)
+            if new_times is not None:
+                new_times.join(self._file, new_times.newest)
         self._key = new
-        if initial_time <= self._now() + _TOLERANCE:
+        if initial_time <= self._now() + TOLERANCE:
             self._sent = max(self._sent, initial_time)
 
     def close(self) -> None:
         """Release the key's file."""
         if self._file is not None:
             self._file.close()
-
-    def _in_time(self, sender: tuple[int, int, int], time: int) -> bool:
-        now = self._now()
-        last = self._senders.get(sender)
-        if last is None:
-            if len(self._senders) >= _MAX_SENDERS:
-                return False
-            last = max(self._oldest, now - _TOLERANCE)
-        if not last < time <= now + _TOLERANCE:
-            return False
-        # Kept before the frame does anything: a process that is killed leaves it to the next one.
-        if self._file is not None and time > self._newest():
-            self._file.keep(time)
-        self._senders[sender] = time
-        return True
-
-    def _newest(self) -> int:
-        return max(self._senders.values(), default=self._oldest)
 
     def _hash(self, covered: bytes) -> bytes:
         return sha256(self._key + covered).digest()[:_HASH_SIZE]

@@ -22,6 +22,7 @@ from fsw.link.services.parameter_service import ParameterService
 from fsw.link.services.service import LinkService
 from fsw.link.services.time_service import TimeService
 from fsw.link.signing.key_file import KeyFile
+from fsw.link.signing.signed_times import SignedTimes
 from fsw.link.signing.signing import Signing
 from fsw.link.telemetry.streams import API_RATES, GROUND_RATES
 from fsw.parameters.flight_config import FlightConfig
@@ -107,6 +108,7 @@ def ground_station(
     services: Sequence[LinkService] = (),
     api: bool = False,
     key_file: KeyFile | None = None,
+    times: SignedTimes | None = None,
 ) -> Iterator[Ground]:
     """A link to a ground station, or to a program, of its own."""
     station, inbox, clock = station_socket(), Inbox(), ManualClock()
@@ -116,7 +118,7 @@ def ground_station(
         LinkSetup("test", station.getsockname(), 0, rates, unheard=not api),
         inbox,
         CONTEXT,
-        Signing(0, lambda: clock.unix_us, key_file),
+        Signing(0, lambda: clock.unix_us, key_file, times),
         lambda: clock.now_us,
         lambda t, frame: recorded.append((t, frame)),
         services,

@@ -572,6 +572,19 @@ def test_the_simulator_says_why_it_lets_nothing_fail(
     assert answer.sentence.startswith(sentence)
 
 
+@pytest.mark.parametrize(("name", "result"), [("ground", 3), ("walls-calm", 0), ("hop", 0)])
+def test_only_a_pilot_that_is_there_can_be_silenced(name: str, result: int) -> None:
+    """FAILURE_UNIT_SYSTEM_MAVLINK_SIGNAL is no link of a ground station."""
+    simulation = Simulation(load_scenario(name), 0)
+    answer = carry_out(simulation, Injection(105, 1, 0, system=255, component=190))
+    assert answer.result == result
+    if result:
+        assert answer.sentence.endswith("the scenario's pilot, and this scenario has none")
+    simulation.advance(Controls((0.5, 0.5, 0.5, 0.5), (0.0, 0.0), armed=True))
+    simulation.faults.at(simulation.step)
+    assert simulation.faults.pilot_silent(simulation.t_us) == (result == 0)
+
+
 def test_a_fault_ends_for_whom_it_began() -> None:
     simulation = Simulation(load_scenario("walls-calm"), 0)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import os
 from pathlib import Path
 
 import pytest
@@ -190,6 +191,11 @@ def test_a_file_that_cannot_be_written_is_noticed_before_the_flight(tmp_path: Pa
 def test_a_file_of_any_length_is_refused_at_once(tmp_path: Path) -> None:
     endless = tmp_path / "endless.params"
     endless.symlink_to("/dev/zero")
+    with pytest.raises(OSError, match="it is not a regular file"):
+        load(endless)
+    endless.unlink()
+    endless.touch()
+    os.truncate(endless, 1 << 40)
     with pytest.raises(OSError, match="too long: must be at most 1048576 bytes"):
         load(endless)
 

@@ -113,6 +113,9 @@ def test_contact_with_the_ground_is_not_contact_with_a_wall() -> None:
     assert differences("orbit", falls, replace(FINE, contact="wall", ended="hit"))
 
 
+_MOTOR = '[[faults]]\nunits = ["motor"]\nkinds = ["weak"]\nthen = ["hold"]\n'
+
+
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
@@ -142,6 +145,32 @@ def test_contact_with_the_ground_is_not_contact_with_a_wall() -> None:
         ("[[faults]]\nthen = 3", "faults[0]: "),
         ('[[faults]]\nthen = ["hold"]\nfault = {unit = [1], kind = 2}', "faults[0]: "),
         ("[[", "faults.toml"),
+        (
+            f"{_MOTOR}instances = 5",
+            "instances = 5: must be an array; of a motor whole numbers from",
+        ),
+        (f"{_MOTOR}instances = [nan]", "instances[0] = nan: must be, of a motor, whole numbers"),
+        (
+            f"{_MOTOR}instances = [1, 5]",
+            "instances[1] = 5: must be, of a motor, whole numbers from 0",
+        ),
+        (f"{_MOTOR}instances = [true]", "instances[0] = True: must be"),
+        (f"{_MOTOR}instances = [1.0]", "instances[0] = 1.0: must be"),
+        (f"{_MOTOR}share = [nan]", "share = [nan]: must be a number (0 to 1)"),
+        (f"{_MOTOR}share = nan", "share = nan: must be 0 to 1"),
+        (f'{_MOTOR}size = "big"', "size = 'big': must be a number (0 to 1000)"),
+        (f"{_MOTOR}delay_ms = 3", "delay_ms = 3: must be 0 to 10000 in steps of 2"),
+        (f"{_MOTOR}duration_s = true", "duration_s = True: must be a number (0 to 86400)"),
+        (f"{_MOTOR}jump_s = {'9' * 400}", "jump_s = 999"),
+        (f"{_MOTOR}name = 5", "name = 5: must be a text"),
+        (f'{_MOTOR}link = "no"', "link = 'no': must be true or false"),
+        (f"{_MOTOR}why = 3", "why = 3: must be a text"),
+        (f"{_MOTOR}margin_mm = {'9' * 400}", "must be a length in mm, from -1e+06 to 1e+06"),
+        (f"{_MOTOR}told_within_s = {'9' * 400}", "must be a time above 0, in seconds, up to 86400"),
+        (
+            '[[faults]]\nunits = "gyro"\nthen = ["hold"]',
+            "units = 'gyro': must be an array, of gyro",
+        ),
     ],
 )
 def test_a_file_that_says_something_else_is_refused(

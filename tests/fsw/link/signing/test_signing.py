@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import stat
 from collections.abc import Iterator
 from pathlib import Path
@@ -9,13 +10,18 @@ from typing import Any
 
 import pytest
 
-from fsw.link.signing.key_file import KeyFile
+from fsw.link.build_links import build_links
+from fsw.link.inbox import Inbox
+from fsw.link.link_choice import LinkChoice
+from fsw.link.signing.key_file import KeyFile, SigningKey
+from fsw.link.signing.signed_times import SignedTimes
+from fsw.link.signing.signing import FrameTrust
 from fsw.link.udp_endpoint import LinkError
 from fsw.link.wire import message_ids as ids
 from messages import dialect
-from messages.frames import FrameWriter, as_version_1, is_signed
-from tests.fsw.link.ground import Ground, ground_station, station_socket
-from tests.fsw.link.snapshots import outputs_at
+from messages.frames import FrameWriter, as_version_1, is_signed, split
+from tests.fsw.link.ground import Ground, ManualClock, ground_station, station_socket
+from tests.fsw.link.snapshots import CONTEXT, outputs_at
 
 KEY = bytes(range(1, 33))
 OTHER_KEY = bytes(range(2, 34))
@@ -232,6 +238,116 @@ def test_a_process_that_is_killed_leaves_the_newest_time_to_the_next_one(
         assert commands(restarted) == 1
 
 
+@pytest.mark.requirement("REQ-LINK-3")
+def test_a_frame_of_one_link_cannot_be_played_to_another_with_the_same_key(tmp_path: Path) -> None:
+    times = SignedTimes()
+    with ground_station(times=times) as gcs, ground_station(times=times, api=True) as api:
+        for ground in (gcs, api):
+            ground.fly(5, armed=False)
+            ground.polled(set_up())
+        old = Client(gcs).arm()
+        gcs.polled(old)
+        api.polled(old)
+        assert (commands(gcs), commands(api)) == (1, 0)
+        assert api.link.signing.counters.wrong_time == 1
+        late = Client(api).at(Client(api).now() + 5).arm()
+        api.polled(late)
+        gcs.polled(late)
+        assert (commands(gcs), commands(api)) == (0, 1)
+
+
+def test_links_with_keys_of_their_own_have_times_of_their_own() -> None:
+    times = SignedTimes()
+    with ground_station(times=times) as gcs, ground_station(times=times, api=True) as api:
+        for ground, key in ((gcs, KEY), (api, OTHER_KEY)):
+            ground.fly(5, armed=False)
+            ground.polled(set_up(key))
+        ahead = Client(gcs).at(Client(gcs).now() + MINUTE // 2)
+        gcs.polled(ahead.arm())
+        api.polled(Client(api, OTHER_KEY).arm())
+        assert (commands(gcs), commands(api)) == (1, 1)
+
+
+@pytest.mark.requirement("REQ-LINK-3")
+def test_the_time_of_one_link_is_kept_in_the_file_of_each_that_has_the_key(tmp_path: Path) -> None:
+    files = [tmp_path / "gcs.json", tmp_path / "api.json"]
+    times = SignedTimes()
+    with (
+        ground_station(times=times, key_file=KeyFile(files[0])) as gcs,
+        ground_station(times=times, key_file=KeyFile(files[1]), api=True) as api,
+    ):
+        for ground in (gcs, api):
+            ground.fly(5, armed=False)
+            ground.polled(set_up())
+        old = Client(gcs).arm()
+        gcs.polled(old)  # and the process is killed: nothing is closed
+        kept = [KeyFile(file).read() for file in files]
+    assert kept == [SigningKey(KEY, int.from_bytes(old[-12:-6], "little"))] * 2
+    # The programs' link alone, after a restart and without what the other one kept.
+    with ground_station(key_file=KeyFile(files[1]), api=True) as restarted:
+        restarted.fly(5)
+        restarted.polled(old)
+        assert commands(restarted) == 0
+
+
+@pytest.mark.requirement("REQ-LINK-3")
+def test_after_a_restart_the_newest_time_in_any_file_of_the_key_counts(tmp_path: Path) -> None:
+    """A link may have been off when the other one's time was kept."""
+    old, new = KeyFile(tmp_path / "gcs.json"), KeyFile(tmp_path / "api.json")
+    new.write(SigningKey(KEY, 500))
+    old.write(SigningKey(KEY, 300))
+    for file in (old, new):
+        file.close()
+    times = SignedTimes()
+    with (
+        ground_station(times=times, key_file=KeyFile(tmp_path / "gcs.json")),
+        ground_station(times=times, key_file=KeyFile(tmp_path / "api.json")),
+    ):
+        assert times.of(KEY).newest == 500
+        assert KeyFile(tmp_path / "gcs.json").read() == SigningKey(KEY, 500)
+
+
+def test_the_vehicle_has_one_record_for_its_links(tmp_path: Path) -> None:
+    for name in ("gcs", "api"):
+        file = KeyFile(tmp_path / f"signing-{name}.json")
+        file.write(SigningKey(KEY, 5))
+        file.close()
+    choice = LinkChoice(gcs="udp:127.0.0.1:42011", api="udp:127.0.0.1:42012", keys=tmp_path)
+    clock = ManualClock()
+    clocks = (lambda: clock.now_us, lambda: clock.unix_us)
+    links = build_links(choice, Inbox(), CONTEXT, clocks, lambda t, frame: None, list)
+    try:
+        gcs, api = (link.signing for link in links.links)
+        with ground_station() as ground:
+            raw = Client(ground).arm()
+        (frame,) = split(raw)
+        assert gcs.judge(frame, raw) is FrameTrust.TRUSTED
+        assert api.judge(frame, raw) is FrameTrust.REFUSED
+    finally:
+        links.close()
+
+
+def test_a_key_that_comes_back_remembers_its_times(ground: Ground) -> None:
+    old = Client(ground).arm()
+    ground.polled(old)
+    ground.polled(Client(ground).at(Client(ground).now() + 5).set_up(bytes(32)))
+    ground.polled(set_up())
+    ground.polled(old)
+    assert commands(ground) == 1
+    assert ground.link.signing.counters.wrong_time == 1
+
+
+def test_keys_that_are_remembered_are_bounded() -> None:
+    times = SignedTimes()
+    for number in range(20):
+        record = times.of(bytes([number]) * 32)
+        record.join(None, 0)
+        assert record.accept((255, 190, 0), 100 + number, 0)
+        record.leave(None)
+    assert times.of(bytes([19]) * 32).newest == 119
+    assert not times.of(bytes(32)).accept((255, 190, 0), 100, 0)  # forgotten, and still refused
+
+
 def test_a_key_that_is_set_again_forgets_no_time(ground: Ground) -> None:
     client = Client(ground)
     old = client.arm()
@@ -245,6 +361,18 @@ def test_a_key_that_is_set_again_forgets_no_time(ground: Ground) -> None:
 def test_a_damaged_key_is_an_error_and_no_open_link(file: Path, content: str) -> None:
     file.parent.mkdir()
     file.write_text(content, encoding="latin-1")
+    file.chmod(0o600)
+    with pytest.raises(LinkError, match="no signing key"), ground_station(key_file=KeyFile(file)):
+        pass
+
+
+def test_a_key_that_is_a_pipe_or_nested_is_an_error_and_not_waited_for(file: Path) -> None:
+    file.parent.mkdir()
+    os.mkfifo(file, 0o600)
+    with pytest.raises(LinkError, match="no signing key"), ground_station(key_file=KeyFile(file)):
+        pass
+    file.unlink()
+    file.write_text("[" * 1000)
     file.chmod(0o600)
     with pytest.raises(LinkError, match="no signing key"), ground_station(key_file=KeyFile(file)):
         pass

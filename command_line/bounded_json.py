@@ -1,0 +1,118 @@
+"""JSON that somebody else may have written: an object of bounded depth with finite numbers."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any, Final, NoReturn
+
+from command_line.bounded_file import read_bounded
+
+MOST_DEPTH: Final = 16  # of arrays and objects in each other; what we write has 5
+_LARGEST: Final = 1 << 64  # of an integer
+
+
+class JsonError(ValueError):
+    """What is wrong with a text or a file, as the end of a sentence that begins with its name."""
+
+
+def read_json(path: Path, most: int) -> dict[str, Any]:
+    """The object in a file of at most ``most`` bytes.
+
+    Raises:
+        JsonError: As of :func:`json_object`; or it is no regular file, or longer.
+        FileNotFoundError: There is none.
+    """
+    try:
+        content = read_bounded(path, most)
+    except FileNotFoundError:
+        raise
+    except OSError as error:
+        raise JsonError(f"cannot be read: {error.strerror}") from None
+    return json_object(content)
+
+
+def json_object(text: str | bytes) -> dict[str, Any]:
+    """The object that a text is.
+
+    Raises:
+        JsonError: It is no JSON, no object, nested too deeply, or has a value that JSON does not
+            have: NaN, a number beyond a double or 64 bits, a text that is no Unicode.
+    """
+    try:
+        found = json.loads(
+            text, parse_constant=_no_number, parse_float=_finite, parse_int=_in_range
+        )
+    except JsonError:
+        raise
+    except RecursionError:
+        raise _too_deep() from None
+    except ValueError as error:
+        raise JsonError(f"is not JSON: {error}") from None
+    if not isinstance(found, dict):
+        raise JsonError("must be a JSON object")
+    _check(found)
+    return found
+
+
+def json_numbers(text: str | bytes) -> dict[str, float]:
+    """The numbers by name that a text is; true and false count as 1 and 0.
+
+    Raises:
+        JsonError: As of :func:`json_object`, or a value is no number.
+    """
+    found = json_object(text)
+    for name, value in found.items():
+        if not isinstance(value, int | float):
+            raise JsonError(f"has a wrong value: {name} must be a number")
+    return found
+
+
+def _check(found: dict[str, Any]) -> None:
+    """Level by level, so that depth costs no stack."""
+    level: list[Any] = [found]
+    for _ in range(MOST_DEPTH):
+        inner: list[Any] = []
+        for one in level:
+            parts = one if isinstance(one, list) else [*one, *one.values()]
+            for part in parts:
+                if isinstance(part, list | dict):
+                    inner.append(part)
+                elif isinstance(part, str) and not _is_unicode(part):
+                    raise JsonError("has a text that is not Unicode")
+        if not inner:
+            return
+        level = inner
+    raise _too_deep()
+
+
+def _is_unicode(text: str) -> bool:
+    if text.isascii():
+        return True
+    try:
+        text.encode("utf-8")
+    except UnicodeEncodeError:  # half of a pair, as "\ud800" makes it
+        return False
+    return True
+
+
+def _too_deep() -> JsonError:
+    return JsonError(f"is nested too deeply: must be at most {MOST_DEPTH} levels")
+
+
+def _no_number(name: str) -> NoReturn:
+    raise JsonError(f"holds {name}: every number must be finite")
+
+
+def _finite(digits: str) -> float:
+    value = float(digits)
+    if not math.isfinite(value):
+        raise JsonError(f"holds {digits[:20]}: every number must be finite")
+    return value
+
+
+def _in_range(digits: str) -> int:
+    if len(digits) > 20 or not -_LARGEST < int(digits) < _LARGEST:
+        raise JsonError(f"holds {digits[:20]}…: an integer must have at most 64 bits")
+    return int(digits)
