@@ -17,7 +17,7 @@ from fsw.signals import FlightSnapshot, Vec3
 
 _LOCAL_NED: Final = 1  # MAV_FRAME
 _BODY_FRD: Final = 12  # MAV_FRAME
-_MOCAP: Final = 4  # MAV_ESTIMATOR_TYPE
+_MOCAP: Final = 6  # MAV_ESTIMATOR_TYPE
 _COVARIANCE_UNKNOWN: Final[tuple[float, ...]] = (math.nan, *(0.0,) * 20)
 _I16: Final = 32767
 _AUTOPILOT: Final = 8  # MAV_ESTIMATOR_TYPE
