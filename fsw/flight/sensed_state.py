@@ -88,7 +88,8 @@ class SensedState:
         )
         if came:
             memory = memory._replace(imu_came=came)
-        due = inputs.sensors.t_us // _CHECKED_US != state.t_us // _CHECKED_US
+        # By the filter's own clock: the state has none before the first estimate.
+        due = inputs.sensors.t_us // _CHECKED_US != round(1e6 * before.now) // _CHECKED_US
         news = memory.health is not before.health
         if due or news or estimate is None:
             memory = self._told(before, memory, now, texts, due=due)

@@ -25,6 +25,7 @@ from fsw.measurements import (
 )
 from fsw.signals import StateEstimate
 from tests.fsw.estimation.sensor_runs import (
+    ARM,
     MOCAP,
     RTK,
     START,
@@ -199,6 +200,34 @@ def test_a_filter_that_starts_from_poses_older_than_its_imu_makes_up_no_velocity
     assert np.linalg.norm(np.subtract(estimate.p_WB, place)) < 0.002
     M = fusion.covariance(memory, 0.998)
     assert M[0, 0] > (0.5 * MOCAP.tuning.velocity * 0.2) ** 2, "and does not know how it moved"
+
+
+@pytest.mark.parametrize(
+    ("measured", "comes", "fault"),
+    [
+        (0.944, 0.998, SensorFault.NONE),  # before the filter began, with the IMU's first reading
+        (0.5, 0.998, SensorFault.TOO_OLD),  # later than any receiver
+        (0.957, 1.3, SensorFault.TOO_OLD),  # after it had begun
+    ],
+)
+def test_a_fix_from_before_the_filter_began_is_no_fault(
+    measured: float, comes: float, fault: SensorFault
+) -> None:
+    fusion, memory, still = SensorFusion(MOCAP.tuning), at_start(), (0.0, 0.0, 0.0)
+    level, place, fine = (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, -1.0), (1e-4,) * 3
+    poses = [PoseSample(0.784 + x, (x, 0.0, -1.0), level, fine, fine) for x in (0.0, 0.008)]
+    first = [ImuSample(0.956 + TICK * k, (0.0, 0.0, -9.81 + 1e-4 * k), still) for k in range(21)]
+    memory, _ = fusion.step(memory, [*poses, *first, JointSample(0.996, ARM)], 0.996)
+    assert memory.started
+    for k in range(1, round((comes - 0.996) / TICK) + 1):
+        now = 0.996 + TICK * k
+        samples: list[Sample] = [JointSample(now, ARM), ImuSample(now, (0.0, 0.0, -9.8), still)]
+        pose = PoseSample(now, (1e-3 * k, 0.0, -1.0), level, fine, fine)
+        memory, _ = fusion.step(memory, [pose, *samples], now)
+    fix = GnssSample(measured, place, still, fine, fine)
+    health = fusion.take(memory, fix, now).of(Sensor.GNSS)
+    assert health.came == now
+    assert health.fault is fault
 
 
 @pytest.mark.requirement("REQ-EST-1")
