@@ -57,3 +57,9 @@ def anywhere(random: np.random.Generator, length: float) -> V3:
 def rounded(value: float, resolution: float) -> float:
     """A ``value`` [any unit] on the grid of a ``resolution`` [same unit]; 0: as it is."""
     return resolution * round(value / resolution) if resolution > 0.0 else value
+
+
+def digits(values: V3, resolution: V3) -> V3:
+    """``rounded`` for each of three ``values`` [any unit], to a ``resolution`` [same unit] each."""
+    (x, y, z), (a, b, c) = values, resolution
+    return (rounded(x, a), rounded(y, b), rounded(z, c))
