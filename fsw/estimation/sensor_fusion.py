@@ -128,6 +128,7 @@ class FusionMemory(NamedTuple):
     paces: tuple[Pace, ...] = ()  # how often sensors are heard
     restarts: int = 0  # how often the filter had to start anew, because it had no numbers any more
     began: float = -math.inf  # s, the filter's own time when it began
+    without_fix: GnssSample | None = None  # the newest one that has none
 
     def of(self, sensor: Sensor) -> Health:
         """What is known of a sensor."""
@@ -469,6 +470,8 @@ class SensorFusion:
             delay = self._delay(delay, now - time, now - before.came)
         others = memory.without(health.sensor)
         if fault:
+            if isinstance(sample, GnssSample) and fault is SensorFault.NO_FIX:
+                memory = memory._replace(without_fix=sample)
             return memory._replace(health=(*others, health), delay=delay)
         waiting = (*memory.waiting, Waiting(time, memory.arrivals, sample))
         if len(waiting) > 1 and waiting[-2].time > time:

@@ -14,6 +14,7 @@ from scipy.stats import chi2
 from fsw.estimation.sensor_fault import Sensor, SensorFault
 from fsw.estimation.sensor_fusion import FusionMemory, SensorFusion, at_start
 from fsw.estimation.tuning import chi_square
+from fsw.flight.estimator_report import estimator_report
 from fsw.geometry.rotation import quaternion_from_matrix
 from fsw.measurements import (
     GnssSample,
@@ -73,6 +74,12 @@ class Flown:
                     self.found.add((health.sensor, health.fault))
             if tick % 25 == 0 and now > START + 0.5:
                 self.worst = max(self.worst, *self.in_sigmas()[:3])
+
+    @property
+    def estimate_now(self) -> StateEstimate:
+        """The last one."""
+        assert self.estimate is not None
+        return self.estimate
 
     def error(self) -> Array:
         """Errors and biases now (15,)."""
@@ -651,6 +658,43 @@ def test_a_barometer_far_off_is_used_all_the_same_once_it_says_so_for_a_while() 
     assert health.ratio[0] < 1.0
     assert flown.memory.numbers[0]["baro_bias"] == pytest.approx(40.0, abs=2.0)
     assert flown.worst < 4.0
+
+
+def test_a_receiver_without_a_fix_is_named_heard_and_not_fused() -> None:
+    def blind(now: float, sample: Sample) -> Sample:
+        if isinstance(sample, GnssSample) and now - START > 1.5:
+            return replace(sample, fix_type=1, satellites=3, position=(50.0, 0.0, -1.0))
+        return sample
+
+    flown = Flown(run(RTK, 2, 2.5), blind)
+    assert (Sensor.GNSS, SensorFault.NO_FIX) in flown.found
+    health = flown.memory.of(Sensor.GNSS)
+    assert flown.now - health.came < 0.11
+    assert flown.now - max(health.fused) > 0.8
+    assert flown.memory.reset.number == 0
+    report = estimator_report(
+        flown.memory,
+        flown.fusion.covariance(flown.memory, flown.now),
+        flown.estimate_now,
+        flown.now,
+        0.5,
+    )
+    assert report.fix is not None
+    assert (report.fix.kind, report.fix.satellites) == (1, 3)
+    assert report.fix.t_us >= round(1e6 * (flown.now - 0.25))
+
+
+def test_a_receiver_that_falls_silent_has_no_fix_any_more() -> None:
+    flown = Flown(run(RTK, 2, 1.0))
+    covariance = flown.fusion.covariance(flown.memory, flown.now)
+
+    def kind(memory: FusionMemory, stale: float) -> tuple[int, int]:
+        report = estimator_report(memory, covariance, flown.estimate_now, memory.now, stale)
+        assert report.fix is not None
+        return report.fix.kind, report.fix.satellites
+
+    assert kind(flown.memory, 0.5) == (3, 255)
+    assert kind(flown.memory._replace(now=flown.now + 0.6), 0.5) == (1, 255)
 
 
 def test_satellites_that_came_once_too_seldom_do_not_confirm_each_other() -> None:

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
+from typing import Any
 
 import pytest
 
 from fsw.estimation.sensor_fault import Sensor, SensorFault
 from fsw.flight.state import FlightState
+from fsw.link.wire.encode_health import estimator_status
 from fsw.measurements import JointSample, PoseSample
+from fsw.signals import FlightSnapshot
+from messages.frames import wire_fields
 from tests.fsw.estimation.sensor_runs import MOCAP, TICK, run
 from tests.fsw.flight.test_autopilot import tick
+from tests.fsw.link.snapshots import CONTEXT
 
 
 def test_a_first_stamp_ahead_of_all_others_leaves_no_sensor_unused() -> None:
@@ -45,3 +51,33 @@ def test_before_the_first_estimate_looks_at_sensors_are_as_rare_as_after_it() ->
         told += [text.text for text in outputs.texts]
     assert state.estimate is None
     assert told == ["pose is silent"]
+
+
+def test_an_estimate_that_is_lost_is_reported_as_one() -> None:
+    """The filter is no number, and there is no pose from which it could start anew."""
+    state, outputs = FlightState(), None
+    for k, (now, samples) in enumerate(run(MOCAP, 1, 1.2)):
+        heard = [one for one in samples if k < 300 or not isinstance(one, PoseSample)]
+        if k == 300:
+            assert state.fusion is not None
+            state.fusion.numbers["p"][:] = math.nan
+        state, outputs = tick(state, round(1e6 * now), samples=tuple(heard))
+        if k == 299:
+            known = wire_values(outputs.snapshot)
+            assert known["flags"] & 1
+            assert 0.0 <= known["pos_horiz_ratio"] < 1.0
+    assert outputs is not None
+    lost = wire_values(outputs.snapshot)
+    assert lost["flags"] == 0
+    assert outputs.snapshot.t_us - lost["time_usec"] < 110_000
+    ratios = [number for name, number in lost.items() if name not in ("flags", "time_usec")]
+    assert len(ratios) == 8
+    assert all(math.isnan(one) for one in ratios)
+    assert outputs.snapshot.estimator is not None
+    silent = {one.name: one.fault for one in outputs.snapshot.estimator.sensors}
+    assert silent[Sensor.POSE.value] == "stale"
+
+
+def wire_values(snapshot: FlightSnapshot) -> dict[str, Any]:
+    """ESTIMATOR_STATUS by the names of its fields."""
+    return dict(zip(wire_fields(230), estimator_status(snapshot, CONTEXT), strict=True))

@@ -11,6 +11,7 @@ from typing import Any, Final
 
 import pytest
 
+from fsw import measurements
 from fsw.flight import estimator_report
 from fsw.link.wire import (
     decode,
@@ -34,6 +35,7 @@ from sitl.link import decode as sitl_decode
 from sitl.link import encode as sitl_encode
 from sitl.link import encode_sensors, failures
 from sitl.link import message_ids as sitl_ids
+from sitl.sensors import measurements as sitl_measurements
 
 # What stands in a module, and of which entries it is made: one, several bits (a set joined by |),
 # or one after the other.
@@ -72,7 +74,7 @@ TABLE: Final[list[tuple[ModuleType, str, str, str]]] = [
     (decode_sensors, "_LOCAL_NED", "MAV_FRAME", "LOCAL_NED"),
     (decode_sensors, "_DRIFTING", "MAV_ESTIMATOR_TYPE", "VISION VIO LIDAR"),
     (decode_sensors, "_DOWNWARD", "MAV_SENSOR_ROTATION", "PITCH_270"),
-    (decode_sensors, "_LEVEL_FIX", "GPS_FIX_TYPE", "2D_FIX"),
+    (measurements, "_LEVEL_FIX", "GPS_FIX_TYPE", "2D_FIX"),
     (decode_setpoints, "_LOCAL_NED", "MAV_FRAME", "LOCAL_NED"),
     (decode_setpoints, "_BODY_NED", "MAV_FRAME", "BODY_NED"),
     (decode_setpoints, "_BODY_FRD", "MAV_FRAME", "BODY_FRD"),
@@ -187,6 +189,7 @@ TABLE: Final[list[tuple[ModuleType, str, str, str]]] = [
     (px4_mode, "_NOT_SELECTABLE", "MAV_MODE_PROPERTY", "NOT_USER_SELECTABLE"),
     (telemetry_context, "GENERIC", "MAV_AUTOPILOT", "GENERIC"),
     (telemetry_context, "PX4", "MAV_AUTOPILOT", "PX4"),
+    (estimator_report, "NO_FIX", "GPS_FIX_TYPE", "NO_FIX"),
     (estimator_report, "ATTITUDE", "ESTIMATOR", "ATTITUDE"),
     (estimator_report, "LEVEL_VELOCITY", "ESTIMATOR", "VELOCITY_HORIZ"),
     (estimator_report, "VERTICAL_VELOCITY", "ESTIMATOR", "VELOCITY_VERT"),
@@ -218,8 +221,8 @@ TABLE: Final[list[tuple[ModuleType, str, str, str]]] = [
     (encode_sensors, "_MOTION_CAPTURE", "MAV_ESTIMATOR_TYPE", "MOCAP"),
     (encode_sensors, "_LASER", "MAV_DISTANCE_SENSOR", "LASER"),
     (encode_sensors, "_DOWNWARD", "MAV_SENSOR_ROTATION", "PITCH_270"),
-    (encode_sensors, "_FIXED", "GPS_FIX_TYPE", "RTK_FIXED"),
-    (encode_sensors, "_PLAIN", "GPS_FIX_TYPE", "3D_FIX"),
+    (sitl_measurements, "RTK_FIXED", "GPS_FIX_TYPE", "RTK_FIXED"),
+    (sitl_measurements, "PLAIN_FIX", "GPS_FIX_TYPE", "3D_FIX"),
     (failures, "_WORKS", "FAILURE_TYPE", "OK"),
     (sitl_ids, "PATH_PLANNER", "MAV_COMP_ID", "PATHPLANNER"),
     (sitl_ids, "CMD_LAND", "MAV_CMD", "NAV_LAND"),
