@@ -60,6 +60,9 @@ def rounded(value: float, resolution: float) -> float:
 
 
 def digits(values: V3, resolution: V3) -> V3:
-    """``rounded`` for each of three ``values`` [any unit], to a ``resolution`` [same unit] each."""
+    """Each of three ``values`` on the grid of its own resolution.
+
+    ``values`` [any unit, any frame] and ``resolution`` [same unit, same frame].
+    """
     (x, y, z), (a, b, c) = values, resolution
     return (rounded(x, a), rounded(y, b), rounded(z, c))
