@@ -74,6 +74,7 @@ def step(sender: Any, readings: Any) -> bytes:
 
 def _swap_fsw() -> None:
     from fsw.link.sim_link import SimLink
+    from fsw.link.wire.encode_replies import end_of_controls, hil_actuator_controls
 
     sender, receiver = _codec(1), _codec(1)
     general = SimLink._read
@@ -88,18 +89,15 @@ def _swap_fsw() -> None:
         hil = (h.time_usec, h.xacc, h.yacc, h.zacc, h.xgyro, h.ygyro, h.zgyro)
         return self._new(odometry, arm, hil)
 
-    def frame(self: Any, message_id: int, *values: Any) -> bytes:
-        if message_id != dialect.MAVLINK_MSG_ID_HIL_ACTUATOR_CONTROLS:
-            return plain(self, message_id, *values)
-        t_us, flags, *controls, mode = values
-        message = sender.hil_actuator_controls_encode(t_us, controls, mode, flags)
+    def controls_of(self: Any, stamp_us: int, answer: Any) -> bytes:
+        scales = self._thrust_scale, self._torque_scale
+        t_us, flags, *used = hil_actuator_controls(stamp_us, answer.actuators, *scales)
+        *rest, mode = end_of_controls(armed=answer.armed)
+        message = sender.hil_actuator_controls_encode(t_us, [*used, *rest], mode, flags)
         return _packed(sender, message)
 
-    from messages.frames import FrameWriter
-
-    plain = FrameWriter.frame
     SimLink._read = read  # type: ignore[method-assign]
-    FrameWriter.frame = frame  # type: ignore[method-assign]
+    SimLink._controls = controls_of  # type: ignore[method-assign]
 
 
 def _packed(sender: Any, message: Any) -> bytes:

@@ -21,7 +21,8 @@ def console_beside(target: str | None) -> TextIO:
 
 def say(sentence: str, stream: TextIO | None = None) -> None:
     """Print one line that may hold text from outside; on standard output unless told otherwise."""
-    print(printable(sentence), file=stream or sys.stdout, flush=True)
+    # In one piece: a thread may print as well.
+    print(printable(sentence) + "\n", end="", file=stream or sys.stdout, flush=True)
 
 
 def complain(program: str, sentence: object) -> None:

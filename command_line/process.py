@@ -48,7 +48,9 @@ class JsonEvents:
 
     def report(self, event: str, sentence: str, **details: object) -> None:
         """See :class:`Events`."""
-        print(json_text({"event": event, "message": sentence, **details}), flush=True)
+        # In one piece: a thread may report as well.
+        line = json_text({"event": event, "message": sentence, **details}) + "\n"
+        print(line, end="", flush=True)
 
 
 def events_of(how: str, *, to_stderr: bool = False) -> Events:

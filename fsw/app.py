@@ -37,6 +37,7 @@ from fsw.log.run_directory import run_directory
 from fsw.log.run_files import RunFiles
 from fsw.ports import LoopHealth, PlanningCycle
 from fsw.runtime import clock, report
+from fsw.runtime.console import Console
 from fsw.runtime.planner_service import InlinePlanner, PlannerRecord, ProcessPlanner
 from fsw.runtime.process import in_a_child, settle_memory
 from fsw.runtime.program import FlightProgram
@@ -46,7 +47,7 @@ from fsw.runtime.realtime import (
     release_real_time,
     scheduler,
 )
-from fsw.runtime.sim_loop import Ending, FlightEnd, FlightRecord, SimLoop
+from fsw.runtime.sim_loop import START_US, Ending, FlightEnd, FlightRecord, SimLoop
 from fsw.runtime.timing import GroupTimer
 
 if TYPE_CHECKING:
@@ -120,11 +121,15 @@ class _Session:
         )
         # For a view beside it: the usual port may have been taken.
         self._events.report("links", "", ports={link.name: link.port for link in ground.links})
-        loop = SimLoop(program, sim, ground, inbox, record, clock.now_us, self._stop, files)
+        console = Console(self._events, START_US)
+        loop = SimLoop(
+            *(program, sim, ground, inbox, record, clock.now_us, self._stop, files),
+            tell=console.observe,
+        )
         try:
             end = self._fly(loop, sim, program.planner, planner, record)
         finally:
-            for part in (planner, sim, ground, files, keeping):
+            for part in (planner, sim, ground, files, keeping, console):
                 part.close()
         result = report.as_json(options.control, facts, end, record)
         result["retransmissions"] = sim.retransmissions

@@ -136,15 +136,16 @@ def _seen(
     ]
     actions = _actions([one for one in noted if not one.text and one.at_s >= begun_s], mode)
     result: dict[str, Any] = flown.sitl or {}
-    kind = str(result.get("end_kind"))
-    failure = flown.failure or (str(result.get("end_reason")) if kind == "stopped" else "")
+    kind, reason = str(result.get("end_kind")), str(result.get("end_reason", ""))
+    # As the result says it: a process that had to be killed was silent before.
+    why = [reason] if kind == "stopped" or (flown.failure and reason) else []
+    failure = "; ".join([*why, *([flown.failure] if flown.failure else [])])
     if failure:
         actions.append("ended")
         texts.append(Said(round(ended_s - begun_s, 3), int(Severity.CRITICAL), failure))
     for lost in flown.unwritten:
         texts.append(Said(round(ended_s - begun_s, 3), int(Severity.WARNING), lost))
     ends = {one.value: one for one in EndKind}
-    reason = str(result.get("end_reason", ""))
     contact = contact_of(ends.get(kind), reason)
     return FaultFlight(
         texts=tuple(texts),

@@ -172,7 +172,7 @@ class Supervisor:
             self._faults.begin(event, self._children)
         elif kind == "links" and self._found is not None:
             self._found(event["ports"]["gcs"])
-        if kind in ("listening", "preparing", "warning", "parameters", "fault"):
+        if kind in ("listening", "preparing", "warning", "parameters", "fault", "text"):
             self._display.say(event["message"])
 
     def _note_result(self, child: Child, event: Event) -> None:

@@ -54,6 +54,7 @@ class FlightEvaluator:
         margins = self.margins(places, 0.0)
         check_start(self.world.keys, margins)
         self.record.add(margins, 0.0)
+        self._sample: tuple[V3, float] | None = None  # m, NED, of the end-effector; s
         self.sample_error(critical(places), 0.0)
 
     def end(self, kind: EndKind, sentence: str, time_s: float) -> None:
@@ -114,12 +115,23 @@ class FlightEvaluator:
             self.end(EndKind.DURATION, f"flew {time_s:.1f} s", time_s)
 
     def sample_error(self, points: Points, time_s: float) -> None:
-        """Take one sample of the tracking error, if the trajectory is on."""
+        """Take one sample of the tracking error, if the trajectory is on.
+
+        It is compared with the reference later, by ``compare``: the vehicle need not wait for that.
+        """
+        self.compare()
         if self._clock.counts(time_s):
-            self._error.add(points[2], self._clock.target_at(time_s).p)
+            self._sample = points[2], time_s
+
+    def compare(self) -> None:
+        """Compare the last sample with the reference, if that has not been done yet."""
+        if self._sample is not None:
+            (place, time_s), self._sample = self._sample, None
+            self._error.add(place, self._clock.place_at(time_s))
 
     def result(self, time_s: float) -> TruthResult:
         """The score up to ``time_s``."""
+        self.compare()
         flaws = tuple(flaw for flaw in (self.left, self.silent) if flaw is not None)
         flaws += self.limits.flaws()
         truth = score(self.ended, time_s, self._error, self.record, self._whole, flaws)

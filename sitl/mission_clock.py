@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from sitl.heading import Heading
-from sitl.scenario import Scenario
+from sitl.scenario import V3, Scenario
 from sitl.trajectory import TrajectoryPoint, curve_row, reference
 
 
@@ -37,6 +37,10 @@ class MissionClock:
     def target_at(self, time_s: float) -> TrajectoryPoint:
         """End-effector reference at ``time_s``; its first point where there is no start."""
         return self.reference.at(0.0 if self.starts_s is None else time_s - self.starts_s)
+
+    def place_at(self, time_s: float) -> V3:
+        """The place [m, NED] of ``target_at`` alone."""
+        return self.reference.place(0.0 if self.starts_s is None else time_s - self.starts_s)
 
     def yaw_at(self, time_s: float) -> float:
         """Yaw of the reference at ``time_s`` [rad]."""

@@ -319,6 +319,13 @@ class Simulation:
         evaluator.judge_landing(speed, time_s)
         evaluator.judge_time(time_s)
 
+    def compare(self) -> None:
+        """Do what :meth:`advance` has left for a time in which nobody waits; else it is done later.
+
+        That is to compare a sample of the end-effector's place with the reference.
+        """
+        self._evaluator.compare()
+
     def truth(self) -> Truth:
         """The true state now."""
         exact = self._exact_reading()

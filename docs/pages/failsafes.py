@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fsw.flight.arming import CHECKS
+from fsw.flight.arming import CHECKS, ArmingCheck
 from fsw.flight.failsafe import FAILSAFES, Action, Failsafe
 from fsw.parameters.float32 import as_text
 from fsw.parameters.registry import BY_NAME
@@ -31,19 +31,30 @@ _RULES = """\
 ## Arming checks
 
 Each check that fails is a sentence behind `not armed:`, and in the answer to
-RUN_PREARM_CHECKS. Forced arming overrides all but an invalid estimate. Subjects:
-{subjects}.
+RUN_PREARM_CHECKS. Forced arming overrides all but an invalid estimate. The table is that of
+`fsw/flight/arming.py`; how to read it: [arming](../concepts/failsafes.md#arming).
+
+{checks}
 """
 
 
 def reference() -> str:
     """The page, in Markdown."""
     actions = ", ".join(action.value for action in Action)
-    subjects = ", ".join(dict.fromkeys(check.subject.value for check in CHECKS))
     rows = ["| condition (text) | detected | after | action | severity | ends |", "|---" * 6 + "|"]
     rows += [f"| {' | '.join(_cells(row))} |" for row in FAILSAFES]
     table = "\n".join(rows) + "\n"
-    return "\n".join((_HEAD.format(actions=actions), table, _RULES.format(subjects=subjects)))
+    checks = ["| subject | check fails where | waiting helps |", "|---" * 3 + "|"]
+    checks += [_check(check) for check in CHECKS]
+    return "\n".join(
+        (_HEAD.format(actions=actions), table, _RULES.format(checks="\n".join(checks)))
+    )
+
+
+def _check(check: ArmingCheck) -> str:
+    """A row of the arming checks."""
+    fails = check.summary[0].lower() + check.summary[1:]
+    return f"| {check.subject.value} | {fails} | {'no' if check.permanent else 'yes'} |"
 
 
 def _cells(row: Failsafe) -> tuple[str, ...]:

@@ -66,6 +66,11 @@ FILTER: Final = np.dtype(
         ("steady", np.int64, (2,)),  # how many in a row were near the one before
         ("calm", np.int64, (2,)),  # how many in a row were believed
         ("doubted", np.int64, (2,)),  # how many steady ones it takes to be believed; 0: it is
+        # Of the gyro (imu.note_step): how much it usually changes from one reading to the next
+        # [rad/s], and by how much it stepped lately [rad/s, FRD], up to a time [s].
+        ("shaken", float),
+        ("step", float, (3,)),
+        ("stepped", float),
         ("lost", np.int64),  # which halves of the state's own reading are of no use
         # Joints, at a time of their own (joint_filter.py), and what torques made of them since.
         ("joints", float, (2, 3)),  # angle [rad], rate [rad/s] and disturbance [rad/s^2] of each

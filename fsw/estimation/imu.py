@@ -32,6 +32,12 @@ STUCK_READINGS: Final = 5  # equal to the last bit, in a row: noise never is
 STAYS: Final = 3
 STAYS_LONG: Final = 25
 CALM: Final = 250  # readings that were believed, in a row
+# A step of the gyro from one reading to the next. Rotors turn the body by 17 rad/s^2, which is
+# 0.034 rad/s; in flight it changes by 0.016 rad/s on average with what rotors shake.
+_STEP: Final = 0.06  # rad/s
+_STEP_SHAKEN: Final = 3.0  # times the usual change
+_SHAKEN_SHARE: Final = 0.01  # of the newest change, in the usual one
+STEPS_APART: Final = 0.5  # s; farther apart, steps are not of one kind
 # Plain numbers: kernels return them.
 _NONE: Final = SensorFault.NONE.value
 _NOT_FINITE: Final = SensorFault.NOT_FINITE.value
@@ -56,6 +62,8 @@ def add_imu(x: Any, law: Any, now: float, time: float, f: Vec3, w: Vec3, model: 
         return _FUTURE
     if x.end > 0 and time <= last[TIME]:
         return _REPEATED
+    if x.end > 0 and time - last[TIME] <= law.imu_gap:
+        note_step(x, time, w)
     of_force = _fault(x, 0, f, law.accel_range, law.accel_jump)
     of_rate = _fault(x, 1, w, law.gyro_range, law.gyro_jump)
     keep_force, keep_rate = of_force in (_NONE, _STUCK), of_rate in (_NONE, _STUCK)
@@ -78,6 +86,27 @@ def add_imu(x: Any, law: Any, now: float, time: float, f: Vec3, w: Vec3, model: 
     if x.end - x.first >= IMU_CAPACITY:  # the filter has not begun
         x.first += 1
     return fault
+
+
+@compilable
+def note_step(x: Any, time: float, w: Vec3) -> None:
+    """Note a step of the gyro to a reading ``w`` [rad/s, FRD] of ``time`` [s], if it is one.
+
+    Nothing but a blow turns a body so suddenly. What goes and comes back soon is none in sum.
+    """
+    a, b, c = w[0] - x.newest[3], w[1] - x.newest[4], w[2] - x.newest[5]
+    change = math.sqrt(a * a + b * b + c * c)
+    if not math.isfinite(change):
+        return
+    usual = max(_STEP, _STEP_SHAKEN * x.shaken)
+    x.shaken += _SHAKEN_SHARE * (min(change, usual) - x.shaken)
+    if change <= usual:
+        return
+    kept = 1.0 if time - x.stepped <= STEPS_APART else 0.0
+    x.step[0] = kept * x.step[0] + a
+    x.step[1] = kept * x.step[1] + b
+    x.step[2] = kept * x.step[2] + c
+    x.stepped = time
 
 
 @compilable

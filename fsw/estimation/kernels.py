@@ -54,7 +54,7 @@ Pose = tuple[float, float, Vec3, Vec4, Vec3, Vec3]
 """When the filter reaches it [s], its own time [s], position, attitude and their variances."""
 
 # What ``tick`` does, in this order.
-COPY, JOINTS, READING, END = 1, 2, 4, 8
+COPY, PUSH, JOINTS, READING, END = 1, 2, 4, 8, 16
 
 
 @kernel
@@ -73,10 +73,10 @@ def tick(
 ) -> tuple[int, int, bool, Present]:
     """Do ``parts`` of a tick and ``more``; what is wrong with IMU and encoders, and the present.
 
-    ``COPY`` the filter, so that a tick leaves its inputs as they were, and note what torques made
-    of the joints, accelerated by ``u`` [rad/s^2]; take in ``encoders`` [rad, rad, s], two angles
-    and their age; take in a ``reading`` of the IMU, or what a ``model`` [SI, FRD] makes of it;
-    predict ``until`` [s] the horizon and from there the present, which may be no number.
+    ``COPY`` the filter, so that a tick leaves its inputs as they were; ``PUSH``: note what torques
+    made of the joints, accelerated by ``u`` [rad/s^2]; take in ``encoders`` [rad, rad, s], two
+    angles and their age; take in a ``reading`` of the IMU, or what a ``model`` [SI, FRD] makes of
+    it; predict ``until`` [s] the horizon and from there the present, which may be no number.
     ``times`` [s]: now, and the tick's length.
     """
     fault, of_encoders = _taken_in(old, law, new, parts, times, u, encoders, reading, model)
@@ -139,6 +139,7 @@ def _taken_in(
     now, dt = times
     if parts & COPY:
         _copy(old[0], new[0])
+    if parts & PUSH:
         joint_filter.push(new[0], law[0].tuning, now, dt, u)
     of_encoders, fault = 0, 0
     if parts & JOINTS:
@@ -190,10 +191,18 @@ def _copy(a: Any, b: Any) -> None:
             b.imu[k % IMU_CAPACITY, i] = a.imu[k % IMU_CAPACITY, i]
     for i in range(6):
         b.newest[i] = a.newest[i]
+    _copy_halves(a, b)
+    _copy_joints(a, b)
+
+
+@compilable
+def _copy_halves(a: Any, b: Any) -> None:
     for i in range(2):
         b.same[i], b.steady[i] = a.same[i], a.steady[i]
         b.calm[i], b.doubted[i] = a.calm[i], a.doubted[i]
-    _copy_joints(a, b)
+    b.shaken, b.stepped = a.shaken, a.stepped
+    for i in range(3):
+        b.step[i] = a.step[i]
 
 
 @compilable

@@ -18,7 +18,8 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from fsw.compiled import machine_code, packed
-from fsw.estimation import kernels
+from fsw.estimation import attribution, kernels
+from fsw.estimation.attribution import Dispute
 from fsw.estimation.drift import FrameDrift, least
 from fsw.estimation.error_state import DELAY, ERRORS, FILTER, FRAME, IMU_CAPACITY, Array, Filter
 from fsw.estimation.imu import IMU_TOO_OLD, STUCK_READINGS, TIME_TOLERANCE
@@ -29,7 +30,6 @@ from fsw.estimation.sensor_checks import (
     Health,
     arrived,
     believable,
-    numbers_of,
 )
 from fsw.estimation.sensor_fault import Sensor, SensorFault
 from fsw.estimation.tuning import EstimatorLaw, EstimatorTuning
@@ -62,12 +62,15 @@ _SELDOM_APART: Final = 1.25  # s; the same of a sensor whose readings come farth
 # What poses contradict by no more, an inertial unit may have made; a frame that moves, moves more.
 _SMALL_STEP: Final = 0.05  # m
 _SMALL_TURN: Final = 0.1  # rad
+_JUMPED: Final = 0.2  # s, for which poses are refused after a jump of the IMU that is believed
+_LATELY: Final = 0.02  # s, in which a fault is one of now
 _FLOATS: Final = FILTER.itemsize // 8  # that a filter has room for
 _REST: Vec3 = (0.0, 0.0, 0.0)
 UNKNOWN: Final[Vec3] = (0.0, 0.0, 0.0)  # what rotors make of the vehicle
 _LOST: Final[Vec3] = (math.nan, math.nan, math.nan)
 _NO_TURN: Vec4 = (1.0, 0.0, 0.0, 0.0)
-_USUAL_PARTS: Final = kernels.COPY | kernels.JOINTS | kernels.READING
+_USUAL_PARTS: Final = kernels.COPY | kernels.PUSH | kernels.JOINTS | kernels.READING
+_OF_EVERY_TICK: Final = (ImuSample, JointSample)
 _NO_READING: kernels.Reading = (0.0, _REST, _REST)
 
 
@@ -129,6 +132,7 @@ class FusionMemory(NamedTuple):
     restarts: int = 0  # how often the filter had to start anew, because it had no numbers any more
     began: float = -math.inf  # s, the filter's own time when it began
     without_fix: GnssSample | None = None  # the newest one that has none
+    dispute: Dispute | None = None  # between pose and IMU
 
     def of(self, sensor: Sensor) -> Health:
         """What is known of a sensor."""
@@ -160,9 +164,10 @@ class FusionMemory(NamedTuple):
             memory = memory.noting_fault(Sensor.ENCODERS, SensorFault(of_encoders), now)
         return memory
 
-    def repeats(self, sample: Aiding) -> bool:
-        """Whether a sample says what the last one of its sensor said, to the last bit."""
-        return numbers_of(sample) == self.of(SENSOR_OF[type(sample)]).numbers
+    def in_dispute(self, now: float, *, turned: bool) -> FusionMemory:
+        """The memory after a pose was refused by little at ``now`` [s]: see ``Dispute``."""
+        dispute = attribution.contradicted(self.dispute, now, self.numbers[0], turned=turned)
+        return self._replace(dispute=dispute)
 
     def after(self, one: Waiting, health: Health, refused: tuple[Aiding, ...]) -> FusionMemory:
         """The memory after the first of the waiting samples was fused, or ``refused`` [SI]."""
@@ -254,8 +259,26 @@ class SensorFusion:
         *,
         silent: bool = False,
     ) -> tuple[FusionMemory, StateEstimate | None]:
-        """Take in the ``samples`` that came since the last tick; the state at ``now`` [s].
+        """``take_in`` and ``catch_up``; the state at ``now`` [s] after both."""
+        memory, _ = self.take_in(
+            memory, samples, now, joint_acceleration, watch, model, silent=silent
+        )
+        return self.catch_up(memory, samples, now, model)
 
+    def take_in(
+        self,
+        memory: FusionMemory,
+        samples: Sequence[Sample],
+        now: float,
+        joint_acceleration: Vec2 = (0.0, 0.0),
+        watch: EncoderWatch | None = None,
+        model: Vec3 = UNKNOWN,
+        *,
+        silent: bool = False,
+    ) -> tuple[FusionMemory, StateEstimate | None]:
+        """Take in what IMU and encoders measured since the last tick; the state at ``now`` [s].
+
+        Of the other ``samples`` it knows what ``catch_up`` has fused so far.
         ``joint_acceleration`` [rad/s^2, joints] is what the torques make of the arm; a ``watch`` of
         its encoders is kept in the memory. Where the IMU is of no use, a ``model`` [SI, FRD] tells
         what the rotors make of the vehicle (``imu.add_imu``); it is ``silent`` if it has no reading
@@ -267,23 +290,16 @@ class SensorFusion:
         usual = self._usual(memory, samples, now)
         if usual is not None:
             asked = Asked(x, _USUAL_PARTS, (now, dt), joint_acceleration, *usual, model)
-            if isinstance(samples[0], PoseSample):
-                memory = self.take(memory, samples[0], now)
         else:
-            asked = Asked(x, kernels.COPY, (now, dt), joint_acceleration, model=model)
+            parts = kernels.COPY | kernels.PUSH
+            asked = Asked(x, parts, (now, dt), joint_acceleration, model=model)
             memory, asked = self._take_each(memory, asked, samples)
         imu_came = memory.imu_came if asked.reading is _NO_READING else now
         if silent:
             memory, asked = self._take_no_imu(memory, asked)
-        if not memory.started:
-            memory, asked = self._done(memory, asked)
-            memory = self._start(memory)
         joints_came = memory.joints_came if asked.encoders is _REST else now
-        known, ready = None, memory.started and joints_came >= 0.0
-        if ready:
-            memory, known = self._predicted(memory, asked, now - memory.delay - _MARGIN)
-        else:
-            memory, _ = self._done(memory, asked)
+        ready = memory.started and joints_came >= 0.0
+        memory, known = self._do(memory, asked, kernels.END if ready else 0, -math.inf)
         # By position, because it is done in every tick: what every tick renews, and the rest.
         watched = memory.encoders if watch is None else watch
         memory = FusionMemory(x, now, imu_came, joints_came, watched, *memory[5:])
@@ -291,10 +307,39 @@ class SensorFusion:
             return (_anew(memory) if ready else memory), None
         return memory, StateEstimate(round(1e6 * now), *known)
 
+    def catch_up(
+        self, memory: FusionMemory, samples: Sequence[Sample], now: float, model: Vec3 = UNKNOWN
+    ) -> tuple[FusionMemory, StateEstimate | None]:
+        """Check the other ``samples``, fuse what the filter reaches; the state at ``now`` [s].
+
+        The loops need not wait for it: a pose is late anyway, and the next tick knows of it. Where
+        pose and IMU contradict each other, a ``model`` [SI, FRD] as in ``take_in`` says who is
+        wrong.
+        """
+        x = np.ndarray(1, FILTER, np.empty(_FLOATS))
+        asked = Asked(x, kernels.COPY, (now, 0.0), (0.0, 0.0))
+        for sample in samples:
+            if not isinstance(sample, _OF_EVERY_TICK):
+                memory = self.take(memory, sample, now)
+        if not memory.started:
+            memory, asked = self._done(memory, asked)
+            memory = self._start(memory)
+        known, ready = None, memory.started and memory.joints_came >= 0.0
+        if ready:
+            memory, known = self._predicted(memory, asked, now - memory.delay - _MARGIN)
+        else:
+            memory, _ = self._done(memory, asked)
+        memory = FusionMemory(x, *memory[1:])
+        if memory.dispute is not None:
+            memory = _settled(memory, memory.dispute, model, now)
+        if known is None:
+            return (_anew(memory) if ready else memory), None
+        return memory, StateEstimate(round(1e6 * now), *known)
+
     def _usual(
         self, memory: FusionMemory, samples: Sequence[Sample], now: float
     ) -> tuple[Vec3, kernels.Reading] | None:
-        """Encoders and reading of a tick in which each came once, behind a pose if any.
+        """Encoders and reading of a tick in which each came once, at the end.
 
         None: samples have to be taken one by one. Most ticks are so, and this takes half as long.
         """
@@ -304,7 +349,7 @@ class SensorFusion:
         arm, unit = samples[-2:]
         if type(arm) is not JointSample or type(unit) is not ImuSample:
             return None
-        if count == 3 and type(samples[0]) is not PoseSample:
+        if count == 3 and isinstance(samples[0], _OF_EVERY_TICK):
             return None
         came = memory.joints_came
         if came < 0.0 or unit.time < now - IMU_TOO_OLD or _fault_of_encoders(arm, now, came):
@@ -315,16 +360,12 @@ class SensorFusion:
     def _take_each(
         self, memory: FusionMemory, asked: Asked, samples: Sequence[Sample]
     ) -> tuple[FusionMemory, Asked]:
-        """Take samples in, one after the other, whatever they are."""
+        """Take in samples of IMU and encoders, one after the other."""
         for sample in samples:
             if isinstance(sample, ImuSample):
                 memory, asked = self._take_imu(memory, asked, sample)
             elif isinstance(sample, JointSample):
                 memory, asked = self._take_joints(memory, asked, sample)
-            else:
-                if asked.parts & kernels.READING and memory.repeats(sample):
-                    memory, asked = self._done(memory, asked)
-                memory = self.take(memory, sample, asked.times[0])
         return memory, asked
 
     def _take_imu(
@@ -653,10 +694,14 @@ class SensorFusion:
             self._set_pressure(memory, one.time, sample)
         confirmed = refused and self._is_confirmed(memory, sample)
         latest = memory.refused
-        if refused:
+        little = isinstance(sample, PoseSample) and _is_small(innovation)
+        if refused and not announced and (little or _has_jumped(memory, sample, now)):
+            memory = memory.in_dispute(now, turned=ratio[-1] > 1.0)
+        elif refused:
             health = health.with_fault(SensorFault.JUMP, now)
+        if refused:
             latest = (*[one for one in latest if type(one) is not type(sample)], sample)
-            if confirmed and isinstance(sample, PoseSample) and _is_small(innovation):
+            if confirmed and little and isinstance(sample, PoseSample):
                 kernels.doubt(memory.numbers, self.law, _SMALL_STEP, _SMALL_TURN)
                 ratio = self._fuse_pose(memory, sample)
         fused = health.fused or (now,) * len(ratio)
@@ -766,7 +811,46 @@ def _anew(memory: FusionMemory) -> FusionMemory:
         waiting=(),
         pose=None,
         restarts=memory.restarts + 1,
+        dispute=None,
     )
+
+
+def _settled(memory: FusionMemory, dispute: Dispute, model: Vec3, now: float) -> FusionMemory:
+    """The memory after a ``dispute`` has gone on for a tick, and the fault of who is wrong in it.
+
+    Rotors and a ``model`` [SI, FRD] as in ``step``, at ``now`` [s].
+    """
+    if dispute.is_over(now):
+        return memory._replace(dispute=None)
+    if dispute.wrong is None:
+        x = memory.numbers[0]
+        seen = dispute.witness or attribution.witness(x, now)
+        seen = attribution.felt(seen, x, dispute.before, model)
+        dispute = dispute._replace(witness=seen)
+        if not dispute.is_due(now):
+            return memory._replace(dispute=dispute)
+        dispute = dispute._replace(wrong=attribution.wrong(dispute, attribution.biases(x)))
+    elif now != dispute.last:
+        return memory
+    return _blamed(memory._replace(dispute=dispute), now)
+
+
+def _has_jumped(memory: FusionMemory, sample: Aiding, now: float) -> bool:
+    """Whether what an IMU said that has jumped may be why a pose is refused at ``now`` [s]."""
+    imu = memory.of(Sensor.IMU)
+    jumped = imu.fault is SensorFault.JUMP and now - imu.fault_at <= _JUMPED
+    return jumped and isinstance(sample, PoseSample)
+
+
+def _blamed(memory: FusionMemory, now: float) -> FusionMemory:
+    """The memory with the fault of who is wrong in its dispute, noted at ``now`` [s]."""
+    assert memory.dispute is not None
+    if memory.dispute.wrong is not Sensor.IMU:
+        return memory.noting_fault(Sensor.POSE, SensorFault.JUMP, now)
+    imu = memory.of(Sensor.IMU)
+    if imu.fault is not SensorFault.DISAGREES and now - imu.fault_at <= _LATELY:
+        return memory  # it is known by what is worse
+    return memory.noting_fault(Sensor.IMU, SensorFault.DISAGREES, now)
 
 
 def _of_reading(asked: Asked, fault: int) -> int:

@@ -30,6 +30,7 @@ from fsw.flight.damage_watch import DamageWatch
 from fsw.flight.descent import Descent
 from fsw.flight.exact_state import ExactState
 from fsw.flight.failsafe import FAULTS, Condition
+from fsw.flight.jump import moved_along
 from fsw.flight.modes.mission import with_update
 from fsw.flight.modes.offboard import accept_setpoints, report
 from fsw.flight.plan_exchange import PlanExchange, measured_state, nominal_at_rest, requested
@@ -37,7 +38,7 @@ from fsw.flight.quiet_ticks import QuietTicks
 from fsw.flight.reference_horizon import ReferenceHorizon
 from fsw.flight.safe_set import SafeSetCheck
 from fsw.flight.safety_watch import SafetyWatch
-from fsw.flight.sensed_state import SensedState
+from fsw.flight.sensed_state import CaughtUp, SensedState
 from fsw.flight.state import Damage, FlightState, PlanMemory, SafetyMemory
 from fsw.flight.uncertain_clearance import KeptSet, UncertainClearance, pose_covariance
 from fsw.frozen import replace
@@ -106,6 +107,7 @@ class Controlled(NamedTuple):
     ticks: int = 1  # since the last one
     replaced: bool = False  # the command, by the safety gate
     guarded: Guarded = UNGUARDED
+    caught: CaughtUp | None = None  # what else is known, where that had to be known at once
 
 
 class Autopilot:
@@ -180,14 +182,14 @@ class Autopilot:
         """The part of a tick that the vehicle waits for: from the sensors to the actuators."""
         now_us = inputs.sensors.t_us
         texts: list[StatusText] = []
-        fusion, trust = state.fusion, state.trust
+        fusion, trust, caught = state.fusion, state.trust, None
         if inputs.samples or fusion is not None:
-            state, fusion, estimate = self._sensed.estimate(state, inputs, texts)
+            state, fusion, estimate, caught = self._sensed.estimate(state, inputs)
         else:
             state, trust, estimate = self._exact.estimate(state, inputs, texts)
         state = self._receive(state, inputs, texts)
         if estimate is None:
-            return _blind(state, inputs, texts)
+            return _blind(state, inputs, texts)._replace(fusion=fusion, caught=caught)
 
         acks: list[CommandAck] = []
         if inputs.commands:
@@ -220,6 +222,7 @@ class Autopilot:
             ticks,
             replaced,
             guarded,
+            caught,
         )
 
     def conclude(self, controlled: Controlled) -> tuple[FlightState, TickOutputs]:
@@ -228,22 +231,31 @@ class Autopilot:
         What it finds out is acted upon in the next tick.
         """
         c = controlled
-        answer, inputs, state, memory, estimate = c[:5]
-        if estimate is None:
-            return state, _nothing_known(answer, inputs)
+        answer, inputs, state, memory, estimate, fusion = c[:6]
         nominal, plan, flown, texts = c.nominal, c.plan, c.flown, answer.texts
+        safety = state.safety
+        if estimate is not None:
+            safety = self._watch.off_plan(
+                safety, estimate, nominal if flown else None, state.accuracy.reach
+            )
+        if fusion is not None:
+            caught = c.caught or self._sensed.catch_up(state, fusion, estimate, inputs)
+            fusion, estimate, reset, said = caught
+            texts += said
+            if reset is not None:
+                nominal, memory = moved_along(nominal, memory, reset)
+        if c.estimate is None or estimate is None:
+            unknown = _nothing_known(answer, inputs, texts)
+            return (state if fusion is None else replace(state, fusion=fusion)), unknown
         now_us, per_plan = inputs.sensors.t_us, self._ticks_per_plan
         index = state.index + c.ticks
-        safety = self._watch.off_plan(
-            state.safety, estimate, nominal if flown else None, state.accuracy.reach
-        )
         request = None
         if index // per_plan != state.index // per_plan:
             mission = self._safe_sets.hold_silent_zones(state.mission, now_us)
             if mission is not state.mission:
                 state = replace(state, mission=mission)
-            covariance = self._sensed.covariance(c.fusion)
-            pose = self._pose_error(state, estimate, c.fusion, covariance)
+            covariance = self._sensed.covariance(fusion)
+            pose = self._pose_error(state, estimate, fusion, covariance)
             state = self._keep_clear(state, estimate, pose)
             if flown and nominal is not None:
                 state, request, plan = self._request_plan(
@@ -251,9 +263,9 @@ class Autopilot:
                 )
                 safety = replace(safety, replan=False) if safety.replan else safety
             state = self._report_slowly(state, estimate, now_us)
-            state = self._sensed.reported(state, c.fusion, estimate, covariance)
-            state, said = self._see_accuracy(state, estimate, covariance, pose)
-            texts = (*texts, *said)
+            state = self._sensed.reported(state, fusion, estimate, covariance)
+            state, accuracy = self._see_accuracy(state, estimate, covariance, pose)
+            texts = (*texts, *accuracy)
             safety = self._watch.breach(safety, estimate, state.constraints, flies=flown)
         pushed, margin = c.guarded
         if pushed or safety.filter_us >= 0:
@@ -283,7 +295,7 @@ class Autopilot:
             state.arming_refusal,
             state.arming,
             safety,
-            c.fusion,
+            fusion,
             state.estimator,
             state.aiding,
             c.trust,
@@ -303,7 +315,7 @@ class Autopilot:
         tilted = safety.rolled_us >= 0 or safety.pitched_us >= 0
         if tilted or not estimate.R_WB[8] > watch.upright:
             safety = watch.attitude(safety, estimate, flies=state.vehicle.flies)
-        if state.index >= 0 and not 0 < estimate.t_us - state.t_us <= self._most_us:
+        if self._jumped(state, estimate.t_us):
             safety = watch.jumped(safety, estimate.t_us, estimate.t_us - state.t_us)
         return state if safety is state.safety else replace(state, safety=safety)
 
@@ -370,6 +382,10 @@ class Autopilot:
         if not unheard or inputs.refused_setpoints:
             state = replace(state, offboard=accept_setpoints(state.offboard, inputs, self.config))
         return state
+
+    def _jumped(self, state: FlightState, now_us: int) -> bool:
+        """Whether time did: on by more than is made up for, or not on at all."""
+        return state.index >= 0 and not 0 < now_us - state.t_us <= self._most_us
 
     def _elapsed_ticks(self, state: FlightState, now_us: int) -> int:
         """Ticks since the last one: more than one where sensor frames were missed."""
@@ -515,9 +531,11 @@ class Autopilot:
     ) -> tuple[Damage, Watch | None]:
         """What is known of the actuators; ``memory`` is the loops' for the next tick.
 
-        Where the estimate is not ``known`` from every sensor, how the vehicle moves shows nothing.
+        Where the estimate is not ``known`` from every sensor, how the vehicle moves shows nothing,
+        nor after a jump of time: what was commanded has not been done meanwhile.
         """
-        if not (known and self._watches and state.aiding.sensor is None):
+        jumped = self._jumped(state, estimate.t_us)
+        if jumped or not (known and self._watches and state.aiding.sensor is None):
             return state.damage, paused(state.watch)
         return self._damage.see(
             state.damage,
@@ -643,7 +661,9 @@ def _blind(state: FlightState, inputs: TickInputs, texts: list[StatusText]) -> C
     return Controlled(answer, inputs, state, state.cascade)
 
 
-def _nothing_known(answer: Answer, inputs: TickInputs) -> TickOutputs:
+def _nothing_known(
+    answer: Answer, inputs: TickInputs, texts: tuple[StatusText, ...]
+) -> TickOutputs:
     """What a vehicle says that does not know its state yet."""
     zero = (0.0, 0.0, 0.0)
     level = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
@@ -674,4 +694,4 @@ def _nothing_known(answer: Answer, inputs: TickInputs) -> TickOutputs:
         failures=(Condition.ESTIMATE_INVALID.value,),
     )
     taken = answer.tuning_taken
-    return TickOutputs(answer.actuators, snapshot, None, answer.acks, answer.texts, taken)
+    return TickOutputs(answer.actuators, snapshot, None, answer.acks, texts, taken)

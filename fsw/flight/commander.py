@@ -144,7 +144,7 @@ class Commander:
         vehicle = state.vehicle
         if vehicle.mode is Mode.FAULT:
             return state  # what ended the flight stays on show
-        context = FailsafeContext(state, estimate, self._config)
+        context = FailsafeContext(state, estimate, self._config, self._contradiction)
         slowly = estimate.t_us // SLOW_US != state.t_us // SLOW_US
         rows = failsafe.active(context) if slowly else failsafe.quickly_active(context)
         before = vehicle.conditions

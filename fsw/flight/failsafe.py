@@ -122,6 +122,7 @@ class Condition(Enum):
     BATTERY_LOW = "battery low"
     BATTERY_CRITICAL = "battery critical"
     BATTERY_EMERGENCY = "battery nearly empty"
+    PARAMETERS_CONTRADICT = "parameters contradict each other"
 
 
 class FailsafeMemory(NamedTuple):
@@ -133,7 +134,9 @@ class FailsafeMemory(NamedTuple):
     pending: Action = Action.NONE  # what follows the hold that gives the pilot time
     due_us: int = 0  # when
     overridden: tuple[Condition, ...] = ()  # whose actions a command of the pilot has put aside
-    joint: str = ""  # which joints have failed, as it was looked at last
+    # As they were looked at last; another one is the same condition, and news.
+    joint: str = ""  # which joints have failed
+    contradiction: str = ""  # of parameters
 
 
 NOTHING_DONE: Final = FailsafeMemory()
@@ -146,6 +149,7 @@ class FailsafeContext:
     state: FlightState
     estimate: StateEstimate
     config: FlightConfig
+    against: str = ""  # which parameters contradict each other, whatever the safe set
 
     @property
     def limits(self) -> FlightLimits:
@@ -156,6 +160,12 @@ class FailsafeContext:
     def gcs_silent_us(self) -> int:
         """Time since a ground station was heard."""
         return self.estimate.t_us - self.state.vehicle.gcs_heard_us
+
+    @property
+    def contradiction(self) -> str:
+        """Which parameters contradict each other, or the safe set in force; empty: none."""
+        refusals = self.state.mission.refusals
+        return "; ".join((self.against, *refusals) if self.against else refusals)
 
 
 Evidence = Callable[[FailsafeContext], bool]
@@ -434,7 +444,10 @@ def _refused_plan(context: FailsafeContext) -> str:
 
 
 def _jumped(context: FailsafeContext) -> str:
-    return f" by {1e-6 * context.state.safety.jump_us:+.2f} s"
+    jump_us = context.state.safety.jump_us
+    if abs(jump_us) < 100_000:
+        return f" by {1e-3 * jump_us:+g} ms"
+    return f" by {1e-6 * jump_us:+.2f} s"
 
 
 def _by_mm(length: float) -> str:
@@ -851,6 +864,21 @@ FAILSAFES: Final = (
         parameters=("BAT_EMERGEN_THR", "COM_LOW_BAT_ACT", "COM_FAIL_ACT_T"),
         ends="never in a flight",
     ),
+    Failsafe(
+        Condition.PARAMETERS_CONTRADICT,
+        lambda c: bool(c.contradiction),
+        _always(Action.WARN),
+        detail=lambda c: f": {c.contradiction}",
+        slow=True,
+        detected="two parameters contradict each other (`fsw/parameters/contradictions.py`), or "
+        "the start-up analysis finds that with these parameters the safe set in force cannot be "
+        "kept; with `--allow-inconsistent` that is reported when the safe set comes, and is no "
+        "condition",
+        within_us=_SLOWLY,
+        does="warning, again when it is another contradiction; no arming. A change that would "
+        "bring one about is refused, in the air at least",
+        ends="the parameters or the safe set have been changed",
+    ),
 )
 
 ROWS: Final = {row.condition: row for row in FAILSAFES}
@@ -978,12 +1006,15 @@ def respond(context: FailsafeContext, rows: tuple[Failsafe, ...]) -> Response:
     )
     begun, acting, memory = _begun(context, memory, chosen, at_once)
     waits = memory.pending is not Action.NONE
-    joint, reports = state.damage.joint, []
+    joint, contradiction, reports = state.damage.joint, context.contradiction, []
+    # A second joint that fails is the same condition, and news.
+    changed = {
+        Condition.JOINT_FAILED: joint != memory.joint,
+        Condition.PARAMETERS_CONTRADICT: contradiction != memory.contradiction,
+    }
     for row in rows:
         acts = row in acting
-        # A second joint that fails is the same condition, and news.
-        anew = row.condition is Condition.JOINT_FAILED and joint != memory.joint
-        if row.condition in before and not (acts or anew):
+        if row.condition in before and not (acts or changed.get(row.condition)):
             continue
         later = waits and row is chosen.row
         told = actions[row.condition]
@@ -997,7 +1028,9 @@ def respond(context: FailsafeContext, rows: tuple[Failsafe, ...]) -> Response:
     if vehicle.armed:
         reports += _ended(before, known, now, now_us)
     since = tuple([known.get(condition, now_us) for condition in now])
-    after = memory._replace(since_us=since, overridden=overridden, joint=joint)
+    after = memory._replace(
+        since_us=since, overridden=overridden, joint=joint, contradiction=contradiction
+    )
     return Response(after, tuple(reports), begun)
 
 

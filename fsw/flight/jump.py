@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
+from fsw.control.cascade import CascadeMemory
 from fsw.estimation.dead_reckoning import moved_on
 from fsw.estimation.sensor_fusion import Reset
 from fsw.flight.state import FlightState
@@ -16,7 +17,7 @@ from fsw.geometry.rotation import (
     yaw_of,
 )
 from fsw.geometry.vectors import add_scaled, norm
-from fsw.signals import Severity, StateEstimate, StatusText
+from fsw.signals import PredictionState, Severity, StateEstimate, StatusText
 
 _TOLD: Final = 0.02  # m, of a jump that the operator reads about
 
@@ -41,16 +42,30 @@ def told(reset: Reset) -> str:
     return f"estimate moved by {place:.0f} mm, {abs(yaw):.3f} rad: the plan moves along"
 
 
-def jumped(state: FlightState, reset: Reset) -> FlightState:
-    """The plan and the observer's velocity moved along with the estimate."""
-    nominal, yaw = state.nominal, yaw_of(matrix_from_quaternion(reset.turn))
+def moved_along(
+    nominal: PredictionState | None, cascade: CascadeMemory, reset: Reset
+) -> tuple[PredictionState | None, CascadeMemory]:
+    """The plan's state and the observer's velocity, moved along with the estimate."""
+    yaw = yaw_of(matrix_from_quaternion(reset.turn))
     if nominal is not None:
         nominal = nominal._replace(
             p=add_scaled(nominal.p, reset.position, 1.0), yaw=wrap_angle(nominal.yaw + yaw)
         )
-    observed = state.cascade.observed
+    observed = cascade.observed
     observed = observed._replace(v=add_scaled(observed.v, reset.velocity, 1.0))
-    return replace(state, nominal=nominal, cascade=state.cascade._replace(observed=observed))
+    return nominal, cascade._replace(observed=observed)
+
+
+def on_return(found: StateEstimate, before: StateEstimate) -> tuple[Reset, list[StatusText]]:
+    """The jump when positions are there again, and what is told of it.
+
+    What was found takes the place of what had been carried on from ``before``.
+    """
+    expected = moved_on(before, 1e-6 * (found.t_us - before.t_us))
+    reset = difference(found, expected)
+    if max(map(abs, reset.position)) > _TOLD:
+        return reset, [StatusText(Severity.WARNING, told(reset))]
+    return reset, []
 
 
 def returned(
@@ -60,8 +75,7 @@ def returned(
 
     The plan moves along with what was found instead of what had been carried on from ``before``.
     """
-    expected = moved_on(before, 1e-6 * (found.t_us - before.t_us))
-    reset = difference(found, expected)
-    if max(map(abs, reset.position)) > _TOLD:
-        texts.append(StatusText(Severity.WARNING, told(reset)))
-    return jumped(state, reset)
+    reset, said = on_return(found, before)
+    texts += said
+    nominal, cascade = moved_along(state.nominal, state.cascade, reset)
+    return replace(state, nominal=nominal, cascade=cascade)

@@ -198,12 +198,14 @@ class SafeSetCheck:
             last = mission.refused.safe_set if mission.refused else mission.safe_set
             known = {finding.statement for finding in self.analyse(last)}
             new = [StatusText(Severity.WARNING, text) for text in against if text not in known]
-            new += [
+            weak = [
                 StatusText(Severity.INFO, text) for text in warnings(findings) if text not in known
             ]
-            texts += new
-            if against and not self._config.soft and flies:
-                if new:
+            refused = bool(against) and not self._config.soft and flies
+            # What is taken on the ground all the same is told by a row of the failsafe table.
+            texts += (new if refused or self._config.soft else []) + weak
+            if refused:
+                if new or weak:
                     text = f"safe set refused: the old one is kept; wanted: {change}"
                     texts.append(StatusText(Severity.WARNING, text))
                 return mission

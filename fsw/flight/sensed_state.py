@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from fsw.control.cascade import Cascade, in_hover
 from fsw.estimation import kernels
@@ -18,13 +19,14 @@ from fsw.estimation.sensor_fusion import (
     UNKNOWN,
     EncoderWatch,
     FusionMemory,
+    Reset,
     SensorFusion,
     at_start,
 )
 from fsw.estimation.tuning import EstimatorTuning
 from fsw.estimation.turned_covariance import Vec6
 from fsw.flight.estimator_report import AIDS_PLACE, estimator_report, unaided, unknown_report
-from fsw.flight.jump import jumped, returned, told
+from fsw.flight.jump import on_return, told
 from fsw.flight.state import Aiding, FlightState
 from fsw.frozen import replace
 from fsw.measurements import ImuSample, JointSample, Sample
@@ -37,11 +39,21 @@ _IMU_SILENT = 0.008  # s; longer than the filter takes for jitter
 # most while readings repeat; 50 and 70 within 10 ms of stuck encoders.
 _HELD = (35.0, 70.0)
 _ASKED = 0.1  # rad that joints were asked to move meanwhile; friction has held one for half of it
-_IN_USE = (SensorFault.REPEATED, SensorFault.SELDOM)  # the sensor is, all the same
+# The sensor is, all the same; an IMU that disagrees with its new biases.
+_IN_USE = (SensorFault.REPEATED, SensorFault.SELDOM, SensorFault.DISAGREES)
 _LATELY = 0.02  # s, in which a fault is one of now
 _AWAY = 0.1  # s that a position is overdue, after which its return is a jump
 _ANEW = "estimate is not a number: the filter starts anew"
 _QUIET = 10.0  # s without a fault until the same one is reported again
+
+
+class CaughtUp(NamedTuple):
+    """What a tick knows once all of its samples are looked at."""
+
+    memory: FusionMemory
+    estimate: StateEstimate | None
+    reset: Reset | None  # a jump of the estimate, along with which plan and observer are to move
+    texts: tuple[StatusText, ...]
 
 
 class SensedState:
@@ -69,9 +81,13 @@ class SensedState:
         return lasting_error(memory, self._tuning)
 
     def estimate(
-        self, state: FlightState, inputs: TickInputs, texts: list[StatusText]
-    ) -> tuple[FlightState, FusionMemory, StateEstimate | None]:
-        """The estimate of this tick, or the last one while there is none; appends to ``texts``."""
+        self, state: FlightState, inputs: TickInputs
+    ) -> tuple[FlightState, FusionMemory, StateEstimate | None, CaughtUp | None]:
+        """The estimate of this tick, or the last one while there is none.
+
+        It is of IMU and encoders, and of what ``catch_up`` has made of the other sensors so far.
+        Before there was one, nothing flies that has to wait, and ``catch_up`` is done at once.
+        """
         now = 1e-6 * inputs.sensors.t_us
         before = _memory(state, now)
         pushed = (0.0, 0.0)
@@ -84,29 +100,51 @@ class SensedState:
             came, samples = _without_late_imu(before, now, samples)
         if came or now - before.of(Sensor.IMU).fault_at < _LATELY:
             model = self._model(state)
-        memory, estimate = self._fusion.step(
+        memory, estimate = self._fusion.take_in(
             started, samples, now, pushed, watch, model, silent=came > 0.0
         )
         if came:
             memory = memory._replace(imu_came=came)
+        caught = None
+        if estimate is None and state.estimate is None:
+            caught = self.catch_up(state, memory, None, inputs)
+            estimate = caught.estimate
+        if estimate is None:
+            state = replace(state, invalid_ticks=state.invalid_ticks + 1)
+            return state, memory, _carried_on(state, inputs.sensors.t_us), caught
+        if state.invalid_ticks:
+            state = replace(state, invalid_ticks=0)
+        return state, memory, estimate, caught
+
+    def catch_up(
+        self,
+        state: FlightState,
+        memory: FusionMemory,
+        estimate: StateEstimate | None,
+        inputs: TickInputs,
+    ) -> CaughtUp:
+        """What the other sensors make of the ``memory`` and the ``estimate`` of this tick.
+
+        ``state`` has the memory of the tick before.
+        """
+        now = memory.now
+        before, texts = _memory(state, now), list[StatusText]()
+        model = UNKNOWN if memory.dispute is None else self._model(state)
+        memory, found = self._fusion.catch_up(memory, inputs.samples, now, model)
         # By the filter's own clock: the state has none before the first estimate.
         due = inputs.sensors.t_us // _CHECKED_US != round(1e6 * before.now) // _CHECKED_US
         news = memory.health is not before.health
-        if due or news or estimate is None:
+        if due or news or found is None:
             memory = self._told(before, memory, now, texts, due=due)
-        moved = memory.reset.number != before.reset.number
-        if moved:
-            texts.append(StatusText(Severity.WARNING, told(memory.reset)))
-            state = jumped(state, memory.reset)
-        if estimate is None:
-            state = replace(state, fusion=memory, invalid_ticks=state.invalid_ticks + 1)
-            return state, memory, _carried_on(state, inputs.sensors.t_us)
+        reset = None
         back = (news and _is_back(before, memory, now)) or not before.started
-        if state.estimate is not None and back and not moved:
-            state = returned(state, estimate, state.estimate, texts)
-        if state.invalid_ticks:
-            state = replace(state, invalid_ticks=0)
-        return state, memory, estimate
+        if memory.reset.number != before.reset.number:
+            reset = memory.reset
+            texts.append(StatusText(Severity.WARNING, told(reset)))
+        elif back and found is not None and estimate is not None:
+            reset, said = on_return(found, estimate)
+            texts += said
+        return CaughtUp(memory, found or estimate, reset, tuple(texts))
 
     def reported(
         self,

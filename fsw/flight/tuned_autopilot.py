@@ -86,7 +86,9 @@ class TunedAutopilot:
         if against and state.vehicle.armed and not self._config.soft:
             texts = [StatusText(Severity.WARNING, f"refused while armed: {why}") for why in against]
             return state, False, texts
-        texts = [StatusText(Severity.WARNING, finding.statement) for finding in newly]
+        # What keeps the vehicle on the ground is told by a row of the failsafe table.
+        told = [f.statement for f in newly if self._config.soft or not f.refuses]
+        texts = [StatusText(Severity.WARNING, statement) for statement in told]
         mission = replace(mission, refusals=() if self._config.soft else refusals(findings))
         return replace(state, tuning=wanted, mission=mission), True, texts
 

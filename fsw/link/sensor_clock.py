@@ -3,7 +3,8 @@
 Steps are stamped by the sensors' clock. All that flies counts the vehicle's time: no plan, timeout
 or measurement changes its age when the sensors' clock is set. A stamp that neither follows the last
 step nor fits the time since is doubted at first. It may be wrong once, and datagrams come late,
-twice and in another order.
+twice and in another order. A step that is stamped a little before the last one and was sent after
+it, as MAVLink's numbers of frames say, needs no second look: no late or doubled one is like that.
 """
 
 from __future__ import annotations
@@ -21,6 +22,9 @@ _GAP_US: Final = 50_000  # in which steps may be missing, as many as a tick make
 # late, but then newer ones come in between. The last of four is there before readings are too old.
 # Where old ones have come before, some newer ones may be lost as well; 40 ms can be made up for.
 _STEPS_AHEAD, _STEPS_BACK, _STEPS_BACK_OR_LATE = 2, 4, 20
+# So far back the numbers of frames, which begin anew after 256, say which step was sent first: late
+# ones are less than half of that behind, at six frames a step.
+_NUMBERED_US: Final = 40_000
 # If the second stamp is farther behind the first one, the first one was wrong.
 _FORGOTTEN_US: Final = 1_200_000
 _LAST_US: Final = 1 << 62  # a stamp beyond is none: no step could follow it
@@ -61,6 +65,8 @@ class SensorClock:
         self._clock = clock
         self._say = say
         self._jumped = jumped
+        self._number = 0  # of a frame of the newest step
+        self._jumped_us = -_NUMBERED_US  # when the clock has jumped, monotonic
         self._usual_us = 0  # how far a step may be ahead without a second thought
         self._first = False  # the newest step is the first one
         self._needed_back = _STEPS_BACK
@@ -68,12 +74,15 @@ class SensorClock:
         self._heard_us = -1  # when a step was heard last, monotonic; -1: steps wait for answers
         self._heard_stamp_us = -1  # its stamp
 
-    def follows(self, t_us: int) -> bool:
-        """Whether a stamp [us] is of a new step, which it is only once."""
+    def follows(self, t_us: int, number: int) -> bool:
+        """Whether a stamp [us] is of a new step, which it is only once.
+
+        ``number`` is that of a frame of the step, which its sender counts from 0 to 255.
+        """
         if 0 < t_us - self.newest_us <= self._usual_us:
-            self.newest_us = t_us
+            self.newest_us, self._number = t_us, number
             return True
-        return self._examine(t_us)
+        return self._examine(t_us, number)
 
     def note_time(self) -> None:
         """Note that the newest step came now; what was silent for long may be far ahead then."""
@@ -87,32 +96,57 @@ class SensorClock:
         # From whole microseconds, as they are read: no sample is behind its step by a rounding.
         return [replace(one, time=1e-6 * (round(1e6 * one.time) - ahead_us)) for one in samples]
 
-    def _examine(self, t_us: int) -> bool:
+    def _examine(self, t_us: int, number: int) -> bool:
         """What :meth:`follows` says, where it takes a second thought."""
         if self.newest_us < 0:
-            return self._begin(t_us)
+            return self._begin(t_us, number)
         gap_us = t_us - self.newest_us
         if self._first and gap_us < -_FORGOTTEN_US:
             # All steps would be older than the first one.
             self._say("first step stamped ahead of all others: forgotten")
-            return self._begin(t_us)
-        if gap_us == 0:
+            return self._begin(t_us, number)
+        if self._was_sent_later(gap_us, number):
+            self._doubt_step(t_us)
+            self._jump()
+        elif gap_us == 0 or self._is_of_before(number):
             return False
-        if 0 < gap_us <= _GAP_US or (gap_us > 0 and self._was_silent(t_us)):
+        elif 0 < gap_us <= _GAP_US or (gap_us > 0 and self._was_silent(t_us)):
             self._forget_doubt()
         elif self._is_another_time(t_us):
             self._jump()
         else:
             return False
-        self.newest_us, self._usual_us, self._first = t_us, _GAP_US, False
+        self.newest_us, self._number, self._first = t_us, number, False
+        self._usual_us = 0 if self._jumps_now else _GAP_US
         return True
 
-    def _begin(self, t_us: int) -> bool:
+    def _begin(self, t_us: int, number: int) -> bool:
         if not t_us < _LAST_US:
             self._say("first step stamped beyond all times: ignored")
             return False
-        self.newest_us, self._first = t_us, True
+        self.newest_us, self._number, self._first = t_us, number, True
         return True
+
+    def _was_sent_later(self, gap_us: int, number: int) -> bool:
+        """Whether a step that is not stamped later was sent later than the newest all the same.
+
+        In lockstep nothing is late, and a simulator may number a step anew that it repeats.
+        """
+        real_time = self._heard_us >= 0
+        return real_time and -_NUMBERED_US <= gap_us <= 0 and 0 < self._sent_after(number) < 128
+
+    def _is_of_before(self, number: int) -> bool:
+        """Whether a step was sent before a jump, and comes late: its stamp may be ahead then."""
+        return self._jumps_now and self._sent_after(number) >= 128
+
+    def _sent_after(self, number: int) -> int:
+        """How many frames after the newest step one was sent; from 128 on, before it."""
+        return (number - self._number) % 256
+
+    @property
+    def _jumps_now(self) -> bool:
+        """Whether steps of before the last jump may still come, in real time."""
+        return self._heard_us >= 0 and self._clock() - self._jumped_us <= _NUMBERED_US
 
     def _was_silent(self, t_us: int) -> bool:
         """Whether so much time has passed since the last step; in lockstep none is missing."""
@@ -135,10 +169,7 @@ class SensorClock:
         doubt = self._doubt
         gap_us = _GAP_US + 1 if doubt is None else t_us - doubt.newest_us
         if doubt is None or not -_GAP_US <= gap_us <= _GAP_US or not t_us < _LAST_US:
-            needed = _STEPS_AHEAD if t_us > self.newest_us else self._needed_back
-            after_us = self._since_newest()
-            self._doubt = _Doubt(t_us, after_us, t_us, self.looks, self.silences, needed)
-            self._usual_us = 0
+            self._doubt_step(t_us)
             return False
         if gap_us < 0:
             return False  # one of these, late or twice
@@ -149,6 +180,12 @@ class SensorClock:
             doubt.look = self.looks
             doubt.steps += 1
         return doubt.steps >= doubt.needed
+
+    def _doubt_step(self, t_us: int) -> None:
+        needed = _STEPS_AHEAD if t_us > self.newest_us else self._needed_back
+        after_us = self._since_newest()
+        self._doubt = _Doubt(t_us, after_us, t_us, self.looks, self.silences, needed)
+        self._usual_us = 0
 
     def _since_newest(self) -> int:
         """Whole periods [us] that have begun since the newest step came, at least one."""
@@ -164,4 +201,5 @@ class SensorClock:
         jump_us = doubt.first_us - self.newest_us - doubt.after_us
         self.ahead_us += jump_us
         self._heard_stamp_us += jump_us
+        self._jumped_us = self._clock()
         self._jumped(jump_us)

@@ -47,7 +47,7 @@ from fsw.signals import (
 )
 from messages import status_text
 from messages.frames import Frame, FrameWriter, split
-from messages.lockstep_codec import LockstepReader
+from messages.lockstep_codec import LockstepFrame, LockstepReader
 from messages.udp import PeerSocket
 
 PATIENCE_S: Final = 0.2  # one wait for a datagram; also the interval of announcements
@@ -75,6 +75,7 @@ _STEP_WITH_POSE: Final = LockstepReader(
 )
 _FLAGS_AT: Final = -3
 _INERTIAL: Final = 0x3F
+_NUMBER_AT: Final = 4  # in a datagram, of its first frame
 _SENSOR_AT: Final = 15  # place of HIL_SENSOR's id; the step's clock has 0
 _LOCKSTEP_BIT, _MEASURED_BIT = 1, 2  # of the custom_mode in the simulator's HEARTBEAT
 _NO_VECTOR: Final = (math.nan, math.nan, math.nan)
@@ -103,6 +104,14 @@ class SimLink:
         self._inbox = inbox
         self._decoder = SampleDecoder(inbox.locate)
         self._writer = FrameWriter(SYSTEM_ID, AUTOPILOT)
+        self._controls_frames = {
+            armed: LockstepFrame(
+                self._writer,
+                message_ids.HIL_ACTUATOR_CONTROLS,
+                *encode_replies.end_of_controls(armed=armed),
+            )
+            for armed in (False, True)
+        }
         self._thrust_scale = 1.0 / facts.rotor_thrust_max
         self._torque_scale = 1.0 / facts.joint_torque_max
         self._steps = SensorClock(
@@ -167,14 +176,7 @@ class SimLink:
     def send_actuators(self, t_us: int, answer: Answer) -> None:
         """Send the actuator command that belongs to the step of ``t_us``."""
         stamp_us = t_us + self._steps.ahead_us
-        values = encode_replies.hil_actuator_controls(
-            stamp_us,
-            answer.actuators,
-            answer.armed,
-            self._thrust_scale,
-            self._torque_scale,
-        )
-        controls = self._writer.frame(message_ids.HIL_ACTUATOR_CONTROLS, *values)
+        controls = self._controls(stamp_us, answer)
         due = t_us - self._reported_us >= _REPORT_US
         changed = due or answer.mode is not self._reported_mode
         texts = (*self._texts, *answer.texts) if self._texts else answer.texts
@@ -196,7 +198,7 @@ class SimLink:
         if not self.measured:
             step = _STEP.read(datagram)
             if step is not None:
-                return self._new(*step)
+                return self._new(datagram[_NUMBER_AT], *step)
         else:
             measured = _MEASURED_STEP.read(datagram) or _STEP_WITH_POSE.read(datagram)
             if measured is not None and datagram[_FLAGS_AT] == _INERTIAL:
@@ -204,13 +206,14 @@ class SimLink:
                 samples: list[Sample] = [joint_sample(joints), inertial_sample(inertial)]
                 if pose and (seen := pose_sample(pose[0])) is not None:
                     samples.insert(0, seen)
-                return self._new_measured(int(inertial[0]), samples)
+                return self._new_measured(int(inertial[0]), samples, datagram[_NUMBER_AT])
         return self._read_frames(list(split(datagram)))
 
     def _read_frames(self, frames: list[Frame]) -> SensorFrame | None:
         """What :meth:`_read` says, of a datagram with anything in it."""
         payloads = {frame.message_id: cast(Numbers, frame.payload_values) for frame in frames}
         barrier = payloads.get(message_ids.HIL_SENSOR)  # the last one
+        number = next((f.sequence for f in frames if f.message_id == message_ids.HIL_SENSOR), 0)
         heartbeat = payloads.get(message_ids.HEARTBEAT)
         if heartbeat is not None:
             self._note_pacing(int(heartbeat[0]))
@@ -219,11 +222,11 @@ class SimLink:
             return None
         if self.measured:
             samples = [one for frame in frames for one in self._decoder.samples(frame)]
-            sensors = self._new_measured(int(barrier[0]), samples)
+            sensors = self._new_measured(int(barrier[0]), samples, number)
         else:
             odometry = payloads.get(message_ids.ODOMETRY)
             arm = payloads.get(message_ids.ARM_JOINT_STATE)
-            sensors = self._new(odometry, arm, barrier)
+            sensors = self._new(number, odometry, arm, barrier)
         if sensors is not None:
             if message_ids.COMMAND_ACK in payloads:
                 self._note_answers(frames)
@@ -250,19 +253,19 @@ class SimLink:
         self.measured = bool(custom_mode & _MEASURED_BIT)
 
     def _new(
-        self, odometry: Numbers | None, arm: Numbers | None, barrier: Numbers
+        self, number: int, odometry: Numbers | None, arm: Numbers | None, barrier: Numbers
     ) -> SensorFrame | None:
         """The sensors of a step that is whole and not known yet; a known one is answered again."""
         t_us = int(barrier[0])
-        if odometry is None or arm is None or not self._is_next(t_us):
+        if odometry is None or arm is None or not self._is_next(t_us, number):
             return None
         frame = decode.sensor_frame(odometry, arm, barrier)
         ahead_us = self._steps.ahead_us
         return frame if not ahead_us else replace(frame, t_us=t_us - ahead_us)
 
-    def _new_measured(self, t_us: int, samples: list[Sample]) -> SensorFrame | None:
+    def _new_measured(self, t_us: int, samples: list[Sample], number: int) -> SensorFrame | None:
         """The time of a new step, whose samples are in the inbox; a known one is answered again."""
-        if not self._is_next(t_us):
+        if not self._is_next(t_us, number):
             return None
         if self._early or self._steps.ahead_us:
             samples = self._steps.in_vehicle_time([*self._early, *samples])
@@ -278,9 +281,9 @@ class SimLink:
             t_us, _NO_VECTOR, _NO_VECTOR, _NO_ATTITUDE, rate, force, _NO_JOINTS, _NO_JOINTS
         )
 
-    def _is_next(self, t_us: int) -> bool:
+    def _is_next(self, t_us: int, number: int) -> bool:
         """Whether a step is a new one, which it is only once; a known one is answered again."""
-        if self._steps.follows(t_us):
+        if self._steps.follows(t_us, number):
             return True
         self._repeat(t_us)
         return False
@@ -321,6 +324,13 @@ class SimLink:
             for values in status_text.pieces(text.text, text.severity, self._text_id):
                 frames.append(self._writer.frame(message_ids.STATUSTEXT, *values))
         return frames
+
+    def _controls(self, stamp_us: int, answer: Answer) -> bytes:
+        """HIL_ACTUATOR_CONTROLS of a step."""
+        values = encode_replies.hil_actuator_controls(
+            stamp_us, answer.actuators, self._thrust_scale, self._torque_scale
+        )
+        return self._controls_frames[answer.armed](*values)
 
     def _mode(self, t_us: int, answer: Answer) -> bytes:
         """HEARTBEAT: the simulator sees whether its trajectory is being flown."""

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fsw.compiled import compiled, kernel
+from fsw.compiled import compiled, kernel, of_fixed_types
 from fsw.model.body import ON_BASE, ON_LINK1, ON_LINK2
 from fsw.model.kinematics import body_axes, links
 from fsw.model.prediction import (
@@ -139,7 +139,7 @@ class Linearisation:
 
 
 @compiled
-def _refill(horizon: Horizon, tracked: Tracked, lengths: Vec2, com: Vec2) -> None:
+def _refilled(horizon: Horizon, tracked: Tracked, lengths: Vec2, com: Vec2) -> None:
     turned, slopes = np.empty((TURNED, 3)), np.zeros((2, STATES))
     tip = (0.0, 0.0, lengths[1])
     for i in range(horizon.states.shape[0]):
@@ -419,3 +419,6 @@ def _fill_arm_com(horizon: Horizon, i: int, com: Vec2, tracked: Tracked) -> None
         gain, at = horizon.impulse[i - 1 - step, 9], INPUTS * step
         tracked.d_arm_com[i, at + 4] = (c1 + c12) * gain
         tracked.d_arm_com[i, at + 5] = c12 * gain
+
+
+_refill = of_fixed_types(_refilled)

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from fsw.barriers.constraint_block import block
+from fsw.compiled import kernel, of_fixed_types
 from fsw.model.linearisation import Linearisation
-from fsw.model.prediction import Q_ARM, QD_ARM, CondensedModel
+from fsw.model.prediction import Q_ARM, QD_ARM, Array, CondensedModel
 from fsw.mpc.qp_data import InputLimits
 
 _ANGLES = np.array([[1.0, 0.0], [-1.0, 0.0], [1.0, 1.0], [-1.0, -1.0]])  # +-th1, +-(th1 + th2)
@@ -35,6 +36,19 @@ class JointLimits:
 
     def refill(self, horizon: Linearisation) -> None:
         """Bring angles and rates up to date; the gradient never changes."""
-        value = self.rows.value.reshape(-1, _ROWS)
-        value[:, : len(_ANGLES)] = -(horizon.states[1:, Q_ARM : Q_ARM + 2] @ _ANGLES.T)
-        value[:, len(_ANGLES) :] = -(horizon.states[1:, QD_ARM : QD_ARM + 2] @ _RATES.T)
+        _fill(horizon.states, self.rows.value)
+
+
+@kernel
+def _fill_values(states: Array, value: Array) -> None:
+    """Minus what each row bounds, node by node: the order of ``_ANGLES`` and ``_RATES``."""
+    for i in range(1, states.shape[0]):
+        row, th1, th2 = _ROWS * (i - 1), states[i, Q_ARM], states[i, Q_ARM + 1]
+        value[row], value[row + 1] = -th1, th1
+        value[row + 2], value[row + 3] = -(th1 + th2), th1 + th2
+        for joint in range(2):
+            rate = states[i, QD_ARM + joint]
+            value[row + 4 + 2 * joint], value[row + 5 + 2 * joint] = -rate, rate
+
+
+_fill = of_fixed_types(_fill_values)

@@ -126,16 +126,18 @@ class Planner:
     def _refusal(self, request: PlanRequest, start: Array) -> str | None:
         if len(request.targets) != self._config.horizon + 1:
             return f"{len(request.targets)} targets given, {self._config.horizon + 1} needed"
-        if not np.isfinite(start).all():
+        # What is not finite stays so in a sum.
+        if not math.isfinite(start.sum()):
             return "the start state is not finite"
-        for target in request.targets:
-            if not all(map(math.isfinite, (*target.p_WE, *target.v_WE, target.yaw))):
-                return "a target is not finite"
+        if not math.isfinite(
+            sum([sum(one.p_WE) + sum(one.v_WE) + one.yaw for one in request.targets])
+        ):
+            return "a target is not finite"
         if len(request.joint_targets) not in (0, len(request.targets)):
             return (
                 f"{len(request.joint_targets)} joint targets given for {len(request.targets)} nodes"
             )
-        if not all(math.isfinite(angle) for joints in request.joint_targets for angle in joints):
+        if not math.isfinite(sum([first + second for first, second in request.joint_targets])):
             return "a joint target is not finite"
         return None
 

@@ -51,7 +51,7 @@ from fsw.signals import (
 )
 
 LINK_TIMEOUT_S: Final = 1.2  # silence that ends the flight; both processes end within 2 s
-_START_US: Final = 1_000_000  # time stamp of the simulator's step 0
+START_US: Final = 1_000_000  # time stamp of the simulator's step 0
 
 
 def to_route(commands: tuple[Command, ...], acks: tuple[CommandAck, ...]) -> list[CommandRequest]:
@@ -133,7 +133,9 @@ class SimLoop(Generic[State]):
         files: RunFiles,
         sleep: Callable[[float], None] | None = None,
         wall_clock: Clock = unix_us,
+        tell: Callable[[int, tuple[StatusText, ...]], None] = lambda t_us, texts: None,
     ) -> None:
+        """``tell`` is given the time [us] and the texts of every tick, for the console."""
         self._tick_us = program.facts.tick_period_us
         self._parameters = program.parameters
         self._missions = program.missions
@@ -147,6 +149,7 @@ class SimLoop(Generic[State]):
         self._stop = stop
         self._files = files
         self._sleep = sleep or ground.attend  # spare time reads the ground links
+        self._tell = tell
         self._notices: list[StatusText] = []
         self._host = HostWatch(files, ground, clock, wall_clock)
         self._host_news: HostHealth | None = None  # for the next tick
@@ -259,16 +262,22 @@ class SimLoop(Generic[State]):
             for ack in self._sim.routed_acks:
                 self._ground.acknowledge(t_us, ack)
             self._sim.routed_acks.clear()
-        for request in to_route(cycle.inputs.commands, answer.acks):
+        if answer.acks:
+            self._acknowledge(t_us, cycle.inputs.commands, answer.acks)
+        self._sim.send_actuators(t_us, answer)
+
+    def _acknowledge(
+        self, t_us: int, commands: tuple[Command, ...], acks: tuple[CommandAck, ...]
+    ) -> None:
+        for request in to_route(commands, acks):
             self._sim.route(request)
-        for ack in answer.acks:
+        for ack in acks:
             if ack.result == CommandResult.IN_PROGRESS:
                 continue
             if (ack.target_system, ack.target_component) == (SYSTEM_ID, PATH_PLANNER):
                 self._sim.queue_ack(ack)
             else:
                 self._ground.acknowledge(t_us, ack)
-        self._sim.send_actuators(t_us, answer)
 
     def _conclude(self, cycle: Cycle) -> None:
         outputs = cycle.outputs = self._tick.conclude()
@@ -302,6 +311,7 @@ class SimLoop(Generic[State]):
         if self._notices:
             outputs = replace(outputs, texts=(*outputs.texts, *self._notices))
         self._ground.publish(outputs)
+        self._tell(cycle.release.sensors.t_us, outputs.texts)
         # Lockstep has no other time for it; what is read now is in the next tick.
         self._ground.poll(cycle.release.sensors.t_us)
 
@@ -351,4 +361,4 @@ class SimLoop(Generic[State]):
         self._host_news = self._host.look(missed)
 
     def _step_number(self, t_us: int) -> int:
-        return (t_us - _START_US) // self._tick_us
+        return (t_us - START_US) // self._tick_us

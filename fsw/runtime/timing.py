@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from typing import Final
 
 from fsw.ports import GroupTiming
@@ -18,7 +19,7 @@ class Histogram:
         self.count = 0
         self.total_us = 0.0
         self.max_us = 0.0
-        self._bins = [0] * _BINS
+        self._bins = defaultdict[int, int](int)  # those that have counts: a few of all
 
     def add(self, duration_us: float) -> None:
         """Count one duration [us]; anything below 1 us is in the first bin."""
@@ -27,15 +28,15 @@ class Histogram:
         if duration_us > self.max_us:
             self.max_us = duration_us
         index = int(math.log(duration_us) * _BINS_PER_E) if duration_us > 1.0 else 0
-        self._bins[index if index < _BINS else -1] += 1
+        self._bins[min(index, _BINS - 1)] += 1
 
     def percentile_us(self, share: float) -> float:
         """Duration [us] that a ``share`` [1] of all counts does not exceed; 0 before the first."""
         wanted = share * self.count
         seen = 0
-        for index, count in enumerate(self._bins):
+        for index, count in sorted(self._bins.items()):
             seen += count
-            if count and seen >= wanted:
+            if seen >= wanted:
                 # The upper edge of the last bin in use lies above the maximum.
                 return min(math.exp((index + 1) / _BINS_PER_E), self.max_us)
         return 0.0
@@ -45,7 +46,8 @@ class Histogram:
         self.count += other.count
         self.total_us += other.total_us
         self.max_us = max(self.max_us, other.max_us)
-        self._bins = [mine + theirs for mine, theirs in zip(self._bins, other._bins, strict=True)]
+        for index, count in other._bins.items():
+            self._bins[index] += count
 
 
 class GroupTimer:

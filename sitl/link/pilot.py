@@ -136,7 +136,9 @@ def attends(state: PilotState) -> bool:
 def listen(plan: FlightPlan, state: PilotState, heard: Heard, t_us: int) -> PilotState:
     """Process the vehicle's answer to the step of ``t_us``."""
     if heard.texts:
-        state = replace(state, last_text=heard.texts[-1])
+        # What else the vehicle tells in the same step is not the reason of its refusal.
+        refusals = [text for text in heard.texts if text.startswith("not armed: ")]
+        state = replace(state, last_text=(refusals or heard.texts)[-1])
     for ack in heard.acks:
         wanted = _COMMANDS.get(state.phase)
         if wanted is not None and ack.command == wanted[0]:

@@ -25,7 +25,7 @@ _UNITS: Final[tuple[str, ...]] = typing.get_args(Unit)
 _KINDS: Final[tuple[str, ...]] = typing.get_args(Kind)
 _MOST_BYTES: Final = 1 << 20
 _NUMBERS: Final = ("duration_s", "share", "size", "delay_ms", "rate_hz", "jump_s")
-_EXPECTED: Final = ("told_within_s", "names", "then", "contact", "margin_mm", "why")
+_EXPECTED: Final = ("told_within_s", "names", "then", "last", "contact", "margin_mm", "why")
 _KNOWN: Final = (
     "name",
     "units",
@@ -53,6 +53,7 @@ class Expectation:
     contact: Contact = "none"  # that cannot be helped
     margin_mm: float = 0.0  # least margin to the safe set; where contact is allowed it is not asked
     why: str = ""
+    last: tuple[str, ...] = ()  # of which the last action must be one; empty: any of ``then``
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -179,10 +180,8 @@ def _modes(table: dict[str, Any], names: str) -> dict[str, Expectation]:
 
 
 def _expectation(keys: dict[str, Any]) -> Expectation:
-    then = _words(keys, "then", ACTIONS, ())
+    then, last = _actions(keys)
     contact = keys.get("contact", "none")
-    if not then:
-        raise ExpectationError(f"then must name at least one of {', '.join(ACTIONS)}")
     if contact not in _CONTACTS:
         raise ExpectationError(f"contact = {contact!r}: must be one of {', '.join(_CONTACTS)}")
     if contact != "none" and not keys.get("why"):
@@ -205,7 +204,17 @@ def _expectation(keys: dict[str, Any]) -> Expectation:
         re.compile(names)
     except re.error as error:
         raise ExpectationError(f"names = {names!r} is no regular expression: {error}") from None
-    return Expectation(then, within_s, names, contact, float(margin), keys.get("why", ""))
+    return Expectation(then, within_s, names, contact, float(margin), keys.get("why", ""), last)
+
+
+def _actions(keys: dict[str, Any]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Actions that may follow, and those of which the last must be one."""
+    then, last = _words(keys, "then", ACTIONS, ()), _words(keys, "last", ACTIONS, ())
+    if not then:
+        raise ExpectationError(f"then must name at least one of {', '.join(ACTIONS)}")
+    if not set(last) <= set(then):
+        raise ExpectationError(f"last = {list(last)}: must be among then, {', '.join(then)}")
+    return then, last
 
 
 def _words(
@@ -232,6 +241,8 @@ def differences(mode: str, expected: Expectation, seen: FaultFlight) -> tuple[st
     wrong = [action for action in actions if not _allowed(mode, action, expected.then)]
     if wrong:
         found.append(f"{', then '.join(actions)}; must be {' or '.join(expected.then)}")
+    elif not _allowed(mode, actions[-1], expected.last or expected.then):
+        found.append(f"{', then '.join(actions)}; must end with {' or '.join(expected.last)}")
     if seen.contact and expected.contact not in ("any", seen.contact):
         found.append(seen.ended)
     least_mm = math.inf if seen.least_m is None else 1e3 * seen.least_m

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 import time
 from pathlib import Path
 
@@ -67,3 +68,20 @@ def test_what_could_not_be_written_is_kept_for_the_end(tmp_path: Path) -> None:
     lost = event("unwritten", what="sitl.json: disk full")
     flown = watched(tmp_path, ["short", FLEW, lost], [SHUT_DOWN])
     assert (flown.failure, flown.unwritten) == (None, ["sitl.json: disk full"])
+
+
+@pytest.mark.requirement("REQ-LINK-10")
+def test_a_warning_of_the_vehicle_is_a_line_between_those_of_the_progress(tmp_path: Path) -> None:
+    console = io.StringIO()
+    supervisor = Supervisor(Display(console), tmp_path, runner="tests.cli.fake_processes")
+    progress = event("progress", t_s=0.5, min_margin_m=0.1, real_time_factor=2.0)
+    text = {"event": "text", "message": "fsw: 0.5 s: zone \x1b[2J too close"}
+    supervisor.run(
+        [LISTENING, FLYING, "short", progress, "short", FLEW, "0"],
+        lambda port: [json.dumps(text), SHUT_DOWN, "0"],
+    )
+    lines = console.getvalue().splitlines()
+    assert [line for line in lines if "too close" in line] == [
+        "fsw: 0.5 s: zone \\x1b[2J too close"
+    ]
+    assert "flying    0.5 s  ×2.0  margin 100 mm" in lines

@@ -19,7 +19,7 @@ from fsw.signals import (
     SensorFrame,
     TickInputs,
 )
-from tests.closed_loop.harness import command
+from tests.closed_loop.harness import Flight, command, hover
 
 CONFIG = flight_config(body="points")
 START_US = 1_000_000
@@ -104,3 +104,17 @@ def test_without_loss_every_step_is_one_step_of_the_model() -> None:
     assert plan is not None
     assert len(asked) == 1
     assert state.nominal == model.advance(plan.start, plan.inputs[0], 3)
+
+
+def test_no_rotor_or_joint_is_blamed_for_what_stopped_while_no_tick_was_there() -> None:
+    """The drives hold the last command for 0.1 s, and are off until the next one."""
+    flight = Flight(hover())
+    flight.step(command(400, 1.0))
+    flight.run(2.0)
+    held = flight.closed.controls(flight.sent[-1], armed=True)
+    for k in range(125):
+        flight.sim.advance(held._replace(armed=k < 50))
+    flight.run(3.0)
+    assert any("time jumped" in text for text in flight.texts)
+    assert not [text for text in flight.texts if "failed" in text]
+    assert flight.mode is Mode.HOLD

@@ -182,6 +182,7 @@ class Capture:
     to_fsw: list[bytes]
     to_sitl: list[bytes]
     dropped: int
+    warned: list[str]  # by the flight software, on the console
 
     def actuators(self) -> dict[int, tuple[float | bytes, ...]]:
         """Actuator commands by step time; a repeated one must be the same."""
@@ -210,6 +211,7 @@ def fly_through(
             codes = sitl.finish(), fsw.finish()
         network.close()
     fsw_json = json.loads((out / "fsw.json").read_text())
+    warned = [event["message"] for event in fsw.events if event["event"] == "text"]
     return Capture(
-        *codes, ended["result"], fsw_json, network.to_fsw, network.to_sitl, network.dropped
+        *codes, ended["result"], fsw_json, network.to_fsw, network.to_sitl, network.dropped, warned
     )

@@ -203,6 +203,13 @@ def test_a_denial_ends_the_run_with_the_vehicles_reason(result: int) -> None:
     assert flight.state.refusal == "the vehicle refused to arm: no estimate"
 
 
+def test_a_warning_in_the_same_step_is_not_the_reason_of_a_refusal() -> None:
+    texts = ("not armed: the arm swings", "parameters contradict each other: all of them")
+    flight = Flight(plan(), {ARM: 4}, heard=Heard(texts=texts))
+    flight.fly(0.01)
+    assert flight.state.refusal == "the vehicle refused to arm: not armed: the arm swings"
+
+
 def test_a_vehicle_that_is_not_ready_yet_is_asked_again() -> None:
     flight = Flight(plan(), {ARM: 1})
     flight.fly(2.0)

@@ -39,6 +39,7 @@ from fsw.signals import (
     PlannerCounters,
     PlanRequest,
     SensorFrame,
+    Severity,
     StatusText,
     TickInputs,
     TickOutputs,
@@ -180,6 +181,7 @@ class Bench:
             PlannerRecord(GroupTimer(100_000)), ControlMetrics(), LoopHealth()
         )
         self.files = NoFiles()
+        self.told: list[tuple[int, str]] = []  # on the console
         null: Any = Null()
         self.parameters = Parameters()
         parts = parts_of(tick)
@@ -187,6 +189,7 @@ class Bench:
         self.loop = SimLoop(
             program, cast(Any, self.sim), cast(Any, self.ground), self.inbox, self.record,
             self.time.clock, self.stop, cast(Any, self.files), self._sleep, self.time.clock,
+            lambda t_us, texts: self.told.extend((t_us, text.text) for text in texts),
         )  # fmt: skip
         self.until_us = 0
 
@@ -422,3 +425,18 @@ def test_a_clock_that_jumps_back_costs_waiting_and_repeats_no_tick() -> None:
     assert len(bench.sim.answers) == len(stamps) == pytest.approx(1000, abs=30)
     assert (bench.timer(INNER.name).late, bench.timer(INNER.name).skipped) == (0, 0)
     assert bench.record.deadlines.missed == []
+
+
+def test_the_console_is_given_what_the_ground_is_given_once_and_with_its_time() -> None:
+    def warning(state: int, inputs: TickInputs) -> tuple[int, TickOutputs]:
+        texts = (StatusText(Severity.WARNING, "battery low"),) if state == 300 else ()
+        state, outputs = standing(state, inputs)
+        return state, replace(outputs, texts=texts)
+
+    bench = Bench(warning)
+    bench.record.mpc.events.append("the planner was replaced")
+    bench.run(1.0)
+    assert bench.told == [
+        (FIRST_US, "the planner was replaced"),
+        (FIRST_US + 300 * PERIOD_US, "battery low"),
+    ]

@@ -10,6 +10,7 @@ from fsw.signals import ActuatorCommand, CommandAck
 _ARMED: Final = 128  # MAV_MODE_FLAG
 _CUSTOM_MODE: Final = 1
 _LOCKSTEP: Final = 1  # HIL_ACTUATOR_CONTROLS_FLAGS
+_UNUSED_CONTROLS: Final = 10  # of 16
 
 
 def command_ack(ack: CommandAck) -> WireValues:
@@ -18,9 +19,9 @@ def command_ack(ack: CommandAck) -> WireValues:
 
 
 def hil_actuator_controls(
-    t_us: int, actuators: ActuatorCommand, armed: bool, thrust_scale: float, torque_scale: float
-) -> WireValues:
-    """HIL_ACTUATOR_CONTROLS: the answer to the HIL_SENSOR of ``t_us``.
+    t_us: int, actuators: ActuatorCommand, thrust_scale: float, torque_scale: float
+) -> tuple[float, ...]:
+    """HIL_ACTUATOR_CONTROLS up to the last control in use, the answer to a HIL_SENSOR of ``t_us``.
 
     ``thrust_scale`` [1/N] and ``torque_scale`` [1/(N m)] are the inverses of the largest values.
     """
@@ -35,6 +36,9 @@ def hil_actuator_controls(
         f4 * thrust_scale,
         tau1 * torque_scale,
         tau2 * torque_scale,
-        *(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
-        _CUSTOM_MODE | (_ARMED if armed else 0),
     )
+
+
+def end_of_controls(*, armed: bool) -> tuple[float, ...]:
+    """The rest of HIL_ACTUATOR_CONTROLS: controls that are not used, and the mode."""
+    return (*(0.0,) * _UNUSED_CONTROLS, _CUSTOM_MODE | (_ARMED if armed else 0))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import pytest
 
 from fsw.compiled import packed
 from fsw.estimation.error_state import (
@@ -17,7 +18,7 @@ from fsw.estimation.error_state import (
     NOTHING,
     RATE,
 )
-from fsw.estimation.imu import STAYS, STAYS_LONG, add_imu
+from fsw.estimation.imu import STAYS, STAYS_LONG, STEPS_APART, add_imu
 from fsw.estimation.sensor_fault import SensorFault
 from fsw.estimation.tuning import EstimatorTuning
 from fsw.signals import Vec3
@@ -127,3 +128,59 @@ def test_a_model_stands_in_for_the_half_that_is_lost_alone() -> None:
     np.testing.assert_array_equal(unit.last[FORCE : FORCE + 3], held)
     assert unit.read(model=model) is SensorFault.NONE
     assert unit.last[LOST] == 0
+
+
+@pytest.mark.parametrize("axis", range(3))
+@pytest.mark.parametrize("size", [-2.0, -0.15, 0.15, 2.0, 8.0])
+def test_a_step_of_the_gyro_is_noted_and_one_that_comes_back_is_none(
+    axis: int, size: float
+) -> None:
+    unit = Unit()
+    assert not unit.x.step.any(), "noise makes none"
+    off = np.zeros(3)
+    off[axis] = size
+
+    def said(share: float) -> Vec3:
+        reading: Vec3 = tuple((share * off + 0.01 * unit.random.standard_normal(3)).tolist())  # type: ignore[assignment]
+        return reading
+
+    unit.read(rate=said(1.0))
+    stepped = unit.now
+    np.testing.assert_allclose(unit.x.step, off, atol=0.06)
+    for _ in range(100):
+        unit.read(rate=said(1.0))
+    assert unit.x.stepped == stepped, "it stays"
+    unit.read(rate=said(0.0))
+    np.testing.assert_allclose(unit.x.step, 0.0, atol=0.1)
+    for _ in range(round(STEPS_APART / TICK) + 1):
+        unit.read(rate=said(0.0))
+    unit.read(rate=said(-1.0))
+    np.testing.assert_allclose(unit.x.step, -off, atol=0.06)
+
+
+def test_a_body_that_turns_as_hard_as_rotors_can_makes_no_step() -> None:
+    unit, rate = Unit(), np.zeros(3)
+    for k in range(300):
+        rate = rate + TICK * 17.0 * np.array([1.0, -1.0, 0.0]) * (1 if k % 100 < 50 else -1)
+        noise = 0.005 * unit.random.standard_normal(3)
+        unit.read(rate=tuple((rate + noise).tolist()))  # type: ignore[arg-type]
+    assert not unit.x.step.any()
+
+
+def test_what_shakes_harder_for_a_while_is_no_step_any_more() -> None:
+    unit = Unit()
+    for _ in range(500):
+        noise: Vec3 = tuple((0.1 * unit.random.standard_normal(3)).tolist())  # type: ignore[assignment]
+        unit.read(rate=noise)
+    settled = unit.now
+    for _ in range(500):
+        noise = tuple((0.1 * unit.random.standard_normal(3)).tolist())  # type: ignore[assignment]
+        unit.read(rate=noise)
+    assert unit.x.stepped <= settled
+
+
+def test_readings_that_are_missing_make_no_step() -> None:
+    unit = Unit()
+    unit.now += 0.1
+    unit.read(rate=(1.0, 0.0, 0.0))
+    assert not unit.x.step.any(), "a vehicle turns so far meanwhile"

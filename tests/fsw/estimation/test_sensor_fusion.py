@@ -526,11 +526,12 @@ def replace_suite(flown: Run, suite: Suite) -> Run:
 
 
 def test_a_wider_gate_lets_a_farther_reading_in() -> None:
+    # A single one that is off by little may be the IMU's fault: that is said 0.7 s later.
     aside = at(1.2, lambda s: replace(s, position=(s.position[0] + 0.01, *s.position[1:])))
     wide = replace(MOCAP, tuning=replace(MOCAP.tuning, pose_gate=20.0))
-    narrow = Flown(run(MOCAP, 4, 1.5), aside)
+    narrow = Flown(run(MOCAP, 4, 2.0), aside)
     assert narrow.found == {(Sensor.POSE, SensorFault.JUMP)}
-    assert not Flown(replace_suite(run(MOCAP, 4, 1.5), wide), aside).found
+    assert not Flown(replace_suite(run(MOCAP, 4, 2.0), wide), aside).found
 
 
 @pytest.mark.parametrize("readings", [1, 3])

@@ -70,6 +70,7 @@ class Evidence:
     gcs_silent_us: int = 0
     battery: BatteryState = field(default_factory=BatteryState)
     silent_zones: int = 0
+    refusals: tuple[str, ...] = ()
     safety: SafetyMemory = field(default_factory=SafetyMemory)
     aiding: Aiding = AIDED
     kept: KeptSet = AMPLE
@@ -94,7 +95,7 @@ class Evidence:
             plan=replace(self.plan, since_us=NOW_US - self.plan_age_us, refused=self.plan_refused),
             offboard=OffboardMemory(motion_us=NOW_US - self.setpoint_age_us),
             battery=self.battery,
-            mission=MissionMemory(silent_zones=self.silent_zones),
+            mission=MissionMemory(silent_zones=self.silent_zones, refusals=self.refusals),
             safety=self.safety,
             aiding=self.aiding,
             host=self.host,
@@ -150,6 +151,7 @@ def test_nothing_wrong_is_no_condition() -> None:
 
 @pytest.mark.requirement(
     "REQ-ARM-1",
+    "REQ-ARM-7",
     "REQ-EST-3",
     "REQ-EST-8",
     "REQ-EST-9",
@@ -197,6 +199,7 @@ def test_nothing_wrong_is_no_condition() -> None:
         (replace(FINE, battery=charged(Charge.LOW)), Condition.BATTERY_LOW),
         (replace(FINE, battery=charged(Charge.CRITICAL)), Condition.BATTERY_CRITICAL),
         (replace(FINE, battery=charged(Charge.EMERGENCY)), Condition.BATTERY_EMERGENCY),
+        (replace(FINE, refusals=("lambda is too large",)), Condition.PARAMETERS_CONTRADICT),
     ],
 )
 def test_each_evidence_is_its_condition(evidence: Evidence, condition: Condition) -> None:
@@ -619,7 +622,7 @@ def test_a_fault_is_the_vehicles_own() -> None:
     others |= {Condition.ZONES_SILENT, Condition.FLIGHT_TIME_LOW, Condition.PLAN_LATE}
     others |= {Condition.TIME_JUMPED, Condition.LOOP_OVERRUN, Condition.CLOCK_JUMPED}
     others |= {Condition.LINK_FLOODED, Condition.LOG_STOPPED, Condition.DISK_FULL}
-    others |= {Condition.ROOM_LACKING}
+    others |= {Condition.ROOM_LACKING, Condition.PARAMETERS_CONTRADICT}
     others |= {Condition.BATTERY_CRITICAL, Condition.BATTERY_EMERGENCY}
     assert set(Condition) - others == FAULTS
 

@@ -23,7 +23,15 @@ from fsw.flight.failsafe import (
     allowed,
     respond,
 )
-from fsw.flight.state import Aiding, Damage, FlightState, OffboardMemory, PlanMemory, SafetyMemory
+from fsw.flight.state import (
+    Aiding,
+    Damage,
+    FlightState,
+    MissionMemory,
+    OffboardMemory,
+    PlanMemory,
+    SafetyMemory,
+)
 from fsw.parameters.flight_config import FlightConfig
 from fsw.signals import (
     ActuatorReport,
@@ -367,6 +375,7 @@ HAPPENS: dict[Condition, dict[str, Any]] = {
     Condition.BATTERY_CRITICAL: {"battery": charge(Charge.CRITICAL)},
     Condition.BATTERY_EMERGENCY: {"battery": charge(Charge.EMERGENCY)},
     Condition.FLIGHT_TIME_LOW: {"battery": BatteryState(time_left=1.0)},
+    Condition.PARAMETERS_CONTRADICT: {"mission": MissionMemory(refusals=("too little room",))},
 }
 
 
@@ -380,6 +389,7 @@ HAPPENS: dict[Condition, dict[str, Any]] = {
     "REQ-EST-8",
     "REQ-ACT-5",
     "REQ-ACT-7",
+    "REQ-ARM-7",
 )
 @pytest.mark.parametrize("condition", HAPPENS, ids=lambda condition: condition.name)
 def test_a_condition_is_told_within_the_time_of_its_row(condition: Condition) -> None:
@@ -402,6 +412,22 @@ def test_no_row_is_silent_in_flight() -> None:
     context = FailsafeContext(flying(Mode.MISSION, gcs_heard_us=0), estimate, CONFIG)
     for row in FAILSAFES:
         assert row.action(context) is not Action.NONE, row.condition
+
+
+@pytest.mark.requirement("REQ-ARM-7")
+def test_parameters_that_contradict_each_other_are_told_once_and_again_when_others_do() -> None:
+    contradictory = limits(battery_low=0.05, battery_critical=0.1)
+    watched = Watched(contradictory).heard().until(5.0)
+    words = "parameters contradict each other: BAT_CRIT_THR 0.1 is to be below BAT_LOW_THR, 0.05"
+    assert watched.texts == [words]
+    assert watched.flown == (Mode.MISSION, None), "it warns, whatever is flown"
+    smaller = MissionMemory(refusals=("lambda is too large",))
+    watched.heard().until(9.0, mission=smaller)
+    assert watched.texts == [words, f"{words}; lambda is too large"]
+    watched.heard().until(10.0, mission=MissionMemory())
+    assert len(watched.texts) == 3, "the pair alone again"
+    ended = Watched(state=watched.state, now_us=watched.now_us).heard().until(11.0)
+    assert ended.texts == ["over: parameters contradict each other, after 10.0 s"]
 
 
 BOTH = (Condition.DATALINK_LOST, Condition.BREACH)  # any two, of which the first is delayed

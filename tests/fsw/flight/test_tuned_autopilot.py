@@ -7,6 +7,7 @@ from dataclasses import replace
 import pytest
 
 from fsw.flight.autopilot import Autopilot
+from fsw.flight.failsafe import Condition
 from fsw.flight.plan_exchange import nominal_at_rest
 from fsw.flight.state import FlightState
 from fsw.flight.tuned_autopilot import TunedAutopilot
@@ -98,9 +99,13 @@ def test_what_breaks_an_inequality_is_not_taken_while_armed_unless_softly(
     state, outputs = tick(loop, walled(mode), UNSAFE)
     assert outputs.tuning_taken is taken
     assert state.tuning == (UNSAFE if taken else ())
-    warnings = [text.text for text in outputs.texts if text.severity is Severity.WARNING]
-    assert warnings
-    assert all(text.startswith("refused while armed: ") is not taken for text in warnings)
+    begins = {
+        text.text.partition(": ")[0] for text in outputs.texts if text.severity is Severity.WARNING
+    }
+    contradict = Condition.PARAMETERS_CONTRADICT.value
+    assert ("refused while armed" in begins) is not taken
+    assert (contradict in begins) is (mode is Mode.DISARMED), "told once, by its row"
+    assert len(begins) == 1
     # Disarmed it stands against arming from now on.
     assert bool(state.mission.refusals) is (mode is Mode.DISARMED)
 

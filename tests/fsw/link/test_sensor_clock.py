@@ -6,6 +6,8 @@ import itertools
 import random
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from fsw.link.sensor_clock import SensorClock
 
@@ -28,10 +30,15 @@ class RealTime:
             self.look(BEGIN_US + PERIOD_US * k)
 
     def look(self, *stamps: int) -> int | None:
+        """Steps of a simulator that does not number its frames."""
+        return self.numbered(*((t_us, 0) for t_us in stamps))
+
+    def numbered(self, *steps: tuple[int, int]) -> int | None:
+        """Steps by their stamps and the numbers of their frames."""
         self.now_us += PERIOD_US
         newest = None
-        for t_us in stamps:
-            if self.steps.follows(t_us):
+        for t_us, number in steps:
+            if self.steps.follows(t_us, number):
                 newest = t_us - self.steps.ahead_us
         self.steps.looks += 1
         if newest is not None:
@@ -139,19 +146,85 @@ def test_from_five_steps_on_a_clock_that_goes_back_is_told(steps_back: int) -> N
     assert flight.jumps == ([-PERIOD_US * steps_back] if steps_back >= 5 else [])
 
 
+FRAMES = 4  # a step
+
+
+class Network:
+    """Numbers steps as they are sent, and loses, doubles and delays them, by up to 40 ms."""
+
+    def __init__(self, chance: random.Random, lost: float, doubled: float, late: float) -> None:
+        self.flight = RealTime()
+        self.number = 0
+        self._chance = chance
+        self._lost, self._doubled, self._late = lost, doubled, late
+        self._due: dict[int, list[tuple[int, int]]] = {}  # steps by the look at which they come
+
+    def send(self, k: int, t_us: int, *, surely: bool = False) -> None:
+        self.number = (self.number + FRAMES) % 256
+        step = (t_us, self.number)
+        come = [] if self._chance.random() < self._lost else [0]
+        if self._chance.random() < self._late:
+            come = [self._chance.randint(1, 20)]
+        if self._chance.random() < self._doubled:
+            come.append(self._chance.randint(0, 20))
+        for later in [0, *come[1:]] if surely else come:
+            self._due.setdefault(k + later, []).append(step)
+        steps = self._due.pop(k, [])
+        self._chance.shuffle(steps)
+        self.flight.numbered(*steps)
+
+
+shares = st.floats(0.0, 0.3)
+
+
+@pytest.mark.requirement("REQ-TIME-4")
+@settings(deadline=None, max_examples=200)
+@given(st.integers(0, 2**32), shares, shares, shares, st.integers(0, 25))
+def test_a_clock_that_goes_back_by_a_tick_is_told_and_no_late_or_doubled_step_is(
+    seed: int, lost: float, doubled: float, late: float, steps_back: int
+) -> None:
+    """Whatever the network does to other steps; of the two at the jump it delays none."""
+    network = Network(random.Random(seed), lost, doubled, late)
+    for k in range(10, 300):
+        back_us = PERIOD_US * steps_back if k >= 200 else 0
+        network.send(k, after(k) - back_us, surely=k in (199, 200))
+    flight = network.flight
+    assert flight.jumps == ([-PERIOD_US * steps_back] if 0 < steps_back <= 20 else flight.jumps)
+    assert steps_back or not flight.jumps
+    known = [one for one in flight.times if one is not None]
+    assert all(a < b for a, b in itertools.pairwise(known))
+    assert known[-1] <= after(299)
+
+
+def test_where_nothing_is_numbered_four_steps_are_needed() -> None:
+    flight = RealTime()
+    for k in range(10, 30):
+        flight.look(after(k) - 3 * PERIOD_US)
+    assert flight.jumps == []
+
+
+def test_a_step_that_is_repeated_in_lockstep_may_be_numbered_anew() -> None:
+    jumps: list[int] = []
+    steps = SensorClock(PERIOD_US, lambda: 0, lambda _: None, jumps.append)
+    for k in range(10):
+        assert steps.follows(BEGIN_US + PERIOD_US * k, 2 * k)
+        assert not steps.follows(BEGIN_US + PERIOD_US * k, 2 * k + 1)
+    assert jumps == []
+
+
 def test_in_lockstep_a_repeated_old_step_counts_after_a_silence_alone() -> None:
     jumps: list[int] = []
     steps = SensorClock(PERIOD_US, lambda: 0, lambda _: None, jumps.append)
-    assert [steps.follows(BEGIN_US + PERIOD_US * k) for k in range(10)] == [True] * 10
+    assert [steps.follows(BEGIN_US + PERIOD_US * k, 0) for k in range(10)] == [True] * 10
     for _ in range(5):
-        assert not steps.follows(BEGIN_US)
-        assert not steps.follows(BEGIN_US + PERIOD_US)
+        assert not steps.follows(BEGIN_US, 0)
+        assert not steps.follows(BEGIN_US + PERIOD_US, 0)
     steps.silences += 1
-    assert not steps.follows(BEGIN_US)
-    assert not steps.follows(BEGIN_US)
-    assert steps.follows(BEGIN_US + PERIOD_US * 10)
-    assert not steps.follows(BEGIN_US)
+    assert not steps.follows(BEGIN_US, 0)
+    assert not steps.follows(BEGIN_US, 0)
+    assert steps.follows(BEGIN_US + PERIOD_US * 10, 0)
+    assert not steps.follows(BEGIN_US, 0)
     steps.silences += 1
-    assert steps.follows(BEGIN_US)
+    assert steps.follows(BEGIN_US, 0)
     assert jumps == [-PERIOD_US * 11]
     assert steps.ahead_us == -PERIOD_US * 11

@@ -13,6 +13,8 @@ CELLS = [
     ("offboard", "encoder-slow-mocap"),
     ("land", "accel-garbage-mocap"),
     ("hold", "accel-wrong-mocap"),
+    ("trajectory", "accel-wrong-mocap"),
+    ("hold", "gyro-wrong-mocap"),
     ("mission", "gyro-stuck-mocap"),
     ("hold", "gyro-delayed-mocap"),
     ("hold", "vio-garbage-mocap"),

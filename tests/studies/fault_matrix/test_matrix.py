@@ -79,6 +79,26 @@ def test_what_is_not_as_it_must_be_is_named(flight: FaultFlight, differs: tuple[
     assert differences("orbit", LAND_SOON, flight) == differs
 
 
+def test_what_must_come_of_it_in_the_end_may_not_be_left_out() -> None:
+    lost = replace(LAND_SOON, then=("hold", "descend"), last=("descend",))
+    assert not differences("orbit", lost, replace(FINE, actions=("hold", "descend")))
+    assert not differences("orbit", lost, replace(FINE, actions=("descend",)))
+    differs = differences("orbit", lost, replace(FINE, actions=("hold",)))
+    assert differs == ("hold; must end with descend",)
+    assert differences("orbit", lost, replace(FINE, actions=())) == (
+        "goes on; must be hold or descend",
+    )
+
+
+@pytest.mark.parametrize(
+    "name", ["vio-off", "gps-off-rtk", "gyro-off", "motor-off-2", "joint-off-1"]
+)
+def test_what_needs_an_action_may_not_go_on(name: str) -> None:
+    for mode, expected in expectations()[name].modes.items():
+        if mode != "land":
+            assert "goes on" not in expected.then, mode
+
+
 def test_a_vehicle_that_holds_or_lands_already_goes_on() -> None:
     going_on = replace(FINE, actions=())
     hold = replace(LAND_SOON, then=("hold",))
@@ -103,6 +123,7 @@ def test_contact_with_the_ground_is_not_contact_with_a_wall() -> None:
         ('[[faults]]\nunit = ["gyro"]', 'unknown key "unit"'),
         ('[[faults]]\nthen = ["stop"]', "then: 'stop' is not one of goes on"),
         ("[[faults]]", "then must name at least one"),
+        ('[[faults]]\nthen = ["hold"]\nlast = ["land"]', "last = ['land']: must be among then"),
         ('[[faults]]\nthen = ["hold"]\ncontact = "ground"', "needs a reason"),
         ('[[faults]]\nthen = ["hold"]\ntold_within_s = -1', "told_within_s = -1"),
         ('[[faults]]\nthen = ["hold"]\nnames = "("', "names = '(' is no regular expression"),
@@ -195,7 +216,7 @@ def test_a_matrix_is_resumed_from_its_journal_and_judged_anew(
 
     def count(cell: Cell) -> FaultFlight:
         flown.append(cell.mode)
-        return FINE
+        return replace(FINE, actions=("descend",))
 
     monkeypatch.setattr(Cell, "row", count)
     journal, found = str(tmp_path / "flown.jsonl"), tmp_path / "cells.json"
@@ -207,7 +228,7 @@ def test_a_matrix_is_resumed_from_its_journal_and_judged_anew(
     strict = tmp_path / "strict.toml"
     strict.write_text('[[faults]]\nunits = ["vio"]\nkinds = ["off"]\nthen = ["terminate"]\n')
     assert main([*words, "--expect", str(strict)]) == 1
-    assert "land; must be terminate" in capsys.readouterr().out
+    assert "descend; must be terminate" in capsys.readouterr().out
     assert flown == ["land"]
 
 

@@ -329,8 +329,9 @@ def test_there_is_nothing_to_say_before_the_first_plan() -> None:
 
 
 def test_actuators_are_fractions_of_their_limits() -> None:
-    values = encode_replies.hil_actuator_controls(3_004_000, ACTUATORS, True, 1 / 16.0, 1 / 2.0)
-    message = decoded(FrameWriter(1, 1).frame(ids.HIL_ACTUATOR_CONTROLS, *values))
+    values = encode_replies.hil_actuator_controls(3_004_000, ACTUATORS, 1 / 16.0, 1 / 2.0)
+    end = encode_replies.end_of_controls(armed=True)
+    message = decoded(FrameWriter(1, 1).frame(ids.HIL_ACTUATOR_CONTROLS, *values, *end))
     assert message.time_usec == 3_004_000
     assert message.controls[:6] == pytest.approx([0.5, 0.25, 0.75, 1.0, 0.5, -0.25])
     assert message.mode & 128
