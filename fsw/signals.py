@@ -618,6 +618,8 @@ class FailsafeEvent(NamedTuple):
     action: str  # what is done about it
     severity: Severity
     over: bool = False  # it has ended
+    later: str = ""  # what is done when ``delay_us`` has passed, unless it ends; empty: nothing
+    delay_us: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -627,6 +629,7 @@ class StatusText:
     severity: Severity
     text: str
     event: FailsafeEvent | None = None  # that it is about
+    prompt: bool = False  # an answer, or a change of mode: news even in the same words
 
 
 @dataclass(frozen=True, slots=True)

@@ -31,8 +31,9 @@ _RULES = """\
 ## Arming checks
 
 Each check that fails is a sentence behind `not armed:`, and in the answer to
-RUN_PREARM_CHECKS. Forced arming overrides all but an invalid estimate. The table is that of
-`fsw/flight/arming.py`; how to read it: [arming](../concepts/failsafes.md#arming).
+RUN_PREARM_CHECKS. Forced arming overrides all but an invalid estimate and a flight that was
+terminated. The table is that of `fsw/flight/arming.py`; how to read it:
+[arming](../concepts/failsafes.md#arming).
 
 {checks}
 """

@@ -48,6 +48,7 @@ from fsw.measurements import (
 )
 from fsw.signals import StateEstimate, Vec2, Vec3, Vec4
 
+_FARTHEST_BEHIND: Final = 0.1  # s, that the filter stays behind while there is nothing to fuse
 LATE: Final = 0.01  # s behind the filter, where a measurement is still fused as it stands
 _MARGIN: Final = 0.003  # s, by which a measurement may take longer than lately
 ENCODERS_TOO_OLD: Final = 0.05  # s; what torques made of the joints since is too uncertain
@@ -259,7 +260,10 @@ class SensorFusion:
         *,
         silent: bool = False,
     ) -> tuple[FusionMemory, StateEstimate | None]:
-        """``take_in`` and ``catch_up``; the state at ``now`` [s] after both."""
+        """``take_in`` and ``catch_up``; the state at ``now`` [s] after both.
+
+        ``joint_acceleration`` [rad/s^2, joints] and ``model`` [SI, FRD] are theirs.
+        """
         memory, _ = self.take_in(
             memory, samples, now, joint_acceleration, watch, model, silent=silent
         )
@@ -306,6 +310,22 @@ class SensorFusion:
         if known is None:
             return (_anew(memory) if ready else memory), None
         return memory, StateEstimate(round(1e6 * now), *known)
+
+    def is_caught_up(self, memory: FusionMemory, samples: Sequence[Sample], now: float) -> bool:
+        """Whether ``catch_up`` at ``now`` [s] would change nothing that the next one would not.
+
+        So it is in half of the ticks with motion capture. The filter may stay where it is: the
+        state is made of the IMU's readings since.
+        """
+        for sample in samples:
+            if not isinstance(sample, _OF_EVERY_TICK):
+                return False
+        if not memory.started or memory.dispute is not None:
+            return False
+        waits = memory.waiting
+        if waits:
+            return waits[0].time > now - memory.delay - _MARGIN
+        return bool(now - memory.numbers[0]["time"] < _FARTHEST_BEHIND)
 
     def catch_up(
         self, memory: FusionMemory, samples: Sequence[Sample], now: float, model: Vec3 = UNKNOWN

@@ -9,7 +9,9 @@ from enum import Enum
 from typing import Final
 
 from fsw.flight.modes.base import CommandContext
+from fsw.signals import Mode
 
+_INVALID: Final = "the state estimate is invalid"
 _SWINGING: Final = 2.0  # rad/s of a joint
 _BEYOND: Final = 0.1  # rad that a joint may be beyond its limit: it rests on its end stop
 
@@ -17,6 +19,7 @@ _BEYOND: Final = 0.1  # rad that a joint may be beyond its limit: it rests on it
 class Subject(Enum):
     """What a check is about."""
 
+    TERMINATION = "termination"
     ESTIMATOR = "estimator"
     ATTITUDE = "attitude"
     SENSORS = "sensors"
@@ -37,10 +40,16 @@ class ArmingCheck:
     summary: str  # what is wrong, in words that never change
     refusal: Callable[[CommandContext], str]
     permanent: bool = False  # waiting does not help
+    final: bool = False  # where it fails nothing else is worth a look, and force does not help
+
+
+def _terminated(context: CommandContext) -> str:
+    ended = context.mode is Mode.FAULT
+    return "the flight was terminated; restart the flight software" if ended else ""
 
 
 def _estimate(context: CommandContext) -> str:
-    return "" if context.estimate_valid else "the state estimate is invalid"
+    return "" if context.estimate_valid else _INVALID
 
 
 def _attitude(context: CommandContext) -> str:
@@ -88,7 +97,10 @@ def _storage(context: CommandContext) -> str:
 
 
 CHECKS: Final = (
-    ArmingCheck(Subject.ESTIMATOR, "The state estimate is invalid", _estimate),
+    ArmingCheck(
+        Subject.TERMINATION, "The flight was terminated", _terminated, permanent=True, final=True
+    ),
+    ArmingCheck(Subject.ESTIMATOR, "The state estimate is invalid", _estimate, final=True),
     ArmingCheck(
         Subject.ESTIMATOR,
         "The position is not measured, or the attitude not known",
@@ -117,16 +129,21 @@ CHECKS: Final = (
 
 Failed = tuple[tuple[int, str], ...]
 """What speaks against arming: the check's place in the table, and a sentence."""
+NO_ESTIMATE: Final = (
+    next(number for number, check in enumerate(CHECKS) if check.refusal is _estimate),
+    _INVALID,
+)
+"""What speaks against it before the first estimate, when nothing else can be looked at."""
 
 
 def failed(context: CommandContext) -> Failed:
-    """The checks that fail; behind an invalid estimate nothing is worth a look."""
+    """The checks that fail, up to the first one that is final."""
     found: list[tuple[int, str]] = []
     for number, check in enumerate(CHECKS):
         sentence = check.refusal(context)
         if sentence:
             found.append((number, sentence))
-            if not context.estimate_valid:
+            if check.final:
                 break
     return tuple(found)
 
@@ -137,10 +154,10 @@ def joined(found: Failed) -> str:
 
 
 def refusal(context: CommandContext, *, force: bool = False) -> str | None:
-    """Why the vehicle cannot be armed now; force overrides all but a missing estimate."""
-    if force and context.estimate_valid:
-        return None
+    """Why the vehicle cannot be armed now; force overrides all checks that are not final."""
     found = failed(context)
+    if force:
+        found = tuple([(number, why) for number, why in found if CHECKS[number].final])
     return joined(found) if found else None
 
 

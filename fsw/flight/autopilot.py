@@ -25,6 +25,7 @@ from fsw.estimation.estimator import estimate_state
 from fsw.estimation.frame_trust import FrameTrust
 from fsw.estimation.sensor_fusion import FusionMemory
 from fsw.flight.accuracy_watch import AccuracyWatch
+from fsw.flight.before_estimate import nothing_known, told
 from fsw.flight.commander import Commander, acknowledgement
 from fsw.flight.damage_watch import DamageWatch
 from fsw.flight.descent import Descent
@@ -189,7 +190,7 @@ class Autopilot:
             state, trust, estimate = self._exact.estimate(state, inputs, texts)
         state = self._receive(state, inputs, texts)
         if estimate is None:
-            return _blind(state, inputs, texts)._replace(fusion=fusion, caught=caught)
+            return self._blind(state, inputs, texts)._replace(fusion=fusion, caught=caught)
 
         acks: list[CommandAck] = []
         if inputs.commands:
@@ -245,8 +246,10 @@ class Autopilot:
             if reset is not None:
                 nominal, memory = moved_along(nominal, memory, reset)
         if c.estimate is None or estimate is None:
-            unknown = _nothing_known(answer, inputs, texts)
-            return (state if fusion is None else replace(state, fusion=fusion)), unknown
+            # Ticks are counted from the first estimate on; what looks now and then goes by time.
+            t_us = inputs.sensors.t_us
+            unknown = nothing_known(answer, state, t_us, texts)
+            return replace(state, t_us=t_us, fusion=fusion), unknown
         now_us, per_plan = inputs.sensors.t_us, self._ticks_per_plan
         index = state.index + c.ticks
         request = None
@@ -266,11 +269,12 @@ class Autopilot:
             state = self._sensed.reported(state, fusion, estimate, covariance)
             state, accuracy = self._see_accuracy(state, estimate, covariance, pose)
             texts = (*texts, *accuracy)
-            safety = self._watch.breach(safety, estimate, state.constraints, flies=flown)
+            announced = len(state.mission.announced.zones)
+            safety = self._watch.breach(safety, estimate, state.constraints, announced, flies=flown)
         pushed, margin = c.guarded
         if pushed or safety.filter_us >= 0:
             safety = self._watch.filtered(safety, now_us, pushed=pushed)
-        if safety.breach_us >= 0 or not margin >= 0.0:
+        if not margin >= 0.0:
             safety = self._breached(state, safety, estimate, margin)
         damage, watch = self._see_damage(
             state, memory, estimate, c.ticks, flown and not c.trust.doubted
@@ -309,6 +313,19 @@ class Autopilot:
         taken = answer.tuning_taken
         return state, TickOutputs(answer.actuators, snapshot, request, answer.acks, texts, taken)
 
+    def _blind(self, state: FlightState, inputs: TickInputs, texts: list[StatusText]) -> Controlled:
+        """Before the first estimate: actuators off, commands refused."""
+        acks = [
+            acknowledgement(command, CommandResult.TEMPORARILY_REJECTED)
+            for command in inputs.commands
+        ]
+        if acks:
+            reason = "command refused: there is no valid state estimate yet"
+            texts.append(StatusText(Severity.CRITICAL, reason, prompt=True))
+        texts += told(state, self._tick_us)
+        answer = Answer(STOPPED, False, Mode.DISARMED, tuple(acks), tuple(texts))
+        return Controlled(answer, inputs, state, state.cascade)
+
     def _with_evidence(self, state: FlightState, estimate: StateEstimate) -> FlightState:
         """What the failsafe table looks at and what is not kept up to date elsewhere."""
         safety, watch = state.safety, self._watch
@@ -339,14 +356,10 @@ class Autopilot:
     def _breached(
         self, state: FlightState, safety: SafetyMemory, estimate: StateEstimate, margin: float
     ) -> SafetyMemory:
-        """The memory of a breach with the ``margin`` [m] seen now; at its begin, of what it is."""
-        if not margin >= 0.0:
-            safety = self._watch.margin(safety, estimate.t_us, margin)
-        if state.safety.breach_us >= 0:
-            return safety
+        """The memory of a breach with the negative ``margin`` [m] that the safety filter sees."""
         report = self._safe_sets.margins(state.kept, estimate, state.reference)
-        of_fence = self._watch.of_fence(report, len(state.mission.announced.zones))
-        return replace(safety, breach_of_fence=of_fence)
+        announced = len(state.mission.announced.zones)
+        return self._watch.breach(safety, estimate, report, announced, flies=True, seen=margin)
 
     def _receive(
         self, state: FlightState, inputs: TickInputs, texts: list[StatusText]
@@ -647,51 +660,3 @@ def frozen_arm(
 def _faults(conditions: tuple[Condition, ...]) -> tuple[str, ...]:
     """The vehicle's own faults among the active conditions."""
     return tuple([c.value for c in conditions if c in FAULTS]) if conditions else ()
-
-
-def _blind(state: FlightState, inputs: TickInputs, texts: list[StatusText]) -> Controlled:
-    """Before the first valid sensor frame: actuators off, commands refused."""
-    acks = [
-        acknowledgement(command, CommandResult.TEMPORARILY_REJECTED) for command in inputs.commands
-    ]
-    if acks:
-        reason = "command refused: there is no valid state estimate yet"
-        texts.append(StatusText(Severity.CRITICAL, reason))
-    answer = Answer(STOPPED, False, Mode.DISARMED, tuple(acks), tuple(texts))
-    return Controlled(answer, inputs, state, state.cascade)
-
-
-def _nothing_known(
-    answer: Answer, inputs: TickInputs, texts: tuple[StatusText, ...]
-) -> TickOutputs:
-    """What a vehicle says that does not know its state yet."""
-    zero = (0.0, 0.0, 0.0)
-    level = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
-    nowhere = StateEstimate(
-        t_us=inputs.sensors.t_us,
-        p_WB=zero,
-        v_WB=zero,
-        R_WB=level,
-        w_WB_B=zero,
-        yaw=0.0,
-        q_arm=(0.0, 0.0),
-        qd_arm=(0.0, 0.0),
-    )
-    empty = FlightState()
-    snapshot = FlightSnapshot(
-        t_us=inputs.sensors.t_us,
-        mode=answer.mode,
-        armed=answer.armed,
-        estimate=nowhere,
-        reference=None,
-        plan_state=None,
-        plan_input=None,
-        actuators=answer.actuators,
-        plan=None,
-        plan_status=empty.plan.status,
-        counters=empty.plan.counters,
-        constraints=empty.constraints,
-        failures=(Condition.ESTIMATE_INVALID.value,),
-    )
-    taken = answer.tuning_taken
-    return TickOutputs(answer.actuators, snapshot, None, answer.acks, texts, taken)

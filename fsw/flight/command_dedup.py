@@ -1,4 +1,8 @@
-"""A command that is sent again because its ACK was lost must not act twice."""
+"""A command that is sent again because its ACK was lost must not act twice.
+
+Answers are remembered for as long as nothing else has changed what the vehicle does: the commander
+forgets them when a failsafe or another command does.
+"""
 
 from __future__ import annotations
 

@@ -322,7 +322,10 @@ def _continue_mission(context: CommandContext, modes: Modes) -> Decision:
 def _check_arming(context: CommandContext, modes: Modes) -> Decision:
     if _is_armed(context):
         return Decision(LATER, "no checks: the vehicle is armed")
-    return Decision(ACCEPTED, arming.refusal(context) or "ready to arm")
+    refusal = arming.refusal(context)
+    if refusal is not None and context.mode is Mode.FAULT:
+        return Decision(DENIED, refusal)
+    return Decision(ACCEPTED, refusal or "ready to arm")
 
 
 def _nothing(context: CommandContext, modes: Modes) -> Decision:

@@ -130,8 +130,6 @@ class Commander:
         """
         if state.vehicle.armed:
             return "", _ARMED
-        if state.vehicle.mode is Mode.FAULT:
-            return "terminated: restart the flight software", _ARMED
         found = arming.failed(self.context(state, estimate))
         report = ArmingReport(tuple([number for number, _ in found]))
         sentence = arming.joined(found) if found else ""
@@ -215,7 +213,8 @@ class Commander:
         if forgotten is None:
             return state
         texts.append(StatusText(Severity.WARNING, forgotten))
-        return replace(state, vehicle=replace(state.vehicle, intended_mode=Mode.HOLD))
+        vehicle = replace(state.vehicle, intended_mode=Mode.HOLD, answered=())
+        return replace(state, vehicle=vehicle)
 
     def _carry_out(
         self,
@@ -226,6 +225,9 @@ class Commander:
     ) -> FlightState:
         if decision.result != CommandResult.ACCEPTED:
             return state
+        if _changes_course(decision):
+            # Another sender's command is not done any more: it acts again if it is sent again.
+            state = _without_answers(state)
         state = self._remember(state, decision, estimate)
         if decision.arm:
             state = self._arm(state, estimate, texts)
@@ -372,6 +374,8 @@ class Commander:
         vehicle = replace(
             state.vehicle,
             mode=mode,
+            # What follows from a mode that was completed is what its command led to.
+            answered=state.vehicle.answered if completed else (),
             mode_origin=origin.p_WE,
             mode_yaw=origin.yaw,
             mode_begin_us=estimate.t_us,
@@ -390,6 +394,24 @@ def acknowledgement(command: Command, result: int) -> CommandAck:
     """The answer to its sender."""
     request = command.request
     return CommandAck(request.command, result, request.source_system, request.source_component)
+
+
+def _changes_course(decision: Decision) -> bool:
+    """Whether a decision changes what the vehicle does, or will do when it is armed."""
+    return (
+        decision.arm
+        or decision.stop
+        or decision.mode is not None
+        or decision.intended_mode is not None
+        or decision.goal is not None
+        or decision.joints is not None
+    )
+
+
+def _without_answers(state: FlightState) -> FlightState:
+    if not state.vehicle.answered:
+        return state
+    return replace(state, vehicle=replace(state.vehicle, answered=()))
 
 
 def _blocked(vehicle: VehicleMemory) -> str:
@@ -419,4 +441,4 @@ def _reason(decision: Decision) -> tuple[StatusText, ...]:
         return ()
     harmless = decision.result == CommandResult.ACCEPTED and not decision.alarming
     severity = Severity.INFO if harmless else Severity.CRITICAL
-    return (StatusText(severity, decision.reason),)
+    return (StatusText(severity, decision.reason, prompt=True),)

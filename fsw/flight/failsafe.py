@@ -519,29 +519,30 @@ FAILSAFES: Final = (
     ),
     Failsafe(
         Condition.BREACH,
-        lambda c: c.state.safety.breach_us >= 0 and not c.state.safety.breach_of_fence,
+        lambda c: c.state.safety.breach_us >= 0,
         lambda c: _on_breach(c, c.limits.breach_action),
         Severity.CRITICAL,
         detail=lambda c: _by_mm(c.state.safety.breach_by),
         of_vehicle=True,
-        detected="in flight, a margin of a part of the vehicle is negative by its own estimate: "
+        detected="in flight, a margin of a part of the vehicle to a zone that was announced is "
+        "negative by its own estimate: "
         "each tick for hull, rotors, feet and arm ends near a zone, each planning period for "
         "everything",
         within_us=_SLOWLY,
         parameters=("SAFE_BREACH_ACT",),
-        ends="every margin has been above 10 mm for 0.5 s",
+        ends="every such margin has been above 10 mm for 0.5 s",
     ),
     Failsafe(
         Condition.FENCE_BREACH,
-        lambda c: c.state.safety.breach_us >= 0 and c.state.safety.breach_of_fence,
+        lambda c: c.state.safety.fence_us >= 0,
         lambda c: _on_breach(c, c.limits.fence_action),
         Severity.CRITICAL,
-        detail=lambda c: _by_mm(c.state.safety.breach_by),
+        detail=lambda c: _by_mm(c.state.safety.fence_by),
         of_vehicle=True,
-        detected="the same, and the zone that is breached most is of an uploaded fence",
+        detected="the same to a zone of an uploaded fence",
         within_us=_SLOWLY,
         parameters=("GF_ACTION",),
-        ends="every margin has been above 10 mm for 0.5 s",
+        ends="every such margin has been above 10 mm for 0.5 s",
     ),
     Failsafe(
         Condition.ROTOR_LOST,
@@ -672,8 +673,9 @@ FAILSAFES: Final = (
         lambda c: c.state.invalid_ticks >= INVALID_TICKS,
         _always(Action.WARN),
         of_vehicle=True,
-        detected="on the ground, no valid sensor frame for 5 ticks (10 ms)",
-        does="warning; no arming. Telemetry goes on and shows it",
+        detected="on the ground, no estimate for 5 ticks (10 ms), or for 1 s after the start",
+        does="warning, at the start with the sensors that have never come; no arming. Telemetry "
+        "goes on and shows it",
     ),
     Failsafe(
         Condition.OUTPUT_NOT_FINITE,
@@ -946,6 +948,7 @@ def all_is_well(context: FailsafeContext) -> bool:
         and safety.rolled_us < 0
         and safety.pitched_us < 0
         and safety.breach_us < 0
+        and safety.fence_us < 0
         and safety.off_plan_us < 0
         and safety.filter_us < 0
         and not state.damage.report.lost
@@ -1024,7 +1027,11 @@ def respond(context: FailsafeContext, rows: tuple[Failsafe, ...]) -> Response:
             delay_us = memory.due_us - now_us if later else 0
             severity, text = report(row, context, told, delay_us)
             event = FailsafeEvent(row.condition.value, told.value, severity)
-            reports.append(StatusText(severity, text, event))
+            if later:
+                event = event._replace(
+                    action=Action.HOLD.value, later=told.value, delay_us=delay_us
+                )
+            reports.append(StatusText(severity, text, event, prompt=told.mode is not None))
     if vehicle.armed:
         reports += _ended(before, known, now, now_us)
     since = tuple([known.get(condition, now_us) for condition in now])

@@ -2,7 +2,8 @@
 
 Leaving the tube means that the world is not as assumed: the disturbance is larger, the rotors are
 slower, something holds the arm. Then the next plan starts from the measurement. A negative margin
-is a breach. Both are episodes with hysteresis, so that each is told and acted on once.
+is a breach, of the announced safe set or of the uploaded fence. All are episodes with hysteresis,
+so that each is told and acted on once.
 """
 
 from __future__ import annotations
@@ -98,37 +99,37 @@ class SafetyWatch:
         memory: SafetyMemory,
         estimate: StateEstimate,
         report: ConstraintReport,
+        announced: int,
         *,
         flies: bool,
+        seen: float = math.inf,
     ) -> SafetyMemory:
-        """Look at all margins of the safe set, once a planning period."""
+        """Look at all margins of the safe set, of whose zones the first were ``announced`` [1].
+
+        ``seen`` [m] is the least margin that the safety filter saw in this tick. Where no margin of
+        the report is negative and that one is, it belongs to the zone that is nearest.
+        """
+        known = memory.breach_us >= 0 or memory.fence_us >= 0
         if not flies or not report.margins:
-            return memory if memory.breach_us < 0 else replace(memory, breach_us=-1)
-        least = min(report.margins)
-        if math.isnan(sum(report.margins)):
-            least = -math.inf  # which no comparison with NaN would find
-        return self.margin(memory, estimate.t_us, least)
-
-    def margin(self, memory: SafetyMemory, now_us: int, least: float) -> SafetyMemory:
-        """Look at the ``least`` margin [m] that is known now."""
-        if not least >= 0.0:
-            if memory.breach_us >= 0:
-                return replace(memory, breach_us=now_us)
-            counters = replace(memory.counters, breaches=memory.counters.breaches + 1)
-            return replace(memory, breach_us=now_us, breach_by=-least, counters=counters)
-        if memory.breach_us < 0:
+            return replace(memory, breach_us=-1, fence_us=-1) if known else memory
+        now_us, (of_set, of_fence) = estimate.t_us, _least_margins(report, announced)
+        if not seen >= 0.0 and of_set >= 0.0 and of_fence >= 0.0:
+            of_set, of_fence = (seen, of_fence) if of_set <= of_fence else (of_set, seen)
+        if not known and of_set >= 0.0 and of_fence >= 0.0:
             return memory
-        if least < _CLEAR:
-            return replace(memory, breach_us=now_us)
-        ended = now_us - memory.breach_us >= _CLEAR_US
-        return replace(memory, breach_us=-1) if ended else memory
-
-    def of_fence(self, report: ConstraintReport, announced: int) -> bool:
-        """Whether the least margin is of a zone behind those that were ``announced`` [1]."""
-        if len(report.per_zone) <= announced:
-            return False
-        fence = report.margins[sum(report.per_zone[:announced]) :]
-        return min(fence) <= min(report.margins)
+        breach_us, breach_by = _outside(memory.breach_us, memory.breach_by, now_us, of_set)
+        fence_us, fence_by = _outside(memory.fence_us, memory.fence_by, now_us, of_fence)
+        counters = memory.counters
+        if not known:
+            counters = replace(counters, breaches=counters.breaches + 1)
+        return replace(
+            memory,
+            breach_us=breach_us,
+            breach_by=breach_by,
+            fence_us=fence_us,
+            fence_by=fence_by,
+            counters=counters,
+        )
 
     def jumped(self, memory: SafetyMemory, now_us: int, jump_us: int) -> SafetyMemory:
         """Note a jump of time, from one tick to the next or of the sensors' clock alone."""
@@ -157,6 +158,29 @@ def off_plan_bound(radius: float, unsure: float) -> float:
     ``unsure`` [m] is what the estimate's errors add; the radius has room for some of it.
     """
     return radius + max(unsure - NOISE_ROOM, 0.0)
+
+
+def _least_margins(report: ConstraintReport, announced: int) -> tuple[float, float]:
+    """The least margins [m] of the zones that were ``announced`` [1], and of those behind them."""
+    margins = report.margins
+    first = len(margins)
+    if len(report.per_zone) > announced:
+        first = sum(report.per_zone[:announced])
+    return _least(margins[:first]), _least(margins[first:])
+
+
+def _least(margins: tuple[float, ...]) -> float:
+    # No comparison would find NaN.
+    return -math.inf if math.isnan(sum(margins)) else min(margins, default=math.inf)
+
+
+def _outside(last_us: int, by: float, now_us: int, least: float) -> tuple[int, float]:
+    """When a margin was negative or small last, -1: it is over; and by how much [m] at first."""
+    if not least >= 0.0:
+        return now_us, by if last_us >= 0 else -least
+    if last_us < 0 or least < _CLEAR:
+        return (now_us if last_us >= 0 else -1), by
+    return (-1 if now_us - last_us >= _CLEAR_US else last_us), by
 
 
 def _since(since_us: int, now_us: int, *, so: bool) -> int:

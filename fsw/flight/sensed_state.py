@@ -129,10 +129,15 @@ class SensedState:
         """
         now = memory.now
         before, texts = _memory(state, now), list[StatusText]()
-        model = UNKNOWN if memory.dispute is None else self._model(state)
-        memory, found = self._fusion.catch_up(memory, inputs.samples, now, model)
         # By the filter's own clock: the state has none before the first estimate.
         due = inputs.sensors.t_us // _CHECKED_US != round(1e6 * before.now) // _CHECKED_US
+        news = memory.health is not before.health
+        if not (due or news or estimate is None) and self._fusion.is_caught_up(
+            memory, inputs.samples, now
+        ):
+            return CaughtUp(memory, estimate, None, ())
+        model = UNKNOWN if memory.dispute is None else self._model(state)
+        memory, found = self._fusion.catch_up(memory, inputs.samples, now, model)
         news = memory.health is not before.health
         if due or news or found is None:
             memory = self._told(before, memory, now, texts, due=due)

@@ -165,9 +165,10 @@ class SafetyMemory:
     off_plan_us: int = -1
     off_plan_by: float = 0.0  # m, when it began
     replan: bool = False  # from the measurement, next time
-    breach_us: int = -1
+    breach_us: int = -1  # of the announced safe set
     breach_by: float = 0.0  # m, when it began
-    breach_of_fence: bool = False  # what is outside is outside an uploaded fence
+    fence_us: int = -1  # the same of the uploaded fence, told and acted upon by itself
+    fence_by: float = 0.0
     filter_us: int = -1  # when the safety filter changed an acceleration last
     rolled_us: int = -1  # since when the roll has been beyond its limit; -1: it is not
     pitched_us: int = -1  # the same of the pitch

@@ -1,5 +1,9 @@
 """Limits the status texts of one link: repeated ones are counted, floods are cut.
 
+What answers a command or tells of a change of mode is news even in the same words: it is sent at
+once a few times, so that neither a second failsafe nor a second answer comes late, and a condition
+that flaps cannot flood the link.
+
 An operator reads a handful of texts, and a ground station speaks them. A program that repeats a
 command that cannot be carried out, twice a second, must not bury the texts that matter. Nor may its
 refusals use up the budget of a failsafe's text, which is as severe: see ``_has_room``.
@@ -18,6 +22,7 @@ REPEAT_US: Final = 5_000_000  # the same text is sent once in this time
 _MOST: Final = 32  # texts and budgets remembered
 _RATE_PER_S: Final = 5  # texts of one budget, in the long run
 _BURST: Final = 20
+_PROMPT: Final = 4.0  # of the same prompt text in a burst, and one in REPEAT_US in the long run
 _NUMBER: Final = re.compile(r"[-+]?\d+(\.\d+)?")
 
 
@@ -26,6 +31,7 @@ class _Sent:
     text: StatusText
     at_us: int
     held_back: int = 0
+    left: float = _PROMPT  # of a burst, before this one
 
 
 @dataclass(slots=True)
@@ -46,14 +52,18 @@ class TextLimiter:
     def admit(self, text: StatusText, t_us: int) -> StatusText | None:
         """The text if it is to be sent now; None if it is counted only."""
         before = self._sent.get(text.text)
-        if before is not None and t_us - before.at_us < REPEAT_US:
-            before.held_back += 1
-            return None
+        left = _PROMPT
+        if before is not None:
+            apart_us = t_us - before.at_us
+            left = min(max(before.left - 1.0, 0.0) + apart_us / REPEAT_US, _PROMPT)
+            if apart_us < REPEAT_US and not (text.prompt and left >= 1.0):
+                before.held_back += 1
+                return None
         if not self._has_room(text, t_us):
             self._dropped += 1
             self._dropped_us = t_us
             return None
-        _renew(self._sent, text.text, _Sent(text, t_us))
+        _renew(self._sent, text.text, _Sent(text, t_us, left=left))
         return _counted(before) if before is not None and before.held_back else text
 
     def overdue(self, t_us: int) -> Iterator[StatusText]:

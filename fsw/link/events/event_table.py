@@ -25,7 +25,8 @@ _COMPONENT: Final = 1  # of the ids: the autopilot
 _VERSION: Final = 2  # of the document
 _PROTOCOL: Final = 8  # log level of what is for programs and not for people
 _EVERY_MODE: Final = 0xFFFFFFFF
-_SUMMARY, _HEALTH, _BEGUN, _ENDED, _CHECK = 1, 2, 10, 11, 100  # the last: from there on
+_SUMMARY, _HEALTH, _BEGUN, _ENDED, _DELAYED = 1, 2, 10, 11, 12
+_CHECK: Final = 100  # the first of the arming checks
 
 # PX4's health_component_t: bits, names and what people read.
 _COMPONENTS: Final = {
@@ -39,6 +40,7 @@ _COMPONENTS: Final = {
     28: ("accel", "Inertial unit and encoders"),
 }
 _BITS: Final = {
+    Subject.TERMINATION: 20,
     Subject.ESTIMATOR: 17,
     Subject.ATTITUDE: 16,
     Subject.SENSORS: 28,
@@ -110,18 +112,26 @@ def arming_events(report: ArmingReport) -> tuple[Event, ...]:
 
 
 def failsafe_event(event: FailsafeEvent) -> Event:
-    """A condition that has begun, with what is done about it, or one that is over."""
+    """A condition that has begun, with what is done about it now and later, or one that is over."""
     condition = _CONDITIONS[Condition(event.condition)]
     if event.over:
         return _event(_ENDED, event.severity, struct.pack("<B", condition))
     action = _ACTIONS[Action(event.action)]
+    if event.later:
+        later, seconds = _ACTIONS[Action(event.later)], round(1e-6 * event.delay_us)
+        packed = struct.pack("<BBBB", condition, action, later, min(max(seconds, 0), 255))
+        return _event(_DELAYED, event.severity, packed)
     return _event(_BEGUN, event.severity, struct.pack("<BB", condition, action))
 
 
 def condition_of(id: int, arguments: bytes) -> tuple[Condition, bool] | None:
     """The failsafe condition that an event is about, and whether it is over; None: about none."""
     number = id - (_COMPONENT << 24)
-    if number not in (_BEGUN, _ENDED) or not arguments or arguments[0] >= len(_CONDITIONS):
+    if (
+        number not in (_BEGUN, _DELAYED, _ENDED)
+        or not arguments
+        or arguments[0] >= len(_CONDITIONS)
+    ):
         return None
     return list(Condition)[arguments[0]], number == _ENDED
 
@@ -172,6 +182,15 @@ def event_document() -> bytes:
         "message": "{1}: {2}",
         "arguments": [condition, _argument("", "action", enum="failsafe_action_t")],
     }
+    delayed = {
+        "name": "failsafe_delayed",
+        "message": "{1}: {2}, {3} in {4} s",
+        "arguments": [
+            condition,
+            *(_argument("", name, enum="failsafe_action_t") for name in ("action", "later")),
+            _argument("uint8_t", "delay_s"),
+        ],
+    }
     over = {"name": "failsafe_over", "message": "Over: {1}", "arguments": [condition]}
     described = {
         "namespace": "pandion",
@@ -179,7 +198,7 @@ def event_document() -> bytes:
         "event_groups": {
             "arming_check": {"events": {str(_SUMMARY): arming, **checks}},
             "health": {"events": {str(_HEALTH): healthy}},
-            "default": {"events": {str(_BEGUN): begun, str(_ENDED): over}},
+            "default": {"events": {str(_BEGUN): begun, str(_ENDED): over, str(_DELAYED): delayed}},
         },
         "supported_protocols": ["health_and_arming_check"],
         "navigation_mode_groups": {

@@ -57,7 +57,7 @@ class LinkCommands:
         result, reason, messages = outcome
         ack = CommandAck(request.command, result, request.source_system, request.source_component)
         reply = Outgoing(message_ids.COMMAND_ACK, encode_replies.command_ack(ack))
-        return (reply, *messages), StatusText(Severity.INFO, reason) if reason else None
+        return (reply, *messages), _answer(reason)
 
     def _carry_out(
         self, request: CommandRequest, t_us: int, snapshot: FlightSnapshot | None
@@ -107,3 +107,7 @@ class LinkCommands:
 def _whole(number: float) -> int | None:
     """A parameter as an integer of 32 bits; None for NaN, infinity and what is out of range."""
     return round(number) if abs(number) < 2**31 else None
+
+
+def _answer(reason: str) -> StatusText | None:
+    return StatusText(Severity.INFO, reason, prompt=True) if reason else None

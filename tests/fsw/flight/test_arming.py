@@ -16,7 +16,7 @@ from fsw.flight.arming import Subject
 from fsw.flight.arming_health import ArmingHealth, arming_health
 from fsw.flight.state import Aiding, Damage, FlightState
 from fsw.parameters.flight_config import FlightConfig
-from fsw.signals import BatteryState, ConstraintReport, HostHealth, SensorReport
+from fsw.signals import BatteryState, ConstraintReport, HostHealth, Mode, SensorReport
 from tests.fsw.flight.contexts import STANDING
 from tests.fsw.flight.in_flight import CONFIG, limits
 from tests.fsw.link.snapshots import REPORT
@@ -24,6 +24,7 @@ from tests.fsw.random_states import estimate_of, random_estimate
 
 BLIND = replace(STANDING, estimate_valid=False)
 UNCLEAR = replace(STANDING, standing_unclear=True)
+TERMINATED = replace(STANDING, mode=Mode.FAULT)
 INCONSISTENT = replace(STANDING, inconsistent="the sphere is too small")
 NOW_US = 7_000_000
 LEVEL = estimate_of(Rotation.identity())._replace(t_us=NOW_US)
@@ -34,12 +35,20 @@ def unwell(**changes: Any) -> arming.CommandContext:
 
 
 @pytest.mark.requirement(
-    "REQ-SAFE-8", "REQ-ARM-1", "REQ-ARM-2", "REQ-ARM-6", "REQ-ARM-7", "REQ-ACT-6", "REQ-BAT-5"
+    "REQ-SAFE-8",
+    "REQ-ARM-1",
+    "REQ-ARM-2",
+    "REQ-ARM-6",
+    "REQ-ARM-7",
+    "REQ-ARM-10",
+    "REQ-ACT-6",
+    "REQ-BAT-5",
 )
 @pytest.mark.parametrize(
     ("context", "subject", "words"),
     [
         (BLIND, Subject.ESTIMATOR, "estimate is invalid"),
+        (TERMINATED, Subject.TERMINATION, "terminated; restart the flight software"),
         (unwell(estimator="no position is measured"), Subject.ESTIMATOR, "no position"),
         (unwell(tilt=math.radians(16.0)), Subject.ATTITUDE, "tilted by 16 deg; 15 deg"),
         (unwell(tilt=math.pi), Subject.ATTITUDE, "tilted by 180 deg"),
@@ -65,7 +74,15 @@ def test_each_reason_is_a_sentence_and_force_overrides_all_but_a_missing_estimat
     assert words in sentence
     assert arming.refusal(context) == f"not armed: {sentence}"
     forced = arming.refusal(context, force=True)
-    assert (forced is None) is context.estimate_valid
+    assert (forced is None) is (context not in (BLIND, TERMINATED))
+
+
+def test_behind_a_termination_or_a_missing_estimate_nothing_else_is_told() -> None:
+    worse = replace(TERMINATED, estimate_valid=False, inconsistent="the sphere is too small")
+    for context, told in ((worse, "the flight was terminated"), (BLIND, "the state estimate")):
+        refusal = arming.refusal(context) or ""
+        assert refusal.startswith(f"not armed: {told}")
+        assert arming.refusal(context, force=True) == refusal
 
 
 def test_every_subject_has_a_check() -> None:

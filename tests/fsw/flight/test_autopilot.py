@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -10,12 +11,14 @@ import pytest
 
 from fsw.estimation.dead_reckoning import moved_on
 from fsw.estimation.estimator import estimate_state
+from fsw.flight.arming import CHECKS
 from fsw.flight.autopilot import Autopilot
 from fsw.flight.failsafe import Condition
 from fsw.flight.plan_exchange import nominal_at_rest
 from fsw.flight.safe_set import joined
 from fsw.flight.state import FlightState, MissionMemory
 from fsw.flight.uncertain_clearance import KeptSet
+from fsw.measurements import ImuSample, JointSample, Sample
 from fsw.shapes.half_space import wall
 from fsw.signals import (
     STOPPED,
@@ -27,6 +30,7 @@ from fsw.signals import (
     SafeSet,
     SafeSetAnnouncement,
     SensorFrame,
+    StatusText,
     TickInputs,
     TickOutputs,
     Vec3,
@@ -82,6 +86,68 @@ def test_before_the_first_estimate_nothing_moves_and_commands_are_put_off() -> N
     assert (state.invalid_ticks, state.estimate) == (1, None)
     _, outputs = tick(state, 7000, sensors=blind)
     assert (outputs.acks, outputs.texts) == ((), ())
+
+
+def started_blind(
+    samples: Callable[[float], tuple[Sample, ...]], seconds: float = 3.0
+) -> tuple[list[StatusText], list[TickOutputs]]:
+    """What a vehicle says whose sensors give ``samples`` of a time [s] from its start on."""
+    state, texts, outputs = FlightState(), [], []
+    for t_us in range(TICK_US, round(1e6 * seconds), TICK_US):
+        state, last = tick(state, t_us, samples=samples(1e-6 * t_us))
+        texts += last.texts
+        outputs.append(last)
+    assert state.estimate is None
+    return texts, outputs
+
+
+def imu(t: float) -> Sample:
+    return ImuSample(t, (0.0, 0.0, -9.81), STILL)
+
+
+def encoders(t: float) -> Sample:
+    return JointSample(t, (0.0, 0.0))
+
+
+@pytest.mark.requirement("REQ-ARM-1")
+@pytest.mark.parametrize(
+    ("samples", "never"),
+    [
+        (lambda t: (imu(t), encoders(t)), "pose or GNSS"),
+        (lambda t: (imu(t),), "joint encoders, pose or GNSS"),
+        (lambda t: (encoders(t),), "IMU, pose or GNSS"),
+    ],
+)
+def test_without_a_first_estimate_the_sensors_that_never_came_are_named_once(
+    samples: Callable[[float], tuple[Sample, ...]], never: str
+) -> None:
+    texts, outputs = started_blind(samples)
+    (text,) = [one for one in texts if "estimate" in one.text]
+    assert text.text == f"state estimate invalid for 1 s: nothing has ever come from {never}"
+    assert text in outputs[1_000_000 // TICK_US - 1].texts
+    assert text.event is not None
+    assert text.event.condition == Condition.ESTIMATE_INVALID.value
+    for one in (outputs[0], outputs[-1]):
+        snapshot = one.snapshot
+        assert snapshot.failures == (Condition.ESTIMATE_INVALID.value,)
+        assert snapshot.arming_refusal == "not armed: the state estimate is invalid"
+        (number,) = snapshot.arming.failed
+        assert CHECKS[number].summary == "The state estimate is invalid"
+    assert outputs[-1].snapshot.t_us > outputs[0].snapshot.t_us, "telemetry goes on"
+
+
+@pytest.mark.requirement("REQ-ARM-1")
+def test_without_one_valid_frame_of_exact_states_that_is_told_once() -> None:
+    state, texts = FlightState(), []
+    for t_us in range(TICK_US, 3_000_000, TICK_US):
+        state, outputs = tick(state, t_us, sensors=frame(t_us, p_WB=(math.nan, 0.0, 0.0)))
+        texts += [text.text for text in outputs.texts]
+    assert texts == ["state estimate invalid for 1 s: no valid sensor frame has come"]
+
+
+def test_sensors_that_fall_silent_before_the_first_estimate_are_told_once() -> None:
+    texts, _ = started_blind(lambda t: (imu(t), encoders(t)) if t < 0.5 else (), 2.0)
+    assert [one.text for one in texts].count("IMU is silent") == 1
 
 
 def test_an_invalid_frame_leaves_the_last_estimate_and_is_counted() -> None:
@@ -147,23 +213,28 @@ def test_an_empty_battery_is_not_armed() -> None:
 
 
 @pytest.mark.requirement("REQ-SAFE-4")
-@pytest.mark.parametrize("uploaded", [True, False])
-def test_a_breach_of_an_uploaded_fence_is_one_of_its_own(uploaded: bool) -> None:
-    """Both walls are left; the one that is left by more says whose breach it is."""
-    near, far = (SafeSet((wall((-1.0, 0.0, 0.0), at, 0.1),)) for at in (-59.0, -50.0))
-    announced, fence = (near, far) if uploaded else (far, near)
+@pytest.mark.requirement("REQ-SAFE-4")
+@pytest.mark.parametrize("again_us", [2_000, 50_000])
+def test_outside_a_wall_and_the_fence_both_are_told_with_their_own_sizes(again_us: int) -> None:
+    """A tick later, and in a tick of a planning period: the filter and the report find the same."""
+    announced, fence = (SafeSet((wall((-1.0, 0.0, 0.0), at, 0.1),)) for at in (-50.0, -59.0))
     mission = MissionMemory(safe_set=joined(announced, fence), announced=announced, fence=fence)
     outside = frame(1_000_000, p_WB=(60.0, 0.0, -5.0))
     seen = estimate_state(outside)
     assert seen is not None
     kept = KeptSet().of(mission.safe_set)
     state = replace(flying(), mission=mission, kept=kept, nominal=nominal_at_rest(seen))
-    for t_us in (1_000_000, 1_002_000):
+    texts: list[str] = []
+    for t_us in (1_000_000, 1_000_000 + again_us):
         state, outputs = tick(state, t_us, sensors=replace(outside, t_us=t_us))
-    words = "outside the fence" if uploaded else "outside the safe set"
-    texts = [text.text for text in outputs.texts]
-    assert any(words in text and "retreating" in text for text in texts), texts
-    assert state.safety.breach_of_fence is uploaded
+        texts += [text.text for text in outputs.texts]
+    safety = state.safety
+    assert (safety.breach_us, safety.fence_us) == (t_us, t_us)
+    assert safety.breach_by == pytest.approx(safety.fence_by + 9.0)
+    # Both retreat: the first of the table acts for both.
+    by = f"{1e3 * safety.breach_by:.0f}", f"{1e3 * safety.fence_by:.0f}"
+    assert f"failsafe: outside the safe set by {by[0]} mm, retreating" in texts
+    assert f"outside the fence by {by[1]} mm: warn" in texts
 
 
 @pytest.mark.requirement("REQ-LOG-1")

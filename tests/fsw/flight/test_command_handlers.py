@@ -535,6 +535,9 @@ def test_arming_checks_are_made_on_the_ground_and_answered_in_words() -> None:
     assert decided(Order.CHECK_ARMING, STANDING).reason == "ready to arm"
     nearly_empty = replace(STANDING, health=ArmingHealth(remaining=0.0))
     assert "battery" in decided(Order.CHECK_ARMING, nearly_empty).reason
+    ended = decided(Order.CHECK_ARMING, replace(STANDING, mode=Mode.FAULT))
+    assert ended.result == DENIED
+    assert "terminated; restart the flight software" in ended.reason
     assert decided(Order.CHECK_ARMING).result == TEMPORARILY_REJECTED
 
 

@@ -134,7 +134,9 @@ def test_why_arming_is_refused_is_shown_while_it_matters() -> None:
     again = COMMANDER.arming_report(replace(DISARMED, arming=report), low)[1]
     assert again is report, "what has not changed is the same value"
     assert COMMANDER.arming_report(flying(), low) == ("", ArmingReport())
-    assert "restart" in COMMANDER.arming_report(flying(Mode.FAULT), STANDING)[0]
+    sentence, report = COMMANDER.arming_report(flying(Mode.FAULT), STANDING)
+    assert "terminated; restart" in sentence
+    assert [CHECKS[number].subject for number in report.failed] == [Subject.TERMINATION]
 
 
 # ---------------------------------------------------------------- commands
@@ -149,6 +151,60 @@ def test_a_repeated_command_is_answered_again_and_not_carried_out_again() -> Non
     assert [ack.result for ack in acks] == [CommandResult.ACCEPTED] * 2
     assert [text.text for text in texts] == ["hold to land: command"]
     assert state.vehicle.mode is Mode.LAND
+
+
+def asked(
+    state: FlightState, action: CommandAction, number: int, sender: int, again: int = 0
+) -> FlightState:
+    """The state after an accepted command in the same words whenever the ``number`` is the same."""
+    request = CommandRequest(number, (math.nan,) * 7, sender, 190, again)
+    command = Command(action, request)
+    state, acks = COMMANDER.handle_commands(state, HOVERING, (command,), [])
+    assert [ack.result for ack in acks] == [CommandResult.ACCEPTED]
+    return state
+
+
+@pytest.mark.requirement("REQ-MODE-10")
+@pytest.mark.parametrize("again", [0, 1])
+def test_a_repeated_command_acts_again_where_another_sender_has_changed_the_mode(
+    again: int,
+) -> None:
+    state = asked(flying(), SwitchMode(Mode.LAND), 1, sender=255)
+    state = asked(state, SwitchMode(Mode.HOLD), 2, sender=7)
+    assert state.vehicle.mode is Mode.HOLD
+    assert asked(state, SwitchMode(Mode.LAND), 1, 255, again).vehicle.mode is Mode.LAND
+    away, back = GoTo(Place((5.0, 2.0), 3.0)), GoTo(Place((1.0, 2.0), 3.0))
+    state = asked(asked(flying(), away, 3, sender=255), back, 4, sender=7)
+    goal = asked(state, away, 3, 255, again).setpoint.goal
+    assert goal is not None
+    assert goal.motion.p == (5.0, 2.0, -3.0), "a place counts as well"
+
+
+@pytest.mark.requirement("REQ-MODE-10")
+def test_a_repeated_command_acts_again_where_a_failsafe_has_changed_the_mode() -> None:
+    planned = replace(flying(Mode.OFFBOARD), plan=PlanMemory(since_us=NOW_US))
+    held = asked(planned, SwitchMode(Mode.HOLD), 1, sender=255)
+    outside = SafetyMemory(breach_us=NOW_US, breach_by=0.1)
+    retreating, said = watched(replace(held, safety=outside))
+    assert any("retreating" in text for text in said), said
+    assert retreating.vehicle.failsafe_from is Mode.HOLD
+    taken = asked(retreating, SwitchMode(Mode.HOLD), 1, sender=255, again=1)
+    assert taken.vehicle.failsafe_from is None, "the pilot holds, not the failsafe"
+
+
+@pytest.mark.requirement("REQ-MODE-10")
+def test_a_mode_that_is_complete_is_what_its_command_led_to() -> None:
+    state = asked(flying(), SwitchMode(Mode.LAND), 1, sender=255)
+    answered = state.vehicle.answered
+    on_the_ground = replace(state, vehicle=replace(state.vehicle, landed=True), nominal=None)
+    estimate = STANDING
+    while on_the_ground.vehicle.mode is Mode.LAND:
+        estimate = estimate._replace(t_us=estimate.t_us + 100_000)
+        on_the_ground = COMMANDER.check_mode_completion(on_the_ground, estimate, [])
+    assert on_the_ground.vehicle.mode is Mode.DISARMED
+    assert on_the_ground.vehicle.answered == answered
+    # What is acknowledged does nothing more: it is not told that landing is impossible here.
+    asked(on_the_ground, SwitchMode(Mode.LAND), 1, sender=255, again=1)
 
 
 def test_a_refused_command_changes_nothing_and_says_why() -> None:

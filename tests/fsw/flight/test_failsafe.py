@@ -108,7 +108,7 @@ class Evidence:
 
 FINE = Evidence()
 OUTSIDE = SafetyMemory(breach_us=NOW_US, breach_by=0.0123)
-OVER_THE_FENCE = SafetyMemory(breach_us=NOW_US, breach_by=0.0123, breach_of_fence=True)
+OVER_THE_FENCE = SafetyMemory(fence_us=NOW_US, fence_by=0.0123)
 CRAMPED = KeptSet(lacking=0.0234, ample_us=NOW_US - 500_000)
 OFF_PLAN = SafetyMemory(off_plan_us=NOW_US, off_plan_by=0.0834)
 UNAIDED = Aiding(1_500_000, Sensor.POSE, SensorFault.STUCK)

@@ -41,6 +41,7 @@ from fsw.signals import (
     CommandAction,
     CommandRequest,
     CommandResult,
+    FailsafeEvent,
     GoTo,
     HostHealth,
     Mode,
@@ -71,6 +72,7 @@ class Watched:
     state: FlightState = field(default_factory=lambda: flying(Mode.MISSION, gcs_heard_us=0))
     now_us: int = 0
     texts: list[str] = field(default_factory=list)
+    events: list[FailsafeEvent] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.commander = Commander(self.config)
@@ -86,6 +88,7 @@ class Watched:
             self.state = self.commander.check_failsafes(self.state, estimate, said)
             self.state = replace(self.state, t_us=self.now_us)
             self.texts += [text.text for text in said]
+            self.events += [text.event for text in said if text.event is not None]
         return self
 
     def heard(self) -> Watched:
@@ -136,6 +139,17 @@ def test_a_station_lost_in_a_mission_holds_for_a_while_and_returns_and_is_told_t
         "failsafe: no ground station for 15 s, returning",
         "hold to return: failsafe",
     ]
+
+
+@pytest.mark.requirement("REQ-MODE-1", "REQ-LINK-1")
+def test_the_event_of_a_delayed_action_says_hold_first_and_the_action_when_it_begins() -> None:
+    watched = Watched().until(100.0)
+    hold, back = watched.events
+    assert (hold.action, hold.later, hold.delay_us) == ("holding", "returning", 5 * SECOND)
+    assert (back.action, back.later, back.delay_us) == ("returning", "", 0)
+    assert hold.condition == back.condition == Condition.DATALINK_LOST.value
+    (at_once,) = Watched(AT_ONCE).until(100.0).events
+    assert (at_once.action, at_once.later) == ("returning", "")
 
 
 def test_a_station_lost_in_a_mission_that_is_exempt_is_acted_on_when_the_mission_ends() -> None:
@@ -230,6 +244,7 @@ def test_without_a_position_no_mode_is_accepted_until_there_is_one_again() -> No
 
 
 OUTSIDE = SafetyMemory(breach_us=0, breach_by=0.01)
+OVER_THE_FENCE = SafetyMemory(fence_us=0, fence_by=0.02)
 
 
 @pytest.mark.requirement("REQ-SAFE-4")
@@ -350,12 +365,47 @@ def test_landing_or_disarming_ends_a_failsafe() -> None:
     assert state.vehicle.failsafe.action is Action.NONE
 
 
+def both(fence_action: int, breach_action: int = 6) -> Watched:
+    """A vehicle that is outside an announced zone first, and outside the fence a second later."""
+    config = limits(fence_action=fence_action, breach_action=breach_action)
+    watched = Watched(config, replace(flying(Mode.MISSION))).until(1.0, safety=OUTSIDE)
+    return watched.until(2.0, safety=replace(OUTSIDE, fence_us=0, fence_by=0.02))
+
+
+@pytest.mark.requirement("REQ-SAFE-4")
+def test_fence_and_safe_set_are_told_each_and_neither_masks_the_action_of_the_other() -> None:
+    warned = both(fence_action=1)
+    assert warned.texts[0] == "failsafe: outside the safe set by 10 mm, retreating"
+    assert warned.texts[-1] == "outside the fence by 20 mm: warn"
+    assert warned.state.vehicle.failsafe.action is Action.RETREAT
+    ended = both(fence_action=4, breach_action=1)
+    assert ended.flown == (Mode.FAULT, None)
+    assert ended.texts[:2] == [
+        "outside the safe set by 10 mm: warn",
+        "outside the fence by 20 mm: terminate",
+    ]
+
+
+@pytest.mark.requirement("REQ-SAFE-4")
+def test_outside_both_at_once_the_strongest_action_is_taken_and_both_are_told() -> None:
+    safety = replace(OUTSIDE, fence_us=0, fence_by=0.02)
+    watched = Watched(limits(fence_action=1), flying(Mode.MISSION)).until(1.0, safety=safety)
+    assert watched.texts == [
+        "failsafe: outside the safe set by 10 mm, retreating",
+        "outside the fence by 20 mm: warn",
+        "mission to hold: failsafe",
+    ]
+    watched.until(2.0, safety=OVER_THE_FENCE)
+    assert watched.texts[3:] == ["over: outside the safe set, after 1.0 s"]
+    assert watched.state.vehicle.conditions == (Condition.FENCE_BREACH,)
+
+
 HAPPENS: dict[Condition, dict[str, Any]] = {
     Condition.ATTITUDE_LOST: {"aiding": Aiding(attitude_sigma=0.8)},
     Condition.TILT_LOST: {"safety": SafetyMemory(rolled_us=0)},
     Condition.POSITION_LOST: {"aiding": ADRIFT},
     Condition.BREACH: {"safety": OUTSIDE},
-    Condition.FENCE_BREACH: {"safety": replace(OUTSIDE, breach_of_fence=True)},
+    Condition.FENCE_BREACH: {"safety": OVER_THE_FENCE},
     Condition.ROTOR_LOST: {"damage": Damage("rotor 2", report=ActuatorReport(2, lost=True))},
     Condition.ROTOR_FAILED: {"damage": Damage(rotor="rotor 2")},
     Condition.JOINT_FAILED: {"damage": Damage(joint="joint 1")},

@@ -89,5 +89,5 @@ def test_there_nothing_of_the_vehicle_is_too_close(
     margins = found.margins
     assert min(margins) >= ROOM - 2e-3
     assert FlightState().safety == SafetyWatch(CONFIG, CHECK.loop_tube).breach(
-        FlightState().safety, there, found, flies=True
+        FlightState().safety, there, found, len(zones), flies=True
     )

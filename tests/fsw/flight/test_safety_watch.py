@@ -36,7 +36,7 @@ def away(memory: SafetyMemory, offset: Vec3, t_s: float = 1.0, here: Vec3 = HERE
 
 def margins(memory: SafetyMemory, least: float, t_s: float = 1.0) -> SafetyMemory:
     report = ConstraintReport(margins=(0.5, least, 0.3))
-    return WATCH.breach(memory, vehicle_at(HERE, t_us=round(1e6 * t_s)), report, flies=True)
+    return WATCH.breach(memory, vehicle_at(HERE, t_us=round(1e6 * t_s)), report, 1, flies=True)
 
 
 @pytest.mark.requirement("REQ-SAFE-3")
@@ -124,9 +124,9 @@ def test_on_the_ground_or_without_zones_there_is_no_breach(
     report: tuple[float, ...], flies: bool
 ) -> None:
     constraints = ConstraintReport(margins=report)
-    assert WATCH.breach(CALM, vehicle_at(HERE), constraints, flies=flies) is CALM
+    assert WATCH.breach(CALM, vehicle_at(HERE), constraints, 1, flies=flies) is CALM
     outside = margins(CALM, -0.1)
-    assert WATCH.breach(outside, vehicle_at(HERE), constraints, flies=flies).breach_us == -1
+    assert WATCH.breach(outside, vehicle_at(HERE), constraints, 1, flies=flies).breach_us == -1
 
 
 # ---------------------------------------------------------------- attitude, fences, time
@@ -178,16 +178,56 @@ def test_a_limit_of_zero_is_no_check() -> None:
     assert watch.attitude(SafetyMemory(), rolled(180.0), flies=True) == SafetyMemory()
 
 
-def test_a_breach_is_one_of_the_fence_where_its_zone_is_breached_most() -> None:
-    # Two announced zones and one of the fence, two parts each.
-    for margins, of_fence in (
-        ((0.1, 0.2, 0.3, -0.1, 0.1, 0.1), False),
-        ((0.1, 0.2, 0.3, 0.1, 0.1, -0.1), True),
-        ((-0.2, 0.2, 0.3, 0.1, 0.1, -0.1), False),
-    ):
-        report = ConstraintReport(margins=margins, per_zone=(2, 2, 2))
-        assert WATCH.of_fence(report, announced=2) is of_fence
-    assert not WATCH.of_fence(ConstraintReport(margins=(-0.1,), per_zone=(1,)), announced=1)
+def of_both(
+    memory: SafetyMemory, margins: tuple[float, ...], t_s: float = 1.0, seen: float = math.inf
+) -> SafetyMemory:
+    """The memory after a look at two announced zones and one of the fence, two parts each."""
+    report = ConstraintReport(margins=margins, per_zone=(2, 2, 2))
+    now = vehicle_at(HERE, t_us=round(1e6 * t_s))
+    return WATCH.breach(memory, now, report, 2, flies=True, seen=seen)
+
+
+@pytest.mark.requirement("REQ-SAFE-4")
+@pytest.mark.parametrize(
+    ("margins", "of_set", "of_fence"),
+    [
+        ((0.1, 0.2, 0.3, -0.1, 0.1, 0.1), 0.1, None),
+        ((0.1, 0.2, 0.3, 0.1, 0.1, -0.2), None, 0.2),
+        ((-0.1, 0.2, 0.3, 0.1, 0.1, -0.2), 0.1, 0.2),
+        ((-0.2, 0.2, 0.3, 0.1, 0.1, -0.1), 0.2, 0.1),
+        ((0.1, 0.2, 0.3, 0.1, math.nan, 0.1), None, math.inf),
+    ],
+)
+def test_what_is_outside_the_fence_and_outside_the_rest_are_breaches_of_their_own(
+    margins: tuple[float, ...], of_set: float | None, of_fence: float | None
+) -> None:
+    memory = of_both(CALM, margins)
+    assert (memory.breach_us >= 0, memory.fence_us >= 0) == (
+        of_set is not None,
+        of_fence is not None,
+    )
+    assert (memory.breach_by, memory.fence_by) == (of_set or 0.0, of_fence or 0.0)
+    assert memory.counters.breaches == 1, "it is outside once"
+
+
+@pytest.mark.requirement("REQ-SAFE-4")
+def test_a_breach_of_one_hides_neither_the_beginning_nor_the_end_of_the_other() -> None:
+    memory = of_both(CALM, (0.2, 0.2, 0.2, 0.2, 0.2, -0.1))
+    memory = of_both(memory, (0.2, -0.3, 0.2, 0.2, 0.2, -0.4), 2.0)
+    assert (memory.breach_us, memory.breach_by) == (2_000_000, 0.3)
+    assert (memory.fence_us, memory.fence_by) == (2_000_000, 0.1), "as it began"
+    memory = of_both(memory, (0.2, -0.3, 0.2, 0.2, 0.2, 0.1), 2.5)
+    assert (memory.breach_us, memory.fence_us) == (2_500_000, -1)
+    assert of_both(memory, (0.2,) * 6, 3.0).breach_us == -1
+
+
+def test_what_only_the_safety_filter_sees_is_of_the_nearest_zone() -> None:
+    first = of_both(CALM, (0.2, 0.01, 0.2, 0.2, 0.2, 0.1), seen=-0.003)
+    assert (first.breach_by, first.fence_us) == (0.003, -1)
+    last = of_both(CALM, (0.2, 0.02, 0.2, 0.2, 0.2, 0.01), seen=math.nan)
+    assert (last.breach_us, last.fence_us) == (-1, 1_000_000)
+    both = of_both(CALM, (0.2, 0.01, 0.2, 0.2, 0.2, -0.2), seen=-0.2)
+    assert (both.breach_us, both.fence_by) == (-1, 0.2), "the report has it already"
 
 
 def test_a_jump_of_time_is_noted_with_its_length() -> None:

@@ -69,3 +69,29 @@ def test_a_flood_of_less_severe_sentences_is_cut() -> None:
     limiter = TextLimiter()
     texts = [StatusText(Severity.WARNING, f"parameter {chr(97 + k % 26)}{k}") for k in range(200)]
     assert sum(limiter.admit(text, 1 * S) is not None for text in texts) == 20
+
+
+LOST = StatusText(Severity.CRITICAL, "failsafe: offboard setpoints stopped, holding", prompt=True)
+READY = StatusText(Severity.INFO, "ready to arm", prompt=True)
+
+
+@pytest.mark.requirement("REQ-LINK-7")
+@pytest.mark.parametrize("text", [LOST, READY])
+def test_a_second_failsafe_and_a_second_answer_in_the_same_words_are_sent_at_once(
+    text: StatusText,
+) -> None:
+    limiter = TextLimiter()
+    assert [limiter.admit(text, k * S) for k in range(4)] == [text] * 4
+    assert list(limiter.overdue(10 * S)) == []
+
+
+@pytest.mark.requirement("REQ-LINK-7")
+def test_a_condition_that_flaps_does_not_flood_and_is_counted() -> None:
+    limiter = TextLimiter()
+    sent = [limiter.admit(LOST, k * S // 10) for k in range(600)]
+    passed = [text for text in sent if text is not None]
+    assert 4 + 60 // 5 - 2 <= len(passed) <= 4 + 60 // 5
+    assert {text.severity for text in passed} == {Severity.CRITICAL}
+    assert passed[4].text.startswith(f"{LOST.text} (again, ")
+    for at in (100 * S, 102 * S, 104 * S):
+        assert limiter.admit(LOST, at) is not None, "after a while there is room again"

@@ -9,6 +9,8 @@ import pytest
 from fsw.flight.tuned_autopilot import TunedAutopilot
 from fsw.parameters.contradictions import contradictions
 from fsw.parameters.flight_config import FlightConfig, flight_config
+from fsw.parameters.registry import BY_NAME
+from fsw.tuning import tuned
 
 CONFIG = flight_config(body="points")
 
@@ -38,3 +40,29 @@ def test_a_contradiction_is_a_sentence_with_both_names(
     with pytest.raises(ValueError, match=words):
         TunedAutopilot(CONFIG).prepare(tuning)
     assert contradictions(replace(config, limits=replace(CONFIG.limits, position_low=0.5))) == ()
+
+
+@pytest.mark.requirement("REQ-ARM-7")
+@pytest.mark.parametrize("name", ["FD_FAIL_R", "FD_FAIL_P"])
+@pytest.mark.parametrize(
+    ("degrees", "tilt", "refused"),
+    [
+        (5.0, 18.0, "is to be 0 or at least 15 deg above the 25 deg of the loops"),
+        (39.9, 18.0, "is to be 0 or at least 15 deg above the 25 deg of the loops"),
+        (44.0, 30.0, "is to be 0 or at least 15 deg above PLN_TILT_MAX, 30"),
+        (40.0, 18.0, ""),
+        (45.0, 30.0, ""),
+        (60.0, 30.0, ""),
+        (0.0, 30.0, ""),
+    ],
+)
+def test_an_attitude_failure_that_a_usual_flight_reaches_is_refused_and_zero_is_none(
+    name: str, degrees: float, tilt: float, refused: str
+) -> None:
+    wanted = ((BY_NAME[name], degrees), (BY_NAME["PLN_TILT_MAX"], tilt))
+    tuning = tuple((one.path, value * one.scale) for one, value in wanted)
+    found = contradictions(tuned(CONFIG, tuning))
+    assert found == ((f"{name} {degrees:g} {refused}",) if refused else ())
+    if refused:
+        with pytest.raises(ValueError, match=refused):
+            TunedAutopilot(CONFIG).prepare(tuning)

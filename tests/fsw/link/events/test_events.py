@@ -17,6 +17,7 @@ from fsw.link.events.event_table import (
     ARGUMENTS,
     Event,
     arming_events,
+    condition_of,
     event_document,
     failsafe_event,
 )
@@ -82,6 +83,17 @@ def test_a_condition_and_what_is_done_about_it_are_read_as_in_the_texts(action: 
         assert event.severity == Severity.CRITICAL
     over = failsafe_event(LOST._replace(over=True, severity=Severity.INFO))
     assert (read(over), over.severity) == ("Over: no ground station", Severity.INFO)
+
+
+@pytest.mark.requirement("REQ-MODE-1")
+def test_a_delayed_action_is_read_with_what_is_done_until_then_and_for_how_long() -> None:
+    later = LOST._replace(action=Action.HOLD.value, later=Action.RETURN.value, delay_us=5 * SECOND)
+    event = failsafe_event(later)
+    assert read(event) == "no ground station: holding, returning in ? s"
+    assert explained(event)[2]["delay_s"] == 5
+    assert event != failsafe_event(LOST)
+    assert condition_of(event.id, event.arguments) == (Condition.DATALINK_LOST, False)
+    assert explained(failsafe_event(later._replace(delay_us=10**9)))[2]["delay_s"] == 255
 
 
 def test_the_checks_that_fail_are_between_a_summary_and_the_health() -> None:
