@@ -13,6 +13,7 @@ from fsw.frozen import dataclass
 Vec2 = tuple[float, float]
 Vec3 = tuple[float, float, float]
 Vec4 = tuple[float, float, float, float]
+_LEVEL_FIX = 2  # GPS_FIX_TYPE_2D_FIX; those above it have a height
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +47,13 @@ class GnssSample:
     velocity: Vec3  # m/s, NED
     position_variance: Vec3  # m^2, NED
     velocity_variance: Vec3  # m^2/s^2, NED
+    fix_type: int = 3  # GPS_FIX_TYPE of MAVLink; up to 2 the rest says nothing
+    satellites: int = 255  # that it sees; 255: it does not say
+
+    @property
+    def has_fix(self) -> bool:
+        """Whether it knows its place in space."""
+        return self.fix_type > _LEVEL_FIX
 
 
 @dataclass(frozen=True, slots=True)

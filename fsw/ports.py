@@ -77,3 +77,4 @@ class LoopHealth:
     telemetry: GroupTiming = field(default_factory=lambda: GroupTiming(period_us=TICK_US))
     housekeeping: GroupTiming = field(default_factory=lambda: GroupTiming(period_us=1_000_000))
     vibration: Vec2 = (0.0, 0.0)  # rad/s, m/s^2: gyro and accelerometer, high-pass filtered
+    clipped: int = 0  # readings of one axis of the accelerometer at an end of its range, so far

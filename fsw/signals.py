@@ -743,10 +743,12 @@ class SatelliteFix:
     """The newest reading of a receiver, as far as it was measured."""
 
     t_us: int  # of the measurement
-    p: Vec3  # m, NED
+    p: Vec3  # m, NED; the last known one, NaN where there never was a fix
     v: Vec3  # m/s, NED
     position_sigma: Vec3  # m, NED
     velocity_sigma: float  # m/s
+    kind: int = 3  # GPS_FIX_TYPE; 1, no fix, where it is silent
+    satellites: int = 255  # that it sees; 255: not known
 
 
 @dataclass(frozen=True, slots=True)

@@ -465,7 +465,7 @@ def _sensors(
         START_US - SETTLED_STEPS * STEP_US,
         joints=len(vehicle.links),
         hover_thrust=0.25 * vehicle.mass * vehicle.gravity,
-        origin_altitude=origin.altitude,
+        origin=origin,
     )
     return ExactSensors(Sensors(), seed, STEP_US), suite
 

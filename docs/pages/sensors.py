@@ -30,6 +30,8 @@ _POSE: Final = {
     "attitude_deg": "noise about each axis",
     "outlier_m": "an outlier lies so far off, in any direction",
     "outlier_deg": "and is turned by so much",
+    "position_resolution_m": "step of the digits; 0: none",
+    "attitude_resolution_deg": "the same, of a small rotation",
 }
 MEANINGS: Final[dict[str, dict[str, str]]] = {
     "timing": {
@@ -80,6 +82,10 @@ MEANINGS: Final[dict[str, dict[str, str]]] = {
         "wander_time_s": "its correlation time",
         "velocity_m_s": "noise of each axis",
         "outlier_m": "an outlier lies so far off, in any direction",
+        "position_resolution_deg": "step of latitude and longitude; default 1e-7 as in HIL_GPS, "
+        "11 mm northwards; 0: none",
+        "height_resolution_m": "the same; default 0.001 as in HIL_GPS",
+        "velocity_resolution_m_s": "the same; default 0.01 as in HIL_GPS",
         "rtk": "says that its fix is one with corrections (`fix_type` 6), or a plain one (3)",
     },
     "barometer": {

@@ -110,7 +110,9 @@ def arrived(
         return health.with_fault(SensorFault.REPEATED, now), SensorFault.REPEATED
     numbers = numbers_of(sample)
     repeats = health.repeats + 1 if numbers == health.numbers and not still() else 0
-    if not math.isfinite(sum(numbers)):
+    if isinstance(sample, GnssSample) and not sample.has_fix:
+        fault = SensorFault.NO_FIX
+    elif not math.isfinite(sum(numbers)):
         fault = SensorFault.NOT_FINITE
     elif not _plausible(sample, tuning):
         fault = SensorFault.IMPLAUSIBLE

@@ -31,6 +31,7 @@ class SensorFault(IntEnum):
     STALE = 8
     SELDOM = 9
     DISAGREES = 10
+    NO_FIX = 11
 
 
 _SENTENCES = {
@@ -45,7 +46,13 @@ _SENTENCES = {
     SensorFault.STALE: "is silent",
     SensorFault.SELDOM: "comes less often than it did",
     SensorFault.DISAGREES: "does not agree with the other sensors",
+    SensorFault.NO_FIX: "has no fix",
 }
+
+
+def fault_name(fault: SensorFault) -> str:
+    """What telemetry and log call a fault; empty for none."""
+    return "" if fault is SensorFault.NONE else fault.name.lower().replace("_", " ")
 
 
 def sentence(sensor: Sensor, fault: SensorFault) -> str:

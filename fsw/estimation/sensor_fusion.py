@@ -131,6 +131,8 @@ class FusionMemory(NamedTuple):
     delay_sigma: float = 0.0  # s, with which the estimate of the pose's own delay began
     paces: tuple[Pace, ...] = ()  # how often sensors are heard
     restarts: int = 0  # how often the filter had to start anew, because it had no numbers any more
+    began: float = -math.inf  # s, the filter's own time when it began
+    without_fix: GnssSample | None = None  # the newest one that has none
     dispute: Dispute | None = None  # between pose and IMU
 
     def of(self, sensor: Sensor) -> Health:
@@ -512,12 +514,16 @@ class SensorFusion:
             time -= self.tuning.gnss_delay
         if not fault and memory.started and time < x["time"][0] - LATE:
             fault = SensorFault.TOO_OLD
-            health = health.with_fault(fault, now)
+            # Measured before the filter began, it came as soon as it could.
+            if time >= memory.began or now - time > self.tuning.longest_delay:
+                health = health.with_fault(fault, now)
         delay = memory.delay
         if fault in (SensorFault.NONE, SensorFault.TOO_OLD):
             delay = self._delay(delay, now - time, now - before.came)
         others = memory.without(health.sensor)
         if fault:
+            if isinstance(sample, GnssSample) and fault is SensorFault.NO_FIX:
+                memory = memory._replace(without_fix=sample)
             return memory._replace(health=(*others, health), delay=delay)
         waiting = (*memory.waiting, Waiting(time, memory.arrivals, sample))
         if len(waiting) > 1 and waiting[-2].time > time:
@@ -584,7 +590,12 @@ class SensorFusion:
                 break
         else:
             return memory._replace(waiting=memory.waiting[-_WAITING_AT_START:])
-        return memory._replace(started=True, waiting=(), delay_sigma=self.tuning.pose_delay_sigma)
+        return memory._replace(
+            started=True,
+            waiting=(),
+            delay_sigma=self.tuning.pose_delay_sigma,
+            began=float(memory.numbers["time"][0]),
+        )
 
     def _least_stated(self, waiting: tuple[Waiting, ...]) -> tuple[Vec3, Vec3]:
         """The least variances of the poses so far: of a frame that drifts, the noise alone."""

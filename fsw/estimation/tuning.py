@@ -18,6 +18,9 @@ class EstimatorTuning:
     accel_bias_walk: float = 3e-3  # m/s^3/sqrt(Hz)
     gyro_bias_walk: float = 2e-4  # rad/s^2/sqrt(Hz)
     accel_range: float = 160.0  # m/s^2; beyond it, a reading is none
+    # m/s^2: what the accelerometer can say, +-16 g (TDK InvenSense, ICM-42688-P data sheet). The
+    # filter has no use for it: readings at its end are counted and told.
+    accel_full_scale: float = 156.9
     gyro_range: float = 35.0  # rad/s
     # From one reading to the next. The rotors turn the body by 17 rad/s^2 and accelerate it by
     # 10 m/s^2 more than gravity; the rest is vibration.

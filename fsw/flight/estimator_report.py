@@ -8,9 +8,10 @@ from typing import Final
 
 from fsw.estimation.error_state import BA, BG, ERRORS, TH, Array, P, V
 from fsw.estimation.sensor_checks import Health
-from fsw.estimation.sensor_fault import Sensor, SensorFault
+from fsw.estimation.sensor_fault import Sensor, fault_name
 from fsw.estimation.sensor_fusion import FusionMemory
 from fsw.estimation.turned_covariance import SAME_AXES, turned_covariance
+from fsw.frozen import replace
 from fsw.signals import (
     EstimatorReport,
     SatelliteFix,
@@ -25,6 +26,10 @@ ATTITUDE, LEVEL_VELOCITY, VERTICAL_VELOCITY = 1, 2, 4
 RELATIVE, ABSOLUTE, HEIGHT, ABOVE_GROUND = 8, 16, 32, 64
 PREDICTED_RELATIVE, PREDICTED_ABSOLUTE = 256, 512
 SATELLITES_DOUBTED, ACCELERATION_DOUBTED = 1024, 2048
+NO_FIX: Final = 1  # GPS_FIX_TYPE
+_NOT_SAID: Final = 255  # satellites
+_NOWHERE: Final[Vec3] = (math.nan, math.nan, math.nan)
+_NOT_KNOWN: Final = (math.nan,) * 21
 # What telemetry still calls known: standard deviations.
 _KNOWN_ANGLE: Final = 0.2  # rad
 _KNOWN_SPEED: Final = 0.5  # m/s
@@ -53,7 +58,6 @@ def estimator_report(
     variances = entries[:: ERRORS + 1]
     without = unaided(memory, now)
     sensors = _sensors(memory, now, stale)
-    fix = memory.gnss
     return EstimatorReport(
         t_us=estimate.t_us,
         pose_covariance=_pose(entries),
@@ -68,15 +72,54 @@ def estimator_report(
         unaided_us=round(1e6 * without) if without < math.inf else -1,
         resets=memory.reset.number,
         flags=_flags(variances, sensors, aided=without <= stale),
-        fix=None
-        if fix is None
-        else SatelliteFix(
-            round(1e6 * fix.time),
-            fix.position,
-            fix.velocity,
-            _roots(fix.position_variance),
-            max(_roots(fix.velocity_variance)),
-        ),
+        fix=_fix(memory, now, stale),
+    )
+
+
+def unknown_report(
+    last: EstimatorReport, memory: FusionMemory, t_us: int, stale: float
+) -> EstimatorReport:
+    """The report of a filter that is to start anew, after its ``last`` one: nothing is known.
+
+    A sensor is silent after ``stale`` [s].
+    """
+    now = memory.now
+    without = unaided(memory, now)
+    return replace(
+        last,
+        t_us=t_us,
+        pose_covariance=_NOT_KNOWN,
+        velocity_covariance=_NOT_KNOWN,
+        sensors=_sensors(memory, now, stale),
+        ratios=TestRatios(),
+        unaided_us=round(1e6 * without) if without < math.inf else -1,
+        flags=0,
+        fix=_fix(memory, now, stale),
+    )
+
+
+def _fix(memory: FusionMemory, now: float, stale: float) -> SatelliteFix | None:
+    """What the receiver said last; without a fix where it says so, or says nothing."""
+    fix, none = memory.gnss, memory.without_fix
+    if fix is None and none is None:
+        return None
+    lost = none if fix is None or (none is not None and none.time > fix.time) else None
+    last = lost or fix
+    assert last is not None
+    kind, satellites = last.fix_type, last.satellites
+    if now - memory.came(Sensor.GNSS) > stale:
+        kind, satellites = NO_FIX, _NOT_SAID
+    time = round(1e6 * last.time)
+    if fix is None:
+        return SatelliteFix(time, _NOWHERE, _NOWHERE, _NOWHERE, math.nan, kind, satellites)
+    return SatelliteFix(
+        time,
+        fix.position,
+        fix.velocity,
+        _roots(fix.position_variance),
+        max(_roots(fix.velocity_variance)),
+        kind,
+        satellites,
     )
 
 
@@ -91,7 +134,7 @@ def _sensor(health: Health, came: float, now: float, stale: float) -> SensorRepo
     return SensorReport(
         health.sensor.value,
         round(1e6 * (now - came)) if came >= 0.0 else -1,
-        "" if fault is SensorFault.NONE else fault.name.lower().replace("_", " "),
+        fault_name(fault),
         tuple([math.sqrt(one) for one in health.ratio]),
         health.innovation,
     )

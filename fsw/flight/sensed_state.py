@@ -13,6 +13,7 @@ from fsw.estimation.imu import IMU_TOO_OLD
 from fsw.estimation.kernels import Law
 from fsw.estimation.lasting_error import lasting_error
 from fsw.estimation.pace import looked
+from fsw.estimation.sensor_checks import Health
 from fsw.estimation.sensor_fault import Sensor, SensorFault, sentence
 from fsw.estimation.sensor_fusion import (
     UNKNOWN,
@@ -24,7 +25,7 @@ from fsw.estimation.sensor_fusion import (
 )
 from fsw.estimation.tuning import EstimatorTuning
 from fsw.estimation.turned_covariance import Vec6
-from fsw.flight.estimator_report import AIDS_PLACE, estimator_report, unaided
+from fsw.flight.estimator_report import AIDS_PLACE, estimator_report, unaided, unknown_report
 from fsw.flight.jump import on_return, told
 from fsw.flight.state import Aiding, FlightState
 from fsw.frozen import replace
@@ -132,7 +133,8 @@ class SensedState:
         known = None if state.invalid_ticks else estimate
         model = UNKNOWN if memory.dispute is None else self._model(state)
         memory, found = self._fusion.catch_up(memory, inputs.samples, now, known, model)
-        due = inputs.sensors.t_us // _CHECKED_US != state.t_us // _CHECKED_US
+        # By the filter's own clock: the state has none before the first estimate.
+        due = inputs.sensors.t_us // _CHECKED_US != round(1e6 * before.now) // _CHECKED_US
         news = memory.health is not before.health
         if due or news or found is None:
             memory = self._told(before, memory, now, texts, due=due)
@@ -155,10 +157,15 @@ class SensedState:
     ) -> FlightState:
         """The state with what the estimator says about itself now; nothing before it started.
 
-        ``covariance`` (17, 17) [SI] is of the error of the ``estimate``.
+        ``covariance`` (17, 17) [SI] is of the error of the ``estimate``; None: nothing is known.
         """
-        if memory is None or covariance is None:
+        if memory is None:
             return state
+        if covariance is None:
+            if state.estimator is None:
+                return state
+            unknown = unknown_report(state.estimator, memory, estimate.t_us, self._stale)
+            return replace(state, estimator=unknown)
         report = estimator_report(memory, covariance, estimate, memory.now, self._stale)
         return replace(state, estimator=report, aiding=_aiding(state, memory, report))
 
@@ -299,7 +306,7 @@ def _aiding(state: FlightState, memory: FusionMemory, report: EstimatorReport) -
     return Aiding(
         unaided_us=max(round(1e6 * _overdue(memory, now)), 0) if report.unaided_us > 0 else 0,
         pose=aid.sensor,
-        pose_fault=aid.fault if now - aid.fault_at < _LATELY else SensorFault.STALE,
+        pose_fault=aid.fault if now - aid.fault_at < _recently(aid) else SensorFault.STALE,
         position_sigma=math.sqrt(max(P[0], P[6], P[11])),
         velocity_sigma=math.sqrt(max(V[0], V[6], V[11])),
         attitude_sigma=math.sqrt(max(P[15], P[18])),
@@ -307,6 +314,14 @@ def _aiding(state: FlightState, memory: FusionMemory, report: EstimatorReport) -
         fault=fault,
         since_us=since_us,
     )
+
+
+def _recently(aid: Health) -> float:
+    """Time [s] in which the last fault of a sensor is one of now: its next reading takes so long.
+
+    A fault that its last reading had, that is: a sensor that has fallen silent is silent.
+    """
+    return max(_LATELY, 1.5 * aid.apart) if aid.fault_at >= aid.came else _LATELY
 
 
 def _memory(state: FlightState, now: float) -> FusionMemory:

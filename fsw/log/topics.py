@@ -313,6 +313,8 @@ GNSS_LOCAL: Final = Topic(
         doubles("velocity", 3, "m/s, NED"),
         doubles("position_variance", 3, "m^2"),
         doubles("velocity_variance", 3, "m^2/s^2"),
+        Field("fix_type", "uint32_t", note="GPS_FIX_TYPE"),
+        Field("satellites_used", "uint32_t", note="255: not said"),
     ),
 )
 VEHICLE_AIR_DATA: Final = Topic(

@@ -18,6 +18,7 @@ from fsw.parameters.flight_config import FlightConfig
 from fsw.parameters.float32 import nearest_decimal
 from fsw.tuning import number_at
 
+ACCEL_RANGE: Final = "EST_ACC_RANGE"
 _DEGREE: Final = math.pi / 180.0
 _MICRO: Final = 1e-6
 _MILLI: Final = 1e-3
@@ -238,6 +239,8 @@ _ROWS: Final[dict[str, list[_Row]]] = {
          "Naive controller with centring: weight of the distance to the sphere's centre"),
     ],
     "Estimator": [
+        (ACCEL_RANGE, f"{_EST}.accel_full_scale", "m/s^2", 1.0, 10000.0,
+         "Accelerometer: its range; readings at an end of it are counted in VIBRATION"),
         ("EKF2_EV_DELAY", f"{_EST}.pose_delay", "ms", 0.0, 200.0,
          "Pose: delay beyond what its time stamp says", _MILLI),
         ("EST_EV_DELAY_SD", f"{_EST}.pose_delay_sigma", "ms", 0.0, 100.0,

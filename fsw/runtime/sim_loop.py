@@ -19,6 +19,7 @@ from fsw.link.inbox import Inbox
 from fsw.link.sim_link import Pacing, SimLink
 from fsw.link.wire.message_ids import PATH_PLANNER, SYSTEM_ID
 from fsw.log.run_files import RunFiles
+from fsw.parameters.registry import ACCEL_RANGE
 from fsw.ports import Clock, LoopHealth, PlanService
 from fsw.runtime.clock import unix_us
 from fsw.runtime.deadline_monitor import DeadlineMonitor
@@ -152,7 +153,7 @@ class SimLoop(Generic[State]):
         self._notices: list[StatusText] = []
         self._host = HostWatch(files, ground, clock, wall_clock)
         self._host_news: HostHealth | None = None  # for the next tick
-        self._vibration = VibrationMeter()
+        self._vibration = VibrationMeter(program.parameters.values[ACCEL_RANGE])
         self._releases: StepReleases | ScheduledReleases
         methods: dict[Member, Callable[[Cycle], None]] = {
             Member.RECEIVE: self._receive,
@@ -324,6 +325,8 @@ class SimLoop(Generic[State]):
         record = self._record
         self._count_missed()
         record.health.vibration = self._vibration.metrics
+        record.health.clipped = self._vibration.clipped
+        self._vibration.accel_range = self._parameters.values[ACCEL_RANGE]
         for group in RATE_GROUPS:
             # The planner's cycles are of interest, not the time that a request takes to send.
             timer = record.mpc.timer if group is MPC else record.groups[group.name]

@@ -37,8 +37,6 @@ _ALL_WELL: Final = 100  # quality
 _UNKNOWN: Final = (math.nan, *(0.0,) * 20)  # a covariance
 _NO_RATES: Final = (math.nan,) * 6
 _LASER, _DOWNWARD = 0, 25  # MAV_DISTANCE_SENSOR, MAV_SENSOR_ORIENTATION
-_FIXED, _PLAIN = 6, 3  # GPS_FIX_TYPE
-_SATELLITES: Final = 18
 _MOST_JOINTS: Final = 4
 _U8, _U16, _I16 = 0xFF, 0xFFFF, 0x7FFF
 _WARM_C: Final = 15.0
@@ -129,8 +127,8 @@ class SensorEncoder:
             min(round(100.0 * math.hypot(north, east)), _U16),
             *(min(max(round(100.0 * v), -_I16), _I16) for v in (north, east, down)),
             round(100.0 * course) % 36_000,
-            _FIXED if one.rtk else _PLAIN,
-            _SATELLITES,
+            one.fix_type,
+            one.satellites,
             0,
             0,  # no yaw
         )

@@ -18,13 +18,16 @@ def thrust_rate(thrust: float, command: float, thrust_max: float, lag: float) ->
 
 
 @kernel
-def rotor_torque(thrust: V4, arm: float, yaw_ratio: float) -> V3:
-    """Torque [N·m, B] of four thrusts at a lever arm [m] with yaw_ratio [m], torque per thrust.
+def rotor_torque(thrust: V4, shaft: V4, arm: float, yaw_ratio: float) -> V3:
+    """Torque [N·m, B] of four thrusts [N] at a lever arm [m] with yaw_ratio [m], torque per thrust.
 
-    .. math:: τ = [L(f_2 − f_4), L(f_3 − f_1), b(f_1 − f_2 + f_3 − f_4)]
+    .. math:: τ = [L(f_2 − f_4), L(f_3 − f_1), b(g_1 − g_2 + g_3 − g_4)]
+
+    ``shaft`` is g, the thrusts [N] that the same rotors would have in free air.
     """
     f1, f2, f3, f4 = thrust
-    return (arm * (f2 - f4), arm * (f3 - f1), yaw_ratio * (f1 - f2 + f3 - f4))
+    g1, g2, g3, g4 = shaft
+    return (arm * (f2 - f4), arm * (f3 - f1), yaw_ratio * (g1 - g2 + g3 - g4))
 
 
 @kernel

@@ -154,6 +154,9 @@ def load_into(plant: Plant, state: Array, inputs: Inputs, work: Workspace) -> No
         plant.feet, triple(state, P_WB), triple(state, V_WB), triple(state, W_WB_B), rotation
     )
     thrust = (state[THRUST], state[THRUST + 1], state[THRUST + 2], state[THRUST + 3])
+    # The air's laws are of thrust at the same power, which is the same torque at the same speed:
+    # what a surface adds to the thrust, it does not add to the torque of the shaft.
+    shaft = thrust
     air = plant.air
     if air.active > 0.0:
         p = triple(state, P_WB)
@@ -170,7 +173,7 @@ def load_into(plant: Plant, state: Array, inputs: Inputs, work: Workspace) -> No
         force = add(force, drag_force(air, triple(state, V_WB), rotation))
         force = add(force, wall_force(air, triple(state, P_WB), rotation, thrust))
     put(load, 0, force)
-    turn = rotor_torque(thrust, plant.rotors.arm, plant.rotors.yaw_ratio)
+    turn = rotor_torque(thrust, shaft, plant.rotors.arm, plant.rotors.yaw_ratio)
     put(load, 3, add(add(turn, triple(inputs.torque_B, 0)), feet_moment))
     joints, drive, stops = work.still.shape[0], plant.joints, plant.stops
     for i in range(joints):

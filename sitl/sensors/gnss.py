@@ -1,4 +1,4 @@
-"""Satellite navigation: white noise, a part that wanders, and reflections as outliers."""
+"""Satellite navigation: white noise, a part that wanders, digits, and reflections as outliers."""
 
 from __future__ import annotations
 
@@ -6,17 +6,21 @@ import math
 
 import numpy as np
 
+from sitl.earth import RADIUS
 from sitl.sensors.exact import V4, SensorReadings
 from sitl.sensors.keys import Gnss
 from sitl.sensors.measurements import GnssMeasurement
-from sitl.sensors.noise import GaussMarkov, anywhere
+from sitl.sensors.noise import GaussMarkov, anywhere, digits
 
 
 class GnssSensor:
     """The receiver of one flight."""
 
-    def __init__(self, keys: Gnss, random: np.random.Generator) -> None:
+    def __init__(self, keys: Gnss, random: np.random.Generator, latitude: float = 0.0) -> None:
+        """Draw its errors; the local frame begins at a ``latitude`` [deg]."""
         self._keys = keys
+        step = RADIUS * math.radians(keys.position_resolution_deg)  # m, northwards
+        self._steps = (step, step * math.cos(math.radians(latitude)), keys.height_resolution_m)
         self._random = random
         level, down = keys.wander_horizontal_m, keys.wander_vertical_m
         sigmas = (level, level, down)
@@ -37,8 +41,13 @@ class GnssSensor:
         level, down, speed = keys.horizontal_m, keys.vertical_m, keys.velocity_m_s
         return GnssMeasurement(
             t_us=stamp_us,
-            p_WB=(x + ox + level * dx, y + oy + level * dy, z + oz + down * dz),
-            v_WB=(vx + speed * a, vy + speed * b, vz + speed * c),
+            p_WB=digits(
+                (x + ox + level * dx, y + oy + level * dy, z + oz + down * dz), self._steps
+            ),
+            v_WB=digits(
+                (vx + speed * a, vy + speed * b, vz + speed * c),
+                (keys.velocity_resolution_m_s,) * 3,
+            ),
             horizontal_deviation=self._horizontal,
             vertical_deviation=self._vertical,
             rtk=keys.rtk,

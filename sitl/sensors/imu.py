@@ -62,9 +62,11 @@ def vibrate(errors: _Errors, thrust: V4) -> V3:
 
 @kernel
 def _digit(value: float, limit: float, resolution: float) -> float:
-    """What the converter makes of a value [any unit]: within its range, on its grid."""
-    value = min(max(value, -limit), limit)
-    return resolution * np.rint(value / resolution) if resolution > 0.0 else value
+    """What the converter makes of a value [any unit]: on its grid, within its range."""
+    if resolution > 0.0:
+        value = resolution * np.rint(value / resolution)
+    # Last, because the nearest step may lie beyond the range.
+    return min(max(value, -limit), limit)
 
 
 @kernel

@@ -73,6 +73,9 @@ class MotionCapture(Timing):
     attitude_deg: Annotated[float, _DEGREES] = 0.0
     outlier_m: Annotated[float, _METRES] = 0.0  # how far an outlier lies off, in any direction
     outlier_deg: Annotated[float, _DEGREES] = 0.0
+    # Steps of the digits; 0: as fine as the message. Of the attitude, those of a small rotation.
+    position_resolution_m: Annotated[float, _METRES] = 0.0
+    attitude_resolution_deg: Annotated[float, Range(0.0, 10.0)] = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -100,6 +103,10 @@ class Gnss(Timing):
     wander_time_s: Annotated[float, _SECONDS] = 60.0
     velocity_m_s: Annotated[float, Range(0.0, 10.0)] = 0.0
     outlier_m: Annotated[float, _METRES] = 0.0
+    # Steps of the digits, by default those of HIL_GPS; 0: as fine as the message.
+    position_resolution_deg: Annotated[float, Range(0.0, 1e-3)] = 1e-7  # latitude and longitude
+    height_resolution_m: Annotated[float, _METRES] = 0.001
+    velocity_resolution_m_s: Annotated[float, Range(0.0, 10.0)] = 0.01
     rtk: bool = False  # what it says it is: a fix with corrections, or a plain one
 
 

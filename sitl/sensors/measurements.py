@@ -6,6 +6,8 @@ from typing import NamedTuple, TypeAlias
 
 from sitl.ranges import V3
 
+PLAIN_FIX, RTK_FIXED = 3, 6  # GPS_FIX_TYPE
+
 V4: TypeAlias = tuple[float, float, float, float]
 
 
@@ -38,6 +40,12 @@ class GnssMeasurement(NamedTuple):
     horizontal_deviation: float  # m, as the receiver states it
     vertical_deviation: float  # m
     rtk: bool
+    satellites: int = 18  # that it sees
+
+    @property
+    def fix_type(self) -> int:
+        """GPS_FIX_TYPE of MAVLink."""
+        return RTK_FIXED if self.rtk else PLAIN_FIX
 
 
 class PressureMeasurement(NamedTuple):

@@ -9,7 +9,7 @@ import numpy as np
 from sitl.sensors.exact import V4, SensorReadings, turned
 from sitl.sensors.keys import MotionCapture
 from sitl.sensors.measurements import PoseMeasurement
-from sitl.sensors.noise import anywhere
+from sitl.sensors.noise import anywhere, digits, rounded
 
 
 class MotionCaptureSensor:
@@ -23,6 +23,10 @@ class MotionCaptureSensor:
     def measure(
         self, exact: SensorReadings, thrust: V4, stamp_us: int, outlier: bool
     ) -> PoseMeasurement:
+        """A pose in the digits that it has."""
+        return in_digits(self.seen(exact, stamp_us, outlier), self._keys)
+
+    def seen(self, exact: SensorReadings, stamp_us: int, outlier: bool) -> PoseMeasurement:
         """A pose; an outlier is off by a fixed length and angle in any direction."""
         keys, (x, y, z) = self._keys, exact.p_WB
         dx, dy, dz, a, b, c = self._random.standard_normal(6).tolist()
@@ -34,3 +38,15 @@ class MotionCaptureSensor:
             p = (p[0] + ox, p[1] + oy, p[2] + oz)
             q = turned(q, anywhere(self._random, math.radians(keys.outlier_deg)))
         return PoseMeasurement(stamp_us, p, q, (size * size,) * 3, (turn * turn,) * 3, 0, False)
+
+
+def in_digits(seen: PoseMeasurement, keys: MotionCapture) -> PoseMeasurement:
+    """A pose on the grid of its digits; a rotation by a small angle moves ``q`` by half of it."""
+    step, turn = keys.position_resolution_m, 0.5 * math.radians(keys.attitude_resolution_deg)
+    if step > 0.0:
+        seen = seen._replace(p_WB=digits(seen.p_WB, (step,) * 3))
+    if turn > 0.0:
+        w, x, y, z = [rounded(one, turn) for one in seen.q_WB]
+        size = math.sqrt(w * w + x * x + y * y + z * z)
+        seen = seen._replace(q_WB=(w / size, x / size, y / size, z / size))
+    return seen

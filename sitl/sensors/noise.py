@@ -57,3 +57,12 @@ def anywhere(random: np.random.Generator, length: float) -> V3:
 def rounded(value: float, resolution: float) -> float:
     """A ``value`` [any unit] on the grid of a ``resolution`` [same unit]; 0: as it is."""
     return resolution * round(value / resolution) if resolution > 0.0 else value
+
+
+def digits(values: V3, resolution: V3) -> V3:
+    """Each of three ``values`` on the grid of its own resolution.
+
+    ``values`` [any unit, any frame] and ``resolution`` [same unit, same frame].
+    """
+    (x, y, z), (a, b, c) = values, resolution
+    return (rounded(x, a), rounded(y, b), rounded(z, c))

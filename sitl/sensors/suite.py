@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from sitl.earth import DEFAULT_ORIGIN, Place
 from sitl.seeds import stream
 from sitl.sensors.barometer import BarometerSensor
 from sitl.sensors.channel import Channel, Sensor
@@ -32,12 +33,11 @@ class SensorSuite:
         *,
         joints: int,
         hover_thrust: float,
-        origin_altitude: float = 0.0,
+        origin: Place = DEFAULT_ORIGIN,
     ) -> None:
         """Draw the sensors of this flight, which begins at the stamp ``start_us``.
 
-        A rotor gives ``hover_thrust`` [N] in hover; the origin of the local frame lies at
-        ``origin_altitude`` [m] above the sea.
+        A rotor gives ``hover_thrust`` [N] in hover; the local frame begins at ``origin``.
         """
         self._channels: list[Channel] = []
 
@@ -53,11 +53,12 @@ class SensorSuite:
             name, eyes = "visual odometry", one.visual_odometry
             add(name, eyes, VisualOdometrySensor(eyes, stream(seed, "sensor", name)))
         if one.gnss is not None:
-            add("gnss", one.gnss, GnssSensor(one.gnss, stream(seed, "sensor", "gnss")))
+            random = stream(seed, "sensor", "gnss")
+            add("gnss", one.gnss, GnssSensor(one.gnss, random, origin.latitude))
         if one.barometer is not None:
             name, air = "barometer", one.barometer
             random = stream(seed, "sensor", name)
-            add(name, air, BarometerSensor(air, random, origin_altitude))
+            add(name, air, BarometerSensor(air, random, origin.altitude))
         if one.magnetometer is not None:
             name, compass = "magnetometer", one.magnetometer
             add(name, compass, MagnetometerSensor(compass, stream(seed, "sensor", name)))

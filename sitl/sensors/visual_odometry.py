@@ -10,7 +10,7 @@ from sitl.ranges import V3
 from sitl.sensors.exact import V4, SensorReadings
 from sitl.sensors.keys import VisualOdometry
 from sitl.sensors.measurements import PoseMeasurement
-from sitl.sensors.motion_capture import MotionCaptureSensor
+from sitl.sensors.motion_capture import MotionCaptureSensor, in_digits
 from sitl.sensors.noise import normal
 
 
@@ -43,12 +43,12 @@ class VisualOdometrySensor:
         if self._begun:
             self._drift()
         self._begun = True
-        seen = self._pose.measure(exact, thrust, stamp_us, outlier)
-        (x, y, z), (ox, oy, oz) = seen.p_WB, self._offset
+        seen = self._pose.seen(exact, stamp_us, outlier)
+        keys, (x, y, z), (ox, oy, oz) = self._keys, seen.p_WB, self._offset
         c, s = math.cos(self._yaw), math.sin(self._yaw)
         noise, turn = seen.position_variance[0] + self._offset_variance, self._yaw_variance
         roll, pitch, yaw = seen.attitude_variance
-        return seen._replace(
+        drifted = seen._replace(
             position_variance=(noise + turn * y * y, noise + turn * x * x, noise),
             attitude_variance=(roll, pitch, yaw + turn),
             p_WB=(c * x - s * y + ox, s * x + c * y + oy, z + oz),
@@ -56,6 +56,7 @@ class VisualOdometrySensor:
             resets=self._resets % 256,
             from_cameras_on_board=True,
         )
+        return in_digits(drifted, keys)
 
     def _drift(self) -> None:
         keys, (x, y, z) = self._keys, self._offset

@@ -1,6 +1,7 @@
 """What the simulated sensors say as the flight software's samples, without a link between them.
 
-What the messages would round stays exact; variances are stated as the link's decoder states them.
+What the messages would round stays exact, but for what a sensor itself rounds; variances are stated
+as the link's decoder states them.
 """
 
 from __future__ import annotations
@@ -56,7 +57,15 @@ def sample(said: Measurement) -> Sample:
         case GnssMeasurement():
             level, down = said.horizontal_deviation**2, said.vertical_deviation**2
             speed = (_NOT_STATED,) * 3
-            return GnssSample(time, said.p_WB, said.v_WB, (level, level, down), speed)
+            return GnssSample(
+                time,
+                said.p_WB,
+                said.v_WB,
+                (level, level, down),
+                speed,
+                said.fix_type,
+                said.satellites,
+            )
         case PressureMeasurement():
             return PressureSample(time, standard_altitude(said.pressure_pa), _NOT_STATED)
         case MagneticMeasurement():

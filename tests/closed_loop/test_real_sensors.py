@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from fsw.estimation.sensor_fault import Sensor, SensorFault, sentence
-from fsw.measurements import ImuSample, JointSample, PoseSample, Sample
+from fsw.measurements import GnssSample, ImuSample, JointSample, PoseSample, Sample
 from sitl.scenario import Hold
 from sitl.scenario_file import load_scenario
 from sitl.simulation import START_US
@@ -208,3 +208,21 @@ def test_five_positions_a_second_are_not_taken_for_a_loss() -> None:
     flight.follow()
     flight.run(1.5)
     assert not [text for text in flight.texts if "no position" in text]
+
+
+@pytest.mark.requirement("REQ-EST-1")
+def test_a_receiver_that_loses_its_fix_is_said_to_have_none() -> None:
+    """It goes on to speak: it is not silent."""
+    hold = Hold((0.0, 0.0, -3.6))
+    lost = changed(GnssSample, 1.0, 9.0, lambda one: replace(one, fix_type=1, satellites=3))
+    scenario = replace(load_scenario("field", "rtk"), walls=(), trajectory=hold)
+    flight = Flight(scenario, seed=900, spoil_samples=lost)
+    flight.follow()
+    flight.run(2.2)
+    assert flight.texts.count(sentence(Sensor.GNSS, SensorFault.NO_FIX)) == 1
+    assert not [text for text in flight.texts if "silent" in text]
+    assert [text for text in flight.texts if "no position is measured: GNSS has no fix" in text]
+    report = flight.snapshot.estimator
+    assert report is not None
+    assert report.fix is not None
+    assert (report.fix.kind, report.fix.satellites) == (1, 3)

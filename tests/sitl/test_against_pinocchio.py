@@ -73,7 +73,7 @@ def pinocchio_acceleration(
     rotors, drive = vehicle.rotors, vehicle.joints
     lift = np.array([0.0, 0.0, -view.thrust.sum()])
     f1, f2, f3, f4 = view.thrust
-    turn = rotor_torque((f1, f2, f3, f4), rotors.arm, rotors.yaw_ratio)
+    turn = rotor_torque((f1, f2, f3, f4), (f1, f2, f3, f4), rotors.arm, rotors.yaw_ratio)
     force = lift + rotation.T @ inputs.force_W
     moment = np.array(turn) + inputs.torque_B
     torque = [

@@ -23,6 +23,7 @@ from fsw.link.wire import message_ids
 from fsw.log.flight_log import FlightLog
 from fsw.log.reader import LoggedTick, open_flight, ticks
 from fsw.parameters.flight_config import flight_config
+from fsw.parameters.registry import ACCEL_RANGE
 from fsw.ports import LoopHealth
 from fsw.runtime.planner_service import PlannerRecord
 from fsw.runtime.program import FlightProgram
@@ -132,6 +133,13 @@ class Null:
         return lambda *about, **more: None
 
 
+class Parameters(Null):
+    """Those that the loop reads; nobody changes one."""
+
+    def __init__(self) -> None:
+        self.values = {ACCEL_RANGE: 156.9}
+
+
 class Log(Null):
     """Keeps what the loop says beside the ticks."""
 
@@ -175,7 +183,9 @@ class Bench:
         self.files = NoFiles()
         self.told: list[tuple[int, str]] = []  # on the console
         null: Any = Null()
-        program = FlightProgram(FACTS, first, *parts_of(tick), null, null, null)
+        self.parameters = Parameters()
+        parts = parts_of(tick)
+        program = FlightProgram(FACTS, first, *parts, null, cast(Any, self.parameters), null)
         self.loop = SimLoop(
             program, cast(Any, self.sim), cast(Any, self.ground), self.inbox, self.record,
             self.time.clock, self.stop, cast(Any, self.files), self._sleep, self.time.clock,
@@ -288,6 +298,17 @@ def test_what_was_missed_in_the_last_second_is_counted() -> None:
     bench.asleep = lambda: bench.time.work(7_000) if len(bench.sim.answers) == 700 else None
     bench.run(1.8)
     assert bench.timer(INNER.name).skipped == 3
+
+
+def test_readings_at_the_end_of_the_range_are_counted_as_the_parameter_says() -> None:
+    """Each frame has 9.81 m/s^2; the loop looks at the parameter once a second."""
+    bench = Bench(standing)
+    bench.run(1.6)
+    assert bench.record.health.clipped == 0
+    bench = Bench(standing)
+    bench.parameters.values[ACCEL_RANGE] = 9.0
+    bench.run(3.1)
+    assert 500 <= bench.record.health.clipped <= 1_600
 
 
 @pytest.mark.requirement("REQ-LOG-1")

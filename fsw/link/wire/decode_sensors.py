@@ -42,7 +42,7 @@ _DOWNWARD: Final = 25  # MAV_SENSOR_ORIENTATION
 _UNKNOWN_EPH: Final = 0xFFFF
 _UNKNOWN_VOLTAGE: Final = 0xFFFF
 _VOLTAGE_AT, _REMAINING_AT = 3, 17  # of BATTERY_STATUS: voltages[0] is the pack's
-_LEVEL_FIX: Final = 2  # GPS_FIX_TYPE; those above it have a height
+_FIX_AT, _SATELLITES_AT = 11, 12  # of HIL_GPS
 _NOT_STATED: Final = 0.0  # a variance that the message has no field for
 _SEA_LEVEL_HPA: Final = 1013.25
 _SEA_LEVEL_K: Final = 288.15
@@ -87,11 +87,9 @@ class SampleDecoder:
             found.append(PressureSample(time, altitude, _NOT_STATED))
         return found
 
-    def _gnss(self, values: Numbers) -> GnssSample | None:
-        """HIL_GPS; None without a fix in space."""
-        time_us, latitude, longitude, altitude, eph, epv, _, north, east, down, _, fix = values[:12]
-        if fix <= _LEVEL_FIX:
-            return None
+    def _gnss(self, values: Numbers) -> GnssSample:
+        """HIL_GPS, with a fix or without."""
+        time_us, latitude, longitude, altitude, eph, epv, _, north, east, down = values[:10]
         level = _stated(eph)
         return GnssSample(
             1e-6 * time_us,
@@ -99,6 +97,8 @@ class SampleDecoder:
             (0.01 * north, 0.01 * east, 0.01 * down),
             (level, level, _stated(epv)),
             (_NOT_STATED, _NOT_STATED, _NOT_STATED),
+            int(values[_FIX_AT]),
+            int(values[_SATELLITES_AT]),
         )
 
 

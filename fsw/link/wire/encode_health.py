@@ -5,20 +5,21 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from fsw.estimation.sensor_fault import Sensor
+from fsw.estimation.sensor_fault import Sensor, SensorFault, fault_name
 from fsw.flight.failsafe import Condition
 from fsw.link.wire.outgoing import WireValues
 from fsw.link.wire.telemetry_context import TelemetryContext
-from fsw.signals import BatteryState, Charge, FlightSnapshot
+from fsw.signals import BatteryState, Charge, EstimatorReport, FlightSnapshot, SensorReport
 
-# MAV_SYS_STATUS_SENSOR bits of what this vehicle has. It has no magnetometer and no satellite
-# receiver: heading and position come from motion capture. Their bits say whether heading and
-# position are known, which is what clients ask them for.
+# MAV_SYS_STATUS_SENSOR bits of what every vehicle has. The bits of the magnetometer and of the
+# receiver say whether heading and position are known, which is what clients ask them for; where
+# there are such sensors, also whether those are well.
 _GYRO, _ACCELEROMETER, _HEADING, _PLACE, _EXTERNAL_POSE = 0x1, 0x2, 0x4, 0x20, 0x80
+_PRESSURE, _RANGE = 0x8, 0x100
 _RATE_CONTROL, _ATTITUDE, _YAW, _HEIGHT, _POSITION = 0x400, 0x800, 0x1000, 0x2000, 0x4000
 _MOTORS, _FENCE, _AHRS, _BATTERY, _PREARM = 0x8000, 0x100000, 0x200000, 0x2000000, 0x10000000
 _LOGGING: Final = 0x1000000
-_SENSING: Final = _GYRO | _ACCELEROMETER | _HEADING | _PLACE | _EXTERNAL_POSE | _AHRS
+_SENSING: Final = _GYRO | _ACCELEROMETER | _HEADING | _PLACE | _AHRS
 _CONTROL: Final = _RATE_CONTROL | _ATTITUDE | _YAW | _HEIGHT | _POSITION
 _PRESENT: Final = _SENSING | _CONTROL | _MOTORS | _FENCE | _BATTERY | _LOGGING | _PREARM
 # Which subsystem an operator should look at; any fault also forbids arming.
@@ -26,11 +27,11 @@ _SUSPECT: Final[dict[str, int]] = {
     Condition.PLAN_REFUSED.value: 0,
     Condition.PLAN_STALE.value: _POSITION | _HEIGHT,
     Condition.OUTPUT_NOT_FINITE.value: _MOTORS,
-    Condition.ESTIMATE_INVALID.value: _SENSING,
+    Condition.ESTIMATE_INVALID.value: _SENSING | _EXTERNAL_POSE,
     Condition.ATTITUDE_LOST.value: _ATTITUDE | _RATE_CONTROL | _AHRS,
     Condition.POSITION_LOST.value: _PLACE | _EXTERNAL_POSE | _POSITION | _HEIGHT,
     Condition.POSITION_LOW.value: _PLACE | _EXTERNAL_POSE,
-    Condition.AIDING_LOST.value: _EXTERNAL_POSE,
+    Condition.AIDING_LOST.value: _PLACE | _EXTERNAL_POSE,
     Condition.TILT_LOST.value: _ATTITUDE | _RATE_CONTROL,
     Condition.PLANNER_LOST.value: _POSITION | _HEIGHT,
     Condition.FENCE_BREACH.value: _FENCE,
@@ -44,9 +45,21 @@ _LOST: Final[dict[str, int]] = {
     Sensor.IMU.value: _GYRO | _ACCELEROMETER,
     Sensor.ENCODERS.value: _MOTORS,
 }
+# Those that are there if they are heard.
+_HEARD: Final[dict[str, int]] = {
+    Sensor.POSE.value: _EXTERNAL_POSE,
+    Sensor.GNSS.value: _PLACE,
+    Sensor.BAROMETER.value: _PRESSURE,
+    Sensor.MAGNETOMETER.value: _HEADING,
+    Sensor.RANGEFINDER.value: _RANGE,
+}
+# Faults with which a sensor is in use.
+_IN_USE: Final = frozenset(("", fault_name(SensorFault.REPEATED), fault_name(SensorFault.SELDOM)))
+_JUMP: Final = fault_name(SensorFault.JUMP)
 # MAV_BATTERY_CHARGE_STATE: 0 is undefined, OK is 1.
 _CHARGE_STATES: Final = {charge: int(charge) + 1 for charge in Charge}
 _LIPO, _FOR_EVERYTHING = 1, 1  # MAV_BATTERY_TYPE, MAV_BATTERY_FUNCTION
+_U32: Final = 0xFFFFFFFF
 _UNKNOWN_CELL: Final = 0xFFFF
 _UNKNOWN_TEMPERATURE: Final = 0x7FFF
 _UNKNOWN_ENERGY: Final = -1
@@ -57,7 +70,9 @@ _ESTIMATED: Final = 1 | 2 | 4 | 8 | 16 | 32
 def sys_status(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues:
     """SYS_STATUS: load of the loop, health by subsystem, battery."""
     battery = snapshot.battery
-    health = _PRESENT
+    sensing, ill = _sensors(snapshot.estimator)
+    present = _PRESENT | sensing
+    health = present & ~ill
     for failure in snapshot.failures:
         health &= ~(_SUSPECT.get(failure, 0) | _PREARM)
     if Condition.SENSOR_LOST.value in snapshot.failures:
@@ -71,12 +86,12 @@ def sys_status(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValue
     margins = snapshot.constraints.margins
     if margins and not min(margins) >= 0.0:
         health &= ~_FENCE
-    enabled = _PRESENT if snapshot.armed else _PRESENT & ~(_CONTROL | _MOTORS)
+    enabled = present if snapshot.armed else present & ~(_CONTROL | _MOTORS)
     if not margins:
         enabled &= ~_FENCE
     load = round(1000 * min(context.health.inner.load + context.health.mpc.load, 1.0))
     return (
-        _PRESENT,
+        present,
         enabled,
         health,
         load,
@@ -88,6 +103,25 @@ def sys_status(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValue
         _percent(battery),
         *(0, 0, 0),
     )
+
+
+def _sensors(known: EstimatorReport | None) -> tuple[int, int]:
+    """Bits of the sensors that are there, beside those of all, and of those that are not well."""
+    if known is None:  # exact states
+        return _EXTERNAL_POSE, 0
+    there, ill = 0, 0
+    for one in known.sensors:
+        bit = _HEARD.get(one.name, 0)
+        there |= bit
+        ill |= 0 if _is_well(one) else bit
+    return there, ill
+
+
+def _is_well(one: SensorReport) -> bool:
+    """Whether a sensor is in use; one outlier that was refused does not make it ill for long."""
+    if one.fault == _JUMP:
+        return max(one.ratio, default=0.0) <= 1.0
+    return one.fault in _IN_USE
 
 
 def battery_status(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues:
@@ -137,9 +171,12 @@ def estimator_status(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValue
 
 
 def vibration(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues:
-    """VIBRATION as PX4 fills it: high-frequency gyro and accelerometer, nothing was clipped."""
+    """VIBRATION as PX4 fills it: high-frequency gyro and accelerometer, clipping of all axes.
+
+    There is one accelerometer.
+    """
     gyro, accel = context.health.vibration
-    return (snapshot.t_us, 0.0, gyro, accel, 0, 0, 0)
+    return (snapshot.t_us, 0.0, gyro, accel, context.health.clipped & _U32, 0, 0)
 
 
 def _millivolts(battery: BatteryState) -> int:

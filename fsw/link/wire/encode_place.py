@@ -17,13 +17,11 @@ from fsw.signals import FlightSnapshot, Vec3
 
 _LOCAL_NED: Final = 1  # MAV_FRAME
 _BODY_FRD: Final = 12  # MAV_FRAME
-_MOCAP: Final = 4  # MAV_ESTIMATOR_TYPE
+_MOCAP: Final = 6  # MAV_ESTIMATOR_TYPE
 _COVARIANCE_UNKNOWN: Final[tuple[float, ...]] = (math.nan, *(0.0,) * 20)
 _I16: Final = 32767
 _AUTOPILOT: Final = 8  # MAV_ESTIMATOR_TYPE
-_FIX_3D, _RTK_FIXED = 3, 6  # GPS_FIX_TYPE
-_RTK_SIGMA: Final = 0.05  # m; a receiver without corrections does not promise it
-_UNKNOWN_U8, _UNKNOWN_U16, _U32 = 0xFF, 0xFFFF, 0xFFFFFFFF
+_UNKNOWN_U16, _U32 = 0xFFFF, 0xFFFFFFFF
 
 
 def global_position(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues:
@@ -106,22 +104,21 @@ def gps_raw(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues |
     fix = None if known is None else known.fix
     if fix is None:
         return None
-    latitude, longitude, altitude = _scaled(to_global(context.origin, fix.p))
-    north, east, _ = fix.v
+    known_place = math.isfinite(sum(fix.p))
+    place = _scaled(to_global(context.origin, fix.p)) if known_place else (0, 0, 0)
+    north, east, _ = fix.v if known_place else (0.0, 0.0, 0.0)
     level = max(fix.position_sigma[0], fix.position_sigma[1])
     down = fix.position_sigma[2]
     return (
         fix.t_us,
-        latitude,
-        longitude,
-        altitude,
+        *place,
         _UNKNOWN_U16,  # dilution of precision
         _UNKNOWN_U16,
         _at_most(100.0 * math.hypot(north, east), _UNKNOWN_U16 - 1),
         round(100.0 * _degrees(math.atan2(east, north))) % 36000,
-        _RTK_FIXED if level < _RTK_SIGMA else _FIX_3D,
-        _UNKNOWN_U8,  # satellites
-        altitude,
+        fix.kind,
+        fix.satellites,
+        0,  # height above the ellipsoid: not known
         _at_most(1e3 * level, _U32),
         _at_most(1e3 * down, _U32),
         _at_most(1e3 * fix.velocity_sigma, _U32),

@@ -14,6 +14,7 @@ from scipy.stats import chi2
 from fsw.estimation.sensor_fault import Sensor, SensorFault
 from fsw.estimation.sensor_fusion import FusionMemory, SensorFusion, at_start
 from fsw.estimation.tuning import chi_square
+from fsw.flight.estimator_report import estimator_report
 from fsw.geometry.rotation import quaternion_from_matrix
 from fsw.measurements import (
     GnssSample,
@@ -25,6 +26,7 @@ from fsw.measurements import (
 )
 from fsw.signals import StateEstimate
 from tests.fsw.estimation.sensor_runs import (
+    ARM,
     MOCAP,
     RTK,
     START,
@@ -72,6 +74,12 @@ class Flown:
                     self.found.add((health.sensor, health.fault))
             if tick % 25 == 0 and now > START + 0.5:
                 self.worst = max(self.worst, *self.in_sigmas()[:3])
+
+    @property
+    def estimate_now(self) -> StateEstimate:
+        """The last one."""
+        assert self.estimate is not None
+        return self.estimate
 
     def error(self) -> Array:
         """Errors and biases now (15,)."""
@@ -199,6 +207,34 @@ def test_a_filter_that_starts_from_poses_older_than_its_imu_makes_up_no_velocity
     assert np.linalg.norm(np.subtract(estimate.p_WB, place)) < 0.002
     M = fusion.covariance(memory, 0.998)
     assert M[0, 0] > (0.5 * MOCAP.tuning.velocity * 0.2) ** 2, "and does not know how it moved"
+
+
+@pytest.mark.parametrize(
+    ("measured", "comes", "fault"),
+    [
+        (0.944, 0.998, SensorFault.NONE),  # before the filter began, with the IMU's first reading
+        (0.5, 0.998, SensorFault.TOO_OLD),  # later than any receiver
+        (0.957, 1.3, SensorFault.TOO_OLD),  # after it had begun
+    ],
+)
+def test_a_fix_from_before_the_filter_began_is_no_fault(
+    measured: float, comes: float, fault: SensorFault
+) -> None:
+    fusion, memory, still = SensorFusion(MOCAP.tuning), at_start(), (0.0, 0.0, 0.0)
+    level, place, fine = (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, -1.0), (1e-4,) * 3
+    poses = [PoseSample(0.784 + x, (x, 0.0, -1.0), level, fine, fine) for x in (0.0, 0.008)]
+    first = [ImuSample(0.956 + TICK * k, (0.0, 0.0, -9.81 + 1e-4 * k), still) for k in range(21)]
+    memory, _ = fusion.step(memory, [*poses, *first, JointSample(0.996, ARM)], 0.996)
+    assert memory.started
+    for k in range(1, round((comes - 0.996) / TICK) + 1):
+        now = 0.996 + TICK * k
+        samples: list[Sample] = [JointSample(now, ARM), ImuSample(now, (0.0, 0.0, -9.8), still)]
+        pose = PoseSample(now, (1e-3 * k, 0.0, -1.0), level, fine, fine)
+        memory, _ = fusion.step(memory, [pose, *samples], now)
+    fix = GnssSample(measured, place, still, fine, fine)
+    health = fusion.take(memory, fix, now).of(Sensor.GNSS)
+    assert health.came == now
+    assert health.fault is fault
 
 
 @pytest.mark.requirement("REQ-EST-1")
@@ -623,6 +659,43 @@ def test_a_barometer_far_off_is_used_all_the_same_once_it_says_so_for_a_while() 
     assert health.ratio[0] < 1.0
     assert flown.memory.numbers[0]["baro_bias"] == pytest.approx(40.0, abs=2.0)
     assert flown.worst < 4.0
+
+
+def test_a_receiver_without_a_fix_is_named_heard_and_not_fused() -> None:
+    def blind(now: float, sample: Sample) -> Sample:
+        if isinstance(sample, GnssSample) and now - START > 1.5:
+            return replace(sample, fix_type=1, satellites=3, position=(50.0, 0.0, -1.0))
+        return sample
+
+    flown = Flown(run(RTK, 2, 2.5), blind)
+    assert (Sensor.GNSS, SensorFault.NO_FIX) in flown.found
+    health = flown.memory.of(Sensor.GNSS)
+    assert flown.now - health.came < 0.11
+    assert flown.now - max(health.fused) > 0.8
+    assert flown.memory.reset.number == 0
+    report = estimator_report(
+        flown.memory,
+        flown.fusion.covariance(flown.memory, flown.now),
+        flown.estimate_now,
+        flown.now,
+        0.5,
+    )
+    assert report.fix is not None
+    assert (report.fix.kind, report.fix.satellites) == (1, 3)
+    assert report.fix.t_us >= round(1e6 * (flown.now - 0.25))
+
+
+def test_a_receiver_that_falls_silent_has_no_fix_any_more() -> None:
+    flown = Flown(run(RTK, 2, 1.0))
+    covariance = flown.fusion.covariance(flown.memory, flown.now)
+
+    def kind(memory: FusionMemory, stale: float) -> tuple[int, int]:
+        report = estimator_report(memory, covariance, flown.estimate_now, memory.now, stale)
+        assert report.fix is not None
+        return report.fix.kind, report.fix.satellites
+
+    assert kind(flown.memory, 0.5) == (3, 255)
+    assert kind(flown.memory._replace(now=flown.now + 0.6), 0.5) == (1, 255)
 
 
 def test_satellites_that_came_once_too_seldom_do_not_confirm_each_other() -> None:

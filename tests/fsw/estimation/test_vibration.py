@@ -51,3 +51,22 @@ def test_a_reading_that_is_no_number_is_passed_over_in_both(value: float) -> Non
         before = meter.metrics
         meter.add(gyro, accel)
         assert meter.metrics == before
+
+
+def test_readings_at_an_end_of_the_range_are_counted_axis_by_axis() -> None:
+    meter = VibrationMeter(accel_range=156.9)
+    for accel, count in (
+        ((156.9, 0.0, -9.81), 1),
+        ((-156.9, 156.9, -156.9), 4),
+        ((156.8, 0.0, 0.0), 5),  # within a thousandth, as PX4 counts
+        ((156.7, -156.7, 0.0), 5),
+        ((1e9, math.inf, math.nan), 7),
+    ):
+        meter.add(STILL, accel)
+        assert meter.clipped == count
+
+
+def test_without_a_range_nothing_is_clipped() -> None:
+    meter = VibrationMeter()
+    meter.add(STILL, (1e6, 0.0, 0.0))
+    assert meter.clipped == 0

@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
+from typing import Any
 
 import pytest
 
 from fsw.estimation.sensor_fault import Sensor, SensorFault
 from fsw.flight.state import FlightState
+from fsw.link.wire.encode_health import estimator_status
+from fsw.measurements import JointSample, PoseSample
+from fsw.signals import FlightSnapshot
+from messages.frames import wire_fields
 from tests.fsw.estimation.sensor_runs import MOCAP, TICK, run
 from tests.fsw.flight.test_autopilot import tick
+from tests.fsw.link.snapshots import CONTEXT
 
 
 def test_a_first_stamp_ahead_of_all_others_leaves_no_sensor_unused() -> None:
@@ -28,3 +35,50 @@ def test_a_first_stamp_ahead_of_all_others_leaves_no_sensor_unused() -> None:
     k = flown.truth.at(now)
     assert state.estimate.p_WB == pytest.approx(flown.truth.p[k], abs=0.02)
     assert 0.0 <= now - state.fusion.imu_came <= TICK
+
+
+def test_before_the_first_estimate_looks_at_sensors_are_as_rare_as_after_it() -> None:
+    """Without encoders there is none; the pose comes for a while, and then no more."""
+    state, told = FlightState(), []
+    for now, samples in run(MOCAP, 1, 2.5):
+        heard = [
+            one
+            for one in samples
+            if not isinstance(one, JointSample)
+            and not (isinstance(one, PoseSample) and one.time > 6.5)
+        ]
+        state, outputs = tick(state, round(1e6 * now), samples=tuple(heard))
+        told += [text.text for text in outputs.texts]
+    assert state.estimate is None
+    of_sensors = [text for text in told if "estimate invalid" not in text]
+    assert of_sensors == ["pose is silent"]
+
+
+def test_an_estimate_that_is_lost_is_reported_as_one() -> None:
+    """The filter is no number, and there is no pose from which it could start anew."""
+    state, outputs = FlightState(), None
+    for k, (now, samples) in enumerate(run(MOCAP, 1, 1.2)):
+        heard = [one for one in samples if k < 300 or not isinstance(one, PoseSample)]
+        if k == 300:
+            assert state.fusion is not None
+            state.fusion.numbers["p"][:] = math.nan
+        state, outputs = tick(state, round(1e6 * now), samples=tuple(heard))
+        if k == 299:
+            known = wire_values(outputs.snapshot)
+            assert known["flags"] & 1
+            assert 0.0 <= known["pos_horiz_ratio"] < 1.0
+    assert outputs is not None
+    lost = wire_values(outputs.snapshot)
+    assert lost["flags"] == 0
+    assert outputs.snapshot.t_us - lost["time_usec"] < 110_000
+    ratios = [number for name, number in lost.items() if name not in ("flags", "time_usec")]
+    assert len(ratios) == 8
+    assert all(math.isnan(one) for one in ratios)
+    assert outputs.snapshot.estimator is not None
+    silent = {one.name: one.fault for one in outputs.snapshot.estimator.sensors}
+    assert silent[Sensor.POSE.value] == "stale"
+
+
+def wire_values(snapshot: FlightSnapshot) -> dict[str, Any]:
+    """ESTIMATOR_STATUS by the names of its fields."""
+    return dict(zip(wire_fields(230), estimator_status(snapshot, CONTEXT), strict=True))

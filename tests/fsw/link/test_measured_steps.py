@@ -30,6 +30,8 @@ from sitl import earth
 from sitl.link.encode import StepEncoder
 from sitl.link.pilot_messages import SendCommand
 from sitl.sensors.barometer import standard_pressure
+from sitl.sensors.gnss import GnssSensor
+from sitl.sensors.keys import Gnss
 from sitl.sensors.measurements import (
     GnssMeasurement,
     ImuMeasurement,
@@ -41,6 +43,7 @@ from sitl.sensors.measurements import (
     RangeMeasurement,
 )
 from tests.fsw.link.snapshots import FACTS, outputs_at
+from tests.sitl.sensors.readings import HOVER, reading
 from tests.whole_tick import answer_of
 
 NOW = 1_200_000
@@ -112,12 +115,30 @@ def test_satellites_arrive_within_the_digits_of_the_message() -> None:
     assert sample.position_variance == pytest.approx((1e-4, 1e-4, 4e-4))
 
 
-def test_satellites_without_a_fix_are_no_sample() -> None:
-    writer = FrameWriter(1, 200)
-    for fix, count in ((0, 0), (2, 0), (3, 1), (6, 1)):
-        values = (NOW, 473977420, 85455940, 0, 100, 100, 0, 0, 0, 0, 0, fix, 9, 0, 0)
-        (frame,) = split(writer.frame(ids.HIL_GPS, *values))
-        assert len(SampleDecoder(Inbox().locate).samples(frame)) == count
+@pytest.mark.parametrize(("fix", "known"), [(0, False), (2, False), (3, True), (6, True)])
+def test_a_receiver_says_whether_it_has_a_fix_and_how_many_satellites_it_sees(
+    fix: int, known: bool
+) -> None:
+    values = (NOW, 473977420, 85455940, 0, 100, 100, 0, 0, 0, 0, 0, fix, 9, 0, 0)
+    (frame,) = split(FrameWriter(1, 200).frame(ids.HIL_GPS, *values))
+    (sample,) = SampleDecoder(Inbox().locate).samples(frame)
+    assert isinstance(sample, GnssSample)
+    assert (sample.fix_type, sample.satellites, sample.has_fix) == (fix, 9, known)
+
+
+@pytest.mark.parametrize(("rtk", "fix"), [(True, 6), (False, 3)])
+def test_what_a_receiver_rounds_the_message_does_not_round_again(rtk: bool, fix: int) -> None:
+    """So a flight in process has the digits of one over the link."""
+    keys = Gnss(rate_hz=10.0, horizontal_m=0.2, vertical_m=0.3, velocity_m_s=0.3, rtk=rtk)
+    sensor = GnssSensor(keys, np.random.default_rng(3), HIGH.latitude)
+    for _ in range(100):
+        said = sensor.measure(reading(), HOVER, NOW - 110_000, False)
+        (sample,) = decoded(said, HIGH)
+        assert isinstance(sample, GnssSample)
+        np.testing.assert_allclose(sample.position, said.p_WB, atol=2e-5)
+        np.testing.assert_allclose(sample.velocity, said.v_WB, atol=1e-9)
+        assert (sample.fix_type, sample.satellites) == (said.fix_type, said.satellites)
+        assert sample.fix_type == fix
 
 
 def test_pressure_arrives_as_a_height_above_the_origin() -> None:

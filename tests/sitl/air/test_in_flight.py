@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sitl.plant.state import ARM, P_WB, THRUST, V_WB
+from sitl.plant.state import ARM, P_WB, THRUST, V_WB, W_WB_B
 from sitl.scenario import (
     ActuatorKeys,
     AirKeys,
@@ -77,6 +77,33 @@ def test_below_a_ceiling_the_thrust_of_hover_lifts_and_a_wall_pulls() -> None:
     side = ScenarioWall("side", (-1.0, 0.0, 0.0), -0.7, 0.02)
     beside = replace(AIRBORNE, walls=(side,), air=AirKeys(wall_suction=0.05), body="points")
     assert state(flown(beside, 50))[V_WB] > 0.003
+
+
+@pytest.mark.parametrize("where", ["ground", "ceiling"])
+def test_what_a_surface_adds_to_the_thrust_it_does_not_add_to_the_torque_about_yaw(
+    where: str,
+) -> None:
+    """Both laws are of thrust at the same power: at the same speed the torque is the same."""
+    roof = ScenarioWall("roof", (0.0, 0.0, 1.0), -50.45, 0.02)
+    low = replace(AIRBORNE, trajectory=Hold((0.0, 0.0, -0.3)), body="points")
+    below = replace(AIRBORNE, walls=(roof,), body="points")
+    free = low if where == "ground" else below
+    near = replace(free, air=AirKeys(ground_effect=True, ceiling_effect=True))
+
+    def turned(scenario: Scenario) -> tuple[float, float]:
+        simulation = Simulation(scenario, 0)
+        weight = 0.25 * simulation.vehicle.mass * simulation.vehicle.gravity
+        share = weight / simulation.vehicle.rotors.thrust_max
+        pairs = (1.2 * share, 0.8 * share, 1.2 * share, 0.8 * share)
+        for _ in range(10):
+            simulation.advance(Controls(pairs, (0.0, 0.0), armed=True))
+        now = state(simulation)
+        return float(now[W_WB_B + 2]), float(now[V_WB + 2])
+
+    (spin, climb), (spin_near, climb_near) = turned(free), turned(near)
+    assert climb_near < climb - 2e-3
+    assert spin > 5e-4
+    assert spin_near == pytest.approx(spin, rel=1e-3)
 
 
 def test_more_walls_than_there_is_room_for_are_refused() -> None:

@@ -104,6 +104,22 @@ def test_a_reading_lies_on_the_grid_of_its_digits_and_within_the_range() -> None
     assert (accel[:, 2] == -9.5).any()
 
 
+@pytest.mark.parametrize("limit", [9.5, 34.9, 156.9, 100.0])
+@pytest.mark.parametrize("resolution", [0.0, 1.065e-3, 4.788e-3, 0.3, 7.0])
+def test_no_saturated_reading_exceeds_the_range(limit: float, resolution: float) -> None:
+    keys = Imu(
+        rate_hz=RATE_HZ,
+        gyro_limit_rad_s=limit,
+        accel_limit_m_s2=limit,
+        gyro_resolution_rad_s=resolution,
+        accel_resolution_m_s2=resolution,
+    )
+    sensor = ImuSensor(keys, np.random.default_rng(0), 8.0)
+    said = sensor.measure(reading(), HOVER, 0, True)
+    assert said.gyro_B == (limit, -limit, limit)
+    assert said.accel_B == (limit, -limit, limit)
+
+
 def test_the_rotors_shake_at_their_frequency_and_harder_with_thrust() -> None:
     keys = {"vibration_m_s2": 1.0, "vibration_rad_s": 0.02, "rotor_hz": 75.0}
     hover, one = samples(5000, **keys), samples(5000, thrust=(8.0, 0.0, 0.0, 0.0), **keys)

@@ -68,6 +68,31 @@ def test_an_outlier_of_a_pose_is_off_by_the_stated_length_and_angle() -> None:
     )
 
 
+def test_a_pose_lies_on_the_grid_of_its_digits_and_nearest_to_what_is_seen() -> None:
+    noise = {"rate_hz": 120.0, "position_m": 0.01, "attitude_deg": 1.0}
+    steps = {"position_resolution_m": 0.002, "attitude_resolution_deg": 0.5}
+    fine = MotionCaptureSensor(MotionCapture(**noise), random())
+    coarse = MotionCaptureSensor(MotionCapture(**noise, **steps), random())
+    turns = set()
+    for _ in range(300):
+        exact, said = (one.measure(EXACT, HOVER, 0, False) for one in (fine, coarse))
+        place = np.array(said.p_WB) / 0.002
+        assert np.abs(place - np.rint(place)).max() < 1e-9
+        assert np.abs(np.subtract(said.p_WB, exact.p_WB)).max() <= 0.001 + 1e-12
+        assert math.dist(said.q_WB, (0.0,) * 4) == pytest.approx(1.0, abs=1e-12)
+        assert angle_between(said.q_WB, exact.q_WB) < math.radians(0.5)
+        turns.add(said.q_WB)
+    assert len(turns) < 300
+
+
+def test_odometry_has_its_digits_after_its_drift() -> None:
+    keys = VisualOdometry(rate_hz=30.0, drift_m=0.1, drift_deg=1.0, position_resolution_m=0.005)
+    sensor = VisualOdometrySensor(keys, random())
+    for _ in range(50):
+        place = np.array(sensor.measure(EXACT, HOVER, 0, False).p_WB) / 0.005
+        assert np.abs(place - np.rint(place)).max() < 1e-9
+
+
 def drifted(seed: int, seconds: float, **keys: float) -> list[PoseMeasurement]:
     """What visual odometry says of one place."""
     more = VisualOdometry(rate_hz=30.0, **keys)
@@ -137,6 +162,26 @@ def test_satellites_wander_slowly_and_scatter_at_once() -> None:
     v = np.array([one.v_WB for one in said]) - EXACT.v_WB
     assert v.std(axis=0) == pytest.approx([0.05] * 3, rel=0.05)
     assert said[0].horizontal_deviation == pytest.approx(math.hypot(0.2, 1.0))
+
+
+def test_satellites_have_the_digits_of_their_message_unless_told_otherwise() -> None:
+    noise = {"rate_hz": 10.0, "horizontal_m": 0.2, "vertical_m": 0.3, "velocity_m_s": 0.05}
+    plain = GnssSensor(Gnss(**noise), random(), 60.0).measure(EXACT, HOVER, 0, False)
+    none = Gnss(
+        **noise,
+        position_resolution_deg=0.0,
+        height_resolution_m=0.0,
+        velocity_resolution_m_s=0.0,
+    )
+    exact = GnssSensor(none, random(), 60.0).measure(EXACT, HOVER, 0, False)
+    # 1e-7 deg northwards; eastwards half of it at 60 deg north; mm; cm/s.
+    north = 6_371_000.0 * math.radians(1e-7)
+    steps = np.array([north, 0.5 * north, 1e-3, 1e-2, 1e-2, 1e-2])
+    said = np.array([*plain.p_WB, *plain.v_WB])
+    assert np.abs(said / steps - np.rint(said / steps)).max() < 1e-6
+    off = np.abs(said - [*exact.p_WB, *exact.v_WB])
+    assert (off > 0.0).all()
+    assert (off <= 0.5 * steps + 1e-12).all()
 
 
 def test_the_standard_atmosphere() -> None:

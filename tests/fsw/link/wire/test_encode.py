@@ -24,12 +24,14 @@ from fsw.signals import (
     Mode,
     MotionSetpoint,
     OffboardReport,
+    SatelliteFix,
+    SensorReport,
     SetpointKind,
     Severity,
 )
 from messages import dialect, status_text
 from messages.frames import FrameWriter
-from tests.fsw.link.snapshots import ACTUATORS, CONTEXT, SNAPSHOT
+from tests.fsw.link.snapshots import ACTUATORS, CONTEXT, REPORT, SNAPSHOT
 
 
 def read_back(stream: Stream, snapshot: Any = SNAPSHOT) -> Any:
@@ -84,8 +86,9 @@ TELLING: dict[int, dict[str, Any]] = {
         "pos_horiz_accuracy": math.sqrt(8e-4), "pos_vert_accuracy": math.sqrt(12e-4),
     },
     ids.GPS_RAW_INT: {
-        "time_usec": 2_900_000, "fix_type": 6, "vel": 500, "cog": 5313, "eph": 65535,
-        "satellites_visible": 255, "h_acc": 12, "v_acc": 20, "vel_acc": 100,
+        "time_usec": 2_900_000, "fix_type": 5, "vel": 500, "cog": 5313, "eph": 65535,
+        "satellites_visible": 14, "alt": 3000, "alt_ellipsoid": 0,
+        "h_acc": 12, "v_acc": 20, "vel_acc": 100,
     },
     ids.SYSTEM_TIME: {"time_boot_ms": 3004, "time_unix_usec": 1_750_000_003_004_000},
     ids.MISSION_CURRENT: {
@@ -99,7 +102,7 @@ TELLING: dict[int, dict[str, Any]] = {
         "servo1_raw": 1500, "servo2_raw": 1250, "servo3_raw": 1750, "servo4_raw": 2000,
         "servo5_raw": 1750, "servo6_raw": 1375, "servo7_raw": 0,
     },
-    ids.VIBRATION: {"vibration_y": 0.02, "vibration_z": 0.3, "clipping_0": 0},
+    ids.VIBRATION: {"vibration_y": 0.02, "vibration_z": 0.3, "clipping_0": 17, "clipping_1": 0},
     ids.ORBIT_EXECUTION_STATUS: {
         "radius": -2.5, "x": 473977510, "y": 85456206, "z": 3.0, "frame": 0,
     },
@@ -182,12 +185,69 @@ def test_armed_and_custom_mode_are_flags_of_the_heartbeat() -> None:
 def test_a_fault_takes_the_prearm_bit_and_the_suspect_away() -> None:
     healthy = read_back(stream_of(ids.SYS_STATUS))
     assert healthy.onboard_control_sensors_health == healthy.onboard_control_sensors_present
-    broken = replace(SNAPSHOT, failures=("state estimate invalid",))
+    broken = replace(SNAPSHOT, failures=("state estimate invalid",), estimator=None)
     status = read_back(stream_of(ids.SYS_STATUS), broken)
     lost = status.onboard_control_sensors_present & ~status.onboard_control_sensors_health
     # Nothing is known without an estimate: neither place nor heading nor what feeds them.
     assert lost == 0x10000000 | 0x200000 | 0x80 | 0x27
     assert read_back(stream_of(ids.HEARTBEAT), broken).system_status == 5
+
+
+_GPS, _MAG = dialect.MAV_SYS_STATUS_SENSOR_GPS, dialect.MAV_SYS_STATUS_SENSOR_3D_MAG
+_VISION = dialect.MAV_SYS_STATUS_SENSOR_VISION_POSITION
+_PRESSURE = dialect.MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE
+_LASER = dialect.MAV_SYS_STATUS_SENSOR_LASER_POSITION
+
+
+def bits_with(*sensors: SensorReport, failures: tuple[str, ...] = ()) -> tuple[int, int]:
+    """Bits of sensors that are there, and of those that are not well."""
+    report = replace(REPORT, sensors=sensors)
+    status = read_back(
+        stream_of(ids.SYS_STATUS), replace(SNAPSHOT, estimator=report, failures=failures)
+    )
+    there = status.onboard_control_sensors_present
+    assert status.onboard_control_sensors_enabled & ~there == 0
+    of_sensors = _GPS | _MAG | _VISION | _PRESSURE | _LASER
+    return there & of_sensors, there & ~status.onboard_control_sensors_health & of_sensors
+
+
+@pytest.mark.parametrize(
+    ("sensor", "bit"),
+    [
+        (Sensor.POSE, _VISION),
+        (Sensor.GNSS, _GPS),
+        (Sensor.BAROMETER, _PRESSURE),
+        (Sensor.MAGNETOMETER, _MAG),
+        (Sensor.RANGEFINDER, _LASER),
+    ],
+)
+def test_a_sensor_that_is_heard_has_its_bit_and_one_that_fails_loses_it(
+    sensor: Sensor, bit: int
+) -> None:
+    name, always = sensor.value, _GPS | _MAG  # position and heading are known all the same
+    assert bits_with() == (always, 0)
+    assert bits_with(SensorReport(name, 8_000)) == (always | bit, 0)
+    assert bits_with(SensorReport(name, 8_000, "seldom")) == (always | bit, 0)
+    for fault in ("stale", "stuck", "not finite", "no fix", "too old"):
+        assert bits_with(SensorReport(name, 600_000, fault)) == (always | bit, bit)
+    # One outlier was refused, or the newest reading is.
+    assert bits_with(SensorReport(name, 8_000, "jump", (0.4,))) == (always | bit, 0)
+    assert bits_with(SensorReport(name, 8_000, "jump", (0.4, 9.0))) == (always | bit, bit)
+
+
+def test_satellites_that_are_lost_leave_the_bit_of_vision_alone() -> None:
+    silent = SensorReport(Sensor.GNSS.value, 2_000_000, "stale")
+    there, ill = bits_with(silent, failures=(Condition.AIDING_LOST.value,))
+    assert (there, ill) == (_GPS | _MAG, _GPS)
+
+
+def test_a_receiver_that_never_had_a_fix_shows_no_place() -> None:
+    nowhere = (math.nan,) * 3
+    fix = SatelliteFix(2_900_000, nowhere, nowhere, nowhere, math.nan, kind=1, satellites=3)
+    known = replace(SNAPSHOT, estimator=replace(REPORT, fix=fix))
+    raw = read_back(stream_of(ids.GPS_RAW_INT), known)
+    assert (raw.fix_type, raw.satellites_visible, raw.lat, raw.lon, raw.alt) == (1, 3, 0, 0, 0)
+    assert (raw.h_acc, raw.v_acc, raw.vel) == (0, 0, 0)
 
 
 def test_a_log_that_fails_takes_its_bit_away() -> None:
