@@ -13,7 +13,7 @@ from scipy.stats import chi2
 
 from fsw.estimation.sensor_fault import Sensor, SensorFault
 from fsw.estimation.sensor_fusion import FusionMemory, SensorFusion, at_start
-from fsw.estimation.tuning import chi_square
+from fsw.estimation.tuning import EstimatorTuning, chi_square
 from fsw.geometry.rotation import quaternion_from_matrix
 from fsw.measurements import (
     GnssSample,
@@ -21,6 +21,7 @@ from fsw.measurements import (
     JointSample,
     PoseSample,
     PressureSample,
+    RangeSample,
     Sample,
 )
 from fsw.signals import StateEstimate
@@ -33,6 +34,7 @@ from tests.fsw.estimation.sensor_runs import (
     Run,
     Suite,
     multiply,
+    rotations,
     run,
 )
 
@@ -655,3 +657,26 @@ def test_satellites_that_come_twice_a_second_are_taken_back_after_a_jump() -> No
     flown = Flown(run(RTK, 2, 3.6), seldom_and_moved)
     assert flown.memory.reset.number == 1
     np.testing.assert_allclose(flown.memory.reset.position[:2], (0.0, 8.0), atol=0.3)
+
+
+def in_sigmas_beside_a_long_rangefinder(tuning: EstimatorTuning, seed: int) -> float:
+    """Largest error of roll and pitch over its deviation, with ranges 1 % too long."""
+    flown = run(replace(RTK, tuning=tuning), seed, 4.0)
+    random, due = np.random.default_rng(seed), START
+    for now, samples in flown.ticks:
+        if now >= due:
+            k = flown.truth.at(now)
+            down = rotations(flown.truth.q[k][None])[0][2, 2]
+            distance = 1.01 * (tuning.ground - flown.truth.p[k, 2]) / down
+            read = distance + 0.025 * random.standard_normal()
+            samples.append(RangeSample(now, float(read), 0.025**2))
+            due += 0.02
+    return float(Flown(flown).in_sigmas()[6:8].max())
+
+
+@pytest.mark.requirement("REQ-EST-2")
+def test_a_rangefinder_that_is_wrong_in_proportion_does_not_tilt_the_estimate() -> None:
+    tuning = replace(RTK.tuning, ground=4.0)
+    assert max(in_sigmas_beside_a_long_rangefinder(tuning, seed) for seed in range(4)) < 3.0
+    blind = replace(tuning, range_share=0.0)
+    assert max(in_sigmas_beside_a_long_rangefinder(blind, seed) for seed in range(4)) > 4.0
