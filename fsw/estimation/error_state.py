@@ -35,6 +35,7 @@ Array = NDArray[np.float64]
 P, V, TH, BA, BG, BARO, DELAY = 0, 3, 6, 9, 12, 15, 16
 ERRORS: Final = 17
 FRAME: Final = 4  # errors of an odometry's frame: north, east, down [m], heading [rad]
+FIELD: Final = 3  # errors of a magnetometer that stay: its offset [Gauss, FRD]
 ROWS: Final = 3  # of a measurement, at most
 IMU_CAPACITY: Final = 256  # readings since the filter's time
 # Columns of a reading: time [s], specific force [m/s^2] and rate [rad/s] in body axes, and which of
@@ -99,6 +100,11 @@ FILTER: Final = np.dtype(
         ("drifts", np.int64),
         ("shared", float, (ERRORS, FRAME)),
         ("innovated", float, (ROWS,)),
+        # Of a magnetometer's offset (compass.py): whether one was used, its covariance with the
+        # error, and the slope over it of the heading that is being fused.
+        ("compass", np.int64),
+        ("with_offset", float, (ERRORS, FIELD)),
+        ("offset_slope", float, (FIELD,)),
     ],
     align=True,
 )
@@ -267,6 +273,8 @@ def step_to(x: Any, law: Any, row: Array, before: Array, M: Array) -> None:
         add_noise(M, law, dt, lost)
         if x.drifts:
             carry(x.shared, blocks, dt)
+        if x.compass:
+            carry(x.with_offset, blocks, dt)
     for i in range(3):
         x.p[i], x.v[i], x.acceleration[i] = p[i], v[i], a[i]
         x.rate[i] = row[RATE + i] - x.gyro_bias[i]
@@ -296,6 +304,8 @@ def _watch_biases(x: Any, M: Array, lost: int) -> None:
                 M[j, k] = 0.0
             for j in range(FRAME):
                 x.shared[k, j] = 0.0
+            for j in range(FIELD):
+                x.with_offset[k, j] = 0.0
             M[k, k] = x.kept_variance[i]
 
 
@@ -390,7 +400,9 @@ def correct(x: Any, rows: int) -> None:
             error += W[i, k] * x.residual[k]
         x.error[i] = error
     if x.drifts:
-        _correct_shared(x, rows)
+        _correct_considered(x, x.shared, rows)
+    if x.compass:
+        _correct_considered(x, x.with_offset, rows)
     for i in range(ERRORS):
         for j in range(ERRORS):
             total = 0.0
@@ -403,10 +415,10 @@ def correct(x: Any, rows: int) -> None:
 
 
 @compilable
-def _correct_shared(x: Any, rows: int) -> None:
-    """Multiply the covariance with the frame by I - K H, where K is W L^-1."""
-    X, H, L, W = x.shared, x.H, x.factor, x.gain
-    for c in range(FRAME):
+def _correct_considered(x: Any, X: Array, rows: int) -> None:
+    """Multiply the covariance ``X`` (17, n) with what is considered by I - K H; K is W L^-1."""
+    H, L, W = x.H, x.factor, x.gain
+    for c in range(X.shape[1]):
         for k in range(rows):
             total = 0.0
             for j in range(ERRORS):

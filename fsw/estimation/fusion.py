@@ -13,12 +13,14 @@ import math
 from typing import Any
 
 from fsw.compiled import compilable
+from fsw.estimation.compass import correct_with_offset, distance_with_offset
 from fsw.estimation.error_state import (
     BA,
     BARO,
     BG,
     DELAY,
     ERRORS,
+    FIELD,
     FRAME,
     TH,
     P,
@@ -199,6 +201,7 @@ def heading_rows(x: Any, law: Any, field: Vec3, dt: float) -> bool:
     north, east = size * math.cos(law.declination), size * math.sin(law.declination)
     for i in range(3):
         x.H[0, TH + i] = R[6 + i] - down * (north * R[i] + east * R[3 + i]) / level
+        x.offset_slope[i] = (east * R[i] - north * R[3 + i]) / level
     x.variance[0] = law.mag_noise * law.mag_noise / level
     return True
 
@@ -209,7 +212,11 @@ def fuse_heading(x: Any, law: Any, gates: Any, time: float, field: Vec3) -> floa
     if not heading_rows(x, law, field, time - x.time):
         x.innovation[0, 0] = 0.0
         return math.inf
-    return _judged(x, 1, gates.heading)
+    x.innovation[0, 0] = x.residual[0]
+    ratio: float = distance_with_offset(x, law.mag_offset) / gates.heading
+    if ratio <= 1.0:
+        correct_with_offset(x, law.mag_offset)
+    return ratio
 
 
 @compilable
@@ -251,6 +258,8 @@ def forget(x: Any, first: int, variance: Vec3) -> None:
     for i in range(3):
         for j in range(FRAME):
             x.shared[first + i, j] = 0.0
+        for j in range(FIELD):
+            x.with_offset[first + i, j] = 0.0
         for j in range(ERRORS):
             M[first + i, j] = 0.0
             M[j, first + i] = 0.0

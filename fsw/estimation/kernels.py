@@ -16,6 +16,7 @@ from fsw.estimation.error_state import (
     COLUMNS,
     DELAY,
     ERRORS,
+    FIELD,
     FRAME,
     IMU_CAPACITY,
     LOST,
@@ -224,10 +225,12 @@ def _copy_joints(a: Any, b: Any) -> None:
 
 @compilable
 def _copy_frame(a: Any, b: Any) -> None:
-    b.drifts = a.drifts
+    b.drifts, b.compass = a.drifts, a.compass
     for i in range(ERRORS):
         for j in range(FRAME):
             b.shared[i, j] = a.shared[i, j]
+        for j in range(FIELD):
+            b.with_offset[i, j] = a.with_offset[i, j]
 
 
 @kernel
@@ -362,6 +365,8 @@ def _set_pressure(x: Filter, law: Law, time: float, altitude: float, variance: f
     s.baro_bias = altitude + s.p[2] + (time - s.time) * s.v[2]
     for j in range(FRAME):
         s.shared[BARO, j] = 0.0
+    for j in range(FIELD):
+        s.with_offset[BARO, j] = s.with_offset[P + 2, j]
     for j in range(ERRORS):  # what is wrong with the height is in it
         s.covariance[BARO, j] = s.covariance[P + 2, j]
         s.covariance[j, BARO] = s.covariance[j, P + 2]

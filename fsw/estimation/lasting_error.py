@@ -3,7 +3,9 @@
 The filter takes the errors of its readings for white noise, and is soon surer of its place than one
 of them is. But markers are not where they were measured, and satellites' errors wander within
 minutes. A clearance must count with all of it. The drift of an odometry is in the filter's
-covariance already (``fsw/estimation/drift.py``); of its poses only the noise counts here.
+covariance already (``fsw/estimation/drift.py``); of its poses only the noise counts here. So is
+the offset of a magnetometer (``fsw/estimation/compass.py``): beside satellites, nothing of the
+attitude is added.
 
 Source: docs/equations.md T7.
 """

@@ -541,6 +541,7 @@ class SensorFusion:
             return memory
         M = x["covariance"]
         M[DELAY], M[:, DELAY], x["shared"][DELAY] = 0.0, 0.0, 0.0
+        x["with_offset"][DELAY] = 0.0
         M[DELAY, DELAY] = sigma**2
         return memory._replace(delay_sigma=sigma)
 
@@ -586,7 +587,11 @@ class SensorFusion:
                     believable(sample.position_variance, self._least_gnss[0]),
                     (tilt, tilt, self.tuning.start_heading**2),
                 )
-                kernels.couple_level(memory.numbers, self.law)
+                x = memory.numbers
+                kernels.couple_level(x, self.law)
+                # The heading was made of this field: what it does not know of it, with all of the
+                # tilt that it comes through, is what it does not know of the field.
+                kernels.fuse_heading(x, self.law, float(x["time"][0]), memory.field)
                 break
         else:
             return memory._replace(waiting=memory.waiting[-_WAITING_AT_START:])
@@ -806,7 +811,10 @@ class SensorFusion:
         return (kernels.fuse_heading(memory.numbers, self.law, sample.time, sample.field),)
 
     def _fuse_range(self, memory: FusionMemory, sample: RangeSample) -> tuple[float, ...]:
+        # What is wrong in proportion stays from one reading to the next, and against a height that
+        # satellites know better the filter would explain it by a tilt.
         variance = max(sample.variance, self.tuning.range_floor**2)
+        variance += (self.tuning.range_share * sample.distance) ** 2
         return (
             kernels.fuse_range(memory.numbers, self.law, sample.time, sample.distance, variance),
         )

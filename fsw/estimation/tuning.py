@@ -40,7 +40,7 @@ class EstimatorTuning:
     gyro_bias: float = 0.03  # rad/s
     velocity: float = 0.5  # m/s
     tilt: float = 0.02  # rad, where the accelerometer gives it, besides its bias
-    start_heading: float = 0.1  # rad, where the magnetometer gives it
+    start_heading: float = 1.0  # rad, before the magnetometer gives it
     baro_bias: float = 3.0  # m
     baro_bias_walk: float = 0.03  # m/s/sqrt(Hz)
 
@@ -61,7 +61,11 @@ class EstimatorTuning:
     gnss_velocity_floor: float = 0.1  # m/s
     pressure_floor: float = 0.2  # m: noise of a small barometer, 0.1 m, and gusts
     range_floor: float = 0.01  # m
+    range_share: float = 0.05  # of the distance, besides: EKF2_RNG_SFE of PX4
     mag_noise: float = 0.01  # Gauss
+    # What stays of each axis: 0.01 Gauss that a calibration leaves of hard iron, and 2 % of the
+    # field's level part, 0.2 Gauss, of soft iron.
+    mag_offset: float = 0.011  # Gauss
     declination: float = math.radians(2.9)  # rad, at the default origin (World Magnetic Model 2020)
     ground: float = 0.0  # m, NED z of what the rangefinder measures against
 

@@ -19,8 +19,10 @@ from fsw.signals import PlanInput, PredictionState, StateEstimate
 _RATE: Final = 4.0  # 1/s, of the speed down
 _MOST: Final = 1.0  # m/s^2
 # Times the speed of landing, where no position is measured: how far it is carried grows with the
-# square of the time. The legs stand four times as much.
+# square of the time. The legs stand four times as much, so a height that is wrong does no harm.
 _BLIND: Final = 2.0
+_BLIND_HIGH: Final = 4.0
+_HIGH: Final = 1.0  # m above the legs; with _MOST the vehicle is slow again 0.6 m above them
 _SPEED_KNOWN: Final = 1.0  # m/s, standard deviation; PX4's limit of a usable velocity
 
 
@@ -31,6 +33,7 @@ class Descent:
         self._model = NominalModel(config.airframe, config.tick_period_us * 1e-6)
         self._brake = Brake(config.airframe, config.planner.limits.tilt)
         self._speed = config.limits.land_speed
+        self._high_z = -config.airframe.leg_length - _HIGH
         self._unaided_us = config.limits.aiding_loss_us
 
     def step(
@@ -38,7 +41,9 @@ class Descent:
     ) -> tuple[PredictionState, PlanInput]:
         """The plan's state ``ticks`` [1] later, and the input that leads on from it."""
         blind = aiding.unaided_us >= self._unaided_us
-        speed = _BLIND * self._speed if blind else self._speed
+        speed = self._speed
+        if blind:
+            speed *= _BLIND_HIGH if estimate.p_WB[2] < self._high_z else _BLIND
         for _ in range(ticks):
             nominal = self._model.step(nominal, self._input(nominal, speed))
         if blind:

@@ -10,7 +10,7 @@ from fsw.estimation.error_state import BA, BG, ERRORS, TH, Array, P, V
 from fsw.estimation.sensor_checks import Health
 from fsw.estimation.sensor_fault import Sensor, fault_name
 from fsw.estimation.sensor_fusion import FusionMemory
-from fsw.estimation.turned_covariance import SAME_AXES, turned_covariance
+from fsw.estimation.turned_covariance import SAME_AXES, Vec6, turned_covariance
 from fsw.frozen import replace
 from fsw.signals import (
     EstimatorReport,
@@ -48,14 +48,23 @@ def unaided(memory: FusionMemory, now: float) -> float:
 
 
 def estimator_report(
-    memory: FusionMemory, covariance: Array, estimate: StateEstimate, now: float, stale: float
+    memory: FusionMemory,
+    covariance: Array,
+    lasting: Vec6,
+    estimate: StateEstimate,
+    now: float,
+    stale: float,
 ) -> EstimatorReport:
     """The report at ``now`` [s]; a sensor is silent after ``stale`` [s].
 
-    ``covariance`` (17, 17) [SI] is of the error of the ``estimate``.
+    ``covariance`` (17, 17) [SI] is of the error of the ``estimate`` as the filter knows it; what
+    else is ``lasting`` of position [m^2, NED] and attitude [rad^2, FRD] is told with it. Flags say
+    what is aided and has not drifted, and go by the filter alone.
     """
     x, entries = memory.numbers[0], covariance.ravel().tolist()
     variances = entries[:: ERRORS + 1]
+    for k, more in zip(_OF_POSE, lasting, strict=True):
+        entries[(ERRORS + 1) * k] += more
     without = unaided(memory, now)
     sensors = _sensors(memory, now, stale)
     return EstimatorReport(

@@ -8,7 +8,7 @@ from typing import NamedTuple
 from fsw.control.cascade import Cascade, in_hover
 from fsw.estimation import kernels
 from fsw.estimation.dead_reckoning import moved_on
-from fsw.estimation.error_state import Array
+from fsw.estimation.error_state import Array, P
 from fsw.estimation.imu import IMU_TOO_OLD
 from fsw.estimation.kernels import Law
 from fsw.estimation.lasting_error import lasting_error
@@ -166,8 +166,10 @@ class SensedState:
                 return state
             unknown = unknown_report(state.estimator, memory, estimate.t_us, self._stale)
             return replace(state, estimator=unknown)
-        report = estimator_report(memory, covariance, estimate, memory.now, self._stale)
-        return replace(state, estimator=report, aiding=_aiding(state, memory, report))
+        lasting = self.lasting_error(memory)
+        report = estimator_report(memory, covariance, lasting, estimate, memory.now, self._stale)
+        drifted = math.sqrt(max(covariance.diagonal()[P : P + 3].tolist()))
+        return replace(state, estimator=report, aiding=_aiding(state, memory, report, drifted))
 
     def _model(self, state: FlightState) -> Vec3:
         """What the rotors make of the vehicle, where that is known: see ``imu.add_imu``."""
@@ -294,22 +296,28 @@ def _at_rest(memory: FusionMemory, law: Law, reading: JointSample) -> FusionMemo
     return memory._replace(numbers=numbers)
 
 
-def _aiding(state: FlightState, memory: FusionMemory, report: EstimatorReport) -> Aiding:
-    """What is missing, as failsafes look at it."""
+def _aiding(
+    state: FlightState, memory: FusionMemory, report: EstimatorReport, drifted: float
+) -> Aiding:
+    """What is missing, as failsafes look at it.
+
+    Without a position the estimate drifts, by a deviation of ``drifted`` [m] so far. What lasts of
+    a receiver's error was there before, and is no reason to come down.
+    """
     before, now = state.aiding, memory.now
     aid = memory.of(Sensor.POSE)
     if aid.came < 0.0:
         aid = memory.of(Sensor.GNSS)
     sensor, fault = _lost(memory)
-    P, V = report.pose_covariance, report.velocity_covariance
+    pose, V = report.pose_covariance, report.velocity_covariance
     since_us = before.since_us if sensor is before.sensor else report.t_us
     return Aiding(
         unaided_us=max(round(1e6 * _overdue(memory, now)), 0) if report.unaided_us > 0 else 0,
         pose=aid.sensor,
         pose_fault=aid.fault if now - aid.fault_at < _recently(aid) else SensorFault.STALE,
-        position_sigma=math.sqrt(max(P[0], P[6], P[11])),
+        position_sigma=drifted,
         velocity_sigma=math.sqrt(max(V[0], V[6], V[11])),
-        attitude_sigma=math.sqrt(max(P[15], P[18])),
+        attitude_sigma=math.sqrt(max(pose[15], pose[18])),
         sensor=sensor,
         fault=fault,
         since_us=since_us,

@@ -202,7 +202,7 @@ class Aiding(NamedTuple):
     unaided_us: int = 0  # since a position was used last
     pose: Sensor = Sensor.POSE  # that gives positions
     pose_fault: SensorFault = SensorFault.STALE
-    position_sigma: float = 0.0  # m, of the worst axis
+    position_sigma: float = 0.0  # m, of the worst axis, without what lasts of a sensor's error
     velocity_sigma: float = 0.0  # m/s, the same
     attitude_sigma: float = 0.0  # rad, of roll and pitch
     sensor: Sensor | None = None  # another one that is of no use

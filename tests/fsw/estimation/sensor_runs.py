@@ -240,9 +240,10 @@ def run(suite: Suite, seed: int, duration: float) -> Run:
             measured = height + suite.baro * random.standard_normal()
             due.append((time + 0.01, PressureSample(time, measured, suite.baro**2)))
     if suite.mag:
+        offset = tuning.mag_offset * random.standard_normal(3)
         for time in np.arange(t[0], t[-1], 0.02):
             R = rotations(truth.q[truth.at(time)][None])[0]
-            measured = R.T @ EARTH + tuning.mag_noise * random.standard_normal(3)
+            measured = R.T @ EARTH + offset + tuning.mag_noise * random.standard_normal(3)
             due.append((time + 0.005, MagneticSample(time, tuple(measured.tolist()))))
     due.sort(key=lambda one: one[0])
     ticks, k = [], 0

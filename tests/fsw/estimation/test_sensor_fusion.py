@@ -13,7 +13,7 @@ from scipy.stats import chi2
 
 from fsw.estimation.sensor_fault import Sensor, SensorFault
 from fsw.estimation.sensor_fusion import FusionMemory, SensorFusion, at_start
-from fsw.estimation.tuning import chi_square
+from fsw.estimation.tuning import EstimatorTuning, chi_square
 from fsw.flight.estimator_report import estimator_report
 from fsw.geometry.rotation import quaternion_from_matrix
 from fsw.measurements import (
@@ -22,6 +22,7 @@ from fsw.measurements import (
     JointSample,
     PoseSample,
     PressureSample,
+    RangeSample,
     Sample,
 )
 from fsw.signals import StateEstimate
@@ -35,6 +36,7 @@ from tests.fsw.estimation.sensor_runs import (
     Run,
     Suite,
     multiply,
+    rotations,
     run,
 )
 
@@ -50,6 +52,9 @@ def errors(estimate: StateEstimate, flown: Run, now: float) -> Array:
     turn = multiply((q * [1.0, -1.0, -1.0, -1.0])[None], truth.q[k][None])[0]
     turn *= np.sign(turn[0])
     return np.concatenate([truth.p[k] - estimate.p_WB, truth.v[k] - estimate.v_WB, 2.0 * turn[1:]])
+
+
+NOTHING_LASTS = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)  # m^2, rad^2
 
 
 class Flown:
@@ -158,9 +163,14 @@ def innovations(suite: Suite, seed: int, duration: float) -> tuple[float, int]:
     return total, dimension
 
 
+# An offset that is not estimated makes innovations alike, and the bounds are those of innovations
+# that know nothing of each other. Errors are bounded with it, above.
+NO_OFFSET = replace(RTK, tuning=replace(RTK.tuning, mag_offset=0.0))
+
+
 @pytest.mark.requirement("REQ-EST-2")
 @pytest.mark.long
-@pytest.mark.parametrize("suite", [MOCAP, VIO, RTK], ids=["mocap", "vio", "rtk"])
+@pytest.mark.parametrize("suite", [MOCAP, VIO, NO_OFFSET], ids=["mocap", "vio", "rtk"])
 def test_innovations_are_as_large_as_expected(suite: Suite) -> None:
     found = [innovations(suite, seed, 3.0) for seed in range(100)]
     total, dimension = sum(f[0] for f in found), sum(f[1] for f in found)
@@ -676,6 +686,7 @@ def test_a_receiver_without_a_fix_is_named_heard_and_not_fused() -> None:
     report = estimator_report(
         flown.memory,
         flown.fusion.covariance(flown.memory, flown.now),
+        NOTHING_LASTS,
         flown.estimate_now,
         flown.now,
         0.5,
@@ -690,7 +701,9 @@ def test_a_receiver_that_falls_silent_has_no_fix_any_more() -> None:
     covariance = flown.fusion.covariance(flown.memory, flown.now)
 
     def kind(memory: FusionMemory, stale: float) -> tuple[int, int]:
-        report = estimator_report(memory, covariance, flown.estimate_now, memory.now, stale)
+        report = estimator_report(
+            memory, covariance, NOTHING_LASTS, flown.estimate_now, memory.now, stale
+        )
         assert report.fix is not None
         return report.fix.kind, report.fix.satellites
 
@@ -729,3 +742,26 @@ def test_satellites_that_come_twice_a_second_are_taken_back_after_a_jump() -> No
     flown = Flown(run(RTK, 2, 3.6), seldom_and_moved)
     assert flown.memory.reset.number == 1
     np.testing.assert_allclose(flown.memory.reset.position[:2], (0.0, 8.0), atol=0.3)
+
+
+def in_sigmas_beside_a_long_rangefinder(tuning: EstimatorTuning, seed: int) -> float:
+    """Largest error of roll and pitch over its deviation, with ranges 2 % too long."""
+    flown = run(replace(RTK, tuning=tuning), seed, 4.0)
+    random, due = np.random.default_rng(seed), START
+    for now, samples in flown.ticks:
+        if now >= due:
+            k = flown.truth.at(now)
+            down = rotations(flown.truth.q[k][None])[0][2, 2]
+            distance = 1.02 * (tuning.ground - flown.truth.p[k, 2]) / down
+            read = distance + 0.025 * random.standard_normal()
+            samples.append(RangeSample(now, float(read), 0.025**2))
+            due += 0.02
+    return float(Flown(flown).in_sigmas()[6:8].max())
+
+
+@pytest.mark.requirement("REQ-EST-2")
+def test_a_rangefinder_that_is_wrong_in_proportion_does_not_tilt_the_estimate() -> None:
+    tuning = replace(RTK.tuning, ground=4.0)
+    assert max(in_sigmas_beside_a_long_rangefinder(tuning, seed) for seed in range(4)) < 3.0
+    blind = replace(tuning, range_share=0.0)
+    assert max(in_sigmas_beside_a_long_rangefinder(blind, seed) for seed in range(4)) > 4.0

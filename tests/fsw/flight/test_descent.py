@@ -32,11 +32,15 @@ def descended(seconds: float, aiding: Aiding, v: Vec3, estimate: StateEstimate) 
 
 
 @pytest.mark.requirement("REQ-MODE-9")
-@pytest.mark.parametrize(("aiding", "times"), [(AIDED, 1.0), (BLIND, 2.0)])
+@pytest.mark.parametrize(
+    ("aiding", "height", "times"),
+    [(AIDED, 5.0, 1.0), (AIDED, 0.9, 1.0), (BLIND, 5.0, 4.0), (BLIND, 0.9, 2.0)],
+)
 def test_it_brakes_across_and_sinks_at_the_speed_of_landing_and_faster_where_it_is_blind(
-    aiding: Aiding, times: float
+    aiding: Aiding, height: float, times: float
 ) -> None:
-    vx, vy, vz = descended(4.0, aiding, (0.5, -0.3, -0.2), HERE)
+    here = vehicle_at((1.0, 2.0, GROUND_Z - height))
+    vx, vy, vz = descended(4.0, aiding, (0.5, -0.3, -0.2), here)
     assert math.hypot(vx, vy) < 0.01
     assert vz == pytest.approx(times * LIMITS.land_speed, abs=1e-3)
 

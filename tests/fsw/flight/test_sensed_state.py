@@ -11,10 +11,10 @@ import pytest
 from fsw.estimation.sensor_fault import Sensor, SensorFault
 from fsw.flight.state import FlightState
 from fsw.link.wire.encode_health import estimator_status
-from fsw.measurements import JointSample, PoseSample
+from fsw.measurements import GnssSample, JointSample, PoseSample
 from fsw.signals import FlightSnapshot
 from messages.frames import wire_fields
-from tests.fsw.estimation.sensor_runs import MOCAP, TICK, run
+from tests.fsw.estimation.sensor_runs import MOCAP, RTK, TICK, run
 from tests.fsw.flight.test_autopilot import tick
 from tests.fsw.link.snapshots import CONTEXT
 
@@ -82,3 +82,20 @@ def test_an_estimate_that_is_lost_is_reported_as_one() -> None:
 def wire_values(snapshot: FlightSnapshot) -> dict[str, Any]:
     """ESTIMATOR_STATUS by the names of its fields."""
     return dict(zip(wire_fields(230), estimator_status(snapshot, CONTEXT), strict=True))
+
+
+def test_what_lasts_of_a_sensors_error_is_reported_and_no_reason_to_come_down() -> None:
+    """Satellites whose errors wander by more than a metre: the filter is surer than any fix."""
+    stated = (1.6, 1.7, 4.0)  # m^2
+    state = FlightState()
+    for now, samples in run(RTK, 1, 3.0):
+        told = tuple(
+            replace(one, position_variance=stated) if isinstance(one, GnssSample) else one
+            for one in samples
+        )
+        state, _ = tick(state, round(1e6 * now), samples=told)
+    report = state.estimator
+    assert report is not None
+    assert report.level_accuracy > math.sqrt(stated[0] + stated[1])
+    assert report.vertical_accuracy > math.sqrt(stated[2])
+    assert 0.0 < state.aiding.position_sigma < 0.8
