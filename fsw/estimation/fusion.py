@@ -207,14 +207,19 @@ def heading_rows(x: Any, law: Any, field: Vec3, dt: float) -> bool:
 
 
 @compilable
-def fuse_heading(x: Any, law: Any, gates: Any, time: float, field: Vec3) -> float:
-    """Fuse the heading of a magnetic ``field`` [Gauss, FRD] of ``time`` [s]."""
+def fuse_heading(x: Any, law: Any, gates: Any, time: float, field: Vec3, believed: bool) -> float:
+    """Fuse the heading of a magnetic ``field`` [Gauss, FRD] of ``time`` [s].
+
+    One that is not ``believed``, though it is within its gate, says nothing: infinite.
+    """
     if not heading_rows(x, law, field, time - x.time):
         x.innovation[0, 0] = 0.0
         return math.inf
     x.innovation[0, 0] = x.residual[0]
     ratio: float = distance_with_offset(x, law.mag_offset) / gates.heading
     if ratio <= 1.0:
+        if not believed:
+            return math.inf
         correct_with_offset(x, law.mag_offset)
     return ratio
 

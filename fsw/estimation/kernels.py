@@ -411,8 +411,8 @@ def _fuse_pressure(x: Filter, law: Law, time: float, altitude: float, variance: 
 
 
 @kernel
-def _fuse_heading(x: Filter, law: Law, time: float, field: Vec3) -> float:
-    return fusion.fuse_heading(x[0], law[0].tuning, law[0].gates, time, field)
+def _fuse_heading(x: Filter, law: Law, time: float, field: Vec3, believed: bool) -> float:
+    return fusion.fuse_heading(x[0], law[0].tuning, law[0].gates, time, field, believed)
 
 
 @kernel

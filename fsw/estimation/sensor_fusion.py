@@ -58,6 +58,7 @@ _WAITING_AT_START: Final = 16  # samples that are looked at
 _SPEED_AT_START: Final = 2.0  # m/s and rad/s, with which a vehicle moves between two poses
 _RATE_AT_START: Final = 2.0
 _STRONGEST: Final = 20.0  # m/s^2, with which it does so between two velocities
+_STEADY: Final = 0.5  # s without a refused reading, until a magnetometer is believed again
 _APART: Final = 0.25  # s; readings farther apart do not confirm each other
 _SELDOM_APART: Final = 1.25  # s; the same of a sensor whose readings come farther apart than that
 # What poses contradict by no more, an inertial unit may have made; a frame that moves, moves more.
@@ -591,7 +592,7 @@ class SensorFusion:
                 kernels.couple_level(x, self.law)
                 # The heading was made of this field: what it does not know of it, with all of the
                 # tilt that it comes through, is what it does not know of the field.
-                kernels.fuse_heading(x, self.law, float(x["time"][0]), memory.field)
+                kernels.fuse_heading(x, self.law, float(x["time"][0]), memory.field, True)
                 break
         else:
             return memory._replace(waiting=memory.waiting[-_WAITING_AT_START:])
@@ -808,7 +809,13 @@ class SensorFusion:
         return (kernels.fuse_pressure(x, self.law, sample.time, sample.altitude, variance),)
 
     def _fuse_heading(self, memory: FusionMemory, sample: MagneticSample) -> tuple[float, ...]:
-        return (kernels.fuse_heading(memory.numbers, self.law, sample.time, sample.field),)
+        # Garbage is within the gate now and then.
+        believed = not any(
+            isinstance(one, MagneticSample) and sample.time - one.time < _STEADY
+            for one in memory.refused
+        )
+        x, law = memory.numbers, self.law
+        return (kernels.fuse_heading(x, law, sample.time, sample.field, believed),)
 
     def _fuse_range(self, memory: FusionMemory, sample: RangeSample) -> tuple[float, ...]:
         # What is wrong in proportion stays from one reading to the next, and against a height that

@@ -14,12 +14,13 @@ from fsw.compiled import packed
 from fsw.estimation import fusion
 from fsw.estimation.compass import correct_with_offset, distance_with_offset
 from fsw.estimation.error_state import ERRORS, FIELD, FILTER, TH, correct, distance
+from fsw.estimation.sensor_fault import Sensor
 from fsw.estimation.sensor_fusion import SensorFusion, at_start
 from fsw.estimation.tuning import EstimatorTuning
 from fsw.geometry.quaternion import turned
 from fsw.geometry.rotation import matrix_from_quaternion
 from fsw.measurements import MagneticSample, Sample
-from tests.fsw.estimation.sensor_runs import EARTH, RTK, run
+from tests.fsw.estimation.sensor_runs import EARTH, RTK, START, run
 
 Array = NDArray[np.float64]
 LAW = packed(EstimatorTuning(declination=0.1)).view(np.recarray)[0]
@@ -146,3 +147,26 @@ def _shifted(sample: Sample, by: Array) -> Sample:
         return sample
     a, b, c = (np.array(sample.field) + by).tolist()
     return replace(sample, field=(a, b, c))
+
+
+@pytest.mark.requirement("REQ-EST-4")
+@pytest.mark.parametrize("seed", range(4))
+def test_garbage_that_is_within_the_gate_now_and_then_turns_nothing(seed: int) -> None:
+    """A magnetometer is believed again where it has not been refused for half a second."""
+    random, fusion_, memory = np.random.default_rng(seed), SensorFusion(RTK.tuning), at_start()
+    begins, ends, last = START + 1.0, START + 4.0, START + 4.7
+    fused: list[float] = []
+    for now, samples in run(RTK, seed, last - START):
+        heard: list[Sample] = []
+        for one in samples:
+            if isinstance(one, MagneticSample) and begins <= one.time < ends:
+                x, y, z = (0.5 * random.standard_normal(3)).tolist()
+                one = replace(one, field=(x, y, z))
+            heard.append(one)
+        memory, _ = fusion_.step(memory, heard, now)
+        newest = memory.of(Sensor.MAGNETOMETER).fused
+        if newest and newest[0] == now:
+            fused.append(now)
+    behind = 0.2  # s, as far as the filter stays behind satellites
+    assert begins - 0.1 < max(one for one in fused if one < ends) < begins + behind + 0.1
+    assert ends + 0.5 - 0.02 < min(one for one in fused if one > ends) < ends + 0.5 + behind
