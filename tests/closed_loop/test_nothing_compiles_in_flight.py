@@ -108,7 +108,7 @@ SIMULATIONS: dict[str, Callable[[str], Scenario]] = {
         pytest.param("workspace and faults", marks=pytest.mark.long),
         pytest.param("moving zones and faults", marks=pytest.mark.long),
         "ground and faults",  # where no trim has been computed
-        "air and faults",
+        pytest.param("air and faults", marks=pytest.mark.long),
     ],
 )
 def test_no_fault_of_a_simulation_finds_a_kernel_that_is_not_ready(name: str) -> None:
