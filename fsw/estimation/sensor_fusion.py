@@ -857,7 +857,7 @@ def _anew(memory: FusionMemory) -> FusionMemory:
 def _settled(memory: FusionMemory, dispute: Dispute, model: Vec3, now: float) -> FusionMemory:
     """The memory after a ``dispute`` has gone on for a tick, and the fault of who is wrong in it.
 
-    Rotors and a ``model`` [SI, FRD] as in ``step``, at ``now`` [s].
+    ``model`` [SI, FRD] as in ``catch_up``, at ``now`` [s].
     """
     if dispute.is_over(now):
         return memory._replace(dispute=None)
