@@ -2,7 +2,8 @@
 
 Accelerometer and gyro are judged each for itself. A reading far from the last good one is not
 believed. What jumps once is believed again as soon as it is back, or stays where it jumped to; what
-jumps again soon must be steady for longer.
+jumps again soon must be steady for longer. A gyro in flight that stays where it jumped to is
+believed only where an attitude agrees with it (``claim.py``).
 """
 
 from __future__ import annotations
