@@ -43,6 +43,7 @@ IMU_CAPACITY: Final = 256  # readings since the filter's time
 TIME, FORCE, RATE, LOST, COLUMNS = 0, 1, 4, 7, 8
 NO_FORCE, NO_RATE, NOTHING = 1, 2, 3  # of LOST
 MODELLED = 4  # of LOST: where nothing is measured, it is what rotors make of the vehicle
+CLAIMS: Final = 160  # readings of a gyro that has jumped
 PUSHES: Final = 160  # ticks that the joints' state may lie behind
 
 FILTER: Final = np.dtype(
@@ -72,6 +73,16 @@ FILTER: Final = np.dtype(
         ("shaken", float),
         ("step", float, (3,)),
         ("stepped", float),
+        # Of a gyro that has jumped (claim.py): time [s], what it said and what was flown [rad/s,
+        # FRD], and where and when the comparison begins, with an attitude and with a field.
+        ("claim", float, (CLAIMS, 7)),  # ring
+        ("claims", np.int64),
+        ("claim_started", np.int64),
+        ("claim_time", float),  # s
+        ("claim_q", float, (4,)),  # body to NED
+        ("field_started", np.int64),
+        ("field_time", float),  # s
+        ("claim_field", float, (3,)),  # Gauss, FRD
         ("lost", np.int64),  # which halves of the state's own reading are of no use
         # Joints, at a time of their own (joint_filter.py), and what torques made of them since.
         ("joints", float, (2, 3)),  # angle [rad], rate [rad/s] and disturbance [rad/s^2] of each

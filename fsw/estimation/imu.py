@@ -2,7 +2,8 @@
 
 Accelerometer and gyro are judged each for itself. A reading far from the last good one is not
 believed. What jumps once is believed again as soon as it is back, or stays where it jumped to; what
-jumps again soon must be steady for longer.
+jumps again soon must be steady for longer. A gyro in flight that stays where it jumped to is
+believed only where an attitude agrees with it (``claim.py``).
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import math
 from typing import Any, Final
 
 from fsw.compiled import compilable
+from fsw.estimation.claim import add_claim, forget_claim, open_claim
 from fsw.estimation.error_state import (
     COLUMNS,
     FORCE,
@@ -21,6 +23,7 @@ from fsw.estimation.error_state import (
     NO_RATE,
     RATE,
     TIME,
+    vec3,
 )
 from fsw.estimation.sensor_fault import SensorFault
 from fsw.signals import Vec3
@@ -31,6 +34,8 @@ STUCK_READINGS: Final = 5  # equal to the last bit, in a row: noise never is
 # Steady readings in a row until what has jumped is the truth: of one that was calm, and of others.
 STAYS: Final = 3
 STAYS_LONG: Final = 25
+_BACK: Final = 0.5  # of a jump: so near to what is flown, a gyro has come back to it
+_BLOW: Final = 0.01  # s, for which a blow lasts that makes more than one jump
 CALM: Final = 250  # readings that were believed, in a row
 # A step of the gyro from one reading to the next. Rotors turn the body by 17 rad/s^2, which is
 # 0.034 rad/s; in flight it changes by 0.016 rad/s on average with what rotors shake.
@@ -64,8 +69,9 @@ def add_imu(x: Any, law: Any, now: float, time: float, f: Vec3, w: Vec3, model: 
         return _REPEATED
     if x.end > 0 and time - last[TIME] <= law.imu_gap:
         note_step(x, time, w)
-    of_force = _fault(x, 0, f, law.accel_range, law.accel_jump)
-    of_rate = _fault(x, 1, w, law.gyro_range, law.gyro_jump)
+    doubted = x.doubted[1]
+    of_force = _fault(x, 0, f, law.accel_range, law.accel_jump, False)
+    of_rate = _fault(x, 1, w, law.gyro_range, law.gyro_jump, model[2] > 0.0)
     keep_force, keep_rate = of_force in (_NONE, _STUCK), of_rate in (_NONE, _STUCK)
     fault = of_force if of_force != _NONE else of_rate
     if x.end == 0 and not (keep_force and keep_rate):
@@ -80,12 +86,19 @@ def add_imu(x: Any, law: Any, now: float, time: float, f: Vec3, w: Vec3, model: 
     if modelled:
         _model_what_is_lost(row, last, lost, model)
     if x.end == 0:
-        for i in range(COLUMNS):  # what goes before the first reading
-            last[i] = row[i]
+        _keep_as(last, row)  # what goes before the first reading
+    if x.doubted[1] > 0:
+        _note_claim(x, doubted, time, w, vec3(row, RATE), of_rate == _JUMP)
     x.end += 1
     if x.end - x.first >= IMU_CAPACITY:  # the filter has not begun
         x.first += 1
     return fault
+
+
+@compilable
+def _keep_as(row: Any, other: Any) -> None:
+    for i in range(COLUMNS):
+        row[i] = other[i]
 
 
 @compilable
@@ -122,8 +135,25 @@ def _model_what_is_lost(row: Any, last: Any, lost: int, model: Vec3) -> None:
 
 
 @compilable
-def _fault(x: Any, half: int, reading: Vec3, most: float, jump: float) -> int:
-    """What is wrong with one half of a reading; counts what comes in a row."""
+def _note_claim(x: Any, doubted: int, time: float, w: Vec3, flown: Vec3, said: bool) -> None:
+    """Note a reading ``w`` [rad/s, FRD] of a gyro that has jumped, if it has ``said`` something.
+
+    Before it ``doubted`` was so many, at ``time`` [s], and ``flown`` [rad/s, FRD] is kept of it.
+    """
+    if doubted == 0:
+        open_claim(x)
+    elif not said or (x.steady[1] == 0 and time - x.claim_time > _BLOW):
+        forget_claim(x)
+    if said:
+        add_claim(x, time, w, flown)
+
+
+@compilable
+def _fault(x: Any, half: int, reading: Vec3, most: float, jump: float, flies: bool) -> int:
+    """What is wrong with one half of a reading; counts what comes in a row.
+
+    Of a gyro that ``flies``, that it is steady is not enough: see ``claim.py``.
+    """
     last, at = x.imu[(x.end - 1) % IMU_CAPACITY], 3 * half
     if not math.isfinite(reading[0] + reading[1] + reading[2]):
         x.steady[half] = 0
@@ -141,12 +171,27 @@ def _fault(x: Any, half: int, reading: Vec3, most: float, jump: float) -> int:
         return _NONE
     x.same[half] = x.same[half] + 1 if change == 0.0 else 0
     x.steady[half] = x.steady[half] + 1 if change <= jump else 0
-    x.doubted[half], x.calm[half] = doubt(
-        x.doubted[half], x.steady[half], x.calm[half], stray > jump
-    )
+    if flies and x.doubted[half] > 0:
+        if x.doubted[half] == STAYS and _is_back(x, reading, jump):
+            x.doubted[half], x.calm[half] = 0, 0
+    else:
+        x.doubted[half], x.calm[half] = doubt(
+            x.doubted[half], x.steady[half], x.calm[half], stray > jump
+        )
     if x.doubted[half] > 0:
         return _JUMP
     return _STUCK if x.same[half] >= STUCK_READINGS else _NONE
+
+
+@compilable
+def _is_back(x: Any, reading: Vec3, jump: float) -> bool:
+    """Whether the gyro's ``reading`` [rad/s, FRD] is what is flown, its own bias taken off."""
+    last = x.imu[(x.end - 1) % IMU_CAPACITY]
+    stray = 0.0
+    for i in range(3):
+        bias = x.gyro_bias[i] - x.kept_bias[3 + i] if x.lost & NO_RATE else 0.0
+        stray = max(stray, abs(reading[i] - last[RATE + i] + bias))
+    return stray <= _BACK * jump
 
 
 @compilable

@@ -8,11 +8,12 @@ from typing import Any
 from numpy.typing import NDArray
 
 from fsw.compiled import compilable, kernel, of_fixed_types
-from fsw.estimation import fusion, imu, joint_filter
+from fsw.estimation import claim, fusion, imu, joint_filter
 from fsw.estimation.error_state import (
     BA,
     BARO,
     BG,
+    CLAIMS,
     COLUMNS,
     DELAY,
     ERRORS,
@@ -204,6 +205,21 @@ def _copy_halves(a: Any, b: Any) -> None:
     b.shaken, b.stepped = a.shaken, a.stepped
     for i in range(3):
         b.step[i] = a.step[i]
+    if a.doubted[1] > 0:
+        _copy_claim(a, b)
+
+
+@compilable
+def _copy_claim(a: Any, b: Any) -> None:
+    b.claims, b.claim_started, b.claim_time = a.claims, a.claim_started, a.claim_time
+    b.field_started, b.field_time = a.field_started, a.field_time
+    for i in range(4):
+        b.claim_q[i] = a.claim_q[i]
+    for i in range(3):
+        b.claim_field[i] = a.claim_field[i]
+    for k in range(max(0, a.claims - CLAIMS), a.claims):
+        for i in range(7):
+            b.claim[k % CLAIMS, i] = a.claim[k % CLAIMS, i]
 
 
 @compilable
@@ -380,6 +396,18 @@ def _doubt(x: Filter, law: Law, place: float, turn: float) -> None:
 
 
 @kernel
+def _judge_by_attitude(x: Filter, law: Law, time: float, q: Vec4, sigma: float) -> bool:
+    """Whether an attitude proves a gyro right that has jumped."""
+    return claim.judge_by_attitude(x[0], time, normalised(q), sigma)
+
+
+@kernel
+def _judge_by_field(x: Filter, law: Law, time: float, field: Vec3) -> bool:
+    """Whether the Earth's field does."""
+    return claim.judge_by_field(x[0], law[0].tuning.mag_noise, time, field)
+
+
+@kernel
 def _fuse_pose(
     x: Filter,
     law: Law,
@@ -459,6 +487,8 @@ set_velocity = of_fixed_types(_set_velocity)
 set_attitude = of_fixed_types(_set_attitude)
 set_pressure = of_fixed_types(_set_pressure)
 doubt = of_fixed_types(_doubt)
+judge_by_attitude = of_fixed_types(_judge_by_attitude)
+judge_by_field = of_fixed_types(_judge_by_field)
 fuse_pose = of_fixed_types(_fuse_pose)
 fuse_gnss = of_fixed_types(_fuse_gnss)
 fuse_pressure = of_fixed_types(_fuse_pressure)

@@ -247,6 +247,8 @@ class SensorFusion:
             if isinstance(sample, PoseSample | GnssSample | PressureSample):
                 self._reset(memory, Waiting(t, 0, sample), (math.inf, math.inf))
         kernels.doubt(memory.numbers, self.law, 0.0, 0.0)
+        kernels.judge_by_attitude(memory.numbers, self.law, t, _NO_TURN, 1.0)
+        kernels.judge_by_field(memory.numbers, self.law, t, (0.2, 0.0, 0.4))
         self.covariance(memory, t)
         return estimate
 
@@ -526,12 +528,30 @@ class SensorFusion:
             if isinstance(sample, GnssSample) and fault is SensorFault.NO_FIX:
                 memory = memory._replace(without_fix=sample)
             return memory._replace(health=(*others, health), delay=delay)
+        if x["doubted"][0][1] > 0 and memory.started:
+            memory = self._with_claim_judged(memory, sample, time, now)
         waiting = (*memory.waiting, Waiting(time, memory.arrivals, sample))
         if len(waiting) > 1 and waiting[-2].time > time:
             waiting = tuple(sorted(waiting))
         gnss = sample if isinstance(sample, GnssSample) else memory.gnss
         known = (waiting, (*others, health), memory.arrivals + 1, delay, gnss)
         return FusionMemory._make((*memory[:5], *known, *memory[10:]))
+
+    def _with_claim_judged(
+        self, memory: FusionMemory, sample: Aiding, time: float, now: float
+    ) -> FusionMemory:
+        """The memory after a ``sample`` of ``time`` [s] has told whether a gyro is right again."""
+        x = memory.numbers.copy()
+        if isinstance(sample, PoseSample):
+            _, about = self._noise(memory, sample)
+            sigma = math.sqrt(max(about))
+            kernels.judge_by_attitude(x, self.law, time, sample.attitude, sigma)
+        elif isinstance(sample, MagneticSample):
+            heard = memory.of(Sensor.POSE).came
+            if heard >= 0.0 and now - heard <= self.tuning.stale_time:
+                return memory
+            kernels.judge_by_field(x, self.law, time, sample.field)
+        return memory._replace(numbers=x)
 
     def _with_delay_known(self, memory: FusionMemory) -> FusionMemory:
         """The memory after the parameters of the pose's delay may have changed in flight."""

@@ -23,9 +23,10 @@ class EstimatorTuning:
     accel_full_scale: float = 156.9
     gyro_range: float = 35.0  # rad/s
     # From one reading to the next. The rotors turn the body by 17 rad/s^2 and accelerate it by
-    # 10 m/s^2 more than gravity; the rest is vibration.
+    # 10 m/s^2 more than gravity; the rest is vibration. With `vio` a gyro off by 2 rad/s that is
+    # believed ends a flight, one off by 1 rad/s does not.
     accel_jump: float = 30.0  # m/s^2
-    gyro_jump: float = 3.0  # rad/s
+    gyro_jump: float = 1.0  # rad/s
     imu_gap: float = 0.006  # s; longer without a reading, the IMU was lost meanwhile
     # While the IMU is stuck or silent, what it reads is taken for the truth plus a bias that moves
     # as quickly as the vehicle does: the pose then gives acceleration and rate.

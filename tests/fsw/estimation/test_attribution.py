@@ -214,12 +214,20 @@ _IMU = {(Sensor.IMU, SensorFault.DISAGREES)}
 _POSE = {(Sensor.POSE, SensorFault.JUMP)}
 
 
-@pytest.mark.parametrize("size", [0.15, 0.6, 2.5])
+@pytest.mark.parametrize("size", [0.15, 0.6, 0.9])
 @pytest.mark.parametrize("axis", _AXES, ids=str)
 def test_a_gyro_off_by_a_constant_is_named_and_the_pose_is_not(axis: Vec3, size: float) -> None:
     found, first = hover(Lie(rate=along(axis, size)), 1, gust=0.5)
     assert found == _IMU
     assert first < 0.5
+
+
+@pytest.mark.parametrize("size", [2.5, 10.0])
+@pytest.mark.parametrize("axis", [_AXES[0], _AXES[6]], ids=str)
+def test_a_gyro_off_by_much_is_named_at_once_and_the_pose_is_not(axis: Vec3, size: float) -> None:
+    found, first = hover(Lie(rate=along(axis, size)), 1, gust=0.5)
+    assert found == {(Sensor.IMU, SensorFault.JUMP)}
+    assert first < 0.01
 
 
 @pytest.mark.parametrize("size", [2.5, 8.0, 25.0])

@@ -1,0 +1,84 @@
+"""A gyro that is off for good from one reading to the next, and a blow that looks like it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from fsw.measurements import ImuSample
+from fsw.signals import Mode
+from sitl.scenario_file import load_scenario
+from tests.closed_loop.harness import ARM, Flight, command, hover
+from tests.closed_loop.test_real_sensors import changed
+from tests.closed_loop.test_when_things_go_wrong import OnePush
+
+AT = 0.8  # s, when it happens
+
+in_long = pytest.mark.long
+
+
+def off_by(axis: int, size: float) -> Any:
+    """Readings of a gyro that is off about one axis [rad/s]."""
+
+    def off(sample: ImuSample) -> ImuSample:
+        rate = list(sample.rate)
+        rate[axis] += size
+        return replace(sample, rate=(rate[0], rate[1], rate[2]))
+
+    return off
+
+
+@pytest.mark.requirement("REQ-EST-7")
+@pytest.mark.parametrize(
+    ("suite", "axis", "size"),
+    [
+        ("mocap", 0, 10.0),
+        pytest.param("mocap", 1, 25.0, marks=in_long),
+        pytest.param("vio", 1, -10.0, marks=in_long),
+        pytest.param("vio", 0, 2.0, marks=in_long),
+    ],
+)
+def test_a_gyro_that_is_off_for_good_is_named_and_the_vehicle_holds(
+    suite: str, axis: int, size: float
+) -> None:
+    spoil = changed(ImuSample, AT, 99.0, off_by(axis, size))
+    flight = Flight(load_scenario("walls", suite), spoil_samples=spoil)
+    flight.follow()
+    flight.run(AT + 1.2)  # 10 rad/s believed hit a wall after that
+    assert "IMU jumps, and is not believed" in flight.texts
+    assert any("sensor lost: IMU" in text for text in flight.texts)
+    assert flight.mode is Mode.HOLD
+    estimate, truth = flight.snapshot.estimate, flight.sim.truth()
+    assert max(abs(rate) for rate in estimate.w_WB_B) < 1.0
+    assert estimate.R_WB[8] > 0.98, "level to 11 deg"
+    assert abs(estimate.p_WB[0] - truth.p_WB[0]) < 0.05
+    assert min(truth.margins_m) > 0.0
+
+
+@pytest.mark.requirement("REQ-EST-7")
+@pytest.mark.parametrize("suite", ["mocap", pytest.param("vio", marks=in_long)])
+def test_a_blow_is_believed_in_time_to_stay_in_the_air(
+    suite: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """600 N m for 2 ms: 4 rad/s of roll, which rotors stop within 40 or 50 deg."""
+    monkeypatch.setattr("sitl.simulation.push", lambda item, seed, step_s: item)
+    first = round(AT / 0.002)
+    push: Any = OnePush((600.0, 0.0, 0.0), True, first, first)
+    scenario = load_scenario("walls", suite)
+    calm = hover()
+    scenario = replace(
+        calm, sensors=scenario.sensors, disturbances=(push,), duration_s=calm.duration_s
+    )
+    flight = Flight(scenario)
+    flight.step(command(ARM, 1.0))
+    flight.run(AT + 0.02)
+    assert "IMU jumps, and is not believed" in flight.texts
+    flight.run(0.08)
+    fusion = flight.state.fusion
+    assert fusion is not None
+    assert fusion.numbers["doubted"][0][1] == 0, "believed"
+    flight.run(1.5)
+    assert flight.mode is Mode.HOLD
+    assert flight.snapshot.estimate.R_WB[8] > 0.95
