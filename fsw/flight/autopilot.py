@@ -348,7 +348,9 @@ class Autopilot:
         now_us = estimate.t_us
         planned, plan, u = self._plans.follow(state.plan, nominal, answer, now_us, ticks)
         if state.vehicle.mode is Mode.DESCEND:
-            planned, u = self._descent.step(nominal, estimate, state.aiding, ticks)
+            goal = state.setpoint.goal
+            place = None if goal is None else goal.motion.p
+            planned, u = self._descent.step(nominal, estimate, state.aiding, ticks, place)
         if state.damage.joint:
             planned, u = frozen_arm(planned, u, estimate, state.damage.report.joints)
         return planned, plan, u

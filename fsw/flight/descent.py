@@ -1,12 +1,14 @@
 """The plan's state of a descent without plans: straight down, at rest across, the arm still.
 
 It needs attitude and height only. Where no position is measured, the place is not held: the
-estimate's drift would be flown. Speed across is brought to zero for as long as it is known well
-enough, because wind would carry a level vehicle away; then the vehicle stays level.
+estimate's drift would be flown. For as long as speed across is known well enough, the vehicle draws
+back from zones on what dead reckoning says, and comes to rest where it is as far from them as they
+leave room for. Then it stays level: wind would carry it away, and so would a speed that is wrong.
 """
 
 from __future__ import annotations
 
+import math
 from typing import Final
 
 from fsw.control.braking import Brake
@@ -14,16 +16,26 @@ from fsw.flight.state import Aiding
 from fsw.geometry.vectors import clamp_magnitude
 from fsw.model.nominal import NominalModel
 from fsw.parameters.flight_config import FlightConfig
-from fsw.signals import PlanInput, PredictionState, StateEstimate
+from fsw.signals import PlanInput, PredictionState, StateEstimate, Vec2, Vec3
 
 _RATE: Final = 4.0  # 1/s, of the speed down
 _MOST: Final = 1.0  # m/s^2
-# Times the speed of landing, where no position is measured: how far it is carried grows with the
-# square of the time. The legs stand four times as much, so a height that is wrong does no harm.
+# Where no position is measured the vehicle sinks faster: how far it is carried grows with the
+# square of the time. Times the speed of landing near the ground and above, however wrong the height
+# is: the legs stand eight times as much.
 _BLIND: Final = 2.0
 _BLIND_HIGH: Final = 4.0
 _HIGH: Final = 1.0  # m above the legs; with _MOST the vehicle is slow again 0.6 m above them
+# And faster still where the height is known to be enough to be slow again.
+_FAST: Final = 1.5  # m/s, as PX4's MPC_Z_VEL_MAX_DN
+_SLOW: Final = 0.3  # m above the legs, less ``_SIGMAS`` of the height
+_SIGMAS: Final = 3.0
+_MOST_BLIND: Final = 2.0  # m/s^2
+_BRAKING: Final = 1.2  # m/s^2 that are counted on; loops lag
 _SPEED_KNOWN: Final = 1.0  # m/s, standard deviation; PX4's limit of a usable velocity
+_SPEED_GOOD: Final = 0.5  # m/s; from here to there the vehicle draws back ever slower
+_BACK: Final = 1.0  # m/s, as fast as it draws back at most
+_BACK_RATE: Final = 1.5  # 1/s
 
 
 class Descent:
@@ -33,19 +45,29 @@ class Descent:
         self._model = NominalModel(config.airframe, config.tick_period_us * 1e-6)
         self._brake = Brake(config.airframe, config.planner.limits.tilt)
         self._speed = config.limits.land_speed
-        self._high_z = -config.airframe.leg_length - _HIGH
+        self._legs_z = -config.airframe.leg_length
         self._unaided_us = config.limits.aiding_loss_us
 
     def step(
-        self, nominal: PredictionState, estimate: StateEstimate, aiding: Aiding, ticks: int
+        self,
+        nominal: PredictionState,
+        estimate: StateEstimate,
+        aiding: Aiding,
+        ticks: int,
+        place: Vec3 | None = None,
     ) -> tuple[PredictionState, PlanInput]:
-        """The plan's state ``ticks`` [1] later, and the input that leads on from it."""
+        """The plan's state ``ticks`` [1] later, and the input that leads on from it.
+
+        ``place`` [m, NED] is where the vehicle draws back to while no position is measured.
+        """
         blind = aiding.unaided_us >= self._unaided_us
-        speed = self._speed
+        speed, most, across = self._speed, _MOST, (0.0, 0.0)
         if blind:
-            speed *= _BLIND_HIGH if estimate.p_WB[2] < self._high_z else _BLIND
+            speed, most = self._blind_speed(estimate, aiding)
+            if place is not None:
+                across = _back(estimate, aiding, place)
         for _ in range(ticks):
-            nominal = self._model.step(nominal, self._input(nominal, speed))
+            nominal = self._model.step(nominal, self._input(nominal, speed, most, across))
         if blind:
             (x, y, _), (_, _, z) = estimate.p_WB, nominal.p
             nominal = nominal._replace(p=(x, y, z))
@@ -55,9 +77,34 @@ class Descent:
                 nominal = nominal._replace(
                     v=(vx, vy, vz), a=(0.0, 0.0, az), j=(0.0, 0.0), s=(0.0, 0.0)
                 )
-        return nominal, self._input(nominal, speed)
+        return nominal, self._input(nominal, speed, most, across)
 
-    def _input(self, nominal: PredictionState, speed: float) -> PlanInput:
-        u = self._brake(nominal)
-        down = clamp_magnitude(_RATE * (speed - nominal.v[2]), _MOST)
+    def _blind_speed(self, estimate: StateEstimate, aiding: Aiding) -> Vec2:
+        """How fast to sink where no position is measured, and to get there: [m/s], [m/s^2]."""
+        height = self._legs_z - estimate.p_WB[2]
+        slow = _BLIND * self._speed
+        sure = height - _SLOW - _SIGMAS * aiding.height_sigma
+        usual = _BLIND_HIGH * self._speed if height > _HIGH else slow
+        if not sure > 0.0:
+            return usual, _MOST
+        braked = math.sqrt(slow * slow + 2.0 * _BRAKING * sure)
+        return max(usual, min(_FAST, braked)), _MOST_BLIND
+
+    def _input(
+        self, nominal: PredictionState, speed: float, most: float, across: Vec2
+    ) -> PlanInput:
+        vx, vy, vz = nominal.v
+        u = self._brake(nominal._replace(v=(vx - across[0], vy - across[1], vz)))
+        down = clamp_magnitude(_RATE * (speed - vz), most)
         return u._replace(a=(u.a[0], u.a[1], down))
+
+
+def _back(estimate: StateEstimate, aiding: Aiding, place: Vec3) -> Vec2:
+    """Velocity across [m/s, NED] towards a place to draw back to; slower, the less it is known."""
+    known = (_SPEED_KNOWN - aiding.velocity_sigma) / (_SPEED_KNOWN - _SPEED_GOOD)
+    if not known > 0.0:
+        return 0.0, 0.0
+    dx, dy = place[0] - estimate.p_WB[0], place[1] - estimate.p_WB[1]
+    most = _BACK * min(known, 1.0)
+    share = _BACK_RATE * min(1.0, most / max(_BACK_RATE * math.hypot(dx, dy), 1e-9))
+    return share * dx, share * dy

@@ -91,6 +91,7 @@ def _aiding(trust: FrameTrust, now_us: int) -> Aiding:
         position_sigma=trust.position_sigma(now_us),
         velocity_sigma=trust.velocity_sigma(now_us),
         attitude_sigma=trust.attitude_sigma(now_us),
+        height_sigma=trust.position_sigma(now_us),
         sensor=lost[0][0] if lost else None,
         fault=lost[0][1].fault if lost else faults[0][1].fault,
         since_us=lost[0][1].since_us if lost else now_us,

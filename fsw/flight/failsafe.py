@@ -501,7 +501,7 @@ FAILSAFES: Final = (
         "deviation of the position is above `COM_POS_FS_EPH`",
         within_us=_SLOWLY,
         parameters=("COM_AID_LOSS_T", "COM_POS_FS_EPH"),
-        does="descend where it is, by attitude and height",
+        does="descend by attitude and height, away from zones while the speed is known",
     ),
     Failsafe(
         Condition.PLANNER_LOST,

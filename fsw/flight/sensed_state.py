@@ -318,6 +318,7 @@ def _aiding(
         position_sigma=drifted,
         velocity_sigma=math.sqrt(max(V[0], V[6], V[11])),
         attitude_sigma=math.sqrt(max(pose[15], pose[18])),
+        height_sigma=math.sqrt(pose[11]),
         sensor=sensor,
         fault=fault,
         since_us=since_us,

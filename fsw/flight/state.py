@@ -89,7 +89,10 @@ class VehicleMemory:
 
 @dataclass(frozen=True, slots=True)
 class SetpointMemory:
-    """The generated setpoint; there is one only in Hold, Return, Orbit and Offboard."""
+    """The generated setpoint; there is one only in Hold, Return, Orbit and Offboard.
+
+    Descend has a goal alone: where it draws back to while no position is measured.
+    """
 
     reference: ReferenceState | None = None
     goal: PositionGoal | None = None
@@ -205,6 +208,7 @@ class Aiding(NamedTuple):
     position_sigma: float = 0.0  # m, of the worst axis, without what lasts of a sensor's error
     velocity_sigma: float = 0.0  # m/s, the same
     attitude_sigma: float = 0.0  # rad, of roll and pitch
+    height_sigma: float = 0.0  # m, with what lasts of a sensor's error
     sensor: Sensor | None = None  # another one that is of no use
     fault: SensorFault = SensorFault.NONE  # of that
     since_us: int = 0

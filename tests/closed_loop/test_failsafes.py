@@ -7,9 +7,10 @@ from dataclasses import replace
 
 import pytest
 
-from fsw.measurements import PoseSample
+from fsw.measurements import GnssSample, PoseSample
 from fsw.parameters.flight_config import flight_config
 from fsw.signals import Mode
+from sitl.scenario import Hold, Pilot, ScenarioWall
 from sitl.scenario_file import load_scenario
 from tests.closed_loop.harness import ARM, SET_MODE, Flight, command, hover, real_planner
 from tests.closed_loop.test_lost_sensors import NOTHING, lies
@@ -58,6 +59,27 @@ def test_a_vehicle_without_a_position_descends_where_it_is() -> None:
     assert to_the_ground(flight) < 0.55  # twice the speed of landing, 0.25 m/s
     assert math.hypot(*flight.sim.truth().p_WB[:2]) < 0.3
     assert any("position unknown" in text and "descending" in text for text in flight.texts)
+
+
+@pytest.mark.requirement("REQ-EST-5", "REQ-SAFE-11")
+def test_a_vehicle_without_satellites_draws_back_from_the_wall_while_it_descends() -> None:
+    """Early, so that it must do so in Descend: a hold does by itself."""
+    config = flight_config(body="points")
+    limits = replace(config.limits, position_low=0.02, position_lost=0.05)
+    near = ScenarioWall("right", (0.0, -1.0, 0.0), -1.2, 0.3)
+    field = replace(load_scenario("field", "rtk"), walls=(near,), disturbances=())
+    scenario = replace(field, trajectory=Hold((0.0, 0.0, -2.5)), pilot=Pilot("none"))
+    spoil = changed(GnssSample, 0.5, 999.0, lambda _: None)
+    flight = Flight(scenario, config=replace(config, limits=limits), spoil_samples=spoil)
+    flight.step(command(ARM, 1.0))
+    while flight.mode is not Mode.DESCEND:
+        flight.step()
+        assert flight.sim.time_s < 2.0
+    begin_s, begin = flight.sim.time_s, flight.snapshot.estimate
+    assert to_the_ground(flight) > 1.2  # m/s: the height is measured, and there is time to brake
+    assert flight.sim.time_s - begin_s < 5.0
+    assert flight.snapshot.estimate.p_WB[1] < begin.p_WB[1] - 0.8, "away from the wall"
+    assert min(flight.sim.truth().margins_m) > 0.3
 
 
 @pytest.mark.requirement("REQ-MODE-9")
