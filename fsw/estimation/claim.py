@@ -78,7 +78,10 @@ def forget_claim(x: Any) -> None:
 
 @compilable
 def add_claim(x: Any, time: float, said: Vec3, flown: Vec3) -> None:
-    """Note what the gyro has ``said`` at ``time`` [s] and what is ``flown`` [rad/s, FRD]."""
+    """Note what the gyro ``said`` [rad/s, FRD] and what is ``flown`` [the same, FRD].
+
+    Both are of ``time`` [s].
+    """
     row = x.claim[x.claims % CLAIMS]
     row[0] = time
     for i in range(3):
@@ -95,7 +98,7 @@ def _start(x: Any, time: float, q: Vec4) -> None:
 
 @compilable
 def turns(x: Any, since: float, until: float) -> tuple[bool, Vec4, Vec4]:
-    """How a body turns between two times [s] by what the gyro says, and by what is flown.
+    """How a body turns from ``since`` [s] to ``until`` [s] by what the gyro says, and as is flown.
 
     False: not all of it is known, or they are apart by so much that a whole turn would not show.
     What was said last is held.

@@ -568,7 +568,8 @@ FAILSAFES: Final = (
         of_vehicle=True,
         slow=True,
         detected="in flight, a rotor gives another thrust than it is commanded, by 1.5 N for "
-        "0.15 s, or by 4 N for 0.03 s: 0.1 s after it was lost, 0.3 s after it gives 70 %",
+        "0.15 s, or by 4 N for 0.03 s: 0.1 s after it was lost, 0.3 s after it gives 70 %, "
+        "0.5 to 2 s after it gives random thrusts",
         within_us=_SLOWLY,
         parameters=("FD_ACT_EN", "COM_ACT_FAIL_ACT", "CA_FAILURE_MODE"),
         ends="a weak rotor gives what it is commanded for 3 s; another failure never ends",
