@@ -7,8 +7,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
-from scipy.optimize import minimize_scalar
-
 from fsw.flight import arming
 from fsw.flight.modes.base import CommandContext, FlightMode
 from fsw.flight.offboard_setpoints import joints_refusal
@@ -417,11 +415,11 @@ def _circle_too_close(centre: Vec3, radius: float, context: CommandContext) -> s
             at = surface(context.safe_set, number, place, context.now_us)
             return 1.0 if at is None else at.distance - hull_reach(context.body, at.normal)
 
-        # The nearest of some places on the circle, then the nearest between its neighbours.
-        apart = 2.0 * math.pi / _CIRCLE_PLACES
-        best = min((apart * k for k in range(_CIRCLE_PLACES)), key=room)
-        near = (best - apart, best + apart)
-        best = float(minimize_scalar(room, bounds=near, method="bounded").x)
+        # The nearest of some places on the circle, then of as many between its neighbours.
+        apart, best = math.pi, 0.0  # rad
+        for _ in range(2):
+            begin, apart = best - apart, 2.0 * apart / _CIRCLE_PLACES
+            best = min((begin + apart * k for k in range(_CIRCLE_PLACES + 1)), key=room)
         if not room(best) > 0.0:
             return f"the circle comes too close to zone {number + 1} of the safe set"
     return None

@@ -13,7 +13,6 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from scipy.optimize import minimize
 
 from fsw.barriers.constraint_block import TargetPoints
 from fsw.model.prediction import Array
@@ -44,6 +43,8 @@ def minimise(
     The problem is left around its optimum. The solution is usable only where SLSQP says that it
     converged.
     """
+    from scipy.optimize import minimize  # a seventh of every start, else
+
     cost_slope, margin_slopes = slopes or (None, None)
     constraint = {"type": "ineq", "fun": problem.margins}
     # Far iterates of a failing line search may overflow; the outcome is checked below.

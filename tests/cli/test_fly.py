@@ -159,7 +159,7 @@ def test_the_tlog_reads_with_mavutil(lockstep: Flight) -> None:
     assert counts[76] == 1  # what came from the ground station is in it as well
 
 
-@pytest.mark.parametrize("mode", ["lockstep", "realtime"])
+@pytest.mark.parametrize("mode", ["lockstep", pytest.param("realtime", marks=pytest.mark.long)])
 def test_a_command_that_nobody_supports_is_answered(
     mode: str, request: pytest.FixtureRequest
 ) -> None:

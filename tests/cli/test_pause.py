@@ -14,15 +14,14 @@ from tests.cli.command import clean_up
 from tests.cli.test_stall import flying, half_of
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("pace", "processes", "pause_s"),
     [
         (("--realtime",), ("sitl",), 1.0),
-        pytest.param(  # what a laptop does whose lid is closed
-            ("--realtime",), ("fsw", "sitl"), 3.0, marks=pytest.mark.long
-        ),
-        pytest.param(("--speed", "2"), ("fsw",), 1.0, marks=pytest.mark.long),
-        pytest.param(("--speed", "2"), ("sitl",), 1.0, marks=pytest.mark.long),
+        (("--realtime",), ("fsw", "sitl"), 3.0),  # what a laptop does whose lid is closed
+        (("--speed", "2"), ("fsw",), 1.0),
+        (("--speed", "2"), ("sitl",), 1.0),
     ],
 )
 def test_a_flight_survives_a_pause(

@@ -170,6 +170,7 @@ def test_an_orbit_that_reaches_behind_a_wall_is_refused() -> None:
     assert flight.mode is Mode.HOLD
 
 
+@pytest.mark.long
 def test_a_place_is_looked_at_on_the_way_and_left_again() -> None:
     flight = hovering()
     place = (0.0, 6.0, 0.0)
@@ -229,6 +230,7 @@ def test_the_speed_of_a_goto_can_be_changed() -> None:
     assert any("speed unchanged" in text for text in flight.texts)
 
 
+@pytest.mark.long
 def test_a_return_waits_at_its_descent_height_before_it_lands() -> None:
     config = limits(return_height=2.5, return_descent=1.2, return_wait=3.0)
     flight = standing(Flight(on_the_ground(), config=config))

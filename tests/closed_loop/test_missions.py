@@ -220,6 +220,7 @@ def test_what_cannot_be_begun_is_refused_with_the_reason() -> None:
     ]
 
 
+@pytest.mark.long
 def test_a_step_chosen_in_flight_is_flown_after_braking() -> None:
     flight = Flight(hover())
     flight.step(command(ARM, 1.0))

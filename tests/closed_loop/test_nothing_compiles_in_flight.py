@@ -101,14 +101,15 @@ SIMULATIONS: dict[str, Callable[[str], Scenario]] = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "name",
     [
-        pytest.param("walls and faults", marks=pytest.mark.long),
-        pytest.param("workspace and faults", marks=pytest.mark.long),
-        pytest.param("moving zones and faults", marks=pytest.mark.long),
+        "walls and faults",
+        "workspace and faults",
+        "moving zones and faults",
         "ground and faults",  # where no trim has been computed
-        pytest.param("air and faults", marks=pytest.mark.long),
+        "air and faults",
     ],
 )
 def test_no_fault_of_a_simulation_finds_a_kernel_that_is_not_ready(name: str) -> None:

@@ -178,6 +178,7 @@ def test_what_is_broken_already_may_be_mended_in_steps() -> None:
     assert outputs.tuning_taken is True
 
 
+@pytest.mark.long
 def test_walls_are_kept_whatever_harmless_is_changed_in_flight() -> None:
     flight = Flight(load_scenario("walls"), seed=11)
     flight.follow()

@@ -52,9 +52,9 @@ def urgent_texts(flown: Capture) -> list[str]:
     ("jump_s", "options"),
     [
         (-0.5, ()),
-        (-0.004, ("--realtime", "--sensors", "mocap")),
+        pytest.param(-0.004, ("--realtime", "--sensors", "mocap"), marks=pytest.mark.long),
         (-0.5, ("--realtime", "--sensors", "mocap")),
-        (6.0, ("--realtime",)),
+        pytest.param(6.0, ("--realtime",), marks=pytest.mark.long),
     ],
     ids=["back", "a little back in real time", "back in real time, measured", "ahead in real time"],
 )

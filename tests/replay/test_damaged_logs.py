@@ -99,6 +99,7 @@ def test_a_log_cut_among_its_definitions_is_refused_and_among_its_data_read_up_t
         assert attempt(whole[: chance.randrange(second_tick + len(SENSORS), len(whole))]) == 0
 
 
+@pytest.mark.long
 def test_a_log_cut_between_two_records_is_compared_up_to_its_last_whole_tick(
     whole: bytes, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

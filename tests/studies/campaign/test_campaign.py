@@ -71,6 +71,7 @@ def test_workers_of_another_version_are_refused_and_told_why() -> None:
     assert rows == b""
 
 
+@pytest.mark.long
 def test_flights_are_flown_by_other_processes_here(tmp_path: Path) -> None:
     note, journal = tmp_path / "note", tmp_path / "journal.jsonl"
     flights = [StubFlight(number, note=note) for number in range(30)]
