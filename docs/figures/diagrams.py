@@ -83,13 +83,13 @@ def draw_architecture(target: Path) -> None:
     process(axes, (5.1, 1.5), (5.3, 4.2), "process fsw (flight software)")
     axes.text(6.4, 5.48, "tick, 500 Hz", ha="center", color=BLUE)
     axes.text(9.1, 5.48, "planning cycle, 10 Hz", ha="center", color=GREEN)
-    tick = ("estimate", "commands, failsafes, modes", "take the plan, ask for the next",
-            "500 Hz control laws", "safety gate")  # fmt: skip
+    tick = ("estimate", "commands, failsafes, modes", "take the plan, control laws",
+            "safety gate: send", "fuse, watch, ask for a plan")  # fmt: skip
     stack(axes, (5.25, 5.35), 2.3, tick, BLUE)
     cycle = ("predict the start", "linearise the horizon", "costs, barriers, limits",
              "solve (twice)", "Plan or PlanFailure")  # fmt: skip
     stack(axes, (8.1, 5.35), 2.1, cycle, GREEN)
-    arrow(axes, (7.55, 3.8), (8.1, 5.1), colour=GREEN)
+    arrow(axes, (7.55, 2.4), (8.1, 5.1), colour=GREEN)
     arrow(axes, (8.1, 2.3), (7.55, 3.6), colour=GREEN)
     arrow(axes, (2.7, 5.22), (5.1, 5.22), "targets, safe set, arm, mode", ORANGE)
     arrow(axes, (2.7, 4.38), (5.1, 4.38), "ODOMETRY, ARM_JOINT_STATE,\nHIL_SENSOR (last)")
@@ -117,9 +117,10 @@ def draw_timing(target: Path) -> None:
     process(axes, (4.0, 0.3), (3.0, 4.5), "process fsw")
     box(
         axes, (4.12, 1.75), (2.76, 2.9),
-        "main thread, FIFO 50: the tick\n1 read frames, ground, plan\n2 tick: a pure function\n"
-        "3 send actuators\n4 ask the planner\n5 send telemetry\n6 pass records to the log\n"
-        "7 once a second: summarise\nwaits for: its grid; reads the\nground links meanwhile",
+        "main thread, FIFO 50: the tick\n1 read frames, ground, plan\n2 tick: up to the command\n"
+        "3 send actuators\n4 conclude: the rest of the tick\n5 ask the planner\n"
+        "6 telemetry, records to the log\n7 once a second: summarise\n"
+        "waits for: its grid; reads the\nground links meanwhile",
         BLUE,
     )  # fmt: skip
     box(axes, (4.12, 0.42), (2.76, 0.95),
