@@ -28,7 +28,7 @@ from fsw.estimation.turned_covariance import Vec6
 from fsw.flight.estimator_report import AIDS_PLACE, estimator_report, unaided, unknown_report
 from fsw.flight.jump import on_return, told
 from fsw.flight.state import Aiding, FlightState
-from fsw.frozen import replace
+from fsw.frozen import made, replace
 from fsw.measurements import ImuSample, JointSample, Sample
 from fsw.signals import EstimatorReport, Severity, StateEstimate, StatusText, TickInputs, Vec2, Vec3
 
@@ -279,7 +279,7 @@ def _watched(
     """
     asked = state.cascade.joints.reference
     if angles != watch.angles or not state.vehicle.flies:
-        return EncoderWatch(angles, asked)
+        return made(EncoderWatch, (angles, asked, 0, False))
     stuck = watch.stuck
     watch = watch._replace(repeats=watch.repeats + 1)
     if watch.repeating and not stuck:
