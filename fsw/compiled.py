@@ -54,21 +54,22 @@ def compiled(kernel: Callable[P, R]) -> Callable[P, R]:
 
     ``fastmath`` stays off: results must not depend on how a compiler reorders sums.
     """
-    return _jit(kernel)
+    return _jit(kernel, nogil=True)
 
 
 def kernel(function: Callable[P, R]) -> Callable[P, R]:
     """Compile a kernel that makes no array, without counting references to those it is handed.
 
-    The caller holds them. Counting took half of the time of kernels of some ten operations.
+    The caller holds them. Counting took half of the time of kernels of some ten operations. Those
+    are too short to let go of the GIL, which takes as long as another ten.
     """
-    return _jit(function, _nrt=False)
+    return _jit(function, nogil=False, _nrt=False)
 
 
 def _jit(kernel: Callable[P, R], **more: bool) -> Callable[P, R]:
     before, numba.config.CACHE_DIR = numba.config.CACHE_DIR, _CACHE
     try:
-        compile_it = numba.njit(cache=True, fastmath=False, nogil=True, error_model="numpy", **more)
+        compile_it = numba.njit(cache=True, fastmath=False, error_model="numpy", **more)
         return cast(Callable[P, R], compile_it(kernel))
     finally:
         numba.config.CACHE_DIR = before

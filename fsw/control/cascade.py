@@ -43,6 +43,7 @@ from fsw.control.tracking import (
     velocity_of_mass,
     wanted_accelerations,
 )
+from fsw.frozen import made
 from fsw.geometry.rotation import rotate_back, wrap_angle
 from fsw.geometry.vectors import add_scaled, clamp_magnitude, subtract
 from fsw.model.actuator_health import (
@@ -225,9 +226,9 @@ class Cascade:
         sent, rotors, believed, mass, integrals, joints, off_plan, guarded = self._close_loops(
             self.packed, memory, estimate, plan, u, ticks, zones, self.probes
         )
-        command = ActuatorCommand(*sent)
-        moved = Observed(*believed), mass, *integrals, JointMemory(*joints), off_plan
-        kept = CascadeMemory(rotors, command, *moved, memory.health)
+        command = made(ActuatorCommand, sent)
+        moved = made(Observed, believed), mass, *integrals, made(JointMemory, joints), off_plan
+        kept = made(CascadeMemory, (rotors, command, *moved, memory.health))
         return command, kept, guarded
 
 

@@ -33,6 +33,7 @@ from fsw.estimation.sensor_checks import (
 )
 from fsw.estimation.sensor_fault import Sensor, SensorFault
 from fsw.estimation.tuning import EstimatorLaw, EstimatorTuning
+from fsw.frozen import made
 from fsw.geometry.quaternion import conjugate, multiply, normalised, rotation_vector
 from fsw.geometry.rotation import quaternion_from_matrix
 from fsw.geometry.vectors import norm
@@ -142,6 +143,13 @@ class FusionMemory(NamedTuple):
             if one.sensor is sensor:
                 return one
         return Health(sensor)
+
+    def fault_at(self, sensor: Sensor) -> float:
+        """When a fault of a sensor was seen last [s]; minus infinity: never."""
+        for one in self.health:
+            if one.sensor is sensor:
+                return one.fault_at
+        return -math.inf
 
     def came(self, sensor: Sensor) -> float:
         """When a reading of a sensor came last [s]; negative: never."""
@@ -294,25 +302,40 @@ class SensorFusion:
         """
         dt = min(max(now - memory.now, 0.0), _LONGEST_STEP) if memory.now >= 0.0 else 0.0
         x = np.ndarray(1, FILTER, np.empty(_FLOATS))  # eight times as fast as an empty record
-        usual = self._usual(memory, samples, now)
+        usual = None if silent else self._usual(memory, samples, now)
         if usual is not None:
-            asked = Asked(x, _USUAL_PARTS, (now, dt), joint_acceleration, *usual, model)
+            imu_came, joints_came, ready = now, now, True
+            of_imu, of_encoders, finite, present = self._tick(
+                memory.numbers,
+                self.law,
+                kernels.END,
+                -math.inf,
+                x,
+                _USUAL_PARTS,
+                (now, dt),
+                joint_acceleration,
+                *usual,
+                model,
+            )
+            if of_imu or of_encoders:
+                memory = memory.noting_faults(of_imu, of_encoders, now)
+            known = present if finite else None
         else:
             parts = kernels.COPY | kernels.PUSH
             asked = Asked(x, parts, (now, dt), joint_acceleration, model=model)
             memory, asked = self._take_each(memory, asked, samples)
-        imu_came = memory.imu_came if asked.reading is _NO_READING else now
-        if silent:
-            memory, asked = self._take_no_imu(memory, asked)
-        joints_came = memory.joints_came if asked.encoders is _REST else now
-        ready = memory.started and joints_came >= 0.0
-        memory, known = self._do(memory, asked, kernels.END if ready else 0, -math.inf)
+            imu_came = memory.imu_came if asked.reading is _NO_READING else now
+            if silent:
+                memory, asked = self._take_no_imu(memory, asked)
+            joints_came = memory.joints_came if asked.encoders is _REST else now
+            ready = memory.started and joints_came >= 0.0
+            memory, known = self._do(memory, asked, kernels.END if ready else 0, -math.inf)
         # By position, because it is done in every tick: what every tick renews, and the rest.
         watched = memory.encoders if watch is None else watch
-        memory = FusionMemory(x, now, imu_came, joints_came, watched, *memory[5:])
+        memory = made(FusionMemory, (x, now, imu_came, joints_came, watched, *memory[5:]))
         if known is None:
             return (_anew(memory) if ready else memory), None
-        return memory, StateEstimate(round(1e6 * now), *known)
+        return memory, made(StateEstimate, (round(1e6 * now), *known))
 
     def catch_up(
         self,
@@ -348,7 +371,7 @@ class SensorFusion:
             memory = _settled(memory, memory.dispute, model, now)
         if known is None:
             return (_anew(memory) if ready else memory), None
-        return memory, StateEstimate(round(1e6 * now), *known)
+        return memory, made(StateEstimate, (round(1e6 * now), *known))
 
     def _usual(
         self, memory: FusionMemory, samples: Sequence[Sample], now: float

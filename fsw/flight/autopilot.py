@@ -89,6 +89,7 @@ _STILL = SensorFrame(
 )
 # N m s/rad, about critical for the hanging arm: it is let down beside walls as well.
 _ARM_DAMPING: Vec2 = (0.15, 0.04)
+_DESCEND = Mode.DESCEND  # found in a tenth of the time
 
 
 class Controlled(NamedTuple):
@@ -201,12 +202,15 @@ class Autopilot:
 
         ticks = self._elapsed_ticks(state, now_us)
         nominal, plan, u = state.nominal, state.plan, REST_INPUT
-        flown = state.vehicle.flies and nominal is not None
+        vehicle = state.vehicle
+        armed, flown = vehicle.armed, vehicle.flies and nominal is not None
         if flown and nominal is not None:
             nominal, plan, u = self._follow(state, estimate, nominal, inputs.plan, ticks)
-        sent, memory, replaced, guarded = self._actuate(state, estimate, nominal, u, ticks)
-        vehicle = state.vehicle
-        answer = Answer(sent, vehicle.armed, vehicle.mode, tuple(acks), tuple(texts))
+        followed = nominal if flown else None
+        sent, memory, replaced, guarded = self._actuate(
+            state, estimate, followed, u, ticks, armed=armed
+        )
+        answer = Answer(sent, armed, vehicle.mode, tuple(acks), tuple(texts))
         # By position, as what follows: each is made in every tick, and names cost a microsecond.
         return Controlled(
             answer,
@@ -347,7 +351,7 @@ class Autopilot:
         """The plan's state now; in Descend it is none of a plan, though plans are asked for."""
         now_us = estimate.t_us
         planned, plan, u = self._plans.follow(state.plan, nominal, answer, now_us, ticks)
-        if state.vehicle.mode is Mode.DESCEND:
+        if state.vehicle.mode is _DESCEND:
             goal = state.setpoint.goal
             place = None if goal is None else goal.motion.p
             planned, u = self._descent.step(nominal, estimate, state.aiding, ticks, place)
@@ -513,27 +517,30 @@ class Autopilot:
         nominal: PredictionState | None,
         u: PlanInput,
         ticks: int,
+        *,
+        armed: bool,
     ) -> tuple[ActuatorCommand, CascadeMemory, bool, Guarded]:
         """Close the loops, idle or stay still; the safety gate is the last law.
 
-        Also says whether the gate replaced the command, and what the safety filter found.
+        Without a ``nominal`` state nothing is flown. Also says whether the gate replaced the
+        command, and what the safety filter found.
         """
-        memory, wanted, guarded = state.cascade, STOPPED, UNGUARDED
-        if memory.health is not state.damage.health:
-            memory = memory._replace(health=state.damage.health)
-        if state.vehicle.flies and nominal is not None:
+        last = memory = state.cascade
+        wanted, guarded, airframe = STOPPED, UNGUARDED, self.config.airframe
+        health = state.damage.health
+        if memory.health is not health:
+            memory = memory._replace(health=health)
+        if nominal is not None:
             zones = self.zones_now(state)
             wanted, memory, guarded = self._cascade.step(memory, estimate, nominal, u, ticks, zones)
-        elif state.vehicle.armed:
+        elif armed:
             idle = self.config.limits.idle_thrust
             wanted = ActuatorCommand((idle, idle, idle, idle), _let_down(estimate))
-            memory = at_rest(self.config.airframe, estimate)
-        sent, replaced = gate(
-            self.config.airframe, wanted, state.cascade.commanded, state.vehicle.armed
-        )
+            memory = at_rest(airframe, estimate)
+        sent, replaced = gate(airframe, wanted, last.commanded, armed)
         if replaced:
             # The NaN is in the loops' new memory as well: discard that.
-            memory = state.cascade
+            memory = last
         return sent, memory.after_sending(sent), replaced, guarded
 
     def _see_damage(
@@ -628,7 +635,7 @@ def _snapshot(
         vehicle.intended_mode,
         state.mission.flight.progress,
         vehicle.failsafe_from,
-        goal.orbit if vehicle.mode is Mode.ORBIT and goal is not None else None,
+        goal.orbit if goal is not None and vehicle.mode is Mode.ORBIT else None,
         inputs.sensors.accel_B,
         state.safety.counters,
         state.estimator,

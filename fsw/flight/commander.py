@@ -14,7 +14,7 @@ from fsw.flight.failsafe import SLOW_US, FailsafeContext
 from fsw.flight.land_detector import standing_unclear, stands
 from fsw.flight.mission_sequencer import refusal as mission_refusal
 from fsw.flight.modes import MODES
-from fsw.flight.modes.base import CommandContext, FlightMode, Handover
+from fsw.flight.modes.base import CONTINUE, CommandContext, FlightMode, Handover
 from fsw.flight.modes.hold import stop
 from fsw.flight.modes.mission import left as mission_left
 from fsw.flight.modes.mission import with_update
@@ -46,6 +46,7 @@ from fsw.signals import (
 )
 
 _ARMED = ArmingReport()  # nothing to check
+_DISARMED = Mode.DISARMED  # found in a tenth of the time
 
 
 class Commander:
@@ -139,11 +140,13 @@ class Commander:
         self, state: FlightState, estimate: StateEstimate, texts: list[StatusText]
     ) -> FlightState:
         """Report each condition once, when it becomes active, and take its action."""
+        slowly = estimate.t_us // SLOW_US != state.t_us // SLOW_US
+        if not slowly and failsafe.surely_none(state, estimate, self._config):
+            return state
         vehicle = state.vehicle
         if vehicle.mode is Mode.FAULT:
             return state  # what ended the flight stays on show
         context = FailsafeContext(state, estimate, self._config, self._contradiction)
-        slowly = estimate.t_us // SLOW_US != state.t_us // SLOW_US
         rows = failsafe.active(context) if slowly else failsafe.quickly_active(context)
         before = vehicle.conditions
         if not rows and not before:
@@ -192,9 +195,11 @@ class Commander:
         if vehicle.home is None:
             home = Home(estimate.p_WB, estimate.yaw)
             return replace(state, vehicle=replace(vehicle, home=home))
-        if vehicle.mode is Mode.DISARMED:
+        if vehicle.mode is _DISARMED:
             return self._check_intended_mode(state, estimate, texts)
         state, result = self.mode(state).update(state, estimate)
+        if result is CONTINUE:
+            return state
         texts += result.texts
         if result.lift_off:
             return replace(_lift_off(state, estimate), setpoint=SetpointMemory())

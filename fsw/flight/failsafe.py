@@ -920,12 +920,14 @@ _SLOW: Final = frozenset(row.condition for row in FAILSAFES if row.slow)
 
 def active(context: FailsafeContext) -> tuple[Failsafe, ...]:
     """Rows whose condition is active, in the order of the table; almost always none."""
-    return _found(context, _OTHERS if all_is_well(context) else _TESTS)
+    well = all_is_well(context.state, context.estimate, context.config)
+    return _found(context, _OTHERS if well else _TESTS)
 
 
 def quickly_active(context: FailsafeContext) -> tuple[Failsafe, ...]:
     """The same between two planning periods: the slow rows are as they were found last."""
-    found = _found(context, _QUICK_OTHERS if all_is_well(context) else _QUICK)
+    well = all_is_well(context.state, context.estimate, context.config)
+    found = _found(context, _QUICK_OTHERS if well else _QUICK)
     before = context.state.vehicle.conditions
     if before and not _SLOW.isdisjoint(before):
         known = {row.condition for row in found} | _SLOW.intersection(before)
@@ -933,15 +935,21 @@ def quickly_active(context: FailsafeContext) -> tuple[Failsafe, ...]:
     return found
 
 
-def all_is_well(context: FailsafeContext) -> bool:
+def surely_none(state: FlightState, estimate: StateEstimate, config: FlightConfig) -> bool:
+    """Whether none can be active between two planning periods, known without asking any row."""
+    return (
+        not state.vehicle.conditions and not _QUICK_OTHERS and all_is_well(state, estimate, config)
+    )
+
+
+def all_is_well(state: FlightState, estimate: StateEstimate, config: FlightConfig) -> bool:
     """Whether no condition of ``_RULED_OUT`` can be active, as in nearly every tick.
 
     False says nothing: the rows decide. Tests hold it against each of them.
     """
-    state, config = context.state, context.config
     vehicle, limits, aiding = state.vehicle, config.limits, state.aiding
     safety, plan = state.safety, state.plan
-    plan_age_us = context.estimate.t_us - plan.since_us
+    plan_age_us = estimate.t_us - plan.since_us
     return (
         aiding.unaided_us < limits.aiding_loss_us
         and aiding.sensor is None

@@ -99,7 +99,8 @@ def _each(value: Callable[[int], float]) -> Vec3:
 def planned_input(plan: Plan, now_us: int) -> PlanInput | None:
     """A plan's input at its age; None where it is not young enough."""
     step = (now_us - plan.t_us) // plan.period_us
-    return plan.inputs[step] if 0 <= step < min(PLAN_STALE_PERIODS, len(plan.inputs)) else None
+    young = 0 <= step < PLAN_STALE_PERIODS and step < len(plan.inputs)
+    return plan.inputs[step] if young else None
 
 
 def plan_input(plan: Plan | None, nominal: PredictionState, now_us: int, brake: Brake) -> PlanInput:

@@ -25,7 +25,7 @@ from fsw.control.cascade import Cascade, CascadeMemory, close_loops
 from fsw.control.joints import JointMemory
 from fsw.control.tracking import Observed
 from fsw.estimation.frame_trust import WINDOW_FRAMES, FrameTrust, Window, is_calm, looked_at
-from fsw.flight.failsafe import PLAN_STALE_PERIODS, SLOW_US, FailsafeContext, all_is_well
+from fsw.flight.failsafe import PLAN_STALE_PERIODS, SLOW_US, all_is_well
 from fsw.flight.plan_exchange import planned_input
 from fsw.flight.safety_watch import off_plan_bound
 from fsw.flight.state import AIDED, FlightState
@@ -443,7 +443,7 @@ def _is_quiet(state: FlightState, config: FlightConfig) -> bool:
         and bool(state.mission.stream)
         and plan.running is not None
         and state.t_us >= plan.since_us
-        and all_is_well(FailsafeContext(state, estimate, config))
+        and all_is_well(state, estimate, config)
     )
 
 

@@ -28,12 +28,13 @@ from fsw.estimation.turned_covariance import Vec6
 from fsw.flight.estimator_report import AIDS_PLACE, estimator_report, unaided, unknown_report
 from fsw.flight.jump import on_return, told
 from fsw.flight.state import Aiding, FlightState
-from fsw.frozen import replace
+from fsw.frozen import made, replace
 from fsw.measurements import ImuSample, JointSample, Sample
 from fsw.signals import EstimatorReport, Severity, StateEstimate, StatusText, TickInputs, Vec2, Vec3
 
 _CHECKED_US = 100_000  # between checks for silent sensors
-_EVERY_TICK = (Sensor.IMU, Sensor.ENCODERS)
+_IMU = Sensor.IMU
+_EVERY_TICK = (_IMU, Sensor.ENCODERS)
 _IMU_SILENT = 0.008  # s; longer than the filter takes for jitter
 # rad/s^2 of each joint that torques should have made of it and did not. In flight 15 and 35 at
 # most while readings repeat; 50 and 70 within 10 ms of stuck encoders.
@@ -98,7 +99,7 @@ class SensedState:
         came, model = 0.0, UNKNOWN
         if 0.0 <= before.imu_came < now - _IMU_SILENT:
             came, samples = _without_late_imu(before, now, samples)
-        if came or now - before.of(Sensor.IMU).fault_at < _LATELY:
+        if came or now - before.fault_at(_IMU) < _LATELY:
             model = self._model(state)
         memory, estimate = self._fusion.take_in(
             started, samples, now, pushed, watch, model, silent=came > 0.0
@@ -278,7 +279,7 @@ def _watched(
     """
     asked = state.cascade.joints.reference
     if angles != watch.angles or not state.vehicle.flies:
-        return EncoderWatch(angles, asked)
+        return made(EncoderWatch, (angles, asked, 0, False))
     stuck = watch.stuck
     watch = watch._replace(repeats=watch.repeats + 1)
     if watch.repeating and not stuck:

@@ -10,7 +10,8 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from fsw.compiled import compilable, compiled, machine_code, packed
+from fsw.compiled import compilable, kernel, machine_code, packed
+from fsw.frozen import made
 from fsw.model.airframe import Airframe
 from fsw.model.prediction import A, P, S, discretise
 from fsw.signals import PlanInput, PredictionState, Vec3
@@ -57,11 +58,11 @@ class NominalModel:
 
     def step(self, x: PredictionState, u: PlanInput) -> PredictionState:
         """The state one tick later."""
-        return PredictionState(*self._advance(self.packed, x, u, 1))
+        return made(PredictionState, self._advance(self.packed, x, u, 1))
 
     def advance(self, x: PredictionState, u: PlanInput, ticks: int) -> PredictionState:
         """The state some ticks later under one input."""
-        return PredictionState(*self._advance(self.packed, x, u, ticks))
+        return made(PredictionState, self._advance(self.packed, x, u, ticks))
 
 
 @compilable
@@ -88,7 +89,7 @@ def advance(model: TickModel, x: PredictionState, u: PlanInput, ticks: int) -> P
     return x
 
 
-@compiled
+@kernel
 def _advance(model: NDArray[Any], x: PredictionState, u: PlanInput, ticks: int) -> tuple[Any, ...]:
     """``advance`` that returns a plain tuple, which leaves machine code at half the cost."""
     x = advance(model[0], x, u, ticks)
