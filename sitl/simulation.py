@@ -17,8 +17,8 @@ from sitl.drives import Drives
 from sitl.earth import DEFAULT_ORIGIN, Place
 from sitl.faults.active import Faults
 from sitl.faults.keys import Fault
-from sitl.flight_evaluator import NO_AIM, FlightEvaluator, critical
-from sitl.judged_step import ALL_JUDGED, LIMITS_JUDGED, NOT_JUDGED, judged_step
+from sitl.flight_evaluator import FlightEvaluator, Flown, critical
+from sitl.judged_step import watched_step
 from sitl.mission_clock import MissionClock
 from sitl.plant.aerial_manipulator import Plant, plant
 from sitl.plant.battery import open_circuit
@@ -141,8 +141,8 @@ class Simulation:
         self._evaluator = FlightEvaluator(scenario, self.clock, self._places_now())
         self._held = held(len(self.vehicle.links))
         # No steps: only what the accelerometer feels at the start.
-        example = self._arguments(self._places[:0], self._states[:0], None)
-        self._step = machine_code(judged_step, *example)
+        example = self._arguments(self._places[:0], self._states[:0])
+        self._step = machine_code(watched_step, *example)
         _, self._felt, _ = self._step(*example)
 
     @property
@@ -169,6 +169,7 @@ class Simulation:
     @property
     def min_margin_m(self) -> float | None:
         """Smallest margin so far [m], None without constraints."""
+        self._evaluator.catch_up()
         record = self._evaluator.record
         worst = record.worst()
         return None if worst is None else record.minimum[worst]
@@ -290,11 +291,13 @@ class Simulation:
         return refusal
 
     def advance(self, controls: Controls) -> None:
-        """Integrate one step with ``controls`` held, judging every plant step.
+        """Integrate one step with ``controls`` held; every plant step is judged.
 
         Raises:
             ValueError: A control is not finite or their number is wrong.
         """
+        evaluator, before_s = self._evaluator, self.time_s
+        evaluator.catch_up()
         self._command(controls)
         fails = self.faults.at(self.step)
         if self._drives is not None:
@@ -306,25 +309,23 @@ class Simulation:
             moving[0], moving[1], moving[2] = field.step()
         if self.step >= self._pushed_until:
             self._push()
-        evaluator, before_s = self._evaluator, self.time_s
-        aim = evaluator.aim(before_s + SUBSTEPS * STEP_S)
-        arguments = self._arguments(self._places, self._states, aim)
-        speed, self._felt, clear = self._step(*arguments)
+        places, states = self._places, self._states
+        speed, self._felt, clear = self._step(*self._arguments(places, states))
         self.step += 1
-        if not clear:
-            evaluator.judge_each(self._places, before_s, STEP_S)
+        evaluator.judge_flown(Flown(places, states, self._sent, before_s, STEP_S), clear)
         time_s = self.time_s
         if self.step % SAMPLE_STEPS == 0:
             evaluator.sample_error(critical(self._places[-1]), time_s)
         evaluator.judge_landing(speed, time_s)
         evaluator.judge_time(time_s)
 
-    def compare(self) -> None:
+    def catch_up(self) -> None:
         """Do what :meth:`advance` has left for a time in which nobody waits; else it is done later.
 
-        That is to compare a sample of the end-effector's place with the reference.
+        That is to judge a step in which there can have been no incident, and to compare a sample of
+        the end-effector's place with the reference.
         """
-        self._evaluator.compare()
+        self._evaluator.catch_up()
 
     def truth(self) -> Truth:
         """The true state now."""
@@ -410,12 +411,8 @@ class Simulation:
             if any(newly):
                 seize(self.vehicle, self._state, newly)
 
-    def _arguments(
-        self, places: Array, states: Array, aim: tuple[Array, float] | None
-    ) -> tuple[Any, ...]:
-        """Those of ``judged_step`` for this step."""
-        evaluator = self._evaluator
-        judged = ALL_JUDGED if aim is not None else LIMITS_JUDGED
+    def _arguments(self, places: Array, states: Array) -> tuple[Any, ...]:
+        """Those of ``watched_step`` for this step."""
         return (
             self._plants,
             self._held,
@@ -423,13 +420,10 @@ class Simulation:
             self._thrust,
             self._torque,
             *self._pushed,
+            STEP_S,
             places,
             states,
-            evaluator.quick,
-            self._sent,
-            aim or NO_AIM,
-            (self.time_s, STEP_S),
-            judged if evaluator.ended is None else NOT_JUDGED,
+            self._evaluator.free,
         )
 
     def _push(self) -> None:

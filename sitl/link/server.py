@@ -80,7 +80,7 @@ def serve(
         """What need not wait for the answer, while the vehicle thinks."""
         nonlocal spoken
         truth(simulation)
-        simulation.compare()
+        simulation.catch_up()
         spoken = pilot.speak(plan, state, simulation.t_us + STEP_US)
 
     while simulation.ended is None:
