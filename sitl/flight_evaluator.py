@@ -11,9 +11,9 @@ import numpy as np
 from sitl.body import BASE, END_EFFECTOR, JOINT2
 from sitl.compiled import machine_code
 from sitl.judged_step import Free, Judge, judge_steps
-from sitl.limits import LimitRecord
+from sitl.limits import LimitRecord, largest
 from sitl.mission_clock import MissionClock
-from sitl.plant.vector import Array
+from sitl.plant.vector import V4, Array
 from sitl.result import EndKind, EndReason, MarginRecord, TrackingError, TruthResult, score
 from sitl.scenario import V3, Scenario
 from sitl.scenario_validation import check_start
@@ -31,7 +31,9 @@ class Flown(NamedTuple):
 
     places: Array  # (steps, rows, 3) m, NED
     states: Array  # (steps, 17 + 2j) SI
-    sent: tuple[float, float]  # largest magnitudes commanded, torque [N·m] and thrust [N]
+    thrust: V4  # commanded, before any saturation, of the most of a rotor [1]
+    torque: tuple[float, ...]  # of the most of a joint [1]
+    most: tuple[float, float]  # N, N·m
     before_s: float  # time before the first
     step_s: float  # between two
 
@@ -121,9 +123,9 @@ class FlightEvaluator:
     def _judge_flown(self) -> None:
         if self._flown is None:
             return
-        (places, states, sent, before_s, step_s), self._flown = self._flown, None
+        (places, states, thrust, torque, most, before_s, step_s), self._flown = self._flown, None
         aim = self.aim(before_s + len(places) * step_s)
-        how = (sent, aim or NO_AIM, (before_s, step_s), aim is not None)
+        how = (largest(thrust, torque, most), aim or NO_AIM, (before_s, step_s), aim is not None)
         free = self._judge_steps(self.quick, places, states, *how)
         self.free = (*self._nowhere[:2], free) if self._still else self._nowhere
         if not free >= 0.0:
