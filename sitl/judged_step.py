@@ -47,6 +47,19 @@ def watched_step(
 ) -> tuple[float, V3, bool]:
     """``step`` of the plant, and whether judging it can wait, because it can have no incident.
 
+    Args:
+        plants: One.
+        blocks: One.
+        state: (17 + 2j,) [SI], overwritten.
+        thrust: Commanded [N], rotors 1 to 4.
+        torque: (j,) commanded [N·m].
+        force_W: Force on the base [N, NED].
+        torque_B: Torque on the base [N·m, B].
+        step_s: Of a plant step [s].
+        places: (steps, rows, 3) [m, NED], overwritten, an entry a plant step.
+        states: (steps, 17 + 2j) [SI], overwritten.
+        free: In which there can be no incident.
+
     Returns:
         Fastest downward speed of a foot on the ground [m/s]; specific force at the base's origin in
         the last state [m/s², B]; whether all have travelled less than is ``free``.

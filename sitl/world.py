@@ -258,7 +258,10 @@ def _is_clear(
 
 @kernel
 def travelled(before: Array, places: Array, reach: float) -> float:
-    """As ``travel``; ``before`` becomes ``places``."""
+    """As ``travel``, from ``before`` (rows, 3) to ``places`` (rows, 3) [m, NED], kept there.
+
+    No part is farther from the base's origin than ``reach`` [m].
+    """
     path = travel(before, places, reach)
     for r in range(places.shape[0]):
         put_row(before, r, row(places, r))
@@ -269,8 +272,8 @@ def travelled(before: Array, places: Array, reach: float) -> float:
 def travel(before: Array, places: Array, reach: float) -> float:
     """No place of any part has moved farther [m] from ``before`` to ``places``.
 
-    Both are (rows, 3) [m, NED], the base's axes [1, NED] below. No part is farther from the base's
-    origin than ``reach`` [m].
+    ``before`` and ``places`` are (rows, 3) [m, NED], the base's axes [1, NED] below. No part is
+    farther from the base's origin than ``reach`` [m].
     """
     most, turn = 0.0, 0.0
     for r in range(places.shape[0]):

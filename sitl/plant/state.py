@@ -18,7 +18,7 @@ ARM: Final = 17  # j angles [rad], then j rates [rad/s]
 
 
 def taken_apart(state: Array) -> tuple[V3, V3, V4, V3, V4, tuple[float, ...]]:
-    """Place, velocity, attitude, rate, thrusts and the arm of a state (17 + 2j,), in its units."""
+    """Place, velocity, attitude, rate, thrusts and arm of a ``state`` (17 + 2j,) [SI]."""
     # As a list at once: a view into the vector costs as much as all of this.
     px, py, pz, vx, vy, vz, qw, qx, qy, qz, wx, wy, wz, f1, f2, f3, f4, *arm = state.tolist()
     q, thrust = (qw, qx, qy, qz), (f1, f2, f3, f4)
