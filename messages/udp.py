@@ -129,7 +129,7 @@ class PeerSocket:
 
     def send(self, datagram: bytes) -> None:
         """Send one datagram; UDP promises nothing, so neither does this."""
-        try:  # at half the price of a context
+        try:  # a context would cost more than this
             self._socket.send(datagram)
         except OSError:
             return
