@@ -24,7 +24,7 @@ class _Part(NamedTuple):
 
     id_bytes: bytes
     crc_extra: bytes
-    first: Struct  # the fields that are read
+    first: Struct  # what is read of it: start, length, flags and message id, and the first fields
 
 
 class LockstepReader:
@@ -39,18 +39,18 @@ class LockstepReader:
         values = []
         at, size = 0, len(datagram)
         for id_bytes, crc_extra, first in self._parts:
-            payload_at = at + _HEADER_SIZE
-            if size < payload_at or datagram[at] != 0xFD or datagram[at + 2]:
+            if size < at + first.size:
                 return None
-            end = payload_at + datagram[at + 1]
-            if size < end + _CHECKSUM_SIZE or end - payload_at < first.size:
+            found = first.unpack_from(datagram, at)
+            end = at + _HEADER_SIZE + found[1]
+            if found[0] != 0xFD or found[2] or found[3] != id_bytes or end < at + first.size:
                 return None
-            if datagram[at + 7 : payload_at] != id_bytes:
+            if size < end + _CHECKSUM_SIZE:
                 return None
             expected = datagram[end] | datagram[end + 1] << 8
             if checksum(datagram[at + 1 : end] + crc_extra) != expected:
                 return None
-            values.append(first.unpack_from(datagram, payload_at))
+            values.append(found[4:])
             at = end + _CHECKSUM_SIZE
         return values if at == size else None
 
@@ -87,7 +87,7 @@ class LockstepFrame:
 
 def _part(message_id: int, count: int) -> _Part:
     layout = LAYOUTS[message_id]
-    first = Struct("<" + "".join(_fields(layout.payload)[:count]))
+    first = Struct("<BBB4x3s" + "".join(_fields(layout.payload)[:count]))
     return _Part(layout.id_bytes, layout.crc_extra, first)
 
 

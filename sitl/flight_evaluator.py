@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from sitl.body import BASE, END_EFFECTOR, JOINT2
-from sitl.judged_step import Judge
-from sitl.limits import LimitRecord
+from sitl.compiled import machine_code
+from sitl.judged_step import Free, Judge, judge_steps
+from sitl.limits import LimitRecord, largest
 from sitl.mission_clock import MissionClock
-from sitl.plant.vector import Array
+from sitl.plant.vector import V4, Array
 from sitl.result import EndKind, EndReason, MarginRecord, TrackingError, TruthResult, score
 from sitl.scenario import V3, Scenario
 from sitl.scenario_validation import check_start
@@ -21,7 +23,19 @@ from sitl.world import World, headroom
 TOUCH_DOWN_MAX = 2.0  # m/s; a drop from 0.2 m
 Points = tuple[V3, V3, V3]  # base, joint 2, end-effector [m, NED]
 
-NO_AIM = (np.empty(0), 0.0)
+NO_AIM: Final = (np.empty(0), 0.0)
+
+
+class Flown(NamedTuple):
+    """Plant steps that have been flown and wait to be judged."""
+
+    places: Array  # (steps, rows, 3) m, NED
+    states: Array  # (steps, 17 + 2j) SI
+    thrust: V4  # commanded, before any saturation, of the most of a rotor [1]
+    torque: tuple[float, ...]  # of the most of a joint [1]
+    most: tuple[float, float]  # N, N·m
+    before_s: float  # time before the first
+    step_s: float  # between two
 
 
 class FlightEvaluator:
@@ -51,6 +65,12 @@ class FlightEvaluator:
         table, parts = self.world.table, self.world.parts
         room = headroom(table, len(self.world.keys), len(places))
         self.quick = Judge(table, parts, *self.record.arrays, room, *self.limits.arrays)
+        self._still = not any(zone.moves or zone.kind.follows_target for zone in self.world.zones)
+        self._nowhere: Free = (room.places, parts.reach, -math.inf)
+        self.free = self._nowhere  # in which there can be no incident
+        self._flown: Flown | None = None
+        none = (np.empty((0, *places.shape)), np.empty((0, 0)), (0.0, 0.0), NO_AIM, (0.0, 0.0))
+        self._judge_steps = machine_code(judge_steps, self.quick, *none, False)
         margins = self.margins(places, 0.0)
         check_start(self.world.keys, margins)
         self.record.add(margins, 0.0)
@@ -83,14 +103,33 @@ class FlightEvaluator:
 
     def aim(self, until_s: float) -> tuple[Array, float] | None:
         """What ``record_if_clear`` aims at up to ``until_s``; None if it cannot judge till then."""
-        if self.ended is not None:
-            return None
         if not self.world.follows:
             return NO_AIM
         clock = self._clock
         if clock.starts_s is None or not clock.counts(until_s):
             return None
         return clock.curve, clock.starts_s
+
+    def judge_flown(self, flown: Flown, clear: bool) -> None:
+        """Judge plant steps; where all have kept ``clear`` of any incident, that can wait.
+
+        ``catch_up`` does it then, before ``flown`` is overwritten.
+        """
+        if self.ended is None:
+            self._flown = flown
+            if not clear:
+                self._judge_flown()
+
+    def _judge_flown(self) -> None:
+        if self._flown is None:
+            return
+        (places, states, thrust, torque, most, before_s, step_s), self._flown = self._flown, None
+        aim = self.aim(before_s + len(places) * step_s)
+        how = (largest(thrust, torque, most), aim or NO_AIM, (before_s, step_s), aim is not None)
+        free = self._judge_steps(self.quick, places, states, *how)
+        self.free = (*self._nowhere[:2], free) if self._still else self._nowhere
+        if not free >= 0.0:
+            self.judge_each(places, before_s, step_s)
 
     def judge_each(self, places: Array, before_s: float, step_s: float) -> None:
         """Judge the plant steps, ``step_s`` long, of an exchange that began at ``before_s``.
@@ -117,13 +156,18 @@ class FlightEvaluator:
     def sample_error(self, points: Points, time_s: float) -> None:
         """Take one sample of the tracking error, if the trajectory is on.
 
-        It is compared with the reference later, by ``compare``: the vehicle need not wait for that.
+        It is compared with the reference by ``catch_up``: the vehicle need not wait for that.
         """
-        self.compare()
+        self._compare()
         if self._clock.counts(time_s):
             self._sample = points[2], time_s
 
-    def compare(self) -> None:
+    def catch_up(self) -> None:
+        """Do what has been left for later: the last steps' judgement, and a sample's comparison."""
+        self._judge_flown()
+        self._compare()
+
+    def _compare(self) -> None:
         """Compare the last sample with the reference, if that has not been done yet."""
         if self._sample is not None:
             (place, time_s), self._sample = self._sample, None
@@ -131,7 +175,7 @@ class FlightEvaluator:
 
     def result(self, time_s: float) -> TruthResult:
         """The score up to ``time_s``."""
-        self.compare()
+        self.catch_up()
         flaws = tuple(flaw for flaw in (self.left, self.silent) if flaw is not None)
         flaws += self.limits.flaws()
         truth = score(self.ended, time_s, self._error, self.record, self._whole, flaws)

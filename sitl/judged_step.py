@@ -1,9 +1,10 @@
-"""One exchange with the flight software: plant steps, and what they mean, in one compiled call."""
+"""One exchange with the flight software: plant steps, and what they mean, in a call each."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from typing import Final, NamedTuple
+from typing import NamedTuple, TypeAlias
 
 from sitl.body import Parts
 from sitl.compiled import compiled
@@ -11,11 +12,11 @@ from sitl.limits import Use, record_use
 from sitl.plant.aerial_manipulator import Plant
 from sitl.plant.integrator import Held, step
 from sitl.plant.vector import V3, V4, Array
-from sitl.world import Headroom, ZoneTable, record_if_clear
+from sitl.world import Headroom, ZoneTable, record_if_clear, travel
 
-NOT_JUDGED: Final = 0  # the run is over
-LIMITS_JUDGED: Final = 1  # the vehicle's limits alone
-ALL_JUDGED: Final = 2  # margins as well
+Free: TypeAlias = tuple[Array, float, float]
+"""Where the vehicle was, as ``travel`` has it, its reach [m], and how far all may travel from there
+until there can be an incident [m]."""
 
 
 class Judge(NamedTuple):
@@ -31,7 +32,7 @@ class Judge(NamedTuple):
 
 
 @compiled
-def judged_step(
+def watched_step(
     plants: Sequence[Plant],
     blocks: Sequence[Held],
     state: Array,
@@ -39,15 +40,12 @@ def judged_step(
     torque: tuple[float, ...],
     force_W: V3,
     torque_B: V3,
+    step_s: float,
     places: Array,
     states: Array,
-    judge: Judge,
-    sent: tuple[float, float],
-    aim: tuple[Array, float],
-    instants: tuple[float, float],
-    what: int,
+    free: Free,
 ) -> tuple[float, V3, bool]:
-    """``step`` of the plant, and ``record_use`` and ``record_if_clear`` of where it went.
+    """``step`` of the plant, and whether judging it can wait, because it can have no incident.
 
     Args:
         plants: One.
@@ -57,23 +55,52 @@ def judged_step(
         torque: (j,) commanded [N·m].
         force_W: Force on the base [N, NED].
         torque_B: Torque on the base [N·m, B].
+        step_s: Of a plant step [s].
         places: (steps, rows, 3) [m, NED], overwritten, an entry a plant step.
         states: (steps, 17 + 2j) [SI], overwritten.
-        judge: By which, and where it is recorded.
-        sent: Largest magnitudes commanded, torque [N·m] and thrust [N].
-        aim: As of ``record_if_clear``.
-        instants: Time before the first plant step, and between two [s].
-        what: What is judged, ``NOT_JUDGED`` and so on.
+        free: In which there can be no incident.
 
     Returns:
         Fastest downward speed of a foot on the ground [m/s]; specific force at the base's origin in
-        the last state [m/s², B]; whether the margins were judged and there was no incident.
+        the last state [m/s², B]; whether all have travelled less than is ``free``.
     """
-    motion = (thrust, torque, force_W, torque_B, instants[1])
+    motion = (thrust, torque, force_W, torque_B, step_s)
     speed, felt = step(plants, blocks, state, *motion, places, states)
-    if what >= LIMITS_JUDGED:
-        record_use(states, sent, judge.most, instants, judge.use)
-    clear = what == ALL_JUDGED and record_if_clear(
-        judge.table, judge.parts, aim, places, instants, judge.lowest, judge.when_s, judge.room
-    )
+    before, reach, most = free
+    clear = True
+    for k in range(places.shape[0]):
+        # Written so that what is not a number is judged.
+        if not travel(before, places[k], reach) < most:
+            clear = False
     return speed, felt, clear
+
+
+@compiled
+def judge_steps(
+    judge: Judge,
+    places: Array,
+    states: Array,
+    sent: tuple[float, float],
+    aim: tuple[Array, float],
+    instants: tuple[float, float],
+    margins: bool,
+) -> float:
+    """``record_use`` and ``record_if_clear`` of what ``watched_step`` has written.
+
+    Args:
+        judge: By which, and where it is recorded.
+        places: (steps, rows, 3) [m, NED], an entry a plant step.
+        states: (steps, 17 + 2j) [SI].
+        sent: Largest magnitudes commanded, torque [N·m] and thrust [N].
+        aim: As of ``record_if_clear``.
+        instants: Time before the first plant step, and between two [s].
+        margins: Whether they are judged, or the vehicle's limits alone.
+
+    Returns:
+        As of ``record_if_clear``; minus infinity if margins were not judged.
+    """
+    record_use(states, sent, judge.most, instants, judge.use)
+    if not margins:
+        return -math.inf
+    room = (judge.lowest, judge.when_s, judge.room)
+    return record_if_clear(judge.table, judge.parts, aim, places, instants, *room)

@@ -17,7 +17,7 @@ import numpy as np
 from sitl.compiled import compiled
 from sitl.plant.parameters import Vehicle
 from sitl.plant.state import ARM, Q_WB, W_WB_B
-from sitl.plant.vector import Array
+from sitl.plant.vector import V4, Array
 
 FIRST_JOINT_DEG, BOTH_JOINTS_DEG = 60.0, 90.0  # Table I, either way
 # The servos': 2.5 N·m stall and 5.8 rad/s without load leave 5 rad/s against the arm's weight.
@@ -64,6 +64,19 @@ def limits(vehicle: Vehicle) -> tuple[Limit, ...]:
         Limit("joint_torque", "N m", vehicle.joints.torque_max, 1e-6 * vehicle.joints.torque_max),
         Limit("rotor_thrust", "N", vehicle.rotors.thrust_max, 1e-6 * vehicle.rotors.thrust_max),
     )
+
+
+def largest(
+    thrust: V4, torque: tuple[float, ...], most: tuple[float, float]
+) -> tuple[float, float]:
+    """Largest magnitudes commanded, torque [N·m] and thrust [N].
+
+    ``thrust`` and ``torque`` are shares [1] of the ``most`` of a rotor [N] and a joint [N·m].
+    """
+    weakest, strongest = min(thrust), max(thrust)
+    # A thrust below zero is as far beyond its range as one that is as much too large.
+    beyond = strongest if weakest >= 0.0 else max(strongest, 1.0 - weakest)
+    return most[1] * max(max(torque), -min(torque)), most[0] * beyond
 
 
 class Use(NamedTuple):

@@ -17,8 +17,8 @@ from sitl.drives import Drives
 from sitl.earth import DEFAULT_ORIGIN, Place
 from sitl.faults.active import Faults
 from sitl.faults.keys import Fault
-from sitl.flight_evaluator import NO_AIM, FlightEvaluator, critical
-from sitl.judged_step import ALL_JUDGED, LIMITS_JUDGED, NOT_JUDGED, judged_step
+from sitl.flight_evaluator import FlightEvaluator, Flown, critical
+from sitl.judged_step import watched_step
 from sitl.mission_clock import MissionClock
 from sitl.plant.aerial_manipulator import Plant, plant
 from sitl.plant.battery import open_circuit
@@ -26,7 +26,7 @@ from sitl.plant.integrator import STEP_S, held
 from sitl.plant.kinematics import places as places_into
 from sitl.plant.lock import seize
 from sitl.plant.parameters import Vehicle
-from sitl.plant.state import ARM, P_WB, Q_WB, THRUST, V_WB, W_WB_B
+from sitl.plant.state import ARM, THRUST, taken_apart
 from sitl.plant.vector import Array
 from sitl.result import EndKind, EndReason, TruthResult
 from sitl.scenario import V3, Scenario, Sensors
@@ -47,6 +47,7 @@ SETTLED_NEWEST = 2  # of each sensor, however long ago they came
 SUBSTEPS = 2  # plant steps per exchange
 BATTERY_STEPS = 50  # between two readings of the battery
 _NONE: V3 = (0.0, 0.0, 0.0)
+_OFF = (0.0, 0.0)  # N, N·m
 SAMPLE_STEPS = 50  # tracking error at 10 Hz, as the paper's TE
 
 
@@ -102,6 +103,8 @@ class Simulation:
         self._plant = plant(self.vehicle)
         self._plants = cast(Sequence[Plant], np.array([self._plant]))  # cheaper to hand over
         self._mass = self.vehicle.mass
+        self._joints = len(self.vehicle.links)
+        self._full = (self.vehicle.rotors.thrust_max, self.vehicle.joints.torque_max)  # N, N·m
         self._exact_sensors, self._suite = _sensors(scenario, self.vehicle, seed, origin)
         self._pushes = [push(item, seed, 1e-6 * STEP_US) for item in scenario.disturbances]
         self._pushes += more
@@ -131,18 +134,18 @@ class Simulation:
             sags=self._drives is not None and self._drives.battery is not None,
         )
         self._locked = self.faults.locked
-        self._sent = (0.0, 0.0)  # largest torque and thrust commanded, before any saturation
         axes = 3 if scenario.body == "full" else 0
         self._places = np.empty((SUBSTEPS, 2 + len(self.vehicle.links) + axes, 3))
         self._states = np.empty((SUBSTEPS, len(self._state)))
-        self._reading: SensorReadings | None = None
+        self._reading: SensorReadings | None = None  # of this step, once it has been asked for
+        self._turning: V4 = (0.0, 0.0, 0.0, 0.0)  # N, of the rotors at that reading
         self._said: tuple[int, SensorReadings] | None = None
         self._measured: tuple[int, tuple[Measurement, ...]] = (-1, ())
         self._evaluator = FlightEvaluator(scenario, self.clock, self._places_now())
         self._held = held(len(self.vehicle.links))
         # No steps: only what the accelerometer feels at the start.
-        example = self._arguments(self._places[:0], self._states[:0], None)
-        self._step = machine_code(judged_step, *example)
+        example = self._arguments(self._places[:0], self._states[:0])
+        self._step = machine_code(watched_step, *example)
         _, self._felt, _ = self._step(*example)
 
     @property
@@ -169,6 +172,7 @@ class Simulation:
     @property
     def min_margin_m(self) -> float | None:
         """Smallest margin so far [m], None without constraints."""
+        self._evaluator.catch_up()
         record = self._evaluator.record
         worst = record.worst()
         return None if worst is None else record.minimum[worst]
@@ -212,8 +216,9 @@ class Simulation:
 
     def healthy(self) -> SensorReadings:
         """What :meth:`sense` would say if no sensor failed."""
-        if self._reading is None or self._reading.t_us != self.t_us:
-            self._reading = self._exact_sensors.measure(self._exact_reading())
+        if self._reading is None:
+            exact, self._turning = self._exact_reading()
+            self._reading = self._exact_sensors.measure(exact)
         return self._reading
 
     @property
@@ -240,8 +245,8 @@ class Simulation:
         if self._suite is None:
             return None
         if self._measured[0] != self.step:
-            thrust = _four(self._state[THRUST:ARM].tolist())
             exact = self.healthy()
+            thrust = self._turning
             if self._play is not None:  # encoders are on the motors' side
                 angles = np.array(exact.q_arm) + self._play
                 exact = exact._replace(q_arm=tuple(angles.tolist()))
@@ -290,11 +295,13 @@ class Simulation:
         return refusal
 
     def advance(self, controls: Controls) -> None:
-        """Integrate one step with ``controls`` held, judging every plant step.
+        """Integrate one step with ``controls`` held; every plant step is judged.
 
         Raises:
             ValueError: A control is not finite or their number is wrong.
         """
+        evaluator, before_s = self._evaluator, self.time_s
+        evaluator.catch_up()
         self._command(controls)
         fails = self.faults.at(self.step)
         if self._drives is not None:
@@ -306,29 +313,33 @@ class Simulation:
             moving[0], moving[1], moving[2] = field.step()
         if self.step >= self._pushed_until:
             self._push()
-        evaluator, before_s = self._evaluator, self.time_s
-        aim = evaluator.aim(before_s + SUBSTEPS * STEP_S)
-        arguments = self._arguments(self._places, self._states, aim)
-        speed, self._felt, clear = self._step(*arguments)
+        places, states = self._places, self._states
+        speed, self._felt, clear = self._step(*self._arguments(places, states))
         self.step += 1
-        if not clear:
-            evaluator.judge_each(self._places, before_s, STEP_S)
+        self._reading = None
+        wanted, torques, armed = controls
+        most = self._full if armed else _OFF
+        flown = Flown(places, states, wanted, torques, most, before_s, STEP_S)
+        evaluator.judge_flown(flown, clear)
         time_s = self.time_s
         if self.step % SAMPLE_STEPS == 0:
             evaluator.sample_error(critical(self._places[-1]), time_s)
         evaluator.judge_landing(speed, time_s)
         evaluator.judge_time(time_s)
 
-    def compare(self) -> None:
+    def catch_up(self) -> None:
         """Do what :meth:`advance` has left for a time in which nobody waits; else it is done later.
 
-        That is to compare a sample of the end-effector's place with the reference.
+        That is to judge a step in which there can have been no incident, to compare a sample of the
+        end-effector's place with the reference, and to measure what arrives in a later step.
         """
-        self._evaluator.compare()
+        self._evaluator.catch_up()
+        if self._suite is not None:
+            self._suite.catch_up()
 
     def truth(self) -> Truth:
         """The true state now."""
-        exact = self._exact_reading()
+        exact, thrust = self._exact_reading()
         places = self._places_now()
         return Truth(
             t_us=self.t_us,
@@ -336,7 +347,7 @@ class Simulation:
             v_WB=exact.v_WB,
             q_WB=exact.q_WB,
             w_WB_B=exact.w_WB_B,
-            thrust=_four(self._state[THRUST:ARM].tolist()),
+            thrust=thrust,
             q_arm=exact.q_arm,
             qd_arm=exact.qd_arm,
             p_WE=critical(places)[2],
@@ -352,42 +363,29 @@ class Simulation:
         """The score so far, or of the whole run once ``ended`` is set."""
         return self._evaluator.result(self.time_s)
 
-    def _exact_reading(self) -> SensorReadings:
-        # Taken apart as a list: a view into the vector costs as much as all of this.
-        x: list[float] = self._state.tolist()
-        w = (x[W_WB_B], x[W_WB_B + 1], x[W_WB_B + 2])
-        rates = ARM + len(self._torque)
-        # By position: keywords would take as long again.
-        return SensorReadings(
-            self.t_us,
-            (x[P_WB], x[P_WB + 1], x[P_WB + 2]),
-            (x[V_WB], x[V_WB + 1], x[V_WB + 2]),
-            (x[Q_WB], x[Q_WB + 1], x[Q_WB + 2], x[Q_WB + 3]),
-            w,  # w_WB_B
-            w,  # gyro_B
-            self._felt,  # accel_B
-            tuple(x[ARM:rates]),
-            tuple(x[rates:]),
-            self._torque,
-        )
+    def _exact_reading(self) -> tuple[SensorReadings, V4]:
+        """The true state as readings, and the rotors' thrusts [N]."""
+        p, v, q, w, thrust, arm = taken_apart(self._state)
+        angles, rates = arm[: self._joints], arm[self._joints :]
+        # By position: keywords would take as long again. Gyro and accelerometer are w and felt.
+        felt, torque = self._felt, self._torque
+        return SensorReadings(self.t_us, p, v, q, w, w, felt, angles, rates, torque), thrust
 
     def _command(self, controls: Controls) -> None:
         wanted, torques, armed = controls
-        joints = len(self.vehicle.links)
+        joints = self._joints
         if len(wanted) != 4 or len(torques) != joints:
             raise ValueError(f"{controls} at step {self.step}: expected 4 rotors, {joints} joints")
-        if not math.isfinite(sum(wanted) + sum(torques)):
-            raise ValueError(f"{controls} at step {self.step}: every control must be finite")
-        thrust = self.vehicle.rotors.thrust_max if armed else 0.0
-        torque = self.vehicle.joints.torque_max if armed else 0.0
-        least, most = min(wanted), max(wanted)
-        twist = max(max(torques), -min(torques))
-        # A thrust below zero is as far beyond its range as one that is as much too large.
-        self._sent = (torque * twist, thrust * (most if least >= 0.0 else max(most, 1.0 - least)))
-        if least < 0.0 or most > 1.0 or twist > 1.0:
-            wanted = _four([min(max(f, 0.0), 1.0) for f in wanted])
-            torques = tuple(min(max(f, -1.0), 1.0) for f in torques)
         f1, f2, f3, f4 = wanted
+        kept = 0.0 <= f1 <= 1.0 and 0.0 <= f2 <= 1.0 and 0.0 <= f3 <= 1.0 and 0.0 <= f4 <= 1.0
+        for share in torques:
+            kept = kept and -1.0 <= share <= 1.0
+        if not kept:
+            if not math.isfinite(sum(wanted) + sum(torques)):
+                raise ValueError(f"{controls} at step {self.step}: every control must be finite")
+            f1, f2, f3, f4 = (min(max(f, 0.0), 1.0) for f in wanted)
+            torques = tuple(min(max(f, -1.0), 1.0) for f in torques)
+        thrust, torque = self._full if armed else _OFF
         self._thrust = (thrust * f1, thrust * f2, thrust * f3, thrust * f4)
         self._torque = tuple([torque * f for f in torques])
 
@@ -410,12 +408,8 @@ class Simulation:
             if any(newly):
                 seize(self.vehicle, self._state, newly)
 
-    def _arguments(
-        self, places: Array, states: Array, aim: tuple[Array, float] | None
-    ) -> tuple[Any, ...]:
-        """Those of ``judged_step`` for this step."""
-        evaluator = self._evaluator
-        judged = ALL_JUDGED if aim is not None else LIMITS_JUDGED
+    def _arguments(self, places: Array, states: Array) -> tuple[Any, ...]:
+        """Those of ``watched_step`` for this step."""
         return (
             self._plants,
             self._held,
@@ -423,13 +417,10 @@ class Simulation:
             self._thrust,
             self._torque,
             *self._pushed,
+            STEP_S,
             places,
             states,
-            evaluator.quick,
-            self._sent,
-            aim or NO_AIM,
-            (self.time_s, STEP_S),
-            judged if evaluator.ended is None else NOT_JUDGED,
+            self._evaluator.free,
         )
 
     def _push(self) -> None:

@@ -182,7 +182,7 @@ def record_if_clear(
     lowest: Array,
     when_s: Array,
     room: Headroom,
-) -> bool:
+) -> float:
     """``World.margins`` of plant steps without any incident, into the record of the smallest.
 
     A margin that can be no smaller than what is recorded is not worked out.
@@ -199,8 +199,9 @@ def record_if_clear(
         room: Of the steps so far.
 
     Returns:
-        True; or False, with nothing recorded, if any point is not clearly above ground or any part
-        not within every margin.
+        How far all may travel until there can be an incident, if no zone moves [m]; or minus
+        infinity, with nothing recorded, if any point is not clearly above ground or any part not
+        within every margin.
     """
     margins = np.full((places.shape[0], lowest.shape[0]), np.inf)
     before_s, step_s = instants
@@ -211,13 +212,17 @@ def record_if_clear(
         if curve.shape[0]:
             target = place_on_curve(curve, time_s - starts_s)
         if not _is_clear(table, parts, places[k], time_s, target, lowest, margins[k], room):
-            return False
+            return -math.inf
     for k in range(places.shape[0]):
         for i in range(lowest.shape[0]):
             if margins[k, i] < lowest[i]:
                 lowest[i] = margins[k, i]
                 when_s[i] = before_s + (k + 1) * step_s
-    return True
+    last = places[places.shape[0] - 1]
+    free = -float(max(last[BASE, 2], last[JOINT2, 2], last[END_EFFECTOR, 2]))
+    for i in range(lowest.shape[0]):
+        free = min(free, room.left[i] + _held_back(lowest[i]))
+    return max(free, 0.0)
 
 
 @kernel
@@ -253,7 +258,19 @@ def _is_clear(
 
 @kernel
 def travelled(before: Array, places: Array, reach: float) -> float:
-    """No place of any part has moved farther [m] from ``before`` to ``places``, kept there.
+    """As ``travel``, from ``before`` (rows, 3) to ``places`` (rows, 3) [m, NED], kept there.
+
+    No part is farther from the base's origin than ``reach`` [m].
+    """
+    path = travel(before, places, reach)
+    for r in range(places.shape[0]):
+        put_row(before, r, row(places, r))
+    return path
+
+
+@kernel
+def travel(before: Array, places: Array, reach: float) -> float:
+    """No place of any part has moved farther [m] from ``before`` to ``places``.
 
     ``before`` and ``places`` are (rows, 3) [m, NED], the base's axes [1, NED] below. No part is
     farther from the base's origin than ``reach`` [m].
@@ -261,7 +278,6 @@ def travelled(before: Array, places: Array, reach: float) -> float:
     most, turn = 0.0, 0.0
     for r in range(places.shape[0]):
         by = sub(row(places, r), row(before, r))
-        put_row(before, r, row(places, r))
         square = dot(by, by)
         if r >= AXES:
             turn += square
@@ -311,5 +327,10 @@ def _left(margin: float, lowest: float) -> float:
     """
     if not margin > 0.0:
         return -math.inf
-    # A record that is none yet is far away.
-    return margin - min(max(lowest, 0.0), _FAR) - _ROUNDING
+    return margin - _held_back(lowest) - _ROUNDING
+
+
+@kernel
+def _held_back(lowest: float) -> float:
+    """The margin [m] that is a record, given the ``lowest`` [m] so far."""
+    return min(max(lowest, 0.0), _FAR)

@@ -14,7 +14,6 @@ from sitl.link.pilot_messages import Ack
 from sitl.simulation import Controls
 
 _ARMED: Final = 128  # MAV_MODE_FLAG in the mode of HIL_ACTUATOR_CONTROLS
-_JOINTS_AT: Final = 6  # wire index of controls[4]
 _WHOLE: Final = range(256)  # numbers of units, kinds and instances
 _CONTROLS_ALONE: Final = LockstepReader((message_ids.HIL_ACTUATOR_CONTROLS, 19))
 
@@ -39,7 +38,8 @@ def read_reply(datagram: bytes, joints: int) -> VehicleReply | None:
     """Read an answer of a vehicle with so many joints; None without HIL_ACTUATOR_CONTROLS."""
     alone = _CONTROLS_ALONE.read(datagram)
     if alone is not None:
-        return VehicleReply(int(alone[0][0]), _controls(alone[0], joints))
+        (values,) = alone
+        return VehicleReply(int(values[0]), _controls(values, joints))
     frames = list(split(datagram))
     if not frames or frames[-1].message_id != message_ids.HIL_ACTUATOR_CONTROLS:
         return None
@@ -57,11 +57,8 @@ def read_reply(datagram: bytes, joints: int) -> VehicleReply | None:
 
 def _controls(values: tuple[float, ...], joints: int) -> Controls:
     """From the wire values of HIL_ACTUATOR_CONTROLS."""
-    return Controls(
-        cast("tuple[float, float, float, float]", values[2:6]),
-        values[_JOINTS_AT : _JOINTS_AT + joints],
-        bool(int(values[18]) & _ARMED),
-    )
+    _, _, f1, f2, f3, f4, *torques, mode = values
+    return Controls((f1, f2, f3, f4), tuple(torques[:joints]), bool(int(mode) & _ARMED))
 
 
 def acknowledgements(frames: list[Frame]) -> tuple[Ack, ...]:

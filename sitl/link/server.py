@@ -80,7 +80,7 @@ def serve(
         """What need not wait for the answer, while the vehicle thinks."""
         nonlocal spoken
         truth(simulation)
-        simulation.compare()
+        simulation.catch_up()
         spoken = pilot.speak(plan, state, simulation.t_us + STEP_US)
 
     while simulation.ended is None:
@@ -90,7 +90,7 @@ def serve(
         state, messages = spoken
         if simulation.faults.active:
             messages = _heard_of(simulation, messages, begun)
-        datagram = _datagram(simulation, encoder, messages, exchange, answered)
+        datagram = _datagram(simulation, encoder, messages, exchange, answered, stamp_us)
         try:
             answer = exchange.step(simulation.step, stamp_us, datagram, meanwhile)
             if simulation.step == 0:  # the vehicle may take its time for the first answer
@@ -149,8 +149,9 @@ def _datagram(
     messages: tuple[PilotMessage, ...],
     exchange: Exchange,
     answered: bytes,
+    stamp_us: int,
 ) -> bytes:
-    """The datagram of this step; what has no room in it is sent ahead."""
+    """The datagram of this step, stamped ``stamp_us``; what has no room in it is sent ahead."""
     heartbeat = encoder.heartbeat() if simulation.step % _HEARTBEAT_STEPS == 0 else b""
     opening = heartbeat + answered
     battery = simulation.battery()
@@ -159,8 +160,7 @@ def _datagram(
     measured = simulation.measurements()
     if measured is None:
         return opening + encoder.datagram(simulation.sense(), messages)
-    t_us = simulation.sensor_time_us
-    ahead, datagram = encoder.measured_datagrams(t_us, measured, messages, opening)
+    ahead, datagram = encoder.measured_datagrams(stamp_us, measured, messages, opening)
     for one in ahead:
         exchange.send_ahead(one)
     return datagram

@@ -12,6 +12,8 @@ from sitl.sensors.exact import V4, SensorReadings
 from sitl.sensors.keys import Timing
 from sitl.sensors.measurements import Measurement
 
+_MOST_DEVIATIONS = 8.0  # of a jitter: one draw in 1e15 is below minus that
+
 
 class Sensor(Protocol):
     """One sensor of one flight."""
@@ -54,6 +56,9 @@ class Channel:
         self._steady = not (
             keys.outlier_share or keys.dropout_share or keys.gap_ms or keys.jitter_ms
         )
+        self._prompt = self._steady and not self._latency_us  # nothing is ever under way
+        # What is measured in a step arrives in a later one.
+        self.late = self._latency_us - _MOST_DEVIATIONS * self._jitter_us >= 1.0
         self._start_us = start_us
         self._interval = -1  # of which the gap is known
         self._gap_begins_us = math.inf
@@ -65,43 +70,53 @@ class Channel:
 
         The rotors give ``thrust`` [N].
         """
-        t_us, under_way = exact.t_us, self._under_way
-        if t_us >= self._due_us:
-            self._due_us += self._period_us
-            if t_us >= self._due_us:  # faster than the steps
-                missed = math.floor((t_us - self._due_us) / self._period_us)
-                self._due_us += (missed + 1.0) * self._period_us
-            if self._steady:
-                said = self._sensor.measure(exact, thrust, t_us + self._stamp_error_us, False)
+        if self._prompt:
+            if exact.t_us >= self._due_us:
+                said = self._sensed(exact, thrust, outlier=False)
                 if said is not None:
-                    if not self._latency_us and not under_way:
-                        out.append(said)
-                        self.next_us = self._due_us
-                        return
-                    under_way.append((t_us + self._latency_us, said))
-            else:
-                self._measure(exact, thrust)
+                    out.append(said)
+                self.next_us = self._due_us
+        else:
+            self.measure(exact, thrust)
+            self.arrive(exact.t_us, out)
+
+    def arrive(self, t_us: int, out: list[Measurement]) -> None:
+        """Append what arrives in the step of ``t_us``, the oldest first."""
+        under_way = self._under_way
         while under_way and under_way[0][0] <= t_us:
             out.append(under_way.popleft()[1])
         self.next_us = min(under_way[0][0], self._due_us) if under_way else self._due_us
 
-    def _measure(self, exact: SensorReadings, thrust: V4) -> None:
-        """Measure and send, unless the message is lost."""
+    def measure(self, exact: SensorReadings, thrust: V4) -> None:
+        """Measure if it is time, and send; the rotors give ``thrust`` [N]."""
         t_us = exact.t_us
+        if t_us < self._due_us:
+            return
         outlier = self._outlier_share > 0.0 and self._random.random() < self._outlier_share
-        said = self._sensor.measure(exact, thrust, t_us + self._stamp_error_us, outlier)
-        if said is None:
-            return
+        said = self._sensed(exact, thrust, outlier)
+        if said is not None and (self._steady or not self._lost(t_us)):
+            arrives_us = t_us + self._latency_us
+            if self._jitter_us > 0.0:
+                arrives_us += self._jitter_us * float(self._random.standard_normal())
+                arrives_us = max(arrives_us, t_us, self._newest_us)
+            self._newest_us = arrives_us
+            self._under_way.append((arrives_us, said))
+        self.next_us = min(self._under_way[0][0], self._due_us) if self._under_way else self._due_us
+
+    def _sensed(self, exact: SensorReadings, thrust: V4, outlier: bool) -> Measurement | None:
+        """What the sensor says at a tick of its clock, of which the next one is then due."""
+        t_us = exact.t_us
+        self._due_us += self._period_us
+        if t_us >= self._due_us:  # faster than the steps
+            missed = math.floor((t_us - self._due_us) / self._period_us)
+            self._due_us += (missed + 1.0) * self._period_us
+        return self._sensor.measure(exact, thrust, t_us + self._stamp_error_us, outlier)
+
+    def _lost(self, t_us: int) -> bool:
+        """Whether the message of ``t_us`` does not arrive."""
         if self._dropout_share > 0.0 and self._random.random() < self._dropout_share:
-            return
-        if self._gap_us > 0.0 and self._silent(t_us):
-            return
-        arrives_us = t_us + self._latency_us
-        if self._jitter_us > 0.0:
-            arrives_us += self._jitter_us * float(self._random.standard_normal())
-            arrives_us = max(arrives_us, t_us, self._newest_us)
-        self._newest_us = arrives_us
-        self._under_way.append((arrives_us, said))
+            return True
+        return self._gap_us > 0.0 and self._silent(t_us)
 
     def _silent(self, t_us: int) -> bool:
         """Whether ``t_us`` is in a gap; each interval has one, at a place of its own."""

@@ -69,14 +69,28 @@ class SensorSuite:
         encoders = EncoderSensor(one.encoders, stream(seed, "sensor", name), joints)
         add(name, one.encoders, encoders)
         add("imu", one.imu, ImuSensor(one.imu, stream(seed, "sensor", "imu"), hover_thrust))
+        self._late = [channel for channel in self._channels if channel.late]
+        self._last: tuple[SensorReadings, V4] | None = None  # which they have not measured yet
 
     def step(self, exact: SensorReadings, thrust: V4) -> list[Measurement]:
         """What arrives in the step of the exact readings; to be called once a step.
 
         The rotors give ``thrust`` [N].
         """
-        arrived: list[Measurement] = []
+        self.catch_up()
+        self._last = exact, thrust
+        t_us, arrived = exact.t_us, list[Measurement]()
         for channel in self._channels:
-            if exact.t_us >= channel.next_us:
-                channel.step(exact, thrust, arrived)
+            if t_us >= channel.next_us:
+                if channel.late:
+                    channel.arrive(t_us, arrived)
+                else:
+                    channel.step(exact, thrust, arrived)
         return arrived
+
+    def catch_up(self) -> None:
+        """Measure what can only arrive later; the next step does so where nobody has."""
+        if self._last is not None:
+            for channel in self._late:
+                channel.measure(*self._last)
+            self._last = None

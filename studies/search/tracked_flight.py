@@ -217,7 +217,8 @@ def _judge(
     room: Headroom,
 ) -> None:
     """Take the margins of a tick into the lowest, as the simulator's judge does."""
-    if record_if_clear(table, parts, aim, places, (before_s, STEP_S), lowest, when_s, room):
+    instants = (before_s, STEP_S)
+    if record_if_clear(table, parts, aim, places, instants, lowest, when_s, room) >= 0.0:
         return
     curve, starts_s = aim
     for k in range(places.shape[0]):

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sitl.flight_evaluator import FlightEvaluator
+from sitl.flight_evaluator import FlightEvaluator, Flown
 from sitl.mission_clock import MissionClock
 from sitl.plant.aerial_manipulator import plant
 from sitl.plant.kinematics import places as places_into
@@ -46,7 +46,8 @@ def looked(evaluator: FlightEvaluator, passed: Array, before_s: float) -> bool:
     assert aim is not None
     by = evaluator.quick
     instants = (before_s, STEP_S)
-    return record_if_clear(by.table, by.parts, aim, passed, instants, by.lowest, by.when_s, by.room)
+    room = (by.lowest, by.when_s, by.room)
+    return record_if_clear(by.table, by.parts, aim, passed, instants, *room) >= 0.0
 
 
 @pytest.mark.parametrize("name", ["walls", "workspace", "branches"])
@@ -110,3 +111,37 @@ def test_what_is_not_worked_out_again_could_not_be_a_record(name: str) -> None:
     assert quick.record.minimum == slow.record.minimum
     assert quick.record.time_s == slow.record.time_s
     assert skipped > 0.5 * len(quick.record.minimum) * len(passed) / 2
+
+
+@pytest.mark.parametrize("name", ["walls", "shelf"])
+def test_there_is_no_incident_within_what_is_free(name: str) -> None:
+    passed = swinging(name)
+    judge = evaluator(name, passed[0])
+    for k in range(0, len(passed), 2):
+        judge.judge_flown(flown(passed, k), clear=False)
+        height = -passed[k + 1, [0, 2, 3], 2].max()
+        assert 0.0 < judge.free[2] <= min(*judge.margins(passed[k + 1], 0.0), height)
+
+
+def flown(passed: Array, k: int) -> Flown:
+    """Two steps of a vehicle at rest, placed."""
+    commanded = ((0.0, 0.0, 0.0, 0.0), (0.0, 0.0), (0.0, 0.0))
+    return Flown(passed[k : k + 2], np.array([at_rest(2)] * 2), *commanded, STEP_S * k, STEP_S)
+
+
+def test_where_a_zone_moves_nothing_is_free() -> None:
+    judge, passed = evaluator("workspace"), places(np.random.default_rng(4), "workspace")
+    judge.judge_flown(flown(passed, 0), clear=False)
+    assert judge.free[2] == -math.inf
+
+
+def test_a_judgement_that_waited_is_the_same() -> None:
+    passed = swinging("walls")
+    waiting, prompt = (evaluator("walls", passed[0]) for _ in range(2))
+    for k in range(0, len(passed), 2):
+        waiting.judge_flown(flown(passed, k), clear=True)
+        prompt.judge_flown(flown(passed, k), clear=False)
+        assert max(waiting.record.time_s) < STEP_S * (k + 1) - 1e-9  # of the steps before
+        waiting.catch_up()
+        assert waiting.record.minimum == prompt.record.minimum
+    assert waiting.result(1.0) == prompt.result(1.0)

@@ -300,3 +300,14 @@ def test_a_whole_flight_off_its_trajectory_is_not_completed() -> None:
 def test_a_negative_seed_is_refused() -> None:
     with pytest.raises(ScenarioError, match="seed = -1"):
         Simulation(load_scenario("walls-calm"), -1)
+
+
+def test_what_is_left_for_later_is_done_by_the_next_step_as_well() -> None:
+    scenario = load_scenario("walls", "mocap")
+    prompt, late = Simulation(scenario, 0), Simulation(scenario, 0)
+    for _ in range(60):
+        assert prompt.measurements() == late.measurements()
+        prompt.catch_up()
+        for one in (prompt, late):
+            one.advance(_trimmed(one))
+    assert prompt.result() == late.result()
