@@ -209,7 +209,7 @@ def test_only_what_slsqp_calls_converged_and_finite_is_solved(
     said: dict[str, Any] = {"x": problem.rest(), "fun": 1.0, "status": mode, "nit": 3}
     if broken:
         said[broken] = math.nan * said[broken]
-    monkeypatch.setattr("fsw.mpc.slsqp_solver.minimize", lambda *_, **__: SimpleNamespace(**said))
+    monkeypatch.setattr("scipy.optimize.minimize", lambda *_, **__: SimpleNamespace(**said))
     answer = minimise(problem)
     assert answer.status is (SolverStatus.NUMERICAL_ERROR if broken else status)
     assert answer.usable is (mode == 0 and not broken)
