@@ -72,7 +72,9 @@ def exactly(program: QpData) -> Array:
     cones = [clarabel.NonnegativeConeT(whole.nonnegative_rows)]
     cones += [clarabel.SecondOrderConeT(3)] * whole.cones
     answer = clarabel.DefaultSolver(whole.p, whole.q, whole.a, whole.b, cones, settings).solve()
-    assert answer.status == clarabel.SolverStatus.Solved
+    # It may end a hair above 1e-10 (seen: 1.03e-10); what is compared is known to 1e-6.
+    assert answer.status in (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved)
+    assert max(answer.r_prim, answer.r_dual) < 1e-9
     return np.array(answer.x)
 
 
