@@ -14,11 +14,7 @@ from typing import Any, Final
 
 from fsw.compiled import compilable
 from fsw.estimation.error_state import (
-    BG,
     CLAIMS,
-    ERRORS,
-    FIELD,
-    FRAME,
     IMU_CAPACITY,
     LOST,
     MODELLED,
@@ -27,6 +23,7 @@ from fsw.estimation.error_state import (
     TH,
     TIME,
     V,
+    restore_bias,
     vec3,
     vec4,
 )
@@ -226,7 +223,9 @@ def _believe(x: Any, since: float, q: Vec4) -> None:
         if int(row[LOST]) & NO_RATE:
             _restore(x, row)
     if x.lost & NO_RATE:
-        _take_bias_up(x)
+        for i in range(3, 6):
+            restore_bias(x, x.covariance, i)
+        x.lost &= ~NO_RATE
     if x.time > since:
         known, said, _ = turns(x, since, x.time)
         if known:
@@ -250,24 +249,6 @@ def _restore(x: Any, row: Any) -> None:
                 row[RATE + i] = one[1 + i]
             lost = int(row[LOST]) & ~NO_RATE
             row[LOST] = float(0 if lost == MODELLED else lost)
-
-
-@compilable
-def _take_bias_up(x: Any) -> None:
-    """The gyro's bias is what it was before its readings were of no use."""
-    M = x.covariance
-    for i in range(3):
-        k = BG + i
-        x.gyro_bias[i] = x.kept_bias[3 + i]
-        for j in range(ERRORS):
-            M[k, j] = 0.0
-            M[j, k] = 0.0
-        for j in range(FRAME):
-            x.shared[k, j] = 0.0
-        for j in range(FIELD):
-            x.with_offset[k, j] = 0.0
-        M[k, k] = x.kept_variance[3 + i]
-    x.lost &= ~NO_RATE
 
 
 @compilable

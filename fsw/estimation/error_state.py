@@ -309,15 +309,31 @@ def _watch_biases(x: Any, M: Array, lost: int) -> None:
         if lost & half:
             x.kept_bias[i], x.kept_variance[i] = bias[i % 3], M[k, k]
         else:
-            bias[i % 3] = x.kept_bias[i]
-            for j in range(ERRORS):
-                M[k, j] = 0.0
-                M[j, k] = 0.0
-            for j in range(FRAME):
-                x.shared[k, j] = 0.0
-            for j in range(FIELD):
-                x.with_offset[k, j] = 0.0
-            M[k, k] = x.kept_variance[i]
+            restore_bias(x, M, i)
+
+
+@compilable
+def restore_bias(x: Any, M: Array, i: int) -> None:
+    """Bias ``i`` [1] of the six is what it was before its readings were lost.
+
+    ``M`` (ERRORS, ERRORS) [SI] is the covariance.
+    """
+    bias = x.accel_bias if i < 3 else x.gyro_bias
+    bias[i % 3] = x.kept_bias[i]
+    reset_covariance(x, M, BA + i, x.kept_variance[i])
+
+
+@compilable
+def reset_covariance(x: Any, M: Array, k: int, variance: float) -> None:
+    """Give error ``k`` [1] a ``variance`` [SI, of x] of its own, in ``M`` (ERRORS, ERRORS) [SI]."""
+    for j in range(ERRORS):
+        M[k, j] = 0.0
+        M[j, k] = 0.0
+    for j in range(FRAME):
+        x.shared[k, j] = 0.0
+    for j in range(FIELD):
+        x.with_offset[k, j] = 0.0
+    M[k, k] = variance
 
 
 @compilable

@@ -20,13 +20,12 @@ from fsw.estimation.error_state import (
     BG,
     DELAY,
     ERRORS,
-    FIELD,
-    FRAME,
     TH,
     P,
     V,
     correct,
     distance,
+    reset_covariance,
     vec3,
     vec4,
 )
@@ -259,17 +258,8 @@ def fuse_range(
 @compilable
 def forget(x: Any, first: int, variance: Vec3) -> None:
     """Give three errors of a state ``x`` [SI] a ``variance`` [SI, of x] anew."""
-    M = x.covariance
     for i in range(3):
-        for j in range(FRAME):
-            x.shared[first + i, j] = 0.0
-        for j in range(FIELD):
-            x.with_offset[first + i, j] = 0.0
-        for j in range(ERRORS):
-            M[first + i, j] = 0.0
-            M[j, first + i] = 0.0
-    for i in range(3):
-        M[first + i, first + i] = variance[i]
+        reset_covariance(x, x.covariance, first + i, variance[i])
 
 
 @compilable
