@@ -59,9 +59,9 @@ def test_on_a_noisy_machine_there_is_no_pass_and_no_fail(noise: MachineNoise) ->
 def test_a_loop_that_only_sleeps_sees_the_machine_stand_still_and_leaves_nothing() -> None:
     before = _descendants()
     with BareLoops() as bare:
-        time.sleep(1.0)
-        begin_us = now_us()
         loops = [int(process) for process in _descendants() if process not in before]
+        _wait_until_each_sleeps_at_its_priority_or_ended(loops)
+        begin_us = now_us()
         for loop in loops:
             os.kill(loop, signal.SIGSTOP)
         time.sleep(0.5)
@@ -105,6 +105,18 @@ def test_bad_options_are_one_sentence(words: list[str], capsys: pytest.CaptureFi
     sentence = capsys.readouterr().err
     assert sentence.startswith("python -m benchmarks loop: ")
     assert sentence.count("\n") == 1
+
+
+def _wait_until_each_sleeps_at_its_priority_or_ended(loops: list[int]) -> None:
+    deadline = time.monotonic() + 20.0  # a start takes seconds where the machine is busy
+    while any(os.sched_getscheduler(loop) != os.SCHED_FIFO and not _ended(loop) for loop in loops):
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+    time.sleep(0.1)  # from the priority to the first release
+
+
+def _ended(process: int) -> bool:
+    return Path(f"/proc/{process}/stat").read_text().rsplit(") ", 1)[1].startswith("Z")
 
 
 def _descendants() -> list[str]:
