@@ -48,6 +48,7 @@ def by_name(measured: list[Samples], name: str, iterations: int | None, n: int) 
     )
 
 
+@pytest.mark.long
 def test_every_method_has_a_row_for_every_horizon(measured: list[Samples]) -> None:
     rows = [samples.row() for samples in measured]
     assert all(set(row) == KEYS for row in rows)
@@ -56,6 +57,7 @@ def test_every_method_has_a_row_for_every_horizon(measured: list[Samples]) -> No
     assert [(row["n"], row["method"]) for row in rows] == [(n, m) for n in (1, 5) for m in names]
 
 
+@pytest.mark.long
 def test_times_are_ordered_and_ours_are_made_of_their_stages(measured: list[Samples]) -> None:
     for n in (1, 5):
         ours = by_name(measured, "clarabel", 2, n)
@@ -67,6 +69,7 @@ def test_times_are_ordered_and_ours_are_made_of_their_stages(measured: list[Samp
         assert ours.failed == 0
 
 
+@pytest.mark.long
 def test_everyone_reaches_the_converged_cost(measured: list[Samples]) -> None:
     for n in (1, 5):
         # The optimum in formation costs next to nothing, and tolerances are a share of that.

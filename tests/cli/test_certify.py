@@ -19,6 +19,7 @@ from studies.statistics.certificate import certificate, digest
 from tests.studies.campaign.test_store import begun, put
 
 
+@pytest.mark.long
 def test_a_reader_that_leaves_is_nothing_to_complain_of(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -185,7 +185,9 @@ def flying(tmp_path: Path) -> Iterator[subprocess.Popen[str]]:
     clean_up(process)
 
 
-@pytest.mark.parametrize("ending", ["SIGINT to all", "SIGTERM, fsw frozen"])
+@pytest.mark.parametrize(
+    "ending", ["SIGINT to all", pytest.param("SIGTERM, fsw frozen", marks=pytest.mark.long)]
+)
 def test_a_signal_ends_everything_within_two_seconds_with_a_verdict(
     ending: str, flying: subprocess.Popen[str], tmp_path: Path
 ) -> None:

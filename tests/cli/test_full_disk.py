@@ -29,6 +29,7 @@ def fly(out: Path, *options: str) -> subprocess.CompletedProcess[str]:
     )  # fmt: skip
 
 
+@pytest.mark.long
 def test_results_that_cannot_be_written_are_told_behind_the_verdict(tmp_path: Path) -> None:
     out = tmp_path / "out"
     out.mkdir()

@@ -103,6 +103,7 @@ def test_a_fault_of_another_process_or_unit_touches_nothing(sleeper: Sleeper) ->
     assert sleeper.exit_code is None
 
 
+@pytest.mark.long
 def test_a_scenario_can_kill_the_flight_software(tmp_path: Path) -> None:
     killed = event("fault", unit="flight software", kind="killed", duration_s=0.0)
     flown = watched(tmp_path, ["short", killed, "sleep"], ["sleep", SHUT_DOWN])

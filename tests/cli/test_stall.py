@@ -74,7 +74,7 @@ NOT_SENT = r"FAIL fsw: the simulator sent nothing for .* after step \d{3,}; sitl
         in_long(
             ("--realtime",), "fsw", signal.SIGKILL, r"FAIL fsw .* -9.* silent since step \d{3,}"
         ),
-        (("--realtime",), "sitl", signal.SIGSTOP, NOT_SENT),
+        in_long(("--realtime",), "sitl", signal.SIGSTOP, NOT_SENT),
     ],
 )
 def test_a_stall_of_a_half_ends_both_in_time_and_names_the_step(

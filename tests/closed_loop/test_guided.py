@@ -130,7 +130,8 @@ def test_a_mission_that_is_started_disarmed_arms_and_flies() -> None:
     assert -flight.sim.truth().p_WB[2] == pytest.approx(1.2, abs=0.15)
 
 
-@pytest.mark.parametrize("radius", [pytest.param(2.0, marks=pytest.mark.long), -2.0])
+@pytest.mark.long
+@pytest.mark.parametrize("radius", [2.0, -2.0])
 def test_an_orbit_is_flown_round_its_centre_with_the_nose_to_it(radius: float) -> None:
     flight = hovering()
     x, y, z = 2.0, 1.0, -1.8

@@ -105,6 +105,7 @@ def test_a_mission_from_the_ground_to_the_ground() -> None:
     assert flight.snapshot.intended_mode is Mode.HOLD
 
 
+@pytest.mark.long
 @pytest.mark.requirement("REQ-SAFE-6")
 def test_waypoints_beyond_the_walls_of_an_uploaded_fence_are_flown_up_to_it() -> None:
     flight = among_walls(seed=3)

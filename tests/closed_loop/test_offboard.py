@@ -171,7 +171,9 @@ def test_a_velocity_is_flown_in_both_frames() -> None:
     assert flight.sim.truth().v_WB == pytest.approx((0.0, 0.5, 0.0), abs=0.05)
 
 
-@pytest.mark.parametrize("phase", [0, 1, 17, 49])
+@pytest.mark.parametrize(
+    "phase", [0, 49, *(pytest.param(phase, marks=pytest.mark.long) for phase in (1, 17))]
+)
 @pytest.mark.parametrize("wanted", [body(v=(0.5, 0.0, 0.0)), {"attitude": nose_down(0.1, 0.5)}])
 def test_a_set_point_moves_the_rotors_with_the_next_plan_and_not_before(
     wanted: dict[str, Any], phase: int, monkeypatch: pytest.MonkeyPatch
@@ -291,7 +293,7 @@ def test_from_the_ground_and_back_by_set_points_alone() -> None:
 
 
 @pytest.mark.requirement("REQ-SAFE-6")
-@pytest.mark.parametrize("speed", [1.0, 3.0])
+@pytest.mark.parametrize("speed", [pytest.param(1.0, marks=pytest.mark.long), 3.0])
 def test_a_streamed_trajectory_through_the_wall_is_not_flown_there(speed: float) -> None:
     flight = ThroughTheWall(walls(AFAR, disturbed=True), speed=speed)
     flight.step(command(ARM, 1.0))
@@ -331,7 +333,9 @@ def any_setpoint(chance: random.Random) -> dict[str, Any]:
 
 
 @pytest.mark.requirement("REQ-SAFE-6")
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize(
+    "seed", [0, 1, *(pytest.param(seed, marks=pytest.mark.long) for seed in (2, 3))]
+)
 def test_wild_set_points_in_quick_succession_keep_the_walls(seed: int) -> None:
     chance = random.Random(seed)
     flight = offboard(walls(AFAR if seed % 2 else HOVERING, disturbed=True), **body(v=(1.0, 0, 0)))

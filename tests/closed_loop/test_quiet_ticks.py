@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace as with_fields
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -31,6 +32,7 @@ from studies.flight.closed_loop import (
 )
 from studies.flight.result import FlightResult
 
+in_long = partial(pytest.param, marks=pytest.mark.long)
 Sent = list[Controls]
 
 
@@ -68,12 +70,12 @@ def flown(
     ("name", "seconds", "push", "most_whole"),
     [
         ("walls", 4.0, 0.0, 0.12),
-        ("workspace", 3.0, 0.0, 0.12),
+        in_long("workspace", 3.0, 0.0, 0.12),
         ("branches", 3.0, 0.0, 0.12),
-        ("walls-calm", 3.0, 0.0, 0.08),
+        in_long("walls-calm", 3.0, 0.0, 0.08),
         ("crossing", 3.0, 0.0, 1.0),
         # Pushed off its plan, filtered, saturated, replanned, and retreating in the end.
-        ("walls", 4.0, 3.0, 1.0),
+        in_long("walls", 4.0, 3.0, 1.0),
         ("workspace", 3.0, 3.0, 1.0),
     ],
 )

@@ -42,7 +42,7 @@ either_way = pytest.mark.parametrize(
     ("client", "version"),
     [
         pytest.param(QGC_5, 2, id="5-mavlink2"),
-        pytest.param(QGC_4_4, 1, id="4.4-mavlink1"),
+        pytest.param(QGC_4_4, 1, id="4.4-mavlink1", marks=pytest.mark.long),
         pytest.param(QGC_5, 1, id="5-mavlink1", marks=pytest.mark.long),
         pytest.param(QGC_4_4, 2, id="4.4-mavlink2", marks=pytest.mark.long),
     ],

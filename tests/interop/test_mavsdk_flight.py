@@ -55,6 +55,7 @@ def down(telemetry: Telemetry) -> float:
     return float(telemetry.position_velocity_ned().position.down_m)
 
 
+@pytest.mark.long
 def test_a_takeoff_before_arming_is_remembered_for_a_while(
     action: Action, telemetry: Telemetry
 ) -> None:

@@ -53,7 +53,7 @@ def urgent_texts(flown: Capture) -> list[str]:
     [
         (-0.5, ()),
         pytest.param(-0.004, ("--realtime", "--sensors", "mocap"), marks=pytest.mark.long),
-        (-0.5, ("--realtime", "--sensors", "mocap")),
+        pytest.param(-0.5, ("--realtime", "--sensors", "mocap"), marks=pytest.mark.long),
         pytest.param(6.0, ("--realtime",), marks=pytest.mark.long),
     ],
     ids=["back", "a little back in real time", "back in real time, measured", "ahead in real time"],

@@ -6,6 +6,8 @@ import math
 import socket
 from pathlib import Path
 
+import pytest
+
 from messages.frames import FrameWriter, split
 from tests.processes.both_processes import SystemProcess
 
@@ -14,6 +16,7 @@ SET_MODE, TRAJECTORY, HOLD = 176, 4 << 16 | 11 << 24, 4 << 16 | 3 << 24
 NAN = math.nan
 
 
+@pytest.mark.long
 def test_the_verdict_says_that_the_trajectory_was_left_and_for_what(tmp_path: Path) -> None:
     station = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     station.bind(("127.0.0.1", 0))

@@ -240,7 +240,11 @@ def test_an_accelerometer_off_by_a_constant_is_named_and_the_pose_is_not(
     assert first < 0.7
 
 
-@pytest.mark.parametrize("axis", _AXES, ids=str)
+@pytest.mark.parametrize(
+    "axis",
+    [_AXES[0], *(pytest.param(axis, marks=pytest.mark.long) for axis in _AXES[1:7]), _AXES[7]],
+    ids=str,
+)
 def test_poses_that_jump_or_run_away_are_named_and_the_unit_is_not(axis: Vec3) -> None:
     lies = [
         *(Lie(place=along(axis, size)) for size in (0.01, 0.04, 1.0)),

@@ -82,7 +82,12 @@ def one_axis(axis: int, size: float) -> Any:
 @pytest.mark.requirement("REQ-EST-7")
 @pytest.mark.parametrize(("axis", "size"), [(0, 3.0), (0, -10.0), (1, 25.0), (2, -3.0), (2, 10.0)])
 @pytest.mark.parametrize(
-    ("every", "by_field"), [(0.008, False), (0.034, False), (0.02, True)], ids=["120", "30", "mag"]
+    ("every", "by_field"),
+    [
+        pytest.param(0.008, False, id="120", marks=pytest.mark.long),
+        pytest.param(0.034, False, id="30"),
+        pytest.param(0.02, True, id="mag"),
+    ],
 )
 def test_a_gyro_that_is_off_for_good_is_not_believed_because_it_is_steady(
     axis: int, size: float, every: float, by_field: bool

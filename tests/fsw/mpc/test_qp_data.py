@@ -78,8 +78,13 @@ def targets_of(asked: Question) -> TargetPoints:
 
 @pytest.mark.parametrize(
     "safe_set",
-    [SafeSet(), WALLS, POINTS, SPHERE, BOTH],
-    ids=["open", "walls", "points", "sphere", "both"],
+    [
+        pytest.param(SafeSet(), id="open"),
+        pytest.param(WALLS, id="walls", marks=pytest.mark.long),
+        pytest.param(POINTS, id="points"),
+        pytest.param(SPHERE, id="sphere", marks=pytest.mark.long),
+        pytest.param(BOTH, id="both"),
+    ],
 )
 @pytest.mark.parametrize("seed", [1, *(pytest.param(k, marks=pytest.mark.long) for k in (2, 3))])
 @pytest.mark.parametrize(
