@@ -22,6 +22,7 @@ from fsw.signals import SafeSet, Severity, StatusText, Vec3
 
 _WINDOW_US: Final = 1_000_000  # of which the worst instant counts
 _LEAST, _MOST = 6, 30  # windows before it is told, and after which it is told as it is
+_EXACT: Final = Accuracy("", 0.0, 0.0, 0.0)
 _SETTLED: Final = 0.05  # share by which velocity and tilt may differ from the window before
 
 
@@ -41,6 +42,7 @@ class AccuracyWatch:
 
     def __init__(self, config: FlightConfig, loop: Tube) -> None:
         self._config, self._loop = config, loop
+        estimate_reach(config, _EXACT)  # takes longer than a tick, and is then known
 
     def see(
         self,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from fsw.control import tube
 from fsw.estimation.error_state import ERRORS, TH, Array, V
 from fsw.flight.accuracy_watch import AccuracyMemory, AccuracyWatch
 from fsw.parameters.consistency import Accuracy, estimate_reach, loop_tube
@@ -13,7 +14,8 @@ from fsw.shapes.half_space import wall
 from fsw.signals import SafeSet, Severity, StatusText
 
 CONFIG = FlightConfig()
-WATCH = AccuracyWatch(CONFIG, loop_tube(CONFIG))
+LOOP = loop_tube(CONFIG)
+WATCH = AccuracyWatch(CONFIG, LOOP)
 WALLS = SafeSet((wall((-1.0, 0.0, 0.0), -5.0, 0.1),))
 
 
@@ -43,6 +45,15 @@ def test_it_is_told_once_when_velocity_and_tilt_have_settled() -> None:
         "most; with the tube 89 mm of the 88 mm that the plan keeps; a clearance 2 mm larger is "
         "enough"
     )
+
+
+def test_what_takes_longer_than_a_tick_is_worked_out_before_the_flight(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    tube.estimate_tube.cache_clear()
+    AccuracyWatch(CONFIG, LOOP)
+    monkeypatch.setattr(tube, "_after_a_push", lambda *_: pytest.fail("worked out in flight"))
+    assert len(seen(60, [0.01])) == 1
 
 
 def test_what_still_converges_is_waited_for_but_not_for_ever() -> None:
