@@ -72,8 +72,8 @@ class RateGroupRunner(Generic[Cycle]):
         self._clock = clock
         self._runs = 0
 
-    def run(self, cycle: Cycle, due_us: int, begin_us: int) -> bool:
-        """Run once; returns whether it ended after the group's next release.
+    def run(self, cycle: Cycle, due_us: int, begin_us: int) -> int:
+        """Run once; returns when it ended [us, monotonic].
 
         It was released at ``due_us`` [us, monotonic], and its work began at ``begin_us`` [us,
         monotonic]: now, or when the process woke for it.
@@ -89,4 +89,6 @@ class RateGroupRunner(Generic[Cycle]):
                 now_us = self._clock()
                 stage.add(now_us - mark)
                 mark = now_us
-        return self.timer.add(self._clock() - begin_us, begin_us - due_us)
+        end_us = self._clock()
+        self.timer.add(end_us - begin_us, begin_us - due_us)
+        return end_us

@@ -167,10 +167,16 @@ class SimLoop(Generic[State]):
             Member.WARN: self._warn,
             Member.CHECK_FILES: self._check_host,
         }
-        self._groups = tuple(RateGroupRunner(group, methods, clock) for group in RATE_GROUPS)
-        for runner in self._groups:
-            record.groups[runner.group.name] = runner.timer
+        runners = {group: RateGroupRunner(group, methods, clock) for group in RATE_GROUPS}
+        for group, runner in runners.items():
+            record.groups[group.name] = runner.timer
             record.stages.update({one.value: times for one, times in runner.stages.items()})
+        self._inner, self._planning = runners[INNER], runners[MPC]
+        self._others = tuple(  # with their period in ticks
+            (runner, group.period_us // self._tick_us)
+            for group, runner in runners.items()
+            if group is not INNER
+        )
 
     def connect(self, wait_s: float) -> SensorFrame | None:
         """Announce the vehicle until the first step; None after ``wait_s`` [s] or on a signal."""
@@ -225,20 +231,21 @@ class SimLoop(Generic[State]):
         """Run what is due; returns the release's place on the vehicle's time grid."""
         index = self._step_number(release.sensors.t_us)
         cycle = Cycle(release, planner)
-        for runner in self._groups:
-            if runner.group is MPC:
-                due = cycle.outputs.plan_request is not None  # the tick keeps the planner's grid
+        due_us = release.due_us
+        now_us = self._inner.run(cycle, due_us, release.begun_us)
+        if now_us - due_us > self._inner.group.period_us:
+            self._record.deadlines.add(due_us)
+        for runner, ticks in self._others:
+            if runner is self._planning:
+                if cycle.outputs.plan_request is None:  # the tick keeps the planner's grid
+                    continue
             else:
-                ticks = runner.group.period_us // self._tick_us
                 periods = index // ticks - before // ticks
-                due = ticks == 1 or periods != 0
-                if periods > 1 and before >= 0 and runner.group is not INNER:
+                if periods > 1 and before >= 0:
                     runner.timer.skipped += periods - 1
-            if due:
-                begin_us = release.begun_us if runner.group is INNER else self._clock()
-                late = runner.run(cycle, release.due_us, begin_us)
-                if late and runner.group is INNER:
-                    self._record.deadlines.add(release.due_us)
+                if ticks > 1 and periods == 0:
+                    continue
+            now_us = runner.run(cycle, due_us, now_us)
         return index
 
     def _receive(self, cycle: Cycle) -> None:
