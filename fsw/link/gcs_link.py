@@ -141,8 +141,15 @@ class GcsLink:
             self._encode(HEARTBEAT, snapshot)
             self._send(snapshot.t_us)
 
+    def is_busy(self, t_us: int) -> bool:
+        """Whether a service was asked or has answered lately: then it is to be called every tick.
+
+        Otherwise once a slot is enough, for what it says without being asked.
+        """
+        return self.dispatch.is_busy(t_us)
+
     def serve(self, t_us: int) -> None:
-        """Let services go on with what they are sending; call it once a tick if it talks."""
+        """Let services go on with what they are sending, if it talks; see :meth:`is_busy`."""
         self.dispatch.poll(t_us)
         if self.outbox.waiting:
             self._send(t_us)

@@ -18,6 +18,7 @@ _UNHEARD_SLOTS: Final = 5  # between two polls of a link without a client
 # Tick of a slot on which its messages are encoded; they are sent on the next one. So neither the
 # sending nor what a planning period begins with falls on the same tick.
 _ENCODES: Final = 2
+_SENDS: Final = 3
 _ONE: Final = 1  # byte of budget: one datagram
 _GUARD_US: Final = 200  # before a tick: the dearest datagram takes less
 # Of files, a tick and link: some 3 MB/s in real time, if the client asks as fast.
@@ -34,6 +35,7 @@ class GroundLinks:
         self._slot_ticks = SLOT_US // tick_period_us
         self._tick = 0
         self._shown: object = None
+        self._mission: object = None
         self._t_us = 0  # of the last tick
         self._attends = False
 
@@ -83,22 +85,26 @@ class GroundLinks:
         tick, t_us = self._tick, snapshot.t_us
         self._t_us = t_us
         self._tick += 1
-        slot = tick % self._slot_ticks == _ENCODES
-        news = slot or changed or bool(outputs.texts)
+        place, texts = tick % self._slot_ticks, bool(outputs.texts)
+        encodes, sends = place == _ENCODES, place == _SENDS
+        news = encodes or changed or texts
+        # One step of a mission may follow another by a tick, and each is told.
+        steps = snapshot.mission is not self._mission
+        self._mission = snapshot.mission
         for link in self.links:
             if link.talks:
-                fast = link.rates.slot_us < SLOT_US
+                fast, busy = link.rates.slot_us < SLOT_US, link.is_busy(t_us)
                 if news or fast:
                     link.publish(outputs, changed)
-                if fast or changed or not slot:
+                if fast or changed or sends or steps or ((texts or busy) and not encodes):
                     link.serve(t_us)
-                if not self._attends:
+                if busy and not self._attends:
                     for _ in range(_BULK_DATAGRAMS):
                         if not link.serve_bulk(t_us):
                             break
             elif news:
                 link.announce(snapshot, changed)
-            if slot and self._attends:
+            if encodes and self._attends:
                 # Ticks without a pause between them must not make the vehicle deaf.
                 link.read(t_us, _ONE)
 

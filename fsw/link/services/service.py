@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import traceback
 from collections.abc import Callable, Sequence
-from typing import Protocol, runtime_checkable
+from typing import Final, Protocol, runtime_checkable
 
 from fsw.link.wire.outgoing import ServiceOutput
 from fsw.signals import MessageSource
@@ -26,7 +26,7 @@ class LinkService(Protocol):
         ...
 
     def poll(self, t_us: int) -> Sequence[ServiceOutput]:
-        """Go on with an answer that is paced; called every tick, so idle must cost nothing."""
+        """Go on with an answer that is paced; called often, so idle must cost nothing."""
         ...
 
 
@@ -49,6 +49,9 @@ class SourcedService(LinkService, Protocol):
     source: MessageSource | None  # of the frame that is handled now
 
 
+_BUSY_US: Final = 100_000  # after a question or an answer; the slowest pace is 20 ms
+
+
 class Dispatch:
     """Hands frames to the services of one link that want them, and what they answer to the link."""
 
@@ -56,6 +59,7 @@ class Dispatch:
         self, services: Sequence[LinkService], send: Callable[[ServiceOutput, int], None]
     ) -> None:
         self.failures = 0  # answers that ended in an exception
+        self._busy_until_us = 0
         self._send = send
         self._polls = tuple(service.poll for service in services)
         self._bulky = tuple(service for service in services if isinstance(service, BulkService))
@@ -70,13 +74,19 @@ class Dispatch:
         for sourced in self._sourced:
             sourced.source = source
         for service in self._wanting.get(frame.message_id, ()):
+            self._busy_until_us = t_us + _BUSY_US
             self._answer(t_us, service.handle, frame, t_us)
+
+    def is_busy(self, t_us: int) -> bool:
+        """Whether a service was asked or has answered lately."""
+        return t_us < self._busy_until_us
 
     def poll(self, t_us: int) -> None:
         """Let every service go on with what it is sending."""
         for poll in self._polls:
             try:
                 for outgoing in poll(t_us):
+                    self._busy_until_us = t_us + _BUSY_US
                     self._send(outgoing, t_us)
             except Exception:
                 self._note_failure()
@@ -95,6 +105,7 @@ class Dispatch:
         sent = False
         try:
             for outgoing in service(*about):
+                self._busy_until_us = t_us + _BUSY_US
                 self._send(outgoing, t_us)
                 sent = True
         except Exception:
