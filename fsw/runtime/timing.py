@@ -4,13 +4,20 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Mapping
 from typing import Final
 
 from fsw.ports import GroupTiming
 
 _BINS_PER_E: Final = 50.0  # 2 % resolution
 _BINS: Final = 900  # up to exp(18) us, about a minute
+_KNOWN: Final = 4096  # us; whole durations below it have their bin in a table
+
+
+def _bin(duration_us: float) -> int:
+    return min(int(math.log(duration_us) * _BINS_PER_E), _BINS - 1) if duration_us > 1.0 else 0
+
+
+_BIN_OF: Final = tuple(_bin(duration_us) for duration_us in range(_KNOWN))
 
 
 class Histogram:
@@ -22,14 +29,15 @@ class Histogram:
         self.max_us = 0.0
         self._bins = defaultdict[int, int](int)  # those that have counts: a few of all
 
-    def add(self, duration_us: float, times: int = 1) -> None:
-        """Count a duration [us]; anything below 1 us is in the first bin."""
-        self.count += times
-        self.total_us += times * duration_us
+    def add(self, duration_us: float) -> None:
+        """Count one duration [us]; anything below 1 us is in the first bin."""
+        self.count += 1
+        self.total_us += duration_us
         if duration_us > self.max_us:
             self.max_us = duration_us
-        index = int(math.log(duration_us) * _BINS_PER_E) if duration_us > 1.0 else 0
-        self._bins[min(index, _BINS - 1)] += times
+        whole = int(duration_us)
+        known = whole == duration_us and 0 <= whole < _KNOWN
+        self._bins[_BIN_OF[whole] if known else _bin(duration_us)] += 1
 
     def percentile_us(self, share: float) -> float:
         """Duration [us] that a ``share`` [1] of all counts does not exceed; 0 before the first."""
@@ -61,15 +69,14 @@ class GroupTimer:
         self.skipped = 0
         self.execution = Histogram()  # whole flight, up to the last interval
         self.lateness = Histogram()
-        # Of this interval, how often each was measured: its end sorts them into bins.
-        self._execution = defaultdict[float, int](int)
-        self._lateness = defaultdict[float, int](int)
+        self._execution = Histogram()  # this interval
+        self._lateness = Histogram()
 
     def add(self, execution_us: float, lateness_us: float = 0.0) -> None:
         """Count one tick by its times [us]."""
         self.ticks += 1
-        self._execution[execution_us] += 1
-        self._lateness[lateness_us] += 1
+        self._execution.add(execution_us)
+        self._lateness.add(lateness_us)
         if lateness_us + execution_us > self.period_us:
             self.late += 1  # it ended after the next release
 
@@ -80,7 +87,7 @@ class GroupTimer:
 
     def close_interval(self) -> GroupTiming:
         """Report the interval since the last call and start another."""
-        execution, lateness = _binned(self._execution), _binned(self._lateness)
+        execution, lateness = self._execution, self._lateness
         report = GroupTiming(
             period_us=self.period_us,
             ticks=self.ticks,
@@ -96,14 +103,5 @@ class GroupTimer:
         )
         self.execution.absorb(execution)
         self.lateness.absorb(lateness)
-        self._execution.clear()
-        self._lateness.clear()
+        self._execution, self._lateness = Histogram(), Histogram()
         return report
-
-
-def _binned(times: Mapping[float, int]) -> Histogram:
-    """How often each duration [us] was measured, in bins."""
-    binned = Histogram()
-    for duration_us, count in times.items():
-        binned.add(duration_us, count)
-    return binned
