@@ -55,7 +55,7 @@ tests-of-processes: code-checks
 tests-of-the-rest: fsw-kernels
 	$(call check,the rest,$(BIN)/pytest -m "not long" $(addprefix --ignore=,$(OF_PROCESSES)))
 fsw-kernels sitl-kernels: %-kernels:
-	@$(BIN)/python -m tests.compile_kernels $*
+	@$(BIN)/python -m studies.flight.kernels $*
 
 test-long: setup ## the tests that make test leaves out for its four minutes
 	$(BIN)/pytest -m long

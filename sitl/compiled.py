@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 import warnings
 from collections.abc import Callable
 from pathlib import Path
@@ -37,6 +38,12 @@ def _sources_digest() -> str:
 # would still run the old machine code. A cache directory per state of the sources cannot.
 _ROOT = Path(numba.config.CACHE_DIR or _PACKAGE / "__pycache__")
 _CACHE_DIR = str(_ROOT / f"numba-{_sources_digest()}")
+
+
+def compiling_is_due() -> bool:
+    """Whether kernels of this state of the sources are not on disk yet, and would be kept there."""
+    nearest = next(parent for parent in Path(_CACHE_DIR).parents if parent.is_dir())
+    return not Path(_CACHE_DIR).is_dir() and os.access(nearest, os.W_OK)
 
 
 def compiled(function: Callable[P, R]) -> Callable[P, R]:

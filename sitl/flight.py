@@ -20,10 +20,11 @@ from sitl.link.faulty_endpoint import Endpoint, FaultyEndpoint
 from sitl.link.pilot import flight_plan
 from sitl.link.server import RunTiming, serve, shut_down
 from sitl.link.udp_endpoint import PeerSocket
+from sitl.rehearsal import rehearse
 from sitl.result import EndKind, TruthResult
 from sitl.scenario import Scenario
 from sitl.scenario_file import suite_of
-from sitl.simulation import START_US, STEP_US, Controls, Simulation
+from sitl.simulation import START_US, STEP_US, Simulation
 from sitl.trajectory import TrajectoryPoint
 from sitl.truth_log import TruthLog
 
@@ -180,19 +181,6 @@ class Flight:
             "pauses": counts.pauses,
             "paused_s": counts.paused_s,
         }
-
-
-def rehearse(simulation: Simulation) -> None:
-    """Take two steps of a simulation that is thrown away, so that every kernel is compiled.
-
-    In the second a joint seizes: no other fault needs kernels that a step without does not.
-    """
-    simulation.inject(Fault("joint", "stuck"))
-    controls = Controls((0.5, 0.5, 0.5, 0.5), (0.0,) * len(simulation.vehicle.links), armed=True)
-    for _ in range(2):
-        simulation.sense()
-        simulation.advance(controls)
-    simulation.sense()
 
 
 def _summary(result: TruthResult, timing: RunTiming) -> str:

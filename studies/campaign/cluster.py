@@ -23,6 +23,7 @@ from fsw.runtime.process import pin_numerics_to_one_thread
 from studies.campaign.campaign import Scheduler, SchedulerGoneError
 from studies.campaign.dispatch import Came
 from studies.campaign.identity import identity
+from studies.flight.kernels import compile_first
 
 GIVE_UP_S: Final = 600.0  # without a scheduler
 _HERE: Final = "127.0.0.1"
@@ -74,7 +75,7 @@ class Cluster:
         self._looked_s, self._none_since_s = -1e9, time.monotonic()
         _quiet()
         dask.config.set(_SETTINGS)
-        self._local = _local(workers) if scheduler is None else None
+        self._local = _local(workers, say) if scheduler is None else None
         try:
             self._client = self._connected(first=True)
         except BaseException:
@@ -277,8 +278,9 @@ class Cluster:
                 self._local.close(_CLOSE_S)
 
 
-def _local(workers: int) -> LocalCluster:
+def _local(workers: int, say: Callable[[str], None]) -> LocalCluster:
     """Processes of one thread each, which nothing outside this machine can reach."""
+    compile_first(say)
     pin_numerics_to_one_thread()  # inherited by the processes, before they load their libraries
     return LocalCluster(
         n_workers=workers,

@@ -21,7 +21,7 @@ from fsw.parameters.control_choice import ControlChoice
 from fsw.runtime.assembly import flight_software
 from fsw.signals import AttitudeSetpoint, JointSetpoint, Mode, MotionSetpoint
 from sitl.faults.keys import KINDS, Fault
-from sitl.flight import rehearse
+from sitl.rehearsal import rehearse
 from sitl.scenario import ActuatorKeys, AirKeys, Scenario, Wind
 from sitl.scenario_file import SUITE_NAMES, load_scenario
 from sitl.simulation import Controls, Simulation
