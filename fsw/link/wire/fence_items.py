@@ -20,6 +20,7 @@ refused. One of exclusion may have any shape; what its cylinders cover in additi
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import Final
 
 from fsw.link.wire.mission_items import (
@@ -161,8 +162,10 @@ def cylinders_over(corners: list[Vec2], clearance: float) -> list[Zone]:
     length = last - first
     count = min(max(round(length / max(width, _SHORTEST_EDGE)), 1), _CYLINDERS_OF_ONE)
     cylinders = []
-    for k in range(count):
-        piece = _between(turned, first + k * length / count, first + (k + 1) * length / count)
+    # No cut at the ends: rounded, it would cut corners off.
+    cuts = [-math.inf, *(first + k * length / count for k in range(1, count)), math.inf]
+    for low, high in pairwise(cuts):
+        piece = _between(turned, low, high)
         if not piece:
             continue
         u = 0.5 * (min(p[0] for p in piece) + max(p[0] for p in piece))

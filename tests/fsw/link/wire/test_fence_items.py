@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from matplotlib.path import Path
 
@@ -209,6 +209,7 @@ def test_a_workspace_sphere_is_kept_beside_walls_and_cylinders() -> None:
     st.floats(0.0, 1.0),
     st.floats(0.0, 1.0),
 )
+@example([(0.0, 6.0), (2.0, -1.0), (-6.0, 0.0), (2.0, -1.0)], 0.0, 0.0)
 def test_the_cylinders_cover_every_point_of_a_polygon(
     corners: Corners, share: float, other: float
 ) -> None:
