@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from fsw.flight.trajectory_segment import (
@@ -54,6 +54,7 @@ def test_the_derivatives_of_a_leg_are_those_of_its_position(
 ) -> None:
     segment = segment_to(at_rest(start, yaw), end, new_yaw, PACE)
     step = 1_000  # us
+    assume(segment.end_us - segment.start_us > 100 * step or start == end)  # or it is too long
     for k in range(1, 40):
         t_us = segment.start_us + (segment.end_us - segment.start_us) * k // 40
         before, now, after = segment.at(t_us - step), segment.at(t_us), segment.at(t_us + step)
