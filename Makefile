@@ -57,8 +57,9 @@ tests-of-the-rest: fsw-kernels
 fsw-kernels sitl-kernels: %-kernels:
 	@$(BIN)/python -m studies.flight.kernels $*
 
-test-long: setup ## the tests that make test leaves out for its four minutes
+test-long: setup ## the tests that make test leaves out for its four minutes, and properties with more examples
 	$(BIN)/pytest -m long
+	PROPERTIES=thorough $(BIN)/pytest -m hypothesis
 
 faults: setup ## fly every mode with every fault, write build/faults.html (long): ONLY=motor SEED=1
 	@mkdir -p build
