@@ -168,6 +168,7 @@ def test_a_command_that_nobody_supports_is_answered(
     assert ack == (31010, 3, 0, 0, 255, 190)
 
 
+@pytest.mark.long
 def test_real_time_is_real_time(realtime: Flight) -> None:
     assert realtime.result["real_time_factor"] == pytest.approx(1.0, rel=0.02)
     assert realtime.result["completed"] is True

@@ -264,7 +264,13 @@ def test_a_return_that_is_not_to_land_holds_over_home() -> None:
 
 
 @pytest.mark.parametrize(
-    ("action", "mode"), [(0, Mode.HOLD), (1, Mode.HOLD), (2, Mode.RETURN), (3, Mode.LAND)]
+    ("action", "mode"),
+    [
+        (0, Mode.HOLD),
+        pytest.param(1, Mode.HOLD, marks=pytest.mark.long),
+        (2, Mode.RETURN),
+        pytest.param(3, Mode.LAND, marks=pytest.mark.long),
+    ],
 )
 def test_a_lost_ground_station_is_acted_upon_as_the_parameter_says(action: int, mode: Mode) -> None:
     config = limits(station_timeout_us=3_000_000, station_loss_action=action, failsafe_delay_us=0)

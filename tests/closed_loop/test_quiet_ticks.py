@@ -75,8 +75,8 @@ def flown(
         in_long("walls-calm", 3.0, 0.0, 0.08),
         ("crossing", 3.0, 0.0, 1.0),
         # Pushed off its plan, filtered, saturated, replanned, and retreating in the end.
-        in_long("walls", 4.0, 3.0, 1.0),
-        ("workspace", 3.0, 3.0, 1.0),
+        ("walls", 4.0, 3.0, 1.0),
+        in_long("workspace", 3.0, 3.0, 1.0),
     ],
 )
 def test_the_flight_is_the_same_to_the_last_bit(

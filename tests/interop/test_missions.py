@@ -85,6 +85,7 @@ def test_a_heading_that_is_not_given_stays_not_given(system: System) -> None:
     assert raw.download_mission() == []
 
 
+@pytest.mark.long
 def test_a_mission_is_uploaded_flown_and_told_of(system: System) -> None:
     mission, action, telemetry = Mission(system), Action(system), Telemetry(system)
     takeoff = MissionItem.VehicleAction.TAKEOFF

@@ -83,6 +83,7 @@ def test_a_full_disk_ends_the_files_and_is_told_once_a_file(
     assert log.whole
 
 
+@pytest.mark.long
 @pytest.mark.requirement("REQ-LOG-3")
 def test_a_slow_disk_delays_no_tick_and_leaves_a_marked_gap(tmp_path: Path) -> None:
     disk_is_back = threading.Event()
