@@ -25,7 +25,7 @@ from pandion.child import Event
 from pandion.display import Display
 from pandion.processor import Places, lockstep_places
 from pandion.supervisor import ProcessFailed, Supervisor
-from sitl.scenario_file import PERFECT, SUITE_NAMES
+from sitl.scenario_file import PERFECT, SUITE_NAMES, ScenarioError, load_scenario
 
 DONE, SLOW = 0, 1  # exit codes
 TARGET: Final = 25.0  # times real time, at 500 Hz
@@ -64,7 +64,7 @@ def main(argv: list[str]) -> int:
     console = console_beside(options.json)
     try:
         found = _measure(options, console)
-    except (ProcessFailed, OSError) as error:
+    except (ProcessFailed, ScenarioError, OSError) as error:
         complain("python -m benchmarks lockstep", error)
         return COULD_NOT_START
     write_text(options.json, json_text(found, 1) + "\n")
@@ -157,16 +157,18 @@ def _measure_one(options: LockstepOptions, kind: _Kind) -> dict[str, Any]:
             "--wait=600",
             f"--out={out}",
         ]
+        body = load_scenario(options.scenario).body  # as pandion fly has it
+        fsw = [f"--body={body}", f"--out={out}", "--wait=600"]
         flown = Supervisor(_Silent(sys.stderr), out, places, kind.runner).run(
-            sitl, lambda port: [f"--sim=udp:127.0.0.1:{port}", f"--out={out}", "--wait=600"]
+            sitl, lambda port: [f"--sim=udp:127.0.0.1:{port}", *fsw]
         )
         if flown.failure is not None or flown.sitl is None or flown.interrupted:
             raise ProcessFailed(flown.failure or "the flight was interrupted", exit_code=1)
         written = out / "fsw.json"
         if not written.exists():
             raise ProcessFailed("the flight software was ended before it wrote its result", 1)
-        fsw: Event = json.loads(written.read_text(encoding="utf-8"))
-        return {"sitl": flown.sitl, "fsw": fsw, "places": _described(places)}
+        vehicle: Event = json.loads(written.read_text(encoding="utf-8"))
+        return {"sitl": flown.sitl, "fsw": vehicle, "places": _described(places)}
 
 
 def _places(processors: int | None) -> Places:

@@ -20,10 +20,12 @@ from benchmarks.machine_watch import Watch
 from benchmarks.values import several
 from command_line.options import json_file, option, read
 from command_line.output import complain, console_beside, json_text, write_text
+from command_line.parser import COULD_NOT_START
 from command_line.values import seconds, whole
 from command_line.version import version
 from pandion.display import Display
 from pandion.supervisor import ProcessFailed, Supervisor
+from sitl.scenario_file import ScenarioError, load_scenario
 
 PASSED, NOT_PASSED = 0, 1  # exit codes
 _EXCHANGE = ("receive", "actuate")  # stages
@@ -68,6 +70,9 @@ def main(argv: list[str]) -> int:
     except ProcessFailed as error:
         complain("python -m benchmarks loop", error)
         return error.exit_code
+    except ScenarioError as error:
+        complain("python -m benchmarks loop", error)
+        return COULD_NOT_START
     machine["load_after"] = round(os.getloadavg()[0], 2)
     for measured in flown:
         print("\n".join(_lines(measured)), file=console)
@@ -88,6 +93,7 @@ def _measure(options: LoopOptions, hogs: int, budgets: Budgets, console: TextIO)
         bare = stack.enter_context(BareLoops())
         for _ in range(hogs):
             stack.enter_context(Hog())
+        body = load_scenario(options.scenario).body  # as pandion fly has it
         sitl = [
             options.scenario,
             "--realtime",
@@ -99,6 +105,7 @@ def _measure(options: LoopOptions, hogs: int, budgets: Budgets, console: TextIO)
             # Telemetry goes where nothing listens: it is encoded and sent all the same.
             lambda port: [
                 f"--sim=udp:127.0.0.1:{port}",
+                f"--body={body}",
                 *("--gcs=udp:127.0.0.1:9", "--wait=600", f"--out={out}"),
             ],
         )
