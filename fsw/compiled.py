@@ -70,9 +70,25 @@ def _jit(kernel: Callable[P, R], **more: bool) -> Callable[P, R]:
     before, numba.config.CACHE_DIR = numba.config.CACHE_DIR, _CACHE
     try:
         compile_it = numba.njit(cache=True, fastmath=False, error_model="numpy", **more)
-        return cast(Callable[P, R], compile_it(kernel))
+        dispatcher = compile_it(kernel)
     finally:
         numba.config.CACHE_DIR = before
+    _DISPATCHERS.append(dispatcher)
+    return cast(Callable[P, R], dispatcher)
+
+
+_DISPATCHERS: list[Any] = []
+
+
+def forget_bitcode() -> None:
+    """Free what only compiling needs of kernels that are loaded: 30 MB.
+
+    numba keeps each as LLVM's bitcode beside its machine code, to link it into kernels that are
+    compiled later. Call it where none is: one that calls these would raise a RuntimeError.
+    """
+    for dispatcher in _DISPATCHERS:
+        for overload in dispatcher.overloads.values():
+            overload.library._shared_module = None
 
 
 def machine_code(kernel: Callable[P, R], *example: Any) -> Callable[P, R]:

@@ -36,6 +36,9 @@ def settle_memory() -> None:
     The loop makes no reference cycles, so counting references frees all it allocates; a
     collection over numba's and SciPy's objects would cost tens of milliseconds in a tick.
     """
+    from fsw.compiled import forget_bitcode  # numba, which is imported with threads pinned
+
+    forget_bitcode()
     gc.collect()
     gc.freeze()
     gc.disable()

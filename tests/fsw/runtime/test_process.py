@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -31,3 +33,29 @@ def test_work_that_fails_in_a_child_is_silent(
     in_a_child(work)
     assert (tmp_path / "begun").exists()
     assert capfd.readouterr() == ("", "")
+
+
+# In a process of its own: kernels that are compiled afterwards could not call those of before.
+SETTLE = """
+from pathlib import Path
+from fsw.parameters.control_choice import ControlChoice
+from fsw.runtime.assembly import flight_software
+from fsw.runtime.process import settle_memory
+
+def anonymous_mb():
+    lines = Path("/proc/self/status").read_text().splitlines()
+    return next(int(line.split()[1]) / 1024 for line in lines if line.startswith("RssAnon"))
+
+program = flight_software(ControlChoice())
+before = anonymous_mb()
+settle_memory()
+print(before - anonymous_mb())
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="needs /proc")
+def test_what_only_building_needed_is_given_back() -> None:
+    given_back = subprocess.run(
+        [sys.executable, "-c", SETTLE], capture_output=True, text=True, check=True
+    )
+    assert float(given_back.stdout) > 15.0
