@@ -100,10 +100,7 @@ def _cell(mode: str, expected: Expected, seed: int) -> Cell:
 
 
 def _unknown(what: str, name: str | None, known: tuple[str, ...]) -> str:
-    if name is None:
-        return _NEITHER
-    hint = unknown_name(what, name, known)
-    return hint if "did you mean" in hint else f"{hint} (known: {', '.join(known)})"
+    return _NEITHER if name is None else unknown_name(what, name, known)
 
 
 def _run(options: FaultsOptions, cells: list[Cell]) -> int:
