@@ -42,6 +42,11 @@ def _cache_directory() -> str:
 _CACHE = _cache_directory()
 
 
+def kernel_directory() -> Path:
+    """Where the kernels of this state of the sources are kept."""
+    return Path(_CACHE)
+
+
 def compiling_is_due() -> bool:
     """Whether kernels of this state of the sources are not on disk yet, and would be kept there."""
     cache = Path(_CACHE)

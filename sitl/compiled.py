@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import os
 import warnings
 from collections.abc import Callable
 from pathlib import Path
@@ -40,10 +39,9 @@ _ROOT = Path(numba.config.CACHE_DIR or _PACKAGE / "__pycache__")
 _CACHE_DIR = str(_ROOT / f"numba-{_sources_digest()}")
 
 
-def compiling_is_due() -> bool:
-    """Whether kernels of this state of the sources are not on disk yet, and would be kept there."""
-    nearest = next(parent for parent in Path(_CACHE_DIR).parents if parent.is_dir())
-    return not Path(_CACHE_DIR).is_dir() and os.access(nearest, os.W_OK)
+def kernel_directory() -> Path:
+    """Where the kernels of this state of the sources are kept."""
+    return Path(_CACHE_DIR)
 
 
 def compiled(function: Callable[P, R]) -> Callable[P, R]:

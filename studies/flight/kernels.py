@@ -6,13 +6,18 @@ compiler leaves behind for as long as it flies.
 
 from __future__ import annotations
 
+import contextlib
 import gc
 import os
 import subprocess
 import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Final
 
+HALVES: Final = ("fsw", "sitl")
+# In the folder of a half, once all are there: another command may have left some of them.
+_ALL: Final = "complete"
 # Compiling leaves much behind that is not garbage yet: as often as Python looks by itself, looking
 # takes 7 % of the time; so, 2.5 %.
 _YOUNG: Final = 100_000
@@ -23,11 +28,7 @@ def compile_first(say: Callable[[str], None]) -> None:
 
     ``say`` takes a sentence. If a half cannot be compiled, the first flight will say why.
     """
-    from fsw import compiled as fsw
-    from sitl import compiled as sitl
-
-    halves = {"fsw": fsw.compiling_is_due, "sitl": sitl.compiling_is_due}
-    due = [half for half, is_due in halves.items() if is_due()]
+    due = [half for half in HALVES if _is_due(half)]
     if not due:
         return
     say("compiling before the first flight, which takes a minute")
@@ -53,6 +54,26 @@ def compile_first(say: Callable[[str], None]) -> None:
 
 def compile_half(half: str) -> None:
     """Build what flies, or what simulates; either compiles all that it calls."""
+    _build(half)
+    with contextlib.suppress(OSError):
+        (_directory(half) / _ALL).touch()
+
+
+def _is_due(half: str) -> bool:
+    """Whether some kernels may not be on disk yet, and would be kept there."""
+    directory = _directory(half)
+    nearest = next(one for one in (directory, *directory.parents) if one.is_dir())
+    return not (directory / _ALL).exists() and os.access(nearest, os.W_OK)
+
+
+def _directory(half: str) -> Path:
+    from fsw import compiled as fsw
+    from sitl import compiled as sitl
+
+    return {"fsw": fsw.kernel_directory, "sitl": sitl.kernel_directory}[half]()
+
+
+def _build(half: str) -> None:
     if half == "fsw":
         from fsw.flight.autopilot import Autopilot
         from fsw.mpc.planner import Planner

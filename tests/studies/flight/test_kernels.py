@@ -27,17 +27,30 @@ for name, suite in (("walls", "perfect"), ("workspace", "mocap"), ("field", "rtk
 """
 
 
-def due(monkeypatch: pytest.MonkeyPatch, *halves: bool) -> None:
-    for half, is_due in zip((fsw.compiled, sitl.compiled), halves, strict=True):
-        monkeypatch.setattr(half, "compiling_is_due", lambda is_due=is_due: is_due)
+@pytest.fixture
+def folders(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[Path]:
+    """Where the kernels of either half are kept: an earlier flight has left some of them."""
+    found = []
+    for half in (fsw.compiled, sitl.compiled):
+        folder = tmp_path / half.__name__
+        folder.mkdir()
+        (folder / "some.nbc").touch()
+        monkeypatch.setattr(half, "kernel_directory", lambda folder=folder: folder)
+        found.append(folder)
+    return found
 
 
-def test_where_all_is_on_disk_no_process_is_started(monkeypatch: pytest.MonkeyPatch) -> None:
-    due(monkeypatch, False, False)
+def test_where_all_is_on_disk_no_process_is_started(
+    folders: list[Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(kernels, "_build", lambda half: None)
+    for half in kernels.HALVES:
+        kernels.compile_half(half)
     monkeypatch.setattr(kernels.subprocess, "Popen", lambda *_, **__: pytest.fail("started"))
     kernels.compile_first(pytest.fail)
 
 
+@pytest.mark.usefixtures("folders")
 def test_what_is_not_on_disk_is_compiled_and_an_interrupt_ends_it(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
@@ -45,7 +58,6 @@ def test_what_is_not_on_disk_is_compiled_and_an_interrupt_ends_it(
     compiler.write_text(f'#!/bin/sh\necho "$$ $3" >> {asked}\nexec sleep 60\n')
     compiler.chmod(0o755)
     monkeypatch.setattr(kernels.sys, "executable", str(compiler))
-    due(monkeypatch, True, True)
     said: list[str] = []
 
     def interrupt(number: int, frame: object) -> None:
