@@ -86,14 +86,15 @@ def _measure(options: LoopOptions, hogs: int, budgets: Budgets, console: TextIO)
 
     Raises:
         ProcessFailed: There was no flight.
+        ScenarioError: There is no such scenario, or it cannot be read.
     """
+    body = load_scenario(options.scenario).body  # as pandion fly has it
     with ExitStack() as stack:
         out = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="pandion-bench-")))
         watch = stack.enter_context(Watch((out / "flight.ulg").exists))
         bare = stack.enter_context(BareLoops())
         for _ in range(hogs):
             stack.enter_context(Hog())
-        body = load_scenario(options.scenario).body  # as pandion fly has it
         sitl = [
             options.scenario,
             "--realtime",

@@ -6,7 +6,7 @@ import socket
 import threading
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -17,8 +17,9 @@ from fsw.link.link_choice import LinkChoice, addresses
 from fsw.link.services.time_service import TimeService
 from fsw.link.udp_endpoint import LinkError, OpenEndpoint
 from fsw.link.wire import message_ids as ids
+from fsw.link.wire.outgoing import ServiceOutput
 from fsw.signals import CommandAck
-from messages.frames import FrameWriter, split
+from messages.frames import Frame, FrameWriter, split
 from tests.fsw.link.ground import Ground, ground_station
 from tests.fsw.link.snapshots import outputs_at
 
@@ -83,6 +84,34 @@ def test_an_answer_goes_to_the_link_the_command_came_from(
     assert gcs.heard() == []
     links.acknowledge(1_000_000, CommandAck(400, 0, 99, 1))  # of no known peer: to all
     assert [len(ground.heard()) for ground in (gcs, api)] == [1, 1]
+
+
+class Counting:
+    """A service that says nothing, and counts how often it is asked whether it would."""
+
+    message_ids = frozenset((ids.TIMESYNC,))
+    polls = 0
+
+    def handle(self, frame: Frame, t_us: int) -> Sequence[ServiceOutput]:
+        return ()
+
+    def poll(self, t_us: int) -> Sequence[ServiceOutput]:
+        self.polls += 1
+        return ()
+
+
+def test_a_service_is_asked_once_a_slot_and_every_tick_after_a_question() -> None:
+    service = Counting()
+    with ground_station(services=(service,)) as gcs:
+        gcs.fly(500)
+        assert service.polls == pytest.approx(100, abs=1)
+        gcs.polled(FrameWriter(255, 190).frame(ids.TIMESYNC, 0, 1))
+        before = service.polls
+        gcs.fly(50)  # 0.1 s; never on the tick on which messages are encoded
+        assert service.polls - before == pytest.approx(40, abs=2)
+        before = service.polls
+        gcs.fly(500)
+        assert service.polls - before == pytest.approx(100, abs=4)
 
 
 def test_between_ticks_the_time_is_told_within_a_millisecond(
