@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
+from collections.abc import Mapping
 from typing import Final
 
 from fsw.ports import GroupTiming
@@ -17,7 +18,14 @@ def _bin(duration_us: float) -> int:
     return min(int(math.log(duration_us) * _BINS_PER_E), _BINS - 1) if duration_us > 1.0 else 0
 
 
-_BIN_OF: Final = tuple(_bin(duration_us) for duration_us in range(_KNOWN))
+_KNOWN_BINS: Final[dict[float, int]] = {
+    duration_us: _bin(duration_us) for duration_us in range(_KNOWN)
+}
+
+
+def _bin_of(duration_us: float) -> int:
+    known = _KNOWN_BINS.get(duration_us)
+    return _bin(duration_us) if known is None else known
 
 
 class Histogram:
@@ -35,9 +43,15 @@ class Histogram:
         self.total_us += duration_us
         if duration_us > self.max_us:
             self.max_us = duration_us
-        whole = int(duration_us)
-        known = whole == duration_us and 0 <= whole < _KNOWN
-        self._bins[_BIN_OF[whole] if known else _bin(duration_us)] += 1
+        self._bins[_bin_of(duration_us)] += 1
+
+    def add_counted(self, durations_us: Mapping[float, int]) -> None:
+        """Count durations [us] that each came so often."""
+        self.count += sum(durations_us.values())
+        self.total_us += sum([times * duration for duration, times in durations_us.items()])
+        self.max_us = max(self.max_us, max(durations_us, default=0.0))
+        for duration_us, times in durations_us.items():
+            self._bins[_bin_of(duration_us)] += times
 
     def percentile_us(self, share: float) -> float:
         """Duration [us] that a ``share`` [1] of all counts does not exceed; 0 before the first."""
@@ -60,7 +74,12 @@ class Histogram:
 
 
 class GroupTimer:
-    """Timing of one rate group: of the last interval and of the whole flight."""
+    """Timing of one rate group: of the last interval and of the whole flight.
+
+    The clock counts whole microseconds, and in one interval few are different. So each tick adds to
+    the count of its own, a quarter of the time that a bin takes; they are sorted into bins when the
+    interval is over.
+    """
 
     def __init__(self, period_us: int) -> None:
         self.period_us = period_us
@@ -69,14 +88,14 @@ class GroupTimer:
         self.skipped = 0
         self.execution = Histogram()  # whole flight, up to the last interval
         self.lateness = Histogram()
-        self._execution = Histogram()  # this interval
-        self._lateness = Histogram()
+        self._execution = defaultdict[float, int](int)  # this interval: how often each time
+        self._lateness = defaultdict[float, int](int)
 
     def add(self, execution_us: float, lateness_us: float = 0.0) -> None:
         """Count one tick by its times [us]."""
         self.ticks += 1
-        self._execution.add(execution_us)
-        self._lateness.add(lateness_us)
+        self._execution[execution_us] += 1
+        self._lateness[lateness_us] += 1
         if lateness_us + execution_us > self.period_us:
             self.late += 1  # it ended after the next release
 
@@ -87,7 +106,9 @@ class GroupTimer:
 
     def close_interval(self) -> GroupTiming:
         """Report the interval since the last call and start another."""
-        execution, lateness = self._execution, self._lateness
+        execution, lateness = Histogram(), Histogram()
+        execution.add_counted(self._execution)
+        lateness.add_counted(self._lateness)
         report = GroupTiming(
             period_us=self.period_us,
             ticks=self.ticks,
@@ -103,5 +124,6 @@ class GroupTimer:
         )
         self.execution.absorb(execution)
         self.lateness.absorb(lateness)
-        self._execution, self._lateness = Histogram(), Histogram()
+        self._execution.clear()
+        self._lateness.clear()
         return report
