@@ -146,7 +146,7 @@ class GcsLink:
 
         Otherwise once a slot is enough, for what it says without being asked.
         """
-        return self.dispatch.is_busy(t_us)
+        return t_us < self.dispatch.busy_until_us
 
     def serve(self, t_us: int) -> None:
         """Let services go on with what they are sending, if it talks; see :meth:`is_busy`."""

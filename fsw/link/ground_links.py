@@ -5,13 +5,14 @@ from __future__ import annotations
 import select
 import time
 from collections.abc import Sequence
+from operator import attrgetter
 from typing import Final
 
 from fsw.link.gcs_link import GcsLink
 from fsw.link.telemetry.stream_rates import SLOT_US
 from fsw.link.wire.px4_mode import shown_mode
 from fsw.ports import Clock
-from fsw.signals import CommandAck, TickOutputs
+from fsw.signals import CommandAck, FlightSnapshot, TickOutputs
 
 _READ_BYTES: Final = 4096  # of each link a slot in lockstep, of all links a tick in real time
 _UNHEARD_SLOTS: Final = 5  # between two polls of a link without a client
@@ -20,6 +21,9 @@ _UNHEARD_SLOTS: Final = 5  # between two polls of a link without a client
 _ENCODES: Final = 2
 _SENDS: Final = 3
 _ONE: Final = 1  # byte of budget: one datagram
+# What may have to be told at once, of a snapshot.
+_TOLD_AT_ONCE: Final = attrgetter("mode", "intended_mode", "armed", "landed", "failures", "mission")
+_NOTHING: Final = (False, False)
 _GUARD_US: Final = 200  # before a tick: the dearest datagram takes less
 # Of files, a tick and link: some 3 MB/s in real time, if the client asks as fast.
 _BULK_DATAGRAMS: Final = 6
@@ -34,6 +38,7 @@ class GroundLinks:
         self._tick_us = tick_period_us
         self._slot_ticks = SLOT_US // tick_period_us
         self._tick = 0
+        self._seen: object = None
         self._shown: object = None
         self._mission: object = None
         self._t_us = 0  # of the last tick
@@ -79,18 +84,15 @@ class GroundLinks:
     def publish(self, outputs: TickOutputs) -> None:
         """Send what is due on this tick; call it once a tick, after the actuators."""
         snapshot = outputs.snapshot
-        shown = (shown_mode(snapshot), snapshot.armed, snapshot.landed, snapshot.failures)
-        changed = shown != self._shown
-        self._shown = shown
         tick, t_us = self._tick, snapshot.t_us
         self._t_us = t_us
         self._tick += 1
         place, texts = tick % self._slot_ticks, bool(outputs.texts)
         encodes, sends = place == _ENCODES, place == _SENDS
+        seen = _TOLD_AT_ONCE(snapshot)
+        changed, steps = _NOTHING if seen == self._seen else self._changed(snapshot)
+        self._seen = seen
         news = encodes or changed or texts
-        # One step of a mission may follow another by a tick, and each is told.
-        steps = snapshot.mission is not self._mission
-        self._mission = snapshot.mission
         for link in self.links:
             if link.talks:
                 fast, busy = link.rates.slot_us < SLOT_US, link.is_busy(t_us)
@@ -107,6 +109,16 @@ class GroundLinks:
             if encodes and self._attends:
                 # Ticks without a pause between them must not make the vehicle deaf.
                 link.read(t_us, _ONE)
+
+    def _changed(self, snapshot: FlightSnapshot) -> tuple[bool, bool]:
+        """Whether a heartbeat says something new at once, and whether a mission has gone on.
+
+        One step of a mission may follow another by a tick, and each is told.
+        """
+        shown = (shown_mode(snapshot), snapshot.armed, snapshot.landed, snapshot.failures)
+        changed, steps = shown != self._shown, snapshot.mission is not self._mission
+        self._shown, self._mission = shown, snapshot.mission
+        return changed, steps
 
     def acknowledge(self, t_us: int, ack: CommandAck) -> None:
         """Answer a command on the link it came from; on all where that is not known."""

@@ -38,6 +38,7 @@ from fsw.signals import (
     CommandAck,
     CommandRequest,
     CommandResult,
+    FlightSnapshot,
     HostHealth,
     InjectFailure,
     OffboardReport,
@@ -102,9 +103,22 @@ class FlightRecord:
     begun_us: int = 0  # first release, monotonic
     stale: int = 0  # ticks without a sensor frame of their own
     scheduler: str = ""  # class and priority of the tick process
-    counters: PlannerCounters = field(default_factory=PlannerCounters)
-    safety: SafetyCounters = field(default_factory=SafetyCounters)
-    offboard: OffboardReport = field(default_factory=OffboardReport)
+    snapshot: FlightSnapshot | None = None  # of the last tick
+
+    @property
+    def counters(self) -> PlannerCounters:
+        """The planner's, as the tick counts them."""
+        return PlannerCounters() if self.snapshot is None else self.snapshot.counters
+
+    @property
+    def safety(self) -> SafetyCounters:
+        """How often the vehicle was not where it should be."""
+        return SafetyCounters() if self.snapshot is None else self.snapshot.safety
+
+    @property
+    def offboard(self) -> OffboardReport:
+        """Set-points of clients."""
+        return OffboardReport() if self.snapshot is None else self.snapshot.offboard
 
 
 @dataclass(slots=True)
@@ -305,9 +319,7 @@ class SimLoop(Generic[State]):
 
     def _publish(self, cycle: Cycle) -> None:
         record, outputs = self._record, cycle.outputs
-        record.counters = outputs.snapshot.counters
-        record.safety = outputs.snapshot.safety
-        record.offboard = outputs.snapshot.offboard
+        record.snapshot = outputs.snapshot
         events = record.mpc.events
         if events:
             self._notices += [StatusText(Severity.WARNING, event) for event in events]

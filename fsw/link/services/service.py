@@ -59,7 +59,7 @@ class Dispatch:
         self, services: Sequence[LinkService], send: Callable[[ServiceOutput, int], None]
     ) -> None:
         self.failures = 0  # answers that ended in an exception
-        self._busy_until_us = 0
+        self.busy_until_us = 0  # a service was asked or has answered lately
         self._send = send
         self._polls = tuple(service.poll for service in services)
         self._bulky = tuple(service for service in services if isinstance(service, BulkService))
@@ -74,19 +74,15 @@ class Dispatch:
         for sourced in self._sourced:
             sourced.source = source
         for service in self._wanting.get(frame.message_id, ()):
-            self._busy_until_us = t_us + _BUSY_US
+            self.busy_until_us = t_us + _BUSY_US
             self._answer(t_us, service.handle, frame, t_us)
-
-    def is_busy(self, t_us: int) -> bool:
-        """Whether a service was asked or has answered lately."""
-        return t_us < self._busy_until_us
 
     def poll(self, t_us: int) -> None:
         """Let every service go on with what it is sending."""
         for poll in self._polls:
             try:
                 for outgoing in poll(t_us):
-                    self._busy_until_us = t_us + _BUSY_US
+                    self.busy_until_us = t_us + _BUSY_US
                     self._send(outgoing, t_us)
             except Exception:
                 self._note_failure()
@@ -105,7 +101,7 @@ class Dispatch:
         sent = False
         try:
             for outgoing in service(*about):
-                self._busy_until_us = t_us + _BUSY_US
+                self.busy_until_us = t_us + _BUSY_US
                 self._send(outgoing, t_us)
                 sent = True
         except Exception:
