@@ -36,13 +36,18 @@ class BusyPollReceiver:
         if self._rest:
             self._rest -= 1
             return self._receive(self._size)
-        until_s = time.perf_counter() + _LOOK_S
-        while time.perf_counter() < until_s:
+        until_s = 0.0  # one that is there already needs no look at the clock
+        while True:
             try:
                 datagram = self._receive(self._size, socket.MSG_DONTWAIT)
             except BlockingIOError:
-                continue
-            self._credit = min(self._credit + 1, _MOST)
+                now_s = time.perf_counter()
+                until_s = until_s or now_s + _LOOK_S
+                if now_s < until_s:
+                    continue
+                break
+            if self._credit < _MOST:
+                self._credit += 1
             return datagram
         self._credit -= _PRICE
         if self._credit <= 0:

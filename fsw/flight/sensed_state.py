@@ -129,7 +129,8 @@ class SensedState:
         ``state`` has the memory of the tick before.
         """
         now = memory.now
-        before, texts = _memory(state, now), list[StatusText]()
+        before = _memory(state, now)
+        texts: list[StatusText] = []  # by itself: to call a type with its parameters takes 1 us
         # A state that is carried on is none of this tick.
         known = None if state.invalid_ticks else estimate
         model = UNKNOWN if memory.dispute is None else self._model(state)
@@ -281,13 +282,13 @@ def _watched(
     if angles != watch.angles or not state.vehicle.flies:
         return made(EncoderWatch, (angles, asked, 0, False))
     stuck = watch.stuck
-    watch = watch._replace(repeats=watch.repeats + 1)
+    watch = made(EncoderWatch, (angles, watch.asked, watch.repeats + 1, stuck))
     if watch.repeating and not stuck:
         first, second = memory.numbers["joints"][0][:, 2].tolist()
         held = abs(first) > _HELD[0] or abs(second) > _HELD[1]
         moved = max(abs(asked[0] - watch.asked[0]), abs(asked[1] - watch.asked[1]))
-        stuck = held and moved > _ASKED
-    return watch._replace(stuck=stuck)
+        return watch._replace(stuck=held and moved > _ASKED)
+    return watch
 
 
 def _at_rest(memory: FusionMemory, law: Law, reading: JointSample) -> FusionMemory:

@@ -87,6 +87,7 @@ class Inbox:
         self.locate = partial(to_local, origin)
         self.refused = 0  # messages with numbers of no use, or too many of them
         self._received = Received()
+        self._is_news = False  # there is more in it than samples
         # By source: the walls of two announcers must not mix.
         self._incomplete: dict[MessageSource, _Incomplete] = {}
         self._source = UNKNOWN_SOURCE  # of the frame that is read now
@@ -114,7 +115,7 @@ class Inbox:
         """Keep what the frame says if it is for this vehicle and of use; never raises."""
         handler = self._handlers.get(frame.message_id)
         if handler is not None:
-            self._source = source
+            self._source, self._is_news = source, True
             handler(frame)
 
     def accept_samples(self, samples: list[Sample]) -> None:
@@ -127,15 +128,17 @@ class Inbox:
 
     def accept_battery(self, reading: BatteryReading) -> None:
         """Keep what the battery's sensor has measured last."""
+        self._is_news = True
         self._received.battery = reading
 
     def accept_clock_jump(self, jump_us: int) -> None:
         """Keep by how much [us] the sensors' clock has jumped against the vehicle's time."""
+        self._is_news = True
         self._received.sensor_clock_jump_us += jump_us
 
     def take(self) -> Received:
         """Hand over what came."""
-        taken, self._received = self._received, Received()
+        taken, self._received, self._is_news = self._received, Received(), False
         return taken
 
     def take_inputs(
@@ -151,8 +154,14 @@ class Inbox:
 
         The sensors' readings are ``stale_us`` older than their stamp says.
         """
+        # By position: it is made in every tick, and in most of them there are samples alone.
+        if not self._is_news:
+            samples, self._received.samples = self._received.samples, []
+            return TickInputs(
+                *(sensors, plan, (), (), (), None, None, None, 0, False),
+                *(mission, tuning, stale_us, tuple(samples), None, host, 0),
+            )
         came = self.take()
-        # By position: it is made in every tick.
         return TickInputs(
             sensors,
             plan,

@@ -44,14 +44,10 @@ class _Codec:
         self._kind = kind
         self._names = tuple(field.name for field in dataclasses.fields(kind))
         self._sizes = tuple(field.count for field in topic.fields)  # 0: a number by itself
-        self._head = data_head(self.number, topic)
-        self._pack = Struct("<5s" + topic.codes).pack
-        self._values = _VALUES.get(kind, self._any_values)
+        self.head = data_head(self.number, topic)
+        self.pack = Struct("<5s" + topic.codes).pack
+        self.values = _VALUES.get(kind, self._any_values)
         self._unpack: Callable[[bytes], Values] = unpacker(topic).unpack
-
-    def write(self, t_us: int, sample: Sample) -> bytes:
-        """The record of a sample that arrived for the tick of ``t_us``."""
-        return self._pack(self._head, t_us, *self._values(sample))
 
     def _any_values(self, sample: Sample) -> Values:
         values: list[float] = []
@@ -81,7 +77,8 @@ TOPIC_NUMBERS: Final = frozenset(_BY_NUMBER)
 
 def record(t_us: int, sample: Sample) -> bytes:
     """The record of a sample that arrived for the tick of ``t_us``."""
-    return _CODECS[type(sample)].write(t_us, sample)
+    codec = _CODECS[type(sample)]
+    return codec.pack(codec.head, t_us, *codec.values(sample))
 
 
 def sample_of(number: int, body: bytes) -> Sample:

@@ -79,7 +79,8 @@ class SensorSuite:
         """
         self.catch_up()
         self._last = exact, thrust
-        t_us, arrived = exact.t_us, list[Measurement]()
+        t_us = exact.t_us
+        arrived: list[Measurement] = []
         for channel in self._channels:
             if t_us >= channel.next_us:
                 if channel.late:
