@@ -543,7 +543,7 @@ class PlanRequest:
 
 @dataclass(frozen=True, slots=True)
 class PlanTimings:
-    """Wall time of one planning cycle by stage [us]; never used by control."""
+    """Wall time of one planning cycle by stage [us]; never used by control. Negative: unknown."""
 
     linearise_us: float
     solve_us: float

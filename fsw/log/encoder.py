@@ -43,6 +43,7 @@ DETAIL_US: Final = {
 }  # from one record of what follows from others to the next
 
 _UNMEASURED: Final = PlanTimings(math.nan, math.nan, math.nan)
+_NO_TIMES: Final = PlanTimings(-1.0, -1.0, -1.0)  # in inputs: JSON has no NaN
 _NOWHERE: Final = (math.nan, math.nan, math.nan)
 _LARGEST: Final = struct.unpack("<f", b"\xff\xff\x7f\x7f")[0]
 _U16, _U32 = 0xFFFF, 0xFFFFFFFF
@@ -123,7 +124,7 @@ class LogEncoder:
         """
         self._detail_us = DETAIL_US[profile]
         self._detailed = -1  # number of the interval of which details were written last
-        self.inputs = JsonCodec(TickInputs, {} if measured else {PlanTimings: _UNMEASURED})
+        self.inputs = JsonCodec(TickInputs, {} if measured else {PlanTimings: _NO_TIMES})
         self._measured = measured
         self._per_newton = 1.0 / thrust_max
         self._link_length = link_length

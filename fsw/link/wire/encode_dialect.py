@@ -190,7 +190,7 @@ def loop_timing(group: int) -> Callable[[FlightSnapshot, TelemetryContext], Wire
 
 
 def _microseconds(value: float) -> int:
-    return min(max(round(value), 0), _U32) if math.isfinite(value) else _U32
+    return min(round(value), _U32) if 0.0 <= value < math.inf else _U32
 
 
 def _four(pair: Vec2) -> Vec4:

@@ -1,0 +1,60 @@
+"""Inputs as JSON, by either of two encoders: read back to the bit."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from fsw.log import json_codec
+from fsw.log.encoder import LogEncoder
+from fsw.log.json_codec import JsonCodec
+from fsw.signals import PlanTimings
+from tests.fsw.link.snapshots import PLAN
+
+
+@dataclasses.dataclass(frozen=True)
+class Anything:
+    numbers: tuple[float, ...]
+    whole: int
+    text: str
+    perhaps: float | None
+
+
+@given(
+    st.builds(
+        Anything,
+        st.lists(st.floats()).map(tuple),
+        st.integers(-(2**70), 2**70),
+        st.text(st.characters(codec="utf-8")) | st.text(st.characters(max_codepoint=0x7F)),
+        st.none() | st.floats(),
+    )
+)
+def test_what_is_written_is_read_to_the_bit_and_is_ascii(one: Anything) -> None:
+    codec = JsonCodec(Anything)
+    for name in codec.names:
+        text = codec.encode(name, getattr(one, name))
+        assert text.isascii()
+        assert min(text) >= 0x20, "a control character"
+        assert repr(codec.decode(name, text)) == repr(getattr(one, name))
+
+
+@given(st.lists(st.floats(allow_nan=False, allow_infinity=False), min_size=1).map(tuple))
+def test_finite_numbers_are_those_of_the_standard_library(numbers: tuple[float, ...]) -> None:
+    text = JsonCodec(Anything).encode("numbers", numbers)
+    assert repr(json.loads(text)) == repr(list(numbers))
+
+
+@pytest.mark.parametrize("measured", [True, False], ids=["real time", "lockstep"])
+def test_a_plan_is_written_by_the_fast_encoder(
+    measured: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The tick that a plan comes in has the most to write."""
+    encoder = LogEncoder(measured=measured, thrust_max=16.0, link_length=(0.15, 0.15))
+    monkeypatch.delattr(json_codec, "_ENCODER")
+    text = encoder.inputs.encode("plan", PLAN)
+    times = PLAN.timings if measured else PlanTimings(-1.0, -1.0, -1.0)
+    assert encoder.inputs.decode("plan", text) == dataclasses.replace(PLAN, timings=times)
