@@ -231,14 +231,18 @@ def load_flight_software(options: FswOptions) -> FlightProgram[Any]:
         CouldNotStart: A controller or inner loop of that name does not exist.
     """
     # Imported here because SciPy, Clarabel and numba take a second, which a refusal need not wait.
-    from fsw.compiled import compiling_is_due
+    from fsw.compiled import compiling_is_due, note_compiled
     from fsw.runtime.assembly import flight_software
 
     def load() -> FlightProgram[Any]:
         return flight_software(options.control, origin=options.links.origin)
 
-    if compiling_is_due():
-        in_a_child(load)  # the compiler leaves 150 MB behind where it has run
+    def compile_first() -> None:
+        load()
+        note_compiled(options.control.kernels)
+
+    if compiling_is_due(options.control.kernels):
+        in_a_child(compile_first)  # the compiler leaves 150 MB behind where it has run
     try:
         return load()
     except ValueError as error:

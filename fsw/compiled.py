@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import hashlib
 import os
@@ -47,11 +48,24 @@ def kernel_directory() -> Path:
     return Path(_CACHE)
 
 
-def compiling_is_due() -> bool:
-    """Whether kernels of this state of the sources are not on disk yet, and would be kept there."""
-    cache = Path(_CACHE)
-    nearest = next(parent for parent in cache.parents if parent.is_dir())
-    return not cache.is_dir() and os.access(nearest, os.W_OK)
+def compiling_is_due(what: str, directory: Path | None = None) -> bool:
+    """Whether a kernel of ``what`` flies may not be on disk yet, and would be kept there.
+
+    That some are there says nothing: another command, or one that was interrupted, has left them.
+    """
+    cache = directory or kernel_directory()
+    nearest = next(one for one in (cache, *cache.parents) if one.is_dir())
+    return not _mark(cache, what).exists() and os.access(nearest, os.W_OK)
+
+
+def note_compiled(what: str, directory: Path | None = None) -> None:
+    """Keep in mind, on disk, that all kernels of ``what`` flies are there."""
+    with contextlib.suppress(OSError):  # then it is looked for again
+        _mark(directory or kernel_directory(), what).touch()
+
+
+def _mark(cache: Path, what: str) -> Path:
+    return cache / f"{what}.complete"
 
 
 def compiled(kernel: Callable[P, R]) -> Callable[P, R]:

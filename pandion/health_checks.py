@@ -15,6 +15,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from fsw.parameters.control_choice import ControlChoice
+
 OK, WARN, FAIL = "ok", "warn", "fail"
 
 _GB: Final = 1e9
@@ -189,7 +191,7 @@ def compile_cache() -> Check:
 
     halves = {"fsw": Path(fsw.__file__), "sitl": Path(sitl.__file__)}
     closed = [half for half, file in halves.items() if not os.access(file.parent, os.W_OK)]
-    due = fsw.compiling_is_due()
+    due = fsw.compiling_is_due(ControlChoice().kernels)
     if closed and not os.environ.get("NUMBA_CACHE_DIR"):
         remedy = "set NUMBA_CACHE_DIR to a folder that can be written"
         found = f"{', '.join(closed)} cannot be written: every flight would compile for a minute"

@@ -63,6 +63,11 @@ class ControlChoice:
     )
 
     @property
+    def kernels(self) -> str:
+        """A name for the kernels that it flies with."""
+        return f"{self.controller}-{self.tracking}-{self.solver}"
+
+    @property
     def inner(self) -> str:
         """The name of the inner loop in logs and configurations."""
         return INNER_LOOPS.get(self.tracking, self.tracking)

@@ -6,7 +6,6 @@ compiler leaves behind for as long as it flies.
 
 from __future__ import annotations
 
-import contextlib
 import gc
 import os
 import subprocess
@@ -15,9 +14,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
+from fsw.parameters.control_choice import ControlChoice
+
 HALVES: Final = ("fsw", "sitl")
-# In the folder of a half, once all are there: another command may have left some of them.
-_ALL: Final = "complete"
+_CAMPAIGN: Final = "campaign"
 # Compiling leaves much behind that is not garbage yet: as often as Python looks by itself, looking
 # takes 7 % of the time; so, 2.5 %.
 _YOUNG: Final = 100_000
@@ -54,16 +54,18 @@ def compile_first(say: Callable[[str], None]) -> None:
 
 def compile_half(half: str) -> None:
     """Build what flies, or what simulates; either compiles all that it calls."""
+    from fsw.compiled import note_compiled
+
     _build(half)
-    with contextlib.suppress(OSError):
-        (_directory(half) / _ALL).touch()
+    note_compiled(_CAMPAIGN, _directory(half))
+    if half == "fsw":
+        note_compiled(ControlChoice().kernels)
 
 
 def _is_due(half: str) -> bool:
-    """Whether some kernels may not be on disk yet, and would be kept there."""
-    directory = _directory(half)
-    nearest = next(one for one in (directory, *directory.parents) if one.is_dir())
-    return not (directory / _ALL).exists() and os.access(nearest, os.W_OK)
+    from fsw.compiled import compiling_is_due
+
+    return compiling_is_due(_CAMPAIGN, _directory(half))
 
 
 def _directory(half: str) -> Path:

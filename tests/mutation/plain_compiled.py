@@ -11,8 +11,12 @@ from pathlib import Path
 from typing import Any
 
 
-def compiling_is_due() -> bool:
+def compiling_is_due(what: str, directory: Path | None = None) -> bool:
     return False
+
+
+def note_compiled(what: str, directory: Path | None = None) -> None:
+    pass
 
 
 def kernel_directory() -> Path:
