@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from fsw.barriers.safe_approach import BarrierTuning
@@ -10,7 +12,7 @@ from fsw.compiled import kernel, machine_code, of_fixed_types
 from fsw.model.body import Body
 from fsw.model.linearisation import FRAME, put_arm, put_pose, put_turning
 from fsw.model.prediction import Array
-from fsw.shapes.zones import FOLLOWS, shifts, zone_arrays
+from fsw.shapes.zones import FOLLOWS, all_moving_zones, shifts, zone_arrays
 from fsw.signals import (
     ConstraintReport,
     EndEffectorTarget,
@@ -22,6 +24,16 @@ from fsw.signals import (
 )
 
 _REST: Vec3 = (0.0, 0.0, 0.0)
+
+
+class _Known(NamedTuple):
+    """A safe set as kernels take it."""
+
+    safe_set: SafeSet
+    zones: Array
+    moving: Array
+    per_zone: tuple[int, ...]  # how many margins each has
+    follows_target: bool  # one of them does
 
 
 class Margins:
@@ -41,6 +53,7 @@ class Margins:
         self.parts = tuple(part.name for part in body.parts)
         self._probes, self._links = body.probes, links
         self._settings = settings(tunings, period)
+        self._known = _known(SafeSet(), 0)
         self._fill = of_fixed_types(fill_starts)
         level, arm = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0), (0.0, 0.0)
         vehicle = np.zeros(FRAME), links, _REST, _REST, level, _REST, arm, arm
@@ -54,19 +67,19 @@ class Margins:
         There is one of each zone and part, zone by zone; of a zone that follows the target a
         single one, and none while there is no target.
         """
-        zones = zone_arrays(safe_set)
-        follows = [zone[FOLLOWS] > 0.0 for zone in zones.tolist()]
-        if not follows or (target is None and any(follows)):
+        if safe_set is not self._known.safe_set:  # looked at ten times a second, and the same
+            self._known = _known(safe_set, len(self.parts))
+        _, zones, moving, per_zone, follows_target = self._known
+        if not per_zone or (target is None and follows_target):
             return ConstraintReport(safe_set.kind)
         p, v = (_REST, _REST) if target is None else (target.p_WE, target.v_WE)
         of_target = np.array((p, v), dtype=np.float64)
-        shift, speed = shifts(safe_set, np.array([estimate.t_us]), of_target[:1], of_target[1:])
+        shift, speed = shifts(moving, np.array([estimate.t_us]), of_target[:1], of_target[1:])
         vehicle = np.zeros(FRAME)
         self._put_vehicle(
             *(vehicle, self._links, estimate.p_WB, estimate.v_WB, estimate.R_WB),
             *(estimate.w_WB_B, estimate.q_arm, estimate.qd_arm),
         )
-        per_zone = tuple([1 if rides else len(self.parts) for rides in follows])
         size = sum(per_zone)
         margins, values = np.empty(size), np.empty(size)
         how = (zones, shift[0], speed[0], self._probes, vehicle, self._settings)
@@ -75,6 +88,14 @@ class Margins:
         return ConstraintReport(
             safe_set.kind, tuple(margins.tolist()), tuple(values.tolist()), per_zone
         )
+
+
+def _known(safe_set: SafeSet, parts: int) -> _Known:
+    """What is known of a safe set, of which most zones have a margin for each of ``parts`` [1]."""
+    zones = zone_arrays(safe_set)
+    follows = [zone[FOLLOWS] > 0.0 for zone in zones.tolist()]
+    per_zone = tuple([1 if rides else parts for rides in follows])
+    return _Known(safe_set, zones, all_moving_zones(safe_set), per_zone, any(follows))
 
 
 @kernel

@@ -48,7 +48,7 @@ from fsw.model.prediction import (
     CondensedModel,
     J,
 )
-from fsw.shapes.zones import FOLLOWS, PLANES, shifts, zone_arrays
+from fsw.shapes.zones import FOLLOWS, PLANES, all_moving_zones, shifts, zone_arrays
 from fsw.signals import SafeSet, Vec3, Vec4
 
 _NO_ROW = 1e3  # residual of a row that is left out
@@ -123,14 +123,14 @@ class ZoneRows:
 
     def update(self, safe_set: SafeSet) -> None:
         """See ``fsw.barriers.constraint_block.Barrier``."""
-        self._safe_set, self._zones = safe_set, zone_arrays(safe_set)
+        self._zones, self._moving = zone_arrays(safe_set), all_moving_zones(safe_set)
         self._targets: TargetPoints | None = None
 
     def refill(self, horizon: Linearisation, targets: TargetPoints) -> None:
         """Linearise every row along the normals of the guess."""
         if targets is not self._targets:  # one request has many iterations
             times_us = targets.t_us + self._period_us * np.arange(len(targets.position))
-            self._moves = shifts(self._safe_set, times_us, targets.position, targets.velocity)
+            self._moves = shifts(self._moving, times_us, targets.position, targets.velocity)
             self._targets = targets
         self._fill(
             self._zones,

@@ -61,9 +61,12 @@ class Health(NamedTuple):
     # Every kind of fault so far, with the time before the last one of its kind [s].
     known: tuple[tuple[SensorFault, float, float], ...] = ()
 
-    def fault_now(self, now: float, stale: float) -> SensorFault:
-        """What is wrong at ``now`` [s]; silence counts after ``stale`` [s]."""
-        if now - self.came > stale:
+    def fault_now(self, came: float, now: float, stale: float) -> SensorFault:
+        """What is wrong at ``now`` [s] with a sensor that ``came`` [s] last.
+
+        Silence counts after ``stale`` [s].
+        """
+        if now - came > stale:
             return SensorFault.STALE
         return self.fault if now - self.fault_at <= _SHOWN else SensorFault.NONE
 

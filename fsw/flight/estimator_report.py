@@ -139,7 +139,7 @@ def _sensors(memory: FusionMemory, now: float, stale: float) -> tuple[SensorRepo
 
 
 def _sensor(health: Health, came: float, now: float, stale: float) -> SensorReport:
-    fault = health._replace(came=came).fault_now(now, stale)
+    fault = health.fault_now(came, now, stale)
     return SensorReport(
         health.sensor.value,
         round(1e6 * (now - came)) if came >= 0.0 else -1,

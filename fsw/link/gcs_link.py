@@ -105,6 +105,11 @@ class GcsLink:
         """All receivers of telemetry."""
         return self._peers.all
 
+    @property
+    def is_heard(self) -> bool:
+        """Whether it has a client."""
+        return self._peers.any_heard
+
     def fileno(self) -> int:
         """The socket, to wait for."""
         return self._endpoint.fileno()

@@ -55,7 +55,7 @@ class GroundLinks:
             return
         for link in self.links:
             # Each poll is a system call; a link without a client can wait a little longer.
-            if link.talks or self._tick % (_UNHEARD_SLOTS * self._slot_ticks) == 0:
+            if link.is_heard or self._tick % (_UNHEARD_SLOTS * self._slot_ticks) == 0:
                 link.read(t_us, _READ_BYTES)
 
     def attend(self, seconds: float) -> None:

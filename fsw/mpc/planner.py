@@ -127,7 +127,7 @@ class Planner:
         if len(request.targets) != self._config.horizon + 1:
             return f"{len(request.targets)} targets given, {self._config.horizon + 1} needed"
         # What is not finite stays so in a sum.
-        if not math.isfinite(start.sum()):
+        if not math.isfinite(sum(start.tolist())):
             return "the start state is not finite"
         if not math.isfinite(
             sum([sum(one.p_WE) + sum(one.v_WE) + one.yaw for one in request.targets])

@@ -114,24 +114,23 @@ def nearest_plane(zones: Array, zone: int, p: Vec3, t_us: int) -> Surface:
     return nearest
 
 
+def all_moving_zones(safe_set: SafeSet) -> Array:
+    """Those of ``moving_zones``, with the zones that follow the target, wherever it is."""
+    return moving_zones(safe_set, _NO_TARGET)
+
+
 def shifts(
-    safe_set: SafeSet, times_us: NDArray[np.int64], p_target: Array, v_target: Array
+    zones: Array, times_us: NDArray[np.int64], p_target: Array, v_target: Array
 ) -> tuple[Array, Array]:
     """How far each zone has moved at each time, and its velocity, (times, zones, 3) [m], [m/s].
 
-    ``p_target`` (times, 3) [m, NED] and ``v_target`` (times, 3) [m/s, NED] are those of the target.
+    ``zones`` (zones, columns) [SI] are ``all_moving_zones``; ``p_target`` (times, 3) [m, NED] and
+    ``v_target`` (times, 3) [m/s, NED] are those of the target.
     """
-    zones = _all_moving_zones(safe_set)
     moved = np.empty((len(times_us), len(zones), 3))
     velocities = np.empty_like(moved)
     _fill_shifts(zones, times_us, p_target, v_target, moved, velocities)
     return moved, velocities
-
-
-@lru_cache(maxsize=16)
-def _all_moving_zones(safe_set: SafeSet) -> Array:
-    """Those of ``moving_zones``, with the zones that follow the target, wherever it is."""
-    return moving_zones(safe_set, _NO_TARGET)
 
 
 @kernel

@@ -9,7 +9,15 @@ from fsw.shapes.ball import ball, point
 from fsw.shapes.box import box
 from fsw.shapes.half_space import wall
 from fsw.shapes.target_sphere import target_sphere
-from fsw.shapes.zones import moved_by, moving_zones, nearest_plane, shifts, surfaces, velocity_of
+from fsw.shapes.zones import (
+    all_moving_zones,
+    moved_by,
+    moving_zones,
+    nearest_plane,
+    shifts,
+    surfaces,
+    velocity_of,
+)
 from fsw.signals import EndEffectorTarget, SafeSet, Vec3, Zone
 
 MOVING = Zone(ball((0.0, 0.0, 0.0), 0.5), 0.1, velocity=(1.0, -2.0, 0.5), t_us=2_000_000)
@@ -40,7 +48,8 @@ def test_shifts_of_each_zone_at_each_time() -> None:
     still = wall((1.0, 0.0, 0.0), 0.0, 0.1)
     times = np.array([2_000_000, 2_100_000])
     p_target, v_target = np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]), np.ones((2, 3))
-    moved, velocities = shifts(SafeSet((still, MOVING, SPHERE)), times, p_target, v_target)
+    zones = all_moving_zones(SafeSet((still, MOVING, SPHERE)))
+    moved, velocities = shifts(zones, times, p_target, v_target)
     np.testing.assert_allclose(moved[:, 0], 0.0)
     np.testing.assert_allclose(moved[:, 1], [[0.0, 0.0, 0.0], [0.1, -0.2, 0.05]], atol=1e-15)
     np.testing.assert_array_equal(moved[:, 2], p_target)
