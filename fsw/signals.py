@@ -30,6 +30,8 @@ Mat3 = tuple[float, float, float, float, float, float, float, float, float]  # r
 class Mode(Enum):
     """Where the vehicle is in its flight; each flight mode has a file in ``flight/modes``."""
 
+    __hash__ = object.__hash__  # an Enum's own runs Python, for each look into a table
+
     DISARMED = "disarmed"
     TAKEOFF = "takeoff"
     HOLD = "hold"

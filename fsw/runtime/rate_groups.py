@@ -18,7 +18,9 @@ from fsw.runtime.timing import GroupTimer, Histogram
 
 Cycle = TypeVar("Cycle")
 
-_STAGES_EVERY: Final = 8  # runs between two whose members are timed one by one
+# Ticks between two whose members are timed one by one. It has no divisor in common with the ticks
+# of a planning period, so that every place in one is timed as often.
+STAGES_EVERY: Final = 27
 
 
 class Member(enum.Enum):
@@ -71,6 +73,7 @@ class RateGroupRunner(Generic[Cycle]):
         self._calls = tuple(methods[member] for member in group.members)
         self._clock = clock
         self._runs = 0
+        self._stages_every = STAGES_EVERY if group.period_us == TICK_US else 1
 
     def run(self, cycle: Cycle, due_us: int, begin_us: int) -> int:
         """Run once; returns when it ended [us, monotonic].
@@ -79,7 +82,7 @@ class RateGroupRunner(Generic[Cycle]):
         monotonic]: now, or when the process woke for it.
         """
         self._runs += 1
-        if self._runs % _STAGES_EVERY:
+        if self._runs % self._stages_every:
             for call in self._calls:
                 call(cycle)
         else:
