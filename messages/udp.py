@@ -58,6 +58,8 @@ class PeerSocket:
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, waiting)
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _RECEIVE_BUFFER)
         self._receive = BusyPollReceiver(self._socket, MAX_DATAGRAM)
+        self._ready = select.poll()
+        self._ready.register(self._socket, select.POLLIN)
 
     @classmethod
     def connected(cls, peer: Address, patience_s: float) -> PeerSocket:
@@ -122,6 +124,10 @@ class PeerSocket:
             return self._socket.recv(MAX_DATAGRAM, socket.MSG_DONTWAIT)
         except (BlockingIOError, ConnectionRefusedError):
             return None
+
+    def has_waiting(self) -> bool:
+        """Whether a datagram is there: half of what it takes to find none by receiving."""
+        return bool(self._ready.poll(0))
 
     def wait(self, wait_s: float) -> bool:
         """Wait until a datagram is there; False when the time is over."""

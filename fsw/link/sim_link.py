@@ -148,8 +148,10 @@ class SimLink:
     def newest(self) -> SensorFrame | None:
         """The newest of the steps that are there; what came with all of them is in the inbox."""
         newest = None
-        while (datagram := self._endpoint.receive_waiting()) is not None:
+        datagram = self._endpoint.receive_waiting()
+        while datagram is not None:
             newest = self._read(datagram) or newest
+            datagram = self._endpoint.receive_waiting() if self._endpoint.has_waiting() else None
         self._steps.looks += 1
         if newest is not None:
             self._steps.note_time()

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import math
 import socket
-import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
@@ -16,7 +15,6 @@ from fsw.link.inbox import Inbox
 from fsw.link.sim_link import Pacing, SimLink
 from fsw.link.wire import message_ids as ids
 from fsw.measurements import ImuSample, JointSample, PressureSample
-from fsw.runtime.clock import now_us
 from fsw.signals import (
     BatteryReading,
     CommandAck,
@@ -67,6 +65,16 @@ def readings(t_us: int) -> SensorReadings:
     )
 
 
+class HandClock:
+    """A machine that is busy with something else changes nothing."""
+
+    def __init__(self) -> None:
+        self.now_us = 5_000_000
+
+    def __call__(self) -> int:
+        return self.now_us
+
+
 @dataclass
 class Wire:
     """A simulator's socket and the link under test."""
@@ -74,6 +82,7 @@ class Wire:
     simulator: socket.socket
     link: SimLink
     inbox: Inbox
+    clock: HandClock
 
     def send(self, datagram: bytes) -> None:
         self.simulator.send(datagram)
@@ -88,12 +97,13 @@ def wire() -> Iterator[Wire]:
     simulator.bind(("127.0.0.1", 0))
     simulator.settimeout(0.5)
     inbox = Inbox()
-    link = SimLink(simulator.getsockname(), inbox, FACTS, now_us)
+    clock = HandClock()
+    link = SimLink(simulator.getsockname(), inbox, FACTS, clock)
     link.announce()
     hello, vehicle = simulator.recvfrom(2048)
     assert [frame.message_id for frame in split(hello)] == [ids.HEARTBEAT]
     simulator.connect(vehicle)
-    yield Wire(simulator, link, inbox)
+    yield Wire(simulator, link, inbox, clock)
     link.close()
     simulator.close()
 
@@ -236,6 +246,7 @@ class Flight:
     def take(self) -> int | None:
         """The vehicle's time of the step that came; it is answered."""
         link = self.wire.link
+        self.wire.clock.now_us += 2_000
         in_real_time = link.pacing is Pacing.REALTIME
         sensors = link.newest() if in_real_time else link.wait_for_step()
         if sensors is None:
@@ -375,7 +386,7 @@ def test_frames_that_were_missing_for_long_are_no_jump(wire: Wire) -> None:
     flight = Flight(wire, lockstep=False)
     flight.step(1_004_000)
     flight.step(1_006_000)
-    time.sleep(0.25)
+    wire.clock.now_us += 250_000
     assert flight.step(1_206_000) == 1_206_000
     assert (flight.jumps(), wire.link.notices) == (0, [])
 
