@@ -35,6 +35,7 @@ _SETTLED_S: Final = 120.0  # from here on nothing may grow
 _LEAST_GLANCES: Final = 24  # two minutes, to say anything
 _MOST_GROWTH_MB_H: Final = 10.0
 _MOST_FLIGHTS: Final = 3  # an hour: what is injected should not end them
+_MOST_GROUNDED: Final = 0.5  # of the time; a soak of a vehicle that stands says little
 _RECORDED: Final = ["COMMAND_LONG", "COMMAND_INT", "COMMAND_ACK"]
 _PARAMETERS: Final = "# Pandion\n1\t1\tSYS_FAILURE_EN\t1\t6\n"
 
@@ -175,7 +176,9 @@ def judge(flights: list[Soaked]) -> list[Requirement]:
             for what, value in grown(glances).items():
                 kind = f"{name.split()[0]}: {what}"
                 growth[kind] = max(growth[kind], value)
-    hours = sum(one.flown_s for one in flights) / 3600.0
+    flown_s = max(sum(one.flown_s for one in flights), 1.0)
+    aloft_s = sum(one.heard["airborne_s"] for one in flights)
+    hours = flown_s / 3600.0
     rows = [
         Requirement("commands without an answer within 1 s", unanswered, 0, ""),
         Requirement("command to answer, longest", max(answers, default=9.9), ANSWER_S, "s"),
@@ -187,6 +190,7 @@ def judge(flights: list[Soaked]) -> list[Requirement]:
             "",
         ),
         Requirement("flights an hour", len(flights) / max(hours, 1.0), _MOST_FLIGHTS, ""),
+        Requirement("share of the time on the ground", 1.0 - aloft_s / flown_s, _MOST_GROUNDED, ""),
     ]
     # What did not live for long enough is not judged, and says nothing.
     unjudged = sum(f"{name}: memory" not in growth for name in ("fsw", "sitl"))

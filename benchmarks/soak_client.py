@@ -18,6 +18,7 @@ _FAULT_EVERY_S: Final = 10.0
 _FAULT_LASTS_S: Final = 1.5
 _BEAT_S: Final = 0.5
 _TAKES_S: Final = 8.0  # from one takeoff to the next
+_PATIENCE_S: Final = 10.0  # without being armed, until the flight software is restarted
 _PARAMETERS: Final = ("SYS_FAILURE_EN", "COM_DL_LOSS_T", "BAT_LOW_THR", "JNT_ARMATURE")
 _NAN: Final = float("nan")
 _UNITS: Final = (
@@ -50,6 +51,8 @@ class Heard:
     parameters_missing: int = 0
     faults: int = 0
     takeoffs: int = 0
+    restarts: int = 0
+    airborne_s: float = 0.0
     texts: int = 0
     largest_gap_s: float = 0.0  # between two datagrams of the vehicle
 
@@ -69,6 +72,8 @@ class Client(threading.Thread):
         self._waiting: tuple[int, float] | None = None
         self._parameter: tuple[str, float] | None = None
         self._flies = self._armed = False
+        self._refused_s = 0.0  # since when it was not armed though it was to be; 0: it was
+        self._seen_s = 0.0  # when it said last whether it flies
         self._beat_s = self._next_s = self._fault_s = self._takes_off_s = self._heard_s = 0.0
         self._fault: tuple[int, float] | None = None  # unit, and when it ends
         self._ended = False
@@ -146,7 +151,7 @@ class Client(threading.Thread):
             if now_s < self._takes_off_s:
                 return self._random.choice(_ASKED)
             if not self._armed:
-                return _command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
+                return self._arming(now_s)
             self.heard.takeoffs += 1
             self._takes_off_s = now_s + _TAKES_S
             height = -1.2 - 0.6 * draw
@@ -159,6 +164,15 @@ class Client(threading.Thread):
             place = (self._random.uniform(-1.0, 1.0), self._random.uniform(-1.0, 1.0))
             return (dialect.MAV_CMD_DO_REPOSITION, (-1.0, 1.0, 0.0, _NAN, *place, -1.4))
         return self._random.choice(_ASKED)
+
+    def _arming(self, now_s: float) -> Asked:
+        """Arm it; what failed in the last flight is well again, and it has to be told."""
+        self._refused_s = self._refused_s or now_s
+        if now_s - self._refused_s < _PATIENCE_S:
+            return _command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
+        self._refused_s = 0.0
+        self.heard.restarts += 1
+        return _command(dialect.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, 1.0)
 
     def _take(self, message: Any, now_s: float) -> None:
         name, heard = message.get_type(), self.heard
@@ -173,8 +187,13 @@ class Client(threading.Thread):
                 self._parameter = None
         elif name == "HEARTBEAT":
             self._armed = bool(message.base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED)
+            if self._armed:
+                self._refused_s = 0.0
         elif name == "EXTENDED_SYS_STATE":
+            if self._flies:
+                heard.airborne_s += now_s - self._seen_s
             self._flies = message.landed_state == dialect.MAV_LANDED_STATE_IN_AIR
+            self._seen_s = now_s
         elif name == "STATUSTEXT":
             heard.texts += 1
 

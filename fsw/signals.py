@@ -374,6 +374,7 @@ class Order(Enum):
     PAUSE_MISSION = "pause mission"
     CONTINUE_MISSION = "continue mission"
     CHECK_ARMING = "check arming"
+    RESTART = "restart"
     NOTHING = "nothing"  # accepted, and nothing to do
 
 

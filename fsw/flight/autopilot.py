@@ -37,6 +37,7 @@ from fsw.flight.modes.offboard import accept_setpoints, report
 from fsw.flight.plan_exchange import PlanExchange, measured_state, nominal_at_rest, requested
 from fsw.flight.quiet_ticks import QuietTicks
 from fsw.flight.reference_horizon import ReferenceHorizon
+from fsw.flight.restart import restarted
 from fsw.flight.safe_set import SafeSetCheck
 from fsw.flight.safety_watch import SafetyWatch
 from fsw.flight.sensed_state import CaughtUp, SensedState
@@ -184,6 +185,8 @@ class Autopilot:
         """The part of a tick that the vehicle waits for: from the sensors to the actuators."""
         now_us = inputs.sensors.t_us
         texts: list[StatusText] = []
+        if state.vehicle.restarts:
+            state = restarted(state)
         fusion, trust, caught = state.fusion, state.trust, None
         if inputs.samples or fusion is not None:
             state, fusion, estimate, caught = self._sensed.estimate(state, inputs)

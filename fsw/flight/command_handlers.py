@@ -76,6 +76,7 @@ class Decision:
     mission_step: int | None = None  # to fly next
     look_at: NewHeading | None = None
     speed: ChangeSpeed | None = None
+    restart: bool = False
 
 
 Modes = Mapping[Mode, FlightMode]
@@ -326,6 +327,13 @@ def _check_arming(context: CommandContext, modes: Modes) -> Decision:
     return Decision(ACCEPTED, refusal or "ready to arm")
 
 
+def _restart(context: CommandContext, modes: Modes) -> Decision:
+    """Begin anew: what had failed is well again, says the operator."""
+    if _is_armed(context):
+        return Decision(DENIED, "not restarted: the vehicle is armed; disarm first")
+    return Decision(ACCEPTED, "flight software restarted", restart=True)
+
+
 def _nothing(context: CommandContext, modes: Modes) -> Decision:
     return Decision(ACCEPTED)
 
@@ -335,6 +343,7 @@ _ORDERS: Final[dict[Order, Callable[[CommandContext, Modes], Decision]]] = {
     Order.PAUSE_MISSION: _pause_mission,
     Order.CONTINUE_MISSION: _continue_mission,
     Order.CHECK_ARMING: _check_arming,
+    Order.RESTART: _restart,
     Order.NOTHING: _nothing,
 }
 

@@ -281,6 +281,8 @@ class Commander:
             vehicle = replace(vehicle, speed=decision.speed.speed)
             flight = replace(state.mission.flight, speed=decision.speed.speed)
             state = replace(state, mission=replace(state.mission, flight=flight))
+        if decision.restart:
+            vehicle = replace(vehicle, restarts=True)
         if vehicle is not state.vehicle:
             state = replace(state, vehicle=vehicle)
         if decision.look_at is not None:

@@ -74,6 +74,7 @@ class VehicleMemory:
     failsafe_from: Mode | None = None  # what was flown when a failsafe took over
     look_at: Vec3 | None = None  # m, where the nose is to point
     speed: float | None = None  # m/s, on the way to places; None: as usual
+    restarts: bool = False  # the next tick begins anew
 
     @property
     def armed(self) -> bool:

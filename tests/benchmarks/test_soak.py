@@ -15,7 +15,7 @@ from messages.frames import FrameWriter
 
 STEADY = [Glance(5.0 * k, 100.0, 8, 4) for k in range(100)]
 FINE = Soaked(
-    heard={"answered_s": [0.01], "unanswered": [], "parameters_missing": 0},
+    heard={"answered_s": [0.01], "unanswered": [], "parameters_missing": 0, "airborne_s": 400.0},
     dropped=0,
     read=1,
     written=1,
@@ -44,6 +44,10 @@ def test_a_leak_of_memory_and_of_handles_is_seen() -> None:
     [
         (FINE, set()),
         (replace(FINE, written=0), {"commands that were read and not answered"}),
+        (
+            replace(FINE, heard=FINE.heard | {"airborne_s": 200.0}),
+            {"share of the time on the ground"},
+        ),
         (
             replace(FINE, heard=FINE.heard | {"unanswered": [(3.0, 400)]}),
             {"commands without an answer within 1 s"},

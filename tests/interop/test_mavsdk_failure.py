@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import pytest
 from mavsdk import System
-from mavsdk.plugins.action import Action
+from mavsdk.plugins.action import Action, ActionError
 from mavsdk.plugins.events import Events
 from mavsdk.plugins.failure import Failure, FailureError, FailureType, FailureUnit
 from mavsdk.plugins.param import Param
@@ -48,6 +48,24 @@ def test_a_failure_is_injected_seen_and_ended(system: System) -> None:
         failure.inject(FailureUnit.SYSTEM_RC_SIGNAL, FailureType.OFF, 0)
     assert eventually(lambda: any("no unit 104" in text for text in texts)), texts
     Param(system).set_param_float("SYS_FAILURE_EN", 0.0)
+
+
+@pytest.mark.requirement("REQ-MODE-12")
+def test_it_restarts_on_the_ground_and_takes_off_again(system: System) -> None:
+    telemetry, action = Telemetry(system), Action(system)
+    texts: list[str] = []
+    heard = telemetry.subscribe_status_text(lambda text, _: texts.append(text.text))
+    action.reboot()
+    assert eventually(lambda: "flight software restarted" in texts), texts
+    assert eventually(telemetry.health_all_ok), telemetry.health()
+    with pytest.raises(ActionError):
+        action.shutdown()
+    action.arm()
+    with pytest.raises(ActionError):
+        action.reboot()
+    assert eventually(lambda: any("disarm first" in text for text in texts)), texts
+    action.disarm()
+    telemetry.unsubscribe_status_text(heard)
 
 
 @pytest.mark.long

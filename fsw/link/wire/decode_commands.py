@@ -217,6 +217,16 @@ def _calibrate(request: CommandRequest, _: Locate) -> CommandAction:
     raise _InvalidError("[cal] calibration failed: these sensors need none")
 
 
+def _restart(request: CommandRequest, _: Locate) -> CommandAction:
+    """Parameter 1 is what the autopilot is to do; other parameters are of other computers."""
+    wish = request.params[0]
+    if wish == 1.0:
+        return Order.RESTART
+    if wish == 0.0:
+        return Order.NOTHING
+    raise _InvalidError(f"not restarted: param1 = {wish:g}; 1 restarts, the console shuts down")
+
+
 def _test_actuator(request: CommandRequest, _: Locate) -> CommandAction:
     reason = "rotors and joints move only in closed loop; arm and fly instead"
     raise _InvalidError(f"no actuator test: {reason}")
@@ -298,6 +308,7 @@ _READERS: Final[dict[int, Callable[[CommandRequest, Locate], CommandAction]]] = 
     209: _test_actuator,  # DO_MOTOR_TEST
     224: _set_mission_step,  # DO_SET_MISSION_CURRENT
     241: _calibrate,  # PREFLIGHT_CALIBRATION
+    246: _restart,  # PREFLIGHT_REBOOT_SHUTDOWN
     262: _set_standard_mode,  # DO_SET_STANDARD_MODE
     300: _start_mission,  # MISSION_START
     310: _test_actuator,  # ACTUATOR_TEST

@@ -159,7 +159,9 @@ def test_asking_again_for_what_is_so_is_accepted_and_changes_nothing(
 
 
 def test_shutdown_belongs_to_the_simulator_s_link_alone() -> None:
-    assert ask(STANDING, SHUTDOWN, 2.0).result == UNSUPPORTED
+    decision = ask(STANDING, SHUTDOWN, 2.0)
+    assert decision.result == DENIED
+    assert "the console shuts down" in decision.reason
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,35 @@
+"""What a restart of the flight software on command leaves as it is.
+
+It is how an operator says that what had failed is well again. As after a start of the process,
+nothing is known of actuators, estimate and modes, and a termination is over. What the ground has
+sent stays: tuning, safe set, fence, mission and rally points. So do the battery's charge and the
+counts of the flight.
+"""
+
+from __future__ import annotations
+
+from fsw.flight.state import (
+    FlightState,
+    OffboardMemory,
+    PlanMemory,
+    SafetyMemory,
+    VehicleMemory,
+)
+from fsw.flight.uncertain_clearance import KeptSet
+
+
+def restarted(state: FlightState) -> FlightState:
+    """The state from which the next tick begins anew."""
+    vehicle, plan, offboard = state.vehicle, state.plan, state.offboard
+    return FlightState(
+        # What was answered stays as well: the same command, sent again, is no second restart.
+        vehicle=VehicleMemory(gcs_heard_us=vehicle.gcs_heard_us, answered=vehicle.answered),
+        mission=state.mission,
+        kept=KeptSet().of(state.mission.safe_set),
+        tuning=state.tuning,
+        plan=PlanMemory(next_id=plan.next_id, counters=plan.counters),
+        offboard=OffboardMemory(accepted=offboard.accepted, refused=offboard.refused),
+        battery=state.battery,
+        safety=SafetyMemory(counters=state.safety.counters),
+        host=state.host,
+    )

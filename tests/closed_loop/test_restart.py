@@ -1,0 +1,154 @@
+"""A restart on command: what had failed is well again, if it is, and what the ground has stays."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import replace
+
+import pytest
+
+from fsw.flight.restart import restarted
+from fsw.flight.state import FlightState, OffboardMemory, PlanMemory, SafetyMemory, VehicleMemory
+from fsw.signals import CommandResult, Mode, PlannerCounters, SafetyCounters
+from sitl.scenario_file import parse_scenario
+from tests.closed_loop.harness import ARM, TAKEOFF, Flight, command, hover
+
+REBOOT, TERMINATE = 246, 185
+ACCEPTED, DENIED = CommandResult.ACCEPTED, CommandResult.DENIED
+# Weak until the vehicle stands, where no rotor can show what it gives, and well again then.
+SCENARIO = """
+duration_s = inf
+[start]
+kind = "ground"
+[pilot]
+plan = "none"
+[trajectory]
+kind = "hold"
+position_m = [0.0, 0.0, -1.2]
+[[zones]]
+name = "wall"
+shape = "half-space"
+normal = [-1.0, 0.0, 0.0]
+offset_m = -3.0
+clearance_m = 0.1
+[[faults]]
+unit = "motor"
+kind = "weak"
+instance = 2
+share = 0.7
+start_s = 3.5
+duration_s = 5.0
+"""
+
+
+def results_of(flight: Flight, number: int) -> list[int]:
+    return [result for asked, result in flight.results if asked == number]
+
+
+def take_off(flight: Flight) -> None:
+    flight.step(command(ARM, 1.0))
+    flight.step(command(TAKEOFF))
+
+
+@pytest.mark.requirement("REQ-MODE-12", "REQ-ACT-6")
+@pytest.mark.parametrize("suite", ["perfect", "mocap"])
+def test_what_had_failed_flies_again_after_a_restart_and_not_before(suite: str) -> None:
+    flight = Flight(parse_scenario(SCENARIO, "restart", suite))
+    flight.run(1.0)
+    take_off(flight)
+    flight.run(9.0)
+    assert flight.modes[-2:] == [Mode.LAND, Mode.DISARMED], flight.texts
+    flight.step(command(ARM, 1.0))
+    assert results_of(flight, ARM)[-1] != ACCEPTED
+    assert "rotor 2 (left)" in flight.texts[-1]
+    safe_set, home = flight.state.mission.safe_set, flight.state.vehicle.home
+    assert safe_set.zones
+
+    flight.step(command(REBOOT, 1.0))
+    assert flight.results[-1] == (REBOOT, ACCEPTED)
+    assert flight.texts[-1] == "flight software restarted"
+    flight.run(1.0)  # the estimator looks at where it is once more
+    assert flight.snapshot.actuators_found.rotor == 0
+    assert flight.state.mission.safe_set is safe_set
+    assert flight.snapshot.home is not None
+    assert home is not None
+    take_off(flight)
+    flight.run(4.5)
+    assert results_of(flight, ARM)[-1] == ACCEPTED, flight.texts[-3:]
+    assert flight.mode is Mode.HOLD
+    assert flight.sim.truth().p_WB[2] < -1.0
+    assert flight.snapshot.failures == ()
+
+
+def test_the_same_command_sent_again_is_no_second_restart() -> None:
+    flight = Flight(parse_scenario(SCENARIO, "restart"))
+    flight.run(0.5)
+    flight.step(command(REBOOT, 1.0))
+    flight.run(0.2)
+    index = flight.state.index
+    flight.step(command(REBOOT, 1.0, confirmation=1))
+    flight.run(0.2)
+    assert flight.state.index > index
+    assert results_of(flight, REBOOT) == [ACCEPTED, ACCEPTED]
+    assert flight.texts.count("flight software restarted") == 1
+
+
+@pytest.mark.requirement("REQ-MODE-12")
+def test_in_flight_it_is_denied_and_the_flight_goes_on() -> None:
+    flight = Flight(hover())
+    flight.step(command(ARM, 1.0))
+    flight.run(0.5)
+    flight.step(command(REBOOT, 1.0))
+    assert flight.results[-1] == (REBOOT, DENIED)
+    assert flight.texts[-1] == "not restarted: the vehicle is armed; disarm first"
+    flight.run(0.5)
+    assert flight.mode is Mode.HOLD
+    for wish, result in ((0.0, ACCEPTED), (2.0, DENIED), (3.0, DENIED)):
+        flight.step(command(REBOOT, wish))
+        assert flight.results[-1] == (REBOOT, result), wish
+
+
+@pytest.mark.requirement("REQ-MODE-7", "REQ-MODE-12")
+def test_a_termination_is_over_after_a_restart() -> None:
+    flight = Flight(hover())
+    flight.step(command(ARM, 1.0))
+    flight.run(0.1)
+    flight.step(command(TERMINATE, 1.0))
+    flight.step()
+    assert flight.mode is Mode.FAULT
+    flight.step(command(REBOOT, 1.0))
+    flight.step()
+    assert flight.mode is Mode.DISARMED
+
+
+@pytest.mark.requirement("REQ-MODE-12")
+def test_only_what_the_ground_has_and_what_is_counted_stays() -> None:
+    flight = Flight(parse_scenario(SCENARIO, "restart", "mocap"))
+    flight.run(1.0)
+    take_off(flight)
+    flight.run(5.0)
+    counted = replace(
+        flight.state,
+        tuning=(("a.gain", 2.0),),
+        safety=SafetyMemory(breach_us=5, counters=SafetyCounters(breaches=1)),
+        offboard=OffboardMemory(motion_us=7, accepted=3, refused=2),
+    )
+    after, fresh = restarted(counted), FlightState()
+    kept = {"mission", "tuning", "battery", "host"}
+    for name in kept:
+        assert getattr(after, name) is getattr(counted, name)
+    assert after.kept.source is counted.mission.safe_set
+    partly = {
+        "safety": SafetyMemory(counters=SafetyCounters(breaches=1)),
+        "offboard": OffboardMemory(accepted=3, refused=2),
+        "plan": PlanMemory(next_id=counted.plan.next_id, counters=counted.plan.counters),
+        "vehicle": VehicleMemory(
+            gcs_heard_us=counted.vehicle.gcs_heard_us, answered=counted.vehicle.answered
+        ),
+    }
+    assert counted.plan.counters != PlannerCounters()
+    for name, expected in partly.items():
+        assert getattr(after, name) == expected, name
+    for field in dataclasses.fields(FlightState):
+        if field.name not in {*kept, *partly, "kept"}:
+            assert getattr(after, field.name) == getattr(fresh, field.name), field.name
