@@ -156,9 +156,9 @@ class Client(threading.Thread):
             self._takes_off_s = now_s + _TAKES_S
             height = -1.2 - 0.6 * draw
             return _command(dialect.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, _NAN, 0, 0, height)
-        if draw < 0.01:
+        if draw < 0.003:  # once in a minute or so; returning lands as well
             return _mode(4, 6)  # land
-        if draw < 0.05:
+        if draw < 0.02:
             return self._random.choice((_mode(4, 3), _mode(4, 5), _mode(6), _mode(4, 4)))
         if draw < 0.2:
             place = (self._random.uniform(-1.0, 1.0), self._random.uniform(-1.0, 1.0))
