@@ -9,6 +9,7 @@ from fsw.estimation.sensor_fusion import FusionMemory
 from fsw.flight.arming import NO_ESTIMATE, joined
 from fsw.flight.estimator_report import AIDS_PLACE
 from fsw.flight.failsafe import ROWS, Action, Condition
+from fsw.flight.modes.offboard import report
 from fsw.flight.state import FlightState
 from fsw.signals import (
     Answer,
@@ -89,10 +90,13 @@ def nothing_known(
         actuators=answer.actuators,
         plan=None,
         plan_status=empty.plan.status,
-        counters=empty.plan.counters,
+        counters=state.plan.counters,
         constraints=empty.constraints,
         failures=(Condition.ESTIMATE_INVALID.value,),
         battery=state.battery,
+        offboard=report(state, t_us),
+        mission=state.mission.flight.progress,
+        safety=state.safety.counters,
         arming_refusal=_REFUSAL,
         log_failure=state.host.log_failure,
         arming=_REPORT,

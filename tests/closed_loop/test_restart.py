@@ -67,7 +67,14 @@ def test_what_had_failed_flies_again_after_a_restart_and_not_before(suite: str) 
     flight.step(command(REBOOT, 1.0))
     assert flight.results[-1] == (REBOOT, ACCEPTED)
     assert flight.texts[-1] == "flight software restarted"
-    flight.run(1.0)  # the estimator looks at where it is once more
+    before = flight.snapshot
+    flight.step()
+    # The estimator looks at where it is once more; what is counted is not forgotten meanwhile.
+    shown = flight.snapshot
+    assert before.counters.plans > 0
+    assert (shown.counters, shown.safety) == (before.counters, before.safety)
+    assert shown.mission == before.mission
+    flight.run(1.0)
     assert flight.snapshot.actuators_found.rotor == 0
     assert flight.state.mission.safe_set is safe_set
     assert flight.snapshot.home is not None
