@@ -37,7 +37,12 @@ _MOST_GROWTH_MB_H: Final = 10.0
 _MOST_FLIGHTS: Final = 3  # an hour: what is injected should not end them
 _MOST_GROUNDED: Final = 0.5  # of the time; a soak of a vehicle that stands says little
 _RECORDED: Final = ["COMMAND_LONG", "COMMAND_INT", "COMMAND_ACK"]
-_PARAMETERS: Final = "# Pandion\n1\t1\tSYS_FAILURE_EN\t1\t6\n"
+# A battery lasts 16 minutes: an empty one is told, and neither lands the vehicle nor keeps it down.
+_PARAMETERS: Final = """# Pandion
+1\t1\tSYS_FAILURE_EN\t1\t6
+1\t1\tCOM_LOW_BAT_ACT\t0\t6
+1\t1\tCOM_ARM_BAT_MIN\t0\t9
+"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

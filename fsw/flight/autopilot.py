@@ -26,7 +26,7 @@ from fsw.estimation.frame_trust import FrameTrust
 from fsw.estimation.sensor_fusion import FusionMemory
 from fsw.flight.accuracy_watch import AccuracyWatch
 from fsw.flight.before_estimate import nothing_known, told
-from fsw.flight.commander import Commander, acknowledgement
+from fsw.flight.commander import Commander
 from fsw.flight.damage_watch import DamageWatch
 from fsw.flight.descent import Descent
 from fsw.flight.exact_state import ExactState
@@ -58,7 +58,6 @@ from fsw.signals import (
     Answer,
     BatteryState,
     CommandAck,
-    CommandResult,
     ConstraintKind,
     EndEffectorTarget,
     FlightSnapshot,
@@ -322,11 +321,11 @@ class Autopilot:
 
     def _blind(self, state: FlightState, inputs: TickInputs, texts: list[StatusText]) -> Controlled:
         """Before the first estimate: actuators off, commands refused."""
-        acks = [
-            acknowledgement(command, CommandResult.TEMPORARILY_REJECTED)
-            for command in inputs.commands
-        ]
-        if acks:
+        now_us = inputs.sensors.t_us
+        state, acks, refused = self._commander.handle_before_estimate(
+            state, inputs.commands, now_us
+        )
+        if refused:
             reason = "command refused: there is no valid state estimate yet"
             texts.append(StatusText(Severity.CRITICAL, reason, prompt=True))
         texts += told(state, self._tick_us)

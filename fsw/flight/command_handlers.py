@@ -331,6 +331,11 @@ def _restart(context: CommandContext, modes: Modes) -> Decision:
     """Begin anew: what had failed is well again, says the operator."""
     if _is_armed(context):
         return Decision(DENIED, "not restarted: the vehicle is armed; disarm first")
+    if not context.rests:
+        return Decision(LATER, "not restarted: the vehicle must have been at rest for a second")
+    if context.mode is Mode.FAULT:
+        reason = "flight software restarted by {sender}; the termination is over"
+        return Decision(ACCEPTED, reason, alarming=True, restart=True)
     return Decision(ACCEPTED, "flight software restarted", restart=True)
 
 

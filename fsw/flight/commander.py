@@ -5,6 +5,9 @@ Every function takes a state and returns one; almost every tick it is the same o
 
 from __future__ import annotations
 
+import math
+from typing import Final
+
 from fsw.control.cascade import at_rest, in_hover
 from fsw.flight import arming, failsafe
 from fsw.flight.arming_health import arming_health
@@ -39,6 +42,7 @@ from fsw.signals import (
     MissionUpdate,
     Mode,
     MotionSetpoint,
+    Order,
     Severity,
     StateEstimate,
     StatusText,
@@ -47,6 +51,9 @@ from fsw.signals import (
 
 _ARMED = ArmingReport()  # nothing to check
 _DISARMED = Mode.DISARMED  # found in a tenth of the time
+_REST_US: Final = 1_000_000  # without thrust, for which what falls is fast or has come down
+_REST_SPEED: Final = 0.2  # m/s
+_REST_RATE: Final = 0.5  # rad/s
 
 
 class Commander:
@@ -76,6 +83,9 @@ class Commander:
         acks = []
         for command in commands:
             request, memory = command.request, state.vehicle.answered
+            if state.vehicle.restarts:  # it would be undone
+                acks.append(acknowledgement(command, CommandResult.TEMPORARILY_REJECTED))
+                continue
             before = answered_before(memory, request, estimate.t_us)
             if before is not None:
                 result = before.result
@@ -88,6 +98,31 @@ class Commander:
                 state = replace(state, vehicle=replace(state.vehicle, answered=memory))
             acks.append(acknowledgement(command, result))
         return state, acks
+
+    def handle_before_estimate(
+        self, state: FlightState, commands: tuple[Command, ...], now_us: int
+    ) -> tuple[FlightState, list[CommandAck], bool]:
+        """Refuse commands, but for a restart, while nothing is known; whether any was refused.
+
+        One that is sent again, from before, is acknowledged as it was.
+        """
+        acks: list[CommandAck] = []
+        refused = False
+        for command in commands:
+            request, result = command.request, CommandResult.TEMPORARILY_REJECTED
+            before = answered_before(state.vehicle.answered, request, now_us)
+            if before is not None:
+                acks.append(acknowledgement(command, before.result))
+                continue
+            if command.action is Order.RESTART:
+                result = CommandResult.ACCEPTED
+                memory = remember(state.vehicle.answered, request, result, now_us)
+                state = replace(
+                    state, vehicle=replace(state.vehicle, answered=memory, restarts=True)
+                )
+            refused = refused or result != CommandResult.ACCEPTED
+            acks.append(acknowledgement(command, result))
+        return state, acks, refused
 
     def context(self, state: FlightState, estimate: StateEstimate) -> CommandContext:
         """The state that a decision may depend on."""
@@ -120,6 +155,7 @@ class Commander:
             yaw_rate=setpoint_limits.yaw_rate,
             acceleration=setpoint_limits.acceleration,
             failures_allowed=limits.failure_injection == 1,
+            rests=_rests(state, estimate),
         )
 
     def arming_report(
@@ -412,7 +448,19 @@ def _changes_course(decision: Decision) -> bool:
         or decision.intended_mode is not None
         or decision.goal is not None
         or decision.joints is not None
+        or decision.restart
     )
+
+
+def _rests(state: FlightState, estimate: StateEstimate) -> bool:
+    """Whether a vehicle without thrust has come to rest, as far as is known.
+
+    Where it has come down, and how it lies, height and attitude say nothing.
+    """
+    if state.invalid_ticks:
+        return True
+    slow = math.hypot(*estimate.v_WB) < _REST_SPEED and math.hypot(*estimate.w_WB_B) < _REST_RATE
+    return slow and estimate.t_us - state.vehicle.mode_begin_us >= _REST_US
 
 
 def _without_answers(state: FlightState) -> FlightState:

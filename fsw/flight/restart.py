@@ -26,6 +26,9 @@ def restarted(state: FlightState) -> FlightState:
         vehicle=VehicleMemory(gcs_heard_us=vehicle.gcs_heard_us, answered=vehicle.answered),
         mission=state.mission,
         kept=KeptSet().of(state.mission.safe_set),
+        # Until margins are known anew, those of where it stands count for arming.
+        constraints=state.constraints,
+        aiding=state.aiding,
         tuning=state.tuning,
         plan=PlanMemory(next_id=plan.next_id, counters=plan.counters),
         offboard=OffboardMemory(accepted=offboard.accepted, refused=offboard.refused),

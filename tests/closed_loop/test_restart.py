@@ -9,12 +9,23 @@ import pytest
 
 from fsw.flight.restart import restarted
 from fsw.flight.state import FlightState, OffboardMemory, PlanMemory, SafetyMemory, VehicleMemory
-from fsw.signals import CommandResult, Mode, PlannerCounters, SafetyCounters
+from fsw.shapes.half_space import wall
+from fsw.signals import (
+    CommandResult,
+    MessageSource,
+    Mode,
+    PlannerCounters,
+    SafeSet,
+    SafeSetAnnouncement,
+    SafetyCounters,
+)
+from sitl.scenario import Hold
 from sitl.scenario_file import parse_scenario
-from tests.closed_loop.harness import ARM, TAKEOFF, Flight, command, hover
+from tests.closed_loop.harness import ARM, TAKEOFF, Flight, command, hover, on_the_ground
 
 REBOOT, TERMINATE = 246, 185
 ACCEPTED, DENIED = CommandResult.ACCEPTED, CommandResult.DENIED
+LATER = CommandResult.TEMPORARILY_REJECTED
 # Weak until the vehicle stands, where no rotor can show what it gives, and well again then.
 SCENARIO = """
 duration_s = inf
@@ -116,16 +127,96 @@ def test_in_flight_it_is_denied_and_the_flight_goes_on() -> None:
 
 
 @pytest.mark.requirement("REQ-MODE-7", "REQ-MODE-12")
-def test_a_termination_is_over_after_a_restart() -> None:
-    flight = Flight(hover())
-    flight.step(command(ARM, 1.0))
+def test_a_termination_is_over_after_a_restart_by_somebody_who_is_named() -> None:
+    flight = Flight(on_the_ground())
     flight.run(0.1)
+    flight.step(command(ARM, 1.0))
     flight.step(command(TERMINATE, 1.0))
-    flight.step()
+    flight.run(1.1)
     assert flight.mode is Mode.FAULT
     flight.step(command(REBOOT, 1.0))
+    assert flight.texts[-1] == "flight software restarted by 255/190; the termination is over"
     flight.step()
     assert flight.mode is Mode.DISARMED
+
+
+@pytest.mark.requirement("REQ-MODE-12")
+@pytest.mark.parametrize("ended_by", [(TERMINATE, 1.0), (ARM, 0.0, 21196.0)])
+def test_what_falls_is_not_restarted(ended_by: tuple[float, ...]) -> None:
+    flight = Flight(replace(hover(), trajectory=Hold((0.0, 0.0, -12.0))))
+    flight.step(command(ARM, 1.0))
+    flight.run(0.1)
+    number, *params = ended_by
+    flight.step(command(int(number), *params))
+    for _ in range(8):
+        for _ in range(50):
+            flight.step()
+        flight.step(command(REBOOT, 1.0))
+        assert flight.results[-1] == (REBOOT, LATER)
+    assert flight.texts[-1] == "not restarted: the vehicle must have been at rest for a second"
+
+
+@pytest.mark.requirement("REQ-MODE-12")
+def test_what_follows_in_the_same_tick_is_not_carried_out_and_can_be_sent_again() -> None:
+    flight = Flight(parse_scenario(SCENARIO, "restart", "mocap"))
+    flight.run(0.5)
+    flight.step(command(REBOOT, 1.0), command(ARM, 1.0))
+    assert flight.results[-2:] == [(REBOOT, ACCEPTED), (ARM, LATER)]
+    flight.run(0.4)
+    flight.step(command(ARM, 1.0))
+    assert flight.results[-1] == (ARM, ACCEPTED)
+    assert flight.mode is Mode.HOLD
+
+
+def test_what_another_had_chosen_before_is_done_if_it_is_sent_again() -> None:
+    flight = Flight(parse_scenario(SCENARIO, "restart"))
+    flight.run(0.5)
+    flight.step(command(TAKEOFF))
+    reboot = command(REBOOT, 1.0)
+    flight.step(replace(reboot, request=replace(reboot.request, source_system=254)))
+    flight.run(0.1)
+    assert flight.snapshot.intended_mode is Mode.HOLD
+    flight.step(command(TAKEOFF))
+    assert flight.snapshot.intended_mode is Mode.TAKEOFF
+
+
+def test_while_nothing_is_known_it_is_answered_again_and_may_be_asked_for() -> None:
+    silent = [False]
+    flight = Flight(
+        parse_scenario(SCENARIO, "restart", "mocap"),
+        spoil_samples=lambda samples: () if silent[0] else samples,
+    )
+    flight.run(0.5)
+    silent[0] = True
+    flight.step(command(REBOOT, 1.0))
+    flight.run(0.1)
+    flight.step(command(REBOOT, 1.0, confirmation=1))
+    assert results_of(flight, REBOOT) == [ACCEPTED, ACCEPTED]
+    flight.run(4.0)
+    flight.step(command(ARM, 1.0), command(REBOOT, 1.0))
+    assert flight.results[-2:] == [(ARM, LATER), (REBOOT, ACCEPTED)]
+    silent[0] = False
+    flight.run(1.0)
+    flight.step(command(ARM, 1.0))
+    assert flight.mode is Mode.HOLD
+
+
+@pytest.mark.requirement("REQ-MODE-12", "REQ-ARM-6")
+@pytest.mark.parametrize("suite", ["perfect", "mocap"])
+def test_outside_its_safe_set_it_cannot_be_armed_in_any_tick_after_a_restart(suite: str) -> None:
+    flight = Flight(parse_scenario(SCENARIO, "restart", suite), announces=False)
+    flight.run(1.0)
+    behind = SafeSet((wall((0.5, 0.0, 0.0), 0.0, 0.1),))
+    flight.streamed = {"announced": (SafeSetAnnouncement(MessageSource(1, 195, "sim"), behind),)}
+    flight.run(0.5)
+    flight.streamed = {}
+    flight.step(command(ARM, 1.0))
+    assert flight.results[-1][1] != ACCEPTED
+    assert "safe set" in flight.texts[-1]
+    flight.step(command(REBOOT, 1.0))
+    for _ in range(250):
+        flight.step(command(ARM, 1.0))
+        assert flight.results[-1][1] != ACCEPTED
 
 
 @pytest.mark.requirement("REQ-MODE-12")
@@ -141,7 +232,7 @@ def test_only_what_the_ground_has_and_what_is_counted_stays() -> None:
         offboard=OffboardMemory(motion_us=7, accepted=3, refused=2),
     )
     after, fresh = restarted(counted), FlightState()
-    kept = {"mission", "tuning", "battery", "host"}
+    kept = {"mission", "tuning", "battery", "host", "constraints", "aiding"}
     for name in kept:
         assert getattr(after, name) is getattr(counted, name)
     assert after.kept.source is counted.mission.safe_set

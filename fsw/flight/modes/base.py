@@ -71,6 +71,7 @@ class CommandContext:
     yaw_rate: float  # rad/s, at most
     acceleration: float  # m/s^2, of a generated setpoint
     failures_allowed: bool = False  # to be injected
+    rests: bool = True  # it lies or stands still
 
 
 @dataclass(frozen=True, slots=True)
