@@ -13,6 +13,7 @@ from typing import Any, ParamSpec, TypeVar, cast
 
 import numba
 import numpy as np
+from llvmlite.binding import get_host_cpu_name
 from numba.extending import register_jitable
 from numpy.typing import NDArray
 
@@ -65,7 +66,8 @@ def note_compiled(what: str, directory: Path | None = None) -> None:
 
 
 def _mark(cache: Path, what: str) -> Path:
-    return cache / f"{what}.complete"
+    # numba keeps what it compiled by its own version and processor.
+    return cache / f"{what}-{numba.__version__}-{get_host_cpu_name()}.complete"
 
 
 def compiled(kernel: Callable[P, R]) -> Callable[P, R]:

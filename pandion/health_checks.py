@@ -197,7 +197,7 @@ def compile_cache() -> Check:
         found = f"{', '.join(closed)} cannot be written: every flight would compile for a minute"
         return Check("compile cache", WARN, found, remedy)
     if due:
-        return Check("compile cache", OK, "empty: the first flight compiles for a minute")
+        return Check("compile cache", OK, "not complete: the first flight compiles for a minute")
     return Check("compile cache", OK, "the kernels are compiled")
 
 

@@ -2,8 +2,9 @@
 
 It is how an operator says that what had failed is well again. As after a start of the process,
 nothing is known of actuators, estimate and modes, and a termination is over. What the ground has
-sent stays: tuning, safe set, fence, mission and rally points. So do the battery's charge and the
-counts of the flight.
+uploaded stays: tuning, safe set, fence, mission and rally points. So do the battery's charge and
+the counts of the flight. Home, speed, region of interest, a mode chosen before arming and
+setpoints do not.
 """
 
 from __future__ import annotations

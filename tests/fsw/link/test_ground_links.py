@@ -8,6 +8,7 @@ import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -18,7 +19,7 @@ from fsw.link.services.time_service import TimeService
 from fsw.link.udp_endpoint import LinkError, OpenEndpoint
 from fsw.link.wire import message_ids as ids
 from fsw.link.wire.outgoing import ServiceOutput
-from fsw.signals import CommandAck
+from fsw.signals import CommandAck, MissionProgress
 from messages.frames import Frame, FrameWriter, split
 from tests.fsw.link.ground import Ground, ground_station
 from tests.fsw.link.snapshots import outputs_at
@@ -112,6 +113,19 @@ def test_a_service_is_asked_once_a_slot_and_every_tick_after_a_question() -> Non
         before = service.polls
         gcs.fly(500)
         assert service.polls - before == pytest.approx(100, abs=4)
+
+
+def test_each_step_of_a_mission_is_asked_about_in_its_own_tick() -> None:
+    service = Counting()
+    with ground_station(services=(service,)) as gcs:
+        gcs.fly(50)
+        for current in range(1, 5):
+            t_us, before = 2_000 * gcs.ticks, service.polls
+            said = outputs_at(t_us)
+            progress = MissionProgress(total=5, current=current)
+            snapshot = replace(said.snapshot, mission=progress)
+            gcs.links.publish(replace(said, snapshot=snapshot))
+            assert service.polls == before + 1
 
 
 def test_between_ticks_the_time_is_told_within_a_millisecond(
