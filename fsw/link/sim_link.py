@@ -14,6 +14,7 @@ Stamps on the wire are of the sensors' clock, all others of the vehicle's time: 
 from __future__ import annotations
 
 import math
+from collections import deque
 from enum import Enum
 from typing import Final, cast
 
@@ -52,6 +53,7 @@ from messages.udp import PeerSocket
 
 PATIENCE_S: Final = 0.2  # one wait for a datagram; also the interval of announcements
 
+_ANSWERS: Final = 32  # steps with answers that are remembered: more than can be late or repeated
 _SHUTDOWN: Final = 246  # MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN
 _POWER_OFF: Final = 2.0  # its second parameter here: shut the autopilot down
 _ACCEPTED: Final = 0  # MAV_RESULT
@@ -117,6 +119,7 @@ class SimLink:
         self._steps = SensorClock(
             facts.tick_period_us, clock, self.notices.append, inbox.accept_clock_jump
         )
+        self._answered_in = deque[tuple[int, int]](maxlen=_ANSWERS)  # stamps and numbers of steps
         self._early: list[Sample] = []  # of the next step, which had no room for them
         self._answer: tuple[int, list[bytes]] = (-1, [])  # with the stamp of its step
         self._acks: list[CommandAck] = []
@@ -229,9 +232,9 @@ class SimLink:
             odometry = payloads.get(message_ids.ODOMETRY)
             arm = payloads.get(message_ids.ARM_JOINT_STATE)
             sensors = self._new(number, odometry, arm, barrier)
+        if message_ids.COMMAND_ACK in payloads:
+            self._note_answers((int(barrier[0]), number), frames)
         if sensors is not None:
-            if message_ids.COMMAND_ACK in payloads:
-                self._note_answers(frames)
             battery = payloads.get(message_ids.BATTERY_STATUS)
             reading = None if battery is None else battery_reading(battery)
             if reading is not None:
@@ -241,8 +244,14 @@ class SimLink:
                     self._inbox.accept(frame, _source(frame))
         return sensors
 
-    def _note_answers(self, frames: list[Frame]) -> None:
-        """What the simulator says about commands that were routed to it."""
+    def _note_answers(self, step: tuple[int, int], frames: list[Frame]) -> None:
+        """What the simulator says about commands that were routed to it, once for each ``step``.
+
+        A datagram that another has overtaken brings an answer all the same.
+        """
+        if step in self._answered_in:
+            return
+        self._answered_in.append(step)
         self.notices += status_text.joined(frames)
         for frame in frames:
             if frame.message_id == message_ids.COMMAND_ACK:

@@ -548,6 +548,19 @@ def test_a_fault_is_asked_for_in_the_name_of_its_sender_and_the_answer_comes_bac
     assert math.isnan(simulation.sense().gyro_B[0])
 
 
+@pytest.mark.parametrize("lockstep", [True, False])
+def test_an_answer_of_the_simulator_is_taken_late_and_once(wire: Wire, lockstep: bool) -> None:
+    flight = Flight(wire, lockstep=lockstep)
+    answer = FrameWriter(1, 200).frame(ids.COMMAND_ACK, 420, 0, 0, 0, 245, 190)
+    late = answer + flight.datagram(1_004_000)
+    if not lockstep:
+        flight.step(1_006_000)  # has overtaken it
+    for _ in range(2):  # by a network that doubles it, or because the vehicle's answer was lost
+        wire.send(late)
+        flight.take()
+    assert wire.link.routed_acks == [CommandAck(420, 0, 245, 190)]
+
+
 @pytest.mark.parametrize("number", [NAN, math.inf, -1.0, 0.5, 256.0, 1e30])
 @pytest.mark.parametrize("place", range(3))
 def test_the_simulator_passes_over_a_fault_of_no_number(
